@@ -1,0 +1,74 @@
+/* The public C API of Lambert: open a store, apply its transport operator (emission in, radiosity out).
+ * Knows nothing of how an operator was built, nor of HTTP. */
+#ifndef LAMBERT_H
+#define LAMBERT_H
+
+#include <stddef.h>
+
+/* Every status and its text, once. Any status but LAM_OK leaves outputs untouched. */
+#define LAM_STATUS_LIST(X)                                                                                   \
+    X(LAM_OK, "done")                                                                                        \
+    X(LAM_ERR_ARGUMENT, "bad argument")                                                                      \
+    X(LAM_ERR_MEMORY, "not enough memory")                                                                   \
+    X(LAM_ERR_IO, "cannot read or write")                                                                    \
+    X(LAM_ERR_FORMAT, "not a file of this format")                                                           \
+    X(LAM_ERR_VERSION, "another version of the format")                                                      \
+    X(LAM_ERR_DAMAGED, "damaged file")                                                                       \
+    X(LAM_ERR_NUMERIC, "numerically impossible")                                                             \
+    X(LAM_ERR_UNSUPPORTED, "not supported yet")                                                              \
+    X(LAM_ERR_CANCELLED, "cancelled")                                                                        \
+    X(LAM_ERR_INTERNAL, "internal error")
+
+#define LAM_STATUS_ENUM(code, text) code,
+typedef enum lam_status { LAM_STATUS_LIST(LAM_STATUS_ENUM) } lam_status;
+#undef LAM_STATUS_ENUM
+
+/* What went wrong, in one line that names the object, the value and the limit. Owned by the caller. */
+typedef struct lam_error {
+    lam_status status;
+    char message[480];
+} lam_error;
+
+/* The text of a status; never NULL, static. */
+const char *lam_status_text(lam_status status);
+
+/* Radiosity B, irradiance H (all that is received) or indirect light B - E - rho H0; all in the unit of E. */
+typedef enum lam_quantity { LAM_RADIOSITY, LAM_IRRADIANCE, LAM_INDIRECT } lam_quantity;
+
+/* A transport operator: immutable once open, so any number of threads may apply it. */
+typedef struct lam_operator lam_operator;
+
+/* Opens the store at path and loads its operator; the caller closes it with lam_operator_close.
+ * Errors: LAM_ERR_IO, LAM_ERR_FORMAT, LAM_ERR_VERSION, LAM_ERR_DAMAGED, LAM_ERR_MEMORY, LAM_ERR_UNSUPPORTED.
+ * One thread at a time may open stores. */
+lam_status lam_operator_open(const char *path, lam_operator **op, lam_error *error);
+
+/* Frees an operator; NULL is allowed. */
+void lam_operator_close(lam_operator *op);
+
+/* Elements n, channels C, and the bytes of operator that a solve reads. */
+size_t lam_operator_elements(const lam_operator *op);
+size_t lam_operator_channels(const lam_operator *op);
+size_t lam_operator_bytes(const lam_operator *op);
+
+/* The contract's name of its kind ("low_rank", ...); owned by the operator. */
+const char *lam_operator_kind(const lam_operator *op);
+
+/* Bytes of work area that lam_operator_apply and its adjoint need for n_rhs vectors; 0 when that overflows.
+ */
+size_t lam_operator_work_bytes(const lam_operator *op, size_t n_rhs);
+
+/* out = quantity(M~ E) for a batch.
+ * E and out are [n_rhs][C][n] in mesh order and must not overlap. work holds work_bytes, at least what
+ * lam_operator_work_bytes says, aligned as malloc does; its content is lost. Allocates nothing.
+ * A vector's bits do not depend on the batch it is in.
+ * Cost: O(nk) a vector for a low-rank operator. Errors: LAM_ERR_ARGUMENT. */
+lam_status lam_operator_apply(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
+                              float *out, void *work, size_t work_bytes, lam_error *error);
+
+/* w = (d quantity / d E)^T g for a batch: the transpose of lam_operator_apply, same shapes, same rules. */
+lam_status lam_operator_apply_adjoint(const lam_operator *op, size_t n_rhs, lam_quantity quantity,
+                                      const float *g, float *w, void *work, size_t work_bytes,
+                                      lam_error *error);
+
+#endif
