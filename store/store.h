@@ -1,0 +1,99 @@
+/* A store file: named typed arrays and attributes in HDF5, sealed once, then read only.
+ * The only user of <hdf5.h>; knows no operator kind. Names are HDF5 paths ("/mesh/area").
+ * One thread at a time may call into a store. */
+#ifndef LAMBERT_STORE_STORE_H
+#define LAMBERT_STORE_STORE_H
+
+#include "lambert/lambert.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define STORE_VERSION 1
+#define STORE_MAX_RANK 4
+
+typedef struct store store;
+
+typedef enum store_type { STORE_F32, STORE_F64, STORE_U32, STORE_U64 } store_type;
+
+/* Bytes of one value of a type. */
+size_t store_type_size(store_type type);
+
+/* --- writing ---------------------------------------------------------------------------------------- */
+
+/* Starts a store that will become path: a hidden partial file beside it, created exclusively.
+ * Groups are made as arrays and attributes name them. Errors: LAM_ERR_IO (names path), LAM_ERR_MEMORY. */
+lam_status store_create(const char *path, store **out, lam_error *error);
+
+/* Writes one whole array, row-major, contiguous and aligned; rank 1 to STORE_MAX_RANK. A dimension may be 0.
+ */
+lam_status store_write(store *s, const char *name, store_type type, int rank, const size_t *dims,
+                       const void *data, lam_error *error);
+
+/* Writes an array of UTF-8 texts (fixed length, zero padded). */
+lam_status store_write_texts(store *s, const char *name, size_t count, const char *const *texts,
+                             lam_error *error);
+
+/* Sets an attribute of the group or dataset object ("/" for the root); makes the group when it is missing. */
+lam_status store_set_text(store *s, const char *object, const char *name, const char *text, lam_error *error);
+lam_status store_set_number(store *s, const char *object, const char *name, double value, lam_error *error);
+lam_status store_set_integer(store *s, const char *object, const char *name, int64_t value, lam_error *error);
+
+/* The path of the partial file, for a signal handler that must unlink it; owned by s. NULL for a store that
+ * was opened. */
+const char *store_partial_path(const store *s);
+
+/* Adds format, version, created and /checksum, flushes to the disk, renames onto path (an older file is
+ * replaced as a whole) and frees s, whatever the outcome; on an error nothing is left behind.
+ * Errors: LAM_ERR_IO (a full disk among them; names path). */
+lam_status store_seal(store *s, lam_error *error);
+
+/* Abandons a store being written, or closes one that was opened; NULL is allowed. */
+void store_close(store *s);
+
+/* --- reading ---------------------------------------------------------------------------------------- */
+
+/* Opens read only and checks that it is a sealed store of this version.
+ * Errors: LAM_ERR_IO, LAM_ERR_FORMAT (foreign or truncated), LAM_ERR_VERSION, LAM_ERR_DAMAGED. */
+lam_status store_open(const char *path, store **out, lam_error *error);
+
+/* Reads every dataset and compares it with /checksum; LAM_ERR_DAMAGED names the dataset and its MiB. */
+lam_status store_verify(store *s, lam_error *error);
+
+/* The path it was opened or created with; owned by s. */
+const char *store_path(const store *s);
+
+/* Whether there is a group or dataset of this name. */
+bool store_has(store *s, const char *name);
+
+/* Type and shape of an array. LAM_ERR_FORMAT when it is missing or of a type that is not ours. */
+lam_status store_array_info(store *s, const char *name, store_type *type, int *rank, size_t *dims,
+                            lam_error *error);
+
+/* Reads one array whole into fresh memory (*data, freed by the caller with free) and checks it against its
+ * checksum. It must have this type, this rank, and these dims where they are not SIZE_MAX; a SIZE_MAX is
+ * replaced by what was found. Sizes are compared with the file's real size before anything is allocated.
+ * Errors: LAM_ERR_FORMAT, LAM_ERR_DAMAGED, LAM_ERR_MEMORY; each names the path and the dataset. */
+lam_status store_read(store *s, const char *name, store_type type, int rank, size_t *dims, void **data,
+                      lam_error *error);
+
+/* Reads texts into one block: *texts is an array of *count pointers, freed by the caller with one free(). */
+lam_status store_read_texts(store *s, const char *name, size_t *count, char ***texts, lam_error *error);
+
+/* Attributes; LAM_ERR_FORMAT when missing or of another type. A text is freed by the caller. */
+lam_status store_get_text(store *s, const char *object, const char *name, char **text, lam_error *error);
+lam_status store_get_number(store *s, const char *object, const char *name, double *value, lam_error *error);
+lam_status store_get_integer(store *s, const char *object, const char *name, int64_t *value,
+                             lam_error *error);
+bool store_has_attribute(store *s, const char *object, const char *name);
+
+/* Calls visit for every attribute of object, sorted by name: text is NULL for a number. */
+typedef void store_visit(void *context, const char *name, const char *text, double number);
+lam_status store_each_attribute(store *s, const char *object, store_visit *visit, void *context,
+                                lam_error *error);
+
+/* Bytes of all datasets below a group, as stored. */
+lam_status store_group_bytes(store *s, const char *group, uint64_t *bytes, lam_error *error);
+
+#endif

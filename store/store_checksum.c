@@ -1,0 +1,249 @@
+/* Checksums: XXH3 of every MiB of every array, and one over all of these. */
+#include "store/store_private.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <xxhash.h>
+
+static size_t count_pieces(size_t bytes) {
+    return bytes / STORE_PIECE + (bytes % STORE_PIECE != 0);
+}
+
+static size_t piece_size(size_t bytes, size_t piece) {
+    size_t rest = bytes - piece * STORE_PIECE;
+    return rest < STORE_PIECE ? rest : STORE_PIECE;
+}
+
+/* --- the table -------------------------------------------------------------------------------------------
+ */
+
+void store_sums_free(store_sums *sums) {
+    for (size_t i = 0; i < sums->count; i++) {
+        free(sums->entries[i].name);
+        free(sums->entries[i].pieces);
+    }
+    free(sums->entries);
+    *sums = (store_sums){0};
+}
+
+/* Where name is, or belongs. */
+static size_t sums_place(const store_sums *sums, const char *name) {
+    size_t low = 0, high = sums->count;
+    while (low < high) {
+        size_t middle = low + (high - low) / 2;
+        if (strcmp(sums->entries[middle].name, name) < 0)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+const store_sum *store_sums_find(const store_sums *sums, const char *name) {
+    size_t at = sums_place(sums, name);
+    return at < sums->count && strcmp(sums->entries[at].name, name) == 0 ? &sums->entries[at] : NULL;
+}
+
+/* Takes pieces over when it succeeds. */
+static lam_status sums_insert(store_sums *sums, const char *name, size_t n_pieces, uint64_t *pieces,
+                              lam_error *error) {
+    size_t at = sums_place(sums, name), size = strlen(name) + 1;
+    if (sums->count == sums->capacity) {
+        size_t capacity = 2 * sums->capacity + 16;
+        store_sum *entries = memory_allocate(capacity, sizeof *entries, "checksums", error);
+        if (entries == NULL) return LAM_ERR_MEMORY;
+        if (sums->count > 0) memcpy(entries, sums->entries, sums->count * sizeof *entries);
+        free(sums->entries);
+        sums->entries = entries;
+        sums->capacity = capacity;
+    }
+    char *copy = memory_allocate(size, 1, "checksums", error);
+    if (copy == NULL) return LAM_ERR_MEMORY;
+    memcpy(copy, name, size);
+    memmove(sums->entries + at + 1, sums->entries + at, (sums->count - at) * sizeof *sums->entries);
+    sums->entries[at] = (store_sum){copy, n_pieces, pieces};
+    sums->count++;
+    return LAM_OK;
+}
+
+lam_status store_sums_add(store_sums *sums, const char *name, const void *data, size_t bytes,
+                          lam_error *error) {
+    size_t n_pieces = count_pieces(bytes);
+    uint64_t *pieces = memory_allocate(n_pieces, sizeof *pieces, name, error);
+    if (pieces == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < n_pieces; i++)
+        pieces[i] = XXH3_64bits((const char *)data + i * STORE_PIECE, piece_size(bytes, i));
+    lam_status status = sums_insert(sums, name, n_pieces, pieces, error);
+    if (status != LAM_OK) free(pieces);
+    return status;
+}
+
+/* XXH3 over, for each entry in order, its name with the NUL and its pieces; as 16 hex digits and a NUL. */
+static lam_status sums_digest(const store_sums *sums, char digest[17], lam_error *error) {
+    size_t size = 0, at = 0;
+    for (size_t i = 0; i < sums->count; i++)
+        size += strlen(sums->entries[i].name) + 1 + sums->entries[i].n_pieces * sizeof(uint64_t);
+    char *all = memory_allocate(size, 1, "checksums", error);
+    if (all == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < sums->count; i++) {
+        const store_sum *sum = &sums->entries[i];
+        size_t name_size = strlen(sum->name) + 1, bytes = sum->n_pieces * sizeof(uint64_t);
+        memcpy(all + at, sum->name, name_size);
+        memcpy(all + at + name_size, sum->pieces, bytes);
+        at += name_size + bytes;
+    }
+    snprintf(digest, 17, "%016" PRIx64, (uint64_t)XXH3_64bits(all, size));
+    free(all);
+    return LAM_OK;
+}
+
+/* --- /checksum -------------------------------------------------------------------------------------------
+ */
+
+lam_status store_sums_write(store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    char digest[17];
+    TRY(store_set_integer(s, "/checksum", "piece_bytes", (int64_t)STORE_PIECE, error));
+    for (size_t i = 0; i < s->sums.count; i++) {
+        char name[STORE_NAME_SIZE];
+        const store_sum *sum = &s->sums.entries[i];
+        snprintf(name, sizeof name, "/checksum%s", sum->name);
+        TRY(store_write_plain(s, name, H5T_STD_U64LE, 1, &sum->n_pieces, sum->pieces, error));
+    }
+    TRY(sums_digest(&s->sums, digest, error));
+    TRY(store_set_text(s, "/checksum", "xxh3", digest, error));
+done:
+    return status;
+}
+
+typedef struct sums_walk {
+    store *s;
+    lam_status status;
+    lam_error *error;
+} sums_walk;
+
+/* Reads one dataset below /checksum into the table. */
+static herr_t sums_visit(hid_t group, const char *relative, const H5L_info_t *info, void *context) {
+    sums_walk *walk = context;
+    store *s = walk->s;
+    lam_error *error = walk->error;
+    lam_status status = LAM_OK;
+    char name[STORE_NAME_SIZE];
+    store_array array = {.id = -1};
+    uint64_t *pieces = NULL;
+    H5I_type_t kind = H5I_BADID;
+    size_t depth = 1;
+    for (const char *c = relative; *c != '\0'; c++) depth += *c == '/';
+    int length = snprintf(name, sizeof name, "/checksum/%s", relative);
+    if (info->type != H5L_TYPE_HARD || length >= (int)sizeof name || depth > STORE_MAX_DEPTH)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /checksum/%.80s is a link or lies too deep", s->path, relative);
+    hid_t object = H5Oopen(group, relative, H5P_DEFAULT);
+    if (object < 0) TRY(store_hdf5_failure(s, name, "read", error));
+    kind = H5Iget_type(object);
+    H5Oclose(object);
+    if (kind == H5I_GROUP) goto done;
+    TRY(store_array_open(s, name, &array, error));
+    if (array.is_text || array.type != STORE_U64 || array.rank != 1)
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s is not a list of checksums", s->path, name);
+    pieces = memory_allocate(array.bytes, 1, name, error);
+    if (pieces == NULL) TRY(LAM_ERR_MEMORY);
+    if (!store_file_read(&s->file, array.offset, pieces, array.bytes))
+        TRY(store_hdf5_failure(s, name, "read", error));
+    TRY(sums_insert(&s->sums, name + strlen("/checksum"), array.dims[0], pieces, error));
+    pieces = NULL;
+done:
+    free(pieces);
+    store_array_close(&array);
+    walk->status = status;
+    return status == LAM_OK ? 0 : -1;
+}
+
+lam_status store_sums_read(store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *expected = NULL, digest[17];
+    sums_walk walk = {s, LAM_OK, error};
+    hid_t group = H5Gopen2(s->h5, "/checksum", H5P_DEFAULT);
+    if (group < 0 || H5Lvisit(group, H5_INDEX_NAME, H5_ITER_INC, sums_visit, &walk) < 0) {
+        TRY(walk.status);
+        TRY(store_hdf5_failure(s, "/checksum", "read", error));
+    }
+    TRY(sums_digest(&s->sums, digest, error));
+    TRY(store_get_text(s, "/checksum", "xxh3", &expected, error));
+    if (strcmp(digest, expected) != 0)
+        FAIL(error, LAM_ERR_DAMAGED, "%s: /checksum is damaged; make the store again", s->path);
+done:
+    if (group >= 0) H5Gclose(group);
+    free(expected);
+    return status;
+}
+
+/* --- comparing -------------------------------------------------------------------------------------------
+ */
+
+lam_status store_array_load(store *s, const char *name, const store_array *array, void *data,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    char *scratch = NULL;
+    const store_sum *sum = store_sums_find(&s->sums, name);
+    if (sum == NULL || sum->n_pieces != count_pieces(array->bytes))
+        FAIL(error, LAM_ERR_DAMAGED, "%s: %s has no checksum of its size; make the store again", s->path,
+             name);
+    if (data == NULL) {
+        scratch = memory_allocate(array->bytes < STORE_PIECE ? array->bytes : STORE_PIECE, 1, name, error);
+        if (scratch == NULL) TRY(LAM_ERR_MEMORY);
+    }
+    for (size_t i = 0; i < sum->n_pieces; i++) {
+        size_t start = i * STORE_PIECE, size = piece_size(array->bytes, i);
+        char *piece = data == NULL ? scratch : (char *)data + start;
+        if (!store_file_read(&s->file, array->offset + start, piece, size))
+            TRY(store_hdf5_failure(s, name, "read", error));
+        if (XXH3_64bits(piece, size) != sum->pieces[i])
+            FAIL(error, LAM_ERR_DAMAGED, "%s: %s is damaged in MiB %zu of %zu; make the store again", s->path,
+                 name, i + 1, sum->n_pieces);
+    }
+done:
+    free(scratch);
+    return status;
+}
+
+lam_status store_verify(store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    store_mute mute = store_mute_begin();
+    store_array array = {.id = -1};
+    /* Every array is in the table: store_open has seen to it. */
+    for (size_t i = 0; i < s->sums.count; i++) {
+        const char *name = s->sums.entries[i].name;
+        TRY(store_array_open(s, name, &array, error));
+        TRY(store_array_load(s, name, &array, NULL, error));
+        store_array_close(&array);
+    }
+done:
+    store_array_close(&array);
+    store_mute_end(&mute);
+    return status;
+}
+
+lam_status store_group_bytes(store *s, const char *group, uint64_t *bytes, lam_error *error) {
+    lam_status status = LAM_OK;
+    store_mute mute = store_mute_begin();
+    store_array array = {.id = -1};
+    uint64_t total = 0;
+    size_t length = strlen(group);
+    if (store_exists(s, group) == 0) FAIL(error, LAM_ERR_FORMAT, "%s: has no %s", s->path, group);
+    if (length == 1) length = 0; /* "/": every name goes on with a slash */
+    for (size_t i = 0; i < s->sums.count; i++) {
+        const char *name = s->sums.entries[i].name;
+        if (strncmp(name, group, length) != 0 || name[length] != '/') continue;
+        TRY(store_array_open(s, name, &array, error));
+        total += array.bytes;
+        store_array_close(&array);
+    }
+    *bytes = total;
+done:
+    store_array_close(&array);
+    store_mute_end(&mute);
+    return status;
+}

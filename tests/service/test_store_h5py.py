@@ -1,0 +1,435 @@
+"""A store as others see it: read with h5py and nothing of ours, as store/FORMAT.md says."""
+
+import ctypes
+import ctypes.util
+import datetime
+import functools
+import os
+import pathlib
+import re
+import subprocess
+import tempfile
+import unittest
+
+import h5py
+import numpy as np
+
+LAMBERT = os.environ["LAMBERT"]
+FORMAT = pathlib.Path(__file__).resolve().parents[2] / "store" / "FORMAT.md"
+PIECE = 2**20
+ROUND = 2.0**-24  # of one operation in single precision, relative
+
+# A cube of one metre seen from inside; one wall is black, a quarter of the ceiling's material glows.
+CUBE = """mtllib cube.mtl
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+v 0 0 1
+v 1 0 1
+v 1 1 1
+v 0 1 1
+o Böden
+usemtl floor
+f 1 2 3 4
+o ceiling
+usemtl lamp
+f 8 7 6 5
+o left
+usemtl red
+f 4 8 5 1
+o right
+usemtl white
+f 2 6 7 3
+o front
+usemtl black
+f 1 5 6 2
+o back
+usemtl white
+f 3 7 8 4
+"""
+MATERIALS = """newmtl floor
+Kd 0.5 0.5 0.5
+newmtl lamp
+Kd 0.7 0.7 0.7
+Ke 2 2 2
+newmtl red
+Kd {red}
+newmtl white
+Kd 0.75 0.75 0.75
+newmtl black
+Kd 0 0 0
+"""
+
+
+def run(*arguments):
+    return subprocess.run([LAMBERT, *map(str, arguments)], capture_output=True, text=True, timeout=600)
+
+
+def datasets(store, below="/"):
+    found = {}
+    store[below].visititems(
+        lambda path, item: found.update({"/" + path: item}) if isinstance(item, h5py.Dataset) else None
+    )
+    return found
+
+
+def load_xxhash():
+    library = ctypes.CDLL(ctypes.util.find_library("xxhash"))
+    library.XXH3_64bits.restype = ctypes.c_uint64
+    library.XXH3_64bits.argtypes = [ctypes.c_char_p, ctypes.c_size_t]
+    return lambda data: library.XXH3_64bits(bytes(data), len(data))
+
+
+class Store:
+    """What FORMAT.md says of an operator, in numpy, in double."""
+
+    def __init__(self, path):
+        with h5py.File(path, "r") as f:
+            self.reflectance = f["mesh/reflectance"][()].astype(float)
+            self.area = f["mesh/area"][()]
+            self.channels, self.n = self.reflectance.shape
+            operator = f["operator"]
+            self.kind = operator.attrs["kind"].decode()
+            self.form = operator.attrs["form"].decode() if "form" in operator.attrs else None
+            self.epsilon = operator.attrs.get("epsilon")
+            self.order = operator["order"][()] if "order" in operator else np.arange(self.n)
+            self.arrays = {name: operator[name][()].astype(float) for name in operator if name != "order"}
+            rows = f["form_factors"]
+            self.F = np.zeros((self.n, self.n))
+            indptr, indices, data = (rows[name][()] for name in ("indptr", "indices", "data"))
+            for i in range(self.n):
+                span = slice(int(indptr[i]), int(indptr[i + 1]))
+                self.F[i, indices[span]] = data[span]
+
+    def bounced(self, E, magnitude=False):
+        """The operator's row sums of bounced light; with magnitude, of the sizes of all terms in them."""
+        size = np.abs if magnitude else lambda x: x
+        sign = 1 if magnitude else -1
+        result = np.zeros_like(E)
+        a = {name: size(array) for name, array in self.arrays.items()}
+        for c in range(self.channels):
+            e = size(E[c, self.order])
+            if self.form == "folded":
+                row = sign * (a["Y"] @ (a["V"].T @ e))
+            elif self.form == "factored":
+                row = a["U"] @ (a["core"][c] @ (a["V"].T @ e))
+            else:
+                row = a["M"][c] @ e + (e if magnitude else -e)
+            result[c, self.order] = row
+        return result
+
+    def answer(self, E):
+        """Radiosity and irradiance."""
+        row = self.bounced(E)
+        rho, black = self.reflectance, self.reflectance == 0
+        if self.form == "factored":
+            return E + rho * row, row
+        return np.where(black, E, E + row), row / np.where(black, 1, rho)
+
+    def rounding(self, E):
+        """How far single precision may be from it: an operation rounds by ROUND of what it adds, and no sum
+        here has more terms than n for each of at most three products."""
+        return 3 * (self.n + 2) * ROUND * (np.abs(E) + self.bounced(E, magnitude=True))
+
+    def reference(self, E):
+        """(1 - rho F) B = E, channel by channel."""
+        unit = np.eye(self.n)
+        pairs = zip(self.reflectance, E)
+        return np.array([np.linalg.solve(unit - rho[:, None] * self.F, e) for rho, e in pairs])
+
+    def norm(self, x):
+        return np.sqrt(np.sum(self.area * x * x))
+
+
+def each_store(test):
+    """Runs a test for every store, all of them whatever fails."""
+
+    @functools.wraps(test)
+    def run_all(self):
+        for name, path in self.stores.items():
+            with self.subTest(store=name):
+                test(self, name, path)
+
+    return run_all
+
+
+class StoreTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        cls.root = pathlib.Path(cls.folder.name)
+        cls.stores = {}
+        cases = {
+            "folded": ("0.5 0.5 0.5", "low-rank"),
+            "factored": ("0.6 0.1 0.1", "low-rank"),
+            "exact": ("0.5 0.5 0.5", "exact"),
+            "exact_colour": ("0.6 0.1 0.1", "exact"),
+        }
+        for name, (red, method) in cases.items():
+            scene = cls.root / name
+            scene.mkdir()
+            (scene / "cube.obj").write_text(CUBE)
+            (scene / "cube.mtl").write_text(MATERIALS.format(red=red))
+            store = scene / "cube.h5"
+            made = run("precompute", scene / "cube.obj", "-o", store, "--method", method, "--subdivide", 2,
+                       "--epsilon", 0.05, "--rays", 4096, "--seed", 7, "--keep-form-factors", "--quiet")
+            if made.returncode != 0:
+                raise AssertionError(f"precompute {name}: exit {made.returncode}: {made.stderr}")
+            cls.stores[name] = store
+
+    def text(self, attributes, name):
+        value = attributes[name]
+        self.assertIsInstance(value, bytes, name)
+        return value.decode()
+
+    @each_store
+    def test_root(self, name, path):
+        with h5py.File(path, "r") as f:
+            self.assertEqual(self.text(f.attrs, "format"), "lambert")
+            self.assertEqual(f.attrs["version"], 1)
+            self.assertEqual(f.attrs["version"].dtype, np.dtype("<i8"))
+            self.assertEqual(self.text(f.attrs, "name"), "cube")
+            self.assertEqual(f.attrs["seed"], 7)
+            self.assertIn("lambert", self.text(f.attrs, "tool"))
+            self.assertIn("precompute", self.text(f.attrs, "command"))
+            self.assertEqual(f.attrs["unit"], 1.0)
+            created = self.text(f.attrs, "created")
+            self.assertRegex(created, r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$")
+            made = datetime.datetime.strptime(created, "%Y-%m-%dT%H:%M:%S%z")
+            self.assertLess(abs(datetime.datetime.now(datetime.timezone.utc) - made),
+                            datetime.timedelta(days=1))
+
+    @each_store
+    def test_every_dataset_is_documented(self, name, path):
+        n = 6 * 16
+        with h5py.File(path, "r") as f:
+            C = 3 if name in ("factored", "exact_colour") else 1
+            v = f["mesh/vertices"].shape[0]
+            g = f["mesh/group_names"].shape[0]
+            nnz = f["form_factors/data"].shape[0]
+            k = int(f["operator"].attrs.get("rank", 0))
+            expected = {
+                "/mesh/vertices": ((v, 3), "<f8"), "/mesh/elements": ((n, 4), "<u4"),
+                "/mesh/area": ((n,), "<f8"), "/mesh/normal": ((n, 3), "<f4"),
+                "/mesh/reflectance": ((C, n), "<f4"), "/mesh/emission": ((C, n), "<f4"),
+                "/mesh/group": ((n,), "<u4"), "/mesh/row_sums": ((n,), "<f8"),
+                "/form_factors/indptr": ((n + 1,), "<u8"), "/form_factors/indices": ((nnz,), "<u4"),
+                "/form_factors/data": ((nnz,), "<f4"), "/form_factors/leaving": ((n,), "<f8"),
+                "/form_factors/absorbed": ((n,), "<f8"),
+            }
+            if name == "folded":
+                expected.update({"/operator/Y": ((n, k), "<f4"), "/operator/V": ((n, k), "<f4")})
+            elif name == "factored":
+                expected.update({"/operator/U": ((n, k), "<f4"), "/operator/V": ((n, k), "<f4"),
+                                 "/operator/core": ((C, k, k), "<f4")})
+            else:
+                expected.update({"/operator/M": ((C, n, n), "<f4")})
+            if "order" in f["operator"]:
+                expected["/operator/order"] = ((n,), "<u4")
+            found = {p: (d.shape, d.dtype.str) for p, d in datasets(f).items()
+                     if not p.startswith("/checksum/")}
+            names = found.pop("/mesh/group_names")
+            self.assertEqual(names[0], (g,))
+            self.assertRegex(names[1], r"^\|S\d+$")
+            self.assertEqual(found, expected)
+            for dataset in datasets(f).values():
+                self.assertIsNone(dataset.chunks)
+                self.assertIsNone(dataset.compression)
+                if dataset.nbytes >= 4096:
+                    self.assertEqual(dataset.id.get_offset() % 4096, 0, dataset.name)
+
+    @each_store
+    def test_every_attribute_is_documented(self, name, path):
+        words = set(re.findall(r"`(\w+)`", FORMAT.read_text()))
+        figures = re.compile(r"(total|operator)_(relative|indirect)_(mean|std|max)")
+        with h5py.File(path, "r") as f:
+            found = set(f.attrs)
+            f.visititems(lambda _, item: found.update(item.attrs))
+        self.assertGreater(len(found), 30)
+        self.assertEqual({a for a in found if not figures.fullmatch(a)} - words, set())
+
+    @each_store
+    def test_mesh(self, name, path):
+        with h5py.File(path, "r") as f:
+            mesh = f["mesh"]
+            names = [name.decode() for name in mesh["group_names"]]
+            self.assertEqual(sorted(names), sorted(["Böden", "ceiling", "left", "right", "front", "back"]))
+            for hash_name in ("geometry_hash", "source_hash"):
+                self.assertRegex(self.text(mesh.attrs, hash_name), r"^[0-9a-f]{32}$")
+            self.assertIn(self.text(mesh.attrs, "up"), "xyz")
+            self.assertEqual(mesh.attrs["two_sided"], 0)
+            # 16 squares on each face of the unit cube; .25 is exact in binary
+            np.testing.assert_allclose(mesh["area"][()], 1 / 16, rtol=1e-12)
+            corners = mesh["vertices"][()][mesh["elements"][()]]
+            np.testing.assert_allclose(
+                np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) * 16,
+                mesh["normal"][()], atol=1e-6)
+            group = mesh["group"][()]
+            floor = group == names.index("Böden")
+            self.assertEqual(floor.sum(), 16)
+            np.testing.assert_allclose(mesh["normal"][()][floor], [[0, 0, 1]] * 16, atol=1e-6)
+            np.testing.assert_allclose(mesh["reflectance"][()][:, floor], 0.5, rtol=1e-6)
+            lit = mesh["emission"][()] > 0
+            np.testing.assert_array_equal(lit, np.broadcast_to(group == names.index("ceiling"), lit.shape))
+            self.assertTrue((mesh["reflectance"][()][:, group == names.index("front")] == 0).all())
+
+    @each_store
+    def test_form_factors(self, name, path):
+        store = Store(path)
+        with h5py.File(path, "r") as f:
+            attributes = f["form_factors"].attrs
+            self.assertEqual(self.text(attributes, "method"), "rays")
+            self.assertEqual(self.text(attributes, "storage"), "rows")
+            self.assertEqual(attributes["rays"], 4096)
+            for number in ("closure_error", "reciprocity_error", "leaving_share", "absorbed_share",
+                           "repair_mean", "repair_max"):
+                self.assertGreaterEqual(attributes[number], 0, number)
+            self.assertIn("seed", attributes)
+            self.assertEqual(attributes["closed"], 1)
+            row_sums = f["mesh/row_sums"][()]
+            indptr = f["form_factors/indptr"][()]
+            self.assertEqual(indptr[0], 0)
+            self.assertEqual(indptr[-1], f["form_factors/data"].shape[0])
+        # the sum of up to n values rounded to single precision, each at most 1
+        np.testing.assert_allclose(store.F.sum(axis=1), row_sums, atol=store.n * ROUND)
+        np.testing.assert_allclose(store.F.sum(axis=1), 1, atol=1e-3)
+        flow = store.area[:, None] * store.F
+        np.testing.assert_allclose(flow, flow.T, atol=4 * ROUND * flow.max())
+
+    @each_store
+    def test_radiosity_is_that_of_the_formula(self, name, path):
+        """`lambert solve` answers what a reader of FORMAT.md computes."""
+        rng = np.random.default_rng(3)
+        store = Store(path)
+        self.assertEqual(store.kind, "exact" if name.startswith("exact") else "low_rank")
+        self.assertEqual(store.form, None if name.startswith("exact") else name)
+        E = np.where(rng.random((store.channels, store.n)) < 0.2,
+                     rng.random((store.channels, store.n)), 0).astype("<f4")
+        np.save(self.root / "E.npy", E)
+        B, H = store.answer(E.astype(float))
+        bound = store.rounding(E.astype(float))
+        small = np.where(store.reflectance == 0, 1, store.reflectance)
+        for quantity, expected, tolerance in (("radiosity", B, bound), ("irradiance", H, bound / small),
+                                              ("indirect", B - E, bound)):
+            out = self.root / "out.npy"
+            solved = run("solve", path, "--emission", self.root / "E.npy", "--quantity", quantity, "-o", out)
+            self.assertEqual(solved.returncode, 0, solved.stderr)
+            answer = np.load(out).astype(float).reshape(store.channels, store.n)
+            self.assertGreater(np.abs(answer).max(), 0)
+            worst = (np.abs(answer - expected) / tolerance).max()
+            self.assertLessEqual(worst, 1, quantity)
+
+    @each_store
+    def test_radiosity_is_that_of_the_form_factors(self, name, path):
+        """Exact: but for rounding. Low rank: within epsilon/(1 - max rho), area-weighted."""
+        store = Store(path)
+        E = np.zeros((store.channels, store.n))
+        E[:, 5] = 1
+        for emission in (E, np.ones_like(E)):
+            B, H = store.answer(emission)
+            reference = store.reference(emission)
+            if name.startswith("exact"):
+                # M is the inverse in double, rounded once; its own error is of the order of 1e-13
+                np.testing.assert_array_less(np.abs(B - reference), store.rounding(emission) + 1e-12)
+                np.testing.assert_allclose(H, [store.F @ b for b in reference], atol=1e-4)
+            else:
+                error = store.norm(B - reference) / store.norm(reference)
+                self.assertLess(error, store.epsilon / (1 - store.reflectance.max()))
+
+    @each_store
+    def test_errors_are_stored(self, name, path):
+        with h5py.File(path, "r") as f:
+            self.assertIn("single", f["error"])
+            for group in f["error"].values():
+                attributes = group.attrs
+                self.assertGreater(attributes["probes"], 0)
+                for kind in ("total", "operator"):
+                    for norm in ("relative", "indirect"):
+                        figures = [attributes[f"{kind}_{norm}_{what}"] for what in ("mean", "std", "max")]
+                        self.assertTrue(np.isfinite(figures).all())
+                        # the mean may pass the largest by rounding where all are equal
+                        self.assertLessEqual(figures[0], figures[2] * (1 + 1e-12))
+                for what in ("reference_noise", "negative_share", "energy_balance"):
+                    self.assertTrue(np.isfinite(attributes[what]), what)
+
+    @each_store
+    def test_checksums(self, name, path):
+        xxh3 = load_xxhash()
+        with h5py.File(path, "r") as f:
+            arrays = {p: d for p, d in datasets(f).items() if not p.startswith("/checksum/")}
+            sums = datasets(f, "/checksum")
+            self.assertEqual(sorted(arrays), sorted(sums))
+            self.assertEqual(f["checksum"].attrs["piece_bytes"], PIECE)
+            everything = b""
+            for array in sorted(arrays, key=str.encode):
+                raw = np.ascontiguousarray(arrays[array][()]).tobytes()
+                expected = [xxh3(raw[i : i + PIECE]) for i in range(0, len(raw), PIECE)]
+                self.assertEqual(sums[array].dtype.str, "<u8")
+                self.assertEqual(expected, [int(s) for s in sums[array][()]], array)
+                everything += array.encode() + b"\0" + sums[array][()].tobytes()
+            self.assertEqual(f"{xxh3(everything):016x}", self.text(f["checksum"].attrs, "xxh3"))
+
+    def test_python_of_the_documentation(self):
+        """The example in FORMAT.md, run as it stands there."""
+        examples = re.findall(r"```python\n(.*?)```", FORMAT.read_text(), re.S)
+        example = next(e for e in examples if "operator/Y" in e)
+        self.assertLessEqual(len(example.splitlines()), 10)
+        path = self.stores["folded"]
+        names = {}
+        exec(example.replace("STORE.h5", str(path)), names)
+        store = Store(path)
+        with h5py.File(path, "r") as f:
+            E = f["mesh/emission"][()].astype(float)
+        np.testing.assert_allclose(names["B"], store.answer(E)[0][0], rtol=1e-12)
+
+    def refused(self, path, *words):
+        for verb in ("info", "verify"):
+            answer = run(verb, path)
+            self.assertEqual(answer.returncode, 1, answer.stderr)
+            self.assertEqual(len(answer.stderr.strip().splitlines()), 1, answer.stderr)
+            for word in (str(path), *words):
+                self.assertIn(word, answer.stderr)
+
+    def copy(self, name):
+        path = self.root / f"{name}.h5"
+        path.write_bytes(self.stores["folded"].read_bytes())
+        return path
+
+    def test_another_version_is_refused(self):
+        path = self.copy("newer")
+        with h5py.File(path, "r+") as f:
+            f.attrs.modify("version", 2)
+        self.refused(path, "version 2", "version 1")
+
+    def test_foreign_files_are_refused(self):
+        path = self.root / "foreign.h5"
+        with h5py.File(path, "w") as f:
+            f["x"] = np.arange(9)
+        self.refused(path)
+        path.write_text("not HDF5\n" * 100)
+        self.refused(path)
+
+    def test_truncated_stores_are_refused(self):
+        path = self.copy("truncated")
+        size = path.stat().st_size
+        for length in (0, 47, 1000, size // 2, size - 1):
+            os.truncate(path, length)
+            self.refused(path)
+            path = self.copy("truncated")
+
+    def test_a_flipped_bit_is_found(self):
+        path = self.copy("flipped")
+        with h5py.File(path, "r") as f:
+            offset = f["operator/Y"].id.get_offset() + f["operator/Y"].nbytes // 2
+        content = bytearray(path.read_bytes())
+        content[offset] ^= 16
+        path.write_bytes(content)
+        answer = run("verify", path)
+        self.assertEqual(answer.returncode, 1)
+        self.assertIn("/operator/Y", answer.stdout + answer.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

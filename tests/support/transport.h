@@ -1,0 +1,311 @@
+/* Small transport problems whose operator is known in double, for every kind: what the contract test judges
+ * by. Everything here is dense, slow and obvious. */
+#ifndef LAMBERT_TESTS_TRANSPORT_H
+#define LAMBERT_TESTS_TRANSPORT_H
+
+#include "solver/operator/operator.h"
+
+#include <check.h>
+#include <float.h>
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The unit roundoff of single precision. */
+#define TRANSPORT_U (FLT_EPSILON / 2.0)
+
+/* An operator and what it should be. */
+typedef struct transport {
+    const char *name;
+    size_t n, n_channels, k;
+    float *reflectance; /* [C][n] */
+    double *P;          /* [C][n][n] bounced light, mesh order: what the kind must compute */
+    double *magnitude;  /* [C][n][n] the sum of the magnitudes of the products behind P */
+    double roundings;   /* how often each of those products is rounded at most, in units of u */
+    uint32_t *order;    /* [n] or NULL */
+    lam_operator *op;
+} transport;
+
+static inline double random_unit(uint64_t *state) {
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(*state >> 11) / 9007199254740992.0;
+}
+
+static inline void *test_allocate(size_t count, size_t size) {
+    void *memory = calloc(count + 1, size);
+    ck_assert_ptr_nonnull(memory);
+    return memory;
+}
+
+/* X := X^-1, [n][n], by Gauss-Jordan with row pivots. */
+static inline void invert(size_t n, double *X) {
+    double *inverse = test_allocate(n * n, sizeof *inverse);
+    for (size_t i = 0; i < n; i++) inverse[i * n + i] = 1;
+    for (size_t c = 0; c < n; c++) {
+        size_t pivot = c;
+        for (size_t i = c + 1; i < n; i++)
+            if (fabs(X[i * n + c]) > fabs(X[pivot * n + c])) pivot = i;
+        for (size_t j = 0; j < n; j++) {
+            double x = X[c * n + j], y = inverse[c * n + j];
+            X[c * n + j] = X[pivot * n + j];
+            X[pivot * n + j] = x;
+            inverse[c * n + j] = inverse[pivot * n + j];
+            inverse[pivot * n + j] = y;
+        }
+        double scale = 1 / X[c * n + c];
+        for (size_t j = 0; j < n; j++) {
+            X[c * n + j] *= scale;
+            inverse[c * n + j] *= scale;
+        }
+        for (size_t i = 0; i < n; i++) {
+            double factor = X[i * n + c];
+            if (i == c || factor == 0) continue;
+            for (size_t j = 0; j < n; j++) {
+                X[i * n + j] -= factor * X[c * n + j];
+                inverse[i * n + j] -= factor * inverse[c * n + j];
+            }
+        }
+    }
+    memcpy(X, inverse, n * n * sizeof *X);
+    free(inverse);
+}
+
+static inline double rho_or_one(float rho) {
+    return rho > 0 ? (double)rho : 1.0;
+}
+
+/* P = rho' F M with M = (I - R F)^-1: row i of F M is the irradiance, whatever rho_i is. */
+static inline void bounced_light(size_t n, const double *F, const float *rho, double *P) {
+    double *M = test_allocate(n * n, sizeof *M);
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++) M[i * n + j] = (i == j ? 1.0 : 0.0) - (double)rho[i] * F[i * n + j];
+    invert(n, M);
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++) {
+            double sum = 0;
+            for (size_t l = 0; l < n; l++) sum += F[i * n + l] * M[l * n + j];
+            P[i * n + j] = rho_or_one(rho[i]) * sum;
+        }
+    free(M);
+}
+
+/* Form factors G_ij / A_i of rank k with uneven areas and row sums up to .95, as U V^T, both rounded to
+ * single precision; every reflectance in (.05, .85), one element in six has none. */
+static inline void random_factors(size_t n, size_t k, float *U, float *V, uint64_t *state) {
+    double *A = test_allocate(n, sizeof *A), largest = 0;
+    double *column = test_allocate(k, sizeof *column);
+    for (size_t i = 0; i < n; i++) {
+        A[i] = 0.1 + 3 * random_unit(state);
+        for (size_t j = 0; j < k; j++) {
+            V[i * k + j] = random_unit(state) < 0.4 ? (float)random_unit(state) : 0.0f;
+            column[j] += (double)V[i * k + j];
+        }
+    }
+    for (size_t i = 0; i < n; i++) {
+        double sum = 0;
+        for (size_t j = 0; j < k; j++) sum += (double)V[i * k + j] * column[j] / A[i];
+        largest = fmax(largest, sum);
+    }
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < k; j++) U[i * k + j] = (float)(0.95 * (double)V[i * k + j] / A[i] / largest);
+    /* The same product from unlike factors, or the core would be symmetric and its transpose as good. */
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < k; j++) {
+            U[i * k + j] = ldexpf(U[i * k + j], (int)(j % 5) - 2);
+            V[i * k + j] = ldexpf(V[i * k + j], 2 - (int)(j % 5));
+        }
+    free(A);
+    free(column);
+}
+
+/* [C][n] in (.05, .85); one element in six has none. */
+static inline float *random_reflectance(size_t n, size_t n_channels, uint64_t *state) {
+    float *rho = test_allocate(n * n_channels, sizeof *rho);
+    for (size_t i = 0; i < n * n_channels; i++)
+        rho[i] = random_unit(state) < 1 / 6.0 ? 0.0f : (float)(0.05 + 0.8 * random_unit(state));
+    return rho;
+}
+
+/* Rows (and columns, when square) of x [n][columns] into position order; the caller frees. */
+static inline float *in_positions(const uint32_t *order, size_t n, size_t columns, bool square,
+                                  const float *x) {
+    float *y = test_allocate(n * columns, sizeof *y);
+    for (size_t p = 0; p < n; p++)
+        for (size_t j = 0; j < columns; j++)
+            y[p * columns + j] = x[(order ? order[p] : p) * columns + (square && order ? order[j] : j)];
+    return y;
+}
+
+static inline uint32_t *random_order(size_t n, uint64_t *state) {
+    uint32_t *order = test_allocate(n, sizeof *order);
+    for (size_t p = 0; p < n; p++) order[p] = (uint32_t)p;
+    for (size_t p = n; p > 1; p--) {
+        size_t other = (size_t)(random_unit(state) * (double)p);
+        uint32_t x = order[p - 1];
+        order[p - 1] = order[other];
+        order[other] = x;
+    }
+    return order;
+}
+
+/* A sum of count products in single precision: each is rounded when it is made and with every partial sum; at
+ * most 128 of them stand in one, 16 lanes are added, and the total is rounded once more. */
+static inline double sum_roundings(size_t count) {
+    return (count < 128 ? (double)count : 128.0) + 6.0;
+}
+
+typedef enum transport_kind {
+    TRANSPORT_EXACT,
+    TRANSPORT_EXACT_COLOUR,
+    TRANSPORT_FOLDED,
+    TRANSPORT_FACTORED,
+    TRANSPORT_FACTORED_COLOUR,
+    TRANSPORT_KINDS
+} transport_kind;
+
+static inline void make_exact(transport *t, const double *F) {
+    lam_error error = {.message = ""};
+    size_t n = t->n, square = n * n;
+    float *P = test_allocate(t->n_channels * square, sizeof *P);
+    for (size_t c = 0; c < t->n_channels; c++) {
+        float *rounded = test_allocate(square, sizeof *rounded);
+        bounced_light(n, F, t->reflectance + c * n, t->P + c * square);
+        for (size_t e = 0; e < square; e++) {
+            rounded[e] = (float)t->P[c * square + e];
+            /* The diagonal is kept as 1 + P_ii. */
+            t->magnitude[c * square + e] = fabs(t->P[c * square + e]) + (e % (n + 1) == 0 ? 1.0 : 0.0);
+        }
+        float *positions = in_positions(t->order, n, n, true, rounded);
+        memcpy(P + c * square, positions, square * sizeof *P);
+        free(positions);
+        free(rounded);
+    }
+    t->roundings = 2 + sum_roundings(n);
+    ck_assert_msg(operator_exact_create(n, t->n_channels, t->reflectance, P, &t->op, &error) == LAM_OK, "%s",
+                  error.message);
+}
+
+/* Y = -rho' U core for one channel, magnitude |U| |core| |V|^T rho' for all. */
+static inline void make_low_rank(transport *t, const double *F, const float *U, const float *V, bool folded) {
+    lam_error error = {.message = ""};
+    size_t n = t->n, k = t->k;
+    float *core = test_allocate(t->n_channels * k * k, sizeof *core), *Y = test_allocate(n * k, sizeof *Y);
+    double *K = test_allocate(k * k, sizeof *K), *left = test_allocate(n * k, sizeof *left);
+    for (size_t c = 0; c < t->n_channels; c++) {
+        const float *rho = t->reflectance + c * n;
+        bounced_light(n, F, rho, t->P + c * n * n);
+        for (size_t a = 0; a < k; a++) /* core = (I - V^T R U)^-1 */
+            for (size_t b = 0; b < k; b++) {
+                K[a * k + b] = a == b ? 1.0 : 0.0;
+                for (size_t i = 0; i < n; i++)
+                    K[a * k + b] -= (double)V[i * k + a] * (double)rho[i] * (double)U[i * k + b];
+            }
+        invert(k, K);
+        for (size_t e = 0; e < k * k; e++) core[c * k * k + e] = (float)K[e];
+        for (size_t i = 0; i < n; i++)
+            for (size_t b = 0; b < k; b++) {
+                double sum = 0;
+                left[i * k + b] = 0;
+                for (size_t a = 0; a < k; a++) {
+                    double product = rho_or_one(rho[i]) * (double)U[i * k + a] * K[a * k + b];
+                    sum += product;
+                    left[i * k + b] += fabs(product);
+                }
+                Y[i * k + b] = (float)-sum;
+            }
+        for (size_t i = 0; i < n; i++)
+            for (size_t j = 0; j < n; j++)
+                for (size_t b = 0; b < k; b++)
+                    t->magnitude[(c * n + i) * n + j] += left[i * k + b] * fabs((double)V[j * k + b]);
+    }
+    float *V_positions = in_positions(t->order, n, k, false, V);
+    lam_status status;
+    if (folded) { /* Y rounded; V^T E, Y t */
+        t->roundings = 1 + sum_roundings(n) + sum_roundings(k);
+        status = operator_low_rank_create_folded(n, k, t->reflectance, in_positions(t->order, n, k, false, Y),
+                                                 V_positions, &t->op, &error);
+        free(core);
+    } else { /* core rounded; V^T E, core t, U t, rho' */
+        t->roundings = 2 + sum_roundings(n) + 2 * sum_roundings(k);
+        status = operator_low_rank_create_factored(n, k, t->n_channels, t->reflectance,
+                                                   in_positions(t->order, n, k, false, U), V_positions, core,
+                                                   &t->op, &error);
+    }
+    ck_assert_msg(status == LAM_OK, "%s", error.message);
+    free(Y);
+    free(K);
+    free(left);
+}
+
+/* An operator of a kind with its truth; ordered: its rows are in a random order inside. */
+static inline transport transport_make(transport_kind kind, bool ordered) {
+    static const char *const names[] = {"exact", "exact, 3 channels", "folded", "factored",
+                                        "factored, 3 channels"};
+    lam_error error = {.message = ""};
+    uint64_t state = 11 + (uint64_t)kind;
+    bool colour = kind == TRANSPORT_EXACT_COLOUR || kind == TRANSPORT_FACTORED_COLOUR;
+    transport t = {.name = names[kind], .n = 151, .k = 21, .n_channels = colour ? 3 : 1};
+    size_t n = t.n, k = t.k;
+    float *U = test_allocate(n * k, sizeof *U), *V = test_allocate(n * k, sizeof *V);
+    double *F = test_allocate(n * n, sizeof *F);
+    random_factors(n, k, U, V, &state);
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++)
+            for (size_t b = 0; b < k; b++) F[i * n + j] += (double)U[i * k + b] * (double)V[j * k + b];
+    t.reflectance = random_reflectance(n, t.n_channels, &state);
+    t.P = test_allocate(t.n_channels * n * n, sizeof *t.P);
+    t.magnitude = test_allocate(t.n_channels * n * n, sizeof *t.magnitude);
+    if (ordered) t.order = random_order(n, &state);
+    if (kind == TRANSPORT_EXACT || kind == TRANSPORT_EXACT_COLOUR)
+        make_exact(&t, F);
+    else
+        make_low_rank(&t, F, U, V, kind == TRANSPORT_FOLDED);
+    if (ordered) ck_assert(operator_set_order(t.op, t.order, &error) == LAM_OK);
+    free(F);
+    free(U);
+    free(V);
+    return t;
+}
+
+static inline void transport_free(transport *t) {
+    lam_operator_close(t->op);
+    free(t->reflectance);
+    free(t->P);
+    free(t->magnitude);
+    free(t->order);
+}
+
+/* The row of a quantity's matrix: out_i = direct E_i + scale sum_j P_ij E_j. */
+static inline void quantity_row(lam_quantity quantity, float rho, double *direct, double *scale) {
+    *direct = quantity == LAM_RADIOSITY ? 1.0 : 0.0;
+    *scale = quantity == LAM_IRRADIANCE ? 1.0 / rho_or_one(rho) : rho > 0 ? 1.0 : 0.0;
+}
+
+/* Numbers of both signs, none of them 0. */
+static inline float *random_vectors(size_t count, uint64_t seed) {
+    float *x = test_allocate(count, sizeof *x);
+    for (size_t i = 0; i < count; i++) x[i] = (float)(random_unit(&seed) * 2 - 0.999);
+    return x;
+}
+
+/* Applies (or its adjoint) into NaN with a fresh work area of just the size asked for; the caller frees. */
+static inline float *transport_apply(const lam_operator *op, bool adjoint, size_t n_rhs,
+                                     lam_quantity quantity, const float *in) {
+    lam_error error = {.message = ""};
+    size_t count = n_rhs * lam_operator_channels(op) * lam_operator_elements(op);
+    size_t work_bytes = lam_operator_work_bytes(op, n_rhs);
+    void *work = malloc(work_bytes);
+    float *out = test_allocate(count, sizeof *out);
+    ck_assert_uint_gt(work_bytes, 0);
+    memset(work, 0xff, work_bytes);
+    for (size_t i = 0; i < count; i++) out[i] = NAN;
+    lam_status status =
+        adjoint ? lam_operator_apply_adjoint(op, n_rhs, quantity, in, out, work, work_bytes, &error)
+                : lam_operator_apply(op, n_rhs, quantity, in, out, work, work_bytes, &error);
+    ck_assert_msg(status == LAM_OK, "%s", error.message);
+    free(work);
+    return out;
+}
+
+#endif
