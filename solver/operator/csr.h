@@ -1,0 +1,25 @@
+/* Sparse rows (CSR) in single precision with products in double. */
+#ifndef LAMBERT_OPERATOR_CSR_H
+#define LAMBERT_OPERATOR_CSR_H
+
+#include "store/store.h"
+
+#include <stdint.h>
+
+typedef struct csr {
+    size_t n;          /* rows and columns */
+    uint64_t *indptr;  /* [n+1] */
+    uint32_t *indices; /* [nnz], ascending in a row */
+    float *data;       /* [nnz] */
+} csr;
+
+void csr_free(csr *a);
+
+/* indptr ascending from 0 to nnz, indices ascending and below n, data finite. LAM_ERR_FORMAT names the row.
+ */
+lam_status csr_check(const csr *a, size_t nnz, const char *name, lam_error *error);
+
+/* Y[first..last) = A X for rows first <= i < last: X and Y are [n][m] row-major, double. */
+void csr_multiply_rows(const csr *a, size_t first, size_t last, size_t m, const double *X, double *Y);
+
+#endif

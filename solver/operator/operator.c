@@ -1,0 +1,329 @@
+/* The list of operator kinds, and what all of them share: loading, checks, mesh order, quantities.
+ * Knows no kind from inside. */
+#include "solver/operator/operator.h"
+
+#include "solver/operator/panel.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static const operator_kind *const operator_kinds[] = {&operator_exact, &operator_low_rank};
+
+/* Kinds of the format that are still to come. */
+static const char *const future_kinds[] = {"two_mesh", "sparse", "emitters", "hierarchical"};
+
+const operator_kind *operator_kind_find(const char *name) {
+    for (size_t i = 0; i < sizeof operator_kinds / sizeof *operator_kinds; i++)
+        if (strcmp(operator_kinds[i]->name, name) == 0) return operator_kinds[i];
+    return NULL;
+}
+
+lam_status operator_init(lam_operator *op, const operator_kind *kind, size_t n, size_t n_channels,
+                         const float *reflectance, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t count;
+    if (n == 0 || n_channels == 0 || n > UINT32_MAX || !size_multiply(n, n_channels, &count))
+        FAIL(error, LAM_ERR_ARGUMENT, "an operator of %zu elements and %zu channels cannot be", n,
+             n_channels);
+    for (size_t i = 0; i < count; i++)
+        if (!(reflectance[i] >= 0.0f && reflectance[i] < 1.0f))
+            FAIL(error, LAM_ERR_NUMERIC, "reflectance[%zu][%zu] = %g, must be at least 0 and below 1", i / n,
+                 i % n, (double)reflectance[i]);
+    op->reflectance = memory_allocate(count, sizeof *op->reflectance, "reflectance", error);
+    if (op->reflectance == NULL) {
+        status = LAM_ERR_MEMORY;
+        goto done;
+    }
+    memcpy(op->reflectance, reflectance, count * sizeof *op->reflectance);
+    op->kind = kind;
+    op->n = n;
+    op->n_channels = n_channels;
+done:
+    return status;
+}
+
+lam_status operator_set_order(lam_operator *op, const uint32_t *order, lam_error *error) {
+    lam_status status = LAM_OK;
+    uint32_t *copy = NULL;
+    unsigned char *seen = NULL;
+    if (order != NULL) {
+        copy = memory_allocate(op->n, sizeof *copy, "order", error);
+        seen = memory_allocate(op->n, 1, "order", error);
+        if (copy == NULL || seen == NULL) {
+            status = LAM_ERR_MEMORY;
+            goto done;
+        }
+        for (size_t p = 0; p < op->n; p++) {
+            if (order[p] >= op->n)
+                FAIL(error, LAM_ERR_NUMERIC, "order[%zu] = %u, must be below %zu", p, (unsigned)order[p],
+                     op->n);
+            if (seen[order[p]])
+                FAIL(error, LAM_ERR_NUMERIC, "order[%zu] = %u, which stands there twice", p,
+                     (unsigned)order[p]);
+            seen[order[p]] = 1;
+        }
+        memcpy(copy, order, op->n * sizeof *copy);
+    }
+    free(op->order);
+    op->order = copy;
+    copy = NULL;
+done:
+    free(copy);
+    free(seen);
+    return status;
+}
+
+/* The kind of an open store; its layout must be the one we know. */
+static lam_status load_kind(store *s, const operator_kind **kind, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *name = NULL, *layout = NULL;
+    TRY(store_get_text(s, "/operator", "kind", &name, error));
+    *kind = operator_kind_find(name);
+    if (*kind == NULL) {
+        for (size_t i = 0; i < sizeof future_kinds / sizeof *future_kinds; i++)
+            if (strcmp(future_kinds[i], name) == 0)
+                FAIL(error, LAM_ERR_UNSUPPORTED, "%s: kind '%s' is not supported yet", store_path(s), name);
+        FAIL(error, LAM_ERR_FORMAT, "%s: /operator has the unknown kind '%s'; precompute it again",
+             store_path(s), name);
+    }
+    if (store_has_attribute(s, "/operator", "layout")) {
+        TRY(store_get_text(s, "/operator", "layout", &layout, error));
+        if (strcmp(layout, "panel64") == 0)
+            FAIL(error, LAM_ERR_UNSUPPORTED, "%s: layout 'panel64' is not supported yet", store_path(s));
+        if (strcmp(layout, "rows") != 0)
+            FAIL(error, LAM_ERR_FORMAT, "%s: /operator has the unknown layout '%s'", store_path(s), layout);
+    }
+done:
+    free(name);
+    free(layout);
+    return status;
+}
+
+lam_status operator_load(store *s, lam_operator **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const operator_kind *kind = NULL;
+    lam_operator *op = NULL;
+    void *reflectance = NULL, *order = NULL;
+    size_t dims[STORE_MAX_RANK] = {SIZE_MAX, SIZE_MAX};
+    lam_error cause = {.message = ""};
+    if (!store_has(s, "/operator"))
+        FAIL(error, LAM_ERR_FORMAT, "%s: holds no operator; precompute it again", store_path(s));
+    TRY(load_kind(s, &kind, error));
+    TRY(store_read(s, "/mesh/reflectance", STORE_F32, 2, dims, &reflectance, error));
+    size_t n_channels = dims[0], n = dims[1];
+    if (n == 0 || n_channels == 0 || n > UINT32_MAX)
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s: /mesh/reflectance is %zu x %zu, must be channels x elements, not empty", store_path(s),
+             n_channels, n);
+    status = kind->load(s, n, n_channels, reflectance, &op, &cause);
+    if (status == LAM_OK && store_has(s, "/operator/order")) {
+        dims[0] = n;
+        status = store_read(s, "/operator/order", STORE_U32, 1, dims, &order, &cause);
+        if (status == LAM_OK) status = operator_set_order(op, order, &cause);
+    }
+    /* Values that cannot be, met in a file, make it a file that is not ours. */
+    if (status == LAM_ERR_NUMERIC) FAIL(error, LAM_ERR_FORMAT, "%s: %s", store_path(s), cause.message);
+    if (status != LAM_OK) FAIL(error, status, "%s", cause.message);
+    *out = op;
+    op = NULL;
+done:
+    free(reflectance);
+    free(order);
+    lam_operator_close(op);
+    return status;
+}
+
+lam_status operator_save(const lam_operator *op, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    operator_description description = {0};
+    op->kind->describe(op, &description);
+    TRY(store_set_text(s, "/operator", "kind", op->kind->name, error));
+    if (description.form != NULL) TRY(store_set_text(s, "/operator", "form", description.form, error));
+    TRY(store_set_text(s, "/operator", "layout", "rows", error));
+    if (op->order != NULL) TRY(store_write(s, "/operator/order", STORE_U32, 1, &op->n, op->order, error));
+    TRY(op->kind->save(op, s, error));
+done:
+    return status;
+}
+
+void operator_describe(const lam_operator *op, operator_description *description) {
+    *description = (operator_description){.density = -1};
+    op->kind->describe(op, description);
+}
+
+lam_status lam_operator_open(const char *path, lam_operator **op, lam_error *error) {
+    lam_status status = LAM_OK;
+    store *s = NULL;
+    if (path == NULL || op == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "a path and a place for the operator are needed");
+    TRY(store_open(path, &s, error));
+    TRY(operator_load(s, op, error));
+done:
+    store_close(s);
+    return status;
+}
+
+void lam_operator_close(lam_operator *op) {
+    if (op == NULL) return;
+    op->kind->destroy(op);
+    free(op->reflectance);
+    free(op->order);
+    free(op);
+}
+
+size_t lam_operator_elements(const lam_operator *op) {
+    return op->n;
+}
+
+size_t lam_operator_channels(const lam_operator *op) {
+    return op->n_channels;
+}
+
+size_t lam_operator_bytes(const lam_operator *op) {
+    operator_description description;
+    operator_describe(op, &description);
+    return description.bytes;
+}
+
+const char *lam_operator_kind(const lam_operator *op) {
+    return op->kind->name;
+}
+
+/* A pass needs the caller's vectors in position order (the adjoint: g pulled back through the quantity), with
+ * an order also the answer before it is put into mesh order, and what the kind needs. */
+static size_t pass_bytes(const lam_operator *op, size_t n_rhs, size_t *vectors_bytes) {
+    size_t count, vectors, kind_bytes = op->kind->work_bytes(op, n_rhs), total = PANEL_ALIGN;
+    if (kind_bytes == 0 || !size_multiply(n_rhs, op->n_channels, &count) ||
+        !size_multiply(count, op->n, &count) || !size_multiply(count, sizeof(float), &vectors) ||
+        !work_add(&total, vectors) || (op->order != NULL && !work_add(&total, vectors)) ||
+        !work_add(&total, kind_bytes))
+        return 0;
+    if (vectors_bytes != NULL) *vectors_bytes = vectors;
+    return total;
+}
+
+size_t lam_operator_work_bytes(const lam_operator *op, size_t n_rhs) {
+    return pass_bytes(op, n_rhs < OPERATOR_PASS ? n_rhs : OPERATOR_PASS, NULL);
+}
+
+static bool overlap(const void *a, size_t a_bytes, const void *b, size_t b_bytes) {
+    uintptr_t first = (uintptr_t)a, second = (uintptr_t)b;
+    return first < second ? second - first < a_bytes : first - second < b_bytes;
+}
+
+static lam_status check_apply(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *in,
+                              const float *out, const void *work, size_t work_bytes, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t bytes;
+    if (op == NULL || in == NULL || out == NULL || work == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "an operator, its input, its output and a work area are needed, one is NULL");
+    if (quantity != LAM_RADIOSITY && quantity != LAM_IRRADIANCE && quantity != LAM_INDIRECT)
+        FAIL(error, LAM_ERR_ARGUMENT, "there is no quantity %d", (int)quantity);
+    if (!size_multiply(n_rhs, op->n_channels, &bytes) || !size_multiply(bytes, op->n, &bytes) ||
+        !size_multiply(bytes, sizeof(float), &bytes))
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "n_rhs = %zu vectors of %zu x %zu numbers are more than memory can have", n_rhs, op->n_channels,
+             op->n);
+    size_t needed = lam_operator_work_bytes(op, n_rhs);
+    if (needed == 0 || work_bytes < needed)
+        FAIL(error, LAM_ERR_ARGUMENT, "work area of %zu bytes, %zu are needed for n_rhs = %zu", work_bytes,
+             needed, n_rhs);
+    if ((uintptr_t)work % _Alignof(max_align_t) != 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "work area is not aligned to %zu bytes", _Alignof(max_align_t));
+    if (overlap(in, bytes, out, bytes) || overlap(in, bytes, work, work_bytes) ||
+        overlap(out, bytes, work, work_bytes))
+        FAIL(error, LAM_ERR_ARGUMENT, "input, output and work area overlap");
+done:
+    return status;
+}
+
+static void *align_work(void *work) {
+    return (char *)work + (PANEL_ALIGN - (uintptr_t)work % PANEL_ALIGN) % PANEL_ALIGN;
+}
+
+/* One row of out (mesh order) from the same row of E (mesh order) and P (position order). out may be P when
+ * there is no order. */
+static void finish_row(const lam_operator *op, size_t c, lam_quantity quantity, const float *E,
+                       const float *P, float *out) {
+    const float *rho = op->reflectance + c * op->n;
+    for (size_t p = 0; p < op->n; p++) {
+        size_t i = op->order != NULL ? op->order[p] : p;
+        switch (quantity) {
+        case LAM_RADIOSITY: /* B = E + P */
+            out[i] = rho[i] > 0.0f ? E[i] + P[p] : E[i];
+            break;
+        case LAM_IRRADIANCE: /* H = P / rho' */
+            out[i] = rho[i] > 0.0f ? P[p] / rho[i] : P[p];
+            break;
+        case LAM_INDIRECT: /* B - E */
+            out[i] = rho[i] > 0.0f ? P[p] : 0.0f;
+            break;
+        }
+    }
+}
+
+lam_status lam_operator_apply(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
+                              float *out, void *work, size_t work_bytes, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(check_apply(op, n_rhs, quantity, E, out, work, work_bytes, error));
+    size_t n = op->n, row_bytes = n * sizeof(float);
+    for (size_t r = 0; r < n_rhs; r += OPERATOR_PASS) {
+        size_t count = n_rhs - r < OPERATOR_PASS ? n_rhs - r : OPERATOR_PASS, rows = count * op->n_channels;
+        const float *E_pass = E + r * op->n_channels * n, *E_positions = E_pass;
+        float *out_pass = out + r * op->n_channels * n, *P = out_pass;
+        void *rest = align_work(work);
+        if (op->order != NULL) {
+            float *gathered = work_take(&rest, rows * row_bytes);
+            P = work_take(&rest, rows * row_bytes);
+            for (size_t row = 0; row < rows; row++)
+                for (size_t p = 0; p < n; p++) gathered[row * n + p] = E_pass[row * n + op->order[p]];
+            E_positions = gathered;
+        }
+        op->kind->apply(op, count, E_positions, P, rest);
+        for (size_t row = 0; row < rows; row++)
+            finish_row(op, row % op->n_channels, quantity, E_pass + row * n, P + row * n, out_pass + row * n);
+    }
+done:
+    return status;
+}
+
+/* One row of g (mesh order) pulled back through the quantity, into position order: what P^T takes. */
+static void pull_back_row(const lam_operator *op, size_t c, lam_quantity quantity, const float *g,
+                          float *pulled) {
+    const float *rho = op->reflectance + c * op->n;
+    for (size_t p = 0; p < op->n; p++) {
+        size_t i = op->order != NULL ? op->order[p] : p;
+        if (quantity == LAM_IRRADIANCE)
+            pulled[p] = rho[i] > 0.0f ? g[i] / rho[i] : g[i];
+        else
+            pulled[p] = rho[i] > 0.0f ? g[i] : 0.0f;
+    }
+}
+
+lam_status lam_operator_apply_adjoint(const lam_operator *op, size_t n_rhs, lam_quantity quantity,
+                                      const float *g, float *w, void *work, size_t work_bytes,
+                                      lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(check_apply(op, n_rhs, quantity, g, w, work, work_bytes, error));
+    size_t n = op->n, row_bytes = n * sizeof(float);
+    for (size_t r = 0; r < n_rhs; r += OPERATOR_PASS) {
+        size_t count = n_rhs - r < OPERATOR_PASS ? n_rhs - r : OPERATOR_PASS, rows = count * op->n_channels;
+        const float *g_pass = g + r * op->n_channels * n;
+        float *w_pass = w + r * op->n_channels * n, *transposed = w_pass;
+        void *rest = align_work(work);
+        float *pulled = work_take(&rest, rows * row_bytes);
+        if (op->order != NULL) transposed = work_take(&rest, rows * row_bytes);
+        for (size_t row = 0; row < rows; row++)
+            pull_back_row(op, row % op->n_channels, quantity, g_pass + row * n, pulled + row * n);
+        op->kind->apply_adjoint(op, count, pulled, transposed, rest);
+        for (size_t row = 0; row < rows; row++)
+            for (size_t p = 0; p < n; p++) {
+                size_t i = row * n + (op->order != NULL ? op->order[p] : p);
+                float direct = quantity == LAM_RADIOSITY ? g_pass[i] : 0.0f;
+                w_pass[i] = direct + transposed[row * n + p];
+            }
+    }
+done:
+    return status;
+}

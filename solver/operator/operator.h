@@ -1,0 +1,91 @@
+/* The shared part of every operator kind, and the table a kind fills in. Private to solver/ and server/. */
+#ifndef LAMBERT_OPERATOR_OPERATOR_H
+#define LAMBERT_OPERATOR_OPERATOR_H
+
+#include "store/store.h"
+
+#include <stdint.h>
+
+/* What an operator says about itself. */
+typedef struct operator_description {
+    const char *form; /* "folded", "factored" or NULL */
+    size_t rank;      /* 0 when the kind has none */
+    double density;   /* share of n^2 stored; negative when the kind has none */
+    size_t bytes;     /* of the arrays a solve reads */
+} operator_description;
+
+/* One kind: a const table at the end of its file, listed in operator.c.
+ *
+ * A kind computes the bounced light P = rho' (M~ - I)/rho E, one row per position, where rho'_i = rho_i, or 1
+ * where rho_i = 0 (contract, /operator, last line): B_i = E_i + P_i where rho_i > 0, else E_i, and
+ * H_i = P_i / rho'_i. E and P are [n_rhs][C][n] in position order, n_rhs at most OPERATOR_PASS. apply and its
+ * adjoint P^T cannot fail, allocate nothing, and give a vector the same bits in any batch; the adjoint may
+ * overwrite g. work is aligned to a cache line; work_bytes is 0 when it overflows, and only then. */
+#define OPERATOR_PASS 16 /* a larger batch is cut into passes */
+
+typedef struct operator_kind {
+    const char *name;
+    lam_status (*load)(store *s, size_t n, size_t n_channels, const float *reflectance, lam_operator **op,
+                       lam_error *error);
+    lam_status (*save)(const lam_operator *op, store *s, lam_error *error);
+    size_t (*work_bytes)(const lam_operator *op, size_t n_rhs);
+    void (*apply)(const lam_operator *op, size_t n_rhs, const float *E, float *P, void *work);
+    void (*apply_adjoint)(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work);
+    void (*destroy)(lam_operator *op);
+    void (*describe)(const lam_operator *op, operator_description *description);
+} operator_kind;
+
+struct lam_operator {
+    const operator_kind *kind;
+    size_t n;
+    size_t n_channels;
+    float *reflectance; /* [C][n], mesh order, owned */
+    uint32_t *order;    /* [n], position -> element, owned; NULL: mesh order */
+};
+
+extern const operator_kind operator_exact;
+extern const operator_kind operator_low_rank;
+
+/* The kind of this name, or NULL. */
+const operator_kind *operator_kind_find(const char *name);
+
+/* Fills the shared part (copies reflectance) of a zeroed operator; kind->destroy frees what the kind added.
+ * Errors: LAM_ERR_NUMERIC names a reflectance outside [0, 1), LAM_ERR_ARGUMENT, LAM_ERR_MEMORY. */
+lam_status operator_init(lam_operator *op, const operator_kind *kind, size_t n, size_t n_channels,
+                         const float *reflectance, lam_error *error);
+
+/* Says that position p of the kind's arrays is element order[p] (copied; NULL: mesh order). Before the
+ * operator is shared. Errors: LAM_ERR_NUMERIC when order is no permutation of 0 .. n-1, LAM_ERR_MEMORY. */
+lam_status operator_set_order(lam_operator *op, const uint32_t *order, lam_error *error);
+
+/* The reflectance of channel c at a position, 1 where it is 0: rho' above. */
+static inline float operator_reflectance_or_one(const lam_operator *op, size_t c, size_t position) {
+    float rho = op->reflectance[c * op->n + (op->order != NULL ? op->order[position] : position)];
+    return rho > 0.0f ? rho : 1.0f;
+}
+
+/* Loads /operator of an open store (its reflectances from /mesh); the caller frees with lam_operator_close.
+ */
+lam_status operator_load(store *s, lam_operator **op, lam_error *error);
+
+/* Writes the arrays of /operator with its attributes kind, form, layout; method, epsilon, ... are the
+ * builder's to write. */
+lam_status operator_save(const lam_operator *op, store *s, lam_error *error);
+
+void operator_describe(const lam_operator *op, operator_description *description);
+
+/* Operators made by a builder. Arrays are taken over (freed with free()), also on an error; reflectance is
+ * copied and in mesh order, the rows of the arrays are too unless operator_set_order follows.
+ * Errors: LAM_ERR_NUMERIC names an entry that is not finite or a reflectance outside [0, 1), LAM_ERR_MEMORY.
+ * exact: P is [C][n][n], row-major, as described above (no identity in it). */
+lam_status operator_exact_create(size_t n, size_t n_channels, const float *reflectance, float *P,
+                                 lam_operator **op, lam_error *error);
+/* folded, grey: P = -Y (V^T E); Y, V are [n][k]. */
+lam_status operator_low_rank_create_folded(size_t n, size_t k, const float *reflectance, float *Y, float *V,
+                                           lam_operator **op, lam_error *error);
+/* factored: H_c = U core_c (V^T E_c); U, V are [n][k], core is [C][k][k]. */
+lam_status operator_low_rank_create_factored(size_t n, size_t k, size_t n_channels, const float *reflectance,
+                                             float *U, float *V, float *core, lam_operator **op,
+                                             lam_error *error);
+
+#endif
