@@ -1,0 +1,24 @@
+/* The generated scenes, written as OBJ + MTL. */
+#ifndef LAMBERT_SCENE_GENERATE_H
+#define LAMBERT_SCENE_GENERATE_H
+
+#include "solver/progress.h"
+
+#include <stdint.h>
+
+typedef struct generate_options {
+    const char *kind;   /* "box", "cornell", "furnace" */
+    double size[3];     /* box, metres; 1,1,1 */
+    unsigned divisions; /* box: M, exactly 6 M^2 faces; 0: not set */
+    bool closed;        /* cornell */
+    size_t elements;    /* about this many faces; 0: not set */
+    double reflectance; /* for every face, grey (emission turns grey too); negative: the scene's own */
+    uint64_t seed;
+} generate_options;
+
+/* Writes path (an .obj) and its .mtl beside it, each written aside and renamed.
+ * LAM_ERR_UNSUPPORTED for a kind of the contract that is still to come, LAM_ERR_ARGUMENT for an unknown one.
+ */
+lam_status scene_generate(const generate_options *options, const char *path, size_t *faces, lam_error *error);
+
+#endif

@@ -1,0 +1,176 @@
+/* Measures, bounds and the hash of a mesh; refinement, order and storage have files of their own. */
+#include "solver/scene/mesh.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <xxhash.h>
+
+void mesh_free(mesh *m) {
+    free(m->vertices);
+    free(m->elements);
+    free(m->area);
+    free(m->normal);
+    free(m->group);
+    free(m->group_names);
+    free(m->reflectance);
+    free(m->emission);
+    *m = (mesh){0};
+}
+
+static void cross_of_differences(const double a[3], const double b[3], const double c[3], const double d[3],
+                                 double out[3]) {
+    const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    const double v[3] = {d[0] - c[0], d[1] - c[1], d[2] - c[2]};
+    out[0] = u[1] * v[2] - u[2] * v[1];
+    out[1] = u[2] * v[0] - u[0] * v[2];
+    out[2] = u[0] * v[1] - u[1] * v[0];
+}
+
+lam_status mesh_measure(mesh *m, lam_error *error) {
+    lam_status status = LAM_OK;
+    double *area = NULL;
+    float(*normal)[3] = NULL;
+    area = memory_allocate(m->n, sizeof *area, "element areas", error);
+    normal = memory_allocate(m->n, sizeof *normal, "element normals", error);
+    if (area == NULL || normal == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < m->n; i++) {
+        const uint32_t *e = m->elements[i];
+        const size_t corners = e[3] == MESH_NO_VERTEX ? 3 : 4;
+        for (size_t k = 0; k < corners; k++)
+            if (e[k] >= m->n_vertices)
+                FAIL(error, LAM_ERR_ARGUMENT, "element %zu: vertex index %u, there are %zu vertices", i, e[k],
+                     m->n_vertices);
+        const double(*v)[3] = (const double(*)[3])m->vertices;
+        double twice[3]; /* a planar polygon's doubled area vector: the cross product of its diagonals */
+        if (corners == 3)
+            cross_of_differences(v[e[0]], v[e[1]], v[e[0]], v[e[2]], twice);
+        else
+            cross_of_differences(v[e[0]], v[e[2]], v[e[1]], v[e[3]], twice);
+        const double length = sqrt(twice[0] * twice[0] + twice[1] * twice[1] + twice[2] * twice[2]);
+        if (!(length > 0) || !isfinite(length))
+            FAIL(error, LAM_ERR_ARGUMENT, "element %zu: area %g, must be positive and finite", i, length / 2);
+        area[i] = length / 2;
+        for (int k = 0; k < 3; k++) normal[i][k] = (float)(twice[k] / length);
+    }
+    free(m->area);
+    free(m->normal);
+    m->area = area;
+    m->normal = normal;
+    area = NULL;
+    normal = NULL;
+done:
+    free(area);
+    free(normal);
+    return status;
+}
+
+/* An array [rows][n] of size-byte values made [rows][2 n], every row followed by its copy; NULL on failure.
+ */
+static void *doubled(const void *data, size_t rows, size_t n, size_t size, lam_error *error) {
+    size_t row;
+    if (!size_multiply(n, size, &row)) return NULL;
+    char *out = memory_allocate(rows * 2, row, "two-sided mesh", error);
+    for (size_t r = 0; out != NULL && r < rows && row > 0; r++) {
+        memcpy(out + 2 * r * row, (const char *)data + r * row, row);
+        memcpy(out + (2 * r + 1) * row, (const char *)data + r * row, row);
+    }
+    return out;
+}
+
+lam_status mesh_make_two_sided(mesh *m, lam_error *error) {
+    lam_status status = LAM_OK;
+    mesh wide = {0};
+    if (m->two_sided) return LAM_OK;
+    if (m->n > MESH_NO_VERTEX / 2)
+        FAIL(error, LAM_ERR_ARGUMENT, "mesh: %zu elements are too many to make them two-sided", m->n);
+    wide.elements = doubled(m->elements, 1, m->n, sizeof *m->elements, error);
+    wide.area = doubled(m->area, 1, m->n, sizeof *m->area, error);
+    wide.normal = doubled(m->normal, 1, m->n, sizeof *m->normal, error);
+    wide.group = doubled(m->group, 1, m->n, sizeof *m->group, error);
+    wide.reflectance = doubled(m->reflectance, m->n_channels, m->n, sizeof *m->reflectance, error);
+    wide.emission = doubled(m->emission, m->n_channels, m->n, sizeof *m->emission, error);
+    if (wide.elements == NULL || wide.area == NULL || wide.normal == NULL || wide.group == NULL ||
+        wide.reflectance == NULL || wide.emission == NULL)
+        TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < m->n; i++) {
+        const uint32_t *front = m->elements[i];
+        uint32_t *back = wide.elements[m->n + i];
+        const size_t last = front[3] == MESH_NO_VERTEX ? 2 : 3;
+        for (size_t k = 0; k <= last; k++) back[k] = front[last - k];
+        for (int k = 0; k < 3; k++) wide.normal[m->n + i][k] = -m->normal[i][k];
+    }
+#define MESH_EXCHANGE(member)                                                                                \
+    free(m->member);                                                                                         \
+    m->member = wide.member;                                                                                 \
+    wide.member = NULL
+    MESH_EXCHANGE(elements);
+    MESH_EXCHANGE(area);
+    MESH_EXCHANGE(normal);
+    MESH_EXCHANGE(group);
+    MESH_EXCHANGE(reflectance);
+    MESH_EXCHANGE(emission);
+#undef MESH_EXCHANGE
+    m->n *= 2;
+    m->two_sided = true;
+done:
+    mesh_free(&wide);
+    return status;
+}
+
+void mesh_geometry_hash(const mesh *m, char hash[33]) {
+    struct {
+        XXH128_hash_t vertices, elements;
+        uint64_t n_vertices, n, two_sided;
+    } parts;
+    memset(&parts, 0, sizeof parts); /* padding is hashed too */
+    parts.vertices = XXH3_128bits(m->vertices, m->n_vertices * sizeof *m->vertices);
+    parts.elements = XXH3_128bits(m->elements, m->n * sizeof *m->elements);
+    parts.n_vertices = m->n_vertices;
+    parts.n = m->n;
+    parts.two_sided = m->two_sided;
+    XXH128_canonical_t bytes;
+    XXH128_canonicalFromHash(&bytes, XXH3_128bits(&parts, sizeof parts));
+    for (size_t i = 0; i < sizeof bytes.digest; i++) {
+        hash[2 * i] = "0123456789abcdef"[bytes.digest[i] >> 4];
+        hash[2 * i + 1] = "0123456789abcdef"[bytes.digest[i] & 15];
+    }
+    hash[32] = '\0';
+}
+
+void mesh_bounds(const mesh *m, double centre[3], double *radius) {
+    double low[3] = {0, 0, 0}, high[3] = {0, 0, 0}, square = 0;
+    for (size_t v = 0; v < m->n_vertices; v++)
+        for (int k = 0; k < 3; k++) {
+            const double x = m->vertices[v][k];
+            if (v == 0 || x < low[k]) low[k] = x;
+            if (v == 0 || x > high[k]) high[k] = x;
+        }
+    for (int k = 0; k < 3; k++) {
+        centre[k] = low[k] + (high[k] - low[k]) / 2;
+        square += (high[k] - low[k]) * (high[k] - low[k]);
+    }
+    *radius = sqrt(square) / 2;
+}
+
+void mesh_centroid(const mesh *m, size_t element, double centroid[3]) {
+    const uint32_t *e = m->elements[element];
+    const double *a = m->vertices[e[0]], *b = m->vertices[e[1]], *c = m->vertices[e[2]];
+    if (e[3] == MESH_NO_VERTEX) {
+        for (int k = 0; k < 3; k++) centroid[k] = a[k] + ((b[k] - a[k]) + (c[k] - a[k])) / 3;
+        return;
+    }
+    const double *d = m->vertices[e[3]];
+    double abc[3], acd[3], area_abc = 0, area_acd = 0;
+    cross_of_differences(a, b, a, c, abc);
+    cross_of_differences(a, c, a, d, acd);
+    for (int k = 0; k < 3; k++) {
+        area_abc += abc[k] * abc[k];
+        area_acd += acd[k] * acd[k];
+    }
+    area_abc = sqrt(area_abc);
+    area_acd = sqrt(area_acd);
+    const double share = area_abc + area_acd > 0 ? area_acd / (area_abc + area_acd) : 0;
+    for (int k = 0; k < 3; k++)
+        centroid[k] = a[k] + ((c[k] - a[k]) + (1 - share) * (b[k] - a[k]) + share * (d[k] - a[k])) / 3;
+}

@@ -1,0 +1,71 @@
+/* The mesh: planar elements with their materials and groups. Owns geometry; must not know form factors. */
+#ifndef LAMBERT_SCENE_MESH_H
+#define LAMBERT_SCENE_MESH_H
+
+#include "solver/progress.h"
+#include "store/store.h"
+
+#include <stdint.h>
+
+/* The 4th vertex of an element that is a triangle. */
+#define MESH_NO_VERTEX 0xFFFFFFFFu
+
+/* A quad is planar and convex; its front is the side from which its vertices run counter-clockwise.
+ * With two_sided, elements n/2 ... n-1 are the backs of elements 0 ... n/2-1, in the same order. */
+typedef struct mesh {
+    size_t n_vertices;
+    double (*vertices)[3]; /* [v][3], metres */
+    size_t n;              /* elements */
+    uint32_t (*elements)[4];
+    double *area;       /* [n], m^2 */
+    float (*normal)[3]; /* [n][3], unit, towards the front */
+    uint32_t *group;    /* [n] */
+    size_t n_groups;
+    char **group_names; /* [n_groups], one block freed by one free() */
+    size_t n_channels;  /* 1 when every reflectance and emission is grey, else 3 */
+    float *reflectance; /* [C][n], in [0, 1) */
+    float *emission;    /* [C][n], W/m^2 */
+    bool two_sided;
+    double unit;          /* metres per unit of the scene file, for the record */
+    char up;              /* 'x', 'y' or 'z' */
+    char name[128];       /* the scene file's stem */
+    char source_hash[33]; /* of the faces as imported, before any subdivision: hex */
+} mesh;
+
+/* Frees what a mesh owns and zeroes it. */
+void mesh_free(mesh *m);
+
+/* Computes area and normal from vertices and elements (allocating them when NULL).
+ * Errors: LAM_ERR_ARGUMENT for a zero area or an index out of range, naming the element. */
+lam_status mesh_measure(mesh *m, lam_error *error);
+
+/* How a mesh is refined; at most one of the three is set, 0 means not set. */
+typedef struct mesh_refinement {
+    unsigned subdivide_levels; /* each element into 4, this often */
+    double max_edge;           /* metres */
+    size_t elements;           /* as close to this as equal-area splitting gives */
+} mesh_refinement;
+
+/* Refines in place; children of an element are consecutive and inherit its group and materials. */
+lam_status mesh_refine(mesh *m, const mesh_refinement *how, lam_error *error);
+
+/* Makes every element two: all fronts, then all backs (contract, `--two-sided`). */
+lam_status mesh_make_two_sided(mesh *m, lam_error *error);
+
+/* 3-D Morton order of the element centroids (thesis 2.3): order[position] = element. order is [n]. */
+lam_status mesh_z_order(const mesh *m, uint32_t *order, lam_error *error);
+
+/* Hash of vertices, elements and sidedness: 32 hex digits and a NUL. */
+void mesh_geometry_hash(const mesh *m, char hash[33]);
+
+/* Centre of the bounding box and half its diagonal: what single precision is recentred by. */
+void mesh_bounds(const mesh *m, double centre[3], double *radius);
+
+/* The centroid of an element. */
+void mesh_centroid(const mesh *m, size_t element, double centroid[3]);
+
+/* /mesh of a store, as the contract says; loading checks every index and value before use. */
+lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error *error);
+lam_status mesh_load(store *s, mesh *m, double **row_sums, lam_error *error);
+
+#endif

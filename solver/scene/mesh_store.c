@@ -1,0 +1,180 @@
+/* /mesh of a store: written as it is, read back with every index and value checked. */
+#include "solver/scene/mesh.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    char hash[33];
+    const char up[2] = {m->up, '\0'};
+    const size_t of_vertices[2] = {m->n_vertices, 3}, of_elements[2] = {m->n, 4}, of_normals[2] = {m->n, 3};
+    const size_t of_channels[2] = {m->n_channels, m->n};
+    mesh_geometry_hash(m, hash);
+    TRY(store_write(s, "/mesh/vertices", STORE_F64, 2, of_vertices, m->vertices, error));
+    TRY(store_write(s, "/mesh/elements", STORE_U32, 2, of_elements, m->elements, error));
+    TRY(store_write(s, "/mesh/area", STORE_F64, 1, &m->n, m->area, error));
+    TRY(store_write(s, "/mesh/normal", STORE_F32, 2, of_normals, m->normal, error));
+    TRY(store_write(s, "/mesh/reflectance", STORE_F32, 2, of_channels, m->reflectance, error));
+    TRY(store_write(s, "/mesh/emission", STORE_F32, 2, of_channels, m->emission, error));
+    TRY(store_write(s, "/mesh/group", STORE_U32, 1, &m->n, m->group, error));
+    TRY(store_write_texts(s, "/mesh/group_names", m->n_groups, (const char *const *)m->group_names, error));
+    TRY(store_write(s, "/mesh/row_sums", STORE_F64, 1, &m->n, row_sums, error));
+    TRY(store_set_text(s, "/mesh", "geometry_hash", hash, error));
+    TRY(store_set_text(s, "/mesh", "source_hash", m->source_hash, error));
+    TRY(store_set_text(s, "/mesh", "name", m->name, error));
+    TRY(store_set_text(s, "/mesh", "up", up, error));
+    TRY(store_set_number(s, "/mesh", "unit", m->unit, error));
+    TRY(store_set_integer(s, "/mesh", "two_sided", m->two_sided, error));
+done:
+    return status;
+}
+
+/* An attribute of /mesh into a fixed array. */
+static lam_status load_text(store *s, const char *name, char *out, size_t size, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *text = NULL;
+    TRY(store_get_text(s, "/mesh", name, &text, error));
+    if (strlen(text) >= size)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute %s is longer than %zu bytes", store_path(s), name,
+             size - 1);
+    strcpy(out, text);
+done:
+    free(text);
+    return status;
+}
+
+static lam_status load_attributes(store *s, mesh *m, lam_error *error) {
+    lam_status status = LAM_OK;
+    char up[8];
+    int64_t two_sided = 0;
+    TRY(load_text(s, "source_hash", m->source_hash, sizeof m->source_hash, error));
+    TRY(load_text(s, "name", m->name, sizeof m->name, error));
+    TRY(load_text(s, "up", up, sizeof up, error));
+    TRY(store_get_number(s, "/mesh", "unit", &m->unit, error));
+    TRY(store_get_integer(s, "/mesh", "two_sided", &two_sided, error));
+    if (strlen(up) != 1 || strchr("xyz", up[0]) == NULL)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute up is '%s', must be x, y or z", store_path(s), up);
+    if (!(m->unit > 0) || !isfinite(m->unit))
+        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute unit is %g, must be positive", store_path(s),
+             m->unit);
+    if (two_sided != 0 && two_sided != 1)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh attribute two_sided is %lld, must be 0 or 1", store_path(s),
+             (long long)two_sided);
+    m->up = up[0];
+    m->two_sided = two_sided == 1;
+done:
+    return status;
+}
+
+/* Reads an array of doubles and checks that low <= value (low < value when strict) and that it is finite. */
+static lam_status load_f64(store *s, const char *name, size_t n, double low, bool strict, double **out,
+                           lam_error *error) {
+    lam_status status = LAM_OK;
+    void *data = NULL;
+    TRY(store_read(s, name, STORE_F64, 1, &n, &data, error));
+    const double *values = data;
+    for (size_t i = 0; i < n; i++)
+        if (!isfinite(values[i]) || values[i] < low || (strict && values[i] == low))
+            FAIL(error, LAM_ERR_FORMAT, "%s: %s[%zu] = %g, must be %s %g and finite", store_path(s), name, i,
+                 values[i], strict ? "above" : "at least", low);
+    *out = data;
+    data = NULL;
+done:
+    free(data);
+    return status;
+}
+
+static lam_status load_geometry(store *s, mesh *m, lam_error *error) {
+    lam_status status = LAM_OK;
+    void *data = NULL;
+    size_t of_vertices[2] = {SIZE_MAX, 3}, of_elements[2] = {SIZE_MAX, 4};
+    char stated[33], found[33];
+    TRY(store_read(s, "/mesh/vertices", STORE_F64, 2, of_vertices, &data, error));
+    m->vertices = data;
+    m->n_vertices = of_vertices[0];
+    TRY(store_read(s, "/mesh/elements", STORE_U32, 2, of_elements, &data, error));
+    m->elements = data;
+    m->n = of_elements[0];
+    for (size_t v = 0; v < m->n_vertices; v++)
+        for (int k = 0; k < 3; k++)
+            if (!isfinite(m->vertices[v][k]))
+                FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/vertices[%zu][%d] = %g, must be finite", store_path(s),
+                     v, k, m->vertices[v][k]);
+    for (size_t i = 0; i < m->n; i++)
+        for (int k = 0; k < 4; k++)
+            if (m->elements[i][k] >= m->n_vertices && !(k == 3 && m->elements[i][k] == MESH_NO_VERTEX))
+                FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/elements[%zu][%d] = %u, there are %zu vertices",
+                     store_path(s), i, k, m->elements[i][k], m->n_vertices);
+    if (m->n == 0 || m->n >= MESH_NO_VERTEX || (m->two_sided && m->n % 2 != 0))
+        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/elements holds %zu elements, %s", store_path(s), m->n,
+             m->two_sided ? "must be an even number" : "must be 1 to 2^32 - 2");
+    TRY(load_text(s, "geometry_hash", stated, sizeof stated, error));
+    mesh_geometry_hash(m, found);
+    if (strcmp(stated, found) != 0)
+        FAIL(error, LAM_ERR_DAMAGED, "%s: /mesh: geometry_hash says %s, the geometry has %s", store_path(s),
+             stated, found);
+done:
+    return status;
+}
+
+/* reflectance or emission: [C][n], at least 0 and below limit. */
+static lam_status load_channels(store *s, const char *name, float limit, size_t dims[2], float **out,
+                                lam_error *error) {
+    lam_status status = LAM_OK;
+    void *data = NULL;
+    TRY(store_read(s, name, STORE_F32, 2, dims, &data, error));
+    const float *values = data;
+    for (size_t i = 0; i < dims[0] * dims[1]; i++)
+        if (!(values[i] >= 0) || !(values[i] < limit))
+            FAIL(error, LAM_ERR_FORMAT, "%s: %s[%zu][%zu] = %g, must be in [0, %g)", store_path(s), name,
+                 i / dims[1], i % dims[1], (double)values[i], (double)limit);
+    *out = data;
+    data = NULL;
+done:
+    free(data);
+    return status;
+}
+
+lam_status mesh_load(store *s, mesh *m, double **row_sums, lam_error *error) {
+    lam_status status = LAM_OK;
+    mesh loaded = {0};
+    double *sums = NULL;
+    void *data = NULL;
+    TRY(load_attributes(s, &loaded, error));
+    TRY(load_geometry(s, &loaded, error));
+    TRY(load_f64(s, "/mesh/area", loaded.n, 0, true, &loaded.area, error));
+    size_t of_normals[2] = {loaded.n, 3};
+    TRY(store_read(s, "/mesh/normal", STORE_F32, 2, of_normals, &data, error));
+    loaded.normal = data;
+    for (size_t i = 0; i < loaded.n; i++)
+        for (int k = 0; k < 3; k++)
+            if (!isfinite(loaded.normal[i][k]))
+                FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/normal[%zu][%d] = %g, must be finite", store_path(s),
+                     i, k, (double)loaded.normal[i][k]);
+    size_t of_channels[2] = {SIZE_MAX, loaded.n};
+    TRY(load_channels(s, "/mesh/reflectance", 1.f, of_channels, &loaded.reflectance, error));
+    if (of_channels[0] == 0)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/reflectance has no channel", store_path(s));
+    loaded.n_channels = of_channels[0];
+    TRY(load_channels(s, "/mesh/emission", INFINITY, of_channels, &loaded.emission, error));
+    TRY(store_read_texts(s, "/mesh/group_names", &loaded.n_groups, &loaded.group_names, error));
+    TRY(store_read(s, "/mesh/group", STORE_U32, 1, &loaded.n, &data, error));
+    loaded.group = data;
+    for (size_t i = 0; i < loaded.n; i++)
+        if (loaded.group[i] >= loaded.n_groups)
+            FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/group[%zu] = %u, there are %zu group names", store_path(s),
+                 i, loaded.group[i], loaded.n_groups);
+    TRY(load_f64(s, "/mesh/row_sums", loaded.n, 0, false, &sums, error));
+    *m = loaded;
+    loaded = (mesh){0};
+    if (row_sums != NULL) {
+        *row_sums = sums;
+        sums = NULL;
+    }
+done:
+    mesh_free(&loaded);
+    free(sums);
+    return status;
+}

@@ -1,0 +1,129 @@
+#include "solver/scene/tables.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <xxhash.h>
+
+void *array_grow(void *data, size_t *capacity, size_t count, size_t size, const char *what,
+                 lam_error *error) {
+    if (count <= *capacity && data != NULL) return data;
+    size_t wanted = *capacity < 64 ? 64 : *capacity, bytes;
+    while (wanted < count && size_multiply(wanted, 2, &wanted)) continue;
+    if (wanted < count || !size_multiply(wanted, size, &bytes)) {
+        status_fail(error, LAM_ERR_MEMORY, "%s: %zu entries are too many", what, count);
+        return NULL;
+    }
+    void *grown = realloc(data, bytes);
+    if (grown == NULL)
+        status_fail(error, LAM_ERR_MEMORY, "%s: cannot allocate %zu bytes; use a smaller scene", what, bytes);
+    else
+        *capacity = wanted;
+    return grown;
+}
+
+/* Doubles the slots; hash_of(table, i) gives the hash of entry i < n. */
+static lam_status slots_grow(table_slots *slots, size_t n, uint64_t (*hash_of)(const void *table, size_t i),
+                             const void *table, lam_error *error) {
+    size_t wanted = slots->n_slots == 0 ? 256 : slots->n_slots * 2;
+    uint32_t *fresh = memory_allocate(wanted, sizeof *fresh, "scene table", error);
+    if (fresh == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < n; i++) {
+        size_t slot = hash_of(table, i) & (wanted - 1);
+        while (fresh[slot] != 0) slot = (slot + 1) & (wanted - 1);
+        fresh[slot] = (uint32_t)(i + 1);
+    }
+    free(slots->slots);
+    slots->slots = fresh;
+    slots->n_slots = wanted;
+    return LAM_OK;
+}
+
+/* More entries than this would make an index look like TABLE_NONE or MESH_NO_VERTEX. */
+static const size_t most_entries = 0xFFFFFFF0u;
+
+static uint64_t name_hash(const void *table, size_t i) {
+    const name_table *t = table;
+    const char *name = t->text + t->start[i];
+    return XXH3_64bits(name, strlen(name));
+}
+
+/* The slot that holds name, or the free one where it belongs. */
+static size_t name_slot(const name_table *t, const char *name, size_t length) {
+    size_t slot = XXH3_64bits(name, length) & (t->slots.n_slots - 1);
+    for (; t->slots.slots[slot] != 0; slot = (slot + 1) & (t->slots.n_slots - 1)) {
+        const char *there = t->text + t->start[t->slots.slots[slot] - 1];
+        if (strlen(there) == length && memcmp(there, name, length) == 0) break;
+    }
+    return slot;
+}
+
+lam_status name_table_add(name_table *t, const char *name, size_t length, uint32_t *index, lam_error *error) {
+    lam_status status = LAM_OK;
+    length = strnlen(name, length);
+    if ((t->n + 1) * 2 > t->slots.n_slots) TRY(slots_grow(&t->slots, t->n, name_hash, t, error));
+    size_t slot = name_slot(t, name, length);
+    if (t->slots.slots[slot] == 0) {
+        if (t->n >= most_entries) FAIL(error, LAM_ERR_MEMORY, "scene: more than %zu names", most_entries);
+        size_t *start = array_grow(t->start, &t->start_capacity, t->n + 1, sizeof *start, "names", error);
+        if (start == NULL) TRY(LAM_ERR_MEMORY);
+        t->start = start;
+        char *text = array_grow(t->text, &t->text_capacity, t->text_bytes + length + 1, 1, "names", error);
+        if (text == NULL) TRY(LAM_ERR_MEMORY);
+        t->text = text;
+        t->start[t->n] = t->text_bytes;
+        memcpy(t->text + t->text_bytes, name, length);
+        t->text[t->text_bytes + length] = '\0';
+        t->text_bytes += length + 1;
+        t->slots.slots[slot] = (uint32_t)++t->n;
+    }
+    *index = t->slots.slots[slot] - 1;
+done:
+    return status;
+}
+
+const char *name_table_get(const name_table *t, size_t index) {
+    return t->text + t->start[index];
+}
+
+uint32_t name_table_find(const name_table *t, const char *name) {
+    if (t->n == 0) return TABLE_NONE;
+    return t->slots.slots[name_slot(t, name, strlen(name))] - 1; /* a free slot holds 0 */
+}
+
+void name_table_free(name_table *t) {
+    free(t->start);
+    free(t->text);
+    free(t->slots.slots);
+    *t = (name_table){0};
+}
+
+static uint64_t point_hash(const void *table, size_t i) {
+    const point_table *t = table;
+    return XXH3_64bits(t->points[i], sizeof t->points[i]);
+}
+
+lam_status point_table_add(point_table *t, const double point[3], uint32_t *index, lam_error *error) {
+    lam_status status = LAM_OK;
+    const double p[3] = {point[0] + 0.0, point[1] + 0.0, point[2] + 0.0}; /* turns -0 into 0 */
+    if ((t->n + 1) * 2 > t->slots.n_slots) TRY(slots_grow(&t->slots, t->n, point_hash, t, error));
+    size_t slot = XXH3_64bits(p, sizeof p) & (t->slots.n_slots - 1);
+    while (t->slots.slots[slot] != 0 && memcmp(t->points[t->slots.slots[slot] - 1], p, sizeof p) != 0)
+        slot = (slot + 1) & (t->slots.n_slots - 1);
+    if (t->slots.slots[slot] == 0) {
+        if (t->n >= most_entries) FAIL(error, LAM_ERR_MEMORY, "mesh: more than %zu vertices", most_entries);
+        void *points = array_grow(t->points, &t->capacity, t->n + 1, sizeof *t->points, "vertices", error);
+        if (points == NULL) TRY(LAM_ERR_MEMORY);
+        t->points = points;
+        memcpy(t->points[t->n], p, sizeof p);
+        t->slots.slots[slot] = (uint32_t)++t->n;
+    }
+    *index = t->slots.slots[slot] - 1;
+done:
+    return status;
+}
+
+void point_table_free(point_table *t) {
+    free(t->points);
+    free(t->slots.slots);
+    *t = (point_table){0};
+}

@@ -1,0 +1,51 @@
+/* Growing arrays and the two tables that scenes are made with: names and points, each entry kept once.
+ * Private to solver/scene. */
+#ifndef LAMBERT_SCENE_TABLES_H
+#define LAMBERT_SCENE_TABLES_H
+
+#include "store/status.h"
+
+#include <stdint.h>
+
+/* No entry: a face without an object name or a material. */
+#define TABLE_NONE 0xFFFFFFFFu
+
+/* data, or its larger copy, with room for count items of size bytes; *capacity is in items, never 0 after
+ * success. NULL when that fails: data is then as it was. */
+void *array_grow(void *data, size_t *capacity, size_t count, size_t size, const char *what, lam_error *error);
+
+/* Open addressing: slot -> index + 1 of an entry, 0 when free. */
+typedef struct table_slots {
+    uint32_t *slots;
+    size_t n_slots; /* a power of two, or 0 */
+} table_slots;
+
+/* Texts, one after the other in text with their NULs; start[i] is where text i begins. */
+typedef struct name_table {
+    size_t n;
+    size_t *start;
+    size_t start_capacity;
+    char *text;
+    size_t text_bytes, text_capacity;
+    table_slots slots;
+} name_table;
+
+/* *index = the entry that equals the first length bytes of name, added when it is new. */
+lam_status name_table_add(name_table *t, const char *name, size_t length, uint32_t *index, lam_error *error);
+const char *name_table_get(const name_table *t, size_t index);
+/* The index of name, or TABLE_NONE. */
+uint32_t name_table_find(const name_table *t, const char *name);
+void name_table_free(name_table *t);
+
+/* Points; two are the same when all coordinates are equal (-0 equals 0). */
+typedef struct point_table {
+    size_t n;
+    double (*points)[3];
+    size_t capacity;
+    table_slots slots;
+} point_table;
+
+lam_status point_table_add(point_table *t, const double point[3], uint32_t *index, lam_error *error);
+void point_table_free(point_table *t);
+
+#endif
