@@ -1,0 +1,131 @@
+#include "solver/formfactor/formfactor.h"
+
+#include "solver/formfactor/rays.h"
+#include "solver/formfactor/repair.h"
+#include "solver/formfactor/visibility.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* A scene is closed when less than this share of its rays leaves: in single precision a few rays slip between
+ * elements that meet without sharing vertices, or start behind a neighbour and meet its back. Their share is
+ * put back by the repair. */
+static const double crack_share = 1e-4;
+
+enum { MIN_AUTO_RAYS = 256, MAX_AUTO_RAYS = 65536 };
+
+void form_factors_free(form_factors *f) {
+    csr_free(&f->F);
+    free(f->row_sums);
+    free(f->leaving);
+    free(f->absorbed);
+    *f = (form_factors){0};
+}
+
+size_t form_factors_auto_rays(double epsilon, double share) {
+    /* sqrt(2 / rays) <= share epsilon */
+    const double wanted = 2 / (share * epsilon * share * epsilon);
+    size_t rays = MIN_AUTO_RAYS;
+    while (rays < MAX_AUTO_RAYS && (double)rays < wanted) rays *= 2;
+    return rays;
+}
+
+static double area_mean(const mesh *m, const double *x) {
+    double sum = 0, total = 0;
+    for (size_t i = 0; i < m->n; i++) {
+        sum += m->area[i] * x[i];
+        total += m->area[i];
+    }
+    return total > 0 ? sum / total : 0;
+}
+
+lam_status form_factors_trace(const mesh *m, const uint32_t *order, const ray_options *options,
+                              form_factors *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = m->n;
+    visibility *v = NULL;
+    csr counts = {0};
+    form_factors f = {.rays = options->rays, .seed = options->seed};
+    double *outside = NULL;
+    if (options->rays == 0 || options->rays > 1u << 24)
+        FAIL(error, LAM_ERR_ARGUMENT, "--rays %zu: must be from 1 to %u", options->rays, 1u << 24);
+    snprintf(f.method, sizeof f.method, "rays");
+    f.leaving = memory_allocate(n, sizeof *f.leaving, "form factors", error);
+    f.absorbed = memory_allocate(n, sizeof *f.absorbed, "form factors", error);
+    outside = memory_allocate(n, sizeof *outside, "form factors", error);
+    if (f.leaving == NULL || f.absorbed == NULL || outside == NULL) TRY(LAM_ERR_MEMORY);
+
+    TRY(visibility_create(m, &v, error));
+    TRY(rays_count(m, v, order, options, &counts, f.leaving, f.absorbed, error));
+    TRY(repair_merge(&counts, options->rays, m->area, &f.F, error));
+    csr_free(&counts);
+    f.leaving_share = area_mean(m, f.leaving);
+    f.absorbed_share = area_mean(m, f.absorbed);
+    f.closed = f.leaving_share < crack_share;
+    for (size_t i = 0; i < n; i++)
+        outside[i] = (f.closed ? 0 : f.leaving[i]) + (f.absorbed_share < crack_share ? 0 : f.absorbed[i]);
+    TRY(repair_close(&f.F, m->area, outside, &f, error));
+    *out = f;
+    f = (form_factors){0};
+done:
+    visibility_destroy(v);
+    csr_free(&counts);
+    free(outside);
+    form_factors_free(&f);
+    return status;
+}
+
+/* The mean of row i of two CSRs; returns how many indices either has. With indices NULL it only counts. */
+static size_t mean_row(const csr *a, const csr *b, size_t i, uint32_t *indices, float *data) {
+    uint64_t p = a->indptr[i], q = b->indptr[i];
+    size_t length = 0;
+    while (p < a->indptr[i + 1] || q < b->indptr[i + 1]) {
+        const uint32_t ja = p < a->indptr[i + 1] ? a->indices[p] : UINT32_MAX;
+        const uint32_t jb = q < b->indptr[i + 1] ? b->indices[q] : UINT32_MAX;
+        const uint32_t j = ja < jb ? ja : jb;
+        float sum = 0;
+        if (ja == j) sum += .5f * a->data[p++];
+        if (jb == j) sum += .5f * b->data[q++];
+        if (indices != NULL) {
+            indices[length] = j;
+            data[length] = sum;
+        }
+        length++;
+    }
+    return length;
+}
+
+lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_factors *out,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = a->F.n;
+    form_factors f = *a;
+    f.F = (csr){.n = n};
+    f.row_sums = f.leaving = f.absorbed = NULL;
+    f.rays = a->rays + b->rays;
+    if (b->F.n != n)
+        FAIL(error, LAM_ERR_ARGUMENT, "form factors of %zu and %zu elements cannot be averaged", n, b->F.n);
+    f.row_sums = memory_allocate(n, sizeof *f.row_sums, "form factors", error);
+    f.leaving = memory_allocate(n, sizeof *f.leaving, "form factors", error);
+    f.absorbed = memory_allocate(n, sizeof *f.absorbed, "form factors", error);
+    f.F.indptr = memory_allocate(n + 1, sizeof *f.F.indptr, "form factors", error);
+    if (f.row_sums == NULL || f.leaving == NULL || f.absorbed == NULL || f.F.indptr == NULL)
+        TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < n; i++) f.F.indptr[i + 1] = f.F.indptr[i] + mean_row(&a->F, &b->F, i, NULL, NULL);
+    f.F.indices = memory_allocate(f.F.indptr[n], sizeof *f.F.indices, "form factors", error);
+    f.F.data = memory_allocate(f.F.indptr[n], sizeof *f.F.data, "form factors", error);
+    if (f.F.indices == NULL || f.F.data == NULL) TRY(LAM_ERR_MEMORY);
+#pragma omp parallel for schedule(static, 64)
+    for (size_t i = 0; i < n; i++) {
+        mean_row(&a->F, &b->F, i, f.F.indices + f.F.indptr[i], f.F.data + f.F.indptr[i]);
+        for (uint64_t p = f.F.indptr[i]; p < f.F.indptr[i + 1]; p++) f.row_sums[i] += (double)f.F.data[p];
+        f.leaving[i] = .5 * (a->leaving[i] + b->leaving[i]);
+        f.absorbed[i] = .5 * (a->absorbed[i] + b->absorbed[i]);
+    }
+    *out = f;
+    f = (form_factors){0};
+done:
+    form_factors_free(&f);
+    return status;
+}

@@ -1,0 +1,13 @@
+/* Ray counting: how many of an element's rays first meet each other element. */
+#ifndef LAMBERT_FORMFACTOR_RAYS_H
+#define LAMBERT_FORMFACTOR_RAYS_H
+
+#include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/visibility.h"
+
+/* counts gets rows of hits (as floats, exact up to 2^24); leaving and absorbed, [n], the shares that met
+ * nothing or a back face. The caller frees counts with csr_free. */
+lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order, const ray_options *options,
+                      csr *counts, double *leaving, double *absorbed, lam_error *error);
+
+#endif

@@ -1,0 +1,134 @@
+#include "solver/formfactor/sample.h"
+
+#include <math.h>
+
+/* Steps of the 4-d Kronecker sequence: frac(phi^-d), d = 1 ... 4, in units of 2^-32, where phi^5 = phi + 1
+ * (the generalised golden ratio; Roberts 2018). */
+static const uint32_t kronecker_step[4] = {3679390609u, 3152041523u, 2700274807u, 2313257605u};
+
+/* A well-mixed 64-bit value of x (the finalizer of SplitMix64; Steele et al. 2014). */
+static uint64_t mix(uint64_t x) {
+    x += 0x9E3779B97F4A7C15u;
+    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
+    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
+    return x ^ (x >> 31);
+}
+
+static void set_piece(element_sampler *s, int piece, const double *a, const double *b, const double *c,
+                      const visibility *v) {
+    visibility_recentre(v, a, s->corner[piece]);
+    for (int d = 0; d < 3; d++) {
+        s->edge[piece][0][d] = (float)(b[d] - a[d]);
+        s->edge[piece][1][d] = (float)(c[d] - a[d]);
+    }
+}
+
+static double triangle_area(const double *a, const double *b, const double *c) {
+    double u[3], w[3];
+    for (int d = 0; d < 3; d++) {
+        u[d] = b[d] - a[d];
+        w[d] = c[d] - a[d];
+    }
+    const double x = u[1] * w[2] - u[2] * w[1], y = u[2] * w[0] - u[0] * w[2], z = u[0] * w[1] - u[1] * w[0];
+    return .5 * sqrt(x * x + y * y + z * z);
+}
+
+/* The frame is turned about the first edge; which edge does not matter, the sequence is shifted anyway. */
+static void set_frame(element_sampler *s, const float *normal, const double *a, const double *b) {
+    double t[3], length = 0;
+    for (int d = 0; d < 3; d++) length += (b[d] - a[d]) * (b[d] - a[d]);
+    length = sqrt(length);
+    for (int d = 0; d < 3; d++) t[d] = (b[d] - a[d]) / length;
+    const double n[3] = {normal[0], normal[1], normal[2]};
+    for (int d = 0; d < 3; d++) {
+        s->normal[d] = normal[d];
+        s->tangent[d] = (float)t[d];
+        s->bitangent[d] = (float)(n[(d + 1) % 3] * t[(d + 2) % 3] - n[(d + 2) % 3] * t[(d + 1) % 3]);
+    }
+}
+
+void element_sampler_init(element_sampler *s, const mesh *m, const visibility *v, size_t element,
+                          uint64_t seed) {
+    const uint32_t *corner = m->elements[element];
+    const double *a = m->vertices[corner[0]], *b = m->vertices[corner[1]], *c = m->vertices[corner[2]];
+    s->parallelogram = false;
+    s->first_share = 1;
+    set_piece(s, 0, a, b, c, v);
+    if (corner[3] != MESH_NO_VERTEX) {
+        const double *e = m->vertices[corner[3]];
+        double off = 0, size = 0;
+        for (int d = 0; d < 3; d++) {
+            off += fabs(a[d] - b[d] + c[d] - e[d]);
+            size += fabs(c[d] - a[d]) + fabs(e[d] - b[d]);
+        }
+        s->parallelogram = off <= 1e-9 * size;
+        if (s->parallelogram) {
+            set_piece(s, 0, a, b, e, v);
+        } else {
+            const double first = triangle_area(a, b, c), second = triangle_area(a, c, e);
+            s->first_share = (float)(first / (first + second));
+            set_piece(s, 1, a, c, e, v);
+        }
+    }
+    set_frame(s, m->normal[element], a, b);
+    uint64_t state = mix(seed) ^ mix((uint64_t)element + 1);
+    for (int d = 0; d < 4; d += 2) {
+        state = mix(state);
+        s->shift[d] = (uint32_t)state;
+        s->shift[d + 1] = (uint32_t)(state >> 32);
+    }
+}
+
+/* A 32-bit fraction as a float in [0, 1). */
+static inline float fraction(uint32_t x) {
+    return (float)(x >> 8) * 0x1p-24f;
+}
+
+/* Shirley and Chiu's concentric map of the square to the disc: it keeps neighbours together, so a sequence
+ * that is even in the square stays even in the disc. x, y in [-1, 1]; the sine and cosine of |angle| <= pi/4
+ * are Taylor polynomials good to 4e-8. */
+static inline void square_to_disc(float x, float y, float *dx, float *dy) {
+    const float ax = fabsf(x), ay = fabsf(y);
+    const float r = ax > ay ? x : y;
+    const float ratio = ax > ay ? y / x : (ay > 0 ? x / y : 0);
+    const float t = .785398163f * ratio, t2 = t * t;
+    const float sine =
+        t * (1 + t2 * (-1.f / 6 + t2 * (1.f / 120 + t2 * (-1.f / 5040 + t2 * (1.f / 362880)))));
+    const float cosine = 1 + t2 * (-.5f + t2 * (1.f / 24 + t2 * (-1.f / 720 + t2 * (1.f / 40320))));
+    *dx = r * (ax > ay ? cosine : sine);
+    *dy = r * (ax > ay ? sine : cosine);
+}
+
+void element_sampler_packet(const element_sampler *s, uint32_t first, ray_packet *rays) {
+    float x[4][VISIBILITY_PACKET];
+    for (int d = 0; d < 4; d++)
+        for (uint32_t i = 0; i < VISIBILITY_PACKET; i++)
+            x[d][i] = fraction(s->shift[d] + (first + i) * kronecker_step[d]);
+
+    for (int i = 0; i < VISIBILITY_PACKET; i++) {
+        float u = x[0][i], w = x[1][i];
+        int piece = 0;
+        if (!s->parallelogram) {
+            /* The first coordinate chooses the triangle and is stretched again; then the square is folded. */
+            if (u < s->first_share) {
+                u = u / s->first_share;
+            } else {
+                u = (u - s->first_share) / (1 - s->first_share);
+                piece = 1;
+            }
+            if (u + w > 1) {
+                u = 1 - u;
+                w = 1 - w;
+            }
+        }
+        for (int d = 0; d < 3; d++)
+            rays->origin[d][i] = s->corner[piece][d] + u * s->edge[piece][0][d] + w * s->edge[piece][1][d];
+    }
+    for (int i = 0; i < VISIBILITY_PACKET; i++) {
+        float dx, dy;
+        square_to_disc(2 * x[2][i] - 1, 2 * x[3][i] - 1, &dx, &dy);
+        const float dz = sqrtf(fmaxf(1 - dx * dx - dy * dy, 1e-12f));
+        for (int d = 0; d < 3; d++)
+            rays->direction[d][i] = dx * s->tangent[d] + dy * s->bitangent[d] + dz * s->normal[d];
+    }
+}

@@ -1,0 +1,39 @@
+/* What a ray hits: the only room with Embree in it. Immutable once made, so any number of threads may ask. */
+#ifndef LAMBERT_FORMFACTOR_VISIBILITY_H
+#define LAMBERT_FORMFACTOR_VISIBILITY_H
+
+#include "solver/scene/mesh.h"
+
+typedef struct visibility visibility;
+
+#define VISIBILITY_NOTHING 0xFFFFFFFFu
+#define VISIBILITY_PACKET 8
+
+/* Eight rays, recentred coordinates (visibility_recentre), one array a component as vector units like it. */
+typedef struct ray_packet {
+    float origin[3][VISIBILITY_PACKET];
+    float direction[3][VISIBILITY_PACKET];
+} ray_packet;
+
+/* What each ray of a packet met: the element whose front (or, with back set, whose back) it hit, or
+ * VISIBILITY_NOTHING; the distance along the direction, whose length is the unit. */
+typedef struct hit_packet {
+    uint32_t element[VISIBILITY_PACKET];
+    bool back[VISIBILITY_PACKET];
+    float distance[VISIBILITY_PACKET];
+} hit_packet;
+
+/* Builds the acceleration structure over a mesh, which must outlive it. Errors: LAM_ERR_MEMORY, _INTERNAL. */
+lam_status visibility_create(const mesh *m, visibility **out, lam_error *error);
+void visibility_destroy(visibility *v);
+
+/* A point of the scene in the recentred single precision that rays are given in. */
+void visibility_recentre(const visibility *v, const double point[3], float recentred[3]);
+
+/* Casts the first n_rays rays of a packet. self[i] is the element a ray leaves (itself and, if two-sided, its
+ * back are never hit), or VISIBILITY_NOTHING. cull_back looks through back faces instead of reporting them.
+ */
+void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
+                     bool cull_back, hit_packet *hits);
+
+#endif
