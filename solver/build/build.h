@@ -1,0 +1,57 @@
+/* From form factors to an operator: the offline half. One file per method; methods.c lists them. */
+#ifndef LAMBERT_BUILD_BUILD_H
+#define LAMBERT_BUILD_BUILD_H
+
+#include "solver/operator/csr.h"
+#include "solver/operator/operator.h"
+#include "solver/progress.h"
+
+/* What every method is given. All in mesh order; order[position] = element is the Z-order. */
+typedef struct build_problem {
+    size_t n;
+    size_t n_channels;
+    const double *area;       /* [n] */
+    const float *reflectance; /* [C][n], in [0, 1) */
+    const csr *F;
+    const uint32_t *order; /* [n] */
+} build_problem;
+
+typedef struct build_options {
+    const char *method;     /* "auto", "exact", "low-rank", ... */
+    const char *factorizer; /* "auto", "hf", ... */
+    double epsilon;
+    double alpha;
+    int levels;    /* negative: auto */
+    size_t rank;   /* 0: by epsilon; else exactly min(rank, n) columns */
+    size_t memory; /* bytes it may use; 0: no limit */
+    const progress *progress;
+} build_options;
+
+typedef struct build_report {
+    const char *method;     /* as built; static text */
+    const char *factorizer; /* or NULL */
+    char reason[256];       /* why this method */
+    size_t rank;
+    int levels;
+    double epsilon;             /* the bound reached; negative when it has none */
+    double measured_norm_error; /* |S - Q V^T|_2 by power iteration; negative when not measured */
+    double rcond;               /* of the matrix inverted; 1 when none was */
+    double factorize_seconds, invert_seconds;
+} build_report;
+
+/* A method: fills op (closed by the caller) and report. Errors: LAM_ERR_NUMERIC, _MEMORY, _CANCELLED. */
+typedef struct build_method {
+    const char *name;
+    lam_status (*build)(const build_problem *problem, const build_options *options, lam_operator **op,
+                        build_report *report, lam_error *error);
+} build_method;
+
+extern const build_method build_exact;
+extern const build_method build_low_rank;
+
+/* Builds by options->method ("auto" chooses and says why). LAM_ERR_UNSUPPORTED for a method of the contract
+ * that is still to come. */
+lam_status build_operator(const build_problem *problem, const build_options *options, lam_operator **op,
+                          build_report *report, lam_error *error);
+
+#endif

@@ -1,0 +1,91 @@
+/* The list of methods and the choice among them. */
+#include "solver/build/build.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* Up to this many elements the whole inverse is small, exact, and built in well under a second. */
+enum { AUTO_EXACT_ELEMENTS = 1024, EXACT_ELEMENTS = 8192 };
+
+static const build_method *const methods[] = {&build_exact, &build_low_rank};
+
+/* Methods and factorizers of the contract that are still to come. */
+static const char *const later_methods[] = {"2msc", "sparse", "emitters", "hierarchical"};
+static const char *const later_factorizers[] = {"svd", "rsi", "sgrsvd"};
+
+static bool is_among(const char *name, const char *const *list, size_t n) {
+    for (size_t i = 0; i < n; i++)
+        if (strcmp(name, list[i]) == 0) return true;
+    return false;
+}
+
+static lam_status check_options(const build_options *options, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (is_among(options->method, later_methods, sizeof later_methods / sizeof *later_methods))
+        FAIL(error, LAM_ERR_UNSUPPORTED, "--method %s is not supported yet", options->method);
+    if (is_among(options->factorizer, later_factorizers,
+                 sizeof later_factorizers / sizeof *later_factorizers))
+        FAIL(error, LAM_ERR_UNSUPPORTED, "--factorizer %s is not supported yet", options->factorizer);
+    if (strcmp(options->factorizer, "auto") != 0 && strcmp(options->factorizer, "hf") != 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "--factorizer %.40s: unknown; use auto or hf", options->factorizer);
+    if (!(options->epsilon > 0 && options->epsilon <= 1))
+        FAIL(error, LAM_ERR_ARGUMENT, "--epsilon %g: must be above 0 and at most 1", options->epsilon);
+    if (!(options->alpha > 0 && options->alpha < 1))
+        FAIL(error, LAM_ERR_ARGUMENT, "--alpha %g: must be above 0 and below 1", options->alpha);
+done:
+    return status;
+}
+
+/* auto: exact while it is small, else low-rank; exact again where the rank turns out to save nothing. */
+static lam_status build_auto(const build_problem *problem, const build_options *options, lam_operator **op,
+                             build_report *report, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = problem->n;
+    lam_operator *low_rank = NULL;
+    if (n <= AUTO_EXACT_ELEMENTS) {
+        TRY(build_exact.build(problem, options, op, report, error));
+        snprintf(report->reason, sizeof report->reason,
+                 "exact: %zu elements are few enough (up to %d) to keep the whole inverse", n,
+                 AUTO_EXACT_ELEMENTS);
+        return LAM_OK;
+    }
+    TRY(build_low_rank.build(problem, options, &low_rank, report, error));
+    const size_t rank = report->rank;
+    if (2 * rank >= n && n <= EXACT_ELEMENTS) {
+        const double spent = report->factorize_seconds;
+        TRY(build_exact.build(problem, options, op, report, error));
+        report->factorize_seconds = spent;
+        snprintf(report->reason, sizeof report->reason,
+                 "exact: rank %zu of %zu at epsilon %g would take more memory than the whole inverse", rank,
+                 n, options->epsilon);
+    } else {
+        *op = low_rank;
+        low_rank = NULL;
+        snprintf(report->reason, sizeof report->reason,
+                 "low-rank: rank %zu of %zu at epsilon %g keeps %.1f %% of the whole inverse", rank, n,
+                 options->epsilon, 200. * (double)rank / (double)n);
+    }
+done:
+    lam_operator_close(low_rank);
+    return status;
+}
+
+lam_status build_operator(const build_problem *problem, const build_options *options, lam_operator **op,
+                          build_report *report, lam_error *error) {
+    lam_status status = LAM_OK;
+    *report = (build_report){.measured_norm_error = -1, .rcond = 1};
+    TRY(check_options(options, error));
+    if (strcmp(options->method, "auto") == 0) {
+        TRY(build_auto(problem, options, op, report, error));
+        goto done;
+    }
+    for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
+        if (strcmp(options->method, methods[i]->name) != 0) continue;
+        TRY(methods[i]->build(problem, options, op, report, error));
+        snprintf(report->reason, sizeof report->reason, "%s: asked for by --method", methods[i]->name);
+        goto done;
+    }
+    FAIL(error, LAM_ERR_ARGUMENT, "--method %.40s: unknown; use auto, exact or low-rank", options->method);
+done:
+    return status;
+}

@@ -1,0 +1,107 @@
+#include "solver/build/norm.h"
+
+#include <cblas.h>
+#include <lapacke.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { STEPS = 32 };
+
+/* The difference D = S - Q V^T and the space its products need. */
+typedef struct difference {
+    const scaled_matrix *S;
+    const uint32_t *order;
+    const tall_factors *f;
+    double *y;       /* [n] */
+    float *x_single; /* [n] */
+    float *t;        /* [rank] */
+} difference;
+
+/* y = D x, or y = D^T x; the product with Q V^T is made in single precision, its rounding is far below any
+ * bound a factorization in single precision can have. */
+static void difference_multiply(const difference *D, bool transposed, const double *x, double *y) {
+    const size_t n = D->f->n, k = D->f->rank;
+    scaled_multiply(D->S, x, y); /* S is symmetric */
+    if (k == 0) return;
+    if (!transposed) {
+        for (size_t p = 0; p < n; p++) D->x_single[p] = (float)x[D->order[p]];
+        cblas_sgemv(CblasColMajor, CblasTrans, (int)n, (int)k, 1, D->f->V, (int)n, D->x_single, 1, 0, D->t,
+                    1);
+        cblas_sgemv(CblasColMajor, CblasNoTrans, (int)n, (int)k, 1, D->f->Q, (int)n, D->t, 1, 0, D->x_single,
+                    1);
+        for (size_t i = 0; i < n; i++) y[i] -= (double)D->x_single[i];
+    } else {
+        for (size_t i = 0; i < n; i++) D->x_single[i] = (float)x[i];
+        cblas_sgemv(CblasColMajor, CblasTrans, (int)n, (int)k, 1, D->f->Q, (int)n, D->x_single, 1, 0, D->t,
+                    1);
+        cblas_sgemv(CblasColMajor, CblasNoTrans, (int)n, (int)k, 1, D->f->V, (int)n, D->t, 1, 0, D->x_single,
+                    1);
+        for (size_t p = 0; p < n; p++) y[D->order[p]] -= (double)D->x_single[p];
+    }
+}
+
+/* Largest eigenvalue of the symmetric tridiagonal matrix of Lanczos. */
+static lam_status largest_ritz(int steps, const double *diagonal, const double *off, double *largest,
+                               lam_error *error) {
+    double d[STEPS], e[STEPS];
+    memcpy(d, diagonal, (size_t)steps * sizeof *d);
+    memcpy(e, off, (size_t)steps * sizeof *e);
+    const lapack_int info = LAPACKE_dsterf(steps, d, e);
+    if (info != 0) return status_fail(error, LAM_ERR_NUMERIC, "norm: LAPACK dsterf returned %d", (int)info);
+    *largest = d[steps - 1];
+    return LAM_OK;
+}
+
+lam_status norm_of_error(const scaled_matrix *S, const uint32_t *order, const tall_factors *f,
+                         const progress *p, double *norm, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = f->n;
+    const int steps = n < STEPS ? (int)n : STEPS;
+    difference D = {.S = S, .order = order, .f = f};
+    double *basis = memory_allocate((size_t)steps * n, sizeof *basis, "norm", error);
+    double *w = memory_allocate(n, sizeof *w, "norm", error);
+    D.y = memory_allocate(n, sizeof *D.y, "norm", error);
+    D.x_single = memory_allocate(n, sizeof *D.x_single, "norm", error);
+    D.t = memory_allocate(f->rank, sizeof *D.t, "norm", error);
+    if (basis == NULL || w == NULL || D.y == NULL || D.x_single == NULL || D.t == NULL) TRY(LAM_ERR_MEMORY);
+
+    /* A start that no symmetry of a scene is likely to be orthogonal to. */
+    uint64_t state = 1;
+    for (size_t i = 0; i < n; i++) {
+        state = state * 6364136223846793005u + 1442695040888963407u;
+        basis[i] = (double)(state >> 11) * 0x1p-53 - .5;
+    }
+    cblas_dscal((int)n, 1 / cblas_dnrm2((int)n, basis, 1), basis, 1);
+
+    double diagonal[STEPS] = {0}, off[STEPS] = {0}, largest = 0;
+    int done_steps = 0;
+    for (int s = 0; s < steps; s++) {
+        if (progress_cancelled(p)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+        progress_report(p, "check norm", (double)s / steps);
+        const double *q = basis + (size_t)s * n;
+        difference_multiply(&D, false, q, D.y);
+        difference_multiply(&D, true, D.y, w);
+        diagonal[s] = cblas_ddot((int)n, q, 1, w, 1);
+        done_steps = s + 1;
+        for (int twice = 0; twice < 2; twice++)
+            for (int b = 0; b <= s; b++) {
+                const double *v = basis + (size_t)b * n;
+                cblas_daxpy((int)n, -cblas_ddot((int)n, v, 1, w, 1), v, 1, w, 1);
+            }
+        off[s] = cblas_dnrm2((int)n, w, 1);
+        if (s + 1 == steps || off[s] <= 1e-14) break;
+        cblas_dcopy((int)n, w, 1, basis + (size_t)(s + 1) * n, 1);
+        cblas_dscal((int)n, 1 / off[s], basis + (size_t)(s + 1) * n, 1);
+    }
+    TRY(largest_ritz(done_steps, diagonal, off, &largest, error));
+    *norm = sqrt(fmax(largest, 0));
+done:
+    free(basis);
+    free(w);
+    free(D.y);
+    free(D.x_single);
+    free(D.t);
+    return status;
+}
