@@ -1,0 +1,290 @@
+/* lambert render: a picture of a store under any lighting. */
+#include "solver/emission.h"
+#include "solver/operator/operator.h"
+#include "solver/output_file.h"
+#include "solver/picture.h"
+#include "solver/terminal.h"
+#include "solver/verbs.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct camera_option {
+    bool given;
+    double eye[3], target[3], fov;
+} camera_option;
+
+typedef struct size_option {
+    size_t width, height;
+} size_option;
+
+typedef struct fields {
+    option_list emit;
+    const char *emission;
+    const char *quantity;
+    camera_option camera;
+    size_option size;
+    double exposure;
+    bool false_color;
+    bool smooth;
+    const char *output;
+} fields;
+
+static lam_status parse_camera(const char *text, void *field, lam_error *error) {
+    lam_status status = LAM_OK;
+    camera_option *option = field;
+    double numbers[7];
+    camera ignored;
+    TRY(option_numbers("--camera", text, 7, true, numbers, NULL, error));
+    TRY(camera_look(numbers, numbers + 3, numbers[6], 1, 'z', &ignored, error));
+    option->given = true;
+    memcpy(option->eye, numbers, sizeof option->eye);
+    memcpy(option->target, numbers + 3, sizeof option->target);
+    option->fov = numbers[6];
+done:
+    return status;
+}
+
+static lam_status parse_size(const char *text, void *field, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_option *option = field;
+    const char *x = strchr(text, 'x');
+    char width_text[24];
+    uint64_t width, height;
+    if (x == NULL || (size_t)(x - text) >= sizeof width_text)
+        FAIL(error, LAM_ERR_ARGUMENT, "--size %s: must be WxH pixels, such as 640x480", text);
+    memcpy(width_text, text, (size_t)(x - text));
+    width_text[x - text] = '\0';
+    if (option_count("--size", width_text, &width, NULL) != LAM_OK ||
+        option_count("--size", x + 1, &height, NULL) != LAM_OK)
+        FAIL(error, LAM_ERR_ARGUMENT, "--size %s: must be WxH pixels, such as 640x480", text);
+    TRY(image_check_size(width, height, error));
+    *option = (size_option){width, height};
+done:
+    return status;
+}
+
+#define FIELD(member) offsetof(fields, member)
+static const option_row rows[] = {
+    {.name = "output",
+     .letter = 'o',
+     .kind = OPTION_TEXT,
+     .offset = FIELD(output),
+     .value = "IMAGE.png",
+     .doc = "Where the picture goes"},
+    {.kind = OPTION_HEADING, .doc = "light (without: the scene's own)"},
+    {.name = "emit",
+     .kind = OPTION_LIST,
+     .offset = FIELD(emit),
+     .value = "GROUP=V[,V,V]",
+     .doc = "A group emits V W/m2, one number or one per channel; again for more groups"},
+    {.name = "emission",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(emission),
+     .value = "FILE.npy|.json",
+     .doc = "One emission from a file"},
+    {.name = "sky", .kind = OPTION_LATER, .value = "FILE.npy", .doc = "(not supported yet)"},
+    {.kind = OPTION_HEADING, .doc = "view"},
+    {.name = "quantity",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(quantity),
+     .value = "NAME",
+     .doc = "radiosity (the default), irradiance or indirect",
+     .choices = "radiosity|irradiance|indirect",
+     .later = "coherence|patch|visible"},
+    {.name = "camera",
+     .kind = OPTION_CUSTOM,
+     .offset = FIELD(camera),
+     .value = "EYE,TARGET,FOV",
+     .doc = "x,y,z,x,y,z,degrees: from where, to where, how high the picture is (chosen to show the scene)",
+     .parse = parse_camera},
+    {.name = "size",
+     .kind = OPTION_CUSTOM,
+     .offset = FIELD(size),
+     .value = "WxH",
+     .doc = "Pixels (640x640)",
+     .parse = parse_size},
+    {.name = "exposure",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(exposure),
+     .value = "EV",
+     .doc = "Twice as bright for each 1 (0)",
+     .low = -60,
+     .high = 60},
+    {.name = "false-color",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(false_color),
+     .doc = "Colours for values, with a legend"},
+    {.name = "smooth", .kind = OPTION_FLAG, .offset = FIELD(smooth), .doc = "Interpolate within a surface"},
+    {.name = "animate", .kind = OPTION_LATER, .value = "FRAMES.npy", .doc = "(not supported yet)"},
+    {0},
+};
+
+static const option_verb verb = {
+    .name = "render",
+    .arguments = "STORE -o IMAGE.png",
+    .summary = "Draws what a store answers: every element in the light it gives back, seen by a camera. Back "
+               "faces are looked through.",
+    .options = rows,
+    .min_arguments = 1,
+    .max_arguments = 1,
+};
+
+/* One solve: *values is [C][n], freed by the caller. */
+static lam_status solve(const lam_operator *op, lam_quantity quantity, const float *E, float **values,
+                        lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t work_bytes = lam_operator_work_bytes(op, 1);
+    float *out = memory_allocate(lam_operator_elements(op), lam_operator_channels(op) * sizeof *out,
+                                 "the values shown", error);
+    void *work = memory_allocate(work_bytes, 1, "the work area of a solve", error);
+    if (out == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(lam_operator_apply(op, 1, quantity, E, out, work, work_bytes, error));
+    *values = out;
+    out = NULL;
+done:
+    free(out);
+    free(work);
+    return status;
+}
+
+static float luminance_of(const mesh *m, const float *values, size_t i) {
+    float channels[3] = {0, 0, 0};
+    for (size_t c = 0; c < m->n_channels && c < 3; c++) channels[c] = values[c * m->n + i];
+    return tone_luminance(channels, m->n_channels);
+}
+
+/* Which elements have light at all, and which show mostly their own. */
+static void mark(const mesh *m, const float *values, const float *E, bool emission_shows, bool *lit,
+                 bool *glows) {
+    float largest = 0;
+    for (size_t i = 0; i < m->n; i++) largest = fmaxf(largest, luminance_of(m, values, i));
+    for (size_t i = 0; i < m->n; i++) {
+        const float shown = luminance_of(m, values, i);
+        lit[i] = shown > 1e-6f * largest;
+        glows[i] = emission_shows && luminance_of(m, E, i) > .5f * shown;
+    }
+}
+
+/* The next number whose quarters are short. */
+static double round_up(double x) {
+    static const double steps[] = {1, 1.2, 1.6, 2, 2.4, 2.8, 3.2, 4, 4.8, 6, 8, 10};
+    if (!(x > 0)) return 1;
+    const double unit = pow(10, floor(log10(x)));
+    size_t i = 0;
+    while (i + 1 < sizeof steps / sizeof steps[0] && steps[i] * unit < x) i++;
+    return steps[i] * unit;
+}
+
+/* The columns of the picture that show the scene. */
+static size_t view_width(const fields *f) {
+    return f->size.width - (f->false_color ? picture_legend_width(f->size.width, f->size.height) : 0);
+}
+
+static lam_status choose_camera(const fields *f, const picture_scene *scene, const bool *lit, camera *c,
+                                lam_error *error) {
+    const double aspect = (double)view_width(f) / (double)f->size.height;
+    if (f->camera.given)
+        return camera_look(f->camera.eye, f->camera.target, f->camera.fov, aspect, scene->mesh->up, c, error);
+    return camera_choose(scene->mesh, scene->visibility, lit, aspect, c, error);
+}
+
+static lam_status draw(const fields *f, const picture_scene *scene, const camera *c, const progress *how,
+                       terminal *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    image picture = {0};
+    tone_histogram histogram = {0};
+    picture_look look = {.width = view_width(f)};
+    const size_t channels = f->false_color || shade_channels(scene->shade) == 3 ? 3 : 1;
+    TRY(image_create(f->size.width, f->size.height, channels, &picture, error));
+    picture_measure(scene, c, &histogram);
+    if (f->false_color)
+        look.range = round_up(tone_histogram_quantile(&histogram, .99) / exp2(f->exposure));
+    else
+        look.exposure = tone_exposure(&histogram) * exp2(f->exposure);
+    TRY(picture_draw(scene, c, &look, how, &picture, error));
+    if (f->false_color) picture_legend(look.range, &picture);
+    TRY(image_write_png(&picture, f->output, error));
+    terminal_log(t, "camera %.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.4g", c->eye[0], c->eye[1], c->eye[2],
+                 c->eye[0] + c->forward[0], c->eye[1] + c->forward[1], c->eye[2] + c->forward[2],
+                 2 * atan(c->tan_y) * 180 / M_PI);
+    if (f->false_color)
+        terminal_log(t, "colours from 0 to %g W/m2", look.range);
+    else
+        terminal_log(t, "white is about %.3g W/m2", 1 / look.exposure);
+done:
+    image_free(&picture);
+    return status;
+}
+
+static lam_status render(const char *path, const fields *f, terminal *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    const progress how = terminal_progress(t);
+    store *s = NULL;
+    mesh m = {0};
+    lam_operator *op = NULL;
+    visibility *seen = NULL;
+    shade *shown = NULL;
+    emission light = {0};
+    double *row_sums = NULL;
+    float *values = NULL;
+    bool *lit = NULL, *glows = NULL, own = false;
+    camera c;
+
+    TRY(output_file_check(f->output, error));
+    TRY(store_open(path, &s, error));
+    TRY(mesh_load(s, &m, &row_sums, error));
+    TRY(emission_choose(&m, &f->emit, f->emission, &light, &own, error));
+    if (light.n_vectors != 1)
+        FAIL(error, LAM_ERR_ARGUMENT, "%s: holds %zu emissions, a picture shows exactly 1", f->emission,
+             light.n_vectors);
+    TRY(operator_load(s, &op, error));
+    TRY(terminal_check(error));
+    const lam_quantity quantity = strcmp(f->quantity, "irradiance") == 0 ? LAM_IRRADIANCE
+                                  : strcmp(f->quantity, "indirect") == 0 ? LAM_INDIRECT
+                                                                         : LAM_RADIOSITY;
+    TRY(solve(op, quantity, light.E, &values, error));
+    lit = memory_allocate(m.n, sizeof *lit, "lit elements", error);
+    glows = memory_allocate(m.n, sizeof *glows, "glowing elements", error);
+    if (lit == NULL || glows == NULL) TRY(LAM_ERR_MEMORY);
+    mark(&m, values, light.E, quantity == LAM_RADIOSITY, lit, glows);
+    if (own && memchr(glows, true, m.n) == NULL && memchr(lit, true, m.n) == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "%s: the scene has no light of its own; give --emit GROUP=V or --emission", path);
+    TRY(visibility_create(&m, &seen, error));
+    TRY(shade_create(&m, m.n_channels, values, f->smooth, &shown, error));
+    const picture_scene scene = {.mesh = &m, .visibility = seen, .shade = shown, .glows = glows};
+    TRY(choose_camera(f, &scene, lit, &c, error));
+    TRY(draw(f, &scene, &c, &how, t, error));
+done:
+    free(lit);
+    free(glows);
+    free(values);
+    free(row_sums);
+    shade_destroy(shown);
+    visibility_destroy(seen);
+    emission_free(&light);
+    lam_operator_close(op);
+    mesh_free(&m);
+    store_close(s);
+    return status;
+}
+
+int cmd_render(int argc, char **argv) {
+    fields f = {.quantity = "radiosity", .size = {640, 640}};
+    option_result result = {0};
+    lam_error error = {0};
+    terminal t;
+    char extension[16];
+    int go = options_parse(&verb, argc, argv, &f, &result);
+    if (go != OPTIONS_GO) return go;
+    if (f.output == NULL) return options_usage(verb.name, "give -o IMAGE.png");
+    output_file_extension(f.output, extension);
+    if (strcmp(extension, "png") != 0) return options_usage(verb.name, "-o %s: must end in .png", f.output);
+    if (f.emit.count > 0 && f.emission != NULL)
+        return options_usage(verb.name, "give --emit or --emission, not both");
+    terminal_open(&t, verb.name, false, false);
+    return render(result.arguments[0], &f, &t, &error) == LAM_OK ? 0 : terminal_fail(&t, &error);
+}

@@ -1,0 +1,40 @@
+/* Solutions as files: NPY, JSON, CSV, PLY, VTU. */
+#ifndef LAMBERT_SOLVER_OUTPUT_H
+#define LAMBERT_SOLVER_OUTPUT_H
+
+#include "solver/reduce.h"
+#include "solver/scene/mesh.h"
+
+#include <stdio.h>
+
+/* What a solve found, and what it was asked. */
+typedef struct solution {
+    const mesh *m;
+    const char *scene;
+    const char *quantity;
+    size_t n_vectors;
+    bool batch;
+    const float *values; /* [n_vectors][C][n] */
+    const reduction *reductions;
+    size_t n_reductions;       /* 0: the values themselves are written */
+    double relative, indirect; /* mean error that the store states; negative: not measured */
+} solution;
+
+/* Whether a file of this name can be written; LAM_ERR_ARGUMENT names the extensions that can,
+ * LAM_ERR_UNSUPPORTED those still to come. Reductions go into JSON and CSV only. */
+lam_status output_check(const char *path, bool reduced, lam_error *error);
+
+/* Writes path in the format of its extension, whole or not at all. */
+lam_status output_write(const solution *s, const char *path, lam_error *error);
+
+/* "radiosity", "radiosity_g", "radiosity_3_g": the column of a vector and channel. */
+#define OUTPUT_COLUMN 64
+void output_column(const solution *s, size_t vector, size_t channel, char name[OUTPUT_COLUMN]);
+
+/* The formats; a failed write is seen by ferror(stream). */
+lam_status output_json(const solution *s, FILE *stream, lam_error *error);
+void output_csv(const solution *s, FILE *stream);
+void output_ply(const solution *s, FILE *stream);
+void output_vtu(const solution *s, FILE *stream);
+
+#endif

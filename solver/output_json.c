@@ -1,0 +1,87 @@
+/* A solution as the daemon answers it. */
+#include "solver/output.h"
+
+#include <jansson.h>
+#include <math.h>
+
+/* Nine digits give back the same single-precision number. */
+#define FLOAT_DIGITS JSON_REAL_PRECISION(9)
+
+static json_t *row(const float *values, size_t n) {
+    json_t *out = json_array();
+    for (size_t i = 0; i < n; i++) json_array_append_new(out, json_real((double)values[i]));
+    return out;
+}
+
+/* [n], or [C][n] for more than one channel. */
+static json_t *vector(const solution *s, size_t v) {
+    const size_t n = s->m->n, n_channels = s->m->n_channels;
+    const float *values = s->values + v * n_channels * n;
+    if (n_channels == 1) return row(values, n);
+    json_t *out = json_array();
+    for (size_t c = 0; c < n_channels; c++) json_array_append_new(out, row(values + c * n, n));
+    return out;
+}
+
+static json_t *number_or_null(double x) {
+    return isfinite(x) ? json_real(x) : json_null();
+}
+
+/* One group's figures of one vector: a number each, or one per channel. */
+static void reduce_into(const solution *s, const reduction *r, size_t v, json_t *groups) {
+    const size_t n = s->m->n, n_channels = s->m->n_channels;
+    json_t *out = json_object_get(groups, r->group);
+    if (out == NULL) {
+        out = json_object();
+        json_object_set_new(groups, r->group, out);
+    }
+    for (int k = 0; k < REDUCE_COUNT; k++)
+        if (r->wanted[k]) json_object_set_new(out, reduce_name((reduce_statistic)k), json_array());
+    for (size_t c = 0; c < n_channels; c++) {
+        double figures[REDUCE_COUNT];
+        reduce_compute(s->m, r->inside, s->values + (v * n_channels + c) * n, figures);
+        for (int k = 0; k < REDUCE_COUNT; k++) {
+            const char *name = reduce_name((reduce_statistic)k);
+            if (!r->wanted[k]) continue;
+            if (n_channels == 1)
+                json_object_set_new(out, name, number_or_null(figures[k]));
+            else
+                json_array_append_new(json_object_get(out, name), number_or_null(figures[k]));
+        }
+    }
+}
+
+static json_t *groups_of(const solution *s, size_t v) {
+    json_t *groups = json_object();
+    for (size_t i = 0; i < s->n_reductions; i++) reduce_into(s, &s->reductions[i], v, groups);
+    return groups;
+}
+
+lam_status output_json(const solution *s, FILE *stream, lam_error *error) {
+    lam_status status = LAM_OK;
+    json_t *answer = json_object();
+    const bool reduced = s->n_reductions > 0;
+    json_object_set_new(answer, "scene", json_string(s->scene));
+    json_object_set_new(answer, "elements", json_integer((json_int_t)s->m->n));
+    json_object_set_new(answer, "channels", json_integer((json_int_t)s->m->n_channels));
+    json_object_set_new(answer, "quantity", json_string(s->quantity));
+    json_t *values;
+    if (s->batch) {
+        values = json_array();
+        for (size_t v = 0; v < s->n_vectors; v++)
+            json_array_append_new(values, reduced ? groups_of(s, v) : vector(s, v));
+    } else {
+        values = reduced ? groups_of(s, 0) : vector(s, 0);
+    }
+    json_object_set_new(answer, reduced ? "groups" : s->quantity, values);
+    if (s->relative >= 0)
+        json_object_set_new(
+            answer, "error",
+            json_pack("{s:f, s:f}", "relative_mean", s->relative, "indirect_mean", s->indirect));
+    if (json_dumpf(answer, stream, JSON_COMPACT | FLOAT_DIGITS) != 0 && !ferror(stream))
+        FAIL(error, LAM_ERR_MEMORY, "not enough memory to write the answer as JSON; write .npy");
+    fputc('\n', stream);
+done:
+    json_decref(answer);
+    return status;
+}

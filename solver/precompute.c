@@ -1,0 +1,372 @@
+#include "solver/precompute.h"
+
+#include "solver/build/judge.h"
+#include "solver/clock.h"
+#include "solver/forecast.h"
+#include "solver/formfactor/formfactor.h"
+#include "solver/scene/import.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Above this many elements a probe is dear: fewer are measured at defaults. */
+enum { PROBES = 200, PROBES_OF_LARGE = 32, LARGE = 10240 };
+
+/* What the stages hand on. */
+typedef struct work {
+    const precompute_options *options;
+    terminal *t;
+    progress progress;
+    double memory; /* bytes */
+    mesh m;
+    uint32_t *order;
+    form_factors f;
+    size_t rays, probes;
+    lam_operator *op;
+    build_report built;
+    error_report errors;
+} work;
+
+static void work_free(work *w) {
+    mesh_free(&w->m);
+    free(w->order);
+    form_factors_free(&w->f);
+    lam_operator_close(w->op);
+}
+
+uint64_t precompute_seed(uint64_t seed, uint64_t purpose) {
+    uint64_t x = seed + purpose * 0x9E3779B97F4A7C15u;
+    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
+    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
+    return x ^ (x >> 31);
+}
+
+static void log_stage(work *w, const char *stage, double started) {
+    terminal_log(w->t, "%-14s%8.2f s", stage, clock_seconds() - started);
+}
+
+/* --- scene and mesh --------------------------------------------------------------------------------------
+ */
+
+static void log_warnings(terminal *t, const char *warnings) {
+    while (*warnings != '\0') {
+        const size_t length = strcspn(warnings, "\n");
+        if (length > 0) terminal_warn(t, "%.*s", (int)length, warnings);
+        warnings += length + (warnings[length] == '\n');
+    }
+}
+
+static lam_status load_scene(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = w->options;
+    const import_options how = {.unit = o->unit, .up = o->up, .reflectance = o->reflectance};
+    import_report report = {0};
+    TRY(scene_import(o->input, &how, &w->m, &report, error));
+    log_warnings(w->t, report.warnings);
+    if (report.dropped_faces > 0)
+        terminal_log(w->t, "%zu faces of zero area were dropped", report.dropped_faces);
+    if (report.clamped > 0)
+        terminal_log(w->t, "%zu materials reflected all light or more: set below 1", report.clamped);
+done:
+    return status;
+}
+
+static lam_status load_store(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    store *s = NULL;
+    double *row_sums = NULL;
+    TRY(store_open(w->options->input, &s, error));
+    TRY(mesh_load(s, &w->m, &row_sums, error));
+    TRY(form_factors_load(s, &w->m, &w->f, error));
+    if (w->options->reflectance >= 0)
+        for (size_t i = 0; i < w->m.n * w->m.n_channels; i++)
+            w->m.reflectance[i] = (float)w->options->reflectance;
+done:
+    free(row_sums);
+    store_close(s);
+    return status;
+}
+
+/* About how many elements there will be; never fewer than now. */
+static double elements_after(const mesh *m, const precompute_options *o) {
+    const mesh_refinement *how = &o->refinement;
+    double n = (double)m->n, area = 0;
+    if (how->subdivide_levels > 0) n *= pow(4, how->subdivide_levels);
+    if (how->max_edge > 0) {
+        for (size_t i = 0; i < m->n; i++) area += m->area[i];
+        n = fmax(n, area / (how->max_edge * how->max_edge));
+    }
+    if (o->two_sided) n *= 2;
+    return fmax(n, (double)how->elements);
+}
+
+static lam_status check_memory(work *w, double n, lam_error *error) {
+    const precompute_options *o = w->options;
+    if (n > 4e9)
+        return status_fail(error, LAM_ERR_MEMORY, "%s: %.3g elements, must be below 4e9; refine less",
+                           o->input, n);
+    const forecast f = {.n = (size_t)n,
+                        .n_channels = w->m.n_channels,
+                        .rays = w->rays,
+                        .probes = o->probes == PRECOMPUTE_AUTO ? PROBES_OF_LARGE : o->probes,
+                        .exact = strcmp(o->method, "exact") == 0,
+                        .rank = o->rank};
+    return forecast_check(&f, w->memory, error);
+}
+
+static lam_status prepare_mesh(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = w->options;
+    mesh_refinement refinement = o->refinement;
+    /* --elements counts both sides. */
+    if (o->two_sided) refinement.elements = (refinement.elements + 1) / 2;
+    TRY(check_memory(w, elements_after(&w->m, o), error));
+    if (refinement.subdivide_levels > 0 || refinement.max_edge > 0 || refinement.elements > 0)
+        TRY(mesh_refine(&w->m, &refinement, error));
+    if (o->two_sided) TRY(mesh_make_two_sided(&w->m, error));
+    TRY(check_memory(w, (double)w->m.n, error));
+    w->order = memory_allocate(w->m.n, sizeof *w->order, "the order of the elements", error);
+    if (w->order == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(mesh_z_order(&w->m, w->order, error));
+    w->probes = o->probes != PRECOMPUTE_AUTO ? o->probes : w->m.n > LARGE ? PROBES_OF_LARGE : PROBES;
+    if (w->probes > w->m.n) w->probes = w->m.n;
+    terminal_log(w->t, "%zu elements in %zu groups, %zu channel%s%s", w->m.n, w->m.n_groups, w->m.n_channels,
+                 w->m.n_channels == 1 ? "" : "s", w->m.two_sided ? ", two-sided" : "");
+done:
+    return status;
+}
+
+/* --- form factors ----------------------------------------------------------------------------------------
+ */
+
+static double quality_share(const char *quality) {
+    if (strcmp(quality, "draft") == 0) return 1. / 2;
+    if (strcmp(quality, "high") == 0) return 1. / 8;
+    return 1. / 4;
+}
+
+static void choose_rays(work *w) {
+    const precompute_options *o = w->options;
+    if (o->rays != PRECOMPUTE_AUTO)
+        w->rays = o->rays;
+    else if (o->from_store && w->f.rays > 0)
+        w->rays = w->f.rays;
+    else
+        w->rays = form_factors_auto_rays(o->epsilon, quality_share(o->quality));
+}
+
+static void log_form_factors(work *w) {
+    const form_factors *f = &w->f;
+    terminal_log(
+        w->t,
+        "%zu rays an element: %.2f %% leave the scene%s, %.2f %% meet back faces; row sums repaired by "
+        "%.2g on average, at most %.2g",
+        f->rays, 100 * f->leaving_share, f->closed ? " (closed)" : "", 100 * f->absorbed_share,
+        f->repair_mean, f->repair_max);
+    if (f->absorbed_share > .01 && !w->m.two_sided)
+        terminal_warn(w->t,
+                      "%.1f %% of the light meets back faces and is lost there: turn the faces, or give "
+                      "--two-sided",
+                      100 * f->absorbed_share);
+}
+
+static lam_status trace(work *w, lam_error *error) {
+    const ray_options how = {
+        .rays = w->rays, .seed = w->options->seed, .progress = &w->progress, .stage = "form factors"};
+    return form_factors_trace(&w->m, w->order, &how, &w->f, error);
+}
+
+/* --- operator --------------------------------------------------------------------------------------------
+ */
+
+static build_problem problem_of(const work *w) {
+    return (build_problem){.n = w->m.n,
+                           .n_channels = w->m.n_channels,
+                           .area = w->m.area,
+                           .reflectance = w->m.reflectance,
+                           .F = &w->f.F,
+                           .order = w->order};
+}
+
+static lam_status build(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = w->options;
+    const build_problem problem = problem_of(w);
+    const double held = (double)w->f.F.indptr[w->m.n] * 8 + 400 * (double)w->m.n;
+    const build_options how = {.method = o->method,
+                               .factorizer = o->factorizer,
+                               .epsilon = o->epsilon,
+                               .alpha = o->alpha,
+                               .levels = o->levels == PRECOMPUTE_AUTO ? -1 : (int)o->levels,
+                               .rank = o->rank,
+                               .memory = (size_t)fmax(1, w->memory - held),
+                               .progress = &w->progress};
+    TRY(build_operator(&problem, &how, &w->op, &w->built, error));
+    const double noise = sqrt(2 / (double)w->f.rays);
+    const bool tried = w->built.factorizer != NULL || w->built.factorize_seconds > 0;
+    if (w->built.factorizer != NULL) {
+        terminal_log(w->t, "%-14s%8.2f s", "factorize", w->built.factorize_seconds);
+        terminal_log(w->t, "rank %zu of %zu, real norm error %.3g", w->built.rank, w->m.n,
+                     w->built.measured_norm_error);
+    }
+    if (tried && o->rank == 0 && o->epsilon < noise)
+        terminal_warn(
+            w->t,
+            "--epsilon %g is below the sampling noise %.2g of %zu rays: what is stored beyond it is "
+            "noise; --rays %zu would fit",
+            o->epsilon, noise, w->f.rays, form_factors_auto_rays(o->epsilon, quality_share(o->quality)));
+    terminal_log(w->t, "%-14s%8.2f s", "invert", w->built.invert_seconds);
+    terminal_log(w->t, "%s", w->built.reason);
+done:
+    return status;
+}
+
+/* --- errors ----------------------------------------------------------------------------------------------
+ */
+
+static void log_figures(terminal *t, const char *name, const error_group *g, bool has_total) {
+    if (g->probes == 0) return;
+    if (has_total)
+        terminal_log(t, "%-8s total relative %.3g, indirect %.3g (noise of the reference %.2g)", name,
+                     g->total_relative.mean, g->total_indirect.mean, g->reference_noise);
+    terminal_log(t, "%-8s operator relative %.3g, indirect %.3g", name, g->operator_relative.mean,
+                 g->operator_indirect.mean);
+}
+
+/* Two more samples of F, their mean, and what they say of the operator. */
+static lam_status judge(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    static const char *const stages[2] = {"form factors for the judge, 1 of 2",
+                                          "form factors for the judge, 2 of 2"};
+    form_factors half[2] = {{.rays = 0}, {.rays = 0}}, mean = {.rays = 0};
+    const build_problem problem = problem_of(w);
+    uint64_t purpose = 0;
+    for (int h = 0; h < 2; h++) {
+        ray_options how = {.rays = w->rays, .progress = &w->progress, .stage = stages[h]};
+        /* Independent of what was factorized: kept form factors may have any seed. */
+        do how.seed = precompute_seed(w->options->seed, ++purpose);
+        while (how.seed == w->f.seed);
+        TRY(form_factors_trace(&w->m, w->order, &how, &half[h], error));
+    }
+    TRY(form_factors_mean(&half[0], &half[1], &mean, error));
+    const judge_input input = {.problem = &problem,
+                               .row_sums = w->f.row_sums,
+                               .emission = w->m.emission,
+                               .independent = &mean.F,
+                               .halves = {&half[0].F, &half[1].F},
+                               .probes = w->probes,
+                               .seed = precompute_seed(w->options->seed, 3),
+                               .progress = &w->progress};
+    TRY(judge_operator(w->op, &input, &w->errors, error));
+    log_figures(w->t, "single", &w->errors.single, w->errors.has_total);
+    log_figures(w->t, "lights", &w->errors.lights, w->errors.has_total);
+    log_figures(w->t, "random", &w->errors.random, w->errors.has_total);
+done:
+    form_factors_free(&half[0]);
+    form_factors_free(&half[1]);
+    form_factors_free(&mean);
+    return status;
+}
+
+/* --- store -----------------------------------------------------------------------------------------------
+ */
+
+static lam_status describe_operator(const work *w, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const build_report *r = &w->built;
+    const bool factorized = r->factorizer != NULL;
+    operator_description about = {.density = -1};
+    operator_describe(w->op, &about);
+    TRY(store_set_text(s, "/operator", "method", r->method, error));
+    TRY(store_set_text(s, "/operator", "factorizer", factorized ? r->factorizer : "none", error));
+    TRY(store_set_text(s, "/operator", "reason", r->reason, error));
+    if (r->epsilon >= 0) TRY(store_set_number(s, "/operator", "epsilon", r->epsilon, error));
+    TRY(store_set_number(s, "/operator", "rcond", r->rcond, error));
+    if (factorized) {
+        TRY(store_set_number(s, "/operator", "alpha", w->options->alpha, error));
+        TRY(store_set_integer(s, "/operator", "levels", r->levels, error));
+        TRY(store_set_integer(s, "/operator", "rank", (int64_t)r->rank, error));
+        TRY(store_set_number(s, "/operator", "measured_norm_error", r->measured_norm_error, error));
+    } else if (about.density >= 0) {
+        TRY(store_set_number(s, "/operator", "density", about.density, error));
+    }
+    /* What the form factors were made with, so that they can be made again where they are not kept. */
+    TRY(store_set_integer(s, "/operator", "rays", (int64_t)w->f.rays, error));
+    TRY(store_set_integer(s, "/operator", "ray_seed", (int64_t)w->f.seed, error));
+done:
+    return status;
+}
+
+static lam_status save(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = w->options;
+    store *s = NULL;
+    TRY(store_create(o->output, &s, error));
+    TRY(store_set_text(s, "/", "name", w->m.name, error));
+    TRY(store_set_text(s, "/", "tool", "lambert " LAMBERT_VERSION, error));
+    TRY(store_set_text(s, "/", "command", o->command, error));
+    TRY(store_set_integer(s, "/", "seed", (int64_t)o->seed, error));
+    TRY(store_set_number(s, "/", "unit", w->m.unit, error));
+    TRY(mesh_save(&w->m, w->f.row_sums, s, error));
+    if (o->reflectance >= 0) TRY(store_set_number(s, "/mesh", "reflectance_given", o->reflectance, error));
+    TRY(terminal_check(error));
+    if (o->keep_form_factors) TRY(form_factors_save(&w->f, s, error));
+    TRY(terminal_check(error));
+    TRY(operator_save(w->op, s, error));
+    TRY(describe_operator(w, s, error));
+    if (w->probes > 0) TRY(judge_save(&w->errors, s, error));
+    TRY(terminal_check(error));
+    store *sealing = s;
+    s = NULL;
+    TRY(store_seal(sealing, error));
+done:
+    store_close(s);
+    return status;
+}
+
+lam_status precompute_run(const precompute_options *options, terminal *t, build_report *report,
+                          lam_error *error) {
+    lam_status status = LAM_OK;
+    work w = {.options = options, .t = t, .progress = terminal_progress(t)};
+    const uint64_t available = memory_available();
+    w.memory = options->memory > 0 ? (double)options->memory
+               : available > 0     ? .7 * (double)available
+                                   : 0x1p60;
+
+    double started = clock_seconds();
+    TRY(options->from_store ? load_store(&w, error) : load_scene(&w, error));
+    choose_rays(&w);
+    log_stage(&w, "import", started);
+    TRY(terminal_check(error));
+
+    started = clock_seconds();
+    TRY(prepare_mesh(&w, error));
+    log_stage(&w, "mesh", started);
+    TRY(terminal_check(error));
+
+    if (!options->from_store) {
+        started = clock_seconds();
+        TRY(trace(&w, error));
+        log_stage(&w, "form factors", started);
+    }
+    log_form_factors(&w);
+
+    TRY(build(&w, error));
+    TRY(terminal_check(error));
+
+    if (w.probes > 0) {
+        started = clock_seconds();
+        TRY(judge(&w, error));
+        log_stage(&w, "judge", started);
+    }
+    TRY(terminal_check(error));
+
+    started = clock_seconds();
+    TRY(save(&w, error));
+    log_stage(&w, "store", started);
+    *report = w.built;
+done:
+    work_free(&w);
+    return status;
+}

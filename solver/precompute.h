@@ -1,0 +1,39 @@
+/* From a scene (or a store with form factors) to a sealed store: the stages in their order. */
+#ifndef LAMBERT_SOLVER_PRECOMPUTE_H
+#define LAMBERT_SOLVER_PRECOMPUTE_H
+
+#include "solver/build/build.h"
+#include "solver/scene/mesh.h"
+#include "solver/terminal.h"
+
+/* Where --rays auto and --probes auto are still open. */
+#define PRECOMPUTE_AUTO UINT64_MAX
+
+typedef struct precompute_options {
+    const char *input, *output;
+    bool from_store;
+    const char *command; /* for the record */
+    mesh_refinement refinement;
+    double unit;
+    char up; /* 0: by the file */
+    bool two_sided;
+    double reflectance; /* negative: the file's own */
+    uint64_t rays, probes;
+    const char *quality;
+    bool keep_form_factors;
+    const char *method, *factorizer;
+    double epsilon, alpha;
+    uint64_t levels; /* PRECOMPUTE_AUTO */
+    uint64_t rank;   /* 0: by epsilon */
+    uint64_t memory; /* bytes; 0: 70 % of what is free */
+    uint64_t seed;
+} precompute_options;
+
+/* Does it all; on an error nothing is written. report says what was built. */
+lam_status precompute_run(const precompute_options *options, terminal *t, build_report *report,
+                          lam_error *error);
+
+/* A seed that belongs to seed but shares no stream with it; another one for every purpose from 1. */
+uint64_t precompute_seed(uint64_t seed, uint64_t purpose);
+
+#endif
