@@ -1,0 +1,222 @@
+#include "server/catalog.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+struct catalog {
+    const config *config;
+    pthread_mutex_t lock; /* of present */
+    catalog_snapshot *present;
+};
+
+/* A store to read: path[path_length] may be the ':' before its name. */
+typedef struct source {
+    char *path;
+    const char *name; /* NULL: the store's own; points behind path's NUL */
+} source;
+
+typedef struct source_list {
+    source *items;
+    size_t count, capacity;
+} source_list;
+
+static void free_sources(source_list *list) {
+    for (size_t i = 0; i < list->count; i++) free(list->items[i].path);
+    free(list->items);
+}
+
+static lam_status add_source(source_list *list, const char *folder, const char *argument, bool may_name,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    char *path = NULL;
+    if (list->count == list->capacity) {
+        size_t capacity = 2 * list->capacity + 8;
+        source *items = realloc(list->items, capacity * sizeof *items);
+        if (items == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", argument);
+        list->items = items;
+        list->capacity = capacity;
+    }
+    if (asprintf(&path, "%s%s%s", folder == NULL ? "" : folder, folder == NULL ? "" : "/", argument) < 0) {
+        path = NULL;
+        FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", argument);
+    }
+    source *added = &list->items[list->count++];
+    *added = (source){path, NULL};
+    /* A file whose own name has a colon is taken as it is. */
+    char *colon = may_name ? strrchr(path, ':') : NULL;
+    if (colon != NULL && colon[1] != '\0' && strchr(colon, '/') == NULL && access(path, F_OK) != 0) {
+        *colon = '\0';
+        added->name = colon + 1;
+    }
+done:
+    return status;
+}
+
+static int compare_names(const void *a, const void *b) {
+    return strcmp(*(char *const *)a, *(char *const *)b);
+}
+
+/* Every *.h5 of a folder, by name. */
+static lam_status add_folder(source_list *list, const char *folder, lam_error *error) {
+    lam_status status = LAM_OK;
+    struct dirent **entries = NULL;
+    char **names = NULL;
+    size_t count = 0;
+    int found = scandir(folder, &entries, NULL, NULL);
+    if (found < 0) FAIL(error, LAM_ERR_IO, "%s: cannot be read: %s", folder, strerror(errno));
+    names = memory_allocate((size_t)found, sizeof *names, folder, error);
+    if (names == NULL) {
+        status = LAM_ERR_MEMORY;
+        goto done;
+    }
+    for (int i = 0; i < found; i++) {
+        char *name = entries[i]->d_name;
+        size_t length = strlen(name);
+        if (name[0] != '.' && length > 3 && strcmp(name + length - 3, ".h5") == 0) names[count++] = name;
+    }
+    qsort(names, count, sizeof *names, compare_names);
+    for (size_t i = 0; i < count; i++) TRY(add_source(list, folder, names[i], false, error));
+done:
+    for (int i = 0; i < found; i++) free(entries[i]);
+    free(entries);
+    free(names);
+    return status;
+}
+
+lam_status catalog_create(const config *c, catalog **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    catalog *made = memory_allocate(1, sizeof *made, "catalog", error);
+    catalog_snapshot *empty = memory_allocate(1, sizeof *empty, "catalog", error);
+    if (made == NULL || empty == NULL) {
+        free(made);
+        free(empty);
+        return LAM_ERR_MEMORY;
+    }
+    atomic_init(&empty->references, 1);
+    made->config = c;
+    made->present = empty;
+    pthread_mutex_init(&made->lock, NULL);
+    *out = made;
+    return status;
+}
+
+void catalog_destroy(catalog *all) {
+    if (all == NULL) return;
+    catalog_release(all->present);
+    pthread_mutex_destroy(&all->lock);
+    free(all);
+}
+
+catalog_snapshot *catalog_acquire(catalog *all) {
+    pthread_mutex_lock(&all->lock);
+    catalog_snapshot *snapshot = all->present;
+    atomic_fetch_add(&snapshot->references, 1);
+    pthread_mutex_unlock(&all->lock);
+    return snapshot;
+}
+
+void catalog_release(catalog_snapshot *snapshot) {
+    if (snapshot == NULL || atomic_fetch_sub(&snapshot->references, 1) != 1) return;
+    for (size_t i = 0; i < snapshot->n_scenes; i++) scene_release(snapshot->scenes[i]);
+    free(snapshot->scenes);
+    free(snapshot);
+}
+
+static int compare_to_name(const void *name, const void *entry) {
+    return strcmp(name, (*(scene *const *)entry)->name);
+}
+
+const scene *catalog_find(const catalog_snapshot *snapshot, const char *name) {
+    if (snapshot->n_scenes == 0) return NULL;
+    scene *const *found =
+        bsearch(name, snapshot->scenes, snapshot->n_scenes, sizeof *snapshot->scenes, compare_to_name);
+    return found == NULL ? NULL : *found;
+}
+
+/* The scene that was read from this source before, or NULL. */
+static scene *find_before(const catalog_snapshot *before, const source *from) {
+    for (size_t i = 0; i < before->n_scenes; i++)
+        if (strcmp(before->scenes[i]->path, from->path) == 0 &&
+            (from->name == NULL || strcmp(before->scenes[i]->name, from->name) == 0))
+            return before->scenes[i];
+    return NULL;
+}
+
+/* Puts s where its name belongs, or returns the scene that has the name already. */
+static const scene *insert(catalog_snapshot *snapshot, scene *s) {
+    size_t at = 0;
+    while (at < snapshot->n_scenes && strcmp(snapshot->scenes[at]->name, s->name) < 0) at++;
+    if (at < snapshot->n_scenes && strcmp(snapshot->scenes[at]->name, s->name) == 0)
+        return snapshot->scenes[at];
+    memmove(snapshot->scenes + at + 1, snapshot->scenes + at,
+            (snapshot->n_scenes - at) * sizeof *snapshot->scenes);
+    snapshot->scenes[at] = s;
+    snapshot->n_scenes++;
+    return NULL;
+}
+
+static void load_source(catalog_snapshot *next, const catalog_snapshot *before, const source *from,
+                        bool verify, FILE *out, FILE *problems) {
+    lam_error error = {0};
+    scene *loaded = NULL;
+    if (scene_open(from->path, from->name, verify, &loaded, &error) != LAM_OK) {
+        scene *old = find_before(before, from);
+        if (old == NULL) {
+            /* Most messages begin with the path, some (out of memory) do not. */
+            bool named = strncmp(error.message, from->path, strlen(from->path)) == 0;
+            fprintf(problems, "refused %s%s%s\n", named ? "" : from->path, named ? "" : ": ", error.message);
+            return;
+        }
+        fprintf(problems, "kept the %s read before; %s cannot be read now: %s\n", old->name, from->path,
+                error.message);
+        loaded = scene_acquire(old);
+    }
+    const scene *taken = insert(next, loaded);
+    if (taken != NULL) {
+        fprintf(problems, "refused %s: the name %s is taken by %s; give it another: %s:NAME\n", from->path,
+                loaded->name, taken->path, from->path);
+        scene_release(loaded);
+        return;
+    }
+    fprintf(out, "serving %s: %zu elements, %zu channel%s, %s, from %s\n", loaded->name, loaded->n,
+            loaded->n_channels, loaded->n_channels == 1 ? "" : "s", lam_operator_kind(loaded->op),
+            loaded->path);
+}
+
+size_t catalog_reload(catalog *all, FILE *out, FILE *problems) {
+    source_list sources = {0};
+    lam_error error = {0};
+    lam_status status = LAM_OK;
+    catalog_snapshot *before = catalog_acquire(all), *next = NULL;
+    for (size_t i = 0; i < all->config->n_stores; i++)
+        TRY(add_source(&sources, NULL, all->config->stores[i], true, &error));
+    if (all->config->stores_dir != NULL) TRY(add_folder(&sources, all->config->stores_dir, &error));
+    next = memory_allocate(1, sizeof *next, "catalog", &error);
+    if (next == NULL) TRY(LAM_ERR_MEMORY);
+    atomic_init(&next->references, 1);
+    next->scenes = memory_allocate(sources.count, sizeof *next->scenes, "catalog", &error);
+    if (next->scenes == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < sources.count; i++)
+        load_source(next, before, &sources.items[i], all->config->verify, out, problems);
+    pthread_mutex_lock(&all->lock);
+    catalog_snapshot *old = all->present;
+    all->present = next;
+    pthread_mutex_unlock(&all->lock);
+    next = NULL;
+    catalog_release(old);
+done:
+    if (status != LAM_OK) fprintf(problems, "%s\n", error.message);
+    catalog_release(next);
+    catalog_release(before);
+    free_sources(&sources);
+    fflush(out);
+    fflush(problems);
+    pthread_mutex_lock(&all->lock);
+    size_t served = all->present->n_scenes;
+    pthread_mutex_unlock(&all->lock);
+    return served;
+}

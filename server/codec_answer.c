@@ -1,0 +1,80 @@
+#include "server/codec_answer.h"
+
+#include "server/codec_json_writer.h"
+#include "server/codec_npy.h"
+#include "server/codec_request.h"
+
+#include <float.h>
+#include <math.h>
+
+static bool no_memory(problem *why) {
+    return problem_set(why, 503,
+                       "not enough memory for the answer; ask for fewer vectors or select elements");
+}
+
+bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
+                  problem *why) {
+    if (as->type == MEDIA_NPY) {
+        size_t dims[3], rank = 0;
+        if (shape->batch) dims[rank++] = shape->n_rhs;
+        if (shape->n_channels > 1) dims[rank++] = shape->n_channels;
+        dims[rank++] = shape->selected != NULL ? shape->n_selected : shape->n;
+        return npy_write_header(b, as->npy, rank, dims) || no_memory(why);
+    }
+    const char *quantity = codec_quantity_name(notes->quantity);
+    return (buffer_append_text(b, "{\"scene\":") && json_write_text(b, notes->scene) &&
+            buffer_printf(b, ",\"elements\":%zu,\"channels\":%zu,\"quantity\":\"%s\",\"%s\":", shape->n,
+                          shape->n_channels, quantity, quantity) &&
+            (!shape->batch || buffer_append(b, "[", 1))) ||
+           no_memory(why);
+}
+
+/* Refuses what would be written as something else than it is. */
+static bool check_range(const float *x, size_t count, float limit, problem *why) {
+    int bad = 0;
+    for (size_t i = 0; i < count; i++) bad |= !(fabsf(x[i]) <= limit);
+    if (!bad) return true;
+    if (limit < FLT_MAX)
+        return problem_set(why, 422, "the answer passes the range of half precision (%g); ask for dtype=f4",
+                           (double)limit);
+    return problem_set(why, 422,
+                       "the answer passes the range of single precision (3.4e38); scale the emission");
+}
+
+static bool add_row(buffer *b, const answer_shape *shape, const media_accept *as, const float *row) {
+    size_t count = shape->selected != NULL ? shape->n_selected : shape->n;
+    if (as->type == MEDIA_NPY) return npy_write_values(b, as->npy, row, shape->selected, count);
+    if (shape->selected != NULL) return json_write_selected_floats(b, row, shape->selected, count);
+    return json_write_floats(b, row, count);
+}
+
+bool answer_add(buffer *b, const answer_shape *shape, const media_accept *as, size_t first, size_t count,
+                const float *x, problem *why) {
+    size_t C = shape->n_channels, n = shape->n;
+    bool json = as->type == MEDIA_JSON;
+    if (!check_range(x, count * C * n, !json && as->npy == NPY_F2 ? NPY_HALF_MAX : FLT_MAX, why))
+        return false;
+    for (size_t r = 0; r < count; r++) {
+        bool written =
+            !json || ((first + r == 0 || buffer_append(b, ",", 1)) && (C == 1 || buffer_append(b, "[", 1)));
+        for (size_t c = 0; written && c < C; c++)
+            written =
+                (!json || c == 0 || buffer_append(b, ",", 1)) && add_row(b, shape, as, x + (r * C + c) * n);
+        if (!written || (json && C > 1 && !buffer_append(b, "]", 1))) return no_memory(why);
+    }
+    return true;
+}
+
+bool answer_end(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
+                problem *why) {
+    if (as->type == MEDIA_NPY) return true;
+    bool written = !shape->batch || buffer_append(b, "]", 1);
+    if (notes->has_error)
+        written = written && buffer_append_text(b, ",\"error\":{\"relative_mean\":") &&
+                  json_write_double(b, notes->relative_mean) &&
+                  buffer_append_text(b, ",\"indirect_mean\":") &&
+                  json_write_double(b, notes->indirect_mean) && buffer_append(b, "}", 1);
+    return (written && buffer_printf(b, ",\"time_ms\":{\"parse\":%.3f,\"solve\":%.3f,\"encode\":%.3f}}\n",
+                                     notes->parse_ms, notes->solve_ms, notes->encode_ms)) ||
+           no_memory(why);
+}

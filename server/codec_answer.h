@@ -1,0 +1,39 @@
+/* Vectors to the bytes of an answer, in as many parts as the solve has passes. No I/O. */
+#ifndef LAMBERT_SERVER_CODEC_ANSWER_H
+#define LAMBERT_SERVER_CODEC_ANSWER_H
+
+#include "lambert/lambert.h"
+#include "server/codec_media.h"
+#include "server/problem.h"
+
+#include <stdint.h>
+
+typedef struct answer_shape {
+    size_t n;
+    size_t n_channels;
+    size_t n_rhs;
+    bool batch;
+    const uint32_t *selected; /* NULL: all elements */
+    size_t n_selected;
+} answer_shape;
+
+/* What the JSON object says beside the vectors. */
+typedef struct answer_notes {
+    const char *scene;
+    lam_quantity quantity;
+    bool has_error;
+    double relative_mean, indirect_mean;
+    double parse_ms, solve_ms, encode_ms;
+} answer_notes;
+
+/* Appends what stands before the vectors, then vectors first ... first + count of x [count][C][n], then what
+ * stands behind the last. False with *why: 422 when a value is beyond what the encoding holds, 503 when
+ * memory is short. */
+bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
+                  problem *why);
+bool answer_add(buffer *b, const answer_shape *shape, const media_accept *as, size_t first, size_t count,
+                const float *x, problem *why);
+bool answer_end(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
+                problem *why);
+
+#endif

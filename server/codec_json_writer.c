@@ -1,0 +1,197 @@
+#include "server/codec_json_writer.h"
+
+#include "server/codec_json_reader.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define LEAST_POWER (-49)
+#define GREATEST_POWER 59
+
+/* 10^-49 ... 10^59, each rounded to the nearest double. */
+#define UP(e) 1e##e
+#define DOWN(e) 1e-##e
+#define ROW_UP(d)                                                                                            \
+    UP(d##0), UP(d##1), UP(d##2), UP(d##3), UP(d##4), UP(d##5), UP(d##6), UP(d##7), UP(d##8), UP(d##9)
+#define ROW_DOWN(d)                                                                                          \
+    DOWN(d##9), DOWN(d##8), DOWN(d##7), DOWN(d##6), DOWN(d##5), DOWN(d##4), DOWN(d##3), DOWN(d##2),          \
+        DOWN(d##1), DOWN(d##0)
+static const double powers[] = {ROW_DOWN(4), ROW_DOWN(3), ROW_DOWN(2), ROW_DOWN(1), 1e-9,     1e-8, 1e-7,
+                                1e-6,        1e-5,        1e-4,        1e-3,        1e-2,     1e-1, ROW_UP(),
+                                ROW_UP(1),   ROW_UP(2),   ROW_UP(3),   ROW_UP(4),   ROW_UP(5)};
+#undef UP
+#undef DOWN
+#undef ROW_UP
+#undef ROW_DOWN
+_Static_assert(sizeof powers / sizeof powers[0] == GREATEST_POWER - LEAST_POWER + 1, "one power each");
+
+static inline double power_of_ten(int exponent) {
+    return powers[exponent - LEAST_POWER];
+}
+
+/* |value| = digits 10^exponent with the fewest digits that we can vouch for.
+ * All of it is judged in y = |value| 10^s with 9 digits before the point: double carries y to about 3e-16,
+ * that is 1e-6 of its unit, while half the gap to the next float (the smaller one, below a power of two) is
+ * at least 2.9 of them; a decimal closer to y than that gap, less a margin of 1e-4, reads back as value, also
+ * when it is read through a double. */
+static inline void shortest_digits(float value, uint32_t *digits, int *exponent) {
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    uint32_t fraction = bits & 0x7FFFFFu;
+    int binary = (int)(bits >> 23 & 0xFFu);
+    double x = fabs((double)value);
+    uint64_t x_bits;
+    memcpy(&x_bits, &x, sizeof x_bits);
+
+    /* Half the gap, in x: 2^(binary - 151), and half of that below a power of two. */
+    int power_of_two = (binary == 0 ? 1 : binary) - 151 - (fraction == 0 && binary > 1);
+    uint64_t gap_bits = (uint64_t)(power_of_two + 1023) << 52;
+    double half_gap;
+    memcpy(&half_gap, &gap_bits, sizeof half_gap);
+
+    /* 10^decimal <= x < 10^(decimal + 1), from x = 1.... 2^magnitude and floor(magnitude log10(2)). */
+    int magnitude = (int)(x_bits >> 52) - 1023;
+    int decimal = (magnitude * 315653) >> 20;
+    if (x >= power_of_ten(decimal + 1)) decimal++;
+    int s = 8 - decimal;
+    double scale = power_of_ten(s);
+    double y = x * scale, gap = half_gap * scale - 1e-4;
+
+    uint64_t best = (uint64_t)(y + 0.5);
+    int dropped = 0;
+    uint64_t unit = 10;
+    for (int k = 1; k <= 9; k++, unit *= 10) {
+        uint64_t rounded = (uint64_t)(y * power_of_ten(-k) + 0.5);
+        if (rounded == 0 || !(fabs((double)(rounded * unit) - y) < gap)) break;
+        best = rounded;
+        dropped = k;
+    }
+    *digits = (uint32_t)best;
+    *exponent = dropped - s;
+}
+
+static size_t write_unsigned(char *to, uint32_t value) {
+    char reversed[10];
+    size_t count = 0;
+    do {
+        reversed[count++] = (char)('0' + value % 10);
+        value /= 10;
+    } while (value > 0);
+    for (size_t i = 0; i < count; i++) to[i] = reversed[count - 1 - i];
+    return count;
+}
+
+size_t json_write_float(char *to, float value) {
+    assert(isfinite(value));
+    char *at = to;
+    if (value == 0.0f) {
+        *at = '0';
+        return 1;
+    }
+    if (value < 0.0f) *at++ = '-';
+    uint32_t number;
+    int exponent;
+    shortest_digits(value, &number, &exponent);
+    char digits[10];
+    int count = (int)write_unsigned(digits, number);
+    int point = count + exponent; /* digits before the decimal point */
+
+    if (exponent >= 0 && point <= 9) { /* 1200 */
+        memcpy(at, digits, (size_t)count);
+        memset(at + count, '0', (size_t)exponent);
+        at += point;
+    } else if (point > 0 && point <= 9) { /* 12.34 */
+        memcpy(at, digits, (size_t)point);
+        at[point] = '.';
+        memcpy(at + point + 1, digits + point, (size_t)(count - point));
+        at += count + 1;
+    } else if (point <= 0 && point > -3) { /* 0.0012 */
+        memcpy(at, "0.000", 5);
+        at += 2 - point;
+        memcpy(at, digits, (size_t)count);
+        at += count;
+    } else { /* 1.234e-7 */
+        *at++ = digits[0];
+        if (count > 1) {
+            *at++ = '.';
+            memcpy(at, digits + 1, (size_t)(count - 1));
+            at += count - 1;
+        }
+        *at++ = 'e';
+        int power = point - 1;
+        if (power < 0) *at++ = '-';
+        at += write_unsigned(at, (uint32_t)abs(power));
+    }
+    assert(at - to <= JSON_FLOAT_MAX);
+    return (size_t)(at - to);
+}
+
+static bool reserve_floats(buffer *b, size_t count) {
+    size_t bytes;
+    return !__builtin_mul_overflow(count, (size_t)JSON_FLOAT_MAX + 1, &bytes) && buffer_reserve(b, bytes + 2);
+}
+
+bool json_write_floats(buffer *b, const float *values, size_t count) {
+    if (!reserve_floats(b, count)) return false;
+    char *at = b->bytes + b->length;
+    *at++ = '[';
+    for (size_t i = 0; i < count; i++) {
+        at += json_write_float(at, values[i]);
+        *at++ = ',';
+    }
+    if (count > 0) at--;
+    *at++ = ']';
+    *at = '\0';
+    b->length = (size_t)(at - b->bytes);
+    return true;
+}
+
+bool json_write_selected_floats(buffer *b, const float *values, const uint32_t *index, size_t count) {
+    if (!reserve_floats(b, count)) return false;
+    char *at = b->bytes + b->length;
+    *at++ = '[';
+    for (size_t i = 0; i < count; i++) {
+        at += json_write_float(at, values[index[i]]);
+        *at++ = ',';
+    }
+    if (count > 0) at--;
+    *at++ = ']';
+    *at = '\0';
+    b->length = (size_t)(at - b->bytes);
+    return true;
+}
+
+bool json_write_double(buffer *b, double value) {
+    char text[32];
+    assert(isfinite(value));
+    for (int precision = 6; precision <= 17; precision++) {
+        snprintf(text, sizeof text, "%.*g", precision, value);
+        if (precision == 17 || strtod(text, NULL) == value) break;
+    }
+    return buffer_append_text(b, text);
+}
+
+bool json_write_text(buffer *b, const char *text) {
+    const char *end = text + strlen(text);
+    bool written = buffer_append(b, "\"", 1);
+    while (written && text < end) {
+        size_t length = utf8_sequence(text, end);
+        unsigned char c = (unsigned char)*text;
+        if (length == 0) {
+            written = buffer_append(b, "?", 1);
+            length = 1;
+        } else if (c == '"' || c == '\\') {
+            written = buffer_append(b, "\\", 1) && buffer_append(b, text, 1);
+        } else if (c < 0x20) {
+            written = buffer_printf(b, "\\u%04x", c);
+        } else {
+            written = buffer_append(b, text, length);
+        }
+        text += length;
+    }
+    return written && buffer_append(b, "\"", 1);
+}

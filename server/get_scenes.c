@@ -1,0 +1,16 @@
+/* GET /v1/scenes: what is served. */
+#include "server/codec_json_writer.h"
+#include "server/routes.h"
+
+void get_scenes(call *in, answer *out) {
+    buffer b = {0};
+    bool written = buffer_append_text(&b, "{\"scenes\":[");
+    for (size_t i = 0; i < in->snapshot->n_scenes; i++) {
+        const scene *s = in->snapshot->scenes[i];
+        written = written && buffer_append_text(&b, i > 0 ? ",{\"name\":" : "{\"name\":") &&
+                  json_write_text(&b, s->name) &&
+                  buffer_printf(&b, ",\"elements\":%zu,\"channels\":%zu,\"kind\":\"%s\",\"bytes\":%llu}",
+                                s->n, s->n_channels, lam_operator_kind(s->op), (unsigned long long)s->bytes);
+    }
+    answer_json(out, &b, written && buffer_append_text(&b, "]}\n"));
+}

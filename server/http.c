@@ -1,0 +1,329 @@
+#include "server/http.h"
+
+#include "server/access_log.h"
+#include "server/routes.h"
+
+#include <microhttpd.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+/* What libmicrohttpd may hold of a connection's head; bodies are ours. */
+#define CONNECTION_MEMORY (32u << 10)
+
+/* Once a request is refused, so much more of its body is read and dropped, so that its connection can go on.
+ */
+#define DROP_MAX ((uint64_t)1 << 20)
+
+struct http {
+    service *service;
+    struct MHD_Daemon *daemon;
+    uint64_t next_id;
+    int listen_fd; /* after http_quiesce; before, the daemon's */
+};
+
+/* A request, from its head to the last byte of its answer. The I/O thread owns it; while its connection is
+ * suspended, the thread that solves does. */
+typedef struct request {
+    batch_job job;
+    http *http;
+    struct MHD_Connection *connection;
+    uint64_t id;
+    char method[16];
+    char *path; /* as sent */
+    struct timespec start;
+    route_match match;
+    catalog_snapshot *snapshot;
+    call call;
+    answer answer;
+    bool answered; /* the answer is made: what follows of the body is dropped */
+    bool queued;   /* the answer was handed to libmicrohttpd */
+    buffer body;
+    uint64_t received;
+    size_t sent;
+} request;
+
+/* --- checks of the head ------------------------------------------------------------------------------- */
+
+static const char *header(const request *r, const char *name) {
+    return MHD_lookup_connection_value(r->connection, MHD_HEADER_KIND, name);
+}
+
+static void refuse_token(request *r) {
+    answer_refuse(&r->answer, 401, "a bearer token is needed: Authorization: Bearer TOKEN");
+}
+
+static bool check_scene(request *r) {
+    if (!r->match.has_name) return true;
+    r->call.scene = catalog_find(r->snapshot, r->match.name);
+    if (r->call.scene != NULL) return true;
+    if (atomic_load(&r->http->service->state) == SERVICE_LOADING)
+        answer_refuse(&r->answer, 503, "stores are being loaded");
+    else
+        answer_refuse(&r->answer, 404, "there is no scene %.200s; GET /v1/scenes lists them", r->match.name);
+    return false;
+}
+
+static bool check_type(request *r) {
+    const char *type = header(r, MHD_HTTP_HEADER_CONTENT_TYPE);
+    const char *encoding = header(r, MHD_HTTP_HEADER_CONTENT_ENCODING);
+    r->call.body_type = media_content_type(type);
+    r->call.accept = media_choose(header(r, MHD_HTTP_HEADER_ACCEPT));
+    if (r->call.body_type == MEDIA_OTHER)
+        answer_refuse(&r->answer, 415,
+                      "Content-Type is %.100s, must be application/json or application/x-npy", type);
+    else if (encoding != NULL && strcasecmp(encoding, "identity") != 0)
+        answer_refuse(&r->answer, 415, "Content-Encoding is %.100s, must be left out", encoding);
+    else
+        return true;
+    return false;
+}
+
+static void refuse_length(request *r) {
+    answer_refuse(&r->answer, 413, "the body is longer than %zu bytes (--max-body); send several requests",
+                  r->http->service->config->max_body);
+}
+
+/* Whatever the head alone decides: route, method, token, scene, type, length; true when the body is wanted.
+ */
+static bool check_head(request *r, const char *method, uint64_t length) {
+    const service *s = r->http->service;
+    route_find(method, r->path, &r->match, &r->answer);
+    if (r->match.with_token && !token_matches(&s->token, header(r, MHD_HTTP_HEADER_AUTHORIZATION))) {
+        refuse_token(r);
+        return false;
+    }
+    if (r->match.route == NULL) return false;
+    r->snapshot = catalog_acquire(s->catalog);
+    r->call = (call){.service = s, .snapshot = r->snapshot};
+    if (!check_scene(r)) return false;
+    if (r->match.route->body == BODY_NONE) return true;
+    if (!check_type(r)) return false;
+    if (length > s->config->max_body) {
+        refuse_length(r);
+        return false;
+    }
+    return true;
+}
+
+/* --- answers ------------------------------------------------------------------------------------------ */
+
+static enum MHD_Result send_answer(request *r) {
+    answer *a = &r->answer;
+    const service *s = r->http->service;
+    struct MHD_Response *response;
+    r->sent = a->body.length;
+    if (a->body.bytes == NULL) {
+        static char nothing[1];
+        response = MHD_create_response_from_buffer(0, nothing, MHD_RESPMEM_PERSISTENT);
+    } else {
+        response = MHD_create_response_from_buffer(a->body.length, a->body.bytes, MHD_RESPMEM_MUST_FREE);
+    }
+    if (response == NULL) return MHD_NO;
+    a->body = (buffer){0};
+    char seconds[16];
+    snprintf(seconds, sizeof seconds, "%u", a->retry_after);
+    bool good = a->type == NULL || MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, a->type);
+    if (a->allow[0] != '\0')
+        good = good && MHD_add_response_header(response, MHD_HTTP_HEADER_ALLOW, a->allow);
+    if (a->retry_after > 0)
+        good = good && MHD_add_response_header(response, MHD_HTTP_HEADER_RETRY_AFTER, seconds);
+    if (a->status == 401)
+        good = good && MHD_add_response_header(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, "Bearer");
+    if (atomic_load(&s->state) == SERVICE_DRAINING)
+        good = good && MHD_add_response_header(response, MHD_HTTP_HEADER_CONNECTION, "close");
+    enum MHD_Result result = good ? MHD_queue_response(r->connection, a->status, response) : MHD_NO;
+    MHD_destroy_response(response);
+    r->queued = result == MHD_YES;
+    return result;
+}
+
+static request *request_of(batch_job *job) {
+    return (request *)(void *)job;
+}
+
+static void run_solve(batch_job *job, batch_workspace *workspace) {
+    request *r = request_of(job);
+    r->call.workspace = workspace;
+    r->match.route->handle(&r->call, &r->answer);
+    buffer_free(&r->body);
+}
+
+static void finish_solve(batch_job *job) {
+    request *r = request_of(job);
+    r->answered = true;
+    MHD_resume_connection(r->connection);
+}
+
+/* The whole request is here. */
+static enum MHD_Result handle(request *r) {
+    if (!r->answered) {
+        r->call.body = r->body.bytes == NULL ? "" : r->body.bytes;
+        r->call.length = r->body.length;
+        if (r->match.route->body == BODY_OF_SOLVE) {
+            /* Suspended first: the solve may be done before batch_submit returns. */
+            r->job = (batch_job){.run = run_solve, .finish = finish_solve};
+            MHD_suspend_connection(r->connection);
+            if (batch_submit(r->http->service->queue, &r->job)) return MHD_YES;
+            answer_refuse(&r->answer, 503, "%zu solves wait or run (--max-inflight); try again",
+                          r->http->service->config->max_inflight);
+            r->answered = true;
+            MHD_resume_connection(r->connection);
+            return MHD_YES;
+        }
+        r->match.route->handle(&r->call, &r->answer);
+        r->answered = true;
+    }
+    return send_answer(r);
+}
+
+/* --- libmicrohttpd's callbacks ------------------------------------------------------------------------ */
+
+static request *begin_request(http *h, struct MHD_Connection *connection, const char *path,
+                              const char *method) {
+    request *r = calloc(1, sizeof *r);
+    if (r == NULL || (r->path = strdup(path)) == NULL) {
+        free(r);
+        return NULL;
+    }
+    r->http = h;
+    r->connection = connection;
+    r->id = h->next_id++;
+    snprintf(r->method, sizeof r->method, "%s", method);
+    clock_gettime(CLOCK_MONOTONIC, &r->start);
+    r->match.label = route_label_count() - 1;
+    metrics_begin(h->service->metrics);
+    return r;
+}
+
+/* Bytes of body that the head announces; UINT64_MAX when they are not to be had as a number. */
+static uint64_t announced_length(const request *r) {
+    const char *text = header(r, MHD_HTTP_HEADER_CONTENT_LENGTH);
+    if (text == NULL) return 0;
+    char *end;
+    unsigned long long length = strtoull(text, &end, 10);
+    return *end == '\0' ? length : UINT64_MAX;
+}
+
+static enum MHD_Result on_head(http *h, struct MHD_Connection *connection, const char *path,
+                               const char *method, void **context) {
+    request *r = begin_request(h, connection, path, method);
+    if (r == NULL) return MHD_NO;
+    *context = r;
+    uint64_t length = announced_length(r);
+    r->answered = !check_head(r, method, length);
+    /* An answer that is sent before the body has come closes the connection. So the body of a refused request
+     * is read and dropped, unless it is long, or its client waits to be told whether to send it. */
+    if (r->answered && (length > DROP_MAX || header(r, MHD_HTTP_HEADER_EXPECT) != NULL))
+        return send_answer(r);
+    return MHD_YES;
+}
+
+static enum MHD_Result on_body(request *r, const char *bytes, size_t *size) {
+    const config *c = r->http->service->config;
+    r->received += *size;
+    if (!r->answered && r->match.route->body == BODY_OF_SOLVE) {
+        if (r->received > c->max_body) {
+            refuse_length(r);
+            r->answered = true;
+            buffer_free(&r->body);
+        } else if (!buffer_append(&r->body, bytes, *size)) {
+            answer_refuse(&r->answer, 503, "not enough memory for the body");
+            r->answered = true;
+            buffer_free(&r->body);
+        }
+    }
+    /* No answer can be sent in the middle of a body (libmicrohttpd): one without end is cut. */
+    if (r->received > c->max_body + DROP_MAX) return MHD_NO;
+    *size = 0;
+    return MHD_YES;
+}
+
+static enum MHD_Result on_request(void *context, struct MHD_Connection *connection, const char *path,
+                                  const char *method, const char *version, const char *bytes, size_t *size,
+                                  void **request_context) {
+    (void)version;
+    request *r = *request_context;
+    if (r == NULL) return on_head(context, connection, path, method, request_context);
+    if (*size > 0) return on_body(r, bytes, size);
+    return handle(r);
+}
+
+static void on_completed(void *context, struct MHD_Connection *connection, void **request_context,
+                         enum MHD_RequestTerminationCode code) {
+    (void)connection;
+    http *h = context;
+    request *r = *request_context;
+    if (r == NULL) return;
+    *request_context = NULL;
+    struct timespec end;
+    clock_gettime(CLOCK_MONOTONIC, &end);
+    double seconds = (double)(end.tv_sec - r->start.tv_sec) + 1e-9 * (double)(end.tv_nsec - r->start.tv_nsec);
+    unsigned status = r->queued && code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? r->answer.status : 0;
+    if (h->service->access_log != NULL)
+        access_log_write(h->service->access_log, &(access_entry){.id = r->id,
+                                                                 .method = r->method,
+                                                                 .path = r->path,
+                                                                 .status = status,
+                                                                 .received = (size_t)r->received,
+                                                                 .sent = r->sent,
+                                                                 .n_rhs = r->call.n_rhs,
+                                                                 .ms = seconds * 1e3});
+    catalog_release(r->snapshot);
+    buffer_free(&r->body);
+    buffer_free(&r->answer.body);
+    size_t label = r->match.label;
+    free(r->path);
+    free(r);
+    metrics_end(h->service->metrics, label, status, seconds);
+}
+
+/* Routes resolve escapes themselves, so that %2F does not become a slash. */
+static size_t keep_escapes(void *context, struct MHD_Connection *connection, char *text) {
+    (void)context;
+    (void)connection;
+    return strlen(text);
+}
+
+lam_status http_start(service *s, int listen_fd, http **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    http *h = memory_allocate(1, sizeof *h, "HTTP", error);
+    if (h == NULL) {
+        close(listen_fd);
+        return LAM_ERR_MEMORY;
+    }
+    h->service = s;
+    h->listen_fd = listen_fd;
+    h->next_id = 1;
+    h->daemon = MHD_start_daemon(MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL,
+                                 on_request, h, MHD_OPTION_LISTEN_SOCKET, listen_fd,
+                                 MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
+                                 MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)s->config->timeout_s,
+                                 MHD_OPTION_NOTIFY_COMPLETED, on_completed, h, MHD_OPTION_UNESCAPE_CALLBACK,
+                                 keep_escapes, NULL, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
+    if (h->daemon == NULL) FAIL(error, LAM_ERR_IO, "the HTTP server cannot start");
+    h->listen_fd = -1;
+    *out = h;
+    h = NULL;
+done:
+    if (h != NULL) {
+        close(h->listen_fd);
+        free(h);
+    }
+    return status;
+}
+
+void http_quiesce(http *h) {
+    h->listen_fd = MHD_quiesce_daemon(h->daemon);
+    /* Refuses those who come now; closing the descriptor has to wait for the thread that may still use it. */
+    if (h->listen_fd >= 0) shutdown(h->listen_fd, SHUT_RDWR);
+}
+
+void http_stop(http *h) {
+    if (h == NULL) return;
+    MHD_stop_daemon(h->daemon);
+    if (h->listen_fd >= 0) close(h->listen_fd);
+    free(h);
+}

@@ -1,0 +1,120 @@
+/* lambertd: reads stores, answers over HTTP what light they have, until a signal ends it. */
+#include "server/http.h"
+#include "server/listener.h"
+#include "server/routes.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#define EXIT_USAGE 2
+
+static int complain(const lam_error *error, int code) {
+    fprintf(stderr, "lambertd: %s\n", error->message);
+    return code;
+}
+
+/* The signals that are waited for; blocked before any thread is started, so that none gets them. */
+static sigset_t block_signals(void) {
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGHUP);
+    sigaddset(&set, SIGINT);
+    sigaddset(&set, SIGTERM);
+    sigprocmask(SIG_BLOCK, &set, NULL);
+    signal(SIGPIPE, SIG_IGN);
+    return set;
+}
+
+static lam_status open_access_log(const char *path, FILE **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (path == NULL) return LAM_OK;
+    FILE *log = strcmp(path, "-") == 0 ? stdout : fopen(path, "ae");
+    if (log == NULL) FAIL(error, LAM_ERR_IO, "%s: cannot be opened: %s", path, strerror(errno));
+    *out = log;
+done:
+    return status;
+}
+
+/* Reads the stores again on every SIGHUP until another signal comes. */
+static void serve_until_told(service *s, const sigset_t *signals) {
+    int signal_number = 0;
+    for (;;) {
+        if (sigwait(signals, &signal_number) != 0 || signal_number != SIGHUP) return;
+        size_t served = catalog_reload(s->catalog, stdout, stderr);
+        printf("reloaded: %zu scene%s\n", served, served == 1 ? "" : "s");
+        fflush(stdout);
+    }
+}
+
+/* Waits until no request is open, at most as long as a silent connection is kept; a further signal (but
+ * SIGHUP) ends the wait. */
+static void drain(service *s, const sigset_t *signals) {
+    const struct timespec pause = {.tv_nsec = 5000000};
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    time_t end = now.tv_sec + (time_t)s->config->timeout_s + 1;
+    while (metrics_in_flight(s->metrics) > 0 && now.tv_sec < end) {
+        int signal_number = sigtimedwait(signals, NULL, &pause);
+        if (signal_number == SIGINT || signal_number == SIGTERM) break;
+        clock_gettime(CLOCK_MONOTONIC, &now);
+    }
+}
+
+static lam_status run(const config *c, const sigset_t *signals, lam_error *error) {
+    lam_status status = LAM_OK;
+    service s = {.config = c};
+    http *h = NULL;
+    int listen_fd = -1;
+    bool bound = false;
+    char where[256];
+    const char **labels = memory_allocate(route_label_count(), sizeof *labels, "routes", error);
+    if (labels == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < route_label_count(); i++) labels[i] = route_label(i);
+    atomic_init(&s.state, SERVICE_LOADING);
+    if (c->token_file != NULL) TRY(token_read(c->token_file, &s.token, error));
+    TRY(open_access_log(c->access_log, &s.access_log, error));
+    TRY(metrics_create(route_label_count(), labels, &s.metrics, error));
+    TRY(catalog_create(c, &s.catalog, error));
+    TRY(batch_start(c->threads, c->max_inflight, &s.queue, error));
+    TRY(c->unix_path != NULL ? listener_unix(c->unix_path, &listen_fd, where, sizeof where, error)
+                             : listener_tcp(c->listen_address, &listen_fd, where, sizeof where, error));
+    bound = true;
+    TRY(http_start(&s, listen_fd, &h, error));
+    if (catalog_reload(s.catalog, stdout, stderr) == 0) FAIL(error, LAM_ERR_IO, "no store can be served");
+    atomic_store(&s.state, SERVICE_READY);
+    printf("listening on %s\n", where);
+    fflush(stdout);
+    serve_until_told(&s, signals);
+    http_quiesce(h);
+    atomic_store(&s.state, SERVICE_DRAINING);
+    drain(&s, signals);
+done:
+    if (s.queue != NULL) batch_close(s.queue);
+    http_stop(h);
+    batch_destroy(s.queue);
+    catalog_destroy(s.catalog);
+    metrics_destroy(s.metrics);
+    if (s.access_log != NULL && s.access_log != stdout) fclose(s.access_log);
+    if (bound && c->unix_path != NULL) unlink(c->unix_path);
+    free(labels);
+    return status;
+}
+
+int main(int argc, char **argv) {
+    config c;
+    lam_error error = {0};
+    sigset_t signals = block_signals();
+    if (config_read(&c, argc, argv, &error) != LAM_OK) return complain(&error, EXIT_USAGE);
+    if (c.help || c.version) {
+        if (c.help)
+            config_print_help(stdout);
+        else
+            printf("lambertd %s\n", LAMBERT_VERSION);
+        return fflush(stdout) == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    }
+    return run(&c, &signals, &error) == LAM_OK ? EXIT_SUCCESS : complain(&error, EXIT_FAILURE);
+}

@@ -1,0 +1,106 @@
+/* POST /v1/scenes/NAME/radiosity: emission in, light out. */
+#include "server/codec_answer.h"
+#include "server/codec_request.h"
+#include "server/routes.h"
+
+#include <time.h>
+
+/* Vectors of one pass over the operator: enough to use each row read many times, few enough that they stay in
+ * the cache. */
+#define PASS 16
+
+/* Emission vectors of one request, in bytes: a short sparse text may ask for many long ones. */
+#define LEAST_EMISSION_LIMIT ((size_t)1 << 30)
+
+static double now_ms(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
+}
+
+/* A pass's vectors and work area, in the thread's own memory. */
+static bool get_pass_memory(call *in, size_t n_rhs, float **out, void **work, size_t *work_bytes,
+                            problem *why) {
+    const scene *s = in->scene;
+    size_t values, out_bytes, total;
+    *work_bytes = lam_operator_work_bytes(s->op, n_rhs);
+    if (*work_bytes > 0 && size_multiply(n_rhs * s->n_channels, s->n, &values) &&
+        size_multiply(values, sizeof(float), &out_bytes)) {
+        /* The work area comes behind the vectors, aligned as malloc does. */
+        out_bytes = (out_bytes + 63) / 64 * 64;
+        if (!__builtin_add_overflow(out_bytes, *work_bytes, &total)) {
+            char *bytes = batch_workspace_get(in->workspace, total);
+            if (bytes != NULL) {
+                *out = (float *)(void *)bytes;
+                *work = bytes + out_bytes;
+                return true;
+            }
+        }
+    }
+    return problem_set(why, 503, "not enough memory to solve %zu vectors", n_rhs);
+}
+
+/* Applies the operator pass by pass, each pass's vectors encoded while they are in the cache. */
+static bool solve(call *in, const radiosity_request *request, answer_notes *notes, buffer *b, problem *why) {
+    const scene *s = in->scene;
+    answer_shape shape = {.n = s->n,
+                          .n_channels = s->n_channels,
+                          .n_rhs = request->n_rhs,
+                          .batch = request->batch,
+                          .selected = request->select ? request->selected : NULL,
+                          .n_selected = request->n_selected};
+    float *out = NULL;
+    void *work = NULL;
+    size_t work_bytes = 0;
+    if (!get_pass_memory(in, request->n_rhs < PASS ? request->n_rhs : PASS, &out, &work, &work_bytes, why) ||
+        !answer_begin(b, &shape, &in->accept, notes, why))
+        return false;
+    for (size_t first = 0; first < request->n_rhs; first += PASS) {
+        size_t count = request->n_rhs - first < PASS ? request->n_rhs - first : PASS;
+        lam_error error;
+        double start = now_ms();
+        if (lam_operator_apply(s->op, count, request->quantity, request->E + first * s->n_channels * s->n,
+                               out, work, work_bytes, &error) != LAM_OK)
+            return problem_set(why, 500, "%s", error.message);
+        double solved = now_ms();
+        metrics_pass(in->service->metrics, count);
+        notes->solve_ms += solved - start;
+        if (!answer_add(b, &shape, &in->accept, first, count, out, why)) return false;
+        notes->encode_ms += now_ms() - solved;
+    }
+    return answer_end(b, &shape, &in->accept, notes, why);
+}
+
+void post_radiosity(call *in, answer *out) {
+    const scene *s = in->scene;
+    const config *c = in->service->config;
+    codec_scene about = {.n = s->n,
+                         .n_channels = s->n_channels,
+                         .groups = &s->groups,
+                         .has_sky = s->has_sky,
+                         .has_emitters = s->has_emitters,
+                         .max_batch = c->max_batch,
+                         .max_bytes =
+                             4 * c->max_body > LEAST_EMISSION_LIMIT ? 4 * c->max_body : LEAST_EMISSION_LIMIT};
+    answer_notes notes = {.scene = s->name,
+                          .has_error = s->has_error,
+                          .relative_mean = s->relative_mean,
+                          .indirect_mean = s->indirect_mean};
+    radiosity_request request = {0};
+    problem why = {0};
+    buffer b = {0};
+    double start = now_ms();
+    bool good = in->body_type == MEDIA_NPY ? codec_read_npy(&about, in->body, in->length, &request, &why)
+                                           : codec_read_json(&about, in->body, in->length, &request, &why);
+    notes.parse_ms = now_ms() - start;
+    notes.quantity = request.quantity;
+    in->n_rhs = request.n_rhs;
+    if (good && solve(in, &request, &notes, &b, &why)) {
+        answer_json(out, &b, true);
+        if (in->accept.type == MEDIA_NPY) out->type = "application/x-npy";
+    } else {
+        answer_problem(out, &why);
+    }
+    buffer_free(&b);
+    radiosity_request_free(&request);
+}

@@ -1,0 +1,72 @@
+/* The one table of routes, and what a handler sees of a request and gives back. Knows no HTTP library. */
+#ifndef LAMBERT_SERVER_ROUTES_H
+#define LAMBERT_SERVER_ROUTES_H
+
+#include "server/codec_media.h"
+#include "server/problem.h"
+#include "server/service.h"
+
+/* A request that has passed its checks and whose body is there. */
+typedef struct call {
+    const service *service;
+    const catalog_snapshot *snapshot;
+    const scene *scene; /* of a route with {name} */
+    media_type body_type;
+    media_accept accept;
+    const char *body; /* body[length] is NUL */
+    size_t length;
+    batch_workspace *workspace; /* of a solving route */
+    size_t n_rhs;               /* set by the handler, for the log */
+} call;
+
+/* Starts zeroed. body is taken over by whoever sends it. */
+typedef struct answer {
+    unsigned status;
+    const char *type; /* static */
+    buffer body;
+    char allow[32];       /* of a 405 */
+    unsigned retry_after; /* of a 503: seconds; 0: not said */
+} answer;
+
+typedef void route_handler(call *in, answer *out);
+
+typedef struct route {
+    const char *method;
+    const char *pattern;
+    route_handler *handle;
+    enum {
+        BODY_NONE,
+        BODY_OF_SOLVE
+    } body; /* a solve is up to --max-body long and runs on a thread of its own */
+    enum { OPEN, WITH_TOKEN } access;
+} route;
+
+#define ROUTE_NAME_MAX 256
+
+/* Labels for metrics: the patterns, and at last "other". */
+size_t route_label_count(void);
+const char *route_label(size_t label);
+
+/* What a method and a raw path (escapes not resolved) lead to. */
+typedef struct route_match {
+    const route *route; /* NULL: the answer is made */
+    size_t label;
+    bool with_token; /* the path asks for it, whatever the method */
+    bool has_name;
+    char name[ROUTE_NAME_MAX]; /* of {name}, escapes resolved; "" when it cannot be one */
+} route_match;
+
+/* Fills *match, and *out with a 404 or 405 when there is no route. */
+void route_find(const char *method, const char *path, route_match *match, answer *out);
+
+/* Fills an answer with a problem. */
+void answer_problem(answer *out, const problem *what);
+void answer_refuse(answer *out, unsigned status, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+/* Gives JSON back that is in b (taken over), or 503 when it could not be written. */
+void answer_json(answer *out, buffer *b, bool written);
+
+route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, post_radiosity, not_yet;
+
+#endif

@@ -1,0 +1,37 @@
+/* One store, read whole and ready to answer: immutable, counted by who uses it. */
+#ifndef LAMBERT_SERVER_SCENE_H
+#define LAMBERT_SERVER_SCENE_H
+
+#include "lambert/lambert.h"
+#include "server/groups.h"
+
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct scene {
+    atomic_size_t references;
+    char *name; /* as served */
+    char *path;
+    size_t n;
+    size_t n_channels;
+    lam_operator *op;
+    group_index groups;
+    bool has_sky;
+    bool has_emitters;
+    uint64_t bytes;    /* of /operator as stored */
+    char *description; /* the JSON of GET /v1/scenes/NAME */
+    bool has_error;    /* the store's total error, of its own lights or else of single elements */
+    double relative_mean, indirect_mean;
+} scene;
+
+/* Reads the store at path; its file is closed again before this returns. name NULL: the store's own.
+ * With verify everything in the file is compared with its checksums, also what is not read.
+ * Errors: as store_open and operator_load; each names the path. One thread at a time. */
+lam_status scene_open(const char *path, const char *name, bool verify, scene **out, lam_error *error);
+
+/* Another user; every one gives it back with scene_release. Any thread. */
+scene *scene_acquire(scene *s);
+void scene_release(scene *s);
+
+#endif

@@ -1,0 +1,23 @@
+/* What all requests share. */
+#ifndef LAMBERT_SERVER_SERVICE_H
+#define LAMBERT_SERVER_SERVICE_H
+
+#include "server/batch.h"
+#include "server/catalog.h"
+#include "server/config.h"
+#include "server/metrics.h"
+#include "server/token.h"
+
+typedef enum service_state { SERVICE_LOADING, SERVICE_READY, SERVICE_DRAINING } service_state;
+
+typedef struct service {
+    const config *config;
+    catalog *catalog;
+    metrics *metrics;
+    batch_queue *queue;
+    token token;      /* empty: none is asked for */
+    FILE *access_log; /* NULL: none */
+    atomic_int state; /* a service_state */
+} service;
+
+#endif
