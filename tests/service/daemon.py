@@ -1,0 +1,134 @@
+"""A lambertd for a test: on a free port of the loopback, stopped whatever happens."""
+
+import http.client
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+
+LAMBERTD = os.environ["LAMBERTD"]
+
+# Nothing here is a measure of speed: so long only a daemon that hangs takes.
+PATIENCE = 120
+
+
+class Answer:
+    def __init__(self, status, headers, body):
+        self.status, self.headers, self.body = status, headers, body
+
+    def json(self):
+        return json.loads(self.body)
+
+    def __repr__(self):
+        return f"{self.status} {self.body[:300]!r}"
+
+
+class Daemon:
+    def __init__(self, *arguments, listen="127.0.0.1:0", ready=True):
+        self.out = tempfile.TemporaryFile("w+")
+        self.err = tempfile.TemporaryFile("w+")
+        self.port = None
+        where = ["--listen", listen] if listen is not None else []
+        self.process = subprocess.Popen([LAMBERTD, *where, *map(str, arguments)], stdout=self.out, stderr=self.err)
+        try:
+            if ready:
+                self.wait_for("listening on")
+                found = re.search(r"listening on http://127\.0\.0\.1:(\d+)", self.output())
+                self.port = int(found.group(1)) if found else None
+        except BaseException:
+            self.kill()
+            self.out.close()
+            self.err.close()
+            raise
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, value, trace):
+        try:
+            if kind is not None:
+                self.kill()
+                print(self.output(), self.errors())
+            elif self.process.poll() is None:
+                self.stop()
+        finally:
+            self.kill()
+            self.out.close()
+            self.err.close()
+
+    def output(self):
+        return self._read(self.out)
+
+    def errors(self):
+        return self._read(self.err)
+
+    @staticmethod
+    def _read(file):
+        # The daemon shares the file's offset: pread does not move it.
+        return os.pread(file.fileno(), 1 << 20, 0).decode()
+
+    def wait_for(self, words, times=1):
+        """Until standard output holds the words so often."""
+        deadline = time.monotonic() + PATIENCE
+        while self.output().count(words) < times:
+            if self.process.poll() is not None:
+                raise RuntimeError(f"lambertd ended with {self.process.returncode}: {self.errors()}")
+            if time.monotonic() > deadline:
+                raise TimeoutError(f"lambertd did not say {words!r}: {self.output()} {self.errors()}")
+            time.sleep(0.005)
+
+    def signal(self, number):
+        self.process.send_signal(number)
+
+    def wait(self):
+        return self.process.wait(PATIENCE)
+
+    def stop(self):
+        """By SIGTERM; a sanitizer's complaint is another exit status than 0."""
+        self.signal(signal.SIGTERM)
+        code = self.wait()
+        if code != 0:
+            raise RuntimeError(f"lambertd ended with {code}: {self.errors()}")
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+
+    # --- requests
+
+    def connect(self):
+        return http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
+
+    def raw(self):
+        return socket.create_connection(("127.0.0.1", self.port), timeout=PATIENCE)
+
+    def ask(self, method, path, body=None, headers=None, connection=None):
+        own = connection is None
+        connection = connection or self.connect()
+        try:
+            connection.request(method, path, body, headers or {})
+            response = connection.getresponse()
+            return Answer(response.status, response.headers, response.read())
+        finally:
+            if own:
+                connection.close()
+
+    def get(self, path, **more):
+        return self.ask("GET", path, **more)
+
+    def post(self, path, body, kind="application/json", accept=None, connection=None, headers=None):
+        if not isinstance(body, (bytes, str)):
+            body = json.dumps(body)
+        headers = dict(headers or {})
+        if kind is not None:
+            headers["Content-Type"] = kind
+        if accept is not None:
+            headers["Accept"] = accept
+        return self.ask("POST", path, body, headers, connection)
+
+    def radiosity(self, name, body, **more):
+        return self.post(f"/v1/scenes/{name}/radiosity", body, **more)

@@ -1,0 +1,153 @@
+"""Writes small stores after store/FORMAT.md with numpy and h5py alone, and knows what they must answer.
+
+The form factors are of low rank, F = U V', so that every kind of operator holds the same M exactly.
+"""
+
+import ctypes
+import ctypes.util
+
+import h5py
+import numpy as np
+
+PIECE = 1 << 20
+NO_VERTEX = 0xFFFFFFFF
+
+_xxhash = ctypes.CDLL(ctypes.util.find_library("xxhash"))
+_xxhash.XXH3_64bits.restype = ctypes.c_uint64
+_xxhash.XXH3_64bits.argtypes = [ctypes.c_char_p, ctypes.c_size_t]
+
+
+def xxh3(raw):
+    return _xxhash.XXH3_64bits(raw, len(raw))
+
+
+def text(value):
+    raw = value.encode()
+    return np.array(raw, dtype=f"S{max(len(raw), 1)}")[()]
+
+
+class Scene:
+    """What a store holds: answers in double, for comparison."""
+
+    def __init__(self, n, channels=1, rank=5, seed=1, groups=("floor", "lamp", "box.red", "box.blue", "wall")):
+        rng = np.random.default_rng(seed)
+        self.n, self.channels, self.rank = n, channels, rank
+        self.U = rng.random((n, rank)) + 0.01
+        self.V = rng.random((n, rank))
+        self.U *= (0.9 / (self.U @ self.V.sum(axis=0)))[:, None]  # rows of F sum to .9
+        self.rho = rng.uniform(0.1, 0.8, (channels, n))
+        self.rho[:, ::7] = 0.0
+        self.rho = self.rho.astype(np.float32).astype(float)
+        self.group_names = list(groups)
+        self.group = rng.integers(0, len(groups), n).astype(np.uint32)
+        self.group[: min(n, len(groups))] = np.arange(min(n, len(groups)))
+        self.order = rng.permutation(n).astype(np.uint32)
+        self.core = np.stack([np.linalg.inv(np.eye(rank) - self.V.T @ (r[:, None] * self.U)) for r in self.rho])
+
+    def members(self, name):
+        """The elements of a group, or of all `name.something`, in the order that `select` gives."""
+        ids = [g for g, known in enumerate(self.group_names) if known == name]
+        if not ids:
+            ids = sorted(
+                (g for g, known in enumerate(self.group_names) if known.startswith(name + ".")),
+                key=lambda g: self.group_names[g].encode(),
+            )
+        return np.concatenate([np.flatnonzero(self.group == g) for g in ids])
+
+    def solve(self, E, quantity="radiosity"):
+        """E is [..., C, n]."""
+        E = np.asarray(E, dtype=float)
+        H = np.einsum("ik,ckl,...cl->...ci", self.U, self.core, np.einsum("ik,...ci->...ck", self.V, E))
+        return {"radiosity": E + self.rho * H, "irradiance": H, "indirect": self.rho * H}[quantity]
+
+    def write(self, path, name="box", kind="low_rank", with_order=True, error=True, sky=False):
+        n, C = self.n, self.channels
+        order = self.order if with_order else np.arange(n)
+        with h5py.File(path, "w", libver=("v108", "v108")) as f:
+            f.create_group("mesh")
+            f.create_group("operator")
+            arrays = {
+                "/mesh/vertices": np.random.default_rng(0).random((n + 2, 3)),
+                "/mesh/elements": np.array([[i, i + 1, i + 2, NO_VERTEX] for i in range(n)], np.uint32),
+                "/mesh/area": np.ones(n),
+                "/mesh/normal": np.tile(np.array([0, 0, 1], np.float32), (n, 1)),
+                "/mesh/reflectance": self.rho.astype(np.float32),
+                "/mesh/emission": np.ones((C, n), np.float32),
+                "/mesh/group": self.group,
+                "/mesh/row_sums": np.full(n, 0.9),
+            }
+            if with_order:
+                arrays["/operator/order"] = self.order
+            if sky:
+                arrays["/sky/first_bounce"] = np.zeros((2, n), np.float32)
+            rho_stored = np.where(self.rho == 0, 1.0, self.rho)
+            attributes = {"kind": kind, "layout": "rows", "reason": "a test", "epsilon": 0.05}
+            if kind == "exact":
+                M = np.stack([rho_stored[c][:, None] * (self.U @ self.core[c] @ self.V.T) for c in range(C)])
+                M += np.eye(n)
+                arrays["/operator/M"] = M[:, order][:, :, order].astype(np.float32)
+                attributes["method"] = "exact"
+            elif C == 1:
+                Y = -rho_stored[0][:, None] * (self.U @ self.core[0])
+                arrays["/operator/Y"] = Y[order].astype(np.float32)
+                arrays["/operator/V"] = self.V[order].astype(np.float32)
+                attributes.update(method="low-rank", form="folded", rank=self.rank)
+            else:
+                arrays["/operator/U"] = self.U[order].astype(np.float32)
+                arrays["/operator/V"] = self.V[order].astype(np.float32)
+                arrays["/operator/core"] = self.core.astype(np.float32)
+                attributes.update(method="low-rank", form="factored", rank=self.rank)
+            for path_in_file, values in arrays.items():
+                f.create_dataset(path_in_file, data=np.ascontiguousarray(values))
+            width = max(len(g.encode()) for g in self.group_names)
+            f.create_dataset("/mesh/group_names", data=np.array([g.encode() for g in self.group_names], f"S{width}"))
+            set_attributes(f["operator"], attributes)
+            set_attributes(f["mesh"], {"geometry_hash": "0" * 32, "name": name, "unit": 1.0, "up": "z", "two_sided": 0})
+            if error:
+                figures = {"probes": 3}
+                for against in "total", "operator":
+                    for norm in "relative", "indirect":
+                        for figure in "mean", "std", "max":
+                            figures[f"{against}_{norm}_{figure}"] = 0.125 if norm == "relative" else 0.25
+                f.create_group("error")
+                for light in "single", "lights":
+                    set_attributes(f["error"].create_group(light), figures)
+            set_attributes(
+                f,
+                {
+                    "format": "lambert",
+                    "version": 1,
+                    "created": "2026-01-31T12:00:00Z",
+                    "name": name,
+                    "tool": "make_store.py",
+                    "command": "a test",
+                    "seed": 1,
+                    "unit": "W/m^2",
+                },
+            )
+            add_checksums(f)
+        return self
+
+
+def set_attributes(group, values):
+    for key, value in values.items():
+        if isinstance(value, str):
+            group.attrs[key] = text(value)
+        else:
+            group.attrs[key] = np.int64(value) if isinstance(value, int) else np.float64(value)
+
+
+def add_checksums(f):
+    """/checksum of all that is there; an older one is replaced."""
+    if "checksum" in f:
+        del f["checksum"]
+    paths = []
+    f.visititems(lambda p, o: paths.append("/" + p) if isinstance(o, h5py.Dataset) else None)
+    together = b""
+    f.create_group("checksum")
+    for path in sorted(paths, key=str.encode):
+        raw = np.ascontiguousarray(f[path][()]).tobytes()
+        sums = np.array([xxh3(raw[i : i + PIECE]) for i in range(0, len(raw), PIECE)], np.uint64)
+        f.create_dataset("/checksum" + path, data=sums)
+        together += path.encode() + b"\0" + sums.tobytes()
+    set_attributes(f["checksum"], {"piece_bytes": PIECE, "xxh3": f"{xxh3(together):016x}"})

@@ -1,0 +1,315 @@
+"""lambertd answers what the store holds: every form of emission, selection, quantity and encoding."""
+
+import io
+import json
+import pathlib
+import tempfile
+import unittest
+
+import numpy as np
+
+from daemon import Daemon
+from make_store import Scene
+
+# Factors are stored in single precision (6e-8 each) and at most 60 terms of one sign are summed in it: 4e-6 of
+# the largest value.
+TOLERANCE = 1e-5
+
+
+def npy(array):
+    out = io.BytesIO()
+    np.save(out, array)
+    return out.getvalue()
+
+
+class Answers(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        path = pathlib.Path(folder.name)
+        cls.grey = Scene(60, seed=1).write(path / "grey.h5", "grey")
+        cls.exact = Scene(40, seed=2).write(path / "exact.h5", "exact", kind="exact", error=False)
+        cls.plain = Scene(30, seed=3).write(path / "plain.h5", "plain", with_order=False)
+        cls.colour = Scene(50, channels=3, seed=4).write(path / "colour.h5", "colour")
+        cls.exact3 = Scene(20, channels=3, seed=5).write(path / "exact3.h5", "exact3", kind="exact")
+        cls.spaced = Scene(10, groups=("a~b/c", "größe", "x")).write(path / "spaced.h5", "two words/ä")
+        cls.scenes = {name: getattr(cls, name) for name in ("grey", "exact", "plain", "colour", "exact3")}
+        cls.daemon = Daemon("--stores", path, "--max-batch", 40)
+        cls.addClassCleanup(cls.daemon.__exit__, None, None, None)
+
+    def solve(self, name, body, **more):
+        answer = self.daemon.radiosity(name, body, **more)
+        self.assertEqual(answer.status, 200, answer)
+        return answer
+
+    def check(self, name, body, E, quantity="radiosity", take=None, **more):
+        """E is [C][n], or [m][C][n]; the answer has no axis for one channel."""
+        scene = self.scenes[name]
+        answer = self.solve(name, body, **more).json()
+        self.assertEqual(answer["scene"], name)
+        self.assertEqual(answer["elements"], scene.n)
+        self.assertEqual(answer["channels"], scene.channels)
+        self.assertEqual(answer["quantity"], quantity)
+        wanted = scene.solve(E, quantity)
+        if take is not None:
+            wanted = wanted[..., take]
+        if scene.channels == 1:
+            wanted = wanted[..., 0, :]
+        given = np.array(answer[quantity], float)
+        self.assertEqual(given.shape, wanted.shape)
+        largest = max(np.abs(wanted).max(initial=0), 1e-30)
+        self.assertLessEqual(np.abs(given - wanted).max(initial=0), TOLERANCE * largest)
+        return answer
+
+    def test_dense(self):
+        for name, scene in self.scenes.items():
+            E = np.random.default_rng(7).random(scene.n).round(6)
+            all_alike = np.tile(E, (scene.channels, 1))
+            self.check(name, {"emission": E.tolist()}, all_alike)
+            rows = np.random.default_rng(8).random((scene.channels, scene.n)).round(6)
+            self.check(name, {"emission": rows.tolist()}, rows)
+
+    def test_dense_without_light(self):
+        self.check("grey", {"emission": [0] * 60}, np.zeros((1, 60)))
+
+    def test_quantities(self):
+        for name, scene in self.scenes.items():
+            E = np.random.default_rng(9).random((scene.channels, scene.n))
+            for quantity in "radiosity", "irradiance", "indirect":
+                answer = self.check(name, {"emission": E.tolist(), "quantity": quantity}, E, quantity)
+                self.assertNotIn("radiosity" if quantity != "radiosity" else "irradiance", answer)
+
+    def test_sparse(self):
+        for name, scene in self.scenes.items():
+            E = np.zeros((scene.channels, scene.n))
+            E[:, 3], E[:, 0], E[:, scene.n - 1] = 2.5, 1, 4
+            body = {"elements": [3, 0, scene.n - 1], "values": [2.5, 1, 4]}
+            self.check(name, {"emission": body}, E)
+            colours = [[0.5, 1, 2][: scene.channels], 3, [1, 0, 7][: scene.channels]]
+            E[:, 3], E[:, 0], E[:, scene.n - 1] = colours
+            body = {"values": colours, "elements": [3, 0, scene.n - 1]}
+            self.check(name, {"emission": body}, E)
+        self.check("grey", {"emission": {"elements": [], "values": []}}, np.zeros((1, 60)))
+        self.check("grey", {"emission": {"elements": [1e1, 2.0], "values": [1, 1]}}, np.isin(np.arange(60), (10, 2))[None])
+
+    def test_groups(self):
+        for name, scene in self.scenes.items():
+            E = np.zeros((scene.channels, scene.n))
+            E[:, scene.members("lamp")] = 12.5
+            E[:, scene.members("box.red")] = 1
+            self.check(name, {"emission": {"groups": {"lamp": 12.5, "box.red": 1}}}, E)
+        E = np.zeros((3, 50))
+        E[:, self.colour.members("lamp")] = [[1], [2], [3]]
+        self.check("colour", {"emission": {"groups": {"lamp": [1, 2, 3]}}}, E)
+        self.check("grey", {"emission": {"groups": {}}}, np.zeros((1, 60)))
+
+    def test_an_object_is_all_of_its_groups(self):
+        E = np.zeros((1, 60))
+        E[:, self.grey.members("box.red")] = 2
+        E[:, self.grey.members("box.blue")] = 2
+        self.check("grey", {"emission": {"groups": {"box": 2}}}, E)
+        self.check("grey", {"emission": {"groups": {"box": 2}}, "select": {"groups": ["box"]}}, E,
+                   take=self.grey.members("box"))
+
+    def test_names_with_escapes(self):
+        path = "/v1/scenes/two%20words%2F%C3%A4"
+        about = self.daemon.get(path)
+        self.assertEqual(about.status, 200, about)
+        self.assertEqual(about.json()["name"], "two words/ä")
+        body = '{"emission": {"groups": {"a~b\\/c": 1, "gr\\u00f6\\u00dfe": 2}}}'
+        answer = self.daemon.post(path + "/radiosity", body)
+        self.assertEqual(answer.status, 200, answer)
+        self.assertEqual(answer.json()["scene"], "two words/ä")
+        again = self.daemon.post(path + "/radiosity", {"emission": {"groups": {"größe": 2, "a~b/c": 1}}})
+        self.assertEqual(again.json()["radiosity"], answer.json()["radiosity"])
+
+    def test_select_keeps_the_order_asked(self):
+        for name, scene in self.scenes.items():
+            E = np.random.default_rng(10).random((scene.channels, scene.n))
+            take = [scene.n - 1, 0, 5, 3, 5]
+            self.check(name, {"select": {"elements": take}, "emission": E.tolist()}, E, take=take)
+            take = np.concatenate([scene.members("wall"), scene.members("floor")])
+            for quantity in "irradiance", "indirect":
+                self.check(name, {"emission": E.tolist(), "select": {"groups": ["wall", "floor"]}, "quantity": quantity},
+                           E, quantity, take)
+        self.check("grey", {"emission": [1] * 60, "select": {"elements": []}}, np.ones((1, 60)), take=[])
+
+    def test_batches(self):
+        for name, scene in self.scenes.items():
+            rng = np.random.default_rng(11)
+            # More than one pass, and not a multiple of one.
+            E = np.zeros((37, scene.channels, scene.n))
+            forms = []
+            for i in range(37):
+                if i % 3 == 0:
+                    E[i] = rng.random((scene.channels, scene.n))
+                    forms.append(E[i].tolist())
+                elif i % 3 == 1:
+                    E[i][:, i % scene.n] = i
+                    forms.append({"elements": [i % scene.n], "values": [i]})
+                else:
+                    E[i][:, scene.members("lamp")] = i
+                    forms.append({"groups": {"lamp": i}})
+            self.check(name, {"emissions": forms}, E)
+            self.check(name, {"emissions": forms[:1]}, E[:1])
+            self.check(name, {"emissions": forms, "select": {"elements": [2, 1]}, "quantity": "indirect"}, E, "indirect",
+                       [2, 1])
+
+    def test_a_vector_has_the_same_bits_in_any_batch(self):
+        E = np.random.default_rng(12).random((40, 60)).astype(np.float32)
+        batch = self.solve("grey", {"emissions": E.tolist()}).json()["radiosity"]
+        for i in 0, 15, 16, 39:
+            self.assertEqual(self.solve("grey", {"emission": E[i].tolist()}).json()["radiosity"], batch[i])
+
+    def test_error_and_times(self):
+        answer = self.solve("grey", {"emission": [1] * 60}).json()
+        self.assertEqual(answer["error"], {"relative_mean": 0.125, "indirect_mean": 0.25})
+        self.assertEqual(sorted(answer["time_ms"]), ["encode", "parse", "solve"])
+        for value in answer["time_ms"].values():
+            self.assertGreaterEqual(value, 0)
+        self.assertNotIn("error", self.solve("exact", {"emission": [1] * 40}).json())
+
+    # --- NPY
+
+    def load(self, answer, dtype):
+        self.assertEqual(answer.headers["Content-Type"], "application/x-npy")
+        array = np.load(io.BytesIO(answer.body))
+        self.assertEqual(array.dtype, np.dtype(dtype))
+        return array
+
+    def test_npy_in(self):
+        rng = np.random.default_rng(13)
+        for name, scene in self.scenes.items():
+            C, n = scene.channels, scene.n
+            one = rng.random(n)
+            rows = rng.random((C, n))
+            batch = rng.random((3, C, n))
+            for dtype in "<f4", "<f8":
+                kind = "application/x-npy"
+                self.check(name, npy(one.astype(dtype)), np.tile(one, (C, 1)), kind=kind)
+                self.check(name, npy(batch.astype(dtype)), batch, kind=kind)
+                if C > 1:
+                    self.check(name, npy(rows.astype(dtype)), rows, kind=kind)
+                else:
+                    self.check(name, npy(batch[:, 0].astype(dtype)), batch, kind=kind)
+
+    def test_npy_versions(self):
+        E = np.arange(60, dtype="<f4")
+        for version in (1, 0), (2, 0), (3, 0):
+            out = io.BytesIO()
+            np.lib.format.write_array(out, E, version)
+            self.check("grey", out.getvalue(), E[None], kind="application/x-npy")
+
+    def test_npy_out_equals_json(self):
+        for name, scene in self.scenes.items():
+            C, n = scene.channels, scene.n
+            E = np.random.default_rng(14).random((2, C, n)).astype(np.float32)
+            for body, shape in (
+                ({"emissions": E.tolist()}, (2, C, n)),
+                ({"emission": E[0].tolist()}, (C, n)),
+                ({"emissions": E.tolist(), "select": {"elements": [4, 1, 2]}}, (2, C, 3)),
+            ):
+                shape = tuple(s for axis, s in enumerate(shape) if not (C == 1 and axis == len(shape) - 2))
+                said = np.array(self.solve(name, body).json()["radiosity"])
+                answer = self.solve(name, body, accept="application/x-npy")
+                array = self.load(answer, "<f4")
+                self.assertEqual(array.shape, shape)
+                # The JSON text reads back as the same single precision numbers.
+                np.testing.assert_array_equal(array, said.astype(np.float32))
+                wide = self.load(self.solve(name, body, accept="application/x-npy; dtype=f8"), "<f8")
+                np.testing.assert_array_equal(wide, array.astype(float))
+                half = self.load(self.solve(name, body, accept="application/x-npy;dtype=f2"), "<f2")
+                np.testing.assert_array_equal(half, array.astype(np.float16))
+
+    def test_npy_both_ways(self):
+        E = np.random.default_rng(15).random(60).astype("<f4")
+        answer = self.solve("grey", npy(E), kind="application/x-npy", accept="application/x-npy")
+        array = self.load(answer, "<f4")
+        wanted = self.grey.solve(E[None])[0]
+        self.assertLessEqual(np.abs(array - wanted).max(), TOLERANCE * wanted.max())
+
+    def test_accept(self):
+        body = {"emission": [1] * 60}
+        json_type, npy_type = "application/json", "application/x-npy"
+        for accept, wanted in (
+            (None, json_type),
+            ("*/*", json_type),
+            ("application/*", json_type),
+            ("text/html", json_type),
+            ("application/x-npy;q=0", json_type),
+            ("application/json, application/x-npy", json_type),
+            ("application/x-npy, application/json", npy_type),
+            ("application/x-npy;q=0.5, application/json;q=0.4", npy_type),
+            ("application/x-npy;q=0.4, application/json;q=0.5", json_type),
+            ("application/x-npy, */*;q=0.1", npy_type),
+            ("APPLICATION/X-NPY; DTYPE=F4", npy_type),
+            ("application/x-npy; dtype=i4", json_type),
+            (",;=,\"", json_type),
+        ):
+            answer = self.solve("grey", body, accept=accept)
+            self.assertEqual(answer.headers["Content-Type"], wanted, accept)
+
+    def test_content_type(self):
+        for kind in "application/json", "application/json; charset=utf-8", "Application/JSON", None:
+            self.solve("grey", {"emission": [1] * 60}, kind=kind)
+
+    # --- what a store says of itself
+
+    def test_scenes(self):
+        listed = {s["name"]: s for s in self.daemon.get("/v1/scenes").json()["scenes"]}
+        self.assertEqual(set(listed), set(self.scenes) | {"two words/ä"})
+        self.assertEqual(list(listed), sorted(listed, key=lambda name: name.encode()))
+        self.assertEqual(listed["exact3"],
+                         {"name": "exact3", "elements": 20, "channels": 3, "kind": "exact",
+                          "bytes": 3 * 20 * 20 * 4 + 20 * 4})
+
+    def test_scene(self):
+        about = self.daemon.get("/v1/scenes/colour").json()
+        for member in ("name elements channels kind method reason epsilon rank bytes groups emitters sky error "
+                       "provenance").split():
+            self.assertIn(member, about)
+        self.assertEqual(about["rank"], 5)
+        self.assertEqual(about["epsilon"], 0.05)
+        self.assertEqual(about["groups"], [{"name": name, "elements": int((self.colour.group == g).sum())}
+                                           for g, name in enumerate(self.colour.group_names)])
+        self.assertEqual(about["error"]["single"]["total_indirect_mean"], 0.25)
+        self.assertEqual(about["error"]["single"]["probes"], 3)
+        self.assertEqual(about["provenance"]["seed"], 1)
+        self.assertEqual(about["provenance"]["tool"], "make_store.py")
+        self.assertIsNone(about["sky"])
+        self.assertIsNone(about["emitters"])
+        exact = self.daemon.get("/v1/scenes/exact").json()
+        self.assertEqual(exact["density"], 1)
+        self.assertEqual(exact["error"], {})
+
+    def test_health(self):
+        for path in "/healthz", "/readyz":
+            self.assertEqual(self.daemon.get(path).status, 200)
+            head = self.daemon.ask("HEAD", path)
+            self.assertEqual((head.status, head.body), (200, b""))
+
+    def test_metrics(self):
+        def count():
+            lines = self.daemon.get("/metrics").body.decode().splitlines()
+            return {line.rsplit(" ", 1)[0]: float(line.rsplit(" ", 1)[1]) for line in lines if not line.startswith("#")}
+
+        before = count()
+        self.solve("grey", {"emissions": [[1] * 60] * 20})
+        self.assertEqual(self.daemon.radiosity("grey", "{").status, 400)
+        after = count()
+        route = "/v1/scenes/{name}/radiosity"
+        for key, more in (
+            (f'lambertd_requests_total{{route="{route}",status="200"}}', 1),
+            (f'lambertd_requests_total{{route="{route}",status="400"}}', 1),
+            (f'lambertd_request_duration_seconds_count{{route="{route}"}}', 2),
+            ("lambertd_batch_size_sum", 20),
+        ):
+            self.assertEqual(after[key] - before.get(key, 0), more, key)
+        self.assertEqual(after["lambertd_in_flight"], 1)  # the very request
+        held = sum(s["bytes"] for s in self.daemon.get("/v1/scenes").json()["scenes"])
+        self.assertGreater(after["lambertd_operator_bytes"], held / 2)
+
+
+if __name__ == "__main__":
+    unittest.main()

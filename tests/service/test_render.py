@@ -1,0 +1,266 @@
+"""Black box: pictures of known scenes show what they should, and wrong usage is one line."""
+
+import os
+import resource
+import signal
+import struct
+import subprocess
+import tempfile
+import time
+import unittest
+import zlib
+
+import numpy
+
+LAMBERT = os.environ["LAMBERT"]
+BACKGROUND = 38
+GLOW = [word for group in ("floor", "ceiling", "wall-x0", "wall-x1", "wall-y0", "wall-y1", "block-1", "block-2",
+                           "block-3") for word in ("--emit", group + "=1")]
+
+
+def lambert(*arguments, threads=2, **more):
+    environment = dict(os.environ, OMP_NUM_THREADS=str(threads))
+    return subprocess.run([LAMBERT, *map(str, arguments)], capture_output=True, text=True, timeout=600,
+                          env=environment, check=False, **more)
+
+
+def decode_png(path):
+    """A PNG of 8 bits a channel as an array [height][width][channels], by the specification alone."""
+    with open(path, "rb") as file:
+        data = file.read()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n", path
+    place, packed = 8, b""
+    while place < len(data):
+        length, kind = struct.unpack(">I4s", data[place:place + 8])
+        body = data[place + 8:place + 8 + length]
+        assert struct.unpack(">I", data[place + 8 + length:place + 12 + length])[0] == zlib.crc32(kind + body)
+        place += 12 + length
+        if kind == b"IHDR":
+            width, height, depth, colour = struct.unpack(">IIBB", body[:10])
+            assert depth == 8
+        elif kind == b"IDAT":
+            packed += body
+    assert kind == b"IEND"
+    channels = {0: 1, 2: 3}[colour]
+    rows = numpy.frombuffer(zlib.decompress(packed), numpy.uint8).reshape(height, 1 + width * channels)
+    pixels = numpy.zeros((height, width, channels), int)
+    above = numpy.zeros((width, channels), int)
+    for y in range(height):
+        row = rows[y, 1:].reshape(width, channels).astype(int)
+        method = rows[y, 0]
+        if method == 1:
+            row = numpy.cumsum(row, axis=0) & 255
+        elif method == 2:
+            row = (row + above) & 255
+        elif method in (3, 4):
+            left, corner = numpy.zeros(channels, int), numpy.zeros(channels, int)
+            for x in range(width):
+                up = above[x]
+                if method == 3:
+                    guess = (left + up) // 2
+                else:
+                    to_left, to_up = abs(up - corner), abs(left - corner)
+                    to_corner = abs(left + up - 2 * corner)
+                    guess = numpy.where((to_left <= to_up) & (to_left <= to_corner), left,
+                                        numpy.where(to_up <= to_corner, up, corner))
+                row[x] = (row[x] + guess) & 255
+                left, corner = row[x], up
+        pixels[y] = above = row
+    return pixels
+
+
+class Render(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory(prefix="lambert-render-")
+        cls.cornell = cls.make("cornell", "cornell", "--elements", 700)
+        cls.furnace = cls.make("furnace", "furnace", "--elements", 300)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    @classmethod
+    def path(cls, name):
+        return os.path.join(cls.folder.name, name)
+
+    @classmethod
+    def make(cls, name, kind, *options):
+        scene, store = cls.path(name + ".obj"), cls.path(name + ".h5")
+        for command in (("generate", kind, *options, "-o", scene),
+                        ("precompute", scene, "-o", store, "--method", "exact", "--rays", 1024,
+                         "--probes", 4, "--quiet")):
+            done = lambert(*command)
+            assert done.returncode == 0, done.stderr
+        return store
+
+    def draw(self, store, *options, name="picture.png", **more):
+        image = self.path(name)
+        done = lambert("render", store, *options, "-o", image, **more)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return decode_png(image)
+
+    def test_cornell_box_bleeds(self):
+        pixels = self.draw(self.cornell, "--size", "240x240").astype(float)
+        self.assertEqual(pixels.shape, (240, 240, 3))
+        left, right = (pixels[40:200, a:b].mean((0, 1)) for a, b in ((4, 48), (192, 236)))
+        self.assertGreater(left[0], 2 * left[1])
+        self.assertGreater(right[1], 1.25 * right[0])
+        # The white back wall beside each coloured one has some of its colour.
+        near_red, near_green = (pixels[70:110, a:b].mean((0, 1)) for a, b in ((54, 70), (170, 186)))
+        self.assertGreater(near_red[0] / near_red[1], 1.03 * near_green[0] / near_green[1])
+        # The lamp is white and above the middle, the room neither black nor washed out.
+        white = numpy.argwhere(pixels.min(2) >= 250)
+        self.assertGreater(len(white), 50)
+        self.assertTrue((white[:, 0] < 60).all())
+        self.assertTrue(60 < pixels.mean() < 190, pixels.mean())
+
+    def test_no_seams(self):
+        for option in ([], ["--smooth"]):
+            # A room of one brightness: a gap between two elements, or an element left out, would be another.
+            pixels = self.draw(self.furnace, *GLOW, "--size", "301x301", *option)
+            self.assertEqual(pixels.shape[2], 1)
+            scene = pixels[pixels != BACKGROUND]
+            self.assertGreater(scene.size, 301 * 301 // 2)
+            middle = pixels[90:-90, 30:-30]
+            self.assertLessEqual(middle.max() - middle.min(), 1)
+            # sRGB of .75, which exposure aims at, is 225; a grey, neither black nor white.
+            self.assertTrue(100 < middle.mean() < 240, middle.mean())
+            # No background shows through in the coloured room either.
+            pixels = self.draw(self.cornell, "--size", "301x301", *option)
+            inside = pixels[15:-15, 15:-15].reshape(-1, 3)
+            self.assertFalse((inside == BACKGROUND).all(1).any())
+            self.assertFalse((inside.max(1) < 3).any())
+
+    def test_same_for_any_number_of_threads(self):
+        for option in ([], ["--smooth"], ["--false-color"]):
+            one = self.draw(self.cornell, "--size", "130x90", *option, threads=1)
+            two = self.draw(self.cornell, "--size", "130x90", *option, threads=2)
+            self.assertTrue((one == two).all())
+
+    def test_smooth_is_smoother(self):
+        def roughness(pixels):
+            return numpy.abs(numpy.diff(pixels[150:165, 10:50, 0], axis=0)).max()
+
+        flat = self.draw(self.cornell, "--size", "240x240")
+        smooth = self.draw(self.cornell, "--size", "240x240", "--smooth")
+        self.assertLess(2 * roughness(smooth), roughness(flat))
+
+    def test_exposure_and_quantities(self):
+        plain = self.draw(self.cornell, "--size", "90x90").mean()
+        brighter = self.draw(self.cornell, "--size", "90x90", "--exposure", 1).mean()
+        darker = self.draw(self.cornell, "--size", "90x90", "--exposure", -1).mean()
+        self.assertGreater(brighter, plain + 10)
+        self.assertLess(darker, plain - 10)
+        # What the lamp sends is no part of what it receives by reflection.
+        indirect = self.draw(self.cornell, "--size", "240x240", "--quantity", "indirect")
+        self.assertFalse((indirect.min(2) >= 250).any())
+        self.draw(self.cornell, "--size", "90x90", "--quantity", "irradiance")
+
+    def test_emit_chooses_the_light(self):
+        warm = self.draw(self.cornell, "--size", "120x120", "--emit", "lamp=1,.2,.1").astype(float)
+        cold = self.draw(self.cornell, "--size", "120x120", "--emit", "lamp=.1,.2,1").astype(float)
+        self.assertGreater(warm[..., 0].mean(), 2 * warm[..., 2].mean())
+        self.assertGreater(cold[..., 2].mean(), cold[..., 0].mean())
+
+    def test_emission_file(self):
+        groups = self.path("emission.json")
+        with open(groups, "w", encoding="utf-8") as file:
+            file.write('{"groups": {"lamp": [1, 0.2, 0.1]}}')
+        by_file = self.draw(self.cornell, "--size", "120x120", "--emission", groups)
+        by_option = self.draw(self.cornell, "--size", "120x120", "--emit", "lamp=1,.2,.1")
+        self.assertTrue((by_file == by_option).all())
+
+    def test_false_color(self):
+        pixels = self.draw(self.furnace, *GLOW, "--false-color", "--size", "320x240")
+        self.assertEqual(pixels.shape, (240, 320, 3))
+        # The legend's top is yellow, its bottom violet.
+        self.assertTrue((pixels[:60, -40:] == (251, 231, 37)).all(2).any())
+        self.assertTrue((pixels[-60:, -40:] == (59, 3, 84)).all(2).any())
+
+    def test_camera(self):
+        # From close by, only the back wall, which is white: no channel far from the others.
+        pixels = self.draw(self.cornell, "--camera", ".3,.2,.45,.3,.55,.45,20", "--size", "60x40")
+        self.assertEqual(pixels.shape, (40, 60, 3))
+        self.assertFalse((pixels == BACKGROUND).all(2).any())
+        # Away from the scene there is nothing but background.
+        pixels = self.draw(self.cornell, "--camera", "-9,-9,9,-10,-10,9,40", "--size", "10x10")
+        self.assertTrue((pixels == BACKGROUND).all())
+
+    def test_wrong_usage_is_one_line(self):
+        image = self.path("never.png")
+        foreign = self.path("foreign.h5")
+        with open(foreign, "w", encoding="utf-8") as file:
+            file.write("not a store")
+        for status, words, arguments in (
+                (2, "-o", [self.cornell]),
+                (2, "png", [self.cornell, "-o", self.path("never.jpg")]),
+                (2, "STORE", ["-o", image]),
+                (2, "--size", [self.cornell, "-o", image, "--size", "640"]),
+                (2, "--size", [self.cornell, "-o", image, "--size", "-1x5"]),
+                (2, "0x5", [self.cornell, "-o", image, "--size", "0x5"]),
+                (2, "16385x1", [self.cornell, "-o", image, "--size", "16385x1"]),
+                (2, "16384x16384", [self.cornell, "-o", image, "--size", "16384x16384"]),
+                (2, "--camera", [self.cornell, "-o", image, "--camera", "1,2,3"]),
+                (2, "--camera", [self.cornell, "-o", image, "--camera", "0,0,0,0,0,nan,40"]),
+                (2, "field of view", [self.cornell, "-o", image, "--camera", "0,0,0,1,0,0,180"]),
+                (2, "two different", [self.cornell, "-o", image, "--camera", "1,1,1,1,1,1,40"]),
+                (2, "--exposure", [self.cornell, "-o", image, "--exposure", "bright"]),
+                (2, "--quantity", [self.cornell, "-o", image, "--quantity", "beauty"]),
+                (2, "not supported yet", [self.cornell, "-o", image, "--quantity", "coherence"]),
+                (2, "not supported yet", [self.cornell, "-o", image, "--quantity", "patch"]),
+                (2, "not supported yet", [self.cornell, "-o", image, "--quantity", "visible"]),
+                (2, "not supported yet", [self.cornell, "-o", image, "--sky", "a.npy"]),
+                (2, "not supported yet", [self.cornell, "-o", image, "--animate", "a.npy"]),
+                (2, "both", [self.cornell, "-o", image, "--emit", "lamp=1", "--emission", "a.npy"]),
+                (2, "--frobnicate", [self.cornell, "-o", image, "--frobnicate"]),
+                (1, "nonexistent", [self.path("nonexistent.h5"), "-o", image]),
+                (1, "foreign", [foreign, "-o", image]),
+                (1, "no light of its own", [self.furnace, "-o", image]),
+                (1, "nowhere", [self.cornell, "-o", self.path("nowhere/a.png")]),
+                (1, "missing.npy", [self.cornell, "-o", image, "--emission", self.path("missing.npy")])):
+            done = lambert("render", *arguments)
+            self.assertEqual(done.returncode, status, (arguments, done.stderr))
+            self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+            self.assertIn(words, done.stderr)
+            self.assertEqual(done.stdout, "")
+            self.assertFalse(os.path.exists(image))
+        done = lambert("render", self.cornell, "-o", image, "--emit", "cellar=1")
+        self.assertIn(done.returncode, (1, 2))
+        self.assertIn("cellar", done.stderr)
+
+    def test_full_disk_keeps_the_old_picture(self):
+        folder = self.path("full")
+        os.mkdir(folder)
+        image = os.path.join(folder, "a.png")
+        with open(image, "w", encoding="utf-8") as file:
+            file.write("older")
+        # A limit on file size stands for the full disk; the picture of noise-free colours is larger than it.
+        done = lambert("render", self.cornell, "-o", image, "--size", "400x400", "--smooth",
+                       preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192)))
+        self.assertEqual(done.returncode, 1)
+        self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+        self.assertIn("a.png", done.stderr)
+        self.assertEqual(os.listdir(folder), ["a.png"])
+        with open(image, encoding="utf-8") as file:
+            self.assertEqual(file.read(), "older")
+
+    def test_interrupted_leaves_nothing(self):
+        folder = self.path("interrupted")
+        os.mkdir(folder)
+        with subprocess.Popen([LAMBERT, "render", self.cornell, "--size", "8192x8192", "-o",
+                               os.path.join(folder, "a.png")], stderr=subprocess.PIPE, text=True) as process:
+            time.sleep(1)  # into the drawing, which takes tens of seconds; earlier is as good
+            process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=300)
+        self.assertIn(process.returncode, (1, -signal.SIGINT), errors)
+        self.assertEqual(os.listdir(folder), [])
+
+    def test_help(self):
+        done = lambert("render", "--help")
+        self.assertEqual(done.returncode, 0)
+        self.assertIn("--false-color", done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,419 @@
+/* The builders and the reference against closed forms (exact form factors in, nine digits out). */
+#include "solver/build/build.h"
+#include "solver/build/hf.h"
+#include "solver/build/judge.h"
+#include "solver/build/norm.h"
+#include "solver/build/reference.h"
+#include "support/box.h"
+#include "support/suite.h"
+
+#include <lapacke.h>
+
+static const double unit_cube[3] = {1, 1, 1};
+static const double room[3] = {10, 6, 3};
+
+/* Everything a builder needs, of one box. */
+typedef struct fixture {
+    mesh m;
+    csr F;
+    uint32_t *order;
+    build_problem problem;
+} fixture;
+
+static fixture fixture_box(const double size[3], unsigned divisions, float reflectance) {
+    fixture f = {.m = box_mesh(size, divisions, reflectance)};
+    f.F = box_form_factors(size, divisions, f.m.area);
+    f.order = malloc(f.m.n * sizeof *f.order);
+    lam_error error = {0};
+    ck_assert_msg(mesh_z_order(&f.m, f.order, &error) == LAM_OK, "%s", error.message);
+    return f;
+}
+
+static const build_problem *problem_of(fixture *f) {
+    f->problem = (build_problem){.n = f->m.n,
+                                 .n_channels = f->m.n_channels,
+                                 .area = f->m.area,
+                                 .reflectance = f->m.reflectance,
+                                 .F = &f->F,
+                                 .order = f->order};
+    return &f->problem;
+}
+
+static void fixture_free(fixture *f) {
+    mesh_free(&f->m);
+    csr_free(&f->F);
+    free(f->order);
+}
+
+static const build_options defaults = {
+    .method = "low-rank", .factorizer = "auto", .epsilon = .1, .alpha = .5, .levels = -1};
+
+static lam_operator *build(const build_problem *problem, const build_options *options, build_report *report) {
+    lam_operator *op = NULL;
+    lam_error error = {0};
+    ck_assert_msg(build_operator(problem, options, &op, report, &error) == LAM_OK, "%s", error.message);
+    return op;
+}
+
+static void apply(const lam_operator *op, lam_quantity quantity, const float *E, float *out) {
+    const size_t bytes = lam_operator_work_bytes(op, 1);
+    void *work = malloc(bytes);
+    lam_error error = {0};
+    ck_assert_msg(lam_operator_apply(op, 1, quantity, E, out, work, bytes, &error) == LAM_OK, "%s",
+                  error.message);
+    free(work);
+}
+
+/* Mean of x over the cells of a face. */
+static double face_mean(const double *x, unsigned divisions, size_t face) {
+    const size_t cells = (size_t)divisions * divisions;
+    double sum = 0;
+    for (size_t i = 0; i < cells; i++) sum += x[face * cells + i];
+    return sum / (double)cells;
+}
+
+/* Unit cube, E = 1 on face x0, rho = .5: the exact values of the discrete problem. */
+static const struct {
+    unsigned divisions;
+    double emitter, adjacent, opposite;
+} cubes[] = {{1, 1.090909098, .181836269, .181745826},
+             {4, 1.102645712, .181381216, .171829422},
+             {16, 1.104210821, .181133371, .171255694}};
+
+/* F is stored in single precision: relative rounding 6e-8 a factor, so 1e-7 in a mean of B. */
+static const double tolerance = 1e-7;
+
+START_TEST(reference_cube) {
+    fixture f = fixture_box(unit_cube, cubes[_i].divisions, .5f);
+    const size_t n = f.m.n, cells = n / 6;
+    double *E = calloc(n, sizeof *E), *B = calloc(n, sizeof *B);
+    for (size_t i = 0; i < cells; i++) E[i] = 1;
+    for (int way = REFERENCE_DENSE; way <= REFERENCE_ITERATED; way++) {
+        reference *r = NULL;
+        lam_error error = {0};
+        memcpy(B, E, n * sizeof *B);
+        ck_assert_int_eq(reference_create(&f.F, f.m.area, f.m.reflectance, way, &r, &error), LAM_OK);
+        ck_assert_msg(reference_solve(r, 1, E, B, 1e-11, NULL, &error) == LAM_OK, "%s", error.message);
+        ck_assert_double_eq_tol(face_mean(B, cubes[_i].divisions, 0), cubes[_i].emitter, tolerance);
+        ck_assert_double_eq_tol(face_mean(B, cubes[_i].divisions, 1), cubes[_i].opposite, tolerance);
+        for (size_t face = 2; face < 6; face++)
+            ck_assert_double_eq_tol(face_mean(B, cubes[_i].divisions, face), cubes[_i].adjacent, tolerance);
+        reference_destroy(r);
+    }
+    free(E);
+    free(B);
+    fixture_free(&f);
+}
+END_TEST
+
+START_TEST(exact_cube) {
+    fixture f = fixture_box(unit_cube, cubes[_i].divisions, .5f);
+    const size_t n = f.m.n, cells = n / 6;
+    build_options options = defaults;
+    options.method = "exact";
+    build_report report;
+    lam_operator *op = build(problem_of(&f), &options, &report);
+    ck_assert_str_eq(report.method, "exact");
+    float *E = calloc(n, sizeof *E), *B = calloc(n, sizeof *B);
+    double *wide = calloc(n, sizeof *wide);
+    for (size_t i = 0; i < cells; i++) E[i] = 1;
+    apply(op, LAM_RADIOSITY, E, B);
+    for (size_t i = 0; i < n; i++) wide[i] = (double)B[i];
+    /* The operator and its sums over n are single precision now: 1e-6. */
+    ck_assert_double_eq_tol(face_mean(wide, cubes[_i].divisions, 0), cubes[_i].emitter, 1e-6);
+    ck_assert_double_eq_tol(face_mean(wide, cubes[_i].divisions, 1), cubes[_i].opposite, 1e-6);
+    ck_assert_double_eq_tol(face_mean(wide, cubes[_i].divisions, 2), cubes[_i].adjacent, 1e-6);
+    lam_operator_close(op);
+    free(E);
+    free(B);
+    free(wide);
+    fixture_free(&f);
+}
+END_TEST
+
+/* Room 10 x 6 x 3, one element a face, rho ceiling .7, floor .2, walls .5, E_ceiling = 1. */
+START_TEST(room_one_element_per_face) {
+    fixture f = fixture_box(room, 1, .5f);
+    /* faces: x0, x1 (6 x 3), y0, y1 (10 x 3), floor, ceiling */
+    f.m.reflectance[4] = .2f;
+    f.m.reflectance[5] = .7f;
+    const double expected[6] = {.244787308, .244787308, .249787404, .249787404, .136329470, 1.135385436};
+    float E[6] = {0, 0, 0, 0, 0, 1}, B[6], H[6];
+    const char *const methods[] = {"exact", "low-rank"};
+    for (int method = 0; method < 2; method++) {
+        build_options options = defaults;
+        options.method = methods[method];
+        options.epsilon = 1e-6; /* full rank */
+        build_report report;
+        lam_operator *op = build(problem_of(&f), &options, &report);
+        apply(op, LAM_RADIOSITY, E, B);
+        apply(op, LAM_IRRADIANCE, E, H);
+        double absorbed = 0;
+        for (int i = 0; i < 6; i++) {
+            ck_assert_double_eq_tol((double)B[i], expected[i], 1e-6);
+            absorbed += f.m.area[i] * (1 - (double)f.m.reflectance[i]) * (double)H[i];
+        }
+        ck_assert_double_eq_tol(absorbed, 60, 6e-5);
+        lam_operator_close(op);
+    }
+    fixture_free(&f);
+}
+END_TEST
+
+/* A sphere as a matrix: F_ij = A_j / A (with F_ii = A_i / A), B_i = E_i + rho_i mean(E) / (1 - mean(rho)). */
+START_TEST(sphere_has_rank_one) {
+    enum { N = 60 };
+    double area[N], total = 0, mean_E = 0, mean_rho = 0;
+    float rho[N], E[N], B[N];
+    uint64_t indptr[N + 1] = {0};
+    uint32_t indices[N * N], order[N];
+    float data[N * N];
+    for (int i = 0; i < N; i++) {
+        area[i] = 1 + (i * 7 % 11);
+        rho[i] = .1f + .01f * (float)(i % 13);
+        E[i] = (float)(i % 5);
+        order[i] = (uint32_t)i;
+        total += area[i];
+    }
+    for (int i = 0; i < N; i++) {
+        mean_E += area[i] * (double)E[i] / total;
+        mean_rho += area[i] * (double)rho[i] / total;
+        for (int j = 0; j < N; j++) {
+            indices[i * N + j] = (uint32_t)j;
+            data[i * N + j] = (float)(area[j] / total);
+        }
+        indptr[i + 1] = (uint64_t)(i + 1) * N;
+    }
+    const csr F = {N, indptr, indices, data};
+    const build_problem problem = {
+        .n = N, .n_channels = 1, .area = area, .reflectance = rho, .F = &F, .order = order};
+    const char *const methods[] = {"exact", "low-rank"};
+    for (int method = 0; method < 2; method++) {
+        build_options options = defaults;
+        options.method = methods[method];
+        options.epsilon = 1e-3;
+        build_report report;
+        lam_operator *op = build(&problem, &options, &report);
+        if (method == 1) ck_assert_uint_eq(report.rank, 1);
+        apply(op, LAM_RADIOSITY, E, B);
+        for (int i = 0; i < N; i++) /* single precision in F and in the operator */
+            ck_assert_double_eq_tol((double)B[i], (double)E[i] + (double)rho[i] * mean_E / (1 - mean_rho),
+                                    2e-6);
+        lam_operator_close(op);
+    }
+}
+END_TEST
+
+/* |S - Q V^T|_2 by a dense SVD in double. */
+static double dense_norm(const scaled_matrix *S, const uint32_t *order, const tall_factors *f) {
+    const size_t n = f->n;
+    float *block = malloc(n * n * sizeof *block);
+    double *D = malloc(n * n * sizeof *D), *values = malloc(n * sizeof *values),
+           *extra = malloc(n * sizeof *extra);
+    scaled_columns(S, order, n, block);
+    for (size_t c = 0; c < n; c++)
+        for (size_t i = 0; i < n; i++) {
+            double sum = (double)block[c * n + i];
+            for (size_t k = 0; k < f->rank; k++) sum -= (double)f->Q[k * n + i] * (double)f->V[k * n + c];
+            D[c * n + i] = sum;
+        }
+    ck_assert_int_eq(LAPACKE_dgesvd(LAPACK_COL_MAJOR, 'N', 'N', (int)n, (int)n, D, (int)n, values, NULL, 1,
+                                    NULL, 1, extra),
+                     0);
+    const double norm = values[0];
+    free(block);
+    free(D);
+    free(values);
+    free(extra);
+    return norm;
+}
+
+static const double alphas[] = {.1, .5, .9};
+
+START_TEST(hf_keeps_its_bound) {
+    fixture f = fixture_box(room, 5, .5f); /* 150 elements, areas differ from face to face */
+    scaled_matrix S;
+    lam_error error = {0};
+    ck_assert_int_eq(scaled_init(&S, &f.F, f.m.area, &error), LAM_OK);
+    const double epsilons[] = {.3, .1, .01, 1e-4};
+    for (int e = 0; e < 4; e++)
+        for (int levels = 0; levels <= 4; levels++) {
+            const hf_options options = {.epsilon = epsilons[e], .alpha = alphas[_i], .levels = levels};
+            tall_factors q = {0};
+            ck_assert_msg(hf_factorize(&S, f.order, &options, &q, &error) == LAM_OK, "%s", error.message);
+            const double norm = dense_norm(&S, f.order, &q);
+            /* Rounding of the factors: 1e-6 of |S| = 1. */
+            ck_assert_msg(norm <= epsilons[e] + 2e-6, "epsilon %g, %d levels: error %g", epsilons[e], levels,
+                          norm);
+            double lanczos;
+            ck_assert_int_eq(norm_of_error(&S, f.order, &q, NULL, &lanczos, &error), LAM_OK);
+            ck_assert_msg(lanczos <= norm * 1.0001 + 1e-7 && lanczos >= .97 * norm - 1e-6,
+                          "norm %g, found %g", norm, lanczos);
+            /* V is orthonormal. */
+            for (size_t a = 0; a < q.rank; a++)
+                for (size_t b = 0; b <= a; b++) {
+                    double dot = 0;
+                    for (size_t i = 0; i < q.m; i++)
+                        dot += (double)q.V[a * q.m + i] * (double)q.V[b * q.m + i];
+                    ck_assert_double_eq_tol(dot, a == b ? 1 : 0, 2e-5);
+                }
+            tall_factors_free(&q);
+        }
+    scaled_free(&S);
+    fixture_free(&f);
+}
+END_TEST
+
+START_TEST(fixed_rank_is_exact) {
+    fixture f = fixture_box(unit_cube, 4, .5f);
+    const size_t ranks[] = {1, 7, 50, 96, 1000};
+    for (int i = 0; i < 5; i++) {
+        build_options options = defaults;
+        options.rank = ranks[i];
+        options.levels = 2;
+        build_report report;
+        lam_operator *op = build(problem_of(&f), &options, &report);
+        ck_assert_uint_eq(report.rank, ranks[i] < 96 ? ranks[i] : 96);
+        ck_assert(report.epsilon >= 0 && report.epsilon <= 1);
+        if (ranks[i] >= 96) ck_assert_double_le(report.epsilon, 2e-6);
+        lam_operator_close(op);
+    }
+    fixture_free(&f);
+}
+END_TEST
+
+/* E = 1, uniform rho, closed: B = 1 / (1 - rho) (white furnace). */
+START_TEST(furnace) {
+    const float rhos[] = {.5f, .9f};
+    for (int r = 0; r < 2; r++) {
+        fixture f = fixture_box(unit_cube, 8, rhos[r]);
+        const size_t n = f.m.n;
+        float *E = malloc(n * sizeof *E), *B = malloc(n * sizeof *B);
+        for (size_t i = 0; i < n; i++) E[i] = 1;
+        const double expected = 1 / (1 - (double)rhos[r]);
+        build_options options = defaults;
+        build_report report;
+        options.method = "exact";
+        lam_operator *op = build(problem_of(&f), &options, &report);
+        apply(op, LAM_RADIOSITY, E, B);
+        for (size_t i = 0; i < n; i++) ck_assert_double_eq_tol((double)B[i], expected, 1e-5 * expected);
+        lam_operator_close(op);
+        options.method = "low-rank";
+        op = build(problem_of(&f), &options, &report);
+        apply(op, LAM_RADIOSITY, E, B);
+        double error = 0;
+        for (size_t i = 0; i < n; i++) error += pow((double)B[i] / expected - 1, 2) / (double)n;
+        /* eq. 2.9 with equal areas: relative error at most epsilon / (1 - max rho). */
+        ck_assert_double_le(sqrt(error), report.measured_norm_error / (1 - (double)rhos[r]) + 1e-5);
+        lam_operator_close(op);
+        free(E);
+        free(B);
+        fixture_free(&f);
+    }
+}
+END_TEST
+
+START_TEST(judge_finds_the_exact_operator_exact) {
+    fixture f = fixture_box(room, 4, .5f);
+    const size_t n = f.m.n;
+    f.m.reflectance[3] = 0; /* a black emitter must not upset anything */
+    f.m.emission[3] = 2;
+    double *row_sums = calloc(n, sizeof *row_sums);
+    for (size_t i = 0; i < n; i++)
+        for (uint64_t p = f.F.indptr[i]; p < f.F.indptr[i + 1]; p++) row_sums[i] += (double)f.F.data[p];
+    const char *const methods[] = {"exact", "low-rank"};
+    for (int method = 0; method < 2; method++) {
+        build_options options = defaults;
+        options.method = methods[method];
+        build_report built;
+        lam_operator *op = build(problem_of(&f), &options, &built);
+        const judge_input input = {.problem = &f.problem,
+                                   .row_sums = row_sums,
+                                   .emission = f.m.emission,
+                                   .independent = &f.F,
+                                   .halves = {&f.F, &f.F},
+                                   .probes = 40,
+                                   .seed = 1};
+        error_report report;
+        lam_error error = {0};
+        ck_assert_msg(judge_operator(op, &input, &report, &error) == LAM_OK, "%s", error.message);
+        ck_assert_uint_eq(report.single.probes, 40);
+        ck_assert_uint_eq(report.lights.probes, 1);
+        const error_group *groups[3] = {&report.single, &report.lights, &report.random};
+        for (int g = 0; g < 3; g++) {
+            ck_assert(groups[g]->probes > 0);
+            /* The same F on both sides: total and operator figures agree, the halves do not differ. */
+            ck_assert_double_eq_tol(groups[g]->total_indirect.mean, groups[g]->operator_indirect.mean, 1e-12);
+            ck_assert_double_eq_tol(groups[g]->reference_noise, 0, 1e-12);
+            ck_assert(groups[g]->operator_indirect.max >= groups[g]->operator_indirect.mean);
+            if (method == 0) {
+                ck_assert_double_le(groups[g]->operator_relative.max, 1e-6);
+                /* Exact's P_ii is stored as M_ii, whose rounding of 6e-8 is 1e-5 of the indirect light here.
+                 */
+                ck_assert_double_le(groups[g]->operator_indirect.max, 1e-5);
+                ck_assert_double_le(groups[g]->energy_balance, 1e-5);
+            } else {
+                ck_assert_double_ge(groups[g]->operator_indirect.mean, 1e-5);
+                ck_assert_double_le(groups[g]->operator_relative.max, built.measured_norm_error / .5);
+            }
+        }
+        lam_operator_close(op);
+    }
+    free(row_sums);
+    fixture_free(&f);
+}
+END_TEST
+
+START_TEST(auto_explains_itself) {
+    fixture f = fixture_box(unit_cube, 3, .5f);
+    build_options options = defaults;
+    options.method = "auto";
+    build_report report;
+    lam_operator *op = build(problem_of(&f), &options, &report);
+    ck_assert_str_eq(report.method, "exact");
+    ck_assert_ptr_nonnull(strstr(report.reason, "54 elements"));
+    lam_operator_close(op);
+    fixture_free(&f);
+}
+END_TEST
+
+START_TEST(bad_options_are_refused) {
+    fixture f = fixture_box(unit_cube, 2, .5f);
+    lam_operator *op = NULL;
+    build_report report;
+    lam_error error = {0};
+    build_options options = defaults;
+    options.method = "sparse";
+    ck_assert_int_eq(build_operator(problem_of(&f), &options, &op, &report, &error), LAM_ERR_UNSUPPORTED);
+    options.method = "magic";
+    ck_assert_int_eq(build_operator(&f.problem, &options, &op, &report, &error), LAM_ERR_ARGUMENT);
+    options = defaults;
+    options.epsilon = NAN;
+    ck_assert_int_eq(build_operator(&f.problem, &options, &op, &report, &error), LAM_ERR_ARGUMENT);
+    options = defaults;
+    options.method = "exact";
+    options.memory = 100;
+    ck_assert_int_eq(build_operator(&f.problem, &options, &op, &report, &error), LAM_ERR_MEMORY);
+    ck_assert_ptr_nonnull(strstr(error.message, "--method low-rank"));
+    ck_assert_ptr_null(op);
+    fixture_free(&f);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("build");
+    TCase *cases = tcase_create("build");
+    tcase_set_timeout(cases, 300);
+    tcase_add_loop_test(cases, reference_cube, 0, 3);
+    tcase_add_loop_test(cases, exact_cube, 0, 3);
+    tcase_add_test(cases, room_one_element_per_face);
+    tcase_add_test(cases, sphere_has_rank_one);
+    tcase_add_loop_test(cases, hf_keeps_its_bound, 0, 3);
+    tcase_add_test(cases, fixed_rank_is_exact);
+    tcase_add_test(cases, furnace);
+    tcase_add_test(cases, judge_finds_the_exact_operator_exact);
+    tcase_add_test(cases, auto_explains_itself);
+    tcase_add_test(cases, bad_options_are_refused);
+    suite_add_tcase(suite, cases);
+    return suite_run(suite);
+}

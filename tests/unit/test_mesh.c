@@ -1,0 +1,429 @@
+#include "support/suite.h"
+
+#include "solver/scene/mesh.h"
+#include "support/scene.h"
+
+/* A mesh of quads and triangles (4th index MESH_NO_VERTEX) in one group, grey .5. */
+static mesh make_mesh(const double (*vertices)[3], size_t n_vertices, const uint32_t (*elements)[4],
+                      size_t n) {
+    lam_error error;
+    mesh m = {.n_vertices = n_vertices, .n = n, .n_groups = 1, .n_channels = 1, .unit = 1, .up = 'z'};
+    m.vertices = malloc(n_vertices * sizeof *m.vertices);
+    m.elements = malloc(n * sizeof *m.elements);
+    m.group = calloc(n, sizeof *m.group);
+    m.reflectance = calloc(n, sizeof *m.reflectance);
+    m.emission = calloc(n, sizeof *m.emission);
+    m.group_names = malloc(sizeof *m.group_names + 8);
+    memcpy(m.vertices, vertices, n_vertices * sizeof *vertices);
+    memcpy(m.elements, elements, n * sizeof *elements);
+    m.group_names[0] = strcpy((char *)(m.group_names + 1), "all");
+    for (size_t i = 0; i < n; i++) m.reflectance[i] = .5f, m.emission[i] = (float)i;
+    snprintf(m.name, sizeof m.name, "made");
+    snprintf(m.source_hash, sizeof m.source_hash, "%032d", 7);
+    ck_assert_int_eq(mesh_measure(&m, &error), LAM_OK);
+    return m;
+}
+
+#define TRIANGLE MESH_NO_VERTEX
+
+static const double cube_vertices[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
+                                           {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
+static const uint32_t cube_elements[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 4, 6, 2},
+                                             {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}};
+static const double octahedron_vertices[6][3] = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},
+                                                 {0, -1, 0}, {0, 0, 1},  {0, 0, -1}};
+static const uint32_t octahedron_elements[8][4] = {
+    {0, 2, 4, TRIANGLE}, {2, 1, 4, TRIANGLE}, {1, 3, 4, TRIANGLE}, {3, 0, 4, TRIANGLE},
+    {2, 0, 5, TRIANGLE}, {1, 2, 5, TRIANGLE}, {3, 1, 5, TRIANGLE}, {0, 3, 5, TRIANGLE}};
+
+static mesh make_cube(void) {
+    return make_mesh(cube_vertices, 8, cube_elements, 6);
+}
+
+static mesh make_octahedron(void) {
+    return make_mesh(octahedron_vertices, 6, octahedron_elements, 8);
+}
+
+START_TEST(areas_and_normals_are_exact) {
+    mesh m = make_cube();
+    const float normals[6][3] = {{0, 0, -1}, {0, 0, 1}, {-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}};
+    for (size_t i = 0; i < 6; i++) {
+        ck_assert_double_eq(m.area[i], 1);
+        for (int k = 0; k < 3; k++) ck_assert_float_eq(m.normal[i][k], normals[i][k]);
+    }
+    mesh_free(&m);
+    m = make_octahedron();
+    for (size_t i = 0; i < 8; i++) ck_assert_double_eq_tol(m.area[i], sqrt(3) / 2, 1e-15);
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(measuring_refuses_bad_elements) {
+    mesh m = make_cube();
+    lam_error error;
+    m.elements[4][2] = 8;
+    const double *area = m.area;
+    ck_assert_int_eq(mesh_measure(&m, &error), LAM_ERR_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "element 4"));
+    ck_assert_ptr_eq(m.area, area);
+    memcpy(m.elements[4], (uint32_t[4]){0, 1, 1, MESH_NO_VERTEX}, sizeof m.elements[4]);
+    ck_assert_int_eq(mesh_measure(&m, &error), LAM_ERR_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "element 4: area 0"));
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(two_sided_meshes_have_backs) {
+    mesh m = make_cube();
+    lam_error error;
+    m.elements[5][3] = MESH_NO_VERTEX;
+    ck_assert_int_eq(mesh_measure(&m, &error), LAM_OK);
+    ck_assert_int_eq(mesh_make_two_sided(&m, &error), LAM_OK);
+    ck_assert_uint_eq(m.n, 12);
+    mesh measured = m;
+    measured.area = NULL;
+    measured.normal = NULL;
+    ck_assert_int_eq(mesh_measure(&measured, &error),
+                     LAM_OK); /* the backs' own corners say where they look */
+    for (size_t i = 0; i < 6; i++) {
+        ck_assert_double_eq(m.area[i + 6], m.area[i]);
+        ck_assert_uint_eq(m.elements[i + 6][3] == MESH_NO_VERTEX, i == 5);
+        for (int k = 0; k < 3; k++) {
+            ck_assert_float_eq(measured.normal[i + 6][k], -m.normal[i][k]);
+            ck_assert_float_eq(m.normal[i + 6][k], -m.normal[i][k]);
+        }
+        ck_assert_float_eq(m.emission[i + 6], (float)i);
+        ck_assert_float_eq(m.reflectance[i + 6], .5f);
+    }
+    free(measured.area);
+    free(measured.normal);
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(centroid_and_bounds) {
+    /* A trapezoid with parallel sides 2 and 1 and height 3: its centroid is 3 (2 + 2 * 1) / (3 (2 + 1)) = 4/3
+     * up. */
+    const double vertices[4][3] = {{0, 0, 5}, {2, 0, 5}, {1.5, 3, 5}, {.5, 3, 5}};
+    const uint32_t quad[1][4] = {{0, 1, 2, 3}};
+    mesh m = make_mesh(vertices, 4, quad, 1);
+    double c[3], radius;
+    mesh_centroid(&m, 0, c);
+    ck_assert_double_eq_tol(c[0], 1, 1e-15);
+    ck_assert_double_eq_tol(c[1], 4.0 / 3, 1e-15);
+    ck_assert_double_eq(c[2], 5);
+    mesh_bounds(&m, c, &radius);
+    ck_assert_double_eq(c[0], 1);
+    ck_assert_double_eq(c[1], 1.5);
+    ck_assert_double_eq_tol(radius, sqrt(4 + 9) / 2, 1e-15);
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(hash_tells_geometries_apart) {
+    mesh m = make_cube(), same = make_cube();
+    char first[33], other[33];
+    mesh_geometry_hash(&m, first);
+    ck_assert_uint_eq(strlen(first), 32);
+    same.reflectance[0] = .1f; /* no geometry */
+    mesh_geometry_hash(&same, other);
+    ck_assert_str_eq(first, other);
+    same.vertices[3][1] = nextafter(same.vertices[3][1], 2);
+    mesh_geometry_hash(&same, other);
+    ck_assert_str_ne(first, other);
+    same.vertices[3][1] = m.vertices[3][1];
+    same.elements[2][3] = MESH_NO_VERTEX;
+    mesh_geometry_hash(&same, other);
+    ck_assert_str_ne(first, other);
+    same.elements[2][3] = m.elements[2][3];
+    same.two_sided = true;
+    mesh_geometry_hash(&same, other);
+    ck_assert_str_ne(first, other);
+    mesh_free(&m);
+    mesh_free(&same);
+}
+END_TEST
+
+START_TEST(z_order_keeps_neighbours_together) {
+    mesh m = make_cube();
+    lam_error error;
+    ck_assert_int_eq(mesh_refine(&m, &(mesh_refinement){.subdivide_levels = 4}, &error), LAM_OK);
+    ck_assert_uint_eq(m.n, 6 * 256);
+    uint32_t *order = malloc(m.n * sizeof *order);
+    char *seen = calloc(m.n, 1);
+    double sum = 0;
+    ck_assert_int_eq(mesh_z_order(&m, order, &error), LAM_OK);
+    for (size_t p = 0; p < m.n; p++) {
+        ck_assert_uint_lt(order[p], m.n);
+        ck_assert_int_eq(seen[order[p]]++, 0);
+        double a[3], b[3];
+        mesh_centroid(&m, order[p], a);
+        mesh_centroid(&m, order[p > 0 ? p - 1 : 0], b);
+        sum += hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
+    }
+    /* Cells are 1/16 wide. Two random points on a cube are about .9 apart; a Z-curve steps a few cells. */
+    ck_assert_double_lt(sum / (double)m.n, 4.0 / 16);
+    /* Each eighth of the order is one octant, x changing first: the cube's surface has 192 elements in each.
+     */
+    for (size_t p = 0; p < m.n; p++) {
+        double a[3];
+        mesh_centroid(&m, order[p], a);
+        for (int k = 0; k < 3; k++) ck_assert_int_eq(a[k] > .5, (int)(p / (m.n / 8) >> k & 1));
+    }
+    free(order);
+    free(seen);
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(subdivision_shares_vertices) {
+    /* A closed mesh of quads has as many vertices as quads, plus 2 (Euler); of triangles, half as many,
+     * plus 2. */
+    for (unsigned levels = 1; levels <= 4; levels++) {
+        mesh cube = make_cube(), octahedron = make_octahedron();
+        lam_error error;
+        const size_t pieces = (size_t)1 << 2 * levels;
+        const mesh_refinement how = {.subdivide_levels = levels};
+        ck_assert_int_eq(mesh_refine(&cube, &how, &error), LAM_OK);
+        ck_assert_int_eq(mesh_refine(&octahedron, &how, &error), LAM_OK);
+        ck_assert_uint_eq(cube.n, 6 * pieces);
+        ck_assert_uint_eq(cube.n_vertices, cube.n + 2);
+        ck_assert_uint_eq(octahedron.n, 8 * pieces);
+        ck_assert_uint_eq(octahedron.n_vertices, octahedron.n / 2 + 2);
+        for (size_t i = 0; i < cube.n; i++) {
+            ck_assert_double_eq(cube.area[i], 1.0 / (double)pieces);
+            ck_assert_float_eq(cube.emission[i], (float)(i / pieces)); /* children follow each other */
+        }
+        for (size_t i = 0; i < octahedron.n; i++) {
+            ck_assert_double_eq_tol(octahedron.area[i], sqrt(3) / 2 / (double)pieces, 1e-14);
+            ck_assert_float_eq(octahedron.normal[i][0], octahedron.normal[i / pieces * pieces][0]);
+        }
+        ck_assert_str_eq(cube.source_hash, "00000000000000000000000000000007");
+        ck_assert_str_eq(cube.group_names[0], "all");
+        mesh_free(&cube);
+        mesh_free(&octahedron);
+    }
+}
+END_TEST
+
+START_TEST(shared_edges_divide_alike_at_odd_places) {
+    /* Two parallelograms that see their common edge in opposite directions, at coordinates that round. */
+    const double vertices[6][3] = {{.1, .2, .3},   {1.7, .9, .3},  {1.4, 2.3, .9},
+                                   {-.2, 1.6, .9}, {.4, 3.1, 2.2}, {2.0, 3.8, 2.2}};
+    const uint32_t elements[2][4] = {{0, 1, 2, 3}, {2, 5, 4, 3}};
+    const double edge = hypot(1.6, .7);
+    for (size_t columns = 2; columns < 40; columns++) {
+        mesh m = make_mesh(vertices, 6, elements, 2);
+        const double before = total_area(&m);
+        lam_error error;
+        ck_assert_int_eq(mesh_refine(&m, &(mesh_refinement){.max_edge = edge / (double)columns}, &error),
+                         LAM_OK);
+        ck_assert_uint_eq(m.n % columns, 0);
+        ck_assert_uint_eq(m.n_vertices, (columns + 1) * (m.n / columns + 1));
+        ck_assert_double_eq_tol(total_area(&m), before, 1e-12 * before);
+        mesh_free(&m);
+    }
+}
+END_TEST
+
+START_TEST(no_edge_is_longer_than_asked) {
+    const double limits[] = {.4, .25, .198, .278, .1, .033};
+    for (size_t l = 0; l < sizeof limits / sizeof *limits; l++) {
+        mesh m = l % 2 == 0 ? make_cube() : make_octahedron();
+        const double before = total_area(&m);
+        lam_error error;
+        ck_assert_int_eq(mesh_refine(&m, &(mesh_refinement){.max_edge = limits[l]}, &error), LAM_OK);
+        for (size_t i = 0; i < m.n; i++) {
+            const size_t corners = m.elements[i][3] == MESH_NO_VERTEX ? 3 : 4;
+            for (size_t k = 0; k < corners; k++) {
+                const double *a = m.vertices[m.elements[i][k]],
+                             *b = m.vertices[m.elements[i][(k + 1) % corners]];
+                ck_assert_double_le(hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]),
+                                    limits[l] * (1 + 1e-8));
+            }
+        }
+        ck_assert_double_eq_tol(total_area(&m), before, 1e-12 * before);
+        mesh_free(&m);
+    }
+    mesh m = make_cube(); /* 1 m by .1 m is 10 steps, whatever 1 / .1 rounds to */
+    lam_error error;
+    ck_assert_int_eq(mesh_refine(&m, &(mesh_refinement){.max_edge = .1}, &error), LAM_OK);
+    ck_assert_uint_eq(m.n, 600);
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(elements_come_near_the_number_with_equal_areas) {
+    const size_t wanted[] = {24, 150, 1000, 5000, 54321};
+    for (size_t w = 0; w < sizeof wanted / sizeof *wanted; w++) {
+        /* A box of sides 1, 2 and 3: faces of different areas, as quads and, above, one cut in triangles. */
+        double vertices[8][3];
+        uint32_t elements[7][4];
+        for (int v = 0; v < 8; v++)
+            for (int k = 0; k < 3; k++) vertices[v][k] = cube_vertices[v][k] * (k + 1);
+        memcpy(elements, cube_elements, sizeof cube_elements);
+        memcpy(elements[5], (uint32_t[4]){2, 6, 7, MESH_NO_VERTEX}, sizeof elements[5]);
+        memcpy(elements[6], (uint32_t[4]){2, 7, 3, MESH_NO_VERTEX}, sizeof elements[6]);
+        mesh m = make_mesh((const double(*)[3])vertices, 8, (const uint32_t(*)[4])elements, 7);
+        const double before = total_area(&m);
+        lam_error error;
+        ck_assert_int_eq(mesh_refine(&m, &(mesh_refinement){.elements = wanted[w]}, &error), LAM_OK);
+        /* A face of p pieces can be off by half a row, about sqrt(p) / 2, and 7 faces partly cancel. */
+        const double row = sqrt((double)wanted[w] / 7);
+        ck_assert_double_lt(fabs((double)m.n - (double)wanted[w]), 2 * row);
+        ck_assert_double_eq_tol(total_area(&m), before, 1e-12 * before);
+        double low = HUGE_VAL, high = 0;
+        for (size_t i = 0; i < m.n; i++) low = fmin(low, m.area[i]), high = fmax(high, m.area[i]);
+        /* Of 22 m^2 the smallest quad has 2, twice as long as wide: sqrt(N / 22) rows, of which half a one is
+         * too much or too little; a triangle of 3 m^2, cut m^2-fold, is off by a share of 1 / m = .58 / rows.
+         */
+        const double rows = sqrt((double)wanted[w] / 22);
+        ck_assert_double_lt(high / low, (1 + .6 / rows) / (1 - .6 / rows));
+        mesh_free(&m);
+    }
+}
+END_TEST
+
+START_TEST(fewer_elements_than_faces_changes_nothing) {
+    mesh m = make_octahedron();
+    lam_error error;
+    ck_assert_int_eq(mesh_refine(&m, &(mesh_refinement){.elements = 3}, &error), LAM_OK);
+    ck_assert_uint_eq(m.n, 8);
+    ck_assert_int_eq(mesh_refine(&m, &(mesh_refinement){.elements = 3, .max_edge = 1}, &error),
+                     LAM_ERR_ARGUMENT);
+    ck_assert_int_eq(mesh_refine(&m, &(mesh_refinement){.max_edge = -1}, &error), LAM_ERR_ARGUMENT);
+    ck_assert_int_eq(mesh_refine(&m, &(mesh_refinement){.max_edge = 1e-9}, &error), LAM_ERR_ARGUMENT);
+    ck_assert_int_eq(mesh_refine(&m, &(mesh_refinement){.subdivide_levels = 15}, &error), LAM_ERR_ARGUMENT);
+    ck_assert_uint_eq(m.n, 8);
+    mesh_free(&m);
+}
+END_TEST
+
+/* --- store --------------------------------------------------------------------------------------------- */
+
+static lam_status save_and_load(const mesh *m, mesh *loaded, double **row_sums, lam_error *error) {
+    char folder[64], path[256];
+    store *s = NULL;
+    double *ones = malloc(m->n * sizeof *ones);
+    for (size_t i = 0; i < m->n; i++) ones[i] = 1 - (double)i * .01;
+    folder_make(folder);
+    snprintf(path, sizeof path, "%s/mesh.h5", folder);
+    ck_assert_int_eq(store_create(path, &s, error), LAM_OK);
+    ck_assert_int_eq(mesh_save(m, ones, s, error), LAM_OK);
+    ck_assert_int_eq(store_seal(s, error), LAM_OK);
+    ck_assert_int_eq(store_open(path, &s, error), LAM_OK);
+    const lam_status status = mesh_load(s, loaded, row_sums, error);
+    store_close(s);
+    folder_remove(folder);
+    free(ones);
+    return status;
+}
+
+START_TEST(store_keeps_every_bit) {
+    mesh m = make_octahedron(), back = {0};
+    double *row_sums = NULL;
+    lam_error error = {0};
+    ck_assert_int_eq(mesh_make_two_sided(&m, &error), LAM_OK);
+    m.unit = .001;
+    m.up = 'y';
+    ck_assert_msg(save_and_load(&m, &back, &row_sums, &error) == LAM_OK, "%s", error.message);
+    ck_assert_uint_eq(back.n, 16);
+    ck_assert_uint_eq(back.n_vertices, 6);
+    ck_assert_uint_eq(back.n_channels, 1);
+    ck_assert_mem_eq(back.vertices, m.vertices, 6 * sizeof *m.vertices);
+    ck_assert_mem_eq(back.elements, m.elements, 16 * sizeof *m.elements);
+    ck_assert_mem_eq(back.area, m.area, 16 * sizeof *m.area);
+    ck_assert_mem_eq(back.normal, m.normal, 16 * sizeof *m.normal);
+    ck_assert_mem_eq(back.reflectance, m.reflectance, 16 * sizeof *m.reflectance);
+    ck_assert_mem_eq(back.emission, m.emission, 16 * sizeof *m.emission);
+    ck_assert_mem_eq(back.group, m.group, 16 * sizeof *m.group);
+    ck_assert_uint_eq(back.n_groups, 1);
+    ck_assert_str_eq(back.group_names[0], "all");
+    ck_assert(back.two_sided);
+    ck_assert_double_eq(back.unit, .001);
+    ck_assert_int_eq(back.up, 'y');
+    ck_assert_str_eq(back.name, "made");
+    ck_assert_str_eq(back.source_hash, m.source_hash);
+    ck_assert_double_eq(row_sums[15], 1 - 15 * .01);
+    free(row_sums);
+    mesh_free(&back);
+    mesh_free(&m);
+}
+END_TEST
+
+/* One defect each; what the message must name. */
+static void spoil(mesh *m, int defect) {
+    switch (defect) {
+    case 0:
+        m->elements[2][1] = 6;
+        break;
+    case 1:
+        m->vertices[3][2] = NAN;
+        break;
+    case 2:
+        m->reflectance[7] = 1;
+        break;
+    case 3:
+        m->reflectance[7] = -.1f;
+        break;
+    case 4:
+        m->emission[1] = NAN;
+        break;
+    case 5:
+        m->group[4] = 1;
+        break;
+    case 6:
+        m->area[0] = 0;
+        break;
+    case 7:
+        m->normal[0][0] = INFINITY;
+        break;
+    case 8:
+        m->up = 'q';
+        break;
+    case 9:
+        m->unit = 0;
+        break;
+    default:
+        m->n = 7, m->two_sided = true;
+        break;
+    }
+}
+
+START_TEST(loading_refuses_bad_values) {
+    const char *const names[] = {"elements[2][1] = 6", "vertices[3][2]", "reflectance[0][7] = 1",
+                                 "reflectance[0][7]",  "emission[0][1]", "group[4] = 1",
+                                 "area[0] = 0",        "normal[0][0]",   "up is 'q'",
+                                 "unit is 0",          "7 elements"};
+    mesh m = make_octahedron(), back = {0};
+    lam_error error = {0};
+    spoil(&m, _i);
+    const lam_status status = save_and_load(&m, &back, NULL, &error);
+    ck_assert_int_eq(status, LAM_ERR_FORMAT);
+    ck_assert_msg(strstr(error.message, names[_i]) != NULL, "%s", error.message);
+    ck_assert_ptr_null(back.vertices);
+    m.n = 8;
+    mesh_free(&m);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("mesh");
+    TCase *tests = tcase_create("mesh");
+    tcase_set_timeout(tests, 120);
+    tcase_add_test(tests, areas_and_normals_are_exact);
+    tcase_add_test(tests, measuring_refuses_bad_elements);
+    tcase_add_test(tests, two_sided_meshes_have_backs);
+    tcase_add_test(tests, centroid_and_bounds);
+    tcase_add_test(tests, hash_tells_geometries_apart);
+    tcase_add_test(tests, z_order_keeps_neighbours_together);
+    tcase_add_test(tests, subdivision_shares_vertices);
+    tcase_add_test(tests, shared_edges_divide_alike_at_odd_places);
+    tcase_add_test(tests, no_edge_is_longer_than_asked);
+    tcase_add_test(tests, elements_come_near_the_number_with_equal_areas);
+    tcase_add_test(tests, fewer_elements_than_faces_changes_nothing);
+    tcase_add_test(tests, store_keeps_every_bit);
+    tcase_add_loop_test(tests, loading_refuses_bad_values, 0, 11);
+    suite_add_tcase(suite, tests);
+    return suite_run(suite);
+}
