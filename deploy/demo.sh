@@ -1,0 +1,100 @@
+#!/usr/bin/env bash
+# From a bare Debian to the light of a scene over HTTP:
+#   deploy/demo.sh [--once] [SCENE]
+# installs what is missing, builds, precomputes SCENE (without one: a generated Cornell box), starts lambertd on
+# loopback, asks it for two lightings, draws both. --once stops the daemon at the end.
+set -euo pipefail
+
+once=no
+scene=
+while [ $# -gt 0 ]; do
+    case $1 in
+    --once) once=yes ;;
+    --help) sed -n '2,5s/^# \?//p' "$0"; exit 0 ;;
+    -*) echo "demo: unknown option $1; usage: deploy/demo.sh [--once] [SCENE]" >&2; exit 2 ;;
+    *) if [ -n "$scene" ]; then echo "demo: more than one scene: $scene and $1" >&2; exit 2; fi
+       scene=$(realpath -- "$1")
+       if [ ! -r "$scene" ]; then echo "demo: cannot read the scene $1" >&2; exit 2; fi ;;
+    esac
+    shift
+done
+cd "$(dirname "$0")/.."
+out=$PWD/build/demo
+mkdir -p "$out"
+
+daemon=
+stop_daemon() {
+    if [ -n "$daemon" ] && kill -0 "$daemon" 2>/dev/null; then
+        kill -TERM "$daemon"
+        wait "$daemon" || true
+    fi
+}
+trap stop_daemon EXIT
+trap 'exit 130' INT TERM
+
+echo "== packages"
+./deploy/install-packages
+
+echo "== build"
+cmake -S . -B build/release -DCMAKE_BUILD_TYPE=Release >"$out/configure.log" || { cat "$out/configure.log"; exit 1; }
+cmake --build build/release -j "$(nproc)" --target lambert lambertd >"$out/build.log" 2>&1 ||
+    { tail -n 40 "$out/build.log"; exit 1; }
+lambert=$PWD/build/release/lambert
+lambertd=$PWD/build/release/lambertd
+
+if [ -z "$scene" ]; then
+    echo "== scene"
+    scene=$out/cornell.obj
+    "$lambert" generate cornell --elements 2560 -o "$scene"
+fi
+store=$out/$(basename "${scene%.*}").h5
+
+echo "== precompute"
+"$lambert" precompute "$scene" -o "$store"
+
+echo "== daemon"
+rm -f "$out/daemon.log"
+"$lambertd" "$store" --listen 127.0.0.1:0 >"$out/daemon.log" 2>&1 &
+daemon=$!
+address=
+for _ in $(seq 100); do
+    address=$(sed -n 's/.*listening on \(http:[^ ]*\).*/\1/p' "$out/daemon.log" | head -n 1)
+    [ -n "$address" ] && break
+    kill -0 "$daemon" 2>/dev/null || break
+    sleep .1
+done
+[ -n "$address" ] || { echo "demo: the daemon did not start:" >&2; cat "$out/daemon.log" >&2; exit 1; }
+echo "$address (process $daemon)"
+
+echo "== two lightings"
+name=$(curl -sS --fail "$address/v1/scenes" | /usr/bin/python3 -c 'import json, sys; print(json.load(sys.stdin)["scenes"][0]["name"])')
+path=$(/usr/bin/python3 -c 'import sys, urllib.parse; print(urllib.parse.quote(sys.argv[1], safe=""))' "$name")
+url=$address/v1/scenes/$path/radiosity
+/usr/bin/python3 deploy/demo_lightings.py requests "$store" "$out"
+for lighting in 1 2; do
+    curl -sS --fail-with-body -H 'Content-Type: application/json' --data-binary "@$out/request-$lighting.json" \
+        -o "$out/answer-$lighting.json" -w 'answered in %{time_total} s\n' "$url"
+    /usr/bin/python3 deploy/demo_lightings.py table "$store" "$out" "$lighting"
+    picture=$out/$(basename "${store%.h5}")-$lighting.png
+    "$lambert" render "$store" --emission "$out/emission-$lighting.json" -o "$picture" --quiet
+    echo "picture: $picture"
+    echo
+done
+
+echo "== measured errors of this store"
+"$lambert" info "$store"
+
+echo
+example="curl -H 'Content-Type: application/json' -d @$out/request-1.json $url"
+if [ $once = yes ]; then
+    stop_daemon
+    daemon=
+    echo "the daemon was stopped (--once); a request to it looks like this:"
+    echo "  $example"
+else
+    trap - EXIT
+    disown "$daemon"
+    echo "the daemon goes on at $address; ask it again with"
+    echo "  $example"
+    echo "and stop it with: kill $daemon"
+fi
