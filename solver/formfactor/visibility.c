@@ -3,6 +3,7 @@
 #include <embree3/rtcore.h>
 
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -16,6 +17,7 @@ struct visibility {
     size_t n_fronts; /* elements in the scene: n, or n/2 when two-sided */
     uint32_t *prim_element[N_GEOMETRIES];
     double centre[3];
+    float rounding; /* how far single precision may move a point of the scene */
 };
 
 static lam_status device_error(const visibility *v, const char *what, lam_error *error) {
@@ -79,13 +81,14 @@ lam_status visibility_create(const mesh *m, visibility **out, lam_error *error) 
     v->n_fronts = m->two_sided ? m->n / 2 : m->n;
     double radius;
     mesh_bounds(m, v->centre, &radius);
+    v->rounding = 4 * 0x1p-24f * (float)radius;
 
     /* One thread: the hierarchy is built in a fraction of a second and rays bring their own threads. */
     v->device = rtcNewDevice("threads=1,user_threads=0,set_affinity=0");
     if (v->device == NULL) FAIL(error, LAM_ERR_INTERNAL, "Embree: cannot make a device");
     v->scene = rtcNewScene(v->device);
     if (v->scene == NULL) TRY(device_error(v, "new scene", error));
-    rtcSetSceneFlags(v->scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneFlags(v->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
     rtcSetSceneBuildQuality(v->scene, RTC_BUILD_QUALITY_HIGH);
     TRY(add_geometry(v, TRIANGLES, error));
     TRY(add_geometry(v, QUADS, error));
@@ -111,67 +114,139 @@ void visibility_recentre(const visibility *v, const double point[3], float recen
     for (int d = 0; d < 3; d++) recentred[d] = (float)(point[d] - v->centre[d]);
 }
 
+/* What the filter must know beside Embree's own context, which it is handed back as. */
+typedef struct cast_context {
+    struct RTCIntersectContext embree;
+    const visibility *visibility;
+    bool cull_back;
+} cast_context;
+
+/* The component of a direction along an element's normal: negative where the front is met. */
+static float along_normal(const visibility *v, uint32_t front, float x, float y, float z) {
+    const float *normal = v->mesh->normal[front];
+    return normal[0] * x + normal[1] * y + normal[2] * z;
+}
+
+/* Packets of any width hold one array a member, in the order of those of eight: the place of each array. */
+enum {
+    RAY_DIRECTION = offsetof(struct RTCRay8, dir_x) / (8 * sizeof(float)),
+    RAY_DISTANCE = offsetof(struct RTCRay8, tfar) / (8 * sizeof(float)),
+    RAY_ID = offsetof(struct RTCRay8, id) / (8 * sizeof(unsigned)),
+    HIT_PRIMITIVE = offsetof(struct RTCHit8, primID) / (8 * sizeof(unsigned)),
+    HIT_GEOMETRY = offsetof(struct RTCHit8, geomID) / (8 * sizeof(unsigned)),
+};
+
+/* The ray's own plane: a face in it, met where the ray starts, is either the element's other side modelled as
+ * a face of its own, or something that stands on the element and hides that ray anyway by its other faces. */
+static bool in_own_plane(const visibility *v, uint32_t front, uint32_t own, float travelled) {
+    const float *n = v->mesh->normal[own], *m = v->mesh->normal[front];
+    return travelled <= v->rounding && fabsf(n[0] * m[0] + n[1] * m[1] + n[2] * m[2]) > 1 - 1e-6f;
+}
+
+/* Refuses hits on the element a ray leaves, whose index the ray carries as its id, on faces in the same
+ * place, and on culled backs. Nine rays of ten meet their own element at distance 0: refusing that inside the
+ * traversal spares a second cast. */
+static void refuse_own_and_culled(const struct RTCFilterFunctionNArguments *args) {
+    const cast_context *context = (const cast_context *)args->context;
+    const visibility *v = context->visibility;
+    const size_t n = args->N;
+    const float *direction = (const float *)args->ray + RAY_DIRECTION * n;
+    const float *distance = (const float *)args->ray + RAY_DISTANCE * n;
+    const unsigned *own = (const unsigned *)args->ray + RAY_ID * n;
+    const unsigned *primitive = (const unsigned *)args->hit + HIT_PRIMITIVE * n;
+    const unsigned *geometry = (const unsigned *)args->hit + HIT_GEOMETRY * n;
+    for (size_t i = 0; i < n; i++) {
+        if (args->valid[i] == 0) continue;
+        const uint32_t front = v->prim_element[geometry[i]][primitive[i]];
+        const float cosine = along_normal(v, front, direction[i], direction[n + i], direction[2 * n + i]);
+        if (front == own[i] || (context->cull_back && cosine >= 0) ||
+            (own[i] != VISIBILITY_NOTHING && in_own_plane(v, front, own[i], distance[i] * fabsf(cosine))))
+            args->valid[i] = 0;
+    }
+}
+
+static void packet_set(struct RTCRayHit8 *ray, const ray_packet *rays) {
+    memcpy(ray->ray.org_x, rays->origin[0], sizeof rays->origin[0]);
+    memcpy(ray->ray.org_y, rays->origin[1], sizeof rays->origin[1]);
+    memcpy(ray->ray.org_z, rays->origin[2], sizeof rays->origin[2]);
+    memcpy(ray->ray.dir_x, rays->direction[0], sizeof rays->direction[0]);
+    memcpy(ray->ray.dir_y, rays->direction[1], sizeof rays->direction[1]);
+    memcpy(ray->ray.dir_z, rays->direction[2], sizeof rays->direction[2]);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        ray->ray.tnear[i] = 0;
+        ray->ray.tfar[i] = INFINITY;
+        ray->ray.time[i] = 0;
+        ray->ray.mask[i] = 0xFFFFFFFFu;
+        ray->ray.flags[i] = 0;
+        ray->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+        ray->hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    }
+}
+
+/* A sheet modelled as two faces in one place is met at its front and at its back at once, and either may be
+ * found first. The front is what counts: looks for one where backs were met, and takes it instead. */
+static void prefer_fronts(const visibility *v, const float cosine[VISIBILITY_PACKET], cast_context *context,
+                          struct RTCRayHit8 *ray) {
+    struct RTCRayHit8 again = *ray;
+    int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
+    bool any = false;
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        active[i] = cosine[i] > 0 ? -1 : 0;
+        if (cosine[i] <= 0) continue;
+        any = true;
+        const float slack = v->rounding / cosine[i];
+        again.ray.tnear[i] = fmaxf(0, ray->ray.tfar[i] - slack);
+        again.ray.tfar[i] = ray->ray.tfar[i] + slack;
+        again.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    }
+    if (!any) return;
+    context->cull_back = true;
+    rtcIntersect8(active, v->scene, &context->embree, &again);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        if (cosine[i] <= 0 || again.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+        ray->hit.geomID[i] = again.hit.geomID[i];
+        ray->hit.primID[i] = again.hit.primID[i];
+        ray->ray.tfar[i] = again.ray.tfar[i];
+    }
+}
+
 void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
                      bool cull_back, hit_packet *hits) {
+    const bool two_sided = v->mesh->two_sided;
     struct RTCRayHit8 ray __attribute__((aligned(32)));
     int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-
-    memcpy(ray.ray.org_x, rays->origin[0], sizeof rays->origin[0]);
-    memcpy(ray.ray.org_y, rays->origin[1], sizeof rays->origin[1]);
-    memcpy(ray.ray.org_z, rays->origin[2], sizeof rays->origin[2]);
-    memcpy(ray.ray.dir_x, rays->direction[0], sizeof rays->direction[0]);
-    memcpy(ray.ray.dir_y, rays->direction[1], sizeof rays->direction[1]);
-    memcpy(ray.ray.dir_z, rays->direction[2], sizeof rays->direction[2]);
+    float cosine[VISIBILITY_PACKET] = {0}; /* of what was met, 0 where nothing was */
+    cast_context context = {.visibility = v, .cull_back = cull_back && !two_sided};
+    rtcInitIntersectContext(&context.embree);
+    context.embree.filter = refuse_own_and_culled;
+    packet_set(&ray, rays);
     for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        uint32_t own = self != NULL && i < n_rays ? self[i] : VISIBILITY_NOTHING;
+        if (own != VISIBILITY_NOTHING && own >= v->n_fronts) own -= (uint32_t)v->n_fronts;
+        ray.ray.id[i] = own;
         active[i] = i < n_rays ? -1 : 0;
-        ray.ray.tnear[i] = 0;
-        ray.ray.tfar[i] = INFINITY;
-        ray.ray.time[i] = 0;
-        ray.ray.mask[i] = 0xFFFFFFFFu;
-        ray.ray.id[i] = (unsigned)i;
-        ray.ray.flags[i] = 0;
-        ray.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-        ray.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     }
+    rtcIntersect8(active, v->scene, &context.embree, &ray);
 
-    bool again = true;
-    while (again) {
-        rtcIntersect8(active, v->scene, &context, &ray);
-        again = false;
-        for (size_t i = 0; i < n_rays; i++) {
-            if (!active[i]) continue;
-            active[i] = 0;
-            if (ray.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
-                hits->element[i] = VISIBILITY_NOTHING;
-                hits->back[i] = false;
-                hits->distance[i] = INFINITY;
-                continue;
-            }
-            const uint32_t front = v->prim_element[ray.hit.geomID[i]][ray.hit.primID[i]];
-            const float *normal = v->mesh->normal[front];
-            bool back = normal[0] * rays->direction[0][i] + normal[1] * rays->direction[1][i] +
-                            normal[2] * rays->direction[2][i] >=
-                        0;
-            uint32_t own = self != NULL ? self[i] : VISIBILITY_NOTHING;
-            if (own != VISIBILITY_NOTHING && own >= v->n_fronts) own -= (uint32_t)v->n_fronts;
-            if (front == own || (back && cull_back && !v->mesh->two_sided)) {
-                /* Go on behind what does not count. */
-                ray.ray.tnear[i] = nextafterf(ray.ray.tfar[i], INFINITY);
-                ray.ray.tfar[i] = INFINITY;
-                ray.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-                active[i] = -1;
-                again = true;
-                continue;
-            }
-            hits->element[i] = front;
-            hits->distance[i] = ray.ray.tfar[i];
-            hits->back[i] = back;
-            if (back && v->mesh->two_sided) {
-                hits->element[i] = front + (uint32_t)v->n_fronts;
-                hits->back[i] = false;
-            }
-        }
+    bool backs = false;
+    for (size_t i = 0; i < n_rays; i++) {
+        if (ray.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+        hits->element[i] = v->prim_element[ray.hit.geomID[i]][ray.hit.primID[i]];
+        cosine[i] = along_normal(v, hits->element[i], rays->direction[0][i], rays->direction[1][i],
+                                 rays->direction[2][i]);
+        backs = backs || cosine[i] > 0;
+    }
+    if (backs && !two_sided) prefer_fronts(v, cosine, &context, &ray);
+
+    for (size_t i = 0; i < n_rays; i++) {
+        hits->distance[i] = ray.ray.tfar[i];
+        hits->element[i] = VISIBILITY_NOTHING;
+        hits->back[i] = false;
+        if (ray.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+        const uint32_t front = v->prim_element[ray.hit.geomID[i]][ray.hit.primID[i]];
+        const bool back =
+            along_normal(v, front, rays->direction[0][i], rays->direction[1][i], rays->direction[2][i]) >= 0;
+        hits->element[i] = back && two_sided ? front + (uint32_t)v->n_fronts : front;
+        hits->back[i] = back && !two_sided;
     }
 }
