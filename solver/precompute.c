@@ -180,13 +180,19 @@ static lam_status trace(work *w, lam_error *error) {
 /* --- operator --------------------------------------------------------------------------------------------
  */
 
+/* The 2-norm of the sampling error of S, about: independent rays, the two estimates of a pair merged. */
+static double noise_of(const work *w) {
+    return w->f.rays > 0 ? sqrt(2 / (double)w->f.rays) : 0;
+}
+
 static build_problem problem_of(const work *w) {
     return (build_problem){.n = w->m.n,
                            .n_channels = w->m.n_channels,
                            .area = w->m.area,
                            .reflectance = w->m.reflectance,
                            .F = &w->f.F,
-                           .order = w->order};
+                           .order = w->order,
+                           .noise = noise_of(w)};
 }
 
 static lam_status build(work *w, lam_error *error) {
@@ -203,7 +209,7 @@ static lam_status build(work *w, lam_error *error) {
                                .memory = (size_t)fmax(1, w->memory - held),
                                .progress = &w->progress};
     TRY(build_operator(&problem, &how, &w->op, &w->built, error));
-    const double noise = sqrt(2 / (double)w->f.rays);
+    const double noise = noise_of(w);
     const bool tried = w->built.factorizer != NULL || w->built.factorize_seconds > 0;
     if (w->built.factorizer != NULL) {
         terminal_log(w->t, "%-14s%8.2f s", "factorize", w->built.factorize_seconds);

@@ -14,6 +14,7 @@ typedef struct build_problem {
     const float *reflectance; /* [C][n], in [0, 1) */
     const csr *F;
     const uint32_t *order; /* [n] */
+    double noise;          /* sampling error of S in the 2-norm, about; 0: not known */
 } build_problem;
 
 typedef struct build_options {

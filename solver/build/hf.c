@@ -9,7 +9,7 @@
 /* At the root the rank goes up to a multiple of ROOT_ROUND where the spectrum still has something to give:
  * the online kernels work in vectors and panels of that width, and the tail of the spectrum is steep (on the
  * Cornell box 6 % more columns take 20 % off the error). */
-enum { LEAF_COLUMNS = 1024, MAX_LEVELS = 20, ROOT_ROUND = 64 };
+enum { LEAF_COLUMNS = 1024, LEAF_COLUMNS_MOST = 8192, MAX_LEVELS = 20, ROOT_ROUND = 64 };
 
 typedef struct hf_run {
     const scaled_matrix *S;
@@ -18,9 +18,19 @@ typedef struct hf_run {
     size_t columns_done;
 } hf_run;
 
-int hf_levels(size_t n) {
+/* What a node of this epsilon leaves to each of its two children (eq. 3.11). */
+static double epsilon_of_child(double epsilon, double alpha) {
+    return (1 - alpha) * epsilon / sqrt(2);
+}
+
+int hf_levels(size_t n, double epsilon, double alpha, double noise) {
     int levels = 0;
-    while (levels < MAX_LEVELS && (n >> levels) >= LEAF_COLUMNS) levels++;
+    for (double leaf = epsilon_of_child(epsilon, alpha); levels < MAX_LEVELS;
+         leaf = epsilon_of_child(leaf, alpha)) {
+        const size_t columns = n >> levels;
+        if (columns < LEAF_COLUMNS || (leaf < noise / 2 && columns <= LEAF_COLUMNS_MOST)) break;
+        levels++;
+    }
     return levels;
 }
 
@@ -98,7 +108,7 @@ static lam_status node(hf_run *run, size_t first, size_t last, double epsilon, i
     if (levels <= 0 || last - first < 2) {
         TRY(leaf(run, first, last, &keep, out, error));
     } else {
-        const double epsilon_ch = (1 - alpha) * epsilon / sqrt(2); /* eq. 3.11 */
+        const double epsilon_ch = epsilon_of_child(epsilon, alpha);
         const size_t middle = first + (last - first) / 2;
         TRY(node(run, first, middle, epsilon_ch, levels - 1, &one, error));
         TRY(node(run, middle, last, epsilon_ch, levels - 1, &two, error));
@@ -115,6 +125,5 @@ lam_status hf_factorize(const scaled_matrix *S, const uint32_t *order, const hf_
                         tall_factors *out, lam_error *error) {
     hf_run run = {.S = S, .order = order, .options = options};
     const size_t n = S->F->n;
-    const int levels = options->levels < 0 ? hf_levels(n) : options->levels;
-    return node(&run, 0, n, options->epsilon, levels, out, error);
+    return node(&run, 0, n, options->epsilon, options->levels, out, error);
 }

@@ -88,9 +88,13 @@ static lam_status build(const build_problem *problem, const build_options *optio
     float *U = NULL, *V = NULL, *Y = NULL, *core = NULL;
     const size_t n = problem->n;
     const double start = clock_seconds();
+    /* With the rank given, epsilon decides nothing and noise is nothing to it. */
+    const double noise = options->rank > 0 ? 0 : problem->noise;
     const hf_options hf = {.epsilon = options->epsilon,
                            .alpha = options->alpha,
-                           .levels = options->levels,
+                           .levels = options->levels >= 0
+                                         ? options->levels
+                                         : hf_levels(n, options->epsilon, options->alpha, noise),
                            .rank = options->rank,
                            .progress = options->progress};
 
@@ -120,7 +124,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
     report->method = "low-rank";
     report->factorizer = "hf";
     report->rank = k;
-    report->levels = options->levels < 0 ? hf_levels(n) : options->levels;
+    report->levels = hf.levels;
     report->epsilon = options->rank > 0 ? report->measured_norm_error : options->epsilon;
 done:
     scaled_free(&S);

@@ -228,6 +228,16 @@ static double dense_norm(const scaled_matrix *S, const uint32_t *order, const ta
     return norm;
 }
 
+START_TEST(levels_stop_at_the_noise) {
+    ck_assert_int_eq(hf_levels(1023, .1, .5, 0), 0);
+    ck_assert_int_eq(hf_levels(10240, .1, .5, 0), 4); /* leaves of 640 */
+    /* A level takes the bound from .1 to .035, .0125, .0044: the third is below half the noise. */
+    ck_assert_int_eq(hf_levels(10240, .1, .5, .022), 2);
+    /* Leaves no one can take the eigenvectors of are split, noise or not. */
+    ck_assert_int_eq(hf_levels(100000, .1, .5, .022), 4);
+}
+END_TEST
+
 static const double alphas[] = {.1, .5, .9};
 
 START_TEST(hf_keeps_its_bound) {
@@ -408,6 +418,7 @@ int main(void) {
     tcase_add_loop_test(cases, exact_cube, 0, 3);
     tcase_add_test(cases, room_one_element_per_face);
     tcase_add_test(cases, sphere_has_rank_one);
+    tcase_add_test(cases, levels_stop_at_the_noise);
     tcase_add_loop_test(cases, hf_keeps_its_bound, 0, 3);
     tcase_add_test(cases, fixed_rank_is_exact);
     tcase_add_test(cases, furnace);
