@@ -36,6 +36,12 @@ done:
     return status;
 }
 
+/* The numbers of a low-rank operator over those of the exact one: folded Y and V, or U, V and C cores. */
+static double low_rank_share(size_t n, size_t rank, size_t n_channels) {
+    const double k = (double)rank, whole = (double)n * (double)n * (double)n_channels;
+    return (2 * (double)n * k + (n_channels > 1 ? (double)n_channels * k * k : 0)) / whole;
+}
+
 /* auto: exact while it is small, else low-rank; exact again where the rank turns out to save nothing. */
 static lam_status build_auto(const build_problem *problem, const build_options *options, lam_operator **op,
                              build_report *report, lam_error *error) {
@@ -51,19 +57,20 @@ static lam_status build_auto(const build_problem *problem, const build_options *
     }
     TRY(build_low_rank.build(problem, options, &low_rank, report, error));
     const size_t rank = report->rank;
-    if (2 * rank >= n && n <= EXACT_ELEMENTS) {
-        const double spent = report->factorize_seconds;
+    const double share = low_rank_share(n, rank, problem->n_channels);
+    if (share >= 1 && n <= EXACT_ELEMENTS) {
+        const double spent = report->factorize_seconds, bound = report->epsilon;
         TRY(build_exact.build(problem, options, op, report, error));
         report->factorize_seconds = spent;
         snprintf(report->reason, sizeof report->reason,
-                 "exact: rank %zu of %zu at epsilon %g would take more memory than the whole inverse", rank,
-                 n, options->epsilon);
+                 "exact: rank %zu of %zu for epsilon %.3g would take more memory than the whole inverse",
+                 rank, n, bound);
     } else {
         *op = low_rank;
         low_rank = NULL;
         snprintf(report->reason, sizeof report->reason,
-                 "low-rank: rank %zu of %zu at epsilon %g keeps %.1f %% of the whole inverse", rank, n,
-                 options->epsilon, 200. * (double)rank / (double)n);
+                 "low-rank: rank %zu of %zu, epsilon %.3g, takes %.1f %% of the memory of the whole inverse",
+                 rank, n, report->epsilon, 100 * share);
     }
 done:
     lam_operator_close(low_rank);
