@@ -1,20 +1,24 @@
 #!/usr/bin/env bash
 # From a bare Debian to the light of a scene over HTTP:
-#   deploy/demo.sh [--once] [SCENE]
+#   deploy/demo.sh [--once] [SCENE [OPTION...]]
 # installs what is missing, builds, precomputes SCENE (without one: a generated Cornell box), starts lambertd on
-# loopback, asks it for two lightings, draws both. --once stops the daemon at the end.
+# loopback, asks it for two lightings, draws both. --once stops the daemon at the end. OPTIONs go to lambert
+# precompute; --up y for a scene whose second axis points up.
 set -euo pipefail
 
 once=no
 scene=
+how=()
 while [ $# -gt 0 ]; do
     case $1 in
     --once) once=yes ;;
-    --help) sed -n '2,5s/^# \?//p' "$0"; exit 0 ;;
-    -*) echo "demo: unknown option $1; usage: deploy/demo.sh [--once] [SCENE]" >&2; exit 2 ;;
-    *) if [ -n "$scene" ]; then echo "demo: more than one scene: $scene and $1" >&2; exit 2; fi
+    --help) sed -n '2,6s/^# \?//p' "$0"; exit 0 ;;
+    -*) echo "demo: unknown option $1; usage: deploy/demo.sh [--once] [SCENE [OPTION...]]" >&2; exit 2 ;;
+    *) if [ ! -f "$1" ] || [ ! -r "$1" ]; then echo "demo: cannot read the scene $1" >&2; exit 2; fi
        scene=$(realpath -- "$1")
-       if [ ! -r "$scene" ]; then echo "demo: cannot read the scene $1" >&2; exit 2; fi ;;
+       shift
+       how=("$@")
+       break ;;
     esac
     shift
 done
@@ -42,7 +46,6 @@ cmake --build build/release -j "$(nproc)" --target lambert lambertd >"$out/build
 lambert=$PWD/build/release/lambert
 lambertd=$PWD/build/release/lambertd
 
-how=()
 if [ -z "$scene" ]; then
     # Its lamp is a hundred times brighter than the floor in the shadow: an error small beside the lamp would
     # still show there, so this picture asks for more than the defaults do.
