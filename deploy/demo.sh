@@ -61,15 +61,16 @@ echo "lambert precompute $scene -o $store ${how[*]}"
 "$lambert" precompute "$scene" -o "$store" "${how[@]}"
 
 echo "== daemon"
-rm -f "$out/daemon.log"
-"$lambertd" "$store" --listen 127.0.0.1:0 >"$out/daemon.log" 2>&1 &
-daemon=$!
 address=
-for _ in $(seq 100); do
-    address=$(sed -n 's/.*listening on \(http:[^ ]*\).*/\1/p' "$out/daemon.log" | head -n 1)
-    [ -n "$address" ] && break
-    kill -0 "$daemon" 2>/dev/null || break
-    sleep .1
+# The usual port where it is free, else any.
+for listen in 127.0.0.1:8317 127.0.0.1:0; do
+    "$lambertd" "$store" --listen "$listen" >"$out/daemon.log" 2>&1 &
+    daemon=$!
+    while kill -0 "$daemon" 2>/dev/null; do
+        address=$(sed -n 's/.*listening on \(http:[^ ]*\).*/\1/p' "$out/daemon.log" | head -n 1)
+        [ -n "$address" ] && break 2
+        sleep .1
+    done
 done
 [ -n "$address" ] || { echo "demo: the daemon did not start:" >&2; cat "$out/daemon.log" >&2; exit 1; }
 echo "$address (process $daemon)"

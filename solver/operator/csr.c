@@ -5,9 +5,13 @@
 
 #include <math.h>
 #include <stdlib.h>
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
 
-/* Columns whose sums stay in registers. */
-#define CSR_TILE 8
+/* Columns whose sums stay in registers. A multiplication waits several cycles for its result, so WIDE has
+ * enough independent sums to fill them; compilers do not find that by themselves. */
+enum { WIDE = 32, NARROW = 8 };
 
 void csr_free(csr *a) {
     if (a == NULL) return;
@@ -44,14 +48,16 @@ done:
     return status;
 }
 
-/* width columns of Y_i = sum_e a_e X_j(e). */
+/* One row of the product, WIDE columns from where X and Y point: Y_i = sum_e a_e X_j(e). */
+typedef void multiply_wide(const uint32_t *indices, const float *data, uint64_t n_entries, size_t m,
+                           const double *X, double *Y);
+
 static inline __attribute__((always_inline)) void multiply_tile(size_t width, const uint32_t *indices,
-                                                                const float *data, uint64_t first,
-                                                                uint64_t last, size_t m, const double *X,
-                                                                double *Y) {
-    double sum[CSR_TILE] = {0};
-    for (uint64_t e = first; e < last; e++) {
-        double a = (double)data[e];
+                                                                const float *data, uint64_t n_entries,
+                                                                size_t m, const double *X, double *Y) {
+    double sum[NARROW] = {0};
+    for (uint64_t e = 0; e < n_entries; e++) {
+        const double a = (double)data[e];
         const double *X_j = X + indices[e] * m;
 #pragma omp simd
         for (size_t v = 0; v < width; v++) sum[v] += a * X_j[v];
@@ -59,42 +65,61 @@ static inline __attribute__((always_inline)) void multiply_tile(size_t width, co
     for (size_t v = 0; v < width; v++) Y[v] = sum[v];
 }
 
-static inline __attribute__((always_inline)) void multiply_rows(const csr *a, size_t first, size_t last,
-                                                                size_t m, const double *X, double *Y) {
-    for (size_t i = first; i < last; i++) {
-        uint64_t begin = a->indptr[i], end = a->indptr[i + 1];
-        size_t v = 0;
-        for (; v + CSR_TILE <= m; v += CSR_TILE)
-            multiply_tile(CSR_TILE, a->indices, a->data, begin, end, m, X + v, Y + i * m + v);
-        for (; v + 4 <= m; v += 4) multiply_tile(4, a->indices, a->data, begin, end, m, X + v, Y + i * m + v);
-        for (; v + 2 <= m; v += 2) multiply_tile(2, a->indices, a->data, begin, end, m, X + v, Y + i * m + v);
-        if (v < m) multiply_tile(1, a->indices, a->data, begin, end, m, X + v, Y + i * m + v);
-    }
+static void multiply_wide_portable(const uint32_t *indices, const float *data, uint64_t n_entries, size_t m,
+                                   const double *X, double *Y) {
+    for (size_t v = 0; v < WIDE; v += NARROW)
+        multiply_tile(NARROW, indices, data, n_entries, m, X + v, Y + v);
 }
 
-/* The same loop compiled for several CPUs. */
 #if defined(__x86_64__)
-__attribute__((target("avx512f"))) static void multiply_rows_avx512(const csr *a, size_t first, size_t last,
+__attribute__((target("avx512f"))) static void multiply_wide_avx512(const uint32_t *indices,
+                                                                    const float *data, uint64_t n_entries,
                                                                     size_t m, const double *X, double *Y) {
-    multiply_rows(a, first, last, m, X, Y);
+    __m512d sum[WIDE / 8];
+    for (int t = 0; t < WIDE / 8; t++) sum[t] = _mm512_setzero_pd();
+    for (uint64_t e = 0; e < n_entries; e++) {
+        const __m512d a = _mm512_set1_pd((double)data[e]);
+        const double *X_j = X + indices[e] * m;
+        for (int t = 0; t < WIDE / 8; t++) sum[t] = _mm512_fmadd_pd(a, _mm512_loadu_pd(X_j + 8 * t), sum[t]);
+    }
+    for (int t = 0; t < WIDE / 8; t++) _mm512_storeu_pd(Y + 8 * t, sum[t]);
 }
 
-__attribute__((target("avx2"))) static void multiply_rows_avx2(const csr *a, size_t first, size_t last,
-                                                               size_t m, const double *X, double *Y) {
-    multiply_rows(a, first, last, m, X, Y);
+__attribute__((target("avx2,fma"))) static void multiply_wide_avx2(const uint32_t *indices, const float *data,
+                                                                   uint64_t n_entries, size_t m,
+                                                                   const double *X, double *Y) {
+    __m256d sum[WIDE / 4];
+    for (int t = 0; t < WIDE / 4; t++) sum[t] = _mm256_setzero_pd();
+    for (uint64_t e = 0; e < n_entries; e++) {
+        const __m256d a = _mm256_set1_pd((double)data[e]);
+        const double *X_j = X + indices[e] * m;
+        for (int t = 0; t < WIDE / 4; t++) sum[t] = _mm256_fmadd_pd(a, _mm256_loadu_pd(X_j + 4 * t), sum[t]);
+    }
+    for (int t = 0; t < WIDE / 4; t++) _mm256_storeu_pd(Y + 4 * t, sum[t]);
 }
 #endif
+
+static multiply_wide *wide_for_this_cpu(void) {
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx512f")) return multiply_wide_avx512;
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return multiply_wide_avx2;
+#endif
+    return multiply_wide_portable;
+}
 
 void csr_multiply_rows(const csr *a, size_t first, size_t last, size_t m, const double *X, double *Y) {
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx512f")) {
-        multiply_rows_avx512(a, first, last, m, X, Y);
-        return;
+    multiply_wide *wide = wide_for_this_cpu();
+    for (size_t i = first; i < last; i++) {
+        const uint64_t begin = a->indptr[i], n_entries = a->indptr[i + 1] - begin;
+        const uint32_t *indices = a->indices + begin;
+        const float *data = a->data + begin;
+        double *Y_i = Y + i * m;
+        size_t v = 0;
+        for (; v + WIDE <= m; v += WIDE) wide(indices, data, n_entries, m, X + v, Y_i + v);
+        for (; v + NARROW <= m; v += NARROW)
+            multiply_tile(NARROW, indices, data, n_entries, m, X + v, Y_i + v);
+        for (; v + 4 <= m; v += 4) multiply_tile(4, indices, data, n_entries, m, X + v, Y_i + v);
+        for (; v + 2 <= m; v += 2) multiply_tile(2, indices, data, n_entries, m, X + v, Y_i + v);
+        if (v < m) multiply_tile(1, indices, data, n_entries, m, X + v, Y_i + v);
     }
-    if (__builtin_cpu_supports("avx2")) {
-        multiply_rows_avx2(a, first, last, m, X, Y);
-        return;
-    }
-#endif
-    multiply_rows(a, first, last, m, X, Y);
 }
