@@ -5,8 +5,7 @@
 #include "server/scene.h"
 #include "store/store.h"
 
-/* *text is the contract's object, on one line; the caller frees it. Reads attributes of s, and sizes, groups
- * and name of what was loaded. */
+/* *text is what the store says of itself under the name it was loaded by, on one line; the caller frees it. */
 lam_status scene_describe(store *s, const scene *loaded, char **text, lam_error *error);
 
 #endif

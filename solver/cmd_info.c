@@ -1,5 +1,5 @@
 /* lambert info: what a store holds, how large and how exact it is. */
-#include "solver/describe.h"
+#include "solver/operator/describe.h"
 #include "solver/options.h"
 #include "solver/terminal.h"
 #include "solver/verbs.h"

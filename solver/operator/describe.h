@@ -1,6 +1,6 @@
-/* What a store says about itself, as the JSON of `lambert info --json` (contract, GET /v1/scenes/NAME). */
-#ifndef LAMBERT_SOLVER_DESCRIBE_H
-#define LAMBERT_SOLVER_DESCRIBE_H
+/* What a store says about itself: the JSON of `lambert info --json` and of GET /v1/scenes/NAME. */
+#ifndef LAMBERT_OPERATOR_DESCRIBE_H
+#define LAMBERT_OPERATOR_DESCRIBE_H
 
 #include "store/store.h"
 

@@ -1,4 +1,4 @@
-#include "solver/describe.h"
+#include "solver/operator/describe.h"
 
 #include "store/status.h"
 
