@@ -78,6 +78,19 @@ static void print_error(const json_t *figures) {
          "built from");
 }
 
+/* A screen's worth: a city has hundreds of groups. */
+static void print_groups(const json_t *groups) {
+    enum { MOST = 20 };
+    const size_t count = json_array_size(groups), shown = count <= MOST ? count : MOST - 1;
+    for (size_t i = 0; i < shown; i++) {
+        const json_t *group = json_array_get(groups, i);
+        const json_int_t elements = json_integer_value(json_object_get(group, "elements"));
+        printf("%-18s%s, %" JSON_INTEGER_FORMAT " element%s\n", i == 0 ? "groups" : "",
+               json_string_value(json_object_get(group, "name")), elements, elements == 1 ? "" : "s");
+    }
+    if (shown < count) printf("%-18sand %zu more (--json names them)\n", "", count - shown);
+}
+
 static void print_text(const json_t *about) {
     static const char *const plain[] = {"name",   "elements", "channels", "kind",
                                         "method", "reason",   "epsilon"};
@@ -86,13 +99,7 @@ static void print_text(const json_t *about) {
     print_value("rank", json_object_get(about, "rank"));
     print_value("density", json_object_get(about, "density"));
     print_bytes(json_number_value(json_object_get(about, "bytes")));
-    const json_t *groups = json_object_get(about, "groups");
-    for (size_t i = 0; i < json_array_size(groups); i++) {
-        const json_t *group = json_array_get(groups, i);
-        printf("%-18s%s, %" JSON_INTEGER_FORMAT " elements\n", i == 0 ? "groups" : "",
-               json_string_value(json_object_get(group, "name")),
-               json_integer_value(json_object_get(group, "elements")));
-    }
+    print_groups(json_object_get(about, "groups"));
     print_error(json_object_get(about, "error"));
     const json_t *provenance = json_object_get(about, "provenance");
     const json_t *form_factors = json_object_get(provenance, "form_factors");
