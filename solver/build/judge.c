@@ -14,6 +14,10 @@ enum { RANDOM_PROBES = 8, NOISE_PROBES = 32 };
 /* Residual at which a reference counts as converged: four digits below the smallest error worth printing. */
 static const double reference_tolerance = 1e-8;
 
+/* Indirect light below this share of all light is none: no ray found what the element sees, and what is left
+ * is what the reference's iteration did not converge to 0. */
+static const double dark = 1e-6;
+
 enum { SINGLE, LIGHTS, RANDOM, N_GROUPS };
 
 /* Emissions E with the operator's radiosity, both [m][C][n], and what is summed up for each of them. Group g
@@ -198,7 +202,7 @@ static lam_status figures_against(const judge_input *input, const csr *F, probes
                 bright++;
             }
             /* An element that nothing sees has no indirect light to be wrong about. */
-            if (p->indirect_norm[v] > 0) {
+            if (p->indirect_norm[v] > dark * dark * p->B_norm[v]) {
                 add_figure(indirect[g], sqrt(p->error_norm[v] / p->indirect_norm[v]));
                 lit++;
             }
@@ -226,13 +230,14 @@ static void keep_half(void *context, size_t channel, const double *B) {
 /* Half the distance between the halves' solutions, over the indirect light: the standard error of their mean.
  * negative where there is no indirect light. */
 static double half_distance(const build_problem *problem, const float *E, const double *x, const double *y) {
-    double difference = 0, indirect = 0;
+    double difference = 0, indirect = 0, all = 0;
     for (size_t i = 0; i < problem->n_channels * problem->n; i++) {
-        const double a = problem->area[i % problem->n], mean = .5 * (x[i] + y[i]) - (double)E[i];
+        const double a = problem->area[i % problem->n], mean = .5 * (x[i] + y[i]);
         difference += a * .25 * (x[i] - y[i]) * (x[i] - y[i]);
-        indirect += a * mean * mean;
+        indirect += a * (mean - (double)E[i]) * (mean - (double)E[i]);
+        all += a * mean * mean;
     }
-    return indirect > 0 ? sqrt(difference / indirect) : -1;
+    return indirect > dark * dark * all ? sqrt(difference / indirect) : -1;
 }
 
 static lam_status measure_noise(const judge_input *input, const probes *p, error_group *groups[N_GROUPS],

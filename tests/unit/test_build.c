@@ -374,6 +374,56 @@ START_TEST(judge_finds_the_exact_operator_exact) {
 }
 END_TEST
 
+/* Half of the elements see one another in pairs, the others nothing: too many elements for a dense reference,
+ * whose zeros would be exact, and an operator that is a little wrong everywhere. */
+START_TEST(judge_ignores_what_sees_nothing) {
+    enum { N = REFERENCE_DENSE_ELEMENTS + 2 };
+    lam_error error = {0};
+    csr F = {.n = N,
+             .indptr = calloc(N + 1, sizeof(uint64_t)),
+             .indices = calloc(N, sizeof(uint32_t)),
+             .data = calloc(N, sizeof(float))};
+    double *area = calloc(N, sizeof *area), *row_sums = calloc(N, sizeof *row_sums);
+    float *rho = calloc(N, sizeof *rho), *emission = calloc(N, sizeof *emission);
+    float *Y = calloc(N, sizeof *Y), *V = calloc(N, sizeof *V);
+    for (size_t i = 0; i < N; i++) {
+        F.indptr[i + 1] = F.indptr[i];
+        area[i] = 1;
+        rho[i] = .5f;
+        Y[i] = -1e-4f;
+        V[i] = 1e-4f;
+        if (i % 4 >= 2) continue;
+        F.indices[F.indptr[i]] = (uint32_t)(i ^ 1);
+        F.data[F.indptr[i + 1]++] = .5f;
+        row_sums[i] = .5;
+    }
+    lam_operator *op = NULL;
+    ck_assert_msg(operator_low_rank_create_folded(N, 1, rho, Y, V, &op, &error) == LAM_OK, "%s",
+                  error.message);
+    const build_problem problem = {
+        .n = N, .n_channels = 1, .area = area, .reflectance = rho, .F = &F, .order = NULL};
+    const judge_input input = {.problem = &problem,
+                               .row_sums = row_sums,
+                               .emission = emission,
+                               .independent = &F,
+                               .halves = {&F, &F},
+                               .probes = 40,
+                               .seed = 1};
+    error_report report;
+    ck_assert_msg(judge_operator(op, &input, &report, &error) == LAM_OK, "%s", error.message);
+    /* With E_i = 1 its partner gives back B_j = rho F = .25 and the operator next to nothing: wrong by all of
+     * it. */
+    ck_assert_double_eq_tol(report.single.operator_indirect.max, 1, 1e-2);
+    ck_assert_double_eq_tol(report.single.reference_noise, 0, 1e-9);
+    lam_operator_close(op);
+    csr_free(&F);
+    free(area);
+    free(row_sums);
+    free(rho);
+    free(emission);
+}
+END_TEST
+
 START_TEST(auto_explains_itself) {
     fixture f = fixture_box(unit_cube, 3, .5f);
     build_options options = defaults;
@@ -423,6 +473,7 @@ int main(void) {
     tcase_add_test(cases, fixed_rank_is_exact);
     tcase_add_test(cases, furnace);
     tcase_add_test(cases, judge_finds_the_exact_operator_exact);
+    tcase_add_test(cases, judge_ignores_what_sees_nothing);
     tcase_add_test(cases, auto_explains_itself);
     tcase_add_test(cases, bad_options_are_refused);
     suite_add_tcase(suite, cases);
