@@ -103,4 +103,12 @@ static inline double seen_from(const mesh *m, const double p[3]) {
     return sum;
 }
 
+/* Imports a file of tests/fixtures. */
+static inline lam_status import_fixture(const char *name, mesh *m, import_report *report, lam_error *error) {
+    char path[512];
+    const import_options options = import_plain();
+    snprintf(path, sizeof path, FIXTURES "/%s", name);
+    return scene_import(path, &options, m, report, error);
+}
+
 #endif
