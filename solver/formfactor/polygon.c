@@ -1,0 +1,82 @@
+#include "solver/formfactor/polygon.h"
+
+#include <math.h>
+#include <string.h>
+
+static double dot(const double *a, const double *b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Twice the area vector, by Newell's formula about the first corner. */
+static void area_vector(const polygon *p, double out[3]) {
+    memset(out, 0, 3 * sizeof *out);
+    for (int c = 1; c + 1 < p->n; c++) {
+        double u[3], v[3];
+        for (int d = 0; d < 3; d++) {
+            u[d] = p->corner[c][d] - p->corner[0][d];
+            v[d] = p->corner[c + 1][d] - p->corner[0][d];
+        }
+        for (int d = 0; d < 3; d++)
+            out[d] += u[(d + 1) % 3] * v[(d + 2) % 3] - u[(d + 2) % 3] * v[(d + 1) % 3];
+    }
+}
+
+double polygon_area(const polygon *p) {
+    double twice[3];
+    area_vector(p, twice);
+    return .5 * sqrt(dot(twice, twice));
+}
+
+static void measure_extent(polygon *p) {
+    memset(p->centre, 0, sizeof p->centre);
+    for (int c = 0; c < p->n; c++)
+        for (int d = 0; d < 3; d++) p->centre[d] += p->corner[c][d] / p->n;
+    p->radius = 0;
+    for (int c = 0; c < p->n; c++) {
+        double r[3];
+        for (int d = 0; d < 3; d++) r[d] = p->corner[c][d] - p->centre[d];
+        p->radius = fmax(p->radius, sqrt(dot(r, r)));
+    }
+}
+
+void polygon_measure(polygon *p) {
+    double twice[3];
+    area_vector(p, twice);
+    const double length = sqrt(dot(twice, twice));
+    for (int d = 0; d < 3; d++) p->normal[d] = twice[d] / length;
+    measure_extent(p);
+}
+
+void polygon_of_element(const mesh *m, size_t element, polygon *out) {
+    const uint32_t *corner = m->elements[element];
+    *out = (polygon){.n = corner[3] == MESH_NO_VERTEX ? 3 : 4};
+    for (int c = 0; c < out->n; c++) memcpy(out->corner[c], m->vertices[corner[c]], sizeof out->corner[c]);
+    polygon_measure(out);
+}
+
+void polygon_in_front(const polygon *p, const polygon *other, polygon *out) {
+    double height[POLYGON_CORNERS], most = 0;
+    for (int c = 0; c < p->n; c++) {
+        double r[3];
+        for (int d = 0; d < 3; d++) r[d] = p->corner[c][d] - other->centre[d];
+        height[c] = dot(r, other->normal);
+        most = fmax(most, height[c]);
+    }
+    /* Corners that lie in the plane itself are moved off it by rounding; nothing is seen of so little. */
+    const double rounding = 1e-12 * (p->radius + other->radius);
+    polygon made = *p;
+    made.n = 0;
+    for (int c = 0; c < p->n && most > rounding; c++) {
+        const int next = (c + 1) % p->n;
+        if (height[c] >= 0) memcpy(made.corner[made.n++], p->corner[c], sizeof made.corner[0]);
+        if ((height[c] > 0 && height[next] < 0) || (height[c] < 0 && height[next] > 0)) {
+            const double t = height[c] / (height[c] - height[next]);
+            for (int d = 0; d < 3; d++)
+                made.corner[made.n][d] = p->corner[c][d] + t * (p->corner[next][d] - p->corner[c][d]);
+            made.n++;
+        }
+    }
+    if (made.n < 3) made.n = 0;
+    if (made.n > 0) measure_extent(&made);
+    *out = made;
+}

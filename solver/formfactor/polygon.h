@@ -1,0 +1,27 @@
+/* A planar convex polygon in double: an element, or what of it lies in front of another's plane. */
+#ifndef LAMBERT_FORMFACTOR_POLYGON_H
+#define LAMBERT_FORMFACTOR_POLYGON_H
+
+#include "solver/scene/mesh.h"
+
+/* A quad cut by a plane has at most five corners; one more for the cut of a cut. */
+enum { POLYGON_CORNERS = 6 };
+
+typedef struct polygon {
+    int n;                             /* corners; below 3 it is empty */
+    double corner[POLYGON_CORNERS][3]; /* counter-clockwise seen from the front */
+    double normal[3];                  /* unit, towards the front */
+    double centre[3], radius;          /* of a sphere about all corners */
+} polygon;
+
+/* Takes normal, centre and radius from the corners, which must span an area. */
+void polygon_measure(polygon *p);
+
+void polygon_of_element(const mesh *m, size_t element, polygon *out);
+
+/* What of p lies in front of the plane of other; empty when nothing reaches further than rounding. */
+void polygon_in_front(const polygon *p, const polygon *other, polygon *out);
+
+double polygon_area(const polygon *p);
+
+#endif
