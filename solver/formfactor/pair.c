@@ -275,12 +275,13 @@ static double cubature(const polygon *a, const polygon *b, const pair_gauss *g) 
 }
 
 /* The rule that is far enough: a singularity q half-widths away leaves n Gauss nodes an error of about
- * (2 q)^-2n. NULL: none of those that pay. */
+ * (2 q)^-2n in each of the four directions, times what the fourth power of the distance brings. NULL: none of
+ * those that pay. */
 static const pair_gauss *far_rule(const pair_rules *rules, const polygon *a, const polygon *b,
                                   double distance, double tolerance) {
     const double wide = fmax(a->radius, b->radius), q = (distance - wide) / wide;
     for (int r = 0; r < PAIR_FAR_RULES && q > 2; r++)
-        if (pow(2 * q, -2 * rules->gauss[r].n) <= .3 * tolerance) return &rules->gauss[r];
+        if (pow(2 * q, -2 * rules->gauss[r].n) <= .03 * tolerance) return &rules->gauss[r];
     return NULL;
 }
 

@@ -80,3 +80,57 @@ void polygon_in_front(const polygon *p, const polygon *other, polygon *out) {
     if (made.n > 0) measure_extent(&made);
     *out = made;
 }
+
+/* A corner, the middle of an edge, or the middle of all. */
+static void middle(const polygon *p, int a, int b, double out[3]) {
+    for (int d = 0; d < 3; d++) out[d] = .5 * (p->corner[a][d] + p->corner[b][d]);
+}
+
+void polygon_quarter(const polygon *p, polygon quarters[4]) {
+    double between[4][3], centre[3];
+    for (int c = 0; c < p->n; c++) middle(p, c, (c + 1) % p->n, between[c]);
+    for (int d = 0; d < 3; d++) centre[d] = .5 * (between[0][d] + between[2][d]);
+    for (int q = 0; q < 4; q++) {
+        polygon *out = &quarters[q];
+        *out = (polygon){.n = p->n};
+        memcpy(out->normal, p->normal, sizeof out->normal);
+        if (p->n == 4) {
+            memcpy(out->corner[0], p->corner[q], sizeof centre);
+            memcpy(out->corner[1], between[q], sizeof centre);
+            memcpy(out->corner[2], centre, sizeof centre);
+            memcpy(out->corner[3], between[(q + 3) % 4], sizeof centre);
+        } else if (q < 3) {
+            memcpy(out->corner[0], p->corner[q], sizeof centre);
+            memcpy(out->corner[1], between[q], sizeof centre);
+            memcpy(out->corner[2], between[(q + 2) % 3], sizeof centre);
+        } else {
+            memcpy(out->corner, between, 3 * sizeof centre);
+        }
+        measure_extent(out);
+    }
+}
+
+double polygon_point(const polygon *p, double u, double w, double point[3]) {
+    const double *a = p->corner[0], *b = p->corner[1], *c = p->corner[2], *e = p->corner[3];
+    double along_u[3], along_w[3];
+    if (p->n == 3) { /* the square folded along its diagonal */
+        const bool beyond = u + w > 1;
+        const double s = beyond ? 1 - u : u, t = beyond ? 1 - w : w;
+        for (int d = 0; d < 3; d++) {
+            along_u[d] = b[d] - a[d];
+            along_w[d] = c[d] - a[d];
+            point[d] = a[d] + s * along_u[d] + t * along_w[d];
+        }
+    } else { /* bilinear */
+        for (int d = 0; d < 3; d++) {
+            along_u[d] = (1 - w) * (b[d] - a[d]) + w * (c[d] - e[d]);
+            along_w[d] = (1 - u) * (e[d] - a[d]) + u * (c[d] - b[d]);
+            point[d] = (1 - w) * ((1 - u) * a[d] + u * b[d]) + w * ((1 - u) * e[d] + u * c[d]);
+        }
+    }
+    double area[3];
+    for (int d = 0; d < 3; d++)
+        area[d] = along_u[(d + 1) % 3] * along_w[(d + 2) % 3] - along_u[(d + 2) % 3] * along_w[(d + 1) % 3];
+    const double jacobian = sqrt(dot(area, area));
+    return p->n == 3 ? .5 * jacobian : jacobian;
+}

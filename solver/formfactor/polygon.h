@@ -24,4 +24,11 @@ void polygon_in_front(const polygon *p, const polygon *other, polygon *out);
 
 double polygon_area(const polygon *p);
 
+/* The quarters of a triangle or a quad, between the middles of its edges. */
+void polygon_quarter(const polygon *p, polygon quarters[4]);
+
+/* The point of a triangle or a quad at (u, w) in the unit square; returns how much area a unit of the square
+ * has there. */
+double polygon_point(const polygon *p, double u, double w, double point[3]);
+
 #endif

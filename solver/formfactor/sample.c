@@ -33,17 +33,18 @@ static double triangle_area(const double *a, const double *b, const double *c) {
     return .5 * sqrt(x * x + y * y + z * z);
 }
 
-/* The frame is turned about the first edge; which edge does not matter, the sequence is shifted anyway. */
-static void set_frame(element_sampler *s, const float *normal, const double *a, const double *b) {
+void element_frame_init(element_frame *f, const mesh *m, size_t element) {
+    const double *a = m->vertices[m->elements[element][0]], *b = m->vertices[m->elements[element][1]];
+    const float *normal = m->normal[element];
     double t[3], length = 0;
     for (int d = 0; d < 3; d++) length += (b[d] - a[d]) * (b[d] - a[d]);
     length = sqrt(length);
     for (int d = 0; d < 3; d++) t[d] = (b[d] - a[d]) / length;
     const double n[3] = {normal[0], normal[1], normal[2]};
     for (int d = 0; d < 3; d++) {
-        s->normal[d] = normal[d];
-        s->tangent[d] = (float)t[d];
-        s->bitangent[d] = (float)(n[(d + 1) % 3] * t[(d + 2) % 3] - n[(d + 2) % 3] * t[(d + 1) % 3]);
+        f->normal[d] = normal[d];
+        f->tangent[d] = (float)t[d];
+        f->bitangent[d] = (float)(n[(d + 1) % 3] * t[(d + 2) % 3] - n[(d + 2) % 3] * t[(d + 1) % 3]);
     }
 }
 
@@ -70,7 +71,7 @@ void element_sampler_init(element_sampler *s, const mesh *m, const visibility *v
             set_piece(s, 1, a, c, e, v);
         }
     }
-    set_frame(s, m->normal[element], a, b);
+    element_frame_init(&s->frame, m, element);
     uint64_t state = mix(seed) ^ mix((uint64_t)element + 1);
     for (int d = 0; d < 4; d += 2) {
         state = mix(state);
@@ -99,36 +100,56 @@ static inline void square_to_disc(float x, float y, float *dx, float *dy) {
     *dy = r * (ax > ay ? sine : cosine);
 }
 
+void element_sampler_point(const element_sampler *s, float u, float w, float point[3]) {
+    int piece = 0;
+    if (!s->parallelogram) {
+        /* The first coordinate chooses the triangle and is stretched again; then the square is folded. */
+        if (u < s->first_share) {
+            u = u / s->first_share;
+        } else {
+            u = (u - s->first_share) / (1 - s->first_share);
+            piece = 1;
+        }
+        if (u + w > 1) {
+            u = 1 - u;
+            w = 1 - w;
+        }
+    }
+    for (int d = 0; d < 3; d++)
+        point[d] = s->corner[piece][d] + u * s->edge[piece][0][d] + w * s->edge[piece][1][d];
+}
+
+/* The place of a low-discrepancy sequence (see kronecker_step). */
+void pair_sampler_init(pair_sampler *s, uint64_t seed, size_t i, size_t j) {
+    uint64_t state = mix(mix(seed) ^ mix((uint64_t)i + 1)) ^ mix((uint64_t)j + 0x100000001u);
+    for (int d = 0; d < 4; d += 2) {
+        state = mix(state);
+        s->shift[d] = (uint32_t)state;
+        s->shift[d + 1] = (uint32_t)(state >> 32);
+    }
+}
+
+void pair_sampler_place(const pair_sampler *s, uint32_t index, double x[4]) {
+    for (int d = 0; d < 4; d++) x[d] = (double)(s->shift[d] + index * kronecker_step[d]) * 0x1p-32;
+}
+
 void element_sampler_packet(const element_sampler *s, uint32_t first, ray_packet *rays) {
+    const element_frame *f = &s->frame;
     float x[4][VISIBILITY_PACKET];
     for (int d = 0; d < 4; d++)
         for (uint32_t i = 0; i < VISIBILITY_PACKET; i++)
             x[d][i] = fraction(s->shift[d] + (first + i) * kronecker_step[d]);
 
     for (int i = 0; i < VISIBILITY_PACKET; i++) {
-        float u = x[0][i], w = x[1][i];
-        int piece = 0;
-        if (!s->parallelogram) {
-            /* The first coordinate chooses the triangle and is stretched again; then the square is folded. */
-            if (u < s->first_share) {
-                u = u / s->first_share;
-            } else {
-                u = (u - s->first_share) / (1 - s->first_share);
-                piece = 1;
-            }
-            if (u + w > 1) {
-                u = 1 - u;
-                w = 1 - w;
-            }
-        }
-        for (int d = 0; d < 3; d++)
-            rays->origin[d][i] = s->corner[piece][d] + u * s->edge[piece][0][d] + w * s->edge[piece][1][d];
+        float origin[3];
+        element_sampler_point(s, x[0][i], x[1][i], origin);
+        for (int d = 0; d < 3; d++) rays->origin[d][i] = origin[d];
     }
     for (int i = 0; i < VISIBILITY_PACKET; i++) {
         float dx, dy;
         square_to_disc(2 * x[2][i] - 1, 2 * x[3][i] - 1, &dx, &dy);
         const float dz = sqrtf(fmaxf(1 - dx * dx - dy * dy, 1e-12f));
         for (int d = 0; d < 3; d++)
-            rays->direction[d][i] = dx * s->tangent[d] + dy * s->bitangent[d] + dz * s->normal[d];
+            rays->direction[d][i] = dx * f->tangent[d] + dy * f->bitangent[d] + dz * f->normal[d];
     }
 }

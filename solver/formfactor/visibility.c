@@ -250,3 +250,55 @@ void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays,
         hits->back[i] = back && !two_sided;
     }
 }
+
+/* A packet of segments: the elements whose points each joins, by lane, which the segment carries as its id.
+ */
+typedef struct segment_context {
+    struct RTCIntersectContext embree;
+    const visibility *visibility;
+    uint32_t from[VISIBILITY_PACKET], to[VISIBILITY_PACKET];
+} segment_context;
+
+/* Refuses hits on the two elements that a segment joins and on faces in the same place. */
+static void refuse_both_ends(const struct RTCFilterFunctionNArguments *args) {
+    const segment_context *context = (const segment_context *)args->context;
+    const visibility *v = context->visibility;
+    const size_t n = args->N;
+    const float *direction = (const float *)args->ray + RAY_DIRECTION * n;
+    const float *distance = (const float *)args->ray + RAY_DISTANCE * n;
+    const unsigned *lane = (const unsigned *)args->ray + RAY_ID * n;
+    const unsigned *primitive = (const unsigned *)args->hit + HIT_PRIMITIVE * n;
+    const unsigned *geometry = (const unsigned *)args->hit + HIT_GEOMETRY * n;
+    for (size_t i = 0; i < n; i++) {
+        if (args->valid[i] == 0) continue;
+        const uint32_t front = v->prim_element[geometry[i]][primitive[i]];
+        const uint32_t from = context->from[lane[i]], to = context->to[lane[i]];
+        const float along =
+            fabsf(along_normal(v, front, direction[i], direction[n + i], direction[2 * n + i]));
+        if (front == from || front == to || in_own_plane(v, front, from, distance[i] * along) ||
+            in_own_plane(v, front, to, (1 - distance[i]) * along))
+            args->valid[i] = 0;
+    }
+}
+
+unsigned visibility_blocked(const visibility *v, const ray_packet *segments, size_t n_segments,
+                            const uint32_t *from, const uint32_t *to) {
+    struct RTCRayHit8 packet __attribute__((aligned(32)));
+    int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
+    segment_context context = {.visibility = v};
+    rtcInitIntersectContext(&context.embree);
+    context.embree.filter = refuse_both_ends;
+    packet_set(&packet, segments);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        active[i] = i < n_segments ? -1 : 0;
+        packet.ray.tfar[i] = 1;
+        packet.ray.id[i] = (unsigned)i;
+        if (i >= n_segments) continue;
+        context.from[i] = from[i] < v->n_fronts ? from[i] : from[i] - (uint32_t)v->n_fronts;
+        context.to[i] = to[i] < v->n_fronts ? to[i] : to[i] - (uint32_t)v->n_fronts;
+    }
+    rtcOccluded8(active, v->scene, &context.embree, &packet.ray);
+    unsigned blocked = 0;
+    for (size_t i = 0; i < n_segments; i++) blocked |= (unsigned)(packet.ray.tfar[i] < 0) << i;
+    return blocked;
+}

@@ -36,4 +36,10 @@ void visibility_recentre(const visibility *v, const double point[3], float recen
 void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
                      bool cull_back, hit_packet *hits);
 
+/* Which of the first n_segments segments meet something on their way: bit i for segment i, from rays->origin
+ * to origin + direction, points of the elements from[i] and to[i]. Neither those nor faces in the same place
+ * count. */
+unsigned visibility_blocked(const visibility *v, const ray_packet *segments, size_t n_segments,
+                            const uint32_t *from, const uint32_t *to);
+
 #endif

@@ -2,6 +2,7 @@
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/visibility.h"
 #include "support/box.h"
+#include "support/plates.h"
 #include "support/suite.h"
 
 #include <omp.h>
@@ -88,34 +89,6 @@ START_TEST(box_against_analytic) {
 }
 END_TEST
 
-/* Unit squares at z = 0 (up) and z = 1 (down), with an occluder between that has both its faces. */
-static mesh plates(const double *occluder) {
-    mesh m = {0};
-    const box_cell low = {.axis = 2, .level = 0, .from = {0, 0, 0}, .to = {1, 1, 0}};
-    const box_cell high = {.axis = 2, .level = 1, .from = {0, 0, 1}, .to = {1, 1, 1}};
-    mesh_add_cell(&m, &low, true);
-    mesh_add_cell(&m, &high, false);
-    if (occluder != NULL) {
-        const box_cell cell = {.axis = 2,
-                               .level = .5,
-                               .from = {occluder[0], occluder[2], .5},
-                               .to = {occluder[1], occluder[3], .5}};
-        mesh_add_cell(&m, &cell, true);
-        mesh_add_cell(&m, &cell, false);
-    }
-    mesh_finish(&m, .5f);
-    return m;
-}
-
-static void move(mesh *m, double scale, double offset) {
-    for (size_t i = 0; i < m->n_vertices; i++)
-        for (int d = 0; d < 3; d++) m->vertices[i][d] = m->vertices[i][d] * scale + offset;
-    lam_error error = {0};
-    ck_assert_msg(mesh_measure(m, &error) == LAM_OK, "%s", error.message);
-}
-
-static const double places[][2] = {{1, 0}, {1, 1e6}, {1e-3, 0}, {1e3, 0}};
-
 START_TEST(occluded_plates) {
     const double quarter[4] = {0, .5, 0, .5}, half[4] = {0, .5, 0, 1}, whole[4] = {0, 1, 0, 1},
                  centre[4] = {.25, .75, .25, .75};
@@ -126,7 +99,7 @@ START_TEST(occluded_plates) {
         {NULL, .199824895698}, {quarter, .149868671774}, {half, .099912447849}, {centre, .099506294599}};
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
         mesh m = plates(cases[c].occluder);
-        move(&m, places[_i][0], places[_i][1]);
+        plates_move(&m, plates_places[_i][0], plates_places[_i][1]);
         form_factors f = trace(&m, RAYS, 1);
         check_invariants(&m, &f);
         ck_assert(!f.closed);
@@ -135,7 +108,7 @@ START_TEST(occluded_plates) {
         mesh_free(&m);
     }
     mesh m = plates(whole);
-    move(&m, places[_i][0], places[_i][1]);
+    plates_move(&m, plates_places[_i][0], plates_places[_i][1]);
     form_factors f = trace(&m, 4 * RAYS, 1);
     ck_assert_double_eq(entry(&f.F, 0, 1), 0); /* exactly: edges must not leak */
     form_factors_free(&f);
@@ -306,7 +279,7 @@ int main(void) {
     tcase_set_timeout(cases, 300);
     tcase_add_test(cases, room_closed_forms);
     tcase_add_test(cases, box_against_analytic);
-    tcase_add_loop_test(cases, occluded_plates, 0, sizeof places / sizeof *places);
+    tcase_add_loop_test(cases, occluded_plates, 0, sizeof plates_places / sizeof *plates_places);
     tcase_add_test(cases, l_room_corner_hides);
     tcase_add_test(cases, same_for_any_thread_count);
     tcase_add_test(cases, back_faces_absorb);

@@ -1,0 +1,30 @@
+/* Form factors pair by pair: the magnitude by mathematics, by rays only what of it is hidden. */
+#ifndef LAMBERT_FORMFACTOR_PAIRS_H
+#define LAMBERT_FORMFACTOR_PAIRS_H
+
+#include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/visibility.h"
+
+typedef struct pairs_options {
+    double tolerance; /* of the unoccluded factor, relative */
+    double accuracy;  /* of a factor that is partly hidden, absolute */
+    size_t segments; /* at least, between the elements of a pair that may be partly hidden; a multiple of 8 */
+    uint64_t seed;
+    const progress *progress;
+    const char *stage;
+} pairs_options;
+
+/* What was skipped and what was done, in pairs. */
+typedef struct pairs_report {
+    size_t facing, open, hidden, mixed;
+} pairs_report;
+
+/* The exchange areas g_ij = A_i F_ij = g_ji of all pairs, both triangles, as sparse rows freed by csr_free.
+ * Eight segments decide whether a pair is plainly open or plainly hidden; where they disagree, or where the
+ * pair of a neighbour came out otherwise, options->segments find the share that is seen, each weighted with
+ * the kernel. The result is the same for any number of threads. Memory: 2.5 n^2 bytes beside the rows.
+ * Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_options *options, csr *G,
+                          pairs_report *report, lam_error *error);
+
+#endif
