@@ -106,8 +106,11 @@ static void print_text(const json_t *about) {
     static const char *const origin[] = {"tool", "command", "created", "seed", "unit", "geometry_hash"};
     for (size_t i = 0; i < sizeof origin / sizeof origin[0]; i++)
         print_value(origin[i], json_object_get(provenance, origin[i]));
-    if (form_factors != NULL) print_value("form factors", json_object_get(form_factors, "method"));
-    if (form_factors != NULL) print_value("rays", json_object_get(form_factors, "rays"));
+    if (form_factors == NULL) return;
+    print_value("form factors", json_object_get(form_factors, "method"));
+    if (json_integer_value(json_object_get(form_factors, "rays")) > 0)
+        print_value("rays", json_object_get(form_factors, "rays"));
+    print_value("resolution", json_object_get(form_factors, "resolution"));
 }
 
 static lam_status info(const char *path, bool as_json, lam_error *error) {

@@ -1,9 +1,11 @@
 /* lambert precompute: turns a scene into a store. */
+#include "solver/formfactor/formfactor.h"
 #include "solver/options.h"
 #include "solver/output_file.h"
 #include "solver/precompute.h"
 #include "solver/verbs.h"
 
+#include <inttypes.h>
 #include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -87,10 +89,9 @@ static const option_row rows[] = {
     {.name = "form-factors",
      .kind = OPTION_CHOICE,
      .offset = FIELD(form_factors),
-     .value = "rays",
-     .doc = "How they are found (rays; hemicube is not supported yet)",
-     .choices = "rays",
-     .later = "hemicube"},
+     .value = "rays|hemicube",
+     .doc = "How they are found (rays)",
+     .choices = "rays|hemicube"},
     {.name = "rays",
      .kind = OPTION_COUNT_AUTO,
      .offset = FIELD(rays),
@@ -102,14 +103,16 @@ static const option_row rows[] = {
      .kind = OPTION_COUNT,
      .offset = FIELD(resolution),
      .value = "PIXELS",
-     .doc = "Of a hemicube",
-     .low = 1,
-     .high = 1 << 16},
+     .doc = "Of a hemicube: pixels along its top, even (512)",
+     .low = HEMICUBE_LEAST,
+     .high = HEMICUBE_MOST},
     {.name = "quality",
      .kind = OPTION_CHOICE,
      .offset = FIELD(quality),
      .value = "draft|normal|high",
-     .doc = "Sampling noise of at most 1/2, 1/4 or 1/8 of epsilon (normal)",
+     .doc = "draft, normal: rays whose noise is at most 1/2, 1/4 of epsilon; high: "
+            "pair by pair, magnitudes by mathematics and rays only for what is "
+            "hidden, up to 16384 elements, else rays at 1/8 (normal)",
      .choices = "draft|normal|high"},
     {.name = "sky",
      .kind = OPTION_CHOICE,
@@ -319,41 +322,78 @@ static int check_together(const fields *f, const option_result *given, bool from
             return options_usage(verb.name,
                                  "--%s: the mesh of a store is fixed; precompute from its scene instead",
                                  of_mesh[i]);
+    if (f->resolution % 2 != 0)
+        return options_usage(verb.name, "--resolution %" PRIu64 ": must be even", f->resolution);
     if (!from_store && same_file(input, f->output))
         return options_usage(verb.name, "-o %s: is the scene itself", f->output);
     return 0;
 }
 
-/* Names the options that what was built had no use for. */
+static bool is_hemicube(const fields *f) {
+    return strcmp(f->form_factors, "hemicube") == 0;
+}
+
+/* Standard error of a partly hidden form factor at --quality high: a third of the 2e-4 that a factor of .1
+ * may be off by. */
+static const double high_accuracy = 7e-6;
+
+static bool takes_pairs(const fields *f, bool from_store) {
+    return !from_store && !is_hemicube(f) && f->rays == OPTION_AUTO && strcmp(f->quality, "high") == 0;
+}
+
+/* Whether an option about form factors had no use. Those of a store leave only the judge to cast rays; the
+ * judge of a hemicube chooses its own number of them. */
+static bool unused_by_form_factors(const char *name, const fields *f, bool from_store) {
+    const bool hemicube = is_hemicube(f);
+    if (strcmp(name, "form-factors") == 0) return from_store;
+    if (strcmp(name, "resolution") == 0) return from_store || !hemicube;
+    if (strcmp(name, "quality") == 0) return from_store || hemicube || f->rays != OPTION_AUTO;
+    if (strcmp(name, "rays") == 0) return from_store ? f->probes == 0 : hemicube;
+    return false;
+}
+
+static bool unused_by_method(const char *name, const fields *f, const build_report *built) {
+    static const char *const never[] = {"coherence", "min-area", "assign", "threshold", "correction"};
+    static const char *const factorized[] = {"factorizer", "epsilon", "alpha", "levels", "rank"};
+    for (size_t k = 0; k < sizeof never / sizeof never[0]; k++)
+        if (strcmp(name, never[k]) == 0) return true;
+    for (size_t k = 0; built->factorizer == NULL && k < sizeof factorized / sizeof factorized[0]; k++)
+        if (strcmp(name, factorized[k]) == 0) return true;
+    return strcmp(name, "epsilon") == 0 && f->rank > 0;
+}
+
+typedef struct name_list {
+    char text[256];
+} name_list;
+
+static void list_add(name_list *list, const char *name) {
+    if (strlen(list->text) + strlen(name) + 5 > sizeof list->text) return;
+    strcat(list->text, list->text[0] == '\0' ? "--" : ", --");
+    strcat(list->text, name);
+}
+
+/* Names the options that what was done had no use for. */
 static void log_unused(terminal *t, const option_result *given, const build_report *built, const fields *f,
                        bool from_store) {
-    static const char *const never[] = {"resolution", "coherence", "min-area",
-                                        "assign",     "threshold", "correction"};
-    static const char *const factorized[] = {"factorizer", "epsilon", "alpha", "levels", "rank"};
-    char names[256] = "";
-    const bool exact = built->factorizer == NULL;
+    name_list of_form_factors = {""}, of_method = {""};
     for (size_t i = 0; verb.options[i].name != NULL || verb.options[i].doc != NULL; i++) {
         const char *name = verb.options[i].name;
         if (name == NULL || !options_given(&verb, given, name)) continue;
-        bool unused = false;
-        for (size_t k = 0; k < sizeof never / sizeof never[0]; k++) unused |= strcmp(name, never[k]) == 0;
-        for (size_t k = 0; exact && k < sizeof factorized / sizeof factorized[0]; k++)
-            unused |= strcmp(name, factorized[k]) == 0;
-        unused |= strcmp(name, "epsilon") == 0 && f->rank > 0;
-        unused |= strcmp(name, "quality") == 0 && (f->rays != OPTION_AUTO || from_store);
-        unused |= strcmp(name, "rays") == 0 && from_store && f->probes == 0;
-        if (unused && strlen(names) + strlen(name) + 4 < sizeof names) {
-            strcat(names, names[0] == '\0' ? "--" : ", --");
-            strcat(names, name);
-        }
+        if (unused_by_form_factors(name, f, from_store)) list_add(&of_form_factors, name);
+        if (unused_by_method(name, f, built)) list_add(&of_method, name);
     }
-    if (names[0] != '\0') terminal_log(t, "%s does not use %s", built->method, names);
+    if (of_form_factors.text[0] != '\0')
+        terminal_log(t, "%s does not use %s", from_store ? "a store with form factors" : f->form_factors,
+                     of_form_factors.text);
+    if (of_method.text[0] != '\0') terminal_log(t, "%s does not use %s", built->method, of_method.text);
 }
 
 int cmd_precompute(int argc, char **argv) {
     fields f = {.unit = 1,
                 .reflectance = -1,
                 .rays = OPTION_AUTO,
+                .form_factors = "rays",
+                .resolution = 512,
                 .quality = "normal",
                 .method = "auto",
                 .factorizer = "auto",
@@ -389,6 +429,8 @@ int cmd_precompute(int argc, char **argv) {
         .two_sided = f.two_sided,
         .reflectance = f.reflectance,
         .rays = f.rays,
+        .resolution = is_hemicube(&f) && !from_store ? f.resolution : 0,
+        .accuracy = takes_pairs(&f, from_store) ? high_accuracy : 0,
         .probes = f.probes,
         .quality = f.quality,
         .keep_form_factors = f.keep_form_factors != NULL,

@@ -9,9 +9,11 @@
 typedef struct forecast {
     size_t n, n_channels;
     size_t rays;
-    size_t probes; /* 0: no independent samples */
-    bool exact;    /* the whole inverse is built */
-    size_t rank;   /* 0: not known yet */
+    size_t resolution; /* of hemicubes: rays are then those of the independent samples only; 0: none */
+    bool pairs;        /* found pair by pair, the independent samples too */
+    size_t probes;     /* 0: no independent samples */
+    bool exact;        /* the whole inverse is built */
+    size_t rank;       /* 0: not known yet */
 } forecast;
 
 /* Bytes at the peak; an upper bound for the form factors, an estimate for the rest. */

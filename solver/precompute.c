@@ -7,6 +7,7 @@
 #include "solver/scene/import.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -101,6 +102,12 @@ static double elements_after(const mesh *m, const precompute_options *o) {
     return fmax(n, (double)how->elements);
 }
 
+/* Whether the form factors of n elements are, or will be, found pair by pair. */
+static bool takes_pairs(const work *w, double n) {
+    if (w->options->from_store) return w->f.accuracy > 0;
+    return w->options->accuracy > 0 && n <= PAIRS_ELEMENTS_MOST;
+}
+
 static lam_status check_memory(work *w, double n, lam_error *error) {
     const precompute_options *o = w->options;
     if (n > 4e9)
@@ -109,6 +116,8 @@ static lam_status check_memory(work *w, double n, lam_error *error) {
     const forecast f = {.n = (size_t)n,
                         .n_channels = w->m.n_channels,
                         .rays = w->rays,
+                        .resolution = o->from_store ? w->f.resolution : o->resolution,
+                        .pairs = takes_pairs(w, n),
                         .probes = o->probes == PRECOMPUTE_AUTO ? PROBES_OF_LARGE : o->probes,
                         .exact = strcmp(o->method, "exact") == 0,
                         .rank = o->rank};
@@ -148,22 +157,30 @@ static double quality_share(const char *quality) {
 
 static void choose_rays(work *w) {
     const precompute_options *o = w->options;
-    if (o->rays != PRECOMPUTE_AUTO)
+    /* Beside hemicubes only the judge casts rays, and --quality is not about the judge. */
+    const bool hemicubes = o->from_store ? w->f.resolution > 0 : o->resolution > 0;
+    if (o->rays != PRECOMPUTE_AUTO && o->resolution == 0)
         w->rays = o->rays;
     else if (o->from_store && w->f.rays > 0)
         w->rays = w->f.rays;
     else
-        w->rays = form_factors_auto_rays(o->epsilon, quality_share(o->quality));
+        w->rays = form_factors_auto_rays(o->epsilon, quality_share(hemicubes ? "normal" : o->quality));
 }
 
 static void log_form_factors(work *w) {
     const form_factors *f = &w->f;
-    terminal_log(
-        w->t,
-        "%zu rays an element: %.2f %% leave the scene%s, %.2f %% meet back faces; row sums repaired by "
-        "%.2g on average, at most %.2g",
-        f->rays, 100 * f->leaving_share, f->closed ? " (closed)" : "", 100 * f->absorbed_share,
-        f->repair_mean, f->repair_max);
+    char how[64];
+    if (f->accuracy > 0)
+        snprintf(how, sizeof how, "pair by pair to %g", f->accuracy);
+    else if (f->resolution > 0)
+        snprintf(how, sizeof how, "hemicubes of %zu pixels", f->resolution);
+    else
+        snprintf(how, sizeof how, "%zu rays an element", f->rays);
+    terminal_log(w->t,
+                 "%s: %.2f %% leave the scene%s, %.2f %% meet back faces; row sums repaired by "
+                 "%.2g on average, at most %.2g",
+                 how, 100 * f->leaving_share, f->closed ? " (closed)" : "", 100 * f->absorbed_share,
+                 f->repair_mean, f->repair_max);
     if (f->absorbed_share > .01 && !w->m.two_sided)
         terminal_warn(w->t,
                       "%.1f %% of the light meets back faces and is lost there: turn the faces, or give "
@@ -172,15 +189,23 @@ static void log_form_factors(work *w) {
 }
 
 static lam_status trace(work *w, lam_error *error) {
-    const ray_options how = {
-        .rays = w->rays, .seed = w->options->seed, .progress = &w->progress, .stage = "form factors"};
-    return form_factors_trace(&w->m, w->order, &how, &w->f, error);
+    const char *const stage = "form factors";
+    const hemicube_options cubes = {
+        .resolution = w->options->resolution, .progress = &w->progress, .stage = stage};
+    const ray_options rays = {
+        .rays = w->rays, .seed = w->options->seed, .progress = &w->progress, .stage = stage};
+    const pair_options pairs = {
+        .accuracy = w->options->accuracy, .seed = w->options->seed, .progress = &w->progress, .stage = stage};
+    if (takes_pairs(w, (double)w->m.n)) return form_factors_pairs(&w->m, w->order, &pairs, &w->f, error);
+    return w->options->resolution > 0 ? form_factors_hemicube(&w->m, w->order, &cubes, &w->f, error)
+                                      : form_factors_trace(&w->m, w->order, &rays, &w->f, error);
 }
 
 /* --- operator --------------------------------------------------------------------------------------------
  */
 
-/* The 2-norm of the sampling error of S, about: independent rays, the two estimates of a pair merged. */
+/* The 2-norm of the sampling error of S, about: independent rays, the two estimates of a pair merged. That of
+ * a hemicube is not known: it samples nothing. */
 static double noise_of(const work *w) {
     return w->f.rays > 0 ? sqrt(2 / (double)w->f.rays) : 0;
 }
@@ -240,7 +265,9 @@ static void log_figures(terminal *t, const char *name, const error_group *g, boo
                  g->operator_indirect.mean);
 }
 
-/* Two more samples of F, their mean, and what they say of the operator. */
+/* Two more samples of F, their mean, and what they say of the operator. They are of rays even beside a
+ * hemicube, which would only repeat itself; beside pairs, whose magnitudes are no sample, they are of pairs:
+ * the noise of rays would hide what is to be measured. */
 static lam_status judge(work *w, lam_error *error) {
     lam_status status = LAM_OK;
     static const char *const stages[2] = {"form factors for the judge, 1 of 2",
@@ -253,7 +280,12 @@ static lam_status judge(work *w, lam_error *error) {
         /* Independent of what was factorized: kept form factors may have any seed. */
         do how.seed = precompute_seed(w->options->seed, ++purpose);
         while (how.seed == w->f.seed);
-        TRY(form_factors_trace(&w->m, w->order, &how, &half[h], error));
+        const pair_options pairs = {
+            .accuracy = w->f.accuracy, .seed = how.seed, .progress = &w->progress, .stage = stages[h]};
+        if (w->f.accuracy > 0)
+            TRY(form_factors_pairs(&w->m, w->order, &pairs, &half[h], error));
+        else
+            TRY(form_factors_trace(&w->m, w->order, &how, &half[h], error));
     }
     TRY(form_factors_mean(&half[0], &half[1], &mean, error));
     const judge_input input = {.problem = &problem,
@@ -298,8 +330,15 @@ static lam_status describe_operator(const work *w, store *s, lam_error *error) {
         TRY(store_set_number(s, "/operator", "density", about.density, error));
     }
     /* What the form factors were made with, so that they can be made again where they are not kept. */
-    TRY(store_set_integer(s, "/operator", "rays", (int64_t)w->f.rays, error));
-    TRY(store_set_integer(s, "/operator", "ray_seed", (int64_t)w->f.seed, error));
+    if (w->f.accuracy > 0) {
+        TRY(store_set_number(s, "/operator", "accuracy", w->f.accuracy, error));
+        TRY(store_set_integer(s, "/operator", "ray_seed", (int64_t)w->f.seed, error));
+    } else if (w->f.resolution > 0) {
+        TRY(store_set_integer(s, "/operator", "resolution", (int64_t)w->f.resolution, error));
+    } else {
+        TRY(store_set_integer(s, "/operator", "rays", (int64_t)w->f.rays, error));
+        TRY(store_set_integer(s, "/operator", "ray_seed", (int64_t)w->f.seed, error));
+    }
 done:
     return status;
 }

@@ -19,6 +19,8 @@ typedef struct precompute_options {
     bool two_sided;
     double reflectance; /* negative: the file's own */
     uint64_t rays, probes;
+    size_t resolution; /* of hemicubes in place of rays; 0: rays, or what a store holds */
+    double accuracy;   /* of pairs taken one by one in place of rays, where n allows; 0: rays */
     const char *quality;
     bool keep_form_factors;
     const char *method, *factorizer;

@@ -1,9 +1,12 @@
 #include "solver/formfactor/formfactor.h"
 
+#include "solver/formfactor/hemicube.h"
+#include "solver/formfactor/pairs.h"
 #include "solver/formfactor/rays.h"
 #include "solver/formfactor/repair.h"
 #include "solver/formfactor/visibility.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,31 +43,112 @@ static double area_mean(const mesh *m, const double *x) {
     return total > 0 ? sum / total : 0;
 }
 
+/* What a sample begins with. */
+static lam_status form_factors_begin(form_factors *f, const char *method, size_t n, lam_error *error) {
+    snprintf(f->method, sizeof f->method, "%s", method);
+    f->leaving = memory_allocate(n, sizeof *f->leaving, "form factors", error);
+    f->absorbed = memory_allocate(n, sizeof *f->absorbed, "form factors", error);
+    return f->leaving == NULL || f->absorbed == NULL ? LAM_ERR_MEMORY : LAM_OK;
+}
+
+/* From one-sided rows, which are freed, whose entries are F_ij times rays, to F. */
+static lam_status form_factors_finish(form_factors *f, const mesh *m, csr *rows, size_t rays,
+                                      lam_error *error) {
+    lam_status status = LAM_OK;
+    double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
+    if (outside == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(repair_merge(rows, rays, m->area, &f->F, error));
+    csr_free(rows);
+    f->leaving_share = area_mean(m, f->leaving);
+    f->absorbed_share = area_mean(m, f->absorbed);
+    f->closed = f->leaving_share < crack_share;
+    for (size_t i = 0; i < m->n; i++)
+        outside[i] = (f->closed ? 0 : f->leaving[i]) + (f->absorbed_share < crack_share ? 0 : f->absorbed[i]);
+    TRY(repair_close(&f->F, m->area, outside, f, error));
+done:
+    free(outside);
+    return status;
+}
+
 lam_status form_factors_trace(const mesh *m, const uint32_t *order, const ray_options *options,
                               form_factors *out, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = m->n;
     visibility *v = NULL;
     csr counts = {0};
     form_factors f = {.rays = options->rays, .seed = options->seed};
-    double *outside = NULL;
     if (options->rays == 0 || options->rays > 1u << 24)
         FAIL(error, LAM_ERR_ARGUMENT, "--rays %zu: must be from 1 to %u", options->rays, 1u << 24);
-    snprintf(f.method, sizeof f.method, "rays");
-    f.leaving = memory_allocate(n, sizeof *f.leaving, "form factors", error);
-    f.absorbed = memory_allocate(n, sizeof *f.absorbed, "form factors", error);
-    outside = memory_allocate(n, sizeof *outside, "form factors", error);
-    if (f.leaving == NULL || f.absorbed == NULL || outside == NULL) TRY(LAM_ERR_MEMORY);
-
+    TRY(form_factors_begin(&f, "rays", m->n, error));
     TRY(visibility_create(m, &v, error));
     TRY(rays_count(m, v, order, options, &counts, f.leaving, f.absorbed, error));
-    TRY(repair_merge(&counts, options->rays, m->area, &f.F, error));
+    TRY(form_factors_finish(&f, m, &counts, options->rays, error));
+    *out = f;
+    f = (form_factors){0};
+done:
+    visibility_destroy(v);
     csr_free(&counts);
+    form_factors_free(&f);
+    return status;
+}
+
+lam_status form_factors_hemicube(const mesh *m, const uint32_t *order, const hemicube_options *options,
+                                 form_factors *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    visibility *v = NULL;
+    hemicube h = {0};
+    csr rows = {0};
+    form_factors f = {.resolution = options->resolution};
+    TRY(hemicube_create(options->resolution, &h, error));
+    TRY(form_factors_begin(&f, "hemicube", m->n, error));
+    TRY(visibility_create(m, &v, error));
+    TRY(hemicube_trace(&h, m, v, order, options, &rows, f.leaving, f.absorbed, error));
+    /* The weights are form factors already, as if one ray had been cast. */
+    TRY(form_factors_finish(&f, m, &rows, 1, error));
+    *out = f;
+    f = (form_factors){0};
+done:
+    visibility_destroy(v);
+    hemicube_free(&h);
+    csr_free(&rows);
+    form_factors_free(&f);
+    return status;
+}
+
+/* Rays that only ask whether a scene is closed and whether its faces are turned. */
+enum { FEW_RAYS = 256 };
+
+lam_status form_factors_pairs(const mesh *m, const uint32_t *order, const pair_options *options,
+                              form_factors *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    visibility *v = NULL;
+    csr counts = {0};
+    double *outside = NULL;
+    pairs_report report;
+    form_factors f = {.accuracy = options->accuracy, .seed = options->seed};
+    const ray_options few = {.rays = FEW_RAYS, .seed = options->seed, .stage = options->stage};
+    const pairs_options how = {.tolerance = 1e-6,
+                               .accuracy = options->accuracy,
+                               .segments = 16,
+                               .seed = options->seed,
+                               .progress = options->progress,
+                               .stage = options->stage};
+    if (m->n > PAIRS_ELEMENTS_MOST)
+        FAIL(error, LAM_ERR_ARGUMENT, "%zu elements have too many pairs; at most %d", m->n,
+             PAIRS_ELEMENTS_MOST);
+    TRY(form_factors_begin(&f, "pairs", m->n, error));
+    outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
+    if (outside == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(visibility_create(m, &v, error));
+    TRY(rays_count(m, v, order, &few, &counts, f.leaving, f.absorbed, error));
+    TRY(pairs_exchange(m, v, &how, &f.F, &report, error));
     f.leaving_share = area_mean(m, f.leaving);
     f.absorbed_share = area_mean(m, f.absorbed);
     f.closed = f.leaving_share < crack_share;
-    for (size_t i = 0; i < n; i++)
-        outside[i] = (f.closed ? 0 : f.leaving[i]) + (f.absorbed_share < crack_share ? 0 : f.absorbed[i]);
+    for (size_t i = 0; i < m->n && !(f.closed && f.absorbed_share < crack_share); i++) {
+        double seen = 0;
+        for (uint64_t p = f.F.indptr[i]; p < f.F.indptr[i + 1]; p++) seen += (double)f.F.data[p];
+        outside[i] = fmax(0, 1 - seen / m->area[i]);
+    }
     TRY(repair_close(&f.F, m->area, outside, &f, error));
     *out = f;
     f = (form_factors){0};

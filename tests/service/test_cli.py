@@ -120,6 +120,12 @@ class Usage(Case):
                 ("--rays 1e3: not a whole number", "precompute a.obj -o b.h5 --rays 1e3"),
                 ("too large", "precompute a.obj -o b.h5 --seed 18446744073709551616"),
                 ("--levels 21: must be at least 0 and at most 20", "precompute a.obj -o b.h5 --levels 21"),
+                ("--resolution 2: must be at least 4 and at most 4096", "precompute a.obj -o b.h5 --resolution 2"),
+                ("--resolution 4098: must be at least 4", "precompute a.obj -o b.h5 --resolution 4098"),
+                ("--resolution 33: must be even",
+                 "precompute a.obj -o b.h5 --form-factors hemicube --resolution 33"),
+                ("--form-factors spheres: must be one of: rays hemicube",
+                 "precompute a.obj -o b.h5 --form-factors spheres"),
                 ("--rank 0: must be at least 1", "precompute a.obj -o b.h5 --rank 0"),
                 ("--memory 5X: not a size", "precompute a.obj -o b.h5 --memory 5X"),
                 ("--memory -5G: not a size", "precompute a.obj -o b.h5 --memory -5G"),
@@ -158,7 +164,7 @@ class Usage(Case):
                      "generate maze -o a.obj", "generate canopy -o a.obj", "solve a.h5 --sky s.npy",
                      "solve a.h5 --tolerance 1e-4", "solve a.h5 -o b.glb",
                      *("precompute a.obj -o b.h5 " + option for option in (
-                         "--form-factors hemicube", "--sky tregenza", "--sky reinhart:2", "--sky grid:4x8",
+                         "--sky tregenza", "--sky reinhart:2", "--sky grid:4x8",
                          "--ground-albedo .2", "--keep-form-factors=compressed", "--method 2msc", "--method sparse",
                          "--method emitters", "--method hierarchical", "--factorizer svd", "--factorizer rsi",
                          "--factorizer sgrsvd", "--keep-factors", "--emitters sky", "--positions p.json",
@@ -516,6 +522,73 @@ class Stores(Case):
                 self.assertEqual(one.attrs["name"], two.attrs["name"])
         self.refused(2, "--subdivide", "precompute", self.store, "--subdivide", 1, "-o", self.path("b.h5"))
         self.failed("holds no /form_factors", "precompute", self.path("exact.h5"), "-o", self.path("b.h5"))
+
+    def test_pairs(self):
+        kept, bare, again = self.path("kept.h5"), self.path("bare.h5"), self.path("again.h5")
+        common = ("--quality", "high", "--method", "exact", "--probes", 8)
+        done = self.must("precompute", self.box, "-o", kept, *common, "--keep-form-factors")
+        self.assertIn("pair by pair to 7e-06: 0.00 % leave the scene (closed)", done.stderr)
+        self.must("precompute", self.box, "-o", bare, *common)
+        self.must("precompute", kept, "-o", again, *common)
+        with h5py.File(kept) as file:
+            attributes = dict(file["form_factors"].attrs)
+            self.assertEqual((attributes["method"], attributes["rays"]), (b"pairs", 0))
+            self.assertEqual(file["operator"].attrs["accuracy"], attributes["accuracy"])
+            numpy.testing.assert_allclose(file["mesh/row_sums"][:], 1, atol=1e-6)
+            # An empty box: nothing is hidden, so nothing is sampled.
+            self.assertLess(attributes["repair_max"], 1e-5)
+            self.assertLess(file["error/single"].attrs["total_indirect_max"], 1e-4)
+        for store in (kept, bare, again):
+            self.must("verify", store, "--probes", 4)
+        self.assertRegex(self.must("info", kept).stdout, r"(?m)^form factors +pairs$")
+        # Rays asked for by number are rays.
+        done = self.must("precompute", self.box, "-o", bare, *common, "--rays", 64)
+        self.assertIn("64 rays an element", done.stderr)
+        done = lambert("precompute", self.box, "-o", bare, *common, "--memory", "100K")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("--quality high need about", done.stderr)
+
+    def test_hemicube(self):
+        kept, bare, again = self.path("kept.h5"), self.path("bare.h5"), self.path("again.h5")
+        common = ("--form-factors", "hemicube", "--resolution", 48, "--method", "low-rank", "--epsilon", ".02",
+                  "--probes", 8)
+        done = self.must("precompute", self.box, "-o", kept, *common, "--rays", 64, "--quality", "high",
+                         "--keep-form-factors")
+        self.assertIn("hemicubes of 48 pixels: 0.00 % leave the scene (closed)", done.stderr)
+        self.assertIn("hemicube does not use --rays, --quality", done.stderr)
+        self.assertNotIn("noise of 0 rays", done.stderr)
+        self.assertNotIn("below the sampling noise", done.stderr)
+        with h5py.File(kept) as file:
+            attributes = dict(file["form_factors"].attrs)
+            self.assertEqual((attributes["method"], attributes["resolution"], attributes["rays"]),
+                             (b"hemicube", 48, 0))
+            self.assertLess(attributes["reciprocity_error"], 1e-6)
+            numpy.testing.assert_allclose(file["mesh/row_sums"][:], 1, atol=1e-6)
+            self.assertEqual(file["operator"].attrs["resolution"], 48)
+            # Judged by rays: a hemicube that judged itself would find no difference and no noise.
+            single = file["error/single"].attrs
+            self.assertGreater(single["total_indirect_mean"], 1.5 * single["operator_indirect_mean"])
+            self.assertGreater(single["reference_noise"], 1e-3)
+        self.assertRegex(self.must("info", kept).stdout, r"(?m)^form factors +hemicube\nresolution +48$")
+        about = json.loads(self.must("info", kept, "--json").stdout)["provenance"]["form_factors"]
+        self.assertEqual((about["method"], about["resolution"]), ("hemicube", 48))
+
+        # Kept or not, a later run and verify know what the operator was built from.
+        self.must("precompute", self.box, "-o", bare, *common)
+        done = self.must("precompute", kept, "-o", again, *common, "--keep-form-factors")
+        self.assertIn("does not use --form-factors, --resolution", done.stderr)
+        for store in (bare, again):
+            with h5py.File(kept) as one, h5py.File(store) as two:
+                for name in one["operator"]:
+                    numpy.testing.assert_array_equal(one["operator"][name][:], two["operator"][name][:])
+                self.assertEqual(two["operator"].attrs["resolution"], 48)
+            self.must("verify", store, self.box, "--probes", 6)
+        with h5py.File(again) as file:
+            self.assertEqual((file["form_factors"].attrs["method"], file["form_factors"].attrs["resolution"]),
+                             (b"hemicube", 48))
+
+        done = self.must("precompute", self.box, "-o", again, "--resolution", 32, "--rays", 64, "--probes", 0)
+        self.assertIn("rays does not use --resolution", done.stderr)
 
     def test_judged_by_another_sample_whatever_the_seeds(self):
         # With the F of seed s kept, another seed must not make the judge draw s again: then total = operator.

@@ -1,0 +1,41 @@
+/* Rows of form factors that threads make one element at a time, each into a pool of its own, and that are put
+ * in order at the end. Knows nothing of how an element looks around. */
+#ifndef LAMBERT_FORMFACTOR_ROW_POOL_H
+#define LAMBERT_FORMFACTOR_ROW_POOL_H
+
+#include "solver/operator/csr.h"
+#include "solver/progress.h"
+
+/* What one thread works with: the sums of the element it is at, and the rows it has finished. */
+typedef struct row_pool {
+    double *sums;      /* [n], all zero between elements */
+    uint64_t *touched; /* bit set over elements: where sums were added to */
+    uint32_t *indices; /* one row after the other */
+    float *data;
+    size_t used, capacity;
+} row_pool;
+
+/* The element at hand sees this much more of another one. */
+static inline void row_pool_add(row_pool *pool, uint32_t seen, double weight) {
+    pool->sums[seen] += weight;
+    pool->touched[seen >> 6] |= 1ull << (seen & 63);
+}
+
+/* How one row is made: adds all that an element sees to the pool; leaving and absorbed are the shares that
+ * met nothing or a back face. Called from many threads at once; must depend on the element alone. */
+typedef struct row_maker {
+    void (*make)(const void *context, size_t element, row_pool *pool, double *leaving, double *absorbed);
+    const void *context;
+    size_t rays;         /* of one element */
+    const char *cheaper; /* what would need less memory: "fewer --rays" */
+    const progress *progress;
+    const char *stage;
+} row_maker;
+
+/* Makes the rows of all n elements; the same for any number of threads. order is [n], the sequence in which
+ * elements are worked on; leaving and absorbed are [n]. The caller frees rows with csr_free.
+ * Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+lam_status rows_make(const row_maker *maker, size_t n, const uint32_t *order, csr *rows, double *leaving,
+                     double *absorbed, lam_error *error);
+
+#endif
