@@ -5,7 +5,8 @@
 #include "server/scene.h"
 #include "store/store.h"
 
-/* *text is what the store says of itself under the name it was loaded by, on one line; the caller frees it. */
+/* *text is what the store says of itself under the name it was loaded by, on one line; the caller frees it.
+ */
 lam_status scene_describe(store *s, const scene *loaded, char **text, lam_error *error);
 
 #endif
