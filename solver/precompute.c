@@ -181,6 +181,14 @@ static void log_form_factors(work *w) {
                  "%.2g on average, at most %.2g",
                  how, 100 * f->leaving_share, f->closed ? " (closed)" : "", 100 * f->absorbed_share,
                  f->repair_mean, f->repair_max);
+    if (f->pairs_facing > 0) {
+        const double all = .5 * (double)w->m.n * (double)(w->m.n - 1), facing = (double)f->pairs_facing;
+        terminal_log(
+            w->t,
+            "of all pairs %.1f %% face away; of the others %.1f %% are plainly open, %.1f %% plainly hidden",
+            100 * (1 - facing / all), 100 * (double)f->pairs_open / facing,
+            100 * (double)f->pairs_hidden / facing);
+    }
     if (f->absorbed_share > .01 && !w->m.two_sided)
         terminal_warn(w->t,
                       "%.1f %% of the light meets back faces and is lost there: turn the faces, or give "

@@ -141,6 +141,9 @@ lam_status form_factors_pairs(const mesh *m, const uint32_t *order, const pair_o
     TRY(visibility_create(m, &v, error));
     TRY(rays_count(m, v, order, &few, &counts, f.leaving, f.absorbed, error));
     TRY(pairs_exchange(m, v, &how, &f.F, &report, error));
+    f.pairs_facing = report.facing;
+    f.pairs_open = report.open;
+    f.pairs_hidden = report.hidden;
     f.leaving_share = area_mean(m, f.leaving);
     f.absorbed_share = area_mean(m, f.absorbed);
     f.closed = f.leaving_share < crack_share;

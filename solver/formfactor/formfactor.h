@@ -6,17 +6,18 @@
 #include "solver/scene/mesh.h"
 
 typedef struct form_factors {
-    csr F;                /* rows F[i][.], mesh order */
-    double *row_sums;     /* [n], of F after repair, <= 1 */
-    double *leaving;      /* [n], share of an element's rays that left the scene */
-    double *absorbed;     /* [n], share that hit a back face */
-    char method[16];      /* "rays", "hemicube", "pairs" */
-    size_t rays;          /* per element; 0 where magnitudes are not counted by rays */
-    uint64_t seed;        /* of the rays */
-    size_t resolution;    /* of a hemicube: pixels along its top; else 0 */
-    double accuracy;      /* of pairs: of a factor that is partly hidden; else 0 */
-    bool closed;          /* nothing leaves but through cracks between elements */
-    double leaving_share; /* area-weighted means */
+    csr F;             /* rows F[i][.], mesh order */
+    double *row_sums;  /* [n], of F after repair, <= 1 */
+    double *leaving;   /* [n], share of an element's rays that left the scene */
+    double *absorbed;  /* [n], share that hit a back face */
+    char method[16];   /* "rays", "hemicube", "pairs" */
+    size_t rays;       /* per element; 0 where magnitudes are not counted by rays */
+    uint64_t seed;     /* of the rays */
+    size_t resolution; /* of a hemicube: pixels along its top; else 0 */
+    double accuracy;   /* of pairs: of a factor that is partly hidden; else 0 */
+    size_t pairs_facing, pairs_open, pairs_hidden; /* of pairs, when just made: plainly one or the other */
+    bool closed;                                   /* nothing leaves but through cracks between elements */
+    double leaving_share;                          /* area-weighted means */
     double absorbed_share;
     double closure_error;           /* largest |row sum - its target| after repair */
     double reciprocity_error;       /* largest |A_i F_ij - A_j F_ji| / max of both */

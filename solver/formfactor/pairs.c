@@ -235,7 +235,9 @@ static void refine_row(pairs_run *run, size_t i, pairs_report *row) {
                                      .segments_per_area =
                                          (double)segments_for(run, factor_of(run, i, j, g)) / g};
             row->mixed++;
-            run->exchange[at] = (float)seen_exchange(run, &pair, &run->polygons[i], &run->polygons[j], 0, 0);
+            /* The pieces sum to the whole within the tolerance; nothing between may raise it. */
+            run->exchange[at] =
+                (float)fmin(g, seen_exchange(run, &pair, &run->polygons[i], &run->polygons[j], 0, 0));
         } else if (state == OPEN) {
             row->open++;
         } else {
