@@ -68,6 +68,90 @@ START_TEST(occluded_plates_are_right) {
 }
 END_TEST
 
+/* A floor and a wall that share an edge, and a partition across both: what is left is each half of the floor
+ * with its half of the wall, which mathematics knows. The kernel is steep along the edge. */
+START_TEST(touching_elements_are_right) {
+    const box_cell floor = {.axis = 2, .level = 0, .from = {0, 0, 0}, .to = {1, 1, 0}},
+                   side = {.axis = 0, .level = 0, .from = {0, 0, 0}, .to = {0, 1, 1}},
+                   partition = {.axis = 1, .level = .5, .from = {0, .5, 0}, .to = {1, .5, 1}},
+                   half_floor = {.axis = 2, .level = 0, .from = {0, 0, 0}, .to = {1, .5, 0}},
+                   half_side = {.axis = 0, .level = 0, .from = {0, 0, 0}, .to = {0, .5, 1}};
+    mesh m = {0}, half = {0};
+    mesh_add_cell(&m, &floor, true);
+    mesh_add_cell(&m, &side, true);
+    mesh_add_cell(&m, &partition, true);
+    mesh_add_cell(&m, &partition, false);
+    mesh_finish(&m, .5f);
+    mesh_add_cell(&half, &half_floor, true);
+    mesh_add_cell(&half, &half_side, true);
+    mesh_finish(&half, .5f);
+    csr of_half = exchange(&half, 1e-4, 1, NULL);
+    const double exact = 2 * entry(&of_half, 0, 1), accuracy = 7e-5;
+    double square = 0;
+    for (uint64_t seed = 1; seed <= 8; seed++) {
+        csr G = exchange(&m, accuracy, seed, NULL);
+        square += pow(entry(&G, 0, 1) - exact, 2) / 8;
+        csr_free(&G);
+    }
+    /* accuracy is the standard error that is stated. */
+    ck_assert_double_le(sqrt(square), accuracy);
+    csr_free(&of_half);
+    mesh_free(&m);
+    mesh_free(&half);
+}
+END_TEST
+
+/* Two plates of many elements and an occluder between. With shared, cells of a plate share their corners,
+ * which is what makes them neighbours. */
+static mesh divided_plates(bool shared) {
+    enum { DIVISIONS = 6 };
+    const double w = 1. / DIVISIONS;
+    mesh m = {0};
+    for (int side = 0; side < 2; side++)
+        for (int x = 0; x < DIVISIONS; x++)
+            for (int y = 0; y < DIVISIONS; y++) {
+                const box_cell cell = {.axis = 2,
+                                       .level = side,
+                                       .from = {x * w, y * w, side},
+                                       .to = {(x + 1) * w, (y + 1) * w, side}};
+                mesh_add_cell(&m, &cell, side == 0);
+            }
+    for (size_t e = 0; shared && e < m.n; e++)
+        for (int c = 0; c < 4; c++)
+            for (uint32_t v = 0; v < m.elements[e][c]; v++) {
+                double off = 0;
+                for (int d = 0; d < 3; d++) off += fabs(m.vertices[v][d] - m.vertices[m.elements[e][c]][d]);
+                if (off < 1e-12) m.elements[e][c] = v;
+            }
+    const box_cell occluder = {.axis = 2, .level = .5, .from = {.25, .25, .5}, .to = {.75, .75, .5}};
+    mesh_add_cell(&m, &occluder, true);
+    mesh_add_cell(&m, &occluder, false);
+    mesh_finish(&m, .5f);
+    return m;
+}
+
+/* The pairs sum to the factor of the whole plates, and pairs beside a border are looked at again where
+ * elements know their neighbours. */
+START_TEST(borders_are_found) {
+    size_t mixed[2];
+    for (int shared = 0; shared < 2; shared++) {
+        mesh m = divided_plates(shared);
+        const size_t plate = (m.n - 2) / 2;
+        pairs_report report;
+        csr G = exchange(&m, 7e-5, 1, &report);
+        double F = 0;
+        for (size_t i = 0; i < plate; i++)
+            for (size_t j = plate; j < 2 * plate; j++) F += entry(&G, i, j);
+        /* The same promise as for the plates as one pair. */
+        ck_assert_double_eq_tol(F, plates_cases[3].F, 2e-3 * plates_cases[3].F);
+        mixed[shared] = report.mixed;
+        csr_free(&G);
+        mesh_free(&m);
+    }
+    ck_assert_uint_gt(mixed[1], mixed[0]);
+}
+END_TEST
+
 /* A room with a plate in it: whatever a seed and the threads are, the factors are symmetric, never more than
  * without the plate, and the same for any number of threads. */
 START_TEST(an_occluder_never_raises_a_factor) {
@@ -116,6 +200,8 @@ int main(void) {
     tcase_set_timeout(cases, 300);
     tcase_add_test(cases, closed_room_is_exact);
     tcase_add_loop_test(cases, occluded_plates_are_right, 0, sizeof plates_places / sizeof *plates_places);
+    tcase_add_test(cases, touching_elements_are_right);
+    tcase_add_test(cases, borders_are_found);
     tcase_add_test(cases, an_occluder_never_raises_a_factor);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
