@@ -167,6 +167,36 @@ START_TEST(halves_sum_to_the_whole) {
 }
 END_TEST
 
+/* The quarters fill the polygon, and the areas that its points stand for sum to its own: by the midpoint
+ * rule, which is exact for areas linear in u and w, as those of a bilinear quad are. */
+START_TEST(pieces_and_points_fill_the_polygon) {
+    const polygon shapes[2] = {
+        make(4, (const double[4][3]){{0, 0, 0}, {1, .1, 0}, {1.2, 1.1, 0}, {-.1, .6, 0}}),
+        make(3, (const double[3][3]){{0, 0, 0}, {2, .1, 0}, {.3, 1.1, 0}})};
+    enum { GRID = 8 };
+    for (int s = 0; s < 2; s++) {
+        const double area = polygon_area(&shapes[s]);
+        polygon quarters[4];
+        double of_quarters = 0, of_points = 0;
+        polygon_quarter(&shapes[s], quarters);
+        for (int q = 0; q < 4; q++) {
+            polygon turned = quarters[q];
+            polygon_measure(&turned);
+            ck_assert_double_eq_tol(turned.normal[2], 1, 1e-12);
+            of_quarters += polygon_area(&quarters[q]);
+        }
+        for (int i = 0; i < GRID; i++)
+            for (int j = 0; j < GRID; j++) {
+                double point[3];
+                of_points +=
+                    polygon_point(&shapes[s], (i + .5) / GRID, (j + .5) / GRID, point) / (GRID * GRID);
+            }
+        ck_assert_double_eq_tol(of_quarters, area, 1e-12);
+        ck_assert_double_eq_tol(of_points, area, 1e-12);
+    }
+}
+END_TEST
+
 /* F does not depend on the unit of length nor on the place. */
 START_TEST(scale_and_place) {
     const double scales[] = {1e-3, 1, 1e5}, places[] = {0, 1e6};
@@ -191,6 +221,7 @@ int main(void) {
     tcase_add_test(cases, room_and_small_elements);
     tcase_add_test(cases, what_is_behind_is_not_seen);
     tcase_add_loop_test(cases, halves_sum_to_the_whole, 0, 2);
+    tcase_add_test(cases, pieces_and_points_fill_the_polygon);
     tcase_add_test(cases, scale_and_place);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
