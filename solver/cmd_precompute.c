@@ -1,5 +1,4 @@
 /* lambert precompute: turns a scene into a store. */
-#include "solver/formfactor/formfactor.h"
 #include "solver/options.h"
 #include "solver/output_file.h"
 #include "solver/precompute.h"
@@ -104,8 +103,8 @@ static const option_row rows[] = {
      .offset = FIELD(resolution),
      .value = "PIXELS",
      .doc = "Of a hemicube: pixels along its top, even (512)",
-     .low = HEMICUBE_LEAST,
-     .high = HEMICUBE_MOST},
+     .low = RECIPE_RESOLUTION_LEAST,
+     .high = RECIPE_RESOLUTION_MOST},
     {.name = "quality",
      .kind = OPTION_CHOICE,
      .offset = FIELD(quality),
@@ -333,14 +332,6 @@ static bool is_hemicube(const fields *f) {
     return strcmp(f->form_factors, "hemicube") == 0;
 }
 
-/* Standard error of a partly hidden form factor at --quality high: a third of the 2e-4 that a factor of .1
- * may be off by. */
-static const double high_accuracy = 7e-6;
-
-static bool takes_pairs(const fields *f, bool from_store) {
-    return !from_store && !is_hemicube(f) && f->rays == OPTION_AUTO && strcmp(f->quality, "high") == 0;
-}
-
 /* Whether an option about form factors had no use. Those of a store leave only the judge to cast rays; the
  * judge of a hemicube chooses its own number of them. */
 static bool unused_by_form_factors(const char *name, const fields *f, bool from_store) {
@@ -428,11 +419,13 @@ int cmd_precompute(int argc, char **argv) {
         .up = f.up != NULL ? f.up[0] : 0,
         .two_sided = f.two_sided,
         .reflectance = f.reflectance,
-        .rays = f.rays,
-        .resolution = is_hemicube(&f) && !from_store ? f.resolution : 0,
-        .accuracy = takes_pairs(&f, from_store) ? high_accuracy : 0,
+        /* Beside hemicubes only the judge casts rays, and --quality is not about the judge. */
+        .form_factors = {.quality = is_hemicube(&f) ? "normal" : f.quality,
+                         .epsilon = f.epsilon,
+                         .rays = is_hemicube(&f) && !from_store ? CHOICE_AUTO : f.rays,
+                         .resolution = is_hemicube(&f) && !from_store ? f.resolution : 0,
+                         .seed = f.seed},
         .probes = f.probes,
-        .quality = f.quality,
         .keep_form_factors = f.keep_form_factors != NULL,
         .method = f.method,
         .factorizer = f.factorizer,
@@ -441,7 +434,6 @@ int cmd_precompute(int argc, char **argv) {
         .levels = f.levels,
         .rank = f.rank,
         .memory = f.memory,
-        .seed = f.seed,
     };
     lam_status status = output_file_check(f.output, &error);
     if (status == LAM_OK) status = precompute_run(&options, &term, &built, &error);

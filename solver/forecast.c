@@ -12,15 +12,27 @@ static double sample_bytes(double n, double rays) {
     return n * fmin(n, 2 * rays) * 8;
 }
 
-double forecast_bytes(const forecast *f) {
-    const double n = (double)f->n, n_channels = (double)f->n_channels, rays = (double)f->rays;
+/* Bytes of one merged sample. */
+static double recipe_bytes(double n, const recipe *r) {
+    switch (r->method) {
+    case RECIPE_PAIRS:
+        return sample_bytes(n, n);
     /* A hemicube is a ray for each of its pixels. */
-    const double pixels = 3 * (double)f->resolution * (double)f->resolution;
+    case RECIPE_HEMICUBE:
+        return sample_bytes(n, 3 * (double)r->resolution * (double)r->resolution);
+    case RECIPE_RAYS:
+        break;
+    }
+    return sample_bytes(n, (double)r->rays);
+}
+
+double forecast_bytes(const forecast *f) {
+    const double n = (double)f->n, n_channels = (double)f->n_channels;
     const double mesh = 400 * n;
-    const double sample = f->pairs ? sample_bytes(n, n) : sample_bytes(n, pixels > 0 ? pixels : rays);
+    const double sample = recipe_bytes(n, &f->recipe);
     /* While it is traced, a sample exists as counts, as rows, and as the merged rows; of pairs as magnitudes,
      * first looks and rows. */
-    const double trace = f->pairs ? sample + 2.5 * n * n : 2 * sample;
+    const double trace = f->recipe.method == RECIPE_PAIRS ? sample + 2.5 * n * n : 2 * sample;
     /* The inverse in double and the operator; else leaf blocks and both factors of two nodes. */
     const double rank = f->rank > 0 ? fmin((double)f->rank, n) : fmin(1024, n);
     const double build = f->exact ? n * n * (8 + 4 * n_channels) : 4 * n * (2 * fmin(1024, n) + 6 * rank);
@@ -29,8 +41,10 @@ double forecast_bytes(const forecast *f) {
     if (f->probes > 0) {
         /* Two more samples and their mean; emissions, answers and the vectors of the iteration per probe. */
         const double probes = (double)f->probes + 9;
-        const double reference = f->pairs ? sample : sample_bytes(n, rays);
-        const double references = 2 * reference + (f->pairs ? sample : sample_bytes(n, 2 * rays));
+        const double reference = recipe_bytes(n, &f->judge_recipe);
+        const bool dense = f->judge_recipe.method == RECIPE_PAIRS;
+        const double references =
+            2 * reference + (dense ? reference : sample_bytes(n, 2 * (double)f->judge_recipe.rays));
         const double judge = probes * n * (12 * n_channels + 72) + (n <= 8192 ? 8 * n * n : 0);
         peak = fmax(peak, sample + kept + fmax(references + judge, 4 * reference));
     }
@@ -45,28 +59,31 @@ static void format_bytes(double bytes, char text[32]) {
 }
 
 /* Halves what the rows are found with; false when that is little already. */
-static bool sample_less(forecast *f) {
-    const bool hemicubes = f->resolution > 0;
-    if (f->pairs) {
-        f->pairs = false;
-        return true;
+static bool sample_less(recipe *r) {
+    switch (r->method) {
+    case RECIPE_PAIRS:
+        *r = (recipe){.method = RECIPE_RAYS, .rays = RECIPE_RAYS_MOST};
+        break;
+    case RECIPE_HEMICUBE:
+        if (r->resolution / 2 < LOWEST_RESOLUTION) return false;
+        r->resolution = r->resolution / 4 * 2; /* even */
+        break;
+    case RECIPE_RAYS:
+        if (r->rays <= FEWEST_RAYS) return false;
+        r->rays /= 2;
+        break;
     }
-    if (hemicubes ? f->resolution / 2 < LOWEST_RESOLUTION : f->rays <= FEWEST_RAYS) return false;
-    if (hemicubes)
-        f->resolution = f->resolution / 4 * 2; /* even */
-    else
-        f->rays /= 2;
     return true;
 }
 
-/* "1024 rays" or "--resolution 512" */
-static void format_sampling(const forecast *f, char text[40]) {
-    if (f->pairs)
-        snprintf(text, 40, "--quality high");
-    else if (f->resolution > 0)
-        snprintf(text, 40, "--resolution %zu", f->resolution);
+/* "--rays 1024" or "--resolution 512" */
+static void format_recipe(const recipe *r, char text[40]) {
+    if (r->method == RECIPE_PAIRS)
+        snprintf(text, 40, "all pairs");
+    else if (r->method == RECIPE_HEMICUBE)
+        snprintf(text, 40, "--resolution %zu", r->resolution);
     else
-        snprintf(text, 40, "%zu rays", f->rays);
+        snprintf(text, 40, "--rays %zu", r->rays);
 }
 
 lam_status forecast_check(const forecast *f, double limit, lam_error *error) {
@@ -78,22 +95,24 @@ lam_status forecast_check(const forecast *f, double limit, lam_error *error) {
     format_bytes(limit, allows);
     const char *method = f->exact ? "--method low-rank" : "";
     forecast cheaper = *f;
+    bool less = false;
     cheaper.exact = false;
-    while (forecast_bytes(&cheaper) > limit && sample_less(&cheaper)) continue;
-    format_sampling(f, asked);
-    format_sampling(&cheaper, fits);
+    while (forecast_bytes(&cheaper) > limit && sample_less(&cheaper.recipe)) {
+        less = true;
+        cheaper.judge_recipe = recipe_of_judge(&cheaper.recipe, f->judge_recipe.rays, 0);
+    }
+    format_recipe(&f->recipe, asked);
+    format_recipe(&cheaper.recipe, fits);
     if (forecast_bytes(&cheaper) > limit) {
         /* Every term grows with n: halve until it fits. */
         while (cheaper.n > 1 && forecast_bytes(&cheaper) > limit) cheaper.n /= 2;
-        snprintf(advice, sizeof advice, "about %zu elements at %s, or --memory %s", cheaper.n, fits, needs);
-    } else if (cheaper.rays < f->rays || cheaper.pairs != f->pairs) {
-        snprintf(advice, sizeof advice, "%s%s--rays %zu", method, f->exact ? " " : "", cheaper.rays);
-    } else if (cheaper.resolution < f->resolution) {
+        snprintf(advice, sizeof advice, "about %zu elements with %s, or --memory %s", cheaper.n, fits, needs);
+    } else if (less) {
         snprintf(advice, sizeof advice, "%s%s%s", method, f->exact ? " " : "", fits);
     } else {
         snprintf(advice, sizeof advice, "%s", method);
     }
-    FAIL(error, LAM_ERR_MEMORY, "%zu elements at %s need about %s of memory, --memory allows %s; fits: %s",
+    FAIL(error, LAM_ERR_MEMORY, "%zu elements with %s need about %s of memory, --memory allows %s; fits: %s",
          f->n, asked, needs, allows, advice);
 done:
     return status;

@@ -2,18 +2,16 @@
 #ifndef LAMBERT_SOLVER_FORECAST_H
 #define LAMBERT_SOLVER_FORECAST_H
 
-#include "store/status.h"
+#include "solver/formfactor/recipe.h"
 
 #include <stdint.h>
 
 typedef struct forecast {
     size_t n, n_channels;
-    size_t rays;
-    size_t resolution; /* of hemicubes: rays are then those of the independent samples only; 0: none */
-    bool pairs;        /* found pair by pair, the independent samples too */
-    size_t probes;     /* 0: no independent samples */
-    bool exact;        /* the whole inverse is built */
-    size_t rank;       /* 0: not known yet */
+    recipe recipe, judge_recipe; /* of the form factors and of the judge's samples */
+    size_t probes;               /* 0: no independent samples */
+    bool exact;                  /* the whole inverse is built */
+    size_t rank;                 /* 0: not known yet */
 } forecast;
 
 /* Bytes at the peak; an upper bound for the form factors, an estimate for the rest. */

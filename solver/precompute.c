@@ -3,7 +3,6 @@
 #include "solver/build/judge.h"
 #include "solver/clock.h"
 #include "solver/forecast.h"
-#include "solver/formfactor/formfactor.h"
 #include "solver/scene/import.h"
 
 #include <math.h>
@@ -23,7 +22,8 @@ typedef struct work {
     mesh m;
     uint32_t *order;
     form_factors f;
-    size_t rays, probes;
+    recipe recipe; /* of f */
+    size_t probes;
     lam_operator *op;
     build_report built;
     error_report errors;
@@ -102,22 +102,28 @@ static double elements_after(const mesh *m, const precompute_options *o) {
     return fmax(n, (double)how->elements);
 }
 
-/* Whether the form factors of n elements are, or will be, found pair by pair. */
-static bool takes_pairs(const work *w, double n) {
-    if (w->options->from_store) return w->f.accuracy > 0;
-    return w->options->accuracy > 0 && n <= PAIRS_ELEMENTS_MOST;
+/* The recipe of the judge's samples: with --rays given, of as many also where a store's form factors had
+ * others. */
+static recipe judge_recipe(const work *w, uint64_t seed) {
+    const choice_request *asked = &w->options->form_factors;
+    const recipe *of = &w->recipe;
+    recipe r = recipe_of_judge(of, choice_rays(asked), seed);
+    if (w->options->from_store && r.method == RECIPE_RAYS && asked->rays != CHOICE_AUTO)
+        r.rays = (size_t)asked->rays;
+    return r;
 }
 
+/* Chooses the recipe for n elements and sees that it fits. */
 static lam_status check_memory(work *w, double n, lam_error *error) {
     const precompute_options *o = w->options;
     if (n > 4e9)
         return status_fail(error, LAM_ERR_MEMORY, "%s: %.3g elements, must be below 4e9; refine less",
                            o->input, n);
+    w->recipe = o->from_store ? w->f.recipe : choice_recipe(&o->form_factors, n);
     const forecast f = {.n = (size_t)n,
                         .n_channels = w->m.n_channels,
-                        .rays = w->rays,
-                        .resolution = o->from_store ? w->f.resolution : o->resolution,
-                        .pairs = takes_pairs(w, n),
+                        .recipe = w->recipe,
+                        .judge_recipe = judge_recipe(w, 0),
                         .probes = o->probes == PRECOMPUTE_AUTO ? PROBES_OF_LARGE : o->probes,
                         .exact = strcmp(o->method, "exact") == 0,
                         .rank = o->rank};
@@ -149,33 +155,10 @@ done:
 /* --- form factors ----------------------------------------------------------------------------------------
  */
 
-static double quality_share(const char *quality) {
-    if (strcmp(quality, "draft") == 0) return 1. / 2;
-    if (strcmp(quality, "high") == 0) return 1. / 8;
-    return 1. / 4;
-}
-
-static void choose_rays(work *w) {
-    const precompute_options *o = w->options;
-    /* Beside hemicubes only the judge casts rays, and --quality is not about the judge. */
-    const bool hemicubes = o->from_store ? w->f.resolution > 0 : o->resolution > 0;
-    if (o->rays != PRECOMPUTE_AUTO && o->resolution == 0)
-        w->rays = o->rays;
-    else if (o->from_store && w->f.rays > 0)
-        w->rays = w->f.rays;
-    else
-        w->rays = form_factors_auto_rays(o->epsilon, quality_share(hemicubes ? "normal" : o->quality));
-}
-
 static void log_form_factors(work *w) {
     const form_factors *f = &w->f;
     char how[64];
-    if (f->accuracy > 0)
-        snprintf(how, sizeof how, "pair by pair to %g", f->accuracy);
-    else if (f->resolution > 0)
-        snprintf(how, sizeof how, "hemicubes of %zu pixels", f->resolution);
-    else
-        snprintf(how, sizeof how, "%zu rays an element", f->rays);
+    recipe_describe(&f->recipe, how);
     terminal_log(w->t,
                  "%s: %.2f %% leave the scene%s, %.2f %% meet back faces; row sums repaired by "
                  "%.2g on average, at most %.2g",
@@ -197,26 +180,12 @@ static void log_form_factors(work *w) {
 }
 
 static lam_status trace(work *w, lam_error *error) {
-    const char *const stage = "form factors";
-    const hemicube_options cubes = {
-        .resolution = w->options->resolution, .progress = &w->progress, .stage = stage};
-    const ray_options rays = {
-        .rays = w->rays, .seed = w->options->seed, .progress = &w->progress, .stage = stage};
-    const pair_options pairs = {
-        .accuracy = w->options->accuracy, .seed = w->options->seed, .progress = &w->progress, .stage = stage};
-    if (takes_pairs(w, (double)w->m.n)) return form_factors_pairs(&w->m, w->order, &pairs, &w->f, error);
-    return w->options->resolution > 0 ? form_factors_hemicube(&w->m, w->order, &cubes, &w->f, error)
-                                      : form_factors_trace(&w->m, w->order, &rays, &w->f, error);
+    const form_factor_options how = {.recipe = w->recipe, .progress = &w->progress, .stage = "form factors"};
+    return form_factors_make(&w->m, w->order, &how, &w->f, error);
 }
 
 /* --- operator --------------------------------------------------------------------------------------------
  */
-
-/* The 2-norm of the sampling error of S, about: independent rays, the two estimates of a pair merged. That of
- * a hemicube is not known: it samples nothing. */
-static double noise_of(const work *w) {
-    return w->f.rays > 0 ? sqrt(2 / (double)w->f.rays) : 0;
-}
 
 static build_problem problem_of(const work *w) {
     return (build_problem){.n = w->m.n,
@@ -225,7 +194,7 @@ static build_problem problem_of(const work *w) {
                            .reflectance = w->m.reflectance,
                            .F = &w->f.F,
                            .order = w->order,
-                           .noise = noise_of(w)};
+                           .noise = recipe_noise(&w->f.recipe)};
 }
 
 static lam_status build(work *w, lam_error *error) {
@@ -242,7 +211,7 @@ static lam_status build(work *w, lam_error *error) {
                                .memory = (size_t)fmax(1, w->memory - held),
                                .progress = &w->progress};
     TRY(build_operator(&problem, &how, &w->op, &w->built, error));
-    const double noise = noise_of(w);
+    const double noise = recipe_noise(&w->f.recipe);
     const bool tried = w->built.factorizer != NULL || w->built.factorize_seconds > 0;
     if (w->built.factorizer != NULL) {
         terminal_log(w->t, "%-14s%8.2f s", "factorize", w->built.factorize_seconds);
@@ -254,7 +223,7 @@ static lam_status build(work *w, lam_error *error) {
             w->t,
             "--epsilon %g is below the sampling noise %.2g of %zu rays: what is stored beyond it is "
             "noise; --rays %zu would fit",
-            o->epsilon, noise, w->f.rays, form_factors_auto_rays(o->epsilon, quality_share(o->quality)));
+            o->epsilon, noise, w->f.recipe.rays, recipe_auto_rays(o->epsilon, 1. / 4));
     terminal_log(w->t, "%-14s%8.2f s", "invert", w->built.invert_seconds);
     terminal_log(w->t, "%s", w->built.reason);
 done:
@@ -273,27 +242,21 @@ static void log_figures(terminal *t, const char *name, const error_group *g, boo
                  g->operator_indirect.mean);
 }
 
-/* Two more samples of F, their mean, and what they say of the operator. They are of rays even beside a
- * hemicube, which would only repeat itself; beside pairs, whose magnitudes are no sample, they are of pairs:
- * the noise of rays would hide what is to be measured. */
+/* Two more samples of F, their mean, and what they say of the operator. */
 static lam_status judge(work *w, lam_error *error) {
     lam_status status = LAM_OK;
     static const char *const stages[2] = {"form factors for the judge, 1 of 2",
                                           "form factors for the judge, 2 of 2"};
-    form_factors half[2] = {{.rays = 0}, {.rays = 0}}, mean = {.rays = 0};
+    form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}}, mean = {.row_sums = NULL};
     const build_problem problem = problem_of(w);
-    uint64_t purpose = 0;
+    uint64_t purpose = 0, seed;
     for (int h = 0; h < 2; h++) {
-        ray_options how = {.rays = w->rays, .progress = &w->progress, .stage = stages[h]};
         /* Independent of what was factorized: kept form factors may have any seed. */
-        do how.seed = precompute_seed(w->options->seed, ++purpose);
-        while (how.seed == w->f.seed);
-        const pair_options pairs = {
-            .accuracy = w->f.accuracy, .seed = how.seed, .progress = &w->progress, .stage = stages[h]};
-        if (w->f.accuracy > 0)
-            TRY(form_factors_pairs(&w->m, w->order, &pairs, &half[h], error));
-        else
-            TRY(form_factors_trace(&w->m, w->order, &how, &half[h], error));
+        do seed = precompute_seed(w->options->form_factors.seed, ++purpose);
+        while (seed == w->f.recipe.seed);
+        const form_factor_options how = {
+            .recipe = judge_recipe(w, seed), .progress = &w->progress, .stage = stages[h]};
+        TRY(form_factors_make(&w->m, w->order, &how, &half[h], error));
     }
     TRY(form_factors_mean(&half[0], &half[1], &mean, error));
     const judge_input input = {.problem = &problem,
@@ -302,7 +265,7 @@ static lam_status judge(work *w, lam_error *error) {
                                .independent = &mean.F,
                                .halves = {&half[0].F, &half[1].F},
                                .probes = w->probes,
-                               .seed = precompute_seed(w->options->seed, 3),
+                               .seed = precompute_seed(w->options->form_factors.seed, 3),
                                .progress = &w->progress};
     TRY(judge_operator(w->op, &input, &w->errors, error));
     log_figures(w->t, "single", &w->errors.single, w->errors.has_total);
@@ -338,15 +301,7 @@ static lam_status describe_operator(const work *w, store *s, lam_error *error) {
         TRY(store_set_number(s, "/operator", "density", about.density, error));
     }
     /* What the form factors were made with, so that they can be made again where they are not kept. */
-    if (w->f.accuracy > 0) {
-        TRY(store_set_number(s, "/operator", "accuracy", w->f.accuracy, error));
-        TRY(store_set_integer(s, "/operator", "ray_seed", (int64_t)w->f.seed, error));
-    } else if (w->f.resolution > 0) {
-        TRY(store_set_integer(s, "/operator", "resolution", (int64_t)w->f.resolution, error));
-    } else {
-        TRY(store_set_integer(s, "/operator", "rays", (int64_t)w->f.rays, error));
-        TRY(store_set_integer(s, "/operator", "ray_seed", (int64_t)w->f.seed, error));
-    }
+    TRY(recipe_save(&w->f.recipe, &recipe_of_operator, s, error));
 done:
     return status;
 }
@@ -359,7 +314,7 @@ static lam_status save(work *w, lam_error *error) {
     TRY(store_set_text(s, "/", "name", w->m.name, error));
     TRY(store_set_text(s, "/", "tool", "lambert " LAMBERT_VERSION, error));
     TRY(store_set_text(s, "/", "command", o->command, error));
-    TRY(store_set_integer(s, "/", "seed", (int64_t)o->seed, error));
+    TRY(store_set_integer(s, "/", "seed", (int64_t)o->form_factors.seed, error));
     TRY(store_set_number(s, "/", "unit", w->m.unit, error));
     TRY(mesh_save(&w->m, w->f.row_sums, s, error));
     if (o->reflectance >= 0) TRY(store_set_number(s, "/mesh", "reflectance_given", o->reflectance, error));
@@ -389,7 +344,6 @@ lam_status precompute_run(const precompute_options *options, terminal *t, build_
 
     double started = clock_seconds();
     TRY(options->from_store ? load_store(&w, error) : load_scene(&w, error));
-    choose_rays(&w);
     log_stage(&w, "import", started);
     TRY(terminal_check(error));
 

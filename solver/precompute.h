@@ -3,10 +3,11 @@
 #define LAMBERT_SOLVER_PRECOMPUTE_H
 
 #include "solver/build/build.h"
+#include "solver/choice.h"
 #include "solver/scene/mesh.h"
 #include "solver/terminal.h"
 
-/* Where --rays auto and --probes auto are still open. */
+/* Where --levels auto and --probes auto are still open. */
 #define PRECOMPUTE_AUTO UINT64_MAX
 
 typedef struct precompute_options {
@@ -17,18 +18,15 @@ typedef struct precompute_options {
     double unit;
     char up; /* 0: by the file */
     bool two_sided;
-    double reflectance; /* negative: the file's own */
-    uint64_t rays, probes;
-    size_t resolution; /* of hemicubes in place of rays; 0: rays, or what a store holds */
-    double accuracy;   /* of pairs taken one by one in place of rays, where n allows; 0: rays */
-    const char *quality;
+    double reflectance;          /* negative: the file's own */
+    choice_request form_factors; /* from a store: of the judge only */
+    uint64_t probes;
     bool keep_form_factors;
     const char *method, *factorizer;
     double epsilon, alpha;
     uint64_t levels; /* PRECOMPUTE_AUTO */
     uint64_t rank;   /* 0: by epsilon */
     uint64_t memory; /* bytes; 0: 70 % of what is free */
-    uint64_t seed;
 } precompute_options;
 
 /* Does it all; on an error nothing is written. report says what was built. */

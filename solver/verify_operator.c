@@ -174,14 +174,6 @@ static void compare_figure(store *s, const char *group, const char *against, con
                   again->mean, mean, allowed);
 }
 
-/* What the form factors were made with, and what the judge's are to be made with. */
-typedef struct sampling {
-    double accuracy;   /* of pairs; 0: rays or hemicubes */
-    size_t resolution; /* of hemicubes; 0: rays */
-    size_t rays;       /* beside hemicubes: the judge's only */
-    uint64_t seed;
-} sampling;
-
 /* A hemicube's judge takes as many rays as precompute does at defaults for the recorded epsilon: with other
  * options it may have taken others, and compare_figure allows for the noise that goes with the number. */
 static size_t judge_rays(const examination *e) {
@@ -189,77 +181,31 @@ static size_t judge_rays(const examination *e) {
     if (store_has_attribute(e->s, "/operator", "epsilon") &&
         store_get_number(e->s, "/operator", "epsilon", &epsilon, NULL) != LAM_OK)
         epsilon = .05;
-    return form_factors_auto_rays(epsilon, .25);
+    return recipe_auto_rays(epsilon, .25);
 }
 
-static lam_status read_sampling(examination *e, sampling *out, lam_error *error) {
+static lam_status read_recipe(examination *e, recipe *out, lam_error *error) {
+    if (e->f.F.indptr == NULL) return recipe_load(e->s, &recipe_of_operator, out, error);
+    *out = e->f.recipe;
+    return LAM_OK;
+}
+
+/* Purposes 1 to 3 belong to precompute: the samples of these are new to the operator and to its figures. */
+static recipe recipe_again(const examination *e, const recipe *of, uint64_t half) {
+    return recipe_of_judge(of, judge_rays(e), precompute_seed(of->seed, 11 + half));
+}
+
+static lam_status measure_again(examination *e, const recipe *from, error_report *out, lam_error *error) {
     lam_status status = LAM_OK;
-    int64_t recorded_rays = 0, recorded_seed = 0, resolution = 0;
-    if (e->f.F.indptr != NULL) {
-        *out = (sampling){
-            .accuracy = e->f.accuracy, .resolution = e->f.resolution, .rays = e->f.rays, .seed = e->f.seed};
-        if (e->f.resolution > 0) out->rays = judge_rays(e);
-        return LAM_OK;
-    }
-    if (store_has_attribute(e->s, "/operator", "accuracy")) {
-        double accuracy;
-        TRY(store_get_number(e->s, "/operator", "accuracy", &accuracy, error));
-        TRY(store_get_integer(e->s, "/operator", "ray_seed", &recorded_seed, error));
-        if (!(accuracy > 0 && accuracy <= 1))
-            FAIL(error, LAM_ERR_FORMAT,
-                 "%s: /operator attribute accuracy is %g, must be above 0 and at most 1", store_path(e->s),
-                 accuracy);
-        *out = (sampling){.accuracy = accuracy, .seed = (uint64_t)recorded_seed};
-        return LAM_OK;
-    }
-    if (store_has_attribute(e->s, "/operator", "resolution")) {
-        TRY(store_get_integer(e->s, "/operator", "resolution", &resolution, error));
-        if (resolution < HEMICUBE_LEAST || resolution > HEMICUBE_MOST)
-            FAIL(error, LAM_ERR_FORMAT, "%s: /operator attribute resolution is %lld, must be from %d to %d",
-                 store_path(e->s), (long long)resolution, HEMICUBE_LEAST, HEMICUBE_MOST);
-        *out = (sampling){.resolution = (size_t)resolution, .rays = judge_rays(e)};
-        return LAM_OK;
-    }
-    TRY(store_get_integer(e->s, "/operator", "rays", &recorded_rays, error));
-    TRY(store_get_integer(e->s, "/operator", "ray_seed", &recorded_seed, error));
-    if (recorded_rays < 1 || recorded_rays > 1 << 24)
-        FAIL(error, LAM_ERR_FORMAT, "%s: /operator attribute rays is %lld, must be from 1 to %d",
-             store_path(e->s), (long long)recorded_rays, 1 << 24);
-    *out = (sampling){.rays = (size_t)recorded_rays, .seed = (uint64_t)recorded_seed};
-done:
-    return status;
-}
-
-/* The form factors again that the operator was built from. */
-static lam_status trace_again(examination *e, const sampling *from, const uint32_t *order, lam_error *error) {
-    const char *const stage = "form factors";
-    const hemicube_options cubes = {.resolution = from->resolution, .progress = e->progress, .stage = stage};
-    const ray_options rays = {
-        .rays = from->rays, .seed = from->seed, .progress = e->progress, .stage = stage};
-    const pair_options pairs = {
-        .accuracy = from->accuracy, .seed = from->seed, .progress = e->progress, .stage = stage};
-    if (from->accuracy > 0) return form_factors_pairs(&e->m, order, &pairs, &e->f, error);
-    return from->resolution > 0 ? form_factors_hemicube(&e->m, order, &cubes, &e->f, error)
-                                : form_factors_trace(&e->m, order, &rays, &e->f, error);
-}
-
-static lam_status measure_again(examination *e, const sampling *from, error_report *out, lam_error *error) {
-    lam_status status = LAM_OK;
-    form_factors half[2] = {{.rays = 0}, {.rays = 0}}, mean = {.rays = 0};
+    form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}}, mean = {.row_sums = NULL};
+    form_factor_options how = {.recipe = *from, .progress = e->progress, .stage = "form factors"};
     uint32_t *order = memory_allocate(e->m.n, sizeof *order, "the order of the elements", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&e->m, order, error));
-    if (e->f.F.indptr == NULL) TRY(trace_again(e, from, order, error));
-    ray_options how = {.rays = from->rays, .progress = e->progress, .stage = "form factors"};
-    for (int h = 0; h < 2; h++) {
-        /* Purposes 1 to 3 belong to precompute: these samples are new to the operator and to its figures. */
-        how.seed = precompute_seed(from->seed, 11 + (uint64_t)h);
-        const pair_options pairs = {
-            .accuracy = from->accuracy, .seed = how.seed, .progress = e->progress, .stage = how.stage};
-        if (from->accuracy > 0)
-            TRY(form_factors_pairs(&e->m, order, &pairs, &half[h], error));
-        else
-            TRY(form_factors_trace(&e->m, order, &how, &half[h], error));
+    if (e->f.F.indptr == NULL) TRY(form_factors_make(&e->m, order, &how, &e->f, error));
+    for (uint64_t h = 0; h < 2; h++) {
+        how.recipe = recipe_again(e, from, h);
+        TRY(form_factors_make(&e->m, order, &how, &half[h], error));
     }
     TRY(form_factors_mean(&half[0], &half[1], &mean, error));
     const build_problem problem = {.n = e->m.n,
@@ -288,20 +234,19 @@ done:
 lam_status verify_error(examination *e, check *c, lam_error *error) {
     lam_status status = LAM_OK;
     error_report again = {.seconds = 0};
-    sampling from = {.rays = 0};
+    recipe from = {.rays = 0};
     if (skip(e, c)) return LAM_OK;
     if (e->probes == 0 || !store_has(e->s, "/error/single")) {
         check_say(c, VERDICT_SKIPPED, e->probes == 0 ? "not measured again (--probes 0)" : "none is stated");
         return LAM_OK;
     }
     if (e->probes > e->m.n) e->probes = e->m.n;
-    TRY(read_sampling(e, &from, error));
+    TRY(read_recipe(e, &from, error));
     const uint64_t available = memory_available();
     const forecast f = {.n = e->m.n,
                         .n_channels = e->m.n_channels,
-                        .rays = from.rays,
-                        .resolution = from.resolution,
-                        .pairs = from.accuracy > 0,
+                        .recipe = from,
+                        .judge_recipe = recipe_again(e, &from, 0),
                         .probes = e->probes,
                         .rank = 1};
     if (available > 0) TRY(forecast_check(&f, .7 * (double)available, error));

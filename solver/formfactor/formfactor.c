@@ -7,16 +7,12 @@
 #include "solver/formfactor/visibility.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* A scene is closed when less than this share of its rays leaves: in single precision a few rays slip between
  * elements that meet without sharing vertices, or start behind a neighbour and meet its back. Their share is
  * put back by the repair. */
 static const double crack_share = 1e-4;
-
-enum { MIN_AUTO_RAYS = 256, MAX_AUTO_RAYS = 65536 };
 
 void form_factors_free(form_factors *f) {
     csr_free(&f->F);
@@ -26,14 +22,6 @@ void form_factors_free(form_factors *f) {
     *f = (form_factors){0};
 }
 
-size_t form_factors_auto_rays(double epsilon, double share) {
-    /* sqrt(2 / rays) <= share epsilon */
-    const double wanted = 2 / (share * epsilon * share * epsilon);
-    size_t rays = MIN_AUTO_RAYS;
-    while (rays < MAX_AUTO_RAYS && (double)rays < wanted) rays *= 2;
-    return rays;
-}
-
 static double area_mean(const mesh *m, const double *x) {
     double sum = 0, total = 0;
     for (size_t i = 0; i < m->n; i++) {
@@ -41,14 +29,6 @@ static double area_mean(const mesh *m, const double *x) {
         total += m->area[i];
     }
     return total > 0 ? sum / total : 0;
-}
-
-/* What a sample begins with. */
-static lam_status form_factors_begin(form_factors *f, const char *method, size_t n, lam_error *error) {
-    snprintf(f->method, sizeof f->method, "%s", method);
-    f->leaving = memory_allocate(n, sizeof *f->leaving, "form factors", error);
-    f->absorbed = memory_allocate(n, sizeof *f->absorbed, "form factors", error);
-    return f->leaving == NULL || f->absorbed == NULL ? LAM_ERR_MEMORY : LAM_OK;
 }
 
 /* From one-sided rows, which are freed, whose entries are F_ij times rays, to F. */
@@ -70,95 +50,97 @@ done:
     return status;
 }
 
-lam_status form_factors_trace(const mesh *m, const uint32_t *order, const ray_options *options,
-                              form_factors *out, lam_error *error) {
+static lam_status make_of_rays(const mesh *m, const visibility *v, const uint32_t *order,
+                               const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
-    visibility *v = NULL;
     csr counts = {0};
-    form_factors f = {.rays = options->rays, .seed = options->seed};
-    if (options->rays == 0 || options->rays > 1u << 24)
-        FAIL(error, LAM_ERR_ARGUMENT, "--rays %zu: must be from 1 to %u", options->rays, 1u << 24);
-    TRY(form_factors_begin(&f, "rays", m->n, error));
-    TRY(visibility_create(m, &v, error));
-    TRY(rays_count(m, v, order, options, &counts, f.leaving, f.absorbed, error));
-    TRY(form_factors_finish(&f, m, &counts, options->rays, error));
-    *out = f;
-    f = (form_factors){0};
+    TRY(rays_count(m, v, order, options, &counts, f->leaving, f->absorbed, error));
+    TRY(form_factors_finish(f, m, &counts, options->recipe.rays, error));
 done:
-    visibility_destroy(v);
     csr_free(&counts);
-    form_factors_free(&f);
     return status;
 }
 
-lam_status form_factors_hemicube(const mesh *m, const uint32_t *order, const hemicube_options *options,
-                                 form_factors *out, lam_error *error) {
+static lam_status make_of_hemicubes(const mesh *m, const visibility *v, const uint32_t *order,
+                                    const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
-    visibility *v = NULL;
     hemicube h = {0};
     csr rows = {0};
-    form_factors f = {.resolution = options->resolution};
-    TRY(hemicube_create(options->resolution, &h, error));
-    TRY(form_factors_begin(&f, "hemicube", m->n, error));
-    TRY(visibility_create(m, &v, error));
-    TRY(hemicube_trace(&h, m, v, order, options, &rows, f.leaving, f.absorbed, error));
+    TRY(hemicube_create(options->recipe.resolution, &h, error));
+    TRY(hemicube_trace(&h, m, v, order, options, &rows, f->leaving, f->absorbed, error));
     /* The weights are form factors already, as if one ray had been cast. */
-    TRY(form_factors_finish(&f, m, &rows, 1, error));
-    *out = f;
-    f = (form_factors){0};
+    TRY(form_factors_finish(f, m, &rows, 1, error));
 done:
-    visibility_destroy(v);
     hemicube_free(&h);
     csr_free(&rows);
-    form_factors_free(&f);
     return status;
 }
 
-/* Rays that only ask whether a scene is closed and whether its faces are turned. */
-enum { FEW_RAYS = 256 };
-
-lam_status form_factors_pairs(const mesh *m, const uint32_t *order, const pair_options *options,
-                              form_factors *out, lam_error *error) {
+static lam_status make_of_pairs(const mesh *m, const visibility *v, const uint32_t *order,
+                                const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
-    visibility *v = NULL;
     csr counts = {0};
     double *outside = NULL;
     pairs_report report;
-    form_factors f = {.accuracy = options->accuracy, .seed = options->seed};
-    const ray_options few = {.rays = FEW_RAYS, .seed = options->seed, .stage = options->stage};
+    form_factor_options silent = *options;
+    silent.progress = NULL;
     const pairs_options how = {.tolerance = 1e-6,
-                               .accuracy = options->accuracy,
+                               .accuracy = options->recipe.accuracy,
                                .segments = 16,
-                               .seed = options->seed,
+                               .seed = options->recipe.seed,
                                .progress = options->progress,
                                .stage = options->stage};
     if (m->n > PAIRS_ELEMENTS_MOST)
         FAIL(error, LAM_ERR_ARGUMENT, "%zu elements have too many pairs; at most %d", m->n,
              PAIRS_ELEMENTS_MOST);
-    TRY(form_factors_begin(&f, "pairs", m->n, error));
     outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(visibility_create(m, &v, error));
-    TRY(rays_count(m, v, order, &few, &counts, f.leaving, f.absorbed, error));
-    TRY(pairs_exchange(m, v, &how, &f.F, &report, error));
-    f.pairs_facing = report.facing;
-    f.pairs_open = report.open;
-    f.pairs_hidden = report.hidden;
-    f.leaving_share = area_mean(m, f.leaving);
-    f.absorbed_share = area_mean(m, f.absorbed);
-    f.closed = f.leaving_share < crack_share;
-    for (size_t i = 0; i < m->n && !(f.closed && f.absorbed_share < crack_share); i++) {
+    TRY(rays_count(m, v, order, &silent, &counts, f->leaving, f->absorbed, error));
+    csr_free(&counts);
+    TRY(pairs_exchange(m, v, &how, &f->F, &report, error));
+    f->pairs_facing = report.facing;
+    f->pairs_open = report.open;
+    f->pairs_hidden = report.hidden;
+    f->leaving_share = area_mean(m, f->leaving);
+    f->absorbed_share = area_mean(m, f->absorbed);
+    f->closed = f->leaving_share < crack_share;
+    for (size_t i = 0; i < m->n && !(f->closed && f->absorbed_share < crack_share); i++) {
         double seen = 0;
-        for (uint64_t p = f.F.indptr[i]; p < f.F.indptr[i + 1]; p++) seen += (double)f.F.data[p];
+        for (uint64_t p = f->F.indptr[i]; p < f->F.indptr[i + 1]; p++) seen += (double)f->F.data[p];
         outside[i] = fmax(0, 1 - seen / m->area[i]);
     }
-    TRY(repair_close(&f.F, m->area, outside, &f, error));
+    TRY(repair_close(&f->F, m->area, outside, f, error));
+done:
+    csr_free(&counts);
+    free(outside);
+    return status;
+}
+
+lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_factor_options *options,
+                             form_factors *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    visibility *v = NULL;
+    form_factors f = {.recipe = options->recipe};
+    TRY(recipe_check(&options->recipe, error));
+    f.leaving = memory_allocate(m->n, sizeof *f.leaving, "form factors", error);
+    f.absorbed = memory_allocate(m->n, sizeof *f.absorbed, "form factors", error);
+    if (f.leaving == NULL || f.absorbed == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(visibility_create(m, &v, error));
+    switch (options->recipe.method) {
+    case RECIPE_RAYS:
+        TRY(make_of_rays(m, v, order, options, &f, error));
+        break;
+    case RECIPE_HEMICUBE:
+        TRY(make_of_hemicubes(m, v, order, options, &f, error));
+        break;
+    case RECIPE_PAIRS:
+        TRY(make_of_pairs(m, v, order, options, &f, error));
+        break;
+    }
     *out = f;
     f = (form_factors){0};
 done:
     visibility_destroy(v);
-    csr_free(&counts);
-    free(outside);
     form_factors_free(&f);
     return status;
 }
@@ -190,7 +172,7 @@ lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_
     form_factors f = *a;
     f.F = (csr){.n = n};
     f.row_sums = f.leaving = f.absorbed = NULL;
-    f.rays = a->rays + b->rays;
+    f.recipe.rays = a->recipe.rays + b->recipe.rays;
     if (b->F.n != n)
         FAIL(error, LAM_ERR_ARGUMENT, "form factors of %zu and %zu elements cannot be averaged", n, b->F.n);
     f.row_sums = memory_allocate(n, sizeof *f.row_sums, "form factors", error);

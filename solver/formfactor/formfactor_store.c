@@ -14,12 +14,8 @@ lam_status form_factors_save(const form_factors *f, store *s, lam_error *error) 
     TRY(store_write(s, GROUP "/data", STORE_F32, 1, &nnz, f->F.data, error));
     TRY(store_write(s, GROUP "/leaving", STORE_F64, 1, &n, f->leaving, error));
     TRY(store_write(s, GROUP "/absorbed", STORE_F64, 1, &n, f->absorbed, error));
-    TRY(store_set_text(s, GROUP, "method", f->method, error));
+    TRY(recipe_save(&f->recipe, &recipe_of_form_factors, s, error));
     TRY(store_set_text(s, GROUP, "storage", "rows", error));
-    TRY(store_set_integer(s, GROUP, "rays", (int64_t)f->rays, error));
-    TRY(store_set_integer(s, GROUP, "seed", (int64_t)f->seed, error));
-    if (f->resolution > 0) TRY(store_set_integer(s, GROUP, "resolution", (int64_t)f->resolution, error));
-    if (f->accuracy > 0) TRY(store_set_number(s, GROUP, "accuracy", f->accuracy, error));
     TRY(store_set_integer(s, GROUP, "closed", f->closed, error));
     TRY(store_set_number(s, GROUP, "leaving_share", f->leaving_share, error));
     TRY(store_set_number(s, GROUP, "absorbed_share", f->absorbed_share, error));
@@ -34,34 +30,13 @@ done:
 static lam_status load_attributes(store *s, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
     char *text = NULL;
-    int64_t rays, seed, closed, resolution = 0;
+    int64_t closed;
     TRY(store_get_text(s, GROUP, "storage", &text, error));
     if (strcmp(text, "rows") != 0)
         FAIL(error, LAM_ERR_UNSUPPORTED, "%s: /form_factors with storage '%.20s' is not supported yet",
              store_path(s), text);
-    free(text);
-    text = NULL;
-    TRY(store_get_text(s, GROUP, "method", &text, error));
-    strncpy(f->method, text, sizeof f->method - 1);
-    TRY(store_get_integer(s, GROUP, "rays", &rays, error));
-    TRY(store_get_integer(s, GROUP, "seed", &seed, error));
+    TRY(recipe_load(s, &recipe_of_form_factors, &f->recipe, error));
     TRY(store_get_integer(s, GROUP, "closed", &closed, error));
-    if (rays < 0) FAIL(error, LAM_ERR_FORMAT, "%s: /form_factors: rays is negative", store_path(s));
-    if (strcmp(f->method, "hemicube") == 0) {
-        TRY(store_get_integer(s, GROUP, "resolution", &resolution, error));
-        if (resolution < HEMICUBE_LEAST || resolution > HEMICUBE_MOST)
-            FAIL(error, LAM_ERR_FORMAT, "%s: /form_factors: resolution is %lld, must be from %d to %d",
-                 store_path(s), (long long)resolution, HEMICUBE_LEAST, HEMICUBE_MOST);
-    }
-    if (strcmp(f->method, "pairs") == 0) {
-        TRY(store_get_number(s, GROUP, "accuracy", &f->accuracy, error));
-        if (!(f->accuracy > 0 && f->accuracy <= 1))
-            FAIL(error, LAM_ERR_FORMAT, "%s: /form_factors: accuracy is %g, must be above 0 and at most 1",
-                 store_path(s), f->accuracy);
-    }
-    f->resolution = (size_t)resolution;
-    f->rays = (size_t)rays;
-    f->seed = (uint64_t)seed;
     f->closed = closed != 0;
     TRY(store_get_number(s, GROUP, "leaving_share", &f->leaving_share, error));
     TRY(store_get_number(s, GROUP, "absorbed_share", &f->absorbed_share, error));

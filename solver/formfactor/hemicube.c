@@ -39,9 +39,9 @@ lam_status hemicube_create(size_t resolution, hemicube *out, lam_error *error) {
     lam_status status = LAM_OK;
     hemicube h = {.resolution = resolution};
     const size_t half = resolution / 2;
-    if (resolution < HEMICUBE_LEAST || resolution > HEMICUBE_MOST || resolution % 2 != 0)
+    if (resolution < RECIPE_RESOLUTION_LEAST || resolution > RECIPE_RESOLUTION_MOST || resolution % 2 != 0)
         FAIL(error, LAM_ERR_ARGUMENT, "--resolution %zu: must be even and from %d to %d", resolution,
-             HEMICUBE_LEAST, HEMICUBE_MOST);
+             RECIPE_RESOLUTION_LEAST, RECIPE_RESOLUTION_MOST);
     h.top = memory_allocate(half * half, sizeof *h.top, "the hemicube's pixels", error);
     h.side = memory_allocate(half * half, sizeof *h.side, "the hemicube's pixels", error);
     if (h.top == NULL || h.side == NULL) TRY(LAM_ERR_MEMORY);
@@ -164,7 +164,7 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
 }
 
 lam_status hemicube_trace(const hemicube *h, const mesh *m, const visibility *v, const uint32_t *order,
-                          const hemicube_options *options, csr *rows, double *leaving, double *absorbed,
+                          const form_factor_options *options, csr *rows, double *leaving, double *absorbed,
                           lam_error *error) {
     const cube_context context = {.h = h, .m = m, .v = v};
     const row_maker maker = {.make = trace_element,

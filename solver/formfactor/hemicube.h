@@ -31,7 +31,7 @@ double hemicube_weight(const hemicube *h, int face, size_t row, size_t column);
  * leaving and absorbed, [n], the weight of those that show nothing or a back face. The caller frees rows with
  * csr_free. Cost: 3 resolution^2 rays an element. */
 lam_status hemicube_trace(const hemicube *h, const mesh *m, const visibility *v, const uint32_t *order,
-                          const hemicube_options *options, csr *rows, double *leaving, double *absorbed,
+                          const form_factor_options *options, csr *rows, double *leaving, double *absorbed,
                           lam_error *error);
 
 #endif

@@ -40,12 +40,13 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
     *absorbed = (double)lost / (double)c->rays;
 }
 
-lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order, const ray_options *options,
-                      csr *counts, double *leaving, double *absorbed, lam_error *error) {
-    const ray_context context = {.m = m, .v = v, .rays = options->rays, .seed = options->seed};
+lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
+                      const form_factor_options *options, csr *counts, double *leaving, double *absorbed,
+                      lam_error *error) {
+    const ray_context context = {.m = m, .v = v, .rays = options->recipe.rays, .seed = options->recipe.seed};
     const row_maker maker = {.make = trace_element,
                              .context = &context,
-                             .rays = options->rays,
+                             .rays = options->recipe.rays,
                              .cheaper = "fewer --rays",
                              .progress = options->progress,
                              .stage = options->stage};

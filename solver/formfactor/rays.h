@@ -7,7 +7,8 @@
 
 /* counts gets rows of hits (as floats, exact up to 2^24); leaving and absorbed, [n], the shares that met
  * nothing or a back face. The caller frees counts with csr_free. */
-lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order, const ray_options *options,
-                      csr *counts, double *leaving, double *absorbed, lam_error *error);
+lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
+                      const form_factor_options *options, csr *counts, double *leaving, double *absorbed,
+                      lam_error *error);
 
 #endif

@@ -532,7 +532,7 @@ class Stores(Case):
         self.must("precompute", kept, "-o", again, *common)
         with h5py.File(kept) as file:
             attributes = dict(file["form_factors"].attrs)
-            self.assertEqual((attributes["method"], attributes["rays"]), (b"pairs", 0))
+            self.assertEqual((attributes["method"], attributes["rays"]), (b"pairs", 256))
             self.assertEqual(file["operator"].attrs["accuracy"], attributes["accuracy"])
             numpy.testing.assert_allclose(file["mesh/row_sums"][:], 1, atol=1e-6)
             # An empty box: nothing is hidden, so nothing is sampled.

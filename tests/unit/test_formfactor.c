@@ -13,9 +13,9 @@ static form_factors trace(const mesh *m, size_t rays, uint64_t seed) {
     uint32_t *order = malloc(m->n * sizeof *order);
     lam_error error = {0};
     form_factors f = {0};
-    const ray_options options = {.rays = rays, .seed = seed};
+    const form_factor_options options = {.recipe = {.rays = rays, .seed = seed}};
     ck_assert_msg(mesh_z_order(m, order, &error) == LAM_OK, "%s", error.message);
-    ck_assert_msg(form_factors_trace(m, order, &options, &f, &error) == LAM_OK, "%s", error.message);
+    ck_assert_msg(form_factors_make(m, order, &options, &f, &error) == LAM_OK, "%s", error.message);
     free(order);
     return f;
 }
@@ -236,10 +236,10 @@ START_TEST(mean_halves_the_variance) {
 END_TEST
 
 START_TEST(auto_rays_follow_the_noise_law) {
-    ck_assert_uint_eq(form_factors_auto_rays(.1, .25), 4096); /* sqrt(2 / 3200) = .025 */
-    ck_assert_uint_eq(form_factors_auto_rays(.05, .25), 16384);
-    ck_assert_uint_eq(form_factors_auto_rays(1, 1), 256);
-    ck_assert_uint_eq(form_factors_auto_rays(1e-6, .25), 65536);
+    ck_assert_uint_eq(recipe_auto_rays(.1, .25), 4096); /* sqrt(2 / 3200) = .025 */
+    ck_assert_uint_eq(recipe_auto_rays(.05, .25), 16384);
+    ck_assert_uint_eq(recipe_auto_rays(1, 1), 256);
+    ck_assert_uint_eq(recipe_auto_rays(1e-6, .25), 65536);
 }
 END_TEST
 
@@ -255,12 +255,12 @@ START_TEST(bad_requests_are_refused) {
     for (uint32_t i = 0; i < 24; i++) order[i] = i;
     form_factors f = {0};
     lam_error error = {0};
-    ray_options options = {.rays = 0, .seed = 1};
-    ck_assert_int_eq(form_factors_trace(&m, order, &options, &f, &error), LAM_ERR_ARGUMENT);
-    options.rays = 1000;
+    form_factor_options options = {.recipe = {.rays = 0, .seed = 1}};
+    ck_assert_int_eq(form_factors_make(&m, order, &options, &f, &error), LAM_ERR_ARGUMENT);
+    options.recipe.rays = 1000;
     const progress cancelled = {.cancelled = stop_at_once};
     options.progress = &cancelled;
-    ck_assert_int_eq(form_factors_trace(&m, order, &options, &f, &error), LAM_ERR_CANCELLED);
+    ck_assert_int_eq(form_factors_make(&m, order, &options, &f, &error), LAM_ERR_CANCELLED);
     ck_assert_ptr_null(f.F.indptr);
     mesh_free(&m);
 }

@@ -34,8 +34,8 @@ static build_problem problem_of(const sample *s, const uint32_t *order) {
 }
 
 static void trace(const mesh *m, const uint32_t *order, uint64_t seed, form_factors *out) {
-    const ray_options how = {.rays = RAYS, .seed = seed, .stage = "rays"};
-    MUST(form_factors_trace(m, order, &how, out, error));
+    const form_factor_options how = {.recipe = {.rays = RAYS, .seed = seed}, .stage = "rays"};
+    MUST(form_factors_make(m, order, &how, out, error));
 }
 
 static void build(sample *s, const uint32_t *order) {
@@ -58,7 +58,7 @@ static sample make_sample(void) {
     uint32_t order[54];
     ck_assert_uint_eq(s.m.n, 54);
     MUST(mesh_z_order(&s.m, order, error));
-    form_factors half[2] = {{.rays = 0}, {.rays = 0}}, mean = {.rays = 0};
+    form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}}, mean = {.row_sums = NULL};
     trace(&s.m, order, SEED, &s.f);
     for (uint64_t h = 0; h < 2; h++) trace(&s.m, order, SEED + 1 + h, &half[h]);
     MUST(form_factors_mean(&half[0], &half[1], &mean, error));

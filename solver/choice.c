@@ -1,0 +1,41 @@
+#include "solver/choice.h"
+
+#include <string.h>
+
+/* What a quality promises. */
+typedef struct quality_level {
+    const char *name;
+    double noise_share; /* of rays: part of epsilon that their noise may be */
+    double accuracy;    /* of pairs: standard error of a factor that is partly hidden; 0: plain rays */
+} quality_level;
+
+static const quality_level levels[] = {
+    {"draft", 1. / 2, 0},
+    {"normal", 1. / 4, 0},
+    /* A third of the 2e-4 that a partly hidden factor of .1 may be off by. */
+    {"high", 1. / 8, 7e-6},
+};
+
+static const quality_level *level_of(const char *name) {
+    size_t k = 0;
+    while (k + 1 < sizeof levels / sizeof levels[0] && strcmp(levels[k].name, name) != 0) k++;
+    return &levels[k];
+}
+
+size_t choice_rays(const choice_request *asked) {
+    if (asked->rays != CHOICE_AUTO) return (size_t)asked->rays;
+    return recipe_auto_rays(asked->epsilon, level_of(asked->quality)->noise_share);
+}
+
+/* Rays that only ask whether a scene is closed and whether its faces are turned. */
+enum { FEW_RAYS = 256 };
+
+recipe choice_recipe(const choice_request *asked, double n) {
+    const quality_level *level = level_of(asked->quality);
+    if (asked->resolution > 0)
+        return (recipe){.method = RECIPE_HEMICUBE, .resolution = asked->resolution, .seed = asked->seed};
+    if (asked->rays == CHOICE_AUTO && level->accuracy > 0 && n <= PAIRS_ELEMENTS_MOST)
+        return (recipe){
+            .method = RECIPE_PAIRS, .rays = FEW_RAYS, .accuracy = level->accuracy, .seed = asked->seed};
+    return (recipe){.method = RECIPE_RAYS, .rays = choice_rays(asked), .seed = asked->seed};
+}

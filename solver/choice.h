@@ -1,0 +1,25 @@
+/* Which recipe of form factors the options of a precomputation lead to. */
+#ifndef LAMBERT_SOLVER_CHOICE_H
+#define LAMBERT_SOLVER_CHOICE_H
+
+#include "solver/formfactor/formfactor.h"
+
+#define CHOICE_AUTO UINT64_MAX
+
+/* What was asked for. */
+typedef struct choice_request {
+    const char *quality; /* "draft", "normal", "high" */
+    double epsilon;
+    uint64_t rays;     /* CHOICE_AUTO */
+    size_t resolution; /* of hemicubes in place of rays; 0: none */
+    uint64_t seed;
+} choice_request;
+
+/* The recipe for n elements: hemicubes where they are asked for, plain rays where their number is given, at
+ * draft, or where there are too many pairs, else pairs. */
+recipe choice_recipe(const choice_request *asked, double n);
+
+/* Rays that keep the noise of the samples the quality's part below epsilon, or the number given. */
+size_t choice_rays(const choice_request *asked);
+
+#endif

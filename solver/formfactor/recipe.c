@@ -1,0 +1,112 @@
+#include "solver/formfactor/recipe.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MIN_AUTO_RAYS = 256, MAX_AUTO_RAYS = 65536 };
+
+static const char *const method_names[] = {"rays", "hemicube", "pairs"};
+enum { N_METHODS = sizeof method_names / sizeof method_names[0] };
+
+const recipe_names recipe_of_form_factors = {"/form_factors", "method", "seed"};
+const recipe_names recipe_of_operator = {"/operator", "form_factors", "ray_seed"};
+
+const char *recipe_name(recipe_method method) {
+    return method_names[method];
+}
+
+lam_status recipe_check(const recipe *r, lam_error *error) {
+    if (r->method == RECIPE_HEMICUBE) {
+        if (r->resolution < RECIPE_RESOLUTION_LEAST || r->resolution > RECIPE_RESOLUTION_MOST ||
+            r->resolution % 2 != 0)
+            return status_fail(error, LAM_ERR_ARGUMENT, "--resolution %zu: must be even, from %d to %d",
+                               r->resolution, RECIPE_RESOLUTION_LEAST, RECIPE_RESOLUTION_MOST);
+        return LAM_OK;
+    }
+    if (r->rays < 1 || r->rays > RECIPE_RAYS_MOST)
+        return status_fail(error, LAM_ERR_ARGUMENT, "--rays %zu: must be from 1 to %d", r->rays,
+                           RECIPE_RAYS_MOST);
+    if (r->method == RECIPE_PAIRS && !(r->accuracy > 0 && r->accuracy <= 1))
+        return status_fail(error, LAM_ERR_ARGUMENT, "accuracy %g: must be above 0 and at most 1",
+                           r->accuracy);
+    return LAM_OK;
+}
+
+void recipe_describe(const recipe *r, char text[64]) {
+    switch (r->method) {
+    case RECIPE_RAYS:
+        snprintf(text, 64, "%zu rays an element", r->rays);
+        break;
+    case RECIPE_HEMICUBE:
+        snprintf(text, 64, "hemicubes of %zu pixels", r->resolution);
+        break;
+    case RECIPE_PAIRS:
+        snprintf(text, 64, "pair by pair to %g", r->accuracy);
+        break;
+    }
+}
+
+lam_status recipe_save(const recipe *r, const recipe_names *names, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const char *const group = names->group;
+    TRY(store_set_text(s, group, names->method, recipe_name(r->method), error));
+    TRY(store_set_integer(s, group, "rays", (int64_t)r->rays, error));
+    TRY(store_set_integer(s, group, names->seed, (int64_t)r->seed, error));
+    if (r->method == RECIPE_HEMICUBE)
+        TRY(store_set_integer(s, group, "resolution", (int64_t)r->resolution, error));
+    if (r->method == RECIPE_PAIRS) TRY(store_set_number(s, group, "accuracy", r->accuracy, error));
+done:
+    return status;
+}
+
+lam_status recipe_load(store *s, const recipe_names *names, recipe *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const char *const group = names->group;
+    int64_t rays = 0, resolution = 0, seed = 0;
+    char *method = NULL;
+    recipe r = {0};
+    lam_error why = {0};
+    TRY(store_get_text(s, group, names->method, &method, error));
+    size_t k = 0;
+    while (k < N_METHODS && strcmp(method, method_names[k]) != 0) k++;
+    if (k == N_METHODS)
+        FAIL(error, LAM_ERR_UNSUPPORTED, "%s: %s attribute %s is '%.20s', which is not supported",
+             store_path(s), group, names->method, method);
+    r.method = (recipe_method)k;
+    TRY(store_get_integer(s, group, "rays", &rays, error));
+    TRY(store_get_integer(s, group, names->seed, &seed, error));
+    if (r.method == RECIPE_HEMICUBE) TRY(store_get_integer(s, group, "resolution", &resolution, error));
+    if (r.method == RECIPE_PAIRS) TRY(store_get_number(s, group, "accuracy", &r.accuracy, error));
+    r.rays = rays < 0 ? 0 : (size_t)rays;
+    r.resolution = resolution < 0 ? 0 : (size_t)resolution;
+    r.seed = (uint64_t)seed;
+    if (recipe_check(&r, &why) != LAM_OK)
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s: %s", store_path(s), group, why.message);
+    *out = r;
+done:
+    free(method);
+    return status;
+}
+
+size_t recipe_auto_rays(double epsilon, double share) {
+    /* sqrt(2 / rays) <= share epsilon */
+    const double wanted = 2 / (share * epsilon * share * epsilon);
+    size_t rays = MIN_AUTO_RAYS;
+    while (rays < MAX_AUTO_RAYS && (double)rays < wanted) rays *= 2;
+    return rays;
+}
+
+double recipe_noise(const recipe *r) {
+    /* Independent rays, the two estimates of a pair merged. A hemicube samples nothing; of pairs only what is
+     * partly hidden is sampled, far more finely. */
+    return r->method == RECIPE_RAYS ? sqrt(2 / (double)r->rays) : 0;
+}
+
+recipe recipe_of_judge(const recipe *judged, size_t rays_beside_hemicubes, uint64_t seed) {
+    recipe r = *judged;
+    if (judged->method == RECIPE_HEMICUBE) r = (recipe){.method = RECIPE_RAYS, .rays = rays_beside_hemicubes};
+    r.seed = seed;
+    return r;
+}

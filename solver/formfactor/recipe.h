@@ -1,0 +1,51 @@
+/* How form factors are found: all that it takes to find the same ones again. */
+#ifndef LAMBERT_FORMFACTOR_RECIPE_H
+#define LAMBERT_FORMFACTOR_RECIPE_H
+
+#include "store/status.h"
+#include "store/store.h"
+
+typedef enum recipe_method { RECIPE_RAYS, RECIPE_HEMICUBE, RECIPE_PAIRS } recipe_method;
+
+typedef struct recipe {
+    recipe_method method;
+    size_t rays;       /* from every element; of pairs: those that find what leaves the scene */
+    size_t resolution; /* of a hemicube: pixels along its top, even; else 0 */
+    double accuracy;   /* of pairs: standard error of a factor that is partly hidden; else 0 */
+    uint64_t seed;     /* of all that is sampled */
+} recipe;
+
+enum { RECIPE_RAYS_MOST = 1 << 24, RECIPE_RESOLUTION_LEAST = 4, RECIPE_RESOLUTION_MOST = 4096 };
+
+/* "rays", "hemicube", "pairs" */
+const char *recipe_name(recipe_method method);
+
+/* LAM_ERR_ARGUMENT for what is out of bounds, naming the option. */
+lam_status recipe_check(const recipe *r, lam_error *error);
+
+/* "4096 rays an element": for a log. */
+void recipe_describe(const recipe *r, char text[64]);
+
+/* The attributes of one group that hold a recipe; resolution and accuracy only where the method has one. */
+typedef struct recipe_names {
+    const char *group, *method, *seed;
+} recipe_names;
+extern const recipe_names recipe_of_form_factors, recipe_of_operator;
+
+lam_status recipe_save(const recipe *r, const recipe_names *names, store *s, lam_error *error);
+
+/* LAM_ERR_FORMAT when it is missing or out of bounds. */
+lam_status recipe_load(store *s, const recipe_names *names, recipe *out, lam_error *error);
+
+/* Rays per element for a factorization bound epsilon: the sampling noise of a merged F has a 2-norm of about
+ * sqrt(2/rays); share is what part of epsilon it may be. A power of two. */
+size_t recipe_auto_rays(double epsilon, double share);
+
+/* The 2-norm of the sampling error of S, about; 0 where it is not known or negligible. */
+double recipe_noise(const recipe *r);
+
+/* The recipe of an independent sample that another one is judged by: its like with another seed; of rays
+ * beside hemicubes, which would only repeat themselves. */
+recipe recipe_of_judge(const recipe *judged, size_t rays_beside_hemicubes, uint64_t seed);
+
+#endif
