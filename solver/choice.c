@@ -11,7 +11,7 @@ typedef struct quality_level {
 
 static const quality_level levels[] = {
     {"draft", 1. / 2, 0},
-    {"normal", 1. / 4, 0},
+    {"normal", 1. / 4, 7e-5},
     /* A third of the 2e-4 that a partly hidden factor of .1 may be off by. */
     {"high", 1. / 8, 7e-6},
 };
@@ -30,12 +30,14 @@ size_t choice_rays(const choice_request *asked) {
 /* Rays that only ask whether a scene is closed and whether its faces are turned. */
 enum { FEW_RAYS = 256 };
 
-recipe choice_recipe(const choice_request *asked, double n) {
+recipe choice_recipe(const choice_request *asked, bool all_pairs) {
     const quality_level *level = level_of(asked->quality);
+    recipe r = {.method = RECIPE_RAYS, .rays = choice_rays(asked), .seed = asked->seed};
     if (asked->resolution > 0)
         return (recipe){.method = RECIPE_HEMICUBE, .resolution = asked->resolution, .seed = asked->seed};
-    if (asked->rays == CHOICE_AUTO && level->accuracy > 0 && n <= PAIRS_ELEMENTS_MOST)
-        return (recipe){
-            .method = RECIPE_PAIRS, .rays = FEW_RAYS, .accuracy = level->accuracy, .seed = asked->seed};
-    return (recipe){.method = RECIPE_RAYS, .rays = choice_rays(asked), .seed = asked->seed};
+    if (asked->rays != CHOICE_AUTO || level->accuracy == 0) return r;
+    r.method = all_pairs ? RECIPE_PAIRS : RECIPE_NEAR_PAIRS;
+    r.accuracy = level->accuracy;
+    if (all_pairs) r.rays = FEW_RAYS;
+    return r;
 }

@@ -15,9 +15,12 @@ typedef struct choice_request {
     uint64_t seed;
 } choice_request;
 
-/* The recipe for n elements: hemicubes where they are asked for, plain rays where their number is given, at
- * draft, or where there are too many pairs, else pairs. */
-recipe choice_recipe(const choice_request *asked, double n);
+/* More elements than these have more pairs than anybody waits for. */
+enum { CHOICE_PAIRS_MOST = 32768 };
+
+/* The recipe: hemicubes where they are asked for, plain rays where their number is given or at draft, else
+ * pairs, all where that is affordable and else the near ones. */
+recipe choice_recipe(const choice_request *asked, bool all_pairs);
 
 /* Rays that keep the noise of the samples the quality's part below epsilon, or the number given. */
 size_t choice_rays(const choice_request *asked);

@@ -109,9 +109,9 @@ static const option_row rows[] = {
      .kind = OPTION_CHOICE,
      .offset = FIELD(quality),
      .value = "draft|normal|high",
-     .doc = "draft, normal: rays whose noise is at most 1/2, 1/4 of epsilon; high: "
-            "pair by pair, magnitudes by mathematics and rays only for what is "
-            "hidden, up to 16384 elements, else rays at 1/8 (normal)",
+     .doc = "draft: rays whose noise is at most 1/2 of epsilon; normal, high: pair by pair, magnitudes by "
+            "mathematics and rays only for what is hidden, or, where there are too many pairs, the near ones "
+            "so and the others by rays at 1/4, 1/8 (normal)",
      .choices = "draft|normal|high"},
     {.name = "sky",
      .kind = OPTION_CHOICE,

@@ -21,6 +21,7 @@ static double recipe_bytes(double n, const recipe *r) {
     case RECIPE_HEMICUBE:
         return sample_bytes(n, 3 * (double)r->resolution * (double)r->resolution);
     case RECIPE_RAYS:
+    case RECIPE_NEAR_PAIRS:
         break;
     }
     return sample_bytes(n, (double)r->rays);
@@ -30,9 +31,11 @@ double forecast_bytes(const forecast *f) {
     const double n = (double)f->n, n_channels = (double)f->n_channels;
     const double mesh = 400 * n;
     const double sample = recipe_bytes(n, &f->recipe);
-    /* While it is traced, a sample exists as counts, as rows, and as the merged rows; of pairs as magnitudes,
-     * first looks and rows. */
-    const double trace = f->recipe.method == RECIPE_PAIRS ? sample + 2.5 * n * n : 2 * sample;
+    /* While it is traced, a sample exists as counts, as rows, and as the merged rows; of pairs as one
+     * triangle with what is known of each, with room to grow, and as rows. */
+    const double trace = f->recipe.method == RECIPE_PAIRS        ? sample + 6.8 * n * n
+                         : f->recipe.method == RECIPE_NEAR_PAIRS ? 3 * sample
+                                                                 : 2 * sample;
     /* The inverse in double and the operator; else leaf blocks and both factors of two nodes. */
     const double rank = f->rank > 0 ? fmin((double)f->rank, n) : fmin(1024, n);
     const double build = f->exact ? n * n * (8 + 4 * n_channels) : 4 * n * (2 * fmin(1024, n) + 6 * rank);
@@ -62,6 +65,7 @@ static void format_bytes(double bytes, char text[32]) {
 static bool sample_less(recipe *r) {
     switch (r->method) {
     case RECIPE_PAIRS:
+    case RECIPE_NEAR_PAIRS:
         *r = (recipe){.method = RECIPE_RAYS, .rays = RECIPE_RAYS_MOST};
         break;
     case RECIPE_HEMICUBE:
@@ -78,8 +82,8 @@ static bool sample_less(recipe *r) {
 
 /* "--rays 1024" or "--resolution 512" */
 static void format_recipe(const recipe *r, char text[40]) {
-    if (r->method == RECIPE_PAIRS)
-        snprintf(text, 40, "all pairs");
+    if (r->method == RECIPE_PAIRS || r->method == RECIPE_NEAR_PAIRS)
+        snprintf(text, 40, "%s", recipe_name(r->method));
     else if (r->method == RECIPE_HEMICUBE)
         snprintf(text, 40, "--resolution %zu", r->resolution);
     else

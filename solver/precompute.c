@@ -119,14 +119,18 @@ static lam_status check_memory(work *w, double n, lam_error *error) {
     if (n > 4e9)
         return status_fail(error, LAM_ERR_MEMORY, "%s: %.3g elements, must be below 4e9; refine less",
                            o->input, n);
-    w->recipe = o->from_store ? w->f.recipe : choice_recipe(&o->form_factors, n);
-    const forecast f = {.n = (size_t)n,
-                        .n_channels = w->m.n_channels,
-                        .recipe = w->recipe,
-                        .judge_recipe = judge_recipe(w, 0),
-                        .probes = o->probes == PRECOMPUTE_AUTO ? PROBES_OF_LARGE : o->probes,
-                        .exact = strcmp(o->method, "exact") == 0,
-                        .rank = o->rank};
+    forecast f = {.n = (size_t)n,
+                  .n_channels = w->m.n_channels,
+                  .probes = o->probes == PRECOMPUTE_AUTO ? PROBES_OF_LARGE : o->probes,
+                  .exact = strcmp(o->method, "exact") == 0,
+                  .rank = o->rank};
+    /* All pairs where they are affordable. */
+    for (int all_pairs = n <= CHOICE_PAIRS_MOST; all_pairs >= 0; all_pairs--) {
+        w->recipe = o->from_store ? w->f.recipe : choice_recipe(&o->form_factors, all_pairs);
+        f.recipe = w->recipe;
+        f.judge_recipe = judge_recipe(w, 0);
+        if (forecast_bytes(&f) <= w->memory) break;
+    }
     return forecast_check(&f, w->memory, error);
 }
 
@@ -164,13 +168,13 @@ static void log_form_factors(work *w) {
                  "%.2g on average, at most %.2g",
                  how, 100 * f->leaving_share, f->closed ? " (closed)" : "", 100 * f->absorbed_share,
                  f->repair_mean, f->repair_max);
-    if (f->pairs_facing > 0) {
-        const double all = .5 * (double)w->m.n * (double)(w->m.n - 1), facing = (double)f->pairs_facing;
-        terminal_log(
-            w->t,
-            "of all pairs %.1f %% face away; of the others %.1f %% are plainly open, %.1f %% plainly hidden",
-            100 * (1 - facing / all), 100 * (double)f->pairs_open / facing,
-            100 * (double)f->pairs_hidden / facing);
+    if (f->pairs.facing > 0) {
+        const double all = .5 * (double)w->m.n * (double)(w->m.n - 1), facing = f->pairs.facing;
+        terminal_log(w->t,
+                     "%.1f %% of all pairs taken one by one; of those %.1f %% have nothing between them, "
+                     "%.1f %% are plainly open, %.1f %% plainly hidden",
+                     100 * facing / all, 100 * f->pairs.certain / facing, 100 * f->pairs.open / facing,
+                     100 * f->pairs.hidden / facing);
     }
     if (f->absorbed_share > .01 && !w->m.two_sided)
         terminal_warn(w->t,

@@ -4,6 +4,7 @@
 #include "solver/formfactor/pairs.h"
 #include "solver/formfactor/rays.h"
 #include "solver/formfactor/repair.h"
+#include "solver/formfactor/rows.h"
 #include "solver/formfactor/visibility.h"
 
 #include <math.h>
@@ -31,22 +32,33 @@ static double area_mean(const mesh *m, const double *x) {
     return total > 0 ? sum / total : 0;
 }
 
+static void measure_leaving(form_factors *f, const mesh *m) {
+    f->leaving_share = area_mean(m, f->leaving);
+    f->absorbed_share = area_mean(m, f->absorbed);
+    f->closed = f->leaving_share < crack_share;
+}
+
+/* Repairs rows of exchange areas by what their rays say leaves. */
+static lam_status close_rows(form_factors *f, const mesh *m, lam_error *error) {
+    lam_status status = LAM_OK;
+    double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
+    if (outside == NULL) return LAM_ERR_MEMORY;
+    measure_leaving(f, m);
+    for (size_t i = 0; i < m->n; i++)
+        outside[i] = (f->closed ? 0 : f->leaving[i]) + (f->absorbed_share < crack_share ? 0 : f->absorbed[i]);
+    status = repair_close(&f->F, m->area, outside, f, error);
+    free(outside);
+    return status;
+}
+
 /* From one-sided rows, which are freed, whose entries are F_ij times rays, to F. */
 static lam_status form_factors_finish(form_factors *f, const mesh *m, csr *rows, size_t rays,
                                       lam_error *error) {
     lam_status status = LAM_OK;
-    double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
-    if (outside == NULL) TRY(LAM_ERR_MEMORY);
     TRY(repair_merge(rows, rays, m->area, &f->F, error));
     csr_free(rows);
-    f->leaving_share = area_mean(m, f->leaving);
-    f->absorbed_share = area_mean(m, f->absorbed);
-    f->closed = f->leaving_share < crack_share;
-    for (size_t i = 0; i < m->n; i++)
-        outside[i] = (f->closed ? 0 : f->leaving[i]) + (f->absorbed_share < crack_share ? 0 : f->absorbed[i]);
-    TRY(repair_close(&f->F, m->area, outside, f, error));
+    TRY(close_rows(f, m, error));
 done:
-    free(outside);
     return status;
 }
 
@@ -76,34 +88,33 @@ done:
     return status;
 }
 
+static lam_status find_pairs(const mesh *m, const visibility *v, const form_factor_options *options,
+                             double threshold, form_factors *f, csr *G, lam_error *error) {
+    const recipe *r = &options->recipe;
+    const pairs_options how = {.tolerance = recipe_tolerance(r),
+                               .accuracy = r->accuracy,
+                               .segments = VISIBILITY_PACKET,
+                               .threshold = threshold,
+                               .keep_hidden = threshold > 0,
+                               .seed = r->seed,
+                               .progress = options->progress,
+                               .stage = options->stage};
+    return pairs_exchange(m, v, &how, G, &f->pairs, error);
+}
+
 static lam_status make_of_pairs(const mesh *m, const visibility *v, const uint32_t *order,
                                 const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
     csr counts = {0};
     double *outside = NULL;
-    pairs_report report;
     form_factor_options silent = *options;
     silent.progress = NULL;
-    const pairs_options how = {.tolerance = 1e-6,
-                               .accuracy = options->recipe.accuracy,
-                               .segments = 16,
-                               .seed = options->recipe.seed,
-                               .progress = options->progress,
-                               .stage = options->stage};
-    if (m->n > PAIRS_ELEMENTS_MOST)
-        FAIL(error, LAM_ERR_ARGUMENT, "%zu elements have too many pairs; at most %d", m->n,
-             PAIRS_ELEMENTS_MOST);
     outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) TRY(LAM_ERR_MEMORY);
     TRY(rays_count(m, v, order, &silent, &counts, f->leaving, f->absorbed, error));
     csr_free(&counts);
-    TRY(pairs_exchange(m, v, &how, &f->F, &report, error));
-    f->pairs_facing = report.facing;
-    f->pairs_open = report.open;
-    f->pairs_hidden = report.hidden;
-    f->leaving_share = area_mean(m, f->leaving);
-    f->absorbed_share = area_mean(m, f->absorbed);
-    f->closed = f->leaving_share < crack_share;
+    TRY(find_pairs(m, v, options, 0, f, &f->F, error));
+    measure_leaving(f, m);
     for (size_t i = 0; i < m->n && !(f->closed && f->absorbed_share < crack_share); i++) {
         double seen = 0;
         for (uint64_t p = f->F.indptr[i]; p < f->F.indptr[i + 1]; p++) seen += (double)f->F.data[p];
@@ -113,6 +124,43 @@ static lam_status make_of_pairs(const mesh *m, const visibility *v, const uint32
 done:
     csr_free(&counts);
     free(outside);
+    return status;
+}
+
+/* Takes out of counts what near has an entry for, of 0 too: those pairs are known better. */
+static void drop_near(csr *counts, const csr *near) {
+    uint64_t kept = 0, begin = 0;
+    for (size_t i = 0; i < counts->n; i++) {
+        uint64_t q = near->indptr[i];
+        for (uint64_t p = begin; p < counts->indptr[i + 1]; p++) {
+            const uint32_t j = counts->indices[p];
+            while (q < near->indptr[i + 1] && near->indices[q] < j) q++;
+            if (q < near->indptr[i + 1] && near->indices[q] == j) continue;
+            counts->indices[kept] = j;
+            counts->data[kept++] = counts->data[p];
+        }
+        begin = counts->indptr[i + 1];
+        counts->indptr[i + 1] = kept;
+    }
+}
+
+static lam_status make_of_near_pairs(const mesh *m, const visibility *v, const uint32_t *order,
+                                     const form_factor_options *options, form_factors *f, lam_error *error) {
+    lam_status status = LAM_OK;
+    csr counts = {0}, near = {0}, far = {0};
+    TRY(find_pairs(m, v, options, recipe_near(&options->recipe), f, &near, error));
+    TRY(rays_count(m, v, order, options, &counts, f->leaving, f->absorbed, error));
+    drop_near(&counts, &near);
+    TRY(repair_merge(&counts, options->recipe.rays, m->area, &far, error));
+    csr_free(&counts);
+    TRY(rows_combine(&near, 1, &far, 1, &f->F, error));
+    csr_free(&near);
+    csr_free(&far);
+    TRY(close_rows(f, m, error));
+done:
+    csr_free(&counts);
+    csr_free(&near);
+    csr_free(&far);
     return status;
 }
 
@@ -136,6 +184,9 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
     case RECIPE_PAIRS:
         TRY(make_of_pairs(m, v, order, options, &f, error));
         break;
+    case RECIPE_NEAR_PAIRS:
+        TRY(make_of_near_pairs(m, v, order, options, &f, error));
+        break;
     }
     *out = f;
     f = (form_factors){0};
@@ -143,26 +194,6 @@ done:
     visibility_destroy(v);
     form_factors_free(&f);
     return status;
-}
-
-/* The mean of row i of two CSRs; returns how many indices either has. With indices NULL it only counts. */
-static size_t mean_row(const csr *a, const csr *b, size_t i, uint32_t *indices, float *data) {
-    uint64_t p = a->indptr[i], q = b->indptr[i];
-    size_t length = 0;
-    while (p < a->indptr[i + 1] || q < b->indptr[i + 1]) {
-        const uint32_t ja = p < a->indptr[i + 1] ? a->indices[p] : UINT32_MAX;
-        const uint32_t jb = q < b->indptr[i + 1] ? b->indices[q] : UINT32_MAX;
-        const uint32_t j = ja < jb ? ja : jb;
-        float sum = 0;
-        if (ja == j) sum += .5f * a->data[p++];
-        if (jb == j) sum += .5f * b->data[q++];
-        if (indices != NULL) {
-            indices[length] = j;
-            data[length] = sum;
-        }
-        length++;
-    }
-    return length;
 }
 
 lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_factors *out,
@@ -173,21 +204,13 @@ lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_
     f.F = (csr){.n = n};
     f.row_sums = f.leaving = f.absorbed = NULL;
     f.recipe.rays = a->recipe.rays + b->recipe.rays;
-    if (b->F.n != n)
-        FAIL(error, LAM_ERR_ARGUMENT, "form factors of %zu and %zu elements cannot be averaged", n, b->F.n);
     f.row_sums = memory_allocate(n, sizeof *f.row_sums, "form factors", error);
     f.leaving = memory_allocate(n, sizeof *f.leaving, "form factors", error);
     f.absorbed = memory_allocate(n, sizeof *f.absorbed, "form factors", error);
-    f.F.indptr = memory_allocate(n + 1, sizeof *f.F.indptr, "form factors", error);
-    if (f.row_sums == NULL || f.leaving == NULL || f.absorbed == NULL || f.F.indptr == NULL)
-        TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < n; i++) f.F.indptr[i + 1] = f.F.indptr[i] + mean_row(&a->F, &b->F, i, NULL, NULL);
-    f.F.indices = memory_allocate(f.F.indptr[n], sizeof *f.F.indices, "form factors", error);
-    f.F.data = memory_allocate(f.F.indptr[n], sizeof *f.F.data, "form factors", error);
-    if (f.F.indices == NULL || f.F.data == NULL) TRY(LAM_ERR_MEMORY);
+    if (f.row_sums == NULL || f.leaving == NULL || f.absorbed == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(rows_combine(&a->F, .5f, &b->F, .5f, &f.F, error));
 #pragma omp parallel for schedule(static, 64)
     for (size_t i = 0; i < n; i++) {
-        mean_row(&a->F, &b->F, i, f.F.indices + f.F.indptr[i], f.F.data + f.F.indptr[i]);
         for (uint64_t p = f.F.indptr[i]; p < f.F.indptr[i + 1]; p++) f.row_sums[i] += (double)f.F.data[p];
         f.leaving[i] = .5 * (a->leaving[i] + b->leaving[i]);
         f.absorbed[i] = .5 * (a->absorbed[i] + b->absorbed[i]);

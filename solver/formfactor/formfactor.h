@@ -6,15 +6,24 @@
 #include "solver/operator/csr.h"
 #include "solver/scene/mesh.h"
 
+/* What was skipped and what was done, in pairs. */
+typedef struct pairs_report {
+    double facing;  /* each other, and near enough */
+    double certain; /* of those: nothing is between their clusters */
+    double settled; /* so small that a first look says enough */
+    double open;    /* no segment was blocked; hidden: every one was; mixed: some were, or a neighbour's */
+    double hidden, mixed;
+} pairs_report;
+
 typedef struct form_factors {
     csr F;            /* rows F[i][.], mesh order */
     double *row_sums; /* [n], of F after repair, <= 1 */
     double *leaving;  /* [n], share of an element's rays that left the scene */
     double *absorbed; /* [n], share that hit a back face */
     recipe recipe;
-    size_t pairs_facing, pairs_open, pairs_hidden; /* of pairs, when just made: plainly one or the other */
-    bool closed;                                   /* nothing leaves but through cracks between elements */
-    double leaving_share;                          /* area-weighted means */
+    pairs_report pairs;   /* where just made of pairs */
+    bool closed;          /* nothing leaves but through cracks between elements */
+    double leaving_share; /* area-weighted means */
     double absorbed_share;
     double closure_error;           /* largest |row sum - its target| after repair */
     double reciprocity_error;       /* largest |A_i F_ij - A_j F_ji| / max of both */
@@ -27,9 +36,6 @@ typedef struct form_factor_options {
     const char *stage; /* what progress calls it */
 } form_factor_options;
 
-/* More pairs than those of this many elements are not taken one by one. */
-enum { PAIRS_ELEMENTS_MOST = 16384 };
-
 /* Finds the form factors by a recipe, merges the two estimates of each pair by reciprocity and repairs the
  * row sums. The result is the same for any number of threads. order is [n] (mesh_z_order): the sequence in
  * which elements are worked on, for locality only.
@@ -37,11 +43,12 @@ enum { PAIRS_ELEMENTS_MOST = 16384 };
  * rays: counts rays (Embree) from every element. Cost: n * rays rays and O(nnz) memory.
  * hemicube: the same by hemicubes around every element's centroid: no sampling noise, but aliasing. Cost:
  *   3 n resolution^2 rays and O(nnz) memory.
- * pairs: pair by pair, magnitudes by mathematics to 1e-6, by rays only what is hidden of them. What a row
- *   lacks goes outside, or, where the scene is closed, is put back by the repair. Cost: O(n^2), about 1 us a
- *   pair; 2.5 n^2 bytes beside the rows.
+ * pairs: pair by pair, magnitudes by mathematics, by rays only what is hidden of them. What a row lacks goes
+ *   outside, or, where the scene is closed, is put back by the repair. Cost: O(n^2), about .3 us a pair that
+ *   is facing; 9 bytes for each of those beside the rows.
+ * near-pairs: the same for pairs of which a ray would hit several times, the others by rays.
  *
- * Errors: LAM_ERR_ARGUMENT (a recipe out of bounds, too many pairs), LAM_ERR_MEMORY, LAM_ERR_CANCELLED,
+ * Errors: LAM_ERR_ARGUMENT (a recipe out of bounds), LAM_ERR_MEMORY, LAM_ERR_CANCELLED,
  * LAM_ERR_INTERNAL. */
 lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_factor_options *options,
                              form_factors *out, lam_error *error);

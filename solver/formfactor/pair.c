@@ -204,14 +204,6 @@ typedef struct cubature_points {
     double x[3][POINTS_MOST], weight[POINTS_MOST];
 } cubature_points;
 
-static bool is_parallelogram(const polygon *p) {
-    if (p->n != 4) return false;
-    double off = 0;
-    for (int d = 0; d < 3; d++)
-        off += fabs(p->corner[0][d] - p->corner[1][d] + p->corner[2][d] - p->corner[3][d]);
-    return off <= 1e-12 * p->radius;
-}
-
 /* The square (u, w) -> first + u one + w two, weights of sum area. */
 static void map_square(const double *first, const double *one, const double *two, double area,
                        const pair_gauss *g, cubature_points *points) {
@@ -240,7 +232,7 @@ static void map_triangle(const double *first, const double *one, const double *t
 
 static void set_points(const polygon *p, const pair_gauss *g, cubature_points *points) {
     points->n = 0;
-    if (is_parallelogram(p)) {
+    if (p->n == 4 && p->affine) {
         map_square(p->corner[0], p->corner[1], p->corner[3], polygon_area(p), g, points);
         return;
     }
@@ -274,14 +266,18 @@ static double cubature(const polygon *a, const polygon *b, const pair_gauss *g) 
     return fmax(sum / pi, 0);
 }
 
-/* The rule that is far enough: a singularity q half-widths away leaves n Gauss nodes an error of about
- * (2 q)^-2n in each of the four directions, times what the fourth power of the distance brings. NULL: none of
- * those that pay. */
+/* A singularity q half-widths away leaves n Gauss nodes an error of about (2 q)^-2n in each of the four
+ * directions, times what the fourth power of the distance brings. */
+double pair_far_enough(int nodes, double tolerance) {
+    return fmax(2, .5 * pow(.03 * tolerance, -.5 / nodes));
+}
+
+/* The rule that is far enough; NULL: none of those that pay. */
 static const pair_gauss *far_rule(const pair_rules *rules, const polygon *a, const polygon *b,
                                   double distance, double tolerance) {
     const double wide = fmax(a->radius, b->radius), q = (distance - wide) / wide;
     for (int r = 0; r < PAIR_FAR_RULES && q > 2; r++)
-        if (pow(2 * q, -2 * rules->gauss[r].n) <= .03 * tolerance) return &rules->gauss[r];
+        if (q >= pair_far_enough(rules->gauss[r].n, tolerance)) return &rules->gauss[r];
     return NULL;
 }
 

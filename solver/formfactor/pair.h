@@ -21,6 +21,10 @@ typedef struct pair_rules {
 
 void pair_rules_init(pair_rules *rules);
 
+/* How many radii (of the larger) beyond one the centres of two polygons must be apart for a product rule of
+ * nodes x nodes points on either to keep the relative tolerance. */
+double pair_far_enough(int nodes, double tolerance);
+
 /* A_a F_ab = A_b F_ba, m^2, of two polygons with nothing between them: each sees what of the other lies in
  * front of its plane. To the relative tolerance, at best 1e-8 (and 1e-10 of A_a), wherever they lie:
  * touching, crossing one another's planes, or far apart. Contour integral (Sparrow 1963) when near, cubature

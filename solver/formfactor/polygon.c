@@ -37,6 +37,10 @@ static void measure_extent(polygon *p) {
         for (int d = 0; d < 3; d++) r[d] = p->corner[c][d] - p->centre[d];
         p->radius = fmax(p->radius, sqrt(dot(r, r)));
     }
+    double off = 0;
+    for (int d = 0; d < 3 && p->n == 4; d++)
+        off += fabs(p->corner[0][d] - p->corner[1][d] + p->corner[2][d] - p->corner[3][d]);
+    p->affine = p->n == 3 || (p->n == 4 && off <= 1e-12 * p->radius);
 }
 
 void polygon_measure(polygon *p) {
@@ -107,6 +111,18 @@ void polygon_quarter(const polygon *p, polygon quarters[4]) {
             memcpy(out->corner, between, 3 * sizeof centre);
         }
         measure_extent(out);
+    }
+}
+
+void polygon_affine_points(const polygon *p, const double u[8], const double w[8], double points[3][8]) {
+    const bool triangle = p->n == 3; /* the square folded along its diagonal */
+    for (int d = 0; d < 3; d++) {
+        const double from = p->corner[0][d], one = p->corner[1][d] - from,
+                     two = p->corner[triangle ? 2 : 3][d] - from;
+        for (int k = 0; k < 8; k++) {
+            const bool beyond = triangle && u[k] + w[k] > 1;
+            points[d][k] = from + (beyond ? 1 - u[k] : u[k]) * one + (beyond ? 1 - w[k] : w[k]) * two;
+        }
     }
 }
 

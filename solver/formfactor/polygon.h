@@ -12,6 +12,7 @@ typedef struct polygon {
     double corner[POLYGON_CORNERS][3]; /* counter-clockwise seen from the front */
     double normal[3];                  /* unit, towards the front */
     double centre[3], radius;          /* of a sphere about all corners */
+    bool affine;                       /* a triangle or a parallelogram */
 } polygon;
 
 /* Takes normal, centre and radius from the corners, which must span an area. */
@@ -26,6 +27,9 @@ double polygon_area(const polygon *p);
 
 /* The quarters of a triangle or a quad, between the middles of its edges. */
 void polygon_quarter(const polygon *p, polygon quarters[4]);
+
+/* Eight points of an affine polygon at (u, w) in the unit square, component by component. */
+void polygon_affine_points(const polygon *p, const double u[8], const double w[8], double points[3][8]);
 
 /* The point of a triangle or a quad at (u, w) in the unit square; returns how much area a unit of the square
  * has there. */

@@ -7,7 +7,7 @@
 
 enum { MIN_AUTO_RAYS = 256, MAX_AUTO_RAYS = 65536 };
 
-static const char *const method_names[] = {"rays", "hemicube", "pairs"};
+static const char *const method_names[] = {"rays", "hemicube", "pairs", "near-pairs"};
 enum { N_METHODS = sizeof method_names / sizeof method_names[0] };
 
 const recipe_names recipe_of_form_factors = {"/form_factors", "method", "seed"};
@@ -28,7 +28,7 @@ lam_status recipe_check(const recipe *r, lam_error *error) {
     if (r->rays < 1 || r->rays > RECIPE_RAYS_MOST)
         return status_fail(error, LAM_ERR_ARGUMENT, "--rays %zu: must be from 1 to %d", r->rays,
                            RECIPE_RAYS_MOST);
-    if (r->method == RECIPE_PAIRS && !(r->accuracy > 0 && r->accuracy <= 1))
+    if (r->method != RECIPE_RAYS && !(r->accuracy > 0 && r->accuracy <= 1))
         return status_fail(error, LAM_ERR_ARGUMENT, "accuracy %g: must be above 0 and at most 1",
                            r->accuracy);
     return LAM_OK;
@@ -45,6 +45,9 @@ void recipe_describe(const recipe *r, char text[64]) {
     case RECIPE_PAIRS:
         snprintf(text, 64, "pair by pair to %g", r->accuracy);
         break;
+    case RECIPE_NEAR_PAIRS:
+        snprintf(text, 64, "near pairs to %g, %zu rays an element", r->accuracy, r->rays);
+        break;
     }
 }
 
@@ -56,7 +59,7 @@ lam_status recipe_save(const recipe *r, const recipe_names *names, store *s, lam
     TRY(store_set_integer(s, group, names->seed, (int64_t)r->seed, error));
     if (r->method == RECIPE_HEMICUBE)
         TRY(store_set_integer(s, group, "resolution", (int64_t)r->resolution, error));
-    if (r->method == RECIPE_PAIRS) TRY(store_set_number(s, group, "accuracy", r->accuracy, error));
+    if (r->accuracy > 0) TRY(store_set_number(s, group, "accuracy", r->accuracy, error));
 done:
     return status;
 }
@@ -78,7 +81,8 @@ lam_status recipe_load(store *s, const recipe_names *names, recipe *out, lam_err
     TRY(store_get_integer(s, group, "rays", &rays, error));
     TRY(store_get_integer(s, group, names->seed, &seed, error));
     if (r.method == RECIPE_HEMICUBE) TRY(store_get_integer(s, group, "resolution", &resolution, error));
-    if (r.method == RECIPE_PAIRS) TRY(store_get_number(s, group, "accuracy", &r.accuracy, error));
+    if (r.method == RECIPE_PAIRS || r.method == RECIPE_NEAR_PAIRS)
+        TRY(store_get_number(s, group, "accuracy", &r.accuracy, error));
     r.rays = rays < 0 ? 0 : (size_t)rays;
     r.resolution = resolution < 0 ? 0 : (size_t)resolution;
     r.seed = (uint64_t)seed;
@@ -88,6 +92,15 @@ lam_status recipe_load(store *s, const recipe_names *names, recipe *out, lam_err
 done:
     free(method);
     return status;
+}
+
+double recipe_tolerance(const recipe *r) {
+    /* 1e-5 and 1e-6 at the accuracies of normal and high quality. */
+    return fmin(r->accuracy / 7, 1e-4);
+}
+
+double recipe_near(const recipe *r) {
+    return 4 / (double)r->rays;
 }
 
 size_t recipe_auto_rays(double epsilon, double share) {
@@ -101,7 +114,7 @@ size_t recipe_auto_rays(double epsilon, double share) {
 double recipe_noise(const recipe *r) {
     /* Independent rays, the two estimates of a pair merged. A hemicube samples nothing; of pairs only what is
      * partly hidden is sampled, far more finely. */
-    return r->method == RECIPE_RAYS ? sqrt(2 / (double)r->rays) : 0;
+    return r->method == RECIPE_RAYS || r->method == RECIPE_NEAR_PAIRS ? sqrt(2 / (double)r->rays) : 0;
 }
 
 recipe recipe_of_judge(const recipe *judged, size_t rays_beside_hemicubes, uint64_t seed) {

@@ -5,19 +5,19 @@
 #include "store/status.h"
 #include "store/store.h"
 
-typedef enum recipe_method { RECIPE_RAYS, RECIPE_HEMICUBE, RECIPE_PAIRS } recipe_method;
+typedef enum recipe_method { RECIPE_RAYS, RECIPE_HEMICUBE, RECIPE_PAIRS, RECIPE_NEAR_PAIRS } recipe_method;
 
 typedef struct recipe {
     recipe_method method;
-    size_t rays;       /* from every element; of pairs: those that find what leaves the scene */
+    size_t rays;       /* from every element; of pairs: those that only find what leaves the scene */
     size_t resolution; /* of a hemicube: pixels along its top, even; else 0 */
-    double accuracy;   /* of pairs: standard error of a factor that is partly hidden; else 0 */
+    double accuracy;   /* of (near) pairs: standard error of a factor that is partly hidden; else 0 */
     uint64_t seed;     /* of all that is sampled */
 } recipe;
 
 enum { RECIPE_RAYS_MOST = 1 << 24, RECIPE_RESOLUTION_LEAST = 4, RECIPE_RESOLUTION_MOST = 4096 };
 
-/* "rays", "hemicube", "pairs" */
+/* "rays", "hemicube", "pairs", "near-pairs" */
 const char *recipe_name(recipe_method method);
 
 /* LAM_ERR_ARGUMENT for what is out of bounds, naming the option. */
@@ -36,6 +36,12 @@ lam_status recipe_save(const recipe *r, const recipe_names *names, store *s, lam
 
 /* LAM_ERR_FORMAT when it is missing or out of bounds. */
 lam_status recipe_load(store *s, const recipe_names *names, recipe *out, lam_error *error);
+
+/* Relative tolerance of unoccluded factors of pairs. */
+double recipe_tolerance(const recipe *r);
+
+/* Pairs are near when one of their unoccluded factors is above this: when rays would hit it several times. */
+double recipe_near(const recipe *r);
 
 /* Rays per element for a factorization bound epsilon: the sampling noise of a merged F has a 2-norm of about
  * sqrt(2/rays); share is what part of epsilon it may be. A power of two. */

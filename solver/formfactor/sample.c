@@ -133,6 +133,12 @@ void pair_sampler_place(const pair_sampler *s, uint32_t index, double x[4]) {
     for (int d = 0; d < 4; d++) x[d] = (double)(s->shift[d] + index * kronecker_step[d]) * 0x1p-32;
 }
 
+void pair_sampler_packet(const pair_sampler *s, uint32_t first, double x[4][VISIBILITY_PACKET]) {
+    for (int d = 0; d < 4; d++)
+        for (uint32_t k = 0; k < VISIBILITY_PACKET; k++)
+            x[d][k] = (double)(s->shift[d] + (first + k) * kronecker_step[d]) * 0x1p-32;
+}
+
 void element_sampler_packet(const element_sampler *s, uint32_t first, ray_packet *rays) {
     const element_frame *f = &s->frame;
     float x[4][VISIBILITY_PACKET];

@@ -42,4 +42,7 @@ void pair_sampler_init(pair_sampler *s, uint64_t seed, size_t i, size_t j);
 /* The index-th point of the unit cube in four dimensions: two for each of the elements. */
 void pair_sampler_place(const pair_sampler *s, uint32_t index, double x[4]);
 
+/* The same from index first on, for a packet. */
+void pair_sampler_packet(const pair_sampler *s, uint32_t first, double x[4][VISIBILITY_PACKET]);
+
 #endif

@@ -114,6 +114,16 @@ void visibility_recentre(const visibility *v, const double point[3], float recen
     for (int d = 0; d < 3; d++) recentred[d] = (float)(point[d] - v->centre[d]);
 }
 
+void visibility_recentre_packet(const visibility *v, const double points[3][VISIBILITY_PACKET],
+                                float recentred[3][VISIBILITY_PACKET]) {
+    for (int d = 0; d < 3; d++)
+        for (int k = 0; k < VISIBILITY_PACKET; k++) recentred[d][k] = (float)(points[d][k] - v->centre[d]);
+}
+
+double visibility_rounding(const visibility *v) {
+    return (double)v->rounding;
+}
+
 /* What the filter must know beside Embree's own context, which it is handed back as. */
 typedef struct cast_context {
     struct RTCIntersectContext embree;

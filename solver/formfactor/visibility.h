@@ -30,6 +30,13 @@ void visibility_destroy(visibility *v);
 /* A point of the scene in the recentred single precision that rays are given in. */
 void visibility_recentre(const visibility *v, const double point[3], float recentred[3]);
 
+/* The same for a packet of points. */
+void visibility_recentre_packet(const visibility *v, const double points[3][VISIBILITY_PACKET],
+                                float recentred[3][VISIBILITY_PACKET]);
+
+/* How far single precision may move a point of the scene, metres. */
+double visibility_rounding(const visibility *v);
+
 /* Casts the first n_rays rays of a packet. self[i] is the element a ray leaves (itself and, if two-sided, its
  * back are never hit), or VISIBILITY_NOTHING. cull_back looks through back faces instead of reporting them.
  */

@@ -546,7 +546,7 @@ class Stores(Case):
         self.assertIn("64 rays an element", done.stderr)
         done = lambert("precompute", self.box, "-o", bare, *common, "--memory", "100K")
         self.assertEqual(done.returncode, 1)
-        self.assertIn("--quality high need about", done.stderr)
+        self.assertIn("with near-pairs need about", done.stderr)
 
     def test_hemicube(self):
         kept, bare, again = self.path("kept.h5"), self.path("bare.h5"), self.path("again.h5")
