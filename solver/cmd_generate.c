@@ -9,7 +9,7 @@
 #include <string.h>
 
 typedef struct fields {
-    const char *output;
+    const char *output, *variant, *terrain;
     uint64_t divisions, elements, seed;
     double size[3];
     double reflectance;
@@ -72,15 +72,25 @@ static const option_row rows[] = {
      .parse = parse_size},
     {.kind = OPTION_HEADING, .doc = "cornell"},
     {.name = "closed", .kind = OPTION_FLAG, .offset = FIELD(closed), .doc = "With a front wall"},
-    {.kind = OPTION_HEADING, .doc = "city (not supported yet)"},
-    {.name = "variant", .kind = OPTION_LATER, .value = "1|2|3", .doc = "Kind of city"},
-    {.name = "terrain", .kind = OPTION_LATER, .value = "flat|valley|hill", .doc = "What it stands on"},
+    {.kind = OPTION_HEADING, .doc = "city"},
+    {.name = "variant",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(variant),
+     .value = "1|2|3",
+     .doc = "Flat houses; up to middle-high; with skyscrapers (1)",
+     .choices = "1|2|3"},
+    {.name = "terrain",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(terrain),
+     .value = "flat|valley|hill",
+     .doc = "What it stands on (flat)",
+     .choices = "flat|valley|hill"},
     {0},
 };
 
 static const option_verb verb = {
     .name = "generate",
-    .arguments = "box|cornell|furnace -o SCENE.obj",
+    .arguments = "box|city|cornell|furnace -o SCENE.obj",
     .summary = "Write one of the known scenes as OBJ and MTL, z up, in metres.",
     .options = rows,
     .min_arguments = 1,
@@ -88,7 +98,7 @@ static const option_verb verb = {
 };
 
 int cmd_generate(int argc, char **argv) {
-    fields f = {.size = {1, 1, 1}, .reflectance = -1, .seed = 1};
+    fields f = {.size = {1, 1, 1}, .reflectance = -1, .seed = 1, .variant = "1", .terrain = "flat"};
     option_result given = {0};
     lam_error error = {0};
     terminal term;
@@ -96,10 +106,10 @@ int cmd_generate(int argc, char **argv) {
     int code = options_parse(&verb, argc, argv, &f, &given);
     if (code != OPTIONS_GO) return code;
     const char *kind = given.arguments[0];
-    if (option_among(kind, "city|rooms|anechoic|patio|atrium|maze|canopy"))
+    if (option_among(kind, "rooms|anechoic|patio|atrium|maze|canopy"))
         return options_usage(verb.name, "%s is not supported yet", kind);
-    if (!option_among(kind, "box|cornell|furnace"))
-        return options_usage(verb.name, "%s: no such scene; must be one of: box cornell furnace", kind);
+    if (!option_among(kind, "box|city|cornell|furnace"))
+        return options_usage(verb.name, "%s: no such scene; must be one of: box city cornell furnace", kind);
     if (f.output == NULL) return options_usage(verb.name, "no -o SCENE.obj given");
     if (f.divisions != 0 && f.elements != 0)
         return options_usage(verb.name, "--divisions and --elements exclude each other");
@@ -108,6 +118,9 @@ int cmd_generate(int argc, char **argv) {
     if (strcmp(kind, "box") != 0 &&
         (options_given(&verb, &given, "size") || options_given(&verb, &given, "divisions")))
         return options_usage(verb.name, "--size and --divisions: only for box");
+    if (strcmp(kind, "city") != 0 &&
+        (options_given(&verb, &given, "variant") || options_given(&verb, &given, "terrain")))
+        return options_usage(verb.name, "--variant and --terrain: only for city");
     char extension[16];
     output_file_extension(f.output, extension);
     if (strcmp(extension, "obj") != 0) return options_usage(verb.name, "-o %s: must end in .obj", f.output);
@@ -117,6 +130,8 @@ int cmd_generate(int argc, char **argv) {
                                 .size = {f.size[0], f.size[1], f.size[2]},
                                 .divisions = (unsigned)f.divisions,
                                 .closed = f.closed,
+                                .variant = (unsigned)(f.variant[0] - '0'),
+                                .terrain = f.terrain,
                                 .elements = f.elements,
                                 .reflectance = f.reflectance,
                                 .seed = f.seed};

@@ -56,6 +56,7 @@ lam_status draft_build_near(draft *d, draft_builder *build, const generate_optio
 
 lam_status draft_box_scene(draft *d, const generate_options *options, lam_error *error);
 lam_status draft_cornell_scene(draft *d, const generate_options *options, lam_error *error);
+lam_status draft_city_scene(draft *d, const generate_options *options, lam_error *error);
 lam_status draft_furnace_scene(draft *d, const generate_options *options, lam_error *error);
 
 #endif

@@ -109,7 +109,7 @@ static const struct {
     {"box", draft_box_scene},
     {"cornell", draft_cornell_scene},
     {"furnace", draft_furnace_scene},
-    {"city", NULL},
+    {"city", draft_city_scene},
     {"rooms", NULL},
     {"anechoic", NULL},
     {"patio", NULL},
@@ -125,7 +125,7 @@ lam_status scene_generate(const generate_options *options, const char *path, siz
     size_t kind = 0;
     while (kind < sizeof kinds / sizeof *kinds && strcmp(kinds[kind].name, options->kind) != 0) kind++;
     if (kind == sizeof kinds / sizeof *kinds)
-        FAIL(error, LAM_ERR_ARGUMENT, "unknown kind of scene '%s'; known are box, cornell, furnace",
+        FAIL(error, LAM_ERR_ARGUMENT, "unknown kind of scene '%s'; known are box, city, cornell, furnace",
              options->kind);
     if (kinds[kind].build == NULL)
         FAIL(error, LAM_ERR_UNSUPPORTED, "generate %s: not supported yet", options->kind);

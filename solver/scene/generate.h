@@ -7,12 +7,14 @@
 #include <stdint.h>
 
 typedef struct generate_options {
-    const char *kind;   /* "box", "cornell", "furnace" */
-    double size[3];     /* box, metres; 1,1,1 */
-    unsigned divisions; /* box: M, exactly 6 M^2 faces; 0: not set */
-    bool closed;        /* cornell */
-    size_t elements;    /* about this many faces; 0: not set */
-    double reflectance; /* for every face, grey (emission turns grey too); negative: the scene's own */
+    const char *kind;    /* "box", "city", "cornell", "furnace" */
+    double size[3];      /* box, metres; 1,1,1 */
+    unsigned divisions;  /* box: M, exactly 6 M^2 faces; 0: not set */
+    bool closed;         /* cornell */
+    unsigned variant;    /* city: 1, 2 or 3 */
+    const char *terrain; /* city: "flat", "valley" or "hill" */
+    size_t elements;     /* about this many faces; 0: not set */
+    double reflectance;  /* for every face, grey (emission turns grey too); negative: the scene's own */
     uint64_t seed;
 } generate_options;
 

@@ -140,6 +140,9 @@ class Usage(Case):
                 ("exclude each other", "generate box -o a.obj --divisions 2 --elements 9"),
                 ("only for cornell", "generate box -o a.obj --closed"),
                 ("only for box", "generate cornell -o a.obj --divisions 2"),
+                ("only for city", "generate box -o a.obj --terrain hill"),
+                ("--variant", "generate city -o a.obj --variant 4"),
+                ("--terrain", "generate city -o a.obj --terrain swamp"),
                 ("--size 1,2: 2 numbers, needs 3", "generate box -o a.obj --size 1,2"),
                 ("--size 1,2,0: every length", "generate box -o a.obj --size 1,2,0"),
                 ("--size 1,,2: not numbers", "generate box -o a.obj --size 1,,2"),
@@ -159,9 +162,9 @@ class Usage(Case):
 
     def test_not_supported_yet(self):
         for line in ("classify a.obj", "sky w.epw -o a.npy", "bench service",
-                     "generate city --variant 1 --terrain flat -o a.obj", "generate rooms -o a.obj",
-                     "generate anechoic -o a.obj", "generate patio -o a.obj", "generate atrium -o a.obj",
-                     "generate maze -o a.obj", "generate canopy -o a.obj", "solve a.h5 --sky s.npy",
+                     "generate rooms -o a.obj", "generate anechoic -o a.obj", "generate patio -o a.obj",
+                     "generate atrium -o a.obj", "generate maze -o a.obj", "generate canopy -o a.obj",
+                     "solve a.h5 --sky s.npy",
                      "solve a.h5 --tolerance 1e-4", "solve a.h5 -o b.glb",
                      *("precompute a.obj -o b.h5 " + option for option in (
                          "--sky tregenza", "--sky reinhart:2", "--sky grid:4x8",
