@@ -35,7 +35,9 @@ recipe choice_recipe(const choice_request *asked, double n) {
     if (asked->resolution > 0)
         return (recipe){.method = RECIPE_HEMICUBE, .resolution = asked->resolution, .seed = asked->seed};
     if (asked->rays == CHOICE_AUTO && level->accuracy > 0 && n <= PAIRS_ELEMENTS_MOST)
-        return (recipe){
-            .method = RECIPE_PAIRS, .rays = FEW_RAYS, .accuracy = level->accuracy, .seed = asked->seed};
+        return (recipe){.method = RECIPE_PAIRS,
+                        .rays = asked->sky ? choice_rays(asked) : FEW_RAYS,
+                        .accuracy = level->accuracy,
+                        .seed = asked->seed};
     return (recipe){.method = RECIPE_RAYS, .rays = choice_rays(asked), .seed = asked->seed};
 }

@@ -13,6 +13,7 @@ typedef struct choice_request {
     uint64_t rays;     /* CHOICE_AUTO */
     size_t resolution; /* of hemicubes in place of rays; 0: none */
     uint64_t seed;
+    bool sky; /* what leaves the scene matters too */
 } choice_request;
 
 /* The recipe for n elements: hemicubes where they are asked for, plain rays where their number is given, at

@@ -28,7 +28,7 @@ static double recipe_bytes(double n, const recipe *r) {
 
 double forecast_bytes(const forecast *f) {
     const double n = (double)f->n, n_channels = (double)f->n_channels;
-    const double mesh = 400 * n;
+    const double mesh = 400 * n + (4 * n + 16) * (double)f->sky_tiles;
     const double sample = recipe_bytes(n, &f->recipe);
     /* While it is traced, a sample exists as counts, as rows, and as the merged rows; of pairs as magnitudes,
      * first looks and rows. */

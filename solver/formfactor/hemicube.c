@@ -83,6 +83,7 @@ typedef struct cube_context {
     const hemicube *h;
     const mesh *m;
     const visibility *v;
+    const sky_bounce *sky;
 } cube_context;
 
 /* Where a face is in the scene: pixels lie at forward + x across + y up from the centroid. */
@@ -149,12 +150,14 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
                 visibility_cast(c->v, &rays, n, self, false, &hits);
                 for (size_t i = 0; i < n; i++) {
                     const double weight = hemicube_weight(c->h, face, row, column + i);
-                    if (hits.element[i] == VISIBILITY_NOTHING)
+                    if (hits.element[i] == VISIBILITY_NOTHING) {
                         left += weight;
-                    else if (hits.back[i])
+                        row_pool_leave(pool, c->sky, &rays, i, weight);
+                    } else if (hits.back[i]) {
                         lost += weight;
-                    else
+                    } else {
                         row_pool_add(pool, hits.element[i], weight);
+                    }
                 }
             }
         }
@@ -166,10 +169,12 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
 lam_status hemicube_trace(const hemicube *h, const mesh *m, const visibility *v, const uint32_t *order,
                           const form_factor_options *options, csr *rows, double *leaving, double *absorbed,
                           lam_error *error) {
-    const cube_context context = {.h = h, .m = m, .v = v};
+    const cube_context context = {.h = h, .m = m, .v = v, .sky = options->bounce};
     const row_maker maker = {.make = trace_element,
                              .context = &context,
                              .rays = 3 * h->resolution * h->resolution,
+                             .whole = 1,
+                             .sky = options->bounce,
                              .cheaper = "a lower --resolution",
                              .progress = options->progress,
                              .stage = options->stage};

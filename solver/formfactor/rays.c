@@ -9,6 +9,7 @@ typedef struct ray_context {
     const visibility *v;
     size_t rays;
     uint64_t seed;
+    const sky_bounce *sky;
 } ray_context;
 
 /* Traces one element: every ray counts 1. */
@@ -28,12 +29,14 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
         visibility_cast(c->v, &rays, n, self, false, &hits);
         for (size_t i = 0; i < n; i++) {
             const uint32_t hit = hits.element[i];
-            if (hit == VISIBILITY_NOTHING)
+            if (hit == VISIBILITY_NOTHING) {
                 left++;
-            else if (hits.back[i])
+                row_pool_leave(pool, c->sky, &rays, i, 1);
+            } else if (hits.back[i]) {
                 lost++;
-            else
+            } else {
                 row_pool_add(pool, hit, 1);
+            }
         }
     }
     *leaving = (double)left / (double)c->rays;
@@ -43,10 +46,13 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
 lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
                       const form_factor_options *options, csr *counts, double *leaving, double *absorbed,
                       lam_error *error) {
-    const ray_context context = {.m = m, .v = v, .rays = options->recipe.rays, .seed = options->recipe.seed};
+    const ray_context context = {
+        .m = m, .v = v, .rays = options->recipe.rays, .seed = options->recipe.seed, .sky = options->bounce};
     const row_maker maker = {.make = trace_element,
                              .context = &context,
                              .rays = options->recipe.rays,
+                             .whole = (double)options->recipe.rays,
+                             .sky = options->bounce,
                              .cheaper = "fewer --rays",
                              .progress = options->progress,
                              .stage = options->stage};
