@@ -339,10 +339,12 @@ static int check_together(const fields *f, const option_result *given, bool from
     if (f->output == NULL) return options_usage(verb.name, "no -o STORE.h5 given");
     if (refinements > 1)
         return options_usage(verb.name, "--subdivide, --max-edge and --elements exclude each other");
-    if (from_store && (f->sky != NULL || options_given(&verb, given, "ground-albedo")))
-        return options_usage(verb.name,
-                             "--%s: a store keeps the sky it has; precompute from its scene instead",
-                             f->sky != NULL ? "sky" : "ground-albedo");
+    static const char *const of_sky[] = {"sky", "ground-albedo"};
+    for (size_t i = 0; from_store && i < 2; i++)
+        if (options_given(&verb, given, of_sky[i]))
+            return options_usage(verb.name,
+                                 "--%s: a store keeps the sky it has; precompute from its scene instead",
+                                 of_sky[i]);
     for (size_t i = 0; from_store && i < sizeof of_mesh / sizeof of_mesh[0]; i++)
         if (options_given(&verb, given, of_mesh[i]))
             return options_usage(verb.name,
