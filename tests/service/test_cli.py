@@ -161,7 +161,7 @@ class Usage(Case):
         for line in ("classify a.obj", "sky w.epw -o a.npy", "bench service",
                      "generate city --variant 1 --terrain flat -o a.obj", "generate rooms -o a.obj",
                      "generate anechoic -o a.obj", "generate patio -o a.obj", "generate atrium -o a.obj",
-                     "generate maze -o a.obj", "generate canopy -o a.obj", "solve a.h5 --sky s.npy",
+                     "generate maze -o a.obj", "generate canopy -o a.obj",
                      "solve a.h5 --tolerance 1e-4", "solve a.h5 -o b.glb",
                      *("precompute a.obj -o b.h5 " + option for option in (
                          "--keep-form-factors=compressed", "--method 2msc", "--method sparse",
