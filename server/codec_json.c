@@ -121,6 +121,10 @@ bool codec_read_json(const codec_scene *scene, const char *text, size_t length, 
     json_begin(&p.r, text, length);
     bool good = parser_allocate(&p, (void **)&p.colour, scene->n_channels, sizeof *p.colour) && read_body(&p);
     json_end(&p.r);
+    float *last;
+    /* Vectors behind the last that is under a sky. */
+    if (good && request->L != NULL && request->n_lit < request->n_rhs)
+        good = radiosity_request_light(request, scene, &last, why);
     if (!good && (why->status == 422 || why->status == 501)) {
         /* What is not JSON at all is told first, wherever its fault lies. */
         json_begin(&p.r, text, length);

@@ -175,6 +175,37 @@ static bool read_groups(parser *p, float *E) {
     return p->why->status == 0;
 }
 
+/* A refusal that says what is too large, at the value being read. */
+static bool refused_here(parser *p) {
+    memcpy(p->why->pointer, p->pointer, p->pointer_length);
+    p->why->pointer[p->pointer_length] = '\0';
+    return false;
+}
+
+/* One radiance a tile, each a number or C of them. */
+static bool read_sky(parser *p) {
+    const size_t m = p->scene->n_tiles, C = p->scene->n_channels, mark = p->pointer_length;
+    size_t t = 0;
+    float *L;
+    if (m == 0)
+        return parser_refuse(p, 422, "%s: the store has no sky; precompute it with --sky", parser_here(p));
+    if (!parser_expect(p, JSON_ARRAY, "an array of radiances")) return false;
+    if (!radiosity_request_light(p->request, p->scene, &L, p->why)) return refused_here(p);
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    for (; json_next_element(&p->r); t++) {
+        if (t == m)
+            return parser_refuse(p, 422, "%s holds more than %zu values, one for each tile", parser_here(p),
+                                 m);
+        parser_point_index(p, t);
+        if (!read_colour(p, p->colour)) return false;
+        for (size_t c = 0; c < C; c++) L[c * m + t] = p->colour[c];
+        p->pointer_length = mark;
+    }
+    if (!parser_closed(p)) return false;
+    return t == m ||
+           parser_refuse(p, 422, "%s holds %zu values, must be %zu, one for each tile", parser_here(p), t, m);
+}
+
 static bool read_emission_object(parser *p, float *E) {
     static const char *const names[] = {"elements", "values", "groups", "sky", "emitters"};
     enum { ELEMENTS, VALUES, GROUPS, SKY, EMITTERS, N_NAMES };
@@ -200,9 +231,7 @@ static bool read_emission_object(parser *p, float *E) {
             good = read_groups(p, E);
             break;
         case SKY:
-            good = p->scene->has_sky
-                       ? parser_refuse(p, 501, "%s: a sky as emission is not supported yet", parser_here(p))
-                       : parser_refuse(p, 422, "%s: the store has no sky", parser_here(p));
+            good = read_sky(p);
             break;
         default:
             good =
@@ -214,9 +243,11 @@ static bool read_emission_object(parser *p, float *E) {
         p->pointer_length = mark;
     }
     if (p->why->status != 0) return false;
-    bool sparse = (seen & (1u << ELEMENTS | 1u << VALUES)) != 0, groups = (seen & 1u << GROUPS) != 0;
-    if (sparse == groups)
-        return parser_refuse(p, 422, "%s must hold either elements and values or groups", parser_here(p));
+    const bool sparse = (seen & (1u << ELEMENTS | 1u << VALUES)) != 0;
+    const bool groups = (seen & 1u << GROUPS) != 0, sky = (seen & 1u << SKY) != 0;
+    if ((sparse && groups) || (!sparse && !groups && !sky))
+        return parser_refuse(p, 422, "%s must hold either elements and values or groups, or a sky",
+                             parser_here(p));
     if (sparse && ((seen & 1u << ELEMENTS) == 0 || (seen & 1u << VALUES) == 0))
         return parser_refuse(p, 422, "%s must hold both elements and values", parser_here(p));
     if (n_elements != n_values)
@@ -233,11 +264,7 @@ bool parser_read_emission(parser *p) {
     if (kind == JSON_NOTHING) return parser_fault(p);
     if (kind != JSON_ARRAY && kind != JSON_OBJECT)
         return parser_refuse(p, 422, "%s must be an array of numbers or an object", parser_here(p));
-    if (!radiosity_request_add(p->request, p->scene, &E, p->why)) {
-        memcpy(p->why->pointer, p->pointer, p->pointer_length);
-        p->why->pointer[p->pointer_length] = '\0';
-        return false;
-    }
+    if (!radiosity_request_add(p->request, p->scene, &E, p->why)) return refused_here(p);
     return kind == JSON_ARRAY ? read_dense(p, E) : read_emission_object(p, E);
 }
 

@@ -298,6 +298,23 @@ class Sky(unittest.TestCase):
             self.assertIn(wanted, done.stderr)
             self.assertFalse((self.folder / "no.npy").exists())
 
+    # --- the daemon
+
+    def test_daemon(self):
+        for name, path in self.stores.items():
+            t = self.truth[name]
+            with Daemon(f"{path}:{name}") as daemon:
+                about = daemon.get(f"/v1/scenes/{name}").json()["sky"]
+                self.assertEqual(about, {"tiling": t.attributes["tiling"], "tiles": len(t.tiles),
+                                         "ground_albedo": t.attributes["ground_albedo"]})
+                L = self.rng.random((t.C, len(t.tiles)))
+                for quantity in "radiosity", "irradiance", "indirect":
+                    answer = daemon.radiosity(name, {"emission": {"sky": L.T.tolist(), "groups": {"lamp": 3}},
+                                                     "quantity": quantity})
+                    self.assertEqual(answer.status, 200, answer)
+                    got = np.array(answer.json()[quantity]).reshape(t.C, t.n)
+                    self.close(got, t.solve(t.lamp(3), L, quantity), (name, quantity))
+
     def test_render(self):
         sky = self.npy("render.npy", np.ones(145))
         picture = self.folder / "yard.png"
