@@ -186,7 +186,8 @@ static const recipe ways[] = {{.rays = 1024, .seed = 5},
                               {.method = RECIPE_PAIRS, .rays = 1024, .accuracy = 1e-4, .seed = 5}};
 enum { N_WAYS = sizeof ways / sizeof ways[0] };
 
-/* A box without a lid, four cells a face, and a block of two faces in it. */
+/* A box without a lid, four cells a face, and a slab of two faces in it; and where nobody sees their backs,
+ * one face that looks east and one that looks down. */
 static mesh open_box(void) {
     const double size[3] = {2, 3, 1};
     mesh m = {0};
@@ -197,6 +198,10 @@ static mesh open_box(void) {
     const box_cell slab = {.axis = 2, .level = .6, .from = {.3, .4, .6}, .to = {1.1, 2.2, .6}};
     mesh_add_cell(&m, &slab, true);
     mesh_add_cell(&m, &slab, false);
+    const box_cell wall = {.axis = 0, .level = 5, .from = {5, 0, 0}, .to = {5, 1, 1}};
+    const box_cell below = {.axis = 2, .level = -2, .from = {-3, 0, -2}, .to = {-2, 1, -2}};
+    mesh_add_cell(&m, &wall, true);
+    mesh_add_cell(&m, &below, false);
     mesh_finish(&m, .5f);
     return m;
 }
@@ -230,6 +235,8 @@ START_TEST(open_furnace) {
     f = trace(&m, &ways[_i], "grid:12x11", 0);
     for (size_t i = 0; i < n; i++) ck_assert_double_le(f.row_sums[i] + uniform_sky(&f, i) * M_1_PI, 1 + 1e-6);
     ck_assert_double_gt(uniform_sky(&f, 20), 1);
+    ck_assert_double_eq_tol(uniform_sky(&f, 22), M_PI / 2, .05);
+    ck_assert_double_eq(uniform_sky(&f, 23), 0);
     form_factors_free(&f);
     mesh_free(&m);
 }
