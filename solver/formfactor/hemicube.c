@@ -148,17 +148,20 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
                              n = rest < VISIBILITY_PACKET ? rest : VISIBILITY_PACKET;
                 aim(&f, y, column, resolution, &rays);
                 visibility_cast(c->v, &rays, n, self, false, &hits);
+                double weights[VISIBILITY_PACKET] = {0};
+                unsigned leaving_now = 0;
                 for (size_t i = 0; i < n; i++) {
-                    const double weight = hemicube_weight(c->h, face, row, column + i);
+                    const double weight = weights[i] = hemicube_weight(c->h, face, row, column + i);
                     if (hits.element[i] == VISIBILITY_NOTHING) {
                         left += weight;
-                        row_pool_leave(pool, c->sky, &rays, i, weight);
+                        leaving_now |= 1u << i;
                     } else if (hits.back[i]) {
                         lost += weight;
                     } else {
                         row_pool_add(pool, hits.element[i], weight);
                     }
                 }
+                row_pool_leave(pool, c->sky, &rays, leaving_now, weights);
             }
         }
     }

@@ -23,7 +23,7 @@ typedef struct sky_band {
     uint32_t first, count;
 } sky_band;
 
-enum { SKY_NAME = 24, SKY_REINHART_MOST = 16, SKY_SECTORS_MOST = 360, SKY_BANDS_MOST = 90 };
+enum { SKY_PACKET = 8, SKY_NAME = 24, SKY_REINHART_MOST = 16, SKY_SECTORS_MOST = 360, SKY_BANDS_MOST = 90 };
 
 typedef struct sky_tiling {
     char name[SKY_NAME];
@@ -47,7 +47,8 @@ typedef struct sky_tiling {
 lam_status sky_tiling_create(const char *name, char up, sky_tiling *out, lam_error *error);
 void sky_tiling_free(sky_tiling *s);
 
-/* The tile that a direction (of any length) meets, or n_tiles: the ground, below the horizon. O(1). */
-size_t sky_tiling_find(const sky_tiling *s, float x, float y, float z);
+/* The tile that each of a packet of directions (of any length, by component) meets, or n_tiles: the ground,
+ * below the horizon. O(1). */
+void sky_tiling_find(const sky_tiling *s, const float direction[3][SKY_PACKET], uint32_t tile[SKY_PACKET]);
 
 #endif
