@@ -5,6 +5,7 @@
 
 void radiosity_request_free(radiosity_request *request) {
     free(request->E);
+    free(request->L);
     free(request->selected);
     *request = (radiosity_request){0};
 }
@@ -38,6 +39,32 @@ bool radiosity_request_add(radiosity_request *request, const codec_scene *scene,
     *E = request->E + request->n_rhs * values;
     memset(*E, 0, bytes);
     request->n_rhs++;
+    return true;
+}
+
+bool radiosity_request_light(radiosity_request *request, const codec_scene *scene, float **L, problem *why) {
+    size_t values, bytes, size;
+    if (!size_multiply(scene->n_tiles, scene->n_channels, &values) ||
+        !size_multiply(values, sizeof(float), &bytes) || !size_multiply(bytes, request->n_rhs, &size) ||
+        size > scene->max_bytes)
+        return problem_set(why, 422,
+                           "%zu skies of %zu channels and %zu tiles pass the %zu bytes that a request may "
+                           "hold; send several requests",
+                           request->n_rhs, scene->n_channels, scene->n_tiles, scene->max_bytes);
+    if (request->n_rhs > request->lit_capacity) {
+        size_t capacity = request->capacity;
+        if (!size_multiply(bytes, capacity, &size) || size > scene->max_bytes) {
+            capacity = scene->max_bytes / bytes;
+            size = capacity * bytes;
+        }
+        float *grown = realloc(request->L, size);
+        if (grown == NULL) return problem_set(why, 503, "not enough memory for %zu bytes of sky", size);
+        request->L = grown;
+        request->lit_capacity = capacity;
+    }
+    memset(request->L + request->n_lit * values, 0, (request->n_rhs - request->n_lit) * bytes);
+    request->n_lit = request->n_rhs;
+    *L = request->L + (request->n_rhs - 1) * values;
     return true;
 }
 

@@ -12,7 +12,7 @@ typedef struct codec_scene {
     size_t n;
     size_t n_channels;
     const group_index *groups;
-    bool has_sky;
+    size_t n_tiles; /* of the sky; 0: none */
     bool has_emitters;
     size_t max_batch; /* vectors in a request */
     size_t max_bytes; /* of emission vectors in a request */
@@ -28,7 +28,11 @@ typedef struct radiosity_request {
     size_t n_selected;
     lam_quantity quantity;
 
+    float *L;     /* [n_rhs][C][m], radiances of the sky's tiles; NULL: no vector is under a sky */
+    size_t n_lit; /* vectors that L holds so far */
+
     size_t capacity; /* vectors that E has room for */
+    size_t lit_capacity;
 } radiosity_request;
 
 void radiosity_request_free(radiosity_request *request);
@@ -46,6 +50,10 @@ bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, 
 
 /* Room for one more vector, zeroed: *E is its [C][n]. */
 bool radiosity_request_add(radiosity_request *request, const codec_scene *scene, float **E, problem *why);
+
+/* The sky over the last vector, zeroed: *L is its [C][m]; so are those over the vectors before it that have
+ * none. */
+bool radiosity_request_light(radiosity_request *request, const codec_scene *scene, float **L, problem *why);
 
 /* The contract's word for a quantity. */
 const char *codec_quantity_name(lam_quantity quantity);

@@ -18,21 +18,30 @@ static double now_ms(void) {
     return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
 }
 
-/* A pass's vectors and work area, in the thread's own memory. */
-static bool get_pass_memory(call *in, size_t n_rhs, float **out, void **work, size_t *work_bytes,
-                            problem *why) {
+/* What a pass works with, in the thread's own memory. */
+typedef struct pass_memory {
+    float *out; /* [n_rhs][C][n] */
+    float *H0;  /* likewise, what the sky gives; NULL where no vector is under one */
+    void *work;
+    size_t work_bytes;
+} pass_memory;
+
+static bool get_pass_memory(call *in, size_t n_rhs, bool lit, pass_memory *memory, problem *why) {
     const scene *s = in->scene;
-    size_t values, out_bytes, total;
-    *work_bytes = lam_operator_work_bytes(s->op, n_rhs);
-    if (*work_bytes > 0 && size_multiply(n_rhs * s->n_channels, s->n, &values) &&
+    size_t values, out_bytes, lit_bytes, total;
+    memory->work_bytes = lam_operator_work_bytes(s->op, n_rhs);
+    if (memory->work_bytes > 0 && size_multiply(n_rhs * s->n_channels, s->n, &values) &&
         size_multiply(values, sizeof(float), &out_bytes)) {
-        /* The work area comes behind the vectors, aligned as malloc does. */
+        /* The others come behind the vectors, aligned as malloc does. */
         out_bytes = (out_bytes + 63) / 64 * 64;
-        if (!__builtin_add_overflow(out_bytes, *work_bytes, &total)) {
+        lit_bytes = lit ? out_bytes : 0;
+        if (!__builtin_add_overflow(out_bytes, memory->work_bytes, &total) &&
+            !__builtin_add_overflow(total, lit_bytes, &total)) {
             char *bytes = batch_workspace_get(in->workspace, total);
             if (bytes != NULL) {
-                *out = (float *)(void *)bytes;
-                *work = bytes + out_bytes;
+                memory->out = (float *)(void *)bytes;
+                memory->H0 = lit ? (float *)(void *)(bytes + out_bytes) : NULL;
+                memory->work = bytes + out_bytes + lit_bytes;
                 return true;
             }
         }
@@ -49,23 +58,25 @@ static bool solve(call *in, const radiosity_request *request, answer_notes *note
                           .batch = request->batch,
                           .selected = request->select ? request->selected : NULL,
                           .n_selected = request->n_selected};
-    float *out = NULL;
-    void *work = NULL;
-    size_t work_bytes = 0;
-    if (!get_pass_memory(in, request->n_rhs < PASS ? request->n_rhs : PASS, &out, &work, &work_bytes, why) ||
+    pass_memory memory = {0};
+    if (!get_pass_memory(in, request->n_rhs < PASS ? request->n_rhs : PASS, request->L != NULL, &memory,
+                         why) ||
         !answer_begin(b, &shape, &in->accept, notes, why))
         return false;
     for (size_t first = 0; first < request->n_rhs; first += PASS) {
         size_t count = request->n_rhs - first < PASS ? request->n_rhs - first : PASS;
         lam_error error;
         double start = now_ms();
-        if (lam_operator_apply(s->op, count, request->quantity, request->E + first * s->n_channels * s->n,
-                               out, work, work_bytes, &error) != LAM_OK)
+        if (request->L != NULL)
+            lam_sky_irradiance(s->sky, count * s->n_channels,
+                               request->L + first * s->n_channels * lam_sky_tiles(s->sky), memory.H0);
+        if (lam_operator_apply_lit(s->op, count, request->quantity, request->E + first * s->n_channels * s->n,
+                                   memory.H0, memory.out, memory.work, memory.work_bytes, &error) != LAM_OK)
             return problem_set(why, 500, "%s", error.message);
         double solved = now_ms();
         metrics_pass(in->service->metrics, count);
         notes->solve_ms += solved - start;
-        if (!answer_add(b, &shape, &in->accept, first, count, out, why)) return false;
+        if (!answer_add(b, &shape, &in->accept, first, count, memory.out, why)) return false;
         notes->encode_ms += now_ms() - solved;
     }
     return answer_end(b, &shape, &in->accept, notes, why);
@@ -77,7 +88,7 @@ void post_radiosity(call *in, answer *out) {
     codec_scene about = {.n = s->n,
                          .n_channels = s->n_channels,
                          .groups = &s->groups,
-                         .has_sky = s->has_sky,
+                         .n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0,
                          .has_emitters = s->has_emitters,
                          .max_batch = c->max_batch,
                          .max_bytes =

@@ -2,6 +2,7 @@
 
 #include "server/scene_description.h"
 #include "solver/operator/operator.h"
+#include "solver/operator/sky.h"
 #include "store/store.h"
 
 #include <math.h>
@@ -55,7 +56,7 @@ lam_status scene_open(const char *path, const char *name, bool verify, scene **o
     TRY(operator_load(s, &made->op, error));
     made->n = lam_operator_elements(made->op);
     made->n_channels = lam_operator_channels(made->op);
-    made->has_sky = store_has(s, "/sky");
+    TRY(sky_load(s, made->n, &made->sky, error));
     made->has_emitters = strcmp(lam_operator_kind(made->op), "emitters") == 0;
     TRY(read_groups(s, made, error));
     TRY(store_group_bytes(s, "/operator", &made->bytes, error));
@@ -77,6 +78,7 @@ scene *scene_acquire(scene *s) {
 void scene_release(scene *s) {
     if (atomic_fetch_sub(&s->references, 1) != 1) return;
     lam_operator_close(s->op);
+    lam_sky_close(s->sky);
     group_index_free(&s->groups);
     free(s->description);
     free(s->name);

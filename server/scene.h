@@ -17,7 +17,7 @@ typedef struct scene {
     size_t n_channels;
     lam_operator *op;
     group_index groups;
-    bool has_sky;
+    lam_sky *sky; /* NULL: none */
     bool has_emitters;
     uint64_t bytes;    /* of /operator as stored */
     char *description; /* the JSON of GET /v1/scenes/NAME */

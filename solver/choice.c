@@ -27,9 +27,6 @@ size_t choice_rays(const choice_request *asked) {
     return recipe_auto_rays(asked->epsilon, level_of(asked->quality)->noise_share);
 }
 
-/* Rays that only ask whether a scene is closed and whether its faces are turned. */
-enum { FEW_RAYS = 256 };
-
 recipe choice_recipe(const choice_request *asked, bool all_pairs) {
     const quality_level *level = level_of(asked->quality);
     recipe r = {.method = RECIPE_RAYS, .rays = choice_rays(asked), .seed = asked->seed};
@@ -38,6 +35,6 @@ recipe choice_recipe(const choice_request *asked, bool all_pairs) {
     if (asked->rays != CHOICE_AUTO || level->accuracy == 0) return r;
     r.method = all_pairs ? RECIPE_PAIRS : RECIPE_NEAR_PAIRS;
     r.accuracy = level->accuracy;
-    if (all_pairs) r.rays = FEW_RAYS;
+    if (all_pairs && !asked->sky) r.rays = RECIPE_RAYS_FEW;
     return r;
 }

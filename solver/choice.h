@@ -13,6 +13,7 @@ typedef struct choice_request {
     uint64_t rays;     /* CHOICE_AUTO */
     size_t resolution; /* of hemicubes in place of rays; 0: none */
     uint64_t seed;
+    bool sky; /* what leaves the scene matters too */
 } choice_request;
 
 /* More elements than these have more pairs than anybody waits for. */

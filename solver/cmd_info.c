@@ -91,6 +91,14 @@ static void print_groups(const json_t *groups) {
     if (shown < count) printf("%-18sand %zu more (--json names them)\n", "", count - shown);
 }
 
+static void print_sky(const json_t *sky) {
+    if (!json_is_object(sky)) return;
+    const char *tiling = json_string_value(json_object_get(sky, "tiling"));
+    printf("%-18s%s, %" JSON_INTEGER_FORMAT " tiles, ground albedo %g\n", "sky",
+           tiling != NULL ? tiling : "?", json_integer_value(json_object_get(sky, "tiles")),
+           json_number_value(json_object_get(sky, "ground_albedo")));
+}
+
 static void print_text(const json_t *about) {
     static const char *const plain[] = {"name",   "elements", "channels", "kind",
                                         "method", "reason",   "epsilon"};
@@ -100,6 +108,7 @@ static void print_text(const json_t *about) {
     print_value("density", json_object_get(about, "density"));
     print_bytes(json_number_value(json_object_get(about, "bytes")));
     print_groups(json_object_get(about, "groups"));
+    print_sky(json_object_get(about, "sky"));
     print_error(json_object_get(about, "error"));
     const json_t *provenance = json_object_get(about, "provenance");
     const json_t *form_factors = json_object_get(provenance, "form_factors");

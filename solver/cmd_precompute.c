@@ -20,6 +20,7 @@ typedef struct fields {
     const char *form_factors;
     uint64_t rays, resolution;
     const char *quality, *sky, *keep_form_factors;
+    double ground_albedo;
     const char *method, *factorizer;
     double epsilon, alpha;
     uint64_t levels, rank;
@@ -28,6 +29,22 @@ typedef struct fields {
     uint64_t threads, memory, seed, probes;
     bool quiet, progress;
 } fields;
+
+/* NULL: none. */
+static lam_status parse_sky(const char *text, void *field, lam_error *error) {
+    lam_status status = LAM_OK;
+    sky_tiling tiling = {0};
+    const char **sky = field;
+    lam_error why = {0};
+    *sky = NULL;
+    if (strcmp(text, "none") == 0) return LAM_OK;
+    status = sky_tiling_create(text, 'z', &tiling, &why);
+    if (status != LAM_OK) FAIL(error, status, "--sky %s", why.message);
+    *sky = text;
+done:
+    sky_tiling_free(&tiling);
+    return status;
+}
 
 #define FIELD(member) offsetof(fields, member)
 static const option_row rows[] = {
@@ -114,13 +131,19 @@ static const option_row rows[] = {
             "so and the others by rays at 1/4, 1/8 (normal)",
      .choices = "draft|normal|high"},
     {.name = "sky",
-     .kind = OPTION_CHOICE,
+     .kind = OPTION_CUSTOM,
      .offset = FIELD(sky),
-     .value = "none",
-     .doc = "Sky tiles (none; the others are not supported yet)",
-     .choices = "none",
-     .later = "tregenza|reinhart:|grid:"},
-    {.name = "ground-albedo", .kind = OPTION_LATER, .value = "X", .doc = "(not supported yet)"},
+     .value = "none|tregenza|reinhart:MF|grid:AxB",
+     .doc = "Sky in tiles, whose light the store then takes: 145, 144 MF^2 + 1, or A sectors by B bands "
+            "(none)",
+     .parse = parse_sky},
+    {.name = "ground-albedo",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(ground_albedo),
+     .value = "X",
+     .doc = "Share of the sky's light that the ground returns: what lies below the horizon (0)",
+     .low = 0,
+     .high = 1},
     {.name = "keep-form-factors",
      .kind = OPTION_OPTIONAL,
      .offset = FIELD(keep_form_factors),
@@ -316,6 +339,12 @@ static int check_together(const fields *f, const option_result *given, bool from
     if (f->output == NULL) return options_usage(verb.name, "no -o STORE.h5 given");
     if (refinements > 1)
         return options_usage(verb.name, "--subdivide, --max-edge and --elements exclude each other");
+    static const char *const of_sky[] = {"sky", "ground-albedo"};
+    for (size_t i = 0; from_store && i < 2; i++)
+        if (options_given(&verb, given, of_sky[i]))
+            return options_usage(verb.name,
+                                 "--%s: a store keeps the sky it has; precompute from its scene instead",
+                                 of_sky[i]);
     for (size_t i = 0; from_store && i < sizeof of_mesh / sizeof of_mesh[0]; i++)
         if (options_given(&verb, given, of_mesh[i]))
             return options_usage(verb.name,
@@ -339,6 +368,7 @@ static bool unused_by_form_factors(const char *name, const fields *f, bool from_
     if (strcmp(name, "form-factors") == 0) return from_store;
     if (strcmp(name, "resolution") == 0) return from_store || !hemicube;
     if (strcmp(name, "quality") == 0) return from_store || hemicube || f->rays != OPTION_AUTO;
+    if (strcmp(name, "ground-albedo") == 0) return f->sky == NULL;
     if (strcmp(name, "rays") == 0) return from_store ? f->probes == 0 : hemicube;
     return false;
 }
@@ -424,7 +454,10 @@ int cmd_precompute(int argc, char **argv) {
                          .epsilon = f.epsilon,
                          .rays = is_hemicube(&f) && !from_store ? CHOICE_AUTO : f.rays,
                          .resolution = is_hemicube(&f) && !from_store ? f.resolution : 0,
-                         .seed = f.seed},
+                         .seed = f.seed,
+                         .sky = f.sky != NULL},
+        .sky = f.sky,
+        .ground_albedo = f.ground_albedo,
         .probes = f.probes,
         .keep_form_factors = f.keep_form_factors != NULL,
         .method = f.method,

@@ -1,6 +1,7 @@
 /* lambert render: a picture of a store under any lighting. */
 #include "solver/emission.h"
 #include "solver/operator/operator.h"
+#include "solver/operator/sky.h"
 #include "solver/output_file.h"
 #include "solver/picture.h"
 #include "solver/terminal.h"
@@ -22,7 +23,7 @@ typedef struct size_option {
 
 typedef struct fields {
     option_list emit;
-    const char *emission;
+    const char *emission, *sky;
     const char *quantity;
     camera_option camera;
     size_option size;
@@ -85,7 +86,11 @@ static const option_row rows[] = {
      .offset = FIELD(emission),
      .value = "FILE.npy|.json",
      .doc = "One emission from a file"},
-    {.name = "sky", .kind = OPTION_LATER, .value = "FILE.npy", .doc = "(not supported yet)"},
+    {.name = "sky",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(sky),
+     .value = "FILE.npy",
+     .doc = "Radiances of the sky's tiles, W/(m2 sr): [m] or [C][m]; alone or beside one of the others"},
     {.kind = OPTION_HEADING, .doc = "view"},
     {.name = "quantity",
      .kind = OPTION_CHOICE,
@@ -131,24 +136,6 @@ static const option_verb verb = {
     .min_arguments = 1,
     .max_arguments = 1,
 };
-
-/* One solve: *values is [C][n], freed by the caller. */
-static lam_status solve(const lam_operator *op, lam_quantity quantity, const float *E, float **values,
-                        lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t work_bytes = lam_operator_work_bytes(op, 1);
-    float *out = memory_allocate(lam_operator_elements(op), lam_operator_channels(op) * sizeof *out,
-                                 "the values shown", error);
-    void *work = memory_allocate(work_bytes, 1, "the work area of a solve", error);
-    if (out == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(lam_operator_apply(op, 1, quantity, E, out, work, work_bytes, error));
-    *values = out;
-    out = NULL;
-done:
-    free(out);
-    free(work);
-    return status;
-}
 
 static float luminance_of(const mesh *m, const float *values, size_t i) {
     float channels[3] = {0, 0, 0};
@@ -225,6 +212,7 @@ static lam_status render(const char *path, const fields *f, terminal *t, lam_err
     store *s = NULL;
     mesh m = {0};
     lam_operator *op = NULL;
+    lam_sky *sky = NULL;
     visibility *seen = NULL;
     shade *shown = NULL;
     emission light = {0};
@@ -236,23 +224,25 @@ static lam_status render(const char *path, const fields *f, terminal *t, lam_err
     TRY(output_file_check(f->output, error));
     TRY(store_open(path, &s, error));
     TRY(mesh_load(s, &m, &row_sums, error));
-    TRY(emission_choose(&m, &f->emit, f->emission, &light, &own, error));
+    TRY(sky_load(s, m.n, &sky, error));
+    const emission_wish wish = {.items = &f->emit, .path = f->emission, .sky = f->sky};
+    TRY(emission_choose(&m, sky, &wish, &light, &own, error));
     if (light.n_vectors != 1)
-        FAIL(error, LAM_ERR_ARGUMENT, "%s: holds %zu emissions, a picture shows exactly 1", f->emission,
-             light.n_vectors);
+        FAIL(error, LAM_ERR_ARGUMENT, "%s: holds %zu emissions, a picture shows exactly 1",
+             f->emission != NULL ? f->emission : f->sky, light.n_vectors);
     TRY(operator_load(s, &op, error));
     TRY(terminal_check(error));
     const lam_quantity quantity = strcmp(f->quantity, "irradiance") == 0 ? LAM_IRRADIANCE
                                   : strcmp(f->quantity, "indirect") == 0 ? LAM_INDIRECT
                                                                          : LAM_RADIOSITY;
-    TRY(solve(op, quantity, light.E, &values, error));
+    TRY(emission_apply(&light, op, sky, quantity, NULL, &values, error));
     lit = memory_allocate(m.n, sizeof *lit, "lit elements", error);
     glows = memory_allocate(m.n, sizeof *glows, "glowing elements", error);
     if (lit == NULL || glows == NULL) TRY(LAM_ERR_MEMORY);
     mark(&m, values, light.E, quantity == LAM_RADIOSITY, lit, glows);
     if (own && memchr(glows, true, m.n) == NULL && memchr(lit, true, m.n) == NULL)
         FAIL(error, LAM_ERR_ARGUMENT,
-             "%s: the scene has no light of its own; give --emit GROUP=V or --emission", path);
+             "%s: the scene has no light of its own; give --emit GROUP=V, --emission or --sky", path);
     TRY(visibility_create(&m, &seen, error));
     TRY(shade_create(&m, m.n_channels, values, f->smooth, &shown, error));
     const picture_scene scene = {.mesh = &m, .visibility = seen, .shade = shown, .glows = glows};
@@ -267,6 +257,7 @@ done:
     visibility_destroy(seen);
     emission_free(&light);
     lam_operator_close(op);
+    lam_sky_close(sky);
     mesh_free(&m);
     store_close(s);
     return status;

@@ -1,6 +1,7 @@
 /* lambert solve: lights a store and writes what it answers. */
 #include "solver/emission.h"
 #include "solver/operator/operator.h"
+#include "solver/operator/sky.h"
 #include "solver/output.h"
 #include "solver/output_file.h"
 #include "solver/terminal.h"
@@ -10,12 +11,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Vectors in one pass over the operator. */
-enum { AT_ONCE = 64 };
-
 typedef struct fields {
     option_list emit, reduce;
-    const char *emission, *quantity, *output;
+    const char *emission, *sky, *quantity, *output;
 } fields;
 
 #define FIELD(member) offsetof(fields, member)
@@ -37,7 +35,11 @@ static const option_row rows[] = {
      .offset = FIELD(emission),
      .value = "FILE.npy|.json",
      .doc = "One emission or a batch from a file"},
-    {.name = "sky", .kind = OPTION_LATER, .value = "FILE.npy", .doc = "(not supported yet)"},
+    {.name = "sky",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(sky),
+     .value = "FILE.npy",
+     .doc = "Radiances of the sky's tiles, W/(m2 sr): [m], [C][m] or a batch; alone or beside the others"},
     {.kind = OPTION_HEADING, .doc = "answer"},
     {.name = "quantity",
      .kind = OPTION_CHOICE,
@@ -73,33 +75,6 @@ static bool is_dark(const emission *light, size_t count) {
     for (size_t i = 0; i < count; i++)
         if (light->E[i] > 0) return false;
     return true;
-}
-
-static lam_status apply(const lam_operator *op, lam_quantity quantity, const emission *light, float **out,
-                        lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t vector = lam_operator_elements(op) * lam_operator_channels(op);
-    const size_t bytes = lam_operator_work_bytes(op, AT_ONCE);
-    void *area = NULL;
-    float *values = NULL;
-    size_t count;
-    if (!size_multiply(vector, light->n_vectors, &count))
-        FAIL(error, LAM_ERR_MEMORY, "%zu emissions are too many for memory", light->n_vectors);
-    values = memory_allocate(count, sizeof *values, "the solution", error);
-    area = memory_allocate(bytes, 1, "the work area of a solve", error);
-    if (values == NULL || area == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t first = 0; first < light->n_vectors; first += AT_ONCE) {
-        const size_t n = light->n_vectors - first < AT_ONCE ? light->n_vectors - first : AT_ONCE;
-        TRY(lam_operator_apply(op, n, quantity, light->E + first * vector, values + first * vector, area,
-                               bytes, error));
-        TRY(terminal_check(error));
-    }
-    *out = values;
-    values = NULL;
-done:
-    free(values);
-    free(area);
-    return status;
 }
 
 /* The mean total error for the scene's own lights, or for single elements; negative where there is none. */
@@ -182,6 +157,7 @@ static lam_status solve(const char *path, const fields *f, reduction *reductions
     store *s = NULL;
     mesh m = {0};
     lam_operator *op = NULL;
+    lam_sky *sky = NULL;
     emission light = {0};
     double *row_sums = NULL;
     float *values = NULL;
@@ -192,14 +168,17 @@ static lam_status solve(const char *path, const fields *f, reduction *reductions
     TRY(store_get_text(s, "/", "name", &scene, error));
     TRY(mesh_load(s, &m, &row_sums, error));
     for (size_t i = 0; i < f->reduce.count; i++) TRY(reduce_bind(&reductions[i], &m, error));
-    TRY(emission_choose(&m, &f->emit, f->emission, &light, &own, error));
+    TRY(sky_load(s, m.n, &sky, error));
+    const emission_wish wish = {.items = &f->emit, .path = f->emission, .sky = f->sky};
+    TRY(emission_choose(&m, sky, &wish, &light, &own, error));
     if (own && is_dark(&light, m.n * m.n_channels))
         FAIL(error, LAM_ERR_ARGUMENT,
-             "%s: the scene has no light of its own; give --emit GROUP=V or --emission FILE", path);
-    if (own) terminal_log(t, "no --emit and no --emission: the scene's own light");
+             "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s", path,
+             sky != NULL ? " or --sky FILE" : "");
+    if (own) terminal_log(t, "no --emit, --emission or --sky: the scene's own light");
     TRY(operator_load(s, &op, error));
     TRY(terminal_check(error));
-    TRY(apply(op, quantity_of(f->quantity), &light, &values, error));
+    TRY(emission_apply(&light, op, sky, quantity_of(f->quantity), terminal_check, &values, error));
     solution out = {.m = &m,
                     .scene = scene,
                     .quantity = f->quantity,
@@ -219,6 +198,7 @@ done:
     free(row_sums);
     emission_free(&light);
     lam_operator_close(op);
+    lam_sky_close(sky);
     mesh_free(&m);
     store_close(s);
     return status;

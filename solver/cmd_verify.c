@@ -41,9 +41,15 @@ static const struct {
     const char *name;
     verify_check *run;
 } checks[] = {
-    {"checksums", verify_checksums}, {"mesh", verify_mesh},           {"form factors", verify_form_factors},
-    {"operator", verify_operator},   {"linearity", verify_linearity}, {"energy", verify_energy},
-    {"error", verify_error},         {"scene", verify_scene},
+    {"checksums", verify_checksums},
+    {"mesh", verify_mesh},
+    {"form factors", verify_form_factors},
+    {"sky", verify_sky},
+    {"operator", verify_operator},
+    {"linearity", verify_linearity},
+    {"energy", verify_energy},
+    {"error", verify_error},
+    {"scene", verify_scene},
 };
 #define N_CHECKS (sizeof checks / sizeof checks[0])
 

@@ -10,6 +10,7 @@ enum { EMISSION_MAX_CHANNELS = 16 };
 
 void emission_free(emission *e) {
     free(e->E);
+    free(e->L);
     *e = (emission){0};
 }
 
@@ -154,10 +155,61 @@ done:
     return status;
 }
 
-lam_status emission_choose(const mesh *m, const option_list *items, const char *path, emission *out,
+lam_status emission_choose(const mesh *m, const lam_sky *sky, const emission_wish *wish, emission *out,
                            bool *own, lam_error *error) {
-    *own = items->count == 0 && path == NULL;
-    if (items->count > 0) return emission_from_groups(m, items, out, error);
-    if (path != NULL) return emission_read(path, m, out, error);
-    return emission_of_scene(m, out, error);
+    lam_status status = LAM_OK;
+    emission e = {.n_vectors = 1};
+    const size_t n_tiles = sky != NULL ? lam_sky_tiles(sky) : 0;
+    *own = wish->items->count == 0 && wish->path == NULL && wish->sky == NULL;
+    if (*own)
+        TRY(emission_of_scene(m, &e, error));
+    else if (wish->items->count > 0)
+        TRY(emission_from_groups(m, wish->items, &e, error));
+    else if (wish->path != NULL)
+        TRY(emission_read(wish->path, m, n_tiles, &e, error));
+    else
+        TRY(one_vector(m, &e.E, error));
+    if (wish->sky != NULL) TRY(emission_add_sky(&e, wish->sky, m, n_tiles, error));
+    *out = e;
+    e = (emission){0};
+done:
+    emission_free(&e);
+    return status;
+}
+
+lam_status emission_apply(const emission *e, const lam_operator *op, const lam_sky *sky,
+                          lam_quantity quantity, lam_status (*stop)(lam_error *error), float **values,
+                          lam_error *error) {
+    enum { AT_ONCE = 64 }; /* vectors in one pass */
+    lam_status status = LAM_OK;
+    const size_t n_channels = lam_operator_channels(op), vector = lam_operator_elements(op) * n_channels;
+    const size_t most = e->n_vectors < AT_ONCE ? e->n_vectors : AT_ONCE;
+    const size_t bytes = lam_operator_work_bytes(op, most);
+    void *work = NULL;
+    float *made = NULL, *H0 = NULL;
+    size_t count;
+    if (!size_multiply(vector, e->n_vectors, &count))
+        FAIL(error, LAM_ERR_MEMORY, "%zu emissions are too many for memory", e->n_vectors);
+    made = memory_allocate(count, sizeof *made, "the solution", error);
+    work = memory_allocate(bytes, 1, "the work area of a solve", error);
+    if (made == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
+    if (e->L != NULL) {
+        H0 = memory_allocate(vector, most * sizeof *H0, "the light of the sky", error);
+        if (H0 == NULL) TRY(LAM_ERR_MEMORY);
+    }
+    for (size_t first = 0; first < e->n_vectors; first += most) {
+        const size_t n = e->n_vectors - first < most ? e->n_vectors - first : most;
+        if (e->L != NULL)
+            lam_sky_irradiance(sky, n * n_channels, e->L + first * n_channels * lam_sky_tiles(sky), H0);
+        TRY(lam_operator_apply_lit(op, n, quantity, e->E + first * vector, H0, made + first * vector, work,
+                                   bytes, error));
+        if (stop != NULL) TRY(stop(error));
+    }
+    *values = made;
+    made = NULL;
+done:
+    free(made);
+    free(work);
+    free(H0);
+    return status;
 }

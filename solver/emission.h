@@ -2,6 +2,7 @@
 #ifndef LAMBERT_SOLVER_EMISSION_H
 #define LAMBERT_SOLVER_EMISSION_H
 
+#include "lambert/lambert.h"
 #include "solver/options.h"
 #include "solver/scene/mesh.h"
 
@@ -10,6 +11,7 @@ typedef struct emission {
     size_t n_vectors;
     bool batch; /* given as a batch (also of one), so answered as one */
     float *E;
+    float *L; /* [n_vectors][C][m], radiances of the tiles of the store's sky, W/(m^2 sr); NULL: no sky */
 } emission;
 
 void emission_free(emission *e);
@@ -22,18 +24,45 @@ lam_status emission_from_groups(const mesh *m, const option_list *items, emissio
 /* Whether every item is well formed, whatever the store: otherwise it is wrong usage. */
 lam_status emission_check_items(const option_list *items, lam_error *error);
 
-/* A file. NPY: <f4 or <f8 of shape [n], [C][n] or a batch of them ([m][C][n]; also [m][n] with one channel).
- * JSON: such an array, the contract's EMISSION, or an object with `emission` or `emissions`.
+/* A file. NPY: <f4 or <f8 of shape [n], [C][n] or a batch of them ([b][C][n]; also [b][n] with one channel).
+ * JSON: such an array, the contract's EMISSION, or an object with `emission` or `emissions`; n_tiles says how
+ * many tiles its skies have, 0: the store has none.
  * Errors name the file, the place, the value and the limit. */
-lam_status emission_read(const char *path, const mesh *m, emission *out, lam_error *error);
+lam_status emission_read(const char *path, const mesh *m, size_t n_tiles, emission *out, lam_error *error);
+lam_status emission_read_npy(const char *path, const mesh *m, emission *out, lam_error *error);
+
+/* Puts e under the sky of an NPY file: [m], [C][m] or a batch of them; one sky goes with every emission, one
+ * emission with every sky, else there must be as many. */
+lam_status emission_add_sky(emission *e, const char *path, const mesh *m, size_t n_tiles, lam_error *error);
+
+/* A value of a file that must be light: finite, not negative. */
+lam_status emission_check_value(const char *path, size_t vector, size_t index, double value, float *out,
+                                lam_error *error);
+
+/* *values is [n_vectors][C][width], zero; freed with free(). */
+lam_status emission_allocate(const char *path, size_t n_channels, size_t width, size_t n_vectors,
+                             float **values, lam_error *error);
 
 /* The scene's own emission as one vector. */
 lam_status emission_of_scene(const mesh *m, emission *out, lam_error *error);
 
-/* Whichever of the three the command line asks for: groups when there are items, else the file, else the
- * scene's own, which is *own. */
-lam_status emission_choose(const mesh *m, const option_list *items, const char *path, emission *out,
+/* What a command line asks for. */
+typedef struct emission_wish {
+    const option_list *items; /* --emit */
+    const char *path;         /* --emission, or NULL */
+    const char *sky;          /* --sky, or NULL */
+} emission_wish;
+
+/* Groups when there are items, else the file, else none beside a sky, else the scene's own, which is *own.
+ * sky is the store's, or NULL. */
+lam_status emission_choose(const mesh *m, const lam_sky *sky, const emission_wish *wish, emission *out,
                            bool *own, lam_error *error);
+
+/* *values is [n_vectors][C][n], freed with free(): what the operator makes of each vector under its sky.
+ * stop, which may be NULL, is asked between passes and ends the work with its status. */
+lam_status emission_apply(const emission *e, const lam_operator *op, const lam_sky *sky,
+                          lam_quantity quantity, lam_status (*stop)(lam_error *error), float **values,
+                          lam_error *error);
 
 /* Calls visit(context, g) for each group that name means; returns how many. */
 size_t emission_match_groups(const mesh *m, const char *name, void (*visit)(void *context, size_t group),

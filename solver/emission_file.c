@@ -1,83 +1,25 @@
-/* Emissions from NPY and JSON files; every number is checked before it becomes light. */
+/* Emissions from JSON files; every number is checked before it becomes light. */
 #include "solver/emission.h"
-#include "solver/npy.h"
 #include "solver/output_file.h"
 
 #include <errno.h>
-#include <float.h>
 #include <jansson.h>
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-/* What a reader is filling: vector number `vector` of E. */
+/* What a reader is filling: vector number `vector`. */
 typedef struct reading {
     const char *path;
     const mesh *m;
+    size_t n_tiles;
     size_t vector;
-    float *E; /* [C][n] of this vector */
+    float *E;       /* [C][n] of this vector */
+    emission *made; /* all vectors, whose L comes into being with the first sky */
     lam_error *error;
 } reading;
 
 static lam_status check_value(const reading *r, size_t index, double value, float *out) {
-    lam_status status = LAM_OK;
-    if (!isfinite(value))
-        FAIL(r->error, LAM_ERR_ARGUMENT, "%s: emission %zu, value %zu is not finite", r->path, r->vector,
-             index);
-    if (value < 0 || value > (double)FLT_MAX)
-        FAIL(r->error, LAM_ERR_ARGUMENT, "%s: emission %zu, value %zu = %g, must be from 0 to %g", r->path,
-             r->vector, index, value, (double)FLT_MAX);
-    *out = (float)value;
-done:
-    return status;
+    return emission_check_value(r->path, r->vector, index, value, out, r->error);
 }
-
-static lam_status allocate_vectors(const mesh *m, size_t n_vectors, const char *path, float **E,
-                                   lam_error *error) {
-    size_t count = 0;
-    if (!size_multiply(m->n, m->n_channels, &count) || !size_multiply(count, n_vectors, &count))
-        return status_fail(error, LAM_ERR_MEMORY, "%s: too many emissions for memory", path);
-    *E = memory_allocate(count, sizeof **E, path, error);
-    return *E == NULL ? LAM_ERR_MEMORY : LAM_OK;
-}
-
-/* --- NPY -------------------------------------------------------------------------------------------------
- */
-
-static lam_status npy_emission(const char *path, const mesh *m, emission *out, lam_error *error) {
-    lam_status status = LAM_OK;
-    npy a = {0};
-    emission made = {0};
-    const size_t n = m->n, n_channels = m->n_channels;
-    TRY(npy_read(path, &a, error));
-    const bool grey = a.rank == 1; /* one row stands for every channel */
-    const bool rows = a.rank == 2 && a.dims[0] == n_channels;
-    made.batch = a.rank == 3 || (a.rank == 2 && !rows && n_channels == 1);
-    if (a.dims[a.rank - 1] != n)
-        FAIL(error, LAM_ERR_ARGUMENT, "%s: rows of %zu values, the store has %zu elements", path,
-             a.dims[a.rank - 1], n);
-    if ((!grey && !rows && !made.batch) || (a.rank == 3 && a.dims[1] != n_channels))
-        FAIL(error, LAM_ERR_ARGUMENT, "%s: shape does not fit; needs [%zu], [%zu][%zu] or a batch of them",
-             path, n, n_channels, n);
-    made.n_vectors = made.batch ? a.dims[0] : 1;
-    if (made.n_vectors == 0) FAIL(error, LAM_ERR_ARGUMENT, "%s: an empty batch", path);
-    TRY(allocate_vectors(m, made.n_vectors, path, &made.E, error));
-    for (size_t v = 0; v < made.n_vectors; v++)
-        for (size_t i = 0; i < n_channels * n; i++) {
-            const size_t from = grey ? i % n : v * n_channels * n + i;
-            const reading r = {path, m, v, made.E + v * n_channels * n, error};
-            TRY(check_value(&r, grey ? i % n : i, a.values[from], &r.E[i]));
-        }
-    *out = made;
-    made = (emission){0};
-done:
-    emission_free(&made);
-    npy_free(&a);
-    return status;
-}
-
-/* --- JSON ------------------------------------------------------------------------------------------------
- */
 
 /* A number, or one number per channel. */
 static lam_status read_channels(const reading *r, size_t index, const json_t *value, float *out) {
@@ -179,6 +121,29 @@ done:
     return status;
 }
 
+/* One radiance a tile, W/(m^2 sr). */
+static lam_status read_sky(const reading *r, const json_t *sky) {
+    lam_status status = LAM_OK;
+    const size_t m = r->n_tiles, n_channels = r->m->n_channels;
+    float channels[16];
+    if (m == 0)
+        FAIL(r->error, LAM_ERR_ARGUMENT,
+             "%s: emission %zu asks for a sky, the store has none; precompute with --sky", r->path,
+             r->vector);
+    if (!json_is_array(sky) || n_channels > 16 || json_array_size(sky) != m)
+        FAIL(r->error, LAM_ERR_ARGUMENT, "%s: emission %zu: sky must be an array of %zu values, one a tile",
+             r->path, r->vector, m);
+    if (r->made->L == NULL)
+        TRY(emission_allocate(r->path, n_channels, m, r->made->n_vectors, &r->made->L, r->error));
+    for (size_t t = 0; t < m; t++) {
+        TRY(read_channels(r, t, json_array_get(sky, t), channels));
+        for (size_t c = 0; c < n_channels; c++)
+            r->made->L[(r->vector * n_channels + c) * m + t] = channels[c];
+    }
+done:
+    return status;
+}
+
 /* The contract's EMISSION. */
 static lam_status read_one(const reading *r, const json_t *value) {
     lam_status status = LAM_OK;
@@ -188,18 +153,21 @@ static lam_status read_one(const reading *r, const json_t *value) {
              r->vector);
     json_t *groups = json_object_get(value, "groups");
     const json_t *elements = json_object_get(value, "elements"), *values = json_object_get(value, "values");
-    if (json_object_get(value, "sky") != NULL || json_object_get(value, "emitters") != NULL)
-        FAIL(r->error, LAM_ERR_ARGUMENT, "%s: emission %zu asks for %s, the store has none", r->path,
-             r->vector, json_object_get(value, "sky") != NULL ? "a sky" : "emitters");
-    if ((groups == NULL) == (elements == NULL) || (elements == NULL) != (values == NULL) ||
-        json_object_size(value) > (groups != NULL ? 1 : 2))
-        FAIL(r->error, LAM_ERR_ARGUMENT,
-             "%s: emission %zu must be an array, {\"elements\", \"values\"} or {\"groups\"}", r->path,
+    const json_t *sky = json_object_get(value, "sky");
+    if (json_object_get(value, "emitters") != NULL)
+        FAIL(r->error, LAM_ERR_ARGUMENT, "%s: emission %zu asks for emitters, the store has none", r->path,
              r->vector);
-    if (groups != NULL)
-        TRY(read_groups(r, groups));
-    else
-        TRY(read_elements(r, elements, values));
+    const size_t members = (groups != NULL) + 2 * (elements != NULL) + (sky != NULL);
+    if ((groups != NULL && elements != NULL) || (elements == NULL) != (values == NULL) || members == 0 ||
+        json_object_size(value) > members)
+        FAIL(r->error, LAM_ERR_ARGUMENT,
+             "%s: emission %zu must be an array, or {\"elements\", \"values\"} or {\"groups\"} or {\"sky\"} "
+             "or "
+             "the last beside one of them",
+             r->path, r->vector);
+    if (groups != NULL) TRY(read_groups(r, groups));
+    if (elements != NULL) TRY(read_elements(r, elements, values));
+    if (sky != NULL) TRY(read_sky(r, sky));
 done:
     return status;
 }
@@ -212,7 +180,8 @@ static bool is_array_batch(const json_t *value, const mesh *m) {
     return json_is_array(json_array_get(first, 0)) || (m->n_channels == 1 && json_array_size(value) > 1);
 }
 
-static lam_status json_emission(const char *path, const mesh *m, emission *out, lam_error *error) {
+static lam_status json_emission(const char *path, const mesh *m, size_t n_tiles, emission *out,
+                                lam_error *error) {
     lam_status status = LAM_OK;
     emission made = {.n_vectors = 1};
     json_error_t place;
@@ -229,9 +198,9 @@ static lam_status json_emission(const char *path, const mesh *m, emission *out, 
     made.batch = many != NULL || is_array_batch(value, m);
     if (made.batch) made.n_vectors = json_array_size(value);
     if (made.n_vectors == 0) FAIL(error, LAM_ERR_ARGUMENT, "%s: an empty batch", path);
-    TRY(allocate_vectors(m, made.n_vectors, path, &made.E, error));
+    TRY(emission_allocate(path, m->n_channels, m->n, made.n_vectors, &made.E, error));
     for (size_t v = 0; v < made.n_vectors; v++) {
-        const reading r = {path, m, v, made.E + v * m->n * m->n_channels, error};
+        const reading r = {path, m, n_tiles, v, made.E + v * m->n * m->n_channels, &made, error};
         TRY(read_one(&r, made.batch ? json_array_get(value, v) : value));
     }
     *out = made;
@@ -242,10 +211,10 @@ done:
     return status;
 }
 
-lam_status emission_read(const char *path, const mesh *m, emission *out, lam_error *error) {
+lam_status emission_read(const char *path, const mesh *m, size_t n_tiles, emission *out, lam_error *error) {
     char extension[16];
     output_file_extension(path, extension);
-    if (strcmp(extension, "npy") == 0) return npy_emission(path, m, out, error);
-    if (strcmp(extension, "json") == 0) return json_emission(path, m, out, error);
+    if (strcmp(extension, "npy") == 0) return emission_read_npy(path, m, out, error);
+    if (strcmp(extension, "json") == 0) return json_emission(path, m, n_tiles, out, error);
     return status_fail(error, LAM_ERR_ARGUMENT, "--emission %s: must end in .npy or .json", path);
 }

@@ -12,6 +12,11 @@ static double sample_bytes(double n, double rays) {
     return n * fmin(n, 2 * rays) * 8;
 }
 
+/* Bytes of one tile of a sky: what each element receives of it, and where it is. */
+static double tile_bytes(double n) {
+    return 4 * n + 100;
+}
+
 /* Bytes of one merged sample. */
 static double recipe_bytes(double n, const recipe *r) {
     switch (r->method) {
@@ -29,7 +34,7 @@ static double recipe_bytes(double n, const recipe *r) {
 
 double forecast_bytes(const forecast *f) {
     const double n = (double)f->n, n_channels = (double)f->n_channels;
-    const double mesh = 400 * n;
+    const double mesh = 400 * n + tile_bytes(n) * (double)f->sky_tiles;
     const double sample = recipe_bytes(n, &f->recipe);
     /* While it is traced, a sample exists as counts, as rows, and as the merged rows; of pairs as one
      * triangle with what is known of each, with room to grow, and as rows. */
@@ -93,13 +98,23 @@ static void format_recipe(const recipe *r, char text[40]) {
 lam_status forecast_check(const forecast *f, double limit, lam_error *error) {
     lam_status status = LAM_OK;
     const double bytes = forecast_bytes(f);
-    char needs[32], allows[32], asked[40], fits[40], advice[160];
+    char needs[32], allows[32], asked[40], fits[40], advice[160], sky[48] = "";
     if (bytes <= limit) return LAM_OK;
     format_bytes(bytes, needs);
     format_bytes(limit, allows);
     const char *method = f->exact ? "--method low-rank" : "";
     forecast cheaper = *f;
     bool less = false;
+    if (f->sky_tiles > 0) snprintf(sky, sizeof sky, " and %zu sky tiles", f->sky_tiles);
+    cheaper.sky_tiles = 0;
+    const double spare = limit - forecast_bytes(&cheaper);
+    if (f->sky_tiles > 0 && spare >= tile_bytes((double)f->n)) {
+        snprintf(advice, sizeof advice, "a --sky of at most %.0f tiles, or --memory %s",
+                 floor(spare / tile_bytes((double)f->n)), needs);
+        FAIL(error, LAM_ERR_MEMORY, "%zu elements%s need about %s of memory, --memory allows %s; fits: %s",
+             f->n, sky, needs, allows, advice);
+    }
+    cheaper = *f;
     cheaper.exact = false;
     while (forecast_bytes(&cheaper) > limit && sample_less(&cheaper.recipe)) {
         less = true;
@@ -116,8 +131,9 @@ lam_status forecast_check(const forecast *f, double limit, lam_error *error) {
     } else {
         snprintf(advice, sizeof advice, "%s", method);
     }
-    FAIL(error, LAM_ERR_MEMORY, "%zu elements with %s need about %s of memory, --memory allows %s; fits: %s",
-         f->n, asked, needs, allows, advice);
+    FAIL(error, LAM_ERR_MEMORY,
+         "%zu elements with %s%s need about %s of memory, --memory allows %s; fits: %s", f->n, asked, sky,
+         needs, allows, advice);
 done:
     return status;
 }

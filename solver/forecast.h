@@ -8,6 +8,7 @@
 
 typedef struct forecast {
     size_t n, n_channels;
+    size_t sky_tiles;            /* 0: no sky */
     recipe recipe, judge_recipe; /* of the form factors and of the judge's samples */
     size_t probes;               /* 0: no independent samples */
     bool exact;                  /* the whole inverse is built */

@@ -80,6 +80,7 @@ static lam_status load_store(work *w, lam_error *error) {
     TRY(store_open(w->options->input, &s, error));
     TRY(mesh_load(s, &w->m, &row_sums, error));
     TRY(form_factors_load(s, &w->m, &w->f, error));
+    if (store_has(s, "/sky")) TRY(sky_bounce_load(s, w->m.n, &w->f.sky, error));
     if (w->options->reflectance >= 0)
         for (size_t i = 0; i < w->m.n * w->m.n_channels; i++)
             w->m.reflectance[i] = (float)w->options->reflectance;
@@ -116,11 +117,19 @@ static recipe judge_recipe(const work *w, uint64_t seed) {
 /* Chooses the recipe for n elements and sees that it fits. */
 static lam_status check_memory(work *w, double n, lam_error *error) {
     const precompute_options *o = w->options;
+    sky_tiling tiling = {.n_tiles = w->f.sky.tiling.n_tiles};
+    if (o->sky != NULL) {
+        const lam_status status = sky_tiling_create(o->sky, w->m.up, &tiling, error);
+        if (status != LAM_OK) return status;
+    }
+    const size_t sky_tiles = tiling.n_tiles;
+    sky_tiling_free(&tiling);
     if (n > 4e9)
         return status_fail(error, LAM_ERR_MEMORY, "%s: %.3g elements, must be below 4e9; refine less",
                            o->input, n);
     forecast f = {.n = (size_t)n,
                   .n_channels = w->m.n_channels,
+                  .sky_tiles = sky_tiles,
                   .probes = o->probes == PRECOMPUTE_AUTO ? PROBES_OF_LARGE : o->probes,
                   .exact = strcmp(o->method, "exact") == 0,
                   .rank = o->rank};
@@ -176,6 +185,12 @@ static void log_form_factors(work *w) {
                      100 * facing / all, 100 * f->pairs.certain / facing, 100 * f->pairs.open / facing,
                      100 * f->pairs.hidden / facing);
     }
+    const sky_bounce *sky = &f->sky;
+    if (sky->first_bounce != NULL)
+        terminal_log(w->t, "sky: %s, %zu tiles, ground albedo %g", sky->tiling.name, sky->tiling.n_tiles,
+                     sky->ground_albedo);
+    if (sky->first_bounce != NULL && f->closed)
+        terminal_warn(w->t, "the scene is closed: no element sees the sky");
     if (f->absorbed_share > .01 && !w->m.two_sided)
         terminal_warn(w->t,
                       "%.1f %% of the light meets back faces and is lost there: turn the faces, or give "
@@ -184,7 +199,11 @@ static void log_form_factors(work *w) {
 }
 
 static lam_status trace(work *w, lam_error *error) {
-    const form_factor_options how = {.recipe = w->recipe, .progress = &w->progress, .stage = "form factors"};
+    const form_factor_options how = {.recipe = w->recipe,
+                                     .progress = &w->progress,
+                                     .stage = "form factors",
+                                     .sky = w->options->sky,
+                                     .ground_albedo = w->options->ground_albedo};
     return form_factors_make(&w->m, w->order, &how, &w->f, error);
 }
 
@@ -324,6 +343,7 @@ static lam_status save(work *w, lam_error *error) {
     if (o->reflectance >= 0) TRY(store_set_number(s, "/mesh", "reflectance_given", o->reflectance, error));
     TRY(terminal_check(error));
     if (o->keep_form_factors) TRY(form_factors_save(&w->f, s, error));
+    if (w->f.sky.first_bounce != NULL) TRY(sky_bounce_save(&w->f.sky, s, error));
     TRY(terminal_check(error));
     TRY(operator_save(w->op, s, error));
     TRY(describe_operator(w, s, error));

@@ -20,6 +20,8 @@ typedef struct precompute_options {
     bool two_sided;
     double reflectance;          /* negative: the file's own */
     choice_request form_factors; /* from a store: of the judge only */
+    const char *sky;             /* a tiling, or NULL; from a store: that of the store */
+    double ground_albedo;
     uint64_t probes;
     bool keep_form_factors;
     const char *method, *factorizer;

@@ -35,8 +35,8 @@ void examination_free(examination *e);
 /* One check: fills verdict and detail, or fails when it could not be made (cancelled, out of memory). */
 typedef lam_status verify_check(examination *e, check *c, lam_error *error);
 
-verify_check verify_checksums, verify_mesh, verify_form_factors, verify_operator, verify_linearity,
-    verify_energy, verify_error, verify_scene;
+verify_check verify_checksums, verify_mesh, verify_form_factors, verify_sky, verify_operator,
+    verify_linearity, verify_energy, verify_error, verify_scene;
 
 /* Sets a verdict with its detail. */
 void check_say(check *c, verdict v, const char *format, ...) __attribute__((format(printf, 3, 4)));

@@ -32,7 +32,8 @@ typedef struct lam_error {
 /* The text of a status; never NULL, static. */
 const char *lam_status_text(lam_status status);
 
-/* Radiosity B, irradiance H (all that is received) or indirect light B - E - rho H0; all in the unit of E. */
+/* Radiosity B, irradiance H (all that is received) or indirect light B - E - rho H0; all in the unit of E. H0
+ * is what a sky gives directly, 0 without one. */
 typedef enum lam_quantity { LAM_RADIOSITY, LAM_IRRADIANCE, LAM_INDIRECT } lam_quantity;
 
 /* A transport operator: immutable once open, so any number of threads may apply it. */
@@ -66,9 +67,34 @@ size_t lam_operator_work_bytes(const lam_operator *op, size_t n_rhs);
 lam_status lam_operator_apply(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
                               float *out, void *work, size_t work_bytes, lam_error *error);
 
+/* The same under a sky that gives the irradiance H0, [n_rhs][C][n] (lam_sky_irradiance; NULL: none):
+ * E' = E + rho H0, B = M~ E', H = H0 + F B. Elements without reflectance have an irradiance too. */
+lam_status lam_operator_apply_lit(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
+                                  const float *H0, float *out, void *work, size_t work_bytes,
+                                  lam_error *error);
+
 /* w = (d quantity / d E)^T g for a batch: the transpose of lam_operator_apply, same shapes, same rules. */
 lam_status lam_operator_apply_adjoint(const lam_operator *op, size_t n_rhs, lam_quantity quantity,
                                       const float *g, float *w, void *work, size_t work_bytes,
                                       lam_error *error);
+
+/* What the elements of a store receive directly from the tiles of a sky: immutable once open. */
+typedef struct lam_sky lam_sky;
+
+/* Opens the store at path and loads its sky; *sky is NULL when it has none. The caller closes it with
+ * lam_sky_close. Errors and threads as lam_operator_open. */
+lam_status lam_sky_open(const char *path, lam_sky **sky, lam_error *error);
+
+/* Frees a sky; NULL is allowed. */
+void lam_sky_close(lam_sky *sky);
+
+/* Tiles m and elements n. */
+size_t lam_sky_tiles(const lam_sky *sky);
+size_t lam_sky_elements(const lam_sky *sky);
+
+/* H0 = first_bounce^T L for n_rows rows (vectors times channels): L is [n_rows][m], W/(m^2 sr), H0 is
+ * [n_rows][n] in mesh order. Allocates nothing; a row's bits do not depend on its neighbours.
+ * Cost: O(mn) a row, less for tiles that are dark. */
+void lam_sky_irradiance(const lam_sky *sky, size_t n_rows, const float *L, float *H0);
 
 #endif

@@ -20,6 +20,7 @@ void form_factors_free(form_factors *f) {
     free(f->row_sums);
     free(f->leaving);
     free(f->absorbed);
+    sky_bounce_free(&f->sky);
     *f = (form_factors){0};
 }
 
@@ -164,15 +165,34 @@ done:
     return status;
 }
 
-lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_factor_options *options,
+/* What repaired rows leave outside, shared as the rays found it: those that left and those that met a back
+ * face where the repair counts them. */
+static lam_status close_sky(form_factors *f, size_t n, lam_error *error) {
+    double *scale = memory_allocate(n, sizeof *scale, "the light of the sky", error);
+    if (scale == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < n; i++) {
+        const double outside = f->leaving[i] + (f->absorbed_share < crack_share ? 0 : f->absorbed[i]);
+        scale[i] = f->closed || outside <= 0 ? 0 : fmax(0, 1 - f->row_sums[i]) / outside;
+    }
+    sky_bounce_close(&f->sky, scale);
+    free(scale);
+    return LAM_OK;
+}
+
+lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_factor_options *asked,
                              form_factors *out, lam_error *error) {
     lam_status status = LAM_OK;
     visibility *v = NULL;
+    form_factor_options own = *asked;
+    const form_factor_options *const options = &own;
     form_factors f = {.recipe = options->recipe};
     TRY(recipe_check(&options->recipe, error));
     f.leaving = memory_allocate(m->n, sizeof *f.leaving, "form factors", error);
     f.absorbed = memory_allocate(m->n, sizeof *f.absorbed, "form factors", error);
     if (f.leaving == NULL || f.absorbed == NULL) TRY(LAM_ERR_MEMORY);
+    if (asked->sky != NULL)
+        TRY(sky_bounce_create(asked->sky, m->up, asked->ground_albedo, m->n, &f.sky, error));
+    own.bounce = asked->sky != NULL ? &f.sky : NULL;
     TRY(visibility_create(m, &v, error));
     switch (options->recipe.method) {
     case RECIPE_RAYS:
@@ -188,6 +208,7 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
         TRY(make_of_near_pairs(m, v, order, options, &f, error));
         break;
     }
+    if (asked->sky != NULL) TRY(close_sky(&f, m->n, error));
     *out = f;
     f = (form_factors){0};
 done:
@@ -203,6 +224,7 @@ lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_
     form_factors f = *a;
     f.F = (csr){.n = n};
     f.row_sums = f.leaving = f.absorbed = NULL;
+    f.sky = (sky_bounce){0};
     f.recipe.rays = a->recipe.rays + b->recipe.rays;
     f.row_sums = memory_allocate(n, sizeof *f.row_sums, "form factors", error);
     f.leaving = memory_allocate(n, sizeof *f.leaving, "form factors", error);

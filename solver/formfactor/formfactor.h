@@ -3,6 +3,7 @@
 #define LAMBERT_FORMFACTOR_FORMFACTOR_H
 
 #include "solver/formfactor/recipe.h"
+#include "solver/formfactor/sky_bounce.h"
 #include "solver/operator/csr.h"
 #include "solver/scene/mesh.h"
 
@@ -20,6 +21,7 @@ typedef struct form_factors {
     double *row_sums; /* [n], of F after repair, <= 1 */
     double *leaving;  /* [n], share of an element's rays that left the scene */
     double *absorbed; /* [n], share that hit a back face */
+    sky_bounce sky;   /* where one was asked for, else zero */
     recipe recipe;
     pairs_report pairs;   /* where just made of pairs */
     bool closed;          /* nothing leaves but through cracks between elements */
@@ -34,6 +36,9 @@ typedef struct form_factor_options {
     recipe recipe;
     const progress *progress;
     const char *stage; /* what progress calls it */
+    const char *sky;   /* a tiling that what leaves is binned by, at no further ray; NULL: none */
+    double ground_albedo;
+    sky_bounce *bounce; /* form_factors_make's own: where the rays put what leaves */
 } form_factor_options;
 
 /* Finds the form factors by a recipe, merges the two estimates of each pair by reciprocity and repairs the
@@ -48,6 +53,10 @@ typedef struct form_factor_options {
  *   is facing; 9 bytes for each of those beside the rows.
  * near-pairs: the same for pairs of which a ray would hit several times, the others by rays.
  *
+ * With a sky, what a repaired row leaves outside is shared among its tiles, the ground and back faces as the
+ * rays (of pairs: recipe.rays of them) found it: sum_j F_ij + sum_t first_bounce/pi <= 1, and = 1 where
+ * nothing meets a back face and the ground's albedo is 1. Cost: 4 m n bytes.
+ *
  * Errors: LAM_ERR_ARGUMENT (a recipe out of bounds), LAM_ERR_MEMORY, LAM_ERR_CANCELLED,
  * LAM_ERR_INTERNAL. */
 lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_factor_options *options,
@@ -55,11 +64,11 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
 
 void form_factors_free(form_factors *f);
 
-/* The mean of two independent samples of the same mesh: a reference with half the variance. */
+/* The mean of two independent samples of the same mesh: a reference with half the variance, without a sky. */
 lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_factors *out,
                              lam_error *error);
 
-/* /form_factors of a store. */
+/* /form_factors of a store; its /sky apart, by sky_bounce_save and sky_bounce_load. */
 lam_status form_factors_save(const form_factors *f, store *s, lam_error *error);
 lam_status form_factors_load(store *s, const mesh *m, form_factors *out, lam_error *error);
 

@@ -83,6 +83,7 @@ typedef struct cube_context {
     const hemicube *h;
     const mesh *m;
     const visibility *v;
+    const sky_bounce *sky;
 } cube_context;
 
 /* Where a face is in the scene: pixels lie at forward + x across + y up from the centroid. */
@@ -147,15 +148,20 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
                              n = rest < VISIBILITY_PACKET ? rest : VISIBILITY_PACKET;
                 aim(&f, y, column, resolution, &rays);
                 visibility_cast(c->v, &rays, n, self, false, &hits);
+                double weights[VISIBILITY_PACKET] = {0};
+                unsigned leaving_now = 0;
                 for (size_t i = 0; i < n; i++) {
-                    const double weight = hemicube_weight(c->h, face, row, column + i);
-                    if (hits.element[i] == VISIBILITY_NOTHING)
+                    const double weight = weights[i] = hemicube_weight(c->h, face, row, column + i);
+                    if (hits.element[i] == VISIBILITY_NOTHING) {
                         left += weight;
-                    else if (hits.back[i])
+                        leaving_now |= 1u << i;
+                    } else if (hits.back[i]) {
                         lost += weight;
-                    else
+                    } else {
                         row_pool_add(pool, hits.element[i], weight);
+                    }
                 }
+                row_pool_leave(pool, c->sky, &rays, leaving_now, weights);
             }
         }
     }
@@ -166,10 +172,12 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
 lam_status hemicube_trace(const hemicube *h, const mesh *m, const visibility *v, const uint32_t *order,
                           const form_factor_options *options, csr *rows, double *leaving, double *absorbed,
                           lam_error *error) {
-    const cube_context context = {.h = h, .m = m, .v = v};
+    const cube_context context = {.h = h, .m = m, .v = v, .sky = options->bounce};
     const row_maker maker = {.make = trace_element,
                              .context = &context,
                              .rays = 3 * h->resolution * h->resolution,
+                             .whole = 1,
+                             .sky = options->bounce,
                              .cheaper = "a lower --resolution",
                              .progress = options->progress,
                              .stage = options->stage};

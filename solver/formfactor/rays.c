@@ -9,6 +9,7 @@ typedef struct ray_context {
     const visibility *v;
     size_t rays;
     uint64_t seed;
+    const sky_bounce *sky;
 } ray_context;
 
 /* Traces one element: every ray counts 1. */
@@ -19,6 +20,7 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
     element_sampler_init(&sampler, c->m, c->v, element, c->seed);
     uint32_t self[VISIBILITY_PACKET];
     for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = (uint32_t)element;
+    static const double ones[VISIBILITY_PACKET] = {1, 1, 1, 1, 1, 1, 1, 1};
     size_t left = 0, lost = 0;
     for (size_t ray = 0; ray < c->rays; ray += VISIBILITY_PACKET) {
         ray_packet rays;
@@ -26,15 +28,19 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
         const size_t n = c->rays - ray < VISIBILITY_PACKET ? c->rays - ray : VISIBILITY_PACKET;
         element_sampler_packet(&sampler, (uint32_t)ray, &rays);
         visibility_cast(c->v, &rays, n, self, false, &hits);
+        unsigned leaving_now = 0;
         for (size_t i = 0; i < n; i++) {
             const uint32_t hit = hits.element[i];
-            if (hit == VISIBILITY_NOTHING)
+            if (hit == VISIBILITY_NOTHING) {
                 left++;
-            else if (hits.back[i])
+                leaving_now |= 1u << i;
+            } else if (hits.back[i]) {
                 lost++;
-            else
+            } else {
                 row_pool_add(pool, hit, 1);
+            }
         }
+        row_pool_leave(pool, c->sky, &rays, leaving_now, ones);
     }
     *leaving = (double)left / (double)c->rays;
     *absorbed = (double)lost / (double)c->rays;
@@ -43,10 +49,13 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
 lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
                       const form_factor_options *options, csr *counts, double *leaving, double *absorbed,
                       lam_error *error) {
-    const ray_context context = {.m = m, .v = v, .rays = options->recipe.rays, .seed = options->recipe.seed};
+    const ray_context context = {
+        .m = m, .v = v, .rays = options->recipe.rays, .seed = options->recipe.seed, .sky = options->bounce};
     const row_maker maker = {.make = trace_element,
                              .context = &context,
                              .rays = options->recipe.rays,
+                             .whole = (double)options->recipe.rays,
+                             .sky = options->bounce,
                              .cheaper = "fewer --rays",
                              .progress = options->progress,
                              .stage = options->stage};

@@ -120,6 +120,7 @@ double recipe_noise(const recipe *r) {
 recipe recipe_of_judge(const recipe *judged, size_t rays_beside_hemicubes, uint64_t seed) {
     recipe r = *judged;
     if (judged->method == RECIPE_HEMICUBE) r = (recipe){.method = RECIPE_RAYS, .rays = rays_beside_hemicubes};
+    if (r.method == RECIPE_PAIRS && r.rays > RECIPE_RAYS_FEW) r.rays = RECIPE_RAYS_FEW;
     r.seed = seed;
     return r;
 }

@@ -17,6 +17,9 @@ typedef struct recipe {
 
 enum { RECIPE_RAYS_MOST = 1 << 24, RECIPE_RESOLUTION_LEAST = 4, RECIPE_RESOLUTION_MOST = 4096 };
 
+/* Rays beside pairs that only ask whether a scene is closed and whether its faces are turned. */
+enum { RECIPE_RAYS_FEW = 256 };
+
 /* "rays", "hemicube", "pairs", "near-pairs" */
 const char *recipe_name(recipe_method method);
 
@@ -51,7 +54,7 @@ size_t recipe_auto_rays(double epsilon, double share);
 double recipe_noise(const recipe *r);
 
 /* The recipe of an independent sample that another one is judged by: its like with another seed; of rays
- * beside hemicubes, which would only repeat themselves. */
+ * beside hemicubes, which would only repeat themselves; of pairs without the rays that only a sky needs. */
 recipe recipe_of_judge(const recipe *judged, size_t rays_beside_hemicubes, uint64_t seed);
 
 #endif

@@ -31,6 +31,7 @@ static bool pool_reserve(row_pool *p, size_t more) {
 static void pool_free(row_pool *p) {
     free(p->sums);
     free(p->touched);
+    free(p->sky);
     free(p->indices);
     free(p->data);
 }
@@ -98,6 +99,10 @@ lam_status rows_make(const row_maker *maker, size_t n, const uint32_t *order, cs
         pools[t].touched =
             memory_allocate((n + 63) / 64, sizeof *pools[t].touched, "form factor rows", error);
         if (pools[t].sums == NULL || pools[t].touched == NULL) TRY(LAM_ERR_MEMORY);
+        if (maker->sky == NULL) continue;
+        pools[t].sky = memory_allocate(maker->sky->tiling.n_tiles + 1, sizeof *pools[t].sky,
+                                       "the tiles of the sky", error);
+        if (pools[t].sky == NULL) TRY(LAM_ERR_MEMORY);
     }
 
     bool cancelled = false, out_of_memory = false;
@@ -113,6 +118,7 @@ lam_status rows_make(const row_maker *maker, size_t n, const uint32_t *order, cs
         for (size_t position = c * chunk; position < last; position++) {
             const size_t i = order[position];
             maker->make(maker->context, i, &pools[thread], &leaving[i], &absorbed[i]);
+            if (maker->sky != NULL) sky_bounce_put(maker->sky, i, pools[thread].sky, maker->whole);
             places[i].thread = thread;
             if (!take_row(&pools[thread], n, &places[i])) {
 #pragma omp atomic write

@@ -3,6 +3,8 @@
 #ifndef LAMBERT_FORMFACTOR_ROW_POOL_H
 #define LAMBERT_FORMFACTOR_ROW_POOL_H
 
+#include "solver/formfactor/sky_bounce.h"
+#include "solver/formfactor/visibility.h"
 #include "solver/operator/csr.h"
 #include "solver/progress.h"
 
@@ -10,6 +12,7 @@
 typedef struct row_pool {
     double *sums;      /* [n], all zero between elements */
     uint64_t *touched; /* bit set over elements: where sums were added to */
+    double *sky;       /* [m + 1], likewise zero: of the tiles of a sky and of the ground; NULL: none */
     uint32_t *indices; /* one row after the other */
     float *data;
     size_t used, capacity;
@@ -21,12 +24,26 @@ static inline void row_pool_add(row_pool *pool, uint32_t seen, double weight) {
     pool->touched[seen >> 6] |= 1ull << (seen & 63);
 }
 
+_Static_assert((int)SKY_PACKET == VISIBILITY_PACKET, "packets go through the sky whole");
+
+/* What the element at hand sends out through these rays of a packet leaves the scene. */
+static inline void row_pool_leave(row_pool *pool, const sky_bounce *sky, const ray_packet *rays,
+                                  unsigned leaving, const double weight[VISIBILITY_PACKET]) {
+    uint32_t tile[SKY_PACKET];
+    if (sky == NULL || leaving == 0) return;
+    sky_tiling_find(&sky->tiling, rays->direction, tile);
+    for (int i = 0; i < VISIBILITY_PACKET; i++)
+        if ((leaving >> i & 1) != 0) pool->sky[tile[i]] += weight[i];
+}
+
 /* How one row is made: adds all that an element sees to the pool; leaving and absorbed are the shares that
  * met nothing or a back face. Called from many threads at once; must depend on the element alone. */
 typedef struct row_maker {
     void (*make)(const void *context, size_t element, row_pool *pool, double *leaving, double *absorbed);
     const void *context;
     size_t rays;         /* of one element */
+    double whole;        /* weight of all that it sends out */
+    sky_bounce *sky;     /* takes what leaves by direction; NULL: nobody asks */
     const char *cheaper; /* what would need less memory: "fewer --rays" */
     const progress *progress;
     const char *stage;

@@ -118,6 +118,33 @@ done:
     return status;
 }
 
+/* null where there is none. */
+static lam_status add_sky(store *s, json_t *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    json_t *attributes = NULL, *sky = NULL;
+    size_t dims[STORE_MAX_RANK];
+    store_type type;
+    int rank;
+    if (!store_has(s, "/sky")) {
+        json_object_set_new(out, "sky", json_null());
+        return LAM_OK;
+    }
+    TRY(attributes_of(s, "/sky", &attributes, error));
+    TRY(store_array_info(s, "/sky/first_bounce", &type, &rank, dims, error));
+    if (rank != 2)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /sky/first_bounce has %d dimensions, must have 2", store_path(s),
+             rank);
+    sky = json_object();
+    copy_member(sky, "tiling", attributes, "tiling");
+    json_object_set_new(sky, "tiles", json_integer((json_int_t)dims[0]));
+    copy_member(sky, "ground_albedo", attributes, "ground_albedo");
+    json_object_set(out, "sky", sky);
+done:
+    json_decref(attributes);
+    json_decref(sky);
+    return status;
+}
+
 lam_status describe_store(store *s, json_t **out, lam_error *error) {
     lam_status status = LAM_OK;
     json_t *root = NULL, *operator_attributes = NULL, *made = json_object();
@@ -146,7 +173,7 @@ lam_status describe_store(store *s, json_t **out, lam_error *error) {
     json_object_set_new(made, "bytes", json_integer((json_int_t)bytes));
     TRY(add_groups(s, dims[1], made, error));
     json_object_set_new(made, "emitters", json_null());
-    json_object_set_new(made, "sky", json_null());
+    TRY(add_sky(s, made, error));
     TRY(add_error(s, made, error));
     TRY(add_provenance(s, root, made, error));
     *out = json_incref(made);

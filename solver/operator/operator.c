@@ -242,47 +242,66 @@ static void *align_work(void *work) {
     return (char *)work + (PANEL_ALIGN - (uintptr_t)work % PANEL_ALIGN) % PANEL_ALIGN;
 }
 
-/* One row of out (mesh order) from the same row of E (mesh order) and P (position order). out may be P when
- * there is no order. */
-static void finish_row(const lam_operator *op, size_t c, lam_quantity quantity, const float *E,
-                       const float *P, float *out) {
+/* One row of out (mesh order) from the same row of E' = E + rho H0 and of P (position order) and of H0 (mesh
+ * order, NULL: 0). out may be P when there is no order. */
+static void finish_row(const lam_operator *op, size_t c, lam_quantity quantity, const float *lit,
+                       const float *H0, const float *P, float *out) {
     const float *rho = op->reflectance + c * op->n;
     for (size_t p = 0; p < op->n; p++) {
         size_t i = op->order != NULL ? op->order[p] : p;
         switch (quantity) {
-        case LAM_RADIOSITY: /* B = E + P */
-            out[i] = rho[i] > 0.0f ? E[i] + P[p] : E[i];
+        case LAM_RADIOSITY: /* B = E' + P */
+            out[i] = rho[i] > 0.0f ? lit[p] + P[p] : lit[p];
             break;
-        case LAM_IRRADIANCE: /* H = P / rho' */
-            out[i] = rho[i] > 0.0f ? P[p] / rho[i] : P[p];
+        case LAM_IRRADIANCE: /* H = H0 + P / rho' */
+            out[i] = (rho[i] > 0.0f ? P[p] / rho[i] : P[p]) + (H0 != NULL ? H0[i] : 0.0f);
             break;
-        case LAM_INDIRECT: /* B - E */
+        case LAM_INDIRECT: /* B - E' */
             out[i] = rho[i] > 0.0f ? P[p] : 0.0f;
             break;
         }
     }
 }
 
+/* One row of E' = E + rho H0, from mesh order into position order. */
+static void light_row(const lam_operator *op, size_t c, const float *E, const float *H0, float *lit) {
+    const float *rho = op->reflectance + c * op->n;
+    for (size_t p = 0; p < op->n; p++) {
+        size_t i = op->order != NULL ? op->order[p] : p;
+        lit[p] = H0 != NULL ? E[i] + rho[i] * H0[i] : E[i];
+    }
+}
+
 lam_status lam_operator_apply(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
                               float *out, void *work, size_t work_bytes, lam_error *error) {
+    return lam_operator_apply_lit(op, n_rhs, quantity, E, NULL, out, work, work_bytes, error);
+}
+
+lam_status lam_operator_apply_lit(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
+                                  const float *H0, float *out, void *work, size_t work_bytes,
+                                  lam_error *error) {
     lam_status status = LAM_OK;
     TRY(check_apply(op, n_rhs, quantity, E, out, work, work_bytes, error));
+    if (H0 != NULL) TRY(check_apply(op, n_rhs, quantity, H0, out, work, work_bytes, error));
     size_t n = op->n, row_bytes = n * sizeof(float);
     for (size_t r = 0; r < n_rhs; r += OPERATOR_PASS) {
         size_t count = n_rhs - r < OPERATOR_PASS ? n_rhs - r : OPERATOR_PASS, rows = count * op->n_channels;
-        const float *E_pass = E + r * op->n_channels * n, *E_positions = E_pass;
+        const float *E_pass = E + r * op->n_channels * n, *lit = E_pass;
+        const float *H0_pass = H0 != NULL ? H0 + r * op->n_channels * n : NULL;
         float *out_pass = out + r * op->n_channels * n, *P = out_pass;
         void *rest = align_work(work);
-        if (op->order != NULL) {
-            float *gathered = work_take(&rest, rows * row_bytes);
-            P = work_take(&rest, rows * row_bytes);
+        if (op->order != NULL || H0 != NULL) {
+            float *positions = work_take(&rest, rows * row_bytes);
             for (size_t row = 0; row < rows; row++)
-                for (size_t p = 0; p < n; p++) gathered[row * n + p] = E_pass[row * n + op->order[p]];
-            E_positions = gathered;
+                light_row(op, row % op->n_channels, E_pass + row * n,
+                          H0_pass != NULL ? H0_pass + row * n : NULL, positions + row * n);
+            lit = positions;
         }
-        op->kind->apply(op, count, E_positions, P, rest);
+        if (op->order != NULL) P = work_take(&rest, rows * row_bytes);
+        op->kind->apply(op, count, lit, P, rest);
         for (size_t row = 0; row < rows; row++)
-            finish_row(op, row % op->n_channels, quantity, E_pass + row * n, P + row * n, out_pass + row * n);
+            finish_row(op, row % op->n_channels, quantity, lit + row * n,
+                       H0_pass != NULL ? H0_pass + row * n : NULL, P + row * n, out_pass + row * n);
     }
 done:
     return status;

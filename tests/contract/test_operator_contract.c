@@ -170,6 +170,40 @@ START_TEST(without_reflectance_nothing_bounces_but_light_arrives) {
 }
 END_TEST
 
+/* Under a sky: B = M~ E' and B - E' are those of E' = E + rho H0, H gets H0 on top, black elements too. */
+START_TEST(sky_lights_what_reflects) {
+    transport t = subject(_i);
+    const size_t n_rhs = 19, size = vector_size(&t), count = n_rhs * size;
+    const size_t work_bytes = lam_operator_work_bytes(t.op, n_rhs);
+    float *E = random_vectors(count, 9), *H0 = random_vectors(count, 10), *lit = test_allocate(count, 4);
+    float *out = test_allocate(count, sizeof *out);
+    void *work = malloc(work_bytes);
+    lam_error error;
+    for (size_t i = 0; i < count; i++) lit[i] = E[i] + t.reflectance[i % size] * H0[i];
+    for (int q = 0; q < QUANTITIES; q++) {
+        float *expected = transport_apply(t.op, false, n_rhs, quantities[q], lit);
+        for (size_t i = 0; i < count; i++) {
+            out[i] = NAN;
+            if (quantities[q] == LAM_IRRADIANCE) expected[i] += H0[i];
+        }
+        memset(work, 0xff, work_bytes);
+        ck_assert_int_eq(
+            lam_operator_apply_lit(t.op, n_rhs, quantities[q], E, H0, out, work, work_bytes, &error), LAM_OK);
+        ck_assert_mem_eq(out, expected, count * sizeof *out);
+        free(expected);
+    }
+    ck_assert_int_eq(
+        lam_operator_apply_lit(t.op, n_rhs, LAM_RADIOSITY, E, out, out, work, work_bytes, &error),
+        LAM_ERR_ARGUMENT);
+    free(E);
+    free(H0);
+    free(lit);
+    free(out);
+    free(work);
+    transport_free(&t);
+}
+END_TEST
+
 START_TEST(darkness_stays_dark) {
     transport t = subject(_i);
     size_t size = 17 * vector_size(&t);
@@ -370,6 +404,7 @@ int main(void) {
     tcase_add_loop_test(tests, adjoint_is_the_transpose, 0, SUBJECTS);
     tcase_add_loop_test(tests, is_linear, 0, SUBJECTS);
     tcase_add_loop_test(tests, without_reflectance_nothing_bounces_but_light_arrives, 0, SUBJECTS);
+    tcase_add_loop_test(tests, sky_lights_what_reflects, 0, SUBJECTS);
     tcase_add_loop_test(tests, darkness_stays_dark, 0, SUBJECTS);
     tcase_add_loop_test(tests, bits_do_not_depend_on_the_batch, 0, SUBJECTS);
     tcase_add_loop_test(tests, eight_threads_give_the_same_bits, 0, SUBJECTS);

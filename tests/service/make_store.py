@@ -54,13 +54,22 @@ class Scene:
             )
         return np.concatenate([np.flatnonzero(self.group == g) for g in ids])
 
-    def solve(self, E, quantity="radiosity"):
-        """E is [..., C, n]."""
+    def first_bounce(self, tiles):
+        """What `tiles` sectors of the horizon give, as it is stored."""
+        return np.random.default_rng(tiles).random((tiles, self.n)).astype(np.float32)
+
+    def solve(self, E, quantity="radiosity", L=None):
+        """E is [..., C, n]; L, [..., C, m], the radiances of a sky."""
         E = np.asarray(E, dtype=float)
+        if L is not None:
+            L = np.asarray(L, dtype=float)
+            H0 = L @ self.first_bounce(L.shape[-1]).astype(float)
+            return self.solve(E + self.rho * H0, quantity) + (H0 if quantity == "irradiance" else 0)
         H = np.einsum("ik,ckl,...cl->...ci", self.U, self.core, np.einsum("ik,...ci->...ck", self.V, E))
         return {"radiosity": E + self.rho * H, "irradiance": H, "indirect": self.rho * H}[quantity]
 
-    def write(self, path, name="box", kind="low_rank", with_order=True, error=True, sky=False):
+    def write(self, path, name="box", kind="low_rank", with_order=True, error=True, sky=0):
+        """sky: so many tiles, 0 for none."""
         n, C = self.n, self.channels
         order = self.order if with_order else np.arange(n)
         with h5py.File(path, "w", libver=("v108", "v108")) as f:
@@ -79,7 +88,16 @@ class Scene:
             if with_order:
                 arrays["/operator/order"] = self.order
             if sky:
-                arrays["/sky/first_bounce"] = np.zeros((2, n), np.float32)
+                width = 2 * np.pi / sky
+                tiles = np.zeros((sky, 9))
+                tiles[:, 4] = np.pi / 2
+                tiles[:, 5], tiles[:, 6] = (np.arange(sky) - 0.5) * width, (np.arange(sky) + 0.5) * width
+                tiles[:, 0] = np.sin(np.arange(sky) * width) * np.sqrt(0.5)
+                tiles[:, 1] = np.cos(np.arange(sky) * width) * np.sqrt(0.5)
+                tiles[:, 2] = np.sqrt(0.5)
+                tiles[:, 7], tiles[:, 8] = width, width / 2
+                arrays["/sky/tiles"] = tiles
+                arrays["/sky/first_bounce"] = self.first_bounce(sky)
             rho_stored = np.where(self.rho == 0, 1.0, self.rho)
             attributes = {"kind": kind, "layout": "rows", "reason": "a test", "epsilon": 0.05}
             if kind == "exact":
@@ -102,6 +120,8 @@ class Scene:
             width = max(len(g.encode()) for g in self.group_names)
             f.create_dataset("/mesh/group_names", data=np.array([g.encode() for g in self.group_names], f"S{width}"))
             set_attributes(f["operator"], attributes)
+            if sky:
+                set_attributes(f["sky"], {"tiling": f"grid:{sky}x1", "ground_albedo": 0.0, "up": "z"})
             set_attributes(f["mesh"], {"geometry_hash": "0" * 32, "name": name, "unit": 1.0, "up": "z", "two_sided": 0})
             if error:
                 figures = {"probes": 3}

@@ -28,11 +28,11 @@ class Answers(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(folder.cleanup)
         path = pathlib.Path(folder.name)
-        cls.grey = Scene(60, seed=1).write(path / "grey.h5", "grey")
+        cls.grey = Scene(60, seed=1).write(path / "grey.h5", "grey", sky=6)
         cls.exact = Scene(40, seed=2).write(path / "exact.h5", "exact", kind="exact", error=False)
-        cls.plain = Scene(30, seed=3).write(path / "plain.h5", "plain", with_order=False)
+        cls.plain = Scene(30, seed=3).write(path / "plain.h5", "plain", with_order=False, sky=3)
         cls.colour = Scene(50, channels=3, seed=4).write(path / "colour.h5", "colour")
-        cls.exact3 = Scene(20, channels=3, seed=5).write(path / "exact3.h5", "exact3", kind="exact")
+        cls.exact3 = Scene(20, channels=3, seed=5).write(path / "exact3.h5", "exact3", kind="exact", sky=5)
         cls.spaced = Scene(10, groups=("a~b/c", "größe", "x")).write(path / "spaced.h5", "two words/ä")
         cls.scenes = {name: getattr(cls, name) for name in ("grey", "exact", "plain", "colour", "exact3")}
         cls.daemon = Daemon("--stores", path, "--max-batch", 40)
@@ -43,15 +43,15 @@ class Answers(unittest.TestCase):
         self.assertEqual(answer.status, 200, answer)
         return answer
 
-    def check(self, name, body, E, quantity="radiosity", take=None, **more):
-        """E is [C][n], or [m][C][n]; the answer has no axis for one channel."""
+    def check(self, name, body, E, quantity="radiosity", take=None, L=None, **more):
+        """E is [C][n], or [b][C][n], L likewise [C][m]; the answer has no axis for one channel."""
         scene = self.scenes[name]
         answer = self.solve(name, body, **more).json()
         self.assertEqual(answer["scene"], name)
         self.assertEqual(answer["elements"], scene.n)
         self.assertEqual(answer["channels"], scene.channels)
         self.assertEqual(answer["quantity"], quantity)
-        wanted = scene.solve(E, quantity)
+        wanted = scene.solve(E, quantity, L)
         if take is not None:
             wanted = wanted[..., take]
         if scene.channels == 1:
@@ -282,6 +282,48 @@ class Answers(unittest.TestCase):
         exact = self.daemon.get("/v1/scenes/exact").json()
         self.assertEqual(exact["density"], 1)
         self.assertEqual(exact["error"], {})
+
+    SKIES = {"grey": 6, "plain": 3, "exact3": 5}
+
+    def test_scene_with_a_sky(self):
+        for name, tiles in self.SKIES.items():
+            self.assertEqual(self.daemon.get(f"/v1/scenes/{name}").json()["sky"],
+                             {"tiling": f"grid:{tiles}x1", "tiles": tiles, "ground_albedo": 0})
+
+    def test_sky(self):
+        rng = np.random.default_rng(3)
+        for name, m in self.SKIES.items():
+            scene = self.scenes[name]
+            n, C = scene.n, scene.channels
+            grey = rng.random(m).round(6)
+            colours = rng.random((m, C)).round(6)
+            all_alike, none = np.tile(grey, (C, 1)), np.zeros((C, n))
+            lamp = none.copy()
+            lamp[:, scene.members("lamp")] = 2
+            single = none.copy()
+            single[:, 3] = 7
+            for quantity in "radiosity", "irradiance", "indirect":
+                more = {"quantity": quantity}
+                self.check(name, {"emission": {"sky": grey.tolist()}, **more}, none, quantity, L=all_alike)
+                self.check(name, {"emission": {"sky": colours.tolist()}, **more}, none, quantity, L=colours.T)
+                self.check(name, {"emission": {"sky": grey.tolist(), "groups": {"lamp": 2}}, **more}, lamp, quantity,
+                           L=all_alike)
+                self.check(name, {"emission": {"elements": [3], "sky": colours.tolist(), "values": [7]}, **more},
+                           single, quantity, L=colours.T)
+            # Black elements receive too.
+            answer = self.check(name, {"emission": {"sky": grey.tolist()}, "quantity": "irradiance",
+                                       "select": {"elements": [0, 7, 14]}}, none, "irradiance", take=[0, 7, 14],
+                                L=all_alike)
+            self.assertGreater(np.min(answer["irradiance"]), 0)
+            # A batch of which some are under a sky: none of them takes the sky of another.
+            skies = rng.random((40, C, m)).round(6)
+            skies[[0, 1, 7, 8, 20, 38, 39]] = 0
+            emissions = [{"sky": L.T.tolist(), "groups": {"lamp": 2}} if L.any() else {"groups": {"lamp": 2}}
+                         for L in skies]
+            emissions[20] = lamp.tolist()
+            for quantity in "radiosity", "irradiance":
+                self.check(name, {"emissions": emissions, "quantity": quantity}, np.tile(lamp, (40, 1, 1)), quantity,
+                           L=skies)
 
     def test_health(self):
         for path in "/healthz", "/readyz":

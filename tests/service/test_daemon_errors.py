@@ -1,5 +1,6 @@
 """Every line of the contract's list of errors, over a real socket; the next request on the same connection works."""
 
+import functools
 import io
 import json
 import pathlib
@@ -35,7 +36,8 @@ class Errors(unittest.TestCase):
         path = pathlib.Path(folder.name)
         cls.grey = Scene(N).write(path / "grey.h5", "grey")
         cls.colour = Scene(N, channels=3).write(path / "colour.h5", "colour")
-        Scene(N).write(path / "sky.h5", "sky", sky=True)
+        Scene(N).write(path / "sky.h5", "sky", sky=4)
+        Scene(N, channels=3).write(path / "dusk.h5", "dusk", sky=4)
         cls.daemon = Daemon("--stores", path, "--max-body", MAX_BODY, "--max-batch", 8)
         cls.addClassCleanup(cls.daemon.__exit__, None, None, None)
         cls.right = cls.daemon.radiosity("grey", {"emission": [1] * N}).json()["radiosity"]
@@ -327,7 +329,29 @@ class Errors(unittest.TestCase):
     def test_sky_and_emitters(self):
         self.refuse({"emission": {"sky": [1]}}, 422, "no sky", pointer="/emission/sky")
         self.refuse({"emission": {"emitters": [1]}}, 422, "no precomputed emitters", pointer="/emission/emitters")
-        self.refuse({"emission": {"sky": [1]}}, 501, name="sky", pointer="/emission/sky")
+
+    def test_skies_that_are_wrong(self):
+        refuse = functools.partial(self.refuse, name="sky")
+        at = "/emission/sky"
+        refuse({"emission": {"sky": [1] * 3}}, 422, "holds 3 values, must be 4", "tile", pointer=at)
+        refuse({"emission": {"sky": [1] * 5}}, 422, "more than 4 values", pointer=at)
+        refuse({"emission": {"sky": []}}, 422, "holds 0 values", pointer=at)
+        refuse({"emission": {"sky": [1, 2, -3, 4]}}, 422, "-3", "negative", pointer=at + "/2")
+        refuse({"emission": {"sky": [1, 2, 3, [4, 5]]}}, 422, "channel", pointer=at + "/3")
+        refuse({"emission": {"sky": [1, [], 3, 4]}}, 422, "channel", pointer=at + "/1")
+        refuse('{"emission":{"sky":[1,2,3,1e39]}}', 422, "1e39", pointer=at + "/3")
+        refuse('{"emission":{"sky":[1,2,3,NaN]}}', 400)
+        refuse('{"emission":{"sky":[1,2,3,4],"sky":[1,2,3,4]}}', 422, "twice", pointer=at)
+        for value in (None, True, 7, "blue", {}):
+            refuse({"emission": {"sky": value}}, 422, "array", pointer=at)
+            refuse({"emission": {"sky": [1, 2, 3, value if value != 7 else "x"]}}, 422, "number", pointer=at + "/3")
+        refuse({"emission": {}}, 422, "or a sky", pointer="/emission")
+        refuse({"emission": {"sky": [1] * 4, "values": [1]}}, 422, "both elements and values", pointer="/emission")
+        refuse({"emission": {"sky": [1] * 4, "groups": {}, "elements": [1], "values": [1]}}, 422, "either")
+        refuse({"emission": {"sky": [1] * 4, "emitters": [1]}}, 422, "no precomputed emitters")
+        refuse({"emissions": [[1] * N, {"sky": [1] * 3}]}, 422, "must be 4", pointer="/emissions/1/sky")
+        self.refuse({"emission": {"sky": [1, 2, 3, [4, 5]]}}, 422, "must be 3", name="dusk", pointer=at + "/3")
+        self.refuse({"emission": {"sky": [1, 2, 3, [4, 5, -6]]}}, 422, "-6", name="dusk", pointer=at + "/3/2")
 
     # --- NPY
 

@@ -210,7 +210,7 @@ class Render(unittest.TestCase):
                 (2, "not supported yet", [self.cornell, "-o", image, "--quantity", "coherence"]),
                 (2, "not supported yet", [self.cornell, "-o", image, "--quantity", "patch"]),
                 (2, "not supported yet", [self.cornell, "-o", image, "--quantity", "visible"]),
-                (2, "not supported yet", [self.cornell, "-o", image, "--sky", "a.npy"]),
+                (1, "has no sky", [self.cornell, "-o", image, "--sky", "a.npy"]),
                 (2, "not supported yet", [self.cornell, "-o", image, "--animate", "a.npy"]),
                 (2, "both", [self.cornell, "-o", image, "--emit", "lamp=1", "--emission", "a.npy"]),
                 (2, "--frobnicate", [self.cornell, "-o", image, "--frobnicate"]),

@@ -174,7 +174,8 @@ class StoreTest(unittest.TestCase):
             (scene / "cube.mtl").write_text(MATERIALS.format(red=red))
             store = scene / "cube.h5"
             made = run("precompute", scene / "cube.obj", "-o", store, "--method", method, "--subdivide", 2,
-                       "--epsilon", 0.05, "--rays", 4096, "--seed", 7, "--keep-form-factors", "--quiet")
+                       "--epsilon", 0.05, "--rays", 4096, "--seed", 7, "--keep-form-factors",
+                       "--sky", "grid:4x3", "--quiet")
             if made.returncode != 0:
                 raise AssertionError(f"precompute {name}: exit {made.returncode}: {made.stderr}")
             cls.stores[name] = store
@@ -217,7 +218,8 @@ class StoreTest(unittest.TestCase):
                 "/mesh/group": ((n,), "<u4"), "/mesh/row_sums": ((n,), "<f8"),
                 "/form_factors/indptr": ((n + 1,), "<u8"), "/form_factors/indices": ((nnz,), "<u4"),
                 "/form_factors/data": ((nnz,), "<f4"), "/form_factors/leaving": ((n,), "<f8"),
-                "/form_factors/absorbed": ((n,), "<f8"),
+                "/form_factors/absorbed": ((n,), "<f8"), "/sky/tiles": ((12, 9), "<f8"),
+                "/sky/first_bounce": ((12, n), "<f4"),
             }
             if name == "folded":
                 expected.update({"/operator/Y": ((n, k), "<f4"), "/operator/V": ((n, k), "<f4")})

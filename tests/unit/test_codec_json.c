@@ -25,7 +25,8 @@ static fixture make_scene(size_t n_channels) {
         strcpy(block[g], names[g]);
     }
     ck_assert_int_eq(group_index_make(N, group, N_GROUPS, block, &f.groups, NULL), LAM_OK);
-    f.scene = (codec_scene){.n = N, .n_channels = n_channels, .max_batch = 8, .max_bytes = 4096};
+    f.scene =
+        (codec_scene){.n = N, .n_channels = n_channels, .n_tiles = 3, .max_batch = 8, .max_bytes = 4096};
     return f;
 }
 
@@ -95,6 +96,46 @@ static const char *const good_requests[] = {
      "\"quantity\":\"irradiance\"}"),
 };
 #define N_GOOD (sizeof good_requests / sizeof good_requests[0])
+
+/* Skies of three tiles; in a batch a vector without one is under a dark one, wherever it stands. */
+START_TEST(skies_are_read) {
+    static const char one[] = "{\"emission\":{\"sky\":[1,[2],3],\"groups\":{\"lamp\":5}}}";
+    static const char three[] = "{\"emission\":{\"sky\":[1,[2,3,4],5]}}";
+    static const char many[] = "{\"emissions\":[[1,2,3,4,5],{\"groups\":{}},{\"sky\":[1,2,3]},[1,2,3,4,5],"
+                               "{\"elements\":[1],\"sky\":[4,5,6],\"values\":[2]},[1,2,3,4,5]]}";
+    fixture grey = make_scene(1), colour = make_scene(3);
+    radiosity_request request = {0};
+    ck_assert_uint_eq(status_of(&grey, one, strlen(one), &request), 0);
+    ck_assert_mem_eq(request.L, ((float[]){1, 2, 3}), 3 * sizeof(float));
+    ck_assert_mem_eq(request.E, ((float[N]){0, 5}), N * sizeof(float));
+    radiosity_request_free(&request);
+    ck_assert_uint_eq(status_of(&colour, three, strlen(three), &request), 0);
+    ck_assert_mem_eq(request.L, ((float[]){1, 2, 5, 1, 3, 5, 1, 4, 5}), 9 * sizeof(float));
+    radiosity_request_free(&request);
+    ck_assert_uint_eq(status_of(&grey, many, strlen(many), &request), 0);
+    ck_assert_uint_eq(request.n_rhs, 6);
+    ck_assert_mem_eq(request.L, ((float[18]){[6] = 1, 2, 3, [12] = 4, 5, 6}), 18 * sizeof(float));
+    radiosity_request_free(&request);
+    ck_assert_uint_eq(status_of(&grey, "{\"emission\":[1,2,3,4,5]}", 24, &request), 0);
+    ck_assert_ptr_null(request.L);
+    radiosity_request_free(&request);
+    /* Skies count for what a request may hold. */
+    grey.scene.n_tiles = 300;
+    char text[2400], *end = text;
+    end += sprintf(end, "{\"emissions\":[");
+    for (int v = 0; v < 3; v++, *end++ = v < 3 ? ',' : ']') {
+        end += sprintf(end, "{\"sky\":[0");
+        for (int t = 1; t < 300; t++) end += sprintf(end, ",0");
+        end += sprintf(end, "]}");
+    }
+    *end++ = '}';
+    ck_assert_uint_eq(status_of(&grey, text, (size_t)(end - text), NULL), 0);
+    grey.scene.max_bytes = 3000;
+    ck_assert_uint_eq(status_of(&grey, text, (size_t)(end - text), NULL), 422);
+    group_index_free(&grey.groups);
+    group_index_free(&colour.groups);
+}
+END_TEST
 
 START_TEST(good_requests_are_read) {
     fixture f = make_scene(1);
@@ -243,6 +284,7 @@ int main(void) {
     tcase_set_timeout(tcase, 300);
     tcase_add_test(tcase, published_cases);
     tcase_add_test(tcase, good_requests_are_read);
+    tcase_add_test(tcase, skies_are_read);
     tcase_add_test(tcase, a_request_cut_anywhere_is_not_json);
     tcase_add_test(tcase, changed_requests_never_do_harm);
     tcase_add_test(tcase, nesting_has_a_limit);

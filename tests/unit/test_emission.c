@@ -1,5 +1,6 @@
 /* Emissions by group, by file, and the figures over groups, on a mesh made by hand. */
 #include "solver/emission.h"
+#include "solver/npy.h"
 #include "solver/reduce.h"
 #include "support/suite.h"
 
@@ -7,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { N = 4 };
+enum { N = 4, N_TILES = 2 };
 
 static double area[N] = {1, 2, 3, 4};
 static uint32_t group[N] = {0, 1, 1, 2};
@@ -59,7 +60,7 @@ static lam_status by_json(const mesh *m, const char *text, emission *e, lam_erro
     ck_assert_int_ge(descriptor, 0);
     ck_assert_int_eq(write(descriptor, text, strlen(text)), (ssize_t)strlen(text));
     close(descriptor);
-    lam_status status = emission_read(path, m, e, error);
+    lam_status status = emission_read(path, m, N_TILES, e, error);
     unlink(path);
     return status;
 }
@@ -106,6 +107,14 @@ START_TEST(test_json) {
                                       "{\"groups\":{\"lamp\":null}}",
                                       "{\"groups\":{},\"elements\":[],\"values\":[]}",
                                       "{\"sky\":[1]}",
+                                      "{\"sky\":[1,2,3]}",
+                                      "{\"sky\":[1,-2]}",
+                                      "{\"sky\":[1,null]}",
+                                      "{\"sky\":[1,[1,2]]}",
+                                      "{\"sky\":7}",
+                                      "{\"sky\":[1,2],\"emitters\":[1]}",
+                                      "{\"sky\":[1,2],\"values\":[1]}",
+                                      "{\"sky\":[1,2],\"other\":1}",
                                       "{\"emitters\":[1]}",
                                       "{\"emissions\":[]}",
                                       "{\"emissions\":{}}",
@@ -128,6 +137,99 @@ START_TEST(test_json) {
         ck_assert_msg(by_json(&m, bad[i], &e, &error) != LAM_OK, "was read: %s", bad[i]);
         ck_assert_ptr_null(e.E);
         ck_assert_ptr_nonnull(strstr(error.message, ".json"));
+    }
+}
+END_TEST
+
+START_TEST(test_json_skies) {
+    const mesh m = hand_made(1), colour = hand_made(3);
+    emission e = {0};
+    lam_error error;
+    ck_assert_int_eq(by_json(&m, "[1,2,3,4]", &e, &error), LAM_OK);
+    ck_assert_ptr_null(e.L);
+    emission_free(&e);
+    ck_assert_int_eq(by_json(&m, "{\"sky\":[5,6]}", &e, &error), LAM_OK);
+    ck_assert_mem_eq(e.E, ((float[N]){0}), sizeof(float[N]));
+    ck_assert_mem_eq(e.L, ((float[]){5, 6}), 2 * sizeof(float));
+    emission_free(&e);
+    ck_assert_int_eq(by_json(&colour, "{\"sky\":[5,[6,7,8]],\"groups\":{\"lamp\":1}}", &e, &error), LAM_OK);
+    ck_assert_mem_eq(e.E, ((float[]){1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}), 12 * sizeof(float));
+    ck_assert_mem_eq(e.L, ((float[]){5, 6, 5, 7, 5, 8}), 6 * sizeof(float));
+    emission_free(&e);
+    /* In a batch one without a sky is under a dark one. */
+    ck_assert_int_eq(by_json(&m,
+                             "{\"emissions\":[[1,2,3,4],{\"elements\":[1],\"values\":[9],\"sky\":[5,6]},"
+                             "{\"groups\":{\"lamp\":7}}]}",
+                             &e, &error),
+                     LAM_OK);
+    ck_assert_mem_eq(e.E, ((float[]){1, 2, 3, 4, 0, 9, 0, 0, 7, 0, 0, 0}), 12 * sizeof(float));
+    ck_assert_mem_eq(e.L, ((float[]){0, 0, 5, 6, 0, 0}), 6 * sizeof(float));
+    emission_free(&e);
+}
+END_TEST
+
+/* Puts three dark emissions, or one, under a sky of this shape whose values count from 1. */
+static lam_status under_sky(const mesh *m, size_t n_vectors, int rank, const size_t *dims, emission *e,
+                            lam_error *error) {
+    char path[] = "/tmp/test-emission-XXXXXX.npy";
+    float values[64];
+    int descriptor = mkstemps(path, 4);
+    FILE *stream = fdopen(descriptor, "wb");
+    for (size_t i = 0; i < 64; i++) values[i] = (float)(i + 1);
+    npy_write(stream, rank, dims, values);
+    ck_assert_int_eq(fclose(stream), 0);
+    *e = (emission){.n_vectors = n_vectors};
+    ck_assert_int_eq(emission_allocate(path, m->n_channels, N, n_vectors, &e->E, error), LAM_OK);
+    e->E[1] = 3;
+    const lam_status status = emission_add_sky(e, path, m, N_TILES, error);
+    unlink(path);
+    return status;
+}
+
+START_TEST(test_skies_from_files) {
+    const mesh m = hand_made(1), colour = hand_made(3);
+    emission e;
+    lam_error error;
+    ck_assert_int_eq(under_sky(&m, 1, 1, (size_t[]){2}, &e, &error), LAM_OK);
+    ck_assert(e.n_vectors == 1 && !e.batch);
+    ck_assert_mem_eq(e.L, ((float[]){1, 2}), 2 * sizeof(float));
+    emission_free(&e);
+    ck_assert_int_eq(under_sky(&colour, 1, 1, (size_t[]){2}, &e, &error), LAM_OK);
+    ck_assert_mem_eq(e.L, ((float[]){1, 2, 1, 2, 1, 2}), 6 * sizeof(float));
+    emission_free(&e);
+    ck_assert_int_eq(under_sky(&colour, 1, 2, (size_t[]){3, 2}, &e, &error), LAM_OK);
+    ck_assert(e.n_vectors == 1 && !e.batch);
+    ck_assert_mem_eq(e.L, ((float[]){1, 2, 3, 4, 5, 6}), 6 * sizeof(float));
+    emission_free(&e);
+    /* One emission under two skies. */
+    ck_assert_int_eq(under_sky(&m, 1, 2, (size_t[]){2, 2}, &e, &error), LAM_OK);
+    ck_assert(e.n_vectors == 2 && e.batch);
+    ck_assert_mem_eq(e.L, ((float[]){1, 2, 3, 4}), 4 * sizeof(float));
+    ck_assert_mem_eq(e.E, ((float[]){0, 3, 0, 0, 0, 3, 0, 0}), 8 * sizeof(float));
+    emission_free(&e);
+    /* Three emissions under one sky, and under three. */
+    ck_assert_int_eq(under_sky(&m, 3, 1, (size_t[]){2}, &e, &error), LAM_OK);
+    ck_assert_mem_eq(e.L, ((float[]){1, 2, 1, 2, 1, 2}), 6 * sizeof(float));
+    emission_free(&e);
+    ck_assert_int_eq(under_sky(&colour, 3, 3, (size_t[]){3, 3, 2}, &e, &error), LAM_OK);
+    ck_assert_float_eq(e.L[17], 18);
+    emission_free(&e);
+    static const struct {
+        size_t n_channels, n_vectors;
+        int rank;
+        size_t dims[3];
+        const char *says;
+    } bad[] = {{1, 1, 1, {3}, "rows of 3 values, the store has 2 tiles"},
+               {3, 1, 2, {2, 2}, "shape"},
+               {1, 3, 2, {2, 2}, "2 skies beside 3 emissions"},
+               {1, 1, 2, {0, 2}, "empty"}};
+    for (size_t k = 0; k < sizeof bad / sizeof bad[0]; k++) {
+        const mesh *of = bad[k].n_channels == 1 ? &m : &colour;
+        ck_assert_int_eq(under_sky(of, bad[k].n_vectors, bad[k].rank, bad[k].dims, &e, &error),
+                         LAM_ERR_ARGUMENT);
+        ck_assert_msg(strstr(error.message, bad[k].says) != NULL, "%s", error.message);
+        ck_assert_ptr_null(e.L);
+        emission_free(&e);
     }
 }
 END_TEST
@@ -170,6 +272,8 @@ int main(void) {
     tcase_set_timeout(c, 60);
     tcase_add_test(c, test_groups);
     tcase_add_test(c, test_json);
+    tcase_add_test(c, test_json_skies);
+    tcase_add_test(c, test_skies_from_files);
     tcase_add_test(c, test_reduce);
     suite_add_tcase(s, c);
     return suite_run(s);

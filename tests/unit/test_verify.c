@@ -34,7 +34,8 @@ static build_problem problem_of(const sample *s, const uint32_t *order) {
 }
 
 static void trace(const mesh *m, const uint32_t *order, uint64_t seed, form_factors *out) {
-    const form_factor_options how = {.recipe = {.rays = RAYS, .seed = seed}, .stage = "rays"};
+    const form_factor_options how = {
+        .recipe = {.rays = RAYS, .seed = seed}, .stage = "rays", .sky = "grid:3x2", .ground_albedo = .5};
     MUST(form_factors_make(m, order, &how, out, error));
 }
 
@@ -102,6 +103,7 @@ static void save(const sample *s, const char *path) {
     MUST(store_set_text(out, "/", "name", "box", error));
     MUST(mesh_save(&s->m, s->f.row_sums, out, error));
     MUST(form_factors_save(&s->f, out, error));
+    MUST(sky_bounce_save(&s->f.sky, out, error));
     if (s->op != NULL)
         MUST(operator_save(s->op, out, error));
     else
@@ -110,9 +112,9 @@ static void save(const sample *s, const char *path) {
     MUST(store_seal(out, error));
 }
 
-static verify_check *const checks[] = {verify_checksums, verify_mesh,   verify_form_factors, verify_operator,
-                                       verify_linearity, verify_energy, verify_error};
-enum { CHECKSUMS, MESH, FORM_FACTORS, OPERATOR, LINEARITY, ENERGY, ERROR, N_CHECKS };
+static verify_check *const checks[] = {verify_checksums, verify_mesh,      verify_form_factors, verify_sky,
+                                       verify_operator,  verify_linearity, verify_energy,       verify_error};
+enum { CHECKSUMS, MESH, FORM_FACTORS, SKY, OPERATOR, LINEARITY, ENERGY, ERROR, N_CHECKS };
 
 /* Saves, opens and examines a sample. */
 static void examine(const sample *s, check done[N_CHECKS]) {
@@ -190,6 +192,30 @@ START_TEST(test_form_factors_without_reciprocity) {
 }
 END_TEST
 
+/* The box is closed: no light of the sky comes in but what single precision may hide. */
+START_TEST(test_a_sky_that_shines_through_walls) {
+    sample s = make_sample();
+    check done[N_CHECKS];
+    s.f.sky.first_bounce[3 * s.m.n + 11] = 1e-6f;
+    examine(&s, done);
+    ck_assert_int_eq(done[SKY].verdict, VERDICT_OK);
+    s.f.sky.first_bounce[3 * s.m.n + 11] = 1e-5f;
+    examine(&s, done);
+    ck_assert_int_eq(done[SKY].verdict, VERDICT_BROKEN);
+    ck_assert_ptr_nonnull(strstr(done[SKY].detail, "element 11"));
+    s.f.sky.first_bounce[3 * s.m.n + 11] = -1;
+    examine(&s, done);
+    ck_assert_int_eq(done[SKY].verdict, VERDICT_BROKEN);
+    ck_assert_ptr_nonnull(strstr(done[SKY].detail, "first_bounce[3][11]"));
+    s.f.sky.first_bounce[3 * s.m.n + 11] = 0;
+    s.m.up = 'y';
+    examine(&s, done);
+    ck_assert_int_eq(done[SKY].verdict, VERDICT_BROKEN);
+    ck_assert_ptr_nonnull(strstr(done[SKY].detail, "z is up in the sky, y in the mesh"));
+    free_sample(&s);
+}
+END_TEST
+
 START_TEST(test_a_mesh_that_is_not_its_vertices) {
     sample s = make_sample();
     check done[N_CHECKS];
@@ -216,6 +242,7 @@ int main(void) {
     tcase_add_test(c, test_an_operator_that_loses_light);
     tcase_add_test(c, test_an_operator_that_is_not_finite);
     tcase_add_test(c, test_form_factors_without_reciprocity);
+    tcase_add_test(c, test_a_sky_that_shines_through_walls);
     tcase_add_test(c, test_a_mesh_that_is_not_its_vertices);
     suite_add_tcase(s, c);
     return suite_run(s);

@@ -1,0 +1,283 @@
+/* The emissions of a request: dense, sparse, by group, by sky. */
+#include "server/codec_json_parser.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+/* --- numbers ------------------------------------------------------------------------------------------ */
+
+static inline bool is_emission(float value) {
+    return value >= 0.0f && value <= FLT_MAX;
+}
+
+static bool bad_value(parser *p, float value) {
+    int length = p->r.number.length > 40 ? 40 : (int)p->r.number.length;
+    const char *more = p->r.number.length > 40 ? "..." : "";
+    if (!isfinite(value))
+        return parser_refuse(p, 422, "%s = %.*s%s, must be within the range of single precision (3.4e38)",
+                             parser_here(p), length, p->r.number.bytes, more);
+    return parser_refuse(p, 422, "%s = %.*s%s, an emission must not be negative", parser_here(p), length,
+                         p->r.number.bytes, more);
+}
+
+/* One emission value. */
+static inline bool read_value(parser *p, float *value) {
+    if (json_peek(&p->r) != JSON_NUMBER) return parser_expect(p, JSON_NUMBER, "a number");
+    if (!json_read_float(&p->r, value)) return parser_fault(p);
+    return is_emission(*value) || bad_value(p, *value);
+}
+
+/* Inside an array that was entered: count values, then its end. */
+static bool read_rest_of_row(parser *p, float *row, size_t count, const char *of_what) {
+    size_t i = 0;
+    for (; json_next_element(&p->r); i++) {
+        if (i == count)
+            return parser_refuse(p, 422, "%s holds more than %zu values, one for each %s", parser_here(p),
+                                 count, of_what);
+        if (json_peek(&p->r) != JSON_NUMBER) {
+            parser_point_index(p, i);
+            return parser_expect(p, JSON_NUMBER, "a number");
+        }
+        if (!json_read_float(&p->r, &row[i])) return parser_fault(p);
+        if (!is_emission(row[i])) {
+            parser_point_index(p, i);
+            return bad_value(p, row[i]);
+        }
+    }
+    if (!parser_closed(p)) return false;
+    return i == count || parser_refuse(p, 422, "%s holds %zu values, must be %zu, one for each %s",
+                                       parser_here(p), i, count, of_what);
+}
+
+/* A number for all channels, or one each. */
+static bool read_colour(parser *p, float *colour) {
+    size_t C = p->scene->n_channels;
+    if (json_peek(&p->r) == JSON_ARRAY) {
+        if (!json_enter_array(&p->r)) return parser_fault(p);
+        return read_rest_of_row(p, colour, C, "channel");
+    }
+    if (json_peek(&p->r) != JSON_NUMBER)
+        return parser_expect(p, JSON_NUMBER, "a number or one for each channel");
+    if (!read_value(p, &colour[0])) return false;
+    for (size_t c = 1; c < C; c++) colour[c] = colour[0];
+    return true;
+}
+
+bool parser_read_elements(parser *p, uint32_t *elements, size_t *count, bool once) {
+    size_t n = p->scene->n, mark = p->pointer_length;
+    *count = 0;
+    if (!parser_expect(p, JSON_ARRAY, "an array of element indices")) return false;
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    bool good = true;
+    while (json_next_element(&p->r)) {
+        double index;
+        parser_point_index(p, *count);
+        good = parser_expect(p, JSON_NUMBER, "an element index");
+        if (!good) break;
+        if (!json_read_double(&p->r, &index)) return parser_fault(p);
+        if (!(index >= 0.0 && index < (double)n && index == floor(index))) {
+            int length = p->r.number.length > 40 ? 40 : (int)p->r.number.length;
+            good = parser_refuse(p, 422, "%s = %.*s, must be an integer from 0 to %zu", parser_here(p),
+                                 length, p->r.number.bytes, n - 1);
+            break;
+        }
+        size_t element = (size_t)index;
+        if (*count == n || (once && p->element_set[element])) {
+            good = *count == n ? parser_refuse(p, 422, "%s: more than the %zu elements of the scene",
+                                               parser_here(p), n)
+                               : parser_refuse(p, 422, "%s = %zu, an element that was listed before",
+                                               parser_here(p), element);
+            break;
+        }
+        if (once) p->element_set[element] = true;
+        elements[(*count)++] = (uint32_t)element;
+        p->pointer_length = mark;
+    }
+    if (once)
+        for (size_t i = 0; i < *count; i++) p->element_set[elements[i]] = false;
+    return good && parser_closed(p);
+}
+
+/* --- emissions ---------------------------------------------------------------------------------------- */
+
+/* [e0, e1, ...] or C rows of it. */
+static bool read_dense(parser *p, float *E) {
+    size_t n = p->scene->n, C = p->scene->n_channels, mark = p->pointer_length, rows = 0;
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    if (json_look(&p->r) != JSON_ARRAY) {
+        if (!read_rest_of_row(p, E, n, "element")) return false;
+        for (size_t c = 1; c < C; c++) memcpy(E + c * n, E, n * sizeof *E);
+        return true;
+    }
+    while (json_next_element(&p->r)) {
+        if (rows == C)
+            return parser_refuse(p, 422, "%s holds more than %zu rows, one for each channel", parser_here(p),
+                                 C);
+        parser_point_index(p, rows);
+        if (!parser_expect(p, JSON_ARRAY, "an array of numbers")) return false;
+        if (!json_enter_array(&p->r)) return parser_fault(p);
+        if (!read_rest_of_row(p, E + rows * n, n, "element")) return false;
+        p->pointer_length = mark;
+        rows++;
+    }
+    if (!parser_closed(p)) return false;
+    return rows == C || parser_refuse(p, 422, "%s holds %zu rows, must be %zu, one for each channel",
+                                      parser_here(p), rows, C);
+}
+
+/* [v...] of the sparse form: each a number or C of them. */
+static bool read_values(parser *p, size_t *count) {
+    size_t n = p->scene->n, C = p->scene->n_channels, mark = p->pointer_length;
+    *count = 0;
+    if (!parser_expect(p, JSON_ARRAY, "an array of values")) return false;
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    while (json_next_element(&p->r)) {
+        if (*count == n)
+            return parser_refuse(p, 422, "%s holds more values than there are elements", parser_here(p));
+        parser_point_index(p, *count);
+        if (!read_colour(p, p->values + *count * C)) return false;
+        p->pointer_length = mark;
+        (*count)++;
+    }
+    return parser_closed(p);
+}
+
+/* {"lamp": v, ...} */
+static bool read_groups(parser *p, float *E) {
+    const group_index *groups = p->scene->groups;
+    size_t n = p->scene->n, C = p->scene->n_channels, mark = p->pointer_length;
+    json_slice key;
+    if (!parser_expect(p, JSON_OBJECT, "an object of group names and values") ||
+        !parser_allocate(p, (void **)&p->group_set, groups->n_groups, sizeof *p->group_set))
+        return false;
+    memset(p->group_set, 0, groups->n_groups * sizeof *p->group_set);
+    if (!json_enter_object(&p->r)) return parser_fault(p);
+    while (parser_next_member(p, &key)) {
+        const uint32_t *found = NULL;
+        parser_point_key(p, key.bytes, key.length);
+        size_t n_found = group_index_find(groups, key.bytes, key.length, &found);
+        if (n_found == 0)
+            return parser_refuse(p, 422, "%s: the scene has no group of this name", parser_here(p));
+        if (!read_colour(p, p->colour)) return false;
+        for (size_t k = 0; k < n_found; k++) {
+            uint32_t g = found[k];
+            if (p->group_set[g])
+                return parser_refuse(p, 422, "%s: the group %s is given twice", parser_here(p),
+                                     groups->names[g]);
+            p->group_set[g] = true;
+            for (size_t c = 0; c < C; c++)
+                for (uint32_t i = groups->start[g]; i < groups->start[g + 1]; i++)
+                    E[c * n + groups->elements[i]] = p->colour[c];
+        }
+        p->pointer_length = mark;
+    }
+    return p->why->status == 0;
+}
+
+/* A refusal that says what is too large, at the value being read. */
+static bool refused_here(parser *p) {
+    memcpy(p->why->pointer, p->pointer, p->pointer_length);
+    p->why->pointer[p->pointer_length] = '\0';
+    return false;
+}
+
+/* One radiance a tile, each a number or C of them. */
+static bool read_sky(parser *p) {
+    const size_t m = p->scene->n_tiles, C = p->scene->n_channels, mark = p->pointer_length;
+    size_t t = 0;
+    float *L;
+    if (m == 0)
+        return parser_refuse(p, 422, "%s: the store has no sky; precompute it with --sky", parser_here(p));
+    if (!parser_expect(p, JSON_ARRAY, "an array of radiances")) return false;
+    if (!radiosity_request_light(p->request, p->scene, &L, p->why)) return refused_here(p);
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    for (; json_next_element(&p->r); t++) {
+        if (t == m)
+            return parser_refuse(p, 422, "%s holds more than %zu values, one for each tile", parser_here(p),
+                                 m);
+        parser_point_index(p, t);
+        if (!read_colour(p, p->colour)) return false;
+        for (size_t c = 0; c < C; c++) L[c * m + t] = p->colour[c];
+        p->pointer_length = mark;
+    }
+    if (!parser_closed(p)) return false;
+    return t == m ||
+           parser_refuse(p, 422, "%s holds %zu values, must be %zu, one for each tile", parser_here(p), t, m);
+}
+
+static bool read_emission_object(parser *p, float *E) {
+    static const char *const names[] = {"elements", "values", "groups", "sky", "emitters"};
+    enum { ELEMENTS, VALUES, GROUPS, SKY, EMITTERS, N_NAMES };
+    size_t n = p->scene->n, C = p->scene->n_channels, mark = p->pointer_length;
+    size_t n_elements = 0, n_values = 0, which;
+    unsigned seen = 0;
+    json_slice key;
+    if (!json_enter_object(&p->r)) return parser_fault(p);
+    while (parser_next_member(p, &key)) {
+        bool good = parser_known_member(p, &key, names, N_NAMES, &seen, &which);
+        if (!good) return false;
+        switch (which) {
+        case ELEMENTS:
+            good = parser_allocate(p, (void **)&p->elements, n, sizeof *p->elements) &&
+                   parser_allocate(p, (void **)&p->element_set, n, sizeof *p->element_set) &&
+                   parser_read_elements(p, p->elements, &n_elements, true);
+            break;
+        case VALUES:
+            good = parser_allocate(p, (void **)&p->values, n, C * sizeof *p->values) &&
+                   read_values(p, &n_values);
+            break;
+        case GROUPS:
+            good = read_groups(p, E);
+            break;
+        case SKY:
+            good = read_sky(p);
+            break;
+        default:
+            good =
+                p->scene->has_emitters
+                    ? parser_refuse(p, 501, "%s: precomputed emitters are not supported yet", parser_here(p))
+                    : parser_refuse(p, 422, "%s: the store has no precomputed emitters", parser_here(p));
+        }
+        if (!good) return false;
+        p->pointer_length = mark;
+    }
+    if (p->why->status != 0) return false;
+    const bool sparse = (seen & (1u << ELEMENTS | 1u << VALUES)) != 0;
+    const bool groups = (seen & 1u << GROUPS) != 0, sky = (seen & 1u << SKY) != 0;
+    if ((sparse && groups) || (!sparse && !groups && !sky))
+        return parser_refuse(p, 422, "%s must hold either elements and values or groups, or a sky",
+                             parser_here(p));
+    if (sparse && ((seen & 1u << ELEMENTS) == 0 || (seen & 1u << VALUES) == 0))
+        return parser_refuse(p, 422, "%s must hold both elements and values", parser_here(p));
+    if (n_elements != n_values)
+        return parser_refuse(p, 422, "%s holds %zu elements and %zu values, must be as many", parser_here(p),
+                             n_elements, n_values);
+    for (size_t i = 0; i < n_elements; i++)
+        for (size_t c = 0; c < C; c++) E[c * n + p->elements[i]] = p->values[i * C + c];
+    return true;
+}
+
+bool parser_read_emission(parser *p) {
+    float *E;
+    json_kind kind = json_peek(&p->r);
+    if (kind == JSON_NOTHING) return parser_fault(p);
+    if (kind != JSON_ARRAY && kind != JSON_OBJECT)
+        return parser_refuse(p, 422, "%s must be an array of numbers or an object", parser_here(p));
+    if (!radiosity_request_add(p->request, p->scene, &E, p->why)) return refused_here(p);
+    return kind == JSON_ARRAY ? read_dense(p, E) : read_emission_object(p, E);
+}
+
+bool parser_read_emissions(parser *p) {
+    size_t mark = p->pointer_length;
+    if (!parser_expect(p, JSON_ARRAY, "an array of emissions")) return false;
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    while (json_next_element(&p->r)) {
+        parser_point_index(p, p->request->n_rhs);
+        if (!parser_read_emission(p)) return false;
+        p->pointer_length = mark;
+    }
+    if (!parser_closed(p)) return false;
+    return p->request->n_rhs > 0 ||
+           parser_refuse(p, 422, "%s is empty, must hold an emission", parser_here(p));
+}

@@ -1,0 +1,12 @@
+/* The runtime half of a sky: first_bounce of an open store. */
+#ifndef LAMBERT_OPERATOR_SKY_H
+#define LAMBERT_OPERATOR_SKY_H
+
+#include "store/store.h"
+
+/* Loads /sky for n elements, or NULL where the store has none; freed by lam_sky_close.
+ * Errors: LAM_ERR_FORMAT (another shape, a value that is negative or not finite), LAM_ERR_DAMAGED, _MEMORY.
+ */
+lam_status sky_load(store *s, size_t n, lam_sky **out, lam_error *error);
+
+#endif

@@ -1,0 +1,330 @@
+"""A sky from end to end: what `precompute --sky` stores, and what `solve`, `render` and the daemon make of it.
+
+Answers are compared with a dense solution in double of what h5py reads from the store alone.
+"""
+
+import json
+import os
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+import h5py
+import numpy as np
+
+from daemon import Daemon
+from make_store import Scene, add_checksums
+
+LAMBERT = os.environ["LAMBERT"]
+
+# A courtyard: a floor, two walls and a lamp that lies on the floor; one wall is black. The fronts look inwards.
+YARD = """mtllib yard.mtl
+v 0 0 0
+v 4 0 0
+v 4 4 0
+v 0 4 0
+v 0 0 3
+v 4 0 3
+v 4 4 3
+v 1 1 .01
+v 2 1 .01
+v 2 2 .01
+v 1 2 .01
+o floor
+usemtl floor
+f 1 2 3 4
+o south
+usemtl wall
+f 1 5 6 2
+o east
+usemtl black
+f 2 6 7 3
+o lamp
+usemtl lamp
+f 8 9 10 11
+"""
+MATERIALS = """newmtl floor
+Kd {floor}
+newmtl wall
+Kd 0.6 0.6 0.6
+newmtl black
+Kd 0 0 0
+newmtl lamp
+Kd 0.3 0.3 0.3
+Ke 5 5 5
+"""
+
+
+def run(*arguments):
+    return subprocess.run([LAMBERT, *map(str, arguments)], capture_output=True, text=True, timeout=600)
+
+
+class Truth:
+    """The dense solution of a store that keeps its form factors."""
+
+    def __init__(self, path):
+        with h5py.File(path) as f:
+            self.rho = f["mesh/reflectance"][()].astype(float)
+            self.C, self.n = self.rho.shape
+            self.F = np.zeros((self.n, self.n))
+            pointers, columns, values = (f["form_factors/" + name][()] for name in ("indptr", "indices", "data"))
+            for i in range(self.n):
+                row = slice(int(pointers[i]), int(pointers[i + 1]))
+                self.F[i, columns[row]] = values[row]
+            self.first_bounce = f["sky/first_bounce"][()].astype(float)
+            self.tiles = f["sky/tiles"][()]
+            self.attributes = {k: v.decode() if isinstance(v, bytes) else v for k, v in f["sky"].attrs.items()}
+            self.area = f["mesh/area"][()]
+            self.normal = f["mesh/normal"][()].astype(float)
+            self.group = f["mesh/group"][()]
+            self.groups = [name.decode() for name in f["mesh/group_names"][()]]
+
+    def solve(self, E, L, quantity):
+        """E is [C][n], L is [C][m]."""
+        out = np.empty((self.C, self.n))
+        for c in range(self.C):
+            rho, H0 = self.rho[c], L[c] @ self.first_bounce
+            B = np.linalg.solve(np.eye(self.n) - rho[:, None] * self.F, E[c] + rho * H0)
+            H = H0 + self.F @ B
+            out[c] = {"radiosity": B, "irradiance": H, "indirect": B - E[c] - rho * H0}[quantity]
+        return out
+
+    def lamp(self, value):
+        E = np.zeros((self.C, self.n))
+        E[:, self.group == self.groups.index("lamp")] = value
+        return E
+
+
+class Sky(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
+        cls.scene = cls.folder / "yard.obj"
+        cls.scene.write_text(YARD)
+        cls.rng = np.random.default_rng(5)
+        cls.stores, cls.truth = {}, {}
+        for name, floor, options in (
+            ("exact", "0.5 0.5 0.5", ["--method", "exact", "--sky", "tregenza", "--ground-albedo", ".3"]),
+            ("colour", "0.7 0.4 0.2", ["--method", "low-rank", "--rank", "150", "--sky", "grid:12x11"]),
+            ("folded", "0.5 0.5 0.5", ["--method", "low-rank", "--rank", "150", "--sky", "reinhart:2"]),
+        ):
+            (cls.folder / "yard.mtl").write_text(MATERIALS.format(floor=floor))
+            path = cls.folder / (name + ".h5")
+            done = run("precompute", cls.scene, "-o", path, "--elements", 150, "--rays", 1024, "--probes", 4,
+                       "--keep-form-factors", *options)
+            assert done.returncode == 0, done.stderr
+            cls.stores[name], cls.truth[name] = path, Truth(path)
+        cls.plain = cls.folder / "plain.h5"
+        done = run("precompute", cls.scene, "-o", cls.plain, "--probes", 0, "--rays", 64)
+        assert done.returncode == 0, done.stderr
+
+    def npy(self, name, values):
+        path = self.folder / name
+        np.save(path, np.asarray(values))
+        return path
+
+    def close(self, got, wanted, what):
+        """Operators of full rank: single precision, over some hundred terms."""
+        np.testing.assert_allclose(got, wanted, atol=2e-5 * np.abs(wanted).max(), err_msg=str(what))
+
+    # --- the store
+
+    def test_store(self):
+        for name, tiling, count, albedo in (("exact", "tregenza", 145, 0.3), ("colour", "grid:12x11", 132, 0.0),
+                                            ("folded", "reinhart:2", 577, 0.0)):
+            t = self.truth[name]
+            self.assertEqual(t.attributes, {"tiling": tiling, "ground_albedo": albedo, "up": "z"})
+            self.assertEqual((t.tiles.shape, t.first_bounce.shape), ((count, 9), (count, t.n)))
+            self.assertAlmostEqual(t.tiles[:, 7].sum(), 2 * np.pi, delta=1e-12)
+            self.assertAlmostEqual(t.tiles[:, 8].sum(), np.pi, delta=1e-12)
+            altitude, azimuth = t.tiles[:, 3:5], t.tiles[:, 5:7]
+            np.testing.assert_allclose(np.diff(azimuth)[:, 0] * np.diff(np.sin(altitude))[:, 0], t.tiles[:, 7],
+                                       atol=1e-14)
+            middle, towards = altitude.mean(axis=1), azimuth.mean(axis=1)
+            middle[np.isclose(np.diff(azimuth)[:, 0], 2 * np.pi)] = np.pi / 2
+            np.testing.assert_allclose(t.tiles[:, 0], np.sin(towards) * np.cos(middle), atol=1e-14)
+            np.testing.assert_allclose(t.tiles[:, 1], np.cos(towards) * np.cos(middle), atol=1e-14)
+            # What comes in is what rows leave outside; the yard shows nobody a back face but its lamp and walls.
+            outside = 1 - t.F.sum(axis=1)
+            self.assertTrue((t.first_bounce.sum(axis=0) / np.pi <= outside + 1e-6).all())
+            self.assertGreater(t.first_bounce.sum(), 0)
+
+    def test_walls_and_directions(self):
+        t = self.truth["colour"]  # no ground
+        south = t.group == t.groups.index("south")  # looks north
+        H0 = t.first_bounce[:, south].mean(axis=1)
+        self.assertEqual(H0[t.tiles[:, 1] < -0.5].sum(), 0)
+        self.assertGreater(H0[t.tiles[:, 1] > 0.5].sum(), 0.2)
+        # The wall in the east hides it.
+        low_east, low_west = (np.argmax(s * t.tiles[:, 0]) for s in (1, -1))
+        floor = t.group == t.groups.index("floor")
+        self.assertLess(t.first_bounce[low_east, floor].mean(), 0.5 * t.first_bounce[low_west, floor].mean())
+
+    def test_information(self):
+        about = json.loads(run("info", self.stores["exact"], "--json").stdout)
+        self.assertEqual(about["sky"], {"tiling": "tregenza", "tiles": 145, "ground_albedo": 0.3})
+        self.assertIsNone(json.loads(run("info", self.plain, "--json").stdout)["sky"])
+        self.assertRegex(run("info", self.stores["folded"]).stdout, r"(?m)^sky +reinhart:2, 577 tiles, ground albedo 0$")
+        self.assertNotIn("sky", run("info", self.plain).stdout.replace("--sky", ""))
+
+    def test_verify(self):
+        for path in self.stores.values():
+            done = run("verify", path, "--probes", 0)
+            self.assertEqual(done.returncode, 0, done.stdout)
+            self.assertRegex(done.stdout, r"(?m)^ok +sky ")
+        self.assertRegex(run("verify", self.plain, "--probes", 0).stdout, r"(?m)^skipped +sky ")
+        bright = self.folder / "bright.h5"
+        bright.write_bytes(self.stores["exact"].read_bytes())
+        with h5py.File(bright, "r+") as f:
+            f["sky/first_bounce"][7, 3] = 4
+            add_checksums(f)
+        done = run("verify", bright, "--probes", 0)
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stdout, r"(?m)^BROKEN +sky +element 3 receives")
+
+    def test_store_keeps_its_sky(self):
+        again = self.folder / "again.h5"
+        done = run("precompute", self.stores["exact"], "-o", again, "--method", "low-rank", "--rank", 20, "--probes", 0)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        with h5py.File(again) as new, h5py.File(self.stores["exact"]) as old:
+            for name in "tiles", "first_bounce":
+                self.assertEqual(new["sky"][name][()].tobytes(), old["sky"][name][()].tobytes())
+            self.assertEqual(dict(new["sky"].attrs), dict(old["sky"].attrs))
+        for option in (["--sky", "tregenza"], ["--sky", "none"], ["--ground-albedo", ".3"]):
+            done = run("precompute", self.stores["exact"], "-o", again, *option)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1))
+            self.assertIn("keeps the sky it has", done.stderr)
+
+    def test_options(self):
+        for option, wanted in ((["--sky", "dome"], "must be none, tregenza"), (["--sky", "reinhart:0"], "from 1 to 16"),
+                               (["--sky", "reinhart:17"], "from 1 to 16"), (["--sky", "grid:12"], "grid:AxB"),
+                               (["--sky", "grid:361x2"], "from 1 to 360"), (["--sky", "tregenza "], "must be"),
+                               (["--ground-albedo", "1.1"], "--ground-albedo"), (["--ground-albedo", "-1"], "albedo")):
+            done = run("precompute", self.scene, "-o", self.folder / "none.h5", *option)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), (option, done.stderr))
+            self.assertIn(wanted, done.stderr)
+        done = run("precompute", self.scene, "-o", self.folder / "none.h5", "--sky", "none", "--ground-albedo", ".2",
+                   "--rays", 64, "--probes", 0)
+        self.assertEqual(done.returncode, 0)
+        self.assertIn("does not use --ground-albedo", done.stderr)
+        # 36,865 tiles of 500,000 elements are 74 GB.
+        done = run("precompute", self.scene, "-o", self.folder / "none.h5", "--sky", "reinhart:16", "--elements", 500000,
+                   "--rays", 256, "--probes", 0, "--rank", 1, "--memory", "40G")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertRegex(done.stderr, r"36865 sky tiles need .* fits: a --sky of at most \d+ tiles, or --memory")
+
+    def test_closed(self):
+        self.assertEqual(run("generate", "box", "-o", self.folder / "box.obj").returncode, 0)
+        done = run("precompute", self.folder / "box.obj", "-o", self.folder / "box.h5", "--sky", "tregenza", "--rays",
+                   64, "--probes", 0)
+        self.assertEqual(done.returncode, 0)
+        self.assertIn("no element sees the sky", done.stderr)
+
+    def test_other_ways_to_form_factors(self):
+        for options in (["--form-factors", "hemicube", "--resolution", 64], ["--quality", "high"]):
+            path = self.folder / "way.h5"
+            done = run("precompute", self.scene, "-o", path, "--elements", 60, "--probes", 0, "--keep-form-factors",
+                       "--sky", "tregenza", "--ground-albedo", "1", *options)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            t = Truth(path)
+            outside = 1 - t.F.sum(axis=1)
+            self.assertTrue((t.first_bounce.sum(axis=0) / np.pi <= outside + 1e-6).all(), options)
+            # What of the outside is no back face is sky or ground; of floor and walls at least this much.
+            self.assertGreater((t.area * t.first_bounce.sum(axis=0)).sum(), 0.5 * np.pi * (t.area * outside).sum())
+            with h5py.File(path) as f:
+                if options[0] == "--quality":  # the sky needs more rays than the pairs do
+                    self.assertEqual(f["form_factors"].attrs["rays"], 65536)
+
+    # --- solve
+
+    def test_solve(self):
+        for name, path in self.stores.items():
+            t = self.truth[name]
+            m = len(t.tiles)
+            L = self.rng.random((t.C, m)) * 10
+            sky = self.npy("sky.npy", (L if t.C > 1 else L[0]).astype("<f4"))
+            L = np.load(sky).astype(float).reshape(t.C, m)
+            out = self.folder / "out.npy"
+            for quantity in "radiosity", "irradiance", "indirect":
+                for light, E in (([], t.lamp(0)), (["--emit", "lamp=3"], t.lamp(3))):
+                    done = run("solve", path, "--sky", sky, *light, "--quantity", quantity, "-o", out)
+                    self.assertEqual(done.returncode, 0, done.stderr)
+                    got = np.load(out).reshape(t.C, t.n)
+                    self.close(got, t.solve(E, L, quantity), (name, quantity, light))
+            # Black elements have no radiosity, but irradiance.
+            black = t.group == t.groups.index("east")
+            self.assertTrue((t.solve(t.lamp(0), L, "irradiance")[:, black] > 0).all())
+
+    def test_solve_other_files(self):
+        t = self.truth["exact"]
+        skies = self.rng.random((3, 145))
+        batch = self.npy("batch.npy", skies)
+        out = self.folder / "out.npy"
+        done = run("solve", self.stores["exact"], "--sky", batch, "--emit", "lamp=1", "-o", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for got, L in zip(np.load(out).reshape(3, t.n), skies):
+            self.close(got, t.solve(t.lamp(1), L[None], "radiosity")[0], "batch")
+        emission = self.npy("emission.npy", np.tile(t.lamp(2), (3, 1)))
+        done = run("solve", self.stores["exact"], "--sky", batch, "--emission", emission, "-o", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.close(np.load(out).reshape(3, t.n)[1], t.solve(t.lamp(2), skies[1:2], "radiosity")[0], "emission")
+        text = self.folder / "sky.json"
+        text.write_text(json.dumps({"emission": {"sky": skies[0].tolist(), "groups": {"lamp": 4}}}))
+        done = run("solve", self.stores["exact"], "--emission", text, "-o", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.close(np.load(out), t.solve(t.lamp(4), skies[:1], "radiosity")[0], "json")
+
+    def test_solve_refuses(self):
+        good = self.rng.random(145)
+        negative, nan = good.copy(), good.copy()
+        negative[3], nan[7] = -1, np.nan
+        both = self.folder / "both.json"
+        both.write_text(json.dumps({"sky": good.tolist()}))
+        for wanted, store, *arguments in (
+            ("rows of 144 values, the store has 145 tiles", "exact", "--sky", self.npy("a.npy", good[:-1])),
+            ("value 3 = -1", "exact", "--sky", self.npy("b.npy", negative)),
+            ("value 7 is not finite", "exact", "--sky", self.npy("c.npy", nan)),
+            ("shape", "colour", "--sky", self.npy("d.npy", np.ones((2, 132)))),
+            ("No such file", "exact", "--sky", self.folder / "missing.npy"),
+            ("a sky of its own", "exact", "--sky", self.npy("e.npy", good), "--emission", both),
+            ("has no sky", None, "--sky", self.npy("e.npy", good)),
+            ("has none; precompute with --sky", None, "--emission", both),
+        ):
+            done = run("solve", self.stores[store] if store else self.plain, *arguments, "-o", self.folder / "no.npy")
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1), done.stderr)
+            self.assertIn(wanted, done.stderr)
+            self.assertFalse((self.folder / "no.npy").exists())
+
+    # --- the daemon
+
+    def test_daemon(self):
+        for name, path in self.stores.items():
+            t = self.truth[name]
+            with Daemon(f"{path}:{name}") as daemon:
+                about = daemon.get(f"/v1/scenes/{name}").json()["sky"]
+                self.assertEqual(about, {"tiling": t.attributes["tiling"], "tiles": len(t.tiles),
+                                         "ground_albedo": t.attributes["ground_albedo"]})
+                L = self.rng.random((t.C, len(t.tiles)))
+                for quantity in "radiosity", "irradiance", "indirect":
+                    answer = daemon.radiosity(name, {"emission": {"sky": L.T.tolist(), "groups": {"lamp": 3}},
+                                                     "quantity": quantity})
+                    self.assertEqual(answer.status, 200, answer)
+                    got = np.array(answer.json()[quantity]).reshape(t.C, t.n)
+                    self.close(got, t.solve(t.lamp(3), L, quantity), (name, quantity))
+
+    def test_render(self):
+        sky = self.npy("render.npy", np.ones(145))
+        picture = self.folder / "yard.png"
+        done = run("render", self.stores["exact"], "--sky", sky, "-o", picture, "--size", "40x40")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(picture.read_bytes()[1:4], b"PNG")
+        done = run("render", self.stores["exact"], "--sky", self.npy("two.npy", np.ones((2, 145))), "-o", picture)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("holds 2 emissions", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
