@@ -1,0 +1,114 @@
+/* Near pairs by mathematics and the others by rays: joined without counting anything twice. */
+#include "solver/formfactor/formfactor.h"
+#include "support/box.h"
+#include "support/suite.h"
+
+enum { DIVISIONS = 8, RAYS = 256 };
+
+/* A room with a plate in it. */
+static mesh room(void) {
+    mesh m = {0};
+    const double size[3] = {2, 2, 2};
+    const box_cell plate = {.axis = 2, .level = 1, .from = {.3, .4, 1}, .to = {1.2, 1.5, 1}};
+    for (size_t i = 0; i < 6 * DIVISIONS * DIVISIONS; i++) {
+        const box_cell cell = box_cell_of(size, DIVISIONS, i);
+        mesh_add_cell(&m, &cell, cell.level == 0);
+    }
+    mesh_add_cell(&m, &plate, true);
+    mesh_add_cell(&m, &plate, false);
+    mesh_finish(&m, .5f);
+    return m;
+}
+
+static form_factors make(const mesh *m, const recipe *r) {
+    uint32_t *order = malloc(m->n * sizeof *order);
+    form_factors f = {0};
+    lam_error error = {0};
+    const form_factor_options how = {.recipe = *r};
+    ck_assert_ptr_nonnull(order);
+    for (size_t i = 0; i < m->n; i++) order[i] = (uint32_t)i;
+    ck_assert_msg(form_factors_make(m, order, &how, &f, &error) == LAM_OK, "%s", error.message);
+    free(order);
+    return f;
+}
+
+static double entry(const csr *F, size_t i, size_t j) {
+    for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++)
+        if (F->indices[p] == j) return (double)F->data[p];
+    return 0;
+}
+
+START_TEST(near_pairs_are_exact_and_nothing_is_counted_twice) {
+    mesh m = room();
+    const recipe all = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 1e-5, .seed = 9},
+                 near = {.method = RECIPE_NEAR_PAIRS, .rays = RAYS, .accuracy = 7e-5, .seed = 2},
+                 rays = {.method = RECIPE_RAYS, .rays = RAYS, .seed = 2};
+    form_factors exact = make(&m, &all), joined = make(&m, &near), counted = make(&m, &rays);
+    double of_joined = 0, of_counted = 0, worst_near = 0;
+    size_t n_near = 0;
+    for (size_t i = 0; i < m.n; i++)
+        for (size_t j = 0; j < m.n; j++) {
+            const double F = entry(&exact.F, i, j), one = entry(&joined.F, i, j);
+            of_joined += (one - F) * (one - F);
+            of_counted += pow(entry(&counted.F, i, j) - F, 2);
+            /* Well above the threshold, whatever is hidden. */
+            if (F < 2 * recipe_near(&near)) continue;
+            n_near++;
+            worst_near = fmax(worst_near, fabs(one - F) / F);
+        }
+    ck_assert_uint_gt(n_near, m.n);
+    /* Rows are scaled by what the rays' share of their sums was off: about .5/sqrt(rays), three times that at
+     * either end. */
+    ck_assert_double_le(worst_near, .2);
+    ck_assert_double_le(joined.repair_mean, .5 / sqrt(RAYS));
+    /* Near pairs are a good part of what rays are off by: their own variance is F/(2 rays) each. */
+    ck_assert_double_le(of_joined, .8 * of_counted);
+    ck_assert_double_gt(joined.pairs.facing, 0);
+    ck_assert_double_eq(counted.pairs.facing, 0);
+    form_factors_free(&exact);
+    form_factors_free(&joined);
+    form_factors_free(&counted);
+    mesh_free(&m);
+}
+END_TEST
+
+/* The mean of many seeds tends to the truth: neither regime is biased where they meet. */
+START_TEST(the_mean_is_right) {
+    enum { SEEDS = 24 };
+    mesh m = room();
+    const recipe all = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 1e-5, .seed = 9};
+    form_factors exact = make(&m, &all);
+    double *mean = calloc(m.n * m.n, sizeof *mean);
+    ck_assert_ptr_nonnull(mean);
+    for (uint64_t seed = 1; seed <= SEEDS; seed++) {
+        const recipe near = {.method = RECIPE_NEAR_PAIRS, .rays = RAYS, .accuracy = 7e-5, .seed = seed};
+        form_factors f = make(&m, &near);
+        for (size_t i = 0; i < m.n; i++)
+            for (uint64_t p = f.F.indptr[i]; p < f.F.indptr[i + 1]; p++)
+                mean[i * m.n + f.F.indices[p]] += (double)f.F.data[p] / SEEDS;
+        form_factors_free(&f);
+    }
+    double off = 0, expected = 0;
+    for (size_t i = 0; i < m.n; i++)
+        for (size_t j = 0; j < m.n; j++) {
+            const double F = entry(&exact.F, i, j);
+            off += pow(mean[i * m.n + j] - F, 2);
+            expected += F / (2 * RAYS * SEEDS);
+        }
+    /* Independent samples: no more than the variance of counting everything. */
+    ck_assert_double_le(off, expected);
+    free(mean);
+    form_factors_free(&exact);
+    mesh_free(&m);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("near_pairs");
+    TCase *cases = tcase_create("near_pairs");
+    tcase_set_timeout(cases, 300);
+    tcase_add_test(cases, near_pairs_are_exact_and_nothing_is_counted_twice);
+    tcase_add_test(cases, the_mean_is_right);
+    suite_add_tcase(suite, cases);
+    return suite_run(suite);
+}
