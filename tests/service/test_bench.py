@@ -101,9 +101,9 @@ class FormFactors(unittest.TestCase):
             self.assertEqual((row["stated_bar"], row["covered"]), ("", ""))
 
     def test_enclosures(self):
-        # published to 1e-5; stated are 7e-5 a pair, and a surface has up to three pieces
+        # published to 2.1e-5; stated are 7e-5 a pair, and a surface has up to three pieces
         for row in self.rows("enclosures", enclosure="L-room", method="pair", quantity="F"):
-            self.assertLessEqual(float(row["error"]), 1e-5 + 3 * 2 * 7e-5, row)
+            self.assertLessEqual(float(row["error"]), 2.1e-5 + 3 * 2 * 7e-5, row)
         for row in self.rows("enclosures", enclosure="square", method="pair", quantity="F"):
             self.assertLessEqual(float(row["error"]), float(row["own_accuracy"]), row)
         self.assertEqual(len(self.rows("enclosures", method="pair", quantity="B")), 8)
