@@ -20,7 +20,7 @@ static const verb verbs[] = {
     {"solve", cmd_solve, "light a store and write the radiosity"},
     {"verify", cmd_verify, "check a store: checksums, invariants, error"},
     {"render", cmd_render, "picture a lighting"},
-    {"bench", NULL, "measure (not supported yet)"},
+    {"bench", cmd_bench, "measure: error against exact values and time, throughput"},
 };
 
 static void print_help(void) {

@@ -14,6 +14,7 @@
 #define OPTION_AUTO UINT64_MAX
 
 #define OPTIONS_MAX 63
+#define OPTIONS_ARGUMENTS_MAX 8
 #define OPTION_LIST_MAX 256
 
 typedef enum option_kind {
@@ -57,11 +58,11 @@ typedef struct option_verb {
     const char *arguments; /* "SCENE -o STORE.h5", for --help */
     const char *summary;
     const option_row *options;           /* the last row has neither name nor doc */
-    size_t min_arguments, max_arguments; /* at most 4 */
+    size_t min_arguments, max_arguments; /* at most OPTIONS_ARGUMENTS_MAX */
 } option_verb;
 
 typedef struct option_result {
-    const char *arguments[4];
+    const char *arguments[OPTIONS_ARGUMENTS_MAX];
     size_t n_arguments;
     uint64_t given; /* bit i: row i of the table was on the command line */
 } option_result;

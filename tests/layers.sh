@@ -14,6 +14,7 @@ declare -A allowed=(
     [solver/formfactor]="lambert/ store/ solver/progress.h solver/clock.h solver/operator/ solver/scene/ solver/formfactor/"
     [solver/matrix]="lambert/ store/ solver/progress.h solver/operator/ solver/matrix/"
     [solver/build]="lambert/ store/ solver/progress.h solver/clock.h solver/operator/ solver/matrix/ solver/build/"
+    [solver/bench]="lambert/ store/ solver/progress.h solver/clock.h solver/operator/ solver/scene/ solver/formfactor/ solver/build/ solver/bench/"
     [solver]="lambert/ store/ solver/"
     [server]="lambert/ store/ solver/operator/ server/"
 )
@@ -26,6 +27,7 @@ declare -A home=(
     ["embree3/"]="solver/formfactor/"
     ["lapacke.h"]="solver/build/ solver/operator/core.c"
     ["cblas.h"]="solver/build/ solver/matrix/ solver/operator/core.c"
+    ["cairo"]="solver/bench/plot.c"
     ["png.h"]="solver/image.c"
     ["jansson.h"]="solver/ server/"
     ["microhttpd.h"]="server/"
@@ -39,6 +41,7 @@ room_of() {
     solver/scene/*) echo solver/scene ;;
     solver/formfactor/*) echo solver/formfactor ;;
     solver/matrix/*) echo solver/matrix ;;
+    solver/bench/*) echo solver/bench ;;
     solver/build/*) echo solver/build ;;
     solver/*) echo solver ;;
     server/*) echo server ;;

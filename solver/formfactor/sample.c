@@ -82,22 +82,34 @@ void element_sampler_init(element_sampler *s, const mesh *m, const visibility *v
 
 /* A 32-bit fraction as a float in [0, 1). */
 static inline float fraction(uint32_t x) {
-    return (float)(x >> 8) * 0x1p-24f;
+    return (float)(int32_t)(x >> 8) * 0x1p-24f; /* signed: converted four at once */
+}
+
+/* a where the mask is all ones, b where it is 0. */
+static inline float pick(uint32_t mask, float a, float b) {
+    union {
+        float value;
+        uint32_t bits;
+    } one = {.value = a}, two = {.value = b};
+    one.bits = (one.bits & mask) | (two.bits & ~mask);
+    return one.value;
 }
 
 /* Shirley and Chiu's concentric map of the square to the disc: it keeps neighbours together, so a sequence
  * that is even in the square stays even in the disc. x, y in [-1, 1]; the sine and cosine of |angle| <= pi/4
  * are Taylor polynomials good to 4e-8. */
 static inline void square_to_disc(float x, float y, float *dx, float *dy) {
-    const float ax = fabsf(x), ay = fabsf(y);
-    const float r = ax > ay ? x : y;
-    const float ratio = ax > ay ? y / x : (ay > 0 ? x / y : 0);
+    /* Bits of the larger and the smaller coordinate are chosen by a mask: without branches eight are mapped
+     * at once. */
+    const uint32_t wide = -(uint32_t)(fabsf(x) > fabsf(y));
+    const float r = pick(wide, x, y), other = pick(wide, y, x);
+    const float ratio = other / (r + (float)(r == 0)); /* never by 0 */
     const float t = .785398163f * ratio, t2 = t * t;
     const float sine =
         t * (1 + t2 * (-1.f / 6 + t2 * (1.f / 120 + t2 * (-1.f / 5040 + t2 * (1.f / 362880)))));
     const float cosine = 1 + t2 * (-.5f + t2 * (1.f / 24 + t2 * (-1.f / 720 + t2 * (1.f / 40320))));
-    *dx = r * (ax > ay ? cosine : sine);
-    *dy = r * (ax > ay ? sine : cosine);
+    *dx = r * pick(wide, cosine, sine);
+    *dy = r * pick(wide, sine, cosine);
 }
 
 void element_sampler_point(const element_sampler *s, float u, float w, float point[3]) {
@@ -142,20 +154,33 @@ void pair_sampler_packet(const pair_sampler *s, uint32_t first, double x[4][VISI
 void element_sampler_packet(const element_sampler *s, uint32_t first, ray_packet *rays) {
     const element_frame *f = &s->frame;
     float x[4][VISIBILITY_PACKET];
+    /* Told to, the compiler takes the rays four at a time; of itself it takes the axes. */
     for (int d = 0; d < 4; d++)
+#pragma omp simd
         for (uint32_t i = 0; i < VISIBILITY_PACKET; i++)
             x[d][i] = fraction(s->shift[d] + (first + i) * kronecker_step[d]);
 
-    for (int i = 0; i < VISIBILITY_PACKET; i++) {
-        float origin[3];
-        element_sampler_point(s, x[0][i], x[1][i], origin);
-        for (int d = 0; d < 3; d++) rays->origin[d][i] = origin[d];
-    }
-    for (int i = 0; i < VISIBILITY_PACKET; i++) {
-        float dx, dy;
-        square_to_disc(2 * x[2][i] - 1, 2 * x[3][i] - 1, &dx, &dy);
-        const float dz = sqrtf(fmaxf(1 - dx * dx - dy * dy, 1e-12f));
+    if (s->parallelogram) {
         for (int d = 0; d < 3; d++)
-            rays->direction[d][i] = dx * f->tangent[d] + dy * f->bitangent[d] + dz * f->normal[d];
+#pragma omp simd
+            for (int i = 0; i < VISIBILITY_PACKET; i++)
+                rays->origin[d][i] =
+                    s->corner[0][d] + x[0][i] * s->edge[0][0][d] + x[1][i] * s->edge[0][1][d];
+    } else {
+        for (int i = 0; i < VISIBILITY_PACKET; i++) {
+            float origin[3];
+            element_sampler_point(s, x[0][i], x[1][i], origin);
+            for (int d = 0; d < 3; d++) rays->origin[d][i] = origin[d];
+        }
     }
+    float dx[VISIBILITY_PACKET], dy[VISIBILITY_PACKET], dz[VISIBILITY_PACKET];
+    for (int i = 0; i < VISIBILITY_PACKET; i++) {
+        square_to_disc(2 * x[2][i] - 1, 2 * x[3][i] - 1, &dx[i], &dy[i]);
+        const float left = 1 - dx[i] * dx[i] - dy[i] * dy[i];
+        dz[i] = sqrtf(left > 1e-12f ? left : 1e-12f);
+    }
+    for (int d = 0; d < 3; d++)
+#pragma omp simd
+        for (int i = 0; i < VISIBILITY_PACKET; i++)
+            rays->direction[d][i] = dx[i] * f->tangent[d] + dy[i] * f->bitangent[d] + dz[i] * f->normal[d];
 }

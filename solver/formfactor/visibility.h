@@ -49,4 +49,11 @@ void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays,
 unsigned visibility_blocked(const visibility *v, const ray_packet *segments, size_t n_segments,
                             const uint32_t *from, const uint32_t *to);
 
+/* How fast Embree alone is: what visibility_cast is measured by. Casts packets that are in memory already, on
+ * the same hierarchy, by all threads, without a filter and without a look at what was met; packet p leaves
+ * element self[p], above which its rays begin by more than rounding. own, unless NULL, gets how many rays met
+ * their own element all the same, counted afterwards. Errors: LAM_ERR_MEMORY. */
+lam_status visibility_bare_seconds(const visibility *v, const ray_packet *packets, const uint32_t *self,
+                                   size_t n_packets, double *seconds, size_t *own, lam_error *error);
+
 #endif

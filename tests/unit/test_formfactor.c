@@ -194,6 +194,24 @@ START_TEST(two_sided_sheet) {
 END_TEST
 
 /* Areas over eight decades: the merge weighs by variance, nothing passes 1, reciprocity holds. */
+/* A quad is planar to a millionth of its size only, which is more than rays are lifted by: from either half
+ * of one that is bent up or down, no ray may meet the quad itself, nor its back. */
+START_TEST(bent_quad_does_not_see_itself) {
+    for (int sign = -1; sign <= 1; sign += 2) {
+        mesh m = plates(NULL);
+        m.vertices[m.elements[0][2]][2] += sign * 2e-6;
+        lam_error error = {0};
+        ck_assert_msg(mesh_measure(&m, &error) == LAM_OK, "%s", error.message);
+        form_factors f = trace(&m, RAYS, 1);
+        check_invariants(&m, &f);
+        for (size_t i = 0; i < 2; i++) ck_assert_double_eq(f.absorbed[i], 0);
+        ck_assert_double_eq_tol(entry(&f.F, 0, 1), .199824895698, spread(.2, RAYS));
+        form_factors_free(&f);
+        mesh_free(&m);
+    }
+}
+END_TEST
+
 START_TEST(uneven_areas) {
     mesh m = {0};
     const box_cell low = {.axis = 2, .level = 0, .from = {0, 0, 0}, .to = {1, 1, 0}};
@@ -277,6 +295,7 @@ int main(void) {
     tcase_add_test(cases, same_for_any_thread_count);
     tcase_add_test(cases, back_faces_absorb);
     tcase_add_test(cases, two_sided_sheet);
+    tcase_add_test(cases, bent_quad_does_not_see_itself);
     tcase_add_test(cases, uneven_areas);
     tcase_add_test(cases, mean_halves_the_variance);
     tcase_add_test(cases, auto_rays_follow_the_noise_law);

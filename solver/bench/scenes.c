@@ -1,0 +1,128 @@
+#include "solver/bench/scenes.h"
+
+#include "solver/scene/generate.h"
+#include "solver/scene/import.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static lam_status plain_materials(mesh *m, lam_error *error) {
+    m->n_channels = 1;
+    m->unit = 1;
+    m->up = 'z';
+    m->group = memory_allocate(m->n, sizeof *m->group, "scene", error);
+    m->reflectance = memory_allocate(m->n, sizeof *m->reflectance, "scene", error);
+    m->emission = memory_allocate(m->n, sizeof *m->emission, "scene", error);
+    if (m->group == NULL || m->reflectance == NULL || m->emission == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < m->n; i++) m->reflectance[i] = .5f;
+    return LAM_OK;
+}
+
+lam_status scene_of_pieces(const scene_piece *pieces, size_t n, mesh *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    mesh m = {.n = n};
+    m.vertices = memory_allocate(n, 4 * sizeof *m.vertices, "scene", error);
+    m.elements = memory_allocate(n, sizeof *m.elements, "scene", error);
+    if (m.vertices == NULL || m.elements == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < n; i++) {
+        const scene_piece *p = &pieces[i];
+        /* corner, + along, + both (not of a triangle), + across */
+        for (int k = 0; k < 4; k++) {
+            m.elements[i][k] = MESH_NO_VERTEX;
+            if (p->triangle && k == 2) continue;
+            const int place = p->triangle && k == 3 ? 2 : k;
+            for (int d = 0; d < 3; d++)
+                m.vertices[m.n_vertices][d] = p->corner[d] + (k == 1 || k == 2 ? p->along[d] : 0) +
+                                              (k == 2 || k == 3 ? p->across[d] : 0);
+            m.elements[i][place] = (uint32_t)m.n_vertices++;
+        }
+    }
+    TRY(mesh_measure(&m, error));
+    TRY(plain_materials(&m, error));
+    *out = m;
+    m = (mesh){0};
+done:
+    mesh_free(&m);
+    return status;
+}
+
+/* A lot is 4 x 4 cells of 1 m; the middle 2 x 2 of them carry a house. */
+enum { LOT = 4, STOREYS_MOST = 6, LOT_MOST_PIECES = 12 + 4 + 8 * STOREYS_MOST };
+
+static size_t add_square(scene_piece *pieces, double x, double y, double z, const double along[3],
+                         const double across[3]) {
+    *pieces = (scene_piece){.corner = {x, y, z}};
+    memcpy(pieces->along, along, sizeof pieces->along);
+    memcpy(pieces->across, across, sizeof pieces->across);
+    return 1;
+}
+
+static size_t add_lot(scene_piece *pieces, double x, double y, int storeys) {
+    static const double east[3] = {1, 0, 0}, north[3] = {0, 1, 0}, west[3] = {-1, 0, 0},
+                        south[3] = {0, -1, 0}, up[3] = {0, 0, 1};
+    size_t n = 0;
+    for (int i = 0; i < LOT; i++)
+        for (int k = 0; k < LOT; k++) {
+            const bool house = i > 0 && i < LOT - 1 && k > 0 && k < LOT - 1;
+            n += add_square(pieces + n, x + i, y + k, house ? storeys : 0, east, north);
+        }
+    for (int z = 0; z < storeys; z++)
+        for (int k = 0; k < LOT - 2; k++) {
+            n += add_square(pieces + n, x + 1 + k, y + 1, z, east, up);             /* faces south */
+            n += add_square(pieces + n, x + LOT - 1 - k, y + LOT - 1, z, west, up); /* north */
+            n += add_square(pieces + n, x + LOT - 1, y + 1 + k, z, north, up);      /* east */
+            n += add_square(pieces + n, x + 1, y + LOT - 1 - k, z, south, up);      /* west */
+        }
+    return n;
+}
+
+lam_status scene_houses(size_t lots, uint64_t seed, mesh *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    scene_piece *pieces = NULL;
+    size_t most, n = 0;
+    if (!size_multiply(lots, lots, &most) || !size_multiply(most, LOT_MOST_PIECES, &most))
+        FAIL(error, LAM_ERR_MEMORY, "%zu x %zu houses: too many", lots, lots);
+    pieces = memory_allocate(most, sizeof *pieces, "scene", error);
+    if (pieces == NULL) TRY(LAM_ERR_MEMORY);
+    uint64_t state = seed;
+    for (size_t i = 0; i < lots; i++)
+        for (size_t k = 0; k < lots; k++) {
+            state = state * 6364136223846793005u + 1442695040888963407u;
+            const int storeys = 1 + (int)((state >> 33) % STOREYS_MOST);
+            n += add_lot(pieces + n, (double)(LOT * i), (double)(LOT * k), storeys);
+        }
+    TRY(scene_of_pieces(pieces, n, out, error));
+done:
+    free(pieces);
+    return status;
+}
+
+lam_status scene_file(const char *path, mesh *out, lam_error *error) {
+    const import_options how = {.unit = 1, .reflectance = -1};
+    import_report report = {0};
+    return scene_import(path, &how, out, &report, error);
+}
+
+lam_status scene_cornell(size_t elements, mesh *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const generate_options how = {.kind = "cornell", .elements = elements, .reflectance = -1, .seed = 1};
+    const char *parent = getenv("TMPDIR");
+    char folder[4096], path[4200] = "", materials[4200] = "";
+    if (parent == NULL || parent[0] == '\0') parent = "/tmp";
+    if ((size_t)snprintf(folder, sizeof folder, "%s/lambert-bench-XXXXXX", parent) >= sizeof folder ||
+        mkdtemp(folder) == NULL)
+        return status_fail(error, LAM_ERR_IO, "%s: cannot make a folder in it: %s; set TMPDIR", parent,
+                           strerror(errno));
+    snprintf(path, sizeof path, "%s/cornell.obj", folder);
+    snprintf(materials, sizeof materials, "%s/cornell.mtl", folder);
+    TRY(scene_generate(&how, path, NULL, error));
+    TRY(scene_file(path, out, error));
+done:
+    unlink(path);
+    unlink(materials);
+    rmdir(folder);
+    return status;
+}

@@ -1,0 +1,28 @@
+/* The scenes that suites measure on: built in memory, generated, or read from a file. */
+#ifndef LAMBERT_BENCH_SCENES_H
+#define LAMBERT_BENCH_SCENES_H
+
+#include "solver/scene/mesh.h"
+
+/* A planar piece: a parallelogram, or the triangle that is half of it. Its front is where along x across
+ * points. */
+typedef struct scene_piece {
+    double corner[3], along[3], across[3];
+    bool triangle;
+} scene_piece;
+
+/* A mesh with an element a piece, reflectance .5, without emission. Freed by mesh_free.
+ * Errors: LAM_ERR_MEMORY, LAM_ERR_ARGUMENT for a piece without an area. */
+lam_status scene_of_pieces(const scene_piece *pieces, size_t n, mesh *out, lam_error *error);
+
+/* Houses of one to six storeys on a plain under an open sky, lots x lots of them, about 44 elements each: the
+ * kind of scene that the thesis calls a city. */
+lam_status scene_houses(size_t lots, uint64_t seed, mesh *out, lam_error *error);
+
+/* The Cornell box of `lambert generate cornell --elements`. */
+lam_status scene_cornell(size_t elements, mesh *out, lam_error *error);
+
+/* A scene file, every face an element. */
+lam_status scene_file(const char *path, mesh *out, lam_error *error);
+
+#endif

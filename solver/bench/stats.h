@@ -1,0 +1,16 @@
+/* What repeated measurements come to. */
+#ifndef LAMBERT_BENCH_STATS_H
+#define LAMBERT_BENCH_STATS_H
+
+#include <stddef.h>
+
+/* The value below which a share q (0 to 1) of x lies, between two values linearly. Sorts x, which holds n
+ * finite values; NaN when n is 0. */
+double stats_quantile(double *x, size_t n, double q);
+
+/* Sorts x too. */
+double stats_median(double *x, size_t n);
+
+double stats_mean(const double *x, size_t n);
+
+#endif

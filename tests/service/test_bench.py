@@ -1,0 +1,193 @@
+"""Black box: `lambert bench`, its files, and whether what it measures makes sense."""
+
+import csv
+import json
+import math
+import os
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+import xml.etree.ElementTree
+
+LAMBERT = os.environ["LAMBERT"]
+ENVIRONMENT = dict(os.environ, OMP_NUM_THREADS="2", LC_ALL="C")
+
+COLUMNS = {
+    "closed-forms": "case source method occluded truth estimate absolute_error relative_error stated_bar repeats "
+                    "covered worst_error seconds",
+    "closed-forms-summary": "method open_worst open_median hidden_worst zero_worst covered seconds",
+    "enclosures": "enclosure source method quantity from to truth estimate error own_accuracy",
+    "enclosures-summary": "enclosure method F_worst F_own B_worst B_own seconds",
+    "throughput": "scene elements rays threads bare counted whole counted_ratio whole_ratio bare_speedup "
+                  "counted_speedup own_share",
+    "resolution": "scene elements resolution seconds density speedup error density_1 density_2 density_3 speedup_1 "
+                  "error_1 error_2 error_3",
+    "error": "scene elements method reference seconds entries single_mean single_q05 single_median single_q95 lamp",
+}
+
+
+def lambert(*arguments):
+    return subprocess.run([LAMBERT, *map(str, arguments)], capture_output=True, text=True, timeout=600,
+                          env=ENVIRONMENT, check=False)
+
+
+class FormFactors(unittest.TestCase):
+    """One quick run, looked at from all sides."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.out = os.path.join(cls.folder.name, "results")
+        cls.done = lambert("bench", "formfactors", "--quick", "-o", cls.out)
+        assert cls.done.returncode == 0, cls.done.stderr
+        cls.tables = {}
+        for name in COLUMNS:
+            with open(cls.path(name, "csv"), newline="", encoding="utf-8") as file:
+                cls.tables[name] = list(csv.DictReader(file))
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    @classmethod
+    def path(cls, name, extension):
+        return os.path.join(cls.out, f"formfactors-{name}.{extension}")
+
+    def rows(self, name, **wanted):
+        found = [row for row in self.tables[name] if all(row[key].startswith(w) for key, w in wanted.items())]
+        self.assertGreater(len(found), 0, wanted)
+        return found
+
+    def test_files(self):
+        plots = [name for name in os.listdir(self.out) if name.endswith(".svg")]
+        self.assertGreaterEqual(len(plots), 3)
+        self.assertEqual(len(os.listdir(self.out)), 2 * len(COLUMNS) + 2 * len(plots), os.listdir(self.out))
+        self.assertIn(f"{len(os.listdir(self.out))} files in", self.done.stdout)
+        for name in plots:
+            root = xml.etree.ElementTree.parse(os.path.join(self.out, name)).getroot()
+            self.assertTrue(root.tag.endswith("svg"))
+            with open(os.path.join(self.out, name[:-3] + "png"), "rb") as file:
+                self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
+
+    def test_columns_and_json(self):
+        for name, columns in COLUMNS.items():
+            with open(self.path(name, "csv"), newline="", encoding="utf-8") as file:
+                self.assertEqual(next(csv.reader(file)), columns.split(), name)
+            with open(self.path(name, "json"), encoding="utf-8") as file:
+                whole = json.load(file)
+            self.assertEqual([column["name"] for column in whole["columns"]], columns.split())
+            self.assertEqual(whole["run"]["scale"], "quick")
+            self.assertEqual(len(whole["rows"]), len(self.tables[name]))
+            for row, same in zip(whole["rows"], self.tables[name]):
+                for key, value in row.items():
+                    if isinstance(value, float):
+                        self.assertAlmostEqual(value, float(same[key]), delta=1e-9 * abs(value))
+                    else:
+                        self.assertEqual(value or "", same[key])
+
+    def test_closed_forms(self):
+        self.assertEqual(len({row["case"] for row in self.tables["closed-forms"]}), 34)
+        for row in self.rows("closed-forms", method="pair by pair", occluded="0"):
+            self.assertLessEqual(float(row["relative_error"]), 1e-6, row)
+        for row in self.rows("closed-forms", truth="0"):
+            if row["truth"] == "0":
+                self.assertEqual(float(row["worst_error"]), 0, row)
+        for row in self.rows("closed-forms", method="4096 rays"):
+            # the bar is two standard errors of independent rays: twice that is 1 in 16,000
+            self.assertLessEqual(float(row["absolute_error"]), 2 * float(row["stated_bar"]) + 1e-12, row)
+        for row in self.rows("closed-forms", method="hemicube"):
+            self.assertEqual((row["stated_bar"], row["covered"]), ("", ""))
+
+    def test_enclosures(self):
+        # published to 2.1e-5; stated are 7e-5 a pair, and a surface has up to three pieces
+        for row in self.rows("enclosures", enclosure="L-room", method="pair", quantity="F"):
+            self.assertLessEqual(float(row["error"]), 2.1e-5 + 3 * 2 * 7e-5, row)
+        for row in self.rows("enclosures", enclosure="square", method="pair", quantity="F"):
+            self.assertLessEqual(float(row["error"]), float(row["own_accuracy"]), row)
+        self.assertEqual(len(self.rows("enclosures", method="pair", quantity="B")), 8)
+
+    def test_throughput(self):
+        self.assertEqual({row["threads"] for row in self.tables["throughput"]}, {"1", "2"})
+        for row in self.tables["throughput"]:
+            for key in ("bare", "counted", "whole", "counted_ratio", "counted_speedup"):
+                self.assertGreater(float(row[key]), 0, row)
+            # what the bare loop casts must not end where it begins
+            self.assertLess(float(row["own_share"]), 1e-3, row)
+
+    def test_resolution(self):
+        rows = self.tables["resolution"]
+        self.assertEqual([row["resolution"] for row in rows], ["64", "32"])
+        self.assertEqual(float(rows[0]["error"]), 0)
+        self.assertTrue(0 < float(rows[1]["error"]) < 1, rows)
+        self.assertEqual(rows[1]["error_2"], "0.1281")  # the thesis' own
+
+    def test_error_against_time(self):
+        few, many = (float(self.rows("error", method=f"{rays} rays")[0]["single_mean"]) for rays in (256, 1024))
+        pairs = float(self.rows("error", method="pair")[0]["single_mean"])
+        # four times the rays: half the noise; low-discrepancy rays do no worse than .8
+        self.assertLess(many, .8 * few)
+        self.assertLess(pairs, .1 * many)
+        for row in self.tables["error"]:
+            self.assertTrue(0 < float(row["single_q05"]) <= float(row["single_median"]) <= float(row["single_q95"]))
+            self.assertTrue(math.isfinite(float(row["lamp"])))
+
+
+class Refusals(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+
+    def refused(self, status, wanted, *arguments):
+        done = lambert("bench", *arguments)
+        self.assertEqual(done.returncode, status, done.stderr)
+        self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+        self.assertIn(wanted, done.stderr)
+        self.assertEqual(done.stdout, "")
+
+    def test_usage(self):
+        out = os.path.join(self.folder, "out")
+        self.refused(2, "too few arguments", "-o", out)
+        self.refused(2, "no such suite", "speed", "-o", out)
+        self.refused(2, "exclude each other", "formfactors", "--quick", "--full", "-o", out)
+        for later in ("lowrank", "stability", "cities", "service", "hierarchical", "reuse"):
+            self.refused(2, "not supported yet", "formfactors", later, "-o", out)
+        self.assertEqual(os.listdir(self.folder), [])
+
+    def test_folders(self):
+        self.refused(1, "cannot be made", "formfactors", "-o", os.path.join(self.folder, "no", "parent"))
+        file = os.path.join(self.folder, "file")
+        with open(file, "w", encoding="utf-8") as stream:
+            stream.write("mine")
+        self.refused(1, "not a directory", "formfactors", "-o", file)
+        self.assertEqual(os.listdir(self.folder), ["file"])
+
+    def test_scene_is_missed_at_once(self):
+        self.refused(1, "none.obj", "formfactors", "--scene", os.path.join(self.folder, "none.obj"), "-o",
+                     os.path.join(self.folder, "out"))
+        self.assertEqual(os.listdir(self.folder), [])
+
+    def test_cancelled(self):
+        """Ctrl-C leaves whole files only; what a test run needs for its scenes is gone too."""
+        out, scratch = os.path.join(self.folder, "out"), os.path.join(self.folder, "scratch")
+        os.mkdir(scratch)
+        with subprocess.Popen([LAMBERT, "bench", "formfactors", "-o", out], stdout=subprocess.DEVNULL,
+                              stderr=subprocess.PIPE, text=True, env=dict(ENVIRONMENT, TMPDIR=scratch)) as running:
+            until = time.monotonic() + 60
+            while not os.path.isdir(out) and time.monotonic() < until:
+                time.sleep(.01)
+            time.sleep(.3)
+            running.send_signal(signal.SIGINT)
+            _, said = running.communicate(timeout=60)
+        self.assertEqual(running.returncode, 1, said)
+        self.assertIn("cancelled", said)
+        self.assertEqual(os.listdir(scratch), [])
+        if os.path.isdir(out):
+            for name in os.listdir(out):
+                self.assertFalse(name.startswith("."), name)
+
+
+if __name__ == "__main__":
+    unittest.main()
