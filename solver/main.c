@@ -38,6 +38,8 @@ static void print_help(void) {
 static int finish(const char *name, int status) {
     errno = 0;
     if (fflush(stdout) == 0 && !ferror(stdout)) return status;
+    /* Where what is refused was longer than a buffer, the reason is gone: one more byte brings it back. */
+    if (errno == 0 && putchar('\n') != EOF) fflush(stdout);
     fprintf(stderr, "lambert %s: cannot write to standard output: %s\n", name, strerror(errno));
     return 1;
 }

@@ -153,10 +153,10 @@ typedef struct dissection {
 } dissection;
 
 /* The exchange area that is not hidden. While pieces nearly touch, the kernel varies too much over them for
- * few segments: the larger is quartered, as often as splits allow. path tells the pieces' samples apart. */
+ * few segments: the larger is halved, as often as splits allow. path tells the pieces' samples apart. */
 static double seen_exchange(const look *l, const dissection *pair, const polygon *a, const polygon *b,
                             int splits, uint64_t path) {
-    enum { MOST_SPLITS = 6 };
+    enum { MOST_SPLITS = 12 };
     const double g = pair_exchange(l->rules, a, b, l->tolerance);
     if (g <= 0) return 0;
     double apart2 = 0;
@@ -168,12 +168,13 @@ static double seen_exchange(const look *l, const dissection *pair, const polygon
         pair_sampler_init(&two.sampler, l->seed + path, pair->i, pair->j);
         return g * seen_share(l, &two, (size_t)packets * VISIBILITY_PACKET);
     }
-    polygon quarters[4];
+    const bool of_a = a->radius > b->radius;
+    polygon halves[2];
     double sum = 0;
-    polygon_quarter(a->radius > b->radius ? a : b, quarters);
-    for (uint64_t q = 0; q < 4; q++)
-        sum += a->radius > b->radius ? seen_exchange(l, pair, &quarters[q], b, splits + 1, path * 5 + q + 1)
-                                     : seen_exchange(l, pair, a, &quarters[q], splits + 1, path * 5 + q + 1);
+    polygon_halve(of_a ? a : b, halves);
+    for (uint64_t h = 0; h < 2; h++)
+        sum += seen_exchange(l, pair, of_a ? &halves[h] : a, of_a ? b : &halves[h], splits + 1,
+                             path * 3 + h + 1);
     return sum;
 }
 

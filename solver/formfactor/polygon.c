@@ -85,30 +85,46 @@ void polygon_in_front(const polygon *p, const polygon *other, polygon *out) {
     *out = made;
 }
 
-/* A corner, the middle of an edge, or the middle of all. */
-static void middle(const polygon *p, int a, int b, double out[3]) {
-    for (int d = 0; d < 3; d++) out[d] = .5 * (p->corner[a][d] + p->corner[b][d]);
+static double side2(const polygon *p, int c) {
+    double sum = 0;
+    for (int d = 0; d < 3; d++) {
+        const double along = p->corner[(c + 1) % p->n][d] - p->corner[c][d];
+        sum += along * along;
+    }
+    return sum;
 }
 
-void polygon_quarter(const polygon *p, polygon quarters[4]) {
-    double between[4][3], centre[3];
-    for (int c = 0; c < p->n; c++) middle(p, c, (c + 1) % p->n, between[c]);
-    for (int d = 0; d < 3; d++) centre[d] = .5 * (between[0][d] + between[2][d]);
-    for (int q = 0; q < 4; q++) {
-        polygon *out = &quarters[q];
+void polygon_halve(const polygon *p, polygon halves[2]) {
+    int cut = 0; /* the side that is cut, and of a quad the opposite one */
+    double longest = 0;
+    for (int c = 0; c < (p->n == 4 ? 2 : 3); c++) {
+        const double length = p->n == 4 ? fmax(side2(p, c), side2(p, c + 2)) : side2(p, c);
+        if (!(length > longest)) continue;
+        longest = length;
+        cut = c;
+    }
+    const int next = (cut + 1) % p->n, across = (cut + 2) % p->n, last = (cut + 3) % p->n;
+    double middle[3], opposite[3];
+    for (int d = 0; d < 3; d++) {
+        middle[d] = .5 * (p->corner[cut][d] + p->corner[next][d]);
+        opposite[d] = p->n == 4 ? .5 * (p->corner[across][d] + p->corner[last][d]) : p->corner[across][d];
+    }
+    for (int h = 0; h < 2; h++) {
+        polygon *out = &halves[h];
         *out = (polygon){.n = p->n};
         memcpy(out->normal, p->normal, sizeof out->normal);
-        if (p->n == 4) {
-            memcpy(out->corner[0], p->corner[q], sizeof centre);
-            memcpy(out->corner[1], between[q], sizeof centre);
-            memcpy(out->corner[2], centre, sizeof centre);
-            memcpy(out->corner[3], between[(q + 3) % 4], sizeof centre);
-        } else if (q < 3) {
-            memcpy(out->corner[0], p->corner[q], sizeof centre);
-            memcpy(out->corner[1], between[q], sizeof centre);
-            memcpy(out->corner[2], between[(q + 2) % 3], sizeof centre);
+        /* Both halves go round as the whole does: first half from the cut side's begin, second from its end.
+         */
+        if (h == 0) {
+            memcpy(out->corner[0], p->corner[cut], sizeof middle);
+            memcpy(out->corner[1], middle, sizeof middle);
+            memcpy(out->corner[2], opposite, sizeof middle);
+            if (p->n == 4) memcpy(out->corner[3], p->corner[last], sizeof middle);
         } else {
-            memcpy(out->corner, between, 3 * sizeof centre);
+            memcpy(out->corner[0], middle, sizeof middle);
+            memcpy(out->corner[1], p->corner[next], sizeof middle);
+            memcpy(out->corner[2], p->n == 4 ? p->corner[across] : opposite, sizeof middle);
+            if (p->n == 4) memcpy(out->corner[3], opposite, sizeof middle);
         }
         measure_extent(out);
     }

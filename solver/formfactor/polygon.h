@@ -25,8 +25,9 @@ void polygon_in_front(const polygon *p, const polygon *other, polygon *out);
 
 double polygon_area(const polygon *p);
 
-/* The quarters of a triangle or a quad, between the middles of its edges. */
-void polygon_quarter(const polygon *p, polygon quarters[4]);
+/* The halves of a triangle or a quad, cut across its longest side (the middle of the longer pair of sides).
+ */
+void polygon_halve(const polygon *p, polygon halves[2]);
 
 /* Eight points of an affine polygon at (u, w) in the unit square, component by component. */
 void polygon_affine_points(const polygon *p, const double u[8], const double w[8], double points[3][8]);

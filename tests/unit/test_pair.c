@@ -167,7 +167,7 @@ START_TEST(halves_sum_to_the_whole) {
 }
 END_TEST
 
-/* The quarters fill the polygon, and the areas that its points stand for sum to its own: by the midpoint
+/* The halves fill the polygon, and the areas that its points stand for sum to its own: by the midpoint
  * rule, which is exact for areas linear in u and w, as those of a bilinear quad are. */
 START_TEST(pieces_and_points_fill_the_polygon) {
     const polygon shapes[2] = {
@@ -176,14 +176,15 @@ START_TEST(pieces_and_points_fill_the_polygon) {
     enum { GRID = 8 };
     for (int s = 0; s < 2; s++) {
         const double area = polygon_area(&shapes[s]);
-        polygon quarters[4];
-        double of_quarters = 0, of_points = 0;
-        polygon_quarter(&shapes[s], quarters);
-        for (int q = 0; q < 4; q++) {
-            polygon turned = quarters[q];
+        polygon halves[2];
+        double of_halves = 0, of_points = 0;
+        polygon_halve(&shapes[s], halves);
+        for (int h = 0; h < 2; h++) {
+            polygon turned = halves[h];
             polygon_measure(&turned);
             ck_assert_double_eq_tol(turned.normal[2], 1, 1e-12);
-            of_quarters += polygon_area(&quarters[q]);
+            ck_assert_double_lt(turned.radius, .9 * shapes[s].radius);
+            of_halves += polygon_area(&halves[h]);
         }
         for (int i = 0; i < GRID; i++)
             for (int j = 0; j < GRID; j++) {
@@ -191,7 +192,7 @@ START_TEST(pieces_and_points_fill_the_polygon) {
                 of_points +=
                     polygon_point(&shapes[s], (i + .5) / GRID, (j + .5) / GRID, point) / (GRID * GRID);
             }
-        ck_assert_double_eq_tol(of_quarters, area, 1e-12);
+        ck_assert_double_eq_tol(of_halves, area, 1e-12);
         ck_assert_double_eq_tol(of_points, area, 1e-12);
     }
 }
