@@ -89,20 +89,23 @@ static void bundle_of_affine(bundle *s, const look *l, const joined *two, size_t
     }
 }
 
-/* Casts segments first ... first+7; returns which are blocked. */
-static unsigned cast(const look *l, const joined *two, size_t first, double kernel[VISIBILITY_PACKET]) {
-    bundle s;
+static void bundle_of(bundle *s, const look *l, const joined *two, size_t first) {
     if (two->a->affine && two->b->affine) {
-        bundle_of_affine(&s, l, two, first);
-        memcpy(kernel, s.kernel, sizeof s.kernel);
-        return visibility_blocked(l->v, &s.segments, VISIBILITY_PACKET, s.from, s.to);
+        bundle_of_affine(s, l, two, first);
+        return;
     }
     for (int k = 0; k < VISIBILITY_PACKET; k++) {
         double x[4];
         pair_sampler_place(&two->sampler, (uint32_t)first + (uint32_t)k, x);
-        bundle_set(&s, l, k, two->i, two->a, two->j, two->b, x);
-        kernel[k] = s.kernel[k];
+        bundle_set(s, l, k, two->i, two->a, two->j, two->b, x);
     }
+}
+
+/* Casts segments first ... first+7; returns which are blocked. */
+static unsigned cast(const look *l, const joined *two, size_t first, double kernel[VISIBILITY_PACKET]) {
+    bundle s;
+    bundle_of(&s, l, two, first);
+    memcpy(kernel, s.kernel, sizeof s.kernel);
     return visibility_blocked(l->v, &s.segments, VISIBILITY_PACKET, s.from, s.to);
 }
 
@@ -152,20 +155,45 @@ typedef struct dissection {
     double segments_per_area; /* of exchange: each piece gets its share of the pair's segments */
 } dissection;
 
-/* The exchange area that is not hidden. While pieces nearly touch, the kernel varies too much over them for
- * few segments: the larger is halved, as often as splits allow. path tells the pieces' samples apart. */
+/* How many segments out of one are worth something: (sum k)^2 / (N sum k^2), 1 where the kernel is the same
+ * everywhere. */
+static double worth(const look *l, const joined *two) {
+    enum { SEGMENTS = 64 };
+    double sum = 0, sum2 = 0;
+    for (size_t first = 0; first < SEGMENTS; first += VISIBILITY_PACKET) {
+        bundle s;
+        bundle_of(&s, l, two, first);
+        for (int k = 0; k < VISIBILITY_PACKET; k++) {
+            sum += s.kernel[k];
+            sum2 += s.kernel[k] * s.kernel[k];
+        }
+    }
+    return sum2 > 0 ? sum * sum / (SEGMENTS * sum2) : 0;
+}
+
+/* Whether the kernel varies little enough over two pieces. Where they nearly touch it is so steep that a few
+ * segments need not even notice. */
+static bool is_even(const look *l, const joined *two) {
+    const double enough = .4, size = two->a->radius + two->b->radius;
+    double apart2 = 0;
+    for (int d = 0; d < 3; d++) {
+        const double r = two->a->centre[d] - two->b->centre[d];
+        apart2 += r * r;
+    }
+    return apart2 > .5 * size * size && worth(l, two) > enough;
+}
+
+/* The exchange area that is not hidden. While the kernel varies too much over two pieces the larger is
+ * halved, as often as splits allow. path tells the pieces' samples apart. */
 static double seen_exchange(const look *l, const dissection *pair, const polygon *a, const polygon *b,
                             int splits, uint64_t path) {
-    enum { MOST_SPLITS = 12 };
+    enum { MOST_SPLITS = 14 };
     const double g = pair_exchange(l->rules, a, b, l->tolerance);
     if (g <= 0) return 0;
-    double apart2 = 0;
-    for (int d = 0; d < 3; d++) apart2 += (a->centre[d] - b->centre[d]) * (a->centre[d] - b->centre[d]);
-    const double size = a->radius + b->radius;
-    if (splits == MOST_SPLITS || apart2 > .5 * size * size) {
+    joined two = {.i = pair->i, .j = pair->j, .a = a, .b = b};
+    pair_sampler_init(&two.sampler, l->seed + path, pair->i, pair->j);
+    if (splits == MOST_SPLITS || is_even(l, &two)) {
         const double packets = ceil(g * pair->segments_per_area / VISIBILITY_PACKET);
-        joined two = {.i = pair->i, .j = pair->j, .a = a, .b = b};
-        pair_sampler_init(&two.sampler, l->seed + path, pair->i, pair->j);
         return g * seen_share(l, &two, (size_t)packets * VISIBILITY_PACKET);
     }
     const bool of_a = a->radius > b->radius;
