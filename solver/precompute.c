@@ -18,7 +18,8 @@ typedef struct work {
     const precompute_options *options;
     terminal *t;
     progress progress;
-    double memory; /* bytes */
+    double memory;    /* bytes */
+    scratch *scratch; /* NULL: none */
     mesh m;
     uint32_t *order;
     form_factors f;
@@ -30,6 +31,7 @@ typedef struct work {
 } work;
 
 static void work_free(work *w) {
+    scratch_close(w->scratch, false);
     mesh_free(&w->m);
     free(w->order);
     form_factors_free(&w->f);
@@ -80,6 +82,7 @@ static lam_status load_store(work *w, lam_error *error) {
     TRY(store_open(w->options->input, &s, error));
     TRY(mesh_load(s, &w->m, &row_sums, error));
     TRY(form_factors_load(s, &w->m, &w->f, error));
+    TRY(form_factors_expand(&w->f, w->m.area, error));
     if (w->options->reflectance >= 0)
         for (size_t i = 0; i < w->m.n * w->m.n_channels; i++)
             w->m.reflectance[i] = (float)w->options->reflectance;
@@ -179,9 +182,39 @@ static void log_form_factors(work *w) {
                       100 * f->absorbed_share);
 }
 
+/* Rows that are found with rays go to the scratch folder; pairs have no use for one. */
+static lam_status take_scratch(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = w->options;
+    const bool judged = w->probes > 0 && judge_recipe(w, 0).method != RECIPE_PAIRS;
+    if (o->scratch == NULL) return LAM_OK;
+    if (!judged && (o->from_store || w->recipe.method == RECIPE_PAIRS)) {
+        terminal_log(w->t, "%s does not use --scratch",
+                     o->from_store ? "a store with form factors" : recipe_name(w->recipe.method));
+        return LAM_OK;
+    }
+    TRY(scratch_open(o->scratch, &w->scratch, error));
+    w->t->nothing = o->continues;
+done:
+    return status;
+}
+
+static void log_kept(work *w, const form_factors *f) {
+    if (f->rows_kept > 0)
+        terminal_log(w->t, "%zu of %zu rows were in %s already", f->rows_kept, w->m.n, w->options->scratch);
+}
+
 static lam_status trace(work *w, lam_error *error) {
-    const form_factor_options how = {.recipe = w->recipe, .progress = &w->progress, .stage = "form factors"};
-    return form_factors_make(&w->m, w->order, &how, &w->f, error);
+    lam_status status = LAM_OK;
+    const form_factor_options how = {.recipe = w->recipe,
+                                     .progress = &w->progress,
+                                     .stage = "form factors",
+                                     .scratch = w->scratch,
+                                     .scratch_name = "form-factors.rows"};
+    TRY(form_factors_make(&w->m, w->order, &how, &w->f, error));
+    log_kept(w, &w->f);
+done:
+    return status;
 }
 
 /* --- operator --------------------------------------------------------------------------------------------
@@ -247,6 +280,7 @@ static lam_status judge(work *w, lam_error *error) {
     lam_status status = LAM_OK;
     static const char *const stages[2] = {"form factors for the judge, 1 of 2",
                                           "form factors for the judge, 2 of 2"};
+    static const char *const files[2] = {"judge-1.rows", "judge-2.rows"};
     form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}}, mean = {.row_sums = NULL};
     const build_problem problem = problem_of(w);
     uint64_t purpose = 0, seed;
@@ -254,9 +288,13 @@ static lam_status judge(work *w, lam_error *error) {
         /* Independent of what was factorized: kept form factors may have any seed. */
         do seed = precompute_seed(w->options->form_factors.seed, ++purpose);
         while (seed == w->f.recipe.seed);
-        const form_factor_options how = {
-            .recipe = judge_recipe(w, seed), .progress = &w->progress, .stage = stages[h]};
+        const form_factor_options how = {.recipe = judge_recipe(w, seed),
+                                         .progress = &w->progress,
+                                         .stage = stages[h],
+                                         .scratch = w->scratch,
+                                         .scratch_name = files[h]};
         TRY(form_factors_make(&w->m, w->order, &how, &half[h], error));
+        log_kept(w, &half[h]);
     }
     TRY(form_factors_mean(&half[0], &half[1], &mean, error));
     const judge_input input = {.problem = &problem,
@@ -319,6 +357,8 @@ static lam_status save(work *w, lam_error *error) {
     TRY(mesh_save(&w->m, w->f.row_sums, s, error));
     if (o->reflectance >= 0) TRY(store_set_number(s, "/mesh", "reflectance_given", o->reflectance, error));
     TRY(terminal_check(error));
+    if (o->keep_form_factors && w->m.n > FORM_FACTORS_ROWS_MOST)
+        TRY(form_factors_gather(&w->f, w->m.area, error));
     if (o->keep_form_factors) TRY(form_factors_save(&w->f, s, error));
     TRY(terminal_check(error));
     TRY(operator_save(w->op, s, error));
@@ -352,6 +392,7 @@ lam_status precompute_run(const precompute_options *options, terminal *t, build_
     log_stage(&w, "mesh", started);
     TRY(terminal_check(error));
 
+    TRY(take_scratch(&w, error));
     if (!options->from_store) {
         started = clock_seconds();
         TRY(trace(&w, error));
@@ -372,6 +413,8 @@ lam_status precompute_run(const precompute_options *options, terminal *t, build_
     started = clock_seconds();
     TRY(save(&w, error));
     log_stage(&w, "store", started);
+    scratch_close(w.scratch, true);
+    w.scratch = NULL;
     *report = w.built;
 done:
     work_free(&w);

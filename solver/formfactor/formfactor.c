@@ -4,6 +4,7 @@
 #include "solver/formfactor/pairs.h"
 #include "solver/formfactor/rays.h"
 #include "solver/formfactor/repair.h"
+#include "solver/formfactor/upper.h"
 #include "solver/formfactor/visibility.h"
 
 #include <math.h>
@@ -16,6 +17,7 @@ static const double crack_share = 1e-4;
 
 void form_factors_free(form_factors *f) {
     csr_free(&f->F);
+    csr_free(&f->upper);
     free(f->row_sums);
     free(f->leaving);
     free(f->absorbed);
@@ -31,20 +33,35 @@ static double area_mean(const mesh *m, const double *x) {
     return total > 0 ? sum / total : 0;
 }
 
-/* From one-sided rows, which are freed, whose entries are F_ij times rays, to F. */
-static lam_status form_factors_finish(form_factors *f, const mesh *m, csr *rows, size_t rays,
+lam_status form_factors_expand(form_factors *f, const double *area, lam_error *error) {
+    if (f->upper.indptr == NULL) return LAM_OK;
+    f->F = f->upper;
+    f->upper = (csr){0};
+    return upper_expand(&f->F, area, f->row_sums, error);
+}
+
+lam_status form_factors_gather(form_factors *f, const double *area, lam_error *error) {
+    if (f->F.indptr == NULL) return LAM_OK;
+    f->upper = f->F;
+    f->F = (csr){0};
+    return upper_gather(&f->upper, area, error);
+}
+
+/* From one-sided rows, which are freed, whose entries are F_ij times rays, to the upper triangle. */
+static lam_status form_factors_finish(form_factors *f, const mesh *m, found_rows *rows, size_t rays,
                                       lam_error *error) {
     lam_status status = LAM_OK;
     double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(repair_merge(rows, rays, m->area, &f->F, error));
-    csr_free(rows);
+    f->rows_kept = rows->kept;
+    TRY(upper_merge(rows, rays, m->area, &f->upper, error));
+    found_rows_free(rows);
     f->leaving_share = area_mean(m, f->leaving);
     f->absorbed_share = area_mean(m, f->absorbed);
     f->closed = f->leaving_share < crack_share;
     for (size_t i = 0; i < m->n; i++)
         outside[i] = (f->closed ? 0 : f->leaving[i]) + (f->absorbed_share < crack_share ? 0 : f->absorbed[i]);
-    TRY(repair_close(&f->F, m->area, outside, f, error));
+    TRY(repair_close(&f->upper, m->area, outside, f, error));
 done:
     free(outside);
     return status;
@@ -53,11 +70,11 @@ done:
 static lam_status make_of_rays(const mesh *m, const visibility *v, const uint32_t *order,
                                const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
-    csr counts = {0};
+    found_rows counts = {0};
     TRY(rays_count(m, v, order, options, &counts, f->leaving, f->absorbed, error));
     TRY(form_factors_finish(f, m, &counts, options->recipe.rays, error));
 done:
-    csr_free(&counts);
+    found_rows_free(&counts);
     return status;
 }
 
@@ -65,25 +82,26 @@ static lam_status make_of_hemicubes(const mesh *m, const visibility *v, const ui
                                     const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
     hemicube h = {0};
-    csr rows = {0};
+    found_rows rows = {0};
     TRY(hemicube_create(options->recipe.resolution, &h, error));
     TRY(hemicube_trace(&h, m, v, order, options, &rows, f->leaving, f->absorbed, error));
     /* The weights are form factors already, as if one ray had been cast. */
     TRY(form_factors_finish(f, m, &rows, 1, error));
 done:
     hemicube_free(&h);
-    csr_free(&rows);
+    found_rows_free(&rows);
     return status;
 }
 
 static lam_status make_of_pairs(const mesh *m, const visibility *v, const uint32_t *order,
                                 const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
-    csr counts = {0};
+    found_rows counts = {0};
     double *outside = NULL;
     pairs_report report;
     form_factor_options silent = *options;
     silent.progress = NULL;
+    silent.scratch = NULL;
     const pairs_options how = {.tolerance = 1e-6,
                                .accuracy = options->recipe.accuracy,
                                .segments = 16,
@@ -96,7 +114,7 @@ static lam_status make_of_pairs(const mesh *m, const visibility *v, const uint32
     outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) TRY(LAM_ERR_MEMORY);
     TRY(rays_count(m, v, order, &silent, &counts, f->leaving, f->absorbed, error));
-    csr_free(&counts);
+    found_rows_free(&counts);
     TRY(pairs_exchange(m, v, &how, &f->F, &report, error));
     f->pairs_facing = report.facing;
     f->pairs_open = report.open;
@@ -109,9 +127,12 @@ static lam_status make_of_pairs(const mesh *m, const visibility *v, const uint32
         for (uint64_t p = f->F.indptr[i]; p < f->F.indptr[i + 1]; p++) seen += (double)f->F.data[p];
         outside[i] = fmax(0, 1 - seen / m->area[i]);
     }
-    TRY(repair_close(&f->F, m->area, outside, f, error));
+    upper_fold(&f->F);
+    f->upper = f->F;
+    f->F = (csr){0};
+    TRY(repair_close(&f->upper, m->area, outside, f, error));
 done:
-    csr_free(&counts);
+    found_rows_free(&counts);
     free(outside);
     return status;
 }
@@ -137,6 +158,7 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
         TRY(make_of_pairs(m, v, order, options, &f, error));
         break;
     }
+    if (!options->upper) TRY(form_factors_expand(&f, m->area, error));
     *out = f;
     f = (form_factors){0};
 done:
@@ -171,6 +193,7 @@ lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_
     const size_t n = a->F.n;
     form_factors f = *a;
     f.F = (csr){.n = n};
+    f.upper = (csr){0};
     f.row_sums = f.leaving = f.absorbed = NULL;
     f.recipe.rays = a->recipe.rays + b->recipe.rays;
     if (b->F.n != n)

@@ -3,15 +3,22 @@
 #define LAMBERT_FORMFACTOR_FORMFACTOR_H
 
 #include "solver/formfactor/recipe.h"
+#include "solver/formfactor/scratch.h"
 #include "solver/operator/csr.h"
 #include "solver/scene/mesh.h"
 
+/* Above this many elements a store keeps A_i F_ij for j > i in place of rows: half of it. */
+enum { FORM_FACTORS_ROWS_MOST = 10240 };
+
+/* Either F or upper is there; the other one is zero. */
 typedef struct form_factors {
     csr F;            /* rows F[i][.], mesh order */
+    csr upper;        /* A_i F_ij for j > i, m^2, in place of F */
     double *row_sums; /* [n], of F after repair, <= 1 */
     double *leaving;  /* [n], share of an element's rays that left the scene */
     double *absorbed; /* [n], share that hit a back face */
     recipe recipe;
+    size_t rows_kept; /* of rows, when just made: that were in the scratch folder */
     size_t pairs_facing, pairs_open, pairs_hidden; /* of pairs, when just made: plainly one or the other */
     bool closed;                                   /* nothing leaves but through cracks between elements */
     double leaving_share;                          /* area-weighted means */
@@ -25,6 +32,9 @@ typedef struct form_factor_options {
     recipe recipe;
     const progress *progress;
     const char *stage; /* what progress calls it */
+    bool upper;        /* leave the upper triangle, without the rows it stands for */
+    scratch *scratch;  /* where rows are kept as they are found (rays, hemicubes); NULL: in memory only */
+    const char *scratch_name; /* of the file there, one for each sample */
 } form_factor_options;
 
 /* More pairs than those of this many elements are not taken one by one. */
@@ -34,25 +44,35 @@ enum { PAIRS_ELEMENTS_MOST = 16384 };
  * row sums. The result is the same for any number of threads. order is [n] (mesh_z_order): the sequence in
  * which elements are worked on, for locality only.
  *
- * rays: counts rays (Embree) from every element. Cost: n * rays rays and O(nnz) memory.
+ * rays: counts rays (Embree) from every element. Cost: n * rays rays; 8 bytes of memory for each entry of the
+ *   rows, half of that for the upper triangle.
  * hemicube: the same by hemicubes around every element's centroid: no sampling noise, but aliasing. Cost:
- *   3 n resolution^2 rays and O(nnz) memory.
+ *   3 n resolution^2 rays, memory likewise.
  * pairs: pair by pair, magnitudes by mathematics to 1e-6, by rays only what is hidden of them. What a row
  *   lacks goes outside, or, where the scene is closed, is put back by the repair. Cost: O(n^2), about 1 us a
  *   pair; 2.5 n^2 bytes beside the rows.
  *
- * Errors: LAM_ERR_ARGUMENT (a recipe out of bounds, too many pairs), LAM_ERR_MEMORY, LAM_ERR_CANCELLED,
- * LAM_ERR_INTERNAL. */
+ * With a scratch folder a run that is stopped goes on where it was, and the result is the same.
+ *
+ * Errors: LAM_ERR_ARGUMENT (a recipe out of bounds, too many pairs, a scratch file of something else),
+ * LAM_ERR_IO (of the scratch folder), LAM_ERR_MEMORY, LAM_ERR_CANCELLED, LAM_ERR_INTERNAL. */
 lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_factor_options *options,
                              form_factors *out, lam_error *error);
 
 void form_factors_free(form_factors *f);
 
-/* The mean of two independent samples of the same mesh: a reference with half the variance. */
+/* Turns the upper triangle into rows, in place; nothing where they are rows already. Costs as much memory
+ * again. LAM_ERR_MEMORY: f is then only to be freed. */
+lam_status form_factors_expand(form_factors *f, const double *area, lam_error *error);
+
+/* The reverse, exact: expanded again, the rows have the same bits. */
+lam_status form_factors_gather(form_factors *f, const double *area, lam_error *error);
+
+/* The mean of the rows of two independent samples of the same mesh: a reference with half the variance. */
 lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_factors *out,
                              lam_error *error);
 
-/* /form_factors of a store. */
+/* /form_factors of a store: rows or the upper triangle, as they are. */
 lam_status form_factors_save(const form_factors *f, store *s, lam_error *error);
 lam_status form_factors_load(store *s, const mesh *m, form_factors *out, lam_error *error);
 

@@ -41,14 +41,19 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
 }
 
 lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
-                      const form_factor_options *options, csr *counts, double *leaving, double *absorbed,
-                      lam_error *error) {
+                      const form_factor_options *options, found_rows *counts, double *leaving,
+                      double *absorbed, lam_error *error) {
     const ray_context context = {.m = m, .v = v, .rays = options->recipe.rays, .seed = options->recipe.seed};
     const row_maker maker = {.make = trace_element,
                              .context = &context,
+                             .kind = ROW_COUNTS,
                              .rays = options->recipe.rays,
                              .cheaper = "fewer --rays",
                              .progress = options->progress,
-                             .stage = options->stage};
-    return rows_make(&maker, m->n, order, counts, leaving, absorbed, error);
+                             .stage = options->stage,
+                             .m = m,
+                             .recipe = &options->recipe,
+                             .scratch = options->scratch,
+                             .scratch_name = options->scratch_name};
+    return rows_make(&maker, order, counts, leaving, absorbed, error);
 }
