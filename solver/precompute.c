@@ -6,6 +6,7 @@
 #include "solver/scene/import.h"
 
 #include <math.h>
+#include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -116,6 +117,20 @@ static recipe judge_recipe(const work *w, uint64_t seed) {
     return r;
 }
 
+static forecast forecast_of(const work *w, double n) {
+    const precompute_options *o = w->options;
+    return (forecast){.n = (size_t)n,
+                      .n_channels = w->m.n_channels,
+                      .recipe = w->recipe,
+                      .judge_recipe = judge_recipe(w, 0),
+                      .probes = o->probes == PRECOMPUTE_AUTO ? PROBES_OF_LARGE : o->probes,
+                      .from_store = o->from_store,
+                      .scratch = o->scratch != NULL,
+                      .keep = o->keep_form_factors,
+                      .exact = strcmp(o->method, "exact") == 0,
+                      .rank = o->rank};
+}
+
 /* Chooses the recipe for n elements and sees that it fits. */
 static lam_status check_memory(work *w, double n, lam_error *error) {
     const precompute_options *o = w->options;
@@ -123,13 +138,7 @@ static lam_status check_memory(work *w, double n, lam_error *error) {
         return status_fail(error, LAM_ERR_MEMORY, "%s: %.3g elements, must be below 4e9; refine less",
                            o->input, n);
     w->recipe = o->from_store ? w->f.recipe : choice_recipe(&o->form_factors, n);
-    const forecast f = {.n = (size_t)n,
-                        .n_channels = w->m.n_channels,
-                        .recipe = w->recipe,
-                        .judge_recipe = judge_recipe(w, 0),
-                        .probes = o->probes == PRECOMPUTE_AUTO ? PROBES_OF_LARGE : o->probes,
-                        .exact = strcmp(o->method, "exact") == 0,
-                        .rank = o->rank};
+    const forecast f = forecast_of(w, n);
     return forecast_check(&f, w->memory, error);
 }
 
@@ -195,6 +204,32 @@ static lam_status take_scratch(work *w, lam_error *error) {
     }
     TRY(scratch_open(o->scratch, &w->scratch, error));
     w->t->nothing = o->continues;
+done:
+    return status;
+}
+
+/* One line of what is to come, and whether the disks can hold it. */
+static lam_status announce(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = w->options;
+    const forecast f = forecast_of(w, (double)w->m.n);
+    char memory[32], stored[32], seconds[32], judging[32], scratch_room[32];
+    char made[64] = "", judged[64] = "", kept[64] = "";
+    double rate;
+    TRY(forecast_check_disk(&f, o->output, w->scratch, o->scratch, error));
+    if (w->t->quiet || (o->from_store && w->probes == 0)) goto done;
+    TRY(form_factors_ray_rate(&w->m, w->order, &rate, error));
+    const forecast_times times = forecast_seconds(&f, rate, omp_get_max_threads());
+    forecast_format_bytes(forecast_bytes(&f), memory);
+    forecast_format_bytes(forecast_store_bytes(&f), stored);
+    forecast_format_bytes(forecast_scratch_bytes(&f), scratch_room);
+    forecast_format_seconds(times.form_factors, seconds);
+    forecast_format_seconds(times.judge, judging);
+    if (!o->from_store) snprintf(made, sizeof made, " form factors %s,", seconds);
+    if (w->probes > 0) snprintf(judged, sizeof judged, " the judge's %s,", judging);
+    if (w->scratch != NULL) snprintf(kept, sizeof kept, ", scratch up to %s", scratch_room);
+    terminal_log(w->t, "forecast:%s%s at %.3g Mray/s of a trial; memory up to %s, store up to %s%s", made,
+                 judged, rate * 1e-6, memory, stored, kept);
 done:
     return status;
 }
@@ -393,6 +428,7 @@ lam_status precompute_run(const precompute_options *options, terminal *t, build_
     TRY(terminal_check(error));
 
     TRY(take_scratch(&w, error));
+    TRY(announce(&w, error));
     if (!options->from_store) {
         started = clock_seconds();
         TRY(trace(&w, error));

@@ -1,5 +1,6 @@
 #include "solver/formfactor/formfactor.h"
 
+#include "solver/clock.h"
 #include "solver/formfactor/hemicube.h"
 #include "solver/formfactor/pairs.h"
 #include "solver/formfactor/rays.h"
@@ -164,6 +165,28 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
 done:
     visibility_destroy(v);
     form_factors_free(&f);
+    return status;
+}
+
+lam_status form_factors_ray_rate(const mesh *m, const uint32_t *order, double *rays_per_second,
+                                 lam_error *error) {
+    enum { ELEMENTS = 256, RAYS = 512, LONG_ENOUGH = 16 };
+    static const double trial_seconds = .02;
+    lam_status status = LAM_OK;
+    visibility *v = NULL;
+    TRY(visibility_create(m, &v, error));
+    rays_cast_some(m, v, order, ELEMENTS, VISIBILITY_PACKET); /* threads start, caches fill */
+    size_t cast = 0;
+    const double started = clock_seconds();
+    double seconds = 0;
+    for (int k = 0; k < LONG_ENOUGH && seconds < trial_seconds; k++) {
+        rays_cast_some(m, v, order, ELEMENTS, RAYS);
+        cast += ELEMENTS * RAYS;
+        seconds = clock_seconds() - started;
+    }
+    *rays_per_second = (double)cast / fmax(seconds, 1e-6);
+done:
+    visibility_destroy(v);
     return status;
 }
 

@@ -68,6 +68,11 @@ lam_status form_factors_expand(form_factors *f, const double *area, lam_error *e
 /* The reverse, exact: expanded again, the rows have the same bits. */
 lam_status form_factors_gather(form_factors *f, const double *area, lam_error *error);
 
+/* Rays a second that all threads cast from some elements of the scene: a trial of some hundredths of a second
+ * for a forecast. order as above. Errors as of form_factors_make. */
+lam_status form_factors_ray_rate(const mesh *m, const uint32_t *order, double *rays_per_second,
+                                 lam_error *error);
+
 /* The mean of the rows of two independent samples of the same mesh: a reference with half the variance. */
 lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_factors *out,
                              lam_error *error);

@@ -57,3 +57,21 @@ lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
                              .scratch_name = options->scratch_name};
     return rows_make(&maker, order, counts, leaving, absorbed, error);
 }
+
+void rays_cast_some(const mesh *m, const visibility *v, const uint32_t *order, size_t n_elements,
+                    size_t rays) {
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t k = 0; k < n_elements; k++) {
+        const size_t element = order[k * m->n / n_elements];
+        element_sampler sampler;
+        element_sampler_init(&sampler, m, v, element, 0);
+        uint32_t self[VISIBILITY_PACKET];
+        for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = (uint32_t)element;
+        for (size_t ray = 0; ray < rays; ray += VISIBILITY_PACKET) {
+            ray_packet packet;
+            hit_packet hits;
+            element_sampler_packet(&sampler, (uint32_t)ray, &packet);
+            visibility_cast(v, &packet, VISIBILITY_PACKET, self, false, &hits);
+        }
+    }
+}

@@ -12,4 +12,8 @@ lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
                       const form_factor_options *options, found_rows *counts, double *leaving,
                       double *absorbed, lam_error *error);
 
+/* Casts rays from n_elements elements, spread over the order, and drops what they meet: for their time. */
+void rays_cast_some(const mesh *m, const visibility *v, const uint32_t *order, size_t n_elements,
+                    size_t rays);
+
 #endif

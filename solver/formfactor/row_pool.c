@@ -7,8 +7,8 @@
 #include <string.h>
 
 /* Between two looks at the cancel flag and the progress line: at most so many elements, and about so many
- * rays. A block on the disk takes some tenths of a second. */
-enum { CHUNK_MOST = 16, CHUNK_RAYS = 1 << 18, BLOCK_RAYS = 1 << 22 };
+ * rays. A block on the disk takes about a tenth of a second. */
+enum { CHUNK_MOST = 16, CHUNK_RAYS = 1 << 18, BLOCK_RAYS = 1 << 20 };
 
 static bool pool_reserve(row_pool *p, size_t more) {
     if (p->capacity - p->used >= more) return true;

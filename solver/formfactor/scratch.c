@@ -1,5 +1,6 @@
 #include "solver/formfactor/scratch.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -66,10 +67,23 @@ lam_status scratch_file(scratch *s, const char *name, int *fd, char **path, lam_
     return LAM_OK;
 }
 
+uint64_t scratch_used_bytes(const scratch *s) {
+    uint64_t bytes = 0;
+    DIR *folder = opendir(s->folder);
+    if (folder == NULL) return 0;
+    for (struct dirent *entry; (entry = readdir(folder)) != NULL;) {
+        struct stat about;
+        if (fstatat(s->fd, entry->d_name, &about, AT_SYMLINK_NOFOLLOW) == 0 && S_ISREG(about.st_mode))
+            bytes += (uint64_t)about.st_size;
+    }
+    closedir(folder);
+    return bytes;
+}
+
 uint64_t scratch_free_bytes(const scratch *s) {
     struct statvfs about;
     if (fstatvfs(s->fd, &about) != 0) return UINT64_MAX;
-    return (uint64_t)about.f_bavail * about.f_frsize;
+    return (uint64_t)about.f_bavail * about.f_frsize + scratch_used_bytes(s);
 }
 
 void scratch_close(scratch *s, bool done) {

@@ -17,7 +17,9 @@ lam_status scratch_open(const char *folder, scratch **out, lam_error *error);
  * missing. The caller closes fd and frees path with free. */
 lam_status scratch_file(scratch *s, const char *name, int *fd, char **path, lam_error *error);
 
-/* Bytes that are free for more; UINT64_MAX when unknown. */
+/* Bytes that its files have already, and those that they can have: with what is free; UINT64_MAX when that is
+ * unknown. */
+uint64_t scratch_used_bytes(const scratch *s);
 uint64_t scratch_free_bytes(const scratch *s);
 
 /* Lets go of the folder. With done set the files opened through it are removed, else they stay for the next

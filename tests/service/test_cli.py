@@ -169,7 +169,7 @@ class Usage(Case):
                          "--method emitters", "--method hierarchical", "--factorizer svd", "--factorizer rsi",
                          "--factorizer sgrsvd", "--keep-factors", "--emitters sky", "--positions p.json",
                          "--path p.json --frames 3", "--reuse A", "--paths 9", "--store-precision f16",
-                         "--store-precision bf16", "--store-precision i8", "--scratch d"))):
+                         "--store-precision bf16", "--store-precision i8"))):
             with self.subTest(line):
                 self.refused(2, "not supported yet", *line.split())
 
