@@ -218,7 +218,7 @@ class Files(Case):
         self.failed("--method low-rank", "precompute", self.box, "--elements", 6000, "--method", "exact", "--rays", 256,
                     "--memory", "300M", "--probes", 0, "-o", self.path("a.h5"))
         self.failed("--rays", "precompute", self.box, "--elements", 3000, "--rays", 65536, "--method", "low-rank",
-                    "--memory", "200M", "--probes", 0, "-o", self.path("a.h5"))
+                    "--memory", "130M", "--probes", 0, "-o", self.path("a.h5"))
         self.failed("--memory", "precompute", self.box, "--elements", 3000000000, "-o", self.path("a.h5"))
         self.assertEqual(os.listdir(self.folder), [])
 
@@ -546,7 +546,7 @@ class Stores(Case):
         self.assertIn("64 rays an element", done.stderr)
         done = lambert("precompute", self.box, "-o", bare, *common, "--memory", "100K")
         self.assertEqual(done.returncode, 1)
-        self.assertIn("--quality high need about", done.stderr)
+        self.assertIn("all pairs need about", done.stderr)
 
     def test_hemicube(self):
         kept, bare, again = self.path("kept.h5"), self.path("bare.h5"), self.path("again.h5")
