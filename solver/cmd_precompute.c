@@ -26,6 +26,7 @@ typedef struct fields {
     uint64_t levels, rank;
     double coherence, min_area, threshold;
     const char *assign, *correction, *precision;
+    const char *scratch;
     uint64_t threads, memory, seed, probes;
     bool quiet, progress;
 } fields;
@@ -256,7 +257,11 @@ static const option_row rows[] = {
      .offset = FIELD(memory),
      .value = "SIZE",
      .doc = "Memory to stay within, such as 500M or 16G (70 % of what is free)"},
-    {.name = "scratch", .kind = OPTION_LATER, .value = "DIR", .doc = "(not supported yet)"},
+    {.name = "scratch",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(scratch),
+     .value = "DIR",
+     .doc = "Keep rows of form factors there as they are found; the same command after a stop goes on there"},
     {.name = "seed", .kind = OPTION_COUNT, .offset = FIELD(seed), .value = "S", .doc = "Of the sampling (1)"},
     {.name = "probes",
      .kind = OPTION_COUNT,
@@ -427,7 +432,7 @@ int cmd_precompute(int argc, char **argv) {
     lam_error error = {0};
     terminal term;
     build_report built = {0};
-    char *command = command_line(argc, argv);
+    char *command = command_line(argc, argv), *continues = NULL;
     int code = options_parse(&verb, argc, argv, &f, &given);
     const bool from_store = code == OPTIONS_GO && is_store(given.arguments[0]);
     if (code == OPTIONS_GO && check_together(&f, &given, from_store) != 0) code = 2;
@@ -435,6 +440,9 @@ int cmd_precompute(int argc, char **argv) {
         free(command);
         return code;
     }
+    if (f.scratch != NULL && command != NULL &&
+        asprintf(&continues, "what was finished stays in %s; to go on: %s", f.scratch, command) < 0)
+        continues = NULL;
     terminal_open(&term, verb.name, f.quiet, f.progress);
     if (f.threads > 0) omp_set_num_threads((int)f.threads); /* OpenBLAS asks OpenMP too */
     const precompute_options options = {
@@ -467,11 +475,15 @@ int cmd_precompute(int argc, char **argv) {
         .levels = f.levels,
         .rank = f.rank,
         .memory = f.memory,
+        .scratch = f.scratch,
+        .continues = continues != NULL ? continues : "what was finished stays in the scratch folder",
     };
     lam_status status = output_file_check(f.output, &error);
     if (status == LAM_OK) status = precompute_run(&options, &term, &built, &error);
+    code = status == LAM_OK ? 0 : terminal_fail(&term, &error);
     free(command);
-    if (status != LAM_OK) return terminal_fail(&term, &error);
+    free(continues);
+    if (code != 0) return code;
     log_unused(&term, &given, &built, &f, from_store);
     terminal_log(&term, "%s", f.output);
     return 0;

@@ -1,15 +1,31 @@
 #include "solver/forecast.h"
 
+#include "solver/formfactor/formfactor.h"
+
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
 
 /* Below this many rays or pixels a forecast is not worth making cheaper. */
 enum { FEWEST_RAYS = 256, LOWEST_RESOLUTION = 32 };
 
-/* Bytes of the rows of one merged sample: a pair is seen from either end, so rows have on average at most
- * twice as many entries as an element has rays, an index and a value each. */
-static double sample_bytes(double n, double rays) {
-    return n * fmin(n, 2 * rays) * 8;
+/* Memory of a panel of rows that is merged or expanded. */
+static const double panel_bytes = 128e6;
+
+/* Rays that look for other elements from one; a hemicube is a ray for each of its pixels. */
+static double recipe_rays(double n, const recipe *r) {
+    switch (r->method) {
+    case RECIPE_PAIRS:
+        return n;
+    case RECIPE_HEMICUBE:
+        return 3 * (double)r->resolution * (double)r->resolution;
+    case RECIPE_RAYS:
+    case RECIPE_NEAR_PAIRS:
+        break;
+    }
+    return (double)r->rays;
 }
 
 /* Bytes of one tile of a sky: what each element receives of it, and where it is. */
@@ -17,35 +33,57 @@ static double tile_bytes(double n) {
     return 4 * n + 100;
 }
 
-/* Bytes of one merged sample. */
+/* Bytes of the rows of one merged sample: a pair is seen from either end, so rows have on average at most
+ * twice as many entries as an element has rays, an index and a value each. */
+static double sample_bytes(double n, double rays) {
+    return n * fmin(n, 2 * rays) * 8;
+}
+
 static double recipe_bytes(double n, const recipe *r) {
-    switch (r->method) {
-    case RECIPE_PAIRS:
-        return sample_bytes(n, n);
-    /* A hemicube is a ray for each of its pixels. */
-    case RECIPE_HEMICUBE:
-        return sample_bytes(n, 3 * (double)r->resolution * (double)r->resolution);
-    case RECIPE_RAYS:
-    case RECIPE_NEAR_PAIRS:
-        break;
-    }
-    return sample_bytes(n, (double)r->rays);
+    return sample_bytes(n, recipe_rays(n, r));
+}
+
+/* Bytes of packed rows: a gap in groups of seven bits, of which one bit tells of a count above 1, or a
+ * weight; the row's own figures. */
+static double found_bytes(double n, const recipe *r) {
+    const double rays = recipe_rays(n, r), entries = fmin(n, rays), gap = n / fmax(1, entries);
+    if (r->method == RECIPE_PAIRS) return 0;
+    const bool weights = r->method == RECIPE_HEMICUBE;
+    const double bytes = 1 + floor(log2(fmax(1, gap)) / 7 + 2. / 7) + (weights ? 4 : rays > n / 4 ? 1 : 0);
+    return n * (entries * bytes + 24);
+}
+
+/* The peak while one sample is found: packed rows and the triangle they are merged into, or that and the rows
+ * in its place; of pairs one triangle with what is known of each, with room to grow, and again as such. */
+static double trace_bytes(double n, const recipe *r, bool to_disk) {
+    const double sample = recipe_bytes(n, r);
+    if (r->method == RECIPE_PAIRS) return fmax(sample, 10.8 * n * n);
+    /* Near pairs are a quarter as many as rays at most, and stand in a triangle of their own. */
+    const double near = r->method == RECIPE_NEAR_PAIRS ? sample / 4 : 0;
+    const double merging = (to_disk ? 0 : found_bytes(n, r)) + near + sample / (near > 0 ? 1 : 2);
+    return fmax(sample, merging) + fmin(panel_bytes, sample);
+}
+
+/* About as many columns as a factorization will have. */
+static double likely_rank(const forecast *f) {
+    const double n = (double)f->n;
+    return f->rank > 0 ? fmin((double)f->rank, n) : fmin(1024, n);
+}
+
+static double operator_bytes(const forecast *f) {
+    const double n = (double)f->n;
+    return f->exact ? 4 * n * n * (double)f->n_channels : 8 * n * likely_rank(f);
 }
 
 double forecast_bytes(const forecast *f) {
     const double n = (double)f->n, n_channels = (double)f->n_channels;
-    const double mesh = 400 * n + tile_bytes(n) * (double)f->sky_tiles;
+    const double of_mesh = 400 * n + tile_bytes(n) * (double)f->sky_tiles;
     const double sample = recipe_bytes(n, &f->recipe);
-    /* While it is traced, a sample exists as counts, as rows, and as the merged rows; of pairs as one
-     * triangle with what is known of each, with room to grow, and as rows. */
-    const double trace = f->recipe.method == RECIPE_PAIRS        ? sample + 6.8 * n * n
-                         : f->recipe.method == RECIPE_NEAR_PAIRS ? 3 * sample
-                                                                 : 2 * sample;
+    const double trace = f->from_store ? 0 : trace_bytes(n, &f->recipe, f->scratch);
     /* The inverse in double and the operator; else leaf blocks and both factors of two nodes. */
-    const double rank = f->rank > 0 ? fmin((double)f->rank, n) : fmin(1024, n);
-    const double build = f->exact ? n * n * (8 + 4 * n_channels) : 4 * n * (2 * fmin(1024, n) + 6 * rank);
-    const double kept = f->exact ? 4 * n * n * n_channels : 8 * n * rank;
-    double peak = sample + fmax(trace, build);
+    const double build =
+        f->exact ? n * n * (8 + 4 * n_channels) : 4 * n * (2 * fmin(1024, n) + 6 * likely_rank(f));
+    double peak = fmax(trace, sample + build);
     if (f->probes > 0) {
         /* Two more samples and their mean; emissions, answers and the vectors of the iteration per probe. */
         const double probes = (double)f->probes + 9;
@@ -54,16 +92,103 @@ double forecast_bytes(const forecast *f) {
         const double references =
             2 * reference + (dense ? reference : sample_bytes(n, 2 * (double)f->judge_recipe.rays));
         const double judge = probes * n * (12 * n_channels + 72) + (n <= 8192 ? 8 * n * n : 0);
-        peak = fmax(peak, sample + kept + fmax(references + judge, 4 * reference));
+        const double second = reference + trace_bytes(n, &f->judge_recipe, f->scratch);
+        peak = fmax(peak, sample + operator_bytes(f) + fmax(references + judge, second));
     }
-    return mesh + peak;
+    return of_mesh + peak;
 }
 
-static void format_bytes(double bytes, char text[32]) {
+/* --- time --------------------------------------------------------------------------------------------------
+ */
+
+/* Processor seconds a pair, beside rays: packing, merging, some 30 sweeps, expanding; and of pair by pair. */
+static const double merge_seconds = 1.2e-7, pair_seconds = 4e-7;
+
+static double sample_seconds(double n, const recipe *r, double rays_per_second, double n_threads) {
+    const double pairs = n * n / 2;
+    if (r->method == RECIPE_PAIRS) return pairs * pair_seconds / n_threads;
+    const double rays = recipe_rays(n, r), entries = fmin(pairs, n * rays);
+    return n * rays / rays_per_second + entries * merge_seconds / n_threads;
+}
+
+forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n_threads) {
+    const double n = (double)f->n;
+    forecast_times times = {0};
+    if (!f->from_store) times.form_factors = sample_seconds(n, &f->recipe, rays_per_second, n_threads);
+    if (f->probes > 0) times.judge = 2 * sample_seconds(n, &f->judge_recipe, rays_per_second, n_threads);
+    return times;
+}
+
+/* --- disk --------------------------------------------------------------------------------------------------
+ */
+
+double forecast_store_bytes(const forecast *f) {
+    const double n = (double)f->n, rows = recipe_bytes(n, &f->recipe);
+    const double kept = !f->keep ? 0 : f->n > FORM_FACTORS_ROWS_MOST ? rows / 2 : rows;
+    return operator_bytes(f) + kept + tile_bytes(n) * (double)f->sky_tiles + 300 * n;
+}
+
+double forecast_scratch_bytes(const forecast *f) {
+    const double n = (double)f->n;
+    if (!f->scratch) return 0;
+    return (f->from_store ? 0 : found_bytes(n, &f->recipe) + 4 * n * (double)f->sky_tiles) +
+           (f->probes > 0 ? 2 * found_bytes(n, &f->judge_recipe) : 0);
+}
+
+lam_status forecast_check_disk(const forecast *f, const char *output, const scratch *rows,
+                               const char *scratch_folder, lam_error *error) {
+    lam_status status = LAM_OK;
+    char folder[4096] = ".", needs[32], has[32];
+    struct statvfs about;
+    struct stat here, there;
+    const char *slash = strrchr(output, '/');
+    double in_store = forecast_store_bytes(f);
+    if (slash != NULL)
+        snprintf(folder, sizeof folder, "%.*s", slash == output ? 1 : (int)(slash - output), output);
+    if (rows != NULL) {
+        const double in_scratch = forecast_scratch_bytes(f), free_there = (double)scratch_free_bytes(rows);
+        if (in_scratch > free_there) {
+            forecast_format_bytes(in_scratch, needs);
+            forecast_format_bytes(free_there, has);
+            FAIL(error, LAM_ERR_IO,
+                 "--scratch %s: rows of form factors need about %s, %s are free there; use another folder or "
+                 "fewer --rays",
+                 scratch_folder, needs, has);
+        }
+        if (stat(scratch_folder, &there) == 0 && stat(folder, &here) == 0 && here.st_dev == there.st_dev)
+            in_store += in_scratch - fmin(in_scratch, scratch_used_bytes(rows));
+    }
+    if (statvfs(folder, &about) != 0) return LAM_OK; /* whoever writes there will say why */
+    const double free_here = (double)about.f_bavail * (double)about.f_frsize;
+    if (in_store > free_here) {
+        forecast_format_bytes(in_store, needs);
+        forecast_format_bytes(free_here, has);
+        FAIL(error, LAM_ERR_IO, "%s: needs about %s of the disk, %s are free; %s", output, needs, has,
+             f->keep    ? "leave out --keep-form-factors or write to another disk"
+             : f->exact ? "use --method low-rank or write to another disk"
+                        : "write to another disk");
+    }
+done:
+    return status;
+}
+
+/* --- words -------------------------------------------------------------------------------------------------
+ */
+
+void forecast_format_bytes(double bytes, char text[32]) {
     if (bytes < 0x1p30)
         snprintf(text, 32, "%.0fM", ceil(bytes * 0x1p-20));
     else
         snprintf(text, 32, "%.1fG", ceil(bytes * 0x1p-30 * 10) / 10);
+}
+
+void forecast_format_seconds(double seconds, char text[32]) {
+    if (seconds < 60)
+        snprintf(text, 32, "%.*f s", seconds < 10 ? 1 : 0, seconds);
+    else if (seconds < 3600)
+        snprintf(text, 32, "%.0f min", ceil(seconds / 60));
+    else
+        snprintf(text, 32, "%.1f h", seconds / 3600);
 }
 
 /* Halves what the rows are found with; false when that is little already. */
@@ -100,8 +225,8 @@ lam_status forecast_check(const forecast *f, double limit, lam_error *error) {
     const double bytes = forecast_bytes(f);
     char needs[32], allows[32], asked[40], fits[40], advice[160], sky[48] = "";
     if (bytes <= limit) return LAM_OK;
-    format_bytes(bytes, needs);
-    format_bytes(limit, allows);
+    forecast_format_bytes(bytes, needs);
+    forecast_format_bytes(limit, allows);
     const char *method = f->exact ? "--method low-rank" : "";
     forecast cheaper = *f;
     bool less = false;
@@ -115,6 +240,12 @@ lam_status forecast_check(const forecast *f, double limit, lam_error *error) {
              f->n, sky, needs, allows, advice);
     }
     cheaper = *f;
+    cheaper.scratch = true;
+    if (forecast_bytes(&cheaper) <= limit)
+        FAIL(error, LAM_ERR_MEMORY,
+             "%zu elements need about %s of memory, --memory allows %s; fits: --scratch DIR", f->n, needs,
+             allows);
+    cheaper.scratch = f->scratch;
     cheaper.exact = false;
     while (forecast_bytes(&cheaper) > limit && sample_less(&cheaper.recipe)) {
         less = true;

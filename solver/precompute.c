@@ -6,6 +6,7 @@
 #include "solver/scene/import.h"
 
 #include <math.h>
+#include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,11 +19,13 @@ typedef struct work {
     const precompute_options *options;
     terminal *t;
     progress progress;
-    double memory; /* bytes */
+    double memory;    /* bytes */
+    scratch *scratch; /* NULL: none */
     mesh m;
     uint32_t *order;
     form_factors f;
     recipe recipe; /* of f */
+    size_t sky_tiles;
     size_t probes;
     lam_operator *op;
     build_report built;
@@ -30,6 +33,7 @@ typedef struct work {
 } work;
 
 static void work_free(work *w) {
+    scratch_close(w->scratch, false);
     mesh_free(&w->m);
     free(w->order);
     form_factors_free(&w->f);
@@ -80,6 +84,7 @@ static lam_status load_store(work *w, lam_error *error) {
     TRY(store_open(w->options->input, &s, error));
     TRY(mesh_load(s, &w->m, &row_sums, error));
     TRY(form_factors_load(s, &w->m, &w->f, error));
+    TRY(form_factors_expand(&w->f, w->m.area, error));
     if (store_has(s, "/sky")) TRY(sky_bounce_load(s, w->m.n, &w->f.sky, error));
     if (w->options->reflectance >= 0)
         for (size_t i = 0; i < w->m.n * w->m.n_channels; i++)
@@ -114,6 +119,21 @@ static recipe judge_recipe(const work *w, uint64_t seed) {
     return r;
 }
 
+static forecast forecast_of(const work *w, double n) {
+    const precompute_options *o = w->options;
+    return (forecast){.n = (size_t)n,
+                      .n_channels = w->m.n_channels,
+                      .sky_tiles = w->sky_tiles,
+                      .recipe = w->recipe,
+                      .judge_recipe = judge_recipe(w, 0),
+                      .probes = o->probes == PRECOMPUTE_AUTO ? PROBES_OF_LARGE : o->probes,
+                      .from_store = o->from_store,
+                      .scratch = o->scratch != NULL,
+                      .keep = o->keep_form_factors,
+                      .exact = strcmp(o->method, "exact") == 0,
+                      .rank = o->rank};
+}
+
 /* Chooses the recipe for n elements and sees that it fits. */
 static lam_status check_memory(work *w, double n, lam_error *error) {
     const precompute_options *o = w->options;
@@ -122,22 +142,16 @@ static lam_status check_memory(work *w, double n, lam_error *error) {
         const lam_status status = sky_tiling_create(o->sky, w->m.up, &tiling, error);
         if (status != LAM_OK) return status;
     }
-    const size_t sky_tiles = tiling.n_tiles;
+    w->sky_tiles = tiling.n_tiles;
     sky_tiling_free(&tiling);
     if (n > 4e9)
         return status_fail(error, LAM_ERR_MEMORY, "%s: %.3g elements, must be below 4e9; refine less",
                            o->input, n);
-    forecast f = {.n = (size_t)n,
-                  .n_channels = w->m.n_channels,
-                  .sky_tiles = sky_tiles,
-                  .probes = o->probes == PRECOMPUTE_AUTO ? PROBES_OF_LARGE : o->probes,
-                  .exact = strcmp(o->method, "exact") == 0,
-                  .rank = o->rank};
+    forecast f;
     /* All pairs where they are affordable. */
     for (int all_pairs = n <= CHOICE_PAIRS_MOST; all_pairs >= 0; all_pairs--) {
         w->recipe = o->from_store ? w->f.recipe : choice_recipe(&o->form_factors, all_pairs);
-        f.recipe = w->recipe;
-        f.judge_recipe = judge_recipe(w, 0);
+        f = forecast_of(w, n);
         if (forecast_bytes(&f) <= w->memory) break;
     }
     return forecast_check(&f, w->memory, error);
@@ -198,13 +212,67 @@ static void log_form_factors(work *w) {
                       100 * f->absorbed_share);
 }
 
+/* Rows that are found with rays go to the scratch folder; pairs have no use for one. */
+static lam_status take_scratch(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = w->options;
+    const bool judged = w->probes > 0 && judge_recipe(w, 0).method != RECIPE_PAIRS;
+    if (o->scratch == NULL) return LAM_OK;
+    if (!judged && (o->from_store || w->recipe.method == RECIPE_PAIRS)) {
+        terminal_log(w->t, "%s does not use --scratch",
+                     o->from_store ? "a store with form factors" : recipe_name(w->recipe.method));
+        return LAM_OK;
+    }
+    TRY(scratch_open(o->scratch, &w->scratch, error));
+    w->t->nothing = o->continues;
+done:
+    return status;
+}
+
+/* One line of what is to come, and whether the disks can hold it. */
+static lam_status announce(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = w->options;
+    const forecast f = forecast_of(w, (double)w->m.n);
+    char memory[32], stored[32], seconds[32], judging[32], scratch_room[32];
+    char made[64] = "", judged[64] = "", kept[64] = "";
+    double rate;
+    TRY(forecast_check_disk(&f, o->output, w->scratch, o->scratch, error));
+    if (w->t->quiet || (o->from_store && w->probes == 0)) goto done;
+    TRY(form_factors_ray_rate(&w->m, w->order, &rate, error));
+    const forecast_times times = forecast_seconds(&f, rate, omp_get_max_threads());
+    forecast_format_bytes(forecast_bytes(&f), memory);
+    forecast_format_bytes(forecast_store_bytes(&f), stored);
+    forecast_format_bytes(forecast_scratch_bytes(&f), scratch_room);
+    forecast_format_seconds(times.form_factors, seconds);
+    forecast_format_seconds(times.judge, judging);
+    if (!o->from_store) snprintf(made, sizeof made, " form factors %s,", seconds);
+    if (w->probes > 0) snprintf(judged, sizeof judged, " the judge's %s,", judging);
+    if (w->scratch != NULL) snprintf(kept, sizeof kept, ", scratch up to %s", scratch_room);
+    terminal_log(w->t, "forecast:%s%s at %.3g Mray/s of a trial; memory up to %s, store up to %s%s", made,
+                 judged, rate * 1e-6, memory, stored, kept);
+done:
+    return status;
+}
+
+static void log_kept(work *w, const form_factors *f) {
+    if (f->rows_kept > 0)
+        terminal_log(w->t, "%zu of %zu rows were in %s already", f->rows_kept, w->m.n, w->options->scratch);
+}
+
 static lam_status trace(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
     const form_factor_options how = {.recipe = w->recipe,
                                      .progress = &w->progress,
                                      .stage = "form factors",
+                                     .scratch = w->scratch,
+                                     .scratch_name = "form-factors.rows",
                                      .sky = w->options->sky,
                                      .ground_albedo = w->options->ground_albedo};
-    return form_factors_make(&w->m, w->order, &how, &w->f, error);
+    TRY(form_factors_make(&w->m, w->order, &how, &w->f, error));
+    log_kept(w, &w->f);
+done:
+    return status;
 }
 
 /* --- operator --------------------------------------------------------------------------------------------
@@ -270,6 +338,7 @@ static lam_status judge(work *w, lam_error *error) {
     lam_status status = LAM_OK;
     static const char *const stages[2] = {"form factors for the judge, 1 of 2",
                                           "form factors for the judge, 2 of 2"};
+    static const char *const files[2] = {"judge-1.rows", "judge-2.rows"};
     form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}}, mean = {.row_sums = NULL};
     const build_problem problem = problem_of(w);
     uint64_t purpose = 0, seed;
@@ -277,9 +346,13 @@ static lam_status judge(work *w, lam_error *error) {
         /* Independent of what was factorized: kept form factors may have any seed. */
         do seed = precompute_seed(w->options->form_factors.seed, ++purpose);
         while (seed == w->f.recipe.seed);
-        const form_factor_options how = {
-            .recipe = judge_recipe(w, seed), .progress = &w->progress, .stage = stages[h]};
+        const form_factor_options how = {.recipe = judge_recipe(w, seed),
+                                         .progress = &w->progress,
+                                         .stage = stages[h],
+                                         .scratch = w->scratch,
+                                         .scratch_name = files[h]};
         TRY(form_factors_make(&w->m, w->order, &how, &half[h], error));
+        log_kept(w, &half[h]);
     }
     TRY(form_factors_mean(&half[0], &half[1], &mean, error));
     const judge_input input = {.problem = &problem,
@@ -342,6 +415,8 @@ static lam_status save(work *w, lam_error *error) {
     TRY(mesh_save(&w->m, w->f.row_sums, s, error));
     if (o->reflectance >= 0) TRY(store_set_number(s, "/mesh", "reflectance_given", o->reflectance, error));
     TRY(terminal_check(error));
+    if (o->keep_form_factors && w->m.n > FORM_FACTORS_ROWS_MOST)
+        TRY(form_factors_gather(&w->f, w->m.area, error));
     if (o->keep_form_factors) TRY(form_factors_save(&w->f, s, error));
     if (w->f.sky.first_bounce != NULL) TRY(sky_bounce_save(&w->f.sky, s, error));
     TRY(terminal_check(error));
@@ -376,6 +451,8 @@ lam_status precompute_run(const precompute_options *options, terminal *t, build_
     log_stage(&w, "mesh", started);
     TRY(terminal_check(error));
 
+    TRY(take_scratch(&w, error));
+    TRY(announce(&w, error));
     if (!options->from_store) {
         started = clock_seconds();
         TRY(trace(&w, error));
@@ -396,6 +473,8 @@ lam_status precompute_run(const precompute_options *options, terminal *t, build_
     started = clock_seconds();
     TRY(save(&w, error));
     log_stage(&w, "store", started);
+    scratch_close(w.scratch, true);
+    w.scratch = NULL;
     *report = w.built;
 done:
     work_free(&w);

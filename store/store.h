@@ -20,6 +20,9 @@ typedef enum store_type { STORE_F32, STORE_F64, STORE_U32, STORE_U64 } store_typ
 /* Bytes of one value of a type. */
 size_t store_type_size(store_type type);
 
+/* XXH3 with 64 bits and seed 0: the checksum of every array, and of files beside a store. */
+uint64_t store_checksum(const void *data, size_t bytes);
+
 /* --- writing ---------------------------------------------------------------------------------------- */
 
 /* Starts a store that will become path: a hidden partial file beside it, created exclusively.

@@ -8,6 +8,10 @@
 
 #include <xxhash.h>
 
+uint64_t store_checksum(const void *data, size_t bytes) {
+    return XXH3_64bits(data, bytes);
+}
+
 static size_t count_pieces(size_t bytes) {
     return bytes / STORE_PIECE + (bytes % STORE_PIECE != 0);
 }
@@ -75,7 +79,7 @@ lam_status store_sums_add(store_sums *sums, const char *name, const void *data, 
     uint64_t *pieces = memory_allocate(n_pieces, sizeof *pieces, name, error);
     if (pieces == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < n_pieces; i++)
-        pieces[i] = XXH3_64bits((const char *)data + i * STORE_PIECE, piece_size(bytes, i));
+        pieces[i] = store_checksum((const char *)data + i * STORE_PIECE, piece_size(bytes, i));
     lam_status status = sums_insert(sums, name, n_pieces, pieces, error);
     if (status != LAM_OK) free(pieces);
     return status;
@@ -95,7 +99,7 @@ static lam_status sums_digest(const store_sums *sums, char digest[17], lam_error
         memcpy(all + at + name_size, sum->pieces, bytes);
         at += name_size + bytes;
     }
-    snprintf(digest, 17, "%016" PRIx64, (uint64_t)XXH3_64bits(all, size));
+    snprintf(digest, 17, "%016" PRIx64, store_checksum(all, size));
     free(all);
     return LAM_OK;
 }
@@ -200,7 +204,7 @@ lam_status store_array_load(store *s, const char *name, const store_array *array
         char *piece = data == NULL ? scratch : (char *)data + start;
         if (!store_file_read(&s->file, array->offset + start, piece, size))
             TRY(store_hdf5_failure(s, name, "read", error));
-        if (XXH3_64bits(piece, size) != sum->pieces[i])
+        if (store_checksum(piece, size) != sum->pieces[i])
             FAIL(error, LAM_ERR_DAMAGED, "%s: %s is damaged in MiB %zu of %zu; make the store again", s->path,
                  name, i + 1, sum->n_pieces);
     }

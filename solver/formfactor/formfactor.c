@@ -1,10 +1,12 @@
 #include "solver/formfactor/formfactor.h"
 
+#include "solver/clock.h"
 #include "solver/formfactor/hemicube.h"
 #include "solver/formfactor/pairs.h"
 #include "solver/formfactor/rays.h"
 #include "solver/formfactor/repair.h"
 #include "solver/formfactor/rows.h"
+#include "solver/formfactor/upper.h"
 #include "solver/formfactor/visibility.h"
 
 #include <math.h>
@@ -17,6 +19,7 @@ static const double crack_share = 1e-4;
 
 void form_factors_free(form_factors *f) {
     csr_free(&f->F);
+    csr_free(&f->upper);
     free(f->row_sums);
     free(f->leaving);
     free(f->absorbed);
@@ -33,32 +36,46 @@ static double area_mean(const mesh *m, const double *x) {
     return total > 0 ? sum / total : 0;
 }
 
+lam_status form_factors_expand(form_factors *f, const double *area, lam_error *error) {
+    if (f->upper.indptr == NULL) return LAM_OK;
+    f->F = f->upper;
+    f->upper = (csr){0};
+    return upper_expand(&f->F, area, f->row_sums, error);
+}
+
+lam_status form_factors_gather(form_factors *f, const double *area, lam_error *error) {
+    if (f->F.indptr == NULL) return LAM_OK;
+    f->upper = f->F;
+    f->F = (csr){0};
+    return upper_gather(&f->upper, area, error);
+}
+
 static void measure_leaving(form_factors *f, const mesh *m) {
     f->leaving_share = area_mean(m, f->leaving);
     f->absorbed_share = area_mean(m, f->absorbed);
     f->closed = f->leaving_share < crack_share;
 }
 
-/* Repairs rows of exchange areas by what their rays say leaves. */
-static lam_status close_rows(form_factors *f, const mesh *m, lam_error *error) {
-    lam_status status = LAM_OK;
+/* Repairs exchange areas by what their rays say leaves. */
+static lam_status close_upper(form_factors *f, const mesh *m, lam_error *error) {
     double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) return LAM_ERR_MEMORY;
     measure_leaving(f, m);
     for (size_t i = 0; i < m->n; i++)
         outside[i] = (f->closed ? 0 : f->leaving[i]) + (f->absorbed_share < crack_share ? 0 : f->absorbed[i]);
-    status = repair_close(&f->F, m->area, outside, f, error);
+    const lam_status status = repair_close(&f->upper, m->area, outside, f, error);
     free(outside);
     return status;
 }
 
-/* From one-sided rows, which are freed, whose entries are F_ij times rays, to F. */
-static lam_status form_factors_finish(form_factors *f, const mesh *m, csr *rows, size_t rays,
+/* From one-sided rows, which are freed, whose entries are F_ij times rays, to the upper triangle. */
+static lam_status form_factors_finish(form_factors *f, const mesh *m, found_rows *rows, size_t rays,
                                       lam_error *error) {
     lam_status status = LAM_OK;
-    TRY(repair_merge(rows, rays, m->area, &f->F, error));
-    csr_free(rows);
-    TRY(close_rows(f, m, error));
+    f->rows_kept = rows->kept;
+    TRY(upper_merge(rows, rays, m->area, &f->upper, error));
+    found_rows_free(rows);
+    TRY(close_upper(f, m, error));
 done:
     return status;
 }
@@ -66,11 +83,11 @@ done:
 static lam_status make_of_rays(const mesh *m, const visibility *v, const uint32_t *order,
                                const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
-    csr counts = {0};
+    found_rows counts = {0};
     TRY(rays_count(m, v, order, options, &counts, f->leaving, f->absorbed, error));
     TRY(form_factors_finish(f, m, &counts, options->recipe.rays, error));
 done:
-    csr_free(&counts);
+    found_rows_free(&counts);
     return status;
 }
 
@@ -78,14 +95,14 @@ static lam_status make_of_hemicubes(const mesh *m, const visibility *v, const ui
                                     const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
     hemicube h = {0};
-    csr rows = {0};
+    found_rows rows = {0};
     TRY(hemicube_create(options->recipe.resolution, &h, error));
     TRY(hemicube_trace(&h, m, v, order, options, &rows, f->leaving, f->absorbed, error));
     /* The weights are form factors already, as if one ray had been cast. */
     TRY(form_factors_finish(f, m, &rows, 1, error));
 done:
     hemicube_free(&h);
-    csr_free(&rows);
+    found_rows_free(&rows);
     return status;
 }
 
@@ -106,62 +123,50 @@ static lam_status find_pairs(const mesh *m, const visibility *v, const form_fact
 static lam_status make_of_pairs(const mesh *m, const visibility *v, const uint32_t *order,
                                 const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
-    csr counts = {0};
-    double *outside = NULL;
+    found_rows counts = {0};
     form_factor_options silent = *options;
     silent.progress = NULL;
-    outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
-    if (outside == NULL) TRY(LAM_ERR_MEMORY);
+    silent.scratch = NULL;
+    double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
+    if (outside == NULL) return LAM_ERR_MEMORY;
     TRY(rays_count(m, v, order, &silent, &counts, f->leaving, f->absorbed, error));
-    csr_free(&counts);
-    TRY(find_pairs(m, v, options, 0, f, &f->F, error));
+    found_rows_free(&counts);
+    TRY(find_pairs(m, v, options, 0, f, &f->upper, error));
     measure_leaving(f, m);
-    for (size_t i = 0; i < m->n && !(f->closed && f->absorbed_share < crack_share); i++) {
-        double seen = 0;
-        for (uint64_t p = f->F.indptr[i]; p < f->F.indptr[i + 1]; p++) seen += (double)f->F.data[p];
-        outside[i] = fmax(0, 1 - seen / m->area[i]);
+    if (!(f->closed && f->absorbed_share < crack_share)) {
+        /* What a row lacks goes outside: 1 - sum_j g_ij / A_i. */
+        for (size_t i = 0; i < m->n; i++)
+            for (uint64_t p = f->upper.indptr[i]; p < f->upper.indptr[i + 1]; p++) {
+                outside[i] += (double)f->upper.data[p];
+                outside[f->upper.indices[p]] += (double)f->upper.data[p];
+            }
+        for (size_t i = 0; i < m->n; i++) outside[i] = fmax(0, 1 - outside[i] / m->area[i]);
     }
-    TRY(repair_close(&f->F, m->area, outside, f, error));
+    TRY(repair_close(&f->upper, m->area, outside, f, error));
 done:
-    csr_free(&counts);
+    found_rows_free(&counts);
     free(outside);
     return status;
-}
-
-/* Takes out of counts what near has an entry for, of 0 too: those pairs are known better. */
-static void drop_near(csr *counts, const csr *near) {
-    uint64_t kept = 0, begin = 0;
-    for (size_t i = 0; i < counts->n; i++) {
-        uint64_t q = near->indptr[i];
-        for (uint64_t p = begin; p < counts->indptr[i + 1]; p++) {
-            const uint32_t j = counts->indices[p];
-            while (q < near->indptr[i + 1] && near->indices[q] < j) q++;
-            if (q < near->indptr[i + 1] && near->indices[q] == j) continue;
-            counts->indices[kept] = j;
-            counts->data[kept++] = counts->data[p];
-        }
-        begin = counts->indptr[i + 1];
-        counts->indptr[i + 1] = kept;
-    }
 }
 
 static lam_status make_of_near_pairs(const mesh *m, const visibility *v, const uint32_t *order,
                                      const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
-    csr counts = {0}, near = {0}, far = {0};
+    found_rows counts = {0};
+    csr near = {0}, counted = {0};
     TRY(find_pairs(m, v, options, recipe_near(&options->recipe), f, &near, error));
     TRY(rays_count(m, v, order, options, &counts, f->leaving, f->absorbed, error));
-    drop_near(&counts, &near);
-    TRY(repair_merge(&counts, options->recipe.rays, m->area, &far, error));
-    csr_free(&counts);
-    TRY(rows_combine(&near, 1, &far, 1, &f->F, error));
+    f->rows_kept = counts.kept;
+    TRY(upper_merge(&counts, options->recipe.rays, m->area, &counted, error));
+    found_rows_free(&counts);
+    TRY(rows_replace(&counted, &near, &f->upper, error));
     csr_free(&near);
-    csr_free(&far);
-    TRY(close_rows(f, m, error));
+    csr_free(&counted);
+    TRY(close_upper(f, m, error));
 done:
-    csr_free(&counts);
+    found_rows_free(&counts);
     csr_free(&near);
-    csr_free(&far);
+    csr_free(&counted);
     return status;
 }
 
@@ -209,11 +214,34 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
         break;
     }
     if (asked->sky != NULL) TRY(close_sky(&f, m->n, error));
+    if (!options->upper) TRY(form_factors_expand(&f, m->area, error));
     *out = f;
     f = (form_factors){0};
 done:
     visibility_destroy(v);
     form_factors_free(&f);
+    return status;
+}
+
+lam_status form_factors_ray_rate(const mesh *m, const uint32_t *order, double *rays_per_second,
+                                 lam_error *error) {
+    enum { ELEMENTS = 256, RAYS = 512, LONG_ENOUGH = 16 };
+    static const double trial_seconds = .02;
+    lam_status status = LAM_OK;
+    visibility *v = NULL;
+    TRY(visibility_create(m, &v, error));
+    rays_cast_some(m, v, order, ELEMENTS, VISIBILITY_PACKET); /* threads start, caches fill */
+    size_t cast = 0;
+    const double started = clock_seconds();
+    double seconds = 0;
+    for (int k = 0; k < LONG_ENOUGH && seconds < trial_seconds; k++) {
+        rays_cast_some(m, v, order, ELEMENTS, RAYS);
+        cast += ELEMENTS * RAYS;
+        seconds = clock_seconds() - started;
+    }
+    *rays_per_second = (double)cast / fmax(seconds, 1e-6);
+done:
+    visibility_destroy(v);
     return status;
 }
 
@@ -223,6 +251,7 @@ lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_
     const size_t n = a->F.n;
     form_factors f = *a;
     f.F = (csr){.n = n};
+    f.upper = (csr){0};
     f.row_sums = f.leaving = f.absorbed = NULL;
     f.sky = (sky_bounce){0};
     f.recipe.rays = a->recipe.rays + b->recipe.rays;

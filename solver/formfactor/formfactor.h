@@ -3,6 +3,7 @@
 #define LAMBERT_FORMFACTOR_FORMFACTOR_H
 
 #include "solver/formfactor/recipe.h"
+#include "solver/formfactor/scratch.h"
 #include "solver/formfactor/sky_bounce.h"
 #include "solver/operator/csr.h"
 #include "solver/scene/mesh.h"
@@ -16,13 +17,19 @@ typedef struct pairs_report {
     double hidden, mixed;
 } pairs_report;
 
+/* Above this many elements a store keeps A_i F_ij for j > i in place of rows: half of it. */
+enum { FORM_FACTORS_ROWS_MOST = 10240 };
+
+/* Either F or upper is there; the other one is zero. */
 typedef struct form_factors {
     csr F;            /* rows F[i][.], mesh order */
+    csr upper;        /* A_i F_ij for j > i, m^2, in place of F */
     double *row_sums; /* [n], of F after repair, <= 1 */
     double *leaving;  /* [n], share of an element's rays that left the scene */
     double *absorbed; /* [n], share that hit a back face */
     sky_bounce sky;   /* where one was asked for, else zero */
     recipe recipe;
+    size_t rows_kept;     /* of rows, when just made: that were in the scratch folder */
     pairs_report pairs;   /* where just made of pairs */
     bool closed;          /* nothing leaves but through cracks between elements */
     double leaving_share; /* area-weighted means */
@@ -35,8 +42,11 @@ typedef struct form_factors {
 typedef struct form_factor_options {
     recipe recipe;
     const progress *progress;
-    const char *stage; /* what progress calls it */
-    const char *sky;   /* a tiling that what leaves is binned by, at no further ray; NULL: none */
+    const char *stage;        /* what progress calls it */
+    bool upper;               /* leave the upper triangle, without the rows it stands for */
+    scratch *scratch;         /* where rows are kept as they are found (not of pairs); NULL: in memory only */
+    const char *scratch_name; /* of the file there, one for each sample */
+    const char *sky;          /* a tiling that what leaves is binned by, at no further ray; NULL: none */
     double ground_albedo;
     sky_bounce *bounce; /* form_factors_make's own: where the rays put what leaves */
 } form_factor_options;
@@ -45,9 +55,10 @@ typedef struct form_factor_options {
  * row sums. The result is the same for any number of threads. order is [n] (mesh_z_order): the sequence in
  * which elements are worked on, for locality only.
  *
- * rays: counts rays (Embree) from every element. Cost: n * rays rays and O(nnz) memory.
+ * rays: counts rays (Embree) from every element. Cost: n * rays rays; 8 bytes of memory for each entry of the
+ *   rows, half of that for the upper triangle.
  * hemicube: the same by hemicubes around every element's centroid: no sampling noise, but aliasing. Cost:
- *   3 n resolution^2 rays and O(nnz) memory.
+ *   3 n resolution^2 rays, memory likewise.
  * pairs: pair by pair, magnitudes by mathematics, by rays only what is hidden of them. What a row lacks goes
  *   outside, or, where the scene is closed, is put back by the repair. Cost: O(n^2), about .3 us a pair that
  *   is facing; 9 bytes for each of those beside the rows.
@@ -57,18 +68,34 @@ typedef struct form_factor_options {
  * rays (of pairs: recipe.rays of them) found it: sum_j F_ij + sum_t first_bounce/pi <= 1, and = 1 where
  * nothing meets a back face and the ground's albedo is 1. Cost: 4 m n bytes.
  *
- * Errors: LAM_ERR_ARGUMENT (a recipe out of bounds), LAM_ERR_MEMORY, LAM_ERR_CANCELLED,
- * LAM_ERR_INTERNAL. */
+ * With a scratch folder a run that is stopped goes on where it was, and the result is the same.
+ *
+ * Errors: LAM_ERR_ARGUMENT (a recipe out of bounds, a scratch file of something else), LAM_ERR_IO (of the
+ * scratch folder), LAM_ERR_MEMORY, LAM_ERR_CANCELLED, LAM_ERR_INTERNAL. */
 lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_factor_options *options,
                              form_factors *out, lam_error *error);
 
 void form_factors_free(form_factors *f);
 
-/* The mean of two independent samples of the same mesh: a reference with half the variance, without a sky. */
+/* Turns the upper triangle into rows, in place; nothing where they are rows already. Costs as much memory
+ * again. LAM_ERR_MEMORY: f is then only to be freed. */
+lam_status form_factors_expand(form_factors *f, const double *area, lam_error *error);
+
+/* The reverse, exact: expanded again, the rows have the same bits. */
+lam_status form_factors_gather(form_factors *f, const double *area, lam_error *error);
+
+/* Rays a second that all threads cast from some elements of the scene: a trial of some hundredths of a second
+ * for a forecast. order as above. Errors as of form_factors_make. */
+lam_status form_factors_ray_rate(const mesh *m, const uint32_t *order, double *rays_per_second,
+                                 lam_error *error);
+
+/* The mean of the rows of two independent samples of the same mesh: a reference with half the variance,
+ * without a sky. */
 lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_factors *out,
                              lam_error *error);
 
-/* /form_factors of a store; its /sky apart, by sky_bounce_save and sky_bounce_load. */
+/* /form_factors of a store, rows or the upper triangle, as they are; its /sky apart, by sky_bounce_save and
+ * sky_bounce_load. */
 lam_status form_factors_save(const form_factors *f, store *s, lam_error *error);
 lam_status form_factors_load(store *s, const mesh *m, form_factors *out, lam_error *error);
 

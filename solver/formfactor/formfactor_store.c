@@ -1,5 +1,7 @@
-/* /form_factors of a store: rows F[i][.] in mesh order. */
+/* /form_factors of a store, in mesh order: rows F[i][.], or A_i F_ij for j > i. */
 #include "solver/formfactor/formfactor.h"
+
+#include "solver/formfactor/upper.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -8,14 +10,16 @@
 
 lam_status form_factors_save(const form_factors *f, store *s, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = f->F.n, nnz = f->F.indptr[n];
-    TRY(store_write(s, GROUP "/indptr", STORE_U64, 1, (size_t[]){n + 1}, f->F.indptr, error));
-    TRY(store_write(s, GROUP "/indices", STORE_U32, 1, &nnz, f->F.indices, error));
-    TRY(store_write(s, GROUP "/data", STORE_F32, 1, &nnz, f->F.data, error));
+    const bool rows = f->upper.indptr == NULL;
+    const csr *held = rows ? &f->F : &f->upper;
+    const size_t n = held->n, nnz = held->indptr[n];
+    TRY(store_write(s, GROUP "/indptr", STORE_U64, 1, (size_t[]){n + 1}, held->indptr, error));
+    TRY(store_write(s, GROUP "/indices", STORE_U32, 1, &nnz, held->indices, error));
+    TRY(store_write(s, GROUP "/data", STORE_F32, 1, &nnz, held->data, error));
     TRY(store_write(s, GROUP "/leaving", STORE_F64, 1, &n, f->leaving, error));
     TRY(store_write(s, GROUP "/absorbed", STORE_F64, 1, &n, f->absorbed, error));
     TRY(recipe_save(&f->recipe, &recipe_of_form_factors, s, error));
-    TRY(store_set_text(s, GROUP, "storage", "rows", error));
+    TRY(store_set_text(s, GROUP, "storage", rows ? "rows" : "upper", error));
     TRY(store_set_integer(s, GROUP, "closed", f->closed, error));
     TRY(store_set_number(s, GROUP, "leaving_share", f->leaving_share, error));
     TRY(store_set_number(s, GROUP, "absorbed_share", f->absorbed_share, error));
@@ -27,12 +31,13 @@ done:
     return status;
 }
 
-static lam_status load_attributes(store *s, form_factors *f, lam_error *error) {
+static lam_status load_attributes(store *s, form_factors *f, bool *rows, lam_error *error) {
     lam_status status = LAM_OK;
     char *text = NULL;
     int64_t closed;
     TRY(store_get_text(s, GROUP, "storage", &text, error));
-    if (strcmp(text, "rows") != 0)
+    *rows = strcmp(text, "rows") == 0;
+    if (!*rows && strcmp(text, "upper") != 0)
         FAIL(error, LAM_ERR_UNSUPPORTED, "%s: /form_factors with storage '%.20s' is not supported yet",
              store_path(s), text);
     TRY(recipe_load(s, &recipe_of_form_factors, &f->recipe, error));
@@ -46,6 +51,54 @@ static lam_status load_attributes(store *s, form_factors *f, lam_error *error) {
     TRY(store_get_number(s, GROUP, "repair_max", &f->repair_max, error));
 done:
     free(text);
+    return status;
+}
+
+/* Each entry from 0 to 1, each row at most 1; fills row_sums. */
+static lam_status check_rows(store *s, const csr *F, double *row_sums, lam_error *error) {
+    lam_status status = LAM_OK;
+    for (size_t i = 0; i < F->n; i++) {
+        row_sums[i] = 0;
+        for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++) {
+            const float value = F->data[p];
+            if (value < 0 || value > 1)
+                FAIL(error, LAM_ERR_FORMAT, "%s: form factor F[%zu][%u] = %g, must be from 0 to 1",
+                     store_path(s), i, F->indices[p], (double)value);
+            row_sums[i] += (double)value;
+        }
+        if (row_sums[i] > 1 + 1e-5)
+            FAIL(error, LAM_ERR_FORMAT, "%s: form factors of element %zu sum to %g, must be at most 1",
+                 store_path(s), i, row_sums[i]);
+    }
+done:
+    return status;
+}
+
+/* The same of the upper triangle: each entry stands for two. */
+static lam_status check_upper(store *s, const csr *g, const double *area, double *row_sums,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    for (size_t i = 0; i < g->n; i++) {
+        for (uint64_t p = g->indptr[i]; p < g->indptr[i + 1]; p++) {
+            const uint32_t j = g->indices[p];
+            const double exchange = (double)g->data[p], least = fmin(area[i], area[j]);
+            if (j <= i)
+                FAIL(error, LAM_ERR_FORMAT, "%s: /form_factors: row %zu has the column %u, must be above it",
+                     store_path(s), i, j);
+            /* Rounded to single precision twice. */
+            if (exchange < 0 || exchange > least * (1 + 1e-6))
+                FAIL(error, LAM_ERR_FORMAT,
+                     "%s: /form_factors: A_i F_ij of elements %zu and %u is %g m2, must be from 0 to %g",
+                     store_path(s), i, j, exchange, least);
+            row_sums[i] += (double)upper_factor(g->data[p], area[i]);
+            row_sums[j] += (double)upper_factor(g->data[p], area[j]);
+        }
+    }
+    for (size_t i = 0; i < g->n; i++)
+        if (row_sums[i] > 1 + 1e-5)
+            FAIL(error, LAM_ERR_FORMAT, "%s: form factors of element %zu sum to %g, must be at most 1",
+                 store_path(s), i, row_sums[i]);
+done:
     return status;
 }
 
@@ -63,18 +116,20 @@ lam_status form_factors_load(store *s, const mesh *m, form_factors *out, lam_err
         FAIL(error, LAM_ERR_FORMAT,
              "%s: the form factors belong to geometry %.32s, the mesh is %s; precompute from the scene again",
              store_path(s), recorded, found);
-    TRY(load_attributes(s, &f, error));
+    bool rows;
+    TRY(load_attributes(s, &f, &rows, error));
 
     size_t nnz = SIZE_MAX;
     void *data;
-    f.F.n = n;
+    csr *const held = rows ? &f.F : &f.upper;
+    held->n = n;
     TRY(store_read(s, GROUP "/indptr", STORE_U64, 1, (size_t[]){n + 1}, &data, error));
-    f.F.indptr = data;
+    held->indptr = data;
     TRY(store_read(s, GROUP "/indices", STORE_U32, 1, &nnz, &data, error));
-    f.F.indices = data;
+    held->indices = data;
     TRY(store_read(s, GROUP "/data", STORE_F32, 1, &nnz, &data, error));
-    f.F.data = data;
-    TRY(csr_check(&f.F, nnz, GROUP, error));
+    held->data = data;
+    TRY(csr_check(held, nnz, GROUP, error));
     TRY(store_read(s, GROUP "/leaving", STORE_F64, 1, (size_t[]){n}, &data, error));
     f.leaving = data;
     TRY(store_read(s, GROUP "/absorbed", STORE_F64, 1, (size_t[]){n}, &data, error));
@@ -82,18 +137,7 @@ lam_status form_factors_load(store *s, const mesh *m, form_factors *out, lam_err
 
     f.row_sums = memory_allocate(n, sizeof *f.row_sums, "form factors", error);
     if (f.row_sums == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < n; i++) {
-        for (uint64_t p = f.F.indptr[i]; p < f.F.indptr[i + 1]; p++) {
-            const float value = f.F.data[p];
-            if (value < 0 || value > 1)
-                FAIL(error, LAM_ERR_FORMAT, "%s: form factor F[%zu][%u] = %g, must be from 0 to 1",
-                     store_path(s), i, f.F.indices[p], (double)value);
-            f.row_sums[i] += (double)value;
-        }
-        if (f.row_sums[i] > 1 + 1e-5)
-            FAIL(error, LAM_ERR_FORMAT, "%s: form factors of element %zu sum to %g, must be at most 1",
-                 store_path(s), i, f.row_sums[i]);
-    }
+    TRY(rows ? check_rows(s, held, f.row_sums, error) : check_upper(s, held, m->area, f.row_sums, error));
     *out = f;
     f = (form_factors){0};
 done:

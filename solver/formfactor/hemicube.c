@@ -170,16 +170,21 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
 }
 
 lam_status hemicube_trace(const hemicube *h, const mesh *m, const visibility *v, const uint32_t *order,
-                          const form_factor_options *options, csr *rows, double *leaving, double *absorbed,
-                          lam_error *error) {
+                          const form_factor_options *options, found_rows *rows, double *leaving,
+                          double *absorbed, lam_error *error) {
     const cube_context context = {.h = h, .m = m, .v = v, .sky = options->bounce};
     const row_maker maker = {.make = trace_element,
                              .context = &context,
+                             .kind = ROW_WEIGHTS,
                              .rays = 3 * h->resolution * h->resolution,
                              .whole = 1,
                              .sky = options->bounce,
                              .cheaper = "a lower --resolution",
                              .progress = options->progress,
-                             .stage = options->stage};
-    return rows_make(&maker, m->n, order, rows, leaving, absorbed, error);
+                             .stage = options->stage,
+                             .m = m,
+                             .recipe = &options->recipe,
+                             .scratch = options->scratch,
+                             .scratch_name = options->scratch_name};
+    return rows_make(&maker, order, rows, leaving, absorbed, error);
 }

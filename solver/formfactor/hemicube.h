@@ -4,6 +4,7 @@
 #define LAMBERT_FORMFACTOR_HEMICUBE_H
 
 #include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/found_rows.h"
 #include "solver/formfactor/visibility.h"
 
 /* The delta form factors, the same for every element. The top spans [-1, 1]^2 at height 1 in resolution x
@@ -29,9 +30,9 @@ double hemicube_weight(const hemicube *h, int face, size_t row, size_t column);
 
 /* rows gets, for every element, the weight of the pixels through which its centroid sees each other one;
  * leaving and absorbed, [n], the weight of those that show nothing or a back face. The caller frees rows with
- * csr_free. Cost: 3 resolution^2 rays an element. */
+ * found_rows_free. Cost: 3 resolution^2 rays an element. */
 lam_status hemicube_trace(const hemicube *h, const mesh *m, const visibility *v, const uint32_t *order,
-                          const form_factor_options *options, csr *rows, double *leaving, double *absorbed,
-                          lam_error *error);
+                          const form_factor_options *options, found_rows *rows, double *leaving,
+                          double *absorbed, lam_error *error);
 
 #endif

@@ -340,7 +340,7 @@ static lam_status sort_rows(csr *rows, lam_error *error) {
                          : LAM_OK;
 }
 
-/* Both triangles of what is not zero, by element, rows ascending. */
+/* What is not zero, by element, above the diagonal, rows ascending. */
 static lam_status gather(const pairs_run *run, csr *G, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = run->m->n;
@@ -354,21 +354,19 @@ static lam_status gather(const pairs_run *run, csr *G, lam_error *error) {
         for (size_t at = 0; at < n; at++) {
             const row_place *place = &run->places[at];
             const pair_pool *pool = &run->pools[place->thread];
-            const uint32_t i = run->tree.element[at];
+            const uint32_t one = run->tree.element[at];
             for (size_t p = place->offset; p < place->offset + place->length; p++) {
                 const float g = pool->exchange[p];
-                const uint32_t j = run->tree.element[pool->other[p]];
+                const uint32_t two = run->tree.element[pool->other[p]];
+                const uint32_t i = one < two ? one : two, j = one < two ? two : one;
                 if (!(g > 0 || keep)) continue;
                 if (fill == 0) {
                     __atomic_fetch_add(&rows.indptr[i + 1], 1, __ATOMIC_RELAXED);
-                    __atomic_fetch_add(&rows.indptr[j + 1], 1, __ATOMIC_RELAXED);
                     continue;
                 }
-                const uint64_t there = __atomic_fetch_add(&next[i], 1, __ATOMIC_RELAXED),
-                               back = __atomic_fetch_add(&next[j], 1, __ATOMIC_RELAXED);
+                const uint64_t there = __atomic_fetch_add(&next[i], 1, __ATOMIC_RELAXED);
                 rows.indices[there] = j;
-                rows.indices[back] = i;
-                rows.data[there] = rows.data[back] = g;
+                rows.data[there] = g;
             }
         }
         if (fill == 1) break;

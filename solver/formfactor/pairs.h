@@ -16,12 +16,12 @@ typedef struct pairs_options {
     const char *stage;
 } pairs_options;
 
-/* The exchange areas g_ij = A_i F_ij = g_ji of all pairs, both triangles, as sparse rows freed by csr_free.
+/* The exchange areas g_ij = A_i F_ij = g_ji of all pairs, j > i, as sparse rows freed by csr_free.
  * What lies between clusters of elements tells which pairs are surely open, and segments which clusters are
  * plainly hidden from each other. Of the other pairs segments decide: where they disagree, or where the pair
  * of a neighbour came out otherwise, many find the share that is seen, each weighted with the kernel. The
- * result is the same for any number of threads. Memory: 9 bytes a pair that is facing and not hidden, and
- * twice 8 in the rows. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+ * result is the same for any number of threads. Memory: 9 bytes a pair that is facing and not hidden, half as
+ * much again to grow, and 8 in the rows. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
 lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_options *options, csr *G,
                           pairs_report *report, lam_error *error);
 

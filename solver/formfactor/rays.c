@@ -47,17 +47,40 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
 }
 
 lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
-                      const form_factor_options *options, csr *counts, double *leaving, double *absorbed,
-                      lam_error *error) {
+                      const form_factor_options *options, found_rows *counts, double *leaving,
+                      double *absorbed, lam_error *error) {
     const ray_context context = {
         .m = m, .v = v, .rays = options->recipe.rays, .seed = options->recipe.seed, .sky = options->bounce};
     const row_maker maker = {.make = trace_element,
                              .context = &context,
+                             .kind = ROW_COUNTS,
                              .rays = options->recipe.rays,
                              .whole = (double)options->recipe.rays,
                              .sky = options->bounce,
                              .cheaper = "fewer --rays",
                              .progress = options->progress,
-                             .stage = options->stage};
-    return rows_make(&maker, m->n, order, counts, leaving, absorbed, error);
+                             .stage = options->stage,
+                             .m = m,
+                             .recipe = &options->recipe,
+                             .scratch = options->scratch,
+                             .scratch_name = options->scratch_name};
+    return rows_make(&maker, order, counts, leaving, absorbed, error);
+}
+
+void rays_cast_some(const mesh *m, const visibility *v, const uint32_t *order, size_t n_elements,
+                    size_t rays) {
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t k = 0; k < n_elements; k++) {
+        const size_t element = order[k * m->n / n_elements];
+        element_sampler sampler;
+        element_sampler_init(&sampler, m, v, element, 0);
+        uint32_t self[VISIBILITY_PACKET];
+        for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = (uint32_t)element;
+        for (size_t ray = 0; ray < rays; ray += VISIBILITY_PACKET) {
+            ray_packet packet;
+            hit_packet hits;
+            element_sampler_packet(&sampler, (uint32_t)ray, &packet);
+            visibility_cast(v, &packet, VISIBILITY_PACKET, self, false, &hits);
+        }
+    }
 }

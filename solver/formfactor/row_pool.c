@@ -1,152 +1,226 @@
 #include "solver/formfactor/row_pool.h"
 
+#include "solver/formfactor/row_file.h"
+
 #include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* Between two looks at the cancel flag and the progress line: at most so many elements, and about so many
- * rays. */
-enum { CHUNK_MOST = 16, CHUNK_RAYS = 1 << 18 };
-
-/* Where a row lies before the rows are put in order. */
-typedef struct row_place {
-    uint32_t thread;
-    uint32_t length;
-    size_t offset;
-} row_place;
+ * rays. A block on the disk takes about a tenth of a second. */
+enum { CHUNK_MOST = 16, CHUNK_RAYS = 1 << 18, BLOCK_RAYS = 1 << 20 };
 
 static bool pool_reserve(row_pool *p, size_t more) {
     if (p->capacity - p->used >= more) return true;
-    size_t capacity = p->capacity + p->capacity / 2 + more + 4096;
-    uint32_t *indices = realloc(p->indices, capacity * sizeof *indices);
-    if (indices == NULL) return false;
-    p->indices = indices;
-    float *data = realloc(p->data, capacity * sizeof *data);
-    if (data == NULL) return false;
-    p->data = data;
+    const size_t capacity = p->capacity + p->capacity / 2 + more + 4096;
+    uint8_t *bytes = realloc(p->bytes, capacity);
+    if (bytes == NULL) return false;
+    p->bytes = bytes;
     p->capacity = capacity;
     return true;
 }
 
-static void pool_free(row_pool *p) {
-    free(p->sums);
-    free(p->touched);
-    free(p->sky);
-    free(p->indices);
-    free(p->data);
-}
-
-/* Moves the sums into a row with ascending indices and clears them. */
-static bool take_row(row_pool *pool, size_t n, row_place *place) {
-    const size_t words = (n + 63) / 64;
-    size_t length = 0;
-    for (size_t w = 0; w < words; w++) length += (size_t)__builtin_popcountll(pool->touched[w]);
-    if (!pool_reserve(pool, length)) return false;
-    place->offset = pool->used;
-    place->length = (uint32_t)length;
-    for (size_t w = 0; w < words; w++) {
-        for (uint64_t bits = pool->touched[w]; bits != 0; bits &= bits - 1) {
-            const uint32_t j = (uint32_t)(w * 64 + (size_t)__builtin_ctzll(bits));
-            pool->indices[pool->used] = j;
-            pool->data[pool->used++] = (float)pool->sums[j];
-            pool->sums[j] = 0;
-        }
-        pool->touched[w] = 0;
-    }
-    return true;
-}
-
-/* Copies the rows of all pools into one CSR. */
-static lam_status gather_rows(size_t n, const row_place *places, const row_pool *pools, csr *out,
-                              lam_error *error) {
-    lam_status status = LAM_OK;
-    csr rows = {.n = n};
-    rows.indptr = memory_allocate(n + 1, sizeof *rows.indptr, "form factor rows", error);
-    if (rows.indptr == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < n; i++) rows.indptr[i + 1] = rows.indptr[i] + places[i].length;
-    rows.indices = memory_allocate(rows.indptr[n], sizeof *rows.indices, "form factor rows", error);
-    rows.data = memory_allocate(rows.indptr[n], sizeof *rows.data, "form factor rows", error);
-    if (rows.indices == NULL || rows.data == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < n; i++) {
-        if (places[i].length == 0) continue; /* its pool may be NULL */
-        const row_pool *pool = &pools[places[i].thread];
-        memcpy(rows.indices + rows.indptr[i], pool->indices + places[i].offset,
-               places[i].length * sizeof *rows.indices);
-        memcpy(rows.data + rows.indptr[i], pool->data + places[i].offset,
-               places[i].length * sizeof *rows.data);
-    }
-    *out = rows;
-    rows = (csr){0};
-done:
-    csr_free(&rows);
-    return status;
-}
-
-static size_t chunk_of(size_t rays) {
-    const size_t elements = CHUNK_RAYS / rays;
-    return elements < 1 ? 1 : elements > CHUNK_MOST ? CHUNK_MOST : elements;
-}
-
-lam_status rows_make(const row_maker *maker, size_t n, const uint32_t *order, csr *rows, double *leaving,
-                     double *absorbed, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n_pools = (size_t)omp_get_max_threads(), chunk = chunk_of(maker->rays);
+static lam_status pools_create(const row_maker *maker, size_t n_pools, row_pool **out, lam_error *error) {
+    const size_t n = maker->m->n;
     row_pool *pools = memory_allocate(n_pools, sizeof *pools, "form factor rows", error);
-    row_place *places = memory_allocate(n, sizeof *places, "form factor rows", error);
-    if (pools == NULL || places == NULL) TRY(LAM_ERR_MEMORY);
+    *out = pools;
+    if (pools == NULL) return LAM_ERR_MEMORY;
     for (size_t t = 0; t < n_pools; t++) {
         pools[t].sums = memory_allocate(n, sizeof *pools[t].sums, "form factor rows", error);
         pools[t].touched =
             memory_allocate((n + 63) / 64, sizeof *pools[t].touched, "form factor rows", error);
-        if (pools[t].sums == NULL || pools[t].touched == NULL) TRY(LAM_ERR_MEMORY);
+        if (pools[t].sums == NULL || pools[t].touched == NULL) return LAM_ERR_MEMORY;
         if (maker->sky == NULL) continue;
         pools[t].sky = memory_allocate(maker->sky->tiling.n_tiles + 1, sizeof *pools[t].sky,
                                        "the tiles of the sky", error);
-        if (pools[t].sky == NULL) TRY(LAM_ERR_MEMORY);
+        if (pools[t].sky == NULL) return LAM_ERR_MEMORY;
+    }
+    return LAM_OK;
+}
+
+static void pools_free(row_pool *pools, size_t n_pools) {
+    for (size_t t = 0; pools != NULL && t < n_pools; t++) {
+        free(pools[t].sums);
+        free(pools[t].touched);
+        free(pools[t].sky);
+        free(pools[t].bytes);
+    }
+    free(pools);
+}
+
+/* Packs the sums with ascending columns and clears them. */
+static bool take_row(row_pool *pool, row_kind kind, size_t n, found_row *row) {
+    const size_t words = (n + 63) / 64;
+    size_t length = 0;
+    for (size_t w = 0; w < words; w++) length += (size_t)__builtin_popcountll(pool->touched[w]);
+    if (!pool_reserve(pool, length * ROW_ENTRY_MOST)) return false;
+    uint8_t *const begin = pool->bytes + pool->used, *to = begin;
+    uint32_t next = 0;
+    for (size_t w = 0; w < words; w++) {
+        for (uint64_t bits = pool->touched[w]; bits != 0; bits &= bits - 1) {
+            const uint32_t j = (uint32_t)(w * 64 + (size_t)__builtin_ctzll(bits));
+            to = row_put(kind, to, j - next, (float)pool->sums[j]);
+            next = j + 1;
+            pool->sums[j] = 0;
+        }
+        pool->touched[w] = 0;
+    }
+    *row = (found_row){.n_bytes = (uint32_t)(to - begin), .n_entries = (uint32_t)length};
+    pool->used += (size_t)(to - begin);
+    return true;
+}
+
+/* All that the threads share. */
+typedef struct rows_run {
+    const row_maker *maker;
+    const uint32_t *order;
+    found_rows *rows;
+    double *leaving, *absorbed;
+    row_file *file;         /* NULL: all in memory */
+    size_t chunk, of_block; /* elements in a chunk, chunks in a block */
+    size_t *left;           /* [blocks], chunks that are still missing */
+    size_t finished;        /* elements */
+    bool stop;
+    lam_status status;
+    lam_error error;
+} rows_run;
+
+static void run_fail(rows_run *run, lam_status status, const lam_error *error) {
+#pragma omp critical(rows_failure)
+    if (run->status == LAM_OK) {
+        run->status = status;
+        run->error = *error;
+    }
+#pragma omp atomic write
+    run->stop = true;
+}
+
+/* Finds the rows of a chunk; their bytes become a chunk of run->rows. */
+static void make_chunk(rows_run *run, size_t c, row_pool *pool) {
+    const row_maker *maker = run->maker;
+    const size_t n = run->rows->n, first = c * run->chunk,
+                 last = first + run->chunk < n ? first + run->chunk : n;
+    lam_error error = {0};
+    bool enough = true;
+    pool->used = 0;
+    for (size_t position = first; position < last && enough; position++) {
+        const size_t i = run->order[position];
+        maker->make(maker->context, i, pool, &run->leaving[i], &run->absorbed[i]);
+        if (maker->sky != NULL) sky_bounce_put(maker->sky, i, pool->sky, maker->whole);
+        enough = take_row(pool, maker->kind, n, &run->rows->rows[i]);
+    }
+    uint8_t *bytes = enough ? malloc(pool->used + 1) : NULL;
+    if (bytes == NULL) {
+        run_fail(run,
+                 status_fail(&error, LAM_ERR_MEMORY,
+                             "form factors of %zu elements at %zu rays: out of memory; use %s", n,
+                             maker->rays, maker->cheaper),
+                 &error);
+        return;
+    }
+    if (pool->used > 0) memcpy(bytes, pool->bytes, pool->used);
+    run->rows->chunks[c] = bytes;
+    for (size_t position = first; position < last; position++) {
+        found_row *row = &run->rows->rows[run->order[position]];
+        row->bytes = bytes;
+        bytes += row->n_bytes;
+    }
+}
+
+/* After a chunk: when it was the last of its block, the block goes to the file and out of memory. */
+static void finish_chunk(rows_run *run, size_t c) {
+    lam_error error = {0};
+    lam_status status = LAM_OK;
+    const size_t block = c / run->of_block, first = block * run->of_block,
+                 last = first + run->of_block < run->rows->n_chunks ? first + run->of_block
+                                                                    : run->rows->n_chunks;
+    size_t left;
+#pragma omp atomic capture seq_cst
+    left = --run->left[block];
+    if (left > 0 || run->file == NULL) return;
+#pragma omp critical(rows_file)
+    status = row_file_append(run->file, block, run->rows->rows, run->leaving, run->absorbed, &error);
+    for (size_t k = first; k < last; k++) {
+        free(run->rows->chunks[k]);
+        run->rows->chunks[k] = NULL;
+    }
+    if (status != LAM_OK) run_fail(run, status, &error);
+}
+
+static void tell_progress(rows_run *run, size_t elements) {
+    const row_maker *maker = run->maker;
+#pragma omp critical(rows_progress)
+    {
+        run->finished += elements;
+        progress_report(maker->progress, maker->stage, (double)run->finished / (double)run->rows->n);
+        if (progress_cancelled(maker->progress)) {
+            lam_error error = {0};
+            run_fail(run, status_fail(&error, LAM_ERR_CANCELLED, "cancelled"), &error);
+        }
+    }
+}
+
+static lam_status open_file(const row_maker *maker, size_t block_rows, const uint32_t *order, row_file **out,
+                            lam_error *error) {
+    row_file_contents contents = {.recipe = *maker->recipe,
+                                  .n = maker->m->n,
+                                  .block_rows = block_rows,
+                                  .kind = maker->kind,
+                                  .sky = maker->sky};
+    mesh_geometry_hash(maker->m, contents.geometry);
+    return row_file_open(maker->scratch, maker->scratch_name, &contents, order, out, error);
+}
+
+static size_t at_least_one(size_t x) {
+    return x < 1 ? 1 : x;
+}
+
+lam_status rows_make(const row_maker *maker, const uint32_t *order, found_rows *rows, double *leaving,
+                     double *absorbed, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = maker->m->n, n_pools = (size_t)omp_get_max_threads();
+    row_pool *pools = NULL;
+    found_rows found = {.n = n, .kind = maker->kind};
+    rows_run run = {.maker = maker, .order = order, .rows = &found, .leaving = leaving, .absorbed = absorbed};
+    run.chunk = at_least_one(CHUNK_RAYS / maker->rays);
+    if (run.chunk > CHUNK_MOST) run.chunk = CHUNK_MOST;
+    run.of_block = at_least_one(BLOCK_RAYS / maker->rays / run.chunk);
+    const size_t n_chunks = (n + run.chunk - 1) / run.chunk,
+                 n_blocks = (n_chunks + run.of_block - 1) / run.of_block;
+    TRY(pools_create(maker, n_pools, &pools, error));
+    found.rows = memory_allocate(n, sizeof *found.rows, "form factor rows", error);
+    found.chunks = memory_allocate(n_chunks, sizeof *found.chunks, "form factor rows", error);
+    run.left = memory_allocate(n_blocks, sizeof *run.left, "form factor rows", error);
+    if (found.rows == NULL || found.chunks == NULL || run.left == NULL) TRY(LAM_ERR_MEMORY);
+    found.n_chunks = n_chunks;
+    for (size_t c = 0; c < n_chunks; c++) run.left[c / run.of_block]++;
+    if (maker->scratch != NULL) {
+        TRY(open_file(maker, run.chunk * run.of_block, order, &run.file, error));
+        found.kept = run.finished = row_file_kept(run.file);
     }
 
-    bool cancelled = false, out_of_memory = false;
-    size_t finished = 0;
 #pragma omp parallel for schedule(dynamic, 1)
-    for (size_t c = 0; c < (n + chunk - 1) / chunk; c++) {
+    for (size_t c = 0; c < n_chunks; c++) {
         bool stop;
 #pragma omp atomic read
-        stop = cancelled;
-        if (stop) continue;
-        const uint32_t thread = (uint32_t)omp_get_thread_num();
-        const size_t last = (c + 1) * chunk < n ? (c + 1) * chunk : n;
-        for (size_t position = c * chunk; position < last; position++) {
-            const size_t i = order[position];
-            maker->make(maker->context, i, &pools[thread], &leaving[i], &absorbed[i]);
-            if (maker->sky != NULL) sky_bounce_put(maker->sky, i, pools[thread].sky, maker->whole);
-            places[i].thread = thread;
-            if (!take_row(&pools[thread], n, &places[i])) {
-#pragma omp atomic write
-                out_of_memory = true;
-#pragma omp atomic write
-                cancelled = true;
-                break;
-            }
-        }
-#pragma omp critical(rows_progress)
-        {
-            finished += last - c * chunk;
-            progress_report(maker->progress, maker->stage, (double)finished / (double)n);
-            if (progress_cancelled(maker->progress)) {
-#pragma omp atomic write
-                cancelled = true;
-            }
-        }
+        stop = run.stop;
+        if (stop || (run.file != NULL && row_file_has(run.file, c / run.of_block))) continue;
+        make_chunk(&run, c, &pools[omp_get_thread_num()]);
+        if (found.chunks[c] == NULL) continue;
+        finish_chunk(&run, c);
+        tell_progress(&run, c + 1 < n_chunks ? run.chunk : n - c * run.chunk);
     }
-    if (out_of_memory)
-        FAIL(error, LAM_ERR_MEMORY, "form factors of %zu elements at %zu rays: out of memory; use %s", n,
-             maker->rays, maker->cheaper);
-    if (cancelled) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
-    TRY(gather_rows(n, places, pools, rows, error));
+    if (run.status != LAM_OK) {
+        if (error != NULL) *error = run.error;
+        TRY(run.status);
+    }
+    if (run.file != NULL) TRY(row_file_map(run.file, &found, leaving, absorbed, error));
+    *rows = found;
+    found = (found_rows){0};
 done:
-    if (pools != NULL)
-        for (size_t t = 0; t < n_pools; t++) pool_free(&pools[t]);
-    free(pools);
-    free(places);
+    pools_free(pools, n_pools);
+    free(run.left);
+    row_file_close(run.file);
+    found_rows_free(&found);
     return status;
 }

@@ -1,20 +1,22 @@
-/* Rows of form factors that threads make one element at a time, each into a pool of its own, and that are put
- * in order at the end. Knows nothing of how an element looks around. */
+/* Rows of form factors that threads find one element at a time and pack. With a scratch folder they go there
+ * a block at a time. Knows nothing of how an element looks around. */
 #ifndef LAMBERT_FORMFACTOR_ROW_POOL_H
 #define LAMBERT_FORMFACTOR_ROW_POOL_H
 
+#include "solver/formfactor/found_rows.h"
+#include "solver/formfactor/recipe.h"
+#include "solver/formfactor/scratch.h"
 #include "solver/formfactor/sky_bounce.h"
 #include "solver/formfactor/visibility.h"
-#include "solver/operator/csr.h"
 #include "solver/progress.h"
+#include "solver/scene/mesh.h"
 
-/* What one thread works with: the sums of the element it is at, and the rows it has finished. */
+/* What one thread works with: the sums of the element it is at, and the packed rows of its chunk. */
 typedef struct row_pool {
     double *sums;      /* [n], all zero between elements */
     uint64_t *touched; /* bit set over elements: where sums were added to */
     double *sky;       /* [m + 1], likewise zero: of the tiles of a sky and of the ground; NULL: none */
-    uint32_t *indices; /* one row after the other */
-    float *data;
+    uint8_t *bytes;
     size_t used, capacity;
 } row_pool;
 
@@ -41,18 +43,25 @@ static inline void row_pool_leave(row_pool *pool, const sky_bounce *sky, const r
 typedef struct row_maker {
     void (*make)(const void *context, size_t element, row_pool *pool, double *leaving, double *absorbed);
     const void *context;
+    row_kind kind;       /* whether what is added are whole numbers */
     size_t rays;         /* of one element */
     double whole;        /* weight of all that it sends out */
     sky_bounce *sky;     /* takes what leaves by direction; NULL: nobody asks */
     const char *cheaper; /* what would need less memory: "fewer --rays" */
     const progress *progress;
     const char *stage;
+    const mesh *m;
+    const recipe *recipe;
+    scratch *scratch; /* NULL: all in memory */
+    const char *scratch_name;
 } row_maker;
 
-/* Makes the rows of all n elements; the same for any number of threads. order is [n], the sequence in which
- * elements are worked on; leaving and absorbed are [n]. The caller frees rows with csr_free.
- * Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
-lam_status rows_make(const row_maker *maker, size_t n, const uint32_t *order, csr *rows, double *leaving,
+/* Makes the rows of all elements; the same for any number of threads, with a scratch folder and without, and
+ * whatever of them was there already. order is [n], the sequence in which elements are worked on; leaving and
+ * absorbed are [n]. The caller frees rows with found_rows_free.
+ * Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED, and those of row_file.h; what is in the scratch folder by then
+ * stays there. */
+lam_status rows_make(const row_maker *maker, const uint32_t *order, found_rows *rows, double *leaving,
                      double *absorbed, lam_error *error);
 
 #endif

@@ -386,6 +386,29 @@ class StoreTest(unittest.TestCase):
             E = f["mesh/emission"][()].astype(float)
         np.testing.assert_allclose(names["B"], store.answer(E)[0][0], rtol=1e-12)
 
+    def test_upper_triangle(self):
+        """Above 10,240 elements: read as the example in FORMAT.md says, and as `precompute` and `verify` do."""
+        examples = re.findall(r"```python\n(.*?)```", FORMAT.read_text(), re.S)
+        example = next(e for e in examples if "upper" in e)
+        scene, path, again = (self.root / name for name in ("many.obj", "many.h5", "again.h5"))
+        how = ("--method", "low-rank", "--rank", 8, "--probes", 0, "--keep-form-factors")
+        for line in (("generate", "box", "--divisions", 42, "-o", scene), ("precompute", scene, "-o", path, "--rays", 64, *how),
+                     ("precompute", path, "-o", again, *how), ("verify", path, "--probes", 0)):
+            done = run(*line)
+            self.assertEqual(done.returncode, 0, done.stderr + done.stdout)
+        names = {}
+        exec(example.replace("STORE.h5", str(path)), names)
+        n, pairs = 10584, len(names["F"])
+        with h5py.File(path, "r") as one, h5py.File(again, "r") as two:
+            self.assertEqual(one["form_factors"].attrs["storage"], b"upper")
+            self.assertEqual(2 * len(one["form_factors/data"]), pairs)
+            sums = np.bincount(names["i"], names["F"].astype(np.float32), n)
+            np.testing.assert_allclose(sums, one["mesh/row_sums"][()], rtol=1e-12)
+            for name in ("operator/Y", "operator/V", "mesh/row_sums", *(f"form_factors/{d}" for d in one["form_factors"])):
+                np.testing.assert_array_equal(one[name][()], two[name][()], name)
+        with h5py.File(self.stores["folded"], "r") as few:
+            self.assertEqual(few["form_factors"].attrs["storage"], b"rows")
+
     def refused(self, path, *words):
         for verb in ("info", "verify"):
             answer = run(verb, path)

@@ -1,6 +1,7 @@
 /* Hemicubes: delta form factors, what one centroid sees against closed forms, and the invariants. */
 #include "solver/formfactor/hemicube.h"
 #include "support/box.h"
+#include "support/found.h"
 #include "support/plates.h"
 #include "support/suite.h"
 
@@ -93,16 +94,18 @@ enum { N_VIEWS = sizeof views / sizeof *views };
 static csr trace_rows(const mesh *m, size_t resolution, double *leaving, double *absorbed) {
     hemicube h = cube(resolution);
     visibility *v = NULL;
-    csr rows = {0};
+    found_rows found = {0};
     lam_error error = {0};
     const form_factor_options how = {.recipe = {.method = RECIPE_HEMICUBE, .resolution = resolution}};
     const uint32_t order[4] = {0, 1, 2, 3};
     ck_assert_uint_le(m->n, 4);
     ck_assert_msg(visibility_create(m, &v, &error) == LAM_OK, "%s", error.message);
-    ck_assert_msg(hemicube_trace(&h, m, v, order, &how, &rows, leaving, absorbed, &error) == LAM_OK, "%s",
+    ck_assert_msg(hemicube_trace(&h, m, v, order, &how, &found, leaving, absorbed, &error) == LAM_OK, "%s",
                   error.message);
     visibility_destroy(v);
     hemicube_free(&h);
+    const csr rows = found_unpack(&found);
+    found_rows_free(&found);
     return rows;
 }
 

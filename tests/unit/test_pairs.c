@@ -18,7 +18,9 @@ static csr exchange(const mesh *m, double accuracy, uint64_t seed, pairs_report 
     return G;
 }
 
-static double entry(const csr *G, size_t i, size_t j) {
+/* G holds the upper triangle. */
+static double entry(const csr *G, size_t a, size_t b) {
+    const size_t i = a < b ? a : b, j = a < b ? b : a;
     for (uint64_t p = G->indptr[i]; p < G->indptr[i + 1]; p++)
         if (G->indices[p] == j) return (double)G->data[p];
     return 0;
@@ -33,11 +35,11 @@ START_TEST(closed_room_is_exact) {
     ck_assert_double_eq(report.certain, report.facing); /* a convex room */
     for (size_t i = 0; i < m.n; i++) {
         double sum = 0;
-        for (uint64_t p = G.indptr[i]; p < G.indptr[i + 1]; p++) {
-            const double F = entry(&exact, i, G.indices[p]);
-            sum += (double)G.data[p];
-            /* The tolerance, and what single precision rounds. */
-            ck_assert_double_eq_tol((double)G.data[p] / m.area[i], F, 2e-6 * F);
+        for (size_t j = 0; j < m.n; j++) {
+            const double F = entry(&exact, i, j), g = i == j ? 0 : entry(&G, i, j);
+            sum += g;
+            /* The tolerance, and what single precision rounds; exact is of the smaller index. */
+            ck_assert_double_eq_tol(g / m.area[i < j ? i : j], F, 2e-6 * F + 1e-12);
         }
         ck_assert_double_eq_tol(sum / m.area[i], 1, 2e-6);
     }
@@ -174,7 +176,6 @@ START_TEST(an_occluder_never_raises_a_factor) {
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++) {
             const double one = entry(&with, i, j), before = entry(&without, i, j);
-            ck_assert_double_eq(one, entry(&with, j, i));
             ck_assert_double_le(one, before);
             lowered += one < before;
         }

@@ -1,0 +1,33 @@
+/* Exchange areas g_ij = A_i F_ij = g_ji by their upper triangle, j > i, as sparse rows: from rows as they
+ * were found, and to whole rows. */
+#ifndef LAMBERT_FORMFACTOR_UPPER_H
+#define LAMBERT_FORMFACTOR_UPPER_H
+
+#include "solver/formfactor/found_rows.h"
+#include "solver/operator/csr.h"
+
+#include <math.h>
+
+/* F_ij from g_ij: both ends of a pair are rounded from one number. */
+static inline float upper_factor(float exchange, double area) {
+    return (float)fmin((double)exchange / area, 1);
+}
+
+/* Merges c_ij and c_ji of rows (rays each; weights as if of one ray) into
+ *     g_ij = (c_ij + c_ji)/rays * A_i A_j/(A_i + A_j)
+ * which weighs the two estimates of g, of variance ~ A_i g/rays and ~ A_j g/rays, by their inverse variances.
+ * A few columns at a time: beside rows and upper, which the caller frees with csr_free, it takes about 100
+ * MB. The same for any number of threads. LAM_ERR_MEMORY. */
+lam_status upper_merge(const found_rows *rows, size_t rays, const double *area, csr *upper, lam_error *error);
+
+/* Keeps what is above the diagonal of a symmetric G, in place. */
+void upper_fold(csr *G);
+
+/* Turns exchange areas into the rows of F, in place: upper becomes F. Beside F it takes about 100 MB.
+ * row_sums, [n], gets the sums of F's rows. On an error upper may be lost; it is still freed by csr_free. */
+lam_status upper_expand(csr *upper, const double *area, double *row_sums, lam_error *error);
+
+/* The reverse, in place, exact for rows that upper_expand made: what the result expands to has their bits. */
+lam_status upper_gather(csr *F, const double *area, lam_error *error);
+
+#endif

@@ -1,0 +1,174 @@
+"""Black box: a precomputation that is stopped again and again goes on where it was, with the same bits."""
+
+import os
+import random
+import re
+import resource
+import shlex
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+
+import h5py
+
+LAMBERT = os.environ["LAMBERT"]
+SEED = 20260301
+ENVIRONMENT = dict(os.environ, OMP_NUM_THREADS="2", LC_ALL="C")
+
+
+class Scratch(unittest.TestCase):
+    """A box whose form factors take some dozens of blocks; what an undisturbed run makes of it."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.shared = tempfile.TemporaryDirectory()
+        cls.scene = os.path.join(cls.shared.name, "room.obj")
+        cls.run_once("generate", "box", "--divisions", "10", "-o", cls.scene)
+        cls.options = ["--rays", "65536", "--probes", "0", "--rank", "16", "--method", "low-rank",
+                       "--keep-form-factors"]
+        cls.undisturbed = os.path.join(cls.shared.name, "undisturbed.h5")
+        cls.run_once("precompute", cls.scene, "-o", cls.undisturbed, *cls.options)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.shared.cleanup()
+
+    @staticmethod
+    def run_once(*arguments, **more):
+        done = subprocess.run([LAMBERT, *arguments], capture_output=True, text=True, timeout=600, check=False,
+                              env=ENVIRONMENT, **more)
+        assert done.returncode == 0, (arguments, done.stderr)
+        return done
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        self.store = os.path.join(self.folder, "room.h5")
+        self.scratch = os.path.join(self.folder, "scratch")
+        self.rows = os.path.join(self.scratch, "form-factors.rows")
+        self.command = [LAMBERT, "precompute", self.scene, "-o", self.store, *self.options, "--scratch", self.scratch]
+
+    def size(self):
+        return os.stat(self.rows).st_size if os.path.exists(self.rows) else 0
+
+    def stop_after(self, number, grown, pause):
+        """Starts the command, and stops it when its file has grown by so much."""
+        with open(os.path.join(self.folder, "log"), "w+", encoding="utf-8") as log:
+            before = self.size()
+            process = subprocess.Popen(self.command, stderr=log, env=ENVIRONMENT)
+            try:
+                while self.size() < before + grown:
+                    self.assertIsNone(process.poll(), "it ended before it could be stopped")
+                    time.sleep(.002)
+                time.sleep(pause)
+                process.send_signal(number)
+                status = process.wait(timeout=300)
+            finally:
+                if process.poll() is None:
+                    process.kill()
+                    process.wait()
+            log.seek(0)
+            return status, log.read()
+
+    def same_as_undisturbed(self):
+        found = 0
+
+        def visit(name, one):
+            nonlocal found
+            if isinstance(one, h5py.Dataset):
+                found += 1
+                self.assertEqual(one[()].tobytes(), other[name][()].tobytes(), name)
+
+        with h5py.File(self.undisturbed) as wanted, h5py.File(self.store) as other:
+            wanted.visititems(visit)
+            self.assertEqual(sorted(wanted), sorted(other))
+        self.assertGreater(found, 10)
+
+    def test_killed_ten_times(self):
+        print("seed", SEED)
+        chance = random.Random(SEED)
+        for stop in range(10):
+            # Blocks of 16 rows are some kilobytes each: one to three of the 38 at a time.
+            status, said = self.stop_after(signal.SIGKILL, chance.randint(1, 20000), chance.uniform(0, .05))
+            self.assertEqual(status, -signal.SIGKILL, said)
+            self.assertFalse(os.path.exists(self.store))
+            self.assertNotIn("form factors  ", said, "it was killed behind the form factors")
+        done = self.run_once(*self.command[1:])
+        kept = int(re.search(r"(\d+) of 600 rows were in", done.stderr).group(1))
+        self.assertGreaterEqual(kept, 10)
+        self.assertLess(kept, 600)
+        self.same_as_undisturbed()
+        self.assertFalse(os.path.exists(self.rows))
+
+    def test_interrupted(self):
+        status, said = self.stop_after(signal.SIGINT, 20000, 0)
+        self.assertEqual(status, 1)
+        last = said.splitlines()[-1]
+        start = f"lambert precompute: cancelled; what was finished stays in {self.scratch}; to go on: lambert "
+        self.assertTrue(last.startswith(start), last)
+        done = self.run_once(*shlex.split(last[len(start):]))
+        self.assertRegex(done.stderr, r"\d+ of 600 rows were in")
+        self.same_as_undisturbed()
+
+    def test_a_full_disk(self):
+        def small():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (40000, 40000))
+        done = subprocess.run(self.command, capture_output=True, text=True, timeout=600, check=False, env=ENVIRONMENT,
+                              preexec_fn=small)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertRegex(done.stderr.splitlines()[-1], r"form-factors\.rows: .*; \d+ of \d+ blocks stay there")
+        self.assertFalse(os.path.exists(self.store))
+        again = self.run_once(*self.command[1:])
+        self.assertRegex(again.stderr, r"\d+ of 600 rows were in")
+        self.same_as_undisturbed()
+
+    def test_other_options_are_refused(self):
+        self.stop_after(signal.SIGKILL, 1, 0)
+        before = self.size()
+        for options, words in ((["--rays", "1024"], "other options"), (["--max-edge", ".06"], "another scene")):
+            done = subprocess.run([*self.command, *options], capture_output=True, text=True, timeout=600, check=False,
+                                  env=ENVIRONMENT)
+            self.assertEqual(done.returncode, 1, done.stderr)
+            self.assertIn(words, done.stderr.splitlines()[-1])
+            self.assertIn(self.rows, done.stderr.splitlines()[-1])
+            self.assertEqual(self.size(), before)
+
+    def test_two_at_once_are_refused(self):
+        with open(os.path.join(self.folder, "log"), "w", encoding="utf-8") as log:
+            first = subprocess.Popen(self.command, stderr=log, env=ENVIRONMENT)
+            try:
+                while self.size() == 0:
+                    self.assertIsNone(first.poll())
+                    time.sleep(.002)
+                second = subprocess.run([*self.command, "-o", self.store + "2"], capture_output=True, text=True,
+                                        timeout=600, check=False, env=ENVIRONMENT)
+            finally:
+                first.kill()
+                first.wait()
+        self.assertEqual(second.returncode, 1)
+        self.assertIn("another run works there", second.stderr.splitlines()[-1])
+
+    def test_unused(self):
+        done = self.run_once("precompute", self.undisturbed, "-o", self.store, "--probes", "0", "--rank", "16",
+                             "--scratch", self.scratch)
+        self.assertIn("does not use --scratch", done.stderr)
+        self.assertFalse(os.path.exists(self.scratch))
+
+
+class Forecast(unittest.TestCase):
+    def test_said_before_the_form_factors(self):
+        with tempfile.TemporaryDirectory() as folder:
+            scene, store = os.path.join(folder, "a.obj"), os.path.join(folder, "a.h5")
+            Scratch.run_once("generate", "box", "--divisions", "3", "-o", scene)
+            said = Scratch.run_once("precompute", scene, "-o", store, "--rays", "1000", "--scratch", folder).stderr
+            line = next(line for line in said.splitlines() if line.startswith("forecast: "))
+            self.assertRegex(line, r"^forecast: form factors [\d.]+ s, the judge's [\d.]+ s, at [\d.e+]+ Mray/s of a trial; "
+                                   r"memory up to \d+M, store up to \d+M, scratch up to \d+M$")
+            self.assertLess(said.index(line), said.index("form factors  "))
+
+
+if __name__ == "__main__":
+    unittest.main()
