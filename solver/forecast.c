@@ -46,18 +46,18 @@ static double recipe_bytes(double n, const recipe *r) {
 /* Bytes of packed rows: a gap in groups of seven bits, of which one bit tells of a count above 1, or a
  * weight; the row's own figures. */
 static double found_bytes(double n, const recipe *r) {
+    if (r->method == RECIPE_PAIRS) return 2 * 4.5 * n * n; /* as found, and as seen */
     const double rays = recipe_rays(n, r), entries = fmin(n, rays), gap = n / fmax(1, entries);
-    if (r->method == RECIPE_PAIRS) return 0;
     const bool weights = r->method == RECIPE_HEMICUBE;
     const double bytes = 1 + floor(log2(fmax(1, gap)) / 7 + 2. / 7) + (weights ? 4 : rays > n / 4 ? 1 : 0);
     return n * (entries * bytes + 24);
 }
 
 /* The peak while one sample is found: packed rows and the triangle they are merged into, or that and the rows
- * in its place; of pairs one triangle with what is known of each, with room to grow, and again as such. */
+ * in its place; of pairs one triangle with what is known of each, and again as such. */
 static double trace_bytes(double n, const recipe *r, bool to_disk) {
     const double sample = recipe_bytes(n, r);
-    if (r->method == RECIPE_PAIRS) return fmax(sample, 10.8 * n * n);
+    if (r->method == RECIPE_PAIRS) return fmax(sample, 9 * n * n);
     /* Near pairs are a quarter as many as rays at most, and stand in a triangle of their own. */
     const double near = r->method == RECIPE_NEAR_PAIRS ? sample / 4 : 0;
     const double merging = (to_disk ? 0 : found_bytes(n, r)) + near + sample / (near > 0 ? 1 : 2);

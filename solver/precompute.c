@@ -212,15 +212,13 @@ static void log_form_factors(work *w) {
                       100 * f->absorbed_share);
 }
 
-/* Rows that are found with rays go to the scratch folder; pairs have no use for one. */
+/* Rows go to the scratch folder as they are found; a store that has them needs none but for the judge. */
 static lam_status take_scratch(work *w, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = w->options;
-    const bool judged = w->probes > 0 && judge_recipe(w, 0).method != RECIPE_PAIRS;
     if (o->scratch == NULL) return LAM_OK;
-    if (!judged && (o->from_store || w->recipe.method == RECIPE_PAIRS)) {
-        terminal_log(w->t, "%s does not use --scratch",
-                     o->from_store ? "a store with form factors" : recipe_name(w->recipe.method));
+    if (w->probes == 0 && o->from_store) {
+        terminal_log(w->t, "a store with form factors does not use --scratch");
         return LAM_OK;
     }
     TRY(scratch_open(o->scratch, &w->scratch, error));

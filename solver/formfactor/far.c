@@ -25,20 +25,26 @@ static void share_out(far_table *t) {
         }
 }
 
-/* The square on the polygon: (u, w) -> first + u one + w two, or folded to a triangle, (u, w) -> u (1 - w),
- * u w, of area 2 A u du dw. */
+/* A product rule over the unit square, mapped to the polygon: bilinear, or folded to a triangle, (u, w) ->
+ * u (1 - w), u w; weighted with the area that a unit of the square has there. */
 static void set_points(far_rule_points *rule, size_t at, const polygon *p, const pair_gauss *g) {
-    const bool triangle = p->n == 3;
-    const double *first = p->corner[0], *one = p->corner[1], *two = p->corner[triangle ? 2 : 3];
-    const double area = polygon_area(p) / sqrt(3.14159265358979323846); /* half of the kernel's 1/pi */
+    const double share = 1 / sqrt(3.14159265358979323846); /* half of the kernel's 1/pi */
+    const double *first = p->corner[0], *one = p->corner[1], *two = p->corner[2];
+    const double twice_area = 2 * polygon_area(p);
     int q = 0;
     for (int i = 0; i < g->n; i++)
         for (int j = 0; j < g->n; j++, q++) {
             const double u = g->node[i], w = g->node[j];
-            const double s = triangle ? u * (1 - w) : u, r = triangle ? u * w : w;
-            for (int d = 0; d < 3; d++)
-                rule->point[q][d][at] = first[d] + s * (one[d] - first[d]) + r * (two[d] - first[d]);
-            rule->weight[q][at] = area * g->weight[i] * g->weight[j] * (triangle ? 2 * u : 1);
+            double x[3], density;
+            if (p->n == 3) {
+                for (int d = 0; d < 3; d++)
+                    x[d] = first[d] + u * (1 - w) * (one[d] - first[d]) + u * w * (two[d] - first[d]);
+                density = twice_area * u;
+            } else {
+                density = polygon_point(p, u, w, x);
+            }
+            for (int d = 0; d < 3; d++) rule->point[q][d][at] = x[d];
+            rule->weight[q][at] = density * share * g->weight[i] * g->weight[j];
         }
 }
 
@@ -49,8 +55,7 @@ static void set_element(far_table *t, size_t at, const polygon *p, const pair_ru
         t->normal[d][at] = p->normal[d];
         for (int c = 0; c < 4; c++) t->corner[c][d][at] = p->corner[c < last ? c : last][d];
     }
-    /* Nothing is far from an element that the rules do not fit. */
-    t->radius[at] = p->affine ? p->radius : 1e150;
+    t->radius[at] = p->radius;
     for (int r = 0; r < FAR_RULES; r++) set_points(&t->rule[r], at, p, &rules->gauss[r + 1]);
 }
 

@@ -20,7 +20,8 @@ typedef struct far_table {
     size_t n, stride;
     double *block; /* all of the below */
     double *centre[3], *normal[3], *radius;
-    double *corner[4][3];            /* a triangle's last one twice */
+    double *reach;        /* the radius, or beyond everything where no product rule fits the element */
+    double *corner[4][3]; /* a triangle's last one twice */
     far_rule_points rule[FAR_RULES]; /* the one for what is further first: 4 points an element, then 9 */
 } far_table;
 

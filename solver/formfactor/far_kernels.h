@@ -55,8 +55,8 @@ KERNEL(kernel_sum)(const far_table *t, const far_rule_points *rule, size_t i, si
 /* Lanes whose elements are closer to element i than a rule allows. */
 TARGET static inline __attribute__((always_inline)) mask
 KERNEL(too_close)(const far_table *t, size_t i, lane apart2, lane radius, double closest) {
-    const double reach = closest * t->radius[i];
-    return (apart2 < reach * reach) | (apart2 < closest * closest * radius * radius);
+    const double of_i = closest * t->radius[i];
+    return (apart2 < of_i * of_i) | (apart2 < closest * closest * radius * radius);
 }
 
 TARGET static inline __attribute__((always_inline)) bool KERNEL(any)(mask m) {

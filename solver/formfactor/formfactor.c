@@ -116,8 +116,11 @@ static lam_status find_pairs(const mesh *m, const visibility *v, const form_fact
                                .keep_hidden = threshold > 0,
                                .seed = r->seed,
                                .progress = options->progress,
-                               .stage = options->stage};
-    return pairs_exchange(m, v, &how, G, &f->pairs, error);
+                               .stage = options->stage,
+                               .scratch = options->scratch,
+                               .scratch_name = options->scratch_name,
+                               .recipe = r};
+    return pairs_exchange(m, v, &how, G, &f->pairs, &f->rows_kept, error);
 }
 
 static lam_status make_of_pairs(const mesh *m, const visibility *v, const uint32_t *order,
@@ -156,7 +159,7 @@ static lam_status make_of_near_pairs(const mesh *m, const visibility *v, const u
     csr near = {0}, counted = {0};
     TRY(find_pairs(m, v, options, recipe_near(&options->recipe), f, &near, error));
     TRY(rays_count(m, v, order, options, &counts, f->leaving, f->absorbed, error));
-    f->rows_kept = counts.kept;
+    if (counts.kept > f->rows_kept) f->rows_kept = counts.kept;
     TRY(upper_merge(&counts, options->recipe.rays, m->area, &counted, error));
     found_rows_free(&counts);
     TRY(rows_replace(&counted, &near, &f->upper, error));

@@ -44,7 +44,7 @@ typedef struct form_factor_options {
     const progress *progress;
     const char *stage;        /* what progress calls it */
     bool upper;               /* leave the upper triangle, without the rows it stands for */
-    scratch *scratch;         /* where rows are kept as they are found (not of pairs); NULL: in memory only */
+    scratch *scratch;         /* where rows are kept as they are found; NULL: in memory only */
     const char *scratch_name; /* of the file there, one for each sample */
     const char *sky;          /* a tiling that what leaves is binned by, at no further ray; NULL: none */
     double ground_albedo;

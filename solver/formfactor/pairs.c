@@ -3,29 +3,13 @@
 #include "solver/formfactor/far.h"
 #include "solver/formfactor/links.h"
 #include "solver/formfactor/neighbours.h"
+#include "solver/formfactor/pair_rows.h"
 
 #include <math.h>
 #include <omp.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* What is known of a pair, and beside it that no more need be known. */
-typedef enum pair_state { UNKNOWN, CERTAIN, OPEN, HIDDEN, MIXED } pair_state;
-enum { SETTLED = 8 };
-
-/* Pairs of a position with greater ones, in the order they were found: one array a member. */
-typedef struct pair_pool {
-    uint32_t *other;
-    float *exchange;
-    uint8_t *state;
-    size_t used, capacity;
-} pair_pool;
-
-/* Where the row of a position lies. */
-typedef struct row_place {
-    uint32_t thread, length;
-    size_t offset;
-} row_place;
 
 typedef struct pairs_run {
     const mesh *m;
@@ -34,35 +18,15 @@ typedef struct pairs_run {
     polygon *polygons; /* [n], by element */
     look look;
     cluster_tree tree;
+    uint32_t *leaf;   /* [n], the leaf of a position */
+    uint32_t *parent; /* of each cluster */
     far_table far;
     cluster_links links;
     uint32_t (*neighbours)[NEIGHBOURS_MOST]; /* [n], by element */
-    size_t n_pools;
-    pair_pool *pools;  /* a thread's each */
-    row_place *places; /* [n], by position: the pairs with greater positions, ascending */
+    pair_rows rows;
 } pairs_run;
 
 /* --- rows ---------------------------------------------------------------------------------------------- */
-
-static bool pool_reserve(pair_pool *p, size_t more) {
-    if (p->capacity - p->used >= more) return true;
-    const size_t capacity = p->capacity + p->capacity / 2 + more + 4096;
-    uint32_t *other = realloc(p->other, capacity * sizeof *other);
-    if (other != NULL) p->other = other;
-    float *exchange = realloc(p->exchange, capacity * sizeof *exchange);
-    if (exchange != NULL) p->exchange = exchange;
-    uint8_t *state = realloc(p->state, capacity * sizeof *state);
-    if (state != NULL) p->state = state;
-    if (other == NULL || exchange == NULL || state == NULL) return false;
-    p->capacity = capacity;
-    return true;
-}
-
-static void pool_free(pair_pool *p) {
-    free(p->other);
-    free(p->exchange);
-    free(p->state);
-}
 
 /* What a leaf is linked with, itself or as part of a larger cluster: positions first ... last-1. */
 typedef struct reach {
@@ -74,7 +38,6 @@ typedef struct reach {
 typedef struct leaf_reaches {
     reach *reaches;
     size_t n, capacity;
-    uint32_t leaf;
 } leaf_reaches;
 
 static int compare_reaches(const void *a, const void *b) {
@@ -83,9 +46,9 @@ static int compare_reaches(const void *a, const void *b) {
 }
 
 /* All that the leaf's ancestors and itself are linked with, by position; their positions do not overlap. */
-static bool find_reaches(const pairs_run *run, const uint32_t *parent, uint32_t leaf, leaf_reaches *out) {
+static bool find_reaches(const pairs_run *run, uint32_t leaf, leaf_reaches *out) {
     out->n = 0;
-    for (uint32_t c = leaf;; c = parent[c]) {
+    for (uint32_t c = leaf;; c = run->parent[c]) {
         const size_t first = run->links.of_cluster[c], last = run->links.of_cluster[c + 1];
         if (out->n + (last - first) > out->capacity) {
             const size_t capacity = 2 * (out->n + (last - first)) + 64;
@@ -113,25 +76,23 @@ static double factor_of(const pairs_run *run, uint32_t i, uint32_t j, double g) 
 static int look_at(const pairs_run *run, uint32_t i, uint32_t j, double *g) {
     double seen;
     const look_verdict verdict = look_first(&run->look, i, j, *g, &seen);
-    const int state = verdict == LOOK_OPEN ? OPEN : verdict == LOOK_HIDDEN ? HIDDEN : MIXED;
+    const int state = verdict == LOOK_OPEN ? PAIR_OPEN : verdict == LOOK_HIDDEN ? PAIR_HIDDEN : PAIR_MIXED;
     if (!look_suffices(&run->look, i, j, *g)) return state;
     *g = seen;
-    return state | SETTLED;
+    return state | PAIR_SETTLED;
 }
 
 /* The pairs of one position: magnitudes and, where something may be between, a first look. */
-static bool find_row(pairs_run *run, uint32_t position, const leaf_reaches *to, pair_pool *pool,
-                     row_place *place) {
+static bool find_row(const pairs_run *run, uint32_t position, const leaf_reaches *to, pair_block *block) {
     enum { PIECE = 64 };
     const uint32_t i = run->tree.element[position];
-    *place = (row_place){.thread = (uint32_t)(pool - run->pools), .offset = pool->used};
     for (size_t k = 0; k < to->n; k++) {
         const reach *r = &to->reaches[k];
         const uint32_t begin = r->first > position ? r->first : position + 1;
         for (uint32_t first = begin; first < r->last; first += PIECE) {
             double exchange[PIECE];
             const uint32_t count = r->last - first < PIECE ? r->last - first : PIECE;
-            if (!pool_reserve(pool, count)) return false;
+            if (!pair_block_reserve(block, count)) return false;
             far_row(&run->far, position, first, count, exchange);
             for (uint32_t c = 0; c < count; c++) {
                 const uint32_t j = run->tree.element[first + c];
@@ -140,35 +101,33 @@ static bool find_row(pairs_run *run, uint32_t position, const leaf_reaches *to, 
                     g = pair_exchange(&run->rules, &run->polygons[i], &run->polygons[j],
                                       run->options->tolerance);
                 if (!((float)g > 0) || factor_of(run, i, j, g) < run->options->threshold) continue;
-                pool->state[pool->used] = (uint8_t)(r->open ? CERTAIN : look_at(run, i, j, &g));
-                pool->other[pool->used] = first + c;
-                pool->exchange[pool->used++] = (float)g;
+                const int state = r->open ? PAIR_CERTAIN : look_at(run, i, j, &g);
+                pair_block_add(block, first + c, (float)g, (uint8_t)state);
             }
         }
     }
-    place->length = (uint32_t)(pool->used - place->offset);
     return true;
+}
+
+static bool find_block(pairs_run *run, size_t index, leaf_reaches *to) {
+    pair_block *block = &run->rows.blocks[index];
+    const size_t first = pair_rows_first(index), length = pair_rows_length(&run->rows, index);
+    bool enough = true;
+    for (size_t r = 0; r < length && enough; r++) {
+        const size_t at = first + r;
+        block->begin[r] = block->used;
+        if (r == 0 || run->leaf[at] != run->leaf[at - 1]) enough = find_reaches(run, run->leaf[at], to);
+        enough = enough && find_row(run, (uint32_t)at, to, block);
+    }
+    for (size_t r = length; r <= PAIR_BLOCK_ROWS; r++) block->begin[r] = block->used;
+    pair_block_shrink(block);
+    return enough;
 }
 
 /* --- refinement ---------------------------------------------------------------------------------------- */
 
-/* The state of a pair of elements; UNKNOWN where they do not face each other or their clusters are hidden. */
 static pair_state state_of(const pairs_run *run, uint32_t i, uint32_t j) {
-    const uint32_t p = run->tree.position[i], q = run->tree.position[j];
-    const uint32_t row = p < q ? p : q, wanted = p < q ? q : p;
-    const row_place *place = &run->places[row];
-    const pair_pool *pool = &run->pools[place->thread];
-    size_t low = place->offset, high = place->offset + place->length;
-    while (low < high) {
-        const size_t middle = low + (high - low) / 2;
-        if (pool->other[middle] < wanted)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low < place->offset + place->length && pool->other[low] == wanted
-               ? (pair_state)(pool->state[low] & ~SETTLED)
-               : UNKNOWN;
+    return pair_rows_state(&run->rows, run->tree.position[i], run->tree.position[j]);
 }
 
 /* Whether a pair next to this one, with either element replaced by a neighbour of it, came out otherwise. */
@@ -179,122 +138,152 @@ static bool at_a_border(const pairs_run *run, uint32_t i, uint32_t j, pair_state
         for (int k = 0; k < NEIGHBOURS_MOST && others[k] != UINT32_MAX; k++) {
             if (others[k] == kept) continue;
             const pair_state other = state_of(run, kept, others[k]);
-            if (other == MIXED || (state == OPEN ? other == HIDDEN : other == OPEN || other == CERTAIN))
+            if (other == PAIR_MIXED ||
+                (state == PAIR_OPEN ? other == PAIR_HIDDEN : other == PAIR_OPEN || other == PAIR_CERTAIN))
                 return true;
         }
     }
     return false;
 }
 
-/* What is hidden of the pairs of one position. States stay as they were found: neighbours ask for them. */
-static void refine_row(pairs_run *run, uint32_t position, pairs_report *row) {
-    const row_place *place = &run->places[position];
-    pair_pool *pool = &run->pools[place->thread];
-    const uint32_t i = run->tree.element[position];
-    for (size_t at = place->offset; at < place->offset + place->length; at++) {
-        const pair_state state = (pair_state)(pool->state[at] & ~SETTLED);
-        const uint32_t j = run->tree.element[pool->other[at]];
-        row->facing++;
-        if (state == CERTAIN) {
-            row->certain++;
-        } else if (pool->state[at] & SETTLED) {
-            row->settled++;
-        } else if (state == MIXED || at_a_border(run, i, j, state)) {
-            row->mixed++;
-            pool->exchange[at] = (float)look_closely(&run->look, i, j, (double)pool->exchange[at]);
-        } else if (state == OPEN) {
-            row->open++;
+/* What is hidden of the pairs of one block. States stay as they were found: neighbours ask for them. Where
+ * the exchange areas came from a scratch file nothing is looked at again. */
+static void refine_block(pairs_run *run, size_t index, bool known, pairs_report *sum) {
+    pair_block *block = &run->rows.blocks[index];
+    size_t r = 0;
+    for (size_t at = 0; at < block->used; at++) {
+        while (at >= block->begin[r + 1]) r++;
+        const pair_state state = (pair_state)(block->state[at] & ~PAIR_SETTLED);
+        const uint32_t i = run->tree.element[pair_rows_first(index) + r],
+                       j = run->tree.element[block->other[at]];
+        sum->facing++;
+        if (state == PAIR_CERTAIN) {
+            sum->certain++;
+        } else if (block->state[at] & PAIR_SETTLED) {
+            sum->settled++;
+        } else if (state == PAIR_MIXED || at_a_border(run, i, j, state)) {
+            sum->mixed++;
+            if (!known)
+                block->exchange[at] = (float)look_closely(&run->look, i, j, (double)block->exchange[at]);
+        } else if (state == PAIR_OPEN) {
+            sum->open++;
         } else {
-            row->hidden++;
-            pool->exchange[at] = 0;
+            sum->hidden++;
+            block->exchange[at] = 0;
         }
     }
 }
 
 /* --- passes -------------------------------------------------------------------------------------------- */
 
-/* What each of the passes over the tree's leaves does with one. */
-typedef struct pass_state {
+/* A walk over all blocks: what it finds, and what it adds to a file. */
+typedef struct pass {
     pairs_run *run;
-    const uint32_t *parent;
+    bool refine;
     double share_before, share; /* of the work, for the progress line */
-    size_t finished;
-    bool stop, out_of_memory;
-    pairs_report report;
-} pass_state;
-
-static void add_report(pairs_report *sum, const pairs_report *row) {
-    sum->facing += row->facing;
-    sum->certain += row->certain;
-    sum->open += row->open;
-    sum->hidden += row->hidden;
-    sum->mixed += row->mixed;
-    sum->settled += row->settled;
-}
-
-static bool pass_stopped(pass_state *p) {
+    row_file *file;             /* NULL: none */
+    size_t finished, kept;      /* rows */
     bool stop;
-#pragma omp atomic read
-    stop = p->stop;
-    return stop;
-}
+    lam_status status;
+    lam_error error;
+    pairs_report report;
+} pass;
 
-static void pass_finished(pass_state *p, const pairs_report *row, uint32_t elements, bool memory) {
-    const pairs_options *o = p->run->options;
-#pragma omp critical(pairs_progress)
-    {
-        add_report(&p->report, row);
-        p->finished += elements;
-        p->out_of_memory = p->out_of_memory || !memory;
-        progress_report(o->progress, o->stage,
-                        p->share_before + p->share * (double)p->finished / (double)p->run->m->n);
-        if (!memory || progress_cancelled(o->progress)) {
+static void pass_fail(pass *p, lam_status status, const lam_error *error) {
+#pragma omp critical(pairs_failure)
+    if (p->status == LAM_OK) {
+        p->status = status;
+        p->error = *error;
+    }
 #pragma omp atomic write
-            p->stop = true;
-        }
-    }
+    p->stop = true;
 }
 
-static lam_status pass_result(const pass_state *p, lam_error *error) {
-    if (p->out_of_memory)
+static void add_report(pairs_report *sum, const pairs_report *more) {
+    sum->facing += more->facing;
+    sum->certain += more->certain;
+    sum->settled += more->settled;
+    sum->open += more->open;
+    sum->hidden += more->hidden;
+    sum->mixed += more->mixed;
+}
+
+/* One block of a pass, found or fetched. */
+static lam_status pass_block(pass *p, size_t index, leaf_reaches *to, pairs_report *more, lam_error *error) {
+    pairs_run *run = p->run;
+    const bool known = p->file != NULL && row_file_has(p->file, index);
+    if (known) {
+        const lam_status status = pair_rows_fetch(&run->rows, index, run->tree.element, p->file, error);
+        if (status != LAM_OK) return status;
+    } else if (!p->refine && !find_block(run, index, to)) {
         return status_fail(error, LAM_ERR_MEMORY, "pairs of %zu elements: out of memory; use --quality draft",
-                           p->run->m->n);
-    if (p->stop) return status_fail(error, LAM_ERR_CANCELLED, "cancelled");
-    return LAM_OK;
+                           run->m->n);
+    }
+    if (p->refine) refine_block(run, index, known, more);
+    if (p->file == NULL || known) return LAM_OK;
+    lam_status status;
+#pragma omp critical(pairs_file)
+    status = pair_rows_append(&run->rows, index, run->tree.element, p->file, error);
+    return status;
 }
 
-static lam_status find_rows(pairs_run *run, const uint32_t *parent, lam_error *error) {
-    pass_state p = {.run = run, .parent = parent, .share_before = .1, .share = .5};
-    const cluster_tree *t = &run->tree;
-    leaf_reaches *reaches = memory_allocate(run->n_pools, sizeof *reaches, "pairs", error);
+static lam_status pass_run(pass *p, lam_error *error) {
+    pairs_run *run = p->run;
+    const pairs_options *o = run->options;
+    const size_t n_threads = (size_t)omp_get_max_threads();
+    leaf_reaches *reaches = memory_allocate(n_threads, sizeof *reaches, "pairs", error);
     if (reaches == NULL) return LAM_ERR_MEMORY;
-#pragma omp parallel for schedule(dynamic, 16)
-    for (size_t c = 0; c < t->n_clusters; c++) {
-        if (!cluster_is_leaf(&t->clusters[c]) || pass_stopped(&p)) continue;
-        const cluster *leaf = &t->clusters[c];
-        const int thread = omp_get_thread_num();
-        const pairs_report nothing = {0};
-        bool memory = find_reaches(run, parent, (uint32_t)c, &reaches[thread]);
-        for (uint32_t at = leaf->first; at < leaf->last && memory; at++)
-            memory = find_row(run, at, &reaches[thread], &run->pools[thread], &run->places[at]);
-        pass_finished(&p, &nothing, leaf->last - leaf->first, memory);
+    if (p->file != NULL) p->kept = row_file_kept(p->file);
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t b = 0; b < run->rows.n_blocks; b++) {
+        bool stop;
+        lam_error why = {0};
+        pairs_report more = {0};
+#pragma omp atomic read
+        stop = p->stop;
+        if (stop) continue;
+        const lam_status status = pass_block(p, b, &reaches[omp_get_thread_num()], &more, &why);
+        if (status != LAM_OK) pass_fail(p, status, &why);
+#pragma omp critical(pairs_progress)
+        {
+            add_report(&p->report, &more);
+            p->finished += pair_rows_length(&run->rows, b);
+            progress_report(o->progress, o->stage,
+                            p->share_before + p->share * (double)p->finished / (double)run->m->n);
+        }
+        if (progress_cancelled(o->progress))
+            pass_fail(p, status_fail(&why, LAM_ERR_CANCELLED, "cancelled"), &why);
     }
-    for (size_t k = 0; k < run->n_pools; k++) free(reaches[k].reaches);
+    for (size_t k = 0; k < n_threads; k++) free(reaches[k].reaches);
     free(reaches);
-    return pass_result(&p, error);
+    if (p->status != LAM_OK && error != NULL) *error = p->error;
+    return p->status;
 }
 
-static lam_status refine_rows(pairs_run *run, pairs_report *report, lam_error *error) {
-    pass_state p = {.run = run, .share_before = .6, .share = .4};
-#pragma omp parallel for schedule(dynamic, 8)
-    for (size_t at = 0; at < run->m->n; at++) {
-        pairs_report row = {0};
-        if (pass_stopped(&p)) continue;
-        refine_row(run, (uint32_t)at, &row);
-        pass_finished(&p, &row, 1, true);
-    }
-    *report = p.report;
-    return pass_result(&p, error);
+/* The file of a pass in the scratch folder; none without one. */
+static lam_status open_file(const pairs_run *run, const char *suffix, row_file **out, lam_error *error) {
+    const pairs_options *o = run->options;
+    char name[64], geometry[33];
+    if (o->scratch == NULL) return LAM_OK;
+    snprintf(name, sizeof name, "%s.%s", o->scratch_name, suffix);
+    mesh_geometry_hash(run->m, geometry);
+    return pair_rows_open(o->scratch, name, geometry, o->recipe, run->m->n, run->tree.element, out, error);
+}
+
+static lam_status run_passes(pairs_run *run, pairs_report *report, size_t *kept, lam_error *error) {
+    lam_status status = LAM_OK;
+    pass find = {.run = run, .share_before = .1, .share = .5},
+         refine = {.run = run, .refine = true, .share_before = .6, .share = .4};
+    TRY(open_file(run, "found", &find.file, error));
+    TRY(open_file(run, "seen", &refine.file, error));
+    TRY(pass_run(&find, error));
+    TRY(pass_run(&refine, error));
+    *report = refine.report;
+    if (kept != NULL) *kept = find.kept;
+done:
+    row_file_close(find.file);
+    row_file_close(refine.file);
+    return status;
 }
 
 /* --- result -------------------------------------------------------------------------------------------- */
@@ -352,12 +341,12 @@ static lam_status gather(const pairs_run *run, csr *G, lam_error *error) {
     for (int fill = 0; fill < 2; fill++) {
 #pragma omp parallel for schedule(dynamic, 64)
         for (size_t at = 0; at < n; at++) {
-            const row_place *place = &run->places[at];
-            const pair_pool *pool = &run->pools[place->thread];
+            const pair_block *block = &run->rows.blocks[at / PAIR_BLOCK_ROWS];
+            const size_t *begin = &block->begin[at % PAIR_BLOCK_ROWS];
             const uint32_t one = run->tree.element[at];
-            for (size_t p = place->offset; p < place->offset + place->length; p++) {
-                const float g = pool->exchange[p];
-                const uint32_t two = run->tree.element[pool->other[p]];
+            for (size_t p = begin[0]; p < begin[1]; p++) {
+                const float g = block->exchange[p];
+                const uint32_t two = run->tree.element[block->other[p]];
                 const uint32_t i = one < two ? one : two, j = one < two ? two : one;
                 if (!(g > 0 || keep)) continue;
                 if (fill == 0) {
@@ -385,31 +374,33 @@ done:
     return status;
 }
 
-static lam_status find_parents(const cluster_tree *t, uint32_t **out, lam_error *error) {
-    uint32_t *parent = memory_allocate(t->n_clusters, sizeof *parent, "pairs", error);
-    if (parent == NULL) return LAM_ERR_MEMORY;
-    for (size_t c = 0; c < t->n_clusters; c++)
-        for (int k = 0; k < 2 && !cluster_is_leaf(&t->clusters[c]); k++)
-            parent[t->clusters[c].child[k]] = (uint32_t)c;
-    *out = parent;
+static lam_status find_parents(pairs_run *run, lam_error *error) {
+    const cluster_tree *t = &run->tree;
+    run->parent = memory_allocate(t->n_clusters, sizeof *run->parent, "pairs", error);
+    run->leaf = memory_allocate(t->n, sizeof *run->leaf, "pairs", error);
+    if (run->parent == NULL || run->leaf == NULL) return LAM_ERR_MEMORY;
+    for (size_t c = 0; c < t->n_clusters; c++) {
+        const cluster *one = &t->clusters[c];
+        if (cluster_is_leaf(one))
+            for (uint32_t p = one->first; p < one->last; p++) run->leaf[p] = (uint32_t)c;
+        else
+            for (int k = 0; k < 2; k++) run->parent[one->child[k]] = (uint32_t)c;
+    }
     return LAM_OK;
 }
 
 lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_options *options, csr *G,
-                          pairs_report *report, lam_error *error) {
+                          pairs_report *report, size_t *kept, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = m->n;
     const double slack = visibility_rounding(v);
-    uint32_t *parent = NULL;
-    pairs_run run = {.m = m, .options = options, .n_pools = (size_t)omp_get_max_threads()};
+    pairs_run run = {.m = m, .options = options};
     const link_options how = {.threshold = options->threshold, .slack = slack, .progress = options->progress};
     pair_rules_init(&run.rules);
     run.polygons = memory_allocate(n, sizeof *run.polygons, "pairs", error);
     run.neighbours = memory_allocate(n, sizeof *run.neighbours, "pairs", error);
-    run.pools = memory_allocate(run.n_pools, sizeof *run.pools, "pairs", error);
-    run.places = memory_allocate(n, sizeof *run.places, "pairs", error);
-    if (run.polygons == NULL || run.neighbours == NULL || run.pools == NULL || run.places == NULL)
-        TRY(LAM_ERR_MEMORY);
+    if (run.polygons == NULL || run.neighbours == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(pair_rows_create(n, &run.rows, error));
     for (size_t i = 0; i < n; i++) polygon_of_element(m, i, &run.polygons[i]);
     run.look = (look){.v = v,
                       .area = m->area,
@@ -423,20 +414,17 @@ lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_option
     TRY(cluster_tree_build(m, slack, &run.tree, error));
     TRY(far_table_build(run.polygons, &run.tree, &run.rules, options->tolerance, &run.far, error));
     TRY(cluster_links_find(m, &run.tree, &run.look, &how, &run.links, error));
-    TRY(find_parents(&run.tree, &parent, error));
-    TRY(find_rows(&run, parent, error));
-    TRY(refine_rows(&run, report, error));
+    TRY(find_parents(&run, error));
+    TRY(run_passes(&run, report, kept, error));
     report->hidden += run.links.hidden_pairs;
     report->facing += run.links.hidden_pairs;
     TRY(gather(&run, G, error));
 done:
-    if (run.pools != NULL)
-        for (size_t k = 0; k < run.n_pools; k++) pool_free(&run.pools[k]);
-    free(run.pools);
-    free(run.places);
+    pair_rows_free(&run.rows);
     free(run.polygons);
     free(run.neighbours);
-    free(parent);
+    free(run.parent);
+    free(run.leaf);
     far_table_free(&run.far);
     cluster_links_free(&run.links);
     cluster_tree_free(&run.tree);

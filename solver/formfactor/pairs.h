@@ -14,15 +14,19 @@ typedef struct pairs_options {
     uint64_t seed;
     const progress *progress;
     const char *stage;
+    scratch *scratch; /* where rows are kept as they are found; NULL: in memory only */
+    const char *scratch_name;
+    const recipe *recipe; /* of the scratch files */
 } pairs_options;
 
 /* The exchange areas g_ij = A_i F_ij = g_ji of all pairs, j > i, as sparse rows freed by csr_free.
  * What lies between clusters of elements tells which pairs are surely open, and segments which clusters are
  * plainly hidden from each other. Of the other pairs segments decide: where they disagree, or where the pair
  * of a neighbour came out otherwise, many find the share that is seen, each weighted with the kernel. The
- * result is the same for any number of threads. Memory: 9 bytes a pair that is facing and not hidden, half as
- * much again to grow, and 8 in the rows. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+ * result is the same for any number of threads. Memory: 9 bytes a pair that is facing and not hidden, and 8
+ * in the rows. kept, which may be NULL, gets how many rows the scratch folder had already. Errors:
+ * LAM_ERR_MEMORY, LAM_ERR_CANCELLED, those of row_file.h. */
 lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_options *options, csr *G,
-                          pairs_report *report, lam_error *error);
+                          pairs_report *report, size_t *kept, lam_error *error);
 
 #endif

@@ -10,7 +10,23 @@ static const uint8_t *get_number_within(const uint8_t *from, const uint8_t *end,
     return row_get_number(from, x);
 }
 
+/* Positions ascend below n, exchange areas are finite and not negative. */
+static bool check_pairs(const found_row *row, size_t n) {
+    const size_t count = row->n_entries;
+    if (row->n_bytes != count * ROW_PAIR_BYTES) return false;
+    for (size_t e = 0; e < count; e++) {
+        uint32_t other, before = 0;
+        float exchange;
+        memcpy(&other, row->bytes + 4 * e, sizeof other);
+        if (e > 0) memcpy(&before, row->bytes + 4 * (e - 1), sizeof before);
+        memcpy(&exchange, row->bytes + 4 * (count + e), sizeof exchange);
+        if (other >= n || (e > 0 && other <= before) || !(exchange >= 0 && isfinite(exchange))) return false;
+    }
+    return true;
+}
+
 bool row_check(row_kind kind, const found_row *row, size_t n) {
+    if (kind == ROW_PAIRS) return check_pairs(row, n);
     const uint8_t *at = row->bytes, *const end = at + row->n_bytes;
     uint64_t column = 0; /* the smallest that may come */
     for (uint32_t e = 0; e < row->n_entries; e++) {

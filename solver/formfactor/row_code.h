@@ -8,7 +8,11 @@
 #include <stdint.h>
 #include <string.h>
 
-typedef enum row_kind { ROW_COUNTS, ROW_WEIGHTS } row_kind;
+/* ROW_PAIRS: of pairs taken one by one (pair_rows.h), not packed. */
+typedef enum row_kind { ROW_COUNTS, ROW_WEIGHTS, ROW_PAIRS } row_kind;
+
+/* Bytes of a pair: position, exchange area, state. */
+enum { ROW_PAIR_BYTES = 9 };
 
 /* Bytes of one entry at most: 33 bits of gap and 24 of count in groups of seven. */
 enum { ROW_ENTRY_MOST = 10 };

@@ -253,6 +253,29 @@ size_t row_file_kept(const row_file *f) {
 /* --- writing and reading -----------------------------------------------------------------------------------
  */
 
+lam_status row_file_read(const row_file *f, size_t block, found_row *rows, void **data, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t first = block_first(f, block), n_rows = block_length(f, block);
+    block_head head;
+    uint8_t *bytes = NULL;
+    if (!read_all(f->fd, &head, sizeof head, f->offset[block] - sizeof head)) TRY(file_failed(f, error));
+    bytes = memory_allocate(head.bytes, 1, "a block of form factors", error);
+    if (bytes == NULL) TRY(LAM_ERR_MEMORY);
+    if (!read_all(f->fd, bytes, head.bytes, f->offset[block])) TRY(file_failed(f, error));
+    size_t at = n_rows * sizeof(row_head);
+    for (size_t r = 0; r < n_rows; r++) {
+        row_head row;
+        memcpy(&row, bytes + r * sizeof row, sizeof row);
+        rows[f->order[first + r]] = (found_row){bytes + at, row.n_bytes, row.n_entries};
+        at += row.n_bytes;
+    }
+    *data = bytes;
+    bytes = NULL;
+done:
+    free(bytes);
+    return status;
+}
+
 lam_status row_file_append(row_file *f, size_t block, const found_row *rows, const double *leaving,
                            const double *absorbed, lam_error *error) {
     lam_status status = LAM_OK;
@@ -264,7 +287,8 @@ lam_status row_file_append(row_file *f, size_t block, const found_row *rows, con
     row_head *heads = (row_head *)(data + sizeof(block_head));
     for (size_t r = 0; r < n_rows; r++) {
         const size_t i = f->order[first + r];
-        heads[r] = (row_head){leaving[i], absorbed[i], rows[i].n_bytes, rows[i].n_entries};
+        heads[r] = (row_head){leaving != NULL ? leaving[i] : 0, absorbed != NULL ? absorbed[i] : 0,
+                              rows[i].n_bytes, rows[i].n_entries};
         if (rows[i].n_bytes > 0) memcpy(data + at, rows[i].bytes, rows[i].n_bytes);
         at += rows[i].n_bytes;
     }

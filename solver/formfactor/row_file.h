@@ -32,8 +32,12 @@ bool row_file_has(const row_file *f, size_t block);
 /* Rows that row_file_open found. */
 size_t row_file_kept(const row_file *f);
 
-/* Appends a block, whose rows (by element), leaving, absorbed and bins of the sky are there. One thread at a
- * time. On LAM_ERR_IO (a full disk) the file holds the blocks it held. Flushed to the disk every few seconds.
+/* Reads a block that is there: rows, by element, point into data, which the caller frees. */
+lam_status row_file_read(const row_file *f, size_t block, found_row *rows, void **data, lam_error *error);
+
+/* Appends a block, whose rows (by element), leaving, absorbed (or neither) and bins of the sky are there. One
+ * thread at a time. On LAM_ERR_IO (a full disk) the file holds the blocks it held. Flushed to the disk every
+ * few seconds.
  */
 lam_status row_file_append(row_file *f, size_t block, const found_row *rows, const double *leaving,
                            const double *absorbed, lam_error *error);

@@ -1,5 +1,6 @@
 #include "solver/formfactor/scratch.h"
 
+#include <assert.h>
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -11,13 +12,14 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
-enum { MAX_FILES = 8 };
+/* Three samples of three files each, and room. */
+enum { MAX_FILES = 16, MAX_NAME = 64 };
 
 struct scratch {
     char *folder;
     int fd; /* of the folder, which is locked through it */
     bool made;
-    const char *files[MAX_FILES]; /* names, not owned */
+    char files[MAX_FILES][MAX_NAME]; /* their names */
     size_t n_files;
 };
 
@@ -52,6 +54,7 @@ done:
 lam_status scratch_file(scratch *s, const char *name, int *fd, char **path, lam_error *error) {
     char *text = NULL;
     size_t k = 0;
+    assert(s->n_files < MAX_FILES && strlen(name) < MAX_NAME);
     if (asprintf(&text, "%s/%s", s->folder, name) < 0)
         return status_fail(error, LAM_ERR_MEMORY, "scratch: out of memory");
     const int opened = openat(s->fd, name, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
@@ -61,7 +64,7 @@ lam_status scratch_file(scratch *s, const char *name, int *fd, char **path, lam_
         return status;
     }
     while (k < s->n_files && strcmp(s->files[k], name) != 0) k++;
-    if (k == s->n_files && k < MAX_FILES) s->files[s->n_files++] = name;
+    if (k == s->n_files) strcpy(s->files[s->n_files++], name);
     *fd = opened;
     *path = text;
     return LAM_OK;

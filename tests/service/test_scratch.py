@@ -158,6 +158,50 @@ class Scratch(unittest.TestCase):
         self.assertFalse(os.path.exists(self.scratch))
 
 
+class Pairs(Scratch):
+    """The same where form factors are found pair by pair, as they are at defaults."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.shared = tempfile.TemporaryDirectory()
+        cls.scene = os.path.join(cls.shared.name, "room.obj")
+        cls.run_once("generate", "cornell", "--elements", "1500", "-o", cls.scene)
+        cls.options = ["--probes", "0", "--rank", "16", "--method", "low-rank",
+                       "--keep-form-factors"]
+        cls.undisturbed = os.path.join(cls.shared.name, "undisturbed.h5")
+        cls.run_once("precompute", cls.scene, "-o", cls.undisturbed, *cls.options)
+
+    def setUp(self):
+        super().setUp()
+        self.rows = os.path.join(self.scratch, "form-factors.rows.seen")
+
+    def test_killed_ten_times(self):
+        print("seed", SEED)
+        chance = random.Random(SEED)
+        for stop in range(10):
+            # Some are stopped while pairs are found, some while it is looked closely at what is hidden.
+            self.rows = os.path.join(self.scratch, "form-factors.rows." + ("found" if stop < 5 else "seen"))
+            status, said = self.stop_after(signal.SIGKILL, 1, chance.uniform(0, .04))
+            self.assertEqual(status, -signal.SIGKILL, said)
+            self.assertNotIn("form factors  ", said, "it was killed behind the form factors")
+        done = self.run_once(*self.command[1:])
+        self.assertRegex(done.stderr, r"\d+ of \d+ rows were in")
+        self.same_as_undisturbed()
+        self.assertFalse(os.path.exists(self.rows))
+
+    def test_interrupted(self):
+        status, said = self.stop_after(signal.SIGINT, 1, 0)
+        self.assertEqual(status, 1)
+        self.assertIn("to go on: lambert ", said.splitlines()[-1])
+        self.run_once(*self.command[1:])
+        self.same_as_undisturbed()
+
+    def test_a_full_disk(self):
+        self.skipTest("the same code writes")
+
+    test_other_options_are_refused = test_two_at_once_are_refused = test_unused = test_a_full_disk
+
+
 class Forecast(unittest.TestCase):
     def test_said_before_the_form_factors(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -30,6 +30,14 @@ static mesh room(void) {
     add_turned_box(&m, (double[]){0, 0, 0}, (double[]){3, 3, 2}, 7, 0, true);
     add_turned_box(&m, (double[]){.9, .2, 0}, (double[]){.3, 2.5, 1.7}, 3, 0, false);
     add_turned_box(&m, (double[]){1.8, 1.4, .3}, (double[]){.7, .7, .8}, 3, .4, false);
+    /* Two elements that are no parallelograms, and a triangle. */
+    const double trapezoid[4][3] = {{.2, .2, 1.9}, {.2, .8, 1.9}, {.5, .7, 1.9}, {.5, .3, 1.9}},
+                 other[4][3] = {{2.9, 1, .2}, {2.9, 1.1, .9}, {2.9, 1.8, .8}, {2.9, 2, .2}},
+                 triangle[4][3] = {{2.2, 2.2, .05}, {2.8, 2.2, .05}, {2.4, 2.8, .05}, {2.2, 2.2, .05}};
+    mesh_add_quad(&m, trapezoid);
+    mesh_add_quad(&m, other);
+    mesh_add_quad(&m, triangle);
+    m.elements[m.n - 1][3] = MESH_NO_VERTEX;
     mesh_finish(&m, .5f);
     return m;
 }

@@ -1,5 +1,7 @@
 /* Near pairs by mathematics and the others by rays: joined without counting anything twice. */
 #include "solver/formfactor/formfactor.h"
+#include "solver/scene/generate.h"
+#include "solver/scene/import.h"
 #include "support/box.h"
 #include "support/suite.h"
 
@@ -103,12 +105,52 @@ START_TEST(the_mean_is_right) {
 }
 END_TEST
 
+/* What rays see of generated scenes, quads of any shape among them: each row's sum, and the rows themselves.
+ */
+START_TEST(pairs_see_what_rays_see) {
+    static const generate_options scenes[] = {
+        {.kind = "cornell", .elements = 400, .reflectance = -1, .seed = 1},
+        {.kind = "city", .elements = 600, .variant = 3, .terrain = "hill", .reflectance = -1, .seed = 1}};
+    enum { MANY = 4096 };
+    char folder[] = "/tmp/lambert-near-XXXXXX", path[64], command[96];
+    mesh m = {0};
+    import_report report;
+    size_t faces;
+    lam_error error = {0};
+    const import_options how = {.unit = 1, .reflectance = -1};
+    ck_assert_ptr_nonnull(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/scene.obj", folder);
+    ck_assert_msg(scene_generate(&scenes[_i], path, &faces, &error) == LAM_OK, "%s", error.message);
+    ck_assert_msg(scene_import(path, &how, &m, &report, &error) == LAM_OK, "%s", error.message);
+    const recipe pairs = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 7e-5, .seed = 3},
+                 rays = {.method = RECIPE_RAYS, .rays = MANY, .seed = 4};
+    form_factors one = make(&m, &pairs), other = make(&m, &rays);
+    double off = 0, all = 0;
+    for (size_t i = 0; i < m.n; i++) {
+        /* Half a ray in sqrt(rays), five times; low-discrepancy rays do better. */
+        ck_assert_double_eq_tol(one.row_sums[i], other.row_sums[i], 5 * .5 / sqrt(MANY));
+        for (size_t j = 0; j < m.n; j++) {
+            const double F = entry(&one.F, i, j);
+            off += pow(entry(&other.F, i, j) - F, 2);
+            all += F / (2 * MANY);
+        }
+    }
+    ck_assert_double_le(off, 2 * all); /* the variance of counting, and areas that are not equal */
+    form_factors_free(&one);
+    form_factors_free(&other);
+    mesh_free(&m);
+    snprintf(command, sizeof command, "rm -r %s", folder);
+    ck_assert_int_eq(system(command), 0);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("near_pairs");
     TCase *cases = tcase_create("near_pairs");
     tcase_set_timeout(cases, 300);
     tcase_add_test(cases, near_pairs_are_exact_and_nothing_is_counted_twice);
     tcase_add_test(cases, the_mean_is_right);
+    tcase_add_loop_test(cases, pairs_see_what_rays_see, 0, 2);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }

@@ -12,7 +12,8 @@ static csr exchange(const mesh *m, double accuracy, uint64_t seed, pairs_report 
     csr G = {0};
     pairs_report ignored;
     ck_assert_msg(visibility_create(m, &v, &error) == LAM_OK, "%s", error.message);
-    ck_assert_msg(pairs_exchange(m, v, &options, &G, report != NULL ? report : &ignored, &error) == LAM_OK,
+    ck_assert_msg(pairs_exchange(m, v, &options, &G, report != NULL ? report : &ignored, NULL, &error) ==
+                      LAM_OK,
                   "%s", error.message);
     visibility_destroy(v);
     return G;
