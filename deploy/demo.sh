@@ -49,7 +49,7 @@ lambertd=$PWD/build/release/lambertd
 if [ -z "$scene" ]; then
     # Its lamp is a hundred times brighter than the floor in the shadow: an error small beside the lamp would
     # still show there, so this picture asks for more than the defaults do.
-    how=(--rank 1024 --rays 32768)
+    how=(--rank 1024)
     echo "== scene"
     scene=$out/cornell.obj
     "$lambert" generate cornell --elements 2560 -o "$scene"

@@ -23,6 +23,7 @@ void form_factors_free(form_factors *f) {
     free(f->row_sums);
     free(f->leaving);
     free(f->absorbed);
+    free(f->repair);
     sky_bounce_free(&f->sky);
     *f = (form_factors){0};
 }
@@ -255,7 +256,7 @@ lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_
     form_factors f = *a;
     f.F = (csr){.n = n};
     f.upper = (csr){0};
-    f.row_sums = f.leaving = f.absorbed = NULL;
+    f.row_sums = f.leaving = f.absorbed = f.repair = NULL;
     f.sky = (sky_bounce){0};
     f.recipe.rays = a->recipe.rays + b->recipe.rays;
     f.row_sums = memory_allocate(n, sizeof *f.row_sums, "form factors", error);

@@ -27,7 +27,9 @@ typedef struct form_factors {
     double *row_sums; /* [n], of F after repair, <= 1 */
     double *leaving;  /* [n], share of an element's rays that left the scene */
     double *absorbed; /* [n], share that hit a back face */
-    sky_bounce sky;   /* where one was asked for, else zero */
+    double *repair; /* [n], by how much a row and what goes outside summed to more than 1 before repair; NULL
+                       of a mean, or where a store has none */
+    sky_bounce sky; /* where one was asked for, else zero */
     recipe recipe;
     size_t rows_kept;     /* of rows, when just made: that were in the scratch folder */
     pairs_report pairs;   /* where just made of pairs */
@@ -36,7 +38,7 @@ typedef struct form_factors {
     double absorbed_share;
     double closure_error;           /* largest |row sum - its target| after repair */
     double reciprocity_error;       /* largest |A_i F_ij - A_j F_ji| / max of both */
-    double repair_mean, repair_max; /* |1 - row sum - what goes outside| before repair */
+    double repair_mean, repair_max; /* of |repair|, by area */
 } form_factors;
 
 typedef struct form_factor_options {

@@ -18,6 +18,7 @@ lam_status form_factors_save(const form_factors *f, store *s, lam_error *error) 
     TRY(store_write(s, GROUP "/data", STORE_F32, 1, &nnz, held->data, error));
     TRY(store_write(s, GROUP "/leaving", STORE_F64, 1, &n, f->leaving, error));
     TRY(store_write(s, GROUP "/absorbed", STORE_F64, 1, &n, f->absorbed, error));
+    if (f->repair != NULL) TRY(store_write(s, GROUP "/repair", STORE_F64, 1, &n, f->repair, error));
     TRY(recipe_save(&f->recipe, &recipe_of_form_factors, s, error));
     TRY(store_set_text(s, GROUP, "storage", rows ? "rows" : "upper", error));
     TRY(store_set_integer(s, GROUP, "closed", f->closed, error));
@@ -134,6 +135,10 @@ lam_status form_factors_load(store *s, const mesh *m, form_factors *out, lam_err
     f.leaving = data;
     TRY(store_read(s, GROUP "/absorbed", STORE_F64, 1, (size_t[]){n}, &data, error));
     f.absorbed = data;
+    if (store_has(s, GROUP "/repair")) {
+        TRY(store_read(s, GROUP "/repair", STORE_F64, 1, (size_t[]){n}, &data, error));
+        f.repair = data;
+    }
 
     f.row_sums = memory_allocate(n, sizeof *f.row_sums, "form factors", error);
     if (f.row_sums == NULL) TRY(LAM_ERR_MEMORY);

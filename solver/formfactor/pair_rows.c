@@ -96,8 +96,8 @@ done:
     return status;
 }
 
-lam_status pair_rows_fetch(pair_rows *rows, size_t block, const uint32_t *order, const row_file *f,
-                           lam_error *error) {
+static lam_status read_block(const pair_rows *rows, size_t block, const uint32_t *order, const row_file *f,
+                             pair_block *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t first = pair_rows_first(block), length = pair_rows_length(rows, block);
     pair_block fresh = {0};
@@ -119,12 +119,36 @@ lam_status pair_rows_fetch(pair_rows *rows, size_t block, const uint32_t *order,
         fresh.used += count;
     }
     for (size_t r = length; r <= PAIR_BLOCK_ROWS; r++) fresh.begin[r] = fresh.used;
-    block_free(&rows->blocks[block]);
-    rows->blocks[block] = fresh;
+    *out = fresh;
     fresh = (pair_block){0};
 done:
     block_free(&fresh);
     free(data);
     free(found);
+    return status;
+}
+
+lam_status pair_rows_fetch(pair_rows *rows, size_t block, const uint32_t *order, const row_file *f,
+                           lam_error *error) {
+    pair_block fresh;
+    const lam_status status = read_block(rows, block, order, f, &fresh, error);
+    if (status != LAM_OK) return status;
+    block_free(&rows->blocks[block]);
+    rows->blocks[block] = fresh;
+    return LAM_OK;
+}
+
+lam_status pair_rows_fetch_exchange(pair_rows *rows, size_t block, const uint32_t *order, const row_file *f,
+                                    lam_error *error) {
+    pair_block fresh, *held = &rows->blocks[block];
+    lam_status status = read_block(rows, block, order, f, &fresh, error);
+    if (status != LAM_OK) return status;
+    if (fresh.used != held->used)
+        status = status_fail(error, LAM_ERR_FORMAT,
+                             "the scratch folder holds %zu pairs of block %zu, must be %zu; remove its files",
+                             fresh.used, block, held->used);
+    else
+        memcpy(held->exchange, fresh.exchange, held->used * sizeof *held->exchange);
+    block_free(&fresh);
     return status;
 }

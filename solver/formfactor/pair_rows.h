@@ -59,4 +59,8 @@ lam_status pair_rows_append(const pair_rows *rows, size_t block, const uint32_t 
 lam_status pair_rows_fetch(pair_rows *rows, size_t block, const uint32_t *order, const row_file *f,
                            lam_error *error);
 
+/* Only the exchange areas of a block that is there already: other threads may read its states. */
+lam_status pair_rows_fetch_exchange(pair_rows *rows, size_t block, const uint32_t *order, const row_file *f,
+                                    lam_error *error);
+
 #endif

@@ -213,7 +213,9 @@ static lam_status pass_block(pass *p, size_t index, leaf_reaches *to, pairs_repo
     pairs_run *run = p->run;
     const bool known = p->file != NULL && row_file_has(p->file, index);
     if (known) {
-        const lam_status status = pair_rows_fetch(&run->rows, index, run->tree.element, p->file, error);
+        const lam_status status =
+            p->refine ? pair_rows_fetch_exchange(&run->rows, index, run->tree.element, p->file, error)
+                      : pair_rows_fetch(&run->rows, index, run->tree.element, p->file, error);
         if (status != LAM_OK) return status;
     } else if (!p->refine && !find_block(run, index, to)) {
         return status_fail(error, LAM_ERR_MEMORY, "pairs of %zu elements: out of memory; use --quality draft",

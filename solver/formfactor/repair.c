@@ -131,7 +131,8 @@ lam_status repair_close(csr *G, const double *area, const double *outside, form_
     out->closure_error = out->repair_max = 0;
     double repair = 0, total_area = 0;
     for (size_t i = 0; i < n; i++) {
-        const double total = row_sums[i] + d[i] * outside[i], change = fabs(1 - before[i] / area[i]);
+        before[i] = before[i] / area[i] - 1;
+        const double total = row_sums[i] + d[i] * outside[i], change = fabs(before[i]);
         /* A row that sees nothing at all has nothing to close. */
         if (total > 0) out->closure_error = fmax(out->closure_error, fabs(1 - total));
         out->repair_max = fmax(out->repair_max, change);
@@ -140,7 +141,8 @@ lam_status repair_close(csr *G, const double *area, const double *outside, form_
     }
     out->repair_mean = repair / total_area;
     out->row_sums = row_sums;
-    row_sums = NULL;
+    out->repair = before;
+    row_sums = before = NULL;
 done:
     free(s.of_slices);
     free(before);

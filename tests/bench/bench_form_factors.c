@@ -1,9 +1,10 @@
-/* Time and memory of plain-ray form factors and of what keeping them costs, as CSV: medians of some runs and
- * the peak of them all.
+/* Time and memory of form factors and of what keeping them costs, as CSV: medians of some runs and the peak
+ * of them all.
  *
- *     bench_form_factors SCENE RAYS RUNS [STORE.h5 [SCRATCH]]
+ *     bench_form_factors SCENE RAYS|pairs|near:RAYS RUNS [STORE.h5 [SCRATCH]]
  *
- * rows=1 in the environment expands the upper triangle to rows, as an operator needs them. */
+ * Pairs, all or near ones, are those of normal quality. rows=1 in the environment expands the upper triangle
+ * to rows, as an operator needs them. */
 #include "solver/clock.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/scene/import.h"
@@ -11,6 +12,7 @@
 #include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/resource.h>
 
 enum { MAX_RUNS = 99 };
@@ -51,6 +53,19 @@ done:
     return status;
 }
 
+/* "4096", "pairs" or "near:4096"; false for anything else. */
+static bool read_recipe(const char *text, recipe *out) {
+    const double normal = 7e-5;
+    const bool near = strncmp(text, "near:", 5) == 0;
+    *out =
+        (recipe){.method = near ? RECIPE_NEAR_PAIRS : RECIPE_RAYS, .seed = 1, .accuracy = near ? normal : 0};
+    if (strcmp(text, "pairs") == 0)
+        *out = (recipe){.method = RECIPE_PAIRS, .rays = 256, .seed = 1, .accuracy = normal};
+    else
+        out->rays = strtoull(near ? text + 5 : text, NULL, 10);
+    return out->rays > 0;
+}
+
 static lam_status run_once(const mesh *m, const uint32_t *order, const form_factor_options *how,
                            const char *store_to, const char *scratch_in, run_times *times, size_t *entries,
                            lam_error *error) {
@@ -81,19 +96,16 @@ int main(int argc, char **argv) {
     import_report report;
     run_times runs[MAX_RUNS];
     const import_options plain = {.unit = 1, .reflectance = -1};
-    form_factor_options how = {.recipe = {.method = RECIPE_RAYS, .seed = 1},
-                               .stage = "form factors",
-                               .upper = getenv("rows") == NULL,
-                               .scratch_name = "form-factors"};
+    form_factor_options how = {
+        .stage = "form factors", .upper = getenv("rows") == NULL, .scratch_name = "form-factors"};
     size_t n_runs, entries = 0;
     struct rusage used;
     if (argc < 4 || argc > 6) {
-        fprintf(stderr, "usage: %s SCENE RAYS RUNS [STORE.h5 [SCRATCH]]\n", argv[0]);
+        fprintf(stderr, "usage: %s SCENE RAYS|pairs|near:RAYS RUNS [STORE.h5 [SCRATCH]]\n", argv[0]);
         return 2;
     }
-    how.recipe.rays = strtoull(argv[2], NULL, 10);
     n_runs = strtoull(argv[3], NULL, 10);
-    if (n_runs < 1 || n_runs > MAX_RUNS) return 2;
+    if (!read_recipe(argv[2], &how.recipe) || n_runs < 1 || n_runs > MAX_RUNS) return 2;
     TRY(scene_import(argv[1], &plain, &m, &report, error));
     order = memory_allocate(m.n, sizeof *order, "the order of the elements", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);
@@ -102,8 +114,8 @@ int main(int argc, char **argv) {
         TRY(run_once(&m, order, &how, argc > 4 ? argv[4] : NULL, argc > 5 ? argv[5] : NULL, &runs[k],
                      &entries, error));
     getrusage(RUSAGE_SELF, &used);
-    printf("elements,rays,threads,runs,make_s,save_s,cpu_s,peak_MiB,entries\n");
-    printf("%zu,%zu,%d,%zu,%.2f,%.2f,%.2f,%.0f,%zu\n", m.n, how.recipe.rays, omp_get_max_threads(), n_runs,
+    printf("elements,recipe,threads,runs,make_s,save_s,cpu_s,peak_MiB,entries\n");
+    printf("%zu,%s,%d,%zu,%.2f,%.2f,%.2f,%.0f,%zu\n", m.n, argv[2], omp_get_max_threads(), n_runs,
            median(runs, n_runs, offsetof(run_times, make)), median(runs, n_runs, offsetof(run_times, save)),
            median(runs, n_runs, offsetof(run_times, cpu)), (double)used.ru_maxrss / 1024, entries);
 done:

@@ -218,7 +218,7 @@ class StoreTest(unittest.TestCase):
                 "/mesh/group": ((n,), "<u4"), "/mesh/row_sums": ((n,), "<f8"),
                 "/form_factors/indptr": ((n + 1,), "<u8"), "/form_factors/indices": ((nnz,), "<u4"),
                 "/form_factors/data": ((nnz,), "<f4"), "/form_factors/leaving": ((n,), "<f8"),
-                "/form_factors/absorbed": ((n,), "<f8"), "/sky/tiles": ((12, 9), "<f8"),
+                "/form_factors/absorbed": ((n,), "<f8"), "/form_factors/repair": ((n,), "<f8"), "/sky/tiles": ((12, 9), "<f8"),
                 "/sky/first_bounce": ((12, n), "<f4"),
             }
             if name == "folded":

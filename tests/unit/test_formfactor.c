@@ -165,6 +165,9 @@ START_TEST(back_faces_absorb) {
     ck_assert_double_eq_tol(f.leaving[5], 1, 1e-12);
     ck_assert_double_eq(entry(&f.F, 4, 5), 0);
     ck_assert_double_eq_tol(f.row_sums[4] + f.absorbed[4] + f.leaving[4], 1, 1e-6);
+    double most = 0;
+    for (size_t i = 0; i < m.n; i++) most = fmax(most, fabs(f.repair[i]));
+    ck_assert_double_eq(most, f.repair_max);
     form_factors_free(&f);
     mesh_free(&m);
 }
