@@ -58,8 +58,8 @@ static double found_bytes(double n, const recipe *r) {
 static double trace_bytes(double n, const recipe *r, bool to_disk) {
     const double sample = recipe_bytes(n, r);
     if (r->method == RECIPE_PAIRS) return fmax(sample, 9 * n * n);
-    /* Near pairs are a quarter as many as rays at most, and stand in a triangle of their own. */
-    const double near = r->method == RECIPE_NEAR_PAIRS ? sample / 4 : 0;
+    /* Near pairs are as many as rays at most, and stand in a triangle of their own. */
+    const double near = r->method == RECIPE_NEAR_PAIRS ? sample : 0;
     const double merging = (to_disk ? 0 : found_bytes(n, r)) + near + sample / (near > 0 ? 1 : 2);
     return fmax(sample, merging) + fmin(panel_bytes, sample);
 }

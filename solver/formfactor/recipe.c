@@ -100,7 +100,7 @@ double recipe_tolerance(const recipe *r) {
 }
 
 double recipe_near(const recipe *r) {
-    return 4 / (double)r->rays;
+    return 1 / (double)r->rays;
 }
 
 size_t recipe_auto_rays(double epsilon, double share) {
