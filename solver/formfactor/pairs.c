@@ -63,7 +63,7 @@ static bool find_reaches(const pairs_run *run, uint32_t leaf, leaf_reaches *out)
         }
         if (c == 0) break;
     }
-    qsort(out->reaches, out->n, sizeof *out->reaches, compare_reaches);
+    if (out->n > 0) qsort(out->reaches, out->n, sizeof *out->reaches, compare_reaches);
     return true;
 }
 

@@ -152,6 +152,7 @@ static lam_status merge_panel(merge_run *run, columns *below, merge_room *room, 
 #pragma omp parallel for schedule(static)
     for (size_t i = first; i < last; i++) {
         const size_t from = room->start[i - first], length = room->length[i - first];
+        if (length == 0) continue; /* nothing may have been allocated */
         memcpy(g->indices + g->indptr[i], room->indices + from, length * sizeof *g->indices);
         memcpy(g->data + g->indptr[i], room->data + from, length * sizeof *g->data);
     }
@@ -284,8 +285,8 @@ lam_status upper_expand(csr *upper, const double *area, double *row_sums, lam_er
         TRY(columns_collect(&below, 0, last, first, last, take_last, &run, error));
         const uint64_t begin = upper->indptr[first], count = upper->indptr[last] - begin;
         TRY(room_reserve(&room, 0, count, error));
-        memcpy(room.indices, indices + begin, count * sizeof *indices);
-        memcpy(room.data, data + begin, count * sizeof *data);
+        if (count > 0) memcpy(room.indices, indices + begin, count * sizeof *indices);
+        if (count > 0) memcpy(room.data, data + begin, count * sizeof *data);
 #pragma omp parallel for schedule(dynamic, 16)
         for (size_t i = first; i < last; i++) {
             const double a = area[i];
