@@ -107,12 +107,20 @@ done:
     return status;
 }
 
+/* Segments for all pairs that are partly hidden: an element's share is as many as finer plain rays would be,
+ * the more the finer the accuracy by the law of their error, and a small scene has enough to keep it. */
+static double segments_most(size_t n, double accuracy) {
+    const double an_element = 32768, enough = 64e6, normal = 7e-5;
+    return fmax(an_element * (double)n, enough) * pow(normal / accuracy, 4. / 3);
+}
+
 static lam_status find_pairs(const mesh *m, const visibility *v, const form_factor_options *options,
                              double threshold, form_factors *f, csr *G, lam_error *error) {
     const recipe *r = &options->recipe;
     const pairs_options how = {.tolerance = recipe_tolerance(r),
                                .accuracy = r->accuracy,
                                .segments = VISIBILITY_PACKET,
+                               .segments_most = segments_most(m->n, r->accuracy),
                                .threshold = threshold,
                                .keep_hidden = threshold > 0,
                                .seed = r->seed,

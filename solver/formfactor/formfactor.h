@@ -15,6 +15,7 @@ typedef struct pairs_report {
     double settled; /* so small that a first look says enough */
     double open;    /* no segment was blocked; hidden: every one was; mixed: some were, or a neighbour's */
     double hidden, mixed;
+    double accuracy; /* that mixed pairs were found to: asked for, or what their number allowed */
 } pairs_report;
 
 /* Above this many elements a store keeps A_i F_ij for j > i in place of rows: half of it. */

@@ -21,6 +21,7 @@ lam_status form_factors_save(const form_factors *f, store *s, lam_error *error) 
     if (f->repair != NULL) TRY(store_write(s, GROUP "/repair", STORE_F64, 1, &n, f->repair, error));
     TRY(recipe_save(&f->recipe, &recipe_of_form_factors, s, error));
     TRY(store_set_text(s, GROUP, "storage", rows ? "rows" : "upper", error));
+    if (f->pairs.accuracy > 0) TRY(store_set_number(s, GROUP, "accuracy_reached", f->pairs.accuracy, error));
     TRY(store_set_integer(s, GROUP, "closed", f->closed, error));
     TRY(store_set_number(s, GROUP, "leaving_share", f->leaving_share, error));
     TRY(store_set_number(s, GROUP, "absorbed_share", f->absorbed_share, error));
@@ -44,6 +45,8 @@ static lam_status load_attributes(store *s, form_factors *f, bool *rows, lam_err
     TRY(recipe_load(s, &recipe_of_form_factors, &f->recipe, error));
     TRY(store_get_integer(s, GROUP, "closed", &closed, error));
     f->closed = closed != 0;
+    if (store_has_attribute(s, GROUP, "accuracy_reached"))
+        TRY(store_get_number(s, GROUP, "accuracy_reached", &f->pairs.accuracy, error));
     TRY(store_get_number(s, GROUP, "leaving_share", &f->leaving_share, error));
     TRY(store_get_number(s, GROUP, "absorbed_share", &f->absorbed_share, error));
     TRY(store_get_number(s, GROUP, "closure_error", &f->closure_error, error));

@@ -216,6 +216,12 @@ static double accuracy_for(const look *l, uint32_t i, uint32_t j, double F) {
     return l->accuracy * fmax(1, 10 * F * seen_share(l, &two, PILOT));
 }
 
+double look_segments(const look *l, uint32_t i, uint32_t j, double g) {
+    /* Half of a factor above .1 may be seen: see accuracy_for. */
+    const double F = factor_of(l, i, j, g);
+    return (double)segments_for(l, F, l->accuracy * fmax(1, 5 * F));
+}
+
 double look_closely(const look *l, uint32_t i, uint32_t j, double g) {
     const double F = factor_of(l, i, j, g), accuracy = accuracy_for(l, i, j, F);
     const dissection pair = {.i = i, .j = j, .segments_per_area = (double)segments_for(l, F, accuracy) / g};

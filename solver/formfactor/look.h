@@ -27,6 +27,9 @@ bool look_suffices(const look *l, uint32_t i, uint32_t j, double g);
  * that matters more, until two disagree. seen: what of g they say is not hidden. */
 look_verdict look_first(const look *l, uint32_t i, uint32_t j, double g, double *seen);
 
+/* About how many segments look_closely will cast. */
+double look_segments(const look *l, uint32_t i, uint32_t j, double g);
+
 /* What of g is not hidden, never more than g. The standard error is about accuracy, of a factor F above
  * .1 about 10 F accuracy: of segments enough, each weighted with the kernel. */
 double look_closely(const look *l, uint32_t i, uint32_t j, double g);

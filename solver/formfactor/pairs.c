@@ -146,6 +146,43 @@ static bool at_a_border(const pairs_run *run, uint32_t i, uint32_t j, pair_state
     return false;
 }
 
+/* Whether a pair must be looked at closely. */
+static bool is_mixed(const pairs_run *run, uint32_t i, uint32_t j, uint8_t state) {
+    if (state == PAIR_CERTAIN || (state & PAIR_SETTLED) != 0) return false;
+    return state == PAIR_MIXED || at_a_border(run, i, j, (pair_state)state);
+}
+
+/* Segments that the accuracy asked for would take for the pairs of one block. */
+static double segments_of_block(const pairs_run *run, size_t index) {
+    const pair_block *block = &run->rows.blocks[index];
+    double sum = 0;
+    size_t r = 0;
+    for (size_t at = 0; at < block->used; at++) {
+        while (at >= block->begin[r + 1]) r++;
+        const uint32_t i = run->tree.element[pair_rows_first(index) + r],
+                       j = run->tree.element[block->other[at]];
+        if (is_mixed(run, i, j, block->state[at]))
+            sum += look_segments(&run->look, i, j, (double)block->exchange[at]);
+    }
+    return sum;
+}
+
+/* Where all mixed pairs together would take more segments than there may be, each gets its part of them: N
+ * segments leave an error of N^-3/4. */
+static lam_status share_segments(pairs_run *run, lam_error *error) {
+    const size_t n_blocks = run->rows.n_blocks;
+    double wanted = 0;
+    double *of_block = memory_allocate(n_blocks, sizeof *of_block, "pairs", error);
+    if (of_block == NULL) return LAM_ERR_MEMORY;
+#pragma omp parallel for schedule(dynamic, 4)
+    for (size_t b = 0; b < n_blocks; b++) of_block[b] = segments_of_block(run, b);
+    for (size_t b = 0; b < n_blocks; b++) wanted += of_block[b];
+    free(of_block);
+    if (wanted > run->options->segments_most)
+        run->look.accuracy *= pow(wanted / run->options->segments_most, .75);
+    return LAM_OK;
+}
+
 /* What is hidden of the pairs of one block. States stay as they were found: neighbours ask for them. Where
  * the exchange areas came from a scratch file nothing is looked at again. */
 static void refine_block(pairs_run *run, size_t index, bool known, pairs_report *sum) {
@@ -161,7 +198,7 @@ static void refine_block(pairs_run *run, size_t index, bool known, pairs_report 
             sum->certain++;
         } else if (block->state[at] & PAIR_SETTLED) {
             sum->settled++;
-        } else if (state == PAIR_MIXED || at_a_border(run, i, j, state)) {
+        } else if (is_mixed(run, i, j, block->state[at])) {
             sum->mixed++;
             if (!known)
                 block->exchange[at] = (float)look_closely(&run->look, i, j, (double)block->exchange[at]);
@@ -279,8 +316,10 @@ static lam_status run_passes(pairs_run *run, pairs_report *report, size_t *kept,
     TRY(open_file(run, "found", &find.file, error));
     TRY(open_file(run, "seen", &refine.file, error));
     TRY(pass_run(&find, error));
+    TRY(share_segments(run, error));
     TRY(pass_run(&refine, error));
     *report = refine.report;
+    report->accuracy = run->look.accuracy;
     if (kept != NULL) *kept = find.kept;
 done:
     row_file_close(find.file);

@@ -6,7 +6,8 @@
 #include <omp.h>
 
 static csr exchange(const mesh *m, double accuracy, uint64_t seed, pairs_report *report) {
-    const pairs_options options = {.tolerance = 1e-6, .accuracy = accuracy, .segments = 8, .seed = seed};
+    const pairs_options options = {
+        .tolerance = 1e-6, .accuracy = accuracy, .segments = 8, .segments_most = 1e12, .seed = seed};
     lam_error error = {0};
     visibility *v = NULL;
     csr G = {0};
@@ -198,6 +199,42 @@ START_TEST(an_occluder_never_raises_a_factor) {
 }
 END_TEST
 
+/* With fewer segments than all mixed pairs ask for, each is found less accurately, and that is told. */
+START_TEST(segments_are_shared) {
+    mesh m = divided_plates(true);
+    lam_error error = {0};
+    visibility *v = NULL;
+    ck_assert_msg(visibility_create(&m, &v, &error) == LAM_OK, "%s", error.message);
+    double off[2];
+    for (int few = 0; few < 2; few++) {
+        const pairs_options options = {.tolerance = 1e-6,
+                                       .accuracy = 7e-6,
+                                       .segments = 8,
+                                       .segments_most = few ? 20000 : 1e12,
+                                       .seed = 1};
+        pairs_report report;
+        csr G = {0};
+        ck_assert_msg(pairs_exchange(&m, v, &options, &G, &report, NULL, &error) == LAM_OK, "%s",
+                      error.message);
+        const size_t plate = (m.n - 2) / 2;
+        double F = 0;
+        for (size_t i = 0; i < plate; i++)
+            for (size_t j = plate; j < 2 * plate; j++) F += entry(&G, i, j);
+        off[few] = fabs(F - plates_cases[3].F);
+        if (few)
+            ck_assert_double_gt(report.accuracy, 2 * options.accuracy);
+        else
+            ck_assert_double_eq(report.accuracy, options.accuracy);
+        /* The plate's area is 1: independent errors of its mixed pairs, each g = accuracy / 36 m^2, ten times
+         * that for what a first look misses. */
+        ck_assert_double_le(off[few], 10 * report.accuracy / 36 * sqrt(report.mixed));
+        csr_free(&G);
+    }
+    visibility_destroy(v);
+    mesh_free(&m);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("pairs");
     TCase *cases = tcase_create("pairs");
@@ -207,6 +244,7 @@ int main(void) {
     tcase_add_test(cases, touching_elements_are_right);
     tcase_add_test(cases, borders_are_found);
     tcase_add_test(cases, an_occluder_never_raises_a_factor);
+    tcase_add_test(cases, segments_are_shared);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }
