@@ -249,7 +249,9 @@ static lam_status announce(work *w, lam_error *error) {
     forecast_format_bytes(forecast_scratch_bytes(&f), scratch_room);
     forecast_format_seconds(times.form_factors, seconds);
     forecast_format_seconds(times.judge, judging);
-    if (!o->from_store) snprintf(made, sizeof made, " form factors %s,", seconds);
+    /* How much is partly hidden is not known before. */
+    const bool pairs = w->recipe.method == RECIPE_PAIRS || w->recipe.method == RECIPE_NEAR_PAIRS;
+    if (!o->from_store) snprintf(made, sizeof made, " form factors %s%s,", seconds, pairs ? " or more" : "");
     if (w->probes > 0) snprintf(judged, sizeof judged, " the judge's %s,", judging);
     if (w->scratch != NULL) snprintf(kept, sizeof kept, ", scratch up to %s", scratch_room);
     terminal_log(w->t, "forecast:%s%s at %.3g Mray/s of a trial; memory up to %s, store up to %s%s", made,
