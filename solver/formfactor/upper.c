@@ -198,21 +198,6 @@ done:
     return status;
 }
 
-void upper_fold(csr *G) {
-    uint64_t used = 0, p = 0;
-    for (size_t i = 0; i < G->n; i++) {
-        const uint64_t end = G->indptr[i + 1];
-        for (; p < end; p++) {
-            if (G->indices[p] <= i) continue;
-            G->indices[used] = G->indices[p];
-            G->data[used++] = G->data[p];
-        }
-        G->indptr[i + 1] = used;
-    }
-    G->indices = shrink(G->indices, used, sizeof *G->indices);
-    G->data = shrink(G->data, used, sizeof *G->data);
-}
-
 /* --- expanding ---------------------------------------------------------------------------------------------
  */
 

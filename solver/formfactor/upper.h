@@ -20,9 +20,6 @@ static inline float upper_factor(float exchange, double area) {
  * MB. The same for any number of threads. LAM_ERR_MEMORY. */
 lam_status upper_merge(const found_rows *rows, size_t rays, const double *area, csr *upper, lam_error *error);
 
-/* Keeps what is above the diagonal of a symmetric G, in place. */
-void upper_fold(csr *G);
-
 /* Turns exchange areas into the rows of F, in place: upper becomes F. Beside F it takes about 100 MB.
  * row_sums, [n], gets the sums of F's rows. On an error upper may be lost; it is still freed by csr_free. */
 lam_status upper_expand(csr *upper, const double *area, double *row_sums, lam_error *error);
