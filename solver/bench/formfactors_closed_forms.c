@@ -45,14 +45,15 @@ typedef struct method_summary {
  * Rays: two standard errors of independent rays. Of the counts c_ij and c_ji of N rays each,
  *     F = (c_ij + c_ji) / N * A_j / (A_i + A_j)
  * so the variance is [F_ij (1 - F_ij) + F_ji (1 - F_ji)] / N * (A_j / (A_i + A_j))^2; the points of a
- * low-discrepancy sequence do better. Pairs: two of the recipe's accuracy where something is hidden, else the
+ * low-discrepancy sequence do better. Pairs: two of the accuracy reached where something is hidden, else the
  * relative tolerance of the mathematics. A hemicube states nothing. */
-static double stated_bar(const recipe *how, const mesh *m, const formfactors_truth *t, double F) {
+static double stated_bar(const recipe *how, const form_factors *f, const mesh *m, const formfactors_truth *t,
+                         double F) {
     static const double pairs_tolerance = 1e-6;
     const double a = m->area[t->from], b = m->area[t->to], back = fmin(1, F * a / b);
     if (how->method == RECIPE_RAYS)
         return 2 * sqrt((F * (1 - F) + back * (1 - back)) / (double)how->rays) * b / (a + b);
-    if (how->method == RECIPE_PAIRS) return t->occluded ? 2 * how->accuracy : pairs_tolerance * F;
+    if (how->method == RECIPE_PAIRS) return t->occluded ? 2 * f->pairs.accuracy : pairs_tolerance * F;
     return NAN;
 }
 
@@ -71,7 +72,7 @@ static lam_status measure(const bench_run *run, const formfactors_truth *t, reci
     for (size_t s = 0; s < seeds; s++) {
         how.seed = run->seed + s;
         TRY(formfactors_make_timed(run, &m, order, &how, "closed forms", &f, &seconds[s], error));
-        const double F = formfactors_entry(&f.F, t->from, t->to), bar = stated_bar(&how, &m, t, F);
+        const double F = formfactors_entry(&f.F, t->from, t->to), bar = stated_bar(&how, &f, &m, t, F);
         if (s == 0) first = F, first_bar = bar;
         worst = fmax(worst, fabs(F - t->F));
         covered += fabs(F - t->F) <= bar;

@@ -12,7 +12,7 @@ static const table_column columns[] = {
     {"quantity", NULL, "F, or B in W/m2"},
     {"from", "", "surface, from 1"},
     {"to", "", "surface, from 1"},
-    {"truth", "", "as published"},
+    {"truth", "", "F: exact, or as published; B: as published"},
     {"estimate", "", "as found"},
     {"error", "", "absolute"},
     {"own_accuracy", "", "how far the published value may be off"},

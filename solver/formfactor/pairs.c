@@ -167,8 +167,8 @@ static double segments_of_block(const pairs_run *run, size_t index) {
     return sum;
 }
 
-/* Where all mixed pairs together would take more segments than there may be, each gets its part of them: N
- * segments leave an error of N^-3/4. */
+/* Where all mixed pairs together would take more segments than there may be, or fewer than there shall be at
+ * least, each gets its part of them: N segments leave an error of N^-3/4. */
 static lam_status share_segments(pairs_run *run, lam_error *error) {
     const size_t n_blocks = run->rows.n_blocks;
     double wanted = 0;
@@ -178,8 +178,8 @@ static lam_status share_segments(pairs_run *run, lam_error *error) {
     for (size_t b = 0; b < n_blocks; b++) of_block[b] = segments_of_block(run, b);
     for (size_t b = 0; b < n_blocks; b++) wanted += of_block[b];
     free(of_block);
-    if (wanted > run->options->segments_most)
-        run->look.accuracy *= pow(wanted / run->options->segments_most, .75);
+    const double cast = fmin(fmax(wanted, run->options->segments_least), run->options->segments_most);
+    if (wanted > 0) run->look.accuracy *= pow(wanted / cast, .75);
     return LAM_OK;
 }
 

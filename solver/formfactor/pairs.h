@@ -9,9 +9,10 @@ typedef struct pairs_options {
     double tolerance; /* of the unoccluded factor, relative */
     double accuracy;  /* of a factor that is partly hidden, absolute */
     size_t segments; /* at least, between the elements of a pair that may be partly hidden; a multiple of 8 */
-    double segments_most; /* for all mixed pairs, about: with more of them each is found less accurately */
-    double threshold;     /* only pairs of which one factor is above; 0: all */
-    bool keep_hidden;     /* hidden pairs that were looked at stay in the rows, with 0 */
+    /* For all mixed pairs, about: with more each pair is found less accurately, with fewer more so. */
+    double segments_least, segments_most;
+    double threshold; /* only pairs of which one factor is above; 0: all */
+    bool keep_hidden; /* hidden pairs that were looked at stay in the rows, with 0 */
     uint64_t seed;
     const progress *progress;
     const char *stage;
