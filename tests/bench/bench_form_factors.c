@@ -8,6 +8,7 @@
 #include "solver/clock.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/scene/import.h"
+#include "tests/bench/bench_recipe.h"
 
 #include <omp.h>
 #include <stdio.h>
@@ -53,19 +54,6 @@ done:
     return status;
 }
 
-/* "4096", "pairs" or "near:4096"; false for anything else. */
-static bool read_recipe(const char *text, recipe *out) {
-    const double normal = 7e-5;
-    const bool near = strncmp(text, "near:", 5) == 0;
-    *out =
-        (recipe){.method = near ? RECIPE_NEAR_PAIRS : RECIPE_RAYS, .seed = 1, .accuracy = near ? normal : 0};
-    if (strcmp(text, "pairs") == 0)
-        *out = (recipe){.method = RECIPE_PAIRS, .rays = 256, .seed = 1, .accuracy = normal};
-    else
-        out->rays = strtoull(near ? text + 5 : text, NULL, 10);
-    return out->rays > 0;
-}
-
 static lam_status run_once(const mesh *m, const uint32_t *order, const form_factor_options *how,
                            const char *store_to, const char *scratch_in, run_times *times, size_t *entries,
                            lam_error *error) {
@@ -105,7 +93,7 @@ int main(int argc, char **argv) {
         return 2;
     }
     n_runs = strtoull(argv[3], NULL, 10);
-    if (!read_recipe(argv[2], &how.recipe) || n_runs < 1 || n_runs > MAX_RUNS) return 2;
+    if (!bench_recipe(argv[2], 1, &how.recipe) || n_runs < 1 || n_runs > MAX_RUNS) return 2;
     TRY(scene_import(argv[1], &plain, &m, &report, error));
     order = memory_allocate(m.n, sizeof *order, "the order of the elements", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);

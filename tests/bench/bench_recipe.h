@@ -1,0 +1,23 @@
+/* How the drivers of form factors are told what to make. */
+#ifndef LAMBERT_TESTS_BENCH_RECIPE_H
+#define LAMBERT_TESTS_BENCH_RECIPE_H
+
+#include "solver/formfactor/recipe.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* "4096" (rays), "pairs" or "near:4096", pairs to the accuracy of normal quality; false for anything else. */
+static inline bool bench_recipe(const char *text, uint64_t seed, recipe *out) {
+    const double normal = 7e-5;
+    const bool near = strncmp(text, "near:", 5) == 0;
+    *out = (recipe){
+        .method = near ? RECIPE_NEAR_PAIRS : RECIPE_RAYS, .seed = seed, .accuracy = near ? normal : 0};
+    if (strcmp(text, "pairs") == 0)
+        *out = (recipe){.method = RECIPE_PAIRS, .rays = 256, .seed = seed, .accuracy = normal};
+    else
+        out->rays = strtoull(near ? text + 5 : text, NULL, 10);
+    return out->rays > 0;
+}
+
+#endif
