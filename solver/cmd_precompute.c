@@ -23,6 +23,7 @@ typedef struct fields {
     double ground_albedo;
     const char *method, *factorizer;
     double epsilon, alpha;
+    const char *budget;
     uint64_t levels, rank;
     double coherence, min_area, threshold;
     const char *assign, *correction, *precision;
@@ -164,10 +165,9 @@ static const option_row rows[] = {
     {.name = "factorizer",
      .kind = OPTION_CHOICE,
      .offset = FIELD(factorizer),
-     .value = "auto|hf",
+     .value = "auto|hf|svd|rsi|sgrsvd",
      .doc = "How a low rank is found (auto)",
-     .choices = "auto|hf",
-     .later = "svd|rsi|sgrsvd"},
+     .choices = "auto|hf|svd|rsi|sgrsvd"},
     {.name = "epsilon",
      .kind = OPTION_NUMBER,
      .offset = FIELD(epsilon),
@@ -180,11 +180,19 @@ static const option_row rows[] = {
      .kind = OPTION_NUMBER,
      .offset = FIELD(alpha),
      .value = "X",
-     .doc = "Share of epsilon between parents and children (.5)",
+     .doc = "hf: share of the bound that the last step may take (.5)",
      .low = 0,
      .low_open = true,
      .high = 1,
      .high_open = true},
+    {.name = "budget",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(budget),
+     .value = "squares|sums|frobenius",
+     .doc =
+         "hf: how errors of its steps add up: in squares (the default), as eq. 3.10 of the thesis has it, or "
+         "in squares with --epsilon in the Frobenius norm",
+     .choices = "squares|sums|frobenius"},
     {.name = "levels",
      .kind = OPTION_COUNT_AUTO,
      .offset = FIELD(levels),
@@ -380,11 +388,14 @@ static bool unused_by_form_factors(const char *name, const fields *f, bool from_
 
 static bool unused_by_method(const char *name, const fields *f, const build_report *built) {
     static const char *const never[] = {"coherence", "min-area", "assign", "threshold", "correction"};
-    static const char *const factorized[] = {"factorizer", "epsilon", "alpha", "levels", "rank"};
+    static const char *const factorized[] = {"factorizer", "epsilon", "alpha", "budget", "levels", "rank"};
+    static const char *const of_hf[] = {"alpha", "budget", "levels"};
     for (size_t k = 0; k < sizeof never / sizeof never[0]; k++)
         if (strcmp(name, never[k]) == 0) return true;
     for (size_t k = 0; built->factorizer == NULL && k < sizeof factorized / sizeof factorized[0]; k++)
         if (strcmp(name, factorized[k]) == 0) return true;
+    for (size_t k = 0; strcmp(built->factorizer != NULL ? built->factorizer : "hf", "hf") != 0 && k < 3; k++)
+        if (strcmp(name, of_hf[k]) == 0) return true;
     return strcmp(name, "epsilon") == 0 && f->rank > 0;
 }
 
@@ -425,6 +436,7 @@ int cmd_precompute(int argc, char **argv) {
                 .factorizer = "auto",
                 .epsilon = .05,
                 .alpha = .5,
+                .budget = "squares",
                 .levels = OPTION_AUTO,
                 .seed = 1,
                 .probes = PRECOMPUTE_AUTO};
@@ -472,6 +484,8 @@ int cmd_precompute(int argc, char **argv) {
         .factorizer = f.factorizer,
         .epsilon = f.epsilon,
         .alpha = f.alpha,
+        .budget = f.budget,
+        .seed = f.seed,
         .levels = f.levels,
         .rank = f.rank,
         .memory = f.memory,

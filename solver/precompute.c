@@ -297,14 +297,18 @@ static lam_status build(work *w, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = w->options;
     const build_problem problem = problem_of(w);
+    budget_rule rule = BUDGET_SQUARES;
+    if (!budget_rule_find(o->budget, &rule))
+        FAIL(error, LAM_ERR_ARGUMENT, "--budget %.40s: unknown; use squares, sums or frobenius", o->budget);
     const double held = (double)w->f.F.indptr[w->m.n] * 8 + 400 * (double)w->m.n;
     const build_options how = {.method = o->method,
                                .factorizer = o->factorizer,
                                .epsilon = o->epsilon,
-                               .alpha = o->alpha,
+                               .budget = {.rule = rule, .alpha = o->alpha},
                                .levels = o->levels == PRECOMPUTE_AUTO ? -1 : (int)o->levels,
                                .rank = o->rank,
                                .memory = (size_t)fmax(1, w->memory - held),
+                               .seed = o->seed,
                                .progress = &w->progress};
     TRY(build_operator(&problem, &how, &w->op, &w->built, error));
     const double noise = recipe_noise(&w->f.recipe);
@@ -394,8 +398,12 @@ static lam_status describe_operator(const work *w, store *s, lam_error *error) {
     if (r->epsilon >= 0) TRY(store_set_number(s, "/operator", "epsilon", r->epsilon, error));
     TRY(store_set_number(s, "/operator", "rcond", r->rcond, error));
     if (factorized) {
-        TRY(store_set_number(s, "/operator", "alpha", w->options->alpha, error));
+        if (r->levels > 0) {
+            TRY(store_set_text(s, "/operator", "budget", w->options->budget, error));
+            TRY(store_set_number(s, "/operator", "alpha", w->options->alpha, error));
+        }
         TRY(store_set_integer(s, "/operator", "levels", r->levels, error));
+        TRY(store_set_number(s, "/operator", "passes", r->factorized.passes, error));
         TRY(store_set_integer(s, "/operator", "rank", (int64_t)r->rank, error));
         TRY(store_set_number(s, "/operator", "measured_norm_error", r->measured_norm_error, error));
     } else if (about.density >= 0) {

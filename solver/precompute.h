@@ -26,6 +26,8 @@ typedef struct precompute_options {
     bool keep_form_factors;
     const char *method, *factorizer;
     double epsilon, alpha;
+    const char *budget;    /* "squares", ... */
+    uint64_t seed;         /* of random sketches */
     uint64_t levels;       /* PRECOMPUTE_AUTO */
     uint64_t rank;         /* 0: by epsilon */
     uint64_t memory;       /* bytes; 0: 70 % of what is free */

@@ -2,6 +2,7 @@
 #ifndef LAMBERT_BUILD_BUILD_H
 #define LAMBERT_BUILD_BUILD_H
 
+#include "solver/build/factorizer.h"
 #include "solver/operator/csr.h"
 #include "solver/operator/operator.h"
 #include "solver/progress.h"
@@ -21,10 +22,11 @@ typedef struct build_options {
     const char *method;     /* "auto", "exact", "low-rank", ... */
     const char *factorizer; /* "auto", "hf", ... */
     double epsilon;
-    double alpha;
+    budget budget; /* of hf */
     int levels;    /* negative: auto */
     size_t rank;   /* 0: by epsilon; else exactly min(rank, n) columns */
     size_t memory; /* bytes it may use; 0: no limit */
+    uint64_t seed; /* of random sketches */
     const progress *progress;
 } build_options;
 
@@ -34,6 +36,7 @@ typedef struct build_report {
     char reason[256];       /* why this method */
     size_t rank;
     int levels;
+    factorizer_report factorized;
     double epsilon;             /* the bound reached; negative when it has none */
     double measured_norm_error; /* |S - Q V^T|_2 by power iteration; negative when not measured */
     double rcond;               /* of the matrix inverted; 1 when none was */

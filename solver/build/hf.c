@@ -1,68 +1,74 @@
+/* The hierarchical factorization (Aguerre and Fernandez 2016; thesis chapter 3, algorithm 4). */
 #include "solver/build/hf.h"
 
-#include <cblas.h>
+#include "solver/matrix/dense.h"
 
 #include <math.h>
+#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* At the root the rank goes up to a multiple of ROOT_ROUND where the spectrum still has something to give:
  * the online kernels work in vectors and panels of that width, and the tail of the spectrum is steep (on the
  * Cornell box 6 % more columns take 20 % off the error). */
-enum { LEAF_COLUMNS = 1024, LEAF_COLUMNS_MOST = 8192, MAX_LEVELS = 20, ROOT_ROUND = 64 };
+enum { ROOT_ROUND = 64 };
 
 typedef struct hf_run {
     const scaled_matrix *S;
-    const uint32_t *order;
-    const hf_options *options;
+    const factorizer_options *options;
+    int levels;
+    double p[BUDGET_LEVELS_MOST + 1];
     size_t columns_done;
+    size_t given[BUDGET_LEVELS_MOST + 1], kept[BUDGET_LEVELS_MOST + 1]; /* columns, by level */
+    lam_status status;                                                  /* the first failure of a task */
+    lam_error error;
 } hf_run;
 
-/* What a node of this epsilon leaves to each of its two children (eq. 3.11). */
-static double epsilon_of_child(double epsilon, double alpha) {
-    return (1 - alpha) * epsilon / sqrt(2);
+static truncation truncation_of(const hf_run *run, int level) {
+    return (truncation){.norm = budget_norm(run->options->budget.rule),
+                        .epsilon = run->p[level],
+                        .rank = run->options->rank,
+                        .round = level == 0 ? ROOT_ROUND : 1};
 }
 
-int hf_levels(size_t n, double epsilon, double alpha, double noise) {
-    int levels = 0;
-    for (double leaf = epsilon_of_child(epsilon, alpha); levels < MAX_LEVELS;
-         leaf = epsilon_of_child(leaf, alpha)) {
-        const size_t columns = n >> levels;
-        if (columns < LEAF_COLUMNS || (leaf < noise / 2 && columns <= LEAF_COLUMNS_MOST)) break;
-        levels++;
+static void count(hf_run *run, int level, size_t given, size_t kept) {
+    __atomic_fetch_add(&run->given[level], given, __ATOMIC_RELAXED);
+    __atomic_fetch_add(&run->kept[level], kept, __ATOMIC_RELAXED);
+}
+
+/* (Q1 | Q2), whose rows are joined; Q1 and Q2 go as soon as that is done. */
+static lam_status join(tall_factors *one, tall_factors *two, float **out, lam_error *error) {
+    const size_t n = one->n, k1 = one->rank, k2 = two->rank, k = k1 + k2;
+    size_t values;
+    if (!size_multiply(n, k, &values))
+        return status_fail(error, LAM_ERR_MEMORY, "a node of %zu columns is too large", k);
+    float *Q = memory_allocate(values, sizeof *Q, "factorization", error);
+    if (Q == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < n; i++) {
+        if (k1 > 0) memcpy(Q + i * k, one->Q + i * k1, k1 * sizeof *Q);
+        if (k2 > 0) memcpy(Q + i * k + k1, two->Q + i * k2, k2 * sizeof *Q);
     }
-    return levels;
+    free(one->Q);
+    free(two->Q);
+    one->Q = two->Q = NULL;
+    *out = Q;
+    return LAM_OK;
 }
 
-/* (Q1 | Q2) = Q_r V_r^T and V^T = (V_r1^T V1^T | V_r2^T V2^T), eqs. 3.3, 3.5, 3.6. Takes one and two over. */
-static lam_status combine(tall_factors *one, tall_factors *two, const tsvd_options *keep, tall_factors *out,
+/* (Q1 | Q2) = Q_r V_r^T and V = (V1 V_r1 ; V2 V_r2), eqs. 3.3, 3.5, 3.6. Takes one and two over. */
+static lam_status combine(tall_factors *one, tall_factors *two, const truncation *keep, tall_factors *out,
                           lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = one->n, k1 = one->rank, k2 = two->rank, k = k1 + k2, m = one->m + two->m;
     tall_factors joint = {0};
     float *Q = NULL, *V = NULL;
-    size_t values;
-    if (!size_multiply(n, k, &values)) FAIL(error, LAM_ERR_MEMORY, "a node of %zu columns is too large", k);
-    Q = memory_allocate(values, sizeof *Q, "factorization", error);
-    if (Q == NULL) TRY(LAM_ERR_MEMORY);
-    memcpy(Q, one->Q, n * k1 * sizeof *Q);
-    memcpy(Q + n * k1, two->Q, n * k2 * sizeof *Q);
-    free(one->Q);
-    free(two->Q);
-    one->Q = two->Q = NULL;
+    TRY(join(one, two, &Q, error));
     TRY(tsvd(n, k, Q, keep, &joint, error));
-    free(Q);
-    Q = NULL;
-
     const size_t r = joint.rank;
-    V = memory_allocate(m * r, sizeof *V, "factorization", error);
+    V = memory_allocate(m, r * sizeof *V, "factorization", error);
     if (V == NULL) TRY(LAM_ERR_MEMORY);
-    if (r > 0 && k1 > 0)
-        cblas_sgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, (int)one->m, (int)r, (int)k1, 1, one->V,
-                    (int)one->m, joint.V, (int)k, 0, V, (int)m);
-    if (r > 0 && k2 > 0)
-        cblas_sgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, (int)two->m, (int)r, (int)k2, 1, two->V,
-                    (int)two->m, joint.V + k1, (int)k, 0, V + one->m, (int)m);
+    dense_multiply(one->m, k1, r, one->V, joint.V, false, V);
+    dense_multiply(two->m, k2, r, two->V, joint.V + k1 * r, false, V + one->m * r);
     free(joint.V);
     joint.V = V;
     joint.m = m;
@@ -78,52 +84,147 @@ done:
     return status;
 }
 
-static lam_status leaf(hf_run *run, size_t first, size_t last, const tsvd_options *keep, tall_factors *out,
+static lam_status leaf(hf_run *run, size_t first, size_t last, const truncation *keep, tall_factors *out,
                        lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = run->S->F->n, m = last - first;
-    float *block = NULL;
-    size_t values;
-    if (!size_multiply(n, m, &values)) FAIL(error, LAM_ERR_MEMORY, "a leaf of %zu columns is too large", m);
-    block = memory_allocate(values, sizeof *block, "a leaf of the factorization", error);
-    if (block == NULL) TRY(LAM_ERR_MEMORY);
-    scaled_columns(run->S, run->order + first, m, block);
-    TRY(tsvd(n, m, block, keep, out, error));
-    run->columns_done += m;
-    progress_report(run->options->progress, "factorize", (double)run->columns_done / (double)n);
+    sparse_block block = {0};
+    TRY(scaled_block(run->S, first, last, &block, error));
+    TRY(tsvd_sparse(&block, keep, out, error));
+#pragma omp critical(hf_progress)
+    {
+        run->columns_done += last - first;
+        progress_report(run->options->progress, "factorize", (double)run->columns_done / (double)run->S->n);
+    }
 done:
-    free(block);
+    sparse_block_free(&block);
+    return status;
+}
+
+static lam_status node(hf_run *run, size_t first, size_t last, int level, tall_factors *out,
+                       lam_error *error);
+
+static void fail(hf_run *run, lam_status status, const lam_error *error) {
+#pragma omp critical(hf_failure)
+    if (run->status == LAM_OK) {
+        run->status = status;
+        run->error = *error;
+    }
+}
+
+/* Both halves, as two tasks where there is a team and memory for both at once, else one after the other. */
+static lam_status children(hf_run *run, size_t first, size_t last, int level, tall_factors *one,
+                           tall_factors *two, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t middle = first + (last - first) / 2;
+    if (!omp_in_parallel()) {
+        TRY(node(run, first, middle, level + 1, one, error));
+        TRY(node(run, middle, last, level + 1, two, error));
+        goto done;
+    }
+#pragma omp task
+    {
+        lam_error why = {0};
+        const lam_status mine = node(run, first, middle, level + 1, one, &why);
+        if (mine != LAM_OK) fail(run, mine, &why);
+    }
+    {
+        lam_error why = {0};
+        const lam_status mine = node(run, middle, last, level + 1, two, &why);
+        if (mine != LAM_OK) fail(run, mine, &why);
+    }
+#pragma omp taskwait
+    status = run->status;
+    if (status != LAM_OK && error != NULL) *error = run->error;
+done:
     return status;
 }
 
 /* Columns first ... last-1 (algorithm 4, HF). */
-static lam_status node(hf_run *run, size_t first, size_t last, double epsilon, int levels, tall_factors *out,
+static lam_status node(hf_run *run, size_t first, size_t last, int level, tall_factors *out,
                        lam_error *error) {
     lam_status status = LAM_OK;
-    const double alpha = run->options->alpha;
-    const bool root = last - first == run->S->F->n;
-    tsvd_options keep = {.epsilon = epsilon, .rank = run->options->rank, .round = root ? ROOT_ROUND : 1};
     tall_factors one = {0}, two = {0};
+    truncation keep = truncation_of(run, level);
+    size_t given = last - first;
     if (progress_cancelled(run->options->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
-    if (levels <= 0 || last - first < 2) {
+    if (level >= run->levels || last - first < 2) {
         TRY(leaf(run, first, last, &keep, out, error));
     } else {
-        const double epsilon_ch = epsilon_of_child(epsilon, alpha);
-        const size_t middle = first + (last - first) / 2;
-        TRY(node(run, first, middle, epsilon_ch, levels - 1, &one, error));
-        TRY(node(run, middle, last, epsilon_ch, levels - 1, &two, error));
-        keep.epsilon = alpha * epsilon; /* epsilon_p */
+        TRY(children(run, first, last, level, &one, &two, error));
+        given = one.rank + two.rank;
         TRY(combine(&one, &two, &keep, out, error));
     }
+    count(run, level, given, out->rank);
 done:
     tall_factors_free(&one);
     tall_factors_free(&two);
     return status;
 }
 
-lam_status hf_factorize(const scaled_matrix *S, const uint32_t *order, const hf_options *options,
-                        tall_factors *out, lam_error *error) {
-    hf_run run = {.S = S, .order = order, .options = options};
-    const size_t n = S->F->n;
-    return node(&run, 0, n, options->epsilon, options->levels, out, error);
+/* A node's columns in a team of its own. */
+static lam_status team(hf_run *run, size_t first, size_t last, int level, tall_factors *out,
+                       lam_error *error) {
+    lam_status status = LAM_OK;
+#pragma omp parallel
+#pragma omp single
+    status = node(run, first, last, level, out, error);
+    return status;
 }
+
+/* Above the level where all subtrees fit into memory at once nodes are made one after the other, each by all
+ * threads; below, siblings side by side. */
+static lam_status tree(hf_run *run, size_t first, size_t last, int level, int alone, tall_factors *out,
+                       lam_error *error) {
+    lam_status status = LAM_OK;
+    tall_factors one = {0}, two = {0};
+    if (level >= alone) return team(run, first, last, level, out, error);
+    const size_t middle = first + (last - first) / 2;
+    const truncation keep = truncation_of(run, level);
+    TRY(tree(run, first, middle, level + 1, alone, &one, error));
+    TRY(tree(run, middle, last, level + 1, alone, &two, error));
+    const size_t given = one.rank + two.rank;
+    TRY(combine(&one, &two, &keep, out, error));
+    count(run, level, given, out->rank);
+done:
+    tall_factors_free(&one);
+    tall_factors_free(&two);
+    return status;
+}
+
+/* Levels that are made one node after the other: in a team each thread holds the joined factors of a node and
+ * its result, of at most half of the columns each has. */
+static int levels_alone(const hf_run *run) {
+    const double n = (double)run->S->n, threads = omp_get_max_threads();
+    int level = 0;
+    if (run->options->memory == 0) return 0;
+    while (level < run->levels &&
+           threads * 2 * n * ldexp(n, -level) * sizeof(float) * .5 > (double)run->options->memory)
+        level++;
+    return level;
+}
+
+static lam_status hf_factorize(const scaled_matrix *S, const factorizer_options *options, tall_factors *out,
+                               factorizer_report *report, lam_error *error) {
+    lam_status status = LAM_OK;
+    hf_run run = {.S = S, .options = options};
+    hf_forecast *forecast = NULL;
+    hf_plan plan = {.levels = options->levels, .ratio = options->budget.ratio};
+    if (plan.levels < 0 || (plan.ratio <= 0 && options->budget.rule != BUDGET_SUMS)) {
+        TRY(hf_forecast_create(S, &forecast, error));
+        plan = hf_forecast_plan(forecast, S->n, options);
+    }
+    run.levels = plan.levels < BUDGET_LEVELS_MOST ? plan.levels : BUDGET_LEVELS_MOST;
+    budget shared = options->budget;
+    shared.ratio = plan.ratio;
+    budget_share(&shared, options->epsilon, run.levels, run.p);
+    TRY(tree(&run, 0, S->n, 0, levels_alone(&run), out, error));
+    report->ratio = plan.ratio;
+    report->levels = run.levels;
+    for (int l = 0; l <= run.levels; l++)
+        report->compression[l] = run.given[l] > 0 ? (double)run.kept[l] / (double)run.given[l] : 1;
+done:
+    hf_forecast_free(forecast);
+    return status;
+}
+
+const factorizer factorizer_hf = {"hf", hf_factorize};

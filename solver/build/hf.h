@@ -1,28 +1,31 @@
-/* The hierarchical factorization (Aguerre 2016; thesis chapter 3, algorithm 4). */
+/* The hierarchical factorization's own choice: how many levels. */
 #ifndef LAMBERT_BUILD_HF_H
 #define LAMBERT_BUILD_HF_H
 
-#include "solver/build/tsvd.h"
-#include "solver/matrix/scaled.h"
-#include "solver/progress.h"
+#include "solver/build/factorizer.h"
 
-typedef struct hf_options {
-    double epsilon; /* |S - Q V^T|_2 <= epsilon (eq. 3.10) */
-    double alpha;   /* its share between parents and children (eq. 3.11), in (0, 1) */
-    int levels;     /* of the recursion */
-    size_t rank;    /* 0, or the number of columns kept at every node in place of epsilon */
-    const progress *progress;
-} hf_options;
+/* What some columns of S are expected to keep: the rank of m neighbouring columns at a threshold, from the
+ * singular values of a few samples of them. */
+typedef struct hf_forecast hf_forecast;
 
-/* Levels that suit n columns: leaves of 512 columns or more, but no leaf asked for less than half of noise,
- * the sampling error of S in the 2-norm (0: none known): below it every column is kept and nothing is gained.
- * Leaves beyond 8,192 columns are split all the same: their eigenvectors would cost more than that. */
-int hf_levels(size_t n, double epsilon, double alpha, double noise);
+/* Takes the samples, from two places on the curve. Freed by hf_forecast_free. Cost: as a leaf or two. */
+lam_status hf_forecast_create(const scaled_matrix *S, hf_forecast **out, lam_error *error);
+void hf_forecast_free(hf_forecast *f);
 
-/* S ~ Q V^T with V orthonormal; Q has rows in mesh order, V rows in position order (order[position] = element
- * gives the columns of S their place). Both column-major, out->n = out->m = n. One pass over the columns.
- * Cost: O(n^2 leaf + n k^2 levels). Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC, LAM_ERR_CANCELLED. */
-lam_status hf_factorize(const scaled_matrix *S, const uint32_t *order, const hf_options *options,
-                        tall_factors *out, lam_error *error);
+/* How many of m columns a truncation at p keeps, about. */
+double hf_forecast_rank(const hf_forecast *f, double m, double p);
+
+/* Seconds, about, on one core: eq. 3.16 with the rank of each level in place of rho, and with what a Gram
+ * matrix, eigenvectors and a product each take. */
+double hf_forecast_seconds(const hf_forecast *f, size_t n, const factorizer_options *options, int levels,
+                           double ratio);
+
+typedef struct hf_plan {
+    int levels;
+    double ratio; /* of the budget */
+} hf_plan;
+
+/* The plan that is forecast to be fastest; what options give is kept. */
+hf_plan hf_forecast_plan(const hf_forecast *f, size_t n, const factorizer_options *options);
 
 #endif

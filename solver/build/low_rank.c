@@ -1,6 +1,6 @@
 /* low-rank: factorize S, then Sherman-Morrison-Woodbury (thesis eq. 2.8) with the areas scaled back. */
 #include "solver/build/build.h"
-#include "solver/build/hf.h"
+#include "solver/build/factorizer.h"
 #include "solver/build/norm.h"
 #include "solver/clock.h"
 #include "solver/operator/core.h"
@@ -12,8 +12,8 @@
 #include <string.h>
 
 /* F ~ U V^T from S ~ Q V^T: U = A^-1/2 Q and V = A^1/2 V, as rows [n][k] in mesh order. */
-static lam_status scale_back(const build_problem *problem, const scaled_matrix *S, const tall_factors *f,
-                             float **U, float **V, lam_error *error) {
+static lam_status scale_back(const scaled_matrix *S, const tall_factors *f, float **U, float **V,
+                             lam_error *error) {
     const size_t n = f->n, k = f->rank;
     float *u = memory_allocate(n, k * sizeof *u, "operator", error);
     float *v = memory_allocate(n, k * sizeof *v, "operator", error);
@@ -24,11 +24,11 @@ static lam_status scale_back(const build_problem *problem, const scaled_matrix *
     }
 #pragma omp parallel for schedule(static, 64)
     for (size_t p = 0; p < n; p++) {
-        const size_t i = problem->order[p];
+        const size_t i = S->order[p];
         const double root = S->root_area[i];
         for (size_t c = 0; c < k; c++) {
-            u[i * k + c] = (float)((double)f->Q[c * n + i] / root);
-            v[i * k + c] = (float)((double)f->V[c * n + p] * root);
+            u[i * k + c] = (float)((double)f->Q[p * k + c] / root);
+            v[i * k + c] = (float)((double)f->V[p * k + c] * root);
         }
     }
     *U = u;
@@ -83,30 +83,34 @@ done:
 static lam_status build(const build_problem *problem, const build_options *options, lam_operator **op,
                         build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
+    row_source rows;
     scaled_matrix S = {0};
     tall_factors f = {0};
     float *U = NULL, *V = NULL, *Y = NULL, *core = NULL;
     const size_t n = problem->n;
     const double start = clock_seconds();
-    /* With the rank given, epsilon decides nothing and noise is nothing to it. */
-    const double noise = options->rank > 0 ? 0 : problem->noise;
-    const hf_options hf = {.epsilon = options->epsilon,
-                           .alpha = options->alpha,
-                           .levels = options->levels >= 0
-                                         ? options->levels
-                                         : hf_levels(n, options->epsilon, options->alpha, noise),
-                           .rank = options->rank,
-                           .progress = options->progress};
+    const factorizer_options how = {
+        .epsilon = options->epsilon,
+        .rank = options->rank,
+        .budget = options->budget,
+        .levels = options->levels,
+        .iterations = -1,
+        /* With the rank given, epsilon decides nothing and noise is nothing to it. */
+        .noise = options->rank > 0 ? 0 : problem->noise,
+        .memory = options->memory,
+        .seed = options->seed,
+        .progress = options->progress};
 
-    TRY(scaled_init(&S, problem->F, problem->area, error));
-    TRY(hf_factorize(&S, problem->order, &hf, &f, error));
+    row_source_of_csr(&rows, problem->F);
+    TRY(scaled_init(&S, &rows, problem->area, problem->order, error));
+    TRY(factorize(options->factorizer, &S, &how, &f, &report->factorized, error));
     const size_t k = f.rank;
     report->factorize_seconds = clock_seconds() - start;
 
-    TRY(norm_of_error(&S, problem->order, &f, options->progress, &report->measured_norm_error, error));
+    TRY(norm_of_error(&S, &f, options->progress, &report->measured_norm_error, error));
     const double inverting = clock_seconds();
     progress_report(options->progress, "invert", 0);
-    TRY(scale_back(problem, &S, &f, &U, &V, error));
+    TRY(scale_back(&S, &f, &U, &V, error));
     tall_factors_free(&f);
     if (problem->n_channels == 1) {
         TRY(fold(problem, k, U, V, &Y, &report->rcond, error));
@@ -122,9 +126,9 @@ static lam_status build(const build_problem *problem, const build_options *optio
     }
     report->invert_seconds = clock_seconds() - inverting;
     report->method = "low-rank";
-    report->factorizer = "hf";
+    report->factorizer = report->factorized.name;
     report->rank = k;
-    report->levels = hf.levels;
+    report->levels = report->factorized.levels;
     report->epsilon = options->rank > 0 ? report->measured_norm_error : options->epsilon;
 done:
     scaled_free(&S);

@@ -11,7 +11,6 @@ static const build_method *const methods[] = {&build_exact, &build_low_rank};
 
 /* Methods and factorizers of the contract that are still to come. */
 static const char *const later_methods[] = {"2msc", "sparse", "emitters", "hierarchical"};
-static const char *const later_factorizers[] = {"svd", "rsi", "sgrsvd"};
 
 static bool is_among(const char *name, const char *const *list, size_t n) {
     for (size_t i = 0; i < n; i++)
@@ -23,15 +22,13 @@ static lam_status check_options(const build_options *options, lam_error *error) 
     lam_status status = LAM_OK;
     if (is_among(options->method, later_methods, sizeof later_methods / sizeof *later_methods))
         FAIL(error, LAM_ERR_UNSUPPORTED, "--method %s is not supported yet", options->method);
-    if (is_among(options->factorizer, later_factorizers,
-                 sizeof later_factorizers / sizeof *later_factorizers))
-        FAIL(error, LAM_ERR_UNSUPPORTED, "--factorizer %s is not supported yet", options->factorizer);
-    if (strcmp(options->factorizer, "auto") != 0 && strcmp(options->factorizer, "hf") != 0)
-        FAIL(error, LAM_ERR_ARGUMENT, "--factorizer %.40s: unknown; use auto or hf", options->factorizer);
+    if (!factorizer_exists(options->factorizer))
+        FAIL(error, LAM_ERR_ARGUMENT, "--factorizer %.40s: unknown; use auto, hf, svd, rsi or sgrsvd",
+             options->factorizer);
     if (!(options->epsilon > 0 && options->epsilon <= 1))
         FAIL(error, LAM_ERR_ARGUMENT, "--epsilon %g: must be above 0 and at most 1", options->epsilon);
-    if (!(options->alpha > 0 && options->alpha < 1))
-        FAIL(error, LAM_ERR_ARGUMENT, "--alpha %g: must be above 0 and below 1", options->alpha);
+    if (!(options->budget.alpha > 0 && options->budget.alpha < 1))
+        FAIL(error, LAM_ERR_ARGUMENT, "--alpha %g: must be above 0 and below 1", options->budget.alpha);
 done:
     return status;
 }

@@ -12,7 +12,6 @@ enum { STEPS = 32 };
 /* The difference D = S - Q V^T and the space its products need. */
 typedef struct difference {
     const scaled_matrix *S;
-    const uint32_t *order;
     const tall_factors *f;
     double *y;       /* [n] */
     float *x_single; /* [n] */
@@ -21,25 +20,17 @@ typedef struct difference {
 
 /* y = D x, or y = D^T x; the product with Q V^T is made in single precision, its rounding is far below any
  * bound a factorization in single precision can have. */
-static void difference_multiply(const difference *D, bool transposed, const double *x, double *y) {
+static lam_status difference_multiply(const difference *D, bool transposed, const double *x, double *y,
+                                      lam_error *error) {
     const size_t n = D->f->n, k = D->f->rank;
-    scaled_multiply(D->S, x, y); /* S is symmetric */
-    if (k == 0) return;
-    if (!transposed) {
-        for (size_t p = 0; p < n; p++) D->x_single[p] = (float)x[D->order[p]];
-        cblas_sgemv(CblasColMajor, CblasTrans, (int)n, (int)k, 1, D->f->V, (int)n, D->x_single, 1, 0, D->t,
-                    1);
-        cblas_sgemv(CblasColMajor, CblasNoTrans, (int)n, (int)k, 1, D->f->Q, (int)n, D->t, 1, 0, D->x_single,
-                    1);
-        for (size_t i = 0; i < n; i++) y[i] -= (double)D->x_single[i];
-    } else {
-        for (size_t i = 0; i < n; i++) D->x_single[i] = (float)x[i];
-        cblas_sgemv(CblasColMajor, CblasTrans, (int)n, (int)k, 1, D->f->Q, (int)n, D->x_single, 1, 0, D->t,
-                    1);
-        cblas_sgemv(CblasColMajor, CblasNoTrans, (int)n, (int)k, 1, D->f->V, (int)n, D->t, 1, 0, D->x_single,
-                    1);
-        for (size_t p = 0; p < n; p++) y[D->order[p]] -= (double)D->x_single[p];
-    }
+    const float *first = transposed ? D->f->Q : D->f->V, *second = transposed ? D->f->V : D->f->Q;
+    const lam_status status = scaled_multiply_double(D->S, x, y, error); /* S is symmetric */
+    if (status != LAM_OK || k == 0) return status;
+    for (size_t i = 0; i < n; i++) D->x_single[i] = (float)x[i];
+    cblas_sgemv(CblasRowMajor, CblasTrans, (int)n, (int)k, 1, first, (int)k, D->x_single, 1, 0, D->t, 1);
+    cblas_sgemv(CblasRowMajor, CblasNoTrans, (int)n, (int)k, 1, second, (int)k, D->t, 1, 0, D->x_single, 1);
+    for (size_t i = 0; i < n; i++) y[i] -= (double)D->x_single[i];
+    return LAM_OK;
 }
 
 /* Largest eigenvalue of the symmetric tridiagonal matrix of Lanczos. */
@@ -54,12 +45,12 @@ static lam_status largest_ritz(int steps, const double *diagonal, const double *
     return LAM_OK;
 }
 
-lam_status norm_of_error(const scaled_matrix *S, const uint32_t *order, const tall_factors *f,
-                         const progress *p, double *norm, lam_error *error) {
+lam_status norm_of_error(const scaled_matrix *S, const tall_factors *f, const progress *p, double *norm,
+                         lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = f->n;
     const int steps = n < STEPS ? (int)n : STEPS;
-    difference D = {.S = S, .order = order, .f = f};
+    difference D = {.S = S, .f = f};
     double *basis = memory_allocate((size_t)steps * n, sizeof *basis, "norm", error);
     double *w = memory_allocate(n, sizeof *w, "norm", error);
     D.y = memory_allocate(n, sizeof *D.y, "norm", error);
@@ -81,8 +72,8 @@ lam_status norm_of_error(const scaled_matrix *S, const uint32_t *order, const ta
         if (progress_cancelled(p)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         progress_report(p, "check norm", (double)s / steps);
         const double *q = basis + (size_t)s * n;
-        difference_multiply(&D, false, q, D.y);
-        difference_multiply(&D, true, D.y, w);
+        TRY(difference_multiply(&D, false, q, D.y, error));
+        TRY(difference_multiply(&D, true, D.y, w, error));
         diagonal[s] = cblas_ddot((int)n, q, 1, w, 1);
         done_steps = s + 1;
         for (int twice = 0; twice < 2; twice++)
@@ -103,5 +94,23 @@ done:
     free(D.y);
     free(D.x_single);
     free(D.t);
+    return status;
+}
+
+lam_status norm_of_error_frobenius(const scaled_matrix *S, const tall_factors *f, double *norm,
+                                   lam_error *error) {
+    lam_status status = LAM_OK;
+    enum { COLUMNS = 256 };
+    double left = 0;
+    for (size_t first = 0; first < S->n; first += COLUMNS) {
+        sparse_block block = {0};
+        TRY(scaled_block(S, first, S->n - first < COLUMNS ? S->n : first + COLUMNS, &block, error));
+        for (uint64_t p = 0; p < block.indptr[S->n]; p++)
+            left += (double)block.data[p] * (double)block.data[p];
+        sparse_block_free(&block);
+    }
+    for (size_t k = 0; k < f->n * f->rank; k++) left -= (double)f->Q[k] * (double)f->Q[k];
+    *norm = sqrt(fmax(left, 0));
+done:
     return status;
 }

@@ -7,9 +7,18 @@
 #include "solver/progress.h"
 
 /* |S - Q V^T|_2 to about a per cent from below: Lanczos steps on the square of the difference, which is what
- * a power iteration with memory is. f as hf_factorize returns it. Cost: a few dozen products with S, Q and V.
- */
-lam_status norm_of_error(const scaled_matrix *S, const uint32_t *order, const tall_factors *f,
-                         const progress *p, double *norm, lam_error *error);
+ * a power iteration with memory is. f as a factorizer returns it. Cost: a few dozen products with S, Q and V.
+ * Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC, LAM_ERR_CANCELLED, those of the source of S. */
+lam_status norm_of_error(const scaled_matrix *S, const tall_factors *f, const progress *p, double *norm,
+                         lam_error *error);
+
+/* |S - B X^T|_2, X and B [n][m], to about a tenth from below: power iteration on the square of the difference
+ * with eight vectors at once, six passes. Errors as above. */
+lam_status norm_estimate(const scaled_matrix *S, size_t m, const float *X, const float *B, uint64_t seed,
+                         double *norm, lam_error *error);
+
+/* |S - Q V^T|_F = sqrt(|S|_F^2 - |Q|_F^2), which holds where Q = S V and V is orthonormal. One pass. */
+lam_status norm_of_error_frobenius(const scaled_matrix *S, const tall_factors *f, double *norm,
+                                   lam_error *error);
 
 #endif

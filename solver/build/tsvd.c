@@ -1,18 +1,24 @@
 #include "solver/build/tsvd.h"
 
-#include <cblas.h>
-#include <lapacke.h>
+#include "solver/build/gram.h"
+#include "solver/matrix/dense.h"
+#include "store/status.h"
 
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Above this share of the largest singular value the eigenvalues of a Gram matrix in single precision are
  * good to a few per cent (it is useless below the root of its rounding, 2.4e-4). */
 static const double single_share = 2e-3;
 
-/* Rows converted to double at a time. */
-enum { PANEL = 512 };
+/* A row of a sparse block with more than this share of its entries goes to BLAS, which makes that many more
+ * products in the same time. */
+static const double spread_above = 1. / 8;
+
+/* Rows spread out at a time; columns from which on few eigenvectors are looked for before all. */
+enum { PANEL = 1024, LEADING_LEAST = 768 };
 
 void tall_factors_free(tall_factors *f) {
     free(f->Q);
@@ -20,117 +26,175 @@ void tall_factors_free(tall_factors *f) {
     *f = (tall_factors){0};
 }
 
-/* G = A^T A in single precision; only the upper triangle (column-major) is set. */
-static void gram_single(size_t n, size_t m, const float *A, float *G) {
-    cblas_ssyrk(CblasColMajor, CblasUpper, CblasTrans, (int)m, (int)n, 1, A, (int)n, 0, G, (int)m);
+size_t truncation_rank(const truncation *keep, size_t m, const double *values) {
+    const double kept = keep->epsilon * keep->epsilon;
+    size_t rank = 0;
+    if (keep->rank > 0) return keep->rank < m ? keep->rank : m;
+    if (keep->norm == TRUNCATION_FROBENIUS) {
+        double dropped = 0;
+        for (rank = m; rank > 0; rank--) {
+            dropped += fmax(values[m - rank], 0);
+            if (dropped > kept) break;
+        }
+        return rank;
+    }
+    const size_t round = keep->round > 0 ? keep->round : 1;
+    while (rank < m && values[m - 1 - rank] >= kept) rank++;
+    while (rank < m && rank % round != 0 && values[m - 1 - rank] >= kept / 4) rank++;
+    return rank;
 }
 
-/* G = A^T A in double, by panels of rows. */
-static lam_status gram_double(size_t n, size_t m, const float *A, double *G, lam_error *error) {
-    double *panel = memory_allocate(PANEL * m, sizeof *panel, "factorization", error);
+/* Whether a truncation may be made by a Gram matrix in single precision at all. */
+static bool may_be_single(const truncation *keep) {
+    return keep->rank == 0 && keep->norm == TRUNCATION_SPECTRAL && keep->epsilon >= 1e-3;
+}
+
+/* V [m][rank] from the eigenvectors, largest first. */
+static lam_status take_vectors(const gram *g, size_t rank, float **V, lam_error *error) {
+    const size_t m = g->m;
+    float *v = memory_allocate(m, rank * sizeof *v, "factorization", error);
+    if (v == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < m; i++)
+        for (size_t c = 0; c < rank; c++) {
+            const size_t at = (m - 1 - c) * m + i;
+            v[i * rank + c] = g->single != NULL ? g->single[at] : (float)g->full[at];
+        }
+    *V = v;
+    return LAM_OK;
+}
+
+/* --- dense and sparse blocks -----------------------------------------------------------------------------
+ */
+
+/* Either. */
+typedef struct tall_block {
+    size_t n, m;
+    const float *dense; /* [n][m], or NULL: */
+    const sparse_block *sparse;
+} tall_block;
+
+static size_t row_length(const sparse_block *A, size_t i) {
+    return (size_t)(A->indptr[i + 1] - A->indptr[i]);
+}
+
+static void spread_row(const sparse_block *A, size_t i, float *row) {
+    memset(row, 0, A->m * sizeof *row);
+    for (uint64_t p = A->indptr[i]; p < A->indptr[i + 1]; p++) row[A->columns[p]] = A->data[p];
+}
+
+static lam_status gram_of(const tall_block *A, gram *g, lam_error *error) {
+    return A->dense != NULL ? gram_add(g, A->n, A->dense, error) : gram_add_sparse(g, A->sparse, error);
+}
+
+/* q = sum_c A_ic V_c. */
+static void project_row(const sparse_block *A, size_t i, size_t k, const float *V, float *q) {
+    memset(q, 0, k * sizeof *q);
+    for (uint64_t p = A->indptr[i]; p < A->indptr[i + 1]; p++) {
+        const float a = A->data[p], *v = V + A->columns[p] * k;
+#pragma omp simd
+        for (size_t c = 0; c < k; c++) q[c] += a * v[c];
+    }
+}
+
+/* Q = A V, [n][k]. */
+static lam_status project(const tall_block *A, size_t k, const float *V, float *Q, lam_error *error) {
+    const size_t m = A->m;
+    if (A->dense != NULL) {
+        dense_multiply(A->n, m, k, A->dense, V, false, Q);
+        return LAM_OK;
+    }
+    float *panel = memory_allocate(PANEL, m * sizeof *panel, "factorization", error);
     if (panel == NULL) return LAM_ERR_MEMORY;
-    for (size_t first = 0; first < n; first += PANEL) {
-        const size_t rows = n - first < PANEL ? n - first : PANEL;
-        for (size_t c = 0; c < m; c++)
-            for (size_t r = 0; r < rows; r++) panel[c * rows + r] = (double)A[c * n + first + r];
-        cblas_dsyrk(CblasColMajor, CblasUpper, CblasTrans, (int)m, (int)rows, 1, panel, (int)rows,
-                    first == 0 ? 0 : 1, G, (int)m);
+    for (size_t first = 0; first < A->n;) {
+        size_t rows = 0;
+        if ((double)row_length(A->sparse, first) <= spread_above * (double)m) {
+            project_row(A->sparse, first, k, V, Q + first * k);
+            first++;
+            continue;
+        }
+        /* As many rows in a row as have much in them. */
+        while (rows < PANEL && first + rows < A->n &&
+               (double)row_length(A->sparse, first + rows) > spread_above * (double)m) {
+            spread_row(A->sparse, first + rows, panel + rows * m);
+            rows++;
+        }
+        dense_multiply(rows, m, k, panel, V, false, Q + first * k);
+        first += rows;
     }
     free(panel);
     return LAM_OK;
 }
 
-/* As LAPACKE_ssyevd, whose own query for the size of the work area comes back rounded to single precision,
- * too small from about 2,900 columns on. The sizes are those of LAPACK's manual for ssyevd. */
-static lapack_int eigen_single(size_t m, float *G, float *w) {
-    const size_t n_work = 1 + 6 * m + 2 * m * m, n_integers = 3 + 5 * m;
-    float *work = malloc(n_work * sizeof *work);
-    lapack_int *integers = malloc(n_integers * sizeof *integers);
-    lapack_int info = LAPACK_WORK_MEMORY_ERROR;
-    if (n_work <= INT_MAX && work != NULL && integers != NULL)
-        info = LAPACKE_ssyevd_work(LAPACK_COL_MAJOR, 'V', 'U', (lapack_int)m, G, (lapack_int)m, w, work,
-                                   (lapack_int)n_work, integers, (lapack_int)n_integers);
-    free(work);
-    free(integers);
-    return info;
-}
-
-/* Eigenvectors of A^T A into vectors ([m][m] columns, ascending) and their eigenvalues. */
-static lam_status gram_eigen(size_t n, size_t m, const float *A, bool single, float *vectors, double *values,
-                             lam_error *error) {
+/* V by all eigenvectors of A^T A, in single precision where that is enough; g is its Gram matrix in single
+ * precision, or empty. */
+static lam_status decompose(const tall_block *A, const truncation *keep, gram *g, float **V, size_t *rank,
+                            lam_error *error) {
     lam_status status = LAM_OK;
-    double *G = NULL;
-    float *w = NULL;
-    lapack_int info;
-    if (single) {
-        w = memory_allocate(m, sizeof *w, "factorization", error);
-        if (w == NULL) TRY(LAM_ERR_MEMORY);
-        gram_single(n, m, A, vectors);
-        info = eigen_single(m, vectors, w);
-        if (info == 0)
-            for (size_t i = 0; i < m; i++) values[i] = (double)w[i];
-    } else {
-        G = memory_allocate(m * m, sizeof *G, "factorization", error);
-        if (G == NULL) TRY(LAM_ERR_MEMORY);
-        TRY(gram_double(n, m, A, G, error));
-        info = LAPACKE_dsyevd(LAPACK_COL_MAJOR, 'V', 'U', (lapack_int)m, G, (lapack_int)m, values);
-        if (info == 0)
-            for (size_t i = 0; i < m * m; i++) vectors[i] = (float)G[i];
+    const size_t m = A->m;
+    double *values = memory_allocate(m, sizeof *values, "factorization", error);
+    if (values == NULL) return LAM_ERR_MEMORY;
+    for (;;) {
+        const bool single = g->single != NULL;
+        if (!single) {
+            TRY(gram_create(m, false, g, error));
+            TRY(gram_of(A, g, error));
+        }
+        TRY(gram_eigen(g, true, values, error));
+        if (!single || m == 0 || keep->epsilon >= single_share * sqrt(fmax(values[m - 1], 0))) break;
+        gram_free(g);
     }
-    if (info == LAPACK_WORK_MEMORY_ERROR)
-        FAIL(error, LAM_ERR_MEMORY,
-             "eigenvectors of a block of %zu columns: out of memory; use more --levels", m);
-    if (info != 0)
-        FAIL(error, LAM_ERR_NUMERIC, "eigenvectors of a block of %zu columns: LAPACK syevd returned %d", m,
-             (int)info);
+    *rank = truncation_rank(keep, m, values);
+    TRY(take_vectors(g, *rank, V, error));
 done:
-    free(G);
-    free(w);
+    free(values);
     return status;
 }
 
-/* values are the squares of the singular values, ascending. */
-static size_t choose_rank(size_t m, const double *values, const tsvd_options *options) {
-    const double kept = options->epsilon * options->epsilon;
-    size_t rank = 0;
-    if (options->rank > 0) return options->rank < m ? options->rank : m;
-    while (rank < m && values[m - 1 - rank] >= kept) rank++;
-    while (rank < m && rank % options->round != 0 && values[m - 1 - rank] >= kept / 4) rank++;
-    return rank;
-}
-
-lam_status tsvd(size_t n, size_t m, const float *A, const tsvd_options *options, tall_factors *out,
-                lam_error *error) {
+static lam_status factorize(const tall_block *A, const truncation *keep, tall_factors *out,
+                            lam_error *error) {
     lam_status status = LAM_OK;
-    tall_factors f = {.n = n, .m = m};
-    float *vectors = NULL;
-    double *values = NULL;
-    if (n > INT_MAX || m > INT_MAX)
-        FAIL(error, LAM_ERR_ARGUMENT, "a block of %zu x %zu is beyond LAPACK's integers", n, m);
-    vectors = memory_allocate(m * m, sizeof *vectors, "factorization", error);
-    values = memory_allocate(m, sizeof *values, "factorization", error);
-    if (vectors == NULL || values == NULL) TRY(LAM_ERR_MEMORY);
-
-    const double epsilon = options->epsilon;
-    const bool single = options->rank == 0 && epsilon >= 1e-3;
-    TRY(gram_eigen(n, m, A, single, vectors, values, error));
-    if (single && m > 0 && epsilon < single_share * sqrt(fmax(values[m - 1], 0)))
-        TRY(gram_eigen(n, m, A, false, vectors, values, error));
-
-    f.rank = choose_rank(m, values, options);
-    f.Q = memory_allocate(n * f.rank, sizeof *f.Q, "factorization", error);
-    f.V = memory_allocate(m * f.rank, sizeof *f.V, "factorization", error);
-    if (f.Q == NULL || f.V == NULL) TRY(LAM_ERR_MEMORY);
-    /* LAPACK gives the largest last. */
-    for (size_t c = 0; c < f.rank; c++) cblas_scopy((int)m, vectors + (m - 1 - c) * m, 1, f.V + c * m, 1);
-    if (f.rank > 0) /* Q = A V */
-        cblas_sgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, (int)n, (int)f.rank, (int)m, 1, A, (int)n, f.V,
-                    (int)m, 0, f.Q, (int)n);
+    tall_factors f = {.n = A->n, .m = A->m};
+    gram g = {0};
+    if (A->n > INT_MAX || A->m > INT_MAX)
+        FAIL(error, LAM_ERR_ARGUMENT, "a block of %zu x %zu is beyond LAPACK's integers", A->n, A->m);
+    if (may_be_single(keep)) {
+        TRY(gram_create(A->m, true, &g, error));
+        TRY(gram_of(A, &g, error));
+        /* |A| is at most 1 here and hardly ever more. */
+        if (A->m >= LEADING_LEAST && keep->epsilon >= single_share)
+            TRY(gram_leading(&g, keep->epsilon * keep->epsilon, &f.V, &f.rank, error));
+    }
+    if (f.V == NULL) TRY(decompose(A, keep, &g, &f.V, &f.rank, error));
+    gram_free(&g);
+    f.Q = memory_allocate(A->n, f.rank * sizeof *f.Q, "factorization", error);
+    if (f.Q == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(project(A, f.rank, f.V, f.Q, error)); /* Q = A V */
     *out = f;
     f = (tall_factors){0};
 done:
-    free(vectors);
-    free(values);
+    gram_free(&g);
     tall_factors_free(&f);
+    return status;
+}
+
+lam_status tsvd(size_t n, size_t m, const float *A, const truncation *keep, tall_factors *out,
+                lam_error *error) {
+    const tall_block block = {.n = n, .m = m, .dense = A};
+    return factorize(&block, keep, out, error);
+}
+
+lam_status tsvd_sparse(const sparse_block *A, const truncation *keep, tall_factors *out, lam_error *error) {
+    const tall_block block = {.n = A->n, .m = A->m, .sparse = A};
+    return factorize(&block, keep, out, error);
+}
+
+lam_status tsvd_values(const sparse_block *A, size_t m, double *values, lam_error *error) {
+    lam_status status = LAM_OK;
+    gram g = {0};
+    TRY(gram_create(m, true, &g, error));
+    TRY(gram_add_sparse(&g, A, error));
+    TRY(gram_eigen(&g, false, values, error));
+done:
+    gram_free(&g);
     return status;
 }

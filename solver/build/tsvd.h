@@ -2,10 +2,11 @@
 #ifndef LAMBERT_BUILD_TSVD_H
 #define LAMBERT_BUILD_TSVD_H
 
-#include "store/status.h"
+#include "solver/matrix/scaled.h"
 
-/* A ~ Q V^T: Q is [rank] columns of n, V is [rank] columns of m, one after the other (column-major), V
- * orthonormal, columns by falling singular value. Both freed by the caller with free(). */
+/* A ~ Q V^T: Q is [n][rank], V is [m][rank] with orthonormal columns, by falling singular value. Both freed
+ * by tall_factors_free. Since Q = A V, what is left out, A (I - V V^T), has only rows orthogonal to V's
+ * columns. */
 typedef struct tall_factors {
     size_t n, m, rank;
     float *Q;
@@ -14,18 +15,30 @@ typedef struct tall_factors {
 
 void tall_factors_free(tall_factors *f);
 
-/* What is kept: every singular value of at least epsilon (thesis, algorithm 4, TSVD), so that
- * |A - Q V^T|_2 < epsilon; then, up to the next multiple of round, those of at least epsilon / 2. With rank >
- * 0 exactly min(rank, m) columns are kept instead. */
-typedef struct tsvd_options {
+typedef enum truncation_norm { TRUNCATION_SPECTRAL, TRUNCATION_FROBENIUS } truncation_norm;
+
+/* What is kept. Spectral: every singular value of at least epsilon (thesis, algorithm 4, TSVD), so that
+ * |A - Q V^T|_2 < epsilon; then, up to the next multiple of round, those of at least epsilon / 2. Frobenius:
+ * as few as leave |A - Q V^T|_F <= epsilon. With rank > 0 exactly min(rank, m) columns are kept instead. */
+typedef struct truncation {
+    truncation_norm norm;
     double epsilon;
     size_t rank;
-    size_t round; /* 1: none */
-} tsvd_options;
+    size_t round; /* 0 or 1: none */
+} truncation;
 
-/* Factorizes A (m columns of n, column-major). The Gram matrix squares the condition: it is formed in double
- * unless epsilon is above 2e-3 of |A|. Cost: O(n m^2). Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC. */
-lam_status tsvd(size_t n, size_t m, const float *A, const tsvd_options *options, tall_factors *out,
+/* Factorizes A, [n][m]. The Gram matrix squares the condition: it is formed in double unless epsilon is above
+ * 2e-3 of |A|. Cost: O(n m^2). Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC. */
+lam_status tsvd(size_t n, size_t m, const float *A, const truncation *keep, tall_factors *out,
                 lam_error *error);
+
+/* The same of sparse columns: rows with few entries cost the squares of those, not m^2. */
+lam_status tsvd_sparse(const sparse_block *A, const truncation *keep, tall_factors *out, lam_error *error);
+
+/* The squares of the singular values of the first m columns of A, ascending, into values [m]. */
+lam_status tsvd_values(const sparse_block *A, size_t m, double *values, lam_error *error);
+
+/* How many of the singular values whose squares, ascending, are values [m] a truncation keeps. */
+size_t truncation_rank(const truncation *keep, size_t m, const double *values);
 
 #endif

@@ -1,52 +1,12 @@
 /* The builders and the reference against closed forms (exact form factors in, nine digits out). */
 #include "solver/build/build.h"
-#include "solver/build/hf.h"
 #include "solver/build/judge.h"
-#include "solver/build/norm.h"
 #include "solver/build/reference.h"
-#include "support/box.h"
+#include "support/box_problem.h"
 #include "support/suite.h"
 
-#include <lapacke.h>
-
-static const double unit_cube[3] = {1, 1, 1};
-static const double room[3] = {10, 6, 3};
-
-/* Everything a builder needs, of one box. */
-typedef struct fixture {
-    mesh m;
-    csr F;
-    uint32_t *order;
-    build_problem problem;
-} fixture;
-
-static fixture fixture_box(const double size[3], unsigned divisions, float reflectance) {
-    fixture f = {.m = box_mesh(size, divisions, reflectance)};
-    f.F = box_form_factors(size, divisions, f.m.area);
-    f.order = malloc(f.m.n * sizeof *f.order);
-    lam_error error = {0};
-    ck_assert_msg(mesh_z_order(&f.m, f.order, &error) == LAM_OK, "%s", error.message);
-    return f;
-}
-
-static const build_problem *problem_of(fixture *f) {
-    f->problem = (build_problem){.n = f->m.n,
-                                 .n_channels = f->m.n_channels,
-                                 .area = f->m.area,
-                                 .reflectance = f->m.reflectance,
-                                 .F = &f->F,
-                                 .order = f->order};
-    return &f->problem;
-}
-
-static void fixture_free(fixture *f) {
-    mesh_free(&f->m);
-    csr_free(&f->F);
-    free(f->order);
-}
-
 static const build_options defaults = {
-    .method = "low-rank", .factorizer = "auto", .epsilon = .1, .alpha = .5, .levels = -1};
+    .method = "low-rank", .factorizer = "auto", .epsilon = .1, .budget = {.alpha = .5}, .levels = -1};
 
 static lam_operator *build(const build_problem *problem, const build_options *options, build_report *report) {
     lam_operator *op = NULL;
@@ -201,94 +161,6 @@ START_TEST(sphere_has_rank_one) {
                                     2e-6);
         lam_operator_close(op);
     }
-}
-END_TEST
-
-/* |S - Q V^T|_2 by a dense SVD in double. */
-static double dense_norm(const scaled_matrix *S, const uint32_t *order, const tall_factors *f) {
-    const size_t n = f->n;
-    float *block = malloc(n * n * sizeof *block);
-    double *D = malloc(n * n * sizeof *D), *values = malloc(n * sizeof *values),
-           *extra = malloc(n * sizeof *extra);
-    scaled_columns(S, order, n, block);
-    for (size_t c = 0; c < n; c++)
-        for (size_t i = 0; i < n; i++) {
-            double sum = (double)block[c * n + i];
-            for (size_t k = 0; k < f->rank; k++) sum -= (double)f->Q[k * n + i] * (double)f->V[k * n + c];
-            D[c * n + i] = sum;
-        }
-    ck_assert_int_eq(LAPACKE_dgesvd(LAPACK_COL_MAJOR, 'N', 'N', (int)n, (int)n, D, (int)n, values, NULL, 1,
-                                    NULL, 1, extra),
-                     0);
-    const double norm = values[0];
-    free(block);
-    free(D);
-    free(values);
-    free(extra);
-    return norm;
-}
-
-START_TEST(levels_stop_at_the_noise) {
-    ck_assert_int_eq(hf_levels(1023, .1, .5, 0), 0);
-    ck_assert_int_eq(hf_levels(10240, .1, .5, 0), 4); /* leaves of 640 */
-    /* A level takes the bound from .1 to .035, .0125, .0044: the third is below half the noise. */
-    ck_assert_int_eq(hf_levels(10240, .1, .5, .022), 2);
-    /* Leaves no one can take the eigenvectors of are split, noise or not. */
-    ck_assert_int_eq(hf_levels(100000, .1, .5, .022), 4);
-}
-END_TEST
-
-static const double alphas[] = {.1, .5, .9};
-
-START_TEST(hf_keeps_its_bound) {
-    fixture f = fixture_box(room, 5, .5f); /* 150 elements, areas differ from face to face */
-    scaled_matrix S;
-    lam_error error = {0};
-    ck_assert_int_eq(scaled_init(&S, &f.F, f.m.area, &error), LAM_OK);
-    const double epsilons[] = {.3, .1, .01, 1e-4};
-    for (int e = 0; e < 4; e++)
-        for (int levels = 0; levels <= 4; levels++) {
-            const hf_options options = {.epsilon = epsilons[e], .alpha = alphas[_i], .levels = levels};
-            tall_factors q = {0};
-            ck_assert_msg(hf_factorize(&S, f.order, &options, &q, &error) == LAM_OK, "%s", error.message);
-            const double norm = dense_norm(&S, f.order, &q);
-            /* Rounding of the factors: 1e-6 of |S| = 1. */
-            ck_assert_msg(norm <= epsilons[e] + 2e-6, "epsilon %g, %d levels: error %g", epsilons[e], levels,
-                          norm);
-            double lanczos;
-            ck_assert_int_eq(norm_of_error(&S, f.order, &q, NULL, &lanczos, &error), LAM_OK);
-            ck_assert_msg(lanczos <= norm * 1.0001 + 1e-7 && lanczos >= .97 * norm - 1e-6,
-                          "norm %g, found %g", norm, lanczos);
-            /* V is orthonormal. */
-            for (size_t a = 0; a < q.rank; a++)
-                for (size_t b = 0; b <= a; b++) {
-                    double dot = 0;
-                    for (size_t i = 0; i < q.m; i++)
-                        dot += (double)q.V[a * q.m + i] * (double)q.V[b * q.m + i];
-                    ck_assert_double_eq_tol(dot, a == b ? 1 : 0, 2e-5);
-                }
-            tall_factors_free(&q);
-        }
-    scaled_free(&S);
-    fixture_free(&f);
-}
-END_TEST
-
-START_TEST(fixed_rank_is_exact) {
-    fixture f = fixture_box(unit_cube, 4, .5f);
-    const size_t ranks[] = {1, 7, 50, 96, 1000};
-    for (int i = 0; i < 5; i++) {
-        build_options options = defaults;
-        options.rank = ranks[i];
-        options.levels = 2;
-        build_report report;
-        lam_operator *op = build(problem_of(&f), &options, &report);
-        ck_assert_uint_eq(report.rank, ranks[i] < 96 ? ranks[i] : 96);
-        ck_assert(report.epsilon >= 0 && report.epsilon <= 1);
-        if (ranks[i] >= 96) ck_assert_double_le(report.epsilon, 2e-6);
-        lam_operator_close(op);
-    }
-    fixture_free(&f);
 }
 END_TEST
 
@@ -468,9 +340,6 @@ int main(void) {
     tcase_add_loop_test(cases, exact_cube, 0, 3);
     tcase_add_test(cases, room_one_element_per_face);
     tcase_add_test(cases, sphere_has_rank_one);
-    tcase_add_test(cases, levels_stop_at_the_noise);
-    tcase_add_loop_test(cases, hf_keeps_its_bound, 0, 3);
-    tcase_add_test(cases, fixed_rank_is_exact);
     tcase_add_test(cases, furnace);
     tcase_add_test(cases, judge_finds_the_exact_operator_exact);
     tcase_add_test(cases, judge_ignores_what_sees_nothing);

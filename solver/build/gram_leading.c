@@ -1,0 +1,157 @@
+/* The leading eigenvectors of a Gram matrix where they are few, by subspace iteration. */
+#include "solver/build/gram.h"
+#include "solver/build/sketch.h"
+#include "solver/matrix/dense.h"
+#include "store/status.h"
+
+#include <cblas.h>
+#include <lapacke.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The first guess is so many eigenvectors; with more than GIVE_UP of all the whole decomposition is cheaper.
+ */
+enum { FIRST_GUESS = 16, GIVE_UP = 3, ITERATIONS = 3, LANCZOS = 24 };
+
+/* Ritz values come from below; this much under the floor they count. */
+static const double slack = .9;
+
+/* The whole of a symmetric matrix of which j >= i is set. */
+static float *fill_symmetric(const gram *g, lam_error *error) {
+    const size_t m = g->m;
+    float *G = memory_allocate(m, m * sizeof *G, "factorization", error);
+    if (G == NULL) return NULL;
+    for (size_t i = 0; i < m; i++) {
+        memcpy(G + i * m + i, g->single + i * m + i, (m - i) * sizeof *G);
+        for (size_t j = 0; j < i; j++) G[i * m + j] = g->single[j * m + i];
+    }
+    return G;
+}
+
+/* Rayleigh and Ritz: X [m][w] orthonormal becomes X Z, with Z the eigenvectors of X^T G X by falling value.
+ */
+static lam_status ritz(size_t m, size_t w, const float *G, float *X, double *values, lam_error *error) {
+    lam_status status = LAM_OK;
+    float *Z = NULL, *product = memory_allocate(m, w * sizeof *product, "factorization", error);
+    double *T = memory_allocate(w, w * sizeof *T, "factorization", error);
+    Z = memory_allocate(w, w * sizeof *Z, "factorization", error);
+    if (product == NULL || T == NULL || Z == NULL) TRY(LAM_ERR_MEMORY);
+    dense_multiply(m, m, w, G, X, false, product);
+    TRY(dense_project(m, w, w, X, product, T, error));
+    const lapack_int info =
+        LAPACKE_dsyevd(LAPACK_COL_MAJOR, 'V', 'L', (lapack_int)w, T, (lapack_int)w, values);
+    if (info != 0) FAIL(error, LAM_ERR_NUMERIC, "Ritz values: LAPACK dsyevd returned %d", (int)info);
+    for (size_t i = 0; i < w; i++)
+        for (size_t c = 0; c < w; c++) Z[i * w + c] = (float)T[(w - 1 - c) * w + i];
+    for (size_t k = 0; k < w / 2; k++) {
+        const double swap = values[k];
+        values[k] = values[w - 1 - k];
+        values[w - 1 - k] = swap;
+    }
+    dense_multiply(m, w, w, X, Z, false, product);
+    memcpy(X, product, m * w * sizeof *X);
+done:
+    free(product);
+    free(T);
+    free(Z);
+    return status;
+}
+
+/* x -= V (V^T x) for V [m][w] of which the first r columns count. */
+static void deflate(size_t m, size_t w, size_t r, const float *V, float *x, float *t) {
+    if (r == 0) return;
+    cblas_sgemv(CblasRowMajor, CblasTrans, (int)m, (int)r, 1, V, (int)w, x, 1, 0, t, 1);
+    cblas_sgemv(CblasRowMajor, CblasNoTrans, (int)m, (int)r, -1, V, (int)w, t, 1, 1, x, 1);
+}
+
+/* The largest x^T G x over |x| = 1 orthogonal to the first r columns of V, by Lanczos steps. */
+static lam_status largest_beside(size_t m, const float *G, size_t w, size_t r, const float *V,
+                                 double *largest, lam_error *error) {
+    lam_status status = LAM_OK;
+    double d[LANCZOS] = {0}, e[LANCZOS] = {0};
+    int steps = 0;
+    float *t = NULL, *y = NULL, *basis = memory_allocate(LANCZOS * m, sizeof *basis, "norm", error);
+    t = memory_allocate(w, sizeof *t, "norm", error);
+    y = memory_allocate(m, sizeof *y, "norm", error);
+    if (basis == NULL || t == NULL || y == NULL) TRY(LAM_ERR_MEMORY);
+    sketch_gaussian(7, m, 1, y);
+    deflate(m, w, r, V, y, t);
+    float size = cblas_snrm2((int)m, y, 1);
+    while (steps < LANCZOS && size > 1e-12f) {
+        float *q = basis + (size_t)steps * m;
+        for (size_t i = 0; i < m; i++) q[i] = y[i] / size;
+        cblas_sgemv(CblasRowMajor, CblasNoTrans, (int)m, (int)m, 1, G, (int)m, q, 1, 0, y, 1);
+        deflate(m, w, r, V, y, t);
+        d[steps] = (double)cblas_sdot((int)m, q, 1, y, 1);
+        steps++;
+        for (int twice = 0; twice < 2; twice++)
+            for (int b = 0; b < steps; b++) {
+                const float *v = basis + (size_t)b * m;
+                cblas_saxpy((int)m, -cblas_sdot((int)m, v, 1, y, 1), v, 1, y, 1);
+            }
+        size = cblas_snrm2((int)m, y, 1);
+        e[steps - 1] = (double)size;
+        if ((double)size <= 1e-7 * fabs(d[0])) break;
+    }
+    *largest = 0;
+    if (steps > 0) {
+        const lapack_int info = LAPACKE_dsterf(steps, d, e);
+        if (info != 0) FAIL(error, LAM_ERR_NUMERIC, "norm: LAPACK dsterf returned %d", (int)info);
+        *largest = d[steps - 1];
+    }
+done:
+    free(basis);
+    free(t);
+    free(y);
+    return status;
+}
+
+/* One attempt with w vectors; *rank is 0 where they are not enough. */
+static lam_status attempt(size_t m, const float *G, size_t w, double floor, float **V, size_t *rank,
+                          lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t found = w, kept = 0;
+    double *values = NULL, beside;
+    float *v = NULL, *product = NULL, *X = memory_allocate(m, w * sizeof *X, "factorization", error);
+    values = memory_allocate(w, sizeof *values, "factorization", error);
+    product = memory_allocate(m, w * sizeof *product, "factorization", error);
+    if (X == NULL || values == NULL || product == NULL) TRY(LAM_ERR_MEMORY);
+    sketch_gaussian(3, m, w, product);
+    for (int k = 0; k < ITERATIONS; k++) {
+        dense_multiply(m, m, found, G, product, false, X);
+        TRY(sketch_orthonormalize(m, found, X, &found, error));
+        memcpy(product, X, m * found * sizeof *X);
+    }
+    TRY(ritz(m, found, G, X, values, error));
+    while (kept < found && values[kept] >= slack * floor) kept++;
+    if (kept + kept / 8 >= found && found == w) goto done; /* there may be more of them */
+    TRY(largest_beside(m, G, found, kept, X, &beside, error));
+    if (beside > floor) goto done;
+    v = memory_allocate(m, kept * sizeof *v, "factorization", error);
+    if (v == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < m; i++)
+        if (kept > 0) memcpy(v + i * kept, X + i * found, kept * sizeof *v);
+    *V = v;
+    *rank = kept;
+done:
+    free(X);
+    free(values);
+    free(product);
+    return status;
+}
+
+lam_status gram_leading(const gram *g, double floor, float **V, size_t *rank, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t m = g->m;
+    float *G = fill_symmetric(g, error);
+    *V = NULL;
+    *rank = 0;
+    if (G == NULL) return LAM_ERR_MEMORY;
+    for (size_t w = m / FIRST_GUESS; w * GIVE_UP <= m && *V == NULL && w > 0; w *= 2)
+        TRY(attempt(m, G, w, floor, V, rank, error));
+done:
+    free(G);
+    return status;
+}

@@ -1,0 +1,40 @@
+/* Where the rows of F come from: memory, a file, or rays. A factorizer asks for blocks of rows and is told
+ * how often it has been over all of them. */
+#ifndef LAMBERT_MATRIX_ROW_SOURCE_H
+#define LAMBERT_MATRIX_ROW_SOURCE_H
+
+#include "solver/operator/csr.h"
+
+/* Rows of some elements: row k begins at data + begin[k] and has length[k] entries, indices ascending. What
+ * owned holds is freed by row_block_free. */
+typedef struct row_block {
+    size_t m;
+    const uint32_t *const *indices; /* [m] */
+    const float *const *data;       /* [m] */
+    size_t *length;                 /* [m] */
+    void *owned[5];
+} row_block;
+
+void row_block_free(row_block *block);
+
+typedef struct row_source {
+    size_t n;
+    double density; /* share of the n^2 entries that are there, about */
+    /* The rows of elements[0] ... elements[m-1]. Any number of threads may ask at once. */
+    lam_status (*rows)(void *context, const uint32_t *elements, size_t m, row_block *out, lam_error *error);
+    void *context;
+    uint64_t rows_given; /* counted by row_source_get */
+} row_source;
+
+/* Rows of F, which must outlive the source, from memory: nothing is copied. */
+void row_source_of_csr(row_source *source, const csr *F);
+
+/* The rows of elements[0] ... elements[m-1], freed by row_block_free. Errors: LAM_ERR_MEMORY, what the source
+ * says. */
+lam_status row_source_get(row_source *source, const uint32_t *elements, size_t m, row_block *out,
+                          lam_error *error);
+
+/* How often all rows have been asked for. */
+double row_source_passes(const row_source *source);
+
+#endif

@@ -1,0 +1,44 @@
+/* Everything a builder needs, of one box with exact form factors. */
+#ifndef LAMBERT_TESTS_BOX_PROBLEM_H
+#define LAMBERT_TESTS_BOX_PROBLEM_H
+
+#include "solver/build/build.h"
+#include "support/box.h"
+#include "support/suite.h"
+
+static const double unit_cube[3] = {1, 1, 1};
+static const double room[3] = {10, 6, 3};
+
+typedef struct fixture {
+    mesh m;
+    csr F;
+    uint32_t *order;
+    build_problem problem;
+} fixture;
+
+static inline fixture fixture_box(const double size[3], unsigned divisions, float reflectance) {
+    fixture f = {.m = box_mesh(size, divisions, reflectance)};
+    f.F = box_form_factors(size, divisions, f.m.area);
+    f.order = malloc(f.m.n * sizeof *f.order);
+    lam_error error = {0};
+    ck_assert_msg(mesh_z_order(&f.m, f.order, &error) == LAM_OK, "%s", error.message);
+    return f;
+}
+
+static inline const build_problem *problem_of(fixture *f) {
+    f->problem = (build_problem){.n = f->m.n,
+                                 .n_channels = f->m.n_channels,
+                                 .area = f->m.area,
+                                 .reflectance = f->m.reflectance,
+                                 .F = &f->F,
+                                 .order = f->order};
+    return &f->problem;
+}
+
+static inline void fixture_free(fixture *f) {
+    mesh_free(&f->m);
+    csr_free(&f->F);
+    free(f->order);
+}
+
+#endif
