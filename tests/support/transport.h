@@ -166,8 +166,6 @@ typedef enum transport_kind {
     TRANSPORT_FOLDED_F16,
     TRANSPORT_FOLDED_BF16,
     TRANSPORT_FOLDED_I8,
-    TRANSPORT_FACTORED_COLOUR_F16,
-    TRANSPORT_FACTORED_COLOUR_BF16,
     TRANSPORT_FACTORED_COLOUR_I8,
     TRANSPORT_KINDS
 } transport_kind;
@@ -294,8 +292,6 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
                  {"folded, f16", PANEL_F16},
                  {"folded, bf16", PANEL_BF16},
                  {"folded, i8", PANEL_I8},
-                 {"factored, 3 channels, f16", PANEL_F16},
-                 {"factored, 3 channels, bf16", PANEL_BF16},
                  {"factored, 3 channels, i8", PANEL_I8}};
     lam_error error = {.message = ""};
     uint64_t state = 11 + (uint64_t)kind;
