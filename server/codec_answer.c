@@ -3,6 +3,7 @@
 #include "server/codec_json_writer.h"
 #include "server/codec_npy.h"
 #include "server/codec_request.h"
+#include "solver/operator/half.h"
 
 #include <float.h>
 #include <math.h>
@@ -18,7 +19,7 @@ bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, 
         size_t dims[3], rank = 0;
         if (shape->batch) dims[rank++] = shape->n_rhs;
         if (shape->n_channels > 1) dims[rank++] = shape->n_channels;
-        dims[rank++] = shape->selected != NULL ? shape->n_selected : shape->n;
+        dims[rank++] = shape->n_values;
         return npy_write_header(b, as->npy, rank, dims) || no_memory(why);
     }
     const char *quantity = codec_quantity_name(notes->quantity);
@@ -42,18 +43,15 @@ static bool check_range(const float *x, size_t count, float limit, problem *why)
 }
 
 static bool add_row(buffer *b, const answer_shape *shape, const media_accept *as, const float *row) {
-    size_t count = shape->selected != NULL ? shape->n_selected : shape->n;
-    if (as->type == MEDIA_NPY) return npy_write_values(b, as->npy, row, shape->selected, count);
-    if (shape->selected != NULL) return json_write_selected_floats(b, row, shape->selected, count);
-    return json_write_floats(b, row, count);
+    if (as->type == MEDIA_NPY) return npy_write_values(b, as->npy, row, shape->n_values);
+    return json_write_floats(b, row, shape->n_values);
 }
 
 bool answer_add(buffer *b, const answer_shape *shape, const media_accept *as, size_t first, size_t count,
                 const float *x, problem *why) {
-    size_t C = shape->n_channels, n = shape->n;
+    size_t C = shape->n_channels, n = shape->n_values;
     bool json = as->type == MEDIA_JSON;
-    if (!check_range(x, count * C * n, !json && as->npy == NPY_F2 ? NPY_HALF_MAX : FLT_MAX, why))
-        return false;
+    if (!check_range(x, count * C * n, !json && as->npy == NPY_F2 ? HALF_MAX : FLT_MAX, why)) return false;
     for (size_t r = 0; r < count; r++) {
         bool written =
             !json || ((first + r == 0 || buffer_append(b, ",", 1)) && (C == 1 || buffer_append(b, "[", 1)));

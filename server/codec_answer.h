@@ -6,15 +6,12 @@
 #include "server/codec_media.h"
 #include "server/problem.h"
 
-#include <stdint.h>
-
 typedef struct answer_shape {
-    size_t n;
+    size_t n; /* elements of the scene */
     size_t n_channels;
     size_t n_rhs;
     bool batch;
-    const uint32_t *selected; /* NULL: all elements */
-    size_t n_selected;
+    size_t n_values; /* elements that the answer is about: n, or those selected */
 } answer_shape;
 
 /* What the JSON object says beside the vectors. */
@@ -26,9 +23,9 @@ typedef struct answer_notes {
     double parse_ms, solve_ms, encode_ms;
 } answer_notes;
 
-/* Appends what stands before the vectors, then vectors first ... first + count of x [count][C][n], then what
- * stands behind the last. False with *why: 422 when a value is beyond what the encoding holds, 503 when
- * memory is short. */
+/* Appends what stands before the vectors, then vectors first ... first + count of x [count][C][n_values],
+ * then what stands behind the last. False with *why: 422 when a value is beyond what the encoding holds, 503
+ * when memory is short. */
 bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
                   problem *why);
 bool answer_add(buffer *b, const answer_shape *shape, const media_accept *as, size_t first, size_t count,

@@ -150,21 +150,6 @@ bool json_write_floats(buffer *b, const float *values, size_t count) {
     return true;
 }
 
-bool json_write_selected_floats(buffer *b, const float *values, const uint32_t *index, size_t count) {
-    if (!reserve_floats(b, count)) return false;
-    char *at = b->bytes + b->length;
-    *at++ = '[';
-    for (size_t i = 0; i < count; i++) {
-        at += json_write_float(at, values[index[i]]);
-        *at++ = ',';
-    }
-    if (count > 0) at--;
-    *at++ = ']';
-    *at = '\0';
-    b->length = (size_t)(at - b->bytes);
-    return true;
-}
-
 bool json_write_double(buffer *b, double value) {
     char text[32];
     assert(isfinite(value));

@@ -16,9 +16,6 @@ size_t json_write_float(char *to, float value);
 /* Appends [v0,v1,...] of finite values; false when memory is short. */
 bool json_write_floats(buffer *b, const float *values, size_t count);
 
-/* Appends [values[index[0]],...]. */
-bool json_write_selected_floats(buffer *b, const float *values, const uint32_t *index, size_t count);
-
 /* Appends the shortest decimal that reads back as the same double; value must be finite. */
 bool json_write_double(buffer *b, double value);
 

@@ -2,6 +2,7 @@
 #include "server/codec_npy.h"
 
 #include "server/codec_request.h"
+#include "solver/operator/half.h"
 
 #include <float.h>
 #include <math.h>
@@ -232,25 +233,6 @@ bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, 
 
 /* --- answers ------------------------------------------------------------------------------------------ */
 
-uint16_t npy_half(float value) {
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    uint32_t sign = bits >> 16 & 0x8000u, magnitude = bits & 0x7FFFFFFFu;
-    if (magnitude > 0x7F800000u) return (uint16_t)(sign | 0x7E00u);
-    if (magnitude >= 0x477FF000u) return (uint16_t)(sign | 0x7C00u); /* 65520 and more round to infinity */
-    if (magnitude < 0x38800000u) {
-        /* Below 2^-14 the unit is 2^-24: adding 0.5 in float, whose unit there is 2^-24, rounds to it. */
-        float shifted;
-        memcpy(&shifted, &magnitude, sizeof shifted);
-        shifted += 0.5f;
-        memcpy(&magnitude, &shifted, sizeof magnitude);
-        return (uint16_t)(sign | (magnitude - 0x3F000000u));
-    }
-    /* Ties go to the even one of the two. */
-    uint32_t rounded = magnitude - 0x38000000u + 0xFFFu + (magnitude >> 13 & 1u);
-    return (uint16_t)(sign | rounded >> 13);
-}
-
 bool npy_write_header(buffer *b, npy_type type, size_t rank, const size_t *shape) {
     static const char *const names[] = {[NPY_F2] = "<f2", [NPY_F4] = "<f4", [NPY_F8] = "<f8"};
     char text[192];
@@ -270,21 +252,18 @@ bool npy_write_header(buffer *b, npy_type type, size_t rank, const size_t *shape
     return buffer_append(b, "\n", 1);
 }
 
-bool npy_write_values(buffer *b, npy_type type, const float *values, const uint32_t *index, size_t count) {
+bool npy_write_values(buffer *b, npy_type type, const float *values, size_t count) {
     static const size_t sizes[] = {[NPY_F2] = 2, [NPY_F4] = 4, [NPY_F8] = 8};
     size_t bytes;
     if (!size_multiply(count, sizes[type], &bytes) || !buffer_reserve(b, bytes)) return false;
     char *to = b->bytes + b->length;
-    if (type == NPY_F4 && index == NULL) {
+    if (type == NPY_F4) {
         memcpy(to, values, bytes);
     } else {
         for (size_t i = 0; i < count; i++) {
-            float value = values[index == NULL ? i : index[i]];
-            double wide = value;
-            uint16_t half = type == NPY_F2 ? npy_half(value) : 0;
-            const void *from = type == NPY_F2   ? (const void *)&half
-                               : type == NPY_F4 ? (const void *)&value
-                                                : &wide;
+            const double wide = (double)values[i];
+            const uint16_t half = half_of_float(values[i]);
+            const void *from = type == NPY_F2 ? (const void *)&half : &wide;
             memcpy(to + i * sizes[type], from, sizes[type]);
         }
     }

@@ -20,8 +20,8 @@ static double now_ms(void) {
 
 /* What a pass works with, in the thread's own memory. */
 typedef struct pass_memory {
-    float *out; /* [n_rhs][C][n] */
-    float *H0;  /* likewise, what the sky gives; NULL where no vector is under one */
+    float *out; /* [n_rhs][C][n], less where elements are selected */
+    float *H0;  /* [n_rhs][C][n], what the sky gives; NULL where no vector is under one */
     void *work;
     size_t work_bytes;
 } pass_memory;
@@ -56,8 +56,7 @@ static bool solve(call *in, const radiosity_request *request, answer_notes *note
                           .n_channels = s->n_channels,
                           .n_rhs = request->n_rhs,
                           .batch = request->batch,
-                          .selected = request->select ? request->selected : NULL,
-                          .n_selected = request->n_selected};
+                          .n_values = request->select ? request->n_selected : s->n};
     pass_memory memory = {0};
     if (!get_pass_memory(in, request->n_rhs < PASS ? request->n_rhs : PASS, request->L != NULL, &memory,
                          why) ||
@@ -70,9 +69,14 @@ static bool solve(call *in, const radiosity_request *request, answer_notes *note
         if (request->L != NULL)
             lam_sky_irradiance(s->sky, count * s->n_channels,
                                request->L + first * s->n_channels * lam_sky_tiles(s->sky), memory.H0);
-        if (lam_operator_apply_lit(s->op, count, request->quantity, request->E + first * s->n_channels * s->n,
-                                   memory.H0, memory.out, memory.work, memory.work_bytes, &error) != LAM_OK)
-            return problem_set(why, 500, "%s", error.message);
+        const float *E = request->E + first * s->n_channels * s->n;
+        const lam_status solved_well =
+            request->select ? lam_operator_apply_selected(s->op, count, request->quantity, E, memory.H0,
+                                                          request->n_selected, request->selected, memory.out,
+                                                          memory.work, memory.work_bytes, &error)
+                            : lam_operator_apply_lit(s->op, count, request->quantity, E, memory.H0,
+                                                     memory.out, memory.work, memory.work_bytes, &error);
+        if (solved_well != LAM_OK) return problem_set(why, 500, "%s", error.message);
         double solved = now_ms();
         metrics_pass(in->service->metrics, count);
         notes->solve_ms += solved - start;

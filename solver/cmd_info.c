@@ -106,6 +106,7 @@ static void print_text(const json_t *about) {
         print_value(plain[i], json_object_get(about, plain[i]));
     print_value("rank", json_object_get(about, "rank"));
     print_value("density", json_object_get(about, "density"));
+    print_value("precision", json_object_get(about, "precision"));
     print_bytes(json_number_value(json_object_get(about, "bytes")));
     print_groups(json_object_get(about, "groups"));
     print_sky(json_object_get(about, "sky"));

@@ -8,6 +8,7 @@
 #include "solver/verbs.h"
 
 #include <math.h>
+#include <omp.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
@@ -231,11 +232,12 @@ static lam_status render(const char *path, const fields *f, terminal *t, lam_err
         FAIL(error, LAM_ERR_ARGUMENT, "%s: holds %zu emissions, a picture shows exactly 1",
              f->emission != NULL ? f->emission : f->sky, light.n_vectors);
     TRY(operator_load(s, &op, error));
+    lam_operator_set_threads(op, (size_t)omp_get_max_threads());
     TRY(terminal_check(error));
     const lam_quantity quantity = strcmp(f->quantity, "irradiance") == 0 ? LAM_IRRADIANCE
                                   : strcmp(f->quantity, "indirect") == 0 ? LAM_INDIRECT
                                                                          : LAM_RADIOSITY;
-    TRY(emission_apply(&light, op, sky, quantity, NULL, &values, error));
+    TRY(emission_apply(&light, op, sky, quantity, 0, NULL, NULL, &values, error));
     lit = memory_allocate(m.n, sizeof *lit, "lit elements", error);
     glows = memory_allocate(m.n, sizeof *glows, "glowing elements", error);
     if (lit == NULL || glows == NULL) TRY(LAM_ERR_MEMORY);

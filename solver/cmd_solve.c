@@ -8,6 +8,7 @@
 #include "solver/verbs.h"
 
 #include <math.h>
+#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -151,6 +152,22 @@ static lam_status print_solution(const solution *s, lam_error *error) {
     return LAM_OK;
 }
 
+/* The elements that some reduction is about, *selected freed with free(); NULL where all are wanted. */
+static lam_status wanted_elements(const mesh *m, const reduction *reductions, size_t n_reductions,
+                                  size_t *n_selected, uint32_t **selected, lam_error *error) {
+    *selected = NULL;
+    *n_selected = 0;
+    if (n_reductions == 0) return LAM_OK;
+    *selected = memory_allocate(m->n, sizeof **selected, "the elements wanted", error);
+    if (*selected == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < m->n; i++) {
+        bool inside = false;
+        for (size_t r = 0; r < n_reductions; r++) inside = inside || reductions[r].inside[m->group[i]];
+        if (inside) (*selected)[(*n_selected)++] = (uint32_t)i;
+    }
+    return LAM_OK;
+}
+
 static lam_status solve(const char *path, const fields *f, reduction *reductions, terminal *t,
                         lam_error *error) {
     lam_status status = LAM_OK;
@@ -162,6 +179,8 @@ static lam_status solve(const char *path, const fields *f, reduction *reductions
     double *row_sums = NULL;
     float *values = NULL;
     char *scene = NULL;
+    uint32_t *selected = NULL;
+    size_t n_selected = 0;
     bool own = false;
     if (f->output != NULL) TRY(output_file_check(f->output, error));
     TRY(store_open(path, &s, error));
@@ -177,8 +196,12 @@ static lam_status solve(const char *path, const fields *f, reduction *reductions
              sky != NULL ? " or --sky FILE" : "");
     if (own) terminal_log(t, "no --emit, --emission or --sky: the scene's own light");
     TRY(operator_load(s, &op, error));
+    lam_operator_set_threads(op, (size_t)omp_get_max_threads());
     TRY(terminal_check(error));
-    TRY(emission_apply(&light, op, sky, quantity_of(f->quantity), terminal_check, &values, error));
+    /* With --reduce only figures are written, with -o too. */
+    TRY(wanted_elements(&m, reductions, f->reduce.count, &n_selected, &selected, error));
+    TRY(emission_apply(&light, op, sky, quantity_of(f->quantity), n_selected, selected, terminal_check,
+                       &values, error));
     solution out = {.m = &m,
                     .scene = scene,
                     .quantity = f->quantity,
@@ -194,6 +217,7 @@ static lam_status solve(const char *path, const fields *f, reduction *reductions
         TRY(print_solution(&out, error));
 done:
     free(scene);
+    free(selected);
     free(values);
     free(row_sums);
     emission_free(&light);

@@ -177,22 +177,33 @@ done:
     return status;
 }
 
+/* Chosen numbers of so many rows to their elements. */
+static void scatter(size_t n_rows, size_t n, size_t n_selected, const uint32_t *selected, const float *from,
+                    float *to) {
+    for (size_t row = 0; row < n_rows; row++)
+        for (size_t r = 0; r < n_selected; r++) to[row * n + selected[r]] = from[row * n_selected + r];
+}
+
 lam_status emission_apply(const emission *e, const lam_operator *op, const lam_sky *sky,
-                          lam_quantity quantity, lam_status (*stop)(lam_error *error), float **values,
-                          lam_error *error) {
+                          lam_quantity quantity, size_t n_selected, const uint32_t *selected,
+                          lam_status (*stop)(lam_error *error), float **values, lam_error *error) {
     enum { AT_ONCE = 64 }; /* vectors in one pass */
     lam_status status = LAM_OK;
     const size_t n_channels = lam_operator_channels(op), vector = lam_operator_elements(op) * n_channels;
     const size_t most = e->n_vectors < AT_ONCE ? e->n_vectors : AT_ONCE;
     const size_t bytes = lam_operator_work_bytes(op, most);
     void *work = NULL;
-    float *made = NULL, *H0 = NULL;
+    float *made = NULL, *H0 = NULL, *some = NULL;
     size_t count;
     if (!size_multiply(vector, e->n_vectors, &count))
         FAIL(error, LAM_ERR_MEMORY, "%zu emissions are too many for memory", e->n_vectors);
     made = memory_allocate(count, sizeof *made, "the solution", error);
     work = memory_allocate(bytes, 1, "the work area of a solve", error);
     if (made == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
+    if (selected != NULL) {
+        some = memory_allocate(n_selected * n_channels, most * sizeof *some, "the solution", error);
+        if (some == NULL) TRY(LAM_ERR_MEMORY);
+    }
     if (e->L != NULL) {
         H0 = memory_allocate(vector, most * sizeof *H0, "the light of the sky", error);
         if (H0 == NULL) TRY(LAM_ERR_MEMORY);
@@ -201,8 +212,14 @@ lam_status emission_apply(const emission *e, const lam_operator *op, const lam_s
         const size_t n = e->n_vectors - first < most ? e->n_vectors - first : most;
         if (e->L != NULL)
             lam_sky_irradiance(sky, n * n_channels, e->L + first * n_channels * lam_sky_tiles(sky), H0);
-        TRY(lam_operator_apply_lit(op, n, quantity, e->E + first * vector, H0, made + first * vector, work,
-                                   bytes, error));
+        if (selected == NULL) {
+            TRY(lam_operator_apply_lit(op, n, quantity, e->E + first * vector, H0, made + first * vector,
+                                       work, bytes, error));
+        } else {
+            TRY(lam_operator_apply_selected(op, n, quantity, e->E + first * vector, H0, n_selected, selected,
+                                            some, work, bytes, error));
+            scatter(n * n_channels, vector / n_channels, n_selected, selected, some, made + first * vector);
+        }
         if (stop != NULL) TRY(stop(error));
     }
     *values = made;
@@ -210,6 +227,7 @@ lam_status emission_apply(const emission *e, const lam_operator *op, const lam_s
 done:
     free(made);
     free(work);
+    free(some);
     free(H0);
     return status;
 }

@@ -58,11 +58,12 @@ typedef struct emission_wish {
 lam_status emission_choose(const mesh *m, const lam_sky *sky, const emission_wish *wish, emission *out,
                            bool *own, lam_error *error);
 
-/* *values is [n_vectors][C][n], freed with free(): what the operator makes of each vector under its sky.
- * stop, which may be NULL, is asked between passes and ends the work with its status. */
+/* *values is [n_vectors][C][n], freed with free(): what the operator makes of each vector under its sky;
+ * where selected is not NULL only of these elements, which is less work, and 0 elsewhere. stop, which may be
+ * NULL, is asked between passes and ends the work with its status. */
 lam_status emission_apply(const emission *e, const lam_operator *op, const lam_sky *sky,
-                          lam_quantity quantity, lam_status (*stop)(lam_error *error), float **values,
-                          lam_error *error);
+                          lam_quantity quantity, size_t n_selected, const uint32_t *selected,
+                          lam_status (*stop)(lam_error *error), float **values, lam_error *error);
 
 /* Calls visit(context, g) for each group that name means; returns how many. */
 size_t emission_match_groups(const mesh *m, const char *name, void (*visit)(void *context, size_t group),

@@ -3,6 +3,7 @@
 #include "solver/build/judge.h"
 #include "solver/clock.h"
 #include "solver/forecast.h"
+#include "solver/narrow.h"
 #include "solver/scene/import.h"
 
 #include <math.h>
@@ -326,6 +327,9 @@ static lam_status build(work *w, lam_error *error) {
             o->epsilon, noise, w->f.recipe.rays, recipe_auto_rays(o->epsilon, 1. / 4));
     terminal_log(w->t, "%-14s%8.2f s", "invert", w->built.invert_seconds);
     terminal_log(w->t, "%s", w->built.reason);
+    lam_operator_set_threads(w->op, (size_t)omp_get_max_threads());
+    TRY(narrow_replace(&w->op, o->precision, w->m.area, precompute_seed(o->form_factors.seed, 4), w->t,
+                       error));
 done:
     return status;
 }
@@ -376,6 +380,9 @@ static lam_status judge(work *w, lam_error *error) {
     log_figures(w->t, "single", &w->errors.single, w->errors.has_total);
     log_figures(w->t, "lights", &w->errors.lights, w->errors.has_total);
     log_figures(w->t, "random", &w->errors.random, w->errors.has_total);
+    if (w->options->precision == PANEL_F32)
+        TRY(narrow_advise(w->op, &w->errors, w->m.area, precompute_seed(w->options->form_factors.seed, 4),
+                          w->t, error));
 done:
     form_factors_free(&half[0]);
     form_factors_free(&half[1]);

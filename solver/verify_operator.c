@@ -45,7 +45,8 @@ lam_status verify_operator(examination *e, check *c, lam_error *error) {
     }
     TRY(operator_load(e->s, &e->op, error));
     operator_describe(e->op, &about);
-    check_say(c, VERDICT_OK, "%s, %zu bytes, finite", lam_operator_kind(e->op), about.bytes);
+    check_say(c, VERDICT_OK, "%s, %s, %zu bytes, finite", lam_operator_kind(e->op),
+              about.precision != NULL ? about.precision : "f32", about.bytes);
     /* Light everywhere: a value that is not finite anywhere in the operator shows in the answer. */
     const size_t count = e->m.n * e->m.n_channels;
     E = memory_allocate(count, sizeof *E, "an emission", error);

@@ -29,7 +29,20 @@ void store_mute_end(const store_mute *mute) {
 }
 
 size_t store_type_size(store_type type) {
-    return type == STORE_F32 || type == STORE_U32 ? 4 : 8;
+    switch (type) {
+    case STORE_I8:
+        return 1;
+    case STORE_F16:
+    case STORE_U16:
+        return 2;
+    case STORE_F32:
+    case STORE_U32:
+        return 4;
+    case STORE_F64:
+    case STORE_U64:
+        return 8;
+    }
+    return 0;
 }
 
 const char *store_path(const store *s) {

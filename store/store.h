@@ -15,7 +15,16 @@
 
 typedef struct store store;
 
-typedef enum store_type { STORE_F32, STORE_F64, STORE_U32, STORE_U64 } store_type;
+/* f16: IEEE half precision. */
+typedef enum store_type {
+    STORE_F32,
+    STORE_F64,
+    STORE_U32,
+    STORE_U64,
+    STORE_F16,
+    STORE_U16,
+    STORE_I8
+} store_type;
 
 /* Bytes of one value of a type. */
 size_t store_type_size(store_type type);

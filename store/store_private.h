@@ -94,6 +94,9 @@ lam_status store_write_plain(store *s, const char *name, hid_t type, int rank, c
 /* The type of texts of width bytes: UTF-8, zero padded. The caller closes it. */
 lam_status store_text_type(store *s, size_t width, hid_t *out, lam_error *error);
 
+/* The HDF5 type of values; the caller closes it. Negative when HDF5 fails. */
+hid_t store_file_type(store_type type);
+
 /* --- store_read.c ----------------------------------------------------------------------------------------
  */
 

@@ -7,12 +7,15 @@
 
 /* What the values are; false for a type that no store holds. */
 static bool describe_type(hid_t type, store_array *array) {
-    const hid_t types[] = {H5T_IEEE_F32LE, H5T_IEEE_F64LE, H5T_STD_U32LE, H5T_STD_U64LE};
-    const store_type names[] = {STORE_F32, STORE_F64, STORE_U32, STORE_U64};
+    static const store_type types[] = {STORE_F32, STORE_F64, STORE_U32, STORE_U64,
+                                       STORE_F16, STORE_U16, STORE_I8};
     for (size_t i = 0; i < sizeof types / sizeof *types; i++) {
-        if (H5Tequal(type, types[i]) <= 0) continue;
-        array->type = names[i];
-        array->value_size = store_type_size(names[i]);
+        hid_t ours = store_file_type(types[i]);
+        const bool same = ours >= 0 && H5Tequal(type, ours) > 0;
+        if (ours >= 0) H5Tclose(ours);
+        if (!same) continue;
+        array->type = types[i];
+        array->value_size = store_type_size(types[i]);
         return true;
     }
     array->is_text = H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0;
@@ -91,6 +94,12 @@ static const char *type_text(store_type type) {
         return "u32";
     case STORE_U64:
         return "u64";
+    case STORE_F16:
+        return "f16";
+    case STORE_U16:
+        return "u16";
+    case STORE_I8:
+        return "i8";
     }
     return "unknown";
 }

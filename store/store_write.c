@@ -81,16 +81,33 @@ done:
     return status;
 }
 
-static hid_t file_type(store_type type) {
+/* IEEE half precision, which HDF5 1.10 has no name for: 1 sign, 5 exponent, 10 mantissa bits. */
+static hid_t half_type(void) {
+    hid_t type = H5Tcopy(H5T_IEEE_F32LE);
+    if (type >= 0 && (H5Tset_fields(type, 15, 10, 5, 0, 10) < 0 || H5Tset_size(type, 2) < 0 ||
+                      H5Tset_ebias(type, 15) < 0)) {
+        H5Tclose(type);
+        type = -1;
+    }
+    return type;
+}
+
+hid_t store_file_type(store_type type) {
     switch (type) {
     case STORE_F32:
-        return H5T_IEEE_F32LE;
+        return H5Tcopy(H5T_IEEE_F32LE);
     case STORE_F64:
-        return H5T_IEEE_F64LE;
+        return H5Tcopy(H5T_IEEE_F64LE);
     case STORE_U32:
-        return H5T_STD_U32LE;
+        return H5Tcopy(H5T_STD_U32LE);
     case STORE_U64:
-        return H5T_STD_U64LE;
+        return H5Tcopy(H5T_STD_U64LE);
+    case STORE_F16:
+        return half_type();
+    case STORE_U16:
+        return H5Tcopy(H5T_STD_U16LE);
+    case STORE_I8:
+        return H5Tcopy(H5T_STD_I8LE);
     }
     return -1;
 }
@@ -117,9 +134,16 @@ done:
 lam_status store_write(store *s, const char *name, store_type type, int rank, const size_t *dims,
                        const void *data, lam_error *error) {
     assert(s->target != NULL && rank >= 1 && rank <= STORE_MAX_RANK);
+    lam_status status = LAM_OK;
     store_mute mute = store_mute_begin();
-    lam_status status =
-        write_summed(s, name, file_type(type), store_type_size(type), rank, dims, data, error);
+    hid_t made = store_file_type(type);
+    if (made < 0) {
+        s->broken = true;
+        TRY(store_hdf5_failure(s, name, "write", error));
+    }
+    TRY(write_summed(s, name, made, store_type_size(type), rank, dims, data, error));
+done:
+    if (made >= 0) H5Tclose(made);
     store_mute_end(&mute);
     return status;
 }

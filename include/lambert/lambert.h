@@ -4,6 +4,7 @@
 #define LAMBERT_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 /* Every status and its text, once. Any status but LAM_OK leaves outputs untouched. */
 #define LAM_STATUS_LIST(X)                                                                                   \
@@ -55,7 +56,12 @@ size_t lam_operator_bytes(const lam_operator *op);
 /* The contract's name of its kind ("low_rank", ...); owned by the operator. */
 const char *lam_operator_kind(const lam_operator *op);
 
-/* Bytes of work area that lam_operator_apply and its adjoint need for n_rhs vectors; 0 when that overflows.
+/* How many threads one answer may use (1 unless told), for vectors large enough to be worth it. Before the
+ * operator is shared and before its work area is asked for; the bits do not depend on it. */
+void lam_operator_set_threads(lam_operator *op, size_t n_threads);
+
+/* Bytes of work area that lam_operator_apply, _selected and its adjoint need for n_rhs vectors; 0 when that
+ * overflows.
  */
 size_t lam_operator_work_bytes(const lam_operator *op, size_t n_rhs);
 
@@ -72,6 +78,15 @@ lam_status lam_operator_apply(const lam_operator *op, size_t n_rhs, lam_quantity
 lam_status lam_operator_apply_lit(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
                                   const float *H0, float *out, void *work, size_t work_bytes,
                                   lam_error *error);
+
+/* The same for some elements only, of which no other row is computed: out is [n_rhs][C][n_selected], in the
+ * order of selected, which may name an element twice; bit for bit what the whole answer has there. E and H0
+ * are whole. Cost: O((n + n_selected) k) a vector for a low-rank operator, less where E is sparse. Errors:
+ * also LAM_ERR_ARGUMENT for an element that is not below n. */
+lam_status lam_operator_apply_selected(const lam_operator *op, size_t n_rhs, lam_quantity quantity,
+                                       const float *E, const float *H0, size_t n_selected,
+                                       const uint32_t *selected, float *out, void *work, size_t work_bytes,
+                                       lam_error *error);
 
 /* w = (d quantity / d E)^T g for a batch: the transpose of lam_operator_apply, same shapes, same rules. */
 lam_status lam_operator_apply_adjoint(const lam_operator *op, size_t n_rhs, lam_quantity quantity,

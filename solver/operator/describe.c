@@ -170,6 +170,10 @@ lam_status describe_store(store *s, json_t **out, lam_error *error) {
     copy_member(made, "reason", operator_attributes, "reason");
     copy_member(made, "epsilon", operator_attributes, "epsilon");
     add_size_figure(made, operator_attributes, json_string_value(kind));
+    /* Only kinds that have a choice say it. */
+    const json_t *precision = json_object_get(operator_attributes, "precision");
+    json_object_set_new(made, "precision",
+                        precision != NULL ? json_deep_copy(precision) : json_string("f32"));
     json_object_set_new(made, "bytes", json_integer((json_int_t)bytes));
     TRY(add_groups(s, dims[1], made, error));
     json_object_set_new(made, "emitters", json_null());

@@ -114,6 +114,21 @@ static void exact_apply_adjoint(const lam_operator *op, size_t n_rhs, float *g, 
         panel_project(&self->P[c], n_rhs, g + c * n, stride, w + c * n, stride, work);
 }
 
+/* P_c E_c, some rows of it */
+static void exact_apply_selected(const lam_operator *op, size_t n_rhs, const float *E, size_t n_selected,
+                                 const uint32_t *selected, float *P, void *work) {
+    const exact *self = (const exact *)op;
+    size_t n = op->n, C = op->n_channels;
+    for (size_t c = 0; c < C; c++)
+        panel_expand_rows(&self->P[c], n_rhs, E + c * n, C * n, n_selected, selected, op->position,
+                          P + c * n_selected, C * n_selected, work);
+}
+
+static void exact_set_threads(lam_operator *op, size_t n_threads) {
+    exact *self = (exact *)op;
+    for (size_t c = 0; c < op->n_channels; c++) self->P[c].n_threads = n_threads;
+}
+
 static void exact_describe(const lam_operator *op, operator_description *description) {
     const exact *self = (const exact *)op;
     description->density = 1.0;
@@ -127,6 +142,8 @@ const operator_kind operator_exact = {
     .work_bytes = exact_work_bytes,
     .apply = exact_apply,
     .apply_adjoint = exact_apply_adjoint,
+    .apply_selected = exact_apply_selected,
+    .set_threads = exact_set_threads,
     .destroy = exact_destroy,
     .describe = exact_describe,
 };

@@ -23,29 +23,25 @@ static void low_rank_destroy(lam_operator *op) {
     free(self->core);
 }
 
-/* Both forms; core is NULL when folded. Each array goes as soon as its panel stands, so that only one is
- * there twice. */
-static lam_status create(size_t n, size_t k, size_t n_channels, const float *reflectance, float *left,
-                         float *V, float *core, lam_operator **op, lam_error *error) {
+/* Takes left, right and core [C][k][k] (NULL: folded), also on an error. */
+static lam_status assemble(size_t n, size_t k, size_t n_channels, const float *reflectance, panel *left,
+                           panel *right, float *core, lam_operator **op, lam_error *error) {
     lam_status status = LAM_OK;
     char name[48];
     low_rank *self = memory_allocate(1, sizeof *self, "operator", error);
     if (self == NULL) {
-        status = LAM_ERR_MEMORY;
-        goto done;
+        panel_free(left);
+        panel_free(right);
+        TRY(LAM_ERR_MEMORY);
     }
     self->base.kind = &operator_low_rank;
+    self->left = *left;
+    self->right = *right;
+    *left = *right = (panel){0};
     TRY(operator_init(&self->base, &operator_low_rank, n, n_channels, reflectance, error));
-    TRY(panel_create(n, k, left, core == NULL ? "/operator/Y" : "/operator/U", &self->left, error));
-    free(left);
-    left = NULL;
-    TRY(panel_create(n, k, V, "/operator/V", &self->right, error));
     if (core != NULL) {
         self->core = memory_allocate(n_channels, sizeof *self->core, "operator", error);
-        if (self->core == NULL) {
-            status = LAM_ERR_MEMORY;
-            goto done;
-        }
+        if (self->core == NULL) TRY(LAM_ERR_MEMORY);
         for (size_t c = 0; c < n_channels; c++) {
             snprintf(name, sizeof name, "/operator/core[%zu]", c);
             TRY(panel_create(k, k, core + c * k * k, name, &self->core[c], error));
@@ -54,10 +50,30 @@ static lam_status create(size_t n, size_t k, size_t n_channels, const float *ref
     *op = &self->base;
     self = NULL;
 done:
+    free(core);
+    if (self != NULL) lam_operator_close(&self->base);
+    return status;
+}
+
+/* Both forms; core is NULL when folded. Each array goes as soon as its panel stands, so that only one is
+ * there twice. */
+static lam_status create(size_t n, size_t k, size_t n_channels, const float *reflectance, float *left,
+                         float *V, float *core, lam_operator **op, lam_error *error) {
+    lam_status status = LAM_OK;
+    panel left_panel = {0}, V_panel = {0};
+    TRY(panel_create(n, k, left, core == NULL ? "/operator/Y" : "/operator/U", &left_panel, error));
+    free(left);
+    left = NULL;
+    TRY(panel_create(n, k, V, "/operator/V", &V_panel, error));
+    float *core_taken = core;
+    core = NULL;
+    TRY(assemble(n, k, n_channels, reflectance, &left_panel, &V_panel, core_taken, op, error));
+done:
+    panel_free(&left_panel);
+    panel_free(&V_panel);
     free(left);
     free(V);
     free(core);
-    if (self != NULL) lam_operator_close(&self->base);
     return status;
 }
 
@@ -72,12 +88,81 @@ lam_status operator_low_rank_create_factored(size_t n, size_t k, size_t n_channe
     return create(n, k, n_channels, reflectance, U, V, core, op, error);
 }
 
+/* --- precisions and the store -------------------------------------------------------------------------- */
+
+/* What a panel of a precision is in a file: bf16 as u16 with the attribute encoding. */
+static const store_type panel_types[PANEL_PRECISIONS] = {STORE_F32, STORE_F16, STORE_U16, STORE_I8};
+
+static lam_status read_precision(store *s, const char *name, panel_precision *precision, lam_error *error) {
+    lam_status status = LAM_OK;
+    store_type type;
+    int rank;
+    size_t dims[STORE_MAX_RANK], p = 0;
+    char *encoding = NULL;
+    TRY(store_array_info(s, name, &type, &rank, dims, error));
+    while (p < PANEL_PRECISIONS && panel_types[p] != type) p++;
+    if (p == PANEL_PRECISIONS)
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s must be of f32, f16, bf16 or i8", store_path(s), name);
+    if (store_has_attribute(s, name, "encoding")) TRY(store_get_text(s, name, "encoding", &encoding, error));
+    if (encoding != NULL ? p != PANEL_BF16 || strcmp(encoding, "bf16") != 0 : p == PANEL_BF16)
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s: %s has the encoding '%s', must be 'bf16' where it is of u16 and none elsewhere",
+             store_path(s), name, encoding != NULL ? encoding : "");
+    *precision = (panel_precision)p;
+done:
+    free(encoding);
+    return status;
+}
+
+/* A panel [n][*k] with its scale; *k may be SIZE_MAX: as found. */
+static lam_status load_panel(store *s, const char *name, size_t n, size_t *k, panel *a, lam_error *error) {
+    lam_status status = LAM_OK;
+    char scale_name[48];
+    void *values = NULL, *scale = NULL;
+    panel_precision precision = PANEL_F32;
+    size_t dims[STORE_MAX_RANK] = {n, *k};
+    TRY(read_precision(s, name, &precision, error));
+    snprintf(scale_name, sizeof scale_name, "%s_scale", name);
+    const bool scaled = store_has(s, scale_name);
+    if (precision == PANEL_I8 && !scaled)
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s is of i8 and has no %s", store_path(s), name, scale_name);
+    if (scaled && precision != PANEL_I8 && precision != PANEL_F16)
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s is of %s and must not have a %s", store_path(s), name,
+             panel_precision_name(precision), scale_name);
+    TRY(store_read(s, name, panel_types[precision], 2, dims, &values, error));
+    if (scaled) TRY(store_read(s, scale_name, STORE_F32, 1, &dims[1], &scale, error));
+    TRY(panel_create_kept(n, dims[1], precision, values, scale, name, a, error));
+    *k = dims[1];
+done:
+    free(values);
+    free(scale);
+    return status;
+}
+
+/* The attribute, where there is one, must say what Y or U and V are kept in. */
+static lam_status check_precision(store *s, const panel *left, const panel *right, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *said = NULL;
+    if (left->precision != right->precision)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /operator has one array of %s and one of %s, must be the same",
+             store_path(s), panel_precision_name(left->precision), panel_precision_name(right->precision));
+    if (!store_has_attribute(s, "/operator", "precision")) goto done;
+    TRY(store_get_text(s, "/operator", "precision", &said, error));
+    if (strcmp(said, panel_precision_name(left->precision)) != 0)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /operator says precision '%s', its arrays are of %s", store_path(s),
+             said, panel_precision_name(left->precision));
+done:
+    free(said);
+    return status;
+}
+
 static lam_status low_rank_load(store *s, size_t n, size_t n_channels, const float *reflectance,
                                 lam_operator **op, lam_error *error) {
     lam_status status = LAM_OK;
     char *form = NULL;
-    void *left = NULL, *V = NULL, *core = NULL;
-    size_t dims[STORE_MAX_RANK] = {n, SIZE_MAX};
+    void *core = NULL;
+    panel left = {0}, right = {0};
+    size_t k = SIZE_MAX;
     TRY(store_get_text(s, "/operator", "form", &form, error));
     bool folded = strcmp(form, "folded") == 0;
     if (!folded && strcmp(form, "factored") != 0)
@@ -87,41 +172,38 @@ static lam_status low_rank_load(store *s, size_t n, size_t n_channels, const flo
         FAIL(error, LAM_ERR_FORMAT,
              "%s: /operator is folded, which needs 1 channel, /mesh/reflectance has %zu", store_path(s),
              n_channels);
-    TRY(store_read(s, folded ? "/operator/Y" : "/operator/U", STORE_F32, 2, dims, &left, error));
-    size_t k = dims[1];
-    TRY(store_read(s, "/operator/V", STORE_F32, 2, dims, &V, error));
+    TRY(load_panel(s, folded ? "/operator/Y" : "/operator/U", n, &k, &left, error));
+    TRY(load_panel(s, "/operator/V", n, &k, &right, error));
+    TRY(check_precision(s, &left, &right, error));
     if (!folded) {
         size_t core_dims[STORE_MAX_RANK] = {n_channels, k, k};
         TRY(store_read(s, "/operator/core", STORE_F32, 3, core_dims, &core, error));
     }
-    float *left_taken = left, *V_taken = V, *core_taken = core;
-    left = V = core = NULL;
-    TRY(create(n, k, n_channels, reflectance, left_taken, V_taken, core_taken, op, error));
+    float *core_taken = core;
+    core = NULL;
+    TRY(assemble(n, k, n_channels, reflectance, &left, &right, core_taken, op, error));
 done:
     free(form);
-    free(left);
-    free(V);
     free(core);
+    panel_free(&left);
+    panel_free(&right);
     return status;
 }
 
-/* Writes a panel without its padding. */
 static lam_status save_panel(const panel *a, store *s, const char *name, lam_error *error) {
     lam_status status = LAM_OK;
+    char scale_name[48];
     size_t dims[2] = {a->n, a->k};
-    float *rows = NULL;
-    /* The padded panel was allocated, so the products below cannot overflow. */
-    if (a->stride != a->k) {
-        rows = memory_allocate(a->n * a->k, sizeof *rows, name, error);
-        if (rows == NULL) {
-            status = LAM_ERR_MEMORY;
-            goto done;
-        }
-        panel_copy_rows(a, rows);
-    }
-    TRY(store_write(s, name, STORE_F32, 2, dims, rows != NULL ? rows : a->data, error));
+    /* The padded panel was allocated, so the product below cannot overflow. */
+    void *values = memory_allocate(a->n * a->k, panel_value_size(a->precision), name, error);
+    if (values == NULL) TRY(LAM_ERR_MEMORY);
+    panel_copy_values(a, values);
+    TRY(store_write(s, name, panel_types[a->precision], 2, dims, values, error));
+    if (a->precision == PANEL_BF16) TRY(store_set_text(s, name, "encoding", "bf16", error));
+    snprintf(scale_name, sizeof scale_name, "%s_scale", name);
+    if (a->scale != NULL) TRY(store_write(s, scale_name, STORE_F32, 1, &a->k, a->scale, error));
 done:
-    free(rows);
+    free(values);
     return status;
 }
 
@@ -150,37 +232,88 @@ done:
     return status;
 }
 
+static lam_status low_rank_narrow(const lam_operator *op, panel_precision precision, lam_operator **out,
+                                  lam_error *error) {
+    lam_status status = LAM_OK;
+    const low_rank *self = (const low_rank *)op;
+    const size_t k = self->left.k;
+    panel left = {0}, right = {0};
+    float *core = NULL;
+    TRY(panel_convert(&self->left, precision, self->core == NULL ? "/operator/Y" : "/operator/U", &left,
+                      error));
+    TRY(panel_convert(&self->right, precision, "/operator/V", &right, error));
+    if (self->core != NULL) {
+        core = memory_allocate(op->n_channels, k * k * sizeof *core, "/operator/core", error);
+        if (core == NULL) TRY(LAM_ERR_MEMORY);
+        for (size_t c = 0; c < op->n_channels; c++) panel_copy_rows(&self->core[c], core + c * k * k);
+    }
+    float *core_taken = core;
+    core = NULL;
+    TRY(assemble(op->n, k, op->n_channels, op->reflectance, &left, &right, core_taken, out, error));
+done:
+    free(core);
+    panel_free(&left);
+    panel_free(&right);
+    return status;
+}
+
+/* --- products ------------------------------------------------------------------------------------------- */
+
 /* t = V^T E and core t, [n_rhs][C][stride] each, and what the products need. */
 static size_t low_rank_work_bytes(const lam_operator *op, size_t n_rhs) {
     const low_rank *self = (const low_rank *)op;
-    size_t m, t_bytes, product = 0, total = 0;
+    size_t m, t_bytes, product, total = 0;
     if (!size_multiply(n_rhs, op->n_channels, &m) || !size_multiply(m, self->left.stride, &t_bytes) ||
         !size_multiply(t_bytes, sizeof(float), &t_bytes))
         return 0;
-    product = panel_work_bytes(&self->left, m);
-    if (product == 0 || !work_add(&total, t_bytes) || !work_add(&total, t_bytes) ||
-        !work_add(&total, product))
-        return 0;
+    const panel *panels[] = {&self->left, &self->right, self->core};
+    product = 0;
+    for (size_t i = 0; i < 3 && panels[i] != NULL; i++) {
+        const size_t bytes = panel_work_bytes(panels[i], m);
+        if (bytes == 0) return 0;
+        product = bytes > product ? bytes : product;
+    }
+    if (!work_add(&total, t_bytes) || !work_add(&total, t_bytes) || !work_add(&total, product)) return 0;
     return total;
 }
 
-static void low_rank_apply(const lam_operator *op, size_t n_rhs, const float *E, float *P, void *work) {
-    const low_rank *self = (const low_rank *)op;
-    size_t n = op->n, C = op->n_channels, m = n_rhs * C, stride = self->left.stride;
-    float *t = work_take(&work, m * stride * sizeof *t);
-    float *core_t = work_take(&work, m * stride * sizeof *core_t);
-    panel_project(&self->right, m, E, n, t, stride, work);
-    if (self->core == NULL) { /* P = -Y (V^T E) */
+/* -V^T E (folded) or core_c V^T E_c: [n_rhs][C][stride]; work goes on behind it. */
+static float *light_columns(const low_rank *self, size_t n_rhs, const float *E, void **work) {
+    size_t C = self->base.n_channels, m = n_rhs * C, stride = self->left.stride;
+    float *t = work_take(work, m * stride * sizeof *t);
+    float *core_t = work_take(work, m * stride * sizeof *core_t);
+    panel_project(&self->right, m, E, self->base.n, t, stride, *work);
+    if (self->core == NULL) {
         for (size_t j = 0; j < m * stride; j++) core_t[j] = -t[j];
-        panel_expand(&self->left, m, core_t, stride, P, n, work);
-    } else { /* P_c = rho'_c U core_c (V^T E_c) */
+    } else {
         for (size_t c = 0; c < C; c++)
             panel_expand(&self->core[c], n_rhs, t + c * stride, C * stride, core_t + c * stride, C * stride,
-                         work);
-        panel_expand(&self->left, m, core_t, stride, P, n, work);
-        for (size_t v = 0; v < m; v++)
-            for (size_t p = 0; p < n; p++) P[v * n + p] *= operator_reflectance_or_one(op, v % C, p);
+                         *work);
     }
+    return core_t;
+}
+
+/* P = -Y (V^T E), or P_c = rho'_c U core_c (V^T E_c) */
+static void low_rank_apply(const lam_operator *op, size_t n_rhs, const float *E, float *P, void *work) {
+    const low_rank *self = (const low_rank *)op;
+    size_t n = op->n, C = op->n_channels, m = n_rhs * C;
+    const float *t = light_columns(self, n_rhs, E, &work);
+    panel_expand(&self->left, m, t, self->left.stride, P, n, work);
+    for (size_t v = 0; v < m && self->core != NULL; v++)
+        for (size_t p = 0; p < n; p++) P[v * n + p] *= operator_reflectance_or_one(op, v % C, p);
+}
+
+static void low_rank_apply_selected(const lam_operator *op, size_t n_rhs, const float *E, size_t n_selected,
+                                    const uint32_t *selected, float *P, void *work) {
+    const low_rank *self = (const low_rank *)op;
+    size_t C = op->n_channels, m = n_rhs * C;
+    const float *t = light_columns(self, n_rhs, E, &work);
+    panel_expand_rows(&self->left, m, t, self->left.stride, n_selected, selected, op->position, P, n_selected,
+                      work);
+    for (size_t v = 0; v < m && self->core != NULL; v++)
+        for (size_t r = 0; r < n_selected; r++)
+            P[v * n_selected + r] *=
+                operator_reflectance_or_one(op, v % C, operator_position(op, selected[r]));
 }
 
 static void low_rank_apply_adjoint(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work) {
@@ -202,8 +335,15 @@ static void low_rank_apply_adjoint(const lam_operator *op, size_t n_rhs, float *
     panel_expand(&self->right, m, core_t, stride, w, n, work);
 }
 
+static void low_rank_set_threads(lam_operator *op, size_t n_threads) {
+    low_rank *self = (low_rank *)op;
+    self->left.n_threads = self->right.n_threads = n_threads;
+    for (size_t c = 0; self->core != NULL && c < op->n_channels; c++) self->core[c].n_threads = n_threads;
+}
+
 static void low_rank_describe(const lam_operator *op, operator_description *description) {
     const low_rank *self = (const low_rank *)op;
+    description->precision = panel_precision_name(self->left.precision);
     description->form = self->core == NULL ? "folded" : "factored";
     description->rank = self->left.k;
     description->bytes = panel_bytes(&self->left) + panel_bytes(&self->right);
@@ -218,6 +358,9 @@ const operator_kind operator_low_rank = {
     .work_bytes = low_rank_work_bytes,
     .apply = low_rank_apply,
     .apply_adjoint = low_rank_apply_adjoint,
+    .apply_selected = low_rank_apply_selected,
+    .set_threads = low_rank_set_threads,
+    .narrow = low_rank_narrow,
     .destroy = low_rank_destroy,
     .describe = low_rank_describe,
 };

@@ -2,8 +2,6 @@
  * Knows no kind from inside. */
 #include "solver/operator/operator.h"
 
-#include "solver/operator/panel.h"
-
 #include <stdlib.h>
 #include <string.h>
 
@@ -38,38 +36,38 @@ lam_status operator_init(lam_operator *op, const operator_kind *kind, size_t n, 
     op->kind = kind;
     op->n = n;
     op->n_channels = n_channels;
+    op->n_threads = 1;
 done:
     return status;
 }
 
 lam_status operator_set_order(lam_operator *op, const uint32_t *order, lam_error *error) {
     lam_status status = LAM_OK;
-    uint32_t *copy = NULL;
-    unsigned char *seen = NULL;
+    uint32_t *copy = NULL, *position = NULL;
     if (order != NULL) {
         copy = memory_allocate(op->n, sizeof *copy, "order", error);
-        seen = memory_allocate(op->n, 1, "order", error);
-        if (copy == NULL || seen == NULL) {
-            status = LAM_ERR_MEMORY;
-            goto done;
-        }
+        position = memory_allocate(op->n, sizeof *position, "order", error);
+        if (copy == NULL || position == NULL) TRY(LAM_ERR_MEMORY);
+        memset(position, 0xff, op->n * sizeof *position);
         for (size_t p = 0; p < op->n; p++) {
             if (order[p] >= op->n)
                 FAIL(error, LAM_ERR_NUMERIC, "order[%zu] = %u, must be below %zu", p, (unsigned)order[p],
                      op->n);
-            if (seen[order[p]])
+            if (position[order[p]] != UINT32_MAX)
                 FAIL(error, LAM_ERR_NUMERIC, "order[%zu] = %u, which stands there twice", p,
                      (unsigned)order[p]);
-            seen[order[p]] = 1;
+            position[order[p]] = (uint32_t)p;
         }
         memcpy(copy, order, op->n * sizeof *copy);
     }
     free(op->order);
+    free(op->position);
     op->order = copy;
-    copy = NULL;
+    op->position = position;
+    copy = position = NULL;
 done:
     free(copy);
-    free(seen);
+    free(position);
     return status;
 }
 
@@ -140,6 +138,8 @@ lam_status operator_save(const lam_operator *op, store *s, lam_error *error) {
     TRY(store_set_text(s, "/operator", "kind", op->kind->name, error));
     if (description.form != NULL) TRY(store_set_text(s, "/operator", "form", description.form, error));
     TRY(store_set_text(s, "/operator", "layout", "rows", error));
+    if (description.precision != NULL)
+        TRY(store_set_text(s, "/operator", "precision", description.precision, error));
     if (op->order != NULL) TRY(store_write(s, "/operator/order", STORE_U32, 1, &op->n, op->order, error));
     TRY(op->kind->save(op, s, error));
 done:
@@ -168,6 +168,7 @@ void lam_operator_close(lam_operator *op) {
     op->kind->destroy(op);
     free(op->reflectance);
     free(op->order);
+    free(op->position);
     free(op);
 }
 
@@ -189,13 +190,36 @@ const char *lam_operator_kind(const lam_operator *op) {
     return op->kind->name;
 }
 
+void lam_operator_set_threads(lam_operator *op, size_t n_threads) {
+    op->n_threads = n_threads > 0 ? n_threads : 1;
+    if (op->kind->set_threads != NULL) op->kind->set_threads(op, op->n_threads);
+}
+
+lam_status operator_narrow(const lam_operator *op, panel_precision precision, lam_operator **out,
+                           lam_error *error) {
+    lam_status status = LAM_OK;
+    lam_operator *made = NULL;
+    if (op->kind->narrow == NULL)
+        FAIL(error, LAM_ERR_UNSUPPORTED, "an operator of kind '%s' is kept in f32", op->kind->name);
+    TRY(op->kind->narrow(op, precision, &made, error));
+    TRY(operator_set_order(made, op->order, error));
+    lam_operator_set_threads(made, op->n_threads);
+    *out = made;
+    made = NULL;
+done:
+    lam_operator_close(made);
+    return status;
+}
+
 /* A pass needs the caller's vectors in position order (the adjoint: g pulled back through the quantity), with
- * an order also the answer before it is put into mesh order, and what the kind needs. */
+ * an order also the answer before it is put into mesh order (and where a kind cannot choose rows, in case
+ * some are chosen), and what the kind needs. */
 static size_t pass_bytes(const lam_operator *op, size_t n_rhs, size_t *vectors_bytes) {
     size_t count, vectors, kind_bytes = op->kind->work_bytes(op, n_rhs), total = PANEL_ALIGN;
     if (kind_bytes == 0 || !size_multiply(n_rhs, op->n_channels, &count) ||
         !size_multiply(count, op->n, &count) || !size_multiply(count, sizeof(float), &vectors) ||
-        !work_add(&total, vectors) || (op->order != NULL && !work_add(&total, vectors)) ||
+        !work_add(&total, vectors) ||
+        ((op->order != NULL || op->kind->apply_selected == NULL) && !work_add(&total, vectors)) ||
         !work_add(&total, kind_bytes))
         return 0;
     if (vectors_bytes != NULL) *vectors_bytes = vectors;
@@ -211,10 +235,12 @@ static bool overlap(const void *a, size_t a_bytes, const void *b, size_t b_bytes
     return first < second ? second - first < a_bytes : first - second < b_bytes;
 }
 
+/* n_out: numbers of out in a vector and a channel. */
 static lam_status check_apply(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *in,
-                              const float *out, const void *work, size_t work_bytes, lam_error *error) {
+                              size_t n_out, const float *out, const void *work, size_t work_bytes,
+                              lam_error *error) {
     lam_status status = LAM_OK;
-    size_t bytes;
+    size_t bytes, out_bytes;
     if (op == NULL || in == NULL || out == NULL || work == NULL)
         FAIL(error, LAM_ERR_ARGUMENT,
              "an operator, its input, its output and a work area are needed, one is NULL");
@@ -225,14 +251,18 @@ static lam_status check_apply(const lam_operator *op, size_t n_rhs, lam_quantity
         FAIL(error, LAM_ERR_ARGUMENT,
              "n_rhs = %zu vectors of %zu x %zu numbers are more than memory can have", n_rhs, op->n_channels,
              op->n);
+    if (!size_multiply(bytes / op->n, n_out, &out_bytes))
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "n_rhs = %zu vectors of %zu x %zu numbers are more than memory can have", n_rhs, op->n_channels,
+             n_out);
     size_t needed = lam_operator_work_bytes(op, n_rhs);
     if (needed == 0 || work_bytes < needed)
         FAIL(error, LAM_ERR_ARGUMENT, "work area of %zu bytes, %zu are needed for n_rhs = %zu", work_bytes,
              needed, n_rhs);
     if ((uintptr_t)work % _Alignof(max_align_t) != 0)
         FAIL(error, LAM_ERR_ARGUMENT, "work area is not aligned to %zu bytes", _Alignof(max_align_t));
-    if (overlap(in, bytes, out, bytes) || overlap(in, bytes, work, work_bytes) ||
-        overlap(out, bytes, work, work_bytes))
+    if (overlap(in, bytes, out, out_bytes) || overlap(in, bytes, work, work_bytes) ||
+        overlap(out, out_bytes, work, work_bytes))
         FAIL(error, LAM_ERR_ARGUMENT, "input, output and work area overlap");
 done:
     return status;
@@ -242,33 +272,104 @@ static void *align_work(void *work) {
     return (char *)work + (PANEL_ALIGN - (uintptr_t)work % PANEL_ALIGN) % PANEL_ALIGN;
 }
 
-/* One row of out (mesh order) from the same row of E' = E + rho H0 and of P (position order) and of H0 (mesh
- * order, NULL: 0). out may be P when there is no order. */
+/* Rows shorter than this are finished by one thread. */
+#define THREADS_WORTH 65536
+
+/* One element of the quantity: from E' = E + rho H0, P and H0. */
+static inline float finish(lam_quantity quantity, float rho, float lit, float P, float H0) {
+    switch (quantity) {
+    case LAM_RADIOSITY: /* B = E' + P */
+        return rho > 0.0f ? lit + P : lit;
+    case LAM_IRRADIANCE: /* H = H0 + P / rho' */
+        return (rho > 0.0f ? P / rho : P) + H0;
+    case LAM_INDIRECT: /* B - E' */
+        return rho > 0.0f ? P : 0.0f;
+    }
+    return 0.0f;
+}
+
+/* One row of out (mesh order) from the same row of E' and of P (position order) and of H0 (mesh order, NULL:
+ * 0). out may be P when there is no order. */
 static void finish_row(const lam_operator *op, size_t c, lam_quantity quantity, const float *lit,
                        const float *H0, const float *P, float *out) {
     const float *rho = op->reflectance + c * op->n;
+#pragma omp parallel for schedule(static)                                                                    \
+    num_threads((int)op->n_threads) if (op->n_threads > 1 && op->n >= THREADS_WORTH)
     for (size_t p = 0; p < op->n; p++) {
-        size_t i = op->order != NULL ? op->order[p] : p;
-        switch (quantity) {
-        case LAM_RADIOSITY: /* B = E' + P */
-            out[i] = rho[i] > 0.0f ? lit[p] + P[p] : lit[p];
-            break;
-        case LAM_IRRADIANCE: /* H = H0 + P / rho' */
-            out[i] = (rho[i] > 0.0f ? P[p] / rho[i] : P[p]) + (H0 != NULL ? H0[i] : 0.0f);
-            break;
-        case LAM_INDIRECT: /* B - E' */
-            out[i] = rho[i] > 0.0f ? P[p] : 0.0f;
-            break;
-        }
+        const size_t i = op->order != NULL ? op->order[p] : p;
+        out[i] = finish(quantity, rho[i], lit[p], P[p], H0 != NULL ? H0[i] : 0.0f);
+    }
+}
+
+/* The same for some elements: P holds theirs, or (by_position) all. out may be P when it holds theirs. */
+static void finish_selected(const lam_operator *op, size_t c, lam_quantity quantity, const float *lit,
+                            const float *H0, size_t n_selected, const uint32_t *selected, bool by_position,
+                            const float *P, float *out) {
+    const float *rho = op->reflectance + c * op->n;
+    for (size_t r = 0; r < n_selected; r++) {
+        const size_t i = selected[r], p = operator_position(op, i);
+        out[r] = finish(quantity, rho[i], lit[p], P[by_position ? p : r], H0 != NULL ? H0[i] : 0.0f);
     }
 }
 
 /* One row of E' = E + rho H0, from mesh order into position order. */
 static void light_row(const lam_operator *op, size_t c, const float *E, const float *H0, float *lit) {
     const float *rho = op->reflectance + c * op->n;
+#pragma omp parallel for schedule(static)                                                                    \
+    num_threads((int)op->n_threads) if (op->n_threads > 1 && op->n >= THREADS_WORTH)
     for (size_t p = 0; p < op->n; p++) {
-        size_t i = op->order != NULL ? op->order[p] : p;
+        const size_t i = op->order != NULL ? op->order[p] : p;
         lit[p] = H0 != NULL ? E[i] + rho[i] * H0[i] : E[i];
+    }
+}
+
+/* What one pass takes in, for all of out or (selected not NULL) some elements. */
+typedef struct pass {
+    const float *E, *H0;
+    size_t count, n_selected;
+    const uint32_t *selected;
+    lam_quantity quantity;
+} pass;
+
+static void apply_pass(const lam_operator *op, const pass *in, float *out, void *work) {
+    const size_t n = op->n, rows = in->count * op->n_channels, row_bytes = n * sizeof(float);
+    const bool choose = in->selected != NULL && op->kind->apply_selected != NULL;
+    const bool apart = in->selected != NULL ? !choose : op->order != NULL;
+    const float *lit = in->E;
+    float *P = out;
+    void *rest = align_work(work);
+    if (op->order != NULL || in->H0 != NULL) {
+        float *positions = work_take(&rest, rows * row_bytes);
+        for (size_t row = 0; row < rows; row++)
+            light_row(op, row % op->n_channels, in->E + row * n, in->H0 != NULL ? in->H0 + row * n : NULL,
+                      positions + row * n);
+        lit = positions;
+    }
+    if (apart) P = work_take(&rest, rows * row_bytes);
+    if (choose)
+        op->kind->apply_selected(op, in->count, lit, in->n_selected, in->selected, P, rest);
+    else
+        op->kind->apply(op, in->count, lit, P, rest);
+    for (size_t row = 0; row < rows; row++) {
+        const float *H0 = in->H0 != NULL ? in->H0 + row * n : NULL;
+        const size_t c = row % op->n_channels;
+        if (in->selected == NULL)
+            finish_row(op, c, in->quantity, lit + row * n, H0, P + row * n, out + row * n);
+        else
+            finish_selected(op, c, in->quantity, lit + row * n, H0, in->n_selected, in->selected, !choose,
+                            P + row * (choose ? in->n_selected : n), out + row * in->n_selected);
+    }
+}
+
+static void apply_passes(const lam_operator *op, size_t n_rhs, const pass *all, float *out, void *work) {
+    const size_t in_size = op->n_channels * op->n;
+    const size_t out_size = all->selected != NULL ? op->n_channels * all->n_selected : in_size;
+    for (size_t r = 0; r < n_rhs; r += OPERATOR_PASS) {
+        pass one = *all;
+        one.count = n_rhs - r < OPERATOR_PASS ? n_rhs - r : OPERATOR_PASS;
+        one.E += r * in_size;
+        if (one.H0 != NULL) one.H0 += r * in_size;
+        apply_pass(op, &one, out + r * out_size, work);
     }
 }
 
@@ -281,28 +382,30 @@ lam_status lam_operator_apply_lit(const lam_operator *op, size_t n_rhs, lam_quan
                                   const float *H0, float *out, void *work, size_t work_bytes,
                                   lam_error *error) {
     lam_status status = LAM_OK;
-    TRY(check_apply(op, n_rhs, quantity, E, out, work, work_bytes, error));
-    if (H0 != NULL) TRY(check_apply(op, n_rhs, quantity, H0, out, work, work_bytes, error));
-    size_t n = op->n, row_bytes = n * sizeof(float);
-    for (size_t r = 0; r < n_rhs; r += OPERATOR_PASS) {
-        size_t count = n_rhs - r < OPERATOR_PASS ? n_rhs - r : OPERATOR_PASS, rows = count * op->n_channels;
-        const float *E_pass = E + r * op->n_channels * n, *lit = E_pass;
-        const float *H0_pass = H0 != NULL ? H0 + r * op->n_channels * n : NULL;
-        float *out_pass = out + r * op->n_channels * n, *P = out_pass;
-        void *rest = align_work(work);
-        if (op->order != NULL || H0 != NULL) {
-            float *positions = work_take(&rest, rows * row_bytes);
-            for (size_t row = 0; row < rows; row++)
-                light_row(op, row % op->n_channels, E_pass + row * n,
-                          H0_pass != NULL ? H0_pass + row * n : NULL, positions + row * n);
-            lit = positions;
-        }
-        if (op->order != NULL) P = work_take(&rest, rows * row_bytes);
-        op->kind->apply(op, count, lit, P, rest);
-        for (size_t row = 0; row < rows; row++)
-            finish_row(op, row % op->n_channels, quantity, lit + row * n,
-                       H0_pass != NULL ? H0_pass + row * n : NULL, P + row * n, out_pass + row * n);
-    }
+    const size_t n = op != NULL ? op->n : 0;
+    TRY(check_apply(op, n_rhs, quantity, E, n, out, work, work_bytes, error));
+    if (H0 != NULL) TRY(check_apply(op, n_rhs, quantity, H0, n, out, work, work_bytes, error));
+    apply_passes(op, n_rhs, &(pass){.E = E, .H0 = H0, .quantity = quantity}, out, work);
+done:
+    return status;
+}
+
+lam_status lam_operator_apply_selected(const lam_operator *op, size_t n_rhs, lam_quantity quantity,
+                                       const float *E, const float *H0, size_t n_selected,
+                                       const uint32_t *selected, float *out, void *work, size_t work_bytes,
+                                       lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(check_apply(op, n_rhs, quantity, E, n_selected, out, work, work_bytes, error));
+    if (H0 != NULL) TRY(check_apply(op, n_rhs, quantity, H0, n_selected, out, work, work_bytes, error));
+    if (selected == NULL) FAIL(error, LAM_ERR_ARGUMENT, "a list of the elements selected is needed");
+    for (size_t r = 0; r < n_selected; r++)
+        if (selected[r] >= op->n)
+            FAIL(error, LAM_ERR_ARGUMENT, "selected[%zu] = %u, must be below %zu", r, (unsigned)selected[r],
+                 op->n);
+    apply_passes(
+        op, n_rhs,
+        &(pass){.E = E, .H0 = H0, .quantity = quantity, .n_selected = n_selected, .selected = selected}, out,
+        work);
 done:
     return status;
 }
@@ -324,7 +427,7 @@ lam_status lam_operator_apply_adjoint(const lam_operator *op, size_t n_rhs, lam_
                                       const float *g, float *w, void *work, size_t work_bytes,
                                       lam_error *error) {
     lam_status status = LAM_OK;
-    TRY(check_apply(op, n_rhs, quantity, g, w, work, work_bytes, error));
+    TRY(check_apply(op, n_rhs, quantity, g, op != NULL ? op->n : 0, w, work, work_bytes, error));
     size_t n = op->n, row_bytes = n * sizeof(float);
     for (size_t r = 0; r < n_rhs; r += OPERATOR_PASS) {
         size_t count = n_rhs - r < OPERATOR_PASS ? n_rhs - r : OPERATOR_PASS, rows = count * op->n_channels;

@@ -2,16 +2,18 @@
 #ifndef LAMBERT_OPERATOR_OPERATOR_H
 #define LAMBERT_OPERATOR_OPERATOR_H
 
+#include "solver/operator/panel.h"
 #include "store/store.h"
 
 #include <stdint.h>
 
 /* What an operator says about itself. */
 typedef struct operator_description {
-    const char *form; /* "folded", "factored" or NULL */
-    size_t rank;      /* 0 when the kind has none */
-    double density;   /* share of n^2 stored; negative when the kind has none */
-    size_t bytes;     /* of the arrays a solve reads */
+    const char *form;      /* "folded", "factored" or NULL */
+    const char *precision; /* of its large arrays; NULL: f32, which the kind has no choice about */
+    size_t rank;           /* 0 when the kind has none */
+    double density;        /* share of n^2 stored; negative when the kind has none */
+    size_t bytes;          /* of the arrays a solve reads */
 } operator_description;
 
 /* One kind: a const table at the end of its file, listed in operator.c.
@@ -20,7 +22,12 @@ typedef struct operator_description {
  * where rho_i = 0 (contract, /operator, last line): B_i = E_i + P_i where rho_i > 0, else E_i, and
  * H_i = P_i / rho'_i. E and P are [n_rhs][C][n] in position order, n_rhs at most OPERATOR_PASS. apply and its
  * adjoint P^T cannot fail, allocate nothing, and give a vector the same bits in any batch; the adjoint may
- * overwrite g. work is aligned to a cache line; work_bytes is 0 when it overflows, and only then. */
+ * overwrite g. work is aligned to a cache line; work_bytes is 0 when it overflows, and only then.
+ *
+ * What a kind may leave NULL: apply_selected, the rows of apply for the n_selected elements selected
+ * (operator_position says where they are), P being [n_rhs][C][n_selected] (without it all rows are computed);
+ * set_threads, which passes n_threads on to its arrays; narrow, which makes the operator again with its large
+ * arrays in another precision, all of its own. */
 #define OPERATOR_PASS 16 /* a larger batch is cut into passes */
 
 typedef struct operator_kind {
@@ -31,6 +38,11 @@ typedef struct operator_kind {
     size_t (*work_bytes)(const lam_operator *op, size_t n_rhs);
     void (*apply)(const lam_operator *op, size_t n_rhs, const float *E, float *P, void *work);
     void (*apply_adjoint)(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work);
+    void (*apply_selected)(const lam_operator *op, size_t n_rhs, const float *E, size_t n_selected,
+                           const uint32_t *selected, float *P, void *work);
+    void (*set_threads)(lam_operator *op, size_t n_threads);
+    lam_status (*narrow)(const lam_operator *op, panel_precision precision, lam_operator **out,
+                         lam_error *error);
     void (*destroy)(lam_operator *op);
     void (*describe)(const lam_operator *op, operator_description *description);
 } operator_kind;
@@ -41,6 +53,8 @@ struct lam_operator {
     size_t n_channels;
     float *reflectance; /* [C][n], mesh order, owned */
     uint32_t *order;    /* [n], position -> element, owned; NULL: mesh order */
+    uint32_t *position; /* [n], element -> position, owned; NULL with order */
+    size_t n_threads;   /* of one answer */
 };
 
 extern const operator_kind operator_exact;
@@ -58,11 +72,22 @@ lam_status operator_init(lam_operator *op, const operator_kind *kind, size_t n, 
  * operator is shared. Errors: LAM_ERR_NUMERIC when order is no permutation of 0 .. n-1, LAM_ERR_MEMORY. */
 lam_status operator_set_order(lam_operator *op, const uint32_t *order, lam_error *error);
 
+/* Where an element's row is. */
+static inline size_t operator_position(const lam_operator *op, size_t element) {
+    return op->position != NULL ? op->position[element] : element;
+}
+
 /* The reflectance of channel c at a position, 1 where it is 0: rho' above. */
 static inline float operator_reflectance_or_one(const lam_operator *op, size_t c, size_t position) {
     float rho = op->reflectance[c * op->n + (op->order != NULL ? op->order[position] : position)];
     return rho > 0.0f ? rho : 1.0f;
 }
+
+/* Makes op, in f32, again with its large arrays in another precision; the caller frees out with
+ * lam_operator_close. Errors: LAM_ERR_UNSUPPORTED for a kind that has no choice, LAM_ERR_MEMORY,
+ * LAM_ERR_NUMERIC for a value beyond the precision. */
+lam_status operator_narrow(const lam_operator *op, panel_precision precision, lam_operator **out,
+                           lam_error *error);
 
 /* Loads /operator of an open store (its reflectances from /mesh); the caller frees with lam_operator_close.
  */

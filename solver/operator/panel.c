@@ -1,239 +1,282 @@
-/* Owns the dense matrix of an operator: its memory, and its two products for the CPU at hand. */
+/* Owns the dense matrix of an operator: its memory, its precision. The products are in panel_product.c. */
 #include "solver/operator/panel.h"
 
+#include "solver/operator/half.h"
+
 #include <math.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#if defined(__x86_64__)
-#include <immintrin.h>
-#endif
-
-/* Rows whose products are added in single precision before they join the sum in double. */
-#define PROJECT_BLOCK 128
-/* Rows that go through project together. */
-#define PROJECT_ROWS 8
-/* Chunks of columns that a lane of expand adds before they join the sum in double. */
-#define EXPAND_CHUNKS 128
 
 #define HUGE_PAGE ((size_t)2 << 20)
 
-struct panel_kernels {
+/* f16: a column whose largest magnitude lies between these needs no scale. Below, what its small values lose
+ * to f16's smallest step of 2^-24 would show beside the rounding of its large ones. */
+#define HALF_LEAST 0x1p-7f
+#define HALF_MOST 6e4f
+/* i8: steps from 0 to the largest magnitude of a column. */
+#define I8_STEPS 127.0f
+
+static const struct {
     const char *name;
-    void (*project)(size_t n_rows, const float *const *rows, const float *c, size_t m, size_t n_chunks,
-                    float *t);
-    void (*expand)(const panel *a, size_t m, const float *t, float *Y, size_t y_stride);
-    void (*flush)(size_t count, float *restrict part, double *restrict total);
-};
+    size_t size;
+} precisions[PANEL_PRECISIONS] = {{"f32", 4}, {"f16", 2}, {"bf16", 2}, {"i8", 1}};
 
-typedef float lane4 __attribute__((vector_size(16), may_alias));
-
-#define KERNEL(name) name##_portable
-#define TARGET
-#define lane lane4
-#define LANE_SET(x) ((lane4){(x), (x), (x), (x)})
-#define LANE_FMA(a, b, c) ((a) * (b) + (c))
-static inline float lane_sum_portable(lane4 x) {
-    return (x[0] + x[2]) + (x[1] + x[3]);
-}
-#define ROW_TILE 2
-#define VECTOR_TILE 1
-#define PROJECT_TILE 2
-#include "solver/operator/panel_kernels.h"
-
-#if defined(__x86_64__)
-#define KERNEL(name) name##_avx2
-#define TARGET __attribute__((target("avx2,fma")))
-#define lane __m256
-#define LANE_SET(x) _mm256_set1_ps(x)
-#define LANE_FMA(a, b, c) _mm256_fmadd_ps(a, b, c)
-TARGET static inline float lane_sum_avx2(__m256 x) {
-    __m128 four = _mm256_castps256_ps128(x) + _mm256_extractf128_ps(x, 1);
-    __m128 two = four + _mm_movehl_ps(four, four);
-    return _mm_cvtss_f32(two + _mm_movehdup_ps(two));
-}
-#define ROW_TILE 4
-#define VECTOR_TILE 1
-#define PROJECT_TILE 4
-#include "solver/operator/panel_kernels.h"
-
-#define KERNEL(name) name##_avx512
-#define TARGET __attribute__((target("avx512f")))
-#define lane __m512
-#define LANE_SET(x) _mm512_set1_ps(x)
-#define LANE_FMA(a, b, c) _mm512_fmadd_ps(a, b, c)
-TARGET static inline float lane_sum_avx512(__m512 x) {
-    __m256 eight =
-        _mm512_castps512_ps256(x) + _mm256_castpd_ps(_mm512_extractf64x4_pd(_mm512_castps_pd(x), 1));
-    __m128 four = _mm256_castps256_ps128(eight) + _mm256_extractf128_ps(eight, 1);
-    __m128 two = four + _mm_movehl_ps(four, four);
-    return _mm_cvtss_f32(two + _mm_movehdup_ps(two));
-}
-#define ROW_TILE 4
-#define VECTOR_TILE 4
-#define PROJECT_TILE 8
-#include "solver/operator/panel_kernels.h"
-#endif
-
-static const panel_kernels kernels_portable = {"portable", project_portable, expand_portable, flush_portable};
-#if defined(__x86_64__)
-static const panel_kernels kernels_avx2 = {"avx2", project_avx2, expand_avx2, flush_avx2};
-static const panel_kernels kernels_avx512 = {"avx512", project_avx512, expand_avx512, flush_avx512};
-#endif
-
-const panel_kernels *panel_kernels_available(size_t index) {
-    const panel_kernels *available[3];
-    size_t count = 0;
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx512f")) available[count++] = &kernels_avx512;
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) available[count++] = &kernels_avx2;
-#endif
-    available[count++] = &kernels_portable;
-    return index < count ? available[index] : NULL;
+const char *panel_precision_name(panel_precision precision) {
+    return precisions[precision].name;
 }
 
-const char *panel_kernels_name(const panel_kernels *kernels) {
-    return kernels->name;
+bool panel_precision_find(const char *name, panel_precision *precision) {
+    for (size_t i = 0; i < PANEL_PRECISIONS; i++) {
+        if (strcmp(name, precisions[i].name) != 0) continue;
+        *precision = (panel_precision)i;
+        return true;
+    }
+    return false;
 }
 
-/* Zeroed memory for count floats, *data at a cache line in it, or in huge pages: with 4 KiB pages a solve
+size_t panel_value_size(panel_precision precision) {
+    return precisions[precision].size;
+}
+
+/* Zeroed memory of so many bytes, *data at a cache line in it, or in huge pages: with 4 KiB pages a solve
  * takes twice as long. NULL on failure. */
-static void *allocate_floats(size_t count, const char *name, float **data, lam_error *error) {
-    size_t align = count < 2 * HUGE_PAGE / sizeof(float) ? PANEL_ALIGN : HUGE_PAGE;
-    char *memory = memory_allocate(count + align / sizeof(float), sizeof(float), name, error);
+static void *allocate_data(size_t bytes, const char *name, void **data, lam_error *error) {
+    const size_t align = bytes < 2 * HUGE_PAGE ? PANEL_ALIGN : HUGE_PAGE;
+    char *memory = memory_allocate(bytes + align, 1, name, error);
     if (memory == NULL) return NULL;
     char *aligned = memory + (align - (uintptr_t)memory % align) % align;
     /* Only advice: without it the result is the same, later. */
-    if (align == HUGE_PAGE) (void)madvise(aligned, count * sizeof(float), MADV_HUGEPAGE);
-    *data = (float *)aligned;
+    if (align == HUGE_PAGE) (void)madvise(aligned, bytes, MADV_HUGEPAGE);
+    *data = aligned;
     return memory;
 }
 
-/* Whether all are finite; a sum of x - x is 0 then, else NaN. */
-static bool all_finite(size_t count, const float *x) {
-    float sum = 0.0f;
-#pragma omp simd reduction(+ : sum)
-    for (size_t j = 0; j < count; j++) sum += x[j] - x[j];
-    return sum == 0.0f;
+static float value_as_float(panel_precision precision, const void *values, size_t j) {
+    switch (precision) {
+    case PANEL_F32:
+        return ((const float *)values)[j];
+    case PANEL_F16:
+        return float_of_half(((const uint16_t *)values)[j]);
+    case PANEL_BF16:
+        return float_of_bfloat(((const uint16_t *)values)[j]);
+    case PANEL_I8:
+        return (float)((const int8_t *)values)[j];
+    }
+    return NAN;
+}
+
+/* Whether all are finite: no exponent has all its bits. */
+static bool all_finite(panel_precision precision, size_t count, const void *values) {
+    static const uint16_t exponent[PANEL_PRECISIONS] = {0, 0x7c00, 0x7f80, 0};
+    bool good = true;
+    switch (precision) {
+    case PANEL_F32:
+        for (size_t j = 0; j < count; j++)
+            good &= (((const uint32_t *)values)[j] & 0x7f800000u) != 0x7f800000u;
+        break;
+    case PANEL_F16:
+    case PANEL_BF16:
+        for (size_t j = 0; j < count; j++)
+            good &= (((const uint16_t *)values)[j] & exponent[precision]) != exponent[precision];
+        break;
+    case PANEL_I8:
+        break;
+    }
+    return good;
+}
+
+/* The chunk of columns from PANEL_CHUNK q on of row i. */
+static void *chunk_of(const panel *a, size_t i, size_t q) {
+    const size_t tile = i / PANEL_TILE * PANEL_TILE * a->stride;
+    return (char *)a->data +
+           (tile + (q * PANEL_TILE + i % PANEL_TILE) * PANEL_CHUNK) * panel_value_size(a->precision);
+}
+
+/* Columns of chunk q that are not padding. */
+static size_t chunk_columns(const panel *a, size_t q) {
+    return a->k - q * PANEL_CHUNK < PANEL_CHUNK ? a->k - q * PANEL_CHUNK : PANEL_CHUNK;
+}
+
+static void put_row(panel *a, size_t i, const void *values) {
+    const size_t size = panel_value_size(a->precision);
+    for (size_t q = 0; q < a->stride / PANEL_CHUNK; q++)
+        memcpy(chunk_of(a, i, q), (const char *)values + q * PANEL_CHUNK * size, chunk_columns(a, q) * size);
+}
+
+static void get_row(const panel *a, size_t i, void *values) {
+    const size_t size = panel_value_size(a->precision);
+    for (size_t q = 0; q < a->stride / PANEL_CHUNK; q++)
+        memcpy((char *)values + q * PANEL_CHUNK * size, chunk_of(a, i, q), chunk_columns(a, q) * size);
+}
+
+/* An empty panel: zeros, and room for a scale. */
+static lam_status panel_init(size_t n, size_t k, panel_precision precision, bool scaled, const char *name,
+                             panel *a, lam_error *error) {
+    lam_status status = LAM_OK;
+    panel made = {.n = n, .k = k, .precision = precision, .n_threads = 1};
+    const size_t size = panel_value_size(precision);
+    size_t count;
+    made.stride = k / PANEL_CHUNK * PANEL_CHUNK + (k % PANEL_CHUNK > 0 ? PANEL_CHUNK : 0);
+    const size_t rows = n + (PANEL_TILE - n % PANEL_TILE) % PANEL_TILE;
+    if (made.stride < k || rows < n || !size_multiply(rows, made.stride, &count) ||
+        count > (PTRDIFF_MAX - HUGE_PAGE) / size)
+        FAIL(error, LAM_ERR_MEMORY, "%s: %zu x %zu numbers are more than memory can have", name, n, k);
+    if (scaled) {
+        made.scale = memory_allocate(k, sizeof *made.scale, name, error);
+        if (made.scale == NULL) TRY(LAM_ERR_MEMORY);
+    }
+    made.memory = allocate_data(count * size, name, &made.data, error);
+    if (made.memory == NULL) TRY(LAM_ERR_MEMORY);
+    made.kernels = panel_kernels_available(0);
+    *a = made;
+    made = (panel){0};
+done:
+    panel_free(&made);
+    return status;
+}
+
+lam_status panel_create_kept(size_t n, size_t k, panel_precision precision, const void *values,
+                             const float *scale, const char *name, panel *a, lam_error *error) {
+    lam_status status = LAM_OK;
+    panel made = {0};
+    const size_t row_bytes = k * panel_value_size(precision);
+    TRY(panel_init(n, k, precision, scale != NULL, name, &made, error));
+    for (size_t j = 0; j < k && scale != NULL; j++) {
+        if (!(scale[j] > 0.0f && isfinite(scale[j])))
+            FAIL(error, LAM_ERR_NUMERIC, "%s_scale[%zu] = %g, must be above 0 and finite", name, j,
+                 (double)scale[j]);
+        made.scale[j] = scale[j];
+    }
+    for (size_t i = 0; i < n && k > 0; i++) {
+        const char *row = (const char *)values + i * row_bytes;
+        if (!all_finite(precision, k, row)) {
+            size_t j = 0;
+            while (isfinite(value_as_float(precision, row, j))) j++;
+            FAIL(error, LAM_ERR_NUMERIC, "%s[%zu][%zu] = %g, must be finite", name, i, j,
+                 (double)value_as_float(precision, row, j));
+        }
+        put_row(&made, i, row);
+    }
+    *a = made;
+    made = (panel){0};
+done:
+    panel_free(&made);
+    return status;
 }
 
 lam_status panel_create(size_t n, size_t k, const float *rows, const char *name, panel *a, lam_error *error) {
-    lam_status status = LAM_OK;
-    float *data = NULL;
-    void *memory = NULL;
-    size_t count, stride = k / PANEL_CHUNK * PANEL_CHUNK + (k % PANEL_CHUNK > 0 ? PANEL_CHUNK : 0);
-    if (stride < k || !size_multiply(n, stride, &count) || count > PTRDIFF_MAX / sizeof(float))
-        FAIL(error, LAM_ERR_MEMORY, "%s: %zu x %zu numbers are more than memory can have", name, n, k);
-    memory = allocate_floats(count, name, &data, error);
-    if (memory == NULL) {
-        status = LAM_ERR_MEMORY;
-        goto done;
-    }
-    for (size_t i = 0; i < n && k > 0; i++) {
-        const float *row = rows + i * k;
-        if (!all_finite(k, row)) {
-            size_t j = 0;
-            while (isfinite(row[j])) j++;
-            FAIL(error, LAM_ERR_NUMERIC, "%s[%zu][%zu] = %g, must be finite", name, i, j, (double)row[j]);
-        }
-        memcpy(data + i * stride, row, k * sizeof *data);
-    }
-    *a = (panel){.n = n,
-                 .k = k,
-                 .stride = stride,
-                 .data = data,
-                 .memory = memory,
-                 .kernels = panel_kernels_available(0)};
-    memory = NULL;
-done:
-    free(memory);
-    return status;
+    return panel_create_kept(n, k, PANEL_F32, rows, NULL, name, a, error);
 }
 
 void panel_free(panel *a) {
     free(a->memory);
+    free(a->scale);
     *a = (panel){0};
 }
 
+/* --- precisions --------------------------------------------------------------------------------------- */
+
+/* A power of two that brings the largest magnitude of a column to at least 2^14 and below 2^15. */
+static float half_scale(float largest) {
+    int exponent;
+    if (largest == 0.0f || (largest >= HALF_LEAST && largest <= HALF_MOST)) return 1.0f;
+    (void)frexpf(largest, &exponent); /* below 2^exponent */
+    exponent -= 15;
+    return ldexpf(1.0f, exponent > -126 ? exponent : -126);
+}
+
+/* Scales of the columns for a precision; whether there is one that is not 1. row has room for one. */
+static bool find_scale(const panel *a, panel_precision precision, float *row, float *scale) {
+    bool any = false;
+    memset(scale, 0, a->k * sizeof *scale);
+    for (size_t i = 0; i < a->n; i++) {
+        get_row(a, i, row);
+        for (size_t j = 0; j < a->k; j++) {
+            const float magnitude = fabsf(row[j]);
+            scale[j] = magnitude > scale[j] ? magnitude : scale[j];
+        }
+    }
+    for (size_t j = 0; j < a->k; j++) {
+        const float largest = scale[j];
+        if (precision == PANEL_F16)
+            scale[j] = half_scale(largest);
+        else /* the division would end in 0 far down among the subnormal numbers */
+            scale[j] = largest > 0x1p-119f ? largest / I8_STEPS : 0x1p-126f;
+        any = any || scale[j] != 1.0f;
+    }
+    return any;
+}
+
+/* values = row / scale, rounded; false where one is beyond the precision. */
+static bool round_row(const float *row, const float *scale, panel_precision precision, size_t k,
+                      void *values) {
+    for (size_t j = 0; j < k; j++) {
+        const float x = scale != NULL ? row[j] / scale[j] : row[j];
+        if (precision == PANEL_F32)
+            ((float *)values)[j] = x;
+        else if (precision == PANEL_F16)
+            ((uint16_t *)values)[j] = half_of_float(x);
+        else if (precision == PANEL_BF16)
+            ((uint16_t *)values)[j] = bfloat_of_float(x);
+        else
+            ((int8_t *)values)[j] = (int8_t)fmaxf(-I8_STEPS, fminf(I8_STEPS, rintf(x)));
+    }
+    return all_finite(precision, k, values);
+}
+
+lam_status panel_convert(const panel *a, panel_precision precision, const char *name, panel *out,
+                         lam_error *error) {
+    lam_status status = LAM_OK;
+    panel made = {0};
+    float *row = memory_allocate(a->k, 2 * sizeof *row, name, error);
+    float *scale = memory_allocate(a->k, sizeof *scale, name, error);
+    bool scaled = false;
+    if (row == NULL || scale == NULL) TRY(LAM_ERR_MEMORY);
+    if (a->precision != PANEL_F32)
+        FAIL(error, LAM_ERR_INTERNAL, "%s: is of %s, only f32 is converted", name,
+             panel_precision_name(a->precision));
+    if (precision == PANEL_F16 || precision == PANEL_I8)
+        scaled = find_scale(a, precision, row, scale) || precision == PANEL_I8;
+    TRY(panel_init(a->n, a->k, precision, scaled, name, &made, error));
+    if (scaled) memcpy(made.scale, scale, a->k * sizeof *scale);
+    made.n_threads = a->n_threads;
+    for (size_t i = 0; i < a->n; i++) {
+        float *values = row + a->k;
+        get_row(a, i, row);
+        if (!round_row(row, made.scale, precision, a->k, values)) {
+            size_t j = 0;
+            while (isfinite(value_as_float(precision, values, j))) j++;
+            FAIL(error, LAM_ERR_NUMERIC, "%s[%zu][%zu] = %g is beyond %s; keep it in f32", name, i, j,
+                 (double)row[j], panel_precision_name(precision));
+        }
+        put_row(&made, i, values);
+    }
+    *out = made;
+    made = (panel){0};
+done:
+    free(row);
+    free(scale);
+    panel_free(&made);
+    return status;
+}
+
+/* --- out again ---------------------------------------------------------------------------------------- */
+
 void panel_copy_rows(const panel *a, float *rows) {
-    for (size_t i = 0; i < a->n && a->k > 0; i++)
-        memcpy(rows + i * a->k, a->data + i * a->stride, a->k * sizeof *rows);
+    for (size_t i = 0; i < a->n; i++)
+        for (size_t j = 0; j < a->k; j++)
+            rows[i * a->k + j] =
+                value_as_float(a->precision, chunk_of(a, i, j / PANEL_CHUNK), j % PANEL_CHUNK) *
+                (a->scale != NULL ? a->scale[j] : 1.0f);
+}
+
+void panel_copy_values(const panel *a, void *values) {
+    for (size_t i = 0; i < a->n; i++)
+        get_row(a, i, (char *)values + i * a->k * panel_value_size(a->precision));
 }
 
 size_t panel_bytes(const panel *a) {
-    return a->n * a->stride * sizeof(float);
-}
-
-size_t panel_work_bytes(const panel *a, size_t m) {
-    size_t count, total = 0;
-    if (m > PANEL_VECTORS) m = PANEL_VECTORS;
-    if (!size_multiply(a->stride, m, &count)) return 0;
-    if (count > SIZE_MAX / sizeof(double) || !work_add(&total, count * sizeof(float)) ||
-        !work_add(&total, count * sizeof(double)))
-        return 0;
-    return total > 0 ? total : PANEL_ALIGN;
-}
-
-/* The rows of a block where some vector is not 0: their numbers go to c, [rows found][m]. */
-static size_t find_rows(const panel *a, size_t first, size_t last, size_t m, const float *X, size_t x_stride,
-                        const float **rows, float *c) {
-    size_t found = 0;
-    for (size_t i = first; i < last; i++) {
-        bool any = false;
-        for (size_t v = 0; v < m; v++) {
-            float x = X[v * x_stride + i];
-            c[found * m + v] = x;
-            any = any || x != 0.0f;
-        }
-        if (any) rows[found++] = a->data + i * a->stride;
-    }
-    return found;
-}
-
-static void project_pass(const panel *a, size_t m, const float *X, size_t x_stride, float *T, size_t t_stride,
-                         void *work) {
-    const float *rows[PROJECT_BLOCK];
-    float c[PROJECT_BLOCK * PANEL_VECTORS];
-    size_t n_chunks = a->stride / PANEL_CHUNK, count = a->stride * m;
-    float *part = work_take(&work, count * sizeof *part);
-    double *total = work_take(&work, count * sizeof *total);
-    memset(part, 0, count * sizeof *part);
-    memset(total, 0, count * sizeof *total);
-    for (size_t first = 0; first < a->n; first += PROJECT_BLOCK) {
-        size_t last = a->n - first < PROJECT_BLOCK ? a->n : first + PROJECT_BLOCK;
-        size_t found = find_rows(a, first, last, m, X, x_stride, rows, c);
-        for (size_t r = 0; r < found; r += PROJECT_ROWS) {
-            size_t n_rows = found - r < PROJECT_ROWS ? found - r : PROJECT_ROWS;
-            a->kernels->project(n_rows, rows + r, c + r * m, m, n_chunks, part);
-        }
-        if (found > 0) a->kernels->flush(count, part, total);
-    }
-    for (size_t v = 0; v < m; v++)
-        for (size_t j = 0; j < a->k; j++)
-            T[v * t_stride + j] = (float)total[(j / PANEL_CHUNK * m + v) * PANEL_CHUNK + j % PANEL_CHUNK];
-}
-
-static void expand_pass(const panel *a, size_t m, const float *T, size_t t_stride, float *Y, size_t y_stride,
-                        void *work) {
-    float *t = work_take(&work, a->stride * m * sizeof *t);
-    for (size_t v = 0; v < m; v++)
-        for (size_t j = 0; j < a->stride; j++)
-            t[(j / PANEL_CHUNK * m + v) * PANEL_CHUNK + j % PANEL_CHUNK] =
-                j < a->k ? T[v * t_stride + j] : 0.0f;
-    a->kernels->expand(a, m, t, Y, y_stride);
-}
-
-void panel_project(const panel *a, size_t m, const float *X, size_t x_stride, float *T, size_t t_stride,
-                   void *work) {
-    for (size_t v = 0; v < m; v += PANEL_VECTORS)
-        project_pass(a, m - v < PANEL_VECTORS ? m - v : PANEL_VECTORS, X + v * x_stride, x_stride,
-                     T + v * t_stride, t_stride, work);
-}
-
-void panel_expand(const panel *a, size_t m, const float *T, size_t t_stride, float *Y, size_t y_stride,
-                  void *work) {
-    for (size_t v = 0; v < m; v += PANEL_VECTORS)
-        expand_pass(a, m - v < PANEL_VECTORS ? m - v : PANEL_VECTORS, T + v * t_stride, t_stride,
-                    Y + v * y_stride, y_stride, work);
+    return a->n * a->stride * panel_value_size(a->precision) +
+           (a->scale != NULL ? a->k * sizeof *a->scale : 0);
 }

@@ -294,6 +294,50 @@ START_TEST(eight_threads_give_the_same_bits) {
 }
 END_TEST
 
+/* Chosen rows, some twice, are those of the whole answer. */
+START_TEST(selected_elements_have_the_same_bits) {
+    enum { N_RHS = 19, SELECTED = 40 };
+    transport t = subject(_i);
+    const size_t size = vector_size(&t), rows = N_RHS * t.n_channels;
+    const size_t work_bytes = lam_operator_work_bytes(t.op, N_RHS);
+    float *E = random_vectors(N_RHS * size, 13), *H0 = random_vectors(N_RHS * size, 14);
+    float *whole = test_allocate(N_RHS * size, sizeof *whole);
+    float *some = test_allocate(rows * SELECTED, sizeof *some);
+    void *work = malloc(work_bytes);
+    uint32_t selected[SELECTED];
+    lam_error error = {.message = ""};
+    for (size_t r = 0; r < SELECTED; r++) selected[r] = (uint32_t)((r * r * 7 + 150) % t.n);
+    for (int q = 0; q < QUANTITIES; q++)
+        for (int lit = 0; lit < 2; lit++)
+            for (size_t count = 0; count <= SELECTED; count += SELECTED / 2) {
+                for (size_t i = 0; i < rows * SELECTED; i++) some[i] = NAN;
+                ck_assert(lam_operator_apply_lit(t.op, N_RHS, quantities[q], E, lit ? H0 : NULL, whole, work,
+                                                 work_bytes, &error) == LAM_OK);
+                memset(work, 0xff, work_bytes);
+                ck_assert_msg(lam_operator_apply_selected(t.op, N_RHS, quantities[q], E, lit ? H0 : NULL,
+                                                          count, selected, some, work, work_bytes,
+                                                          &error) == LAM_OK,
+                              "%s", error.message);
+                for (size_t row = 0; row < rows; row++)
+                    for (size_t r = 0; r < count; r++)
+                        ck_assert_mem_eq(&some[row * count + r], &whole[row * t.n + selected[r]],
+                                         sizeof(float));
+            }
+    selected[SELECTED - 1] = (uint32_t)t.n;
+    ck_assert(lam_operator_apply_selected(t.op, 1, LAM_RADIOSITY, E, NULL, SELECTED, selected, some, work,
+                                          work_bytes, &error) == LAM_ERR_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "selected[39] = 151, must be below 151"));
+    ck_assert(lam_operator_apply_selected(t.op, 1, LAM_RADIOSITY, E, NULL, SELECTED, NULL, some, work,
+                                          work_bytes, &error) == LAM_ERR_ARGUMENT);
+    free(E);
+    free(H0);
+    free(whole);
+    free(some);
+    free(work);
+    transport_free(&t);
+}
+END_TEST
+
 /* --- the work area and other arguments ----------------------------------------------------------------- */
 
 START_TEST(work_area_is_not_overrun) {
@@ -387,7 +431,8 @@ START_TEST(says_what_it_is) {
     } else {
         ck_assert_double_lt(description.density, 0);
         ck_assert_str_eq(description.form, strncmp(t.name, "folded", 6) == 0 ? "folded" : "factored");
-        ck_assert_uint_ge(description.bytes, 2 * t.n * t.k * sizeof(float));
+        ck_assert_uint_ge(description.bytes, 2 * t.n * t.k * panel_value_size(t.precision));
+        ck_assert_str_eq(description.precision, panel_precision_name(t.precision));
     }
     /* A batch is cut into passes, so that its work area stays bounded. */
     ck_assert_uint_eq(lam_operator_work_bytes(t.op, OPERATOR_PASS), lam_operator_work_bytes(t.op, SIZE_MAX));
@@ -408,6 +453,7 @@ int main(void) {
     tcase_add_loop_test(tests, darkness_stays_dark, 0, SUBJECTS);
     tcase_add_loop_test(tests, bits_do_not_depend_on_the_batch, 0, SUBJECTS);
     tcase_add_loop_test(tests, eight_threads_give_the_same_bits, 0, SUBJECTS);
+    tcase_add_loop_test(tests, selected_elements_have_the_same_bits, 0, SUBJECTS);
     tcase_add_loop_test(tests, work_area_is_not_overrun, 0, SUBJECTS);
     tcase_add_loop_test(tests, bad_arguments_are_refused, 0, SUBJECTS);
     tcase_add_loop_test(tests, says_what_it_is, 0, SUBJECTS);

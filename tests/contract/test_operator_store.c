@@ -138,7 +138,15 @@ typedef struct recipe {
     const char *what, *kind, *form, *layout;
     const char *without;    /* this dataset */
     const char *other_type; /* this dataset in double */
-    const char *bad;        /* this dataset holds bad_value at bad_index */
+    const char *narrow;     /* these datasets (names after each other) are of narrow_type, all of fill */
+    store_type narrow_type;
+    uint16_t fill;
+    const char *encoding; /* of those; NULL: none */
+    const char *scales;   /* these have a scale of scale_size (0: 2) numbers that are scale */
+    float scale;
+    size_t scale_size;
+    const char *precision; /* the attribute; NULL: none */
+    const char *bad;       /* this dataset holds bad_value at bad_index */
     float bad_value;
     size_t bad_index;
     size_t n, n_channels, left[2], V[2], core[3], M[3], order_size;
@@ -156,6 +164,25 @@ static void write_array(store *s, const recipe *r, const char *name, int rank, c
     size_t count = 1;
     for (int i = 0; i < rank; i++) count *= dims[i];
     if (r->without != NULL && strcmp(r->without, name) == 0) return;
+    if (r->scales != NULL && strstr(r->scales, name) != NULL) {
+        char scale_name[64];
+        const size_t size = or_else(r->scale_size, 2);
+        float *scale = test_allocate(size, sizeof *scale);
+        for (size_t j = 0; j < size; j++) scale[j] = r->scale;
+        snprintf(scale_name, sizeof scale_name, "%s_scale", name);
+        ck_ok(store_write(s, scale_name, STORE_F32, 1, &size, scale, &error));
+        free(scale);
+    }
+    if (r->narrow != NULL && strstr(r->narrow, name) != NULL) {
+        uint32_t *values = test_allocate(count, sizeof *values);
+        for (size_t i = 0; i < count; i++)
+            memcpy((char *)values + i * store_type_size(r->narrow_type), &r->fill,
+                   store_type_size(r->narrow_type) < 2 ? 1 : 2);
+        ck_ok(store_write(s, name, r->narrow_type, rank, dims, values, &error));
+        if (r->encoding != NULL) ck_ok(store_set_text(s, name, "encoding", r->encoding, &error));
+        free(values);
+        return;
+    }
     if (r->other_type != NULL && strcmp(r->other_type, name) == 0) {
         double *doubles = test_allocate(count, sizeof *doubles);
         ck_ok(store_write(s, name, STORE_F64, rank, dims, doubles, &error));
@@ -188,6 +215,7 @@ static void write_recipe(const recipe *r) {
     if (r->without == NULL || strcmp(r->without, "/operator") != 0) {
         write_attribute(s, "kind", kind, NULL);
         write_attribute(s, "layout", r->layout, "rows");
+        if (r->precision != NULL) write_attribute(s, "precision", r->precision, NULL);
         if (strcmp(kind, "exact") != 0) write_attribute(s, "form", form, NULL);
         if (strcmp(kind, "exact") == 0) {
             write_array(s, r, "/operator/M", 3, M, 0.1f);
@@ -311,6 +339,100 @@ static const recipe recipes[] = {
      .bad_index = 14,
      .status = LAM_ERR_FORMAT,
      .word = "/operator/M[0][2][2]"},
+#define BOTH "/operator/Y /operator/V"
+    {.what = "good, f16", .narrow = BOTH, .narrow_type = STORE_F16, .precision = "f16"},
+    {.what = "good, f16 with scales",
+     .narrow = BOTH,
+     .narrow_type = STORE_F16,
+     .scales = BOTH,
+     .scale = .25f,
+     .precision = "f16"},
+    {.what = "good, bf16", .narrow = BOTH, .narrow_type = STORE_U16, .encoding = "bf16", .precision = "bf16"},
+    {.what = "good, i8", .narrow = BOTH, .narrow_type = STORE_I8, .scales = BOTH, .scale = .5f},
+    {.what = "u16 without an encoding",
+     .narrow = BOTH,
+     .narrow_type = STORE_U16,
+     .status = LAM_ERR_FORMAT,
+     .word = "/operator/Y has the encoding '', must be 'bf16'"},
+    {.what = "unknown encoding",
+     .narrow = BOTH,
+     .narrow_type = STORE_U16,
+     .encoding = "posit",
+     .status = LAM_ERR_FORMAT,
+     .word = "encoding 'posit'"},
+    {.what = "i8 said to be bf16",
+     .narrow = BOTH,
+     .narrow_type = STORE_I8,
+     .encoding = "bf16",
+     .status = LAM_ERR_FORMAT,
+     .word = "encoding 'bf16'"},
+    {.what = "whole numbers",
+     .narrow = BOTH,
+     .narrow_type = STORE_U32,
+     .status = LAM_ERR_FORMAT,
+     .word = "must be of f32, f16, bf16 or i8"},
+    {.what = "only Y in f16",
+     .narrow = "/operator/Y",
+     .narrow_type = STORE_F16,
+     .status = LAM_ERR_FORMAT,
+     .word = "one array of f16 and one of f32"},
+    {.what = "i8 without a scale",
+     .narrow = BOTH,
+     .narrow_type = STORE_I8,
+     .status = LAM_ERR_FORMAT,
+     .word = "no /operator/Y_scale"},
+    {.what = "i8, V without a scale",
+     .narrow = BOTH,
+     .narrow_type = STORE_I8,
+     .scales = "/operator/Y",
+     .scale = 1,
+     .status = LAM_ERR_FORMAT,
+     .word = "no /operator/V_scale"},
+    {.what = "scale short",
+     .narrow = BOTH,
+     .narrow_type = STORE_I8,
+     .scales = BOTH,
+     .scale = 1,
+     .scale_size = 1,
+     .status = LAM_ERR_FORMAT,
+     .word = "/operator/Y_scale"},
+    {.what = "scale 0",
+     .narrow = BOTH,
+     .narrow_type = STORE_I8,
+     .scales = BOTH,
+     .status = LAM_ERR_FORMAT,
+     .word = "/operator/Y_scale[0] = 0, must be above 0"},
+    {.what = "scale NaN",
+     .narrow = BOTH,
+     .narrow_type = STORE_F16,
+     .scales = BOTH,
+     .scale = NAN,
+     .status = LAM_ERR_FORMAT,
+     .word = "/operator/Y_scale[0] = nan"},
+    {.what = "f32 with a scale",
+     .scales = "/operator/V",
+     .scale = 1,
+     .status = LAM_ERR_FORMAT,
+     .word = "/operator/V is of f32 and must not have"},
+    {.what = "NaN in f16",
+     .narrow = BOTH,
+     .narrow_type = STORE_F16,
+     .fill = 0x7e00,
+     .status = LAM_ERR_FORMAT,
+     .word = "/operator/Y[0][0] = nan"},
+    {.what = "infinity in bf16",
+     .narrow = BOTH,
+     .narrow_type = STORE_U16,
+     .fill = 0xff80,
+     .encoding = "bf16",
+     .status = LAM_ERR_FORMAT,
+     .word = "/operator/Y[0][0] = -inf"},
+    {.what = "another precision said",
+     .narrow = BOTH,
+     .narrow_type = STORE_F16,
+     .precision = "bf16",
+     .status = LAM_ERR_FORMAT,
+     .word = "precision 'bf16', its arrays are of f16"},
     {.what = "reflectance 1",
      .bad = "/mesh/reflectance",
      .bad_value = 1,

@@ -169,8 +169,7 @@ class Usage(Case):
                          "--keep-form-factors=compressed", "--method 2msc", "--method sparse",
                          "--method emitters", "--method hierarchical", "--factorizer svd", "--factorizer rsi",
                          "--factorizer sgrsvd", "--keep-factors", "--emitters sky", "--positions p.json",
-                         "--path p.json --frames 3", "--reuse A", "--paths 9", "--store-precision f16",
-                         "--store-precision bf16", "--store-precision i8"))):
+                         "--path p.json --frames 3", "--reuse A", "--paths 9"))):
             with self.subTest(line):
                 self.refused(2, "not supported yet", *line.split())
 

@@ -4,6 +4,7 @@
 #define LAMBERT_TESTS_TRANSPORT_H
 
 #include "solver/operator/operator.h"
+#include "solver/operator/panel.h"
 
 #include <check.h>
 #include <float.h>
@@ -24,6 +25,7 @@ typedef struct transport {
     double *magnitude;  /* [C][n][n] the sum of the magnitudes of the products behind P */
     double roundings;   /* how often each of those products is rounded at most, in units of u */
     uint32_t *order;    /* [n] or NULL */
+    panel_precision precision;
     lam_operator *op;
 } transport;
 
@@ -161,6 +163,10 @@ typedef enum transport_kind {
     TRANSPORT_FOLDED,
     TRANSPORT_FACTORED,
     TRANSPORT_FACTORED_COLOUR,
+    TRANSPORT_FOLDED_F16,
+    TRANSPORT_FOLDED_BF16,
+    TRANSPORT_FOLDED_I8,
+    TRANSPORT_FACTORED_COLOUR_I8,
     TRANSPORT_KINDS
 } transport_kind;
 
@@ -184,6 +190,33 @@ static inline void make_exact(transport *t, const double *F) {
     t->roundings = 2 + sum_roundings(n);
     ck_assert_msg(operator_exact_create(n, t->n_channels, t->reflectance, P, &t->op, &error) == LAM_OK, "%s",
                   error.message);
+}
+
+/* x [n][k] as a precision keeps it, so that narrowing it changes nothing any more (i8: but one rounding, of
+ * the product with the scale). */
+static inline void round_to(panel_precision precision, size_t n, size_t k, float *x) {
+    lam_error error = {.message = ""};
+    panel wide, narrow;
+    if (precision == PANEL_F32) return;
+    ck_assert(panel_create(n, k, x, "x", &wide, &error) == LAM_OK);
+    ck_assert_msg(panel_convert(&wide, precision, "x", &narrow, &error) == LAM_OK, "%s", error.message);
+    panel_copy_rows(&narrow, x);
+    panel_free(&wide);
+    panel_free(&narrow);
+}
+
+/* In place of P = rho' F M, which Y and V no longer are once they are rounded: P = -Y V^T. */
+static inline void product_of_factors(transport *t, const float *Y, const float *V) {
+    const size_t n = t->n, k = t->k;
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++) {
+            t->P[i * n + j] = t->magnitude[i * n + j] = 0;
+            for (size_t b = 0; b < k; b++) {
+                const double product = -(double)Y[i * k + b] * (double)V[j * k + b];
+                t->P[i * n + j] += product;
+                t->magnitude[i * n + j] += fabs(product);
+            }
+        }
 }
 
 /* Y = -rho' U core for one channel, magnitude |U| |core| |V|^T rho' for all. */
@@ -219,6 +252,8 @@ static inline void make_low_rank(transport *t, const double *F, const float *U, 
                 for (size_t b = 0; b < k; b++)
                     t->magnitude[(c * n + i) * n + j] += left[i * k + b] * fabs((double)V[j * k + b]);
     }
+    if (folded) round_to(t->precision, n, k, Y);
+    if (folded && t->precision != PANEL_F32) product_of_factors(t, Y, V);
     float *V_positions = in_positions(t->order, n, k, false, V);
     lam_status status;
     if (folded) { /* Y rounded; V^T E, Y t */
@@ -233,6 +268,12 @@ static inline void make_low_rank(transport *t, const double *F, const float *U, 
                                                    &t->op, &error);
     }
     ck_assert_msg(status == LAM_OK, "%s", error.message);
+    if (t->precision != PANEL_F32) { /* a scale's division and product, with V^T E and with t */
+        lam_operator *wide = t->op;
+        t->roundings += 4;
+        ck_assert_msg(operator_narrow(wide, t->precision, &t->op, &error) == LAM_OK, "%s", error.message);
+        lam_operator_close(wide);
+    }
     free(Y);
     free(K);
     free(left);
@@ -240,16 +281,32 @@ static inline void make_low_rank(transport *t, const double *F, const float *U, 
 
 /* An operator of a kind with its truth; ordered: its rows are in a random order inside. */
 static inline transport transport_make(transport_kind kind, bool ordered) {
-    static const char *const names[] = {"exact", "exact, 3 channels", "folded", "factored",
-                                        "factored, 3 channels"};
+    static const struct {
+        const char *name;
+        panel_precision precision;
+    } kinds[] = {{"exact", PANEL_F32},
+                 {"exact, 3 channels", PANEL_F32},
+                 {"folded", PANEL_F32},
+                 {"factored", PANEL_F32},
+                 {"factored, 3 channels", PANEL_F32},
+                 {"folded, f16", PANEL_F16},
+                 {"folded, bf16", PANEL_BF16},
+                 {"folded, i8", PANEL_I8},
+                 {"factored, 3 channels, i8", PANEL_I8}};
     lam_error error = {.message = ""};
     uint64_t state = 11 + (uint64_t)kind;
-    bool colour = kind == TRANSPORT_EXACT_COLOUR || kind == TRANSPORT_FACTORED_COLOUR;
-    transport t = {.name = names[kind], .n = 151, .k = 21, .n_channels = colour ? 3 : 1};
+    bool colour = strstr(kinds[kind].name, "3 channels") != NULL;
+    transport t = {.name = kinds[kind].name,
+                   .n = 151,
+                   .k = 21,
+                   .n_channels = colour ? 3 : 1,
+                   .precision = kinds[kind].precision};
     size_t n = t.n, k = t.k;
     float *U = test_allocate(n * k, sizeof *U), *V = test_allocate(n * k, sizeof *V);
     double *F = test_allocate(n * n, sizeof *F);
     random_factors(n, k, U, V, &state);
+    round_to(t.precision, n, k, U);
+    round_to(t.precision, n, k, V);
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++)
             for (size_t b = 0; b < k; b++) F[i * n + j] += (double)U[i * k + b] * (double)V[j * k + b];
@@ -260,7 +317,7 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
     if (kind == TRANSPORT_EXACT || kind == TRANSPORT_EXACT_COLOUR)
         make_exact(&t, F);
     else
-        make_low_rank(&t, F, U, V, kind == TRANSPORT_FOLDED);
+        make_low_rank(&t, F, U, V, strncmp(t.name, "folded", 6) == 0);
     if (ordered) ck_assert(operator_set_order(t.op, t.order, &error) == LAM_OK);
     free(F);
     free(U);

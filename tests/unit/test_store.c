@@ -67,20 +67,26 @@ START_TEST(values_keep_their_type) {
     const double f64[] = {0.1, -INFINITY, 5e-324, 1.7976931348623157e308};
     const uint32_t u32[] = {0, 1, 0x12345678u, UINT32_MAX};
     const uint64_t u64[] = {0, 1, 0x123456789abcdef0u, UINT64_MAX};
-    const void *all[] = {f32, f64, u32, u64};
-    const store_type types[] = {STORE_F32, STORE_F64, STORE_U32, STORE_U64};
-    const char *names[] = {"/f32", "/f64", "/u32", "/u64"};
+    const uint16_t f16[] = {0x3e00, 0x8000, 0x7c00, 0x0001}, u16[] = {0, 1, 0x1234, UINT16_MAX};
+    const int8_t i8[] = {0, -1, INT8_MIN, INT8_MAX};
+    const void *all[] = {f32, f64, u32, u64, f16, u16, i8};
+    const store_type types[] = {STORE_F32, STORE_F64, STORE_U32, STORE_U64, STORE_F16, STORE_U16, STORE_I8};
+    const char *names[] = {"/f32", "/f64", "/u32", "/u64", "/f16", "/u16", "/i8"};
+    enum { TYPES = sizeof types / sizeof *types };
     const size_t four = 4;
     ck_ok(store_create(path, &s, &error));
-    for (int i = 0; i < 4; i++) ck_ok(store_write(s, names[i], types[i], 1, &four, all[i], &error));
+    for (int i = 0; i < TYPES; i++) ck_ok(store_write(s, names[i], types[i], 1, &four, all[i], &error));
     ck_ok(store_seal(s, &error));
     ck_ok(store_open(path, &s, &error));
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < TYPES; i++) {
         size_t dims = 4;
         void *values = NULL;
         ck_ok(store_read(s, names[i], types[i], 1, &dims, &values, &error));
         ck_assert_mem_eq(values, all[i], 4 * store_type_size(types[i]));
         free(values);
+        values = NULL;
+        ck_assert(store_read(s, names[i], types[(i + 1) % TYPES], 1, &dims, &values, &error) ==
+                  LAM_ERR_FORMAT);
     }
     store_close(s);
 }
