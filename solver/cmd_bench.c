@@ -46,10 +46,10 @@ static const option_verb verb = {
     .name = "bench",
     .arguments = "SUITE... [-o DIR]",
     .summary =
-        "Measure. Suites: formfactors (error against exact values and time, throughput of rays). Not "
-        "supported "
-        "yet: lowrank, stability, cities, service, hierarchical, reuse. Each writes its tables as CSV and "
-        "JSON, its plots as SVG and PNG.",
+        "Measure. Suites: formfactors (error against exact values and time, throughput of rays), lowrank "
+        "(factorizations and two meshes beside the tables of the papers), stability (operators where "
+        "numbers are hard). Not supported yet: cities, service, hierarchical, reuse. Each writes its tables "
+        "as CSV and JSON, its plots as SVG and PNG.",
     .options = rows,
     .min_arguments = 1,
     .max_arguments = OPTIONS_ARGUMENTS_MAX,

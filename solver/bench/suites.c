@@ -4,8 +4,8 @@
 
 const bench_suite bench_suites[] = {
     {"formfactors", bench_formfactors},
-    {"lowrank", NULL},
-    {"stability", NULL},
+    {"lowrank", bench_lowrank},
+    {"stability", bench_stability},
     {"cities", NULL},
     {"service", NULL},
     {"hierarchical", NULL},

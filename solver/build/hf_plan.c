@@ -5,8 +5,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Columns of a sample, and how often it is halved. */
-enum { SAMPLE = 512, HALVINGS = 3, PLACES = 2, SIZES = HALVINGS + 1 };
+/* Columns of a sample: at most SAMPLE, and no more than the part of all that may be read twice; how often it
+ * is halved. */
+enum { SAMPLE = 512, SAMPLE_LEAST = 64, SAMPLE_PART = 20, HALVINGS = 3, PLACES = 2, SIZES = HALVINGS + 1 };
 /* Leaves have no fewer and no more columns than these, or the eigenvectors of one cost more than all. */
 enum { LEAF_LEAST = 64, LEAF_MOST = 8192 };
 
@@ -30,7 +31,9 @@ lam_status hf_forecast_create(const scaled_matrix *S, hf_forecast **out, lam_err
     size_t filled = 0, entries = 0;
     hf_forecast *f = memory_allocate(1, sizeof *f, "factorization", error);
     if (f == NULL) return LAM_ERR_MEMORY;
-    const size_t most = S->n < SAMPLE ? S->n : SAMPLE;
+    size_t most = S->n / SAMPLE_PART;
+    if (most > SAMPLE) most = SAMPLE;
+    if (most < SAMPLE_LEAST) most = S->n < SAMPLE_LEAST ? S->n : SAMPLE_LEAST;
     for (size_t k = 0; k < SIZES && most >> k > 0; k++) f->sizes[k] = most >> k;
     for (size_t place = 0; place < PLACES; place++) {
         const size_t first = (S->n - most) * (2 * place + 1) / (2 * PLACES);

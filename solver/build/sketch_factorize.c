@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Vectors of a basis beyond the columns that are kept; the first guess where only a bound is given: at least
- * this many, and a twelfth of the elements. */
+/* Vectors of a basis beyond the columns that are kept (twice as many where S X is only guessed); the first
+ * guess where only a bound is given: at least this many, and a twelfth of the elements. */
 enum { OVERSAMPLING = 16, BASIS_LEAST = 64, BASIS_SHARE = 12 };
 
 void sketch_basis_free(sketch_basis *b) {
@@ -123,9 +123,10 @@ done:
 }
 
 static lam_status fixed_rank(const scaled_matrix *S, const factorizer_options *o, sketch_find find,
-                             tall_factors *out, lam_error *error) {
+                             bool exact, tall_factors *out, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = S->n, rank = o->rank < n ? o->rank : n, m = rank + OVERSAMPLING;
+    const size_t n = S->n, rank = o->rank < n ? o->rank : n;
+    const size_t m = exact ? rank + OVERSAMPLING : 2 * rank + OVERSAMPLING;
     const truncation keep = {.rank = rank};
     sketch_basis b = {0};
     tall_factors f = {0};
@@ -147,7 +148,7 @@ lam_status sketch_factorize(const scaled_matrix *S, const factorizer_options *op
         FAIL(error, LAM_ERR_UNSUPPORTED,
              "--budget frobenius with a random sketch: use --factorizer hf or svd");
     if (options->rank > 0)
-        TRY(fixed_rank(S, options, find, out, error));
+        TRY(fixed_rank(S, options, find, exact, out, error));
     else
         TRY(fixed_precision(S, options, find, exact, out, error));
     if (!exact) cut_to_one(out);

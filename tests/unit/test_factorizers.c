@@ -220,7 +220,7 @@ START_TEST(forecast_knows_the_samples) {
     subject s;
     lam_error error = {0};
     hf_forecast *forecast = NULL;
-    subject_make(&s, unit_cube, 8); /* 384 elements: the sample is all */
+    subject_make(&s, unit_cube, 3); /* 54 elements: the sample is all */
     double *values = values_of_difference(&s.S, NULL);
     ck_assert_int_eq(hf_forecast_create(&s.S, &forecast, &error), LAM_OK);
     for (double p = .3; p > .02; p *= .7) {

@@ -1,0 +1,65 @@
+/* The parts of the suite lowrank and what they share. */
+#ifndef LAMBERT_BENCH_LOWRANK_H
+#define LAMBERT_BENCH_LOWRANK_H
+
+#include "solver/bench/bench.h"
+#include "solver/build/build.h"
+#include "solver/formfactor/formfactor.h"
+
+/* A scene with its form factors as a matrix. */
+typedef struct lowrank_scene {
+    const char *name; /* static */
+    mesh m;
+    uint32_t *z_order, *mesh_order; /* [n] */
+    form_factors f;
+    double seconds; /* of the form factors */
+} lowrank_scene;
+
+void lowrank_scene_free(lowrank_scene *s);
+
+/* Five walls of a cube, each of divisions x divisions squares of two triangles: 10 divisions^2 elements,
+ * which are the sizes of the thesis' Cornell box, 640 x 4^k. All pairs up to 12,000 elements, rays beyond. */
+lam_status lowrank_room(const bench_run *run, size_t divisions, lowrank_scene *out, lam_error *error);
+
+/* The Cornell box with its blocks; a courtyard of two storeys with galleries. About so many elements. */
+lam_status lowrank_cornell(const bench_run *run, size_t elements, lowrank_scene *out, lam_error *error);
+lam_status lowrank_patio(const bench_run *run, size_t elements, lowrank_scene *out, lam_error *error);
+
+/* One factorization, measured. */
+typedef struct lowrank_result {
+    double seconds; /* median of the repeats */
+    size_t rank;
+    double real; /* |S - Q V^T|_2 */
+    double peak; /* bytes of memory, the most while it ran, beside what was there before */
+    factorizer_report report;
+} lowrank_result;
+
+lam_status lowrank_factorize(const bench_run *run, const lowrank_scene *s, const char *name,
+                             const factorizer_options *options, bool in_z_order, size_t repeats,
+                             lowrank_result *out, lam_error *error);
+
+/* Options as precompute has them. */
+factorizer_options lowrank_options(const bench_run *run, double epsilon, size_t rank);
+
+/* The problem that a build method gets. */
+build_problem lowrank_problem(const lowrank_scene *s);
+
+/* Tables 3.1 to 3.5 of the thesis and figures 3.3 to 3.5. */
+lam_status lowrank_of_alpha(const bench_run *run, const lowrank_scene *s, lam_error *error);
+lam_status lowrank_of_order(const bench_run *run, const lowrank_scene *const *scenes, size_t n,
+                            lam_error *error);
+lam_status lowrank_of_compression(const bench_run *run, const lowrank_scene *s, lam_error *error);
+lam_status lowrank_of_factorizers(const bench_run *run, const lowrank_scene *const *scenes, size_t n,
+                                  lam_error *error);
+lam_status lowrank_of_levels(const bench_run *run, const lowrank_scene *const *scenes, size_t n,
+                             lam_error *error);
+lam_status lowrank_of_rank(const bench_run *run, const lowrank_scene *const *scenes, size_t n,
+                           lam_error *error);
+
+/* Tables 3.6 and 3.7: radiosity. */
+lam_status lowrank_of_radiosity(const bench_run *run, lam_error *error);
+
+/* Every method: run time and memory against error, and two meshes against the SVD at equal k. */
+lam_status lowrank_of_methods(const bench_run *run, lam_error *error);
+
+#endif

@@ -1,0 +1,267 @@
+#include "solver/bench/formfactors.h"
+#include "solver/bench/lowrank.h"
+#include "solver/bench/scenes.h"
+#include "solver/bench/stats.h"
+#include "solver/build/norm.h"
+#include "solver/clock.h"
+
+#include <malloc.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+/* Above this many elements all pairs would take minutes. */
+enum { PAIRS_MOST = 12000, RAYS = 4096, REPEATS_MOST = 9 };
+
+void lowrank_scene_free(lowrank_scene *s) {
+    form_factors_free(&s->f);
+    free(s->z_order);
+    free(s->mesh_order);
+    mesh_free(&s->m);
+    *s = (lowrank_scene){0};
+}
+
+/* Takes the mesh over; form factors of it. */
+static lam_status open_scene(const bench_run *run, const char *name, mesh *m, lowrank_scene *out,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    lowrank_scene s = {.name = name, .m = *m};
+    const recipe how =
+        m->n <= PAIRS_MOST ? formfactors_pairs(7e-5, run->seed) : formfactors_rays(RAYS, run->seed);
+    *m = (mesh){0};
+    TRY(formfactors_order(&s.m, &s.z_order, error));
+    s.mesh_order = memory_allocate(s.m.n, sizeof *s.mesh_order, "scene", error);
+    if (s.mesh_order == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < s.m.n; i++) s.mesh_order[i] = (uint32_t)i;
+    TRY(formfactors_make_timed(run, &s.m, s.z_order, &how, "form factors", &s.f, &s.seconds, error));
+    if (s.f.F.indptr == NULL) TRY(form_factors_expand(&s.f, s.m.area, error));
+    bench_say(run, "%s of %zu elements: form factors in %.1f s", name, s.m.n, s.seconds);
+    *out = s;
+    s = (lowrank_scene){0};
+done:
+    lowrank_scene_free(&s);
+    return status;
+}
+
+/* divisions x divisions squares of a wall, each of one piece or two triangles. */
+static size_t add_wall(scene_piece *pieces, const double corner[3], const double along[3],
+                       const double across[3], size_t u, size_t v, bool triangles) {
+    size_t n = 0;
+    for (size_t i = 0; i < u; i++)
+        for (size_t k = 0; k < v; k++) {
+            scene_piece p = {.triangle = triangles};
+            for (int d = 0; d < 3; d++) {
+                p.along[d] = along[d] / (double)u;
+                p.across[d] = across[d] / (double)v;
+                p.corner[d] = corner[d] + p.along[d] * (double)i + p.across[d] * (double)k;
+            }
+            pieces[n++] = p;
+            if (!triangles) continue;
+            scene_piece other = p;
+            for (int d = 0; d < 3; d++) {
+                other.corner[d] = p.corner[d] + p.along[d] + p.across[d];
+                other.along[d] = -p.along[d];
+                other.across[d] = -p.across[d];
+            }
+            pieces[n++] = other;
+        }
+    return n;
+}
+
+lam_status lowrank_room(const bench_run *run, size_t divisions, lowrank_scene *out, lam_error *error) {
+    /* floor, ceiling, left, right, back: fronts inside */
+    static const double walls[5][3][3] = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
+                                          {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}},
+                                          {{0, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                                          {{1, 0, 0}, {0, 0, 1}, {0, 1, 0}},
+                                          {{0, 1, 0}, {1, 0, 0}, {0, 0, 1}}};
+    lam_status status = LAM_OK;
+    mesh m = {0};
+    size_t n = 0;
+    scene_piece *pieces = memory_allocate(10 * divisions * divisions, sizeof *pieces, "scene", error);
+    if (pieces == NULL) TRY(LAM_ERR_MEMORY);
+    for (int w = 0; w < 5; w++)
+        n += add_wall(pieces + n, walls[w][0], walls[w][1], walls[w][2], divisions, divisions, true);
+    TRY(scene_of_pieces(pieces, n, &m, error));
+    TRY(open_scene(run, "open room", &m, out, error));
+done:
+    free(pieces);
+    mesh_free(&m);
+    return status;
+}
+
+lam_status lowrank_cornell(const bench_run *run, size_t elements, lowrank_scene *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    mesh m = {0};
+    TRY(scene_cornell(elements, &m, error));
+    TRY(open_scene(run, "cornell", &m, out, error));
+done:
+    mesh_free(&m);
+    return status;
+}
+
+/* --- a courtyard of two storeys ---------------------------------------------------------------------------
+ */
+
+/* Rectangles that are cut into cells of about one size. */
+typedef struct builder {
+    double cell;
+    scene_piece *pieces; /* NULL: only counted */
+    size_t n;
+} builder;
+
+static void add_rectangle(builder *b, double x, double y, double z, const double along[3],
+                          const double across[3]) {
+    double size[2] = {0, 0};
+    for (int d = 0; d < 3; d++) {
+        size[0] += along[d] > 0 ? along[d] : -along[d];
+        size[1] += across[d] > 0 ? across[d] : -across[d];
+    }
+    const size_t u = (size_t)(size[0] / b->cell + .999), v = (size_t)(size[1] / b->cell + .999);
+    const double corner[3] = {x, y, z};
+    if (b->pieces != NULL) add_wall(b->pieces + b->n, corner, along, across, u, v, false);
+    b->n += u * v;
+}
+
+/* The four sides of a shaft x0 ... x1, y0 ... y1, z0 ... z1, fronts outside or inside. */
+static void add_sides(builder *b, const double at[3][2], bool outside) {
+    const double w = at[0][1] - at[0][0], d = at[1][1] - at[1][0], h = at[2][1] - at[2][0], z = at[2][0];
+    const double up[3] = {0, 0, h}, east[3] = {w, 0, 0}, north[3] = {0, d, 0};
+    const double *first[4] = {outside ? east : up, outside ? up : east, outside ? up : north,
+                              outside ? north : up};
+    const double *second[4] = {outside ? up : east, outside ? east : up, outside ? north : up,
+                               outside ? up : north};
+    const double x[4] = {at[0][0], at[0][0], at[0][0], at[0][1]},
+                 y[4] = {at[1][0], at[1][1], at[1][0], at[1][0]};
+    for (int k = 0; k < 4; k++) add_rectangle(b, x[k], y[k], z, first[k], second[k]);
+}
+
+/* A ring between two squares about (8, 8), half sizes inner and outer, at height z, facing up or down. */
+static void add_ring(builder *b, double inner, double outer, double z, bool up) {
+    const double strips[4][4] = {{8 - outer, 8 - outer, 2 * outer, outer - inner},
+                                 {8 - outer, 8 + inner, 2 * outer, outer - inner},
+                                 {8 - outer, 8 - inner, outer - inner, 2 * inner},
+                                 {8 + inner, 8 - inner, outer - inner, 2 * inner}};
+    for (int k = 0; k < 4; k++) {
+        const double east[3] = {strips[k][2], 0, 0}, north[3] = {0, strips[k][3], 0};
+        add_rectangle(b, strips[k][0], strips[k][1], z, up ? east : north, up ? north : east);
+    }
+}
+
+/* A court of 8 m under the sky, galleries of 4 m about it on two storeys of 3 m, a column every 2 m. */
+static void add_patio(builder *b) {
+    const double east[3] = {16, 0, 0}, north[3] = {0, 16, 0};
+    const double outer[3][2] = {{0, 16}, {0, 16}, {0, 6.5}};
+    add_rectangle(b, 0, 0, 0, east, north);
+    add_sides(b, outer, false);
+    add_ring(b, 4, 8, 3, false); /* the slab between the storeys: below, above, and its edge to the court */
+    add_ring(b, 4, 8, 3.5, true);
+    const double edge[3][2] = {{4, 12}, {4, 12}, {3, 3.5}};
+    add_sides(b, edge, false);
+    add_ring(b, 4, 8, 6.5, false);
+    for (int storey = 0; storey < 2; storey++)
+        for (int side = 0; side < 4; side++)
+            for (int k = 0; k < 4; k++) {
+                const double along = 4 + 2 * k, at = side % 2 == 0 ? 3.6 : 12.4;
+                const double x = side < 2 ? along : at, y = side < 2 ? at : along + 2,
+                             z = storey == 0 ? 0 : 3.5;
+                const double column[3][2] = {{x - .2, x + .2}, {y - .2, y + .2}, {z, z + 3}};
+                add_sides(b, column, true);
+            }
+}
+
+lam_status lowrank_patio(const bench_run *run, size_t elements, lowrank_scene *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    mesh m = {0};
+    builder b = {.cell = 4};
+    for (;; b.cell *= .98) {
+        b.n = 0;
+        add_patio(&b);
+        if (b.n >= elements) break;
+    }
+    b.pieces = memory_allocate(b.n, sizeof *b.pieces, "scene", error);
+    if (b.pieces == NULL) TRY(LAM_ERR_MEMORY);
+    b.n = 0;
+    add_patio(&b);
+    TRY(scene_of_pieces(b.pieces, b.n, &m, error));
+    TRY(open_scene(run, "patio", &m, out, error));
+done:
+    free(b.pieces);
+    mesh_free(&m);
+    return status;
+}
+
+/* --- one factorization ------------------------------------------------------------------------------------
+ */
+
+factorizer_options lowrank_options(const bench_run *run, double epsilon, size_t rank) {
+    return (factorizer_options){.epsilon = epsilon,
+                                .rank = rank,
+                                .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
+                                .levels = -1,
+                                .iterations = -1,
+                                .seed = run->seed,
+                                .progress = run->progress};
+}
+
+build_problem lowrank_problem(const lowrank_scene *s) {
+    return (build_problem){.n = s->m.n,
+                           .n_channels = s->m.n_channels,
+                           .area = s->m.area,
+                           .reflectance = s->m.reflectance,
+                           .F = &s->f.F,
+                           .order = s->z_order,
+                           .noise = recipe_noise(&s->f.recipe)};
+}
+
+/* A line of /proc/self/status in bytes, 0 where there is none. */
+static double memory_of(const char *name) {
+    char line[256];
+    double kib = 0;
+    FILE *f = fopen("/proc/self/status", "r");
+    if (f == NULL) return 0;
+    while (fgets(line, sizeof line, f) != NULL)
+        if (strncmp(line, name, strlen(name)) == 0) kib = strtod(line + strlen(name) + 1, NULL);
+    fclose(f);
+    return 1024 * kib;
+}
+
+/* Lets the peak begin anew; where the kernel does not, peaks are those of the whole run. */
+static void reset_peak(void) {
+    FILE *f = fopen("/proc/self/clear_refs", "w");
+    if (f == NULL) return;
+    fputs("5", f);
+    fclose(f);
+}
+
+lam_status lowrank_factorize(const bench_run *run, const lowrank_scene *s, const char *name,
+                             const factorizer_options *options, bool in_z_order, size_t repeats,
+                             lowrank_result *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    row_source rows;
+    scaled_matrix S = {0};
+    tall_factors f = {0};
+    double seconds[REPEATS_MOST], before;
+    if (repeats > REPEATS_MOST) repeats = REPEATS_MOST;
+    row_source_of_csr(&rows, &s->f.F);
+    TRY(scaled_init(&S, &rows, s->m.area, in_z_order ? s->z_order : s->mesh_order, error));
+    malloc_trim(0);
+    before = memory_of("VmRSS:");
+    reset_peak();
+    for (size_t k = 0; k < repeats; k++) {
+        TRY(bench_check(run, error));
+        tall_factors_free(&f);
+        const double started = clock_seconds();
+        TRY(factorize(name, &S, options, &f, &out->report, error));
+        seconds[k] = clock_seconds() - started;
+    }
+    out->peak = memory_of("VmHWM:") - before;
+    out->seconds = stats_median(seconds, repeats);
+    out->rank = f.rank;
+    TRY(norm_of_error(&S, &f, run->progress, &out->real, error));
+done:
+    tall_factors_free(&f);
+    scaled_free(&S);
+    return status;
+}

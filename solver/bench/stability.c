@@ -1,0 +1,318 @@
+#include "solver/bench/stability.h"
+
+#include "solver/bench/scenes.h"
+#include "solver/build/reference.h"
+#include "solver/formfactor/formfactor.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { DIVISIONS = 5, FLAT = 64, SPHERE = 60, PROBES = 4 };
+
+void stability_free(stability_problem *p) {
+    free(p->area);
+    free(p->reflectance);
+    free(p->order);
+    csr_free(&p->F);
+    *p = (stability_problem){0};
+}
+
+/* --- problems ---------------------------------------------------------------------------------------------
+ */
+
+static lam_status allocate(stability_problem *p, size_t n, size_t entries, lam_error *error) {
+    p->n = n;
+    p->area = memory_allocate(n, sizeof *p->area, "problem", error);
+    p->reflectance = memory_allocate(n, sizeof *p->reflectance, "problem", error);
+    p->order = memory_allocate(n, sizeof *p->order, "problem", error);
+    p->F.n = n;
+    p->F.indptr = memory_allocate(n + 1, sizeof *p->F.indptr, "problem", error);
+    p->F.indices = memory_allocate(entries, sizeof *p->F.indices, "problem", error);
+    p->F.data = memory_allocate(entries, sizeof *p->F.data, "problem", error);
+    if (p->area == NULL || p->reflectance == NULL || p->order == NULL || p->F.indptr == NULL ||
+        p->F.indices == NULL || p->F.data == NULL)
+        return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < n; i++) p->order[i] = (uint32_t)i;
+    return LAM_OK;
+}
+
+/* A cube from inside, each face DIVISIONS x DIVISIONS. */
+static lam_status cube_mesh(mesh *m, lam_error *error) {
+    static const double faces[6][3][3] = {
+        {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}},
+        {{0, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{1, 0, 0}, {0, 0, 1}, {0, 1, 0}},
+        {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}}, {{0, 1, 0}, {1, 0, 0}, {0, 0, 1}}};
+    scene_piece pieces[6 * DIVISIONS * DIVISIONS];
+    size_t n = 0;
+    for (int f = 0; f < 6; f++)
+        for (int i = 0; i < DIVISIONS; i++)
+            for (int k = 0; k < DIVISIONS; k++, n++)
+                for (int d = 0; d < 3; d++) {
+                    pieces[n].triangle = false;
+                    pieces[n].along[d] = faces[f][1][d] / DIVISIONS;
+                    pieces[n].across[d] = faces[f][2][d] / DIVISIONS;
+                    pieces[n].corner[d] = faces[f][0][d] + i * pieces[n].along[d] + k * pieces[n].across[d];
+                }
+    return scene_of_pieces(pieces, n, m, error);
+}
+
+static lam_status make_room(double rho, stability_problem *p, lam_error *error) {
+    lam_status status = LAM_OK;
+    mesh m = {0};
+    form_factors f = {.row_sums = NULL};
+    uint32_t *order = NULL;
+    TRY(cube_mesh(&m, error));
+    order = memory_allocate(m.n, sizeof *order, "problem", error);
+    if (order == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(mesh_z_order(&m, order, error));
+    const form_factor_options how = {
+        .recipe = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 7e-5, .seed = 1},
+        .stage = "form factors"};
+    TRY(form_factors_make(&m, order, &how, &f, error));
+    TRY(allocate(p, m.n, 1, error));
+    memcpy(p->area, m.area, m.n * sizeof *p->area);
+    memcpy(p->order, order, m.n * sizeof *order);
+    for (size_t i = 0; i < m.n; i++) p->reflectance[i] = (float)rho;
+    csr_free(&p->F);
+    p->F = f.F;
+    f.F = (csr){0};
+    p->closed = true;
+done:
+    form_factors_free(&f);
+    free(order);
+    mesh_free(&m);
+    return status;
+}
+
+/* Every element twice, each half of the other's area. */
+static lam_status make_twins(double rho, stability_problem *p, lam_error *error) {
+    lam_status status = LAM_OK;
+    stability_problem one = {0};
+    TRY(make_room(rho, &one, error));
+    const size_t n = one.n;
+    TRY(allocate(p, 2 * n, 4 * one.F.indptr[n], error));
+    uint64_t at = 0;
+    for (size_t i = 0; i < 2 * n; i++) {
+        p->area[i] = one.area[i % n] / 2;
+        p->reflectance[i] = (float)rho;
+        for (int half = 0; half < 2; half++)
+            for (uint64_t e = one.F.indptr[i % n]; e < one.F.indptr[i % n + 1]; e++, at++) {
+                p->F.indices[at] = one.F.indices[e] + (half ? (uint32_t)n : 0);
+                p->F.data[at] = one.F.data[e] / 2;
+            }
+        p->F.indptr[i + 1] = at;
+    }
+    p->closed = true;
+done:
+    stability_free(&one);
+    return status;
+}
+
+/* The inside of a sphere, F_ij = A_j / A, with areas over eight decades. */
+static lam_status make_areas(double rho, stability_problem *p, lam_error *error) {
+    double all = 0;
+    const lam_status status = allocate(p, SPHERE, SPHERE * SPHERE, error);
+    if (status != LAM_OK) return status;
+    for (size_t i = 0; i < SPHERE; i++)
+        all += p->area[i] = pow(10, 8. * (double)((i * 37) % SPHERE) / SPHERE - 4);
+    for (size_t i = 0; i < SPHERE; i++) {
+        p->reflectance[i] = (float)rho;
+        p->F.indptr[i + 1] = (i + 1) * SPHERE;
+        for (size_t j = 0; j < SPHERE; j++) {
+            p->F.indices[i * SPHERE + j] = (uint32_t)j;
+            p->F.data[i * SPHERE + j] = (float)(p->area[j] / all);
+        }
+    }
+    p->closed = true;
+    return LAM_OK;
+}
+
+/* Nothing sees anything. */
+static lam_status make_blind(size_t n, double rho, stability_problem *p, lam_error *error) {
+    const lam_status status = allocate(p, n, 1, error);
+    for (size_t i = 0; status == LAM_OK && i < n; i++) {
+        p->area[i] = 1;
+        p->reflectance[i] = (float)rho;
+    }
+    return status;
+}
+
+lam_status stability_make(int which, double rho, stability_problem *out, lam_error *error) {
+    static const char *const names[STABILITY_PROBLEMS] = {
+        "closed room", "black room",          "half black room",         "one element",
+        "flat",        "every element twice", "areas over eight decades"};
+    lam_status status = LAM_OK;
+    stability_problem p = {0};
+    switch (which) {
+    case STABILITY_ONE:
+        TRY(make_blind(1, rho, &p, error));
+        break;
+    case STABILITY_FLAT:
+        TRY(make_blind(FLAT, rho, &p, error));
+        break;
+    case STABILITY_TWINS:
+        TRY(make_twins(rho, &p, error));
+        break;
+    case STABILITY_AREAS:
+        TRY(make_areas(rho, &p, error));
+        break;
+    case STABILITY_BLACK:
+        TRY(make_room(0, &p, error));
+        break;
+    default:
+        TRY(make_room(rho, &p, error));
+        break;
+    }
+    for (size_t i = 0; which == STABILITY_HALF_BLACK && i < p.n; i += 2) p.reflectance[i] = 0;
+    p.name = names[which];
+    *out = p;
+    p = (stability_problem){0};
+done:
+    stability_free(&p);
+    return status;
+}
+
+/* --- an operator on probation ------------------------------------------------------------------------------
+ */
+
+/* What it is given and what it answers, [PROBES][n]: one bright element, every third, all, 2 of the first and
+ * the second. */
+typedef struct probation {
+    const stability_problem *p;
+    lam_operator *op;
+    float *E, *B, *H;
+    double *exact;
+} probation;
+
+static void set_probes(const stability_problem *p, float *E) {
+    for (size_t i = 0; i < p->n; i++) {
+        E[i] = i == p->n / 2 ? 1 : 0;
+        E[p->n + i] = i % 3 == 0 ? 1 : 0;
+        E[2 * p->n + i] = 1;
+        E[3 * p->n + i] = 2 * E[i] + E[p->n + i];
+    }
+}
+
+static lam_status answer(probation *q, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t bytes = lam_operator_work_bytes(q->op, PROBES);
+    void *work = memory_allocate(bytes, 1, "probation", error);
+    if (work == NULL) return LAM_ERR_MEMORY;
+    TRY(lam_operator_apply(q->op, PROBES, LAM_RADIOSITY, q->E, q->B, work, bytes, error));
+    TRY(lam_operator_apply(q->op, PROBES, LAM_IRRADIANCE, q->E, q->H, work, bytes, error));
+done:
+    free(work);
+    return status;
+}
+
+static lam_status solve_exactly(probation *q, lam_error *error) {
+    lam_status status = LAM_OK;
+    const stability_problem *p = q->p;
+    reference *r = NULL;
+    double *E = memory_allocate(PROBES * p->n, sizeof *E, "probation", error);
+    if (E == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < PROBES * p->n; k++) E[k] = q->exact[k] = (double)q->E[k];
+    TRY(reference_create(&p->F, p->area, p->reflectance, REFERENCE_DENSE, &r, error));
+    TRY(reference_solve(r, PROBES, E, q->exact, 1e-12, NULL, error));
+done:
+    reference_destroy(r);
+    free(E);
+    return status;
+}
+
+static void judge_probe(const probation *q, size_t k, stability_result *out) {
+    const stability_problem *p = q->p;
+    const float *E = q->E + k * p->n, *B = q->B + k * p->n, *H = q->H + k * p->n;
+    double wrong = 0, all = 0, bounced = 0, least = 0, most = 0, emitted = 0, kept = 0;
+    for (size_t i = 0; i < p->n; i++) {
+        const double b = (double)B[i], e = (double)E[i], x = q->exact[k * p->n + i], a = p->area[i];
+        out->finite = out->finite && isfinite(b) && isfinite(H[i]);
+        wrong += a * (b - x) * (b - x);
+        all += a * x * x;
+        bounced += a * (x - e) * (x - e);
+        least = fmin(least, b);
+        most = fmax(most, b);
+        emitted += a * e;
+        kept += a * (1 - (double)p->reflectance[i]) * (double)H[i];
+    }
+    out->relative = fmax(out->relative, sqrt(wrong / all));
+    if (bounced > 0) out->indirect = fmax(out->indirect, sqrt(wrong / bounced));
+    if (most > 0) out->negative = fmax(out->negative, -least / most);
+    if (p->closed) out->energy = fmax(out->energy, fabs(emitted - kept) / emitted);
+}
+
+static void judge_linearity(const probation *q, stability_result *out) {
+    const size_t n = q->p->n;
+    double off = 0, all = 0;
+    for (size_t i = 0; i < n; i++) {
+        const double sum = (double)q->B[3 * n + i], parts = 2 * (double)q->B[i] + (double)q->B[n + i];
+        off += (sum - parts) * (sum - parts);
+        all += sum * sum;
+    }
+    out->linearity = all > 0 ? sqrt(off / all) : 0;
+}
+
+/* diag(A / rho) M is symmetric, or diag(A) (M - I) / rho, which black elements have too: <g, A H_e> = <e, A
+ * H_g> of the first two probes. */
+static void judge_reciprocity(const probation *q, stability_result *out) {
+    const size_t n = q->p->n;
+    double one = 0, two = 0;
+    for (size_t i = 0; i < n; i++) {
+        one += (double)q->E[n + i] * q->p->area[i] * (double)q->H[i];
+        two += (double)q->E[i] * q->p->area[i] * (double)q->H[n + i];
+    }
+    const double larger = fmax(fabs(one), fabs(two));
+    out->reciprocity = larger > 0 ? fabs(one - two) / larger : 0;
+}
+
+lam_status stability_try(const stability_problem *p, const stability_way *way, stability_result *out,
+                         lam_error *error) {
+    lam_status status = LAM_OK;
+    lam_error why = {0};
+    build_report built;
+    double most_rho = 0;
+    const build_problem problem = {.n = p->n,
+                                   .n_channels = 1,
+                                   .area = p->area,
+                                   .reflectance = p->reflectance,
+                                   .F = &p->F,
+                                   .order = p->order};
+    const build_options how = {.method = way->method,
+                               .factorizer = way->factorizer,
+                               .epsilon = way->epsilon,
+                               .rank = way->rank,
+                               .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
+                               .levels = -1,
+                               .seed = 1};
+    probation q = {.p = p};
+    *out = (stability_result){.finite = true};
+    out->status = build_operator(&problem, &how, &q.op, &built, &why);
+    if (out->status == LAM_ERR_MEMORY) FAIL(error, LAM_ERR_MEMORY, "%s", why.message);
+    snprintf(out->message, sizeof out->message, "%s", why.message);
+    if (out->status != LAM_OK) goto done;
+    q.E = memory_allocate(PROBES * p->n, sizeof *q.E, "probation", error);
+    q.B = memory_allocate(PROBES * p->n, sizeof *q.B, "probation", error);
+    q.H = memory_allocate(PROBES * p->n, sizeof *q.H, "probation", error);
+    q.exact = memory_allocate(PROBES * p->n, sizeof *q.exact, "probation", error);
+    if (q.E == NULL || q.B == NULL || q.H == NULL || q.exact == NULL) TRY(LAM_ERR_MEMORY);
+    set_probes(p, q.E);
+    TRY(answer(&q, error));
+    TRY(solve_exactly(&q, error));
+    for (size_t k = 0; k < 3; k++) judge_probe(&q, k, out);
+    judge_linearity(&q, out);
+    judge_reciprocity(&q, out);
+    for (size_t i = 0; i < p->n; i++) most_rho = fmax(most_rho, (double)p->reflectance[i]);
+    out->rank = built.rank;
+    out->rcond = built.rcond;
+    out->norm = fmax(built.measured_norm_error, 0);
+    out->bound = out->norm / (1 - most_rho);
+done:
+    lam_operator_close(q.op);
+    free(q.E);
+    free(q.B);
+    free(q.H);
+    free(q.exact);
+    return status;
+}
