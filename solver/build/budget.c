@@ -36,9 +36,15 @@ void budget_share(const budget *b, double epsilon, int levels, double p[BUDGET_L
         return;
     }
     double all = 0;
-    for (int l = 1; l <= levels; l++) all += pow(b->ratio, l);
+    const bool apart = b->leaf > 0 && levels > 1;
+    const int geometric = apart ? levels - 1 : levels;
+    for (int l = 1; l <= geometric; l++) all += pow(b->ratio, l);
     for (int l = 0; l <= levels; l++) {
-        const double share = l == 0 ? b->alpha : (1 - b->alpha) * pow(b->ratio, l) / all;
+        double share = b->alpha;
+        if (l > geometric)
+            share = (1 - b->alpha) * b->leaf;
+        else if (l > 0)
+            share = (1 - b->alpha) * (apart ? 1 - b->leaf : 1) * pow(b->ratio, l) / all;
         p[l] = epsilon * sqrt(share / ldexp(1, l)); /* 2^l p_l^2 = share epsilon^2 */
     }
 }

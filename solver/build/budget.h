@@ -24,6 +24,7 @@ typedef struct budget {
     budget_rule rule;
     double alpha; /* the root's share (of epsilon^2, or of epsilon where errors are summed), in (0, 1) */
     double ratio; /* of squares: the share of a level over that of the level above it, > 0 */
+    double leaf;  /* of squares: the leaves' part of what the root leaves; 0: by the ratio too */
 } budget;
 
 /* What a node of each level may leave out, p[0] of the root to p[levels] of a leaf. */

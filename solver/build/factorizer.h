@@ -20,7 +20,7 @@ typedef struct factorizer_options {
 typedef struct factorizer_report {
     const char *name;
     int levels;                                 /* of HF, else 0 */
-    double ratio;                               /* of its budget */
+    budget shared;                              /* as it was used */
     double compression[BUDGET_LEVELS_MOST + 1]; /* rho_l: columns kept over columns given, by level */
     double passes;                              /* how often all columns of S were read */
 } factorizer_report;

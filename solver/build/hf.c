@@ -208,7 +208,7 @@ static lam_status hf_factorize(const scaled_matrix *S, const factorizer_options 
     lam_status status = LAM_OK;
     hf_run run = {.S = S, .options = options};
     hf_forecast *forecast = NULL;
-    hf_plan plan = {.levels = options->levels, .ratio = options->budget.ratio};
+    hf_plan plan = {.levels = options->levels, .ratio = options->budget.ratio, .leaf = options->budget.leaf};
     if (plan.levels < 0 || (plan.ratio <= 0 && options->budget.rule != BUDGET_SUMS)) {
         TRY(hf_forecast_create(S, &forecast, error));
         plan = hf_forecast_plan(forecast, S->n, options);
@@ -216,9 +216,10 @@ static lam_status hf_factorize(const scaled_matrix *S, const factorizer_options 
     run.levels = plan.levels < BUDGET_LEVELS_MOST ? plan.levels : BUDGET_LEVELS_MOST;
     budget shared = options->budget;
     shared.ratio = plan.ratio;
+    shared.leaf = plan.leaf;
     budget_share(&shared, options->epsilon, run.levels, run.p);
     TRY(tree(&run, 0, S->n, 0, levels_alone(&run), out, error));
-    report->ratio = plan.ratio;
+    report->shared = shared;
     report->levels = run.levels;
     for (int l = 0; l <= run.levels; l++)
         report->compression[l] = run.given[l] > 0 ? (double)run.kept[l] / (double)run.given[l] : 1;

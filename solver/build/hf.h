@@ -15,15 +15,15 @@ void hf_forecast_free(hf_forecast *f);
 /* How many of m columns a truncation at p keeps, about. */
 double hf_forecast_rank(const hf_forecast *f, double m, double p);
 
-/* Seconds, about, on one core: eq. 3.16 with the rank of each level in place of rho, and with what a Gram
- * matrix, eigenvectors and a product each take. */
-double hf_forecast_seconds(const hf_forecast *f, size_t n, const factorizer_options *options, int levels,
-                           double ratio);
-
 typedef struct hf_plan {
     int levels;
-    double ratio; /* of the budget */
+    double ratio, leaf; /* of the budget */
 } hf_plan;
+
+/* Seconds, about, on one core: eq. 3.16 with the rank of each level in place of rho, and with what a Gram
+ * matrix, eigenvectors and a product each take. */
+double hf_forecast_seconds(const hf_forecast *f, size_t n, const factorizer_options *options,
+                           const hf_plan *plan);
 
 /* The plan that is forecast to be fastest; what options give is kept. */
 hf_plan hf_forecast_plan(const hf_forecast *f, size_t n, const factorizer_options *options);

@@ -97,11 +97,14 @@ static double seconds_of_leaf(const hf_forecast *f, double n, double m, double r
            seconds_of_eigenvectors(m, r);
 }
 
-double hf_forecast_seconds(const hf_forecast *f, size_t n, const factorizer_options *options, int levels,
-                           double ratio) {
+double hf_forecast_seconds(const hf_forecast *f, size_t n, const factorizer_options *options,
+                           const hf_plan *plan) {
     double p[BUDGET_LEVELS_MOST + 1], seconds = 0, kept = 0;
-    budget shared = options->budget;
-    shared.ratio = ratio;
+    const int levels = plan->levels;
+    const budget shared = {.rule = options->budget.rule,
+                           .alpha = options->budget.alpha,
+                           .ratio = plan->ratio,
+                           .leaf = plan->leaf};
     budget_share(&shared, options->epsilon, levels, p);
     for (int l = levels; l >= 0; l--) {
         const double m = ldexp((double)n, -l), nodes = ldexp(1, l), given = l == levels ? m : 2 * kept;
@@ -115,8 +118,9 @@ double hf_forecast_seconds(const hf_forecast *f, size_t n, const factorizer_opti
 }
 
 hf_plan hf_forecast_plan(const hf_forecast *f, size_t n, const factorizer_options *options) {
-    /* Falling shares suit a spectrum that falls; equal and rising ones keep the leaves above the noise. */
-    static const double ratios[] = {.5, .7, 1, 1.5, 2.5, 4};
+    /* Falling shares suit a spectrum that falls; much for the leaves keeps them above the noise of rays. */
+    static const double ratios[] = {.5, .7, 1}, leaves[] = {0, .3, .5, .7, .9};
+    enum { RATIOS = sizeof ratios / sizeof *ratios, LEAVES = sizeof leaves / sizeof *leaves };
     hf_plan best = {.ratio = .5};
     double least = INFINITY;
     for (int levels = 0; levels <= BUDGET_LEVELS_MOST; levels++) {
@@ -124,12 +128,12 @@ hf_plan hf_forecast_plan(const hf_forecast *f, size_t n, const factorizer_option
         if (options->levels >= 0 && levels != options->levels) continue;
         if (options->levels < 0 && levels > 0 && columns < LEAF_LEAST) break;
         if (options->levels < 0 && columns > LEAF_MOST) continue;
-        for (size_t k = 0; k < sizeof ratios / sizeof *ratios; k++) {
-            const double ratio = options->budget.ratio > 0 ? options->budget.ratio : ratios[k];
-            const double seconds = hf_forecast_seconds(f, n, options, levels, ratio);
+        for (size_t k = 0; k < RATIOS * LEAVES; k++) {
+            const hf_plan plan = {.levels = levels, .ratio = ratios[k % RATIOS], .leaf = leaves[k / RATIOS]};
+            const double seconds = hf_forecast_seconds(f, n, options, &plan);
             if (seconds >= least) continue;
             least = seconds;
-            best = (hf_plan){.levels = levels, .ratio = ratio};
+            best = plan;
         }
     }
     return best;

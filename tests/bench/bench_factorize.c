@@ -47,6 +47,7 @@ int main(int argc, char **argv) {
         if (sscanf(argv[k], "rank=%lf", &x) == 1) how.rank = (size_t)x;
         if (sscanf(argv[k], "alpha=%lf", &x) == 1) how.budget.alpha = x;
         if (sscanf(argv[k], "ratio=%lf", &x) == 1) how.budget.ratio = x;
+        if (sscanf(argv[k], "leaf=%lf", &x) == 1) how.budget.leaf = x;
         if (sscanf(argv[k], "levels=%lf", &x) == 1) how.levels = (int)x;
         if (sscanf(argv[k], "iterations=%lf", &x) == 1) how.iterations = (int)x;
         if (sscanf(argv[k], "runs=%lf", &x) == 1) runs = (size_t)x;
@@ -78,11 +79,12 @@ int main(int argc, char **argv) {
     qsort(seconds, runs, sizeof *seconds, ascending);
     getrusage(RUSAGE_SELF, &used);
     printf("elements,density,factorizer,epsilon,rank_asked,alpha,budget,order,threads,runs,seconds,rank,real,"
-           "levels,ratio,passes,peak_MiB,compression\n");
-    printf("%zu,%.4f,%s,%g,%zu,%g,%s,%s,%d,%zu,%.3f,%zu,%.4f,%d,%g,%.2f,%.0f,", m.n, rows.density,
+           "levels,ratio,leaf,passes,peak_MiB,compression\n");
+    printf("%zu,%.4f,%s,%g,%zu,%g,%s,%s,%d,%zu,%.3f,%zu,%.4f,%d,%g,%g,%.2f,%.0f,", m.n, rows.density,
            report.name, how.epsilon, how.rank, how.budget.alpha, budget_rule_name(how.budget.rule),
            mesh_order ? "mesh" : "z", omp_get_max_threads(), runs, seconds[runs / 2], factors.rank, norm,
-           report.levels, report.ratio, report.passes, (double)used.ru_maxrss / 1024);
+           report.levels, report.shared.ratio, report.shared.leaf, report.passes,
+           (double)used.ru_maxrss / 1024);
     for (int l = 0; l <= report.levels; l++) printf("%.3f ", report.compression[l]);
     printf("\n");
 done:
