@@ -54,18 +54,13 @@ static lam_status largest_ritz(int steps, const double *diagonal, const double *
     return LAM_OK;
 }
 
-lam_status norm_of_error(const scaled_matrix *S, const uint32_t *order, const tall_factors *f,
-                         const progress *p, double *norm, lam_error *error) {
+lam_status norm_of_product(size_t n, norm_product *product, void *context, const progress *p, double *norm,
+                           lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = f->n;
     const int steps = n < STEPS ? (int)n : STEPS;
-    difference D = {.S = S, .order = order, .f = f};
     double *basis = memory_allocate((size_t)steps * n, sizeof *basis, "norm", error);
     double *w = memory_allocate(n, sizeof *w, "norm", error);
-    D.y = memory_allocate(n, sizeof *D.y, "norm", error);
-    D.x_single = memory_allocate(n, sizeof *D.x_single, "norm", error);
-    D.t = memory_allocate(f->rank, sizeof *D.t, "norm", error);
-    if (basis == NULL || w == NULL || D.y == NULL || D.x_single == NULL || D.t == NULL) TRY(LAM_ERR_MEMORY);
+    if (basis == NULL || w == NULL) TRY(LAM_ERR_MEMORY);
 
     /* A start that no symmetry of a scene is likely to be orthogonal to. */
     uint64_t state = 1;
@@ -81,8 +76,7 @@ lam_status norm_of_error(const scaled_matrix *S, const uint32_t *order, const ta
         if (progress_cancelled(p)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         progress_report(p, "check norm", (double)s / steps);
         const double *q = basis + (size_t)s * n;
-        difference_multiply(&D, false, q, D.y);
-        difference_multiply(&D, true, D.y, w);
+        product(context, q, w);
         diagonal[s] = cblas_ddot((int)n, q, 1, w, 1);
         done_steps = s + 1;
         for (int twice = 0; twice < 2; twice++)
@@ -100,6 +94,25 @@ lam_status norm_of_error(const scaled_matrix *S, const uint32_t *order, const ta
 done:
     free(basis);
     free(w);
+    return status;
+}
+
+static void difference_square(void *context, const double *q, double *w) {
+    const difference *D = context;
+    difference_multiply(D, false, q, D->y);
+    difference_multiply(D, true, D->y, w);
+}
+
+lam_status norm_of_error(const scaled_matrix *S, const uint32_t *order, const tall_factors *f,
+                         const progress *p, double *norm, lam_error *error) {
+    lam_status status = LAM_OK;
+    difference D = {.S = S, .order = order, .f = f};
+    D.y = memory_allocate(f->n, sizeof *D.y, "norm", error);
+    D.x_single = memory_allocate(f->n, sizeof *D.x_single, "norm", error);
+    D.t = memory_allocate(f->rank, sizeof *D.t, "norm", error);
+    if (D.y == NULL || D.x_single == NULL || D.t == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(norm_of_product(f->n, difference_square, &D, p, norm, error));
+done:
     free(D.y);
     free(D.x_single);
     free(D.t);

@@ -12,4 +12,11 @@
 lam_status norm_of_error(const scaled_matrix *S, const uint32_t *order, const tall_factors *f,
                          const progress *p, double *norm, lam_error *error);
 
+/* w = D^T D q of some matrix D; q and w are [n]. */
+typedef void norm_product(void *context, const double *q, double *w);
+
+/* The same for any D of n columns: |D|_2. Cost: at most 32 products. */
+lam_status norm_of_product(size_t n, norm_product *product, void *context, const progress *p, double *norm,
+                           lam_error *error);
+
 #endif

@@ -92,7 +92,7 @@ lam_status operator_low_rank_create_factored(size_t n, size_t k, size_t n_channe
 /* What a two_mesh operator is made of. */
 typedef struct two_mesh_arrays {
     float *left;      /* [n][k]: Y (folded, grey: P = -Y T) or U (factored: H_c = U core_c T_c) */
-    uint64_t *I;      /* [k+1]: T_p is the sum of weight E over rows I[p] ... I[p+1]-1 */
+    uint64_t *begin;  /* [k+1]: T_p is the sum of weight E over rows begin[p] ... begin[p+1]-1 */
     float *weight;    /* [n]; NULL: 1 */
     float *coherence; /* [k], for the record; or NULL */
     float *core;      /* [C][k][k]; NULL: folded */

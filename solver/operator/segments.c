@@ -47,11 +47,12 @@ static inline __attribute__((always_inline)) float sum_run(const float *x, const
 }
 
 static inline __attribute__((always_inline)) void sum_runs(const segments *s, const float *x, float *t) {
-    const uint64_t *I = s->I;
+    const uint64_t *begin = s->begin;
     if (s->weight == NULL)
-        for (size_t p = 0; p < s->k; p++) t[p] = sum_run(x + I[p], NULL, I[p + 1] - I[p]);
+        for (size_t p = 0; p < s->k; p++) t[p] = sum_run(x + begin[p], NULL, begin[p + 1] - begin[p]);
     else
-        for (size_t p = 0; p < s->k; p++) t[p] = sum_run(x + I[p], s->weight + I[p], I[p + 1] - I[p]);
+        for (size_t p = 0; p < s->k; p++)
+            t[p] = sum_run(x + begin[p], s->weight + begin[p], begin[p + 1] - begin[p]);
 }
 
 static void sum_portable(const segments *s, const float *x, float *t) {
@@ -87,32 +88,34 @@ const char *segment_kernels_name(const segment_kernels *kernels) {
     return kernels->name;
 }
 
-lam_status segments_create(size_t n, size_t k, uint64_t *I, float *weight, segments *s, lam_error *error) {
+lam_status segments_create(size_t n, size_t k, uint64_t *begin, float *weight, segments *s,
+                           lam_error *error) {
     lam_status status = LAM_OK;
-    if (I[0] != 0) FAIL(error, LAM_ERR_NUMERIC, "/operator/I[0] = %" PRIu64 ", must be 0", I[0]);
+    if (begin[0] != 0) FAIL(error, LAM_ERR_NUMERIC, "/operator/I[0] = %" PRIu64 ", must be 0", begin[0]);
     for (size_t p = 0; p < k; p++)
-        if (I[p + 1] < I[p] || I[p + 1] > n)
+        if (begin[p + 1] < begin[p] || begin[p + 1] > n)
             FAIL(error, LAM_ERR_NUMERIC,
                  "/operator/I[%zu] = %" PRIu64 ", must be at least %" PRIu64 " and at most %zu", p + 1,
-                 I[p + 1], I[p], n);
-    if (k > 0 && I[k] != n)
-        FAIL(error, LAM_ERR_NUMERIC, "/operator/I[%zu] = %" PRIu64 ", must be %zu", k, I[k], n);
+                 begin[p + 1], begin[p], n);
+    if (k > 0 && begin[k] != n)
+        FAIL(error, LAM_ERR_NUMERIC, "/operator/I[%zu] = %" PRIu64 ", must be %zu", k, begin[k], n);
     for (size_t j = 0; weight != NULL && j < n; j++)
         if (!isfinite(weight[j]))
             FAIL(error, LAM_ERR_NUMERIC, "/operator/weight[%zu] = %g, must be finite", j, (double)weight[j]);
-    *s = (segments){.n = n, .k = k, .I = I, .weight = weight, .kernels = segment_kernels_available(0)};
+    *s =
+        (segments){.n = n, .k = k, .begin = begin, .weight = weight, .kernels = segment_kernels_available(0)};
 done:
     return status;
 }
 
 void segments_free(segments *s) {
-    free(s->I);
+    free(s->begin);
     free(s->weight);
     *s = (segments){0};
 }
 
 size_t segments_bytes(const segments *s) {
-    return (s->k + 1) * sizeof *s->I + (s->weight != NULL ? s->n * sizeof *s->weight : 0);
+    return (s->k + 1) * sizeof *s->begin + (s->weight != NULL ? s->n * sizeof *s->weight : 0);
 }
 
 void segments_sum(const segments *s, const float *x, float *t) {
@@ -121,6 +124,6 @@ void segments_sum(const segments *s, const float *x, float *t) {
 
 void segments_spread(const segments *s, const float *t, float *x) {
     for (size_t p = 0; p < s->k; p++)
-        for (uint64_t j = s->I[p]; j < s->I[p + 1]; j++)
+        for (uint64_t j = s->begin[p]; j < s->begin[p + 1]; j++)
             x[j] = s->weight != NULL ? s->weight[j] * t[p] : t[p];
 }

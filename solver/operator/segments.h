@@ -9,17 +9,17 @@
 
 typedef struct segment_kernels segment_kernels;
 
-/* Row j of V has weight_j in column p, where I[p] <= j < I[p+1], and nothing else. */
+/* Row j of V has weight_j in column p, where begin[p] <= j < begin[p+1], and nothing else. */
 typedef struct segments {
     size_t n, k;
-    uint64_t *I;                    /* [k+1], ascending from 0 to n, owned */
+    uint64_t *begin;                /* [k+1], ascending from 0 to n, owned: the index vector I */
     float *weight;                  /* [n], owned; NULL: 1 */
     const segment_kernels *kernels; /* for this CPU */
 } segments;
 
-/* Takes I and weight over when they are sound: ascending from 0 to n, finite; else leaves them to the caller.
- * LAM_ERR_NUMERIC names the entry. */
-lam_status segments_create(size_t n, size_t k, uint64_t *I, float *weight, segments *s, lam_error *error);
+/* Takes begin and weight over when they are sound: ascending from 0 to n, finite; else leaves them to the
+ * caller. LAM_ERR_NUMERIC names the entry. */
+lam_status segments_create(size_t n, size_t k, uint64_t *begin, float *weight, segments *s, lam_error *error);
 
 /* A zeroed one is allowed. */
 void segments_free(segments *s);

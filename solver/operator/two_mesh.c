@@ -1,8 +1,9 @@
-/* kind "two_mesh": a fine mesh of n elements that receives, a coarse one of k patches that sends (Fernández
- * et al. 2011, section 4). As low_rank with a V of one entry a row, kept as the index vector I (eq. 7):
- * folded (grey):  P = -Y T                  (eq. 5),    T_p = sum of weight_j E_j over positions I[p] ...
- * I[p+1]-1 factored:       P_c = rho'_c U core_c T_c              U free of reflectance, shared by all
- * channels */
+/* kind "two_mesh": a fine mesh of n elements receives, a coarse one of k patches sends (Fernández et al.
+ * 2011, section 4). As low_rank, with a V of one entry a row, of which the index vector I is kept (eq. 7); T
+ * = V^T E:
+ *
+ * folded (grey):  P = -Y T                     eq. 5
+ * factored:       P_c = rho'_c U core_c T_c    U free of reflectance, shared by all channels */
 #include "solver/operator/two_mesh.h"
 
 #include "solver/operator/panel.h"
@@ -32,7 +33,7 @@ static void two_mesh_destroy(lam_operator *op) {
 
 void two_mesh_arrays_free(two_mesh_arrays *arrays) {
     free(arrays->left);
-    free(arrays->I);
+    free(arrays->begin);
     free(arrays->weight);
     free(arrays->coherence);
     free(arrays->core);
@@ -51,8 +52,8 @@ lam_status operator_two_mesh_create(size_t n, size_t k, size_t n_channels, const
     TRY(panel_create(n, k, arrays->left, folded ? "/operator/Y" : "/operator/U", &self->left, error));
     free(arrays->left);
     arrays->left = NULL;
-    TRY(segments_create(n, k, arrays->I, arrays->weight, &self->right, error));
-    arrays->I = NULL;
+    TRY(segments_create(n, k, arrays->begin, arrays->weight, &self->right, error));
+    arrays->begin = NULL;
     arrays->weight = NULL;
     for (size_t p = 0; arrays->coherence != NULL && p < k; p++)
         if (!(arrays->coherence[p] >= 0 && arrays->coherence[p] <= 1))
@@ -105,7 +106,8 @@ static lam_status two_mesh_load(store *s, size_t n, size_t n_channels, const flo
     if (!folded)
         TRY(store_read(s, "/operator/core", STORE_F32, 3, (size_t[STORE_MAX_RANK]){n_channels, k, k}, &core,
                        error));
-    two_mesh_arrays arrays = {.left = left, .I = I, .weight = weight, .coherence = coherence, .core = core};
+    two_mesh_arrays arrays = {
+        .left = left, .begin = I, .weight = weight, .coherence = coherence, .core = core};
     left = I = weight = coherence = core = NULL;
     TRY(operator_two_mesh_create(n, k, n_channels, reflectance, &arrays, op, error));
 done:
@@ -144,7 +146,7 @@ static lam_status two_mesh_save(const lam_operator *op, store *s, lam_error *err
     const size_t k = self->left.k, n_ends = k + 1;
     TRY(store_set_integer(s, "/operator", "rank", (int64_t)k, error));
     TRY(save_panels(&self->left, 1, 2, s, self->core == NULL ? "/operator/Y" : "/operator/U", error));
-    TRY(store_write(s, "/operator/I", STORE_U64, 1, &n_ends, self->right.I, error));
+    TRY(store_write(s, "/operator/I", STORE_U64, 1, &n_ends, self->right.begin, error));
     if (self->right.weight != NULL)
         TRY(store_write(s, "/operator/weight", STORE_F32, 1, &op->n, self->right.weight, error));
     if (self->coherence != NULL)
@@ -232,6 +234,6 @@ bool operator_patches_of(const lam_operator *op, operator_patches *patches) {
     if (op->kind != &operator_two_mesh) return false;
     const two_mesh *self = (const two_mesh *)op;
     *patches = (operator_patches){
-        .k = self->left.k, .I = self->right.I, .order = op->order, .coherence = self->coherence};
+        .k = self->left.k, .begin = self->right.begin, .order = op->order, .coherence = self->coherence};
     return true;
 }

@@ -4,10 +4,11 @@
 
 #include "solver/operator/operator.h"
 
-/* The patches of an operator, views into it: patch p holds the elements at positions I[p] ... I[p+1]-1. */
+/* The patches of an operator, views into it: patch p holds the elements at positions begin[p] ...
+ * begin[p+1]-1. */
 typedef struct operator_patches {
     size_t k;
-    const uint64_t *I;      /* [k+1] */
+    const uint64_t *begin;  /* [k+1] */
     const uint32_t *order;  /* [n], position -> element; NULL: mesh order */
     const float *coherence; /* [k], in [0, 1]; NULL: not stored */
 } operator_patches;

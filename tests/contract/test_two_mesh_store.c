@@ -23,7 +23,7 @@ typedef struct recipe {
     const char *what;
     bool factored, no_I, no_form;
     size_t I_size, weight_size, coherence_size, left[2]; /* weight and coherence: 0 leaves them out */
-    uint64_t I[3];
+    uint64_t begin[3];
     float weight, coherence, left_value;
     const char *word; /* NULL: it is good */
 } recipe;
@@ -33,14 +33,14 @@ static const recipe recipes[] = {
     {.what = "good, factored", .factored = true},
     {.what = "good, weighted", .weight_size = 6, .weight = .5f},
     {.what = "good, coherence", .coherence_size = 2, .coherence = 1},
-    {.what = "a patch without elements", .I = {0, 6, 6}},
+    {.what = "a patch without elements", .begin = {0, 6, 6}},
     {.what = "no form", .no_form = true, .word = "form"},
     {.what = "no I", .no_I = true, .word = "/operator/I"},
     {.what = "I short", .I_size = 2, .word = "/operator/I"},
-    {.what = "I ends early", .I = {0, 3, 5}, .word = "I[2] = 5, must be 6"},
-    {.what = "I ends late", .I = {0, 3, 7}, .word = "I[2] = 7, must be at least 3 and at most 6"},
-    {.what = "I falls", .I = {0, 4, 3}, .word = "I[2] = 3"},
-    {.what = "I begins late", .I = {1, 4, 6}, .word = "I[0] = 1"},
+    {.what = "I ends early", .begin = {0, 3, 5}, .word = "I[2] = 5, must be 6"},
+    {.what = "I ends late", .begin = {0, 3, 7}, .word = "I[2] = 7, must be at least 3 and at most 6"},
+    {.what = "I falls", .begin = {0, 4, 3}, .word = "I[2] = 3"},
+    {.what = "I begins late", .begin = {1, 4, 6}, .word = "I[0] = 1"},
     {.what = "weight short", .weight_size = 5, .weight = 1, .word = "/operator/weight"},
     {.what = "weight NaN", .weight_size = 6, .weight = NAN, .word = "weight[5] = nan"},
     {.what = "coherence long", .coherence_size = 3, .word = "/operator/coherence"},
@@ -77,7 +77,8 @@ static void write_recipe(const recipe *r) {
     write_floats(s, r->factored ? "/operator/U" : "/operator/Y", 2, left, .1f,
                  r->left_value != 0 ? r->left_value : .1f);
     if (!r->no_I)
-        ck_ok(store_write(s, "/operator/I", STORE_U64, 1, &I_size, r->I[2] > 0 ? r->I : usual, &error));
+        ck_ok(
+            store_write(s, "/operator/I", STORE_U64, 1, &I_size, r->begin[2] > 0 ? r->begin : usual, &error));
     if (r->weight_size > 0) write_floats(s, "/operator/weight", 1, &r->weight_size, .1f, r->weight);
     if (r->coherence_size > 0)
         write_floats(s, "/operator/coherence", 1, &r->coherence_size, .5f, r->coherence);
@@ -110,7 +111,7 @@ START_TEST(patches_can_be_asked_for) {
     ck_ok(lam_operator_open(path, &op, &error));
     ck_assert(operator_patches_of(op, &patches));
     ck_assert_uint_eq(patches.k, 2);
-    ck_assert_uint_eq(patches.I[1], 2);
+    ck_assert_uint_eq(patches.begin[1], 2);
     ck_assert_ptr_null(patches.order);
     ck_assert_float_eq(patches.coherence[0], .5f);
     lam_operator_close(op);

@@ -192,20 +192,21 @@ static inline void make_exact(transport *t, const double *F) {
 /* Of two meshes: U with row sums up to .95, V with one weight a row, of a patch that is one run of positions;
  * patches of 1 element and of many, weights that sum to 1 or (unweighted) are 1. I is [k+1]. */
 static inline void random_two_mesh(size_t n, size_t k, const uint32_t *order, bool weighted, float *U,
-                                   float *V, uint64_t *I, uint64_t *state) {
-    for (size_t p = 1; p <= k; p++) I[p] = p + (n - k) * p * p * p / (k * k * k);
+                                   float *V, uint64_t *begin, uint64_t *state) {
+    for (size_t p = 1; p <= k; p++) begin[p] = p + (n - k) * p * p * p / (k * k * k);
     for (size_t p = 0; p < k; p++) {
         double area = 0, share[512];
-        ck_assert(I[p + 1] > I[p] && I[p + 1] - I[p] < 512);
-        for (uint64_t j = I[p]; j < I[p + 1]; j++) area += share[j - I[p]] = 0.1 + random_unit(state);
-        for (uint64_t j = I[p]; j < I[p + 1]; j++)
-            V[(order ? order[j] : j) * k + p] = weighted ? (float)(share[j - I[p]] / area) : 1.0f;
+        ck_assert(begin[p + 1] > begin[p] && begin[p + 1] - begin[p] < 512);
+        for (uint64_t j = begin[p]; j < begin[p + 1]; j++)
+            area += share[j - begin[p]] = 0.1 + random_unit(state);
+        for (uint64_t j = begin[p]; j < begin[p + 1]; j++)
+            V[(order ? order[j] : j) * k + p] = weighted ? (float)(share[j - begin[p]] / area) : 1.0f;
     }
     for (size_t i = 0; i < n; i++) {
         double sum = 0;
         for (size_t p = 0; p < k; p++) {
             U[i * k + p] = random_unit(state) < 0.4 ? (float)random_unit(state) : 0.0f;
-            sum += (double)U[i * k + p] * (weighted ? 1.0 : (double)(I[p + 1] - I[p]));
+            sum += (double)U[i * k + p] * (weighted ? 1.0 : (double)(begin[p + 1] - begin[p]));
         }
         for (size_t p = 0; p < k && sum > 0; p++) U[i * k + p] = (float)(0.95 * (double)U[i * k + p] / sum);
     }
@@ -213,18 +214,18 @@ static inline void random_two_mesh(size_t n, size_t k, const uint32_t *order, bo
 
 /* The operator of two meshes from a V that is one: left [n][k] and core as of low rank. */
 static inline lam_status create_two_mesh(const transport *t, float *left, const float *V_positions,
-                                         const uint64_t *I, float *core, lam_operator **op,
+                                         const uint64_t *begin, float *core, lam_operator **op,
                                          lam_error *error) {
     size_t n = t->n, k = t->k;
     two_mesh_arrays arrays = {.left = left, .core = core};
-    arrays.I = test_allocate(k + 1, sizeof *arrays.I);
-    memcpy(arrays.I, I, (k + 1) * sizeof *I);
+    arrays.begin = test_allocate(k + 1, sizeof *arrays.begin);
+    memcpy(arrays.begin, begin, (k + 1) * sizeof *begin);
     arrays.coherence = test_allocate(k, sizeof *arrays.coherence);
     float *weight = test_allocate(n, sizeof *weight);
     bool ones = true;
     for (size_t p = 0; p < k; p++) {
         arrays.coherence[p] = (float)p / (float)k;
-        for (uint64_t j = I[p]; j < I[p + 1]; j++) {
+        for (uint64_t j = begin[p]; j < begin[p + 1]; j++) {
             weight[j] = V_positions[j * k + p];
             ones = ones && weight[j] == 1;
         }
@@ -239,7 +240,7 @@ static inline lam_status create_two_mesh(const transport *t, float *left, const 
 /* Y = -rho' U core for one channel, magnitude |U| |core| |V|^T rho' for all. With I, V is that of two meshes.
  */
 static inline void make_low_rank(transport *t, const double *F, const float *U, const float *V, bool folded,
-                                 const uint64_t *I) {
+                                 const uint64_t *begin) {
     lam_error error = {.message = ""};
     size_t n = t->n, k = t->k;
     float *core = test_allocate(t->n_channels * k * k, sizeof *core), *Y = test_allocate(n * k, sizeof *Y);
@@ -247,7 +248,7 @@ static inline void make_low_rank(transport *t, const double *F, const float *U, 
     for (size_t c = 0; c < t->n_channels; c++) {
         const float *rho = t->reflectance + c * n;
         bounced_light(n, F, rho, t->P + c * n * n);
-        for (size_t a = 0; a < k; a++) /* core = (I - V^T R U)^-1 */
+        for (size_t a = 0; a < k; a++) /* core = (begin - V^T R U)^-1 */
             for (size_t b = 0; b < k; b++) {
                 K[a * k + b] = a == b ? 1.0 : 0.0;
                 for (size_t i = 0; i < n; i++)
@@ -276,21 +277,21 @@ static inline void make_low_rank(transport *t, const double *F, const float *U, 
     if (folded) { /* Y rounded; V^T E, Y t */
         float *rows = in_positions(t->order, n, k, false, Y);
         t->roundings = 1 + sum_roundings(n) + sum_roundings(k);
-        if (I != NULL)
-            status = create_two_mesh(t, rows, V_positions, I, NULL, &t->op, &error);
+        if (begin != NULL)
+            status = create_two_mesh(t, rows, V_positions, begin, NULL, &t->op, &error);
         else
             status = operator_low_rank_create_folded(n, k, t->reflectance, rows, V_positions, &t->op, &error);
         free(core);
     } else { /* core rounded; V^T E, core t, U t, rho' */
         float *rows = in_positions(t->order, n, k, false, U);
         t->roundings = 2 + sum_roundings(n) + 2 * sum_roundings(k);
-        if (I != NULL)
-            status = create_two_mesh(t, rows, V_positions, I, core, &t->op, &error);
+        if (begin != NULL)
+            status = create_two_mesh(t, rows, V_positions, begin, core, &t->op, &error);
         else
             status = operator_low_rank_create_factored(n, k, t->n_channels, t->reflectance, rows, V_positions,
                                                        core, &t->op, &error);
     }
-    if (I != NULL) free(V_positions);
+    if (begin != NULL) free(V_positions);
     ck_assert_msg(status == LAM_OK, "%s", error.message);
     free(Y);
     free(K);
@@ -311,14 +312,14 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
     bool colour = kind == TRANSPORT_EXACT_COLOUR || kind == TRANSPORT_FACTORED_COLOUR ||
                   kind == TRANSPORT_TWO_MESH_COLOUR;
     bool two_mesh = kind == TRANSPORT_TWO_MESH || kind == TRANSPORT_TWO_MESH_COLOUR;
-    uint64_t I[64] = {0};
+    uint64_t begin[64] = {0};
     transport t = {.name = names[kind], .n = 151, .k = 21, .n_channels = colour ? 3 : 1};
     size_t n = t.n, k = t.k;
     float *U = test_allocate(n * k, sizeof *U), *V = test_allocate(n * k, sizeof *V);
     double *F = test_allocate(n * n, sizeof *F);
     if (ordered) t.order = random_order(n, &state);
     if (two_mesh)
-        random_two_mesh(n, k, t.order, colour, U, V, I, &state);
+        random_two_mesh(n, k, t.order, colour, U, V, begin, &state);
     else
         random_factors(n, k, U, V, &state);
     for (size_t i = 0; i < n; i++)
@@ -331,7 +332,7 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
         make_exact(&t, F);
     else
         make_low_rank(&t, F, U, V, kind == TRANSPORT_FOLDED || kind == TRANSPORT_TWO_MESH,
-                      two_mesh ? I : NULL);
+                      two_mesh ? begin : NULL);
     if (ordered) ck_assert(operator_set_order(t.op, t.order, &error) == LAM_OK);
     free(F);
     free(U);

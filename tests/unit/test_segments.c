@@ -39,7 +39,7 @@ START_TEST(sums_are_right) {
         segments_sum(&s, x, t);
         for (size_t p = 0; p < RUNS; p++) {
             double truth = 0, magnitude = 0;
-            for (uint64_t j = s.I[p]; j < s.I[p + 1]; j++) {
+            for (uint64_t j = s.begin[p]; j < s.begin[p + 1]; j++) {
                 const double term = (s.weight != NULL ? (double)s.weight[j] : 1) * (double)x[j];
                 truth += term;
                 magnitude += fabs(term);
@@ -77,7 +77,7 @@ START_TEST(spread_is_the_transpose) {
     for (size_t p = 0; p < RUNS; p++) t[p] = (float)random_double();
     segments_spread(&s, t, x);
     for (size_t p = 0; p < RUNS; p++)
-        for (uint64_t j = s.I[p]; j < s.I[p + 1]; j++)
+        for (uint64_t j = s.begin[p]; j < s.begin[p + 1]; j++)
             ck_assert_float_eq(x[j], s.weight != NULL ? s.weight[j] * t[p] : t[p]);
     segments_free(&s);
 }
