@@ -4,71 +4,69 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
 
 struct segment_kernels {
     const char *name;
     void (*sum)(const segments *s, const float *x, float *t);
 };
 
-/* 8 and 4 sums side by side, whatever the width of a register: so the order of the additions is one. */
+/* 8 sums side by side, and half of them. */
 typedef double wide __attribute__((vector_size(64)));
 typedef double half __attribute__((vector_size(32)));
 typedef float wide_floats __attribute__((vector_size(32), aligned(4), may_alias));
-typedef float half_floats __attribute__((vector_size(16), aligned(4), may_alias));
 
 #define WIDE(x) __builtin_convertvector(*(const wide_floats *)(x), wide)
-#define HALF(x) __builtin_convertvector(*(const half_floats *)(x), half)
 
-/* sum weight_j x_j, j < count; weight may be NULL. */
-static inline __attribute__((always_inline)) float sum_run(const float *x, const float *weight,
-                                                           size_t count) {
-    wide one = {0}, two = {0};
-    half three = {0};
-    double rest = 0;
-    size_t j = 0;
-    for (; j + 16 <= count; j += 16) {
-        one += weight != NULL ? WIDE(weight + j) * WIDE(x + j) : WIDE(x + j);
-        two += weight != NULL ? WIDE(weight + j + 8) * WIDE(x + j + 8) : WIDE(x + j + 8);
-    }
-    if (j + 8 <= count) {
-        one += weight != NULL ? WIDE(weight + j) * WIDE(x + j) : WIDE(x + j);
-        j += 8;
-    }
-    if (j + 4 <= count) {
-        three = weight != NULL ? HALF(weight + j) * HALF(x + j) : HALF(x + j);
-        j += 4;
-    }
-    for (; j < count; j++) rest += weight != NULL ? (double)weight[j] * (double)x[j] : (double)x[j];
-    if (count >= 8) {
-        one += two;
-        for (int lane = 0; lane < 4; lane++) three[lane] += one[lane] + one[lane + 4];
-    }
-    return (float)(((three[0] + three[2]) + (three[1] + three[3])) + rest);
+#define KERNEL(name) name##_portable
+#define TARGET
+static inline void load_eight_portable(const float *x, size_t count, wide *lanes) {
+    *lanes = (wide){0};
+    for (size_t j = 0; j < count; j++) (*lanes)[j] = (double)x[j];
 }
-
-static inline __attribute__((always_inline)) void sum_runs(const segments *s, const float *x, float *t) {
-    const uint64_t *begin = s->begin;
-    if (s->weight == NULL)
-        for (size_t p = 0; p < s->k; p++) t[p] = sum_run(x + begin[p], NULL, begin[p + 1] - begin[p]);
-    else
-        for (size_t p = 0; p < s->k; p++)
-            t[p] = sum_run(x + begin[p], s->weight + begin[p], begin[p + 1] - begin[p]);
+static inline void load_four_portable(const float *x, size_t count, half *lanes) {
+    *lanes = (half){0};
+    for (size_t j = 0; j < count; j++) (*lanes)[j] = (double)x[j];
 }
-
-static void sum_portable(const segments *s, const float *x, float *t) {
-    sum_runs(s, x, t);
-}
+#include "solver/operator/segment_kernels.h"
 static const segment_kernels kernels_portable = {"portable", sum_portable};
 
 #if defined(__x86_64__)
-__attribute__((target("avx2,fma"))) static void sum_avx2(const segments *s, const float *x, float *t) {
-    sum_runs(s, x, t);
+#define KERNEL(name) name##_avx2
+#define TARGET __attribute__((target("avx2,fma")))
+TARGET static inline __attribute__((always_inline)) void load_eight_avx2(const float *x, size_t count,
+                                                                         wide *lanes) {
+    static const int32_t masks[16] = {-1, -1, -1, -1, -1, -1, -1, -1};
+    const __m256 first =
+        _mm256_maskload_ps(x, _mm256_loadu_si256((const __m256i_u *)(const void *)(masks + 8 - count)));
+    const __m256d low = _mm256_cvtps_pd(_mm256_castps256_ps128(first)),
+                  high = _mm256_cvtps_pd(_mm256_extractf128_ps(first, 1));
+    memcpy(lanes, &low, sizeof low);
+    memcpy((char *)lanes + sizeof low, &high, sizeof high);
 }
-__attribute__((target("avx512f,avx512vl"))) static void sum_avx512(const segments *s, const float *x,
-                                                                   float *t) {
-    sum_runs(s, x, t);
+TARGET static inline __attribute__((always_inline)) void load_four_avx2(const float *x, size_t count,
+                                                                        half *lanes) {
+    static const int32_t masks[8] = {-1, -1, -1, -1};
+    *lanes = (half)_mm256_cvtps_pd(
+        _mm_maskload_ps(x, _mm_loadu_si128((const __m128i_u *)(const void *)(masks + 4 - count))));
 }
+#include "solver/operator/segment_kernels.h"
 static const segment_kernels kernels_avx2 = {"avx2", sum_avx2};
+
+#define KERNEL(name) name##_avx512
+#define TARGET __attribute__((target("avx512f,avx512vl")))
+TARGET static inline __attribute__((always_inline)) void load_eight_avx512(const float *x, size_t count,
+                                                                           wide *lanes) {
+    *lanes = (wide)_mm512_cvtps_pd(_mm256_maskz_loadu_ps((__mmask8)((1u << count) - 1), x));
+}
+TARGET static inline __attribute__((always_inline)) void load_four_avx512(const float *x, size_t count,
+                                                                          half *lanes) {
+    *lanes = (half)_mm256_cvtps_pd(_mm_maskz_loadu_ps((__mmask8)((1u << count) - 1), x));
+}
+#include "solver/operator/segment_kernels.h"
 static const segment_kernels kernels_avx512 = {"avx512", sum_avx512};
 #endif
 
