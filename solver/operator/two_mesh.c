@@ -233,7 +233,10 @@ const operator_kind operator_two_mesh = {
 bool operator_patches_of(const lam_operator *op, operator_patches *patches) {
     if (op->kind != &operator_two_mesh) return false;
     const two_mesh *self = (const two_mesh *)op;
-    *patches = (operator_patches){
-        .k = self->left.k, .begin = self->right.begin, .order = op->order, .coherence = self->coherence};
+    *patches = (operator_patches){.k = self->left.k,
+                                  .begin = self->right.begin,
+                                  .order = op->order,
+                                  .weight = self->right.weight,
+                                  .coherence = self->coherence};
     return true;
 }

@@ -10,6 +10,7 @@ typedef struct operator_patches {
     size_t k;
     const uint64_t *begin;  /* [k+1] */
     const uint32_t *order;  /* [n], position -> element; NULL: mesh order */
+    const float *weight;    /* [n], A_j / A_p by position; NULL: areas are equal in each patch */
     const float *coherence; /* [k], in [0, 1]; NULL: not stored */
 } operator_patches;
 
