@@ -95,14 +95,11 @@ static lam_status qr_factors(const build_problem *problem, const coarse_mesh *me
     TRY(two_mesh_factors(problem, mesh, &U, &weight, error));
     f.Q = memory_allocate(n, k * sizeof *f.Q, "U_QR", error);
     if (f.Q == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t p = 0; p < k; p++) { /* (S W)_ep = (A_e / A_p)^1/2 sum of F_ej over p */
-        const double count = weight != NULL ? 1 : (double)(mesh->begin[p + 1] - mesh->begin[p]);
+    for (size_t p = 0; p < k; p++) /* S W but for the lengths of its columns: A^1/2 U has the same span */
         for (size_t position = 0; position < n; position++) {
             const size_t e = mesh->element[position];
-            f.Q[p * n + e] =
-                (float)(S->root_area[e] / sqrt(mesh->area[p]) * count * (double)U[position * k + p]);
+            f.Q[p * n + e] = (float)(S->root_area[e] * (double)U[position * k + p]);
         }
-    }
     free(U);
     U = NULL;
     TRY(orthonormal_columns(n, k, f.Q, error));

@@ -94,6 +94,38 @@ START_TEST(a_sphere_is_one_patch) {
 }
 END_TEST
 
+/* With no more elements than groups, each is its own: coherence is then the share of the squares of S's
+ * columns, S = A^1/2 F A^-1/2, that their projection on a patch keeps: S W W^T, W_jp = (A_j / A_p)^1/2. In
+ * double from the same F, but for views in single precision: 1e-6 of the squares. Patches of one face and
+ * patches of several, whose areas differ. */
+START_TEST(coherence_is_what_a_patch_keeps_of_S) {
+    room r = room_create(hall, 3, .5f, 1);
+    const size_t n = r.m.n;
+    const double *A = r.m.area;
+    double *F = room_dense(&r.F);
+    for (size_t k = 4; k <= 16; k += 12) {
+        coarse_mesh c = create(room_problem(&r), (coarse_options){.patches = k});
+        for (size_t p = 0; p < k; p++) {
+            double all = 0, kept = 0;
+            for (size_t i = 0; i < n; i++) {
+                double along = 0;
+                for (uint64_t q = c.begin[p]; q < c.begin[p + 1]; q++) {
+                    const size_t j = c.element[q];
+                    const double S_ij = sqrt(A[i]) * F[i * n + j] / sqrt(A[j]);
+                    all += S_ij * S_ij;
+                    along += S_ij * sqrt(A[j] / c.area[p]);
+                }
+                kept += along * along;
+            }
+            ck_assert_double_eq_tol((double)c.coherence[p], kept / all, 1e-6);
+        }
+        coarse_mesh_free(&c);
+    }
+    free(F);
+    room_free(&r);
+}
+END_TEST
+
 /* --- splitting ----------------------------------------------------------------------------------------- */
 
 START_TEST(patches_are_as_many_as_asked_for) {
@@ -228,6 +260,7 @@ START_TEST(proximity_takes_the_nearest) {
         for (uint64_t i = b.begin[p]; i < b.begin[p + 1]; i++) {
             const uint32_t e = b.element[i];
             double nearest = INFINITY;
+            ck_assert_uint_eq(a.element[a.begin[p]] / 64, e / 64);
             for (size_t q = 0; q < k; q++)
                 if (a.element[a.begin[q]] / 64 == e / 64)
                     nearest = fmin(nearest, distance(r.geometry.centre[e], centre[q]));
@@ -264,6 +297,18 @@ START_TEST(proximity_leaves_what_faces_no_patch) {
 }
 END_TEST
 
+/* All in one place, the first patch is the nearest for everything: what stays keeps the others alive. */
+START_TEST(proximity_empties_no_patch) {
+    room r = room_create(hall, 3, .5f, 1);
+    for (size_t i = 0; i < r.m.n; i++)
+        for (int d = 0; d < 3; d++) r.geometry.centre[i][d] = 1;
+    coarse_mesh c = create(room_problem(&r), (coarse_options){.patches = 20, .proximity = true});
+    ck_assert_uint_eq(c.k, 20);
+    coarse_mesh_free(&c);
+    room_free(&r);
+}
+END_TEST
+
 START_TEST(threads_give_the_same_bits) {
     room r = room_create(hall, 8, .5f, 1);
     const int usual = omp_get_max_threads();
@@ -291,6 +336,7 @@ int main(void) {
     tcase_add_test(tests, coherence_is_one_where_all_see_the_same);
     tcase_add_test(tests, coherence_of_unlike_views);
     tcase_add_test(tests, a_sphere_is_one_patch);
+    tcase_add_test(tests, coherence_is_what_a_patch_keeps_of_S);
     tcase_add_loop_test(tests, patches_are_as_many_as_asked_for, 0, 11);
     tcase_add_test(tests, too_many_surfaces_begin_as_directions);
     tcase_add_loop_test(tests, splitting_stops_at_the_smallest_area, 0, 6);
@@ -298,6 +344,7 @@ int main(void) {
     tcase_add_test(tests, halves_are_cut_across_the_longest_side);
     tcase_add_test(tests, what_lies_in_one_place_is_split_too);
     tcase_add_test(tests, proximity_takes_the_nearest);
+    tcase_add_test(tests, proximity_empties_no_patch);
     tcase_add_test(tests, proximity_leaves_what_faces_no_patch);
     tcase_add_test(tests, threads_give_the_same_bits);
     suite_add_tcase(suite, tests);
