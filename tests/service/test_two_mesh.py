@@ -9,6 +9,7 @@ import unittest
 import h5py
 import numpy
 
+from daemon import Daemon
 from test_render import decode_png
 
 LAMBERT = os.environ["LAMBERT"]
@@ -176,6 +177,19 @@ class TwoMesh(unittest.TestCase):
         numpy.testing.assert_allclose(sums, 1, atol=1e-5)
         done = must("solve", self.cornell, "--emit", "lamp=17,12,4", "-o", self.path("B.csv"))
         self.assertEqual(done.stderr.count("error"), 0)
+
+    def test_the_daemon_serves_it(self):
+        """The same bits from a socket as from `lambert solve`, for one lighting and in a batch."""
+        must("solve", self.cornell, "--emit", "lamp=17,12,4", "-o", self.path("B.npy"))
+        expected = numpy.load(self.path("B.npy")).reshape(3, -1)
+        lamp = {"groups": {"lamp": [17, 12, 4]}}
+        with Daemon(self.cornell) as daemon:
+            one = daemon.post("/v1/scenes/cornell/radiosity", {"emission": lamp}).json()
+            batch = daemon.post("/v1/scenes/cornell/radiosity",
+                                {"emissions": [{"groups": {"floor": 3}}, lamp]}).json()
+            self.assertEqual(daemon.get("/v1/scenes/cornell").json()["kind"], "two_mesh")
+        numpy.testing.assert_array_equal(numpy.array(one["radiosity"], numpy.float32), expected)
+        numpy.testing.assert_array_equal(numpy.array(batch["radiosity"][1], numpy.float32), expected)
 
     def test_same_bits(self):
         sums = []
