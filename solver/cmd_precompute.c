@@ -196,7 +196,7 @@ static const option_row rows[] = {
      .kind = OPTION_COUNT,
      .offset = FIELD(rank),
      .value = "K",
-     .doc = "Exactly this many columns in place of --epsilon",
+     .doc = "Exactly this many columns (2msc: patches) in place of --epsilon",
      .low = 1,
      .high = 4e9},
     {.name = "keep-factors", .kind = OPTION_LATER, .doc = "(not supported yet)"},
