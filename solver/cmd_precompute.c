@@ -158,16 +158,16 @@ static const option_row rows[] = {
     {.name = "method",
      .kind = OPTION_CHOICE,
      .offset = FIELD(method),
-     .value = "auto|exact|low-rank",
+     .value = "auto|exact|low-rank|2msc",
      .doc = "Kind of operator (auto)",
-     .choices = "auto|exact|low-rank",
-     .later = "2msc|sparse|emitters|hierarchical"},
+     .choices = "auto|exact|low-rank|2msc",
+     .later = "sparse|emitters|hierarchical"},
     {.name = "factorizer",
      .kind = OPTION_CHOICE,
      .offset = FIELD(factorizer),
-     .value = "auto|hf|svd|rsi|sgrsvd",
-     .doc = "How a low rank is found (auto)",
-     .choices = "auto|hf|svd|rsi|sgrsvd"},
+     .value = "auto|hf|svd|rsi|sgrsvd|qr",
+     .doc = "How a low rank is found (auto); qr: 2msc with its columns made orthogonal",
+     .choices = "auto|hf|svd|rsi|sgrsvd|qr"},
     {.name = "epsilon",
      .kind = OPTION_NUMBER,
      .offset = FIELD(epsilon),
@@ -204,7 +204,7 @@ static const option_row rows[] = {
      .kind = OPTION_COUNT,
      .offset = FIELD(rank),
      .value = "K",
-     .doc = "Exactly this many columns in place of --epsilon",
+     .doc = "Exactly this many columns (2msc: patches) in place of --epsilon",
      .low = 1,
      .high = 4e9},
     {.name = "keep-factors", .kind = OPTION_LATER, .doc = "(not supported yet)"},
@@ -219,19 +219,23 @@ static const option_row rows[] = {
      .kind = OPTION_NUMBER,
      .offset = FIELD(coherence),
      .value = "X",
-     .doc = "2msc: smallest coherence of a patch",
-     .low_open = true},
+     .doc = "2msc: split patches whose coherence is below this. Coherence is 1 less the variance of what the "
+            "elements of a patch see over its mean square, by area: 1 where all see the same (without this "
+            "and --min-area: those that lose most, until patches have 16 elements on average)",
+     .low_open = true,
+     .high = 1},
     {.name = "min-area",
      .kind = OPTION_NUMBER,
      .offset = FIELD(min_area),
      .value = "M2",
-     .doc = "2msc: smallest patch",
+     .doc = "2msc: split no patch of this area or less (alone: split all others)",
      .low_open = true},
     {.name = "assign",
      .kind = OPTION_CHOICE,
      .offset = FIELD(assign),
      .value = "inclusion|proximity",
-     .doc = "2msc: which elements are of a patch",
+     .doc = "2msc: elements are of the patch they were split into, or of the nearest that faces the same way "
+            "(inclusion)",
      .choices = "inclusion|proximity"},
     {.name = "threshold",
      .kind = OPTION_NUMBER,
@@ -363,6 +367,10 @@ static int check_together(const fields *f, const option_result *given, bool from
             return options_usage(verb.name,
                                  "--%s: the mesh of a store is fixed; precompute from its scene instead",
                                  of_mesh[i]);
+    const bool qr = strcmp(f->factorizer, "qr") == 0, two_mesh = strcmp(f->method, "2msc") == 0;
+    if (qr && !two_mesh) return options_usage(verb.name, "--factorizer qr: goes with --method 2msc only");
+    if (two_mesh && !qr && strcmp(f->factorizer, "auto") != 0)
+        return options_usage(verb.name, "--factorizer %s: --method 2msc has auto or qr", f->factorizer);
     if (f->resolution % 2 != 0)
         return options_usage(verb.name, "--resolution %" PRIu64 ": must be even", f->resolution);
     if (!from_store && same_file(input, f->output))
@@ -387,9 +395,17 @@ static bool unused_by_form_factors(const char *name, const fields *f, bool from_
 }
 
 static bool unused_by_method(const char *name, const fields *f, const build_report *built) {
-    static const char *const never[] = {"coherence", "min-area", "assign", "threshold", "correction"};
+    static const char *const never[] = {"threshold", "correction"};
+    static const char *const patches[] = {"coherence", "min-area", "assign"};
     static const char *const factorized[] = {"factorizer", "epsilon", "alpha", "budget", "levels", "rank"};
     static const char *const of_hf[] = {"alpha", "budget", "levels"};
+    const bool two_mesh = strcmp(built->method, "2msc") == 0;
+    for (size_t k = 0; k < sizeof patches / sizeof patches[0]; k++)
+        if (strcmp(name, patches[k]) == 0) return !two_mesh || (k < 2 && f->rank > 0);
+    for (size_t k = 0; two_mesh && k < sizeof of_hf / sizeof of_hf[0]; k++)
+        if (strcmp(name, of_hf[k]) == 0) return true;
+    if (two_mesh && (strcmp(name, "factorizer") == 0 || strcmp(name, "rank") == 0)) return false;
+    if (two_mesh && strcmp(name, "epsilon") == 0) return true;
     for (size_t k = 0; k < sizeof never / sizeof never[0]; k++)
         if (strcmp(name, never[k]) == 0) return true;
     if (strcmp(name, "store-precision") == 0) return strcmp(built->method, "exact") == 0;
@@ -436,6 +452,7 @@ int cmd_precompute(int argc, char **argv) {
                 .method = "auto",
                 .factorizer = "auto",
                 .precision = "f32",
+                .assign = "inclusion",
                 .epsilon = .05,
                 .alpha = .5,
                 .budget = "squares",
@@ -493,6 +510,9 @@ int cmd_precompute(int argc, char **argv) {
         .levels = f.levels,
         .rank = f.rank,
         .precision = precision,
+        .coherence = f.coherence,
+        .min_area = f.min_area,
+        .proximity = strcmp(f.assign, "proximity") == 0,
         .memory = f.memory,
         .scratch = f.scratch,
         .continues = continues != NULL ? continues : "what was finished stays in the scratch folder",
