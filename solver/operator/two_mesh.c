@@ -6,11 +6,9 @@
  * factored:       P_c = rho'_c U core_c T_c    U free of reflectance, shared by all channels */
 #include "solver/operator/two_mesh.h"
 
-#include "solver/operator/panel.h"
+#include "solver/operator/panel_store.h"
 #include "solver/operator/segments.h"
 
-#include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -27,8 +25,7 @@ static void two_mesh_destroy(lam_operator *op) {
     panel_free(&self->left);
     segments_free(&self->right);
     free(self->coherence);
-    for (size_t c = 0; self->core != NULL && c < op->n_channels; c++) panel_free(&self->core[c]);
-    free(self->core);
+    core_panels_free(self->core, op->n_channels);
 }
 
 void two_mesh_arrays_free(two_mesh_arrays *arrays) {
@@ -40,18 +37,17 @@ void two_mesh_arrays_free(two_mesh_arrays *arrays) {
     *arrays = (two_mesh_arrays){0};
 }
 
-lam_status operator_two_mesh_create(size_t n, size_t k, size_t n_channels, const float *reflectance,
-                                    two_mesh_arrays *arrays, lam_operator **op, lam_error *error) {
+/* Takes left over and what arrays has beside it, also on an error. */
+static lam_status assemble(size_t n, size_t n_channels, const float *reflectance, panel *left,
+                           two_mesh_arrays *arrays, lam_operator **op, lam_error *error) {
     lam_status status = LAM_OK;
-    char name[48];
-    const bool folded = arrays->core == NULL;
+    const size_t k = left->k;
     two_mesh *self = memory_allocate(1, sizeof *self, "operator", error);
     if (self == NULL) TRY(LAM_ERR_MEMORY);
     self->base.kind = &operator_two_mesh;
+    self->left = *left;
+    *left = (panel){0};
     TRY(operator_init(&self->base, &operator_two_mesh, n, n_channels, reflectance, error));
-    TRY(panel_create(n, k, arrays->left, folded ? "/operator/Y" : "/operator/U", &self->left, error));
-    free(arrays->left);
-    arrays->left = NULL;
     TRY(segments_create(n, k, arrays->begin, arrays->weight, &self->right, error));
     arrays->begin = NULL;
     arrays->weight = NULL;
@@ -61,28 +57,38 @@ lam_status operator_two_mesh_create(size_t n, size_t k, size_t n_channels, const
                  (double)arrays->coherence[p]);
     self->coherence = arrays->coherence;
     arrays->coherence = NULL;
-    if (!folded) {
-        self->core = memory_allocate(n_channels, sizeof *self->core, "operator", error);
-        if (self->core == NULL) TRY(LAM_ERR_MEMORY);
-        for (size_t c = 0; c < n_channels; c++) {
-            snprintf(name, sizeof name, "/operator/core[%zu]", c);
-            TRY(panel_create(k, k, arrays->core + c * k * k, name, &self->core[c], error));
-        }
-    }
+    if (arrays->core != NULL) TRY(core_panels_create(n_channels, k, arrays->core, &self->core, error));
     *op = &self->base;
     self = NULL;
 done:
+    panel_free(left);
     two_mesh_arrays_free(arrays);
     if (self != NULL) lam_operator_close(&self->base);
     return status;
 }
 
+lam_status operator_two_mesh_create(size_t n, size_t k, size_t n_channels, const float *reflectance,
+                                    two_mesh_arrays *arrays, lam_operator **op, lam_error *error) {
+    lam_status status = LAM_OK;
+    panel left = {0};
+    TRY(panel_create(n, k, arrays->left, arrays->core == NULL ? "/operator/Y" : "/operator/U", &left, error));
+    free(arrays->left);
+    arrays->left = NULL;
+    TRY(assemble(n, n_channels, reflectance, &left, arrays, op, error));
+done:
+    two_mesh_arrays_free(arrays);
+    return status;
+}
+
+/* --- precisions and the store -------------------------------------------------------------------------- */
+
 static lam_status two_mesh_load(store *s, size_t n, size_t n_channels, const float *reflectance,
                                 lam_operator **op, lam_error *error) {
     lam_status status = LAM_OK;
     char *form = NULL;
-    void *left = NULL, *I = NULL, *weight = NULL, *coherence = NULL, *core = NULL;
-    size_t dims[STORE_MAX_RANK] = {n, SIZE_MAX};
+    void *I = NULL, *weight = NULL, *coherence = NULL, *core = NULL;
+    panel left = {0};
+    size_t k = SIZE_MAX;
     TRY(store_get_text(s, "/operator", "form", &form, error));
     const bool folded = strcmp(form, "folded") == 0;
     if (!folded && strcmp(form, "factored") != 0)
@@ -92,8 +98,8 @@ static lam_status two_mesh_load(store *s, size_t n, size_t n_channels, const flo
         FAIL(error, LAM_ERR_FORMAT,
              "%s: /operator is folded, which needs 1 channel, /mesh/reflectance has %zu", store_path(s),
              n_channels);
-    TRY(store_read(s, folded ? "/operator/Y" : "/operator/U", STORE_F32, 2, dims, &left, error));
-    const size_t k = dims[1];
+    TRY(panel_load(s, folded ? "/operator/Y" : "/operator/U", n, &k, &left, error));
+    TRY(panel_check_precision(s, left.precision, error));
     if (k == 0 || k > n)
         FAIL(error, LAM_ERR_FORMAT, "%s: /operator has %zu patches, must be at least 1 and at most %zu",
              store_path(s), k, n);
@@ -106,35 +112,16 @@ static lam_status two_mesh_load(store *s, size_t n, size_t n_channels, const flo
     if (!folded)
         TRY(store_read(s, "/operator/core", STORE_F32, 3, (size_t[STORE_MAX_RANK]){n_channels, k, k}, &core,
                        error));
-    two_mesh_arrays arrays = {
-        .left = left, .begin = I, .weight = weight, .coherence = coherence, .core = core};
-    left = I = weight = coherence = core = NULL;
-    TRY(operator_two_mesh_create(n, k, n_channels, reflectance, &arrays, op, error));
+    two_mesh_arrays arrays = {.begin = I, .weight = weight, .coherence = coherence, .core = core};
+    I = weight = coherence = core = NULL;
+    TRY(assemble(n, n_channels, reflectance, &left, &arrays, op, error));
 done:
     free(form);
-    free(left);
+    panel_free(&left);
     free(I);
     free(weight);
     free(coherence);
     free(core);
-    return status;
-}
-
-/* Panels one after the other without their padding, [count][n][k] or, of one, [n][k]. */
-static lam_status save_panels(const panel *a, size_t count, int rank, store *s, const char *name,
-                              lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t dims[3] = {count, a->n, a->k}, one = a->n * a->k;
-    size_t all;
-    float *rows = NULL;
-    if (!size_multiply(one, count, &all))
-        FAIL(error, LAM_ERR_MEMORY, "%s is larger than memory can have", name);
-    rows = memory_allocate(all, sizeof *rows, name, error);
-    if (rows == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < count; i++) panel_copy_rows(&a[i], rows + i * one);
-    TRY(store_write(s, name, STORE_F32, rank, dims + 3 - rank, rows, error));
-done:
-    free(rows);
     return status;
 }
 
@@ -143,49 +130,110 @@ static lam_status two_mesh_save(const lam_operator *op, store *s, lam_error *err
     const two_mesh *self = (const two_mesh *)op;
     const size_t k = self->left.k, n_ends = k + 1;
     TRY(store_set_integer(s, "/operator", "rank", (int64_t)k, error));
-    TRY(save_panels(&self->left, 1, 2, s, self->core == NULL ? "/operator/Y" : "/operator/U", error));
+    TRY(panel_save(&self->left, s, self->core == NULL ? "/operator/Y" : "/operator/U", error));
     TRY(store_write(s, "/operator/I", STORE_U64, 1, &n_ends, self->right.begin, error));
     if (self->right.weight != NULL)
         TRY(store_write(s, "/operator/weight", STORE_F32, 1, &op->n, self->right.weight, error));
     if (self->coherence != NULL)
         TRY(store_write(s, "/operator/coherence", STORE_F32, 1, &k, self->coherence, error));
-    if (self->core != NULL) TRY(save_panels(self->core, op->n_channels, 3, s, "/operator/core", error));
+    if (self->core != NULL) TRY(core_panels_save(self->core, op->n_channels, s, error));
 done:
     return status;
 }
 
+/* A copy of count values; none: NULL. */
+static lam_status copy_of(const void *values, size_t count, size_t size, void **copy, lam_error *error) {
+    *copy = NULL;
+    if (values == NULL) return LAM_OK;
+    *copy = memory_allocate(count, size, "operator", error);
+    if (*copy == NULL) return LAM_ERR_MEMORY;
+    memcpy(*copy, values, count * size);
+    return LAM_OK;
+}
+
+/* The n x k array alone: I and weights are little beside it. */
+static lam_status two_mesh_narrow(const lam_operator *op, panel_precision precision, lam_operator **out,
+                                  lam_error *error) {
+    lam_status status = LAM_OK;
+    const two_mesh *self = (const two_mesh *)op;
+    const segments *right = &self->right;
+    const size_t k = self->left.k;
+    panel left = {0};
+    void *begin = NULL, *weight = NULL, *coherence = NULL;
+    float *core = NULL;
+    TRY(panel_convert(&self->left, precision, self->core == NULL ? "/operator/Y" : "/operator/U", &left,
+                      error));
+    TRY(copy_of(right->begin, k + 1, sizeof *right->begin, &begin, error));
+    TRY(copy_of(right->weight, op->n, sizeof *right->weight, &weight, error));
+    TRY(copy_of(self->coherence, k, sizeof *self->coherence, &coherence, error));
+    if (self->core != NULL) TRY(core_panels_copy(self->core, op->n_channels, &core, error));
+    two_mesh_arrays arrays = {.begin = begin, .weight = weight, .coherence = coherence, .core = core};
+    begin = weight = coherence = core = NULL;
+    TRY(assemble(op->n, op->n_channels, op->reflectance, &left, &arrays, out, error));
+done:
+    panel_free(&left);
+    free(begin);
+    free(weight);
+    free(coherence);
+    free(core);
+    return status;
+}
+
+/* --- products ------------------------------------------------------------------------------------------ */
+
 /* T and core T, [n_rhs][C][stride] each, and what the products need. */
 static size_t two_mesh_work_bytes(const lam_operator *op, size_t n_rhs) {
     const two_mesh *self = (const two_mesh *)op;
-    size_t m, t_bytes, product = 0, total = 0;
+    size_t m, t_bytes, total = 0;
     if (!size_multiply(n_rhs, op->n_channels, &m) || !size_multiply(m, self->left.stride, &t_bytes) ||
         !size_multiply(t_bytes, sizeof(float), &t_bytes))
         return 0;
-    product = panel_work_bytes(&self->left, m);
-    if (product == 0 || !work_add(&total, t_bytes) || !work_add(&total, t_bytes) ||
-        !work_add(&total, product))
+    const size_t of_left = panel_work_bytes(&self->left, m);
+    const size_t of_core = self->core != NULL ? panel_work_bytes(self->core, n_rhs) : of_left;
+    if (of_left == 0 || of_core == 0 || !work_add(&total, t_bytes) || !work_add(&total, t_bytes) ||
+        !work_add(&total, of_core > of_left ? of_core : of_left))
         return 0;
     return total;
 }
 
+/* -T (folded) or core_c T_c: [n_rhs][C][stride]; work goes on behind it. */
+static float *light_columns(const two_mesh *self, size_t n_rhs, const float *E, void **work) {
+    const size_t C = self->base.n_channels, m = n_rhs * C, k = self->left.k, stride = self->left.stride;
+    float *t = work_take(work, m * stride * sizeof *t);
+    float *core_t = work_take(work, m * stride * sizeof *core_t);
+    for (size_t v = 0; v < m; v++) segments_sum(&self->right, E + v * self->base.n, t + v * stride);
+    if (self->core == NULL) {
+        for (size_t v = 0; v < m; v++)
+            for (size_t p = 0; p < k; p++) core_t[v * stride + p] = -t[v * stride + p];
+    } else {
+        for (size_t c = 0; c < C; c++)
+            panel_expand(&self->core[c], n_rhs, t + c * stride, C * stride, core_t + c * stride, C * stride,
+                         *work);
+    }
+    return core_t;
+}
+
+/* P = -Y T, or P_c = rho'_c U core_c T_c */
 static void two_mesh_apply(const lam_operator *op, size_t n_rhs, const float *E, float *P, void *work) {
     const two_mesh *self = (const two_mesh *)op;
-    const size_t n = op->n, C = op->n_channels, m = n_rhs * C, k = self->left.k, stride = self->left.stride;
-    float *t = work_take(&work, m * stride * sizeof *t);
-    float *core_t = work_take(&work, m * stride * sizeof *core_t);
-    for (size_t v = 0; v < m; v++) segments_sum(&self->right, E + v * n, t + v * stride);
-    if (self->core == NULL) { /* P = -Y T */
-        for (size_t v = 0; v < m; v++)
-            for (size_t p = 0; p < k; p++) t[v * stride + p] = -t[v * stride + p];
-        panel_expand(&self->left, m, t, stride, P, n, work);
-        return;
-    }
-    for (size_t c = 0; c < C; c++) /* P_c = rho'_c U core_c T_c */
-        panel_expand(&self->core[c], n_rhs, t + c * stride, C * stride, core_t + c * stride, C * stride,
-                     work);
-    panel_expand(&self->left, m, core_t, stride, P, n, work);
-    for (size_t v = 0; v < m; v++)
+    const size_t n = op->n, C = op->n_channels, m = n_rhs * C;
+    const float *t = light_columns(self, n_rhs, E, &work);
+    panel_expand(&self->left, m, t, self->left.stride, P, n, work);
+    for (size_t v = 0; v < m && self->core != NULL; v++)
         for (size_t j = 0; j < n; j++) P[v * n + j] *= operator_reflectance_or_one(op, v % C, j);
+}
+
+static void two_mesh_apply_selected(const lam_operator *op, size_t n_rhs, const float *E, size_t n_selected,
+                                    const uint32_t *selected, float *P, void *work) {
+    const two_mesh *self = (const two_mesh *)op;
+    const size_t C = op->n_channels, m = n_rhs * C;
+    const float *t = light_columns(self, n_rhs, E, &work);
+    panel_expand_rows(&self->left, m, t, self->left.stride, n_selected, selected, op->position, P, n_selected,
+                      work);
+    for (size_t v = 0; v < m && self->core != NULL; v++)
+        for (size_t r = 0; r < n_selected; r++)
+            P[v * n_selected + r] *=
+                operator_reflectance_or_one(op, v % C, operator_position(op, selected[r]));
 }
 
 static void two_mesh_apply_adjoint(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work) {
@@ -208,6 +256,12 @@ static void two_mesh_apply_adjoint(const lam_operator *op, size_t n_rhs, float *
     for (size_t v = 0; v < m; v++) segments_spread(&self->right, core_t + v * stride, w + v * n);
 }
 
+static void two_mesh_set_threads(lam_operator *op, size_t n_threads) {
+    two_mesh *self = (two_mesh *)op;
+    self->left.n_threads = n_threads;
+    for (size_t c = 0; self->core != NULL && c < op->n_channels; c++) self->core[c].n_threads = n_threads;
+}
+
 static void two_mesh_describe(const lam_operator *op, operator_description *description) {
     const two_mesh *self = (const two_mesh *)op;
     description->precision = panel_precision_name(self->left.precision);
@@ -225,6 +279,9 @@ const operator_kind operator_two_mesh = {
     .work_bytes = two_mesh_work_bytes,
     .apply = two_mesh_apply,
     .apply_adjoint = two_mesh_apply_adjoint,
+    .apply_selected = two_mesh_apply_selected,
+    .set_threads = two_mesh_set_threads,
+    .narrow = two_mesh_narrow,
     .destroy = two_mesh_destroy,
     .describe = two_mesh_describe,
 };

@@ -25,7 +25,9 @@ typedef struct recipe {
     size_t I_size, weight_size, coherence_size, left[2]; /* weight and coherence: 0 leaves them out */
     uint64_t begin[3];
     float weight, coherence, left_value;
-    const char *word; /* NULL: it is good */
+    bool bf16;                     /* Y is of u16 */
+    const char *encoding, *claims; /* of Y; of /operator's precision; NULL: no such attribute */
+    const char *word;              /* NULL: it is good */
 } recipe;
 
 static const recipe recipes[] = {
@@ -34,6 +36,9 @@ static const recipe recipes[] = {
     {.what = "good, weighted", .weight_size = 6, .weight = .5f},
     {.what = "good, coherence", .coherence_size = 2, .coherence = 1},
     {.what = "a patch without elements", .begin = {0, 6, 6}},
+    {.what = "good, bf16", .bf16 = true, .encoding = "bf16", .claims = "bf16"},
+    {.what = "u16 without encoding", .bf16 = true, .word = "/operator/Y has the encoding ''"},
+    {.what = "another precision said", .claims = "i8", .word = "precision 'i8', its arrays are of f32"},
     {.what = "no form", .no_form = true, .word = "form"},
     {.what = "no I", .no_I = true, .word = "/operator/I"},
     {.what = "I short", .I_size = 2, .word = "/operator/I"},
@@ -74,8 +79,13 @@ static void write_recipe(const recipe *r) {
     ck_ok(store_set_text(s, "/operator", "kind", "two_mesh", &error));
     if (!r->no_form)
         ck_ok(store_set_text(s, "/operator", "form", r->factored ? "factored" : "folded", &error));
-    write_floats(s, r->factored ? "/operator/U" : "/operator/Y", 2, left, .1f,
-                 r->left_value != 0 ? r->left_value : .1f);
+    if (r->bf16)
+        ck_ok(store_write(s, "/operator/Y", STORE_U16, 2, left, (uint16_t[12]){0}, &error));
+    else
+        write_floats(s, r->factored ? "/operator/U" : "/operator/Y", 2, left, .1f,
+                     r->left_value != 0 ? r->left_value : .1f);
+    if (r->encoding != NULL) ck_ok(store_set_text(s, "/operator/Y", "encoding", r->encoding, &error));
+    if (r->claims != NULL) ck_ok(store_set_text(s, "/operator", "precision", r->claims, &error));
     if (!r->no_I)
         ck_ok(
             store_write(s, "/operator/I", STORE_U64, 1, &I_size, r->begin[2] > 0 ? r->begin : usual, &error));

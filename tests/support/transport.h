@@ -170,6 +170,10 @@ typedef enum transport_kind {
     TRANSPORT_FACTORED_COLOUR_I8,
     TRANSPORT_TWO_MESH,
     TRANSPORT_TWO_MESH_COLOUR,
+    TRANSPORT_TWO_MESH_F16,
+    TRANSPORT_TWO_MESH_BF16,
+    TRANSPORT_TWO_MESH_I8,
+    TRANSPORT_TWO_MESH_COLOUR_I8,
     TRANSPORT_KINDS
 } transport_kind;
 
@@ -354,7 +358,11 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
                  {"folded, i8", PANEL_I8},
                  {"factored, 3 channels, i8", PANEL_I8},
                  {"two meshes, folded", PANEL_F32},
-                 {"two meshes, 3 channels", PANEL_F32}};
+                 {"two meshes, 3 channels", PANEL_F32},
+                 {"two meshes, folded, f16", PANEL_F16},
+                 {"two meshes, folded, bf16", PANEL_BF16},
+                 {"two meshes, folded, i8", PANEL_I8},
+                 {"two meshes, 3 channels, i8", PANEL_I8}};
     lam_error error = {.message = ""};
     uint64_t state = 11 + (uint64_t)kind;
     const bool colour = strstr(kinds[kind].name, "3 channels") != NULL;
