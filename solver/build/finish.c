@@ -1,14 +1,13 @@
 #include "solver/build/finish.h"
 
+#include "solver/matrix/dense.h"
 #include "solver/operator/core.h"
-
-#include <cblas.h>
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
-enum { FOLD_ROWS = 1024 };
+/* Rows that are multiplied at a time: work for every thread, and little beside U. */
+enum { FOLD_ROWS = 8192 };
 
 lam_status finish_fold(size_t n, size_t k, const float *core, const float *reflectance, const uint32_t *order,
                        float *U, lam_error *error) {
@@ -17,13 +16,12 @@ lam_status finish_fold(size_t n, size_t k, const float *core, const float *refle
     if (block == NULL) return LAM_ERR_MEMORY;
     for (size_t first = 0; first < n && k > 0; first += most) {
         const size_t rows = n - first < most ? n - first : most;
-        cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, (int)rows, (int)k, (int)k, -1, U + first * k,
-                    (int)k, core, (int)k, 0, block, (int)k);
+        dense_multiply(rows, k, k, U + first * k, core, false, block);
         for (size_t r = 0; r < rows; r++) {
             const float rho = reflectance[order != NULL ? order[first + r] : first + r];
-            if (rho > 0) cblas_sscal((int)k, rho, block + r * k, 1);
+            const float factor = rho > 0 ? -rho : -1;
+            for (size_t c = 0; c < k; c++) U[(first + r) * k + c] = factor * block[r * k + c];
         }
-        memcpy(U + first * k, block, rows * k * sizeof *U);
     }
     free(block);
     return LAM_OK;
