@@ -140,7 +140,8 @@ static forecast forecast_of(const work *w, double n) {
                       .scratch = o->scratch != NULL,
                       .keep = o->keep_form_factors,
                       .exact = strcmp(o->method, "exact") == 0,
-                      .rank = likely_rank(o, n)};
+                      .rank = likely_rank(o, n),
+                      .precision = o->precision};
 }
 
 /* Chooses the recipe for n elements and sees that it fits. */
