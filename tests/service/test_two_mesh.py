@@ -108,6 +108,41 @@ class TwoMesh(unittest.TestCase):
         must("solve", store, "--emission", self.path("E.npy"), "-o", self.path("B.npy"))
         numpy.testing.assert_allclose(numpy.load(self.path("B.npy")).ravel(), B, rtol=1e-6)
 
+    def test_precisions(self):
+        E = numpy.random.default_rng(2).random(384)
+        numpy.save(self.path("light.npy"), E)
+        # Y's values are off by half a unit in the last place of 11 and 8 bits, or half a 127th of the column's
+        # largest; 1e-6 more for the answer in single precision.
+        for precision, kept, bits in (("f16", "<f2", 2. ** -11), ("bf16", "<u2", 2. ** -8), ("i8", "|i1", .5 / 127)):
+            with self.subTest(precision):
+                store, log = self.build("--rank", 31, "--store-precision", precision, name=precision + ".h5")
+                wide, _ = self.build("--rank", 31, name="wide.h5")
+                self.assertIn(precision + " takes ", log)
+                self.assertNotIn("2msc does not use", log)
+                with h5py.File(store) as file, h5py.File(wide) as before:
+                    group = file["operator"]
+                    self.assertEqual(group.attrs["precision"], precision.encode())
+                    self.assertEqual(group["Y"].dtype.str, kept)
+                    Y = group["Y"][()]
+                    if precision == "bf16":
+                        Y = (Y.astype("<u4") << 16).view("<f4")
+                    Y = Y * (group["Y_scale"][()] if "Y_scale" in group else 1.)
+                    exact = before["operator/Y"][()].astype(float)
+                    off = abs(Y - exact)
+                    self.assertGreater(off.max(), 0)
+                    largest = abs(exact).max(axis=0)
+                    # f16 below 2^-14 has steps of 2^-24
+                    limit = largest * bits * 1.001 if precision == "i8" else abs(exact) * bits + 2. ** -25
+                    self.assertTrue((off <= limit).all())
+                    weight = group["weight"][()] if "weight" in group else numpy.ones(384)
+                    order, starts = group["order"][()], group["I"][()].astype(int)[:-1]
+                    B = E.copy()
+                    B[order] -= Y @ numpy.add.reduceat(weight * E[order], starts)
+                must("solve", store, "--emission", self.path("light.npy"), "-o", self.path("B.npy"))
+                numpy.testing.assert_allclose(numpy.load(self.path("B.npy")).ravel(), B, rtol=1e-6)
+                self.assertIn("precision         " + precision, must("info", store).stdout)
+                must("verify", store, "--probes", 8)
+
     def test_against_exact(self):
         """With every element a patch it is the exact operator; with few, power in a closed box still balances."""
         numpy.save(self.path("one.npy"), numpy.eye(384)[7])
