@@ -3,6 +3,7 @@
 #include "solver/operator/operator.h"
 #include "solver/operator/sky.h"
 #include "solver/output_file.h"
+#include "solver/patch_view.h"
 #include "solver/picture.h"
 #include "solver/terminal.h"
 #include "solver/verbs.h"
@@ -97,9 +98,11 @@ static const option_row rows[] = {
      .kind = OPTION_CHOICE,
      .offset = FIELD(quantity),
      .value = "NAME",
-     .doc = "radiosity (the default), irradiance or indirect",
-     .choices = "radiosity|irradiance|indirect",
-     .later = "coherence|patch|visible"},
+     .doc = "radiosity (the default), irradiance or indirect; of --method 2msc, which need no light: "
+            "coherence, from black for that of the least coherent patch to white for 1, or patch, a colour "
+            "for each",
+     .choices = "radiosity|irradiance|indirect|coherence|patch",
+     .later = "visible"},
     {.name = "camera",
      .kind = OPTION_CUSTOM,
      .offset = FIELD(camera),
@@ -179,29 +182,30 @@ static lam_status choose_camera(const fields *f, const picture_scene *scene, con
     return camera_choose(scene->mesh, scene->visibility, lit, aspect, c, error);
 }
 
-static lam_status draw(const fields *f, const picture_scene *scene, const camera *c, const progress *how,
-                       terminal *t, lam_error *error) {
-    lam_status status = LAM_OK;
-    image picture = {0};
+/* What fits the light that is seen. */
+static picture_look look_of_light(const fields *f, const picture_scene *scene, const camera *c) {
     tone_histogram histogram = {0};
     picture_look look = {.width = view_width(f)};
-    const size_t channels = f->false_color || shade_channels(scene->shade) == 3 ? 3 : 1;
-    TRY(image_create(f->size.width, f->size.height, channels, &picture, error));
     picture_measure(scene, c, &histogram);
     if (f->false_color)
         look.range = round_up(tone_histogram_quantile(&histogram, .99) / exp2(f->exposure));
     else
         look.exposure = tone_exposure(&histogram) * exp2(f->exposure);
-    TRY(picture_draw(scene, c, &look, how, &picture, error));
-    if (f->false_color) picture_legend(look.range, &picture);
+    return look;
+}
+
+static lam_status draw(const fields *f, const picture_scene *scene, const camera *c, const picture_look *look,
+                       const progress *how, terminal *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    image picture = {0};
+    const size_t channels = look->range > 0 || shade_channels(scene->shade) == 3 ? 3 : 1;
+    TRY(image_create(f->size.width, f->size.height, channels, &picture, error));
+    TRY(picture_draw(scene, c, look, how, &picture, error));
+    if (look->range > 0) picture_legend(look->range, &picture);
     TRY(image_write_png(&picture, f->output, error));
     terminal_log(t, "camera %.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.4g", c->eye[0], c->eye[1], c->eye[2],
                  c->eye[0] + c->forward[0], c->eye[1] + c->forward[1], c->eye[2] + c->forward[2],
                  2 * atan(c->tan_y) * 180 / M_PI);
-    if (f->false_color)
-        terminal_log(t, "colours from 0 to %g W/m2", look.range);
-    else
-        terminal_log(t, "white is about %.3g W/m2", 1 / look.exposure);
 done:
     image_free(&picture);
     return status;
@@ -249,7 +253,12 @@ static lam_status render(const char *path, const fields *f, terminal *t, lam_err
     TRY(shade_create(&m, m.n_channels, values, f->smooth, &shown, error));
     const picture_scene scene = {.mesh = &m, .visibility = seen, .shade = shown, .glows = glows};
     TRY(choose_camera(f, &scene, lit, &c, error));
-    TRY(draw(f, &scene, &c, &how, t, error));
+    const picture_look look = look_of_light(f, &scene, &c);
+    TRY(draw(f, &scene, &c, &look, &how, t, error));
+    if (f->false_color)
+        terminal_log(t, "colours from 0 to %g W/m2", look.range);
+    else
+        terminal_log(t, "white is about %.3g W/m2", 1 / look.exposure);
 done:
     free(lit);
     free(glows);
@@ -263,6 +272,84 @@ done:
     mesh_free(&m);
     store_close(s);
     return status;
+}
+
+static bool shows_patches(const fields *f) {
+    return strcmp(f->quantity, "coherence") == 0 || strcmp(f->quantity, "patch") == 0;
+}
+
+/* The values of --quantity coherence or patch, one channel or three, and how to show them. The least coherent
+ * patch is a little above black, so that it is seen. */
+static lam_status patch_values(const fields *f, store *s, size_t n, terminal *t, float **values,
+                               picture_look *look, lam_error *error) {
+    lam_status status = LAM_OK;
+    float smallest;
+    size_t n_patches;
+    *look = (picture_look){.width = view_width(f), .plain = true};
+    if (strcmp(f->quantity, "patch") == 0) {
+        TRY(patch_view_colors(s, values, &n_patches, error));
+        terminal_log(t, "%zu patches", n_patches);
+        return LAM_OK;
+    }
+    TRY(patch_view_coherence(s, values, &smallest, error));
+    if (f->false_color) {
+        *look = (picture_look){.width = view_width(f), .range = 1};
+        terminal_log(t, "colours from coherence 0 to 1");
+        return LAM_OK;
+    }
+    for (size_t i = 0; i < n; i++) {
+        const float share = smallest < 1 ? ((*values)[i] - smallest) / (1 - smallest) : 1;
+        (*values)[i] = tone_decode(.06f + .94f * share);
+    }
+    terminal_log(t, "black is coherence %.3g, white 1", (double)smallest);
+done:
+    return status;
+}
+
+static lam_status render_patches(const char *path, const fields *f, terminal *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    const progress how = terminal_progress(t);
+    store *s = NULL;
+    mesh m = {0};
+    visibility *seen = NULL;
+    shade *shown = NULL;
+    double *row_sums = NULL;
+    float *values = NULL;
+    bool *lit = NULL, *glows = NULL;
+    picture_look look;
+    camera c;
+    TRY(output_file_check(f->output, error));
+    TRY(store_open(path, &s, error));
+    TRY(mesh_load(s, &m, &row_sums, error));
+    TRY(patch_values(f, s, m.n, t, &values, &look, error));
+    lit = memory_allocate(m.n, sizeof *lit, "lit elements", error);
+    glows = memory_allocate(m.n, sizeof *glows, "glowing elements", error);
+    if (lit == NULL || glows == NULL) TRY(LAM_ERR_MEMORY);
+    memset(lit, true, m.n);
+    TRY(visibility_create(&m, &seen, error));
+    TRY(shade_create(&m, strcmp(f->quantity, "patch") == 0 ? 3 : 1, values, false, &shown, error));
+    const picture_scene scene = {.mesh = &m, .visibility = seen, .shade = shown, .glows = glows};
+    TRY(choose_camera(f, &scene, lit, &c, error));
+    TRY(draw(f, &scene, &c, &look, &how, t, error));
+done:
+    free(lit);
+    free(glows);
+    free(values);
+    free(row_sums);
+    shade_destroy(shown);
+    visibility_destroy(seen);
+    mesh_free(&m);
+    store_close(s);
+    return status;
+}
+
+/* Names the options that a picture of patches has no use for. */
+static void log_unused(const fields *f, const option_result *given, terminal *t) {
+    static const char *const of_light[] = {"emit", "emission", "sky", "exposure", "smooth", "false-color"};
+    const size_t count = strcmp(f->quantity, "patch") == 0 ? 6 : 5;
+    for (size_t i = 0; i < count; i++)
+        if (options_given(&verb, given, of_light[i]))
+            terminal_log(t, "--quantity %s does not use --%s", f->quantity, of_light[i]);
 }
 
 int cmd_render(int argc, char **argv) {
@@ -279,5 +366,11 @@ int cmd_render(int argc, char **argv) {
     if (f.emit.count > 0 && f.emission != NULL)
         return options_usage(verb.name, "give --emit or --emission, not both");
     terminal_open(&t, verb.name, false, false);
+    if (shows_patches(&f)) {
+        if (strcmp(f.quantity, "patch") == 0) f.false_color = false; /* and no room for a legend */
+        if (render_patches(result.arguments[0], &f, &t, &error) != LAM_OK) return terminal_fail(&t, &error);
+        log_unused(&f, &result, &t);
+        return 0;
+    }
     return render(result.arguments[0], &f, &t, &error) == LAM_OK ? 0 : terminal_fail(&t, &error);
 }

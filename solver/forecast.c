@@ -12,7 +12,7 @@
 enum { FEWEST_RAYS = 256, LOWEST_RESOLUTION = 32 };
 
 /* Memory of a panel of rows that is merged or expanded. */
-static const double panel_bytes = 128e6;
+static const double merge_bytes = 128e6;
 
 /* Rays that look for other elements from one; a hemicube is a ray for each of its pixels. */
 static double recipe_rays(double n, const recipe *r) {
@@ -61,7 +61,7 @@ static double trace_bytes(double n, const recipe *r, bool to_disk) {
     /* Near pairs are as many as rays at most, and stand in a triangle of their own. */
     const double near = r->method == RECIPE_NEAR_PAIRS ? sample : 0;
     const double merging = (to_disk ? 0 : found_bytes(n, r)) + near + sample / (near > 0 ? 1 : 2);
-    return fmax(sample, merging) + fmin(panel_bytes, sample);
+    return fmax(sample, merging) + fmin(merge_bytes, sample);
 }
 
 /* About as many columns as a factorization will have. */
@@ -72,7 +72,8 @@ static double likely_rank(const forecast *f) {
 
 static double operator_bytes(const forecast *f) {
     const double n = (double)f->n;
-    return f->exact ? 4 * n * n * (double)f->n_channels : 8 * n * likely_rank(f);
+    return f->exact ? 4 * n * n * (double)f->n_channels
+                    : 2 * n * likely_rank(f) * (double)panel_value_size(f->precision);
 }
 
 double forecast_bytes(const forecast *f) {

@@ -4,6 +4,7 @@
 
 #include "solver/formfactor/recipe.h"
 #include "solver/formfactor/scratch.h"
+#include "solver/operator/panel.h"
 
 #include <stdint.h>
 
@@ -17,6 +18,7 @@ typedef struct forecast {
     bool keep;                   /* the store keeps the form factors */
     bool exact;                  /* the whole inverse is built */
     size_t rank;                 /* 0: not known yet */
+    panel_precision precision;   /* of an operator of low rank */
 } forecast;
 
 /* Bytes at the peak; an upper bound for the form factors, an estimate for the rest. */

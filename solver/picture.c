@@ -101,6 +101,10 @@ static void add_sample(const picture_scene *scene, const camera *c, const pictur
         for (size_t k = 0; k < channels_out; k++) sum[k] += tone_decode(rgb[k]);
         return;
     }
+    if (how->plain) {
+        for (size_t k = 0; k < channels_out; k++) sum[k] += values[channels == 3 ? k : 0];
+        return;
+    }
     /* Toned sample by sample: averaged first, a lamp's edge would be as white as the lamp, and ragged. */
     for (size_t k = 0; k < channels; k++) values[k] *= (float)how->exposure;
     if (channels == 3)

@@ -15,10 +15,12 @@ typedef struct picture_scene {
     const bool *glows; /* [n]: elements whose light is mostly their own; they do not set the exposure */
 } picture_scene;
 
-/* How values become colours: exposed and toned, or, with range > 0, false colour from 0 to range. */
+/* How values become colours: exposed and toned, or, with range > 0, false colour from 0 to range, or, with
+ * plain, as they are: display-linear from 0 to 1. */
 typedef struct picture_look {
     double exposure;
     double range;
+    bool plain;
     size_t width; /* columns drawn on, from the left; a legend takes the others */
 } picture_look;
 

@@ -2,6 +2,7 @@
 
 #include "solver/build/judge.h"
 #include "solver/clock.h"
+#include "solver/element_geometry.h"
 #include "solver/forecast.h"
 #include "solver/narrow.h"
 #include "solver/scene/import.h"
@@ -120,6 +121,13 @@ static recipe judge_recipe(const work *w, uint64_t seed) {
     return r;
 }
 
+/* Columns of the operator where they are known before: the patches of 2msc without its options are. */
+static size_t likely_rank(const precompute_options *o, double n) {
+    const bool by_size = o->coherence <= 0 && o->min_area <= 0;
+    if (o->rank > 0 || strcmp(o->method, "2msc") != 0 || !by_size) return o->rank;
+    return (size_t)ceil(n / 16);
+}
+
 static forecast forecast_of(const work *w, double n) {
     const precompute_options *o = w->options;
     return (forecast){.n = (size_t)n,
@@ -132,7 +140,8 @@ static forecast forecast_of(const work *w, double n) {
                       .scratch = o->scratch != NULL,
                       .keep = o->keep_form_factors,
                       .exact = strcmp(o->method, "exact") == 0,
-                      .rank = o->rank};
+                      .rank = likely_rank(o, n),
+                      .precision = o->precision};
 }
 
 /* Chooses the recipe for n elements and sees that it fits. */
@@ -297,7 +306,8 @@ static build_problem problem_of(const work *w) {
 static lam_status build(work *w, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = w->options;
-    const build_problem problem = problem_of(w);
+    build_problem problem = problem_of(w);
+    element_geometry geometry = {0};
     budget_rule rule = BUDGET_SQUARES;
     if (!budget_rule_find(o->budget, &rule))
         FAIL(error, LAM_ERR_ARGUMENT, "--budget %.40s: unknown; use squares, sums or frobenius", o->budget);
@@ -308,13 +318,18 @@ static lam_status build(work *w, lam_error *error) {
                                .budget = {.rule = rule, .alpha = o->alpha},
                                .levels = o->levels == PRECOMPUTE_AUTO ? -1 : (int)o->levels,
                                .rank = o->rank,
+                               .coherence = o->coherence,
+                               .min_area = o->min_area,
+                               .proximity = o->proximity,
                                .memory = (size_t)fmax(1, w->memory - held),
                                .seed = o->seed,
                                .progress = &w->progress};
+    if (strcmp(o->method, "2msc") == 0) TRY(element_geometry_add(&w->m, &geometry, &problem, error));
     TRY(build_operator(&problem, &how, &w->op, &w->built, error));
     const double noise = recipe_noise(&w->f.recipe);
-    const bool tried = w->built.factorizer != NULL || w->built.factorize_seconds > 0;
-    if (w->built.factorizer != NULL) {
+    const bool patches = w->built.coherence >= 0;
+    const bool tried = !patches && (w->built.factorizer != NULL || w->built.factorize_seconds > 0);
+    if (w->built.factorizer != NULL || patches) {
         terminal_log(w->t, "%-14s%8.2f s", "factorize", w->built.factorize_seconds);
         terminal_log(w->t, "rank %zu of %zu, real norm error %.3g", w->built.rank, w->m.n,
                      w->built.measured_norm_error);
@@ -331,6 +346,7 @@ static lam_status build(work *w, lam_error *error) {
     TRY(narrow_replace(&w->op, o->precision, w->m.area, precompute_seed(o->form_factors.seed, 4), w->t,
                        error));
 done:
+    element_geometry_free(&geometry);
     return status;
 }
 
@@ -404,13 +420,21 @@ static lam_status describe_operator(const work *w, store *s, lam_error *error) {
     TRY(store_set_text(s, "/operator", "reason", r->reason, error));
     if (r->epsilon >= 0) TRY(store_set_number(s, "/operator", "epsilon", r->epsilon, error));
     TRY(store_set_number(s, "/operator", "rcond", r->rcond, error));
-    if (factorized) {
-        if (r->levels > 0) {
-            TRY(store_set_text(s, "/operator", "budget", w->options->budget, error));
-            TRY(store_set_number(s, "/operator", "alpha", w->options->alpha, error));
-        }
+    if (factorized && r->levels > 0) {
+        TRY(store_set_text(s, "/operator", "budget", w->options->budget, error));
+        TRY(store_set_number(s, "/operator", "alpha", w->options->alpha, error));
+    }
+    if (factorized && r->levels >= 0) {
         TRY(store_set_integer(s, "/operator", "levels", r->levels, error));
         TRY(store_set_number(s, "/operator", "passes", r->factorized.passes, error));
+    }
+    if (r->coherence >= 0) {
+        TRY(store_set_text(s, "/operator", "assign", w->options->proximity ? "proximity" : "inclusion",
+                           error));
+        TRY(store_set_number(s, "/operator", "coherence_min", r->coherence, error));
+        TRY(store_set_number(s, "/operator", "patch_area_min", r->patch_area, error));
+    }
+    if (factorized || r->coherence >= 0) {
         TRY(store_set_integer(s, "/operator", "rank", (int64_t)r->rank, error));
         TRY(store_set_number(s, "/operator", "measured_norm_error", r->measured_norm_error, error));
     } else if (about.density >= 0) {

@@ -26,14 +26,16 @@ typedef struct precompute_options {
     bool keep_form_factors;
     const char *method, *factorizer;
     double epsilon, alpha;
-    const char *budget;        /* "squares", ... */
-    uint64_t seed;             /* of random sketches */
-    uint64_t levels;           /* PRECOMPUTE_AUTO */
-    uint64_t rank;             /* 0: by epsilon */
-    panel_precision precision; /* of the stored operator */
-    uint64_t memory;           /* bytes; 0: 70 % of what is free */
-    const char *scratch;       /* a folder, or NULL */
-    const char *continues;     /* what a cancelled run says where the folder holds what it has finished */
+    const char *budget;         /* "squares", ... */
+    uint64_t seed;              /* of random sketches */
+    uint64_t levels;            /* PRECOMPUTE_AUTO */
+    uint64_t rank;              /* 0: by epsilon */
+    double coherence, min_area; /* of 2msc; 0: not given */
+    bool proximity;             /* of 2msc */
+    panel_precision precision;  /* of the stored operator */
+    uint64_t memory;            /* bytes; 0: 70 % of what is free */
+    const char *scratch;        /* a folder, or NULL */
+    const char *continues;      /* what a cancelled run says where the folder holds what it has finished */
 } precompute_options;
 
 /* Does it all; on an error nothing is written. report says what was built. */

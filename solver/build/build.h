@@ -16,17 +16,23 @@ typedef struct build_problem {
     const csr *F;
     const uint32_t *order; /* [n] */
     double noise;          /* sampling error of S in the 2-norm, about; 0: not known */
+    /* Only 2msc needs these; NULL elsewhere. */
+    const double (*centre)[3]; /* [n] centroids, m */
+    const float (*normal)[3];  /* [n] unit */
+    const uint32_t *surface;   /* [n] below n: equal where elements are of one surface */
 } build_problem;
 
 typedef struct build_options {
     const char *method;     /* "auto", "exact", "low-rank", ... */
     const char *factorizer; /* "auto", "hf", ... */
     double epsilon;
-    budget budget; /* of hf */
-    int levels;    /* negative: auto */
-    size_t rank;   /* 0: by epsilon; else exactly min(rank, n) columns */
-    size_t memory; /* bytes it may use; 0: no limit */
-    uint64_t seed; /* of random sketches */
+    budget budget;              /* of hf */
+    int levels;                 /* negative: auto */
+    size_t rank;                /* 0: by epsilon; else exactly min(rank, n) columns */
+    double coherence, min_area; /* 2msc: smallest coherence, smallest area of a patch, m^2; 0: not given */
+    bool proximity;             /* 2msc: elements belong to the nearest patch */
+    size_t memory;              /* bytes it may use; 0: no limit */
+    uint64_t seed;              /* of random sketches */
     const progress *progress;
 } build_options;
 
@@ -37,9 +43,10 @@ typedef struct build_report {
     size_t rank;
     int levels;
     factorizer_report factorized;
-    double epsilon;             /* the bound reached; negative when it has none */
-    double measured_norm_error; /* |S - Q V^T|_2 by power iteration; negative when not measured */
-    double rcond;               /* of the matrix inverted; 1 when none was */
+    double epsilon;               /* the bound reached; negative when it has none */
+    double measured_norm_error;   /* |S - Q V^T|_2 by power iteration; negative when not measured */
+    double rcond;                 /* of the matrix inverted; 1 when none was */
+    double coherence, patch_area; /* 2msc: the smallest of a patch, m^2; negative when there are no patches */
     double factorize_seconds, invert_seconds;
 } build_report;
 
@@ -52,6 +59,7 @@ typedef struct build_method {
 
 extern const build_method build_exact;
 extern const build_method build_low_rank;
+extern const build_method build_two_mesh;
 
 /* Builds by options->method ("auto" chooses and says why). LAM_ERR_UNSUPPORTED for a method of the contract
  * that is still to come. */

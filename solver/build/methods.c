@@ -1,16 +1,17 @@
 /* The list of methods and the choice among them. */
 #include "solver/build/build.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 /* Up to this many elements the whole inverse is small, exact, and built in well under a second. */
 enum { AUTO_EXACT_ELEMENTS = 1024, EXACT_ELEMENTS = 8192 };
 
-static const build_method *const methods[] = {&build_exact, &build_low_rank};
+static const build_method *const methods[] = {&build_exact, &build_low_rank, &build_two_mesh};
 
 /* Methods and factorizers of the contract that are still to come. */
-static const char *const later_methods[] = {"2msc", "sparse", "emitters", "hierarchical"};
+static const char *const later_methods[] = {"sparse", "emitters", "hierarchical"};
 
 static bool is_among(const char *name, const char *const *list, size_t n) {
     for (size_t i = 0; i < n; i++)
@@ -22,9 +23,18 @@ static lam_status check_options(const build_options *options, lam_error *error) 
     lam_status status = LAM_OK;
     if (is_among(options->method, later_methods, sizeof later_methods / sizeof *later_methods))
         FAIL(error, LAM_ERR_UNSUPPORTED, "--method %s is not supported yet", options->method);
-    if (!factorizer_exists(options->factorizer))
-        FAIL(error, LAM_ERR_ARGUMENT, "--factorizer %.40s: unknown; use auto, hf, svd, rsi or sgrsvd",
+    /* 2msc does not factorize: it can only make its own columns orthogonal. */
+    const bool two_mesh = strcmp(options->method, "2msc") == 0, qr = strcmp(options->factorizer, "qr") == 0;
+    if (!qr && !factorizer_exists(options->factorizer))
+        FAIL(error, LAM_ERR_ARGUMENT, "--factorizer %.40s: unknown; use auto, hf, svd, rsi, sgrsvd or qr",
              options->factorizer);
+    if (qr && !two_mesh) FAIL(error, LAM_ERR_ARGUMENT, "--factorizer qr: is of --method 2msc alone");
+    if (two_mesh && !qr && strcmp(options->factorizer, "auto") != 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "--factorizer %s: --method 2msc has auto or qr", options->factorizer);
+    if (!(options->coherence >= 0 && options->coherence <= 1))
+        FAIL(error, LAM_ERR_ARGUMENT, "--coherence %g: must be above 0 and at most 1", options->coherence);
+    if (!(options->min_area >= 0 && options->min_area < INFINITY))
+        FAIL(error, LAM_ERR_ARGUMENT, "--min-area %g: must be above 0", options->min_area);
     if (!(options->epsilon > 0 && options->epsilon <= 1))
         FAIL(error, LAM_ERR_ARGUMENT, "--epsilon %g: must be above 0 and at most 1", options->epsilon);
     if (!(options->budget.alpha > 0 && options->budget.alpha < 1))
@@ -77,7 +87,7 @@ done:
 lam_status build_operator(const build_problem *problem, const build_options *options, lam_operator **op,
                           build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
-    *report = (build_report){.measured_norm_error = -1, .rcond = 1};
+    *report = (build_report){.measured_norm_error = -1, .rcond = 1, .coherence = -1, .patch_area = -1};
     TRY(check_options(options, error));
     if (strcmp(options->method, "auto") == 0) {
         TRY(build_auto(problem, options, op, report, error));
@@ -86,10 +96,12 @@ lam_status build_operator(const build_problem *problem, const build_options *opt
     for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
         if (strcmp(options->method, methods[i]->name) != 0) continue;
         TRY(methods[i]->build(problem, options, op, report, error));
-        snprintf(report->reason, sizeof report->reason, "%s: asked for by --method", methods[i]->name);
+        if (report->reason[0] == '\0')
+            snprintf(report->reason, sizeof report->reason, "%s: asked for by --method", methods[i]->name);
         goto done;
     }
-    FAIL(error, LAM_ERR_ARGUMENT, "--method %.40s: unknown; use auto, exact or low-rank", options->method);
+    FAIL(error, LAM_ERR_ARGUMENT, "--method %.40s: unknown; use auto, exact, low-rank or 2msc",
+         options->method);
 done:
     return status;
 }

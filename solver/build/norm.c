@@ -45,18 +45,13 @@ static lam_status largest_ritz(int steps, const double *diagonal, const double *
     return LAM_OK;
 }
 
-lam_status norm_of_error(const scaled_matrix *S, const tall_factors *f, const progress *p, double *norm,
-                         lam_error *error) {
+lam_status norm_of_product(size_t n, norm_product *product, void *context, const progress *p, double *norm,
+                           lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = f->n;
     const int steps = n < STEPS ? (int)n : STEPS;
-    difference D = {.S = S, .f = f};
     double *basis = memory_allocate((size_t)steps * n, sizeof *basis, "norm", error);
     double *w = memory_allocate(n, sizeof *w, "norm", error);
-    D.y = memory_allocate(n, sizeof *D.y, "norm", error);
-    D.x_single = memory_allocate(n, sizeof *D.x_single, "norm", error);
-    D.t = memory_allocate(f->rank, sizeof *D.t, "norm", error);
-    if (basis == NULL || w == NULL || D.y == NULL || D.x_single == NULL || D.t == NULL) TRY(LAM_ERR_MEMORY);
+    if (basis == NULL || w == NULL) TRY(LAM_ERR_MEMORY);
 
     /* A start that no symmetry of a scene is likely to be orthogonal to. */
     uint64_t state = 1;
@@ -72,8 +67,7 @@ lam_status norm_of_error(const scaled_matrix *S, const tall_factors *f, const pr
         if (progress_cancelled(p)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         progress_report(p, "check norm", (double)s / steps);
         const double *q = basis + (size_t)s * n;
-        TRY(difference_multiply(&D, false, q, D.y, error));
-        TRY(difference_multiply(&D, true, D.y, w, error));
+        TRY(product(context, q, w, error));
         diagonal[s] = cblas_ddot((int)n, q, 1, w, 1);
         done_steps = s + 1;
         for (int twice = 0; twice < 2; twice++)
@@ -91,6 +85,25 @@ lam_status norm_of_error(const scaled_matrix *S, const tall_factors *f, const pr
 done:
     free(basis);
     free(w);
+    return status;
+}
+
+static lam_status difference_square(void *context, const double *q, double *w, lam_error *error) {
+    const difference *D = context;
+    const lam_status status = difference_multiply(D, false, q, D->y, error);
+    return status != LAM_OK ? status : difference_multiply(D, true, D->y, w, error);
+}
+
+lam_status norm_of_error(const scaled_matrix *S, const tall_factors *f, const progress *p, double *norm,
+                         lam_error *error) {
+    lam_status status = LAM_OK;
+    difference D = {.S = S, .f = f};
+    D.y = memory_allocate(f->n, sizeof *D.y, "norm", error);
+    D.x_single = memory_allocate(f->n, sizeof *D.x_single, "norm", error);
+    D.t = memory_allocate(f->rank, sizeof *D.t, "norm", error);
+    if (D.y == NULL || D.x_single == NULL || D.t == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(norm_of_product(f->n, difference_square, &D, p, norm, error));
+done:
     free(D.y);
     free(D.x_single);
     free(D.t);

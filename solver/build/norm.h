@@ -21,4 +21,12 @@ lam_status norm_estimate(const scaled_matrix *S, size_t m, const float *X, const
 lam_status norm_of_error_frobenius(const scaled_matrix *S, const tall_factors *f, double *norm,
                                    lam_error *error);
 
+/* w = D^T D q of some matrix D; q and w are [n]. */
+typedef lam_status norm_product(void *context, const double *q, double *w, lam_error *error);
+
+/* |D|_2 as norm_of_error finds it, for any D of n columns. Cost: at most 32 products. Errors: also those of
+ * the product. */
+lam_status norm_of_product(size_t n, norm_product *product, void *context, const progress *p, double *norm,
+                           lam_error *error);
+
 #endif

@@ -2,9 +2,8 @@
  * folded (grey):  P = -Y V^T                      (Aguerre 2016, eq. 2.8)
  * factored:       P_c = rho'_c U core_c V^T       U, V free of reflectance, shared by all channels */
 #include "solver/operator/operator.h"
-#include "solver/operator/panel.h"
+#include "solver/operator/panel_store.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -19,15 +18,13 @@ static void low_rank_destroy(lam_operator *op) {
     low_rank *self = (low_rank *)op;
     panel_free(&self->left);
     panel_free(&self->right);
-    for (size_t c = 0; self->core != NULL && c < op->n_channels; c++) panel_free(&self->core[c]);
-    free(self->core);
+    core_panels_free(self->core, op->n_channels);
 }
 
 /* Takes left, right and core [C][k][k] (NULL: folded), also on an error. */
 static lam_status assemble(size_t n, size_t k, size_t n_channels, const float *reflectance, panel *left,
                            panel *right, float *core, lam_operator **op, lam_error *error) {
     lam_status status = LAM_OK;
-    char name[48];
     low_rank *self = memory_allocate(1, sizeof *self, "operator", error);
     if (self == NULL) {
         panel_free(left);
@@ -39,14 +36,7 @@ static lam_status assemble(size_t n, size_t k, size_t n_channels, const float *r
     self->right = *right;
     *left = *right = (panel){0};
     TRY(operator_init(&self->base, &operator_low_rank, n, n_channels, reflectance, error));
-    if (core != NULL) {
-        self->core = memory_allocate(n_channels, sizeof *self->core, "operator", error);
-        if (self->core == NULL) TRY(LAM_ERR_MEMORY);
-        for (size_t c = 0; c < n_channels; c++) {
-            snprintf(name, sizeof name, "/operator/core[%zu]", c);
-            TRY(panel_create(k, k, core + c * k * k, name, &self->core[c], error));
-        }
-    }
+    if (core != NULL) TRY(core_panels_create(n_channels, k, core, &self->core, error));
     *op = &self->base;
     self = NULL;
 done:
@@ -90,72 +80,6 @@ lam_status operator_low_rank_create_factored(size_t n, size_t k, size_t n_channe
 
 /* --- precisions and the store -------------------------------------------------------------------------- */
 
-/* What a panel of a precision is in a file: bf16 as u16 with the attribute encoding. */
-static const store_type panel_types[PANEL_PRECISIONS] = {STORE_F32, STORE_F16, STORE_U16, STORE_I8};
-
-static lam_status read_precision(store *s, const char *name, panel_precision *precision, lam_error *error) {
-    lam_status status = LAM_OK;
-    store_type type;
-    int rank;
-    size_t dims[STORE_MAX_RANK], p = 0;
-    char *encoding = NULL;
-    TRY(store_array_info(s, name, &type, &rank, dims, error));
-    while (p < PANEL_PRECISIONS && panel_types[p] != type) p++;
-    if (p == PANEL_PRECISIONS)
-        FAIL(error, LAM_ERR_FORMAT, "%s: %s must be of f32, f16, bf16 or i8", store_path(s), name);
-    if (store_has_attribute(s, name, "encoding")) TRY(store_get_text(s, name, "encoding", &encoding, error));
-    if (encoding != NULL ? p != PANEL_BF16 || strcmp(encoding, "bf16") != 0 : p == PANEL_BF16)
-        FAIL(error, LAM_ERR_FORMAT,
-             "%s: %s has the encoding '%s', must be 'bf16' where it is of u16 and none elsewhere",
-             store_path(s), name, encoding != NULL ? encoding : "");
-    *precision = (panel_precision)p;
-done:
-    free(encoding);
-    return status;
-}
-
-/* A panel [n][*k] with its scale; *k may be SIZE_MAX: as found. */
-static lam_status load_panel(store *s, const char *name, size_t n, size_t *k, panel *a, lam_error *error) {
-    lam_status status = LAM_OK;
-    char scale_name[48];
-    void *values = NULL, *scale = NULL;
-    panel_precision precision = PANEL_F32;
-    size_t dims[STORE_MAX_RANK] = {n, *k};
-    TRY(read_precision(s, name, &precision, error));
-    snprintf(scale_name, sizeof scale_name, "%s_scale", name);
-    const bool scaled = store_has(s, scale_name);
-    if (precision == PANEL_I8 && !scaled)
-        FAIL(error, LAM_ERR_FORMAT, "%s: %s is of i8 and has no %s", store_path(s), name, scale_name);
-    if (scaled && precision != PANEL_I8 && precision != PANEL_F16)
-        FAIL(error, LAM_ERR_FORMAT, "%s: %s is of %s and must not have a %s", store_path(s), name,
-             panel_precision_name(precision), scale_name);
-    TRY(store_read(s, name, panel_types[precision], 2, dims, &values, error));
-    if (scaled) TRY(store_read(s, scale_name, STORE_F32, 1, &dims[1], &scale, error));
-    TRY(panel_create_kept(n, dims[1], precision, values, scale, name, a, error));
-    *k = dims[1];
-done:
-    free(values);
-    free(scale);
-    return status;
-}
-
-/* The attribute, where there is one, must say what Y or U and V are kept in. */
-static lam_status check_precision(store *s, const panel *left, const panel *right, lam_error *error) {
-    lam_status status = LAM_OK;
-    char *said = NULL;
-    if (left->precision != right->precision)
-        FAIL(error, LAM_ERR_FORMAT, "%s: /operator has one array of %s and one of %s, must be the same",
-             store_path(s), panel_precision_name(left->precision), panel_precision_name(right->precision));
-    if (!store_has_attribute(s, "/operator", "precision")) goto done;
-    TRY(store_get_text(s, "/operator", "precision", &said, error));
-    if (strcmp(said, panel_precision_name(left->precision)) != 0)
-        FAIL(error, LAM_ERR_FORMAT, "%s: /operator says precision '%s', its arrays are of %s", store_path(s),
-             said, panel_precision_name(left->precision));
-done:
-    free(said);
-    return status;
-}
-
 static lam_status low_rank_load(store *s, size_t n, size_t n_channels, const float *reflectance,
                                 lam_operator **op, lam_error *error) {
     lam_status status = LAM_OK;
@@ -172,9 +96,12 @@ static lam_status low_rank_load(store *s, size_t n, size_t n_channels, const flo
         FAIL(error, LAM_ERR_FORMAT,
              "%s: /operator is folded, which needs 1 channel, /mesh/reflectance has %zu", store_path(s),
              n_channels);
-    TRY(load_panel(s, folded ? "/operator/Y" : "/operator/U", n, &k, &left, error));
-    TRY(load_panel(s, "/operator/V", n, &k, &right, error));
-    TRY(check_precision(s, &left, &right, error));
+    TRY(panel_load(s, folded ? "/operator/Y" : "/operator/U", n, &k, &left, error));
+    TRY(panel_load(s, "/operator/V", n, &k, &right, error));
+    if (left.precision != right.precision)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /operator has one array of %s and one of %s, must be the same",
+             store_path(s), panel_precision_name(left.precision), panel_precision_name(right.precision));
+    TRY(panel_check_precision(s, left.precision, error));
     if (!folded) {
         size_t core_dims[STORE_MAX_RANK] = {n_channels, k, k};
         TRY(store_read(s, "/operator/core", STORE_F32, 3, core_dims, &core, error));
@@ -190,45 +117,14 @@ done:
     return status;
 }
 
-static lam_status save_panel(const panel *a, store *s, const char *name, lam_error *error) {
-    lam_status status = LAM_OK;
-    char scale_name[48];
-    size_t dims[2] = {a->n, a->k};
-    /* The padded panel was allocated, so the product below cannot overflow. */
-    void *values = memory_allocate(a->n * a->k, panel_value_size(a->precision), name, error);
-    if (values == NULL) TRY(LAM_ERR_MEMORY);
-    panel_copy_values(a, values);
-    TRY(store_write(s, name, panel_types[a->precision], 2, dims, values, error));
-    if (a->precision == PANEL_BF16) TRY(store_set_text(s, name, "encoding", "bf16", error));
-    snprintf(scale_name, sizeof scale_name, "%s_scale", name);
-    if (a->scale != NULL) TRY(store_write(s, scale_name, STORE_F32, 1, &a->k, a->scale, error));
-done:
-    free(values);
-    return status;
-}
-
 static lam_status low_rank_save(const lam_operator *op, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     const low_rank *self = (const low_rank *)op;
-    size_t k = self->left.k, count;
-    float *core = NULL;
-    TRY(store_set_integer(s, "/operator", "rank", (int64_t)k, error));
-    TRY(save_panel(&self->left, s, self->core == NULL ? "/operator/Y" : "/operator/U", error));
-    TRY(save_panel(&self->right, s, "/operator/V", error));
-    if (self->core != NULL) {
-        size_t dims[3] = {op->n_channels, k, k};
-        if (!size_multiply(k * k, op->n_channels, &count))
-            FAIL(error, LAM_ERR_MEMORY, "/operator/core is larger than memory can have");
-        core = memory_allocate(count, sizeof *core, "/operator/core", error);
-        if (core == NULL) {
-            status = LAM_ERR_MEMORY;
-            goto done;
-        }
-        for (size_t c = 0; c < op->n_channels; c++) panel_copy_rows(&self->core[c], core + c * k * k);
-        TRY(store_write(s, "/operator/core", STORE_F32, 3, dims, core, error));
-    }
+    TRY(store_set_integer(s, "/operator", "rank", (int64_t)self->left.k, error));
+    TRY(panel_save(&self->left, s, self->core == NULL ? "/operator/Y" : "/operator/U", error));
+    TRY(panel_save(&self->right, s, "/operator/V", error));
+    if (self->core != NULL) TRY(core_panels_save(self->core, op->n_channels, s, error));
 done:
-    free(core);
     return status;
 }
 
@@ -242,11 +138,7 @@ static lam_status low_rank_narrow(const lam_operator *op, panel_precision precis
     TRY(panel_convert(&self->left, precision, self->core == NULL ? "/operator/Y" : "/operator/U", &left,
                       error));
     TRY(panel_convert(&self->right, precision, "/operator/V", &right, error));
-    if (self->core != NULL) {
-        core = memory_allocate(op->n_channels, k * k * sizeof *core, "/operator/core", error);
-        if (core == NULL) TRY(LAM_ERR_MEMORY);
-        for (size_t c = 0; c < op->n_channels; c++) panel_copy_rows(&self->core[c], core + c * k * k);
-    }
+    if (self->core != NULL) TRY(core_panels_copy(self->core, op->n_channels, &core, error));
     float *core_taken = core;
     core = NULL;
     TRY(assemble(op->n, k, op->n_channels, op->reflectance, &left, &right, core_taken, out, error));

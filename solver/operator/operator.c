@@ -5,10 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const operator_kind *const operator_kinds[] = {&operator_exact, &operator_low_rank};
+static const operator_kind *const operator_kinds[] = {&operator_exact, &operator_low_rank,
+                                                      &operator_two_mesh};
 
 /* Kinds of the format that are still to come. */
-static const char *const future_kinds[] = {"two_mesh", "sparse", "emitters", "hierarchical"};
+static const char *const future_kinds[] = {"sparse", "emitters", "hierarchical"};
 
 const operator_kind *operator_kind_find(const char *name) {
     for (size_t i = 0; i < sizeof operator_kinds / sizeof *operator_kinds; i++)

@@ -59,6 +59,7 @@ struct lam_operator {
 
 extern const operator_kind operator_exact;
 extern const operator_kind operator_low_rank;
+extern const operator_kind operator_two_mesh;
 
 /* The kind of this name, or NULL. */
 const operator_kind *operator_kind_find(const char *name);
@@ -112,5 +113,20 @@ lam_status operator_low_rank_create_folded(size_t n, size_t k, const float *refl
 lam_status operator_low_rank_create_factored(size_t n, size_t k, size_t n_channels, const float *reflectance,
                                              float *U, float *V, float *core, lam_operator **op,
                                              lam_error *error);
+
+/* What a two_mesh operator is made of. */
+typedef struct two_mesh_arrays {
+    float *left;      /* [n][k]: Y (folded, grey: P = -Y T) or U (factored: H_c = U core_c T_c) */
+    uint64_t *begin;  /* [k+1]: T_p is the sum of weight E over rows begin[p] ... begin[p+1]-1 */
+    float *weight;    /* [n]; NULL: 1 */
+    float *coherence; /* [k], for the record; or NULL */
+    float *core;      /* [C][k][k]; NULL: folded */
+} two_mesh_arrays;
+
+void two_mesh_arrays_free(two_mesh_arrays *arrays);
+
+/* Takes over what arrays points to, also on an error, and zeroes it. */
+lam_status operator_two_mesh_create(size_t n, size_t k, size_t n_channels, const float *reflectance,
+                                    two_mesh_arrays *arrays, lam_operator **op, lam_error *error);
 
 #endif

@@ -242,7 +242,6 @@ static const recipe recipes[] = {
      .kind = "sparse",
      .status = LAM_ERR_UNSUPPORTED,
      .word = "kind 'sparse' is not supported yet"},
-    {.what = "two_mesh", .kind = "two_mesh", .status = LAM_ERR_UNSUPPORTED, .word = "'two_mesh'"},
     {.what = "emitters", .kind = "emitters", .status = LAM_ERR_UNSUPPORTED, .word = "'emitters'"},
     {.what = "hierarchical", .kind = "hierarchical", .status = LAM_ERR_UNSUPPORTED, .word = "'hierarchical'"},
     {.what = "kind unknown", .kind = "magic", .status = LAM_ERR_FORMAT, .word = "unknown kind 'magic'"},

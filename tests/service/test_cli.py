@@ -166,9 +166,8 @@ class Usage(Case):
                      "generate atrium -o a.obj", "generate maze -o a.obj", "generate canopy -o a.obj",
                      "solve a.h5 --tolerance 1e-4", "solve a.h5 -o b.glb",
                      *("precompute a.obj -o b.h5 " + option for option in (
-                         "--keep-form-factors=compressed", "--method 2msc", "--method sparse",
-                         "--method emitters", "--method hierarchical", "--factorizer svd", "--factorizer rsi",
-                         "--factorizer sgrsvd", "--keep-factors", "--emitters sky", "--positions p.json",
+                         "--keep-form-factors=compressed", "--method sparse",
+                         "--method emitters", "--method hierarchical", "--keep-factors", "--emitters sky", "--positions p.json",
                          "--path p.json --frames 3", "--reuse A", "--paths 9"))):
             with self.subTest(line):
                 self.refused(2, "not supported yet", *line.split())

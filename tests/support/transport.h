@@ -151,8 +151,9 @@ static inline uint32_t *random_order(size_t n, uint64_t *state) {
     return order;
 }
 
-/* A sum of count products in single precision: each is rounded when it is made and with every partial sum; at
- * most 128 of them stand in one, 16 lanes are added, and the total is rounded once more. */
+/* A sum of count products in single precision (of two meshes, in double, fewer): each is rounded when it is
+ * made and with every partial sum; at most 128 of them stand in one, 16 lanes are added, and the total is
+ * rounded once more. */
 static inline double sum_roundings(size_t count) {
     return (count < 128 ? (double)count : 128.0) + 6.0;
 }
@@ -167,6 +168,12 @@ typedef enum transport_kind {
     TRANSPORT_FOLDED_BF16,
     TRANSPORT_FOLDED_I8,
     TRANSPORT_FACTORED_COLOUR_I8,
+    TRANSPORT_TWO_MESH,
+    TRANSPORT_TWO_MESH_COLOUR,
+    TRANSPORT_TWO_MESH_F16,
+    TRANSPORT_TWO_MESH_BF16,
+    TRANSPORT_TWO_MESH_I8,
+    TRANSPORT_TWO_MESH_COLOUR_I8,
     TRANSPORT_KINDS
 } transport_kind;
 
@@ -219,8 +226,58 @@ static inline void product_of_factors(transport *t, const float *Y, const float 
         }
 }
 
-/* Y = -rho' U core for one channel, magnitude |U| |core| |V|^T rho' for all. */
-static inline void make_low_rank(transport *t, const double *F, const float *U, const float *V, bool folded) {
+/* Of two meshes: U with row sums up to .95, V with one weight a row, of a patch that is one run of positions;
+ * patches of 1 element and of many, weights that sum to 1 or (unweighted) are 1. I is [k+1]. */
+static inline void random_two_mesh(size_t n, size_t k, const uint32_t *order, bool weighted, float *U,
+                                   float *V, uint64_t *begin, uint64_t *state) {
+    for (size_t p = 1; p <= k; p++) begin[p] = p + (n - k) * p * p * p / (k * k * k);
+    for (size_t p = 0; p < k; p++) {
+        double area = 0, share[512];
+        ck_assert(begin[p + 1] > begin[p] && begin[p + 1] - begin[p] < 512);
+        for (uint64_t j = begin[p]; j < begin[p + 1]; j++)
+            area += share[j - begin[p]] = 0.1 + random_unit(state);
+        for (uint64_t j = begin[p]; j < begin[p + 1]; j++)
+            V[(order ? order[j] : j) * k + p] = weighted ? (float)(share[j - begin[p]] / area) : 1.0f;
+    }
+    for (size_t i = 0; i < n; i++) {
+        double sum = 0;
+        for (size_t p = 0; p < k; p++) {
+            U[i * k + p] = random_unit(state) < 0.4 ? (float)random_unit(state) : 0.0f;
+            sum += (double)U[i * k + p] * (weighted ? 1.0 : (double)(begin[p + 1] - begin[p]));
+        }
+        for (size_t p = 0; p < k && sum > 0; p++) U[i * k + p] = (float)(0.95 * (double)U[i * k + p] / sum);
+    }
+}
+
+/* The operator of two meshes from a V that is one: left [n][k] and core as of low rank. */
+static inline lam_status create_two_mesh(const transport *t, float *left, const float *V_positions,
+                                         const uint64_t *begin, float *core, lam_operator **op,
+                                         lam_error *error) {
+    size_t n = t->n, k = t->k;
+    two_mesh_arrays arrays = {.left = left, .core = core};
+    arrays.begin = test_allocate(k + 1, sizeof *arrays.begin);
+    memcpy(arrays.begin, begin, (k + 1) * sizeof *begin);
+    arrays.coherence = test_allocate(k, sizeof *arrays.coherence);
+    float *weight = test_allocate(n, sizeof *weight);
+    bool ones = true;
+    for (size_t p = 0; p < k; p++) {
+        arrays.coherence[p] = (float)p / (float)k;
+        for (uint64_t j = begin[p]; j < begin[p + 1]; j++) {
+            weight[j] = V_positions[j * k + p];
+            ones = ones && weight[j] == 1;
+        }
+    }
+    if (ones)
+        free(weight);
+    else
+        arrays.weight = weight;
+    return operator_two_mesh_create(n, k, t->n_channels, t->reflectance, &arrays, op, error);
+}
+
+/* Y = -rho' U core for one channel, magnitude |U| |core| |V|^T rho' for all. With I, V is that of two meshes.
+ */
+static inline void make_low_rank(transport *t, const double *F, const float *U, const float *V, bool folded,
+                                 const uint64_t *begin) {
     lam_error error = {.message = ""};
     size_t n = t->n, k = t->k;
     float *core = test_allocate(t->n_channels * k * k, sizeof *core), *Y = test_allocate(n * k, sizeof *Y);
@@ -257,16 +314,23 @@ static inline void make_low_rank(transport *t, const double *F, const float *U, 
     float *V_positions = in_positions(t->order, n, k, false, V);
     lam_status status;
     if (folded) { /* Y rounded; V^T E, Y t */
+        float *rows = in_positions(t->order, n, k, false, Y);
         t->roundings = 1 + sum_roundings(n) + sum_roundings(k);
-        status = operator_low_rank_create_folded(n, k, t->reflectance, in_positions(t->order, n, k, false, Y),
-                                                 V_positions, &t->op, &error);
+        if (begin != NULL)
+            status = create_two_mesh(t, rows, V_positions, begin, NULL, &t->op, &error);
+        else
+            status = operator_low_rank_create_folded(n, k, t->reflectance, rows, V_positions, &t->op, &error);
         free(core);
     } else { /* core rounded; V^T E, core t, U t, rho' */
+        float *rows = in_positions(t->order, n, k, false, U);
         t->roundings = 2 + sum_roundings(n) + 2 * sum_roundings(k);
-        status = operator_low_rank_create_factored(n, k, t->n_channels, t->reflectance,
-                                                   in_positions(t->order, n, k, false, U), V_positions, core,
-                                                   &t->op, &error);
+        if (begin != NULL)
+            status = create_two_mesh(t, rows, V_positions, begin, core, &t->op, &error);
+        else
+            status = operator_low_rank_create_factored(n, k, t->n_channels, t->reflectance, rows, V_positions,
+                                                       core, &t->op, &error);
     }
+    if (begin != NULL) free(V_positions);
     ck_assert_msg(status == LAM_OK, "%s", error.message);
     if (t->precision != PANEL_F32) { /* a scale's division and product, with V^T E and with t */
         lam_operator *wide = t->op;
@@ -292,10 +356,18 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
                  {"folded, f16", PANEL_F16},
                  {"folded, bf16", PANEL_BF16},
                  {"folded, i8", PANEL_I8},
-                 {"factored, 3 channels, i8", PANEL_I8}};
+                 {"factored, 3 channels, i8", PANEL_I8},
+                 {"two meshes, folded", PANEL_F32},
+                 {"two meshes, 3 channels", PANEL_F32},
+                 {"two meshes, folded, f16", PANEL_F16},
+                 {"two meshes, folded, bf16", PANEL_BF16},
+                 {"two meshes, folded, i8", PANEL_I8},
+                 {"two meshes, 3 channels, i8", PANEL_I8}};
     lam_error error = {.message = ""};
     uint64_t state = 11 + (uint64_t)kind;
-    bool colour = strstr(kinds[kind].name, "3 channels") != NULL;
+    const bool colour = strstr(kinds[kind].name, "3 channels") != NULL;
+    const bool two_mesh = strncmp(kinds[kind].name, "two meshes", 10) == 0;
+    uint64_t begin[64] = {0};
     transport t = {.name = kinds[kind].name,
                    .n = 151,
                    .k = 21,
@@ -304,20 +376,25 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
     size_t n = t.n, k = t.k;
     float *U = test_allocate(n * k, sizeof *U), *V = test_allocate(n * k, sizeof *V);
     double *F = test_allocate(n * n, sizeof *F);
-    random_factors(n, k, U, V, &state);
-    round_to(t.precision, n, k, U);
-    round_to(t.precision, n, k, V);
+    if (ordered) t.order = random_order(n, &state);
+    if (two_mesh) {
+        random_two_mesh(n, k, t.order, colour, U, V, begin, &state);
+        round_to(t.precision, n, k, U);
+    } else {
+        random_factors(n, k, U, V, &state);
+        round_to(t.precision, n, k, U);
+        round_to(t.precision, n, k, V);
+    }
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++)
             for (size_t b = 0; b < k; b++) F[i * n + j] += (double)U[i * k + b] * (double)V[j * k + b];
     t.reflectance = random_reflectance(n, t.n_channels, &state);
     t.P = test_allocate(t.n_channels * n * n, sizeof *t.P);
     t.magnitude = test_allocate(t.n_channels * n * n, sizeof *t.magnitude);
-    if (ordered) t.order = random_order(n, &state);
     if (kind == TRANSPORT_EXACT || kind == TRANSPORT_EXACT_COLOUR)
         make_exact(&t, F);
     else
-        make_low_rank(&t, F, U, V, strncmp(t.name, "folded", 6) == 0);
+        make_low_rank(&t, F, U, V, strstr(t.name, "folded") != NULL, two_mesh ? begin : NULL);
     if (ordered) ck_assert(operator_set_order(t.op, t.order, &error) == LAM_OK);
     free(F);
     free(U);

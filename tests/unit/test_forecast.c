@@ -53,6 +53,21 @@ START_TEST(files_are_within_the_forecast) {
 }
 END_TEST
 
+/* Two matrices of 4, 2 or 1 bytes a value; the whole inverse has no choice. */
+START_TEST(fewer_bits_take_less_of_the_disk) {
+    forecast f = {.n = 5000, .n_channels = 1, .recipe = {.method = RECIPE_RAYS, .rays = 512}, .rank = 100};
+    const double single = forecast_store_bytes(&f), all = 2. * 5000 * 100;
+    f.precision = PANEL_BF16;
+    ck_assert_double_eq(single - forecast_store_bytes(&f), 2 * all);
+    f.precision = PANEL_I8;
+    ck_assert_double_eq(single - forecast_store_bytes(&f), 3 * all);
+    f.exact = true;
+    const double inverse = forecast_store_bytes(&f);
+    f.precision = PANEL_F32;
+    ck_assert_double_eq(forecast_store_bytes(&f), inverse);
+}
+END_TEST
+
 START_TEST(more_work_takes_longer) {
     forecast f = {.n = 100000, .n_channels = 1, .recipe = recipes[1], .judge_recipe = recipes[1]};
     const forecast_times one = forecast_seconds(&f, 1e7, 2);
@@ -103,6 +118,7 @@ int main(void) {
     TCase *cases = tcase_create("forecast");
     tcase_set_timeout(cases, 300);
     tcase_add_loop_test(cases, files_are_within_the_forecast, 0, sizeof recipes / sizeof *recipes);
+    tcase_add_test(cases, fewer_bits_take_less_of_the_disk);
     tcase_add_test(cases, more_work_takes_longer);
     tcase_add_test(cases, what_does_not_fit_is_refused);
     suite_add_tcase(suite, cases);

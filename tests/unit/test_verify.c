@@ -234,6 +234,50 @@ START_TEST(test_a_mesh_that_is_not_its_vertices) {
 }
 END_TEST
 
+/* Patches of 20 and 34 equal elements by hand: weights are 1/20 and 1/34, or absent with those in Y. */
+static void give_patches(sample *s, const float *weight) {
+    two_mesh_arrays arrays = {.left = calloc(54 * 2, sizeof(float)), .begin = calloc(3, sizeof(uint64_t))};
+    ck_assert(arrays.left != NULL && arrays.begin != NULL);
+    arrays.begin[1] = 20;
+    arrays.begin[2] = 54;
+    if (weight != NULL) {
+        arrays.weight = malloc(54 * sizeof *weight);
+        ck_assert_ptr_nonnull(arrays.weight);
+        memcpy(arrays.weight, weight, 54 * sizeof *weight);
+    }
+    lam_operator_close(s->op);
+    MUST(operator_two_mesh_create(54, 2, 1, s->m.reflectance, &arrays, &s->op, error));
+}
+
+START_TEST(test_patches_that_weigh_wrong) {
+    sample s = make_sample();
+    check done[N_CHECKS];
+    float weight[54];
+    for (size_t i = 0; i < 54; i++) weight[i] = 1.f / (i < 20 ? 20 : 34);
+    give_patches(&s, weight);
+    examine(&s, done);
+    ck_assert_int_eq(done[OPERATOR].verdict, VERDICT_OK);
+    weight[21] *= 1.0001f;
+    give_patches(&s, weight);
+    examine(&s, done);
+    ck_assert_int_eq(done[OPERATOR].verdict, VERDICT_BROKEN);
+    ck_assert_ptr_nonnull(strstr(done[OPERATOR].detail, "element 21 weighs 0.029"));
+    give_patches(&s, NULL);
+    examine(&s, done);
+    ck_assert_int_eq(done[OPERATOR].verdict, VERDICT_OK);
+    free_sample(&s);
+    /* Of unlike area: they need weights. */
+    sample room = make_sample();
+    for (size_t i = 0; i < room.m.n_vertices; i++) room.m.vertices[i][2] *= 3;
+    MUST(mesh_measure(&room.m, error));
+    give_patches(&room, NULL);
+    examine(&room, done);
+    ck_assert_int_eq(done[OPERATOR].verdict, VERDICT_BROKEN);
+    ck_assert_ptr_nonnull(strstr(done[OPERATOR].detail, "in patch 1"));
+    free_sample(&room);
+}
+END_TEST
+
 int main(void) {
     Suite *s = suite_create("verify");
     TCase *c = tcase_create("all");
@@ -244,6 +288,7 @@ int main(void) {
     tcase_add_test(c, test_form_factors_without_reciprocity);
     tcase_add_test(c, test_a_sky_that_shines_through_walls);
     tcase_add_test(c, test_a_mesh_that_is_not_its_vertices);
+    tcase_add_test(c, test_patches_that_weigh_wrong);
     suite_add_tcase(s, c);
     return suite_run(s);
 }

@@ -1,0 +1,19 @@
+/* From factors of F to what an operator holds. */
+#ifndef LAMBERT_BUILD_FINISH_H
+#define LAMBERT_BUILD_FINISH_H
+
+#include "solver/build/build.h"
+#include "solver/build/tsvd.h"
+#include "solver/matrix/scaled.h"
+
+/* U [n][k] becomes Y = -R' U core (Aguerre 2016, eq. 2.8), R' with 1 for a reflectance of 0; row r is element
+ * order[r], NULL: r. Cost: O(n k^2), a block of rows at a time. Errors: LAM_ERR_MEMORY. */
+lam_status finish_fold(size_t n, size_t k, const float *core, const float *reflectance, const uint32_t *order,
+                       float *U, lam_error *error);
+
+/* The operator of S ~ Q V^T, both with rows in positions of S: folded for one channel, else factored. Frees
+ * f. *rcond is the worst of the cores'. Errors: LAM_ERR_MEMORY, as core_invert. */
+lam_status finish_low_rank(const build_problem *problem, const scaled_matrix *S, tall_factors *f,
+                           lam_operator **op, double *rcond, lam_error *error);
+
+#endif

@@ -1,0 +1,125 @@
+#include "solver/operator/panel_store.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* What a panel of a precision is in a file: bf16 as u16 with the attribute encoding. */
+static const store_type panel_types[PANEL_PRECISIONS] = {STORE_F32, STORE_F16, STORE_U16, STORE_I8};
+
+static lam_status read_precision(store *s, const char *name, panel_precision *precision, lam_error *error) {
+    lam_status status = LAM_OK;
+    store_type type;
+    int rank;
+    size_t dims[STORE_MAX_RANK], p = 0;
+    char *encoding = NULL;
+    TRY(store_array_info(s, name, &type, &rank, dims, error));
+    while (p < PANEL_PRECISIONS && panel_types[p] != type) p++;
+    if (p == PANEL_PRECISIONS)
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s must be of f32, f16, bf16 or i8", store_path(s), name);
+    if (store_has_attribute(s, name, "encoding")) TRY(store_get_text(s, name, "encoding", &encoding, error));
+    if (encoding != NULL ? p != PANEL_BF16 || strcmp(encoding, "bf16") != 0 : p == PANEL_BF16)
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s: %s has the encoding '%s', must be 'bf16' where it is of u16 and none elsewhere",
+             store_path(s), name, encoding != NULL ? encoding : "");
+    *precision = (panel_precision)p;
+done:
+    free(encoding);
+    return status;
+}
+
+lam_status panel_load(store *s, const char *name, size_t n, size_t *k, panel *a, lam_error *error) {
+    lam_status status = LAM_OK;
+    char scale_name[48];
+    void *values = NULL, *scale = NULL;
+    panel_precision precision = PANEL_F32;
+    size_t dims[STORE_MAX_RANK] = {n, *k};
+    TRY(read_precision(s, name, &precision, error));
+    snprintf(scale_name, sizeof scale_name, "%s_scale", name);
+    const bool scaled = store_has(s, scale_name);
+    if (precision == PANEL_I8 && !scaled)
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s is of i8 and has no %s", store_path(s), name, scale_name);
+    if (scaled && precision != PANEL_I8 && precision != PANEL_F16)
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s is of %s and must not have a %s", store_path(s), name,
+             panel_precision_name(precision), scale_name);
+    TRY(store_read(s, name, panel_types[precision], 2, dims, &values, error));
+    if (scaled) TRY(store_read(s, scale_name, STORE_F32, 1, &dims[1], &scale, error));
+    TRY(panel_create_kept(n, dims[1], precision, values, scale, name, a, error));
+    *k = dims[1];
+done:
+    free(values);
+    free(scale);
+    return status;
+}
+
+lam_status panel_save(const panel *a, store *s, const char *name, lam_error *error) {
+    lam_status status = LAM_OK;
+    char scale_name[48];
+    size_t dims[2] = {a->n, a->k};
+    /* The padded panel was allocated, so the product below cannot overflow. */
+    void *values = memory_allocate(a->n * a->k, panel_value_size(a->precision), name, error);
+    if (values == NULL) TRY(LAM_ERR_MEMORY);
+    panel_copy_values(a, values);
+    TRY(store_write(s, name, panel_types[a->precision], 2, dims, values, error));
+    if (a->precision == PANEL_BF16) TRY(store_set_text(s, name, "encoding", "bf16", error));
+    snprintf(scale_name, sizeof scale_name, "%s_scale", name);
+    if (a->scale != NULL) TRY(store_write(s, scale_name, STORE_F32, 1, &a->k, a->scale, error));
+done:
+    free(values);
+    return status;
+}
+
+lam_status panel_check_precision(store *s, panel_precision precision, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *said = NULL;
+    if (!store_has_attribute(s, "/operator", "precision")) goto done;
+    TRY(store_get_text(s, "/operator", "precision", &said, error));
+    if (strcmp(said, panel_precision_name(precision)) != 0)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /operator says precision '%s', its arrays are of %s", store_path(s),
+             said, panel_precision_name(precision));
+done:
+    free(said);
+    return status;
+}
+
+lam_status core_panels_create(size_t n_channels, size_t k, const float *core, panel **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    char name[48];
+    panel *cores = memory_allocate(n_channels, sizeof *cores, "operator", error);
+    if (cores == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t c = 0; c < n_channels; c++) {
+        snprintf(name, sizeof name, "/operator/core[%zu]", c);
+        TRY(panel_create(k, k, core + c * k * k, name, &cores[c], error));
+    }
+    *out = cores;
+    cores = NULL;
+done:
+    core_panels_free(cores, n_channels);
+    return status;
+}
+
+void core_panels_free(panel *cores, size_t n_channels) {
+    for (size_t c = 0; cores != NULL && c < n_channels; c++) panel_free(&cores[c]);
+    free(cores);
+}
+
+lam_status core_panels_copy(const panel *cores, size_t n_channels, float **core, lam_error *error) {
+    /* The padded panels were allocated, so the square of k cannot overflow. */
+    const size_t k = cores[0].k;
+    float *rows = memory_allocate(n_channels, k * k * sizeof *rows, "/operator/core", error);
+    if (rows == NULL) return LAM_ERR_MEMORY;
+    for (size_t c = 0; c < n_channels; c++) panel_copy_rows(&cores[c], rows + c * k * k);
+    *core = rows;
+    return LAM_OK;
+}
+
+lam_status core_panels_save(const panel *cores, size_t n_channels, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t dims[3] = {n_channels, cores[0].k, cores[0].k};
+    float *core = NULL;
+    TRY(core_panels_copy(cores, n_channels, &core, error));
+    TRY(store_write(s, "/operator/core", STORE_F32, 3, dims, core, error));
+done:
+    free(core);
+    return status;
+}
