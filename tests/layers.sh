@@ -14,7 +14,7 @@ declare -A allowed=(
     [solver/formfactor]="lambert/ store/ solver/progress.h solver/clock.h solver/operator/ solver/scene/ solver/formfactor/"
     [solver/matrix]="lambert/ store/ solver/progress.h solver/operator/ solver/matrix/"
     [solver/build]="lambert/ store/ solver/progress.h solver/clock.h solver/operator/ solver/matrix/ solver/build/"
-    [solver/bench]="lambert/ store/ solver/progress.h solver/clock.h solver/operator/ solver/scene/ solver/formfactor/ solver/build/ solver/bench/"
+    [solver/bench]="lambert/ store/ solver/progress.h solver/clock.h solver/operator/ solver/scene/ solver/formfactor/ solver/matrix/ solver/build/ solver/bench/"
     [solver]="lambert/ store/ solver/"
     [server]="lambert/ store/ solver/operator/ server/"
 )

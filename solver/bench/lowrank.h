@@ -11,6 +11,8 @@ typedef struct lowrank_scene {
     const char *name; /* static */
     mesh m;
     uint32_t *z_order, *mesh_order; /* [n] */
+    double (*centre)[3];            /* [n] centroids */
+    uint32_t *surface;              /* [n] */
     form_factors f;
     double seconds; /* of the form factors */
 } lowrank_scene;
@@ -44,6 +46,9 @@ factorizer_options lowrank_options(const bench_run *run, double epsilon, size_t 
 /* The problem that a build method gets. */
 build_problem lowrank_problem(const lowrank_scene *s);
 
+/* Median seconds of one radiosity. */
+lam_status lowrank_answer_seconds(const lam_operator *op, double *median, lam_error *error);
+
 /* Tables 3.1 to 3.5 of the thesis and figures 3.3 to 3.5. */
 lam_status lowrank_of_alpha(const bench_run *run, const lowrank_scene *s, lam_error *error);
 lam_status lowrank_of_order(const bench_run *run, const lowrank_scene *const *scenes, size_t n,
@@ -61,5 +66,8 @@ lam_status lowrank_of_radiosity(const bench_run *run, lam_error *error);
 
 /* Every method: run time and memory against error, and two meshes against the SVD at equal k. */
 lam_status lowrank_of_methods(const bench_run *run, lam_error *error);
+
+/* Tables 1 to 5 of seed 000: the index vector, and frames a second. */
+lam_status lowrank_of_index_vector(const bench_run *run, lam_error *error);
 
 #endif

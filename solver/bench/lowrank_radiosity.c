@@ -1,13 +1,11 @@
 /* Tables 3.6 and 3.7 of the thesis: what an operator costs, and how far its radiosity is off. */
 #include "solver/bench/lowrank.h"
-#include "solver/bench/stats.h"
 #include "solver/build/judge.h"
-#include "solver/clock.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-enum { EPSILONS = 5, PROBES = 500, PROBES_OF_LARGE = 64, LARGE = 5000, SOLVES = 31 };
+enum { EPSILONS = 5, PROBES = 500, PROBES_OF_LARGE = 64, LARGE = 5000 };
 
 static const double epsilons[EPSILONS] = {.05, .1, .2, .3, .5};
 
@@ -22,32 +20,6 @@ static const double cornell[EPSILONS][4] = {{560, .0021, .0017, .0094},
                                             {328, .0088, .0075, .0448},
                                             {274, .0133, .0122, .0839},
                                             {139, .0255, .0299, .1713}};
-
-/* Median time of one answer, all threads. */
-static lam_status time_of_answer(const lam_operator *op, double *median, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = lam_operator_elements(op) * lam_operator_channels(op);
-    double seconds[SOLVES];
-    float *E = NULL, *B = NULL;
-    void *work = NULL;
-    const size_t bytes = lam_operator_work_bytes(op, 1);
-    E = memory_allocate(n, sizeof *E, "an answer", error);
-    B = memory_allocate(n, sizeof *B, "an answer", error);
-    work = memory_allocate(1, bytes, "an answer", error);
-    if (E == NULL || B == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < n; i++) E[i] = (float)(i % 7);
-    for (int k = 0; k < SOLVES; k++) {
-        const double started = clock_seconds();
-        TRY(lam_operator_apply(op, 1, LAM_RADIOSITY, E, B, work, bytes, error));
-        seconds[k] = clock_seconds() - started;
-    }
-    *median = stats_median(seconds, SOLVES);
-done:
-    free(E);
-    free(B);
-    free(work);
-    return status;
-}
 
 static lam_status add_epsilon(const bench_run *run, const lowrank_scene *s, double epsilon,
                               const double theirs[4], table *out, lam_error *error) {
@@ -67,7 +39,7 @@ static lam_status add_epsilon(const bench_run *run, const lowrank_scene *s, doub
     double answer;
     TRY(bench_check(run, error));
     TRY(build_operator(&problem, &how, &op, &built, error));
-    TRY(time_of_answer(op, &answer, error));
+    TRY(lowrank_answer_seconds(op, &answer, error));
     const judge_input input = {.problem = &problem,
                                .row_sums = s->f.row_sums,
                                .emission = s->m.emission,

@@ -4,6 +4,7 @@
 #include "solver/bench/stats.h"
 #include "solver/build/norm.h"
 #include "solver/clock.h"
+#include "solver/scene/surfaces.h"
 
 #include <malloc.h>
 #include <stdio.h>
@@ -12,12 +13,14 @@
 #include <unistd.h>
 
 /* Above this many elements all pairs would take minutes. */
-enum { PAIRS_MOST = 12000, RAYS = 4096, REPEATS_MOST = 9 };
+enum { PAIRS_MOST = 12000, RAYS = 4096, REPEATS_MOST = 9, SOLVES = 31 };
 
 void lowrank_scene_free(lowrank_scene *s) {
     form_factors_free(&s->f);
     free(s->z_order);
     free(s->mesh_order);
+    free(s->centre);
+    free(s->surface);
     mesh_free(&s->m);
     *s = (lowrank_scene){0};
 }
@@ -27,13 +30,20 @@ static lam_status open_scene(const bench_run *run, const char *name, mesh *m, lo
                              lam_error *error) {
     lam_status status = LAM_OK;
     lowrank_scene s = {.name = name, .m = *m};
+    size_t n_surfaces;
     const recipe how =
         m->n <= PAIRS_MOST ? formfactors_pairs(7e-5, run->seed) : formfactors_rays(RAYS, run->seed);
     *m = (mesh){0};
     TRY(formfactors_order(&s.m, &s.z_order, error));
     s.mesh_order = memory_allocate(s.m.n, sizeof *s.mesh_order, "scene", error);
-    if (s.mesh_order == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < s.m.n; i++) s.mesh_order[i] = (uint32_t)i;
+    s.centre = memory_allocate(s.m.n, sizeof *s.centre, "scene", error);
+    s.surface = memory_allocate(s.m.n, sizeof *s.surface, "scene", error);
+    if (s.mesh_order == NULL || s.centre == NULL || s.surface == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < s.m.n; i++) {
+        s.mesh_order[i] = (uint32_t)i;
+        mesh_centroid(&s.m, i, s.centre[i]);
+    }
+    TRY(mesh_surfaces(&s.m, s.surface, &n_surfaces, error));
     TRY(formfactors_make_timed(run, &s.m, s.z_order, &how, "form factors", &s.f, &s.seconds, error));
     if (s.f.F.indptr == NULL) TRY(form_factors_expand(&s.f, s.m.area, error));
     bench_say(run, "%s of %zu elements: form factors in %.1f s", name, s.m.n, s.seconds);
@@ -212,7 +222,10 @@ build_problem lowrank_problem(const lowrank_scene *s) {
                            .reflectance = s->m.reflectance,
                            .F = &s->f.F,
                            .order = s->z_order,
-                           .noise = recipe_noise(&s->f.recipe)};
+                           .noise = recipe_noise(&s->f.recipe),
+                           .centre = (const double(*)[3])s->centre,
+                           .normal = (const float(*)[3])s->m.normal,
+                           .surface = s->surface};
 }
 
 /* A line of /proc/self/status in bytes, 0 where there is none. */
@@ -263,5 +276,30 @@ lam_status lowrank_factorize(const bench_run *run, const lowrank_scene *s, const
 done:
     tall_factors_free(&f);
     scaled_free(&S);
+    return status;
+}
+
+lam_status lowrank_answer_seconds(const lam_operator *op, double *median, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = lam_operator_elements(op) * lam_operator_channels(op);
+    double seconds[SOLVES];
+    float *E = NULL, *B = NULL;
+    void *work = NULL;
+    const size_t bytes = lam_operator_work_bytes(op, 1);
+    E = memory_allocate(n, sizeof *E, "an answer", error);
+    B = memory_allocate(n, sizeof *B, "an answer", error);
+    work = memory_allocate(1, bytes, "an answer", error);
+    if (E == NULL || B == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < n; i++) E[i] = (float)(i % 7);
+    for (int k = 0; k < SOLVES; k++) {
+        const double started = clock_seconds();
+        TRY(lam_operator_apply(op, 1, LAM_RADIOSITY, E, B, work, bytes, error));
+        seconds[k] = clock_seconds() - started;
+    }
+    *median = stats_median(seconds, SOLVES);
+done:
+    free(E);
+    free(B);
+    free(work);
     return status;
 }

@@ -23,6 +23,8 @@ lam_status bench_lowrank(const bench_run *run, lam_error *error) {
     TRY(lowrank_of_factorizers(run, all, n < 3 ? n : 3, error));
     TRY(lowrank_of_rank(run, all, n, error));
     TRY(lowrank_of_radiosity(run, error));
+    TRY(lowrank_of_methods(run, error));
+    TRY(lowrank_of_index_vector(run, error));
 done:
     for (size_t k = 0; k < ROOMS_MOST; k++) lowrank_scene_free(&rooms[k]);
     return status;

@@ -112,6 +112,11 @@ lam_status dense_gram_double(size_t n, size_t m, const float *A, double *G, lam_
     return LAM_OK;
 }
 
+void dense_vector(size_t n, size_t m, const float *A, bool columns, const float *x, float *t) {
+    cblas_sgemv(columns ? CblasColMajor : CblasRowMajor, CblasTrans, (int)n, (int)m, 1, A,
+                (int)(columns ? n : m), x, 1, 0, t, 1);
+}
+
 typedef struct project_job {
     size_t rows, m, w;
     const double *A, *B;

@@ -1,0 +1,179 @@
+/* Every method at several settings: run time and memory against error; two meshes against the SVD at equal k.
+ */
+#include "solver/bench/formfactors.h"
+#include "solver/bench/lowrank.h"
+#include "solver/build/judge.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { PROBES = 100, PROBES_OF_LARGE = 48, LARGE = 5000, KINDS = 7, SETTINGS_MOST = 5 };
+
+/* A method and what is varied. */
+typedef struct kind {
+    const char *label, *method, *factorizer;
+    bool by_rank; /* at ranks, else at bounds */
+} kind;
+
+static const kind kinds[KINDS] = {
+    {"HF", "low-rank", "hf", false},          {"SVD", "low-rank", "svd", true},
+    {"RSI", "low-rank", "rsi", true},         {"SGRSVD", "low-rank", "sgrsvd", true},
+    {"two meshes", "2msc", "auto", true},     {"two meshes, QR", "2msc", "qr", true},
+    {"whole inverse", "exact", "auto", false}};
+
+static const double bounds[SETTINGS_MOST] = {.3, .2, .1, .05, .02};
+/* k as parts of n. */
+static const double parts[SETTINGS_MOST] = {1. / 32, 1. / 16, 1. / 8, 1. / 5, 1. / 4};
+
+static const table_column columns[] = {
+    {"scene", NULL, "which"},
+    {"elements", "", "n"},
+    {"method", NULL, "how it was built"},
+    {"epsilon", "", "bound asked for"},
+    {"rank", "", "k"},
+    {"norm", "", "|S - S~|_2"},
+    {"build_s", "s", "factorization and inverse, without form factors"},
+    {"mb", "MB", "that an answer reads"},
+    {"answer_ms", "ms", "of one B, median, one thread"},
+    {"single", "", "total indirect error for one bright element, mean"},
+    {"lights", "", "for the scene's lights"},
+    {"random", "", "for light all over, mean"},
+    {"single_operator", "", "indirect error against the very same form factors"},
+    {"lights_operator", "", "against the same form factors"},
+    {"random_operator", "", "against the same form factors"},
+};
+
+/* A line of each plot for every kind. */
+typedef struct curve {
+    size_t n;
+    double build[SETTINGS_MOST], memory[SETTINGS_MOST], answer[SETTINGS_MOST], error[SETTINGS_MOST];
+} curve;
+
+typedef struct bench_scene {
+    const lowrank_scene *s;
+    form_factors independent; /* finer, of another seed */
+    build_problem problem;
+} bench_scene;
+
+static lam_status try(const bench_run *run, const bench_scene *b, const kind *k, int setting, table *out,
+                      curve *drawn, lam_error *error) {
+    lam_status status = LAM_OK;
+    const lowrank_scene *s = b->s;
+    const size_t n = s->m.n, probes = n > LARGE ? PROBES_OF_LARGE : PROBES;
+    lam_operator *op = NULL;
+    build_report built;
+    error_report judged = {.seconds = 0};
+    double answer;
+    const build_options how = {.method = k->method,
+                               .factorizer = k->factorizer,
+                               .epsilon = bounds[setting],
+                               .rank = k->by_rank ? (size_t)(parts[setting] * (double)n) : 0,
+                               .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
+                               .levels = -1,
+                               .seed = run->seed,
+                               .progress = run->progress};
+    TRY(bench_check(run, error));
+    TRY(build_operator(&b->problem, &how, &op, &built, error));
+    TRY(lowrank_answer_seconds(op, &answer, error));
+    const judge_input input = {.problem = &b->problem,
+                               .row_sums = s->f.row_sums,
+                               .emission = s->m.emission,
+                               .independent = &b->independent.F,
+                               .probes = n < probes ? n : probes,
+                               .seed = run->seed,
+                               .progress = run->progress};
+    TRY(judge_operator(op, &input, &judged, error));
+    const double mb = 1e-6 * (double)lam_operator_bytes(op);
+    const double seconds = built.factorize_seconds + built.invert_seconds;
+    table_text(out, s->name);
+    table_number(out, (double)n);
+    table_text(out, k->label);
+    table_number(out, k->by_rank || strcmp(k->method, "exact") == 0 ? NAN : how.epsilon);
+    table_number(out, built.rank > 0 ? (double)built.rank : NAN);
+    table_number(out, built.measured_norm_error >= 0 ? built.measured_norm_error : NAN);
+    table_number(out, seconds);
+    table_number(out, mb);
+    table_number(out, 1e3 * answer);
+    table_number(out, judged.single.total_indirect.mean);
+    table_number(out, judged.lights.probes > 0 ? judged.lights.total_indirect.mean : NAN);
+    table_number(out, judged.random.total_indirect.mean);
+    table_number(out, judged.single.operator_indirect.mean);
+    table_number(out, judged.lights.probes > 0 ? judged.lights.operator_indirect.mean : NAN);
+    table_number(out, judged.random.operator_indirect.mean);
+    drawn->build[drawn->n] = seconds;
+    drawn->memory[drawn->n] = mb;
+    drawn->answer[drawn->n] = 1e3 * answer;
+    drawn->error[drawn->n++] = judged.single.total_indirect.mean;
+done:
+    lam_operator_close(op);
+    return status;
+}
+
+static lam_status draw(const bench_run *run, const lowrank_scene *s, const char *what, const char *x_label,
+                       const curve curves[KINDS], size_t offset, lam_error *error) {
+    plot_series series[KINDS];
+    char name[64], title[128];
+    for (int k = 0; k < KINDS; k++)
+        series[k] = (plot_series){.label = kinds[k].label,
+                                  .n = curves[k].n,
+                                  .x = (const double *)((const char *)&curves[k] + offset),
+                                  .y = curves[k].error,
+                                  .joined = true};
+    snprintf(name, sizeof name, "error-by-%s-%zu", what, s->m.n);
+    snprintf(title, sizeof title, "Cornell box of %zu elements: error by %s", s->m.n, what);
+    const plot p = {.name = name,
+                    .title = title,
+                    .x_label = x_label,
+                    .y_label = "total indirect error, one bright element",
+                    .x_log = true,
+                    .y_log = true,
+                    .series = series,
+                    .n_series = KINDS};
+    return run->sink->plot(run->sink->context, &p, error);
+}
+
+static lam_status measure(const bench_run *run, const lowrank_scene *s, table *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    bench_scene b = {.s = s, .problem = lowrank_problem(s)};
+    curve curves[KINDS] = {{.n = 0}};
+    const recipe finer = formfactors_pairs(2e-5, run->seed + 1000);
+    double seconds;
+    TRY(formfactors_make_timed(run, &s->m, s->z_order, &finer, "independent form factors", &b.independent,
+                               &seconds, error));
+    if (b.independent.F.indptr == NULL) TRY(form_factors_expand(&b.independent, s->m.area, error));
+    for (int k = 0; k < KINDS; k++)
+        for (int setting = 0; setting < SETTINGS_MOST; setting++) {
+            if (run->scale == BENCH_QUICK && setting % 2 == 1) continue;
+            if (strcmp(kinds[k].method, "exact") == 0 && setting > 0) continue;
+            TRY(try(run, &b, &kinds[k], setting, out, &curves[k], error));
+        }
+    TRY(draw(run, s, "build-time", "factorization and inverse, seconds", curves, offsetof(curve, build),
+             error));
+    TRY(draw(run, s, "memory", "operator, MB", curves, offsetof(curve, memory), error));
+    TRY(draw(run, s, "answer-time", "one answer, ms", curves, offsetof(curve, answer), error));
+done:
+    form_factors_free(&b.independent);
+    return status;
+}
+
+lam_status lowrank_of_methods(const bench_run *run, lam_error *error) {
+    static const size_t sizes[3][2] = {{320, 0}, {2560, 0}, {2560, 10240}};
+    lam_status status = LAM_OK;
+    lowrank_scene s = {.name = NULL};
+    table out = {.name = "methods",
+                 .title = "Every method: run time and memory against error",
+                 .columns = columns,
+                 .n_columns = sizeof columns / sizeof *columns,
+                 .printed = true};
+    for (int k = 0; k < 2 && sizes[run->scale][k] > 0; k++) {
+        TRY(lowrank_cornell(run, sizes[run->scale][k], &s, error));
+        TRY(measure(run, &s, &out, error));
+        lowrank_scene_free(&s);
+    }
+    TRY(bench_table(run, &out, error));
+done:
+    lowrank_scene_free(&s);
+    table_free(&out);
+    return status;
+}
