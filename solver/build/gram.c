@@ -11,7 +11,7 @@
 
 /* A row of a sparse block with more than this share of its entries goes to BLAS, which makes that many more
  * products in the same time. */
-static const double spread_above = 1. / 8;
+static const double spread_above = 1. / 5;
 
 /* Rows spread out at a time. */
 enum { PANEL = 1024 };

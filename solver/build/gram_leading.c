@@ -142,14 +142,17 @@ done:
     return status;
 }
 
-lam_status gram_leading(const gram *g, double floor, float **V, size_t *rank, lam_error *error) {
+lam_status gram_leading(const gram *g, double floor, size_t guess, float **V, size_t *rank,
+                        lam_error *error) {
     lam_status status = LAM_OK;
     const size_t m = g->m;
     float *G = fill_symmetric(g, error);
     *V = NULL;
     *rank = 0;
     if (G == NULL) return LAM_ERR_MEMORY;
-    for (size_t w = m / FIRST_GUESS; w * GIVE_UP <= m && *V == NULL && w > 0; w *= 2)
+    /* A quarter more than are expected, or the iteration is slow. */
+    for (size_t w = guess > 0 ? guess + guess / 4 + 8 : m / FIRST_GUESS;
+         w * GIVE_UP <= m && *V == NULL && w > 0; w *= 2)
         TRY(attempt(m, G, w, floor, V, rank, error));
 done:
     free(G);

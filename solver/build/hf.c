@@ -18,6 +18,7 @@ typedef struct hf_run {
     const factorizer_options *options;
     int levels;
     double p[BUDGET_LEVELS_MOST + 1];
+    const hf_forecast *forecast; /* or NULL */
     size_t columns_done;
     size_t given[BUDGET_LEVELS_MOST + 1], kept[BUDGET_LEVELS_MOST + 1]; /* columns, by level */
     lam_status status;                                                  /* the first failure of a task */
@@ -84,12 +85,14 @@ done:
     return status;
 }
 
-static lam_status leaf(hf_run *run, size_t first, size_t last, const truncation *keep, tall_factors *out,
+static lam_status leaf(hf_run *run, size_t first, size_t last, truncation keep, tall_factors *out,
                        lam_error *error) {
     lam_status status = LAM_OK;
     sparse_block block = {0};
+    if (run->forecast != NULL)
+        keep.guess = (size_t)hf_forecast_rank(run->forecast, (double)(last - first), keep.epsilon);
     TRY(scaled_block(run->S, first, last, &block, error));
-    TRY(tsvd_sparse(&block, keep, out, error));
+    TRY(tsvd_sparse(&block, &keep, out, error));
 #pragma omp critical(hf_progress)
     {
         run->columns_done += last - first;
@@ -148,7 +151,7 @@ static lam_status node(hf_run *run, size_t first, size_t last, int level, tall_f
     size_t given = last - first;
     if (progress_cancelled(run->options->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
     if (level >= run->levels || last - first < 2) {
-        TRY(leaf(run, first, last, &keep, out, error));
+        TRY(leaf(run, first, last, keep, out, error));
     } else {
         TRY(children(run, first, last, level, &one, &two, error));
         given = one.rank + two.rank;
@@ -213,6 +216,7 @@ static lam_status hf_factorize(const scaled_matrix *S, const factorizer_options 
         TRY(hf_forecast_create(S, &forecast, error));
         plan = hf_forecast_plan(forecast, S->n, options);
     }
+    run.forecast = forecast;
     run.levels = plan.levels < BUDGET_LEVELS_MOST ? plan.levels : BUDGET_LEVELS_MOST;
     budget shared = options->budget;
     shared.ratio = plan.ratio;

@@ -16,7 +16,7 @@ enum { LEAF_LEAST = 64, LEAF_MOST = 8192 };
 static const double blas_rate = 9e10, scatter_rate = 1e9, axpy_rate = 8e9, eigen_rate = 1e10;
 
 /* A row with more entries than this share of the columns is spread out (tsvd.c). */
-static const double spread_above = 1. / 8;
+static const double spread_above = 1. / 5;
 
 struct hf_forecast {
     size_t sizes[SIZES];                  /* columns, falling by halves; 0: none */

@@ -15,7 +15,7 @@ static const double single_share = 2e-3;
 
 /* A row of a sparse block with more than this share of its entries goes to BLAS, which makes that many more
  * products in the same time. */
-static const double spread_above = 1. / 8;
+static const double spread_above = 1. / 5;
 
 /* Rows spread out at a time; columns from which on few eigenvectors are looked for before all. */
 enum { PANEL = 1024, LEADING_LEAST = 768 };
@@ -162,7 +162,7 @@ static lam_status factorize(const tall_block *A, const truncation *keep, tall_fa
         TRY(gram_of(A, &g, error));
         /* |A| is at most 1 here and hardly ever more. */
         if (A->m >= LEADING_LEAST && keep->epsilon >= single_share)
-            TRY(gram_leading(&g, keep->epsilon * keep->epsilon, &f.V, &f.rank, error));
+            TRY(gram_leading(&g, keep->epsilon * keep->epsilon, keep->guess, &f.V, &f.rank, error));
     }
     if (f.V == NULL) TRY(decompose(A, keep, &g, &f.V, &f.rank, error));
     gram_free(&g);

@@ -25,6 +25,7 @@ typedef struct truncation {
     double epsilon;
     size_t rank;
     size_t round; /* 0 or 1: none */
+    size_t guess; /* about how many columns will be kept; 0: not known */
 } truncation;
 
 /* Factorizes A, [n][m]. The Gram matrix squares the condition: it is formed in double unless epsilon is above

@@ -441,7 +441,7 @@ START_TEST(leading_eigenvectors) {
         float *V = NULL;
         size_t rank = 0, above = 0;
         for (size_t k = 0; k < M; k++) above += values[k] >= floor;
-        ck_assert_int_eq(gram_leading(&g, floor, &V, &rank, &error), LAM_OK);
+        ck_assert_int_eq(gram_leading(&g, floor, 0, &V, &rank, &error), LAM_OK);
         if (V == NULL) {
             ck_assert_uint_gt(above, M / 10);
             continue;
