@@ -1,5 +1,6 @@
 /* The leading eigenvectors of a Gram matrix where they are few, by subspace iteration. */
 #include "solver/build/gram.h"
+#include "solver/build/norm.h"
 #include "solver/build/sketch.h"
 #include "solver/matrix/dense.h"
 #include "store/status.h"
@@ -13,7 +14,7 @@
 
 /* The first guess is so many eigenvectors; with more than GIVE_UP of all the whole decomposition is cheaper.
  */
-enum { FIRST_GUESS = 16, GIVE_UP = 3, ITERATIONS = 3, LANCZOS = 24 };
+enum { FIRST_GUESS = 16, GIVE_UP = 3, ITERATIONS = 3 };
 
 /* Ritz values come from below; this much under the floor they count. */
 static const double slack = .9;
@@ -59,52 +60,51 @@ done:
     return status;
 }
 
-/* x -= V (V^T x) for V [m][w] of which the first r columns count. */
-static void deflate(size_t m, size_t w, size_t r, const float *V, float *x, float *t) {
+/* G between projections that take the first r columns of V [m][w] away. */
+typedef struct deflated {
+    size_t m, w, r;
+    const float *G, *V;
+    float *x, *y; /* [m] */
+    float *t;     /* [r] */
+} deflated;
+
+/* x -= V (V^T x) */
+static void deflate(const deflated *d, float *x) {
+    const int m = (int)d->m, w = (int)d->w, r = (int)d->r;
     if (r == 0) return;
-    cblas_sgemv(CblasRowMajor, CblasTrans, (int)m, (int)r, 1, V, (int)w, x, 1, 0, t, 1);
-    cblas_sgemv(CblasRowMajor, CblasNoTrans, (int)m, (int)r, -1, V, (int)w, t, 1, 1, x, 1);
+    cblas_sgemv(CblasRowMajor, CblasTrans, m, r, 1, d->V, w, x, 1, 0, d->t, 1);
+    cblas_sgemv(CblasRowMajor, CblasNoTrans, m, r, -1, d->V, w, d->t, 1, 1, x, 1);
 }
 
-/* The largest x^T G x over |x| = 1 orthogonal to the first r columns of V, by Lanczos steps. */
+/* w = (I - V V^T) G (I - V V^T) q */
+static lam_status deflated_multiply(void *context, const double *q, double *w, lam_error *error) {
+    (void)error;
+    const deflated *d = context;
+    const int m = (int)d->m;
+    for (size_t i = 0; i < d->m; i++) d->x[i] = (float)q[i];
+    deflate(d, d->x);
+    cblas_sgemv(CblasRowMajor, CblasNoTrans, m, m, 1, d->G, m, d->x, 1, 0, d->y, 1);
+    deflate(d, d->y);
+    for (size_t i = 0; i < d->m; i++) w[i] = (double)d->y[i];
+    return LAM_OK;
+}
+
+/* The largest x^T G x over |x| = 1 orthogonal to the first r columns of V. */
 static lam_status largest_beside(size_t m, const float *G, size_t w, size_t r, const float *V,
                                  double *largest, lam_error *error) {
     lam_status status = LAM_OK;
-    double d[LANCZOS] = {0}, e[LANCZOS] = {0};
-    int steps = 0;
-    float *t = NULL, *y = NULL, *basis = memory_allocate(LANCZOS * m, sizeof *basis, "norm", error);
-    t = memory_allocate(w, sizeof *t, "norm", error);
-    y = memory_allocate(m, sizeof *y, "norm", error);
-    if (basis == NULL || t == NULL || y == NULL) TRY(LAM_ERR_MEMORY);
-    sketch_gaussian(7, m, 1, y);
-    deflate(m, w, r, V, y, t);
-    float size = cblas_snrm2((int)m, y, 1);
-    while (steps < LANCZOS && size > 1e-12f) {
-        float *q = basis + (size_t)steps * m;
-        for (size_t i = 0; i < m; i++) q[i] = y[i] / size;
-        cblas_sgemv(CblasRowMajor, CblasNoTrans, (int)m, (int)m, 1, G, (int)m, q, 1, 0, y, 1);
-        deflate(m, w, r, V, y, t);
-        d[steps] = (double)cblas_sdot((int)m, q, 1, y, 1);
-        steps++;
-        for (int twice = 0; twice < 2; twice++)
-            for (int b = 0; b < steps; b++) {
-                const float *v = basis + (size_t)b * m;
-                cblas_saxpy((int)m, -cblas_sdot((int)m, v, 1, y, 1), v, 1, y, 1);
-            }
-        size = cblas_snrm2((int)m, y, 1);
-        e[steps - 1] = (double)size;
-        if ((double)size <= 1e-7 * fabs(d[0])) break;
-    }
-    *largest = 0;
-    if (steps > 0) {
-        const lapack_int info = LAPACKE_dsterf(steps, d, e);
-        if (info != 0) FAIL(error, LAM_ERR_NUMERIC, "norm: LAPACK dsterf returned %d", (int)info);
-        *largest = d[steps - 1];
-    }
+    double norm;
+    deflated d = {.m = m, .w = w, .r = r, .G = G, .V = V};
+    d.x = memory_allocate(m, sizeof *d.x, "norm", error);
+    d.y = memory_allocate(m, sizeof *d.y, "norm", error);
+    d.t = memory_allocate(r, sizeof *d.t, "norm", error);
+    if (d.x == NULL || d.y == NULL || d.t == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(norm_of_product(m, deflated_multiply, &d, NULL, &norm, error));
+    *largest = norm * norm; /* G is A^T A: its largest value is |A|^2 */
 done:
-    free(basis);
-    free(t);
-    free(y);
+    free(d.x);
+    free(d.y);
+    free(d.t);
     return status;
 }
 

@@ -85,14 +85,26 @@ done:
     return status;
 }
 
-static lam_status leaf(hf_run *run, size_t first, size_t last, truncation keep, tall_factors *out,
+/* A node of a level from its halves, which it takes over. */
+static lam_status parent(hf_run *run, int level, tall_factors *one, tall_factors *two, tall_factors *out,
+                         lam_error *error) {
+    const truncation keep = truncation_of(run, level);
+    const size_t given = one->rank + two->rank;
+    const lam_status status = combine(one, two, &keep, out, error);
+    if (status == LAM_OK) count(run, level, given, out->rank);
+    return status;
+}
+
+static lam_status leaf(hf_run *run, int level, size_t first, size_t last, tall_factors *out,
                        lam_error *error) {
     lam_status status = LAM_OK;
     sparse_block block = {0};
+    truncation keep = truncation_of(run, level);
     if (run->forecast != NULL)
         keep.guess = (size_t)hf_forecast_rank(run->forecast, (double)(last - first), keep.epsilon);
     TRY(scaled_block(run->S, first, last, &block, error));
     TRY(tsvd_sparse(&block, &keep, out, error));
+    count(run, level, last - first, out->rank);
 #pragma omp critical(hf_progress)
     {
         run->columns_done += last - first;
@@ -112,6 +124,17 @@ static void fail(hf_run *run, lam_status status, const lam_error *error) {
         run->status = status;
         run->error = *error;
     }
+}
+
+/* The first failure of any task so far. */
+static lam_status failure(hf_run *run, lam_error *error) {
+    lam_status status;
+#pragma omp critical(hf_failure)
+    {
+        status = run->status;
+        if (status != LAM_OK && error != NULL) *error = run->error;
+    }
+    return status;
 }
 
 /* Both halves, as two tasks where there is a team and memory for both at once, else one after the other. */
@@ -136,8 +159,7 @@ static lam_status children(hf_run *run, size_t first, size_t last, int level, ta
         if (mine != LAM_OK) fail(run, mine, &why);
     }
 #pragma omp taskwait
-    status = run->status;
-    if (status != LAM_OK && error != NULL) *error = run->error;
+    status = failure(run, error);
 done:
     return status;
 }
@@ -147,17 +169,13 @@ static lam_status node(hf_run *run, size_t first, size_t last, int level, tall_f
                        lam_error *error) {
     lam_status status = LAM_OK;
     tall_factors one = {0}, two = {0};
-    truncation keep = truncation_of(run, level);
-    size_t given = last - first;
     if (progress_cancelled(run->options->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
     if (level >= run->levels || last - first < 2) {
-        TRY(leaf(run, first, last, keep, out, error));
+        TRY(leaf(run, level, first, last, out, error));
     } else {
         TRY(children(run, first, last, level, &one, &two, error));
-        given = one.rank + two.rank;
-        TRY(combine(&one, &two, &keep, out, error));
+        TRY(parent(run, level, &one, &two, out, error));
     }
-    count(run, level, given, out->rank);
 done:
     tall_factors_free(&one);
     tall_factors_free(&two);
@@ -182,12 +200,9 @@ static lam_status tree(hf_run *run, size_t first, size_t last, int level, int al
     tall_factors one = {0}, two = {0};
     if (level >= alone) return team(run, first, last, level, out, error);
     const size_t middle = first + (last - first) / 2;
-    const truncation keep = truncation_of(run, level);
     TRY(tree(run, first, middle, level + 1, alone, &one, error));
     TRY(tree(run, middle, last, level + 1, alone, &two, error));
-    const size_t given = one.rank + two.rank;
-    TRY(combine(&one, &two, &keep, out, error));
-    count(run, level, given, out->rank);
+    TRY(parent(run, level, &one, &two, out, error));
 done:
     tall_factors_free(&one);
     tall_factors_free(&two);

@@ -9,7 +9,7 @@
 
 enum { VECTORS = 8, ITERATIONS = 3 };
 
-/* x -= U (V^T x) of w vectors. */
+/* y -= U (V^T x) of w vectors. */
 static lam_status take_away(size_t n, size_t m, size_t w, const float *U, const float *V, const float *x,
                             float *y, lam_error *error) {
     lam_status status = LAM_OK;

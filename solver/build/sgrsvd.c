@@ -5,29 +5,15 @@
 #include "solver/matrix/dense.h"
 #include "store/status.h"
 
+#include <cblas.h>
 #include <lapacke.h>
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Entries of a column of a sparse Gaussian matrix, and how many more rows than l_2 the sketches have. */
-enum { ENTRIES = 8, WIDER = 2 };
-
-/* Entry e of column i of a sparse Gaussian matrix with k rows: where and how much. */
-typedef struct sparse_entry {
-    size_t row;
-    float value;
-} sparse_entry;
-
-static sparse_entry entry_of(uint64_t seed, size_t k, size_t i, size_t e) {
-    float pair[2];
-    sketch_gaussian(seed + 2 * (i * ENTRIES + e) + 1, 2, 1, pair);
-    /* Where: the second number, which the first does not know, as the phase of a Gaussian's distribution. */
-    const double share = .5 * erfc(-(double)pair[1] / sqrt(2));
-    const size_t row = (size_t)(share * (double)k);
-    return (sparse_entry){row < k ? row : k - 1, pair[0]};
-}
+/* How many times l_2 rows the sketches have. */
+enum { WIDER = 2 };
 
 /* X = Omega_1^* Omega_1'^*, [n][l2]: row i is a sum of a few rows of Omega_1'^*, [k1][l2]. */
 static lam_status first_sketch(uint64_t seed, size_t n, size_t k1, size_t l2, size_t stride, float *X,
@@ -39,9 +25,11 @@ static lam_status first_sketch(uint64_t seed, size_t n, size_t k1, size_t l2, si
     for (size_t i = 0; i < n; i++) {
         float *x = X + i * stride;
         memset(x, 0, l2 * sizeof *x);
-        for (size_t e = 0; e < ENTRIES; e++) {
-            const sparse_entry s = entry_of(~seed, k1, i, e);
-            for (size_t c = 0; c < l2; c++) x[c] += s.value * gaussian[s.row * l2 + c];
+        sketch_entry column[SKETCH_ENTRIES];
+        sketch_sparse_column(~seed, k1, i, column);
+        for (size_t e = 0; e < SKETCH_ENTRIES; e++) {
+            const float *row = gaussian + column[e].row * l2;
+            for (size_t c = 0; c < l2; c++) x[c] += column[e].value * row[c];
         }
     }
     free(gaussian);
@@ -54,10 +42,9 @@ static void second_sketch(uint64_t seed, size_t n, size_t k2, size_t stride, flo
     for (size_t i = 0; i < n; i++) {
         float *x = X + i * stride;
         memset(x, 0, k2 * sizeof *x);
-        for (size_t e = 0; e < ENTRIES; e++) {
-            const sparse_entry s = entry_of(seed ^ 0x5bd1e995u, k2, i, e);
-            x[s.row] += s.value;
-        }
+        sketch_entry column[SKETCH_ENTRIES];
+        sketch_sparse_column(seed ^ 0x5bd1e995u, k2, i, column);
+        for (size_t e = 0; e < SKETCH_ENTRIES; e++) x[column[e].row] += column[e].value;
     }
 }
 
@@ -75,19 +62,15 @@ static lam_status pseudo_inverse(size_t k2, size_t m, const double *C, float *W,
     if (info == 0)
         info = LAPACKE_dorgqr(LAPACK_ROW_MAJOR, (lapack_int)k2, (lapack_int)m, (lapack_int)m, Q,
                               (lapack_int)m, tau);
-    /* C = Q R, W = Q R^-*: its rows solve R w = q. */
-    for (size_t r = 0; info == 0 && r < k2; r++) {
-        double *q = Q + r * m;
-        for (size_t i = m; i-- > 0;) {
-            for (size_t j = i + 1; j < m; j++) q[i] -= R[i * m + j] * q[j];
-            if (!(fabs(R[i * m + i]) > 1e-9 * fabs(R[0])))
-                FAIL(error, LAM_ERR_NUMERIC,
-                     "sgrsvd: a sketch of %zu rows does not see all of %zu directions", k2, m);
-            q[i] /= R[i * m + i];
-        }
-        for (size_t i = 0; i < m; i++) W[r * m + i] = (float)q[i];
-    }
     if (info != 0) FAIL(error, LAM_ERR_NUMERIC, "sgrsvd: LAPACK returned %d", (int)info);
+    for (size_t i = 0; i < m; i++)
+        if (!(fabs(R[i * m + i]) > 1e-9 * fabs(R[0])))
+            FAIL(error, LAM_ERR_NUMERIC, "sgrsvd: a sketch of %zu rows does not see all of %zu directions",
+                 k2, m);
+    /* C = Q R, W = Q R^-* */
+    cblas_dtrsm(CblasRowMajor, CblasRight, CblasUpper, CblasTrans, CblasNonUnit, (int)k2, (int)m, 1, R,
+                (int)m, Q, (int)m);
+    for (size_t k = 0; k < k2 * m; k++) W[k] = (float)Q[k];
 done:
     free(Q);
     free(R);

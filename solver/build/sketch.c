@@ -17,17 +17,35 @@ static uint64_t mix(uint64_t x) {
     return x ^ (x >> 31);
 }
 
+/* Two numbers uniform over [0, 1), the first never 0. */
+static void uniform_pair(uint64_t key, double *one, double *two) {
+    const uint64_t bits = mix(key), more = mix(bits);
+    *one = ((double)(bits >> 11) + .5) * 0x1p-53;
+    *two = (double)(more >> 11) * 0x1p-53;
+}
+
 void sketch_gaussian(uint64_t seed, size_t n, size_t m, float *X) {
     const uint64_t key = mix(seed);
     const size_t pairs = (n * m + 1) / 2;
 #pragma omp parallel for schedule(static)
     for (size_t k = 0; k < pairs; k++) { /* Box and Muller 1958 */
-        const uint64_t bits = mix(key + k), more = mix(bits);
-        const double u = ((double)(bits >> 11) + .5) * 0x1p-53,
-                     angle = (double)(more >> 11) * 0x1p-53 * 2 * M_PI;
-        const double radius = sqrt(-2 * log(u));
+        double u, turn;
+        uniform_pair(key + k, &u, &turn);
+        const double radius = sqrt(-2 * log(u)), angle = 2 * M_PI * turn;
         X[2 * k] = (float)(radius * cos(angle));
         if (2 * k + 1 < n * m) X[2 * k + 1] = (float)(radius * sin(angle));
+    }
+}
+
+void sketch_sparse_column(uint64_t seed, size_t k, size_t i, sketch_entry column[SKETCH_ENTRIES]) {
+    const uint64_t key = mix(seed);
+    for (size_t e = 0; e < SKETCH_ENTRIES; e++) {
+        double u, turn, place, unused;
+        uniform_pair(key + 2 * (i * SKETCH_ENTRIES + e), &u, &turn);
+        uniform_pair(key + 2 * (i * SKETCH_ENTRIES + e) + 1, &place, &unused);
+        const size_t row = (size_t)(place * (double)k);
+        column[e] = (sketch_entry){.row = row < k ? row : k - 1,
+                                   .value = (float)(sqrt(-2 * log(u)) * cos(2 * M_PI * turn))};
     }
 }
 

@@ -7,6 +7,17 @@
 /* X [n][m] with independent standard Gaussian entries, the same for a seed whatever the threads. */
 void sketch_gaussian(uint64_t seed, size_t n, size_t m, float *X);
 
+/* A column of a sparse Gaussian matrix: so many entries, which may share a row. */
+enum { SKETCH_ENTRIES = 8 };
+
+typedef struct sketch_entry {
+    size_t row;
+    float value;
+} sketch_entry;
+
+/* Column i of the sparse Gaussian matrix of k rows that a seed stands for. */
+void sketch_sparse_column(uint64_t seed, size_t k, size_t i, sketch_entry column[SKETCH_ENTRIES]);
+
 /* Replaces the columns of Y, [n][m], by an orthonormal basis of their span, to the rounding of single
  * precision; *rank, at most m, is how many it takes: directions below 1e-6 of the largest are left out, and Y
  * becomes [n][*rank]. By Cholesky or, where that fails, eigenvectors of the Gram matrix in double, twice.
