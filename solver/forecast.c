@@ -55,13 +55,26 @@ static double found_bytes(double n, const recipe *r) {
 
 /* The peak while one sample is found: packed rows and the triangle they are merged into, or that and the rows
  * in its place; of pairs one triangle with what is known of each, and again as such. */
-static double trace_bytes(double n, const recipe *r, bool to_disk) {
+static double trace_bytes(double n, const recipe *r, bool to_disk, bool large) {
     const double sample = recipe_bytes(n, r);
     if (r->method == RECIPE_PAIRS) return fmax(sample, 9 * n * n);
     /* Near pairs are as many as rays at most, and stand in a triangle of their own. */
-    const double near = r->method == RECIPE_NEAR_PAIRS ? sample : 0;
+    const double near = r->method == RECIPE_NEAR_PAIRS ? sample : 0, some = fmin(merge_bytes, sample);
+    if (large) return near + some;
     const double merging = (to_disk ? 0 : found_bytes(n, r)) + near + sample / (near > 0 ? 1 : 2);
-    return fmax(sample, merging) + fmin(merge_bytes, sample);
+    return fmax(sample, merging) + some;
+}
+
+/* Of the rows of a sample, what lies in memory; those of pairs always do. */
+static double held_bytes(const forecast *f, double bytes, const recipe *r) {
+    return f->large && r->method != RECIPE_PAIRS ? 0 : bytes;
+}
+
+/* Bytes of the judge's two samples and their mean. */
+static double reference_bytes(const forecast *f) {
+    const double n = (double)f->n, one = recipe_bytes(n, &f->judge_recipe);
+    const bool dense = f->judge_recipe.method == RECIPE_PAIRS;
+    return 2 * one + (dense ? one : sample_bytes(n, 2 * (double)f->judge_recipe.rays));
 }
 
 /* About as many columns as a factorization will have. */
@@ -79,8 +92,8 @@ static double operator_bytes(const forecast *f) {
 double forecast_bytes(const forecast *f) {
     const double n = (double)f->n, n_channels = (double)f->n_channels;
     const double of_mesh = 400 * n + tile_bytes(n) * (double)f->sky_tiles;
-    const double sample = recipe_bytes(n, &f->recipe);
-    const double trace = f->from_store ? 0 : trace_bytes(n, &f->recipe, f->scratch);
+    const double sample = held_bytes(f, recipe_bytes(n, &f->recipe), &f->recipe);
+    const double trace = f->from_store ? 0 : trace_bytes(n, &f->recipe, f->scratch, f->large);
     /* The inverse in double and the operator; else leaf blocks and both factors of two nodes. */
     const double build =
         f->exact ? n * n * (8 + 4 * n_channels) : 4 * n * (2 * fmin(1024, n) + 6 * likely_rank(f));
@@ -88,12 +101,10 @@ double forecast_bytes(const forecast *f) {
     if (f->probes > 0) {
         /* Two more samples and their mean; emissions, answers and the vectors of the iteration per probe. */
         const double probes = (double)f->probes + 9;
-        const double reference = recipe_bytes(n, &f->judge_recipe);
-        const bool dense = f->judge_recipe.method == RECIPE_PAIRS;
-        const double references =
-            2 * reference + (dense ? reference : sample_bytes(n, 2 * (double)f->judge_recipe.rays));
+        const recipe *r = &f->judge_recipe;
+        const double references = held_bytes(f, reference_bytes(f), r);
         const double judge = probes * n * (12 * n_channels + 72) + (n <= 8192 ? 8 * n * n : 0);
-        const double second = reference + trace_bytes(n, &f->judge_recipe, f->scratch);
+        const double second = held_bytes(f, recipe_bytes(n, r), r) + trace_bytes(n, r, f->scratch, f->large);
         peak = fmax(peak, sample + operator_bytes(f) + fmax(references + judge, second));
     }
     return of_mesh + peak;
@@ -132,8 +143,10 @@ double forecast_store_bytes(const forecast *f) {
 double forecast_scratch_bytes(const forecast *f) {
     const double n = (double)f->n;
     if (!f->scratch) return 0;
-    return (f->from_store ? 0 : found_bytes(n, &f->recipe) + 4 * n * (double)f->sky_tiles) +
-           (f->probes > 0 ? 2 * found_bytes(n, &f->judge_recipe) : 0);
+    const double found = (f->from_store ? 0 : found_bytes(n, &f->recipe) + 4 * n * (double)f->sky_tiles) +
+                         (f->probes > 0 ? 2 * found_bytes(n, &f->judge_recipe) : 0);
+    if (!f->large) return found;
+    return found + recipe_bytes(n, &f->recipe) + (f->probes > 0 ? reference_bytes(f) : 0);
 }
 
 lam_status forecast_check_disk(const forecast *f, const char *output, const scratch *rows,
@@ -241,12 +254,10 @@ lam_status forecast_check(const forecast *f, double limit, lam_error *error) {
              f->n, sky, needs, allows, advice);
     }
     cheaper = *f;
-    cheaper.scratch = true;
-    if (forecast_bytes(&cheaper) <= limit)
-        FAIL(error, LAM_ERR_MEMORY,
-             "%zu elements need about %s of memory, --memory allows %s; fits: --scratch DIR", f->n, needs,
-             allows);
+    cheaper.scratch = cheaper.large = true;
+    const char *disk = forecast_bytes(&cheaper) <= limit ? "--scratch DIR, or " : "";
     cheaper.scratch = f->scratch;
+    cheaper.large = f->large;
     cheaper.exact = false;
     while (forecast_bytes(&cheaper) > limit && sample_less(&cheaper.recipe)) {
         less = true;
@@ -264,8 +275,8 @@ lam_status forecast_check(const forecast *f, double limit, lam_error *error) {
         snprintf(advice, sizeof advice, "%s", method);
     }
     FAIL(error, LAM_ERR_MEMORY,
-         "%zu elements with %s%s need about %s of memory, --memory allows %s; fits: %s", f->n, asked, sky,
-         needs, allows, advice);
+         "%zu elements with %s%s need about %s of memory, --memory allows %s; fits: %s%s", f->n, asked, sky,
+         needs, allows, disk, advice);
 done:
     return status;
 }

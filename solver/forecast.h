@@ -15,6 +15,7 @@ typedef struct forecast {
     size_t probes;               /* 0: no independent samples */
     bool from_store;             /* form factors are there already */
     bool scratch;                /* rows go to a scratch folder as they are found */
+    bool large;                  /* and whole samples lie there, as memory is too small for them */
     bool keep;                   /* the store keeps the form factors */
     bool exact;                  /* the whole inverse is built */
     size_t rank;                 /* 0: not known yet */

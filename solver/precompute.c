@@ -27,6 +27,7 @@ typedef struct work {
     uint32_t *order;
     form_factors f;
     recipe recipe; /* of f */
+    bool large;    /* its rows and the judge's lie in the scratch folder */
     size_t sky_tiles;
     size_t probes;
     lam_operator *op;
@@ -35,10 +36,10 @@ typedef struct work {
 } work;
 
 static void work_free(work *w) {
-    scratch_close(w->scratch, false);
     mesh_free(&w->m);
     free(w->order);
     form_factors_free(&w->f);
+    scratch_close(w->scratch, false);
     lam_operator_close(w->op);
 }
 
@@ -76,24 +77,6 @@ static lam_status load_scene(work *w, lam_error *error) {
     if (report.clamped > 0)
         terminal_log(w->t, "%zu materials reflected all light or more: set below 1", report.clamped);
 done:
-    return status;
-}
-
-static lam_status load_store(work *w, lam_error *error) {
-    lam_status status = LAM_OK;
-    store *s = NULL;
-    double *row_sums = NULL;
-    TRY(store_open(w->options->input, &s, error));
-    TRY(mesh_load(s, &w->m, &row_sums, error));
-    TRY(form_factors_load(s, &w->m, &w->f, error));
-    TRY(form_factors_expand(&w->f, w->m.area, error));
-    if (store_has(s, "/sky")) TRY(sky_bounce_load(s, w->m.n, &w->f.sky, error));
-    if (w->options->reflectance >= 0)
-        for (size_t i = 0; i < w->m.n * w->m.n_channels; i++)
-            w->m.reflectance[i] = (float)w->options->reflectance;
-done:
-    free(row_sums);
-    store_close(s);
     return status;
 }
 
@@ -138,6 +121,7 @@ static forecast forecast_of(const work *w, double n) {
                       .probes = o->probes == PRECOMPUTE_AUTO ? PROBES_OF_LARGE : o->probes,
                       .from_store = o->from_store,
                       .scratch = o->scratch != NULL,
+                      .large = w->large,
                       .keep = o->keep_form_factors,
                       .exact = strcmp(o->method, "exact") == 0,
                       .rank = likely_rank(o, n),
@@ -158,13 +142,61 @@ static lam_status check_memory(work *w, double n, lam_error *error) {
         return status_fail(error, LAM_ERR_MEMORY, "%s: %.3g elements, must be below 4e9; refine less",
                            o->input, n);
     forecast f;
-    /* All pairs where they are affordable. */
-    for (int all_pairs = n <= CHOICE_PAIRS_MOST; all_pairs >= 0; all_pairs--) {
+    /* All pairs where they are affordable, and the disk in place of memory only where there is no other way.
+     */
+    const int disk_too = o->scratch != NULL, pairs_too = n <= CHOICE_PAIRS_MOST;
+    for (int way = 0; way <= 2 * disk_too + 1; way++) {
+        const bool all_pairs = way % 2 == 0;
+        if (all_pairs && !pairs_too) continue;
+        w->large = way >= 2;
         w->recipe = o->from_store ? w->f.recipe : choice_recipe(&o->form_factors, all_pairs);
         f = forecast_of(w, n);
         if (forecast_bytes(&f) <= w->memory) break;
     }
     return forecast_check(&f, w->memory, error);
+}
+
+/* Rows go to the scratch folder as they are found, and whole samples where memory is too small for them. */
+static lam_status open_scratch(work *w, lam_error *error) {
+    if (w->scratch != NULL) return LAM_OK;
+    w->t->nothing = w->options->continues;
+    return scratch_open(w->options->scratch, &w->scratch, error);
+}
+
+/* A store has its rows: it needs the folder for the judge's only, or where memory is too small. */
+static lam_status take_scratch(work *w, lam_error *error) {
+    const precompute_options *o = w->options;
+    if (o->scratch == NULL) return LAM_OK;
+    if (w->probes > 0 || !o->from_store || w->large) return open_scratch(w, error);
+    terminal_log(w->t, "a store with form factors does not use --scratch");
+    return LAM_OK;
+}
+
+static const large_place *large_place_of(const work *w) {
+    return w->large ? scratch_place(w->scratch) : NULL;
+}
+
+static lam_status load_store(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    store *s = NULL;
+    double *row_sums = NULL;
+    TRY(store_open(w->options->input, &s, error));
+    TRY(mesh_load(s, &w->m, &row_sums, error));
+    if (store_has(s, "/form_factors")) {
+        TRY(recipe_load(s, &recipe_of_form_factors, &w->f.recipe, error));
+        TRY(check_memory(w, (double)w->m.n, error));
+    }
+    if (w->large) TRY(open_scratch(w, error));
+    TRY(form_factors_load(s, &w->m, large_place_of(w), &w->f, error));
+    TRY(form_factors_expand(&w->f, w->m.area, error));
+    if (store_has(s, "/sky")) TRY(sky_bounce_load(s, w->m.n, &w->f.sky, error));
+    if (w->options->reflectance >= 0)
+        for (size_t i = 0; i < w->m.n * w->m.n_channels; i++)
+            w->m.reflectance[i] = (float)w->options->reflectance;
+done:
+    free(row_sums);
+    store_close(s);
+    return status;
 }
 
 static lam_status prepare_mesh(work *w, lam_error *error) {
@@ -227,21 +259,6 @@ static void log_form_factors(work *w) {
                       100 * f->absorbed_share);
 }
 
-/* Rows go to the scratch folder as they are found; a store that has them needs none but for the judge. */
-static lam_status take_scratch(work *w, lam_error *error) {
-    lam_status status = LAM_OK;
-    const precompute_options *o = w->options;
-    if (o->scratch == NULL) return LAM_OK;
-    if (w->probes == 0 && o->from_store) {
-        terminal_log(w->t, "a store with form factors does not use --scratch");
-        return LAM_OK;
-    }
-    TRY(scratch_open(o->scratch, &w->scratch, error));
-    w->t->nothing = o->continues;
-done:
-    return status;
-}
-
 /* One line of what is to come, and whether the disks can hold it. */
 static lam_status announce(work *w, lam_error *error) {
     lam_status status = LAM_OK;
@@ -266,6 +283,7 @@ static lam_status announce(work *w, lam_error *error) {
     if (w->scratch != NULL) snprintf(kept, sizeof kept, ", scratch up to %s", scratch_room);
     terminal_log(w->t, "forecast:%s%s at %.3g Mray/s of a trial; memory up to %s, store up to %s%s", made,
                  judged, rate * 1e-6, memory, stored, kept);
+    if (w->large) terminal_log(w->t, "rows are kept in %s, as memory is too small for them", o->scratch);
 done:
     return status;
 }
@@ -282,6 +300,7 @@ static lam_status trace(work *w, lam_error *error) {
                                      .stage = "form factors",
                                      .scratch = w->scratch,
                                      .scratch_name = "form-factors.rows",
+                                     .large = large_place_of(w),
                                      .sky = w->options->sky,
                                      .ground_albedo = w->options->ground_albedo};
     TRY(form_factors_make(&w->m, w->order, &how, &w->f, error));
@@ -311,7 +330,7 @@ static lam_status build(work *w, lam_error *error) {
     budget_rule rule = BUDGET_SQUARES;
     if (!budget_rule_find(o->budget, &rule))
         FAIL(error, LAM_ERR_ARGUMENT, "--budget %.40s: unknown; use squares, sums or frobenius", o->budget);
-    const double held = (double)w->f.F.indptr[w->m.n] * 8 + 400 * (double)w->m.n;
+    const double held = (w->large ? 0 : (double)w->f.F.indptr[w->m.n] * 8) + 400 * (double)w->m.n;
     const build_options how = {.method = o->method,
                                .factorizer = o->factorizer,
                                .epsilon = o->epsilon,
@@ -379,7 +398,8 @@ static lam_status judge(work *w, lam_error *error) {
                                          .progress = &w->progress,
                                          .stage = stages[h],
                                          .scratch = w->scratch,
-                                         .scratch_name = files[h]};
+                                         .scratch_name = files[h],
+                                         .large = large_place_of(w)};
         TRY(form_factors_make(&w->m, w->order, &how, &half[h], error));
         log_kept(w, &half[h]);
     }

@@ -246,7 +246,8 @@ static const option_row rows[] = {
      .kind = OPTION_TEXT,
      .offset = FIELD(scratch),
      .value = "DIR",
-     .doc = "Keep rows of form factors there as they are found; the same command after a stop goes on there"},
+     .doc = "Keep rows of form factors there as they are found; the same command after a stop goes on there; "
+            "rows that memory is too small for lie there too"},
     {.name = "seed", .kind = OPTION_COUNT, .offset = FIELD(seed), .value = "S", .doc = "Of the sampling (1)"},
     {.name = "probes",
      .kind = OPTION_COUNT,

@@ -116,7 +116,7 @@ lam_status verify_form_factors(examination *e, check *c, lam_error *error) {
         check_say(c, VERDICT_SKIPPED, e->has_mesh ? "none are kept" : "no mesh to compare with");
         return LAM_OK;
     }
-    lam_status loaded = form_factors_load(e->s, &e->m, &e->f, error);
+    lam_status loaded = form_factors_load(e->s, &e->m, NULL, &e->f, error);
     if (loaded == LAM_OK) loaded = form_factors_expand(&e->f, e->m.area, error);
     if (loaded != LAM_OK) return check_failed(c, loaded, error);
     const csr *F = &e->f.F;

@@ -90,6 +90,10 @@ lam_status store_array_info(store *s, const char *name, store_type *type, int *r
 lam_status store_read(store *s, const char *name, store_type type, int rank, size_t *dims, void **data,
                       lam_error *error);
 
+/* The same into memory that the caller has for an array of this type and dims, none of them SIZE_MAX. */
+lam_status store_read_into(store *s, const char *name, store_type type, int rank, const size_t *dims,
+                           void *data, lam_error *error);
+
 /* Reads texts into one block: *texts is an array of *count pointers, freed by the caller with one free(). */
 lam_status store_read_texts(store *s, const char *name, size_t *count, char ***texts, lam_error *error);
 

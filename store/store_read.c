@@ -120,24 +120,33 @@ done:
     return status;
 }
 
+/* Opens an array that must be of this type and shape; SIZE_MAX stands for any. */
+static lam_status open_as(store *s, const char *name, store_type type, int rank, const size_t *dims,
+                          store_array *array, lam_error *error) {
+    lam_status status = LAM_OK;
+    assert(rank >= 1 && rank <= STORE_MAX_RANK);
+    TRY(store_array_open(s, name, array, error));
+    if (array->is_text || array->type != type)
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s is of %s, must be %s", s->path, name,
+             array->is_text ? "texts" : type_text(array->type), type_text(type));
+    if (array->rank != rank)
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s has %d dimensions, must have %d", s->path, name, array->rank,
+             rank);
+    for (int i = 0; i < rank; i++)
+        if (dims[i] != SIZE_MAX && dims[i] != array->dims[i])
+            FAIL(error, LAM_ERR_FORMAT, "%s: dimension %d of %s is %zu, must be %zu", s->path, i, name,
+                 array->dims[i], dims[i]);
+done:
+    return status;
+}
+
 lam_status store_read(store *s, const char *name, store_type type, int rank, size_t *dims, void **data,
                       lam_error *error) {
-    assert(rank >= 1 && rank <= STORE_MAX_RANK);
     lam_status status = LAM_OK;
     store_mute mute = store_mute_begin();
     store_array array = {.id = -1};
     void *values = NULL;
-    TRY(store_array_open(s, name, &array, error));
-    if (array.is_text || array.type != type)
-        FAIL(error, LAM_ERR_FORMAT, "%s: %s is of %s, must be %s", s->path, name,
-             array.is_text ? "texts" : type_text(array.type), type_text(type));
-    if (array.rank != rank)
-        FAIL(error, LAM_ERR_FORMAT, "%s: %s has %d dimensions, must have %d", s->path, name, array.rank,
-             rank);
-    for (int i = 0; i < rank; i++)
-        if (dims[i] != SIZE_MAX && dims[i] != array.dims[i])
-            FAIL(error, LAM_ERR_FORMAT, "%s: dimension %d of %s is %zu, must be %zu", s->path, i, name,
-                 array.dims[i], dims[i]);
+    TRY(open_as(s, name, type, rank, dims, &array, error));
     values = memory_allocate(array.bytes, 1, name, error);
     if (values == NULL) TRY(LAM_ERR_MEMORY);
     TRY(store_array_load(s, name, &array, values, error));
@@ -146,6 +155,19 @@ lam_status store_read(store *s, const char *name, store_type type, int rank, siz
     values = NULL;
 done:
     free(values);
+    store_array_close(&array);
+    store_mute_end(&mute);
+    return status;
+}
+
+lam_status store_read_into(store *s, const char *name, store_type type, int rank, const size_t *dims,
+                           void *data, lam_error *error) {
+    lam_status status = LAM_OK;
+    store_mute mute = store_mute_begin();
+    store_array array = {.id = -1};
+    TRY(open_as(s, name, type, rank, dims, &array, error));
+    TRY(store_array_load(s, name, &array, data, error));
+done:
     store_array_close(&array);
     store_mute_end(&mute);
     return status;

@@ -71,10 +71,10 @@ static lam_status close_upper(form_factors *f, const mesh *m, lam_error *error) 
 
 /* From one-sided rows, which are freed, whose entries are F_ij times rays, to the upper triangle. */
 static lam_status form_factors_finish(form_factors *f, const mesh *m, found_rows *rows, size_t rays,
-                                      lam_error *error) {
+                                      const large_place *place, lam_error *error) {
     lam_status status = LAM_OK;
     f->rows_kept = rows->kept;
-    TRY(upper_merge(rows, rays, m->area, &f->upper, error));
+    TRY(upper_merge(rows, rays, m->area, place, &f->upper, error));
     found_rows_free(rows);
     TRY(close_upper(f, m, error));
 done:
@@ -86,7 +86,7 @@ static lam_status make_of_rays(const mesh *m, const visibility *v, const uint32_
     lam_status status = LAM_OK;
     found_rows counts = {0};
     TRY(rays_count(m, v, order, options, &counts, f->leaving, f->absorbed, error));
-    TRY(form_factors_finish(f, m, &counts, options->recipe.rays, error));
+    TRY(form_factors_finish(f, m, &counts, options->recipe.rays, options->large, error));
 done:
     found_rows_free(&counts);
     return status;
@@ -100,7 +100,7 @@ static lam_status make_of_hemicubes(const mesh *m, const visibility *v, const ui
     TRY(hemicube_create(options->recipe.resolution, &h, error));
     TRY(hemicube_trace(&h, m, v, order, options, &rows, f->leaving, f->absorbed, error));
     /* The weights are form factors already, as if one ray had been cast. */
-    TRY(form_factors_finish(f, m, &rows, 1, error));
+    TRY(form_factors_finish(f, m, &rows, 1, options->large, error));
 done:
     hemicube_free(&h);
     found_rows_free(&rows);
@@ -174,7 +174,7 @@ static lam_status make_of_near_pairs(const mesh *m, const visibility *v, const u
     TRY(find_pairs(m, v, options, recipe_near(&options->recipe), f, &near, error));
     TRY(rays_count(m, v, order, options, &counts, f->leaving, f->absorbed, error));
     if (counts.kept > f->rows_kept) f->rows_kept = counts.kept;
-    TRY(upper_merge(&counts, options->recipe.rays, m->area, &counted, error));
+    TRY(upper_merge(&counts, options->recipe.rays, m->area, options->large, &counted, error));
     found_rows_free(&counts);
     TRY(rows_replace(&counted, &near, &f->upper, error));
     csr_free(&near);

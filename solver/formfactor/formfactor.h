@@ -49,6 +49,7 @@ typedef struct form_factor_options {
     bool upper;               /* leave the upper triangle, without the rows it stands for */
     scratch *scratch;         /* where rows are kept as they are found; NULL: in memory only */
     const char *scratch_name; /* of the file there, one for each sample */
+    const large_place *large; /* where the result lies if it is of rays or a hemicube; NULL: in memory */
     const char *sky;          /* a tiling that what leaves is binned by, at no further ray; NULL: none */
     double ground_albedo;
     sky_bounce *bounce; /* form_factors_make's own: where the rays put what leaves */
@@ -70,6 +71,9 @@ typedef struct form_factor_options {
  * With a sky, what a repaired row leaves outside is shared among its tiles, the ground and back faces as the
  * rays (of pairs: recipe.rays of them) found it: sum_j F_ij + sum_t first_bounce/pi <= 1, and = 1 where
  * nothing meets a back face and the ground's albedo is 1. Cost: 4 m n bytes.
+ *
+ * With a place for large arrays what is merged lies in files there, and takes about 100 MB of memory that
+ * cannot be given back to the system.
  *
  * With a scratch folder a run that is stopped goes on where it was, and the result is the same.
  *
@@ -98,8 +102,9 @@ lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_
                              lam_error *error);
 
 /* /form_factors of a store, rows or the upper triangle, as they are; its /sky apart, by sky_bounce_save and
- * sky_bounce_load. */
+ * sky_bounce_load. large as above. */
 lam_status form_factors_save(const form_factors *f, store *s, lam_error *error);
-lam_status form_factors_load(store *s, const mesh *m, form_factors *out, lam_error *error);
+lam_status form_factors_load(store *s, const mesh *m, const large_place *large, form_factors *out,
+                             lam_error *error);
 
 #endif

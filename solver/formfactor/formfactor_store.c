@@ -106,7 +106,29 @@ done:
     return status;
 }
 
-lam_status form_factors_load(store *s, const mesh *m, form_factors *out, lam_error *error) {
+/* Rows or the triangle, checked as sparse rows. */
+static lam_status load_csr(store *s, csr *held, lam_error *error) {
+    lam_status status = LAM_OK;
+    store_type type;
+    size_t nnz[STORE_MAX_RANK];
+    int rank;
+    void *data;
+    TRY(store_read(s, GROUP "/indptr", STORE_U64, 1, (size_t[]){held->n + 1}, &data, error));
+    held->indptr = data;
+    TRY(store_array_info(s, GROUP "/indices", &type, &rank, nnz, error));
+    if (rank != 1)
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s has %d dimensions, must have 1", store_path(s), GROUP "/indices",
+             rank);
+    TRY(csr_reserve(held, nnz[0], error));
+    TRY(store_read_into(s, GROUP "/indices", STORE_U32, 1, nnz, held->indices, error));
+    TRY(store_read_into(s, GROUP "/data", STORE_F32, 1, nnz, held->data, error));
+    TRY(csr_check(held, nnz[0], GROUP, error));
+done:
+    return status;
+}
+
+lam_status form_factors_load(store *s, const mesh *m, const large_place *large, form_factors *out,
+                             lam_error *error) {
     lam_status status = LAM_OK;
     form_factors f = {0};
     const size_t n = m->n;
@@ -123,17 +145,10 @@ lam_status form_factors_load(store *s, const mesh *m, form_factors *out, lam_err
     bool rows;
     TRY(load_attributes(s, &f, &rows, error));
 
-    size_t nnz = SIZE_MAX;
     void *data;
     csr *const held = rows ? &f.F : &f.upper;
-    held->n = n;
-    TRY(store_read(s, GROUP "/indptr", STORE_U64, 1, (size_t[]){n + 1}, &data, error));
-    held->indptr = data;
-    TRY(store_read(s, GROUP "/indices", STORE_U32, 1, &nnz, &data, error));
-    held->indices = data;
-    TRY(store_read(s, GROUP "/data", STORE_F32, 1, &nnz, &data, error));
-    held->data = data;
-    TRY(csr_check(held, nnz, GROUP, error));
+    *held = (csr){.n = n, .place = large};
+    TRY(load_csr(s, held, error));
     TRY(store_read(s, GROUP "/leaving", STORE_F64, 1, (size_t[]){n}, &data, error));
     f.leaving = data;
     TRY(store_read(s, GROUP "/absorbed", STORE_F64, 1, (size_t[]){n}, &data, error));

@@ -402,9 +402,7 @@ static lam_status gather(const pairs_run *run, csr *G, lam_error *error) {
         if (fill == 1) break;
         for (size_t i = 0; i < n; i++) rows.indptr[i + 1] += rows.indptr[i];
         memcpy(next, rows.indptr, (n + 1) * sizeof *next);
-        rows.indices = memory_allocate(rows.indptr[n], sizeof *rows.indices, "form factor rows", error);
-        rows.data = memory_allocate(rows.indptr[n], sizeof *rows.data, "form factor rows", error);
-        if (rows.indices == NULL || rows.data == NULL) TRY(LAM_ERR_MEMORY);
+        TRY(csr_reserve(&rows, rows.indptr[n], error));
     }
     TRY(sort_rows(&rows, error));
     *G = rows;

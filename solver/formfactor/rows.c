@@ -34,7 +34,7 @@ static size_t combine_row(const combination *c, size_t i, uint32_t *indices, flo
 static lam_status combine(const combination *c, csr *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = c->A->n;
-    csr sum = {.n = n};
+    csr sum = {.n = n, .place = c->A->place};
     if (c->B->n != n)
         FAIL(error, LAM_ERR_ARGUMENT, "rows of %zu and %zu elements cannot be combined", n, c->B->n);
     sum.indptr = memory_allocate(n + 1, sizeof *sum.indptr, "form factors", error);
@@ -42,9 +42,7 @@ static lam_status combine(const combination *c, csr *out, lam_error *error) {
 #pragma omp parallel for schedule(static, 64)
     for (size_t i = 0; i < n; i++) sum.indptr[i + 1] = combine_row(c, i, NULL, NULL);
     for (size_t i = 0; i < n; i++) sum.indptr[i + 1] += sum.indptr[i];
-    sum.indices = memory_allocate(sum.indptr[n], sizeof *sum.indices, "form factors", error);
-    sum.data = memory_allocate(sum.indptr[n], sizeof *sum.data, "form factors", error);
-    if (sum.indices == NULL || sum.data == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(csr_reserve(&sum, sum.indptr[n], error));
 #pragma omp parallel for schedule(static, 64)
     for (size_t i = 0; i < n; i++) combine_row(c, i, sum.indices + sum.indptr[i], sum.data + sum.indptr[i]);
     *out = sum;

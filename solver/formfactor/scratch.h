@@ -3,7 +3,7 @@
 #ifndef LAMBERT_FORMFACTOR_SCRATCH_H
 #define LAMBERT_FORMFACTOR_SCRATCH_H
 
-#include "store/status.h"
+#include "store/large_file.h"
 
 #include <stdint.h>
 
@@ -16,6 +16,9 @@ lam_status scratch_open(const char *folder, scratch **out, lam_error *error);
 /* The path of a file in it, for messages, and the file opened for reading and writing, made where it is
  * missing. The caller closes fd and frees path with free. */
 lam_status scratch_file(scratch *s, const char *name, int *fd, char **path, lam_error *error);
+
+/* The folder as a place for arrays that memory is too small for; they do not outlast the run. Owned by s. */
+const large_place *scratch_place(const scratch *s);
 
 /* Bytes that its files have already, and those that they can have: with what is free; UINT64_MAX when that is
  * unknown. */

@@ -13,12 +13,6 @@ static size_t panel_entries(size_t all) {
     return some < PANEL_LEAST ? PANEL_LEAST : some > PANEL_MOST ? PANEL_MOST : some;
 }
 
-/* Gives back what an array does not use; it may stay where it is. */
-static void *shrink(void *array, size_t count, size_t size) {
-    void *smaller = realloc(array, (count == 0 ? 1 : count) * size);
-    return smaller == NULL ? array : smaller;
-}
-
 /* --- merging -----------------------------------------------------------------------------------------------
  */
 
@@ -160,14 +154,14 @@ done:
     return status;
 }
 
-lam_status upper_merge(const found_rows *rows, size_t rays, const double *area, csr *upper,
-                       lam_error *error) {
+lam_status upper_merge(const found_rows *rows, size_t rays, const double *area, const large_place *place,
+                       csr *upper, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = rows->n;
     merge_run run = {.rows = rows};
     columns below = {0};
     merge_room room = {0};
-    csr g = {.n = n};
+    csr g = {.n = n, .place = place};
     size_t n_found = 0;
     run.cursors = memory_allocate(n, sizeof *run.cursors, "form factors", error);
     g.indptr = memory_allocate(n + 1, sizeof *g.indptr, "form factors", error);
@@ -176,18 +170,14 @@ lam_status upper_merge(const found_rows *rows, size_t rays, const double *area, 
         run.cursors[i] = (row_cursor){rows->rows[i].bytes, 0, rows->rows[i].n_entries};
         n_found += rows->rows[i].n_entries;
     }
-    /* As many as are found at most; pages that are not written take no memory. */
-    g.indices = memory_allocate(n_found, sizeof *g.indices, "form factors", error);
-    g.data = memory_allocate(n_found, sizeof *g.data, "form factors", error);
-    if (g.indices == NULL || g.data == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(csr_reserve(&g, n_found, error)); /* as many as are found at most */
     const size_t panel = panel_entries(n_found);
     for (size_t first = 0, last; first < n; first = last) {
         size_t n_entries = 0;
         for (last = first; last < n && n_entries < panel; last++) n_entries += rows->rows[last].n_entries;
         TRY(merge_panel(&run, &below, &room, first, last, rays, area, &g, error));
     }
-    g.indices = shrink(g.indices, g.indptr[n], sizeof *g.indices);
-    g.data = shrink(g.data, g.indptr[n], sizeof *g.data);
+    TRY(csr_reserve(&g, g.indptr[n], error));
     *upper = g;
     g = (csr){0};
 done:
@@ -241,9 +231,6 @@ lam_status upper_expand(csr *upper, const double *area, double *row_sums, lam_er
     expand_run run = {.g = upper};
     columns below = {0};
     merge_room room = {0};
-    uint32_t *indices;
-    float *data;
-    size_t bytes;
     uint64_t *indptr = memory_allocate(n + 1, sizeof *indptr, "form factors", error);
     run.ends = memory_allocate(n, sizeof *run.ends, "form factors", error);
     if (indptr == NULL || run.ends == NULL) TRY(LAM_ERR_MEMORY);
@@ -252,14 +239,9 @@ lam_status upper_expand(csr *upper, const double *area, double *row_sums, lam_er
         indptr[i + 1] += indptr[i] + upper->indptr[i + 1] - upper->indptr[i];
         run.ends[i] = upper->indptr[i + 1];
     }
-    if (!size_multiply(nnz == 0 ? 1 : nnz, 2 * sizeof *indices, &bytes))
-        FAIL(error, LAM_ERR_MEMORY, "form factors: %zu entries are too many", nnz);
-    indices = realloc(upper->indices, bytes);
-    if (indices != NULL) upper->indices = indices;
-    data = realloc(upper->data, bytes);
-    if (data != NULL) upper->data = data;
-    if (indices == NULL || data == NULL)
-        FAIL(error, LAM_ERR_MEMORY, "form factors: cannot allocate %zu x 2 bytes; use fewer --rays", bytes);
+    TRY(csr_reserve(upper, 2 * nnz, error));
+    uint32_t *const indices = upper->indices;
+    float *const data = upper->data;
 
     /* Row i of F begins at or behind where row i of the triangle did: from the last row to the first, what is
      * overwritten has been taken before. */
@@ -337,7 +319,5 @@ lam_status upper_gather(csr *F, const double *area, lam_error *error) {
         F->indptr[i + 1] = used;
     }
     free(mirror);
-    F->indices = shrink(F->indices, used, sizeof *F->indices);
-    F->data = shrink(F->data, used, sizeof *F->data);
-    return LAM_OK;
+    return csr_reserve(F, used, error);
 }

@@ -16,9 +16,46 @@ enum { WIDE = 32, NARROW = 8 };
 void csr_free(csr *a) {
     if (a == NULL) return;
     free(a->indptr);
-    free(a->indices);
-    free(a->data);
+    if (a->place == NULL) {
+        free(a->indices);
+        free(a->data);
+    }
+    for (int k = 0; k < 2; k++) large_file_free(a->files[k]);
     *a = (csr){0};
+}
+
+/* One of the two arrays with another room, in a file or in memory. */
+static lam_status reserve(const large_place *place, large_file **file, size_t entries, size_t size,
+                          void **array, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t bytes;
+    void *moved;
+    if (!size_multiply(entries == 0 ? 1 : entries, size, &bytes))
+        FAIL(error, LAM_ERR_MEMORY, "sparse rows: %zu entries are too many", entries);
+    if (place != NULL) {
+        if (*file == NULL) TRY(large_file_create(place, file, error));
+        TRY(large_file_resize(*file, bytes, array, error));
+        goto done;
+    }
+    moved = *array == NULL ? memory_allocate(bytes, 1, "sparse rows", error) : realloc(*array, bytes);
+    if (moved == NULL)
+        FAIL(error, LAM_ERR_MEMORY,
+             "sparse rows: cannot allocate %zu bytes; use fewer --rays, or --scratch and less --memory",
+             bytes);
+    *array = moved;
+done:
+    return status;
+}
+
+lam_status csr_reserve(csr *a, size_t entries, lam_error *error) {
+    lam_status status = LAM_OK;
+    void *indices = a->indices, *data = a->data;
+    TRY(reserve(a->place, &a->files[0], entries, sizeof *a->indices, &indices, error));
+    a->indices = indices;
+    TRY(reserve(a->place, &a->files[1], entries, sizeof *a->data, &data, error));
+    a->data = data;
+done:
+    return status;
 }
 
 lam_status csr_check(const csr *a, size_t nnz, const char *name, lam_error *error) {

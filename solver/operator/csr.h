@@ -2,6 +2,7 @@
 #ifndef LAMBERT_OPERATOR_CSR_H
 #define LAMBERT_OPERATOR_CSR_H
 
+#include "store/large_file.h"
 #include "store/store.h"
 
 #include <stdint.h>
@@ -11,9 +12,17 @@ typedef struct csr {
     uint64_t *indptr;  /* [n+1] */
     uint32_t *indices; /* [nnz], ascending in a row */
     float *data;       /* [nnz] */
+    /* Where indices and data lie: in memory where this is NULL, else in files there. */
+    const large_place *place;
+    large_file *files[2];
 } csr;
 
 void csr_free(csr *a);
+
+/* Gives indices and data room for so many entries, more or fewer than now, and keeps what is there; in
+ * memory, pages that are not written take none. Errors: LAM_ERR_MEMORY, LAM_ERR_IO; a is then as it was, but
+ * for room that one of the two may have more. */
+lam_status csr_reserve(csr *a, size_t entries, lam_error *error);
 
 /* indptr ascending from 0 to nnz, indices ascending and below n, data finite. LAM_ERR_FORMAT names the row.
  */

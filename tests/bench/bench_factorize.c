@@ -59,7 +59,7 @@ int main(int argc, char **argv) {
     if (runs < 1 || runs > MAX_RUNS) return 2;
     TRY(store_open(argv[1], &s, error));
     TRY(mesh_load(s, &m, &row_sums, error));
-    TRY(form_factors_load(s, &m, &f, error));
+    TRY(form_factors_load(s, &m, NULL, &f, error));
     TRY(form_factors_expand(&f, m.area, error));
     order = memory_allocate(m.n, sizeof *order, "order", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);

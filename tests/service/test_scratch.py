@@ -202,6 +202,35 @@ class Pairs(Scratch):
     test_other_options_are_refused = test_two_at_once_are_refused = test_unused = test_a_full_disk
 
 
+class Large(unittest.TestCase):
+    """Rows that memory is too small for lie in the scratch folder: the same store comes out."""
+
+    def test_memory_too_small_for_rows(self):
+        with tempfile.TemporaryDirectory() as folder:
+            scene, scratch = os.path.join(folder, "a.obj"), os.path.join(folder, "scratch")
+            wide, narrow, again = (os.path.join(folder, name) for name in ("wide.h5", "narrow.h5", "again.h5"))
+            options = ["--rank", "16", "--method", "low-rank", "--probes", "3", "--keep-form-factors", "--threads", "2"]
+            traced = [*options, "--form-factors", "rays", "--rays", "300"]
+            Scratch.run_once("generate", "cornell", "--elements", "3000", "-o", scene)
+            said = Scratch.run_once("precompute", scene, "-o", wide, *traced).stderr
+            needs = re.search(r"memory up to (\d+)M", said)
+            self.assertIsNotNone(needs, said)
+            less = ["--memory", f"{int(needs[1]) * 3 // 4}M"]
+            for source, out, more in (scene, narrow, traced), (wide, again, options):
+                command = ["precompute", source, "-o", out, *more, *less]
+                refused = subprocess.run([LAMBERT, *command], capture_output=True, text=True, timeout=600, check=False,
+                                         env=ENVIRONMENT)
+                self.assertEqual(refused.returncode, 1)
+                self.assertIn("fits: --scratch DIR", refused.stderr.splitlines()[-1])
+                said = Scratch.run_once(*command, "--scratch", scratch).stderr
+                self.assertIn("as memory is too small for them", said)
+                self.assertFalse(os.path.exists(scratch))
+                with h5py.File(wide) as one, h5py.File(out) as two:
+                    for name in "form_factors/data", "form_factors/indices", "operator/V", "operator/Y", "mesh/row_sum":
+                        if name in one:
+                            self.assertTrue((one[name][()] == two[name][()]).all(), name)
+
+
 class Forecast(unittest.TestCase):
     def test_said_before_the_form_factors(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -144,7 +144,7 @@ START_TEST(sphere_has_rank_one) {
         }
         indptr[i + 1] = (uint64_t)(i + 1) * N;
     }
-    const csr F = {N, indptr, indices, data};
+    const csr F = {.n = N, .indptr = indptr, .indices = indices, .data = data};
     const build_problem problem = {
         .n = N, .n_channels = 1, .area = area, .reflectance = rho, .F = &F, .order = order};
     const char *const methods[] = {"exact", "low-rank"};

@@ -16,7 +16,7 @@ static csr merge(const square *s, int threads) {
     csr upper = {0};
     lam_error error = {0};
     omp_set_num_threads(threads);
-    ck_assert_msg(upper_merge(&s->found, RAYS, s->area, &upper, &error) == LAM_OK, "%s", error.message);
+    ck_assert_msg(upper_merge(&s->found, RAYS, s->area, NULL, &upper, &error) == LAM_OK, "%s", error.message);
     return upper;
 }
 
@@ -107,7 +107,7 @@ static lam_status save_and_load(const mesh *m, const form_factors *f, form_facto
     ck_assert_msg(form_factors_save(f, s, error) == LAM_OK, "%s", error->message);
     ck_assert_msg(store_seal(s, error) == LAM_OK, "%s", error->message);
     ck_assert_int_eq(store_open(path, &s, error), LAM_OK);
-    const lam_status status = form_factors_load(s, m, out, error);
+    const lam_status status = form_factors_load(s, m, NULL, out, error);
     store_close(s);
     folder_remove(folder);
     return status;
