@@ -37,34 +37,17 @@ static void count(hf_run *run, int level, size_t given, size_t kept) {
     __atomic_fetch_add(&run->kept[level], kept, __ATOMIC_RELAXED);
 }
 
-/* (Q1 | Q2), whose rows are joined; Q1 and Q2 go as soon as that is done. */
-static lam_status join(tall_factors *one, tall_factors *two, float **out, lam_error *error) {
-    const size_t n = one->n, k1 = one->rank, k2 = two->rank, k = k1 + k2;
-    size_t values;
-    if (!size_multiply(n, k, &values))
-        return status_fail(error, LAM_ERR_MEMORY, "a node of %zu columns is too large", k);
-    float *Q = memory_allocate(values, sizeof *Q, "factorization", error);
-    if (Q == NULL) return LAM_ERR_MEMORY;
-    for (size_t i = 0; i < n; i++) {
-        if (k1 > 0) memcpy(Q + i * k, one->Q + i * k1, k1 * sizeof *Q);
-        if (k2 > 0) memcpy(Q + i * k + k1, two->Q + i * k2, k2 * sizeof *Q);
-    }
-    free(one->Q);
-    free(two->Q);
-    one->Q = two->Q = NULL;
-    *out = Q;
-    return LAM_OK;
-}
-
 /* (Q1 | Q2) = Q_r V_r^T and V = (V1 V_r1 ; V2 V_r2), eqs. 3.3, 3.5, 3.6. Takes one and two over. */
 static lam_status combine(tall_factors *one, tall_factors *two, const truncation *keep, tall_factors *out,
                           lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = one->n, k1 = one->rank, k2 = two->rank, k = k1 + k2, m = one->m + two->m;
+    const size_t k1 = one->rank, k2 = two->rank, m = one->m + two->m;
     tall_factors joint = {0};
-    float *Q = NULL, *V = NULL;
-    TRY(join(one, two, &Q, error));
-    TRY(tsvd(n, k, Q, keep, &joint, error));
+    float *V = NULL;
+    TRY(tsvd_pair(one->n, k1, one->Q, k2, two->Q, keep, &joint, error));
+    free(one->Q);
+    free(two->Q);
+    one->Q = two->Q = NULL;
     const size_t r = joint.rank;
     V = memory_allocate(m, r * sizeof *V, "factorization", error);
     if (V == NULL) TRY(LAM_ERR_MEMORY);
@@ -77,7 +60,6 @@ static lam_status combine(tall_factors *one, tall_factors *two, const truncation
     *out = joint;
     joint = (tall_factors){0};
 done:
-    free(Q);
     free(V);
     tall_factors_free(&joint);
     tall_factors_free(one);

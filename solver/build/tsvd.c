@@ -20,6 +20,9 @@ static const double spread_above = 1. / 5;
 /* Rows spread out at a time; columns from which on few eigenvectors are looked for before all. */
 enum { PANEL = 1024, LEADING_LEAST = 768 };
 
+/* Rows of two halves joined at a time. */
+enum { JOINED = 4096 };
+
 void tall_factors_free(tall_factors *f) {
     free(f->Q);
     free(f->V);
@@ -66,11 +69,13 @@ static lam_status take_vectors(const gram *g, size_t rank, float **V, lam_error 
 /* --- dense and sparse blocks -----------------------------------------------------------------------------
  */
 
-/* Either. */
+/* One of three. */
 typedef struct tall_block {
     size_t n, m;
-    const float *dense; /* [n][m], or NULL: */
-    const sparse_block *sparse;
+    const float *dense;         /* [n][m] */
+    const sparse_block *sparse; /* or this */
+    const float *half[2];       /* or two, [n][width] each, side by side: m is the sum of their widths */
+    size_t width[2];
 } tall_block;
 
 static size_t row_length(const sparse_block *A, size_t i) {
@@ -82,8 +87,43 @@ static void spread_row(const sparse_block *A, size_t i, float *row) {
     for (uint64_t p = A->indptr[i]; p < A->indptr[i + 1]; p++) row[A->columns[p]] = A->data[p];
 }
 
+/* Rows first ... first+rows-1 of two halves, joined. */
+static void join_rows(const tall_block *A, size_t first, size_t rows, float *panel) {
+#pragma omp parallel for schedule(static)
+    for (size_t i = 0; i < rows; i++)
+        for (size_t h = 0; h < 2; h++)
+            if (A->width[h] > 0)
+                memcpy(panel + i * A->m + (h == 0 ? 0 : A->width[0]), A->half[h] + (first + i) * A->width[h],
+                       A->width[h] * sizeof *panel);
+}
+
+/* Calls for the rows of two halves, joined, a panel at a time. */
+static lam_status each_panel(const tall_block *A,
+                             lam_status (*take)(void *context, size_t first, size_t rows, const float *panel,
+                                                lam_error *error),
+                             void *context, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t most = A->n < JOINED ? A->n : JOINED;
+    float *panel = memory_allocate(most, A->m * sizeof *panel, "factorization", error);
+    if (panel == NULL) return LAM_ERR_MEMORY;
+    for (size_t first = 0; first < A->n; first += most) {
+        const size_t rows = A->n - first < most ? A->n - first : most;
+        join_rows(A, first, rows, panel);
+        TRY(take(context, first, rows, panel, error));
+    }
+done:
+    free(panel);
+    return status;
+}
+
+static lam_status add_panel(void *context, size_t first, size_t rows, const float *panel, lam_error *error) {
+    (void)first;
+    return gram_add(context, rows, panel, error);
+}
+
 static lam_status gram_of(const tall_block *A, gram *g, lam_error *error) {
-    return A->dense != NULL ? gram_add(g, A->n, A->dense, error) : gram_add_sparse(g, A->sparse, error);
+    if (A->dense != NULL) return gram_add(g, A->n, A->dense, error);
+    return A->sparse != NULL ? gram_add_sparse(g, A->sparse, error) : each_panel(A, add_panel, g, error);
 }
 
 /* q = sum_c A_ic V_c. */
@@ -96,12 +136,31 @@ static void project_row(const sparse_block *A, size_t i, size_t k, const float *
     }
 }
 
+/* Q = A V of a panel. */
+typedef struct projection {
+    size_t m, k;
+    const float *V;
+    float *Q;
+} projection;
+
+static lam_status project_panel(void *context, size_t first, size_t rows, const float *panel,
+                                lam_error *error) {
+    (void)error;
+    const projection *p = context;
+    dense_multiply(rows, p->m, p->k, panel, p->V, false, p->Q + first * p->k);
+    return LAM_OK;
+}
+
 /* Q = A V, [n][k]. */
 static lam_status project(const tall_block *A, size_t k, const float *V, float *Q, lam_error *error) {
     const size_t m = A->m;
     if (A->dense != NULL) {
         dense_multiply(A->n, m, k, A->dense, V, false, Q);
         return LAM_OK;
+    }
+    if (A->sparse == NULL) {
+        projection p = {.m = m, .k = k, .V = V, .Q = Q};
+        return each_panel(A, project_panel, &p, error);
     }
     float *panel = memory_allocate(PANEL, m * sizeof *panel, "factorization", error);
     if (panel == NULL) return LAM_ERR_MEMORY;
@@ -180,6 +239,12 @@ done:
 lam_status tsvd(size_t n, size_t m, const float *A, const truncation *keep, tall_factors *out,
                 lam_error *error) {
     const tall_block block = {.n = n, .m = m, .dense = A};
+    return factorize(&block, keep, out, error);
+}
+
+lam_status tsvd_pair(size_t n, size_t m, const float *A, size_t k, const float *B, const truncation *keep,
+                     tall_factors *out, lam_error *error) {
+    const tall_block block = {.n = n, .m = m + k, .half = {A, B}, .width = {m, k}};
     return factorize(&block, keep, out, error);
 }
 

@@ -33,6 +33,10 @@ typedef struct truncation {
 lam_status tsvd(size_t n, size_t m, const float *A, const truncation *keep, tall_factors *out,
                 lam_error *error);
 
+/* The same of (A | B), [n][m] and [n][k], which is never put together as a whole. */
+lam_status tsvd_pair(size_t n, size_t m, const float *A, size_t k, const float *B, const truncation *keep,
+                     tall_factors *out, lam_error *error);
+
 /* The same of sparse columns: rows with few entries cost the squares of those, not m^2. */
 lam_status tsvd_sparse(const sparse_block *A, const truncation *keep, tall_factors *out, lam_error *error);
 
