@@ -126,6 +126,8 @@ static bool unused_by_method(const char *name, const precompute_arguments *f, co
     if (two_mesh) return is_among(name, of_hf) || strcmp(name, "epsilon") == 0;
     if (built->factorizer == NULL) return is_among(name, of_factors);
     if (strcmp(name, "epsilon") == 0) return rank_given;
+    /* Whose norm a bound is in matters to every factorizer that keeps it. */
+    if (strcmp(name, "budget") == 0 && built->norm == TRUNCATION_FROBENIUS) return false;
     return strcmp(built->factorizer, "hf") != 0 && is_among(name, of_hf);
 }
 
