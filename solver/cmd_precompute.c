@@ -112,6 +112,7 @@ static bool unused_by_form_factors(const char *name, const precompute_arguments 
 static bool unused_by_method(const char *name, const precompute_arguments *f, const build_report *built) {
     static const char *const never[] = {"threshold", "correction", NULL};
     static const char *const of_patches[] = {"coherence", "min-area", "assign", NULL};
+    static const char *const of_bound[] = {"epsilon", "alpha", "budget", NULL};
     static const char *const of_hf[] = {"alpha", "budget", "levels", NULL};
     static const char *const of_factors[] = {"factorizer", "epsilon", "alpha", "budget",
                                              "levels",     "rank",    NULL};
@@ -124,7 +125,7 @@ static bool unused_by_method(const char *name, const precompute_arguments *f, co
         return built->factorizer == NULL && strcmp(f->factorizer, "auto") != 0;
     if (two_mesh) return is_among(name, of_hf) || strcmp(name, "epsilon") == 0;
     if (built->factorizer == NULL) return is_among(name, of_factors);
-    if (strcmp(name, "epsilon") == 0) return rank_given;
+    if (rank_given && is_among(name, of_bound)) return true;
     /* Whose norm a bound is in matters to every factorizer that keeps it. */
     if (strcmp(name, "budget") == 0 && built->norm == TRUNCATION_FROBENIUS) return false;
     return strcmp(built->factorizer, "hf") != 0 && is_among(name, of_hf);

@@ -421,7 +421,7 @@ static lam_status describe_operator(const work *w, store *s, lam_error *error) {
     TRY(store_set_text(s, "/operator", "reason", r->reason, error));
     if (r->epsilon >= 0) TRY(store_set_number(s, "/operator", "epsilon", r->epsilon, error));
     TRY(store_set_number(s, "/operator", "rcond", r->rcond, error));
-    if (factorized && r->levels > 0) {
+    if (factorized && r->levels > 0 && w->options->rank == 0) {
         TRY(store_set_text(s, "/operator", "budget", w->options->budget, error));
         TRY(store_set_number(s, "/operator", "alpha", w->options->alpha, error));
     }
