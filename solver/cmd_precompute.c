@@ -58,6 +58,11 @@ static char *command_line(int argc, char **argv) {
     return text;
 }
 
+static bool is_among(const char *name, const char *const *list) {
+    while (*list != NULL && strcmp(name, *list) != 0) list++;
+    return *list != NULL;
+}
+
 /* What the arguments say together; 0 or the status of wrong usage. */
 static int check_together(const precompute_arguments *f, const option_result *given, bool from_store) {
     const char *input = given->arguments[0];
@@ -78,12 +83,9 @@ static int check_together(const precompute_arguments *f, const option_result *gi
             return options_usage(precompute_verb.name,
                                  "--%s: the mesh of a store is fixed; precompute from its scene instead",
                                  of_mesh[i]);
-    const bool qr = strcmp(f->factorizer, "qr") == 0, two_mesh = strcmp(f->method, "2msc") == 0;
-    if (qr && !two_mesh)
+    static const char *const factorizing[] = {"auto", "low-rank", NULL};
+    if (strcmp(f->factorizer, "qr") == 0 && is_among(f->method, factorizing))
         return options_usage(precompute_verb.name, "--factorizer qr: goes with --method 2msc only");
-    if (two_mesh && !qr && strcmp(f->factorizer, "auto") != 0)
-        return options_usage(precompute_verb.name, "--factorizer %s: --method 2msc has auto or qr",
-                             f->factorizer);
     if (f->resolution % 2 != 0)
         return options_usage(precompute_verb.name, "--resolution %" PRIu64 ": must be even", f->resolution);
     if (!from_store && same_file(input, f->output))
@@ -107,14 +109,10 @@ static bool unused_by_form_factors(const char *name, const precompute_arguments 
     return false;
 }
 
-static bool is_among(const char *name, const char *const *list) {
-    while (*list != NULL && strcmp(name, *list) != 0) list++;
-    return *list != NULL;
-}
-
 static bool unused_by_method(const char *name, const precompute_arguments *f, const build_report *built) {
     static const char *const never[] = {"threshold", "correction", NULL};
     static const char *const of_patches[] = {"coherence", "min-area", "assign", NULL};
+    static const char *const of_bound[] = {"epsilon", "alpha", "budget", NULL};
     static const char *const of_hf[] = {"alpha", "budget", "levels", NULL};
     static const char *const of_factors[] = {"factorizer", "epsilon", "alpha", "budget",
                                              "levels",     "rank",    NULL};
@@ -123,9 +121,13 @@ static bool unused_by_method(const char *name, const precompute_arguments *f, co
     if (is_among(name, never)) return true;
     if (strcmp(name, "store-precision") == 0) return strcmp(built->method, "exact") == 0;
     if (is_among(name, of_patches)) return !two_mesh || (rank_given && strcmp(name, "assign") != 0);
+    if (two_mesh && strcmp(name, "factorizer") == 0)
+        return built->factorizer == NULL && strcmp(f->factorizer, "auto") != 0;
     if (two_mesh) return is_among(name, of_hf) || strcmp(name, "epsilon") == 0;
     if (built->factorizer == NULL) return is_among(name, of_factors);
-    if (strcmp(name, "epsilon") == 0) return rank_given;
+    if (rank_given && is_among(name, of_bound)) return true;
+    /* Whose norm a bound is in matters to every factorizer that keeps it. */
+    if (strcmp(name, "budget") == 0 && built->norm == TRUNCATION_FROBENIUS) return false;
     return strcmp(built->factorizer, "hf") != 0 && is_among(name, of_hf);
 }
 

@@ -174,19 +174,63 @@ static size_t view_width(const fields *f) {
     return f->size.width - (f->false_color ? picture_legend_width(f->size.width, f->size.height) : 0);
 }
 
-static lam_status choose_camera(const fields *f, const picture_scene *scene, const bool *lit, camera *c,
-                                lam_error *error) {
+/* A store, what its elements show, and from where they are seen. */
+typedef struct view {
+    store *s;
+    mesh m;
+    float *values; /* [1 or 3][n] */
+    bool *lit;     /* [n]: elements that a chosen camera is to show */
+    bool *glows;   /* [n]: see picture_scene */
+    visibility *seen;
+    shade *shown;
+    picture_scene scene;
+    camera camera;
+} view;
+
+static void view_close(view *v) {
+    shade_destroy(v->shown);
+    visibility_destroy(v->seen);
+    free(v->lit);
+    free(v->glows);
+    free(v->values);
+    mesh_free(&v->m);
+    store_close(v->s);
+}
+
+/* All but what the elements show, and so nothing that costs much. */
+static lam_status view_open(const char *path, const fields *f, view *v, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(output_file_check(f->output, error));
+    TRY(store_open(path, &v->s, error));
+    TRY(mesh_load(v->s, &v->m, NULL, error));
+    v->lit = memory_allocate(v->m.n, sizeof *v->lit, "lit elements", error);
+    v->glows = memory_allocate(v->m.n, sizeof *v->glows, "glowing elements", error);
+    if (v->lit == NULL || v->glows == NULL) TRY(LAM_ERR_MEMORY);
+done:
+    return status;
+}
+
+/* The scene and the camera of a view whose values are there. */
+static lam_status view_aim(const fields *f, size_t n_channels, bool smooth, view *v, lam_error *error) {
+    lam_status status = LAM_OK;
     const double aspect = (double)view_width(f) / (double)f->size.height;
-    if (f->camera.given)
-        return camera_look(f->camera.eye, f->camera.target, f->camera.fov, aspect, scene->mesh->up, c, error);
-    return camera_choose(scene->mesh, scene->visibility, lit, aspect, c, error);
+    const camera_option *given = &f->camera;
+    TRY(visibility_create(&v->m, &v->seen, error));
+    TRY(shade_create(&v->m, n_channels, v->values, smooth, &v->shown, error));
+    v->scene = (picture_scene){.mesh = &v->m, .visibility = v->seen, .shade = v->shown, .glows = v->glows};
+    if (given->given)
+        TRY(camera_look(given->eye, given->target, given->fov, aspect, v->m.up, &v->camera, error));
+    else
+        TRY(camera_choose(&v->m, v->seen, v->lit, aspect, &v->camera, error));
+done:
+    return status;
 }
 
 /* What fits the light that is seen. */
-static picture_look look_of_light(const fields *f, const picture_scene *scene, const camera *c) {
+static picture_look look_of_light(const fields *f, const view *v) {
     tone_histogram histogram = {0};
     picture_look look = {.width = view_width(f)};
-    picture_measure(scene, c, &histogram);
+    picture_measure(&v->scene, &v->camera, &histogram);
     if (f->false_color)
         look.range = round_up(tone_histogram_quantile(&histogram, .99) / exp2(f->exposure));
     else
@@ -194,13 +238,15 @@ static picture_look look_of_light(const fields *f, const picture_scene *scene, c
     return look;
 }
 
-static lam_status draw(const fields *f, const picture_scene *scene, const camera *c, const picture_look *look,
-                       const progress *how, terminal *t, lam_error *error) {
+static lam_status draw(const fields *f, const view *v, const picture_look *look, terminal *t,
+                       lam_error *error) {
     lam_status status = LAM_OK;
+    const progress how = terminal_progress(t);
+    const camera *c = &v->camera;
     image picture = {0};
-    const size_t channels = look->range > 0 || shade_channels(scene->shade) == 3 ? 3 : 1;
+    const size_t channels = look->range > 0 || shade_channels(v->shown) == 3 ? 3 : 1;
     TRY(image_create(f->size.width, f->size.height, channels, &picture, error));
-    TRY(picture_draw(scene, c, look, how, &picture, error));
+    TRY(picture_draw(&v->scene, c, look, &how, &picture, error));
     if (look->range > 0) picture_legend(look->range, &picture);
     TRY(image_write_png(&picture, f->output, error));
     terminal_log(t, "camera %.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.4g", c->eye[0], c->eye[1], c->eye[2],
@@ -213,64 +259,42 @@ done:
 
 static lam_status render(const char *path, const fields *f, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
-    const progress how = terminal_progress(t);
-    store *s = NULL;
-    mesh m = {0};
+    view v = {.s = NULL};
     lam_operator *op = NULL;
     lam_sky *sky = NULL;
-    visibility *seen = NULL;
-    shade *shown = NULL;
     emission light = {0};
-    double *row_sums = NULL;
-    float *values = NULL;
-    bool *lit = NULL, *glows = NULL, own = false;
-    camera c;
+    bool own = false;
 
-    TRY(output_file_check(f->output, error));
-    TRY(store_open(path, &s, error));
-    TRY(mesh_load(s, &m, &row_sums, error));
-    TRY(sky_load(s, m.n, &sky, error));
+    TRY(view_open(path, f, &v, error));
+    TRY(sky_load(v.s, v.m.n, &sky, error));
     const emission_wish wish = {.items = &f->emit, .path = f->emission, .sky = f->sky};
-    TRY(emission_choose(&m, sky, &wish, &light, &own, error));
+    TRY(emission_choose(&v.m, sky, &wish, &light, &own, error));
     if (light.n_vectors != 1)
         FAIL(error, LAM_ERR_ARGUMENT, "%s: holds %zu emissions, a picture shows exactly 1",
              f->emission != NULL ? f->emission : f->sky, light.n_vectors);
-    TRY(operator_load(s, &op, error));
+    TRY(operator_load(v.s, &op, error));
     lam_operator_set_threads(op, (size_t)omp_get_max_threads());
     TRY(terminal_check(error));
     const lam_quantity quantity = strcmp(f->quantity, "irradiance") == 0 ? LAM_IRRADIANCE
                                   : strcmp(f->quantity, "indirect") == 0 ? LAM_INDIRECT
                                                                          : LAM_RADIOSITY;
-    TRY(emission_apply(&light, op, sky, quantity, 0, NULL, NULL, &values, error));
-    lit = memory_allocate(m.n, sizeof *lit, "lit elements", error);
-    glows = memory_allocate(m.n, sizeof *glows, "glowing elements", error);
-    if (lit == NULL || glows == NULL) TRY(LAM_ERR_MEMORY);
-    mark(&m, values, light.E, quantity == LAM_RADIOSITY, lit, glows);
-    if (own && memchr(glows, true, m.n) == NULL && memchr(lit, true, m.n) == NULL)
+    TRY(emission_apply(&light, op, sky, quantity, 0, NULL, NULL, &v.values, error));
+    mark(&v.m, v.values, light.E, quantity == LAM_RADIOSITY, v.lit, v.glows);
+    if (own && memchr(v.glows, true, v.m.n) == NULL && memchr(v.lit, true, v.m.n) == NULL)
         FAIL(error, LAM_ERR_ARGUMENT,
              "%s: the scene has no light of its own; give --emit GROUP=V, --emission or --sky", path);
-    TRY(visibility_create(&m, &seen, error));
-    TRY(shade_create(&m, m.n_channels, values, f->smooth, &shown, error));
-    const picture_scene scene = {.mesh = &m, .visibility = seen, .shade = shown, .glows = glows};
-    TRY(choose_camera(f, &scene, lit, &c, error));
-    const picture_look look = look_of_light(f, &scene, &c);
-    TRY(draw(f, &scene, &c, &look, &how, t, error));
+    TRY(view_aim(f, v.m.n_channels, f->smooth, &v, error));
+    const picture_look look = look_of_light(f, &v);
+    TRY(draw(f, &v, &look, t, error));
     if (f->false_color)
         terminal_log(t, "colours from 0 to %g W/m2", look.range);
     else
         terminal_log(t, "white is about %.3g W/m2", 1 / look.exposure);
 done:
-    free(lit);
-    free(glows);
-    free(values);
-    free(row_sums);
-    shade_destroy(shown);
-    visibility_destroy(seen);
+    view_close(&v);
     emission_free(&light);
     lam_operator_close(op);
     lam_sky_close(sky);
-    mesh_free(&m);
-    store_close(s);
     return status;
 }
 
@@ -308,38 +332,15 @@ done:
 
 static lam_status render_patches(const char *path, const fields *f, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
-    const progress how = terminal_progress(t);
-    store *s = NULL;
-    mesh m = {0};
-    visibility *seen = NULL;
-    shade *shown = NULL;
-    double *row_sums = NULL;
-    float *values = NULL;
-    bool *lit = NULL, *glows = NULL;
+    view v = {.s = NULL};
     picture_look look;
-    camera c;
-    TRY(output_file_check(f->output, error));
-    TRY(store_open(path, &s, error));
-    TRY(mesh_load(s, &m, &row_sums, error));
-    TRY(patch_values(f, s, m.n, t, &values, &look, error));
-    lit = memory_allocate(m.n, sizeof *lit, "lit elements", error);
-    glows = memory_allocate(m.n, sizeof *glows, "glowing elements", error);
-    if (lit == NULL || glows == NULL) TRY(LAM_ERR_MEMORY);
-    memset(lit, true, m.n);
-    TRY(visibility_create(&m, &seen, error));
-    TRY(shade_create(&m, strcmp(f->quantity, "patch") == 0 ? 3 : 1, values, false, &shown, error));
-    const picture_scene scene = {.mesh = &m, .visibility = seen, .shade = shown, .glows = glows};
-    TRY(choose_camera(f, &scene, lit, &c, error));
-    TRY(draw(f, &scene, &c, &look, &how, t, error));
+    TRY(view_open(path, f, &v, error));
+    TRY(patch_values(f, v.s, v.m.n, t, &v.values, &look, error));
+    memset(v.lit, true, v.m.n);
+    TRY(view_aim(f, strcmp(f->quantity, "patch") == 0 ? 3 : 1, false, &v, error));
+    TRY(draw(f, &v, &look, t, error));
 done:
-    free(lit);
-    free(glows);
-    free(values);
-    free(row_sums);
-    shade_destroy(shown);
-    visibility_destroy(seen);
-    mesh_free(&m);
-    store_close(s);
+    view_close(&v);
     return status;
 }
 

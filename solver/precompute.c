@@ -350,8 +350,9 @@ static lam_status build(work *w, lam_error *error) {
     const bool tried = !patches && (w->built.factorizer != NULL || w->built.factorize_seconds > 0);
     if (w->built.factorizer != NULL || patches) {
         terminal_log(w->t, "%-14s%8.2f s", "factorize", w->built.factorize_seconds);
-        terminal_log(w->t, "rank %zu of %zu, real norm error %.3g", w->built.rank, w->m.n,
-                     w->built.measured_norm_error);
+        terminal_log(w->t, "rank %zu of %zu, real norm error %.3g in the %s", w->built.rank, w->m.n,
+                     w->built.measured_norm_error,
+                     w->built.norm == TRUNCATION_FROBENIUS ? "Frobenius norm" : "2-norm");
     }
     if (tried && o->rank == 0 && o->epsilon < noise)
         terminal_warn(
@@ -440,7 +441,7 @@ static lam_status describe_operator(const work *w, store *s, lam_error *error) {
     TRY(store_set_text(s, "/operator", "reason", r->reason, error));
     if (r->epsilon >= 0) TRY(store_set_number(s, "/operator", "epsilon", r->epsilon, error));
     TRY(store_set_number(s, "/operator", "rcond", r->rcond, error));
-    if (factorized && r->levels > 0) {
+    if (factorized && r->levels > 0 && w->options->rank == 0) {
         TRY(store_set_text(s, "/operator", "budget", w->options->budget, error));
         TRY(store_set_number(s, "/operator", "alpha", w->options->alpha, error));
     }
@@ -457,6 +458,8 @@ static lam_status describe_operator(const work *w, store *s, lam_error *error) {
     if (factorized || r->coherence >= 0) {
         TRY(store_set_integer(s, "/operator", "rank", (int64_t)r->rank, error));
         TRY(store_set_number(s, "/operator", "measured_norm_error", r->measured_norm_error, error));
+        TRY(store_set_text(s, "/operator", "norm", r->norm == TRUNCATION_FROBENIUS ? "frobenius" : "2",
+                           error));
     } else if (about.density >= 0) {
         TRY(store_set_number(s, "/operator", "density", about.density, error));
     }

@@ -3,7 +3,7 @@
 #define LAMBERT_BENCH_LOWRANK_H
 
 #include "solver/bench/bench.h"
-#include "solver/build/build.h"
+#include "solver/build/judge.h"
 #include "solver/formfactor/formfactor.h"
 
 /* A scene with its form factors as a matrix. */
@@ -43,11 +43,24 @@ lam_status lowrank_factorize(const bench_run *run, const lowrank_scene *s, const
 /* Options as precompute has them. */
 factorizer_options lowrank_options(const bench_run *run, double epsilon, size_t rank);
 
-/* The problem that a build method gets. */
-build_problem lowrank_problem(const lowrank_scene *s);
+/* How an operator is built, and by what it is judged; else as precompute has it. */
+typedef struct lowrank_case {
+    const char *method, *factorizer;
+    double epsilon;
+    size_t rank;            /* 0: by epsilon */
+    size_t probes;          /* single elements, at most */
+    const csr *independent; /* another sample of F, or NULL: no total error */
+} lowrank_case;
 
-/* Median seconds of one radiosity. */
-lam_status lowrank_answer_seconds(const lam_operator *op, double *median, lam_error *error);
+typedef struct lowrank_verdict {
+    build_report built;
+    error_report judged;
+    double answer_seconds; /* of one radiosity, median, one thread */
+    double bytes;          /* that an answer reads */
+} lowrank_verdict;
+
+lam_status lowrank_judge(const bench_run *run, const lowrank_scene *s, const lowrank_case *of,
+                         lowrank_verdict *out, lam_error *error);
 
 /* Tables 3.1 to 3.5 of the thesis and figures 3.3 to 3.5. */
 lam_status lowrank_of_alpha(const bench_run *run, const lowrank_scene *s, lam_error *error);

@@ -2,7 +2,6 @@
  */
 #include "solver/bench/formfactors.h"
 #include "solver/bench/lowrank.h"
-#include "solver/build/judge.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -50,63 +49,39 @@ typedef struct curve {
     double build[SETTINGS_MOST], memory[SETTINGS_MOST], answer[SETTINGS_MOST], error[SETTINGS_MOST];
 } curve;
 
-typedef struct bench_scene {
-    const lowrank_scene *s;
-    form_factors independent; /* finer, of another seed */
-    build_problem problem;
-} bench_scene;
-
-static lam_status try(const bench_run *run, const bench_scene *b, const kind *k, int setting, table *out,
-                      curve *drawn, lam_error *error) {
+static lam_status try(const bench_run *run, const lowrank_scene *s, const csr *independent, const kind *k,
+                      int setting, table *out, curve *drawn, lam_error *error) {
     lam_status status = LAM_OK;
-    const lowrank_scene *s = b->s;
-    const size_t n = s->m.n, probes = n > LARGE ? PROBES_OF_LARGE : PROBES;
-    lam_operator *op = NULL;
-    build_report built;
-    error_report judged = {.seconds = 0};
-    double answer;
-    const build_options how = {.method = k->method,
-                               .factorizer = k->factorizer,
-                               .epsilon = bounds[setting],
-                               .rank = k->by_rank ? (size_t)(parts[setting] * (double)n) : 0,
-                               .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
-                               .levels = -1,
-                               .seed = run->seed,
-                               .progress = run->progress};
-    TRY(bench_check(run, error));
-    TRY(build_operator(&b->problem, &how, &op, &built, error));
-    TRY(lowrank_answer_seconds(op, &answer, error));
-    const judge_input input = {.problem = &b->problem,
-                               .row_sums = s->f.row_sums,
-                               .emission = s->m.emission,
-                               .independent = &b->independent.F,
-                               .probes = n < probes ? n : probes,
-                               .seed = run->seed,
-                               .progress = run->progress};
-    TRY(judge_operator(op, &input, &judged, error));
-    const double mb = 1e-6 * (double)lam_operator_bytes(op);
-    const double seconds = built.factorize_seconds + built.invert_seconds;
+    const lowrank_case of = {.method = k->method,
+                             .factorizer = k->factorizer,
+                             .epsilon = bounds[setting],
+                             .rank = k->by_rank ? (size_t)(parts[setting] * (double)s->m.n) : 0,
+                             .probes = s->m.n > LARGE ? PROBES_OF_LARGE : PROBES,
+                             .independent = independent};
+    lowrank_verdict v;
+    TRY(lowrank_judge(run, s, &of, &v, error));
+    const double mb = 1e-6 * v.bytes;
+    const double seconds = v.built.factorize_seconds + v.built.invert_seconds;
     table_text(out, s->name);
-    table_number(out, (double)n);
+    table_number(out, (double)s->m.n);
     table_text(out, k->label);
-    table_number(out, k->by_rank || strcmp(k->method, "exact") == 0 ? NAN : how.epsilon);
-    table_number(out, built.rank > 0 ? (double)built.rank : NAN);
-    table_number(out, built.measured_norm_error >= 0 ? built.measured_norm_error : NAN);
+    table_number(out, k->by_rank || strcmp(k->method, "exact") == 0 ? NAN : of.epsilon);
+    table_number(out, v.built.rank > 0 ? (double)v.built.rank : NAN);
+    table_number(out, v.built.measured_norm_error >= 0 ? v.built.measured_norm_error : NAN);
     table_number(out, seconds);
     table_number(out, mb);
-    table_number(out, 1e3 * answer);
-    table_number(out, judged.single.total_indirect.mean);
-    table_number(out, judged.lights.probes > 0 ? judged.lights.total_indirect.mean : NAN);
-    table_number(out, judged.random.total_indirect.mean);
-    table_number(out, judged.single.operator_indirect.mean);
-    table_number(out, judged.lights.probes > 0 ? judged.lights.operator_indirect.mean : NAN);
-    table_number(out, judged.random.operator_indirect.mean);
+    table_number(out, 1e3 * v.answer_seconds);
+    table_number(out, v.judged.single.total_indirect.mean);
+    table_number(out, v.judged.lights.probes > 0 ? v.judged.lights.total_indirect.mean : NAN);
+    table_number(out, v.judged.random.total_indirect.mean);
+    table_number(out, v.judged.single.operator_indirect.mean);
+    table_number(out, v.judged.lights.probes > 0 ? v.judged.lights.operator_indirect.mean : NAN);
+    table_number(out, v.judged.random.operator_indirect.mean);
     drawn->build[drawn->n] = seconds;
     drawn->memory[drawn->n] = mb;
-    drawn->answer[drawn->n] = 1e3 * answer;
-    drawn->error[drawn->n++] = judged.single.total_indirect.mean;
+    drawn->answer[drawn->n] = 1e3 * v.answer_seconds;
+    drawn->error[drawn->n++] = v.judged.single.total_indirect.mean;
 done:
-    lam_operator_close(op);
     return status;
 }
 
@@ -135,25 +110,25 @@ static lam_status draw(const bench_run *run, const lowrank_scene *s, const char 
 
 static lam_status measure(const bench_run *run, const lowrank_scene *s, table *out, lam_error *error) {
     lam_status status = LAM_OK;
-    bench_scene b = {.s = s, .problem = lowrank_problem(s)};
+    form_factors independent = {.row_sums = NULL}; /* finer, of another seed */
     curve curves[KINDS] = {{.n = 0}};
     const recipe finer = formfactors_pairs(2e-5, run->seed + 1000);
     double seconds;
-    TRY(formfactors_make_timed(run, &s->m, s->z_order, &finer, "independent form factors", &b.independent,
+    TRY(formfactors_make_timed(run, &s->m, s->z_order, &finer, "independent form factors", &independent,
                                &seconds, error));
-    if (b.independent.F.indptr == NULL) TRY(form_factors_expand(&b.independent, s->m.area, error));
+    if (independent.F.indptr == NULL) TRY(form_factors_expand(&independent, s->m.area, error));
     for (int k = 0; k < KINDS; k++)
         for (int setting = 0; setting < SETTINGS_MOST; setting++) {
             if (run->scale == BENCH_QUICK && setting % 2 == 1) continue;
             if (strcmp(kinds[k].method, "exact") == 0 && setting > 0) continue;
-            TRY(try(run, &b, &kinds[k], setting, out, &curves[k], error));
+            TRY(try(run, s, &independent.F, &kinds[k], setting, out, &curves[k], error));
         }
     TRY(draw(run, s, "build-time", "factorization and inverse, seconds", curves, offsetof(curve, build),
              error));
     TRY(draw(run, s, "memory", "operator, MB", curves, offsetof(curve, memory), error));
     TRY(draw(run, s, "answer-time", "one answer, ms", curves, offsetof(curve, answer), error));
 done:
-    form_factors_free(&b.independent);
+    form_factors_free(&independent);
     return status;
 }
 

@@ -1,6 +1,5 @@
 /* Tables 3.6 and 3.7 of the thesis: what an operator costs, and how far its radiosity is off. */
 #include "solver/bench/lowrank.h"
-#include "solver/build/judge.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -24,46 +23,27 @@ static const double cornell[EPSILONS][4] = {{560, .0021, .0017, .0094},
 static lam_status add_epsilon(const bench_run *run, const lowrank_scene *s, double epsilon,
                               const double theirs[4], table *out, lam_error *error) {
     lam_status status = LAM_OK;
-    const build_problem problem = lowrank_problem(s);
     /* The real error of the thesis is half of its epsilon. */
-    const build_options how = {.method = "low-rank",
-                               .factorizer = "hf",
-                               .epsilon = epsilon / 2,
-                               .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
-                               .levels = -1,
-                               .seed = run->seed,
-                               .progress = run->progress};
-    lam_operator *op = NULL;
-    build_report built;
-    error_report judged = {.seconds = 0};
-    double answer;
-    TRY(bench_check(run, error));
-    TRY(build_operator(&problem, &how, &op, &built, error));
-    TRY(lowrank_answer_seconds(op, &answer, error));
-    const judge_input input = {.problem = &problem,
-                               .row_sums = s->f.row_sums,
-                               .emission = s->m.emission,
-                               .probes = s->m.n > LARGE    ? PROBES_OF_LARGE
-                                         : s->m.n < PROBES ? s->m.n
-                                                           : PROBES,
-                               .seed = run->seed,
-                               .progress = run->progress};
-    TRY(judge_operator(op, &input, &judged, error));
+    const lowrank_case of = {.method = "low-rank",
+                             .factorizer = "hf",
+                             .epsilon = epsilon / 2,
+                             .probes = s->m.n > LARGE ? PROBES_OF_LARGE : PROBES};
+    lowrank_verdict v;
+    TRY(lowrank_judge(run, s, &of, &v, error));
     table_text(out, s->name);
     table_number(out, (double)s->m.n);
     table_number(out, epsilon);
-    table_number(out, (double)built.rank);
-    table_number(out, built.measured_norm_error);
-    table_number(out, built.factorize_seconds);
-    table_number(out, built.invert_seconds);
-    table_number(out, 1e3 * answer);
-    table_number(out, judged.single.operator_relative.mean);
-    table_number(out, judged.single.operator_relative.std);
-    table_number(out, judged.single.operator_relative.max);
-    table_number(out, judged.single.operator_indirect.mean);
+    table_number(out, (double)v.built.rank);
+    table_number(out, v.built.measured_norm_error);
+    table_number(out, v.built.factorize_seconds);
+    table_number(out, v.built.invert_seconds);
+    table_number(out, 1e3 * v.answer_seconds);
+    table_number(out, v.judged.single.operator_relative.mean);
+    table_number(out, v.judged.single.operator_relative.std);
+    table_number(out, v.judged.single.operator_relative.max);
+    table_number(out, v.judged.single.operator_indirect.mean);
     for (int k = 0; k < 4; k++) table_number(out, theirs[k]);
 done:
-    lam_operator_close(op);
     return status;
 }
 

@@ -13,7 +13,7 @@
 #include <unistd.h>
 
 /* Above this many elements all pairs would take minutes. */
-enum { PAIRS_MOST = 12000, RAYS = 4096, REPEATS_MOST = 9, SOLVES = 31 };
+enum { PAIRS_MOST = 12000, RAYS = 4096, REPEATS_MOST = 9 };
 
 void lowrank_scene_free(lowrank_scene *s) {
     form_factors_free(&s->f);
@@ -215,19 +215,6 @@ factorizer_options lowrank_options(const bench_run *run, double epsilon, size_t 
                                 .progress = run->progress};
 }
 
-build_problem lowrank_problem(const lowrank_scene *s) {
-    return (build_problem){.n = s->m.n,
-                           .n_channels = s->m.n_channels,
-                           .area = s->m.area,
-                           .reflectance = s->m.reflectance,
-                           .F = &s->f.F,
-                           .order = s->z_order,
-                           .noise = recipe_noise(&s->f.recipe),
-                           .centre = (const double(*)[3])s->centre,
-                           .normal = (const float(*)[3])s->m.normal,
-                           .surface = s->surface};
-}
-
 /* A line of /proc/self/status in bytes, 0 where there is none. */
 static double memory_of(const char *name) {
     char line[256];
@@ -276,30 +263,5 @@ lam_status lowrank_factorize(const bench_run *run, const lowrank_scene *s, const
 done:
     tall_factors_free(&f);
     scaled_free(&S);
-    return status;
-}
-
-lam_status lowrank_answer_seconds(const lam_operator *op, double *median, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = lam_operator_elements(op) * lam_operator_channels(op);
-    double seconds[SOLVES];
-    float *E = NULL, *B = NULL;
-    void *work = NULL;
-    const size_t bytes = lam_operator_work_bytes(op, 1);
-    E = memory_allocate(n, sizeof *E, "an answer", error);
-    B = memory_allocate(n, sizeof *B, "an answer", error);
-    work = memory_allocate(1, bytes, "an answer", error);
-    if (E == NULL || B == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < n; i++) E[i] = (float)(i % 7);
-    for (int k = 0; k < SOLVES; k++) {
-        const double started = clock_seconds();
-        TRY(lam_operator_apply(op, 1, LAM_RADIOSITY, E, B, work, bytes, error));
-        seconds[k] = clock_seconds() - started;
-    }
-    *median = stats_median(seconds, SOLVES);
-done:
-    free(E);
-    free(B);
-    free(work);
     return status;
 }

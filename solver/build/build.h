@@ -43,8 +43,9 @@ typedef struct build_report {
     size_t rank;
     int levels;
     factorizer_report factorized;
+    truncation_norm norm;         /* of epsilon and of measured_norm_error */
     double epsilon;               /* the bound reached; negative when it has none */
-    double measured_norm_error;   /* |S - Q V^T|_2 by power iteration; negative when not measured */
+    double measured_norm_error;   /* |S - Q V^T|; negative when not measured */
     double rcond;                 /* of the matrix inverted; 1 when none was */
     double coherence, patch_area; /* 2msc: the smallest of a patch, m^2; negative when there are no patches */
     double factorize_seconds, invert_seconds;

@@ -22,10 +22,10 @@ lam_status factorize(const char *name, const scaled_matrix *S, const factorizer_
     lam_status status = LAM_OK;
     const factorizer *chosen = strcmp(name, "auto") == 0 ? &factorizer_hf : find(name);
     if (chosen == NULL) FAIL(error, LAM_ERR_ARGUMENT, "--factorizer %.40s: unknown", name);
-    const uint64_t before = S->rows->rows_given;
+    const double before = row_source_passes(S->rows);
     *report = (factorizer_report){.name = chosen->name};
     TRY(chosen->factorize(S, options, out, report, error));
-    report->passes = (double)(S->rows->rows_given - before) / (double)(S->n > 0 ? S->n : 1);
+    report->passes = row_source_passes(S->rows) - before;
 done:
     return status;
 }

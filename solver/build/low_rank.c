@@ -30,7 +30,12 @@ static lam_status build(const build_problem *problem, const build_options *optio
     const size_t k = f.rank;
     report->factorize_seconds = clock_seconds() - start;
 
-    TRY(norm_of_error(&S, &f, options->progress, &report->measured_norm_error, error));
+    /* In the norm of the bound, if there is one: a rank that was given leaves what it leaves. */
+    if (options->rank == 0) report->norm = budget_norm(options->budget.rule);
+    if (report->norm == TRUNCATION_FROBENIUS)
+        TRY(norm_of_error_frobenius(&S, &f, &report->measured_norm_error, error));
+    else
+        TRY(norm_of_error(&S, &f, options->progress, &report->measured_norm_error, error));
     const double inverting = clock_seconds();
     progress_report(options->progress, "invert", 0);
     TRY(finish_low_rank(problem, &S, &f, op, &report->rcond, error));

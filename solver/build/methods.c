@@ -23,14 +23,16 @@ static lam_status check_options(const build_options *options, lam_error *error) 
     lam_status status = LAM_OK;
     if (is_among(options->method, later_methods, sizeof later_methods / sizeof *later_methods))
         FAIL(error, LAM_ERR_UNSUPPORTED, "--method %s is not supported yet", options->method);
-    /* 2msc does not factorize: it can only make its own columns orthogonal. */
-    const bool two_mesh = strcmp(options->method, "2msc") == 0, qr = strcmp(options->factorizer, "qr") == 0;
+    /* 2msc does not factorize, it can make its own columns orthogonal; exact does neither. What a method has
+     * no use for is not refused. */
+    const bool qr = strcmp(options->factorizer, "qr") == 0;
+    const bool factorizes = strcmp(options->method, "2msc") != 0 && strcmp(options->method, "exact") != 0;
     if (!qr && !factorizer_exists(options->factorizer))
         FAIL(error, LAM_ERR_ARGUMENT, "--factorizer %.40s: unknown; use auto, hf, svd, rsi, sgrsvd or qr",
              options->factorizer);
-    if (qr && !two_mesh) FAIL(error, LAM_ERR_ARGUMENT, "--factorizer qr: is of --method 2msc alone");
-    if (two_mesh && !qr && strcmp(options->factorizer, "auto") != 0)
-        FAIL(error, LAM_ERR_ARGUMENT, "--factorizer %s: --method 2msc has auto or qr", options->factorizer);
+    if (qr && factorizes)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--factorizer qr: is of --method 2msc alone; --method %.40s cannot use it", options->method);
     if (!(options->coherence >= 0 && options->coherence <= 1))
         FAIL(error, LAM_ERR_ARGUMENT, "--coherence %g: must be above 0 and at most 1", options->coherence);
     if (!(options->min_area >= 0 && options->min_area < INFINITY))

@@ -1,4 +1,4 @@
-/* The 2-norm of what a factorization left out. */
+/* The norm of what a factorization left out. */
 #ifndef LAMBERT_BUILD_NORM_H
 #define LAMBERT_BUILD_NORM_H
 
@@ -17,7 +17,8 @@ lam_status norm_of_error(const scaled_matrix *S, const tall_factors *f, const pr
 lam_status norm_estimate(const scaled_matrix *S, size_t m, const float *X, const float *B, uint64_t seed,
                          double *norm, lam_error *error);
 
-/* |S - Q V^T|_F = sqrt(|S|_F^2 - |Q|_F^2), which holds where Q = S V and V is orthonormal. One pass. */
+/* |S - Q V^T|_F = sqrt(|S|_F^2 - |Q|_F^2), which holds where Q = S V and V is orthonormal: in single
+ * precision to 1e-6 of |S|_F^2 under the root. One pass. Errors: LAM_ERR_MEMORY, those of the source of S. */
 lam_status norm_of_error_frobenius(const scaled_matrix *S, const tall_factors *f, double *norm,
                                    lam_error *error);
 

@@ -3,6 +3,7 @@
  *     bench_factorize STORE.h5 FACTORIZER epsilon=X|rank=K [alpha=X] [levels=N] [budget=RULE] [iterations=Q]
  *                     [order=mesh] [runs=N] [norm=0]
  */
+#include "solver/bench/stats.h"
 #include "solver/build/build.h"
 #include "solver/build/norm.h"
 #include "solver/clock.h"
@@ -15,11 +16,6 @@
 #include <sys/resource.h>
 
 enum { MAX_RUNS = 99 };
-
-static int ascending(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 int main(int argc, char **argv) {
     lam_status status = LAM_OK;
@@ -76,14 +72,13 @@ int main(int argc, char **argv) {
         seconds[k] = clock_seconds() - started;
     }
     if (with_norm) TRY(norm_of_error(&S, &factors, NULL, &norm, error));
-    qsort(seconds, runs, sizeof *seconds, ascending);
     getrusage(RUSAGE_SELF, &used);
     printf("elements,density,factorizer,epsilon,rank_asked,alpha,budget,order,threads,runs,seconds,rank,real,"
            "levels,ratio,leaf,passes,peak_MiB,compression\n");
     printf("%zu,%.4f,%s,%g,%zu,%g,%s,%s,%d,%zu,%.3f,%zu,%.4f,%d,%g,%g,%.2f,%.0f,", m.n, rows.density,
            report.name, how.epsilon, how.rank, how.budget.alpha, budget_rule_name(how.budget.rule),
-           mesh_order ? "mesh" : "z", omp_get_max_threads(), runs, seconds[runs / 2], factors.rank, norm,
-           report.levels, report.shared.ratio, report.shared.leaf, report.passes,
+           mesh_order ? "mesh" : "z", omp_get_max_threads(), runs, stats_median(seconds, runs), factors.rank,
+           norm, report.levels, report.shared.ratio, report.shared.leaf, report.passes,
            (double)used.ru_maxrss / 1024);
     for (int l = 0; l <= report.levels; l++) printf("%.3f ", report.compression[l]);
     printf("\n");

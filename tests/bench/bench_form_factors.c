@@ -5,6 +5,7 @@
  *
  * Pairs, all or near ones, are those of normal quality. rows=1 in the environment expands the upper triangle
  * to rows, as an operator needs them. */
+#include "solver/bench/stats.h"
 #include "solver/clock.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/scene/import.h"
@@ -29,16 +30,10 @@ static double cpu_seconds(void) {
            1e-6 * (double)(used.ru_utime.tv_usec + used.ru_stime.tv_usec);
 }
 
-static int ascending(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static double median(const run_times *runs, size_t n, size_t offset) {
     double values[MAX_RUNS];
     for (size_t k = 0; k < n; k++) values[k] = *(const double *)((const char *)&runs[k] + offset);
-    qsort(values, n, sizeof *values, ascending);
-    return values[n / 2];
+    return stats_median(values, n);
 }
 
 static lam_status keep(const form_factors *f, const char *path, lam_error *error) {

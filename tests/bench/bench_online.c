@@ -6,6 +6,7 @@
  * CSV, times are medians. Ratios of one run are worth more than times: where sgemm_scaling, how much faster
  * OpenBLAS is with all threads, is far below their number, the machine was not free.
  */
+#include "solver/bench/stats.h"
 #include "solver/clock.h"
 #include "solver/operator/panel.h"
 
@@ -136,11 +137,6 @@ static double measure(subject *s, int which, int n_threads) {
     return clock_seconds() - start;
 }
 
-static int ascending(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static double sgemm_seconds(int n_threads) {
     enum { N = 1536 };
     float *A = malloc((size_t)3 * N * N * sizeof *A);
@@ -155,8 +151,7 @@ static double sgemm_seconds(int n_threads) {
         times[r] = clock_seconds() - start;
     }
     free(A);
-    qsort(times, 5, sizeof *times, ascending);
-    return times[2];
+    return stats_median(times, 5);
 }
 
 static void print_lines(const subject *s, int n_threads, const double *seconds, double scaling) {
@@ -195,10 +190,8 @@ static void bench(size_t n, size_t k, int n_rounds, double scaling) {
                 times[t][which][r < 0 ? 0 : r] = measure(&s, which, n_threads);
         }
     for (int t = 0; t < 2; t++) {
-        for (int which = 0; which < MEASURED; which++) {
-            qsort(times[t][which], (size_t)n_rounds, sizeof(double), ascending);
-            median[which] = times[t][which][n_rounds / 2];
-        }
+        for (int which = 0; which < MEASURED; which++)
+            median[which] = stats_median(times[t][which], (size_t)n_rounds);
         print_lines(&s, t == 0 ? 1 : n_procs, median, scaling);
         fflush(stdout);
     }

@@ -6,6 +6,7 @@
  * with F_e, the light of the bright element itself, pair by pair and far more finely than the recipes do, and
  * F' of the recipe JUDGE (the one that is judged) and another seed for what bounces on: by then it comes from
  * everywhere, and its noise has averaged out. How much of it has not is printed beside. As CSV. */
+#include "solver/bench/stats.h"
 #include "solver/build/reference.h"
 #include "solver/clock.h"
 #include "solver/formfactor/formfactor.h"
@@ -103,12 +104,7 @@ done:
     return status;
 }
 
-static int ascending(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* |X - B| / |B|, area-weighted, of every probe; sorted. */
+/* |X - B| / |B|, area-weighted, of every probe. */
 static void compare(const bench *b, const double *X, double *errors) {
     const size_t n = b->m.n;
     for (size_t k = 0; k < b->n_probes; k++) {
@@ -120,13 +116,6 @@ static void compare(const bench *b, const double *X, double *errors) {
         }
         errors[k] = all > 0 ? sqrt(wrong / all) : 0;
     }
-    qsort(errors, b->n_probes, sizeof *errors, ascending);
-}
-
-static double mean(const double *x, size_t n) {
-    double sum = 0;
-    for (size_t k = 0; k < n; k++) sum += x[k];
-    return sum / (double)n;
 }
 
 static lam_status judge(bench *b, const char *text, const char *judge_text, lam_error *error) {
@@ -149,7 +138,8 @@ static lam_status judge(bench *b, const char *text, const char *judge_text, lam_
     compare(b, X, errors);
     const size_t m = b->n_probes;
     printf("%zu,%s,%s,%.1f,%zu,%.4f,%.4f,%.4f,%.4f,%.4f\n", b->m.n, text, judge_text, seconds, m,
-           mean(errors, m), errors[m / 20], errors[m / 2], errors[m - 1 - m / 20], mean(own, m));
+           stats_mean(errors, m), stats_quantile(errors, m, .05), stats_median(errors, m),
+           stats_quantile(errors, m, .95), stats_mean(own, m));
     fflush(stdout);
 done:
     form_factors_free(&f);

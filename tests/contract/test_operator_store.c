@@ -1,15 +1,11 @@
 /* Operators in a store: what is saved comes back bit for bit, what cannot be is refused in one clear line,
  * and no failed allocation is lost. */
-#include "support/store_sample.h"
+#include "support/operator_file.h"
 #include "support/suite.h"
-#include "support/transport.h"
-
-static char folder[64], path[256];
-static lam_error error;
 
 /* --- memory that fails when told to -------------------------------------------------------------------- */
 
-static long allocations_left; /* negative: no end */
+static long allocations_left = -1; /* negative: no end */
 
 /* Takes the place of the one in store/memory.c. */
 void *memory_allocate(size_t count, size_t size, const char *what, lam_error *cause) {
@@ -23,25 +19,11 @@ void *memory_allocate(size_t count, size_t size, const char *what, lam_error *ca
 }
 
 static void setup(void) {
-    sample_folder(folder);
-    snprintf(path, sizeof path, "%s/operator.h5", folder);
-    error = (lam_error){.message = ""};
+    file_setup();
     allocations_left = -1;
 }
 
-static void teardown(void) {
-    sample_folder_remove(folder);
-}
-
-#define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
-
 /* --- saving and loading -------------------------------------------------------------------------------- */
-
-enum { SUBJECTS = 2 * TRANSPORT_KINDS };
-
-static transport subject(int index) {
-    return transport_make((transport_kind)(index % TRANSPORT_KINDS), index >= TRANSPORT_KINDS);
-}
 
 static lam_status save(const lam_operator *op, lam_error *cause) {
     lam_status status = LAM_OK;
@@ -59,19 +41,19 @@ done:
 
 START_TEST(what_is_saved_comes_back_bit_for_bit) {
     static const lam_quantity quantities[] = {LAM_RADIOSITY, LAM_IRRADIANCE, LAM_INDIRECT};
-    transport t = subject(_i);
-    size_t count = 17 * t.n * t.n_channels;
+    const transport *t = transport_kept(_i);
+    size_t count = 17 * t->n * t->n_channels;
     float *in = random_vectors(count, 12);
     lam_operator *loaded = NULL;
-    ck_ok(save(t.op, &error));
+    ck_ok(save(t->op, &error));
     ck_ok(lam_operator_open(path, &loaded, &error));
-    ck_assert_str_eq(lam_operator_kind(loaded), lam_operator_kind(t.op));
-    ck_assert_uint_eq(lam_operator_bytes(loaded), lam_operator_bytes(t.op));
-    ck_assert_uint_eq(lam_operator_work_bytes(loaded, 17), lam_operator_work_bytes(t.op, 17));
-    ck_assert((loaded->order != NULL) == (t.order != NULL));
+    ck_assert_str_eq(lam_operator_kind(loaded), lam_operator_kind(t->op));
+    ck_assert_uint_eq(lam_operator_bytes(loaded), lam_operator_bytes(t->op));
+    ck_assert_uint_eq(lam_operator_work_bytes(loaded, 17), lam_operator_work_bytes(t->op, 17));
+    ck_assert((loaded->order != NULL) == (t->order != NULL));
     for (int q = 0; q < 3; q++)
         for (int adjoint = 0; adjoint < 2; adjoint++) {
-            float *before = transport_apply(t.op, adjoint, 17, quantities[q], in);
+            float *before = transport_apply(t->op, adjoint, 17, quantities[q], in);
             float *after = transport_apply(loaded, adjoint, 17, quantities[q], in);
             ck_assert_mem_eq(before, after, count * sizeof *before);
             free(before);
@@ -79,7 +61,6 @@ START_TEST(what_is_saved_comes_back_bit_for_bit) {
         }
     lam_operator_close(loaded);
     free(in);
-    transport_free(&t);
 }
 END_TEST
 
@@ -110,14 +91,14 @@ START_TEST(exact_is_stored_as_the_whole_matrix) {
 END_TEST
 
 START_TEST(every_failed_allocation_is_an_error) {
-    transport t = subject(_i);
+    const transport *t = transport_kept(_i);
     long failures[2] = {0, 0};
     for (int loads = 0; loads < 2; loads++)
         for (long k = 0;; k++) {
             lam_operator *op = NULL;
             ck_assert_int_lt(k, 100000);
             allocations_left = k;
-            lam_status status = loads ? lam_operator_open(path, &op, &error) : save(t.op, &error);
+            lam_status status = loads ? lam_operator_open(path, &op, &error) : save(t->op, &error);
             allocations_left = -1;
             lam_operator_close(op);
             if (status == LAM_OK) break;
@@ -126,111 +107,12 @@ START_TEST(every_failed_allocation_is_an_error) {
         }
     ck_assert_int_gt(failures[0], 1);
     ck_assert_int_gt(failures[1], 3);
-    transport_free(&t);
 }
 END_TEST
 
 /* --- files that cannot be ------------------------------------------------------------------------------- */
 
-/* A file to write, and how it differs from a good one: what is 0 or NULL is as it should be, "-" is left out.
- * The good ones have n = 6, k = 2; one channel when folded or exact, two when factored. */
-typedef struct recipe {
-    const char *what, *kind, *form, *layout;
-    const char *without;    /* this dataset */
-    const char *other_type; /* this dataset in double */
-    const char *narrow;     /* these datasets (names after each other) are of narrow_type, all of fill */
-    store_type narrow_type;
-    uint16_t fill;
-    const char *encoding; /* of those; NULL: none */
-    const char *scales;   /* these have a scale of scale_size (0: 2) numbers that are scale */
-    float scale;
-    size_t scale_size;
-    const char *precision; /* the attribute; NULL: none */
-    const char *bad;       /* this dataset holds bad_value at bad_index */
-    float bad_value;
-    size_t bad_index;
-    size_t n, n_channels, left[2], V[2], core[3], M[3], order_size;
-    uint32_t order[6];
-    lam_status status;
-    const char *word;
-} recipe;
-
-static size_t or_else(size_t value, size_t usual) {
-    return value > 0 ? value : usual;
-}
-
-static void write_array(store *s, const recipe *r, const char *name, int rank, const size_t *dims,
-                        float value) {
-    size_t count = 1;
-    for (int i = 0; i < rank; i++) count *= dims[i];
-    if (r->without != NULL && strcmp(r->without, name) == 0) return;
-    if (r->scales != NULL && strstr(r->scales, name) != NULL) {
-        char scale_name[64];
-        const size_t size = or_else(r->scale_size, 2);
-        float *scale = test_allocate(size, sizeof *scale);
-        for (size_t j = 0; j < size; j++) scale[j] = r->scale;
-        snprintf(scale_name, sizeof scale_name, "%s_scale", name);
-        ck_ok(store_write(s, scale_name, STORE_F32, 1, &size, scale, &error));
-        free(scale);
-    }
-    if (r->narrow != NULL && strstr(r->narrow, name) != NULL) {
-        uint32_t *values = test_allocate(count, sizeof *values);
-        for (size_t i = 0; i < count; i++)
-            memcpy((char *)values + i * store_type_size(r->narrow_type), &r->fill,
-                   store_type_size(r->narrow_type) < 2 ? 1 : 2);
-        ck_ok(store_write(s, name, r->narrow_type, rank, dims, values, &error));
-        if (r->encoding != NULL) ck_ok(store_set_text(s, name, "encoding", r->encoding, &error));
-        free(values);
-        return;
-    }
-    if (r->other_type != NULL && strcmp(r->other_type, name) == 0) {
-        double *doubles = test_allocate(count, sizeof *doubles);
-        ck_ok(store_write(s, name, STORE_F64, rank, dims, doubles, &error));
-        free(doubles);
-        return;
-    }
-    float *x = test_allocate(count, sizeof *x);
-    for (size_t i = 0; i < count; i++) x[i] = value;
-    if (r->bad != NULL && strcmp(r->bad, name) == 0) x[r->bad_index] = r->bad_value;
-    ck_ok(store_write(s, name, STORE_F32, rank, dims, x, &error));
-    free(x);
-}
-
-static void write_attribute(store *s, const char *name, const char *given, const char *usual) {
-    if (given == NULL) given = usual;
-    if (strcmp(given, "-") != 0) ck_ok(store_set_text(s, "/operator", name, given, &error));
-}
-
-static void write_recipe(const recipe *r) {
-    store *s = NULL;
-    const char *kind = r->kind != NULL ? r->kind : "low_rank", *form = r->form != NULL ? r->form : "folded";
-    bool factored = strcmp(form, "factored") == 0;
-    size_t n = or_else(r->n, 6), C = or_else(r->n_channels, factored ? 2 : 1);
-    size_t left[2] = {or_else(r->left[0], n), or_else(r->left[1], 2)};
-    size_t V[2] = {or_else(r->V[0], n), or_else(r->V[1], 2)};
-    size_t core[3] = {or_else(r->core[0], C), or_else(r->core[1], 2), or_else(r->core[2], 2)};
-    size_t M[3] = {or_else(r->M[0], C), or_else(r->M[1], n), or_else(r->M[2], n)}, rho[2] = {C, n};
-    ck_ok(store_create(path, &s, &error));
-    write_array(s, r, "/mesh/reflectance", 2, rho, 0.5f);
-    if (r->without == NULL || strcmp(r->without, "/operator") != 0) {
-        write_attribute(s, "kind", kind, NULL);
-        write_attribute(s, "layout", r->layout, "rows");
-        if (r->precision != NULL) write_attribute(s, "precision", r->precision, NULL);
-        if (strcmp(kind, "exact") != 0) write_attribute(s, "form", form, NULL);
-        if (strcmp(kind, "exact") == 0) {
-            write_array(s, r, "/operator/M", 3, M, 0.1f);
-        } else {
-            write_array(s, r, factored ? "/operator/U" : "/operator/Y", 2, left, -0.1f);
-            write_array(s, r, "/operator/V", 2, V, 0.1f);
-            if (factored) write_array(s, r, "/operator/core", 3, core, 0.1f);
-        }
-        if (r->order_size > 0)
-            ck_ok(store_write(s, "/operator/order", STORE_U32, 1, &r->order_size, r->order, &error));
-    }
-    ck_ok(store_seal(s, &error));
-}
-
-static const recipe recipes[] = {
+static const file_recipe recipes[] = {
     {.what = "good, folded"},
     {.what = "good, factored", .form = "factored"},
     {.what = "good, exact", .kind = "exact", .n_channels = 3},
@@ -338,100 +220,6 @@ static const recipe recipes[] = {
      .bad_index = 14,
      .status = LAM_ERR_FORMAT,
      .word = "/operator/M[0][2][2]"},
-#define BOTH "/operator/Y /operator/V"
-    {.what = "good, f16", .narrow = BOTH, .narrow_type = STORE_F16, .precision = "f16"},
-    {.what = "good, f16 with scales",
-     .narrow = BOTH,
-     .narrow_type = STORE_F16,
-     .scales = BOTH,
-     .scale = .25f,
-     .precision = "f16"},
-    {.what = "good, bf16", .narrow = BOTH, .narrow_type = STORE_U16, .encoding = "bf16", .precision = "bf16"},
-    {.what = "good, i8", .narrow = BOTH, .narrow_type = STORE_I8, .scales = BOTH, .scale = .5f},
-    {.what = "u16 without an encoding",
-     .narrow = BOTH,
-     .narrow_type = STORE_U16,
-     .status = LAM_ERR_FORMAT,
-     .word = "/operator/Y has the encoding '', must be 'bf16'"},
-    {.what = "unknown encoding",
-     .narrow = BOTH,
-     .narrow_type = STORE_U16,
-     .encoding = "posit",
-     .status = LAM_ERR_FORMAT,
-     .word = "encoding 'posit'"},
-    {.what = "i8 said to be bf16",
-     .narrow = BOTH,
-     .narrow_type = STORE_I8,
-     .encoding = "bf16",
-     .status = LAM_ERR_FORMAT,
-     .word = "encoding 'bf16'"},
-    {.what = "whole numbers",
-     .narrow = BOTH,
-     .narrow_type = STORE_U32,
-     .status = LAM_ERR_FORMAT,
-     .word = "must be of f32, f16, bf16 or i8"},
-    {.what = "only Y in f16",
-     .narrow = "/operator/Y",
-     .narrow_type = STORE_F16,
-     .status = LAM_ERR_FORMAT,
-     .word = "one array of f16 and one of f32"},
-    {.what = "i8 without a scale",
-     .narrow = BOTH,
-     .narrow_type = STORE_I8,
-     .status = LAM_ERR_FORMAT,
-     .word = "no /operator/Y_scale"},
-    {.what = "i8, V without a scale",
-     .narrow = BOTH,
-     .narrow_type = STORE_I8,
-     .scales = "/operator/Y",
-     .scale = 1,
-     .status = LAM_ERR_FORMAT,
-     .word = "no /operator/V_scale"},
-    {.what = "scale short",
-     .narrow = BOTH,
-     .narrow_type = STORE_I8,
-     .scales = BOTH,
-     .scale = 1,
-     .scale_size = 1,
-     .status = LAM_ERR_FORMAT,
-     .word = "/operator/Y_scale"},
-    {.what = "scale 0",
-     .narrow = BOTH,
-     .narrow_type = STORE_I8,
-     .scales = BOTH,
-     .status = LAM_ERR_FORMAT,
-     .word = "/operator/Y_scale[0] = 0, must be above 0"},
-    {.what = "scale NaN",
-     .narrow = BOTH,
-     .narrow_type = STORE_F16,
-     .scales = BOTH,
-     .scale = NAN,
-     .status = LAM_ERR_FORMAT,
-     .word = "/operator/Y_scale[0] = nan"},
-    {.what = "f32 with a scale",
-     .scales = "/operator/V",
-     .scale = 1,
-     .status = LAM_ERR_FORMAT,
-     .word = "/operator/V is of f32 and must not have"},
-    {.what = "NaN in f16",
-     .narrow = BOTH,
-     .narrow_type = STORE_F16,
-     .fill = 0x7e00,
-     .status = LAM_ERR_FORMAT,
-     .word = "/operator/Y[0][0] = nan"},
-    {.what = "infinity in bf16",
-     .narrow = BOTH,
-     .narrow_type = STORE_U16,
-     .fill = 0xff80,
-     .encoding = "bf16",
-     .status = LAM_ERR_FORMAT,
-     .word = "/operator/Y[0][0] = -inf"},
-    {.what = "another precision said",
-     .narrow = BOTH,
-     .narrow_type = STORE_F16,
-     .precision = "bf16",
-     .status = LAM_ERR_FORMAT,
-     .word = "precision 'bf16', its arrays are of f16"},
     {.what = "reflectance 1",
      .bad = "/mesh/reflectance",
      .bad_value = 1,
@@ -467,19 +255,9 @@ static const recipe recipes[] = {
 };
 
 START_TEST(files_that_cannot_be_are_refused) {
-    const recipe *r = &recipes[_i];
-    lam_operator *op = NULL;
-    write_recipe(r);
-    error = (lam_error){.message = ""};
-    lam_status status = lam_operator_open(path, &op, &error);
-    ck_assert_msg(status == r->status, "%s: %s (%s)", r->what, lam_status_text(status), error.message);
-    ck_assert((op != NULL) == (status == LAM_OK));
-    if (status != LAM_OK) {
-        ck_assert_msg(strstr(error.message, r->word) != NULL, "%s: no '%s' in: %s", r->what, r->word,
-                      error.message);
-        ck_assert_msg(strstr(error.message, path) != NULL, "%s: no file in: %s", r->what, error.message);
-    }
-    lam_operator_close(op);
+    const file_recipe *r = &recipes[_i];
+    file_write(r);
+    file_judge(r->what, r->status, r->word);
 }
 END_TEST
 
@@ -599,10 +377,11 @@ int main(void) {
     Suite *suite = suite_create("operator store");
     TCase *tests = tcase_create("files");
     tcase_set_timeout(tests, 300);
-    tcase_add_checked_fixture(tests, setup, teardown);
-    tcase_add_loop_test(tests, what_is_saved_comes_back_bit_for_bit, 0, SUBJECTS);
+    tcase_add_unchecked_fixture(tests, transport_keep_all, transport_free_all);
+    tcase_add_checked_fixture(tests, setup, file_teardown);
+    tcase_add_loop_test(tests, what_is_saved_comes_back_bit_for_bit, 0, TRANSPORTS);
     tcase_add_test(tests, exact_is_stored_as_the_whole_matrix);
-    tcase_add_loop_test(tests, every_failed_allocation_is_an_error, 0, SUBJECTS);
+    tcase_add_loop_test(tests, every_failed_allocation_is_an_error, 0, TRANSPORTS);
     tcase_add_loop_test(tests, files_that_cannot_be_are_refused, 0, (int)(sizeof recipes / sizeof *recipes));
     tcase_add_test(tests, missing_arguments_and_files_are_errors);
     tcase_add_test(tests, builders_are_told_what_is_wrong);

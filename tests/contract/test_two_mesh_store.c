@@ -1,22 +1,7 @@
 /* Operators of two meshes in a store: what a file must hold, and what is refused in one clear line. */
 #include "solver/operator/two_mesh.h"
-#include "support/store_sample.h"
+#include "support/operator_file.h"
 #include "support/suite.h"
-#include "support/transport.h"
-
-static char folder[64], path[256];
-static lam_error error;
-
-static void setup(void) {
-    sample_folder(folder);
-    snprintf(path, sizeof path, "%s/operator.h5", folder);
-}
-
-static void teardown(void) {
-    sample_folder_remove(folder);
-}
-
-#define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
 
 /* How a file differs from a good one of n = 6, k = 2: what is 0 or NULL is as it should be. */
 typedef struct recipe {
@@ -98,19 +83,8 @@ static void write_recipe(const recipe *r) {
 
 START_TEST(files_are_judged) {
     const recipe *r = &recipes[_i];
-    lam_operator *op = NULL;
     write_recipe(r);
-    error = (lam_error){.message = ""};
-    const lam_status status = lam_operator_open(path, &op, &error);
-    ck_assert_msg(status == (r->word == NULL ? LAM_OK : LAM_ERR_FORMAT), "%s: %s (%s)", r->what,
-                  lam_status_text(status), error.message);
-    ck_assert((op != NULL) == (status == LAM_OK));
-    if (r->word != NULL) {
-        ck_assert_msg(strstr(error.message, r->word) != NULL, "%s: no '%s' in: %s", r->what, r->word,
-                      error.message);
-        ck_assert_msg(strstr(error.message, path) != NULL, "%s: no file in: %s", r->what, error.message);
-    }
-    lam_operator_close(op);
+    file_judge(r->what, r->word == NULL ? LAM_OK : LAM_ERR_FORMAT, r->word);
 }
 END_TEST
 
@@ -140,7 +114,7 @@ int main(void) {
     Suite *suite = suite_create("two meshes in a store");
     TCase *tests = tcase_create("files");
     tcase_set_timeout(tests, 120);
-    tcase_add_checked_fixture(tests, setup, teardown);
+    tcase_add_checked_fixture(tests, file_setup, file_teardown);
     tcase_add_loop_test(tests, files_are_judged, 0, (int)(sizeof recipes / sizeof *recipes));
     tcase_add_test(tests, patches_can_be_asked_for);
     suite_add_tcase(suite, tests);

@@ -284,8 +284,18 @@ class TwoMesh(unittest.TestCase):
             self.assertIn("--quantity patch does not use " + option, done.stderr)
         _, log = self.build("--rank", 9, "--coherence", .5, "--min-area", 1, "--alpha", .3, "--epsilon", .2)
         self.assertIn("2msc does not use --epsilon, --alpha, --coherence, --min-area", log)
-        _, log = self.build("--coherence", .5, "--assign", "inclusion")
+        _, log = self.build("--coherence", .5, "--assign", "inclusion", "--factorizer", "auto")
         self.assertNotIn("2msc does not use", log)
+        for factorizer in ("hf", "svd", "rsi", "sgrsvd"):
+            store, log = self.build("--rank", 9, "--factorizer", factorizer)
+            self.assertIn("2msc does not use --factorizer", log)
+            with h5py.File(store) as file:
+                self.assertEqual(file["operator"].attrs["factorizer"], b"none")
+        _, log = self.build("--rank", 9, "--factorizer", "qr")
+        self.assertNotIn("--factorizer", log)
+        done = must("precompute", self.factors, "-o", self.path("e.h5"), "--method", "exact", "--factorizer", "qr",
+                    "--probes", 0)
+        self.assertIn("exact does not use --factorizer", done.stderr)
 
     # --- what is refused ---------------------------------------------------------------------------------------
 
@@ -300,14 +310,15 @@ class TwoMesh(unittest.TestCase):
                 (2, "--min-area", ["--min-area", "small"]),
                 (2, "--assign", ["--assign", "guess"]),
                 (2, "--rank", ["--rank", 0]),
-                (2, "--method 2msc has auto or qr", ["--factorizer", "hf"]),
+                (2, "--factorizer", ["--factorizer", "cholesky"]),
                 (1, "--memory", ["--memory", "100K"])):
             with self.subTest(options):
                 self.refused(status, wanted, "precompute", self.factors, "-o", out, "--method", "2msc",
                              "--probes", 0, "--quiet", *options)
                 self.assertFalse(os.path.exists(out))
-        self.refused(2, "--factorizer qr: goes with --method 2msc only", "precompute", self.factors, "-o", out,
-                     "--factorizer", "qr")
+        for method in ([], ["--method", "low-rank"]):
+            self.refused(2, "--factorizer qr: goes with --method 2msc only", "precompute", self.factors, "-o", out,
+                         "--factorizer", "qr", *method)
 
     def test_a_damaged_patch_is_refused(self):
         store, _ = self.build(name="damaged.h5")

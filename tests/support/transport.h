@@ -410,6 +410,30 @@ static inline void transport_free(transport *t) {
     free(t->order);
 }
 
+/* Each kind in mesh order, then each in an order of its own. */
+enum { TRANSPORTS = 2 * TRANSPORT_KINDS };
+
+/* Made once and kept: an operator does not change. */
+static inline transport *transport_kept(int index) {
+    static transport kept[TRANSPORTS];
+    if (kept[index].op == NULL)
+        kept[index] = transport_make((transport_kind)(index % TRANSPORT_KINDS), index >= TRANSPORT_KINDS);
+    return &kept[index];
+}
+
+/* Unchecked fixtures: what is there before libcheck forks, no test makes again. */
+static inline void transport_keep_all(void) {
+    for (int i = 0; i < TRANSPORTS; i++) (void)transport_kept(i);
+}
+
+static inline void transport_free_all(void) {
+    for (int i = 0; i < TRANSPORTS; i++) {
+        transport *t = transport_kept(i);
+        transport_free(t);
+        *t = (transport){.op = NULL};
+    }
+}
+
 /* The row of a quantity's matrix: out_i = direct E_i + scale sum_j P_ij E_j. */
 static inline void quantity_row(lam_quantity quantity, float rho, double *direct, double *scale) {
     *direct = quantity == LAM_RADIOSITY ? 1.0 : 0.0;

@@ -441,6 +441,34 @@ START_TEST(a_core_that_is_singular_is_refused) {
 }
 END_TEST
 
+/* The factorizers of low rank have no use here: the operator is the same without them. */
+START_TEST(other_factorizers_are_not_used) {
+    static const char *const others[] = {"hf", "svd", "rsi", "sgrsvd"};
+    room r = room_create(cube, 4, .5f, 1);
+    float *E = random_vectors(r.m.n, 5);
+    build_report report;
+    lam_operator *op = build_rank(&r, 12, "auto", &report);
+    float *expected = transport_apply(op, false, 1, LAM_RADIOSITY, E);
+    lam_operator_close(op);
+    for (int f = 0; f < 4; f++) {
+        op = build_rank(&r, 12, others[f], &report);
+        float *B = transport_apply(op, false, 1, LAM_RADIOSITY, E);
+        ck_assert_ptr_null(report.factorizer);
+        ck_assert_mem_eq(B, expected, r.m.n * sizeof *B);
+        free(B);
+        lam_operator_close(op);
+    }
+    build_options options = defaults; /* exact uses none of them, nor qr */
+    options.method = "exact";
+    options.factorizer = "qr";
+    lam_operator_close(build_as(room_problem(&r), &options, &report));
+    ck_assert_ptr_null(report.factorizer);
+    free(expected);
+    free(E);
+    room_free(&r);
+}
+END_TEST
+
 START_TEST(what_cannot_be_built_is_refused) {
     room r = room_create(cube, 4, .5f, 1);
     const build_problem *problem = room_problem(&r);
@@ -456,11 +484,14 @@ START_TEST(what_cannot_be_built_is_refused) {
     options.min_area = -1;
     check_refused(problem, &options, LAM_ERR_ARGUMENT, "--min-area -1");
     options = defaults;
-    options.factorizer = "hf";
-    check_refused(problem, &options, LAM_ERR_ARGUMENT, "auto or qr");
-    options.method = "low-rank";
-    options.factorizer = "qr";
-    check_refused(problem, &options, LAM_ERR_ARGUMENT, "--method 2msc");
+    options.factorizer = "cholesky";
+    check_refused(problem, &options, LAM_ERR_ARGUMENT, "--factorizer cholesky: unknown");
+    static const char *const factorizing[] = {"low-rank", "auto"};
+    for (int m = 0; m < 2; m++) {
+        options.method = factorizing[m];
+        options.factorizer = "qr";
+        check_refused(problem, &options, LAM_ERR_ARGUMENT, "--method 2msc");
+    }
     options = defaults;
     r.problem.surface = NULL;
     check_refused(problem, &options, LAM_ERR_INTERNAL, "surfaces");
@@ -506,6 +537,7 @@ int main(void) {
     tcase_add_test(tests, without_reflectance_light_arrives_once);
     tcase_add_test(tests, one_element);
     tcase_add_test(tests, a_core_that_is_singular_is_refused);
+    tcase_add_test(tests, other_factorizers_are_not_used);
     tcase_add_test(tests, what_cannot_be_built_is_refused);
     tcase_add_test(tests, threads_give_the_same_bits);
     suite_add_tcase(suite, tests);

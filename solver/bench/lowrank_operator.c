@@ -1,0 +1,79 @@
+/* One operator: built, timed and judged. */
+#include "solver/bench/lowrank.h"
+#include "solver/bench/stats.h"
+#include "solver/clock.h"
+
+#include <stdlib.h>
+
+enum { SOLVES = 31 };
+
+static build_problem problem_of(const lowrank_scene *s) {
+    return (build_problem){.n = s->m.n,
+                           .n_channels = s->m.n_channels,
+                           .area = s->m.area,
+                           .reflectance = s->m.reflectance,
+                           .F = &s->f.F,
+                           .order = s->z_order,
+                           .noise = recipe_noise(&s->f.recipe),
+                           .centre = (const double(*)[3])s->centre,
+                           .normal = (const float(*)[3])s->m.normal,
+                           .surface = s->surface};
+}
+
+/* Median seconds of one radiosity. */
+static lam_status time_answer(const lam_operator *op, double *median, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = lam_operator_elements(op) * lam_operator_channels(op);
+    double seconds[SOLVES];
+    float *E = NULL, *B = NULL;
+    void *work = NULL;
+    const size_t bytes = lam_operator_work_bytes(op, 1);
+    E = memory_allocate(n, sizeof *E, "an answer", error);
+    B = memory_allocate(n, sizeof *B, "an answer", error);
+    work = memory_allocate(1, bytes, "an answer", error);
+    if (E == NULL || B == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < n; i++) E[i] = (float)(i % 7);
+    for (int k = 0; k < SOLVES; k++) {
+        const double started = clock_seconds();
+        TRY(lam_operator_apply(op, 1, LAM_RADIOSITY, E, B, work, bytes, error));
+        seconds[k] = clock_seconds() - started;
+    }
+    *median = stats_median(seconds, SOLVES);
+done:
+    free(E);
+    free(B);
+    free(work);
+    return status;
+}
+
+lam_status lowrank_judge(const bench_run *run, const lowrank_scene *s, const lowrank_case *of,
+                         lowrank_verdict *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const build_problem problem = problem_of(s);
+    const build_options how = {.method = of->method,
+                               .factorizer = of->factorizer,
+                               .epsilon = of->epsilon,
+                               .rank = of->rank,
+                               .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
+                               .levels = -1,
+                               .seed = run->seed,
+                               .progress = run->progress};
+    const judge_input input = {.problem = &problem,
+                               .row_sums = s->f.row_sums,
+                               .emission = s->m.emission,
+                               .independent = of->independent,
+                               .probes = s->m.n < of->probes ? s->m.n : of->probes,
+                               .seed = run->seed,
+                               .progress = run->progress};
+    lowrank_verdict verdict = {.bytes = 0};
+    lam_operator *op = NULL;
+    TRY(bench_check(run, error));
+    TRY(build_operator(&problem, &how, &op, &verdict.built, error));
+    TRY(time_answer(op, &verdict.answer_seconds, error));
+    TRY(judge_operator(op, &input, &verdict.judged, error));
+    verdict.bytes = (double)lam_operator_bytes(op);
+    *out = verdict;
+done:
+    lam_operator_close(op);
+    return status;
+}
