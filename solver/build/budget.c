@@ -35,16 +35,21 @@ void budget_share(const budget *b, double epsilon, int levels, double p[BUDGET_L
         share_sums(epsilon, b->alpha, levels, p);
         return;
     }
-    double all = 0;
-    const bool apart = b->leaf > 0 && levels > 1;
+    p[0] = epsilon * sqrt(b->alpha);
+    for (int l = 1; l <= levels; l++) /* 2^l p_l^2 = (1 - alpha) part_l epsilon^2 */
+        p[l] = epsilon * sqrt((1 - b->alpha) * b->part[l] / ldexp(1, l));
+}
+
+void budget_divide(budget *b, int levels, double ratio, double leaf) {
+    const bool apart = leaf > 0 && levels > 1;
     const int geometric = apart ? levels - 1 : levels;
-    for (int l = 1; l <= geometric; l++) all += pow(b->ratio, l);
-    for (int l = 0; l <= levels; l++) {
-        double share = b->alpha;
-        if (l > geometric)
-            share = (1 - b->alpha) * b->leaf;
-        else if (l > 0)
-            share = (1 - b->alpha) * (apart ? 1 - b->leaf : 1) * pow(b->ratio, l) / all;
-        p[l] = epsilon * sqrt(share / ldexp(1, l)); /* 2^l p_l^2 = share epsilon^2 */
+    double all = 0;
+    for (int l = 1; l <= geometric; l++) all += pow(ratio, l);
+    for (int l = 0; l <= BUDGET_LEVELS_MOST; l++) {
+        b->part[l] = 0;
+        if (l > geometric && l <= levels)
+            b->part[l] = leaf;
+        else if (l > 0 && l <= levels)
+            b->part[l] = (apart ? 1 - leaf : 1) * pow(ratio, l) / all;
     }
 }

@@ -23,9 +23,12 @@ typedef enum budget_rule {
 typedef struct budget {
     budget_rule rule;
     double alpha; /* the root's share (of epsilon^2, or of epsilon where errors are summed), in (0, 1) */
-    double ratio; /* of squares: the share of a level over that of the level above it, > 0 */
-    double leaf;  /* of squares: the leaves' part of what the root leaves; 0: by the ratio too */
+    /* Of squares: the part of what the root leaves that level l = 1 ... levels takes; together 1. */
+    double part[BUDGET_LEVELS_MOST + 1];
 } budget;
+
+/* Parts that fall by a ratio from level to level, but for the leaves where leaf > 0: those take it. */
+void budget_divide(budget *b, int levels, double ratio, double leaf);
 
 /* What a node of each level may leave out, p[0] of the root to p[levels] of a leaf. */
 void budget_share(const budget *b, double epsilon, int levels, double p[BUDGET_LEVELS_MOST + 1]);

@@ -8,7 +8,7 @@
 typedef struct factorizer_options {
     double epsilon; /* |S - Q V^T|_2 <= epsilon (in the Frobenius norm where the budget says so) */
     size_t rank;    /* > 0: exactly min(rank, n) columns, whatever they leave */
-    budget budget;  /* of HF; a ratio of 0: the one that is expected to be fastest */
+    budget budget;  /* of HF; parts of 0: those that are expected to be fastest */
     int levels;     /* of HF; negative: as many as are expected to be fastest */
     int iterations; /* of RSI; negative: its default */
     double noise;   /* sampling error of S in the 2-norm, about; 0: none known */
@@ -20,7 +20,7 @@ typedef struct factorizer_options {
 typedef struct factorizer_report {
     const char *name;
     int levels;                                 /* of HF, else 0 */
-    budget shared;                              /* as it was used */
+    double left[BUDGET_LEVELS_MOST + 1];        /* what a node of each level might leave out */
     double compression[BUDGET_LEVELS_MOST + 1]; /* rho_l: columns kept over columns given, by level */
     double passes;                              /* how often all columns of S were read */
 } factorizer_report;

@@ -1,6 +1,7 @@
 #include "solver/build/gram.h"
 
 #include "solver/matrix/dense.h"
+#include "solver/matrix/pieces.h"
 #include "store/status.h"
 
 #include <lapacke.h>
@@ -49,21 +50,66 @@ typedef struct thin_rows {
     uint64_t *begin; /* [n][tiles + 1] */
 } thin_rows;
 
-/* g += a_p a_q for p in tile one and q in tile two of every row. */
-static void add_tile(gram *g, const sparse_block *A, const thin_rows *rows, size_t one, size_t two) {
-    const size_t m = g->m;
+typedef struct thin_job {
+    gram *g;
+    const sparse_block *A;
+    thin_rows rows;
+} thin_job;
+
+/* g_c += a_q x and h_c += a_q y at the columns c of entries first <= q < last: two rows of the tile share
+ * what is read. */
+static inline void add_two(const sparse_block *A, uint64_t first, uint64_t last, float x, float y,
+                           float *restrict g, float *restrict h) {
+    for (uint64_t q = first; q < last; q++) {
+        const uint32_t c = A->columns[q];
+        const float a = A->data[q];
+        g[c] += a * x;
+        h[c] += a * y;
+    }
+}
+
+/* The products of entries p of one tile and q of another, or q >= p of the same, of one row. */
+static void add_single(gram *g, const sparse_block *A, uint64_t p, uint64_t p_end, uint64_t q,
+                       uint64_t q_end) {
+    const bool same = p == q;
+    for (; p + 2 <= p_end; p += 2) {
+        const float x = A->data[p], y = A->data[p + 1];
+        float *one = g->single + (size_t)A->columns[p] * g->m,
+              *two = g->single + (size_t)A->columns[p + 1] * g->m;
+        if (same) {
+            one[A->columns[p]] += x * x;
+            one[A->columns[p + 1]] += x * y;
+            two[A->columns[p + 1]] += y * y;
+        }
+        add_two(A, same ? p + 2 : q, q_end, x, y, one, two);
+    }
+    if (p < p_end) {
+        float *one = g->single + (size_t)A->columns[p] * g->m;
+        for (q = same ? p : q; q < q_end; q++) one[A->columns[q]] += A->data[p] * A->data[q];
+    }
+}
+
+static void add_double(gram *g, const sparse_block *A, uint64_t p, uint64_t p_end, uint64_t q,
+                       uint64_t q_end) {
+    const bool same = p == q;
+    for (; p < p_end; p++) {
+        double *one = g->full + (size_t)A->columns[p] * g->m;
+        for (uint64_t k = same ? p : q; k < q_end; k++)
+            one[A->columns[k]] += (double)A->data[p] * (double)A->data[k];
+    }
+}
+
+/* One tile of g from every row; pieces count the tiles of the upper triangle. */
+static void add_tile(const void *context, size_t piece) {
+    const thin_job *job = context;
+    const thin_rows *rows = &job->rows;
+    size_t one = 0;
+    while (piece >= rows->tiles - one) piece -= rows->tiles - one++;
+    const size_t two = one + piece;
     for (size_t i = 0; i < rows->n; i++) {
         const uint64_t *begin = rows->begin + i * (rows->tiles + 1);
-        for (uint64_t p = begin[one]; p < begin[one + 1]; p++) {
-            const float a = A->data[p];
-            for (uint64_t q = one == two ? p : begin[two]; q < begin[two + 1]; q++) {
-                const size_t at = (size_t)A->columns[p] * m + A->columns[q];
-                if (g->single != NULL)
-                    g->single[at] += a * A->data[q];
-                else
-                    g->full[at] += (double)a * (double)A->data[q];
-            }
-        }
+        (job->g->single != NULL ? add_single : add_double)(job->g, job->A, begin[one], begin[one + 1],
+                                                           begin[two], begin[two + 1]);
     }
 }
 
@@ -103,8 +149,8 @@ lam_status gram_add_sparse(gram *g, const sparse_block *A, lam_error *error) {
         spread = 0;
     }
     TRY(gram_add(g, spread, panel, error));
-    for (size_t one = 0; one < tiles; one++)
-        for (size_t two = one; two < tiles; two++) add_tile(g, A, &thin, one, two);
+    const thin_job job = {.g = g, .A = A, .rows = thin};
+    pieces_run(add_tile, &job, tiles * (tiles + 1) / 2);
 done:
     free(panel);
     free(thin.begin);

@@ -27,8 +27,8 @@ lam_status gram_eigen(gram *g, bool vectors, double *values, lam_error *error);
 /* V [m][*rank], freed by the caller, orthonormal: about the eigenvectors whose values are at least floor, by
  * subspace iteration, so that no vector orthogonal to V has x^T G x above floor |x|^2 (measured by Lanczos
  * steps, to about a per cent). *rank is 0 and *V NULL where they turn out to be many: then gram_eigen is
- * cheaper. Of a gram in single precision; g stays. guess is about how many they are, 0: not known. Cost:
- * O(m^2 rank). Errors as above. */
-lam_status gram_leading(const gram *g, double floor, size_t guess, float **V, size_t *rank, lam_error *error);
+ * cheaper. Of a gram in single precision, whose other half it sets. guess is about how many they are, 0: not
+ * known. Cost: O(m^2 rank). Errors as above. */
+lam_status gram_leading(gram *g, double floor, size_t guess, float **V, size_t *rank, lam_error *error);
 
 #endif

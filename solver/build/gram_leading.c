@@ -19,16 +19,10 @@ enum { FIRST_GUESS = 16, GIVE_UP = 3, ITERATIONS = 3 };
 /* Ritz values come from below; this much under the floor they count. */
 static const double slack = .9;
 
-/* The whole of a symmetric matrix of which j >= i is set. */
-static float *fill_symmetric(const gram *g, lam_error *error) {
-    const size_t m = g->m;
-    float *G = memory_allocate(m, m * sizeof *G, "factorization", error);
-    if (G == NULL) return NULL;
-    for (size_t i = 0; i < m; i++) {
-        memcpy(G + i * m + i, g->single + i * m + i, (m - i) * sizeof *G);
-        for (size_t j = 0; j < i; j++) G[i * m + j] = g->single[j * m + i];
-    }
-    return G;
+/* Sets the other half too. */
+static void fill_symmetric(gram *g) {
+    for (size_t i = 0; i < g->m; i++)
+        for (size_t j = 0; j < i; j++) g->single[i * g->m + j] = g->single[j * g->m + i];
 }
 
 /* Rayleigh and Ritz: X [m][w] orthonormal becomes X Z, with Z the eigenvectors of X^T G X by falling value.
@@ -142,19 +136,16 @@ done:
     return status;
 }
 
-lam_status gram_leading(const gram *g, double floor, size_t guess, float **V, size_t *rank,
-                        lam_error *error) {
+lam_status gram_leading(gram *g, double floor, size_t guess, float **V, size_t *rank, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t m = g->m;
-    float *G = fill_symmetric(g, error);
     *V = NULL;
     *rank = 0;
-    if (G == NULL) return LAM_ERR_MEMORY;
+    fill_symmetric(g);
     /* A quarter more than are expected, or the iteration is slow. */
     for (size_t w = guess > 0 ? guess + guess / 4 + 8 : m / FIRST_GUESS;
          w * GIVE_UP <= m && *V == NULL && w > 0; w *= 2)
-        TRY(attempt(m, G, w, floor, V, rank, error));
+        TRY(attempt(m, g->single, w, floor, V, rank, error));
 done:
-    free(G);
     return status;
 }

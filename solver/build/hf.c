@@ -16,9 +16,9 @@ enum { ROOT_ROUND = 64 };
 typedef struct hf_run {
     const scaled_matrix *S;
     const factorizer_options *options;
-    int levels;
-    double p[BUDGET_LEVELS_MOST + 1];
+    hf_plan plan;
     const hf_forecast *forecast; /* or NULL */
+    int alone;                   /* levels whose nodes are made one after the other */
     size_t columns_done;
     size_t given[BUDGET_LEVELS_MOST + 1], kept[BUDGET_LEVELS_MOST + 1]; /* columns, by level */
     lam_status status;                                                  /* the first failure of a task */
@@ -27,32 +27,39 @@ typedef struct hf_run {
 
 static truncation truncation_of(const hf_run *run, int level) {
     return (truncation){.norm = budget_norm(run->options->budget.rule),
-                        .epsilon = run->p[level],
+                        .epsilon = run->plan.left[level],
                         .rank = run->options->rank,
                         .round = level == 0 ? ROOT_ROUND : 1};
 }
 
-static void count(hf_run *run, int level, size_t given, size_t kept) {
+static void count_columns(hf_run *run, int level, size_t given, size_t kept) {
     __atomic_fetch_add(&run->given[level], given, __ATOMIC_RELAXED);
     __atomic_fetch_add(&run->kept[level], kept, __ATOMIC_RELAXED);
 }
 
-/* (Q1 | Q2) = Q_r V_r^T and V = (V1 V_r1 ; V2 V_r2), eqs. 3.3, 3.5, 3.6. Takes one and two over. */
-static lam_status combine(tall_factors *one, tall_factors *two, const truncation *keep, tall_factors *out,
+/* (Q1 | Q2 | ...) = Q_r V_r^T and V = (V1 V_r1 ; V2 V_r2 ; ...), eqs. 3.3, 3.5, 3.6, of two or more parts,
+ * whose arrays go as soon as they are used. */
+static lam_status combine(size_t count, tall_factors *parts, const truncation *keep, tall_factors *out,
                           lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t k1 = one->rank, k2 = two->rank, m = one->m + two->m;
+    size_t m = 0, row = 0, column = 0;
     tall_factors joint = {0};
     float *V = NULL;
-    TRY(tsvd_pair(one->n, k1, one->Q, k2, two->Q, keep, &joint, error));
-    free(one->Q);
-    free(two->Q);
-    one->Q = two->Q = NULL;
+    TRY(tsvd_joined(count, parts, keep, &joint, error));
     const size_t r = joint.rank;
+    for (size_t k = 0; k < count; k++) {
+        m += parts[k].m;
+        free(parts[k].Q);
+        parts[k].Q = NULL;
+    }
     V = memory_allocate(m, r * sizeof *V, "factorization", error);
     if (V == NULL) TRY(LAM_ERR_MEMORY);
-    dense_multiply(one->m, k1, r, one->V, joint.V, false, V);
-    dense_multiply(two->m, k2, r, two->V, joint.V + k1 * r, false, V + one->m * r);
+    for (size_t k = 0; k < count; k++) {
+        dense_multiply(parts[k].m, parts[k].rank, r, parts[k].V, joint.V + column * r, false, V + row * r);
+        row += parts[k].m;
+        column += parts[k].rank;
+        tall_factors_free(&parts[k]);
+    }
     free(joint.V);
     joint.V = V;
     joint.m = m;
@@ -62,18 +69,17 @@ static lam_status combine(tall_factors *one, tall_factors *two, const truncation
 done:
     free(V);
     tall_factors_free(&joint);
-    tall_factors_free(one);
-    tall_factors_free(two);
     return status;
 }
 
-/* A node of a level from its halves, which it takes over. */
-static lam_status parent(hf_run *run, int level, tall_factors *one, tall_factors *two, tall_factors *out,
-                         lam_error *error) {
-    const truncation keep = truncation_of(run, level);
-    const size_t given = one->rank + two->rank;
-    const lam_status status = combine(one, two, &keep, out, error);
-    if (status == LAM_OK) count(run, level, given, out->rank);
+/* The same by a team, in which BLAS and LAPACK work alone, so that the bits do not depend on its size. */
+static lam_status combine_in_team(size_t count, tall_factors *parts, const truncation *keep,
+                                  tall_factors *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (omp_get_level() > 0) return combine(count, parts, keep, out, error);
+#pragma omp parallel
+#pragma omp single
+    status = combine(count, parts, keep, out, error);
     return status;
 }
 
@@ -86,7 +92,7 @@ static lam_status leaf(hf_run *run, int level, size_t first, size_t last, tall_f
         keep.guess = (size_t)hf_forecast_rank(run->forecast, (double)(last - first), keep.epsilon);
     TRY(scaled_block(run->S, first, last, &block, error));
     TRY(tsvd_sparse(&block, &keep, out, error));
-    count(run, level, last - first, out->rank);
+    count_columns(run, level, last - first, out->rank);
 #pragma omp critical(hf_progress)
     {
         run->columns_done += last - first;
@@ -96,9 +102,6 @@ done:
     sparse_block_free(&block);
     return status;
 }
-
-static lam_status node(hf_run *run, size_t first, size_t last, int level, tall_factors *out,
-                       lam_error *error);
 
 static void fail(hf_run *run, lam_status status, const lam_error *error) {
 #pragma omp critical(hf_failure)
@@ -119,86 +122,99 @@ static lam_status failure(hf_run *run, lam_error *error) {
     return status;
 }
 
-/* Both halves, as two tasks where there is a team and memory for both at once, else one after the other. */
-static lam_status children(hf_run *run, size_t first, size_t last, int level, tall_factors *one,
-                           tall_factors *two, lam_error *error) {
+/* --- the tree --------------------------------------------------------------------------------------------
+ *
+ * A level whose nodes may leave out nothing has none: the nodes below go to the next level above that has. */
+
+static int level_below(const hf_run *run, int level) {
+    do level++;
+    while (level < run->plan.levels && run->plan.left[level] <= 0 && run->options->rank == 0);
+    return level < run->plan.levels ? level : run->plan.levels;
+}
+
+static lam_status gather(hf_run *run, size_t first, size_t last, int level, int below, tall_factors *parts,
+                         lam_error *error);
+
+/* Columns first ... last-1 (algorithm 4, HF). */
+static lam_status node(hf_run *run, size_t first, size_t last, int level, tall_factors *out,
+                       lam_error *error) {
+    lam_status status = LAM_OK;
+    tall_factors *parts = NULL;
+    size_t count = 0, given = 0;
+    if (progress_cancelled(run->options->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+    if (level >= run->plan.levels || last - first < 2) {
+        TRY(leaf(run, level, first, last, out, error));
+        goto done;
+    }
+    const int below = level_below(run, level);
+    const truncation keep = truncation_of(run, level);
+    count = (size_t)1 << (below - level);
+    parts = memory_allocate(count, sizeof *parts, "factorization", error);
+    if (parts == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(gather(run, first, last, level, below, parts, error));
+    for (size_t k = 0; k < count; k++) given += parts[k].rank;
+    TRY(combine_in_team(count, parts, &keep, out, error));
+    count_columns(run, level, given, out->rank);
+done:
+    for (size_t k = 0; parts != NULL && k < count; k++) tall_factors_free(&parts[k]);
+    free(parts);
+    return status;
+}
+
+/* As a task, which has nobody to return to. */
+static void gather_task(hf_run *run, size_t first, size_t last, int level, int below, tall_factors *parts) {
+    lam_error why = {0};
+    const lam_status mine = gather(run, first, last, level, below, parts, &why);
+    if (mine != LAM_OK) fail(run, mine, &why);
+}
+
+/* The nodes of a level below into parts, [2^(below - level)]; a range too short for as many leaves some as
+ * they are. Above the level where memory is enough for a subtree of each thread they are made one after the
+ * other, each by all threads; from there on siblings side by side. */
+static lam_status gather(hf_run *run, size_t first, size_t last, int level, int below, tall_factors *parts,
+                         lam_error *error) {
     lam_status status = LAM_OK;
     const size_t middle = first + (last - first) / 2;
-    if (!omp_in_parallel()) {
-        TRY(node(run, first, middle, level + 1, one, error));
-        TRY(node(run, middle, last, level + 1, two, error));
+    const bool in_team = omp_get_level() > 0;
+    if (!in_team && level >= run->alone) {
+#pragma omp parallel
+#pragma omp single
+        status = gather(run, first, last, level, below, parts, error);
+        return status;
+    }
+    if (level == below || last - first < 2) return node(run, first, last, below, parts, error);
+    tall_factors *others = parts + ((size_t)1 << (below - level - 1));
+    if (!in_team) {
+        TRY(gather(run, first, middle, level + 1, below, parts, error));
+        TRY(gather(run, middle, last, level + 1, below, others, error));
         goto done;
     }
 #pragma omp task
-    {
-        lam_error why = {0};
-        const lam_status mine = node(run, first, middle, level + 1, one, &why);
-        if (mine != LAM_OK) fail(run, mine, &why);
-    }
-    {
-        lam_error why = {0};
-        const lam_status mine = node(run, middle, last, level + 1, two, &why);
-        if (mine != LAM_OK) fail(run, mine, &why);
-    }
+    gather_task(run, first, middle, level + 1, below, parts);
+    gather_task(run, middle, last, level + 1, below, others);
 #pragma omp taskwait
     status = failure(run, error);
 done:
     return status;
 }
 
-/* Columns first ... last-1 (algorithm 4, HF). */
-static lam_status node(hf_run *run, size_t first, size_t last, int level, tall_factors *out,
-                       lam_error *error) {
-    lam_status status = LAM_OK;
-    tall_factors one = {0}, two = {0};
-    if (progress_cancelled(run->options->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
-    if (level >= run->levels || last - first < 2) {
-        TRY(leaf(run, level, first, last, out, error));
-    } else {
-        TRY(children(run, first, last, level, &one, &two, error));
-        TRY(parent(run, level, &one, &two, out, error));
-    }
-done:
-    tall_factors_free(&one);
-    tall_factors_free(&two);
-    return status;
+/* Bytes that a thread holds which makes a subtree from this level on: on the way down, each level's finished
+ * half; a leaf's columns, Gram matrix and result. */
+static double subtree_bytes(const hf_run *run, int level) {
+    const double n = (double)run->S->n, levels = run->plan.levels, m = ldexp(n, -run->plan.levels);
+    double halves = n * run->plan.kept[level];
+    for (int l = level + 1; l <= levels; l++)
+        if (run->plan.left[l] > 0) halves += n * run->plan.kept[l];
+    return sizeof(float) * (halves + m * m + 2 * m * n * run->S->rows->density);
 }
 
-/* A node's columns in a team of its own. */
-static lam_status team(hf_run *run, size_t first, size_t last, int level, tall_factors *out,
-                       lam_error *error) {
-    lam_status status = LAM_OK;
-#pragma omp parallel
-#pragma omp single
-    status = node(run, first, last, level, out, error);
-    return status;
-}
-
-/* Above the level where all subtrees fit into memory at once nodes are made one after the other, each by all
- * threads; below, siblings side by side. */
-static lam_status tree(hf_run *run, size_t first, size_t last, int level, int alone, tall_factors *out,
-                       lam_error *error) {
-    lam_status status = LAM_OK;
-    tall_factors one = {0}, two = {0};
-    if (level >= alone) return team(run, first, last, level, out, error);
-    const size_t middle = first + (last - first) / 2;
-    TRY(tree(run, first, middle, level + 1, alone, &one, error));
-    TRY(tree(run, middle, last, level + 1, alone, &two, error));
-    TRY(parent(run, level, &one, &two, out, error));
-done:
-    tall_factors_free(&one);
-    tall_factors_free(&two);
-    return status;
-}
-
-/* Levels that are made one node after the other: in a team each thread holds the joined factors of a node and
- * its result, of at most half of the columns each has. */
+/* Levels that are made one node after the other, because memory is too small for as many subtrees as there
+ * are threads. */
 static int levels_alone(const hf_run *run) {
-    const double n = (double)run->S->n, threads = omp_get_max_threads();
+    const double threads = omp_get_max_threads();
     int level = 0;
     if (run->options->memory == 0) return 0;
-    while (level < run->levels &&
-           threads * 2 * n * ldexp(n, -level) * sizeof(float) * .5 > (double)run->options->memory)
+    while (level < run->plan.levels && threads * subtree_bytes(run, level) > (double)run->options->memory)
         level++;
     return level;
 }
@@ -208,22 +224,24 @@ static lam_status hf_factorize(const scaled_matrix *S, const factorizer_options 
     lam_status status = LAM_OK;
     hf_run run = {.S = S, .options = options};
     hf_forecast *forecast = NULL;
-    hf_plan plan = {.levels = options->levels, .ratio = options->budget.ratio, .leaf = options->budget.leaf};
-    if (plan.levels < 0 || (plan.ratio <= 0 && options->budget.rule != BUDGET_SUMS)) {
+    const budget *shares = &options->budget;
+    const bool shared = shares->rule == BUDGET_SUMS || shares->part[1] > 0 || options->levels == 0;
+    if (options->levels >= 0 && shared) {
+        run.plan.levels = options->levels < BUDGET_LEVELS_MOST ? options->levels : BUDGET_LEVELS_MOST;
+        budget_share(shares, options->epsilon, run.plan.levels, run.plan.left);
+        for (int l = 0; l <= run.plan.levels; l++) run.plan.kept[l] = ldexp((double)S->n, -l - 1);
+    } else {
         TRY(hf_forecast_create(S, &forecast, error));
-        plan = hf_forecast_plan(forecast, S->n, options);
+        run.plan = hf_forecast_plan(forecast, options);
     }
     run.forecast = forecast;
-    run.levels = plan.levels < BUDGET_LEVELS_MOST ? plan.levels : BUDGET_LEVELS_MOST;
-    budget shared = options->budget;
-    shared.ratio = plan.ratio;
-    shared.leaf = plan.leaf;
-    budget_share(&shared, options->epsilon, run.levels, run.p);
-    TRY(tree(&run, 0, S->n, 0, levels_alone(&run), out, error));
-    report->shared = shared;
-    report->levels = run.levels;
-    for (int l = 0; l <= run.levels; l++)
+    run.alone = levels_alone(&run);
+    TRY(node(&run, 0, S->n, 0, out, error));
+    report->levels = run.plan.levels;
+    for (int l = 0; l <= run.plan.levels; l++) {
+        report->left[l] = run.plan.left[l];
         report->compression[l] = run.given[l] > 0 ? (double)run.kept[l] / (double)run.given[l] : 1;
+    }
 done:
     hf_forecast_free(forecast);
     return status;

@@ -17,15 +17,15 @@ double hf_forecast_rank(const hf_forecast *f, double m, double p);
 
 typedef struct hf_plan {
     int levels;
-    double ratio, leaf; /* of the budget */
+    double left[BUDGET_LEVELS_MOST + 1]; /* what a node of each level may leave out */
+    double kept[BUDGET_LEVELS_MOST + 1]; /* columns it is expected to keep */
 } hf_plan;
 
 /* Seconds, about, on one core: eq. 3.16 with the rank of each level in place of rho, and with what a Gram
- * matrix, eigenvectors and a product each take. */
-double hf_forecast_seconds(const hf_forecast *f, size_t n, const factorizer_options *options,
-                           const hf_plan *plan);
+ * matrix, eigenvectors and a product each take. Fills in kept. */
+double hf_forecast_seconds(const hf_forecast *f, const factorizer_options *options, hf_plan *plan);
 
 /* The plan that is forecast to be fastest; what options give is kept. */
-hf_plan hf_forecast_plan(const hf_forecast *f, size_t n, const factorizer_options *options);
+hf_plan hf_forecast_plan(const hf_forecast *f, const factorizer_options *options);
 
 #endif

@@ -2,6 +2,7 @@
 
 #include "solver/build/gram.h"
 #include "solver/matrix/dense.h"
+#include "solver/matrix/pieces.h"
 #include "store/status.h"
 
 #include <limits.h>
@@ -20,7 +21,7 @@ static const double spread_above = 1. / 5;
 /* Rows spread out at a time; columns from which on few eigenvectors are looked for before all. */
 enum { PANEL = 1024, LEADING_LEAST = 768 };
 
-/* Rows of two halves joined at a time. */
+/* Rows of parts joined at a time. */
 enum { JOINED = 4096 };
 
 void tall_factors_free(tall_factors *f) {
@@ -74,8 +75,8 @@ typedef struct tall_block {
     size_t n, m;
     const float *dense;         /* [n][m] */
     const sparse_block *sparse; /* or this */
-    const float *half[2];       /* or two, [n][width] each, side by side: m is the sum of their widths */
-    size_t width[2];
+    const tall_factors *parts;  /* or their Q, side by side: m is the sum of their ranks */
+    size_t count;
 } tall_block;
 
 static size_t row_length(const sparse_block *A, size_t i) {
@@ -87,17 +88,20 @@ static void spread_row(const sparse_block *A, size_t i, float *row) {
     for (uint64_t p = A->indptr[i]; p < A->indptr[i + 1]; p++) row[A->columns[p]] = A->data[p];
 }
 
-/* Rows first ... first+rows-1 of two halves, joined. */
+/* Rows first ... first+rows-1 of the parts, joined. */
 static void join_rows(const tall_block *A, size_t first, size_t rows, float *panel) {
 #pragma omp parallel for schedule(static)
-    for (size_t i = 0; i < rows; i++)
-        for (size_t h = 0; h < 2; h++)
-            if (A->width[h] > 0)
-                memcpy(panel + i * A->m + (h == 0 ? 0 : A->width[0]), A->half[h] + (first + i) * A->width[h],
-                       A->width[h] * sizeof *panel);
+    for (size_t i = 0; i < rows; i++) {
+        float *to = panel + i * A->m;
+        for (size_t k = 0; k < A->count; k++) {
+            const size_t width = A->parts[k].rank;
+            if (width > 0) memcpy(to, A->parts[k].Q + (first + i) * width, width * sizeof *to);
+            to += width;
+        }
+    }
 }
 
-/* Calls for the rows of two halves, joined, a panel at a time. */
+/* Calls for the rows of the parts, joined, a panel at a time. */
 static lam_status each_panel(const tall_block *A,
                              lam_status (*take)(void *context, size_t first, size_t rows, const float *panel,
                                                 lam_error *error),
@@ -136,6 +140,23 @@ static void project_row(const sparse_block *A, size_t i, size_t k, const float *
     }
 }
 
+typedef struct sparse_projection {
+    const sparse_block *A;
+    size_t k;
+    const float *V;
+    float *Q;
+} sparse_projection;
+
+static bool is_thin(const sparse_block *A, size_t i) {
+    return (double)row_length(A, i) <= spread_above * (double)A->m;
+}
+
+static void project_thin_rows(const void *context, size_t piece) {
+    const sparse_projection *p = context;
+    for (size_t i = piece * PANEL; i < p->A->n && i < (piece + 1) * PANEL; i++)
+        if (is_thin(p->A, i)) project_row(p->A, i, p->k, p->V, p->Q + i * p->k);
+}
+
 /* Q = A V of a panel. */
 typedef struct projection {
     size_t m, k;
@@ -162,18 +183,18 @@ static lam_status project(const tall_block *A, size_t k, const float *V, float *
         projection p = {.m = m, .k = k, .V = V, .Q = Q};
         return each_panel(A, project_panel, &p, error);
     }
+    const sparse_projection thin = {A->sparse, k, V, Q};
+    pieces_run(project_thin_rows, &thin, (A->n + PANEL - 1) / PANEL);
     float *panel = memory_allocate(PANEL, m * sizeof *panel, "factorization", error);
     if (panel == NULL) return LAM_ERR_MEMORY;
     for (size_t first = 0; first < A->n;) {
         size_t rows = 0;
-        if ((double)row_length(A->sparse, first) <= spread_above * (double)m) {
-            project_row(A->sparse, first, k, V, Q + first * k);
+        if (is_thin(A->sparse, first)) {
             first++;
             continue;
         }
         /* As many rows in a row as have much in them. */
-        while (rows < PANEL && first + rows < A->n &&
-               (double)row_length(A->sparse, first + rows) > spread_above * (double)m) {
+        while (rows < PANEL && first + rows < A->n && !is_thin(A->sparse, first + rows)) {
             spread_row(A->sparse, first + rows, panel + rows * m);
             rows++;
         }
@@ -242,9 +263,13 @@ lam_status tsvd(size_t n, size_t m, const float *A, const truncation *keep, tall
     return factorize(&block, keep, out, error);
 }
 
-lam_status tsvd_pair(size_t n, size_t m, const float *A, size_t k, const float *B, const truncation *keep,
-                     tall_factors *out, lam_error *error) {
-    const tall_block block = {.n = n, .m = m + k, .half = {A, B}, .width = {m, k}};
+lam_status tsvd_joined(size_t count, const tall_factors *parts, const truncation *keep, tall_factors *out,
+                       lam_error *error) {
+    tall_block block = {.parts = parts, .count = count};
+    for (size_t k = 0; k < count; k++) {
+        if (parts[k].n > block.n) block.n = parts[k].n;
+        block.m += parts[k].rank;
+    }
     return factorize(&block, keep, out, error);
 }
 

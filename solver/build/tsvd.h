@@ -33,9 +33,10 @@ typedef struct truncation {
 lam_status tsvd(size_t n, size_t m, const float *A, const truncation *keep, tall_factors *out,
                 lam_error *error);
 
-/* The same of (A | B), [n][m] and [n][k], which is never put together as a whole. */
-lam_status tsvd_pair(size_t n, size_t m, const float *A, size_t k, const float *B, const truncation *keep,
-                     tall_factors *out, lam_error *error);
+/* The same of (Q_1 | Q_2 | ...) of some factors, one of which must be there, empty ones left out; it is never
+ * put together as a whole. */
+lam_status tsvd_joined(size_t count, const tall_factors *parts, const truncation *keep, tall_factors *out,
+                       lam_error *error);
 
 /* The same of sparse columns: rows with few entries cost the squares of those, not m^2. */
 lam_status tsvd_sparse(const sparse_block *A, const truncation *keep, tall_factors *out, lam_error *error);

@@ -1,31 +1,14 @@
 #include "solver/matrix/dense.h"
 
+#include "solver/matrix/pieces.h"
+
 #include <cblas.h>
 
-#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* Rows of a tall product, and columns of a tile of a Gram matrix, that one call of BLAS gets. */
 enum { ROWS = 512, TILE = 256, PANEL = 2048 };
-
-/* Work cut into pieces 0 ... count-1, each one call: tasks where there is a team already, else a team. Inside
- * of either BLAS works alone. */
-typedef struct pieces {
-    void (*run)(const void *job, size_t piece);
-    const void *job;
-    size_t count;
-} pieces;
-
-static void run_pieces(const pieces *p) {
-    if (omp_in_parallel()) {
-#pragma omp taskloop grainsize(1)
-        for (size_t k = 0; k < p->count; k++) p->run(p->job, k);
-    } else {
-#pragma omp parallel for schedule(dynamic, 1)
-        for (size_t k = 0; k < p->count; k++) p->run(p->job, k);
-    }
-}
 
 typedef struct multiply_job {
     size_t n, k, m;
@@ -49,8 +32,7 @@ void dense_multiply(size_t n, size_t k, size_t m, const float *A, const float *B
         return;
     }
     const multiply_job job = {n, k, m, A, B, transposed, C};
-    const pieces p = {multiply_piece, &job, (n + ROWS - 1) / ROWS};
-    run_pieces(&p);
+    pieces_run(multiply_piece, &job, (n + ROWS - 1) / ROWS);
 }
 
 /* The tile of a piece, counted along the rows of the upper triangle of tiles. */
@@ -92,8 +74,7 @@ void dense_gram(size_t n, size_t m, const float *A, float *G) {
     if (n == 0 || m == 0) return;
     const size_t tiles = (m + TILE - 1) / TILE;
     const gram_job job = {.n = n, .m = m, .tiles = tiles, .A = A, .G = G};
-    const pieces p = {gram_piece, &job, tiles * (tiles + 1) / 2};
-    run_pieces(&p);
+    pieces_run(gram_piece, &job, tiles * (tiles + 1) / 2);
 }
 
 lam_status dense_gram_double(size_t n, size_t m, const float *A, double *G, lam_error *error) {
@@ -105,8 +86,7 @@ lam_status dense_gram_double(size_t n, size_t m, const float *A, double *G, lam_
         const size_t rows = n - first < PANEL ? n - first : PANEL;
         for (size_t k = 0; k < rows * m; k++) panel[k] = (double)A[first * m + k];
         const gram_job job = {.n = rows, .m = m, .tiles = tiles, .A_double = panel, .G_double = G};
-        const pieces p = {gram_piece, &job, tiles * (tiles + 1) / 2};
-        run_pieces(&p);
+        pieces_run(gram_piece, &job, tiles * (tiles + 1) / 2);
     }
     free(panel);
     return LAM_OK;
@@ -142,8 +122,7 @@ lam_status dense_project(size_t n, size_t m, size_t w, const float *A, const flo
             for (size_t k = 0; k < rows * m; k++) a[k] = (double)A[first * m + k];
             for (size_t k = 0; k < rows * w; k++) b[k] = (double)B[first * w + k];
             const project_job job = {rows, m, w, a, b, C};
-            const pieces p = {project_piece, &job, (m + TILE - 1) / TILE};
-            run_pieces(&p);
+            pieces_run(project_piece, &job, (m + TILE - 1) / TILE);
         }
     const bool enough = a != NULL && b != NULL;
     free(a);

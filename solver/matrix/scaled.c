@@ -174,6 +174,9 @@ lam_status scaled_multiply(const scaled_matrix *S, size_t w, const float *X, flo
 
 lam_status scaled_multiply_double(const scaled_matrix *S, const double *x, double *y, lam_error *error) {
     lam_status status = LAM_OK;
+    double *lit = memory_allocate(S->n, sizeof *lit, "a product", error); /* A^-1/2 x, by element */
+    if (lit == NULL) return LAM_ERR_MEMORY;
+    for (size_t j = 0; j < S->n; j++) lit[j] = x[S->position[j]] / S->root_area[j];
 #pragma omp parallel for schedule(dynamic, 1)
     for (size_t first = 0; first < S->n; first += ROWS) {
         const size_t m = S->n - first < ROWS ? S->n - first : ROWS;
@@ -182,10 +185,8 @@ lam_status scaled_multiply_double(const scaled_matrix *S, const double *x, doubl
         const lam_status one = row_source_get(S->rows, S->order + first, m, &rows, &why);
         for (size_t k = 0; one == LAM_OK && k < m; k++) {
             double sum = 0;
-            for (size_t p = 0; p < rows.length[k]; p++) {
-                const uint32_t j = rows.indices[k][p];
-                sum += (double)rows.data[k][p] * x[S->position[j]] / S->root_area[j];
-            }
+            for (size_t p = 0; p < rows.length[k]; p++)
+                sum += (double)rows.data[k][p] * lit[rows.indices[k][p]];
             y[first + k] = S->root_area[S->order[first + k]] * sum;
         }
         row_block_free(&rows);
@@ -196,6 +197,7 @@ lam_status scaled_multiply_double(const scaled_matrix *S, const double *x, doubl
             if (error != NULL) *error = why;
         }
     }
+    free(lit);
     return status;
 }
 

@@ -29,6 +29,7 @@ int main(int argc, char **argv) {
     tall_factors factors = {0};
     factorizer_report report;
     factorizer_options how = {.budget = {.alpha = .5}, .levels = -1, .iterations = -1, .seed = 1};
+    double ratio = 0, leaf = 0;
     bool mesh_order = false, with_norm = true;
     size_t runs = 3;
     double seconds[MAX_RUNS], norm = -1, *row_sums = NULL;
@@ -42,8 +43,8 @@ int main(int argc, char **argv) {
         if (sscanf(argv[k], "epsilon=%lf", &x) == 1) how.epsilon = x;
         if (sscanf(argv[k], "rank=%lf", &x) == 1) how.rank = (size_t)x;
         if (sscanf(argv[k], "alpha=%lf", &x) == 1) how.budget.alpha = x;
-        if (sscanf(argv[k], "ratio=%lf", &x) == 1) how.budget.ratio = x;
-        if (sscanf(argv[k], "leaf=%lf", &x) == 1) how.budget.leaf = x;
+        if (sscanf(argv[k], "ratio=%lf", &x) == 1) ratio = x;
+        if (sscanf(argv[k], "leaf=%lf", &x) == 1) leaf = x;
         if (sscanf(argv[k], "levels=%lf", &x) == 1) how.levels = (int)x;
         if (sscanf(argv[k], "iterations=%lf", &x) == 1) how.iterations = (int)x;
         if (sscanf(argv[k], "runs=%lf", &x) == 1) runs = (size_t)x;
@@ -52,6 +53,7 @@ int main(int argc, char **argv) {
         if (strncmp(argv[k], "budget=", 7) == 0 && !budget_rule_find(argv[k] + 7, &how.budget.rule)) return 2;
         if (strcmp(argv[k], "order=mesh") == 0) mesh_order = true;
     }
+    if (ratio > 0 && how.levels > 0) budget_divide(&how.budget, how.levels, ratio, leaf);
     if (runs < 1 || runs > MAX_RUNS) return 2;
     TRY(store_open(argv[1], &s, error));
     TRY(mesh_load(s, &m, &row_sums, error));
@@ -74,12 +76,12 @@ int main(int argc, char **argv) {
     if (with_norm) TRY(norm_of_error(&S, &factors, NULL, &norm, error));
     getrusage(RUSAGE_SELF, &used);
     printf("elements,density,factorizer,epsilon,rank_asked,alpha,budget,order,threads,runs,seconds,rank,real,"
-           "levels,ratio,leaf,passes,peak_MiB,compression\n");
-    printf("%zu,%.4f,%s,%g,%zu,%g,%s,%s,%d,%zu,%.3f,%zu,%.4f,%d,%g,%g,%.2f,%.0f,", m.n, rows.density,
-           report.name, how.epsilon, how.rank, how.budget.alpha, budget_rule_name(how.budget.rule),
+           "levels,passes,peak_MiB,left,compression\n");
+    printf("%zu,%.4f,%s,%g,%zu,%g,%s,%s,%d,%zu,%.3f,%zu,%.4f,%d,%.2f,%.0f,", m.n, rows.density, report.name,
+           how.epsilon, how.rank, how.budget.alpha, budget_rule_name(how.budget.rule),
            mesh_order ? "mesh" : "z", omp_get_max_threads(), runs, stats_median(seconds, runs), factors.rank,
-           norm, report.levels, report.shared.ratio, report.shared.leaf, report.passes,
-           (double)used.ru_maxrss / 1024);
+           norm, report.levels, report.passes, (double)used.ru_maxrss / 1024);
+    for (int l = 0; l <= report.levels; l++) printf("%.4f%s", report.left[l], l < report.levels ? " " : ",");
     for (int l = 0; l <= report.levels; l++) printf("%.3f ", report.compression[l]);
     printf("\n");
 done:

@@ -92,8 +92,8 @@ START_TEST(shares_fill_the_budget) {
     for (int a = 0; a < 3; a++)
         for (int r = 0; r < 3; r++)
             for (int levels = 0; levels <= 8; levels++) {
-                const budget b = {
-                    .rule = BUDGET_SQUARES, .alpha = alphas[a], .ratio = ratios[r], .leaf = levels % 3 * .3};
+                budget b = {.rule = BUDGET_SQUARES, .alpha = alphas[a]};
+                budget_divide(&b, levels, ratios[r], levels % 3 * .3);
                 double p[BUDGET_LEVELS_MOST + 1], sum = 0;
                 budget_share(&b, .1, levels, p);
                 for (int l = 0; l <= levels; l++) sum += ldexp(p[l] * p[l], l);
@@ -128,10 +128,10 @@ START_TEST(hf_keeps_its_bound) {
     for (int e = 0; e < 4; e++)
         for (int a = 0; a < 3; a++)
             for (int levels = 0; levels <= 4; levels++) {
-                const factorizer_options options = {
-                    .epsilon = epsilons[e],
-                    .budget = {.rule = rules[_i], .alpha = alphas[a], .ratio = levels % 2 ? .5 : 2},
-                    .levels = levels};
+                factorizer_options options = {.epsilon = epsilons[e],
+                                              .budget = {.rule = rules[_i], .alpha = alphas[a]},
+                                              .levels = levels};
+                budget_divide(&options.budget, levels, levels % 2 ? .5 : 2, 0);
                 factorizer_report report;
                 tall_factors f = factors_of(&s, "hf", &options, &report);
                 double *values = values_of_difference(&s.S, &f), squares = 0, lanczos, frobenius;
@@ -163,8 +163,9 @@ START_TEST(errors_add_in_squares) {
     subject s;
     subject_make(&s, unit_cube, 5);
     for (int levels = 1; levels <= 3; levels++) {
-        const factorizer_options options = {
-            .epsilon = .2, .budget = {.rule = BUDGET_SQUARES, .alpha = .5, .ratio = 1}, .levels = levels};
+        factorizer_options options = {
+            .epsilon = .2, .budget = {.rule = BUDGET_SQUARES, .alpha = .5}, .levels = levels};
+        budget_divide(&options.budget, levels, 1, 0);
         tall_factors f = factors_of(&s, "hf", &options, NULL);
         const double norm = norm_of_difference(&s.S, &f);
         double p[BUDGET_LEVELS_MOST + 1], sum = 0;
@@ -202,7 +203,8 @@ START_TEST(bits_do_not_depend_on_threads) {
     subject s;
     subject_make(&s, room, 6);
     const int before = omp_get_max_threads();
-    const factorizer_options options = {.epsilon = .05, .budget = {.alpha = .5, .ratio = 1}, .levels = 3};
+    factorizer_options options = {.epsilon = .05, .budget = {.alpha = .5}, .levels = 3};
+    budget_divide(&options.budget, 3, 1, 0);
     tall_factors f[2];
     for (int k = 0; k < 2; k++) {
         omp_set_num_threads(k == 0 ? 1 : 3);
@@ -230,10 +232,9 @@ START_TEST(forecast_knows_the_samples) {
         ck_assert_double_eq_tol(hf_forecast_rank(forecast, (double)s.S.n, p), (double)kept, 1.5);
     }
     const factorizer_options options = {.epsilon = .1, .budget = {.alpha = .5}, .levels = -1};
-    const hf_plan plan = hf_forecast_plan(forecast, s.S.n, &options);
-    const hf_plan other = {.levels = 0, .ratio = 1};
-    ck_assert_double_le(hf_forecast_seconds(forecast, s.S.n, &options, &plan),
-                        hf_forecast_seconds(forecast, s.S.n, &options, &other));
+    hf_plan plan = hf_forecast_plan(forecast, &options), other = {.levels = 0, .left = {.1}};
+    ck_assert_double_le(hf_forecast_seconds(forecast, &options, &plan),
+                        hf_forecast_seconds(forecast, &options, &other));
     hf_forecast_free(forecast);
     free(values);
     subject_free(&s);
@@ -452,7 +453,7 @@ static double largest_orthogonal(const gram *g, const float *V, size_t rank) {
 
 /* Few eigenvectors above a floor: none that matters is missed, and many are left to the whole decomposition:
  * above or near the floor there are more than a tenth. */
-static void check_leading(const gram *g, double floor, size_t many) {
+static void check_leading(gram *g, double floor, size_t many) {
     lam_error error = {0};
     float *V = NULL;
     size_t rank = 0;
