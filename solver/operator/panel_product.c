@@ -12,8 +12,8 @@
 #define MANY_VECTORS 4
 /* Slabs of rows whose sums in double are made apart, then added up in their order: at most so many, of at
  * least so many rows. However many threads there are, these are the same. */
-#define MOST_SLABS 32
-#define SLAB_ROWS 1024
+#define MOST_SLABS 64
+#define SLAB_ROWS 512
 /* Rows of expand that a thread takes at a time. */
 #define EXPAND_BLOCK 64
 /* Bytes of a panel below which threads cost more than they bring. */
