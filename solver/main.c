@@ -3,9 +3,7 @@
 
 #include <errno.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 typedef struct verb {
     const char *name;
@@ -46,22 +44,7 @@ static int finish(const char *name, int status) {
     return 1;
 }
 
-/* Threads that wait for others sleep. Those of OpenMP otherwise spin for milliseconds at the end of each
- * loop: a tenth faster where loops are small and nothing else runs, but beside another such program HF took
- * more than twice its time (10,240 elements, two cores: 9.0 s, asleep 3.9). OpenMP reads this before main
- * begins, hence the new start. What the user has set stays. */
-static void wait_asleep(char **argv) {
-    char program[4096];
-    if (getenv("OMP_WAIT_POLICY") != NULL || getenv("GOMP_SPINCOUNT") != NULL) return;
-    const ssize_t length = readlink("/proc/self/exe", program, sizeof program);
-    if (length <= 0 || (size_t)length == sizeof program) return;
-    program[length] = '\0'; /* by its own name, which ps shows */
-    if (setenv("OMP_WAIT_POLICY", "passive", 1) == 0) execv(program, argv);
-    /* Where that cannot be, it goes on as it is. */
-}
-
 int main(int argc, char **argv) {
-    wait_asleep(argv);
     if (argc < 2) {
         fputs("lambert: no verb given; see lambert --help\n", stderr);
         return 2;
