@@ -20,7 +20,7 @@ typedef struct lowrank_scene {
 void lowrank_scene_free(lowrank_scene *s);
 
 /* Five walls of a cube, each of divisions x divisions squares of two triangles: 10 divisions^2 elements,
- * which are the sizes of the thesis' Cornell box, 640 x 4^k. All pairs up to 12,000 elements, rays beyond. */
+ * which are the sizes of the thesis' Cornell box, 640 x 4^k. All pairs up to 24,000 elements, rays beyond. */
 lam_status lowrank_room(const bench_run *run, size_t divisions, lowrank_scene *out, lam_error *error);
 
 /* The Cornell box with its blocks; a courtyard of two storeys with galleries. About so many elements. */

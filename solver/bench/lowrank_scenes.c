@@ -13,7 +13,7 @@
 #include <unistd.h>
 
 /* Above this many elements all pairs would take minutes. */
-enum { PAIRS_MOST = 12000, RAYS = 4096, REPEATS_MOST = 9 };
+enum { PAIRS_MOST = 24000, RAYS = 4096, REPEATS_MOST = 9 };
 
 void lowrank_scene_free(lowrank_scene *s) {
     form_factors_free(&s->f);
