@@ -40,6 +40,12 @@ void budget_share(const budget *b, double epsilon, int levels, double p[BUDGET_L
         p[l] = epsilon * sqrt((1 - b->alpha) * b->part[l] / ldexp(1, l));
 }
 
+bool budget_divided(const budget *b) {
+    for (int l = 1; l <= BUDGET_LEVELS_MOST; l++)
+        if (b->part[l] > 0) return true;
+    return false;
+}
+
 void budget_divide(budget *b, int levels, double ratio, double leaf) {
     const bool apart = leaf > 0 && levels > 1;
     const int geometric = apart ? levels - 1 : levels;

@@ -30,6 +30,9 @@ typedef struct budget {
 /* Parts that fall by a ratio from level to level, but for the leaves where leaf > 0: those take it. */
 void budget_divide(budget *b, int levels, double ratio, double leaf);
 
+/* Whether any level has a part. */
+bool budget_divided(const budget *b);
+
 /* What a node of each level may leave out, p[0] of the root to p[levels] of a leaf. */
 void budget_share(const budget *b, double epsilon, int levels, double p[BUDGET_LEVELS_MOST + 1]);
 

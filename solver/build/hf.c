@@ -225,7 +225,7 @@ static lam_status hf_factorize(const scaled_matrix *S, const factorizer_options 
     hf_run run = {.S = S, .options = options};
     hf_forecast *forecast = NULL;
     const budget *shares = &options->budget;
-    const bool shared = shares->rule == BUDGET_SUMS || shares->part[1] > 0 || options->levels == 0;
+    const bool shared = shares->rule == BUDGET_SUMS || budget_divided(shares) || options->levels == 0;
     if (options->levels >= 0 && shared) {
         run.plan.levels = options->levels < BUDGET_LEVELS_MOST ? options->levels : BUDGET_LEVELS_MOST;
         budget_share(shares, options->epsilon, run.plan.levels, run.plan.left);

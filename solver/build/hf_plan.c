@@ -228,7 +228,7 @@ static double divide(const hf_forecast *f, const factorizer_options *options, bu
 hf_plan hf_forecast_plan(const hf_forecast *f, const factorizer_options *options) {
     /* A way to share that is this much slower than the best of another number of levels is not improved. */
     static const double hopeless = 3;
-    const bool shared = options->budget.rule == BUDGET_SUMS || options->budget.part[1] > 0;
+    const bool shared = options->budget.rule == BUDGET_SUMS || budget_divided(&options->budget);
     hf_plan best = {.levels = 0};
     double least = INFINITY;
     for (int levels = 0; levels <= BUDGET_LEVELS_MOST; levels++) {
