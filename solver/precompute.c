@@ -330,7 +330,7 @@ static lam_status build(work *w, lam_error *error) {
     budget_rule rule = BUDGET_SQUARES;
     if (!budget_rule_find(o->budget, &rule))
         FAIL(error, LAM_ERR_ARGUMENT, "--budget %.40s: unknown; use squares, sums or frobenius", o->budget);
-    const double held = (w->large ? 0 : (double)w->f.F.indptr[w->m.n] * 8) + 400 * (double)w->m.n;
+    const double held = (w->f.F.place != NULL ? 0 : (double)w->f.F.indptr[w->m.n] * 8) + 400 * (double)w->m.n;
     const build_options how = {.method = o->method,
                                .factorizer = o->factorizer,
                                .epsilon = o->epsilon,

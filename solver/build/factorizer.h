@@ -33,7 +33,8 @@ typedef struct factorizer {
                             factorizer_report *report, lam_error *error);
 } factorizer;
 
-/* thesis chapter 3, algorithm 4; Aguerre and Fernandez 2016. One pass. */
+/* thesis chapter 3, algorithm 4; Aguerre and Fernandez 2016. One pass, and at most a third of one for
+ * samples. */
 extern const factorizer factorizer_hf;
 /* The whole S by its eigenvectors: the best there is at any rank. One pass, O(n^3). */
 extern const factorizer factorizer_svd;

@@ -8,7 +8,7 @@
  * singular values of a few samples of them. */
 typedef struct hf_forecast hf_forecast;
 
-/* Takes the samples, from two places on the curve. Freed by hf_forecast_free. Cost: as a leaf or two. */
+/* Takes the samples, from some places on the curve. Freed by hf_forecast_free. Cost: as a leaf or two. */
 lam_status hf_forecast_create(const scaled_matrix *S, hf_forecast **out, lam_error *error);
 void hf_forecast_free(hf_forecast *f);
 

@@ -5,8 +5,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Columns of a sample: at most SAMPLE, and no more than the part of all that may be read twice; how often it
- * is halved. */
+/* Columns of a sample: at most SAMPLE, and of all no more than one in SAMPLE_PART, as they are read twice;
+ * how often it is halved, and from how many places there is one. */
 enum { SAMPLE = 512, SAMPLE_LEAST = 64, SAMPLE_PART = 20, HALVINGS = 3, PLACES = 6, SIZES = HALVINGS + 1 };
 /* Leaves have no fewer and no more columns than these, or the eigenvectors of one cost more than all. */
 enum { LEAF_LEAST = 64, LEAF_MOST = 16384 };

@@ -21,8 +21,8 @@ static const double spread_above = 1. / 5;
 /* Rows spread out at a time; columns from which on few eigenvectors are looked for before all. */
 enum { PANEL = 1024, LEADING_LEAST = 768 };
 
-/* Rows of parts joined at a time. */
-enum { JOINED = 4096 };
+/* Rows of parts joined at a time, and by one thread. */
+enum { JOINED = 4096, JOINED_PIECE = 256 };
 
 void tall_factors_free(tall_factors *f) {
     free(f->Q);
@@ -88,14 +88,20 @@ static void spread_row(const sparse_block *A, size_t i, float *row) {
     for (uint64_t p = A->indptr[i]; p < A->indptr[i + 1]; p++) row[A->columns[p]] = A->data[p];
 }
 
-/* Rows first ... first+rows-1 of the parts, joined. */
-static void join_rows(const tall_block *A, size_t first, size_t rows, float *panel) {
-#pragma omp parallel for schedule(static)
-    for (size_t i = 0; i < rows; i++) {
-        float *to = panel + i * A->m;
-        for (size_t k = 0; k < A->count; k++) {
-            const size_t width = A->parts[k].rank;
-            if (width > 0) memcpy(to, A->parts[k].Q + (first + i) * width, width * sizeof *to);
+typedef struct join_job {
+    const tall_block *A;
+    size_t first, rows;
+    float *panel;
+} join_job;
+
+/* Some of the rows first ... first+rows-1 of the parts, joined. */
+static void join_piece(const void *context, size_t piece) {
+    const join_job *j = context;
+    for (size_t i = piece * JOINED_PIECE; i < j->rows && i < (piece + 1) * JOINED_PIECE; i++) {
+        float *to = j->panel + i * j->A->m;
+        for (size_t k = 0; k < j->A->count; k++) {
+            const size_t width = j->A->parts[k].rank;
+            if (width > 0) memcpy(to, j->A->parts[k].Q + (j->first + i) * width, width * sizeof *to);
             to += width;
         }
     }
@@ -112,7 +118,8 @@ static lam_status each_panel(const tall_block *A,
     if (panel == NULL) return LAM_ERR_MEMORY;
     for (size_t first = 0; first < A->n; first += most) {
         const size_t rows = A->n - first < most ? A->n - first : most;
-        join_rows(A, first, rows, panel);
+        const join_job job = {A, first, rows, panel};
+        pieces_run(join_piece, &job, (rows + JOINED_PIECE - 1) / JOINED_PIECE);
         TRY(take(context, first, rows, panel, error));
     }
 done:

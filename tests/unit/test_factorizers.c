@@ -425,6 +425,41 @@ START_TEST(gram_matrices_agree) {
 }
 END_TEST
 
+/* Entries of a symmetric F as so many rays would find them: their variance is F_ij / (2 rays). */
+static void add_noise(csr *F, double rays) {
+    const size_t n = F->n;
+    float *g = malloc(n * n * sizeof *g);
+    sketch_gaussian(9, n, n, g);
+    for (size_t i = 0; i < n; i++)
+        for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++) {
+            const size_t j = F->indices[p], one = i < j ? i : j, other = i < j ? j : i;
+            const double f = (double)F->data[p];
+            F->data[p] = (float)fmax(0, f + sqrt(f / (2 * rays)) * (double)g[one * n + other]);
+        }
+    free(g);
+}
+
+/* What is asked for below the noise of rays keeps every column: no level has such a share. */
+START_TEST(no_level_is_asked_for_less_than_noise) {
+    enum { RAYS = 400 };
+    subject s;
+    lam_error error = {0};
+    hf_forecast *forecast = NULL;
+    subject_make(&s, unit_cube, 15);
+    add_noise(&s.f.F, RAYS);
+    ck_assert_int_eq(hf_forecast_create(&s.S, &forecast, &error), LAM_OK);
+    const factorizer_options options = {.epsilon = .2, .budget = {.alpha = .5}, .levels = -1};
+    const hf_plan plan = hf_forecast_plan(forecast, &options);
+    const double noise = sqrt(1. / (2 * RAYS)); /* the length of a column of it: F's rows sum to 1 */
+    for (int l = 1; l <= plan.levels; l++)
+        ck_assert_msg(plan.left[l] <= 0 || plan.left[l] > .9 * noise,
+                      "level %d of %d may leave out %g, noise %g", l, plan.levels, plan.left[l], noise);
+    ck_assert_int_gt(plan.levels, 0);
+    hf_forecast_free(forecast);
+    subject_free(&s);
+}
+END_TEST
+
 /* The largest x^T G x over |x| = 1 orthogonal to V, by all eigenvalues of (I - V V^T) G (I - V V^T). */
 static double largest_orthogonal(const gram *g, const float *V, size_t rank) {
     lam_error error = {0};
@@ -532,6 +567,7 @@ int main(void) {
     tcase_add_test(cases, hf_rank_is_near_the_best);
     tcase_add_test(cases, bits_do_not_depend_on_threads);
     tcase_add_test(cases, forecast_knows_the_samples);
+    tcase_add_test(cases, no_level_is_asked_for_less_than_noise);
     tcase_add_loop_test(cases, every_factorizer_keeps_its_bound, 0, NAMES);
     tcase_add_loop_test(cases, fixed_rank_is_exact, 0, NAMES);
     tcase_add_loop_test(cases, odd_matrices, 0, NAMES);
