@@ -13,11 +13,13 @@ static const table_column columns[] = {
     {"elements", "", "n"},
     {"rays", "", "from every element"},
     {"threads", "", "that cast"},
-    {"bare", "Mray/s", "Embree alone, rays in memory; median of the passes"},
+    {"bare", "Mray/s", "Embree alone on the elements, rays in memory; median of the passes"},
+    {"facets", "Mray/s", "Embree alone on the facets that the elements lie in, likewise"},
     {"counted", "Mray/s", "rays made, cast and counted into rows; median of the passes"},
     {"whole", "Mray/s", "form_factors_make: hierarchy, counting, merging, repair; median of the passes"},
     {"counted_ratio", "", "counted / bare, median over pairs of alternating passes"},
     {"whole_ratio", "", "whole / bare, likewise"},
+    {"facets_ratio", "", "counted / facets, likewise"},
     {"bare_speedup", "", "bare, against one thread"},
     {"counted_speedup", "", "counted, against one thread"},
     {"own_share", "", "rays of the bare loop that met the element they leave"},
@@ -28,7 +30,7 @@ enum { PASSES_MOST = 9 };
 typedef struct prepared {
     mesh m;
     uint32_t *order;
-    visibility *v;
+    visibility *v, *elements; /* as rays are cast, and one element after the other */
     size_t rays, n_packets;
     ray_packet *packets; /* the rays of an element together, elements in Z-order, as they are counted */
     uint32_t *self;
@@ -37,6 +39,7 @@ typedef struct prepared {
 
 static void prepared_free(prepared *s) {
     visibility_destroy(s->v);
+    visibility_destroy(s->elements);
     mesh_free(&s->m);
     free(s->order);
     free(s->packets);
@@ -49,6 +52,7 @@ static lam_status prepare_rays(prepared *s, uint64_t seed, lam_error *error) {
     const size_t per_element = s->rays / VISIBILITY_PACKET;
     TRY(formfactors_order(&s->m, &s->order, error));
     TRY(visibility_create(&s->m, &s->v, error));
+    TRY(visibility_create_of_elements(&s->m, &s->elements, error));
     s->n_packets = s->m.n * per_element;
     s->packets = memory_allocate(s->n_packets, sizeof *s->packets, "rays", error);
     s->self = memory_allocate(s->n_packets, sizeof *s->self, "rays", error);
@@ -68,7 +72,7 @@ done:
 }
 
 typedef struct pass_times {
-    double bare[PASSES_MOST], counted[PASSES_MOST], whole[PASSES_MOST];
+    double bare[PASSES_MOST], facets[PASSES_MOST], counted[PASSES_MOST], whole[PASSES_MOST];
 } pass_times;
 
 static lam_status one_pass(const bench_run *run, const prepared *s, size_t pass, pass_times *times,
@@ -80,7 +84,9 @@ static lam_status one_pass(const bench_run *run, const prepared *s, size_t pass,
     double *leaving = memory_allocate(s->m.n, sizeof *leaving, "form factors", error);
     double *absorbed = memory_allocate(s->m.n, sizeof *absorbed, "form factors", error);
     if (leaving == NULL || absorbed == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(visibility_bare_seconds(s->v, s->packets, s->self, s->n_packets, &times->bare[pass], own, error));
+    TRY(visibility_bare_seconds(s->elements, s->packets, s->self, s->n_packets, &times->bare[pass], own,
+                                error));
+    TRY(visibility_bare_seconds(s->v, s->packets, s->self, s->n_packets, &times->facets[pass], NULL, error));
     double started = clock_seconds();
     TRY(rays_count(&s->m, s->v, s->order, &how, &counts, leaving, absorbed, error));
     times->counted[pass] = clock_seconds() - started;
@@ -100,7 +106,7 @@ static lam_status measure(const bench_run *run, const prepared *s, int threads, 
                           double alone[2], table *out, lam_error *error) {
     lam_status status = LAM_OK;
     pass_times times;
-    double ratio[PASSES_MOST], whole_ratio[PASSES_MOST];
+    double ratio[PASSES_MOST], whole_ratio[PASSES_MOST], facets_ratio[PASSES_MOST];
     size_t own = 0;
     omp_set_num_threads(threads);
     for (size_t pass = 0; pass < passes; pass++) {
@@ -108,6 +114,7 @@ static lam_status measure(const bench_run *run, const prepared *s, int threads, 
         TRY(one_pass(run, s, pass, &times, pass == 0 ? &own : NULL, error));
         ratio[pass] = times.bare[pass] / times.counted[pass];
         whole_ratio[pass] = times.bare[pass] / times.whole[pass];
+        facets_ratio[pass] = times.facets[pass] / times.counted[pass];
     }
     const double bare = stats_median(times.bare, passes), counted = stats_median(times.counted, passes);
     const double rays = (double)(s->n_packets * VISIBILITY_PACKET);
@@ -117,10 +124,12 @@ static lam_status measure(const bench_run *run, const prepared *s, int threads, 
     table_number(out, (double)s->rays);
     table_number(out, threads);
     table_number(out, 1e-6 * rays / bare);
+    table_number(out, 1e-6 * rays / stats_median(times.facets, passes));
     table_number(out, 1e-6 * rays / counted);
     table_number(out, 1e-6 * rays / stats_median(times.whole, passes));
     table_number(out, stats_median(ratio, passes));
     table_number(out, stats_median(whole_ratio, passes));
+    table_number(out, stats_median(facets_ratio, passes));
     table_number(out, alone[0] / bare);
     table_number(out, alone[1] / counted);
     table_number(out, (double)own / rays);

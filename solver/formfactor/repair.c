@@ -11,6 +11,10 @@
 static const double sweep_tolerance = 2e-8;
 enum { MAX_SWEEPS = 200 };
 
+/* Extrapolated sweeps: how many steps are looked back on, how many are tried, and by what the worst row may
+ * grow on the way. */
+enum { STEPS = 5, MAX_STEPS = 60, GROWTH_MOST = 4 };
+
 /* Rows are cut into slices that do not depend on the number of threads: each adds what its rows send to
  * others into sums of its own, which are then added in their order. */
 enum { SLICES = 32 };
@@ -66,24 +70,134 @@ static void scaled_row_sums(const csr *G, sums *s, const double *area, const dou
     for (size_t i = 0; i < s->n; i++) r[i] = d[i] * (area[i] * outside[i] + r[i]);
 }
 
+/* A scaling on its way: d, its row sums r, and the worst of |r_i / A_i - 1|. */
+typedef struct scaling {
+    const csr *G;
+    sums *s;
+    const double *area, *outside;
+    double *d, *r;
+    double worst;
+} scaling;
+
+static void measure(scaling *c) {
+    scaled_row_sums(c->G, c->s, c->area, c->outside, c->d, c->r);
+    c->worst = 0;
+    for (size_t i = 0; i < c->G->n; i++)
+        if (c->r[i] > 0) c->worst = fmax(c->worst, fabs(c->r[i] / c->area[i] - 1));
+}
+
 /* d_i <- d_i sqrt(A_i / r_i) until r_i = A_i; the root damps the sweep so that it also settles where light
- * goes to and fro between two sets (facing plates). Where no scaling meets every row, rows may still pass
- * A_i: they are scaled down, and with them the other ends of their pairs. */
-static void sweep(const csr *G, sums *s, const double *area, const double *outside, double *d, double *r) {
-    const size_t n = G->n;
-    for (int count = 0; count < MAX_SWEEPS; count++) {
-        scaled_row_sums(G, s, area, outside, d, r);
-        double worst = 0;
-        for (size_t i = 0; i < n; i++) {
-            if (r[i] <= 0) continue;
-            worst = fmax(worst, fabs(r[i] / area[i] - 1));
-            d[i] *= sqrt(area[i] / r[i]);
-        }
-        if (worst <= sweep_tolerance) break;
+ * goes to and fro between two sets (facing plates). Ends measured. */
+static void sweep(scaling *c) {
+    measure(c);
+    for (int count = 0; count < MAX_SWEEPS && c->worst > sweep_tolerance; count++) {
+        for (size_t i = 0; i < c->G->n; i++)
+            if (c->r[i] > 0) c->d[i] *= sqrt(c->area[i] / c->r[i]);
+        measure(c);
     }
-    scaled_row_sums(G, s, area, outside, d, r);
-    for (size_t i = 0; i < n; i++)
-        if (r[i] > area[i]) d[i] *= area[i] / r[i];
+}
+
+/* The last steps of x = log d and the changes of what a sweep would add to it, f = log(A / r) / 2. */
+typedef struct history {
+    size_t n, held, next;
+    double *x, *f;                 /* [n] before the step that is being taken */
+    double *dx[STEPS], *df[STEPS]; /* [n] each */
+} history;
+
+static lam_status history_create(history *h, size_t n, lam_error *error) {
+    double *all = memory_allocate(n, (2 + 2 * STEPS) * sizeof *all, "row scales", error);
+    *h = (history){.n = n, .x = all};
+    if (all == NULL) return LAM_ERR_MEMORY;
+    h->f = all + n;
+    for (size_t k = 0; k < STEPS; k++) {
+        h->dx[k] = all + (2 + 2 * k) * n;
+        h->df[k] = all + (3 + 2 * k) * n;
+    }
+    return LAM_OK;
+}
+
+static double product(const double *a, const double *b, const double *weight, size_t n) {
+    double sum = 0;
+    for (size_t i = 0; i < n; i++) sum += weight[i] * a[i] * b[i];
+    return sum;
+}
+
+/* gamma = argmin |f - sum gamma_k df_k|, weighted by areas, from the normal equations. */
+static void least_squares(const history *h, const double *f, const double *area, double gamma[STEPS]) {
+    double A[STEPS][STEPS], b[STEPS];
+    for (size_t k = 0; k < h->held; k++) {
+        for (size_t l = 0; l <= k; l++) A[k][l] = A[l][k] = product(h->df[k], h->df[l], area, h->n);
+        b[k] = product(h->df[k], f, area, h->n);
+    }
+    for (size_t k = 0; k < h->held; k++) A[k][k] *= 1 + 1e-12; /* the same change twice is no division by 0 */
+    for (size_t k = 0; k < h->held; k++)
+        for (size_t row = k + 1; row < h->held; row++) {
+            const double by = A[k][k] > 0 ? A[row][k] / A[k][k] : 0;
+            for (size_t l = k; l < h->held; l++) A[row][l] -= by * A[k][l];
+            b[row] -= by * b[k];
+        }
+    for (size_t k = h->held; k-- > 0;) {
+        gamma[k] = b[k];
+        for (size_t l = k + 1; l < h->held; l++) gamma[k] -= A[k][l] * gamma[l];
+        gamma[k] = A[k][k] > 0 ? gamma[k] / A[k][k] : 0;
+    }
+}
+
+/* The same from d = 1 by far fewer sweeps: each is extrapolated from the steps before (Anderson 1965). before
+ * gets the row sums at the start. Where it does not settle perhaps no scaling meets every row. */
+static lam_status extrapolate(scaling *c, double *before, bool *settled, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = c->G->n;
+    history h = {0};
+    double least = INFINITY;
+    *settled = false;
+    TRY(history_create(&h, n, error));
+    for (size_t i = 0; i < n; i++) c->d[i] = 1;
+    measure(c);
+    memcpy(before, c->r, n * sizeof *before);
+    for (int count = 0; count < MAX_STEPS; count++) {
+        *settled = c->worst <= sweep_tolerance;
+        if (*settled || c->worst > GROWTH_MOST * least) break;
+        least = fmin(least, c->worst);
+        double *dx = h.dx[h.next], *df = h.df[h.next], gamma[STEPS];
+        for (size_t i = 0; i < n; i++) {
+            const double x = log(c->d[i]), f = c->r[i] > 0 ? .5 * log(c->area[i] / c->r[i]) : 0;
+            dx[i] = x - h.x[i];
+            df[i] = f - h.f[i];
+            h.x[i] = x;
+            h.f[i] = f;
+        }
+        if (count > 0) {
+            h.next = (h.next + 1) % STEPS;
+            if (h.held < STEPS) h.held++;
+        }
+        least_squares(&h, h.f, c->area, gamma);
+        for (size_t i = 0; i < n; i++) {
+            double x = h.x[i] + h.f[i];
+            for (size_t k = 0; k < h.held; k++) x -= gamma[k] * (h.dx[k][i] + h.df[k][i]);
+            c->d[i] = exp(x);
+        }
+        measure(c);
+    }
+done:
+    free(h.x);
+    return status;
+}
+
+/* d so that r_i = A_i. Where no scaling meets every row, rows may still pass A_i: they are scaled down, and
+ * with them the other ends of their pairs. */
+static lam_status settle(scaling *c, double *before, lam_error *error) {
+    lam_status status = LAM_OK;
+    bool settled;
+    TRY(extrapolate(c, before, &settled, error));
+    if (!settled) {
+        for (size_t i = 0; i < c->G->n; i++) c->d[i] = 1;
+        sweep(c);
+    }
+    for (size_t i = 0; i < c->G->n; i++)
+        if (c->r[i] > c->area[i]) c->d[i] *= c->area[i] / c->r[i];
+done:
+    return status;
 }
 
 /* g_ij <- g_ij d_i d_j; row sums of the F it gives; returns the largest error of reciprocity. */
@@ -124,9 +238,7 @@ lam_status repair_close(csr *G, const double *area, const double *outside, form_
     if (before == NULL || d == NULL || r == NULL || row_sums == NULL) TRY(LAM_ERR_MEMORY);
     TRY(sums_init(&s, G, error));
 
-    for (size_t i = 0; i < n; i++) d[i] = 1;
-    scaled_row_sums(G, &s, area, outside, d, before);
-    sweep(G, &s, area, outside, d, r);
+    TRY(settle(&(scaling){.G = G, .s = &s, .area = area, .outside = outside, .d = d, .r = r}, before, error));
     out->reciprocity_error = scale(G, &s, area, d, row_sums);
     out->closure_error = out->repair_max = 0;
     double repair = 0, total_area = 0;

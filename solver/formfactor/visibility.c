@@ -1,6 +1,7 @@
 #include "solver/formfactor/visibility.h"
 
 #include "solver/clock.h"
+#include "solver/scene/facet_grid.h"
 
 #include <embree3/rtcore.h>
 
@@ -9,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Triangles and quads are two geometries; prim_element leads from (geometry, primitive) to the element. */
+/* Triangles and quads are two geometries; prim_piece leads from (geometry, primitive) to the piece. */
 enum { TRIANGLES, QUADS, N_GEOMETRIES };
 
 struct visibility {
@@ -17,7 +18,9 @@ struct visibility {
     RTCScene scene;
     const mesh *mesh;
     size_t n_fronts; /* elements in the scene: n, or n/2 when two-sided */
-    uint32_t *prim_element[N_GEOMETRIES];
+    facets facets;   /* what is cast against */
+    facet_grids grids;
+    uint32_t *prim_piece[N_GEOMETRIES];
     double centre[3];
     float rounding; /* how far single precision may move a point of the scene */
 };
@@ -29,22 +32,21 @@ static lam_status device_error(const visibility *v, const char *what, lam_error 
     return status_fail(error, LAM_ERR_INTERNAL, "Embree: %s: error %d", what, (int)code);
 }
 
-static bool is_triangle(const mesh *m, size_t element) {
-    return m->elements[element][3] == MESH_NO_VERTEX;
-}
-
-/* Adds the triangles or the quads among the fronts as one geometry with its own copy of the vertices. */
+/* Adds the triangles or the quads among the facets' pieces as one geometry with its own copy of the vertices.
+ */
 static lam_status add_geometry(visibility *v, int kind, lam_error *error) {
     lam_status status = LAM_OK;
     const mesh *m = v->mesh;
+    const facets *f = &v->facets;
     const unsigned corners = kind == TRIANGLES ? 3 : 4;
     RTCGeometry geometry = NULL;
     size_t count = 0;
-    for (size_t i = 0; i < v->n_fronts; i++) count += is_triangle(m, i) == (kind == TRIANGLES);
+    for (size_t p = 0; p < f->n_pieces; p++)
+        count += (f->pieces[p][3] == MESH_NO_VERTEX) == (kind == TRIANGLES);
     if (count == 0) goto done;
 
-    v->prim_element[kind] = memory_allocate(count, sizeof(uint32_t), "visibility", error);
-    if (v->prim_element[kind] == NULL) return LAM_ERR_MEMORY;
+    v->prim_piece[kind] = memory_allocate(count, sizeof(uint32_t), "visibility", error);
+    if (v->prim_piece[kind] == NULL) return LAM_ERR_MEMORY;
     geometry =
         rtcNewGeometry(v->device, kind == TRIANGLES ? RTC_GEOMETRY_TYPE_TRIANGLE : RTC_GEOMETRY_TYPE_QUAD);
     if (geometry == NULL) {
@@ -62,10 +64,10 @@ static lam_status add_geometry(visibility *v, int kind, lam_error *error) {
     }
     for (size_t i = 0; i < m->n_vertices; i++) visibility_recentre(v, m->vertices[i], vertices + 3 * i);
     size_t prim = 0;
-    for (size_t i = 0; i < v->n_fronts; i++) {
-        if (is_triangle(m, i) != (kind == TRIANGLES)) continue;
-        for (unsigned c = 0; c < corners; c++) indices[prim * corners + c] = m->elements[i][c];
-        v->prim_element[kind][prim++] = (uint32_t)i;
+    for (size_t p = 0; p < f->n_pieces; p++) {
+        if ((f->pieces[p][3] == MESH_NO_VERTEX) != (kind == TRIANGLES)) continue;
+        for (unsigned c = 0; c < corners; c++) indices[prim * corners + c] = f->pieces[p][c];
+        v->prim_piece[kind][prim++] = (uint32_t)p;
     }
     rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
     rtcCommitGeometry(geometry);
@@ -75,7 +77,7 @@ done:
     return status;
 }
 
-lam_status visibility_create(const mesh *m, visibility **out, lam_error *error) {
+static lam_status create(const mesh *m, bool join, visibility **out, lam_error *error) {
     lam_status status = LAM_OK;
     visibility *v = memory_allocate(1, sizeof *v, "visibility", error);
     if (v == NULL) return LAM_ERR_MEMORY;
@@ -84,6 +86,11 @@ lam_status visibility_create(const mesh *m, visibility **out, lam_error *error) 
     double radius;
     mesh_bounds(m, v->centre, &radius);
     v->rounding = 4 * 0x1p-24f * (float)radius;
+    if (join)
+        TRY(facets_join(m, v->n_fronts, (double)v->rounding, &v->facets, error));
+    else
+        TRY(facets_alone(m, v->n_fronts, &v->facets, error));
+    TRY(facet_grids_create(m, &v->facets, &v->grids, error));
 
     /* One thread: the hierarchy is built in a fraction of a second and rays bring their own threads. */
     v->device = rtcNewDevice("threads=1,user_threads=0,set_affinity=0");
@@ -104,11 +111,21 @@ done:
     return status;
 }
 
+lam_status visibility_create(const mesh *m, visibility **out, lam_error *error) {
+    return create(m, true, out, error);
+}
+
+lam_status visibility_create_of_elements(const mesh *m, visibility **out, lam_error *error) {
+    return create(m, false, out, error);
+}
+
 void visibility_destroy(visibility *v) {
     if (v == NULL) return;
     if (v->scene != NULL) rtcReleaseScene(v->scene);
     if (v->device != NULL) rtcReleaseDevice(v->device);
-    for (int kind = 0; kind < N_GEOMETRIES; kind++) free(v->prim_element[kind]);
+    for (int kind = 0; kind < N_GEOMETRIES; kind++) free(v->prim_piece[kind]);
+    facets_free(&v->facets);
+    facet_grids_free(&v->grids);
     free(v);
 }
 
@@ -133,9 +150,9 @@ typedef struct cast_context {
     bool cull_back;
 } cast_context;
 
-/* The component of a direction along an element's normal: negative where the front is met. */
-static float along_normal(const visibility *v, uint32_t front, float x, float y, float z) {
-    const float *normal = v->mesh->normal[front];
+/* The component of a direction along a facet's normal: negative where the front is met. */
+static float along_normal(const visibility *v, uint32_t facet, float x, float y, float z) {
+    const float *normal = v->facets.normal[facet];
     return normal[0] * x + normal[1] * y + normal[2] * z;
 }
 
@@ -148,15 +165,19 @@ enum {
     HIT_GEOMETRY = offsetof(struct RTCHit8, geomID) / (8 * sizeof(unsigned)),
 };
 
+static uint32_t facet_of(const visibility *v, unsigned geometry, unsigned primitive) {
+    return v->facets.piece_facet[v->prim_piece[geometry][primitive]];
+}
+
 /* The ray's own plane: a face in it, met where the ray starts, is either the element's other side modelled as
  * a face of its own, or something that stands on the element and hides that ray anyway by its other faces. */
-static bool in_own_plane(const visibility *v, uint32_t front, uint32_t own, float travelled) {
-    const float *n = v->mesh->normal[own], *m = v->mesh->normal[front];
+static bool in_own_plane(const visibility *v, uint32_t facet, uint32_t own, float travelled) {
+    const float *n = v->facets.normal[own], *m = v->facets.normal[facet];
     return travelled <= v->rounding && fabsf(n[0] * m[0] + n[1] * m[1] + n[2] * m[2]) > 1 - 1e-6f;
 }
 
-/* Refuses hits on the element a ray leaves, whose index the ray carries as its id, on faces in the same
- * place, and on culled backs. Nine rays of ten meet their own element at distance 0: refusing that inside the
+/* Refuses hits on the facet a ray leaves, whose index the ray carries as its id, on faces in the same
+ * place, and on culled backs. Nine rays of ten meet their own facet at distance 0: refusing that inside the
  * traversal spares a second cast. */
 static void refuse_own_and_culled(const struct RTCFilterFunctionNArguments *args) {
     const cast_context *context = (const cast_context *)args->context;
@@ -169,10 +190,10 @@ static void refuse_own_and_culled(const struct RTCFilterFunctionNArguments *args
     const unsigned *geometry = (const unsigned *)args->hit + HIT_GEOMETRY * n;
     for (size_t i = 0; i < n; i++) {
         if (args->valid[i] == 0) continue;
-        const uint32_t front = v->prim_element[geometry[i]][primitive[i]];
-        const float cosine = along_normal(v, front, direction[i], direction[n + i], direction[2 * n + i]);
-        if (front == own[i] || (context->cull_back && cosine >= 0) ||
-            (own[i] != VISIBILITY_NOTHING && in_own_plane(v, front, own[i], distance[i] * fabsf(cosine))))
+        const uint32_t facet = facet_of(v, geometry[i], primitive[i]);
+        const float cosine = along_normal(v, facet, direction[i], direction[n + i], direction[2 * n + i]);
+        if (facet == own[i] || (context->cull_back && cosine >= 0) ||
+            (own[i] != VISIBILITY_NOTHING && in_own_plane(v, facet, own[i], distance[i] * fabsf(cosine))))
             args->valid[i] = 0;
     }
 }
@@ -218,29 +239,31 @@ static void prefer_fronts(const visibility *v, const float cosine[VISIBILITY_PAC
         if (cosine[i] <= 0 || again.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
         ray->hit.geomID[i] = again.hit.geomID[i];
         ray->hit.primID[i] = again.hit.primID[i];
+        ray->hit.u[i] = again.hit.u[i];
+        ray->hit.v[i] = again.hit.v[i];
         ray->ray.tfar[i] = again.ray.tfar[i];
     }
 }
 
-/* What the rays of a packet met first: the fronts' indices and the components of the directions along their
- * normals; VISIBILITY_NOTHING and 0 where there is nothing. */
+/* What the rays of a packet met first: the facets and the components of the directions along their normals;
+ * VISIBILITY_NOTHING and 0 where there is nothing. */
 typedef struct met_packet {
-    uint32_t front[VISIBILITY_PACKET];
+    uint32_t facet[VISIBILITY_PACKET];
     float cosine[VISIBILITY_PACKET];
 } met_packet;
 
 static void look_up(const visibility *v, const struct RTCRayHit8 *ray, size_t n_rays, met_packet *met) {
     for (size_t i = 0; i < n_rays; i++) {
-        met->front[i] = VISIBILITY_NOTHING;
+        met->facet[i] = VISIBILITY_NOTHING;
         met->cosine[i] = 0;
         if (ray->hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
-        met->front[i] = v->prim_element[ray->hit.geomID[i]][ray->hit.primID[i]];
+        met->facet[i] = facet_of(v, ray->hit.geomID[i], ray->hit.primID[i]);
         met->cosine[i] =
-            along_normal(v, met->front[i], ray->ray.dir_x[i], ray->ray.dir_y[i], ray->ray.dir_z[i]);
+            along_normal(v, met->facet[i], ray->ray.dir_x[i], ray->ray.dir_y[i], ray->ray.dir_z[i]);
     }
 }
 
-/* Above its own element's plane by more than rounding a ray cannot meet that plane again: no filter need ask
+/* Above its own facet's plane by more than rounding a ray cannot meet that plane again: no filter need ask
  * at each of the hits, which would cost a third of all time. */
 static void lift(const visibility *v, const uint32_t *self, size_t n_rays, struct RTCRayHit8 *ray) {
     const float height = 2 * v->rounding;
@@ -253,8 +276,8 @@ static void lift(const visibility *v, const uint32_t *self, size_t n_rays, struc
     }
 }
 
-/* Casts the rays of a packet that leave elements. The few that meet their own all the same, one that is not
- * quite planar, or one in its place, go again from where they were, with the filter. */
+/* Casts the rays of a packet that leave elements. The few that meet their own facet all the same, one that is
+ * not quite planar, or one in its place, go again from where they were, with the filter. */
 static void cast_lifted(const visibility *v, const ray_packet *rays, const uint32_t *self, size_t n_rays,
                         cast_context *context, int active[VISIBILITY_PACKET], struct RTCRayHit8 *ray,
                         met_packet *met) {
@@ -265,10 +288,10 @@ static void cast_lifted(const visibility *v, const ray_packet *rays, const uint3
     context->embree.filter = refuse_own_and_culled;
     look_up(v, ray, n_rays, met);
     for (size_t i = 0; i < n_rays; i++) {
-        const uint32_t own = ray->ray.id[i], front = met->front[i];
+        const uint32_t own = ray->ray.id[i], facet = met->facet[i];
         const bool again =
-            own != VISIBILITY_NOTHING && front != VISIBILITY_NOTHING &&
-            (front == own || in_own_plane(v, front, own, ray->ray.tfar[i] * fabsf(met->cosine[i])));
+            own != VISIBILITY_NOTHING && facet != VISIBILITY_NOTHING &&
+            (facet == own || in_own_plane(v, facet, own, ray->ray.tfar[i] * fabsf(met->cosine[i])));
         active[i] = again ? -1 : 0;
         any = any || again;
         if (!again) continue;
@@ -296,7 +319,7 @@ void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays,
     for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
         uint32_t own = self != NULL && i < n_rays ? self[i] : VISIBILITY_NOTHING;
         if (own != VISIBILITY_NOTHING && own >= v->n_fronts) own -= (uint32_t)v->n_fronts;
-        ray.ray.id[i] = own;
+        ray.ray.id[i] = own == VISIBILITY_NOTHING ? own : v->facets.of_element[own];
         active[i] = i < n_rays ? -1 : 0;
     }
     if (self != NULL && !context.cull_back) {
@@ -313,11 +336,16 @@ void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays,
         look_up(v, &ray, n_rays, &met);
     }
 
+    uint32_t piece[VISIBILITY_PACKET];
+    for (size_t i = 0; i < n_rays; i++)
+        piece[i] = met.facet[i] == VISIBILITY_NOTHING ? FACET_NO_PIECE
+                                                      : v->prim_piece[ray.hit.geomID[i]][ray.hit.primID[i]];
+    facet_grids_find(&v->grids, n_rays, piece, ray.hit.u, ray.hit.v, hits->element);
     for (size_t i = 0; i < n_rays; i++) {
-        const bool back = met.front[i] != VISIBILITY_NOTHING && met.cosine[i] >= 0;
+        const bool back = met.facet[i] != VISIBILITY_NOTHING && met.cosine[i] >= 0;
         hits->distance[i] = ray.ray.tfar[i];
-        hits->element[i] = back && two_sided ? met.front[i] + (uint32_t)v->n_fronts : met.front[i];
         hits->back[i] = back && !two_sided;
+        if (back && two_sided) hits->element[i] += (uint32_t)v->n_fronts;
     }
 }
 
@@ -326,10 +354,10 @@ void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays,
 typedef struct segment_context {
     struct RTCIntersectContext embree;
     const visibility *visibility;
-    uint32_t from[VISIBILITY_PACKET], to[VISIBILITY_PACKET];
+    uint32_t from[VISIBILITY_PACKET], to[VISIBILITY_PACKET]; /* facets */
 } segment_context;
 
-/* Refuses hits on the two elements that a segment joins and on faces in the same place. */
+/* Refuses hits on the facets of the two elements that a segment joins and on faces in the same place. */
 static void refuse_both_ends(const struct RTCFilterFunctionNArguments *args) {
     const segment_context *context = (const segment_context *)args->context;
     const visibility *v = context->visibility;
@@ -341,12 +369,12 @@ static void refuse_both_ends(const struct RTCFilterFunctionNArguments *args) {
     const unsigned *geometry = (const unsigned *)args->hit + HIT_GEOMETRY * n;
     for (size_t i = 0; i < n; i++) {
         if (args->valid[i] == 0) continue;
-        const uint32_t front = v->prim_element[geometry[i]][primitive[i]];
+        const uint32_t facet = facet_of(v, geometry[i], primitive[i]);
         const uint32_t from = context->from[lane[i]], to = context->to[lane[i]];
         const float along =
-            fabsf(along_normal(v, front, direction[i], direction[n + i], direction[2 * n + i]));
-        if (front == from || front == to || in_own_plane(v, front, from, distance[i] * along) ||
-            in_own_plane(v, front, to, (1 - distance[i]) * along))
+            fabsf(along_normal(v, facet, direction[i], direction[n + i], direction[2 * n + i]));
+        if (facet == from || facet == to || in_own_plane(v, facet, from, distance[i] * along) ||
+            in_own_plane(v, facet, to, (1 - distance[i]) * along))
             args->valid[i] = 0;
     }
 }
@@ -364,8 +392,8 @@ unsigned visibility_blocked(const visibility *v, const ray_packet *segments, siz
         packet.ray.tfar[i] = 1;
         packet.ray.id[i] = (unsigned)i;
         if (i >= n_segments) continue;
-        context.from[i] = from[i] < v->n_fronts ? from[i] : from[i] - (uint32_t)v->n_fronts;
-        context.to[i] = to[i] < v->n_fronts ? to[i] : to[i] - (uint32_t)v->n_fronts;
+        context.from[i] = v->facets.of_element[from[i] < v->n_fronts ? from[i] : from[i] - v->n_fronts];
+        context.to[i] = v->facets.of_element[to[i] < v->n_fronts ? to[i] : to[i] - v->n_fronts];
     }
     rtcOccluded8(active, v->scene, &context.embree, &packet.ray);
     unsigned blocked = 0;
@@ -373,7 +401,7 @@ unsigned visibility_blocked(const visibility *v, const ray_packet *segments, siz
     return blocked;
 }
 
-/* One packet of the bare loop; returns how many rays met their own element, which nobody need ask. */
+/* One packet of the bare loop; returns how many rays met their own facet, which nobody need ask. */
 static size_t cast_bare(const visibility *v, const ray_packet *rays, const float nearest[VISIBILITY_PACKET],
                         uint32_t self, bool look) {
     static const int active[VISIBILITY_PACKET]
@@ -387,7 +415,7 @@ static size_t cast_bare(const visibility *v, const ray_packet *rays, const float
     rtcIntersect8(active, v->scene, &context, &packet);
     for (size_t i = 0; i < VISIBILITY_PACKET && look; i++)
         own += packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID &&
-               v->prim_element[packet.hit.geomID[i]][packet.hit.primID[i]] == self;
+               facet_of(v, packet.hit.geomID[i], packet.hit.primID[i]) == v->facets.of_element[self];
     return own;
 }
 
@@ -398,7 +426,7 @@ lam_status visibility_bare_seconds(const visibility *v, const ray_packet *packet
 #pragma omp parallel for schedule(static)
     for (size_t p = 0; p < n_packets; p++)
         for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
-            const float cosine = along_normal(v, self[p], packets[p].direction[0][i],
+            const float cosine = along_normal(v, v->facets.of_element[self[p]], packets[p].direction[0][i],
                                               packets[p].direction[1][i], packets[p].direction[2][i]);
             nearest[p][i] = 2 * v->rounding / fmaxf(cosine, 1e-3f);
         }

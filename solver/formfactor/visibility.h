@@ -23,8 +23,13 @@ typedef struct hit_packet {
     float distance[VISIBILITY_PACKET];
 } hit_packet;
 
-/* Builds the acceleration structure over a mesh, which must outlive it. Errors: LAM_ERR_MEMORY, _INTERNAL. */
+/* Builds the acceleration structure over a mesh, which must outlive it, and not over its elements but over
+ * the facets that they lie in (solver/scene/facets.h): a room has few of those however finely it is divided.
+ * Errors: LAM_ERR_MEMORY, _INTERNAL. */
 lam_status visibility_create(const mesh *m, visibility **out, lam_error *error);
+
+/* The same over the elements one by one: what the other is measured by. */
+lam_status visibility_create_of_elements(const mesh *m, visibility **out, lam_error *error);
 void visibility_destroy(visibility *v);
 
 /* A point of the scene in the recentred single precision that rays are given in. */
@@ -50,9 +55,9 @@ unsigned visibility_blocked(const visibility *v, const ray_packet *segments, siz
                             const uint32_t *from, const uint32_t *to);
 
 /* How fast Embree alone is: what visibility_cast is measured by. Casts packets that are in memory already, on
- * the same hierarchy, by all threads, without a filter and without a look at what was met; packet p leaves
+ * the hierarchy of v, by all threads, without a filter and without a look at what was met; packet p leaves
  * element self[p], above which its rays begin by more than rounding. own, unless NULL, gets how many rays met
- * their own element all the same, counted afterwards. Errors: LAM_ERR_MEMORY. */
+ * their own facet all the same, counted afterwards. Errors: LAM_ERR_MEMORY. */
 lam_status visibility_bare_seconds(const visibility *v, const ray_packet *packets, const uint32_t *self,
                                    size_t n_packets, double *seconds, size_t *own, lam_error *error);
 

@@ -1,5 +1,7 @@
 /* One polygon to a planar convex quad or to triangles, by cutting ears off its plane projection. */
-#include "solver/scene/soup.h"
+#include "solver/scene/polygon.h"
+
+#include "solver/scene/tables.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -119,7 +121,10 @@ static double ear_quality(const polygon_scratch *s, size_t n, size_t i) {
     for (size_t j = 0; j < n; j++) {
         if (j == before || j == i || j == after) continue;
         const double *p = s->flat[j];
-        if (memcmp(p, a, sizeof *s->flat) == 0 || memcmp(p, c, sizeof *s->flat) == 0) continue;
+        /* A corner met twice, where a bridge leads to a hole: each time it has its own part of the angle. */
+        if (memcmp(p, a, sizeof *s->flat) == 0 || memcmp(p, b, sizeof *s->flat) == 0 ||
+            memcmp(p, c, sizeof *s->flat) == 0)
+            continue;
         if (turn(a, b, p) >= 0 && turn(b, c, p) >= 0 && turn(c, a, p) >= 0) return -1;
     }
     const double ab = distance2(a, b), bc = distance2(b, c), ca = distance2(c, a);
@@ -159,7 +164,7 @@ static void clip_ears(polygon_scratch *s, size_t n, double least_turn) {
 }
 
 lam_status polygon_split(const double (*vertices)[3], const uint32_t *corners, size_t n, double least_area,
-                         polygon_scratch *s, lam_error *error) {
+                         bool keep_straight, polygon_scratch *s, lam_error *error) {
     lam_status status = LAM_OK;
     double normal[3], diameter = 0;
     s->n_pieces = 0;
@@ -172,7 +177,7 @@ lam_status polygon_split(const double (*vertices)[3], const uint32_t *corners, s
     memcpy(s->corners, corners, n * sizeof *corners);
     const double off = flatten(vertices, corners, n, normal, s->flat);
     for (size_t i = 1; i < n; i++) diameter = fmax(diameter, distance2(s->flat[0], s->flat[i]));
-    if (n > 3) remove_straight(s, &n, diameter);
+    if (n > 3 && !keep_straight) remove_straight(s, &n, diameter);
     if (n < 3) return LAM_OK;
     bool convex = true;
     for (size_t i = 0; i < n; i++)

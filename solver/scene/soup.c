@@ -133,7 +133,7 @@ lam_status soup_split(soup *s, const char *path, lam_error *error) {
     for (size_t i = 0; i < s->n_polygons; i++) {
         const struct soup_polygon *polygon = &s->polygons[i];
         TRY(polygon_split((const double(*)[3])s->vertices, s->corners + polygon->first, polygon->n_corners,
-                          1e-14 * extent * extent, &scratch, error));
+                          1e-14 * extent * extent, false, &scratch, error));
         if (scratch.n_pieces == 0) s->dropped++;
         for (size_t p = 0; p < scratch.n_pieces; p++) TRY(add_element(s, scratch.pieces[p], polygon, error));
     }

@@ -3,6 +3,7 @@
 #ifndef LAMBERT_SCENE_SOUP_H
 #define LAMBERT_SCENE_SOUP_H
 
+#include "solver/scene/polygon.h"
 #include "solver/scene/tables.h"
 
 #include <stdbool.h>
@@ -68,21 +69,6 @@ lam_status file_text(const char *path, char **out, size_t *out_length, lam_error
 typedef lam_status soup_reader(const char *path, soup *s, lam_error *error);
 soup_reader obj_read;
 soup_reader assimp_read;
-
-/* One polygon to pieces (4th index TABLE_NONE: a triangle), at most n - 2 of them: scratch.pieces.
- * No piece when its area is at most least_area. Corners that are straight to 1e-6 of its diameter go. */
-typedef struct polygon_scratch {
-    uint32_t *corners; /* what is left of the polygon */
-    double (*flat)[2];
-    double *quality; /* of the ear at each corner; negative: not an ear */
-    uint32_t (*pieces)[4];
-    size_t corner_capacity, flat_capacity, quality_capacity, piece_capacity;
-    size_t n_pieces;
-} polygon_scratch;
-
-lam_status polygon_split(const double (*vertices)[3], const uint32_t *corners, size_t n, double least_area,
-                         polygon_scratch *scratch, lam_error *error);
-void polygon_scratch_free(polygon_scratch *scratch);
 
 /* Runs reader on path in a child process under limits and receives the elements, names and materials (not the
  * polygons), every index and size checked. */

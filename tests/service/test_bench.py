@@ -20,8 +20,8 @@ COLUMNS = {
     "closed-forms-summary": "method open_worst open_median hidden_worst zero_worst covered seconds",
     "enclosures": "enclosure source method quantity from to truth estimate error own_accuracy",
     "enclosures-summary": "enclosure method F_worst F_own B_worst B_own seconds",
-    "throughput": "scene elements rays threads bare counted whole counted_ratio whole_ratio bare_speedup "
-                  "counted_speedup own_share",
+    "throughput": "scene elements rays threads bare facets counted whole counted_ratio whole_ratio facets_ratio "
+                  "bare_speedup counted_speedup own_share",
     "resolution": "scene elements resolution seconds density speedup error density_1 density_2 density_3 speedup_1 "
                   "error_1 error_2 error_3",
     "error": "scene elements method reference seconds entries single_mean single_q05 single_median single_q95 lamp",
