@@ -266,6 +266,7 @@ lam_status lowrank_of_factorizers(const bench_run *run, const lowrank_scene *con
             for (int k = 0; k < 4; k++) {
                 const factorizer_options how = lowrank_options(run, .1, fixed && k > 0 ? hf.rank : 0);
                 if (k == 3 && s->m.n > 15000) continue; /* n^2 numbers three times, and hours */
+                if (k > 1 && s->m.n > 5000 && run->scale != BENCH_FULL) continue; /* minutes */
                 if (k > 0 || !fixed) TRY(lowrank_factorize(run, s, names[k], &how, true, repeats, &r, error));
                 if (k == 0 && !fixed) hf = r;
                 add_factorizer(&out, s, names[k], fixed ? "equal rank" : "epsilon .1", k == 0 ? &hf : &r,
