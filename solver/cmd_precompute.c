@@ -110,7 +110,7 @@ static bool unused_by_form_factors(const char *name, const precompute_arguments 
 }
 
 static bool unused_by_method(const char *name, const precompute_arguments *f, const build_report *built) {
-    static const char *const never[] = {"threshold", "correction", NULL};
+    static const char *const of_sparse[] = {"threshold", "correction", NULL};
     static const char *const of_patches[] = {"coherence", "min-area", "assign", NULL};
     static const char *const of_bound[] = {"epsilon", "alpha", "budget", NULL};
     static const char *const of_hf[] = {"alpha", "budget", "levels", NULL};
@@ -118,8 +118,9 @@ static bool unused_by_method(const char *name, const precompute_arguments *f, co
                                              "levels",     "rank",    NULL};
     const bool two_mesh = strcmp(built->method, "2msc") == 0;
     const bool rank_given = f->rank > 0;
-    if (is_among(name, never)) return true;
-    if (strcmp(name, "store-precision") == 0) return strcmp(built->method, "exact") == 0;
+    if (is_among(name, of_sparse)) return built->threshold <= 0;
+    if (strcmp(name, "store-precision") == 0)
+        return strcmp(built->method, "exact") == 0 || built->threshold > 0;
     if (is_among(name, of_patches)) return !two_mesh || (rank_given && strcmp(name, "assign") != 0);
     if (two_mesh && strcmp(name, "factorizer") == 0)
         return built->factorizer == NULL && strcmp(f->factorizer, "auto") != 0;
@@ -169,6 +170,8 @@ int cmd_precompute(int argc, char **argv) {
                               .factorizer = "auto",
                               .precision = "f32",
                               .assign = "inclusion",
+                              .threshold = 1e-4,
+                              .correction = "delta",
                               .epsilon = .05,
                               .alpha = .5,
                               .budget = "squares",
@@ -229,6 +232,8 @@ int cmd_precompute(int argc, char **argv) {
         .coherence = f.coherence,
         .min_area = f.min_area,
         .proximity = strcmp(f.assign, "proximity") == 0,
+        .threshold = f.threshold,
+        .correction = f.correction,
         .memory = f.memory,
         .scratch = f.scratch,
         .continues = continues != NULL ? continues : "what was finished stays in the scratch folder",

@@ -322,6 +322,15 @@ static build_problem problem_of(const work *w) {
                            .noise = recipe_noise(&w->f.recipe)};
 }
 
+static const char *const corrections[] = {
+    [SPARSE_NONE] = "none", [SPARSE_DELTA] = "delta", [SPARSE_DISCARDED] = "discarded"};
+
+static sparse_correction correction_of(const char *name) {
+    for (sparse_correction c = SPARSE_NONE; c <= SPARSE_DISCARDED; c++)
+        if (strcmp(corrections[c], name) == 0) return c;
+    return SPARSE_NONE;
+}
+
 static lam_status build(work *w, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = w->options;
@@ -340,6 +349,8 @@ static lam_status build(work *w, lam_error *error) {
                                .coherence = o->coherence,
                                .min_area = o->min_area,
                                .proximity = o->proximity,
+                               .threshold = o->threshold,
+                               .correction = correction_of(o->correction),
                                .memory = (size_t)fmax(1, w->memory - held),
                                .seed = o->seed,
                                .progress = &w->progress};
@@ -448,6 +459,10 @@ static lam_status describe_operator(const work *w, store *s, lam_error *error) {
     if (factorized && r->levels >= 0) {
         TRY(store_set_integer(s, "/operator", "levels", r->levels, error));
         TRY(store_set_number(s, "/operator", "passes", r->factorized.passes, error));
+    }
+    if (r->threshold > 0) {
+        TRY(store_set_number(s, "/operator", "threshold", r->threshold, error));
+        TRY(store_set_text(s, "/operator", "correction", corrections[r->correction], error));
     }
     if (r->coherence >= 0) {
         TRY(store_set_text(s, "/operator", "assign", w->options->proximity ? "proximity" : "inclusion",

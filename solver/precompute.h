@@ -32,6 +32,8 @@ typedef struct precompute_options {
     uint64_t rank;              /* 0: by epsilon */
     double coherence, min_area; /* of 2msc; 0: not given */
     bool proximity;             /* of 2msc */
+    double threshold;           /* of sparse */
+    const char *correction;     /* of sparse: "none", "delta", "discarded" */
     panel_precision precision;  /* of the stored operator */
     uint64_t memory;            /* bytes; 0: 70 % of what is free */
     const char *scratch;        /* a folder, or NULL */

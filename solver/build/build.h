@@ -22,6 +22,11 @@ typedef struct build_problem {
     const uint32_t *surface;   /* [n] below n: equal where elements are of one surface */
 } build_problem;
 
+/* How a sparse inverse makes up for what is left out of it: not; by what one solution with light everywhere
+ * misses; by the sum of what was left out, whose own further bounces are forgotten (Aguerre 2016, eq. 4.7).
+ */
+typedef enum sparse_correction { SPARSE_NONE, SPARSE_DELTA, SPARSE_DISCARDED } sparse_correction;
+
 typedef struct build_options {
     const char *method;     /* "auto", "exact", "low-rank", ... */
     const char *factorizer; /* "auto", "hf", ... */
@@ -31,8 +36,10 @@ typedef struct build_options {
     size_t rank;                /* 0: by epsilon; else exactly min(rank, n) columns */
     double coherence, min_area; /* 2msc: smallest coherence, smallest area of a patch, m^2; 0: not given */
     bool proximity;             /* 2msc: elements belong to the nearest patch */
-    size_t memory;              /* bytes it may use; 0: no limit */
-    uint64_t seed;              /* of random sketches */
+    double threshold;           /* sparse: entries below it are left out */
+    sparse_correction correction;
+    size_t memory; /* bytes it may use; 0: no limit */
+    uint64_t seed; /* of random sketches */
     const progress *progress;
 } build_options;
 
@@ -48,6 +55,8 @@ typedef struct build_report {
     double measured_norm_error;   /* |S - Q V^T|; negative when not measured */
     double rcond;                 /* of the matrix inverted; 1 when none was */
     double coherence, patch_area; /* 2msc: the smallest of a patch, m^2; negative when there are no patches */
+    double threshold;             /* sparse, as reached; 0: not sparse */
+    sparse_correction correction;
     double factorize_seconds, invert_seconds;
 } build_report;
 
@@ -61,6 +70,7 @@ typedef struct build_method {
 extern const build_method build_exact;
 extern const build_method build_low_rank;
 extern const build_method build_two_mesh;
+extern const build_method build_sparse;
 
 /* Builds by options->method ("auto" chooses and says why). LAM_ERR_UNSUPPORTED for a method of the contract
  * that is still to come. */

@@ -8,10 +8,10 @@
 /* Up to this many elements the whole inverse is small, exact, and built in well under a second. */
 enum { AUTO_EXACT_ELEMENTS = 1024, EXACT_ELEMENTS = 8192 };
 
-static const build_method *const methods[] = {&build_exact, &build_low_rank, &build_two_mesh};
+static const build_method *const methods[] = {&build_exact, &build_low_rank, &build_two_mesh, &build_sparse};
 
 /* Methods and factorizers of the contract that are still to come. */
-static const char *const later_methods[] = {"sparse", "emitters", "hierarchical"};
+static const char *const later_methods[] = {"emitters", "hierarchical"};
 
 static bool is_among(const char *name, const char *const *list, size_t n) {
     for (size_t i = 0; i < n; i++)
@@ -26,7 +26,7 @@ static lam_status check_options(const build_options *options, lam_error *error) 
     /* 2msc does not factorize, it can make its own columns orthogonal; exact does neither. What a method has
      * no use for is not refused. */
     const bool qr = strcmp(options->factorizer, "qr") == 0;
-    const bool factorizes = strcmp(options->method, "2msc") != 0 && strcmp(options->method, "exact") != 0;
+    const bool factorizes = strcmp(options->method, "auto") == 0 || strcmp(options->method, "low-rank") == 0;
     if (!qr && !factorizer_exists(options->factorizer))
         FAIL(error, LAM_ERR_ARGUMENT, "--factorizer %.40s: unknown; use auto, hf, svd, rsi, sgrsvd or qr",
              options->factorizer);
@@ -37,6 +37,8 @@ static lam_status check_options(const build_options *options, lam_error *error) 
         FAIL(error, LAM_ERR_ARGUMENT, "--coherence %g: must be above 0 and at most 1", options->coherence);
     if (!(options->min_area >= 0 && options->min_area < INFINITY))
         FAIL(error, LAM_ERR_ARGUMENT, "--min-area %g: must be above 0", options->min_area);
+    if (strcmp(options->method, "sparse") == 0 && !(options->threshold > 0 && options->threshold < 1))
+        FAIL(error, LAM_ERR_ARGUMENT, "--threshold %g: must be above 0 and below 1", options->threshold);
     if (!(options->epsilon > 0 && options->epsilon <= 1))
         FAIL(error, LAM_ERR_ARGUMENT, "--epsilon %g: must be above 0 and at most 1", options->epsilon);
     if (!(options->budget.alpha > 0 && options->budget.alpha < 1))
@@ -102,7 +104,7 @@ lam_status build_operator(const build_problem *problem, const build_options *opt
             snprintf(report->reason, sizeof report->reason, "%s: asked for by --method", methods[i]->name);
         goto done;
     }
-    FAIL(error, LAM_ERR_ARGUMENT, "--method %.40s: unknown; use auto, exact, low-rank or 2msc",
+    FAIL(error, LAM_ERR_ARGUMENT, "--method %.40s: unknown; use auto, exact, low-rank, 2msc or sparse",
          options->method);
 done:
     return status;

@@ -42,7 +42,7 @@ static lam_status check_memory(const build_problem *problem, const build_options
 }
 
 /* eqs. 5 and 6: the operator of two meshes, folded for one channel. */
-static lam_status build_sparse(const build_problem *problem, coarse_mesh *mesh, lam_operator **op,
+static lam_status build_summed(const build_problem *problem, coarse_mesh *mesh, lam_operator **op,
                                build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n, C = problem->n_channels, k = mesh->k;
@@ -155,7 +155,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
     if (qr)
         TRY(finish_low_rank(problem, &S, &f, op, &report->rcond, error));
     else
-        TRY(build_sparse(problem, &mesh, op, report, error));
+        TRY(build_summed(problem, &mesh, op, report, error));
     report->invert_seconds = clock_seconds() - inverting;
     report->method = "2msc";
     report->factorizer = qr ? "qr" : NULL;

@@ -5,11 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const operator_kind *const operator_kinds[] = {&operator_exact, &operator_low_rank,
-                                                      &operator_two_mesh};
+static const operator_kind *const operator_kinds[] = {&operator_exact, &operator_low_rank, &operator_two_mesh,
+                                                      &operator_sparse};
 
 /* Kinds of the format that are still to come. */
-static const char *const future_kinds[] = {"sparse", "emitters", "hierarchical"};
+static const char *const future_kinds[] = {"emitters", "hierarchical"};
 
 const operator_kind *operator_kind_find(const char *name) {
     for (size_t i = 0; i < sizeof operator_kinds / sizeof *operator_kinds; i++)

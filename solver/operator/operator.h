@@ -60,6 +60,7 @@ struct lam_operator {
 extern const operator_kind operator_exact;
 extern const operator_kind operator_low_rank;
 extern const operator_kind operator_two_mesh;
+extern const operator_kind operator_sparse;
 
 /* The kind of this name, or NULL. */
 const operator_kind *operator_kind_find(const char *name);

@@ -166,7 +166,7 @@ class Usage(Case):
                      "generate atrium -o a.obj", "generate maze -o a.obj", "generate canopy -o a.obj",
                      "solve a.h5 --tolerance 1e-4", "solve a.h5 -o b.glb",
                      *("precompute a.obj -o b.h5 " + option for option in (
-                         "--keep-form-factors=compressed", "--method sparse",
+                         "--keep-form-factors=compressed", "--method emitters",
                          "--method emitters", "--method hierarchical", "--keep-factors", "--emitters sky", "--positions p.json",
                          "--path p.json --frames 3", "--reuse A", "--paths 9"))):
             with self.subTest(line):

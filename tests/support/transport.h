@@ -5,6 +5,7 @@
 
 #include "solver/operator/operator.h"
 #include "solver/operator/panel.h"
+#include "solver/operator/sparse.h"
 
 #include <check.h>
 #include <float.h>
@@ -174,6 +175,8 @@ typedef enum transport_kind {
     TRANSPORT_TWO_MESH_BF16,
     TRANSPORT_TWO_MESH_I8,
     TRANSPORT_TWO_MESH_COLOUR_I8,
+    TRANSPORT_SPARSE,
+    TRANSPORT_SPARSE_COLOUR,
     TRANSPORT_KINDS
 } transport_kind;
 
@@ -196,6 +199,56 @@ static inline void make_exact(transport *t, const double *F) {
     }
     t->roundings = 2 + sum_roundings(n);
     ck_assert_msg(operator_exact_create(n, t->n_channels, t->reflectance, P, &t->op, &error) == LAM_OK, "%s",
+                  error.message);
+}
+
+/* Every third entry of the inverse; grey also what was left out of each row, spread by weights, and rows 20
+ * to 29 without any entry. */
+static inline void make_sparse(transport *t, const double *F) {
+    lam_error error = {.message = ""};
+    const size_t n = t->n, C = t->n_channels;
+    sparse_arrays arrays = {.M = test_allocate(C, sizeof *arrays.M)};
+    if (C == 1) {
+        arrays.delta = test_allocate(n, sizeof *arrays.delta);
+        arrays.weight = test_allocate(n, sizeof *arrays.weight);
+        for (size_t p = 0; p < n; p++)
+            arrays.weight[p] = (float)(2. * (double)(p + 1) / (double)(n * (n + 1)));
+    }
+    for (size_t c = 0; c < C; c++) {
+        double *P = t->P + c * n * n, *magnitude = t->magnitude + c * n * n;
+        csr *M = &arrays.M[c];
+        *M = (csr){.n = n,
+                   .indptr = test_allocate(n + 1, sizeof *M->indptr),
+                   .indices = test_allocate(n * n, sizeof *M->indices),
+                   .data = test_allocate(n * n, sizeof *M->data)};
+        bounced_light(n, F, t->reflectance + c * n, P);
+        for (size_t p = 0; p < n; p++) {
+            const size_t i = t->order != NULL ? t->order[p] : p;
+            uint64_t last = M->indptr[p];
+            double lost = 0;
+            for (size_t q = 0; q < n; q++) {
+                const size_t j = t->order != NULL ? t->order[q] : q;
+                const bool kept = (p + q) % 3 == 0 && (C > 1 || p < 20 || p >= 30);
+                lost += kept ? 0 : P[i * n + j];
+                if (kept) {
+                    M->indices[last] = (uint32_t)q;
+                    M->data[last++] = (float)P[i * n + j];
+                }
+                P[i * n + j] = kept ? (double)(float)P[i * n + j] : 0;
+            }
+            M->indptr[p + 1] = last;
+            if (arrays.delta != NULL) arrays.delta[p] = (float)lost;
+            for (size_t q = 0; q < n; q++) {
+                const size_t j = t->order != NULL ? t->order[q] : q;
+                const double spread =
+                    arrays.delta != NULL ? (double)arrays.delta[p] * (double)arrays.weight[q] : 0;
+                magnitude[i * n + j] = fabs(P[i * n + j]) + fabs(spread);
+                P[i * n + j] += spread;
+            }
+        }
+    }
+    t->roundings = 4 + sum_roundings(n); /* delta: its product and its place in the sum */
+    ck_assert_msg(operator_sparse_create(n, C, t->reflectance, &arrays, &t->op, &error) == LAM_OK, "%s",
                   error.message);
 }
 
@@ -362,7 +415,9 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
                  {"two meshes, folded, f16", PANEL_F16},
                  {"two meshes, folded, bf16", PANEL_BF16},
                  {"two meshes, folded, i8", PANEL_I8},
-                 {"two meshes, 3 channels, i8", PANEL_I8}};
+                 {"two meshes, 3 channels, i8", PANEL_I8},
+                 {"sparse, with delta", PANEL_F32},
+                 {"sparse, 3 channels", PANEL_F32}};
     lam_error error = {.message = ""};
     uint64_t state = 11 + (uint64_t)kind;
     const bool colour = strstr(kinds[kind].name, "3 channels") != NULL;
@@ -393,6 +448,8 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
     t.magnitude = test_allocate(t.n_channels * n * n, sizeof *t.magnitude);
     if (kind == TRANSPORT_EXACT || kind == TRANSPORT_EXACT_COLOUR)
         make_exact(&t, F);
+    else if (kind == TRANSPORT_SPARSE || kind == TRANSPORT_SPARSE_COLOUR)
+        make_sparse(&t, F);
     else
         make_low_rank(&t, F, U, V, strstr(t.name, "folded") != NULL, two_mesh ? begin : NULL);
     if (ordered) ck_assert(operator_set_order(t.op, t.order, &error) == LAM_OK);

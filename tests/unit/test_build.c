@@ -315,7 +315,7 @@ START_TEST(bad_options_are_refused) {
     build_report report;
     lam_error error = {0};
     build_options options = defaults;
-    options.method = "sparse";
+    options.method = "emitters";
     ck_assert_int_eq(build_operator(problem_of(&f), &options, &op, &report, &error), LAM_ERR_UNSUPPORTED);
     options.method = "magic";
     ck_assert_int_eq(build_operator(&f.problem, &options, &op, &report, &error), LAM_ERR_ARGUMENT);

@@ -1,0 +1,20 @@
+/* What only a sparse operator is made of. */
+#ifndef LAMBERT_OPERATOR_SPARSE_H
+#define LAMBERT_OPERATOR_SPARSE_H
+
+#include "solver/operator/csr.h"
+#include "solver/operator/operator.h"
+
+typedef struct sparse_arrays {
+    csr *M;        /* [C], of n rows each: P without what was left out; rows and columns are positions */
+    float *delta;  /* [C][n] by position, what each row lacks of its sum; or NULL */
+    float *weight; /* [n] by position, its sum is 1; NULL with delta */
+} sparse_arrays;
+
+void sparse_arrays_free(sparse_arrays *arrays, size_t n_channels);
+
+/* P = M E + delta (weight . E). Takes over what arrays points to, also on an error, and zeroes it. */
+lam_status operator_sparse_create(size_t n, size_t n_channels, const float *reflectance,
+                                  sparse_arrays *arrays, lam_operator **op, lam_error *error);
+
+#endif
