@@ -10,8 +10,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Triangles and quads are two geometries; prim_piece leads from (geometry, primitive) to the piece. */
+/* Triangles and quads are two geometries; primitives leads from (geometry, primitive) to what was met. */
 enum { TRIANGLES, QUADS, N_GEOMETRIES };
+
+typedef struct primitive {
+    uint32_t piece, facet;
+} primitive;
 
 struct visibility {
     RTCDevice device;
@@ -20,7 +24,7 @@ struct visibility {
     size_t n_fronts; /* elements in the scene: n, or n/2 when two-sided */
     facets facets;   /* what is cast against */
     facet_grids grids;
-    uint32_t *prim_piece[N_GEOMETRIES];
+    primitive *primitives[N_GEOMETRIES];
     double centre[3];
     float rounding; /* how far single precision may move a point of the scene */
 };
@@ -45,8 +49,8 @@ static lam_status add_geometry(visibility *v, int kind, lam_error *error) {
         count += (f->pieces[p][3] == MESH_NO_VERTEX) == (kind == TRIANGLES);
     if (count == 0) goto done;
 
-    v->prim_piece[kind] = memory_allocate(count, sizeof(uint32_t), "visibility", error);
-    if (v->prim_piece[kind] == NULL) return LAM_ERR_MEMORY;
+    v->primitives[kind] = memory_allocate(count, sizeof(primitive), "visibility", error);
+    if (v->primitives[kind] == NULL) return LAM_ERR_MEMORY;
     geometry =
         rtcNewGeometry(v->device, kind == TRIANGLES ? RTC_GEOMETRY_TYPE_TRIANGLE : RTC_GEOMETRY_TYPE_QUAD);
     if (geometry == NULL) {
@@ -67,7 +71,7 @@ static lam_status add_geometry(visibility *v, int kind, lam_error *error) {
     for (size_t p = 0; p < f->n_pieces; p++) {
         if ((f->pieces[p][3] == MESH_NO_VERTEX) != (kind == TRIANGLES)) continue;
         for (unsigned c = 0; c < corners; c++) indices[prim * corners + c] = f->pieces[p][c];
-        v->prim_piece[kind][prim++] = (uint32_t)p;
+        v->primitives[kind][prim++] = (primitive){.piece = (uint32_t)p, .facet = f->piece_facet[p]};
     }
     rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
     rtcCommitGeometry(geometry);
@@ -123,7 +127,7 @@ void visibility_destroy(visibility *v) {
     if (v == NULL) return;
     if (v->scene != NULL) rtcReleaseScene(v->scene);
     if (v->device != NULL) rtcReleaseDevice(v->device);
-    for (int kind = 0; kind < N_GEOMETRIES; kind++) free(v->prim_piece[kind]);
+    for (int kind = 0; kind < N_GEOMETRIES; kind++) free(v->primitives[kind]);
     facets_free(&v->facets);
     facet_grids_free(&v->grids);
     free(v);
@@ -165,8 +169,8 @@ enum {
     HIT_GEOMETRY = offsetof(struct RTCHit8, geomID) / (8 * sizeof(unsigned)),
 };
 
-static uint32_t facet_of(const visibility *v, unsigned geometry, unsigned primitive) {
-    return v->facets.piece_facet[v->prim_piece[geometry][primitive]];
+static uint32_t facet_of(const visibility *v, unsigned geometry, unsigned id) {
+    return v->primitives[geometry][id].facet;
 }
 
 /* The ray's own plane: a face in it, met where the ray starts, is either the element's other side modelled as
@@ -186,11 +190,11 @@ static void refuse_own_and_culled(const struct RTCFilterFunctionNArguments *args
     const float *direction = (const float *)args->ray + RAY_DIRECTION * n;
     const float *distance = (const float *)args->ray + RAY_DISTANCE * n;
     const unsigned *own = (const unsigned *)args->ray + RAY_ID * n;
-    const unsigned *primitive = (const unsigned *)args->hit + HIT_PRIMITIVE * n;
+    const unsigned *id = (const unsigned *)args->hit + HIT_PRIMITIVE * n;
     const unsigned *geometry = (const unsigned *)args->hit + HIT_GEOMETRY * n;
     for (size_t i = 0; i < n; i++) {
         if (args->valid[i] == 0) continue;
-        const uint32_t facet = facet_of(v, geometry[i], primitive[i]);
+        const uint32_t facet = facet_of(v, geometry[i], id[i]);
         const float cosine = along_normal(v, facet, direction[i], direction[n + i], direction[2 * n + i]);
         if (facet == own[i] || (context->cull_back && cosine >= 0) ||
             (own[i] != VISIBILITY_NOTHING && in_own_plane(v, facet, own[i], distance[i] * fabsf(cosine))))
@@ -338,8 +342,9 @@ void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays,
 
     uint32_t piece[VISIBILITY_PACKET];
     for (size_t i = 0; i < n_rays; i++)
-        piece[i] = met.facet[i] == VISIBILITY_NOTHING ? FACET_NO_PIECE
-                                                      : v->prim_piece[ray.hit.geomID[i]][ray.hit.primID[i]];
+        piece[i] = met.facet[i] == VISIBILITY_NOTHING
+                       ? FACET_NO_PIECE
+                       : v->primitives[ray.hit.geomID[i]][ray.hit.primID[i]].piece;
     facet_grids_find(&v->grids, n_rays, piece, ray.hit.u, ray.hit.v, hits->element);
     for (size_t i = 0; i < n_rays; i++) {
         const bool back = met.facet[i] != VISIBILITY_NOTHING && met.cosine[i] >= 0;
@@ -365,11 +370,11 @@ static void refuse_both_ends(const struct RTCFilterFunctionNArguments *args) {
     const float *direction = (const float *)args->ray + RAY_DIRECTION * n;
     const float *distance = (const float *)args->ray + RAY_DISTANCE * n;
     const unsigned *lane = (const unsigned *)args->ray + RAY_ID * n;
-    const unsigned *primitive = (const unsigned *)args->hit + HIT_PRIMITIVE * n;
+    const unsigned *id = (const unsigned *)args->hit + HIT_PRIMITIVE * n;
     const unsigned *geometry = (const unsigned *)args->hit + HIT_GEOMETRY * n;
     for (size_t i = 0; i < n; i++) {
         if (args->valid[i] == 0) continue;
-        const uint32_t facet = facet_of(v, geometry[i], primitive[i]);
+        const uint32_t facet = facet_of(v, geometry[i], id[i]);
         const uint32_t from = context->from[lane[i]], to = context->to[lane[i]];
         const float along =
             fabsf(along_normal(v, facet, direction[i], direction[n + i], direction[2 * n + i]));

@@ -7,9 +7,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Corners of an outline at most: cutting takes their square. How often parts without an outline are taken out
- * before all are. */
-enum { OUTLINE_MOST = 4096, ROUNDS_MOST = 16 };
+/* Corners of an outline at most: cutting takes their square. How often parts that are not worth it are taken
+ * out before all are. */
+enum { OUTLINE_MOST = 4096, ROUNDS_MOST = 64 };
+
+/* Elements for each piece at least. Pieces are longer than elements, and an element must be looked for: for
+ * fewer that is slower. */
+enum { ELEMENTS_EACH = 16 };
 
 typedef struct loop {
     size_t first, count; /* in vertices */
@@ -280,7 +284,7 @@ static lam_status add_piece(outlines *o, const uint32_t corners[4], uint32_t par
 }
 
 /* Cuts the part of the loops first ... last-1. What was cut is right if every corner has its share in it and
- * its area is that of the elements; otherwise they stay alone. */
+ * its area is that of the elements; otherwise, or where it is little gain, they stay alone. */
 static lam_status cut_part(cutter *c, size_t first, size_t last, lam_error *error) {
     lam_status status = LAM_OK;
     outlines *o = c->o;
@@ -309,14 +313,14 @@ static lam_status cut_part(cutter *c, size_t first, size_t last, lam_error *erro
         }
     }
     const bool all = c->scratch.n_pieces == n - 2 || (n == 4 && c->scratch.n_pieces == 1);
-    o->alone[part] = !all || o->n_pieces - before > o->size[part] ||
+    o->alone[part] = !all || (o->n_pieces - before) * ELEMENTS_EACH > o->size[part] ||
                      fabs(area - o->area[part]) > 1e-9 * o->area[part] + round * o->flat;
     if (o->alone[part]) o->n_pieces = before;
 done:
     return status;
 }
 
-/* Cuts all parts; *failed: how many of them have no outline. */
+/* Cuts all parts; *failed: how many of them stay alone from now on. */
 static lam_status cut_all(cutter *c, size_t *failed, lam_error *error) {
     lam_status status = LAM_OK;
     c->o->n_pieces = *failed = 0;
@@ -349,7 +353,7 @@ lam_status outlines_cut(outlines *o, lam_error *error) {
         c.stamp == NULL || c.outer == NULL || c.hole == NULL)
         TRY(LAM_ERR_MEMORY);
     follow_all(&c);
-    /* A part without an outline makes corners of what its neighbours had left out: they are cut again. */
+    /* A part that is not joined makes corners of what its neighbours had left out: they are cut again. */
     for (size_t round = 0, failed = 1; failed > 0; round++) {
         if (round == ROUNDS_MOST) memset(o->alone, true, o->n_parts * sizeof *o->alone);
         TRY(cut_all(&c, &failed, error));

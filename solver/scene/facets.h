@@ -20,9 +20,9 @@ typedef struct facets {
 
 /* Joins elements 0 ... n_elements-1 that share an edge and lie within flat metres of one plane. Two facets
  * that meet share the corners of their pieces: a vertex goes only where it lies straight, within flat metres,
- * on the outline of every facet around it, so no ray passes between them that did not before. Facets whose
- * outline cannot be had that way, with more than a few thousand corners or crossing itself, are left as
- * elements. Freed by facets_free. Cost: O(n log n). Errors: LAM_ERR_MEMORY. */
+ * on the outline of every facet around it, so no ray passes between them that did not before. Elements stay
+ * alone where their outline crosses itself, has thousands of corners, or takes a piece for few of them. Freed
+ * by facets_free. Cost: O(n log n). Errors: LAM_ERR_MEMORY. */
 lam_status facets_join(const mesh *m, size_t n_elements, double flat, facets *out, lam_error *error);
 
 /* Every element a facet. */
