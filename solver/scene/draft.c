@@ -73,7 +73,21 @@ lam_status draft_cells(draft *d, const double quad[4][3], double size, lam_error
     return LAM_OK;
 }
 
+lam_status draft_even_cells(draft *d, const double quad[4][3], double size, lam_error *error) {
+    const double along = (point_distance(quad[0], quad[1]) + point_distance(quad[3], quad[2])) / 2;
+    const double across = (point_distance(quad[0], quad[3]) + point_distance(quad[1], quad[2])) / 2;
+    const double shorter = fmin(along, across), longer = fmax(along, across);
+    const size_t n_shorter = draft_steps_along(d, shorter, size);
+    const double width = shorter / (double)n_shorter;
+    const size_t n_longer = draft_steps_along(d, longer, fmin(size * size / width, 2 * width));
+    const size_t na = along < across ? n_shorter : n_longer, nb = along < across ? n_longer : n_shorter;
+    if (!d->counting) return draft_grid(d, quad, na, nb, error);
+    d->n_faces += na * nb;
+    return LAM_OK;
+}
+
 typedef struct near_search {
+    const void *plan;
     draft_builder *build;
     const generate_options *options;
     size_t wanted;
@@ -83,7 +97,7 @@ typedef struct near_search {
 /* Counts the faces at one cell size and keeps it when it is the best. */
 static lam_status try_cells(near_search *search, double size, double stretch, size_t *n_faces,
                             lam_error *error) {
-    draft counted = {.counting = true, .stretch = stretch};
+    draft counted = {.counting = true, .stretch = stretch, .plan = search->plan};
     const lam_status status = search->build(&counted, search->options, size, error);
     const double off = fabs((double)counted.n_faces - (double)search->wanted);
     if (status == LAM_OK && off < search->off)
@@ -96,7 +110,7 @@ static lam_status try_cells(near_search *search, double size, double stretch, si
 lam_status draft_build_near(draft *d, draft_builder *build, const generate_options *options, size_t wanted,
                             lam_error *error) {
     lam_status status = LAM_OK;
-    near_search search = {build, options, wanted, HUGE_VAL, 1, 1};
+    near_search search = {d->plan, build, options, wanted, HUGE_VAL, 1, 1};
     size_t n = 0;
     double size = 1;
     /* The number of faces goes like 1 / size^2: a few corrections come near, then what lies around is tried
