@@ -64,5 +64,6 @@ lam_status draft_box_scene(draft *d, const generate_options *options, lam_error 
 lam_status draft_cornell_scene(draft *d, const generate_options *options, lam_error *error);
 lam_status draft_city_scene(draft *d, const generate_options *options, lam_error *error);
 lam_status draft_furnace_scene(draft *d, const generate_options *options, lam_error *error);
+lam_status draft_rooms_scene(draft *d, const generate_options *options, lam_error *error);
 
 #endif

@@ -110,7 +110,7 @@ static const struct {
     {"cornell", draft_cornell_scene},
     {"furnace", draft_furnace_scene},
     {"city", draft_city_scene},
-    {"rooms", NULL},
+    {"rooms", draft_rooms_scene},
     {"anechoic", NULL},
     {"patio", NULL},
     {"atrium", NULL},
@@ -125,8 +125,8 @@ lam_status scene_generate(const generate_options *options, const char *path, siz
     size_t kind = 0;
     while (kind < sizeof kinds / sizeof *kinds && strcmp(kinds[kind].name, options->kind) != 0) kind++;
     if (kind == sizeof kinds / sizeof *kinds)
-        FAIL(error, LAM_ERR_ARGUMENT, "unknown kind of scene '%s'; known are box, city, cornell, furnace",
-             options->kind);
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "unknown kind of scene '%s'; known are box, city, cornell, furnace, rooms", options->kind);
     if (kinds[kind].build == NULL)
         FAIL(error, LAM_ERR_UNSUPPORTED, "generate %s: not supported yet", options->kind);
     if (isnan(options->reflectance) || options->reflectance >= 1)

@@ -141,6 +141,9 @@ class Usage(Case):
                 ("only for cornell", "generate box -o a.obj --closed"),
                 ("only for box", "generate cornell -o a.obj --divisions 2"),
                 ("only for city", "generate box -o a.obj --terrain hill"),
+                ("only for city", "generate rooms -o a.obj --variant 2"),
+                ("only for cornell", "generate rooms -o a.obj --closed"),
+                ("only for box", "generate rooms -o a.obj --size 1,2,3"),
                 ("--variant", "generate city -o a.obj --variant 4"),
                 ("--terrain", "generate city -o a.obj --terrain swamp"),
                 ("--size 1,2: 2 numbers, needs 3", "generate box -o a.obj --size 1,2"),
@@ -162,7 +165,7 @@ class Usage(Case):
 
     def test_not_supported_yet(self):
         for line in ("classify a.obj", "sky w.epw -o a.npy", "bench service",
-                     "generate rooms -o a.obj", "generate anechoic -o a.obj", "generate patio -o a.obj",
+                     "generate anechoic -o a.obj", "generate patio -o a.obj",
                      "generate atrium -o a.obj", "generate maze -o a.obj", "generate canopy -o a.obj",
                      "solve a.h5 --tolerance 1e-4", "solve a.h5 -o b.glb",
                      *("precompute a.obj -o b.h5 " + option for option in (
