@@ -111,10 +111,10 @@ static const struct {
     {"furnace", draft_furnace_scene},
     {"city", draft_city_scene},
     {"rooms", draft_rooms_scene},
-    {"anechoic", NULL},
+    {"anechoic", draft_anechoic_scene},
     {"patio", NULL},
     {"atrium", NULL},
-    {"maze", NULL},
+    {"maze", draft_maze_scene},
     {"canopy", NULL},
 };
 
@@ -126,7 +126,8 @@ lam_status scene_generate(const generate_options *options, const char *path, siz
     while (kind < sizeof kinds / sizeof *kinds && strcmp(kinds[kind].name, options->kind) != 0) kind++;
     if (kind == sizeof kinds / sizeof *kinds)
         FAIL(error, LAM_ERR_ARGUMENT,
-             "unknown kind of scene '%s'; known are box, city, cornell, furnace, rooms", options->kind);
+             "unknown kind of scene '%s'; known are box, city, cornell, furnace, rooms, anechoic, maze",
+             options->kind);
     if (kinds[kind].build == NULL)
         FAIL(error, LAM_ERR_UNSUPPORTED, "generate %s: not supported yet", options->kind);
     if (isnan(options->reflectance) || options->reflectance >= 1)

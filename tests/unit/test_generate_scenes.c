@@ -15,6 +15,8 @@ typedef struct scene_kind {
 
 static const scene_kind kinds[] = {
     {.name = "rooms", .small = 700, .large = 3000, .usual = 6000, .closed = true, .lamps = true},
+    {.name = "anechoic", .small = 1000, .large = 3000, .usual = 6000, .closed = true, .lamps = true},
+    {.name = "maze", .small = 800, .large = 3000, .usual = 6000},
 };
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
@@ -168,14 +170,15 @@ static size_t root_of(size_t *joined, size_t i) {
 typedef struct tally {
     size_t all, gone, backs;
     size_t far;   /* met what is 8 m away or more, seen from above */
-    size_t parts; /* of the scene between which no light goes, over however many bounces */
+    size_t parts; /* between which no light goes, over however many bounces; what sees only the sky is none */
 } tally;
 
 static tally cast_from_all(const mesh *m, size_t rays, uint64_t seed) {
     tally t = {0};
     visibility *v;
     size_t *joined = malloc(m->n * sizeof *joined);
-    ck_assert_ptr_nonnull(joined);
+    bool *sees = calloc(m->n, sizeof *sees);
+    ck_assert(joined != NULL && sees != NULL);
     for (size_t i = 0; i < m->n; i++) joined[i] = i;
     ck_assert_msg(visibility_create(m, &v, &error) == LAM_OK, "%s", error.message);
     for (size_t i = 0; i < m->n; i++) {
@@ -196,14 +199,16 @@ static tally cast_from_all(const mesh *m, size_t rays, uint64_t seed) {
                 t.gone += gone;
                 t.backs += hits.back[k];
                 if (gone || hits.back[k]) continue;
+                sees[i] = sees[hits.element[k]] = true;
                 joined[root_of(joined, i)] = root_of(joined, hits.element[k]);
                 mesh_centroid(m, hits.element[k], to);
                 t.far += hypot(from[0] - to[0], from[1] - to[1]) > 8;
             }
         }
     }
-    for (size_t i = 0; i < m->n; i++) t.parts += joined[i] == i;
+    for (size_t i = 0; i < m->n; i++) t.parts += sees[i] && joined[i] == i;
     free(joined);
+    free(sees);
     visibility_destroy(v);
     return t;
 }
@@ -244,6 +249,43 @@ START_TEST(rooms_are_joined_by_bent_corridors) {
 }
 END_TEST
 
+/* As many openings as make a tree of the cells, and two to the outside: with fewer some cells could not be
+ * reached (rays tell), with more there would be a way round. */
+START_TEST(maze_is_a_tree) {
+    const size_t sizes[] = {0, 300, 2000, 20000};
+    for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++) {
+        mesh m = scene("maze", sizes[s], s);
+        double side = 0;
+        for (size_t v = 0; v < m.n_vertices; v++) side = fmax(side, m.vertices[v][0]);
+        const double cells = round((side - .3) / 2.1), n = cells * cells;
+        ck_assert_double_eq_tol(side, 2.1 * cells + .3, 1e-9);
+        ck_assert_double_ge(cells, 3);
+        ck_assert_double_eq_tol(group_area(&m, "floor", NULL), 1.8 * 1.8 * n + 1.8 * .3 * (n - 1 + 2),
+                                1e-6 * n);
+        ck_assert_double_eq_tol(group_area(&m, "floor", NULL) + group_area(&m, "wall-top", NULL), side * side,
+                                1e-6 * n);
+        ck_assert_uint_eq(cast_from_all(&m, 16, 1).parts, 1);
+        mesh_free(&m);
+    }
+}
+END_TEST
+
+/* Four times as many elements are pyramids of half the width, each of sixteen as before. */
+START_TEST(pyramids_grow_in_number) {
+    double foot = 0;
+    for (size_t elements = 1000; elements <= 16000; elements *= 4) {
+        mesh m = scene("anechoic", elements, 1);
+        size_t n;
+        const double area = group_area(&m, "floor", &n); /* of a pyramid: 4 pitch^2 sqrt(5) / 4 */
+        const double pitch = sqrt(area / sqrt(5) / ((double)n / 16));
+        ck_assert_uint_eq(n % 16, 0);
+        if (foot > 0) ck_assert_double_eq_tol(pitch, foot / 2, .25 * foot);
+        foot = pitch;
+        mesh_free(&m);
+    }
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("generate_scenes");
     TCase *tests = tcase_create("generate_scenes");
@@ -254,6 +296,8 @@ int main(void) {
     tcase_add_loop_test(tests, no_two_faces_lie_on_one_another, 0, KINDS);
     tcase_add_loop_test(tests, rays_stay_on_the_lit_side, 0, KINDS);
     tcase_add_test(tests, rooms_are_joined_by_bent_corridors);
+    tcase_add_test(tests, maze_is_a_tree);
+    tcase_add_test(tests, pyramids_grow_in_number);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
