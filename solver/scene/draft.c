@@ -73,19 +73,6 @@ lam_status draft_cells(draft *d, const double quad[4][3], double size, lam_error
     return LAM_OK;
 }
 
-lam_status draft_even_cells(draft *d, const double quad[4][3], double size, lam_error *error) {
-    const double along = (point_distance(quad[0], quad[1]) + point_distance(quad[3], quad[2])) / 2;
-    const double across = (point_distance(quad[0], quad[3]) + point_distance(quad[1], quad[2])) / 2;
-    const double shorter = fmin(along, across), longer = fmax(along, across);
-    const size_t n_shorter = draft_steps_along(d, shorter, size);
-    const double width = shorter / (double)n_shorter;
-    const size_t n_longer = draft_steps_along(d, longer, fmin(size * size / width, 2 * width));
-    const size_t na = along < across ? n_shorter : n_longer, nb = along < across ? n_longer : n_shorter;
-    if (!d->counting) return draft_grid(d, quad, na, nb, error);
-    d->n_faces += na * nb;
-    return LAM_OK;
-}
-
 typedef struct near_search {
     const void *plan;
     draft_builder *build;

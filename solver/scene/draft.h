@@ -40,11 +40,6 @@ lam_status draft_grid(draft *d, const double quad[4][3], size_t na, size_t nb, l
 
 /* The same with cells whose sides are as near to size as whole numbers allow. */
 lam_status draft_cells(draft *d, const double quad[4][3], double size, lam_error *error);
-
-/* Cells of about size^2: the shorter side is rounded first and the other makes up for it, up to cells twice
- * as long as wide. */
-lam_status draft_even_cells(draft *d, const double quad[4][3], double size, lam_error *error);
-
 /* How many cells of this size a length takes, along a first edge or across. */
 size_t draft_steps_along(const draft *d, double length, double size);
 size_t draft_steps_across(const draft *d, double length, double size);

@@ -2,6 +2,7 @@
  * three terrains of its section 4.3.5. Buildings are open below: nothing sees the ground under them. */
 #include "solver/scene/city_plan.h"
 #include "solver/scene/draft.h"
+#include "solver/scene/grid.h"
 
 #include <math.h>
 #include <string.h>
@@ -11,6 +12,21 @@
 enum { BLOCKS_PER_SIDE = 5, LEAST_PER_BLOCK = 160, THESIS_ELEMENTS = 35588 };
 
 static const draft_material grey = {"grey", {.7, .7, .7}, {0, 0, 0}};
+
+/* Cells of about size^2: the shorter side is rounded first and the other makes up for it, up to cells twice
+ * as long as wide. */
+static lam_status add_cells(draft *d, const double quad[4][3], double size, lam_error *error) {
+    const double along = (point_distance(quad[0], quad[1]) + point_distance(quad[3], quad[2])) / 2;
+    const double across = (point_distance(quad[0], quad[3]) + point_distance(quad[1], quad[2])) / 2;
+    const double shorter = fmin(along, across), longer = fmax(along, across);
+    const size_t n_shorter = draft_steps_along(d, shorter, size);
+    const double width = shorter / (double)n_shorter;
+    const size_t n_longer = draft_steps_along(d, longer, fmin(size * size / width, 2 * width));
+    const size_t na = along < across ? n_shorter : n_longer, nb = along < across ? n_longer : n_shorter;
+    if (!d->counting) return draft_grid(d, quad, na, nb, error);
+    d->n_faces += na * nb;
+    return LAM_OK;
+}
 
 /* On the ground, front upwards. */
 static void ground_quad(const city_plan *plan, const city_rectangle *r, double quad[4][3]) {
@@ -38,7 +54,7 @@ static lam_status add_ground(draft *d, const city_plan *plan, const city_rectang
     double quad[4][3];
     for (size_t i = 0; i < all->n; i++) {
         ground_quad(plan, &all->items[i], quad);
-        TRY(draft_even_cells(d, (const double(*)[3])quad, size, error));
+        TRY(add_cells(d, (const double(*)[3])quad, size, error));
     }
 done:
     return status;
@@ -50,14 +66,14 @@ static lam_status add_buildings(draft *d, const city_plan *plan, bool roofs, dou
     for (size_t b = 0; b < plan->buildings.n; b++) {
         ground_quad(plan, &plan->buildings.items[b], foot);
         roof_quad((const double(*)[3])foot, plan->heights[b], roof);
-        if (roofs) TRY(draft_even_cells(d, (const double(*)[3])roof, size, error));
+        if (roofs) TRY(add_cells(d, (const double(*)[3])roof, size, error));
         for (int k = 0; k < 4 && !roofs; k++) {
             double wall[4][3];
             memcpy(wall[0], foot[k], sizeof *wall);
             memcpy(wall[1], foot[(k + 1) % 4], sizeof *wall);
             memcpy(wall[2], roof[(k + 1) % 4], sizeof *wall);
             memcpy(wall[3], roof[k], sizeof *wall);
-            TRY(draft_even_cells(d, (const double(*)[3])wall, size, error));
+            TRY(add_cells(d, (const double(*)[3])wall, size, error));
         }
     }
 done:

@@ -50,7 +50,7 @@ done:
 
 static lam_status draw_patch(draft *d, const patch *p, double size, lam_error *error) {
     return p->n == 3 ? draw_triangle(d, p, size, error)
-                     : draft_even_cells(d, (const double(*)[3])p->corners, size, error);
+                     : draft_cells(d, (const double(*)[3])p->corners, size, error);
 }
 
 static lam_status draw_all(draft *d, const generate_options *options, double size, lam_error *error) {
