@@ -62,5 +62,6 @@ lam_status draft_furnace_scene(draft *d, const generate_options *options, lam_er
 lam_status draft_rooms_scene(draft *d, const generate_options *options, lam_error *error);
 lam_status draft_maze_scene(draft *d, const generate_options *options, lam_error *error);
 lam_status draft_anechoic_scene(draft *d, const generate_options *options, lam_error *error);
+lam_status draft_patio_scene(draft *d, const generate_options *options, lam_error *error);
 
 #endif

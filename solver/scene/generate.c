@@ -106,16 +106,11 @@ static const struct {
     lam_status (*build)(draft *d, const generate_options *options,
                         lam_error *error); /* NULL: still to come */
 } kinds[] = {
-    {"box", draft_box_scene},
-    {"cornell", draft_cornell_scene},
-    {"furnace", draft_furnace_scene},
-    {"city", draft_city_scene},
-    {"rooms", draft_rooms_scene},
-    {"anechoic", draft_anechoic_scene},
-    {"patio", NULL},
-    {"atrium", NULL},
-    {"maze", draft_maze_scene},
-    {"canopy", NULL},
+    {"box", draft_box_scene},         {"cornell", draft_cornell_scene},
+    {"furnace", draft_furnace_scene}, {"city", draft_city_scene},
+    {"rooms", draft_rooms_scene},     {"anechoic", draft_anechoic_scene},
+    {"patio", draft_patio_scene},     {"atrium", NULL},
+    {"maze", draft_maze_scene},       {"canopy", NULL},
 };
 
 lam_status scene_generate(const generate_options *options, const char *path, size_t *faces,
@@ -125,9 +120,10 @@ lam_status scene_generate(const generate_options *options, const char *path, siz
     size_t kind = 0;
     while (kind < sizeof kinds / sizeof *kinds && strcmp(kinds[kind].name, options->kind) != 0) kind++;
     if (kind == sizeof kinds / sizeof *kinds)
-        FAIL(error, LAM_ERR_ARGUMENT,
-             "unknown kind of scene '%s'; known are box, city, cornell, furnace, rooms, anechoic, maze",
-             options->kind);
+        FAIL(
+            error, LAM_ERR_ARGUMENT,
+            "unknown kind of scene '%s'; known are box, city, cornell, furnace, rooms, anechoic, patio, maze",
+            options->kind);
     if (kinds[kind].build == NULL)
         FAIL(error, LAM_ERR_UNSUPPORTED, "generate %s: not supported yet", options->kind);
     if (isnan(options->reflectance) || options->reflectance >= 1)
