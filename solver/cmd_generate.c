@@ -90,7 +90,7 @@ static const option_row rows[] = {
 
 static const option_verb verb = {
     .name = "generate",
-    .arguments = "box|city|cornell|furnace|rooms|anechoic|patio|maze -o SCENE.obj",
+    .arguments = "box|city|cornell|furnace|rooms|anechoic|patio|atrium|maze -o SCENE.obj",
     .summary = "Write one of the known scenes as OBJ and MTL, z up, in metres.",
     .options = rows,
     .min_arguments = 1,
@@ -106,11 +106,12 @@ int cmd_generate(int argc, char **argv) {
     int code = options_parse(&verb, argc, argv, &f, &given);
     if (code != OPTIONS_GO) return code;
     const char *kind = given.arguments[0];
-    if (option_among(kind, "atrium|canopy")) return options_usage(verb.name, "%s is not supported yet", kind);
-    if (!option_among(kind, "box|city|cornell|furnace|rooms|anechoic|patio|maze"))
+    if (option_among(kind, "canopy")) return options_usage(verb.name, "%s is not supported yet", kind);
+    if (!option_among(kind, "box|city|cornell|furnace|rooms|anechoic|patio|atrium|maze"))
         return options_usage(
             verb.name,
-            "%s: no such scene; must be one of: box city cornell furnace rooms anechoic patio maze", kind);
+            "%s: no such scene; must be one of: box city cornell furnace rooms anechoic patio atrium maze",
+            kind);
     if (f.output == NULL) return options_usage(verb.name, "no -o SCENE.obj given");
     if (f.divisions != 0 && f.elements != 0)
         return options_usage(verb.name, "--divisions and --elements exclude each other");

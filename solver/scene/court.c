@@ -9,11 +9,11 @@ double court_half(const court *c, int side) {
 void court_point(const court *c, int side, double out, double along, double z, double point[3]) {
     const double sign = side < 2 ? 1 : -1;
     if (side % 2 == 0) {
-        point[0] = sign * (c->half[0] + out);
+        point[0] = sign * block_place(c->half[0] + out);
         point[1] = sign * along;
     } else {
         point[0] = -sign * along;
-        point[1] = sign * (c->half[1] + out);
+        point[1] = sign * block_place(c->half[1] + out);
     }
     point[2] = z;
 }

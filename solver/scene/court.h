@@ -15,7 +15,7 @@ enum { COURT_SIDES = 4 }; /* +x, +y, -x, -y */
 double court_half(const court *c, int side);
 
 /* A point so far out from a side of the court, and so far along it from its middle. Out, along and up are
- * right-handed. */
+ * right-handed. How far out is taken to the millimetre, as blocks are. */
 void court_point(const court *c, int side, double out, double along, double z, double point[3]);
 
 /* A box between two such places. */

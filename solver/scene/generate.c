@@ -109,7 +109,7 @@ static const struct {
     {"box", draft_box_scene},         {"cornell", draft_cornell_scene},
     {"furnace", draft_furnace_scene}, {"city", draft_city_scene},
     {"rooms", draft_rooms_scene},     {"anechoic", draft_anechoic_scene},
-    {"patio", draft_patio_scene},     {"atrium", NULL},
+    {"patio", draft_patio_scene},     {"atrium", draft_atrium_scene},
     {"maze", draft_maze_scene},       {"canopy", NULL},
 };
 
@@ -120,10 +120,10 @@ lam_status scene_generate(const generate_options *options, const char *path, siz
     size_t kind = 0;
     while (kind < sizeof kinds / sizeof *kinds && strcmp(kinds[kind].name, options->kind) != 0) kind++;
     if (kind == sizeof kinds / sizeof *kinds)
-        FAIL(
-            error, LAM_ERR_ARGUMENT,
-            "unknown kind of scene '%s'; known are box, city, cornell, furnace, rooms, anechoic, patio, maze",
-            options->kind);
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "unknown kind of scene '%s'; known are box, city, cornell, furnace, rooms, anechoic, patio, "
+             "atrium, maze",
+             options->kind);
     if (kinds[kind].build == NULL)
         FAIL(error, LAM_ERR_UNSUPPORTED, "generate %s: not supported yet", options->kind);
     if (isnan(options->reflectance) || options->reflectance >= 1)

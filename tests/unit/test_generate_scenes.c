@@ -17,6 +17,7 @@ static const scene_kind kinds[] = {
     {.name = "rooms", .small = 700, .large = 3000, .usual = 6000, .closed = true, .lamps = true},
     {.name = "anechoic", .small = 1000, .large = 3000, .usual = 6000, .closed = true, .lamps = true},
     {.name = "patio", .small = 3000, .large = 5000, .usual = 21888, .lamps = true},
+    {.name = "atrium", .small = 4000, .large = 6000, .usual = 79232, .lamps = true},
     {.name = "maze", .small = 800, .large = 3000, .usual = 6000},
 };
 enum { KINDS = sizeof kinds / sizeof *kinds };
