@@ -64,5 +64,6 @@ lam_status draft_maze_scene(draft *d, const generate_options *options, lam_error
 lam_status draft_anechoic_scene(draft *d, const generate_options *options, lam_error *error);
 lam_status draft_patio_scene(draft *d, const generate_options *options, lam_error *error);
 lam_status draft_atrium_scene(draft *d, const generate_options *options, lam_error *error);
+lam_status draft_canopy_scene(draft *d, const generate_options *options, lam_error *error);
 
 #endif

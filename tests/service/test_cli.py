@@ -165,8 +165,6 @@ class Usage(Case):
 
     def test_not_supported_yet(self):
         for line in ("classify a.obj", "sky w.epw -o a.npy", "bench service",
-                     
-                     "generate canopy -o a.obj",
                      "solve a.h5 --tolerance 1e-4", "solve a.h5 -o b.glb",
                      *("precompute a.obj -o b.h5 " + option for option in (
                          "--keep-form-factors=compressed", "--method sparse",

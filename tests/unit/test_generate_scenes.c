@@ -19,6 +19,7 @@ static const scene_kind kinds[] = {
     {.name = "patio", .small = 3000, .large = 5000, .usual = 21888, .lamps = true},
     {.name = "atrium", .small = 4000, .large = 6000, .usual = 79232, .lamps = true},
     {.name = "maze", .small = 800, .large = 3000, .usual = 6000},
+    {.name = "canopy", .small = 500, .large = 4000, .usual = 12000, .sheets = "leaf"},
 };
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
