@@ -55,7 +55,7 @@ static const option_row rows[] = {
      .kind = OPTION_COUNT,
      .offset = FIELD(seed),
      .value = "S",
-     .doc = "Of what is random (1)"},
+     .doc = "Of what is random in city, rooms, maze and canopy (1)"},
     {.kind = OPTION_HEADING, .doc = "box"},
     {.name = "divisions",
      .kind = OPTION_COUNT,

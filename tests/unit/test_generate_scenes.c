@@ -164,6 +164,29 @@ START_TEST(no_two_faces_lie_on_one_another) {
 }
 END_TEST
 
+/* The surface has no gaps but those below and around an open scene, whose sides are alike: the integral of
+ * the front's normal over it is nothing, or what lies open below. A face too many or missing would turn it.
+ */
+START_TEST(the_surface_has_no_gaps) {
+    mesh m = scene(kinds[_i].name, kinds[_i].large, 4);
+    const size_t sheets = kinds[_i].sheets == NULL ? m.n_groups : group_find(&m, kinds[_i].sheets);
+    double sum[3] = {0}, low[2] = {HUGE_VAL, HUGE_VAL}, high[2] = {-HUGE_VAL, -HUGE_VAL};
+    for (size_t i = 0; i < m.n; i++) {
+        for (int d = 0; d < 3; d++) sum[d] += m.area[i] * (double)m.normal[i][d];
+        for (size_t k = 0; k < corners_of(&m, i) && m.group[i] != sheets; k++)
+            for (int d = 0; d < 2; d++) {
+                low[d] = fmin(low[d], m.vertices[m.elements[i][k]][d]);
+                high[d] = fmax(high[d], m.vertices[m.elements[i][k]][d]);
+            }
+    }
+    const double site = (high[0] - low[0]) * (high[1] - low[1]);
+    const double tolerance = 1e-7 * total_area(&m); /* a normal is a float */
+    for (int d = 0; d < 3; d++)
+        ck_assert_double_eq_tol(sum[d], d == 2 && !kinds[_i].closed ? site : 0, tolerance);
+    mesh_free(&m);
+}
+END_TEST
+
 static size_t root_of(size_t *joined, size_t i) {
     while (joined[i] != i) i = joined[i] = joined[joined[i]];
     return i;
@@ -297,6 +320,7 @@ int main(void) {
     tcase_add_loop_test(tests, it_is_its_seed_s, 0, KINDS);
     tcase_add_loop_test(tests, it_takes_a_reflectance, 0, KINDS);
     tcase_add_loop_test(tests, no_two_faces_lie_on_one_another, 0, KINDS);
+    tcase_add_loop_test(tests, the_surface_has_no_gaps, 0, KINDS);
     tcase_add_loop_test(tests, rays_stay_on_the_lit_side, 0, KINDS);
     tcase_add_test(tests, rooms_are_joined_by_bent_corridors);
     tcase_add_test(tests, maze_is_a_tree);
