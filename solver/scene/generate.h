@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 typedef struct generate_options {
-    const char *kind;    /* "box", "city", "cornell", "furnace" */
+    const char *kind;    /* "box", "city", "rooms": the list is in generate.c */
     double size[3];      /* box, metres; 1,1,1 */
     unsigned divisions;  /* box: M, exactly 6 M^2 faces; 0: not set */
     bool closed;         /* cornell */

@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import resource
 import shutil
 import signal
@@ -199,6 +200,18 @@ class Files(Case):
             self.refused(1, self.folder, verb, self.folder)
             self.refused(1, "box.obj", verb, self.box)
         self.assertEqual(sorted(os.listdir(self.folder)), ["empty.obj", "foreign.h5"])
+
+    def test_every_kind_of_scene_that_help_names_is_generated(self):
+        usage = " ".join(self.must("generate", "--help").stdout.split())
+        kinds = re.search(r"[a-z|]+(?= -o SCENE)", usage).group().split("|")
+        self.assertGreaterEqual(len(kinds), 10)
+        for kind in kinds:
+            scene = self.path(kind + ".obj")
+            done = self.must("generate", kind, "--elements", 600, "--seed", 5, "-o", scene)
+            with open(scene) as text:
+                faces = sum(line.startswith("f ") for line in text)
+            self.assertEqual(done.stdout, "%s: %d faces\n" % (scene, faces))
+            self.assertIn(" " + kind, self.refused(2, "no such scene", "generate", "castle", "-o", scene).stderr)
 
     def test_bad_targets_are_refused_before_any_work(self):
         for verb, source, name in (("precompute", self.box, "a.h5"), ("solve", self.store, "a.npy"),
