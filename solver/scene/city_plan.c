@@ -1,4 +1,5 @@
 #include "solver/scene/city_plan.h"
+#include "solver/scene/dice.h"
 #include "solver/scene/tables.h"
 
 #include <math.h>
@@ -17,28 +18,6 @@ static const double steepness = .2; /* mean slope from the middle of the site to
 static const struct {
     double low, middle, top, power;
 } variants[3] = {{4, 6, 0, 1}, {4.5, 10, 0, 1}, {4, 8, 70, 48}};
-
-/* SplitMix64. Each purpose has its own, so that another number of one thing does not move all others. */
-typedef struct dice {
-    uint64_t state;
-} dice;
-
-static uint64_t dice_throw(dice *r) {
-    uint64_t z = r->state += 0x9e3779b97f4a7c15u;
-    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
-    return z ^ z >> 31;
-}
-
-/* Uniform in [low, high). */
-static double dice_between(dice *r, double low, double high) {
-    return low + (high - low) * ((double)(dice_throw(r) >> 11) * 0x1p-53);
-}
-
-static dice dice_for(uint64_t seed, uint64_t purpose) {
-    dice r = {seed};
-    return (dice){dice_throw(&r) + purpose};
-}
 
 static lam_status rectangle_add(city_rectangles *all, city_rectangle one, lam_error *error) {
     city_rectangle *grown =

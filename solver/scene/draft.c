@@ -74,6 +74,7 @@ lam_status draft_cells(draft *d, const double quad[4][3], double size, lam_error
 }
 
 typedef struct near_search {
+    const void *plan;
     draft_builder *build;
     const generate_options *options;
     size_t wanted;
@@ -83,7 +84,7 @@ typedef struct near_search {
 /* Counts the faces at one cell size and keeps it when it is the best. */
 static lam_status try_cells(near_search *search, double size, double stretch, size_t *n_faces,
                             lam_error *error) {
-    draft counted = {.counting = true, .stretch = stretch};
+    draft counted = {.counting = true, .stretch = stretch, .plan = search->plan};
     const lam_status status = search->build(&counted, search->options, size, error);
     const double off = fabs((double)counted.n_faces - (double)search->wanted);
     if (status == LAM_OK && off < search->off)
@@ -96,7 +97,7 @@ static lam_status try_cells(near_search *search, double size, double stretch, si
 lam_status draft_build_near(draft *d, draft_builder *build, const generate_options *options, size_t wanted,
                             lam_error *error) {
     lam_status status = LAM_OK;
-    near_search search = {build, options, wanted, HUGE_VAL, 1, 1};
+    near_search search = {d->plan, build, options, wanted, HUGE_VAL, 1, 1};
     size_t n = 0;
     double size = 1;
     /* The number of faces goes like 1 / size^2: a few corrections come near, then what lies around is tried

@@ -11,8 +11,9 @@ typedef struct draft_material {
 } draft_material;
 
 typedef struct draft {
-    bool counting;  /* faces are counted, not kept */
-    double stretch; /* of cells along a quad's first edge; 0 means 1 */
+    bool counting;    /* faces are counted, not kept */
+    double stretch;   /* of cells along a quad's first edge; 0 means 1 */
+    const void *plan; /* what a draft_builder is to draw, where its options do not say it; not owned */
     size_t n_faces;
     point_table points;
     struct draft_face {
@@ -58,5 +59,11 @@ lam_status draft_box_scene(draft *d, const generate_options *options, lam_error 
 lam_status draft_cornell_scene(draft *d, const generate_options *options, lam_error *error);
 lam_status draft_city_scene(draft *d, const generate_options *options, lam_error *error);
 lam_status draft_furnace_scene(draft *d, const generate_options *options, lam_error *error);
+lam_status draft_rooms_scene(draft *d, const generate_options *options, lam_error *error);
+lam_status draft_maze_scene(draft *d, const generate_options *options, lam_error *error);
+lam_status draft_anechoic_scene(draft *d, const generate_options *options, lam_error *error);
+lam_status draft_patio_scene(draft *d, const generate_options *options, lam_error *error);
+lam_status draft_atrium_scene(draft *d, const generate_options *options, lam_error *error);
+lam_status draft_canopy_scene(draft *d, const generate_options *options, lam_error *error);
 
 #endif

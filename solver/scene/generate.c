@@ -103,19 +103,12 @@ lam_status draft_furnace_scene(draft *d, const generate_options *options, lam_er
 
 static const struct {
     const char *name;
-    lam_status (*build)(draft *d, const generate_options *options,
-                        lam_error *error); /* NULL: still to come */
+    lam_status (*build)(draft *d, const generate_options *options, lam_error *error);
 } kinds[] = {
-    {"box", draft_box_scene},
-    {"cornell", draft_cornell_scene},
-    {"furnace", draft_furnace_scene},
-    {"city", draft_city_scene},
-    {"rooms", NULL},
-    {"anechoic", NULL},
-    {"patio", NULL},
-    {"atrium", NULL},
-    {"maze", NULL},
-    {"canopy", NULL},
+    {"box", draft_box_scene},       {"cornell", draft_cornell_scene}, {"furnace", draft_furnace_scene},
+    {"city", draft_city_scene},     {"rooms", draft_rooms_scene},     {"anechoic", draft_anechoic_scene},
+    {"patio", draft_patio_scene},   {"atrium", draft_atrium_scene},   {"maze", draft_maze_scene},
+    {"canopy", draft_canopy_scene},
 };
 
 lam_status scene_generate(const generate_options *options, const char *path, size_t *faces,
@@ -125,10 +118,10 @@ lam_status scene_generate(const generate_options *options, const char *path, siz
     size_t kind = 0;
     while (kind < sizeof kinds / sizeof *kinds && strcmp(kinds[kind].name, options->kind) != 0) kind++;
     if (kind == sizeof kinds / sizeof *kinds)
-        FAIL(error, LAM_ERR_ARGUMENT, "unknown kind of scene '%s'; known are box, city, cornell, furnace",
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "unknown kind of scene '%s'; known are box, city, cornell, furnace, rooms, anechoic, patio, "
+             "atrium, maze, canopy",
              options->kind);
-    if (kinds[kind].build == NULL)
-        FAIL(error, LAM_ERR_UNSUPPORTED, "generate %s: not supported yet", options->kind);
     if (isnan(options->reflectance) || options->reflectance >= 1)
         FAIL(error, LAM_ERR_ARGUMENT, "reflectance = %g, must be in [0, 1)", options->reflectance);
     if (options->elements > most_faces)

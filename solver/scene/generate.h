@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 typedef struct generate_options {
-    const char *kind;    /* "box", "city", "cornell", "furnace" */
+    const char *kind;    /* "box", "city", "rooms": the list is in generate.c */
     double size[3];      /* box, metres; 1,1,1 */
     unsigned divisions;  /* box: M, exactly 6 M^2 faces; 0: not set */
     bool closed;         /* cornell */
@@ -19,7 +19,7 @@ typedef struct generate_options {
 } generate_options;
 
 /* Writes path (an .obj) and its .mtl beside it, each written aside and renamed.
- * LAM_ERR_UNSUPPORTED for a kind of the contract that is still to come, LAM_ERR_ARGUMENT for an unknown one.
+ * LAM_ERR_ARGUMENT for an unknown kind.
  */
 lam_status scene_generate(const generate_options *options, const char *path, size_t *faces, lam_error *error);
 

@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import resource
 import shutil
 import signal
@@ -141,6 +142,9 @@ class Usage(Case):
                 ("only for cornell", "generate box -o a.obj --closed"),
                 ("only for box", "generate cornell -o a.obj --divisions 2"),
                 ("only for city", "generate box -o a.obj --terrain hill"),
+                ("only for city", "generate rooms -o a.obj --variant 2"),
+                ("only for cornell", "generate rooms -o a.obj --closed"),
+                ("only for box", "generate rooms -o a.obj --size 1,2,3"),
                 ("--variant", "generate city -o a.obj --variant 4"),
                 ("--terrain", "generate city -o a.obj --terrain swamp"),
                 ("--size 1,2: 2 numbers, needs 3", "generate box -o a.obj --size 1,2"),
@@ -162,8 +166,6 @@ class Usage(Case):
 
     def test_not_supported_yet(self):
         for line in ("classify a.obj", "sky w.epw -o a.npy", "bench service",
-                     "generate rooms -o a.obj", "generate anechoic -o a.obj", "generate patio -o a.obj",
-                     "generate atrium -o a.obj", "generate maze -o a.obj", "generate canopy -o a.obj",
                      "solve a.h5 --tolerance 1e-4", "solve a.h5 -o b.glb",
                      *("precompute a.obj -o b.h5 " + option for option in (
                          "--keep-form-factors=compressed", "--method emitters",
@@ -198,6 +200,18 @@ class Files(Case):
             self.refused(1, self.folder, verb, self.folder)
             self.refused(1, "box.obj", verb, self.box)
         self.assertEqual(sorted(os.listdir(self.folder)), ["empty.obj", "foreign.h5"])
+
+    def test_every_kind_of_scene_that_help_names_is_generated(self):
+        usage = " ".join(self.must("generate", "--help").stdout.split())
+        kinds = re.search(r"[a-z|]+(?= -o SCENE)", usage).group().split("|")
+        self.assertGreaterEqual(len(kinds), 10)
+        for kind in kinds:
+            scene = self.path(kind + ".obj")
+            done = self.must("generate", kind, "--elements", 600, "--seed", 5, "-o", scene)
+            with open(scene) as text:
+                faces = sum(line.startswith("f ") for line in text)
+            self.assertEqual(done.stdout, "%s: %d faces\n" % (scene, faces))
+            self.assertIn(" " + kind, self.refused(2, "no such scene", "generate", "castle", "-o", scene).stderr)
 
     def test_bad_targets_are_refused_before_any_work(self):
         for verb, source, name in (("precompute", self.box, "a.h5"), ("solve", self.store, "a.npy"),
