@@ -13,8 +13,9 @@
 /* Triangles and quads are two geometries; primitives leads from (geometry, primitive) to what was met. */
 enum { TRIANGLES, QUADS, N_GEOMETRIES };
 
+/* element: of a facet that is one alone; elsewhere MESH_NO_VERTEX, and the piece's grid knows. */
 typedef struct primitive {
-    uint32_t piece, facet;
+    uint32_t piece, facet, element;
 } primitive;
 
 struct visibility {
@@ -71,7 +72,12 @@ static lam_status add_geometry(visibility *v, int kind, lam_error *error) {
     for (size_t p = 0; p < f->n_pieces; p++) {
         if ((f->pieces[p][3] == MESH_NO_VERTEX) != (kind == TRIANGLES)) continue;
         for (unsigned c = 0; c < corners; c++) indices[prim * corners + c] = f->pieces[p][c];
-        v->primitives[kind][prim++] = (primitive){.piece = (uint32_t)p, .facet = f->piece_facet[p]};
+        const uint32_t facet = f->piece_facet[p];
+        const bool alone = f->first[facet + 1] - f->first[facet] == 1;
+        v->primitives[kind][prim++] =
+            (primitive){.piece = (uint32_t)p,
+                        .facet = facet,
+                        .element = alone ? f->elements[f->first[facet]] : MESH_NO_VERTEX};
     }
     rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
     rtcCommitGeometry(geometry);
@@ -340,18 +346,28 @@ void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays,
         look_up(v, &ray, n_rays, &met);
     }
 
-    uint32_t piece[VISIBILITY_PACKET];
-    for (size_t i = 0; i < n_rays; i++)
-        piece[i] = met.facet[i] == VISIBILITY_NOTHING
-                       ? FACET_NO_PIECE
-                       : v->primitives[ray.hit.geomID[i]][ray.hit.primID[i]].piece;
-    facet_grids_find(&v->grids, n_rays, piece, ray.hit.u, ray.hit.v, hits->element);
+    uint32_t piece[VISIBILITY_PACKET], lane[VISIBILITY_PACKET], found[VISIBILITY_PACKET];
+    float u[VISIBILITY_PACKET], v_at[VISIBILITY_PACKET];
+    size_t open = 0;
     for (size_t i = 0; i < n_rays; i++) {
         const bool back = met.facet[i] != VISIBILITY_NOTHING && met.cosine[i] >= 0;
         hits->distance[i] = ray.ray.tfar[i];
         hits->back[i] = back && !two_sided;
-        if (back && two_sided) hits->element[i] += (uint32_t)v->n_fronts;
+        hits->element[i] = VISIBILITY_NOTHING;
+        if (met.facet[i] == VISIBILITY_NOTHING) continue;
+        const primitive *p = &v->primitives[ray.hit.geomID[i]][ray.hit.primID[i]];
+        hits->element[i] = p->element;
+        if (p->element != MESH_NO_VERTEX) continue;
+        piece[open] = p->piece;
+        u[open] = ray.hit.u[i];
+        v_at[open] = ray.hit.v[i];
+        lane[open++] = (uint32_t)i;
     }
+    if (open > 0) facet_grids_find(&v->grids, open, piece, u, v_at, found);
+    for (size_t k = 0; k < open; k++) hits->element[lane[k]] = found[k];
+    for (size_t i = 0; i < n_rays && two_sided; i++)
+        if (met.facet[i] != VISIBILITY_NOTHING && met.cosine[i] >= 0)
+            hits->element[i] += (uint32_t)v->n_fronts;
 }
 
 /* A packet of segments: the elements whose points each joins, by lane, which the segment carries as its id.

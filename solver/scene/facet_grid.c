@@ -381,9 +381,7 @@ void facet_grids_find(const facet_grids *g, size_t n, const uint32_t *piece, con
     size_t open = 0;
     /* All are looked up step by step: while one waits for memory the others do too. */
     for (size_t i = 0; i < n; i++) {
-        element[i] = MESH_NO_VERTEX;
-        if (piece[i] == FACET_NO_PIECE || !begin(g, &g->pieces[piece[i]], u[i], v[i], &s[open], &element[i]))
-            continue;
+        if (!begin(g, &g->pieces[piece[i]], u[i], v[i], &s[open], &element[i])) continue;
         __builtin_prefetch(s[open].cell);
         wanted[open++] = (uint32_t)i;
     }

@@ -26,14 +26,12 @@ typedef struct facet_grids {
 lam_status facet_grids_create(const mesh *m, const facets *f, facet_grids *out, lam_error *error);
 void facet_grids_free(facet_grids *g);
 
-/* No piece: nothing was met. */
-#define FACET_NO_PIECE 0xFFFFFFFFu
 /* Points looked up at once, at most. */
 #define FACET_SEARCHES 16
 
-/* element[i], i < n: the one at (u, v) of a piece, of its facet whatever u and v are; MESH_NO_VERTEX where
- * there is no piece. A point within about 1e-5 of an element's width from its border may go to the neighbour.
- * Cost: O(1) each, two or three lines of memory. */
+/* element[i], i < n: the one at (u, v) of a piece, of its facet whatever u and v are. A point within about
+ * 1e-5 of an element's width from its border may go to the neighbour. Cost: O(1) each, two or three lines of
+ * memory. */
 void facet_grids_find(const facet_grids *g, size_t n, const uint32_t *piece, const float *u, const float *v,
                       uint32_t *element);
 
