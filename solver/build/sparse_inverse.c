@@ -275,8 +275,10 @@ static lam_status gather_block(gathering *g, size_t b, desk *d, lam_error *error
     block->indices = memory_allocate(d->used, sizeof *block->indices, "sparse inverse", error);
     block->data = memory_allocate(d->used, sizeof *block->data, "sparse inverse", error);
     if (block->indices == NULL || block->data == NULL) TRY(LAM_ERR_MEMORY);
-    memcpy(block->indices, d->indices, d->used * sizeof *block->indices);
-    memcpy(block->data, d->data, d->used * sizeof *block->data);
+    if (d->used > 0) {
+        memcpy(block->indices, d->indices, d->used * sizeof *block->indices);
+        memcpy(block->data, d->data, d->used * sizeof *block->data);
+    }
     block->used = d->used;
 #pragma omp critical(sparse_inverse_count)
     {

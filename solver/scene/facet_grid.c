@@ -227,7 +227,7 @@ static lam_status gather(const mesh *m, const uint32_t *elements, size_t n, cons
                 g->overlaps[g->n++] = (overlap){y * grid->nx + x, (uint32_t)k, worst >= -margin};
             }
     }
-    qsort(g->overlaps, g->n, sizeof *g->overlaps, overlap_order);
+    if (g->n > 1) qsort(g->overlaps, g->n, sizeof *g->overlaps, overlap_order);
     return LAM_OK;
 }
 

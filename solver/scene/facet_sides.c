@@ -70,7 +70,7 @@ static lam_status cut_side(const mesh *m, double flat, const side *all, size_t n
         const double *p = m->vertices[s.from], *x = m->vertices[v];
         c->at[c->n++] = (on_side){hypot(hypot(x[0] - p[0], x[1] - p[1]), x[2] - p[2]), v};
     }
-    qsort(c->at, c->n, sizeof *c->at, on_side_order);
+    if (c->n > 1) qsort(c->at, c->n, sizeof *c->at, on_side_order);
     uint32_t from = s.from;
     for (size_t k = 0; k < c->n; k++) {
         if (c->at[k].vertex == from) continue;
