@@ -40,6 +40,7 @@ typedef struct form_factors {
     double closure_error;           /* largest |row sum - its target| after repair */
     double reciprocity_error;       /* largest |A_i F_ij - A_j F_ji| / max of both */
     double repair_mean, repair_max; /* of |repair|, by area */
+    size_t repair_products;         /* with the matrix, until all rows were right; when just made */
 } form_factors;
 
 typedef struct form_factor_options {

@@ -1,6 +1,7 @@
 #include "solver/formfactor/repair.h"
 
 #include "solver/formfactor/upper.h"
+#include "solver/operator/core.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -14,6 +15,8 @@ enum { MAX_SWEEPS = 200 };
 /* Extrapolated sweeps: how many steps are looked back on, how many are tried, and by what the worst row may
  * grow on the way. */
 enum { STEPS = 5, MAX_STEPS = 60, GROWTH_MOST = 4 };
+/* What is added to the diagonal of their products: steps that are nearly alike share what they explain. */
+static const double alike = 1e-11;
 
 /* Rows are cut into slices that do not depend on the number of threads: each adds what its rows send to
  * others into sums of its own, which are then added in their order. */
@@ -77,10 +80,12 @@ typedef struct scaling {
     const double *area, *outside;
     double *d, *r;
     double worst;
+    size_t products; /* row sums taken */
 } scaling;
 
 static void measure(scaling *c) {
     scaled_row_sums(c->G, c->s, c->area, c->outside, c->d, c->r);
+    c->products++;
     c->worst = 0;
     for (size_t i = 0; i < c->G->n; i++)
         if (c->r[i] > 0) c->worst = fmax(c->worst, fabs(c->r[i] / c->area[i] - 1));
@@ -122,25 +127,29 @@ static double product(const double *a, const double *b, const double *weight, si
     return sum;
 }
 
-/* gamma = argmin |f - sum gamma_k df_k|, weighted by areas, from the normal equations. */
-static void least_squares(const history *h, const double *f, const double *area, double gamma[STEPS]) {
-    double A[STEPS][STEPS], b[STEPS];
-    for (size_t k = 0; k < h->held; k++) {
-        for (size_t l = 0; l <= k; l++) A[k][l] = A[l][k] = product(h->df[k], h->df[l], area, h->n);
+/* gamma = argmin |f - sum gamma_k df_k|, weighted by areas, from the normal equations with the df_k made of
+ * length 1; false where those are too much alike. */
+static bool least_squares(const history *h, const double *f, const double *area, double gamma[STEPS]) {
+    double A[STEPS * STEPS], b[STEPS], length[STEPS], rcond;
+    const size_t held = h->held;
+    for (size_t k = 0; k < held; k++) {
+        for (size_t l = 0; l <= k; l++)
+            A[k * held + l] = A[l * held + k] = product(h->df[k], h->df[l], area, h->n);
         b[k] = product(h->df[k], f, area, h->n);
+        length[k] = sqrt(A[k * held + k]);
+        if (!(length[k] > 0)) return false;
     }
-    for (size_t k = 0; k < h->held; k++) A[k][k] *= 1 + 1e-12; /* the same change twice is no division by 0 */
-    for (size_t k = 0; k < h->held; k++)
-        for (size_t row = k + 1; row < h->held; row++) {
-            const double by = A[k][k] > 0 ? A[row][k] / A[k][k] : 0;
-            for (size_t l = k; l < h->held; l++) A[row][l] -= by * A[k][l];
-            b[row] -= by * b[k];
-        }
-    for (size_t k = h->held; k-- > 0;) {
-        gamma[k] = b[k];
-        for (size_t l = k + 1; l < h->held; l++) gamma[k] -= A[k][l] * gamma[l];
-        gamma[k] = A[k][k] > 0 ? gamma[k] / A[k][k] : 0;
+    for (size_t k = 0; k < held; k++) {
+        for (size_t l = 0; l < held; l++) A[k * held + l] /= length[k] * length[l];
+        A[k * held + k] += alike; /* after the division: on the diagonal is 1 */
     }
+    if (core_invert(held, A, &rcond, NULL) != LAM_OK) return false;
+    for (size_t k = 0; k < held; k++) {
+        gamma[k] = 0;
+        for (size_t l = 0; l < held; l++) gamma[k] += A[k * held + l] * b[l] / length[l];
+        gamma[k] /= length[k];
+    }
+    return true;
 }
 
 /* The same from d = 1 by far fewer sweeps: each is extrapolated from the steps before (Anderson 1965). before
@@ -171,7 +180,7 @@ static lam_status extrapolate(scaling *c, double *before, bool *settled, lam_err
             h.next = (h.next + 1) % STEPS;
             if (h.held < STEPS) h.held++;
         }
-        least_squares(&h, h.f, c->area, gamma);
+        if (!least_squares(&h, h.f, c->area, gamma)) h.held = 0;
         for (size_t i = 0; i < n; i++) {
             double x = h.x[i] + h.f[i];
             for (size_t k = 0; k < h.held; k++) x -= gamma[k] * (h.dx[k][i] + h.df[k][i]);
@@ -238,7 +247,9 @@ lam_status repair_close(csr *G, const double *area, const double *outside, form_
     if (before == NULL || d == NULL || r == NULL || row_sums == NULL) TRY(LAM_ERR_MEMORY);
     TRY(sums_init(&s, G, error));
 
-    TRY(settle(&(scaling){.G = G, .s = &s, .area = area, .outside = outside, .d = d, .r = r}, before, error));
+    scaling c = {.G = G, .s = &s, .area = area, .outside = outside, .d = d, .r = r};
+    TRY(settle(&c, before, error));
+    out->repair_products = c.products;
     out->reciprocity_error = scale(G, &s, area, d, row_sums);
     out->closure_error = out->repair_max = 0;
     double repair = 0, total_area = 0;

@@ -151,6 +151,18 @@ START_TEST(same_for_any_thread_count) {
 }
 END_TEST
 
+/* Plain sweeps take 38 products here, what is extrapolated 15. */
+START_TEST(repair_ends_soon) {
+    const double size[3] = {4, 1, 1};
+    mesh m = box_mesh(size, 8, .5f);
+    form_factors f = trace(&m, 500, 3);
+    ck_assert_uint_le(f.repair_products, 20);
+    check_invariants(&m, &f);
+    form_factors_free(&f);
+    mesh_free(&m);
+}
+END_TEST
+
 START_TEST(back_faces_absorb) {
     const double size[3] = {1, 1, 1};
     mesh m = box_mesh(size, 1, .5f);
@@ -296,6 +308,7 @@ int main(void) {
     tcase_add_loop_test(cases, occluded_plates, 0, sizeof plates_places / sizeof *plates_places);
     tcase_add_test(cases, l_room_corner_hides);
     tcase_add_test(cases, same_for_any_thread_count);
+    tcase_add_test(cases, repair_ends_soon);
     tcase_add_test(cases, back_faces_absorb);
     tcase_add_test(cases, two_sided_sheet);
     tcase_add_test(cases, bent_quad_does_not_see_itself);
