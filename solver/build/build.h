@@ -27,6 +27,10 @@ typedef struct build_problem {
  */
 typedef enum sparse_correction { SPARSE_NONE, SPARSE_DELTA, SPARSE_DISCARDED } sparse_correction;
 
+/* "none", "delta", "discarded"; find: false where the name is none of them. */
+const char *sparse_correction_name(sparse_correction correction);
+bool sparse_correction_find(const char *name, sparse_correction *correction);
+
 typedef struct build_options {
     const char *method;     /* "auto", "exact", "low-rank", ... */
     const char *factorizer; /* "auto", "hf", ... */

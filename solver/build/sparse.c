@@ -8,11 +8,28 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* How close to 1 the solution with light everywhere comes that delta is measured by. */
 static const double delta_tolerance = 1e-7;
 /* By what a threshold rises at a time where memory is too small, and what its forecast may be wrong by. */
 static const double rise = 1.25, doubt = 1.15;
+
+static const char *const corrections[] = {
+    [SPARSE_NONE] = "none", [SPARSE_DELTA] = "delta", [SPARSE_DISCARDED] = "discarded"};
+
+const char *sparse_correction_name(sparse_correction correction) {
+    return corrections[correction];
+}
+
+bool sparse_correction_find(const char *name, sparse_correction *correction) {
+    for (sparse_correction c = SPARSE_NONE; c <= SPARSE_DISCARDED; c++) {
+        if (strcmp(corrections[c], name) != 0) continue;
+        *correction = c;
+        return true;
+    }
+    return false;
+}
 
 /* The smallest threshold from that asked for on whose entries memory is forecast to hold, of all channels. */
 static lam_status fitting_threshold(const build_problem *problem, const build_options *options,
@@ -22,9 +39,9 @@ static lam_status fitting_threshold(const build_problem *problem, const build_op
     for (double needed = INFINITY; options->memory > 0 && needed > (double)options->memory;) {
         needed = 0;
         for (size_t c = 0; c < problem->n_channels; c++) {
-            double entries, seconds;
+            double entries;
             TRY(sparse_inverse_forecast(problem, problem->reflectance + c * problem->n, *threshold, &entries,
-                                        &seconds, error));
+                                        error));
             needed += doubt * entries * (sizeof(uint32_t) + sizeof(float));
         }
         if (needed > (double)options->memory) *threshold *= rise;
@@ -40,20 +57,19 @@ static lam_status find_delta(const build_problem *problem, const float *rho, con
                              const progress *told, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n;
-    const csr *F = problem->F;
     reference *r = NULL;
     double *E = memory_allocate(n, sizeof *E, "sparse inverse", error);
     double *B = memory_allocate(n, sizeof *B, "sparse inverse", error);
+    double *H = E; /* E is no longer needed then */
     if (E == NULL || B == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < n; i++) E[i] = B[i] = 1;
-    TRY(reference_create(F, problem->area, rho, REFERENCE_ITERATED, &r, error));
+    TRY(reference_create(problem->F, problem->area, rho, REFERENCE_ITERATED, &r, error));
     TRY(reference_solve(r, 1, E, B, delta_tolerance, told, error));
+    csr_multiply_rows(problem->F, 0, n, 1, B, H);
     for (size_t p = 0; p < n; p++) {
         const size_t i = problem->order[p];
-        double bounced = 0, kept = 0;
-        for (uint64_t e = F->indptr[i]; e < F->indptr[i + 1]; e++)
-            bounced += (double)F->data[e] * B[F->indices[e]];
-        if (rho[i] > 0) bounced *= (double)rho[i];
+        const double bounced = rho[i] > 0 ? (double)rho[i] * H[i] : H[i];
+        double kept = 0;
         for (uint64_t e = M->indptr[p]; e < M->indptr[p + 1]; e++) kept += (double)M->data[e];
         delta[p] = (float)(bounced - kept);
     }

@@ -1,7 +1,5 @@
 #include "solver/build/sparse_inverse.h"
 
-#include "solver/clock.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -207,7 +205,7 @@ static lam_status job_begin(const build_problem *problem, const float *rho, doub
 }
 
 lam_status sparse_inverse_forecast(const build_problem *problem, const float *rho, double threshold,
-                                   double *entries, double *seconds, lam_error *error) {
+                                   double *entries, lam_error *error) {
     lam_status status = LAM_OK;
     rows_job job;
     desk d = {.n = 0};
@@ -215,7 +213,6 @@ lam_status sparse_inverse_forecast(const build_problem *problem, const float *rh
     const size_t n = problem->n, sampled = n < SAMPLED ? n : SAMPLED;
     TRY(job_begin(problem, rho, threshold, &job, &position, error));
     TRY(desk_make(n, &d, error));
-    const double started = clock_seconds();
     for (size_t k = 0; k < sampled; k++) {
         double discarded;
         size_t bounces;
@@ -224,7 +221,6 @@ lam_status sparse_inverse_forecast(const build_problem *problem, const float *rh
         if (!put_sum(&d, &count)) FAIL(error, LAM_ERR_MEMORY, "sparse inverse: out of memory");
     }
     *entries = (double)d.used * (double)n / (double)sampled;
-    *seconds = (clock_seconds() - started) * (double)n / (double)sampled;
 done:
     reflected_free(&job.RF);
     desk_free(&d);

@@ -21,8 +21,8 @@ void sparse_inverse_free(sparse_inverse *s);
 lam_status sparse_inverse_rows(const build_problem *problem, const float *rho, double threshold,
                                size_t memory, const progress *told, sparse_inverse *out, lam_error *error);
 
-/* Entries of all rows, from some of them; *seconds: of all, at this pace. */
+/* Entries of all rows, from some of them. */
 lam_status sparse_inverse_forecast(const build_problem *problem, const float *rho, double threshold,
-                                   double *entries, double *seconds, lam_error *error);
+                                   double *entries, lam_error *error);
 
 #endif

@@ -1,0 +1,130 @@
+/* The operator of a precompute and its measured errors. */
+#include "solver/clock.h"
+#include "solver/element_geometry.h"
+#include "solver/narrow.h"
+#include "solver/precompute_work.h"
+
+#include <math.h>
+#include <omp.h>
+#include <string.h>
+
+static build_problem problem_of(const work *w) {
+    return (build_problem){.n = w->m.n,
+                           .n_channels = w->m.n_channels,
+                           .area = w->m.area,
+                           .reflectance = w->m.reflectance,
+                           .F = &w->f.F,
+                           .order = w->order,
+                           .noise = recipe_noise(&w->f.recipe)};
+}
+
+lam_status work_build(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = w->options;
+    build_problem problem = problem_of(w);
+    element_geometry geometry = {0};
+    budget_rule rule = BUDGET_SQUARES;
+    sparse_correction correction = SPARSE_DELTA;
+    if (!budget_rule_find(o->budget, &rule))
+        FAIL(error, LAM_ERR_ARGUMENT, "--budget %.40s: unknown; use squares, sums or frobenius", o->budget);
+    if (!sparse_correction_find(o->correction, &correction))
+        FAIL(error, LAM_ERR_ARGUMENT, "--correction %.40s: unknown; use none, delta or discarded",
+             o->correction);
+    const double held = (w->f.F.place != NULL ? 0 : (double)w->f.F.indptr[w->m.n] * 8) + 400 * (double)w->m.n;
+    const build_options how = {.method = o->method,
+                               .factorizer = o->factorizer,
+                               .epsilon = o->epsilon,
+                               .budget = {.rule = rule, .alpha = o->alpha},
+                               .levels = o->levels == PRECOMPUTE_AUTO ? -1 : (int)o->levels,
+                               .rank = o->rank,
+                               .coherence = o->coherence,
+                               .min_area = o->min_area,
+                               .proximity = o->proximity,
+                               .threshold = o->threshold,
+                               .correction = correction,
+                               .memory = (size_t)fmax(1, w->memory - held),
+                               .seed = o->seed,
+                               .progress = &w->progress};
+    if (strcmp(o->method, "2msc") == 0) TRY(element_geometry_add(&w->m, &geometry, &problem, error));
+    TRY(build_operator(&problem, &how, &w->op, &w->built, error));
+    const double noise = recipe_noise(&w->f.recipe);
+    const bool patches = w->built.coherence >= 0;
+    const bool tried = !patches && (w->built.factorizer != NULL || w->built.factorize_seconds > 0);
+    if (w->built.factorizer != NULL || patches) {
+        terminal_log(w->t, "%-14s%8.2f s", "factorize", w->built.factorize_seconds);
+        terminal_log(w->t, "rank %zu of %zu, real norm error %.3g in the %s", w->built.rank, w->m.n,
+                     w->built.measured_norm_error,
+                     w->built.norm == TRUNCATION_FROBENIUS ? "Frobenius norm" : "2-norm");
+    }
+    if (tried && o->rank == 0 && o->epsilon < noise)
+        terminal_warn(
+            w->t,
+            "--epsilon %g is below the sampling noise %.2g of %zu rays: what is stored beyond it is "
+            "noise; --rays %zu would fit",
+            o->epsilon, noise, w->f.recipe.rays, recipe_auto_rays(o->epsilon, 1. / 4));
+    terminal_log(w->t, "%-14s%8.2f s", "invert", w->built.invert_seconds);
+    terminal_log(w->t, "%s", w->built.reason);
+    lam_operator_set_threads(w->op, (size_t)omp_get_max_threads());
+    TRY(narrow_replace(&w->op, o->precision, w->m.area, precompute_seed(o->form_factors.seed, 4), w->t,
+                       error));
+done:
+    element_geometry_free(&geometry);
+    return status;
+}
+
+/* --- errors ----------------------------------------------------------------------------------------------
+ */
+
+static void log_figures(terminal *t, const char *name, const error_group *g, bool has_total) {
+    if (g->probes == 0) return;
+    if (has_total)
+        terminal_log(t, "%-8s total relative %.3g, indirect %.3g (noise of the reference %.2g)", name,
+                     g->total_relative.mean, g->total_indirect.mean, g->reference_noise);
+    terminal_log(t, "%-8s operator relative %.3g, indirect %.3g", name, g->operator_relative.mean,
+                 g->operator_indirect.mean);
+}
+
+/* Two more samples of F, their mean, and what they say of the operator. */
+lam_status work_judge(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    static const char *const stages[2] = {"form factors for the judge, 1 of 2",
+                                          "form factors for the judge, 2 of 2"};
+    static const char *const files[2] = {"judge-1.rows", "judge-2.rows"};
+    form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}}, mean = {.row_sums = NULL};
+    const build_problem problem = problem_of(w);
+    uint64_t purpose = 0, seed;
+    for (int h = 0; h < 2; h++) {
+        /* Independent of what was factorized: kept form factors may have any seed. */
+        do seed = precompute_seed(w->options->form_factors.seed, ++purpose);
+        while (seed == w->f.recipe.seed);
+        const form_factor_options how = {.recipe = work_judge_recipe(w, seed),
+                                         .progress = &w->progress,
+                                         .stage = stages[h],
+                                         .scratch = w->scratch,
+                                         .scratch_name = files[h],
+                                         .large = work_large_place(w)};
+        TRY(form_factors_make(&w->m, w->order, &how, &half[h], error));
+        work_log_kept(w, &half[h]);
+    }
+    TRY(form_factors_mean(&half[0], &half[1], &mean, error));
+    const judge_input input = {.problem = &problem,
+                               .row_sums = w->f.row_sums,
+                               .emission = w->m.emission,
+                               .independent = &mean.F,
+                               .halves = {&half[0].F, &half[1].F},
+                               .probes = w->probes,
+                               .seed = precompute_seed(w->options->form_factors.seed, 3),
+                               .progress = &w->progress};
+    TRY(judge_operator(w->op, &input, &w->errors, error));
+    log_figures(w->t, "single", &w->errors.single, w->errors.has_total);
+    log_figures(w->t, "lights", &w->errors.lights, w->errors.has_total);
+    log_figures(w->t, "random", &w->errors.random, w->errors.has_total);
+    if (w->options->precision == PANEL_F32)
+        TRY(narrow_advise(w->op, &w->errors, w->m.area, precompute_seed(w->options->form_factors.seed, 4),
+                          w->t, error));
+done:
+    form_factors_free(&half[0]);
+    form_factors_free(&half[1]);
+    form_factors_free(&mean);
+    return status;
+}

@@ -1,0 +1,172 @@
+/* The first stages of a precompute: what comes in, its mesh, and whether memory holds what is to come. */
+#include "solver/precompute_work.h"
+#include "solver/scene/import.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Above this many elements a probe is dear: fewer are measured at defaults. */
+enum { PROBES = 200, PROBES_OF_LARGE = 32, LARGE = 10240 };
+
+static void log_warnings(terminal *t, const char *warnings) {
+    while (*warnings != '\0') {
+        const size_t length = strcspn(warnings, "\n");
+        if (length > 0) terminal_warn(t, "%.*s", (int)length, warnings);
+        warnings += length + (warnings[length] == '\n');
+    }
+}
+
+lam_status work_load_scene(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = w->options;
+    const import_options how = {.unit = o->unit, .up = o->up, .reflectance = o->reflectance};
+    import_report report = {0};
+    TRY(scene_import(o->input, &how, &w->m, &report, error));
+    log_warnings(w->t, report.warnings);
+    if (report.dropped_faces > 0)
+        terminal_log(w->t, "%zu faces of zero area were dropped", report.dropped_faces);
+    if (report.clamped > 0)
+        terminal_log(w->t, "%zu materials reflected all light or more: set below 1", report.clamped);
+done:
+    return status;
+}
+
+/* About how many elements there will be; never fewer than now. */
+static double elements_after(const mesh *m, const precompute_options *o) {
+    const mesh_refinement *how = &o->refinement;
+    double n = (double)m->n, area = 0;
+    if (how->subdivide_levels > 0) n *= pow(4, how->subdivide_levels);
+    if (how->max_edge > 0) {
+        for (size_t i = 0; i < m->n; i++) area += m->area[i];
+        n = fmax(n, area / (how->max_edge * how->max_edge));
+    }
+    if (o->two_sided) n *= 2;
+    return fmax(n, (double)how->elements);
+}
+
+recipe work_judge_recipe(const work *w, uint64_t seed) {
+    const choice_request *asked = &w->options->form_factors;
+    const recipe *of = &w->recipe;
+    recipe r = recipe_of_judge(of, choice_rays(asked), seed);
+    if (w->options->from_store && r.method == RECIPE_RAYS && asked->rays != CHOICE_AUTO)
+        r.rays = (size_t)asked->rays;
+    return r;
+}
+
+/* Columns of the operator where they are known before: the patches of 2msc without its options are. */
+static size_t likely_rank(const precompute_options *o, double n) {
+    const bool by_size = o->coherence <= 0 && o->min_area <= 0;
+    if (o->rank > 0 || strcmp(o->method, "2msc") != 0 || !by_size) return o->rank;
+    return (size_t)ceil(n / 16);
+}
+
+forecast work_forecast(const work *w, double n) {
+    const precompute_options *o = w->options;
+    return (forecast){.n = (size_t)n,
+                      .n_channels = w->m.n_channels,
+                      .sky_tiles = w->sky_tiles,
+                      .recipe = w->recipe,
+                      .judge_recipe = work_judge_recipe(w, 0),
+                      .probes = o->probes == PRECOMPUTE_AUTO ? PROBES_OF_LARGE : o->probes,
+                      .from_store = o->from_store,
+                      .scratch = o->scratch != NULL,
+                      .large = w->large,
+                      .keep = o->keep_form_factors,
+                      .exact = strcmp(o->method, "exact") == 0,
+                      .rank = likely_rank(o, n),
+                      .precision = o->precision};
+}
+
+/* Chooses the recipe for n elements and sees that it fits. */
+static lam_status check_memory(work *w, double n, lam_error *error) {
+    const precompute_options *o = w->options;
+    sky_tiling tiling = {.n_tiles = w->f.sky.tiling.n_tiles};
+    if (o->sky != NULL) {
+        const lam_status status = sky_tiling_create(o->sky, w->m.up, &tiling, error);
+        if (status != LAM_OK) return status;
+    }
+    w->sky_tiles = tiling.n_tiles;
+    sky_tiling_free(&tiling);
+    if (n > 4e9)
+        return status_fail(error, LAM_ERR_MEMORY, "%s: %.3g elements, must be below 4e9; refine less",
+                           o->input, n);
+    forecast f;
+    /* All pairs where they are affordable, and the disk in place of memory only where there is no other way.
+     */
+    const int disk_too = o->scratch != NULL, pairs_too = n <= CHOICE_PAIRS_MOST;
+    for (int way = 0; way <= 2 * disk_too + 1; way++) {
+        const bool all_pairs = way % 2 == 0;
+        if (all_pairs && !pairs_too) continue;
+        w->large = way >= 2;
+        w->recipe = o->from_store ? w->f.recipe : choice_recipe(&o->form_factors, all_pairs);
+        f = work_forecast(w, n);
+        if (forecast_bytes(&f) <= w->memory) break;
+    }
+    return forecast_check(&f, w->memory, error);
+}
+
+/* Rows go to the scratch folder as they are found, and whole samples where memory is too small for them. */
+static lam_status open_scratch(work *w, lam_error *error) {
+    if (w->scratch != NULL) return LAM_OK;
+    w->t->nothing = w->options->continues;
+    return scratch_open(w->options->scratch, &w->scratch, error);
+}
+
+/* A store has its rows: it needs the folder for the judge's only, or where memory is too small. */
+lam_status work_take_scratch(work *w, lam_error *error) {
+    const precompute_options *o = w->options;
+    if (o->scratch == NULL) return LAM_OK;
+    if (w->probes > 0 || !o->from_store || w->large) return open_scratch(w, error);
+    terminal_log(w->t, "a store with form factors does not use --scratch");
+    return LAM_OK;
+}
+
+const large_place *work_large_place(const work *w) {
+    return w->large ? scratch_place(w->scratch) : NULL;
+}
+
+lam_status work_load_store(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    store *s = NULL;
+    double *row_sums = NULL;
+    TRY(store_open(w->options->input, &s, error));
+    TRY(mesh_load(s, &w->m, &row_sums, error));
+    if (store_has(s, "/form_factors")) {
+        TRY(recipe_load(s, &recipe_of_form_factors, &w->f.recipe, error));
+        TRY(check_memory(w, (double)w->m.n, error));
+    }
+    if (w->large) TRY(open_scratch(w, error));
+    TRY(form_factors_load(s, &w->m, work_large_place(w), &w->f, error));
+    TRY(form_factors_expand(&w->f, w->m.area, error));
+    if (store_has(s, "/sky")) TRY(sky_bounce_load(s, w->m.n, &w->f.sky, error));
+    if (w->options->reflectance >= 0)
+        for (size_t i = 0; i < w->m.n * w->m.n_channels; i++)
+            w->m.reflectance[i] = (float)w->options->reflectance;
+done:
+    free(row_sums);
+    store_close(s);
+    return status;
+}
+
+lam_status work_prepare_mesh(work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = w->options;
+    mesh_refinement refinement = o->refinement;
+    /* --elements counts both sides. */
+    if (o->two_sided) refinement.elements = (refinement.elements + 1) / 2;
+    TRY(check_memory(w, elements_after(&w->m, o), error));
+    if (refinement.subdivide_levels > 0 || refinement.max_edge > 0 || refinement.elements > 0)
+        TRY(mesh_refine(&w->m, &refinement, error));
+    if (o->two_sided) TRY(mesh_make_two_sided(&w->m, error));
+    TRY(check_memory(w, (double)w->m.n, error));
+    w->order = memory_allocate(w->m.n, sizeof *w->order, "the order of the elements", error);
+    if (w->order == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(mesh_z_order(&w->m, w->order, error));
+    w->probes = o->probes != PRECOMPUTE_AUTO ? o->probes : w->m.n > LARGE ? PROBES_OF_LARGE : PROBES;
+    if (w->probes > w->m.n) w->probes = w->m.n;
+    terminal_log(w->t, "%zu elements in %zu groups, %zu channel%s%s", w->m.n, w->m.n_groups, w->m.n_channels,
+                 w->m.n_channels == 1 ? "" : "s", w->m.two_sided ? ", two-sided" : "");
+done:
+    return status;
+}

@@ -1,0 +1,58 @@
+/* What the stages of a precompute hand on. Private to solver/precompute*.c. */
+#ifndef LAMBERT_SOLVER_PRECOMPUTE_WORK_H
+#define LAMBERT_SOLVER_PRECOMPUTE_WORK_H
+
+#include "solver/build/judge.h"
+#include "solver/forecast.h"
+#include "solver/formfactor/formfactor.h"
+#include "solver/precompute.h"
+
+typedef struct work {
+    const precompute_options *options;
+    terminal *t;
+    progress progress;
+    double memory;    /* bytes */
+    scratch *scratch; /* NULL: none */
+    mesh m;
+    uint32_t *order;
+    form_factors f;
+    recipe recipe; /* of f */
+    bool large;    /* its rows and the judge's lie in the scratch folder */
+    size_t sky_tiles;
+    size_t probes;
+    lam_operator *op;
+    build_report built;
+    error_report errors;
+} work;
+
+/* The scene, or a store with its form factors: precompute_scene.c. */
+lam_status work_load_scene(work *w, lam_error *error);
+lam_status work_load_store(work *w, lam_error *error);
+
+/* Refines the mesh, orders it, chooses the recipe and sees that memory holds what it takes. */
+lam_status work_prepare_mesh(work *w, lam_error *error);
+
+/* Opens the folder for rows where one was given and is needed. */
+lam_status work_take_scratch(work *w, lam_error *error);
+
+/* The recipe of the judge's samples: with --rays given, of as many also where a store's form factors had
+ * others. */
+recipe work_judge_recipe(const work *w, uint64_t seed);
+
+/* What n elements are going to take. */
+forecast work_forecast(const work *w, double n);
+
+/* Where large arrays lie; NULL: in memory. */
+const large_place *work_large_place(const work *w);
+
+/* Says how many rows were there already: precompute.c. */
+void work_log_kept(work *w, const form_factors *f);
+
+/* The operator and its errors: precompute_operator.c. */
+lam_status work_build(work *w, lam_error *error);
+lam_status work_judge(work *w, lam_error *error);
+
+/* The sealed store: precompute_store.c. */
+lam_status work_save(work *w, lam_error *error);
+
+#endif
