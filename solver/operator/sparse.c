@@ -2,6 +2,8 @@
  * section 4.4.2). An answer costs what is stored; a row alone what is stored of it. */
 #include "solver/operator/sparse.h"
 
+#include "solver/operator/csr_floats.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,10 +16,6 @@ typedef struct sparse {
 
 /* Rows shorter than this in all are done by one thread. */
 enum { THREADS_WORTH = 200000 };
-
-/* Sums of a row, one after the other in so many: additions wait for each other less. The same for one vector
- * and for many, so that a vector's bits are its own. */
-enum { SUMS = 4 };
 
 void sparse_arrays_free(sparse_arrays *arrays, size_t n_channels) {
     for (size_t c = 0; arrays->M != NULL && c < n_channels; c++) csr_free(&arrays->M[c]);
@@ -140,40 +138,18 @@ done:
 /* --- the products ----------------------------------------------------------------------------------------
  */
 
-/* Vectors side by side, as the batch is multiplied: 1, 4, 8 or 16 of them. */
-static size_t width_of(size_t n_rhs) {
-    return n_rhs == 1 ? 1 : n_rhs <= 4 ? 4 : n_rhs <= 8 ? 8 : OPERATOR_PASS;
-}
-
 static size_t sparse_work_bytes(const lam_operator *op, size_t n_rhs) {
     size_t bytes, total = PANEL_ALIGN;
-    if (!size_multiply(op->n, width_of(n_rhs) * sizeof(float), &bytes) || !work_add(&total, bytes)) return 0;
+    if (!size_multiply(op->n, csr_floats_width(n_rhs) * sizeof(float), &bytes) || !work_add(&total, bytes))
+        return 0;
     return total;
-}
-
-/* sums_v = row . X_v, X being [n][width] */
-static inline __attribute__((always_inline)) void multiply_row(size_t width, const uint32_t *indices,
-                                                               const float *data, uint64_t entries,
-                                                               const float *X, float *sums) {
-    float part[SUMS][OPERATOR_PASS] = {{0}};
-    uint64_t e = 0;
-    for (; e + SUMS <= entries; e += SUMS)
-        for (int k = 0; k < SUMS; k++) {
-            const float a = data[e + k], *x = X + (size_t)indices[e + k] * width;
-#pragma omp simd
-            for (size_t v = 0; v < width; v++) part[k][v] += a * x[v];
-        }
-    for (int k = 0; e < entries; e++, k++) {
-        const float a = data[e], *x = X + (size_t)indices[e] * width;
-        for (size_t v = 0; v < width; v++) part[k][v] += a * x[v];
-    }
-    for (size_t v = 0; v < width; v++) sums[v] = (part[0][v] + part[1][v]) + (part[2][v] + part[3][v]);
 }
 
 typedef struct row_job {
     const csr *M;
-    const float *X; /* [n][width] */
-    size_t width, n_rhs;
+    csr_float_row *multiply;
+    const float *X; /* side by side */
+    size_t n_rhs;
     const float *delta; /* of the channel, or NULL */
     const float *lost;  /* [n_rhs], weight . E */
     float *P;           /* P[v stride + r] */
@@ -185,19 +161,7 @@ static void do_row(const row_job *j, size_t row, size_t r) {
     const uint32_t *indices = j->M->indices + first;
     const float *data = j->M->data + first;
     float sums[OPERATOR_PASS];
-    switch (j->width) {
-    case 1:
-        multiply_row(1, indices, data, entries, j->X, sums);
-        break;
-    case 4:
-        multiply_row(4, indices, data, entries, j->X, sums);
-        break;
-    case 8:
-        multiply_row(8, indices, data, entries, j->X, sums);
-        break;
-    default:
-        multiply_row(OPERATOR_PASS, indices, data, entries, j->X, sums);
-    }
+    j->multiply(indices, data, entries, j->X, sums);
     for (size_t v = 0; v < j->n_rhs; v++)
         j->P[v * j->stride + r] = j->delta == NULL ? sums[v] : sums[v] + j->delta[row] * j->lost[v];
 }
@@ -235,10 +199,10 @@ static void multiply_together(const lam_operator *op, size_t n_rhs, const float 
     for (size_t c = 0; c < C; c++) {
         float lost[OPERATOR_PASS];
         for (size_t v = 0; v < n_rhs; v++) lost[v] = lost_of(self, E + (v * C + c) * n);
-        const size_t width = width_of(n_rhs);
+        const size_t width = csr_floats_width(n_rhs);
         const row_job job = {.M = &self->a.M[c],
+                             .multiply = csr_floats_row(width),
                              .X = side_by_side(op, n_rhs, E + c * n, width, work),
-                             .width = width,
                              .n_rhs = n_rhs,
                              .delta = self->a.delta != NULL ? self->a.delta + c * n : NULL,
                              .lost = lost,

@@ -1,5 +1,6 @@
 /* Sparse rows: their product and what the check refuses. */
 #include "solver/operator/csr.h"
+#include "solver/operator/csr_floats.h"
 #include "support/suite.h"
 
 #include <float.h>
@@ -31,6 +32,40 @@ static csr random_rows(size_t n) {
     }
     return a;
 }
+
+/* In every instruction set and width: right, and a vector's bits its own. */
+START_TEST(products_of_floats_side_by_side) {
+    enum { N = 83 };
+    static const size_t widths[] = {1, 8, 16, 32};
+    csr a = random_rows(N);
+    float *X = aligned_alloc(64, N * CSR_FLOATS_WIDTH * sizeof *X), one[N], sums[CSR_FLOATS_WIDTH], alone;
+    for (size_t set = 0; csr_floats_row_of(set, 1) != NULL; set++)
+        for (size_t w = 0; w < 4; w++) {
+            const size_t width = widths[w];
+            ck_assert_uint_eq(csr_floats_width(width), width);
+            ck_assert_uint_eq(csr_floats_width(width - width / 4), width);
+            for (size_t j = 0; j < N * width; j++) X[j] = (float)random_double();
+            for (size_t i = 0; i < N; i++) {
+                const uint64_t first = a.indptr[i], count = a.indptr[i + 1] - first;
+                csr_floats_row_of(set, width)(a.indices + first, a.data + first, count, X, sums);
+                for (size_t v = 0; v < width; v++) {
+                    double sum = 0, magnitude = 0;
+                    for (size_t j = 0; j < N; j++) one[j] = X[j * width + v];
+                    csr_floats_row_of(set, 1)(a.indices + first, a.data + first, count, one, &alone);
+                    for (uint64_t e = first; e < first + count; e++) {
+                        const double product = (double)a.data[e] * (double)one[a.indices[e]];
+                        sum += product;
+                        magnitude += fabs(product);
+                    }
+                    ck_assert_mem_eq(&alone, &sums[v], sizeof alone);
+                    ck_assert_double_le(fabs((double)alone - sum), (N + 1) * FLT_EPSILON * magnitude);
+                }
+            }
+        }
+    free(X);
+    csr_free(&a);
+}
+END_TEST
 
 START_TEST(product_agrees_with_the_dense_one) {
     enum { N = 83, FIRST = 3, LAST = 80 };
@@ -112,6 +147,7 @@ int main(void) {
     TCase *tests = tcase_create("csr");
     tcase_set_timeout(tests, 120);
     tcase_add_test(tests, product_agrees_with_the_dense_one);
+    tcase_add_test(tests, products_of_floats_side_by_side);
     tcase_add_test(tests, bad_rows_are_refused);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
