@@ -117,10 +117,12 @@ static bool unused_by_method(const char *name, const precompute_arguments *f, co
     static const char *const of_factors[] = {"factorizer", "epsilon", "alpha", "budget",
                                              "levels",     "rank",    NULL};
     const bool two_mesh = strcmp(built->method, "2msc") == 0;
+    const bool emitters = strcmp(built->method, "emitters") == 0;
     const bool rank_given = f->rank > 0;
     if (is_among(name, of_sparse)) return built->threshold <= 0;
+    if (strcmp(name, "emitters") == 0) return !emitters;
     if (strcmp(name, "store-precision") == 0)
-        return strcmp(built->method, "exact") == 0 || built->threshold > 0;
+        return strcmp(built->method, "exact") == 0 || built->threshold > 0 || emitters;
     if (is_among(name, of_patches)) return !two_mesh || (rank_given && strcmp(name, "assign") != 0);
     if (two_mesh && strcmp(name, "factorizer") == 0)
         return built->factorizer == NULL && strcmp(f->factorizer, "auto") != 0;
@@ -234,6 +236,7 @@ int cmd_precompute(int argc, char **argv) {
         .proximity = strcmp(f.assign, "proximity") == 0,
         .threshold = f.threshold,
         .correction = f.correction,
+        .emitters = f.emitters,
         .memory = f.memory,
         .scratch = f.scratch,
         .continues = continues != NULL ? continues : "what was finished stays in the scratch folder",

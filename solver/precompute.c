@@ -11,6 +11,7 @@ static void work_free(work *w) {
     mesh_free(&w->m);
     free(w->order);
     form_factors_free(&w->f);
+    emitter_wish_free(&w->emitters);
     scratch_close(w->scratch, false);
     lam_operator_close(w->op);
 }

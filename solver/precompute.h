@@ -34,6 +34,7 @@ typedef struct precompute_options {
     bool proximity;             /* of 2msc */
     double threshold;           /* of sparse */
     const char *correction;     /* of sparse: "none", "delta", "discarded" */
+    const char *emitters;       /* FILE, group=NAME, sky; or NULL */
     panel_precision precision;  /* of the stored operator */
     uint64_t memory;            /* bytes; 0: 70 % of what is free */
     const char *scratch;        /* a folder, or NULL */

@@ -20,7 +20,7 @@ typedef struct precompute_arguments {
     const char *budget;
     uint64_t levels, rank;
     double coherence, min_area, threshold;
-    const char *assign, *correction, *precision;
+    const char *assign, *correction, *emitters, *precision;
     const char *scratch;
     uint64_t threads, memory, seed, probes;
     bool quiet, progress;

@@ -8,8 +8,19 @@
 #include <omp.h>
 #include <string.h>
 
-static build_problem problem_of(const work *w) {
-    return (build_problem){.n = w->m.n,
+static emitter_source emitters_of(const work *w) {
+    return (emitter_source){.s = w->emitters.s,
+                            .names = (const char *const *)w->emitters.names,
+                            .E = w->emitters.light.E,
+                            .n_tiles = w->f.sky.tiling.n_tiles,
+                            .L = w->emitters.light.L,
+                            .first_bounce = w->f.sky.first_bounce};
+}
+
+/* emitters: of emitters_of, as long as it is used. */
+static build_problem problem_of(const work *w, const emitter_source *emitters) {
+    return (build_problem){.emitters = emitters->s > 0 ? emitters : NULL,
+                           .n = w->m.n,
                            .n_channels = w->m.n_channels,
                            .area = w->m.area,
                            .reflectance = w->m.reflectance,
@@ -21,7 +32,8 @@ static build_problem problem_of(const work *w) {
 lam_status work_build(work *w, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = w->options;
-    build_problem problem = problem_of(w);
+    const emitter_source emitters = emitters_of(w);
+    build_problem problem = problem_of(w, &emitters);
     element_geometry geometry = {0};
     budget_rule rule = BUDGET_SQUARES;
     sparse_correction correction = SPARSE_DELTA;
@@ -91,7 +103,8 @@ lam_status work_judge(work *w, lam_error *error) {
                                           "form factors for the judge, 2 of 2"};
     static const char *const files[2] = {"judge-1.rows", "judge-2.rows"};
     form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}}, mean = {.row_sums = NULL};
-    const build_problem problem = problem_of(w);
+    const emitter_source emitters = emitters_of(w);
+    const build_problem problem = problem_of(w, &emitters);
     uint64_t purpose = 0, seed;
     for (int h = 0; h < 2; h++) {
         /* Independent of what was factorized: kept form factors may have any seed. */

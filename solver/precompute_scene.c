@@ -165,6 +165,7 @@ lam_status work_prepare_mesh(work *w, lam_error *error) {
     TRY(mesh_z_order(&w->m, w->order, error));
     w->probes = o->probes != PRECOMPUTE_AUTO ? o->probes : w->m.n > LARGE ? PROBES_OF_LARGE : PROBES;
     if (w->probes > w->m.n) w->probes = w->m.n;
+    if (o->emitters != NULL) TRY(emitter_wish_read(o->emitters, &w->m, w->sky_tiles, &w->emitters, error));
     terminal_log(w->t, "%zu elements in %zu groups, %zu channel%s%s", w->m.n, w->m.n_groups, w->m.n_channels,
                  w->m.n_channels == 1 ? "" : "s", w->m.two_sided ? ", two-sided" : "");
 done:

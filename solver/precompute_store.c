@@ -24,6 +24,10 @@ static lam_status describe_operator(const work *w, store *s, lam_error *error) {
         TRY(store_set_number(s, "/operator", "threshold", r->threshold, error));
         TRY(store_set_text(s, "/operator", "correction", sparse_correction_name(r->correction), error));
     }
+    if (r->residual >= 0) {
+        TRY(store_set_number(s, "/operator", "residual", r->residual, error));
+        TRY(store_set_integer(s, "/operator", "sweeps", (int64_t)r->sweeps, error));
+    }
     if (r->coherence >= 0) {
         TRY(store_set_text(s, "/operator", "assign", w->options->proximity ? "proximity" : "inclusion",
                            error));

@@ -3,6 +3,7 @@
 #define LAMBERT_SOLVER_PRECOMPUTE_WORK_H
 
 #include "solver/build/judge.h"
+#include "solver/emitter_wish.h"
 #include "solver/forecast.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/precompute.h"
@@ -20,6 +21,7 @@ typedef struct work {
     bool large;    /* its rows and the judge's lie in the scratch folder */
     size_t sky_tiles;
     size_t probes;
+    emitter_wish emitters;
     lam_operator *op;
     build_report built;
     error_report errors;

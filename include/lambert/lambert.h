@@ -88,6 +88,31 @@ lam_status lam_operator_apply_selected(const lam_operator *op, size_t n_rhs, lam
                                        const uint32_t *selected, float *out, void *work, size_t work_bytes,
                                        lam_error *error);
 
+/* How many emitters a store of few emitters answers for; 0 of any other operator, which answers any emission.
+ * Where it is not 0 the four functions above and below end in LAM_ERR_ARGUMENT, and these take their place.
+ */
+size_t lam_operator_emitters(const lam_operator *op);
+
+/* The name of emitter k; owned by the operator. */
+const char *lam_operator_emitter_name(const lam_operator *op, size_t k);
+
+/* The weights W [n_rhs][C][s] whose emitters together are the emissions E [n_rhs][C][n] and the sky of
+ * radiances L [n_rhs][C][m]; either may be NULL, for none. Errors: LAM_ERR_ARGUMENT names an element or a
+ * tile whose light no weights give (to 1e-5 of it), LAM_ERR_MEMORY. */
+lam_status lam_operator_weights(const lam_operator *op, size_t n_rhs, const float *E, const float *L,
+                                float *W, lam_error *error);
+
+/* out = the quantity under emitters of weights W [n_rhs][C][s]: out is [n_rhs][C][n], or, where selected is
+ * not NULL, [n_rhs][C][n_selected]. Otherwise as lam_operator_apply_selected. Cost: O(ns) a vector. */
+lam_status lam_operator_apply_emitters(const lam_operator *op, size_t n_rhs, lam_quantity quantity,
+                                       const float *W, size_t n_selected, const uint32_t *selected,
+                                       float *out, void *work, size_t work_bytes, lam_error *error);
+
+/* W = (d quantity / d weights)^T g: g is [n_rhs][C][n], W [n_rhs][C][s]. */
+lam_status lam_operator_adjoint_emitters(const lam_operator *op, size_t n_rhs, lam_quantity quantity,
+                                         const float *g, float *W, void *work, size_t work_bytes,
+                                         lam_error *error);
+
 /* w = (d quantity / d E)^T g for a batch: the transpose of lam_operator_apply, same shapes, same rules. */
 lam_status lam_operator_apply_adjoint(const lam_operator *op, size_t n_rhs, lam_quantity quantity,
                                       const float *g, float *w, void *work, size_t work_bytes,
@@ -111,5 +136,9 @@ size_t lam_sky_elements(const lam_sky *sky);
  * [n_rows][n] in mesh order. Allocates nothing; a row's bits do not depend on its neighbours.
  * Cost: O(mn) a row, less for tiles that are dark. */
 void lam_sky_irradiance(const lam_sky *sky, size_t n_rows, const float *L, float *H0);
+
+/* L = first_bounce g, its transpose: what a sum over g of H0 says of every tile. g is [n_rows][n], L is
+ * [n_rows][m]. */
+void lam_sky_adjoint(const lam_sky *sky, size_t n_rows, const float *g, float *L);
 
 #endif

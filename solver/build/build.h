@@ -7,6 +7,16 @@
 #include "solver/operator/operator.h"
 #include "solver/progress.h"
 
+/* What is to shine, for the method emitters: numbers of emitter k come k C at a time. */
+typedef struct emitter_source {
+    size_t s;
+    const char *const *names;  /* [s] */
+    const float *E;            /* [s][C][n], W/m^2, mesh order */
+    size_t n_tiles;            /* of the sky; 0: none */
+    const float *L;            /* [s][C][m], radiances of its tiles; NULL: no emitter is of the sky */
+    const float *first_bounce; /* [m][n], sr */
+} emitter_source;
+
 /* What every method is given. All in mesh order; order[position] = element is the Z-order. */
 typedef struct build_problem {
     size_t n;
@@ -17,9 +27,10 @@ typedef struct build_problem {
     const uint32_t *order; /* [n] */
     double noise;          /* sampling error of S in the 2-norm, about; 0: not known */
     /* Only 2msc needs these; NULL elsewhere. */
-    const double (*centre)[3]; /* [n] centroids, m */
-    const float (*normal)[3];  /* [n] unit */
-    const uint32_t *surface;   /* [n] below n: equal where elements are of one surface */
+    const double (*centre)[3];      /* [n] centroids, m */
+    const float (*normal)[3];       /* [n] unit */
+    const uint32_t *surface;        /* [n] below n: equal where elements are of one surface */
+    const emitter_source *emitters; /* NULL: none asked for */
 } build_problem;
 
 /* How a sparse inverse makes up for what is left out of it: not; by what one solution with light everywhere
@@ -61,6 +72,8 @@ typedef struct build_report {
     double coherence, patch_area; /* 2msc: the smallest of a patch, m^2; negative when there are no patches */
     double threshold;             /* sparse, as reached; 0: not sparse */
     sparse_correction correction;
+    double residual; /* emitters: of the worst; negative: no emitters */
+    size_t sweeps;   /* emitters: products with F for a block of them, at most */
     double factorize_seconds, invert_seconds;
 } build_report;
 
@@ -75,6 +88,7 @@ extern const build_method build_exact;
 extern const build_method build_low_rank;
 extern const build_method build_two_mesh;
 extern const build_method build_sparse;
+extern const build_method build_emitters;
 
 /* Builds by options->method ("auto" chooses and says why). LAM_ERR_UNSUPPORTED for a method of the contract
  * that is still to come. */

@@ -2,6 +2,7 @@
 
 #include "solver/build/reference.h"
 #include "solver/clock.h"
+#include "solver/operator/emitters.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -26,11 +27,14 @@ typedef struct probes {
     size_t m;
     size_t first[N_GROUPS + 1];
     float *E, *B;
+    float *W, *H0; /* [m][C][s], [m][C][n]: of an operator of emitters, else NULL */
     double *B_norm, *indirect_norm, *error_norm; /* [m] squares, area-weighted, channels stacked */
 } probes;
 
 static void probes_free(probes *p) {
     free(p->E);
+    free(p->W);
+    free(p->H0);
     free(p->B);
     free(p->B_norm);
     free(p->indirect_norm);
@@ -102,7 +106,11 @@ static lam_status apply(const lam_operator *op, const probes *p, lam_quantity qu
         lam_error one = {0};
         void *work = memory_allocate(1, bytes, "work area", &one);
         lam_status result = LAM_ERR_MEMORY;
-        if (work != NULL)
+        if (work != NULL && p->W != NULL)
+            result = lam_operator_apply_emitters(
+                op, count, quantity, p->W + first * lam_operator_emitters(op) * lam_operator_channels(op), 0,
+                NULL, out + first * vector, work, bytes, &one);
+        else if (work != NULL)
             result = lam_operator_apply(op, count, quantity, p->E + first * vector, out + first * vector,
                                         work, bytes, &one);
         free(work);
@@ -290,7 +298,9 @@ static lam_status physics(const lam_operator *op, const judge_input *input, cons
             double negative = 0, all = 0, emitted = 0, accounted = 0;
             for (size_t i = 0; i < vector; i++) {
                 const double a = problem->area[i % n], b = (double)p->B[v * vector + i];
-                const double s = input->row_sums[i % n], h = (double)H[v * vector + i];
+                const double s = input->row_sums[i % n],
+                             direct = p->H0 != NULL ? (double)p->H0[v * vector + i] : 0;
+                const double h = (double)H[v * vector + i] - direct;
                 negative += a * fmax(-b, 0);
                 all += a * fabs(b);
                 emitted += a * (double)p->E[v * vector + i];
@@ -305,7 +315,44 @@ done:
     return status;
 }
 
-static bool any_light(const judge_input *input) {
+/* Of an operator of emitters, some of them alone and all with random weights: E + rho H0 is what they send,
+ * as they stand in for elements. */
+static lam_status emitter_emissions(const lam_operator *op, const judge_input *input, probes *p,
+                                    lam_error *error) {
+    lam_status status = LAM_OK;
+    const build_problem *problem = input->problem;
+    const size_t s = lam_operator_emitters(op), C = problem->n_channels, vector = C * problem->n;
+    uint64_t seed = input->seed;
+    p->W = memory_allocate(p->m, s * C * sizeof *p->W, "probes", error);
+    p->H0 = memory_allocate(p->m, vector * sizeof *p->H0, "probes", error);
+    if (p->W == NULL || p->H0 == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t v = 0; v < p->m; v++)
+        for (size_t c = 0; c < C; c++)
+            for (size_t k = 0; k < s; k++)
+                p->W[(v * C + c) * s + k] = v >= p->first[RANDOM]           ? (float)next_random(&seed)
+                                            : k == v * s / p->first[LIGHTS] ? 1
+                                                                            : 0;
+    if (p->first[RANDOM] > p->first[LIGHTS])
+        TRY(lam_operator_weights(op, 1, input->emission, NULL, p->W + p->first[LIGHTS] * C * s, error));
+    TRY(operator_emitters_light(op, p->m, p->W, p->E, p->H0, error));
+    for (size_t v = 0; v < p->m; v++)
+        for (size_t i = 0; i < vector; i++)
+            p->E[v * vector + i] += problem->reflectance[i] * p->H0[v * vector + i];
+done:
+    return status;
+}
+
+/* Whether the scene has light of its own that the operator can answer. */
+static bool any_light(const lam_operator *op, const judge_input *input) {
+    if (lam_operator_emitters(op) > 0) {
+        const size_t s = lam_operator_emitters(op), C = input->problem->n_channels;
+        float *W = memory_allocate(s * C, sizeof *W, "weights", NULL);
+        bool any = W != NULL && lam_operator_weights(op, 1, input->emission, NULL, W, NULL) == LAM_OK,
+             lit = false;
+        for (size_t k = 0; any && k < s * C; k++) lit = lit || W[k] > 0;
+        free(W);
+        return any && lit;
+    }
     for (size_t i = 0; i < input->problem->n * input->problem->n_channels; i++)
         if (input->emission[i] > 0) return true;
     return false;
@@ -321,13 +368,18 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     error_group *groups[N_GROUPS] = {&found.single, &found.lights, &found.random};
     error_figures *relative[N_GROUPS], *indirect[N_GROUPS];
     probes p = {0};
-    const size_t counts[N_GROUPS] = {input->probes < problem->n ? input->probes : problem->n,
-                                     any_light(input), RANDOM_PROBES};
+    const size_t s = lam_operator_emitters(op), most = s > 0 ? s : problem->n;
+    const size_t counts[N_GROUPS] = {input->probes < most ? input->probes : most, any_light(op, input),
+                                     RANDOM_PROBES};
     TRY(probes_init(&p, counts, problem, error));
     for (int g = 0; g < N_GROUPS; g++) groups[g]->probes = counts[g];
-    TRY(single_emissions(problem, input->seed, &p, error));
-    if (counts[LIGHTS] > 0) memcpy(p.E + p.first[LIGHTS] * vector, input->emission, vector * sizeof *p.E);
-    random_emissions(problem, input->seed + 1, &p);
+    if (s > 0)
+        TRY(emitter_emissions(op, input, &p, error));
+    else
+        TRY(single_emissions(problem, input->seed, &p, error));
+    if (counts[LIGHTS] > 0 && s == 0)
+        memcpy(p.E + p.first[LIGHTS] * vector, input->emission, vector * sizeof *p.E);
+    if (s == 0) random_emissions(problem, input->seed + 1, &p);
 
     progress_report(input->progress, "judge", 0);
     TRY(apply(op, &p, LAM_RADIOSITY, p.B, error));

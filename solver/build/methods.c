@@ -8,10 +8,11 @@
 /* Up to this many elements the whole inverse is small, exact, and built in well under a second. */
 enum { AUTO_EXACT_ELEMENTS = 1024, EXACT_ELEMENTS = 8192 };
 
-static const build_method *const methods[] = {&build_exact, &build_low_rank, &build_two_mesh, &build_sparse};
+static const build_method *const methods[] = {&build_exact, &build_low_rank, &build_two_mesh, &build_sparse,
+                                              &build_emitters};
 
 /* Methods and factorizers of the contract that are still to come. */
-static const char *const later_methods[] = {"emitters", "hierarchical"};
+static const char *const later_methods[] = {"hierarchical"};
 
 static bool is_among(const char *name, const char *const *list, size_t n) {
     for (size_t i = 0; i < n; i++)
@@ -91,9 +92,15 @@ done:
 lam_status build_operator(const build_problem *problem, const build_options *options, lam_operator **op,
                           build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
-    *report = (build_report){.measured_norm_error = -1, .rcond = 1, .coherence = -1, .patch_area = -1};
+    *report = (build_report){
+        .measured_norm_error = -1, .rcond = 1, .coherence = -1, .patch_area = -1, .residual = -1};
     TRY(check_options(options, error));
-    if (strcmp(options->method, "auto") == 0) {
+    const bool chosen = strcmp(options->method, "auto") == 0;
+    if (chosen && problem->emitters != NULL) {
+        TRY(build_emitters.build(problem, options, op, report, error));
+        goto done;
+    }
+    if (chosen) {
         TRY(build_auto(problem, options, op, report, error));
         goto done;
     }
@@ -104,8 +111,8 @@ lam_status build_operator(const build_problem *problem, const build_options *opt
             snprintf(report->reason, sizeof report->reason, "%s: asked for by --method", methods[i]->name);
         goto done;
     }
-    FAIL(error, LAM_ERR_ARGUMENT, "--method %.40s: unknown; use auto, exact, low-rank, 2msc or sparse",
-         options->method);
+    FAIL(error, LAM_ERR_ARGUMENT,
+         "--method %.40s: unknown; use auto, exact, low-rank, 2msc, sparse or emitters", options->method);
 done:
     return status;
 }

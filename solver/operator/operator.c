@@ -6,10 +6,10 @@
 #include <string.h>
 
 static const operator_kind *const operator_kinds[] = {&operator_exact, &operator_low_rank, &operator_two_mesh,
-                                                      &operator_sparse};
+                                                      &operator_sparse, &operator_emitters};
 
 /* Kinds of the format that are still to come. */
-static const char *const future_kinds[] = {"emitters", "hierarchical"};
+static const char *const future_kinds[] = {"hierarchical"};
 
 const operator_kind *operator_kind_find(const char *name) {
     for (size_t i = 0; i < sizeof operator_kinds / sizeof *operator_kinds; i++)
@@ -245,6 +245,9 @@ static lam_status check_apply(const lam_operator *op, size_t n_rhs, lam_quantity
     if (op == NULL || in == NULL || out == NULL || work == NULL)
         FAIL(error, LAM_ERR_ARGUMENT,
              "an operator, its input, its output and a work area are needed, one is NULL");
+    if (op->kind->apply == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "an operator of kind %s answers for its own emitters only",
+             op->kind->name);
     if (quantity != LAM_RADIOSITY && quantity != LAM_IRRADIANCE && quantity != LAM_INDIRECT)
         FAIL(error, LAM_ERR_ARGUMENT, "there is no quantity %d", (int)quantity);
     if (!size_multiply(n_rhs, op->n_channels, &bytes) || !size_multiply(bytes, op->n, &bytes) ||

@@ -24,7 +24,8 @@ typedef struct operator_description {
  * adjoint P^T cannot fail, allocate nothing, and give a vector the same bits in any batch; the adjoint may
  * overwrite g. work is aligned to a cache line; work_bytes is 0 when it overflows, and only then.
  *
- * What a kind may leave NULL: apply_selected, the rows of apply for the n_selected elements selected
+ * What a kind may leave NULL: apply and apply_adjoint, where it answers for its own emitters only
+ * (emitters_apply.c); apply_selected, the rows of apply for the n_selected elements selected
  * (operator_position says where they are), P being [n_rhs][C][n_selected] (without it all rows are computed);
  * set_threads, which passes n_threads on to its arrays; narrow, which makes the operator again with its large
  * arrays in another precision, all of its own. */
@@ -61,6 +62,7 @@ extern const operator_kind operator_exact;
 extern const operator_kind operator_low_rank;
 extern const operator_kind operator_two_mesh;
 extern const operator_kind operator_sparse;
+extern const operator_kind operator_emitters;
 
 /* The kind of this name, or NULL. */
 const operator_kind *operator_kind_find(const char *name);

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 struct lam_sky {
     size_t n_tiles, n;
@@ -34,6 +35,22 @@ lam_status sky_load(store *s, size_t n, lam_sky **out, lam_error *error) {
     *out = made;
 done:
     free(data);
+    return status;
+}
+
+lam_status sky_create(size_t n_tiles, size_t n, const float *first_bounce, lam_sky **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    lam_sky *made = memory_allocate(1, sizeof *made, "the sky", error);
+    if (made == NULL) TRY(LAM_ERR_MEMORY);
+    made->n_tiles = n_tiles;
+    made->n = n;
+    made->first_bounce = memory_allocate(n_tiles, n * sizeof *made->first_bounce, "the sky", error);
+    if (made->first_bounce == NULL) TRY(LAM_ERR_MEMORY);
+    memcpy(made->first_bounce, first_bounce, n_tiles * n * sizeof *first_bounce);
+    *out = made;
+    made = NULL;
+done:
+    lam_sky_close(made);
     return status;
 }
 
@@ -85,4 +102,15 @@ void lam_sky_irradiance(const lam_sky *sky, size_t n_rows, const float *L, float
             for (size_t i = 0; i < count; i++) H0[r * n + first + i] = (float)sum[i];
         }
     }
+}
+
+void lam_sky_adjoint(const lam_sky *sky, size_t n_rows, const float *g, float *L) {
+    const size_t m = sky->n_tiles, n = sky->n;
+    for (size_t r = 0; r < n_rows; r++)
+        for (size_t t = 0; t < m; t++) {
+            const float *row = sky->first_bounce + t * n, *g_r = g + r * n;
+            double sum = 0;
+            for (size_t i = 0; i < n; i++) sum += (double)row[i] * (double)g_r[i];
+            L[r * m + t] = (float)sum;
+        }
 }

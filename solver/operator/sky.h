@@ -9,4 +9,7 @@
  */
 lam_status sky_load(store *s, size_t n, lam_sky **out, lam_error *error);
 
+/* A sky of first_bounce [m][n], copied. Errors: LAM_ERR_MEMORY. */
+lam_status sky_create(size_t n_tiles, size_t n, const float *first_bounce, lam_sky **out, lam_error *error);
+
 #endif

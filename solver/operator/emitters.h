@@ -1,0 +1,50 @@
+/* What only an operator of few emitters is made of. */
+#ifndef LAMBERT_OPERATOR_EMITTERS_H
+#define LAMBERT_OPERATOR_EMITTERS_H
+
+#include "solver/operator/operator.h"
+
+/* Rows are numbered c s + k for emitter k in channel c. */
+typedef struct emitter_arrays {
+    size_t s;
+    char **names; /* [s], one block freed by one free() */
+    float *T; /* [C][s][n] in mesh order: rho' H of every emitter alone, rho' being rho or 1 where it is 0 */
+    uint64_t
+        *ends; /* [C s + 1]: what the elements themselves emit, entries ends[row] ... ends[row + 1] - 1: */
+    uint32_t *elements;
+    float *values;
+    size_t n_tiles;
+    float *L;     /* [C][s][m], radiances of the sky's tiles; NULL: no emitter is of the sky */
+    lam_sky *sky; /* with L */
+} emitter_arrays;
+
+void emitter_arrays_free(emitter_arrays *arrays);
+
+/* The answer to weights w is sum_k w_k B_k. Takes over what arrays points to, also on an error, and zeroes
+ * it. Errors as the others: LAM_ERR_NUMERIC names a value, LAM_ERR_FORMAT what does not fit. */
+lam_status operator_emitters_create(size_t n, size_t n_channels, const float *reflectance,
+                                    emitter_arrays *arrays, lam_operator **op, lam_error *error);
+
+/* The operator itself, for emitters.c and emitters_apply.c. */
+typedef struct emitters {
+    lam_operator base;
+    emitter_arrays a; /* without T */
+    panel *T;         /* [C] of [n][s] */
+    /* [C s]: an element, or (n and above) a tile n + t, where no other emitter sends anything; EMITTERS_NONE:
+     * there is none. */
+    uint32_t *own;
+    float *own_value; /* [C s], what it sends there */
+} emitters;
+
+#define EMITTERS_NONE UINT32_MAX
+
+/* The same operator seen from inside; NULL of another kind. */
+const emitters *operator_emitters_of(const lam_operator *op);
+
+/* What so many weights [n_rhs][C][s] send out: E [n_rhs][C][n], and H0, the same of what their sky gives
+ * directly. Errors:
+ * LAM_ERR_MEMORY. */
+lam_status operator_emitters_light(const lam_operator *op, size_t n_rhs, const float *W, float *E, float *H0,
+                                   lam_error *error);
+
+#endif

@@ -1,0 +1,257 @@
+/* What an operator of few emitters answers: B = sum_k w_k B_k, its weights from an emission, its adjoint. */
+#include "solver/operator/emitters.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* What an emission may miss of what its weights send out, of the larger of both. */
+static const float close_enough = 1e-5f;
+
+size_t lam_operator_emitters(const lam_operator *op) {
+    const emitters *self = operator_emitters_of(op);
+    return self != NULL ? self->a.s : 0;
+}
+
+const char *lam_operator_emitter_name(const lam_operator *op, size_t k) {
+    return operator_emitters_of(op)->a.names[k];
+}
+
+/* E [n] += what the elements themselves send out, of one channel. */
+static void add_emission(const emitters *self, size_t c, const float *W, float *E) {
+    const emitter_arrays *a = &self->a;
+    for (size_t k = 0; k < a->s; k++) {
+        const size_t row = c * a->s + k;
+        if (W[k] == 0) continue;
+        for (uint64_t e = a->ends[row]; e < a->ends[row + 1]; e++) E[a->elements[e]] += W[k] * a->values[e];
+    }
+}
+
+/* L [m] = the radiances of the tiles. */
+static void sum_tiles(const emitters *self, size_t c, const float *W, float *L) {
+    const emitter_arrays *a = &self->a;
+    for (size_t t = 0; t < a->n_tiles; t++) L[t] = 0;
+    for (size_t k = 0; k < a->s; k++)
+        for (size_t t = 0; t < a->n_tiles && W[k] != 0; t++)
+            L[t] += W[k] * a->L[(c * a->s + k) * a->n_tiles + t];
+}
+
+/* --- weights ------------------------------------------------------------------------------------------ */
+
+static bool is_close(float x, float y) {
+    return fabsf(x - y) <= close_enough * fmaxf(x, y);
+}
+
+/* One channel of one emission: sent has room for n + m numbers. */
+static lam_status weights_of_one(const emitters *self, size_t c, const float *E, const float *L, float *sent,
+                                 float *W, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = self->base.n, s = self->a.s, m = self->a.n_tiles;
+    const char *const what = s == 1 ? "emitter does" : "emitters do";
+    for (size_t k = 0; k < s; k++) {
+        const uint32_t at = self->own[c * s + k];
+        const float *from = at < n ? E : L;
+        if (at == EMITTERS_NONE)
+            FAIL(error, LAM_ERR_ARGUMENT,
+                 "emitter %zu (%.40s) is nowhere alone, so that its weight cannot be told from an emission; "
+                 "give \"emitters\", a weight each",
+                 k, self->a.names[k]);
+        W[k] = from == NULL ? 0 : from[at < n ? at : at - n] / self->own_value[c * s + k];
+    }
+    memset(sent, 0, n * sizeof *sent);
+    add_emission(self, c, W, sent);
+    sum_tiles(self, c, W, sent + n);
+    for (size_t i = 0; i < n; i++)
+        if (!is_close(E != NULL ? E[i] : 0, sent[i]))
+            FAIL(error, LAM_ERR_ARGUMENT,
+                 "element %zu emits %g, which the store's %zu %s not; give what they send, or \"emitters\"",
+                 i, (double)(E != NULL ? E[i] : 0), s, what);
+    for (size_t t = 0; t < m; t++)
+        if (!is_close(L != NULL ? L[t] : 0, sent[n + t]))
+            FAIL(error, LAM_ERR_ARGUMENT,
+                 "tile %zu of the sky has radiance %g, which the store's %zu %s not give", t,
+                 (double)(L != NULL ? L[t] : 0), s, what);
+    if (m == 0 && L != NULL)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "no emitter of the store is of the sky; precompute with --emitters sky");
+done:
+    return status;
+}
+
+lam_status lam_operator_weights(const lam_operator *op, size_t n_rhs, const float *E, const float *L,
+                                float *W, lam_error *error) {
+    lam_status status = LAM_OK;
+    const emitters *self = op != NULL ? operator_emitters_of(op) : NULL;
+    float *sent = NULL;
+    if (self == NULL || W == NULL) FAIL(error, LAM_ERR_ARGUMENT, "an operator of few emitters is needed");
+    const size_t n = op->n, C = op->n_channels, m = self->a.n_tiles;
+    sent = memory_allocate(n + m, sizeof *sent, "emitters", error);
+    if (sent == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t row = 0; row < n_rhs * C; row++)
+        TRY(weights_of_one(self, row % C, E != NULL ? E + row * n : NULL, L != NULL ? L + row * m : NULL,
+                           sent, W + row * self->a.s, error));
+done:
+    free(sent);
+    return status;
+}
+
+lam_status operator_emitters_light(const lam_operator *op, size_t n_rhs, const float *W, float *E, float *H0,
+                                   lam_error *error) {
+    const emitters *self = operator_emitters_of(op);
+    const size_t n = op->n, C = op->n_channels;
+    float *L = memory_allocate(self->a.n_tiles + 1, sizeof *L, "emitters", error);
+    if (L == NULL) return LAM_ERR_MEMORY;
+    memset(E, 0, n_rhs * C * n * sizeof *E);
+    memset(H0, 0, n_rhs * C * n * sizeof *H0);
+    for (size_t row = 0; row < n_rhs * C; row++) {
+        const float *w = W + row * self->a.s;
+        add_emission(self, row % C, w, E + row * n);
+        if (self->a.L == NULL) continue;
+        sum_tiles(self, row % C, w, L);
+        lam_sky_irradiance(self->a.sky, 1, L, H0 + row * n);
+    }
+    free(L);
+    return LAM_OK;
+}
+
+/* --- answers ------------------------------------------------------------------------------------------ */
+
+static lam_status check(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *in,
+                        const float *out, const void *work, size_t work_bytes, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (op == NULL || in == NULL || out == NULL || work == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "an operator, its input, its output and a work area are needed, one is NULL");
+    if (operator_emitters_of(op) == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "an operator of kind %s has no emitters", op->kind->name);
+    if (quantity != LAM_RADIOSITY && quantity != LAM_IRRADIANCE && quantity != LAM_INDIRECT)
+        FAIL(error, LAM_ERR_ARGUMENT, "there is no quantity %d", (int)quantity);
+    const size_t needed = lam_operator_work_bytes(op, n_rhs);
+    if (needed == 0 || work_bytes < needed)
+        FAIL(error, LAM_ERR_ARGUMENT, "work area of %zu bytes, %zu are needed for n_rhs = %zu", work_bytes,
+             needed, n_rhs);
+done:
+    return status;
+}
+
+static void *aligned(const void *work) {
+    return (char *)(uintptr_t)work + (PANEL_ALIGN - (uintptr_t)work % PANEL_ALIGN) % PANEL_ALIGN;
+}
+
+/* What is T in out becomes the quantity: radiosity E + T, irradiance T / rho', indirect T - rho H0; where rho
+ * is 0 radiosity is E alone and indirect 0. other [n]: E, or H0; NULL: 0. */
+static void finish(const lam_operator *op, size_t c, lam_quantity quantity, const float *other,
+                   size_t n_selected, const uint32_t *selected, float *out) {
+    const float *rho = op->reflectance + c * op->n;
+    for (size_t r = 0; r < n_selected; r++) {
+        const size_t i = selected != NULL ? selected[r] : r;
+        const float T = rho[i] > 0 ? out[r] : 0, x = other != NULL ? other[i] : 0;
+        if (quantity == LAM_RADIOSITY)
+            out[r] = T + x;
+        else if (quantity == LAM_INDIRECT)
+            out[r] = T - rho[i] * x;
+        else if (rho[i] > 0)
+            out[r] /= rho[i];
+    }
+}
+
+lam_status lam_operator_apply_emitters(const lam_operator *op, size_t n_rhs, lam_quantity quantity,
+                                       const float *W, size_t n_selected, const uint32_t *selected,
+                                       float *out, void *work, size_t work_bytes, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(check(op, n_rhs, quantity, W, out, work, work_bytes, error));
+    const emitters *self = operator_emitters_of(op);
+    const size_t n = op->n, C = op->n_channels, s = self->a.s, count = selected != NULL ? n_selected : n;
+    for (size_t r = 0; selected != NULL && r < n_selected; r++)
+        if (selected[r] >= n)
+            FAIL(error, LAM_ERR_ARGUMENT, "selected[%zu] = %u, must be below %zu", r, (unsigned)selected[r],
+                 n);
+    for (size_t first = 0; first < n_rhs; first += OPERATOR_PASS) {
+        const size_t m = n_rhs - first < OPERATOR_PASS ? n_rhs - first : OPERATOR_PASS;
+        const float *w = W + first * C * s;
+        float *to = out + first * C * count;
+        void *rest = aligned(work);
+        float *other = work_take(&rest, n * sizeof *other),
+              *L = work_take(&rest, self->a.n_tiles * sizeof *L);
+        for (size_t c = 0; c < C; c++)
+            if (selected != NULL)
+                panel_expand_rows(&self->T[c], m, w + c * s, C * s, count, selected, NULL, to + c * count,
+                                  C * count, rest);
+            else
+                panel_expand(&self->T[c], m, w + c * s, C * s, to + c * count, C * count, rest);
+        for (size_t row = 0; row < m * C; row++) {
+            const bool sky = quantity == LAM_INDIRECT && self->a.L != NULL;
+            if (quantity == LAM_RADIOSITY) {
+                memset(other, 0, n * sizeof *other);
+                add_emission(self, row % C, w + row * s, other);
+            } else if (sky) {
+                sum_tiles(self, row % C, w + row * s, L);
+                lam_sky_irradiance(self->a.sky, 1, L, other);
+            }
+            finish(op, row % C, quantity, quantity == LAM_RADIOSITY || sky ? other : NULL, count, selected,
+                   to + row * count);
+        }
+    }
+done:
+    return status;
+}
+
+/* g of the quantity becomes g of T: dB / dT is 1 where rho is not 0, dH / dT is 1 / rho'. */
+static void pull_back(const lam_operator *op, size_t c, lam_quantity quantity, const float *g,
+                      float *pulled) {
+    const float *rho = op->reflectance + c * op->n;
+    for (size_t i = 0; i < op->n; i++)
+        if (quantity == LAM_IRRADIANCE)
+            pulled[i] = rho[i] > 0 ? g[i] / rho[i] : g[i];
+        else
+            pulled[i] = rho[i] > 0 ? g[i] : 0;
+}
+
+/* w [s] += what g says of emission (radiosity), or, by - rho H0, of the sky (indirect). other: [n]. */
+static void adjoint_of_light(const lam_operator *op, size_t c, lam_quantity quantity, const float *g,
+                             float *other, float *L, float *w) {
+    const emitters *self = operator_emitters_of(op);
+    const emitter_arrays *a = &self->a;
+    const float *rho = op->reflectance + c * op->n;
+    for (size_t k = 0; quantity == LAM_RADIOSITY && k < a->s; k++) {
+        double sum = 0;
+        for (uint64_t e = a->ends[c * a->s + k]; e < a->ends[c * a->s + k + 1]; e++)
+            sum += (double)a->values[e] * (double)g[a->elements[e]];
+        w[k] += (float)sum;
+    }
+    if (quantity != LAM_INDIRECT || a->L == NULL) return;
+    for (size_t i = 0; i < op->n; i++) other[i] = rho[i] * g[i];
+    lam_sky_adjoint(a->sky, 1, other, L);
+    for (size_t k = 0; k < a->s; k++) {
+        double sum = 0;
+        for (size_t t = 0; t < a->n_tiles; t++)
+            sum += (double)a->L[(c * a->s + k) * a->n_tiles + t] * (double)L[t];
+        w[k] -= (float)sum;
+    }
+}
+
+lam_status lam_operator_adjoint_emitters(const lam_operator *op, size_t n_rhs, lam_quantity quantity,
+                                         const float *g, float *W, void *work, size_t work_bytes,
+                                         lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(check(op, n_rhs, quantity, g, W, work, work_bytes, error));
+    const emitters *self = operator_emitters_of(op);
+    const size_t n = op->n, C = op->n_channels, s = self->a.s;
+    for (size_t first = 0; first < n_rhs; first += OPERATOR_PASS) {
+        const size_t m = n_rhs - first < OPERATOR_PASS ? n_rhs - first : OPERATOR_PASS;
+        const float *from = g + first * C * n;
+        float *to = W + first * C * s;
+        void *rest = aligned(work);
+        float *other = work_take(&rest, n * sizeof *other),
+              *L = work_take(&rest, self->a.n_tiles * sizeof *L);
+        float *pulled = work_take(&rest, m * C * n * sizeof *pulled);
+        for (size_t row = 0; row < m * C; row++)
+            pull_back(op, row % C, quantity, from + row * n, pulled + row * n);
+        for (size_t c = 0; c < C; c++)
+            panel_project(&self->T[c], m, pulled + c * n, C * n, to + c * s, C * s, rest);
+        for (size_t row = 0; row < m * C; row++)
+            adjoint_of_light(op, row % C, quantity, from + row * n, other, L, to + row * s);
+    }
+done:
+    return status;
+}
