@@ -55,7 +55,7 @@ void element_sampler_init(element_sampler *s, const mesh *m, const visibility *v
     s->parallelogram = false;
     s->first_share = 1;
     set_piece(s, 0, a, b, c, v);
-    if (corner[3] != MESH_NO_VERTEX) {
+    if (mesh_corners(m, element) == 4) {
         const double *e = m->vertices[corner[3]];
         double off = 0, size = 0;
         for (int d = 0; d < 3; d++) {

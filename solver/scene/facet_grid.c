@@ -34,10 +34,6 @@ typedef struct frame {
     double origin[3], x[3], y[3]; /* place = ((p - origin) . x, (p - origin) . y) */
 } frame;
 
-static size_t corners_of(const mesh *m, size_t element) {
-    return m->elements[element][3] == MESH_NO_VERTEX ? 3 : 4;
-}
-
 static void to_cells(const frame *f, const double p[3], double at[2]) {
     at[0] = at[1] = 0;
     for (int d = 0; d < 3; d++) {
@@ -49,7 +45,7 @@ static void to_cells(const frame *f, const double p[3], double at[2]) {
 /* Axes along two sides of an element, those of the corner that is nearest to a right angle, one side long
  * each: what was divided evenly then fills cells evenly. */
 static void set_axes(const mesh *m, size_t element, frame *f) {
-    const size_t corners = corners_of(m, element);
+    const size_t corners = mesh_corners(m, element);
     double best = INFINITY, u[3] = {0}, w[3] = {0};
     for (size_t k = 0; k < corners; k++) {
         const double *o = m->vertices[m->elements[element][k]];
@@ -100,7 +96,7 @@ static void lay(const mesh *m, const uint32_t *elements, size_t n, frame *f, fac
     memcpy(f->origin, m->vertices[m->elements[elements[0]][0]], sizeof f->origin);
     set_axes(m, typical(m, elements, n), f);
     for (size_t k = 0; k < n; k++)
-        for (size_t c = 0; c < corners_of(m, elements[k]); c++) {
+        for (size_t c = 0; c < mesh_corners(m, elements[k]); c++) {
             double at[2];
             to_cells(f, m->vertices[m->elements[elements[k]][c]], at);
             for (int d = 0; d < 2; d++) {
@@ -144,7 +140,7 @@ typedef struct footprint {
 } footprint;
 
 static void set_footprint(const mesh *m, const frame *f, uint32_t element, footprint *p) {
-    const size_t corners = corners_of(m, element);
+    const size_t corners = mesh_corners(m, element);
     double at[4][2], around = 0;
     *p = (footprint){.element = element, .low = {INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY}};
     for (size_t k = 0; k < corners; k++) {
@@ -274,7 +270,7 @@ static void place_piece(const mesh *m, const frame *f, const uint32_t piece[4], 
     double o[2], u[2], w[2];
     to_cells(f, m->vertices[piece[0]], o);
     to_cells(f, m->vertices[piece[1]], u);
-    to_cells(f, m->vertices[piece[3] == MESH_NO_VERTEX ? piece[2] : piece[3]], w);
+    to_cells(f, m->vertices[piece[corner_count(piece) - 1]], w);
     out->x[0] = (float)o[0], out->x[1] = (float)(u[0] - o[0]), out->x[2] = (float)(w[0] - o[0]);
     out->y[0] = (float)o[1], out->y[1] = (float)(u[1] - o[1]), out->y[2] = (float)(w[1] - o[1]);
 }

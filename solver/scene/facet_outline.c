@@ -116,7 +116,7 @@ static void find_corners(cutter *c) {
     const outlines *o = c->o;
     memset(c->corner, 0, o->m->n_vertices * sizeof *c->corner);
     for (size_t i = 0; i < o->n_elements; i++)
-        for (int k = 0; k < 4 && o->alone[o->part[i]] && o->m->elements[i][k] != MESH_NO_VERTEX; k++)
+        for (size_t k = 0; k < mesh_corners(o->m, i) && o->alone[o->part[i]]; k++)
             c->corner[o->place[o->m->elements[i][k]]] = true;
     for (size_t l = 0; l < c->n_loops; l++) {
         const uint32_t *v = c->vertices + c->loops[l].first;

@@ -77,10 +77,6 @@ static lam_status weld(joining *j, lam_error *error) {
     return LAM_OK;
 }
 
-static size_t corners_of(const mesh *m, size_t element) {
-    return m->elements[element][3] == MESH_NO_VERTEX ? 3 : 4;
-}
-
 static uint32_t find(uint32_t *parent, uint32_t i) {
     while (parent[i] != i) i = parent[i] = parent[parent[i]];
     return i;
@@ -89,7 +85,7 @@ static uint32_t find(uint32_t *parent, uint32_t i) {
 /* The distance of an element's farthest corner from the plane through a point. */
 static double off_plane(const mesh *m, size_t element, const double at[3], const double normal[3]) {
     double most = 0;
-    for (size_t k = 0; k < corners_of(m, element); k++) {
+    for (size_t k = 0; k < mesh_corners(m, element); k++) {
         const double *v = m->vertices[m->elements[element][k]];
         double off = 0;
         for (int d = 0; d < 3; d++) off += normal[d] * (v[d] - at[d]);
@@ -129,7 +125,7 @@ static void join_meeting(joining *j, edge *e, size_t count) {
 static void join_neighbours(joining *j) {
     const mesh *m = j->m;
     for (uint32_t i = 0; i < j->n; i++) {
-        const size_t corners = corners_of(m, i);
+        const size_t corners = mesh_corners(m, i);
         j->parent[i] = i;
         for (size_t k = 0; k < corners; k++) {
             const uint32_t from = j->place[m->elements[i][k]],

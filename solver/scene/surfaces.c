@@ -77,8 +77,8 @@ lam_status mesh_surfaces(const mesh *m, uint32_t *surface, size_t *n_surfaces, l
     if (places == NULL || corners == NULL || parent == NULL) TRY(LAM_ERR_MEMORY);
     TRY(weld(m, places, error));
     for (uint32_t i = 0; i < m->n; i++) {
-        const size_t sides = m->elements[i][3] == MESH_NO_VERTEX ? 3 : 4;
-        for (size_t k = 0; k < sides; k++) corners[n_corners++] = (corner){places[m->elements[i][k]], i};
+        for (size_t k = 0; k < mesh_corners(m, i); k++)
+            corners[n_corners++] = (corner){places[m->elements[i][k]], i};
         parent[i] = i;
     }
     qsort(corners, n_corners, sizeof *corners, corner_order);

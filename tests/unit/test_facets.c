@@ -23,7 +23,7 @@ static facets joined(const mesh *m) {
 
 /* (u, v) of a point in a piece; whether it is inside. */
 static bool in_piece(const mesh *m, const uint32_t piece[4], const double p[3], float *u, float *v) {
-    const bool quad = piece[3] != MESH_NO_VERTEX;
+    const bool quad = corner_count(piece) == 4;
     const double *o = m->vertices[piece[0]], *a = m->vertices[piece[1]],
                  *b = m->vertices[piece[quad ? 3 : 2]];
     double aa = 0, ab = 0, bb = 0, pa = 0, pb = 0;
@@ -42,7 +42,7 @@ static bool in_piece(const mesh *m, const uint32_t piece[4], const double p[3], 
 
 /* A point of an element, not on its border. */
 static void point_in(const mesh *m, size_t element, uint64_t *state, double p[3]) {
-    const size_t corners = m->elements[element][3] == MESH_NO_VERTEX ? 3 : 4;
+    const size_t corners = mesh_corners(m, element);
     double weight[4], sum = 0;
     for (size_t k = 0; k < corners; k++) sum += weight[k] = .01 + random_unit(state);
     for (int d = 0; d < 3; d++) {
@@ -77,7 +77,7 @@ static void check_points(const mesh *m, const facets *f) {
 
 static double area_of(const mesh *m, const uint32_t piece[4]) {
     double area = 0;
-    for (int half = 0; half < (piece[3] == MESH_NO_VERTEX ? 1 : 2); half++) {
+    for (size_t half = 0; half + 2 < corner_count(piece); half++) {
         const double *a = m->vertices[piece[0]], *b = m->vertices[piece[1 + half]],
                      *c = m->vertices[piece[2 + half]];
         double n[3];
@@ -112,12 +112,12 @@ static void check_cover(const mesh *m, const facets *f) {
 /* Every side of a piece is the side of another piece the other way round: nothing passes between them. */
 static void check_closed(const mesh *m, const facets *f) {
     for (size_t p = 0; p < f->n_pieces; p++) {
-        const size_t corners = f->pieces[p][3] == MESH_NO_VERTEX ? 3 : 4;
+        const size_t corners = corner_count(f->pieces[p]);
         for (size_t k = 0; k < corners; k++) {
             const double *a = m->vertices[f->pieces[p][k]], *b = m->vertices[f->pieces[p][(k + 1) % corners]];
             size_t mates = 0;
             for (size_t q = 0; q < f->n_pieces; q++) {
-                const size_t others = f->pieces[q][3] == MESH_NO_VERTEX ? 3 : 4;
+                const size_t others = corner_count(f->pieces[q]);
                 for (size_t l = 0; l < others; l++)
                     mates += memcmp(m->vertices[f->pieces[q][l]], b, sizeof *m->vertices) == 0 &&
                              memcmp(m->vertices[f->pieces[q][(l + 1) % others]], a, sizeof *m->vertices) == 0;

@@ -112,10 +112,6 @@ START_TEST(it_takes_a_reflectance) {
 }
 END_TEST
 
-static size_t corners_of(const mesh *m, size_t i) {
-    return m->elements[i][3] == MESH_NO_VERTEX ? 3 : 4;
-}
-
 /* Twice the area of the triangle abp times the cosine of its normal to n. */
 static double turn(const double *a, const double *b, const double *p, const float *n) {
     double sum = 0;
@@ -133,7 +129,7 @@ static bool is_in(const mesh *m, size_t i, const double p[3]) {
     double off = 0;
     for (int d = 0; d < 3; d++) off += (double)m->normal[i][d] * (p[d] - first[d]);
     if (fabs(off) > 1e-5) return false;
-    for (size_t k = 0, n = corners_of(m, i); k < n; k++)
+    for (size_t k = 0, n = mesh_corners(m, i); k < n; k++)
         if (turn(m->vertices[m->elements[i][k]], m->vertices[m->elements[i][(k + 1) % n]], p, m->normal[i]) <
             1e-9)
             return false;
@@ -173,7 +169,7 @@ START_TEST(the_surface_has_no_gaps) {
     double sum[3] = {0}, low[2] = {HUGE_VAL, HUGE_VAL}, high[2] = {-HUGE_VAL, -HUGE_VAL};
     for (size_t i = 0; i < m.n; i++) {
         for (int d = 0; d < 3; d++) sum[d] += m.area[i] * (double)m.normal[i][d];
-        for (size_t k = 0; k < corners_of(&m, i) && m.group[i] != sheets; k++)
+        for (size_t k = 0; k < mesh_corners(&m, i) && m.group[i] != sheets; k++)
             for (int d = 0; d < 2; d++) {
                 low[d] = fmin(low[d], m.vertices[m.elements[i][k]][d]);
                 high[d] = fmax(high[d], m.vertices[m.elements[i][k]][d]);
