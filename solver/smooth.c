@@ -1,5 +1,7 @@
 #include "solver/smooth.h"
 
+#include "solver/scene/joined.h"
+
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
@@ -144,25 +146,17 @@ static int compare_corners(const void *left, const void *right) {
     return (a->number > b->number) - (a->number < b->number);
 }
 
-static uint32_t root_of(uint32_t *parent, uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 /* Gives the corners at one place their nodes: joined where their elements are one surface. */
 static void join_corners(smoother *s, const corner *corners, uint32_t *parent, size_t count) {
     for (size_t i = 0; i < count; i++) parent[i] = (uint32_t)i;
     for (size_t i = 0; i < count; i++)
         for (size_t j = i > MANY_CORNERS ? i - MANY_CORNERS : 0; j < i; j++) {
             if (!same_surface(s->m, corners[i].element, corners[j].element)) continue;
-            const uint32_t x = root_of(parent, (uint32_t)i), y = root_of(parent, (uint32_t)j);
-            if (x < y)
-                parent[y] = x;
-            else
-                parent[x] = y;
+            const uint32_t x = joined_root(parent, (uint32_t)i), y = joined_root(parent, (uint32_t)j);
+            joined_link(parent, x > y ? x : y, x > y ? y : x);
         }
     for (size_t i = 0; i < count; i++) {
-        const uint32_t root = root_of(parent, (uint32_t)i);
+        const uint32_t root = joined_root(parent, (uint32_t)i);
         uint32_t *node = &s->nodes->corner[corners[i].element][corners[i].number];
         if (root == i) { /* the smallest of its set, so met first */
             s->node_vertex[s->nodes->n_nodes] = corners[i].vertex;

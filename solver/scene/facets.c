@@ -1,6 +1,7 @@
 #include "solver/scene/facets.h"
 
 #include "solver/scene/facet_outline.h"
+#include "solver/scene/joined.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -77,11 +78,6 @@ static lam_status weld(joining *j, lam_error *error) {
     return LAM_OK;
 }
 
-static uint32_t find(uint32_t *parent, uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 /* The distance of an element's farthest corner from the plane through a point. */
 static double off_plane(const mesh *m, size_t element, const double at[3], const double normal[3]) {
     double most = 0;
@@ -118,7 +114,7 @@ static void join_meeting(joining *j, edge *e, size_t count) {
             back += e[l].forward == e[k].forward && of_one_plane(j, e[mate].element, e[l].element);
         if (back != 1) continue;
         e[k].inner = e[mate].inner = true;
-        j->parent[find(j->parent, e[k].element)] = find(j->parent, e[mate].element);
+        joined_link(j->parent, e[k].element, e[mate].element);
     }
 }
 
@@ -150,7 +146,7 @@ static lam_status measure_parts(joining *j, lam_error *error) {
     const mesh *m = j->m;
     for (size_t i = 0; i < j->n; i++) j->part[i] = MESH_NO_VERTEX;
     for (uint32_t i = 0; i < j->n; i++) {
-        const uint32_t root = find(j->parent, i);
+        const uint32_t root = joined_root(j->parent, i);
         if (j->part[root] == MESH_NO_VERTEX) j->part[root] = (uint32_t)j->n_parts++;
         j->part[i] = j->part[root];
     }

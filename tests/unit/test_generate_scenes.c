@@ -3,6 +3,7 @@
 
 #include "solver/formfactor/sample.h"
 #include "solver/formfactor/visibility.h"
+#include "solver/scene/joined.h"
 #include "support/scene.h"
 
 typedef struct scene_kind {
@@ -183,11 +184,6 @@ START_TEST(the_surface_has_no_gaps) {
 }
 END_TEST
 
-static size_t root_of(size_t *joined, size_t i) {
-    while (joined[i] != i) i = joined[i] = joined[joined[i]];
-    return i;
-}
-
 /* What became of rays from every element. */
 typedef struct tally {
     size_t all, gone, backs;
@@ -198,16 +194,16 @@ typedef struct tally {
 static tally cast_from_all(const mesh *m, size_t rays, uint64_t seed) {
     tally t = {0};
     visibility *v;
-    size_t *joined = malloc(m->n * sizeof *joined);
+    uint32_t *joined = malloc(m->n * sizeof *joined);
     bool *sees = calloc(m->n, sizeof *sees);
     ck_assert(joined != NULL && sees != NULL);
-    for (size_t i = 0; i < m->n; i++) joined[i] = i;
+    for (uint32_t i = 0; i < m->n; i++) joined[i] = i;
     ck_assert_msg(visibility_create(m, &v, &error) == LAM_OK, "%s", error.message);
-    for (size_t i = 0; i < m->n; i++) {
+    for (uint32_t i = 0; i < m->n; i++) {
         element_sampler sampler;
         uint32_t self[VISIBILITY_PACKET];
         double from[3], to[3];
-        for (int k = 0; k < VISIBILITY_PACKET; k++) self[k] = (uint32_t)i;
+        for (int k = 0; k < VISIBILITY_PACKET; k++) self[k] = i;
         mesh_centroid(m, i, from);
         element_sampler_init(&sampler, m, v, i, seed);
         for (size_t ray = 0; ray < rays; ray += VISIBILITY_PACKET) {
@@ -222,7 +218,7 @@ static tally cast_from_all(const mesh *m, size_t rays, uint64_t seed) {
                 t.backs += hits.back[k];
                 if (gone || hits.back[k]) continue;
                 sees[i] = sees[hits.element[k]] = true;
-                joined[root_of(joined, i)] = root_of(joined, hits.element[k]);
+                joined_link(joined, i, hits.element[k]);
                 mesh_centroid(m, hits.element[k], to);
                 t.far += hypot(from[0] - to[0], from[1] - to[1]) > 8;
             }
