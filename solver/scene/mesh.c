@@ -1,6 +1,8 @@
 /* Measures, bounds and the hash of a mesh; refinement, order and storage have files of their own. */
 #include "solver/scene/mesh.h"
 
+#include "solver/scene/plane.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -161,15 +163,7 @@ void mesh_centroid(const mesh *m, size_t element, double centroid[3]) {
         return;
     }
     const double *d = m->vertices[e[3]];
-    double abc[3], acd[3], area_abc = 0, area_acd = 0;
-    cross_of_differences(a, b, a, c, abc);
-    cross_of_differences(a, c, a, d, acd);
-    for (int k = 0; k < 3; k++) {
-        area_abc += abc[k] * abc[k];
-        area_acd += acd[k] * acd[k];
-    }
-    area_abc = sqrt(area_abc);
-    area_acd = sqrt(area_acd);
+    const double area_abc = triangle_area(a, b, c), area_acd = triangle_area(a, c, d);
     const double share = area_abc + area_acd > 0 ? area_acd / (area_abc + area_acd) : 0;
     for (int k = 0; k < 3; k++)
         centroid[k] = a[k] + ((c[k] - a[k]) + (1 - share) * (b[k] - a[k]) + share * (d[k] - a[k])) / 3;
