@@ -201,25 +201,30 @@ static lam_status find_sides(joining *j, lam_error *error) {
     return sides_cancel(j->m, j->flat, &j->sides, error);
 }
 
+static lam_status reserve(size_t n_elements, size_t n, size_t n_pieces, facets *f, lam_error *error) {
+    f->n = n;
+    f->of_element = memory_allocate(n_elements, sizeof *f->of_element, "facets", error);
+    f->elements = memory_allocate(n_elements, sizeof *f->elements, "facets", error);
+    f->first = memory_allocate(n + 1, sizeof *f->first, "facets", error);
+    f->normal = memory_allocate(n, sizeof *f->normal, "facets", error);
+    f->pieces = memory_allocate(n_pieces, sizeof *f->pieces, "facets", error);
+    f->piece_facet = memory_allocate(n_pieces, sizeof *f->piece_facet, "facets", error);
+    return f->of_element == NULL || f->elements == NULL || f->first == NULL || f->normal == NULL ||
+                   f->pieces == NULL || f->piece_facet == NULL
+               ? LAM_ERR_MEMORY
+               : LAM_OK;
+}
+
 /* What the parts become: one facet each, or one for every element where they are alone. */
 static lam_status fill(const joining *j, const outlines *o, facets *f, lam_error *error) {
+    lam_status status = LAM_OK;
     const mesh *m = j->m;
     uint32_t *facet_of = memory_allocate(j->n_parts, sizeof *facet_of, "facets", error);
     size_t singles = 0, joined = 0;
     for (size_t i = 0; i < j->n; i++) singles += o->alone[j->part[i]];
     for (size_t part = 0; part < j->n_parts; part++) joined += !o->alone[part];
-    f->n = singles + joined;
-    f->of_element = memory_allocate(j->n, sizeof *f->of_element, "facets", error);
-    f->elements = memory_allocate(j->n, sizeof *f->elements, "facets", error);
-    f->first = memory_allocate(f->n + 1, sizeof *f->first, "facets", error);
-    f->normal = memory_allocate(f->n, sizeof *f->normal, "facets", error);
-    f->pieces = memory_allocate(singles + o->n_pieces, sizeof *f->pieces, "facets", error);
-    f->piece_facet = memory_allocate(singles + o->n_pieces, sizeof *f->piece_facet, "facets", error);
-    if (facet_of == NULL || f->of_element == NULL || f->elements == NULL || f->first == NULL ||
-        f->normal == NULL || f->pieces == NULL || f->piece_facet == NULL) {
-        free(facet_of);
-        return LAM_ERR_MEMORY;
-    }
+    if (facet_of == NULL) return LAM_ERR_MEMORY;
+    TRY(reserve(j->n, singles + joined, singles + o->n_pieces, f, error));
     uint32_t next = 0;
     for (size_t part = 0; part < j->n_parts; part++) facet_of[part] = MESH_NO_VERTEX;
     for (size_t i = 0; i < j->n; i++) {
@@ -243,12 +248,12 @@ static lam_status fill(const joining *j, const outlines *o, facets *f, lam_error
     for (size_t i = j->n; i-- > 0;) f->elements[--f->first[f->of_element[i] + 1]] = (uint32_t)i;
     for (size_t k = 0; k < f->n; k++) f->first[k] = f->first[k + 1];
     f->first[f->n] = (uint32_t)j->n;
+done:
     free(facet_of);
-    return LAM_OK;
+    return status;
 }
 
-static lam_status join(const mesh *m, size_t n_elements, double flat, bool neighbours, facets *out,
-                       lam_error *error) {
+lam_status facets_join(const mesh *m, size_t n_elements, double flat, facets *out, lam_error *error) {
     lam_status status = LAM_OK;
     joining j = {.m = m, .n = n_elements, .flat = flat};
     outlines o = {.m = m};
@@ -259,10 +264,7 @@ static lam_status join(const mesh *m, size_t n_elements, double flat, bool neigh
     j.edges = memory_allocate(j.n, 4 * sizeof *j.edges, "facets", error);
     if (j.place == NULL || j.parent == NULL || j.part == NULL || j.edges == NULL) TRY(LAM_ERR_MEMORY);
     TRY(weld(&j, error));
-    if (neighbours)
-        join_neighbours(&j);
-    else
-        for (size_t i = 0; i < j.n; i++) j.parent[i] = (uint32_t)i;
+    join_neighbours(&j);
     TRY(measure_parts(&j, error));
     TRY(find_sides(&j, error));
     o = (outlines){.m = m,
@@ -295,12 +297,19 @@ done:
     return status;
 }
 
-lam_status facets_join(const mesh *m, size_t n_elements, double flat, facets *out, lam_error *error) {
-    return join(m, n_elements, flat, true, out, error);
-}
-
 lam_status facets_alone(const mesh *m, size_t n_elements, facets *out, lam_error *error) {
-    return join(m, n_elements, 0, false, out, error);
+    lam_status status = LAM_OK;
+    *out = (facets){.n = 0};
+    TRY(reserve(n_elements, n_elements, n_elements, out, error));
+    for (uint32_t i = 0; i < n_elements; i++)
+        out->of_element[i] = out->elements[i] = out->first[i] = out->piece_facet[i] = i;
+    out->first[n_elements] = (uint32_t)n_elements;
+    out->n_pieces = n_elements;
+    memcpy(out->normal, m->normal, n_elements * sizeof *out->normal);
+    memcpy(out->pieces, m->elements, n_elements * sizeof *out->pieces);
+done:
+    if (status != LAM_OK) facets_free(out);
+    return status;
 }
 
 void facets_free(facets *f) {
