@@ -301,10 +301,8 @@ lam_status facet_grids_create(const mesh *m, const facets *f, facet_grids *out, 
     }
     for (size_t p = 0; p < f->n_pieces; p++) {
         const uint32_t facet = f->piece_facet[p];
-        out->pieces[p].grid = grid_of[facet];
-        out->pieces[p].element = f->elements[f->first[facet]];
         if (f->first[facet + 1] - f->first[facet] == 1) continue;
-        out->pieces[p].element = MESH_NO_VERTEX;
+        out->pieces[p].grid = grid_of[facet];
         place_piece(m, &frames[grid_of[facet]], f->pieces[p], &out->pieces[p]);
     }
 done:
@@ -344,18 +342,12 @@ typedef struct search {
     const uint32_t *cell;
 } search;
 
-/* Finds the cell, or the element itself where its facet has no other. */
-static bool begin(const facet_grids *g, const piece_place *p, float u, float v, search *s,
-                  uint32_t *element) {
-    *element = p->element;
-    if (p->element != MESH_NO_VERTEX) return false;
+static search begin(const facet_grids *g, const piece_place *p, float u, float v) {
     const facet_grid *grid = &g->grids[p->grid];
     const float x = p->x[0] + u * p->x[1] + v * p->x[2], y = p->y[0] + u * p->y[1] + v * p->y[2];
     const uint32_t cell_x = cell_at(x, grid->nx), cell_y = cell_at(y, grid->ny);
-    s->x = x - (float)cell_x;
-    s->y = y - (float)cell_y;
-    s->cell = &g->cells[grid->first + cell_y * grid->nx + cell_x];
-    return true;
+    return (search){x - (float)cell_x, y - (float)cell_y,
+                    &g->cells[grid->first + cell_y * grid->nx + cell_x]};
 }
 
 static uint32_t choose(const facet_candidate *c, float x, float y) {
@@ -373,23 +365,20 @@ static uint32_t choose(const facet_candidate *c, float x, float y) {
 void facet_grids_find(const facet_grids *g, size_t n, const uint32_t *piece, const float *u, const float *v,
                       uint32_t *element) {
     search s[FACET_SEARCHES];
-    uint32_t wanted[FACET_SEARCHES];
-    size_t open = 0;
     /* All are looked up step by step: while one waits for memory the others do too. */
     for (size_t i = 0; i < n; i++) {
-        if (!begin(g, &g->pieces[piece[i]], u[i], v[i], &s[open], &element[i])) continue;
-        __builtin_prefetch(s[open].cell);
-        wanted[open++] = (uint32_t)i;
+        s[i] = begin(g, &g->pieces[piece[i]], u[i], v[i]);
+        __builtin_prefetch(s[i].cell);
     }
-    for (size_t k = 0; k < open; k++)
-        if ((*s[k].cell & CELL_FILLED) == 0) __builtin_prefetch(&g->candidates[*s[k].cell]);
-    for (size_t k = 0; k < open; k++) {
-        const uint32_t cell = *s[k].cell;
+    for (size_t i = 0; i < n; i++)
+        if ((*s[i].cell & CELL_FILLED) == 0) __builtin_prefetch(&g->candidates[*s[i].cell]);
+    for (size_t i = 0; i < n; i++) {
+        const uint32_t cell = *s[i].cell;
         if (cell == CELL_EMPTY)
-            element[wanted[k]] = g->grids[g->pieces[piece[wanted[k]]].grid].element;
+            element[i] = g->grids[g->pieces[piece[i]].grid].element;
         else if ((cell & CELL_FILLED) != 0)
-            element[wanted[k]] = cell & ~CELL_FILLED;
+            element[i] = cell & ~CELL_FILLED;
         else
-            element[wanted[k]] = choose(&g->candidates[cell], s[k].x, s[k].y);
+            element[i] = choose(&g->candidates[cell], s[i].x, s[i].y);
     }
 }
