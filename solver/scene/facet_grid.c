@@ -26,7 +26,6 @@ struct facet_grid {
 typedef struct facet_candidate {
     float a[4], b[4], c[4];
     uint32_t element, last;
-    uint32_t unused[2];
 } facet_candidate;
 
 /* The plane of a facet in cells. */
