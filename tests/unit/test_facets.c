@@ -145,6 +145,22 @@ START_TEST(a_box_is_six) {
 }
 END_TEST
 
+/* What was divided evenly lies in cells that one element fills: nothing is looked for. */
+START_TEST(even_divisions_need_no_search) {
+    const double size[3] = {10, 6, 3};
+    mesh m = box_mesh(size, 7, .5f);
+    facets f = joined(&m);
+    facet_grids g;
+    ck_assert_msg(facet_grids_create(&m, &f, &g, &error) == LAM_OK, "%s", error.message);
+    ck_assert_uint_eq(g.n_grids, 6);
+    ck_assert_uint_eq(g.n_cells, m.n);
+    ck_assert_uint_eq(g.n_candidates, 0);
+    facet_grids_free(&g);
+    facets_free(&f);
+    mesh_free(&m);
+}
+END_TEST
+
 /* Halves every quad, and moves what a function says. */
 static mesh bent_box(unsigned divisions, void (*bend)(double p[3])) {
     const double size[3] = {1, 1, 1};
@@ -295,6 +311,7 @@ int main(void) {
     TCase *cases = tcase_create("facets");
     tcase_set_timeout(cases, 300);
     tcase_add_test(cases, a_box_is_six);
+    tcase_add_test(cases, even_divisions_need_no_search);
     tcase_add_test(cases, walls_keep_the_corners_of_what_is_not_joined);
     tcase_add_loop_test(cases, a_bend_parts, 0, 4);
     tcase_add_test(cases, a_bow_is_no_line);

@@ -288,7 +288,8 @@ START_TEST(maze_is_a_tree) {
 }
 END_TEST
 
-/* Four times as many elements are pyramids of half the width, each of sixteen as before. */
+/* Four times as many elements are pyramids of half the width, each of sixteen as before. They fill the 6 m
+ * between the tips at both ends, and are as high as wide, or the width that their area tells would not. */
 START_TEST(pyramids_grow_in_number) {
     double foot = 0;
     for (size_t elements = 1000; elements <= 16000; elements *= 4) {
@@ -297,6 +298,7 @@ START_TEST(pyramids_grow_in_number) {
         const double area = group_area(&m, "floor", &n); /* of a pyramid: 4 pitch^2 sqrt(5) / 4 */
         const double pitch = sqrt(area / sqrt(5) / ((double)n / 16));
         ck_assert_uint_eq(n % 16, 0);
+        ck_assert_double_eq_tol(6 / pitch, round(6 / pitch), 1e-6);
         if (foot > 0) ck_assert_double_eq_tol(pitch, foot / 2, .25 * foot);
         foot = pitch;
         mesh_free(&m);
