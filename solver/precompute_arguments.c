@@ -222,7 +222,7 @@ static const option_row rows[] = {
      .kind = OPTION_CHOICE,
      .offset = FIELD(correction),
      .value = "none|delta|discarded",
-     .doc = "sparse: how that is made up for (delta)",
+     .doc = "sparse: how what is left out is made up for (delta)",
      .choices = "none|delta|discarded"},
     {.name = "emitters", .kind = OPTION_LATER, .value = "FILE|group=NAME|sky", .doc = "(not supported yet)"},
     {.name = "positions", .kind = OPTION_LATER, .value = "FILE.json", .doc = "(not supported yet)"},
