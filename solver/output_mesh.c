@@ -4,10 +4,6 @@
 #include <endian.h>
 #include <string.h>
 
-static int corners(const mesh *m, size_t element) {
-    return m->elements[element][3] == MESH_NO_VERTEX ? 3 : 4;
-}
-
 static void put_float(float value, FILE *stream) {
     uint32_t bits;
     memcpy(&bits, &value, sizeof bits);
@@ -38,11 +34,11 @@ void output_ply(const solution *s, FILE *stream) {
     for (size_t v = 0; v < m->n_vertices; v++)
         for (int k = 0; k < 3; k++) put_double(m->vertices[v][k], stream);
     for (size_t i = 0; i < m->n; i++) {
-        fputc(corners(m, i), stream);
+        fputc((int)mesh_corners(m, i), stream);
         uint32_t numbers[5];
-        for (int k = 0; k < corners(m, i); k++) numbers[k] = htole32(m->elements[i][k]);
-        numbers[corners(m, i)] = htole32(m->group[i]);
-        fwrite(numbers, sizeof numbers[0], (size_t)corners(m, i) + 1, stream);
+        for (size_t k = 0; k < mesh_corners(m, i); k++) numbers[k] = htole32(m->elements[i][k]);
+        numbers[mesh_corners(m, i)] = htole32(m->group[i]);
+        fwrite(numbers, sizeof numbers[0], mesh_corners(m, i) + 1, stream);
         for (size_t k = 0; k < s->n_vectors * m->n_channels; k++) put_float(s->values[k * m->n + i], stream);
     }
 }
@@ -70,15 +66,15 @@ void output_vtu(const solution *s, FILE *stream) {
     fputs("</Points>\n<Cells>\n", stream);
     OPEN_ARRAY("UInt32", "connectivity", 1);
     for (size_t i = 0; i < m->n; i++)
-        for (int k = 0; k < corners(m, i); k++)
-            fprintf(stream, "%u%c", m->elements[i][k], k + 1 < corners(m, i) ? ' ' : '\n');
+        for (size_t k = 0; k < mesh_corners(m, i); k++)
+            fprintf(stream, "%u%c", m->elements[i][k], k + 1 < mesh_corners(m, i) ? ' ' : '\n');
     CLOSE_ARRAY();
     OPEN_ARRAY("UInt64", "offsets", 1);
-    for (size_t i = 0; i < m->n; i++) fprintf(stream, "%zu\n", end += (size_t)corners(m, i));
+    for (size_t i = 0; i < m->n; i++) fprintf(stream, "%zu\n", end += mesh_corners(m, i));
     CLOSE_ARRAY();
     OPEN_ARRAY("UInt8", "types", 1);
     for (size_t i = 0; i < m->n; i++)
-        fprintf(stream, "%d\n", corners(m, i) == 3 ? (int)VTK_TRIANGLE : (int)VTK_QUAD);
+        fprintf(stream, "%d\n", mesh_corners(m, i) == 3 ? (int)VTK_TRIANGLE : (int)VTK_QUAD);
     CLOSE_ARRAY();
     fputs("</Cells>\n<CellData>\n", stream);
     OPEN_ARRAY("UInt32", "group", 1);

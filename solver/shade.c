@@ -53,7 +53,7 @@ void shade_at(const shade *s, uint32_t element, const double point[3], float *va
         memcpy(values, s->values + (size_t)element * s->n_channels, s->n_channels * sizeof *values);
         return;
     }
-    const size_t n_corners = m->elements[element][3] == MESH_NO_VERTEX ? 3 : 4;
+    const size_t n_corners = mesh_corners(m, element);
     double corners[4][3], normal[3], weights[4], sum[SHADE_MAX_CHANNELS] = {0};
     for (size_t k = 0; k < n_corners; k++)
         memcpy(corners[k], m->vertices[m->elements[element][k]], sizeof corners[k]);

@@ -1,5 +1,7 @@
 #include "solver/smooth.h"
 
+#include "solver/scene/joined.h"
+
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
@@ -93,10 +95,6 @@ typedef struct smoother {
     constraint *constraints; /* [n_nodes] */
 } smoother;
 
-static size_t corners_of(const mesh *m, size_t element) {
-    return m->elements[element][3] == MESH_NO_VERTEX ? 3 : 4;
-}
-
 static bool same_surface(const mesh *m, uint32_t i, uint32_t j) {
     const float *a = m->normal[i], *b = m->normal[j];
     return m->group[i] == m->group[j] && (double)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) > SURFACE_COS;
@@ -148,25 +146,17 @@ static int compare_corners(const void *left, const void *right) {
     return (a->number > b->number) - (a->number < b->number);
 }
 
-static uint32_t root_of(uint32_t *parent, uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 /* Gives the corners at one place their nodes: joined where their elements are one surface. */
 static void join_corners(smoother *s, const corner *corners, uint32_t *parent, size_t count) {
     for (size_t i = 0; i < count; i++) parent[i] = (uint32_t)i;
     for (size_t i = 0; i < count; i++)
         for (size_t j = i > MANY_CORNERS ? i - MANY_CORNERS : 0; j < i; j++) {
             if (!same_surface(s->m, corners[i].element, corners[j].element)) continue;
-            const uint32_t x = root_of(parent, (uint32_t)i), y = root_of(parent, (uint32_t)j);
-            if (x < y)
-                parent[y] = x;
-            else
-                parent[x] = y;
+            const uint32_t x = joined_root(parent, (uint32_t)i), y = joined_root(parent, (uint32_t)j);
+            joined_link(parent, x > y ? x : y, x > y ? y : x);
         }
     for (size_t i = 0; i < count; i++) {
-        const uint32_t root = root_of(parent, (uint32_t)i);
+        const uint32_t root = joined_root(parent, (uint32_t)i);
         uint32_t *node = &s->nodes->corner[corners[i].element][corners[i].number];
         if (root == i) { /* the smallest of its set, so met first */
             s->node_vertex[s->nodes->n_nodes] = corners[i].vertex;
@@ -191,7 +181,7 @@ static lam_status make_nodes(smoother *s, lam_error *error) {
         s->node_element == NULL)
         TRY(LAM_ERR_MEMORY);
     for (uint32_t i = 0; i < m->n; i++)
-        for (uint32_t k = 0; k < corners_of(m, i); k++)
+        for (uint32_t k = 0; k < mesh_corners(m, i); k++)
             corners[count++] = (corner){s->welded[m->elements[i][k]], i, k};
     qsort(corners, count, sizeof *corners, compare_corners);
     for (size_t first = 0, last; first < count; first = last) {
@@ -206,7 +196,7 @@ done:
 
 /* The angle of an element at a corner. */
 static double corner_angle(const mesh *m, size_t element, size_t k) {
-    const size_t count = corners_of(m, element);
+    const size_t count = mesh_corners(m, element);
     const double *here = m->vertices[m->elements[element][k]];
     const double *after = m->vertices[m->elements[element][(k + 1) % count]];
     const double *before = m->vertices[m->elements[element][(k + count - 1) % count]];
@@ -225,7 +215,7 @@ static lam_status average(smoother *s, size_t n_channels, const float *values, l
     nodes->values = memory_allocate(nodes->n_nodes, n_channels * sizeof *nodes->values, "smoothing", error);
     if (sums == NULL || nodes->values == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < m->n; i++)
-        for (size_t k = 0; k < corners_of(m, i); k++) {
+        for (size_t k = 0; k < mesh_corners(m, i); k++) {
             double *sum = sums + nodes->corner[i][k] * (n_channels + 1);
             const double weight = corner_angle(m, i, k) + 1e-9;
             for (size_t c = 0; c < n_channels; c++) sum[c] += weight * (double)values[c * m->n + i];
@@ -249,7 +239,7 @@ static int compare_edges(const void *left, const void *right) {
 
 static void edge_nodes(const smoother *s, const edge *e, uint32_t *a, uint32_t *b) {
     *a = s->nodes->corner[e->element][e->corner];
-    *b = s->nodes->corner[e->element][(e->corner + 1) % corners_of(s->m, e->element)];
+    *b = s->nodes->corner[e->element][(e->corner + 1) % mesh_corners(s->m, e->element)];
 }
 
 /* The edges that no second element shares: of open ends, and of places where elements meet edge to part of an
@@ -260,7 +250,7 @@ static lam_status lone_edges(const smoother *s, edge **edges, size_t *count, lam
     edge *list = memory_allocate(m->n, 4 * sizeof *list, "smoothing", error);
     if (list == NULL) return LAM_ERR_MEMORY;
     for (uint32_t i = 0; i < m->n; i++)
-        for (uint32_t k = 0; k < corners_of(m, i); k++) {
+        for (uint32_t k = 0; k < mesh_corners(m, i); k++) {
             edge e = {0, i, k};
             uint32_t a, b;
             edge_nodes(s, &e, &a, &b);

@@ -28,10 +28,6 @@ static double dot(const double *a, const double *b) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static int corners_of(const mesh *m, uint32_t element) {
-    return m->elements[element][3] == MESH_NO_VERTEX ? 3 : 4;
-}
-
 static void measure_box(const builder *b, cluster *c) {
     const mesh *m = b->m;
     for (int d = 0; d < 3; d++) {
@@ -40,7 +36,7 @@ static void measure_box(const builder *b, cluster *c) {
     }
     for (uint32_t p = c->first; p < c->last; p++) {
         const uint32_t e = b->tree.element[p];
-        for (int k = 0; k < corners_of(m, e); k++) {
+        for (size_t k = 0; k < mesh_corners(m, e); k++) {
             const double *x = m->vertices[m->elements[e][k]];
             for (int d = 0; d < 3; d++) {
                 c->low[d] = fmin(c->low[d], x[d]);
@@ -71,7 +67,7 @@ static void measure_directions(const builder *b, cluster *c) {
     double low = INFINITY, high = -INFINITY;
     for (uint32_t p = c->first; p < c->last; p++) {
         const uint32_t e = b->tree.element[p];
-        for (int k = 0; k < corners_of(m, e); k++) {
+        for (size_t k = 0; k < mesh_corners(m, e); k++) {
             const double level = dot(m->vertices[m->elements[e][k]], c->normal);
             low = fmin(low, level);
             high = fmax(high, level);

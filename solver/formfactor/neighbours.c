@@ -30,8 +30,8 @@ lam_status neighbours_find(const mesh *m, uint32_t (*neighbours)[NEIGHBOURS_MOST
     if (edges == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < m->n; i++) {
         const uint32_t *corner = m->elements[i];
-        const int corners = corner[3] == MESH_NO_VERTEX ? 3 : 4;
-        for (int c = 0; c < corners; c++) {
+        const size_t corners = mesh_corners(m, i);
+        for (size_t c = 0; c < corners; c++) {
             const uint32_t a = corner[c], b = corner[(c + 1) % corners];
             edges[n_edges++] = (edge_use){a < b ? a : b, a < b ? b : a, (uint32_t)i};
         }

@@ -53,7 +53,7 @@ void polygon_measure(polygon *p) {
 
 void polygon_of_element(const mesh *m, size_t element, polygon *out) {
     const uint32_t *corner = m->elements[element];
-    *out = (polygon){.n = corner[3] == MESH_NO_VERTEX ? 3 : 4};
+    *out = (polygon){.n = (int)mesh_corners(m, element)};
     for (int c = 0; c < out->n; c++) memcpy(out->corner[c], m->vertices[corner[c]], sizeof out->corner[c]);
     polygon_measure(out);
 }

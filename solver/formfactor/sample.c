@@ -1,5 +1,7 @@
 #include "solver/formfactor/sample.h"
 
+#include "solver/scene/plane.h"
+
 #include <math.h>
 
 /* Steps of the 4-d Kronecker sequence: frac(phi^-d), d = 1 ... 4, in units of 2^-32, where phi^5 = phi + 1
@@ -21,16 +23,6 @@ static void set_piece(element_sampler *s, int piece, const double *a, const doub
         s->edge[piece][0][d] = (float)(b[d] - a[d]);
         s->edge[piece][1][d] = (float)(c[d] - a[d]);
     }
-}
-
-static double triangle_area(const double *a, const double *b, const double *c) {
-    double u[3], w[3];
-    for (int d = 0; d < 3; d++) {
-        u[d] = b[d] - a[d];
-        w[d] = c[d] - a[d];
-    }
-    const double x = u[1] * w[2] - u[2] * w[1], y = u[2] * w[0] - u[0] * w[2], z = u[0] * w[1] - u[1] * w[0];
-    return .5 * sqrt(x * x + y * y + z * z);
 }
 
 void element_frame_init(element_frame *f, const mesh *m, size_t element) {
@@ -55,7 +47,7 @@ void element_sampler_init(element_sampler *s, const mesh *m, const visibility *v
     s->parallelogram = false;
     s->first_share = 1;
     set_piece(s, 0, a, b, c, v);
-    if (corner[3] != MESH_NO_VERTEX) {
+    if (mesh_corners(m, element) == 4) {
         const double *e = m->vertices[corner[3]];
         double off = 0, size = 0;
         for (int d = 0; d < 3; d++) {

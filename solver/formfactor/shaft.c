@@ -58,9 +58,9 @@ bool shaft_misses_box(const shaft *s, const double low[3], const double high[3])
 
 bool shaft_misses_element(const shaft *s, const mesh *m, uint32_t element) {
     const uint32_t *corner = m->elements[element];
-    const int corners = corner[3] == MESH_NO_VERTEX ? 3 : 4;
+    const size_t corners = mesh_corners(m, element);
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (int c = 0; c < corners; c++)
+    for (size_t c = 0; c < corners; c++)
         for (int d = 0; d < 3; d++) {
             const double x = m->vertices[corner[c]][d];
             low[d] = x < low[d] ? x : low[d];
@@ -70,7 +70,7 @@ bool shaft_misses_element(const shaft *s, const mesh *m, uint32_t element) {
         if (low[d] >= s->high[d] || high[d] <= s->low[d]) return true;
     for (int k = 0; k < s->n_planes; k++) {
         double least = INFINITY;
-        for (int c = 0; c < corners; c++) {
+        for (size_t c = 0; c < corners; c++) {
             const double *x = m->vertices[corner[c]];
             const double at = s->normal[k][0] * x[0] + s->normal[k][1] * x[1] + s->normal[k][2] * x[2];
             least = at < least ? at : least;

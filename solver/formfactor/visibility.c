@@ -43,11 +43,10 @@ static lam_status add_geometry(visibility *v, int kind, lam_error *error) {
     lam_status status = LAM_OK;
     const mesh *m = v->mesh;
     const facets *f = &v->facets;
-    const unsigned corners = kind == TRIANGLES ? 3 : 4;
+    const size_t corners = kind == TRIANGLES ? 3 : 4;
     RTCGeometry geometry = NULL;
     size_t count = 0;
-    for (size_t p = 0; p < f->n_pieces; p++)
-        count += (f->pieces[p][3] == MESH_NO_VERTEX) == (kind == TRIANGLES);
+    for (size_t p = 0; p < f->n_pieces; p++) count += corner_count(f->pieces[p]) == corners;
     if (count == 0) goto done;
 
     v->primitives[kind] = memory_allocate(count, sizeof(primitive), "visibility", error);
@@ -70,8 +69,8 @@ static lam_status add_geometry(visibility *v, int kind, lam_error *error) {
     for (size_t i = 0; i < m->n_vertices; i++) visibility_recentre(v, m->vertices[i], vertices + 3 * i);
     size_t prim = 0;
     for (size_t p = 0; p < f->n_pieces; p++) {
-        if ((f->pieces[p][3] == MESH_NO_VERTEX) != (kind == TRIANGLES)) continue;
-        for (unsigned c = 0; c < corners; c++) indices[prim * corners + c] = f->pieces[p][c];
+        if (corner_count(f->pieces[p]) != corners) continue;
+        for (size_t c = 0; c < corners; c++) indices[prim * corners + c] = f->pieces[p][c];
         const uint32_t facet = f->piece_facet[p];
         const bool alone = f->first[facet + 1] - f->first[facet] == 1;
         v->primitives[kind][prim++] =

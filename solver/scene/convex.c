@@ -1,26 +1,20 @@
 #include "solver/scene/convex.h"
 
+#include "solver/scene/plane.h"
+
 #include <math.h>
 #include <string.h>
 
-static double turn(const double a[2], const double b[2], const double c[2]) {
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-}
-
-static double distance(const double a[2], const double b[2]) {
-    return hypot(b[0] - a[0], b[1] - a[1]);
-}
-
 double convex_area(const convex *a) {
     double twice = 0;
-    for (size_t i = 1; i + 1 < a->n; i++) twice += turn(a->p[0], a->p[i], a->p[i + 1]);
+    for (size_t i = 1; i + 1 < a->n; i++) twice += plane_turn(a->p[0], a->p[i], a->p[i + 1]);
     return twice / 2;
 }
 
 /* 1 for a square, less the longer and thinner. */
 static double shape(const convex *a) {
     double around = 0;
-    for (size_t i = 0; i < a->n; i++) around += distance(a->p[i], a->p[(i + 1) % a->n]);
+    for (size_t i = 0; i < a->n; i++) around += plane_distance(a->p[i], a->p[(i + 1) % a->n]);
     return around > 0 ? 16 * convex_area(a) / (around * around) : 0;
 }
 
@@ -41,11 +35,11 @@ static void crossing(const double a[2], double da, const double b[2], double db,
 
 /* The parts of a to the left and to the right of the line from s to e. */
 static void cut(const convex *a, const double s[2], const double e[2], convex *left, convex *right) {
-    const double length = distance(s, e);
+    const double length = plane_distance(s, e);
     double side[CONVEX_MOST];
     left->n = right->n = 0;
     for (size_t i = 0; i < a->n; i++) {
-        side[i] = turn(s, e, a->p[i]) / length;
+        side[i] = plane_turn(s, e, a->p[i]) / length;
         if (fabs(side[i]) < 1e-12) side[i] = 0; /* a corner on the line stays one point */
     }
     for (size_t i = 0; i < a->n; i++) {
@@ -97,14 +91,15 @@ bool convex_merge(const convex *a, const convex *b, double near, convex *merged)
     for (size_t i = 0; i < a->n; i++)
         for (size_t j = 0; j < b->n; j++) {
             const size_t i2 = (i + 1) % a->n, j2 = (j + 1) % b->n;
-            if (distance(a->p[i], b->p[j2]) > near || distance(a->p[i2], b->p[j]) > near) continue;
+            if (plane_distance(a->p[i], b->p[j2]) > near || plane_distance(a->p[i2], b->p[j]) > near)
+                continue;
             convex all = {0}, out = {0};
             for (size_t k = 0; k < a->n; k++) append(&all, a->p[(i2 + k) % a->n]);
             for (size_t k = 2; k < b->n; k++) append(&all, b->p[(j + k) % b->n]);
             if (all.n != a->n + b->n - 2) return false;
             for (size_t k = 0; k < all.n; k++) {
                 const double *before = all.p[(k + all.n - 1) % all.n], *after = all.p[(k + 1) % all.n];
-                const double off = turn(before, all.p[k], after) / distance(before, after);
+                const double off = plane_turn(before, all.p[k], after) / plane_distance(before, after);
                 if (off < -near) return false;
                 if (off > near) append(&out, all.p[k]);
             }

@@ -26,17 +26,12 @@ struct facet_grid {
 typedef struct facet_candidate {
     float a[4], b[4], c[4];
     uint32_t element, last;
-    uint32_t unused[2];
 } facet_candidate;
 
 /* The plane of a facet in cells. */
 typedef struct frame {
     double origin[3], x[3], y[3]; /* place = ((p - origin) . x, (p - origin) . y) */
 } frame;
-
-static size_t corners_of(const mesh *m, size_t element) {
-    return m->elements[element][3] == MESH_NO_VERTEX ? 3 : 4;
-}
 
 static void to_cells(const frame *f, const double p[3], double at[2]) {
     at[0] = at[1] = 0;
@@ -49,7 +44,7 @@ static void to_cells(const frame *f, const double p[3], double at[2]) {
 /* Axes along two sides of an element, those of the corner that is nearest to a right angle, one side long
  * each: what was divided evenly then fills cells evenly. */
 static void set_axes(const mesh *m, size_t element, frame *f) {
-    const size_t corners = corners_of(m, element);
+    const size_t corners = mesh_corners(m, element);
     double best = INFINITY, u[3] = {0}, w[3] = {0};
     for (size_t k = 0; k < corners; k++) {
         const double *o = m->vertices[m->elements[element][k]];
@@ -100,7 +95,7 @@ static void lay(const mesh *m, const uint32_t *elements, size_t n, frame *f, fac
     memcpy(f->origin, m->vertices[m->elements[elements[0]][0]], sizeof f->origin);
     set_axes(m, typical(m, elements, n), f);
     for (size_t k = 0; k < n; k++)
-        for (size_t c = 0; c < corners_of(m, elements[k]); c++) {
+        for (size_t c = 0; c < mesh_corners(m, elements[k]); c++) {
             double at[2];
             to_cells(f, m->vertices[m->elements[elements[k]][c]], at);
             for (int d = 0; d < 2; d++) {
@@ -144,7 +139,7 @@ typedef struct footprint {
 } footprint;
 
 static void set_footprint(const mesh *m, const frame *f, uint32_t element, footprint *p) {
-    const size_t corners = corners_of(m, element);
+    const size_t corners = mesh_corners(m, element);
     double at[4][2], around = 0;
     *p = (footprint){.element = element, .low = {INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY}};
     for (size_t k = 0; k < corners; k++) {
@@ -274,7 +269,7 @@ static void place_piece(const mesh *m, const frame *f, const uint32_t piece[4], 
     double o[2], u[2], w[2];
     to_cells(f, m->vertices[piece[0]], o);
     to_cells(f, m->vertices[piece[1]], u);
-    to_cells(f, m->vertices[piece[3] == MESH_NO_VERTEX ? piece[2] : piece[3]], w);
+    to_cells(f, m->vertices[piece[corner_count(piece) - 1]], w);
     out->x[0] = (float)o[0], out->x[1] = (float)(u[0] - o[0]), out->x[2] = (float)(w[0] - o[0]);
     out->y[0] = (float)o[1], out->y[1] = (float)(u[1] - o[1]), out->y[2] = (float)(w[1] - o[1]);
 }
@@ -305,10 +300,8 @@ lam_status facet_grids_create(const mesh *m, const facets *f, facet_grids *out, 
     }
     for (size_t p = 0; p < f->n_pieces; p++) {
         const uint32_t facet = f->piece_facet[p];
-        out->pieces[p].grid = grid_of[facet];
-        out->pieces[p].element = f->elements[f->first[facet]];
         if (f->first[facet + 1] - f->first[facet] == 1) continue;
-        out->pieces[p].element = MESH_NO_VERTEX;
+        out->pieces[p].grid = grid_of[facet];
         place_piece(m, &frames[grid_of[facet]], f->pieces[p], &out->pieces[p]);
     }
 done:
@@ -348,18 +341,12 @@ typedef struct search {
     const uint32_t *cell;
 } search;
 
-/* Finds the cell, or the element itself where its facet has no other. */
-static bool begin(const facet_grids *g, const piece_place *p, float u, float v, search *s,
-                  uint32_t *element) {
-    *element = p->element;
-    if (p->element != MESH_NO_VERTEX) return false;
+static search begin(const facet_grids *g, const piece_place *p, float u, float v) {
     const facet_grid *grid = &g->grids[p->grid];
     const float x = p->x[0] + u * p->x[1] + v * p->x[2], y = p->y[0] + u * p->y[1] + v * p->y[2];
     const uint32_t cell_x = cell_at(x, grid->nx), cell_y = cell_at(y, grid->ny);
-    s->x = x - (float)cell_x;
-    s->y = y - (float)cell_y;
-    s->cell = &g->cells[grid->first + cell_y * grid->nx + cell_x];
-    return true;
+    return (search){x - (float)cell_x, y - (float)cell_y,
+                    &g->cells[grid->first + cell_y * grid->nx + cell_x]};
 }
 
 static uint32_t choose(const facet_candidate *c, float x, float y) {
@@ -377,23 +364,20 @@ static uint32_t choose(const facet_candidate *c, float x, float y) {
 void facet_grids_find(const facet_grids *g, size_t n, const uint32_t *piece, const float *u, const float *v,
                       uint32_t *element) {
     search s[FACET_SEARCHES];
-    uint32_t wanted[FACET_SEARCHES];
-    size_t open = 0;
     /* All are looked up step by step: while one waits for memory the others do too. */
     for (size_t i = 0; i < n; i++) {
-        if (!begin(g, &g->pieces[piece[i]], u[i], v[i], &s[open], &element[i])) continue;
-        __builtin_prefetch(s[open].cell);
-        wanted[open++] = (uint32_t)i;
+        s[i] = begin(g, &g->pieces[piece[i]], u[i], v[i]);
+        __builtin_prefetch(s[i].cell);
     }
-    for (size_t k = 0; k < open; k++)
-        if ((*s[k].cell & CELL_FILLED) == 0) __builtin_prefetch(&g->candidates[*s[k].cell]);
-    for (size_t k = 0; k < open; k++) {
-        const uint32_t cell = *s[k].cell;
+    for (size_t i = 0; i < n; i++)
+        if ((*s[i].cell & CELL_FILLED) == 0) __builtin_prefetch(&g->candidates[*s[i].cell]);
+    for (size_t i = 0; i < n; i++) {
+        const uint32_t cell = *s[i].cell;
         if (cell == CELL_EMPTY)
-            element[wanted[k]] = g->grids[g->pieces[piece[wanted[k]]].grid].element;
+            element[i] = g->grids[g->pieces[piece[i]].grid].element;
         else if ((cell & CELL_FILLED) != 0)
-            element[wanted[k]] = cell & ~CELL_FILLED;
+            element[i] = cell & ~CELL_FILLED;
         else
-            element[wanted[k]] = choose(&g->candidates[cell], s[k].x, s[k].y);
+            element[i] = choose(&g->candidates[cell], s[i].x, s[i].y);
     }
 }

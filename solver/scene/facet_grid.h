@@ -8,13 +8,13 @@
  * u and v, the shares of its second and last corner. */
 typedef struct piece_place {
     float x[3], y[3];
-    uint32_t grid, element; /* element: of a facet that is one alone; otherwise MESH_NO_VERTEX */
+    uint32_t grid;
 } piece_place;
 
 typedef struct facet_grid facet_grid;
 
 typedef struct facet_grids {
-    piece_place *pieces; /* [n_pieces] */
+    piece_place *pieces; /* [n_pieces]; nothing where a facet is one element */
     facet_grid *grids;
     size_t n_grids;
     uint32_t *cells;
@@ -29,7 +29,8 @@ void facet_grids_free(facet_grids *g);
 /* Points looked up at once, at most. */
 #define FACET_SEARCHES 16
 
-/* element[i], i < n: the one at (u, v) of a piece, of its facet whatever u and v are. A point within about
+/* element[i], i < n: the one at (u, v) of a piece, of its facet whatever u and v are. The facets have more
+ * than one element. A point within about
  * 1e-5 of an element's width from its border may go to the neighbour. Cost: O(1) each, two or three lines of
  * memory. */
 void facet_grids_find(const facet_grids *g, size_t n, const uint32_t *piece, const float *u, const float *v,

@@ -1,5 +1,6 @@
 #include "solver/scene/facet_outline.h"
 
+#include "solver/scene/plane.h"
 #include "solver/scene/polygon.h"
 #include "solver/scene/tables.h"
 
@@ -41,10 +42,6 @@ typedef struct cutter {
     walk *outer, *hole; /* of one part */
     polygon_scratch scratch;
 } cutter;
-
-static double turn(const double a[2], const double b[2], const double c[2]) {
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-}
 
 /* Follows the sides first ... last-1 of a part around; false when they branch or end. */
 static bool follow(cutter *c, size_t first, size_t last) {
@@ -116,7 +113,7 @@ static void find_corners(cutter *c) {
     const outlines *o = c->o;
     memset(c->corner, 0, o->m->n_vertices * sizeof *c->corner);
     for (size_t i = 0; i < o->n_elements; i++)
-        for (int k = 0; k < 4 && o->alone[o->part[i]] && o->m->elements[i][k] != MESH_NO_VERTEX; k++)
+        for (size_t k = 0; k < mesh_corners(o->m, i) && o->alone[o->part[i]]; k++)
             c->corner[o->place[o->m->elements[i][k]]] = true;
     for (size_t l = 0; l < c->n_loops; l++) {
         const uint32_t *v = c->vertices + c->loops[l].first;
@@ -135,33 +132,24 @@ static void find_corners(cutter *c) {
 
 /* The corners of a loop in the plane of its part; false when they are too many. */
 static bool set_walk(const cutter *c, const loop *l, walk *w) {
-    const double(*vertices)[3] = (const double(*)[3])c->o->m->vertices, *n = c->o->normal[l->part];
-    const int least =
-        fabs(n[0]) < fabs(n[1]) ? (fabs(n[0]) < fabs(n[2]) ? 0 : 2) : (fabs(n[1]) < fabs(n[2]) ? 1 : 2);
-    double u[3] = {-n[least] * n[0], -n[least] * n[1], -n[least] * n[2]};
-    u[least] += 1;
-    const double length = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+    double x[3], y[3];
+    plane_axes(c->o->normal[l->part], x, y);
     w->n = 0;
     for (size_t i = 0; i < l->count; i++) {
         const uint32_t v = c->vertices[l->first + i];
         if (!c->corner[v]) continue;
         if (w->n == OUTLINE_MOST) return false;
-        const double *p = vertices[v];
-        double x = 0, y = 0;
-        for (int d = 0; d < 3; d++) {
-            x += p[d] * u[d] / length;
-            y += p[d] * (n[(d + 1) % 3] * u[(d + 2) % 3] - n[(d + 2) % 3] * u[(d + 1) % 3]) / length;
-        }
+        const double *p = c->o->m->vertices[v];
         w->vertex[w->n] = v;
-        w->at[w->n][0] = x;
-        w->at[w->n++][1] = y;
+        w->at[w->n][0] = p[0] * x[0] + p[1] * x[1] + p[2] * x[2];
+        w->at[w->n++][1] = p[0] * y[0] + p[1] * y[1] + p[2] * y[2];
     }
     return w->n >= 3;
 }
 
 static double doubled_area(const walk *w) {
     double sum = 0;
-    for (size_t i = 1; i + 1 < w->n; i++) sum += turn(w->at[0], w->at[i], w->at[i + 1]);
+    for (size_t i = 1; i + 1 < w->n; i++) sum += plane_turn(w->at[0], w->at[i], w->at[i + 1]);
     return sum;
 }
 
@@ -172,7 +160,8 @@ static bool crosses(const walk *w, uint32_t from, const double a[2], uint32_t to
         const double *p = w->at[i], *q = w->at[j];
         if (w->vertex[i] == from || w->vertex[i] == to || w->vertex[j] == from || w->vertex[j] == to)
             continue;
-        const double s = turn(a, b, p), t = turn(a, b, q), u = turn(p, q, a), v = turn(p, q, b);
+        const double s = plane_turn(a, b, p), t = plane_turn(a, b, q), u = plane_turn(p, q, a),
+                     v = plane_turn(p, q, b);
         if (((s <= 0 && t >= 0) || (s >= 0 && t <= 0)) && ((u <= 0 && v >= 0) || (u >= 0 && v <= 0)))
             return true;
     }
@@ -182,8 +171,8 @@ static bool crosses(const walk *w, uint32_t from, const double a[2], uint32_t to
 /* Whether a segment from corner i of a walk to b begins on the walk's inner side. */
 static bool leaves_inwards(const walk *w, size_t i, const double b[2]) {
     const double *a = w->at[i], *before = w->at[(i + w->n - 1) % w->n], *after = w->at[(i + 1) % w->n];
-    if (turn(before, a, after) >= 0) return turn(a, b, before) > 0 && turn(b, a, after) > 0;
-    return !(turn(a, b, after) >= 0 && turn(b, a, before) >= 0);
+    if (plane_turn(before, a, after) >= 0) return plane_turn(a, b, before) > 0 && plane_turn(b, a, after) > 0;
+    return !(plane_turn(a, b, after) >= 0 && plane_turn(b, a, before) >= 0);
 }
 
 /* Joins the hole to the outer walk by a bridge from its rightmost corner to the nearest that is seen from
@@ -201,7 +190,7 @@ static bool bridge(cutter *c, const loop *holes, size_t n_holes, size_t now) {
         double nearest = INFINITY;
         if (tries == outer->n) return false;
         for (size_t i = 0; i < outer->n; i++) {
-            const double distance = hypot(outer->at[i][0] - a[0], outer->at[i][1] - a[1]);
+            const double distance = plane_distance(a, outer->at[i]);
             if (outer->tried[i] || distance >= nearest) continue;
             nearest = distance;
             best = i;
@@ -248,16 +237,6 @@ static bool outline(cutter *c, size_t first, size_t last) {
     return true;
 }
 
-static double piece_area(const mesh *m, const uint32_t piece[4]) {
-    const double *a = m->vertices[piece[0]], *b = m->vertices[piece[1]], *c = m->vertices[piece[2]];
-    double u[3], w[3];
-    for (int d = 0; d < 3; d++) {
-        u[d] = b[d] - a[d];
-        w[d] = c[d] - a[d];
-    }
-    return .5 * hypot(hypot(u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2]), u[0] * w[1] - u[1] * w[0]);
-}
-
 /* A piece of four corners stays one if it is a parallelogram. */
 static bool is_parallelogram(const outlines *o, const uint32_t piece[4]) {
     double off = 0;
@@ -288,23 +267,22 @@ static lam_status add_piece(outlines *o, const uint32_t corners[4], uint32_t par
 static lam_status cut_part(cutter *c, size_t first, size_t last, lam_error *error) {
     lam_status status = LAM_OK;
     outlines *o = c->o;
+    const double(*v)[3] = (const double(*)[3])o->m->vertices;
     const uint32_t part = c->loops[first].part;
     const size_t before = o->n_pieces;
     double area = 0, round = 0;
     o->alone[part] = true;
     if (!outline(c, first, last)) return LAM_OK;
     const size_t n = c->outer->n;
-    TRY(polygon_split((const double(*)[3])o->m->vertices, c->outer->vertex, n, 0, true, &c->scratch, error));
-    for (size_t i = 0; i < n; i++) {
-        const size_t j = (i + 1) % n;
-        round += hypot(c->outer->at[i][0] - c->outer->at[j][0], c->outer->at[i][1] - c->outer->at[j][1]);
-    }
+    TRY(polygon_split(v, c->outer->vertex, n, 0, true, &c->scratch, error));
+    for (size_t i = 0; i < n; i++) round += plane_distance(c->outer->at[i], c->outer->at[(i + 1) % n]);
     for (size_t p = 0; p < c->scratch.n_pieces; p++) {
         const uint32_t *piece = c->scratch.pieces[p];
         const uint32_t halves[2][4] = {{piece[0], piece[1], piece[2], MESH_NO_VERTEX},
                                        {piece[2], piece[3], piece[0], MESH_NO_VERTEX}};
         const bool quad = piece[3] != TABLE_NONE;
-        area += piece_area(o->m, halves[0]) + (quad ? piece_area(o->m, halves[1]) : 0);
+        area += triangle_area(v[piece[0]], v[piece[1]], v[piece[2]]) +
+                (quad ? triangle_area(v[piece[2]], v[piece[3]], v[piece[0]]) : 0);
         if (quad && !is_parallelogram(o, piece)) {
             TRY(add_piece(o, halves[0], part, error));
             TRY(add_piece(o, halves[1], part, error));

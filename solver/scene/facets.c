@@ -1,6 +1,7 @@
 #include "solver/scene/facets.h"
 
 #include "solver/scene/facet_outline.h"
+#include "solver/scene/joined.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -77,19 +78,10 @@ static lam_status weld(joining *j, lam_error *error) {
     return LAM_OK;
 }
 
-static size_t corners_of(const mesh *m, size_t element) {
-    return m->elements[element][3] == MESH_NO_VERTEX ? 3 : 4;
-}
-
-static uint32_t find(uint32_t *parent, uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 /* The distance of an element's farthest corner from the plane through a point. */
 static double off_plane(const mesh *m, size_t element, const double at[3], const double normal[3]) {
     double most = 0;
-    for (size_t k = 0; k < corners_of(m, element); k++) {
+    for (size_t k = 0; k < mesh_corners(m, element); k++) {
         const double *v = m->vertices[m->elements[element][k]];
         double off = 0;
         for (int d = 0; d < 3; d++) off += normal[d] * (v[d] - at[d]);
@@ -122,14 +114,14 @@ static void join_meeting(joining *j, edge *e, size_t count) {
             back += e[l].forward == e[k].forward && of_one_plane(j, e[mate].element, e[l].element);
         if (back != 1) continue;
         e[k].inner = e[mate].inner = true;
-        j->parent[find(j->parent, e[k].element)] = find(j->parent, e[mate].element);
+        joined_link(j->parent, e[k].element, e[mate].element);
     }
 }
 
 static void join_neighbours(joining *j) {
     const mesh *m = j->m;
     for (uint32_t i = 0; i < j->n; i++) {
-        const size_t corners = corners_of(m, i);
+        const size_t corners = mesh_corners(m, i);
         j->parent[i] = i;
         for (size_t k = 0; k < corners; k++) {
             const uint32_t from = j->place[m->elements[i][k]],
@@ -154,7 +146,7 @@ static lam_status measure_parts(joining *j, lam_error *error) {
     const mesh *m = j->m;
     for (size_t i = 0; i < j->n; i++) j->part[i] = MESH_NO_VERTEX;
     for (uint32_t i = 0; i < j->n; i++) {
-        const uint32_t root = find(j->parent, i);
+        const uint32_t root = joined_root(j->parent, i);
         if (j->part[root] == MESH_NO_VERTEX) j->part[root] = (uint32_t)j->n_parts++;
         j->part[i] = j->part[root];
     }
@@ -209,25 +201,30 @@ static lam_status find_sides(joining *j, lam_error *error) {
     return sides_cancel(j->m, j->flat, &j->sides, error);
 }
 
+static lam_status reserve(size_t n_elements, size_t n, size_t n_pieces, facets *f, lam_error *error) {
+    f->n = n;
+    f->of_element = memory_allocate(n_elements, sizeof *f->of_element, "facets", error);
+    f->elements = memory_allocate(n_elements, sizeof *f->elements, "facets", error);
+    f->first = memory_allocate(n + 1, sizeof *f->first, "facets", error);
+    f->normal = memory_allocate(n, sizeof *f->normal, "facets", error);
+    f->pieces = memory_allocate(n_pieces, sizeof *f->pieces, "facets", error);
+    f->piece_facet = memory_allocate(n_pieces, sizeof *f->piece_facet, "facets", error);
+    return f->of_element == NULL || f->elements == NULL || f->first == NULL || f->normal == NULL ||
+                   f->pieces == NULL || f->piece_facet == NULL
+               ? LAM_ERR_MEMORY
+               : LAM_OK;
+}
+
 /* What the parts become: one facet each, or one for every element where they are alone. */
 static lam_status fill(const joining *j, const outlines *o, facets *f, lam_error *error) {
+    lam_status status = LAM_OK;
     const mesh *m = j->m;
     uint32_t *facet_of = memory_allocate(j->n_parts, sizeof *facet_of, "facets", error);
     size_t singles = 0, joined = 0;
     for (size_t i = 0; i < j->n; i++) singles += o->alone[j->part[i]];
     for (size_t part = 0; part < j->n_parts; part++) joined += !o->alone[part];
-    f->n = singles + joined;
-    f->of_element = memory_allocate(j->n, sizeof *f->of_element, "facets", error);
-    f->elements = memory_allocate(j->n, sizeof *f->elements, "facets", error);
-    f->first = memory_allocate(f->n + 1, sizeof *f->first, "facets", error);
-    f->normal = memory_allocate(f->n, sizeof *f->normal, "facets", error);
-    f->pieces = memory_allocate(singles + o->n_pieces, sizeof *f->pieces, "facets", error);
-    f->piece_facet = memory_allocate(singles + o->n_pieces, sizeof *f->piece_facet, "facets", error);
-    if (facet_of == NULL || f->of_element == NULL || f->elements == NULL || f->first == NULL ||
-        f->normal == NULL || f->pieces == NULL || f->piece_facet == NULL) {
-        free(facet_of);
-        return LAM_ERR_MEMORY;
-    }
+    if (facet_of == NULL) return LAM_ERR_MEMORY;
+    TRY(reserve(j->n, singles + joined, singles + o->n_pieces, f, error));
     uint32_t next = 0;
     for (size_t part = 0; part < j->n_parts; part++) facet_of[part] = MESH_NO_VERTEX;
     for (size_t i = 0; i < j->n; i++) {
@@ -251,12 +248,12 @@ static lam_status fill(const joining *j, const outlines *o, facets *f, lam_error
     for (size_t i = j->n; i-- > 0;) f->elements[--f->first[f->of_element[i] + 1]] = (uint32_t)i;
     for (size_t k = 0; k < f->n; k++) f->first[k] = f->first[k + 1];
     f->first[f->n] = (uint32_t)j->n;
+done:
     free(facet_of);
-    return LAM_OK;
+    return status;
 }
 
-static lam_status join(const mesh *m, size_t n_elements, double flat, bool neighbours, facets *out,
-                       lam_error *error) {
+lam_status facets_join(const mesh *m, size_t n_elements, double flat, facets *out, lam_error *error) {
     lam_status status = LAM_OK;
     joining j = {.m = m, .n = n_elements, .flat = flat};
     outlines o = {.m = m};
@@ -267,10 +264,7 @@ static lam_status join(const mesh *m, size_t n_elements, double flat, bool neigh
     j.edges = memory_allocate(j.n, 4 * sizeof *j.edges, "facets", error);
     if (j.place == NULL || j.parent == NULL || j.part == NULL || j.edges == NULL) TRY(LAM_ERR_MEMORY);
     TRY(weld(&j, error));
-    if (neighbours)
-        join_neighbours(&j);
-    else
-        for (size_t i = 0; i < j.n; i++) j.parent[i] = (uint32_t)i;
+    join_neighbours(&j);
     TRY(measure_parts(&j, error));
     TRY(find_sides(&j, error));
     o = (outlines){.m = m,
@@ -303,12 +297,19 @@ done:
     return status;
 }
 
-lam_status facets_join(const mesh *m, size_t n_elements, double flat, facets *out, lam_error *error) {
-    return join(m, n_elements, flat, true, out, error);
-}
-
 lam_status facets_alone(const mesh *m, size_t n_elements, facets *out, lam_error *error) {
-    return join(m, n_elements, 0, false, out, error);
+    lam_status status = LAM_OK;
+    *out = (facets){.n = 0};
+    TRY(reserve(n_elements, n_elements, n_elements, out, error));
+    for (uint32_t i = 0; i < n_elements; i++)
+        out->of_element[i] = out->elements[i] = out->first[i] = out->piece_facet[i] = i;
+    out->first[n_elements] = (uint32_t)n_elements;
+    out->n_pieces = n_elements;
+    memcpy(out->normal, m->normal, n_elements * sizeof *out->normal);
+    memcpy(out->pieces, m->elements, n_elements * sizeof *out->pieces);
+done:
+    if (status != LAM_OK) facets_free(out);
+    return status;
 }
 
 void facets_free(facets *f) {

@@ -2,6 +2,7 @@
  * which sees next to nothing of the others. */
 #include "solver/scene/blocks.h"
 #include "solver/scene/dice.h"
+#include "solver/scene/joined.h"
 
 #include <math.h>
 
@@ -59,19 +60,14 @@ done:
     return status;
 }
 
-/* The room that stands for all that a room is joined to. */
-static size_t root_of(const size_t *joined, size_t i) {
-    while (joined[i] != i) i = joined[i];
-    return i;
-}
-
 /* Neighbours in random order: those that are not joined yet are, and a few others. */
 static lam_status add_corridors(blocks *all, const room *rooms, size_t nx, size_t ny, uint64_t seed,
                                 lam_error *error) {
     lam_status status = LAM_OK;
     dice order = dice_for(seed, 3), shape = dice_for(seed, 4);
-    size_t joined[ROOMS_MOST], pairs[2 * ROOMS_MOST], n = 0; /* a pair: 2 i + axis */
-    for (size_t i = 0; i < nx * ny; i++) {
+    uint32_t joined[ROOMS_MOST];
+    size_t pairs[2 * ROOMS_MOST], n = 0; /* a pair: 2 i + axis */
+    for (uint32_t i = 0; i < nx * ny; i++) {
         joined[i] = i;
         if (i % nx + 1 < nx) pairs[n++] = 2 * i;
         if (i / nx + 1 < ny) pairs[n++] = 2 * i + 1;
@@ -79,10 +75,10 @@ static lam_status add_corridors(blocks *all, const room *rooms, size_t nx, size_
     for (size_t left = n; left > 0; left--) {
         const size_t drawn = (size_t)(dice_throw(&order) % left), pair = pairs[drawn];
         const size_t i = pair / 2, axis = pair % 2, j = axis == 0 ? i + 1 : i + nx;
-        const size_t a = root_of(joined, i), b = root_of(joined, j);
+        const uint32_t a = joined_root(joined, (uint32_t)i), b = joined_root(joined, (uint32_t)j);
         pairs[drawn] = pairs[left - 1];
         if (a == b && dice_between(&order, 0, 1) >= extra_share) continue;
-        joined[a] = b;
+        joined_link(joined, a, b);
         const double lots[2] = {(double)(i % nx), (double)(i / nx)};
         TRY(add_corridor(all, &shape, &rooms[i], &rooms[j], (int)axis, lot * (lots[axis] + 1),
                          lot * (lots[1 - axis] + .5), error));

@@ -1,6 +1,8 @@
 /* Measures, bounds and the hash of a mesh; refinement, order and storage have files of their own. */
 #include "solver/scene/mesh.h"
 
+#include "solver/scene/plane.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,7 +38,7 @@ lam_status mesh_measure(mesh *m, lam_error *error) {
     if (area == NULL || normal == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < m->n; i++) {
         const uint32_t *e = m->elements[i];
-        const size_t corners = e[3] == MESH_NO_VERTEX ? 3 : 4;
+        const size_t corners = mesh_corners(m, i);
         for (size_t k = 0; k < corners; k++)
             if (e[k] >= m->n_vertices)
                 FAIL(error, LAM_ERR_ARGUMENT, "element %zu: vertex index %u, there are %zu vertices", i, e[k],
@@ -96,7 +98,7 @@ lam_status mesh_make_two_sided(mesh *m, lam_error *error) {
     for (size_t i = 0; i < m->n; i++) {
         const uint32_t *front = m->elements[i];
         uint32_t *back = wide.elements[m->n + i];
-        const size_t last = front[3] == MESH_NO_VERTEX ? 2 : 3;
+        const size_t last = mesh_corners(m, i) - 1;
         for (size_t k = 0; k <= last; k++) back[k] = front[last - k];
         for (int k = 0; k < 3; k++) wide.normal[m->n + i][k] = -m->normal[i][k];
     }
@@ -156,20 +158,12 @@ void mesh_bounds(const mesh *m, double centre[3], double *radius) {
 void mesh_centroid(const mesh *m, size_t element, double centroid[3]) {
     const uint32_t *e = m->elements[element];
     const double *a = m->vertices[e[0]], *b = m->vertices[e[1]], *c = m->vertices[e[2]];
-    if (e[3] == MESH_NO_VERTEX) {
+    if (mesh_corners(m, element) == 3) {
         for (int k = 0; k < 3; k++) centroid[k] = a[k] + ((b[k] - a[k]) + (c[k] - a[k])) / 3;
         return;
     }
     const double *d = m->vertices[e[3]];
-    double abc[3], acd[3], area_abc = 0, area_acd = 0;
-    cross_of_differences(a, b, a, c, abc);
-    cross_of_differences(a, c, a, d, acd);
-    for (int k = 0; k < 3; k++) {
-        area_abc += abc[k] * abc[k];
-        area_acd += acd[k] * acd[k];
-    }
-    area_abc = sqrt(area_abc);
-    area_acd = sqrt(area_acd);
+    const double area_abc = triangle_area(a, b, c), area_acd = triangle_area(a, c, d);
     const double share = area_abc + area_acd > 0 ? area_acd / (area_abc + area_acd) : 0;
     for (int k = 0; k < 3; k++)
         centroid[k] = a[k] + ((c[k] - a[k]) + (1 - share) * (b[k] - a[k]) + share * (d[k] - a[k])) / 3;

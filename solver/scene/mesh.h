@@ -32,6 +32,15 @@ typedef struct mesh {
     char source_hash[33]; /* of the faces as imported, before any subdivision: hex */
 } mesh;
 
+/* 3 or 4, of an element or of anything else that names its vertices in this way. */
+static inline size_t corner_count(const uint32_t vertices[4]) {
+    return vertices[3] == MESH_NO_VERTEX ? 3 : 4;
+}
+
+static inline size_t mesh_corners(const mesh *m, size_t element) {
+    return corner_count(m->elements[element]);
+}
+
 /* Frees what a mesh owns and zeroes it. */
 void mesh_free(mesh *m);
 

@@ -1,5 +1,6 @@
 #include "solver/scene/patches.h"
 #include "solver/scene/grid.h"
+#include "solver/scene/plane.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -24,10 +25,7 @@ void patches_free(patch_list *list) {
 static lam_status draw_triangle(draft *d, const patch *p, double size, lam_error *error) {
     lam_status status = LAM_OK;
     const double(*corners)[3] = (const double(*)[3])p->corners;
-    const double a = point_distance(corners[0], corners[1]), b = point_distance(corners[1], corners[2]),
-                 c = point_distance(corners[2], corners[0]), half = (a + b + c) / 2;
-    const double area = sqrt(fmax(0, half * (half - a) * (half - b) * (half - c)));
-    const size_t m = draft_steps_along(d, sqrt(area), size);
+    const size_t m = draft_steps_along(d, sqrt(triangle_area(corners[0], corners[1], corners[2])), size);
     if (d->counting) {
         d->n_faces += m * m;
         return LAM_OK;

@@ -1,6 +1,7 @@
 /* One polygon to a planar convex quad or to triangles, by cutting ears off its plane projection. */
 #include "solver/scene/polygon.h"
 
+#include "solver/scene/plane.h"
 #include "solver/scene/tables.h"
 
 #include <math.h>
@@ -36,15 +37,6 @@ static lam_status scratch_reserve(polygon_scratch *s, size_t n, lam_error *error
     return LAM_OK;
 }
 
-static double distance2(const double a[2], const double b[2]) {
-    return hypot(b[0] - a[0], b[1] - a[1]);
-}
-
-/* Twice the area of a, b, c; positive when they run counter-clockwise. */
-static double turn(const double a[2], const double b[2], const double c[2]) {
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-}
-
 /* Newell's sum: twice the area vector of a polygon, taken about its first corner. */
 static void doubled_area(const double (*v)[3], const uint32_t *corners, size_t n, double sum[3]) {
     const double *o = v[corners[0]];
@@ -62,16 +54,8 @@ static void doubled_area(const double (*v)[3], const uint32_t *corners, size_t n
 /* Projects the corners on the plane across the unit normal; returns the largest distance from it. */
 static double flatten(const double (*v)[3], const uint32_t *corners, size_t n, const double normal[3],
                       double (*flat)[2]) {
-    const int least = fabs(normal[0]) < fabs(normal[1]) ? (fabs(normal[0]) < fabs(normal[2]) ? 0 : 2)
-                                                        : (fabs(normal[1]) < fabs(normal[2]) ? 1 : 2);
-    double u[3] = {0, 0, 0}, w[3], off = 0, mean = 0;
-    u[least] = 1; /* the axis farthest from the normal, made orthogonal to it */
-    for (int k = 0; k < 3; k++) u[k] -= normal[least] * normal[k];
-    const double length = sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
-    for (int k = 0; k < 3; k++) u[k] /= length;
-    w[0] = normal[1] * u[2] - normal[2] * u[1];
-    w[1] = normal[2] * u[0] - normal[0] * u[2];
-    w[2] = normal[0] * u[1] - normal[1] * u[0];
+    double u[3], w[3], off = 0, mean = 0;
+    plane_axes(normal, u, w);
     const double *o = v[corners[0]];
     for (size_t i = 0; i < n; i++) {
         const double *a = v[corners[i]], d[3] = {a[0] - o[0], a[1] - o[1], a[2] - o[2]};
@@ -98,9 +82,9 @@ static void remove_straight(polygon_scratch *s, size_t *n, double diameter) {
     for (size_t i = 0, unchanged = 0; *n >= 3 && unchanged < *n;) {
         const size_t before = (i + *n - 1) % *n, after = (i + 1) % *n;
         const double *a = s->flat[before], *b = s->flat[i], *c = s->flat[after];
-        const double chord = distance2(a, c), tiny = straightness * diameter;
-        const bool repeats = distance2(a, b) <= tiny;
-        if (repeats || chord <= tiny || fabs(turn(a, b, c)) <= tiny * chord) {
+        const double chord = plane_distance(a, c), tiny = straightness * diameter;
+        const bool repeats = plane_distance(a, b) <= tiny;
+        if (repeats || chord <= tiny || fabs(plane_turn(a, b, c)) <= tiny * chord) {
             remove_corner(s, n, i);
             unchanged = 0;
             if (i >= *n) i = 0;
@@ -116,7 +100,7 @@ static void remove_straight(polygon_scratch *s, size_t *n, double diameter) {
 static double ear_quality(const polygon_scratch *s, size_t n, size_t i) {
     const size_t before = (i + n - 1) % n, after = (i + 1) % n;
     const double *a = s->flat[before], *b = s->flat[i], *c = s->flat[after];
-    const double area = turn(a, b, c);
+    const double area = plane_turn(a, b, c);
     if (!(area > 0)) return -1;
     for (size_t j = 0; j < n; j++) {
         if (j == before || j == i || j == after) continue;
@@ -125,9 +109,9 @@ static double ear_quality(const polygon_scratch *s, size_t n, size_t i) {
         if (memcmp(p, a, sizeof *s->flat) == 0 || memcmp(p, b, sizeof *s->flat) == 0 ||
             memcmp(p, c, sizeof *s->flat) == 0)
             continue;
-        if (turn(a, b, p) >= 0 && turn(b, c, p) >= 0 && turn(c, a, p) >= 0) return -1;
+        if (plane_turn(a, b, p) >= 0 && plane_turn(b, c, p) >= 0 && plane_turn(c, a, p) >= 0) return -1;
     }
-    const double ab = distance2(a, b), bc = distance2(b, c), ca = distance2(c, a);
+    const double ab = plane_distance(a, b), bc = plane_distance(b, c), ca = plane_distance(c, a);
     return 2 * sqrt(3.0) * area / (ab * ab + bc * bc + ca * ca);
 }
 
@@ -147,19 +131,19 @@ static void clip_ears(polygon_scratch *s, size_t n, double least_turn) {
         if (s->quality[best] < 0) {
             double largest = -HUGE_VAL;
             for (size_t i = 0; i < n; i++) {
-                const double area = turn(s->flat[(i + n - 1) % n], s->flat[i], s->flat[(i + 1) % n]);
+                const double area = plane_turn(s->flat[(i + n - 1) % n], s->flat[i], s->flat[(i + 1) % n]);
                 if (area > largest) best = i, largest = area;
             }
         }
         const size_t before = (best + n - 1) % n, after = (best + 1) % n;
-        if (turn(s->flat[before], s->flat[best], s->flat[after]) > least_turn)
+        if (plane_turn(s->flat[before], s->flat[best], s->flat[after]) > least_turn)
             add_piece(s, s->corners[before], s->corners[best], s->corners[after], TABLE_NONE);
         remove_corner(s, &n, best);
         const size_t next = best % n, last = (best + n - 1) % n;
         s->quality[next] = ear_quality(s, n, next);
         s->quality[last] = ear_quality(s, n, last);
     }
-    if (turn(s->flat[0], s->flat[1], s->flat[2]) > least_turn)
+    if (plane_turn(s->flat[0], s->flat[1], s->flat[2]) > least_turn)
         add_piece(s, s->corners[0], s->corners[1], s->corners[2], TABLE_NONE);
 }
 
@@ -176,12 +160,12 @@ lam_status polygon_split(const double (*vertices)[3], const uint32_t *corners, s
     for (int k = 0; k < 3; k++) normal[k] /= twice;
     memcpy(s->corners, corners, n * sizeof *corners);
     const double off = flatten(vertices, corners, n, normal, s->flat);
-    for (size_t i = 1; i < n; i++) diameter = fmax(diameter, distance2(s->flat[0], s->flat[i]));
+    for (size_t i = 1; i < n; i++) diameter = fmax(diameter, plane_distance(s->flat[0], s->flat[i]));
     if (n > 3 && !keep_straight) remove_straight(s, &n, diameter);
     if (n < 3) return LAM_OK;
     bool convex = true;
     for (size_t i = 0; i < n; i++)
-        convex = convex && turn(s->flat[(i + n - 1) % n], s->flat[i], s->flat[(i + 1) % n]) > 0;
+        convex = convex && plane_turn(s->flat[(i + n - 1) % n], s->flat[i], s->flat[(i + 1) % n]) > 0;
     if (n == 4 && convex && off <= flatness * diameter)
         add_piece(s, s->corners[0], s->corners[1], s->corners[2], s->corners[3]);
     else

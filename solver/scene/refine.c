@@ -18,13 +18,13 @@ typedef struct face {
 } face;
 
 static face face_of(const mesh *m, size_t i) {
-    face f = {.n = m->elements[i][3] == MESH_NO_VERTEX ? 3 : 4};
+    face f = {.n = mesh_corners(m, i)};
     for (size_t k = 0; k < f.n; k++) memcpy(f.p[k], m->vertices[m->elements[i][k]], sizeof f.p[k]);
     return f;
 }
 
 static size_t cut_pieces(const mesh *m, size_t i, face_cut cut) {
-    return m->elements[i][3] == MESH_NO_VERTEX ? (size_t)cut.a * cut.a : (size_t)cut.a * cut.b;
+    return mesh_corners(m, i) == 3 ? (size_t)cut.a * cut.a : (size_t)cut.a * cut.b;
 }
 
 /* --- how to cut ---------------------------------------------------------------------------------------- */

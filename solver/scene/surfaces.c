@@ -1,5 +1,7 @@
 #include "solver/scene/surfaces.h"
 
+#include "solver/scene/joined.h"
+
 #include <math.h>
 #include <stdlib.h>
 
@@ -58,11 +60,6 @@ static lam_status weld(const mesh *m, uint32_t *places, lam_error *error) {
     return LAM_OK;
 }
 
-static uint32_t find(uint32_t *parent, uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 static bool face_alike(const mesh *m, uint32_t i, uint32_t j) {
     const float *a = m->normal[i], *b = m->normal[j];
     return (double)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) > SURFACE_COS;
@@ -77,8 +74,8 @@ lam_status mesh_surfaces(const mesh *m, uint32_t *surface, size_t *n_surfaces, l
     if (places == NULL || corners == NULL || parent == NULL) TRY(LAM_ERR_MEMORY);
     TRY(weld(m, places, error));
     for (uint32_t i = 0; i < m->n; i++) {
-        const size_t sides = m->elements[i][3] == MESH_NO_VERTEX ? 3 : 4;
-        for (size_t k = 0; k < sides; k++) corners[n_corners++] = (corner){places[m->elements[i][k]], i};
+        for (size_t k = 0; k < mesh_corners(m, i); k++)
+            corners[n_corners++] = (corner){places[m->elements[i][k]], i};
         parent[i] = i;
     }
     qsort(corners, n_corners, sizeof *corners, corner_order);
@@ -86,12 +83,11 @@ lam_status mesh_surfaces(const mesh *m, uint32_t *surface, size_t *n_surfaces, l
         if (corners[k].place != corners[first].place) first = k;
         const uint32_t i = corners[k].element;
         for (size_t l = k - first > MANY_CORNERS ? k - MANY_CORNERS : first; l < k; l++)
-            if (face_alike(m, i, corners[l].element))
-                parent[find(parent, i)] = find(parent, corners[l].element);
+            if (face_alike(m, i, corners[l].element)) joined_link(parent, i, corners[l].element);
     }
     for (size_t i = 0; i < m->n; i++) surface[i] = NONE;
     for (uint32_t i = 0; i < m->n; i++) { /* the root's entry holds the number until its own turn */
-        const uint32_t root = find(parent, i);
+        const uint32_t root = joined_root(parent, i);
         if (surface[root] == NONE) surface[root] = (uint32_t)count++;
         surface[i] = surface[root];
     }

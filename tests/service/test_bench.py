@@ -11,8 +11,7 @@ import time
 import unittest
 import xml.etree.ElementTree
 
-LAMBERT = os.environ["LAMBERT"]
-ENVIRONMENT = dict(os.environ, OMP_NUM_THREADS="2", LC_ALL="C")
+from command import ENVIRONMENT, LAMBERT, lambert
 
 COLUMNS = {
     "closed-forms": "case source method occluded truth estimate absolute_error relative_error stated_bar repeats "
@@ -26,11 +25,6 @@ COLUMNS = {
                   "error_1 error_2 error_3",
     "error": "scene elements method reference seconds entries single_mean single_q05 single_median single_q95 lamp",
 }
-
-
-def lambert(*arguments):
-    return subprocess.run([LAMBERT, *map(str, arguments)], capture_output=True, text=True, timeout=600,
-                          env=ENVIRONMENT, check=False)
 
 
 class FormFactors(unittest.TestCase):

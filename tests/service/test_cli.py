@@ -16,13 +16,7 @@ import xml.etree.ElementTree
 import h5py
 import numpy
 
-LAMBERT = os.environ["LAMBERT"]
-
-
-def lambert(*arguments, **more):
-    environment = dict(os.environ, OMP_NUM_THREADS="2", LC_ALL="C")
-    return subprocess.run([LAMBERT, *map(str, arguments)], capture_output=True, text=True, timeout=600,
-                          env=environment, check=False, **more)
+from command import LAMBERT, lambert, must
 
 
 class Case(unittest.TestCase):
@@ -33,9 +27,9 @@ class Case(unittest.TestCase):
         cls.shared = tempfile.TemporaryDirectory()
         cls.box = os.path.join(cls.shared.name, "box.obj")
         cls.store = os.path.join(cls.shared.name, "box.h5")
-        cls.must("generate", "box", "--divisions", 4, "--reflectance", .5, "-o", cls.box)
-        cls.must("precompute", cls.box, "-o", cls.store, "--method", "exact", "--rays", 256, "--probes", 8,
-                 "--keep-form-factors", "--quiet")
+        must("generate", "box", "--divisions", 4, "--reflectance", .5, "-o", cls.box)
+        must("precompute", cls.box, "-o", cls.store, "--method", "exact", "--rays", 256, "--probes", 8,
+             "--keep-form-factors", "--quiet")
 
     @classmethod
     def tearDownClass(cls):
@@ -48,12 +42,6 @@ class Case(unittest.TestCase):
 
     def path(self, name):
         return os.path.join(self.folder, name)
-
-    @staticmethod
-    def must(*arguments):
-        done = lambert(*arguments)
-        assert done.returncode == 0, (arguments, done.stderr)
-        return done
 
     def refused(self, status, wanted, *arguments, **more):
         """It fails with this status and one line that says so, and writes nothing else."""
@@ -76,22 +64,22 @@ class Case(unittest.TestCase):
 
 class Usage(Case):
     def test_help_and_version(self):
-        self.assertRegex(self.must("--version").stdout, r"^lambert \d+\.\d+\.\d+\n$")
-        verbs = self.must("--help").stdout
+        self.assertRegex(must("--version").stdout, r"^lambert \d+\.\d+\.\d+\n$")
+        verbs = must("--help").stdout
         for verb in ("generate", "precompute", "info", "solve", "verify", "render"):
             self.assertIn(verb, verbs)
-            about = self.must(verb, "--help")
+            about = must(verb, "--help")
             self.assertIn("Usage: lambert " + verb, about.stdout)
             self.assertEqual(about.stderr, "")
 
     def test_help_names_every_option_of_the_contract(self):
-        known = self.must("precompute", "--help").stdout
+        known = must("precompute", "--help").stdout
         for option in ("subdivide max-edge elements unit up two-sided reflectance form-factors rays resolution quality "
                        "sky ground-albedo keep-form-factors method factorizer epsilon alpha levels rank keep-factors "
                        "coherence min-area assign threshold correction emitters positions path frames reuse paths "
                        "store-precision threads memory scratch seed probes quiet progress").split():
             self.assertRegex(known, r"--" + option + r"\b", option)
-        known = self.must("solve", "--help").stdout
+        known = must("solve", "--help").stdout
         for option in "emit emission sky quantity reduce tolerance output".split():
             self.assertRegex(known, r"--" + option + r"\b", option)
 
@@ -202,12 +190,12 @@ class Files(Case):
         self.assertEqual(sorted(os.listdir(self.folder)), ["empty.obj", "foreign.h5"])
 
     def test_every_kind_of_scene_that_help_names_is_generated(self):
-        usage = " ".join(self.must("generate", "--help").stdout.split())
+        usage = " ".join(must("generate", "--help").stdout.split())
         kinds = re.search(r"[a-z|]+(?= -o SCENE)", usage).group().split("|")
         self.assertGreaterEqual(len(kinds), 10)
         for kind in kinds:
             scene = self.path(kind + ".obj")
-            done = self.must("generate", kind, "--elements", 600, "--seed", 5, "-o", scene)
+            done = must("generate", kind, "--elements", 600, "--seed", 5, "-o", scene)
             with open(scene) as text:
                 faces = sum(line.startswith("f ") for line in text)
             self.assertEqual(done.stdout, "%s: %d faces\n" % (scene, faces))
@@ -308,7 +296,7 @@ class Stopping(Case):
 
 class Answers(Case):
     def solve(self, name, *arguments):
-        self.must("solve", self.store, "-o", self.path(name), *arguments)
+        must("solve", self.store, "-o", self.path(name), *arguments)
         return self.path(name)
 
     def glow(self):
@@ -448,41 +436,41 @@ class Answers(Case):
             rows = {row["statistic"]: float(row["radiosity"]) for row in csv.DictReader(file)}
         self.assertAlmostEqual(rows["mean"], mean, delta=1e-6 * mean)
         self.refused(1, "no group", "solve", self.store, "--reduce", "lava=mean", *light)
-        table = self.must("solve", self.store, *light).stdout
+        table = must("solve", self.store, *light).stdout
         line = next(line for line in table.splitlines() if line.startswith("floor"))
         self.assertAlmostEqual(float(line.split()[3]), mean, delta=1e-4 * mean)
 
     def test_own_light_in_colour(self):
         scene, store = self.path("cornell.obj"), self.path("cornell.h5")
-        self.must("generate", "cornell", "--elements", 200, "-o", scene)
-        self.must("precompute", scene, "-o", store, "--method", "low-rank", "--rays", 256, "--probes", 4, "--quiet")
-        done = self.must("solve", store, "-o", self.path("a.npy"))
+        must("generate", "cornell", "--elements", 200, "-o", scene)
+        must("precompute", scene, "-o", store, "--method", "low-rank", "--rays", 256, "--probes", 4, "--quiet")
+        done = must("solve", store, "-o", self.path("a.npy"))
         self.assertIn("the scene's own light", done.stderr)
         with h5py.File(store) as file:
             n, E = file["mesh/area"].shape[0], file["mesh/emission"][:]
         B = numpy.load(self.path("a.npy"))
         self.assertEqual(B.shape, (3, n))
         numpy.save(self.path("e.npy"), E)
-        self.must("solve", store, "--emission", self.path("e.npy"), "-o", self.path("b.npy"))
+        must("solve", store, "--emission", self.path("e.npy"), "-o", self.path("b.npy"))
         numpy.testing.assert_array_equal(numpy.load(self.path("b.npy")), B)
         lamp = E[:, E[0].argmax()]
-        self.must("solve", store, "--emit", "lamp=" + ",".join(repr(float(e)) for e in lamp), "-o", self.path("c.npy"))
+        must("solve", store, "--emit", "lamp=" + ",".join(repr(float(e)) for e in lamp), "-o", self.path("c.npy"))
         numpy.testing.assert_array_equal(numpy.load(self.path("c.npy")), B)
         with open(self.path("c.json"), "w", encoding="utf-8") as file:
             json.dump({"emissions": [E.tolist(), {"groups": {"lamp": [1, 0, 0]}}]}, file)
-        self.must("solve", store, "--emission", self.path("c.json"), "-o", self.path("d.npy"))
+        must("solve", store, "--emission", self.path("c.json"), "-o", self.path("d.npy"))
         batch = numpy.load(self.path("d.npy"))
         self.assertEqual(batch.shape, (2, 3, n))
         numpy.testing.assert_array_equal(batch[0], B)
         self.assertEqual((abs(batch[1, 1:]).max(), batch[1, 0].max() > 0), (0, True))
-        self.must("solve", store, "-o", self.path("a.csv"))
+        must("solve", store, "-o", self.path("a.csv"))
         with open(self.path("a.csv"), encoding="utf-8") as header:
             self.assertEqual(header.readline(), "element,group,area,radiosity_r,radiosity_g,radiosity_b\n")
 
 
 class Stores(Case):
     def test_info_as_json(self):
-        about = json.loads(self.must("info", self.store, "--json").stdout)
+        about = json.loads(must("info", self.store, "--json").stdout)
         self.assertEqual((about["name"], about["elements"], about["channels"], about["kind"], about["method"]),
                          ("box", 96, 1, "exact", "exact"))
         self.assertIsInstance(about["reason"], str)
@@ -503,31 +491,31 @@ class Stores(Case):
         self.assertEqual((provenance["seed"], provenance["unit"]), (1, 1))
         self.assertTrue(provenance["command"].startswith("lambert precompute "))
         self.assertEqual(provenance["form_factors"]["rays"], 256)
-        text = self.must("info", self.store).stdout
+        text = must("info", self.store).stdout
         for word in ("box", "exact", "floor, 16 elements", "single", "lambert precompute"):
             self.assertIn(word, text)
 
     def test_log_and_quiet(self):
-        done = self.must("precompute", self.box, "-o", self.path("a.h5"), "--method", "exact", "--alpha", ".3",
-                         "--coherence", ".5", "--rays", 64, "--probes", 0)
+        done = must("precompute", self.box, "-o", self.path("a.h5"), "--method", "exact", "--alpha", ".3",
+                    "--coherence", ".5", "--rays", 64, "--probes", 0)
         self.assertIn("exact does not use --alpha, --coherence", done.stderr)
         for stage in ("import", "mesh", "form factors", "invert", "store"):
             self.assertRegex(done.stderr, r"(?m)^" + stage + r" +[\d.]+ s$")
         self.assertEqual(done.stdout, "")
-        done = self.must("precompute", self.box, "-o", self.path("a.h5"), "--rays", 64, "--probes", 0, "--quiet")
+        done = must("precompute", self.box, "-o", self.path("a.h5"), "--rays", 64, "--probes", 0, "--quiet")
         self.assertEqual(done.stderr, "")
-        about = json.loads(self.must("info", self.path("a.h5"), "--json").stdout)
+        about = json.loads(must("info", self.path("a.h5"), "--json").stdout)
         self.assertEqual(about["error"], {})
-        done = self.must("precompute", self.box, "-o", self.path("a.h5"), "--rays", 64, "--probes", 0, "--method",
-                         "low-rank", "--epsilon", ".1")
+        done = must("precompute", self.box, "-o", self.path("a.h5"), "--rays", 64, "--probes", 0, "--method",
+                    "low-rank", "--epsilon", ".1")
         self.assertIn("below the sampling noise", done.stderr)
 
     def test_from_a_store_with_form_factors(self):
         for method in ("exact", "low-rank"):
             direct, again = self.path(method + ".h5"), self.path(method + "-again.h5")
             common = ("--method", method, "--rays", 256, "--epsilon", ".2", "--probes", 6)
-            self.must("precompute", self.box, "-o", direct, *common)
-            self.must("precompute", self.store, "-o", again, *common)
+            must("precompute", self.box, "-o", direct, *common)
+            must("precompute", self.store, "-o", again, *common)
             with h5py.File(direct) as one, h5py.File(again) as two:
                 self.assertEqual(sorted(one["operator"]), sorted(two["operator"]))
                 for name in one["operator"]:
@@ -539,10 +527,10 @@ class Stores(Case):
     def test_pairs(self):
         kept, bare, again = self.path("kept.h5"), self.path("bare.h5"), self.path("again.h5")
         common = ("--quality", "high", "--method", "exact", "--probes", 8)
-        done = self.must("precompute", self.box, "-o", kept, *common, "--keep-form-factors")
+        done = must("precompute", self.box, "-o", kept, *common, "--keep-form-factors")
         self.assertIn("pair by pair to 7e-06: 0.00 % leave the scene (closed)", done.stderr)
-        self.must("precompute", self.box, "-o", bare, *common)
-        self.must("precompute", kept, "-o", again, *common)
+        must("precompute", self.box, "-o", bare, *common)
+        must("precompute", kept, "-o", again, *common)
         with h5py.File(kept) as file:
             attributes = dict(file["form_factors"].attrs)
             self.assertEqual((attributes["method"], attributes["rays"]), (b"pairs", 256))
@@ -552,10 +540,10 @@ class Stores(Case):
             self.assertLess(attributes["repair_max"], 1e-5)
             self.assertLess(file["error/single"].attrs["total_indirect_max"], 1e-4)
         for store in (kept, bare, again):
-            self.must("verify", store, "--probes", 4)
-        self.assertRegex(self.must("info", kept).stdout, r"(?m)^form factors +pairs$")
+            must("verify", store, "--probes", 4)
+        self.assertRegex(must("info", kept).stdout, r"(?m)^form factors +pairs$")
         # Rays asked for by number are rays.
-        done = self.must("precompute", self.box, "-o", bare, *common, "--rays", 64)
+        done = must("precompute", self.box, "-o", bare, *common, "--rays", 64)
         self.assertIn("64 rays an element", done.stderr)
         done = lambert("precompute", self.box, "-o", bare, *common, "--memory", "100K")
         self.assertEqual(done.returncode, 1)
@@ -565,8 +553,8 @@ class Stores(Case):
         kept, bare, again = self.path("kept.h5"), self.path("bare.h5"), self.path("again.h5")
         common = ("--form-factors", "hemicube", "--resolution", 48, "--method", "low-rank", "--epsilon", ".02",
                   "--probes", 8)
-        done = self.must("precompute", self.box, "-o", kept, *common, "--rays", 64, "--quality", "high",
-                         "--keep-form-factors")
+        done = must("precompute", self.box, "-o", kept, *common, "--rays", 64, "--quality", "high",
+                    "--keep-form-factors")
         self.assertIn("hemicubes of 48 pixels: 0.00 % leave the scene (closed)", done.stderr)
         self.assertIn("hemicube does not use --rays, --quality", done.stderr)
         self.assertNotIn("noise of 0 rays", done.stderr)
@@ -582,49 +570,49 @@ class Stores(Case):
             single = file["error/single"].attrs
             self.assertGreater(single["total_indirect_mean"], 1.5 * single["operator_indirect_mean"])
             self.assertGreater(single["reference_noise"], 1e-3)
-        self.assertRegex(self.must("info", kept).stdout, r"(?m)^form factors +hemicube\nresolution +48$")
-        about = json.loads(self.must("info", kept, "--json").stdout)["provenance"]["form_factors"]
+        self.assertRegex(must("info", kept).stdout, r"(?m)^form factors +hemicube\nresolution +48$")
+        about = json.loads(must("info", kept, "--json").stdout)["provenance"]["form_factors"]
         self.assertEqual((about["method"], about["resolution"]), ("hemicube", 48))
 
         # Kept or not, a later run and verify know what the operator was built from.
-        self.must("precompute", self.box, "-o", bare, *common)
-        done = self.must("precompute", kept, "-o", again, *common, "--keep-form-factors")
+        must("precompute", self.box, "-o", bare, *common)
+        done = must("precompute", kept, "-o", again, *common, "--keep-form-factors")
         self.assertIn("does not use --form-factors, --resolution", done.stderr)
         for store in (bare, again):
             with h5py.File(kept) as one, h5py.File(store) as two:
                 for name in one["operator"]:
                     numpy.testing.assert_array_equal(one["operator"][name][:], two["operator"][name][:])
                 self.assertEqual(two["operator"].attrs["resolution"], 48)
-            self.must("verify", store, self.box, "--probes", 6)
+            must("verify", store, self.box, "--probes", 6)
         with h5py.File(again) as file:
             self.assertEqual((file["form_factors"].attrs["method"], file["form_factors"].attrs["resolution"]),
                              (b"hemicube", 48))
 
-        done = self.must("precompute", self.box, "-o", again, "--resolution", 32, "--rays", 64, "--probes", 0)
+        done = must("precompute", self.box, "-o", again, "--resolution", 32, "--rays", 64, "--probes", 0)
         self.assertIn("rays does not use --resolution", done.stderr)
 
     def test_judged_by_another_sample_whatever_the_seeds(self):
         # With the F of seed s kept, another seed must not make the judge draw s again: then total = operator.
         about = {}
         for seed in (1, 2, 3):
-            self.must("precompute", self.store, "-o", self.path("a.h5"), "--method", "exact", "--seed", seed,
-                      "--probes", 4, "--quiet")
-            about[seed] = json.loads(self.must("info", self.path("a.h5"), "--json").stdout)["error"]["single"]
+            must("precompute", self.store, "-o", self.path("a.h5"), "--method", "exact", "--seed", seed,
+                 "--probes", 4, "--quiet")
+            about[seed] = json.loads(must("info", self.path("a.h5"), "--json").stdout)["error"]["single"]
             self.assertLess(about[seed]["operator_indirect_mean"], 1e-5)
             self.assertGreater(about[seed]["total_indirect_mean"], 1e-3)
 
     def test_threads_do_not_change_the_store(self):
         for threads in (1, 2):
-            self.must("precompute", self.box, "-o", self.path(f"{threads}.h5"), "--method", "exact", "--rays", 256,
-                      "--probes", 0, "--threads", threads, "--keep-form-factors")
+            must("precompute", self.box, "-o", self.path(f"{threads}.h5"), "--method", "exact", "--rays", 256,
+                 "--probes", 0, "--threads", threads, "--keep-form-factors")
         with h5py.File(self.path("1.h5")) as one, h5py.File(self.path("2.h5")) as two:
             for name in ("indptr", "indices", "data"):
                 numpy.testing.assert_array_equal(one["form_factors"][name][:], two["form_factors"][name][:])
 
     def test_verify(self):
-        done = self.must("verify", self.store, self.box, "--probes", 6)
+        done = must("verify", self.store, self.box, "--probes", 6)
         self.assertEqual([line.split()[0] for line in done.stdout.splitlines()], ["ok"] * 3 + ["skipped"] + ["ok"] * 5)  # no sky
-        answer = json.loads(self.must("verify", self.store, "--probes", 0, "--json").stdout)
+        answer = json.loads(must("verify", self.store, "--probes", 0, "--json").stdout)
         self.assertTrue(answer["ok"])
         self.assertEqual({check["name"]: check["result"] for check in answer["checks"]}["scene"], "skipped")
 
@@ -647,11 +635,11 @@ class Stores(Case):
 
     def test_verify_finds_another_scene(self):
         other = self.path("box.obj")
-        self.must("generate", "box", "--divisions", 4, "--reflectance", .5, "--size", "1,1,2", "-o", other)
+        must("generate", "box", "--divisions", 4, "--reflectance", .5, "--size", "1,1,2", "-o", other)
         done = lambert("verify", self.store, other, "--probes", 0)
         self.assertEqual(done.returncode, 1)
         self.assertRegex(done.stdout, r"(?m)^BROKEN +scene +stale: .*geometry")
-        self.must("generate", "box", "--divisions", 4, "--reflectance", .6, "-o", other)
+        must("generate", "box", "--divisions", 4, "--reflectance", .6, "-o", other)
         done = lambert("verify", self.store, other, "--probes", 0)
         self.assertEqual(done.returncode, 1)
         self.assertRegex(done.stdout, r"(?m)^BROKEN +scene +stale: group .*material")

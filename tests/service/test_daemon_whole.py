@@ -2,24 +2,14 @@
 
 import io
 import json
-import os
 import pathlib
-import subprocess
 import tempfile
 import unittest
 
 import numpy as np
 
+from command import must
 from daemon import Daemon
-
-LAMBERT = os.environ["LAMBERT"]
-
-
-def lambert(*arguments):
-    done = subprocess.run([LAMBERT, *map(str, arguments)], capture_output=True, text=True, timeout=600)
-    if done.returncode != 0:
-        raise RuntimeError(f"lambert {arguments}: {done.stderr}")
-    return done.stdout
 
 
 class Whole(unittest.TestCase):
@@ -31,12 +21,12 @@ class Whole(unittest.TestCase):
         cls.kinds = {"exact": "exact", "low-rank": "low_rank"}
         for rho in ".5", ".9":
             scene = path / f"furnace{rho[1:]}.obj"
-            lambert("generate", "furnace", "--reflectance", rho, "--elements", 300, "-o", scene)
+            must("generate", "furnace", "--reflectance", rho, "--elements", 300, "-o", scene)
             for method in cls.kinds:
-                lambert("precompute", scene, "-o", path / f"{scene.stem}-{method}.h5", "--method", method,
-                        "--rays", 512, "--probes", 8, "--quiet")
-        lambert("generate", "cornell", "--elements", 300, "-o", path / "cornell.obj")
-        lambert("precompute", path / "cornell.obj", "-o", path / "cornell.h5", "--rays", 256, "--probes", 4, "--quiet")
+                must("precompute", scene, "-o", path / f"{scene.stem}-{method}.h5", "--method", method,
+                     "--rays", 512, "--probes", 8, "--quiet")
+        must("generate", "cornell", "--elements", 300, "-o", path / "cornell.obj")
+        must("precompute", path / "cornell.obj", "-o", path / "cornell.h5", "--rays", 256, "--probes", 4, "--quiet")
         stores = [f"{store}:{store.stem}" for store in sorted(path.glob("*.h5"))]
         assert len(stores) == 5, stores
         cls.daemon = Daemon(*stores)
@@ -64,7 +54,7 @@ class Whole(unittest.TestCase):
     def test_info_prints_what_the_route_answers(self):
         for store in sorted(self.folder.glob("*.h5")):
             said = self.daemon.get(f"/v1/scenes/{store.stem}").json()
-            printed = json.loads(lambert("info", store, "--json"))
+            printed = json.loads(must("info", store, "--json").stdout)
             # The daemon was given another name for it.
             self.assertEqual(said.pop("name"), store.stem)
             self.assertEqual(printed.pop("name"), store.stem.split("-")[0])
@@ -77,7 +67,7 @@ class Whole(unittest.TestCase):
         for emission in {groups[0]: [1, 2, 3]}, {groups[-1]: [4.5, 0, 1], groups[1]: [1, 1, 1]}:
             out = self.folder / "out.npy"
             emit = [f"--emit={name}={','.join(map(str, value))}" for name, value in emission.items()]
-            lambert("solve", self.folder / "cornell.h5", *emit, "-o", out)
+            must("solve", self.folder / "cornell.h5", *emit, "-o", out)
             answer = self.daemon.radiosity("cornell", {"emission": {"groups": emission}}, accept="application/x-npy")
             self.assertEqual(answer.status, 200, answer)
             B = np.load(io.BytesIO(answer.body))

@@ -12,16 +12,11 @@ import zlib
 
 import numpy
 
-LAMBERT = os.environ["LAMBERT"]
+from command import LAMBERT, lambert
+
 BACKGROUND = 38
 GLOW = [word for group in ("floor", "ceiling", "wall-x0", "wall-x1", "wall-y0", "wall-y1", "block-1", "block-2",
                            "block-3") for word in ("--emit", group + "=1")]
-
-
-def lambert(*arguments, threads=2, **more):
-    environment = dict(os.environ, OMP_NUM_THREADS=str(threads))
-    return subprocess.run([LAMBERT, *map(str, arguments)], capture_output=True, text=True, timeout=600,
-                          env=environment, check=False, **more)
 
 
 def decode_png(path):

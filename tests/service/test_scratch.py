@@ -13,9 +13,9 @@ import unittest
 
 import h5py
 
-LAMBERT = os.environ["LAMBERT"]
+from command import ENVIRONMENT, LAMBERT, must
+
 SEED = 20260301
-ENVIRONMENT = dict(os.environ, OMP_NUM_THREADS="2", LC_ALL="C")
 
 
 class Scratch(unittest.TestCase):
@@ -25,22 +25,15 @@ class Scratch(unittest.TestCase):
     def setUpClass(cls):
         cls.shared = tempfile.TemporaryDirectory()
         cls.scene = os.path.join(cls.shared.name, "room.obj")
-        cls.run_once("generate", "cornell", "--elements", "600", "-o", cls.scene)
+        must("generate", "cornell", "--elements", "600", "-o", cls.scene)
         cls.options = ["--rays", "65536", "--probes", "0", "--rank", "16", "--method", "low-rank",
                        "--keep-form-factors", "--sky", "tregenza", "--ground-albedo", ".2"]
         cls.undisturbed = os.path.join(cls.shared.name, "undisturbed.h5")
-        cls.run_once("precompute", cls.scene, "-o", cls.undisturbed, *cls.options)
+        must("precompute", cls.scene, "-o", cls.undisturbed, *cls.options)
 
     @classmethod
     def tearDownClass(cls):
         cls.shared.cleanup()
-
-    @staticmethod
-    def run_once(*arguments, **more):
-        done = subprocess.run([LAMBERT, *arguments], capture_output=True, text=True, timeout=600, check=False,
-                              env=ENVIRONMENT, **more)
-        assert done.returncode == 0, (arguments, done.stderr)
-        return done
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -96,7 +89,7 @@ class Scratch(unittest.TestCase):
             self.assertEqual(status, -signal.SIGKILL, said)
             self.assertFalse(os.path.exists(self.store))
             self.assertNotIn("form factors  ", said, "it was killed behind the form factors")
-        done = self.run_once(*self.command[1:])
+        done = must(*self.command[1:])
         kept, rows = map(int, re.search(r"(\d+) of (\d+) rows were in", done.stderr).groups())
         self.assertGreaterEqual(kept, 10)
         self.assertLess(kept, rows)
@@ -109,7 +102,7 @@ class Scratch(unittest.TestCase):
         last = said.splitlines()[-1]
         start = f"lambert precompute: cancelled; what was finished stays in {self.scratch}; to go on: lambert "
         self.assertTrue(last.startswith(start), last)
-        done = self.run_once(*shlex.split(last[len(start):]))
+        done = must(*shlex.split(last[len(start):]))
         self.assertRegex(done.stderr, r"\d+ of 601 rows were in")
         self.same_as_undisturbed()
 
@@ -121,7 +114,7 @@ class Scratch(unittest.TestCase):
         self.assertEqual(done.returncode, 1, done.stderr)
         self.assertRegex(done.stderr.splitlines()[-1], r"form-factors\.rows: .*; \d+ of \d+ blocks stay there")
         self.assertFalse(os.path.exists(self.store))
-        again = self.run_once(*self.command[1:])
+        again = must(*self.command[1:])
         self.assertRegex(again.stderr, r"\d+ of 601 rows were in")
         self.same_as_undisturbed()
 
@@ -152,8 +145,8 @@ class Scratch(unittest.TestCase):
         self.assertIn("another run works there", second.stderr.splitlines()[-1])
 
     def test_unused(self):
-        done = self.run_once("precompute", self.undisturbed, "-o", self.store, "--probes", "0", "--rank", "16",
-                             "--scratch", self.scratch)
+        done = must("precompute", self.undisturbed, "-o", self.store, "--probes", "0", "--rank", "16",
+                    "--scratch", self.scratch)
         self.assertIn("does not use --scratch", done.stderr)
         self.assertFalse(os.path.exists(self.scratch))
 
@@ -165,11 +158,11 @@ class Pairs(Scratch):
     def setUpClass(cls):
         cls.shared = tempfile.TemporaryDirectory()
         cls.scene = os.path.join(cls.shared.name, "room.obj")
-        cls.run_once("generate", "cornell", "--elements", "1500", "-o", cls.scene)
+        must("generate", "cornell", "--elements", "1500", "-o", cls.scene)
         cls.options = ["--probes", "0", "--rank", "16", "--method", "low-rank",
                        "--keep-form-factors"]
         cls.undisturbed = os.path.join(cls.shared.name, "undisturbed.h5")
-        cls.run_once("precompute", cls.scene, "-o", cls.undisturbed, *cls.options)
+        must("precompute", cls.scene, "-o", cls.undisturbed, *cls.options)
 
     def setUp(self):
         super().setUp()
@@ -184,7 +177,7 @@ class Pairs(Scratch):
             status, said = self.stop_after(signal.SIGKILL, 1, chance.uniform(0, .04))
             self.assertEqual(status, -signal.SIGKILL, said)
             self.assertNotIn("form factors  ", said, "it was killed behind the form factors")
-        done = self.run_once(*self.command[1:])
+        done = must(*self.command[1:])
         self.assertRegex(done.stderr, r"\d+ of \d+ rows were in")
         self.same_as_undisturbed()
         self.assertFalse(os.path.exists(self.rows))
@@ -193,7 +186,7 @@ class Pairs(Scratch):
         status, said = self.stop_after(signal.SIGINT, 1, 0)
         self.assertEqual(status, 1)
         self.assertIn("to go on: lambert ", said.splitlines()[-1])
-        self.run_once(*self.command[1:])
+        must(*self.command[1:])
         self.same_as_undisturbed()
 
     def test_a_full_disk(self):
@@ -211,8 +204,8 @@ class Large(unittest.TestCase):
             wide, narrow, again = (os.path.join(folder, name) for name in ("wide.h5", "narrow.h5", "again.h5"))
             options = ["--rank", "16", "--method", "low-rank", "--probes", "3", "--keep-form-factors", "--threads", "2"]
             traced = [*options, "--form-factors", "rays", "--rays", "300"]
-            Scratch.run_once("generate", "cornell", "--elements", "3000", "-o", scene)
-            said = Scratch.run_once("precompute", scene, "-o", wide, *traced).stderr
+            must("generate", "cornell", "--elements", "3000", "-o", scene)
+            said = must("precompute", scene, "-o", wide, *traced).stderr
             needs = re.search(r"memory up to (\d+)M", said)
             self.assertIsNotNone(needs, said)
             less = ["--memory", f"{int(needs[1]) * 3 // 4}M"]
@@ -222,7 +215,7 @@ class Large(unittest.TestCase):
                                          env=ENVIRONMENT)
                 self.assertEqual(refused.returncode, 1)
                 self.assertIn("fits: --scratch DIR", refused.stderr.splitlines()[-1])
-                said = Scratch.run_once(*command, "--scratch", scratch).stderr
+                said = must(*command, "--scratch", scratch).stderr
                 self.assertIn("as memory is too small for them", said)
                 self.assertFalse(os.path.exists(scratch))
                 with h5py.File(wide) as one, h5py.File(out) as two:
@@ -235,8 +228,8 @@ class Forecast(unittest.TestCase):
     def test_said_before_the_form_factors(self):
         with tempfile.TemporaryDirectory() as folder:
             scene, store = os.path.join(folder, "a.obj"), os.path.join(folder, "a.h5")
-            Scratch.run_once("generate", "box", "--divisions", "3", "-o", scene)
-            said = Scratch.run_once("precompute", scene, "-o", store, "--rays", "1000", "--scratch", folder).stderr
+            must("generate", "box", "--divisions", "3", "-o", scene)
+            said = must("precompute", scene, "-o", store, "--rays", "1000", "--scratch", folder).stderr
             line = next(line for line in said.splitlines() if line.startswith("forecast: "))
             self.assertRegex(line, r"^forecast: form factors [\d.]+ s, the judge's [\d.]+ s, at [\d.e+]+ Mray/s of a trial; "
                                    r"memory up to \d+M, store up to \d+M, scratch up to \d+M$")

@@ -4,19 +4,17 @@ Answers are compared with a dense solution in double of what h5py reads from the
 """
 
 import json
-import os
 import pathlib
-import subprocess
 import tempfile
 import unittest
 
 import h5py
 import numpy as np
 
+from command import lambert as run
 from daemon import Daemon
 from make_store import Scene, add_checksums
 
-LAMBERT = os.environ["LAMBERT"]
 
 # A courtyard: a floor, two walls and a lamp that lies on the floor; one wall is black. The fronts look inwards.
 YARD = """mtllib yard.mtl
@@ -54,10 +52,6 @@ newmtl lamp
 Kd 0.3 0.3 0.3
 Ke 5 5 5
 """
-
-
-def run(*arguments):
-    return subprocess.run([LAMBERT, *map(str, arguments)], capture_output=True, text=True, timeout=600)
 
 
 class Truth:

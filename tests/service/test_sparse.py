@@ -2,28 +2,14 @@
 
 import json
 import os
-import subprocess
 import tempfile
 import unittest
 
 import h5py
 import numpy
 
+from command import lambert, must
 from daemon import Daemon
-
-LAMBERT = os.environ["LAMBERT"]
-
-
-def lambert(*arguments, threads=2):
-    environment = dict(os.environ, OMP_NUM_THREADS=str(threads), LC_ALL="C")
-    return subprocess.run([LAMBERT, *map(str, arguments)], capture_output=True, text=True, timeout=600,
-                          env=environment, check=False)
-
-
-def must(*arguments, **more):
-    done = lambert(*arguments, **more)
-    assert done.returncode == 0, (arguments, done.stderr)
-    return done
 
 
 def bounced(store, E):

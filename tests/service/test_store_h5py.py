@@ -7,14 +7,14 @@ import functools
 import os
 import pathlib
 import re
-import subprocess
 import tempfile
 import unittest
 
 import h5py
 import numpy as np
 
-LAMBERT = os.environ["LAMBERT"]
+from command import lambert as run
+
 FORMAT = pathlib.Path(__file__).resolve().parents[2] / "store" / "FORMAT.md"
 PIECE = 2**20
 ROUND = 2.0**-24  # of one operation in single precision, relative
@@ -60,10 +60,6 @@ Kd 0.75 0.75 0.75
 newmtl black
 Kd 0 0 0
 """
-
-
-def run(*arguments):
-    return subprocess.run([LAMBERT, *map(str, arguments)], capture_output=True, text=True, timeout=600)
 
 
 def datasets(store, below="/"):

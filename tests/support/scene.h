@@ -97,7 +97,7 @@ static inline double seen_from(const mesh *m, const double p[3]) {
     for (size_t i = 0; i < m->n; i++) {
         const uint32_t *e = m->elements[i];
         sum += solid_angle(p, m->vertices[e[0]], m->vertices[e[1]], m->vertices[e[2]]);
-        if (e[3] != MESH_NO_VERTEX)
+        if (mesh_corners(m, i) == 4)
             sum += solid_angle(p, m->vertices[e[0]], m->vertices[e[2]], m->vertices[e[3]]);
     }
     return sum;

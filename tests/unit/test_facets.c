@@ -23,7 +23,7 @@ static facets joined(const mesh *m) {
 
 /* (u, v) of a point in a piece; whether it is inside. */
 static bool in_piece(const mesh *m, const uint32_t piece[4], const double p[3], float *u, float *v) {
-    const bool quad = piece[3] != MESH_NO_VERTEX;
+    const bool quad = corner_count(piece) == 4;
     const double *o = m->vertices[piece[0]], *a = m->vertices[piece[1]],
                  *b = m->vertices[piece[quad ? 3 : 2]];
     double aa = 0, ab = 0, bb = 0, pa = 0, pb = 0;
@@ -42,7 +42,7 @@ static bool in_piece(const mesh *m, const uint32_t piece[4], const double p[3], 
 
 /* A point of an element, not on its border. */
 static void point_in(const mesh *m, size_t element, uint64_t *state, double p[3]) {
-    const size_t corners = m->elements[element][3] == MESH_NO_VERTEX ? 3 : 4;
+    const size_t corners = mesh_corners(m, element);
     double weight[4], sum = 0;
     for (size_t k = 0; k < corners; k++) sum += weight[k] = .01 + random_unit(state);
     for (int d = 0; d < 3; d++) {
@@ -57,27 +57,30 @@ static void check_points(const mesh *m, const facets *f) {
     facet_grids g;
     uint64_t state = 5;
     ck_assert_msg(facet_grids_create(m, f, &g, &error) == LAM_OK, "%s", error.message);
-    for (uint32_t i = 0; i < m->n; i++)
+    for (uint32_t i = 0; i < m->n; i++) {
+        const uint32_t facet = f->of_element[i];
+        const bool alone = f->first[facet + 1] - f->first[facet] == 1;
         for (int repeat = 0; repeat < 4; repeat++) {
             double at[3];
             size_t pieces = 0;
             point_in(m, i, &state, at);
             for (uint32_t p = 0; p < f->n_pieces; p++) {
                 float u, v;
-                uint32_t found;
-                if (f->piece_facet[p] != f->of_element[i] || !in_piece(m, f->pieces[p], at, &u, &v)) continue;
-                facet_grids_find(&g, 1, &p, &u, &v, &found);
+                uint32_t found = i;
+                if (f->piece_facet[p] != facet || !in_piece(m, f->pieces[p], at, &u, &v)) continue;
+                if (!alone) facet_grids_find(&g, 1, &p, &u, &v, &found);
                 ck_each(found == i);
                 pieces++;
             }
             ck_each(pieces > 0);
         }
+    }
     facet_grids_free(&g);
 }
 
 static double area_of(const mesh *m, const uint32_t piece[4]) {
     double area = 0;
-    for (int half = 0; half < (piece[3] == MESH_NO_VERTEX ? 1 : 2); half++) {
+    for (size_t half = 0; half + 2 < corner_count(piece); half++) {
         const double *a = m->vertices[piece[0]], *b = m->vertices[piece[1 + half]],
                      *c = m->vertices[piece[2 + half]];
         double n[3];
@@ -112,12 +115,12 @@ static void check_cover(const mesh *m, const facets *f) {
 /* Every side of a piece is the side of another piece the other way round: nothing passes between them. */
 static void check_closed(const mesh *m, const facets *f) {
     for (size_t p = 0; p < f->n_pieces; p++) {
-        const size_t corners = f->pieces[p][3] == MESH_NO_VERTEX ? 3 : 4;
+        const size_t corners = corner_count(f->pieces[p]);
         for (size_t k = 0; k < corners; k++) {
             const double *a = m->vertices[f->pieces[p][k]], *b = m->vertices[f->pieces[p][(k + 1) % corners]];
             size_t mates = 0;
             for (size_t q = 0; q < f->n_pieces; q++) {
-                const size_t others = f->pieces[q][3] == MESH_NO_VERTEX ? 3 : 4;
+                const size_t others = corner_count(f->pieces[q]);
                 for (size_t l = 0; l < others; l++)
                     mates += memcmp(m->vertices[f->pieces[q][l]], b, sizeof *m->vertices) == 0 &&
                              memcmp(m->vertices[f->pieces[q][(l + 1) % others]], a, sizeof *m->vertices) == 0;
@@ -137,6 +140,22 @@ START_TEST(a_box_is_six) {
     check_cover(&m, &f);
     check_points(&m, &f);
     check_closed(&m, &f);
+    facets_free(&f);
+    mesh_free(&m);
+}
+END_TEST
+
+/* What was divided evenly lies in cells that one element fills: nothing is looked for. */
+START_TEST(even_divisions_need_no_search) {
+    const double size[3] = {10, 6, 3};
+    mesh m = box_mesh(size, 7, .5f);
+    facets f = joined(&m);
+    facet_grids g;
+    ck_assert_msg(facet_grids_create(&m, &f, &g, &error) == LAM_OK, "%s", error.message);
+    ck_assert_uint_eq(g.n_grids, 6);
+    ck_assert_uint_eq(g.n_cells, m.n);
+    ck_assert_uint_eq(g.n_candidates, 0);
+    facet_grids_free(&g);
     facets_free(&f);
     mesh_free(&m);
 }
@@ -292,6 +311,7 @@ int main(void) {
     TCase *cases = tcase_create("facets");
     tcase_set_timeout(cases, 300);
     tcase_add_test(cases, a_box_is_six);
+    tcase_add_test(cases, even_divisions_need_no_search);
     tcase_add_test(cases, walls_keep_the_corners_of_what_is_not_joined);
     tcase_add_loop_test(cases, a_bend_parts, 0, 4);
     tcase_add_test(cases, a_bow_is_no_line);

@@ -3,6 +3,7 @@
 
 #include "solver/formfactor/sample.h"
 #include "solver/formfactor/visibility.h"
+#include "solver/scene/joined.h"
 #include "support/scene.h"
 
 typedef struct scene_kind {
@@ -112,10 +113,6 @@ START_TEST(it_takes_a_reflectance) {
 }
 END_TEST
 
-static size_t corners_of(const mesh *m, size_t i) {
-    return m->elements[i][3] == MESH_NO_VERTEX ? 3 : 4;
-}
-
 /* Twice the area of the triangle abp times the cosine of its normal to n. */
 static double turn(const double *a, const double *b, const double *p, const float *n) {
     double sum = 0;
@@ -133,7 +130,7 @@ static bool is_in(const mesh *m, size_t i, const double p[3]) {
     double off = 0;
     for (int d = 0; d < 3; d++) off += (double)m->normal[i][d] * (p[d] - first[d]);
     if (fabs(off) > 1e-5) return false;
-    for (size_t k = 0, n = corners_of(m, i); k < n; k++)
+    for (size_t k = 0, n = mesh_corners(m, i); k < n; k++)
         if (turn(m->vertices[m->elements[i][k]], m->vertices[m->elements[i][(k + 1) % n]], p, m->normal[i]) <
             1e-9)
             return false;
@@ -173,7 +170,7 @@ START_TEST(the_surface_has_no_gaps) {
     double sum[3] = {0}, low[2] = {HUGE_VAL, HUGE_VAL}, high[2] = {-HUGE_VAL, -HUGE_VAL};
     for (size_t i = 0; i < m.n; i++) {
         for (int d = 0; d < 3; d++) sum[d] += m.area[i] * (double)m.normal[i][d];
-        for (size_t k = 0; k < corners_of(&m, i) && m.group[i] != sheets; k++)
+        for (size_t k = 0; k < mesh_corners(&m, i) && m.group[i] != sheets; k++)
             for (int d = 0; d < 2; d++) {
                 low[d] = fmin(low[d], m.vertices[m.elements[i][k]][d]);
                 high[d] = fmax(high[d], m.vertices[m.elements[i][k]][d]);
@@ -187,11 +184,6 @@ START_TEST(the_surface_has_no_gaps) {
 }
 END_TEST
 
-static size_t root_of(size_t *joined, size_t i) {
-    while (joined[i] != i) i = joined[i] = joined[joined[i]];
-    return i;
-}
-
 /* What became of rays from every element. */
 typedef struct tally {
     size_t all, gone, backs;
@@ -202,16 +194,16 @@ typedef struct tally {
 static tally cast_from_all(const mesh *m, size_t rays, uint64_t seed) {
     tally t = {0};
     visibility *v;
-    size_t *joined = malloc(m->n * sizeof *joined);
+    uint32_t *joined = malloc(m->n * sizeof *joined);
     bool *sees = calloc(m->n, sizeof *sees);
     ck_assert(joined != NULL && sees != NULL);
-    for (size_t i = 0; i < m->n; i++) joined[i] = i;
+    for (uint32_t i = 0; i < m->n; i++) joined[i] = i;
     ck_assert_msg(visibility_create(m, &v, &error) == LAM_OK, "%s", error.message);
-    for (size_t i = 0; i < m->n; i++) {
+    for (uint32_t i = 0; i < m->n; i++) {
         element_sampler sampler;
         uint32_t self[VISIBILITY_PACKET];
         double from[3], to[3];
-        for (int k = 0; k < VISIBILITY_PACKET; k++) self[k] = (uint32_t)i;
+        for (int k = 0; k < VISIBILITY_PACKET; k++) self[k] = i;
         mesh_centroid(m, i, from);
         element_sampler_init(&sampler, m, v, i, seed);
         for (size_t ray = 0; ray < rays; ray += VISIBILITY_PACKET) {
@@ -226,7 +218,7 @@ static tally cast_from_all(const mesh *m, size_t rays, uint64_t seed) {
                 t.backs += hits.back[k];
                 if (gone || hits.back[k]) continue;
                 sees[i] = sees[hits.element[k]] = true;
-                joined[root_of(joined, i)] = root_of(joined, hits.element[k]);
+                joined_link(joined, i, hits.element[k]);
                 mesh_centroid(m, hits.element[k], to);
                 t.far += hypot(from[0] - to[0], from[1] - to[1]) > 8;
             }
@@ -296,7 +288,8 @@ START_TEST(maze_is_a_tree) {
 }
 END_TEST
 
-/* Four times as many elements are pyramids of half the width, each of sixteen as before. */
+/* Four times as many elements are pyramids of half the width, each of sixteen as before. They fill the 6 m
+ * between the tips at both ends, and are as high as wide, or the width that their area tells would not. */
 START_TEST(pyramids_grow_in_number) {
     double foot = 0;
     for (size_t elements = 1000; elements <= 16000; elements *= 4) {
@@ -305,6 +298,7 @@ START_TEST(pyramids_grow_in_number) {
         const double area = group_area(&m, "floor", &n); /* of a pyramid: 4 pitch^2 sqrt(5) / 4 */
         const double pitch = sqrt(area / sqrt(5) / ((double)n / 16));
         ck_assert_uint_eq(n % 16, 0);
+        ck_assert_double_eq_tol(6 / pitch, round(6 / pitch), 1e-6);
         if (foot > 0) ck_assert_double_eq_tol(pitch, foot / 2, .25 * foot);
         foot = pitch;
         mesh_free(&m);

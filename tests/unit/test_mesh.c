@@ -234,7 +234,7 @@ START_TEST(no_edge_is_longer_than_asked) {
         lam_error error;
         ck_assert_int_eq(mesh_refine(&m, &(mesh_refinement){.max_edge = limits[l]}, &error), LAM_OK);
         for (size_t i = 0; i < m.n; i++) {
-            const size_t corners = m.elements[i][3] == MESH_NO_VERTEX ? 3 : 4;
+            const size_t corners = mesh_corners(&m, i);
             for (size_t k = 0; k < corners; k++) {
                 const double *a = m.vertices[m.elements[i][k]],
                              *b = m.vertices[m.elements[i][(k + 1) % corners]];
