@@ -122,9 +122,11 @@ bool codec_read_json(const codec_scene *scene, const char *text, size_t length, 
     bool good = parser_allocate(&p, (void **)&p.colour, scene->n_channels, sizeof *p.colour) && read_body(&p);
     json_end(&p.r);
     float *last;
-    /* Vectors behind the last that is under a sky. */
-    if (good && request->L != NULL && request->n_lit < request->n_rhs)
-        good = radiosity_request_light(request, scene, &last, why);
+    /* Vectors behind the last that is under a sky, or has emitters. */
+    if (good && request->sky.values != NULL && request->sky.n < request->n_rhs)
+        good = radiosity_request_sky(request, scene, &last, why);
+    if (good && request->emitters.values != NULL && request->emitters.n < request->n_rhs)
+        good = radiosity_request_emitters(request, scene, &last, why);
     if (!good && (why->status == 422 || why->status == 501)) {
         /* What is not JSON at all is told first, wherever its fault lies. */
         json_begin(&p.r, text, length);

@@ -182,28 +182,43 @@ static bool refused_here(parser *p) {
     return false;
 }
 
-/* One radiance a tile, each a number or C of them. */
-static bool read_sky(parser *p) {
-    const size_t m = p->scene->n_tiles, C = p->scene->n_channels, mark = p->pointer_length;
+/* Inside an array that was not entered yet: width values into row [C][width], each a number or C of them. */
+static bool read_side(parser *p, size_t width, const char *each, float *row) {
+    const size_t C = p->scene->n_channels, mark = p->pointer_length;
     size_t t = 0;
-    float *L;
-    if (m == 0)
-        return parser_refuse(p, 422, "%s: the store has no sky; precompute it with --sky", parser_here(p));
-    if (!parser_expect(p, JSON_ARRAY, "an array of radiances")) return false;
-    if (!radiosity_request_light(p->request, p->scene, &L, p->why)) return refused_here(p);
     if (!json_enter_array(&p->r)) return parser_fault(p);
     for (; json_next_element(&p->r); t++) {
-        if (t == m)
-            return parser_refuse(p, 422, "%s holds more than %zu values, one for each tile", parser_here(p),
-                                 m);
+        if (t == width)
+            return parser_refuse(p, 422, "%s holds more than %zu values, one for each %s", parser_here(p),
+                                 width, each);
         parser_point_index(p, t);
         if (!read_colour(p, p->colour)) return false;
-        for (size_t c = 0; c < C; c++) L[c * m + t] = p->colour[c];
+        for (size_t c = 0; c < C; c++) row[c * width + t] = p->colour[c];
         p->pointer_length = mark;
     }
     if (!parser_closed(p)) return false;
-    return t == m ||
-           parser_refuse(p, 422, "%s holds %zu values, must be %zu, one for each tile", parser_here(p), t, m);
+    return t == width || parser_refuse(p, 422, "%s holds %zu values, must be %zu, one for each %s",
+                                       parser_here(p), t, width, each);
+}
+
+/* One radiance a tile. */
+static bool read_sky(parser *p) {
+    float *L;
+    if (p->scene->n_tiles == 0)
+        return parser_refuse(p, 422, "%s: the store has no sky; precompute it with --sky", parser_here(p));
+    if (!parser_expect(p, JSON_ARRAY, "an array of radiances")) return false;
+    if (!radiosity_request_sky(p->request, p->scene, &L, p->why)) return refused_here(p);
+    return read_side(p, p->scene->n_tiles, "tile", L);
+}
+
+/* One weight an emitter. */
+static bool read_emitters(parser *p) {
+    float *W;
+    if (p->scene->n_emitters == 0)
+        return parser_refuse(p, 422, "%s: the store has no precomputed emitters", parser_here(p));
+    if (!parser_expect(p, JSON_ARRAY, "an array of weights")) return false;
+    if (!radiosity_request_emitters(p->request, p->scene, &W, p->why)) return refused_here(p);
+    return read_side(p, p->scene->n_emitters, "emitter", W);
 }
 
 static bool read_emission_object(parser *p, float *E) {
@@ -234,10 +249,7 @@ static bool read_emission_object(parser *p, float *E) {
             good = read_sky(p);
             break;
         default:
-            good =
-                p->scene->has_emitters
-                    ? parser_refuse(p, 501, "%s: precomputed emitters are not supported yet", parser_here(p))
-                    : parser_refuse(p, 422, "%s: the store has no precomputed emitters", parser_here(p));
+            good = read_emitters(p);
         }
         if (!good) return false;
         p->pointer_length = mark;
@@ -245,8 +257,11 @@ static bool read_emission_object(parser *p, float *E) {
     if (p->why->status != 0) return false;
     const bool sparse = (seen & (1u << ELEMENTS | 1u << VALUES)) != 0;
     const bool groups = (seen & 1u << GROUPS) != 0, sky = (seen & 1u << SKY) != 0;
-    if ((sparse && groups) || (!sparse && !groups && !sky))
-        return parser_refuse(p, 422, "%s must hold either elements and values or groups, or a sky",
+    const bool emitters = (seen & 1u << EMITTERS) != 0;
+    const int ways = sparse + groups + emitters;
+    if (ways > 1 || (ways == 0 && !sky))
+        return parser_refuse(p, 422,
+                             "%s must hold either elements and values or groups or emitters, or a sky",
                              parser_here(p));
     if (sparse && ((seen & 1u << ELEMENTS) == 0 || (seen & 1u << VALUES) == 0))
         return parser_refuse(p, 422, "%s must hold both elements and values", parser_here(p));

@@ -5,7 +5,8 @@
 
 void radiosity_request_free(radiosity_request *request) {
     free(request->E);
-    free(request->L);
+    free(request->sky.values);
+    free(request->emitters.values);
     free(request->selected);
     *request = (radiosity_request){0};
 }
@@ -42,30 +43,40 @@ bool radiosity_request_add(radiosity_request *request, const codec_scene *scene,
     return true;
 }
 
-bool radiosity_request_light(radiosity_request *request, const codec_scene *scene, float **L, problem *why) {
+static bool add_side(const radiosity_request *request, const codec_scene *scene, side_rows *side,
+                     size_t width, const char *what, float **row, problem *why) {
     size_t values, bytes, size;
-    if (!size_multiply(scene->n_tiles, scene->n_channels, &values) ||
-        !size_multiply(values, sizeof(float), &bytes) || !size_multiply(bytes, request->n_rhs, &size) ||
-        size > scene->max_bytes)
-        return problem_set(why, 422,
-                           "%zu skies of %zu channels and %zu tiles pass the %zu bytes that a request may "
-                           "hold; send several requests",
-                           request->n_rhs, scene->n_channels, scene->n_tiles, scene->max_bytes);
-    if (request->n_rhs > request->lit_capacity) {
+    if (!size_multiply(width, scene->n_channels, &values) || !size_multiply(values, sizeof(float), &bytes) ||
+        !size_multiply(bytes, request->n_rhs, &size) || size > scene->max_bytes)
+        return problem_set(
+            why, 422,
+            "%zu times %zu channels of %zu %s pass the %zu bytes that a request may hold; send "
+            "several requests",
+            request->n_rhs, scene->n_channels, width, what, scene->max_bytes);
+    if (request->n_rhs > side->capacity) {
         size_t capacity = request->capacity;
         if (!size_multiply(bytes, capacity, &size) || size > scene->max_bytes) {
             capacity = scene->max_bytes / bytes;
             size = capacity * bytes;
         }
-        float *grown = realloc(request->L, size);
-        if (grown == NULL) return problem_set(why, 503, "not enough memory for %zu bytes of sky", size);
-        request->L = grown;
-        request->lit_capacity = capacity;
+        float *grown = realloc(side->values, size);
+        if (grown == NULL) return problem_set(why, 503, "not enough memory for %zu bytes of %s", size, what);
+        side->values = grown;
+        side->capacity = capacity;
     }
-    memset(request->L + request->n_lit * values, 0, (request->n_rhs - request->n_lit) * bytes);
-    request->n_lit = request->n_rhs;
-    *L = request->L + (request->n_rhs - 1) * values;
+    memset(side->values + side->n * values, 0, (request->n_rhs - side->n) * bytes);
+    side->n = request->n_rhs;
+    *row = side->values + (request->n_rhs - 1) * values;
     return true;
+}
+
+bool radiosity_request_sky(radiosity_request *request, const codec_scene *scene, float **row, problem *why) {
+    return add_side(request, scene, &request->sky, scene->n_tiles, "tiles", row, why);
+}
+
+bool radiosity_request_emitters(radiosity_request *request, const codec_scene *scene, float **row,
+                                problem *why) {
+    return add_side(request, scene, &request->emitters, scene->n_emitters, "emitters", row, why);
 }
 
 const char *codec_quantity_name(lam_quantity quantity) {

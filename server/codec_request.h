@@ -12,11 +12,17 @@ typedef struct codec_scene {
     size_t n;
     size_t n_channels;
     const group_index *groups;
-    size_t n_tiles; /* of the sky; 0: none */
-    bool has_emitters;
-    size_t max_batch; /* vectors in a request */
-    size_t max_bytes; /* of emission vectors in a request */
+    size_t n_tiles;    /* of the sky; 0: none */
+    size_t n_emitters; /* 0: none */
+    size_t max_batch;  /* vectors in a request */
+    size_t max_bytes;  /* of emission vectors in a request */
 } codec_scene;
+
+/* What stands beside the emissions of some vectors: [n][C][width], for the first n of them. */
+typedef struct side_rows {
+    float *values; /* NULL: no vector has any */
+    size_t n, capacity;
+} side_rows;
 
 /* Starts zeroed. */
 typedef struct radiosity_request {
@@ -28,11 +34,10 @@ typedef struct radiosity_request {
     size_t n_selected;
     lam_quantity quantity;
 
-    float *L;     /* [n_rhs][C][m], radiances of the sky's tiles; NULL: no vector is under a sky */
-    size_t n_lit; /* vectors that L holds so far */
+    side_rows sky;      /* radiances of its tiles */
+    side_rows emitters; /* their weights */
 
     size_t capacity; /* vectors that E has room for */
-    size_t lit_capacity;
 } radiosity_request;
 
 void radiosity_request_free(radiosity_request *request);
@@ -51,9 +56,11 @@ bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, 
 /* Room for one more vector, zeroed: *E is its [C][n]. */
 bool radiosity_request_add(radiosity_request *request, const codec_scene *scene, float **E, problem *why);
 
-/* The sky over the last vector, zeroed: *L is its [C][m]; so are those over the vectors before it that have
- * none. */
-bool radiosity_request_light(radiosity_request *request, const codec_scene *scene, float **L, problem *why);
+/* The sky over the last vector, or the weights of its emitters, zeroed: *row is its [C][m], or [C][s]; so are
+ * those of the vectors before it that have none. */
+bool radiosity_request_sky(radiosity_request *request, const codec_scene *scene, float **row, problem *why);
+bool radiosity_request_emitters(radiosity_request *request, const codec_scene *scene, float **row,
+                                problem *why);
 
 /* The contract's word for a quantity. */
 const char *codec_quantity_name(lam_quantity quantity);

@@ -22,31 +22,73 @@ static double now_ms(void) {
 typedef struct pass_memory {
     float *out; /* [n_rhs][C][n], less where elements are selected */
     float *H0;  /* [n_rhs][C][n], what the sky gives; NULL where no vector is under one */
+    float *W;   /* [n_rhs][C][s], weights of the store's emitters, in place of H0 */
     void *work;
     size_t work_bytes;
 } pass_memory;
 
 static bool get_pass_memory(call *in, size_t n_rhs, bool lit, pass_memory *memory, problem *why) {
     const scene *s = in->scene;
-    size_t values, out_bytes, lit_bytes, total;
+    size_t values, out_bytes, side_bytes, total;
+    const size_t side = s->n_emitters > 0 ? s->n_emitters : lit ? s->n : 0;
     memory->work_bytes = lam_operator_work_bytes(s->op, n_rhs);
     if (memory->work_bytes > 0 && size_multiply(n_rhs * s->n_channels, s->n, &values) &&
         size_multiply(values, sizeof(float), &out_bytes)) {
         /* The others come behind the vectors, aligned as malloc does. */
         out_bytes = (out_bytes + 63) / 64 * 64;
-        lit_bytes = lit ? out_bytes : 0;
+        side_bytes = (n_rhs * s->n_channels * side * sizeof(float) + 63) / 64 * 64;
         if (!__builtin_add_overflow(out_bytes, memory->work_bytes, &total) &&
-            !__builtin_add_overflow(total, lit_bytes, &total)) {
+            !__builtin_add_overflow(total, side_bytes, &total)) {
             char *bytes = batch_workspace_get(in->workspace, total);
             if (bytes != NULL) {
+                float *beside = (float *)(void *)(bytes + out_bytes);
                 memory->out = (float *)(void *)bytes;
-                memory->H0 = lit ? (float *)(void *)(bytes + out_bytes) : NULL;
-                memory->work = bytes + out_bytes + lit_bytes;
+                memory->H0 = lit && s->n_emitters == 0 ? beside : NULL;
+                memory->W = s->n_emitters > 0 ? beside : NULL;
+                memory->work = bytes + out_bytes + side_bytes;
                 return true;
             }
         }
     }
     return problem_set(why, 503, "not enough memory to solve %zu vectors", n_rhs);
+}
+
+/* The answer of an operator of few emitters: to weights given, and to those told from the emission. */
+static bool solve_emitters(const scene *s, const radiosity_request *request, size_t first, size_t count,
+                           const pass_memory *memory, problem *why) {
+    const size_t C = s->n_channels, weights = C * s->n_emitters;
+    lam_error error;
+    const float *L = request->sky.values;
+    const size_t n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
+    if (L != NULL) L += first * C * n_tiles;
+    lam_status status =
+        lam_operator_weights(s->op, count, request->E + first * C * s->n, n_tiles, L, memory->W, &error);
+    if (status != LAM_OK)
+        return problem_set(why, status == LAM_ERR_MEMORY ? 503 : 422, "emission %zu or after: %s", first,
+                           error.message);
+    for (size_t k = 0; request->emitters.values != NULL && k < count * weights; k++)
+        memory->W[k] += request->emitters.values[first * weights + k];
+    status = lam_operator_apply_emitters(s->op, count, request->quantity, memory->W, request->n_selected,
+                                         request->select ? request->selected : NULL, memory->out,
+                                         memory->work, memory->work_bytes, &error);
+    return status == LAM_OK || problem_set(why, 500, "%s", error.message);
+}
+
+/* That of any other. */
+static bool solve_any(const scene *s, const radiosity_request *request, size_t first, size_t count,
+                      const pass_memory *memory, problem *why) {
+    const float *E = request->E + first * s->n_channels * s->n;
+    lam_error error;
+    if (memory->H0 != NULL)
+        lam_sky_irradiance(s->sky, count * s->n_channels,
+                           request->sky.values + first * s->n_channels * lam_sky_tiles(s->sky), memory->H0);
+    const lam_status status =
+        request->select ? lam_operator_apply_selected(s->op, count, request->quantity, E, memory->H0,
+                                                      request->n_selected, request->selected, memory->out,
+                                                      memory->work, memory->work_bytes, &error)
+                        : lam_operator_apply_lit(s->op, count, request->quantity, E, memory->H0, memory->out,
+                                                 memory->work, memory->work_bytes, &error);
+    return status == LAM_OK || problem_set(why, 500, "%s", error.message);
 }
 
 /* Applies the operator pass by pass, each pass's vectors encoded while they are in the cache. */
@@ -58,25 +100,16 @@ static bool solve(call *in, const radiosity_request *request, answer_notes *note
                           .batch = request->batch,
                           .n_values = request->select ? request->n_selected : s->n};
     pass_memory memory = {0};
-    if (!get_pass_memory(in, request->n_rhs < PASS ? request->n_rhs : PASS, request->L != NULL, &memory,
-                         why) ||
+    if (!get_pass_memory(in, request->n_rhs < PASS ? request->n_rhs : PASS, request->sky.values != NULL,
+                         &memory, why) ||
         !answer_begin(b, &shape, &in->accept, notes, why))
         return false;
     for (size_t first = 0; first < request->n_rhs; first += PASS) {
         size_t count = request->n_rhs - first < PASS ? request->n_rhs - first : PASS;
-        lam_error error;
         double start = now_ms();
-        if (request->L != NULL)
-            lam_sky_irradiance(s->sky, count * s->n_channels,
-                               request->L + first * s->n_channels * lam_sky_tiles(s->sky), memory.H0);
-        const float *E = request->E + first * s->n_channels * s->n;
-        const lam_status solved_well =
-            request->select ? lam_operator_apply_selected(s->op, count, request->quantity, E, memory.H0,
-                                                          request->n_selected, request->selected, memory.out,
-                                                          memory.work, memory.work_bytes, &error)
-                            : lam_operator_apply_lit(s->op, count, request->quantity, E, memory.H0,
-                                                     memory.out, memory.work, memory.work_bytes, &error);
-        if (solved_well != LAM_OK) return problem_set(why, 500, "%s", error.message);
+        const bool good = s->n_emitters > 0 ? solve_emitters(s, request, first, count, &memory, why)
+                                            : solve_any(s, request, first, count, &memory, why);
+        if (!good) return false;
         double solved = now_ms();
         metrics_pass(in->service->metrics, count);
         notes->solve_ms += solved - start;
@@ -93,7 +126,7 @@ void post_radiosity(call *in, answer *out) {
                          .n_channels = s->n_channels,
                          .groups = &s->groups,
                          .n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0,
-                         .has_emitters = s->has_emitters,
+                         .n_emitters = s->n_emitters,
                          .max_batch = c->max_batch,
                          .max_bytes =
                              4 * c->max_body > LEAST_EMISSION_LIMIT ? 4 * c->max_body : LEAST_EMISSION_LIMIT};

@@ -57,7 +57,7 @@ lam_status scene_open(const char *path, const char *name, bool verify, scene **o
     made->n = lam_operator_elements(made->op);
     made->n_channels = lam_operator_channels(made->op);
     TRY(sky_load(s, made->n, &made->sky, error));
-    made->has_emitters = strcmp(lam_operator_kind(made->op), "emitters") == 0;
+    made->n_emitters = lam_operator_emitters(made->op);
     TRY(read_groups(s, made, error));
     TRY(store_group_bytes(s, "/operator", &made->bytes, error));
     read_error(s, made);

@@ -17,8 +17,8 @@ typedef struct scene {
     size_t n_channels;
     lam_operator *op;
     group_index groups;
-    lam_sky *sky; /* NULL: none */
-    bool has_emitters;
+    lam_sky *sky;      /* NULL: none */
+    size_t n_emitters; /* 0: the store answers any emission */
     uint64_t bytes;    /* of /operator as stored */
     char *description; /* the JSON of GET /v1/scenes/NAME */
     bool has_error;    /* the store's total error, of its own lights or else of single elements */

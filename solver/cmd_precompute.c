@@ -86,6 +86,9 @@ static int check_together(const precompute_arguments *f, const option_result *gi
     static const char *const factorizing[] = {"auto", "low-rank", NULL};
     if (strcmp(f->factorizer, "qr") == 0 && is_among(f->method, factorizing))
         return options_usage(precompute_verb.name, "--factorizer qr: goes with --method 2msc only");
+    if (strcmp(f->method, "emitters") == 0 && f->emitters == NULL)
+        return options_usage(precompute_verb.name,
+                             "--method emitters: give --emitters FILE, group=NAME or sky");
     if (f->resolution % 2 != 0)
         return options_usage(precompute_verb.name, "--resolution %" PRIu64 ": must be even", f->resolution);
     if (!from_store && same_file(input, f->output))

@@ -268,11 +268,11 @@ static lam_status render(const char *path, const fields *f, terminal *t, lam_err
     TRY(view_open(path, f, &v, error));
     TRY(sky_load(v.s, v.m.n, &sky, error));
     const emission_wish wish = {.items = &f->emit, .path = f->emission, .sky = f->sky};
-    TRY(emission_choose(&v.m, sky, &wish, &light, &own, error));
+    TRY(operator_load(v.s, &op, error));
+    TRY(emission_choose(&v.m, emission_sources_of(op, sky), &wish, &light, &own, error));
     if (light.n_vectors != 1)
         FAIL(error, LAM_ERR_ARGUMENT, "%s: holds %zu emissions, a picture shows exactly 1",
              f->emission != NULL ? f->emission : f->sky, light.n_vectors);
-    TRY(operator_load(v.s, &op, error));
     lam_operator_set_threads(op, (size_t)omp_get_max_threads());
     TRY(terminal_check(error));
     const lam_quantity quantity = strcmp(f->quantity, "irradiance") == 0 ? LAM_IRRADIANCE

@@ -189,13 +189,13 @@ static lam_status solve(const char *path, const fields *f, reduction *reductions
     for (size_t i = 0; i < f->reduce.count; i++) TRY(reduce_bind(&reductions[i], &m, error));
     TRY(sky_load(s, m.n, &sky, error));
     const emission_wish wish = {.items = &f->emit, .path = f->emission, .sky = f->sky};
-    TRY(emission_choose(&m, sky, &wish, &light, &own, error));
+    TRY(operator_load(s, &op, error));
+    TRY(emission_choose(&m, emission_sources_of(op, sky), &wish, &light, &own, error));
     if (own && is_dark(&light, m.n * m.n_channels))
         FAIL(error, LAM_ERR_ARGUMENT,
              "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s", path,
              sky != NULL ? " or --sky FILE" : "");
     if (own) terminal_log(t, "no --emit, --emission or --sky: the scene's own light");
-    TRY(operator_load(s, &op, error));
     lam_operator_set_threads(op, (size_t)omp_get_max_threads());
     TRY(terminal_check(error));
     /* With --reduce only figures are written, with -o too. */

@@ -12,6 +12,7 @@ typedef struct emission {
     bool batch; /* given as a batch (also of one), so answered as one */
     float *E;
     float *L; /* [n_vectors][C][m], radiances of the tiles of the store's sky, W/(m^2 sr); NULL: no sky */
+    float *W; /* [n_vectors][C][s], weights of the store's emitters, beside E and L; NULL: none given */
 } emission;
 
 void emission_free(emission *e);
@@ -24,11 +25,16 @@ lam_status emission_from_groups(const mesh *m, const option_list *items, emissio
 /* Whether every item is well formed, whatever the store: otherwise it is wrong usage. */
 lam_status emission_check_items(const option_list *items, lam_error *error);
 
+/* What a store offers beside its elements: tiles of a sky, emitters; 0: none. */
+typedef struct emission_sources {
+    size_t n_tiles, n_emitters;
+} emission_sources;
+
 /* A file. NPY: <f4 or <f8 of shape [n], [C][n] or a batch of them ([b][C][n]; also [b][n] with one channel).
- * JSON: such an array, the contract's EMISSION, or an object with `emission` or `emissions`; n_tiles says how
- * many tiles its skies have, 0: the store has none.
+ * JSON: such an array, the contract's EMISSION, or an object with `emission` or `emissions`.
  * Errors name the file, the place, the value and the limit. */
-lam_status emission_read(const char *path, const mesh *m, size_t n_tiles, emission *out, lam_error *error);
+lam_status emission_read(const char *path, const mesh *m, emission_sources there, emission *out,
+                         lam_error *error);
 lam_status emission_read_npy(const char *path, const mesh *m, emission *out, lam_error *error);
 
 /* Puts e under the sky of an NPY file: [m], [C][m] or a batch of them; one sky goes with every emission, one
@@ -54,9 +60,12 @@ typedef struct emission_wish {
 } emission_wish;
 
 /* Groups when there are items, else the file, else none beside a sky, else the scene's own, which is *own.
- * sky is the store's, or NULL. */
-lam_status emission_choose(const mesh *m, const lam_sky *sky, const emission_wish *wish, emission *out,
+ */
+lam_status emission_choose(const mesh *m, emission_sources there, const emission_wish *wish, emission *out,
                            bool *own, lam_error *error);
+
+/* Those of a store's operator and sky, which may be NULL. */
+emission_sources emission_sources_of(const lam_operator *op, const lam_sky *sky);
 
 /* *values is [n_vectors][C][n], freed with free(): what the operator makes of each vector under its sky;
  * where selected is not NULL only of these elements, which is less work, and 0 elsewhere. stop, which may be

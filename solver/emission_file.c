@@ -10,7 +10,7 @@
 typedef struct reading {
     const char *path;
     const mesh *m;
-    size_t n_tiles;
+    emission_sources there;
     size_t vector;
     float *E;       /* [C][n] of this vector */
     emission *made; /* all vectors, whose L comes into being with the first sky */
@@ -124,7 +124,7 @@ done:
 /* One radiance a tile, W/(m^2 sr). */
 static lam_status read_sky(const reading *r, const json_t *sky) {
     lam_status status = LAM_OK;
-    const size_t m = r->n_tiles, n_channels = r->m->n_channels;
+    const size_t m = r->there.n_tiles, n_channels = r->m->n_channels;
     float channels[16];
     if (m == 0)
         FAIL(r->error, LAM_ERR_ARGUMENT,
@@ -144,6 +144,29 @@ done:
     return status;
 }
 
+/* One weight an emitter. */
+static lam_status read_emitters(const reading *r, const json_t *weights) {
+    lam_status status = LAM_OK;
+    const size_t s = r->there.n_emitters, n_channels = r->m->n_channels;
+    float channels[16];
+    if (s == 0)
+        FAIL(r->error, LAM_ERR_ARGUMENT, "%s: emission %zu asks for emitters, the store has none", r->path,
+             r->vector);
+    if (!json_is_array(weights) || n_channels > 16 || json_array_size(weights) != s)
+        FAIL(r->error, LAM_ERR_ARGUMENT,
+             "%s: emission %zu: emitters must be an array of %zu values, one for each", r->path, r->vector,
+             s);
+    if (r->made->W == NULL)
+        TRY(emission_allocate(r->path, n_channels, s, r->made->n_vectors, &r->made->W, r->error));
+    for (size_t k = 0; k < s; k++) {
+        TRY(read_channels(r, k, json_array_get(weights, k), channels));
+        for (size_t c = 0; c < n_channels; c++)
+            r->made->W[(r->vector * n_channels + c) * s + k] = channels[c];
+    }
+done:
+    return status;
+}
+
 /* The contract's EMISSION. */
 static lam_status read_one(const reading *r, const json_t *value) {
     lam_status status = LAM_OK;
@@ -153,21 +176,20 @@ static lam_status read_one(const reading *r, const json_t *value) {
              r->vector);
     json_t *groups = json_object_get(value, "groups");
     const json_t *elements = json_object_get(value, "elements"), *values = json_object_get(value, "values");
-    const json_t *sky = json_object_get(value, "sky");
-    if (json_object_get(value, "emitters") != NULL)
-        FAIL(r->error, LAM_ERR_ARGUMENT, "%s: emission %zu asks for emitters, the store has none", r->path,
-             r->vector);
-    const size_t members = (groups != NULL) + 2 * (elements != NULL) + (sky != NULL);
-    if ((groups != NULL && elements != NULL) || (elements == NULL) != (values == NULL) || members == 0 ||
+    const json_t *sky = json_object_get(value, "sky"), *emitters = json_object_get(value, "emitters");
+    const int ways = (groups != NULL) + (elements != NULL) + (emitters != NULL);
+    const size_t members = (size_t)ways + (elements != NULL) + (sky != NULL);
+    if (ways > 1 || (elements == NULL) != (values == NULL) || members == 0 ||
         json_object_size(value) > members)
         FAIL(r->error, LAM_ERR_ARGUMENT,
-             "%s: emission %zu must be an array, or {\"elements\", \"values\"} or {\"groups\"} or {\"sky\"} "
-             "or "
-             "the last beside one of them",
+             "%s: emission %zu must be an array, or {\"elements\", \"values\"} or {\"groups\"} or "
+             "{\"emitters\"} or "
+             "{\"sky\"} or the last beside one of them",
              r->path, r->vector);
     if (groups != NULL) TRY(read_groups(r, groups));
     if (elements != NULL) TRY(read_elements(r, elements, values));
     if (sky != NULL) TRY(read_sky(r, sky));
+    if (emitters != NULL) TRY(read_emitters(r, emitters));
 done:
     return status;
 }
@@ -180,7 +202,7 @@ static bool is_array_batch(const json_t *value, const mesh *m) {
     return json_is_array(json_array_get(first, 0)) || (m->n_channels == 1 && json_array_size(value) > 1);
 }
 
-static lam_status json_emission(const char *path, const mesh *m, size_t n_tiles, emission *out,
+static lam_status json_emission(const char *path, const mesh *m, emission_sources there, emission *out,
                                 lam_error *error) {
     lam_status status = LAM_OK;
     emission made = {.n_vectors = 1};
@@ -200,7 +222,7 @@ static lam_status json_emission(const char *path, const mesh *m, size_t n_tiles,
     if (made.n_vectors == 0) FAIL(error, LAM_ERR_ARGUMENT, "%s: an empty batch", path);
     TRY(emission_allocate(path, m->n_channels, m->n, made.n_vectors, &made.E, error));
     for (size_t v = 0; v < made.n_vectors; v++) {
-        const reading r = {path, m, n_tiles, v, made.E + v * m->n * m->n_channels, &made, error};
+        const reading r = {path, m, there, v, made.E + v * m->n * m->n_channels, &made, error};
         TRY(read_one(&r, made.batch ? json_array_get(value, v) : value));
     }
     *out = made;
@@ -211,10 +233,11 @@ done:
     return status;
 }
 
-lam_status emission_read(const char *path, const mesh *m, size_t n_tiles, emission *out, lam_error *error) {
+lam_status emission_read(const char *path, const mesh *m, emission_sources there, emission *out,
+                         lam_error *error) {
     char extension[16];
     output_file_extension(path, extension);
     if (strcmp(extension, "npy") == 0) return emission_read_npy(path, m, out, error);
-    if (strcmp(extension, "json") == 0) return json_emission(path, m, n_tiles, out, error);
+    if (strcmp(extension, "json") == 0) return json_emission(path, m, there, out, error);
     return status_fail(error, LAM_ERR_ARGUMENT, "--emission %s: must end in .npy or .json", path);
 }

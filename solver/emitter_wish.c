@@ -94,7 +94,7 @@ lam_status emitter_wish_read(const char *text, const mesh *m, size_t n_tiles, em
     } else if (strncmp(text, "group=", 6) == 0) {
         TRY(read_groups(text + 6, m, &made, error));
     } else {
-        TRY(emission_read(text, m, n_tiles, &made.light, error));
+        TRY(emission_read(text, m, (emission_sources){.n_tiles = n_tiles}, &made.light, error));
         TRY(number_names("emitter", made.light.n_vectors, &made, error));
     }
     for (size_t k = 0; k < made.s; k++)

@@ -83,8 +83,15 @@ static double likely_rank(const forecast *f) {
     return f->rank > 0 ? fmin((double)f->rank, n) : fmin(1024, n);
 }
 
+/* Light, emissions and what the sky gives of every emitter, and the vectors of a block that iterates. */
+static double emitter_bytes(const forecast *f) {
+    const double n = (double)f->n, s = (double)f->emitters, C = (double)f->n_channels;
+    return 4 * n * (s * (3 * C + 2) + 7 * 32);
+}
+
 static double operator_bytes(const forecast *f) {
     const double n = (double)f->n;
+    if (f->emitters > 0) return 4 * n * (double)f->emitters * (double)f->n_channels;
     return f->exact ? 4 * n * n * (double)f->n_channels
                     : 2 * n * likely_rank(f) * (double)panel_value_size(f->precision);
 }
@@ -97,7 +104,7 @@ double forecast_bytes(const forecast *f) {
     /* The inverse in double and the operator; else leaf blocks and both factors of two nodes. */
     const double build =
         f->exact ? n * n * (8 + 4 * n_channels) : 4 * n * (2 * fmin(1024, n) + 6 * likely_rank(f));
-    double peak = fmax(trace, sample + build);
+    double peak = fmax(trace, sample + (f->emitters > 0 ? emitter_bytes(f) : build));
     if (f->probes > 0) {
         /* Two more samples and their mean; emissions, answers and the vectors of the iteration per probe. */
         const double probes = (double)f->probes + 9;

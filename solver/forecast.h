@@ -19,6 +19,7 @@ typedef struct forecast {
     bool keep;                   /* the store keeps the form factors */
     bool exact;                  /* the whole inverse is built */
     size_t rank;                 /* 0: not known yet */
+    size_t emitters;             /* 0: another kind of operator */
     panel_precision precision;   /* of an operator of low rank */
 } forecast;
 

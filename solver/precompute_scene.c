@@ -75,6 +75,7 @@ forecast work_forecast(const work *w, double n) {
                       .keep = o->keep_form_factors,
                       .exact = strcmp(o->method, "exact") == 0,
                       .rank = likely_rank(o, n),
+                      .emitters = w->emitters.s,
                       .precision = o->precision};
 }
 
@@ -165,7 +166,10 @@ lam_status work_prepare_mesh(work *w, lam_error *error) {
     TRY(mesh_z_order(&w->m, w->order, error));
     w->probes = o->probes != PRECOMPUTE_AUTO ? o->probes : w->m.n > LARGE ? PROBES_OF_LARGE : PROBES;
     if (w->probes > w->m.n) w->probes = w->m.n;
-    if (o->emitters != NULL) TRY(emitter_wish_read(o->emitters, &w->m, w->sky_tiles, &w->emitters, error));
+    if (o->emitters != NULL) {
+        TRY(emitter_wish_read(o->emitters, &w->m, w->sky_tiles, &w->emitters, error));
+        TRY(check_memory(w, (double)w->m.n, error));
+    }
     terminal_log(w->t, "%zu elements in %zu groups, %zu channel%s%s", w->m.n, w->m.n_groups, w->m.n_channels,
                  w->m.n_channels == 1 ? "" : "s", w->m.two_sided ? ", two-sided" : "");
 done:

@@ -1,6 +1,7 @@
 /* Checks of the operator: finite, linear, energy, and its error measured again. */
 #include "solver/build/judge.h"
 #include "solver/forecast.h"
+#include "solver/operator/emitters.h"
 #include "solver/operator/two_mesh.h"
 #include "solver/precompute.h"
 #include "solver/verify.h"
@@ -13,6 +14,13 @@
 /* Of what a single-precision product over n terms may round, relative to the largest value. */
 static const double rounding = 1e-5;
 
+/* Numbers of one emission: a channel has one for each element, or, of an operator of emitters, a weight each.
+ */
+static size_t input_size(const examination *e) {
+    const size_t s = lam_operator_emitters(e->op);
+    return e->m.n_channels * (s > 0 ? s : e->m.n);
+}
+
 static lam_status apply(const examination *e, size_t m, lam_quantity quantity, const float *E, float **out,
                         lam_error *error) {
     lam_status status = LAM_OK;
@@ -20,7 +28,10 @@ static lam_status apply(const examination *e, size_t m, lam_quantity quantity, c
     float *values = memory_allocate(e->m.n * e->m.n_channels, m * sizeof *values, "a solution", error);
     void *area = memory_allocate(bytes, 1, "the work area of a solve", error);
     if (values == NULL || area == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(lam_operator_apply(e->op, m, quantity, E, values, area, bytes, error));
+    if (lam_operator_emitters(e->op) > 0)
+        TRY(lam_operator_apply_emitters(e->op, m, quantity, E, 0, NULL, values, area, bytes, error));
+    else
+        TRY(lam_operator_apply(e->op, m, quantity, E, values, area, bytes, error));
     *out = values;
     values = NULL;
 done:
@@ -71,10 +82,10 @@ lam_status verify_operator(examination *e, check *c, lam_error *error) {
               about.precision != NULL ? about.precision : "f32", about.bytes);
     check_patches(e, c);
     /* Light everywhere: a value that is not finite anywhere in the operator shows in the answer. */
-    const size_t count = e->m.n * e->m.n_channels;
-    E = memory_allocate(count, sizeof *E, "an emission", error);
+    const size_t count = e->m.n * e->m.n_channels, inputs = input_size(e);
+    E = memory_allocate(inputs, sizeof *E, "an emission", error);
     if (E == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < count; i++) E[i] = 1;
+    for (size_t i = 0; i < inputs; i++) E[i] = 1;
     for (size_t q = 0; q < 3 && c->verdict == VERDICT_OK; q++) {
         free(out);
         out = NULL;
@@ -93,14 +104,14 @@ lam_status verify_linearity(examination *e, check *c, lam_error *error) {
     lam_status status = LAM_OK;
     float *E = NULL, *out = NULL;
     if (skip(e, c)) return LAM_OK;
-    const size_t count = e->m.n * e->m.n_channels;
+    const size_t count = e->m.n * e->m.n_channels, inputs = input_size(e);
     uint64_t state = 1;
-    E = memory_allocate(count, 3 * sizeof *E, "emissions", error);
+    E = memory_allocate(inputs, 3 * sizeof *E, "emissions", error);
     if (E == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < inputs; i++) {
         E[i] = (float)(precompute_seed(state, 1) >> 40) * 0x1p-24f;
-        E[count + i] = (float)(precompute_seed(state, 2) >> 40) * 0x1p-24f;
-        E[2 * count + i] = E[i] + 2 * E[count + i];
+        E[inputs + i] = (float)(precompute_seed(state, 2) >> 40) * 0x1p-24f;
+        E[2 * inputs + i] = E[i] + 2 * E[inputs + i];
         state++;
     }
     TRY(apply(e, 3, LAM_RADIOSITY, E, &out, error));
@@ -136,39 +147,70 @@ static double allowed_imbalance(store *s, bool own, double emitted, double area,
     return -1;
 }
 
+/* What is tested for its energy: the scene's own light, or light everywhere, or all emitters at once, whose
+ * sky counts as what the elements reflect of it (E + rho H0) and is taken out of what they receive. */
+typedef struct lit {
+    bool own;
+    const char *name;
+    float *input, *E, *H0; /* H0 NULL: no sky */
+} lit;
+
+static lam_status light_up(const examination *e, lit *l, lam_error *error) {
+    lam_status status = LAM_OK;
+    const mesh *m = &e->m;
+    const size_t count = m->n * m->n_channels, inputs = input_size(e);
+    l->E = memory_allocate(count, sizeof *l->E, "an emission", error);
+    l->input = memory_allocate(inputs, sizeof *l->input, "an emission", error);
+    if (l->E == NULL || l->input == NULL) TRY(LAM_ERR_MEMORY);
+    if (lam_operator_emitters(e->op) > 0) {
+        l->name = "all emitters";
+        l->H0 = memory_allocate(count, sizeof *l->H0, "an emission", error);
+        if (l->H0 == NULL) TRY(LAM_ERR_MEMORY);
+        for (size_t k = 0; k < inputs; k++) l->input[k] = 1;
+        TRY(operator_emitters_light(e->op, 1, l->input, l->E, l->H0, error));
+        for (size_t i = 0; i < count; i++) l->E[i] += m->reflectance[i] * l->H0[i];
+        goto done;
+    }
+    for (size_t i = 0; i < count; i++) l->own = l->own || m->emission[i] > 0;
+    for (size_t i = 0; i < count; i++) l->input[i] = l->E[i] = l->own ? m->emission[i] : 1;
+    l->name = l->own ? "the scene's own light" : "light everywhere";
+done:
+    return status;
+}
+
 /* sum A E = sum A [(1 - rho) H + B (1 - s)], s the row sums: what is emitted is absorbed or leaves. */
 lam_status verify_energy(examination *e, check *c, lam_error *error) {
     lam_status status = LAM_OK;
-    float *E = NULL, *B = NULL, *H = NULL;
+    float *B = NULL, *H = NULL;
+    lit light = {.own = false};
     if (skip(e, c)) return LAM_OK;
     const mesh *m = &e->m;
     const size_t count = m->n * m->n_channels;
     double emitted = 0, accounted = 0, area = 0, received = 0;
-    bool own = false;
-    E = memory_allocate(count, sizeof *E, "an emission", error);
-    if (E == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < count; i++) own = own || m->emission[i] > 0;
-    for (size_t i = 0; i < count; i++) E[i] = own ? m->emission[i] : 1;
-    TRY(apply(e, 1, LAM_RADIOSITY, E, &B, error));
-    TRY(apply(e, 1, LAM_IRRADIANCE, E, &H, error));
+    TRY(light_up(e, &light, error));
+    TRY(apply(e, 1, LAM_RADIOSITY, light.input, &B, error));
+    TRY(apply(e, 1, LAM_IRRADIANCE, light.input, &H, error));
     for (size_t i = 0; i < count; i++) {
-        const double a = m->area[i % m->n], h = (double)H[i];
-        emitted += a * (double)E[i];
+        const double direct = light.H0 != NULL ? (double)light.H0[i] : 0;
+        const double a = m->area[i % m->n], h = (double)H[i] - direct;
+        emitted += a * (double)light.E[i];
         accounted += a * ((1 - (double)m->reflectance[i]) * h + (double)B[i] * (1 - e->row_sums[i % m->n]));
         area += a;
         received += a * h * h;
     }
     const double off = fabs(emitted - accounted);
-    const double allowed = allowed_imbalance(e->s, own, emitted, area, received);
+    const double allowed = allowed_imbalance(e->s, light.own, emitted, area, received);
     if (allowed < 0)
         check_say(c, VERDICT_SKIPPED, "off by %.2g of the power; the store states no error to compare with",
                   off / emitted);
     else
         check_say(c, off <= allowed ? VERDICT_OK : VERDICT_BROKEN,
-                  "emitted = absorbed + left within %.2g of %s (at most %.2g)", off / emitted,
-                  own ? "the scene's own light" : "light everywhere", allowed / emitted);
+                  "emitted = absorbed + left within %.2g of %s (at most %.2g)", off / emitted, light.name,
+                  allowed / emitted);
 done:
-    free(E);
+    free(light.E);
+    free(light.H0);
+    free(light.input);
     free(B);
     free(H);
     return check_failed(c, status, error);

@@ -97,10 +97,10 @@ size_t lam_operator_emitters(const lam_operator *op);
 const char *lam_operator_emitter_name(const lam_operator *op, size_t k);
 
 /* The weights W [n_rhs][C][s] whose emitters together are the emissions E [n_rhs][C][n] and the sky of
- * radiances L [n_rhs][C][m]; either may be NULL, for none. Errors: LAM_ERR_ARGUMENT names an element or a
- * tile whose light no weights give (to 1e-5 of it), LAM_ERR_MEMORY. */
-lam_status lam_operator_weights(const lam_operator *op, size_t n_rhs, const float *E, const float *L,
-                                float *W, lam_error *error);
+ * radiances L [n_rhs][C][n_tiles]; either may be NULL, for none. Errors: LAM_ERR_ARGUMENT names an element or
+ * a tile whose light no weights give (to 1e-5 of it), LAM_ERR_MEMORY. */
+lam_status lam_operator_weights(const lam_operator *op, size_t n_rhs, const float *E, size_t n_tiles,
+                                const float *L, float *W, lam_error *error);
 
 /* out = the quantity under emitters of weights W [n_rhs][C][s]: out is [n_rhs][C][n], or, where selected is
  * not NULL, [n_rhs][C][n_selected]. Otherwise as lam_operator_apply_selected. Cost: O(ns) a vector. */

@@ -333,7 +333,7 @@ static lam_status emitter_emissions(const lam_operator *op, const judge_input *i
                                             : k == v * s / p->first[LIGHTS] ? 1
                                                                             : 0;
     if (p->first[RANDOM] > p->first[LIGHTS])
-        TRY(lam_operator_weights(op, 1, input->emission, NULL, p->W + p->first[LIGHTS] * C * s, error));
+        TRY(lam_operator_weights(op, 1, input->emission, 0, NULL, p->W + p->first[LIGHTS] * C * s, error));
     TRY(operator_emitters_light(op, p->m, p->W, p->E, p->H0, error));
     for (size_t v = 0; v < p->m; v++)
         for (size_t i = 0; i < vector; i++)
@@ -347,7 +347,7 @@ static bool any_light(const lam_operator *op, const judge_input *input) {
     if (lam_operator_emitters(op) > 0) {
         const size_t s = lam_operator_emitters(op), C = input->problem->n_channels;
         float *W = memory_allocate(s * C, sizeof *W, "weights", NULL);
-        bool any = W != NULL && lam_operator_weights(op, 1, input->emission, NULL, W, NULL) == LAM_OK,
+        bool any = W != NULL && lam_operator_weights(op, 1, input->emission, 0, NULL, W, NULL) == LAM_OK,
              lit = false;
         for (size_t k = 0; any && k < s * C; k++) lit = lit || W[k] > 0;
         free(W);

@@ -118,6 +118,26 @@ done:
     return status;
 }
 
+/* Their names; null of another kind. */
+static lam_status add_emitters(store *s, const char *kind, json_t *out, lam_error *error) {
+    char **names = NULL;
+    size_t count = 0;
+    json_t *list = NULL;
+    lam_status status = LAM_OK;
+    if (strcmp(kind, "emitters") == 0) {
+        TRY(store_read_texts(s, "/operator/names", &count, &names, error));
+        list = json_array();
+        for (size_t k = 0; k < count; k++)
+            if (json_array_append_new(list, json_string(names[k])) != 0)
+                FAIL(error, LAM_ERR_FORMAT, "%s: /operator/names[%zu] is not UTF-8", store_path(s), k);
+    }
+    json_object_set(out, "emitters", list != NULL ? list : json_null());
+done:
+    json_decref(list);
+    free(names);
+    return status;
+}
+
 /* null where there is none. */
 static lam_status add_sky(store *s, json_t *out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -176,7 +196,7 @@ lam_status describe_store(store *s, json_t **out, lam_error *error) {
                         precision != NULL ? json_deep_copy(precision) : json_string("f32"));
     json_object_set_new(made, "bytes", json_integer((json_int_t)bytes));
     TRY(add_groups(s, dims[1], made, error));
-    json_object_set_new(made, "emitters", json_null());
+    TRY(add_emitters(s, json_string_value(kind), made, error));
     TRY(add_sky(s, made, error));
     TRY(add_error(s, made, error));
     TRY(add_provenance(s, root, made, error));

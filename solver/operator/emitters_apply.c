@@ -39,23 +39,34 @@ static void sum_tiles(const emitters *self, size_t c, const float *W, float *L) 
 /* --- weights ------------------------------------------------------------------------------------------ */
 
 static bool is_close(float x, float y) {
-    return fabsf(x - y) <= close_enough * fmaxf(x, y);
+    return fabsf(x - y) <= close_enough * fmaxf(fabsf(x), fabsf(y));
 }
 
-/* One channel of one emission: sent has room for n + m numbers. */
+static bool all_dark(const float *x, size_t count) {
+    for (size_t i = 0; x != NULL && i < count; i++)
+        if (x[i] != 0) return false;
+    return true;
+}
+
+/* One channel of one emission: sent has room for n + m numbers. L is of the tiles that the operator has, or
+ * NULL. */
 static lam_status weights_of_one(const emitters *self, size_t c, const float *E, const float *L, float *sent,
                                  float *W, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = self->base.n, s = self->a.s, m = self->a.n_tiles;
     const char *const what = s == 1 ? "emitter does" : "emitters do";
+    if (all_dark(E, n) && all_dark(L, m)) {
+        memset(W, 0, s * sizeof *W);
+        return LAM_OK;
+    }
     for (size_t k = 0; k < s; k++) {
         const uint32_t at = self->own[c * s + k];
-        const float *from = at < n ? E : L;
         if (at == EMITTERS_NONE)
             FAIL(error, LAM_ERR_ARGUMENT,
                  "emitter %zu (%.40s) is nowhere alone, so that its weight cannot be told from an emission; "
                  "give \"emitters\", a weight each",
                  k, self->a.names[k]);
+        const float *from = at < n ? E : L;
         W[k] = from == NULL ? 0 : from[at < n ? at : at - n] / self->own_value[c * s + k];
     }
     memset(sent, 0, n * sizeof *sent);
@@ -71,20 +82,23 @@ static lam_status weights_of_one(const emitters *self, size_t c, const float *E,
             FAIL(error, LAM_ERR_ARGUMENT,
                  "tile %zu of the sky has radiance %g, which the store's %zu %s not give", t,
                  (double)(L != NULL ? L[t] : 0), s, what);
-    if (m == 0 && L != NULL)
-        FAIL(error, LAM_ERR_ARGUMENT,
-             "no emitter of the store is of the sky; precompute with --emitters sky");
 done:
     return status;
 }
 
-lam_status lam_operator_weights(const lam_operator *op, size_t n_rhs, const float *E, const float *L,
-                                float *W, lam_error *error) {
+lam_status lam_operator_weights(const lam_operator *op, size_t n_rhs, const float *E, size_t n_tiles,
+                                const float *L, float *W, lam_error *error) {
     lam_status status = LAM_OK;
     const emitters *self = op != NULL ? operator_emitters_of(op) : NULL;
     float *sent = NULL;
     if (self == NULL || W == NULL) FAIL(error, LAM_ERR_ARGUMENT, "an operator of few emitters is needed");
     const size_t n = op->n, C = op->n_channels, m = self->a.n_tiles;
+    if (n_tiles != m && !all_dark(L, n_rhs * C * n_tiles))
+        FAIL(error, LAM_ERR_ARGUMENT,
+             m == 0 ? "no emitter of the store is of the sky; precompute with --emitters sky"
+                    : "the sky has %zu tiles, that of the store's emitters %zu",
+             n_tiles, m);
+    if (n_tiles != m) L = NULL;
     sent = memory_allocate(n + m, sizeof *sent, "emitters", error);
     if (sent == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t row = 0; row < n_rhs * C; row++)

@@ -106,18 +106,18 @@ START_TEST(skies_are_read) {
     fixture grey = make_scene(1), colour = make_scene(3);
     radiosity_request request = {0};
     ck_assert_uint_eq(status_of(&grey, one, strlen(one), &request), 0);
-    ck_assert_mem_eq(request.L, ((float[]){1, 2, 3}), 3 * sizeof(float));
+    ck_assert_mem_eq(request.sky.values, ((float[]){1, 2, 3}), 3 * sizeof(float));
     ck_assert_mem_eq(request.E, ((float[N]){0, 5}), N * sizeof(float));
     radiosity_request_free(&request);
     ck_assert_uint_eq(status_of(&colour, three, strlen(three), &request), 0);
-    ck_assert_mem_eq(request.L, ((float[]){1, 2, 5, 1, 3, 5, 1, 4, 5}), 9 * sizeof(float));
+    ck_assert_mem_eq(request.sky.values, ((float[]){1, 2, 5, 1, 3, 5, 1, 4, 5}), 9 * sizeof(float));
     radiosity_request_free(&request);
     ck_assert_uint_eq(status_of(&grey, many, strlen(many), &request), 0);
     ck_assert_uint_eq(request.n_rhs, 6);
-    ck_assert_mem_eq(request.L, ((float[18]){[6] = 1, 2, 3, [12] = 4, 5, 6}), 18 * sizeof(float));
+    ck_assert_mem_eq(request.sky.values, ((float[18]){[6] = 1, 2, 3, [12] = 4, 5, 6}), 18 * sizeof(float));
     radiosity_request_free(&request);
     ck_assert_uint_eq(status_of(&grey, "{\"emission\":[1,2,3,4,5]}", 24, &request), 0);
-    ck_assert_ptr_null(request.L);
+    ck_assert_ptr_null(request.sky.values);
     radiosity_request_free(&request);
     /* Skies count for what a request may hold. */
     grey.scene.n_tiles = 300;

@@ -60,7 +60,7 @@ static lam_status by_json(const mesh *m, const char *text, emission *e, lam_erro
     ck_assert_int_ge(descriptor, 0);
     ck_assert_int_eq(write(descriptor, text, strlen(text)), (ssize_t)strlen(text));
     close(descriptor);
-    lam_status status = emission_read(path, m, N_TILES, e, error);
+    lam_status status = emission_read(path, m, (emission_sources){.n_tiles = N_TILES}, e, error);
     unlink(path);
     return status;
 }
