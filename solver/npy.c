@@ -139,6 +139,7 @@ done:
 }
 
 void npy_write(FILE *stream, int rank, const size_t *dims, const float *values) {
+    enum { BLOCK = 4096 }; /* a year of a city is gigabytes: number by number takes longer than solving it */
     char header[256];
     size_t count = 1, length;
     length = (size_t)sprintf(header, "{'descr': '<f4', 'fortran_order': False, 'shape': (");
@@ -154,10 +155,11 @@ void npy_write(FILE *stream, int rank, const size_t *dims, const float *values) 
     fputc((int)(length & 0xFF), stream);
     fputc((int)(length >> 8), stream);
     fwrite(header, 1, length, stream);
-    for (size_t i = 0; i < count; i++) {
-        uint32_t bits;
-        memcpy(&bits, &values[i], sizeof bits);
-        bits = htole32(bits);
-        fwrite(&bits, sizeof bits, 1, stream);
+    for (size_t first = 0; first < count; first += BLOCK) {
+        const size_t some = count - first < BLOCK ? count - first : BLOCK;
+        uint32_t bits[BLOCK];
+        memcpy(bits, values + first, some * sizeof *bits);
+        for (size_t k = 0; k < some; k++) bits[k] = htole32(bits[k]);
+        fwrite(bits, sizeof *bits, some, stream);
     }
 }
