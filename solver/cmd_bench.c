@@ -48,7 +48,9 @@ static const option_verb verb = {
     .summary =
         "Measure. Suites: formfactors (error against exact values and time, throughput of rays), lowrank "
         "(factorizations and two meshes beside the tables of the papers), stability (operators where "
-        "numbers are hard). Not supported yet: cities, service, hierarchical, reuse. Each writes its tables "
+        "numbers are hard), cities (sparse inverses, few emitters and Jacobi beside the tables of the "
+        "thesis). Not "
+        "supported yet: service, hierarchical, reuse. Each writes its tables "
         "as CSV and JSON, its plots as SVG and PNG.",
     .options = rows,
     .min_arguments = 1,

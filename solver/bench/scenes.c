@@ -1,6 +1,5 @@
 #include "solver/bench/scenes.h"
 
-#include "solver/scene/generate.h"
 #include "solver/scene/import.h"
 
 #include <errno.h>
@@ -106,9 +105,8 @@ lam_status scene_file(const char *path, mesh *out, lam_error *error) {
     return scene_import(path, &how, out, &report, error);
 }
 
-lam_status scene_cornell(size_t elements, mesh *out, lam_error *error) {
+lam_status scene_generated(const generate_options *how, mesh *out, lam_error *error) {
     lam_status status = LAM_OK;
-    const generate_options how = {.kind = "cornell", .elements = elements, .reflectance = -1, .seed = 1};
     const char *parent = getenv("TMPDIR");
     char folder[4096], path[4200] = "", materials[4200] = "";
     if (parent == NULL || parent[0] == '\0') parent = "/tmp";
@@ -116,13 +114,18 @@ lam_status scene_cornell(size_t elements, mesh *out, lam_error *error) {
         mkdtemp(folder) == NULL)
         return status_fail(error, LAM_ERR_IO, "%s: cannot make a folder in it: %s; set TMPDIR", parent,
                            strerror(errno));
-    snprintf(path, sizeof path, "%s/cornell.obj", folder);
-    snprintf(materials, sizeof materials, "%s/cornell.mtl", folder);
-    TRY(scene_generate(&how, path, NULL, error));
+    snprintf(path, sizeof path, "%s/scene.obj", folder);
+    snprintf(materials, sizeof materials, "%s/scene.mtl", folder);
+    TRY(scene_generate(how, path, NULL, error));
     TRY(scene_file(path, out, error));
 done:
     unlink(path);
     unlink(materials);
     rmdir(folder);
     return status;
+}
+
+lam_status scene_cornell(size_t elements, mesh *out, lam_error *error) {
+    const generate_options how = {.kind = "cornell", .elements = elements, .reflectance = -1, .seed = 1};
+    return scene_generated(&how, out, error);
 }

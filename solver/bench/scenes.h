@@ -2,6 +2,7 @@
 #ifndef LAMBERT_BENCH_SCENES_H
 #define LAMBERT_BENCH_SCENES_H
 
+#include "solver/scene/generate.h"
 #include "solver/scene/mesh.h"
 
 /* A planar piece: a parallelogram, or the triangle that is half of it. Its front is where along x across
@@ -21,6 +22,9 @@ lam_status scene_houses(size_t lots, uint64_t seed, mesh *out, lam_error *error)
 
 /* The Cornell box of `lambert generate cornell --elements`. */
 lam_status scene_cornell(size_t elements, mesh *out, lam_error *error);
+
+/* Any of the scenes of `lambert generate`, by way of a file in a folder of its own. */
+lam_status scene_generated(const generate_options *how, mesh *out, lam_error *error);
 
 /* A scene file, every face an element. */
 lam_status scene_file(const char *path, mesh *out, lam_error *error);

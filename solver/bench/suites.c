@@ -6,7 +6,7 @@ const bench_suite bench_suites[] = {
     {"formfactors", bench_formfactors},
     {"lowrank", bench_lowrank},
     {"stability", bench_stability},
-    {"cities", NULL},
+    {"cities", bench_cities},
     {"service", NULL},
     {"hierarchical", NULL},
     {"reuse", NULL},

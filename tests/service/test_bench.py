@@ -128,6 +128,60 @@ class FormFactors(unittest.TestCase):
             self.assertTrue(math.isfinite(float(row["lamp"])))
 
 
+class Cities(unittest.TestCase):
+    """One quick run: columns beside those of the thesis, and errors that fall as they must."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        out = os.path.join(folder.name, "results")
+        done = lambert("bench", "cities", "--quick", "-o", out)
+        assert done.returncode == 0, done.stderr
+        cls.tables = {}
+        for name in "times", "errors", "emitters", "density":
+            with open(os.path.join(out, f"cities-{name}.csv"), encoding="utf-8", newline="") as stream:
+                cls.tables[name] = [{key: float(value) if value.replace(".", "").replace("e-", "").isdigit() else value
+                                     for key, value in row.items()} for row in csv.DictReader(stream)]
+
+    def test_errors(self):
+        rows = self.tables["errors"]
+        self.assertEqual([(row["city"], row["threshold"]) for row in rows],
+                         [(city, threshold) for city in (1, 2, 3) for threshold in (1e-3, 1e-4, 1e-5)])
+        for row in rows:
+            for way in "none", "discarded", "delta":
+                self.assertTrue(0 < row[way + "_mean"] <= row[way + "_max"], row)
+                self.assertLess(row[way + "_mean"], row[way + "_indirect"])
+            self.assertLess(row["discarded_mean"], row["none_mean"])
+            self.assertLess(row["delta_mean"], row["none_mean"])
+        for high, low in zip(rows, rows[1:]):
+            if high["city"] == low["city"]:
+                self.assertLess(low["none_mean"], .5 * high["none_mean"])
+
+    def test_times(self):
+        rows = self.tables["times"]
+        for row in rows:
+            self.assertGreater(row["jacobi_s"], 0)
+            self.assertAlmostEqual(row["speedup"], row["jacobi_s"] / (row["inverse_s"] + row["product_s"]), 1)
+            self.assertTrue(1 <= row["sweeps"] < 40, row)
+        for high, low in zip(rows, rows[1:]):
+            if high["city"] == low["city"]:
+                self.assertGreater(low["density"], high["density"])
+                self.assertGreaterEqual(low["sweeps"], high["sweeps"])
+
+    def test_emitters(self):
+        for row in self.tables["emitters"]:
+            self.assertEqual(row["emitters"], 132)
+            self.assertLess(row["residual"], 1e-6)
+            self.assertTrue(1e-5 < row["five_sweeps_error"] < .1, row)
+
+    def test_density(self):
+        rows = self.tables["density"]
+        self.assertEqual({row["terrain"] for row in rows}, {"flat", "valley", "hill"})
+        for row in rows:
+            self.assertTrue(1 < row["density"] < 30, row)
+
+
 class Refusals(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -146,7 +200,7 @@ class Refusals(unittest.TestCase):
         self.refused(2, "too few arguments", "-o", out)
         self.refused(2, "no such suite", "speed", "-o", out)
         self.refused(2, "exclude each other", "formfactors", "--quick", "--full", "-o", out)
-        for later in ("cities", "service", "hierarchical", "reuse"):
+        for later in ("service", "hierarchical", "reuse"):
             self.refused(2, "not supported yet", "formfactors", later, "-o", out)
         self.assertEqual(os.listdir(self.folder), [])
 

@@ -1,0 +1,41 @@
+/* The parts of the suite cities and what they share. */
+#ifndef LAMBERT_BENCH_CITIES_H
+#define LAMBERT_BENCH_CITIES_H
+
+#include "solver/bench/bench.h"
+#include "solver/build/build.h"
+#include "solver/formfactor/formfactor.h"
+
+enum { CITY_VARIANTS = 3, CITY_SIZES = 3, CITY_TERRAINS = 3, CITY_THRESHOLDS = 3, CITY_SKIES = 3650 };
+
+/* A city of the thesis: its elements and what it says of them. */
+extern const size_t city_sizes[CITY_SIZES];            /* 8897, 35588, 142352 */
+extern const char *const city_terrains[CITY_TERRAINS]; /* flat, valley, hill */
+extern const double city_thresholds[CITY_THRESHOLDS];  /* 1e-3, 1e-4, 1e-5 */
+
+typedef struct city {
+    unsigned variant; /* 1 to 3 */
+    size_t size;      /* index of city_sizes */
+    const char *terrain;
+    mesh m; /* reflectance .7 */
+    uint32_t *order;
+    form_factors f; /* with a sky of 132 tiles, 12 sectors in 11 bands */
+    double seconds; /* of f */
+    build_problem problem;
+} city;
+
+/* Makes one and finds its form factors by a recipe. Freed by city_free. */
+lam_status city_open(const bench_run *run, unsigned variant, size_t size, const char *terrain,
+                     const recipe *how, city *out, lam_error *error);
+void city_free(city *c);
+
+/* Share of n^2 that F has. */
+double city_density(const city *c);
+
+/* Tables 4.1 and 4.5: densities of F. */
+lam_status cities_density(const bench_run *run, lam_error *error);
+
+/* Tables 4.1 to 4.4 and 4.7: M~, its time beside Jacobi, its error; and few emitters (section 4.4.3). */
+lam_status cities_inverse(const bench_run *run, lam_error *error);
+
+#endif
