@@ -91,6 +91,7 @@ static double emitter_bytes(const forecast *f) {
 
 static double operator_bytes(const forecast *f) {
     const double n = (double)f->n;
+    if (f->sparse) return 0;
     if (f->emitters > 0) return 4 * n * (double)f->emitters * (double)f->n_channels;
     return f->exact ? 4 * n * n * (double)f->n_channels
                     : 2 * n * likely_rank(f) * (double)panel_value_size(f->precision);
@@ -104,7 +105,8 @@ double forecast_bytes(const forecast *f) {
     /* The inverse in double and the operator; else leaf blocks and both factors of two nodes. */
     const double build =
         f->exact ? n * n * (8 + 4 * n_channels) : 4 * n * (2 * fmin(1024, n) + 6 * likely_rank(f));
-    double peak = fmax(trace, sample + (f->emitters > 0 ? emitter_bytes(f) : build));
+    const double made = f->emitters > 0 ? emitter_bytes(f) : f->sparse ? 0 : build;
+    double peak = fmax(trace, sample + made);
     if (f->probes > 0) {
         /* Two more samples and their mean; emissions, answers and the vectors of the iteration per probe. */
         const double probes = (double)f->probes + 9;

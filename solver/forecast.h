@@ -20,6 +20,7 @@ typedef struct forecast {
     bool exact;                  /* the whole inverse is built */
     size_t rank;                 /* 0: not known yet */
     size_t emitters;             /* 0: another kind of operator */
+    bool sparse;                 /* a sparse inverse, whose threshold rises until it fits */
     panel_precision precision;   /* of an operator of low rank */
 } forecast;
 

@@ -76,6 +76,7 @@ forecast work_forecast(const work *w, double n) {
                       .exact = strcmp(o->method, "exact") == 0,
                       .rank = likely_rank(o, n),
                       .emitters = w->emitters.s,
+                      .sparse = strcmp(o->method, "sparse") == 0,
                       .precision = o->precision};
 }
 
