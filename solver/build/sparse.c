@@ -15,6 +15,9 @@ static const double delta_tolerance = 1e-7;
 /* By what a threshold rises at a time where memory is too small, and what its forecast may be wrong by. */
 static const double rise = 1.25, doubt = 1.15;
 
+/* Of an entry: its column and its value, in rows and, transposed, in columns. */
+enum { ENTRY_BYTES = 2 * (sizeof(uint32_t) + sizeof(float)) };
+
 static const char *const corrections[] = {
     [SPARSE_NONE] = "none", [SPARSE_DELTA] = "delta", [SPARSE_DISCARDED] = "discarded"};
 
@@ -42,7 +45,7 @@ static lam_status fitting_threshold(const build_problem *problem, const build_op
             double entries;
             TRY(sparse_inverse_forecast(problem, problem->reflectance + c * problem->n, *threshold, &entries,
                                         error));
-            needed += doubt * entries * (sizeof(uint32_t) + sizeof(float));
+            needed += doubt * entries * ENTRY_BYTES;
         }
         if (needed > (double)options->memory) *threshold *= rise;
         if (*threshold >= 1)
@@ -109,12 +112,12 @@ static lam_status build(const build_problem *problem, const build_options *optio
     TRY(fitting_threshold(problem, options, &threshold, error));
     for (size_t c = 0; c < C; c++) {
         const float *rho = problem->reflectance + c * n;
-        TRY(sparse_inverse_rows(problem, rho, threshold, left, options->progress, &inverse, error));
+        TRY(sparse_inverse_rows(problem, rho, threshold, left / 2, options->progress, &inverse, error));
         arrays.M[c] = inverse.M;
         inverse.M = (csr){.n = 0};
         const size_t stored = (size_t)arrays.M[c].indptr[n];
         entries += (double)stored;
-        if (left > 0) left -= stored * (sizeof(uint32_t) + sizeof(float));
+        if (left > 0) left -= stored * ENTRY_BYTES;
         if (inverse.bounces > bounces) bounces = inverse.bounces;
         if (options->correction == SPARSE_DISCARDED)
             for (size_t p = 0; p < n; p++) arrays.delta[c * n + p] = (float)inverse.discarded[p];

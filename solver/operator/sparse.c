@@ -1,8 +1,9 @@
 /* kind "sparse": rows of M~ - I in CSR, and for what was left out of them one number a row (Aguerre 2016,
- * section 4.4.2). An answer costs what is stored; a row alone what is stored of it. */
+ * section 4.4.2). An answer costs what is stored, a row alone what is stored of it, light of few elements
+ * what is stored of their columns. */
 #include "solver/operator/sparse.h"
 
-#include "solver/operator/csr_floats.h"
+#include "solver/operator/sparse_product.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -12,10 +13,8 @@
 typedef struct sparse {
     lam_operator base;
     sparse_arrays a;
+    csr *transposed; /* [C], of a.M: for light of few elements, and for the adjoint */
 } sparse;
-
-/* Rows shorter than this in all are done by one thread. */
-enum { THREADS_WORTH = 200000 };
 
 void sparse_arrays_free(sparse_arrays *arrays, size_t n_channels) {
     for (size_t c = 0; arrays->M != NULL && c < n_channels; c++) csr_free(&arrays->M[c]);
@@ -26,7 +25,10 @@ void sparse_arrays_free(sparse_arrays *arrays, size_t n_channels) {
 }
 
 static void sparse_destroy(lam_operator *op) {
-    sparse_arrays_free(&((sparse *)op)->a, op->n_channels);
+    sparse *self = (sparse *)op;
+    for (size_t c = 0; self->transposed != NULL && c < op->n_channels; c++) csr_free(&self->transposed[c]);
+    free(self->transposed);
+    sparse_arrays_free(&self->a, op->n_channels);
 }
 
 static lam_status check_finite(const float *values, size_t n, const char *name, lam_error *error) {
@@ -55,6 +57,9 @@ lam_status operator_sparse_create(size_t n, size_t n_channels, const float *refl
     }
     self->a = *arrays;
     *arrays = (sparse_arrays){.M = NULL};
+    self->transposed = memory_allocate(n_channels, sizeof *self->transposed, "operator", error);
+    if (self->transposed == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t c = 0; c < n_channels; c++) TRY(csr_transpose(&self->a.M[c], &self->transposed[c], error));
     *op = &self->base;
     self = NULL;
 done:
@@ -139,93 +144,35 @@ done:
  */
 
 static size_t sparse_work_bytes(const lam_operator *op, size_t n_rhs) {
-    size_t bytes, total = PANEL_ALIGN;
-    if (!size_multiply(op->n, csr_floats_width(n_rhs) * sizeof(float), &bytes) || !work_add(&total, bytes))
-        return 0;
-    return total;
+    size_t bytes = sparse_product_work(op->n, n_rhs), total = PANEL_ALIGN;
+    return bytes > 0 && work_add(&total, bytes) ? total : 0;
 }
 
-typedef struct row_job {
-    const csr *M;
-    csr_float_row *multiply;
-    const float *X; /* side by side */
-    size_t n_rhs;
-    const float *delta; /* of the channel, or NULL */
-    const float *lost;  /* [n_rhs], weight . E */
-    float *P;           /* P[v stride + r] */
-    size_t stride;
-} row_job;
-
-static void do_row(const row_job *j, size_t row, size_t r) {
-    const uint64_t first = j->M->indptr[row], entries = j->M->indptr[row + 1] - first;
-    const uint32_t *indices = j->M->indices + first;
-    const float *data = j->M->data + first;
-    float sums[OPERATOR_PASS];
-    j->multiply(indices, data, entries, j->X, sums);
-    for (size_t v = 0; v < j->n_rhs; v++)
-        j->P[v * j->stride + r] = j->delta == NULL ? sums[v] : sums[v] + j->delta[row] * j->lost[v];
-}
-
-/* weight . E, in double and in one order. */
-static float lost_of(const sparse *self, const float *E) {
+/* a . b, in double and in one order. */
+static float dot(size_t n, const float *a, const float *b) {
     double sum = 0;
-    if (self->a.weight == NULL) return 0;
-    for (size_t p = 0; p < self->base.n; p++) sum += (double)self->a.weight[p] * (double)E[p];
+    for (size_t p = 0; p < n; p++) sum += (double)a[p] * (double)b[p];
     return (float)sum;
 }
 
-/* What the rows of one channel are multiplied with: E as it is, or side by side in work. */
-static const float *side_by_side(const lam_operator *op, size_t n_rhs, const float *E, size_t width,
-                                 void *work) {
-    const size_t stride = op->n_channels * op->n;
-    float *X = work;
-    if (width == 1) return E;
-    for (size_t p = 0; p < op->n; p++)
-        for (size_t v = 0; v < width; v++) X[p * width + v] = v < n_rhs ? E[v * stride + p] : 0;
-    return X;
-}
-
-/* A row that few others share what is put side by side with is faster without: a vector at a time, whose bits
- * are the same. */
-static bool rows_are_few(const csr *M, size_t n_rows) {
-    return (double)n_rows * (double)M->indptr[M->n] < (double)M->n * (double)M->n;
-}
-
-/* selected NULL: all rows. */
-static void multiply_together(const lam_operator *op, size_t n_rhs, const float *E, size_t n_rows,
-                              const uint32_t *selected, float *P, void *work) {
+/* P = M E + delta (weight . E), of all rows or (selected not NULL) some. */
+static void multiply(const lam_operator *op, size_t n_rhs, const float *E, size_t n_rows,
+                     const uint32_t *selected, float *P, void *work) {
     const sparse *self = (const sparse *)op;
     const size_t n = op->n, C = op->n_channels;
     for (size_t c = 0; c < C; c++) {
-        float lost[OPERATOR_PASS];
-        for (size_t v = 0; v < n_rhs; v++) lost[v] = lost_of(self, E + (v * C + c) * n);
-        const size_t width = csr_floats_width(n_rhs);
-        const row_job job = {.M = &self->a.M[c],
-                             .multiply = csr_floats_row(width),
-                             .X = side_by_side(op, n_rhs, E + c * n, width, work),
-                             .n_rhs = n_rhs,
-                             .delta = self->a.delta != NULL ? self->a.delta + c * n : NULL,
-                             .lost = lost,
-                             .P = P + c * n_rows,
-                             .stride = C * n_rows};
-        const bool many = op->n_threads > 1 && job.M->indptr[n] / n * n_rows * n_rhs > THREADS_WORTH;
-#pragma omp parallel for schedule(dynamic, 256) num_threads((int)op->n_threads) if (many)
-        for (size_t r = 0; r < n_rows; r++)
-            do_row(&job, selected != NULL ? operator_position(op, selected[r]) : r, r);
+        const sparse_pair M = {&self->a.M[c], &self->transposed[c], op->n_threads};
+        sparse_product(&M, n_rhs, E + c * n, C * n, n_rows, selected, op->position, P + c * n_rows,
+                       C * n_rows, work);
+        if (self->a.delta == NULL) continue;
+        const float *delta = self->a.delta + c * n;
+        for (size_t v = 0; v < n_rhs; v++) {
+            const float lost = dot(n, self->a.weight, E + (v * C + c) * n);
+            float *row = P + (v * C + c) * n_rows;
+            for (size_t r = 0; r < n_rows; r++)
+                row[r] += delta[selected != NULL ? operator_position(op, selected[r]) : r] * lost;
+        }
     }
-}
-
-static void multiply(const lam_operator *op, size_t n_rhs, const float *E, size_t n_rows,
-                     const uint32_t *selected, float *P, void *work) {
-    const size_t C = op->n_channels;
-    bool few = selected != NULL;
-    for (size_t c = 0; c < C; c++) few = few && rows_are_few(&((const sparse *)op)->a.M[c], n_rows);
-    if (!few) {
-        multiply_together(op, n_rhs, E, n_rows, selected, P, work);
-        return;
-    }
-    for (size_t v = 0; v < n_rhs; v++)
-        multiply_together(op, 1, E + v * C * op->n, n_rows, selected, P + v * C * n_rows, work);
 }
 
 static void sparse_apply(const lam_operator *op, size_t n_rhs, const float *E, float *P, void *work) {
@@ -238,28 +185,19 @@ static void sparse_apply_selected(const lam_operator *op, size_t n_rhs, const fl
 }
 
 /* w = M^T g + weight (delta . g) */
-static void adjoint_of_one(const sparse *self, size_t c, const float *g, float *w) {
-    const size_t n = self->base.n;
-    const csr *M = &self->a.M[c];
-    for (size_t p = 0; p < n; p++) w[p] = 0;
-    for (size_t row = 0; row < n; row++) {
-        const float g_row = g[row];
-        if (g_row == 0) continue;
-        for (uint64_t e = M->indptr[row]; e < M->indptr[row + 1]; e++) w[M->indices[e]] += M->data[e] * g_row;
-    }
-    if (self->a.delta == NULL) return;
-    const float *delta = self->a.delta + c * n;
-    double lost = 0;
-    for (size_t p = 0; p < n; p++) lost += (double)delta[p] * (double)g[p];
-    for (size_t p = 0; p < n; p++) w[p] += self->a.weight[p] * (float)lost;
-}
-
 static void sparse_apply_adjoint(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work) {
-    const size_t n = op->n;
-    (void)work;
-#pragma omp parallel for schedule(dynamic, 1) num_threads((int)op->n_threads) if (op->n_threads > 1)
-    for (size_t v = 0; v < n_rhs * op->n_channels; v++)
-        adjoint_of_one((const sparse *)op, v % op->n_channels, g + v * n, w + v * n);
+    const sparse *self = (const sparse *)op;
+    const size_t n = op->n, C = op->n_channels;
+    for (size_t c = 0; c < C; c++) {
+        const sparse_pair transposed = {&self->transposed[c], &self->a.M[c], op->n_threads};
+        sparse_product(&transposed, n_rhs, g + c * n, C * n, 0, NULL, NULL, w + c * n, C * n, work);
+        if (self->a.delta == NULL) continue;
+        for (size_t v = 0; v < n_rhs; v++) {
+            const float lost = dot(n, self->a.delta + c * n, g + (v * C + c) * n);
+            float *row = w + (v * C + c) * n;
+            for (size_t p = 0; p < n; p++) row[p] += self->a.weight[p] * lost;
+        }
+    }
 }
 
 static void sparse_describe(const lam_operator *op, operator_description *description) {

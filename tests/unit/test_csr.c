@@ -1,6 +1,7 @@
 /* Sparse rows: their product and what the check refuses. */
 #include "solver/operator/csr.h"
 #include "solver/operator/csr_floats.h"
+#include "solver/operator/sparse_product.h"
 #include "support/suite.h"
 
 #include <float.h>
@@ -64,6 +65,54 @@ START_TEST(products_of_floats_side_by_side) {
         }
     free(X);
     csr_free(&a);
+}
+END_TEST
+
+/* A batch of full, of nearly empty and of empty vectors: right, each with bits of its own, also where rows
+ * are chosen. */
+START_TEST(products_cost_what_they_touch) {
+    enum { N = 83, M = 16, CHOSEN = 5 };
+    static const uint32_t chosen[CHOSEN] = {82, 4, 0, 4, 61};
+    uint32_t map[N];
+    csr a = random_rows(N), columns;
+    lam_error error = {.message = ""};
+    ck_assert_int_eq(csr_transpose(&a, &columns, &error), LAM_OK);
+    ck_assert_msg(csr_check(&columns, a.indptr[N], "columns", &error) == LAM_OK, "%s", error.message);
+    float *X = calloc(N * M, sizeof *X), *Y = calloc(N * M, sizeof *Y), one[N], some[CHOSEN * M];
+    void *work = aligned_alloc(64, (sparse_product_work(N, M) + 63) / 64 * 64);
+    for (uint32_t i = 0; i < N; i++) map[i] = (i * 7 + 3) % N;
+    for (size_t v = 0; v < M; v++)
+        for (size_t j = 0; j < N; j++)
+            if (v % 3 == 0 || (v % 3 == 1 && j % 40 == v % 5)) X[v * N + j] = (float)random_double();
+    for (int adjoint = 0; adjoint < 2; adjoint++) {
+        const sparse_pair A = {adjoint ? &columns : &a, adjoint ? &a : &columns, 2};
+        sparse_product(&A, M, X, N, 0, NULL, NULL, Y, N, work);
+        for (size_t v = 0; v < M; v++) {
+            for (size_t i = 0; i < N; i++) {
+                double sum = 0, magnitude = 0;
+                for (uint64_t e = A.rows->indptr[i]; e < A.rows->indptr[i + 1]; e++) {
+                    const double product = (double)A.rows->data[e] * (double)X[v * N + A.rows->indices[e]];
+                    sum += product;
+                    magnitude += fabs(product);
+                }
+                ck_assert_double_le(fabs((double)Y[v * N + i] - sum), (N + 1) * FLT_EPSILON * magnitude);
+            }
+            sparse_product(&A, 1, X + v * N, N, 0, NULL, NULL, one, N, work);
+            ck_assert_mem_eq(one, Y + v * N, sizeof one);
+        }
+        for (int mapped = 0; mapped < 2; mapped++) {
+            sparse_product(&A, M, X, N, CHOSEN, chosen, mapped ? map : NULL, some, CHOSEN, work);
+            for (size_t v = 0; v < M; v++)
+                for (size_t r = 0; r < CHOSEN; r++)
+                    ck_assert_mem_eq(&some[v * CHOSEN + r], &Y[v * N + (mapped ? map[chosen[r]] : chosen[r])],
+                                     sizeof *some);
+        }
+    }
+    free(X);
+    free(Y);
+    free(work);
+    csr_free(&a);
+    csr_free(&columns);
 }
 END_TEST
 
@@ -148,6 +197,7 @@ int main(void) {
     tcase_set_timeout(tests, 120);
     tcase_add_test(tests, product_agrees_with_the_dense_one);
     tcase_add_test(tests, products_of_floats_side_by_side);
+    tcase_add_test(tests, products_cost_what_they_touch);
     tcase_add_test(tests, bad_rows_are_refused);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
