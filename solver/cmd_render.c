@@ -7,6 +7,7 @@
 #include "solver/picture.h"
 #include "solver/terminal.h"
 #include "solver/verbs.h"
+#include "solver/visible_view.h"
 
 #include <math.h>
 #include <omp.h>
@@ -100,9 +101,8 @@ static const option_row rows[] = {
      .value = "NAME",
      .doc = "radiosity (the default), irradiance or indirect; of --method 2msc, which need no light: "
             "coherence, from black for that of the least coherent patch to white for 1, or patch, a colour "
-            "for each",
-     .choices = "radiosity|irradiance|indirect|coherence|patch",
-     .later = "visible"},
+            "for each; of a store with form factors: visible, how many elements each one sees",
+     .choices = "radiosity|irradiance|indirect|coherence|patch|visible"},
     {.name = "camera",
      .kind = OPTION_CUSTOM,
      .offset = FIELD(camera),
@@ -298,8 +298,25 @@ done:
     return status;
 }
 
-static bool shows_patches(const fields *f) {
-    return strcmp(f->quantity, "coherence") == 0 || strcmp(f->quantity, "patch") == 0;
+static bool is_visible(const fields *f) {
+    return strcmp(f->quantity, "visible") == 0;
+}
+
+static bool needs_no_light(const fields *f) {
+    return strcmp(f->quantity, "coherence") == 0 || strcmp(f->quantity, "patch") == 0 || is_visible(f);
+}
+
+/* The values of --quantity visible, in colours up to the largest. */
+static lam_status visible_values(const fields *f, store *s, size_t n, terminal *t, float **values,
+                                 picture_look *look, lam_error *error) {
+    lam_status status = LAM_OK;
+    double mean, most;
+    TRY(visible_view_counts(s, n, values, &mean, &most, error));
+    *look = (picture_look){.width = view_width(f), .range = most > 0 ? round_up(most) : 1};
+    terminal_log(t, "an element sees %.3g others on average, %.6g at most; colours from 0 to %g", mean, most,
+                 look->range);
+done:
+    return status;
 }
 
 /* The values of --quantity coherence or patch, one channel or three, and how to show them. The least coherent
@@ -330,12 +347,15 @@ done:
     return status;
 }
 
-static lam_status render_patches(const char *path, const fields *f, terminal *t, lam_error *error) {
+static lam_status render_unlit(const char *path, const fields *f, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
     view v = {.s = NULL};
     picture_look look;
     TRY(view_open(path, f, &v, error));
-    TRY(patch_values(f, v.s, v.m.n, t, &v.values, &look, error));
+    if (is_visible(f))
+        TRY(visible_values(f, v.s, v.m.n, t, &v.values, &look, error));
+    else
+        TRY(patch_values(f, v.s, v.m.n, t, &v.values, &look, error));
     memset(v.lit, true, v.m.n);
     TRY(view_aim(f, strcmp(f->quantity, "patch") == 0 ? 3 : 1, false, &v, error));
     TRY(draw(f, &v, &look, t, error));
@@ -344,10 +364,10 @@ done:
     return status;
 }
 
-/* Names the options that a picture of patches has no use for. */
+/* Names the options that a picture without light has no use for. */
 static void log_unused(const fields *f, const option_result *given, terminal *t) {
     static const char *const of_light[] = {"emit", "emission", "sky", "exposure", "smooth", "false-color"};
-    const size_t count = strcmp(f->quantity, "patch") == 0 ? 6 : 5;
+    const size_t count = strcmp(f->quantity, "coherence") == 0 ? 5 : 6;
     for (size_t i = 0; i < count; i++)
         if (options_given(&verb, given, of_light[i]))
             terminal_log(t, "--quantity %s does not use --%s", f->quantity, of_light[i]);
@@ -367,9 +387,10 @@ int cmd_render(int argc, char **argv) {
     if (f.emit.count > 0 && f.emission != NULL)
         return options_usage(verb.name, "give --emit or --emission, not both");
     terminal_open(&t, verb.name, false, false);
-    if (shows_patches(&f)) {
+    if (needs_no_light(&f)) {
         if (strcmp(f.quantity, "patch") == 0) f.false_color = false; /* and no room for a legend */
-        if (render_patches(result.arguments[0], &f, &t, &error) != LAM_OK) return terminal_fail(&t, &error);
+        if (is_visible(&f)) f.false_color = true;
+        if (render_unlit(result.arguments[0], &f, &t, &error) != LAM_OK) return terminal_fail(&t, &error);
         log_unused(&f, &result, &t);
         return 0;
     }

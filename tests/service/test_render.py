@@ -10,9 +10,10 @@ import time
 import unittest
 import zlib
 
+import h5py
 import numpy
 
-from command import LAMBERT, lambert
+from command import LAMBERT, lambert, must
 
 BACKGROUND = 38
 GLOW = [word for group in ("floor", "ceiling", "wall-x0", "wall-x1", "wall-y0", "wall-y1", "block-1", "block-2",
@@ -205,7 +206,7 @@ class Render(unittest.TestCase):
                 (1, "has no patches; precompute it with --method 2msc",
                  [self.cornell, "-o", image, "--quantity", "coherence"]),
                 (1, "has no patches", [self.cornell, "-o", image, "--quantity", "patch"]),
-                (2, "not supported yet", [self.cornell, "-o", image, "--quantity", "visible"]),
+                (1, "precompute it with --keep-form-factors", [self.cornell, "-o", image, "--quantity", "visible"]),
                 (1, "has no sky", [self.cornell, "-o", image, "--sky", "a.npy"]),
                 (2, "not supported yet", [self.cornell, "-o", image, "--animate", "a.npy"]),
                 (2, "both", [self.cornell, "-o", image, "--emit", "lamp=1", "--emission", "a.npy"]),
@@ -256,6 +257,29 @@ class Render(unittest.TestCase):
         done = lambert("render", "--help")
         self.assertEqual(done.returncode, 0)
         self.assertIn("--false-color", done.stdout)
+
+
+class Visible(unittest.TestCase):
+    """How many elements each one sees, of both ways in which form factors are kept."""
+
+    def test_counts_and_colours(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for elements, storage in (600, "rows"), (10400, "upper"):
+                scene, store, image = (os.path.join(folder, name) for name in ("c.obj", "c.h5", "c.png"))
+                must("generate", "city", "--variant", 3, "--elements", elements, "-o", scene)
+                must("precompute", scene, "-o", store, "--rays", 64, "--probes", 0, "--method", "sparse",
+                     "--threshold", .01, "--keep-form-factors", "--quiet")
+                with h5py.File(store) as file:
+                    kept = file["form_factors"]
+                    self.assertEqual(kept.attrs["storage"].decode(), storage)
+                    counts = numpy.diff(kept["indptr"][()].astype(int))
+                    if storage == "upper":
+                        counts += numpy.bincount(kept["indices"][()], minlength=len(counts))
+                said = must("render", store, "--quantity", "visible", "--size", "200x150", "-o", image).stderr
+                self.assertIn(f"sees {counts.mean():.3g} others on average, {counts.max():.6g} at most", said)
+                self.assertEqual(decode_png(image).shape, (150, 200, 3))
+                said = must("render", store, "--quantity", "visible", "--emit", "roof=1", "-o", image).stderr
+                self.assertIn("visible does not use --emit", said)
 
 
 if __name__ == "__main__":
