@@ -6,6 +6,7 @@ import math
 import os
 import pathlib
 import re
+import resource
 import tempfile
 import unittest
 
@@ -76,7 +77,8 @@ class SkyWeather(unittest.TestCase):
         cls.horizontal = np.array([diffuse + direct * max(0, sine_of_altitude(2001, month, day, hour))
                                    for month, day, hour, direct, diffuse in cls.hours])
         # A square of four under the open sky: nothing else is there.
-        cls.write("square.obj", "mtllib square.mtl\no square\nusemtl grey\nv 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n")
+        cls.write("square.obj", "mtllib square.mtl\no square\nusemtl grey\n"
+                                "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n")
         cls.write("square.mtl", "newmtl grey\nKd 0.5 0.5 0.5\n")
         cls.store = cls.folder / "square.h5"
         must("precompute", cls.folder / "square.obj", "-o", cls.store, "--elements", 4, "--sky", "tregenza",
@@ -130,7 +132,7 @@ class SkyWeather(unittest.TestCase):
 
     def test_horizontal_direct_light(self):
         day = [h for h in self.hours if h[:2] == (6, 21)]
-        flat = [(m, d, h, direct * max(0, sine_of_altitude(2001, m, d, h)), diffuse) for m, d, h, direct, diffuse in day]
+        flat = [(*when, direct * max(0, sine_of_altitude(2001, *when)), diffuse) for *when, direct, diffuse in day]
         a, _ = self.sky(self.write("normal.wea", wea(day)))
         b, _ = self.sky(self.write("flat.wea", wea(flat, units=2)))
         np.testing.assert_allclose(b @ self.cosines(), a @ self.cosines(), rtol=1e-6, atol=950 * math.radians(.02))
@@ -236,6 +238,13 @@ class SkyWeather(unittest.TestCase):
         self.refused(1, "cannot be written", self.wea, "-o", self.folder / "no" / "where.npy")
         (self.folder / "folder.wea").mkdir(exist_ok=True)
         self.refused(1, "not a file", self.folder / "folder.wea", "-o", out)
+
+    def test_a_full_disk(self):
+        done = lambert("sky", self.wea, "-o", self.folder / "full.npy",
+                       preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100000, 100000)))
+        self.assertEqual((done.returncode, done.stdout), (1, ""))
+        self.assertIn("full.npy: cannot be written whole", done.stderr.splitlines()[-1])
+        self.assertEqual([name for name in os.listdir(self.folder) if "full" in name], [])
 
 
 if __name__ == "__main__":
