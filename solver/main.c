@@ -16,7 +16,7 @@ static const verb verbs[] = {
     {"precompute", cmd_precompute, "turn a scene into a store: the operator from emission to radiosity"},
     {"info", cmd_info, "say what a store holds and how exact it is"},
     {"classify", NULL, "say what kind of scene it is (not supported yet)"},
-    {"sky", NULL, "turn weather into the radiance of sky tiles (not supported yet)"},
+    {"sky", cmd_sky, "turn weather into the radiance of sky tiles"},
     {"solve", cmd_solve, "light a store and write the radiosity"},
     {"verify", cmd_verify, "check a store: checksums, invariants, error"},
     {"render", cmd_render, "picture a lighting"},

@@ -15,6 +15,7 @@ declare -A allowed=(
     [solver/matrix]="lambert/ store/ solver/progress.h solver/operator/ solver/matrix/"
     [solver/build]="lambert/ store/ solver/progress.h solver/clock.h solver/operator/ solver/matrix/ solver/build/"
     [solver/bench]="lambert/ store/ solver/progress.h solver/clock.h solver/operator/ solver/scene/ solver/formfactor/ solver/matrix/ solver/build/ solver/bench/"
+    [solver/daylight]="lambert/ store/ solver/progress.h solver/formfactor/sky.h solver/daylight/"
     [solver]="lambert/ store/ solver/"
     [server]="lambert/ store/ solver/operator/ server/"
 )
@@ -41,6 +42,7 @@ room_of() {
     solver/scene/*) echo solver/scene ;;
     solver/formfactor/*) echo solver/formfactor ;;
     solver/matrix/*) echo solver/matrix ;;
+    solver/daylight/*) echo solver/daylight ;;
     solver/bench/*) echo solver/bench ;;
     solver/build/*) echo solver/build ;;
     solver/*) echo solver ;;

@@ -66,7 +66,7 @@ class Usage(Case):
     def test_help_and_version(self):
         self.assertRegex(must("--version").stdout, r"^lambert \d+\.\d+\.\d+\n$")
         verbs = must("--help").stdout
-        for verb in ("generate", "precompute", "info", "solve", "verify", "render"):
+        for verb in ("generate", "precompute", "info", "sky", "solve", "verify", "render"):
             self.assertIn(verb, verbs)
             about = must(verb, "--help")
             self.assertIn("Usage: lambert " + verb, about.stdout)
@@ -153,7 +153,7 @@ class Usage(Case):
                 self.assertEqual(self.refused(2, wanted, *line.split()).stdout, "")
 
     def test_not_supported_yet(self):
-        for line in ("classify a.obj", "sky w.epw -o a.npy", "bench service",
+        for line in ("classify a.obj", "bench service",
                      "solve a.h5 --tolerance 1e-4", "solve a.h5 -o b.glb",
                      *("precompute a.obj -o b.h5 " + option for option in (
                          "--keep-form-factors=compressed", 

@@ -1,0 +1,33 @@
+#include "solver/daylight/sun.h"
+
+#include <math.h>
+
+#define DEGREE (M_PI / 180)
+
+/* Days from noon of 1 January 2000 to the midnight at which a day begins. A year here begins with March,
+ * so that a leap day is its last: 153 days make five months of 31, 30, 31, 30 and 31. */
+static double days_since_2000(int year, int month, int day) {
+    const long back = month <= 2, y = year - back, m = month - 3 + 12 * back;
+    const long days = 365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + day;
+    return (double)(days - 730426) - .5;
+}
+
+sun_position sun_at(double latitude, double longitude, double time_zone, int year, int month, int day,
+                    double hour) {
+    const double ut = hour - time_zone;
+    const double n = days_since_2000(year, month, day) + ut / 24;
+    /* Mean longitude L, mean anomaly g, ecliptic longitude l, obliquity of the ecliptic e. */
+    const double L = 280.460 + .9856474 * n, g = (357.528 + .9856003 * n) * DEGREE;
+    const double l = (L + 1.915 * sin(g) + .020 * sin(2 * g)) * DEGREE, e = (23.439 - 4e-7 * n) * DEGREE;
+    const double ascension = atan2(cos(e) * sin(l), cos(l)), declination = asin(sin(e) * sin(l));
+    /* Sidereal time, in hours at Greenwich, in radians here. */
+    const double sidereal = ((6.697375 + .0657098242 * n + ut) * 15 + longitude) * DEGREE;
+    const double h = sidereal - ascension, phi = latitude * DEGREE;
+    sun_position s = {.distance = 1.00014 - .01671 * cos(g) - .00014 * cos(2 * g)};
+    s.direction[0] = -cos(declination) * sin(h);
+    s.direction[1] = sin(declination) * cos(phi) - cos(declination) * sin(phi) * cos(h);
+    s.direction[2] = sin(declination) * sin(phi) + cos(declination) * cos(phi) * cos(h);
+    s.altitude = atan2(s.direction[2], hypot(s.direction[0], s.direction[1]));
+    s.azimuth = atan2(s.direction[0], s.direction[1]);
+    return s;
+}

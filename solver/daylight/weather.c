@@ -1,0 +1,322 @@
+#include "solver/daylight/weather.h"
+
+#include <ctype.h>
+#include <errno.h>
+#include <limits.h>
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+
+/* More than the sun gives above the air: what a sensor can show for a moment under broken clouds. */
+#define RADIATION_MOST 3000
+#define MISSING_RADIATION 9999
+#define MISSING_DEW_POINT 99.9
+
+/* A text file by lines. */
+typedef struct reader {
+    const char *path;
+    FILE *stream;
+    char *line; /* without its end */
+    size_t room, number;
+} reader;
+
+void weather_free(weather *w) {
+    free(w->hours);
+    *w = (weather){0};
+}
+
+static bool ends_in(const char *path, const char *extension) {
+    const size_t length = strlen(path), tail = strlen(extension);
+    return length > tail && strcasecmp(path + length - tail, extension) == 0;
+}
+
+bool weather_is_named(const char *path) {
+    return ends_in(path, ".epw") || ends_in(path, ".wea");
+}
+
+static void reader_close(reader *r) {
+    free(r->line);
+    if (r->stream != NULL) fclose(r->stream);
+}
+
+static lam_status reader_open(reader *r, lam_error *error) {
+    lam_status status = LAM_OK;
+    struct stat about;
+    r->stream = fopen(r->path, "rb");
+    if (r->stream == NULL || fstat(fileno(r->stream), &about) != 0)
+        FAIL(error, LAM_ERR_IO, "%s: %s", r->path, strerror(errno));
+    if (!S_ISREG(about.st_mode)) FAIL(error, LAM_ERR_IO, "%s: not a file", r->path);
+done:
+    return status;
+}
+
+/* The next line without its end and what blanks stand before that; *more is false where the file ends. */
+static lam_status reader_next(reader *r, bool *more, lam_error *error) {
+    lam_status status = LAM_OK;
+    errno = 0;
+    const ssize_t length = getline(&r->line, &r->room, r->stream);
+    *more = length >= 0;
+    if (length < 0) {
+        if (ferror(r->stream)) FAIL(error, LAM_ERR_IO, "%s: %s", r->path, strerror(errno));
+        if (!feof(r->stream)) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory for a line", r->path);
+        goto done;
+    }
+    r->number++;
+    if (strlen(r->line) != (size_t)length)
+        FAIL(error, LAM_ERR_FORMAT, "%s: line %zu holds a zero byte; not a text file", r->path, r->number);
+    for (size_t end = (size_t)length; end > 0 && isspace((unsigned char)r->line[end - 1]);)
+        r->line[--end] = '\0';
+done:
+    return status;
+}
+
+/* The next line, which must be there: what is its name. */
+static lam_status reader_need(reader *r, const char *what, lam_error *error) {
+    bool more = false;
+    const lam_status status = reader_next(r, &more, error);
+    if (status != LAM_OK || more) return status;
+    return status_fail(error, LAM_ERR_FORMAT, "%s: ends at line %zu, before its line %s", r->path, r->number,
+                       what);
+}
+
+/* Takes the rows that are left at most, at least 1. */
+static lam_status allocate_hours(reader *r, weather *w, lam_error *error) {
+    size_t lines = 1;
+    const long here = ftell(r->stream);
+    for (int c; (c = getc(r->stream)) != EOF;) lines += c == '\n';
+    if (here < 0 || ferror(r->stream) || fseek(r->stream, here, SEEK_SET) != 0)
+        return status_fail(error, LAM_ERR_IO, "%s: cannot be read: %s", r->path, strerror(errno));
+    w->hours = memory_allocate(lines, sizeof *w->hours, r->path, error);
+    return w->hours == NULL ? LAM_ERR_MEMORY : LAM_OK;
+}
+
+/* A field as a finite number from low to high; blanks around it are nothing. */
+static lam_status read_number(const reader *r, const char *what, const char *text, double low, double high,
+                              double *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *end = NULL;
+    while (*text == ' ' || *text == '\t') text++;
+    /* strtod reads "inf", "nan" and hexadecimal too. */
+    const double value = strtod(text, &end);
+    const size_t digits = strspn(text, "+-.0123456789eE");
+    while (*end == ' ' || *end == '\t') end++;
+    if (digits == 0 || *end != '\0' || strspn(text + digits, " \t") != strlen(text + digits))
+        FAIL(error, LAM_ERR_FORMAT, "%s: line %zu: %s is \"%.40s\", must be a number from %g to %g", r->path,
+             r->number, what, text, low, high);
+    if (!(value >= low && value <= high))
+        FAIL(error, LAM_ERR_FORMAT, "%s: line %zu: %s = %.10g, must be from %g to %g", r->path, r->number,
+             what, value, low, high);
+    *out = value;
+done:
+    return status;
+}
+
+static lam_status read_whole(const reader *r, const char *what, const char *text, int low, int high, int *out,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    double value = 0;
+    TRY(read_number(r, what, text, low, high, &value, error));
+    if (value != floor(value))
+        FAIL(error, LAM_ERR_FORMAT, "%s: line %zu: %s = %g, must be a whole number from %d to %d", r->path,
+             r->number, what, value, low, high);
+    *out = (int)value;
+done:
+    return status;
+}
+
+/* Radiation is not taken for missing where it only is too much. */
+static lam_status read_radiation(const reader *r, const char *what, const char *text, double *out,
+                                 lam_error *error) {
+    lam_status status = LAM_OK;
+    double value = 0;
+    if (read_number(r, what, text, MISSING_RADIATION, MISSING_RADIATION, &value, NULL) == LAM_OK)
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s: line %zu: %s is missing (%d), must be from 0 to %d W/m2; fill the gap or take another file",
+             r->path, r->number, what, MISSING_RADIATION, RADIATION_MOST);
+    TRY(read_number(r, what, text, 0, RADIATION_MOST, out, error));
+done:
+    return status;
+}
+
+static bool is_leap(int year) {
+    return (year % 4 == 0 && year % 100 != 0) || year % 400 == 0;
+}
+
+static lam_status read_date(const reader *r, const char *month, const char *day, weather_hour *h,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    static const int days[12] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
+    TRY(read_whole(r, "month", month, 1, 12, &h->month, error));
+    const int most = days[h->month - 1] + (h->month == 2 && is_leap(h->year));
+    TRY(read_whole(r, "day", day, 1, most, &h->day, error));
+done:
+    return status;
+}
+
+/* Cuts text at a mark; fields beyond most are left out. How many there are. */
+static size_t cut(char *text, char mark, const char **fields, size_t most) {
+    size_t n = 0;
+    for (char *at = text; at != NULL && n < most; n++) {
+        fields[n] = at;
+        at = strchr(at, mark);
+        if (at != NULL) *at++ = '\0';
+    }
+    return n;
+}
+
+/* The columns of an EPW that are read, from 0. */
+enum { YEAR, MONTH, DAY, HOUR, DEW_POINT = 7, DIRECT = 14, DIFFUSE = 15, ROW_FIELDS };
+
+static lam_status read_epw_row(reader *r, weather_hour *h, lam_error *error) {
+    lam_status status = LAM_OK;
+    const char *fields[ROW_FIELDS];
+    int hour = 0;
+    const size_t n = cut(r->line, ',', fields, ROW_FIELDS);
+    if (n < ROW_FIELDS)
+        FAIL(error, LAM_ERR_FORMAT, "%s: line %zu has %zu fields between commas, needs at least %d", r->path,
+             r->number, n, ROW_FIELDS);
+    TRY(read_whole(r, "year (field 1)", fields[YEAR], 1900, 2100, &h->year, error));
+    TRY(read_date(r, fields[MONTH], fields[DAY], h, error));
+    TRY(read_whole(r, "hour (field 4)", fields[HOUR], 1, 24, &hour, error));
+    h->hour = hour - .5;
+    TRY(read_number(r, "dew point (field 8)", fields[DEW_POINT], -100, 100, &h->dew_point, error));
+    if (h->dew_point >= MISSING_DEW_POINT) h->dew_point = NAN;
+    TRY(read_radiation(r, "direct normal radiation (field 15)", fields[DIRECT], &h->direct, error));
+    TRY(read_radiation(r, "diffuse horizontal radiation (field 16)", fields[DIFFUSE], &h->diffuse, error));
+done:
+    return status;
+}
+
+static lam_status read_epw_header(reader *r, weather *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    static const char *const names[8] = {"LOCATION",
+                                         "DESIGN CONDITIONS",
+                                         "TYPICAL/EXTREME PERIODS",
+                                         "GROUND TEMPERATURES",
+                                         "HOLIDAYS/DAYLIGHT SAVINGS",
+                                         "COMMENTS 1",
+                                         "COMMENTS 2",
+                                         "DATA PERIODS"};
+    const char *fields[10];
+    int per_hour = 0;
+    for (int k = 0; k < 8; k++) {
+        TRY(reader_need(r, names[k], error));
+        /* A mark of UTF-8 may stand before the first. */
+        char *line = r->line + (k == 0 && strncmp(r->line, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0);
+        const size_t n = cut(line, ',', fields, 10);
+        if (n == 0 || strcasecmp(fields[0], names[k]) != 0)
+            FAIL(error, LAM_ERR_FORMAT, "%s: line %zu begins with \"%.40s\", an EPW has %s there", r->path,
+                 r->number, line, names[k]);
+        if (k != 0 && k != 7) continue;
+        if (n < (k == 0 ? 10 : 3))
+            FAIL(error, LAM_ERR_FORMAT, "%s: line %zu: %s has %zu fields, needs %d", r->path, r->number,
+                 names[k], n, k == 0 ? 10 : 3);
+        if (k == 7) {
+            TRY(read_whole(r, "records an hour (field 3)", fields[2], 1, INT_MAX, &per_hour, error));
+            if (per_hour != 1)
+                FAIL(error, LAM_ERR_FORMAT, "%s: line %zu: %d records an hour, must be 1; take hourly means",
+                     r->path, r->number, per_hour);
+            continue;
+        }
+        snprintf(w->place, sizeof w->place, "%s", fields[1]);
+        TRY(read_number(r, "latitude (field 7)", fields[6], -90, 90, &w->latitude, error));
+        TRY(read_number(r, "longitude (field 8)", fields[7], -180, 180, &w->longitude, error));
+        TRY(read_number(r, "time zone (field 9)", fields[8], -14, 14, &w->time_zone, error));
+        TRY(read_number(r, "elevation (field 10)", fields[9], -1000, 9999.9, &w->elevation, error));
+    }
+done:
+    return status;
+}
+
+static lam_status read_wea_row(reader *r, bool *leap, weather_hour *h, lam_error *error) {
+    lam_status status = LAM_OK;
+    const char *fields[6];
+    size_t n = 0;
+    char *rest = NULL;
+    for (char *word = strtok_r(r->line, " \t", &rest); word != NULL && n < 6;
+         word = strtok_r(NULL, " \t", &rest))
+        fields[n++] = word;
+    if (n != 5)
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s: line %zu must hold five numbers: month day hour direct-normal diffuse-horizontal", r->path,
+             r->number);
+    h->year = 2000;
+    TRY(read_date(r, fields[0], fields[1], h, error));
+    *leap = *leap || (h->month == 2 && h->day == 29);
+    TRY(read_number(r, "hour", fields[2], 0, 24, &h->hour, error));
+    TRY(read_radiation(r, "direct radiation", fields[3], &h->direct, error));
+    TRY(read_radiation(r, "diffuse horizontal radiation", fields[4], &h->diffuse, error));
+    h->dew_point = NAN;
+done:
+    return status;
+}
+
+/* In a WEA west is positive, and its time zone is a meridian. */
+static lam_status read_wea_header(reader *r, weather *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    static const struct {
+        const char *name;
+        double low, high;
+    } lines[6] = {{"place", 0, 0},
+                  {"latitude", -90, 90},
+                  {"longitude", -180, 180},
+                  {"time_zone", -210, 210},
+                  {"site_elevation", -1000, 9999.9},
+                  {"weather_data_file_units", 1, 2}};
+    double values[6] = {0};
+    for (int k = 0; k < 6; k++) {
+        TRY(reader_need(r, lines[k].name, error));
+        const size_t length = strlen(lines[k].name);
+        if (strncmp(r->line, lines[k].name, length) != 0 ||
+            (r->line[length] != ' ' && r->line[length] != '\t' && r->line[length] != '\0'))
+            FAIL(error, LAM_ERR_FORMAT, "%s: line %zu begins with \"%.40s\", a WEA has %s there", r->path,
+                 r->number, r->line, lines[k].name);
+        const char *value = r->line + length;
+        while (*value == ' ' || *value == '\t') value++;
+        if (k == 0)
+            snprintf(w->place, sizeof w->place, "%s", value);
+        else
+            TRY(read_number(r, lines[k].name, value, lines[k].low, lines[k].high, &values[k], error));
+    }
+    if (values[5] != 1 && values[5] != 2)
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s: line %zu: %s = %g, must be 1 (direct light facing the sun) or 2 (on a horizontal plane)",
+             r->path, r->number, lines[5].name, values[5]);
+    w->latitude = values[1];
+    w->longitude = values[2] == 0 ? 0 : -values[2];
+    w->time_zone = values[3] == 0 ? 0 : -values[3] / 15;
+    w->elevation = values[4];
+    w->direct_is_horizontal = values[5] == 2;
+done:
+    return status;
+}
+
+lam_status weather_read(const char *path, weather *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    reader r = {.path = path};
+    weather w = {0};
+    bool more = true, leap = false;
+    const bool epw = ends_in(path, ".epw");
+    TRY(reader_open(&r, error));
+    TRY(epw ? read_epw_header(&r, &w, error) : read_wea_header(&r, &w, error));
+    TRY(allocate_hours(&r, &w, error));
+    for (;;) {
+        TRY(reader_next(&r, &more, error));
+        if (!more) break;
+        if (r.line[0] == '\0') continue;
+        TRY(epw ? read_epw_row(&r, &w.hours[w.n], error) : read_wea_row(&r, &leap, &w.hours[w.n], error));
+        w.n++;
+    }
+    if (w.n == 0) FAIL(error, LAM_ERR_FORMAT, "%s: no hours after its header of %d lines", path, epw ? 8 : 6);
+    for (size_t i = 0; i < w.n && !epw; i++) w.hours[i].year = leap ? 2000 : 2001;
+    *out = w;
+    w = (weather){0};
+done:
+    weather_free(&w);
+    reader_close(&r);
+    return status;
+}

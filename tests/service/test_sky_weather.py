@@ -1,0 +1,251 @@
+"""From a weather file to light on a floor: `lambert sky`, what it writes, what it refuses, and that `lambert solve`
+gives a horizontal square under the open sky what the file says."""
+
+import datetime
+import math
+import os
+import pathlib
+import re
+import resource
+import tempfile
+import unittest
+
+import h5py
+import numpy as np
+
+from command import lambert, must
+
+LATITUDE, LONGITUDE, ZONE = 37.5, -122.25, -8
+DAYS = (31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
+
+
+def sine_of_altitude(year, month, day, hour):
+    """Of the sun over the place above, by the formulas of Meeus, Astronomical Algorithms, ch. 25 and 28 (low accuracy,
+    good to .01 degrees), which are not those of the program."""
+    days = (datetime.date(year, month, day) - datetime.date(2000, 1, 1)).days - .5 + (hour - ZONE) / 24
+    T = days / 36525
+    L, M = math.radians(280.46646 + 36000.76983 * T), math.radians(357.52911 + 35999.05029 * T - .0001537 * T * T)
+    centre = ((1.914602 - .004817 * T) * math.sin(M) + (.019993 - .000101 * T) * math.sin(2 * M)
+              + .000289 * math.sin(3 * M))
+    node = math.radians(125.04 - 1934.136 * T)
+    along = L + math.radians(centre - .00569 - .00478 * math.sin(node))
+    tilt = math.radians(23.439291 - .0130042 * T + .00256 * math.cos(node))
+    declination = math.asin(math.sin(tilt) * math.sin(along))
+    y, e = math.tan(tilt / 2) ** 2, .016708634 - .000042037 * T
+    equation = (y * math.sin(2 * L) - 2 * e * math.sin(M) + 4 * e * y * math.sin(M) * math.cos(2 * L)
+                - y * y / 2 * math.sin(4 * L) - 1.25 * e * e * math.sin(2 * M))
+    turn = math.radians(15 * (hour - 12) + LONGITUDE - 15 * ZONE) + equation
+    phi = math.radians(LATITUDE)
+    return math.sin(phi) * math.sin(declination) + math.cos(phi) * math.cos(declination) * math.cos(turn)
+
+
+def a_year():
+    """(month, day, hour, direct, diffuse) of a made-up year, every hour: clear, broken and overcast by turns."""
+    rng = np.random.default_rng(11)
+    for month in range(1, 13):
+        for day in range(1, DAYS[month - 1] + 1):
+            cloud = rng.random()
+            for hour in range(24):
+                up = max(0, sine_of_altitude(2001, month, day, hour + .5))
+                clear = 950 * up ** .3 if up > .02 else 0
+                yield (month, day, hour + .5, round(clear * max(0, 1 - 1.6 * cloud)),
+                       round(up * (90 + 350 * cloud * (1 - .6 * cloud))))
+
+
+def wea(hours, latitude=LATITUDE, longitude=-LONGITUDE, zone=-15 * ZONE, units=1):
+    head = (f"place Somewhere_XX\nlatitude {latitude}\nlongitude {longitude}\ntime_zone {zone}\nsite_elevation 2.0\n"
+            f"weather_data_file_units {units}\n")
+    return head + "".join(f"{m} {d} {h:.3f} {direct} {diffuse}\n" for m, d, h, direct, diffuse in hours)
+
+
+def epw(hours, dew=99.9):
+    head = (f"LOCATION,Somewhere,XX,USA,TMY3,0,{LATITUDE},{LONGITUDE},{ZONE},2.0\nDESIGN CONDITIONS,0\n"
+            "TYPICAL/EXTREME PERIODS,0\nGROUND TEMPERATURES,0\nHOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0\nCOMMENTS 1,\n"
+            "COMMENTS 2,\nDATA PERIODS,1,1,Data,Sunday, 1/ 1,12/31\n")
+    return head + "".join(f"2001,{m},{d},{int(h + .5)},0,?,15.0,{dew},60,101300,0,0,300,0,{direct},{diffuse},0,0,0,0\n"
+                          for m, d, h, direct, diffuse in hours)
+
+
+class SkyWeather(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
+        cls.hours = list(a_year())
+        cls.wea = cls.write("year.wea", wea(cls.hours))
+        cls.horizontal = np.array([diffuse + direct * max(0, sine_of_altitude(2001, month, day, hour))
+                                   for month, day, hour, direct, diffuse in cls.hours])
+        # A square of four under the open sky: nothing else is there.
+        cls.write("square.obj", "mtllib square.mtl\no square\nusemtl grey\n"
+                                "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n")
+        cls.write("square.mtl", "newmtl grey\nKd 0.5 0.5 0.5\n")
+        cls.store = cls.folder / "square.h5"
+        must("precompute", cls.folder / "square.obj", "-o", cls.store, "--elements", 4, "--sky", "tregenza",
+             "--method", "exact", "--probes", 0, "--quality", "high")
+
+    @classmethod
+    def write(cls, name, text):
+        path = cls.folder / name
+        path.write_text(text)
+        return path
+
+    def sky(self, weather, *options):
+        out = self.folder / "sky.npy"
+        done = must("sky", weather, "-o", out, *options)
+        return np.load(out), done
+
+    def refused(self, status, wanted, *arguments):
+        before = sorted(os.listdir(self.folder))
+        done = lambert("sky", *arguments)
+        self.assertEqual((done.returncode, done.stdout), (status, ""), done.stderr)
+        self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+        self.assertTrue(done.stderr.startswith("lambert sky: "), done.stderr)
+        self.assertIn(wanted, done.stderr)
+        self.assertEqual(sorted(os.listdir(self.folder)), before)
+
+    def cosines(self):
+        with h5py.File(self.store) as f:
+            return f["sky/tiles"][:, 8]
+
+    def test_a_year(self):
+        skies, done = self.sky(self.wea)
+        self.assertEqual((skies.dtype, skies.shape), (np.dtype("<f4"), (8760, 145)))
+        self.assertGreaterEqual(skies.min(), 0)
+        got = skies.astype(float) @ self.cosines()
+        # Hour by hour: single precision, and two hundredths of a degree of a sun of 950 W/m2.
+        np.testing.assert_allclose(got, self.horizontal, rtol=1e-6, atol=950 * math.radians(.02))
+        self.assertEqual(((got > 0) != (self.horizontal > 0)).sum(), 0)
+        said = re.search(r"diffuse ([\d.]+) \+ direct ([\d.]+) = ([\d.]+) kWh/m2", done.stderr)
+        self.assertAlmostEqual(float(said[1]), sum(h[4] for h in self.hours) / 1000, delta=.06)
+        self.assertAlmostEqual(float(said[3]), got.sum() / 1000, delta=.06)
+        self.assertIn("Somewhere_XX: 37.50 degrees north, 122.25 west, UTC-8", done.stderr)
+        self.assertIn(f"{(self.horizontal > 0).sum()} hours with light", done.stderr)
+        self.assertNotIn("warning", done.stderr)
+        self.assertEqual(done.stdout, f"{self.folder / 'sky.npy'}: 8760 skies of 145 tiles (tregenza), W/(m2 sr)\n")
+
+    def test_epw_says_the_same(self):
+        from_wea, _ = self.sky(self.wea)
+        from_epw, done = self.sky(self.write("year.epw", epw(self.hours)))
+        np.testing.assert_array_equal(from_epw, from_wea)
+        self.assertIn("Somewhere: 37.50 degrees north, 122.25 west, UTC-8", done.stderr)
+
+    def test_horizontal_direct_light(self):
+        day = [h for h in self.hours if h[:2] == (6, 21)]
+        flat = [(*when, direct * max(0, sine_of_altitude(2001, *when)), diffuse) for *when, direct, diffuse in day]
+        a, _ = self.sky(self.write("normal.wea", wea(day)))
+        b, _ = self.sky(self.write("flat.wea", wea(flat, units=2)))
+        np.testing.assert_allclose(b @ self.cosines(), a @ self.cosines(), rtol=1e-6, atol=950 * math.radians(.02))
+
+    def test_tiles(self):
+        day = self.write("day.wea", wea([h for h in self.hours if h[:2] in ((3, 20), (6, 21))]))
+        for name, count in ("reinhart:1", 145), ("reinhart:3", 1297), ("grid:12x11", 132), ("grid:1x1", 1):
+            skies, done = self.sky(day, "--tiles", name)
+            self.assertEqual(skies.shape, (48, count))
+            self.assertIn(f"{count} tiles ({name})", done.stdout)
+        np.testing.assert_allclose(skies[:, 0] * np.pi, self.sky(day)[0] @ self.cosines(), rtol=1e-5)
+
+    def test_the_sun_goes_from_east_to_west(self):
+        day = [(6, 21, h + .5, 800 if 6 <= h <= 17 else 0, 60 if 6 <= h <= 17 else 0) for h in range(24)]
+        skies, _ = self.sky(self.write("clear.wea", wea(day)), "--model", "perez")
+        with h5py.File(self.store) as f:
+            centres = f["sky/tiles"][:, :3]
+        for hour, (east, up) in {7: (1, .48), 12: (0, .95), 16: (-1, .5)}.items():
+            x, y, z = centres[skies[hour].argmax()]
+            self.assertTrue(x * east >= 0 and abs(z - up) < .15, (hour, x, y, z))
+            if east:
+                self.assertGreater(abs(x), .4)
+        self.assertLess(centres[skies[11].argmax(), 1], .1)  # noon is in the south
+
+    def test_end_to_end(self):
+        sky = self.folder / "end.npy"
+        must("sky", self.wea, "-o", sky)
+        out = self.folder / "light.npy"
+        must("solve", self.store, "--sky", sky, "--quantity", "irradiance", "-o", out)
+        light = np.load(out)
+        self.assertEqual(light.shape, (8760, 4))
+        # Measured to the noise of the form factors with tiles.
+        self.assertAlmostEqual(light.mean(axis=1).sum() / self.horizontal.sum(), 1, delta=.03)
+
+    def test_photometric(self):
+        skies, _ = self.sky(self.wea)
+        light, done = self.sky(self.wea, "--photometric")
+        self.assertIn("cd/m2", done.stdout)
+        ratio = (light @ self.cosines()).sum() / (skies @ self.cosines()).sum()
+        self.assertTrue(90 < ratio < 130, ratio)
+        self.assertAlmostEqual(float(re.search(r"([\d.]+) lm/W", done.stderr)[1]), ratio, delta=.1)
+        self.assertEqual(((light > 0) & (skies == 0)).sum(), 0)
+        # Dew: dry air and wet air give another light; unknown is 2 cm of water, a dew point of 10.97 degrees.
+        text = {dew: self.write(f"dew{dew}.epw", epw(self.hours, dew)) for dew in (99.9, 10.9735, 24, -20)}
+        lights = {dew: self.sky(path, "--photometric")[0] for dew, path in text.items()}
+        np.testing.assert_array_equal(lights[99.9], light)
+        np.testing.assert_allclose(lights[10.9735], light, rtol=1e-4)
+        self.assertGreater(np.abs(lights[24] - light).max(), .01 * light.max())
+        np.testing.assert_array_equal(self.sky(text[24])[0], skies)  # radiation asks for no dew point
+
+    def test_sun_below_the_horizon(self):
+        path = self.write("late.wea", wea([(6, 21, 12.5, 800, 100), (6, 21, 22.5, 30, 0), (6, 21, 23.5, 50, 5)]))
+        skies, done = self.sky(path)
+        self.assertEqual(skies[1].max(), 0)
+        self.assertAlmostEqual(float(skies[2] @ self.cosines()), 5, delta=1e-4)
+        self.assertIn("lambert sky: warning: 2 hours have direct light (at most 50 W/m2) though the sun is below the "
+                      "horizon", done.stderr)
+
+    def test_polar(self):
+        night = [(12, d, h + .5, 100 if d == 5 else 0, 0) for d in range(1, 21) for h in range(24)]
+        path = self.write("night.wea", wea(night, latitude=80, longitude=0, zone=0))
+        self.refused(1, "night.wea: the sky is dark all year: of 480 hours none has diffuse light", path, "-o",
+                     self.folder / "night.npy")
+        dusk = self.write("dusk.wea", wea(night[:-1] + [(12, 20, 12.5, 0, 1)], latitude=80, longitude=0, zone=0))
+        skies, _ = self.sky(dusk)
+        self.assertEqual((skies.max(axis=1) > 0).sum(), 1)
+
+    def test_a_sign_wrong(self):
+        _, done = self.sky(self.write("sign.wea", wea(self.hours[3600:3700], longitude=LONGITUDE)))
+        self.assertRegex(done.stderr, r"warning: the time zone UTC-8 is 118 degrees from the longitude 122\.25 .*sign")
+
+    def test_wrong_usage(self):
+        out = self.folder / "none.npy"
+        for wanted, arguments in (
+                ("too few arguments", ["-o", out]), ("no -o", [self.wea]),
+                ("must end in .epw or .wea", [self.folder / "square.obj", "-o", out]),
+                ("must end in .npy", [self.wea, "-o", self.folder / "none.h5"]),
+                ("--tiles none: must be tregenza, reinhart:MF or grid:AxB", [self.wea, "-o", out, "--tiles", "none"]),
+                ("from 1 to 16", [self.wea, "-o", out, "--tiles", "reinhart:17"]),
+                ("--tiles grid:12: must be grid:AxB", [self.wea, "-o", out, "--tiles", "grid:12"]),
+                ("--model", [self.wea, "-o", out, "--model", "cie"])):
+            self.refused(2, wanted, *arguments)
+        text = must("sky", "--help").stdout
+        for option in "output tiles model photometric".split():
+            self.assertRegex(text, r"--" + option + r"\b")
+
+    def test_wrong_files(self):
+        out = self.folder / "none.npy"
+        good = wea(self.hours[:30]).splitlines(keepends=True)
+        for name, text, wanted in (
+                ("row.wea", "".join(good[:20]) + "1 1 4.5 0\n", "row.wea: line 21 must hold five numbers"),
+                ("value.wea", "".join(good[:20]) + "1 1 4.5 0 -1\n", "line 21: diffuse horizontal radiation = -1"),
+                ("head.wea", "".join(good[1:]), "head.wea: line 1 begins with"),
+                ("month.wea", "".join(good[:6]) + "0 1 4.5 0 0\n", "line 7: month = 0, must be from 1 to 12"),
+                ("gap.epw", epw(self.hours[:30]).replace(",0,0,0,0,0,0\n", ",9999,0,0,0,0,0\n", 1),
+                 "gap.epw: line 9: direct normal radiation (field 15) is missing (9999)"),
+                ("empty.epw", "", "empty.epw: ends at line 0"),
+                ("wea.epw", "".join(good), "an EPW has LOCATION there"),
+                ("binary.wea", "\0\1\2", "zero byte")):
+            path = self.write(name, text)
+            self.refused(1, wanted, path, "-o", out)
+        self.refused(1, "No such file", self.folder / "absent.wea", "-o", out)
+        self.refused(1, "cannot be written", self.wea, "-o", self.folder / "no" / "where.npy")
+        (self.folder / "folder.wea").mkdir(exist_ok=True)
+        self.refused(1, "not a file", self.folder / "folder.wea", "-o", out)
+
+    def test_a_full_disk(self):
+        done = lambert("sky", self.wea, "-o", self.folder / "full.npy",
+                       preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100000, 100000)))
+        self.assertEqual((done.returncode, done.stdout), (1, ""))
+        self.assertIn("full.npy: cannot be written whole", done.stderr.splitlines()[-1])
+        self.assertEqual([name for name in os.listdir(self.folder) if "full" in name], [])
+
+
+if __name__ == "__main__":
+    unittest.main()
