@@ -9,6 +9,9 @@
 /* Rows that a thread takes at a time; sums over all rows are made of theirs, in their order. */
 enum { ROWS = 64 };
 
+/* Multiplications in a product with F below which threads cost more than they bring. */
+enum { THREADS_WORTH = 200000 };
+
 /* Starts from the true residual at most, and sweeps of each. What single precision cannot bring below this
  * has not settled. */
 enum { MOST_STARTS = 6, MOST_SWEEPS = 2000 };
@@ -22,6 +25,7 @@ typedef struct block {
     float *e, *h0, *u, *r, *p, *q, *t;
     float *root_area, *root_rho; /* [n] */
     double *sums;                /* [chunks][width] */
+    bool many;                   /* enough for more than one thread */
     size_t products;
 } block;
 
@@ -55,6 +59,7 @@ static void block_free(block *b) {
 
 static lam_status block_make(const light_columns *c, size_t width, block *b, lam_error *error) {
     *b = (block){.c = c, .n = c->n, .width = width, .multiply = csr_floats_row(width)};
+    b->many = c->F->indptr[c->n] * width > THREADS_WORTH;
     float **const all[] = {&b->e, &b->h0, &b->u, &b->r, &b->p, &b->q, &b->t};
     for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
         *all[k] = vectors(c->n, width, error);
@@ -87,12 +92,12 @@ static void multiply_S(block *b, const float *x, finish_row *finish, double *sum
     const size_t n = b->n, width = b->width, n_chunks = chunks_of(b);
     const csr *F = b->c->F;
     b->products++;
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (b->many)
     for (size_t i = 0; i < n; i++) {
         const float by = 1 / b->root_area[i];
         for (size_t v = 0; v < width; v++) b->t[i * width + v] = x[i * width + v] * by;
     }
-#pragma omp parallel for schedule(dynamic, 1)
+#pragma omp parallel for schedule(dynamic, 1) if (b->many)
     for (size_t k = 0; k < n_chunks; k++) {
         const size_t last = (k + 1) * ROWS < n ? (k + 1) * ROWS : n;
         float row[CSR_FLOATS_WIDTH];
@@ -139,7 +144,7 @@ static void finish_answer(block *b, size_t i, const float *S_x, double *sums) {
 
 /* q = e + R^1/2 u */
 static void lit(block *b) {
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (b->many)
     for (size_t i = 0; i < b->n; i++)
         for (size_t v = 0; v < b->width; v++)
             b->q[i * b->width + v] = b->e[i * b->width + v] + b->root_rho[i] * b->u[i * b->width + v];
@@ -152,7 +157,7 @@ static void advance(block *b, const float *alpha, double *uu, double *rr) {
         float *x = which == 0 ? b->u : b->r;
         const float *y = which == 0 ? b->p : b->q;
         double *sums = which == 0 ? uu : rr;
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (b->many)
         for (size_t k = 0; k < n_chunks; k++) {
             const size_t last = (k + 1) * ROWS < b->n ? (k + 1) * ROWS : b->n;
             double *chunk = b->sums + k * width;
@@ -183,7 +188,7 @@ static lam_status descend(block *b, double tolerance, double *rr, double *uu, la
     for (size_t sweep = 0; sweep < MOST_SWEEPS && !all_below(b, rr, uu, tolerance); sweep++) {
         if (progress_cancelled(b->c->progress)) return status_fail(error, LAM_ERR_CANCELLED, "cancelled");
             /* q holds R^1/2 p until a row of the product takes its place: rows are read from t alone. */
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (b->many)
         for (size_t i = 0; i < b->n; i++)
             for (size_t v = 0; v < b->width; v++)
                 b->q[i * b->width + v] = b->root_rho[i] * b->p[i * b->width + v];
@@ -197,7 +202,7 @@ static lam_status descend(block *b, double tolerance, double *rr, double *uu, la
         advance(b, alpha, uu, next);
         for (size_t v = 0; v < b->width; v++) beta[v] = rr[v] > 0 ? (float)(next[v] / rr[v]) : 0;
         memcpy(rr, next, b->width * sizeof *rr);
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (b->many)
         for (size_t i = 0; i < b->n; i++)
             for (size_t v = 0; v < b->width; v++)
                 b->p[i * b->width + v] = b->r[i * b->width + v] + beta[v] * b->p[i * b->width + v];
@@ -309,7 +314,7 @@ static lam_status jacobi_one(block *b, void *context, lam_error *error) {
         for (size_t v = 0; v < b->width; v++) b->u[i * b->width + v] = b->c->rho[i] * b->h0[i * b->width + v];
     for (size_t sweep = 0; sweep <= sweeps; sweep++) {
         if (progress_cancelled(b->c->progress)) return status_fail(error, LAM_ERR_CANCELLED, "cancelled");
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (b->many)
         for (size_t i = 0; i < b->n * b->width; i++) b->q[i] = b->e[i] + b->u[i];
         if (sweep + 1 < sweeps)
             multiply_S(b, b->q, finish_sweep, unused);

@@ -216,6 +216,7 @@ END_TEST
 int main(void) {
     Suite *suite = suite_create("columns");
     TCase *cases = tcase_create("columns");
+    tcase_set_timeout(cases, 120); /* threads that wait for a core that others have */
     tcase_add_test(cases, light_is_that_of_the_dense_solution);
     tcase_add_test(cases, bits_do_not_depend_on_threads);
     tcase_add_test(cases, jacobi_sweeps_as_the_equation_says);
