@@ -4,6 +4,7 @@
 #include "store/status.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -82,6 +83,45 @@ lam_status csr_check(const csr *a, size_t nnz, const char *name, lam_error *erro
     if (a->indptr[a->n] != nnz)
         FAIL(error, LAM_ERR_FORMAT, "%s: rows end at %zu, must be %zu", name, (size_t)a->indptr[a->n], nnz);
 done:
+    return status;
+}
+
+enum { NAME_MOST = 64 };
+
+static const char *array_name(const char *name, const char *part, char text[NAME_MOST]) {
+    snprintf(text, NAME_MOST, "%s/%s", name, part);
+    return text;
+}
+
+lam_status csr_save(const csr *a, const char *name, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t ends = a->n + 1, entries = (size_t)a->indptr[a->n];
+    char text[NAME_MOST];
+    TRY(store_write(s, array_name(name, "indptr", text), STORE_U64, 1, &ends, a->indptr, error));
+    TRY(store_write(s, array_name(name, "indices", text), STORE_U32, 1, &entries, a->indices, error));
+    TRY(store_write(s, array_name(name, "data", text), STORE_F32, 1, &entries, a->data, error));
+done:
+    return status;
+}
+
+lam_status csr_load(store *s, const char *name, size_t n, csr *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    void *indptr = NULL, *indices = NULL, *data = NULL;
+    size_t dims[STORE_MAX_RANK] = {SIZE_MAX}, ends[STORE_MAX_RANK] = {n + 1};
+    char text[NAME_MOST];
+    TRY(store_read(s, array_name(name, "indptr", text), STORE_U64, 1, ends, &indptr, error));
+    TRY(store_read(s, array_name(name, "indices", text), STORE_U32, 1, dims, &indices, error));
+    TRY(store_read(s, array_name(name, "data", text), STORE_F32, 1, dims, &data, error));
+    const uint64_t *last = indptr;
+    if (last[n] != dims[0])
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s/indptr ends at %zu, must be %zu", store_path(s), name,
+             (size_t)last[n], dims[0]);
+    *out = (csr){.n = n, .indptr = indptr, .indices = indices, .data = data};
+    indptr = indices = data = NULL;
+done:
+    free(indptr);
+    free(indices);
+    free(data);
     return status;
 }
 

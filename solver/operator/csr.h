@@ -28,6 +28,11 @@ lam_status csr_reserve(csr *a, size_t entries, lam_error *error);
  */
 lam_status csr_check(const csr *a, size_t nnz, const char *name, lam_error *error);
 
+/* The three arrays in a store: NAME/indptr [n+1] u64, NAME/indices u32, NAME/data f32. Loading fills n,
+ * checks that indptr ends where the others do and leaves the rest to csr_check. Errors: as store_read. */
+lam_status csr_save(const csr *a, const char *name, store *s, lam_error *error);
+lam_status csr_load(store *s, const char *name, size_t n, csr *out, lam_error *error);
+
 /* Y[first..last) = A X for rows first <= i < last: X and Y are [n][m] row-major, double. */
 void csr_multiply_rows(const csr *a, size_t first, size_t last, size_t m, const double *X, double *Y);
 

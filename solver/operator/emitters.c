@@ -2,6 +2,7 @@
  * is stored: O(ns). Making, loading and saving; what it answers is in emitters_apply.c. */
 #include "solver/operator/emitters.h"
 
+#include "solver/operator/csr.h"
 #include "solver/operator/sky.h"
 
 #include <math.h>
@@ -151,25 +152,13 @@ done:
 /* --- the store ---------------------------------------------------------------------------------------- */
 
 static lam_status load_emission(store *s, size_t rows, emitter_arrays *a, lam_error *error) {
-    lam_status status = LAM_OK;
-    void *ends = NULL, *elements = NULL, *values = NULL;
-    size_t dims[STORE_MAX_RANK] = {SIZE_MAX}, count[STORE_MAX_RANK] = {rows + 1};
-    TRY(store_read(s, "/operator/E/indptr", STORE_U64, 1, count, &ends, error));
-    TRY(store_read(s, "/operator/E/indices", STORE_U32, 1, dims, &elements, error));
-    TRY(store_read(s, "/operator/E/data", STORE_F32, 1, dims, &values, error));
-    const uint64_t *last = ends;
-    if (last[rows] != dims[0])
-        FAIL(error, LAM_ERR_FORMAT, "%s: /operator/E/indptr ends at %zu, must be %zu", store_path(s),
-             (size_t)last[rows], dims[0]);
-    a->ends = ends;
-    a->elements = elements;
-    a->values = values;
-    ends = elements = values = NULL;
-done:
-    free(ends);
-    free(elements);
-    free(values);
-    return status;
+    csr E;
+    const lam_status status = csr_load(s, "/operator/E", rows, &E, error);
+    if (status != LAM_OK) return status;
+    a->ends = E.indptr;
+    a->elements = E.indices;
+    a->values = E.data;
+    return LAM_OK;
 }
 
 static lam_status emitters_load(store *s, size_t n, size_t n_channels, const float *reflectance,
@@ -206,8 +195,9 @@ static lam_status emitters_save(const lam_operator *op, store *s, lam_error *err
     lam_status status = LAM_OK;
     const emitters *self = (const emitters *)op;
     const emitter_arrays *a = &self->a;
-    const size_t n = op->n, C = op->n_channels, rows = C * a->s, ends = rows + 1;
-    const size_t entries = (size_t)a->ends[rows], dims[3] = {C, a->s, n}, tiles[3] = {C, a->s, a->n_tiles};
+    const size_t n = op->n, C = op->n_channels, rows = C * a->s;
+    const csr E = {.n = rows, .indptr = a->ends, .indices = a->elements, .data = a->values};
+    const size_t dims[3] = {C, a->s, n}, tiles[3] = {C, a->s, a->n_tiles};
     float *B = memory_allocate(rows, n * sizeof *B, "/operator/B", error), *by_row = NULL;
     by_row = memory_allocate(n, a->s * sizeof *by_row, "/operator/B", error);
     if (B == NULL || by_row == NULL) TRY(LAM_ERR_MEMORY);
@@ -221,9 +211,7 @@ static lam_status emitters_save(const lam_operator *op, store *s, lam_error *err
             B[row * n + a->elements[e]] += a->values[e];
     TRY(store_write_texts(s, "/operator/names", a->s, (const char *const *)a->names, error));
     TRY(store_write(s, "/operator/B", STORE_F32, 3, dims, B, error));
-    TRY(store_write(s, "/operator/E/indptr", STORE_U64, 1, &ends, a->ends, error));
-    TRY(store_write(s, "/operator/E/indices", STORE_U32, 1, &entries, a->elements, error));
-    TRY(store_write(s, "/operator/E/data", STORE_F32, 1, &entries, a->values, error));
+    TRY(csr_save(&E, "/operator/E", s, error));
     if (a->L != NULL) TRY(store_write(s, "/operator/L", STORE_F32, 3, tiles, a->L, error));
 done:
     free(B);

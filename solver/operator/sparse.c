@@ -71,36 +71,17 @@ done:
 /* --- the store -------------------------------------------------------------------------------------------
  */
 
-static lam_status load_rows(store *s, size_t n, size_t c, csr *M, lam_error *error) {
-    lam_status status = LAM_OK;
-    char name[3][48];
-    void *indptr = NULL, *indices = NULL, *data = NULL;
-    static const char *const parts[3] = {"indptr", "indices", "data"};
-    for (int k = 0; k < 3; k++) snprintf(name[k], sizeof name[k], "/operator/M/%zu/%s", c, parts[k]);
-    size_t dims[STORE_MAX_RANK] = {SIZE_MAX}, ends[STORE_MAX_RANK] = {n + 1};
-    TRY(store_read(s, name[0], STORE_U64, 1, ends, &indptr, error));
-    TRY(store_read(s, name[1], STORE_U32, 1, dims, &indices, error));
-    TRY(store_read(s, name[2], STORE_F32, 1, dims, &data, error));
-    const uint64_t *last = indptr;
-    if (last[n] != dims[0])
-        FAIL(error, LAM_ERR_FORMAT, "%s: %s ends at %zu, must be %zu", store_path(s), name[0],
-             (size_t)last[n], dims[0]);
-    *M = (csr){.n = n, .indptr = indptr, .indices = indices, .data = data};
-    indptr = indices = data = NULL;
-done:
-    free(indptr);
-    free(indices);
-    free(data);
-    return status;
-}
-
 static lam_status sparse_load(store *s, size_t n, size_t n_channels, const float *reflectance,
                               lam_operator **op, lam_error *error) {
     lam_status status = LAM_OK;
+    char name[48];
     void *delta = NULL, *weight = NULL;
     sparse_arrays arrays = {.M = memory_allocate(n_channels, sizeof *arrays.M, "operator", error)};
     if (arrays.M == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t c = 0; c < n_channels; c++) TRY(load_rows(s, n, c, &arrays.M[c], error));
+    for (size_t c = 0; c < n_channels; c++) {
+        snprintf(name, sizeof name, "/operator/M/%zu", c);
+        TRY(csr_load(s, name, n, &arrays.M[c], error));
+    }
     if (store_has(s, "/operator/delta")) {
         TRY(store_read(s, "/operator/delta", STORE_F32, 2, (size_t[STORE_MAX_RANK]){n_channels, n}, &delta,
                        error));
@@ -121,17 +102,11 @@ done:
 static lam_status sparse_save(const lam_operator *op, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     const sparse *self = (const sparse *)op;
-    const size_t n = op->n, ends = n + 1, both[2] = {op->n_channels, n};
+    const size_t n = op->n, both[2] = {op->n_channels, n};
     char name[48];
     for (size_t c = 0; c < op->n_channels; c++) {
-        const csr *M = &self->a.M[c];
-        const size_t entries = (size_t)M->indptr[n];
-        snprintf(name, sizeof name, "/operator/M/%zu/indptr", c);
-        TRY(store_write(s, name, STORE_U64, 1, &ends, M->indptr, error));
-        snprintf(name, sizeof name, "/operator/M/%zu/indices", c);
-        TRY(store_write(s, name, STORE_U32, 1, &entries, M->indices, error));
-        snprintf(name, sizeof name, "/operator/M/%zu/data", c);
-        TRY(store_write(s, name, STORE_F32, 1, &entries, M->data, error));
+        snprintf(name, sizeof name, "/operator/M/%zu", c);
+        TRY(csr_save(&self->a.M[c], name, s, error));
     }
     if (self->a.delta == NULL) goto done;
     TRY(store_write(s, "/operator/delta", STORE_F32, 2, both, self->a.delta, error));

@@ -2,25 +2,11 @@
  * an emission, and what a store may not be. */
 #include "solver/operator/emitters.h"
 #include "solver/operator/sky.h"
+#include "support/failing_memory.h"
 #include "support/operator_file.h"
 #include "support/suite.h"
 
 enum { N = 61, C = 2, S = 7, M = 5, MANY = 35 };
-
-/* --- memory that fails when told to -------------------------------------------------------------------- */
-
-static long allocations_left = -1; /* negative: no end */
-
-/* Takes the place of the one in store/memory.c. */
-void *memory_allocate(size_t count, size_t size, const char *what, lam_error *cause) {
-    size_t bytes;
-    if (!size_multiply(count, size, &bytes) || bytes > PTRDIFF_MAX || allocations_left == 0) {
-        status_fail(cause, LAM_ERR_MEMORY, "%s: cannot allocate %zu x %zu bytes", what, count, size);
-        return NULL;
-    }
-    if (allocations_left > 0) allocations_left--;
-    return calloc(bytes + (bytes == 0), 1);
-}
 
 static void setup(void) {
     file_setup();

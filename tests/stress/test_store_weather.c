@@ -1,4 +1,5 @@
 /* A store in bad weather: damaged and foreign files, a full disk, no memory, a killed writer. */
+#include "support/failing_memory.h"
 #include "support/store_sample.h"
 #include "support/suite.h"
 
@@ -10,21 +11,6 @@
 
 static char folder[64], path[256];
 static lam_error error;
-
-/* --- memory that fails when told to ------------------------------------------------------------------------
- */
-
-static long allocations_left; /* negative: no end */
-
-/* Takes the place of the one in store/memory.c. */
-void *memory_allocate(size_t count, size_t size, const char *what, lam_error *cause) {
-    if (allocations_left == 0) {
-        status_fail(cause, LAM_ERR_MEMORY, "%s: cannot allocate %zu x %zu bytes", what, count, size);
-        return NULL;
-    }
-    if (allocations_left > 0) allocations_left--;
-    return calloc(count + (count == 0), size + (size == 0));
-}
 
 static void setup(void) {
     sample_folder(folder);
