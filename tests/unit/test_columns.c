@@ -192,6 +192,30 @@ START_TEST(nearly_no_loss_ends) {
 }
 END_TEST
 
+/* A row of elements that see only their neighbours: light goes from one end to the other in as many bounces,
+ * and conjugate gradients need far fewer products. */
+START_TEST(gradients_are_conjugate) {
+    enum { LINE = 400 };
+    uint64_t indptr[LINE + 1] = {0};
+    uint32_t indices[2 * LINE];
+    float data[2 * LINE], rho[LINE], E[LINE] = {1}, T[LINE];
+    double area[LINE];
+    size_t entries = 0;
+    for (uint32_t i = 0; i < LINE; i++) {
+        area[i] = 1;
+        rho[i] = .95f;
+        if (i > 0) indices[entries] = i - 1, data[entries++] = .5f;
+        if (i + 1 < LINE) indices[entries] = i + 1, data[entries++] = .5f;
+        indptr[i + 1] = entries;
+    }
+    const csr F = {.n = LINE, .indptr = indptr, .indices = indices, .data = data};
+    const light_columns c = {.n = LINE, .F = &F, .area = area, .rho = rho, .m = 1, .E = E};
+    columns_report report;
+    ck_assert_int_eq(columns_solve(&c, 1e-6, T, &report, NULL), LAM_OK);
+    ck_assert_uint_le(report.sweeps, 55); /* 44; by directions that are not conjugate 84 */
+}
+END_TEST
+
 static bool at_once(void *context) {
     (void)context;
     return true;
@@ -221,6 +245,7 @@ int main(void) {
     tcase_add_test(cases, bits_do_not_depend_on_threads);
     tcase_add_test(cases, jacobi_sweeps_as_the_equation_says);
     tcase_add_test(cases, nearly_no_loss_ends);
+    tcase_add_test(cases, gradients_are_conjugate);
     tcase_add_test(cases, stops_when_told);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
