@@ -54,6 +54,8 @@ typedef struct form_factor_options {
     const char *sky;          /* a tiling that what leaves is binned by, at no further ray; NULL: none */
     double ground_albedo;
     sky_bounce *bounce; /* form_factors_make's own: where the rays put what leaves */
+    size_t only_first;  /* of rays_count and hemicube_trace: rows of so many of the order alone, the others
+                           stay empty; not with a scratch folder; 0: all */
 } form_factor_options;
 
 /* Finds the form factors by a recipe, merges the two estimates of each pair by reciprocity and repairs the

@@ -184,6 +184,7 @@ lam_status hemicube_trace(const hemicube *h, const mesh *m, const visibility *v,
                              .stage = options->stage,
                              .m = m,
                              .recipe = &options->recipe,
+                             .only_first = options->only_first,
                              .scratch = options->scratch,
                              .scratch_name = options->scratch_name};
     return rows_make(&maker, order, rows, leaving, absorbed, error);

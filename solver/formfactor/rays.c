@@ -62,6 +62,7 @@ lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
                              .stage = options->stage,
                              .m = m,
                              .recipe = &options->recipe,
+                             .only_first = options->only_first,
                              .scratch = options->scratch,
                              .scratch_name = options->scratch_name};
     return rows_make(&maker, order, counts, leaving, absorbed, error);

@@ -75,6 +75,7 @@ typedef struct rows_run {
     const row_maker *maker;
     const uint32_t *order;
     found_rows *rows;
+    size_t n_wanted; /* elements of the order whose rows are made */
     double *leaving, *absorbed;
     row_file *file;         /* NULL: all in memory */
     size_t chunk, of_block; /* elements in a chunk, chunks in a block */
@@ -99,7 +100,7 @@ static void run_fail(rows_run *run, lam_status status, const lam_error *error) {
 static void make_chunk(rows_run *run, size_t c, row_pool *pool) {
     const row_maker *maker = run->maker;
     const size_t n = run->rows->n, first = c * run->chunk,
-                 last = first + run->chunk < n ? first + run->chunk : n;
+                 last = first + run->chunk < run->n_wanted ? first + run->chunk : run->n_wanted;
     lam_error error = {0};
     bool enough = true;
     pool->used = 0;
@@ -152,7 +153,7 @@ static void tell_progress(rows_run *run, size_t elements) {
 #pragma omp critical(rows_progress)
     {
         run->finished += elements;
-        progress_report(maker->progress, maker->stage, (double)run->finished / (double)run->rows->n);
+        progress_report(maker->progress, maker->stage, (double)run->finished / (double)run->n_wanted);
         if (progress_cancelled(maker->progress)) {
             lam_error error = {0};
             run_fail(run, status_fail(&error, LAM_ERR_CANCELLED, "cancelled"), &error);
@@ -181,11 +182,18 @@ lam_status rows_make(const row_maker *maker, const uint32_t *order, found_rows *
     const size_t n = maker->m->n, n_pools = (size_t)omp_get_max_threads();
     row_pool *pools = NULL;
     found_rows found = {.n = n, .kind = maker->kind};
-    rows_run run = {.maker = maker, .order = order, .rows = &found, .leaving = leaving, .absorbed = absorbed};
+    const bool some = maker->only_first > 0 && maker->only_first < n && maker->scratch == NULL;
+    const size_t n_wanted = some ? maker->only_first : n;
+    rows_run run = {.maker = maker,
+                    .order = order,
+                    .rows = &found,
+                    .n_wanted = n_wanted,
+                    .leaving = leaving,
+                    .absorbed = absorbed};
     run.chunk = at_least_one(CHUNK_RAYS / maker->rays);
     if (run.chunk > CHUNK_MOST) run.chunk = CHUNK_MOST;
     run.of_block = at_least_one(BLOCK_RAYS / maker->rays / run.chunk);
-    const size_t n_chunks = (n + run.chunk - 1) / run.chunk,
+    const size_t n_chunks = (n_wanted + run.chunk - 1) / run.chunk,
                  n_blocks = (n_chunks + run.of_block - 1) / run.of_block;
     TRY(pools_create(maker, n_pools, &pools, error));
     found.rows = memory_allocate(n, sizeof *found.rows, "form factor rows", error);
@@ -208,7 +216,7 @@ lam_status rows_make(const row_maker *maker, const uint32_t *order, found_rows *
         make_chunk(&run, c, &pools[omp_get_thread_num()]);
         if (found.chunks[c] == NULL) continue;
         finish_chunk(&run, c);
-        tell_progress(&run, c + 1 < n_chunks ? run.chunk : n - c * run.chunk);
+        tell_progress(&run, c + 1 < n_chunks ? run.chunk : n_wanted - c * run.chunk);
     }
     if (run.status != LAM_OK) {
         if (error != NULL) *error = run.error;

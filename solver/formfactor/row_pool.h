@@ -52,15 +52,16 @@ typedef struct row_maker {
     const char *stage;
     const mesh *m;
     const recipe *recipe;
-    scratch *scratch; /* NULL: all in memory */
+    size_t only_first; /* elements of the order; the others' rows stay empty; 0: all, as with scratch */
+    scratch *scratch;  /* NULL: all in memory */
     const char *scratch_name;
 } row_maker;
 
-/* Makes the rows of all elements; the same for any number of threads, with a scratch folder and without, and
- * whatever of them was there already. order is [n], the sequence in which elements are worked on; leaving and
- * absorbed are [n]. The caller frees rows with found_rows_free.
- * Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED, and those of row_file.h; what is in the scratch folder by then
- * stays there. */
+/* Makes the rows of all elements, or of the first of the order; the same for any number of threads, with a
+ * scratch folder and without, and whatever of them was there already. order is [n], the sequence in which
+ * elements are worked on; leaving and absorbed are [n]. The caller frees rows with found_rows_free. Errors:
+ * LAM_ERR_MEMORY, LAM_ERR_CANCELLED, and those of row_file.h; what is in the scratch folder by then stays
+ * there. */
 lam_status rows_make(const row_maker *maker, const uint32_t *order, found_rows *rows, double *leaving,
                      double *absorbed, lam_error *error);
 

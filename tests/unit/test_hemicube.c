@@ -1,5 +1,6 @@
 /* Hemicubes: delta form factors, what one centroid sees against closed forms, and the invariants. */
 #include "solver/formfactor/hemicube.h"
+#include "solver/formfactor/seen.h"
 #include "support/box.h"
 #include "support/found.h"
 #include "support/plates.h"
@@ -275,6 +276,35 @@ START_TEST(bad_requests_are_refused) {
 }
 END_TEST
 
+/* Some rows in any order have the entries that they have among all of them, one way. */
+START_TEST(some_rows_are_those_of_all) {
+    mesh m = box_mesh((const double[3]){2, 1, 1}, 3, .5f);
+    const recipe ways[] = {{.method = RECIPE_HEMICUBE, .resolution = 32},
+                           {.method = RECIPE_RAYS, .rays = 64, .seed = 5},
+                           {.method = RECIPE_PAIRS}};
+    const uint32_t chosen[] = {40, 3, 17, 0};
+    enum { CHOSEN = sizeof chosen / sizeof *chosen };
+    lam_error error = {0};
+    uint32_t order[54];
+    for (uint32_t i = 0; i < 54; i++) order[i] = i;
+    ck_assert_uint_eq(m.n, 54);
+    for (size_t w = 0; w < 2; w++) {
+        size_t all[54], some[CHOSEN];
+        ck_assert_msg(seen_count(&m, &ways[w], order, 54, NULL, "all", all, &error) == LAM_OK, "%s",
+                      error.message);
+        ck_assert_msg(seen_count(&m, &ways[w], chosen, CHOSEN, NULL, "some", some, &error) == LAM_OK, "%s",
+                      error.message);
+        for (size_t k = 0; k < CHOSEN; k++) ck_assert_uint_eq(some[k], all[chosen[k]]);
+        if (w == 0) /* all but its own wall, nine elements, and every one is larger than a pixel */
+            for (size_t i = 0; i < 54; i++) ck_assert_uint_eq(all[i], 45);
+    }
+    size_t none[CHOSEN];
+    ck_assert_int_eq(seen_count(&m, &ways[2], chosen, CHOSEN, NULL, "none", none, &error), LAM_ERR_ARGUMENT);
+    ck_assert_int_eq(seen_count(&m, &ways[0], chosen, 0, NULL, "none", none, &error), LAM_ERR_ARGUMENT);
+    mesh_free(&m);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("hemicube");
     TCase *cases = tcase_create("hemicube");
@@ -288,6 +318,7 @@ int main(void) {
                         sizeof plates_places / sizeof *plates_places);
     tcase_add_test(cases, closed_box_keeps_the_invariants);
     tcase_add_test(cases, same_bits_for_any_threads_and_order);
+    tcase_add_test(cases, some_rows_are_those_of_all);
     tcase_add_test(cases, bad_requests_are_refused);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
