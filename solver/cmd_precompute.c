@@ -237,7 +237,9 @@ int cmd_precompute(int argc, char **argv) {
         .coherence = f.coherence,
         .min_area = f.min_area,
         .proximity = strcmp(f.assign, "proximity") == 0,
-        .threshold = f.threshold,
+        .threshold = strcmp(f.method, "auto") == 0 && !options_given(&precompute_verb, &given, "threshold")
+                         ? 0
+                         : f.threshold,
         .correction = f.correction,
         .emitters = f.emitters,
         .memory = f.memory,

@@ -32,7 +32,7 @@ typedef struct precompute_options {
     uint64_t rank;              /* 0: by epsilon */
     double coherence, min_area; /* of 2msc; 0: not given */
     bool proximity;             /* of 2msc */
-    double threshold;           /* of sparse */
+    double threshold;           /* of sparse; 0 with auto: what suits epsilon */
     const char *correction;     /* of sparse: "none", "delta", "discarded" */
     const char *emitters;       /* FILE, group=NAME, sky; or NULL */
     panel_precision precision;  /* of the stored operator */

@@ -51,7 +51,7 @@ typedef struct build_options {
     size_t rank;                /* 0: by epsilon; else exactly min(rank, n) columns */
     double coherence, min_area; /* 2msc: smallest coherence, smallest area of a patch, m^2; 0: not given */
     bool proximity;             /* 2msc: elements belong to the nearest patch */
-    double threshold;           /* sparse: entries below it are left out */
+    double threshold;           /* sparse: entries below it are left out; auto: 0 for what suits epsilon */
     sparse_correction correction;
     size_t memory; /* bytes it may use; 0: no limit */
     uint64_t seed; /* of random sketches */

@@ -1,12 +1,13 @@
 /* The list of methods and the choice among them. */
 #include "solver/build/build.h"
+#include "solver/build/classify.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 /* Up to this many elements the whole inverse is small, exact, and built in well under a second. */
-enum { AUTO_EXACT_ELEMENTS = 1024, EXACT_ELEMENTS = 8192 };
+enum { AUTO_EXACT_ELEMENTS = 1024 };
 
 static const build_method *const methods[] = {&build_exact, &build_low_rank, &build_two_mesh, &build_sparse,
                                               &build_emitters};
@@ -54,23 +55,17 @@ static double low_rank_share(size_t n, size_t rank, size_t n_channels) {
     return (2 * (double)n * k + (n_channels > 1 ? (double)n_channels * k * k : 0)) / whole;
 }
 
-/* auto: exact while it is small, else low-rank; exact again where the rank turns out to save nothing. */
-static lam_status build_auto(const build_problem *problem, const build_options *options, lam_operator **op,
-                             build_report *report, lam_error *error) {
+/* Low-rank, or exact where the rank turns out to save nothing. */
+static lam_status build_by_rank(const build_problem *problem, const build_options *options,
+                                const scene_class *looked, lam_operator **op, build_report *report,
+                                lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n;
     lam_operator *low_rank = NULL;
-    if (n <= AUTO_EXACT_ELEMENTS) {
-        TRY(build_exact.build(problem, options, op, report, error));
-        snprintf(report->reason, sizeof report->reason,
-                 "exact: %zu elements are few enough (up to %d) to keep the whole inverse", n,
-                 AUTO_EXACT_ELEMENTS);
-        return LAM_OK;
-    }
     TRY(build_low_rank.build(problem, options, &low_rank, report, error));
     const size_t rank = report->rank;
     const double share = low_rank_share(n, rank, problem->n_channels);
-    if (share >= 1 && n <= EXACT_ELEMENTS) {
+    if (share >= 1 && isfinite(looked->exact_cost)) {
         const double spent = report->factorize_seconds, bound = report->epsilon;
         TRY(build_exact.build(problem, options, op, report, error));
         report->factorize_seconds = spent;
@@ -80,12 +75,48 @@ static lam_status build_auto(const build_problem *problem, const build_options *
     } else {
         *op = low_rank;
         low_rank = NULL;
-        snprintf(report->reason, sizeof report->reason,
-                 "low-rank: rank %zu of %zu, epsilon %.3g, takes %.1f %% of the memory of the whole inverse",
-                 rank, n, report->epsilon, 100 * share);
+        snprintf(
+            report->reason, sizeof report->reason,
+            "low-rank: F is %.3g %% dense; rank %zu of %zu, epsilon %.3g, takes %.3g %% of the memory of "
+            "the whole inverse",
+            100 * looked->density, rank, n, report->epsilon, 100 * share);
     }
 done:
     lam_operator_close(low_rank);
+    return status;
+}
+
+/* auto: exact while it is small, else what classify.h finds. */
+static lam_status build_auto(const build_problem *problem, const build_options *options, lam_operator **op,
+                             build_report *report, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = problem->n;
+    if (n <= AUTO_EXACT_ELEMENTS) {
+        TRY(build_exact.build(problem, options, op, report, error));
+        snprintf(report->reason, sizeof report->reason,
+                 "exact: %zu elements are few enough (up to %d) to keep the whole inverse", n,
+                 AUTO_EXACT_ELEMENTS);
+        return LAM_OK;
+    }
+    scene_class looked;
+    const classify_options look = {.epsilon = options->epsilon,
+                                   .threshold = options->threshold,
+                                   .memory = options->memory,
+                                   .seed = options->seed,
+                                   .progress = options->progress};
+    TRY(classify_scene(problem, &look, &looked, error));
+    if (strcmp(looked.method, "low-rank") == 0 || options->rank > 0) {
+        TRY(build_by_rank(problem, options, &looked, op, report, error));
+    } else if (strcmp(looked.method, "sparse") == 0) {
+        build_options how = *options;
+        how.threshold = looked.threshold;
+        TRY(build_sparse.build(problem, &how, op, report, error));
+        memcpy(report->reason, looked.reason, sizeof report->reason);
+    } else {
+        TRY(build_exact.build(problem, options, op, report, error));
+        memcpy(report->reason, looked.reason, sizeof report->reason);
+    }
+done:
     return status;
 }
 

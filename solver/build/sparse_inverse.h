@@ -25,4 +25,32 @@ lam_status sparse_inverse_rows(const build_problem *problem, const float *rho, d
 lam_status sparse_inverse_forecast(const build_problem *problem, const float *rho, double threshold,
                                    double *entries, lam_error *error);
 
+/* Some rows of M - I, exact to single precision, by which a sparse inverse is judged: those of positions
+ * k n / count, rows [count][n] by position. */
+typedef struct inverse_rows {
+    size_t n, count;
+    float *rows;
+    double square, sum; /* of all */
+} inverse_rows;
+
+void inverse_rows_free(inverse_rows *r);
+
+/* Finds them as columns, which is the same by reciprocity: A_i/rho_i (M - I)_ij is symmetric. Cost: a few
+ * dozen products of F with a block of vectors. Errors: those of columns_solve. */
+lam_status inverse_rows_find(const build_problem *problem, const float *rho, const progress *told,
+                             inverse_rows *out, lam_error *error);
+
+/* What a sparse inverse has and lacks, as its rows tell: entries of all rows; of single elements' light
+ * |M - M~|_F over |M - I|_F; of light from everywhere the same of the sums of rows. */
+typedef struct sparse_sample {
+    double entries, single, everywhere;
+} sparse_sample;
+
+/* If nothing but the entries of M below the threshold were missing: fewer entries than it takes. */
+sparse_sample inverse_rows_truncated(const inverse_rows *r, double threshold);
+
+/* As algorithm 5 makes them. Errors: LAM_ERR_MEMORY. */
+lam_status sparse_inverse_sample(const build_problem *problem, const float *rho, double threshold,
+                                 const inverse_rows *truth, sparse_sample *out, lam_error *error);
+
 #endif

@@ -1,0 +1,149 @@
+#include "solver/build/classify.h"
+
+#include "solver/build/sparse_inverse.h"
+#include "solver/build/spectrum.h"
+
+#include <math.h>
+#include <stdio.h>
+
+/* An entry of a sparse inverse and its column are two numbers, and what they are multiplied with lies
+ * anywhere: measured, four times the time of a number of a panel. */
+static const double sparse_number = 4;
+
+/* A low-rank operator of k columns has 2 n k numbers; k beyond n / 2 is no use, and a sparse inverse is at
+ * least about as dense as F. */
+static const double dense_enough = 1. / sparse_number;
+
+/* Factorizers keep their bound everywhere and so more than they must: their error is about this part of it.
+ */
+static const double bound_reached = .7;
+
+enum { STEPS = 40 };
+
+/* Thresholds of a sparse inverse that are tried, and from one to the next. */
+static const double threshold_first = 1e-2, threshold_last = 1e-6, threshold_step = .3162277660168379;
+
+static lam_status look_at_rank(const build_problem *p, const classify_options *options, scene_class *out,
+                               lam_error *error) {
+    lam_status status = LAM_OK;
+    row_source rows;
+    scaled_matrix S = {0};
+    spectrum values = {0};
+    row_source_of_csr(&rows, p->F);
+    TRY(scaled_init(&S, &rows, p->area, p->order, error));
+    TRY(spectrum_find(&S, STEPS, options->seed, options->progress, &values, error));
+    const double kept = bound_reached * options->epsilon;
+    out->rank = fmax(1, spectrum_above(&values, kept));
+    out->tail = sqrt(spectrum_tail(&values, kept));
+done:
+    spectrum_free(&values);
+    scaled_free(&S);
+    return status;
+}
+
+/* What is left out over what may be: of single elements epsilon, or as much as the low-rank operator leaves
+ * out, of light from everywhere epsilon, which is what that operator keeps to. */
+static double excess(const sparse_sample *sample, const scene_class *c, double epsilon) {
+    return fmax(sample->single / fmax(c->tail, epsilon), sample->everywhere / epsilon);
+}
+
+/* The largest of some thresholds at which truncation alone leaves out no more than may be; 0: none. */
+static double optimistic_threshold(const inverse_rows *truth, const scene_class *c, double epsilon,
+                                   double entries_most) {
+    for (double threshold = threshold_first; threshold > threshold_last; threshold *= threshold_step) {
+        const sparse_sample sample = inverse_rows_truncated(truth, threshold);
+        if (sample.entries > entries_most) return 0;
+        if (excess(&sample, c, epsilon) <= 1) return threshold;
+    }
+    return 0;
+}
+
+/* From the threshold that truncation alone would allow, down until a sparse inverse leaves out no more, or
+ * until its entries are no use; between two thresholds both are taken to be powers of it. */
+static lam_status look_at_inverse(const build_problem *p, const classify_options *options,
+                                  double entries_most, scene_class *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    inverse_rows truth = {.rows = NULL};
+    sparse_sample sample;
+    const bool given = options->threshold > 0;
+    double threshold = options->threshold, last_entries = 0, last_excess = 0;
+    TRY(inverse_rows_find(p, p->reflectance, options->progress, &truth, error));
+    if (!given) threshold = optimistic_threshold(&truth, out, options->epsilon, entries_most);
+    while (threshold >= threshold_last) {
+        if (progress_cancelled(options->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+        TRY(sparse_inverse_sample(p, p->reflectance, threshold, &truth, &sample, error));
+        const double now = excess(&sample, out, options->epsilon);
+        if (given || now <= 1) {
+            out->threshold = threshold;
+            out->entries = sample.entries;
+            if (last_entries > 0 && now > 0) {
+                const double part = log(last_excess) / log(last_excess / now);
+                out->threshold = threshold / threshold_step * pow(threshold_step, part);
+                out->entries = last_entries * pow(sample.entries / last_entries, part);
+            }
+            break;
+        }
+        if (sample.entries > entries_most) break;
+        last_excess = now;
+        last_entries = sample.entries;
+        threshold *= threshold_step;
+    }
+done:
+    inverse_rows_free(&truth);
+    return status;
+}
+
+static void say(scene_class *c, double epsilon) {
+    char rank[64] = "";
+    if (c->rank >= 0) snprintf(rank, sizeof rank, ", rank estimate %.0f at epsilon %.3g", c->rank, epsilon);
+    int n =
+        snprintf(c->reason, sizeof c->reason, "%s: F is %.3g %% dense%s", c->method, 100 * c->density, rank);
+    const struct {
+        const char *method;
+        double cost;
+    } others[] = {{"exact", c->exact_cost}, {"low-rank", c->low_rank_cost}, {"sparse", c->sparse_cost}};
+    const double own = fmin(c->exact_cost, fmin(c->low_rank_cost, c->sparse_cost));
+    for (size_t k = 0; k < 3; k++)
+        if (isfinite(own) && isfinite(others[k].cost) && others[k].cost > own && n > 0 &&
+            (size_t)n < sizeof c->reason)
+            n += snprintf(c->reason + n, sizeof c->reason - (size_t)n, "; %s would take %.3g times as long",
+                          others[k].method, others[k].cost / own);
+}
+
+lam_status classify_scene(const build_problem *problem, const classify_options *options, scene_class *out,
+                          lam_error *error) {
+    lam_status status = LAM_OK;
+    const double n = (double)problem->n, C = (double)problem->n_channels,
+                 numbers = options->memory > 0 ? (double)options->memory / sizeof(float) : INFINITY;
+    scene_class c = {.n = problem->n,
+                     .density = (double)problem->F->indptr[problem->n] / (n * n),
+                     .rank = -1,
+                     .tail = -1,
+                     .entries = -1,
+                     .threshold = options->threshold,
+                     .exact_cost = INFINITY,
+                     .low_rank_cost = INFINITY,
+                     .sparse_cost = INFINITY,
+                     .emitters_cost = INFINITY};
+    if (problem->n <= CLASSIFY_EXACT_MOST && C * n * n <= numbers) c.exact_cost = n * n;
+    if (problem->emitters != NULL) c.emitters_cost = n * (double)problem->emitters->s;
+    /* Where the whole inverse may be the answer the rank decides; else it decides only against sparse. */
+    const bool open = c.density < dense_enough && problem->emitters == NULL;
+    if (open || options->thorough || (isfinite(c.exact_cost) && problem->emitters == NULL)) {
+        TRY(look_at_rank(problem, options, &c, error));
+        if (2 * n * c.rank <= numbers) c.low_rank_cost = 2 * n * c.rank;
+    }
+    if (open) {
+        const double most = fmin(fmin(c.exact_cost, c.low_rank_cost) / sparse_number, numbers / 2 / C);
+        TRY(look_at_inverse(problem, options, most, &c, error));
+        if (c.entries >= 0 && 2 * C * c.entries <= numbers) c.sparse_cost = sparse_number * c.entries;
+    }
+    c.method = "low-rank";
+    if (c.exact_cost <= c.low_rank_cost && c.low_rank_cost < INFINITY) c.method = "exact";
+    if (c.sparse_cost < fmin(c.exact_cost, c.low_rank_cost)) c.method = "sparse";
+    if (problem->emitters != NULL) c.method = "emitters";
+    say(&c, options->epsilon);
+    *out = c;
+done:
+    return status;
+}
