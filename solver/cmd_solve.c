@@ -1,5 +1,5 @@
 /* lambert solve: lights a store and writes what it answers. */
-#include "solver/emission.h"
+#include "solver/emission_apply.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky.h"
 #include "solver/output.h"

@@ -9,7 +9,8 @@
 /* A batch of emissions: E is [n_vectors][C][n] in mesh order, W/m^2, never negative. */
 typedef struct emission {
     size_t n_vectors;
-    bool batch; /* given as a batch (also of one), so answered as one */
+    bool batch;  /* given as a batch (also of one), so answered as one */
+    bool steady; /* E and W are one vector, which goes with every sky of L: a year need not repeat it */
     float *E;
     float *L; /* [n_vectors][C][m], radiances of the tiles of the store's sky, W/(m^2 sr); NULL: no sky */
     float *W; /* [n_vectors][C][s], weights of the store's emitters, beside E and L; NULL: none given */
@@ -38,7 +39,7 @@ lam_status emission_read(const char *path, const mesh *m, emission_sources there
 lam_status emission_read_npy(const char *path, const mesh *m, emission *out, lam_error *error);
 
 /* Puts e under the sky of an NPY file: [m], [C][m] or a batch of them; one sky goes with every emission, one
- * emission with every sky, else there must be as many. */
+ * emission with every sky (steady), else there must be as many. */
 lam_status emission_add_sky(emission *e, const char *path, const mesh *m, size_t n_tiles, lam_error *error);
 
 /* A value of a file that must be light: finite, not negative. */
@@ -66,13 +67,6 @@ lam_status emission_choose(const mesh *m, emission_sources there, const emission
 
 /* Those of a store's operator and sky, which may be NULL. */
 emission_sources emission_sources_of(const lam_operator *op, const lam_sky *sky);
-
-/* *values is [n_vectors][C][n], freed with free(): what the operator makes of each vector under its sky;
- * where selected is not NULL only of these elements, which is less work, and 0 elsewhere. stop, which may be
- * NULL, is asked between passes and ends the work with its status. */
-lam_status emission_apply(const emission *e, const lam_operator *op, const lam_sky *sky,
-                          lam_quantity quantity, size_t n_selected, const uint32_t *selected,
-                          lam_status (*stop)(lam_error *error), float **values, lam_error *error);
 
 /* Calls visit(context, g) for each group that name means; returns how many. */
 size_t emission_match_groups(const mesh *m, const char *name, void (*visit)(void *context, size_t group),

@@ -98,10 +98,8 @@ lam_status emission_add_sky(emission *e, const char *path, const mesh *m, size_t
     if (sky.n != e->n_vectors && sky.n != 1 && e->n_vectors != 1)
         FAIL(error, LAM_ERR_ARGUMENT, "%s: %zu skies beside %zu emissions, must be as many, or one", path,
              sky.n, e->n_vectors);
-    if (e->n_vectors < sky.n) {
-        TRY(repeat(path, m->n_channels, m->n, sky.n, &e->E, error));
-        e->n_vectors = sky.n;
-    }
+    e->steady = e->n_vectors < sky.n;
+    if (e->steady) e->n_vectors = sky.n;
     if (sky.n < e->n_vectors) TRY(repeat(path, m->n_channels, n_tiles, e->n_vectors, &sky.values, error));
     e->batch = e->batch || sky.batch;
     e->L = sky.values;
