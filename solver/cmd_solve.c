@@ -1,5 +1,5 @@
 /* lambert solve: lights a store and writes what it answers. */
-#include "solver/emission_apply.h"
+#include "solver/annual.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky.h"
 #include "solver/output.h"
@@ -13,8 +13,9 @@
 #include <string.h>
 
 typedef struct fields {
-    option_list emit, reduce;
-    const char *emission, *sky, *quantity, *output;
+    option_list emit, reduce, annual;
+    const char *emission, *sky, *quantity, *output, *occupied;
+    double hours;
 } fields;
 
 #define FIELD(member) offsetof(fields, member)
@@ -46,7 +47,7 @@ static const option_row rows[] = {
      .kind = OPTION_CHOICE,
      .offset = FIELD(quantity),
      .value = "NAME",
-     .doc = "radiosity (the default), irradiance or indirect",
+     .doc = "radiosity (the default), irradiance (that of --annual) or indirect",
      .choices = "radiosity|irradiance|indirect"},
     {.name = "reduce",
      .kind = OPTION_LIST,
@@ -54,6 +55,28 @@ static const option_row rows[] = {
      .value = "GROUP=FIGURE",
      .doc = "mean, sum, min, max, uniformity or variance of a group; again for more"},
     {.name = "tolerance", .kind = OPTION_LATER, .value = "X", .doc = "(not supported yet)"},
+    {.kind = OPTION_HEADING,
+     .doc = "a year: figures an element of a batch of skies or emissions, in place of the batch"},
+    {.name = "annual",
+     .kind = OPTION_LIST,
+     .offset = FIELD(annual),
+     .value = "FIGURE",
+     .doc = "sum: over all hours, in 1000 h (kWh/m2 of W/m2, klx h of lx); autonomy=X: share of the hours "
+            "(0 to 1) with at least X; useful=LOW,HIGH: share with LOW to HIGH, both within (100,2000 lx); "
+            "again for more. X, LOW and HIGH are in the unit of the answer: lx where the skies are cd/m2"},
+    {.name = "occupied",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(occupied),
+     .value = "FROM-TO",
+     .doc = "Hours of the day that shares are of, 8-18 say; the batch is whole days from midnight on (all)"},
+    {.name = "hours-per-vector",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(hours),
+     .value = "H",
+     .doc = "How long each vector of the batch lasts (1)",
+     .low = 0,
+     .low_open = true,
+     .high = 8784},
     {0},
 };
 
@@ -91,67 +114,6 @@ static void stated_error(store *s, double *relative, double *indirect) {
     }
 }
 
-static void print_columns(const solution *s, const char *first) {
-    char name[OUTPUT_COLUMN];
-    fputs(first, stdout);
-    for (size_t v = 0; v < s->n_vectors; v++)
-        for (size_t c = 0; c < s->m->n_channels; c++) {
-            output_column(s, v, c, name);
-            printf(" %14s", name);
-        }
-    putchar('\n');
-}
-
-static void print_means(const solution *s, bool *inside) {
-    print_columns(s, "group                    elements   area, m2");
-    for (size_t g = 0; g < s->m->n_groups; g++) {
-        double area = 0;
-        size_t count = 0;
-        for (size_t i = 0; i < s->m->n; i++)
-            if (s->m->group[i] == g) {
-                area += s->m->area[i];
-                count++;
-            }
-        printf("%-24s %8zu %10.4g", s->m->group_names[g], count, area);
-        memset(inside, 0, s->m->n_groups * sizeof *inside);
-        inside[g] = true;
-        for (size_t k = 0; k < s->n_vectors * s->m->n_channels; k++) {
-            double figures[REDUCE_COUNT];
-            reduce_compute(s->m, inside, s->values + k * s->m->n, figures);
-            printf(" %14.6g", figures[REDUCE_MEAN]);
-        }
-        putchar('\n');
-    }
-}
-
-static void print_reductions(const solution *s) {
-    print_columns(s, "group                    figure    ");
-    for (size_t r = 0; r < s->n_reductions; r++)
-        for (int k = 0; k < REDUCE_COUNT; k++) {
-            if (!s->reductions[r].wanted[k]) continue;
-            printf("%-24s %-10s", s->reductions[r].group, reduce_name((reduce_statistic)k));
-            for (size_t column = 0; column < s->n_vectors * s->m->n_channels; column++) {
-                double figures[REDUCE_COUNT];
-                reduce_compute(s->m, s->reductions[r].inside, s->values + column * s->m->n, figures);
-                printf(" %14.6g", figures[k]);
-            }
-            putchar('\n');
-        }
-}
-
-static lam_status print_solution(const solution *s, lam_error *error) {
-    bool *inside = memory_allocate(s->m->n_groups, sizeof *inside, "groups", error);
-    if (inside == NULL) return LAM_ERR_MEMORY;
-    if (s->n_reductions > 0)
-        print_reductions(s);
-    else
-        print_means(s, inside);
-    if (s->relative >= 0)
-        printf("stated error of the store: relative %.3g, indirect %.3g\n", s->relative, s->indirect);
-    free(inside);
-    return LAM_OK;
-}
-
 /* The elements that some reduction is about, *selected freed with free(); NULL where all are wanted. */
 static lam_status wanted_elements(const mesh *m, const reduction *reductions, size_t n_reductions,
                                   size_t *n_selected, uint32_t **selected, lam_error *error) {
@@ -168,8 +130,26 @@ static lam_status wanted_elements(const mesh *m, const reduction *reductions, si
     return LAM_OK;
 }
 
-static lam_status solve(const char *path, const fields *f, reduction *reductions, terminal *t,
-                        lam_error *error) {
+/* Figures of the year in place of the batch; *values is freed with free(). */
+static lam_status solve_year(const annual_wish *wish, const emission *light, const lam_operator *op,
+                             const lam_sky *sky, size_t n_selected, const uint32_t *selected, terminal *t,
+                             solution *out, float **values, lam_error *error) {
+    lam_status status = LAM_OK;
+    const progress steps = terminal_progress(t);
+    annual_summary sum = {0};
+    TRY(annual_apply(wish, light, op, sky, quantity_of(out->quantity), n_selected, selected, &steps, values,
+                     &sum, error));
+    terminal_log(t, "a year of %s: %zu vectors of %g h, %zu with light; the hours of shares are %zu of them",
+                 out->quantity, sum.n, wish->hours, sum.lit, sum.counted);
+    if (sum.lit == 0) terminal_warn(t, "no vector has any light");
+    out->n_vectors = wish->n_figures;
+    out->batch = true;
+done:
+    return status;
+}
+
+static lam_status solve(const char *path, const fields *f, const annual_wish *year, reduction *reductions,
+                        terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
     mesh m = {0};
@@ -182,6 +162,8 @@ static lam_status solve(const char *path, const fields *f, reduction *reductions
     uint32_t *selected = NULL;
     size_t n_selected = 0;
     bool own = false;
+    const char *names[ANNUAL_MOST];
+    for (size_t k = 0; k < year->n_figures; k++) names[k] = year->figures[k].name;
     if (f->output != NULL) TRY(output_file_check(f->output, error));
     TRY(store_open(path, &s, error));
     TRY(store_get_text(s, "/", "name", &scene, error));
@@ -196,25 +178,33 @@ static lam_status solve(const char *path, const fields *f, reduction *reductions
              "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s", path,
              sky != NULL ? " or --sky FILE" : "");
     if (own) terminal_log(t, "no --emit, --emission or --sky: the scene's own light");
+    if (year->n_figures > 0 && !light.batch)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--annual is of a batch, one vector an hour, and this is one light; give --sky [hours][tiles]");
     lam_operator_set_threads(op, (size_t)omp_get_max_threads());
     TRY(terminal_check(error));
     /* With --reduce only figures are written, with -o too. */
     TRY(wanted_elements(&m, reductions, f->reduce.count, &n_selected, &selected, error));
-    TRY(emission_apply(&light, op, sky, quantity_of(f->quantity), n_selected, selected, terminal_check,
-                       &values, error));
     solution out = {.m = &m,
                     .scene = scene,
                     .quantity = f->quantity,
                     .n_vectors = light.n_vectors,
                     .batch = light.batch,
-                    .values = values,
                     .reductions = reductions,
                     .n_reductions = f->reduce.count};
+    if (year->n_figures > 0) {
+        out.names = names;
+        TRY(solve_year(year, &light, op, sky, n_selected, selected, t, &out, &values, error));
+    } else {
+        TRY(emission_apply(&light, op, sky, quantity_of(f->quantity), n_selected, selected, terminal_check,
+                           &values, error));
+    }
+    out.values = values;
     stated_error(s, &out.relative, &out.indirect);
     if (f->output != NULL)
         TRY(output_write(&out, f->output, error));
     else
-        TRY(print_solution(&out, error));
+        TRY(output_print(&out, error));
 done:
     free(scene);
     free(selected);
@@ -228,11 +218,28 @@ done:
     return status;
 }
 
+/* The figures of --annual and the options that are about them. */
+static lam_status read_year(const fields *f, annual_wish *year, lam_error *error) {
+    lam_status status = LAM_OK;
+    bool shares = false;
+    for (size_t i = 0; i < f->annual.count; i++) TRY(annual_add(year, f->annual.items[i], error));
+    for (size_t k = 0; k < year->n_figures; k++) shares = shares || !year->figures[k].is_sum;
+    if (f->annual.count == 0 && f->hours > 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "--hours-per-vector is for --annual");
+    if (!shares && f->occupied != NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "--occupied is for --annual autonomy=X and useful=LOW,HIGH");
+    if (f->hours > 0) year->hours = f->hours;
+    if (f->occupied != NULL) TRY(annual_parse_occupied(f->occupied, year, error));
+done:
+    return status;
+}
+
 int cmd_solve(int argc, char **argv) {
-    fields f = {.quantity = "radiosity"};
+    fields f = {0};
     option_result given = {0};
     lam_error error = {0};
     terminal term;
+    annual_wish year = {.hours = 1, .from = 0, .to = 24};
     int code = options_parse(&verb, argc, argv, &f, &given);
     if (code != OPTIONS_GO) return code;
     if (f.emit.count > 0 && f.emission != NULL)
@@ -240,12 +247,15 @@ int cmd_solve(int argc, char **argv) {
     if (emission_check_items(&f.emit, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
     if (f.output != NULL && output_check(f.output, f.reduce.count > 0, &error) != LAM_OK)
         return options_usage(verb.name, "%s", error.message);
+    if (read_year(&f, &year, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
+    /* What a place receives is what a study of daylight asks for. */
+    if (f.quantity == NULL) f.quantity = year.n_figures > 0 ? "irradiance" : "radiosity";
     reduction reductions[OPTION_LIST_MAX] = {0};
     for (size_t i = 0; i < f.reduce.count; i++)
         if (reduce_parse(f.reduce.items[i], &reductions[i], &error) != LAM_OK)
             return options_usage(verb.name, "%s", error.message);
     terminal_open(&term, verb.name, false, false);
-    const lam_status status = solve(given.arguments[0], &f, reductions, &term, &error);
+    const lam_status status = solve(given.arguments[0], &f, &year, reductions, &term, &error);
     for (size_t i = 0; i < f.reduce.count; i++) reduce_free(&reductions[i]);
     return status == LAM_OK ? 0 : terminal_fail(&term, &error);
 }
