@@ -1,5 +1,7 @@
 #include "solver/annual.h"
 
+#include "solver/sunlight.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -106,6 +108,7 @@ static widths widths_of(const lam_operator *op, const lam_sky *sky) {
 static bool is_lit(const emission *light, const widths *width, size_t v) {
     const size_t one = light->steady ? 0 : v;
     return any(light->E + one * width->E, width->E) ||
+           (light->sun != NULL && sunlight_shines(light->sun, v)) ||
            (light->L != NULL && any(light->L + v * width->L, width->L)) ||
            (light->W != NULL && any(light->W + one * width->W, width->W));
 }
@@ -160,11 +163,16 @@ static lam_status make_sums(const work *w, const emission *light, lam_error *err
     const widths width = widths_of(w->op, w->sky);
     const double scale = (double)light->n_vectors * w->wish->hours / 1000;
     emission mean = {0};
+    sunlight sun = {0};
     emission_pass p = {0};
     for (size_t k = 0; k < w->wish->n_figures; k++) {
         if (!w->wish->figures[k].is_sum) continue;
         float *to = w->made + k * w->row;
         TRY(mean_of(light, &width, &mean, error));
+        if (light->sun != NULL) {
+            TRY(sunlight_mean(light->sun, w->steps, &sun, error));
+            mean.sun = &sun;
+        }
         TRY(emission_pass_create(&mean, w->op, w->sky, w->quantity, w->n_selected, w->selected, 1, &p,
                                  error));
         TRY(emission_pass_solve(&p, 1, (const size_t[]){0}, to, error));
@@ -172,6 +180,7 @@ static lam_status make_sums(const work *w, const emission *light, lam_error *err
     }
 done:
     emission_pass_free(&p);
+    sunlight_free(&sun);
     emission_free(&mean);
     return status;
 }

@@ -1,12 +1,12 @@
 /* lambert sky: turns a weather file or a sky matrix of Radiance into the radiance of the tiles of a sky, hour
  * by hour. */
 #include "solver/daylight/sky_matrix.h"
-#include "solver/daylight/year.h"
 #include "solver/npy.h"
 #include "solver/options.h"
 #include "solver/output_file.h"
 #include "solver/terminal.h"
 #include "solver/verbs.h"
+#include "solver/weather_light.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -89,72 +89,24 @@ static const option_verb verb = {
     .max_arguments = 1,
 };
 
-static void log_weather(terminal *t, const weather *w) {
-    const weather_hour *first = &w->hours[0], *last = &w->hours[w->n - 1];
-    terminal_log(t, "%s: %.2f degrees %s, %.2f %s, UTC%+g", w->place[0] != '\0' ? w->place : "a place",
-                 fabs(w->latitude), w->latitude < 0 ? "south" : "north", fabs(w->longitude),
-                 w->longitude < 0 ? "west" : "east", w->time_zone);
-    terminal_log(t, "%zu hours, %d-%02d-%02d to %d-%02d-%02d", w->n, first->year, first->month, first->day,
-                 last->year, last->month, last->day);
-    /* Clocks are set for political reasons, but not by more than this. */
-    const double apart = remainder(w->time_zone * 15 - w->longitude, 360);
-    if (fabs(apart) > 60)
-        terminal_warn(t,
-                      "the time zone UTC%+g is %.0f degrees from the longitude %g (east is positive here); "
-                      "is a sign wrong in the file?",
-                      w->time_zone, fabs(apart), w->longitude);
-}
-
-static void log_year(terminal *t, const year_summary *sum, bool photometric) {
-    terminal_log(t, "%zu hours with light, %zu with sun", sum->lit, sum->sunny);
-    terminal_log(t, "on a horizontal plane: diffuse %.1f + direct %.1f = %.1f kWh/m2", sum->diffuse * 1e-3,
-                 sum->direct * 1e-3, (sum->diffuse + sum->direct) * 1e-3);
-    if (photometric)
-        terminal_log(t, "in light: %.0f klx h, %.1f lm/W", sum->light * 1e-3,
-                     sum->light / (sum->diffuse + sum->direct));
-    if (sum->sunless > 0)
-        terminal_warn(t,
-                      "%zu hours have direct light (at most %g W/m2) though the sun is below the horizon in "
-                      "their middle; it is left out",
-                      sum->sunless, sum->left_out);
-}
-
 static lam_status make_skies(const char *path, const fields *f, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
-    weather w = {0};
     sky_tiling tiling = {0};
-    year_summary sum = {0};
+    weather_skies made = {0};
     output_file file = {0};
-    float *L = NULL;
-    size_t count = 0;
-    const progress steps = terminal_progress(t);
     TRY(output_file_check(f->output, error));
-    TRY(weather_read(path, &w, error));
     TRY(sky_tiling_create(f->tiles != NULL ? f->tiles : "tregenza", 'z', &tiling, error));
-    if (!size_multiply(w.n, tiling.n_tiles, &count))
-        FAIL(error, LAM_ERR_MEMORY, "%s: too many hours of tiles for memory", path);
-    L = memory_allocate(count, sizeof *L, "the skies", error);
-    if (L == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(year_skies(&w, &tiling, f->photometric, &steps, L, &sum, error));
-    if (sum.lit == 0)
-        FAIL(error, LAM_ERR_ARGUMENT,
-             "%s: the sky is dark all year: of %zu hours none has diffuse light, nor direct light of a sun "
-             "above "
-             "the horizon; see its latitude, longitude and time zone, and whether it holds radiation",
-             path, w.n);
-    terminal_clear(t);
-    log_weather(t, &w);
-    log_year(t, &sum, f->photometric);
+    const year_wish wish = {.photometric = f->photometric, .sun_in_tiles = true};
+    TRY(weather_skies_read(path, &tiling, &wish, t, &made, error));
     TRY(output_file_open(f->output, &file, error));
-    npy_write(file.stream, 2, (const size_t[2]){w.n, tiling.n_tiles}, L);
+    npy_write(file.stream, 2, (const size_t[2]){made.n, tiling.n_tiles}, made.L);
     TRY(output_file_commit(&file, error));
-    printf("%s: %zu skies of %zu tiles (%s), %s\n", f->output, w.n, tiling.n_tiles, tiling.name,
+    printf("%s: %zu skies of %zu tiles (%s), %s\n", f->output, made.n, tiling.n_tiles, tiling.name,
            f->photometric ? "cd/m2" : "W/(m2 sr)");
 done:
     output_file_abort(&file);
-    free(L);
+    weather_skies_free(&made);
     sky_tiling_free(&tiling);
-    weather_free(&w);
     return status;
 }
 

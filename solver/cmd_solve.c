@@ -6,6 +6,7 @@
 #include "solver/output_file.h"
 #include "solver/terminal.h"
 #include "solver/verbs.h"
+#include "solver/weather_light.h"
 
 #include <math.h>
 #include <omp.h>
@@ -14,8 +15,10 @@
 
 typedef struct fields {
     option_list emit, reduce, annual;
-    const char *emission, *sky, *quantity, *output, *occupied;
+    const char *emission, *sky, *weather, *sun, *quantity, *output, *occupied;
     double hours;
+    uint64_t sun_points;
+    bool photometric;
 } fields;
 
 #define FIELD(member) offsetof(fields, member)
@@ -42,6 +45,31 @@ static const option_row rows[] = {
      .offset = FIELD(sky),
      .value = "FILE.npy",
      .doc = "Radiances of the sky's tiles, W/(m2 sr): [m], [C][m] or a batch; alone or beside the others"},
+    {.name = "weather",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(weather),
+     .value = "FILE.epw|.wea",
+     .doc = "The hours of a weather file in place of --sky: what `lambert sky` makes of it for the store's "
+            "tiles"},
+    {.name = "sun",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(sun),
+     .value = "tiles|exact",
+     .doc =
+         "Of --weather: in the tile that holds it (tiles), or itself, with the shadows it throws, by rays at "
+         "the store's mesh. A store of few emitters has direct light exact and bounces from the tile",
+     .choices = "tiles|exact"},
+    {.name = "sun-points",
+     .kind = OPTION_COUNT,
+     .offset = FIELD(sun_points),
+     .value = "N",
+     .doc = "Of --sun exact: points of an element that look for the sun, each hour (4)",
+     .low = 1,
+     .high = SUN_RAYS_MOST},
+    {.name = "photometric",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(photometric),
+     .doc = "Of --weather: in light, lux, as `lambert sky --photometric`"},
     {.kind = OPTION_HEADING, .doc = "answer"},
     {.name = "quantity",
      .kind = OPTION_CHOICE,
@@ -161,6 +189,7 @@ static lam_status solve(const char *path, const fields *f, const annual_wish *ye
     char *scene = NULL;
     uint32_t *selected = NULL;
     size_t n_selected = 0;
+    sunlight sun = {0};
     bool own = false;
     const char *names[ANNUAL_MOST];
     for (size_t k = 0; k < year->n_figures; k++) names[k] = year->figures[k].name;
@@ -170,21 +199,30 @@ static lam_status solve(const char *path, const fields *f, const annual_wish *ye
     TRY(mesh_load(s, &m, &row_sums, error));
     for (size_t i = 0; i < f->reduce.count; i++) TRY(reduce_bind(&reductions[i], &m, error));
     TRY(sky_load(s, m.n, &sky, error));
-    const emission_wish wish = {.items = &f->emit, .path = f->emission, .sky = f->sky};
+    const emission_wish wish = {
+        .items = &f->emit, .path = f->emission, .sky = f->sky, .other = f->weather != NULL};
     TRY(operator_load(s, &op, error));
     TRY(emission_choose(&m, emission_sources_of(op, sky), &wish, &light, &own, error));
     if (own && is_dark(&light, m.n * m.n_channels))
         FAIL(error, LAM_ERR_ARGUMENT,
              "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s", path,
-             sky != NULL ? " or --sky FILE" : "");
-    if (own) terminal_log(t, "no --emit, --emission or --sky: the scene's own light");
-    if (year->n_figures > 0 && !light.batch)
-        FAIL(error, LAM_ERR_ARGUMENT,
-             "--annual is of a batch, one vector an hour, and this is one light; give --sky [hours][tiles]");
-    lam_operator_set_threads(op, (size_t)omp_get_max_threads());
-    TRY(terminal_check(error));
+             sky != NULL ? ", --sky FILE or --weather FILE" : "");
+    if (own) terminal_log(t, "no --emit, --emission, --sky or --weather: the scene's own light");
     /* With --reduce only figures are written, with -o too. */
     TRY(wanted_elements(&m, reductions, f->reduce.count, &n_selected, &selected, error));
+    if (f->weather != NULL) {
+        const weather_wish hours = {.path = f->weather,
+                                    .photometric = f->photometric,
+                                    .exact = strcmp(f->sun, "exact") == 0,
+                                    .sun_points = (size_t)f->sun_points};
+        TRY(weather_light_add(&hours, s, &m, op, sky, n_selected, selected, t, &light, &sun, error));
+    }
+    if (year->n_figures > 0 && !light.batch)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--annual is of a batch, one vector an hour, and this is one light; give --sky [hours][tiles] "
+             "or --weather");
+    lam_operator_set_threads(op, (size_t)omp_get_max_threads());
+    TRY(terminal_check(error));
     solution out = {.m = &m,
                     .scene = scene,
                     .quantity = f->quantity,
@@ -211,6 +249,7 @@ done:
     free(values);
     free(row_sums);
     emission_free(&light);
+    sunlight_free(&sun);
     lam_operator_close(op);
     lam_sky_close(sky);
     mesh_free(&m);
@@ -235,7 +274,7 @@ done:
 }
 
 int cmd_solve(int argc, char **argv) {
-    fields f = {0};
+    fields f = {.sun = "tiles", .sun_points = 4};
     option_result given = {0};
     lam_error error = {0};
     terminal term;
@@ -244,6 +283,14 @@ int cmd_solve(int argc, char **argv) {
     if (code != OPTIONS_GO) return code;
     if (f.emit.count > 0 && f.emission != NULL)
         return options_usage(verb.name, "give --emit or --emission, not both");
+    if (f.sky != NULL && f.weather != NULL)
+        return options_usage(verb.name, "give --sky or --weather, not both");
+    if (f.weather != NULL && !weather_is_named(f.weather))
+        return options_usage(verb.name, "--weather %s: must end in .epw or .wea", f.weather);
+    if (f.weather == NULL && (f.photometric || options_given(&verb, &given, "sun")))
+        return options_usage(verb.name, "--sun and --photometric are for --weather");
+    if (strcmp(f.sun, "exact") != 0 && options_given(&verb, &given, "sun-points"))
+        return options_usage(verb.name, "--sun-points is for --sun exact");
     if (emission_check_items(&f.emit, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
     if (f.output != NULL && output_check(f.output, f.reduce.count > 0, &error) != LAM_OK)
         return options_usage(verb.name, "%s", error.message);

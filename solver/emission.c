@@ -165,7 +165,7 @@ lam_status emission_choose(const mesh *m, emission_sources there, const emission
                            bool *own, lam_error *error) {
     lam_status status = LAM_OK;
     emission e = {.n_vectors = 1};
-    *own = wish->items->count == 0 && wish->path == NULL && wish->sky == NULL;
+    *own = wish->items->count == 0 && wish->path == NULL && wish->sky == NULL && !wish->other;
     if (*own)
         TRY(emission_of_scene(m, &e, error));
     else if (wish->items->count > 0)

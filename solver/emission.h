@@ -14,6 +14,7 @@ typedef struct emission {
     float *E;
     float *L; /* [n_vectors][C][m], radiances of the tiles of the store's sky, W/(m^2 sr); NULL: no sky */
     float *W; /* [n_vectors][C][s], weights of the store's emitters, beside E and L; NULL: none given */
+    const struct sunlight *sun; /* [n_vectors], on every channel, beside L; borrowed, NULL: none */
 } emission;
 
 void emission_free(emission *e);
@@ -42,6 +43,11 @@ lam_status emission_read_npy(const char *path, const mesh *m, emission *out, lam
  * emission with every sky (steady), else there must be as many. */
 lam_status emission_add_sky(emission *e, const char *path, const mesh *m, size_t n_tiles, lam_error *error);
 
+/* The same for a batch of skies L [n_skies][n_tiles], which is copied, the same in every channel; what is the
+ * word for it in messages. */
+lam_status emission_add_skies(emission *e, const char *what, const mesh *m, size_t n_tiles, size_t n_skies,
+                              const float *L, lam_error *error);
+
 /* A value of a file that must be light: finite, not negative. */
 lam_status emission_check_value(const char *path, size_t vector, size_t index, double value, float *out,
                                 lam_error *error);
@@ -58,6 +64,7 @@ typedef struct emission_wish {
     const option_list *items; /* --emit */
     const char *path;         /* --emission, or NULL */
     const char *sky;          /* --sky, or NULL */
+    bool other;               /* a light that is added later: without any of these none is of the scene */
 } emission_wish;
 
 /* Groups when there are items, else the file, else none beside a sky, else the scene's own, which is *own.

@@ -1,5 +1,9 @@
 #include "solver/emission_apply.h"
 
+#include "solver/operator/operator.h"
+#include "solver/sunlight.h"
+
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,6 +15,8 @@ void emission_pass_free(emission_pass *p) {
     free(p->L);
     free(p->H0);
     free(p->W);
+    free(p->sun);
+    free(p->sun_work);
     *p = (emission_pass){0};
 }
 
@@ -39,8 +45,12 @@ lam_status emission_pass_create(const emission *light, const lam_operator *op, c
     if (light->L != NULL) TRY(reserve(most * C, lam_sky_tiles(sky), "skies", &p.L, error));
     if (s > 0)
         TRY(reserve(most * C, s, "weights of emitters", &p.W, error));
-    else if (light->L != NULL)
+    else if (light->L != NULL || light->sun != NULL)
         TRY(reserve(most * C, n, "the light of the sky", &p.H0, error));
+    if (light->sun != NULL) {
+        TRY(reserve(most, n, "the sun", &p.sun, error));
+        TRY(reserve(1, sunlight_work(light->sun), "the sun", &p.sun_work, error));
+    }
     *out = p;
     p = (emission_pass){0};
 done:
@@ -65,6 +75,37 @@ done:
     return status;
 }
 
+/* H0 [n][C][elements] under the skies and the sun. */
+static void light_directly(emission_pass *p, size_t n, const size_t *vectors) {
+    const size_t C = lam_operator_channels(p->op), n_elements = lam_operator_elements(p->op);
+    if (p->L != NULL)
+        lam_sky_irradiance(p->sky, n * C, p->L, p->H0);
+    else
+        memset(p->H0, 0, n * C * n_elements * sizeof *p->H0);
+    if (p->sun == NULL) return;
+    sunlight_irradiance(p->light->sun, n, vectors, p->sun, p->sun_work);
+    for (size_t row = 0; row < n * C; row++)
+        for (size_t i = 0; i < n_elements; i++)
+            p->H0[row * n_elements + i] += p->sun[row / C * n_elements + i];
+}
+
+/* The sun on answers that cannot take it on its way: their direct light becomes exact, what bounces is not
+ * changed, nor is what is indirect. Rounding does not make light negative. */
+static void light_answers(emission_pass *p, size_t n, const size_t *vectors, float *out) {
+    const size_t C = lam_operator_channels(p->op), n_elements = lam_operator_elements(p->op);
+    const size_t width = p->selected != NULL ? p->n_selected : n_elements;
+    if (p->sun == NULL || p->quantity == LAM_INDIRECT) return;
+    sunlight_irradiance(p->light->sun, n, vectors, p->sun, p->sun_work);
+    for (size_t row = 0; row < n * C; row++)
+        for (size_t r = 0; r < width; r++) {
+            const size_t i = p->selected != NULL ? p->selected[r] : r;
+            const float *rho = p->op->reflectance + row % C * n_elements;
+            const float share = p->quantity == LAM_RADIOSITY ? rho[i] : 1;
+            float *x = out + row * width + r;
+            *x = fmaxf(*x + share * p->sun[row / C * n_elements + i], 0);
+        }
+}
+
 lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors, float *out,
                                lam_error *error) {
     lam_status status = LAM_OK;
@@ -76,9 +117,10 @@ lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors
         TRY(find_weights(p, n, vectors, error));
         TRY(lam_operator_apply_emitters(p->op, n, p->quantity, p->W, p->n_selected, p->selected, out, p->work,
                                         p->work_bytes, error));
+        light_answers(p, n, vectors, out);
         goto done;
     }
-    if (p->H0 != NULL) lam_sky_irradiance(p->sky, n * C, p->L, p->H0);
+    if (p->H0 != NULL) light_directly(p, n, vectors);
     if (p->selected != NULL)
         TRY(lam_operator_apply_selected(p->op, n, p->quantity, p->E, p->H0, p->n_selected, p->selected, out,
                                         p->work, p->work_bytes, error));

@@ -13,14 +13,15 @@ typedef struct emission_pass {
     lam_quantity quantity;
     size_t n_selected;
     const uint32_t *selected; /* NULL: every element */
-    size_t most;              /* vectors in one go */
+    size_t most;              /* vectors in one go, at most 64 */
     size_t work_bytes;
     void *work;
     float *E, *L, *H0, *W; /* of one go; NULL where the operator takes none */
+    float *sun, *sun_work; /* [most][elements]; NULL without one */
 } emission_pass;
 
-/* Makes ready for at most this many vectors in one go; with selected for these elements only, which is less
- * work. Freed by emission_pass_free. Errors: LAM_ERR_MEMORY. */
+/* Makes ready for at most this many vectors in one go; with selected for these elements only,
+ * which is less work. Freed by emission_pass_free. Errors: LAM_ERR_MEMORY. */
 lam_status emission_pass_create(const emission *light, const lam_operator *op, const lam_sky *sky,
                                 lam_quantity quantity, size_t n_selected, const uint32_t *selected,
                                 size_t most, emission_pass *out, lam_error *error);

@@ -9,8 +9,8 @@ LATITUDE, LONGITUDE, ZONE = 37.5, -122.25, -8
 DAYS = (31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
 
 
-def sine_of_altitude(year, month, day, hour):
-    """Of the sun over the place above, by the formulas of Meeus, Astronomical Algorithms, ch. 25 and 28 (low accuracy,
+def sun(year, month, day, hour):
+    """East, north and up of the sun over the place above, by the formulas of Meeus, Astronomical Algorithms, ch. 25 and 28 (low accuracy,
     good to .01 degrees), which are not those of the program."""
     days = (datetime.date(year, month, day) - datetime.date(2000, 1, 1)).days - .5 + (hour - ZONE) / 24
     T = days / 36525
@@ -26,7 +26,13 @@ def sine_of_altitude(year, month, day, hour):
                 - y * y / 2 * math.sin(4 * L) - 1.25 * e * e * math.sin(2 * M))
     turn = math.radians(15 * (hour - 12) + LONGITUDE - 15 * ZONE) + equation
     phi = math.radians(LATITUDE)
-    return math.sin(phi) * math.sin(declination) + math.cos(phi) * math.cos(declination) * math.cos(turn)
+    return (-math.cos(declination) * math.sin(turn),
+            math.sin(declination) * math.cos(phi) - math.cos(declination) * math.sin(phi) * math.cos(turn),
+            math.sin(phi) * math.sin(declination) + math.cos(phi) * math.cos(declination) * math.cos(turn))
+
+
+def sine_of_altitude(year, month, day, hour):
+    return sun(year, month, day, hour)[2]
 
 
 def a_year():
