@@ -56,7 +56,7 @@ done:
     return status;
 }
 
-static bool has_shares(const annual_wish *w) {
+bool annual_has_shares(const annual_wish *w) {
     for (size_t k = 0; k < w->n_figures; k++)
         if (!w->figures[k].is_sum) return true;
     return false;
@@ -261,7 +261,7 @@ lam_status annual_apply(const annual_wish *wish, const emission *light, const la
         FAIL(error, LAM_ERR_ARGUMENT, "--occupied %g-%g: no vector of %g hours has its middle in these hours",
              wish->from, wish->to, wish->hours);
     TRY(make_sums(&w, light, error));
-    if (has_shares(wish)) TRY(make_shares(&w, light, lit, n_lit, &sum, error));
+    if (annual_has_shares(wish)) TRY(make_shares(&w, light, lit, n_lit, &sum, error));
     if (selected != NULL) {
         whole = memory_allocate(wish->n_figures * C, n * sizeof *whole, "figures of the year", error);
         if (whole == NULL) TRY(LAM_ERR_MEMORY);

@@ -33,6 +33,9 @@ lam_status annual_add(annual_wish *w, const char *item, lam_error *error);
 /* Reads FROM-TO, whole hours from 0 to 24. */
 lam_status annual_parse_occupied(const char *text, annual_wish *w, lam_error *error);
 
+/* Whether a figure is something else than a sum. */
+bool annual_has_shares(const annual_wish *w);
+
 /* What the figures were made of. */
 typedef struct annual_summary {
     size_t n;       /* vectors */

@@ -96,7 +96,8 @@ static const option_row rows[] = {
      .kind = OPTION_TEXT,
      .offset = FIELD(occupied),
      .value = "FROM-TO",
-     .doc = "Hours of the day that shares are of, 8-18 say; the batch is whole days from midnight on (all)"},
+     .doc = "Hours of the day, of standard time, that shares are of, 8-18 say; the batch is whole days from "
+            "midnight on (all)"},
     {.name = "hours-per-vector",
      .kind = OPTION_NUMBER,
      .offset = FIELD(hours),
@@ -167,8 +168,9 @@ static lam_status solve_year(const annual_wish *wish, const emission *light, con
     annual_summary sum = {0};
     TRY(annual_apply(wish, light, op, sky, quantity_of(out->quantity), n_selected, selected, &steps, values,
                      &sum, error));
-    terminal_log(t, "a year of %s: %zu vectors of %g h, %zu with light; the hours of shares are %zu of them",
-                 out->quantity, sum.n, wish->hours, sum.lit, sum.counted);
+    terminal_log(t, "a year of %s: %zu vectors of %g h, %zu with light", out->quantity, sum.n, wish->hours,
+                 sum.lit);
+    if (annual_has_shares(wish)) terminal_log(t, "shares are of %zu vectors", sum.counted);
     if (sum.lit == 0) terminal_warn(t, "no vector has any light");
     out->n_vectors = wish->n_figures;
     out->batch = true;
@@ -260,12 +262,10 @@ done:
 /* The figures of --annual and the options that are about them. */
 static lam_status read_year(const fields *f, annual_wish *year, lam_error *error) {
     lam_status status = LAM_OK;
-    bool shares = false;
     for (size_t i = 0; i < f->annual.count; i++) TRY(annual_add(year, f->annual.items[i], error));
-    for (size_t k = 0; k < year->n_figures; k++) shares = shares || !year->figures[k].is_sum;
     if (f->annual.count == 0 && f->hours > 0)
         FAIL(error, LAM_ERR_ARGUMENT, "--hours-per-vector is for --annual");
-    if (!shares && f->occupied != NULL)
+    if (!annual_has_shares(year) && f->occupied != NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "--occupied is for --annual autonomy=X and useful=LOW,HIGH");
     if (f->hours > 0) year->hours = f->hours;
     if (f->occupied != NULL) TRY(annual_parse_occupied(f->occupied, year, error));

@@ -81,8 +81,8 @@ class Annual(unittest.TestCase):
                 for counted, more in (slice(None), []), (working, ["--occupied", "8-18"]):
                     got, done = self.year(store, *options, *more)
                     self.assertEqual(got.shape, (3, 3, self.truth.n))
-                    self.assertIn(f"a year of {quantity}: {24 * DAYS} vectors of 1 h, {15 * DAYS} with light; the hours "
-                                  f"of shares are {(10 if more else 24) * DAYS} of them", done.stderr)
+                    self.assertIn(f"a year of {quantity}: {24 * DAYS} vectors of 1 h, {15 * DAYS} with light\nshares are "
+                                  f"of {(10 if more else 24) * DAYS} vectors\n", done.stderr)
                     total = hourly.sum(axis=0) / 1000
                     # An epsilon of 1e-6, and single precision.
                     np.testing.assert_allclose(got[0], total, atol=2e-5 * total.max(), err_msg=kind + quantity)
@@ -123,6 +123,9 @@ class Annual(unittest.TestCase):
         # Means of groups where no file is asked for.
         said = must("solve", self.stores["exact"], *light, *options).stdout.splitlines()
         self.assertEqual(said[0].split()[-9:], columns)
+        for column in columns:  # each number ends under the end of its name
+            end = said[0].index(column) + len(column)
+            self.assertRegex(said[1][end - 1:end + 1], r"^\d ?$")
         area, floor = self.truth.area, self.truth.group == self.truth.groups.index("floor")
         row = next(line.split() for line in said if line.startswith("floor"))
         means = (got.reshape(9, -1)[:, floor] * area[floor]).sum(axis=1) / area[floor].sum()
