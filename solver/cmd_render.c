@@ -1,5 +1,5 @@
 /* lambert render: a picture of a store under any lighting. */
-#include "solver/emission.h"
+#include "solver/emission_apply.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky.h"
 #include "solver/output_file.h"

@@ -1,15 +1,19 @@
-/* lambert sky: turns a weather file into the radiance of the tiles of a sky, hour by hour. */
-#include "solver/daylight/year.h"
+/* lambert sky: turns a weather file or a sky matrix of Radiance into the radiance of the tiles of a sky, hour
+ * by hour. */
+#include "solver/daylight/sky_matrix.h"
 #include "solver/npy.h"
 #include "solver/options.h"
 #include "solver/output_file.h"
 #include "solver/terminal.h"
 #include "solver/verbs.h"
+#include "solver/weather_light.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#define WHITE_EFFICACY 179. /* lm/W of equal-energy white in Radiance */
 
 typedef struct fields {
     const char *output, *tiles, *model;
@@ -40,12 +44,14 @@ static const option_row rows[] = {
      .value = "SKY.npy",
      .doc =
          "Where the skies go: float32 [hours][tiles], W/(m2 sr), the batch that `lambert solve --sky` takes "
-         "for a store of one channel; for three repeat each row three times, [hours][3][tiles]"},
+         "for a store of one channel; for three repeat each row three times, [hours][3][tiles], as a matrix "
+         "whose components differ gives them"},
     {.name = "tiles",
      .kind = OPTION_CUSTOM,
      .offset = FIELD(tiles),
      .value = "tregenza|reinhart:MF|grid:AxB",
-     .doc = "The tiles of the store's --sky: 145, 144 MF^2 + 1, or A sectors by B bands (tregenza)",
+     .doc = "The tiles of the store's --sky: 145, 144 MF^2 + 1, or A sectors by B bands (tregenza, or those "
+            "that the matrix has, which cannot be others)",
      .parse = parse_tiles},
     {.name = "model",
      .kind = OPTION_CHOICE,
@@ -57,96 +63,99 @@ static const option_row rows[] = {
      .kind = OPTION_FLAG,
      .offset = FIELD(photometric),
      .doc = "In cd/m2, by the luminous efficacies of Perez and others, 1990; without a dew point (a .wea has "
-            "none) there are 2 cm of water in the air"},
+            "none) there are 2 cm of water in the air. A matrix is taken times 179 lm/W, by which gendaymtx "
+            "-O0 divides light"},
     {.kind = OPTION_HEADING,
      .doc =
          "An hour's sky is as bright as the diffuse light in the file, and the sun is in the one tile that "
          "holds it: both give a horizontal plane exactly what the file says. The sun is taken in the middle "
          "of the hour; direct light of a sun that is then below the horizon is left out. A .wea is of the "
          "year 2001, or 2000 where it has a 29 February"},
+    {.kind = OPTION_HEADING,
+     .doc =
+         "A sky matrix of Radiance (gendaymtx, genskyvec) is taken as it is: ascii, float or double, rows of "
+         "the ground and of the patches, a column an hour. The ground's row is left out: the store's "
+         "--ground-albedo takes its place"},
     {0},
 };
 
 static const option_verb verb = {
     .name = "sky",
-    .arguments = "WEATHER.epw|.wea -o SKY.npy",
-    .summary = "Turn the weather of a year into the radiance of the tiles of a sky, hour by hour.",
+    .arguments = "WEATHER.epw|.wea|MATRIX.mtx -o SKY.npy",
+    .summary = "Turn the weather of a year, or a sky matrix of Radiance, into the radiance of the tiles of a "
+               "sky, hour by hour.",
     .options = rows,
     .min_arguments = 1,
     .max_arguments = 1,
 };
 
-static void log_weather(terminal *t, const weather *w) {
-    const weather_hour *first = &w->hours[0], *last = &w->hours[w->n - 1];
-    terminal_log(t, "%s: %.2f degrees %s, %.2f %s, UTC%+g", w->place[0] != '\0' ? w->place : "a place",
-                 fabs(w->latitude), w->latitude < 0 ? "south" : "north", fabs(w->longitude),
-                 w->longitude < 0 ? "west" : "east", w->time_zone);
-    terminal_log(t, "%zu hours, %d-%02d-%02d to %d-%02d-%02d", w->n, first->year, first->month, first->day,
-                 last->year, last->month, last->day);
-    /* Clocks are set for political reasons, but not by more than this. */
-    const double apart = remainder(w->time_zone * 15 - w->longitude, 360);
-    if (fabs(apart) > 60)
-        terminal_warn(t,
-                      "the time zone UTC%+g is %.0f degrees from the longitude %g (east is positive here); "
-                      "is a sign wrong in the file?",
-                      w->time_zone, fabs(apart), w->longitude);
-}
-
-static void log_year(terminal *t, const year_summary *sum, bool photometric) {
-    terminal_log(t, "%zu hours with light, %zu with sun", sum->lit, sum->sunny);
-    terminal_log(t, "on a horizontal plane: diffuse %.1f + direct %.1f = %.1f kWh/m2", sum->diffuse * 1e-3,
-                 sum->direct * 1e-3, (sum->diffuse + sum->direct) * 1e-3);
-    if (photometric)
-        terminal_log(t, "in light: %.0f klx h, %.1f lm/W", sum->light * 1e-3,
-                     sum->light / (sum->diffuse + sum->direct));
-    if (sum->sunless > 0)
-        terminal_warn(t,
-                      "%zu hours have direct light (at most %g W/m2) though the sun is below the horizon in "
-                      "their middle; it is left out",
-                      sum->sunless, sum->left_out);
-}
-
 static lam_status make_skies(const char *path, const fields *f, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
-    weather w = {0};
     sky_tiling tiling = {0};
-    year_summary sum = {0};
+    weather_skies made = {0};
     output_file file = {0};
-    float *L = NULL;
-    size_t count = 0;
-    const progress steps = terminal_progress(t);
     TRY(output_file_check(f->output, error));
-    TRY(weather_read(path, &w, error));
-    TRY(sky_tiling_create(f->tiles, 'z', &tiling, error));
-    if (!size_multiply(w.n, tiling.n_tiles, &count))
-        FAIL(error, LAM_ERR_MEMORY, "%s: too many hours of tiles for memory", path);
-    L = memory_allocate(count, sizeof *L, "the skies", error);
-    if (L == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(year_skies(&w, &tiling, f->photometric, &steps, L, &sum, error));
-    if (sum.lit == 0)
-        FAIL(error, LAM_ERR_ARGUMENT,
-             "%s: the sky is dark all year: of %zu hours none has diffuse light, nor direct light of a sun "
-             "above "
-             "the horizon; see its latitude, longitude and time zone, and whether it holds radiation",
-             path, w.n);
-    terminal_clear(t);
-    log_weather(t, &w);
-    log_year(t, &sum, f->photometric);
+    TRY(sky_tiling_create(f->tiles != NULL ? f->tiles : "tregenza", 'z', &tiling, error));
+    const year_wish wish = {.photometric = f->photometric, .sun_in_tiles = true};
+    TRY(weather_skies_read(path, &tiling, &wish, t, &made, error));
     TRY(output_file_open(f->output, &file, error));
-    npy_write(file.stream, 2, (const size_t[2]){w.n, tiling.n_tiles}, L);
+    npy_write(file.stream, 2, (const size_t[2]){made.n, tiling.n_tiles}, made.L);
     TRY(output_file_commit(&file, error));
-    printf("%s: %zu skies of %zu tiles (%s), %s\n", f->output, w.n, tiling.n_tiles, tiling.name,
+    printf("%s: %zu skies of %zu tiles (%s), %s\n", f->output, made.n, tiling.n_tiles, tiling.name,
            f->photometric ? "cd/m2" : "W/(m2 sr)");
 done:
     output_file_abort(&file);
-    free(L);
+    weather_skies_free(&made);
     sky_tiling_free(&tiling);
-    weather_free(&w);
+    return status;
+}
+
+/* Times a factor; what a horizontal plane receives of each channel in all hours. */
+static void weigh(sky_matrix *m, double factor, double received[3], bool *lit) {
+    const size_t n_tiles = m->tiling.n_tiles;
+    for (size_t k = 0; k < m->n * m->n_channels * n_tiles; k++) {
+        const double value = (double)m->L[k] * factor;
+        m->L[k] = (float)value;
+        received[k / n_tiles % m->n_channels] += value * m->tiling.tiles[k % n_tiles].cosine;
+        *lit = *lit || value > 0;
+    }
+}
+
+static lam_status convert_matrix(const char *path, const fields *f, terminal *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    sky_matrix m = {0};
+    output_file file = {0};
+    const progress steps = terminal_progress(t);
+    double received[3] = {0};
+    bool lit = false;
+    TRY(output_file_check(f->output, error));
+    TRY(sky_matrix_read(path, f->tiles, &steps, &m, error));
+    weigh(&m, f->photometric ? WHITE_EFFICACY : 1, received, &lit);
+    terminal_clear(t);
+    if (!lit) FAIL(error, LAM_ERR_ARGUMENT, "%s: the sky is dark in all %zu columns", path, m.n);
+    for (size_t c = 0; c < m.n_channels; c++)
+        terminal_log(t, "on a horizontal plane%s: %.1f %s, if a column is an hour",
+                     m.n_channels == 1 ? ""
+                     : c == 0          ? ", first component"
+                     : c == 1          ? ", second"
+                                       : ", third",
+                     received[c] * 1e-3, f->photometric ? "klx h" : "kWh/m2");
+    TRY(output_file_open(f->output, &file, error));
+    if (m.n_channels == 1)
+        npy_write(file.stream, 2, (const size_t[2]){m.n, m.tiling.n_tiles}, m.L);
+    else
+        npy_write(file.stream, 3, (const size_t[3]){m.n, m.n_channels, m.tiling.n_tiles}, m.L);
+    TRY(output_file_commit(&file, error));
+    printf("%s: %zu skies of %zu tiles (%s), %s%s\n", f->output, m.n, m.tiling.n_tiles, m.tiling.name,
+           m.n_channels == 1 ? "" : "three components, ", f->photometric ? "cd/m2" : "W/(m2 sr)");
+done:
+    output_file_abort(&file);
+    sky_matrix_free(&m);
     return status;
 }
 
 int cmd_sky(int argc, char **argv) {
-    fields f = {.tiles = "tregenza", .model = "perez"};
+    fields f = {.model = "perez"};
     option_result given = {0};
     lam_error error = {0};
     terminal term;
@@ -157,7 +166,10 @@ int cmd_sky(int argc, char **argv) {
     if (f.output == NULL) return options_usage(verb.name, "no -o SKY.npy given");
     output_file_extension(f.output, extension);
     if (strcmp(extension, "npy") != 0) return options_usage(verb.name, "-o %s: must end in .npy", f.output);
-    if (!weather_is_named(path)) return options_usage(verb.name, "%s: must end in .epw or .wea", path);
+    const bool matrix = sky_matrix_is_named(path);
+    if (!matrix && !weather_is_named(path))
+        return options_usage(verb.name, "%s: must end in .epw or .wea, or in .mtx or .smx", path);
     terminal_open(&term, verb.name, false, false);
-    return make_skies(path, &f, &term, &error) == LAM_OK ? 0 : terminal_fail(&term, &error);
+    const lam_status status = (matrix ? convert_matrix : make_skies)(path, &f, &term, &error);
+    return status == LAM_OK ? 0 : terminal_fail(&term, &error);
 }

@@ -1,11 +1,12 @@
 /* lambert solve: lights a store and writes what it answers. */
-#include "solver/emission.h"
+#include "solver/annual.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky.h"
 #include "solver/output.h"
 #include "solver/output_file.h"
 #include "solver/terminal.h"
 #include "solver/verbs.h"
+#include "solver/weather_light.h"
 
 #include <math.h>
 #include <omp.h>
@@ -13,8 +14,11 @@
 #include <string.h>
 
 typedef struct fields {
-    option_list emit, reduce;
-    const char *emission, *sky, *quantity, *output;
+    option_list emit, reduce, annual;
+    const char *emission, *sky, *weather, *sun, *quantity, *output, *occupied;
+    double hours;
+    uint64_t sun_points;
+    bool photometric;
 } fields;
 
 #define FIELD(member) offsetof(fields, member)
@@ -41,12 +45,37 @@ static const option_row rows[] = {
      .offset = FIELD(sky),
      .value = "FILE.npy",
      .doc = "Radiances of the sky's tiles, W/(m2 sr): [m], [C][m] or a batch; alone or beside the others"},
+    {.name = "weather",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(weather),
+     .value = "FILE.epw|.wea",
+     .doc = "The hours of a weather file in place of --sky: what `lambert sky` makes of it for the store's "
+            "tiles"},
+    {.name = "sun",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(sun),
+     .value = "tiles|exact",
+     .doc =
+         "Of --weather: in the tile that holds it (tiles), or itself, with the shadows it throws, by rays at "
+         "the store's mesh. A store of few emitters has direct light exact and bounces from the tile",
+     .choices = "tiles|exact"},
+    {.name = "sun-points",
+     .kind = OPTION_COUNT,
+     .offset = FIELD(sun_points),
+     .value = "N",
+     .doc = "Of --sun exact: points of an element that look for the sun, each hour (4)",
+     .low = 1,
+     .high = SUN_RAYS_MOST},
+    {.name = "photometric",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(photometric),
+     .doc = "Of --weather: in light, lux, as `lambert sky --photometric`"},
     {.kind = OPTION_HEADING, .doc = "answer"},
     {.name = "quantity",
      .kind = OPTION_CHOICE,
      .offset = FIELD(quantity),
      .value = "NAME",
-     .doc = "radiosity (the default), irradiance or indirect",
+     .doc = "radiosity (the default), irradiance (that of --annual) or indirect",
      .choices = "radiosity|irradiance|indirect"},
     {.name = "reduce",
      .kind = OPTION_LIST,
@@ -54,6 +83,29 @@ static const option_row rows[] = {
      .value = "GROUP=FIGURE",
      .doc = "mean, sum, min, max, uniformity or variance of a group; again for more"},
     {.name = "tolerance", .kind = OPTION_LATER, .value = "X", .doc = "(not supported yet)"},
+    {.kind = OPTION_HEADING,
+     .doc = "a year: figures an element of a batch of skies or emissions, in place of the batch"},
+    {.name = "annual",
+     .kind = OPTION_LIST,
+     .offset = FIELD(annual),
+     .value = "FIGURE",
+     .doc = "sum: over all hours, in 1000 h (kWh/m2 of W/m2, klx h of lx); autonomy=X: share of the hours "
+            "(0 to 1) with at least X; useful=LOW,HIGH: share with LOW to HIGH, both within (100,2000 lx); "
+            "again for more. X, LOW and HIGH are in the unit of the answer: lx where the skies are cd/m2"},
+    {.name = "occupied",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(occupied),
+     .value = "FROM-TO",
+     .doc = "Hours of the day, of standard time, that shares are of, 8-18 say; the batch is whole days from "
+            "midnight on (all)"},
+    {.name = "hours-per-vector",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(hours),
+     .value = "H",
+     .doc = "How long each vector of the batch lasts (1)",
+     .low = 0,
+     .low_open = true,
+     .high = 8784},
     {0},
 };
 
@@ -91,67 +143,6 @@ static void stated_error(store *s, double *relative, double *indirect) {
     }
 }
 
-static void print_columns(const solution *s, const char *first) {
-    char name[OUTPUT_COLUMN];
-    fputs(first, stdout);
-    for (size_t v = 0; v < s->n_vectors; v++)
-        for (size_t c = 0; c < s->m->n_channels; c++) {
-            output_column(s, v, c, name);
-            printf(" %14s", name);
-        }
-    putchar('\n');
-}
-
-static void print_means(const solution *s, bool *inside) {
-    print_columns(s, "group                    elements   area, m2");
-    for (size_t g = 0; g < s->m->n_groups; g++) {
-        double area = 0;
-        size_t count = 0;
-        for (size_t i = 0; i < s->m->n; i++)
-            if (s->m->group[i] == g) {
-                area += s->m->area[i];
-                count++;
-            }
-        printf("%-24s %8zu %10.4g", s->m->group_names[g], count, area);
-        memset(inside, 0, s->m->n_groups * sizeof *inside);
-        inside[g] = true;
-        for (size_t k = 0; k < s->n_vectors * s->m->n_channels; k++) {
-            double figures[REDUCE_COUNT];
-            reduce_compute(s->m, inside, s->values + k * s->m->n, figures);
-            printf(" %14.6g", figures[REDUCE_MEAN]);
-        }
-        putchar('\n');
-    }
-}
-
-static void print_reductions(const solution *s) {
-    print_columns(s, "group                    figure    ");
-    for (size_t r = 0; r < s->n_reductions; r++)
-        for (int k = 0; k < REDUCE_COUNT; k++) {
-            if (!s->reductions[r].wanted[k]) continue;
-            printf("%-24s %-10s", s->reductions[r].group, reduce_name((reduce_statistic)k));
-            for (size_t column = 0; column < s->n_vectors * s->m->n_channels; column++) {
-                double figures[REDUCE_COUNT];
-                reduce_compute(s->m, s->reductions[r].inside, s->values + column * s->m->n, figures);
-                printf(" %14.6g", figures[k]);
-            }
-            putchar('\n');
-        }
-}
-
-static lam_status print_solution(const solution *s, lam_error *error) {
-    bool *inside = memory_allocate(s->m->n_groups, sizeof *inside, "groups", error);
-    if (inside == NULL) return LAM_ERR_MEMORY;
-    if (s->n_reductions > 0)
-        print_reductions(s);
-    else
-        print_means(s, inside);
-    if (s->relative >= 0)
-        printf("stated error of the store: relative %.3g, indirect %.3g\n", s->relative, s->indirect);
-    free(inside);
-    return LAM_OK;
-}
-
 /* The elements that some reduction is about, *selected freed with free(); NULL where all are wanted. */
 static lam_status wanted_elements(const mesh *m, const reduction *reductions, size_t n_reductions,
                                   size_t *n_selected, uint32_t **selected, lam_error *error) {
@@ -168,8 +159,27 @@ static lam_status wanted_elements(const mesh *m, const reduction *reductions, si
     return LAM_OK;
 }
 
-static lam_status solve(const char *path, const fields *f, reduction *reductions, terminal *t,
-                        lam_error *error) {
+/* Figures of the year in place of the batch; *values is freed with free(). */
+static lam_status solve_year(const annual_wish *wish, const emission *light, const lam_operator *op,
+                             const lam_sky *sky, size_t n_selected, const uint32_t *selected, terminal *t,
+                             solution *out, float **values, lam_error *error) {
+    lam_status status = LAM_OK;
+    const progress steps = terminal_progress(t);
+    annual_summary sum = {0};
+    TRY(annual_apply(wish, light, op, sky, quantity_of(out->quantity), n_selected, selected, &steps, values,
+                     &sum, error));
+    terminal_log(t, "a year of %s: %zu vectors of %g h, %zu with light", out->quantity, sum.n, wish->hours,
+                 sum.lit);
+    if (annual_has_shares(wish)) terminal_log(t, "shares are of %zu vectors", sum.counted);
+    if (sum.lit == 0) terminal_warn(t, "no vector has any light");
+    out->n_vectors = wish->n_figures;
+    out->batch = true;
+done:
+    return status;
+}
+
+static lam_status solve(const char *path, const fields *f, const annual_wish *year, reduction *reductions,
+                        terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
     mesh m = {0};
@@ -181,46 +191,67 @@ static lam_status solve(const char *path, const fields *f, reduction *reductions
     char *scene = NULL;
     uint32_t *selected = NULL;
     size_t n_selected = 0;
+    sunlight sun = {0};
     bool own = false;
+    const char *names[ANNUAL_MOST];
+    for (size_t k = 0; k < year->n_figures; k++) names[k] = year->figures[k].name;
     if (f->output != NULL) TRY(output_file_check(f->output, error));
     TRY(store_open(path, &s, error));
     TRY(store_get_text(s, "/", "name", &scene, error));
     TRY(mesh_load(s, &m, &row_sums, error));
     for (size_t i = 0; i < f->reduce.count; i++) TRY(reduce_bind(&reductions[i], &m, error));
     TRY(sky_load(s, m.n, &sky, error));
-    const emission_wish wish = {.items = &f->emit, .path = f->emission, .sky = f->sky};
+    const emission_wish wish = {
+        .items = &f->emit, .path = f->emission, .sky = f->sky, .other = f->weather != NULL};
     TRY(operator_load(s, &op, error));
     TRY(emission_choose(&m, emission_sources_of(op, sky), &wish, &light, &own, error));
     if (own && is_dark(&light, m.n * m.n_channels))
         FAIL(error, LAM_ERR_ARGUMENT,
              "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s", path,
-             sky != NULL ? " or --sky FILE" : "");
-    if (own) terminal_log(t, "no --emit, --emission or --sky: the scene's own light");
-    lam_operator_set_threads(op, (size_t)omp_get_max_threads());
-    TRY(terminal_check(error));
+             sky != NULL ? ", --sky FILE or --weather FILE" : "");
+    if (own) terminal_log(t, "no --emit, --emission, --sky or --weather: the scene's own light");
     /* With --reduce only figures are written, with -o too. */
     TRY(wanted_elements(&m, reductions, f->reduce.count, &n_selected, &selected, error));
-    TRY(emission_apply(&light, op, sky, quantity_of(f->quantity), n_selected, selected, terminal_check,
-                       &values, error));
+    if (f->weather != NULL) {
+        const weather_wish hours = {.path = f->weather,
+                                    .photometric = f->photometric,
+                                    .exact = strcmp(f->sun, "exact") == 0,
+                                    .sun_points = (size_t)f->sun_points};
+        TRY(weather_light_add(&hours, s, &m, op, sky, n_selected, selected, t, &light, &sun, error));
+    }
+    if (year->n_figures > 0 && !light.batch)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--annual is of a batch, one vector an hour, and this is one light; give --sky [hours][tiles] "
+             "or --weather");
+    lam_operator_set_threads(op, (size_t)omp_get_max_threads());
+    TRY(terminal_check(error));
     solution out = {.m = &m,
                     .scene = scene,
                     .quantity = f->quantity,
                     .n_vectors = light.n_vectors,
                     .batch = light.batch,
-                    .values = values,
                     .reductions = reductions,
                     .n_reductions = f->reduce.count};
+    if (year->n_figures > 0) {
+        out.names = names;
+        TRY(solve_year(year, &light, op, sky, n_selected, selected, t, &out, &values, error));
+    } else {
+        TRY(emission_apply(&light, op, sky, quantity_of(f->quantity), n_selected, selected, terminal_check,
+                           &values, error));
+    }
+    out.values = values;
     stated_error(s, &out.relative, &out.indirect);
     if (f->output != NULL)
         TRY(output_write(&out, f->output, error));
     else
-        TRY(print_solution(&out, error));
+        TRY(output_print(&out, error));
 done:
     free(scene);
     free(selected);
     free(values);
     free(row_sums);
     emission_free(&light);
+    sunlight_free(&sun);
     lam_operator_close(op);
     lam_sky_close(sky);
     mesh_free(&m);
@@ -228,24 +259,50 @@ done:
     return status;
 }
 
+/* The figures of --annual and the options that are about them. */
+static lam_status read_year(const fields *f, annual_wish *year, lam_error *error) {
+    lam_status status = LAM_OK;
+    for (size_t i = 0; i < f->annual.count; i++) TRY(annual_add(year, f->annual.items[i], error));
+    if (f->annual.count == 0 && f->hours > 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "--hours-per-vector is for --annual");
+    if (!annual_has_shares(year) && f->occupied != NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "--occupied is for --annual autonomy=X and useful=LOW,HIGH");
+    if (f->hours > 0) year->hours = f->hours;
+    if (f->occupied != NULL) TRY(annual_parse_occupied(f->occupied, year, error));
+done:
+    return status;
+}
+
 int cmd_solve(int argc, char **argv) {
-    fields f = {.quantity = "radiosity"};
+    fields f = {.sun = "tiles", .sun_points = 4};
     option_result given = {0};
     lam_error error = {0};
     terminal term;
+    annual_wish year = {.hours = 1, .from = 0, .to = 24};
     int code = options_parse(&verb, argc, argv, &f, &given);
     if (code != OPTIONS_GO) return code;
     if (f.emit.count > 0 && f.emission != NULL)
         return options_usage(verb.name, "give --emit or --emission, not both");
+    if (f.sky != NULL && f.weather != NULL)
+        return options_usage(verb.name, "give --sky or --weather, not both");
+    if (f.weather != NULL && !weather_is_named(f.weather))
+        return options_usage(verb.name, "--weather %s: must end in .epw or .wea", f.weather);
+    if (f.weather == NULL && (f.photometric || options_given(&verb, &given, "sun")))
+        return options_usage(verb.name, "--sun and --photometric are for --weather");
+    if (strcmp(f.sun, "exact") != 0 && options_given(&verb, &given, "sun-points"))
+        return options_usage(verb.name, "--sun-points is for --sun exact");
     if (emission_check_items(&f.emit, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
     if (f.output != NULL && output_check(f.output, f.reduce.count > 0, &error) != LAM_OK)
         return options_usage(verb.name, "%s", error.message);
+    if (read_year(&f, &year, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
+    /* What a place receives is what a study of daylight asks for. */
+    if (f.quantity == NULL) f.quantity = year.n_figures > 0 ? "irradiance" : "radiosity";
     reduction reductions[OPTION_LIST_MAX] = {0};
     for (size_t i = 0; i < f.reduce.count; i++)
         if (reduce_parse(f.reduce.items[i], &reductions[i], &error) != LAM_OK)
             return options_usage(verb.name, "%s", error.message);
     terminal_open(&term, verb.name, false, false);
-    const lam_status status = solve(given.arguments[0], &f, reductions, &term, &error);
+    const lam_status status = solve(given.arguments[0], &f, &year, reductions, &term, &error);
     for (size_t i = 0; i < f.reduce.count; i++) reduce_free(&reductions[i]);
     return status == LAM_OK ? 0 : terminal_fail(&term, &error);
 }

@@ -165,7 +165,7 @@ lam_status emission_choose(const mesh *m, emission_sources there, const emission
                            bool *own, lam_error *error) {
     lam_status status = LAM_OK;
     emission e = {.n_vectors = 1};
-    *own = wish->items->count == 0 && wish->path == NULL && wish->sky == NULL;
+    *own = wish->items->count == 0 && wish->path == NULL && wish->sky == NULL && !wish->other;
     if (*own)
         TRY(emission_of_scene(m, &e, error));
     else if (wish->items->count > 0)
@@ -179,84 +179,5 @@ lam_status emission_choose(const mesh *m, emission_sources there, const emission
     e = (emission){0};
 done:
     emission_free(&e);
-    return status;
-}
-
-/* Chosen numbers of so many rows to their elements. */
-static void scatter(size_t n_rows, size_t n, size_t n_selected, const uint32_t *selected, const float *from,
-                    float *to) {
-    for (size_t row = 0; row < n_rows; row++)
-        for (size_t r = 0; r < n_selected; r++) to[row * n + selected[r]] = from[row * n_selected + r];
-}
-
-/* The weights of vectors first ... first + n - 1: those given and those told from E and L. */
-static lam_status find_weights(const emission *e, const lam_operator *op, const lam_sky *sky, size_t first,
-                               size_t n, float *W, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t C = lam_operator_channels(op), s = lam_operator_emitters(op);
-    const size_t n_tiles = sky != NULL ? lam_sky_tiles(sky) : 0;
-    TRY(lam_operator_weights(op, n, e->E + first * C * lam_operator_elements(op), n_tiles,
-                             e->L != NULL ? e->L + first * C * n_tiles : NULL, W, error));
-    for (size_t k = 0; e->W != NULL && k < n * C * s; k++) W[k] += e->W[first * C * s + k];
-done:
-    return status;
-}
-
-lam_status emission_apply(const emission *e, const lam_operator *op, const lam_sky *sky,
-                          lam_quantity quantity, size_t n_selected, const uint32_t *selected,
-                          lam_status (*stop)(lam_error *error), float **values, lam_error *error) {
-    enum { AT_ONCE = 64 }; /* vectors in one pass */
-    lam_status status = LAM_OK;
-    const size_t n_channels = lam_operator_channels(op), vector = lam_operator_elements(op) * n_channels;
-    const size_t most = e->n_vectors < AT_ONCE ? e->n_vectors : AT_ONCE;
-    const size_t bytes = lam_operator_work_bytes(op, most);
-    void *work = NULL;
-    const size_t s = lam_operator_emitters(op);
-    float *made = NULL, *H0 = NULL, *some = NULL, *W = NULL;
-    size_t count;
-    if (!size_multiply(vector, e->n_vectors, &count))
-        FAIL(error, LAM_ERR_MEMORY, "%zu emissions are too many for memory", e->n_vectors);
-    made = memory_allocate(count, sizeof *made, "the solution", error);
-    work = memory_allocate(bytes, 1, "the work area of a solve", error);
-    if (made == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
-    if (selected != NULL) {
-        some = memory_allocate(n_selected * n_channels, most * sizeof *some, "the solution", error);
-        if (some == NULL) TRY(LAM_ERR_MEMORY);
-    }
-    if (s > 0) {
-        W = memory_allocate(most * n_channels, s * sizeof *W, "weights of emitters", error);
-        if (W == NULL) TRY(LAM_ERR_MEMORY);
-    } else if (e->L != NULL) {
-        H0 = memory_allocate(vector, most * sizeof *H0, "the light of the sky", error);
-        if (H0 == NULL) TRY(LAM_ERR_MEMORY);
-    }
-    for (size_t first = 0; first < e->n_vectors; first += most) {
-        const size_t n = e->n_vectors - first < most ? e->n_vectors - first : most;
-        if (s > 0) TRY(find_weights(e, op, sky, first, n, W, error));
-        if (H0 != NULL)
-            lam_sky_irradiance(sky, n * n_channels, e->L + first * n_channels * lam_sky_tiles(sky), H0);
-        if (s > 0) {
-            TRY(lam_operator_apply_emitters(op, n, quantity, W, n_selected, selected,
-                                            selected != NULL ? some : made + first * vector, work, bytes,
-                                            error));
-        } else if (selected == NULL) {
-            TRY(lam_operator_apply_lit(op, n, quantity, e->E + first * vector, H0, made + first * vector,
-                                       work, bytes, error));
-        } else {
-            TRY(lam_operator_apply_selected(op, n, quantity, e->E + first * vector, H0, n_selected, selected,
-                                            some, work, bytes, error));
-        }
-        if (selected != NULL)
-            scatter(n * n_channels, vector / n_channels, n_selected, selected, some, made + first * vector);
-        if (stop != NULL) TRY(stop(error));
-    }
-    *values = made;
-    made = NULL;
-done:
-    free(made);
-    free(work);
-    free(some);
-    free(W);
-    free(H0);
     return status;
 }

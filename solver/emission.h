@@ -9,10 +9,12 @@
 /* A batch of emissions: E is [n_vectors][C][n] in mesh order, W/m^2, never negative. */
 typedef struct emission {
     size_t n_vectors;
-    bool batch; /* given as a batch (also of one), so answered as one */
+    bool batch;  /* given as a batch (also of one), so answered as one */
+    bool steady; /* E and W are one vector, which goes with every sky of L: a year need not repeat it */
     float *E;
     float *L; /* [n_vectors][C][m], radiances of the tiles of the store's sky, W/(m^2 sr); NULL: no sky */
     float *W; /* [n_vectors][C][s], weights of the store's emitters, beside E and L; NULL: none given */
+    const struct sunlight *sun; /* [n_vectors], on every channel, beside L; borrowed, NULL: none */
 } emission;
 
 void emission_free(emission *e);
@@ -38,8 +40,13 @@ lam_status emission_read(const char *path, const mesh *m, emission_sources there
 lam_status emission_read_npy(const char *path, const mesh *m, emission *out, lam_error *error);
 
 /* Puts e under the sky of an NPY file: [m], [C][m] or a batch of them; one sky goes with every emission, one
- * emission with every sky, else there must be as many. */
+ * emission with every sky (steady), else there must be as many. */
 lam_status emission_add_sky(emission *e, const char *path, const mesh *m, size_t n_tiles, lam_error *error);
+
+/* The same for a batch of skies L [n_skies][n_tiles], which is copied, the same in every channel; what is the
+ * word for it in messages. */
+lam_status emission_add_skies(emission *e, const char *what, const mesh *m, size_t n_tiles, size_t n_skies,
+                              const float *L, lam_error *error);
 
 /* A value of a file that must be light: finite, not negative. */
 lam_status emission_check_value(const char *path, size_t vector, size_t index, double value, float *out,
@@ -57,6 +64,7 @@ typedef struct emission_wish {
     const option_list *items; /* --emit */
     const char *path;         /* --emission, or NULL */
     const char *sky;          /* --sky, or NULL */
+    bool other;               /* a light that is added later: without any of these none is of the scene */
 } emission_wish;
 
 /* Groups when there are items, else the file, else none beside a sky, else the scene's own, which is *own.
@@ -66,13 +74,6 @@ lam_status emission_choose(const mesh *m, emission_sources there, const emission
 
 /* Those of a store's operator and sky, which may be NULL. */
 emission_sources emission_sources_of(const lam_operator *op, const lam_sky *sky);
-
-/* *values is [n_vectors][C][n], freed with free(): what the operator makes of each vector under its sky;
- * where selected is not NULL only of these elements, which is less work, and 0 elsewhere. stop, which may be
- * NULL, is asked between passes and ends the work with its status. */
-lam_status emission_apply(const emission *e, const lam_operator *op, const lam_sky *sky,
-                          lam_quantity quantity, size_t n_selected, const uint32_t *selected,
-                          lam_status (*stop)(lam_error *error), float **values, lam_error *error);
 
 /* Calls visit(context, g) for each group that name means; returns how many. */
 size_t emission_match_groups(const mesh *m, const char *name, void (*visit)(void *context, size_t group),

@@ -88,24 +88,45 @@ static lam_status repeat(const char *path, size_t n_channels, size_t width, size
     return LAM_OK;
 }
 
+/* Puts e under skies, which are taken over. */
+static lam_status put_under(emission *e, const char *path, const mesh *m, size_t n_tiles, vectors *sky,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    if (e->L != NULL) FAIL(error, LAM_ERR_ARGUMENT, "%s: the emission has a sky of its own", path);
+    if (sky->n != e->n_vectors && sky->n != 1 && e->n_vectors != 1)
+        FAIL(error, LAM_ERR_ARGUMENT, "%s: %zu skies beside %zu emissions, must be as many, or one", path,
+             sky->n, e->n_vectors);
+    e->steady = e->n_vectors < sky->n;
+    if (e->steady) e->n_vectors = sky->n;
+    if (sky->n < e->n_vectors) TRY(repeat(path, m->n_channels, n_tiles, e->n_vectors, &sky->values, error));
+    e->batch = e->batch || sky->batch;
+    e->L = sky->values;
+    sky->values = NULL;
+done:
+    return status;
+}
+
 lam_status emission_add_sky(emission *e, const char *path, const mesh *m, size_t n_tiles, lam_error *error) {
     lam_status status = LAM_OK;
     vectors sky = {0};
     if (n_tiles == 0)
         FAIL(error, LAM_ERR_ARGUMENT, "--sky %s: the store has no sky; precompute it with --sky", path);
-    if (e->L != NULL) FAIL(error, LAM_ERR_ARGUMENT, "--sky %s: the emission has a sky of its own", path);
     TRY(read_vectors(path, m->n_channels, n_tiles, "tiles of sky", &sky, error));
-    if (sky.n != e->n_vectors && sky.n != 1 && e->n_vectors != 1)
-        FAIL(error, LAM_ERR_ARGUMENT, "%s: %zu skies beside %zu emissions, must be as many, or one", path,
-             sky.n, e->n_vectors);
-    if (e->n_vectors < sky.n) {
-        TRY(repeat(path, m->n_channels, m->n, sky.n, &e->E, error));
-        e->n_vectors = sky.n;
-    }
-    if (sky.n < e->n_vectors) TRY(repeat(path, m->n_channels, n_tiles, e->n_vectors, &sky.values, error));
-    e->batch = e->batch || sky.batch;
-    e->L = sky.values;
-    sky.values = NULL;
+    TRY(put_under(e, path, m, n_tiles, &sky, error));
+done:
+    free(sky.values);
+    return status;
+}
+
+lam_status emission_add_skies(emission *e, const char *what, const mesh *m, size_t n_tiles, size_t n_skies,
+                              const float *L, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t C = m->n_channels;
+    vectors sky = {.n = n_skies, .batch = true};
+    TRY(emission_allocate(what, C, n_tiles, n_skies, &sky.values, error));
+    for (size_t row = 0; row < n_skies * C; row++)
+        memcpy(sky.values + row * n_tiles, L + row / C * n_tiles, n_tiles * sizeof *L);
+    TRY(put_under(e, what, m, n_tiles, &sky, error));
 done:
     free(sky.values);
     return status;

@@ -24,7 +24,10 @@ done:
 void output_column(const solution *s, size_t vector, size_t channel, char name[OUTPUT_COLUMN]) {
     static const char letters[] = "rgb";
     int length = snprintf(name, OUTPUT_COLUMN, "%s", s->quantity);
-    if (s->batch) length += snprintf(name + length, OUTPUT_COLUMN - (size_t)length, "_%zu", vector);
+    if (s->names != NULL)
+        length += snprintf(name + length, OUTPUT_COLUMN - (size_t)length, "_%s", s->names[vector]);
+    else if (s->batch)
+        length += snprintf(name + length, OUTPUT_COLUMN - (size_t)length, "_%zu", vector);
     if (s->m->n_channels == 3)
         snprintf(name + length, OUTPUT_COLUMN - (size_t)length, "_%c", letters[channel]);
     else if (s->m->n_channels > 1)

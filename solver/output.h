@@ -14,7 +14,8 @@ typedef struct solution {
     const char *quantity;
     size_t n_vectors;
     bool batch;
-    const float *values; /* [n_vectors][C][n] */
+    const char *const *names; /* [n_vectors], of figures of a year in place of vectors; NULL: numbers */
+    const float *values;      /* [n_vectors][C][n] */
     const reduction *reductions;
     size_t n_reductions;       /* 0: the values themselves are written */
     double relative, indirect; /* mean error that the store states; negative: not measured */
@@ -27,9 +28,12 @@ lam_status output_check(const char *path, bool reduced, lam_error *error);
 /* Writes path in the format of its extension, whole or not at all. */
 lam_status output_write(const solution *s, const char *path, lam_error *error);
 
-/* "radiosity", "radiosity_g", "radiosity_3_g": the column of a vector and channel. */
+/* "radiosity", "radiosity_g", "radiosity_3_g", "irradiance_sum": the column of a vector and channel. */
 #define OUTPUT_COLUMN 64
 void output_column(const solution *s, size_t vector, size_t channel, char name[OUTPUT_COLUMN]);
+
+/* On standard output: the reductions, or the mean of every group. */
+lam_status output_print(const solution *s, lam_error *error);
 
 /* The formats; a failed write is seen by ferror(stream). */
 lam_status output_json(const solution *s, FILE *stream, lam_error *error);

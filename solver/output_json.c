@@ -66,14 +66,19 @@ lam_status output_json(const solution *s, FILE *stream, lam_error *error) {
     json_object_set_new(answer, "channels", json_integer((json_int_t)s->m->n_channels));
     json_object_set_new(answer, "quantity", json_string(s->quantity));
     json_t *values;
-    if (s->batch) {
+    if (s->names != NULL) {
+        values = json_object();
+        for (size_t v = 0; v < s->n_vectors; v++)
+            json_object_set_new(values, s->names[v], reduced ? groups_of(s, v) : vector(s, v));
+    } else if (s->batch) {
         values = json_array();
         for (size_t v = 0; v < s->n_vectors; v++)
             json_array_append_new(values, reduced ? groups_of(s, v) : vector(s, v));
     } else {
         values = reduced ? groups_of(s, 0) : vector(s, 0);
     }
-    json_object_set_new(answer, reduced ? "groups" : s->quantity, values);
+    const char *what = s->names != NULL ? "annual" : reduced ? "groups" : s->quantity;
+    json_object_set_new(answer, what, values);
     if (s->relative >= 0)
         json_object_set_new(
             answer, "error",

@@ -42,18 +42,23 @@ void year_add_sky(const sky_tiling *s, const perez_sky *p, const sun_position *s
     for (size_t t = 0; t < s->n_tiles; t++) L[t] = irradiance > 0 ? L[t] * scale : diffuse / M_PI;
 }
 
-void year_add_sun(const sky_tiling *s, const sun_position *sun, double horizontal, double *L) {
+size_t year_sun_tile(const sky_tiling *s, const double sun[3]) {
     float direction[3][SKY_PACKET];
     uint32_t tile[SKY_PACKET];
     for (int d = 0; d < 3; d++)
-        for (int i = 0; i < SKY_PACKET; i++) direction[s->axis[d]][i] = s->sign[d] * (float)sun->direction[d];
+        for (int i = 0; i < SKY_PACKET; i++) direction[s->axis[d]][i] = s->sign[d] * (float)sun[d];
     sky_tiling_find(s, (const float(*)[SKY_PACKET])direction, tile);
-    L[tile[0]] += horizontal / s->tiles[tile[0]].cosine;
+    return tile[0];
+}
+
+void year_add_sun(const sky_tiling *s, const double sun[3], double horizontal, double *L) {
+    const size_t tile = year_sun_tile(s, sun);
+    L[tile] += horizontal / s->tiles[tile].cosine;
 }
 
 /* One hour: L [n_tiles]. */
-static void make_hour(const weather *w, const weather_hour *h, const sky_tiling *s, bool photometric,
-                      double *L, year_summary *sum) {
+static void make_hour(const weather *w, const weather_hour *h, const sky_tiling *s, const year_wish *wish,
+                      double *L, year_sun *seen, year_summary *sum) {
     const sun_position sun =
         sun_at(w->latitude, w->longitude, w->time_zone, h->year, h->month, h->day, h->hour);
     const bool up = sun.direction[2] > 0;
@@ -68,13 +73,19 @@ static void make_hour(const weather *w, const weather_hour *h, const sky_tiling 
         direct = 0;
     }
     for (size_t t = 0; t < s->n_tiles; t++) L[t] = 0;
+    *seen = (year_sun){.direction = {sun.direction[0], sun.direction[1], sun.direction[2]}};
     if (!(h->diffuse > 0 || horizontal > 0)) return;
     const perez_sky p = perez_sky_of(&sun, direct, h->diffuse);
     const double water = perez_water(h->dew_point);
-    const double diffuse_light = h->diffuse * (photometric ? perez_diffuse_efficacy(&p, water) : 1);
-    const double direct_light = horizontal * (photometric ? perez_direct_efficacy(&p, water) : 1);
+    const double diffuse_light = h->diffuse * (wish->photometric ? perez_diffuse_efficacy(&p, water) : 1);
+    const double direct_light = horizontal * (wish->photometric ? perez_direct_efficacy(&p, water) : 1);
     if (diffuse_light > 0) year_add_sky(s, &p, &sun, diffuse_light, L);
-    if (direct_light > 0) year_add_sun(s, &sun, direct_light, L);
+    if (horizontal > 0) {
+        const double most = w->direct_is_horizontal ? 1367 / (sun.distance * sun.distance) : INFINITY;
+        seen->horizontal = direct_light;
+        seen->normal = direct_light / horizontal * fmin(direct, most);
+    }
+    if (direct_light > 0 && wish->sun_in_tiles) year_add_sun(s, sun.direction, direct_light, L);
     sum->diffuse += h->diffuse;
     sum->direct += horizontal;
     sum->light += diffuse_light + direct_light;
@@ -82,11 +93,12 @@ static void make_hour(const weather *w, const weather_hour *h, const sky_tiling 
     sum->sunny += horizontal > 0;
 }
 
-lam_status year_skies(const weather *w, const sky_tiling *s, bool photometric, const progress *steps,
-                      float *L, year_summary *summary, lam_error *error) {
+lam_status year_skies(const weather *w, const sky_tiling *s, const year_wish *wish, const progress *steps,
+                      float *L, year_sun *suns, year_summary *summary, lam_error *error) {
     enum { BETWEEN_REPORTS = 64 };
     lam_status status = LAM_OK;
     year_summary sum = {0};
+    year_sun seen;
     double *hour = memory_allocate(s->n_tiles, sizeof *hour, "the tiles of an hour", error);
     if (hour == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < w->n; i++) {
@@ -94,7 +106,8 @@ lam_status year_skies(const weather *w, const sky_tiling *s, bool photometric, c
             if (progress_cancelled(steps)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
             progress_report(steps, "skies", (double)i / (double)w->n);
         }
-        make_hour(w, &w->hours[i], s, photometric, hour, &sum);
+        make_hour(w, &w->hours[i], s, wish, hour, &seen, &sum);
+        if (suns != NULL) suns[i] = seen;
         for (size_t t = 0; t < s->n_tiles; t++) L[i * s->n_tiles + t] = (float)hour[t];
     }
     *summary = sum;

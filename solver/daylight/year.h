@@ -13,12 +13,16 @@
 void year_add_sky(const sky_tiling *s, const perez_sky *p, const sun_position *sun, double diffuse,
                   double *L);
 
-/* Adds a sun above the horizon that gives a horizontal plane the irradiance horizontal: to the one tile that
- * it stands in, L += horizontal / cosine. What a horizontal plane receives is exact so; the power that comes
- * from the tile is not: it is that of the sun times sin(altitude) over the tile's mean cosine, too little for
- * a sun low in its tile, too much for a high one, which matters for walls under a low sun and coarse tiles.
+/* The tile that holds a sun above the horizon, in this direction (east, north, up). */
+size_t year_sun_tile(const sky_tiling *s, const double sun[3]);
+
+/* Adds a sun above the horizon, in such a direction, that gives a horizontal plane the irradiance horizontal:
+ * to the one tile that it stands in, L += horizontal / cosine. What a horizontal plane receives is exact so;
+ * the power that comes from the tile is not: it is that of the sun times sin(altitude) over the tile's mean
+ * cosine, too little for a sun low in its tile, too much for a high one, which matters for walls under a low
+ * sun and coarse tiles.
  */
-void year_add_sun(const sky_tiling *s, const sun_position *sun, double horizontal, double *L);
+void year_add_sun(const sky_tiling *s, const double sun[3], double horizontal, double *L);
 
 /* What a year was made of. Sums are of a horizontal plane, Wh/m2 where a row is an hour. */
 typedef struct year_summary {
@@ -30,8 +34,23 @@ typedef struct year_summary {
     double left_out; /* the largest of these, W/m2 */
 } year_summary;
 
-/* L [w->n][n_tiles], W/(m2 sr), or cd/m2 where photometric. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
-lam_status year_skies(const weather *w, const sky_tiling *s, bool photometric, const progress *steps,
-                      float *L, year_summary *summary, lam_error *error);
+/* The sun of a row. */
+typedef struct year_sun {
+    double direction[3]; /* unit vector: east, north, up */
+    double horizontal;   /* what a horizontal plane receives, W/m2 or lux; 0: none */
+    double normal;       /* what a plane that faces it receives; where a file has only the other, no more than
+                            comes from above the air, which a sun that just rises would seem to exceed */
+} year_sun;
+
+/* What is made of a year. */
+typedef struct year_wish {
+    bool photometric;  /* cd/m2 and lux */
+    bool sun_in_tiles; /* each sun in the tile that holds it */
+} year_wish;
+
+/* L [w->n][n_tiles], W/(m2 sr), or cd/m2; suns [w->n], or NULL for none. Errors: LAM_ERR_MEMORY,
+ * LAM_ERR_CANCELLED. */
+lam_status year_skies(const weather *w, const sky_tiling *s, const year_wish *wish, const progress *steps,
+                      float *L, year_sun *suns, year_summary *summary, lam_error *error);
 
 #endif

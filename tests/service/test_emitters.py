@@ -92,6 +92,17 @@ class Emitters(unittest.TestCase):
         np.save(self.folder / "E.npy", parts[1][0] * 3)
         self.close(self.solve("file", "--emission", self.folder / "E.npy"), 3 * truth.solve(*parts[1], "radiosity"), "E")
 
+    def test_weights_beside_skies(self):
+        """One set of weights goes with every sky of a batch, in the first pass and after it."""
+        weights, skies = self.rng.random(12), self.rng.random((70, 3, 12))
+        (self.folder / "w.json").write_text(json.dumps({"emitters": list(weights)}))
+        np.save(self.folder / "skies.npy", skies)
+        found = self.solve("tiles", "--emission", self.folder / "w.json", "--sky", self.folder / "skies.npy",
+                           shape=(70, 3, -1))
+        truth = self.truth["tiles"]
+        for k in 0, 1, 63, 64, 69:
+            self.close(found[k], truth.solve(np.zeros((3, truth.n)), skies[k] + weights, "radiosity"), k)
+
     def test_the_store(self):
         for name, truth in self.truth.items():
             with h5py.File(self.stores[name]) as file:

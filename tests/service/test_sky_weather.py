@@ -1,7 +1,6 @@
 """From a weather file to light on a floor: `lambert sky`, what it writes, what it refuses, and that `lambert solve`
 gives a horizontal square under the open sky what the file says."""
 
-import datetime
 import math
 import os
 import pathlib
@@ -14,56 +13,7 @@ import h5py
 import numpy as np
 
 from command import lambert, must
-
-LATITUDE, LONGITUDE, ZONE = 37.5, -122.25, -8
-DAYS = (31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
-
-
-def sine_of_altitude(year, month, day, hour):
-    """Of the sun over the place above, by the formulas of Meeus, Astronomical Algorithms, ch. 25 and 28 (low accuracy,
-    good to .01 degrees), which are not those of the program."""
-    days = (datetime.date(year, month, day) - datetime.date(2000, 1, 1)).days - .5 + (hour - ZONE) / 24
-    T = days / 36525
-    L, M = math.radians(280.46646 + 36000.76983 * T), math.radians(357.52911 + 35999.05029 * T - .0001537 * T * T)
-    centre = ((1.914602 - .004817 * T) * math.sin(M) + (.019993 - .000101 * T) * math.sin(2 * M)
-              + .000289 * math.sin(3 * M))
-    node = math.radians(125.04 - 1934.136 * T)
-    along = L + math.radians(centre - .00569 - .00478 * math.sin(node))
-    tilt = math.radians(23.439291 - .0130042 * T + .00256 * math.cos(node))
-    declination = math.asin(math.sin(tilt) * math.sin(along))
-    y, e = math.tan(tilt / 2) ** 2, .016708634 - .000042037 * T
-    equation = (y * math.sin(2 * L) - 2 * e * math.sin(M) + 4 * e * y * math.sin(M) * math.cos(2 * L)
-                - y * y / 2 * math.sin(4 * L) - 1.25 * e * e * math.sin(2 * M))
-    turn = math.radians(15 * (hour - 12) + LONGITUDE - 15 * ZONE) + equation
-    phi = math.radians(LATITUDE)
-    return math.sin(phi) * math.sin(declination) + math.cos(phi) * math.cos(declination) * math.cos(turn)
-
-
-def a_year():
-    """(month, day, hour, direct, diffuse) of a made-up year, every hour: clear, broken and overcast by turns."""
-    rng = np.random.default_rng(11)
-    for month in range(1, 13):
-        for day in range(1, DAYS[month - 1] + 1):
-            cloud = rng.random()
-            for hour in range(24):
-                up = max(0, sine_of_altitude(2001, month, day, hour + .5))
-                clear = 950 * up ** .3 if up > .02 else 0
-                yield (month, day, hour + .5, round(clear * max(0, 1 - 1.6 * cloud)),
-                       round(up * (90 + 350 * cloud * (1 - .6 * cloud))))
-
-
-def wea(hours, latitude=LATITUDE, longitude=-LONGITUDE, zone=-15 * ZONE, units=1):
-    head = (f"place Somewhere_XX\nlatitude {latitude}\nlongitude {longitude}\ntime_zone {zone}\nsite_elevation 2.0\n"
-            f"weather_data_file_units {units}\n")
-    return head + "".join(f"{m} {d} {h:.3f} {direct} {diffuse}\n" for m, d, h, direct, diffuse in hours)
-
-
-def epw(hours, dew=99.9):
-    head = (f"LOCATION,Somewhere,XX,USA,TMY3,0,{LATITUDE},{LONGITUDE},{ZONE},2.0\nDESIGN CONDITIONS,0\n"
-            "TYPICAL/EXTREME PERIODS,0\nGROUND TEMPERATURES,0\nHOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0\nCOMMENTS 1,\n"
-            "COMMENTS 2,\nDATA PERIODS,1,1,Data,Sunday, 1/ 1,12/31\n")
-    return head + "".join(f"2001,{m},{d},{int(h + .5)},0,?,15.0,{dew},60,101300,0,0,300,0,{direct},{diffuse},0,0,0,0\n"
-                          for m, d, h, direct, diffuse in hours)
+from weather import LONGITUDE, a_year, epw, sine_of_altitude, wea
 
 
 class SkyWeather(unittest.TestCase):

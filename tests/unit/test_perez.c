@@ -256,13 +256,13 @@ START_TEST(sun) {
             for (double azimuth = -179.3; azimuth < 180; azimuth += 17.7) {
                 const sun_position at = sun_in(altitude, azimuth);
                 memset(L, 0, s.n_tiles * sizeof *L);
-                year_add_sun(&s, &at, 700, L);
+                year_add_sun(&s, at.direction, 700, L);
                 ck_each(fabs(irradiance(&s, L) - 700) < 1e-10);
                 ck_each(L[tile_at(&s, altitude, azimuth)] > 0);
             }
         const sun_position low = sun_in(1e-300, 10);
         memset(L, 0, s.n_tiles * sizeof *L);
-        year_add_sun(&s, &low, 1, L);
+        year_add_sun(&s, low.direction, 1, L);
         ck_assert_double_eq_tol(irradiance(&s, L), 1, 1e-12);
         free(L);
         sky_tiling_free(&s);
@@ -281,9 +281,11 @@ START_TEST(year) {
     sky_tiling s = tiles_of("tregenza", 'z');
     float L[N][145], light[N][145], flat[N][145];
     double sums[N] = {0}, horizontal[N] = {0};
+    const year_wish plain = {.sun_in_tiles = true}, bright = {.sun_in_tiles = true, .photometric = true};
     year_summary sum = {0}, lit = {0}, other = {0};
+    year_sun suns[N];
     lam_error error = {0};
-    ck_assert_int_eq(year_skies(&w, &s, false, NULL, L[0], &sum, &error), LAM_OK);
+    ck_assert_int_eq(year_skies(&w, &s, &plain, NULL, L[0], NULL, &sum, &error), LAM_OK);
     for (size_t i = 0; i < N; i++) {
         const sun_position at = sun_at(40, 15, 1, 2001, 6, 21, hours[i].hour);
         for (size_t t = 0; t < 145; t++) sums[i] += (double)L[i][t] * s.tiles[t].cosine;
@@ -298,9 +300,22 @@ START_TEST(year) {
     ck_assert_double_eq(sum.diffuse, 407);
     ck_assert_double_eq_tol(sum.direct, horizontal[3] + horizontal[5], 1e-9);
     ck_assert_double_eq_tol(sum.light, sum.direct + 407, 1e-9);
+    /* Skies without their suns, and the suns beside them. */
+    ck_assert_int_eq(
+        year_skies(&w, &s, &(year_wish){.photometric = false}, NULL, flat[0], suns, &other, &error), LAM_OK);
+    for (size_t i = 0; i < N; i++) {
+        double whole[145];
+        const bool sunny = i == 3 || i == 5;
+        for (size_t t = 0; t < 145; t++) whole[t] = (double)flat[i][t];
+        ck_assert_double_eq_tol(suns[i].horizontal, horizontal[i], 1e-9);
+        ck_assert_double_eq_tol(suns[i].normal, sunny ? hours[i].direct : 0, 1e-9);
+        if (sunny) year_add_sun(&s, suns[i].direction, suns[i].horizontal, whole);
+        for (size_t t = 0; t < 145; t++) ck_each(fabs(whole[t] - (double)L[i][t]) <= 1e-6 * whole[t]);
+        ck_assert(i != 3 || (flat[i][0] == 0 && suns[i].direction[1] < 0 && suns[i].direction[2] > .9));
+    }
     /* In light: every hour by between 60 and 150 lm/W, and the tile of the sun alone where there is but sun.
      */
-    ck_assert_int_eq(year_skies(&w, &s, true, NULL, light[0], &lit, &error), LAM_OK);
+    ck_assert_int_eq(year_skies(&w, &s, &bright, NULL, light[0], NULL, &lit, &error), LAM_OK);
     for (size_t i = 0; i < N; i++)
         for (size_t t = 0; t < 145; t++)
             ck_each(L[i][t] == 0 ? light[i][t] == 0
@@ -309,10 +324,16 @@ START_TEST(year) {
     /* The same year with its direct light on a horizontal plane. */
     for (size_t i = 0; i < N; i++) hours[i].direct = hours[i].direct > 0 ? fmax(horizontal[i], 1) : 0;
     w.direct_is_horizontal = true;
-    ck_assert_int_eq(year_skies(&w, &s, false, NULL, flat[0], &other, &error), LAM_OK);
+    ck_assert_int_eq(year_skies(&w, &s, &plain, NULL, flat[0], NULL, &other, &error), LAM_OK);
     for (size_t i = 0; i < N; i++)
         for (size_t t = 0; t < 145; t++) ck_each(fabsf(flat[i][t] - L[i][t]) <= 1e-5f * L[i][t]);
     ck_assert_double_eq_tol(other.direct, sum.direct, 1e-9);
+    /* It faces the sun again, but a sun that is all but down gives no more than there is above the air. */
+    hours[0] = (weather_hour){2001, 6, 21, 19.43, 40, 9, NAN};
+    ck_assert_int_eq(year_skies(&w, &s, &plain, NULL, flat[0], suns, &other, &error), LAM_OK);
+    ck_assert_double_eq_tol(suns[3].normal, 800, 1e-9);
+    ck_assert(suns[0].horizontal == 40 && suns[0].direction[2] > 0 && 40 / suns[0].direction[2] > 1400);
+    ck_assert(suns[0].normal > 1300 && suns[0].normal < 1367);
     sky_tiling_free(&s);
 }
 END_TEST
@@ -329,7 +350,8 @@ START_TEST(cancelled) {
     float L = 7;
     year_summary sum = {.lit = 77};
     lam_error error = {0};
-    ck_assert_int_eq(year_skies(&w, &s, false, &(progress){.cancelled = stop}, &L, &sum, &error),
+    ck_assert_int_eq(year_skies(&w, &s, &(year_wish){.sun_in_tiles = true}, &(progress){.cancelled = stop},
+                                &L, NULL, &sum, &error),
                      LAM_ERR_CANCELLED);
     ck_assert_uint_eq(sum.lit, 77);
     sky_tiling_free(&s);
