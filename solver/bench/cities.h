@@ -24,6 +24,10 @@ typedef struct city {
     build_problem problem;
 } city;
 
+/* Its elements alone; freed by mesh_free. */
+lam_status city_mesh(const bench_run *run, unsigned variant, size_t size, const char *terrain, mesh *out,
+                     lam_error *error);
+
 /* Makes one and finds its form factors by a recipe. Freed by city_free. */
 lam_status city_open(const bench_run *run, unsigned variant, size_t size, const char *terrain,
                      const recipe *how, city *out, lam_error *error);

@@ -17,20 +17,25 @@ void city_free(city *c) {
     *c = (city){0};
 }
 
-lam_status city_open(const bench_run *run, unsigned variant, size_t size, const char *terrain,
-                     const recipe *how, city *out, lam_error *error) {
-    lam_status status = LAM_OK;
-    city c = {.variant = variant, .size = size, .terrain = terrain};
+lam_status city_mesh(const bench_run *run, unsigned variant, size_t size, const char *terrain, mesh *out,
+                     lam_error *error) {
     const generate_options options = {.kind = "city",
                                       .variant = variant,
                                       .terrain = terrain,
                                       .elements = run->scale == BENCH_QUICK ? 600 : city_sizes[size],
                                       .reflectance = .7,
                                       .seed = 1};
+    return scene_generated(&options, out, error);
+}
+
+lam_status city_open(const bench_run *run, unsigned variant, size_t size, const char *terrain,
+                     const recipe *how, city *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    city c = {.variant = variant, .size = size, .terrain = terrain};
     const form_factor_options ways = {
         .recipe = *how, .progress = run->progress, .stage = "form factors", .sky = "grid:12x11"};
     TRY(bench_check(run, error));
-    TRY(scene_generated(&options, &c.m, error));
+    TRY(city_mesh(run, variant, size, terrain, &c.m, error));
     TRY(formfactors_order(&c.m, &c.order, error));
     const double started = clock_seconds();
     TRY(form_factors_make(&c.m, c.order, &ways, &c.f, error));

@@ -155,7 +155,7 @@ START_TEST(a_box_is_of_low_rank) {
     ck_assert_str_eq(c.method, "low-rank");
     ck_assert_double_gt(c.density, .5);
     ck_assert_double_lt(c.rank, .5 * (double)c.n); /* else the whole inverse is smaller */
-    ck_assert_double_lt(c.entries, 0); /* F is too dense: not looked at */
+    ck_assert_double_lt(c.entries, 0);             /* F is too dense: not looked at */
     fixture_free(&f);
 }
 END_TEST
