@@ -11,22 +11,6 @@
 #include <string.h>
 #include <sys/stat.h>
 
-/* Whether a file is an HDF5 file, or is called one. */
-static bool is_store(const char *path) {
-    static const unsigned char signature[8] = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
-    unsigned char start[8] = {0};
-    char extension[16];
-    struct stat about;
-    output_file_extension(path, extension);
-    if (strcmp(extension, "h5") == 0) return true;
-    if (stat(path, &about) != 0 || !S_ISREG(about.st_mode)) return false;
-    FILE *stream = fopen(path, "rb");
-    if (stream == NULL) return false;
-    const bool whole = fread(start, 1, sizeof start, stream) == sizeof start;
-    fclose(stream);
-    return whole && memcmp(start, signature, sizeof start) == 0;
-}
-
 static bool same_file(const char *a, const char *b) {
     struct stat of_a, of_b;
     return stat(a, &of_a) == 0 && stat(b, &of_b) == 0 && of_a.st_dev == of_b.st_dev &&
@@ -189,7 +173,7 @@ int cmd_precompute(int argc, char **argv) {
     build_report built = {0};
     char *command = command_line(argc, argv), *continues = NULL;
     int code = options_parse(&precompute_verb, argc, argv, &f, &given);
-    const bool from_store = code == OPTIONS_GO && is_store(given.arguments[0]);
+    const bool from_store = code == OPTIONS_GO && precompute_takes_as_store(given.arguments[0]);
     if (code == OPTIONS_GO && check_together(&f, &given, from_store) != 0) code = 2;
     if (code != OPTIONS_GO) {
         free(command);

@@ -15,7 +15,7 @@ static const verb verbs[] = {
     {"generate", cmd_generate, "write one of the known scenes"},
     {"precompute", cmd_precompute, "turn a scene into a store: the operator from emission to radiosity"},
     {"info", cmd_info, "say what a store holds and how exact it is"},
-    {"classify", NULL, "say what kind of scene it is (not supported yet)"},
+    {"classify", cmd_classify, "say what kind of scene it is, and which operator suits it"},
     {"sky", cmd_sky, "turn weather into the radiance of sky tiles"},
     {"solve", cmd_solve, "light a store and write the radiosity"},
     {"verify", cmd_verify, "check a store: checksums, invariants, error"},

@@ -7,13 +7,19 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-static void work_free(work *w) {
+void work_free(work *w) {
     mesh_free(&w->m);
     free(w->order);
     form_factors_free(&w->f);
     emitter_wish_free(&w->emitters);
     scratch_close(w->scratch, false);
     lam_operator_close(w->op);
+}
+
+double work_memory(const precompute_options *o) {
+    const uint64_t available = memory_available();
+    if (o->memory > 0) return (double)o->memory;
+    return available > 0 ? .7 * (double)available : 0x1p60;
 }
 
 uint64_t precompute_seed(uint64_t seed, uint64_t purpose) {
@@ -96,7 +102,7 @@ void work_log_kept(work *w, const form_factors *f) {
         terminal_log(w->t, "%zu of %zu rows were in %s already", f->rows_kept, w->m.n, w->options->scratch);
 }
 
-static lam_status trace(work *w, lam_error *error) {
+lam_status work_trace(work *w, lam_error *error) {
     lam_status status = LAM_OK;
     const form_factor_options how = {.recipe = w->recipe,
                                      .progress = &w->progress,
@@ -116,10 +122,7 @@ lam_status precompute_run(const precompute_options *options, terminal *t, build_
                           lam_error *error) {
     lam_status status = LAM_OK;
     work w = {.options = options, .t = t, .progress = terminal_progress(t)};
-    const uint64_t available = memory_available();
-    w.memory = options->memory > 0 ? (double)options->memory
-               : available > 0     ? .7 * (double)available
-                                   : 0x1p60;
+    w.memory = work_memory(options);
 
     double started = clock_seconds();
     TRY(options->from_store ? work_load_store(&w, error) : work_load_scene(&w, error));
@@ -135,7 +138,7 @@ lam_status precompute_run(const precompute_options *options, terminal *t, build_
     TRY(announce(&w, error));
     if (!options->from_store) {
         started = clock_seconds();
-        TRY(trace(&w, error));
+        TRY(work_trace(&w, error));
         log_stage(&w, "form factors", started);
     }
     log_form_factors(&w);

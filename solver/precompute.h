@@ -2,7 +2,7 @@
 #ifndef LAMBERT_SOLVER_PRECOMPUTE_H
 #define LAMBERT_SOLVER_PRECOMPUTE_H
 
-#include "solver/build/build.h"
+#include "solver/build/classify.h"
 #include "solver/choice.h"
 #include "solver/scene/mesh.h"
 #include "solver/terminal.h"
@@ -40,6 +40,16 @@ typedef struct precompute_options {
     const char *scratch;        /* a folder, or NULL */
     const char *continues;      /* what a cancelled run says where the folder holds what it has finished */
 } precompute_options;
+
+/* Whether an input is a store: an HDF5 file, or one that is called so. */
+bool precompute_takes_as_store(const char *path);
+
+/* What kind of scene it is, looked at thoroughly: its form factors by so many rays as 2^28 allow, from 256 to
+ * 4,096 an element, unless their number is given or a store has them; rays_used says how many (0: of a
+ * store). Of the options those about the scene, its sky and emitters, epsilon, threshold, memory, seed count.
+ */
+lam_status precompute_classify(const precompute_options *options, terminal *t, scene_class *out,
+                               size_t *rays_used, lam_error *error);
 
 /* Does it all; on an error nothing is written. report says what was built. */
 lam_status precompute_run(const precompute_options *options, terminal *t, build_report *report,

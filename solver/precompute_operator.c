@@ -8,7 +8,7 @@
 #include <omp.h>
 #include <string.h>
 
-static emitter_source emitters_of(const work *w) {
+emitter_source work_emitters(const work *w) {
     return (emitter_source){.s = w->emitters.s,
                             .names = (const char *const *)w->emitters.names,
                             .E = w->emitters.light.E,
@@ -17,8 +17,7 @@ static emitter_source emitters_of(const work *w) {
                             .first_bounce = w->f.sky.first_bounce};
 }
 
-/* emitters: of emitters_of, as long as it is used. */
-static build_problem problem_of(const work *w, const emitter_source *emitters) {
+build_problem work_problem(const work *w, const emitter_source *emitters) {
     return (build_problem){.emitters = emitters->s > 0 ? emitters : NULL,
                            .n = w->m.n,
                            .n_channels = w->m.n_channels,
@@ -29,11 +28,16 @@ static build_problem problem_of(const work *w, const emitter_source *emitters) {
                            .noise = recipe_noise(&w->f.recipe)};
 }
 
+size_t work_left(const work *w) {
+    const double held = (w->f.F.place != NULL ? 0 : (double)w->f.F.indptr[w->m.n] * 8) + 400 * (double)w->m.n;
+    return (size_t)fmax(1, w->memory - held);
+}
+
 lam_status work_build(work *w, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = w->options;
-    const emitter_source emitters = emitters_of(w);
-    build_problem problem = problem_of(w, &emitters);
+    const emitter_source emitters = work_emitters(w);
+    build_problem problem = work_problem(w, &emitters);
     element_geometry geometry = {0};
     budget_rule rule = BUDGET_SQUARES;
     sparse_correction correction = SPARSE_DELTA;
@@ -42,7 +46,6 @@ lam_status work_build(work *w, lam_error *error) {
     if (!sparse_correction_find(o->correction, &correction))
         FAIL(error, LAM_ERR_ARGUMENT, "--correction %.40s: unknown; use none, delta or discarded",
              o->correction);
-    const double held = (w->f.F.place != NULL ? 0 : (double)w->f.F.indptr[w->m.n] * 8) + 400 * (double)w->m.n;
     const build_options how = {.method = o->method,
                                .factorizer = o->factorizer,
                                .epsilon = o->epsilon,
@@ -54,7 +57,7 @@ lam_status work_build(work *w, lam_error *error) {
                                .proximity = o->proximity,
                                .threshold = o->threshold,
                                .correction = correction,
-                               .memory = (size_t)fmax(1, w->memory - held),
+                               .memory = work_left(w),
                                .seed = o->seed,
                                .progress = &w->progress};
     if (strcmp(o->method, "2msc") == 0) TRY(element_geometry_add(&w->m, &geometry, &problem, error));
@@ -103,8 +106,8 @@ lam_status work_judge(work *w, lam_error *error) {
                                           "form factors for the judge, 2 of 2"};
     static const char *const files[2] = {"judge-1.rows", "judge-2.rows"};
     form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}}, mean = {.row_sums = NULL};
-    const emitter_source emitters = emitters_of(w);
-    const build_problem problem = problem_of(w, &emitters);
+    const emitter_source emitters = work_emitters(w);
+    const build_problem problem = work_problem(w, &emitters);
     uint64_t purpose = 0, seed;
     for (int h = 0; h < 2; h++) {
         /* Independent of what was factorized: kept form factors may have any seed. */

@@ -1,13 +1,31 @@
 /* The first stages of a precompute: what comes in, its mesh, and whether memory holds what is to come. */
+#include "solver/output_file.h"
 #include "solver/precompute_work.h"
 #include "solver/scene/import.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 /* Above this many elements a probe is dear: fewer are measured at defaults. */
 enum { PROBES = 200, PROBES_OF_LARGE = 32, LARGE = 10240 };
+
+bool precompute_takes_as_store(const char *path) {
+    static const unsigned char signature[8] = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
+    unsigned char start[8] = {0};
+    char extension[16];
+    struct stat about;
+    output_file_extension(path, extension);
+    if (strcmp(extension, "h5") == 0) return true;
+    if (stat(path, &about) != 0 || !S_ISREG(about.st_mode)) return false;
+    FILE *stream = fopen(path, "rb");
+    if (stream == NULL) return false;
+    const bool whole = fread(start, 1, sizeof start, stream) == sizeof start;
+    fclose(stream);
+    return whole && memcmp(start, signature, sizeof start) == 0;
+}
 
 static void log_warnings(terminal *t, const char *warnings) {
     while (*warnings != '\0') {

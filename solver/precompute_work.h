@@ -50,6 +50,20 @@ const large_place *work_large_place(const work *w);
 /* Says how many rows were there already: precompute.c. */
 void work_log_kept(work *w, const form_factors *f);
 
+/* Frees all of it, and how much memory it may use: precompute.c. */
+void work_free(work *w);
+double work_memory(const precompute_options *o);
+
+/* Form factors of a scene: precompute.c. */
+lam_status work_trace(work *w, lam_error *error);
+
+/* What methods are given; emitters: of work_emitters, as long as the problem is used. */
+emitter_source work_emitters(const work *w);
+build_problem work_problem(const work *w, const emitter_source *emitters);
+
+/* Bytes of memory that form factors and mesh leave. */
+size_t work_left(const work *w);
+
 /* The operator and its errors: precompute_operator.c. */
 lam_status work_build(work *w, lam_error *error);
 lam_status work_judge(work *w, lam_error *error);

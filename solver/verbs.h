@@ -5,6 +5,7 @@
 
 int cmd_generate(int argc, char **argv);
 int cmd_precompute(int argc, char **argv);
+int cmd_classify(int argc, char **argv);
 int cmd_info(int argc, char **argv);
 int cmd_sky(int argc, char **argv);
 int cmd_solve(int argc, char **argv);

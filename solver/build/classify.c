@@ -5,6 +5,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 /* An entry of a sparse inverse and its column are two numbers, and what they are multiplied with lies
  * anywhere: measured, four times the time of a number of a panel. */
@@ -93,21 +94,45 @@ done:
     return status;
 }
 
+/* Few elements keep the whole inverse, whatever they see. */
+static bool is_small(const scene_class *c) {
+    return c->n <= CLASSIFY_SMALL && isfinite(c->exact_cost);
+}
+
+static void choose(scene_class *c, bool emitters) {
+    c->method = "low-rank";
+    if (c->exact_cost <= c->low_rank_cost && isfinite(c->low_rank_cost)) c->method = "exact";
+    if (c->sparse_cost < fmin(c->exact_cost, c->low_rank_cost)) c->method = "sparse";
+    if (is_small(c)) c->method = "exact";
+    if (emitters) c->method = "emitters";
+}
+
 static void say(scene_class *c, double epsilon) {
     char rank[64] = "";
+    if (is_small(c) && strcmp(c->method, "exact") == 0) {
+        snprintf(c->reason, sizeof c->reason,
+                 "exact: %zu elements are few enough (up to %d) to keep the whole inverse", c->n,
+                 CLASSIFY_SMALL);
+        return;
+    }
     if (c->rank >= 0) snprintf(rank, sizeof rank, ", rank estimate %.0f at epsilon %.3g", c->rank, epsilon);
     int n =
         snprintf(c->reason, sizeof c->reason, "%s: F is %.3g %% dense%s", c->method, 100 * c->density, rank);
     const struct {
         const char *method;
         double cost;
-    } others[] = {{"exact", c->exact_cost}, {"low-rank", c->low_rank_cost}, {"sparse", c->sparse_cost}};
-    const double own = fmin(c->exact_cost, fmin(c->low_rank_cost, c->sparse_cost));
-    for (size_t k = 0; k < 3; k++)
-        if (isfinite(own) && isfinite(others[k].cost) && others[k].cost > own && n > 0 &&
-            (size_t)n < sizeof c->reason)
+    } all[] = {{"exact", c->exact_cost},
+               {"low-rank", c->low_rank_cost},
+               {"sparse", c->sparse_cost},
+               {"emitters", c->emitters_cost}};
+    enum { ALL = sizeof all / sizeof *all };
+    double own = INFINITY;
+    for (size_t k = 0; k < ALL; k++)
+        if (strcmp(all[k].method, c->method) == 0) own = all[k].cost;
+    for (size_t k = 0; k < ALL && isfinite(own); k++)
+        if (all[k].cost > own && isfinite(all[k].cost) && n > 0 && (size_t)n < sizeof c->reason)
             n += snprintf(c->reason + n, sizeof c->reason - (size_t)n, "; %s would take %.3g times as long",
-                          others[k].method, others[k].cost / own);
+                          all[k].method, all[k].cost / own);
 }
 
 lam_status classify_scene(const build_problem *problem, const classify_options *options, scene_class *out,
@@ -127,21 +152,20 @@ lam_status classify_scene(const build_problem *problem, const classify_options *
                      .emitters_cost = INFINITY};
     if (problem->n <= CLASSIFY_EXACT_MOST && C * n * n <= numbers) c.exact_cost = n * n;
     if (problem->emitters != NULL) c.emitters_cost = n * (double)problem->emitters->s;
+    const bool decided = problem->emitters != NULL || is_small(&c), open = c.density < dense_enough;
+    const bool sparse_too = open && (!decided || options->thorough);
     /* Where the whole inverse may be the answer the rank decides; else it decides only against sparse. */
-    const bool open = c.density < dense_enough && problem->emitters == NULL;
-    if (open || options->thorough || (isfinite(c.exact_cost) && problem->emitters == NULL)) {
+    const bool whole = isfinite(c.exact_cost) && !decided;
+    if (sparse_too || whole || options->thorough) {
         TRY(look_at_rank(problem, options, &c, error));
         if (2 * n * c.rank <= numbers) c.low_rank_cost = 2 * n * c.rank;
     }
-    if (open) {
+    if (sparse_too) {
         const double most = fmin(fmin(c.exact_cost, c.low_rank_cost) / sparse_number, numbers / 2 / C);
         TRY(look_at_inverse(problem, options, most, &c, error));
         if (c.entries >= 0 && 2 * C * c.entries <= numbers) c.sparse_cost = sparse_number * c.entries;
     }
-    c.method = "low-rank";
-    if (c.exact_cost <= c.low_rank_cost && c.low_rank_cost < INFINITY) c.method = "exact";
-    if (c.sparse_cost < fmin(c.exact_cost, c.low_rank_cost)) c.method = "sparse";
-    if (problem->emitters != NULL) c.method = "emitters";
+    choose(&c, problem->emitters != NULL);
     say(&c, options->epsilon);
     *out = c;
 done:

@@ -35,7 +35,8 @@ typedef struct classify_options {
 lam_status classify_scene(const build_problem *problem, const classify_options *options, scene_class *out,
                           lam_error *error);
 
-/* More elements than these make the whole inverse take too long. */
-enum { CLASSIFY_EXACT_MOST = 12288 };
+/* Up to so many elements the whole inverse is small, exact, and built in well under a second; beyond so many
+ * it takes too long. */
+enum { CLASSIFY_SMALL = 1024, CLASSIFY_EXACT_MOST = 12288 };
 
 #endif

@@ -6,9 +6,6 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Up to this many elements the whole inverse is small, exact, and built in well under a second. */
-enum { AUTO_EXACT_ELEMENTS = 1024 };
-
 static const build_method *const methods[] = {&build_exact, &build_low_rank, &build_two_mesh, &build_sparse,
                                               &build_emitters};
 
@@ -86,18 +83,10 @@ done:
     return status;
 }
 
-/* auto: exact while it is small, else what classify.h finds. */
+/* auto: what classify.h finds. */
 static lam_status build_auto(const build_problem *problem, const build_options *options, lam_operator **op,
                              build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = problem->n;
-    if (n <= AUTO_EXACT_ELEMENTS) {
-        TRY(build_exact.build(problem, options, op, report, error));
-        snprintf(report->reason, sizeof report->reason,
-                 "exact: %zu elements are few enough (up to %d) to keep the whole inverse", n,
-                 AUTO_EXACT_ELEMENTS);
-        return LAM_OK;
-    }
     scene_class looked;
     const classify_options look = {.epsilon = options->epsilon,
                                    .threshold = options->threshold,
