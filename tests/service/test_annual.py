@@ -10,7 +10,6 @@ import tempfile
 import time
 import unittest
 
-import h5py
 import numpy as np
 
 from command import ENVIRONMENT, LAMBERT, lambert, must

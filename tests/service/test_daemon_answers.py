@@ -1,7 +1,6 @@
 """lambertd answers what the store holds: every form of emission, selection, quantity and encoding."""
 
 import io
-import json
 import pathlib
 import tempfile
 import unittest

@@ -1,6 +1,5 @@
 """lambertd from start to end: what it refuses to serve, reloading, draining, and clients that misbehave."""
 
-import http.client
 import json
 import os
 import pathlib

@@ -3,66 +3,20 @@
 import os
 import resource
 import signal
-import struct
 import subprocess
 import tempfile
 import time
 import unittest
-import zlib
 
 import h5py
 import numpy
 
 from command import LAMBERT, lambert, must
+from png_file import decode_png
 
 BACKGROUND = 38
 GLOW = [word for group in ("floor", "ceiling", "wall-x0", "wall-x1", "wall-y0", "wall-y1", "block-1", "block-2",
                            "block-3") for word in ("--emit", group + "=1")]
-
-
-def decode_png(path):
-    """A PNG of 8 bits a channel as an array [height][width][channels], by the specification alone."""
-    with open(path, "rb") as file:
-        data = file.read()
-    assert data[:8] == b"\x89PNG\r\n\x1a\n", path
-    place, packed = 8, b""
-    while place < len(data):
-        length, kind = struct.unpack(">I4s", data[place:place + 8])
-        body = data[place + 8:place + 8 + length]
-        assert struct.unpack(">I", data[place + 8 + length:place + 12 + length])[0] == zlib.crc32(kind + body)
-        place += 12 + length
-        if kind == b"IHDR":
-            width, height, depth, colour = struct.unpack(">IIBB", body[:10])
-            assert depth == 8
-        elif kind == b"IDAT":
-            packed += body
-    assert kind == b"IEND"
-    channels = {0: 1, 2: 3}[colour]
-    rows = numpy.frombuffer(zlib.decompress(packed), numpy.uint8).reshape(height, 1 + width * channels)
-    pixels = numpy.zeros((height, width, channels), int)
-    above = numpy.zeros((width, channels), int)
-    for y in range(height):
-        row = rows[y, 1:].reshape(width, channels).astype(int)
-        method = rows[y, 0]
-        if method == 1:
-            row = numpy.cumsum(row, axis=0) & 255
-        elif method == 2:
-            row = (row + above) & 255
-        elif method in (3, 4):
-            left, corner = numpy.zeros(channels, int), numpy.zeros(channels, int)
-            for x in range(width):
-                up = above[x]
-                if method == 3:
-                    guess = (left + up) // 2
-                else:
-                    to_left, to_up = abs(up - corner), abs(left - corner)
-                    to_corner = abs(left + up - 2 * corner)
-                    guess = numpy.where((to_left <= to_up) & (to_left <= to_corner), left,
-                                        numpy.where(to_up <= to_corner, up, corner))
-                row[x] = (row[x] + guess) & 255
-                left, corner = row[x], up
-        pixels[y] = above = row
-    return pixels
 
 
 class Render(unittest.TestCase):

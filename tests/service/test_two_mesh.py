@@ -10,7 +10,7 @@ import numpy
 
 from command import lambert, must
 from daemon import Daemon
-from test_render import decode_png
+from png_file import decode_png
 
 BACKGROUND = 38
 
