@@ -21,7 +21,7 @@ static const double valley_slope = .12, hill_slope = .1;
  * sizes, with a few skyscrapers. */
 static const struct {
     double low, middle, top, power;
-} variants[3] = {{5, 1.2, 0, 1}, {7, 6, 0, 1}, {18, 8, 40, 50}};
+} variants[3] = {{5, 1.2, 0, 1}, {7, 6, 0, 1}, {21, 5, 36, 70}};
 
 static lam_status rectangle_add(city_rectangles *all, city_rectangle one, lam_error *error) {
     city_rectangle *grown =
