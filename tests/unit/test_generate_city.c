@@ -234,7 +234,7 @@ START_TEST(city_variants_differ_in_height_alone) {
     ck_assert_double_lt(highest[0], 7);
     ck_assert_double_lt(highest[1], 14);
     ck_assert_double_gt(highest[1], 1.8 * highest[0]);
-    ck_assert_double_gt(highest[2], 50);
+    ck_assert_double_gt(highest[2], 1.7 * 26); /* a tower stands out over the others, 21 to 26 m high */
     ck_assert_double_gt(facades[1], 1.2 * facades[0]);
     for (int v = 1; v < 3; v++) {
         ck_assert_double_eq_tol(roofs[v], roofs[0], 1e-8 * roofs[0]);
