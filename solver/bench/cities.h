@@ -3,6 +3,7 @@
 #define LAMBERT_BENCH_CITIES_H
 
 #include "solver/bench/bench.h"
+#include "solver/bench/lowrank.h"
 #include "solver/build/build.h"
 #include "solver/formfactor/formfactor.h"
 
@@ -35,6 +36,25 @@ void city_free(city *c);
 
 /* Share of n^2 that F has. */
 double city_density(const city *c);
+
+/* A city under each tile of its sky alone: E = rho first_bounce, and B converged, [m][n]. */
+typedef struct city_light {
+    size_t m;
+    float *E;
+    double *B;
+} city_light;
+
+lam_status city_light_make(const bench_run *run, const city *c, city_light *d, lam_error *error);
+void city_light_free(city_light *d);
+
+/* M~ at a threshold, else as precompute has it. */
+lam_status city_sparse(const bench_run *run, const city *c, double threshold, sparse_correction correction,
+                       lam_operator **op, build_report *report, lam_error *error);
+
+/* B~ [m][n] of an operator, and |B~ - B| over |B| and |B - E| of each tile, area-weighted. */
+lam_status city_light_answer(const city_light *d, const lam_operator *op, float *B, lam_error *error);
+lam_status city_light_errors(const city *c, const city_light *d, const lam_operator *op, double *relative,
+                             double *indirect, lam_error *error);
 
 /* Tables 4.1 and 4.5: densities of F. */
 lam_status cities_density(const bench_run *run, lam_error *error);

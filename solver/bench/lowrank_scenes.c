@@ -25,9 +25,8 @@ void lowrank_scene_free(lowrank_scene *s) {
     *s = (lowrank_scene){0};
 }
 
-/* Takes the mesh over; form factors of it. */
-static lam_status open_scene(const bench_run *run, const char *name, mesh *m, lowrank_scene *out,
-                             lam_error *error) {
+lam_status lowrank_open(const bench_run *run, const char *name, mesh *m, lowrank_scene *out,
+                        lam_error *error) {
     lam_status status = LAM_OK;
     lowrank_scene s = {.name = name, .m = *m};
     size_t n_surfaces;
@@ -94,7 +93,7 @@ lam_status lowrank_room(const bench_run *run, size_t divisions, lowrank_scene *o
     for (int w = 0; w < 5; w++)
         n += add_wall(pieces + n, walls[w][0], walls[w][1], walls[w][2], divisions, divisions, true);
     TRY(scene_of_pieces(pieces, n, &m, error));
-    TRY(open_scene(run, "open room", &m, out, error));
+    TRY(lowrank_open(run, "open room", &m, out, error));
 done:
     free(pieces);
     mesh_free(&m);
@@ -105,7 +104,7 @@ lam_status lowrank_cornell(const bench_run *run, size_t elements, lowrank_scene 
     lam_status status = LAM_OK;
     mesh m = {0};
     TRY(scene_cornell(elements, &m, error));
-    TRY(open_scene(run, "cornell", &m, out, error));
+    TRY(lowrank_open(run, "cornell", &m, out, error));
 done:
     mesh_free(&m);
     return status;
@@ -195,7 +194,7 @@ lam_status lowrank_patio(const bench_run *run, size_t elements, lowrank_scene *o
     b.n = 0;
     add_patio(&b);
     TRY(scene_of_pieces(b.pieces, b.n, &m, error));
-    TRY(open_scene(run, "patio", &m, out, error));
+    TRY(lowrank_open(run, "patio", &m, out, error));
 done:
     free(b.pieces);
     mesh_free(&m);
