@@ -19,10 +19,12 @@ typedef struct lowrank_scene {
 
 void lowrank_scene_free(lowrank_scene *s);
 
-/* Takes the mesh over and finds its form factors: all pairs up to 24,000 elements, rays beyond. name is
- * static. */
-lam_status lowrank_open(const bench_run *run, const char *name, mesh *m, lowrank_scene *out,
-                        lam_error *error);
+/* Takes the mesh over and finds its form factors by a recipe; name is static. */
+lam_status lowrank_open(const bench_run *run, const char *name, mesh *m, const recipe *how,
+                        lowrank_scene *out, lam_error *error);
+
+/* All pairs up to 24,000 elements, rays beyond. */
+recipe lowrank_recipe(const bench_run *run, size_t elements);
 
 /* What builders are given of it, which it must outlive. */
 build_problem lowrank_problem(const lowrank_scene *s);

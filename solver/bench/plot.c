@@ -203,6 +203,10 @@ static void set_colour(cairo_t *c, const plot *p, size_t k) {
     cairo_set_source_rgb(c, rgb[0], rgb[1], rgb[2]);
 }
 
+static bool is_marked(const plot_series *s) {
+    return !s->unmarked && !s->plain;
+}
+
 /* A mark of its own for every series: disc, square, triangles, diamond. */
 static void put_mark(cairo_t *c, size_t k, double x, double y) {
     const double r = 4.5;
@@ -255,8 +259,17 @@ static void put_series(cairo_t *c, const plot *p, size_t k, const axis *x, const
             }
             cairo_stroke(c);
         }
-        if (!s->unmarked) put_mark(c, k, px, py);
+        if (is_marked(s)) put_mark(c, k, px, py);
     }
+}
+
+/* Beside the first point, on the side where there is room. */
+static void put_name(cairo_t *c, const plot_series *s, const axis *x, const axis *y) {
+    if (!s->named || s->n == 0 || !shows(x, y, s, 0)) return;
+    const double px = place(x, s->x[0]), py = place(y, s->y[0]) + .35 * text_size;
+    const bool fits = px + .7 * text_size + text_width(c, s->label) < x->to;
+    cairo_set_source_rgb(c, 0, 0, 0);
+    put_text(c, px + (fits ? .7 : -.7) * text_size, py, fits ? 0 : 1, s->label);
 }
 
 static double legend_width(cairo_t *c, const plot *p) {
@@ -275,7 +288,7 @@ static void put_legend(cairo_t *c, const plot *p, double x, double y) {
             cairo_line_to(c, x + 2 * text_size, middle);
             cairo_stroke(c);
         }
-        if (!p->series[k].unmarked) put_mark(c, k, x + text_size, middle);
+        if (is_marked(&p->series[k])) put_mark(c, k, x + text_size, middle);
         cairo_set_dash(c, NULL, 0, 0);
         cairo_set_source_rgb(c, 0, 0, 0);
         put_text(c, x + 2.6 * text_size, middle + .35 * text_size, 0, p->series[k].label);
@@ -301,6 +314,7 @@ static lam_status draw(const plot *p, cairo_surface_t *surface, lam_error *error
     cairo_rectangle(c, x.from - 6, y.to - 6, x.to - x.from + 12, y.from - y.to + 12);
     cairo_clip(c);
     for (size_t k = 0; k < p->n_series; k++) put_series(c, p, k, &x, &y);
+    for (size_t k = 0; k < p->n_series; k++) put_name(c, &p->series[k], &x, &y);
     cairo_restore(c);
     put_legend(c, p, x.to + legend_gap, top);
     const cairo_status_t drawn = cairo_status(c);
