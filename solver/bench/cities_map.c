@@ -61,7 +61,6 @@ static lam_status draw(const bench_run *run, const lowrank_scene *scenes, const 
                     .x_label = "density of F",
                     .y_label = "rank at epsilon .1, over n",
                     .x_log = true,
-                    .y_log = true,
                     .series = series,
                     .n_series = MAP_SCENES};
     return run->sink->plot(run->sink->context, &p, error);

@@ -61,7 +61,7 @@ done:
     return status;
 }
 
-/* Falling or rising curves, from the lowest value to the highest. */
+/* Curves from the lowest value to the highest. */
 typedef struct sorted_light {
     double place[POINTS], value[CURVES][POINTS];
 } sorted_light;
@@ -89,14 +89,18 @@ static void add_curves(size_t n, const double *B, const double *first, size_t wh
 static lam_status draw_light(const bench_run *run, const city *c, const sorted_light *l, lam_error *error) {
     plot_series series[CURVES];
     char labels[CURVES][32], name[64], title[128];
+    /* What is converged last, in dashes, so that the others show beneath. */
     for (size_t k = 0; k < CURVES; k++) {
-        const char *what = k % 2 == 0 ? "B" : "S";
-        if (k < 2)
-            snprintf(labels[k], sizeof labels[k], "%s, converged", what);
-        else
-            snprintf(labels[k], sizeof labels[k], "%s, %s", what, threshold_labels[k / 2 - 1]);
-        series[k] = (plot_series){
-            .label = labels[k], .n = POINTS, .x = l->place, .y = l->value[k], .joined = true, .plain = true};
+        const size_t which = (k / 2 + 1) % (1 + CITY_THRESHOLDS);
+        snprintf(labels[k], sizeof labels[k], "%s, %s", k % 2 == 0 ? "B" : "S",
+                 which == 0 ? "converged" : threshold_labels[which - 1]);
+        series[k] = (plot_series){.label = labels[k],
+                                  .n = POINTS,
+                                  .x = l->place,
+                                  .y = l->value[2 * which + k % 2],
+                                  .joined = true,
+                                  .plain = which > 0,
+                                  .unmarked = which == 0};
     }
     snprintf(name, sizeof name, "bounces-%u", c->variant);
     snprintf(title, sizeof title,

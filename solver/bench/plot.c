@@ -263,13 +263,44 @@ static void put_series(cairo_t *c, const plot *p, size_t k, const axis *x, const
     }
 }
 
-/* Beside the first point, on the side where there is room. */
-static void put_name(cairo_t *c, const plot_series *s, const axis *x, const axis *y) {
-    if (!s->named || s->n == 0 || !shows(x, y, s, 0)) return;
-    const double px = place(x, s->x[0]), py = place(y, s->y[0]) + .35 * text_size;
-    const bool fits = px + .7 * text_size + text_width(c, s->label) < x->to;
+/* A rectangle of the sheet: a mark or a name that nothing may be written over. */
+typedef struct area {
+    double x, y, width, height; /* of its middle */
+} area;
+
+static bool meet(const area *a, const area *b) {
+    return 2 * fabs(a->x - b->x) < a->width + b->width && 2 * fabs(a->y - b->y) < a->height + b->height;
+}
+
+/* Right of the first point, or left, below or above it: where the sheet is free first. taken holds *n areas
+ * and has room for one more. */
+static void put_name(cairo_t *c, const plot_series *s, const axis *x, const axis *y, area *taken, size_t *n) {
+    const double w = text_width(c, s->label), px = place(x, s->x[0]), py = place(y, s->y[0]);
+    const double side = .5 * w + .7 * text_size, up = 1.1 * text_size;
+    const double shift[4][2] = {{side, 0}, {-side, 0}, {0, up}, {0, -up}};
+    area best = {.width = w, .height = text_size};
+    for (size_t k = 0; k < 4; k++) {
+        best.x = px + shift[k][0];
+        best.y = py + shift[k][1];
+        bool free_there = best.x - .5 * w > x->from && best.x + .5 * w < x->to;
+        for (size_t t = 0; t < *n; t++) free_there = free_there && !meet(&best, &taken[t]);
+        if (free_there) break;
+    }
     cairo_set_source_rgb(c, 0, 0, 0);
-    put_text(c, px + (fits ? .7 : -.7) * text_size, py, fits ? 0 : 1, s->label);
+    put_text(c, best.x, best.y + .35 * text_size, .5, s->label);
+    taken[(*n)++] = best;
+}
+
+static void put_names(cairo_t *c, const plot *p, const axis *x, const axis *y) {
+    area taken[2 * PLOT_SERIES_MOST];
+    size_t n = 0, named[PLOT_SERIES_MOST], n_named = 0;
+    for (size_t k = 0; k < p->n_series; k++) {
+        const plot_series *s = &p->series[k];
+        if (!s->named || s->n == 0 || !shows(x, y, s, 0)) continue;
+        taken[n++] = (area){place(x, s->x[0]), place(y, s->y[0]), 9, 9};
+        named[n_named++] = k;
+    }
+    for (size_t k = 0; k < n_named; k++) put_name(c, &p->series[named[k]], x, y, taken, &n);
 }
 
 static double legend_width(cairo_t *c, const plot *p) {
@@ -314,7 +345,7 @@ static lam_status draw(const plot *p, cairo_surface_t *surface, lam_error *error
     cairo_rectangle(c, x.from - 6, y.to - 6, x.to - x.from + 12, y.from - y.to + 12);
     cairo_clip(c);
     for (size_t k = 0; k < p->n_series; k++) put_series(c, p, k, &x, &y);
-    for (size_t k = 0; k < p->n_series; k++) put_name(c, &p->series[k], &x, &y);
+    put_names(c, p, &x, &y);
     cairo_restore(c);
     put_legend(c, p, x.to + legend_gap, top);
     const cairo_status_t drawn = cairo_status(c);
