@@ -3,7 +3,9 @@
 #define LAMBERT_BENCH_CITIES_H
 
 #include "solver/bench/bench.h"
+#include "solver/bench/lowrank.h"
 #include "solver/build/build.h"
+#include "solver/build/spectrum.h"
 #include "solver/formfactor/formfactor.h"
 
 enum { CITY_VARIANTS = 3, CITY_SIZES = 3, CITY_TERRAINS = 3, CITY_THRESHOLDS = 3, CITY_SKIES = 3650 };
@@ -36,10 +38,57 @@ void city_free(city *c);
 /* Share of n^2 that F has. */
 double city_density(const city *c);
 
+/* A city under each tile of its sky alone: E = rho first_bounce, and B converged, [m][n]. */
+typedef struct city_light {
+    size_t m;
+    float *E;
+    double *B;
+} city_light;
+
+lam_status city_light_make(const bench_run *run, const city *c, city_light *d, lam_error *error);
+void city_light_free(city_light *d);
+
+/* M~ at a threshold, else as precompute has it. */
+lam_status city_sparse(const bench_run *run, const city *c, double threshold, sparse_correction correction,
+                       lam_operator **op, build_report *report, lam_error *error);
+
+/* B~ [m][n] of an operator, and |B~ - B| over |B| and |B - E| of each tile, area-weighted. */
+lam_status city_light_answer(const city_light *d, const lam_operator *op, float *B, lam_error *error);
+lam_status city_light_errors(const city *c, const city_light *d, const lam_operator *op, double *relative,
+                             double *indirect, lam_error *error);
+
+/* The scenes of figure 5.1, the first MAP_MAIN of them the thesis', and others beside them: as `lambert
+ * generate` makes them, cities of reflectance .7 as in the thesis, the others of their own. */
+enum { MAP_SCENES = 10, MAP_MAIN = 4, FALL_SCENES = 4 };
+
+/* Where the singular values of S = A^1/2 F A^-1/2 lie, which are those of F where areas are equal. Freed by
+ * spectrum_free. */
+lam_status map_spectrum(const bench_run *run, const lowrank_scene *s, spectrum *out, lam_error *error);
+
 /* Tables 4.1 and 4.5: densities of F. */
 lam_status cities_density(const bench_run *run, lam_error *error);
 
 /* Tables 4.1 to 4.4 and 4.7: M~, its time beside Jacobi, its error; and few emitters (section 4.4.3). */
 lam_status cities_inverse(const bench_run *run, lam_error *error);
+
+/* Figures 4.1, 4.4 and 5.1 and the table of kinds, of scenes that are opened once for all of them. */
+lam_status cities_figures(const bench_run *run, lam_error *error);
+
+/* Figure 4.1: how singular values fall, and how many are above .1. The Cornell box and the three cities of a
+ * size, in this order, and again of other sizes: n_sizes times FALL_SCENES. */
+lam_status cities_spectra(const bench_run *run, const lowrank_scene *const *scenes, size_t n_sizes,
+                          lam_error *error);
+
+/* Figure 4.4: how the elements of M are distributed in cities 1 and 3. */
+lam_status cities_distribution(const bench_run *run, const lowrank_scene *const scenes[2], lam_error *error);
+
+/* Figure 5.1: density against rank of MAP_SCENES scenes, and what classify_scene makes of them. */
+lam_status cities_map(const bench_run *run, const lowrank_scene *scenes, lam_error *error);
+
+/* Every kind of operator on MAP_MAIN scenes, and whether auto picks well. */
+lam_status cities_kinds(const bench_run *run, const lowrank_scene *scenes, lam_error *error);
+
+/* Figures 4.5 and 4.10: radiosity with and without its first bounces, error of every tile's light. */
+lam_status cities_radiosity(const bench_run *run, lam_error *error);
 
 #endif

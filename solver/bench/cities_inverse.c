@@ -3,7 +3,6 @@
 #include "solver/bench/cities.h"
 #include "solver/bench/formfactors.h"
 #include "solver/build/columns.h"
-#include "solver/build/reference.h"
 #include "solver/clock.h"
 
 #include <math.h>
@@ -40,81 +39,36 @@ static const double error_with[CITY_VARIANTS][CITY_SIZES][CITY_THRESHOLDS] = {
 
 enum { RAYS = 4096, SWEEPS = 40, JACOBI_VECTORS = 320, AT_ONCE = 64 };
 
-/* A city under each tile alone: E = rho first_bounce, and B converged, [132][n]. */
-typedef struct tile_light {
-    size_t m;
-    float *E;
-    double *B;
-} tile_light;
-
-static void tile_light_free(tile_light *d) {
-    free(d->E);
-    free(d->B);
-    *d = (tile_light){0};
-}
-
-static lam_status tile_light_make(const bench_run *run, const city *c, tile_light *d, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = c->m.n, m = c->f.sky.tiling.n_tiles;
-    reference *r = NULL;
-    double *E = memory_allocate(m, n * sizeof *E, "skies", error);
-    *d = (tile_light){.m = m,
-                      .E = memory_allocate(m, n * sizeof *d->E, "skies", error),
-                      .B = memory_allocate(m, n * sizeof *d->B, "skies", error)};
-    if (E == NULL || d->E == NULL || d->B == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t k = 0; k < m * n; k++) {
-        d->E[k] = c->m.reflectance[k % n] * c->f.sky.first_bounce[k];
-        E[k] = d->B[k] = (double)d->E[k];
-    }
-    TRY(reference_create(&c->f.F, c->m.area, c->m.reflectance, REFERENCE_ITERATED, &r, error));
-    TRY(reference_solve(r, m, E, d->B, 1e-10, run->progress, error));
-done:
-    reference_destroy(r);
-    free(E);
-    return status;
-}
-
 typedef struct spread {
     double mean, std, max, indirect; /* relative errors; indirect: mean */
 } spread;
 
-/* |B~ - B| / |B| and / |B - E| over the tiles, area-weighted. */
-static lam_status judge(const city *c, const tile_light *d, const lam_operator *op, spread *out,
+static lam_status judge(const city *c, const city_light *d, const lam_operator *op, spread *out,
                         lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = c->m.n, bytes = lam_operator_work_bytes(op, d->m);
-    float *B = memory_allocate(d->m, n * sizeof *B, "answers", error);
-    void *work = memory_allocate(bytes, 1, "work area", error);
-    double sum = 0, squares = 0, indirect = 0;
-    if (B == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(lam_operator_apply(op, d->m, LAM_RADIOSITY, d->E, B, work, bytes, error));
+    double sum = 0, squares = 0, bounced = 0;
+    double *relative = memory_allocate(d->m, sizeof *relative, "errors", error);
+    double *indirect = memory_allocate(d->m, sizeof *indirect, "errors", error);
+    if (relative == NULL || indirect == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(city_light_errors(c, d, op, relative, indirect, error));
     *out = (spread){.max = 0};
     for (size_t t = 0; t < d->m; t++) {
-        double off = 0, all = 0, bounced = 0;
-        for (size_t i = 0; i < n; i++) {
-            const double b = d->B[t * n + i], e = (double)B[t * n + i] - b, a = c->m.area[i];
-            const double more = b - (double)d->E[t * n + i];
-            off += a * e * e;
-            all += a * b * b;
-            bounced += a * more * more;
-        }
-        const double relative = sqrt(off / all);
-        sum += relative;
-        squares += relative * relative;
-        indirect += sqrt(off / bounced);
-        out->max = fmax(out->max, relative);
+        sum += relative[t];
+        squares += relative[t] * relative[t];
+        bounced += indirect[t];
+        out->max = fmax(out->max, relative[t]);
     }
     out->mean = sum / (double)d->m;
     out->std = sqrt(fmax(0, squares / (double)d->m - out->mean * out->mean));
-    out->indirect = indirect / (double)d->m;
+    out->indirect = bounced / (double)d->m;
 done:
-    free(B);
-    free(work);
+    free(relative);
+    free(indirect);
     return status;
 }
 
 /* Seconds of CITY_SKIES answers, the tiles over and over again. */
-static lam_status time_product(const bench_run *run, const city *c, const tile_light *d,
+static lam_status time_product(const bench_run *run, const city *c, const city_light *d,
                                const lam_operator *op, double *seconds, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = c->m.n, bytes = lam_operator_work_bytes(op, AT_ONCE);
@@ -136,7 +90,7 @@ done:
 }
 
 /* Seconds of so many sweeps for CITY_SKIES skies, from those of JACOBI_VECTORS. */
-static lam_status time_jacobi(const bench_run *run, const city *c, const tile_light *d, size_t sweeps,
+static lam_status time_jacobi(const bench_run *run, const city *c, const city_light *d, size_t sweeps,
                               double *seconds, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = c->m.n;
@@ -162,7 +116,7 @@ done:
 }
 
 /* The fewest sweeps whose error, of the first tiles, is at most that of M~. */
-static lam_status sweeps_for(const bench_run *run, const city *c, const tile_light *d, double wanted,
+static lam_status sweeps_for(const bench_run *run, const city *c, const city_light *d, double wanted,
                              size_t *sweeps, lam_error *error) {
     enum { TILES = 32 };
     lam_status status = LAM_OK;
@@ -202,22 +156,14 @@ typedef struct threshold_row {
     spread of[3]; /* without, with what was discarded, delta */
 } threshold_row;
 
-static lam_status measure(const bench_run *run, const city *c, const tile_light *d, double threshold,
+static lam_status measure(const bench_run *run, const city *c, const city_light *d, double threshold,
                           threshold_row *row, lam_error *error) {
     lam_status status = LAM_OK;
     lam_operator *op = NULL;
     for (sparse_correction how = SPARSE_NONE; how <= SPARSE_DISCARDED; how++) {
-        const build_options options = {.method = "sparse",
-                                       .factorizer = "auto",
-                                       .epsilon = .05,
-                                       .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
-                                       .threshold = threshold,
-                                       .correction = how,
-                                       .seed = run->seed,
-                                       .progress = run->progress};
         build_report report;
         operator_description about;
-        TRY(build_operator(&c->problem, &options, &op, &report, error));
+        TRY(city_sparse(run, c, threshold, how, &op, &report, error));
         lam_operator_set_threads(op, (size_t)omp_get_max_threads());
         operator_describe(op, &about);
         const int place = how == SPARSE_NONE ? 0 : how == SPARSE_DISCARDED ? 1 : 2;
@@ -243,9 +189,9 @@ static double their(const bench_run *run, const double figures[CITY_VARIANTS][CI
 static lam_status add_city(const bench_run *run, const city *c, table *times, table *errors,
                            lam_error *error) {
     lam_status status = LAM_OK;
-    tile_light d = {.m = 0};
+    city_light d = {.m = 0};
     double jacobi, same;
-    TRY(tile_light_make(run, c, &d, error));
+    TRY(city_light_make(run, c, &d, error));
     TRY(time_jacobi(run, c, &d, SWEEPS, &jacobi, error));
     for (size_t k = 0; k < CITY_THRESHOLDS; k++) {
         threshold_row row;
@@ -284,7 +230,7 @@ static lam_status add_city(const bench_run *run, const city *c, table *times, ta
                   city_thresholds[k], row.build_seconds, CITY_SKIES, row.product_seconds, row.of[1].mean);
     }
 done:
-    tile_light_free(&d);
+    city_light_free(&d);
     return status;
 }
 

@@ -19,8 +19,18 @@ typedef struct lowrank_scene {
 
 void lowrank_scene_free(lowrank_scene *s);
 
+/* Takes the mesh over and finds its form factors by a recipe; name is static. */
+lam_status lowrank_open(const bench_run *run, const char *name, mesh *m, const recipe *how,
+                        lowrank_scene *out, lam_error *error);
+
+/* All pairs up to 24,000 elements, rays beyond. */
+recipe lowrank_recipe(const bench_run *run, size_t elements);
+
+/* What builders are given of it, which it must outlive. */
+build_problem lowrank_problem(const lowrank_scene *s);
+
 /* Five walls of a cube, each of divisions x divisions squares of two triangles: 10 divisions^2 elements,
- * which are the sizes of the thesis' Cornell box, 640 x 4^k. All pairs up to 24,000 elements, rays beyond. */
+ * which are the sizes of the thesis' Cornell box, 640 x 4^k. */
 lam_status lowrank_room(const bench_run *run, size_t divisions, lowrank_scene *out, lam_error *error);
 
 /* The Cornell box with its blocks; a courtyard of two storeys with galleries. About so many elements. */
@@ -47,15 +57,18 @@ factorizer_options lowrank_options(const bench_run *run, double epsilon, size_t 
 typedef struct lowrank_case {
     const char *method, *factorizer;
     double epsilon;
-    size_t rank;            /* 0: by epsilon */
-    size_t probes;          /* single elements, at most */
-    const csr *independent; /* another sample of F, or NULL: no total error */
+    size_t rank;      /* 0: by epsilon */
+    size_t probes;    /* single elements, at most */
+    double threshold; /* sparse */
+    sparse_correction correction;
+    const emitter_source *emitters; /* of the method emitters; else NULL */
+    const csr *independent;         /* another sample of F, or NULL: no total error */
 } lowrank_case;
 
 typedef struct lowrank_verdict {
     build_report built;
     error_report judged;
-    double answer_seconds; /* of one radiosity, median, one thread */
+    double answer_seconds; /* of one radiosity, median, one thread; light from everywhere or all emitters */
     double bytes;          /* that an answer reads */
 } lowrank_verdict;
 

@@ -7,7 +7,7 @@
 
 enum { SOLVES = 31 };
 
-static build_problem problem_of(const lowrank_scene *s) {
+build_problem lowrank_problem(const lowrank_scene *s) {
     return (build_problem){.n = s->m.n,
                            .n_channels = s->m.n_channels,
                            .area = s->m.area,
@@ -18,6 +18,14 @@ static build_problem problem_of(const lowrank_scene *s) {
                            .centre = (const double(*)[3])s->centre,
                            .normal = (const float(*)[3])s->m.normal,
                            .surface = s->surface};
+}
+
+/* The kind that answers for its own emitters alone takes their weights W in place of E. */
+static lam_status answer(const lam_operator *op, const float *E, float *B, void *work, size_t bytes,
+                         lam_error *error) {
+    if (lam_operator_emitters(op) > 0)
+        return lam_operator_apply_emitters(op, 1, LAM_RADIOSITY, E, 0, NULL, B, work, bytes, error);
+    return lam_operator_apply(op, 1, LAM_RADIOSITY, E, B, work, bytes, error);
 }
 
 /* Median seconds of one radiosity. */
@@ -35,7 +43,7 @@ static lam_status time_answer(const lam_operator *op, double *median, lam_error 
     for (size_t i = 0; i < n; i++) E[i] = (float)(i % 7);
     for (int k = 0; k < SOLVES; k++) {
         const double started = clock_seconds();
-        TRY(lam_operator_apply(op, 1, LAM_RADIOSITY, E, B, work, bytes, error));
+        TRY(answer(op, E, B, work, bytes, error));
         seconds[k] = clock_seconds() - started;
     }
     *median = stats_median(seconds, SOLVES);
@@ -49,13 +57,15 @@ done:
 lam_status lowrank_judge(const bench_run *run, const lowrank_scene *s, const lowrank_case *of,
                          lowrank_verdict *out, lam_error *error) {
     lam_status status = LAM_OK;
-    const build_problem problem = problem_of(s);
+    build_problem problem = lowrank_problem(s);
     const build_options how = {.method = of->method,
                                .factorizer = of->factorizer,
                                .epsilon = of->epsilon,
                                .rank = of->rank,
                                .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
                                .levels = -1,
+                               .threshold = of->threshold,
+                               .correction = of->correction,
                                .seed = run->seed,
                                .progress = run->progress};
     const judge_input input = {.problem = &problem,
@@ -67,6 +77,7 @@ lam_status lowrank_judge(const bench_run *run, const lowrank_scene *s, const low
                                .progress = run->progress};
     lowrank_verdict verdict = {.bytes = 0};
     lam_operator *op = NULL;
+    problem.emitters = of->emitters;
     TRY(bench_check(run, error));
     TRY(build_operator(&problem, &how, &op, &verdict.built, error));
     TRY(time_answer(op, &verdict.answer_seconds, error));

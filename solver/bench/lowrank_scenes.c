@@ -25,14 +25,15 @@ void lowrank_scene_free(lowrank_scene *s) {
     *s = (lowrank_scene){0};
 }
 
-/* Takes the mesh over; form factors of it. */
-static lam_status open_scene(const bench_run *run, const char *name, mesh *m, lowrank_scene *out,
-                             lam_error *error) {
+recipe lowrank_recipe(const bench_run *run, size_t elements) {
+    return elements <= PAIRS_MOST ? formfactors_pairs(7e-5, run->seed) : formfactors_rays(RAYS, run->seed);
+}
+
+lam_status lowrank_open(const bench_run *run, const char *name, mesh *m, const recipe *how,
+                        lowrank_scene *out, lam_error *error) {
     lam_status status = LAM_OK;
     lowrank_scene s = {.name = name, .m = *m};
     size_t n_surfaces;
-    const recipe how =
-        m->n <= PAIRS_MOST ? formfactors_pairs(7e-5, run->seed) : formfactors_rays(RAYS, run->seed);
     *m = (mesh){0};
     TRY(formfactors_order(&s.m, &s.z_order, error));
     s.mesh_order = memory_allocate(s.m.n, sizeof *s.mesh_order, "scene", error);
@@ -44,7 +45,7 @@ static lam_status open_scene(const bench_run *run, const char *name, mesh *m, lo
         mesh_centroid(&s.m, i, s.centre[i]);
     }
     TRY(mesh_surfaces(&s.m, s.surface, &n_surfaces, error));
-    TRY(formfactors_make_timed(run, &s.m, s.z_order, &how, "form factors", &s.f, &s.seconds, error));
+    TRY(formfactors_make_timed(run, &s.m, s.z_order, how, "form factors", &s.f, &s.seconds, error));
     if (s.f.F.indptr == NULL) TRY(form_factors_expand(&s.f, s.m.area, error));
     bench_say(run, "%s of %zu elements: form factors in %.1f s", name, s.m.n, s.seconds);
     *out = s;
@@ -52,6 +53,12 @@ static lam_status open_scene(const bench_run *run, const char *name, mesh *m, lo
 done:
     lowrank_scene_free(&s);
     return status;
+}
+
+static lam_status open_usual(const bench_run *run, const char *name, mesh *m, lowrank_scene *out,
+                             lam_error *error) {
+    const recipe how = lowrank_recipe(run, m->n);
+    return lowrank_open(run, name, m, &how, out, error);
 }
 
 /* divisions x divisions squares of a wall, each of one piece or two triangles. */
@@ -94,7 +101,7 @@ lam_status lowrank_room(const bench_run *run, size_t divisions, lowrank_scene *o
     for (int w = 0; w < 5; w++)
         n += add_wall(pieces + n, walls[w][0], walls[w][1], walls[w][2], divisions, divisions, true);
     TRY(scene_of_pieces(pieces, n, &m, error));
-    TRY(open_scene(run, "open room", &m, out, error));
+    TRY(open_usual(run, "open room", &m, out, error));
 done:
     free(pieces);
     mesh_free(&m);
@@ -105,7 +112,7 @@ lam_status lowrank_cornell(const bench_run *run, size_t elements, lowrank_scene 
     lam_status status = LAM_OK;
     mesh m = {0};
     TRY(scene_cornell(elements, &m, error));
-    TRY(open_scene(run, "cornell", &m, out, error));
+    TRY(open_usual(run, "cornell", &m, out, error));
 done:
     mesh_free(&m);
     return status;
@@ -195,7 +202,7 @@ lam_status lowrank_patio(const bench_run *run, size_t elements, lowrank_scene *o
     b.n = 0;
     add_patio(&b);
     TRY(scene_of_pieces(b.pieces, b.n, &m, error));
-    TRY(open_scene(run, "patio", &m, out, error));
+    TRY(open_usual(run, "patio", &m, out, error));
 done:
     free(b.pieces);
     mesh_free(&m);

@@ -203,6 +203,10 @@ static void set_colour(cairo_t *c, const plot *p, size_t k) {
     cairo_set_source_rgb(c, rgb[0], rgb[1], rgb[2]);
 }
 
+static bool is_marked(const plot_series *s) {
+    return !s->unmarked && !s->plain;
+}
+
 /* A mark of its own for every series: disc, square, triangles, diamond. */
 static void put_mark(cairo_t *c, size_t k, double x, double y) {
     const double r = 4.5;
@@ -255,8 +259,48 @@ static void put_series(cairo_t *c, const plot *p, size_t k, const axis *x, const
             }
             cairo_stroke(c);
         }
-        if (!s->unmarked) put_mark(c, k, px, py);
+        if (is_marked(s)) put_mark(c, k, px, py);
     }
+}
+
+/* A rectangle of the sheet: a mark or a name that nothing may be written over. */
+typedef struct area {
+    double x, y, width, height; /* of its middle */
+} area;
+
+static bool meet(const area *a, const area *b) {
+    return 2 * fabs(a->x - b->x) < a->width + b->width && 2 * fabs(a->y - b->y) < a->height + b->height;
+}
+
+/* Right of the first point, or left, below or above it: where the sheet is free first. taken holds *n areas
+ * and has room for one more. */
+static void put_name(cairo_t *c, const plot_series *s, const axis *x, const axis *y, area *taken, size_t *n) {
+    const double w = text_width(c, s->label), px = place(x, s->x[0]), py = place(y, s->y[0]);
+    const double side = .5 * w + .7 * text_size, up = 1.1 * text_size;
+    const double shift[4][2] = {{side, 0}, {-side, 0}, {0, up}, {0, -up}};
+    area best = {.width = w, .height = text_size};
+    for (size_t k = 0; k < 4; k++) {
+        best.x = px + shift[k][0];
+        best.y = py + shift[k][1];
+        bool free_there = best.x - .5 * w > x->from && best.x + .5 * w < x->to;
+        for (size_t t = 0; t < *n; t++) free_there = free_there && !meet(&best, &taken[t]);
+        if (free_there) break;
+    }
+    cairo_set_source_rgb(c, 0, 0, 0);
+    put_text(c, best.x, best.y + .35 * text_size, .5, s->label);
+    taken[(*n)++] = best;
+}
+
+static void put_names(cairo_t *c, const plot *p, const axis *x, const axis *y) {
+    area taken[2 * PLOT_SERIES_MOST];
+    size_t n = 0, named[PLOT_SERIES_MOST], n_named = 0;
+    for (size_t k = 0; k < p->n_series; k++) {
+        const plot_series *s = &p->series[k];
+        if (!s->named || s->n == 0 || !shows(x, y, s, 0)) continue;
+        taken[n++] = (area){place(x, s->x[0]), place(y, s->y[0]), 9, 9};
+        named[n_named++] = k;
+    }
+    for (size_t k = 0; k < n_named; k++) put_name(c, &p->series[named[k]], x, y, taken, &n);
 }
 
 static double legend_width(cairo_t *c, const plot *p) {
@@ -275,7 +319,7 @@ static void put_legend(cairo_t *c, const plot *p, double x, double y) {
             cairo_line_to(c, x + 2 * text_size, middle);
             cairo_stroke(c);
         }
-        if (!p->series[k].unmarked) put_mark(c, k, x + text_size, middle);
+        if (is_marked(&p->series[k])) put_mark(c, k, x + text_size, middle);
         cairo_set_dash(c, NULL, 0, 0);
         cairo_set_source_rgb(c, 0, 0, 0);
         put_text(c, x + 2.6 * text_size, middle + .35 * text_size, 0, p->series[k].label);
@@ -301,6 +345,7 @@ static lam_status draw(const plot *p, cairo_surface_t *surface, lam_error *error
     cairo_rectangle(c, x.from - 6, y.to - 6, x.to - x.from + 12, y.from - y.to + 12);
     cairo_clip(c);
     for (size_t k = 0; k < p->n_series; k++) put_series(c, p, k, &x, &y);
+    put_names(c, p, &x, &y);
     cairo_restore(c);
     put_legend(c, p, x.to + legend_gap, top);
     const cairo_status_t drawn = cairo_status(c);

@@ -14,6 +14,8 @@ typedef struct plot_series {
     const double *low, *high; /* [n], ends of the error bars; NULL: none */
     bool joined;              /* by a line, in the order given */
     bool unmarked;            /* a line only, grey and dashed: a limit, not a measurement */
+    bool plain;               /* a line only, in its own colour: a curve of more points than can be marked */
+    bool named;               /* its label stands beside its first point */
 } plot_series;
 
 enum { PLOT_SERIES_MOST = 12 };

@@ -65,6 +65,8 @@ lam_status bench_cities(const bench_run *run, lam_error *error) {
     lam_status status = LAM_OK;
     TRY(cities_inverse(run, error));
     TRY(cities_density(run, error));
+    TRY(cities_radiosity(run, error));
+    TRY(cities_figures(run, error));
 done:
     return status;
 }

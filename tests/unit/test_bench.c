@@ -1,4 +1,5 @@
 /* What suites of measurements write: quantiles, tables, plots; and the scenes they build. */
+#include "solver/bench/cities.h"
 #include "solver/bench/plot.h"
 #include "solver/bench/scenes.h"
 #include "solver/bench/stats.h"
@@ -197,6 +198,84 @@ START_TEST(pieces_become_elements) {
 }
 END_TEST
 
+/* What a suite hands on: tables with their names, whole rows, and plots that can be drawn. */
+typedef struct harvest {
+    char tables[512], plots[512]; /* names, each after a space */
+    size_t kind_rows, map_rows;
+} harvest;
+
+static lam_status reap_table(void *context, const table *t, lam_error *error) {
+    harvest *h = context;
+    (void)error;
+    ck_assert_msg(t->used > 0 && t->used % t->n_columns == 0, "table %s: %zu cells", t->name, t->used);
+    for (size_t c = 0; c < t->n_columns; c++) ck_assert(t->columns[c].doc[0] != '\0');
+    strcat(strcat(h->tables, " "), t->name);
+    if (strcmp(t->name, "kinds") == 0) h->kind_rows = table_rows(t);
+    if (strcmp(t->name, "map") == 0) h->map_rows = table_rows(t);
+    /* Whatever is counted or measured in the first rows is there and not below 0. */
+    for (size_t c = 0; c < t->n_columns && c < 2; c++)
+        if (t->columns[c].unit != NULL) ck_assert_double_ge(t->cells[c].number, 0);
+    return LAM_OK;
+}
+
+static lam_status reap_plot(void *context, const plot *p, lam_error *error) {
+    harvest *h = context;
+    written w = {0};
+    FILE *stream = open_memstream(&w.text, &w.size);
+    const lam_status status = plot_svg(p, stream, error);
+    fclose(stream);
+    free(w.text);
+    for (size_t k = 0; k < p->n_series; k++) {
+        size_t shown = 0;
+        for (size_t i = 0; i < p->series[k].n; i++)
+            shown += isfinite(p->series[k].x[i]) && isfinite(p->series[k].y[i]);
+        ck_assert_msg(shown > 0, "plot %s: nothing of %s", p->name, p->series[k].label);
+    }
+    strcat(strcat(h->plots, " "), p->name);
+    return status;
+}
+
+static void reap_line(void *context, const char *line) {
+    (void)context;
+    (void)line;
+}
+
+START_TEST(figures_of_cities_are_whole) {
+    harvest h = {.kind_rows = 0};
+    lam_error error = {0};
+    const bench_sink sink = {.table = reap_table, .plot = reap_plot, .say = reap_line, .context = &h};
+    const bench_run run = {.scale = BENCH_QUICK, .seed = 1, .sink = &sink};
+    ck_assert_msg(cities_radiosity(&run, &error) == LAM_OK, "%s", error.message);
+    ck_assert_msg(cities_figures(&run, &error) == LAM_OK, "%s", error.message);
+    ck_assert_str_eq(h.tables, " bounces tiles map kinds singular-values distribution");
+    ck_assert_str_eq(h.plots, " bounces-1 bounces-3 tiles-1e-3 tiles-1e-4 tiles-1e-5 map singular-values"
+                              " distribution");
+    ck_assert_uint_eq(h.map_rows, MAP_SCENES);
+    ck_assert_uint_eq(h.kind_rows, 5 * MAP_MAIN);
+}
+END_TEST
+
+/* Twelve names at one place, where four have room. */
+START_TEST(names_stand_beside_points) {
+    plot_series series[PLOT_SERIES_MOST];
+    for (size_t k = 0; k < PLOT_SERIES_MOST; k++)
+        series[k] = (plot_series){.label = "somewhere", .n = 1, .x = x, .y = y, .named = true};
+    const plot p = {.name = "p",
+                    .title = "names",
+                    .x_label = "x",
+                    .y_label = "y",
+                    .series = series,
+                    .n_series = PLOT_SERIES_MOST};
+    lam_error error = {0};
+    written w = {0};
+    FILE *stream = open_memstream(&w.text, &w.size);
+    ck_assert_int_eq(plot_svg(&p, stream, &error), LAM_OK);
+    fclose(stream);
+    ck_assert_str_eq(w.text + w.size - 7, "</svg>\n");
+    free(w.text);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("bench");
     TCase *cases = tcase_create("bench");
@@ -208,6 +287,9 @@ int main(void) {
     tcase_add_test(cases, plots_without_points_are_refused);
     tcase_add_test(cases, houses_stand_on_their_lots);
     tcase_add_test(cases, pieces_become_elements);
+    tcase_add_test(cases, names_stand_beside_points);
+    tcase_add_test(cases, figures_of_cities_are_whole);
+    tcase_set_timeout(cases, 300); /* of the figures, on a busy machine */
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }

@@ -1,0 +1,180 @@
+/* Every kind of operator on the four scenes of figure 5.1: what each takes, and whether auto picks well. */
+#include "solver/bench/cities.h"
+#include "solver/build/classify.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { KINDS = 5, EMITTERS_MOST = 32, PROBES = 100, PROBES_OF_LARGE = 32, LARGE = 5000, NAME = 16 };
+
+static const char *const kinds[KINDS] = {"exact", "low-rank", "2msc", "sparse", "emitters"};
+
+static const double epsilon = .05, usual_threshold = 1e-4;
+
+/* How much less exact than the pick another kind may be and still be compared with it. */
+static const double as_exact = 1.5;
+
+typedef struct light_source {
+    emitter_source of;
+    char names[EMITTERS_MOST][NAME];
+    const char *list[EMITTERS_MOST];
+    float *E;
+} light_source;
+
+static bool shines(const mesh *m, size_t i) {
+    bool any = false;
+    for (size_t c = 0; c < m->n_channels; c++) any = any || m->emission[c * m->n + i] > 0;
+    return any;
+}
+
+/* The scene's lights, element by element, or, where they are many, put together in their order; of a scene
+ * without lights some elements that might be. */
+static lam_status lights_of(const lowrank_scene *s, light_source *out, lam_error *error) {
+    const size_t n = s->m.n, C = s->m.n_channels;
+    size_t lit = 0, seen = 0;
+    for (size_t i = 0; i < n; i++) lit += shines(&s->m, i);
+    const size_t all = lit > 0 ? lit : n, count = all < EMITTERS_MOST ? all : EMITTERS_MOST;
+    out->E = memory_allocate(count * C, n * sizeof *out->E, "emitters", error);
+    if (out->E == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; lit > 0 && i < n; i++) {
+        if (!shines(&s->m, i)) continue;
+        const size_t k = seen++ * count / lit;
+        for (size_t c = 0; c < C; c++) out->E[(k * C + c) * n + i] = s->m.emission[c * n + i];
+    }
+    for (size_t k = 0; k < count; k++) {
+        snprintf(out->names[k], NAME, "light %zu", k);
+        out->list[k] = out->names[k];
+        for (size_t c = 0; lit == 0 && c < C; c++) out->E[(k * C + c) * n + s->z_order[k * n / count]] = 1;
+    }
+    out->of = (emitter_source){.s = count, .names = out->list, .E = out->E};
+    return LAM_OK;
+}
+
+/* The kind that auto builds, and the threshold it would have a sparse inverse at. */
+static lam_status find_pick(const bench_run *run, const lowrank_scene *s, size_t *pick, double *threshold,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    const build_problem problem = lowrank_problem(s);
+    const classify_options look = {
+        .epsilon = epsilon, .seed = run->seed, .thorough = true, .progress = run->progress};
+    const build_options how = {.method = "auto",
+                               .factorizer = "auto",
+                               .epsilon = epsilon,
+                               .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
+                               .levels = -1,
+                               .correction = SPARSE_DELTA,
+                               .seed = run->seed,
+                               .progress = run->progress};
+    scene_class looked;
+    build_report built;
+    lam_operator *op = NULL;
+    TRY(classify_scene(&problem, &look, &looked, error));
+    TRY(build_operator(&problem, &how, &op, &built, error));
+    *threshold = looked.threshold > 0 ? looked.threshold : usual_threshold;
+    for (*pick = 0; *pick + 1 < KINDS && strcmp(kinds[*pick], built.method) != 0;) ++*pick;
+    bench_say(run, "%s, %zu elements: auto: %s", s->name, s->m.n, built.reason);
+done:
+    lam_operator_close(op);
+    return status;
+}
+
+static lam_status judge_kind(const bench_run *run, const lowrank_scene *s, const char *kind, double threshold,
+                             const light_source *lights, lowrank_verdict *out, lam_error *error) {
+    const bool few = strcmp(kind, "emitters") == 0, sparse = strcmp(kind, "sparse") == 0;
+    const lowrank_case of = {.method = kind,
+                             .factorizer = "auto",
+                             .epsilon = epsilon,
+                             .probes = s->m.n > LARGE ? PROBES_OF_LARGE : PROBES,
+                             .threshold = sparse ? threshold : 0,
+                             .correction = SPARSE_DELTA,
+                             .emitters = few ? &lights->of : NULL};
+    return lowrank_judge(run, s, &of, out, error);
+}
+
+static bool is_as_exact(const error_report *a, const error_report *pick) {
+    return a->single.operator_indirect.mean <= as_exact * pick->single.operator_indirect.mean &&
+           a->random.operator_indirect.mean <= as_exact * pick->random.operator_indirect.mean;
+}
+
+/* Time of the pick over that of the fastest that is about as exact; emitters, which answer for their own
+ * lights alone, are no rival. */
+static double over_fastest(const lowrank_verdict verdicts[KINDS], size_t pick) {
+    double fastest = verdicts[pick].answer_seconds;
+    for (size_t k = 0; k + 1 < KINDS; k++)
+        if (is_as_exact(&verdicts[k].judged, &verdicts[pick].judged))
+            fastest = fmin(fastest, verdicts[k].answer_seconds);
+    return verdicts[pick].answer_seconds / fastest;
+}
+
+static void add_row(const lowrank_scene *s, size_t k, double threshold, const lowrank_verdict verdicts[KINDS],
+                    size_t pick, table *out) {
+    const lowrank_verdict *v = &verdicts[k];
+    const error_group *groups[] = {&v->judged.single, &v->judged.lights, &v->judged.random};
+    table_text(out, s->name);
+    table_number(out, (double)s->m.n);
+    table_number(out, (double)s->m.n_channels);
+    table_text(out, kinds[k]);
+    table_number(out, v->built.rank > 0 ? (double)v->built.rank : NAN);
+    table_number(out, v->built.threshold > 0 ? threshold : NAN);
+    table_number(out, v->built.factorize_seconds + v->built.invert_seconds);
+    table_number(out, 1e3 * v->answer_seconds);
+    table_number(out, 1e-6 * v->bytes);
+    for (size_t g = 0; g < sizeof groups / sizeof *groups; g++) {
+        table_number(out, groups[g]->probes > 0 ? groups[g]->operator_relative.mean : NAN);
+        table_number(out, groups[g]->probes > 0 ? groups[g]->operator_indirect.mean : NAN);
+    }
+    table_text(out, k == pick ? "auto" : "");
+    table_number(out, k == pick ? over_fastest(verdicts, pick) : NAN);
+}
+
+static lam_status add_scene(const bench_run *run, const lowrank_scene *s, table *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    lowrank_verdict verdicts[KINDS];
+    light_source lights = {.E = NULL};
+    double threshold;
+    size_t pick;
+    TRY(lights_of(s, &lights, error));
+    TRY(find_pick(run, s, &pick, &threshold, error));
+    for (size_t k = 0; k < KINDS; k++)
+        TRY(judge_kind(run, s, kinds[k], threshold, &lights, &verdicts[k], error));
+    for (size_t k = 0; k < KINDS; k++) add_row(s, k, threshold, verdicts, pick, out);
+done:
+    free(lights.E);
+    return status;
+}
+
+lam_status cities_kinds(const bench_run *run, const lowrank_scene *scenes, lam_error *error) {
+    static const table_column columns[] = {
+        {"scene", NULL, "of figure 5.1"},
+        {"elements", "", "n"},
+        {"channels", "", "C"},
+        {"kind", NULL, "of operator, as precompute makes it at epsilon .05"},
+        {"rank", "", "k"},
+        {"threshold", "", "of the sparse inverse: what classify_scene names, else 1e-4"},
+        {"build_s", "s", "without form factors"},
+        {"query_ms", "ms", "of one radiosity, median, one thread"},
+        {"mb", "MB", "that a query reads"},
+        {"single_relative", "", "|B~ - B|/|B|, one bright element (of emitters: one of them), mean"},
+        {"single_indirect", "", "|B~ - B|/|B - E| of the same"},
+        {"lights_relative", "", "the scene's lights"},
+        {"lights_indirect", "", "the same"},
+        {"random_relative", "", "light from everywhere (of emitters: all of them), mean"},
+        {"random_indirect", "", "the same"},
+        {"picked", NULL, "what --method auto builds"},
+        {"over_fastest", "",
+         "query of the pick over that of the fastest kind of at most 1.5 times its indirect errors, "
+         "emitters apart"}};
+    lam_status status = LAM_OK;
+    table out = {.name = "kinds",
+                 .title = "Every kind of operator on the scenes of figure 5.1",
+                 .columns = columns,
+                 .n_columns = sizeof columns / sizeof *columns,
+                 .printed = true};
+    for (size_t k = 0; k < MAP_MAIN; k++) TRY(add_scene(run, &scenes[k], &out, error));
+    TRY(bench_table(run, &out, error));
+done:
+    table_free(&out);
+    return status;
+}
