@@ -20,7 +20,7 @@ enum {
 static const unsigned variants[CITIES] = {1, 3};
 static const float reflectances[REFLECTANCES] = {.1f, .3f, .5f, .7f, .9f};
 
-/* Section 4.3.2: the share of elements above 1e-5 for R <= .7, in percent. */
+/* Section 4.3.2: the share of elements above 1e-5 "for R <= .7", in percent; the most is that of .7. */
 static const double their_share[CITIES] = {3, 10};
 
 static const double lowest = 1e-12; /* of the bins: 12 decades up to 1 */
@@ -149,7 +149,7 @@ static lam_status add_city(const bench_run *run, const lowrank_scene *s, size_t 
     for (size_t r = 0; r < REFLECTANCES; r++) {
         tally t = {.all = 0};
         TRY(look_at(run, s, reflectances[r], count, &t, error));
-        const bool told = !quick && reflectances[r] < .8f;
+        const bool told = !quick && reflectances[r] > .6f && reflectances[r] < .8f;
         add_row(variants[k], n, reflectances[r], &t, told ? their_share[k] : NAN, out);
         add_curve(variants[k], reflectances[r], &t, drawn);
     }
@@ -167,7 +167,7 @@ lam_status cities_distribution(const bench_run *run, const lowrank_scene *const 
         {"above_1e-4", "%", "greater than 1e-4"},
         {"above_1e-5", "%", "greater than 1e-5"},
         {"deviation", "%", "standard error of that, as not all columns were looked at"},
-        {"theirs", "%", "section 4.3.2: greater than 1e-5 for R <= .7"},
+        {"theirs", "%", "section 4.3.2: greater than 1e-5 for R <= .7, the most of which is at .7"},
         {"above_1e-6", "%", "greater than 1e-6"},
         {"above_1e-7", "%", "greater than 1e-7"}};
     lam_status status = LAM_OK;
