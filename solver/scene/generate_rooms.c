@@ -11,6 +11,9 @@ static const double lot = 8, half_room[2] = {1.8, 2.8}, room_height[2] = {2.6, 3
 static const double half_corridor = .7, corridor_height = 2.2, half_lamp[2] = {.6, .3}, lamp_depth = .1;
 static const double extra_share = .3; /* of the neighbours that need no corridor: these have one too */
 
+/* A room of fewer elements than these is no longer of low rank, which is what this scene is about. */
+enum { ROOM_ELEMENTS = 1000 };
+
 enum { ROOMS_MOST = 12, ROOMS_ELEMENTS = 6000, FLOOR = 0, CEILING, WALL, LAMP };
 
 static const draft_material grey = {"grey", {.6, .6, .6}, {0, 0, 0}};
@@ -105,14 +108,21 @@ done:
 }
 
 lam_status draft_rooms_scene(draft *d, const generate_options *options, lam_error *error) {
-    static const size_t plans[4][2] = {{3, 2}, {4, 2}, {3, 3}, {4, 3}};
+    static const size_t plans[][2] = {{2, 1}, {3, 1}, {2, 2}, {3, 2}, {4, 2}, {3, 3}, {4, 3}};
+    const size_t wanted = options->elements > 0 ? options->elements : ROOMS_ELEMENTS;
+    size_t n_plans = 1;
+    while (n_plans < sizeof plans / sizeof *plans &&
+           plans[n_plans][0] * plans[n_plans][1] * ROOM_ELEMENTS <= wanted)
+        n_plans++;
     lam_status status = LAM_OK;
     blocks all = {0};
     patch_list list = {.groups = groups};
     block_stuff stuffs[1 + ROOMS_MOST] = {{FLOOR, WALL, CEILING}};
     room rooms[ROOMS_MOST];
     dice size = dice_for(options->seed, 1), shape = dice_for(options->seed, 2);
-    const size_t *plan = plans[dice_throw(&size) % 4], n = plan[0] * plan[1];
+    /* one of the two largest, by the seed */
+    const size_t *plan = plans[n_plans - 1 - (n_plans > 1 ? dice_throw(&size) % 2 : 0)],
+                 n = plan[0] * plan[1];
     TRY(block_add(&all, BLOCK_SOLID, 0, 0, -outside, lot * (double)plan[0], lot * (double)plan[1],
                   room_height[1] + outside, error));
     for (size_t i = 0; i < n; i++) {
@@ -124,7 +134,7 @@ lam_status draft_rooms_scene(draft *d, const generate_options *options, lam_erro
     TRY(add_corridors(&all, rooms, plan[0], plan[1], options->seed, error));
     list.n_groups = LAMP + n;
     TRY(blocks_patches(&all, stuffs, &list, error));
-    TRY(patches_draw(&list, d, options, options->elements > 0 ? options->elements : ROOMS_ELEMENTS, error));
+    TRY(patches_draw(&list, d, options, wanted, error));
 done:
     blocks_free(&all);
     patches_free(&list);
