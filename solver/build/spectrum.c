@@ -24,7 +24,6 @@ typedef struct recurrence {
     float *X, *before, *Y;
     double *alpha, *beta;
     size_t taken[VECTORS];
-    double length[VECTORS]; /* square of the start */
     bool ended[VECTORS];
 } recurrence;
 
@@ -95,7 +94,7 @@ static lam_status add_nodes(recurrence *r, node *nodes, size_t *n_nodes, lam_err
             LAPACKE_dstev(LAPACK_ROW_MAJOR, 'V', m, diagonal, r->beta + v * r->steps, vectors, m);
         if (info != 0) FAIL(error, LAM_ERR_NUMERIC, "spectrum: LAPACK dstev returned %d", (int)info);
         for (lapack_int k = 0; k < m; k++)
-            nodes[(*n_nodes)++] = (node){fabs(diagonal[k]), vectors[k] * vectors[k] * r->length[v] / VECTORS};
+            nodes[(*n_nodes)++] = (node){fabs(diagonal[k]), vectors[k] * vectors[k] * (double)r->n / VECTORS};
     }
 done:
     free(vectors);
@@ -109,7 +108,7 @@ lam_status spectrum_find(const scaled_matrix *S, size_t steps, uint64_t seed, co
     recurrence r = {.n = n, .steps = steps < n ? steps : n};
     node *nodes = memory_allocate(VECTORS, r.steps * sizeof *nodes, "spectrum", error);
     size_t n_nodes = 0;
-    double factor[VECTORS];
+    double squares[VECTORS], factor[VECTORS];
     *out = (spectrum){0};
     r.X = memory_allocate(n, VECTORS * sizeof *r.X, "spectrum", error);
     r.before = memory_allocate(n, VECTORS * sizeof *r.before, "spectrum", error);
@@ -123,8 +122,8 @@ lam_status spectrum_find(const scaled_matrix *S, size_t steps, uint64_t seed, co
         TRY(LAM_ERR_MEMORY);
 
     sketch_gaussian(seed, n, VECTORS, r.X);
-    columns_dot(n, r.X, r.X, r.length);
-    for (size_t v = 0; v < VECTORS; v++) factor[v] = 1 / sqrt(r.length[v]);
+    columns_dot(n, r.X, r.X, squares);
+    for (size_t v = 0; v < VECTORS; v++) factor[v] = 1 / sqrt(squares[v]);
     columns_scale(n, r.X, factor);
     for (size_t s = 0; s < r.steps; s++) {
         if (progress_cancelled(told)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
@@ -133,12 +132,10 @@ lam_status spectrum_find(const scaled_matrix *S, size_t steps, uint64_t seed, co
     }
     TRY(add_nodes(&r, nodes, &n_nodes, error));
     qsort(nodes, n_nodes, sizeof *nodes, by_falling_value);
-    double sum = 0;
-    for (size_t k = 0; k < n_nodes; k++) sum += nodes[k].count;
-    out->nodes = n_nodes;
+    out->nodes = n_nodes; /* the weights of a rule are together 1, so counts are n */
     for (size_t k = 0; k < n_nodes; k++) {
         out->value[k] = nodes[k].value;
-        out->count[k] = nodes[k].count * (double)n / sum; /* all of them are n */
+        out->count[k] = nodes[k].count;
     }
 done:
     free(nodes);

@@ -14,7 +14,7 @@ typedef struct spectrum {
 
 void spectrum_free(spectrum *s);
 
-/* Stochastic Lanczos quadrature (Golub and Meurant 2010, ch. 11): a random vector of variance 1 meets all
+/* Stochastic Lanczos quadrature (Golub and Meurant 2010, ch. 11): a random unit vector meets all
  * eigenvectors of S alike, so the Gauss rule that Lanczos steps from it lead to counts eigenvalues; eight
  * vectors go together and their rules are put together. The number above x is right to a few hundredths of
  * itself where the values lie close, and is of no use for the few largest one by one. Cost: `steps` products

@@ -94,12 +94,14 @@ END_TEST
 
 enum { N = 1200, EACH = 330 };
 
-/* F of N like elements that each see `each` others alike, met at random in pairs. */
-static fixture random_pairs(size_t each) {
+/* F of N like elements: one neighbour takes the share near of what each sees, and as many others as each
+ * says, met at random in pairs, take the rest alike. */
+static fixture random_pairs(size_t each, float near) {
     fixture f = {.m = {.n = N, .n_channels = 1}};
     float *dense = calloc((size_t)N * N, sizeof *dense);
     uint64_t state = 7;
     uint32_t partner[N];
+    for (size_t i = 0; i < N; i++) dense[i * N + (i ^ 1u)] = near;
     for (size_t round = 0; round < each; round++) {
         for (uint32_t i = 0; i < N; i++) partner[i] = i;
         for (size_t i = N - 1; i > 0; i--) {
@@ -110,8 +112,8 @@ static fixture random_pairs(size_t each) {
             partner[j] = swap;
         }
         for (size_t i = 0; i + 1 < N; i += 2) {
-            dense[(size_t)partner[i] * N + partner[i + 1]] += 1 / (float)each;
-            dense[(size_t)partner[i + 1] * N + partner[i]] += 1 / (float)each;
+            dense[(size_t)partner[i] * N + partner[i + 1]] += (1 - near) / (float)each;
+            dense[(size_t)partner[i + 1] * N + partner[i]] += (1 - near) / (float)each;
         }
     }
     lam_error error = {0};
@@ -162,12 +164,25 @@ END_TEST
 
 /* Each sees one other: 2 n numbers, and every singular value is 1. */
 START_TEST(pairs_are_sparse) {
-    fixture f = random_pairs(1);
+    fixture f = random_pairs(1, 0);
     const scene_class c = classified(&f, &usual);
     ck_assert_str_eq(c.method, "sparse");
     ck_assert_double_eq_tol(c.rank, N, 1e-3 * N);
     ck_assert_double_eq_tol(c.entries, 2 * N, 1e-6 * N); /* it and, by way of it, itself */
     ck_assert_double_gt(c.threshold, 0);
+    ck_assert_double_eq(c.sparse_cost, 4 * c.entries);
+    fixture_free(&f);
+}
+END_TEST
+
+/* Half of the light comes in crumbs. Without them single elements are right to .1, the crumbs' 1 / sqrt(100)
+ * of the other half, but light from everywhere lacks a half: they must stay, and nothing is sparse. */
+START_TEST(crumbs_that_add_up_are_kept) {
+    fixture f = random_pairs(100, .5f);
+    classify_options how = usual;
+    how.epsilon = .15;
+    const scene_class c = classified(&f, &how);
+    ck_assert(c.entries < 0 || c.entries > 100. * N);
     fixture_free(&f);
 }
 END_TEST
@@ -175,7 +190,7 @@ END_TEST
 /* A quarter of all others, without order: neither. Their singular values lie within 2 / sqrt(EACH) = .11 (the
  * semicircle law), and most of them above .035. */
 START_TEST(noise_is_neither) {
-    fixture f = random_pairs(EACH);
+    fixture f = random_pairs(EACH, 0);
     classify_options how = usual;
     scene_class c = classified(&f, &how);
     ck_assert_str_eq(c.method, "exact");
@@ -191,7 +206,7 @@ START_TEST(noise_is_neither) {
 END_TEST
 
 START_TEST(a_threshold_that_is_given_stays) {
-    fixture f = random_pairs(1);
+    fixture f = random_pairs(1, 0);
     classify_options how = usual;
     how.threshold = 1e-3;
     const scene_class c = classified(&f, &how);
@@ -209,6 +224,7 @@ int main(void) {
     tcase_add_test(cases, samples_tell_of_the_whole);
     tcase_add_test(cases, a_box_is_of_low_rank);
     tcase_add_test(cases, pairs_are_sparse);
+    tcase_add_test(cases, crumbs_that_add_up_are_kept);
     tcase_add_test(cases, noise_is_neither);
     tcase_add_test(cases, a_threshold_that_is_given_stays);
     suite_add_tcase(suite, cases);
