@@ -16,32 +16,27 @@ typedef struct place {
     double density, rank; /* share of n^2; at epsilon .1 over n */
 } place;
 
-static lam_status classify(const bench_run *run, const build_problem *problem, double epsilon,
-                           scene_class *out, lam_error *error) {
-    const classify_options how = {
-        .epsilon = epsilon, .seed = run->seed, .thorough = true, .progress = run->progress};
-    return classify_scene(problem, &how, out, error);
-}
-
 static lam_status add_scene(const bench_run *run, const lowrank_scene *s, place *at, table *out,
                             lam_error *error) {
     lam_status status = LAM_OK;
     const build_problem problem = lowrank_problem(s);
     const double n = (double)s->m.n;
-    scene_class rough, fine;
+    const classify_options how = {
+        .epsilon = .05, .seed = run->seed, .thorough = true, .progress = run->progress};
+    scene_class fine;
     spectrum values = {.nodes = 0};
     TRY(bench_check(run, error));
-    TRY(classify(run, &problem, .1, &rough, error));
-    TRY(classify(run, &problem, .05, &fine, error));
+    TRY(classify_scene(&problem, &how, &fine, error));
     TRY(map_spectrum(run, s, &values, error));
-    *at = (place){.density = fine.density, .rank = rough.rank / n};
+    const double rough = classify_rank(&values, .1);
+    *at = (place){.density = fine.density, .rank = rough / n};
     table_text(out, s->name);
     table_number(out, n);
     table_number(out, 100 * fine.density);
     table_number(out, their_density(run, s));
     table_number(out, spectrum_above(&values, .5));
     table_number(out, spectrum_above(&values, .1));
-    table_number(out, rough.rank);
+    table_number(out, rough);
     table_number(out, fine.rank);
     table_number(out, 100 * fine.rank / n);
     table_number(out, fine.tail);

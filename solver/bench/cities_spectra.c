@@ -1,5 +1,6 @@
 /* Figure 4.1 of the thesis: why not to factorize a city. */
 #include "solver/bench/cities.h"
+#include "solver/build/classify.h"
 #include "solver/build/tsvd.h"
 
 #include <math.h>
@@ -89,13 +90,12 @@ static void add_row(const char *name, size_t n, double all, double counted, cons
 }
 
 lam_status map_spectrum(const bench_run *run, const lowrank_scene *s, spectrum *out, lam_error *error) {
-    enum { STEPS = 40 }; /* as classify_scene takes */
     lam_status status = LAM_OK;
     row_source rows;
     scaled_matrix S = {0};
     row_source_of_csr(&rows, &s->f.F);
     TRY(scaled_init(&S, &rows, s->m.area, s->z_order, error));
-    TRY(spectrum_find(&S, STEPS, run->seed, run->progress, out, error));
+    TRY(spectrum_find(&S, CLASSIFY_STEPS, run->seed, run->progress, out, error));
 done:
     scaled_free(&S);
     return status;

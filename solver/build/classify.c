@@ -1,7 +1,6 @@
 #include "solver/build/classify.h"
 
 #include "solver/build/sparse_inverse.h"
-#include "solver/build/spectrum.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -19,10 +18,12 @@ static const double dense_enough = 1. / sparse_number;
  */
 static const double bound_reached = .7;
 
-enum { STEPS = 40 };
-
 /* Thresholds of a sparse inverse that are tried, and from one to the next. */
 static const double threshold_first = 1e-2, threshold_last = 1e-6, threshold_step = .3162277660168379;
+
+double classify_rank(const spectrum *values, double epsilon) {
+    return fmax(1, spectrum_above(values, bound_reached * epsilon));
+}
 
 static lam_status look_at_rank(const build_problem *p, const classify_options *options, scene_class *out,
                                lam_error *error) {
@@ -32,10 +33,9 @@ static lam_status look_at_rank(const build_problem *p, const classify_options *o
     spectrum values = {0};
     row_source_of_csr(&rows, p->F);
     TRY(scaled_init(&S, &rows, p->area, p->order, error));
-    TRY(spectrum_find(&S, STEPS, options->seed, options->progress, &values, error));
-    const double kept = bound_reached * options->epsilon;
-    out->rank = fmax(1, spectrum_above(&values, kept));
-    out->tail = sqrt(spectrum_tail(&values, kept));
+    TRY(spectrum_find(&S, CLASSIFY_STEPS, options->seed, options->progress, &values, error));
+    out->rank = classify_rank(&values, options->epsilon);
+    out->tail = sqrt(spectrum_tail(&values, bound_reached * options->epsilon));
 done:
     spectrum_free(&values);
     scaled_free(&S);

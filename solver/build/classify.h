@@ -3,6 +3,7 @@
 #define LAMBERT_BUILD_CLASSIFY_H
 
 #include "solver/build/build.h"
+#include "solver/build/spectrum.h"
 
 /* What a query costs is what it reads, in numbers of a panel: 2 n k of a low-rank operator, n^2 of an exact
  * one, four for every entry of a sparse one, n s of emitters. */
@@ -34,6 +35,12 @@ typedef struct classify_options {
  * Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC, LAM_ERR_CANCELLED. */
 lam_status classify_scene(const build_problem *problem, const classify_options *options, scene_class *out,
                           lam_error *error);
+
+/* The rank that a factorization of bound epsilon is going to have. */
+double classify_rank(const spectrum *values, double epsilon);
+
+/* Lanczos steps that the spectrum is found with. */
+enum { CLASSIFY_STEPS = 40 };
 
 /* Up to so many elements the whole inverse is small, exact, and built in well under a second; beyond so many
  * it takes too long. */

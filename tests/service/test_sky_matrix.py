@@ -10,18 +10,10 @@ import unittest
 import numpy as np
 
 from command import lambert, must
+from cube import CORNERS
 
 # A cube without a bottom, its fronts outwards: walls that face south, east, north and west, and a roof.
-CUBE = """mtllib cube.mtl
-v 0 0 0
-v 1 0 0
-v 1 1 0
-v 0 1 0
-v 0 0 1
-v 1 0 1
-v 1 1 1
-v 0 1 1
-usemtl paint
+CUBE = "mtllib cube.mtl\n" + CORNERS + """usemtl paint
 o south
 f 1 2 6 5
 o east

@@ -14,22 +14,14 @@ import h5py
 import numpy as np
 
 from command import lambert as run
+from cube import CORNERS
 
 FORMAT = pathlib.Path(__file__).resolve().parents[2] / "store" / "FORMAT.md"
 PIECE = 2**20
 ROUND = 2.0**-24  # of one operation in single precision, relative
 
 # A cube of one metre seen from inside; one wall is black, a quarter of the ceiling's material glows.
-CUBE = """mtllib cube.mtl
-v 0 0 0
-v 1 0 0
-v 1 1 0
-v 0 1 0
-v 0 0 1
-v 1 0 1
-v 1 1 1
-v 0 1 1
-o Böden
+CUBE = "mtllib cube.mtl\n" + CORNERS + """o Böden
 usemtl floor
 f 1 2 3 4
 o ceiling
