@@ -143,7 +143,8 @@ static void probe(const camera *c, const visibility *v, const bool *lit, double 
                     rays.direction[d][i] = (float)direction[d];
                 }
             }
-            visibility_cast(v, &rays, VISIBILITY_PACKET, NULL, true, &hits);
+            visibility_cast(v, &rays, VISIBILITY_PACKET, NULL, VISIBILITY_CULL_BACK | VISIBILITY_TOGETHER,
+                            &hits);
             for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
                 if (hits.element[i] == VISIBILITY_NOTHING) continue;
                 if (lit[hits.element[i]])
@@ -167,7 +168,7 @@ static double free_distance(const visibility *v, const double from[3], const dou
         rays.origin[d][0] = start[d];
         rays.direction[d][0] = (float)direction[d];
     }
-    visibility_cast(v, &rays, 1, NULL, false, &hits);
+    visibility_cast(v, &rays, 1, NULL, 0, &hits);
     return hits.element[0] == VISIBILITY_NOTHING ? INFINITY : (double)hits.distance[0];
 }
 

@@ -73,7 +73,8 @@ void picture_measure(const picture_scene *scene, const camera *c, tone_histogram
             memset(&rays, 0, sizeof rays);
             for (size_t i = 0; i < count; i++)
                 aim(scene, c, ((double)(first + i) + .5) / (double)width, v, &rays, i);
-            visibility_cast(scene->visibility, &rays, count, NULL, true, &hits);
+            visibility_cast(scene->visibility, &rays, count, NULL, VISIBILITY_CULL_BACK | VISIBILITY_TOGETHER,
+                            &hits);
             for (size_t i = 0; i < count; i++) {
                 float values[SHADE_MAX_CHANNELS];
                 if (hits.element[i] == VISIBILITY_NOTHING) continue;
@@ -129,7 +130,8 @@ static void draw_pixel(const picture_scene *scene, const camera *c, const pictur
             y[s] = ((double)py + sample_y(s)) / (double)picture->height;
             aim(scene, c, x[s], y[s], &rays, i);
         }
-        visibility_cast(scene->visibility, &rays, VISIBILITY_PACKET, NULL, true, &hits);
+        visibility_cast(scene->visibility, &rays, VISIBILITY_PACKET, NULL,
+                        VISIBILITY_CULL_BACK | VISIBILITY_TOGETHER, &hits);
         memcpy(element + p * VISIBILITY_PACKET, hits.element, sizeof hits.element);
     }
     for (size_t s = 0; s < SAMPLES; s++) missed += element[s] == VISIBILITY_NOTHING;
@@ -142,7 +144,7 @@ static void draw_pixel(const picture_scene *scene, const camera *c, const pictur
                      y2 = y[s] + SIDESTEP / (double)picture->height;
         memset(&rays, 0, sizeof rays);
         aim(scene, c, x2, y2, &rays, 0);
-        visibility_cast(scene->visibility, &rays, 1, NULL, true, &hits);
+        visibility_cast(scene->visibility, &rays, 1, NULL, VISIBILITY_CULL_BACK, &hits);
         element[s] = hits.element[0];
         if (element[s] == VISIBILITY_NOTHING) continue;
         x[s] = x2;

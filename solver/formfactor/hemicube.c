@@ -147,7 +147,7 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
                 const size_t rest = resolution - column,
                              n = rest < VISIBILITY_PACKET ? rest : VISIBILITY_PACKET;
                 aim(&f, y, column, resolution, &rays);
-                visibility_cast(c->v, &rays, n, self, false, &hits);
+                visibility_cast(c->v, &rays, n, self, VISIBILITY_TOGETHER, &hits);
                 double weights[VISIBILITY_PACKET] = {0};
                 unsigned leaving_now = 0;
                 for (size_t i = 0; i < n; i++) {

@@ -27,7 +27,7 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
         hit_packet hits;
         const size_t n = c->rays - ray < VISIBILITY_PACKET ? c->rays - ray : VISIBILITY_PACKET;
         element_sampler_packet(&sampler, (uint32_t)ray, &rays);
-        visibility_cast(c->v, &rays, n, self, false, &hits);
+        visibility_cast(c->v, &rays, n, self, 0, &hits);
         unsigned leaving_now = 0;
         for (size_t i = 0; i < n; i++) {
             const uint32_t hit = hits.element[i];
@@ -81,7 +81,7 @@ void rays_cast_some(const mesh *m, const visibility *v, const uint32_t *order, s
             ray_packet packet;
             hit_packet hits;
             element_sampler_packet(&sampler, (uint32_t)ray, &packet);
-            visibility_cast(v, &packet, VISIBILITY_PACKET, self, false, &hits);
+            visibility_cast(v, &packet, VISIBILITY_PACKET, self, 0, &hits);
         }
     }
 }

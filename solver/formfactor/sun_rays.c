@@ -70,7 +70,7 @@ typedef struct waiting {
 
 static void cast(const sun_rays *s, waiting *w, const float cosine[], float *seen) {
     hit_packet hits;
-    visibility_cast(s->v, &w->rays, w->n, w->self, false, &hits);
+    visibility_cast(s->v, &w->rays, w->n, w->self, 0, &hits);
     for (size_t k = 0; k < w->n; k++)
         if (hits.element[k] == VISIBILITY_NOTHING) seen[w->self[k]] += cosine[k] / (float)s->n_points;
     w->n = 0;

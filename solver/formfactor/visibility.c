@@ -316,14 +316,15 @@ static void cast_lifted(const visibility *v, const ray_packet *rays, const uint3
 }
 
 void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
-                     bool cull_back, hit_packet *hits) {
+                     unsigned how, hit_packet *hits) {
     const bool two_sided = v->mesh->two_sided;
     struct RTCRayHit8 ray __attribute__((aligned(32)));
     int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
     met_packet met = {{0}, {0}};
-    cast_context context = {.visibility = v, .cull_back = cull_back && !two_sided};
+    cast_context context = {.visibility = v, .cull_back = (how & VISIBILITY_CULL_BACK) != 0 && !two_sided};
     rtcInitIntersectContext(&context.embree);
     context.embree.filter = refuse_own_and_culled;
+    if ((how & VISIBILITY_TOGETHER) != 0) context.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     packet_set(&ray, rays);
     for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
         uint32_t own = self != NULL && i < n_rays ? self[i] : VISIBILITY_NOTHING;

@@ -42,11 +42,16 @@ void visibility_recentre_packet(const visibility *v, const double points[3][VISI
 /* How far single precision may move a point of the scene, metres. */
 double visibility_rounding(const visibility *v);
 
+/* CULL_BACK looks through back faces instead of reporting them. TOGETHER: the rays of a packet start in one
+ * place and go almost one way, as those of an image do; they meet the same, twice as fast (and two thirds as
+ * fast where it is not so). */
+enum { VISIBILITY_CULL_BACK = 1, VISIBILITY_TOGETHER = 2 };
+
 /* Casts the first n_rays rays of a packet. self[i] is the element a ray leaves (itself and, if two-sided, its
- * back are never hit), or VISIBILITY_NOTHING. cull_back looks through back faces instead of reporting them.
+ * back are never hit), or VISIBILITY_NOTHING. how: VISIBILITY_CULL_BACK | VISIBILITY_TOGETHER, either or 0.
  */
 void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
-                     bool cull_back, hit_packet *hits);
+                     unsigned how, hit_packet *hits);
 
 /* Which of the first n_segments segments meet something on their way: bit i for segment i, from rays->origin
  * to origin + direction, points of the elements from[i] and to[i]. Neither those nor faces in the same place

@@ -261,10 +261,11 @@ START_TEST(a_floor_with_holes) {
 }
 END_TEST
 
-/* The same rays, against facets and against elements; none leaves what is closed. */
+/* The same rays, against facets, with and without the word that they go together, and against elements; none
+ * leaves what is closed. */
 static void check_rays(const mesh *m, size_t rays, bool closed) {
     visibility *of_facets, *of_elements;
-    size_t other = 0, seen = 0;
+    size_t other = 0, apart = 0, seen = 0;
     ck_assert_msg(visibility_create(m, &of_facets, &error) == LAM_OK, "%s", error.message);
     ck_assert_msg(visibility_create_of_elements(m, &of_elements, &error) == LAM_OK, "%s", error.message);
     for (size_t i = 0; i < m->n; i++) {
@@ -274,13 +275,15 @@ static void check_rays(const mesh *m, size_t rays, bool closed) {
         element_sampler_init(&sampler, m, of_facets, i, 3);
         for (size_t ray = 0; ray < rays; ray += VISIBILITY_PACKET) {
             ray_packet packet;
-            hit_packet a, b;
+            hit_packet a, b, together;
             element_sampler_packet(&sampler, (uint32_t)ray, &packet);
-            visibility_cast(of_facets, &packet, VISIBILITY_PACKET, self, false, &a);
-            visibility_cast(of_elements, &packet, VISIBILITY_PACKET, self, false, &b);
+            visibility_cast(of_facets, &packet, VISIBILITY_PACKET, self, 0, &a);
+            visibility_cast(of_elements, &packet, VISIBILITY_PACKET, self, 0, &b);
+            visibility_cast(of_facets, &packet, VISIBILITY_PACKET, self, VISIBILITY_TOGETHER, &together);
             for (int k = 0; k < VISIBILITY_PACKET; k++) {
                 seen += a.element[k] != VISIBILITY_NOTHING;
                 other += a.element[k] != b.element[k] || a.back[k] != b.back[k];
+                apart += a.element[k] != together.element[k] || a.back[k] != together.back[k];
                 ck_each(!closed || a.element[k] != VISIBILITY_NOTHING);
             }
         }
@@ -288,6 +291,8 @@ static void check_rays(const mesh *m, size_t rays, bool closed) {
     ck_assert_uint_gt(seen, 0);
     ck_assert_msg((double)other <= 1e-5 * (double)(m->n * rays), "%zu of %zu rays met another element", other,
                   m->n * rays);
+    ck_assert_msg((double)apart <= 1e-5 * (double)(m->n * rays), "%zu of %zu rays together met another",
+                  apart, m->n * rays);
     visibility_destroy(of_facets);
     visibility_destroy(of_elements);
 }

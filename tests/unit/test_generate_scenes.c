@@ -210,7 +210,7 @@ static tally cast_from_all(const mesh *m, size_t rays, uint64_t seed) {
             ray_packet packet;
             hit_packet hits;
             element_sampler_packet(&sampler, (uint32_t)ray, &packet);
-            visibility_cast(v, &packet, VISIBILITY_PACKET, self, false, &hits);
+            visibility_cast(v, &packet, VISIBILITY_PACKET, self, 0, &hits);
             for (int k = 0; k < VISIBILITY_PACKET; k++) {
                 const bool gone = hits.element[k] == VISIBILITY_NOTHING;
                 t.all++;
