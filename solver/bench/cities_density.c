@@ -14,7 +14,7 @@ static const double theirs[CITY_VARIANTS][CITY_SIZES][CITY_TERRAINS] = {
     {{1.23, 2.99, 1.14}, {.87, 1.97, .79}, {.64, 1.31, .58}}};
 
 /* A row of 512 pixels is 786 thousand rays, an hour for all of 35,588: some rows tell of all. */
-enum { RAYS = 4096, RESOLUTION = 512, RESOLUTION_QUICK = 32, ROWS = 256, ROWS_QUICK = 32, ROWS_FULL = 1024 };
+enum { RAYS = 4096, RESOLUTION = 512, RESOLUTION_QUICK = 32, ROWS = 512, ROWS_QUICK = 32, ROWS_FULL = 1024 };
 
 /* Rows spread over the mesh, whose elements lie group by group and building by building: one at random out of
  * each of count parts. */
