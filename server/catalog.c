@@ -160,10 +160,10 @@ static const scene *insert(catalog_snapshot *snapshot, scene *s) {
 }
 
 static void load_source(catalog_snapshot *next, const catalog_snapshot *before, const source *from,
-                        bool verify, FILE *out, FILE *problems) {
+                        const config *c, FILE *out, FILE *problems) {
     lam_error error = {0};
     scene *loaded = NULL;
-    if (scene_open(from->path, from->name, verify, &loaded, &error) != LAM_OK) {
+    if (scene_open(from->path, from->name, c->verify, &loaded, &error) != LAM_OK) {
         scene *old = find_before(before, from);
         if (old == NULL) {
             /* Most messages begin with the path, some (out of memory) do not. */
@@ -174,6 +174,8 @@ static void load_source(catalog_snapshot *next, const catalog_snapshot *before, 
         fprintf(problems, "kept the %s read before; %s cannot be read now: %s\n", old->name, from->path,
                 error.message);
         loaded = scene_acquire(old);
+    } else {
+        lam_operator_set_threads(loaded->op, c->threads);
     }
     const scene *taken = insert(next, loaded);
     if (taken != NULL) {
@@ -201,7 +203,7 @@ size_t catalog_reload(catalog *all, FILE *out, FILE *problems) {
     next->scenes = memory_allocate(sources.count, sizeof *next->scenes, "catalog", &error);
     if (next->scenes == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < sources.count; i++)
-        load_source(next, before, &sources.items[i], all->config->verify, out, problems);
+        load_source(next, before, &sources.items[i], all->config, out, problems);
     pthread_mutex_lock(&all->lock);
     catalog_snapshot *old = all->present;
     all->present = next;

@@ -63,6 +63,30 @@ bool answer_add(buffer *b, const answer_shape *shape, const media_accept *as, si
     return true;
 }
 
+static size_t count_values(const answer_shape *shape) {
+    size_t count;
+    return size_multiply(shape->n_rhs, shape->n_channels, &count) &&
+                   size_multiply(count, shape->n_values, &count)
+               ? count
+               : SIZE_MAX;
+}
+
+float *answer_place(buffer *b, const answer_shape *shape, const media_accept *as) {
+    size_t bytes;
+    if (as->type != MEDIA_NPY || as->npy != NPY_F4 ||
+        !size_multiply(count_values(shape), sizeof(float), &bytes) || !buffer_reserve(b, bytes))
+        return NULL;
+    return (float *)(void *)(b->bytes + b->length);
+}
+
+bool answer_placed(buffer *b, const answer_shape *shape, problem *why) {
+    const size_t count = count_values(shape);
+    if (!check_range((const float *)(const void *)(b->bytes + b->length), count, FLT_MAX, why)) return false;
+    b->length += count * sizeof(float);
+    b->bytes[b->length] = '\0';
+    return true;
+}
+
 bool answer_end(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
                 problem *why) {
     if (as->type == MEDIA_NPY) return true;

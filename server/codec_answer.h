@@ -28,6 +28,12 @@ typedef struct answer_notes {
  * when memory is short. */
 bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
                   problem *why);
+/* Where the values of a whole answer of so many vectors may be written at once, behind what answer_begin
+ * wrote, [n_rhs][C][n_values]; answer_placed, in place of answer_add, then takes them. NULL where the
+ * encoding is another, or memory is short. */
+float *answer_place(buffer *b, const answer_shape *shape, const media_accept *as);
+bool answer_placed(buffer *b, const answer_shape *shape, problem *why);
+
 bool answer_add(buffer *b, const answer_shape *shape, const media_accept *as, size_t first, size_t count,
                 const float *x, problem *why);
 bool answer_end(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,

@@ -27,7 +27,7 @@ struct http {
 /* A request, from its head to the last byte of its answer. The I/O thread owns it; while its connection is
  * suspended, the thread that solves does. */
 typedef struct request {
-    batch_job job;
+    call call;
     http *http;
     struct MHD_Connection *connection;
     uint64_t id;
@@ -36,7 +36,6 @@ typedef struct request {
     struct timespec start;
     route_match match;
     catalog_snapshot *snapshot;
-    call call;
     answer answer;
     bool answered; /* the answer is made: what follows of the body is dropped */
     bool queued;   /* the answer was handed to libmicrohttpd */
@@ -144,10 +143,23 @@ static request *request_of(batch_job *job) {
     return (request *)(void *)job;
 }
 
-static void run_solve(batch_job *job, batch_workspace *workspace) {
+static bool begin_solve(batch_job *job, batch_workspace *workspace) {
+    request *r = request_of(job);
+    const route *to = r->match.route;
+    r->call.workspace = workspace;
+    if (to->steps != NULL) {
+        if (to->steps->begin(&r->call, &r->answer)) return true;
+    } else {
+        to->handle(&r->call, &r->answer);
+    }
+    buffer_free(&r->body);
+    return false;
+}
+
+static void end_solve(batch_job *job, batch_workspace *workspace) {
     request *r = request_of(job);
     r->call.workspace = workspace;
-    r->match.route->handle(&r->call, &r->answer);
+    r->match.route->steps->end(&r->call, &r->answer);
     buffer_free(&r->body);
 }
 
@@ -164,9 +176,13 @@ static enum MHD_Result handle(request *r) {
         r->call.length = r->body.length;
         if (r->match.route->body == BODY_OF_SOLVE) {
             /* Suspended first: the solve may be done before batch_submit returns. */
-            r->job = (batch_job){.run = run_solve, .finish = finish_solve};
+            const solve_steps *steps = r->match.route->steps;
+            r->call.job = (batch_job){.begin = begin_solve,
+                                      .pass = steps != NULL ? steps->pass : NULL,
+                                      .end = end_solve,
+                                      .finish = finish_solve};
             MHD_suspend_connection(r->connection);
-            if (batch_submit(r->http->service->queue, &r->job)) return MHD_YES;
+            if (batch_submit(r->http->service->queue, &r->call.job)) return MHD_YES;
             answer_refuse(&r->answer, 503, "%zu solves wait or run (--max-inflight); try again",
                           r->http->service->config->max_inflight);
             r->answered = true;

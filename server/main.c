@@ -12,6 +12,13 @@
 
 #define EXIT_USAGE 2
 
+/* Between its loops OpenMP's threads spin unless told otherwise before the program starts: on a machine that
+ * also has clients to talk to, they should sleep. So the program starts once more. */
+static void let_threads_sleep(char **argv) {
+    if (getenv("OMP_WAIT_POLICY") != NULL || setenv("OMP_WAIT_POLICY", "passive", 1) != 0) return;
+    execv("/proc/self/exe", argv);
+}
+
 static int complain(const lam_error *error, int code) {
     fprintf(stderr, "lambertd: %s\n", error->message);
     return code;
@@ -105,6 +112,7 @@ done:
 }
 
 int main(int argc, char **argv) {
+    let_threads_sleep(argv);
     config c;
     lam_error error = {0};
     sigset_t signals = block_signals();

@@ -1,13 +1,11 @@
-/* POST /v1/scenes/NAME/radiosity: emission in, light out. */
+/* POST /v1/scenes/NAME/radiosity: emission in, light out. Reads on the thread that has the request, shares
+ * passes over the operator with other clients, writes on whichever thread is free. */
 #include "server/codec_answer.h"
 #include "server/codec_request.h"
 #include "server/routes.h"
 
+#include <stdlib.h>
 #include <time.h>
-
-/* Vectors of one pass over the operator: enough to use each row read many times, few enough that they stay in
- * the cache. */
-#define PASS 16
 
 /* Emission vectors of one request, in bytes: a short sparse text may ask for many long ones. */
 #define LEAST_EMISSION_LIMIT ((size_t)1 << 30)
@@ -18,111 +16,33 @@ static double now_ms(void) {
     return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
 }
 
-/* What a pass works with, in the thread's own memory. */
-typedef struct pass_memory {
-    float *out; /* [n_rhs][C][n], less where elements are selected */
-    float *H0;  /* [n_rhs][C][n], what the sky gives; NULL where no vector is under one */
-    float *W;   /* [n_rhs][C][s], weights of the store's emitters, in place of H0 */
-    void *work;
-    size_t work_bytes;
-} pass_memory;
+/* From begin to end. */
+typedef struct radiosity_solve {
+    radiosity_request request;
+    answer_notes notes;
+    answer_shape shape;
+    buffer answer;
+    float *out;  /* [n_rhs][C][n_values]: in the answer, where its encoding allows, or own */
+    float *own;  /* else NULL */
+    float *H0;   /* [n_rhs][C][n], what the sky gives; NULL where no vector is under one */
+    float *W;    /* [n_rhs][C][s], weights of the store's emitters; NULL where it has none */
+    problem why; /* of a pass that failed */
+    bool failed;
+} radiosity_solve;
 
-static bool get_pass_memory(call *in, size_t n_rhs, bool lit, pass_memory *memory, problem *why) {
-    const scene *s = in->scene;
-    size_t values, out_bytes, side_bytes, total;
-    const size_t side = s->n_emitters > 0 ? s->n_emitters : lit ? s->n : 0;
-    memory->work_bytes = lam_operator_work_bytes(s->op, n_rhs);
-    if (memory->work_bytes > 0 && size_multiply(n_rhs * s->n_channels, s->n, &values) &&
-        size_multiply(values, sizeof(float), &out_bytes)) {
-        /* The others come behind the vectors, aligned as malloc does. */
-        out_bytes = (out_bytes + 63) / 64 * 64;
-        side_bytes = (n_rhs * s->n_channels * side * sizeof(float) + 63) / 64 * 64;
-        if (!__builtin_add_overflow(out_bytes, memory->work_bytes, &total) &&
-            !__builtin_add_overflow(total, side_bytes, &total)) {
-            char *bytes = batch_workspace_get(in->workspace, total);
-            if (bytes != NULL) {
-                float *beside = (float *)(void *)(bytes + out_bytes);
-                memory->out = (float *)(void *)bytes;
-                memory->H0 = lit && s->n_emitters == 0 ? beside : NULL;
-                memory->W = s->n_emitters > 0 ? beside : NULL;
-                memory->work = bytes + out_bytes + side_bytes;
-                return true;
-            }
-        }
-    }
-    return problem_set(why, 503, "not enough memory to solve %zu vectors", n_rhs);
+static void solve_free(radiosity_solve *s) {
+    radiosity_request_free(&s->request);
+    buffer_free(&s->answer);
+    free(s->own);
+    free(s->H0);
+    free(s->W);
+    free(s);
 }
 
-/* The answer of an operator of few emitters: to weights given, and to those told from the emission. */
-static bool solve_emitters(const scene *s, const radiosity_request *request, size_t first, size_t count,
-                           const pass_memory *memory, problem *why) {
-    const size_t C = s->n_channels, weights = C * s->n_emitters;
-    lam_error error;
-    const float *L = request->sky.values;
-    const size_t n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
-    if (L != NULL) L += first * C * n_tiles;
-    lam_status status =
-        lam_operator_weights(s->op, count, request->E + first * C * s->n, n_tiles, L, memory->W, &error);
-    if (status != LAM_OK)
-        return problem_set(why, status == LAM_ERR_MEMORY ? 503 : 422, "emission %zu or after: %s", first,
-                           error.message);
-    for (size_t k = 0; request->emitters.values != NULL && k < count * weights; k++)
-        memory->W[k] += request->emitters.values[first * weights + k];
-    status = lam_operator_apply_emitters(s->op, count, request->quantity, memory->W, request->n_selected,
-                                         request->select ? request->selected : NULL, memory->out,
-                                         memory->work, memory->work_bytes, &error);
-    return status == LAM_OK || problem_set(why, 500, "%s", error.message);
-}
-
-/* That of any other. */
-static bool solve_any(const scene *s, const radiosity_request *request, size_t first, size_t count,
-                      const pass_memory *memory, problem *why) {
-    const float *E = request->E + first * s->n_channels * s->n;
-    lam_error error;
-    if (memory->H0 != NULL)
-        lam_sky_irradiance(s->sky, count * s->n_channels,
-                           request->sky.values + first * s->n_channels * lam_sky_tiles(s->sky), memory->H0);
-    const lam_status status =
-        request->select ? lam_operator_apply_selected(s->op, count, request->quantity, E, memory->H0,
-                                                      request->n_selected, request->selected, memory->out,
-                                                      memory->work, memory->work_bytes, &error)
-                        : lam_operator_apply_lit(s->op, count, request->quantity, E, memory->H0, memory->out,
-                                                 memory->work, memory->work_bytes, &error);
-    return status == LAM_OK || problem_set(why, 500, "%s", error.message);
-}
-
-/* Applies the operator pass by pass, each pass's vectors encoded while they are in the cache. */
-static bool solve(call *in, const radiosity_request *request, answer_notes *notes, buffer *b, problem *why) {
-    const scene *s = in->scene;
-    answer_shape shape = {.n = s->n,
-                          .n_channels = s->n_channels,
-                          .n_rhs = request->n_rhs,
-                          .batch = request->batch,
-                          .n_values = request->select ? request->n_selected : s->n};
-    pass_memory memory = {0};
-    if (!get_pass_memory(in, request->n_rhs < PASS ? request->n_rhs : PASS, request->sky.values != NULL,
-                         &memory, why) ||
-        !answer_begin(b, &shape, &in->accept, notes, why))
-        return false;
-    for (size_t first = 0; first < request->n_rhs; first += PASS) {
-        size_t count = request->n_rhs - first < PASS ? request->n_rhs - first : PASS;
-        double start = now_ms();
-        const bool good = s->n_emitters > 0 ? solve_emitters(s, request, first, count, &memory, why)
-                                            : solve_any(s, request, first, count, &memory, why);
-        if (!good) return false;
-        double solved = now_ms();
-        metrics_pass(in->service->metrics, count);
-        notes->solve_ms += solved - start;
-        if (!answer_add(b, &shape, &in->accept, first, count, memory.out, why)) return false;
-        notes->encode_ms += now_ms() - solved;
-    }
-    return answer_end(b, &shape, &in->accept, notes, why);
-}
-
-void post_radiosity(call *in, answer *out) {
+static codec_scene scene_to_read(const call *in) {
     const scene *s = in->scene;
     const config *c = in->service->config;
-    codec_scene about = {.n = s->n,
+    return (codec_scene){.n = s->n,
                          .n_channels = s->n_channels,
                          .groups = &s->groups,
                          .n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0,
@@ -130,25 +50,167 @@ void post_radiosity(call *in, answer *out) {
                          .max_batch = c->max_batch,
                          .max_bytes =
                              4 * c->max_body > LEAST_EMISSION_LIMIT ? 4 * c->max_body : LEAST_EMISSION_LIMIT};
-    answer_notes notes = {.scene = s->name,
-                          .has_error = s->has_error,
-                          .relative_mean = s->relative_mean,
-                          .indirect_mean = s->indirect_mean};
-    radiosity_request request = {0};
+}
+
+/* [n_rhs][C][width] floats, not cleared; NULL when memory is short. */
+static float *allocate_rows(const radiosity_solve *s, size_t width) {
+    size_t count;
+    if (!size_multiply(s->shape.n_rhs, s->shape.n_channels, &count) || !size_multiply(count, width, &count) ||
+        !size_multiply(count, sizeof(float), &count))
+        return NULL;
+    return malloc(count > 0 ? count : 1);
+}
+
+/* What the sky gives, or the weights of the store's emitters that an emission stands for. */
+static bool find_light(const scene *s, radiosity_solve *solve, problem *why) {
+    const radiosity_request *request = &solve->request;
+    const size_t C = s->n_channels, n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
+    lam_error error;
+    if (s->n_emitters == 0) {
+        if (request->sky.values == NULL) return true;
+        solve->H0 = allocate_rows(solve, s->n);
+        if (solve->H0 == NULL)
+            return problem_set(why, 503, "not enough memory for %zu skies", request->n_rhs);
+        lam_sky_irradiance(s->sky, request->n_rhs * C, request->sky.values, solve->H0);
+        return true;
+    }
+    solve->W = allocate_rows(solve, s->n_emitters);
+    if (solve->W == NULL)
+        return problem_set(why, 503, "not enough memory for the weights of %zu vectors", request->n_rhs);
+    const lam_status status = lam_operator_weights(s->op, request->n_rhs, request->E, n_tiles,
+                                                   request->sky.values, solve->W, &error);
+    if (status != LAM_OK) return problem_set(why, status == LAM_ERR_MEMORY ? 503 : 422, "%s", error.message);
+    for (size_t k = 0; request->emitters.values != NULL && k < request->n_rhs * C * s->n_emitters; k++)
+        solve->W[k] += request->emitters.values[k];
+    return true;
+}
+
+/* Room for the answer's values, where possible where they are sent from. */
+static bool find_room(call *in, radiosity_solve *s, problem *why) {
+    if (!answer_begin(&s->answer, &s->shape, &in->accept, &s->notes, why)) return false;
+    s->out = answer_place(&s->answer, &s->shape, &in->accept);
+    if (s->out == NULL) s->out = s->own = allocate_rows(s, s->shape.n_values);
+    return s->out != NULL || problem_set(why, 503, "not enough memory to solve %zu vectors", s->shape.n_rhs);
+}
+
+static bool begin(call *in, answer *out) {
+    const scene *of = in->scene;
+    const codec_scene about = scene_to_read(in);
     problem why = {0};
-    buffer b = {0};
-    double start = now_ms();
-    bool good = in->body_type == MEDIA_NPY ? codec_read_npy(&about, in->body, in->length, &request, &why)
-                                           : codec_read_json(&about, in->body, in->length, &request, &why);
-    notes.parse_ms = now_ms() - start;
-    notes.quantity = request.quantity;
-    in->n_rhs = request.n_rhs;
-    if (good && solve(in, &request, &notes, &b, &why)) {
-        answer_json(out, &b, true);
+    radiosity_solve *s = calloc(1, sizeof *s);
+    if (s == NULL) {
+        answer_refuse(out, 503, "not enough memory for the request");
+        return false;
+    }
+    const double start = now_ms();
+    bool good = in->body_type == MEDIA_NPY ? codec_read_npy(&about, in->body, in->length, &s->request, &why)
+                                           : codec_read_json(&about, in->body, in->length, &s->request, &why);
+    const radiosity_request *request = &s->request;
+    s->notes = (answer_notes){.scene = of->name,
+                              .quantity = request->quantity,
+                              .has_error = of->has_error,
+                              .relative_mean = of->relative_mean,
+                              .indirect_mean = of->indirect_mean,
+                              .parse_ms = now_ms() - start};
+    s->shape = (answer_shape){.n = of->n,
+                              .n_channels = of->n_channels,
+                              .n_rhs = request->n_rhs,
+                              .batch = request->batch,
+                              .n_values = request->select ? request->n_selected : of->n};
+    in->n_rhs = request->n_rhs;
+    good = good && find_light(of, s, &why) && find_room(in, s, &why);
+    if (!good) {
+        answer_problem(out, &why);
+        solve_free(s);
+        return false;
+    }
+    in->state = s;
+    in->job.n_vectors = request->n_rhs;
+    /* Whole answers share passes; those of some elements, and of emitters, have passes of their own. */
+    in->job.key = request->select || of->n_emitters > 0 ? (const void *)in : of->op;
+    return true;
+}
+
+/* The work area of a pass; NULL, and why, when memory is short. */
+static void *get_work(const scene *s, size_t n_rhs, batch_workspace *workspace, size_t *bytes, problem *why) {
+    *bytes = lam_operator_work_bytes(s->op, n_rhs);
+    void *work = *bytes > 0 ? batch_workspace_get(workspace, *bytes) : NULL;
+    if (work == NULL) problem_set(why, 503, "not enough memory to solve %zu vectors", n_rhs);
+    return work;
+}
+
+static lam_status pass_of_emitters(const scene *s, const radiosity_solve *solve, const batch_part *part,
+                                   float *out, void *work, size_t bytes, lam_error *error) {
+    const radiosity_request *request = &solve->request;
+    return lam_operator_apply_emitters(
+        s->op, part->count, request->quantity, solve->W + part->first * s->n_channels * s->n_emitters,
+        request->n_selected, request->select ? request->selected : NULL, out, work, bytes, error);
+}
+
+static lam_status pass_of_some(const scene *s, const radiosity_solve *solve, const batch_part *part,
+                               float *out, void *work, size_t bytes, lam_error *error) {
+    const radiosity_request *request = &solve->request;
+    const size_t before = part->first * s->n_channels * s->n;
+    return lam_operator_apply_selected(s->op, part->count, request->quantity, request->E + before,
+                                       solve->H0 != NULL ? solve->H0 + before : NULL, request->n_selected,
+                                       request->selected, out, work, bytes, error);
+}
+
+/* The parts are of one scene; several only of whole answers. */
+static void pass(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
+    const call *first = call_of(parts[0].job);
+    const scene *s = first->scene;
+    lam_part shared[BATCH_PASS];
+    lam_error error = {.message = ""};
+    problem why = {0};
+    size_t count = 0, bytes = 0;
+    const double start = now_ms();
+    for (size_t p = 0; p < n_parts; p++) {
+        const radiosity_solve *solve = call_of(parts[p].job)->state;
+        const size_t before = parts[p].first * s->n_channels * s->n;
+        shared[p] = (lam_part){.n_rhs = parts[p].count,
+                               .quantity = solve->request.quantity,
+                               .E = solve->request.E + before,
+                               .H0 = solve->H0 != NULL ? solve->H0 + before : NULL,
+                               .out = solve->out + parts[p].first * s->n_channels * solve->shape.n_values};
+        count += parts[p].count;
+    }
+    const radiosity_solve *one = first->state;
+    void *work = get_work(s, count, workspace, &bytes, &why);
+    if (work != NULL) {
+        const lam_status status =
+            s->n_emitters > 0     ? pass_of_emitters(s, one, parts, shared[0].out, work, bytes, &error)
+            : one->request.select ? pass_of_some(s, one, parts, shared[0].out, work, bytes, &error)
+                                  : lam_operator_apply_parts(s->op, n_parts, shared, work, bytes, &error);
+        if (status != LAM_OK) problem_set(&why, 500, "%s", error.message);
+    }
+    metrics_pass(first->service->metrics, count);
+    const double took = now_ms() - start;
+    for (size_t p = 0; p < n_parts; p++) {
+        radiosity_solve *solve = call_of(parts[p].job)->state;
+        solve->notes.solve_ms += took;
+        if (why.status == 0) continue;
+        solve->failed = true;
+        solve->why = why;
+    }
+}
+
+static void end(call *in, answer *out) {
+    radiosity_solve *s = in->state;
+    const double start = now_ms();
+    bool good = !s->failed && (s->own == NULL ? answer_placed(&s->answer, &s->shape, &s->why)
+                                              : answer_add(&s->answer, &s->shape, &in->accept, 0,
+                                                           s->shape.n_rhs, s->own, &s->why));
+    s->notes.encode_ms = now_ms() - start;
+    good = good && answer_end(&s->answer, &s->shape, &in->accept, &s->notes, &s->why);
+    if (good) {
+        answer_json(out, &s->answer, true);
         if (in->accept.type == MEDIA_NPY) out->type = "application/x-npy";
     } else {
-        answer_problem(out, &why);
+        answer_problem(out, &s->why);
     }
-    buffer_free(&b);
-    radiosity_request_free(&request);
+    in->state = NULL;
+    solve_free(s);
 }
+
+const solve_steps post_radiosity = {begin, pass, end};

@@ -6,18 +6,18 @@
 #include <string.h>
 
 static const route routes[] = {
-    {"GET", "/healthz", get_healthz, BODY_NONE, OPEN},
-    {"GET", "/readyz", get_readyz, BODY_NONE, OPEN},
-    {"GET", "/metrics", get_metrics, BODY_NONE, OPEN},
-    {"GET", "/v1/scenes", get_scenes, BODY_NONE, WITH_TOKEN},
-    {"GET", "/v1/scenes/{name}", get_scene, BODY_NONE, WITH_TOKEN},
-    {"GET", "/v1/scenes/{name}/mesh", not_yet, BODY_NONE, WITH_TOKEN},
-    {"POST", "/v1/scenes/{name}/radiosity", post_radiosity, BODY_OF_SOLVE, WITH_TOKEN},
-    {"POST", "/v1/scenes/{name}/adjoint", not_yet, BODY_NONE, WITH_TOKEN},
-    {"PUT", "/v1/scenes/{name}/reflectance", not_yet, BODY_NONE, WITH_TOKEN},
-    {"DELETE", "/v1/scenes/{name}/reflectance", not_yet, BODY_NONE, WITH_TOKEN},
-    {"GET", "/v1/openapi.json", not_yet, BODY_NONE, WITH_TOKEN},
-    {"GET", "/", not_yet, BODY_NONE, OPEN},
+    {"GET", "/healthz", get_healthz, NULL, BODY_NONE, OPEN},
+    {"GET", "/readyz", get_readyz, NULL, BODY_NONE, OPEN},
+    {"GET", "/metrics", get_metrics, NULL, BODY_NONE, OPEN},
+    {"GET", "/v1/scenes", get_scenes, NULL, BODY_NONE, WITH_TOKEN},
+    {"GET", "/v1/scenes/{name}", get_scene, NULL, BODY_NONE, WITH_TOKEN},
+    {"GET", "/v1/scenes/{name}/mesh", not_yet, NULL, BODY_NONE, WITH_TOKEN},
+    {"POST", "/v1/scenes/{name}/radiosity", NULL, &post_radiosity, BODY_OF_SOLVE, WITH_TOKEN},
+    {"POST", "/v1/scenes/{name}/adjoint", not_yet, NULL, BODY_NONE, WITH_TOKEN},
+    {"PUT", "/v1/scenes/{name}/reflectance", not_yet, NULL, BODY_NONE, WITH_TOKEN},
+    {"DELETE", "/v1/scenes/{name}/reflectance", not_yet, NULL, BODY_NONE, WITH_TOKEN},
+    {"GET", "/v1/openapi.json", not_yet, NULL, BODY_NONE, WITH_TOKEN},
+    {"GET", "/", not_yet, NULL, BODY_NONE, OPEN},
 };
 #define N_ROUTES (sizeof routes / sizeof routes[0])
 

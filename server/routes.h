@@ -8,6 +8,7 @@
 
 /* A request that has passed its checks and whose body is there. */
 typedef struct call {
+    batch_job job; /* of a solving route */
     const service *service;
     const catalog_snapshot *snapshot;
     const scene *scene; /* of a route with {name} */
@@ -16,6 +17,7 @@ typedef struct call {
     const char *body; /* body[length] is NUL */
     size_t length;
     batch_workspace *workspace; /* of a solving route */
+    void *state;                /* of a route that solves in steps: its own, from begin to end */
     size_t n_rhs;               /* set by the handler, for the log */
 } call;
 
@@ -30,10 +32,24 @@ typedef struct answer {
 
 typedef void route_handler(call *in, answer *out);
 
+/* A solve that shares passes over an operator with those of other clients (server/batch.h). begin sets the
+ * job's key and n_vectors, or makes the answer, a problem as a rule, and returns false. */
+typedef struct solve_steps {
+    bool (*begin)(call *in, answer *out);
+    void (*pass)(const batch_part *parts, size_t n_parts, batch_workspace *workspace);
+    void (*end)(call *in, answer *out);
+} solve_steps;
+
+/* Whose job it is. */
+static inline call *call_of(batch_job *job) {
+    return (call *)(void *)job;
+}
+
 typedef struct route {
     const char *method;
     const char *pattern;
-    route_handler *handle;
+    route_handler *handle;    /* NULL: */
+    const solve_steps *steps; /* of a solve only */
     enum {
         BODY_NONE,
         BODY_OF_SOLVE
@@ -67,6 +83,7 @@ void answer_refuse(answer *out, unsigned status, const char *format, ...)
 /* Gives JSON back that is in b (taken over), or 503 when it could not be written. */
 void answer_json(answer *out, buffer *b, bool written);
 
-route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, post_radiosity, not_yet;
+route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, not_yet;
+extern const solve_steps post_radiosity;
 
 #endif

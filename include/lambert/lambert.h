@@ -88,6 +88,20 @@ lam_status lam_operator_apply_selected(const lam_operator *op, size_t n_rhs, lam
                                        const uint32_t *selected, float *out, void *work, size_t work_bytes,
                                        lam_error *error);
 
+/* What one caller wants of a pass shared with others: as the arguments of lam_operator_apply_lit. */
+typedef struct lam_part {
+    size_t n_rhs;
+    lam_quantity quantity;
+    const float *E, *H0;
+    float *out;
+} lam_part;
+
+/* lam_operator_apply_lit for several callers at once, whose vectors share passes over the operator: each gets
+ * the bits that it would get alone. work_bytes is at least what lam_operator_work_bytes says of all their
+ * vectors together. Errors: LAM_ERR_ARGUMENT; then nobody gets anything. */
+lam_status lam_operator_apply_parts(const lam_operator *op, size_t n_parts, const lam_part *parts, void *work,
+                                    size_t work_bytes, lam_error *error);
+
 /* How many emitters a store of few emitters answers for; 0 of any other operator, which answers any emission.
  * Where it is not 0 the four functions above and below end in LAM_ERR_ARGUMENT, and these take their place.
  */

@@ -323,6 +323,51 @@ START_TEST(selected_elements_have_the_same_bits) {
 }
 END_TEST
 
+/* Callers who share passes, some of which begin and end within a caller's vectors, each with a quantity of
+ * its own, under a sky or not. */
+START_TEST(callers_who_share_passes_get_their_own_bits) {
+    static const size_t counts[] = {1, 3, 20, 0, 2, 7};
+    enum { CALLERS = sizeof counts / sizeof *counts, VECTORS = 33 };
+    const transport *t = transport_kept(_i);
+    const size_t size = vector_size(t), work_bytes = lam_operator_work_bytes(t->op, VECTORS);
+    float *E = random_vectors(VECTORS * size, 15), *H0 = random_vectors(VECTORS * size, 16);
+    float *shared = test_allocate(VECTORS * size, sizeof *shared);
+    float *alone = test_allocate(VECTORS * size, sizeof *alone);
+    void *work = malloc(work_bytes);
+    lam_part parts[CALLERS];
+    lam_error error = {.message = ""};
+    size_t first = 0;
+    for (size_t i = 0; i < VECTORS * size; i++) shared[i] = NAN;
+    for (size_t k = 0; k < CALLERS; first += counts[k++]) {
+        parts[k] = (lam_part){.n_rhs = counts[k],
+                              .quantity = quantities[k % QUANTITIES],
+                              .E = E + first * size,
+                              .H0 = k % 2 == 1 ? H0 + first * size : NULL,
+                              .out = shared + first * size};
+        ck_assert(lam_operator_apply_lit(t->op, counts[k], parts[k].quantity, parts[k].E, parts[k].H0,
+                                         alone + first * size, work, work_bytes, &error) == LAM_OK);
+    }
+    ck_assert_uint_eq(first, VECTORS);
+    memset(work, 0xff, work_bytes);
+    ck_assert_msg(lam_operator_apply_parts(t->op, CALLERS, parts, work, work_bytes, &error) == LAM_OK, "%s",
+                  error.message);
+    ck_assert_mem_eq(shared, alone, VECTORS * size * sizeof *shared);
+    /* One of them wrong: nobody gets anything. */
+    parts[2].quantity = (lam_quantity)7;
+    for (size_t i = 0; i < VECTORS * size; i++) shared[i] = NAN;
+    ck_assert(lam_operator_apply_parts(t->op, CALLERS, parts, work, work_bytes, &error) == LAM_ERR_ARGUMENT);
+    for (size_t i = 0; i < VECTORS * size; i++) ck_each(isnan(shared[i]));
+    parts[2].quantity = LAM_RADIOSITY;
+    ck_assert(lam_operator_apply_parts(t->op, CALLERS, parts, work, lam_operator_work_bytes(t->op, 3),
+                                       &error) == LAM_ERR_ARGUMENT);
+    free(E);
+    free(H0);
+    free(shared);
+    free(alone);
+    free(work);
+}
+END_TEST
+
 /* --- the work area and other arguments ----------------------------------------------------------------- */
 
 START_TEST(work_area_is_not_overrun) {
@@ -452,6 +497,7 @@ int main(void) {
     tcase_add_loop_test(tests, bits_do_not_depend_on_the_batch, 0, TRANSPORTS);
     tcase_add_loop_test(tests, eight_threads_give_the_same_bits, 0, TRANSPORTS);
     tcase_add_loop_test(tests, selected_elements_have_the_same_bits, 0, TRANSPORTS);
+    tcase_add_loop_test(tests, callers_who_share_passes_get_their_own_bits, 0, TRANSPORTS);
     tcase_add_loop_test(tests, work_area_is_not_overrun, 0, TRANSPORTS);
     tcase_add_loop_test(tests, bad_arguments_are_refused, 0, TRANSPORTS);
     tcase_add_loop_test(tests, says_what_it_is, 0, TRANSPORTS);

@@ -1,0 +1,300 @@
+/* What the public functions do around a kind's product: check what is asked, cut it into passes, and lead
+ * from emission in mesh order to the quantity asked for and back. */
+#include "solver/operator/operator.h"
+
+#include <stdint.h>
+
+/* A pass needs the caller's vectors in position order and side by side (the adjoint: g pulled back through
+ * the quantity), the answer before it is put into mesh order or handed out, and what the kind needs. */
+static size_t pass_bytes(const lam_operator *op, size_t n_rhs, size_t *vectors_bytes) {
+    size_t count, vectors, kind_bytes = op->kind->work_bytes(op, n_rhs), total = PANEL_ALIGN;
+    if (kind_bytes == 0 || !size_multiply(n_rhs, op->n_channels, &count) ||
+        !size_multiply(count, op->n, &count) || !size_multiply(count, sizeof(float), &vectors) ||
+        !work_add(&total, vectors) || !work_add(&total, vectors) || !work_add(&total, kind_bytes))
+        return 0;
+    if (vectors_bytes != NULL) *vectors_bytes = vectors;
+    return total;
+}
+
+size_t lam_operator_work_bytes(const lam_operator *op, size_t n_rhs) {
+    return pass_bytes(op, n_rhs < OPERATOR_PASS ? n_rhs : OPERATOR_PASS, NULL);
+}
+
+static bool overlap(const void *a, size_t a_bytes, const void *b, size_t b_bytes) {
+    uintptr_t first = (uintptr_t)a, second = (uintptr_t)b;
+    return first < second ? second - first < a_bytes : first - second < b_bytes;
+}
+
+/* n_out: numbers of out in a vector and a channel. */
+static lam_status check_apply(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *in,
+                              size_t n_out, const float *out, const void *work, size_t work_bytes,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t bytes, out_bytes;
+    if (op == NULL || in == NULL || out == NULL || work == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "an operator, its input, its output and a work area are needed, one is NULL");
+    if (op->kind->apply == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "an operator of kind %s answers for its own emitters only",
+             op->kind->name);
+    if (quantity != LAM_RADIOSITY && quantity != LAM_IRRADIANCE && quantity != LAM_INDIRECT)
+        FAIL(error, LAM_ERR_ARGUMENT, "there is no quantity %d", (int)quantity);
+    if (!size_multiply(n_rhs, op->n_channels, &bytes) || !size_multiply(bytes, op->n, &bytes) ||
+        !size_multiply(bytes, sizeof(float), &bytes))
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "n_rhs = %zu vectors of %zu x %zu numbers are more than memory can have", n_rhs, op->n_channels,
+             op->n);
+    if (!size_multiply(bytes / op->n, n_out, &out_bytes))
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "n_rhs = %zu vectors of %zu x %zu numbers are more than memory can have", n_rhs, op->n_channels,
+             n_out);
+    size_t needed = lam_operator_work_bytes(op, n_rhs);
+    if (needed == 0 || work_bytes < needed)
+        FAIL(error, LAM_ERR_ARGUMENT, "work area of %zu bytes, %zu are needed for n_rhs = %zu", work_bytes,
+             needed, n_rhs);
+    if ((uintptr_t)work % _Alignof(max_align_t) != 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "work area is not aligned to %zu bytes", _Alignof(max_align_t));
+    if (overlap(in, bytes, out, out_bytes) || overlap(in, bytes, work, work_bytes) ||
+        overlap(out, out_bytes, work, work_bytes))
+        FAIL(error, LAM_ERR_ARGUMENT, "input, output and work area overlap");
+done:
+    return status;
+}
+
+static void *align_work(void *work) {
+    return (char *)work + (PANEL_ALIGN - (uintptr_t)work % PANEL_ALIGN) % PANEL_ALIGN;
+}
+
+/* Rows shorter than this are finished by one thread. */
+#define THREADS_WORTH 65536
+
+/* One element of the quantity: from E' = E + rho H0, P and H0. */
+static inline float finish(lam_quantity quantity, float rho, float lit, float P, float H0) {
+    switch (quantity) {
+    case LAM_RADIOSITY: /* B = E' + P */
+        return rho > 0.0f ? lit + P : lit;
+    case LAM_IRRADIANCE: /* H = H0 + P / rho' */
+        return (rho > 0.0f ? P / rho : P) + H0;
+    case LAM_INDIRECT: /* B - E' */
+        return rho > 0.0f ? P : 0.0f;
+    }
+    return 0.0f;
+}
+
+/* One row of out (mesh order) from the same row of E' and of P (position order) and of H0 (mesh order, NULL:
+ * 0). out may be P when there is no order. */
+static void finish_row(const lam_operator *op, size_t c, lam_quantity quantity, const float *lit,
+                       const float *H0, const float *P, float *out) {
+    const float *rho = op->reflectance + c * op->n;
+#pragma omp parallel for schedule(static)                                                                    \
+    num_threads((int)op->n_threads) if (op->n_threads > 1 && op->n >= THREADS_WORTH)
+    for (size_t p = 0; p < op->n; p++) {
+        const size_t i = op->order != NULL ? op->order[p] : p;
+        out[i] = finish(quantity, rho[i], lit[p], P[p], H0 != NULL ? H0[i] : 0.0f);
+    }
+}
+
+/* The same for some elements: P holds theirs, or (by_position) all. out may be P when it holds theirs. */
+static void finish_selected(const lam_operator *op, size_t c, lam_quantity quantity, const float *lit,
+                            const float *H0, size_t n_selected, const uint32_t *selected, bool by_position,
+                            const float *P, float *out) {
+    const float *rho = op->reflectance + c * op->n;
+    for (size_t r = 0; r < n_selected; r++) {
+        const size_t i = selected[r], p = operator_position(op, i);
+        out[r] = finish(quantity, rho[i], lit[p], P[by_position ? p : r], H0 != NULL ? H0[i] : 0.0f);
+    }
+}
+
+/* One row of E' = E + rho H0, from mesh order into position order. */
+static void light_row(const lam_operator *op, size_t c, const float *E, const float *H0, float *lit) {
+    const float *rho = op->reflectance + c * op->n;
+#pragma omp parallel for schedule(static)                                                                    \
+    num_threads((int)op->n_threads) if (op->n_threads > 1 && op->n >= THREADS_WORTH)
+    for (size_t p = 0; p < op->n; p++) {
+        const size_t i = op->order != NULL ? op->order[p] : p;
+        lit[p] = H0 != NULL ? E[i] + rho[i] * H0[i] : E[i];
+    }
+}
+
+/* What one pass takes in, for all of out or (selected not NULL) some elements. */
+typedef struct pass {
+    const float *E, *H0;
+    size_t count, n_selected;
+    const uint32_t *selected;
+    lam_quantity quantity;
+} pass;
+
+static void apply_pass(const lam_operator *op, const pass *in, float *out, void *work) {
+    const size_t n = op->n, rows = in->count * op->n_channels, row_bytes = n * sizeof(float);
+    const bool choose = in->selected != NULL && op->kind->apply_selected != NULL;
+    const bool apart = in->selected != NULL ? !choose : op->order != NULL;
+    const float *lit = in->E;
+    float *P = out;
+    void *rest = align_work(work);
+    if (op->order != NULL || in->H0 != NULL) {
+        float *positions = work_take(&rest, rows * row_bytes);
+        for (size_t row = 0; row < rows; row++)
+            light_row(op, row % op->n_channels, in->E + row * n, in->H0 != NULL ? in->H0 + row * n : NULL,
+                      positions + row * n);
+        lit = positions;
+    }
+    if (apart) P = work_take(&rest, rows * row_bytes);
+    if (choose)
+        op->kind->apply_selected(op, in->count, lit, in->n_selected, in->selected, P, rest);
+    else
+        op->kind->apply(op, in->count, lit, P, rest);
+    for (size_t row = 0; row < rows; row++) {
+        const float *H0 = in->H0 != NULL ? in->H0 + row * n : NULL;
+        const size_t c = row % op->n_channels;
+        if (in->selected == NULL)
+            finish_row(op, c, in->quantity, lit + row * n, H0, P + row * n, out + row * n);
+        else
+            finish_selected(op, c, in->quantity, lit + row * n, H0, in->n_selected, in->selected, !choose,
+                            P + row * (choose ? in->n_selected : n), out + row * in->n_selected);
+    }
+}
+
+static void apply_passes(const lam_operator *op, size_t n_rhs, const pass *all, float *out, void *work) {
+    const size_t in_size = op->n_channels * op->n;
+    const size_t out_size = all->selected != NULL ? op->n_channels * all->n_selected : in_size;
+    for (size_t r = 0; r < n_rhs; r += OPERATOR_PASS) {
+        pass one = *all;
+        one.count = n_rhs - r < OPERATOR_PASS ? n_rhs - r : OPERATOR_PASS;
+        one.E += r * in_size;
+        if (one.H0 != NULL) one.H0 += r * in_size;
+        apply_pass(op, &one, out + r * out_size, work);
+    }
+}
+
+lam_status lam_operator_apply(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
+                              float *out, void *work, size_t work_bytes, lam_error *error) {
+    return lam_operator_apply_lit(op, n_rhs, quantity, E, NULL, out, work, work_bytes, error);
+}
+
+lam_status lam_operator_apply_lit(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
+                                  const float *H0, float *out, void *work, size_t work_bytes,
+                                  lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = op != NULL ? op->n : 0;
+    TRY(check_apply(op, n_rhs, quantity, E, n, out, work, work_bytes, error));
+    if (H0 != NULL) TRY(check_apply(op, n_rhs, quantity, H0, n, out, work, work_bytes, error));
+    apply_passes(op, n_rhs, &(pass){.E = E, .H0 = H0, .quantity = quantity}, out, work);
+done:
+    return status;
+}
+
+/* The vectors of one pass, first ... first + count of all the parts': gathered, computed, handed out. */
+static void share_pass(const lam_operator *op, size_t n_parts, const lam_part *parts, size_t first,
+                       size_t count, void *work) {
+    const size_t n = op->n, C = op->n_channels, rows = count * C;
+    void *rest = align_work(work);
+    float *lit = work_take(&rest, rows * n * sizeof *lit), *P = work_take(&rest, rows * n * sizeof *P);
+    for (int handing_out = 0; handing_out < 2; handing_out++) {
+        size_t before = 0, done_rows = 0; /* vectors of the parts before; rows of this pass */
+        for (size_t k = 0; k < n_parts; before += parts[k++].n_rhs) {
+            const lam_part *part = &parts[k];
+            const size_t begin = first > before ? first - before : 0;
+            for (size_t v = begin; v < part->n_rhs && done_rows < rows; v++)
+                for (size_t c = 0; c < C; c++, done_rows++) {
+                    const size_t row = v * C + c;
+                    const float *H0 = part->H0 != NULL ? part->H0 + row * n : NULL;
+                    float *lit_row = lit + done_rows * n;
+                    if (handing_out)
+                        finish_row(op, c, part->quantity, lit_row, H0, P + done_rows * n,
+                                   part->out + row * n);
+                    else
+                        light_row(op, c, part->E + row * n, H0, lit_row);
+                }
+        }
+        if (!handing_out) op->kind->apply(op, count, lit, P, rest);
+    }
+}
+
+lam_status lam_operator_apply_parts(const lam_operator *op, size_t n_parts, const lam_part *parts, void *work,
+                                    size_t work_bytes, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t total = 0;
+    for (size_t k = 0; k < n_parts; k++) {
+        const lam_part *part = &parts[k];
+        const size_t n = op != NULL ? op->n : 0;
+        TRY(check_apply(op, part->n_rhs, part->quantity, part->E, n, part->out, work, work_bytes, error));
+        if (part->H0 != NULL)
+            TRY(check_apply(op, part->n_rhs, part->quantity, part->H0, n, part->out, work, work_bytes,
+                            error));
+        if (__builtin_add_overflow(total, part->n_rhs, &total))
+            FAIL(error, LAM_ERR_ARGUMENT, "%zu parts have more vectors than memory can", n_parts);
+    }
+    if (n_parts == 1) {
+        const lam_part *part = parts;
+        return lam_operator_apply_lit(op, part->n_rhs, part->quantity, part->E, part->H0, part->out, work,
+                                      work_bytes, error);
+    }
+    if (n_parts > 0 && work_bytes < lam_operator_work_bytes(op, total))
+        FAIL(error, LAM_ERR_ARGUMENT, "work area of %zu bytes, %zu are needed for %zu vectors", work_bytes,
+             lam_operator_work_bytes(op, total), total);
+    for (size_t first = 0; first < total; first += OPERATOR_PASS)
+        share_pass(op, n_parts, parts, first, total - first < OPERATOR_PASS ? total - first : OPERATOR_PASS,
+                   work);
+done:
+    return status;
+}
+
+lam_status lam_operator_apply_selected(const lam_operator *op, size_t n_rhs, lam_quantity quantity,
+                                       const float *E, const float *H0, size_t n_selected,
+                                       const uint32_t *selected, float *out, void *work, size_t work_bytes,
+                                       lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(check_apply(op, n_rhs, quantity, E, n_selected, out, work, work_bytes, error));
+    if (H0 != NULL) TRY(check_apply(op, n_rhs, quantity, H0, n_selected, out, work, work_bytes, error));
+    if (selected == NULL) FAIL(error, LAM_ERR_ARGUMENT, "a list of the elements selected is needed");
+    for (size_t r = 0; r < n_selected; r++)
+        if (selected[r] >= op->n)
+            FAIL(error, LAM_ERR_ARGUMENT, "selected[%zu] = %u, must be below %zu", r, (unsigned)selected[r],
+                 op->n);
+    apply_passes(
+        op, n_rhs,
+        &(pass){.E = E, .H0 = H0, .quantity = quantity, .n_selected = n_selected, .selected = selected}, out,
+        work);
+done:
+    return status;
+}
+
+/* One row of g (mesh order) pulled back through the quantity, into position order: what P^T takes. */
+static void pull_back_row(const lam_operator *op, size_t c, lam_quantity quantity, const float *g,
+                          float *pulled) {
+    const float *rho = op->reflectance + c * op->n;
+    for (size_t p = 0; p < op->n; p++) {
+        size_t i = op->order != NULL ? op->order[p] : p;
+        if (quantity == LAM_IRRADIANCE)
+            pulled[p] = rho[i] > 0.0f ? g[i] / rho[i] : g[i];
+        else
+            pulled[p] = rho[i] > 0.0f ? g[i] : 0.0f;
+    }
+}
+
+lam_status lam_operator_apply_adjoint(const lam_operator *op, size_t n_rhs, lam_quantity quantity,
+                                      const float *g, float *w, void *work, size_t work_bytes,
+                                      lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(check_apply(op, n_rhs, quantity, g, op != NULL ? op->n : 0, w, work, work_bytes, error));
+    size_t n = op->n, row_bytes = n * sizeof(float);
+    for (size_t r = 0; r < n_rhs; r += OPERATOR_PASS) {
+        size_t count = n_rhs - r < OPERATOR_PASS ? n_rhs - r : OPERATOR_PASS, rows = count * op->n_channels;
+        const float *g_pass = g + r * op->n_channels * n;
+        float *w_pass = w + r * op->n_channels * n, *transposed = w_pass;
+        void *rest = align_work(work);
+        float *pulled = work_take(&rest, rows * row_bytes);
+        if (op->order != NULL) transposed = work_take(&rest, rows * row_bytes);
+        for (size_t row = 0; row < rows; row++)
+            pull_back_row(op, row % op->n_channels, quantity, g_pass + row * n, pulled + row * n);
+        op->kind->apply_adjoint(op, count, pulled, transposed, rest);
+        for (size_t row = 0; row < rows; row++)
+            for (size_t p = 0; p < n; p++) {
+                size_t i = row * n + (op->order != NULL ? op->order[p] : p);
+                float direct = quantity == LAM_RADIOSITY ? g_pass[i] : 0.0f;
+                w_pass[i] = direct + transposed[row * n + p];
+            }
+    }
+done:
+    return status;
+}
