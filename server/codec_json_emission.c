@@ -30,8 +30,8 @@ static inline bool read_value(parser *p, float *value) {
 
 /* Inside an array that was entered: count values, then its end. */
 static bool read_rest_of_row(parser *p, float *row, size_t count, const char *of_what) {
-    size_t i = 0;
-    for (; json_next_element(&p->r); i++) {
+    size_t i = json_read_plain_floats(&p->r, row, count);
+    for (; json_next_element(&p->r); i++, i += json_read_plain_floats(&p->r, row + i, count - i)) {
         if (i == count)
             return parser_refuse(p, 422, "%s holds more than %zu values, one for each %s", parser_here(p),
                                  count, of_what);

@@ -1,5 +1,6 @@
 #include "server/codec_json_reader.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -363,6 +364,84 @@ bool json_read_float(json_reader *r, float *value) {
     }
     *value = strtof(r->number.bytes, NULL);
     return true;
+}
+
+/* 10^-22 ... 10^22, of which those below 1 are rounded. */
+static const double rounded_power[] = {
+    1e-22, 1e-21, 1e-20, 1e-19, 1e-18, 1e-17, 1e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8,
+    1e-7,  1e-6,  1e-5,  1e-4,  1e-3,  1e-2,  1e-1,  1e0,   1e1,   1e2,   1e3,   1e4,   1e5,   1e6,  1e7,
+    1e8,   1e9,   1e10,  1e11,  1e12,  1e13,  1e14,  1e15,  1e16,  1e17,  1e18,  1e19,  1e20,  1e21, 1e22};
+_Static_assert(sizeof rounded_power / sizeof *rounded_power == 2 * EXACT_POWERS + 1, "one each");
+
+/* Whether these are eight digits, and their value: pairs of digits, then of pairs, then of those are put
+ * together, all at once in one word. */
+static inline bool eight_digits(const char *at, uint64_t *value) {
+    uint64_t v;
+    memcpy(&v, at, sizeof v);
+    const uint64_t high = 0xF0F0F0F0F0F0F0F0u, zeros = 0x3030303030303030u;
+    if ((v & high) != zeros || ((v + 0x0606060606060606u) & high) != zeros) return false;
+    v = ((v & 0x0F0F0F0F0F0F0F0Fu) * (10 * 256 + 1)) >> 8;
+    v = ((v & 0x00FF00FF00FF00FFu) * (100 * 65536 + 1)) >> 16;
+    *value = ((v & 0x0000FFFF0000FFFFu) * (10000 * (UINT64_C(1) << 32) + 1)) >> 32;
+    return true;
+}
+
+/* A number that is not negative, of at most 18 digits and with an exponent of two at most; NULL for any
+ * other, and for what is none. Else where it ends. */
+static inline const char *read_plain(const char *at, const char *end, float *value) {
+    uint64_t digits = 0, eight;
+    long exponent = 0;
+    const char *begin = at;
+    if (*at == '0' && is_digit(at[1])) return NULL;
+    for (; is_digit(*at); at++) digits = digits * 10 + (uint64_t)(*at - '0');
+    long n_digits = at - begin;
+    if (n_digits == 0 || n_digits > 18) return NULL;
+    if (*at == '.') {
+        const char *point = ++at;
+        if (end - at >= 8 && n_digits <= 10 && eight_digits(at, &eight)) {
+            digits = digits * 100000000 + eight;
+            at += 8;
+        }
+        for (; is_digit(*at); at++) digits = digits * 10 + (uint64_t)(*at - '0');
+        exponent = point - at;
+        n_digits -= exponent;
+        if (exponent == 0 || n_digits > 18) return NULL;
+    }
+    if (*at == 'e' || *at == 'E') {
+        at++;
+        const bool minus = *at == '-';
+        if (*at == '-' || *at == '+') at++;
+        if (!is_digit(*at)) return NULL;
+        long written = *at++ - '0';
+        if (is_digit(*at)) written = written * 10 + (*at++ - '0');
+        if (is_digit(*at)) return NULL;
+        exponent += minus ? -written : written;
+    }
+    if (exponent < -EXACT_POWERS || exponent > EXACT_POWERS) return NULL;
+    /* Off by less than 4 units of 2^-53, one for each of digits, power and product; as in json_read_float. */
+    const double near = (double)digits * rounded_power[exponent + EXACT_POWERS];
+    const float low = (float)(near * (1.0 - 0x1p-50)), high = (float)(near * (1.0 + 0x1p-50));
+    if (low != high || !(low <= FLT_MAX)) return NULL;
+    *value = low;
+    return at;
+}
+
+size_t json_read_plain_floats(json_reader *r, float *values, size_t most) {
+    size_t count = 0;
+    if (r->fault != NULL) return 0;
+    for (; count < most; count++) {
+        const char *at = r->at;
+        if (!r->first) {
+            if (*at != ',') break;
+            at++;
+        }
+        while (*at == ' ' || *at == '\n' || *at == '\r' || *at == '\t') at++;
+        at = read_plain(at, r->end, &values[count]);
+        if (at == NULL) break;
+        r->at = at;
+        r->first = false;
+    }
+    return count;
 }
 
 /* --- the rest --------------------------------------------------------------------------------------- */

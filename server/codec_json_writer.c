@@ -61,11 +61,11 @@ static inline void shortest_digits(float value, uint32_t *digits, int *exponent)
     double scale = power_of_ten(s);
     double y = x * scale, gap = half_gap * scale - 1e-4;
 
-    uint64_t best = (uint64_t)(y + 0.5);
+    int64_t best = (int64_t)(y + 0.5); /* signed: what a CPU converts at once */
     int dropped = 0;
-    uint64_t unit = 10;
+    int64_t unit = 10;
     for (int k = 1; k <= 9; k++, unit *= 10) {
-        uint64_t rounded = (uint64_t)(y * power_of_ten(-k) + 0.5);
+        const int64_t rounded = (int64_t)(y * power_of_ten(-k) + 0.5);
         if (rounded == 0 || !(fabs((double)(rounded * unit) - y) < gap)) break;
         best = rounded;
         dropped = k;
@@ -74,57 +74,82 @@ static inline void shortest_digits(float value, uint32_t *digits, int *exponent)
     *exponent = dropped - s;
 }
 
-static size_t write_unsigned(char *to, uint32_t value) {
-    char reversed[10];
-    size_t count = 0;
-    do {
-        reversed[count++] = (char)('0' + value % 10);
-        value /= 10;
-    } while (value > 0);
-    for (size_t i = 0; i < count; i++) to[i] = reversed[count - 1 - i];
-    return count;
+/* Eight digits of a value below 10^8, with zeros in front, the first in the lowest byte: halves, quarters,
+ * then single digits of it side by side in one word. 10486 / 2^20 and 103 / 2^10 round down as 1/100 and 1/10
+ * do, below 10^4 and below 100. */
+static inline uint64_t eight_digits(uint32_t value) {
+    uint64_t v = value / 10000 | (uint64_t)(value % 10000) << 32;
+    uint64_t tens = (v * 10486 >> 20) & 0x0000007F0000007Fu;
+    v = tens | (v - 100 * tens) << 16;
+    tens = (v * 103 >> 10) & 0x000F000F000F000Fu;
+    return (tens | (v - 10 * tens) << 8) | 0x3030303030303030u;
+}
+
+/* The digits of a value below 10^9: count of them, the first 8 (or all) in word, the last of 9 in ninth. */
+typedef struct digits {
+    uint64_t word;
+    int count;
+    char ninth;
+} digits;
+
+static inline digits digits_of(uint32_t value) {
+    if (value >= 100000000) return (digits){eight_digits(value / 10), 9, (char)('0' + value % 10)};
+    int count = 1;
+    for (uint32_t power = 10; count < 8 && value >= power; power *= 10) count++;
+    return (digits){eight_digits(value) >> 8 * (8 - count), count, '0'};
+}
+
+/* The digits from the k-th on, k at most 8: whole words are written, also behind the last that counts, and
+ * nothing is read back, for which a CPU would wait. */
+static inline void put_digits(char *at, const digits *d, int k) {
+    const uint64_t rest = k < 8 ? d->word >> 8 * k : 0;
+    memcpy(at, &rest, sizeof rest);
+    at[8 - k] = d->ninth;
 }
 
 size_t json_write_float(char *to, float value) {
     assert(isfinite(value));
-    char *at = to;
     if (value == 0.0f) {
-        *at = '0';
+        *to = '0';
         return 1;
     }
-    if (value < 0.0f) *at++ = '-';
     uint32_t number;
     int exponent;
     shortest_digits(value, &number, &exponent);
-    char digits[10];
-    int count = (int)write_unsigned(digits, number);
-    int point = count + exponent; /* digits before the decimal point */
+    const digits d = digits_of(number);
+    const int count = d.count, point = count + exponent; /* digits before the decimal point */
+    char *at = to;
+    *at = '-';
+    at += value < 0.0f;
 
     if (exponent >= 0 && point <= 9) { /* 1200 */
-        memcpy(at, digits, (size_t)count);
-        memset(at + count, '0', (size_t)exponent);
+        put_digits(at, &d, 0);
+        memset(at + count, '0', 8);
         at += point;
     } else if (point > 0 && point <= 9) { /* 12.34 */
-        memcpy(at, digits, (size_t)point);
+        put_digits(at, &d, 0);
+        put_digits(at + point + 1, &d, point);
         at[point] = '.';
-        memcpy(at + point + 1, digits + point, (size_t)(count - point));
         at += count + 1;
     } else if (point <= 0 && point > -3) { /* 0.0012 */
-        memcpy(at, "0.000", 5);
+        memcpy(at, "0.00000", 8);
         at += 2 - point;
-        memcpy(at, digits, (size_t)count);
+        put_digits(at, &d, 0);
         at += count;
     } else { /* 1.234e-7 */
-        *at++ = digits[0];
+        put_digits(at, &d, 0);
         if (count > 1) {
-            *at++ = '.';
-            memcpy(at, digits + 1, (size_t)(count - 1));
-            at += count - 1;
+            put_digits(at + 2, &d, 1);
+            at[1] = '.';
+            at++;
         }
+        at += count;
         *at++ = 'e';
-        int power = point - 1;
-        if (power < 0) *at++ = '-';
-        at += write_unsigned(at, (uint32_t)abs(power));
+        const int power = point - 1, magnitude = power < 0 ? -power : power;
+        *at = '-';
+        at += power < 0;
+        if (magnitude > 9) *at++ = (char)('0' + magnitude / 10);
+        *at++ = (char)('0' + magnitude % 10);
     }
     assert(at - to <= JSON_FLOAT_MAX);
     return (size_t)(at - to);
@@ -132,7 +157,8 @@ size_t json_write_float(char *to, float value) {
 
 static bool reserve_floats(buffer *b, size_t count) {
     size_t bytes;
-    return !__builtin_mul_overflow(count, (size_t)JSON_FLOAT_MAX + 1, &bytes) && buffer_reserve(b, bytes + 2);
+    return !__builtin_mul_overflow(count, (size_t)JSON_FLOAT_MAX + 1, &bytes) &&
+           buffer_reserve(b, bytes + 2 + JSON_FLOAT_ROOM);
 }
 
 bool json_write_floats(buffer *b, const float *values, size_t count) {

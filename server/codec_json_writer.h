@@ -6,11 +6,13 @@
 
 #include <stdint.h>
 
-/* Longest text of one float. */
+/* Longest text of one float; what it is written in. */
 #define JSON_FLOAT_MAX 16
+#define JSON_FLOAT_ROOM 32
 
 /* Writes the shortest decimal that reads back as the same float (in a few cases per thousand a longer one,
- * never of more than 9 digits) and returns how many characters; value must be finite. No NUL is written. */
+ * never of more than 9 digits) and returns how many characters; value must be finite. No NUL is written; to
+ * has room for the longest. */
 size_t json_write_float(char *to, float value);
 
 /* Appends [v0,v1,...] of finite values; false when memory is short. */

@@ -69,7 +69,7 @@ static int shortest_digits(float value) {
 
 /* Returns by how many digits the text is longer than need be. */
 static int check_round_trip(float value) {
-    char text[JSON_FLOAT_MAX + 1];
+    char text[JSON_FLOAT_ROOM];
     size_t length = json_write_float(text, value);
     ck_assert_uint_le(length, JSON_FLOAT_MAX);
     text[length] = '\0';
@@ -130,7 +130,7 @@ START_TEST(texts_are_plain) {
                  {0.3f, "0.3"},
                  {299792458.0f, "299792450"}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        char text[JSON_FLOAT_MAX + 1];
+        char text[JSON_FLOAT_ROOM];
         text[json_write_float(text, cases[i].value)] = '\0';
         ck_assert_str_eq(text, cases[i].text);
     }
@@ -189,6 +189,102 @@ START_TEST(decimals_are_rounded_right) {
 }
 END_TEST
 
+/* An array read the quick way where that goes and one by one where it does not: every value is the C
+ * library's, and the reader stands where the slow way would. */
+START_TEST(plain_numbers_are_the_same_numbers) {
+    enum { COUNT = 64, ARRAYS = 20000 };
+    static const char *const spaces[] = {"", "", "", " ", "\n  ", "\t"};
+    uint64_t state = 5;
+    size_t quick = 0;
+    for (int a = 0; a < ARRAYS; a++) {
+        char text[COUNT * 64] = "[", number[64];
+        float wanted[COUNT];
+        size_t at = 1;
+        for (int k = 0; k < COUNT; k++) {
+            const uint64_t form = next_random(&state) % 8;
+            const uint32_t bits = (uint32_t)(next_random(&state) % 0x7F7FFFFFu);
+            const double value = (double)from_bits(bits);
+            if (form < 3)
+                snprintf(number, sizeof number, "%.9g", value);
+            else if (form == 3)
+                snprintf(number, sizeof number, "%.*f", (int)(next_random(&state) % 20),
+                         (double)(next_random(&state) % 1000000) / 7);
+            else if (form == 4)
+                snprintf(number, sizeof number, "%.*g", 15 + (int)(next_random(&state) % 12),
+                         (value + (double)from_bits(bits + 1)) / 2);
+            else if (form == 5)
+                snprintf(number, sizeof number, "%lluE%+d", (unsigned long long)(next_random(&state) >> 3),
+                         (int)(next_random(&state) % 60) - 45);
+            else if (form == 6)
+                snprintf(number, sizeof number, "-%u", (unsigned)(bits % 100));
+            else
+                snprintf(number, sizeof number, "0.%08u", (unsigned)(next_random(&state) % 100000000));
+            wanted[k] = strtof(number, NULL);
+            at += (size_t)snprintf(text + at, sizeof text - at, "%s%s%s%s", k > 0 ? "," : "",
+                                   spaces[next_random(&state) % 6], number, spaces[next_random(&state) % 6]);
+        }
+        snprintf(text + at, sizeof text - at, "]");
+        json_reader r;
+        json_begin(&r, text, strlen(text));
+        float values[COUNT + 1] = {0};
+        ck_each(json_enter_array(&r));
+        size_t found = json_read_plain_floats(&r, values, COUNT);
+        quick += found;
+        while (json_next_element(&r)) {
+            ck_each(found < COUNT);
+            ck_each(json_read_float(&r, &values[found++]));
+            const size_t more = json_read_plain_floats(&r, values + found, COUNT - found);
+            quick += more;
+            found += more;
+        }
+        ck_each(json_finish(&r) && found == COUNT);
+        for (int k = 0; k < COUNT; k++)
+            ck_assert_msg(values[k] == wanted[k], "%d: %a, must be %a: %s", k, (double)values[k],
+                          (double)wanted[k], text);
+        json_end(&r);
+    }
+    /* Both ways had work: blanks before a comma and exponents beyond 22 are the slow one's. */
+    ck_assert_uint_gt(quick, (size_t)ARRAYS * COUNT / 8);
+    ck_assert_uint_lt(quick, (size_t)ARRAYS * COUNT * 7 / 8);
+}
+END_TEST
+
+/* What the quick way must leave to the slow one: not numbers, what is written otherwise, what is too large.
+ */
+START_TEST(what_is_not_plain_is_left) {
+    static const char *const left[] = {"[-1]",     "[01]",
+                                       "[1.]",     "[.5]",
+                                       "[1e]",     "[+1]",
+                                       "[NaN]",    "[]",
+                                       "[1e39]",   "[1e100]",
+                                       "[1e-100]", "[\"1\"]",
+                                       "[1e+]",    "[1.e5]",
+                                       "[null]",   "[1234567890123456789]",
+                                       "[",        "[0.1234567890123456789]"};
+    for (size_t k = 0; k < sizeof left / sizeof *left; k++) {
+        json_reader r;
+        float value = 7;
+        json_begin(&r, left[k], strlen(left[k]));
+        ck_assert(json_enter_array(&r));
+        ck_assert_msg(json_read_plain_floats(&r, &value, 1) == 0 && r.at == left[k] + 1, "%s", left[k]);
+        json_end(&r);
+    }
+    json_reader r;
+    float values[4];
+    const char *text = "[1,2,3,4]";
+    json_begin(&r, text, strlen(text));
+    ck_assert(json_enter_array(&r));
+    ck_assert_uint_eq(json_read_plain_floats(&r, values, 2), 2);
+    ck_assert(json_next_element(&r) && json_read_float(&r, &values[2]) && values[2] == 3);
+    /* Without a comma between them the second is not taken. */
+    text = "[1 2]";
+    json_begin(&r, text, strlen(text));
+    ck_assert(json_enter_array(&r));
+    ck_assert_uint_eq(json_read_plain_floats(&r, values, 2), 1);
+    ck_assert(!json_next_element(&r) && r.fault != NULL);
+}
+END_TEST
+
 START_TEST(numbers_at_the_edge) {
     ck_assert(isinf(read_double("1e999")) && isinf(read_double("-1e999")) && isinf(read_float("1e39")));
     ck_assert(read_double("1e-999") == 0 && read_float("1e-60") == 0);
@@ -216,6 +312,8 @@ int main(void) {
     tcase_add_test(tcase, doubles_round_trip);
     tcase_add_test(tcase, decimals_are_rounded_right);
     tcase_add_test(tcase, numbers_at_the_edge);
+    tcase_add_test(tcase, plain_numbers_are_the_same_numbers);
+    tcase_add_test(tcase, what_is_not_plain_is_left);
     suite_add_tcase(suite, tcase);
     return suite_run(suite);
 }
