@@ -1,0 +1,54 @@
+"""Writes the seeds of the fuzz harnesses: small requests, arrays, stores and replies of every form.
+
+usage: make_seeds.py LAMBERT FOLDER   (the program, and where to put json/ npy/ store/ import/)
+"""
+import json
+import pathlib
+import struct
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+lambert, folder = sys.argv[1], pathlib.Path(sys.argv[2]).absolute()
+for name in ("json", "npy", "store", "import"):
+    (folder / name).mkdir(parents=True, exist_ok=True)
+
+emissions = [[1, 2.5, 0, 1e-3, 0.125, 3, 4], [[1] * 7, [2] * 7, [0.5] * 7], {"elements": [1, 3], "values": [2, 5.5]},
+             {"elements": [0], "values": [[1, 2, 3]]}, {"groups": {"lamp": 3, "wall": [1, 2, 3]}}, {"sky": [1, 2, 3, 4, 5]},
+             {"sky": [1, 2, 3, 4, 5], "groups": {"wall.red": 1}}, {"emitters": [1, 0, 2]}]
+count = 0
+for e in emissions:
+    for body in ({"emission": e}, {"emissions": [e, e], "quantity": "irradiance"},
+                 {"emission": e, "select": {"elements": [1, 1, 6]}, "quantity": "indirect"},
+                 {"emission": e, "select": {"groups": ["wall"]}, "tolerance": 1e-4},
+                 {"emission": e, "reduce": {"groups": ["wall"], "with": ["mean", "sum", "min", "max", "uniformity",
+                                                                        "variance"]}},
+                 {"cotangent": e, "quantity": "radiosity", "gradient": ["emission", "reflectance"], "emission": e}):
+        for blank in " \t\n\r":
+            (folder / "json" / f"{count:03}").write_text(json.dumps(body) + blank)
+            count += 1
+
+for k, (shape, kind) in enumerate([((5,), "<f4"), ((5,), "<f8"), ((3, 5), "<f4"), ((2, 1, 5), "<f8"), ((2, 3, 5), "<f4"),
+                                   ((5,), ">f4"), ((4,), "<f4"), ((5,), "<i4"), ((0, 5), "<f4")]):
+    with open(folder / "npy" / f"{k}", "wb") as f:
+        np.lib.format.write_array(f, np.ones(shape, kind), version=(1 + k % 3, 0))
+
+# Stores as small as can be: one of every kind.
+with tempfile.TemporaryDirectory() as scratch:
+    def run(*arguments):
+        subprocess.run([lambert, *map(str, arguments)], check=True, cwd=scratch, stdout=subprocess.DEVNULL)
+    run("generate", "box", "--divisions", 1, "-o", "box.obj")
+    for k, how in enumerate((["exact"], ["low-rank", "--rank", 2], ["2msc", "--rank", 2], ["sparse", "--threshold", "1e-2"],
+                             ["emitters", "--emitters", "sky", "--sky", "grid:2x2"],
+                             ["low-rank", "--rank", 2, "--store-precision", "i8"],
+                             ["exact", "--keep-form-factors", "--sky", "grid:2x2"])):
+        run("precompute", "box.obj", "--rays", 64, "--probes", 0, "--quiet", "-o", folder / "store" / f"{k}.h5",
+            "--method", *how)
+
+# What the importing process sends: a header, then points, elements, names, materials.
+header = struct.pack("<8sQ480s2048sQ7Q", b"lamsoup", 0, b"", b"", 0, 3, 1, 1, 2, 1, 2, 0)
+body = struct.pack("<9d", 0, 0, 0, 1, 0, 0, 0, 1, 0) + struct.pack("<6I", 0, 1, 2, 0xFFFFFFFF, 0, 0) + b"a\0" + b"m\0"
+(folder / "import" / "one").write_bytes(header + body + struct.pack("<6d2Q", .5, .5, .5, 0, 0, 0, 1, 1))
+(folder / "import" / "refused").write_bytes(struct.pack("<8sQ480s2048sQ7Q", b"lamsoup", 4, b"no", b"w\nv", 3, *[0] * 7))
