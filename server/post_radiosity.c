@@ -1,22 +1,14 @@
 /* POST /v1/scenes/NAME/radiosity: emission in, light out. */
 #include "server/codec_answer.h"
 #include "server/codec_request.h"
+#include "server/radiosity_figures.h"
 #include "server/routes.h"
 
-#include <time.h>
+#include <stdlib.h>
 
 /* Vectors of one pass over the operator: enough to use each row read many times, few enough that they stay in
  * the cache. */
 #define PASS 16
-
-/* Emission vectors of one request, in bytes: a short sparse text may ask for many long ones. */
-#define LEAST_EMISSION_LIMIT ((size_t)1 << 30)
-
-static double now_ms(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
 
 /* What a pass works with, in the thread's own memory. */
 typedef struct pass_memory {
@@ -91,8 +83,10 @@ static bool solve_any(const scene *s, const radiosity_request *request, size_t f
     return status == LAM_OK || problem_set(why, 500, "%s", error.message);
 }
 
-/* Applies the operator pass by pass, each pass's vectors encoded while they are in the cache. */
-static bool solve(call *in, const radiosity_request *request, answer_notes *notes, buffer *b, problem *why) {
+/* Applies the operator pass by pass, each pass's vectors reduced into figures, or (NULL) encoded, while they
+ * are in the cache. */
+static bool solve_passes(call *in, const radiosity_request *request, answer_notes *notes, double *figures,
+                         buffer *b, problem *why) {
     const scene *s = in->scene;
     answer_shape shape = {.n = s->n,
                           .n_channels = s->n_channels,
@@ -102,45 +96,48 @@ static bool solve(call *in, const radiosity_request *request, answer_notes *note
     pass_memory memory = {0};
     if (!get_pass_memory(in, request->n_rhs < PASS ? request->n_rhs : PASS, request->sky.values != NULL,
                          &memory, why) ||
-        !answer_begin(b, &shape, &in->accept, notes, why))
+        (figures == NULL && !answer_begin(b, &shape, &in->accept, notes, why)))
         return false;
     for (size_t first = 0; first < request->n_rhs; first += PASS) {
         size_t count = request->n_rhs - first < PASS ? request->n_rhs - first : PASS;
-        double start = now_ms();
+        double start = call_now_ms();
         const bool good = s->n_emitters > 0 ? solve_emitters(s, request, first, count, &memory, why)
                                             : solve_any(s, request, first, count, &memory, why);
         if (!good) return false;
-        double solved = now_ms();
+        double solved = call_now_ms();
         metrics_pass(in->service->metrics, count);
         notes->solve_ms += solved - start;
-        if (!answer_add(b, &shape, &in->accept, first, count, memory.out, why)) return false;
-        notes->encode_ms += now_ms() - solved;
+        if (figures != NULL ? !figures_add(s, request, first, count, memory.out, figures, why)
+                            : !answer_add(b, &shape, &in->accept, first, count, memory.out, why))
+            return false;
+        notes->encode_ms += call_now_ms() - solved;
     }
-    return answer_end(b, &shape, &in->accept, notes, why);
+    return figures != NULL ? figures_write(s, request, figures, notes, b, why)
+                           : answer_end(b, &shape, &in->accept, notes, why);
+}
+
+static bool solve(call *in, radiosity_request *request, answer_notes *notes, buffer *b, problem *why) {
+    const reduce_request *reduce = &request->reduce;
+    if (!figures_acceptable(in, request, why)) return false;
+    if (reduce->linear) return figures_linear(in, request, notes, b, why);
+    double *figures = NULL;
+    if (reduce->on && (figures = reduce_figures(reduce, request->n_rhs, in->scene->n_channels)) == NULL)
+        return problem_set(why, 503, "not enough memory for the figures of %zu groups", reduce->n_names);
+    const bool good = solve_passes(in, request, notes, figures, b, why);
+    free(figures);
+    return good;
 }
 
 void post_radiosity(call *in, answer *out) {
-    const scene *s = in->scene;
-    const config *c = in->service->config;
-    codec_scene about = {.n = s->n,
-                         .n_channels = s->n_channels,
-                         .groups = &s->groups,
-                         .n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0,
-                         .n_emitters = s->n_emitters,
-                         .max_batch = c->max_batch,
-                         .max_bytes =
-                             4 * c->max_body > LEAST_EMISSION_LIMIT ? 4 * c->max_body : LEAST_EMISSION_LIMIT};
-    answer_notes notes = {.scene = s->name,
-                          .has_error = s->has_error,
-                          .relative_mean = s->relative_mean,
-                          .indirect_mean = s->indirect_mean};
+    const codec_scene about = call_codec_scene(in);
+    answer_notes notes = call_notes(in);
     radiosity_request request = {0};
     problem why = {0};
     buffer b = {0};
-    double start = now_ms();
+    double start = call_now_ms();
     bool good = in->body_type == MEDIA_NPY ? codec_read_npy(&about, in->body, in->length, &request, &why)
                                            : codec_read_json(&about, in->body, in->length, &request, &why);
-    notes.parse_ms = now_ms() - start;
+    notes.parse_ms = call_now_ms() - start;
     notes.quantity = request.quantity;
     in->n_rhs = request.n_rhs;
     if (good && solve(in, &request, &notes, &b, &why)) {
