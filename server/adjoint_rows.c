@@ -1,8 +1,10 @@
 #include "server/adjoint_rows.h"
 
+#include "server/emitter_weights.h"
 #include "server/gradient.h"
 #include "server/scene.h"
 
+#include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,6 +16,7 @@ struct adjoint_rows {
     adjoint_row *first;
     uint64_t uses;
     size_t bytes;
+    emitter_weights *told; /* once made, for good; NULL: not yet, or not worth it */
 };
 
 /* --- the list ------------------------------------------------------------------------------------------- */
@@ -41,6 +44,7 @@ void adjoint_rows_destroy(adjoint_rows *rows) {
         next = row->next;
         row_free(row);
     }
+    emitter_weights_free(rows->told);
     pthread_mutex_destroy(&rows->lock);
     free(rows);
 }
@@ -120,12 +124,14 @@ bool adjoint_rows_find(const scene *s, const radiosity_request *request, adjoint
 
 /* --- new rows ------------------------------------------------------------------------------------------- */
 
+static size_t tiles_of(const scene *s) {
+    return s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
+}
+
 static size_t row_bytes(const scene *s) {
-    const size_t C = s->n_channels;
-    size_t bytes = sizeof(adjoint_row);
-    if (s->n_emitters > 0) return bytes + C * s->n_emitters * sizeof(float);
-    if (s->sky != NULL) bytes += C * lam_sky_tiles(s->sky) * sizeof(float);
-    return bytes + C * s->n * sizeof(float) + C * s->groups.n_groups * sizeof(double);
+    return sizeof(adjoint_row) +
+           s->n_channels * (s->groups.n_groups * sizeof(double) +
+                            (tiles_of(s) + (s->n_emitters > 0 ? s->n_emitters : s->n)) * sizeof(float));
 }
 
 size_t adjoint_rows_capacity(const scene *s) {
@@ -141,19 +147,12 @@ static adjoint_row *row_allocate(const scene *s, const reduce_name *name, lam_qu
     row->n_groups = name->n_groups;
     row->quantity = quantity;
     row->bytes = row_bytes(s);
-    bool good = true;
-    if (s->n_emitters > 0) {
-        row->emitters = memory_allocate(C * s->n_emitters, sizeof *row->emitters, "an adjoint row", NULL);
-        good = row->emitters != NULL;
-    } else {
-        row->w = memory_allocate(C * s->n, sizeof *row->w, "an adjoint row", NULL);
-        row->of_group =
-            memory_allocate(C * s->groups.n_groups, sizeof *row->of_group, "an adjoint row", NULL);
-        if (s->sky != NULL)
-            row->tiles =
-                memory_allocate(C * lam_sky_tiles(s->sky), sizeof *row->tiles, "an adjoint row", NULL);
-        good = row->w != NULL && row->of_group != NULL && (s->sky == NULL || row->tiles != NULL);
-    }
+    float **const numbers = s->n_emitters > 0 ? &row->emitters : &row->w;
+    *numbers =
+        memory_allocate(C, (s->n_emitters > 0 ? s->n_emitters : s->n) * sizeof **numbers, "a row", NULL);
+    row->of_group = memory_allocate(C, s->groups.n_groups * sizeof *row->of_group, "a row", NULL);
+    row->tiles = memory_allocate(C, tiles_of(s) * sizeof *row->tiles, "a row", NULL);
+    const bool good = *numbers != NULL && row->of_group != NULL && row->tiles != NULL;
     if (good) return row;
     row_free(row);
     return NULL;
@@ -175,13 +174,16 @@ static double write_cotangent(const scene *s, const reduce_name *name, float *g)
     return total;
 }
 
-/* Fills a row from w [C][n] (or [C][s]) and its g, which becomes dJ/dH0. */
-static void fill_row(const scene *s, const float *w, float *g, adjoint_row *row) {
+/* sum_k a_k x_k */
+static double product(const float *a, const float *x, size_t count) {
+    double sum = 0;
+    for (size_t k = 0; k < count; k++) sum += (double)a[k] * (double)x[k];
+    return sum;
+}
+
+/* w is [C][n], g becomes dJ/dH0. */
+static void fill_from_elements(const scene *s, const float *w, float *g, adjoint_row *row) {
     const size_t n = s->n, C = s->n_channels, n_groups = s->groups.n_groups;
-    if (s->n_emitters > 0) {
-        memcpy(row->emitters, w, C * s->n_emitters * sizeof *w);
-        return;
-    }
     memcpy(row->w, w, C * n * sizeof *w);
     for (size_t c = 0; c < C; c++)
         for (size_t h = 0; h < n_groups; h++) {
@@ -195,6 +197,47 @@ static void fill_row(const scene *s, const float *w, float *g, adjoint_row *row)
     lam_sky_adjoint(s->sky, C, g, row->tiles);
 }
 
+/* w is [C][s]; of groups and tiles whose weights are not told it says nothing: NaN. */
+static void fill_from_emitters(const scene *s, const emitter_weights *told, const float *w,
+                               adjoint_row *row) {
+    const size_t n_emitters = s->n_emitters, C = s->n_channels, m = tiles_of(s);
+    const size_t n_groups = s->groups.n_groups;
+    memcpy(row->emitters, w, C * n_emitters * sizeof *w);
+    for (size_t c = 0; c < C; c++) {
+        for (size_t h = 0; h < n_groups; h++)
+            row->of_group[c * n_groups + h] =
+                told == NULL
+                    ? NAN
+                    : product(told->of_group + (h * C + c) * n_emitters, w + c * n_emitters, n_emitters);
+        for (size_t t = 0; t < m; t++)
+            row->tiles[c * m + t] = told == NULL ? NAN
+                                                 : (float)product(told->of_tile + (t * C + c) * n_emitters,
+                                                                  w + c * n_emitters, n_emitters);
+    }
+}
+
+/* Those of a store of emitters, made by the first who needs them; false when memory is short. */
+static bool get_told(const scene *s, const emitter_weights **told) {
+    adjoint_rows *rows = s->rows;
+    *told = NULL;
+    if (s->n_emitters == 0 || !emitter_weights_worth(s)) return true;
+    pthread_mutex_lock(&rows->lock);
+    *told = rows->told;
+    pthread_mutex_unlock(&rows->lock);
+    if (*told != NULL) return true;
+    emitter_weights *made = emitter_weights_make(s);
+    if (made == NULL) return false;
+    pthread_mutex_lock(&rows->lock);
+    if (rows->told == NULL) {
+        rows->told = made;
+        made = NULL;
+    }
+    *told = rows->told;
+    pthread_mutex_unlock(&rows->lock);
+    emitter_weights_free(made);
+    return true;
+}
+
 /* Makes the rows of some names by one pass over the operator, and publishes them. */
 static bool make_rows(const scene *s, const radiosity_request *request, size_t count, const size_t *which,
                       batch_workspace *workspace, adjoint_row **rows, problem *why) {
@@ -203,6 +246,7 @@ static bool make_rows(const scene *s, const radiosity_request *request, size_t c
     size_t g_bytes, w_bytes, total;
     lam_error error;
     char *bytes = NULL;
+    const emitter_weights *told;
     adjoint_row *made[PASS] = {NULL};
     double area[PASS];
     bool allocated, good = false;
@@ -215,7 +259,7 @@ static bool make_rows(const scene *s, const radiosity_request *request, size_t c
             !__builtin_add_overflow(total, work_bytes, &total))
             bytes = batch_workspace_get(workspace, total);
     }
-    allocated = bytes != NULL;
+    allocated = bytes != NULL && get_told(s, &told);
     for (size_t k = 0; allocated && k < count; k++)
         allocated = (made[k] = row_allocate(s, &request->reduce.names[which[k]], request->quantity)) != NULL;
     if (!allocated) {
@@ -236,7 +280,10 @@ static bool make_rows(const scene *s, const radiosity_request *request, size_t c
     }
     for (size_t k = 0; k < count; k++) {
         made[k]->area = area[k];
-        fill_row(s, w + k * C * width, g + k * C * n, made[k]);
+        if (s->n_emitters > 0)
+            fill_from_emitters(s, told, w + k * C * width, made[k]);
+        else
+            fill_from_elements(s, w + k * C * width, g + k * C * n, made[k]);
         rows[which[k]] = publish(s->rows, made[k], &request->reduce.names[which[k]]);
         made[k] = NULL;
     }
@@ -266,41 +313,58 @@ bool adjoint_rows_get(const scene *s, const radiosity_request *request, batch_wo
 /* --- products ------------------------------------------------------------------------------------------- */
 
 size_t adjoint_row_work(const scene *s, const radiosity_request *request) {
-    const size_t tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
-    return s->n_channels *
-           (request->n_rhs + request->n_spots + request->sky.n * tiles + request->emitters.n * s->n_emitters);
+    return s->n_channels * (request->n_rhs + request->n_spots + request->sky.n * tiles_of(s) +
+                            request->emitters.n * s->n_emitters);
 }
 
-/* sum_k a_k x_k */
-static double product(const float *a, const float *x, size_t count) {
-    double sum = 0;
-    for (size_t k = 0; k < count; k++) sum += (double)a[k] * (double)x[k];
-    return sum;
+bool adjoint_row_tells(const scene *s, const adjoint_row *row, const radiosity_request *request) {
+    const size_t C = s->n_channels, m = tiles_of(s);
+    if (row->emitters == NULL) return true;
+    if (request->n_dense > 0) return false;
+    for (size_t k = 0; k < request->n_spots; k++)
+        for (size_t c = 0; c < C; c++)
+            if (request->colours[k * C + c] != 0 &&
+                (!request->spots[k].whole_group ||
+                 isnan(row->of_group[c * s->groups.n_groups + request->spots[k].where])))
+                return false;
+    for (size_t v = 0; v < request->sky.n * C; v++)
+        for (size_t t = 0; t < m; t++)
+            if (request->sky.values[v * m + t] != 0 && isnan(row->tiles[v % C * m + t])) return false;
+    return true;
+}
+
+/* means += what the spots and the skies give; dark ones nothing, also where the row says NaN. */
+static void add_spots(const scene *s, const adjoint_row *row, const radiosity_request *request,
+                      double *means) {
+    const size_t n = s->n, C = s->n_channels, m = tiles_of(s);
+    for (size_t k = 0; k < request->n_spots; k++) {
+        const emission_spot *spot = &request->spots[k];
+        for (size_t c = 0; c < C; c++) {
+            const double value = (double)request->colours[k * C + c];
+            if (value != 0)
+                means[spot->vector * C + c] +=
+                    value * (spot->whole_group ? row->of_group[c * s->groups.n_groups + spot->where]
+                                               : (double)row->w[c * n + spot->where]);
+        }
+    }
+    for (size_t v = 0; v < request->sky.n * C; v++) {
+        double sum = 0;
+        for (size_t t = 0; t < m; t++) {
+            const float L = request->sky.values[v * m + t];
+            if (L != 0) sum += (double)L * (double)row->tiles[v % C * m + t];
+        }
+        means[v] += sum;
+    }
 }
 
 void adjoint_row_evaluate(const scene *s, const adjoint_row *row, const radiosity_request *request,
                           const float *weights, double *means) {
-    const size_t n = s->n, C = s->n_channels;
-    if (row->emitters != NULL) {
-        const float *W = weights != NULL ? weights : request->emitters.values;
-        const size_t count = weights != NULL ? request->n_rhs : request->emitters.n;
-        for (size_t v = 0; v < request->n_rhs * C; v++)
-            means[v] = v < count * C ? product(row->emitters + v % C * s->n_emitters, W + v * s->n_emitters,
-                                               s->n_emitters)
-                                     : 0;
-        return;
-    }
-    for (size_t v = 0; v < request->n_rhs * C; v++)
-        means[v] = request->E != NULL ? product(row->w + v % C * n, request->E + v * n, n) : 0;
-    for (size_t k = 0; k < request->n_spots; k++) {
-        const emission_spot *spot = &request->spots[k];
-        for (size_t c = 0; c < C; c++) {
-            const double w = spot->whole_group ? row->of_group[c * s->groups.n_groups + spot->where]
-                                               : (double)row->w[c * n + spot->where];
-            means[spot->vector * C + c] += w * (double)request->colours[k * C + c];
-        }
-    }
-    const size_t tiles = row->tiles != NULL ? lam_sky_tiles(s->sky) : 0;
-    for (size_t v = 0; tiles > 0 && v < request->sky.n * C; v++)
-        means[v] += product(row->tiles + v % C * tiles, request->sky.values + v * tiles, tiles);
+    const size_t n = s->n, C = s->n_channels, n_emitters = s->n_emitters, count = request->n_rhs * C;
+    const float *W = weights != NULL ? weights : request->emitters.values;
+    const float *const vectors = row->emitters != NULL ? W : request->E;
+    const float *const w = row->emitters != NULL ? row->emitters : row->w;
+    const size_t width = row->emitters != NULL ? n_emitters : n;
+    for (size_t v = 0; v < count; v++)
+        means[v] = vectors != NULL ? product(w + v % C * width, vectors + v * width, width) : 0;
+    if (weights == NULL) add_spots(s, row, request, means);
 }

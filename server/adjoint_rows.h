@@ -30,9 +30,9 @@ typedef struct adjoint_row {
     lam_quantity quantity;
     double area;      /* sum A; 0: the row is 0, and the mean has no value */
     float *w;         /* [C][n]; NULL where the store answers for its own emitters only */
-    double *of_group; /* [C][groups of the scene]: sum of w over each; NULL with w */
-    float *tiles;     /* [C][m], of a sky's radiances; NULL: none */
-    float *emitters;  /* [C][s], of the emitters' weights; NULL: none */
+    float *emitters;  /* [C][s], of their weights, in place of w */
+    double *of_group; /* [C][groups of the scene]: sum of w over each; NaN: the emitters do not tell */
+    float *tiles;     /* [C][m], of a sky's radiances; NaN likewise */
 } adjoint_row;
 
 lam_status adjoint_rows_create(adjoint_rows **out, lam_error *error);
@@ -57,8 +57,12 @@ void adjoint_rows_release(const scene *s, size_t count, adjoint_row **rows);
 /* Products that an evaluation takes, apart from what E holds. */
 size_t adjoint_row_work(const scene *s, const radiosity_request *request);
 
+/* Whether a row answers the request without weights: false where a store of few emitters has to look at whole
+ * vectors. The same of every row of a scene. */
+bool adjoint_row_tells(const scene *s, const adjoint_row *row, const radiosity_request *request);
+
 /* means [n_rhs][C] of a request, in double. weights [n_rhs][C][s] stand for all that shines in a store of few
- * emitters (NULL: request->emitters alone does). Costs what the spots are, and nC a vector of E. */
+ * emitters; NULL: the row tells. Costs what the spots are, and nC a vector of E. */
 void adjoint_row_evaluate(const scene *s, const adjoint_row *row, const radiosity_request *request,
                           const float *weights, double *means);
 

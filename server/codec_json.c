@@ -70,6 +70,7 @@ static bool read_body(parser *p) {
             p->pointer_length = 0;
             return parser_refuse(p, 422, "the body holds both emission and emissions, must hold one of them");
         }
+        if (p->scene->only_linear && which == SELECT) return parser_not_linear(p);
         switch (which) {
         case EMISSION:
             good = parser_read_emission(p);
@@ -114,6 +115,7 @@ bool codec_read_json(const codec_scene *scene, const char *text, size_t length, 
     bool good = parser_begin(&p, scene, text, length, request, why) && read_body(&p) && parser_fill_sides(&p);
     if (!parser_end(&p, good)) return false;
     if (reduce->linear && reduce->n_names > scene->max_rows) reduce->linear = false;
+    if (scene->only_linear && !reduce->linear) return parser_not_linear(&p);
     if (reduce->on && !reduce->linear && !select_reduced(scene, request, why)) return false;
     return (reduce->linear && request->n_dense == 0) || radiosity_request_expand(request, scene, why);
 }

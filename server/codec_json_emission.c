@@ -295,6 +295,7 @@ bool parser_read_emission(parser *p) {
         return parser_refuse(p, 422, "%s must be an array of numbers or an object", parser_here(p));
     if (!radiosity_request_add(p->request, p->scene, p->why)) return refused_here(p);
     if (kind == JSON_OBJECT) return read_emission_object(p);
+    if (p->scene->only_linear) return parser_not_linear(p);
     if (!radiosity_request_dense(p->request, p->scene, &E, p->why)) return refused_here(p);
     return read_dense(p, E);
 }

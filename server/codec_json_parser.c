@@ -48,6 +48,10 @@ bool parser_fault(parser *p) {
                        (size_t)(p->r.at - p->r.start));
 }
 
+bool parser_not_linear(parser *p) {
+    return problem_set(p->why, 503, "no linear reduction of sparse vectors");
+}
+
 bool parser_closed(parser *p) {
     return p->r.fault == NULL || parser_fault(p);
 }

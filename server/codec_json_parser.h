@@ -49,6 +49,9 @@ const char *parser_here(parser *p);
 bool parser_refuse(parser *p, unsigned status, const char *format, ...) __attribute__((format(printf, 3, 4)));
 bool parser_fault(parser *p);
 
+/* Refuses what is not wrong, but no linear reduction of sparse vectors. */
+bool parser_not_linear(parser *p);
+
 /* Over the end of an array or object whose loop has ended. */
 bool parser_closed(parser *p);
 

@@ -17,6 +17,8 @@ typedef struct codec_scene {
     size_t n_emitters; /* 0: none */
     size_t max_batch;  /* vectors in a request */
     size_t max_bytes;  /* of emission vectors in a request */
+    bool only_linear;  /* whatever is no linear reduction of sparse vectors is refused (503) before it costs
+                          more than its text */
     size_t max_rows;   /* adjoint rows that the scene keeps: so many groups can be reduced by them */
 } codec_scene;
 

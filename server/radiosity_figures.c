@@ -11,6 +11,7 @@
  */
 #define QUICK_BODY ((size_t)32 << 10)
 #define QUICK_WORK ((size_t)100000)
+#define QUICK_BYTES ((size_t)1 << 20)
 
 bool figures_acceptable(const call *in, const radiosity_request *request, problem *why) {
     return !request->reduce.on || in->accept.type == MEDIA_JSON ||
@@ -38,8 +39,7 @@ bool figures_write(const scene *s, const radiosity_request *request, const doubl
            problem_set(why, 503, "not enough memory for the answer; ask for fewer vectors or groups");
 }
 
-/* *weights [n_rhs][C][s] of a store of few emitters, all that shines in them; NULL where the request gives
- * nothing but weights. */
+/* *weights [n_rhs][C][s] of a store of few emitters, all that shines in them. */
 static bool weights_of(const call *in, radiosity_request *request, float **weights, problem *why) {
     const scene *s = in->scene;
     const size_t row = s->n_channels * s->n_emitters;
@@ -70,7 +70,7 @@ static bool evaluate(const call *in, radiosity_request *request, adjoint_row *co
     float *weights = NULL;
     bool good = figures != NULL && means != NULL;
     if (!good) problem_set(why, 503, "not enough memory for the answer; ask for fewer vectors or groups");
-    good = good && weights_of(in, request, &weights, why);
+    if (good && !adjoint_row_tells(s, rows[0], request)) good = weights_of(in, request, &weights, why);
     for (size_t k = 0; good && k < r->n_names; k++) {
         adjoint_row_evaluate(s, rows[k], request, weights, means);
         reduce_means(r, k, s->n_channels, request->n_rhs, rows[k]->area, means, figures);
@@ -93,28 +93,28 @@ bool figures_linear(call *in, radiosity_request *request, answer_notes *notes, b
     return good;
 }
 
-/* Whether a request is so small that nobody notices when it is answered between two packets. */
-static bool is_quick(const scene *s, const radiosity_request *request) {
-    const bool told = s->n_emitters == 0 || (request->n_spots == 0 && request->sky.values == NULL);
-    return request->reduce.linear && request->n_dense == 0 && told &&
-           adjoint_row_work(s, request) <= QUICK_WORK / request->reduce.n_names;
-}
-
 bool quick_radiosity(call *in, answer *out) {
     static const char word[] = "\"reduce\"";
     const scene *s = in->scene;
     if (in->body_type != MEDIA_JSON || in->accept.type != MEDIA_JSON || in->length > QUICK_BODY ||
         memmem(in->body, in->length, word, sizeof word - 1) == NULL)
         return false;
-    const codec_scene about = call_codec_scene(in);
+    codec_scene about = call_codec_scene(in);
+    about.only_linear = true;
+    about.max_bytes = QUICK_BYTES;
     answer_notes notes = call_notes(in);
     radiosity_request request = {0};
     problem why = {0};
     buffer b = {0};
     adjoint_row *rows[ADJOINT_ROWS_OF_REQUEST];
     const double start = call_now_ms();
-    bool good = codec_read_json(&about, in->body, in->length, &request, &why) && is_quick(s, &request) &&
+    bool good = codec_read_json(&about, in->body, in->length, &request, &why) &&
+                adjoint_row_work(s, &request) <= QUICK_WORK / request.reduce.n_names &&
                 adjoint_rows_find(s, &request, rows);
+    if (good && !adjoint_row_tells(s, rows[0], &request)) {
+        adjoint_rows_release(s, request.reduce.n_names, rows);
+        good = false;
+    }
     if (good) {
         const double parsed = call_now_ms();
         notes.parse_ms = parsed - start;

@@ -2,9 +2,13 @@
 
 import io
 import json
+import os
 import pathlib
 import tempfile
 import unittest
+
+# Hundreds of small solutions: a second thread of each only waits for a core that others have.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
@@ -188,7 +192,7 @@ class Gradients(Both):
                                                  "gradient": ["reflectance"]})
                     self.assertEqual(set(found), {"reflectance"})
                     # All of a small scene; of a yard, where each is a dense solution, some of every group.
-                    some = np.arange(n) if n <= 60 else rng.permutation(n)[:16]
+                    some = np.arange(n) if n <= 60 else rng.permutation(n)[:10]
                     if n > 60:
                         some[:2] = np.flatnonzero(scene.rho[0] == 0)[:2]
                     wanted = np.empty((C, len(some)))

@@ -24,7 +24,9 @@ def figures_of(x, area, members):
     """All figures of x [..., n] over members, [...] each."""
     A, x = area[members], np.asarray(x)[..., members]
     mean = (x @ A) / A.sum()
-    return {"mean": mean, "sum": x @ A, "min": x.min(-1), "max": x.max(-1), "uniformity": x.min(-1) / mean,
+    with np.errstate(invalid="ignore"):
+        uniformity = x.min(-1) / mean
+    return {"mean": mean, "sum": x @ A, "min": x.min(-1), "max": x.max(-1), "uniformity": uniformity,
             "variance": ((x - mean[..., None]) ** 2) @ A / A.sum()}
 
 
@@ -230,6 +232,40 @@ class Reduce(unittest.TestCase):
                         break
                 self.assertAlmostEqual(given, wanted, delta=TOLERANCE)
 
+    def test_small_ones_wait_for_nobody(self):
+        """While the one place of the queue is taken, a mean by a row that is there is answered all the same."""
+        scene = Scene(3000, rank=40, seed=11)
+        scene.write(self.folder / "queue.h5", "queue")
+        mean = {"emission": {"groups": {"lamp": 1}}, "reduce": {"groups": ["wall"], "with": ["mean"]}}
+        plain = {"emission": {"groups": {"lamp": 1}}, "select": {"elements": [1]}}
+        long = json.dumps({"emissions": [{"groups": {"lamp": 1, "wall": 2}}] * 400})
+        with Daemon(self.folder / "queue.h5", "--threads", 1, "--max-inflight", 1) as daemon:
+            known = daemon.radiosity("queue", mean)
+            self.assertEqual(known.status, 200, known)
+            done = threading.Event()
+
+            def load():
+                while not done.is_set():
+                    daemon.radiosity("queue", long)
+
+            thread = threading.Thread(target=load)
+            thread.start()
+            try:
+                seen = 0
+                for _ in range(5000):
+                    before = daemon.radiosity("queue", plain).status
+                    between = daemon.radiosity("queue", mean)
+                    after = daemon.radiosity("queue", plain).status
+                    self.assertEqual(between.status, 200, between)
+                    self.assertEqual(between.json()["groups"], known.json()["groups"])
+                    seen += before == after == 503
+                    if seen == 5:
+                        break
+                self.assertEqual(seen, 5)
+            finally:
+                done.set()
+                thread.join()
+
     # --- refusals
 
     def refuse(self, reduce, status, *words, pointer=None, emission=None, name="grey", accept=None, **more):
@@ -294,12 +330,16 @@ class KindsThatAreMade(unittest.TestCase):
         cls.folder = pathlib.Path(folder.name)
         scene = cls.folder / "yard.obj"
         scene.write_text(YARD)
+        (cls.folder / "some.json").write_text(json.dumps({"emissions": [
+            {"groups": {"lamp": [1, 2, 3]}, "sky": [[1, .5, .2]] + [0] * 11},
+            {"elements": [3, 8, 40], "values": [1, 4, [0, 2, 1]]}, {"groups": {"east": 2}}]}))
         cls.truth = {}
         for name, floor, options in (
             ("two_mesh", "0.7 0.4 0.2", ["--method", "2msc"]),
             ("sparse", "0.5 0.5 0.5", ["--method", "sparse"]),
             ("lights", "0.7 0.4 0.2", ["--emitters", "group=lamp,south"]),
             ("tiles", "0.5 0.5 0.5", ["--emitters", "sky"]),
+            ("mixed", "0.7 0.4 0.2", ["--emitters", cls.folder / "some.json"]),
         ):
             (cls.folder / "yard.mtl").write_text(MATERIALS.format(floor=floor))
             must("precompute", scene, "-o", cls.folder / (name + ".h5"), "--elements", 150, "--rays", 256, "--probes", 4,
@@ -313,7 +353,10 @@ class KindsThatAreMade(unittest.TestCase):
         rng = np.random.default_rng(8)
         sky = rng.random((12, truth.C)).round(4).tolist()
         if name == "tiles":
-            return [{"sky": sky}, {"emitters": sky}]
+            return [{"sky": sky}, {"emitters": sky}, {"sky": [1] + [0] * 11}]
+        if name == "mixed":  # of the sky and groups, of an element, of one channel
+            return [{"groups": {"east": [0, 0, 5]}}, {"groups": {"east": 2, "lamp": [2, 4, 6]}, "sky": [[2, 1, .4]] + [0] * 11},
+                    {"emitters": [[1, 2, 3], 4, 5]}, {"elements": [3, 8, 40], "values": [2, 8, [0, 4, 2]]}]
         both = {"groups": {"lamp": rng.random(truth.C).round(4).tolist(), "south": 2}}
         if name == "lights":
             return [both, {"emitters": [[1, 2, 3], 4]}]
@@ -363,6 +406,21 @@ class KindsThatAreMade(unittest.TestCase):
                 answer = self.daemon.radiosity("lights", {"emission": emission, "quantity": quantity,
                                                           "reduce": {"groups": ["floor"], "with": ["mean"]}})
                 np.testing.assert_allclose(answer.json()["groups"]["floor"]["mean"], wanted, rtol=2e-5)
+
+    def test_batches_of_emitters(self):
+        """Vectors that groups, tiles or weights tell beside each other, and beside one that only its elements tell."""
+        truth, told = self.truth["mixed"], self.emissions("mixed")
+        for emissions in (told[:1] + told[2:3]) * 10, told[:3], told:
+            for quantity in QUANTITIES:
+                body = {"emissions": emissions, "quantity": quantity}
+                x = np.array(self.daemon.radiosity("mixed", body).json()[quantity])
+                floor = np.flatnonzero(truth.group == truth.groups.index("floor"))
+                for _ in range(2):
+                    body["reduce"] = {"groups": ["floor"], "with": ["mean"]}
+                    answer = self.daemon.radiosity("mixed", body)
+                    self.assertEqual(answer.status, 200, answer)
+                    np.testing.assert_allclose(answer.json()["groups"]["floor"]["mean"],
+                                               figures_of(x, truth.area, floor)["mean"], atol=2e-5 * np.abs(x).max())
 
     def test_what_emitters_do_not_send(self):
         for emission, word in (({"groups": {"floor": 1}}, "do not"), ({"elements": [0], "values": [1]}, "do not"),
