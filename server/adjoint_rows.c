@@ -15,16 +15,17 @@ struct adjoint_rows {
     pthread_mutex_t lock; /* held for a walk over the list, never while anything is computed */
     adjoint_row *first;
     uint64_t uses;
-    size_t bytes;
+    size_t bytes, max_bytes;
     emitter_weights *told; /* once made, for good; NULL: not yet, or not worth it */
 };
 
 /* --- the list ------------------------------------------------------------------------------------------- */
 
-lam_status adjoint_rows_create(adjoint_rows **out, lam_error *error) {
+lam_status adjoint_rows_create(size_t max_bytes, adjoint_rows **out, lam_error *error) {
     adjoint_rows *rows = memory_allocate(1, sizeof *rows, "adjoint rows", error);
     if (rows == NULL) return LAM_ERR_MEMORY;
     pthread_mutex_init(&rows->lock, NULL);
+    rows->max_bytes = max_bytes;
     *out = rows;
     return LAM_OK;
 }
@@ -68,7 +69,7 @@ static void release_locked(adjoint_row *row) {
 /* The lock is held: those unused for longest go, but for the newest, until the others are few enough. Who
  * still uses one frees it. */
 static void evict_locked(adjoint_rows *rows) {
-    while (rows->bytes > ADJOINT_ROWS_BYTES && rows->first->next != NULL) {
+    while (rows->bytes > rows->max_bytes && rows->first->next != NULL) {
         adjoint_row **oldest = &rows->first->next;
         for (adjoint_row **at = oldest; *at != NULL; at = &(*at)->next)
             if ((*at)->used < (*oldest)->used) oldest = at;
@@ -135,7 +136,7 @@ static size_t row_bytes(const scene *s) {
 }
 
 size_t adjoint_rows_capacity(const scene *s) {
-    const size_t count = ADJOINT_ROWS_BYTES / row_bytes(s);
+    const size_t count = s->rows->max_bytes / row_bytes(s);
     return count < ADJOINT_ROWS_OF_REQUEST ? count : ADJOINT_ROWS_OF_REQUEST;
 }
 

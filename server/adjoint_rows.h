@@ -12,9 +12,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* What a scene may keep of them, and how many of it one request may ask for. */
-#define ADJOINT_ROWS_BYTES ((size_t)256 << 20)
-#define ADJOINT_ROWS_OF_REQUEST 64
+#define ADJOINT_ROWS_OF_REQUEST 64 /* so many at most answer one request */
 
 typedef struct scene scene;
 typedef struct adjoint_rows adjoint_rows;
@@ -35,7 +33,8 @@ typedef struct adjoint_row {
     float *tiles;     /* [C][m], of a sky's radiances; NaN likewise */
 } adjoint_row;
 
-lam_status adjoint_rows_create(adjoint_rows **out, lam_error *error);
+/* max_bytes: what all rows together may take. */
+lam_status adjoint_rows_create(size_t max_bytes, adjoint_rows **out, lam_error *error);
 
 /* No row may be in use. NULL is allowed. */
 void adjoint_rows_destroy(adjoint_rows *rows);

@@ -9,6 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* What a scene may keep of adjoint rows. */
+#define ADJOINT_ROWS_BYTES ((size_t)256 << 20)
+
 /* The total error that an answer carries: the scene's own lights, else single elements, else none. */
 static void read_error(store *s, scene *made) {
     static const char *const groups[] = {"/error/lights", "/error/single"};
@@ -74,7 +77,7 @@ lam_status scene_open(const char *path, const char *name, bool verify, scene **o
     made->n_emitters = lam_operator_emitters(made->op);
     TRY(read_groups(s, made, error));
     TRY(read_area(s, made, error));
-    TRY(adjoint_rows_create(&made->rows, error));
+    TRY(adjoint_rows_create(ADJOINT_ROWS_BYTES, &made->rows, error));
     TRY(store_group_bytes(s, "/operator", &made->bytes, error));
     read_error(s, made);
     TRY(scene_describe(s, made, &made->description, error));
