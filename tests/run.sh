@@ -62,7 +62,7 @@ configure_and_build release lambert lambertd -- -DCMAKE_BUILD_TYPE=Release
 export TSAN_OPTIONS=suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1:exitcode=66
 export CK_FORK=no OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 cmake -S . -B "$builds/tsan" -DLAMBERT_TEST_PROGRAM="$PWD/$builds/release/lambert" >/dev/null
-run_ctest tsan -L service -R 'service\.daemon'
+run_ctest tsan -L service -R 'service\.(daemon|reduce)'
 unset CK_FORK OPENBLAS_NUM_THREADS OMP_NUM_THREADS
 
 step "a warning-free build by clang, and the unit and contract tests of it"

@@ -266,6 +266,20 @@ class Reduce(unittest.TestCase):
                 done.set()
                 thread.join()
 
+    def test_areas_that_cannot_be(self):
+        """A store whose areas are damaged is refused by name, the others are served."""
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+            for name, value in ("nan", np.nan), ("negative", -1.0), ("endless", np.inf):
+                scene = Scene(10, seed=1)
+                scene.area[7] = value
+                scene.write(folder / (name + ".h5"), name)
+            Scene(10, seed=1).write(folder / "whole.h5", "whole")
+            with Daemon("--stores", folder) as daemon:
+                self.assertEqual([s["name"] for s in daemon.get("/v1/scenes").json()["scenes"]], ["whole"])
+                for name in "nan", "negative", "endless":
+                    self.assertRegex(daemon.output() + daemon.errors(), name + r"\.h5: /mesh/area\[7\] = .*, must be at least 0")
+
     # --- refusals
 
     def refuse(self, reduce, status, *words, pointer=None, emission=None, name="grey", accept=None, **more):

@@ -138,6 +138,38 @@ START_TEST(others_are_selected) {
 }
 END_TEST
 
+/* A billion elements in 4096 bytes: nothing is as long as a vector. */
+START_TEST(linear_reductions_cost_what_they_name) {
+    fixture f = make_scene(3);
+    f.scene.n = (size_t)1 << 30;
+    radiosity_request request = {0};
+    ck_assert_uint_eq(read_radiosity(&f,
+                                     "{\"emission\":{\"elements\":[1000000000,3],\"values\":[1,[2,3,4]],"
+                                     "\"sky\":[1,2,3]},\"reduce\":{\"groups\":[\"wall\"],\"with\":["
+                                     "\"sum\"]}}",
+                                     &request),
+                      0);
+    ck_assert_ptr_null(request.E);
+    ck_assert_uint_eq(request.spots[0].where, 1000000000);
+    radiosity_request_free(&request);
+    ck_assert_uint_eq(
+        read_radiosity(&f, "{\"emission\":{\"elements\":[1000000000],\"values\":[1]}}", &request), 422);
+    radiosity_request_free(&request);
+    /* What is no linear reduction of sparse vectors is not even tried where nothing else is wanted. */
+    static const char *const others[] = {
+        "{\"emission\":[1", "{\"select\":{\"groups\":[\"wall\"]},\"emission\":{\"groups\":{}}}",
+        "{\"emission\":{\"groups\":{}},\"reduce\":{\"groups\":[\"wall\"],\"with\":[\"max\"]}}",
+        "{\"emission\":{\"groups\":{}}}"};
+    f.scene.only_linear = true;
+    for (size_t i = 0; i < 4; i++) {
+        ck_assert_uint_eq(read_radiosity(&f, others[i], &request), 503);
+        ck_assert(request.E == NULL && request.selected == NULL);
+        radiosity_request_free(&request);
+    }
+    group_index_free(&f.groups);
+}
+END_TEST
+
 /* However short the text: what its spots take has a limit. */
 START_TEST(spots_have_a_limit) {
     fixture f = make_scene(1);
@@ -267,6 +299,7 @@ int main(void) {
     tcase_set_timeout(tcase, 300);
     tcase_add_test(tcase, linear_reductions_stay_sparse);
     tcase_add_test(tcase, others_are_selected);
+    tcase_add_test(tcase, linear_reductions_cost_what_they_name);
     tcase_add_test(tcase, spots_have_a_limit);
     tcase_add_test(tcase, good_requests_are_read);
     tcase_add_test(tcase, a_request_cut_anywhere_is_not_json);
