@@ -3,6 +3,7 @@
 #include "server/adjoint_rows.h"
 #include "server/scene.h"
 #include "solver/operator/operator.h"
+#include "support/failing_memory.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -169,6 +170,33 @@ START_TEST(the_oldest_row_goes) {
 }
 END_TEST
 
+/* Whichever allocation fails: 503 and nothing lost; then, with memory, as if it had not been. */
+START_TEST(memory_runs_out) {
+    fixture f;
+    setup(&f, 5);
+    size_t failed = 0;
+    for (size_t g = 0; g < 5; g++) {
+        radiosity_request request = make_request(&f, g, LAM_IRRADIANCE);
+        adjoint_row *row = NULL;
+        problem why = {0};
+        bool good = false;
+        for (long k = 0; !good; k++) {
+            ck_assert_int_lt(k, 20);
+            allocations_left = k;
+            good = adjoint_rows_get(&f.s, &request, &f.workspace, &row, &why);
+            allocations_left = -1;
+            ck_assert(good || why.status == 503);
+            failed += !good;
+        }
+        judge(&f, row, &request, g);
+        adjoint_rows_release(&f.s, 1, &row);
+        radiosity_request_free(&request);
+    }
+    ck_assert_uint_eq(failed, 5 * 4); /* a row, its numbers, its groups, its tiles */
+    teardown(&f);
+}
+END_TEST
+
 typedef struct client {
     fixture *f;
     double means[3 * N_GROUPS * 20][C];
@@ -220,6 +248,7 @@ int main(void) {
     tcase_set_timeout(tcase, 120);
     tcase_add_test(tcase, rows_answer_and_are_kept);
     tcase_add_test(tcase, the_oldest_row_goes);
+    tcase_add_test(tcase, memory_runs_out);
     tcase_add_test(tcase, many_threads_see_the_same);
     suite_add_tcase(suite, tcase);
     return suite_run(suite);
