@@ -13,6 +13,21 @@ static bool no_memory(problem *why) {
                        "not enough memory for the answer; ask for fewer vectors or select elements");
 }
 
+bool answer_head(buffer *b, size_t n, size_t n_channels, const answer_notes *notes) {
+    return buffer_append_text(b, "{\"scene\":") && json_write_text(b, notes->scene) &&
+           buffer_printf(b, ",\"elements\":%zu,\"channels\":%zu,\"quantity\":\"%s\"", n, n_channels,
+                         codec_quantity_name(notes->quantity));
+}
+
+bool answer_tail(buffer *b, const answer_notes *notes) {
+    return (!notes->has_error ||
+            (buffer_append_text(b, ",\"error\":{\"relative_mean\":") &&
+             json_write_double(b, notes->relative_mean) && buffer_append_text(b, ",\"indirect_mean\":") &&
+             json_write_double(b, notes->indirect_mean) && buffer_append(b, "}", 1))) &&
+           buffer_printf(b, ",\"time_ms\":{\"parse\":%.3f,\"solve\":%.3f,\"encode\":%.3f}}\n",
+                         notes->parse_ms, notes->solve_ms, notes->encode_ms);
+}
+
 bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
                   problem *why) {
     if (as->type == MEDIA_NPY) {
@@ -22,11 +37,8 @@ bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, 
         dims[rank++] = shape->n_values;
         return npy_write_header(b, as->npy, rank, dims) || no_memory(why);
     }
-    const char *quantity = codec_quantity_name(notes->quantity);
-    return (buffer_append_text(b, "{\"scene\":") && json_write_text(b, notes->scene) &&
-            buffer_printf(b, ",\"elements\":%zu,\"channels\":%zu,\"quantity\":\"%s\",\"%s\":", shape->n,
-                          shape->n_channels, quantity, quantity) &&
-            (!shape->batch || buffer_append(b, "[", 1))) ||
+    return (answer_head(b, shape->n, shape->n_channels, notes) &&
+            buffer_printf(b, ",\"%s\":%s", codec_quantity_name(notes->quantity), shape->batch ? "[" : "")) ||
            no_memory(why);
 }
 
@@ -42,23 +54,27 @@ static bool check_range(const float *x, size_t count, float limit, problem *why)
                        "the answer passes the range of single precision (3.4e38); scale the emission");
 }
 
-static bool add_row(buffer *b, const answer_shape *shape, const media_accept *as, const float *row) {
-    if (as->type == MEDIA_NPY) return npy_write_values(b, as->npy, row, shape->n_values);
-    return json_write_floats(b, row, shape->n_values);
+static bool add_row(buffer *b, const media_accept *as, const float *row, size_t n) {
+    if (as->type == MEDIA_NPY) return npy_write_values(b, as->npy, row, n);
+    return json_write_floats(b, row, n);
+}
+
+bool answer_rows(buffer *b, const media_accept *as, size_t n_channels, size_t n, const float *x,
+                 problem *why) {
+    const bool json = as->type == MEDIA_JSON, deep = json && n_channels > 1;
+    if (!check_range(x, n_channels * n, !json && as->npy == NPY_F2 ? HALF_MAX : FLT_MAX, why)) return false;
+    bool written = !deep || buffer_append(b, "[", 1);
+    for (size_t c = 0; written && c < n_channels; c++)
+        written = (!json || c == 0 || buffer_append(b, ",", 1)) && add_row(b, as, x + c * n, n);
+    return (written && (!deep || buffer_append(b, "]", 1))) || no_memory(why);
 }
 
 bool answer_add(buffer *b, const answer_shape *shape, const media_accept *as, size_t first, size_t count,
                 const float *x, problem *why) {
-    size_t C = shape->n_channels, n = shape->n_values;
-    bool json = as->type == MEDIA_JSON;
-    if (!check_range(x, count * C * n, !json && as->npy == NPY_F2 ? HALF_MAX : FLT_MAX, why)) return false;
+    const size_t C = shape->n_channels, n = shape->n_values;
     for (size_t r = 0; r < count; r++) {
-        bool written =
-            !json || ((first + r == 0 || buffer_append(b, ",", 1)) && (C == 1 || buffer_append(b, "[", 1)));
-        for (size_t c = 0; written && c < C; c++)
-            written =
-                (!json || c == 0 || buffer_append(b, ",", 1)) && add_row(b, shape, as, x + (r * C + c) * n);
-        if (!written || (json && C > 1 && !buffer_append(b, "]", 1))) return no_memory(why);
+        if (as->type == MEDIA_JSON && first + r > 0 && !buffer_append(b, ",", 1)) return no_memory(why);
+        if (!answer_rows(b, as, C, n, x + r * C * n, why)) return false;
     }
     return true;
 }
@@ -90,13 +106,5 @@ bool answer_placed(buffer *b, const answer_shape *shape, problem *why) {
 bool answer_end(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
                 problem *why) {
     if (as->type == MEDIA_NPY) return true;
-    bool written = !shape->batch || buffer_append(b, "]", 1);
-    if (notes->has_error)
-        written = written && buffer_append_text(b, ",\"error\":{\"relative_mean\":") &&
-                  json_write_double(b, notes->relative_mean) &&
-                  buffer_append_text(b, ",\"indirect_mean\":") &&
-                  json_write_double(b, notes->indirect_mean) && buffer_append(b, "}", 1);
-    return (written && buffer_printf(b, ",\"time_ms\":{\"parse\":%.3f,\"solve\":%.3f,\"encode\":%.3f}}\n",
-                                     notes->parse_ms, notes->solve_ms, notes->encode_ms)) ||
-           no_memory(why);
+    return ((!shape->batch || buffer_append(b, "]", 1)) && answer_tail(b, notes)) || no_memory(why);
 }

@@ -23,6 +23,15 @@ typedef struct answer_notes {
     double parse_ms, solve_ms, encode_ms;
 } answer_notes;
 
+/* The beginning of any JSON answer, up to and with its quantity, and its end: what notes says, and the
+ * closing bracket. False when memory is short. */
+bool answer_head(buffer *b, size_t n, size_t n_channels, const answer_notes *notes);
+bool answer_tail(buffer *b, const answer_notes *notes);
+
+/* Appends x [C][n], or [n] for one channel. False with *why as the next. */
+bool answer_rows(buffer *b, const media_accept *as, size_t n_channels, size_t n, const float *x,
+                 problem *why);
+
 /* Appends what stands before the vectors, then vectors first ... first + count of x [count][C][n_values],
  * then what stands behind the last. False with *why: 422 when a value is beyond what the encoding holds, 503
  * when memory is short. */

@@ -3,12 +3,13 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* --- numbers ------------------------------------------------------------------------------------------ */
 
-static inline bool is_emission(float value) {
-    return value >= 0.0f && value <= FLT_MAX;
+static inline float least_value(const parser *p) {
+    return p->request->any_sign ? -FLT_MAX : 0.0f;
 }
 
 static bool bad_value(parser *p, float value) {
@@ -25,11 +26,12 @@ static bool bad_value(parser *p, float value) {
 static inline bool read_value(parser *p, float *value) {
     if (json_peek(&p->r) != JSON_NUMBER) return parser_expect(p, JSON_NUMBER, "a number");
     if (!json_read_float(&p->r, value)) return parser_fault(p);
-    return is_emission(*value) || bad_value(p, *value);
+    return (*value >= least_value(p) && *value <= FLT_MAX) || bad_value(p, *value);
 }
 
 /* Inside an array that was entered: count values, then its end. */
 static bool read_rest_of_row(parser *p, float *row, size_t count, const char *of_what) {
+    const float least = least_value(p);
     size_t i = json_read_plain_floats(&p->r, row, count);
     for (; json_next_element(&p->r); i++, i += json_read_plain_floats(&p->r, row + i, count - i)) {
         if (i == count)
@@ -40,7 +42,7 @@ static bool read_rest_of_row(parser *p, float *row, size_t count, const char *of
             return parser_expect(p, JSON_NUMBER, "a number");
         }
         if (!json_read_float(&p->r, &row[i])) return parser_fault(p);
-        if (!is_emission(row[i])) {
+        if (!(row[i] >= least && row[i] <= FLT_MAX)) {
             parser_point_index(p, i);
             return bad_value(p, row[i]);
         }
@@ -64,39 +66,44 @@ static bool read_colour(parser *p, float *colour) {
     return true;
 }
 
-bool parser_read_elements(parser *p, uint32_t *elements, size_t *count, bool once) {
-    size_t n = p->scene->n, mark = p->pointer_length;
-    *count = 0;
+/* Whether an index that was just read may stand in the list. */
+static bool check_element(parser *p, double index, size_t count, bool once) {
+    const size_t n = p->scene->n;
+    if (!(index >= 0.0 && index < (double)n && index == floor(index))) {
+        int length = p->r.number.length > 40 ? 40 : (int)p->r.number.length;
+        return parser_refuse(p, 422, "%s = %.*s, must be an integer from 0 to %zu", parser_here(p), length,
+                             p->r.number.bytes, n - 1);
+    }
+    if (count == n)
+        return parser_refuse(p, 422, "%s: more than the %zu elements of the scene", parser_here(p), n);
+    if (!once) return true;
+    switch (index_set_add(&p->seen, (uint32_t)index)) {
+    case INDEX_SET_ADDED:
+        return true;
+    case INDEX_SET_KNOWN:
+        return parser_refuse(p, 422, "%s = %.0f, an element that was listed before", parser_here(p), index);
+    case INDEX_SET_NO_MEMORY:
+        break;
+    }
+    return problem_set(p->why, 503, "not enough memory for a list of indices");
+}
+
+bool parser_read_elements(parser *p, index_list *elements, bool once) {
+    const size_t mark = p->pointer_length;
+    elements->count = 0;
+    if (once) index_set_clear(&p->seen);
     if (!parser_expect(p, JSON_ARRAY, "an array of element indices")) return false;
     if (!json_enter_array(&p->r)) return parser_fault(p);
-    bool good = true;
     while (json_next_element(&p->r)) {
         double index;
-        parser_point_index(p, *count);
-        good = parser_expect(p, JSON_NUMBER, "an element index");
-        if (!good) break;
+        parser_point_index(p, elements->count);
+        if (!parser_expect(p, JSON_NUMBER, "an element index")) return false;
         if (!json_read_double(&p->r, &index)) return parser_fault(p);
-        if (!(index >= 0.0 && index < (double)n && index == floor(index))) {
-            int length = p->r.number.length > 40 ? 40 : (int)p->r.number.length;
-            good = parser_refuse(p, 422, "%s = %.*s, must be an integer from 0 to %zu", parser_here(p),
-                                 length, p->r.number.bytes, n - 1);
-            break;
-        }
-        size_t element = (size_t)index;
-        if (*count == n || (once && p->element_set[element])) {
-            good = *count == n ? parser_refuse(p, 422, "%s: more than the %zu elements of the scene",
-                                               parser_here(p), n)
-                               : parser_refuse(p, 422, "%s = %zu, an element that was listed before",
-                                               parser_here(p), element);
-            break;
-        }
-        if (once) p->element_set[element] = true;
-        elements[(*count)++] = (uint32_t)element;
+        if (!check_element(p, index, elements->count, once)) return false;
+        if (!parser_append(p, elements, &(uint32_t){(uint32_t)index}, 1)) return false;
         p->pointer_length = mark;
     }
-    if (once)
-        for (size_t i = 0; i < *count; i++) p->element_set[elements[i]] = false;
-    return good && parser_closed(p);
+    return parser_closed(p);
 }
 
 /* --- emissions ---------------------------------------------------------------------------------------- */
@@ -135,6 +142,13 @@ static bool read_values(parser *p, size_t *count) {
     while (json_next_element(&p->r)) {
         if (*count == n)
             return parser_refuse(p, 422, "%s holds more values than there are elements", parser_here(p));
+        if (*count == p->values_capacity) {
+            const size_t capacity = *count == 0 ? 64 : 2 * *count;
+            float *grown = realloc(p->values, capacity * C * sizeof *grown);
+            if (grown == NULL) return problem_set(p->why, 503, "not enough memory for a sparse emission");
+            p->values = grown;
+            p->values_capacity = capacity;
+        }
         parser_point_index(p, *count);
         if (!read_colour(p, p->values + *count * C)) return false;
         p->pointer_length = mark;
@@ -143,15 +157,20 @@ static bool read_values(parser *p, size_t *count) {
     return parser_closed(p);
 }
 
+/* A refusal that says what is too large, at the value being read. */
+static bool refused_here(parser *p) {
+    memcpy(p->why->pointer, p->pointer, p->pointer_length);
+    p->why->pointer[p->pointer_length] = '\0';
+    return false;
+}
+
 /* {"lamp": v, ...} */
-static bool read_groups(parser *p, float *E) {
+static bool read_groups(parser *p) {
     const group_index *groups = p->scene->groups;
-    size_t n = p->scene->n, C = p->scene->n_channels, mark = p->pointer_length;
+    const size_t mark = p->pointer_length;
     json_slice key;
-    if (!parser_expect(p, JSON_OBJECT, "an object of group names and values") ||
-        !parser_allocate(p, (void **)&p->group_set, groups->n_groups, sizeof *p->group_set))
-        return false;
-    memset(p->group_set, 0, groups->n_groups * sizeof *p->group_set);
+    index_set_clear(&p->seen);
+    if (!parser_expect(p, JSON_OBJECT, "an object of group names and values")) return false;
     if (!json_enter_object(&p->r)) return parser_fault(p);
     while (parser_next_member(p, &key)) {
         const uint32_t *found = NULL;
@@ -161,25 +180,18 @@ static bool read_groups(parser *p, float *E) {
             return parser_refuse(p, 422, "%s: the scene has no group of this name", parser_here(p));
         if (!read_colour(p, p->colour)) return false;
         for (size_t k = 0; k < n_found; k++) {
-            uint32_t g = found[k];
-            if (p->group_set[g])
+            const index_set_result added = index_set_add(&p->seen, found[k]);
+            if (added == INDEX_SET_KNOWN)
                 return parser_refuse(p, 422, "%s: the group %s is given twice", parser_here(p),
-                                     groups->names[g]);
-            p->group_set[g] = true;
-            for (size_t c = 0; c < C; c++)
-                for (uint32_t i = groups->start[g]; i < groups->start[g + 1]; i++)
-                    E[c * n + groups->elements[i]] = p->colour[c];
+                                     groups->names[found[k]]);
+            if (added == INDEX_SET_NO_MEMORY)
+                return problem_set(p->why, 503, "not enough memory for a sparse emission");
+            if (!radiosity_request_spot(p->request, p->scene, found[k], true, p->colour, p->why))
+                return refused_here(p);
         }
         p->pointer_length = mark;
     }
     return p->why->status == 0;
-}
-
-/* A refusal that says what is too large, at the value being read. */
-static bool refused_here(parser *p) {
-    memcpy(p->why->pointer, p->pointer, p->pointer_length);
-    p->why->pointer[p->pointer_length] = '\0';
-    return false;
 }
 
 /* Inside an array that was not entered yet: width values into row [C][width], each a number or C of them. */
@@ -221,29 +233,28 @@ static bool read_emitters(parser *p) {
     return read_side(p, p->scene->n_emitters, "emitter", W);
 }
 
-static bool read_emission_object(parser *p, float *E) {
+static bool read_emission_object(parser *p) {
     static const char *const names[] = {"elements", "values", "groups", "sky", "emitters"};
     enum { ELEMENTS, VALUES, GROUPS, SKY, EMITTERS, N_NAMES };
-    size_t n = p->scene->n, C = p->scene->n_channels, mark = p->pointer_length;
-    size_t n_elements = 0, n_values = 0, which;
+    const size_t C = p->scene->n_channels, mark = p->pointer_length;
+    size_t n_values = 0, which;
     unsigned seen = 0;
     json_slice key;
     if (!json_enter_object(&p->r)) return parser_fault(p);
     while (parser_next_member(p, &key)) {
         bool good = parser_known_member(p, &key, names, N_NAMES, &seen, &which);
         if (!good) return false;
+        if (p->request->any_sign && (which == SKY || which == EMITTERS))
+            return parser_refuse(p, 422, "%s: a cotangent is of elements or groups", parser_here(p));
         switch (which) {
         case ELEMENTS:
-            good = parser_allocate(p, (void **)&p->elements, n, sizeof *p->elements) &&
-                   parser_allocate(p, (void **)&p->element_set, n, sizeof *p->element_set) &&
-                   parser_read_elements(p, p->elements, &n_elements, true);
+            good = parser_read_elements(p, &p->elements, true);
             break;
         case VALUES:
-            good = parser_allocate(p, (void **)&p->values, n, C * sizeof *p->values) &&
-                   read_values(p, &n_values);
+            good = read_values(p, &n_values);
             break;
         case GROUPS:
-            good = read_groups(p, E);
+            good = read_groups(p);
             break;
         case SKY:
             good = read_sky(p);
@@ -265,11 +276,14 @@ static bool read_emission_object(parser *p, float *E) {
                              parser_here(p));
     if (sparse && ((seen & 1u << ELEMENTS) == 0 || (seen & 1u << VALUES) == 0))
         return parser_refuse(p, 422, "%s must hold both elements and values", parser_here(p));
-    if (n_elements != n_values)
+    if (!sparse) return true;
+    if (p->elements.count != n_values)
         return parser_refuse(p, 422, "%s holds %zu elements and %zu values, must be as many", parser_here(p),
-                             n_elements, n_values);
-    for (size_t i = 0; i < n_elements; i++)
-        for (size_t c = 0; c < C; c++) E[c * n + p->elements[i]] = p->values[i * C + c];
+                             p->elements.count, n_values);
+    for (size_t i = 0; i < n_values; i++)
+        if (!radiosity_request_spot(p->request, p->scene, p->elements.values[i], false, p->values + i * C,
+                                    p->why))
+            return refused_here(p);
     return true;
 }
 
@@ -279,8 +293,11 @@ bool parser_read_emission(parser *p) {
     if (kind == JSON_NOTHING) return parser_fault(p);
     if (kind != JSON_ARRAY && kind != JSON_OBJECT)
         return parser_refuse(p, 422, "%s must be an array of numbers or an object", parser_here(p));
-    if (!radiosity_request_add(p->request, p->scene, &E, p->why)) return refused_here(p);
-    return kind == JSON_ARRAY ? read_dense(p, E) : read_emission_object(p, E);
+    if (!radiosity_request_add(p->request, p->scene, p->why)) return refused_here(p);
+    if (kind == JSON_OBJECT) return read_emission_object(p);
+    if (p->scene->only_linear) return parser_not_linear(p);
+    if (!radiosity_request_dense(p->request, p->scene, &E, p->why)) return refused_here(p);
+    return read_dense(p, E);
 }
 
 bool parser_read_emissions(parser *p) {

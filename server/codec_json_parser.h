@@ -5,6 +5,13 @@
 
 #include "server/codec_json_reader.h"
 #include "server/codec_request.h"
+#include "server/index_set.h"
+
+/* Indices as they are read. */
+typedef struct index_list {
+    uint32_t *values;
+    size_t count, capacity;
+} index_list;
 
 typedef struct parser {
     json_reader r;
@@ -13,13 +20,22 @@ typedef struct parser {
     problem *why;
     char pointer[sizeof((problem *)0)->pointer]; /* of the value being read */
     size_t pointer_length;
-    /* Sparse emissions, kept from one to the next. */
-    uint32_t *elements; /* [n] */
-    float *values;      /* [n][C] */
-    float *colour;      /* [C] */
-    bool *group_set;    /* [n_groups] */
-    bool *element_set;  /* [n] */
+    /* Of sparse vectors, kept from one to the next; nothing is larger than what was read. */
+    index_list elements;
+    float *values; /* [values_capacity][C] */
+    size_t values_capacity;
+    float *colour;  /* [C] */
+    index_set seen; /* elements, or groups */
 } parser;
+
+/* Begins to read a text into request; parser_end frees what the parser holds and gives good back, with what
+ * is no JSON at all told before all else, wherever its fault lies. */
+bool parser_begin(parser *p, const codec_scene *scene, const char *text, size_t length,
+                  radiosity_request *request, problem *why);
+bool parser_end(parser *p, bool good);
+
+/* Skies and emitters of the vectors behind the last that has any, dark. */
+bool parser_fill_sides(parser *p);
 
 /* Goes into a member, or an array's element; the caller restores pointer_length. What does not fit is left
  * out. */
@@ -32,6 +48,9 @@ const char *parser_here(parser *p);
 /* Refuses what is being read; the text itself, when it is not JSON. */
 bool parser_refuse(parser *p, unsigned status, const char *format, ...) __attribute__((format(printf, 3, 4)));
 bool parser_fault(parser *p);
+
+/* Refuses what is not wrong, but no linear reduction of sparse vectors. */
+bool parser_not_linear(parser *p);
 
 /* Over the end of an array or object whose loop has ended. */
 bool parser_closed(parser *p);
@@ -46,14 +65,23 @@ bool parser_next_member(parser *p, json_slice *key);
 bool parser_known_member(parser *p, const json_slice *key, const char *const *names, size_t count,
                          unsigned *seen, size_t *which);
 
-/* Memory that is kept until the request is read; zeroed where it was NULL. */
-bool parser_allocate(parser *p, void **memory, size_t count, size_t size);
+/* Appends; values is not NULL then, also for none. 503 when memory is short. */
+bool parser_append(parser *p, index_list *list, const uint32_t *indices, size_t count);
+
+/* What of a scene's groups the text that comes next means; name is valid until the next text is read. */
+bool parser_read_group(parser *p, json_slice *name, const uint32_t **groups, size_t *n_groups);
 
 /* [...] of element indices, each below n, at most n of them; those of an emission only once each. */
-bool parser_read_elements(parser *p, uint32_t *elements, size_t *count, bool once);
+bool parser_read_elements(parser *p, index_list *elements, bool once);
 
-/* The value of `emission`, and of `emissions`. */
+/* The value of `quantity`. */
+bool parser_read_quantity(parser *p, lam_quantity *quantity);
+
+/* The value of `emission`, and of `emissions`; of `cotangent`, which has neither sky nor emitters. */
 bool parser_read_emission(parser *p);
 bool parser_read_emissions(parser *p);
+
+/* The value of `reduce`. */
+bool parser_read_reduce(parser *p);
 
 #endif

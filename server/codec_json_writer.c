@@ -179,7 +179,8 @@ bool json_write_floats(buffer *b, const float *values, size_t count) {
 bool json_write_double(buffer *b, double value) {
     char text[32];
     assert(isfinite(value));
-    for (int precision = 6; precision <= 17; precision++) {
+    /* Whatever has up to 15 digits is printed as such, its zeros left out. */
+    for (int precision = 15; precision <= 17; precision++) {
         snprintf(text, sizeof text, "%.*g", precision, value);
         if (precision == 17 || strtod(text, NULL) == value) break;
     }

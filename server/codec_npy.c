@@ -169,9 +169,9 @@ static bool read_layout(const npy_header *h, const codec_scene *scene, layout *f
     return true;
 }
 
-static bool bad_value(size_t index, double value, problem *why) {
+static bool bad_value(size_t index, double value, bool any_sign, problem *why) {
     if (isnan(value)) return problem_set(why, 422, "the array's value %zu is NaN, must be a number", index);
-    if (value < 0.0)
+    if (value < 0.0 && !any_sign)
         return problem_set(why, 422, "the array's value %zu is %.9g, an emission must not be negative", index,
                            value);
     return problem_set(why, 422, "the array's value %zu is %.9g, must be within single precision (3.4e38)",
@@ -179,12 +179,14 @@ static bool bad_value(size_t index, double value, problem *why) {
 }
 
 /* Values first ... first + count of the array to E. */
-static bool read_values(const char *data, bool wide, size_t first, size_t count, float *E, problem *why) {
+static bool read_values(const char *data, bool wide, size_t first, size_t count, bool any_sign, float *E,
+                        problem *why) {
+    const float least = any_sign ? -FLT_MAX : 0.0f;
     if (!wide) {
         memcpy(E, data + first * sizeof *E, count * sizeof *E);
         /* One branch for all of them; the loop that names the culprit runs only when there is one. */
         int bad = 0;
-        for (size_t i = 0; i < count; i++) bad |= !(E[i] >= 0.0f) | !(E[i] <= FLT_MAX);
+        for (size_t i = 0; i < count; i++) bad |= !(E[i] >= least) | !(E[i] <= FLT_MAX);
         if (!bad) return true;
     }
     for (size_t i = 0; i < count; i++) {
@@ -193,8 +195,7 @@ static bool read_values(const char *data, bool wide, size_t first, size_t count,
             memcpy(&value, data + (first + i) * sizeof value, sizeof value);
         else
             value = E[i];
-
-        if (!(value >= 0.0 && value <= FLT_MAX)) return bad_value(first + i, value, why);
+        if (!(value >= least && value <= FLT_MAX)) return bad_value(first + i, value, any_sign, why);
         E[i] = (float)value;
     }
     return true;
@@ -223,8 +224,9 @@ bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, 
     for (size_t r = 0; r < found.n_rhs; r++) {
         float *E;
         size_t count = found.rows * row;
-        if (!radiosity_request_add(request, scene, &E, why) ||
-            !read_values(bytes + h.data, wide, r * count, count, E, why))
+        if (!radiosity_request_add(request, scene, why) ||
+            !radiosity_request_dense(request, scene, &E, why) ||
+            !read_values(bytes + h.data, wide, r * count, count, request->any_sign, E, why))
             return false;
         for (size_t c = found.rows; c < scene->n_channels; c++) memcpy(E + c * row, E, row * sizeof *E);
     }

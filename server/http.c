@@ -174,7 +174,10 @@ static enum MHD_Result handle(request *r) {
     if (!r->answered) {
         r->call.body = r->body.bytes == NULL ? "" : r->body.bytes;
         r->call.length = r->body.length;
-        if (r->match.route->body == BODY_OF_SOLVE) {
+        route_shortcut *shortcut = r->match.route->shortcut;
+        if (shortcut != NULL && shortcut(&r->call, &r->answer)) {
+            buffer_free(&r->body);
+        } else if (r->match.route->body == BODY_OF_SOLVE) {
             /* Suspended first: the solve may be done before batch_submit returns. */
             const solve_steps *steps = r->match.route->steps;
             r->call.job = (batch_job){.begin = begin_solve,
@@ -188,8 +191,9 @@ static enum MHD_Result handle(request *r) {
             r->answered = true;
             MHD_resume_connection(r->connection);
             return MHD_YES;
+        } else {
+            r->match.route->handle(&r->call, &r->answer);
         }
-        r->match.route->handle(&r->call, &r->answer);
         r->answered = true;
     }
     return send_answer(r);

@@ -2,19 +2,10 @@
  * passes over the operator with other clients, writes on whichever thread is free. */
 #include "server/codec_answer.h"
 #include "server/codec_request.h"
+#include "server/radiosity_figures.h"
 #include "server/routes.h"
 
 #include <stdlib.h>
-#include <time.h>
-
-/* Emission vectors of one request, in bytes: a short sparse text may ask for many long ones. */
-#define LEAST_EMISSION_LIMIT ((size_t)1 << 30)
-
-static double now_ms(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
 
 /* From begin to end. */
 typedef struct radiosity_solve {
@@ -22,11 +13,12 @@ typedef struct radiosity_solve {
     answer_notes notes;
     answer_shape shape;
     buffer answer;
-    float *out;  /* [n_rhs][C][n_values]: in the answer, where its encoding allows, or own */
-    float *own;  /* else NULL */
-    float *H0;   /* [n_rhs][C][n], what the sky gives; NULL where no vector is under one */
-    float *W;    /* [n_rhs][C][s], weights of the store's emitters; NULL where it has none */
-    problem why; /* of a pass that failed */
+    float *out;      /* [n_rhs][C][n_values]: in the answer, where its encoding allows, or own */
+    float *own;      /* else NULL */
+    float *H0;       /* [n_rhs][C][n], what the sky gives; NULL where no vector is under one */
+    double *figures; /* of reduce, in place of the answer's values; else NULL */
+    float *W;        /* [n_rhs][C][s], weights of the store's emitters; NULL where it has none */
+    problem why;     /* of a pass that failed */
     bool failed;
 } radiosity_solve;
 
@@ -34,22 +26,10 @@ static void solve_free(radiosity_solve *s) {
     radiosity_request_free(&s->request);
     buffer_free(&s->answer);
     free(s->own);
+    free(s->figures);
     free(s->H0);
     free(s->W);
     free(s);
-}
-
-static codec_scene scene_to_read(const call *in) {
-    const scene *s = in->scene;
-    const config *c = in->service->config;
-    return (codec_scene){.n = s->n,
-                         .n_channels = s->n_channels,
-                         .groups = &s->groups,
-                         .n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0,
-                         .n_emitters = s->n_emitters,
-                         .max_batch = c->max_batch,
-                         .max_bytes =
-                             4 * c->max_body > LEAST_EMISSION_LIMIT ? 4 * c->max_body : LEAST_EMISSION_LIMIT};
 }
 
 /* [n_rhs][C][width] floats, not cleared; NULL when memory is short. */
@@ -85,8 +65,16 @@ static bool find_light(const scene *s, radiosity_solve *solve, problem *why) {
     return true;
 }
 
-/* Room for the answer's values, where possible where they are sent from. */
+/* Room for the answer's values, where possible where they are sent from; figures come of values that are not.
+ */
 static bool find_room(call *in, radiosity_solve *s, problem *why) {
+    const reduce_request *reduce = &s->request.reduce;
+    if (reduce->on) {
+        s->figures = reduce_figures(reduce, s->shape.n_rhs, s->shape.n_channels);
+        s->out = s->own = allocate_rows(s, s->shape.n_values);
+        return (s->figures != NULL && s->own != NULL) ||
+               problem_set(why, 503, "not enough memory to reduce %zu vectors", s->shape.n_rhs);
+    }
     if (!answer_begin(&s->answer, &s->shape, &in->accept, &s->notes, why)) return false;
     s->out = answer_place(&s->answer, &s->shape, &in->accept);
     if (s->out == NULL) s->out = s->own = allocate_rows(s, s->shape.n_values);
@@ -95,32 +83,35 @@ static bool find_room(call *in, radiosity_solve *s, problem *why) {
 
 static bool begin(call *in, answer *out) {
     const scene *of = in->scene;
-    const codec_scene about = scene_to_read(in);
+    const codec_scene about = call_codec_scene(in);
     problem why = {0};
     radiosity_solve *s = calloc(1, sizeof *s);
     if (s == NULL) {
         answer_refuse(out, 503, "not enough memory for the request");
         return false;
     }
-    const double start = now_ms();
+    const double start = call_now_ms();
     bool good = in->body_type == MEDIA_NPY ? codec_read_npy(&about, in->body, in->length, &s->request, &why)
                                            : codec_read_json(&about, in->body, in->length, &s->request, &why);
     const radiosity_request *request = &s->request;
-    s->notes = (answer_notes){.scene = of->name,
-                              .quantity = request->quantity,
-                              .has_error = of->has_error,
-                              .relative_mean = of->relative_mean,
-                              .indirect_mean = of->indirect_mean,
-                              .parse_ms = now_ms() - start};
+    s->notes = call_notes(in);
+    s->notes.quantity = request->quantity;
+    s->notes.parse_ms = call_now_ms() - start;
     s->shape = (answer_shape){.n = of->n,
                               .n_channels = of->n_channels,
                               .n_rhs = request->n_rhs,
                               .batch = request->batch,
                               .n_values = request->select ? request->n_selected : of->n};
     in->n_rhs = request->n_rhs;
-    good = good && find_light(of, s, &why) && find_room(in, s, &why);
-    if (!good) {
-        answer_problem(out, &why);
+    good = good && figures_acceptable(in, request, &why);
+    const bool linear = good && request->reduce.linear; /* answered at once, without a pass of its own */
+    good = linear ? figures_linear(in, &s->request, &s->notes, &s->answer, &why)
+                  : good && find_light(of, s, &why) && find_room(in, s, &why);
+    if (!good || linear) {
+        if (good)
+            answer_json(out, &s->answer, true);
+        else
+            answer_problem(out, &why);
         solve_free(s);
         return false;
     }
@@ -164,7 +155,7 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
     lam_error error = {.message = ""};
     problem why = {0};
     size_t count = 0, bytes = 0;
-    const double start = now_ms();
+    const double start = call_now_ms();
     for (size_t p = 0; p < n_parts; p++) {
         const radiosity_solve *solve = call_of(parts[p].job)->state;
         const size_t before = parts[p].first * s->n_channels * s->n;
@@ -185,7 +176,7 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
         if (status != LAM_OK) problem_set(&why, 500, "%s", error.message);
     }
     metrics_pass(first->service->metrics, count);
-    const double took = now_ms() - start;
+    const double took = call_now_ms() - start;
     for (size_t p = 0; p < n_parts; p++) {
         radiosity_solve *solve = call_of(parts[p].job)->state;
         solve->notes.solve_ms += took;
@@ -195,15 +186,23 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
     }
 }
 
+/* Whether the figures of what was solved, or the values themselves, are in the answer. */
+static bool write_answer(call *in, radiosity_solve *s) {
+    const double start = call_now_ms();
+    bool good = !s->failed;
+    if (s->figures != NULL)
+        return good && figures_add(in->scene, &s->request, 0, s->shape.n_rhs, s->own, s->figures, &s->why) &&
+               figures_write(in->scene, &s->request, s->figures, &s->notes, &s->answer, &s->why);
+    good = good && (s->own == NULL
+                        ? answer_placed(&s->answer, &s->shape, &s->why)
+                        : answer_add(&s->answer, &s->shape, &in->accept, 0, s->shape.n_rhs, s->own, &s->why));
+    s->notes.encode_ms = call_now_ms() - start;
+    return good && answer_end(&s->answer, &s->shape, &in->accept, &s->notes, &s->why);
+}
+
 static void end(call *in, answer *out) {
     radiosity_solve *s = in->state;
-    const double start = now_ms();
-    bool good = !s->failed && (s->own == NULL ? answer_placed(&s->answer, &s->shape, &s->why)
-                                              : answer_add(&s->answer, &s->shape, &in->accept, 0,
-                                                           s->shape.n_rhs, s->own, &s->why));
-    s->notes.encode_ms = now_ms() - start;
-    good = good && answer_end(&s->answer, &s->shape, &in->accept, &s->notes, &s->why);
-    if (good) {
+    if (write_answer(in, s)) {
         answer_json(out, &s->answer, true);
         if (in->accept.type == MEDIA_NPY) out->type = "application/x-npy";
     } else {

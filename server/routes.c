@@ -4,20 +4,25 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
+
+/* Emission vectors of one request, in bytes: a short sparse text may ask for many long ones. */
+#define LEAST_EMISSION_LIMIT ((size_t)1 << 30)
 
 static const route routes[] = {
-    {"GET", "/healthz", get_healthz, NULL, BODY_NONE, OPEN},
-    {"GET", "/readyz", get_readyz, NULL, BODY_NONE, OPEN},
-    {"GET", "/metrics", get_metrics, NULL, BODY_NONE, OPEN},
-    {"GET", "/v1/scenes", get_scenes, NULL, BODY_NONE, WITH_TOKEN},
-    {"GET", "/v1/scenes/{name}", get_scene, NULL, BODY_NONE, WITH_TOKEN},
-    {"GET", "/v1/scenes/{name}/mesh", not_yet, NULL, BODY_NONE, WITH_TOKEN},
-    {"POST", "/v1/scenes/{name}/radiosity", NULL, &post_radiosity, BODY_OF_SOLVE, WITH_TOKEN},
-    {"POST", "/v1/scenes/{name}/adjoint", not_yet, NULL, BODY_NONE, WITH_TOKEN},
-    {"PUT", "/v1/scenes/{name}/reflectance", not_yet, NULL, BODY_NONE, WITH_TOKEN},
-    {"DELETE", "/v1/scenes/{name}/reflectance", not_yet, NULL, BODY_NONE, WITH_TOKEN},
-    {"GET", "/v1/openapi.json", not_yet, NULL, BODY_NONE, WITH_TOKEN},
-    {"GET", "/", not_yet, NULL, BODY_NONE, OPEN},
+    {"GET", "/healthz", get_healthz, NULL, BODY_NONE, OPEN, NULL},
+    {"GET", "/readyz", get_readyz, NULL, BODY_NONE, OPEN, NULL},
+    {"GET", "/metrics", get_metrics, NULL, BODY_NONE, OPEN, NULL},
+    {"GET", "/v1/scenes", get_scenes, NULL, BODY_NONE, WITH_TOKEN, NULL},
+    {"GET", "/v1/scenes/{name}", get_scene, NULL, BODY_NONE, WITH_TOKEN, NULL},
+    {"GET", "/v1/scenes/{name}/mesh", not_yet, NULL, BODY_NONE, WITH_TOKEN, NULL},
+    {"POST", "/v1/scenes/{name}/radiosity", NULL, &post_radiosity, BODY_OF_SOLVE, WITH_TOKEN,
+     quick_radiosity},
+    {"POST", "/v1/scenes/{name}/adjoint", post_adjoint, NULL, BODY_OF_SOLVE, WITH_TOKEN, NULL},
+    {"PUT", "/v1/scenes/{name}/reflectance", not_yet, NULL, BODY_NONE, WITH_TOKEN, NULL},
+    {"DELETE", "/v1/scenes/{name}/reflectance", not_yet, NULL, BODY_NONE, WITH_TOKEN, NULL},
+    {"GET", "/v1/openapi.json", not_yet, NULL, BODY_NONE, WITH_TOKEN, NULL},
+    {"GET", "/", not_yet, NULL, BODY_NONE, OPEN, NULL},
 };
 #define N_ROUTES (sizeof routes / sizeof routes[0])
 
@@ -132,4 +137,34 @@ void answer_json(answer *out, buffer *b, bool written) {
     }
     *out = (answer){.status = 200, .type = "application/json", .body = *b};
     *b = (buffer){0};
+}
+
+/* --- calls -------------------------------------------------------------------------------------------- */
+
+codec_scene call_codec_scene(const call *in) {
+    const scene *s = in->scene;
+    const config *c = in->service->config;
+    return (codec_scene){.n = s->n,
+                         .n_channels = s->n_channels,
+                         .groups = &s->groups,
+                         .n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0,
+                         .n_emitters = s->n_emitters,
+                         .max_batch = c->max_batch,
+                         .max_bytes =
+                             4 * c->max_body > LEAST_EMISSION_LIMIT ? 4 * c->max_body : LEAST_EMISSION_LIMIT,
+                         .max_rows = adjoint_rows_capacity(s)};
+}
+
+answer_notes call_notes(const call *in) {
+    const scene *s = in->scene;
+    return (answer_notes){.scene = s->name,
+                          .has_error = s->has_error,
+                          .relative_mean = s->relative_mean,
+                          .indirect_mean = s->indirect_mean};
+}
+
+double call_now_ms(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
 }

@@ -2,7 +2,9 @@
 #ifndef LAMBERT_SERVER_ROUTES_H
 #define LAMBERT_SERVER_ROUTES_H
 
+#include "server/codec_answer.h"
 #include "server/codec_media.h"
+#include "server/codec_request.h"
 #include "server/problem.h"
 #include "server/service.h"
 
@@ -32,6 +34,10 @@ typedef struct answer {
 
 typedef void route_handler(call *in, answer *out);
 
+/* Answers on the thread of all input and output what takes well below a millisecond and waits for nobody, or
+ * returns false with nothing done: the handler's turn then. */
+typedef bool route_shortcut(call *in, answer *out);
+
 /* A solve that shares passes over an operator with those of other clients (server/batch.h). begin sets the
  * job's key and n_vectors, or makes the answer, a problem as a rule, and returns false. */
 typedef struct solve_steps {
@@ -55,6 +61,7 @@ typedef struct route {
         BODY_OF_SOLVE
     } body; /* a solve is up to --max-body long and runs on a thread of its own */
     enum { OPEN, WITH_TOKEN } access;
+    route_shortcut *shortcut; /* of a solving route; NULL: none */
 } route;
 
 #define ROUTE_NAME_MAX 256
@@ -83,7 +90,15 @@ void answer_refuse(answer *out, unsigned status, const char *format, ...)
 /* Gives JSON back that is in b (taken over), or 503 when it could not be written. */
 void answer_json(answer *out, buffer *b, bool written);
 
-route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, not_yet;
+/* What a body is read against, and what an answer says beside its numbers: of a route with {name}. */
+codec_scene call_codec_scene(const call *in);
+answer_notes call_notes(const call *in);
+
+/* Milliseconds on a clock that only goes forward. */
+double call_now_ms(void);
+
+route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, post_adjoint, not_yet;
+route_shortcut quick_radiosity;
 extern const solve_steps post_radiosity;
 
 #endif

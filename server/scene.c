@@ -9,6 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* What a scene may keep of adjoint rows. */
+#define ADJOINT_ROWS_BYTES ((size_t)256 << 20)
+
 /* The total error that an answer carries: the scene's own lights, else single elements, else none. */
 static void read_error(store *s, scene *made) {
     static const char *const groups[] = {"/error/lights", "/error/single"};
@@ -36,6 +39,19 @@ done:
     return status;
 }
 
+static lam_status read_area(store *s, scene *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    void *area = NULL;
+    TRY(store_read(s, "/mesh/area", STORE_F64, 1, (size_t[]){made->n}, &area, error));
+    made->area = area;
+    for (size_t i = 0; i < made->n; i++)
+        if (!(made->area[i] >= 0 && isfinite(made->area[i])))
+            FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/area[%zu] = %g, must be at least 0", made->path, i,
+                 made->area[i]);
+done:
+    return status;
+}
+
 lam_status scene_open(const char *path, const char *name, bool verify, scene **out, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
@@ -56,9 +72,12 @@ lam_status scene_open(const char *path, const char *name, bool verify, scene **o
     TRY(operator_load(s, &made->op, error));
     made->n = lam_operator_elements(made->op);
     made->n_channels = lam_operator_channels(made->op);
+    made->reflectance = made->op->reflectance;
     TRY(sky_load(s, made->n, &made->sky, error));
     made->n_emitters = lam_operator_emitters(made->op);
     TRY(read_groups(s, made, error));
+    TRY(read_area(s, made, error));
+    TRY(adjoint_rows_create(ADJOINT_ROWS_BYTES, &made->rows, error));
     TRY(store_group_bytes(s, "/operator", &made->bytes, error));
     read_error(s, made);
     TRY(scene_describe(s, made, &made->description, error));
@@ -79,7 +98,9 @@ void scene_release(scene *s) {
     if (atomic_fetch_sub(&s->references, 1) != 1) return;
     lam_operator_close(s->op);
     lam_sky_close(s->sky);
+    adjoint_rows_destroy(s->rows);
     group_index_free(&s->groups);
+    free(s->area);
     free(s->description);
     free(s->name);
     free(s->path);

@@ -1,8 +1,9 @@
-/* One store, read whole and ready to answer: immutable, counted by who uses it. */
+/* One store, read whole and ready to answer: immutable but for the rows it keeps, counted by who uses it. */
 #ifndef LAMBERT_SERVER_SCENE_H
 #define LAMBERT_SERVER_SCENE_H
 
 #include "lambert/lambert.h"
+#include "server/adjoint_rows.h"
 #include "server/groups.h"
 
 #include <stdatomic.h>
@@ -16,13 +17,16 @@ typedef struct scene {
     size_t n;
     size_t n_channels;
     lam_operator *op;
+    const float *reflectance; /* [C][n], of op */
     group_index groups;
+    double *area;      /* [n], m^2 */
     lam_sky *sky;      /* NULL: none */
     size_t n_emitters; /* 0: the store answers any emission */
     uint64_t bytes;    /* of /operator as stored */
     char *description; /* the JSON of GET /v1/scenes/NAME */
     bool has_error;    /* the store's total error, of its own lights or else of single elements */
     double relative_mean, indirect_mean;
+    adjoint_rows *rows; /* what reduces by a product; any thread */
 } scene;
 
 /* Reads the store at path; its file is closed again before this returns. name NULL: the store's own.

@@ -3,6 +3,7 @@
 The form factors are of low rank, F = U V', so that every kind of operator holds the same M exactly.
 """
 
+import copy
 import ctypes
 import ctypes.util
 
@@ -42,7 +43,17 @@ class Scene:
         self.group = rng.integers(0, len(groups), n).astype(np.uint32)
         self.group[: min(n, len(groups))] = np.arange(min(n, len(groups)))
         self.order = rng.permutation(n).astype(np.uint32)
-        self.core = np.stack([np.linalg.inv(np.eye(rank) - self.V.T @ (r[:, None] * self.U)) for r in self.rho])
+        self.area = np.random.default_rng(seed + 1000).uniform(0.5, 2, n)
+        self.core = self.core_of(self.rho)
+
+    def core_of(self, rho):
+        return np.stack([np.linalg.inv(np.eye(self.rank) - self.V.T @ (r[:, None] * self.U)) for r in rho])
+
+    def with_reflectance(self, rho):
+        """The same scene of other reflectances [C][n], made again from its F."""
+        other = copy.copy(self)
+        other.rho, other.core = rho, self.core_of(rho)
+        return other
 
     def members(self, name):
         """The elements of a group, or of all `name.something`, in the order that `select` gives."""
@@ -78,7 +89,7 @@ class Scene:
             arrays = {
                 "/mesh/vertices": np.random.default_rng(0).random((n + 2, 3)),
                 "/mesh/elements": np.array([[i, i + 1, i + 2, NO_VERTEX] for i in range(n)], np.uint32),
-                "/mesh/area": np.ones(n),
+                "/mesh/area": self.area,
                 "/mesh/normal": np.tile(np.array([0, 0, 1], np.float32), (n, 1)),
                 "/mesh/reflectance": self.rho.astype(np.float32),
                 "/mesh/emission": np.ones((C, n), np.float32),
