@@ -411,7 +411,7 @@ done:
     return status;
 }
 
-lam_status store_open(const char *path, store **out, lam_error *error) {
+static lam_status open_here(const char *path, store **out, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
     store_mute mute = store_mute_begin();
@@ -427,4 +427,9 @@ done:
     store_close(s);
     store_mute_end(&mute);
     return status;
+}
+
+lam_status store_open(const char *path, store **out, lam_error *error) {
+    const lam_status status = store_probe(open_here, path, error);
+    return status == LAM_OK ? open_here(path, out, error) : status;
 }

@@ -67,6 +67,14 @@ int store_exists(const store *s, const char *name);
  * what: the verb, "write", "read". */
 lam_status store_hdf5_failure(store *s, const char *name, const char *what, lam_error *error);
 
+/* --- store_probe.c ------------------------------------------------------------------------------------- */
+
+typedef lam_status store_opener(const char *path, store **out, lam_error *error);
+
+/* Whether opening the file and reading its headers ends well or in a refusal: tried in a child process.
+ * Errors: LAM_ERR_DAMAGED when that crashes, or never ends. */
+lam_status store_probe(store_opener *opener, const char *path, lam_error *error);
+
 /* --- store_driver.c ------------------------------------------------------------------------------------ */
 
 /* File access properties that go through file, which must outlive the HDF5 file; negative when that fails. */
