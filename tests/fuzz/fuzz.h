@@ -3,6 +3,7 @@
 #ifndef LAMBERT_TESTS_FUZZ_H
 #define LAMBERT_TESTS_FUZZ_H
 
+#include "server/codec_request.h"
 #include "server/problem.h"
 
 #include <stdint.h>
@@ -34,6 +35,27 @@ static inline char *fuzz_text(const uint8_t *data, size_t size) {
 static inline void fuzz_check_problem(const problem *why) {
     FUZZ_CHECK(why->status == 400 || why->status == 422 || why->status == 501 || why->status == 503);
     FUZZ_CHECK(why->detail[0] != '\0');
+}
+
+/* A small scene; shape says of which kind. The caller frees groups. */
+static inline codec_scene fuzz_scene(unsigned shape, group_index *groups) {
+    static const char *names[] = {"lamp", "wall", "wall.red", "\xc3\xa9t\xc3\xa9"};
+    static const uint32_t group_of[] = {0, 1, 2, 3, 1, 2, 3};
+    enum { N = sizeof group_of / sizeof *group_of, GROUPS = sizeof names / sizeof *names };
+    char **copies = malloc(GROUPS * (sizeof *copies + 16)); /* one block, as a store's names are */
+    lam_error error;
+    FUZZ_CHECK(copies != NULL);
+    for (int g = 0; g < GROUPS; g++) copies[g] = strcpy((char *)(copies + GROUPS) + 16 * g, names[g]);
+    FUZZ_CHECK(group_index_make(N, group_of, GROUPS, copies, groups, &error) == LAM_OK);
+    return (codec_scene){.n = N,
+                         .n_channels = shape & 1 ? 3 : 1,
+                         .groups = groups,
+                         .n_tiles = shape & 2 ? 5 : 0,
+                         .n_emitters = shape & 4 ? 3 : 0,
+                         .max_batch = 4,
+                         .max_bytes = 1 << 20,
+                         .only_linear = (shape & 24) == 24,
+                         .max_rows = shape & 8 ? 8 : 0};
 }
 
 #endif

@@ -1,6 +1,6 @@
 """Writes the seeds of the fuzz harnesses: small requests, arrays, stores and replies of every form.
 
-usage: make_seeds.py LAMBERT FOLDER   (the program, and where to put json/ npy/ store/ import/)
+usage: make_seeds.py LAMBERT FOLDER   (the program, and where to put json/ adjoint/ ...)
 """
 import json
 import pathlib
@@ -12,7 +12,7 @@ import tempfile
 import numpy as np
 
 lambert, folder = sys.argv[1], pathlib.Path(sys.argv[2]).absolute()
-for name in ("json", "npy", "store", "import"):
+for name in ("json", "adjoint", "npy", "store", "import"):
     (folder / name).mkdir(parents=True, exist_ok=True)
 
 emissions = [[1, 2.5, 0, 1e-3, 0.125, 3, 4], [[1] * 7, [2] * 7, [0.5] * 7], {"elements": [1, 3], "values": [2, 5.5]},
@@ -27,7 +27,8 @@ for e in emissions:
                                                                         "variance"]}},
                  {"cotangent": e, "quantity": "radiosity", "gradient": ["emission", "reflectance"], "emission": e}):
         for blank in " \t\n\r":
-            (folder / "json" / f"{count:03}").write_text(json.dumps(body) + blank)
+            for name in ("adjoint",) if "cotangent" in body else ("json",):
+                (folder / name / f"{count:03}").write_text(json.dumps(body) + blank)
             count += 1
 
 for k, (shape, kind) in enumerate([((5,), "<f4"), ((5,), "<f8"), ((3, 5), "<f4"), ((2, 1, 5), "<f8"), ((2, 3, 5), "<f4"),
