@@ -145,7 +145,8 @@ lam_status lam_refiner_create(const lam_operator *op, const lam_form_factors *F,
 void lam_refiner_free(lam_refiner *refiner);
 
 /* out = the quantity of B = E' + R F B for a batch, E' = E + rho H0, with a certified error: in every channel
- *     |B - B~| <= tolerance |B~ - E'|      in the maximum norm, 0 < tolerance < 1.
+ *     |B - B~| <= tolerance |B~ - E'|      in the maximum norm, 0 < tolerance < 1
+ * (where nothing bounces B~ is E', with the rounding of E + rho H0).
  * E, H0 (NULL: none) and out are [n_rhs][C][n] in mesh order; E and H0 from 0 to 1e100.
  * certificates [n_rhs] gets what no number of that vector of out is further than from the quantity that F
  * gives, in the unit of E, rounding counted; iterations [n_rhs] how often F was multiplied for it.

@@ -242,6 +242,7 @@ static lam_status refine_pass(refinement *s, size_t first, const request *asked,
     const double *E = asked->E + begin, *H0 = asked->H0 != NULL ? asked->H0 + begin : NULL;
     s->tolerance = asked->tolerance;
     s->count_sum = asked->quantity == LAM_RADIOSITY;
+    s->lit_rounded = H0 != NULL;
     for (size_t c = 0; c < s->n_columns; c++)
         exponents[c] = light_column(s, c, E + c * n, H0 != NULL ? H0 + c * n : NULL, s->lit + c * n);
     if (asked->start == NULL) {

@@ -47,11 +47,13 @@ enum { REFINE_WINDOW = 6, REFINE_PASSES_MOST = 5000 };
 typedef struct refine_column {
     const refine_channel *channel;
     bool done, stuck;
+    bool from_dark;    /* P began again, with 0 */
     bool plain;        /* the next direction is r itself */
     size_t passes;     /* products with F */
     size_t n_kept;     /* directions, the oldest overwritten first */
     double error;      /* |r - R F (E' + P) + P|, what rounding made of it */
     double r, P;       /* P: of the answer P + r, once judged */
+    double P_first;    /* of the start */
     double least;      /* of E' + P when r was last computed from P, at most 0 */
     double bound;      /* on |P - P~| */
     double at_restart; /* bound when r was last computed from P */
@@ -66,8 +68,9 @@ typedef struct refinement {
     bool help;    /* of the operator */
     bool weights; /* not to a tolerance, but until r is small enough for w = E' + P */
     double tolerance;
-    bool count_sum; /* what rounding makes of E' + the answer must fit into the tolerance too */
-    double *lit;    /* E' */
+    bool lit_rounded; /* E' is a sum */
+    bool count_sum;   /* what rounding makes of E' + the answer must fit into the tolerance too */
+    double *lit;      /* E' */
     double *P, *r, *z, *q;
     double *kept_Z, *kept_Q; /* [REFINE_WINDOW][columns][n] */
     double *X, *Y;           /* of a product, [n][CSR_DOUBLES_WIDTH] */

@@ -212,9 +212,20 @@ void refinement_start(refinement *s) {
 
 double refinement_sum_rounding(const refinement *s, size_t column) {
     /* fl(P + r) is within u of itself, fl(E + fl(rho H0)) within 2u of E', which is at most 1, and fl(E' + P)
-     * within u of itself. */
+     * within u of itself; E' + 0 is E'. */
     const double P = s->columns[column].P;
-    return s->count_sum && P > 0 ? REFINE_U * (3 + 2 * P) : REFINE_U * P;
+    return REFINE_U * (P + (s->count_sum ? (s->lit_rounded ? 2 : 0) + (P > 0 ? 1 + P : 0) : 0));
+}
+
+/* (sum A x^2)^1/2 of an x of this maximum norm; squares of what is tiny would vanish. */
+static double area_norm(size_t n, const double *area, const double *x, double largest) {
+    if (!(largest > 0)) return 0;
+    const double scale = 1 / largest;
+    double sum = 0;
+    if (!isfinite(scale)) return INFINITY;
+#pragma omp simd reduction(+ : sum)
+    for (size_t i = 0; i < n; i++) sum += area[i] * (scale * x[i]) * (scale * x[i]);
+    return largest * sqrt(sum);
 }
 
 /* Is the column done, or can it not be? True where r should be found anew. */
@@ -230,7 +241,7 @@ static bool judge(refinement *s, size_t c) {
         return false;
     }
     const double *P = s->P + c * n, *mean = channel->mean;
-    const double norm = sqrt(dot(n, s->refiner->F->area, r, r)), peak = channel->peak * col->r;
+    const double norm = area_norm(n, s->refiner->F->area, r, col->r), peak = channel->peak * col->r;
     double largest = 0, answer = 0;
 #pragma omp simd reduction(max : largest, answer)
     for (size_t i = 0; i < n; i++) {
@@ -245,12 +256,18 @@ static bool judge(refinement *s, size_t c) {
     const double sum = refinement_sum_rounding(s, c);
     col->bound = left + rounded + sum;
     /* The client's B~ - E' may be less than P by what rounding made of B~. */
-    col->done = col->bound <= s->tolerance * (answer - sum) || (answer == 0 && col->bound == 0);
+    col->done = col->bound <= s->tolerance * (answer - sum) || (answer == 0 && left + rounded == 0);
     if (col->done) return false;
     if (col->passes >= REFINE_PASSES_MOST) col->stuck = true;
     if (left > rounded) return false;
-    /* Only rounding is left: less of it where r is found anew, unless that was so the last time. */
-    if (!(col->bound <= .5 * col->at_restart)) col->stuck = true;
+    /* Only rounding is left: less of it where r is found anew, unless that was so the last time. Where there
+     * is far less light than P began with, none if E' is not seen, that is what the rounding is of. */
+    if (!col->from_dark && answer < 1e-6 * col->P_first) {
+        col->from_dark = true;
+        memset(s->P + c * n, 0, n * sizeof *P);
+    } else {
+        col->stuck = !(col->bound <= .5 * col->at_restart);
+    }
     return !col->stuck;
 }
 
@@ -368,11 +385,11 @@ void refinement_solve(refinement *s) {
     const int n_threads = (int)s->refiner->op->n_threads;
     bool *active = s->active, *again = s->again;
     for (size_t c = 0; c < m; c++) {
-        const refine_channel *channel = s->columns[c].channel;
-        s->columns[c] = (refine_column){.channel = channel, .plain = false};
+        s->columns[c] = (refine_column){.channel = s->columns[c].channel};
         again[c] = true;
     }
     find_residuals(s, again);
+    for (size_t c = 0; c < m; c++) s->columns[c].P_first = s->columns[c].P;
     for (;;) {
         for (size_t c = 0; c < m; c++) {
             active[c] = !s->columns[c].done && !s->columns[c].stuck;

@@ -109,9 +109,11 @@ static inline double certified_check(const certified *s, size_t n_rhs, lam_quant
                       (int)quantity, tolerance, row, worst, certificates[v], iterations[v]);
         if (certificates[v] > 0) share = fmax(share, (double)worst / certificates[v]);
         /* B~ - E' is within the tolerance of B - E'. Irradiance has a certificate of its own: rows sum to 1.
-         * A vector's certificate is that of its worst channel. */
+         * A vector's certificate is that of its worst channel. Where nothing bounces only E + rho H0 is
+         * rounded. */
         if (quantity != LAM_IRRADIANCE && C == 1)
-            ck_assert_msg(certificates[v] <= tolerance * (1 + tolerance) * (double)indirect,
+            ck_assert_msg(certificates[v] <= (indirect > 0 ? tolerance * (1 + tolerance) * (double)indirect
+                                                           : 0x1p-51 * (double)largest),
                           "%s: certificate %g of %Lg, tolerance %g", s->name, certificates[v], indirect,
                           tolerance);
     }
