@@ -31,43 +31,83 @@ bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, 
 }
 
 /* Refuses what would be written as something else than it is. */
-static bool check_range(const float *x, size_t count, float limit, problem *why) {
-    int bad = 0;
-    for (size_t i = 0; i < count; i++) bad |= !(fabsf(x[i]) <= limit);
-    if (!bad) return true;
-    if (limit < FLT_MAX)
+static bool refuse_range(double limit, problem *why) {
+    if (limit < (double)FLT_MAX)
         return problem_set(why, 422, "the answer passes the range of half precision (%g); ask for dtype=f4",
-                           (double)limit);
+                           limit);
     return problem_set(why, 422,
                        "the answer passes the range of single precision (3.4e38); scale the emission");
 }
 
-static bool add_row(buffer *b, const answer_shape *shape, const media_accept *as, const float *row) {
-    if (as->type == MEDIA_NPY) return npy_write_values(b, as->npy, row, shape->n_values);
-    return json_write_floats(b, row, shape->n_values);
+static bool check_range(const float *x, size_t count, float limit, problem *why) {
+    int bad = 0;
+    for (size_t i = 0; i < count; i++) bad |= !(fabsf(x[i]) <= limit);
+    return !bad || refuse_range((double)limit, why);
+}
+
+/* What stands before, between and behind the numbers of a vector and its channels. */
+static bool open_row(buffer *b, const answer_shape *shape, bool json, size_t vector, size_t c) {
+    if (!json) return true;
+    if (c > 0) return buffer_append(b, ",", 1);
+    return (vector == 0 || buffer_append(b, ",", 1)) && (shape->n_channels == 1 || buffer_append(b, "[", 1));
+}
+
+static bool close_row(buffer *b, const answer_shape *shape, bool json, size_t c) {
+    return !json || shape->n_channels == 1 || c + 1 < shape->n_channels || buffer_append(b, "]", 1);
 }
 
 bool answer_add(buffer *b, const answer_shape *shape, const media_accept *as, size_t first, size_t count,
                 const float *x, problem *why) {
-    size_t C = shape->n_channels, n = shape->n_values;
-    bool json = as->type == MEDIA_JSON;
+    const size_t C = shape->n_channels, n = shape->n_values;
+    const bool json = as->type == MEDIA_JSON;
     if (!check_range(x, count * C * n, !json && as->npy == NPY_F2 ? HALF_MAX : FLT_MAX, why)) return false;
-    for (size_t r = 0; r < count; r++) {
-        bool written =
-            !json || ((first + r == 0 || buffer_append(b, ",", 1)) && (C == 1 || buffer_append(b, "[", 1)));
-        for (size_t c = 0; written && c < C; c++)
-            written =
-                (!json || c == 0 || buffer_append(b, ",", 1)) && add_row(b, shape, as, x + (r * C + c) * n);
-        if (!written || (json && C > 1 && !buffer_append(b, "]", 1))) return no_memory(why);
+    for (size_t row = 0; row < count * C; row++) {
+        const float *values = x + row * n;
+        if (!open_row(b, shape, json, first + row / C, row % C) ||
+            !(json ? json_write_floats(b, values, n) : npy_write_values(b, as->npy, values, n)) ||
+            !close_row(b, shape, json, row % C))
+            return no_memory(why);
     }
     return true;
+}
+
+bool answer_add_doubles(buffer *b, const answer_shape *shape, const media_accept *as, size_t first,
+                        size_t count, const double *x, double *rounding, problem *why) {
+    const size_t C = shape->n_channels, n = shape->n_values;
+    const bool json = as->type == MEDIA_JSON;
+    const double limit = json || as->npy == NPY_F8 ? DBL_MAX
+                         : as->npy == NPY_F4       ? (double)FLT_MAX
+                                                   : (double)HALF_MAX;
+    for (size_t i = 0; i < count * C * n; i++)
+        if (!(fabs(x[i]) <= limit)) return refuse_range(limit, why);
+    for (size_t row = 0; row < count * C; row++) {
+        const double *values = x + row * n;
+        if (!open_row(b, shape, json, first + row / C, row % C) ||
+            !(json ? json_write_doubles(b, values, n) : npy_write_doubles(b, as->npy, values, n, rounding)) ||
+            !close_row(b, shape, json, row % C))
+            return no_memory(why);
+    }
+    return true;
+}
+
+/* A number, or one for each vector of a batch. */
+static bool add_figures(buffer *b, const answer_shape *shape, const answer_notes *notes) {
+    bool written = buffer_append_text(b, ",\"certificate\":") &&
+                   (shape->batch ? json_write_doubles(b, notes->certificates, shape->n_rhs)
+                                 : json_write_double(b, notes->certificates[0])) &&
+                   buffer_append_text(b, shape->batch ? ",\"iterations\":[" : ",\"iterations\":");
+    for (size_t v = 0; written && v < shape->n_rhs; v++)
+        written = buffer_printf(b, v > 0 ? ",%zu" : "%zu", notes->iterations[v]);
+    return written && (!shape->batch || buffer_append(b, "]", 1));
 }
 
 bool answer_end(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
                 problem *why) {
     if (as->type == MEDIA_NPY) return true;
     bool written = !shape->batch || buffer_append(b, "]", 1);
-    if (notes->has_error)
+    if (notes->certificates != NULL)
+        written = written && add_figures(b, shape, notes);
+    else if (notes->has_error)
         written = written && buffer_append_text(b, ",\"error\":{\"relative_mean\":") &&
                   json_write_double(b, notes->relative_mean) &&
                   buffer_append_text(b, ",\"indirect_mean\":") &&

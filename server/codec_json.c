@@ -74,6 +74,14 @@ static bool read_quantity(parser *p) {
                          text.length > 80 ? 80 : (int)text.length, text.bytes);
 }
 
+static bool read_tolerance(parser *p) {
+    double *value = &p->request->tolerance;
+    if (!parser_expect(p, JSON_NUMBER, "a number above 0 and below 1")) return false;
+    if (!json_read_double(&p->r, value)) return parser_fault(p);
+    return (*value > 0 && *value < 1) ||
+           parser_refuse(p, 422, "%s = %.9g, must be above 0 and below 1", parser_here(p), *value);
+}
+
 static bool read_body(parser *p) {
     static const char *const names[] = {"emission", "emissions", "select", "quantity", "tolerance", "reduce"};
     enum { EMISSION, EMISSIONS, SELECT, QUANTITY, TOLERANCE, REDUCE, N_NAMES };
@@ -102,6 +110,9 @@ static bool read_body(parser *p) {
             break;
         case QUANTITY:
             good = read_quantity(p);
+            break;
+        case TOLERANCE:
+            good = read_tolerance(p);
             break;
         default:
             good = parser_refuse(p, 501, "%s is not supported yet", parser_here(p));

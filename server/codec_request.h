@@ -33,6 +33,7 @@ typedef struct radiosity_request {
     uint32_t *selected;
     size_t n_selected;
     lam_quantity quantity;
+    double tolerance; /* of a refined answer, above 0 and below 1; 0: none is asked for */
 
     side_rows sky;      /* radiances of its tiles */
     side_rows emitters; /* their weights */

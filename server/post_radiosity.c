@@ -1,6 +1,7 @@
 /* POST /v1/scenes/NAME/radiosity: emission in, light out. */
 #include "server/codec_answer.h"
 #include "server/codec_request.h"
+#include "server/refined_answer.h"
 #include "server/routes.h"
 
 #include <time.h>
@@ -143,12 +144,15 @@ void post_radiosity(call *in, answer *out) {
     notes.parse_ms = now_ms() - start;
     notes.quantity = request.quantity;
     in->n_rhs = request.n_rhs;
-    if (good && solve(in, &request, &notes, &b, &why)) {
+    const bool refine = request.tolerance > 0;
+    if (good && (refine ? refined_answer : solve)(in, &request, &notes, &b, &why)) {
         answer_json(out, &b, true);
         if (in->accept.type == MEDIA_NPY) out->type = "application/x-npy";
+        if (refine) refined_answer_tell(&notes, request.n_rhs, out);
     } else {
         answer_problem(out, &why);
     }
     buffer_free(&b);
+    refined_answer_free(&notes);
     radiosity_request_free(&request);
 }

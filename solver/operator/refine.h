@@ -97,10 +97,11 @@ void refinement_solve(refinement *s);
 /* What rounding makes of lit + P + r, or of P + r. */
 double refinement_sum_rounding(const refinement *s, size_t column);
 
-/* P + r of an element of a column: the answer. */
+/* P + r of an element of a column: the answer. Light is not negative, so what is below 0 is nearer there. */
 static inline double refinement_answer(const refinement *s, size_t column, size_t i) {
     const size_t at = column * s->refiner->op->n + i;
-    return s->P[at] + s->r[at];
+    const double sum = s->P[at] + s->r[at];
+    return sum > 0 ? sum : 0;
 }
 
 /* Y = F X for those columns of X that are chosen ([n_columns] of flags): [n_columns][n] both. */

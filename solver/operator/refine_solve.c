@@ -245,7 +245,7 @@ static bool judge(refinement *s, size_t c) {
     double largest = 0, answer = 0;
 #pragma omp simd reduction(max : largest, answer)
     for (size_t i = 0; i < n; i++) {
-        const double x = mean[i] * norm < peak ? mean[i] * norm : peak, sum = fabs(P[i] + r[i]);
+        const double x = mean[i] * norm < peak ? mean[i] * norm : peak, sum = P[i] + r[i];
         largest = x > largest ? x : largest;
         answer = sum > answer ? sum : answer;
     }

@@ -402,7 +402,6 @@ class Errors(unittest.TestCase):
 
     def test_not_yet(self):
         good = [1] * N
-        self.refuse({"emission": good, "tolerance": 1e-4}, 501, "tolerance", pointer="/tolerance")
         self.refuse({"emission": good, "reduce": {"groups": ["lamp"], "with": ["mean"]}}, 501, "reduce")
         for method, path in (("GET", "/v1/scenes/grey/mesh"), ("POST", "/v1/scenes/grey/adjoint"),
                              ("PUT", "/v1/scenes/grey/reflectance"), ("DELETE", "/v1/scenes/grey/reflectance"),
