@@ -175,14 +175,16 @@ done:
 }
 
 /* lit = E' 2^-exponent, the largest from 1/2 to 1; returns the exponent. */
-static int light_column(const refinement *s, size_t c, const double *E, const double *H0, double *lit) {
+static int light_column(refinement *s, size_t c, const double *E, const double *H0, double *lit) {
     const size_t n = s->refiner->op->n;
     const float *rho = s->columns[c].channel->rho;
     double largest = 0;
     int exponent = 0;
+    s->columns[c].lit_rounded = false;
     for (size_t i = 0; i < n; i++) {
         lit[i] = H0 != NULL ? E[i] + (double)rho[i] * H0[i] : E[i];
         largest = lit[i] > largest ? lit[i] : largest;
+        if (H0 != NULL && rho[i] > 0 && H0[i] > 0) s->columns[c].lit_rounded = true;
     }
     (void)frexp(largest, &exponent);
     for (size_t i = 0; i < n; i++) lit[i] = ldexp(lit[i], -exponent);
@@ -242,7 +244,6 @@ static lam_status refine_pass(refinement *s, size_t first, const request *asked,
     const double *E = asked->E + begin, *H0 = asked->H0 != NULL ? asked->H0 + begin : NULL;
     s->tolerance = asked->tolerance;
     s->count_sum = asked->quantity == LAM_RADIOSITY;
-    s->lit_rounded = H0 != NULL;
     for (size_t c = 0; c < s->n_columns; c++)
         exponents[c] = light_column(s, c, E + c * n, H0 != NULL ? H0 + c * n : NULL, s->lit + c * n);
     if (asked->start == NULL) {

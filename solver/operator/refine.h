@@ -46,6 +46,7 @@ enum { REFINE_WINDOW = 6, REFINE_PASSES_MOST = 5000 };
 /* One channel of one vector. All scalars bound the vectors of the same name in the maximum norm. */
 typedef struct refine_column {
     const refine_channel *channel;
+    bool lit_rounded; /* E' is a sum */
     bool done, stuck;
     bool from_dark;    /* P began again, with 0 */
     bool plain;        /* the next direction is r itself */
@@ -68,9 +69,8 @@ typedef struct refinement {
     bool help;    /* of the operator */
     bool weights; /* not to a tolerance, but until r is small enough for w = E' + P */
     double tolerance;
-    bool lit_rounded; /* E' is a sum */
-    bool count_sum;   /* what rounding makes of E' + the answer must fit into the tolerance too */
-    double *lit;      /* E' */
+    bool count_sum; /* what rounding makes of E' + the answer must fit into the tolerance too */
+    double *lit;    /* E' */
     double *P, *r, *z, *q;
     double *kept_Z, *kept_Q; /* [REFINE_WINDOW][columns][n] */
     double *X, *Y;           /* of a product, [n][CSR_DOUBLES_WIDTH] */

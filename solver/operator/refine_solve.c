@@ -214,7 +214,8 @@ double refinement_sum_rounding(const refinement *s, size_t column) {
     /* fl(P + r) is within u of itself, fl(E + fl(rho H0)) within 2u of E', which is at most 1, and fl(E' + P)
      * within u of itself; E' + 0 is E'. */
     const double P = s->columns[column].P;
-    return REFINE_U * (P + (s->count_sum ? (s->lit_rounded ? 2 : 0) + (P > 0 ? 1 + P : 0) : 0));
+    return REFINE_U *
+           (P + (s->count_sum ? (s->columns[column].lit_rounded ? 2 : 0) + (P > 0 ? 1 + P : 0) : 0));
 }
 
 /* (sum A x^2)^1/2 of an x of this maximum norm; squares of what is tiny would vanish. */
@@ -385,7 +386,8 @@ void refinement_solve(refinement *s) {
     const int n_threads = (int)s->refiner->op->n_threads;
     bool *active = s->active, *again = s->again;
     for (size_t c = 0; c < m; c++) {
-        s->columns[c] = (refine_column){.channel = s->columns[c].channel};
+        refine_column *col = &s->columns[c];
+        *col = (refine_column){.channel = col->channel, .lit_rounded = col->lit_rounded};
         again[c] = true;
     }
     find_residuals(s, again);
