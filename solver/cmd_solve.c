@@ -87,9 +87,9 @@ static const option_row rows[] = {
      .kind = OPTION_NUMBER,
      .offset = FIELD(tolerance),
      .value = "X",
-     .doc =
-         "Refines the answer in double until it is certified to be within X of its largest indirect light, "
-         "and writes double; of a store that keeps its form factors",
+     .doc = "Refines the answer in double until its certified error is at most X times the largest indirect "
+            "light, "
+            "and writes double; of a store that keeps its form factors",
      .low = 0,
      .high = 1,
      .low_open = true,

@@ -155,7 +155,7 @@ void lam_refiner_free(lam_refiner *refiner);
  * batch nor on threads; any number of threads may call. Cost: a product with F and one answer an iteration;
  * a factor of about a thirtieth of the error each for a low-rank operator of epsilon .1.
  * Errors: LAM_ERR_ARGUMENT; LAM_ERR_NUMERIC where the tolerance is more than double can certify, or than
- * 5000 iterations reach, with the bound reached; LAM_ERR_MEMORY. */
+ * 2000 iterations reach, with the bound reached; LAM_ERR_MEMORY. */
 lam_status lam_refine(const lam_refiner *refiner, size_t n_rhs, lam_quantity quantity, const double *E,
                       const double *H0, const float *start, double tolerance, double *out,
                       double *certificates, size_t *iterations, lam_error *error);

@@ -41,7 +41,7 @@ struct lam_refiner {
 };
 
 /* Directions that a new one is made orthogonal to. */
-enum { REFINE_WINDOW = 6, REFINE_PASSES_MOST = 5000 };
+enum { REFINE_WINDOW = 6, REFINE_PASSES_MOST = 2000 };
 
 /* One channel of one vector. All scalars bound the vectors of the same name in the maximum norm. */
 typedef struct refine_column {
