@@ -9,7 +9,8 @@
 
 struct catalog {
     const config *config;
-    pthread_mutex_t lock; /* of present */
+    pthread_mutex_t lock;   /* of present */
+    pthread_mutex_t stores; /* held while a store is open */
     catalog_snapshot *present;
 };
 
@@ -100,6 +101,7 @@ lam_status catalog_create(const config *c, catalog **out, lam_error *error) {
     made->config = c;
     made->present = empty;
     pthread_mutex_init(&made->lock, NULL);
+    pthread_mutex_init(&made->stores, NULL);
     *out = made;
     return status;
 }
@@ -108,6 +110,7 @@ void catalog_destroy(catalog *all) {
     if (all == NULL) return;
     catalog_release(all->present);
     pthread_mutex_destroy(&all->lock);
+    pthread_mutex_destroy(&all->stores);
     free(all);
 }
 
@@ -159,11 +162,15 @@ static const scene *insert(catalog_snapshot *snapshot, scene *s) {
     return NULL;
 }
 
-static void load_source(catalog_snapshot *next, const catalog_snapshot *before, const source *from,
-                        const config *c, FILE *out, FILE *problems) {
+static void load_source(catalog *all, catalog_snapshot *next, const catalog_snapshot *before,
+                        const source *from, FILE *out, FILE *problems) {
     lam_error error = {0};
     scene *loaded = NULL;
-    if (scene_open(from->path, from->name, c->verify, &loaded, &error) != LAM_OK) {
+    pthread_mutex_lock(&all->stores);
+    const lam_status status =
+        scene_open(from->path, from->name, all->config->verify, &all->stores, &loaded, &error);
+    pthread_mutex_unlock(&all->stores);
+    if (status != LAM_OK) {
         scene *old = find_before(before, from);
         if (old == NULL) {
             /* Most messages begin with the path, some (out of memory) do not. */
@@ -175,7 +182,7 @@ static void load_source(catalog_snapshot *next, const catalog_snapshot *before, 
                 error.message);
         loaded = scene_acquire(old);
     } else {
-        lam_operator_set_threads(loaded->op, c->threads);
+        lam_operator_set_threads(loaded->op, all->config->threads);
     }
     const scene *taken = insert(next, loaded);
     if (taken != NULL) {
@@ -203,7 +210,7 @@ size_t catalog_reload(catalog *all, FILE *out, FILE *problems) {
     next->scenes = memory_allocate(sources.count, sizeof *next->scenes, "catalog", &error);
     if (next->scenes == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < sources.count; i++)
-        load_source(next, before, &sources.items[i], all->config, out, problems);
+        load_source(all, next, before, &sources.items[i], out, problems);
     pthread_mutex_lock(&all->lock);
     catalog_snapshot *old = all->present;
     all->present = next;

@@ -20,7 +20,7 @@ bool answer_head(buffer *b, size_t n, size_t n_channels, const answer_notes *not
 }
 
 bool answer_tail(buffer *b, const answer_notes *notes) {
-    return (!notes->has_error ||
+    return (!notes->has_error || notes->certificates != NULL ||
             (buffer_append_text(b, ",\"error\":{\"relative_mean\":") &&
              json_write_double(b, notes->relative_mean) && buffer_append_text(b, ",\"indirect_mean\":") &&
              json_write_double(b, notes->indirect_mean) && buffer_append(b, "}", 1))) &&
@@ -43,15 +43,18 @@ bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, 
 }
 
 /* Refuses what would be written as something else than it is. */
+static bool refuse_range(double limit, problem *why) {
+    if (limit < (double)FLT_MAX)
+        return problem_set(why, 422, "the answer passes the range of half precision (%g); ask for dtype=f4",
+                           limit);
+    return problem_set(why, 422,
+                       "the answer passes the range of single precision (3.4e38); scale the emission");
+}
+
 static bool check_range(const float *x, size_t count, float limit, problem *why) {
     int bad = 0;
     for (size_t i = 0; i < count; i++) bad |= !(fabsf(x[i]) <= limit);
-    if (!bad) return true;
-    if (limit < FLT_MAX)
-        return problem_set(why, 422, "the answer passes the range of half precision (%g); ask for dtype=f4",
-                           (double)limit);
-    return problem_set(why, 422,
-                       "the answer passes the range of single precision (3.4e38); scale the emission");
+    return !bad || refuse_range((double)limit, why);
 }
 
 static bool add_row(buffer *b, const media_accept *as, const float *row, size_t n) {
@@ -103,8 +106,51 @@ bool answer_placed(buffer *b, const answer_shape *shape, problem *why) {
     return true;
 }
 
+/* Behind the channels of a vector before, what stands between; each vector in brackets where there are
+ * several. */
+static bool before_row(buffer *b, const answer_shape *shape, size_t vector, size_t c) {
+    if (c > 0) return buffer_append(b, ",", 1);
+    return (vector == 0 || buffer_append(b, ",", 1)) && (shape->n_channels == 1 || buffer_append(b, "[", 1));
+}
+
+static bool behind_row(buffer *b, const answer_shape *shape, size_t c) {
+    return shape->n_channels == 1 || c + 1 < shape->n_channels || buffer_append(b, "]", 1);
+}
+
+bool answer_add_doubles(buffer *b, const answer_shape *shape, const media_accept *as, size_t first,
+                        size_t count, const double *x, double *rounding, problem *why) {
+    const size_t C = shape->n_channels, n = shape->n_values;
+    const bool json = as->type == MEDIA_JSON;
+    const double limit = json || as->npy == NPY_F8 ? DBL_MAX
+                         : as->npy == NPY_F4       ? (double)FLT_MAX
+                                                   : (double)HALF_MAX;
+    for (size_t i = 0; i < count * C * n; i++)
+        if (!(fabs(x[i]) <= limit)) return refuse_range(limit, why);
+    for (size_t row = 0; row < count * C; row++) {
+        const double *values = x + row * n;
+        const bool written = json ? before_row(b, shape, first + row / C, row % C) &&
+                                        json_write_doubles(b, values, n) && behind_row(b, shape, row % C)
+                                  : npy_write_doubles(b, as->npy, values, n, rounding);
+        if (!written) return no_memory(why);
+    }
+    return true;
+}
+
+/* A number, or one for each vector of a batch. */
+static bool add_certificates(buffer *b, const answer_shape *shape, const answer_notes *notes) {
+    bool written = buffer_append_text(b, ",\"certificate\":") &&
+                   (shape->batch ? json_write_doubles(b, notes->certificates, shape->n_rhs)
+                                 : json_write_double(b, notes->certificates[0])) &&
+                   buffer_append_text(b, shape->batch ? ",\"iterations\":[" : ",\"iterations\":");
+    for (size_t v = 0; written && v < shape->n_rhs; v++)
+        written = buffer_printf(b, v > 0 ? ",%zu" : "%zu", notes->iterations[v]);
+    return written && (!shape->batch || buffer_append(b, "]", 1));
+}
+
 bool answer_end(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
                 problem *why) {
     if (as->type == MEDIA_NPY) return true;
-    return ((!shape->batch || buffer_append(b, "]", 1)) && answer_tail(b, notes)) || no_memory(why);
+    return ((!shape->batch || buffer_append(b, "]", 1)) &&
+            (notes->certificates == NULL || add_certificates(b, shape, notes)) && answer_tail(b, notes)) ||
+           no_memory(why);
 }

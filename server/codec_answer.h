@@ -21,6 +21,10 @@ typedef struct answer_notes {
     bool has_error;
     double relative_mean, indirect_mean;
     double parse_ms, solve_ms, encode_ms;
+    /* Of refined answers, in place of the store's error; else NULL: [n_rhs], what no number of a vector is
+     * further off by, and how often the form factors were multiplied for it. */
+    const double *certificates;
+    const size_t *iterations;
 } answer_notes;
 
 /* The beginning of any JSON answer, up to and with its quantity, and its end: what notes says, and the
@@ -45,6 +49,10 @@ bool answer_placed(buffer *b, const answer_shape *shape, problem *why);
 
 bool answer_add(buffer *b, const answer_shape *shape, const media_accept *as, size_t first, size_t count,
                 const float *x, problem *why);
+/* The same of refined answers. *rounding becomes the largest that a number was rounded by, if that is more
+ * than it was. */
+bool answer_add_doubles(buffer *b, const answer_shape *shape, const media_accept *as, size_t first,
+                        size_t count, const double *x, double *rounding, problem *why);
 bool answer_end(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
                 problem *why);
 

@@ -55,6 +55,14 @@ static bool read_select(parser *p) {
     return good;
 }
 
+static bool read_tolerance(parser *p) {
+    double *value = &p->request->tolerance;
+    if (!parser_expect(p, JSON_NUMBER, "a number above 0 and below 1")) return false;
+    if (!json_read_double(&p->r, value)) return parser_fault(p);
+    return (*value > 0 && *value < 1) ||
+           parser_refuse(p, 422, "%s = %.9g, must be above 0 and below 1", parser_here(p), *value);
+}
+
 static bool read_body(parser *p) {
     static const char *const names[] = {"emission", "emissions", "select", "quantity", "tolerance", "reduce"};
     enum { EMISSION, EMISSIONS, SELECT, QUANTITY, TOLERANCE, REDUCE, N_NAMES };
@@ -70,7 +78,7 @@ static bool read_body(parser *p) {
             p->pointer_length = 0;
             return parser_refuse(p, 422, "the body holds both emission and emissions, must hold one of them");
         }
-        if (p->scene->only_linear && which == SELECT) return parser_not_linear(p);
+        if (p->scene->only_linear && (which == SELECT || which == TOLERANCE)) return parser_not_linear(p);
         switch (which) {
         case EMISSION:
             good = parser_read_emission(p);
@@ -88,6 +96,9 @@ static bool read_body(parser *p) {
         case REDUCE:
             good = parser_read_reduce(p);
             break;
+        case TOLERANCE:
+            good = read_tolerance(p);
+            break;
         default:
             good = parser_refuse(p, 501, "%s is not supported yet", parser_here(p));
         }
@@ -95,6 +106,10 @@ static bool read_body(parser *p) {
         p->pointer_length = 0;
         if (p->request->reduce.on && p->request->select)
             return parser_refuse(p, 422, "the body holds both select and reduce, must hold one of them");
+        if (p->request->reduce.on && p->request->tolerance > 0)
+            return parser_refuse(
+                p, 501,
+                "figures of a refined answer are not supported yet; ask for its elements with select");
     }
     if (p->why->status != 0) return false;
     if (!json_finish(&p->r)) return parser_fault(p);

@@ -179,12 +179,19 @@ bool json_write_floats(buffer *b, const float *values, size_t count) {
 bool json_write_double(buffer *b, double value) {
     char text[32];
     assert(isfinite(value));
-    /* Whatever has up to 15 digits is printed as such, its zeros left out. */
-    for (int precision = 15; precision <= 17; precision++) {
-        snprintf(text, sizeof text, "%.*g", precision, value);
-        if (precision == 17 || strtod(text, NULL) == value) break;
-    }
+    /* Up to 15 digits come back as they were written, so what has fewer is told by 15, without its zeros; but
+     * near the least of doubles fewer do. */
+    int precision = fabs(value) < 1e-290 ? 1 : 15;
+    do snprintf(text, sizeof text, "%.*g", precision, value);
+    while (precision++ < 17 && strtod(text, NULL) != value);
     return buffer_append_text(b, text);
+}
+
+bool json_write_doubles(buffer *b, const double *values, size_t count) {
+    bool written = buffer_append(b, "[", 1);
+    for (size_t i = 0; written && i < count; i++)
+        written = (i == 0 || buffer_append(b, ",", 1)) && json_write_double(b, values[i]);
+    return written && buffer_append(b, "]", 1);
 }
 
 bool json_write_text(buffer *b, const char *text) {

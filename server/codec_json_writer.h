@@ -21,6 +21,9 @@ bool json_write_floats(buffer *b, const float *values, size_t count);
 /* Appends the shortest decimal that reads back as the same double; value must be finite. */
 bool json_write_double(buffer *b, double value);
 
+/* Appends [v0,v1,...] of them; false when memory is short. */
+bool json_write_doubles(buffer *b, const double *values, size_t count);
+
 /* Appends a text in quotes, escaped; bytes that are not UTF-8 become '?'. */
 bool json_write_text(buffer *b, const char *text);
 

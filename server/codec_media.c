@@ -58,7 +58,7 @@ static bool read_npy_type(const char *text, npy_type *type) {
 }
 
 media_accept media_choose(const char *header) {
-    media_accept chosen = {MEDIA_JSON, NPY_F4};
+    media_accept chosen = {MEDIA_JSON, NPY_F4, false};
     double json = -1.0, npy = 0.0; /* json below 0: not named */
     bool npy_first = false;
     cursor c = {header == NULL ? "" : header};
@@ -66,7 +66,7 @@ media_accept media_choose(const char *header) {
         char type[64];
         double q = 1.0;
         npy_type dtype = NPY_F4;
-        bool known = true;
+        bool known = true, given = false;
         take_piece(&c, ";,", type, sizeof type);
         while (*c.at == ';') {
             char key[16], value[32] = "";
@@ -79,7 +79,7 @@ media_accept media_choose(const char *header) {
             if (strcasecmp(key, "q") == 0)
                 q = read_quality(value);
             else if (strcasecmp(key, "dtype") == 0)
-                known = read_npy_type(value, &dtype);
+                given = known = read_npy_type(value, &dtype);
         }
         if (*c.at == ',') c.at++;
         if (strcasecmp(type, "application/json") == 0) {
@@ -87,6 +87,7 @@ media_accept media_choose(const char *header) {
         } else if (strcasecmp(type, "application/x-npy") == 0 && known && q > npy) {
             npy = q;
             chosen.npy = dtype;
+            chosen.npy_given = given;
             npy_first = json < 0.0;
         }
     }

@@ -14,6 +14,7 @@ media_type media_content_type(const char *header);
 typedef struct media_accept {
     media_type type; /* MEDIA_JSON or MEDIA_NPY */
     npy_type npy;
+    bool npy_given; /* with a dtype; else npy is <f4 */
 } media_accept;
 
 /* What to answer to an Accept header: NPY when it is named and not liked less than JSON, else JSON. */

@@ -273,3 +273,24 @@ bool npy_write_values(buffer *b, npy_type type, const float *values, size_t coun
     b->bytes[b->length] = '\0';
     return true;
 }
+
+bool npy_write_doubles(buffer *b, npy_type type, const double *values, size_t count, double *rounding) {
+    static const size_t sizes[] = {[NPY_F2] = 2, [NPY_F4] = 4, [NPY_F8] = 8};
+    size_t bytes;
+    if (!size_multiply(count, sizes[type], &bytes) || !buffer_reserve(b, bytes)) return false;
+    char *to = b->bytes + b->length;
+    for (size_t i = 0; i < count; i++) {
+        const float single = (float)values[i];
+        const uint16_t half = half_of_float(single);
+        const double kept =
+            type == NPY_F8 ? values[i] : (double)(type == NPY_F4 ? single : float_of_half(half));
+        const void *from = type == NPY_F8   ? (const void *)&values[i]
+                           : type == NPY_F4 ? (const void *)&single
+                                            : (const void *)&half;
+        *rounding = fmax(*rounding, fabs(kept - values[i]));
+        memcpy(to + i * sizes[type], from, sizes[type]);
+    }
+    b->length += bytes;
+    b->bytes[b->length] = '\0';
+    return true;
+}

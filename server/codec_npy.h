@@ -14,4 +14,8 @@ bool npy_write_header(buffer *b, npy_type type, size_t rank, const size_t *shape
 /* Appends values[0..count). */
 bool npy_write_values(buffer *b, npy_type type, const float *values, size_t count);
 
+/* The same of doubles, of which *rounding becomes the largest that a value was rounded by, if that is more
+ * than it was. */
+bool npy_write_doubles(buffer *b, npy_type type, const double *values, size_t count, double *rounding);
+
 #endif

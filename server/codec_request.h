@@ -48,6 +48,7 @@ typedef struct radiosity_request {
     uint32_t *selected;
     size_t n_selected;
     lam_quantity quantity;
+    double tolerance; /* of a refined answer, above 0 and below 1; 0: none is asked for */
 
     reduce_request reduce; /* figures of groups in place of vectors */
     side_rows sky;         /* radiances of its tiles */

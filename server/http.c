@@ -109,6 +109,15 @@ static bool check_head(request *r, const char *method, uint64_t length) {
 
 /* --- answers ------------------------------------------------------------------------------------------ */
 
+/* NPY has no place for what a refined answer carries. */
+static bool say_refined(struct MHD_Response *response, const answer *a) {
+    char certificate[32], iterations[24];
+    snprintf(certificate, sizeof certificate, "%.17g", a->certificate);
+    snprintf(iterations, sizeof iterations, "%zu", a->iterations);
+    return MHD_add_response_header(response, "Lambert-Certificate", certificate) == MHD_YES &&
+           MHD_add_response_header(response, "Lambert-Iterations", iterations) == MHD_YES;
+}
+
 static enum MHD_Result send_answer(request *r) {
     answer *a = &r->answer;
     const service *s = r->http->service;
@@ -131,6 +140,7 @@ static enum MHD_Result send_answer(request *r) {
         good = good && MHD_add_response_header(response, MHD_HTTP_HEADER_RETRY_AFTER, seconds);
     if (a->status == 401)
         good = good && MHD_add_response_header(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, "Bearer");
+    if (a->refined) good = good && say_refined(response, a);
     if (atomic_load(&s->state) == SERVICE_DRAINING)
         good = good && MHD_add_response_header(response, MHD_HTTP_HEADER_CONNECTION, "close");
     enum MHD_Result result = good ? MHD_queue_response(r->connection, a->status, response) : MHD_NO;

@@ -3,6 +3,7 @@
 #include "server/codec_answer.h"
 #include "server/codec_request.h"
 #include "server/radiosity_figures.h"
+#include "server/refined_answer.h"
 #include "server/routes.h"
 
 #include <stdlib.h>
@@ -25,6 +26,7 @@ typedef struct radiosity_solve {
 static void solve_free(radiosity_solve *s) {
     radiosity_request_free(&s->request);
     buffer_free(&s->answer);
+    refined_answer_free(&s->notes);
     free(s->own);
     free(s->figures);
     free(s->H0);
@@ -104,14 +106,19 @@ static bool begin(call *in, answer *out) {
                               .n_values = request->select ? request->n_selected : of->n};
     in->n_rhs = request->n_rhs;
     good = good && figures_acceptable(in, request, &why);
-    const bool linear = good && request->reduce.linear; /* answered at once, without a pass of its own */
-    good = linear ? figures_linear(in, &s->request, &s->notes, &s->answer, &why)
-                  : good && find_light(of, s, &why) && find_room(in, s, &why);
-    if (!good || linear) {
-        if (good)
+    /* Two that take no pass and are answered at once. */
+    const bool linear = good && request->reduce.linear, refine = good && request->tolerance > 0;
+    good = linear   ? figures_linear(in, &s->request, &s->notes, &s->answer, &why)
+           : refine ? refined_answer(in, request, &s->notes, &s->answer, &why)
+                    : good && find_light(of, s, &why) && find_room(in, s, &why);
+    if (!good || linear || refine) {
+        if (good) {
             answer_json(out, &s->answer, true);
-        else
+            if (refine && in->accept.type == MEDIA_NPY) out->type = "application/x-npy";
+            if (refine) refined_answer_tell(&s->notes, request->n_rhs, out);
+        } else {
             answer_problem(out, &why);
+        }
         solve_free(s);
         return false;
     }

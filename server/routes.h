@@ -30,6 +30,9 @@ typedef struct answer {
     buffer body;
     char allow[32];       /* of a 405 */
     unsigned retry_after; /* of a 503: seconds; 0: not said */
+    bool refined;         /* then, of its vectors, the largest: */
+    double certificate;
+    size_t iterations;
 } answer;
 
 typedef void route_handler(call *in, answer *out);

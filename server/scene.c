@@ -52,7 +52,8 @@ done:
     return status;
 }
 
-lam_status scene_open(const char *path, const char *name, bool verify, scene **out, lam_error *error) {
+lam_status scene_open(const char *path, const char *name, bool verify, pthread_mutex_t *stores, scene **out,
+                      lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
     scene *made = memory_allocate(1, sizeof *made, path, error);
@@ -80,6 +81,7 @@ lam_status scene_open(const char *path, const char *name, bool verify, scene **o
     TRY(adjoint_rows_create(ADJOINT_ROWS_BYTES, &made->rows, error));
     TRY(store_group_bytes(s, "/operator", &made->bytes, error));
     read_error(s, made);
+    TRY(refined_create(s, made->op, stores, &made->refined, error));
     TRY(scene_describe(s, made, &made->description, error));
     *out = made;
     made = NULL;
@@ -96,6 +98,7 @@ scene *scene_acquire(scene *s) {
 
 void scene_release(scene *s) {
     if (atomic_fetch_sub(&s->references, 1) != 1) return;
+    refined_destroy(s->refined);
     lam_operator_close(s->op);
     lam_sky_close(s->sky);
     adjoint_rows_destroy(s->rows);

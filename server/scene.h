@@ -5,6 +5,7 @@
 #include "lambert/lambert.h"
 #include "server/adjoint_rows.h"
 #include "server/groups.h"
+#include "server/refined.h"
 
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -27,12 +28,15 @@ typedef struct scene {
     bool has_error;    /* the store's total error, of its own lights or else of single elements */
     double relative_mean, indirect_mean;
     adjoint_rows *rows; /* what reduces by a product; any thread */
+    refined *refined;   /* what refining its answers takes, found when it is first asked for */
 } scene;
 
 /* Reads the store at path; its file is closed again before this returns. name NULL: the store's own.
  * With verify everything in the file is compared with its checksums, also what is not read.
- * Errors: as store_open and operator_load; each names the path. One thread at a time. */
-lam_status scene_open(const char *path, const char *name, bool verify, scene **out, lam_error *error);
+ * stores outlives the scene: whoever opens a store holds it, the caller of this too.
+ * Errors: as store_open and operator_load; each names the path. */
+lam_status scene_open(const char *path, const char *name, bool verify, pthread_mutex_t *stores, scene **out,
+                      lam_error *error);
 
 /* Another user; every one gives it back with scene_release. Any thread. */
 scene *scene_acquire(scene *s);

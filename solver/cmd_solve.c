@@ -1,5 +1,6 @@
 /* lambert solve: lights a store and writes what it answers. */
 #include "solver/annual.h"
+#include "solver/emission_refine.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky.h"
 #include "solver/output.h"
@@ -16,7 +17,7 @@
 typedef struct fields {
     option_list emit, reduce, annual;
     const char *emission, *sky, *weather, *sun, *quantity, *output, *occupied;
-    double hours;
+    double hours, tolerance;
     uint64_t sun_points;
     bool photometric;
 } fields;
@@ -82,7 +83,17 @@ static const option_row rows[] = {
      .offset = FIELD(reduce),
      .value = "GROUP=FIGURE",
      .doc = "mean, sum, min, max, uniformity or variance of a group; again for more"},
-    {.name = "tolerance", .kind = OPTION_LATER, .value = "X", .doc = "(not supported yet)"},
+    {.name = "tolerance",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(tolerance),
+     .value = "X",
+     .doc = "Refines the answer in double until its certified error is at most X times the largest indirect "
+            "light, "
+            "and writes double; of a store that keeps its form factors",
+     .low = 0,
+     .high = 1,
+     .low_open = true,
+     .high_open = true},
     {.kind = OPTION_HEADING,
      .doc = "a year: figures an element of a batch of skies or emissions, in place of the batch"},
     {.name = "annual",
@@ -178,6 +189,24 @@ done:
     return status;
 }
 
+/* What came of refining, for the log and the file. */
+static void tell_refined(const refined_light *refined, solution *out, double tolerance, terminal *t) {
+    double certificate = 0;
+    size_t iterations = 0;
+    out->refined = refined->values;
+    out->certificates = refined->certificates;
+    out->iterations = refined->iterations;
+    for (size_t v = 0; v < out->n_vectors; v++) {
+        certificate = fmax(certificate, refined->certificates[v]);
+        if (refined->iterations[v] > iterations) iterations = refined->iterations[v];
+    }
+    terminal_log(t,
+                 "refined to %g: no %s is further than %.3g from that of the store's form factors; %zu "
+                 "iteration%s%s",
+                 tolerance, out->quantity, certificate, iterations, iterations == 1 ? "" : "s",
+                 out->n_vectors > 1 ? " at most" : "");
+}
+
 static lam_status solve(const char *path, const fields *f, const annual_wish *year, reduction *reductions,
                         terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
@@ -188,6 +217,7 @@ static lam_status solve(const char *path, const fields *f, const annual_wish *ye
     emission light = {0};
     double *row_sums = NULL;
     float *values = NULL;
+    refined_light refined = {0};
     char *scene = NULL;
     uint32_t *selected = NULL;
     size_t n_selected = 0;
@@ -235,12 +265,17 @@ static lam_status solve(const char *path, const fields *f, const annual_wish *ye
     if (year->n_figures > 0) {
         out.names = names;
         TRY(solve_year(year, &light, op, sky, n_selected, selected, t, &out, &values, error));
+    } else if (f->tolerance > 0) {
+        TRY(emission_refine(&light, path, op, sky, quantity_of(f->quantity), f->tolerance, terminal_check,
+                            &refined, error));
+        tell_refined(&refined, &out, f->tolerance, t);
     } else {
         TRY(emission_apply(&light, op, sky, quantity_of(f->quantity), n_selected, selected, terminal_check,
                            &values, error));
     }
     out.values = values;
-    stated_error(s, &out.relative, &out.indirect);
+    out.relative = out.indirect = -1;
+    if (f->tolerance == 0) stated_error(s, &out.relative, &out.indirect);
     if (f->output != NULL)
         TRY(output_write(&out, f->output, error));
     else
@@ -249,6 +284,7 @@ done:
     free(scene);
     free(selected);
     free(values);
+    refined_light_free(&refined);
     free(row_sums);
     emission_free(&light);
     sunlight_free(&sun);
@@ -291,6 +327,8 @@ int cmd_solve(int argc, char **argv) {
         return options_usage(verb.name, "--sun and --photometric are for --weather");
     if (strcmp(f.sun, "exact") != 0 && options_given(&verb, &given, "sun-points"))
         return options_usage(verb.name, "--sun-points is for --sun exact");
+    if (f.tolerance > 0 && f.annual.count > 0)
+        return options_usage(verb.name, "--tolerance is not for --annual");
     if (emission_check_items(&f.emit, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
     if (f.output != NULL && output_check(f.output, f.reduce.count > 0, &error) != LAM_OK)
         return options_usage(verb.name, "%s", error.message);

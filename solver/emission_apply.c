@@ -1,6 +1,7 @@
 #include "solver/emission_apply.h"
 
-#include "solver/operator/operator.h"
+#include "solver/operator/emitters.h"
+#include "solver/operator/sky.h"
 #include "solver/sunlight.h"
 
 #include <math.h>
@@ -127,6 +128,47 @@ lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors
     else
         TRY(lam_operator_apply_lit(p->op, n, p->quantity, p->E, p->H0, out, p->work, p->work_bytes, error));
 done:
+    return status;
+}
+
+lam_status emission_pass_light(emission_pass *p, size_t n, const size_t *vectors, double *E, double *H0,
+                               bool *H0_there, float *start, lam_error *error) {
+    lam_status status = LAM_OK;
+    const emission *e = p->light;
+    const size_t C = lam_operator_channels(p->op), n_elements = lam_operator_elements(p->op);
+    double *L = NULL;
+    if (!e->steady) gather(n, vectors, C * n_elements, e->E, p->E);
+    if (e->L != NULL) gather(n, vectors, C * lam_sky_tiles(p->sky), e->L, p->L);
+    *H0_there = p->W != NULL || p->H0 != NULL;
+    if (p->W != NULL) {
+        if (p->sun != NULL)
+            FAIL(error, LAM_ERR_UNSUPPORTED,
+                 "--tolerance beside --sun exact of a store of few emitters is not supported yet; use --sun "
+                 "tiles, or a store of another method");
+        TRY(find_weights(p, n, vectors, error));
+        TRY(operator_emitters_light_double(p->op, n, p->W, E, H0, error));
+        TRY(lam_operator_apply_emitters(p->op, n, LAM_INDIRECT, p->W, n_elements, NULL, start, p->work,
+                                        p->work_bytes, error));
+        goto done;
+    }
+    for (size_t k = 0; k < n * C * n_elements; k++) E[k] = (double)p->E[k];
+    if (!*H0_there) goto done;
+    memset(H0, 0, n * C * n_elements * sizeof *H0);
+    if (p->L != NULL) {
+        const size_t count = n * C * lam_sky_tiles(p->sky);
+        L = memory_allocate(count, sizeof *L, "skies", error);
+        if (L == NULL) TRY(LAM_ERR_MEMORY);
+        for (size_t k = 0; k < count; k++) L[k] = (double)p->L[k];
+        sky_irradiance_double(p->sky, n * C, L, H0);
+    }
+    if (p->sun == NULL) goto done;
+    sunlight_irradiance(e->sun, n, vectors, p->sun, p->sun_work);
+    for (size_t row = 0; row < n * C; row++)
+        for (size_t i = 0; i < n_elements; i++)
+            H0[row * n_elements + i] =
+                fmax(H0[row * n_elements + i] + (double)p->sun[row / C * n_elements + i], 0);
+done:
+    free(L);
     return status;
 }
 

@@ -39,6 +39,12 @@ lam_status emission_apply(const emission *e, const lam_operator *op, const lam_s
                           lam_quantity quantity, size_t n_selected, const uint32_t *selected,
                           lam_status (*stop)(lam_error *error), float **values, lam_error *error);
 
+/* What refines the n vectors of these numbers: E and H0 [n][C][elements] in double; *H0_there whether there
+ * is any; of an operator of few emitters also the indirect light that it answers, start [n][C][elements].
+ * Errors as emission_pass_solve; LAM_ERR_UNSUPPORTED for the sun on such an operator. */
+lam_status emission_pass_light(emission_pass *p, size_t n, const size_t *vectors, double *E, double *H0,
+                               bool *H0_there, float *start, lam_error *error);
+
 /* Answers of chosen elements to their places: to [n_rows][n] of from [n_rows][n_selected]. */
 void emission_scatter(size_t n_rows, size_t n, size_t n_selected, const uint32_t *selected, const float *from,
                       float *to);

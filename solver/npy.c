@@ -138,11 +138,11 @@ done:
     return status;
 }
 
-void npy_write(FILE *stream, int rank, const size_t *dims, const float *values) {
-    enum { BLOCK = 4096 }; /* a year of a city is gigabytes: number by number takes longer than solving it */
+/* The header of an array of this type; returns how many values follow. */
+static size_t write_header(FILE *stream, const char *type, int rank, const size_t *dims) {
     char header[256];
     size_t count = 1, length;
-    length = (size_t)sprintf(header, "{'descr': '<f4', 'fortran_order': False, 'shape': (");
+    length = (size_t)sprintf(header, "{'descr': '%s', 'fortran_order': False, 'shape': (", type);
     for (int i = 0; i < rank; i++) {
         length += (size_t)sprintf(header + length, "%zu,", dims[i]);
         count *= dims[i];
@@ -155,11 +155,29 @@ void npy_write(FILE *stream, int rank, const size_t *dims, const float *values) 
     fputc((int)(length & 0xFF), stream);
     fputc((int)(length >> 8), stream);
     fwrite(header, 1, length, stream);
+    return count;
+}
+
+enum { BLOCK = 4096 }; /* a year of a city is gigabytes: number by number takes longer than solving it */
+
+void npy_write(FILE *stream, int rank, const size_t *dims, const float *values) {
+    const size_t count = write_header(stream, "<f4", rank, dims);
     for (size_t first = 0; first < count; first += BLOCK) {
         const size_t some = count - first < BLOCK ? count - first : BLOCK;
         uint32_t bits[BLOCK];
         memcpy(bits, values + first, some * sizeof *bits);
         for (size_t k = 0; k < some; k++) bits[k] = htole32(bits[k]);
+        fwrite(bits, sizeof *bits, some, stream);
+    }
+}
+
+void npy_write_double(FILE *stream, int rank, const size_t *dims, const double *values) {
+    const size_t count = write_header(stream, "<f8", rank, dims);
+    for (size_t first = 0; first < count; first += BLOCK) {
+        const size_t some = count - first < BLOCK ? count - first : BLOCK;
+        uint64_t bits[BLOCK];
+        memcpy(bits, values + first, some * sizeof *bits);
+        for (size_t k = 0; k < some; k++) bits[k] = htole64(bits[k]);
         fwrite(bits, sizeof *bits, some, stream);
     }
 }

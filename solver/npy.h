@@ -23,4 +23,7 @@ lam_status npy_read(const char *path, npy *out, lam_error *error);
 /* Writes <f4; a failed write is seen by ferror(stream). */
 void npy_write(FILE *stream, int rank, const size_t *dims, const float *values);
 
+/* The same, <f8. */
+void npy_write_double(FILE *stream, int rank, const size_t *dims, const double *values);
+
 #endif

@@ -34,13 +34,23 @@ void output_column(const solution *s, size_t vector, size_t channel, char name[O
         snprintf(name + length, OUTPUT_COLUMN - (size_t)length, "_c%zu", channel);
 }
 
+void output_figures(const solution *s, const bool *inside, size_t column, double figures[REDUCE_COUNT]) {
+    if (s->values != NULL)
+        reduce_compute(s->m, inside, s->values + column * s->m->n, figures);
+    else
+        reduce_compute_double(s->m, inside, s->refined + column * s->m->n, figures);
+}
+
 static void output_npy(const solution *s, FILE *stream) {
     size_t dims[3];
     int rank = 0;
     if (s->batch) dims[rank++] = s->n_vectors;
     if (s->m->n_channels > 1) dims[rank++] = s->m->n_channels;
     dims[rank++] = s->m->n;
-    npy_write(stream, rank, dims, s->values);
+    if (s->values != NULL)
+        npy_write(stream, rank, dims, s->values);
+    else
+        npy_write_double(stream, rank, dims, s->refined);
 }
 
 lam_status output_write(const solution *s, const char *path, lam_error *error) {

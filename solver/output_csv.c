@@ -36,7 +36,7 @@ static void elements(const solution *s, FILE *stream) {
         quoted(m->group_names[m->group[i]], stream);
         fprintf(stream, ",%.9g", m->area[i]);
         for (size_t k = 0; k < s->n_vectors * m->n_channels; k++)
-            fprintf(stream, ",%.9g", (double)s->values[k * m->n + i]);
+            fprintf(stream, ",%.*g", output_digits(s), output_value(s, k * m->n + i));
         fputs("\n", stream);
     }
 }
@@ -51,9 +51,9 @@ static void figures(const solution *s, FILE *stream) {
             fprintf(stream, ",%s", reduce_name((reduce_statistic)k));
             for (size_t column = 0; column < s->n_vectors * m->n_channels; column++) {
                 double out[REDUCE_COUNT];
-                reduce_compute(m, s->reductions[r].inside, s->values + column * m->n, out);
+                output_figures(s, s->reductions[r].inside, column, out);
                 if (isfinite(out[k]))
-                    fprintf(stream, ",%.9g", out[k]);
+                    fprintf(stream, ",%.*g", output_digits(s), out[k]);
                 else
                     fputc(',', stream);
             }

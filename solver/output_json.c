@@ -4,22 +4,19 @@
 #include <jansson.h>
 #include <math.h>
 
-/* Nine digits give back the same single-precision number. */
-#define FLOAT_DIGITS JSON_REAL_PRECISION(9)
-
-static json_t *row(const float *values, size_t n) {
+static json_t *row(const solution *s, size_t column) {
+    const size_t n = s->m->n;
     json_t *out = json_array();
-    for (size_t i = 0; i < n; i++) json_array_append_new(out, json_real((double)values[i]));
+    for (size_t i = 0; i < n; i++) json_array_append_new(out, json_real(output_value(s, column * n + i)));
     return out;
 }
 
 /* [n], or [C][n] for more than one channel. */
 static json_t *vector(const solution *s, size_t v) {
-    const size_t n = s->m->n, n_channels = s->m->n_channels;
-    const float *values = s->values + v * n_channels * n;
-    if (n_channels == 1) return row(values, n);
+    const size_t n_channels = s->m->n_channels;
+    if (n_channels == 1) return row(s, v);
     json_t *out = json_array();
-    for (size_t c = 0; c < n_channels; c++) json_array_append_new(out, row(values + c * n, n));
+    for (size_t c = 0; c < n_channels; c++) json_array_append_new(out, row(s, v * n_channels + c));
     return out;
 }
 
@@ -29,7 +26,7 @@ static json_t *number_or_null(double x) {
 
 /* One group's figures of one vector: a number each, or one per channel. */
 static void reduce_into(const solution *s, const reduction *r, size_t v, json_t *groups) {
-    const size_t n = s->m->n, n_channels = s->m->n_channels;
+    const size_t n_channels = s->m->n_channels;
     json_t *out = json_object_get(groups, r->group);
     if (out == NULL) {
         out = json_object();
@@ -39,7 +36,7 @@ static void reduce_into(const solution *s, const reduction *r, size_t v, json_t 
         if (r->wanted[k]) json_object_set_new(out, reduce_name((reduce_statistic)k), json_array());
     for (size_t c = 0; c < n_channels; c++) {
         double figures[REDUCE_COUNT];
-        reduce_compute(s->m, r->inside, s->values + (v * n_channels + c) * n, figures);
+        output_figures(s, r->inside, v * n_channels + c, figures);
         for (int k = 0; k < REDUCE_COUNT; k++) {
             const char *name = reduce_name((reduce_statistic)k);
             if (!r->wanted[k]) continue;
@@ -55,6 +52,19 @@ static json_t *groups_of(const solution *s, size_t v) {
     json_t *groups = json_object();
     for (size_t i = 0; i < s->n_reductions; i++) reduce_into(s, &s->reductions[i], v, groups);
     return groups;
+}
+
+/* What a refined answer carries: a number, or one for each vector of a batch. */
+static void set_figures(const solution *s, json_t *answer) {
+    json_t *certificates = json_array(), *iterations = json_array();
+    for (size_t v = 0; v < s->n_vectors; v++) {
+        json_array_append_new(certificates, json_real(s->certificates[v]));
+        json_array_append_new(iterations, json_integer((json_int_t)s->iterations[v]));
+    }
+    json_object_set(answer, "certificate", s->batch ? certificates : json_array_get(certificates, 0));
+    json_object_set(answer, "iterations", s->batch ? iterations : json_array_get(iterations, 0));
+    json_decref(certificates);
+    json_decref(iterations);
 }
 
 lam_status output_json(const solution *s, FILE *stream, lam_error *error) {
@@ -79,11 +89,14 @@ lam_status output_json(const solution *s, FILE *stream, lam_error *error) {
     }
     const char *what = s->names != NULL ? "annual" : reduced ? "groups" : s->quantity;
     json_object_set_new(answer, what, values);
-    if (s->relative >= 0)
+    if (s->certificates != NULL)
+        set_figures(s, answer);
+    else if (s->relative >= 0)
         json_object_set_new(
             answer, "error",
             json_pack("{s:f, s:f}", "relative_mean", s->relative, "indirect_mean", s->indirect));
-    if (json_dumpf(answer, stream, JSON_COMPACT | FLOAT_DIGITS) != 0 && !ferror(stream))
+    if (json_dumpf(answer, stream, JSON_COMPACT | JSON_REAL_PRECISION((size_t)output_digits(s))) != 0 &&
+        !ferror(stream))
         FAIL(error, LAM_ERR_MEMORY, "not enough memory to write the answer as JSON; write .npy");
     fputc('\n', stream);
 done:

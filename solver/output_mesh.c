@@ -39,7 +39,8 @@ void output_ply(const solution *s, FILE *stream) {
         for (size_t k = 0; k < mesh_corners(m, i); k++) numbers[k] = htole32(m->elements[i][k]);
         numbers[mesh_corners(m, i)] = htole32(m->group[i]);
         fwrite(numbers, sizeof numbers[0], mesh_corners(m, i) + 1, stream);
-        for (size_t k = 0; k < s->n_vectors * m->n_channels; k++) put_float(s->values[k * m->n + i], stream);
+        for (size_t k = 0; k < s->n_vectors * m->n_channels; k++)
+            put_float((float)output_value(s, k * m->n + i), stream);
     }
 }
 
@@ -82,10 +83,11 @@ void output_vtu(const solution *s, FILE *stream) {
     CLOSE_ARRAY();
     for (size_t v = 0; v < s->n_vectors; v++)
         for (size_t c = 0; c < m->n_channels; c++) {
-            const float *values = s->values + (v * m->n_channels + c) * m->n;
+            const size_t column = v * m->n_channels + c;
             output_column(s, v, c, name);
             OPEN_ARRAY("Float32", name, 1);
-            for (size_t i = 0; i < m->n; i++) fprintf(stream, "%.9g\n", (double)values[i]);
+            for (size_t i = 0; i < m->n; i++)
+                fprintf(stream, "%.9g\n", (double)(float)output_value(s, column * m->n + i));
             CLOSE_ARRAY();
         }
     fputs("</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n", stream);

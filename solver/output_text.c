@@ -38,7 +38,7 @@ static void print_means(const solution *s, bool *inside) {
         inside[g] = true;
         for (size_t k = 0; k < s->n_vectors * s->m->n_channels; k++) {
             double figures[REDUCE_COUNT];
-            reduce_compute(s->m, inside, s->values + k * s->m->n, figures);
+            output_figures(s, inside, k, figures);
             printf(" %*.6g", column_width(s, k), figures[REDUCE_MEAN]);
         }
         putchar('\n');
@@ -53,7 +53,7 @@ static void print_reductions(const solution *s) {
             printf("%-24s %-10s", s->reductions[r].group, reduce_name((reduce_statistic)k));
             for (size_t column = 0; column < s->n_vectors * s->m->n_channels; column++) {
                 double figures[REDUCE_COUNT];
-                reduce_compute(s->m, s->reductions[r].inside, s->values + column * s->m->n, figures);
+                output_figures(s, s->reductions[r].inside, column, figures);
                 printf(" %*.6g", column_width(s, column), figures[k]);
             }
             putchar('\n');

@@ -64,19 +64,23 @@ done:
     return status;
 }
 
-void reduce_compute(const mesh *m, const bool *inside, const float *x, double out[REDUCE_COUNT]) {
+/* Of narrow, or else of wide. */
+static void compute(const mesh *m, const bool *inside, const float *narrow, const double *wide,
+                    double out[REDUCE_COUNT]) {
     double area = 0, sum = 0, squares = 0, low = INFINITY, high = -INFINITY;
     for (size_t i = 0; i < m->n; i++) {
         if (!inside[m->group[i]]) continue;
-        const double value = (double)x[i];
+        const double value = narrow != NULL ? (double)narrow[i] : wide[i];
         area += m->area[i];
         sum += m->area[i] * value;
         low = fmin(low, value);
         high = fmax(high, value);
     }
     const double mean = sum / area;
-    for (size_t i = 0; i < m->n; i++)
-        if (inside[m->group[i]]) squares += m->area[i] * ((double)x[i] - mean) * ((double)x[i] - mean);
+    for (size_t i = 0; i < m->n; i++) {
+        const double value = narrow != NULL ? (double)narrow[i] : wide[i];
+        if (inside[m->group[i]]) squares += m->area[i] * (value - mean) * (value - mean);
+    }
     const bool any = area > 0;
     out[REDUCE_MEAN] = any ? mean : NAN;
     out[REDUCE_SUM] = any ? sum : NAN;
@@ -84,4 +88,12 @@ void reduce_compute(const mesh *m, const bool *inside, const float *x, double ou
     out[REDUCE_MAX] = any ? high : NAN;
     out[REDUCE_UNIFORMITY] = any && mean != 0 ? low / mean : NAN;
     out[REDUCE_VARIANCE] = any ? squares / area : NAN;
+}
+
+void reduce_compute(const mesh *m, const bool *inside, const float *x, double out[REDUCE_COUNT]) {
+    compute(m, inside, x, NULL, out);
+}
+
+void reduce_compute_double(const mesh *m, const bool *inside, const double *x, double out[REDUCE_COUNT]) {
+    compute(m, inside, NULL, x, out);
 }

@@ -33,5 +33,6 @@ void reduce_free(reduction *r);
 
 /* Every statistic of x, [n], over the elements of the groups marked inside; NaN where it has no value. */
 void reduce_compute(const mesh *m, const bool *inside, const float *x, double out[REDUCE_COUNT]);
+void reduce_compute_double(const mesh *m, const bool *inside, const double *x, double out[REDUCE_COUNT]);
 
 #endif

@@ -132,6 +132,48 @@ lam_status lam_operator_apply_adjoint(const lam_operator *op, size_t n_rhs, lam_
                                       const float *g, float *w, void *work, size_t work_bytes,
                                       lam_error *error);
 
+/* The form factors F that a store keeps (lambert precompute --keep-form-factors), as rows of single
+ * precision, 8 bytes an entry; immutable once open. */
+typedef struct lam_form_factors lam_form_factors;
+
+/* Opens the store at path and loads them; *F is NULL when it keeps none. The caller closes them with
+ * lam_form_factors_close. Takes half as much memory again while it expands what a store of more than 10,240
+ * elements keeps. Errors and threads as lam_operator_open. */
+lam_status lam_form_factors_open(const char *path, lam_form_factors **F, lam_error *error);
+
+/* Frees them; NULL is allowed. */
+void lam_form_factors_close(lam_form_factors *F);
+
+/* Bytes that one product with F reads. */
+size_t lam_form_factors_bytes(const lam_form_factors *F);
+
+/* Answers of an operator refined in double until their error is certified against F; immutable. */
+typedef struct lam_refiner lam_refiner;
+
+/* Makes ready: finds a bound on |(I - R F)^-1| for every channel. op and F are of one store and outlive it.
+ * Freed by lam_refiner_free. Allocates; uses the threads that op was told. Cost: a few products with F.
+ * Errors: LAM_ERR_ARGUMENT (another number of elements), LAM_ERR_MEMORY, LAM_ERR_NUMERIC (reflectance times
+ * row sum is too close to 1 for anything to be certified). */
+lam_status lam_refiner_create(const lam_operator *op, const lam_form_factors *F, lam_refiner **out,
+                              lam_error *error);
+void lam_refiner_free(lam_refiner *refiner);
+
+/* out = the quantity of B = E' + R F B for a batch, E' = E + rho H0, with a certified error: in every channel
+ *     |B - B~| <= tolerance |B~ - E'|      in the maximum norm, 0 < tolerance < 1
+ * (where nothing bounces B~ is E', with the rounding of E + rho H0).
+ * E, H0 (NULL: none) and out are [n_rhs][C][n] in mesh order; E and H0 from 0 to 1e100.
+ * certificates [n_rhs] gets what no number of that vector of out is further than from the quantity that F
+ * gives, in the unit of E, rounding counted; iterations [n_rhs] how often F was multiplied for it.
+ * start [n_rhs][C][n] is a first guess of the indirect light, NULL: the operator's answer, or 0 of an
+ * operator of few emitters, which refines without its help. Allocates. A vector's bits depend neither on its
+ * batch nor on threads; any number of threads may call. Cost: a product with F and one answer an iteration;
+ * a factor of about a thirtieth of the error each for a low-rank operator of epsilon .1.
+ * Errors: LAM_ERR_ARGUMENT; LAM_ERR_NUMERIC where the tolerance is more than double can certify, or than
+ * 2000 iterations reach, with the bound reached; LAM_ERR_MEMORY. */
+lam_status lam_refine(const lam_refiner *refiner, size_t n_rhs, lam_quantity quantity, const double *E,
+                      const double *H0, const float *start, double tolerance, double *out,
+                      double *certificates, size_t *iterations, lam_error *error);
+
 /* What the elements of a store receive directly from the tiles of a sky: immutable once open. */
 typedef struct lam_sky lam_sky;
 

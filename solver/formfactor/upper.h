@@ -5,13 +5,7 @@
 
 #include "solver/formfactor/found_rows.h"
 #include "solver/operator/csr.h"
-
-#include <math.h>
-
-/* F_ij from g_ij: both ends of a pair are rounded from one number. */
-static inline float upper_factor(float exchange, double area) {
-    return (float)fmin((double)exchange / area, 1);
-}
+#include "solver/operator/form_factor_rows.h"
 
 /* Merges c_ij and c_ji of rows (rays each; weights as if of one ray) into
  *     g_ij = (c_ij + c_ji)/rays * A_i A_j/(A_i + A_j)

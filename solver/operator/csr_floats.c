@@ -6,8 +6,11 @@
 #endif
 
 /* Sums that take turns: additions wait for each other less. */
-enum { TURNS = 4, WIDTHS = 4 };
-static const size_t widths[WIDTHS] = {1, 8, 16, 32};
+enum { TURNS = 4, WIDTHS = 4, NARROW = 8, MIDDLE = 16, WIDE = 32 };
+static const size_t widths[WIDTHS] = {1, NARROW, MIDDLE, WIDE};
+
+typedef float number;
+typedef csr_float_row row_function;
 
 typedef float lane4 __attribute__((vector_size(16), may_alias));
 
@@ -20,7 +23,7 @@ typedef float lane4 __attribute__((vector_size(16), may_alias));
 #define LANE_STORE(p, x) (*(lane4 *)(p) = (x))
 #define SCALAR_FMA(a, b, c) ((a) * (b) + (c))
 #define AT_ONCE 8
-#include "solver/operator/csr_floats_each.h"
+#include "solver/operator/csr_side_by_side.h"
 
 #if defined(__x86_64__)
 #define KERNEL(name) name##_avx2
@@ -32,7 +35,7 @@ typedef float lane4 __attribute__((vector_size(16), may_alias));
 #define LANE_STORE(p, x) _mm256_storeu_ps(p, x)
 #define SCALAR_FMA(a, b, c) __builtin_fmaf(a, b, c)
 #define AT_ONCE 16
-#include "solver/operator/csr_floats_each.h"
+#include "solver/operator/csr_side_by_side.h"
 
 #define KERNEL(name) name##_avx512
 #define TARGET __attribute__((target("avx512f,fma")))
@@ -43,8 +46,8 @@ typedef float lane4 __attribute__((vector_size(16), may_alias));
 #define LANE_STORE(p, x) _mm512_storeu_ps(p, x)
 #define SCALAR_FMA(a, b, c) __builtin_fmaf(a, b, c)
 #define AT_ONCE 32
-#define ROW_OF_8 row_of_8_avx2 /* half a register; the bits are the same */
-#include "solver/operator/csr_floats_each.h"
+#define ROW_NARROW row_narrow_avx2 /* half a register; the bits are the same */
+#include "solver/operator/csr_side_by_side.h"
 #endif
 
 size_t csr_floats_width(size_t n_vectors) {

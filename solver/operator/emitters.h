@@ -47,4 +47,8 @@ const emitters *operator_emitters_of(const lam_operator *op);
 lam_status operator_emitters_light(const lam_operator *op, size_t n_rhs, const float *W, float *E, float *H0,
                                    lam_error *error);
 
+/* The same in double, for refined answers. */
+lam_status operator_emitters_light_double(const lam_operator *op, size_t n_rhs, const float *W, double *E,
+                                          double *H0, lam_error *error);
+
 #endif

@@ -1,6 +1,8 @@
 /* What an operator of few emitters answers: B = sum_k w_k B_k, its weights from an emission, its adjoint. */
 #include "solver/operator/emitters.h"
 
+#include "solver/operator/sky.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -123,6 +125,31 @@ lam_status operator_emitters_light(const lam_operator *op, size_t n_rhs, const f
         if (self->a.L == NULL) continue;
         sum_tiles(self, row % C, w, L);
         lam_sky_irradiance(self->a.sky, 1, L, H0 + row * n);
+    }
+    free(L);
+    return LAM_OK;
+}
+
+lam_status operator_emitters_light_double(const lam_operator *op, size_t n_rhs, const float *W, double *E,
+                                          double *H0, lam_error *error) {
+    const emitters *self = operator_emitters_of(op);
+    const emitter_arrays *a = &self->a;
+    const size_t n = op->n, C = op->n_channels, s = a->s, m = a->n_tiles;
+    double *L = memory_allocate(m + 1, sizeof *L, "emitters", error);
+    if (L == NULL) return LAM_ERR_MEMORY;
+    memset(E, 0, n_rhs * C * n * sizeof *E);
+    memset(H0, 0, n_rhs * C * n * sizeof *H0);
+    for (size_t row = 0; row < n_rhs * C; row++) {
+        memset(L, 0, m * sizeof *L);
+        for (size_t k = 0; k < s; k++) {
+            const size_t of = row % C * s + k;
+            const double w = (double)W[row * s + k];
+            if (w == 0) continue;
+            for (uint64_t e = a->ends[of]; e < a->ends[of + 1]; e++)
+                E[row * n + a->elements[e]] += w * (double)a->values[e];
+            for (size_t t = 0; a->L != NULL && t < m; t++) L[t] += w * (double)a->L[of * m + t];
+        }
+        if (a->L != NULL) sky_irradiance_double(a->sky, 1, L, H0 + row * n);
     }
     free(L);
     return LAM_OK;

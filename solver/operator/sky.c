@@ -104,6 +104,19 @@ void lam_sky_irradiance(const lam_sky *sky, size_t n_rows, const float *L, float
     }
 }
 
+void sky_irradiance_double(const lam_sky *sky, size_t n_rows, const double *L, double *H0) {
+    const size_t m = sky->n_tiles, n = sky->n;
+    memset(H0, 0, n_rows * n * sizeof *H0);
+    for (size_t r = 0; r < n_rows; r++)
+        for (size_t t = 0; t < m; t++) {
+            const double radiance = L[r * m + t];
+            const float *row = sky->first_bounce + t * n;
+            double *sum = H0 + r * n;
+            if (radiance == 0) continue;
+            for (size_t i = 0; i < n; i++) sum[i] += radiance * (double)row[i];
+        }
+}
+
 void lam_sky_adjoint(const lam_sky *sky, size_t n_rows, const float *g, float *L) {
     const size_t m = sky->n_tiles, n = sky->n;
     for (size_t r = 0; r < n_rows; r++)

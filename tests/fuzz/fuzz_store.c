@@ -24,13 +24,14 @@ static void apply(const scene *s) {
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     char path[] = "/dev/shm/lambert-fuzz-XXXXXX";
+    pthread_mutex_t stores = PTHREAD_MUTEX_INITIALIZER;
     const int fd = mkstemp(path);
     FUZZ_CHECK(fd >= 0 && write(fd, data, size) == (ssize_t)size);
     close(fd);
     for (int verify = 0; verify < 2; verify++) {
         scene *s = NULL;
         lam_error error = {.message = ""};
-        if (scene_open(path, NULL, verify == 1, &s, &error) == LAM_OK) {
+        if (scene_open(path, NULL, verify == 1, &stores, &s, &error) == LAM_OK) {
             apply(s);
             scene_release(s);
         } else {

@@ -154,7 +154,7 @@ class Usage(Case):
 
     def test_not_supported_yet(self):
         for line in ("bench service",
-                     "solve a.h5 --tolerance 1e-4", "solve a.h5 -o b.glb",
+                     "solve a.h5 -o b.glb",
                      *("precompute a.obj -o b.h5 " + option for option in (
                          "--keep-form-factors=compressed", 
                          "--method hierarchical", "--keep-factors", "--positions p.json",

@@ -402,7 +402,8 @@ class Errors(unittest.TestCase):
 
     def test_not_yet(self):
         good = [1] * N
-        self.refuse({"emission": good, "tolerance": 1e-4}, 501, "tolerance", pointer="/tolerance")
+        self.refuse({"emission": good, "tolerance": 1e-4, "reduce": {"groups": ["lamp"], "with": ["mean"]}}, 501,
+                    "refined")
         for method, path in (("GET", "/v1/scenes/grey/mesh"),
                              ("PUT", "/v1/scenes/grey/reflectance"), ("DELETE", "/v1/scenes/grey/reflectance"),
                              ("GET", "/v1/openapi.json"), ("GET", "/")):

@@ -23,6 +23,7 @@ typedef struct transport {
     const char *name;
     size_t n, n_channels, k;
     float *reflectance; /* [C][n] */
+    double *F;          /* [n][n] form factors of the truth, that all channels share */
     double *P;          /* [C][n][n] bounced light, mesh order: what the kind must compute */
     double *magnitude;  /* [C][n][n] the sum of the magnitudes of the products behind P */
     double roundings;   /* how often each of those products is rounded at most, in units of u */
@@ -332,7 +333,7 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
     else
         make_low_rank(&t, F, U, V, strstr(t.name, "folded") != NULL, two_mesh ? begin : NULL);
     if (ordered) ck_assert(operator_set_order(t.op, t.order, &error) == LAM_OK);
-    free(F);
+    t.F = F;
     free(U);
     free(V);
     return t;
@@ -341,6 +342,7 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
 static inline void transport_free(transport *t) {
     lam_operator_close(t->op);
     free(t->reflectance);
+    free(t->F);
     free(t->P);
     free(t->magnitude);
     free(t->order);

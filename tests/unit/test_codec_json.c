@@ -57,6 +57,28 @@ static bool is_json(const char *text, size_t length) {
     return good;
 }
 
+START_TEST(tolerances) {
+    static const struct {
+        const char *text;
+        unsigned status;
+        double value;
+    } cases[] = {{"1e-4", 0, 1e-4},    {"0.9999999", 0, .9999999}, {"5e-324", 0, 5e-324}, {"1", 422, 0},
+                 {"0", 422, 0},        {"-1e-4", 422, 0},          {"1e400", 422, 0},     {"1e-400", 422, 0},
+                 {"\"1e-4\"", 422, 0}, {"null", 422, 0},           {"[0.1]", 422, 0},     {"NaN", 400, 0}};
+    fixture f = make_scene(1);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[96];
+        radiosity_request request = {0};
+        const int length =
+            snprintf(text, sizeof text, "{\"tolerance\":%s,\"emission\":[1,2,3,4,5]}", cases[i].text);
+        ck_assert_msg(status_of(&f, text, (size_t)length, &request) == cases[i].status, "%s", text);
+        if (cases[i].status == 0) ck_assert(request.tolerance == cases[i].value && request.n_rhs == 1);
+        radiosity_request_free(&request);
+    }
+    group_index_free(&f.groups);
+}
+END_TEST
+
 START_TEST(published_cases) {
     fixture f = make_scene(1);
     size_t accepted = 0, rejected = 0;
@@ -283,6 +305,7 @@ int main(void) {
     TCase *tcase = tcase_create("codec_json");
     tcase_set_timeout(tcase, 300);
     tcase_add_test(tcase, published_cases);
+    tcase_add_test(tcase, tolerances);
     tcase_add_test(tcase, good_requests_are_read);
     tcase_add_test(tcase, skies_are_read);
     tcase_add_test(tcase, a_request_cut_anywhere_is_not_json);

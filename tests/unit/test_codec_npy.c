@@ -34,6 +34,36 @@ static buffer make(npy_type type, size_t rank, const size_t *shape, size_t count
     return b;
 }
 
+/* The rounding told is what the array itself shows, and the largest of all that were written. */
+START_TEST(doubles_tell_their_rounding) {
+    const double values[] = {1, 1.0 / 3, -2e-3, 700.1, 0};
+    enum { COUNT = sizeof values / sizeof *values };
+    double rounding = 0;
+    buffer wide = {0}, single = {0}, half = {0};
+    ck_assert(npy_write_doubles(&wide, NPY_F8, values, COUNT, &rounding));
+    ck_assert_uint_eq(wide.length, sizeof values);
+    ck_assert_mem_eq(wide.bytes, values, sizeof values);
+    ck_assert(rounding == 0);
+    ck_assert(npy_write_doubles(&single, NPY_F4, values, COUNT, &rounding));
+    double worst = 0;
+    for (size_t i = 0; i < COUNT; i++) {
+        float kept;
+        memcpy(&kept, single.bytes + i * sizeof kept, sizeof kept);
+        ck_assert(kept == (float)values[i]);
+        worst = fmax(worst, fabs((double)kept - values[i]));
+    }
+    ck_assert(worst > 0 && rounding == worst);
+    ck_assert(npy_write_doubles(&half, NPY_F2, values, COUNT, &rounding));
+    ck_assert_uint_eq(half.length, 2 * COUNT);
+    ck_assert_double_eq_tol(rounding, .1, .001); /* 700.1 is 700 there, half a unit being .25 */
+    const double before = rounding;
+    ck_assert(npy_write_doubles(&half, NPY_F4, values, COUNT, &rounding) && rounding == before);
+    buffer_free(&wide);
+    buffer_free(&single);
+    buffer_free(&half);
+}
+END_TEST
+
 START_TEST(written_arrays_are_read) {
     for (int type = NPY_F4; type <= NPY_F8; type++) {
         static const struct {
@@ -149,6 +179,8 @@ START_TEST(media_types) {
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         media_accept chosen = media_choose(cases[i].accept);
+        if (chosen.type == MEDIA_NPY && strcasestr(cases[i].accept, "dtype") == NULL)
+            ck_assert(!chosen.npy_given);
         ck_assert_msg(chosen.type == cases[i].type, "%s", cases[i].accept);
         if (chosen.type == MEDIA_NPY) ck_assert_int_eq(chosen.npy, cases[i].npy);
     }
@@ -162,6 +194,7 @@ int main(void) {
     Suite *suite = suite_create("codec_npy");
     TCase *tcase = tcase_create("codec_npy");
     tcase_set_timeout(tcase, 300);
+    tcase_add_test(tcase, doubles_tell_their_rounding);
     tcase_add_test(tcase, written_arrays_are_read);
     tcase_add_test(tcase, cut_arrays_are_refused);
     tcase_add_test(tcase, changed_arrays_never_do_harm);

@@ -161,6 +161,36 @@ START_TEST(doubles_round_trip) {
 }
 END_TEST
 
+/* No fewer digits give the number back, tried one by one: of any bits, of few digits, near the least of
+ * doubles. */
+START_TEST(doubles_are_as_short_as_can_be) {
+    uint64_t state = 17;
+    for (int i = 0; i < 30000; i++) {
+        uint64_t bits = next_random(&state);
+        double value;
+        char text[40];
+        memcpy(&value, &bits, sizeof value);
+        if (i % 3 == 1) value = ldexp((double)(bits % 1000000), -(int)(bits >> 32 & 31));
+        if (i % 3 == 2) value = (double)(bits % 512) * 0x1p-1074 * (bits & 1 << 20 ? 1 : 0x1p60);
+        if (!isfinite(value)) continue;
+        for (int digits = 1; digits <= 17; digits++) {
+            snprintf(text, sizeof text, "%.*g", digits, value);
+            if (strtod(text, NULL) == value) break;
+        }
+        /* The same digits, without an exponent where 15 digits need none. */
+        if (strlen(text) < 15 && fabs(value) > 1e-290) snprintf(text, sizeof text, "%.15g", value);
+        buffer b = {0};
+        ck_each(json_write_double(&b, value));
+        if (strcmp(b.bytes, text) != 0) ck_abort_msg("%a is written %s, not %s", value, b.bytes, text);
+        buffer_free(&b);
+    }
+    buffer b = {0};
+    ck_assert(json_write_doubles(&b, (const double[]){1, .5, -3e300}, 3) && json_write_doubles(&b, NULL, 0));
+    ck_assert_str_eq(b.bytes, "[1,0.5,-3e+300][]");
+    buffer_free(&b);
+}
+END_TEST
+
 /* Decimals of any length and size, many of them at the middle of two floats: the C library is the judge. */
 START_TEST(decimals_are_rounded_right) {
     uint64_t state = 99;
@@ -310,6 +340,7 @@ int main(void) {
     tcase_add_test(tcase, random_floats_round_trip);
     tcase_add_test(tcase, texts_are_plain);
     tcase_add_test(tcase, doubles_round_trip);
+    tcase_add_test(tcase, doubles_are_as_short_as_can_be);
     tcase_add_test(tcase, decimals_are_rounded_right);
     tcase_add_test(tcase, numbers_at_the_edge);
     tcase_add_test(tcase, plain_numbers_are_the_same_numbers);

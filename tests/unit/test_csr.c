@@ -1,5 +1,6 @@
 /* Sparse rows: their product and what the check refuses. */
 #include "solver/operator/csr.h"
+#include "solver/operator/csr_doubles.h"
 #include "solver/operator/csr_floats.h"
 #include "solver/operator/sparse_product.h"
 #include "support/suite.h"
@@ -60,6 +61,41 @@ START_TEST(products_of_floats_side_by_side) {
                     }
                     ck_assert_mem_eq(&alone, &sums[v], sizeof alone);
                     ck_assert_double_le(fabs((double)alone - sum), (N + 1) * FLT_EPSILON * magnitude);
+                }
+            }
+        }
+    free(X);
+    csr_free(&a);
+}
+END_TEST
+
+START_TEST(products_of_doubles_side_by_side) {
+    enum { N = 83 };
+    static const size_t widths[] = {1, 4, 8, 16};
+    csr a = random_rows(N);
+    double *X = aligned_alloc(64, N * CSR_DOUBLES_WIDTH * sizeof *X), one[N], sums[CSR_DOUBLES_WIDTH], alone;
+    for (size_t set = 0; csr_doubles_row_of(set, 1) != NULL; set++)
+        for (size_t w = 0; w < 4; w++) {
+            const size_t width = widths[w];
+            ck_assert_uint_eq(csr_doubles_width(width), width);
+            ck_assert_uint_eq(csr_doubles_width(width - width / 4), width);
+            for (size_t j = 0; j < N * width; j++) X[j] = random_double();
+            for (size_t i = 0; i < N; i++) {
+                const uint64_t first = a.indptr[i], count = a.indptr[i + 1] - first;
+                csr_doubles_row_of(set, width)(a.indices + first, a.data + first, count, X, sums);
+                for (size_t v = 0; v < width; v++) {
+                    long double sum = 0, magnitude = 0;
+                    for (size_t j = 0; j < N; j++) one[j] = X[j * width + v];
+                    csr_doubles_row_of(set, 1)(a.indices + first, a.data + first, count, one, &alone);
+                    for (uint64_t e = first; e < first + count; e++) {
+                        const long double product = (long double)a.data[e] * (long double)one[a.indices[e]];
+                        sum += product;
+                        magnitude += fabsl(product);
+                    }
+                    ck_assert_mem_eq(&alone, &sums[v], sizeof alone);
+                    /* What is promised, and the truth's own n 2^-64. */
+                    const long double unit = 0x1p-53L * csr_doubles_roundings(count) + 83 * 0x1p-64L;
+                    ck_each(fabsl((long double)alone - sum) <= unit * magnitude);
                 }
             }
         }
@@ -197,6 +233,7 @@ int main(void) {
     tcase_set_timeout(tests, 120);
     tcase_add_test(tests, product_agrees_with_the_dense_one);
     tcase_add_test(tests, products_of_floats_side_by_side);
+    tcase_add_test(tests, products_of_doubles_side_by_side);
     tcase_add_test(tests, products_cost_what_they_touch);
     tcase_add_test(tests, bad_rows_are_refused);
     suite_add_tcase(suite, tests);

@@ -1,0 +1,86 @@
+#include "server/refined.h"
+
+#include "solver/operator/form_factor_rows.h"
+#include "store/status.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+struct refined {
+    const lam_operator *op;
+    pthread_mutex_t *stores;
+    pthread_mutex_t lock; /* of F and refiner */
+    char *path;           /* NULL: no form factors are kept */
+    char *checksum;       /* of the file that op was read from */
+    lam_form_factors *F;
+    lam_refiner *refiner; /* NULL until asked for */
+};
+
+static lam_status read_checksum(store *s, char **checksum, lam_error *error) {
+    return store_get_text(s, "/checksum", "xxh3", checksum, error);
+}
+
+lam_status refined_create(store *s, const lam_operator *op, pthread_mutex_t *stores, refined **out,
+                          lam_error *error) {
+    lam_status status = LAM_OK;
+    refined *made = memory_allocate(1, sizeof *made, store_path(s), error);
+    if (made == NULL) return LAM_ERR_MEMORY;
+    made->op = op;
+    made->stores = stores;
+    pthread_mutex_init(&made->lock, NULL);
+    if (store_has(s, FORM_FACTORS_GROUP)) {
+        TRY(read_checksum(s, &made->checksum, error));
+        made->path = strdup(store_path(s));
+        if (made->path == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", store_path(s));
+    }
+    *out = made;
+    made = NULL;
+done:
+    refined_destroy(made);
+    return status;
+}
+
+void refined_destroy(refined *r) {
+    if (r == NULL) return;
+    lam_refiner_free(r->refiner);
+    lam_form_factors_close(r->F);
+    pthread_mutex_destroy(&r->lock);
+    free(r->path);
+    free(r->checksum);
+    free(r);
+}
+
+/* The file may be another one by now, although this scene is still served. */
+static lam_status read_form_factors(refined *r, lam_error *error) {
+    lam_status status = LAM_OK;
+    store *s = NULL;
+    char *checksum = NULL;
+    pthread_mutex_lock(r->stores);
+    TRY(store_open(r->path, &s, error));
+    TRY(read_checksum(s, &checksum, error));
+    if (strcmp(checksum, r->checksum) != 0)
+        FAIL(error, LAM_ERR_IO, "%s: the store is another one than was read; read it again (SIGHUP)",
+             r->path);
+    TRY(form_factors_open(s, &r->F, error));
+    if (r->F == NULL) FAIL(error, LAM_ERR_DAMAGED, "%s: its form factors are gone", r->path);
+done:
+    store_close(s);
+    pthread_mutex_unlock(r->stores);
+    free(checksum);
+    return status;
+}
+
+lam_status refined_get(refined *r, const lam_refiner **refiner, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (r->path == NULL) {
+        *refiner = NULL;
+        return LAM_OK;
+    }
+    pthread_mutex_lock(&r->lock);
+    if (r->F == NULL) TRY(read_form_factors(r, error));
+    if (r->refiner == NULL) TRY(lam_refiner_create(r->op, r->F, &r->refiner, error));
+    *refiner = r->refiner;
+done:
+    pthread_mutex_unlock(&r->lock);
+    return status;
+}

@@ -1,0 +1,27 @@
+/* Answers refined until they are certified: what that takes of a scene, and the whole of such an answer. */
+#ifndef LAMBERT_SERVER_REFINED_H
+#define LAMBERT_SERVER_REFINED_H
+
+#include "store/store.h"
+
+#include <pthread.h>
+
+/* The form factors of a store, which are read when they are first asked for and then kept: they may be many
+ * times as large as the operator. Any thread. */
+typedef struct refined refined;
+
+/* Notes whether the open store s, op is of, keeps form factors. op and stores outlive it; whoever opens a
+ * store holds stores. Errors: LAM_ERR_MEMORY, those of store_get_text. */
+lam_status refined_create(store *s, const lam_operator *op, pthread_mutex_t *stores, refined **out,
+                          lam_error *error);
+
+/* What refines op's answers; *refiner is NULL where the store keeps no form factors, else it lives as long as
+ * r. The first call reads them, takes their memory and finds the bound on the inverse; others wait for it.
+ * Errors: LAM_ERR_IO (also where the file is another one by now), LAM_ERR_MEMORY, LAM_ERR_DAMAGED,
+ * LAM_ERR_FORMAT, LAM_ERR_NUMERIC (nothing can be certified). */
+lam_status refined_get(refined *r, const lam_refiner **refiner, lam_error *error);
+
+/* NULL is allowed. */
+void refined_destroy(refined *r);
+
+#endif

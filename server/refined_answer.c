@@ -1,0 +1,197 @@
+#include "server/refined_answer.h"
+
+#include "solver/operator/emitters.h"
+#include "solver/operator/sky.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+/* Vectors refined and written at a time. */
+#define PASS 16
+
+static double now_ms(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
+}
+
+/* What a pass works with; NULL where it is not needed. */
+typedef struct pass_memory {
+    double *E, *H0, *out; /* [PASS][C][n] */
+    double *L;            /* [PASS][C][m] */
+    double *some;         /* [PASS][C][selected] */
+    float *start;         /* [PASS][C][n], of a store of few emitters: its own answer */
+    float *W;             /* [PASS][C][s], their weights */
+    void *work;
+    size_t work_bytes;
+} pass_memory;
+
+static void free_pass(pass_memory *p) {
+    free(p->E);
+    free(p->H0);
+    free(p->out);
+    free(p->L);
+    free(p->some);
+    free(p->start);
+    free(p->W);
+    free(p->work);
+}
+
+static bool get_pass(const scene *s, const radiosity_request *request, pass_memory *p, problem *why) {
+    const size_t vectors = request->n_rhs < PASS ? request->n_rhs : PASS, rows = vectors * s->n_channels;
+    const size_t row = s->n * sizeof(double);
+    const bool few = s->n_emitters > 0;
+    p->E = memory_allocate(rows, row, "E", NULL);
+    p->out = memory_allocate(rows, row, "B", NULL);
+    bool good = p->E != NULL && p->out != NULL;
+    if (few || request->sky.values != NULL) {
+        p->H0 = memory_allocate(rows, row, "H0", NULL);
+        good = good && p->H0 != NULL;
+    }
+    if (request->sky.values != NULL) {
+        p->L = memory_allocate(rows, lam_sky_tiles(s->sky) * sizeof *p->L, "L", NULL);
+        good = good && p->L != NULL;
+    }
+    if (request->select) {
+        p->some = memory_allocate(rows, request->n_selected * sizeof *p->some, "B", NULL);
+        good = good && p->some != NULL;
+    }
+    if (few) {
+        p->work_bytes = lam_operator_work_bytes(s->op, vectors);
+        p->start = memory_allocate(rows, s->n * sizeof *p->start, "B", NULL);
+        p->W = memory_allocate(rows, s->n_emitters * sizeof *p->W, "weights", NULL);
+        p->work = memory_allocate(p->work_bytes, 1, "work", NULL);
+        good = good && p->start != NULL && p->W != NULL && p->work != NULL;
+    }
+    return good || problem_set(why, 503, "not enough memory to refine %zu vectors", vectors);
+}
+
+static bool refuse(lam_status status, const lam_error *error, problem *why) {
+    const unsigned as = status == LAM_ERR_MEMORY || status == LAM_ERR_IO          ? 503
+                        : status == LAM_ERR_NUMERIC || status == LAM_ERR_ARGUMENT ? 422
+                                                                                  : 500;
+    return problem_set(why, as, "%s", error->message);
+}
+
+/* E and H0 of what weights of emitters send out, and the store's own answer to them as a start. */
+static bool light_emitters(const scene *s, const radiosity_request *request, size_t first, size_t count,
+                           pass_memory *p, problem *why) {
+    const size_t C = s->n_channels, weights = C * s->n_emitters;
+    const size_t n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
+    const float *L = request->sky.values;
+    lam_status status = LAM_OK;
+    lam_error error;
+    if (L != NULL) L += first * C * n_tiles;
+    TRY(lam_operator_weights(s->op, count, request->E + first * C * s->n, n_tiles, L, p->W, &error));
+    for (size_t k = 0; request->emitters.values != NULL && k < count * weights; k++)
+        p->W[k] += request->emitters.values[first * weights + k];
+    TRY(operator_emitters_light_double(s->op, count, p->W, p->E, p->H0, &error));
+    TRY(lam_operator_apply_emitters(s->op, count, LAM_INDIRECT, p->W, s->n, NULL, p->start, p->work,
+                                    p->work_bytes, &error));
+done:
+    return status == LAM_OK || refuse(status, &error, why);
+}
+
+static void light_any(const scene *s, const radiosity_request *request, size_t first, size_t count,
+                      pass_memory *p) {
+    const size_t C = s->n_channels, E_begin = first * C * s->n;
+    for (size_t k = 0; k < count * C * s->n; k++) p->E[k] = (double)request->E[E_begin + k];
+    if (p->L == NULL) return;
+    const size_t n_tiles = lam_sky_tiles(s->sky), L_begin = first * C * n_tiles;
+    for (size_t k = 0; k < count * C * n_tiles; k++) p->L[k] = (double)request->sky.values[L_begin + k];
+    sky_irradiance_double(s->sky, count * C, p->L, p->H0);
+}
+
+/* Vectors first ... first + count, refined and, where elements are selected, theirs; NULL with *why. */
+static const double *refine(const scene *s, const lam_refiner *refiner, const radiosity_request *request,
+                            size_t first, size_t count, pass_memory *p, double *certificates,
+                            size_t *iterations, problem *why) {
+    lam_error error;
+    if (s->n_emitters == 0)
+        light_any(s, request, first, count, p);
+    else if (!light_emitters(s, request, first, count, p, why))
+        return NULL;
+    const lam_status status = lam_refine(refiner, count, request->quantity, p->E, p->H0, p->start,
+                                         request->tolerance, p->out, certificates, iterations, &error);
+    if (status != LAM_OK) {
+        refuse(status, &error, why);
+        return NULL;
+    }
+    if (!request->select) return p->out;
+    for (size_t row = 0; row < count * s->n_channels; row++)
+        for (size_t k = 0; k < request->n_selected; k++)
+            p->some[row * request->n_selected + k] = p->out[row * s->n + request->selected[k]];
+    return p->some;
+}
+
+bool refined_answer(call *in, const radiosity_request *request, answer_notes *notes, buffer *b,
+                    problem *why) {
+    const scene *s = in->scene;
+    const size_t C = s->n_channels;
+    const lam_refiner *refiner = NULL;
+    pass_memory p = {0};
+    lam_error error;
+    const answer_shape shape = {.n = s->n,
+                                .n_channels = C,
+                                .n_rhs = request->n_rhs,
+                                .batch = request->batch,
+                                .n_values = request->select ? request->n_selected : s->n};
+    media_accept as = in->accept;
+    if (!as.npy_given) as.npy = NPY_F8;
+    const double begin = now_ms();
+    const lam_status status = refined_get(s->refined, &refiner, &error);
+    if (status != LAM_OK) return refuse(status, &error, why);
+    if (refiner == NULL) {
+        problem_set(why, 422,
+                    "scene %.80s keeps no form factors, which a tolerance needs; precompute it with "
+                    "--keep-form-factors",
+                    s->name);
+        snprintf(why->pointer, sizeof why->pointer, "/tolerance");
+        return false;
+    }
+    double *certificates = memory_allocate(request->n_rhs, sizeof *certificates, "certificates", NULL);
+    size_t *iterations = memory_allocate(request->n_rhs, sizeof *iterations, "certificates", NULL);
+    notes->certificates = certificates;
+    notes->iterations = iterations;
+    bool good = certificates != NULL && iterations != NULL;
+    if (!good) problem_set(why, 503, "not enough memory for %zu certificates", request->n_rhs);
+    good = good && get_pass(s, request, &p, why) && answer_begin(b, &shape, &as, notes, why);
+    notes->solve_ms += now_ms() - begin;
+    for (size_t first = 0; good && first < request->n_rhs; first += PASS) {
+        const size_t count = request->n_rhs - first < PASS ? request->n_rhs - first : PASS;
+        const double start = now_ms();
+        const double *x =
+            refine(s, refiner, request, first, count, &p, certificates + first, iterations + first, why);
+        const double solved = now_ms();
+        notes->solve_ms += solved - start;
+        good = x != NULL;
+        for (size_t v = 0; good && v < count; v++) {
+            /* One by one: what a vector is rounded by is its own affair. */
+            double rounding = 0;
+            good =
+                answer_add_doubles(b, &shape, &as, first + v, 1, x + v * C * shape.n_values, &rounding, why);
+            certificates[first + v] += rounding;
+        }
+        notes->encode_ms += now_ms() - solved;
+        if (good) metrics_pass(in->service->metrics, count);
+    }
+    free_pass(&p);
+    return good && answer_end(b, &shape, &as, notes, why);
+}
+
+void refined_answer_free(answer_notes *notes) {
+    free((void *)(uintptr_t)notes->certificates);
+    free((void *)(uintptr_t)notes->iterations);
+    notes->certificates = NULL;
+    notes->iterations = NULL;
+}
+
+void refined_answer_tell(const answer_notes *notes, size_t n_rhs, answer *out) {
+    out->refined = true;
+    for (size_t v = 0; v < n_rhs; v++) {
+        out->certificate = fmax(out->certificate, notes->certificates[v]);
+        if (notes->iterations[v] > out->iterations) out->iterations = notes->iterations[v];
+    }
+}
