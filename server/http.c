@@ -1,7 +1,9 @@
 #include "server/http.h"
 
 #include "server/access_log.h"
+#include "server/map_guard.h"
 #include "server/routes.h"
+#include "server/verifier.h"
 
 #include <microhttpd.h>
 #include <stdlib.h>
@@ -55,10 +57,20 @@ static void refuse_token(request *r) {
     answer_refuse(&r->answer, 401, "a bearer token is needed: Authorization: Bearer TOKEN");
 }
 
+/* Whether the scene is in service; else it is refused, whatever the answer was. */
+static bool check_health(request *r) {
+    lam_error why;
+    bool news;
+    if (r->call.scene == NULL || !scene_damaged(r->call.scene, &why, &news)) return true;
+    if (news) verifier_tell(stderr, r->call.scene, &why);
+    answer_refuse(&r->answer, 503, "%.200s is out of service: %s", r->call.scene->name, why.message);
+    return false;
+}
+
 static bool check_scene(request *r) {
     if (!r->match.has_name) return true;
     r->call.scene = catalog_find(r->snapshot, r->match.name);
-    if (r->call.scene != NULL) return true;
+    if (r->call.scene != NULL) return check_health(r);
     if (atomic_load(&r->http->service->state) == SERVICE_LOADING)
         answer_refuse(&r->answer, 503, "stores are being loaded");
     else
@@ -147,7 +159,9 @@ static request *request_of(batch_job *job) {
 static void run_solve(batch_job *job, batch_workspace *workspace) {
     request *r = request_of(job);
     r->call.workspace = workspace;
+    map_guard_allow();
     r->match.route->handle(&r->call, &r->answer);
+    (void)check_health(r); /* what was lost on the way makes the answer a wrong one */
     buffer_free(&r->body);
 }
 
