@@ -67,7 +67,8 @@ lam_status scene_verify(scene *s, const atomic_int *cancel, lam_error *error);
 /* Whether what is mapped has been compared (also: with a bad end), or there was no need to. Any thread. */
 bool scene_verified(const scene *s);
 
-/* Whether the scene is out of service: a block differs from its checksum, or cannot be read any more. An
+/* Whether the scene is out of service: a block differs from its checksum or cannot be read any more, or the
+ * file was written to. An
  * answer that was made before this said so the last time is not to be trusted. why names file, array and MiB;
  * *news (or NULL) is true for the first who asks. Any thread. */
 bool scene_damaged(const scene *s, lam_error *why, bool *news);

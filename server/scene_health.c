@@ -59,6 +59,11 @@ bool scene_damaged(const scene *s, lam_error *why, bool *news) {
         store_map_name(s->map, offset, "cannot be read any more", why);
     else if (atomic_load(&health->state) == HEALTH_DAMAGED)
         *why = health->damage;
+    else if (s->map != NULL && store_map_changed(s->map))
+        (void)status_fail(why, LAM_ERR_DAMAGED,
+                          "%s: was changed since it was mapped; put a new file in its place by renaming, and "
+                          "have the stores read again (SIGHUP)",
+                          s->path);
     else
         return false;
     if (news != NULL) *news = !atomic_exchange(&health->told, true);

@@ -3,9 +3,11 @@
 #include "store/store_private.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 /* An array that was given out, with its own copy of the checksums: the store's table goes with the store. */
@@ -19,6 +21,8 @@ typedef struct map_array {
 struct store_map {
     atomic_size_t references;
     char *path;
+    int fd;                  /* of the file, to ask whether it changed */
+    store_identity identity; /* when the store was opened */
     char *base;
     size_t file_bytes;
     size_t mapped_bytes; /* the file's pages and one more */
@@ -37,6 +41,9 @@ lam_status store_map_file(store *s, lam_error *error) {
     if (map == NULL) return LAM_ERR_MEMORY;
     atomic_init(&map->references, 1);
     map->base = MAP_FAILED;
+    map->identity = s->identity;
+    map->fd = fcntl(s->file.fd, F_DUPFD_CLOEXEC, 0);
+    if (map->fd < 0) FAIL(error, LAM_ERR_IO, "%s: cannot be mapped: %s", s->path, strerror(errno));
     map->path = strdup(s->path);
     if (map->path == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", s->path);
     if (s->file.size > PTRDIFF_MAX - 2 * page)
@@ -67,6 +74,7 @@ store_map *store_map_hold(store_map *map) {
 void store_map_release(store_map *map) {
     if (map == NULL || atomic_fetch_sub(&map->references, 1) != 1) return;
     if (map->base != MAP_FAILED) munmap(map->base, map->mapped_bytes);
+    if (map->fd >= 0) close(map->fd);
     for (size_t i = 0; i < map->n_arrays; i++) {
         free(map->arrays[i].name);
         free(map->arrays[i].pieces);
@@ -83,6 +91,13 @@ store_map *store_map_of(const store *s) {
 void store_map_range(const store_map *map, const void **begin, size_t *bytes) {
     *begin = map->base;
     *bytes = map->mapped_bytes;
+}
+
+bool store_map_changed(const store_map *map) {
+    struct stat info;
+    return fstat(map->fd, &info) != 0 || (uint64_t)info.st_size != map->identity.size ||
+           (int64_t)info.st_mtim.tv_sec != map->identity.modified_s ||
+           (int64_t)info.st_mtim.tv_nsec != map->identity.modified_ns;
 }
 
 /* --- arrays ----------------------------------------------------------------------------------------------

@@ -3,8 +3,9 @@
  *
  * What may be relied on. The bytes are the file's: nothing is read, or compared with a checksum, before it is
  * used or store_map_verify has gone over it. Writers of stores never change a file, they put another in its
- * place, which a mapping does not notice. Where somebody cuts the file short all the same, touching what is
- * gone raises SIGBUS; store_map_range says where, for a program that wants to live on. */
+ * place, which a mapping does not notice. Where somebody writes into the file all the same, what is mapped
+ * changes: store_map_changed tells afterwards. Where it is cut short, touching what is gone also raises
+ * SIGBUS; store_map_range says where, for a program that wants to live on. */
 #ifndef LAMBERT_STORE_STORE_MAP_H
 #define LAMBERT_STORE_STORE_MAP_H
 
@@ -51,6 +52,10 @@ store_map *store_map_of(const store *s);
 
 /* Address and size of the whole. */
 void store_map_range(const store_map *map, const void **begin, size_t *bytes);
+
+/* Whether the file was written to, cut or touched since the store was opened, by its size and time of
+ * modification. Any thread; costs a system call. */
+bool store_map_changed(const store_map *map);
 
 /* Bytes of the arrays given out by store_read_view that lie in the mapping. */
 size_t store_map_bytes(const store_map *map);

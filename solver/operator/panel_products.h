@@ -95,14 +95,15 @@ KERNEL(project_part)(size_t W, const VALUE *values, size_t row_step, const float
     lane coefficient[PANEL_TILE][PROJECT_TILE];
     for (size_t r = 0; r < PANEL_TILE; r++)
         for (size_t w = 0; w < W; w++) coefficient[r][w] = LANE_SET(c[r * m + v + w]);
-    for (size_t line = 0; line < n_whole; line += LINE_CHUNKS) {
-        if (v == 0 && wide == NULL) KERNEL(ask_for)(values + line * CHUNK_STEP, 0, PANEL_TILE, row_step);
-        for (size_t q = line; q < line + LINE_CHUNKS && q < n_whole; q++) {
-            KERNEL(project_chunk)
-            (W, values + q * CHUNK_STEP, row_step, 0, wide != NULL ? wide + q * TILE_CHUNK : NULL,
-             coefficient, (lane *)(t + (q * m + v) * PANEL_CHUNK));
-        }
+    size_t q = 0;
+    for (; n_whole - q >= LINE_CHUNKS && v == 0 && wide == NULL; q += LINE_CHUNKS) {
+        KERNEL(ask_for)(values + q * CHUNK_STEP, 0, PANEL_TILE, row_step);
+        for (size_t l = q; l < q + LINE_CHUNKS; l++) KERNEL(project_chunk)
+        (W, values + l * CHUNK_STEP, row_step, 0, NULL, coefficient, (lane *)(t + (l * m + v) * PANEL_CHUNK));
     }
+    for (; q < n_whole; q++) KERNEL(project_chunk)
+    (W, values + q * CHUNK_STEP, row_step, 0, wide != NULL ? wide + q * TILE_CHUNK : NULL, coefficient,
+     (lane *)(t + (q * m + v) * PANEL_CHUNK));
     if (tail > 0) {
         KERNEL(project_chunk)
         (W, values + n_whole * CHUNK_STEP, row_step, tail, NULL, coefficient,
@@ -189,15 +190,17 @@ KERNEL(expand_part)(size_t W, size_t r0, const VALUE *values, size_t row_step, c
     for (size_t r = 0; r < ROW_TILE; r++)
         for (size_t w = 0; w < W; w++)
             for (size_t s = 0; s < REGISTERS; s++) sum[r][w][s] = ((const lane *)lanes[r0 + r][v + w])[s];
-    for (size_t line = 0; line < n_whole; line += LINE_CHUNKS) {
-        if (v == 0 && wide == NULL) KERNEL(ask_for)(values + line * CHUNK_STEP, r0, r0 + ROW_TILE, row_step);
-        for (size_t q = line; q < line + LINE_CHUNKS && q < n_whole; q++) {
-            KERNEL(expand_chunk)
-            (W, values + q * CHUNK_STEP + r0 * row_step, row_step, 0,
-             wide != NULL ? wide + q * TILE_CHUNK + r0 * PANEL_CHUNK : NULL,
-             (const lane *)(t + (q * m + v) * PANEL_CHUNK), sum);
-        }
+    size_t q = 0;
+    for (; n_whole - q >= LINE_CHUNKS && v == 0 && wide == NULL; q += LINE_CHUNKS) {
+        KERNEL(ask_for)(values + q * CHUNK_STEP, r0, r0 + ROW_TILE, row_step);
+        for (size_t l = q; l < q + LINE_CHUNKS; l++) KERNEL(expand_chunk)
+        (W, values + l * CHUNK_STEP + r0 * row_step, row_step, 0, NULL,
+         (const lane *)(t + (l * m + v) * PANEL_CHUNK), sum);
     }
+    for (; q < n_whole; q++) KERNEL(expand_chunk)
+    (W, values + q * CHUNK_STEP + r0 * row_step, row_step, 0,
+     wide != NULL ? wide + q * TILE_CHUNK + r0 * PANEL_CHUNK : NULL,
+     (const lane *)(t + (q * m + v) * PANEL_CHUNK), sum);
     if (tail > 0) {
         KERNEL(expand_chunk)
         (W, values + n_whole * CHUNK_STEP + r0 * row_step, row_step, tail, NULL,

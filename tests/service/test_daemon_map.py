@@ -161,6 +161,24 @@ class Mapped(unittest.TestCase):
             self.assertIn("/operator/V is damaged in MiB 2 of 2", daemon.errors())
             self.assertNotIn("verified", daemon.output())  # there is nothing left to do
 
+    def test_a_file_that_is_written_to_is_out_of_service(self):
+        def cut(path):
+            os.truncate(path, self.place(path, "operator/V") + BYTES // 2)
+
+        def overwrite(path):
+            path.write_bytes((self.made / "other.h5").read_bytes())  # as large: no fault, only another truth
+            os.utime(path, (1, 1))
+
+        for change in cut, overwrite:
+            path, other = self.store("box"), self.store("other")
+            with Daemon(path, other, "--threads", 2) as daemon:
+                daemon.wait_for("verified box: ")
+                daemon.wait_for("verified other: ")
+                self.check(daemon, "box", self.scene)
+                change(path)
+                self.check_out_of_service(daemon, "box", path, "was changed since it was mapped")
+                self.check(daemon, "other", self.other)
+
     def test_a_file_cut_short_is_survived(self):
         path, other = self.store("box"), self.store("other")
         with Daemon(path, other, "--threads", 2) as daemon:
@@ -168,11 +186,11 @@ class Mapped(unittest.TestCase):
             daemon.wait_for("verified other: ")
             self.check(daemon, "box", self.scene)
             os.truncate(path, self.place(path, "operator/V") + BYTES // 2)
-            self.check_out_of_service(daemon, "box", path, "/operator/V cannot be read any more in MiB 1 of 2")
+            self.check_out_of_service(daemon, "box", path, "was changed since it was mapped")
             self.check(daemon, "other", self.other)
             daemon.signal(signal.SIGHUP)
             daemon.wait_for("reloaded: 2 scenes")
-            self.check_out_of_service(daemon, "box", path, "/operator/V cannot be read any more in MiB 1 of 2")
+            self.check_out_of_service(daemon, "box", path, "was changed since it was mapped")
             shutil.copy(self.made / "box.h5", self.folder / "spare")
             os.replace(self.folder / "spare", path)
             daemon.signal(signal.SIGHUP)

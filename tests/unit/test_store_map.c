@@ -94,6 +94,7 @@ START_TEST(large_arrays_lie_in_the_file) {
     /* It outlives the store, and the file's name. */
     store_close(s);
     unlink(path);
+    ck_assert(!store_map_changed(large.map));
     for (size_t i = 0; i < LARGE; i++) ck_each(((const float *)large.data)[i] == value_at(i));
     lam_error error = {.message = ""};
     ck_assert_msg(store_map_verify(large.map, NULL, &error) == LAM_OK, "%s", error.message);
@@ -160,6 +161,7 @@ START_TEST(a_flipped_bit_is_named) {
         byte ^= 4;
         ck_assert(pwrite(fd, &byte, 1, begin + (long)places[i]) == 1);
         ck_assert(store_map_verify(view.map, NULL, &error) == LAM_OK);
+        ck_assert(store_map_changed(view.map)); /* though it is as it was */
         close(fd);
         store_view_free(&view);
         store_close(s);
