@@ -228,7 +228,7 @@ class Mapped(unittest.TestCase):
             self.assertEqual({a.status for a in answers}, {200, 503})
             for answer in answers:
                 if answer.status == 200:
-                    self.assertEqual(answer.json()["radiosity"], right)
+                    self.assertTrue(answer.json()["radiosity"] == right)  # a diff of so much would take minutes
 
     # --- reloading
 
