@@ -12,8 +12,9 @@
 /* Made here, it is kept in tiles of PANEL_TILE rows, [rows / PANEL_TILE][columns /
  * PANEL_CHUNK][PANEL_TILE][PANEL_CHUNK], padded with zeros: memory is read straight on although several rows
  * are summed at once, and yet a single row takes up whole cache lines (f32) of its own. Mapped from a store,
- * it is kept in rows as they are there, [rows][columns] without padding: a third of a percent slower, but
- * nobody has to copy it. */
+ * it is kept in rows as they are there, [rows][columns] without padding, and nobody has to
+ * copy it: in f32 as fast, in 16 bits about a fifth and in 8 bits a third slower (one vector; Xeon, 2 cores).
+ */
 #define PANEL_TILE 4
 #define PANEL_CHUNK 16
 /* So many vectors share one pass over a matrix; more are cut into passes. At 16, one core computes about as

@@ -88,7 +88,7 @@ static void write_mesh(store *s, size_t n, lam_error *error) {
 int main(int argc, char **argv) {
     lam_error error = {.message = ""};
     panel_precision precision = PANEL_F32;
-    size_t n, k;
+    size_t n = 0, k = 0;
     store *s = NULL;
     if (argc < 3 || sscanf(argv[2], "%zux%zu", &n, &k) != 2 || n == 0 || k == 0 ||
         (argc > 3 && (!panel_precision_find(argv[3], &precision) || precision == PANEL_BF16)))
