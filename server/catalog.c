@@ -1,5 +1,7 @@
 #include "server/catalog.h"
 
+#include "server/verifier.h"
+
 #include <dirent.h>
 #include <errno.h>
 #include <pthread.h>
@@ -9,6 +11,8 @@
 
 struct catalog {
     const config *config;
+    FILE *out, *problems;
+    verifier *verifier;
     pthread_mutex_t lock;   /* of present */
     pthread_mutex_t stores; /* held while a store is open */
     catalog_snapshot *present;
@@ -88,26 +92,31 @@ done:
     return status;
 }
 
-lam_status catalog_create(const config *c, catalog **out, lam_error *error) {
+lam_status catalog_create(const config *c, FILE *out, FILE *problems, catalog **made, lam_error *error) {
     lam_status status = LAM_OK;
-    catalog *made = memory_allocate(1, sizeof *made, "catalog", error);
+    catalog *all = memory_allocate(1, sizeof *all, "catalog", error);
     catalog_snapshot *empty = memory_allocate(1, sizeof *empty, "catalog", error);
-    if (made == NULL || empty == NULL) {
-        free(made);
-        free(empty);
-        return LAM_ERR_MEMORY;
-    }
+    if (all == NULL || empty == NULL) TRY(LAM_ERR_MEMORY);
     atomic_init(&empty->references, 1);
-    made->config = c;
-    made->present = empty;
-    pthread_mutex_init(&made->lock, NULL);
-    pthread_mutex_init(&made->stores, NULL);
-    *out = made;
+    all->config = c;
+    all->out = out;
+    all->problems = problems;
+    TRY(verifier_start(out, problems, &all->verifier, error));
+    all->present = empty;
+    empty = NULL;
+    pthread_mutex_init(&all->lock, NULL);
+    pthread_mutex_init(&all->stores, NULL);
+    *made = all;
+    all = NULL;
+done:
+    free(all);
+    free(empty);
     return status;
 }
 
 void catalog_destroy(catalog *all) {
     if (all == NULL) return;
+    verifier_stop(all->verifier);
     catalog_release(all->present);
     pthread_mutex_destroy(&all->lock);
     pthread_mutex_destroy(&all->stores);
@@ -142,10 +151,12 @@ const scene *catalog_find(const catalog_snapshot *snapshot, const char *name) {
 
 /* The scene that was read from this source before, or NULL. */
 static scene *find_before(const catalog_snapshot *before, const source *from) {
-    for (size_t i = 0; i < before->n_scenes; i++)
-        if (strcmp(before->scenes[i]->path, from->path) == 0 &&
-            (from->name == NULL || strcmp(before->scenes[i]->name, from->name) == 0))
-            return before->scenes[i];
+    for (size_t i = 0; i < before->n_scenes; i++) {
+        scene *s = before->scenes[i];
+        if (strcmp(s->path, from->path) == 0 && s->renamed == (from->name != NULL) &&
+            (from->name == NULL || strcmp(s->name, from->name) == 0))
+            return s;
+    }
     return NULL;
 }
 
@@ -162,17 +173,77 @@ static const scene *insert(catalog_snapshot *snapshot, scene *s) {
     return NULL;
 }
 
-static void load_source(catalog *all, catalog_snapshot *next, const catalog_snapshot *before,
-                        const source *from, FILE *out, FILE *problems) {
-    lam_error error = {0};
-    scene *loaded = NULL;
+/* What the scenes of a snapshot count for, and the largest work area of a thread. */
+static uint64_t memory_used(const catalog_snapshot *snapshot, size_t *work_bytes) {
+    uint64_t used = 0;
+    *work_bytes = 0;
+    for (size_t i = 0; i < snapshot->n_scenes; i++) {
+        const scene *s = snapshot->scenes[i];
+        used += s->memory;
+        if (s->work_bytes > *work_bytes) *work_bytes = s->work_bytes;
+    }
+    return used;
+}
+
+/* What another scene may count for. */
+static uint64_t memory_left(const catalog *all, const catalog_snapshot *next) {
+    size_t work_bytes;
+    const uint64_t used =
+        memory_used(next, &work_bytes) + scene_work_memory(all->config->threads, work_bytes);
+    if (all->config->max_memory == 0) return UINT64_MAX;
+    return all->config->max_memory > used ? all->config->max_memory - used : 0;
+}
+
+/* Whether a scene that is open fits with its work areas too; they are shared with the others'. */
+static lam_status check_work(const catalog *all, const catalog_snapshot *next, const scene *s,
+                             lam_error *error) {
+    const size_t threads = all->config->threads;
+    size_t work_bytes;
+    const uint64_t used = memory_used(next, &work_bytes);
+    if (s->work_bytes > work_bytes) work_bytes = s->work_bytes;
+    const uint64_t wanted = used + s->memory + scene_work_memory(threads, work_bytes);
+    if (all->config->max_memory == 0 || wanted <= all->config->max_memory) return LAM_OK;
+    return status_fail(
+        error, LAM_ERR_MEMORY,
+        "%s: takes %llu bytes, and %zu threads %zu each to solve, of --max-memory %zu the other "
+        "stores have %llu",
+        s->path, (unsigned long long)s->memory, threads, work_bytes, all->config->max_memory,
+        (unsigned long long)used);
+}
+
+/* The scene of a source, as it is now. */
+static lam_status open_source(catalog *all, const catalog_snapshot *next, const source *from, scene *old,
+                              scene **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    scene *opened = NULL;
+    /* One that turned out to be damaged has to prove first that it no longer is. */
+    const bool verify = all->config->verify || (old != NULL && scene_damaged(old, NULL, NULL));
+    const scene_wish wish = {.path = from->path,
+                             .name = from->name,
+                             .verify = verify,
+                             .memory = memory_left(all, next),
+                             .before = old,
+                             .threads = all->config->threads,
+                             .stores = &all->stores};
     pthread_mutex_lock(&all->stores);
-    const lam_status status =
-        scene_open(from->path, from->name, all->config->verify, &all->stores, &loaded, &error);
+    status = scene_open(&wish, &opened, error);
     pthread_mutex_unlock(&all->stores);
-    if (status != LAM_OK) {
-        scene *old = find_before(before, from);
-        if (old == NULL) {
+    TRY(status);
+    TRY(check_work(all, next, opened, error));
+    *out = opened;
+    opened = NULL;
+done:
+    if (opened != NULL) scene_release(opened);
+    return status;
+}
+
+static void load_source(catalog *all, catalog_snapshot *next, const catalog_snapshot *before,
+                        const source *from) {
+    lam_error error = {0};
+    scene *loaded = NULL, *old = find_before(before, from);
+    FILE *problems = all->problems;
+    if (open_source(all, next, from, old, &loaded, &error) != LAM_OK) {
+        if (old == NULL || check_work(all, next, old, NULL) != LAM_OK) {
             /* Most messages begin with the path, some (out of memory) do not. */
             bool named = strncmp(error.message, from->path, strlen(from->path)) == 0;
             fprintf(problems, "refused %s%s%s\n", named ? "" : from->path, named ? "" : ": ", error.message);
@@ -181,8 +252,6 @@ static void load_source(catalog *all, catalog_snapshot *next, const catalog_snap
         fprintf(problems, "kept the %s read before; %s cannot be read now: %s\n", old->name, from->path,
                 error.message);
         loaded = scene_acquire(old);
-    } else {
-        lam_operator_set_threads(loaded->op, all->config->threads);
     }
     const scene *taken = insert(next, loaded);
     if (taken != NULL) {
@@ -191,12 +260,13 @@ static void load_source(catalog *all, catalog_snapshot *next, const catalog_snap
         scene_release(loaded);
         return;
     }
-    fprintf(out, "serving %s: %zu elements, %zu channel%s, %s, from %s\n", loaded->name, loaded->n,
+    fprintf(all->out, "serving %s: %zu elements, %zu channel%s, %s, from %s\n", loaded->name, loaded->n,
             loaded->n_channels, loaded->n_channels == 1 ? "" : "s", lam_operator_kind(loaded->op),
             loaded->path);
+    if (loaded != old) verifier_add(all->verifier, loaded);
 }
 
-size_t catalog_reload(catalog *all, FILE *out, FILE *problems) {
+size_t catalog_reload(catalog *all) {
     source_list sources = {0};
     lam_error error = {0};
     lam_status status = LAM_OK;
@@ -209,8 +279,7 @@ size_t catalog_reload(catalog *all, FILE *out, FILE *problems) {
     atomic_init(&next->references, 1);
     next->scenes = memory_allocate(sources.count, sizeof *next->scenes, "catalog", &error);
     if (next->scenes == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < sources.count; i++)
-        load_source(all, next, before, &sources.items[i], out, problems);
+    for (size_t i = 0; i < sources.count; i++) load_source(all, next, before, &sources.items[i]);
     pthread_mutex_lock(&all->lock);
     catalog_snapshot *old = all->present;
     all->present = next;
@@ -218,12 +287,12 @@ size_t catalog_reload(catalog *all, FILE *out, FILE *problems) {
     next = NULL;
     catalog_release(old);
 done:
-    if (status != LAM_OK) fprintf(problems, "%s\n", error.message);
+    if (status != LAM_OK) fprintf(all->problems, "%s\n", error.message);
     catalog_release(next);
     catalog_release(before);
     free_sources(&sources);
-    fflush(out);
-    fflush(problems);
+    fflush(all->out);
+    fflush(all->problems);
     pthread_mutex_lock(&all->lock);
     size_t served = all->present->n_scenes;
     pthread_mutex_unlock(&all->lock);

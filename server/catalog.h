@@ -13,14 +13,15 @@ typedef struct catalog_snapshot {
 
 typedef struct catalog catalog;
 
-/* An empty catalog of what c names; c must outlive it. */
-lam_status catalog_create(const config *c, catalog **out, lam_error *error);
+/* An empty catalog of what c names; c must outlive it. Lines about its scenes go to `out` (served, verified)
+ * or `problems` (refused, damaged), all of them flushed. */
+lam_status catalog_create(const config *c, FILE *out, FILE *problems, catalog **made, lam_error *error);
 void catalog_destroy(catalog *all);
 
-/* Reads every store (again) and swaps the snapshot. A store that cannot be read keeps the scene read before,
- * or is left out. Says a line for each on `out` (served) or `problems` (refused), all of them flushed.
- * Returns how many are served. One thread at a time. */
-size_t catalog_reload(catalog *all, FILE *out, FILE *problems);
+/* Reads every store (again) and swaps the snapshot. A file that is the same as before keeps its scene; a
+ * store that cannot be read keeps the scene read before, or is left out, as is one that does not fit into
+ * --max-memory. What is mapped is verified after this. Returns how many are served. One thread at a time. */
+size_t catalog_reload(catalog *all);
 
 /* The present snapshot, held until it is released. Any thread. */
 catalog_snapshot *catalog_acquire(catalog *all);

@@ -13,8 +13,7 @@ typedef enum option_kind {
     OPTION_COUNT,
     OPTION_SIZE, /* bytes, with K, M, G, T for powers of 1024 */
     OPTION_FLAG,
-    OPTION_FUTURE,     /* of the contract, refused until it is there */
-    OPTION_FUTURE_FLAG /* the same without an argument */
+    OPTION_FUTURE_FLAG /* of the contract, refused until it is there */
 } option_kind;
 
 typedef struct option_row {
@@ -40,7 +39,8 @@ static const option_row rows[] = {
     {"max-batch", OPTION_COUNT, "N", AT(max_batch), 1, 1u << 20, 1024, "most vectors in a request (1024)"},
     {"max-inflight", OPTION_COUNT, "N", AT(max_inflight), 1, 1u << 20, 256,
      "most solves that wait or run; more are answered 503 (256)"},
-    {"max-memory", OPTION_FUTURE, "SIZE", 0, 0, 0, 0, "not supported yet"},
+    {"max-memory", OPTION_SIZE, "SIZE", AT(max_memory), 1, SIZE_MAX / 16, 0,
+     "refuse stores that, with the threads' work areas, take more than so much"},
     {"max-variants", OPTION_COUNT, "N", AT(max_variants), 0, 0, 0,
      "variants of reflectance (0; more are not supported yet)"},
     {"timeout", OPTION_COUNT, "SECONDS", AT(timeout_s), 1, 86400, 60,
@@ -48,7 +48,8 @@ static const option_row rows[] = {
     {"token-file", OPTION_TEXT, "FILE", AT(token_file), 0, 0, 0,
      "ask for the bearer token in this file under /v1"},
     {"access-log", OPTION_TEXT, "-|FILE", AT(access_log), 0, 0, 0, "one JSON line for each request"},
-    {"verify", OPTION_FLAG, NULL, AT(verify), 0, 0, 0, "compare all of a store with its checksums first"},
+    {"verify", OPTION_FLAG, NULL, AT(verify), 0, 0, 0,
+     "compare all of a store with its checksums before it is served"},
     {"lock", OPTION_FUTURE_FLAG, NULL, 0, 0, 0, 0, "not supported yet"},
     {"no-viewer", OPTION_FLAG, NULL, AT(no_viewer), 0, 0, 0, "no page at / (there is none yet)"},
     {"help", OPTION_FLAG, NULL, AT(help), 0, 0, 0, "print this and exit"},
@@ -97,7 +98,6 @@ static lam_status read_option(config *c, const option_row *row, const char *text
     case OPTION_FLAG:
         *(bool *)member = true;
         break;
-    case OPTION_FUTURE:
     case OPTION_FUTURE_FLAG:
         FAIL(error, LAM_ERR_UNSUPPORTED, "--%s: not supported yet", row->name);
     }

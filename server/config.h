@@ -16,6 +16,7 @@ typedef struct config {
     size_t max_body;     /* bytes */
     size_t max_batch;    /* vectors in a request */
     size_t max_inflight; /* solves that wait or run */
+    size_t max_memory;   /* bytes that stores and work areas may take; 0: any */
     size_t timeout_s;
     size_t max_variants;
     bool verify;

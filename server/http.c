@@ -1,7 +1,9 @@
 #include "server/http.h"
 
 #include "server/access_log.h"
+#include "server/map_guard.h"
 #include "server/routes.h"
+#include "server/verifier.h"
 
 #include <microhttpd.h>
 #include <stdlib.h>
@@ -54,10 +56,20 @@ static void refuse_token(request *r) {
     answer_refuse(&r->answer, 401, "a bearer token is needed: Authorization: Bearer TOKEN");
 }
 
+/* Whether the scene is in service; else it is refused, whatever the answer was. */
+static bool check_health(request *r) {
+    lam_error why;
+    bool news;
+    if (r->call.scene == NULL || !scene_damaged(r->call.scene, &why, &news)) return true;
+    if (news) verifier_tell(stderr, r->call.scene, &why);
+    answer_refuse(&r->answer, 503, "%.200s is out of service: %s", r->call.scene->name, why.message);
+    return false;
+}
+
 static bool check_scene(request *r) {
     if (!r->match.has_name) return true;
     r->call.scene = catalog_find(r->snapshot, r->match.name);
-    if (r->call.scene != NULL) return true;
+    if (r->call.scene != NULL) return check_health(r);
     if (atomic_load(&r->http->service->state) == SERVICE_LOADING)
         answer_refuse(&r->answer, 503, "stores are being loaded");
     else
@@ -157,19 +169,27 @@ static bool begin_solve(batch_job *job, batch_workspace *workspace) {
     request *r = request_of(job);
     const route *to = r->match.route;
     r->call.workspace = workspace;
+    map_guard_allow();
     if (to->steps != NULL) {
         if (to->steps->begin(&r->call, &r->answer)) return true;
     } else {
         to->handle(&r->call, &r->answer);
     }
+    (void)check_health(r); /* what was lost on the way makes the answer a wrong one */
     buffer_free(&r->body);
     return false;
+}
+
+static void pass_solve(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
+    map_guard_allow();
+    request_of(parts[0].job)->match.route->steps->pass(parts, n_parts, workspace);
 }
 
 static void end_solve(batch_job *job, batch_workspace *workspace) {
     request *r = request_of(job);
     r->call.workspace = workspace;
     r->match.route->steps->end(&r->call, &r->answer);
+    (void)check_health(r);
     buffer_free(&r->body);
 }
 
@@ -191,7 +211,7 @@ static enum MHD_Result handle(request *r) {
             /* Suspended first: the solve may be done before batch_submit returns. */
             const solve_steps *steps = r->match.route->steps;
             r->call.job = (batch_job){.begin = begin_solve,
-                                      .pass = steps != NULL ? steps->pass : NULL,
+                                      .pass = steps != NULL ? pass_solve : NULL,
                                       .end = end_solve,
                                       .finish = finish_solve};
             MHD_suspend_connection(r->connection);

@@ -1,6 +1,7 @@
 /* lambertd: reads stores, answers over HTTP what light they have, until a signal ends it. */
 #include "server/http.h"
 #include "server/listener.h"
+#include "server/map_guard.h"
 #include "server/routes.h"
 
 #include <errno.h>
@@ -51,7 +52,7 @@ static void serve_until_told(service *s, const sigset_t *signals) {
     int signal_number = 0;
     for (;;) {
         if (sigwait(signals, &signal_number) != 0 || signal_number != SIGHUP) return;
-        size_t served = catalog_reload(s->catalog, stdout, stderr);
+        size_t served = catalog_reload(s->catalog);
         printf("reloaded: %zu scene%s\n", served, served == 1 ? "" : "s");
         fflush(stdout);
     }
@@ -85,13 +86,13 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     if (c->token_file != NULL) TRY(token_read(c->token_file, &s.token, error));
     TRY(open_access_log(c->access_log, &s.access_log, error));
     TRY(metrics_create(route_label_count(), labels, &s.metrics, error));
-    TRY(catalog_create(c, &s.catalog, error));
+    TRY(catalog_create(c, stdout, stderr, &s.catalog, error));
     TRY(batch_start(c->threads, c->max_inflight, &s.queue, error));
     TRY(c->unix_path != NULL ? listener_unix(c->unix_path, &listen_fd, where, sizeof where, error)
                              : listener_tcp(c->listen_address, &listen_fd, where, sizeof where, error));
     bound = true;
     TRY(http_start(&s, listen_fd, &h, error));
-    if (catalog_reload(s.catalog, stdout, stderr) == 0) FAIL(error, LAM_ERR_IO, "no store can be served");
+    if (catalog_reload(s.catalog) == 0) FAIL(error, LAM_ERR_IO, "no store can be served");
     atomic_store(&s.state, SERVICE_READY);
     printf("listening on %s\n", where);
     fflush(stdout);
@@ -116,6 +117,7 @@ int main(int argc, char **argv) {
     config c;
     lam_error error = {0};
     sigset_t signals = block_signals();
+    map_guard_install();
     if (config_read(&c, argc, argv, &error) != LAM_OK) return complain(&error, EXIT_USAGE);
     if (c.help || c.version) {
         if (c.help)

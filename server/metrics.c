@@ -152,3 +152,12 @@ bool metrics_write(metrics *m, size_t n_scenes, uint64_t operator_bytes, size_t 
     pthread_mutex_unlock(&m->lock);
     return written;
 }
+
+bool metrics_write_stores(const metrics_stores *stores, buffer *b) {
+    return write_gauge(b, "lambertd_scenes_damaged", "Scenes out of service for damage.",
+                       stores->n_damaged) &&
+           write_gauge(b, "lambertd_scenes_unverified", "Scenes whose mapped blocks are still compared.",
+                       stores->n_unverified) &&
+           write_gauge(b, "lambertd_mapped_bytes", "Bytes of stores that are mapped, not copied.",
+                       stores->mapped_bytes);
+}

@@ -26,4 +26,11 @@ size_t metrics_in_flight(metrics *m);
 /* Appends the text; gauges that others know are handed in. */
 bool metrics_write(metrics *m, size_t n_scenes, uint64_t operator_bytes, size_t queued, buffer *b);
 
+/* What is known of the scenes' mapped stores. */
+typedef struct metrics_stores {
+    size_t n_damaged, n_unverified; /* scenes out of service; scenes still being compared */
+    uint64_t mapped_bytes;
+} metrics_stores;
+bool metrics_write_stores(const metrics_stores *stores, buffer *b);
+
 #endif

@@ -1,6 +1,7 @@
 #include "server/scene.h"
 
 #include "server/scene_description.h"
+#include "server/scene_health.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky.h"
 #include "store/store.h"
@@ -52,9 +53,74 @@ done:
     return status;
 }
 
-lam_status scene_open(const char *path, const char *name, bool verify, pthread_mutex_t *stores, scene **out,
-                      lam_error *error) {
+/* Vectors of one pass, for which a thread has a work area (post_radiosity.c). */
+#define PASS OPERATOR_PASS
+
+/* What a solve of one pass needs beside the request: the kind's own work, the answer, and what a sky gives.
+ */
+static size_t work_of(const scene *s) {
+    const size_t vectors = PASS * s->n_channels * s->n * sizeof(float);
+    return lam_operator_work_bytes(s->op, PASS) + (s->sky != NULL ? 2 : 1) * vectors;
+}
+
+uint64_t scene_work_memory(size_t n_threads, size_t work_bytes) {
+    return (uint64_t)n_threads * work_bytes;
+}
+
+/* What a store counts for, found before anything large of it is read: the bytes of its operator and its sky,
+ * mapped or read; of a sparse one also those of the transpose that is made. */
+static lam_status memory_of(store *s, uint64_t *memory, uint64_t *operator_bytes, lam_error *error) {
     lam_status status = LAM_OK;
+    char *kind = NULL;
+    uint64_t sky = 0;
+    TRY(store_group_bytes(s, "/operator", operator_bytes, error));
+    if (store_has(s, "/sky")) TRY(store_group_bytes(s, "/sky", &sky, error));
+    TRY(store_get_text(s, "/operator", "kind", &kind, error));
+    *memory = *operator_bytes * (strcmp(kind, "sparse") == 0 ? 2 : 1) + sky;
+done:
+    free(kind);
+    return status;
+}
+
+static lam_status read_store(store *s, const scene_wish *wish, scene *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (!store_has(s, "/operator"))
+        FAIL(error, LAM_ERR_FORMAT, "%s: holds no operator; precompute it again", wish->path);
+    TRY(memory_of(s, &made->memory, &made->bytes, error));
+    if (made->memory > wish->memory)
+        FAIL(error, LAM_ERR_MEMORY, "%s: takes %llu bytes, of --max-memory %llu are left", wish->path,
+             (unsigned long long)made->memory, (unsigned long long)wish->memory);
+    TRY(store_verify_group(s, wish->verify ? "/" : "/mesh", error));
+    TRY(store_map_file(s, error));
+    TRY(operator_load(s, &made->op, error));
+    made->n = lam_operator_elements(made->op);
+    made->n_channels = lam_operator_channels(made->op);
+    made->reflectance = made->op->reflectance;
+    lam_operator_set_threads(made->op, wish->threads);
+    TRY(sky_load(s, made->n, &made->sky, error));
+    made->n_emitters = lam_operator_emitters(made->op);
+    made->work_bytes = work_of(made);
+    TRY(read_groups(s, made, error));
+    TRY(read_area(s, made, error));
+    TRY(adjoint_rows_create(ADJOINT_ROWS_BYTES, &made->rows, error));
+    TRY(refined_create(s, made->op, wish->stores, &made->refined, error));
+    read_error(s, made);
+    TRY(scene_describe(s, made, &made->description, error));
+    if (store_map_bytes(store_map_of(s)) > 0) made->map = store_map_hold(store_map_of(s));
+    TRY(scene_health_create(made->path, made->map, wish->verify, &made->health, error));
+done:
+    return status;
+}
+
+/* Whether the store is what the scene so far was made of, and nothing speaks against that one. */
+static bool is_unchanged(const scene_wish *wish, const store *s) {
+    return wish->before != NULL && store_identity_same(&wish->before->identity, store_identity_of(s)) &&
+           !scene_damaged(wish->before, NULL, NULL);
+}
+
+lam_status scene_open(const scene_wish *wish, scene **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const char *path = wish->path;
     store *s = NULL;
     scene *made = memory_allocate(1, sizeof *made, path, error);
     if (made == NULL) return LAM_ERR_MEMORY;
@@ -62,27 +128,21 @@ lam_status scene_open(const char *path, const char *name, bool verify, pthread_m
     made->path = strdup(path);
     if (made->path == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", path);
     TRY(store_open(path, &s, error));
-    if (verify) TRY(store_verify(s, error));
-    if (name != NULL)
-        made->name = strdup(name);
+    made->identity = *store_identity_of(s);
+    if (is_unchanged(wish, s)) {
+        if (wish->verify) TRY(store_verify(s, error));
+        *out = scene_acquire(wish->before);
+        goto done;
+    }
+    made->renamed = wish->name != NULL;
+    if (wish->name != NULL)
+        made->name = strdup(wish->name);
     else
         TRY(store_get_text(s, "/", "name", &made->name, error));
     if (made->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", path);
     if (made->name[0] == '\0')
         FAIL(error, LAM_ERR_FORMAT, "%s: the store's name is empty; give it one: %s:NAME", path, path);
-    TRY(operator_load(s, &made->op, error));
-    made->n = lam_operator_elements(made->op);
-    made->n_channels = lam_operator_channels(made->op);
-    made->reflectance = made->op->reflectance;
-    TRY(sky_load(s, made->n, &made->sky, error));
-    made->n_emitters = lam_operator_emitters(made->op);
-    TRY(read_groups(s, made, error));
-    TRY(read_area(s, made, error));
-    TRY(adjoint_rows_create(ADJOINT_ROWS_BYTES, &made->rows, error));
-    TRY(store_group_bytes(s, "/operator", &made->bytes, error));
-    read_error(s, made);
-    TRY(refined_create(s, made->op, stores, &made->refined, error));
-    TRY(scene_describe(s, made, &made->description, error));
+    TRY(read_store(s, wish, made, error));
     *out = made;
     made = NULL;
 done:
@@ -104,6 +164,8 @@ void scene_release(scene *s) {
     adjoint_rows_destroy(s->rows);
     group_index_free(&s->groups);
     free(s->area);
+    scene_health_free(s->health);
+    store_map_release(s->map);
     free(s->description);
     free(s->name);
     free(s->path);

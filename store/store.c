@@ -283,6 +283,7 @@ void store_close(store *s) {
     if (s->h5 >= 0) H5Fclose(s->h5);
     if (s->file.fd >= 0) close(s->file.fd);
     store_sums_free(&s->sums);
+    store_map_release(s->map);
     free(s->partial);
     free(s->target);
     free(s->path);
@@ -301,7 +302,22 @@ static lam_status open_file(store *s, lam_error *error) {
     if (!S_ISREG(info.st_mode))
         return status_fail(error, LAM_ERR_FORMAT, "%s: not a regular file, so not a Lambert store", s->path);
     s->file.size = (uint64_t)info.st_size;
+    s->identity = (store_identity){.device = (uint64_t)info.st_dev,
+                                   .inode = (uint64_t)info.st_ino,
+                                   .size = s->file.size,
+                                   .modified_s = (int64_t)info.st_mtim.tv_sec,
+                                   .modified_ns = (int64_t)info.st_mtim.tv_nsec};
     return LAM_OK;
+}
+
+const store_identity *store_identity_of(const store *s) {
+    return &s->identity;
+}
+
+bool store_identity_same(const store_identity *a, const store_identity *b) {
+    return a->device == b->device && a->inode == b->inode && a->size == b->size &&
+           a->modified_s == b->modified_s && a->modified_ns == b->modified_ns &&
+           strcmp(a->digest, b->digest) == 0;
 }
 
 /* The fixed part of a superblock of version 2 or 3: signature [8], version, size of offsets, size of lengths,

@@ -73,6 +73,20 @@ lam_status store_open(const char *path, store **out, lam_error *error);
 /* Reads every dataset and compares it with /checksum; LAM_ERR_DAMAGED names the dataset and its MiB. */
 lam_status store_verify(store *s, lam_error *error);
 
+/* The same for the datasets below a group. */
+lam_status store_verify_group(store *s, const char *group, lam_error *error);
+
+/* What tells a store from another that may have taken its place: the file, and what its checksums come to. */
+typedef struct store_identity {
+    uint64_t device, inode, size;
+    int64_t modified_s, modified_ns;
+    char digest[17]; /* 16 hex digits: the attribute xxh3 of /checksum */
+} store_identity;
+bool store_identity_same(const store_identity *a, const store_identity *b);
+
+/* That of an opened store. */
+const store_identity *store_identity_of(const store *s);
+
 /* The path it was opened or created with; owned by s. */
 const char *store_path(const store *s);
 

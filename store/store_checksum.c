@@ -178,6 +178,7 @@ lam_status store_sums_read(store *s, lam_error *error) {
     TRY(store_get_text(s, "/checksum", "xxh3", &expected, error));
     if (strcmp(digest, expected) != 0)
         FAIL(error, LAM_ERR_DAMAGED, "%s: /checksum is damaged; make the store again", s->path);
+    memcpy(s->identity.digest, digest, sizeof digest);
 done:
     if (group >= 0) H5Gclose(group);
     free(expected);
@@ -187,14 +188,21 @@ done:
 /* --- comparing -------------------------------------------------------------------------------------------
  */
 
+const store_sum *store_sums_find_for(const store *s, const char *name, const store_array *array,
+                                     lam_error *error) {
+    const store_sum *sum = store_sums_find(&s->sums, name);
+    if (sum != NULL && sum->n_pieces == count_pieces(array->bytes)) return sum;
+    (void)status_fail(error, LAM_ERR_DAMAGED, "%s: %s has no checksum of its size; make the store again",
+                      s->path, name);
+    return NULL;
+}
+
 lam_status store_array_load(store *s, const char *name, const store_array *array, void *data,
                             lam_error *error) {
     lam_status status = LAM_OK;
     char *scratch = NULL;
-    const store_sum *sum = store_sums_find(&s->sums, name);
-    if (sum == NULL || sum->n_pieces != count_pieces(array->bytes))
-        FAIL(error, LAM_ERR_DAMAGED, "%s: %s has no checksum of its size; make the store again", s->path,
-             name);
+    const store_sum *sum = store_sums_find_for(s, name, array, error);
+    if (sum == NULL) TRY(LAM_ERR_DAMAGED);
     if (data == NULL) {
         scratch = memory_allocate(array->bytes < STORE_PIECE ? array->bytes : STORE_PIECE, 1, name, error);
         if (scratch == NULL) TRY(LAM_ERR_MEMORY);
@@ -213,13 +221,24 @@ done:
     return status;
 }
 
+/* Whether a dataset lies below a group of so many letters; "/" has none: every name goes on with a slash. */
+static bool is_below(const char *name, const char *group, size_t length) {
+    return strncmp(name, group, length) == 0 && name[length] == '/';
+}
+
 lam_status store_verify(store *s, lam_error *error) {
+    return store_verify_group(s, "/", error);
+}
+
+lam_status store_verify_group(store *s, const char *group, lam_error *error) {
     lam_status status = LAM_OK;
     store_mute mute = store_mute_begin();
     store_array array = {.id = -1};
+    const size_t length = strcmp(group, "/") == 0 ? 0 : strlen(group);
     /* Every array is in the table: store_open has seen to it. */
     for (size_t i = 0; i < s->sums.count; i++) {
         const char *name = s->sums.entries[i].name;
+        if (!is_below(name, group, length)) continue;
         TRY(store_array_open(s, name, &array, error));
         TRY(store_array_load(s, name, &array, NULL, error));
         store_array_close(&array);
@@ -235,12 +254,11 @@ lam_status store_group_bytes(store *s, const char *group, uint64_t *bytes, lam_e
     store_mute mute = store_mute_begin();
     store_array array = {.id = -1};
     uint64_t total = 0;
-    size_t length = strlen(group);
+    const size_t length = strcmp(group, "/") == 0 ? 0 : strlen(group);
     if (store_exists(s, group) == 0) FAIL(error, LAM_ERR_FORMAT, "%s: has no %s", s->path, group);
-    if (length == 1) length = 0; /* "/": every name goes on with a slash */
     for (size_t i = 0; i < s->sums.count; i++) {
         const char *name = s->sums.entries[i].name;
-        if (strncmp(name, group, length) != 0 || name[length] != '/') continue;
+        if (!is_below(name, group, length)) continue;
         TRY(store_array_open(s, name, &array, error));
         total += array.bytes;
         store_array_close(&array);

@@ -5,6 +5,7 @@
 
 #include "store/status.h"
 #include "store/store.h"
+#include "store/store_map.h"
 
 #include <hdf5.h>
 
@@ -45,6 +46,8 @@ struct store {
     store_file file;
     hid_t h5; /* negative: none */
     store_sums sums;
+    store_identity identity; /* of an opened file */
+    store_map *map;          /* of an opened file, held; NULL: none */
 };
 
 /* HDF5 prints its errors unless told not to: muted while one of our functions runs, then as it was. */
@@ -124,6 +127,10 @@ typedef struct store_array {
 lam_status store_array_open(store *s, const char *name, store_array *array, lam_error *error);
 void store_array_close(store_array *array);
 
+/* The same for one that must be of this type and shape; a dimension of SIZE_MAX stands for any. */
+lam_status store_array_open_as(store *s, const char *name, store_type type, int rank, const size_t *dims,
+                               store_array *array, lam_error *error);
+
 /* --- store_checksum.c --------------------------------------------------------------------------------------
  */
 
@@ -132,6 +139,10 @@ lam_status store_sums_add(store_sums *sums, const char *name, const void *data, 
                           lam_error *error);
 void store_sums_free(store_sums *sums);
 const store_sum *store_sums_find(const store_sums *sums, const char *name);
+
+/* The checksums of an array, as many as it has pieces; else NULL and LAM_ERR_DAMAGED in error. */
+const store_sum *store_sums_find_for(const store *s, const char *name, const store_array *array,
+                                     lam_error *error);
 
 /* Writes /checksum; reads it and compares it with its own checksum. */
 lam_status store_sums_write(store *s, lam_error *error);

@@ -120,9 +120,8 @@ done:
     return status;
 }
 
-/* Opens an array that must be of this type and shape; SIZE_MAX stands for any. */
-static lam_status open_as(store *s, const char *name, store_type type, int rank, const size_t *dims,
-                          store_array *array, lam_error *error) {
+lam_status store_array_open_as(store *s, const char *name, store_type type, int rank, const size_t *dims,
+                               store_array *array, lam_error *error) {
     lam_status status = LAM_OK;
     assert(rank >= 1 && rank <= STORE_MAX_RANK);
     TRY(store_array_open(s, name, array, error));
@@ -146,7 +145,7 @@ lam_status store_read(store *s, const char *name, store_type type, int rank, siz
     store_mute mute = store_mute_begin();
     store_array array = {.id = -1};
     void *values = NULL;
-    TRY(open_as(s, name, type, rank, dims, &array, error));
+    TRY(store_array_open_as(s, name, type, rank, dims, &array, error));
     values = memory_allocate(array.bytes, 1, name, error);
     if (values == NULL) TRY(LAM_ERR_MEMORY);
     TRY(store_array_load(s, name, &array, values, error));
@@ -165,7 +164,7 @@ lam_status store_read_into(store *s, const char *name, store_type type, int rank
     lam_status status = LAM_OK;
     store_mute mute = store_mute_begin();
     store_array array = {.id = -1};
-    TRY(open_as(s, name, type, rank, dims, &array, error));
+    TRY(store_array_open_as(s, name, type, rank, dims, &array, error));
     TRY(store_array_load(s, name, &array, data, error));
 done:
     store_array_close(&array);

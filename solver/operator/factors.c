@@ -17,16 +17,17 @@ void factors_free(factors *f) {
     *f = (factors){0};
 }
 
-/* One panel a channel of core [C][k][k]; NULL: none. */
-static lam_status add_cores(size_t k, const float *core, factors *f, lam_error *error) {
+/* One panel a channel of core [C][k][k]; nowhere: none. */
+static lam_status add_cores(size_t k, const store_view *core, factors *f, lam_error *error) {
     lam_status status = LAM_OK;
     char name[48];
-    if (core == NULL) return LAM_OK;
+    if (core->data == NULL) return LAM_OK;
     f->core = memory_allocate(f->n_channels, sizeof *f->core, "operator", error);
     if (f->core == NULL) return LAM_ERR_MEMORY;
     for (size_t c = 0; c < f->n_channels; c++) {
         snprintf(name, sizeof name, "/operator/core[%zu]", c);
-        TRY(panel_create(k, k, core + c * k * k, name, &f->core[c], error));
+        TRY(panel_from_view(k, k, PANEL_F32, core, c * k * k * sizeof(float), NULL, name, &f->core[c],
+                            error));
     }
 done:
     return status;
@@ -53,7 +54,7 @@ lam_status factors_create(size_t n, size_t k, size_t n_channels, float *left, fl
     /* Gone as soon as the panel stands, so that it is not there twice for longer than that. */
     free(left);
     left = NULL;
-    TRY(add_cores(k, core, &f, error));
+    TRY(add_cores(k, &(store_view){.data = core}, &f, error));
     *out = f;
     f = (factors){0};
 done:
@@ -68,7 +69,7 @@ done:
 lam_status factors_load(store *s, size_t n, size_t n_channels, factors *out, lam_error *error) {
     lam_status status = LAM_OK;
     char *form = NULL;
-    void *core = NULL;
+    store_view core = {.data = NULL};
     factors f = {.n_channels = n_channels};
     size_t k = SIZE_MAX;
     TRY(store_get_text(s, "/operator", "form", &form, error));
@@ -83,14 +84,14 @@ lam_status factors_load(store *s, size_t n, size_t n_channels, factors *out, lam
     TRY(panel_load(s, folded ? "/operator/Y" : "/operator/U", n, &k, &f.left, error));
     TRY(panel_check_precision(s, f.left.precision, error));
     if (!folded)
-        TRY(store_read(s, "/operator/core", STORE_F32, 3, (size_t[STORE_MAX_RANK]){n_channels, k, k}, &core,
-                       error));
-    TRY(add_cores(k, core, &f, error));
+        TRY(store_read_view(s, "/operator/core", STORE_F32, 3, (size_t[STORE_MAX_RANK]){n_channels, k, k},
+                            &core, error));
+    TRY(add_cores(k, &core, &f, error));
     *out = f;
     f = (factors){0};
 done:
     free(form);
-    free(core);
+    store_view_free(&core);
     factors_free(&f);
     return status;
 }
@@ -114,7 +115,7 @@ lam_status factors_convert(const factors *f, panel_precision precision, factors 
     float *core = NULL;
     TRY(panel_convert(&f->left, precision, name_of_left(f), &made.left, error));
     TRY(copy_cores(f, &core, error));
-    TRY(add_cores(f->left.k, core, &made, error));
+    TRY(add_cores(f->left.k, &(store_view){.data = core}, &made, error));
     *out = made;
     made = (factors){0};
 done:

@@ -86,11 +86,17 @@ static bool all_finite(panel_precision precision, size_t count, const void *valu
     return good;
 }
 
-/* The chunk of columns from PANEL_CHUNK q on of row i. */
-static void *chunk_of(const panel *a, size_t i, size_t q) {
+/* The chunk of columns from PANEL_CHUNK q on of row i of a tile. */
+static void *tile_chunk(const panel *a, size_t i, size_t q) {
     const size_t tile = i / PANEL_TILE * PANEL_TILE * a->stride;
     return (char *)a->data +
            (tile + (q * PANEL_TILE + i % PANEL_TILE) * PANEL_CHUNK) * panel_value_size(a->precision);
+}
+
+/* The same in either layout. */
+static const void *chunk_of(const panel *a, size_t i, size_t q) {
+    if (a->layout == PANEL_TILES) return tile_chunk(a, i, q);
+    return (const char *)a->rows + (i * a->k + q * PANEL_CHUNK) * panel_value_size(a->precision);
 }
 
 /* Columns of chunk q that are not padding. */
@@ -101,7 +107,8 @@ static size_t chunk_columns(const panel *a, size_t q) {
 static void put_row(panel *a, size_t i, const void *values) {
     const size_t size = panel_value_size(a->precision);
     for (size_t q = 0; q < a->stride / PANEL_CHUNK; q++)
-        memcpy(chunk_of(a, i, q), (const char *)values + q * PANEL_CHUNK * size, chunk_columns(a, q) * size);
+        memcpy(tile_chunk(a, i, q), (const char *)values + q * PANEL_CHUNK * size,
+               chunk_columns(a, q) * size);
 }
 
 static void get_row(const panel *a, size_t i, void *values) {
@@ -110,9 +117,9 @@ static void get_row(const panel *a, size_t i, void *values) {
         memcpy((char *)values + q * PANEL_CHUNK * size, chunk_of(a, i, q), chunk_columns(a, q) * size);
 }
 
-/* An empty panel: zeros, and room for a scale. */
-static lam_status panel_init(size_t n, size_t k, panel_precision precision, bool scaled, const char *name,
-                             panel *a, lam_error *error) {
+/* A panel without values: shape, and a copy of scale or (scaled, scale NULL) room for one. */
+static lam_status panel_shape(size_t n, size_t k, panel_precision precision, const float *scale, bool scaled,
+                              const char *name, panel *a, lam_error *error) {
     lam_status status = LAM_OK;
     panel made = {.n = n, .k = k, .precision = precision, .n_threads = 1};
     const size_t size = panel_value_size(precision);
@@ -126,9 +133,29 @@ static lam_status panel_init(size_t n, size_t k, panel_precision precision, bool
         made.scale = memory_allocate(k, sizeof *made.scale, name, error);
         if (made.scale == NULL) TRY(LAM_ERR_MEMORY);
     }
-    made.memory = allocate_data(count * size, name, &made.data, error);
-    if (made.memory == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t j = 0; j < k && scale != NULL; j++) {
+        if (!(scale[j] > 0.0f && isfinite(scale[j])))
+            FAIL(error, LAM_ERR_NUMERIC, "%s_scale[%zu] = %g, must be above 0 and finite", name, j,
+                 (double)scale[j]);
+        made.scale[j] = scale[j];
+    }
     made.kernels = panel_kernels_available(0);
+    *a = made;
+    made = (panel){0};
+done:
+    panel_free(&made);
+    return status;
+}
+
+/* The same with room for tiles, zeroed. */
+static lam_status panel_init(size_t n, size_t k, panel_precision precision, const float *scale, bool scaled,
+                             const char *name, panel *a, lam_error *error) {
+    lam_status status = LAM_OK;
+    panel made = {0};
+    TRY(panel_shape(n, k, precision, scale, scaled, name, &made, error));
+    const size_t rows = n + (PANEL_TILE - n % PANEL_TILE) % PANEL_TILE;
+    made.memory = allocate_data(rows * made.stride * panel_value_size(precision), name, &made.data, error);
+    if (made.memory == NULL) TRY(LAM_ERR_MEMORY);
     *a = made;
     made = (panel){0};
 done:
@@ -141,13 +168,7 @@ lam_status panel_create_kept(size_t n, size_t k, panel_precision precision, cons
     lam_status status = LAM_OK;
     panel made = {0};
     const size_t row_bytes = k * panel_value_size(precision);
-    TRY(panel_init(n, k, precision, scale != NULL, name, &made, error));
-    for (size_t j = 0; j < k && scale != NULL; j++) {
-        if (!(scale[j] > 0.0f && isfinite(scale[j])))
-            FAIL(error, LAM_ERR_NUMERIC, "%s_scale[%zu] = %g, must be above 0 and finite", name, j,
-                 (double)scale[j]);
-        made.scale[j] = scale[j];
-    }
+    TRY(panel_init(n, k, precision, scale, scale != NULL, name, &made, error));
     for (size_t i = 0; i < n && k > 0; i++) {
         const char *row = (const char *)values + i * row_bytes;
         if (!all_finite(precision, k, row)) {
@@ -169,7 +190,18 @@ lam_status panel_create(size_t n, size_t k, const float *rows, const char *name,
     return panel_create_kept(n, k, PANEL_F32, rows, NULL, name, a, error);
 }
 
+lam_status panel_view(size_t n, size_t k, panel_precision precision, const void *values, const float *scale,
+                      const char *name, panel *a, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(panel_shape(n, k, precision, scale, scale != NULL, name, a, error));
+    a->layout = PANEL_ROWS;
+    a->rows = values;
+done:
+    return status;
+}
+
 void panel_free(panel *a) {
+    store_map_release(a->mapping);
     free(a->memory);
     free(a->scale);
     *a = (panel){0};
@@ -238,8 +270,7 @@ lam_status panel_convert(const panel *a, panel_precision precision, const char *
              panel_precision_name(a->precision));
     if (precision == PANEL_F16 || precision == PANEL_I8)
         scaled = find_scale(a, precision, row, scale) || precision == PANEL_I8;
-    TRY(panel_init(a->n, a->k, precision, scaled, name, &made, error));
-    if (scaled) memcpy(made.scale, scale, a->k * sizeof *scale);
+    TRY(panel_init(a->n, a->k, precision, scaled ? scale : NULL, scaled, name, &made, error));
     made.n_threads = a->n_threads;
     for (size_t i = 0; i < a->n; i++) {
         float *values = row + a->k;
@@ -277,6 +308,6 @@ void panel_copy_values(const panel *a, void *values) {
 }
 
 size_t panel_bytes(const panel *a) {
-    return a->n * a->stride * panel_value_size(a->precision) +
+    return a->n * (a->layout == PANEL_TILES ? a->stride : a->k) * panel_value_size(a->precision) +
            (a->scale != NULL ? a->k * sizeof *a->scale : 0);
 }

@@ -5,12 +5,16 @@
 #define LAMBERT_OPERATOR_PANEL_H
 
 #include "store/status.h"
+#include "store/store_map.h"
 
 #include <stdint.h>
 
-/* Kept in tiles of PANEL_TILE rows, [rows / PANEL_TILE][columns / PANEL_CHUNK][PANEL_TILE][PANEL_CHUNK],
- * padded with zeros: memory is read straight on although several rows are summed at once, and yet a single
- * row takes up whole cache lines (f32) of its own. */
+/* Made here, it is kept in tiles of PANEL_TILE rows, [rows / PANEL_TILE][columns /
+ * PANEL_CHUNK][PANEL_TILE][PANEL_CHUNK], padded with zeros: memory is read straight on although several rows
+ * are summed at once, and yet a single row takes up whole cache lines (f32) of its own. Mapped from a store,
+ * it is kept in rows as they are there, [rows][columns] without padding, and nobody has to
+ * copy it: in f32 as fast, in 16 bits about a fifth and in 8 bits a third slower (one vector; Xeon, 2 cores).
+ */
 #define PANEL_TILE 4
 #define PANEL_CHUNK 16
 /* So many vectors share one pass over a matrix; more are cut into passes. At 16, one core computes about as
@@ -23,6 +27,13 @@
 typedef enum panel_precision { PANEL_F32, PANEL_F16, PANEL_BF16, PANEL_I8 } panel_precision;
 enum { PANEL_PRECISIONS = 4 };
 
+/* Where a value is: PANEL_TILES as above, PANEL_ROWS as in a store. Both give the same bits. */
+typedef enum panel_layout { PANEL_TILES, PANEL_ROWS } panel_layout;
+enum { PANEL_LAYOUTS = 2 };
+
+/* Bytes behind the last row of PANEL_ROWS that are read with it, and ignored. */
+#define PANEL_SLACK (PANEL_CHUNK * sizeof(float))
+
 typedef struct panel_kernels panel_kernels;
 
 typedef struct panel {
@@ -30,7 +41,10 @@ typedef struct panel {
     size_t k;      /* columns */
     size_t stride; /* k rounded up to PANEL_CHUNK */
     panel_precision precision;
-    void *data;                   /* tiles, aligned to PANEL_ALIGN */
+    panel_layout layout;
+    void *data;                   /* PANEL_TILES: tiles, aligned to PANEL_ALIGN */
+    const void *rows;             /* PANEL_ROWS: [n][k] */
+    store_map *mapping;           /* held, where rows lie in one; else NULL */
     float *scale;                 /* [k], what the values of a column are multiplied by; NULL: 1; owned */
     void *memory;                 /* where data lies, owned */
     size_t n_threads;             /* that one product may use, at least 1 */
@@ -51,6 +65,12 @@ lam_status panel_create(size_t n, size_t k, const float *rows, const char *name,
  * Errors: also LAM_ERR_NUMERIC for a scale that is not above 0 and finite. */
 lam_status panel_create_kept(size_t n, size_t k, panel_precision precision, const void *values,
                              const float *scale, const char *name, panel *a, lam_error *error);
+
+/* a becomes values [n][k] as they lie where the caller keeps them for as long as a is there, with PANEL_SLACK
+ * bytes behind that can be read; only scale is copied, and checked. Values are taken to be finite: what they
+ * are compared with is the store's affair. Errors: as panel_create_kept. */
+lam_status panel_view(size_t n, size_t k, panel_precision precision, const void *values, const float *scale,
+                      const char *name, panel *a, lam_error *error);
 
 /* out: what a, in single precision, becomes in another one. f16 gets a scale where a column would pass its
  * range, powers of two; i8 always one, the largest magnitude of a column over 127. Every value is off by at

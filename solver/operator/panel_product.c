@@ -48,9 +48,15 @@ size_t panel_work_bytes(const panel *a, size_t m) {
     return total > 0 ? total : PANEL_ALIGN;
 }
 
-/* The tile that row i is in. */
-static const void *tile_of(const panel *a, size_t i) {
-    return (const char *)a->data + i / PANEL_TILE * PANEL_TILE * a->stride * panel_value_size(a->precision);
+/* The tile that row i is in, and what follows it. */
+static panel_values tile_of(const panel *a, size_t i) {
+    const bool by_rows = a->layout == PANEL_ROWS;
+    const size_t row_step = by_rows ? a->k : a->stride;
+    const size_t at = i / PANEL_TILE * PANEL_TILE * row_step * panel_value_size(a->precision);
+    return (panel_values){.values = by_rows ? (const char *)a->rows + at : (const char *)a->data + at,
+                          .row_step = row_step,
+                          .n_chunks = a->stride / PANEL_CHUNK,
+                          .tail = by_rows ? a->k % PANEL_CHUNK : 0};
 }
 
 /* --- project ------------------------------------------------------------------------------------------ */
@@ -90,11 +96,13 @@ static void find_rows(size_t first, size_t last, size_t m, const float *X, size_
 static void project_block(const panel *a, size_t first, size_t m, const block_rows *rows, float *part) {
     const size_t n_chunks = a->stride / PANEL_CHUNK, step = m > MANY_VECTORS ? STEP_CHUNKS : n_chunks;
     for (size_t q = 0; q < n_chunks; q += step)
-        for (size_t tile = 0; tile < rows->n_tiles; tile++)
+        for (size_t tile = 0; tile < rows->n_tiles; tile++) {
+            const panel_values from = tile_of(a, first + tile * PANEL_TILE);
             if (rows->n_rows[tile] > 0)
-                a->kernels->project[a->precision](tile_of(a, first + tile * PANEL_TILE), rows->n_rows[tile],
-                                                  rows->which[tile], rows->c[tile], m, q,
-                                                  n_chunks - q < step ? n_chunks : q + step, part);
+                a->kernels->project[a->layout][a->precision](&from, rows->n_rows[tile], rows->which[tile],
+                                                             rows->c[tile], m, q,
+                                                             n_chunks - q < step ? n_chunks : q + step, part);
+        }
 }
 
 /* total += the rows of a slab; part is 0 before and after. Whether there were any. */
@@ -165,7 +173,7 @@ static size_t chosen_row(const row_choice *choice, size_t r) {
 
 static void expand_pass(const panel *a, size_t m, const float *T, size_t t_stride, const row_choice *choice,
                         float *Y, size_t y_stride, void *work) {
-    const size_t n_rows = choice->n_rows, n_chunks = a->stride / PANEL_CHUNK;
+    const size_t n_rows = choice->n_rows;
     const size_t n_blocks = n_rows / EXPAND_BLOCK + (n_rows % EXPAND_BLOCK > 0);
     const size_t n_threads = count_threads(a, n_blocks);
     float *t = work_take(&work, a->stride * m * sizeof *t);
@@ -179,13 +187,14 @@ static void expand_pass(const panel *a, size_t m, const float *T, size_t t_strid
     for (size_t b = 0; b < n_blocks; b++) {
         const size_t first = b * EXPAND_BLOCK;
         const size_t last = n_rows - first < EXPAND_BLOCK ? n_rows : first + EXPAND_BLOCK;
-        if (choice->rows == NULL)
-            a->kernels->expand[a->precision](tile_of(a, first), last - first, m, n_chunks, t, Y + first,
-                                             y_stride);
+        if (choice->rows == NULL) {
+            const panel_values from = tile_of(a, first);
+            a->kernels->expand[a->layout][a->precision](&from, last - first, m, t, Y + first, y_stride);
+        }
         for (size_t r = first; r < last && choice->rows != NULL; r++) {
             const size_t i = chosen_row(choice, r);
-            a->kernels->expand_row[a->precision](tile_of(a, i), i % PANEL_TILE, m, n_chunks, t, Y + r,
-                                                 y_stride);
+            const panel_values from = tile_of(a, i);
+            a->kernels->expand_row[a->layout][a->precision](&from, i % PANEL_TILE, m, t, Y + r, y_stride);
         }
     }
 }

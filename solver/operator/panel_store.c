@@ -31,7 +31,8 @@ done:
 lam_status panel_load(store *s, const char *name, size_t n, size_t *k, panel *a, lam_error *error) {
     lam_status status = LAM_OK;
     char scale_name[48];
-    void *values = NULL, *scale = NULL;
+    void *scale = NULL;
+    store_view values = {.data = NULL};
     panel_precision precision = PANEL_F32;
     size_t dims[STORE_MAX_RANK] = {n, *k};
     TRY(read_precision(s, name, &precision, error));
@@ -42,13 +43,28 @@ lam_status panel_load(store *s, const char *name, size_t n, size_t *k, panel *a,
     if (scaled && precision != PANEL_I8 && precision != PANEL_F16)
         FAIL(error, LAM_ERR_FORMAT, "%s: %s is of %s and must not have a %s", store_path(s), name,
              panel_precision_name(precision), scale_name);
-    TRY(store_read(s, name, panel_types[precision], 2, dims, &values, error));
+    TRY(store_read_view(s, name, panel_types[precision], 2, dims, &values, error));
     if (scaled) TRY(store_read(s, scale_name, STORE_F32, 1, &dims[1], &scale, error));
-    TRY(panel_create_kept(n, dims[1], precision, values, scale, name, a, error));
+    TRY(panel_from_view(n, dims[1], precision, &values, 0, scale, name, a, error));
     *k = dims[1];
 done:
-    free(values);
+    store_view_free(&values);
     free(scale);
+    return status;
+}
+
+lam_status panel_from_view(size_t n, size_t k, panel_precision precision, const store_view *values,
+                           size_t offset, const float *scale, const char *name, panel *a, lam_error *error) {
+    lam_status status = LAM_OK;
+    const void *first = (const char *)values->data + offset;
+    if (values->map == NULL) {
+        TRY(panel_create_kept(n, k, precision, first, scale, name, a, error));
+        goto done;
+    }
+    _Static_assert(PANEL_SLACK <= STORE_MAP_SLACK, "the end of a mapping can be read past so far");
+    TRY(panel_view(n, k, precision, first, scale, name, a, error));
+    a->mapping = store_map_hold(values->map);
+done:
     return status;
 }
 

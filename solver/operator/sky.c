@@ -1,6 +1,7 @@
 #include "solver/operator/sky.h"
 
 #include "store/status.h"
+#include "store/store_map.h"
 
 #include <math.h>
 #include <stdint.h>
@@ -9,32 +10,34 @@
 
 struct lam_sky {
     size_t n_tiles, n;
-    float *first_bounce; /* [m][n], sr */
+    const float *first_bounce; /* [m][n], sr; in where */
+    store_view where;
 };
 
 lam_status sky_load(store *s, size_t n, lam_sky **out, lam_error *error) {
     lam_status status = LAM_OK;
     size_t dims[STORE_MAX_RANK] = {SIZE_MAX, n};
-    void *data = NULL;
+    store_view view = {.data = NULL};
     lam_sky *made = NULL;
     if (!store_has(s, "/sky")) {
         *out = NULL;
         return LAM_OK;
     }
-    TRY(store_read(s, "/sky/first_bounce", STORE_F32, 2, dims, &data, error));
-    const float *values = data;
+    TRY(store_read_view(s, "/sky/first_bounce", STORE_F32, 2, dims, &view, error));
+    const float *values = view.data;
     if (dims[0] == 0) FAIL(error, LAM_ERR_FORMAT, "%s: /sky/first_bounce has no tiles", store_path(s));
-    for (size_t k = 0; k < dims[0] * n; k++)
+    /* What is mapped is compared with its checksums later, and is then what a writer has checked. */
+    for (size_t k = 0; k < dims[0] * n && view.map == NULL; k++)
         if (!(values[k] >= 0 && isfinite(values[k])))
             FAIL(error, LAM_ERR_FORMAT, "%s: /sky/first_bounce[%zu][%zu] = %g, must be at least 0",
                  store_path(s), k / n, k % n, (double)values[k]);
     made = memory_allocate(1, sizeof *made, "the sky", error);
     if (made == NULL) TRY(LAM_ERR_MEMORY);
-    *made = (lam_sky){.n_tiles = dims[0], .n = n, .first_bounce = data};
-    data = NULL;
+    *made = (lam_sky){.n_tiles = dims[0], .n = n, .first_bounce = values, .where = view};
+    view = (store_view){.data = NULL};
     *out = made;
 done:
-    free(data);
+    store_view_free(&view);
     return status;
 }
 
@@ -44,9 +47,10 @@ lam_status sky_create(size_t n_tiles, size_t n, const float *first_bounce, lam_s
     if (made == NULL) TRY(LAM_ERR_MEMORY);
     made->n_tiles = n_tiles;
     made->n = n;
-    made->first_bounce = memory_allocate(n_tiles, n * sizeof *made->first_bounce, "the sky", error);
-    if (made->first_bounce == NULL) TRY(LAM_ERR_MEMORY);
-    memcpy(made->first_bounce, first_bounce, n_tiles * n * sizeof *first_bounce);
+    made->where.memory = memory_allocate(n_tiles, n * sizeof *made->first_bounce, "the sky", error);
+    if (made->where.memory == NULL) TRY(LAM_ERR_MEMORY);
+    memcpy(made->where.memory, first_bounce, n_tiles * n * sizeof *first_bounce);
+    made->first_bounce = made->where.memory;
     *out = made;
     made = NULL;
 done:
@@ -74,7 +78,7 @@ done:
 
 void lam_sky_close(lam_sky *sky) {
     if (sky == NULL) return;
-    free(sky->first_bounce);
+    store_view_free(&sky->where);
     free(sky);
 }
 

@@ -1,8 +1,10 @@
 /* How fast one answer of a low-rank operator is: y = Y x for a Gaussian Y [n][k] in every precision, one to
- * 16 vectors at once, beside a plain read of Y and OpenBLAS's sgemv, taking turns in one run.
+ * 16 vectors at once, beside a plain read of Y and OpenBLAS's sgemv, taking turns in one run. Y is kept in
+ * tiles in huge pages, and again as a daemon has it: in rows, in a file that is mapped.
  *
- *     bench_online [-r ROUNDS] [NxK ...]
+ *     bench_online [-r ROUNDS] [-d DIR | -a] [NxK ...]
  *
+ * The file is made in DIR (/tmp); with -a the rows lie in huge pages too, which tells pages from layout.
  * CSV, times are medians. Ratios of one run are worth more than times: where sgemm_scaling, how much faster
  * OpenBLAS is with all threads, is far below their number, the machine was not free.
  */
@@ -16,18 +18,21 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 #define HUGE_PAGE ((size_t)2 << 20)
 
 enum { BATCHES = 5, MOST_ROUNDS = 99, READ = 0, SGEMV = 1, FIRST_PRODUCT = 2 };
 static const size_t batches[BATCHES] = {1, 2, 4, 8, 16};
-/* read, sgemv, then expand and project of each precision and batch. */
-enum { MEASURED = FIRST_PRODUCT + 2 * PANEL_PRECISIONS * BATCHES };
+/* read, sgemv, then expand and project of each layout, precision and batch. */
+enum { EACH = PANEL_PRECISIONS * BATCHES, MEASURED = FIRST_PRODUCT + 2 * PANEL_LAYOUTS * EACH };
 
 typedef struct subject {
     size_t n, k;
     float *rows; /* [n][k], in huge pages: what is read, and what OpenBLAS takes */
-    panel Y[PANEL_PRECISIONS];
+    panel Y[PANEL_LAYOUTS][PANEL_PRECISIONS];
+    void *file[PANEL_PRECISIONS]; /* what the rows of the second layout lie in */
+    size_t file_bytes[PANEL_PRECISIONS];
     float *x, *y; /* 16 vectors of max(n, k) each */
     void *work;
 } subject;
@@ -50,7 +55,39 @@ static void die(const char *what) {
     exit(1);
 }
 
-static void make_subject(subject *s) {
+/* Memory for values: a file of folder, which nobody else sees, or (folder NULL) huge pages. */
+static void *map_values(size_t bytes, const char *folder) {
+    char path[4096];
+    void *values = MAP_FAILED;
+    if (folder == NULL) {
+        values = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+        if (values != MAP_FAILED) (void)madvise(values, bytes, MADV_HUGEPAGE);
+    } else {
+        snprintf(path, sizeof path, "%s/bench_online_XXXXXX", folder);
+        const int fd = mkstemp(path);
+        if (fd < 0) die("the folder cannot be written to");
+        unlink(path);
+        if (ftruncate(fd, (off_t)bytes) == 0)
+            values = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
+        close(fd);
+    }
+    if (values == MAP_FAILED) die("values cannot be mapped");
+    return values;
+}
+
+/* The same numbers once more, in rows. */
+static void make_rows(subject *s, int p, const char *folder) {
+    lam_error error = {0};
+    const panel *tiles = &s->Y[PANEL_TILES][p];
+    s->file_bytes[p] = s->n * s->k * panel_value_size((panel_precision)p) + PANEL_SLACK;
+    s->file[p] = map_values(s->file_bytes[p], folder);
+    panel_copy_values(tiles, s->file[p]);
+    if (panel_view(s->n, s->k, (panel_precision)p, s->file[p], tiles->scale, "Y", &s->Y[PANEL_ROWS][p],
+                   &error) != LAM_OK)
+        die(error.message);
+}
+
+static void make_subject(subject *s, const char *folder) {
     lam_error error = {0};
     const size_t longest = s->n > s->k ? s->n : s->k;
     const size_t bytes_of_rows = (s->n * s->k * sizeof(float) + HUGE_PAGE) / HUGE_PAGE * HUGE_PAGE;
@@ -63,13 +100,16 @@ static void make_subject(subject *s) {
         uint64_t state = i * 0x9E3779B97F4A7C15u + 1;
         for (size_t j = 0; j < s->k; j++) rows[i * s->k + j] = gaussian(&state);
     }
-    if (panel_create(s->n, s->k, rows, "Y", &s->Y[0], &error) != LAM_OK) die(error.message);
+    panel *tiles = s->Y[PANEL_TILES];
+    if (panel_create(s->n, s->k, rows, "Y", &tiles[0], &error) != LAM_OK) die(error.message);
     for (int p = 1; p < PANEL_PRECISIONS; p++)
-        if (panel_convert(&s->Y[0], (panel_precision)p, "Y", &s->Y[p], &error) != LAM_OK) die(error.message);
+        if (panel_convert(&tiles[0], (panel_precision)p, "Y", &tiles[p], &error) != LAM_OK)
+            die(error.message);
     size_t work_bytes = 0;
     for (int p = 0; p < PANEL_PRECISIONS; p++) {
-        s->Y[p].n_threads = (size_t)omp_get_num_procs();
-        const size_t bytes = panel_work_bytes(&s->Y[p], PANEL_VECTORS);
+        make_rows(s, p, folder);
+        tiles[p].n_threads = (size_t)omp_get_num_procs();
+        const size_t bytes = panel_work_bytes(&tiles[p], PANEL_VECTORS);
         if (bytes > work_bytes) work_bytes = bytes;
     }
     s->x = aligned_alloc(PANEL_ALIGN, longest * PANEL_VECTORS * sizeof *s->x);
@@ -83,7 +123,11 @@ static void make_subject(subject *s) {
 }
 
 static void free_subject(subject *s) {
-    for (int p = 0; p < PANEL_PRECISIONS; p++) panel_free(&s->Y[p]);
+    for (int p = 0; p < PANEL_PRECISIONS; p++) {
+        panel_free(&s->Y[PANEL_TILES][p]);
+        panel_free(&s->Y[PANEL_ROWS][p]);
+        munmap(s->file[p], s->file_bytes[p]);
+    }
     free(s->rows);
     free(s->x);
     free(s->y);
@@ -118,6 +162,19 @@ static float read_all(const subject *s, int n_threads) {
 
 static volatile float kept; /* so that no sum is left out */
 
+typedef struct subject_product {
+    bool expand;
+    int layout, precision, batch;
+} subject_product;
+
+static subject_product product_of(int which) {
+    const int product = which - FIRST_PRODUCT;
+    return (subject_product){.expand = product < PANEL_LAYOUTS * EACH,
+                             .layout = product / EACH % PANEL_LAYOUTS,
+                             .precision = product / BATCHES % PANEL_PRECISIONS,
+                             .batch = product % BATCHES};
+}
+
 static double measure(subject *s, int which, int n_threads) {
     double start = clock_seconds();
     if (which == READ) {
@@ -126,13 +183,13 @@ static double measure(subject *s, int which, int n_threads) {
         cblas_sgemv(CblasRowMajor, CblasNoTrans, (int)s->n, (int)s->k, 1, s->rows, (int)s->k, s->x, 1, 0,
                     s->y, 1);
     } else {
-        const int product = which - FIRST_PRODUCT, batch = product % BATCHES, p = product / BATCHES;
-        panel *Y = &s->Y[p % PANEL_PRECISIONS];
+        const subject_product of = product_of(which);
+        panel *Y = &s->Y[of.layout][of.precision];
         Y->n_threads = (size_t)n_threads;
-        if (p < PANEL_PRECISIONS)
-            panel_expand(Y, batches[batch], s->x, s->k, s->y, s->n, s->work);
+        if (of.expand)
+            panel_expand(Y, batches[of.batch], s->x, s->k, s->y, s->n, s->work);
         else
-            panel_project(Y, batches[batch], s->x, s->n, s->y, s->k, s->work);
+            panel_project(Y, batches[of.batch], s->x, s->n, s->y, s->k, s->work);
     }
     return clock_seconds() - start;
 }
@@ -155,33 +212,31 @@ static double sgemm_seconds(int n_threads) {
 }
 
 static void print_lines(const subject *s, int n_threads, const double *seconds, double scaling) {
-    for (int which = 0; which < MEASURED; which++) {
-        const int product = which - FIRST_PRODUCT, batch = product % BATCHES, p = product / BATCHES;
-        const size_t m = which < FIRST_PRODUCT ? 1 : batches[batch];
-        const panel *a = &s->Y[which < FIRST_PRODUCT ? 0 : p % PANEL_PRECISIONS];
-        const double single = which < FIRST_PRODUCT ? seconds[which] : seconds[which - batch];
-        const double f32 =
-            seconds[which < FIRST_PRODUCT  ? FIRST_PRODUCT
-                    : p < PANEL_PRECISIONS ? FIRST_PRODUCT + batch
-                                           : FIRST_PRODUCT + PANEL_PRECISIONS * BATCHES + batch];
-        const char *name = which == READ          ? "read"
-                           : which == SGEMV       ? "sgemv"
-                           : p < PANEL_PRECISIONS ? "expand"
-                                                  : "project";
-        printf("%zu,%zu,%d,%s,%s,%zu,%.3f,%.2f,%.2f,%.2f,%.2f,%.3f,%.2f\n", s->n, s->k, n_threads, name,
-               panel_precision_name(a->precision), m, seconds[which] * 1e3,
-               (double)panel_bytes(a) / seconds[which] * 1e-9, seconds[READ] / seconds[which],
-               seconds[SGEMV] / seconds[which], f32 / seconds[which], seconds[which] / (double)m / single,
-               scaling);
+    static const char *const layouts[PANEL_LAYOUTS] = {"tiles", "mapped"};
+    const double plain = (double)(s->n * s->k * sizeof(float));
+    for (int which = 0; which < FIRST_PRODUCT; which++)
+        printf("%zu,%zu,%d,%s,rows,f32,1,%.3f,%.2f,%.2f,%.2f,1,1,1,%.2f\n", s->n, s->k, n_threads,
+               which == READ ? "read" : "sgemv", seconds[which] * 1e3, plain / seconds[which] * 1e-9,
+               seconds[READ] / seconds[which], seconds[SGEMV] / seconds[which], scaling);
+    for (int which = FIRST_PRODUCT; which < MEASURED; which++) {
+        const subject_product of = product_of(which);
+        const panel *a = &s->Y[of.layout][of.precision];
+        printf("%zu,%zu,%d,%s,%s,%s,%zu,%.3f,%.2f,%.2f,%.2f,%.2f,%.3f,%.2f,%.2f\n", s->n, s->k, n_threads,
+               of.expand ? "expand" : "project", layouts[of.layout], panel_precision_name(a->precision),
+               batches[of.batch], seconds[which] * 1e3, (double)panel_bytes(a) / seconds[which] * 1e-9,
+               seconds[READ] / seconds[which], seconds[SGEMV] / seconds[which],
+               seconds[which - of.precision * BATCHES] / seconds[which],
+               seconds[which] / (double)batches[of.batch] / seconds[which - of.batch],
+               seconds[which - of.layout * EACH] / seconds[which], scaling);
     }
 }
 
-static void bench(size_t n, size_t k, int n_rounds, double scaling) {
+static void bench(size_t n, size_t k, int n_rounds, const char *folder, double scaling) {
     static double times[2][MEASURED][MOST_ROUNDS];
     double median[MEASURED];
     subject s = {.n = n, .k = k};
     const int n_procs = omp_get_num_procs();
-    make_subject(&s);
+    make_subject(&s, folder);
     for (int r = -1; r < n_rounds; r++) /* the first to get warm */
         for (int t = 0; t < 2; t++) {
             const int n_threads = t == 0 ? 1 : n_procs;
@@ -201,20 +256,23 @@ static void bench(size_t n, size_t k, int n_rounds, double scaling) {
 int main(int argc, char **argv) {
     static const size_t sizes[][2] = {{24128, 1364}, {79232, 1751}, {221184, 3456}, {3538944, 216}};
     int n_rounds = 7, first = 1;
-    if (argc > 2 && strcmp(argv[1], "-r") == 0) {
-        n_rounds = atoi(argv[2]);
-        first = 3;
+    const char *folder = "/tmp";
+    for (int option; (option = getopt(argc, argv, "r:d:a")) != -1; first = optind) {
+        if (option == '?') die("[-r ROUNDS] [-d DIR | -a] [NxK ...]");
+        if (option == 'r') n_rounds = atoi(optarg);
+        if (option == 'd') folder = optarg;
+        if (option == 'a') folder = NULL;
     }
     if (n_rounds < 1 || n_rounds > MOST_ROUNDS) die("-r: 1 to 99 rounds");
     const double scaling = sgemm_seconds(1) / sgemm_seconds(omp_get_num_procs());
-    puts("n,k,threads,what,precision,vectors,ms,gb_per_s,speed_of_read,speed_of_sgemv,speed_of_f32,"
-         "time_per_vector_of_single,sgemm_scaling");
+    puts("n,k,threads,what,layout,precision,vectors,ms,gb_per_s,speed_of_read,speed_of_sgemv,speed_of_f32,"
+         "time_per_vector_of_single,speed_of_tiles,sgemm_scaling");
     for (int i = first; i < argc; i++) {
         size_t n, k;
         if (sscanf(argv[i], "%zux%zu", &n, &k) != 2 || n == 0 || k == 0) die("sizes are given as NxK");
-        bench(n, k, n_rounds, scaling);
+        bench(n, k, n_rounds, folder, scaling);
     }
     for (size_t i = 0; first == argc && i < sizeof sizes / sizeof sizes[0]; i++)
-        bench(sizes[i][0], sizes[i][1], n_rounds, scaling);
+        bench(sizes[i][0], sizes[i][1], n_rounds, folder, scaling);
     return 0;
 }

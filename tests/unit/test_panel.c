@@ -272,6 +272,105 @@ START_TEST(chosen_rows_have_the_same_bits) {
 }
 END_TEST
 
+/* What a is kept as, [n][k] values in a place that begins odd where it may, with what is no number behind. */
+static panel view_of(const panel *a, void **memory) {
+    const size_t size = panel_value_size(a->precision), bytes = a->n * a->k * size;
+    lam_error error = {.message = ""};
+    panel rows = {0};
+    char *values = (char *)malloc(bytes + size + PANEL_SLACK);
+    *memory = values;
+    values += size;
+    panel_copy_values(a, values);
+    memset(values + bytes, 0xff, PANEL_SLACK);
+    ck_assert_msg(panel_view(a->n, a->k, a->precision, values, a->scale, "A", &rows, &error) == LAM_OK, "%s",
+                  error.message);
+    rows.kernels = a->kernels;
+    rows.n_threads = a->n_threads;
+    return rows;
+}
+
+/* Rows as they lie in a store take part in the same sums as tiles, whatever stands behind them. */
+START_TEST(rows_give_the_bits_of_tiles) {
+    static const size_t batches[] = {1, 2, 4, 5, 16, VECTORS};
+    for (size_t set = 0; panel_kernels_available(set) != NULL; set++)
+        for (size_t shape_index = 0; shape_index < SHAPES; shape_index++) {
+            const size_t n = shapes[shape_index].n, k = shapes[shape_index].k;
+            subject s;
+            void *memory;
+            subject_make(&s, shapes[shape_index], (panel_precision)_i, panel_kernels_available(set));
+            panel rows = view_of(&s.a, &memory);
+            ck_assert_uint_eq(panel_work_bytes(&rows, VECTORS), panel_work_bytes(&s.a, VECTORS));
+            /* Vector 0 has dark elements, so that tiles are read in part. */
+            for (size_t i = 0; i < n; i++)
+                if (i % 3 == 1) s.X[i] = 0.0f;
+            float *T[2], *Y[2], *some[2];
+            uint32_t chosen[5];
+            for (size_t r = 0; r < 5; r++) chosen[r] = (uint32_t)((n - 1) * r / 4);
+            for (int i = 0; i < 2; i++) {
+                T[i] = nan_floats(VECTORS * (k + GAP));
+                Y[i] = nan_floats(VECTORS * (n + GAP));
+                some[i] = nan_floats(VECTORS * 5);
+            }
+            for (size_t b = 0; b < sizeof batches / sizeof *batches; b++) {
+                for (int i = 0; i < 2; i++) {
+                    const panel *a = i == 0 ? &s.a : &rows;
+                    panel_project(a, batches[b], s.X, n + GAP, T[i], k + GAP, s.work);
+                    panel_expand(a, batches[b], s.T, k + GAP, Y[i], n + GAP, s.work);
+                    panel_expand_rows(a, batches[b], s.T, k + GAP, 5, chosen, NULL, some[i], 5, s.work);
+                }
+                ck_assert_mem_eq(T[0], T[1], VECTORS * (k + GAP) * sizeof **T);
+                ck_assert_mem_eq(Y[0], Y[1], VECTORS * (n + GAP) * sizeof **Y);
+                ck_assert_mem_eq(some[0], some[1], VECTORS * 5 * sizeof **some);
+                ck_assert(!isnan(Y[1][batches[b] * (n + GAP) - GAP - 1]));
+            }
+            for (int i = 0; i < 2; i++) {
+                free(T[i]);
+                free(Y[i]);
+                free(some[i]);
+            }
+            panel_free(&rows);
+            free(memory);
+            subject_free(&s);
+        }
+}
+END_TEST
+
+/* A view gives back what it sees, and can be made into another precision. */
+START_TEST(views_can_be_copied) {
+    enum { N = 37, K = 53 };
+    lam_error error = {.message = ""};
+    subject s;
+    void *memory;
+    panel narrow[2];
+    float copies[2][N * K];
+    subject_make(&s, (shape){N, K}, (panel_precision)_i, panel_kernels_available(0));
+    panel rows = view_of(&s.a, &memory);
+    panel_copy_rows(&s.a, copies[0]);
+    panel_copy_rows(&rows, copies[1]);
+    ck_assert_mem_eq(copies[0], copies[1], sizeof copies[0]);
+    memset(copies, 0, sizeof copies);
+    panel_copy_values(&s.a, copies[0]);
+    panel_copy_values(&rows, copies[1]);
+    ck_assert_mem_eq(copies[0], copies[1], sizeof copies[0]);
+    ck_assert_uint_eq(panel_bytes(&rows), N * K * panel_value_size(rows.precision) +
+                                              (rows.scale != NULL ? K * sizeof(float) : 0));
+    for (int i = 0; i < 2 && _i == PANEL_F32; i++) {
+        ck_assert(panel_convert(i == 0 ? &s.a : &rows, PANEL_F16, "A", &narrow[i], &error) == LAM_OK);
+        panel_copy_rows(&narrow[i], copies[i]);
+        panel_free(&narrow[i]);
+    }
+    ck_assert_mem_eq(copies[0], copies[1], sizeof copies[0]);
+    const float bad[K] = {1, 0};
+    panel untouched = {.n = 3};
+    ck_assert(panel_view(N, K, rows.precision, rows.rows, bad, "A", &untouched, &error) == LAM_ERR_NUMERIC);
+    ck_assert_ptr_nonnull(strstr(error.message, "A_scale[1] = 0"));
+    ck_assert_uint_eq(untouched.n, 3);
+    panel_free(&rows);
+    free(memory);
+    subject_free(&s);
+}
+END_TEST
+
 /* Large enough that threads are used; 3 do not divide the blocks evenly. */
 START_TEST(bits_do_not_depend_on_threads) {
     enum { N = 9001, K = 130, M = 5 };
@@ -434,6 +533,8 @@ int main(void) {
     tcase_add_loop_test(tests, bits_do_not_depend_on_the_batch, 0, PANEL_PRECISIONS);
     tcase_add_loop_test(tests, wide_instruction_sets_give_the_same_bits, 0, PANEL_PRECISIONS);
     tcase_add_loop_test(tests, chosen_rows_have_the_same_bits, 0, PANEL_PRECISIONS);
+    tcase_add_loop_test(tests, rows_give_the_bits_of_tiles, 0, PANEL_PRECISIONS);
+    tcase_add_loop_test(tests, views_can_be_copied, 0, PANEL_PRECISIONS);
     tcase_add_loop_test(tests, bits_do_not_depend_on_threads, 0, PANEL_PRECISIONS);
     tcase_add_test(tests, subnormal_numbers_count);
     tcase_add_loop_test(tests, conversion_rounds_to_nearest, 0, PANEL_PRECISIONS);
