@@ -37,6 +37,7 @@ typedef struct subject {
     cell cells[SERVICE_FORMATS][SERVICE_CLIENTS][SERVICE_SERVERS];
     service_solve solves[SERVICE_ROUNDS], beside[SERVICE_ROUNDS];
     size_t rounds;
+    double solve; /* s, of one vector in process: the sleeping server's sleep */
     bool same_bits;
 } subject;
 
@@ -67,6 +68,13 @@ static double failed_of(const service_load *l) {
     return l->failed;
 }
 
+/* Whether so many came that those under way when wrk stops, which it does not count, are few beside them. */
+static bool enough(const cell *c, int clients) {
+    for (size_t r = 0; r < c->n; r++)
+        if (c->runs[r].requests < 3 * service_clients[clients]) return false;
+    return true;
+}
+
 static const char *why_not(const subject *s, service_server server) {
     if (s->b->wrk[0] == '\0') return "not run: wrk is not installed";
     return s->servers.absent[server];
@@ -81,7 +89,8 @@ static void add_load(subject *s, service_format f, int clients, service_server s
     char failed[64];
     snprintf(failed, sizeof failed, "%.0f of %.0f failed", median_of(c, failed_of),
              median_of(c, requests_of));
-    if (note == NULL) note = c->n > 0 && median_of(c, failed_of) > 0 ? failed : "";
+    if (note == NULL)
+        note = median_of(c, failed_of) > 0 ? failed : enough(c, clients) ? "" : "too few answers";
     table_number(t, (double)s->size->n);
     table_number(t, (double)s->k);
     table_text(t, service_format_names[f]);
@@ -111,15 +120,20 @@ static void add_solve(subject *s, const char *how, int threads, const service_so
     table_number(t, (double)found->count);
 }
 
-/* wanted and limit: NULL and NaN where nothing is wanted of it. */
-static void add_ratio(subject *s, const char *what, double measured, const char *wanted, bool met) {
+/* wanted: NULL where nothing is. */
+static void add_ratio(subject *s, const char *what, double measured, bool sure, const char *wanted,
+                      bool met) {
     table *t = &s->b->tables.ratios;
     table_number(t, (double)s->size->n);
     table_number(t, (double)s->k);
     table_text(t, what);
     table_number(t, measured);
     table_text(t, wanted != NULL ? wanted : "");
-    table_text(t, !isfinite(measured) ? "not run" : wanted == NULL ? "" : met ? "met" : "missed");
+    table_text(t, !isfinite(measured) ? "not run"
+                  : !sure             ? "too few answers"
+                  : wanted == NULL    ? ""
+                  : met               ? "met"
+                                      : "missed");
 }
 
 /* --- making ready --------------------------------------------------------------------------------------- */
@@ -159,23 +173,37 @@ done:
     return status;
 }
 
+/* One after the other on one thread and on all, in turns; of each the best turn, as what disturbs a machine
+ * only ever makes it slower. */
+static lam_status solve_in_turns(subject *s, double seconds, service_solve best[2], lam_error *error) {
+    enum { TURNS = 3 };
+    lam_status status = LAM_OK;
+    const int threads[2] = {1, s->b->threads};
+    for (int turn = 0; turn < TURNS; turn++)
+        for (int i = 0; i < 2; i++) {
+            service_solve found;
+            TRY(service_solve_alone(s->b, s->op, threads[i], s->E, s->B, seconds / TURNS, &found, error));
+            if (turn == 0 || found.p50 < best[i].p50) best[i] = found;
+        }
+    for (int i = 0; i < 2; i++) add_solve(s, "one after the other", threads[i], &best[i]);
+done:
+    return status;
+}
+
 /* In process: how long a solve takes decides how long the sleeping server sleeps, and how many at once: as
  * many as solve at once on these cores, so that it could give as many answers a second. */
-static lam_status solve_first(subject *s, double *sleep, int *sleepers, lam_error *error) {
+static lam_status solve_first(subject *s, int *sleepers, lam_error *error) {
     lam_status status = LAM_OK;
     service_bench *b = s->b;
     const double seconds = b->run->scale == BENCH_QUICK ? .1 : s->size->seconds;
-    service_solve one, all, beside;
-    TRY(service_solve_alone(b, s->op, 1, s->E, s->B, seconds, &one, error));
-    TRY(service_solve_alone(b, s->op, b->threads, s->E, s->B, seconds, &all, error));
+    service_solve alone[2], beside;
+    TRY(solve_in_turns(s, seconds, alone, error));
     TRY(service_solve_beside(b, s->op, s->E, seconds, &beside, error));
-    add_solve(s, "one after the other", 1, &one);
-    add_solve(s, "one after the other", b->threads, &all);
     add_solve(s, "one on each core", b->threads, &beside);
-    *sleep = all.p50;
-    *sleepers = (int)fmax(1, fmin(b->threads, round(b->threads * all.p50 / one.p50)));
+    s->solve = alone[1].p50;
+    *sleepers = (int)fmax(1, fmin(b->threads, round(b->threads * alone[1].p50 / alone[0].p50)));
     bench_say(b->run, "n = %zu: a solve takes %.3g ms; the sleeping server sleeps so long, %d at once",
-              s->size->n, 1e3 * *sleep, *sleepers);
+              s->size->n, 1e3 * s->solve, *sleepers);
 done:
     return status;
 }
@@ -184,7 +212,7 @@ static lam_status make_ready(subject *s, lam_error *error) {
     lam_status status = LAM_OK;
     service_bench *b = s->b;
     const size_t n = s->size->n;
-    double sleep = 0, start = clock_seconds();
+    double start = clock_seconds();
     int sleepers = 1;
     TRY(service_store_make(b, n, s->k, &s->op, error));
     bench_say(b->run, "n = %zu, k = %zu: operator of %.3g GB made and stored in %.1f s", n, s->k,
@@ -201,13 +229,13 @@ static lam_status make_ready(subject *s, lam_error *error) {
                                      .body = s->bodies[f],
                                      .length = length};
     }
-    TRY(solve_first(s, &sleep, &sleepers, error));
+    TRY(solve_first(s, &sleepers, error));
     start = clock_seconds();
     TRY(service_start_lambertd(b, &s->servers, error));
     TRY(ask_once(s, error));
     bench_say(b->run, "n = %zu: lambertd's first answers came %.1f s after its start", n,
               clock_seconds() - start);
-    TRY(service_start_others(b, &s->servers, sleep, sleepers, error));
+    TRY(service_start_others(b, &s->servers, s->solve, sleepers, error));
 done:
     return status;
 }
@@ -226,6 +254,14 @@ static void subject_free(subject *s) {
 
 /* --- measuring ------------------------------------------------------------------------------------------ */
 
+/* So that every client is answered twice where solves have to wait for each other; at most three times as
+ * long as the scale says. */
+static unsigned seconds_of(const subject *s, int clients, service_server server) {
+    const double least = s->size->seconds, wanted = ceil(2 * service_clients[clients] * s->solve);
+    if (server != SERVICE_LAMBERTD && server != SERVICE_SLEEPING) return s->size->seconds;
+    return (unsigned)fmax(least, fmin(wanted, 3 * least));
+}
+
 /* wrk on one server; nothing where either is missing. */
 static lam_status load(subject *s, service_format f, int clients, service_server server, lam_error *error) {
     lam_status status = LAM_OK;
@@ -237,7 +273,7 @@ static lam_status load(subject *s, service_format f, int clients, service_server
     else if (server != SERVICE_LAMBERTD)
         request.path = ready_paths[f];
     TRY(service_wrk(s->b, s->servers.port[server], &request, service_format_names[f],
-                    service_clients[clients], s->size->seconds, &c->runs[c->n], error));
+                    service_clients[clients], seconds_of(s, clients, server), &c->runs[c->n], error));
     c->n++;
 done:
     return status;
@@ -313,23 +349,25 @@ static void add_ratios(subject *s, const service_loops *loops) {
     const double rate = ratio_of(s, many, per_second_of, NULL, s->beside, false);
     const double batch = ratio_of(s, many, per_second_of, one, NULL, false);
     const double tail = best_tail(many), sleeping_tail = best_tail(sleeping);
-    add_ratio(s, "p50 over the solve in process, npy, 1 client", http, large ? "<= 1.15" : NULL,
-              http <= 1.15);
-    add_ratio(s, "answers a second over unbatched solves, npy, 16 clients", rate, small ? ">= 0.85" : NULL,
-              rate >= .85);
-    add_ratio(s, "answers a second of 16 clients over 1, npy", batch, whole && !small ? ">= 4" : NULL,
-              batch >= 4);
-    add_ratio(s, "p99 over p50, npy, 16 clients, best round", tail, NULL, false);
-    add_ratio(s, "p99 over p50 of the sleeping server, likewise", sleeping_tail, NULL, false);
+    const bool sure = enough(many, MANY);
+    add_ratio(s, "p50 over the solve in process, npy, 1 client", http, enough(one, ONE),
+              large ? "<= 1.15" : NULL, http <= 1.15);
+    add_ratio(s, "answers a second over unbatched solves, npy, 16 clients", rate, sure,
+              small ? ">= 0.85" : NULL, rate >= .85);
+    add_ratio(s, "answers a second of 16 clients over 1, npy", batch, sure && enough(one, ONE),
+              whole && !small ? ">= 4" : NULL, batch >= 4);
+    add_ratio(s, "p99 over p50, npy, 16 clients, best round", tail, sure, NULL, false);
+    add_ratio(s, "p99 over p50 of the sleeping server, likewise", sleeping_tail, enough(sleeping, MANY), NULL,
+              false);
     add_ratio(s, "lambertd's p99 over p50 over the sleeping server's", tail / sleeping_tail,
-              small ? "<= 1" : NULL, tail <= sleeping_tail);
-    add_ratio(s, "parse and encode of dense JSON, ms", loops->codec_ms, large ? "<= 9" : NULL,
+              sure && enough(sleeping, MANY), small ? "<= 1" : NULL, tail <= sleeping_tail);
+    add_ratio(s, "parse and encode of dense JSON, ms", loops->codec_ms, true, large ? "<= 9" : NULL,
               loops->codec_ms <= 9);
-    add_ratio(s, "evaluations a second of the reduce loop", loops->reduce_per_second,
+    add_ratio(s, "evaluations a second of the reduce loop", loops->reduce_per_second, true,
               whole ? ">= 5000" : NULL, loops->reduce_per_second >= 5000);
-    add_ratio(s, "adjoint over forward, p50 in turns", loops->adjoint_of_forward, whole ? "<= 1.2" : NULL,
-              loops->adjoint_of_forward <= 1.2);
-    add_ratio(s, "bits as in process (1: yes)", s->same_bits, "= 1", s->same_bits);
+    add_ratio(s, "adjoint over forward, p50 in turns", loops->adjoint_of_forward, true,
+              whole ? "<= 1.2" : NULL, loops->adjoint_of_forward <= 1.2);
+    add_ratio(s, "bits as in process (1: yes)", s->same_bits, true, "= 1", s->same_bits);
 }
 
 lam_status service_measure(service_bench *b, const service_size *size, service_curves *curves,

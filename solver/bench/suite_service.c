@@ -27,7 +27,8 @@ static const table_column load_columns[] = {
     {"mb_per_second", "MB/s", "both bodies"},
     {"requests", "", "answered in a run"},
     {"runs", "", "of which these are medians"},
-    {"note", NULL, "why it was not run, or how many failed"},
+    {"note", NULL,
+     "why it was not run, how many failed, or that wrk stopped before there were three for each client"},
 };
 
 static const table_column solve_columns[] = {
@@ -69,7 +70,7 @@ static const table_column ratio_columns[] = {
     {"what", NULL, "medians of rounds in which both sides had their turn"},
     {"measured", "", ""},
     {"wanted", NULL, "empty: nothing at this size"},
-    {"outcome", NULL, "met, missed, not run"},
+    {"outcome", NULL, "met, missed, not run, too few answers"},
 };
 
 #define COLUMNS(of) .columns = of, .n_columns = sizeof of / sizeof *of, .printed = true

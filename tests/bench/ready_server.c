@@ -56,12 +56,13 @@ static void enqueue(server *s, request *r) {
     pthread_mutex_unlock(&s->lock);
 }
 
-/* NULL when the server ends. */
-static request *dequeue(server *s) {
+/* NULL when the server ends; *hurry: it is about to. */
+static request *dequeue(server *s, bool *hurry) {
     pthread_mutex_lock(&s->lock);
     while (s->first == NULL && !s->closed) pthread_cond_wait(&s->work, &s->lock);
     request *r = s->first;
     if (r != NULL) s->first = r->next;
+    *hurry = s->closed;
     pthread_mutex_unlock(&s->lock);
     return r;
 }
@@ -69,12 +70,13 @@ static request *dequeue(server *s) {
 static void *sleep_for_others(void *context) {
     server *s = context;
     request *r;
+    bool hurry;
     /* The kernel may else add 50 us to every sleep: half of a small solve. */
     prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
-    while ((r = dequeue(s)) != NULL) {
+    while ((r = dequeue(s, &hurry)) != NULL) {
         struct timespec left = {.tv_sec = s->nanoseconds / 1000000000,
                                 .tv_nsec = s->nanoseconds % 1000000000};
-        while (nanosleep(&left, &left) != 0 && errno == EINTR) continue;
+        while (!hurry && nanosleep(&left, &left) != 0 && errno == EINTR) continue;
         r->slept = true;
         MHD_resume_connection(r->connection);
     }

@@ -31,6 +31,7 @@ echo "$@" >> "$CALLS"
 echo measured with care
 printf '\\nmeasured 100 300 1010 2000000 10\\n'
 """
+WRK_ON_A_SLOW_MACHINE = "#!/bin/sh\necho; echo measured 400000 500000 20 1000000 0\n"
 WRK_THAT_FAILS = "#!/bin/sh\necho no more sockets >&2\nexit 1\n"
 WRK_THAT_HANGS = "#!/bin/sh\necho begun > \"$CALLS\"\nexec sleep 600\n"
 NGINX_THAT_FAILS = "#!/bin/sh\necho 'nginx: [emerg] no' >&2\nexit 1\n"
@@ -164,6 +165,18 @@ class MadeUp(Case):
             self.assertEqual(call[:2] + call[4:6], ["-t", "1", "-d", "1s"])
             self.assertEqual(call[-3:], ["POST", "npy", "application/x-npy"] if "npy" in call
                              else ["POST", "json", "application/json"])
+
+    def test_too_few_answers(self):
+        """20 answers are enough for one client (3) and for four (12), not for 16."""
+        self.program("wrk", WRK_ON_A_SLOW_MACHINE)
+        self.program("nginx", NGINX_THAT_FAILS)
+        tables = self.tables()
+        for row in tables["load"]:
+            if row["server"] != "nginx":
+                self.assertEqual(row["note"], "too few answers" if row["clients"] == "16" else "", row)
+        outcomes = {row["what"]: row["outcome"] for row in tables["ratios"]}
+        self.assertEqual(outcomes["p50 over the solve in process, npy, 1 client"], "")
+        self.assertEqual(outcomes["answers a second of 16 clients over 1, npy"], "too few answers")
 
     def test_a_wrk_that_fails(self):
         self.program("wrk", WRK_THAT_FAILS)
