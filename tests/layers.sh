@@ -18,7 +18,7 @@ declare -A allowed=(
     [solver/daylight]="lambert/ store/ solver/progress.h solver/formfactor/sky.h solver/daylight/"
     [solver]="lambert/ store/ solver/"
     [server]="lambert/ store/ solver/operator/ server/"
-    [tests/bench]="lambert/ store/ solver/ tests/bench/"
+    [tests/bench]="lambert/ store/ solver/ server/ tests/bench/"
 )
 
 # third-party header: the only files or folders that may include it
@@ -31,7 +31,7 @@ declare -A home=(
     ["cblas.h"]="solver/build/ solver/matrix/ solver/operator/core.c tests/bench/bench_online.c"
     ["cairo"]="solver/bench/plot.c"
     ["png.h"]="solver/image.c"
-    ["jansson.h"]="solver/ server/"
+    ["jansson.h"]="solver/ server/ tests/bench/"
     ["microhttpd.h"]="server/ tests/bench/ready_server.c"
 )
 

@@ -90,7 +90,9 @@ done:
 /* Forward and adjoint in turns: the cotangent is what the forward answer is made of in size and format. */
 static lam_status with_adjoint(service_bench *b, client *c, const service_scene *scene, service_loops *out,
                                lam_error *error) {
-    static const char path[] = "/v1/scenes/bench/adjoint", old[] = "\"emission\"", new[] = "\"cotangent\"";
+    static const char path[] = "/v1/scenes/bench/adjoint", old[] = "\"emission\"",
+                      new[] = "\"gradient\":[\"emission\"],\"cotangent\"",
+                      short_body[] = "{\"cotangent\":{\"elements\":[0],\"values\":[1]}}";
     lam_status status = LAM_OK;
     const client_request *json = &scene->ask[SERVICE_JSON];
     char note[64], *body = NULL;
@@ -101,8 +103,8 @@ static lam_status with_adjoint(service_bench *b, client *c, const service_scene 
     const client_request probe = {.method = "POST",
                                   .path = path,
                                   .type = json->type,
-                                  .body = "{\"cotangent\":{\"elements\":[0],\"values\":[1]}}",
-                                  .length = strlen("{\"cotangent\":{\"elements\":[0],\"values\":[1]}}")};
+                                  .body = short_body,
+                                  .length = sizeof short_body - 1};
     adjoint.path = path;
     TRY(try_route(c, b->run, &probe, &good, note, error));
     if (!good && (strstr(note, "501") != NULL || strstr(note, "404") != NULL)) {
@@ -115,7 +117,7 @@ static lam_status with_adjoint(service_bench *b, client *c, const service_scene 
         const size_t length = json->length + sizeof new - sizeof old;
         body = memory_allocate(length, 1, "a request", error);
         if (body == NULL) TRY(LAM_ERR_MEMORY);
-        /* {"cotangent": for {"emission": */
+        /* {"gradient":["emission"],"cotangent": for {"emission": */
         body[0] = '{';
         memcpy(body + 1, new, sizeof new - 1);
         memcpy(body + sizeof new, json->body + sizeof old, json->length - sizeof old);

@@ -36,6 +36,35 @@ WRK_THAT_FAILS = "#!/bin/sh\necho no more sockets >&2\nexit 1\n"
 WRK_THAT_HANGS = "#!/bin/sh\necho begun > \"$CALLS\"\nexec sleep 600\n"
 NGINX_THAT_FAILS = "#!/bin/sh\necho 'nginx: [emerg] no' >&2\nexit 1\n"
 
+# Answers every route, and wrongly: what it is sent for the light; adjoint in JSON only
+LAMBERTD = """#!/usr/bin/python3
+import http.server, json
+
+class Handler(http.server.BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+
+    def log_message(self, *arguments):
+        pass
+
+    def do_POST(self):
+        raw = self.rfile.read(int(self.headers["Content-Length"]))
+        body = json.loads(raw) if self.headers["Content-Type"] == "application/json" else None
+        status, answer = 200, raw
+        if self.path.endswith("/adjoint"):
+            status = 200 if body and len(body["cotangent"]) == 200 else 422
+        elif body is not None:
+            times = {"parse": 1.5, "solve": 2, "encode": 0.25}
+            answer = json.dumps({"radiosity": body["emission"], "time_ms": times}, separators=(",", ":")).encode()
+        self.send_response(status)
+        self.send_header("Content-Length", str(len(answer)))
+        self.end_headers()
+        self.wfile.write(answer)
+
+server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+print(f"listening on http://127.0.0.1:{server.server_address[1]}", flush=True)
+server.serve_forever()
+"""
+
 
 def working_in(folder):
     """The processes whose folder is below another one."""
@@ -250,6 +279,26 @@ class Missing(Case):
                 self.assertEqual(row["note"], "not run: no tests/ready_server beside lambert")
             elif row["server"] == "lambertd":
                 self.assertEqual(float(row["per_second"]), 500)
+
+    def test_every_loop(self):
+        """With a lambertd that has all routes: those of the real one come one by one."""
+        self.program("wrk", WRK)
+        self.program("nginx", NGINX_THAT_FAILS)
+        self.program("lambertd", LAMBERTD)
+        tables = self.tables(self.copy("lambert"))
+        self.assertEqual([(row["loop"], row["format"], row["note"]) for row in tables["loop"]],
+                         [("forward", "npy", ""), ("forward", "json", ""), ("forward, adjoint", "json", ""),
+                          ("reduce", "json", "")])
+        for row in tables["loop"]:
+            self.assertGreater(float(row["per_second"]), 0)
+            self.assertEqual(row["p50_second_ms"] != "", row["loop"] == "forward, adjoint")
+        for row in tables["codec"]:
+            self.assertEqual([float(row[key + "_ms"]) for key in ("parse", "solve", "encode", "codec")],
+                             [1.5, 2, .25, 1.75])
+        ratios = {row["what"]: row for row in tables["ratios"]}
+        self.assertEqual(ratios["bits as in process (1: yes)"]["outcome"], "missed")
+        self.assertGreater(float(ratios["adjoint over forward, p50 in turns"]["measured"]), 0)
+        self.assertGreater(float(ratios["evaluations a second of the reduce loop"]["measured"]), 0)
 
     def test_without_lambertd(self):
         done = self.run_it(self.copy("lambert"))
