@@ -254,10 +254,10 @@ static void subject_free(subject *s) {
 
 /* --- measuring ------------------------------------------------------------------------------------------ */
 
-/* So that every client is answered twice where solves have to wait for each other; at most three times as
- * long as the scale says. */
+/* So that there are ten answers, and two for every client, where solves have to wait for each other; at most
+ * three times as long as the scale says. */
 static unsigned seconds_of(const subject *s, int clients, service_server server) {
-    const double least = s->size->seconds, wanted = ceil(2 * service_clients[clients] * s->solve);
+    const double least = s->size->seconds, wanted = ceil(fmax(10, 2 * service_clients[clients]) * s->solve);
     if (server != SERVICE_LAMBERTD && server != SERVICE_SLEEPING) return s->size->seconds;
     return (unsigned)fmax(least, fmin(wanted, 3 * least));
 }
