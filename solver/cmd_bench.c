@@ -1,5 +1,6 @@
 /* lambert bench: measures, suite by suite. */
 #include "solver/bench_files.h"
+#include "solver/forecast.h"
 #include "solver/options.h"
 #include "solver/verbs.h"
 
@@ -49,8 +50,10 @@ static const option_verb verb = {
         "Measure. Suites: formfactors (error against exact values and time, throughput of rays), lowrank "
         "(factorizations and two meshes beside the tables of the papers), stability (operators where "
         "numbers are hard), cities (sparse inverses, few emitters and Jacobi beside the tables of the "
-        "thesis). Not "
-        "supported yet: service, hierarchical, reuse. Each writes its tables "
+        "thesis), service (lambertd under load beside servers that compute nothing and beside solves in "
+        "process; "
+        "wrk and nginx take part where they are installed). Not supported yet: hierarchical, reuse. Each "
+        "writes its tables "
         "as CSV and JSON, its plots as SVG and PNG.",
     .options = rows,
     .min_arguments = 1,
@@ -94,7 +97,12 @@ int cmd_bench(int argc, char **argv) {
                                  .seed = f.seed,
                                  .threads = omp_get_max_threads()}};
     const bench_sink sink = bench_files_sink(&files);
-    const bench_run run = {.scale = scale, .seed = f.seed, .scene = f.scene, .sink = &sink, .progress = &how};
+    const bench_run run = {.scale = scale,
+                           .seed = f.seed,
+                           .memory = memory_available(),
+                           .scene = f.scene,
+                           .sink = &sink,
+                           .progress = &how};
     lam_status status = bench_files_open(&files, &error);
     for (size_t i = 0; i < given.n_arguments && status == LAM_OK; i++) {
         files.suite = suites[i]->name;

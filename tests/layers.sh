@@ -18,6 +18,7 @@ declare -A allowed=(
     [solver/daylight]="lambert/ store/ solver/progress.h solver/formfactor/sky.h solver/daylight/"
     [solver]="lambert/ store/ solver/"
     [server]="lambert/ store/ solver/operator/ server/"
+    [tests/bench]="lambert/ store/ solver/ server/ tests/bench/"
 )
 
 # third-party header: the only files or folders that may include it
@@ -27,11 +28,11 @@ declare -A home=(
     ["assimp/"]="solver/scene/assimp_reader.c"
     ["embree3/"]="solver/formfactor/"
     ["lapacke.h"]="solver/build/ solver/operator/core.c"
-    ["cblas.h"]="solver/build/ solver/matrix/ solver/operator/core.c"
+    ["cblas.h"]="solver/build/ solver/matrix/ solver/operator/core.c tests/bench/bench_online.c"
     ["cairo"]="solver/bench/plot.c"
     ["png.h"]="solver/image.c"
-    ["jansson.h"]="solver/ server/"
-    ["microhttpd.h"]="server/"
+    ["jansson.h"]="solver/ server/ tests/bench/"
+    ["microhttpd.h"]="server/ tests/bench/ready_server.c"
 )
 
 room_of() {
@@ -47,10 +48,11 @@ room_of() {
     solver/build/*) echo solver/build ;;
     solver/*) echo solver ;;
     server/*) echo server ;;
+    tests/bench/*) echo tests/bench ;;
     esac
 }
 
-for file in $(git ls-files 'include/*.h' 'store/*.[ch]' 'solver/*.[ch]' 'server/*.[ch]'); do
+for file in $(git ls-files 'include/*.h' 'store/*.[ch]' 'solver/*.[ch]' 'server/*.[ch]' 'tests/bench/*.[ch]'); do
     room=$(room_of "$file")
     checked=$((checked + 1))
     while read -r header; do

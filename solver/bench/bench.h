@@ -22,6 +22,7 @@ const char *bench_scale_name(bench_scale scale);
 typedef struct bench_run {
     bench_scale scale;
     uint64_t seed;
+    uint64_t memory;   /* bytes that are free; 0 when unknown */
     const char *scene; /* a file for the parts that take any scene; NULL: their own */
     const bench_sink *sink;
     const progress *progress;
@@ -38,7 +39,7 @@ lam_status bench_check(const bench_run *run, lam_error *error);
 
 typedef lam_status bench_suite_run(const bench_run *run, lam_error *error);
 
-bench_suite_run bench_formfactors, bench_lowrank, bench_stability, bench_cities;
+bench_suite_run bench_formfactors, bench_lowrank, bench_stability, bench_cities, bench_service;
 
 typedef struct bench_suite {
     const char *name;

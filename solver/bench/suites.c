@@ -7,7 +7,7 @@ const bench_suite bench_suites[] = {
     {"lowrank", bench_lowrank},
     {"stability", bench_stability},
     {"cities", bench_cities},
-    {"service", NULL},
+    {"service", bench_service},
     {"hierarchical", NULL},
     {"reuse", NULL},
     {NULL, NULL},

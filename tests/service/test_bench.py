@@ -200,7 +200,7 @@ class Refusals(unittest.TestCase):
         self.refused(2, "too few arguments", "-o", out)
         self.refused(2, "no such suite", "speed", "-o", out)
         self.refused(2, "exclude each other", "formfactors", "--quick", "--full", "-o", out)
-        for later in ("service", "hierarchical", "reuse"):
+        for later in ("hierarchical", "reuse"):
             self.refused(2, "not supported yet", "formfactors", later, "-o", out)
         self.assertEqual(os.listdir(self.folder), [])
 

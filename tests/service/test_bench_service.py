@@ -1,0 +1,316 @@
+"""Black box: `lambert bench service`. Whatever of wrk and nginx is installed takes part; figures are only looked at
+where they come from a wrk that is made up, as they must not depend on the machine."""
+
+import csv
+import json
+import os
+import shutil
+import signal
+import stat
+import subprocess
+import tempfile
+import time
+import unittest
+
+from command import ENVIRONMENT, LAMBERT
+
+TABLES = {
+    "load": "n k format clients server p50_ms p99_ms per_second bytes_sent bytes_got mb_per_second requests runs note",
+    "solve": "n k gb solves threads p50_ms p99_ms per_second count",
+    "loop": "n k loop format per_second p50_ms p50_second_ms note",
+    "codec": "n k parse_ms solve_ms encode_ms codec_ms codec_best_ms",
+    "ratios": "n k what measured wanted outcome",
+}
+SERVERS = ["lambertd", "ready", "sleeping", "nginx"]
+NPY_HEADER = 128
+PATIENCE = 120
+
+# 1000 answers and 10 failures in 2 s, half within .1 ms and 99 of 100 within .3 ms
+WRK = """#!/bin/sh
+echo "$@" >> "$CALLS"
+echo measured with care
+printf '\\nmeasured 100 300 1010 2000000 10\\n'
+"""
+WRK_ON_A_SLOW_MACHINE = "#!/bin/sh\necho; echo measured 400000 500000 20 1000000 0\n"
+WRK_THAT_FAILS = "#!/bin/sh\necho no more sockets >&2\nexit 1\n"
+WRK_THAT_HANGS = "#!/bin/sh\necho begun > \"$CALLS\"\nexec sleep 600\n"
+NGINX_THAT_FAILS = "#!/bin/sh\necho 'nginx: [emerg] no' >&2\nexit 1\n"
+
+# Answers every route, and wrongly: what it is sent for the light; adjoint in JSON only
+LAMBERTD = """#!/usr/bin/python3
+import http.server, json
+
+class Handler(http.server.BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+
+    def log_message(self, *arguments):
+        pass
+
+    def do_POST(self):
+        raw = self.rfile.read(int(self.headers["Content-Length"]))
+        body = json.loads(raw) if self.headers["Content-Type"] == "application/json" else None
+        status, answer = 200, raw
+        if self.path.endswith("/adjoint"):
+            status = 200 if body and len(body["cotangent"]) == 200 else 422
+        elif body is not None:
+            times = {"parse": 1.5, "solve": 2, "encode": 0.25}
+            answer = json.dumps({"radiosity": body["emission"], "time_ms": times}, separators=(",", ":")).encode()
+        self.send_response(status)
+        self.send_header("Content-Length", str(len(answer)))
+        self.end_headers()
+        self.wfile.write(answer)
+
+server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+print(f"listening on http://127.0.0.1:{server.server_address[1]}", flush=True)
+server.serve_forever()
+"""
+
+
+def working_in(folder):
+    """The processes whose folder is below another one."""
+    found = []
+    for process in filter(str.isdigit, os.listdir("/proc")):
+        try:
+            if os.readlink(f"/proc/{process}/cwd").startswith(folder + "/"):
+                found.append(int(process))
+        except OSError:
+            pass  # it ended, or is not ours
+    return found
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = os.path.realpath(folder.name)
+        self.out, self.scratch = os.path.join(self.folder, "out"), os.path.join(self.folder, "scratch")
+        self.programs = os.path.join(self.folder, "programs")
+        os.mkdir(self.scratch)
+        os.mkdir(self.programs)
+        self.environment = dict(ENVIRONMENT, TMPDIR=self.scratch, CALLS=os.path.join(self.folder, "calls"))
+
+    def program(self, name, text):
+        """A program that is found before any of that name that is installed."""
+        path = os.path.join(self.programs, name)
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.chmod(path, stat.S_IRWXU)
+        self.environment["PATH"] = self.programs + ":/bin:/usr/bin"
+
+    def command(self, program=LAMBERT):
+        return [program, "bench", "service", "--quick", "-o", self.out]
+
+    def run_it(self, program=LAMBERT):
+        done = subprocess.run(self.command(program), capture_output=True, text=True, timeout=600,
+                              env=self.environment, check=False)
+        # servers, stores and answers are gone, however it ended
+        self.assertEqual(os.listdir(self.scratch), [])
+        self.assertEqual(working_in(self.scratch), [])
+        return done
+
+    def tables(self, program=LAMBERT):
+        done = self.run_it(program)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        found = {}
+        for name, columns in TABLES.items():
+            with open(os.path.join(self.out, f"service-{name}.csv"), newline="", encoding="utf-8") as file:
+                found[name] = list(csv.DictReader(file))
+            with open(os.path.join(self.out, f"service-{name}.json"), encoding="utf-8") as file:
+                whole = json.load(file)
+            self.assertEqual([column["name"] for column in whole["columns"]], columns.split())
+            self.assertEqual(len(whole["rows"]), len(found[name]))
+            self.assertGreater(len(found[name]), 0)
+        return found
+
+
+class Whole(Case):
+    def test_with_what_is_installed(self):
+        tables = self.tables()
+        n, k = 200, 32
+        self.assertEqual(len(tables["load"]), 2 * 3 * len(SERVERS))
+        for row in tables["load"]:
+            self.assertEqual((row["n"], row["k"]), (str(n), str(k)))
+            if shutil.which("wrk") is None:
+                self.assertEqual(row["note"], "not run: wrk is not installed")
+            elif row["server"] == "nginx" and row["note"] != "":
+                self.assertIn("not run: nginx", row["note"])
+            else:
+                self.assertEqual(row["note"], "", row)
+                self.assertLessEqual(float(row["p50_ms"]), float(row["p99_ms"]))
+                for key in ("p50_ms", "per_second", "mb_per_second", "requests", "runs"):
+                    self.assertGreater(float(row[key]), 0, row)
+            # a body is what the format makes of n values; nginx is asked for a file
+            if row["server"] == "nginx":
+                self.assertEqual(row["bytes_sent"], "0")
+            elif row["format"] == "npy":
+                self.assertEqual(int(row["bytes_sent"]), NPY_HEADER + 4 * n)
+                self.assertEqual(int(row["bytes_got"]), NPY_HEADER + 4 * n)
+        self.assertEqual([row["threads"] for row in tables["solve"]], ["1", "2", "2"])
+        for row in tables["solve"]:
+            self.assertGreater(float(row["per_second"]), 0)
+        loops = {(row["loop"], row["format"]): row for row in tables["loop"]}
+        for form in "npy", "json":
+            self.assertGreater(float(loops["forward", form]["per_second"]), 0)
+        for row in tables["loop"]:
+            self.assertTrue(row["note"].startswith("not run") if row["per_second"] == "" else row["note"] == "", row)
+        self.assertGreaterEqual(float(tables["codec"][0]["codec_ms"]), float(tables["codec"][0]["codec_best_ms"]))
+        ratios = {row["what"]: row for row in tables["ratios"]}
+        bits = ratios["bits as in process (1: yes)"]
+        self.assertEqual((bits["measured"], bits["outcome"]), ("1", "met"))
+        for row in tables["ratios"]:
+            self.assertEqual(row["outcome"] == "not run", row["measured"] == "", row)
+        self.assertEqual(os.path.exists(os.path.join(self.out, "service-throughput.svg")),
+                         shutil.which("wrk") is not None)
+
+
+class MadeUp(Case):
+    """With a wrk of our own."""
+
+    def test_figures_of_wrk(self):
+        self.program("wrk", WRK)
+        self.program("nginx", NGINX_THAT_FAILS)
+        tables = self.tables()
+        for row in tables["load"]:
+            if row["server"] == "nginx":
+                self.assertEqual((row["note"], row["per_second"]), ("not run: nginx does not start", ""))
+                continue
+            self.assertEqual((float(row["p50_ms"]), float(row["p99_ms"])), (.1, .3))
+            self.assertEqual(float(row["per_second"]), 500)
+            self.assertAlmostEqual(float(row["mb_per_second"]),
+                                   500e-6 * (int(row["bytes_sent"]) + int(row["bytes_got"])))
+            self.assertEqual(row["note"], "10 of 1010 failed")
+        ratios = {row["what"]: row for row in tables["ratios"]}
+        for what, value in (("answers a second of 16 clients over 1, npy", 1),
+                            ("p99 over p50, npy, 16 clients, best round", 3),
+                            ("lambertd's p99 over p50 over the sleeping server's", 1)):
+            self.assertAlmostEqual(float(ratios[what]["measured"]), value)
+        # at this size nothing is wanted of speed
+        self.assertEqual([row["what"] for row in tables["ratios"] if row["wanted"] != ""],
+                         ["bits as in process (1: yes)"])
+        with open(self.environment["CALLS"], encoding="utf-8") as file:
+            calls = [line.split() for line in file]
+        self.assertEqual(len(calls), 2 * 3 * 3)
+        for call in calls:
+            self.assertEqual(call[:2] + call[4:6], ["-t", "1", "-d", "1s"])
+            self.assertEqual(call[-3:], ["POST", "npy", "application/x-npy"] if "npy" in call
+                             else ["POST", "json", "application/json"])
+
+    def test_too_few_answers(self):
+        """20 answers are enough for one client (3) and for four (12), not for 16."""
+        self.program("wrk", WRK_ON_A_SLOW_MACHINE)
+        self.program("nginx", NGINX_THAT_FAILS)
+        tables = self.tables()
+        for row in tables["load"]:
+            if row["server"] != "nginx":
+                self.assertEqual(row["note"], "too few answers" if row["clients"] == "16" else "", row)
+        outcomes = {row["what"]: row["outcome"] for row in tables["ratios"]}
+        self.assertEqual(outcomes["p50 over the solve in process, npy, 1 client"], "")
+        self.assertEqual(outcomes["answers a second of 16 clients over 1, npy"], "too few answers")
+
+    def test_a_wrk_that_fails(self):
+        self.program("wrk", WRK_THAT_FAILS)
+        done = self.run_it()
+        self.assertEqual((done.returncode, done.stderr.splitlines()[-1]),
+                         (1, "lambert bench: wrk failed: no more sockets"))
+        self.assertFalse(os.path.exists(self.out))
+
+    def started(self):
+        """A run that waits for a wrk without end."""
+        self.program("wrk", WRK_THAT_HANGS)
+        running = subprocess.Popen(self.command(), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                                   env=self.environment)
+        self.addCleanup(running.stderr.close)
+        self.addCleanup(running.wait)
+        self.addCleanup(running.kill)
+        until = time.monotonic() + PATIENCE
+        while not os.path.exists(self.environment["CALLS"]):
+            self.assertLess(time.monotonic(), until)
+            self.assertIsNone(running.poll())
+            time.sleep(.01)
+        # lambertd, both ready servers and wrk, beside nginx where it is installed
+        self.assertGreaterEqual(len(working_in(self.scratch)), 4)
+        return running
+
+    def test_cancelled(self):
+        running = self.started()
+        running.send_signal(signal.SIGINT)
+        _, said = running.communicate(timeout=PATIENCE)
+        self.assertEqual(running.returncode, 1, said)
+        self.assertIn("cancelled", said)
+        self.assertEqual(os.listdir(self.scratch), [])
+        self.assertEqual(working_in(self.scratch), [])
+        self.assertFalse(os.path.exists(self.out))
+
+    def test_killed(self):
+        """Nobody is left to stop the servers: the kernel does."""
+        self.started().kill()
+        until = time.monotonic() + PATIENCE
+        while working_in(self.scratch):
+            self.assertLess(time.monotonic(), until)
+            time.sleep(.01)
+
+
+class Missing(Case):
+    """A lambert that stands elsewhere than its build."""
+
+    def copy(self, *programs):
+        for program in programs:
+            shutil.copy(os.path.join(os.path.dirname(LAMBERT), program), self.programs)
+        return os.path.join(self.programs, "lambert")
+
+    def test_without_wrk_and_ready_server(self):
+        lambert = self.copy("lambert", "lambertd")
+        self.environment["PATH"] = self.programs
+        tables = self.tables(lambert)
+        for row in tables["load"]:
+            self.assertEqual((row["note"], row["p50_ms"]), ("not run: wrk is not installed", ""))
+        outcomes = {row["what"]: row["outcome"] for row in tables["ratios"]}
+        self.assertEqual(outcomes["p50 over the solve in process, npy, 1 client"], "not run")
+        self.assertEqual(outcomes["bits as in process (1: yes)"], "met")
+        self.assertGreater(float(tables["loop"][0]["per_second"]), 0)
+        self.assertFalse(os.path.exists(os.path.join(self.out, "service-throughput.svg")))
+
+    def test_without_ready_server(self):
+        self.program("wrk", WRK)
+        self.program("nginx", NGINX_THAT_FAILS)
+        tables = self.tables(self.copy("lambert", "lambertd"))
+        for row in tables["load"]:
+            if row["server"] in ("ready", "sleeping"):
+                self.assertEqual(row["note"], "not run: no tests/ready_server beside lambert")
+            elif row["server"] == "lambertd":
+                self.assertEqual(float(row["per_second"]), 500)
+
+    def test_every_loop(self):
+        """With a lambertd that has all routes: those of the real one come one by one."""
+        self.program("wrk", WRK)
+        self.program("nginx", NGINX_THAT_FAILS)
+        self.program("lambertd", LAMBERTD)
+        tables = self.tables(self.copy("lambert"))
+        self.assertEqual([(row["loop"], row["format"], row["note"]) for row in tables["loop"]],
+                         [("forward", "npy", ""), ("forward", "json", ""), ("forward, adjoint", "json", ""),
+                          ("reduce", "json", "")])
+        for row in tables["loop"]:
+            self.assertGreater(float(row["per_second"]), 0)
+            self.assertEqual(row["p50_second_ms"] != "", row["loop"] == "forward, adjoint")
+        for row in tables["codec"]:
+            self.assertEqual([float(row[key + "_ms"]) for key in ("parse", "solve", "encode", "codec")],
+                             [1.5, 2, .25, 1.75])
+        ratios = {row["what"]: row for row in tables["ratios"]}
+        self.assertEqual(ratios["bits as in process (1: yes)"]["outcome"], "missed")
+        self.assertGreater(float(ratios["adjoint over forward, p50 in turns"]["measured"]), 0)
+        self.assertGreater(float(ratios["evaluations a second of the reduce loop"]["measured"]), 0)
+
+    def test_without_lambertd(self):
+        done = self.run_it(self.copy("lambert"))
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("lambertd: cannot be run", done.stderr.splitlines()[-1])
+
+    def test_without_a_place_for_stores(self):
+        self.environment["TMPDIR"] = os.path.join(self.folder, "none")
+        done = self.run_it()
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("TMPDIR", done.stderr.splitlines()[-1])
+
+
+if __name__ == "__main__":
+    unittest.main()
