@@ -6,18 +6,20 @@
 #include <string.h>
 
 static const route routes[] = {
-    {"GET", "/healthz", get_healthz, NULL, BODY_NONE, OPEN},
-    {"GET", "/readyz", get_readyz, NULL, BODY_NONE, OPEN},
-    {"GET", "/metrics", get_metrics, NULL, BODY_NONE, OPEN},
-    {"GET", "/v1/scenes", get_scenes, NULL, BODY_NONE, WITH_TOKEN},
-    {"GET", "/v1/scenes/{name}", get_scene, NULL, BODY_NONE, WITH_TOKEN},
-    {"GET", "/v1/scenes/{name}/mesh", not_yet, NULL, BODY_NONE, WITH_TOKEN},
-    {"POST", "/v1/scenes/{name}/radiosity", NULL, &post_radiosity, BODY_OF_SOLVE, WITH_TOKEN},
-    {"POST", "/v1/scenes/{name}/adjoint", not_yet, NULL, BODY_NONE, WITH_TOKEN},
-    {"PUT", "/v1/scenes/{name}/reflectance", not_yet, NULL, BODY_NONE, WITH_TOKEN},
-    {"DELETE", "/v1/scenes/{name}/reflectance", not_yet, NULL, BODY_NONE, WITH_TOKEN},
-    {"GET", "/v1/openapi.json", not_yet, NULL, BODY_NONE, WITH_TOKEN},
-    {"GET", "/", not_yet, NULL, BODY_NONE, OPEN},
+    {"GET", "/healthz", get_healthz, NULL, BODY_NONE, OPEN, SERVED},
+    {"GET", "/readyz", get_readyz, NULL, BODY_NONE, OPEN, SERVED},
+    {"GET", "/metrics", get_metrics, NULL, BODY_NONE, OPEN, SERVED},
+    {"GET", "/v1/scenes", get_scenes, NULL, BODY_NONE, WITH_TOKEN, SERVED},
+    {"GET", "/v1/scenes/{name}", get_scene, NULL, BODY_NONE, WITH_TOKEN, SERVED_OR_BUILT},
+    {"DELETE", "/v1/scenes/{name}", delete_scene, NULL, BODY_NONE, WITH_TOKEN, SERVED_OR_BUILT},
+    {"GET", "/v1/scenes/{name}/mesh", not_yet, NULL, BODY_NONE, WITH_TOKEN, SERVED},
+    {"POST", "/v1/scenes/{name}/radiosity", NULL, &post_radiosity, BODY_OF_SOLVE, WITH_TOKEN, SERVED},
+    {"POST", "/v1/scenes/{name}/adjoint", not_yet, NULL, BODY_NONE, WITH_TOKEN, SERVED},
+    {"PUT", "/v1/scenes/{name}/reflectance", put_reflectance, NULL, BODY_OF_SOLVE, WITH_TOKEN, SERVED},
+    {"DELETE", "/v1/scenes/{name}/reflectance", delete_reflectance, NULL, BODY_OF_SOLVE, WITH_TOKEN,
+     SERVED_OR_BUILT},
+    {"GET", "/v1/openapi.json", not_yet, NULL, BODY_NONE, WITH_TOKEN, SERVED},
+    {"GET", "/", not_yet, NULL, BODY_NONE, OPEN, SERVED},
 };
 #define N_ROUTES (sizeof routes / sizeof routes[0])
 

@@ -11,7 +11,10 @@ typedef struct call {
     batch_job job; /* of a solving route */
     const service *service;
     const catalog_snapshot *snapshot;
-    const scene *scene; /* of a route with {name} */
+    const scene *scene;         /* of a route with {name}; NULL where a variant is not served yet */
+    const char *name;           /* the same, as asked for */
+    variant_state variant;      /* when the request came, */
+    const problem *variant_why; /* and why it failed */
     media_type body_type;
     media_accept accept;
     const char *body; /* body[length] is NUL */
@@ -28,6 +31,7 @@ typedef struct answer {
     buffer body;
     char allow[32];       /* of a 405 */
     unsigned retry_after; /* of a 503: seconds; 0: not said */
+    char *location;       /* of a 202, owned; or NULL */
 } answer;
 
 typedef void route_handler(call *in, answer *out);
@@ -55,6 +59,7 @@ typedef struct route {
         BODY_OF_SOLVE
     } body; /* a solve is up to --max-body long and runs on a thread of its own */
     enum { OPEN, WITH_TOKEN } access;
+    enum { SERVED, SERVED_OR_BUILT } subject; /* {name} may also be a variant that is not served yet */
 } route;
 
 #define ROUTE_NAME_MAX 256
@@ -83,7 +88,8 @@ void answer_refuse(answer *out, unsigned status, const char *format, ...)
 /* Gives JSON back that is in b (taken over), or 503 when it could not be written. */
 void answer_json(answer *out, buffer *b, bool written);
 
-route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, not_yet;
+route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, put_reflectance,
+    delete_reflectance, delete_scene, not_yet;
 extern const solve_steps post_radiosity;
 
 #endif

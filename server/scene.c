@@ -59,6 +59,7 @@ lam_status scene_open(const char *path, const char *name, bool verify, scene **o
     TRY(sky_load(s, made->n, &made->sky, error));
     made->n_emitters = lam_operator_emitters(made->op);
     TRY(read_groups(s, made, error));
+    TRY(store_get_text(s, "/checksum", "xxh3", &made->checksum, error));
     TRY(store_group_bytes(s, "/operator", &made->bytes, error));
     read_error(s, made);
     TRY(scene_describe(s, made, &made->description, error));
@@ -66,6 +67,40 @@ lam_status scene_open(const char *path, const char *name, bool verify, scene **o
     made = NULL;
 done:
     store_close(s);
+    if (made != NULL) scene_release(made);
+    return status;
+}
+
+bool scene_is_same(const scene *one, const scene *other) {
+    /* The checksum is of the arrays, the description of the attributes. */
+    return strcmp(one->checksum, other->checksum) == 0 && strcmp(one->description, other->description) == 0;
+}
+
+lam_status scene_open_variant(scene *base, const char *name, const char *groups, lam_operator *op,
+                              scene **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    operator_description of_op;
+    scene *made = memory_allocate(1, sizeof *made, name, error);
+    if (made == NULL) {
+        lam_operator_close(op);
+        return LAM_ERR_MEMORY;
+    }
+    operator_describe(op, &of_op);
+    atomic_init(&made->references, 1);
+    made->base = scene_acquire(base);
+    made->path = base->path;
+    made->n = base->n;
+    made->n_channels = base->n_channels;
+    made->op = op;
+    made->groups = base->groups;
+    made->sky = base->sky;
+    made->bytes = (uint64_t)base->n_channels * of_op.rank * of_op.rank * sizeof(float);
+    made->name = strdup(name);
+    if (made->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", name);
+    TRY(scene_describe_variant(made, groups, &made->description, error));
+    *out = made;
+    made = NULL;
+done:
     if (made != NULL) scene_release(made);
     return status;
 }
@@ -78,10 +113,15 @@ scene *scene_acquire(scene *s) {
 void scene_release(scene *s) {
     if (atomic_fetch_sub(&s->references, 1) != 1) return;
     lam_operator_close(s->op);
-    lam_sky_close(s->sky);
-    group_index_free(&s->groups);
+    if (s->base == NULL) {
+        lam_sky_close(s->sky);
+        group_index_free(&s->groups);
+        free(s->path);
+    } else {
+        scene_release(s->base);
+    }
+    free(s->checksum);
     free(s->description);
     free(s->name);
-    free(s->path);
     free(s);
 }
