@@ -118,8 +118,8 @@ static void keep_failed(variants *v, build *b, lam_status status, const lam_erro
 static void *build_all(void *context) {
     variants *v = context;
     core_use_one_thread();
-    /* Solves come first; without the permission it is only later. */
-    (void)setpriority(PRIO_PROCESS, 0, 19);
+    /* Solves come first (only this thread is meant). Not last of all: it holds locks that others wait for. */
+    (void)setpriority(PRIO_PROCESS, 0, 10);
     pthread_mutex_lock(&v->lock);
     for (;;) {
         while (!v->closed && *find(v, NULL) == NULL) pthread_cond_wait(&v->changed, &v->lock);
