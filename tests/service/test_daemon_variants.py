@@ -329,14 +329,14 @@ class Variants(unittest.TestCase):
 
     # --- in the background
 
-    def slow_store(self):
-        """A variant of it takes long to build: many columns."""
+    def slow_store(self, n=2000, channels=3):
+        """A variant of it takes long to build: many columns. Of few elements, it is the inversion that does."""
         rng = np.random.default_rng(5)
-        scene = Scene(2000, channels=3)
+        scene = Scene(n, channels=channels)
         scene.rank = 1500
-        scene.U, scene.V = rng.random((2000, 1500)) / 2000, rng.random((2000, 1500)) / 2000
-        scene.core = np.stack([np.eye(1500)] * 3)
-        scene.write(self.folder / "slow.h5", "slow")
+        scene.U, scene.V = rng.random((n, 1500)) / 2000, rng.random((n, 1500)) / 2000
+        scene.core = np.stack([np.eye(1500)] * channels)
+        scene.write(self.folder / "slow.h5", "slow", keep_factors=True)
         return scene
 
     def test_others_are_served_meanwhile(self):
@@ -375,6 +375,18 @@ class Variants(unittest.TestCase):
             for i in range(3):
                 self.put(daemon, {"wall": i / 10}, scene="slow")
             daemon.stop()
+
+    def test_what_was_deleted_does_not_come_back(self):
+        self.slow_store(n=60, channels=1)
+        self.store()
+        with self.daemon("slow.h5", "colour.h5") as daemon:
+            for i in range(6):
+                self.assertEqual(self.put(daemon, {"wall": .5}, scene="slow").status, 202)
+                time.sleep(.02)  # on the way, as a rule; whatever it is, the end is the same
+                self.assertEqual(self.ask(daemon, "DELETE", "/v1/scenes/slow@red").status, 204)
+                # One after the other: when the next is ready, so is the one before.
+                self.made(daemon, RED, str(i % 2))
+                self.problem(self.ask(daemon, "GET", "/v1/scenes/slow@red"), 404)
 
     # --- SIGHUP
 
