@@ -11,7 +11,12 @@
 /* k * k must stay below what a 32-bit lapack_int counts to. */
 #define CORE_MAX_K 46340
 
-lam_status core_invert(size_t k, double *K, double *rcond, lam_error *error) {
+static bool is_cancelled(atomic_bool *cancelled) {
+    return cancelled != NULL && atomic_load(cancelled);
+}
+
+/* LAPACK is not interrupted, but what follows it is left out. */
+static lam_status invert(size_t k, double *K, double *rcond, atomic_bool *cancelled, lam_error *error) {
     lam_status status = LAM_OK;
     lapack_int *pivots = NULL;
     double reciprocal = 1.0;
@@ -30,6 +35,7 @@ lam_status core_invert(size_t k, double *K, double *rcond, lam_error *error) {
         lapack_int info = LAPACKE_dgetrf(LAPACK_COL_MAJOR, order, order, K, order, pivots);
         if (info == LAPACK_WORK_MEMORY_ERROR)
             FAIL(error, LAM_ERR_MEMORY, "core: not enough memory to factorize");
+        if (is_cancelled(cancelled)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         if (info < 0 || !isfinite(norm)) FAIL(error, LAM_ERR_NUMERIC, "core of %zu columns is not finite", k);
         if (info > 0) {
             reciprocal = 0.0;
@@ -53,6 +59,10 @@ lam_status core_invert(size_t k, double *K, double *rcond, lam_error *error) {
 done:
     free(pivots);
     return status;
+}
+
+lam_status core_invert(size_t k, double *K, double *rcond, lam_error *error) {
+    return invert(k, K, rcond, NULL, error);
 }
 
 /* Rows first ... first + count of U or V in double; floats has room for as many when they are in a panel. */
@@ -115,10 +125,10 @@ lam_status core_make(const core_factors *in, float *core, double *rcond, lam_err
     }
     for (size_t j = 0; j < k; j++) K[j * k + j] = 1.0;
     for (size_t first = 0; first < n && k > 0; first += rows_max) {
-        if (in->cancelled != NULL && atomic_load(in->cancelled)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+        if (is_cancelled(in->cancelled)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         take_off(in, first, n - first < rows_max ? n - first : rows_max, &rows, &p, K);
     }
-    TRY(core_invert(k, K, rcond, error));
+    TRY(invert(k, K, rcond, in->cancelled, error));
     for (size_t j = 0; j < square; j++) core[j] = (float)K[j];
 done:
     free(K);

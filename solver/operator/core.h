@@ -28,7 +28,7 @@ typedef struct core_factors {
 
 /* core [k][k] = (I - V^T R U)^-1 with R = diag(rho). Summed and inverted in double, rounded once: the bits do
  * not depend on where U and V are from. Cost: O(n k^2 + k^3), with begin O(nk + k^3). Errors: as core_invert,
- * LAM_ERR_CANCELLED (the inversion itself is not interrupted). */
+ * LAM_ERR_CANCELLED (seen after 512 rows, or k^3 multiplications). */
 lam_status core_make(const core_factors *in, float *core, double *rcond, lam_error *error);
 
 /* The same of arrays in mesh order. */
