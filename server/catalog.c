@@ -153,7 +153,7 @@ const scene *catalog_find(const catalog_snapshot *snapshot, const char *name) {
 static scene *find_before(const catalog_snapshot *before, const source *from) {
     for (size_t i = 0; i < before->n_scenes; i++) {
         scene *s = before->scenes[i];
-        if (strcmp(s->path, from->path) == 0 && s->renamed == (from->name != NULL) &&
+        if (s->base == NULL && strcmp(s->path, from->path) == 0 && s->renamed == (from->name != NULL) &&
             (from->name == NULL || strcmp(s->name, from->name) == 0))
             return s;
     }
@@ -266,6 +266,87 @@ static void load_source(catalog *all, catalog_snapshot *next, const catalog_snap
     if (loaded != old) verifier_add(all->verifier, loaded);
 }
 
+/* --- variants ------------------------------------------------------------------------------------------ */
+
+/* A variant of a scene of this very snapshot? */
+static bool has_base_of(const catalog_snapshot *snapshot, const scene *variant) {
+    return catalog_find(snapshot, variant->base->name) == variant->base;
+}
+
+/* The variants in from whose base is still there. next has room. */
+static void keep_variants(catalog_snapshot *next, const catalog_snapshot *from) {
+    for (size_t i = 0; i < from->n_scenes; i++) {
+        scene *s = from->scenes[i];
+        if (s->base != NULL && has_base_of(next, s) && insert(next, s) == NULL) scene_acquire(s);
+    }
+}
+
+static void say_dropped(const catalog_snapshot *next, const catalog_snapshot *before, FILE *problems) {
+    for (size_t i = 0; i < before->n_scenes; i++) {
+        const scene *s = before->scenes[i];
+        if (s->base != NULL && catalog_find(next, s->name) != s)
+            fprintf(problems, "dropped %s: its store has changed, or another has its name\n", s->name);
+    }
+}
+
+/* The present scenes but for one, with room for one more. */
+static lam_status copy_without(const catalog_snapshot *present, const char *name, catalog_snapshot **out,
+                               lam_error *error) {
+    catalog_snapshot *made = memory_allocate(1, sizeof *made, "catalog", error);
+    if (made == NULL) return LAM_ERR_MEMORY;
+    atomic_init(&made->references, 1);
+    made->scenes = memory_allocate(present->n_scenes + 1, sizeof *made->scenes, "catalog", error);
+    if (made->scenes == NULL) {
+        free(made);
+        return LAM_ERR_MEMORY;
+    }
+    for (size_t i = 0; i < present->n_scenes; i++)
+        if (strcmp(present->scenes[i]->name, name) != 0)
+            made->scenes[made->n_scenes++] = scene_acquire(present->scenes[i]);
+    *out = made;
+    return LAM_OK;
+}
+
+lam_status catalog_put_variant(catalog *all, scene *variant, lam_error *error) {
+    lam_status status = LAM_OK;
+    catalog_snapshot *next = NULL;
+    pthread_mutex_lock(&all->lock);
+    const scene *taken = catalog_find(all->present, variant->name);
+    if (!has_base_of(all->present, variant))
+        FAIL(error, LAM_ERR_CANCELLED, "%s is not what it was", variant->base->name);
+    if (taken != NULL && taken->base == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "the name %s is taken by a store", variant->name);
+    TRY(copy_without(all->present, variant->name, &next, error));
+    (void)insert(next, variant);
+    variant = NULL;
+    catalog_snapshot *old = all->present;
+    all->present = next;
+    next = old;
+done:
+    pthread_mutex_unlock(&all->lock);
+    catalog_release(next);
+    if (variant != NULL) scene_release(variant);
+    return status;
+}
+
+lam_status catalog_remove_variant(catalog *all, const char *name, lam_error *error) {
+    lam_status status = LAM_OK;
+    catalog_snapshot *next = NULL;
+    pthread_mutex_lock(&all->lock);
+    const scene *found = catalog_find(all->present, name);
+    if (found == NULL || found->base == NULL) FAIL(error, LAM_ERR_ARGUMENT, "there is no variant %s", name);
+    TRY(copy_without(all->present, name, &next, error));
+    catalog_snapshot *old = all->present;
+    all->present = next;
+    next = old;
+done:
+    pthread_mutex_unlock(&all->lock);
+    catalog_release(next);
+    return status;
+}
+
+/* --- reading -------------------------------------------------------------------------------------------- */
+
 size_t catalog_reload(catalog *all) {
     source_list sources = {0};
     lam_error error = {0};
@@ -277,14 +358,17 @@ size_t catalog_reload(catalog *all) {
     next = memory_allocate(1, sizeof *next, "catalog", &error);
     if (next == NULL) TRY(LAM_ERR_MEMORY);
     atomic_init(&next->references, 1);
-    next->scenes = memory_allocate(sources.count, sizeof *next->scenes, "catalog", &error);
+    const size_t most = sources.count + all->config->max_variants;
+    next->scenes = memory_allocate(most, sizeof *next->scenes, "catalog", &error);
     if (next->scenes == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < sources.count; i++) load_source(all, next, before, &sources.items[i]);
     pthread_mutex_lock(&all->lock);
     catalog_snapshot *old = all->present;
+    keep_variants(next, old);               /* of the present: some may have come since before was taken */
+    atomic_fetch_add(&next->references, 1); /* ours, for what is said of it */
     all->present = next;
     pthread_mutex_unlock(&all->lock);
-    next = NULL;
+    say_dropped(next, old, all->problems);
     catalog_release(old);
 done:
     if (status != LAM_OK) fprintf(all->problems, "%s\n", error.message);

@@ -38,6 +38,7 @@ typedef struct request {
     struct timespec start;
     route_match match;
     catalog_snapshot *snapshot;
+    problem variant_why;
     answer answer;
     bool answered; /* the answer is made: what follows of the body is dropped */
     bool queued;   /* the answer was handed to libmicrohttpd */
@@ -67,10 +68,17 @@ static bool check_health(request *r) {
 }
 
 static bool check_scene(request *r) {
+    const variant_state variant = r->call.variant;
     if (!r->match.has_name) return true;
     r->call.scene = catalog_find(r->snapshot, r->match.name);
+    r->call.name = r->match.name;
     if (r->call.scene != NULL) return check_health(r);
-    if (atomic_load(&r->http->service->state) == SERVICE_LOADING)
+    if (variant != VARIANT_SETTLED && r->match.route->subject == SERVED_OR_BUILT) return true;
+    if (variant == VARIANT_BUILDING)
+        answer_refuse(&r->answer, 503, "%.200s is being built", r->match.name);
+    else if (variant == VARIANT_FAILED)
+        answer_problem(&r->answer, &r->variant_why);
+    else if (atomic_load(&r->http->service->state) == SERVICE_LOADING)
         answer_refuse(&r->answer, 503, "stores are being loaded");
     else
         answer_refuse(&r->answer, 404, "there is no scene %.200s; GET /v1/scenes lists them", r->match.name);
@@ -107,8 +115,12 @@ static bool check_head(request *r, const char *method, uint64_t length) {
         return false;
     }
     if (r->match.route == NULL) return false;
+    /* The variant first: one that is built meanwhile is then in the snapshot. */
+    const variant_state variant =
+        r->match.has_name ? variants_state(s->variants, r->match.name, &r->variant_why) : VARIANT_SETTLED;
     r->snapshot = catalog_acquire(s->catalog);
-    r->call = (call){.service = s, .snapshot = r->snapshot};
+    r->call =
+        (call){.service = s, .snapshot = r->snapshot, .variant = variant, .variant_why = &r->variant_why};
     if (!check_scene(r)) return false;
     if (r->match.route->body == BODY_NONE) return true;
     if (!check_type(r)) return false;
@@ -148,6 +160,8 @@ static enum MHD_Result send_answer(request *r) {
     bool good = a->type == NULL || MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, a->type);
     if (a->allow[0] != '\0')
         good = good && MHD_add_response_header(response, MHD_HTTP_HEADER_ALLOW, a->allow);
+    if (a->location != NULL)
+        good = good && MHD_add_response_header(response, MHD_HTTP_HEADER_LOCATION, a->location);
     if (a->retry_after > 0)
         good = good && MHD_add_response_header(response, MHD_HTTP_HEADER_RETRY_AFTER, seconds);
     if (a->status == 401)
@@ -324,6 +338,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     catalog_release(r->snapshot);
     buffer_free(&r->body);
     buffer_free(&r->answer.body);
+    free(r->answer.location);
     size_t label = r->match.label;
     free(r->path);
     free(r);

@@ -87,6 +87,7 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     TRY(open_access_log(c->access_log, &s.access_log, error));
     TRY(metrics_create(route_label_count(), labels, &s.metrics, error));
     TRY(catalog_create(c, stdout, stderr, &s.catalog, error));
+    TRY(variants_start(c, s.catalog, &s.variants, error));
     TRY(batch_start(c->threads, c->max_inflight, &s.queue, error));
     TRY(c->unix_path != NULL ? listener_unix(c->unix_path, &listen_fd, where, sizeof where, error)
                              : listener_tcp(c->listen_address, &listen_fd, where, sizeof where, error));
@@ -99,11 +100,13 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     serve_until_told(&s, signals);
     http_quiesce(h);
     atomic_store(&s.state, SERVICE_DRAINING);
+    variants_close(s.variants);
     drain(&s, signals);
 done:
     if (s.queue != NULL) batch_close(s.queue);
     http_stop(h);
     batch_destroy(s.queue);
+    variants_destroy(s.variants);
     catalog_destroy(s.catalog);
     metrics_destroy(s.metrics);
     if (s.access_log != NULL && s.access_log != stdout) fclose(s.access_log);

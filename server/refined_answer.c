@@ -141,6 +141,12 @@ bool refined_answer(call *in, const radiosity_request *request, answer_notes *no
     media_accept as = in->accept;
     if (!as.npy_given) as.npy = NPY_F8;
     const double begin = now_ms();
+    if (s->base != NULL) {
+        problem_set(why, 501, "answers of a variant cannot be refined yet; ask %.80s, or leave tolerance out",
+                    s->base->name);
+        snprintf(why->pointer, sizeof why->pointer, "/tolerance");
+        return false;
+    }
     const lam_status status = refined_get(s->refined, &refiner, &error);
     if (status != LAM_OK) return refuse(status, &error, why);
     if (refiner == NULL) {

@@ -10,19 +10,21 @@
 #define LEAST_EMISSION_LIMIT ((size_t)1 << 30)
 
 static const route routes[] = {
-    {"GET", "/healthz", get_healthz, NULL, BODY_NONE, OPEN, NULL},
-    {"GET", "/readyz", get_readyz, NULL, BODY_NONE, OPEN, NULL},
-    {"GET", "/metrics", get_metrics, NULL, BODY_NONE, OPEN, NULL},
-    {"GET", "/v1/scenes", get_scenes, NULL, BODY_NONE, WITH_TOKEN, NULL},
-    {"GET", "/v1/scenes/{name}", get_scene, NULL, BODY_NONE, WITH_TOKEN, NULL},
-    {"GET", "/v1/scenes/{name}/mesh", not_yet, NULL, BODY_NONE, WITH_TOKEN, NULL},
-    {"POST", "/v1/scenes/{name}/radiosity", NULL, &post_radiosity, BODY_OF_SOLVE, WITH_TOKEN,
+    {"GET", "/healthz", get_healthz, NULL, BODY_NONE, OPEN, SERVED, NULL},
+    {"GET", "/readyz", get_readyz, NULL, BODY_NONE, OPEN, SERVED, NULL},
+    {"GET", "/metrics", get_metrics, NULL, BODY_NONE, OPEN, SERVED, NULL},
+    {"GET", "/v1/scenes", get_scenes, NULL, BODY_NONE, WITH_TOKEN, SERVED, NULL},
+    {"GET", "/v1/scenes/{name}", get_scene, NULL, BODY_NONE, WITH_TOKEN, SERVED_OR_BUILT, NULL},
+    {"DELETE", "/v1/scenes/{name}", delete_scene, NULL, BODY_NONE, WITH_TOKEN, SERVED_OR_BUILT, NULL},
+    {"GET", "/v1/scenes/{name}/mesh", not_yet, NULL, BODY_NONE, WITH_TOKEN, SERVED, NULL},
+    {"POST", "/v1/scenes/{name}/radiosity", NULL, &post_radiosity, BODY_OF_SOLVE, WITH_TOKEN, SERVED,
      quick_radiosity},
-    {"POST", "/v1/scenes/{name}/adjoint", post_adjoint, NULL, BODY_OF_SOLVE, WITH_TOKEN, NULL},
-    {"PUT", "/v1/scenes/{name}/reflectance", not_yet, NULL, BODY_NONE, WITH_TOKEN, NULL},
-    {"DELETE", "/v1/scenes/{name}/reflectance", not_yet, NULL, BODY_NONE, WITH_TOKEN, NULL},
-    {"GET", "/v1/openapi.json", not_yet, NULL, BODY_NONE, WITH_TOKEN, NULL},
-    {"GET", "/", not_yet, NULL, BODY_NONE, OPEN, NULL},
+    {"POST", "/v1/scenes/{name}/adjoint", post_adjoint, NULL, BODY_OF_SOLVE, WITH_TOKEN, SERVED, NULL},
+    {"PUT", "/v1/scenes/{name}/reflectance", put_reflectance, NULL, BODY_OF_SOLVE, WITH_TOKEN, SERVED, NULL},
+    {"DELETE", "/v1/scenes/{name}/reflectance", delete_reflectance, NULL, BODY_OF_SOLVE, WITH_TOKEN,
+     SERVED_OR_BUILT, NULL},
+    {"GET", "/v1/openapi.json", not_yet, NULL, BODY_NONE, WITH_TOKEN, SERVED, NULL},
+    {"GET", "/", not_yet, NULL, BODY_NONE, OPEN, SERVED, NULL},
 };
 #define N_ROUTES (sizeof routes / sizeof routes[0])
 

@@ -13,7 +13,10 @@ typedef struct call {
     batch_job job; /* of a solving route */
     const service *service;
     const catalog_snapshot *snapshot;
-    const scene *scene; /* of a route with {name} */
+    const scene *scene;         /* of a route with {name}; NULL where a variant is not served yet */
+    const char *name;           /* the same, as asked for */
+    variant_state variant;      /* when the request came, */
+    const problem *variant_why; /* and why it failed */
     media_type body_type;
     media_accept accept;
     const char *body; /* body[length] is NUL */
@@ -33,6 +36,7 @@ typedef struct answer {
     bool refined;         /* then, of its vectors, the largest: */
     double certificate;
     size_t iterations;
+    char *location; /* of a 202, owned; or NULL */
 } answer;
 
 typedef void route_handler(call *in, answer *out);
@@ -64,7 +68,8 @@ typedef struct route {
         BODY_OF_SOLVE
     } body; /* a solve is up to --max-body long and runs on a thread of its own */
     enum { OPEN, WITH_TOKEN } access;
-    route_shortcut *shortcut; /* of a solving route; NULL: none */
+    enum { SERVED, SERVED_OR_BUILT } subject; /* {name} may also be a variant that is not served yet */
+    route_shortcut *shortcut;                 /* of a solving route; NULL: none */
 } route;
 
 #define ROUTE_NAME_MAX 256
@@ -100,7 +105,8 @@ answer_notes call_notes(const call *in);
 /* Milliseconds on a clock that only goes forward. */
 double call_now_ms(void);
 
-route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, post_adjoint, not_yet;
+route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, post_adjoint, put_reflectance,
+    delete_reflectance, delete_scene, not_yet;
 route_shortcut quick_radiosity;
 extern const solve_steps post_radiosity;
 

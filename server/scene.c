@@ -151,6 +151,42 @@ done:
     return status;
 }
 
+lam_status scene_open_variant(scene *base, const char *name, const char *groups, lam_operator *op,
+                              scene **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    operator_description of_op;
+    scene *made = memory_allocate(1, sizeof *made, name, error);
+    if (made == NULL) {
+        lam_operator_close(op);
+        return LAM_ERR_MEMORY;
+    }
+    operator_describe(op, &of_op);
+    atomic_init(&made->references, 1);
+    made->base = scene_acquire(base);
+    made->path = base->path;
+    made->n = base->n;
+    made->n_channels = base->n_channels;
+    made->op = op;
+    made->reflectance = op->reflectance;
+    made->groups = base->groups;
+    made->area = base->area;
+    made->sky = base->sky;
+    made->map = base->map;
+    made->health = base->health;
+    made->work_bytes = base->work_bytes;
+    made->bytes = (uint64_t)base->n_channels * of_op.rank * of_op.rank * sizeof(float);
+    made->name = strdup(name);
+    if (made->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", name);
+    made->memory = made->bytes;
+    TRY(adjoint_rows_create(ADJOINT_ROWS_BYTES, &made->rows, error));
+    TRY(scene_describe_variant(made, groups, &made->description, error));
+    *out = made;
+    made = NULL;
+done:
+    if (made != NULL) scene_release(made);
+    return status;
+}
+
 scene *scene_acquire(scene *s) {
     atomic_fetch_add(&s->references, 1);
     return s;
@@ -160,14 +196,18 @@ void scene_release(scene *s) {
     if (atomic_fetch_sub(&s->references, 1) != 1) return;
     refined_destroy(s->refined);
     lam_operator_close(s->op);
-    lam_sky_close(s->sky);
     adjoint_rows_destroy(s->rows);
-    group_index_free(&s->groups);
-    free(s->area);
-    scene_health_free(s->health);
-    store_map_release(s->map);
+    if (s->base == NULL) {
+        lam_sky_close(s->sky);
+        group_index_free(&s->groups);
+        free(s->area);
+        scene_health_free(s->health);
+        store_map_release(s->map);
+        free(s->path);
+    } else {
+        scene_release(s->base);
+    }
     free(s->description);
     free(s->name);
-    free(s->path);
     free(s);
 }

@@ -1,5 +1,5 @@
-/* One store, ready to answer: immutable but for its health and the rows it keeps, counted by who uses it. Its
- * large arrays are mapped, all else is read. */
+/* One store, ready to answer, or a variant of one: immutable but for its health and the rows it keeps,
+ * counted by who uses it. Its large arrays are mapped, all else is read. */
 #ifndef LAMBERT_SERVER_SCENE_H
 #define LAMBERT_SERVER_SCENE_H
 
@@ -16,12 +16,15 @@
 /* Whether what is mapped is known to be what was written. */
 typedef struct scene_health scene_health;
 
-typedef struct scene {
+typedef struct scene scene;
+struct scene {
     atomic_size_t references;
     char *name;   /* as served */
     bool renamed; /* the name was given, it is not the store's own */
     char *path;
     store_identity identity;
+    scene *base; /* of a variant: held; its path, groups, areas, sky, health and factors are lent. NULL: of a
+                    store */
     size_t n;
     size_t n_channels;
     lam_operator *op;
@@ -30,7 +33,7 @@ typedef struct scene {
     double *area;      /* [n], m^2 */
     lam_sky *sky;      /* NULL: none */
     size_t n_emitters; /* 0: the store answers any emission */
-    uint64_t bytes;    /* of /operator as stored */
+    uint64_t bytes;    /* of /operator as stored; of a variant, of the cores alone */
     uint64_t memory;   /* what it counts for in --max-memory, without work areas */
     size_t work_bytes; /* the work area of a thread that solves, at most */
     char *description; /* the JSON of GET /v1/scenes/NAME */
@@ -40,8 +43,8 @@ typedef struct scene {
     refined *refined;   /* what refining its answers takes, found when it is first asked for */
     store_map *map;     /* held; NULL: nothing is mapped */
     scene_health *health;
-    struct scene *next_to_verify; /* verifier.c's */
-} scene;
+    scene *next_to_verify; /* verifier.c's */
+};
 
 /* How a store is opened. */
 typedef struct scene_wish {
@@ -63,6 +66,12 @@ lam_status scene_open(const scene_wish *wish, scene **out, lam_error *error);
 
 /* What scenes of these work areas count for. */
 uint64_t scene_work_memory(size_t n_threads, size_t work_bytes);
+
+/* A scene beside base, which it holds: op (taken over, also on an error) is base's operator relit; groups is
+ * the JSON object of its reflectances, for the description. It has no error figures: those of the base were
+ * measured under other reflectances. Any thread. Errors: LAM_ERR_MEMORY. */
+lam_status scene_open_variant(scene *base, const char *name, const char *groups, lam_operator *op,
+                              scene **out, lam_error *error);
 
 /* Another user; every one gives it back with scene_release. Any thread. */
 scene *scene_acquire(scene *s);

@@ -9,4 +9,8 @@
  */
 lam_status scene_describe(store *s, const scene *loaded, char **text, lam_error *error);
 
+/* The same of a variant: what its base says, but its own name and bytes, whose variant it is, its
+ * reflectances (groups, a JSON object as text), and no error figures. Errors: LAM_ERR_MEMORY. */
+lam_status scene_describe_variant(const scene *variant, const char *groups, char **text, lam_error *error);
+
 #endif

@@ -7,12 +7,14 @@
 #include "server/config.h"
 #include "server/metrics.h"
 #include "server/token.h"
+#include "server/variants.h"
 
 typedef enum service_state { SERVICE_LOADING, SERVICE_READY, SERVICE_DRAINING } service_state;
 
 typedef struct service {
     const config *config;
     catalog *catalog;
+    variants *variants;
     metrics *metrics;
     batch_queue *queue;
     token token;      /* empty: none is asked for */

@@ -108,7 +108,7 @@ static bool unused_by_method(const char *name, const precompute_arguments *f, co
     const bool rank_given = f->rank > 0;
     if (is_among(name, of_sparse)) return built->threshold <= 0;
     if (strcmp(name, "emitters") == 0) return !emitters;
-    if (strcmp(name, "store-precision") == 0)
+    if (strcmp(name, "store-precision") == 0 || strcmp(name, "keep-factors") == 0)
         return strcmp(built->method, "exact") == 0 || built->threshold > 0 || emitters;
     if (is_among(name, of_patches)) return !two_mesh || (rank_given && strcmp(name, "assign") != 0);
     if (two_mesh && strcmp(name, "factorizer") == 0)
@@ -209,6 +209,7 @@ int cmd_precompute(int argc, char **argv) {
         .ground_albedo = f.ground_albedo,
         .probes = f.probes,
         .keep_form_factors = f.keep_form_factors != NULL,
+        .keep_factors = f.keep_factors,
         .method = f.method,
         .factorizer = f.factorizer,
         .epsilon = f.epsilon,

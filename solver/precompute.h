@@ -35,6 +35,7 @@ typedef struct precompute_options {
     double threshold;           /* of sparse; 0 with auto: what suits epsilon */
     const char *correction;     /* of sparse: "none", "delta", "discarded" */
     const char *emitters;       /* FILE, group=NAME, sky; or NULL */
+    bool keep_factors;          /* also of one channel */
     panel_precision precision;  /* of the stored operator */
     uint64_t memory;            /* bytes; 0: 70 % of what is free */
     const char *scratch;        /* a folder, or NULL */

@@ -180,7 +180,11 @@ static const option_row rows[] = {
      .doc = "Exactly this many columns (2msc: patches) in place of --epsilon",
      .low = 1,
      .high = 4e9},
-    {.name = "keep-factors", .kind = OPTION_LATER, .doc = "(not supported yet)"},
+    {.name = "keep-factors",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(keep_factors),
+     .doc = "low-rank, 2msc: keep a grey scene's factors free of reflectance, as coloured ones are, so that "
+            "lambertd can change materials"},
     {.name = "store-precision",
      .kind = OPTION_CHOICE,
      .offset = FIELD(precision),

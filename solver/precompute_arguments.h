@@ -23,7 +23,7 @@ typedef struct precompute_arguments {
     const char *assign, *correction, *emitters, *precision;
     const char *scratch;
     uint64_t threads, memory, seed, probes;
-    bool quiet, progress;
+    bool keep_factors, quiet, progress;
 } precompute_arguments;
 
 extern const option_verb precompute_verb;

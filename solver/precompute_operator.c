@@ -58,6 +58,7 @@ lam_status work_build(work *w, lam_error *error) {
                                .threshold = o->threshold,
                                .correction = correction,
                                .memory = work_left(w),
+                               .keep_factors = o->keep_factors,
                                .seed = o->seed,
                                .progress = &w->progress};
     if (strcmp(o->method, "2msc") == 0) TRY(element_geometry_add(&w->m, &geometry, &problem, error));

@@ -53,8 +53,9 @@ typedef struct build_options {
     bool proximity;             /* 2msc: elements belong to the nearest patch */
     double threshold;           /* sparse: entries below it are left out; auto: 0 for what suits epsilon */
     sparse_correction correction;
-    size_t memory; /* bytes it may use; 0: no limit */
-    uint64_t seed; /* of random sketches */
+    size_t memory;     /* bytes it may use; 0: no limit */
+    bool keep_factors; /* low-rank, 2msc: factored also for one channel */
+    uint64_t seed;     /* of random sketches */
     const progress *progress;
 } build_options;
 

@@ -54,7 +54,7 @@ done:
 }
 
 lam_status finish_low_rank(const build_problem *problem, const scaled_matrix *S, tall_factors *f,
-                           lam_operator **op, double *rcond, lam_error *error) {
+                           bool keep_factors, lam_operator **op, double *rcond, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n, C = problem->n_channels, k = f->rank;
     float *U = NULL, *V = NULL, *core = NULL;
@@ -68,7 +68,7 @@ lam_status finish_low_rank(const build_problem *problem, const scaled_matrix *S,
         TRY(core_factored(k, n, V, U, problem->reflectance + c * n, core + c * k * k, &one, error));
         *rcond = fmin(*rcond, one);
     }
-    if (C == 1) {
+    if (C == 1 && !keep_factors) {
         TRY(finish_fold(n, k, core, problem->reflectance, NULL, U, error));
         status = operator_low_rank_create_folded(n, k, problem->reflectance, U, V, op, error);
     } else {

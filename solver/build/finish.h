@@ -11,9 +11,10 @@
 lam_status finish_fold(size_t n, size_t k, const float *core, const float *reflectance, const uint32_t *order,
                        float *U, lam_error *error);
 
-/* The operator of S ~ Q V^T, both with rows in positions of S: folded for one channel, else factored. Frees
- * f. *rcond is the worst of the cores'. Errors: LAM_ERR_MEMORY, as core_invert. */
+/* The operator of S ~ Q V^T, both with rows in positions of S: folded for one channel unless its factors are
+ * to be kept, else factored. Frees f. *rcond is the worst of the cores'. Errors: LAM_ERR_MEMORY, as
+ * core_invert. */
 lam_status finish_low_rank(const build_problem *problem, const scaled_matrix *S, tall_factors *f,
-                           lam_operator **op, double *rcond, lam_error *error);
+                           bool keep_factors, lam_operator **op, double *rcond, lam_error *error);
 
 #endif

@@ -38,7 +38,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
         TRY(norm_of_error(&S, &f, options->progress, &report->measured_norm_error, error));
     const double inverting = clock_seconds();
     progress_report(options->progress, "invert", 0);
-    TRY(finish_low_rank(problem, &S, &f, op, &report->rcond, error));
+    TRY(finish_low_rank(problem, &S, &f, options->keep_factors, op, &report->rcond, error));
     report->invert_seconds = clock_seconds() - inverting;
     report->method = "low-rank";
     report->factorizer = report->factorized.name;

@@ -47,9 +47,10 @@ done:
 }
 
 /* The numbers of a low-rank operator over those of the exact one: folded Y and V, or U, V and C cores. */
-static double low_rank_share(size_t n, size_t rank, size_t n_channels) {
+static double low_rank_share(size_t n, size_t rank, size_t n_channels, bool keep_factors) {
     const double k = (double)rank, whole = (double)n * (double)n * (double)n_channels;
-    return (2 * (double)n * k + (n_channels > 1 ? (double)n_channels * k * k : 0)) / whole;
+    const bool factored = n_channels > 1 || keep_factors;
+    return (2 * (double)n * k + (factored ? (double)n_channels * k * k : 0)) / whole;
 }
 
 /* Low-rank, or exact where the rank turns out to save nothing. */
@@ -61,7 +62,7 @@ static lam_status build_by_rank(const build_problem *problem, const build_option
     lam_operator *low_rank = NULL;
     TRY(build_low_rank.build(problem, options, &low_rank, report, error));
     const size_t rank = report->rank;
-    const double share = low_rank_share(n, rank, problem->n_channels);
+    const double share = low_rank_share(n, rank, problem->n_channels, options->keep_factors);
     if (share >= 1 && isfinite(looked->exact_cost)) {
         const double spent = report->factorize_seconds, bound = report->epsilon;
         TRY(build_exact.build(problem, options, op, report, error));

@@ -41,9 +41,9 @@ static lam_status check_memory(const build_problem *problem, const build_options
     return LAM_OK;
 }
 
-/* eqs. 5 and 6: the operator of two meshes, folded for one channel. */
-static lam_status build_summed(const build_problem *problem, coarse_mesh *mesh, lam_operator **op,
-                               build_report *report, lam_error *error) {
+/* eqs. 5 and 6: the operator of two meshes, folded for one channel unless its factors are to be kept. */
+static lam_status build_summed(const build_problem *problem, coarse_mesh *mesh, bool keep_factors,
+                               lam_operator **op, build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n, C = problem->n_channels, k = mesh->k;
     lam_operator *made = NULL;
@@ -58,7 +58,7 @@ static lam_status build_summed(const build_problem *problem, coarse_mesh *mesh, 
                           &rcond, error));
         report->rcond = fmin(report->rcond, rcond);
     }
-    if (C == 1) {
+    if (C == 1 && !keep_factors) {
         TRY(finish_fold(n, k, core, problem->reflectance, mesh->element, arrays.left, error));
     } else {
         arrays.core = core;
@@ -153,9 +153,9 @@ static lam_status build(const build_problem *problem, const build_options *optio
     report->coherence = mesh.smallest_coherence;
     report->patch_area = mesh.smallest_area;
     if (qr)
-        TRY(finish_low_rank(problem, &S, &f, op, &report->rcond, error));
+        TRY(finish_low_rank(problem, &S, &f, options->keep_factors, op, &report->rcond, error));
     else
-        TRY(build_summed(problem, &mesh, op, report, error));
+        TRY(build_summed(problem, &mesh, options->keep_factors, op, report, error));
     report->invert_seconds = clock_seconds() - inverting;
     report->method = "2msc";
     report->factorizer = qr ? "qr" : NULL;

@@ -75,35 +75,22 @@ done:
 lam_status two_mesh_core(const coarse_mesh *mesh, const float *U, const float *weight,
                          const float *reflectance, float *core, double *rcond, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t k = mesh->k;
-    size_t square;
-    double *K = NULL;
-    if (!size_multiply(k, k, &square)) FAIL(error, LAM_ERR_MEMORY, "a core of %zu patches is too large", k);
-    K = memory_allocate(square, sizeof *K, "core", error);
-    if (K == NULL) TRY(LAM_ERR_MEMORY);
-#pragma omp parallel for schedule(dynamic, 1)
-    for (size_t p = 0; p < k; p++) { /* K = I - V^T R U: row p has only the elements of patch p */
-        double *K_p = K + p * k;
-        K_p[p] = 1;
-        for (uint64_t j = mesh->begin[p]; j < mesh->begin[p + 1]; j++) {
-            const double VR =
-                (weight != NULL ? (double)weight[j] : 1) * (double)reflectance[mesh->element[j]];
-            const float *U_j = U + j * k;
-            for (size_t q = 0; q < k; q++) K_p[q] -= VR * (double)U_j[q];
-        }
-    }
-    status = core_invert(k, K, rcond, error);
+    const core_factors in = {.n = mesh->n,
+                             .k = mesh->k,
+                             .U = U,
+                             .begin = mesh->begin,
+                             .weight = weight,
+                             .rho = reflectance,
+                             .order = mesh->element};
+    status = core_make(&in, core, rcond, error);
     if (status == LAM_ERR_NUMERIC)
         FAIL(
             error, LAM_ERR_NUMERIC,
             "--method 2msc: I - V^T R U of %zu patches cannot be inverted, its reciprocal condition is below "
             "%g; lower the largest reflectance, or see with lambert verify whether the rows of the form "
             "factors sum to more than 1",
-            k, CORE_RCOND_MIN);
-    if (status != LAM_OK) goto done;
-    for (size_t i = 0; i < square; i++) core[i] = (float)K[i];
+            mesh->k, CORE_RCOND_MIN);
 done:
-    free(K);
     return status;
 }
 

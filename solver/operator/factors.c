@@ -11,7 +11,7 @@ static const char *name_of_left(const factors *f) {
 }
 
 void factors_free(factors *f) {
-    panel_free(&f->left);
+    if (!f->borrowed) panel_free(&f->left);
     for (size_t c = 0; f->core != NULL && c < f->n_channels; c++) panel_free(&f->core[c]);
     free(f->core);
     *f = (factors){0};
@@ -118,6 +118,34 @@ lam_status factors_convert(const factors *f, panel_precision precision, factors 
     TRY(add_cores(f->left.k, &(store_view){.data = core}, &made, error));
     *out = made;
     made = (factors){0};
+done:
+    free(core);
+    factors_free(&made);
+    return status;
+}
+
+lam_status factors_relight(const lam_operator *op, const factors *f, core_factors in,
+                           const float *reflectance, factors *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    factors made = {.left = f->left, .borrowed = true, .n_channels = f->n_channels};
+    float *core = NULL;
+    const size_t k = f->left.k;
+    double rcond;
+    if (f->core == NULL)
+        FAIL(error, LAM_ERR_UNSUPPORTED, "an operator of form folded has its reflectances in its factors");
+    core = memory_allocate(f->n_channels, k * k * sizeof *core, "core", error);
+    if (core == NULL) TRY(LAM_ERR_MEMORY);
+    in.n = op->n;
+    in.k = k;
+    in.U_panel = &f->left;
+    in.order = op->order;
+    for (size_t c = 0; c < f->n_channels; c++) {
+        in.rho = reflectance + c * op->n;
+        TRY(core_make(&in, core + c * k * k, &rcond, error));
+    }
+    TRY(add_cores(k, &(store_view){.data = core}, &made, error));
+    *out = made;
+    made = (factors){.borrowed = true};
 done:
     free(core);
     factors_free(&made);

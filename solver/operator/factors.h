@@ -5,11 +5,13 @@
 #ifndef LAMBERT_OPERATOR_FACTORS_H
 #define LAMBERT_OPERATOR_FACTORS_H
 
+#include "solver/operator/core.h"
 #include "solver/operator/operator.h"
 
 typedef struct factors {
-    panel left;  /* [n][k]: Y or U */
-    panel *core; /* [C] of [k][k]; NULL when folded */
+    panel left;    /* [n][k]: Y or U */
+    bool borrowed; /* left is another operator's, which outlives this */
+    panel *core;   /* [C] of [k][k]; NULL when folded */
     size_t n_channels;
 } factors;
 
@@ -26,6 +28,12 @@ lam_status factors_save(const factors *f, store *s, lam_error *error);
 
 /* The same with left in another precision. Errors: as panel_convert. */
 lam_status factors_convert(const factors *f, panel_precision precision, factors *out, lam_error *error);
+
+/* The cores of op, whose factors f are, under other reflectances [C][n] (mesh order), between the same left,
+ * which out borrows. V is in `in`, as V_panel or begin and weight, with cancelled; the rest of it is filled
+ * here. Errors: LAM_ERR_UNSUPPORTED (folded), as core_make. */
+lam_status factors_relight(const lam_operator *op, const factors *f, core_factors in,
+                           const float *reflectance, factors *out, lam_error *error);
 
 void factors_set_threads(factors *f, size_t n_threads);
 

@@ -12,8 +12,8 @@ typedef struct low_rank {
 
 static void low_rank_destroy(lam_operator *op) {
     low_rank *self = (low_rank *)op;
+    if (!self->f.borrowed) panel_free(&self->V); /* V is where U is */
     factors_free(&self->f);
-    panel_free(&self->V);
 }
 
 /* Takes f and V over, also on an error. */
@@ -31,8 +31,8 @@ static lam_status assemble(size_t n, const float *reflectance, factors *f, panel
     *op = &self->base;
     self = NULL;
 done:
+    if (!f->borrowed) panel_free(V);
     factors_free(f);
-    panel_free(V);
     if (self != NULL) lam_operator_close(&self->base);
     return status;
 }
@@ -107,6 +107,19 @@ done:
     return status;
 }
 
+static lam_status low_rank_relight(const lam_operator *op, const float *reflectance, atomic_bool *cancelled,
+                                   lam_operator **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const low_rank *self = (const low_rank *)op;
+    factors f = {.core = NULL};
+    panel V = self->V;
+    const core_factors in = {.V_panel = &self->V, .cancelled = cancelled};
+    TRY(factors_relight(op, &self->f, in, reflectance, &f, error));
+    TRY(assemble(op->n, reflectance, &f, &V, out, error));
+done:
+    return status;
+}
+
 static size_t low_rank_work_bytes(const lam_operator *op, size_t n_rhs) {
     const low_rank *self = (const low_rank *)op;
     size_t m;
@@ -165,6 +178,7 @@ const operator_kind operator_low_rank = {
     .apply_selected = low_rank_apply_selected,
     .set_threads = low_rank_set_threads,
     .narrow = low_rank_narrow,
+    .relight = low_rank_relight,
     .destroy = low_rank_destroy,
     .describe = low_rank_describe,
 };

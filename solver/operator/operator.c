@@ -17,6 +17,16 @@ const operator_kind *operator_kind_find(const char *name) {
     return NULL;
 }
 
+static lam_status check_reflectance(size_t n, size_t n_channels, const float *reflectance, lam_error *error) {
+    lam_status status = LAM_OK;
+    for (size_t i = 0; i < n * n_channels; i++)
+        if (!(reflectance[i] >= 0.0f && reflectance[i] < 1.0f))
+            FAIL(error, LAM_ERR_NUMERIC, "reflectance[%zu][%zu] = %g, must be at least 0 and below 1", i / n,
+                 i % n, (double)reflectance[i]);
+done:
+    return status;
+}
+
 lam_status operator_init(lam_operator *op, const operator_kind *kind, size_t n, size_t n_channels,
                          const float *reflectance, lam_error *error) {
     lam_status status = LAM_OK;
@@ -24,10 +34,7 @@ lam_status operator_init(lam_operator *op, const operator_kind *kind, size_t n, 
     if (n == 0 || n_channels == 0 || n > UINT32_MAX || !size_multiply(n, n_channels, &count))
         FAIL(error, LAM_ERR_ARGUMENT, "an operator of %zu elements and %zu channels cannot be", n,
              n_channels);
-    for (size_t i = 0; i < count; i++)
-        if (!(reflectance[i] >= 0.0f && reflectance[i] < 1.0f))
-            FAIL(error, LAM_ERR_NUMERIC, "reflectance[%zu][%zu] = %g, must be at least 0 and below 1", i / n,
-                 i % n, (double)reflectance[i]);
+    TRY(check_reflectance(n, n_channels, reflectance, error));
     op->reflectance = memory_allocate(count, sizeof *op->reflectance, "reflectance", error);
     if (op->reflectance == NULL) {
         status = LAM_ERR_MEMORY;
@@ -194,6 +201,30 @@ const char *lam_operator_kind(const lam_operator *op) {
 void lam_operator_set_threads(lam_operator *op, size_t n_threads) {
     op->n_threads = n_threads > 0 ? n_threads : 1;
     if (op->kind->set_threads != NULL) op->kind->set_threads(op, op->n_threads);
+}
+
+bool operator_keeps_factors(const lam_operator *op) {
+    operator_description description;
+    operator_describe(op, &description);
+    return op->kind->relight != NULL && description.form != NULL && strcmp(description.form, "factored") == 0;
+}
+
+lam_status operator_relight(const lam_operator *op, const float *reflectance, atomic_bool *cancelled,
+                            lam_operator **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    lam_operator *made = NULL;
+    if (!operator_keeps_factors(op))
+        FAIL(error, LAM_ERR_UNSUPPORTED, "an operator of kind '%s' without factors cannot be relit",
+             op->kind->name);
+    TRY(check_reflectance(op->n, op->n_channels, reflectance, error));
+    TRY(op->kind->relight(op, reflectance, cancelled, &made, error));
+    TRY(operator_set_order(made, op->order, error));
+    lam_operator_set_threads(made, op->n_threads);
+    *out = made;
+    made = NULL;
+done:
+    lam_operator_close(made);
+    return status;
 }
 
 lam_status operator_narrow(const lam_operator *op, panel_precision precision, lam_operator **out,

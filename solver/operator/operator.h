@@ -5,6 +5,7 @@
 #include "solver/operator/panel.h"
 #include "store/store.h"
 
+#include <stdatomic.h>
 #include <stdint.h>
 
 /* What an operator says about itself. */
@@ -28,7 +29,8 @@ typedef struct operator_description {
  * (emitters_apply.c); apply_selected, the rows of apply for the n_selected elements selected
  * (operator_position says where they are), P being [n_rhs][C][n_selected] (without it all rows are computed);
  * set_threads, which passes n_threads on to its arrays; narrow, which makes the operator again with its large
- * arrays in another precision, all of its own. */
+ * arrays in another precision, all of its own; relight, which makes it again under other reflectances, its
+ * large arrays those of op. */
 #define OPERATOR_PASS 16 /* a larger batch is cut into passes */
 
 typedef struct operator_kind {
@@ -44,6 +46,8 @@ typedef struct operator_kind {
     void (*set_threads)(lam_operator *op, size_t n_threads);
     lam_status (*narrow)(const lam_operator *op, panel_precision precision, lam_operator **out,
                          lam_error *error);
+    lam_status (*relight)(const lam_operator *op, const float *reflectance, atomic_bool *cancelled,
+                          lam_operator **out, lam_error *error);
     void (*destroy)(lam_operator *op);
     void (*describe)(const lam_operator *op, operator_description *description);
 } operator_kind;
@@ -92,6 +96,17 @@ static inline float operator_reflectance_or_one(const lam_operator *op, size_t c
  * LAM_ERR_NUMERIC for a value beyond the precision. */
 lam_status operator_narrow(const lam_operator *op, panel_precision precision, lam_operator **out,
                            lam_error *error);
+
+/* Whether op keeps factors without reflectance, so that it can be relit. */
+bool operator_keeps_factors(const lam_operator *op);
+
+/* Makes op again under other reflectances [C][n] (mesh order): the cores anew, as a builder makes them of the
+ * same factors. out shares the large arrays of op, which must outlive it; the caller closes it first.
+ * cancelled (NULL: nobody) may be set by another thread.
+ * Cost: C times that of core_make. Errors: LAM_ERR_UNSUPPORTED where op keeps no factors, LAM_ERR_NUMERIC (a
+ * reflectance outside [0, 1), a core nearly singular), LAM_ERR_CANCELLED, LAM_ERR_MEMORY. */
+lam_status operator_relight(const lam_operator *op, const float *reflectance, atomic_bool *cancelled,
+                            lam_operator **out, lam_error *error);
 
 /* Loads /operator of an open store (its reflectances from /mesh); the caller frees with lam_operator_close.
  */

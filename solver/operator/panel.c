@@ -294,12 +294,16 @@ done:
 
 /* --- out again ---------------------------------------------------------------------------------------- */
 
-void panel_copy_rows(const panel *a, float *rows) {
-    for (size_t i = 0; i < a->n; i++)
+void panel_copy_some(const panel *a, size_t first, size_t count, float *rows) {
+    for (size_t i = 0; i < count; i++)
         for (size_t j = 0; j < a->k; j++)
             rows[i * a->k + j] =
-                value_as_float(a->precision, chunk_of(a, i, j / PANEL_CHUNK), j % PANEL_CHUNK) *
+                value_as_float(a->precision, chunk_of(a, first + i, j / PANEL_CHUNK), j % PANEL_CHUNK) *
                 (a->scale != NULL ? a->scale[j] : 1.0f);
+}
+
+void panel_copy_rows(const panel *a, float *rows) {
+    panel_copy_some(a, 0, a->n, rows);
 }
 
 void panel_copy_values(const panel *a, void *values) {

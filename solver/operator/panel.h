@@ -84,6 +84,8 @@ void panel_free(panel *a);
 
 /* rows [n][k] = a, without the padding: the values times the scale. */
 void panel_copy_rows(const panel *a, float *rows);
+/* rows [count][k] = rows first ... first + count of it. */
+void panel_copy_some(const panel *a, size_t first, size_t count, float *rows);
 /* values [n][k] as they are kept, without the padding. */
 void panel_copy_values(const panel *a, void *values);
 

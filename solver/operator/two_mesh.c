@@ -17,9 +17,11 @@ typedef struct two_mesh {
 
 static void two_mesh_destroy(lam_operator *op) {
     two_mesh *self = (two_mesh *)op;
+    if (!self->f.borrowed) { /* V is where U is */
+        segments_free(&self->V);
+        free(self->coherence);
+    }
     factors_free(&self->f);
-    segments_free(&self->V);
-    free(self->coherence);
 }
 
 void two_mesh_arrays_free(two_mesh_arrays *arrays) {
@@ -148,6 +150,26 @@ done:
     return status;
 }
 
+static lam_status two_mesh_relight(const lam_operator *op, const float *reflectance, atomic_bool *cancelled,
+                                   lam_operator **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const two_mesh *self = (const two_mesh *)op;
+    const core_factors in = {.begin = self->V.begin, .weight = self->V.weight, .cancelled = cancelled};
+    two_mesh *made = memory_allocate(1, sizeof *made, "operator", error);
+    if (made == NULL) return LAM_ERR_MEMORY;
+    made->base.kind = &operator_two_mesh;
+    made->f.borrowed = true;
+    TRY(factors_relight(op, &self->f, in, reflectance, &made->f, error));
+    TRY(operator_init(&made->base, &operator_two_mesh, op->n, op->n_channels, reflectance, error));
+    made->V = self->V;
+    made->coherence = self->coherence;
+    *out = &made->base;
+    made = NULL;
+done:
+    if (made != NULL) lam_operator_close(&made->base);
+    return status;
+}
+
 static size_t two_mesh_work_bytes(const lam_operator *op, size_t n_rhs) {
     const two_mesh *self = (const two_mesh *)op;
     return factors_work_bytes(&self->f, n_rhs, 0);
@@ -204,6 +226,7 @@ const operator_kind operator_two_mesh = {
     .apply_selected = two_mesh_apply_selected,
     .set_threads = two_mesh_set_threads,
     .narrow = two_mesh_narrow,
+    .relight = two_mesh_relight,
     .destroy = two_mesh_destroy,
     .describe = two_mesh_describe,
 };

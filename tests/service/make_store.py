@@ -79,8 +79,17 @@ class Scene:
         H = np.einsum("ik,ckl,...cl->...ci", self.U, self.core, np.einsum("ik,...ci->...ck", self.V, E))
         return {"radiosity": E + self.rho * H, "irradiance": H, "indirect": self.rho * H}[quantity]
 
-    def write(self, path, name="box", kind="low_rank", with_order=True, error=True, sky=0):
-        """sky: so many tiles, 0 for none."""
+    def relit(self, groups):
+        """The scene under other reflectances: {name: a number or one for each channel}."""
+        other = copy.copy(self)
+        other.rho = self.rho.copy()
+        for name, rho in groups.items():
+            other.rho[:, self.members(name)] = np.broadcast_to(np.float32(rho), self.channels)[:, None]
+        other.core = np.stack([np.linalg.inv(np.eye(self.rank) - self.V.T @ (r[:, None] * self.U)) for r in other.rho])
+        return other
+
+    def write(self, path, name="box", kind="low_rank", with_order=True, error=True, sky=0, keep_factors=False):
+        """sky: so many tiles, 0 for none. keep_factors: a grey store as coloured ones are."""
         n, C = self.n, self.channels
         order = self.order if with_order else np.arange(n)
         with h5py.File(path, "w", libver=("v108", "v108")) as f:
@@ -116,7 +125,7 @@ class Scene:
                 M += np.eye(n)
                 arrays["/operator/M"] = M[:, order][:, :, order].astype(np.float32)
                 attributes["method"] = "exact"
-            elif C == 1:
+            elif C == 1 and not keep_factors:
                 Y = -rho_stored[0][:, None] * (self.U @ self.core[0])
                 arrays["/operator/Y"] = Y[order].astype(np.float32)
                 arrays["/operator/V"] = self.V[order].astype(np.float32)

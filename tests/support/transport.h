@@ -30,6 +30,7 @@ typedef struct transport {
     uint32_t *order;    /* [n] or NULL */
     panel_precision precision;
     lam_operator *op;
+    lam_operator *lender; /* whose large arrays op has; or NULL */
 } transport;
 
 /* A sum of count products in single precision (of two meshes, in double, fewer): each is rounded when it is
@@ -57,6 +58,10 @@ typedef enum transport_kind {
     TRANSPORT_TWO_MESH_COLOUR_I8,
     TRANSPORT_SPARSE,
     TRANSPORT_SPARSE_COLOUR,
+    TRANSPORT_RELIT,
+    TRANSPORT_RELIT_COLOUR_F16,
+    TRANSPORT_RELIT_TWO_MESH_F16,
+    TRANSPORT_RELIT_TWO_MESH_COLOUR,
     TRANSPORT_KINDS
 } transport_kind;
 
@@ -276,6 +281,26 @@ static inline void make_low_rank(transport *t, const double *F, const float *U, 
     free(left);
 }
 
+/* In place of an operator made for its reflectances, one that was made for others and relit. The cores of
+ * both are in double until they are rounded once: nothing is added to the roundings. */
+static inline void relight(transport *t, const double *F, const float *U, const float *V,
+                           const uint64_t *begin, uint64_t *state) {
+    lam_error error = {.message = ""};
+    transport first = *t;
+    first.reflectance = random_reflectance(t->n, t->n_channels, state);
+    first.P = test_allocate(t->n_channels * t->n * t->n, sizeof *first.P);
+    first.magnitude = test_allocate(t->n_channels * t->n * t->n, sizeof *first.magnitude);
+    make_low_rank(&first, F, U, V, false, begin);
+    ck_assert(operator_set_order(first.op, t->order, &error) == LAM_OK);
+    lam_operator_close(t->op);
+    ck_assert_msg(operator_relight(first.op, t->reflectance, NULL, &t->op, &error) == LAM_OK, "%s",
+                  error.message);
+    t->lender = first.op;
+    free(first.reflectance);
+    free(first.P);
+    free(first.magnitude);
+}
+
 /* An operator of a kind with its truth; ordered: its rows are in a random order inside. */
 static inline transport transport_make(transport_kind kind, bool ordered) {
     static const struct {
@@ -297,7 +322,11 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
                  {"two meshes, folded, i8", PANEL_I8},
                  {"two meshes, 3 channels, i8", PANEL_I8},
                  {"sparse, with delta", PANEL_F32},
-                 {"sparse, 3 channels", PANEL_F32}};
+                 {"sparse, 3 channels", PANEL_F32},
+                 {"relit", PANEL_F32},
+                 {"relit, 3 channels, f16", PANEL_F16},
+                 {"two meshes, relit, f16", PANEL_F16},
+                 {"two meshes, relit, 3 channels", PANEL_F32}};
     lam_error error = {.message = ""};
     uint64_t state = 11 + (uint64_t)kind;
     const bool colour = strstr(kinds[kind].name, "3 channels") != NULL;
@@ -332,7 +361,10 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
         make_sparse(&t, F);
     else
         make_low_rank(&t, F, U, V, strstr(t.name, "folded") != NULL, two_mesh ? begin : NULL);
-    if (ordered) ck_assert(operator_set_order(t.op, t.order, &error) == LAM_OK);
+    if (strstr(t.name, "relit") != NULL)
+        relight(&t, F, U, V, two_mesh ? begin : NULL, &state);
+    else if (ordered)
+        ck_assert(operator_set_order(t.op, t.order, &error) == LAM_OK);
     t.F = F;
     free(U);
     free(V);
@@ -341,6 +373,7 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
 
 static inline void transport_free(transport *t) {
     lam_operator_close(t->op);
+    lam_operator_close(t->lender);
     free(t->reflectance);
     free(t->F);
     free(t->P);
