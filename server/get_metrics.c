@@ -2,12 +2,15 @@
 #include "server/routes.h"
 
 void get_metrics(call *in, answer *out) {
+    const service *s = in->service;
     const catalog_snapshot *snapshot = in->snapshot;
-    uint64_t bytes = 0;
+    metrics_gauges gauges = {.n_scenes = snapshot->n_scenes,
+                             .queued = batch_jobs(s->queue),
+                             .body_bytes = atomic_load(&s->body_bytes)};
     buffer b = {0};
-    for (size_t i = 0; i < snapshot->n_scenes; i++) bytes += lam_operator_bytes(snapshot->scenes[i]->op);
-    bool written =
-        metrics_write(in->service->metrics, snapshot->n_scenes, bytes, batch_jobs(in->service->queue), &b);
+    for (size_t i = 0; i < snapshot->n_scenes; i++)
+        gauges.operator_bytes += lam_operator_bytes(snapshot->scenes[i]->op);
+    const bool written = metrics_write(s->metrics, &gauges, &b) && connections_write(s->connections, &b);
     answer_json(out, &b, written);
     if (written) out->type = "text/plain; version=0.0.4; charset=utf-8";
 }

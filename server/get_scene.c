@@ -4,4 +4,5 @@
 void get_scene(call *in, answer *out) {
     buffer b = {0};
     answer_json(out, &b, buffer_append_text(&b, in->scene->description) && buffer_append_text(&b, "\n"));
+    out->cacheable = out->status == 200;
 }

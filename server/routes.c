@@ -16,7 +16,7 @@ static const route routes[] = {
     {"POST", "/v1/scenes/{name}/adjoint", not_yet, NULL, BODY_NONE, WITH_TOKEN},
     {"PUT", "/v1/scenes/{name}/reflectance", not_yet, NULL, BODY_NONE, WITH_TOKEN},
     {"DELETE", "/v1/scenes/{name}/reflectance", not_yet, NULL, BODY_NONE, WITH_TOKEN},
-    {"GET", "/v1/openapi.json", not_yet, NULL, BODY_NONE, WITH_TOKEN},
+    {"GET", "/v1/openapi.json", get_openapi, NULL, BODY_NONE, WITH_TOKEN},
     {"GET", "/", not_yet, NULL, BODY_NONE, OPEN},
 };
 #define N_ROUTES (sizeof routes / sizeof routes[0])

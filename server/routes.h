@@ -28,6 +28,7 @@ typedef struct answer {
     buffer body;
     char allow[32];       /* of a 405 */
     unsigned retry_after; /* of a 503: seconds; 0: not said */
+    bool cacheable;       /* the same until something changes: gets an ETag */
 } answer;
 
 typedef void route_handler(call *in, answer *out);
@@ -83,7 +84,7 @@ void answer_refuse(answer *out, unsigned status, const char *format, ...)
 /* Gives JSON back that is in b (taken over), or 503 when it could not be written. */
 void answer_json(answer *out, buffer *b, bool written);
 
-route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, not_yet;
+route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, get_openapi, not_yet;
 extern const solve_steps post_radiosity;
 
 #endif

@@ -31,7 +31,9 @@ declare -A home=(
     ["cairo"]="solver/bench/plot.c"
     ["png.h"]="solver/image.c"
     ["jansson.h"]="solver/ server/"
-    ["microhttpd.h"]="server/"
+    ["microhttpd.h"]="server/http"
+    ["zlib.h"]="server/codec_compress.c"
+    ["zstd.h"]="server/codec_compress.c"
 )
 
 room_of() {
