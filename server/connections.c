@@ -1,11 +1,13 @@
 #include "server/connections.h"
 
+#include <linux/sockios.h>
 #include <linux/tcp.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdlib.h>
+#include <sys/ioctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <time.h>
@@ -28,10 +30,12 @@ struct client {
     int fd;
     connection_stage stage;
     bool cut;
-    bool measured;  /* base is that of the present answer */
-    double since;   /* seconds, of the stage */
-    uint64_t bytes; /* received of a body, or to be sent of an answer */
-    uint64_t base;  /* bytes that the client had acknowledged when its answer was first looked at */
+    bool measured;         /* acknowledged is that of the present answer */
+    double since;          /* seconds, of the stage */
+    double moved;          /* when something was seen to come or go */
+    uint64_t bytes;        /* received of a body, or to be sent of an answer */
+    uint64_t acknowledged; /* bytes, by the client's machine, when its answer was first looked at */
+    uint64_t seen;         /* what moves, when it was last looked at */
 };
 
 struct connections {
@@ -82,40 +86,53 @@ static bool read_acknowledged(int fd, uint64_t *bytes) {
     return true;
 }
 
-/* Bytes of an answer that count as read. Where the socket does not tell (one in the file system) it is all of
- * them: then only the time for the whole is bounded. */
-static uint64_t measure_read(client *c) {
+/* Bytes of an answer that have been read; *moving changes while they are. A socket in the file system tells
+ * only what waits in it: there all bytes count as read, which bounds the time for the whole. */
+static uint64_t measure_answer(client *c, uint64_t *moving) {
     uint64_t acknowledged;
-    if (!read_acknowledged(c->fd, &acknowledged)) return c->bytes;
-    if (!c->measured) c->base = acknowledged;
-    c->measured = true;
-    return acknowledged - c->base;
+    int waiting = 0;
+    if (read_acknowledged(c->fd, &acknowledged)) {
+        if (!c->measured) c->acknowledged = acknowledged;
+        c->measured = true;
+        *moving = acknowledged;
+        return acknowledged - c->acknowledged;
+    }
+    *moving = ioctl(c->fd, SIOCOUTQ, &waiting) == 0 ? (uint64_t)waiting : 0;
+    return c->bytes;
 }
 
-/* Whether c has had its time: t <= timeout + bytes/rate. */
+/* Whether c has had its time. Where bytes move, t <= timeout + bytes/rate, and none moves for a time-out at
+ * most. */
 static bool is_over_time(const connection_limits *limits, client *c, double now, cut_reason *why) {
-    double allowed = (double)limits->timeout_s;
+    const double timeout = (double)limits->timeout_s;
+    uint64_t bytes = c->bytes, moving = c->bytes;
     switch (c->stage) {
     case STAGE_HEAD:
         *why = CUT_HEAD;
-        break;
+        return now - c->since > timeout;
+    case STAGE_SOLVE:
+        return false;
     case STAGE_BODY:
         *why = CUT_BODY;
-        allowed += (double)c->bytes / (double)limits->least_rate;
         break;
     case STAGE_ANSWER:
         *why = CUT_ANSWER;
-        allowed += (double)measure_read(c) / (double)limits->least_rate;
+        bytes = measure_answer(c, &moving);
         break;
-    case STAGE_SOLVE:
-        return false;
     }
-    return now - c->since > allowed;
+    if (moving != c->seen) {
+        c->seen = moving;
+        c->moved = now;
+    }
+    return now - c->moved > timeout || now - c->since > timeout + (double)bytes / (double)limits->least_rate;
 }
 
 /* With the lock: the descriptor is then still this client's. Whoever serves it finds it ended, and closes it.
  */
 static void cut(connections *all, client *c, cut_reason why) {
+    /* What it did not read should not stay in the socket for as long as it likes. */
+    const struct linger none = {.l_onoff = 1, .l_linger = 0};
+    if (c->stage == STAGE_ANSWER) setsockopt(c->fd, SOL_SOCKET, SO_LINGER, &none, sizeof none);
     c->cut = true;
     all->n_cut[why]++;
     shutdown(c->fd, SHUT_RDWR);
@@ -131,14 +148,14 @@ static client *find_idle(const connections *all, double now) {
     return oldest;
 }
 
-/* With the lock. O(open), and that again for each place that is made: a sixteenth of all. */
+/* With the lock. O(open), and that again for each place that is made: a quarter of all. */
 static void sweep(connections *all) {
     const double now = now_s();
     cut_reason why = CUT_HEAD;
     for (client *c = all->first; c != NULL; c = c->after)
         if (!c->cut && is_over_time(&all->limits, c, now, &why)) cut(all, c, why);
     if (all->n_open < all->limits.most) return;
-    for (size_t place = 0; place <= all->limits.most / 16 && place < PLACES; place++) {
+    for (size_t place = 0; place <= all->limits.most / 4 && place < PLACES; place++) {
         client *idle = find_idle(all, now);
         if (idle == NULL) return;
         cut(all, idle, CUT_PLACE);
@@ -206,7 +223,7 @@ client *connections_add(connections *all, int fd) {
     client *c = calloc(1, sizeof *c);
     if (c == NULL) return NULL;
     c->fd = fd;
-    c->since = now_s();
+    c->since = c->moved = now_s();
     pthread_mutex_lock(&all->lock);
     c->after = all->first;
     if (all->first != NULL) all->first->before = c;
@@ -234,7 +251,7 @@ void client_enter(connections *all, client *c, connection_stage stage, size_t by
     const double now = now_s();
     pthread_mutex_lock(&all->lock);
     c->stage = stage;
-    c->since = now;
+    c->since = c->moved = now;
     c->bytes = bytes;
     c->measured = false;
     pthread_mutex_unlock(&all->lock);

@@ -283,6 +283,10 @@ static void on_connection(void *context, struct MHD_Connection *connection, void
         const union MHD_ConnectionInfo *info =
             MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
         *socket_context = info != NULL ? connections_add(all, info->connect_fd) : NULL;
+        /* Nobody else watches this one. */
+        if (*socket_context == NULL)
+            MHD_set_connection_option(connection, MHD_CONNECTION_OPTION_TIMEOUT,
+                                      (unsigned)((http *)context)->service->config->timeout_s);
     } else {
         /* Its descriptor is still open. */
         connections_remove(all, *socket_context);
@@ -311,13 +315,14 @@ lam_status http_start(service *s, int listen_fd, http **out, lam_error *error) {
     connection_limits limits = {.timeout_s = s->config->timeout_s, .least_rate = s->config->min_rate};
     TRY(connections_affordable(s->config->max_connections, &limits.most, error));
     TRY(connections_start(&limits, &s->connections, error));
-    /* At its limit of connections, or with descriptors run out, the daemon stops accepting until one closes.
+    /* It has no time-out of its own: that would take a client for silent whose answer waits in a socket that
+     * is slow to empty. At its limit of connections, or with descriptors run out, the daemon stops accepting
+     * until one closes.
      */
     h->daemon = MHD_start_daemon(
         MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, on_request, h,
         MHD_OPTION_LISTEN_SOCKET, listen_fd, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
-        MHD_OPTION_CONNECTION_LIMIT, (unsigned)limits.most, MHD_OPTION_CONNECTION_TIMEOUT,
-        (unsigned)s->config->timeout_s, MHD_OPTION_NOTIFY_CONNECTION, on_connection, h,
+        MHD_OPTION_CONNECTION_LIMIT, (unsigned)limits.most, MHD_OPTION_NOTIFY_CONNECTION, on_connection, h,
         MHD_OPTION_NOTIFY_COMPLETED, on_completed, h, MHD_OPTION_UNESCAPE_CALLBACK, keep_escapes, NULL,
         MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
     if (h->daemon == NULL) FAIL(error, LAM_ERR_IO, "the HTTP server cannot start");
