@@ -50,7 +50,7 @@ static const option_row rows[] = {
     {"timeout", OPTION_COUNT, "SECONDS", AT(timeout_s), 1, 86400, 60,
      "close a connection that is idle, or whose next request has not all of its head, for so long (60)"},
     {"min-rate", OPTION_SIZE, "BYTES", AT(min_rate), 1, SIZE_MAX / 16, (size_t)16 << 10,
-     "a second, on average, that a body has to come and an answer to be read, once --timeout is over (16K)"},
+     "a second, on average over --timeout, that a body has to come and an answer to be read (16K)"},
     {"token-file", OPTION_TEXT, "FILE", AT(token_file), 0, 0, 0,
      "ask for the bearer token in this file under /v1"},
     {"access-log", OPTION_TEXT, "-|FILE", AT(access_log), 0, 0, 0, "one JSON line for each request"},

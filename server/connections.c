@@ -30,12 +30,11 @@ struct client {
     int fd;
     connection_stage stage;
     bool cut;
-    bool measured;         /* acknowledged is that of the present answer */
-    double since;          /* seconds, of the stage */
-    double moved;          /* when something was seen to come or go */
-    uint64_t bytes;        /* received of a body, or to be sent of an answer */
-    uint64_t acknowledged; /* bytes, by the client's machine, when its answer was first looked at */
-    uint64_t seen;         /* what moves, when it was last looked at */
+    bool looked_at;  /* in this stage: seen is of it */
+    double since;    /* seconds, of the stage */
+    double deadline; /* put off by what moves */
+    uint64_t bytes;  /* received of a body, or to be sent of an answer */
+    uint64_t seen;   /* what tells that something moves, when it was last looked at */
 };
 
 struct connections {
@@ -86,45 +85,47 @@ static bool read_acknowledged(int fd, uint64_t *bytes) {
     return true;
 }
 
-/* Bytes of an answer that have been read; *moving changes while they are. A socket in the file system tells
- * only what waits in it: there all bytes count as read, which bounds the time for the whole. */
-static uint64_t measure_answer(client *c, uint64_t *moving) {
-    uint64_t acknowledged;
+/* Bytes of an answer that were read since the last look. A socket in the file system tells only how many wait
+ * in it: there any change counts as enough, and the time for the whole is bounded. */
+static double measure_read(const connection_limits *limits, client *c, double now) {
+    uint64_t seen;
     int waiting = 0;
-    if (read_acknowledged(c->fd, &acknowledged)) {
-        if (!c->measured) c->acknowledged = acknowledged;
-        c->measured = true;
-        *moving = acknowledged;
-        return acknowledged - c->acknowledged;
-    }
-    *moving = ioctl(c->fd, SIOCOUTQ, &waiting) == 0 ? (uint64_t)waiting : 0;
-    return c->bytes;
+    const double enough = (double)limits->timeout_s * (double)limits->least_rate;
+    const bool counted = read_acknowledged(c->fd, &seen);
+    if (!counted) seen = ioctl(c->fd, SIOCOUTQ, &waiting) == 0 ? (uint64_t)waiting : 0;
+    const bool changed = c->looked_at && seen != c->seen;
+    const double read = !changed ? 0.0 : counted ? (double)(seen - c->seen) : enough;
+    c->looked_at = true;
+    c->seen = seen;
+    if (!counted && now - c->since > ((double)c->bytes + enough) / (double)limits->least_rate)
+        c->deadline = c->since;
+    return read;
 }
 
-/* Whether c has had its time. Where bytes move, t <= timeout + bytes/rate, and none moves for a time-out at
- * most. */
+/* Whether c has had its time. Every byte that moves puts the deadline off by 1/rate, but never further than a
+ * time-out from now: who was fast may not be as slow as it likes from then on. */
 static bool is_over_time(const connection_limits *limits, client *c, double now, cut_reason *why) {
     const double timeout = (double)limits->timeout_s;
-    uint64_t bytes = c->bytes, moving = c->bytes;
+    double moved = 0.0;
     switch (c->stage) {
-    case STAGE_HEAD:
-        *why = CUT_HEAD;
-        return now - c->since > timeout;
     case STAGE_SOLVE:
         return false;
+    case STAGE_HEAD:
+        *why = CUT_HEAD;
+        break;
     case STAGE_BODY:
         *why = CUT_BODY;
+        moved = (double)(c->bytes - c->seen);
+        c->seen = c->bytes;
         break;
     case STAGE_ANSWER:
         *why = CUT_ANSWER;
-        bytes = measure_answer(c, &moving);
+        moved = measure_read(limits, c, now);
         break;
     }
-    if (moving != c->seen) {
-        c->seen = moving;
-        c->moved = now;
-    }
-    return now - c->moved > timeout || now - c->since > timeout + (double)bytes / (double)limits->least_rate;
+    c->deadline += moved / (double)limits->least_rate;
+    if (c->deadline > now + timeout) c->deadline = now + timeout;
+    return now > c->deadline;
 }
 
 /* With the lock: the descriptor is then still this client's. Whoever serves it finds it ended, and closes it.
@@ -219,11 +220,20 @@ void connections_stop(connections *all) {
     free(all);
 }
 
+static void begin_stage(const connections *all, client *c, connection_stage stage, size_t bytes, double now) {
+    c->stage = stage;
+    c->since = now;
+    c->deadline = now + (double)all->limits.timeout_s;
+    c->bytes = bytes;
+    c->seen = 0;
+    c->looked_at = false;
+}
+
 client *connections_add(connections *all, int fd) {
     client *c = calloc(1, sizeof *c);
     if (c == NULL) return NULL;
     c->fd = fd;
-    c->since = c->moved = now_s();
+    begin_stage(all, c, STAGE_HEAD, 0, now_s());
     pthread_mutex_lock(&all->lock);
     c->after = all->first;
     if (all->first != NULL) all->first->before = c;
@@ -250,10 +260,7 @@ void client_enter(connections *all, client *c, connection_stage stage, size_t by
     if (c == NULL) return;
     const double now = now_s();
     pthread_mutex_lock(&all->lock);
-    c->stage = stage;
-    c->since = c->moved = now;
-    c->bytes = bytes;
-    c->measured = false;
+    begin_stage(all, c, stage, bytes, now);
     pthread_mutex_unlock(&all->lock);
 }
 

@@ -13,8 +13,10 @@ typedef struct client client;
 
 /* What is waited for:
  *   HEAD    the client's next request, as a whole: timeout_s from the connection or from the last answer
- *   BODY    the rest of it: timeout_s, and from then on at least least_rate bytes a second since it began;
- * never nothing for timeout_s SOLVE   us ANSWER  the client's reading of it, at the same rate as a body */
+ *   BODY    the rest of it: timeout_s, put off by every byte at least_rate bytes a second, but never further
+ *           than timeout_s from now
+ *   SOLVE   us
+ *   ANSWER  the client's reading of it, as a body */
 typedef enum connection_stage { STAGE_HEAD, STAGE_BODY, STAGE_SOLVE, STAGE_ANSWER } connection_stage;
 
 typedef struct connection_limits {

@@ -53,7 +53,7 @@ static void refuse_length(request *r) {
 
 static void refuse_to_hold(request *r, const char *what) {
     answer_refuse(&r->answer, 503,
-                  "%s: at most %zu bytes of bodies are held at once (--max-buffered); try again", what,
+                  "there is no room for %s: %zu bytes of bodies are held at once (--max-buffered)", what,
                   r->http->service->config->max_buffered);
 }
 
@@ -79,7 +79,7 @@ static bool check_head(request *r, const char *method, uint64_t length) {
     /* What is announced is not set aside, or a few who send slowly would keep out all others. */
     const size_t held = atomic_load(&s->body_bytes);
     if (length > 0 && (held > s->config->max_buffered || length > s->config->max_buffered - held)) {
-        refuse_to_hold(r, "no room for the body");
+        refuse_to_hold(r, "the body");
         return false;
     }
     return true;
@@ -92,7 +92,10 @@ static bool hold_body(request *r, const char *bytes, size_t count) {
     const bool room = before <= s->config->max_buffered && count <= s->config->max_buffered - before;
     if (room && buffer_append(&r->body, bytes, count)) return true;
     atomic_fetch_sub(&s->body_bytes, count);
-    refuse_to_hold(r, room ? "not enough memory for the body" : "no room for the rest of the body");
+    if (room)
+        answer_refuse(&r->answer, 503, "not enough memory for the body");
+    else
+        refuse_to_hold(r, "the rest of the body");
     return false;
 }
 
