@@ -21,9 +21,9 @@ coding_choice coding_choose(const char *header);
 const char *coding_name(content_coding coding);
 
 /* Puts the coded bytes in place of those of b when that leaves at most four fifths of them, or is forced;
- * returns the coding that b then has. Identity also when memory is short. Of long bodies samples are coded
- * first, so that those that do not shrink (raw numbers) cost little. O(length) at about 100 (gzip) or 300
- * (zstd) MB/s. */
+ * returns the coding that b then has. Identity also when memory is short or b is longer than 64 MiB. Of long
+ * bodies samples are coded first, so that those that do not shrink (raw numbers) cost little. O(length) at
+ * about 100 (gzip) or 300 (zstd) MB/s. */
 content_coding coding_apply(buffer *b, coding_choice choice);
 
 #endif

@@ -218,6 +218,13 @@ class OpenApi(unittest.TestCase):
                 continue
             self.fits(int(given) if header["schema"].get("type") == "integer" else given, header["schema"])
 
+    def test_scenes_are_as_described(self):
+        schema = self.document["components"]["schemas"]["Scene"]
+        for name in "grey", "colour":
+            told = self.daemon.get(f"/v1/scenes/{name}").json()
+            self.fits(told, self.named("Scene"))
+            self.assertEqual(set(told) - set(schema["properties"]), set())
+
     def solve(self, scene, body, accept=None):
         answer = self.daemon.radiosity(scene, body, accept=accept)
         said = self.document["paths"]["/v1/scenes/{name}/radiosity"]["post"]["responses"]
