@@ -204,10 +204,10 @@ class Guard(unittest.TestCase):
             self.serves(daemon)
 
     def test_a_body_at_the_least_rate_is_read(self):
-        # 1 KiB each tenth of a second, for three times the time-out: 10 times the least rate.
-        with Daemon(self.box, "--timeout", 1, "--min-rate", "1K") as daemon, daemon.raw() as s:
-            s.sendall(HEAD + b"Content-Length: %d\r\n\r\n" % (30 * 1024 + len(SOLVE)))
-            for _ in range(30):
+        # 1 KiB each tenth of a second, for more than two times the time-out: 10 times the least rate.
+        with Daemon(self.box, "--timeout", 2, "--min-rate", "1K") as daemon, daemon.raw() as s:
+            s.sendall(HEAD + b"Content-Length: %d\r\n\r\n" % (50 * 1024 + len(SOLVE)))
+            for _ in range(50):
                 s.sendall(b" " * 1024)
                 time.sleep(0.1)
             s.sendall(SOLVE)
@@ -250,14 +250,14 @@ class Guard(unittest.TestCase):
                     self.serves(daemon)
 
     def test_an_answer_at_the_least_rate_is_sent(self):
-        with Daemon(self.box, self.big, "--timeout", 1, "--min-rate", "64K") as daemon, daemon.raw() as s:
+        with Daemon(self.box, self.big, "--timeout", 2, "--min-rate", "64K") as daemon, daemon.raw() as s:
             length, count = self.ask_much(s), 0
-            # 1 MiB every tenth of a second, for more than two times the time-out.
+            # 1 MiB every fifth of a second, for more than two times the time-out.
             while count < length:
-                part = s.recv(min(MIB, length), socket.MSG_WAITALL) if length - count > MIB else s.recv(MIB)
+                part = s.recv(MIB, socket.MSG_WAITALL if length - count > MIB else 0)
                 self.assertTrue(part, f"cut at {count}")
                 count += len(part)
-                time.sleep(0.1)
+                time.sleep(0.2)
             self.assertEqual(cuts(daemon, "answer"), 0)
 
     def test_who_waits_for_a_solve_is_not_cut(self):

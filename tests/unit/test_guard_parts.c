@@ -89,7 +89,7 @@ START_TEST(each_stage_has_its_time) {
 END_TEST
 
 START_TEST(a_body_that_moves_is_cut_for_its_rate_alone) {
-    connections *all = start(100, 1, 1 << 20);
+    connections *all = start(100, 3, 1 << 20);
     pair slow = open_pair(all), fast = open_pair(all);
     client_enter(all, slow.c, STAGE_BODY, 0);
     client_enter(all, fast.c, STAGE_BODY, 0);
