@@ -13,12 +13,14 @@ void access_log_write(FILE *log, const access_entry *entry) {
     gmtime_r(&now.tv_sec, &utc);
     strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%S", &utc);
     bool written =
-        buffer_printf(&b, "{\"time\":\"%s.%03ldZ\",\"id\":%llu,\"method\":", stamp, now.tv_nsec / 1000000,
-                      (unsigned long long)entry->id) &&
+        buffer_printf(&b, "{\"time\":\"%s.%03ldZ\",\"id\":", stamp, now.tv_nsec / 1000000) &&
+        json_write_text(&b, entry->id) && buffer_append_text(&b, ",\"method\":") &&
         json_write_text(&b, entry->method) && buffer_append_text(&b, ",\"path\":") &&
         json_write_text(&b, entry->path) &&
-        buffer_printf(&b, ",\"status\":%u,\"received\":%zu,\"sent\":%zu,\"vectors\":%zu,\"ms\":%.3f}\n",
-                      entry->status, entry->received, entry->sent, entry->n_rhs, entry->ms);
+        buffer_printf(&b,
+                      ",\"status\":%u,\"received\":%zu,\"sent\":%zu,\"coding\":\"%s\",\"vectors\":%zu,"
+                      "\"ms\":%.3f}\n",
+                      entry->status, entry->received, entry->sent, entry->coding, entry->n_rhs, entry->ms);
     if (written) {
         fwrite(b.bytes, 1, b.length, log);
         fflush(log);

@@ -3,16 +3,16 @@
 #define LAMBERT_SERVER_ACCESS_LOG_H
 
 #include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 
 typedef struct access_entry {
-    uint64_t id;
+    const char *id;
     const char *method;
     const char *path;
     unsigned status;       /* 0: the client went before */
     size_t received, sent; /* bytes of body */
     size_t n_rhs;
+    const char *coding; /* of what was sent */
     double ms;
 } access_entry;
 

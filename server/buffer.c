@@ -48,6 +48,14 @@ bool buffer_printf(buffer *b, const char *format, ...) {
     return done;
 }
 
+void buffer_trim(buffer *b) {
+    if (b->bytes == NULL || b->capacity == b->length + 1) return;
+    char *bytes = realloc(b->bytes, b->length + 1);
+    if (bytes == NULL) return;
+    b->bytes = bytes;
+    b->capacity = b->length + 1;
+}
+
 void buffer_free(buffer *b) {
     free(b->bytes);
     *b = (buffer){0};

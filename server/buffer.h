@@ -19,6 +19,9 @@ bool buffer_append(buffer *b, const void *bytes, size_t count);
 bool buffer_append_text(buffer *b, const char *text);
 bool buffer_printf(buffer *b, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+/* Gives back what was reserved and not used, as far as the allocator can. */
+void buffer_trim(buffer *b);
+
 void buffer_free(buffer *b);
 
 #endif

@@ -39,12 +39,18 @@ static const option_row rows[] = {
     {"max-batch", OPTION_COUNT, "N", AT(max_batch), 1, 1u << 20, 1024, "most vectors in a request (1024)"},
     {"max-inflight", OPTION_COUNT, "N", AT(max_inflight), 1, 1u << 20, 256,
      "most solves that wait or run; more are answered 503 (256)"},
+    {"max-buffered", OPTION_SIZE, "BYTES", AT(max_buffered), 1, SIZE_MAX / 16, 0,
+     "most bytes of request bodies held at once; more are answered 503 (4 times --max-body)"},
+    {"max-connections", OPTION_COUNT, "N", AT(max_connections), 1, 1u << 16, 1000,
+     "most open connections; then idle ones are closed for others (1000)"},
     {"max-memory", OPTION_SIZE, "SIZE", AT(max_memory), 1, SIZE_MAX / 16, 0,
      "refuse stores that, with the threads' work areas, take more than so much"},
     {"max-variants", OPTION_COUNT, "N", AT(max_variants), 0, 4096, 0,
      "most variants of reflectance that clients may have made (0); they need --token-file"},
     {"timeout", OPTION_COUNT, "SECONDS", AT(timeout_s), 1, 86400, 60,
-     "close a connection that is idle for so long (60)"},
+     "close a connection that is idle, or whose next request has not all of its head, for so long (60)"},
+    {"min-rate", OPTION_SIZE, "BYTES", AT(min_rate), 1, SIZE_MAX / 16, (size_t)16 << 10,
+     "a second, on average over --timeout, that a body has to come and an answer to be read (16K)"},
     {"token-file", OPTION_TEXT, "FILE", AT(token_file), 0, 0, 0,
      "ask for the bearer token in this file under /v1"},
     {"access-log", OPTION_TEXT, "-|FILE", AT(access_log), 0, 0, 0, "one JSON line for each request"},
@@ -129,6 +135,10 @@ lam_status config_read(config *c, int argc, char **argv, lam_error *error) {
     c->n_stores = (size_t)(argc - optind);
     if (c->n_stores == 0 && c->stores_dir == NULL && !c->help && !c->version)
         FAIL(error, LAM_ERR_ARGUMENT, "no store is given: lambertd STORE.h5[:NAME] ... or --stores DIR");
+    if (c->max_buffered == 0) c->max_buffered = 4 * c->max_body;
+    if (c->max_buffered < c->max_body)
+        FAIL(error, LAM_ERR_ARGUMENT, "--max-buffered %zu: must be at least --max-body (%zu)",
+             c->max_buffered, c->max_body);
 done:
     return status;
 }

@@ -16,8 +16,11 @@ typedef struct config {
     size_t max_body;     /* bytes */
     size_t max_batch;    /* vectors in a request */
     size_t max_inflight; /* solves that wait or run */
-    size_t max_memory;   /* bytes that stores and work areas may take; 0: any */
+    size_t max_buffered; /* bytes of request bodies, of all clients together */
+    size_t max_connections;
+    size_t max_memory; /* bytes that stores and work areas may take; 0: any */
     size_t timeout_s;
+    size_t min_rate; /* bytes a second that a client has to send and to read */
     size_t max_variants;
     bool verify;
     bool no_viewer;

@@ -14,4 +14,5 @@ void get_scene(call *in, answer *out) {
         return;
     }
     answer_json(out, &b, buffer_append_text(&b, in->scene->description) && buffer_append_text(&b, "\n"));
+    out->cacheable = out->status == 200;
 }

@@ -15,4 +15,5 @@ void get_scenes(call *in, answer *out) {
                                 s->n, s->n_channels, lam_operator_kind(s->op), (unsigned long long)s->bytes);
     }
     answer_json(out, &b, written && buffer_append_text(&b, "]}\n"));
+    out->cacheable = out->status == 200;
 }

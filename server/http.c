@@ -1,15 +1,12 @@
-#include "server/http.h"
-
 #include "server/access_log.h"
+#include "server/http_request.h"
 #include "server/map_guard.h"
-#include "server/routes.h"
 #include "server/verifier.h"
 
-#include <microhttpd.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <time.h>
 #include <unistd.h>
 
 /* What libmicrohttpd may hold of a connection's head; bodies are ours. */
@@ -19,39 +16,7 @@
  */
 #define DROP_MAX ((uint64_t)1 << 20)
 
-struct http {
-    service *service;
-    struct MHD_Daemon *daemon;
-    uint64_t next_id;
-    int listen_fd; /* after http_quiesce; before, the daemon's */
-};
-
-/* A request, from its head to the last byte of its answer. The I/O thread owns it; while its connection is
- * suspended, the thread that solves does. */
-typedef struct request {
-    call call;
-    http *http;
-    struct MHD_Connection *connection;
-    uint64_t id;
-    char method[16];
-    char *path; /* as sent */
-    struct timespec start;
-    route_match match;
-    catalog_snapshot *snapshot;
-    problem variant_why;
-    answer answer;
-    bool answered; /* the answer is made: what follows of the body is dropped */
-    bool queued;   /* the answer was handed to libmicrohttpd */
-    buffer body;
-    uint64_t received;
-    size_t sent;
-} request;
-
 /* --- checks of the head ------------------------------------------------------------------------------- */
-
-static const char *header(const request *r, const char *name) {
-    return MHD_lookup_connection_value(r->connection, MHD_HEADER_KIND, name);
-}
 
 static void refuse_token(request *r) {
     answer_refuse(&r->answer, 401, "a bearer token is needed: Authorization: Bearer TOKEN");
@@ -86,10 +51,10 @@ static bool check_scene(request *r) {
 }
 
 static bool check_type(request *r) {
-    const char *type = header(r, MHD_HTTP_HEADER_CONTENT_TYPE);
-    const char *encoding = header(r, MHD_HTTP_HEADER_CONTENT_ENCODING);
+    const char *type = http_header(r, MHD_HTTP_HEADER_CONTENT_TYPE);
+    const char *encoding = http_header(r, MHD_HTTP_HEADER_CONTENT_ENCODING);
     r->call.body_type = media_content_type(type);
-    r->call.accept = media_choose(header(r, MHD_HTTP_HEADER_ACCEPT));
+    r->call.accept = media_choose(http_header(r, MHD_HTTP_HEADER_ACCEPT));
     if (r->call.body_type == MEDIA_OTHER)
         answer_refuse(&r->answer, 415,
                       "Content-Type is %.100s, must be application/json or application/x-npy", type);
@@ -105,12 +70,18 @@ static void refuse_length(request *r) {
                   r->http->service->config->max_body);
 }
 
+static void refuse_to_hold(request *r, const char *what) {
+    answer_refuse(&r->answer, 503,
+                  "there is no room for %s: %zu bytes of bodies are held at once (--max-buffered)", what,
+                  r->http->service->config->max_buffered);
+}
+
 /* Whatever the head alone decides: route, method, token, scene, type, length; true when the body is wanted.
  */
 static bool check_head(request *r, const char *method, uint64_t length) {
     const service *s = r->http->service;
     route_find(method, r->path, &r->match, &r->answer);
-    if (r->match.with_token && !token_matches(&s->token, header(r, MHD_HTTP_HEADER_AUTHORIZATION))) {
+    if (r->match.with_token && !token_matches(&s->token, http_header(r, MHD_HTTP_HEADER_AUTHORIZATION))) {
         refuse_token(r);
         return false;
     }
@@ -128,55 +99,43 @@ static bool check_head(request *r, const char *method, uint64_t length) {
         refuse_length(r);
         return false;
     }
+    /* What is announced is not set aside, or a few who send slowly would keep out all others. */
+    const size_t held = atomic_load(&s->body_bytes);
+    if (length > 0 && (held > s->config->max_buffered || length > s->config->max_buffered - held)) {
+        refuse_to_hold(r, "the body");
+        return false;
+    }
     return true;
 }
 
-/* --- answers ------------------------------------------------------------------------------------------ */
-
-/* NPY has no place for what a refined answer carries. */
-static bool say_refined(struct MHD_Response *response, const answer *a) {
-    char certificate[32], iterations[24];
-    snprintf(certificate, sizeof certificate, "%.17g", a->certificate);
-    snprintf(iterations, sizeof iterations, "%zu", a->iterations);
-    return MHD_add_response_header(response, "Lambert-Certificate", certificate) == MHD_YES &&
-           MHD_add_response_header(response, "Lambert-Iterations", iterations) == MHD_YES;
+/* Body bytes, counted; false with the answer made when there is no room for them. */
+static bool hold_body(request *r, const char *bytes, size_t count) {
+    service *s = r->http->service;
+    const size_t before = atomic_fetch_add(&s->body_bytes, count);
+    const bool room = before <= s->config->max_buffered && count <= s->config->max_buffered - before;
+    if (room && buffer_append(&r->body, bytes, count)) return true;
+    atomic_fetch_sub(&s->body_bytes, count);
+    if (room)
+        answer_refuse(&r->answer, 503, "not enough memory for the body");
+    else
+        refuse_to_hold(r, "the rest of the body");
+    return false;
 }
 
-static enum MHD_Result send_answer(request *r) {
-    answer *a = &r->answer;
-    const service *s = r->http->service;
-    struct MHD_Response *response;
-    r->sent = a->body.length;
-    if (a->body.bytes == NULL) {
-        static char nothing[1];
-        response = MHD_create_response_from_buffer(0, nothing, MHD_RESPMEM_PERSISTENT);
-    } else {
-        response = MHD_create_response_from_buffer(a->body.length, a->body.bytes, MHD_RESPMEM_MUST_FREE);
-    }
-    if (response == NULL) return MHD_NO;
-    a->body = (buffer){0};
-    char seconds[16];
-    snprintf(seconds, sizeof seconds, "%u", a->retry_after);
-    bool good = a->type == NULL || MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, a->type);
-    if (a->allow[0] != '\0')
-        good = good && MHD_add_response_header(response, MHD_HTTP_HEADER_ALLOW, a->allow);
-    if (a->location != NULL)
-        good = good && MHD_add_response_header(response, MHD_HTTP_HEADER_LOCATION, a->location);
-    if (a->retry_after > 0)
-        good = good && MHD_add_response_header(response, MHD_HTTP_HEADER_RETRY_AFTER, seconds);
-    if (a->status == 401)
-        good = good && MHD_add_response_header(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, "Bearer");
-    if (a->refined) good = good && say_refined(response, a);
-    if (atomic_load(&s->state) == SERVICE_DRAINING)
-        good = good && MHD_add_response_header(response, MHD_HTTP_HEADER_CONNECTION, "close");
-    enum MHD_Result result = good ? MHD_queue_response(r->connection, a->status, response) : MHD_NO;
-    MHD_destroy_response(response);
-    r->queued = result == MHD_YES;
-    return result;
+static void drop_body(request *r) {
+    atomic_fetch_sub(&r->http->service->body_bytes, r->body.length);
+    buffer_free(&r->body);
 }
+
+/* --- solves ------------------------------------------------------------------------------------------- */
 
 static request *request_of(batch_job *job) {
     return (request *)(void *)job;
+}
+
+static void made(request *r) {
+    http_finish_answer(r, false);
+    drop_body(r);
 }
 
 static bool begin_solve(batch_job *job, batch_workspace *workspace) {
@@ -184,13 +143,15 @@ static bool begin_solve(batch_job *job, batch_workspace *workspace) {
     const route *to = r->match.route;
     r->call.workspace = workspace;
     map_guard_allow();
-    if (to->steps != NULL) {
+    if (client_is_lost(r->client)) {
+        answer_refuse(&r->answer, 503, "its client went before it was begun");
+    } else if (to->steps != NULL) {
         if (to->steps->begin(&r->call, &r->answer)) return true;
     } else {
         to->handle(&r->call, &r->answer);
     }
     (void)check_health(r); /* what was lost on the way makes the answer a wrong one */
-    buffer_free(&r->body);
+    made(r);
     return false;
 }
 
@@ -204,7 +165,7 @@ static void end_solve(batch_job *job, batch_workspace *workspace) {
     r->call.workspace = workspace;
     r->match.route->steps->end(&r->call, &r->answer);
     (void)check_health(r);
-    buffer_free(&r->body);
+    made(r);
 }
 
 static void finish_solve(batch_job *job) {
@@ -220,7 +181,7 @@ static enum MHD_Result handle(request *r) {
         r->call.length = r->body.length;
         route_shortcut *shortcut = r->match.route->shortcut;
         if (shortcut != NULL && shortcut(&r->call, &r->answer)) {
-            buffer_free(&r->body);
+            drop_body(r);
         } else if (r->match.route->body == BODY_OF_SOLVE) {
             /* Suspended first: the solve may be done before batch_submit returns. */
             const solve_steps *steps = r->match.route->steps;
@@ -228,6 +189,7 @@ static enum MHD_Result handle(request *r) {
                                       .pass = steps != NULL ? pass_solve : NULL,
                                       .end = end_solve,
                                       .finish = finish_solve};
+            client_enter(r->http->service->connections, r->client, STAGE_SOLVE, 0);
             MHD_suspend_connection(r->connection);
             if (batch_submit(r->http->service->queue, &r->call.job)) return MHD_YES;
             answer_refuse(&r->answer, 503, "%zu solves wait or run (--max-inflight); try again",
@@ -238,9 +200,10 @@ static enum MHD_Result handle(request *r) {
         } else {
             r->match.route->handle(&r->call, &r->answer);
         }
+        http_finish_answer(r, true);
         r->answered = true;
     }
-    return send_answer(r);
+    return http_send_answer(r);
 }
 
 /* --- libmicrohttpd's callbacks ------------------------------------------------------------------------ */
@@ -254,7 +217,12 @@ static request *begin_request(http *h, struct MHD_Connection *connection, const 
     }
     r->http = h;
     r->connection = connection;
-    r->id = h->next_id++;
+    const union MHD_ConnectionInfo *info =
+        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
+    r->client = info != NULL ? info->socket_context : NULL;
+    request_id_choose(http_header(r, "X-Request-Id"), h->seed, h->next_id++, r->id);
+    r->accepted = coding_choose(http_header(r, MHD_HTTP_HEADER_ACCEPT_ENCODING));
+    client_enter(h->service->connections, r->client, STAGE_BODY, 0);
     snprintf(r->method, sizeof r->method, "%s", method);
     clock_gettime(CLOCK_MONOTONIC, &r->start);
     r->match.label = route_label_count() - 1;
@@ -264,7 +232,7 @@ static request *begin_request(http *h, struct MHD_Connection *connection, const 
 
 /* Bytes of body that the head announces; UINT64_MAX when they are not to be had as a number. */
 static uint64_t announced_length(const request *r) {
-    const char *text = header(r, MHD_HTTP_HEADER_CONTENT_LENGTH);
+    const char *text = http_header(r, MHD_HTTP_HEADER_CONTENT_LENGTH);
     if (text == NULL) return 0;
     char *end;
     unsigned long long length = strtoull(text, &end, 10);
@@ -280,23 +248,23 @@ static enum MHD_Result on_head(http *h, struct MHD_Connection *connection, const
     r->answered = !check_head(r, method, length);
     /* An answer that is sent before the body has come closes the connection. So the body of a refused request
      * is read and dropped, unless it is long, or its client waits to be told whether to send it. */
-    if (r->answered && (length > DROP_MAX || header(r, MHD_HTTP_HEADER_EXPECT) != NULL))
-        return send_answer(r);
+    if (r->answered && (length > DROP_MAX || http_header(r, MHD_HTTP_HEADER_EXPECT) != NULL))
+        return http_send_answer(r);
     return MHD_YES;
 }
 
 static enum MHD_Result on_body(request *r, const char *bytes, size_t *size) {
     const config *c = r->http->service->config;
     r->received += *size;
+    client_received(r->http->service->connections, r->client, *size);
     if (!r->answered && r->match.route->body == BODY_OF_SOLVE) {
         if (r->received > c->max_body) {
             refuse_length(r);
             r->answered = true;
-            buffer_free(&r->body);
-        } else if (!buffer_append(&r->body, bytes, *size)) {
-            answer_refuse(&r->answer, 503, "not enough memory for the body");
+            drop_body(r);
+        } else if (!hold_body(r, bytes, *size)) {
             r->answered = true;
-            buffer_free(&r->body);
+            drop_body(r);
         }
     }
     /* No answer can be sent in the middle of a body (libmicrohttpd): one without end is cut. */
@@ -324,6 +292,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     *request_context = NULL;
     struct timespec end;
     clock_gettime(CLOCK_MONOTONIC, &end);
+    client_enter(h->service->connections, r->client, STAGE_HEAD, 0);
     double seconds = (double)(end.tv_sec - r->start.tv_sec) + 1e-9 * (double)(end.tv_nsec - r->start.tv_nsec);
     unsigned status = r->queued && code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? r->answer.status : 0;
     if (h->service->access_log != NULL)
@@ -334,15 +303,34 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
                                                                  .received = (size_t)r->received,
                                                                  .sent = r->sent,
                                                                  .n_rhs = r->call.n_rhs,
+                                                                 .coding = coding_name(r->coding),
                                                                  .ms = seconds * 1e3});
     catalog_release(r->snapshot);
-    buffer_free(&r->body);
+    drop_body(r);
     buffer_free(&r->answer.body);
     free(r->answer.location);
     size_t label = r->match.label;
     free(r->path);
     free(r);
     metrics_end(h->service->metrics, label, status, seconds);
+}
+
+static void on_connection(void *context, struct MHD_Connection *connection, void **socket_context,
+                          enum MHD_ConnectionNotificationCode code) {
+    connections *all = ((http *)context)->service->connections;
+    if (code == MHD_CONNECTION_NOTIFY_STARTED) {
+        const union MHD_ConnectionInfo *info =
+            MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+        *socket_context = info != NULL ? connections_add(all, info->connect_fd) : NULL;
+        /* Nobody else watches this one. */
+        if (*socket_context == NULL)
+            MHD_set_connection_option(connection, MHD_CONNECTION_OPTION_TIMEOUT,
+                                      (unsigned)((http *)context)->service->config->timeout_s);
+    } else {
+        /* Its descriptor is still open. */
+        connections_remove(all, *socket_context);
+        *socket_context = NULL;
+    }
 }
 
 /* Routes resolve escapes themselves, so that %2F does not become a slash. */
@@ -361,19 +349,29 @@ lam_status http_start(service *s, int listen_fd, http **out, lam_error *error) {
     }
     h->service = s;
     h->listen_fd = listen_fd;
+    h->seed = request_id_seed();
     h->next_id = 1;
-    h->daemon = MHD_start_daemon(MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL,
-                                 on_request, h, MHD_OPTION_LISTEN_SOCKET, listen_fd,
-                                 MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
-                                 MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)s->config->timeout_s,
-                                 MHD_OPTION_NOTIFY_COMPLETED, on_completed, h, MHD_OPTION_UNESCAPE_CALLBACK,
-                                 keep_escapes, NULL, MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
+    connection_limits limits = {.timeout_s = s->config->timeout_s, .least_rate = s->config->min_rate};
+    TRY(connections_affordable(s->config->max_connections, &limits.most, error));
+    TRY(connections_start(&limits, &s->connections, error));
+    /* It has no time-out of its own: that would take a client for silent whose answer waits in a socket that
+     * is slow to empty. At its limit of connections, or with descriptors run out, the daemon stops accepting
+     * until one closes.
+     */
+    h->daemon = MHD_start_daemon(
+        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, on_request, h,
+        MHD_OPTION_LISTEN_SOCKET, listen_fd, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
+        MHD_OPTION_CONNECTION_LIMIT, (unsigned)limits.most, MHD_OPTION_NOTIFY_CONNECTION, on_connection, h,
+        MHD_OPTION_NOTIFY_COMPLETED, on_completed, h, MHD_OPTION_UNESCAPE_CALLBACK, keep_escapes, NULL,
+        MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
     if (h->daemon == NULL) FAIL(error, LAM_ERR_IO, "the HTTP server cannot start");
     h->listen_fd = -1;
     *out = h;
     h = NULL;
 done:
     if (h != NULL) {
+        connections_stop(s->connections);
+        s->connections = NULL;
         close(h->listen_fd);
         free(h);
     }
@@ -389,6 +387,8 @@ void http_quiesce(http *h) {
 void http_stop(http *h) {
     if (h == NULL) return;
     MHD_stop_daemon(h->daemon);
+    connections_stop(h->service->connections);
+    h->service->connections = NULL;
     if (h->listen_fd >= 0) close(h->listen_fd);
     free(h);
 }

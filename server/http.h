@@ -1,5 +1,5 @@
-/* HTTP over one socket: the only user of <microhttpd.h>. One thread does all input and output and the quick
- * answers; solves go to the queue of the service. Knows routes, not what they mean. */
+/* HTTP over one socket: with http_answer.c the only user of <microhttpd.h>. One thread does all input and
+ * output and the quick answers; solves go to the queue of the service. Knows routes, not what they mean. */
 #ifndef LAMBERT_SERVER_HTTP_H
 #define LAMBERT_SERVER_HTTP_H
 

@@ -5,7 +5,8 @@
 #include <stdlib.h>
 
 /* Statuses that we give; 0 stands for a client that went. */
-static const unsigned statuses[] = {0, 200, 400, 401, 404, 405, 411, 413, 415, 422, 500, 501, 503};
+static const unsigned statuses[] = {0,   200, 202, 204, 304, 400, 401, 404, 405,
+                                    409, 411, 413, 415, 422, 429, 500, 501, 503};
 #define N_STATUSES (sizeof statuses / sizeof statuses[0])
 
 /* Seconds; the last bucket has no bound. */
@@ -141,14 +142,15 @@ static bool write_gauge(buffer *b, const char *name, const char *help, unsigned 
     return write_head(b, name, "gauge", help) && buffer_printf(b, "%s %llu\n", name, value);
 }
 
-bool metrics_write(metrics *m, size_t n_scenes, uint64_t operator_bytes, size_t queued, buffer *b) {
+bool metrics_write(metrics *m, const metrics_gauges *gauges, buffer *b) {
     pthread_mutex_lock(&m->lock);
     bool written =
         write_requests(m, b) && write_latencies(m, b) && write_batches(m, b) &&
         write_gauge(b, "lambertd_in_flight", "Requests that are not answered yet.", m->in_flight) &&
-        write_gauge(b, "lambertd_queued", "Solves that wait or run.", queued) &&
-        write_gauge(b, "lambertd_scenes", "Scenes that are served.", n_scenes) &&
-        write_gauge(b, "lambertd_operator_bytes", "Bytes of operator held.", operator_bytes);
+        write_gauge(b, "lambertd_queued", "Solves that wait or run.", gauges->queued) &&
+        write_gauge(b, "lambertd_body_bytes", "Bytes of request bodies held.", gauges->body_bytes) &&
+        write_gauge(b, "lambertd_scenes", "Scenes that are served.", gauges->n_scenes) &&
+        write_gauge(b, "lambertd_operator_bytes", "Bytes of operator held.", gauges->operator_bytes);
     pthread_mutex_unlock(&m->lock);
     return written;
 }

@@ -23,8 +23,16 @@ void metrics_pass(metrics *m, size_t n_rhs);
 /* Requests that have come and are not answered yet. */
 size_t metrics_in_flight(metrics *m);
 
-/* Appends the text; gauges that others know are handed in. */
-bool metrics_write(metrics *m, size_t n_scenes, uint64_t operator_bytes, size_t queued, buffer *b);
+/* What others know. */
+typedef struct metrics_gauges {
+    size_t n_scenes;
+    uint64_t operator_bytes;
+    size_t queued;     /* solves that wait or run */
+    size_t body_bytes; /* held of requests */
+} metrics_gauges;
+
+/* Appends the text. */
+bool metrics_write(metrics *m, const metrics_gauges *gauges, buffer *b);
 
 /* What is known of the scenes' mapped stores. */
 typedef struct metrics_stores {

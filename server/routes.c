@@ -23,7 +23,7 @@ static const route routes[] = {
     {"PUT", "/v1/scenes/{name}/reflectance", put_reflectance, NULL, BODY_OF_SOLVE, WITH_TOKEN, SERVED, NULL},
     {"DELETE", "/v1/scenes/{name}/reflectance", delete_reflectance, NULL, BODY_OF_SOLVE, WITH_TOKEN,
      SERVED_OR_BUILT, NULL},
-    {"GET", "/v1/openapi.json", not_yet, NULL, BODY_NONE, WITH_TOKEN, SERVED, NULL},
+    {"GET", "/v1/openapi.json", get_openapi, NULL, BODY_NONE, WITH_TOKEN, SERVED, NULL},
     {"GET", "/", not_yet, NULL, BODY_NONE, OPEN, SERVED, NULL},
 };
 #define N_ROUTES (sizeof routes / sizeof routes[0])

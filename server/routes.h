@@ -37,6 +37,7 @@ typedef struct answer {
     double certificate;
     size_t iterations;
     char *location; /* of a 202, owned; or NULL */
+    bool cacheable; /* the same until something changes: gets an ETag */
 } answer;
 
 typedef void route_handler(call *in, answer *out);
@@ -106,7 +107,7 @@ answer_notes call_notes(const call *in);
 double call_now_ms(void);
 
 route_handler get_healthz, get_readyz, get_metrics, get_scenes, get_scene, post_adjoint, put_reflectance,
-    delete_reflectance, delete_scene, not_yet;
+    delete_reflectance, delete_scene, get_openapi, not_yet;
 route_shortcut quick_radiosity;
 extern const solve_steps post_radiosity;
 

@@ -5,6 +5,7 @@
 #include "server/batch.h"
 #include "server/catalog.h"
 #include "server/config.h"
+#include "server/connections.h"
 #include "server/metrics.h"
 #include "server/token.h"
 #include "server/variants.h"
@@ -17,9 +18,11 @@ typedef struct service {
     variants *variants;
     metrics *metrics;
     batch_queue *queue;
-    token token;      /* empty: none is asked for */
-    FILE *access_log; /* NULL: none */
-    atomic_int state; /* a service_state */
+    token token;              /* empty: none is asked for */
+    FILE *access_log;         /* NULL: none */
+    atomic_int state;         /* a service_state */
+    connections *connections; /* from http_start to http_stop */
+    atomic_size_t body_bytes; /* of requests whose bodies are held */
 } service;
 
 #endif

@@ -32,7 +32,9 @@ declare -A home=(
     ["cairo"]="solver/bench/plot.c"
     ["png.h"]="solver/image.c"
     ["jansson.h"]="solver/ server/ tests/bench/"
-    ["microhttpd.h"]="server/ tests/bench/ready_server.c"
+    ["microhttpd.h"]="server/http tests/bench/ready_server.c"
+    ["zlib.h"]="server/codec_compress.c"
+    ["zstd.h"]="server/codec_compress.c"
 )
 
 room_of() {

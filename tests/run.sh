@@ -57,14 +57,14 @@ export UBSAN_OPTIONS=print_stacktrace=1
 run_ctest asan -j "$jobs"
 
 step "the daemon under ThreadSanitizer"
-configure_and_build tsan lambertd unit_batch unit_adjoint_rows -- -DLAMBERT_SANITIZE=thread
+configure_and_build tsan lambertd unit_batch unit_adjoint_rows unit_guard_parts -- -DLAMBERT_SANITIZE=thread
 configure_and_build release lambert lambertd -- -DCMAKE_BUILD_TYPE=Release
 export TSAN_OPTIONS=suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1:exitcode=66
 # OpenMP's runtime is not instrumented: its barriers would look like races, so a pass has one thread here; for the
 # daemon alone, as NumPy's BLAS waits for ever under such a limit.
 export CK_FORK=no OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 LAMBERTD_OMP_THREAD_LIMIT=1
 cmake -S . -B "$builds/tsan" -DLAMBERT_TEST_PROGRAM="$PWD/$builds/release/lambert" >/dev/null
-run_ctest tsan -R 'service\.(daemon|reduce)|unit\.(batch|adjoint_rows)'
+run_ctest tsan -R 'service\.(daemon|reduce|guard|headers)|unit\.(batch|adjoint_rows|guard_parts)'
 unset CK_FORK OPENBLAS_NUM_THREADS OMP_NUM_THREADS LAMBERTD_OMP_THREAD_LIMIT
 
 step "a warning-free build by clang, and the unit and contract tests of it"

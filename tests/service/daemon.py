@@ -28,7 +28,8 @@ class Answer:
 
 
 class Daemon:
-    def __init__(self, *arguments, listen="127.0.0.1:0", ready=True):
+    def __init__(self, *arguments, listen="127.0.0.1:0", ready=True, launcher=()):
+        """launcher: a command that becomes lambertd."""
         self.out = tempfile.TemporaryFile("w+")
         self.err = tempfile.TemporaryFile("w+")
         self.port = None
@@ -36,7 +37,7 @@ class Daemon:
         environment = dict(os.environ)
         if "LAMBERTD_OMP_THREAD_LIMIT" in environment:
             environment["OMP_THREAD_LIMIT"] = environment["LAMBERTD_OMP_THREAD_LIMIT"]
-        self.process = subprocess.Popen([LAMBERTD, *where, *map(str, arguments)], stdout=self.out, stderr=self.err,
+        self.process = subprocess.Popen([*launcher, LAMBERTD, *where, *map(str, arguments)], stdout=self.out, stderr=self.err,
                                         env=environment)
         try:
             if ready:

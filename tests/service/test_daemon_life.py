@@ -45,15 +45,17 @@ class Life(unittest.TestCase):
     def test_help_and_version(self):
         asked = self.run_once("--help")
         self.assertEqual(asked.returncode, 0)
-        for option in ("stores listen unix threads max-body max-batch max-inflight max-memory max-variants timeout "
-                       "token-file access-log verify lock no-viewer").split():
+        for option in ("stores listen unix threads max-body max-batch max-inflight max-buffered max-connections max-memory "
+                       "max-variants timeout min-rate token-file access-log verify lock no-viewer").split():
             self.assertIn(f"--{option}", asked.stdout)
         self.assertRegex(self.run_once("--version").stdout, r"^lambertd \d+\.\d+\.\d+\n$")
 
     def test_wrong_usage(self):
         for arguments in ([], ["--nonsense", "x.h5"], ["x.h5", "--threads"], ["x.h5", "--threads", "0"],
                           ["x.h5", "--threads", "two"], ["x.h5", "--max-body", "12Q"], ["x.h5", "--max-body", "-1"],
-                          ["x.h5", "--max-batch", "0"], ["x.h5", "--max-memory", "0"], ["x.h5", "--max-memory", "lots"], ["x.h5", "--max-body", "99999999999999999999"]):
+                          ["x.h5", "--max-batch", "0"], ["x.h5", "--max-memory", "0"], ["x.h5", "--max-memory", "lots"],
+                          ["x.h5", "--max-body", "99999999999999999999"], ["x.h5", "--max-body", "2M", "--max-buffered", "1M"],
+                          ["x.h5", "--min-rate", "0"], ["x.h5", "--max-connections", "0"]):
             ended = self.run_once(*arguments)
             self.assertEqual(ended.returncode, 2, arguments)
             self.assertEqual(len(ended.stderr.splitlines()), 1, ended.stderr)
