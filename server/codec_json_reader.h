@@ -60,6 +60,7 @@ bool json_read_text(json_reader *r, json_slice *text);
 /* A number rounded to the nearest value of its type: infinite when it is beyond that. */
 bool json_read_float(json_reader *r, float *value);
 bool json_read_double(json_reader *r, double *value);
+bool json_skip_number(json_reader *r);
 
 /* In an array: as many numbers as follow each other that are written plainly (not negative, 18 digits and an
  * exponent of two at most), up to `most`: the same floats, several times as fast. Returns how many; the next
@@ -71,6 +72,9 @@ bool json_read_null(json_reader *r);
 
 /* Over one whole value of any kind, checking its grammar. */
 bool json_skip(json_reader *r);
+
+/* Makes it the fault, unless there is one already; returns false. For the files of the reader. */
+bool json_fail(json_reader *r, const char *fault);
 
 /* Nothing but white space may be left. */
 bool json_finish(json_reader *r);
