@@ -1,5 +1,6 @@
 #include "server/adjoint_rows.h"
 
+#include "server/batch.h"
 #include "server/emitter_weights.h"
 #include "server/gradient.h"
 #include "server/scene.h"
@@ -8,8 +9,6 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define PASS 16 /* rows of one pass over the operator */
 
 struct adjoint_rows {
     pthread_mutex_t lock; /* held for a walk over the list, never while anything is computed */
@@ -248,8 +247,8 @@ static bool make_rows(const scene *s, const radiosity_request *request, size_t c
     lam_error error;
     char *bytes = NULL;
     const emitter_weights *told;
-    adjoint_row *made[PASS] = {NULL};
-    double area[PASS];
+    adjoint_row *made[BATCH_PASS] = {NULL};
+    double area[BATCH_PASS];
     bool allocated, good = false;
     if (work_bytes > 0 && size_multiply(count * C * sizeof(float), n, &g_bytes) &&
         size_multiply(count * C * sizeof(float), width, &w_bytes) && g_bytes < SIZE_MAX - 64 &&
@@ -297,12 +296,12 @@ done:
 bool adjoint_rows_get(const scene *s, const radiosity_request *request, batch_workspace *workspace,
                       adjoint_row **rows, problem *why) {
     const size_t n_names = request->reduce.n_names;
-    size_t which[PASS], count = 0;
+    size_t which[BATCH_PASS], count = 0;
     bool good = true;
     find_all(s, request, rows);
     for (size_t k = 0; good && k < n_names; k++) {
         if (rows[k] == NULL) which[count++] = k;
-        if (count == PASS || (count > 0 && k + 1 == n_names)) {
+        if (count == BATCH_PASS || (count > 0 && k + 1 == n_names)) {
             good = make_rows(s, request, count, which, workspace, rows, why);
             count = 0;
         }

@@ -6,24 +6,14 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
-
-/* Vectors refined and written at a time. */
-#define PASS 16
-
-static double now_ms(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
 
 /* What a pass works with; NULL where it is not needed. */
 typedef struct pass_memory {
-    double *E, *H0, *out; /* [PASS][C][n] */
-    double *L;            /* [PASS][C][m] */
-    double *some;         /* [PASS][C][selected] */
-    float *start;         /* [PASS][C][n], of a store of few emitters: its own answer */
-    float *W;             /* [PASS][C][s], their weights */
+    double *E, *H0, *out; /* [BATCH_PASS][C][n] */
+    double *L;            /* [BATCH_PASS][C][m] */
+    double *some;         /* [BATCH_PASS][C][selected] */
+    float *start;         /* [BATCH_PASS][C][n], of a store of few emitters: its own answer */
+    float *W;             /* [BATCH_PASS][C][s], their weights */
     void *work;
     size_t work_bytes;
 } pass_memory;
@@ -40,7 +30,8 @@ static void free_pass(pass_memory *p) {
 }
 
 static bool get_pass(const scene *s, const radiosity_request *request, pass_memory *p, problem *why) {
-    const size_t vectors = request->n_rhs < PASS ? request->n_rhs : PASS, rows = vectors * s->n_channels;
+    const size_t vectors = request->n_rhs < BATCH_PASS ? request->n_rhs : BATCH_PASS,
+                 rows = vectors * s->n_channels;
     const size_t row = s->n * sizeof(double);
     const bool few = s->n_emitters > 0;
     p->E = memory_allocate(rows, row, "E", NULL);
@@ -140,7 +131,7 @@ bool refined_answer(call *in, const radiosity_request *request, answer_notes *no
                                 .n_values = request->select ? request->n_selected : s->n};
     media_accept as = in->accept;
     if (!as.npy_given) as.npy = NPY_F8;
-    const double begin = now_ms();
+    const double begin = call_now_ms();
     if (s->base != NULL) {
         problem_set(why, 501, "answers of a variant cannot be refined yet; ask %.80s, or leave tolerance out",
                     s->base->name);
@@ -164,13 +155,13 @@ bool refined_answer(call *in, const radiosity_request *request, answer_notes *no
     bool good = certificates != NULL && iterations != NULL;
     if (!good) problem_set(why, 503, "not enough memory for %zu certificates", request->n_rhs);
     good = good && get_pass(s, request, &p, why) && answer_begin(b, &shape, &as, notes, why);
-    notes->solve_ms += now_ms() - begin;
-    for (size_t first = 0; good && first < request->n_rhs; first += PASS) {
-        const size_t count = request->n_rhs - first < PASS ? request->n_rhs - first : PASS;
-        const double start = now_ms();
+    notes->solve_ms += call_now_ms() - begin;
+    for (size_t first = 0; good && first < request->n_rhs; first += BATCH_PASS) {
+        const size_t count = request->n_rhs - first < BATCH_PASS ? request->n_rhs - first : BATCH_PASS;
+        const double start = call_now_ms();
         const double *x =
             refine(s, refiner, request, first, count, &p, certificates + first, iterations + first, why);
-        const double solved = now_ms();
+        const double solved = call_now_ms();
         notes->solve_ms += solved - start;
         good = x != NULL;
         for (size_t v = 0; good && v < count; v++) {
@@ -180,7 +171,7 @@ bool refined_answer(call *in, const radiosity_request *request, answer_notes *no
                 answer_add_doubles(b, &shape, &as, first + v, 1, x + v * C * shape.n_values, &rounding, why);
             certificates[first + v] += rounding;
         }
-        notes->encode_ms += now_ms() - solved;
+        notes->encode_ms += call_now_ms() - solved;
         if (good) metrics_pass(in->service->metrics, count);
     }
     free_pass(&p);

@@ -1,5 +1,6 @@
 #include "server/scene.h"
 
+#include "server/batch.h"
 #include "server/scene_description.h"
 #include "server/scene_health.h"
 #include "solver/operator/operator.h"
@@ -53,14 +54,9 @@ done:
     return status;
 }
 
-/* Vectors of one pass, for which a thread has a work area (post_radiosity.c). */
-#define PASS OPERATOR_PASS
-
-/* What a solve of one pass needs beside the request: the kind's own work, the answer, and what a sky gives.
- */
+/* The work area that a thread keeps for the passes it makes; vectors and answers are their requests'. */
 static size_t work_of(const scene *s) {
-    const size_t vectors = PASS * s->n_channels * s->n * sizeof(float);
-    return lam_operator_work_bytes(s->op, PASS) + (s->sky != NULL ? 2 : 1) * vectors;
+    return lam_operator_work_bytes(s->op, BATCH_PASS);
 }
 
 uint64_t scene_work_memory(size_t n_threads, size_t work_bytes) {
