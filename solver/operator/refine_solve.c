@@ -96,7 +96,6 @@ done:
 
 static double most(size_t n, const double *x) {
     double largest = 0;
-#pragma omp simd reduction(max : largest)
     for (size_t i = 0; i < n; i++) {
         const double magnitude = fabs(x[i]);
         largest = magnitude > largest ? magnitude : largest;
@@ -244,7 +243,6 @@ static bool judge(refinement *s, size_t c) {
     const double *P = s->P + c * n, *mean = channel->mean;
     const double norm = area_norm(n, s->refiner->F->area, r, col->r), peak = channel->peak * col->r;
     double largest = 0, answer = 0;
-#pragma omp simd reduction(max : largest, answer)
     for (size_t i = 0; i < n; i++) {
         const double x = mean[i] * norm < peak ? mean[i] * norm : peak, sum = P[i] + r[i];
         largest = x > largest ? x : largest;
