@@ -1,0 +1,54 @@
+/* A file that ends whoever opens it ends a child of ours, and is refused; any other is for the caller to
+ * open. */
+#include "store/store_private.h"
+#include "support/suite.h"
+
+#include <check.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+
+static lam_status crash(const char *path, store **out, lam_error *error) {
+    (void)path;
+    (void)out;
+    (void)error;
+    raise(SIGKILL);
+    return LAM_OK;
+}
+
+static lam_status end_the_process(const char *path, store **out, lam_error *error) {
+    (void)path;
+    (void)out;
+    (void)error;
+    exit(3);
+}
+
+static lam_status refuse(const char *path, store **out, lam_error *error) {
+    (void)out;
+    return status_fail(error, LAM_ERR_FORMAT, "%s: not a store", path);
+}
+
+START_TEST(what_crashes_is_refused) {
+    static store_opener *const openers[] = {crash, end_the_process};
+    lam_error error = {.message = ""};
+    ck_assert_int_eq(store_probe(openers[_i], "a.h5", &error), LAM_ERR_DAMAGED);
+    ck_assert_str_eq(error.message,
+                     "a.h5: damaged so that HDF5 cannot read its headers; make the store again");
+}
+END_TEST
+
+START_TEST(what_is_refused_is_for_the_caller) {
+    lam_error error = {.message = "as before"};
+    ck_assert_int_eq(store_probe(refuse, "a.h5", &error), LAM_OK);
+    ck_assert_str_eq(error.message, "as before");
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("store probe");
+    TCase *tests = tcase_create("probe");
+    tcase_add_loop_test(tests, what_crashes_is_refused, 0, 2);
+    tcase_add_test(tests, what_is_refused_is_for_the_caller);
+    suite_add_tcase(suite, tests);
+    return suite_run(suite);
+}
