@@ -102,6 +102,15 @@ static double measure_read(const connection_limits *limits, client *c, double no
     return read;
 }
 
+/* Whether nothing of a body can come any more: its client has ended its side, and all it sent was taken.
+ * libmicrohttpd does not look for that in the middle of a body. */
+static bool has_hung_up(const client *c) {
+    int unread = 0;
+    struct pollfd one = {.fd = c->fd, .events = POLLRDHUP};
+    return poll(&one, 1, 0) > 0 && (one.revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0 &&
+           ioctl(c->fd, FIONREAD, &unread) == 0 && unread == 0;
+}
+
 /* Whether c has had its time. Every byte that moves puts the deadline off by 1/rate, but never further than a
  * time-out from now: who was fast may not be as slow as it likes from then on. */
 static bool is_over_time(const connection_limits *limits, client *c, double now, cut_reason *why) {
@@ -117,6 +126,8 @@ static bool is_over_time(const connection_limits *limits, client *c, double now,
         *why = CUT_BODY;
         moved = (double)(c->bytes - c->seen);
         c->seen = c->bytes;
+        /* Not at once: what was taken may be the whole body, which is being looked at. */
+        if (moved <= 0 && now - c->since > 1.0 && has_hung_up(c)) return true;
         break;
     case STAGE_ANSWER:
         *why = CUT_ANSWER;
