@@ -16,6 +16,7 @@ import signal
 import socket
 import sys
 import tempfile
+import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "service"))
 import numpy as np  # noqa: E402
@@ -148,7 +149,7 @@ def main():
                 w.start()
             early, reloads = 0, 0
             while any(w.is_alive() for w in workers):
-                workers[0].join(0.5)
+                time.sleep(0.5)
                 daemon.signal(signal.SIGHUP)
                 reloads += 1
                 if not early and asked.value >= total // 10:
