@@ -14,6 +14,7 @@ typedef enum service_server {
     SERVICE_LAMBERTD,
     SERVICE_READY,    /* the same bytes at once */
     SERVICE_SLEEPING, /* the same bytes after a sleep as long as a solve */
+    SERVICE_AS_MANY,  /* likewise, with as many asleep at once as give as many answers as lambertd */
     SERVICE_NGINX,    /* the same bytes as a file */
     SERVICE_SERVERS
 } service_server;
@@ -87,10 +88,11 @@ typedef struct service_servers {
 /* lambertd with b->folder/store.h5 as scene "bench". */
 lam_status service_start_lambertd(const service_bench *b, service_servers *s, lam_error *error);
 
-/* The others, which serve b->folder/answers/NPY and JSON. sleep is in seconds; so many sleep at once. What is
- * not installed is no error. */
-lam_status service_start_others(const service_bench *b, service_servers *s, double sleep, int sleepers,
-                                lam_error *error);
+/* The others, which serve b->folder/answers/NPY and JSON: a sleeping server, where sleep is in seconds and so
+ * many sleep at once, and all that do not sleep. What is not installed is no error. */
+lam_status service_start_sleeping(const service_bench *b, service_servers *s, service_server which,
+                                  double sleep, int sleepers, lam_error *error);
+lam_status service_start_others(const service_bench *b, service_servers *s, lam_error *error);
 void service_stop(service_servers *s);
 
 /* --- load (service_load.c) ------------------------------------------------------------------------------ */

@@ -9,7 +9,8 @@
 #include <time.h>
 #include <unistd.h>
 
-const char *const service_server_names[SERVICE_SERVERS] = {"lambertd", "ready", "sleeping", "nginx"};
+const char *const service_server_names[SERVICE_SERVERS] = {"lambertd", "ready", "sleeping", "as many",
+                                                           "nginx"};
 
 /* A store of gigabytes from a slow disk. */
 static const double patience_s = 300;
@@ -147,11 +148,14 @@ done:
     return status;
 }
 
-lam_status service_start_others(const service_bench *b, service_servers *s, double sleep, int sleepers,
-                                lam_error *error) {
+lam_status service_start_sleeping(const service_bench *b, service_servers *s, service_server which,
+                                  double sleep, int sleepers, lam_error *error) {
+    return start_ready(b, s, which, sleep, sleepers, error);
+}
+
+lam_status service_start_others(const service_bench *b, service_servers *s, lam_error *error) {
     lam_status status = LAM_OK;
     TRY(start_ready(b, s, SERVICE_READY, 0, 0, error));
-    TRY(start_ready(b, s, SERVICE_SLEEPING, sleep, sleepers, error));
     TRY(start_nginx(b, s, error));
 done:
     return status;
