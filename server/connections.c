@@ -102,8 +102,8 @@ static double measure_read(const connection_limits *limits, client *c, double no
     return read;
 }
 
-/* Whether nothing of a body can come any more: its client has ended its side, and all it sent was taken.
- * libmicrohttpd does not look for that in the middle of a body. */
+/* Whether nothing of a request can come any more: its client has ended its side, and all it sent was taken.
+ * libmicrohttpd does not look for that in the middle of a head or a body. */
 static bool has_hung_up(const client *c) {
     int unread = 0;
     struct pollfd one = {.fd = c->fd, .events = POLLRDHUP};
@@ -120,13 +120,11 @@ static bool is_over_time(const connection_limits *limits, client *c, double now,
     case STAGE_SOLVE:
         return false;
     case STAGE_HEAD:
-        *why = CUT_HEAD;
-        break;
     case STAGE_BODY:
-        *why = CUT_BODY;
+        *why = c->stage == STAGE_HEAD ? CUT_HEAD : CUT_BODY;
         moved = (double)(c->bytes - c->seen);
         c->seen = c->bytes;
-        /* Not at once: what was taken may be the whole body, which is being looked at. */
+        /* Not at once: what was taken may be the whole request, which is being looked at. */
         if (moved <= 0 && now - c->since > 1.0 && has_hung_up(c)) return true;
         break;
     case STAGE_ANSWER:

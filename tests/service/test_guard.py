@@ -203,16 +203,17 @@ class Guard(unittest.TestCase):
             self.assertEqual(metrics(daemon)[("lambertd_body_bytes",)], 0)
             self.serves(daemon)
 
-    def test_who_hangs_up_in_a_body_is_not_waited_for(self):
+    def test_who_hangs_up_is_not_waited_for(self):
         """Long before the time-out. Some of them libmicrohttpd finds by itself, never all of so many."""
-        with Daemon(self.box, "--timeout", 3600) as daemon:
-            for _ in range(40):
-                with daemon.raw() as s:
-                    s.sendall(HEAD + b"Content-Length: 90000\r\n\r\n" + b" " * 9000)
-            until(lambda: cuts(daemon, "body") > 0)
-            until(lambda: metrics(daemon)[("lambertd_body_bytes",)] == 0)
-            until(lambda: metrics(daemon)[("lambertd_connections",)] == 1)
-            self.serves(daemon)
+        for why, part in (("body", HEAD + b"Content-Length: 90000\r\n\r\n" + b" " * 9000), ("head", HEAD + b"X: y")):
+            with self.subTest(why), Daemon(self.box, "--timeout", 3600) as daemon:
+                for _ in range(40):
+                    with daemon.raw() as s:
+                        s.sendall(part)
+                until(lambda: cuts(daemon, why) > 0)
+                until(lambda: metrics(daemon)[("lambertd_body_bytes",)] == 0)
+                until(lambda: metrics(daemon)[("lambertd_connections",)] == 1)
+                self.serves(daemon)
 
     def test_a_body_at_the_least_rate_is_read(self):
         # 1 KiB each tenth of a second, for more than two times the time-out: 10 times the least rate.
