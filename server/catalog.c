@@ -4,6 +4,7 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <malloc.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -375,6 +376,8 @@ done:
     catalog_release(next);
     catalog_release(before);
     free_sources(&sources);
+    (void)malloc_trim(
+        0); /* what the old stores held goes back to the system, which no daemon of months may keep */
     fflush(all->out);
     fflush(all->problems);
     pthread_mutex_lock(&all->lock);

@@ -5,6 +5,7 @@
 #include "server/routes.h"
 
 #include <errno.h>
+#include <malloc.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,6 +24,12 @@ static void let_threads_sleep(char **argv) {
 static int complain(const lam_error *error, int code) {
     fprintf(stderr, "lambertd: %s\n", error->message);
     return code;
+}
+
+/* Threads that allocate little need no heaps of their own: what each keeps of its own busiest moment made the
+ * daemon grow by a tenth in its first hundred thousand requests. */
+static void share_one_heap(void) {
+    (void)mallopt(M_ARENA_MAX, 1);
 }
 
 /* The signals that are waited for; blocked before any thread is started, so that none gets them. */
@@ -117,6 +124,7 @@ done:
 
 int main(int argc, char **argv) {
     let_threads_sleep(argv);
+    share_one_heap();
     config c;
     lam_error error = {0};
     sigset_t signals = block_signals();
