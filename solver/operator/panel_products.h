@@ -161,7 +161,8 @@ TARGET static void KERNEL(project)(const panel_values *from, size_t n_rows, cons
         KERNEL(widen)
         (values + q * CHUNK_STEP, row_step, count, BY_ROWS && q + count == from->n_chunks ? from->tail : 0,
          wide);
-        KERNEL(project_step)(NULL, 0, wide, count, 0, c, m, t + q * m * PANEL_CHUNK);
+        KERNEL(project_step)
+        (values + q * CHUNK_STEP, row_step, wide, count, 0, c, m, t + q * m * PANEL_CHUNK);
     }
 }
 
@@ -257,7 +258,7 @@ TARGET static inline __attribute__((always_inline)) void KERNEL(expand_tile)(con
                 continue;
             }
             KERNEL(widen)(values, row_step, count, tail, wide);
-            KERNEL(expand_step)(NULL, 0, wide, count, 0, t + first * m * PANEL_CHUNK, m, lanes);
+            KERNEL(expand_step)(values, row_step, wide, count, 0, t + first * m * PANEL_CHUNK, m, lanes);
         }
         for (size_t r = 0; r < PANEL_TILE; r++)
             for (size_t v = 0; v < m; v++) sums[r][v] += KERNEL(sum_lanes)(lanes[r][v]);
