@@ -186,7 +186,8 @@ static lam_status receive_reply(reply_pipe *pipe, const char *path, size_t most_
     bool sound = memcmp(header.magic, reply_magic, sizeof reply_magic) == 0;
     header.message[sizeof header.message - 1] = '\0';
     header.warnings.text[sizeof header.warnings.text - 1] = '\0';
-    if (sound && header.status > LAM_OK && header.status <= LAM_ERR_INTERNAL)
+    const bool says_why = header.message[0] != '\0' && strpbrk(header.message, "\r\n") == NULL;
+    if (sound && says_why && header.status > LAM_OK && header.status <= LAM_ERR_INTERNAL)
         FAIL(error, (lam_status)header.status, "%s", header.message);
     const uint64_t most = most_bytes / 8; /* nothing sent is smaller per entry, but for names */
     sound = sound && header.status == LAM_OK && header.n_points < most && header.n_elements < most &&
