@@ -1,5 +1,7 @@
 #include "server/codec_reflectance.h"
 
+#include "server/json_memory.h"
+
 #include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -101,7 +103,6 @@ static bool refuse_text(const json_error_t *error, problem *why) {
     const enum json_error_code code = json_error_code(error);
     const bool number = code == json_error_numeric_overflow, again = code == json_error_duplicate_key;
     const bool nul = code == json_error_null_byte_in_key || code == json_error_null_character;
-    if (code == json_error_out_of_memory) return problem_set(why, 503, "not enough memory for the request");
     return problem_set(why, number || again || nul ? 422 : 400, "%s: %.160s at byte %d",
                        number  ? "a number beyond double"
                        : again ? "a name is given twice"
@@ -112,8 +113,10 @@ static bool refuse_text(const json_error_t *error, problem *why) {
 
 static bool read_text(const char *text, size_t length, json_t **body, problem *why) {
     json_error_t error;
+    json_memory_watch();
     *body =
         json_loadb(text, length, JSON_REJECT_DUPLICATES | JSON_DECODE_ANY | JSON_DECODE_INT_AS_REAL, &error);
+    if (json_memory_failed()) return problem_set(why, 503, "not enough memory for the request");
     if (*body == NULL) return refuse_text(&error, why);
     if (!json_is_object(*body)) return problem_set(why, 422, "the body must be an object");
     return true;

@@ -1,5 +1,6 @@
 /* lambertd: reads stores, answers over HTTP what light they have, until a signal ends it. */
 #include "server/http.h"
+#include "server/json_memory.h"
 #include "server/listener.h"
 #include "server/map_guard.h"
 #include "server/routes.h"
@@ -129,6 +130,7 @@ int main(int argc, char **argv) {
     lam_error error = {0};
     sigset_t signals = block_signals();
     map_guard_install();
+    json_memory_install();
     if (config_read(&c, argc, argv, &error) != LAM_OK) return complain(&error, EXIT_USAGE);
     if (c.help || c.version) {
         if (c.help)

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # All tests: layers and layout, then every test under AddressSanitizer and UndefinedBehaviourSanitizer, then the
-# daemon's tests against a ThreadSanitizer build, then a warning-free build by the other compiler.
+# daemon's tests against a ThreadSanitizer build and with faults around it, then a warning-free build by the other
+# compiler.
 # usage: tests/run.sh [BUILD-FOLDER]
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -58,7 +59,7 @@ run_ctest asan -j "$jobs"
 
 step "the daemon under ThreadSanitizer"
 configure_and_build tsan lambertd unit_batch unit_adjoint_rows unit_guard_parts -- -DLAMBERT_SANITIZE=thread
-configure_and_build release lambert lambertd -- -DCMAKE_BUILD_TYPE=Release
+configure_and_build release lambert lambertd faults -- -DCMAKE_BUILD_TYPE=Release
 export TSAN_OPTIONS=suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1:exitcode=66
 # OpenMP's runtime is not instrumented: its barriers would look like races, so a pass has one thread here; for the
 # daemon alone, as NumPy's BLAS waits for ever under such a limit.
@@ -66,6 +67,9 @@ export CK_FORK=no OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 LAMBERTD_OMP_THREAD_L
 cmake -S . -B "$builds/tsan" -DLAMBERT_TEST_PROGRAM="$PWD/$builds/release/lambert" >/dev/null
 run_ctest tsan -R 'service\.(daemon|reduce|guard|headers)|unit\.(batch|adjoint_rows|guard_parts)'
 unset CK_FORK OPENBLAS_NUM_THREADS OMP_NUM_THREADS LAMBERTD_OMP_THREAD_LIMIT
+
+step "a daemon to which memory, clocks and kill -9 happen"
+run_ctest release -R 'service\.faults'
 
 step "a warning-free build by clang, and the unit and contract tests of it"
 configure_and_build clang -- -DCMAKE_C_COMPILER=clang -DCMAKE_BUILD_TYPE=Release
