@@ -12,7 +12,7 @@ mkdir -p "$logs"
 
 ./deploy/install-packages
 
-step() { printf '\n== %s\n' "$*"; }
+step() { printf '\n== %s (%d s)\n' "$*" "$SECONDS"; }
 
 # configure_and_build NAME TARGETS... -- CMAKE-ARGUMENTS...
 configure_and_build() {
@@ -65,7 +65,7 @@ export TSAN_OPTIONS=suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1:ex
 # daemon alone, as NumPy's BLAS waits for ever under such a limit.
 export CK_FORK=no OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 LAMBERTD_OMP_THREAD_LIMIT=1
 cmake -S . -B "$builds/tsan" -DLAMBERT_TEST_PROGRAM="$PWD/$builds/release/lambert" >/dev/null
-run_ctest tsan -R 'service\.(daemon|reduce|guard|headers)|unit\.(batch|adjoint_rows|guard_parts)'
+run_ctest tsan -j "$jobs" -R 'service\.(daemon|reduce|guard|headers)|unit\.(batch|adjoint_rows|guard_parts)'
 unset CK_FORK OPENBLAS_NUM_THREADS OMP_NUM_THREADS LAMBERTD_OMP_THREAD_LIMIT
 
 step "a daemon to which memory, clocks and kill -9 happen"
