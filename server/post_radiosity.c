@@ -14,19 +14,20 @@ typedef struct radiosity_solve {
     answer_notes notes;
     answer_shape shape;
     buffer answer;
-    float *out;      /* [n_rhs][C][n_values]: in the answer, where its encoding allows, or own */
-    float *own;      /* else NULL */
-    float *H0;       /* [n_rhs][C][n], what the sky gives; NULL where no vector is under one */
-    double *figures; /* of reduce, in place of the answer's values; else NULL */
-    float *W;        /* [n_rhs][C][s], weights of the store's emitters; NULL where it has none */
-    problem why;     /* of a pass that failed */
+    float *out;             /* [n_rhs][C][n_values]: in the answer, where its encoding allows, or own */
+    float *own;             /* else NULL */
+    float *H0;              /* [n_rhs][C][n], what the sky gives; NULL where no vector is under one */
+    double *figures;        /* of reduce, in place of the answer's values; else NULL */
+    float *W;               /* [n_rhs][C][s], weights of the store's emitters; NULL where it has none */
+    refined_solve *refined; /* where a tolerance is asked for; else NULL */
+    problem why;            /* of a pass that failed */
     bool failed;
 } radiosity_solve;
 
 static void solve_free(radiosity_solve *s) {
     radiosity_request_free(&s->request);
     buffer_free(&s->answer);
-    refined_answer_free(&s->notes);
+    refined_free(s->refined, &s->notes);
     free(s->own);
     free(s->figures);
     free(s->H0);
@@ -106,26 +107,27 @@ static bool begin(call *in, answer *out) {
                               .n_values = request->select ? request->n_selected : of->n};
     in->n_rhs = request->n_rhs;
     good = good && figures_acceptable(in, request, &why);
-    /* Two that take no pass and are answered at once. */
+    /* One takes no pass and is answered at once. */
     const bool linear = good && request->reduce.linear, refine = good && request->tolerance > 0;
     good = linear   ? figures_linear(in, &s->request, &s->notes, &s->answer, &why)
-           : refine ? refined_answer(in, request, &s->notes, &s->answer, &why)
+           : refine ? refined_begin(in, request, &s->notes, &s->refined, &why)
                     : good && find_light(of, s, &why) && find_room(in, s, &why);
-    if (!good || linear || refine) {
-        if (good) {
+    if (!good || linear) {
+        if (good)
             answer_json(out, &s->answer, true);
-            if (refine && in->accept.type == MEDIA_NPY) out->type = "application/x-npy";
-            if (refine) refined_answer_tell(&s->notes, request->n_rhs, out);
-        } else {
+        else
             answer_problem(out, &why);
-        }
         solve_free(s);
         return false;
     }
     in->state = s;
     in->job.n_vectors = request->n_rhs;
-    /* Whole answers share passes; those of some elements, and of emitters, have passes of their own. */
-    in->job.key = request->select || of->n_emitters > 0 ? (const void *)in : of->op;
+    /* Whole answers share passes; those of some elements, and of emitters, have passes of their own. What is
+     * refined takes many times as long: one such pass at a time, whoever asks, leaves the other threads to
+     * all others. */
+    in->job.key = refine                                  ? (const void *)in->service->queue
+                  : request->select || of->n_emitters > 0 ? (const void *)in
+                                                          : of->op;
     return true;
 }
 
@@ -154,7 +156,16 @@ static lam_status pass_of_some(const scene *s, const radiosity_solve *solve, con
                                        request->selected, out, work, bytes, error);
 }
 
-/* The parts are of one scene; several only of whole answers. */
+static void pass_refined(const batch_part *parts, size_t n_parts) {
+    for (size_t p = 0; p < n_parts; p++) {
+        call *in = call_of(parts[p].job);
+        radiosity_solve *s = in->state;
+        s->failed = s->failed || !refined_pass(in, &s->request, parts[p].first, parts[p].count, s->refined,
+                                               &s->notes, &s->answer, &s->why);
+    }
+}
+
+/* The parts are of one scene, or all to be refined; several only of whole answers. */
 static void pass(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
     const call *first = call_of(parts[0].job);
     const scene *s = first->scene;
@@ -163,6 +174,11 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
     problem why = {0};
     size_t count = 0, bytes = 0;
     const double start = call_now_ms();
+    const radiosity_solve *one = first->state;
+    if (one->refined != NULL) {
+        pass_refined(parts, n_parts);
+        return;
+    }
     for (size_t p = 0; p < n_parts; p++) {
         const radiosity_solve *solve = call_of(parts[p].job)->state;
         const size_t before = parts[p].first * s->n_channels * s->n;
@@ -173,7 +189,6 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
                                .out = solve->out + parts[p].first * s->n_channels * solve->shape.n_values};
         count += parts[p].count;
     }
-    const radiosity_solve *one = first->state;
     void *work = get_work(s, count, workspace, &bytes, &why);
     if (work != NULL) {
         const lam_status status =
@@ -197,6 +212,7 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
 static bool write_answer(call *in, radiosity_solve *s) {
     const double start = call_now_ms();
     bool good = !s->failed;
+    if (s->refined != NULL) return good && refined_end(s->refined, &s->notes, &s->answer, &s->why);
     if (s->figures != NULL)
         return good && figures_add(in->scene, &s->request, 0, s->shape.n_rhs, s->own, s->figures, &s->why) &&
                figures_write(in->scene, &s->request, s->figures, &s->notes, &s->answer, &s->why);
@@ -212,6 +228,7 @@ static void end(call *in, answer *out) {
     if (write_answer(in, s)) {
         answer_json(out, &s->answer, true);
         if (in->accept.type == MEDIA_NPY) out->type = "application/x-npy";
+        if (s->refined != NULL) refined_answer_tell(&s->notes, s->request.n_rhs, out);
     } else {
         answer_problem(out, &s->why);
     }

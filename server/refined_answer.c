@@ -18,6 +18,15 @@ typedef struct pass_memory {
     size_t work_bytes;
 } pass_memory;
 
+struct refined_solve {
+    answer_shape shape;
+    media_accept as;
+    double *certificates; /* [n_rhs] */
+    size_t *iterations;   /* [n_rhs] */
+    bool made;            /* p is */
+    pass_memory p;
+};
+
 static void free_pass(pass_memory *p) {
     free(p->E);
     free(p->H0);
@@ -117,72 +126,87 @@ static const double *refine(const scene *s, const lam_refiner *refiner, const ra
     return p->some;
 }
 
-bool refined_answer(call *in, const radiosity_request *request, answer_notes *notes, buffer *b,
-                    problem *why) {
+bool refined_begin(call *in, const radiosity_request *request, answer_notes *notes, refined_solve **out,
+                   problem *why) {
     const scene *s = in->scene;
-    const size_t C = s->n_channels;
-    const lam_refiner *refiner = NULL;
-    pass_memory p = {0};
-    lam_error error;
-    const answer_shape shape = {.n = s->n,
-                                .n_channels = C,
-                                .n_rhs = request->n_rhs,
-                                .batch = request->batch,
-                                .n_values = request->select ? request->n_selected : s->n};
-    media_accept as = in->accept;
-    if (!as.npy_given) as.npy = NPY_F8;
-    const double begin = call_now_ms();
     if (s->base != NULL) {
         problem_set(why, 501, "answers of a variant cannot be refined yet; ask %.80s, or leave tolerance out",
                     s->base->name);
         snprintf(why->pointer, sizeof why->pointer, "/tolerance");
         return false;
     }
-    const lam_status status = refined_get(s->refined, &refiner, &error);
-    if (status != LAM_OK) return refuse(status, &error, why);
-    if (refiner == NULL) {
-        problem_set(why, 422,
-                    "scene %.80s keeps no form factors, which a tolerance needs; precompute it with "
-                    "--keep-form-factors",
-                    s->name);
-        snprintf(why->pointer, sizeof why->pointer, "/tolerance");
-        return false;
-    }
-    double *certificates = memory_allocate(request->n_rhs, sizeof *certificates, "certificates", NULL);
-    size_t *iterations = memory_allocate(request->n_rhs, sizeof *iterations, "certificates", NULL);
-    notes->certificates = certificates;
-    notes->iterations = iterations;
-    bool good = certificates != NULL && iterations != NULL;
-    if (!good) problem_set(why, 503, "not enough memory for %zu certificates", request->n_rhs);
-    good = good && get_pass(s, request, &p, why) && answer_begin(b, &shape, &as, notes, why);
-    notes->solve_ms += call_now_ms() - begin;
-    for (size_t first = 0; good && first < request->n_rhs; first += BATCH_PASS) {
-        const size_t count = request->n_rhs - first < BATCH_PASS ? request->n_rhs - first : BATCH_PASS;
-        const double start = call_now_ms();
-        const double *x =
-            refine(s, refiner, request, first, count, &p, certificates + first, iterations + first, why);
-        const double solved = call_now_ms();
-        notes->solve_ms += solved - start;
-        good = x != NULL;
-        for (size_t v = 0; good && v < count; v++) {
-            /* One by one: what a vector is rounded by is its own affair. */
-            double rounding = 0;
-            good =
-                answer_add_doubles(b, &shape, &as, first + v, 1, x + v * C * shape.n_values, &rounding, why);
-            certificates[first + v] += rounding;
-        }
-        notes->encode_ms += call_now_ms() - solved;
-        if (good) metrics_pass(in->service->metrics, count);
-    }
-    free_pass(&p);
-    return good && answer_end(b, &shape, &as, notes, why);
+    refined_solve *r = calloc(1, sizeof *r);
+    if (r == NULL) return problem_set(why, 503, "not enough memory for the request");
+    r->as = in->accept;
+    if (!r->as.npy_given) r->as.npy = NPY_F8;
+    r->shape = (answer_shape){.n = s->n,
+                              .n_channels = s->n_channels,
+                              .n_rhs = request->n_rhs,
+                              .batch = request->batch,
+                              .n_values = request->select ? request->n_selected : s->n};
+    r->certificates = memory_allocate(request->n_rhs, sizeof *r->certificates, "certificates", NULL);
+    r->iterations = memory_allocate(request->n_rhs, sizeof *r->iterations, "certificates", NULL);
+    notes->certificates = r->certificates;
+    notes->iterations = r->iterations;
+    *out = r;
+    return (r->certificates != NULL && r->iterations != NULL) ||
+           problem_set(why, 503, "not enough memory for %zu certificates", request->n_rhs);
 }
 
-void refined_answer_free(answer_notes *notes) {
-    free((void *)(uintptr_t)notes->certificates);
-    free((void *)(uintptr_t)notes->iterations);
+/* What refines; the first time of a scene takes as long as its form factors are large. */
+static bool find_refiner(const scene *s, const lam_refiner **refiner, problem *why) {
+    lam_error error;
+    const lam_status status = refined_get(s->refined, refiner, &error);
+    if (status != LAM_OK) return refuse(status, &error, why);
+    if (*refiner != NULL) return true;
+    problem_set(why, 422,
+                "scene %.80s keeps no form factors, which a tolerance needs; precompute it with "
+                "--keep-form-factors",
+                s->name);
+    snprintf(why->pointer, sizeof why->pointer, "/tolerance");
+    return false;
+}
+
+bool refined_pass(call *in, const radiosity_request *request, size_t first, size_t count, refined_solve *r,
+                  answer_notes *notes, buffer *b, problem *why) {
+    const scene *s = in->scene;
+    const lam_refiner *refiner = NULL;
+    const double begin = call_now_ms();
+    bool good = find_refiner(s, &refiner, why);
+    if (good && !r->made) {
+        r->made = true;
+        good = get_pass(s, request, &r->p, why) && answer_begin(b, &r->shape, &r->as, notes, why);
+    }
+    const double *x = good ? refine(s, refiner, request, first, count, &r->p, r->certificates + first,
+                                    r->iterations + first, why)
+                           : NULL;
+    const double solved = call_now_ms();
+    notes->solve_ms += solved - begin;
+    good = x != NULL;
+    for (size_t v = 0; good && v < count; v++) {
+        /* One by one: what a vector is rounded by is its own affair. */
+        double rounding = 0;
+        good = answer_add_doubles(b, &r->shape, &r->as, first + v, 1,
+                                  x + v * s->n_channels * r->shape.n_values, &rounding, why);
+        r->certificates[first + v] += rounding;
+    }
+    notes->encode_ms += call_now_ms() - solved;
+    if (good) metrics_pass(in->service->metrics, count);
+    return good;
+}
+
+bool refined_end(const refined_solve *r, const answer_notes *notes, buffer *b, problem *why) {
+    return answer_end(b, &r->shape, &r->as, notes, why);
+}
+
+void refined_free(refined_solve *r, answer_notes *notes) {
     notes->certificates = NULL;
     notes->iterations = NULL;
+    if (r == NULL) return;
+    free(r->certificates);
+    free(r->iterations);
+    free_pass(&r->p);
+    free(r);
 }
 
 void refined_answer_tell(const answer_notes *notes, size_t n_rhs, answer *out) {

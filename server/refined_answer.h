@@ -6,12 +6,25 @@
 #include "server/codec_request.h"
 #include "server/routes.h"
 
-/* Refines all that a request asks for and writes it to b; the certificates in notes are freed by
- * refined_answer_free, whatever the outcome. False with *why: 422 where the store keeps no form factors, the
- * tolerance is more than can be certified or the store's emitters cannot give the emission; 503 when memory
- * is short or the store's file has changed; 500 when it is damaged. */
-bool refined_answer(call *in, const radiosity_request *request, answer_notes *notes, buffer *b, problem *why);
-void refined_answer_free(answer_notes *notes);
+/* One such request, from begin to end. */
+typedef struct refined_solve refined_solve;
+
+/* Begins the answer; the certificates in notes are freed by refined_free. Errors: 501 for a variant, 503. */
+bool refined_begin(call *in, const radiosity_request *request, answer_notes *notes, refined_solve **out,
+                   problem *why);
+
+/* Refines vectors first ... first + count, at most BATCH_PASS, and writes them to b, one pass after the other
+ * in their order. Once this was false the others are not tried. Errors: 422 where the store keeps no form
+ * factors, the tolerance is more than can be certified or the store's emitters cannot give the emission; 503
+ * when memory is short or the store's file has changed; 500 when it is damaged. */
+bool refined_pass(call *in, const radiosity_request *request, size_t first, size_t count, refined_solve *r,
+                  answer_notes *notes, buffer *b, problem *why);
+
+/* The rest of the answer. */
+bool refined_end(const refined_solve *r, const answer_notes *notes, buffer *b, problem *why);
+
+/* Either may be empty. */
+void refined_free(refined_solve *r, answer_notes *notes);
 
 /* What goes beside the body: the largest of certificates and iterations. */
 void refined_answer_tell(const answer_notes *notes, size_t n_rhs, answer *out);

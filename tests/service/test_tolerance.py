@@ -224,6 +224,23 @@ class Tolerance(unittest.TestCase):
             self.assertEqual(answer.status, 200, answer)
             self.assertEqual(answer.json()["radiosity"], wanted)
 
+    def test_others_do_not_wait_for_refinements(self):
+        """However many are asked for, they take one thread; with two, who wants a plain answer has the other."""
+        plain = {"emission": {"groups": {"lamp": 3}}}
+        long = json.dumps({"emissions": [{"elements": [i % 50], "values": [1]} for i in range(600)], "tolerance": 1e-10})
+        with Daemon(f"{self.stores['low']}:low", "--threads", 2) as daemon:
+            daemon.radiosity("low", dict(plain, tolerance=1e-2))  # the form factors are read
+            with concurrent.futures.ThreadPoolExecutor(4) as pool:
+                asked = [pool.submit(daemon.radiosity, "low", long) for _ in range(4)]
+                while b"\nlambertd_queued 4\n" not in daemon.get("/metrics").body:
+                    self.assertFalse(asked[0].done(), "too few to wait for")
+                for _ in range(5):
+                    self.assertEqual(daemon.radiosity("low", plain).status, 200)
+                self.assertLess(sum(a.done() for a in asked), 2)
+                answers = [a.result() for a in asked]
+            self.assertEqual({a.status for a in answers}, {200})
+            self.assertEqual(len({str(a.json()["radiosity"]) for a in answers}), 1)
+
     # --- what is refused
 
     def refused(self, status, words, name, body, pointer="/tolerance"):
