@@ -136,21 +136,21 @@ bool answer_add_doubles(buffer *b, const answer_shape *shape, const media_accept
     return true;
 }
 
-/* A number, or one for each vector of a batch. */
-static bool add_certificates(buffer *b, const answer_shape *shape, const answer_notes *notes) {
+bool answer_certificates(buffer *b, size_t n_rhs, bool batch, const answer_notes *notes) {
+    if (notes->certificates == NULL) return true;
     bool written = buffer_append_text(b, ",\"certificate\":") &&
-                   (shape->batch ? json_write_doubles(b, notes->certificates, shape->n_rhs)
-                                 : json_write_double(b, notes->certificates[0])) &&
-                   buffer_append_text(b, shape->batch ? ",\"iterations\":[" : ",\"iterations\":");
-    for (size_t v = 0; written && v < shape->n_rhs; v++)
+                   (batch ? json_write_doubles(b, notes->certificates, n_rhs)
+                          : json_write_double(b, notes->certificates[0])) &&
+                   buffer_append_text(b, batch ? ",\"iterations\":[" : ",\"iterations\":");
+    for (size_t v = 0; written && v < n_rhs; v++)
         written = buffer_printf(b, v > 0 ? ",%zu" : "%zu", notes->iterations[v]);
-    return written && (!shape->batch || buffer_append(b, "]", 1));
+    return written && (!batch || buffer_append(b, "]", 1));
 }
 
 bool answer_end(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
                 problem *why) {
     if (as->type == MEDIA_NPY) return true;
     return ((!shape->batch || buffer_append(b, "]", 1)) &&
-            (notes->certificates == NULL || add_certificates(b, shape, notes)) && answer_tail(b, notes)) ||
+            answer_certificates(b, shape->n_rhs, shape->batch, notes) && answer_tail(b, notes)) ||
            no_memory(why);
 }

@@ -27,6 +27,10 @@ typedef struct answer_notes {
     const size_t *iterations;
 } answer_notes;
 
+/* The certificates and iterations of a refined answer: a number each, or one for each vector of a batch;
+ * nothing for others. False when memory is short. */
+bool answer_certificates(buffer *b, size_t n_rhs, bool batch, const answer_notes *notes);
+
 /* The beginning of any JSON answer, up to and with its quantity, and its end: what notes says, and the
  * closing bracket. False when memory is short. */
 bool answer_head(buffer *b, size_t n, size_t n_channels, const answer_notes *notes);

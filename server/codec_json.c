@@ -106,10 +106,6 @@ static bool read_body(parser *p) {
         p->pointer_length = 0;
         if (p->request->reduce.on && p->request->select)
             return parser_refuse(p, 422, "the body holds both select and reduce, must hold one of them");
-        if (p->request->reduce.on && p->request->tolerance > 0)
-            return parser_refuse(
-                p, 501,
-                "figures of a refined answer are not supported yet; ask for its elements with select");
     }
     if (p->why->status != 0) return false;
     if (!json_finish(&p->r)) return parser_fault(p);
@@ -129,7 +125,7 @@ bool codec_read_json(const codec_scene *scene, const char *text, size_t length, 
     reduce_request *reduce = &request->reduce;
     bool good = parser_begin(&p, scene, text, length, request, why) && read_body(&p) && parser_fill_sides(&p);
     if (!parser_end(&p, good)) return false;
-    if (reduce->linear && reduce->n_names > scene->max_rows) reduce->linear = false;
+    if (request->tolerance > 0 || reduce->n_names > scene->max_rows) reduce->linear = false;
     if (scene->only_linear && !reduce->linear) return parser_not_linear(&p);
     if (reduce->on && !reduce->linear && !select_reduced(scene, request, why)) return false;
     return (reduce->linear && request->n_dense == 0) || radiosity_request_expand(request, scene, why);

@@ -212,7 +212,8 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
 static bool write_answer(call *in, radiosity_solve *s) {
     const double start = call_now_ms();
     bool good = !s->failed;
-    if (s->refined != NULL) return good && refined_end(s->refined, &s->notes, &s->answer, &s->why);
+    if (s->refined != NULL)
+        return good && refined_end(in, &s->request, s->refined, &s->notes, &s->answer, &s->why);
     if (s->figures != NULL)
         return good && figures_add(in->scene, &s->request, 0, s->shape.n_rhs, s->own, s->figures, &s->why) &&
                figures_write(in->scene, &s->request, s->figures, &s->notes, &s->answer, &s->why);

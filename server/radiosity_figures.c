@@ -27,7 +27,7 @@ bool figures_add(const scene *s, const radiosity_request *request, size_t first,
         return problem_set(why, 422,
                            "the answer passes the range of single precision (3.4e38); scale the emission");
     return reduce_vectors(&request->reduce, &s->groups, s->area, s->n_channels, request->n_rhs, first, count,
-                          x, figures) ||
+                          (reduce_values){.floats = x}, figures) ||
            problem_set(why, 503, "not enough memory to reduce %zu vectors", count);
 }
 
@@ -35,7 +35,7 @@ bool figures_write(const scene *s, const radiosity_request *request, const doubl
                    const answer_notes *notes, buffer *b, problem *why) {
     return (answer_head(b, s->n, s->n_channels, notes) && buffer_append_text(b, ",\"groups\":") &&
             reduce_write(&request->reduce, s->n_channels, request->n_rhs, request->batch, figures, b) &&
-            answer_tail(b, notes)) ||
+            answer_certificates(b, request->n_rhs, request->batch, notes) && answer_tail(b, notes)) ||
            problem_set(why, 503, "not enough memory for the answer; ask for fewer vectors or groups");
 }
 

@@ -87,14 +87,18 @@ static double *figure_at(const reduce_request *r, size_t k, size_t s, size_t n_r
     return figures + (((k * r->n_with + s) * n_rhs + v) * n_channels + c);
 }
 
-/* Every statistic of the elements of one name; x is in the order of reduce_elements. */
+static double value_at(reduce_values x, size_t i) {
+    return x.doubles != NULL ? x.doubles[i] : (double)x.floats[i];
+}
+
+/* Every statistic of the elements of one name; x is in the order of reduce_elements, from x_begin on. */
 static void figures_of_name(const reduce_name *name, const group_index *groups, const uint32_t *begin,
-                            const double *area, const float *x, double out[REDUCE_COUNT]) {
+                            const double *area, reduce_values x, size_t x_begin, double out[REDUCE_COUNT]) {
     double total = 0, sum = 0, squares = 0, low = INFINITY, high = -INFINITY;
     for (size_t m = 0; m < name->n_groups; m++) {
         const uint32_t g = name->groups[m], *elements = groups->elements + groups->start[g];
         for (size_t e = 0; e < groups->start[g + 1] - groups->start[g]; e++) {
-            const double value = (double)x[begin[g] + e];
+            const double value = value_at(x, x_begin + begin[g] + e);
             total += area[elements[e]];
             sum += area[elements[e]] * value;
             low = fmin(low, value);
@@ -105,7 +109,7 @@ static void figures_of_name(const reduce_name *name, const group_index *groups, 
     for (size_t m = 0; m < name->n_groups; m++) {
         const uint32_t g = name->groups[m], *elements = groups->elements + groups->start[g];
         for (size_t e = 0; e < groups->start[g + 1] - groups->start[g]; e++) {
-            const double off = (double)x[begin[g] + e] - mean;
+            const double off = value_at(x, x_begin + begin[g] + e) - mean;
             squares += area[elements[e]] * off * off;
         }
     }
@@ -119,7 +123,7 @@ static void figures_of_name(const reduce_name *name, const group_index *groups, 
 }
 
 bool reduce_vectors(const reduce_request *r, const group_index *groups, const double *area, size_t n_channels,
-                    size_t n_rhs, size_t first, size_t count, const float *x, double *figures) {
+                    size_t n_rhs, size_t first, size_t count, reduce_values x, double *figures) {
     size_t n_values;
     uint32_t *begin = places_of_groups(r, groups, &n_values);
     if (begin == NULL) return false;
@@ -127,7 +131,7 @@ bool reduce_vectors(const reduce_request *r, const group_index *groups, const do
         for (size_t c = 0; c < n_channels; c++)
             for (size_t k = 0; k < r->n_names; k++) {
                 double of_name[REDUCE_COUNT];
-                figures_of_name(&r->names[k], groups, begin, area, x + (v * n_channels + c) * n_values,
+                figures_of_name(&r->names[k], groups, begin, area, x, (v * n_channels + c) * n_values,
                                 of_name);
                 for (size_t s = 0; s < r->n_with; s++)
                     *figure_at(r, k, s, n_rhs, first + v, n_channels, c, figures) = of_name[r->with[s]];

@@ -54,11 +54,17 @@ bool reduce_elements(const reduce_request *r, const group_index *groups, uint32_
  * short; the caller frees. */
 double *reduce_figures(const reduce_request *r, size_t n_rhs, size_t n_channels);
 
+/* Values that are reduced: either of the two. */
+typedef struct reduce_values {
+    const float *floats;
+    const double *doubles;
+} reduce_values;
+
 /* Fills the figures of vectors first ... first + count of n_rhs. x is [count][C][n_values], the elements in
  * the order of reduce_elements; area [n] in mesh order. NaN where a figure has no value: no area, or a mean
  * of 0. False when memory is short. */
 bool reduce_vectors(const reduce_request *r, const group_index *groups, const double *area, size_t n_channels,
-                    size_t n_rhs, size_t first, size_t count, const float *x, double *figures);
+                    size_t n_rhs, size_t first, size_t count, reduce_values x, double *figures);
 
 /* Fills those of name k from its means [n_rhs][C] alone; area is that of its elements. */
 void reduce_means(const reduce_request *r, size_t k, size_t n_channels, size_t n_rhs, double area,

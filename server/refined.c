@@ -8,6 +8,7 @@
 
 struct refined {
     const lam_operator *op;
+    refined *base; /* of a variant, whose form factors it uses; NULL: its own */
     pthread_mutex_t *stores;
     pthread_mutex_t lock; /* of F and refiner */
     char *path;           /* NULL: no form factors are kept */
@@ -40,6 +41,16 @@ done:
     return status;
 }
 
+lam_status refined_create_variant(refined *base, const lam_operator *op, refined **out, lam_error *error) {
+    refined *made = memory_allocate(1, sizeof *made, "a variant", error);
+    if (made == NULL) return LAM_ERR_MEMORY;
+    made->op = op;
+    made->base = base;
+    pthread_mutex_init(&made->lock, NULL);
+    *out = made;
+    return LAM_OK;
+}
+
 void refined_destroy(refined *r) {
     if (r == NULL) return;
     lam_refiner_free(r->refiner);
@@ -70,17 +81,27 @@ done:
     return status;
 }
 
-lam_status refined_get(refined *r, const lam_refiner **refiner, lam_error *error) {
+/* *F is NULL where none are kept. */
+static lam_status get_form_factors(refined *r, const lam_form_factors **F, lam_error *error) {
     lam_status status = LAM_OK;
-    if (r->path == NULL) {
-        *refiner = NULL;
-        return LAM_OK;
-    }
     pthread_mutex_lock(&r->lock);
-    if (r->F == NULL) TRY(read_form_factors(r, error));
-    if (r->refiner == NULL) TRY(lam_refiner_create(r->op, r->F, &r->refiner, error));
-    *refiner = r->refiner;
+    if (r->F == NULL && r->path != NULL) TRY(read_form_factors(r, error));
+    *F = r->F;
 done:
     pthread_mutex_unlock(&r->lock);
+    return status;
+}
+
+lam_status refined_get(refined *r, const lam_refiner **refiner, lam_error *error) {
+    lam_status status = LAM_OK;
+    const lam_form_factors *F = NULL;
+    *refiner = NULL;
+    TRY(get_form_factors(r->base != NULL ? r->base : r, &F, error));
+    if (F == NULL) return LAM_OK;
+    pthread_mutex_lock(&r->lock);
+    if (r->refiner == NULL) status = lam_refiner_create(r->op, F, &r->refiner, error);
+    *refiner = r->refiner;
+    pthread_mutex_unlock(&r->lock);
+done:
     return status;
 }

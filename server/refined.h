@@ -15,6 +15,9 @@ typedef struct refined refined;
 lam_status refined_create(store *s, const lam_operator *op, pthread_mutex_t *stores, refined **out,
                           lam_error *error);
 
+/* Of a variant: op is another operator of base's elements. Both outlive it. Errors: LAM_ERR_MEMORY. */
+lam_status refined_create_variant(refined *base, const lam_operator *op, refined **out, lam_error *error);
+
 /* What refines op's answers; *refiner is NULL where the store keeps no form factors, else it lives as long as
  * r. The first call reads them, takes their memory and finds the bound on the inverse; others wait for it.
  * Errors: LAM_ERR_IO (also where the file is another one by now), LAM_ERR_MEMORY, LAM_ERR_DAMAGED,

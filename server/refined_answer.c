@@ -1,5 +1,7 @@
 #include "server/refined_answer.h"
 
+#include "server/radiosity_figures.h"
+#include "server/reduce.h"
 #include "solver/operator/emitters.h"
 #include "solver/operator/sky.h"
 
@@ -23,6 +25,7 @@ struct refined_solve {
     media_accept as;
     double *certificates; /* [n_rhs] */
     size_t *iterations;   /* [n_rhs] */
+    double *figures;      /* of reduce, in place of the values; else NULL */
     bool made;            /* p is */
     pass_memory p;
 };
@@ -129,12 +132,6 @@ static const double *refine(const scene *s, const lam_refiner *refiner, const ra
 bool refined_begin(call *in, const radiosity_request *request, answer_notes *notes, refined_solve **out,
                    problem *why) {
     const scene *s = in->scene;
-    if (s->base != NULL) {
-        problem_set(why, 501, "answers of a variant cannot be refined yet; ask %.80s, or leave tolerance out",
-                    s->base->name);
-        snprintf(why->pointer, sizeof why->pointer, "/tolerance");
-        return false;
-    }
     refined_solve *r = calloc(1, sizeof *r);
     if (r == NULL) return problem_set(why, 503, "not enough memory for the request");
     r->as = in->accept;
@@ -149,7 +146,9 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
     notes->certificates = r->certificates;
     notes->iterations = r->iterations;
     *out = r;
-    return (r->certificates != NULL && r->iterations != NULL) ||
+    if (request->reduce.on) r->figures = reduce_figures(&request->reduce, request->n_rhs, s->n_channels);
+    return (r->certificates != NULL && r->iterations != NULL &&
+            (r->figures != NULL || !request->reduce.on)) ||
            problem_set(why, 503, "not enough memory for %zu certificates", request->n_rhs);
 }
 
@@ -175,7 +174,8 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
     bool good = find_refiner(s, &refiner, why);
     if (good && !r->made) {
         r->made = true;
-        good = get_pass(s, request, &r->p, why) && answer_begin(b, &r->shape, &r->as, notes, why);
+        good = get_pass(s, request, &r->p, why) &&
+               (r->figures != NULL || answer_begin(b, &r->shape, &r->as, notes, why));
     }
     const double *x = good ? refine(s, refiner, request, first, count, &r->p, r->certificates + first,
                                     r->iterations + first, why)
@@ -183,7 +183,11 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
     const double solved = call_now_ms();
     notes->solve_ms += solved - begin;
     good = x != NULL;
-    for (size_t v = 0; good && v < count; v++) {
+    if (good && r->figures != NULL)
+        good = reduce_vectors(&request->reduce, &s->groups, s->area, s->n_channels, request->n_rhs, first,
+                              count, (reduce_values){.doubles = x}, r->figures) ||
+               problem_set(why, 503, "not enough memory to reduce %zu vectors", count);
+    for (size_t v = 0; good && r->figures == NULL && v < count; v++) {
         /* One by one: what a vector is rounded by is its own affair. */
         double rounding = 0;
         good = answer_add_doubles(b, &r->shape, &r->as, first + v, 1,
@@ -195,7 +199,9 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
     return good;
 }
 
-bool refined_end(const refined_solve *r, const answer_notes *notes, buffer *b, problem *why) {
+bool refined_end(const call *in, const radiosity_request *request, const refined_solve *r,
+                 const answer_notes *notes, buffer *b, problem *why) {
+    if (r->figures != NULL) return figures_write(in->scene, request, r->figures, notes, b, why);
     return answer_end(b, &r->shape, &r->as, notes, why);
 }
 
@@ -205,6 +211,7 @@ void refined_free(refined_solve *r, answer_notes *notes) {
     if (r == NULL) return;
     free(r->certificates);
     free(r->iterations);
+    free(r->figures);
     free_pass(&r->p);
     free(r);
 }

@@ -9,7 +9,7 @@
 /* One such request, from begin to end. */
 typedef struct refined_solve refined_solve;
 
-/* Begins the answer; the certificates in notes are freed by refined_free. Errors: 501 for a variant, 503. */
+/* Begins the answer; the certificates in notes are freed by refined_free. Errors: 503. */
 bool refined_begin(call *in, const radiosity_request *request, answer_notes *notes, refined_solve **out,
                    problem *why);
 
@@ -21,7 +21,8 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
                   answer_notes *notes, buffer *b, problem *why);
 
 /* The rest of the answer. */
-bool refined_end(const refined_solve *r, const answer_notes *notes, buffer *b, problem *why);
+bool refined_end(const call *in, const radiosity_request *request, const refined_solve *r,
+                 const answer_notes *notes, buffer *b, problem *why);
 
 /* Either may be empty. */
 void refined_free(refined_solve *r, answer_notes *notes);

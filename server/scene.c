@@ -175,6 +175,7 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
     if (made->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", name);
     made->memory = made->bytes;
     TRY(adjoint_rows_create(ADJOINT_ROWS_BYTES, &made->rows, error));
+    TRY(refined_create_variant(base->refined, op, &made->refined, error));
     TRY(scene_describe_variant(made, groups, &made->description, error));
     *out = made;
     made = NULL;

@@ -401,9 +401,6 @@ class Errors(unittest.TestCase):
     # --- 501
 
     def test_not_yet(self):
-        good = [1] * N
-        self.refuse({"emission": good, "tolerance": 1e-4, "reduce": {"groups": ["lamp"], "with": ["mean"]}}, 501,
-                    "refined")
         for method, path in (("GET", "/v1/scenes/grey/mesh"),
                              ("GET", "/")):
             with self.subTest(path=path):

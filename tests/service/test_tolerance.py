@@ -241,6 +241,70 @@ class Tolerance(unittest.TestCase):
             self.assertEqual({a.status for a in answers}, {200})
             self.assertEqual(len({str(a.json()["radiosity"]) for a in answers}), 1)
 
+    def test_figures(self):
+        """reduce with a tolerance: figures of certified numbers. No figure but a sum and a variance is further off than the
+        numbers are; a sum is by as much as the area makes of it."""
+        for name in "low", "upper", "grey":
+            truth, E = self.truth[name], self.emission(name)
+            group = self.groups(self.stores[name])
+            body = {"emission": E.tolist() if len(E) > 1 else E[0].tolist(), "tolerance": 1e-7,
+                    "reduce": {"groups": ["floor", "lamp"], "with": ["mean", "sum", "min", "max", "variance"]}}
+            answer = self.ask(name, body).json()
+            B, certificate = self.dense(name, E)["radiosity"], answer["certificate"]
+            self.assertGreater(answer["iterations"], 0)
+            self.assertNotIn("error", answer)
+            for g in "floor", "lamp":
+                figures, a, values = answer["groups"][g], truth.area[group == g], B[:, group == g]
+                mean = values @ a / a.sum()
+                for figure, wanted, most in (("mean", mean, 1), ("sum", values @ a, a.sum()), ("min", values.min(axis=1), 1),
+                                             ("max", values.max(axis=1), 1)):
+                    off = np.abs(np.reshape(figures[figure], wanted.shape) - wanted).max()
+                    self.assertLessEqual(off, most * (certificate + SLACK * np.abs(wanted).max()), (name, g, figure))
+                variance = (values - mean[:, None]) ** 2 @ a / a.sum()
+                self.assertLess(np.abs(np.reshape(figures["variance"], variance.shape) - variance).max(), 1e-5 * variance.max())
+            batch = {"emissions": [body["emission"]] * 20, "tolerance": 1e-7, "reduce": body["reduce"]}
+            many = self.ask(name, batch).json()
+            self.assertEqual(many["certificate"], [certificate] * 20)
+            self.assertEqual(many["groups"]["floor"]["mean"], [answer["groups"]["floor"]["mean"]] * 20)
+
+    @staticmethod
+    def groups(path):
+        """[n] names."""
+        with h5py.File(path) as f:
+            names = [g.decode() if isinstance(g, bytes) else g for g in f["mesh/group_names"][()]]
+            return np.array([names[g] for g in f["mesh/group"][()]])
+
+    def test_variants(self):
+        """A variant is refined with the form factors of its base, under its own reflectances."""
+        path = self.folder / "relit.h5"
+        must("precompute", self.folder / "yard.obj", "-o", path, "--elements", 120, "--rays", 1024, "--probes", 0,
+             "--keep-form-factors", "--keep-factors", "--method", "low-rank", "--epsilon", .2, "--sky", "grid:4x3")
+        token = self.folder / "token"
+        token.write_text("s3cret")
+        headers = {"Authorization": "Bearer s3cret", "Content-Type": "application/json"}
+        with Daemon(f"{path}:relit", "--token-file", token, "--max-variants", 1) as daemon:
+            made = daemon.ask("PUT", "/v1/scenes/relit/reflectance",
+                              json.dumps({"variant": "dim", "groups": {"floor": [.1, .2, .3], "south": .9}}), headers)
+            self.assertEqual(made.status, 202, made)
+            while (answer := daemon.get("/v1/scenes/relit@dim", headers=headers)).status == 202:
+                pass
+            self.assertEqual(answer.status, 200, answer)
+            body = {"emission": {"groups": {"lamp": 5}}, "tolerance": 1e-7}
+            answer = daemon.radiosity("relit@dim", body, headers=headers).json()
+            base = daemon.radiosity("relit", body, headers=headers).json()
+        group, truth = self.groups(path), Truth(path)
+        E = np.broadcast_to(np.where(group == "lamp", 5.0, 0.0), (truth.C, truth.n))
+        for rho, given, certificate in ((truth.rho, base, base["certificate"]), (None, answer, answer["certificate"])):
+            if rho is None:
+                rho = truth.rho.copy()
+                rho[:, group == "floor"] = np.float32([[.1], [.2], [.3]])
+                rho[:, group == "south"] = np.float32(.9)
+            B = np.stack([np.linalg.solve(np.eye(truth.n) - r[:, None] * truth.F, e) for r, e in zip(rho, E)])
+            off = np.abs(np.array(given["radiosity"]) - B).max()
+            self.assertLessEqual(off, certificate + SLACK * B.max())
+            self.assertLess(certificate, 1e-6 * np.abs(B - E).max())
+        self.assertNotEqual(answer["radiosity"], base["radiosity"])
+
     # --- what is refused
 
     def refused(self, status, words, name, body, pointer="/tolerance"):

@@ -161,7 +161,8 @@ START_TEST(figures_are_sums_written_out) {
     static const float x[2][N] = {{3, 6, 8, 2, 1, -1, 5}, {0}};
     double *figures = reduce_figures(&r, 2, 1);
     ck_assert_ptr_nonnull(figures);
-    for (size_t v = 0; v < 2; v++) ck_assert(reduce_vectors(&r, &groups, area, 1, 2, v, 1, x[v], figures));
+    for (size_t v = 0; v < 2; v++)
+        ck_assert(reduce_vectors(&r, &groups, area, 1, 2, v, 1, (reduce_values){.floats = x[v]}, figures));
     /* a.y: (2 3 + 1 6) / 3 = 4; (2 1 + 1 4) / 3 = 2. a: (8 + 6 + 6 + 6 + 1) / 8 = 3.375; variance (64 + 18 +
      * 12 + 36 + 1) / 8 - 3.375^2 = 4.984375. b: only the first has an area, the least and the largest are of
      * both. */
