@@ -15,16 +15,19 @@ struct adjoint_rows {
     adjoint_row *first;
     uint64_t uses;
     size_t bytes, max_bytes;
+    memory_ledger *ledger;
     emitter_weights *told; /* once made, for good; NULL: not yet, or not worth it */
 };
 
 /* --- the list ------------------------------------------------------------------------------------------- */
 
-lam_status adjoint_rows_create(size_t max_bytes, adjoint_rows **out, lam_error *error) {
+lam_status adjoint_rows_create(size_t max_bytes, memory_ledger *ledger, adjoint_rows **out,
+                               lam_error *error) {
     adjoint_rows *rows = memory_allocate(1, sizeof *rows, "adjoint rows", error);
     if (rows == NULL) return LAM_ERR_MEMORY;
     pthread_mutex_init(&rows->lock, NULL);
     rows->max_bytes = max_bytes;
+    rows->ledger = ledger;
     *out = rows;
     return LAM_OK;
 }
@@ -44,9 +47,17 @@ void adjoint_rows_destroy(adjoint_rows *rows) {
         next = row->next;
         row_free(row);
     }
+    memory_ledger_give_back(rows->ledger, rows->bytes);
     emitter_weights_free(rows->told);
     pthread_mutex_destroy(&rows->lock);
     free(rows);
+}
+
+size_t adjoint_rows_held(adjoint_rows *rows) {
+    pthread_mutex_lock(&rows->lock);
+    const size_t held = rows->bytes;
+    pthread_mutex_unlock(&rows->lock);
+    return held;
 }
 
 /* The lock is held. Names that mean the same groups share a row. */
@@ -65,32 +76,43 @@ static void release_locked(adjoint_row *row) {
     if (row != NULL && --row->references == 0) row_free(row);
 }
 
-/* The lock is held: those unused for longest go, but for the newest, until the others are few enough. Who
- * still uses one frees it. */
+/* The lock is held, and there is a row: the one unused for longest goes. Who still uses it frees it. */
 static void evict_locked(adjoint_rows *rows) {
-    while (rows->bytes > rows->max_bytes && rows->first->next != NULL) {
-        adjoint_row **oldest = &rows->first->next;
-        for (adjoint_row **at = oldest; *at != NULL; at = &(*at)->next)
-            if ((*at)->used < (*oldest)->used) oldest = at;
-        adjoint_row *gone = *oldest;
-        *oldest = gone->next;
-        rows->bytes -= gone->bytes;
-        release_locked(gone);
-    }
+    adjoint_row **oldest = &rows->first;
+    for (adjoint_row **at = oldest; *at != NULL; at = &(*at)->next)
+        if ((*at)->used < (*oldest)->used) oldest = at;
+    adjoint_row *gone = *oldest;
+    *oldest = gone->next;
+    rows->bytes -= gone->bytes;
+    memory_ledger_give_back(rows->ledger, gone->bytes);
+    release_locked(gone);
 }
 
-/* Puts a new row into the list, which holds one reference, the caller another; or gives back the one that
- * somebody else made meanwhile. */
+/* The lock is held: whether there is room for a row, others going for it. The only one may be as large as it
+ * likes. */
+static bool make_room_locked(adjoint_rows *rows, size_t bytes) {
+    while (rows->first != NULL && rows->bytes + bytes > rows->max_bytes) evict_locked(rows);
+    while (!memory_ledger_take(rows->ledger, bytes)) {
+        if (rows->first == NULL) return false;
+        evict_locked(rows);
+    }
+    return true;
+}
+
+/* Puts a new row into the list, where there is room, which holds one reference, the caller another; or gives
+ * back the one that somebody else made meanwhile. */
 static adjoint_row *publish(adjoint_rows *rows, adjoint_row *made, const reduce_name *name) {
     pthread_mutex_lock(&rows->lock);
     adjoint_row *known = find_locked(rows, name, made->quantity);
     if (known == NULL) {
-        made->references = 2;
+        const bool kept = make_room_locked(rows, made->bytes);
+        made->references = kept ? 2 : 1;
         made->used = ++rows->uses;
-        made->next = rows->first;
-        rows->first = made;
-        rows->bytes += made->bytes;
-        evict_locked(rows);
+        if (kept) {
+            made->next = rows->first;
+            rows->first = made;
+            rows->bytes += made->bytes;
+        }
     }
     pthread_mutex_unlock(&rows->lock);
     if (known == NULL) return made;

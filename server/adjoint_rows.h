@@ -8,6 +8,7 @@
 #include "lambert/lambert.h"
 #include "server/batch.h"
 #include "server/codec_request.h"
+#include "server/memory_ledger.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -33,11 +34,14 @@ typedef struct adjoint_row {
     float *tiles;     /* [C][m], of a sky's radiances; NaN likewise */
 } adjoint_row;
 
-/* max_bytes: what all rows together may take. */
-lam_status adjoint_rows_create(size_t max_bytes, adjoint_rows **out, lam_error *error);
+/* max_bytes: what all rows together may take; and ledger, if any: a row it has no room for answers once. */
+lam_status adjoint_rows_create(size_t max_bytes, memory_ledger *ledger, adjoint_rows **out, lam_error *error);
 
 /* No row may be in use. NULL is allowed. */
 void adjoint_rows_destroy(adjoint_rows *rows);
+
+/* Bytes taken of the ledger. */
+size_t adjoint_rows_held(adjoint_rows *rows);
 
 /* Rows that a scene is willing to keep for one request. */
 size_t adjoint_rows_capacity(const scene *s);

@@ -13,6 +13,7 @@
 struct catalog {
     const config *config;
     FILE *out, *problems;
+    memory_ledger ledger;
     verifier *verifier;
     pthread_mutex_t lock;   /* of present */
     pthread_mutex_t stores; /* held while a store is open */
@@ -100,6 +101,8 @@ lam_status catalog_create(const config *c, FILE *out, FILE *problems, catalog **
     if (all == NULL || empty == NULL) TRY(LAM_ERR_MEMORY);
     atomic_init(&empty->references, 1);
     all->config = c;
+    atomic_init(&all->ledger.taken, 0);
+    atomic_init(&all->ledger.room, 0); /* until it is known what the stores leave */
     all->out = out;
     all->problems = problems;
     TRY(verifier_start(out, problems, &all->verifier, error));
@@ -186,13 +189,26 @@ static uint64_t memory_used(const catalog_snapshot *snapshot, size_t *work_bytes
     return used;
 }
 
-/* What another scene may count for. */
-static uint64_t memory_left(const catalog *all, const catalog_snapshot *next) {
+/* What they have come to hold since. */
+static uint64_t memory_grown(const catalog_snapshot *snapshot) {
+    uint64_t grown = 0;
+    for (size_t i = 0; i < snapshot->n_scenes; i++) grown += scene_grown(snapshot->scenes[i]);
+    return grown;
+}
+
+/* What --max-memory leaves beside the scenes, their work areas and this. */
+static uint64_t memory_left(const catalog *all, const catalog_snapshot *next, uint64_t and) {
     size_t work_bytes;
     const uint64_t used =
-        memory_used(next, &work_bytes) + scene_work_memory(all->config->threads, work_bytes);
+        memory_used(next, &work_bytes) + scene_work_memory(all->config->threads, work_bytes) + and;
     if (all->config->max_memory == 0) return UINT64_MAX;
     return all->config->max_memory > used ? all->config->max_memory - used : 0;
+}
+
+/* The rest is for what scenes come to hold. */
+static void share_memory(catalog *all, const catalog_snapshot *present) {
+    const uint64_t left = memory_left(all, present, 0);
+    atomic_store(&all->ledger.room, left < SIZE_MAX ? (size_t)left : SIZE_MAX);
 }
 
 /* Whether a scene that is open fits with its work areas too; they are shared with the others'. */
@@ -200,7 +216,7 @@ static lam_status check_work(const catalog *all, const catalog_snapshot *next, c
                              lam_error *error) {
     const size_t threads = all->config->threads;
     size_t work_bytes;
-    const uint64_t used = memory_used(next, &work_bytes);
+    const uint64_t used = memory_used(next, &work_bytes) + memory_grown(next);
     if (s->work_bytes > work_bytes) work_bytes = s->work_bytes;
     const uint64_t wanted = used + s->memory + scene_work_memory(threads, work_bytes);
     if (all->config->max_memory == 0 || wanted <= all->config->max_memory) return LAM_OK;
@@ -222,7 +238,8 @@ static lam_status open_source(catalog *all, const catalog_snapshot *next, const 
     const scene_wish wish = {.path = from->path,
                              .name = from->name,
                              .verify = verify,
-                             .memory = memory_left(all, next),
+                             .memory = memory_left(all, next, memory_grown(next)),
+                             .ledger = &all->ledger,
                              .before = old,
                              .threads = all->config->threads,
                              .stores = &all->stores};
@@ -318,11 +335,13 @@ lam_status catalog_put_variant(catalog *all, scene *variant, lam_error *error) {
     if (taken != NULL && taken->base == NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "the name %s is taken by a store", variant->name);
     TRY(copy_without(all->present, variant->name, &next, error));
+    TRY(check_work(all, next, variant, error));
     (void)insert(next, variant);
     variant = NULL;
     catalog_snapshot *old = all->present;
     all->present = next;
     next = old;
+    share_memory(all, all->present);
 done:
     pthread_mutex_unlock(&all->lock);
     catalog_release(next);
@@ -340,6 +359,7 @@ lam_status catalog_remove_variant(catalog *all, const char *name, lam_error *err
     catalog_snapshot *old = all->present;
     all->present = next;
     next = old;
+    share_memory(all, all->present);
 done:
     pthread_mutex_unlock(&all->lock);
     catalog_release(next);
@@ -353,6 +373,7 @@ size_t catalog_reload(catalog *all) {
     lam_error error = {0};
     lam_status status = LAM_OK;
     catalog_snapshot *before = catalog_acquire(all), *next = NULL;
+    if (all->config->max_memory > 0) atomic_store(&all->ledger.room, 0); /* nothing grows meanwhile */
     for (size_t i = 0; i < all->config->n_stores; i++)
         TRY(add_source(&sources, NULL, all->config->stores[i], true, &error));
     if (all->config->stores_dir != NULL) TRY(add_folder(&sources, all->config->stores_dir, &error));
@@ -381,6 +402,7 @@ done:
     fflush(all->out);
     fflush(all->problems);
     pthread_mutex_lock(&all->lock);
+    share_memory(all, all->present);
     size_t served = all->present->n_scenes;
     pthread_mutex_unlock(&all->lock);
     return served;

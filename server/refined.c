@@ -13,6 +13,9 @@ struct refined {
     pthread_mutex_t lock; /* of F and refiner */
     char *path;           /* NULL: no form factors are kept */
     char *checksum;       /* of the file that op was read from */
+    memory_ledger *ledger;
+    size_t bytes, most_bytes; /* that F takes, and on the way */
+    atomic_size_t held;       /* bytes, once F is there */
     lam_form_factors *F;
     lam_refiner *refiner; /* NULL until asked for */
 };
@@ -21,16 +24,18 @@ static lam_status read_checksum(store *s, char **checksum, lam_error *error) {
     return store_get_text(s, "/checksum", "xxh3", checksum, error);
 }
 
-lam_status refined_create(store *s, const lam_operator *op, pthread_mutex_t *stores, refined **out,
-                          lam_error *error) {
+lam_status refined_create(store *s, const lam_operator *op, pthread_mutex_t *stores, memory_ledger *ledger,
+                          refined **out, lam_error *error) {
     lam_status status = LAM_OK;
     refined *made = memory_allocate(1, sizeof *made, store_path(s), error);
     if (made == NULL) return LAM_ERR_MEMORY;
     made->op = op;
     made->stores = stores;
+    made->ledger = ledger;
     pthread_mutex_init(&made->lock, NULL);
     if (store_has(s, FORM_FACTORS_GROUP)) {
         TRY(read_checksum(s, &made->checksum, error));
+        TRY(form_factors_size(s, &made->bytes, &made->most_bytes, error));
         made->path = strdup(store_path(s));
         if (made->path == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", store_path(s));
     }
@@ -54,6 +59,7 @@ lam_status refined_create_variant(refined *base, const lam_operator *op, refined
 void refined_destroy(refined *r) {
     if (r == NULL) return;
     lam_refiner_free(r->refiner);
+    memory_ledger_give_back(r->ledger, atomic_load(&r->held));
     lam_form_factors_close(r->F);
     pthread_mutex_destroy(&r->lock);
     free(r->path);
@@ -81,11 +87,24 @@ done:
     return status;
 }
 
+/* The same within what --max-memory leaves. */
+static lam_status take_form_factors(refined *r, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (!memory_ledger_take(r->ledger, r->most_bytes))
+        return status_fail(error, LAM_ERR_MEMORY,
+                           "%s: its form factors take %zu bytes to read, more than --max-memory leaves",
+                           r->path, r->most_bytes);
+    status = read_form_factors(r, error);
+    if (status == LAM_OK) atomic_store(&r->held, r->bytes);
+    memory_ledger_give_back(r->ledger, r->most_bytes - atomic_load(&r->held));
+    return status;
+}
+
 /* *F is NULL where none are kept. */
 static lam_status get_form_factors(refined *r, const lam_form_factors **F, lam_error *error) {
     lam_status status = LAM_OK;
     pthread_mutex_lock(&r->lock);
-    if (r->F == NULL && r->path != NULL) TRY(read_form_factors(r, error));
+    if (r->F == NULL && r->path != NULL) TRY(take_form_factors(r, error));
     *F = r->F;
 done:
     pthread_mutex_unlock(&r->lock);
@@ -104,4 +123,8 @@ lam_status refined_get(refined *r, const lam_refiner **refiner, lam_error *error
     pthread_mutex_unlock(&r->lock);
 done:
     return status;
+}
+
+size_t refined_held(refined *r) {
+    return atomic_load(&r->held);
 }

@@ -98,8 +98,9 @@ static lam_status read_store(store *s, const scene_wish *wish, scene *made, lam_
     made->work_bytes = work_of(made);
     TRY(read_groups(s, made, error));
     TRY(read_area(s, made, error));
-    TRY(adjoint_rows_create(ADJOINT_ROWS_BYTES, &made->rows, error));
-    TRY(refined_create(s, made->op, wish->stores, &made->refined, error));
+    made->ledger = wish->ledger;
+    TRY(adjoint_rows_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
+    TRY(refined_create(s, made->op, wish->stores, made->ledger, &made->refined, error));
     read_error(s, made);
     TRY(scene_describe(s, made, &made->description, error));
     if (store_map_bytes(store_map_of(s)) > 0) made->map = store_map_hold(store_map_of(s));
@@ -174,7 +175,8 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
     made->name = strdup(name);
     if (made->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", name);
     made->memory = made->bytes;
-    TRY(adjoint_rows_create(ADJOINT_ROWS_BYTES, &made->rows, error));
+    made->ledger = base->ledger;
+    TRY(adjoint_rows_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
     TRY(refined_create_variant(base->refined, op, &made->refined, error));
     TRY(scene_describe_variant(made, groups, &made->description, error));
     *out = made;
@@ -182,6 +184,10 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
 done:
     if (made != NULL) scene_release(made);
     return status;
+}
+
+uint64_t scene_grown(const scene *s) {
+    return (uint64_t)refined_held(s->refined) + adjoint_rows_held(s->rows);
 }
 
 scene *scene_acquire(scene *s) {

@@ -39,9 +39,10 @@ struct scene {
     char *description; /* the JSON of GET /v1/scenes/NAME */
     bool has_error;    /* the store's total error, of its own lights or else of single elements */
     double relative_mean, indirect_mean;
-    adjoint_rows *rows; /* what reduces by a product; any thread */
-    refined *refined;   /* what refining its answers takes, found when it is first asked for */
-    store_map *map;     /* held; NULL: nothing is mapped */
+    memory_ledger *ledger; /* of what is held beyond memory; or NULL */
+    adjoint_rows *rows;    /* what reduces by a product; any thread */
+    refined *refined;      /* what refining its answers takes, found when it is first asked for */
+    store_map *map;        /* held; NULL: nothing is mapped */
     scene_health *health;
     scene *next_to_verify; /* verifier.c's */
 };
@@ -51,8 +52,9 @@ typedef struct scene_wish {
     const char *path, *name; /* name NULL: the store's own */
     bool verify;     /* compare everything in the file with its checksums first, also what is not read */
     uint64_t memory; /* what it may count for; UINT64_MAX: anything */
-    scene *before;   /* the scene of this path and name so far, or NULL */
-    size_t threads;  /* that one answer may use */
+    memory_ledger *ledger;   /* or NULL; outlives the scene */
+    scene *before;           /* the scene of this path and name so far, or NULL */
+    size_t threads;          /* that one answer may use */
     pthread_mutex_t *stores; /* outlives the scene: whoever opens a store holds it, the caller of this too */
 } scene_wish;
 
@@ -63,6 +65,9 @@ typedef struct scene_wish {
  * Errors: as store_open and operator_load; LAM_ERR_MEMORY names the sizes where it does not fit. Each names
  * the path. One thread at a time. */
 lam_status scene_open(const scene_wish *wish, scene **out, lam_error *error);
+
+/* What a scene has come to hold since it was opened, of its ledger. Any thread. */
+uint64_t scene_grown(const scene *s);
 
 /* What scenes of these work areas count for. */
 uint64_t scene_work_memory(size_t n_threads, size_t work_bytes);

@@ -175,6 +175,22 @@ done:
     return status;
 }
 
+lam_status form_factors_size(store *s, size_t *kept, size_t *most, lam_error *error) {
+    lam_status status = LAM_OK;
+    store_type type;
+    size_t rows_of[STORE_MAX_RANK] = {0}, entries[STORE_MAX_RANK] = {0};
+    int rank;
+    bool rows = true;
+    TRY(read_storage(s, &rows, error));
+    TRY(store_array_info(s, GROUP "/indptr", &type, &rank, rows_of, error));
+    TRY(store_array_info(s, GROUP "/data", &type, &rank, entries, error));
+    const size_t entry = sizeof(uint32_t) + sizeof(float), row = sizeof(uint64_t) + 3 * sizeof(double);
+    *kept = (rows ? 1 : 2) * entries[0] * entry + rows_of[0] * row;
+    *most = *kept + (rows ? 0 : entries[0] * entry + rows_of[0] * 2 * sizeof(uint64_t));
+done:
+    return status;
+}
+
 lam_status form_factors_open(store *s, lam_form_factors **out, lam_error *error) {
     lam_status status = LAM_OK;
     lam_form_factors *made = NULL;

@@ -36,4 +36,8 @@ lam_status form_factors_open(store *s, lam_form_factors **out, lam_error *error)
 /* Of rows that are there already (taken over, also on an error) and areas [n] (copied). */
 lam_status form_factors_of_rows(csr *F, const double *area, lam_form_factors **out, lam_error *error);
 
+/* Bytes that form_factors_open takes of a store that has them: for good, and at most on the way. Errors:
+ * those of store_get_text and store_array_info, LAM_ERR_UNSUPPORTED. */
+lam_status form_factors_size(store *s, size_t *kept, size_t *most, lam_error *error);
+
 #endif

@@ -274,6 +274,22 @@ class Tolerance(unittest.TestCase):
             names = [g.decode() if isinstance(g, bytes) else g for g in f["mesh/group_names"][()]]
             return np.array([names[g] for g in f["mesh/group"][()]])
 
+    def test_max_memory_counts_form_factors(self):
+        """Where it leaves no room for them, a plain answer is given and a certified one is not; with room both are."""
+        plain = {"emission": {"groups": {"lamp": 3}}}
+        held = self.daemon.get("/v1/scenes/upper").json()["bytes"]
+        with h5py.File(self.stores["upper"]) as f:
+            form_factors = 24 * len(f["form_factors/data"])
+        # The store, and room for work that is far less than the form factors take
+        for more, status in ((form_factors // 2, 503), (3 * form_factors, 200)):
+            with Daemon(f"{self.stores['upper']}:upper", "--threads", 1, "--max-memory", 2 * held + more) as daemon:
+                self.assertEqual(daemon.radiosity("upper", plain).status, 200)
+                answer = daemon.radiosity("upper", dict(plain, tolerance=1e-6))
+                self.assertEqual(answer.status, status, answer)
+                if status == 503:
+                    self.assertIn("--max-memory", answer.json()["detail"])
+                self.assertEqual(daemon.radiosity("upper", plain).status, 200)
+
     def test_variants(self):
         """A variant is refined with the form factors of its base, under its own reflectances."""
         path = self.folder / "relit.h5"

@@ -22,7 +22,11 @@ typedef struct fixture {
     scene s;
     float P[C][N][N]; /* M - I; where rho is 0 as if it were 1 */
     batch_workspace workspace;
+    memory_ledger ledger; /* shared with whatever else is served */
 } fixture;
+
+/* As row_bytes says. */
+static const size_t row_size = sizeof(adjoint_row) + C * (N_GROUPS * sizeof(double) + N * sizeof(float));
 
 static void setup(fixture *f, size_t rows) {
     memset(f, 0, sizeof *f);
@@ -47,14 +51,14 @@ static void setup(fixture *f, size_t rows) {
     f->s.area = malloc(sizeof area);
     ck_assert_ptr_nonnull(f->s.area);
     memcpy(f->s.area, area, sizeof area);
-    /* As row_bytes says. */
-    const size_t row = sizeof(adjoint_row) + C * (N_GROUPS * sizeof(double) + N * sizeof(float));
-    ck_assert_int_eq(adjoint_rows_create(rows * row, &f->s.rows, NULL), LAM_OK);
+    atomic_init(&f->ledger.room, SIZE_MAX);
+    ck_assert_int_eq(adjoint_rows_create(rows * row_size, &f->ledger, &f->s.rows, NULL), LAM_OK);
     ck_assert_uint_eq(adjoint_rows_capacity(&f->s), rows);
 }
 
 static void teardown(fixture *f) {
     adjoint_rows_destroy(f->s.rows);
+    ck_assert_uint_eq(atomic_load(&f->ledger.taken), 0);
     lam_operator_close(f->s.op);
     group_index_free(&f->s.groups);
     free(f->s.area);
@@ -170,6 +174,40 @@ START_TEST(the_oldest_row_goes) {
 }
 END_TEST
 
+/* What others take of the memory rows cannot have: fewer are kept, then none, and all answer. */
+START_TEST(a_ledger_without_room) {
+    fixture f;
+    setup(&f, 15);
+    adjoint_row *row, *again;
+    problem why = {0};
+    radiosity_request requests[4];
+    for (size_t g = 0; g < 4; g++) requests[g] = make_request(&f, g, LAM_RADIOSITY);
+    atomic_store(&f.ledger.room, 2 * row_size + 1);
+    for (size_t g = 0; g < 4; g++) {
+        ck_assert(adjoint_rows_get(&f.s, &requests[g], &f.workspace, &row, &why));
+        judge(&f, row, &requests[g], g);
+        adjoint_rows_release(&f.s, 1, &row);
+        ck_assert_uint_eq(atomic_load(&f.ledger.taken), (g < 1 ? 1 : 2) * row_size);
+        ck_assert_uint_eq(adjoint_rows_held(f.s.rows), atomic_load(&f.ledger.taken));
+    }
+    ck_assert(!adjoint_rows_find(&f.s, &requests[1], &again));
+    ck_assert(adjoint_rows_find(&f.s, &requests[3], &again));
+    adjoint_rows_release(&f.s, 1, &again);
+    atomic_store(&f.ledger.room, row_size - 1);
+    ck_assert(adjoint_rows_get(&f.s, &requests[0], &f.workspace, &row, &why));
+    judge(&f, row, &requests[0], 0);
+    adjoint_rows_release(&f.s, 1, &row);
+    ck_assert(!adjoint_rows_find(&f.s, &requests[0], &again));
+    ck_assert_uint_eq(atomic_load(&f.ledger.taken), 0);
+    atomic_store(&f.ledger.room, SIZE_MAX);
+    ck_assert(adjoint_rows_get(&f.s, &requests[0], &f.workspace, &row, &why));
+    adjoint_rows_release(&f.s, 1, &row);
+    ck_assert_uint_eq(atomic_load(&f.ledger.taken), row_size);
+    for (size_t g = 0; g < 4; g++) radiosity_request_free(&requests[g]);
+    teardown(&f);
+}
+END_TEST
+
 /* Whichever allocation fails: 503 and nothing lost; then, with memory, as if it had not been. */
 START_TEST(memory_runs_out) {
     fixture f;
@@ -248,6 +286,7 @@ int main(void) {
     tcase_set_timeout(tcase, 120);
     tcase_add_test(tcase, rows_answer_and_are_kept);
     tcase_add_test(tcase, the_oldest_row_goes);
+    tcase_add_test(tcase, a_ledger_without_room);
     tcase_add_test(tcase, memory_runs_out);
     tcase_add_test(tcase, many_threads_see_the_same);
     suite_add_tcase(suite, tcase);
