@@ -1,4 +1,5 @@
 /* `lambert`: finds the verb; the verbs are in cmd_*.c. */
+#include "solver/operator/core.h"
 #include "solver/verbs.h"
 
 #include <errno.h>
@@ -49,6 +50,7 @@ int main(int argc, char **argv) {
         fputs("lambert: no verb given; see lambert --help\n", stderr);
         return 2;
     }
+    core_keep_thread_limit();
     if (strcmp(argv[1], "--help") == 0) {
         print_help();
         return finish("--help", 0);

@@ -4,6 +4,7 @@
 #include <cblas.h>
 #include <lapacke.h>
 #include <math.h>
+#include <omp.h>
 #include <stdlib.h>
 
 /* Rows of U and V that are in double at a time. */
@@ -141,6 +142,10 @@ done:
 lam_status core_factored(size_t k, size_t n, const float *V, const float *U, const float *rho, float *core,
                          double *rcond, lam_error *error) {
     return core_make(&(core_factors){.n = n, .k = k, .U = U, .V = V, .rho = rho}, core, rcond, error);
+}
+
+void core_keep_thread_limit(void) {
+    if (openblas_get_num_threads() > omp_get_thread_limit()) openblas_set_num_threads(omp_get_thread_limit());
 }
 
 void core_use_one_thread(void) {

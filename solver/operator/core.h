@@ -35,6 +35,10 @@ lam_status core_make(const core_factors *in, float *core, double *rcond, lam_err
 lam_status core_factored(size_t k, size_t n, const float *V, const float *U, const float *rho, float *core,
                          double *rcond, lam_error *error);
 
+/* Once, before any linear algebra: OpenBLAS asks OpenMP for as many threads as there are cores and waits for
+ * ever where OMP_THREAD_LIMIT gives it fewer. */
+void core_keep_thread_limit(void);
+
 /* From now on cores are made by one thread, the caller's: for a program where they must leave the other cores
  * of the machine alone. Called by the thread that makes them, before it does. */
 void core_use_one_thread(void);
