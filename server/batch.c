@@ -18,6 +18,9 @@ struct batch_queue {
     size_t n_waiting;                    /* jobs */
     size_t n_jobs;                       /* from submit to finish */
     size_t max_jobs;
+    size_t n_brief;  /* threads that are at something brief, and then come back */
+    size_t n_idle;   /* threads that wait */
+    size_t n_called; /* of them: woken and not there yet */
     bool closed;
     const void **passing; /* [n_threads] keys of the passes that run */
     size_t n_passing;
@@ -40,6 +43,28 @@ static batch_job *list_take(job_list *list) {
     list->first = job->next;
     if (list->first == NULL) list->last = NULL;
     return job;
+}
+
+/* With the lock: somebody is to look at the lists, if nobody is about to; who is busy looks before it waits.
+ */
+static void call_one(batch_queue *queue) {
+    if (queue->n_called > 0 || queue->n_idle == 0) return;
+    queue->n_called++;
+    pthread_cond_signal(&queue->changed);
+}
+
+/* With the lock: before a thread turns to a job and after it. While one is at something brief nobody is woken
+ * for what comes: it would be there no sooner, and then stand in the way on a core that a pass could use. So
+ * who turns to something long leaves what waits to another. */
+static void turn_to(batch_queue *queue, const batch_job *job) {
+    if (job->brief)
+        queue->n_brief++;
+    else if (queue->arrived.first != NULL || queue->computed.first != NULL || queue->waiting.first != NULL)
+        call_one(queue);
+}
+
+static void turn_back(batch_queue *queue, bool brief) {
+    if (brief) queue->n_brief--;
 }
 
 static size_t left_of(const batch_job *job) {
@@ -95,34 +120,43 @@ static void sort_waiting(batch_queue *queue, const batch_part *parts, size_t n_p
 static void make_pass(batch_queue *queue, batch_job *like, batch_workspace *workspace) {
     batch_part parts[BATCH_PASS];
     const void *key = like->key;
+    const bool brief = like->brief;
     const size_t n_parts = choose_parts(like, parts);
     queue->passing[queue->n_passing++] = key;
+    turn_to(queue, like);
     pthread_mutex_unlock(&queue->lock);
     like->pass(parts, n_parts, workspace);
     pthread_mutex_lock(&queue->lock);
+    turn_back(queue, brief);
     size_t mine = 0;
     while (queue->passing[mine] != key) mine++;
     queue->passing[mine] = queue->passing[--queue->n_passing];
     sort_waiting(queue, parts, n_parts);
     /* This thread ends one of them itself: for a single client nobody need be woken. */
-    if (queue->computed.first != queue->computed.last || queue->waiting.first != NULL)
+    if (!brief && (queue->computed.first != queue->computed.last || queue->waiting.first != NULL))
         pthread_cond_broadcast(&queue->changed);
 }
 
 /* With the lock, which is given back meanwhile. */
 static void finish(batch_queue *queue, batch_job *job) {
+    const bool brief = job->brief;
     queue->n_jobs--;
+    turn_to(queue, job);
     if (queue->closed && queue->n_jobs == 0) pthread_cond_broadcast(&queue->changed);
     pthread_mutex_unlock(&queue->lock);
     job->finish(job);
     pthread_mutex_lock(&queue->lock);
+    turn_back(queue, brief);
 }
 
 /* With the lock, which is given back meanwhile. */
 static void begin(batch_queue *queue, batch_job *job, batch_workspace *workspace) {
+    const bool brief = job->brief;
+    turn_to(queue, job);
     pthread_mutex_unlock(&queue->lock);
     const bool waits = job->begin(job, workspace);
     pthread_mutex_lock(&queue->lock);
+    turn_back(queue, brief);
     if (!waits) {
         finish(queue, job);
         return;
@@ -134,9 +168,12 @@ static void begin(batch_queue *queue, batch_job *job, batch_workspace *workspace
 
 /* With the lock, which is given back meanwhile. */
 static void end(batch_queue *queue, batch_job *job, batch_workspace *workspace) {
+    const bool brief = job->brief;
+    turn_to(queue, job);
     pthread_mutex_unlock(&queue->lock);
     job->end(job, workspace);
     pthread_mutex_lock(&queue->lock);
+    turn_back(queue, brief);
     finish(queue, job);
 }
 
@@ -159,8 +196,12 @@ static void *serve(void *argument) {
             make_pass(queue, ready, &workspace);
         else if (queue->closed && queue->n_jobs == 0)
             break;
-        else
+        else {
+            queue->n_idle++;
             pthread_cond_wait(&queue->changed, &queue->lock);
+            queue->n_idle--;
+            if (queue->n_called > 0) queue->n_called--;
+        }
     }
     pthread_mutex_unlock(&queue->lock);
     free(workspace.bytes);
@@ -201,7 +242,7 @@ bool batch_submit(batch_queue *queue, batch_job *job) {
     if (taken) {
         list_add(&queue->arrived, job);
         queue->n_jobs++;
-        pthread_cond_signal(&queue->changed);
+        if (queue->n_brief == 0) call_one(queue);
     }
     pthread_mutex_unlock(&queue->lock);
     return taken;

@@ -38,6 +38,7 @@ struct batch_job {
     void (*finish)(batch_job *job);
     const void *key;
     size_t n_vectors;
+    bool brief;         /* set at submission: none of the four takes much longer than to wake a thread */
     size_t next_vector; /* the queue's */
     batch_job *next;    /* the queue's */
 };

@@ -168,6 +168,15 @@ static void end_solve(batch_job *job, batch_workspace *workspace) {
     made(r);
 }
 
+/* A pass over so much takes about a millisecond, a body so long next to nothing where nothing is parsed. */
+#define BRIEF_OPERATOR ((size_t)32 << 20)
+#define BRIEF_BODY ((size_t)256 << 10)
+
+static bool is_brief(const call *c) {
+    return c->body_type == MEDIA_NPY && c->accept.type == MEDIA_NPY && c->length <= BRIEF_BODY &&
+           c->scene != NULL && lam_operator_bytes(c->scene->op) <= BRIEF_OPERATOR;
+}
+
 static void finish_solve(batch_job *job) {
     request *r = request_of(job);
     r->answered = true;
@@ -188,7 +197,8 @@ static enum MHD_Result handle(request *r) {
             r->call.job = (batch_job){.begin = begin_solve,
                                       .pass = steps != NULL ? pass_solve : NULL,
                                       .end = end_solve,
-                                      .finish = finish_solve};
+                                      .finish = finish_solve,
+                                      .brief = is_brief(&r->call)};
             client_enter(r->http->service->connections, r->client, STAGE_SOLVE, 0);
             MHD_suspend_connection(r->connection);
             if (batch_submit(r->http->service->queue, &r->call.job)) return MHD_YES;

@@ -78,6 +78,15 @@ done:
     return status;
 }
 
+/* A thread is woken for its part of a pass in about the time that it takes to go through so much; with less
+ * to do it only holds up the others. */
+#define LEAST_OF_THREAD ((size_t)8 << 20)
+
+static size_t threads_of(const lam_operator *op, size_t most) {
+    const size_t worth = lam_operator_bytes(op) / LEAST_OF_THREAD;
+    return worth < 1 ? 1 : worth < most ? worth : most;
+}
+
 static lam_status read_store(store *s, const scene_wish *wish, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
     if (!store_has(s, "/operator"))
@@ -92,7 +101,7 @@ static lam_status read_store(store *s, const scene_wish *wish, scene *made, lam_
     made->n = lam_operator_elements(made->op);
     made->n_channels = lam_operator_channels(made->op);
     made->reflectance = made->op->reflectance;
-    lam_operator_set_threads(made->op, wish->threads);
+    lam_operator_set_threads(made->op, threads_of(made->op, wish->threads));
     TRY(sky_load(s, made->n, &made->sky, error));
     made->n_emitters = lam_operator_emitters(made->op);
     made->work_bytes = work_of(made);

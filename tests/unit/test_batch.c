@@ -254,12 +254,59 @@ static void *submit_quick(void *argument) {
     for (size_t k = 0; k < 200; k++) {
         stage *s = jobs[k].stage;
         jobs[k] = (job){.stage = s, .id = k, .wanted = 1 + k % 23, .key = k % 3 == 0 ? "one" : "two"};
-        jobs[k].job =
-            (batch_job){.begin = quick_begin, .pass = quick_pass, .end = job_end, .finish = job_finish};
+        jobs[k].job = (batch_job){.begin = quick_begin,
+                                  .pass = quick_pass,
+                                  .end = job_end,
+                                  .finish = job_finish,
+                                  .brief = k % 7 < 4};
         while (!batch_submit(s->queue, &jobs[k].job)) sched_yield();
     }
     return NULL;
 }
+
+static bool gated_begin(batch_job *b, batch_workspace *workspace) {
+    (void)workspace;
+    stage *s = job_of(b)->stage;
+    job_of(b)->begun++;
+    sem_post(&s->entered);
+    sem_wait(&s->gate);
+    return false;
+}
+
+static bool begin_that_lets_go(batch_job *b, batch_workspace *workspace) {
+    (void)workspace;
+    job_of(b)->begun++;
+    sem_post(&job_of(b)->stage->gate);
+    return false;
+}
+
+/* While somebody is at what is brief nobody is woken for what comes. Who turns from that to something long
+ * has another thread woken first: here the long one ends only once the last has begun. */
+START_TEST(what_waits_behind_a_long_one_is_handed_over) {
+    stage s;
+    job jobs[3];
+    stage_open(&s, 2, MOST_JOBS);
+    for (int round = 0; round < 200; round++) {
+        for (size_t k = 0; k < 3; k++) {
+            jobs[k] = (job){.stage = &s, .id = k};
+            jobs[k].job = (batch_job){.begin = k < 2 ? gated_begin : begin_that_lets_go,
+                                      .pass = job_pass,
+                                      .end = job_end,
+                                      .finish = job_finish,
+                                      .brief = k != 1};
+        }
+        ck_assert(batch_submit(s.queue, &jobs[0].job));
+        wait_for(&s.entered, 1);
+        ck_assert(batch_submit(s.queue, &jobs[1].job));
+        ck_assert(batch_submit(s.queue, &jobs[2].job));
+        let_go(&s, 1); /* the brief one */
+        wait_for(&s.finished, 3);
+        wait_for(&s.entered, 1);
+        for (size_t k = 0; k < 3; k++) ck_assert_uint_eq(jobs[k].begun, 1);
+    }
+    stage_close(&s);
+}
+END_TEST
 
 /* Many at once, from several threads: everybody gets all vectors, once. */
 START_TEST(everybody_is_served_once) {
@@ -294,6 +341,7 @@ int main(void) {
     tcase_add_test(tests, keys_have_passes_of_their_own);
     tcase_add_test(tests, who_wants_no_pass_waits_for_none);
     tcase_add_test(tests, places_are_counted);
+    tcase_add_test(tests, what_waits_behind_a_long_one_is_handed_over);
     tcase_add_test(tests, everybody_is_served_once);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
