@@ -15,10 +15,16 @@ struct refined {
     char *checksum;       /* of the file that op was read from */
     memory_ledger *ledger;
     size_t bytes, most_bytes; /* that F takes, and on the way */
-    atomic_size_t held;       /* bytes, once F is there */
+    atomic_size_t held;       /* of the ledger */
     lam_form_factors *F;
     lam_refiner *refiner; /* NULL until asked for */
+    size_t helper_bytes;  /* that it takes beside F, at most */
 };
+
+/* The operator again, in bytes, and their scales. */
+static size_t helper_bytes_of(const lam_operator *op) {
+    return lam_operator_bytes(op) / 3;
+}
 
 static lam_status read_checksum(store *s, char **checksum, lam_error *error) {
     return store_get_text(s, "/checksum", "xxh3", checksum, error);
@@ -32,6 +38,7 @@ lam_status refined_create(store *s, const lam_operator *op, pthread_mutex_t *sto
     made->op = op;
     made->stores = stores;
     made->ledger = ledger;
+    made->helper_bytes = helper_bytes_of(op);
     pthread_mutex_init(&made->lock, NULL);
     if (store_has(s, FORM_FACTORS_GROUP)) {
         TRY(read_checksum(s, &made->checksum, error));
@@ -51,6 +58,8 @@ lam_status refined_create_variant(refined *base, const lam_operator *op, refined
     if (made == NULL) return LAM_ERR_MEMORY;
     made->op = op;
     made->base = base;
+    made->ledger = base->ledger;
+    made->helper_bytes = helper_bytes_of(op);
     pthread_mutex_init(&made->lock, NULL);
     *out = made;
     return LAM_OK;
@@ -95,8 +104,8 @@ static lam_status take_form_factors(refined *r, lam_error *error) {
                            "%s: its form factors take %zu bytes to read, more than --max-memory leaves",
                            r->path, r->most_bytes);
     status = read_form_factors(r, error);
-    if (status == LAM_OK) atomic_store(&r->held, r->bytes);
-    memory_ledger_give_back(r->ledger, r->most_bytes - atomic_load(&r->held));
+    if (status == LAM_OK) atomic_fetch_add(&r->held, r->bytes);
+    memory_ledger_give_back(r->ledger, status == LAM_OK ? r->most_bytes - r->bytes : r->most_bytes);
     return status;
 }
 
@@ -111,6 +120,18 @@ done:
     return status;
 }
 
+static lam_status take_refiner(refined *r, const lam_form_factors *F, lam_error *error) {
+    if (!memory_ledger_take(r->ledger, r->helper_bytes))
+        return status_fail(error, LAM_ERR_MEMORY, "refining takes %zu bytes more than --max-memory leaves",
+                           r->helper_bytes);
+    const lam_status status = lam_refiner_create(r->op, F, &r->refiner, error);
+    if (status != LAM_OK)
+        memory_ledger_give_back(r->ledger, r->helper_bytes);
+    else
+        atomic_fetch_add(&r->held, r->helper_bytes);
+    return status;
+}
+
 lam_status refined_get(refined *r, const lam_refiner **refiner, lam_error *error) {
     lam_status status = LAM_OK;
     const lam_form_factors *F = NULL;
@@ -118,7 +139,7 @@ lam_status refined_get(refined *r, const lam_refiner **refiner, lam_error *error
     TRY(get_form_factors(r->base != NULL ? r->base : r, &F, error));
     if (F == NULL) return LAM_OK;
     pthread_mutex_lock(&r->lock);
-    if (r->refiner == NULL) status = lam_refiner_create(r->op, F, &r->refiner, error);
+    if (r->refiner == NULL) status = take_refiner(r, F, error);
     *refiner = r->refiner;
     pthread_mutex_unlock(&r->lock);
 done:

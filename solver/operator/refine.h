@@ -34,11 +34,17 @@ typedef struct refine_channel {
 
 struct lam_refiner {
     const lam_operator *op;
+    lam_operator *helper; /* op with its large arrays in bytes; NULL where op helps more */
     const lam_form_factors *F;
     double roundings; /* of a term of a product with F, plus one, times u */
     double row_most;  /* no row sum is more */
     refine_channel *channels;
 };
+
+/* The operator that steps are made with. */
+static inline const lam_operator *refiner_help(const lam_refiner *refiner) {
+    return refiner->helper != NULL ? refiner->helper : refiner->op;
+}
 
 /* Directions that a new one is made orthogonal to. */
 enum { REFINE_WINDOW = 6, REFINE_PASSES_MOST = 2000 };

@@ -65,6 +65,8 @@ lam_status refinement_create(const lam_refiner *refiner, size_t n_vectors, refin
                     .n_columns = m,
                     .help = op->kind->apply != NULL,
                     .work_bytes = lam_operator_work_bytes(op, n_vectors)};
+    const size_t helper_bytes = lam_operator_work_bytes(refiner_help(refiner), n_vectors);
+    if (helper_bytes > s.work_bytes) s.work_bytes = helper_bytes;
     double **const rows[] = {&s.lit, &s.P, &s.r, &s.z, &s.q};
     for (size_t k = 0; k < sizeof rows / sizeof *rows; k++)
         TRY(reserve(m, n * sizeof(double), rows[k], error));
@@ -171,7 +173,7 @@ static double to_range(size_t n, const double *x) {
 
 /* to = the operator's indirect light of `from` for the chosen columns. */
 static void ask_operator(refinement *s, const bool *chosen, const double *from, double *to) {
-    const lam_operator *op = s->refiner->op;
+    const lam_operator *op = refiner_help(s->refiner);
     const size_t n = op->n, C = op->n_channels;
     size_t n_asked = 0;
     for (size_t v = 0; v < s->n_vectors; v++) {

@@ -161,6 +161,44 @@ START_TEST(one_bright_wall_is_not_all_walls) {
 }
 END_TEST
 
+/* Iterations to 1e-6, of light all over. */
+static size_t iterations_of(const certified *s) {
+    const size_t n = s->op->n;
+    double *E = test_allocate(n, sizeof *E), *out = test_allocate(n, sizeof *out), certificate;
+    size_t iterations = 0;
+    for (size_t i = 0; i < n; i++) E[i] = (double)(i % 7);
+    ck_ok(lam_refine(s->refiner, 1, LAM_RADIOSITY, E, NULL, NULL, 1e-6, out, &certificate, &iterations,
+                     &error));
+    free(E);
+    free(out);
+    return iterations;
+}
+
+/* An operator in bytes helps where its own error is far more than what bytes round. */
+START_TEST(bytes_help_what_is_coarse) {
+    static const struct {
+        const char *method;
+        double epsilon;
+        bool helps;
+    } cases[] = {
+        {"low-rank", .2, true}, {"low-rank", .3, true}, {"low-rank", 1e-4, false}, {"exact", .2, false}};
+    stability_problem p;
+    ck_ok(stability_make(STABILITY_ROOM, .6, &p, &error));
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        certified s = subject(cases[k].method, cases[k].method, cases[k].epsilon, 1, &p.F, p.area,
+                              p.reflectance, p.order);
+        ck_assert_msg((s.refiner->helper != NULL) == cases[k].helps, "%s, epsilon %g", cases[k].method,
+                      cases[k].epsilon);
+        const size_t with = iterations_of(&s);
+        lam_operator_close(s.refiner->helper);
+        s.refiner->helper = NULL;
+        ck_assert_uint_le(with, iterations_of(&s) + 1);
+        certified_free(&s);
+    }
+    stability_free(&p);
+}
+END_TEST
+
 /* The bound is of the very F: where rows sum to more than rho allows nothing can be certified. */
 START_TEST(what_gains_light_is_refused) {
     uint64_t indptr[] = {0, 1, 2};
@@ -293,6 +331,7 @@ int main(void) {
     tcase_add_loop_test(tests, hard_problems, 0, 3 * STABILITY_PROBLEMS);
     tcase_add_loop_test(tests, scenes, 0, SCENES);
     tcase_add_test(tests, one_bright_wall_is_not_all_walls);
+    tcase_add_test(tests, bytes_help_what_is_coarse);
     tcase_add_test(tests, what_gains_light_is_refused);
     tcase_add_test(tests, emitters_start_from_their_light);
     tcase_add_test(tests, both_storages);
