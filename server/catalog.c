@@ -197,10 +197,10 @@ static uint64_t memory_grown(const catalog_snapshot *snapshot) {
 }
 
 /* What --max-memory leaves beside the scenes, their work areas and this. */
-static uint64_t memory_left(const catalog *all, const catalog_snapshot *next, uint64_t and) {
+static uint64_t memory_left(const catalog *all, const catalog_snapshot *next, uint64_t grown) {
     size_t work_bytes;
     const uint64_t used =
-        memory_used(next, &work_bytes) + scene_work_memory(all->config->threads, work_bytes) + and;
+        memory_used(next, &work_bytes) + scene_work_memory(all->config->threads, work_bytes) + grown;
     if (all->config->max_memory == 0) return UINT64_MAX;
     return all->config->max_memory > used ? all->config->max_memory - used : 0;
 }
@@ -397,8 +397,9 @@ done:
     catalog_release(next);
     catalog_release(before);
     free_sources(&sources);
-    (void)malloc_trim(
-        0); /* what the old stores held goes back to the system, which no daemon of months may keep */
+    /* What the old stores held goes back to the system: a daemon of months may not keep the most it ever had.
+     */
+    (void)malloc_trim(0);
     fflush(all->out);
     fflush(all->problems);
     pthread_mutex_lock(&all->lock);

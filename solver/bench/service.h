@@ -88,10 +88,12 @@ typedef struct service_servers {
 /* lambertd with b->folder/store.h5 as scene "bench". */
 lam_status service_start_lambertd(const service_bench *b, service_servers *s, lam_error *error);
 
-/* The others, which serve b->folder/answers/NPY and JSON: a sleeping server, where sleep is in seconds and so
- * many sleep at once, and all that do not sleep. What is not installed is no error. */
-lam_status service_start_sleeping(const service_bench *b, service_servers *s, service_server which,
-                                  double sleep, int sleepers, lam_error *error);
+/* A ready server, which serves b->folder/answers/NPY and JSON: at once, or after so many seconds of sleep, in
+ * which so many requests are at once; the others wait. Where it is not there that is no error. */
+lam_status service_start_ready(const service_bench *b, service_servers *s, service_server which, double sleep,
+                               int sleepers, lam_error *error);
+
+/* The one that never sleeps, and nginx. */
 lam_status service_start_others(const service_bench *b, service_servers *s, lam_error *error);
 void service_stop(service_servers *s);
 

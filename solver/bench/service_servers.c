@@ -44,8 +44,8 @@ done:
     return status;
 }
 
-static lam_status start_ready(const service_bench *b, service_servers *s, service_server which, double sleep,
-                              int sleepers, lam_error *error) {
+lam_status service_start_ready(const service_bench *b, service_servers *s, service_server which, double sleep,
+                               int sleepers, lam_error *error) {
     lam_status status = LAM_OK;
     char path[PATH_MAX], microseconds[24], at_once[16];
     child *c = &s->processes[which];
@@ -148,14 +148,9 @@ done:
     return status;
 }
 
-lam_status service_start_sleeping(const service_bench *b, service_servers *s, service_server which,
-                                  double sleep, int sleepers, lam_error *error) {
-    return start_ready(b, s, which, sleep, sleepers, error);
-}
-
 lam_status service_start_others(const service_bench *b, service_servers *s, lam_error *error) {
     lam_status status = LAM_OK;
-    TRY(start_ready(b, s, SERVICE_READY, 0, 0, error));
+    TRY(service_start_ready(b, s, SERVICE_READY, 0, 0, error));
     TRY(start_nginx(b, s, error));
 done:
     return status;

@@ -227,7 +227,7 @@ done:
 static lam_status start_sleeping(subject *s, int sleepers, lam_error *error) {
     lam_status status = LAM_OK;
     double lambertd = 1, sleeping = 1;
-    TRY(service_start_sleeping(s->b, &s->servers, SERVICE_SLEEPING, s->solve, sleepers, error));
+    TRY(service_start_ready(s->b, &s->servers, SERVICE_SLEEPING, s->solve, sleepers, error));
     if (s->b->wrk[0] != '\0' && s->servers.absent[SERVICE_SLEEPING] == NULL) {
         TRY(try_out(s, SERVICE_LAMBERTD, &lambertd, error));
         TRY(try_out(s, SERVICE_SLEEPING, &sleeping, error));
@@ -236,7 +236,7 @@ static lam_status start_sleeping(subject *s, int sleepers, lam_error *error) {
     sleepers = (int)fmax(1, fmin(as_many, service_clients[MANY]));
     bench_say(s->b->run, "n = %zu: with %d asleep at once it gives about as many answers as lambertd",
               s->size->n, sleepers);
-    TRY(service_start_sleeping(s->b, &s->servers, SERVICE_AS_MANY, s->solve, sleepers, error));
+    TRY(service_start_ready(s->b, &s->servers, SERVICE_AS_MANY, s->solve, sleepers, error));
 done:
     return status;
 }
