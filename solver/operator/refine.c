@@ -3,6 +3,7 @@
 
 #include "solver/operator/csr_doubles.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -66,9 +67,13 @@ static void prepare_judging(const lam_refiner *refiner, refine_channel *channel)
 
 /* --- what helps ---------------------------------------------------------------------------------------- */
 
-/* An operator in bytes is read in a quarter of the time. It helps as well where what its start leaves is less
- * than this times what op's leaves: where op is much better than its values are in bytes, it is not. */
-static const double as_well = 1.1;
+/* An operator in bytes is read in a quarter of the time, and leaves more. What a digit costs: bytes of a
+ * step, F and operator, over the digits that it gains; of one that gains none, more than anything. */
+static double cost_of_digit(const refinement *s, double left) {
+    const lam_refiner *refiner = s->refiner;
+    const size_t bytes = lam_form_factors_bytes(refiner->F) + lam_operator_bytes(refiner_help(refiner));
+    return left < 1 ? (double)bytes / -log10(fmax(left, DBL_EPSILON)) : INFINITY;
+}
 
 /* |r| / |P| of the start that the refiner's operator gives, of the worst channel. */
 static double left_by_start(refinement *s) {
@@ -115,9 +120,9 @@ static lam_status find_helper(lam_refiner *refiner, lam_error *error) {
     refiner->helper = helper;
     TRY(refinement_create(refiner, 1, &s, error));
     write_probe(s.n_columns * op->n, s.lit);
-    const double by_helper = left_by_start(&s);
+    const double by_helper = cost_of_digit(&s, left_by_start(&s));
     refiner->helper = NULL;
-    if (by_helper <= as_well * left_by_start(&s)) {
+    if (by_helper < cost_of_digit(&s, left_by_start(&s))) {
         refiner->helper = helper;
         helper = NULL;
     }
