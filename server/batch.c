@@ -53,20 +53,6 @@ static void call_one(batch_queue *queue) {
     pthread_cond_signal(&queue->changed);
 }
 
-/* With the lock: before a thread turns to a job and after it. While one is at something brief nobody is woken
- * for what comes: it would be there no sooner, and then stand in the way on a core that a pass could use. So
- * who turns to something long leaves what waits to another. */
-static void turn_to(batch_queue *queue, const batch_job *job) {
-    if (job->brief)
-        queue->n_brief++;
-    else if (queue->arrived.first != NULL || queue->computed.first != NULL || queue->waiting.first != NULL)
-        call_one(queue);
-}
-
-static void turn_back(batch_queue *queue, bool brief) {
-    if (brief) queue->n_brief--;
-}
-
 static size_t left_of(const batch_job *job) {
     return job->n_vectors - job->next_vector;
 }
@@ -82,6 +68,20 @@ static batch_job *find_ready(const batch_queue *queue) {
     batch_job *job = queue->waiting.first;
     while (job != NULL && is_passing(queue, job->key)) job = job->next;
     return job;
+}
+
+/* With the lock: before a thread turns to a job and after it. While one is at something brief nobody is woken
+ * for what comes: it would be there no sooner, and then stand in the way on a core that a pass could use. So
+ * who turns to something long leaves what waits to another. */
+static void turn_to(batch_queue *queue, const batch_job *job) {
+    if (job->brief)
+        queue->n_brief++;
+    else if (queue->arrived.first != NULL || queue->computed.first != NULL || find_ready(queue) != NULL)
+        call_one(queue);
+}
+
+static void turn_back(batch_queue *queue, bool brief) {
+    if (brief) queue->n_brief--;
 }
 
 /* The vectors of the next pass: of this job and of all like it, first one of each, so that a long request
