@@ -55,14 +55,21 @@ static void bound_by_light(const refinement *s, size_t c, refine_channel *channe
     for (size_t i = 0; i < n; i++) channel->v[i] = (1 - r[i] - error) * (1 - 4 * REFINE_U);
 }
 
+static int by_falling_mean(const void *left, const void *right) {
+    const refine_row *a = left, *b = right;
+    if (a->mean != b->mean) return a->mean < b->mean ? 1 : -1;
+    return a->element < b->element ? -1 : 1;
+}
+
 static void prepare_judging(const lam_refiner *refiner, refine_channel *channel) {
     const lam_form_factors *F = refiner->F;
     channel->peak = 0;
     for (size_t i = 0; i < refiner->op->n; i++) {
         const double rho = (double)channel->rho[i];
         channel->peak = fmax(channel->peak, rho * F->row_sums[i] / channel->v[i]);
-        channel->mean[i] = rho * F->row_norms[i] / channel->v[i];
+        channel->rows[i] = (refine_row){rho * F->row_norms[i] / channel->v[i], (uint32_t)i};
     }
+    qsort(channel->rows, refiner->op->n, sizeof *channel->rows, by_falling_mean);
 }
 
 /* --- what helps ---------------------------------------------------------------------------------------- */
@@ -144,8 +151,8 @@ static lam_status bound_inverse(lam_refiner *refiner, lam_error *error) {
         channel->rho = refiner->op->reflectance + c * n;
         channel->v = memory_allocate(n, sizeof *channel->v, "refining", error);
         channel->scale = memory_allocate(n, sizeof *channel->scale, "refining", error);
-        channel->mean = memory_allocate(n, sizeof *channel->mean, "refining", error);
-        if (channel->v == NULL || channel->scale == NULL || channel->mean == NULL) TRY(LAM_ERR_MEMORY);
+        channel->rows = memory_allocate(n, sizeof *channel->rows, "refining", error);
+        if (channel->v == NULL || channel->scale == NULL || channel->rows == NULL) TRY(LAM_ERR_MEMORY);
         for (size_t i = 0; i < n; i++)
             channel->scale[i] = channel->rho[i] > 0 ? refiner->F->area[i] / (double)channel->rho[i] : 0;
         TRY(bound_by_rows(refiner, c, channel, error));
@@ -198,7 +205,7 @@ void lam_refiner_free(lam_refiner *refiner) {
     for (size_t c = 0; refiner->channels != NULL && c < refiner->op->n_channels; c++) {
         free(refiner->channels[c].v);
         free(refiner->channels[c].scale);
-        free(refiner->channels[c].mean);
+        free(refiner->channels[c].rows);
     }
     free(refiner->channels);
     lam_operator_close(refiner->helper);

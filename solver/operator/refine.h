@@ -9,8 +9,9 @@
  * With r = A (P - P~), the answer is not P~ but P~ + r, which r pays for: what it lacks is A^-1 R F r. F
  * averages, so that of an r whose peaks are few little is left:
  *     (F |r|)_i <= min(s_i |r|_max, k_i |r|_A),   |r|_A^2 = sum A_j r_j^2,   k_i^2 = sum_j F_ij^2 / A_j
- * by Cauchy and Schwarz, and b_i = rho_i times that. What rounding may have changed in r is bounded beside
- * it.
+ * by Cauchy and Schwarz, and b_i = rho_i times that. k is large for few elements, those whose row of F is
+ * held by few others (where walls meet): where those alone are in the way, F r is computed for them, and b_i
+ * is what it is. What rounding may have changed in r is bounded beside it.
  */
 #ifndef LAMBERT_OPERATOR_REFINE_H
 #define LAMBERT_OPERATOR_REFINE_H
@@ -21,12 +22,18 @@
 /* The unit roundoff of double. */
 #define REFINE_U 0x1p-53
 
+/* An element and its rho k / v. */
+typedef struct refine_row {
+    double mean;
+    uint32_t element;
+} refine_row;
+
 /* What one channel of an operator needs. */
 typedef struct refine_channel {
     const float *rho; /* [n] */
     double *scale;    /* [n], A/rho, 0 where rho is: in this inner product R F is its own transpose */
     double *v;        /* [n], a lower bound on A w */
-    double *mean;     /* [n], rho k / v */
+    refine_row *rows; /* [n], those with the largest mean first */
     double peak;      /* the largest rho s / v */
     double w_most;    /* the largest w */
     double v_least;
@@ -99,6 +106,25 @@ void refinement_start(refinement *s);
 
 /* From lit (largest value of a column from 1/2 to 1, or all 0) and P: until every column is done or stuck. */
 void refinement_solve(refinement *s);
+
+/* Is the column done, or can it not be? Sets its r, P, bound, done and stuck. True where r should be found
+ * anew. */
+bool refinement_judge(refinement *s, size_t column);
+
+/* A bound on |A^-1 R F r|_max for an r of this maximum norm, no sharper than it takes to be `allowed`. At
+ * most an eighth of a product with F. */
+double refine_left(const lam_refiner *refiner, const refine_channel *channel, const double *r, double r_most,
+                   double allowed);
+
+/* max |x_i| */
+static inline double refine_most(size_t n, const double *x) {
+    double largest = 0;
+    for (size_t i = 0; i < n; i++) {
+        const double magnitude = x[i] < 0 ? -x[i] : x[i];
+        largest = magnitude > largest ? magnitude : largest;
+    }
+    return largest;
+}
 
 /* What rounding makes of lit + P + r, or of P + r. */
 double refinement_sum_rounding(const refinement *s, size_t column);

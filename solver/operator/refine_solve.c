@@ -12,15 +12,8 @@
 
 enum { ROWS_AT_ONCE = 64 };
 
-/* w = E' + P with |r| below this is as good as A^-1 1: the certificate is at most 1.05 times as wide. */
-static const double weights_good = .02;
-enum { WEIGHTS_PASSES_MOST = 300 };
-
 /* A direction that leaves more than this of |r|^2 is followed by r itself, along which |r| always falls. */
 static const double poor = .81;
-
-/* Bounds are taken this much wider, for their own rounding: it grows with n at most, 2^32 2^-53. */
-#define BOUND_MARGIN 1.000001
 
 /* --- memory -------------------------------------------------------------------------------------------- */
 
@@ -96,15 +89,6 @@ done:
 
 /* --- vectors ------------------------------------------------------------------------------------------- */
 
-static double most(size_t n, const double *x) {
-    double largest = 0;
-    for (size_t i = 0; i < n; i++) {
-        const double magnitude = fabs(x[i]);
-        largest = magnitude > largest ? magnitude : largest;
-    }
-    return largest;
-}
-
 /* sum_i scale_i x_i y_i */
 static double dot(size_t n, const double *scale, const double *x, const double *y) {
     double sum = 0;
@@ -167,7 +151,7 @@ static bool any_of(const bool *chosen, size_t count) {
 /* The power of two that brings x into the range of single precision. */
 static double to_range(size_t n, const double *x) {
     int exponent = 0;
-    (void)frexp(most(n, x), &exponent);
+    (void)frexp(refine_most(n, x), &exponent);
     return ldexp(1, exponent < -1000 ? 1000 : -exponent);
 }
 
@@ -211,67 +195,6 @@ void refinement_start(refinement *s) {
 
 /* --- one column ---------------------------------------------------------------------------------------- */
 
-double refinement_sum_rounding(const refinement *s, size_t column) {
-    /* fl(P + r) is within u of itself, fl(E + fl(rho H0)) within 2u of E', which is at most 1, and fl(E' + P)
-     * within u of itself; E' + 0 is E'. */
-    const double P = s->columns[column].P;
-    return REFINE_U *
-           (P + (s->count_sum ? (s->columns[column].lit_rounded ? 2 : 0) + (P > 0 ? 1 + P : 0) : 0));
-}
-
-/* (sum A x^2)^1/2 of an x of this maximum norm; squares of what is tiny would vanish. */
-static double area_norm(size_t n, const double *area, const double *x, double largest) {
-    if (!(largest > 0)) return 0;
-    const double scale = 1 / largest;
-    double sum = 0;
-    if (!isfinite(scale)) return INFINITY;
-#pragma omp simd reduction(+ : sum)
-    for (size_t i = 0; i < n; i++) sum += area[i] * (scale * x[i]) * (scale * x[i]);
-    return largest * sqrt(sum);
-}
-
-/* Is the column done, or can it not be? True where r should be found anew. */
-static bool judge(refinement *s, size_t c) {
-    refine_column *col = &s->columns[c];
-    const refine_channel *channel = col->channel;
-    const size_t n = s->refiner->op->n;
-    const double *r = s->r + c * n;
-    col->r = most(n, r);
-    if (s->weights) {
-        col->done = col->r + col->error <= weights_good;
-        col->stuck = !col->done && col->passes >= WEIGHTS_PASSES_MOST;
-        return false;
-    }
-    const double *P = s->P + c * n, *mean = channel->mean;
-    const double norm = area_norm(n, s->refiner->F->area, r, col->r), peak = channel->peak * col->r;
-    double largest = 0, answer = 0;
-    for (size_t i = 0; i < n; i++) {
-        const double x = mean[i] * norm < peak ? mean[i] * norm : peak, sum = P[i] + r[i];
-        largest = x > largest ? x : largest;
-        answer = sum > answer ? sum : answer;
-    }
-    col->P = answer;
-    /* A little more than 1, for what rounds the bound itself. */
-    const double left = BOUND_MARGIN * channel->w_most * largest,
-                 rounded = BOUND_MARGIN * channel->w_most * col->error / channel->v_least;
-    const double sum = refinement_sum_rounding(s, c);
-    col->bound = left + rounded + sum;
-    /* The client's B~ - E' may be less than P by what rounding made of B~. */
-    col->done = col->bound <= s->tolerance * (answer - sum) || (answer == 0 && left + rounded == 0);
-    if (col->done) return false;
-    if (col->passes >= REFINE_PASSES_MOST) col->stuck = true;
-    if (left > rounded) return false;
-    /* Only rounding is left: less of it where r is found anew, unless that was so the last time. Where there
-     * is far less light than P began with, none if E' is not seen, that is what the rounding is of. */
-    if (!col->from_dark && answer < 1e-6 * col->P_first) {
-        col->from_dark = true;
-        memset(s->P + c * n, 0, n * sizeof *P);
-    } else {
-        col->stuck = !(col->bound <= .5 * col->at_restart);
-    }
-    return !col->stuck;
-}
-
 /* r = R F (E' + P) - P from F (E' + P), and what rounding made of it. */
 static void restart(refinement *s, size_t c, const double *h) {
     refine_column *col = &s->columns[c];
@@ -287,7 +210,7 @@ static void restart(refinement *s, size_t c, const double *h) {
         const double all = (double)rho[i] * (fabs(h[i]) - 2 * col->least * refiner->row_most);
         largest = all > largest ? all : largest;
     }
-    col->error = refiner->roundings * largest + 2 * REFINE_U * most(n, r);
+    col->error = refiner->roundings * largest + 2 * REFINE_U * refine_most(n, r);
     col->n_kept = 0;
 }
 
@@ -308,7 +231,7 @@ static void find_residuals(refinement *s, bool *chosen) {
         if (!chosen[c]) continue;
         restart(s, c, s->q + c * n);
         s->columns[c].at_restart = INFINITY;
-        (void)judge(s, c);
+        (void)refinement_judge(s, c);
         s->columns[c].at_restart = s->columns[c].bound;
         /* Nothing but rounding was left of a fresh r. */
         chosen[c] = false;
@@ -322,7 +245,7 @@ static void step(refinement *s, size_t c) {
     const size_t n = s->refiner->op->n, m = s->n_columns;
     double *z = s->z + c * n, *q = s->q + c * n, *r = s->r + c * n;
     for (size_t i = 0; i < n; i++) q[i] = z[i] - (double)channel->rho[i] * q[i];
-    double z_most = most(n, z), q_most = most(n, q);
+    double z_most = refine_most(n, z), q_most = refine_most(n, q);
     double error = s->refiner->roundings * s->refiner->row_most * z_most + REFINE_U * q_most;
 
     const size_t n_kept = col->n_kept < REFINE_WINDOW ? col->n_kept : REFINE_WINDOW;
@@ -344,8 +267,8 @@ static void step(refinement *s, size_t c) {
         return;
     }
     const double alpha = along / norm;
-    z_most = most(n, z);
-    q_most = most(n, q);
+    z_most = refine_most(n, z);
+    q_most = refine_most(n, q);
     add(n, alpha, z, s->P + c * n);
     add(n, -alpha, q, r);
     col->error += fabs(alpha) * error + 2 * REFINE_U * (col->r + fabs(alpha) * q_most) +
@@ -404,7 +327,7 @@ void refinement_solve(refinement *s) {
         for (size_t c = 0; c < m; c++) {
             if (!active[c]) continue;
             step(s, c);
-            if (!s->columns[c].stuck) again[c] = judge(s, c);
+            if (!s->columns[c].stuck) again[c] = refinement_judge(s, c);
         }
         if (any_of(again, m)) find_residuals(s, again);
     }

@@ -81,16 +81,11 @@ static double dot(const subject *s, const double *x, const double *y) {
 
 /* The same certificate as that of lam_refine, of P + r; rounding apart. */
 static bool certified(const subject *s, const double *r, const double *P) {
-    const refine_channel *channel = &s->refiner->channels[0];
-    double peak = 0, norm = 0, left = 0, most = 0;
-    for (size_t i = 0; i < s->n; i++) {
-        peak = fmax(peak, fabs(r[i]));
-        norm += s->F->area[i] * r[i] * r[i];
-        most = fmax(most, fabs(P[i] + r[i]));
-    }
-    for (size_t i = 0; i < s->n; i++)
-        left = fmax(left, fmin(channel->peak * peak, channel->mean[i] * sqrt(norm)));
-    return channel->w_most * left <= s->tolerance * most || s->times >= MOST_TIMES;
+    double most = 0;
+    for (size_t i = 0; i < s->n; i++) most = fmax(most, fabs(P[i] + r[i]));
+    const double allowed = s->tolerance * most;
+    return s->times >= MOST_TIMES ||
+           refine_left(s->refiner, &s->refiner->channels[0], r, refine_most(s->n, r), allowed) <= allowed;
 }
 
 static void add(const subject *s, double a, const double *x, double *y) {

@@ -161,6 +161,53 @@ START_TEST(one_bright_wall_is_not_all_walls) {
 }
 END_TEST
 
+/* Where a bound asks for less than averaging alone says, rows are multiplied for it, and A^-1 R F r stays
+ * within it; where it does not, or they would be too many, it is the averaging's. */
+START_TEST(rows_in_the_way_are_multiplied) {
+    view v = make_view(CORNELL);
+    certified s = subject(v.name, "low-rank", .1, v.m.n_channels, &v.f.F, v.m.area, v.m.reflectance, v.order);
+    const size_t n = s.op->n;
+    const csr *F = &s.F->F;
+    double *r = test_allocate(n, sizeof *r), *b = test_allocate(n, sizeof *b),
+           *lacks = test_allocate(n, sizeof *lacks);
+    uint64_t seed = 5;
+    size_t sharper = 0;
+    for (size_t k = 0; k < 8; k++)
+        for (size_t c = 0; c < s.op->n_channels; c++) {
+            const refine_channel *channel = &s.refiner->channels[c];
+            double norm = 0, true_most = 0;
+            for (size_t i = 0; i < n; i++) {
+                r[i] = k == 0 ? (i == n / 3 ? -1 : 0) : random_unit(&seed) - .5;
+                norm += s.F->area[i] * r[i] * r[i];
+            }
+            for (size_t i = 0; i < n; i++) {
+                double sum = 0;
+                for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++)
+                    sum += (double)F->data[p] * r[F->indices[p]];
+                b[i] = (double)channel->rho[i] * sum;
+                lacks[i] = 0;
+            }
+            ck_ok(reference_solve(s.truth[c], 1, b, lacks, 1e-12, NULL, &error));
+            for (size_t i = 0; i < n; i++) true_most = fmax(true_most, fabs(lacks[i]));
+            const double plain = refine_left(s.refiner, channel, r, refine_most(n, r), INFINITY);
+            ck_assert_double_le(true_most, plain * (1 + 1e-9));
+            for (double share = .9; share > .05; share -= .1) {
+                const double left = refine_left(s.refiner, channel, r, refine_most(n, r), share * plain);
+                ck_assert_double_le(true_most, left * (1 + 1e-9));
+                ck_assert_double_le(left, plain);
+                sharper += left <= share * plain;
+            }
+            ck_assert(refine_left(s.refiner, channel, r, refine_most(n, r), 0) == plain);
+        }
+    ck_assert_uint_gt(sharper, 0);
+    free(r);
+    free(b);
+    free(lacks);
+    certified_free(&s);
+    view_free(&v);
+}
+END_TEST
+
 /* Iterations to 1e-6, of light all over. */
 static size_t iterations_of(const certified *s) {
     const size_t n = s->op->n;
@@ -331,6 +378,7 @@ int main(void) {
     tcase_add_loop_test(tests, hard_problems, 0, 3 * STABILITY_PROBLEMS);
     tcase_add_loop_test(tests, scenes, 0, SCENES);
     tcase_add_test(tests, one_bright_wall_is_not_all_walls);
+    tcase_add_test(tests, rows_in_the_way_are_multiplied);
     tcase_add_test(tests, bytes_help_what_is_coarse);
     tcase_add_test(tests, what_gains_light_is_refused);
     tcase_add_test(tests, emitters_start_from_their_light);
