@@ -61,7 +61,8 @@ lam_status work_build(work *w, lam_error *error) {
                                .keep_factors = o->keep_factors,
                                .seed = o->seed,
                                .progress = &w->progress};
-    if (strcmp(o->method, "2msc") == 0) TRY(element_geometry_add(&w->m, &geometry, &problem, error));
+    if (strcmp(o->method, "2msc") == 0 || strcmp(o->method, "hierarchical") == 0)
+        TRY(element_geometry_add(&w->m, &geometry, &problem, error));
     TRY(build_operator(&problem, &how, &w->op, &w->built, error));
     const double noise = recipe_noise(&w->f.recipe);
     const bool patches = w->built.coherence >= 0;

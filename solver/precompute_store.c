@@ -1,6 +1,8 @@
 /* What a precompute writes: all of it, then the seal. */
 #include "solver/precompute_work.h"
 
+#include <string.h>
+
 static lam_status describe_operator(const work *w, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     const build_report *r = &w->built;
@@ -22,7 +24,8 @@ static lam_status describe_operator(const work *w, store *s, lam_error *error) {
     }
     if (r->threshold > 0) {
         TRY(store_set_number(s, "/operator", "threshold", r->threshold, error));
-        TRY(store_set_text(s, "/operator", "correction", sparse_correction_name(r->correction), error));
+        if (strcmp(r->method, "sparse") == 0)
+            TRY(store_set_text(s, "/operator", "correction", sparse_correction_name(r->correction), error));
     }
     if (r->residual >= 0) {
         TRY(store_set_number(s, "/operator", "residual", r->residual, error));

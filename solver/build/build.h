@@ -26,7 +26,7 @@ typedef struct build_problem {
     const csr *F;
     const uint32_t *order; /* [n] */
     double noise;          /* sampling error of S in the 2-norm, about; 0: not known */
-    /* Only 2msc needs these; NULL elsewhere. */
+    /* Only 2msc and hierarchical need these (hierarchical no surface); NULL elsewhere. */
     const double (*centre)[3];      /* [n] centroids, m */
     const float (*normal)[3];       /* [n] unit */
     const uint32_t *surface;        /* [n] below n: equal where elements are of one surface */
@@ -90,6 +90,7 @@ extern const build_method build_low_rank;
 extern const build_method build_two_mesh;
 extern const build_method build_sparse;
 extern const build_method build_emitters;
+extern const build_method build_hierarchical;
 
 /* Builds by options->method ("auto" chooses and says why). LAM_ERR_UNSUPPORTED for a method of the contract
  * that is still to come. */

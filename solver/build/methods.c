@@ -6,22 +6,11 @@
 #include <stdio.h>
 #include <string.h>
 
-static const build_method *const methods[] = {&build_exact, &build_low_rank, &build_two_mesh, &build_sparse,
-                                              &build_emitters};
-
-/* Methods and factorizers of the contract that are still to come. */
-static const char *const later_methods[] = {"hierarchical"};
-
-static bool is_among(const char *name, const char *const *list, size_t n) {
-    for (size_t i = 0; i < n; i++)
-        if (strcmp(name, list[i]) == 0) return true;
-    return false;
-}
+static const build_method *const methods[] = {&build_exact,  &build_low_rank, &build_two_mesh,
+                                              &build_sparse, &build_emitters, &build_hierarchical};
 
 static lam_status check_options(const build_options *options, lam_error *error) {
     lam_status status = LAM_OK;
-    if (is_among(options->method, later_methods, sizeof later_methods / sizeof *later_methods))
-        FAIL(error, LAM_ERR_UNSUPPORTED, "--method %s is not supported yet", options->method);
     /* 2msc does not factorize, it can make its own columns orthogonal; exact does neither. What a method has
      * no use for is not refused. */
     const bool qr = strcmp(options->factorizer, "qr") == 0;
@@ -133,7 +122,8 @@ lam_status build_operator(const build_problem *problem, const build_options *opt
         goto done;
     }
     FAIL(error, LAM_ERR_ARGUMENT,
-         "--method %.40s: unknown; use auto, exact, low-rank, 2msc, sparse or emitters", options->method);
+         "--method %.40s: unknown; use auto, exact, low-rank, 2msc, sparse, emitters or hierarchical",
+         options->method);
 done:
     return status;
 }

@@ -5,11 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const operator_kind *const operator_kinds[] = {&operator_exact, &operator_low_rank, &operator_two_mesh,
-                                                      &operator_sparse, &operator_emitters};
-
-/* Kinds of the format that are still to come. */
-static const char *const future_kinds[] = {"hierarchical"};
+static const operator_kind *const operator_kinds[] = {&operator_exact,    &operator_low_rank,
+                                                      &operator_two_mesh, &operator_sparse,
+                                                      &operator_emitters, &operator_hierarchical};
 
 const operator_kind *operator_kind_find(const char *name) {
     for (size_t i = 0; i < sizeof operator_kinds / sizeof *operator_kinds; i++)
@@ -85,13 +83,9 @@ static lam_status load_kind(store *s, const operator_kind **kind, lam_error *err
     char *name = NULL, *layout = NULL;
     TRY(store_get_text(s, "/operator", "kind", &name, error));
     *kind = operator_kind_find(name);
-    if (*kind == NULL) {
-        for (size_t i = 0; i < sizeof future_kinds / sizeof *future_kinds; i++)
-            if (strcmp(future_kinds[i], name) == 0)
-                FAIL(error, LAM_ERR_UNSUPPORTED, "%s: kind '%s' is not supported yet", store_path(s), name);
+    if (*kind == NULL)
         FAIL(error, LAM_ERR_FORMAT, "%s: /operator has the unknown kind '%s'; precompute it again",
              store_path(s), name);
-    }
     if (store_has_attribute(s, "/operator", "layout")) {
         TRY(store_get_text(s, "/operator", "layout", &layout, error));
         if (strcmp(layout, "panel64") == 0)

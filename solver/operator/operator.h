@@ -67,6 +67,7 @@ extern const operator_kind operator_low_rank;
 extern const operator_kind operator_two_mesh;
 extern const operator_kind operator_sparse;
 extern const operator_kind operator_emitters;
+extern const operator_kind operator_hierarchical;
 
 /* The kind of this name, or NULL. */
 const operator_kind *operator_kind_find(const char *name);

@@ -446,21 +446,28 @@ START_TEST(says_what_it_is) {
     operator_description description;
     operator_describe(t->op, &description);
     bool exact = strncmp(t->name, "exact", 5) == 0, two_mesh = strncmp(t->name, "two", 3) == 0;
+    const bool hierarchical = strncmp(t->name, "hierarchical", 12) == 0;
     bool sparse = strncmp(t->name, "sparse", 6) == 0;
     ck_assert_uint_eq(lam_operator_elements(t->op), t->n);
     ck_assert_uint_eq(lam_operator_channels(t->op), t->n_channels);
-    ck_assert_str_eq(lam_operator_kind(t->op), exact      ? "exact"
-                                               : two_mesh ? "two_mesh"
-                                               : sparse   ? "sparse"
-                                                          : "low_rank");
+    ck_assert_str_eq(lam_operator_kind(t->op), exact          ? "exact"
+                                               : two_mesh     ? "two_mesh"
+                                               : sparse       ? "sparse"
+                                               : hierarchical ? "hierarchical"
+                                                              : "low_rank");
     ck_assert_ptr_eq(operator_kind_find(lam_operator_kind(t->op)), t->op->kind);
     ck_assert_uint_eq(lam_operator_bytes(t->op), description.bytes);
-    ck_assert_uint_eq(description.rank, exact || sparse ? 0 : t->k);
+    ck_assert_uint_eq(description.rank, exact || sparse || hierarchical ? 0 : t->k);
     if (sparse) {
         const size_t stored = (size_t)(description.density * (double)(t->n_channels * t->n * t->n) + .5);
         ck_assert_double_eq_tol(description.density, .33, .03);
         ck_assert_ptr_null(description.form);
         ck_assert_ptr_null(description.precision);
+        ck_assert_uint_ge(description.bytes, 8 * stored);
+    } else if (hierarchical) {
+        const size_t stored = (size_t)(description.density * (double)(t->n_channels * t->n * t->n) + .5);
+        ck_assert_double_eq_tol(description.density, .05, .02);
+        ck_assert_ptr_null(description.form);
         ck_assert_uint_ge(description.bytes, 8 * stored);
     } else if (exact) {
         ck_assert_double_eq(description.density, 1);

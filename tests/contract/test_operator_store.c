@@ -15,8 +15,12 @@ static lam_status save(const lam_operator *op, lam_error *cause) {
     lam_status status = LAM_OK;
     store *s = NULL;
     size_t dims[2] = {op->n_channels, op->n};
+    double area[512];
     TRY(store_create(path, &s, cause));
+    for (size_t i = 0; i < sizeof area / sizeof *area; i++) area[i] = transport_area(i);
+    ck_assert_uint_le(op->n, sizeof area / sizeof *area);
     TRY(store_write(s, "/mesh/reflectance", STORE_F32, 2, dims, op->reflectance, cause));
+    TRY(store_write(s, "/mesh/area", STORE_F64, 1, &op->n, area, cause));
     TRY(operator_save(op, s, cause));
     status = store_seal(s, cause);
     s = NULL;
@@ -110,7 +114,10 @@ static const file_recipe recipes[] = {
      .kind = "emitters",
      .status = LAM_ERR_FORMAT,
      .word = "/operator/names"},
-    {.what = "hierarchical", .kind = "hierarchical", .status = LAM_ERR_UNSUPPORTED, .word = "'hierarchical'"},
+    {.what = "hierarchical without a mesh",
+     .kind = "hierarchical",
+     .status = LAM_ERR_FORMAT,
+     .word = "/mesh/area"},
     {.what = "kind unknown", .kind = "magic", .status = LAM_ERR_FORMAT, .word = "unknown kind 'magic'"},
     {.what = "panels", .layout = "panel64", .status = LAM_ERR_UNSUPPORTED, .word = "panel64"},
     {.what = "layout unknown", .layout = "columns", .status = LAM_ERR_FORMAT, .word = "'columns'"},

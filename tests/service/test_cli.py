@@ -157,7 +157,7 @@ class Usage(Case):
                      "solve a.h5 -o b.glb",
                      *("precompute a.obj -o b.h5 " + option for option in (
                          "--keep-form-factors=compressed", 
-                         "--method hierarchical", "--positions p.json",
+                         "--positions p.json",
                          "--path p.json --frames 3", "--reuse A", "--paths 9"))):
             with self.subTest(line):
                 self.refused(2, "not supported yet", *line.split())

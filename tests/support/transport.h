@@ -3,6 +3,7 @@
 #ifndef LAMBERT_TESTS_TRANSPORT_H
 #define LAMBERT_TESTS_TRANSPORT_H
 
+#include "solver/operator/hierarchical.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/panel.h"
 #include "solver/operator/sparse.h"
@@ -58,6 +59,8 @@ typedef enum transport_kind {
     TRANSPORT_TWO_MESH_COLOUR_I8,
     TRANSPORT_SPARSE,
     TRANSPORT_SPARSE_COLOUR,
+    TRANSPORT_HIERARCHICAL,
+    TRANSPORT_HIERARCHICAL_COLOUR,
     TRANSPORT_RELIT,
     TRANSPORT_RELIT_COLOUR_F16,
     TRANSPORT_RELIT_TWO_MESH_F16,
@@ -135,6 +138,140 @@ static inline void make_sparse(transport *t, const double *F) {
     t->roundings = 4 + sum_roundings(n); /* delta: its product and its place in the sum */
     ck_assert_msg(operator_sparse_create(n, C, t->reflectance, &arrays, &t->op, &error) == LAM_OK, "%s",
                   error.message);
+}
+
+/* Area of an element: that of the store's mesh where a kind asks for it. Roots are exact. */
+static inline double transport_area(size_t element) {
+    const double root = 1 + (double)(element % 3) / 4;
+    return root * root;
+}
+
+/* A tree of leaves with 1 to 7 elements, every node with a matrix of its own that is not far from one that
+ * only swaps and turns signs. W is what it does to all positions, size the magnitudes of the products behind
+ * it, and the return value how often each of those is rounded. */
+static inline double random_basis(size_t n, uint64_t *state, wavelets *basis, double *W, double *size) {
+    enum { NODES = 512 };
+    lam_error error = {.message = ""};
+    uint32_t shapes_of[NODES], waiting[NODES], depth[NODES];
+    size_t n_nodes = 0, n_waiting = 0, used = 0, begin = 0, deepest = 0;
+    wavelet_shape *shapes = test_allocate(NODES, sizeof *shapes);
+    float *matrices = test_allocate(NODES, WAVELET_INPUTS * WAVELET_INPUTS * sizeof *matrices);
+    while (begin < n || n_waiting > 1) {
+        const bool join = n_waiting >= 2 && (begin == n || (n_waiting > 4 && random_unit(state) < .7));
+        wavelet_shape *shape = &shapes[n_nodes];
+        depth[n_nodes] = 1;
+        if (join) {
+            const uint32_t left = waiting[n_waiting - 2], right = waiting[n_waiting - 1];
+            shape->inputs = shapes[left].scaling + shapes[right].scaling;
+            depth[n_nodes] = 1 + (depth[left] > depth[right] ? depth[left] : depth[right]);
+            n_waiting -= 2;
+        } else {
+            shape->leaf = 1;
+            shape->inputs = 1 + (uint32_t)(7 * random_unit(state));
+            if (shape->inputs > n - begin) shape->inputs = (uint32_t)(n - begin);
+            begin += shape->inputs;
+        }
+        if (depth[n_nodes] > deepest) deepest = depth[n_nodes];
+        shape->scaling = shape->inputs < 4 ? shape->inputs : 1 + (uint32_t)(4 * random_unit(state));
+        for (size_t i = 0; i < shape->inputs; i++)
+            for (size_t j = 0; j < shape->inputs; j++)
+                matrices[used++] = (float)((i + j + 1 == shape->inputs ? (j % 2 == 0 ? 1 : -1) : 0) +
+                                           .2 * (random_unit(state) - .5));
+        shapes_of[n_nodes] = (uint32_t)n_nodes;
+        waiting[n_waiting++] = (uint32_t)n_nodes++;
+        ck_assert_uint_lt(n_nodes, NODES);
+    }
+    ck_assert_msg(wavelets_create(n, n_nodes, shapes_of, n_nodes, shapes, matrices, used, basis, &error) ==
+                      LAM_OK,
+                  "%s", error.message);
+    /* Column p: what becomes of a 1 there, node by node. */
+    double(*up)[2][WAVELET_SCALING] = test_allocate(n_nodes, sizeof *up);
+    for (size_t p = 0; p < n; p++) {
+        const float *Q = basis->basis;
+        for (size_t t = 0; t < n_nodes; t++) {
+            const wavelet_node *a = &basis->nodes[t];
+            for (int of = 0; of < 2; of++) {
+                double x[WAVELET_INPUTS], *to = of == 0 ? W : size;
+                for (size_t m = 0; m < a->inputs; m++)
+                    x[m] = a->from_left == 0  ? (a->begin + m == p ? 1 : 0)
+                           : m < a->from_left ? up[a->left][of][m]
+                                              : up[t - 1][of][m - a->from_left];
+                for (size_t k = 0; k < a->inputs; k++) {
+                    double sum = 0;
+                    for (size_t m = 0; m < a->inputs; m++) {
+                        const double q = (double)Q[k * a->inputs + m];
+                        sum += (of == 0 ? q : fabs(q)) * x[m];
+                    }
+                    if (k < a->scaling) up[t][of][k] = sum;
+                    if (k >= a->scaling) to[(a->first + k - a->scaling) * n + p] = sum;
+                    if (k < a->scaling && t + 1 == n_nodes) to[(n - a->scaling + k) * n + p] = sum;
+                }
+            }
+            Q += (size_t)a->inputs * a->inputs;
+        }
+    }
+    free(up);
+    return (double)deepest * (WAVELET_INPUTS + 1);
+}
+
+/* P = R' A^-1/2 W^T K W A^1/2, K random, symmetric and of few numbers, which half precision has. */
+static inline void make_hierarchical(transport *t, uint64_t *state) {
+    lam_error error = {.message = ""};
+    const size_t n = t->n, C = t->n_channels, square = n * n;
+    hierarchical_arrays arrays = {.K = test_allocate(C, sizeof *arrays.K)};
+    double *W = test_allocate(square, sizeof *W), *size = test_allocate(square, sizeof *size),
+           *area = test_allocate(n, sizeof *area), *K = test_allocate(square, sizeof *K);
+    const double roundings = random_basis(n, state, &arrays.basis, W, size);
+    for (size_t p = 0; p < n; p++) area[p] = transport_area(t->order != NULL ? t->order[p] : p);
+    for (size_t c = 0; c < C; c++) {
+        csr *upper = &arrays.K[c];
+        *upper = (csr){.n = n,
+                       .indptr = test_allocate(n + 1, sizeof *upper->indptr),
+                       .indices = test_allocate(square, sizeof *upper->indices),
+                       .data = test_allocate(square, sizeof *upper->data)};
+        memset(K, 0, square * sizeof *K);
+        for (size_t i = 0; i < n; i++) {
+            uint64_t last = upper->indptr[i];
+            for (size_t j = i; j < n; j++) {
+                if (i != j && random_unit(state) > .05) continue;
+                const double value = floor(200 * random_unit(state) - 50) / 64;
+                K[i * n + j] = K[j * n + i] = value;
+                upper->indices[last] = (uint32_t)j;
+                upper->data[last++] = (float)value;
+            }
+            upper->indptr[i + 1] = last;
+        }
+        double *half = test_allocate(square, sizeof *half),
+               *half_size = test_allocate(square, sizeof *half_size);
+        for (size_t i = 0; i < n; i++)
+            for (size_t k = 0; k < n; k++)
+                for (size_t p = 0; p < n && K[i * n + k] != 0; p++) {
+                    half[i * n + p] += K[i * n + k] * W[k * n + p];
+                    half_size[i * n + p] += fabs(K[i * n + k]) * size[k * n + p];
+                }
+        for (size_t p = 0; p < n; p++)
+            for (size_t q = 0; q < n; q++) {
+                const size_t i = t->order != NULL ? t->order[p] : p, j = t->order != NULL ? t->order[q] : q;
+                const double scale = rho_or_one(t->reflectance[c * n + i]) * sqrt(area[q] / area[p]);
+                double sum = 0, sum_size = 0;
+                for (size_t k = 0; k < n; k++) {
+                    sum += W[k * n + p] * half[k * n + q];
+                    sum_size += size[k * n + p] * half_size[k * n + q];
+                }
+                t->P[c * square + i * n + j] = scale * sum;
+                t->magnitude[c * square + i * n + j] = scale * sum_size;
+            }
+        free(half);
+        free(half_size);
+    }
+    /* Two transforms, K's rows, A^1/2 x, rho' / A^1/2, its product. */
+    t->roundings = 2 * roundings + sum_roundings(n) + 4;
+    ck_assert_msg(operator_hierarchical_create(n, C, t->reflectance, area, &arrays, &t->op, &error) == LAM_OK,
+                  "%s", error.message);
+    free(W);
+    free(size);
+    free(area);
+    free(K);
 }
 
 /* x [n][k] as a precision keeps it, so that narrowing it changes nothing any more (i8: but one rounding, of
@@ -323,6 +460,8 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
                  {"two meshes, 3 channels, i8", PANEL_I8},
                  {"sparse, with delta", PANEL_F32},
                  {"sparse, 3 channels", PANEL_F32},
+                 {"hierarchical", PANEL_F32},
+                 {"hierarchical, 3 channels", PANEL_F32},
                  {"relit", PANEL_F32},
                  {"relit, 3 channels, f16", PANEL_F16},
                  {"two meshes, relit, f16", PANEL_F16},
@@ -359,6 +498,8 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
         make_exact(&t, F);
     else if (kind == TRANSPORT_SPARSE || kind == TRANSPORT_SPARSE_COLOUR)
         make_sparse(&t, F);
+    else if (kind == TRANSPORT_HIERARCHICAL || kind == TRANSPORT_HIERARCHICAL_COLOUR)
+        make_hierarchical(&t, &state);
     else
         make_low_rank(&t, F, U, V, strstr(t.name, "folded") != NULL, two_mesh ? begin : NULL);
     if (strstr(t.name, "relit") != NULL)

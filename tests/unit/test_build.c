@@ -315,8 +315,6 @@ START_TEST(bad_options_are_refused) {
     build_report report;
     lam_error error = {0};
     build_options options = defaults;
-    options.method = "hierarchical";
-    ck_assert_int_eq(build_operator(problem_of(&f), &options, &op, &report, &error), LAM_ERR_UNSUPPORTED);
     options.method = "emitters"; /* and none are asked for */
     ck_assert_int_eq(build_operator(problem_of(&f), &options, &op, &report, &error), LAM_ERR_ARGUMENT);
     ck_assert_ptr_nonnull(strstr(error.message, "--emitters"));

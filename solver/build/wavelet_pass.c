@@ -1,0 +1,516 @@
+#include "solver/build/wavelet_pass.h"
+
+#include "store/status.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+/* Rows side by side: what a node takes. */
+typedef float lanes __attribute__((vector_size(32)));
+typedef float lanes_unaligned __attribute__((vector_size(32), aligned(4), may_alias));
+
+/* What a cluster hands up of several rows, and of as many as a node hands up: both at most linear functions.
+ */
+enum { SCALING = 3 };
+typedef struct block {
+    lanes of[SCALING];
+} block;
+typedef struct kept_block {
+    float of[SCALING][SCALING];
+} kept_block;
+
+/* Rows on clusters (nodes, ascending), of which all others are 0. */
+typedef struct live_rows {
+    size_t count;
+    uint32_t *cluster;
+    block *value;
+} live_rows;
+typedef struct kept_rows {
+    size_t count;
+    uint32_t *cluster;
+    kept_block *value;
+} kept_rows;
+
+/* All elements of a node are in it. */
+typedef struct sphere {
+    double centre[3], radius;
+} sphere;
+
+/* What all threads share. */
+typedef struct pass_job {
+    const wavelet_pass_input *input;
+    uint32_t *parent, *height; /* [n_nodes]; UINT32_MAX: of the root */
+    uint32_t *leaf_of;         /* [n], position -> node */
+    uint32_t *position;        /* [n], element -> position */
+    double *root_area;         /* [n], by element */
+    sphere *around;            /* [n_nodes] */
+    size_t n_leaves;
+    kept_rows *kept; /* [n_nodes], of what waits for its sibling */
+    size_t done;     /* elements */
+} pass_job;
+
+/* A coefficient that is kept, above the diagonal or on it. */
+typedef struct kept {
+    uint32_t i, j;
+    float value;
+} kept;
+
+/* What a thread works with. */
+typedef struct desk {
+    lanes *dense;      /* [n], rows of a leaf: all 0 between leaves */
+    uint64_t *touched; /* where they are not */
+    live_rows rows[2], near[2];
+    kept *found;
+    size_t n_found, capacity;
+} desk;
+
+/* The node whose rows are on their way. */
+typedef struct pass_row {
+    const pass_job *job;
+    uint32_t height;
+    uint32_t first; /* coefficient of lane 0, were lanes of what is handed up coefficients too */
+    unsigned wavelet_lanes;
+    float least; /* threshold times the weight of the node */
+} pass_row;
+
+/* Whether wavelets of node a look at cluster b. */
+static bool is_near(const pass_job *job, size_t a, size_t b) {
+    const sphere *x = &job->around[a], *y = &job->around[b];
+    const double far = (1 + job->input->reach) * x->radius + y->radius;
+    double apart = 0;
+    for (int d = 0; d < 3; d++) apart += (x->centre[d] - y->centre[d]) * (x->centre[d] - y->centre[d]);
+    return !(apart > far * far);
+}
+
+static void kept_rows_free(kept_rows *k) {
+    free(k->cluster);
+    free(k->value);
+    *k = (kept_rows){.count = 0};
+}
+
+/* Puts down coefficient (i, j), i of the row's node and j of column node b. Of two nodes of one height each
+ * finds the other: the earlier one keeps what they find, of itself the upper triangle. */
+static lam_status desk_keep(const pass_row *row, desk *d, uint32_t b, uint32_t i, uint32_t j, float value,
+                            lam_error *error) {
+    if (row->job->height[b] == row->height && j < i) return LAM_OK;
+    if (d->n_found == d->capacity) {
+        const size_t capacity = d->capacity + d->capacity / 2 + 4096;
+        kept *const more = realloc(d->found, capacity * sizeof *more);
+        if (more == NULL)
+            return status_fail(error, LAM_ERR_MEMORY, "wavelets: cannot allocate %zu x %zu bytes", capacity,
+                               sizeof *more);
+        d->found = more;
+        d->capacity = capacity;
+    }
+    d->found[d->n_found++] = i < j ? (kept){i, j, value} : (kept){j, i, value};
+    return LAM_OK;
+}
+
+static inline unsigned beyond_portable(const lanes *v, float least) {
+    unsigned bits = 0;
+    for (int lane = 0; lane < WAVELET_INPUTS; lane++) bits |= (unsigned)(fabsf((*v)[lane]) > least) << lane;
+    return bits;
+}
+
+#define KERNEL(name) name##_portable
+#define TARGET
+#define BEYOND(v, x) beyond_portable(v, x)
+#include "solver/build/wavelet_pass_kernels.h"
+
+#if defined(__x86_64__)
+#define KERNEL(name) name##_avx2
+#define TARGET __attribute__((target("avx2,fma")))
+#define BEYOND(v, x)                                                                                         \
+    (unsigned)_mm256_movemask_ps(_mm256_cmp_ps(                                                              \
+        _mm256_andnot_ps(_mm256_set1_ps(-0.0f), *(const __m256 *)(v)), _mm256_set1_ps(x), _CMP_GT_OQ))
+#include "solver/build/wavelet_pass_kernels.h"
+#endif
+
+/* The fastest kernels for this CPU. */
+typedef struct pass_kernels {
+    void (*merge)(const wavelets *, size_t, const kept_rows *, const kept_rows *, live_rows *);
+    lam_status (*promote)(const pass_row *, uint32_t, bool, const live_rows *, live_rows *, desk *,
+                          lam_error *);
+    lam_status (*begin_leaf)(const pass_row *, size_t, live_rows *, desk *, lam_error *);
+} pass_kernels;
+
+static pass_kernels kernels_of_cpu(void) {
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+        return (pass_kernels){merge_avx2, promote_avx2, begin_leaf_avx2};
+#endif
+    return (pass_kernels){merge_portable, promote_portable, begin_leaf_portable};
+}
+
+/* --- one node ------------------------------------------------------------------------------------------ */
+
+/* Scaled rows of a leaf's elements, side by side in the desk. */
+static lam_status scatter_rows(const pass_job *job, size_t node, desk *d, lam_error *error) {
+    lam_status status = LAM_OK;
+    const wavelet_pass_input *input = job->input;
+    const wavelet_node *a = &input->basis->nodes[node];
+    const uint32_t *elements = input->order + a->begin;
+    row_block rows = {0};
+    TRY(row_source_get(input->rows, elements, a->n_elements, &rows, error));
+    for (size_t lane = 0; lane < a->n_elements; lane++) {
+        const double root = job->root_area[elements[lane]];
+        for (size_t e = 0; e < rows.length[lane]; e++) {
+            const uint32_t j = rows.indices[lane][e];
+            const size_t p = job->position[j];
+            d->dense[p][lane] = (float)(root / job->root_area[j] * (double)rows.data[lane][e]);
+            d->touched[p >> 6] |= 1ull << (p & 63);
+        }
+    }
+done:
+    row_block_free(&rows);
+    return status;
+}
+
+/* What the node hands up waits for its sibling. */
+static lam_status keep_rows(const live_rows *rows, size_t scaling, const wavelets *w, kept_rows *out,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    out->count = rows->count;
+    out->cluster = memory_allocate(rows->count, sizeof *out->cluster, "wavelets", error);
+    out->value = memory_allocate(rows->count, sizeof *out->value, "wavelets", error);
+    if (out->cluster == NULL || out->value == NULL) TRY(LAM_ERR_MEMORY);
+    memcpy(out->cluster, rows->cluster, rows->count * sizeof *out->cluster);
+    for (size_t e = 0; e < rows->count; e++)
+        for (size_t k = 0; k < w->nodes[rows->cluster[e]].scaling; k++)
+            for (size_t lane = 0; lane < scaling; lane++)
+                out->value[e].of[k][lane] = rows->value[e].of[k][lane];
+done:
+    return status;
+}
+
+/* Coefficients whose column is what the root would hand up; of the root's own rows those too. */
+static lam_status end_at_root(const pass_row *row, size_t node, const live_rows *rows, desk *d,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    const wavelets *w = row->job->input->basis;
+    const uint32_t root = (uint32_t)w->n_nodes - 1;
+    const wavelet_node *a = &w->nodes[node];
+    const size_t scaling = w->nodes[root].scaling;
+    for (size_t lane = node == root ? 0 : a->scaling; rows->count > 0 && lane < a->inputs; lane++)
+        for (size_t k = 0; k < scaling; k++) {
+            const uint32_t i = lane < a->scaling ? (uint32_t)(w->n - scaling + lane)
+                                                 : a->first + (uint32_t)(lane - a->scaling);
+            const uint32_t j = (uint32_t)(w->n - scaling + k);
+            const float value = rows->value[0].of[k][lane];
+            if (fabsf(value) > row->least * row->job->input->weight[root])
+                TRY(desk_keep(row, d, root, i, j, value, error));
+        }
+done:
+    return status;
+}
+
+/* Of all clusters those that are near. */
+static void take_near(const pass_job *job, size_t node, const live_rows *all, live_rows *out) {
+    out->count = 0;
+    for (size_t e = 0; e < all->count; e++) {
+        if (!is_near(job, node, all->cluster[e])) continue;
+        out->cluster[out->count] = all->cluster[e];
+        out->value[out->count++] = all->value[e];
+    }
+}
+
+static void swap(live_rows **a, live_rows **b) {
+    live_rows *const swapped = *a;
+    *a = *b;
+    *b = swapped;
+}
+
+static lam_status run_node(pass_job *job, size_t node, desk *d, lam_error *error) {
+    lam_status status = LAM_OK;
+    const pass_kernels kernels = kernels_of_cpu();
+    const wavelets *w = job->input->basis;
+    const wavelet_node *a = &w->nodes[node];
+    const uint32_t root = (uint32_t)w->n_nodes - 1, top = job->height[root];
+    const uint32_t keep_at = node == root ? UINT32_MAX : job->height[job->parent[node]] - 1;
+    const pass_row row = {.job = job,
+                          .height = job->height[node],
+                          .first = a->first - a->scaling,
+                          .wavelet_lanes = (1u << a->inputs) - (1u << a->scaling),
+                          .least = job->input->threshold * job->input->weight[node]};
+    live_rows *from = &d->rows[0], *to = &d->rows[1];
+    uint32_t height = row.height;
+    if (a->from_left > 0) {
+        kernels.merge(w, node, &job->kept[a->left], &job->kept[node - 1], from);
+        kept_rows_free(&job->kept[a->left]);
+        kept_rows_free(&job->kept[node - 1]);
+    } else {
+        TRY(scatter_rows(job, node, d, error));
+        TRY(kernels.begin_leaf(&row, node, from, d, error));
+        height = 1;
+    }
+    live_rows *near = &d->near[0], *next = &d->near[1];
+    take_near(job, node, from, near);
+    for (uint32_t h = height; node != root && h <= keep_at; h++) {
+        TRY(kernels.promote(&row, h, false, from, to, d, error));
+        swap(&from, &to);
+    }
+    if (node != root) TRY(keep_rows(from, a->scaling, w, &job->kept[node], error));
+    for (; height <= top; height++) {
+        TRY(kernels.promote(&row, height, true, near, next, d, error));
+        swap(&near, &next);
+    }
+    TRY(end_at_root(&row, node, near, d, error));
+done:
+    return status;
+}
+
+/* --- all of them --------------------------------------------------------------------------------------- */
+
+static void job_free(pass_job *job) {
+    for (size_t t = 0; job->kept != NULL && t < job->input->basis->n_nodes; t++)
+        kept_rows_free(&job->kept[t]);
+    free(job->kept);
+    free(job->parent);
+    free(job->height);
+    free(job->leaf_of);
+    free(job->position);
+    free(job->root_area);
+    free(job->around);
+}
+
+/* The middle of its children's spheres, and what holds both; of a leaf that of its elements, each as large as
+ * a disk of its area. */
+static void surround(const wavelet_pass_input *input, size_t t, sphere *around) {
+    const wavelet_node *a = &input->basis->nodes[t];
+    sphere *own = &around[t];
+    *own = (sphere){.radius = 0};
+    if (a->from_left > 0) {
+        const sphere *parts[2] = {&around[a->left], &around[t - 1]};
+        for (int d = 0; d < 3; d++) own->centre[d] = .5 * (parts[0]->centre[d] + parts[1]->centre[d]);
+        for (int k = 0; k < 2; k++) {
+            double apart = 0;
+            for (int d = 0; d < 3; d++) apart += pow(own->centre[d] - parts[k]->centre[d], 2);
+            own->radius = fmax(own->radius, sqrt(apart) + parts[k]->radius);
+        }
+        return;
+    }
+    const uint32_t *elements = input->order + a->begin;
+    for (size_t k = 0; k < a->n_elements; k++)
+        for (int d = 0; d < 3; d++) own->centre[d] += input->centre[elements[k]][d] / (double)a->n_elements;
+    for (size_t k = 0; k < a->n_elements; k++) {
+        double apart = 0;
+        for (int d = 0; d < 3; d++) apart += pow(own->centre[d] - input->centre[elements[k]][d], 2);
+        own->radius = fmax(own->radius, sqrt(apart) + sqrt(.318 * input->area[elements[k]]));
+    }
+}
+
+static lam_status job_make(const wavelet_pass_input *input, pass_job *job, lam_error *error) {
+    lam_status status = LAM_OK;
+    const wavelets *w = input->basis;
+    const size_t N = w->n_nodes;
+    *job = (pass_job){.input = input};
+    job->kept = memory_allocate(N, sizeof *job->kept, "wavelets", error);
+    job->parent = memory_allocate(N, sizeof *job->parent, "wavelets", error);
+    job->height = memory_allocate(N, sizeof *job->height, "wavelets", error);
+    job->leaf_of = memory_allocate(w->n, sizeof *job->leaf_of, "wavelets", error);
+    job->position = memory_allocate(w->n, sizeof *job->position, "wavelets", error);
+    job->root_area = memory_allocate(w->n, sizeof *job->root_area, "wavelets", error);
+    job->around = memory_allocate(N, sizeof *job->around, "wavelets", error);
+    if (job->kept == NULL || job->parent == NULL || job->height == NULL || job->leaf_of == NULL ||
+        job->position == NULL || job->root_area == NULL || job->around == NULL)
+        TRY(LAM_ERR_MEMORY);
+    job->parent[N - 1] = UINT32_MAX;
+    for (size_t t = 0; t < N; t++) {
+        const wavelet_node *a = &w->nodes[t];
+        surround(input, t, job->around);
+        if (a->scaling > SCALING)
+            FAIL(error, LAM_ERR_ARGUMENT, "node %zu hands up %u numbers, must be at most %d", t,
+                 (unsigned)a->scaling, SCALING);
+        if (a->from_left == 0) {
+            job->n_leaves++;
+            for (size_t p = a->begin; p < a->begin + a->n_elements; p++) job->leaf_of[p] = (uint32_t)t;
+            continue;
+        }
+        const uint32_t left = job->height[a->left], right = job->height[t - 1];
+        job->height[t] = 1 + (left > right ? left : right);
+        job->parent[a->left] = job->parent[t - 1] = (uint32_t)t;
+    }
+    for (size_t p = 0; p < w->n; p++) job->position[input->order[p]] = (uint32_t)p;
+    for (size_t i = 0; i < w->n; i++) job->root_area[i] = sqrt(input->area[i]);
+done:
+    return status;
+}
+
+static void desk_free(desk *d) {
+    free(d->dense);
+    free(d->touched);
+    for (int k = 0; k < 2; k++) {
+        free(d->rows[k].cluster);
+        free(d->rows[k].value);
+        free(d->near[k].cluster);
+        free(d->near[k].value);
+    }
+    free(d->found);
+    *d = (desk){.n_found = 0};
+}
+
+static void *aligned_lanes(size_t count, size_t size, lam_error *error) {
+    size_t bytes;
+    void *made = NULL;
+    if (size_multiply(count, size, &bytes) && bytes < SIZE_MAX / 2)
+        made = aligned_alloc(64, (bytes + 63) / 64 * 64);
+    if (made == NULL)
+        status_fail(error, LAM_ERR_MEMORY, "wavelets: cannot allocate %zu x %zu bytes", count, size);
+    return made;
+}
+
+static lam_status desk_make(const pass_job *job, desk *d, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = job->input->basis->n;
+    d->dense = aligned_lanes(n, sizeof *d->dense, error);
+    d->touched = memory_allocate((n + 63) / 64, sizeof *d->touched, "wavelets", error);
+    if (d->dense == NULL || d->touched == NULL) TRY(LAM_ERR_MEMORY);
+    memset(d->dense, 0, n * sizeof *d->dense);
+    for (int k = 0; k < 2; k++) {
+        d->rows[k].cluster = memory_allocate(job->n_leaves, sizeof *d->rows[k].cluster, "wavelets", error);
+        d->rows[k].value = aligned_lanes(job->n_leaves, sizeof *d->rows[k].value, error);
+        d->near[k].cluster = memory_allocate(job->n_leaves, sizeof *d->near[k].cluster, "wavelets", error);
+        d->near[k].value = aligned_lanes(job->n_leaves, sizeof *d->near[k].value, error);
+        if (d->rows[k].cluster == NULL || d->rows[k].value == NULL || d->near[k].cluster == NULL ||
+            d->near[k].value == NULL)
+            TRY(LAM_ERR_MEMORY);
+    }
+done:
+    return status;
+}
+
+static lam_status told(pass_job *job, size_t elements, lam_error *error) {
+    lam_status status = LAM_OK;
+    const progress *p = job->input->progress;
+#pragma omp critical(wavelet_pass_progress)
+    {
+        job->done += elements;
+        progress_report(p, "wavelets", (double)job->done / (double)job->input->basis->n);
+        if (progress_cancelled(p)) status = status_fail(error, LAM_ERR_CANCELLED, "cancelled");
+    }
+    return status;
+}
+
+/* Subtrees of this many elements at most are a thread's at once. */
+static size_t piece_elements(const pass_job *job) {
+    return job->input->basis->n / 64 + 8;
+}
+
+/* Nodes [first, last) one after the other. */
+static lam_status run_piece(pass_job *job, size_t first, size_t last, desk *d, lam_error *error) {
+    lam_status status = LAM_OK;
+    for (size_t t = first; t < last; t++) TRY(run_node(job, t, d, error));
+    TRY(told(job, job->input->basis->nodes[last - 1].n_elements, error));
+done:
+    return status;
+}
+
+/* The first node of the subtree of t. */
+static size_t subtree_begin(const wavelets *w, size_t t) {
+    while (w->nodes[t].from_left > 0) t = w->nodes[t].left;
+    return t;
+}
+
+static lam_status run_all(pass_job *job, desk *desks, lam_error *error) {
+    lam_status status = LAM_OK;
+    const wavelets *w = job->input->basis;
+    const size_t N = w->n_nodes, most = piece_elements(job);
+    wavelet_piece *pieces = memory_allocate(N, sizeof *pieces, "wavelets", error);
+    size_t n_pieces = 0, n_taken = 0;
+    int failed = 0;
+    if (pieces == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t t = 0; t < N; t++)
+        if (w->nodes[t].n_elements <= most &&
+            (job->parent[t] == UINT32_MAX || w->nodes[job->parent[t]].n_elements > most))
+            pieces[n_pieces++] = (wavelet_piece){(uint32_t)subtree_begin(w, t), (uint32_t)t + 1};
+#pragma omp parallel num_threads((int)job->input->n_threads)
+    {
+        desk *mine = NULL;
+#pragma omp critical(wavelet_pass_desks)
+        mine = &desks[n_taken++];
+#pragma omp for schedule(dynamic, 1)
+        for (size_t k = 0; k < n_pieces; k++) {
+            lam_error one = {.message = ""};
+            lam_status now;
+            if (__atomic_load_n(&failed, __ATOMIC_RELAXED)) continue;
+            now = mine->dense == NULL ? desk_make(job, mine, &one) : LAM_OK;
+            if (now == LAM_OK) now = run_piece(job, pieces[k].first, pieces[k].last, mine, &one);
+            if (now == LAM_OK) continue;
+#pragma omp critical(wavelet_pass_failed)
+            if (!failed) {
+                status = status_fail(error, now, "%s", one.message);
+                __atomic_store_n(&failed, 1, __ATOMIC_RELAXED);
+            }
+        }
+    }
+    if (status != LAM_OK) goto done;
+    if (desks[0].dense == NULL) TRY(desk_make(job, &desks[0], error));
+    for (size_t t = 0; t < N; t++)
+        if (w->nodes[t].n_elements > most) TRY(run_node(job, t, &desks[0], error));
+done:
+    free(pieces);
+    return status;
+}
+
+static int by_column(const void *left, const void *right) {
+    const kept *a = left, *b = right;
+    return a->j < b->j ? -1 : a->j > b->j;
+}
+
+/* All that was kept, by rows. */
+static lam_status gather(const pass_job *job, desk *desks, csr *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = job->input->basis->n;
+    csr made = {.n = n, .indptr = memory_allocate(n + 1, sizeof *made.indptr, "wavelets", error)};
+    kept *all = NULL;
+    if (made.indptr == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < job->input->n_threads; k++)
+        for (size_t e = 0; e < desks[k].n_found; e++) made.indptr[desks[k].found[e].i + 1]++;
+    for (size_t i = 0; i < n; i++) made.indptr[i + 1] += made.indptr[i];
+    const size_t total = (size_t)made.indptr[n];
+    all = memory_allocate(total, sizeof *all, "wavelets", error);
+    made.indices = memory_allocate(total, sizeof *made.indices, "wavelets", error);
+    made.data = memory_allocate(total, sizeof *made.data, "wavelets", error);
+    if (all == NULL || made.indices == NULL || made.data == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < job->input->n_threads; k++) {
+        for (size_t e = 0; e < desks[k].n_found; e++)
+            all[made.indptr[desks[k].found[e].i]++] = desks[k].found[e];
+        desk_free(&desks[k]);
+    }
+    memmove(made.indptr + 1, made.indptr, n * sizeof *made.indptr);
+    made.indptr[0] = 0;
+#pragma omp parallel for schedule(dynamic, 256) num_threads((int)job->input->n_threads)
+    for (size_t i = 0; i < n; i++) {
+        qsort(all + made.indptr[i], (size_t)(made.indptr[i + 1] - made.indptr[i]), sizeof *all, by_column);
+        for (uint64_t e = made.indptr[i]; e < made.indptr[i + 1]; e++) {
+            made.indices[e] = all[e].j;
+            made.data[e] = all[e].value;
+        }
+    }
+    *out = made;
+    made = (csr){.n = 0};
+done:
+    free(all);
+    csr_free(&made);
+    return status;
+}
+
+lam_status wavelet_pass(const wavelet_pass_input *input, csr *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    pass_job job = {.input = input};
+    desk *desks = memory_allocate(input->n_threads, sizeof *desks, "wavelets", error);
+    if (desks == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(job_make(input, &job, error));
+    TRY(run_all(&job, desks, error));
+    TRY(gather(&job, desks, out, error));
+done:
+    for (size_t k = 0; desks != NULL && k < input->n_threads; k++) desk_free(&desks[k]);
+    free(desks);
+    job_free(&job);
+    return status;
+}

@@ -1,0 +1,30 @@
+/* S = A^1/2 F A^-1/2 in a basis of wavelets, in one pass over the rows of F, of which none is held. */
+#ifndef LAMBERT_BUILD_WAVELET_PASS_H
+#define LAMBERT_BUILD_WAVELET_PASS_H
+
+#include "solver/matrix/row_source.h"
+#include "solver/operator/wavelets.h"
+#include "solver/progress.h"
+
+typedef struct wavelet_pass_input {
+    const wavelets *basis;
+    row_source *rows;          /* of F, in which A_i F_ij = A_j F_ji */
+    const double *area;        /* [n], by element */
+    const uint32_t *order;     /* [n], position -> element */
+    float threshold;           /* a coefficient (i, j) is kept from threshold weight_i weight_j on */
+    const float *weight;       /* [n_nodes], of the coefficients of a node */
+    const double (*centre)[3]; /* [n], by element */
+    double reach; /* wavelets of a node see clusters within so many of its radii; INFINITY: all */
+    size_t n_threads;
+    const progress *progress;
+} wavelet_pass_input;
+
+/* The upper triangle of W S W^T, the diagonal included; freed by the caller with csr_free.
+ *
+ * Rows come leaf by leaf. Of every node the rows of what it hands up meet the columns of clusters of the same
+ * height alone; those of its wavelets go on to all coarser columns, and there are final. Finer columns are
+ * the transposed of what finer rows find. The bits do not depend on n_threads. Cost: about nnz(F) (number of
+ * levels) at most. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED, those of rows. */
+lam_status wavelet_pass(const wavelet_pass_input *input, csr *out, lam_error *error);
+
+#endif
