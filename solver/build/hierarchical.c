@@ -103,8 +103,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
         entries += (double)arrays.K[c].indptr[n];
     }
     const size_t n_shapes = arrays.basis.n_shapes, n_nodes = arrays.basis.n_nodes;
-    TRY(operator_hierarchical_create(n, C, problem->reflectance, area, &arrays, &made, error));
-    TRY(operator_set_order(made, tree.order, error));
+    TRY(operator_hierarchical_create(n, C, problem->reflectance, area, tree.order, &arrays, &made, error));
     report->method = "hierarchical";
     report->threshold = threshold;
     report->epsilon = -1;

@@ -3,18 +3,26 @@
  * is left. */
 #include "solver/operator/hierarchical.h"
 
+#include "solver/operator/sliced.h"
 #include "solver/operator/sparse_product.h"
+#include "solver/operator/wavelet_plan.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+/* Numbers that a thread scales at once. */
+enum { BLOCK = 8192 };
+
 typedef struct hierarchical {
     lam_operator base;
     wavelets basis;
-    half_matrix *K;   /* [C] */
-    float *root_area; /* [n] A^1/2, by position */
+    wavelet_plan plan; /* of the coefficients that any K has */
+    half_matrix *K;    /* [C] */
+    sliced_rows *fast; /* [C], the rows of K */
+    float *root_area;  /* [n] A^1/2, by position */
+    float *left;       /* [C][n] rho' A^-1/2, by position */
 } hierarchical;
 
 void hierarchical_arrays_free(hierarchical_arrays *arrays, size_t n_channels) {
@@ -26,15 +34,19 @@ void hierarchical_arrays_free(hierarchical_arrays *arrays, size_t n_channels) {
 
 static void hierarchical_destroy(lam_operator *op) {
     hierarchical *self = (hierarchical *)op;
+    for (size_t c = 0; self->fast != NULL && c < op->n_channels; c++) sliced_free(&self->fast[c]);
     for (size_t c = 0; self->K != NULL && c < op->n_channels; c++) csr_free(&self->K[c].rows);
+    free(self->fast);
     free(self->K);
     free(self->root_area);
+    free(self->left);
+    wavelet_plan_free(&self->plan);
     wavelets_free(&self->basis);
 }
 
 /* The shared part, areas, room for K. */
 static lam_status start(size_t n, size_t n_channels, const float *reflectance, const double *area,
-                        hierarchical **out, lam_error *error) {
+                        const uint32_t *order, hierarchical **out, lam_error *error) {
     lam_status status = LAM_OK;
     hierarchical *self = memory_allocate(1, sizeof *self, "operator", error);
     if (self == NULL) TRY(LAM_ERR_MEMORY);
@@ -42,11 +54,17 @@ static lam_status start(size_t n, size_t n_channels, const float *reflectance, c
     TRY(operator_init(&self->base, &operator_hierarchical, n, n_channels, reflectance, error));
     self->root_area = memory_allocate(n, sizeof *self->root_area, "operator", error);
     self->K = memory_allocate(n_channels, sizeof *self->K, "operator", error);
-    if (self->root_area == NULL || self->K == NULL) TRY(LAM_ERR_MEMORY);
+    self->fast = memory_allocate(n_channels, sizeof *self->fast, "operator", error);
+    self->left = memory_allocate(n_channels, n * sizeof *self->left, "operator", error);
+    if (self->root_area == NULL || self->left == NULL || self->K == NULL || self->fast == NULL)
+        TRY(LAM_ERR_MEMORY);
+    TRY(operator_set_order(&self->base, order, error));
     for (size_t p = 0; p < n; p++) {
         self->root_area[p] = (float)sqrt(area[p]);
         if (!(self->root_area[p] > 0 && self->root_area[p] < INFINITY))
             FAIL(error, LAM_ERR_NUMERIC, "area of position %zu = %g, must be above 0", p, area[p]);
+        for (size_t c = 0; c < n_channels; c++)
+            self->left[c * n + p] = operator_reflectance_or_one(&self->base, c, p) / self->root_area[p];
     }
     *out = self;
     self = NULL;
@@ -55,15 +73,35 @@ done:
     return status;
 }
 
+/* What answers need of basis and K. */
+static lam_status finish(hierarchical *self, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = self->base.n, C = self->base.n_channels;
+    bool *used = memory_allocate(n, sizeof *used, "operator", error);
+    if (used == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t c = 0; c < C; c++)
+        for (size_t i = 0; i < n; i++)
+            used[i] = used[i] || self->K[c].rows.indptr[i + 1] > self->K[c].rows.indptr[i];
+    TRY(wavelet_plan_create(&self->basis, used, &self->plan, error));
+    for (size_t c = 0; c < C; c++) {
+        TRY(half_matrix_compact(&self->K[c], self->plan.coefficient, self->plan.n_used, error));
+        TRY(sliced_create(&self->K[c].rows, &self->fast[c], error));
+    }
+done:
+    free(used);
+    return status;
+}
+
 lam_status operator_hierarchical_create(size_t n, size_t n_channels, const float *reflectance,
-                                        const double *area, hierarchical_arrays *arrays, lam_operator **op,
-                                        lam_error *error) {
+                                        const double *area, const uint32_t *order,
+                                        hierarchical_arrays *arrays, lam_operator **op, lam_error *error) {
     lam_status status = LAM_OK;
     hierarchical *self = NULL;
-    TRY(start(n, n_channels, reflectance, area, &self, error));
+    TRY(start(n, n_channels, reflectance, area, order, &self, error));
     for (size_t c = 0; c < n_channels; c++) TRY(half_matrix_create(&arrays->K[c], &self->K[c], error));
     self->basis = arrays->basis;
     arrays->basis = (wavelets){.n = 0};
+    TRY(finish(self, error));
     *op = &self->base;
     self = NULL;
 done:
@@ -74,8 +112,8 @@ done:
 
 /* --- the store ----------------------------------------------------------------------------------------- */
 
-/* Areas in the order of positions. */
-static lam_status read_area(store *s, size_t n, double **out, lam_error *error) {
+/* Areas in the order of positions, and that order; NULL: mesh order. */
+static lam_status read_area(store *s, size_t n, double **out, uint32_t **out_order, lam_error *error) {
     lam_status status = LAM_OK;
     void *area = NULL, *order = NULL;
     double *placed = memory_allocate(n, sizeof *placed, "operator", error);
@@ -90,7 +128,9 @@ static lam_status read_area(store *s, size_t n, double **out, lam_error *error) 
         placed[p] = ((double *)area)[i];
     }
     *out = placed;
+    *out_order = order;
     placed = NULL;
+    order = NULL;
 done:
     free(area);
     free(order);
@@ -103,18 +143,21 @@ static lam_status hierarchical_load(store *s, size_t n, size_t n_channels, const
     lam_status status = LAM_OK;
     char group[48];
     double *area = NULL;
+    uint32_t *order = NULL;
     hierarchical *self = NULL;
-    TRY(read_area(s, n, &area, error));
-    TRY(start(n, n_channels, reflectance, area, &self, error));
+    TRY(read_area(s, n, &area, &order, error));
+    TRY(start(n, n_channels, reflectance, area, order, &self, error));
     TRY(wavelets_load(s, "/operator/basis", n, &self->basis, error));
     for (size_t c = 0; c < n_channels; c++) {
         snprintf(group, sizeof group, "/operator/K/%zu", c);
         TRY(half_matrix_load(s, group, n, &self->K[c], error));
     }
+    TRY(finish(self, error));
     *op = &self->base;
     self = NULL;
 done:
     free(area);
+    free(order);
     if (self != NULL) lam_operator_close(&self->base);
     return status;
 }
@@ -136,47 +179,67 @@ done:
 
 static size_t hierarchical_work_bytes(const lam_operator *op, size_t n_rhs) {
     const hierarchical *self = (const hierarchical *)op;
-    const size_t product = sparse_product_work(op->n, n_rhs);
-    size_t vectors, slots, total = PANEL_ALIGN;
-    if (product == 0 || !size_multiply(op->n, n_rhs * sizeof(float), &vectors) ||
-        !size_multiply(wavelets_work(&self->basis), n_rhs * sizeof(float), &slots) ||
-        !work_add(&total, vectors) || !work_add(&total, vectors) || !work_add(&total, slots) ||
-        !work_add(&total, product))
+    const size_t used = self->plan.n_used, product = sparse_product_work(used, 1);
+    size_t side, vectors, coefficients, slots, total = PANEL_ALIGN;
+    if (product == 0 || !size_multiply(sliced_work(used, n_rhs), sizeof(float), &side) ||
+        !size_multiply(op->n, n_rhs * sizeof(float), &vectors) ||
+        !size_multiply(used, n_rhs * sizeof(float), &coefficients) ||
+        !size_multiply(wavelet_plan_work(&self->plan), n_rhs * sizeof(float), &slots) ||
+        !work_add(&total, vectors) || !work_add(&total, coefficients) || !work_add(&total, coefficients) ||
+        !work_add(&total, slots) || !work_add(&total, side) || !work_add(&total, product))
         return 0;
     return total;
 }
 
-/* Y = W^T K_c W X of m vectors, [m][n]; X is lost. */
-static void multiply(const hierarchical *self, size_t c, size_t m, float *X, float *Y, float *slots,
-                     void *product) {
-    const size_t n = self->base.n, n_threads = self->base.n_threads;
-    const sparse_pair K = {&self->K[c].rows, &self->K[c].rows, n_threads}; /* symmetric */
-    wavelets_forward(&self->basis, m, X, Y, slots, n_threads);
-    sparse_product(&K, m, Y, n, 0, NULL, NULL, X, n, product);
-    wavelets_inverse(&self->basis, m, X, Y, slots, n_threads);
+/* out_v = K_c in_v: light of few elements by its columns, other vectors together. */
+static void multiply_core(const hierarchical *self, size_t c, size_t m, const float *in, float *out,
+                          float *side, void *product) {
+    const csr *K = &self->K[c].rows;
+    const size_t n = K->n, n_threads = self->base.n_threads;
+    const sparse_pair symmetric = {K, K, n_threads};
+    for (size_t v = 0, last; v < m; v = last) {
+        last = v;
+        while (last < m && !sparse_product_by_columns(K, in + last * n)) last++;
+        if (last > v) {
+            sliced_multiply(&self->fast[c], last - v, in + v * n, out + v * n, side, n_threads);
+        } else {
+            sparse_product(&symmetric, 1, in + v * n, n, 0, NULL, NULL, out + v * n, n, product);
+            last++;
+        }
+    }
+}
+
+/* to_v = by from_v, element by element. */
+static void scale(size_t m, size_t n, const float *by, const float *from, size_t from_stride, float *to,
+                  size_t to_stride, size_t n_threads) {
+    const size_t blocks = (n + BLOCK - 1) / BLOCK;
+#pragma omp parallel for schedule(static) num_threads((int)n_threads) if (n_threads > 1 && m * blocks > 8)
+    for (size_t k = 0; k < m * blocks; k++) {
+        const size_t v = k / blocks, first = k % blocks * BLOCK, last = first + BLOCK < n ? first + BLOCK : n;
+        const float *x = from + v * from_stride;
+        float *y = to + v * to_stride;
+        for (size_t p = first; p < last; p++) y[p] = by[p] * x[p];
+    }
 }
 
 /* out = left W^T K W right in, left = R' A^-1/2 and right = A^1/2, or transposed. */
 static void apply(const lam_operator *op, bool adjoint, size_t n_rhs, const float *in, float *out,
                   void *work) {
     const hierarchical *self = (const hierarchical *)op;
-    const size_t n = op->n, C = op->n_channels;
+    const wavelet_plan *plan = &self->plan;
+    const size_t n = op->n, C = op->n_channels, n_threads = op->n_threads;
     float *X = work_take(&work, n_rhs * n * sizeof *X);
-    float *Y = work_take(&work, n_rhs * n * sizeof *Y);
-    float *slots = work_take(&work, n_rhs * wavelets_work(&self->basis) * sizeof *slots);
+    float *from = work_take(&work, n_rhs * plan->n_used * sizeof *from);
+    float *to = work_take(&work, n_rhs * plan->n_used * sizeof *to);
+    float *slots = work_take(&work, n_rhs * wavelet_plan_work(plan) * sizeof *slots);
+    float *side = work_take(&work, sliced_work(plan->n_used, n_rhs) * sizeof *side);
     for (size_t c = 0; c < C; c++) {
-        for (size_t v = 0; v < n_rhs; v++)
-            for (size_t p = 0; p < n; p++) {
-                const float x = in[(v * C + c) * n + p], root = self->root_area[p];
-                X[v * n + p] = adjoint ? operator_reflectance_or_one(op, c, p) / root * x : root * x;
-            }
-        multiply(self, c, n_rhs, X, Y, slots, work);
-        for (size_t v = 0; v < n_rhs; v++)
-            for (size_t p = 0; p < n; p++) {
-                const float y = Y[v * n + p], root = self->root_area[p];
-                out[(v * C + c) * n + p] =
-                    adjoint ? root * y : operator_reflectance_or_one(op, c, p) / root * y;
-            }
+        const float *left = self->left + c * n, *root = self->root_area;
+        scale(n_rhs, n, adjoint ? left : root, in + c * n, C * n, X, n, n_threads);
+        wavelet_plan_forward(plan, n_rhs, X, from, slots, n_threads);
+        multiply_core(self, c, n_rhs, from, to, side, work);
+        wavelet_plan_inverse(plan, n_rhs, to, X, slots, n_threads);
+        scale(n_rhs, n, adjoint ? root : left, X, n, out + c * n, C * n, n_threads);
     }
 }
 
@@ -193,11 +256,12 @@ static void hierarchical_describe(const lam_operator *op, operator_description *
     const double whole = (double)op->n * (double)op->n * (double)op->n_channels;
     double entries = 0;
     for (size_t c = 0; c < op->n_channels; c++) {
-        const size_t stored = (size_t)self->K[c].rows.indptr[op->n];
+        const size_t stored = (size_t)self->K[c].rows.indptr[self->plan.n_used];
         entries += (double)stored;
-        description->bytes += (op->n + 1) * sizeof(uint64_t) + stored * (sizeof(uint32_t) + sizeof(float));
+        description->bytes +=
+            (self->plan.n_used + 1) * sizeof(uint64_t) + stored * (sizeof(uint32_t) + sizeof(float));
     }
-    description->bytes += wavelets_bytes(&self->basis) + op->n * sizeof *self->root_area;
+    description->bytes += wavelet_plan_bytes(&self->plan) + (1 + op->n_channels) * op->n * sizeof(float);
     description->density = entries / whole;
 }
 

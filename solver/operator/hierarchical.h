@@ -15,23 +15,29 @@ typedef struct hierarchical_arrays {
 
 void hierarchical_arrays_free(hierarchical_arrays *arrays, size_t n_channels);
 
-/* area [n] is by position, that is in the order of the basis. Numbers of K are rounded to half precision.
- * Takes over what arrays points to, also on an error, and zeroes it. Errors: as operator_init;
- * LAM_ERR_NUMERIC for an area or a number that cannot be. */
+/* area [n] is by position, that is in the order of the basis, which order [n] says (copied; NULL: mesh
+ * order). Numbers of K are rounded to half precision. Takes over what arrays points to, also on an error, and
+ * zeroes it. Errors: as operator_init; LAM_ERR_NUMERIC for an area or a number that cannot be. */
 lam_status operator_hierarchical_create(size_t n, size_t n_channels, const float *reflectance,
-                                        const double *area, hierarchical_arrays *arrays, lam_operator **op,
-                                        lam_error *error);
+                                        const double *area, const uint32_t *order,
+                                        hierarchical_arrays *arrays, lam_operator **op, lam_error *error);
 
 /* --- half a symmetric matrix in a store: hierarchical_store.c ------------------------------------------ */
 
 /* A symmetric matrix with its numbers in half precision, times scale. */
 typedef struct half_matrix {
-    csr rows; /* all of it, both triangles */
+    size_t n;               /* rows and columns, empty ones included */
+    csr rows;               /* all of it, both triangles */
+    const uint32_t *number; /* what its rows and columns are, ascending; NULL: all n. Not owned */
     float scale;
 } half_matrix;
 
 /* From the upper triangle of a; its numbers are rounded. Errors: LAM_ERR_NUMERIC, LAM_ERR_MEMORY. */
 lam_status half_matrix_create(const csr *a, half_matrix *out, lam_error *error);
+
+/* Leaves out rows and columns that are not among number [count], which has all that are not empty and must
+ * outlive m. Errors: LAM_ERR_MEMORY. */
+lam_status half_matrix_compact(half_matrix *m, const uint32_t *number, size_t count, lam_error *error);
 
 /* Both triangles of a symmetric matrix from its upper one, without zeros; freed with csr_free. Errors:
  * LAM_ERR_MEMORY. */

@@ -55,7 +55,7 @@ done:
 
 lam_status half_matrix_create(const csr *a, half_matrix *out, lam_error *error) {
     lam_status status = LAM_OK;
-    half_matrix made = {.scale = 1};
+    half_matrix made = {.n = a->n, .scale = 1};
     csr rounded = *a; /* but for its numbers */
     float largest = 0;
     int exponent;
@@ -80,13 +80,44 @@ done:
     return status;
 }
 
-/* Calls visit for every number that is stored of row i; returns how many. */
+lam_status half_matrix_compact(half_matrix *m, const uint32_t *number, size_t count, lam_error *error) {
+    lam_status status = LAM_OK;
+    const csr *a = &m->rows;
+    const size_t entries = (size_t)a->indptr[a->n];
+    csr made = {.n = count, .indptr = memory_allocate(count + 1, sizeof *made.indptr, "operator", error)};
+    uint32_t *place = memory_allocate(a->n, sizeof *place, "operator", error);
+    made.indices = memory_allocate(entries, sizeof *made.indices, "operator", error);
+    made.data = memory_allocate(entries, sizeof *made.data, "operator", error);
+    if (made.indptr == NULL || place == NULL || made.indices == NULL || made.data == NULL)
+        TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < count; k++) place[number[k]] = (uint32_t)k;
+    for (size_t k = 0; k < count; k++) {
+        uint64_t used = made.indptr[k];
+        for (uint64_t e = a->indptr[number[k]]; e < a->indptr[number[k] + 1]; e++) {
+            made.indices[used] = place[a->indices[e]];
+            made.data[used++] = a->data[e];
+        }
+        made.indptr[k + 1] = used;
+    }
+    csr_free(&m->rows);
+    m->rows = made;
+    m->number = number;
+    made = (csr){.n = 0};
+done:
+    free(place);
+    csr_free(&made);
+    return status;
+}
+
+/* Calls visit for every number that is stored of a row; returns how many. */
 typedef void visit_number(void *context, uint16_t step, float value);
 
-static size_t each_stored(const csr *rows, size_t i, visit_number *visit, void *context) {
+static size_t each_stored(const half_matrix *m, size_t row, visit_number *visit, void *context) {
+    const csr *rows = &m->rows;
+    const size_t i = m->number != NULL ? m->number[row] : row;
     size_t count = 0, at = i;
-    for (uint64_t e = rows->indptr[i]; e < rows->indptr[i + 1]; e++) {
-        const size_t j = rows->indices[e];
+    for (uint64_t e = rows->indptr[row]; e < rows->indptr[row + 1]; e++) {
+        const size_t column = rows->indices[e], j = m->number != NULL ? m->number[column] : column;
         if (j < i || rows->data[e] == 0) continue;
         for (; j - at > STEP_MOST; at += STEP_MOST, count++)
             if (visit != NULL) visit(context, STEP_MOST, 0);
@@ -111,15 +142,15 @@ static void encode(void *context, uint16_t step, float value) {
 
 lam_status half_matrix_save(const half_matrix *m, const char *group, store *s, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = m->rows.n;
+    const size_t n = m->n;
     char name[64];
     size_t most = 0, stored = 0;
     encoder to = {.scale = m->scale};
     uint32_t *counts = memory_allocate(n, sizeof *counts, "operator", error);
     uint16_t *narrow = memory_allocate(n, sizeof *narrow, "operator", error);
     if (counts == NULL || narrow == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < n; i++) {
-        const size_t count = each_stored(&m->rows, i, NULL, NULL);
+    for (size_t row = 0; row < m->rows.n; row++) {
+        const size_t count = each_stored(m, row, NULL, NULL), i = m->number != NULL ? m->number[row] : row;
         counts[i] = (uint32_t)count;
         narrow[i] = (uint16_t)count;
         stored += count;
@@ -128,7 +159,7 @@ lam_status half_matrix_save(const half_matrix *m, const char *group, store *s, l
     to.steps = memory_allocate(stored, sizeof *to.steps, "operator", error);
     to.halves = memory_allocate(stored, sizeof *to.halves, "operator", error);
     if (to.steps == NULL || to.halves == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < n; i++) (void)each_stored(&m->rows, i, encode, &to);
+    for (size_t row = 0; row < m->rows.n; row++) (void)each_stored(m, row, encode, &to);
     const bool wide = most > UINT16_MAX;
     const void *as_stored = wide ? (const void *)counts : (const void *)narrow;
     snprintf(name, sizeof name, "%s/count", group);
@@ -203,7 +234,7 @@ lam_status half_matrix_load(store *s, const char *group, size_t n, half_matrix *
     double scale;
     size_t stored[STORE_MAX_RANK] = {SIZE_MAX}, total = 0;
     csr upper = {.n = n};
-    half_matrix made = {.scale = 1};
+    half_matrix made = {.n = n, .scale = 1};
     snprintf(name, sizeof name, "%s/count", group);
     TRY(read_counts(s, name, n, &counts, error));
     snprintf(name, sizeof name, "%s/gap", group);
@@ -237,6 +268,6 @@ done:
 
 size_t half_matrix_bytes(const half_matrix *m) {
     size_t stored = 0;
-    for (size_t i = 0; i < m->rows.n; i++) stored += each_stored(&m->rows, i, NULL, NULL);
-    return stored * 2 * sizeof(uint16_t) + m->rows.n * sizeof(uint16_t);
+    for (size_t row = 0; row < m->rows.n; row++) stored += each_stored(m, row, NULL, NULL);
+    return stored * 2 * sizeof(uint16_t) + m->n * sizeof(uint16_t);
 }

@@ -48,7 +48,7 @@ size_t sparse_product_work(size_t n, size_t m) {
     return total;
 }
 
-static bool is_sparse(const csr *columns, const float *x) {
+bool sparse_product_by_columns(const csr *columns, const float *x) {
     const uint64_t most = columns->indptr[columns->n] / SPARSE_SHARE;
     uint64_t touched = 0;
     for (size_t j = 0; j < columns->n; j++)
@@ -113,7 +113,7 @@ void sparse_product(const sparse_pair *A, size_t m, const float *X, size_t x_str
     for (size_t v = 0; v < m; v++) {
         const float *x = X + v * x_stride;
         float *y = Y + v * y_stride;
-        if (!is_sparse(A->columns, x)) {
+        if (!sparse_product_by_columns(A->columns, x)) {
             dense[n_dense++] = v;
             continue;
         }

@@ -18,6 +18,9 @@ typedef struct sparse_pair {
 /* Bytes of work for m vectors, at most 16; 0 when that overflows. */
 size_t sparse_product_work(size_t n, size_t m);
 
+/* Whether x is multiplied by columns. */
+bool sparse_product_by_columns(const csr *columns, const float *x);
+
 /* Y_v = A X_v for m vectors, at most 16: X_v = X + v x_stride holds n numbers; Y_v = Y + v y_stride gets n,
  * or, where chosen is not NULL, the n_chosen rows chosen[r] (map[chosen[r]] where map is not NULL). A vector
  * that is mostly 0 is multiplied by columns, only those it touches; others by rows, together. Which way

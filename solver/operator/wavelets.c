@@ -7,16 +7,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Elements of a piece at most: several for each thread, each worth a thread's while. */
-enum { PIECE_ELEMENTS = 4096 };
-
 void wavelets_free(wavelets *w) {
     free(w->shapes);
     free(w->basis);
     free(w->nodes);
     free(w->padded);
-    free(w->pieces);
-    free(w->above);
     *w = (wavelets){.n = 0};
 }
 
@@ -88,30 +83,6 @@ done:
     return status;
 }
 
-/* The largest subtrees of at most PIECE_ELEMENTS elements, and what is above them. */
-static lam_status cut_pieces(wavelets *w, lam_error *error) {
-    lam_status status = LAM_OK;
-    uint32_t start = 0; /* of the subtree that ends at a node: its first leaf */
-    uint32_t *begin = memory_allocate(w->n_nodes, sizeof *begin, "wavelets", error);
-    w->pieces = memory_allocate(w->n_nodes, sizeof *w->pieces, "wavelets", error);
-    w->above = memory_allocate(w->n_nodes, sizeof *w->above, "wavelets", error);
-    if (begin == NULL || w->pieces == NULL || w->above == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t t = 0; t < w->n_nodes; t++) {
-        const wavelet_node *a = &w->nodes[t];
-        start = a->from_left > 0 ? begin[a->left] : (uint32_t)t;
-        begin[t] = start;
-        if (a->n_elements > PIECE_ELEMENTS) {
-            w->above[w->n_above++] = (uint32_t)t;
-            continue;
-        }
-        while (w->n_pieces > 0 && w->pieces[w->n_pieces - 1].first >= start) w->n_pieces--;
-        w->pieces[w->n_pieces++] = (wavelet_piece){start, (uint32_t)t + 1};
-    }
-done:
-    free(begin);
-    return status;
-}
-
 static lam_status pad_shapes(wavelets *w, lam_error *error) {
     const float *Q = w->basis;
     w->padded = memory_allocate(w->n_shapes, 2 * WAVELET_INPUTS * WAVELET_INPUTS * sizeof *w->padded,
@@ -145,88 +116,12 @@ lam_status wavelets_create(size_t n, size_t n_nodes, const uint32_t *node_shapes
     w.nodes = memory_allocate(n_nodes, sizeof *w.nodes, "wavelets", error);
     if (w.nodes == NULL) TRY(LAM_ERR_MEMORY);
     TRY(link_nodes(&w, node_shapes, error));
-    TRY(cut_pieces(&w, error));
     TRY(pad_shapes(&w, error));
     *out = w;
     w = (wavelets){.n = 0};
 done:
     wavelets_free(&w);
     return status;
-}
-
-/* --- the transforms ------------------------------------------------------------------------------------ */
-
-#define KERNEL(name) name##_portable
-#define TARGET
-#include "solver/operator/wavelet_kernels.h"
-
-#if defined(__x86_64__)
-#define KERNEL(name) name##_avx2
-#define TARGET __attribute__((target("avx2,fma")))
-#include "solver/operator/wavelet_kernels.h"
-#endif
-
-typedef void transform(const wavelets *w, size_t first, size_t last, const uint32_t *which, const float *from,
-                       float *to, float *s);
-
-static bool has_avx2(void) {
-#if defined(__x86_64__)
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-#else
-    return false;
-#endif
-}
-
-static transform *forward_kernel(void) {
-#if defined(__x86_64__)
-    if (has_avx2()) return forward_avx2;
-#endif
-    return forward_portable;
-}
-
-static transform *inverse_kernel(void) {
-#if defined(__x86_64__)
-    if (has_avx2()) return inverse_avx2;
-#endif
-    return inverse_portable;
-}
-
-void wavelets_forward(const wavelets *w, size_t m, const float *X, float *C, float *work, size_t n_threads) {
-    transform *const run = forward_kernel();
-    const size_t room = wavelets_work(w), n_pieces = w->n_pieces;
-#pragma omp parallel for schedule(dynamic, 1)                                                                \
-    num_threads((int)n_threads) if (n_threads > 1 && m * n_pieces > 1)
-    for (size_t k = 0; k < m * n_pieces; k++) {
-        const size_t v = k / n_pieces;
-        const wavelet_piece *piece = &w->pieces[k % n_pieces];
-        run(w, piece->first, piece->last, NULL, X + v * w->n, C + v * w->n, work + v * room);
-    }
-    const wavelet_node *root = &w->nodes[w->n_nodes - 1];
-    for (size_t v = 0; v < m; v++) {
-        float *c = C + v * w->n;
-        const float *s = work + v * room + (w->n_nodes - 1) * WAVELET_SCALING;
-        run(w, 0, w->n_above, w->above, X + v * w->n, c, work + v * room);
-        for (size_t k = 0; k < root->scaling; k++) c[w->n - root->scaling + k] = s[k];
-    }
-}
-
-void wavelets_inverse(const wavelets *w, size_t m, const float *C, float *X, float *work, size_t n_threads) {
-    transform *const run = inverse_kernel();
-    const size_t room = wavelets_work(w), n_pieces = w->n_pieces;
-    const wavelet_node *root = &w->nodes[w->n_nodes - 1];
-    for (size_t v = 0; v < m; v++) {
-        const float *c = C + v * w->n;
-        float *s = work + v * room + (w->n_nodes - 1) * WAVELET_SCALING;
-        for (size_t k = 0; k < root->scaling; k++) s[k] = c[w->n - root->scaling + k];
-        run(w, 0, w->n_above, w->above, c, X + v * w->n, work + v * room);
-    }
-#pragma omp parallel for schedule(dynamic, 1)                                                                \
-    num_threads((int)n_threads) if (n_threads > 1 && m * n_pieces > 1)
-    for (size_t k = 0; k < m * n_pieces; k++) {
-        const size_t v = k / n_pieces;
-        const wavelet_piece *piece = &w->pieces[k % n_pieces];
-        run(w, piece->first, piece->last, NULL, C + v * w->n, X + v * w->n, work + v * room);
-    }
 }
 
 /* --- the store ----------------------------------------------------------------------------------------- */
@@ -269,9 +164,4 @@ done:
     free(basis);
     free(nodes);
     return status;
-}
-
-size_t wavelets_bytes(const wavelets *w) {
-    return w->n_nodes * sizeof *w->nodes +
-           w->n_shapes * 2 * WAVELET_INPUTS * WAVELET_INPUTS * sizeof *w->padded;
 }

@@ -41,11 +41,8 @@ typedef struct wavelets {
     wavelet_shape *shapes; /* [n_shapes] */
     float *basis;          /* of shape after shape, [inputs][inputs] */
     size_t basis_count;
-    wavelet_node *nodes;   /* [n_nodes], postorder: children before their parent, the left one first */
-    float *padded;         /* [n_shapes][2][8][8]: columns of the matrix, then its rows */
-    wavelet_piece *pieces; /* [n_pieces] */
-    uint32_t *above;       /* [n_above], the nodes in no piece, postorder */
-    size_t n_pieces, n_above;
+    wavelet_node *nodes; /* [n_nodes], postorder: children before their parent, the left one first */
+    float *padded;       /* [n_shapes][2][8][8]: columns of the matrix, then its rows */
 } wavelets;
 
 void wavelets_free(wavelets *w);
@@ -57,24 +54,9 @@ lam_status wavelets_create(size_t n, size_t n_nodes, const uint32_t *node_shapes
                            wavelet_shape *shapes, float *basis, size_t basis_count, wavelets *out,
                            lam_error *error);
 
-/* Floats of work for one vector. */
-static inline size_t wavelets_work(const wavelets *w) {
-    return w->n_nodes * WAVELET_SCALING;
-}
-
-/* C_v = W X_v for m vectors: X_v = X + v n, C_v = C + v n; work: m wavelets_work floats. The bits depend on
- * neither m nor n_threads. */
-void wavelets_forward(const wavelets *w, size_t m, const float *X, float *C, float *work, size_t n_threads);
-
-/* X_v = W^T C_v, likewise. */
-void wavelets_inverse(const wavelets *w, size_t m, const float *C, float *X, float *work, size_t n_threads);
-
 /* GROUP/shape [n_shapes][3] u32, basis [basis_count] f32, node [n_nodes] u32. Errors: as store_read;
  * LAM_ERR_NUMERIC as wavelets_create. */
 lam_status wavelets_save(const wavelets *w, const char *group, store *s, lam_error *error);
 lam_status wavelets_load(store *s, const char *group, size_t n, wavelets *out, lam_error *error);
-
-/* Bytes of it that a transform reads. */
-size_t wavelets_bytes(const wavelets *w);
 
 #endif

@@ -266,8 +266,9 @@ static inline void make_hierarchical(transport *t, uint64_t *state) {
     }
     /* Two transforms, K's rows, A^1/2 x, rho' / A^1/2, its product. */
     t->roundings = 2 * roundings + sum_roundings(n) + 4;
-    ck_assert_msg(operator_hierarchical_create(n, C, t->reflectance, area, &arrays, &t->op, &error) == LAM_OK,
-                  "%s", error.message);
+    ck_assert_msg(
+        operator_hierarchical_create(n, C, t->reflectance, area, t->order, &arrays, &t->op, &error) == LAM_OK,
+        "%s", error.message);
     free(W);
     free(size);
     free(area);

@@ -5,6 +5,7 @@
 #include "solver/build/wavelet_inverse.h"
 #include "solver/build/wavelet_pass.h"
 #include "solver/formfactor/formfactor.h"
+#include "solver/operator/wavelet_plan.h"
 #include "support/box_problem.h"
 #include "support/dense.h"
 #include "support/scene.h"
@@ -24,7 +25,8 @@ typedef struct subject {
     double (*centre)[3];
     plane_tree tree;
     wavelets basis;
-    double *W; /* [n][n], by its columns' positions; NULL until asked for */
+    wavelet_plan plan; /* of all coefficients */
+    double *W;         /* [n][n], by its columns' positions; NULL until asked for */
 } subject;
 
 enum { BOX, ROOM, CITY, MAZE, SUBJECTS };
@@ -43,6 +45,16 @@ static void scene(subject *s, const char *kind, size_t elements) {
     form_factors_free(&f);
 }
 
+static wavelet_plan plan_of_all(const wavelets *basis) {
+    wavelet_plan plan;
+    bool *used = test_allocate(basis->n, sizeof *used);
+    memset(used, true, basis->n * sizeof *used);
+    ck_ok(wavelet_plan_create(basis, used, &plan, &error));
+    ck_assert_uint_eq(plan.n_used, basis->n);
+    free(used);
+    return plan;
+}
+
 static subject subject_make(int which) {
     subject s = {.W = NULL};
     if (which == BOX || which == ROOM) {
@@ -59,6 +71,7 @@ static subject subject_make(int which) {
     ck_ok(
         plane_tree_make(n, (const double(*)[3])s.centre, (const float(*)[3])s.m.normal, 6, &s.tree, &error));
     ck_ok(wavelet_basis_make(&s.tree, s.m.area, (const double(*)[3])s.centre, &s.basis, &error));
+    s.plan = plan_of_all(&s.basis);
     return s;
 }
 
@@ -69,15 +82,16 @@ static void subject_free(subject *s) {
     free(s->centre);
     free(s->W);
     plane_tree_free(&s->tree);
+    wavelet_plan_free(&s->plan);
     wavelets_free(&s->basis);
 }
 
 static void transform(const subject *s, bool back, const float *from, float *to) {
-    float *work = test_allocate(wavelets_work(&s->basis), sizeof *work);
+    float *work = test_allocate(wavelet_plan_work(&s->plan), sizeof *work);
     if (back)
-        wavelets_inverse(&s->basis, 1, from, to, work, 1);
+        wavelet_plan_inverse(&s->plan, 1, from, to, work, 1);
     else
-        wavelets_forward(&s->basis, 1, from, to, work, 1);
+        wavelet_plan_forward(&s->plan, 1, from, to, work, 1);
     free(work);
 }
 
@@ -300,16 +314,18 @@ START_TEST(bits_do_not_depend_on_threads) {
     }
     ck_ok(plane_tree_make(N, (const double(*)[3])centre, (const float(*)[3])normal, 6, &tree, &error));
     ck_ok(wavelet_basis_make(&tree, area, (const double(*)[3])centre, &w, &error));
-    ck_assert_uint_gt(w.n_pieces, 2);
-    ck_assert_uint_gt(w.n_above, 2);
-    float *work = test_allocate(VECTORS * wavelets_work(&w), sizeof *work);
+    wavelet_plan plan = plan_of_all(&w);
+    ck_assert_uint_gt(plan.n_pieces, 2);
+    ck_assert_uint_gt(plan.n_above, 2);
+    float *work = test_allocate(VECTORS * wavelet_plan_work(&plan), sizeof *work);
     for (size_t k = 0; k < VECTORS * N; k++) X[k] = (float)random_unit(&seed);
     for (int back = 0; back < 2; back++) {
         for (size_t v = 0; v < VECTORS; v++)
-            (back ? wavelets_inverse : wavelets_forward)(&w, 1, X + v * N, one + v * N, work, 1);
-        (back ? wavelets_inverse : wavelets_forward)(&w, VECTORS, X, many, work, 4);
+            (back ? wavelet_plan_inverse : wavelet_plan_forward)(&plan, 1, X + v * N, one + v * N, work, 1);
+        (back ? wavelet_plan_inverse : wavelet_plan_forward)(&plan, VECTORS, X, many, work, 4);
         ck_assert_mem_eq(one, many, VECTORS * N * sizeof *one);
     }
+    wavelet_plan_free(&plan);
     wavelets_free(&w);
     plane_tree_free(&tree);
     free(centre);
@@ -319,6 +335,51 @@ START_TEST(bits_do_not_depend_on_threads) {
     free(one);
     free(many);
     free(work);
+}
+END_TEST
+
+/* Without what is not in use: the other coefficients are the same, and come back as if those were 0. */
+START_TEST(a_plan_leaves_out_what_is_not_used) {
+    subject s = subject_make(_i % SUBJECTS);
+    const size_t n = s.m.n, every = _i / SUBJECTS == 0 ? 40 : n;
+    wavelet_plan plan;
+    bool *used = test_allocate(n, sizeof *used);
+    float *x = test_allocate(n, sizeof *x), *c = test_allocate(n, sizeof *c),
+          *some = test_allocate(n, sizeof *some), *back = test_allocate(n, sizeof *back),
+          *truth = test_allocate(n, sizeof *truth);
+    uint64_t seed = 3;
+    for (size_t k = 0; k < n; k++) {
+        used[k] = k % every == every - 1;
+        x[k] = (float)random_unit(&seed);
+    }
+    ck_ok(wavelet_plan_create(&s.basis, used, &plan, &error));
+    ck_assert_uint_lt(plan.n_used, every == n ? 4 : n / 2);
+    ck_assert_uint_lt(plan.n_steps, s.plan.n_steps);
+    float *work = test_allocate(wavelet_plan_work(&plan), sizeof *work);
+    transform(&s, false, x, c);
+    for (size_t p = 0; p < n; p++) back[p] = NAN;
+    wavelet_plan_forward(&plan, 1, x, some, work, 1);
+    wavelet_plan_inverse(&plan, 1, some, back, work, 1);
+    for (size_t k = 0; k < plan.n_used; k++) {
+        const uint32_t at = plan.coefficient[k];
+        ck_each(k == 0 || at > plan.coefficient[k - 1]);
+        ck_each(fabs((double)some[k] - (double)c[at]) <= sqrt((double)n) * TRANSFORM_U);
+        truth[at] = c[at];
+        used[at] = false;
+    }
+    for (size_t k = 0; k < n; k++) ck_each(!used[k]);
+    transform(&s, true, truth, c);
+    for (size_t p = 0; p < n; p++)
+        ck_each(fabs((double)back[p] - (double)c[p]) <= sqrt((double)n) * 2 * TRANSFORM_U);
+    wavelet_plan_free(&plan);
+    free(work);
+    free(used);
+    free(x);
+    free(c);
+    free(some);
+    free(back);
+    free(truth);
+    subject_free(&s);
 }
 END_TEST
 
@@ -458,6 +519,7 @@ int main(void) {
     tcase_add_loop_test(tests, smooth_functions_are_few_numbers, 0, SUBJECTS);
     tcase_add_test(tests, grids_have_few_shapes);
     tcase_add_test(tests, bits_do_not_depend_on_threads);
+    tcase_add_loop_test(tests, a_plan_leaves_out_what_is_not_used, 0, 2 * SUBJECTS);
     tcase_add_loop_test(tests, a_pass_finds_every_coefficient, 0, SUBJECTS);
     tcase_add_loop_test(tests, reflectances_in_the_basis, 0, SUBJECTS * REFLECTANCES);
     tcase_add_loop_test(tests, doubling_inverts, 0, SUBJECTS * REFLECTANCES);
