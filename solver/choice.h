@@ -13,7 +13,8 @@ typedef struct choice_request {
     uint64_t rays;     /* CHOICE_AUTO */
     size_t resolution; /* of hemicubes in place of rays; 0: none */
     uint64_t seed;
-    bool sky; /* what leaves the scene matters too */
+    bool sky;      /* what leaves the scene matters too */
+    bool filtered; /* the method takes out most of the noise of rays: few are enough */
 } choice_request;
 
 /* More elements than these have more pairs than anybody waits for. */

@@ -105,8 +105,10 @@ static bool unused_by_method(const char *name, const precompute_arguments *f, co
                                              "levels",     "rank",    NULL};
     const bool two_mesh = strcmp(built->method, "2msc") == 0;
     const bool emitters = strcmp(built->method, "emitters") == 0;
+    const bool hierarchical = strcmp(built->method, "hierarchical") == 0;
     const bool rank_given = f->rank > 0;
-    if (is_among(name, of_sparse)) return built->threshold <= 0;
+    if (is_among(name, of_sparse)) return strcmp(built->method, "sparse") != 0;
+    if (hierarchical && strcmp(name, "epsilon") == 0) return false;
     if (strcmp(name, "emitters") == 0) return !emitters;
     if (strcmp(name, "store-precision") == 0 || strcmp(name, "keep-factors") == 0)
         return strcmp(built->method, "exact") == 0 || built->threshold > 0 || emitters;

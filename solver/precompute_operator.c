@@ -1,6 +1,7 @@
 /* The operator of a precompute and its measured errors. */
 #include "solver/clock.h"
 #include "solver/element_geometry.h"
+#include "solver/formfactor/first_light.h"
 #include "solver/narrow.h"
 #include "solver/precompute_work.h"
 
@@ -66,7 +67,14 @@ lam_status work_build(work *w, lam_error *error) {
     TRY(build_operator(&problem, &how, &w->op, &w->built, error));
     const double noise = recipe_noise(&w->f.recipe);
     const bool patches = w->built.coherence >= 0;
-    const bool tried = !patches && (w->built.factorizer != NULL || w->built.factorize_seconds > 0);
+    const bool hierarchical = w->built.uniform_error >= 0;
+    const bool tried =
+        !patches && !hierarchical && (w->built.factorizer != NULL || w->built.factorize_seconds > 0);
+    if (hierarchical) {
+        terminal_log(w->t, "%-14s%8.2f s", "wavelets", w->built.factorize_seconds);
+        terminal_log(w->t, "residual of light all over %.2g, of light that is 1 everywhere %.2g",
+                     w->built.probe_residual, w->built.uniform_error);
+    }
     if (w->built.factorizer != NULL || patches) {
         terminal_log(w->t, "%-14s%8.2f s", "factorize", w->built.factorize_seconds);
         terminal_log(w->t, "rank %zu of %zu, real norm error %.3g in the %s", w->built.rank, w->m.n,
@@ -111,6 +119,7 @@ lam_status work_judge(work *w, lam_error *error) {
     const emitter_source emitters = work_emitters(w);
     const build_problem problem = work_problem(w, &emitters);
     uint64_t purpose = 0, seed;
+    first_light *first = NULL;
     for (int h = 0; h < 2; h++) {
         /* Independent of what was factorized: kept form factors may have any seed. */
         do seed = precompute_seed(w->options->form_factors.seed, ++purpose);
@@ -125,11 +134,16 @@ lam_status work_judge(work *w, lam_error *error) {
         work_log_kept(w, &half[h]);
     }
     TRY(form_factors_mean(&half[0], &half[1], &mean, error));
+    /* Of rays the light of one element is mostly noise. */
+    if (recipe_noise(&w->f.recipe) > 0)
+        TRY(first_light_create(&w->m, precompute_seed(w->options->form_factors.seed, 5), &first, error));
     const judge_input input = {.problem = &problem,
                                .row_sums = w->f.row_sums,
                                .emission = w->m.emission,
                                .independent = &mean.F,
                                .halves = {&half[0].F, &half[1].F},
+                               .first_light = first != NULL ? first_light_for_judge : NULL,
+                               .first_light_context = first,
                                .probes = w->probes,
                                .seed = precompute_seed(w->options->form_factors.seed, 3),
                                .progress = &w->progress};
@@ -141,6 +155,7 @@ lam_status work_judge(work *w, lam_error *error) {
         TRY(narrow_advise(w->op, &w->errors, w->m.area, precompute_seed(w->options->form_factors.seed, 4),
                           w->t, error));
 done:
+    first_light_destroy(first);
     form_factors_free(&half[0]);
     form_factors_free(&half[1]);
     form_factors_free(&mean);

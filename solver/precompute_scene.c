@@ -63,12 +63,19 @@ static double elements_after(const mesh *m, const precompute_options *o) {
     return fmax(n, (double)how->elements);
 }
 
+/* What was asked for, and what the method makes of it. */
+static choice_request asked_of(const precompute_options *o) {
+    choice_request asked = o->form_factors;
+    asked.filtered = strcmp(o->method, "hierarchical") == 0;
+    return asked;
+}
+
 recipe work_judge_recipe(const work *w, uint64_t seed) {
-    const choice_request *asked = &w->options->form_factors;
+    const choice_request asked = asked_of(w->options);
     const recipe *of = &w->recipe;
-    recipe r = recipe_of_judge(of, choice_rays(asked), seed);
-    if (w->options->from_store && r.method == RECIPE_RAYS && asked->rays != CHOICE_AUTO)
-        r.rays = (size_t)asked->rays;
+    recipe r = recipe_of_judge(of, choice_rays(&asked), seed);
+    if (w->options->from_store && r.method == RECIPE_RAYS && asked.rays != CHOICE_AUTO)
+        r.rays = (size_t)asked.rays;
     return r;
 }
 
@@ -111,6 +118,7 @@ static lam_status check_memory(work *w, double n, lam_error *error) {
     if (n > 4e9)
         return status_fail(error, LAM_ERR_MEMORY, "%s: %.3g elements, must be below 4e9; refine less",
                            o->input, n);
+    const choice_request asked = asked_of(o);
     forecast f;
     /* All pairs where they are affordable, and the disk in place of memory only where there is no other way.
      */
@@ -119,7 +127,7 @@ static lam_status check_memory(work *w, double n, lam_error *error) {
         const bool all_pairs = way % 2 == 0;
         if (all_pairs && !pairs_too) continue;
         w->large = way >= 2;
-        w->recipe = o->from_store ? w->f.recipe : choice_recipe(&o->form_factors, all_pairs);
+        w->recipe = o->from_store ? w->f.recipe : choice_recipe(&asked, all_pairs);
         f = work_forecast(w, n);
         if (forecast_bytes(&f) <= w->memory) break;
     }

@@ -27,6 +27,10 @@ static lam_status describe_operator(const work *w, store *s, lam_error *error) {
         if (strcmp(r->method, "sparse") == 0)
             TRY(store_set_text(s, "/operator", "correction", sparse_correction_name(r->correction), error));
     }
+    if (r->uniform_error >= 0) {
+        TRY(store_set_number(s, "/operator", "probe_residual", r->probe_residual, error));
+        TRY(store_set_number(s, "/operator", "uniform_error", r->uniform_error, error));
+    }
     if (r->residual >= 0) {
         TRY(store_set_number(s, "/operator", "residual", r->residual, error));
         TRY(store_set_integer(s, "/operator", "sweeps", (int64_t)r->sweeps, error));

@@ -1,6 +1,7 @@
 /* Checks of the operator: finite, linear, energy, and its error measured again. */
 #include "solver/build/judge.h"
 #include "solver/forecast.h"
+#include "solver/formfactor/first_light.h"
 #include "solver/operator/emitters.h"
 #include "solver/operator/two_mesh.h"
 #include "solver/precompute.h"
@@ -265,6 +266,7 @@ static lam_status measure_again(examination *e, const recipe *from, error_report
     lam_status status = LAM_OK;
     form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}}, mean = {.row_sums = NULL};
     form_factor_options how = {.recipe = *from, .progress = e->progress, .stage = "form factors"};
+    first_light *first = NULL;
     uint32_t *order = memory_allocate(e->m.n, sizeof *order, "the order of the elements", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&e->m, order, error));
@@ -280,8 +282,12 @@ static lam_status measure_again(examination *e, const recipe *from, error_report
                                    .reflectance = e->m.reflectance,
                                    .F = &e->f.F,
                                    .order = order};
+    if (recipe_noise(from) > 0)
+        TRY(first_light_create(&e->m, precompute_seed(from->seed, 14), &first, error));
     const judge_input input = {.problem = &problem,
                                .row_sums = e->f.row_sums,
+                               .first_light = first != NULL ? first_light_for_judge : NULL,
+                               .first_light_context = first,
                                .emission = e->m.emission,
                                .independent = &mean.F,
                                .halves = {&half[0].F, &half[1].F},
@@ -290,6 +296,7 @@ static lam_status measure_again(examination *e, const recipe *from, error_report
                                .progress = e->progress};
     TRY(judge_operator(e->op, &input, out, error));
 done:
+    first_light_destroy(first);
     free(order);
     form_factors_free(&half[0]);
     form_factors_free(&half[1]);

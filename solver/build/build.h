@@ -71,7 +71,10 @@ typedef struct build_report {
     double measured_norm_error;   /* |S - Q V^T|; negative when not measured */
     double rcond;                 /* of the matrix inverted; 1 when none was */
     double coherence, patch_area; /* 2msc: the smallest of a patch, m^2; negative when there are no patches */
-    double threshold;             /* sparse, as reached; 0: not sparse */
+    double threshold;             /* sparse, hierarchical: as reached; 0: neither */
+    /* hierarchical, negative elsewhere: |E - (I - R F) B~| / |E| of light all over, the mean of some; |B~ -
+     * 1| / |1| of E = 1 - rho s, whose B is 1. By area, of the worst channel. */
+    double probe_residual, uniform_error;
     sparse_correction correction;
     double residual; /* emitters: of the worst; negative: no emitters */
     size_t sweeps;   /* emitters: products with F for a block of them, at most */

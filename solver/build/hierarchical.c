@@ -17,13 +17,16 @@
 /* Elements of a leaf at most. */
 enum { LEAF = 6 };
 
+/* Random lights that an operator is tried on, and rows of a product that a thread takes at once. */
+enum { SELF_PROBES = 4, ROWS_AT_ONCE = 1024 };
+
 /* Coefficients are kept from this share of epsilon on. */
 static const double share_of_epsilon = .02;
 /* Coefficients below this share of the 2-norm of the sampling error, sqrt(2 / rays), are mostly that error.
  */
-static const double share_of_noise = .06;
+static const double share_of_noise = .055;
 /* A coefficient's weight falls with the elements below it to this power: what is fine is mostly noise. */
-static const double level_exponent = .2;
+static const double level_exponent = .25;
 /* S is kept to this share of the threshold, unless what is below is noise; products on the way to the second,
  * terms of products to the third. */
 static const float share_of_S = .5f, share_inner = .25f, share_skipped = .005f;
@@ -54,6 +57,83 @@ static void place(const build_problem *problem, const uint32_t *order, size_t c,
         area[p] = problem->area[order[p]];
         rho[p] = problem->reflectance[c * problem->n + order[p]];
     }
+}
+
+/* What an operator makes of light that is known. */
+typedef struct self_check {
+    float *E, *B;
+    double *x, *h;
+    void *work;
+    size_t work_bytes;
+} self_check;
+
+/* |E - (B~ - rho F B~)| / |E| and |B~ - 1| / |1| of one channel; h = F B~. */
+static void check_channel(const build_problem *problem, const self_check *s, size_t c, double *residual,
+                          double *from_one) {
+    const size_t n = problem->n;
+    const float *rho = problem->reflectance + c * n, *E = s->E + c * n, *B = s->B + c * n;
+    double left = 0, all = 0, off = 0, area = 0;
+    for (size_t i = 0; i < n; i++) s->x[i] = (double)B[i];
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t first = 0; first < n; first += ROWS_AT_ONCE)
+        csr_multiply_rows(problem->F, first, first + ROWS_AT_ONCE < n ? first + ROWS_AT_ONCE : n, 1, s->x,
+                          s->h);
+    for (size_t i = 0; i < n; i++) {
+        const double r = (double)E[i] - (s->x[i] - (double)rho[i] * s->h[i]), a = problem->area[i];
+        left += a * r * r;
+        all += a * (double)E[i] * (double)E[i];
+        off += a * (s->x[i] - 1) * (s->x[i] - 1);
+        area += a;
+    }
+    *residual = sqrt(left / all);
+    *from_one = sqrt(off / area);
+}
+
+/* Random light all over, then E = 1 - rho s. */
+static lam_status check_itself(const build_problem *problem, const lam_operator *op, uint64_t seed,
+                               build_report *report, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = problem->n, C = problem->n_channels;
+    self_check s = {.E = memory_allocate(C, n * sizeof *s.E, "self-check", error),
+                    .B = memory_allocate(C, n * sizeof *s.B, "self-check", error),
+                    .x = memory_allocate(n, sizeof *s.x, "self-check", error),
+                    .h = memory_allocate(n, sizeof *s.h, "self-check", error),
+                    .work_bytes = lam_operator_work_bytes(op, 1)};
+    s.work = memory_allocate(1, s.work_bytes, "self-check", error);
+    if (s.E == NULL || s.B == NULL || s.x == NULL || s.h == NULL || s.work == NULL) TRY(LAM_ERR_MEMORY);
+    report->probe_residual = report->uniform_error = 0;
+    for (size_t probe = 0; probe <= SELF_PROBES; probe++) {
+        double worst = 0;
+        for (size_t i = 0; i < n; i++) {
+            double sum = 0;
+            for (uint64_t e = problem->F->indptr[i]; e < problem->F->indptr[i + 1] && probe == SELF_PROBES;
+                 e++)
+                sum += (double)problem->F->data[e];
+            for (size_t c = 0; c < C; c++) {
+                seed = seed * 6364136223846793005u + 1442695040888963407u;
+                s.E[c * n + i] = probe < SELF_PROBES
+                                     ? (float)(seed >> 40) * 0x1p-24f
+                                     : (float)fmax(1 - (double)problem->reflectance[c * n + i] * sum, 0);
+            }
+        }
+        TRY(lam_operator_apply(op, 1, LAM_RADIOSITY, s.E, s.B, s.work, s.work_bytes, error));
+        for (size_t c = 0; c < C; c++) {
+            double residual, from_one;
+            check_channel(problem, &s, c, &residual, &from_one);
+            worst = fmax(worst, probe < SELF_PROBES ? residual : from_one);
+        }
+        if (probe < SELF_PROBES)
+            report->probe_residual += worst / SELF_PROBES;
+        else
+            report->uniform_error = worst;
+    }
+done:
+    free(s.E);
+    free(s.B);
+    free(s.x);
+    free(s.h);
+    free(s.work);
+    return status;
 }
 
 static lam_status build(const build_problem *problem, const build_options *options, lam_operator **op,
@@ -109,10 +189,13 @@ static lam_status build(const build_problem *problem, const build_options *optio
     report->epsilon = -1;
     report->invert_seconds = clock_seconds() - started - report->factorize_seconds;
     snprintf(report->reason, sizeof report->reason,
-             "hierarchical: asked for by --method; %.3g numbers an element of %.3g of F, %zu planes, %zu "
-             "clusters of "
-             "%zu shapes",
-             entries / (double)(n * C), (double)S.indptr[n] / (double)n, tree.n_frames, n_nodes, n_shapes);
+             "hierarchical: asked for by --method; threshold %.2g by %s, %.3g numbers an element (%.3g of "
+             "F), %zu planes, "
+             "%zu clusters of %zu shapes",
+             threshold, threshold > least ? "--epsilon" : "the noise of the rays", entries / (double)(n * C),
+             (double)S.indptr[n] / (double)n, tree.n_frames, n_nodes, n_shapes);
+    lam_operator_set_threads(made, n_threads);
+    TRY(check_itself(problem, made, options->seed, report, error));
     *op = made;
     made = NULL;
 done:

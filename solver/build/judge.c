@@ -12,6 +12,9 @@
 /* All-over lights, and how many probes of a group tell the reference's own noise. */
 enum { RANDOM_PROBES = 8, NOISE_PROBES = 32 };
 
+/* Rows of a product that a thread takes at once. */
+enum { ROWS_AT_ONCE = 1024 };
+
 /* Residual at which a reference counts as converged: four digits below the smallest error worth printing. */
 static const double reference_tolerance = 1e-8;
 
@@ -22,13 +25,15 @@ static const double dark = 1e-6;
 enum { SINGLE, LIGHTS, RANDOM, N_GROUPS };
 
 /* Emissions E with the operator's radiosity, both [m][C][n], and what is summed up for each of them. Group g
- * has probes first[g] ... first[g + 1] - 1. */
+ * has probes begin[g] ... begin[g + 1] - 1. */
 typedef struct probes {
     size_t m;
-    size_t first[N_GROUPS + 1];
+    size_t begin[N_GROUPS + 1];
     float *E, *B;
     float *W, *H0; /* [m][C][s], [m][C][n]: of an operator of emitters, else NULL */
     double *B_norm, *indirect_norm, *error_norm; /* [m] squares, area-weighted, channels stacked */
+    double *first; /* [m][C][n], the light H that E itself gives, where known; NULL: of none */
+    bool *known;   /* [m] */
 } probes;
 
 static void probes_free(probes *p) {
@@ -39,6 +44,8 @@ static void probes_free(probes *p) {
     free(p->B_norm);
     free(p->indirect_norm);
     free(p->error_norm);
+    free(p->first);
+    free(p->known);
     *p = (probes){0};
 }
 
@@ -47,8 +54,8 @@ static lam_status probes_init(probes *p, const size_t counts[N_GROUPS], const bu
     lam_status status = LAM_OK;
     const size_t vector = problem->n * problem->n_channels;
     *p = (probes){0};
-    for (int g = 0; g < N_GROUPS; g++) p->first[g + 1] = p->first[g] + counts[g];
-    const size_t m = p->m = p->first[N_GROUPS];
+    for (int g = 0; g < N_GROUPS; g++) p->begin[g + 1] = p->begin[g] + counts[g];
+    const size_t m = p->m = p->begin[N_GROUPS];
     p->E = memory_allocate(m, vector * sizeof *p->E, "probes", error);
     p->B = memory_allocate(m, vector * sizeof *p->B, "probes", error);
     p->B_norm = memory_allocate(m, sizeof *p->B_norm, "probes", error);
@@ -76,7 +83,7 @@ static lam_status single_emissions(const build_problem *problem, uint64_t seed, 
     uint32_t *deck = memory_allocate(n, sizeof *deck, "probes", error);
     if (deck == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < n; i++) deck[i] = (uint32_t)i;
-    for (size_t v = 0; v < p->first[LIGHTS]; v++) {
+    for (size_t v = 0; v < p->begin[LIGHTS]; v++) {
         const size_t other = v + (size_t)(next_random(&seed) * (double)(n - v));
         const uint32_t element = deck[other];
         deck[other] = deck[v];
@@ -89,7 +96,7 @@ static lam_status single_emissions(const build_problem *problem, uint64_t seed, 
 
 static void random_emissions(const build_problem *problem, uint64_t seed, probes *p) {
     const size_t vector = problem->n_channels * problem->n;
-    for (size_t i = p->first[RANDOM] * vector; i < p->m * vector; i++) p->E[i] = (float)next_random(&seed);
+    for (size_t i = p->begin[RANDOM] * vector; i < p->m * vector; i++) p->E[i] = (float)next_random(&seed);
 }
 
 /* out = quantity of the operator for every probe, a few at a time. */
@@ -125,6 +132,60 @@ static lam_status apply(const lam_operator *op, const probes *p, lam_quantity qu
     return status;
 }
 
+/* Finds out what light the probes themselves give, of which few elements shine. */
+static lam_status find_first_light(const judge_input *input, probes *p, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = input->problem->n, C = input->problem->n_channels;
+    if (input->first_light == NULL || p->W != NULL) return LAM_OK;
+    p->first = memory_allocate(p->m, C * n * sizeof *p->first, "probes", error);
+    p->known = memory_allocate(p->m, sizeof *p->known, "probes", error);
+    if (p->first == NULL || p->known == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t v = 0; v < p->begin[RANDOM]; v++)
+        for (size_t c = 0; c < C; c++) {
+            const float *E = p->E + v * C * n;
+            double *H = p->first + v * C * n;
+            if (c > 0 && memcmp(E, E + c * n, n * sizeof *E) == 0) {
+                memcpy(H + c * n, H, n * sizeof *H);
+                continue;
+            }
+            TRY(input->first_light(input->first_light_context, E + c * n, H + c * n, &p->known[v], error));
+            if (!p->known[v]) break;
+        }
+done:
+    return status;
+}
+
+/* Emissions of the probes for a reference: E, or what bounces on of the light R H that they are known to
+ * give. */
+static void reference_emission(const build_problem *problem, const csr *F, const probes *p, size_t v,
+                               size_t c, double *E, double *B, double *scratch) {
+    const size_t n = problem->n, C = problem->n_channels, at = (v * C + c) * n;
+    const float *rho = problem->reflectance + c * n;
+    const bool known = F != problem->F && p->known != NULL && p->known[v];
+    for (size_t i = 0; i < n; i++) {
+        E[i] = (double)p->E[at + i];
+        B[i] = (double)p->B[at + i];
+        if (known) scratch[i] = (double)rho[i] * p->first[at + i];
+    }
+    if (!known) return;
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t first = 0; first < n; first += ROWS_AT_ONCE)
+        csr_multiply_rows(F, first, first + ROWS_AT_ONCE < n ? first + ROWS_AT_ONCE : n, 1, scratch, E);
+    for (size_t i = 0; i < n; i++) {
+        B[i] = fmax(B[i] - (double)p->E[at + i] - scratch[i], 0);
+        E[i] *= (double)rho[i];
+    }
+}
+
+/* From what bounces on to all light. */
+static void add_first_light(const build_problem *problem, const csr *F, const probes *p, size_t v, size_t c,
+                            double *B) {
+    const size_t n = problem->n, at = (v * problem->n_channels + c) * n;
+    if (F == problem->F || p->known == NULL || !p->known[v]) return;
+    for (size_t i = 0; i < n; i++)
+        B[i] += (double)p->E[at + i] + (double)problem->reflectance[c * n + i] * p->first[at + i];
+}
+
 /* Calls visit, a channel at a time, with the converged B of the m probes which[]: B is [m][n]. */
 typedef void visit_reference(void *context, size_t channel, const double *B);
 
@@ -136,24 +197,24 @@ static lam_status each_reference(const judge_input *input, const csr *F, const p
     reference *r = NULL;
     double *E = memory_allocate(m, n * sizeof *E, "reference emissions", error);
     double *B = memory_allocate(m, n * sizeof *B, "reference solutions", error);
-    if (E == NULL || B == NULL) TRY(LAM_ERR_MEMORY);
+    double *scratch = memory_allocate(n, sizeof *scratch, "reference solutions", error);
+    if (E == NULL || B == NULL || scratch == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t c = 0; c < n_channels; c++) {
         for (size_t v = 0; v < m; v++)
-            for (size_t i = 0; i < n; i++) {
-                E[v * n + i] = (double)p->E[(which[v] * n_channels + c) * n + i];
-                B[v * n + i] = (double)p->B[(which[v] * n_channels + c) * n + i];
-            }
+            reference_emission(problem, F, p, which[v], c, E + v * n, B + v * n, scratch);
         if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         TRY(reference_create(F, problem->area, problem->reflectance + c * n, REFERENCE_AUTO, &r, error));
         TRY(reference_solve(r, m, E, B, reference_tolerance, input->progress, error));
         reference_destroy(r);
         r = NULL;
+        for (size_t v = 0; v < m; v++) add_first_light(problem, F, p, which[v], c, B + v * n);
         visit(context, c, B);
     }
 done:
     reference_destroy(r);
     free(E);
     free(B);
+    free(scratch);
     return status;
 }
 
@@ -204,7 +265,7 @@ static lam_status figures_against(const judge_input *input, const csr *F, probes
     TRY(each_reference(input, F, p, all, p->m, compare, &c, error));
     for (int g = 0; g < N_GROUPS; g++) {
         size_t bright = 0, lit = 0;
-        for (size_t v = p->first[g]; v < p->first[g + 1]; v++) {
+        for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
             if (p->B_norm[v] > 0) {
                 add_figure(relative[g], sqrt(p->error_norm[v] / p->B_norm[v]));
                 bright++;
@@ -255,7 +316,7 @@ static lam_status measure_noise(const judge_input *input, const probes *p, error
     const size_t vector = problem->n_channels * problem->n;
     size_t which[N_GROUPS * NOISE_PROBES], m = 0;
     for (int g = 0; g < N_GROUPS; g++)
-        for (size_t v = p->first[g]; v < p->first[g + 1] && v < p->first[g] + NOISE_PROBES; v++)
+        for (size_t v = p->begin[g]; v < p->begin[g + 1] && v < p->begin[g] + NOISE_PROBES; v++)
             which[m++] = v;
     half_solutions half[2] = {{problem->n, problem->n_channels, m, NULL},
                               {problem->n, problem->n_channels, m, NULL}};
@@ -268,7 +329,7 @@ static lam_status measure_noise(const judge_input *input, const probes *p, error
     for (int g = 0; g < N_GROUPS; g++) {
         double sum = 0;
         size_t lit = 0;
-        for (; v < m && which[v] < p->first[g + 1]; v++) {
+        for (; v < m && which[v] < p->begin[g + 1]; v++) {
             const double noise = half_distance(problem, p->E + which[v] * vector, half[0].B + v * vector,
                                                half[1].B + v * vector);
             if (noise < 0) continue;
@@ -293,8 +354,8 @@ static lam_status physics(const lam_operator *op, const judge_input *input, cons
     if (H == NULL) TRY(LAM_ERR_MEMORY);
     TRY(apply(op, p, LAM_IRRADIANCE, H, error));
     for (int g = 0; g < N_GROUPS; g++) {
-        const double count = (double)(p->first[g + 1] - p->first[g]);
-        for (size_t v = p->first[g]; v < p->first[g + 1]; v++) {
+        const double count = (double)(p->begin[g + 1] - p->begin[g]);
+        for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
             double negative = 0, all = 0, emitted = 0, accounted = 0;
             for (size_t i = 0; i < vector; i++) {
                 const double a = problem->area[i % n], b = (double)p->B[v * vector + i];
@@ -329,11 +390,11 @@ static lam_status emitter_emissions(const lam_operator *op, const judge_input *i
     for (size_t v = 0; v < p->m; v++)
         for (size_t c = 0; c < C; c++)
             for (size_t k = 0; k < s; k++)
-                p->W[(v * C + c) * s + k] = v >= p->first[RANDOM]           ? (float)next_random(&seed)
-                                            : k == v * s / p->first[LIGHTS] ? 1
+                p->W[(v * C + c) * s + k] = v >= p->begin[RANDOM]           ? (float)next_random(&seed)
+                                            : k == v * s / p->begin[LIGHTS] ? 1
                                                                             : 0;
-    if (p->first[RANDOM] > p->first[LIGHTS])
-        TRY(lam_operator_weights(op, 1, input->emission, 0, NULL, p->W + p->first[LIGHTS] * C * s, error));
+    if (p->begin[RANDOM] > p->begin[LIGHTS])
+        TRY(lam_operator_weights(op, 1, input->emission, 0, NULL, p->W + p->begin[LIGHTS] * C * s, error));
     TRY(operator_emitters_light(op, p->m, p->W, p->E, p->H0, error));
     for (size_t v = 0; v < p->m; v++)
         for (size_t i = 0; i < vector; i++)
@@ -378,7 +439,7 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     else
         TRY(single_emissions(problem, input->seed, &p, error));
     if (counts[LIGHTS] > 0 && s == 0)
-        memcpy(p.E + p.first[LIGHTS] * vector, input->emission, vector * sizeof *p.E);
+        memcpy(p.E + p.begin[LIGHTS] * vector, input->emission, vector * sizeof *p.E);
     if (s == 0) random_emissions(problem, input->seed + 1, &p);
 
     progress_report(input->progress, "judge", 0);
@@ -391,6 +452,7 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     TRY(figures_against(input, problem->F, &p, relative, indirect, error));
     progress_report(input->progress, "judge", .33);
     if (input->independent != NULL) {
+        TRY(find_first_light(input, &p, error));
         for (int g = 0; g < N_GROUPS; g++) {
             relative[g] = &groups[g]->total_relative;
             indirect[g] = &groups[g]->total_indirect;

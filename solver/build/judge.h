@@ -30,7 +30,12 @@ typedef struct judge_input {
     const float *emission;  /* [C][n], the scene's own */
     const csr *independent; /* the mean of two more samples of F, or NULL: no total error */
     const csr *halves[2];   /* those two samples, for the reference's own noise */
-    size_t probes;          /* single elements */
+    /* H = F E, [n], better than the independent sample has it, where few elements shine; *known is false
+     * where many do. NULL: there is none. What the reference then takes from the sample is how that light
+     * bounces on. */
+    lam_status (*first_light)(void *context, const float *E, double *H, bool *known, lam_error *error);
+    void *first_light_context;
+    size_t probes; /* single elements */
     uint64_t seed;
     const progress *progress;
 } judge_input;

@@ -102,8 +102,13 @@ done:
 lam_status build_operator(const build_problem *problem, const build_options *options, lam_operator **op,
                           build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
-    *report = (build_report){
-        .measured_norm_error = -1, .rcond = 1, .coherence = -1, .patch_area = -1, .residual = -1};
+    *report = (build_report){.measured_norm_error = -1,
+                             .rcond = 1,
+                             .coherence = -1,
+                             .patch_area = -1,
+                             .residual = -1,
+                             .probe_residual = -1,
+                             .uniform_error = -1};
     TRY(check_options(options, error));
     const bool chosen = strcmp(options->method, "auto") == 0;
     if (chosen && problem->emitters != NULL) {
