@@ -152,6 +152,8 @@ static lam_status build(const build_problem *problem, const build_options *optio
     float *weight = NULL, *rho = memory_allocate(n, sizeof *rho, "operator", error);
     double *area = memory_allocate(n, sizeof *area, "operator", error), entries = 0;
     if (arrays.K == NULL || rho == NULL || area == NULL) TRY(LAM_ERR_MEMORY);
+    if (problem->centre == NULL || problem->normal == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "--method hierarchical: where elements are and face is not given");
     TRY(plane_tree_make(n, problem->centre, problem->normal, LEAF, &tree, error));
     TRY(wavelet_basis_make(&tree, problem->area, problem->centre, &arrays.basis, error));
     TRY(make_weights(&arrays.basis, &weight, error));

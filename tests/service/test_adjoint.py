@@ -115,6 +115,7 @@ class Gradients(Both):
             ("low", "0.7 0.4 0.2", ["--method", "low-rank", "--rank", 20]),
             ("two_mesh", "0.5 0.5 0.5", ["--method", "2msc"]),
             ("sparse", "0.7 0.4 0.2", ["--method", "sparse"]),
+            ("hierarchical", "0.7 0.4 0.2", ["--method", "hierarchical"]),
         ):
             (cls.folder / "yard.mtl").write_text(MATERIALS.format(floor=floor))
             must("precompute", scene, "-o", cls.folder / (name + ".h5"), "--elements", 80, "--rays", 256, "--probes", 0,

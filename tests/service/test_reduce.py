@@ -351,6 +351,7 @@ class KindsThatAreMade(unittest.TestCase):
         for name, floor, options in (
             ("two_mesh", "0.7 0.4 0.2", ["--method", "2msc"]),
             ("sparse", "0.5 0.5 0.5", ["--method", "sparse"]),
+            ("hierarchical", "0.7 0.4 0.2", ["--method", "hierarchical"]),
             ("lights", "0.7 0.4 0.2", ["--emitters", "group=lamp,south"]),
             ("tiles", "0.5 0.5 0.5", ["--emitters", "sky"]),
             ("mixed", "0.7 0.4 0.2", ["--emitters", cls.folder / "some.json"]),

@@ -28,6 +28,7 @@ BUILDS = {
     "coarse": ["--method", "2msc"],
     "exact": ["--method", "exact"],
     "sparse": ["--method", "sparse", "--threshold", "1e-2"],
+    "hierarchical": ["--method", "hierarchical", "--epsilon", ".2"],
     "half": ["--method", "low-rank", "--epsilon", ".3", "--store-precision", "i8"],
     "sides": ["--method", "low-rank", "--epsilon", ".2", "--two-sided"],
     "grey": ["--method", "low-rank", "--epsilon", ".2", "--reflectance", ".9"],

@@ -150,7 +150,8 @@ static float *ones(const wavelets *w) {
     return made;
 }
 
-static csr pass(const subject *s, float threshold, const float *weight, size_t n_threads) {
+static csr pass_within(const subject *s, double reach, float threshold, const float *weight,
+                       size_t n_threads) {
     row_source rows;
     csr S = {.n = 0};
     row_source_of_csr(&rows, &s->F);
@@ -161,10 +162,14 @@ static csr pass(const subject *s, float threshold, const float *weight, size_t n
                                       .threshold = threshold,
                                       .weight = weight,
                                       .centre = (const double(*)[3])s->centre,
-                                      .reach = INFINITY,
+                                      .reach = reach,
                                       .n_threads = n_threads};
     ck_ok(wavelet_pass(&input, &S, &error));
     return S;
+}
+
+static csr pass(const subject *s, float threshold, const float *weight, size_t n_threads) {
+    return pass_within(s, INFINITY, threshold, weight, n_threads);
 }
 
 /* An upper triangle, its rows ascending, as a whole matrix. */
@@ -427,6 +432,29 @@ START_TEST(a_pass_finds_every_coefficient) {
 }
 END_TEST
 
+/* A finite reach leaves out coefficients, and of coarse ones parts, that are small together. */
+START_TEST(a_pass_within_reach) {
+    subject s = subject_make(ROOM);
+    const size_t n = s.m.n;
+    float *weight = ones(&s.basis);
+    csr far = pass(&s, 0, weight, 1), near = pass_within(&s, 2, 0, weight, 2);
+    double *all = whole(&far), *some = whole(&near), lost = 0, kept = 0;
+    ck_assert_uint_lt(near.indptr[n], far.indptr[n]);
+    for (size_t k = 0; k < n * n; k++) {
+        lost += (all[k] - some[k]) * (all[k] - some[k]);
+        kept += some[k] * some[k];
+    }
+    ck_assert_double_gt(kept, 0);
+    ck_assert_double_lt(lost, 1e-4 * kept);
+    csr_free(&far);
+    csr_free(&near);
+    free(weight);
+    free(all);
+    free(some);
+    subject_free(&s);
+}
+END_TEST
+
 /* --- the inverse --------------------------------------------------------------------------------------- */
 
 enum { ONE_FOR_ALL, BLACK_IN_PARTS, EACH_ITS_OWN, REFLECTANCES };
@@ -521,6 +549,7 @@ int main(void) {
     tcase_add_test(tests, bits_do_not_depend_on_threads);
     tcase_add_loop_test(tests, a_plan_leaves_out_what_is_not_used, 0, 2 * SUBJECTS);
     tcase_add_loop_test(tests, a_pass_finds_every_coefficient, 0, SUBJECTS);
+    tcase_add_test(tests, a_pass_within_reach);
     tcase_add_loop_test(tests, reflectances_in_the_basis, 0, SUBJECTS * REFLECTANCES);
     tcase_add_loop_test(tests, doubling_inverts, 0, SUBJECTS * REFLECTANCES);
     suite_add_tcase(suite, tests);

@@ -1,0 +1,177 @@
+/* The hierarchical operator of boxes with exact form factors: how near it comes, and what it says of itself.
+ */
+#include "solver/build/reference.h"
+#include "support/box_problem.h"
+#include "support/dense.h"
+
+#include <math.h>
+
+static lam_error error;
+
+#define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
+
+/* A box and where its elements are. */
+typedef struct closed {
+    fixture f;
+    build_problem problem;
+    double (*centre)[3];
+} closed;
+
+static closed closed_make(const double size[3], unsigned divisions, float reflectance) {
+    closed s = {.f = fixture_box(size, divisions, reflectance)};
+    s.problem = *problem_of(&s.f);
+    s.problem.F = &s.f.F;
+    s.centre = test_allocate(s.f.m.n, sizeof *s.centre);
+    for (size_t i = 0; i < s.f.m.n; i++) mesh_centroid(&s.f.m, i, s.centre[i]);
+    return s;
+}
+
+/* The problem as it lies now. */
+static const build_problem *of(closed *s) {
+    s->problem = *problem_of(&s->f);
+    s->problem.centre = (const double(*)[3])s->centre;
+    s->problem.normal = (const float(*)[3])s->f.m.normal;
+    return &s->problem;
+}
+
+static void closed_free(closed *s) {
+    free(s->centre);
+    fixture_free(&s->f);
+}
+
+static lam_operator *build(const build_problem *problem, double epsilon, build_report *report) {
+    const build_options options = {
+        .method = "hierarchical", .factorizer = "auto", .epsilon = epsilon, .budget = {.alpha = .5}};
+    lam_operator *op = NULL;
+    ck_ok(build_operator(problem, &options, &op, report, &error));
+    return op;
+}
+
+/* |B~ - B| / |B - E| by area, against a dense LU. */
+static double indirect_error(const build_problem *problem, const lam_operator *op, const float *E) {
+    const size_t n = problem->n;
+    reference *r = NULL;
+    double *e = test_allocate(n, sizeof *e), *B = test_allocate(n, sizeof *B), wrong = 0, all = 0;
+    float *out = test_allocate(n, sizeof *out);
+    const size_t bytes = lam_operator_work_bytes(op, 1);
+    void *work = test_allocate(1, bytes);
+    for (size_t i = 0; i < n; i++) e[i] = (double)E[i];
+    ck_ok(reference_create(problem->F, problem->area, problem->reflectance, REFERENCE_DENSE, &r, &error));
+    ck_ok(reference_solve(r, 1, e, B, 1e-12, NULL, &error));
+    ck_ok(lam_operator_apply(op, 1, LAM_RADIOSITY, E, out, work, bytes, &error));
+    for (size_t i = 0; i < n; i++) {
+        wrong += problem->area[i] * ((double)out[i] - B[i]) * ((double)out[i] - B[i]);
+        all += problem->area[i] * (B[i] - e[i]) * (B[i] - e[i]);
+    }
+    reference_destroy(r);
+    free(e);
+    free(B);
+    free(out);
+    free(work);
+    return sqrt(wrong / all);
+}
+
+/* One element, a part of a wall, all of it: a smaller epsilon keeps more and is nearer, and error goes with
+ * it. */
+START_TEST(epsilon_is_what_it_costs) {
+    closed s = closed_make(room, 14, .7f); /* 1,176 elements */
+    const build_problem *problem = of(&s);
+    const size_t n = problem->n;
+    const double epsilons[] = {.1, .02, .002}, most[3] = {.12, .04, .006};
+    float *E = test_allocate(3 * n, sizeof *E);
+    uint64_t seed = 2;
+    double density = 0;
+    E[n / 5] = 1;
+    for (size_t i = 0; i < n; i++) {
+        E[n + i] = i > n / 2 && i < n / 2 + 40 ? 1 : 0;
+        E[2 * n + i] = (float)random_unit(&seed);
+    }
+    for (int k = 0; k < 3; k++) {
+        build_report report;
+        operator_description about;
+        lam_operator *op = build(problem, epsilons[k], &report);
+        operator_describe(op, &about);
+        ck_assert_double_gt(about.density, 1.2 * density);
+        density = about.density;
+        for (int light = 0; light < 3; light++)
+            ck_assert_double_lt(indirect_error(problem, op, E + light * n), most[k]);
+        ck_assert_double_eq_tol(report.threshold, .02 * epsilons[k], 1e-12);
+        ck_assert_double_lt(report.uniform_error, .1 * epsilons[k]);
+        ck_assert_double_lt(report.probe_residual, epsilons[k]);
+        ck_assert_str_eq(report.method, "hierarchical");
+        ck_assert_ptr_nonnull(strstr(report.reason, "6 planes"));
+        lam_operator_close(op);
+    }
+    free(E);
+    closed_free(&s);
+}
+END_TEST
+
+/* Where nothing reflects irradiance is there all the same, and where nearly all does nothing grows. */
+START_TEST(black_and_white) {
+    closed s = closed_make(unit_cube, 8, .97f);
+    const build_problem *problem = of(&s);
+    const size_t n = problem->n;
+    build_report report;
+    for (size_t i = 0; i < n; i += 3) s.f.m.reflectance[i] = 0;
+    lam_operator *op = build(problem, .002, &report);
+    float *E = test_allocate(n, sizeof *E), *H = test_allocate(n, sizeof *H);
+    double *B = test_allocate(n, sizeof *B), *truth = test_allocate(n, sizeof *truth), largest = 0;
+    void *work = test_allocate(1, lam_operator_work_bytes(op, 1));
+    for (size_t i = 0; i < n; i++) E[i] = i % 5 == 0 ? 1 : 0;
+    ck_assert_double_lt(indirect_error(problem, op, E), .01);
+    ck_ok(lam_operator_apply(op, 1, LAM_RADIOSITY, E, H, work, lam_operator_work_bytes(op, 1), &error));
+    for (size_t i = 0; i < n; i++) {
+        if (i % 3 == 0) ck_each(H[i] == E[i]);
+        B[i] = (double)H[i];
+    }
+    csr_multiply_rows(problem->F, 0, n, 1, B, truth);
+    ck_ok(lam_operator_apply(op, 1, LAM_IRRADIANCE, E, H, work, lam_operator_work_bytes(op, 1), &error));
+    for (size_t i = 0; i < n; i++) largest = fmax(largest, truth[i]);
+    for (size_t i = 0; i < n; i++) ck_each(fabs((double)H[i] - truth[i]) < .02 * largest);
+    lam_operator_close(op);
+    free(E);
+    free(H);
+    free(B);
+    free(truth);
+    free(work);
+    closed_free(&s);
+}
+END_TEST
+
+/* What is below the noise of rays is not kept, whatever epsilon asks for. */
+START_TEST(noise_sets_the_threshold) {
+    closed s = closed_make(unit_cube, 6, .5f);
+    build_report report;
+    (void)of(&s);
+    s.problem.noise = .2;
+    lam_operator_close(build(&s.problem, .01, &report));
+    ck_assert_double_eq_tol(report.threshold, .055 * .2, 1e-12);
+    ck_assert_ptr_nonnull(strstr(report.reason, "noise"));
+    closed_free(&s);
+}
+END_TEST
+
+START_TEST(it_wants_to_know_where_elements_are) {
+    closed s = closed_make(unit_cube, 2, .5f);
+    const build_options options = {
+        .method = "hierarchical", .factorizer = "auto", .epsilon = .05, .budget = {.alpha = .5}};
+    build_report report;
+    lam_operator *op = NULL;
+    ck_assert_int_eq(build_operator(problem_of(&s.f), &options, &op, &report, &error), LAM_ERR_ARGUMENT);
+    ck_assert_ptr_null(op);
+    closed_free(&s);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("hierarchical");
+    TCase *tests = tcase_create("operator");
+    tcase_set_timeout(tests, 300);
+    tcase_add_test(tests, epsilon_is_what_it_costs);
+    tcase_add_test(tests, black_and_white);
+    tcase_add_test(tests, noise_sets_the_threshold);
+    tcase_add_test(tests, it_wants_to_know_where_elements_are);
+    suite_add_tcase(suite, tests);
+    return suite_run(suite);
+}
