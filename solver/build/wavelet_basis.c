@@ -1,5 +1,7 @@
 #include "solver/build/wavelet_basis.h"
 
+#include "solver/build/grow.h"
+
 #include "store/status.h"
 
 #include <math.h>
@@ -142,16 +144,6 @@ static bool is_same(const shape_table *t, uint32_t k, const wavelet_shape *s, co
         for (size_t j = 0; j < s->inputs; j++)
             if (fabs((double)basis[i * s->inputs + j] - Q->at[i][j]) > same_entry) return false;
     return true;
-}
-
-static lam_status grow(void *array, size_t count, size_t size, lam_error *error) {
-    void *old, *made;
-    memcpy(&old, array, sizeof old);
-    made = realloc(old, count * size);
-    if (made == NULL)
-        return status_fail(error, LAM_ERR_MEMORY, "wavelets: cannot allocate %zu x %zu bytes", count, size);
-    memcpy(array, &made, sizeof made);
-    return LAM_OK;
 }
 
 /* The number of a shape, which is new or one that is there. */

@@ -175,10 +175,9 @@ START_TEST(rows_in_the_way_are_multiplied) {
     for (size_t k = 0; k < 8; k++)
         for (size_t c = 0; c < s.op->n_channels; c++) {
             const refine_channel *channel = &s.refiner->channels[c];
-            double norm = 0, true_most = 0;
+            double true_most = 0;
             for (size_t i = 0; i < n; i++) {
                 r[i] = k == 0 ? (i == n / 3 ? -1 : 0) : random_unit(&seed) - .5;
-                norm += s.F->area[i] * r[i] * r[i];
             }
             for (size_t i = 0; i < n; i++) {
                 double sum = 0;
