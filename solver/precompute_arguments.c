@@ -144,7 +144,8 @@ static const option_row rows[] = {
      .kind = OPTION_NUMBER,
      .offset = FIELD(epsilon),
      .value = "X",
-     .doc = "Bound of the factorization in the 2-norm (.05)",
+     .doc =
+         "Bound of the factorization in the 2-norm (.05); hierarchical: fifty times the smallest number kept",
      .low = 0,
      .low_open = true,
      .high = 1},
