@@ -56,8 +56,8 @@ static void turn_both(const wavelets *w, const wavelet_node *a, const small G, s
 
 /* What wavelet i of node t shares with functions above: x, by what t hands up, is turned at every node on the
  * way. */
-static lam_status couple_up(const wavelets *w, const uint32_t *parent, size_t t, size_t i,
-                            const float *handed, entries *to, lam_error *error) {
+static lam_status couple_up(const wavelets *w, size_t t, size_t i, const float *handed, entries *to,
+                            lam_error *error) {
     lam_status status = LAM_OK;
     float x[WAVELET_SCALING], y[WAVELET_INPUTS];
     memcpy(x, handed, w->nodes[t].scaling * sizeof *x);
@@ -65,12 +65,12 @@ static lam_status couple_up(const wavelets *w, const uint32_t *parent, size_t t,
         float most = 0;
         for (size_t k = 0; k < w->nodes[t].scaling; k++) most = fmaxf(most, fabsf(x[k]));
         if (most <= no_coupling) break;
-        if (parent[t] == UINT32_MAX) {
+        if (w->nodes[t].parent == WAVELET_NONE) {
             for (size_t k = 0; k < w->nodes[t].scaling; k++)
                 TRY(put(to, i, w->n - w->nodes[t].scaling + k, x[k], error));
             break;
         }
-        const wavelet_node *a = &w->nodes[parent[t]];
+        const wavelet_node *a = &w->nodes[w->nodes[t].parent];
         const float *columns = columns_of(w, a);
         const size_t at = a->left == t ? 0 : a->from_left;
         for (size_t k = 0; k < a->inputs; k++) {
@@ -81,7 +81,7 @@ static lam_status couple_up(const wavelets *w, const uint32_t *parent, size_t t,
         for (size_t k = a->scaling; k < a->inputs; k++)
             if (fabsf(y[k]) > no_coupling) TRY(put(to, i, a->first + k - a->scaling, y[k], error));
         memcpy(x, y, a->scaling * sizeof *x);
-        t = parent[t];
+        t = w->nodes[t].parent;
     }
 done:
     return status;
@@ -91,18 +91,15 @@ done:
 static lam_status by_rows(const entries *from, size_t n, csr *out, lam_error *error) {
     lam_status status = LAM_OK;
     csr made = {.n = n, .indptr = memory_allocate(n + 1, sizeof *made.indptr, "wavelets", error)};
-    made.indices = memory_allocate(from->used, sizeof *made.indices, "wavelets", error);
-    made.data = memory_allocate(from->used, sizeof *made.data, "wavelets", error);
-    if (made.indptr == NULL || made.indices == NULL || made.data == NULL) TRY(LAM_ERR_MEMORY);
+    if (made.indptr == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t e = 0; e < from->used; e++) made.indptr[from->row[e] + 1]++;
-    for (size_t i = 0; i < n; i++) made.indptr[i + 1] += made.indptr[i];
+    TRY(csr_begin_rows(&made, "wavelets", error));
     for (size_t e = 0; e < from->used; e++) {
         const uint64_t to = made.indptr[from->row[e]]++;
         made.indices[to] = from->column[e];
         made.data[to] = from->value[e];
     }
-    memmove(made.indptr + 1, made.indptr, n * sizeof *made.indptr);
-    made.indptr[0] = 0;
+    csr_end_rows(&made);
     *out = made;
     made = (csr){.n = 0};
 done:
@@ -114,12 +111,8 @@ lam_status wavelet_diagonal(const wavelets *w, const float *rho, csr *out, lam_e
     lam_status status = LAM_OK;
     const size_t N = w->n_nodes;
     entries found = {.used = 0};
-    uint32_t *parent = memory_allocate(N, sizeof *parent, "wavelets", error);
     float(*up)[WAVELET_SCALING][WAVELET_SCALING] = memory_allocate(N, sizeof *up, "wavelets", error);
-    if (parent == NULL || up == NULL) TRY(LAM_ERR_MEMORY);
-    parent[N - 1] = UINT32_MAX;
-    for (size_t t = 0; t < N; t++)
-        if (w->nodes[t].from_left > 0) parent[w->nodes[t].left] = parent[t - 1] = (uint32_t)t;
+    if (up == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t t = 0; t < N; t++) {
         const wavelet_node *a = &w->nodes[t];
         small G = {{0}}, M;
@@ -138,7 +131,7 @@ lam_status wavelet_diagonal(const wavelets *w, const float *rho, csr *out, lam_e
             for (size_t j = i; j < a->inputs; j++)
                 if (j == i || fabsf(M[i][j]) > no_coupling)
                     TRY(put(&found, at, a->first + j - a->scaling, M[i][j], error));
-            TRY(couple_up(w, parent, t, at, M[i], &found, error));
+            TRY(couple_up(w, t, at, M[i], &found, error));
         }
     }
     const size_t scaling = w->nodes[N - 1].scaling, first = w->n - scaling;
@@ -146,7 +139,6 @@ lam_status wavelet_diagonal(const wavelets *w, const float *rho, csr *out, lam_e
         for (size_t j = i; j < scaling; j++) TRY(put(&found, first + i, first + j, up[N - 1][i][j], error));
     TRY(by_rows(&found, w->n, out, error));
 done:
-    free(parent);
     free(up);
     free(found.row);
     free(found.column);

@@ -27,24 +27,6 @@ static lam_status spread_weights(const wavelets *w, const float *weight, float *
     return LAM_OK;
 }
 
-void wavelet_truncate(const wavelets *w, const float *weight, float threshold, csr *a) {
-    uint64_t used = 0, begin = 0;
-    float *each = NULL;
-    if (spread_weights(w, weight, &each, NULL) != LAM_OK) return; /* all of it is kept then */
-    for (size_t i = 0; i < a->n; i++) {
-        const uint64_t end = a->indptr[i + 1];
-        for (uint64_t e = begin; e < end; e++) {
-            const uint32_t j = a->indices[e];
-            if (!(fabsf(a->data[e]) > threshold * each[i] * each[j])) continue;
-            a->indices[used] = j;
-            a->data[used++] = a->data[e];
-        }
-        begin = end;
-        a->indptr[i + 1] = used;
-    }
-    free(each);
-}
-
 /* --- products ------------------------------------------------------------------------------------------ */
 
 /* A row that grows. */
@@ -315,10 +297,11 @@ static void desks_free(inverse_desk *desks, size_t count) {
     free(desks);
 }
 
-/* The upper triangle of all of a. */
-static lam_status upper_of(const csr *a, csr *out, lam_error *error) {
+/* What of the upper triangle of a is above the threshold. */
+static lam_status final_upper(const product_job *job, const csr *a, csr *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = a->n;
+    const float threshold = job->input->threshold, *weight = job->weight;
     uint64_t used = 0;
     csr made = {.n = n, .indptr = memory_allocate(n + 1, sizeof *made.indptr, "wavelets", error)};
     made.indices = memory_allocate((size_t)a->indptr[n], sizeof *made.indices, "wavelets", error);
@@ -326,8 +309,9 @@ static lam_status upper_of(const csr *a, csr *out, lam_error *error) {
     if (made.indptr == NULL || made.indices == NULL || made.data == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < n; i++) {
         for (uint64_t e = a->indptr[i]; e < a->indptr[i + 1]; e++) {
-            if (a->indices[e] < i) continue;
-            made.indices[used] = a->indices[e];
+            const uint32_t j = a->indices[e];
+            if (j < i || !(fabsf(a->data[e]) > threshold * weight[i] * weight[j])) continue;
+            made.indices[used] = j;
             made.data[used++] = a->data[e];
         }
         made.indptr[i + 1] = used;
@@ -365,8 +349,7 @@ static lam_status run(const product_job *job, csr *out, wavelet_inverse_report *
         replace(&Z, &next_Z);
         report->doublings++;
     }
-    TRY(upper_of(&K, out, error));
-    wavelet_truncate(input->basis, input->weight, input->threshold, out);
+    TRY(final_upper(job, &K, out, error));
 done:
     csr_free(&R);
     csr_free(&K);

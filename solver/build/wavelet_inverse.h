@@ -33,7 +33,4 @@ lam_status wavelet_inverse(const wavelet_inverse_input *input, csr *out, wavelet
  * all over a node. */
 lam_status wavelet_diagonal(const wavelets *w, const float *rho, csr *out, lam_error *error);
 
-/* Out of the upper triangle what is below threshold weight_i weight_j, in place. */
-void wavelet_truncate(const wavelets *w, const float *weight, float threshold, csr *a);
-
 #endif

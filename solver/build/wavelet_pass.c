@@ -44,11 +44,11 @@ typedef struct sphere {
 /* What all threads share. */
 typedef struct pass_job {
     const wavelet_pass_input *input;
-    uint32_t *parent, *height; /* [n_nodes]; UINT32_MAX: of the root */
-    uint32_t *leaf_of;         /* [n], position -> node */
-    uint32_t *position;        /* [n], element -> position */
-    double *root_area;         /* [n], by element */
-    sphere *around;            /* [n_nodes] */
+    uint32_t *height;   /* [n_nodes] */
+    uint32_t *leaf_of;  /* [n], position -> node */
+    uint32_t *position; /* [n], element -> position */
+    double *root_area;  /* [n], by element */
+    sphere *around;     /* [n_nodes] */
     size_t n_leaves;
     kept_rows *kept; /* [n_nodes], of what waits for its sibling */
     size_t done;     /* elements */
@@ -231,7 +231,7 @@ static lam_status run_node(pass_job *job, size_t node, desk *d, lam_error *error
     const wavelets *w = job->input->basis;
     const wavelet_node *a = &w->nodes[node];
     const uint32_t root = (uint32_t)w->n_nodes - 1, top = job->height[root];
-    const uint32_t keep_at = node == root ? UINT32_MAX : job->height[job->parent[node]] - 1;
+    const uint32_t keep_at = node == root ? UINT32_MAX : job->height[a->parent] - 1;
     const pass_row row = {.job = job,
                           .height = job->height[node],
                           .first = a->first - a->scaling,
@@ -270,7 +270,6 @@ static void job_free(pass_job *job) {
     for (size_t t = 0; job->kept != NULL && t < job->input->basis->n_nodes; t++)
         kept_rows_free(&job->kept[t]);
     free(job->kept);
-    free(job->parent);
     free(job->height);
     free(job->leaf_of);
     free(job->position);
@@ -310,16 +309,14 @@ static lam_status job_make(const wavelet_pass_input *input, pass_job *job, lam_e
     const size_t N = w->n_nodes;
     *job = (pass_job){.input = input};
     job->kept = memory_allocate(N, sizeof *job->kept, "wavelets", error);
-    job->parent = memory_allocate(N, sizeof *job->parent, "wavelets", error);
     job->height = memory_allocate(N, sizeof *job->height, "wavelets", error);
     job->leaf_of = memory_allocate(w->n, sizeof *job->leaf_of, "wavelets", error);
     job->position = memory_allocate(w->n, sizeof *job->position, "wavelets", error);
     job->root_area = memory_allocate(w->n, sizeof *job->root_area, "wavelets", error);
     job->around = memory_allocate(N, sizeof *job->around, "wavelets", error);
-    if (job->kept == NULL || job->parent == NULL || job->height == NULL || job->leaf_of == NULL ||
-        job->position == NULL || job->root_area == NULL || job->around == NULL)
+    if (job->kept == NULL || job->height == NULL || job->leaf_of == NULL || job->position == NULL ||
+        job->root_area == NULL || job->around == NULL)
         TRY(LAM_ERR_MEMORY);
-    job->parent[N - 1] = UINT32_MAX;
     for (size_t t = 0; t < N; t++) {
         const wavelet_node *a = &w->nodes[t];
         surround(input, t, job->around);
@@ -333,7 +330,6 @@ static lam_status job_make(const wavelet_pass_input *input, pass_job *job, lam_e
         }
         const uint32_t left = job->height[a->left], right = job->height[t - 1];
         job->height[t] = 1 + (left > right ? left : right);
-        job->parent[a->left] = job->parent[t - 1] = (uint32_t)t;
     }
     for (size_t p = 0; p < w->n; p++) job->position[input->order[p]] = (uint32_t)p;
     for (size_t i = 0; i < w->n; i++) job->root_area[i] = sqrt(input->area[i]);
@@ -426,7 +422,7 @@ static lam_status run_all(pass_job *job, desk *desks, lam_error *error) {
     if (pieces == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t t = 0; t < N; t++)
         if (w->nodes[t].n_elements <= most &&
-            (job->parent[t] == UINT32_MAX || w->nodes[job->parent[t]].n_elements > most))
+            (w->nodes[t].parent == WAVELET_NONE || w->nodes[w->nodes[t].parent].n_elements > most))
             pieces[n_pieces++] = (wavelet_piece){(uint32_t)subtree_begin(w, t), (uint32_t)t + 1};
 #pragma omp parallel num_threads((int)job->input->n_threads)
     {

@@ -72,8 +72,8 @@ static TARGET lam_status KERNEL(promote)(const pass_row *row, uint32_t height, b
     const wavelets *w = job->input->basis;
     size_t used = 0;
     for (size_t e = 0; e < in->count;) {
-        const uint32_t from = in->cluster[e], b = job->parent[from];
-        if (b == UINT32_MAX || job->height[b] != height) {
+        const uint32_t from = in->cluster[e], b = w->nodes[from].parent;
+        if (b == WAVELET_NONE || job->height[b] != height) {
             out->cluster[used] = from;
             out->value[used++] = in->value[e++];
             continue;
@@ -81,7 +81,7 @@ static TARGET lam_status KERNEL(promote)(const pass_row *row, uint32_t height, b
         const wavelet_node *node = &w->nodes[b];
         const float *columns = w->padded + (size_t)node->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
         lanes sums[WAVELET_INPUTS] = {{0}};
-        for (; e < in->count && job->parent[in->cluster[e]] == b; e++) {
+        for (; e < in->count && w->nodes[in->cluster[e]].parent == b; e++) {
             const bool is_left = in->cluster[e] == node->left;
             const size_t first = is_left ? 0 : node->from_left;
             const size_t count = is_left ? node->from_left : node->inputs - node->from_left;

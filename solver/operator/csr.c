@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #if defined(__x86_64__)
 #include <immintrin.h>
 #endif
@@ -57,6 +58,19 @@ lam_status csr_reserve(csr *a, size_t entries, lam_error *error) {
     a->data = data;
 done:
     return status;
+}
+
+lam_status csr_begin_rows(csr *a, const char *what, lam_error *error) {
+    for (size_t i = 0; i < a->n; i++) a->indptr[i + 1] += a->indptr[i];
+    const size_t entries = (size_t)a->indptr[a->n];
+    a->indices = memory_allocate(entries, sizeof *a->indices, what, error);
+    a->data = memory_allocate(entries, sizeof *a->data, what, error);
+    return a->indices != NULL && a->data != NULL ? LAM_OK : LAM_ERR_MEMORY;
+}
+
+void csr_end_rows(csr *a) {
+    memmove(a->indptr + 1, a->indptr, a->n * sizeof *a->indptr);
+    a->indptr[0] = 0;
 }
 
 lam_status csr_check(const csr *a, size_t nnz, const char *name, lam_error *error) {

@@ -24,6 +24,12 @@ void csr_free(csr *a);
  * for room that one of the two may have more. */
 lam_status csr_reserve(csr *a, size_t entries, lam_error *error);
 
+/* Filling rows in any sequence. First indptr [n+1] holds in i + 1 how many entries row i gets: from it
+ * csr_begin_rows gives indices and data their room (LAM_ERR_MEMORY, naming what). Then an entry of row i goes
+ * to indptr[i]++, which so runs ahead to where row i + 1 begins, and csr_end_rows puts that right. */
+lam_status csr_begin_rows(csr *a, const char *what, lam_error *error);
+void csr_end_rows(csr *a);
+
 /* indptr ascending from 0 to nnz, indices ascending and below n, data finite. LAM_ERR_FORMAT names the row.
  */
 lam_status csr_check(const csr *a, size_t nnz, const char *name, lam_error *error);

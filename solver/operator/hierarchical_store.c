@@ -26,12 +26,8 @@ lam_status csr_mirror(const csr *a, csr *out, lam_error *error) {
             made.indptr[i + 1]++;
             if (a->indices[e] != i) made.indptr[a->indices[e] + 1]++;
         }
-    for (size_t i = 0; i < n; i++) made.indptr[i + 1] += made.indptr[i];
-    made.indices = memory_allocate((size_t)made.indptr[n], sizeof *made.indices, "operator", error);
-    made.data = memory_allocate((size_t)made.indptr[n], sizeof *made.data, "operator", error);
-    if (made.indices == NULL || made.data == NULL) TRY(LAM_ERR_MEMORY);
-    /* Row j gets its lower part from rows i < j, in their order, before its own: indptr[j] runs ahead to
-     * where row j + 1 begins. */
+    TRY(csr_begin_rows(&made, "operator", error));
+    /* Row j gets its lower part from rows i < j, in their order, before its own. */
     for (size_t i = 0; i < n; i++)
         for (uint64_t e = a->indptr[i]; e < a->indptr[i + 1]; e++) {
             const uint32_t j = a->indices[e];
@@ -44,8 +40,7 @@ lam_status csr_mirror(const csr *a, csr *out, lam_error *error) {
             made.indices[to] = (uint32_t)i;
             made.data[to] = a->data[e];
         }
-    memmove(made.indptr + 1, made.indptr, n * sizeof *made.indptr);
-    made.indptr[0] = 0;
+    csr_end_rows(&made);
     *out = made;
     made = (csr){.n = 0};
 done:

@@ -20,19 +20,16 @@ lam_status csr_transpose(const csr *a, csr *out, lam_error *error) {
     const size_t n = a->n, entries = (size_t)a->indptr[n];
     csr made = {.n = n};
     made.indptr = memory_allocate(n + 1, sizeof *made.indptr, "columns", error);
-    made.indices = memory_allocate(entries, sizeof *made.indices, "columns", error);
-    made.data = memory_allocate(entries, sizeof *made.data, "columns", error);
-    if (made.indptr == NULL || made.indices == NULL || made.data == NULL) TRY(LAM_ERR_MEMORY);
+    if (made.indptr == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t e = 0; e < entries; e++) made.indptr[a->indices[e] + 1]++;
-    for (size_t j = 0; j < n; j++) made.indptr[j + 1] += made.indptr[j];
-    for (size_t i = 0; i < n; i++) /* indptr[j] runs ahead to where column j + 1 begins */
+    TRY(csr_begin_rows(&made, "columns", error));
+    for (size_t i = 0; i < n; i++)
         for (uint64_t e = a->indptr[i]; e < a->indptr[i + 1]; e++) {
             const uint64_t to = made.indptr[a->indices[e]]++;
             made.indices[to] = (uint32_t)i;
             made.data[to] = a->data[e];
         }
-    memmove(made.indptr + 1, made.indptr, n * sizeof *made.indptr);
-    made.indptr[0] = 0;
+    csr_end_rows(&made);
     *out = made;
     made = (csr){.n = 0};
 done:

@@ -112,9 +112,8 @@ static size_t own_of(const wavelet_node *a) {
     return a->inputs - a->scaling;
 }
 
-/* Coefficients in use below and in every node, the first node of its subtree, its parent. */
-static void count_used(const wavelets *w, const bool *used, uint32_t *below, uint32_t *own, uint32_t *begin,
-                       uint32_t *parent) {
+/* Coefficients in use below and in every node, and the first node of its subtree. */
+static void count_used(const wavelets *w, const bool *used, uint32_t *below, uint32_t *own, uint32_t *begin) {
     for (size_t t = 0; t < w->n_nodes; t++) {
         const wavelet_node *a = &w->nodes[t];
         own[t] = 0;
@@ -124,7 +123,6 @@ static void count_used(const wavelets *w, const bool *used, uint32_t *below, uin
         if (a->from_left == 0) continue;
         below[t] += below[a->left] + below[t - 1];
         begin[t] = begin[a->left];
-        parent[a->left] = parent[t - 1] = (uint32_t)t;
     }
 }
 
@@ -134,14 +132,13 @@ static bool is_whole(const wavelets *w, const uint32_t *below, size_t t) {
 }
 
 static lam_status add_steps(wavelet_plan *plan, whole_table *table, const uint32_t *below,
-                            const uint32_t *own, const uint32_t *parent, uint32_t *step_of,
-                            lam_error *error) {
+                            const uint32_t *own, uint32_t *step_of, lam_error *error) {
     lam_status status = LAM_OK;
     const wavelets *w = table->basis;
     for (size_t t = 0; t < w->n_nodes; t++) {
         const wavelet_node *a = &w->nodes[t];
         const bool whole = is_whole(w, below, t);
-        if (whole && is_whole(w, below, parent[t])) continue;
+        if (whole && is_whole(w, below, a->parent)) continue;
         plan_step *step = &plan->steps[plan->n_steps];
         *step = (plan_step){
             .begin = a->begin, .count = a->n_elements, .scaling = (uint8_t)a->scaling, .whole = whole};
@@ -197,17 +194,16 @@ lam_status wavelet_plan_create(const wavelets *basis, const bool *used, wavelet_
     uint32_t *own = memory_allocate(N, sizeof *own, "wavelets", error);
     uint32_t *begin = memory_allocate(N, sizeof *begin, "wavelets", error);
     uint32_t *step_of = memory_allocate(N, sizeof *step_of, "wavelets", error);
-    uint32_t *parent = memory_allocate(N, sizeof *parent, "wavelets", error);
     whole_table table = {.basis = basis, .begin = begin, .n_slots = 2 * N + 1};
     table.slots = memory_allocate(table.n_slots, sizeof *table.slots, "wavelets", error);
     table.matrix = memory_allocate(N, sizeof *table.matrix, "wavelets", error);
     plan.steps = memory_allocate(N, sizeof *plan.steps, "wavelets", error);
     plan.coefficient = memory_allocate(basis->n, sizeof *plan.coefficient, "wavelets", error);
-    if (below == NULL || own == NULL || begin == NULL || step_of == NULL || parent == NULL ||
-        table.slots == NULL || table.matrix == NULL || plan.steps == NULL || plan.coefficient == NULL)
+    if (below == NULL || own == NULL || begin == NULL || step_of == NULL || table.slots == NULL ||
+        table.matrix == NULL || plan.steps == NULL || plan.coefficient == NULL)
         TRY(LAM_ERR_MEMORY);
-    count_used(basis, used, below, own, begin, parent);
-    TRY(add_steps(&plan, &table, below, own, parent, step_of, error));
+    count_used(basis, used, below, own, begin);
+    TRY(add_steps(&plan, &table, below, own, step_of, error));
     plan.matrices = table.matrices;
     plan.n_numbers = table.used;
     table.matrices = NULL;
@@ -224,7 +220,6 @@ done:
     free(own);
     free(begin);
     free(step_of);
-    free(parent);
     free(table.slots);
     free(table.matrix);
     free(table.matrices);

@@ -50,7 +50,8 @@ static lam_status link_nodes(wavelets *w, const uint32_t *node_shapes, lam_error
                  w->n_shapes);
         const wavelet_shape *shape = &w->shapes[node_shapes[t]];
         wavelet_node *a = &w->nodes[t];
-        *a = (wavelet_node){.shape = node_shapes[t],
+        *a = (wavelet_node){.parent = WAVELET_NONE,
+                            .shape = node_shapes[t],
                             .first = (uint32_t)first,
                             .inputs = shape->inputs,
                             .scaling = shape->scaling};
@@ -67,6 +68,7 @@ static lam_status link_nodes(wavelets *w, const uint32_t *node_shapes, lam_error
             if (left->scaling + right->scaling != shape->inputs)
                 FAIL(error, LAM_ERR_NUMERIC, "node[%zu] takes %u numbers, its children hand up %u", t,
                      (unsigned)shape->inputs, (unsigned)(left->scaling + right->scaling));
+            w->nodes[a->left].parent = w->nodes[t - 1].parent = (uint32_t)t;
             a->from_left = left->scaling;
             a->begin = left->begin;
             a->n_elements = left->n_elements + right->n_elements;

@@ -16,6 +16,8 @@
 /* Numbers that a node takes, and hands up, at most. */
 enum { WAVELET_INPUTS = 8, WAVELET_SCALING = 4 };
 
+#define WAVELET_NONE UINT32_MAX
+
 /* What congruent nodes share. The first `scaling` rows of its matrix are what is handed up. */
 typedef struct wavelet_shape {
     uint32_t leaf; /* 1: of elements, 0: of two children */
@@ -28,6 +30,7 @@ typedef struct wavelet_node {
     uint32_t first;                      /* its first coefficient */
     uint32_t n_elements;                 /* below it */
     uint32_t left;                       /* its left child; the right one is the node before it */
+    uint32_t parent;                     /* WAVELET_NONE: it is the root */
     uint32_t inputs, scaling, from_left; /* of the inputs, those of the left child; 0: a leaf */
 } wavelet_node;
 

@@ -9,8 +9,9 @@
 #include "solver/bench/stats.h"
 #include "solver/build/reference.h"
 #include "solver/clock.h"
+#include "solver/formfactor/first_light.h"
 #include "solver/formfactor/formfactor.h"
-#include "solver/formfactor/look.h"
+
 #include "solver/operator/operator.h"
 #include "solver/scene/import.h"
 #include "tests/bench/bench_recipe.h"
@@ -20,8 +21,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Elements of a lamp that stand for all of it; the width of a lamp over the scene's largest extent. */
-enum { OF_A_LAMP = 96, MOST_PROBES = 96, ROUNDS = 31 };
+enum { MOST_PROBES = 96, ROUNDS = 31 };
+/* Of a lamp, over the scene's largest extent. */
 static const double lamp_width = .24;
 
 enum { SINGLE, LAMP, RANDOM, GROUPS };
@@ -30,12 +31,11 @@ static const char *const group_names[GROUPS] = {"single", "lamp", "random"};
 typedef struct bench {
     mesh m;
     uint32_t *order;
-    look l;
+    first_light *first;
     size_t counts[GROUPS], n_probes;
     float *E;      /* [n_probes][n] */
     double *right; /* [n_probes][n], R H */
     double *B;     /* [n_probes][n], less E */
-    double seconds;
 } bench;
 
 static double unit(uint64_t *state) {
@@ -48,23 +48,18 @@ static void die(const char *what) {
     exit(1);
 }
 
-static double seen(const bench *b, uint32_t e, uint32_t i, bool closely) {
-    double part;
-    if (e == i) return 0;
-    const double g = pair_exchange(b->l.rules, &b->l.polygons[e], &b->l.polygons[i], b->l.tolerance);
-    const uint32_t low = e < i ? e : i, high = e < i ? i : e;
-    if (g <= 0) return 0;
-    if (closely) return look_closely(&b->l, low, high, g);
-    (void)look_first(&b->l, low, high, g, &part);
-    return part;
+/* R H of the light H that E itself gives. */
+static void bounce(const bench *b, const float *E, double *right) {
+    lam_error error = {.message = ""};
+    bool known;
+    if (first_light_of(b->first, E, right, &known, &error) != LAM_OK) die(error.message);
+    if (!known) die("a lamp of too many elements");
+    for (size_t i = 0; i < b->m.n; i++) right[i] *= (double)b->m.reflectance[i];
 }
 
-static void single(bench *b, float *E, double *right, uint64_t *state) {
-    const uint32_t e = (uint32_t)(unit(state) * (double)b->m.n);
-    E[e] = 1;
-#pragma omp parallel for schedule(dynamic, 256)
-    for (size_t i = 0; i < b->m.n; i++)
-        right[i] = (double)b->m.reflectance[i] * seen(b, e, (uint32_t)i, true) / b->m.area[i];
+static void single(const bench *b, float *E, double *right, uint64_t *state) {
+    E[(size_t)(unit(state) * (double)b->m.n)] = 1;
+    bounce(b, E, right);
 }
 
 static double extent(const mesh *m) {
@@ -96,57 +91,12 @@ static size_t lamp_elements(const bench *b, uint32_t middle, uint32_t *out) {
     return count;
 }
 
-/* cos cos' A / (pi r^2) from middle to middle: what pairs are sampled by. */
-static double kernel(const bench *b, uint32_t e, uint32_t i) {
-    const polygon *p = &b->l.polygons[e], *q = &b->l.polygons[i];
-    double r2 = 0, leaving = 0, arriving = 0;
-    for (int d = 0; d < 3; d++) {
-        const double r = q->centre[d] - p->centre[d];
-        r2 += r * r;
-        leaving += r * p->normal[d];
-        arriving -= r * q->normal[d];
-    }
-    return leaving > 0 && arriving > 0
-               ? b->m.area[e] * b->m.area[i] * leaving * arriving / (3.14159265 * r2 * r2)
-               : 0;
-}
-
-/* Elements of the lamp that matter more than others are taken one by one, of the others some stand for all,
- * by the kernel. */
-static void lamp(bench *b, float *E, double *right, uint64_t *state) {
+static void lamp(const bench *b, float *E, double *right, uint64_t *state) {
     uint32_t *of = malloc(b->m.n * sizeof *of);
+    if (of == NULL) die("not enough memory");
     const size_t count = lamp_elements(b, (uint32_t)(unit(state) * (double)b->m.n), of);
     for (size_t k = 0; k < count; k++) E[of[k]] = 1;
-#pragma omp parallel
-    {
-        double *g = malloc((count + 1) * sizeof *g);
-#pragma omp for schedule(dynamic, 256)
-        for (size_t i = 0; i < b->m.n; i++) {
-            uint64_t mine = i * 0x9E3779B97F4A7C15u + 1;
-            double all = 0, rest = 0, sum = 0, sampled = 0, of_sampled = 0;
-            (void)unit(&mine);
-            for (size_t k = 0; k < count; k++) all += g[k] = kernel(b, of[k], (uint32_t)i);
-            const double large = all / OF_A_LAMP;
-            for (size_t k = 0; k < count; k++) {
-                if (g[k] > large)
-                    sum += seen(b, of[k], (uint32_t)i, false);
-                else
-                    rest += g[k];
-            }
-            double at = rest / OF_A_LAMP * unit(&mine), passed = 0;
-            for (size_t k = 0; k < count && rest > 0; k++) {
-                if (g[k] > large) continue;
-                passed += g[k];
-                for (; at < passed; at += rest / OF_A_LAMP) {
-                    of_sampled += seen(b, of[k], (uint32_t)i, false) / g[k];
-                    sampled++;
-                }
-            }
-            if (sampled > 0) sum += rest * of_sampled / sampled;
-            right[i] = (double)b->m.reflectance[i] * sum / b->m.area[i];
-        }
-        free(g);
-    }
+    bounce(b, E, right);
     free(of);
 }
 
@@ -162,23 +112,10 @@ static lam_status make_probes(bench *b, const csr *F, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = b->m.n;
     uint64_t state = 5;
-    visibility *v = NULL;
-    pair_rules rules;
     reference *r = NULL;
     double *X = memory_allocate(b->n_probes * n, sizeof *X, "bench", error);
-    polygon *polygons = memory_allocate(n, sizeof *polygons, "bench", error);
-    if (polygons == NULL || X == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < n; i++) polygon_of_element(&b->m, i, &polygons[i]);
-    pair_rules_init(&rules);
-    TRY(visibility_create(&b->m, &v, error));
-    b->l = (look){.v = v,
-                  .area = b->m.area,
-                  .polygons = polygons,
-                  .rules = &rules,
-                  .tolerance = 1e-5,
-                  .accuracy = 1e-5,
-                  .segments = 64,
-                  .seed = 12345};
+    if (X == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(first_light_create(&b->m, 12345, &b->first, error));
     for (size_t k = 0; k < b->n_probes; k++) {
         float *E = b->E + k * n;
         double *right = b->right + k * n;
@@ -196,8 +133,7 @@ static lam_status make_probes(bench *b, const csr *F, lam_error *error) {
     for (size_t k = 0; k < b->n_probes * n; k++) b->B[k] += b->right[k];
 done:
     reference_destroy(r);
-    visibility_destroy(v);
-    free(polygons);
+    first_light_destroy(b->first);
     free(X);
     return status;
 }
