@@ -262,6 +262,7 @@ static void hierarchical_describe(const lam_operator *op, operator_description *
             (self->plan.n_used + 1) * sizeof(uint64_t) + stored * (sizeof(uint32_t) + sizeof(float));
     }
     description->bytes += wavelet_plan_bytes(&self->plan) + (1 + op->n_channels) * op->n * sizeof(float);
+    description->precision = "f16"; /* of K in the store */
     description->density = entries / whole;
 }
 
