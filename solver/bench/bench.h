@@ -39,7 +39,8 @@ lam_status bench_check(const bench_run *run, lam_error *error);
 
 typedef lam_status bench_suite_run(const bench_run *run, lam_error *error);
 
-bench_suite_run bench_formfactors, bench_lowrank, bench_stability, bench_cities, bench_service;
+bench_suite_run bench_formfactors, bench_lowrank, bench_stability, bench_cities, bench_service,
+    bench_hierarchical;
 
 typedef struct bench_suite {
     const char *name;

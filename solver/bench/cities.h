@@ -60,6 +60,11 @@ lam_status city_light_errors(const city *c, const city_light *d, const lam_opera
 /* The scenes of figure 5.1, the first MAP_MAIN of them the thesis', and others beside them: as `lambert
  * generate` makes them, cities of reflectance .7 as in the thesis, the others of their own. */
 enum { MAP_SCENES = 10, MAP_MAIN = 4, FALL_SCENES = 4 };
+extern const char *const map_scenes[MAP_SCENES];
+
+/* One of them with its form factors: pair by pair as far as lowrank_recipe goes, of a quick run by rays. */
+lam_status map_scene_open(const bench_run *run, const char *name, size_t elements, lowrank_scene *out,
+                          lam_error *error);
 
 /* Where the singular values of S = A^1/2 F A^-1/2 lie, which are those of F where areas are equal. Freed by
  * spectrum_free. */

@@ -7,8 +7,8 @@
 #include <string.h>
 
 /* City 1, two with properties of the thesis' other two, the Cornell box; and others. */
-static const char *const map_scenes[MAP_SCENES] = {"city 1", "rooms", "anechoic", "cornell", "city 2",
-                                                   "city 3", "patio", "atrium",   "maze",    "canopy"};
+const char *const map_scenes[MAP_SCENES] = {"city 1", "rooms", "anechoic", "cornell", "city 2",
+                                            "city 3", "patio", "atrium",   "maze",    "canopy"};
 
 /* Of figure 4.1: where they are among map_scenes. */
 static const size_t fall_scenes[FALL_SCENES] = {3, 0, 4, 5};
@@ -28,8 +28,8 @@ static void scenes_free(figure_scenes *s) {
     free(s);
 }
 
-static lam_status open_one(const bench_run *run, const char *name, size_t elements, lowrank_scene *out,
-                           lam_error *error) {
+lam_status map_scene_open(const bench_run *run, const char *name, size_t elements, lowrank_scene *out,
+                          lam_error *error) {
     lam_status status = LAM_OK;
     mesh m = {0};
     const bool is_city = strncmp(name, "city ", 5) == 0;
@@ -59,11 +59,11 @@ lam_status cities_figures(const bench_run *run, lam_error *error) {
     const lowrank_scene *fall[2 * FALL_SCENES];
     figure_scenes *s = memory_allocate(1, sizeof *s, "scenes", error);
     if (s == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t k = 0; k < MAP_SCENES; k++) TRY(open_one(run, map_scenes[k], n[0], &s->map[k], error));
+    for (size_t k = 0; k < MAP_SCENES; k++) TRY(map_scene_open(run, map_scenes[k], n[0], &s->map[k], error));
     for (size_t k = 0; k < FALL_SCENES; k++) {
         fall[k] = &s->map[fall_scenes[k]];
         fall[FALL_SCENES + k] = &s->other[k];
-        if (n_sizes > 1) TRY(open_one(run, map_scenes[fall_scenes[k]], n[1], &s->other[k], error));
+        if (n_sizes > 1) TRY(map_scene_open(run, map_scenes[fall_scenes[k]], n[1], &s->other[k], error));
     }
     TRY(cities_map(run, s->map, error));
     TRY(cities_kinds(run, s->map, error));

@@ -4,6 +4,7 @@
 
 #include "solver/bench/bench.h"
 #include "solver/build/judge.h"
+#include "solver/formfactor/first_light.h"
 #include "solver/formfactor/formfactor.h"
 
 /* A scene with its form factors as a matrix. */
@@ -63,6 +64,8 @@ typedef struct lowrank_case {
     sparse_correction correction;
     const emitter_source *emitters; /* of the method emitters; else NULL */
     const csr *independent;         /* another sample of F, or NULL: no total error */
+    first_light *first;             /* what single elements give, better than that sample; or NULL */
+    bool weighed;                   /* stored is found */
 } lowrank_case;
 
 typedef struct lowrank_verdict {
@@ -70,7 +73,11 @@ typedef struct lowrank_verdict {
     error_report judged;
     double answer_seconds; /* of one radiosity, median, one thread; light from everywhere or all emitters */
     double bytes;          /* that an answer reads */
+    double stored;         /* bytes of the operator in a store, where it was weighed */
 } lowrank_verdict;
+
+/* What an operator takes in a store: the size of one with nothing else in it, written and removed. */
+lam_status lowrank_stored_bytes(const lam_operator *op, double *bytes, lam_error *error);
 
 lam_status lowrank_judge(const bench_run *run, const lowrank_scene *s, const lowrank_case *of,
                          lowrank_verdict *out, lam_error *error);

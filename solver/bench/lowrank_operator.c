@@ -3,7 +3,12 @@
 #include "solver/bench/stats.h"
 #include "solver/clock.h"
 
+#include <errno.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 enum { SOLVES = 31 };
 
@@ -54,6 +59,27 @@ done:
     return status;
 }
 
+lam_status lowrank_stored_bytes(const lam_operator *op, double *bytes, lam_error *error) {
+    lam_status status = LAM_OK;
+    const char *parent = getenv("TMPDIR");
+    char path[4096];
+    struct stat about;
+    store *s = NULL;
+    if (parent == NULL || parent[0] == '\0') parent = "/tmp";
+    snprintf(path, sizeof path, "%s/lambert-bench-%ld.h5", parent, (long)getpid());
+    TRY(store_create(path, &s, error));
+    TRY(operator_save(op, s, error));
+    store *const sealing = s;
+    s = NULL;
+    TRY(store_seal(sealing, error));
+    if (stat(path, &about) != 0) FAIL(error, LAM_ERR_IO, "%s: %s", path, strerror(errno));
+    *bytes = (double)about.st_size;
+done:
+    store_close(s);
+    unlink(path);
+    return status;
+}
+
 lam_status lowrank_judge(const bench_run *run, const lowrank_scene *s, const lowrank_case *of,
                          lowrank_verdict *out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -72,6 +98,8 @@ lam_status lowrank_judge(const bench_run *run, const lowrank_scene *s, const low
                                .row_sums = s->f.row_sums,
                                .emission = s->m.emission,
                                .independent = of->independent,
+                               .first_light = of->first != NULL ? first_light_for_judge : NULL,
+                               .first_light_context = of->first,
                                .probes = s->m.n < of->probes ? s->m.n : of->probes,
                                .seed = run->seed,
                                .progress = run->progress};
@@ -83,6 +111,7 @@ lam_status lowrank_judge(const bench_run *run, const lowrank_scene *s, const low
     TRY(time_answer(op, &verdict.answer_seconds, error));
     TRY(judge_operator(op, &input, &verdict.judged, error));
     verdict.bytes = (double)lam_operator_bytes(op);
+    if (of->weighed) TRY(lowrank_stored_bytes(op, &verdict.stored, error));
     *out = verdict;
 done:
     lam_operator_close(op);

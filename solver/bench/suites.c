@@ -8,7 +8,7 @@ const bench_suite bench_suites[] = {
     {"stability", bench_stability},
     {"cities", bench_cities},
     {"service", bench_service},
-    {"hierarchical", NULL},
+    {"hierarchical", bench_hierarchical},
     {"reuse", NULL},
     {NULL, NULL},
 };
