@@ -161,7 +161,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
     const wavelet_pass_input pass = {.basis = &arrays.basis,
                                      .rows = &rows,
                                      .area = problem->area,
-                                     .order = tree.order,
+                                     .tree = &tree,
                                      .threshold = (float)threshold * (threshold > least ? share_of_S : 1),
                                      .weight = weight,
                                      .centre = problem->centre,

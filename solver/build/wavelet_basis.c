@@ -11,7 +11,8 @@
 /* Moments of a function: its products with 1, u, v, u^2, uv, v^2 of its plane. */
 enum { MOMENTS = 6, LINEAR = 3 };
 
-/* What is left of a function after others are taken out of it counts from this share on. */
+/* What is left of a function after others are taken out of it counts from this share of the constant's length
+ * on: its own would be that of rounding errors where elements lie in a row. */
 static const double dependent = 1e-5;
 /* Congruent nodes share a matrix: entries differ by less. */
 static const double same_entry = 1e-5;
@@ -63,14 +64,12 @@ static double make_orthogonal(size_t inputs, size_t rows, const square *Q, doubl
     return sqrt(length);
 }
 
-/* Row `rows` of Q is x made orthogonal to those before, where enough is left of it. */
+/* Row `rows` of Q is x made orthogonal to those before, where more than `least` is left of it. */
 static bool add_row(size_t inputs, size_t rows, const double *x, double least, square *Q) {
-    double left[WAVELET_INPUTS], length = 0;
-    for (size_t j = 0; j < inputs; j++) length += x[j] * x[j];
-    length = sqrt(length);
+    double left[WAVELET_INPUTS];
     memcpy(left, x, inputs * sizeof *left);
     const double rest = make_orthogonal(inputs, rows, Q, left);
-    if (!(rest > least * length)) return false;
+    if (!(rest > least)) return false;
     for (size_t j = 0; j < inputs; j++) Q->at[rows][j] = left[j] / rest;
     return true;
 }
@@ -99,6 +98,8 @@ static void complete(size_t inputs, size_t rows, square *Q) {
 static size_t make_square(size_t inputs, const moments *M, bool linear, square *Q) {
     moments about;
     size_t rows = 0, scaling = 0;
+    double constant = 0;
+    for (size_t j = 0; j < inputs; j++) constant += M->of[j][0] * M->of[j][0];
     if (linear) {
         centre_moments(inputs, M, &about);
     } else {
@@ -107,7 +108,7 @@ static size_t make_square(size_t inputs, const moments *M, bool linear, square *
     for (size_t f = 0; f < (linear ? (size_t)MOMENTS : 1) && rows < inputs; f++) {
         double x[WAVELET_INPUTS];
         for (size_t j = 0; j < inputs; j++) x[j] = about.of[j][f];
-        rows += add_row(inputs, rows, x, f == 0 ? 0 : dependent, Q);
+        rows += add_row(inputs, rows, x, f == 0 ? 0 : dependent * sqrt(constant), Q);
         if (f < LINEAR) scaling = rows;
     }
     complete(inputs, rows, Q);

@@ -36,22 +36,19 @@ typedef struct kept_rows {
     kept_block *value;
 } kept_rows;
 
-/* All elements of a node are in it. */
-typedef struct sphere {
-    double centre[3], radius;
-} sphere;
+/* Where the column of an element lies, and A^-1/2 of it. */
+typedef struct column_place {
+    uint32_t position;
+    float over_root;
+} column_place;
 
 /* What all threads share. */
 typedef struct pass_job {
     const wavelet_pass_input *input;
-    uint32_t *height;   /* [n_nodes] */
-    uint32_t *leaf_of;  /* [n], position -> node */
-    uint32_t *position; /* [n], element -> position */
-    double *root_area;  /* [n], by element */
-    sphere *around;     /* [n_nodes] */
-    size_t n_leaves;
-    kept_rows *kept; /* [n_nodes], of what waits for its sibling */
-    size_t done;     /* elements */
+    wavelet_reach reach;
+    column_place *columns; /* [n], by element */
+    kept_rows *kept;       /* [n_nodes], of what waits for its sibling */
+    size_t done;           /* elements */
 } pass_job;
 
 /* A coefficient that is kept, above the diagonal or on it. */
@@ -62,8 +59,9 @@ typedef struct kept {
 
 /* What a thread works with. */
 typedef struct desk {
-    lanes *dense;      /* [n], rows of a leaf: all 0 between leaves */
-    uint64_t *touched; /* where they are not */
+    lanes *dense;           /* [n], rows of a leaf: all 0 between leaves */
+    uint64_t *touched;      /* where they are not */
+    uint32_t *cells, *work; /* of wavelet_cells */
     live_rows rows[2], near[2];
     kept *found;
     size_t n_found, capacity;
@@ -78,15 +76,6 @@ typedef struct pass_row {
     float least; /* threshold times the weight of the node */
 } pass_row;
 
-/* Whether wavelets of node a look at cluster b. */
-static bool is_near(const pass_job *job, size_t a, size_t b) {
-    const sphere *x = &job->around[a], *y = &job->around[b];
-    const double far = (1 + job->input->reach) * x->radius + y->radius;
-    double apart = 0;
-    for (int d = 0; d < 3; d++) apart += (x->centre[d] - y->centre[d]) * (x->centre[d] - y->centre[d]);
-    return !(apart > far * far);
-}
-
 static void kept_rows_free(kept_rows *k) {
     free(k->cluster);
     free(k->value);
@@ -97,7 +86,7 @@ static void kept_rows_free(kept_rows *k) {
  * finds the other: the earlier one keeps what they find, of itself the upper triangle. */
 static lam_status desk_keep(const pass_row *row, desk *d, uint32_t b, uint32_t i, uint32_t j, float value,
                             lam_error *error) {
-    if (row->job->height[b] == row->height && j < i) return LAM_OK;
+    if (row->job->reach.height[b] == row->height && j < i) return LAM_OK;
     if (d->n_found == d->capacity) {
         const size_t capacity = d->capacity + d->capacity / 2 + 4096;
         kept *const more = realloc(d->found, capacity * sizeof *more);
@@ -154,15 +143,15 @@ static lam_status scatter_rows(const pass_job *job, size_t node, desk *d, lam_er
     lam_status status = LAM_OK;
     const wavelet_pass_input *input = job->input;
     const wavelet_node *a = &input->basis->nodes[node];
-    const uint32_t *elements = input->order + a->begin;
+    const uint32_t *elements = input->tree->order + a->begin;
     row_block rows = {0};
     TRY(row_source_get(input->rows, elements, a->n_elements, &rows, error));
     for (size_t lane = 0; lane < a->n_elements; lane++) {
-        const double root = job->root_area[elements[lane]];
+        const float root = job->reach.place[a->begin + lane].root;
         for (size_t e = 0; e < rows.length[lane]; e++) {
-            const uint32_t j = rows.indices[lane][e];
-            const size_t p = job->position[j];
-            d->dense[p][lane] = (float)(root / job->root_area[j] * (double)rows.data[lane][e]);
+            const column_place *at = &job->columns[rows.indices[lane][e]];
+            const size_t p = at->position;
+            d->dense[p][lane] = root * at->over_root * rows.data[lane][e];
             d->touched[p >> 6] |= 1ull << (p & 63);
         }
     }
@@ -213,7 +202,7 @@ done:
 static void take_near(const pass_job *job, size_t node, const live_rows *all, live_rows *out) {
     out->count = 0;
     for (size_t e = 0; e < all->count; e++) {
-        if (!is_near(job, node, all->cluster[e])) continue;
+        if (!wavelet_is_near(&job->reach, node, all->cluster[e])) continue;
         out->cluster[out->count] = all->cluster[e];
         out->value[out->count++] = all->value[e];
     }
@@ -230,10 +219,10 @@ static lam_status run_node(pass_job *job, size_t node, desk *d, lam_error *error
     const pass_kernels kernels = kernels_of_cpu();
     const wavelets *w = job->input->basis;
     const wavelet_node *a = &w->nodes[node];
-    const uint32_t root = (uint32_t)w->n_nodes - 1, top = job->height[root];
-    const uint32_t keep_at = node == root ? UINT32_MAX : job->height[a->parent] - 1;
+    const uint32_t root = (uint32_t)w->n_nodes - 1, top = job->reach.height[root];
+    const uint32_t keep_at = node == root ? UINT32_MAX : job->reach.height[a->parent] - 1;
     const pass_row row = {.job = job,
-                          .height = job->height[node],
+                          .height = job->reach.height[node],
                           .first = a->first - a->scaling,
                           .wavelet_lanes = (1u << a->inputs) - (1u << a->scaling),
                           .least = job->input->threshold * job->input->weight[node]};
@@ -270,37 +259,8 @@ static void job_free(pass_job *job) {
     for (size_t t = 0; job->kept != NULL && t < job->input->basis->n_nodes; t++)
         kept_rows_free(&job->kept[t]);
     free(job->kept);
-    free(job->height);
-    free(job->leaf_of);
-    free(job->position);
-    free(job->root_area);
-    free(job->around);
-}
-
-/* The middle of its children's spheres, and what holds both; of a leaf that of its elements, each as large as
- * a disk of its area. */
-static void surround(const wavelet_pass_input *input, size_t t, sphere *around) {
-    const wavelet_node *a = &input->basis->nodes[t];
-    sphere *own = &around[t];
-    *own = (sphere){.radius = 0};
-    if (a->from_left > 0) {
-        const sphere *parts[2] = {&around[a->left], &around[t - 1]};
-        for (int d = 0; d < 3; d++) own->centre[d] = .5 * (parts[0]->centre[d] + parts[1]->centre[d]);
-        for (int k = 0; k < 2; k++) {
-            double apart = 0;
-            for (int d = 0; d < 3; d++) apart += pow(own->centre[d] - parts[k]->centre[d], 2);
-            own->radius = fmax(own->radius, sqrt(apart) + parts[k]->radius);
-        }
-        return;
-    }
-    const uint32_t *elements = input->order + a->begin;
-    for (size_t k = 0; k < a->n_elements; k++)
-        for (int d = 0; d < 3; d++) own->centre[d] += input->centre[elements[k]][d] / (double)a->n_elements;
-    for (size_t k = 0; k < a->n_elements; k++) {
-        double apart = 0;
-        for (int d = 0; d < 3; d++) apart += pow(own->centre[d] - input->centre[elements[k]][d], 2);
-        own->radius = fmax(own->radius, sqrt(apart) + sqrt(.318 * input->area[elements[k]]));
-    }
+    free(job->columns);
+    wavelet_reach_free(&job->reach);
 }
 
 static lam_status job_make(const wavelet_pass_input *input, pass_job *job, lam_error *error) {
@@ -309,30 +269,13 @@ static lam_status job_make(const wavelet_pass_input *input, pass_job *job, lam_e
     const size_t N = w->n_nodes;
     *job = (pass_job){.input = input};
     job->kept = memory_allocate(N, sizeof *job->kept, "wavelets", error);
-    job->height = memory_allocate(N, sizeof *job->height, "wavelets", error);
-    job->leaf_of = memory_allocate(w->n, sizeof *job->leaf_of, "wavelets", error);
-    job->position = memory_allocate(w->n, sizeof *job->position, "wavelets", error);
-    job->root_area = memory_allocate(w->n, sizeof *job->root_area, "wavelets", error);
-    job->around = memory_allocate(N, sizeof *job->around, "wavelets", error);
-    if (job->kept == NULL || job->height == NULL || job->leaf_of == NULL || job->position == NULL ||
-        job->root_area == NULL || job->around == NULL)
-        TRY(LAM_ERR_MEMORY);
-    for (size_t t = 0; t < N; t++) {
-        const wavelet_node *a = &w->nodes[t];
-        surround(input, t, job->around);
-        if (a->scaling > SCALING)
-            FAIL(error, LAM_ERR_ARGUMENT, "node %zu hands up %u numbers, must be at most %d", t,
-                 (unsigned)a->scaling, SCALING);
-        if (a->from_left == 0) {
-            job->n_leaves++;
-            for (size_t p = a->begin; p < a->begin + a->n_elements; p++) job->leaf_of[p] = (uint32_t)t;
-            continue;
-        }
-        const uint32_t left = job->height[a->left], right = job->height[t - 1];
-        job->height[t] = 1 + (left > right ? left : right);
+    job->columns = memory_allocate(w->n, sizeof *job->columns, "wavelets", error);
+    if (job->kept == NULL || job->columns == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(wavelet_reach_make(w, input->tree, input->area, input->centre, input->reach, &job->reach, error));
+    for (size_t p = 0; p < w->n; p++) {
+        const uint32_t i = input->tree->order[p];
+        job->columns[i] = (column_place){(uint32_t)p, (float)(1 / sqrt(input->area[i]))};
     }
-    for (size_t p = 0; p < w->n; p++) job->position[input->order[p]] = (uint32_t)p;
-    for (size_t i = 0; i < w->n; i++) job->root_area[i] = sqrt(input->area[i]);
 done:
     return status;
 }
@@ -340,6 +283,8 @@ done:
 static void desk_free(desk *d) {
     free(d->dense);
     free(d->touched);
+    free(d->cells);
+    free(d->work);
     for (int k = 0; k < 2; k++) {
         free(d->rows[k].cluster);
         free(d->rows[k].value);
@@ -365,13 +310,18 @@ static lam_status desk_make(const pass_job *job, desk *d, lam_error *error) {
     const size_t n = job->input->basis->n;
     d->dense = aligned_lanes(n, sizeof *d->dense, error);
     d->touched = memory_allocate((n + 63) / 64, sizeof *d->touched, "wavelets", error);
-    if (d->dense == NULL || d->touched == NULL) TRY(LAM_ERR_MEMORY);
+    d->cells = memory_allocate(job->reach.n_leaves, sizeof *d->cells, "wavelets", error);
+    d->work = memory_allocate(2 * (size_t)job->reach.height[job->input->basis->n_nodes - 1] + 4,
+                              sizeof *d->work, "wavelets", error);
+    if (d->dense == NULL || d->touched == NULL || d->cells == NULL || d->work == NULL) TRY(LAM_ERR_MEMORY);
     memset(d->dense, 0, n * sizeof *d->dense);
     for (int k = 0; k < 2; k++) {
-        d->rows[k].cluster = memory_allocate(job->n_leaves, sizeof *d->rows[k].cluster, "wavelets", error);
-        d->rows[k].value = aligned_lanes(job->n_leaves, sizeof *d->rows[k].value, error);
-        d->near[k].cluster = memory_allocate(job->n_leaves, sizeof *d->near[k].cluster, "wavelets", error);
-        d->near[k].value = aligned_lanes(job->n_leaves, sizeof *d->near[k].value, error);
+        d->rows[k].cluster =
+            memory_allocate(job->reach.n_leaves, sizeof *d->rows[k].cluster, "wavelets", error);
+        d->rows[k].value = aligned_lanes(job->reach.n_leaves, sizeof *d->rows[k].value, error);
+        d->near[k].cluster =
+            memory_allocate(job->reach.n_leaves, sizeof *d->near[k].cluster, "wavelets", error);
+        d->near[k].value = aligned_lanes(job->reach.n_leaves, sizeof *d->near[k].value, error);
         if (d->rows[k].cluster == NULL || d->rows[k].value == NULL || d->near[k].cluster == NULL ||
             d->near[k].value == NULL)
             TRY(LAM_ERR_MEMORY);

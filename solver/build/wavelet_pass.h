@@ -2,15 +2,15 @@
 #ifndef LAMBERT_BUILD_WAVELET_PASS_H
 #define LAMBERT_BUILD_WAVELET_PASS_H
 
+#include "solver/build/wavelet_reach.h"
 #include "solver/matrix/row_source.h"
-#include "solver/operator/wavelets.h"
 #include "solver/progress.h"
 
 typedef struct wavelet_pass_input {
     const wavelets *basis;
     row_source *rows;          /* of F, in which A_i F_ij = A_j F_ji */
     const double *area;        /* [n], by element */
-    const uint32_t *order;     /* [n], position -> element */
+    const plane_tree *tree;    /* that the basis is of */
     float threshold;           /* a coefficient (i, j) is kept from threshold weight_i weight_j on */
     const float *weight;       /* [n_nodes], of the coefficients of a node */
     const double (*centre)[3]; /* [n], by element */
@@ -23,8 +23,9 @@ typedef struct wavelet_pass_input {
  *
  * Rows come leaf by leaf. Of every node the rows of what it hands up meet the columns of clusters of the same
  * height alone; those of its wavelets go on to all coarser columns, and there are final. Finer columns are
- * the transposed of what finer rows find. The bits do not depend on n_threads. Cost: about nnz(F) (number of
- * levels) at most. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED, those of rows. */
+ * the transposed of what finer rows find. Rows of a leaf begin on clusters that are the coarser the farther
+ * they are (wavelet_reach.h). The bits do not depend on n_threads. Cost: about nnz(F), and a few hundred
+ * clusters of each level of a leaf. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED, those of rows. */
 lam_status wavelet_pass(const wavelet_pass_input *input, csr *out, lam_error *error);
 
 #endif

@@ -73,7 +73,7 @@ static TARGET lam_status KERNEL(promote)(const pass_row *row, uint32_t height, b
     size_t used = 0;
     for (size_t e = 0; e < in->count;) {
         const uint32_t from = in->cluster[e], b = w->nodes[from].parent;
-        if (b == WAVELET_NONE || job->height[b] != height) {
+        if (b == WAVELET_NONE || job->reach.height[b] != height) {
             out->cluster[used] = from;
             out->value[used++] = in->value[e++];
             continue;
@@ -96,35 +96,78 @@ done:
     return status;
 }
 
-/* The rows of a leaf, as they lie in the desk, on leaves. */
+/* The next place where the desk's rows are not 0, from a position on and below last; last: there is none. */
+static inline TARGET size_t KERNEL(next_touched)(const uint64_t *touched, size_t from, size_t last) {
+    if (from >= last) return last;
+    size_t word = from >> 6;
+    uint64_t bits = touched[word] & (~0ull << (from & 63));
+    while (bits == 0) {
+        if (++word << 6 >= last) return last;
+        bits = touched[word];
+    }
+    const size_t p = (word << 6) + (size_t)__builtin_ctzll(bits);
+    return p < last ? p : last;
+}
+
+/* Rows on the elements of a leaf, as they lie in the desk, turned, become what its matrix makes of them. */
+static TARGET void KERNEL(gather_leaf)(const pass_row *row, const wavelet_node *a, const wavelet_node *leaf,
+                                       size_t p, const desk *d, lanes *sums) {
+    const wavelets *w = row->job->input->basis;
+    const float *turned = w->padded + (size_t)a->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
+    const float *columns = w->padded + (size_t)leaf->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
+    const size_t last = leaf->begin + leaf->n_elements;
+    for (; p < last; p = KERNEL(next_touched)(d->touched, p + 1, last)) {
+        lanes x;
+        KERNEL(turn_lanes)(turned, a->inputs, (const float *)&d->dense[p], &x);
+        d->dense[p] = (lanes){0};
+        KERNEL(spread)(columns, leaf->inputs, p - leaf->begin, &x, sums);
+    }
+}
+
+/* Of a far cluster only what it hands up. */
+static TARGET void KERNEL(gather_far)(const pass_row *row, const wavelet_node *a, uint32_t b, size_t p,
+                                      const desk *d, lanes *out) {
+    const wavelet_reach *reach = &row->job->reach;
+    const wavelets *w = reach->basis;
+    const wavelet_affine *f = &reach->affine[b];
+    const float *turned = w->padded + (size_t)a->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
+    const size_t last = w->nodes[b].begin + w->nodes[b].n_elements;
+    lanes sums[SCALING] = {{0}};
+    for (; p < last; p = KERNEL(next_touched)(d->touched, p + 1, last)) {
+        const wavelet_place *at = &reach->place[p];
+        const lanes x = at->root * d->dense[p];
+        const float u = at->u - f->u, v = at->v - f->v;
+        d->dense[p] = (lanes){0};
+        for (size_t k = 0; k < SCALING; k++) sums[k] += (f->of[k][0] + f->of[k][1] * u + f->of[k][2] * v) * x;
+    }
+    for (size_t k = 0; k < SCALING; k++)
+        KERNEL(turn_lanes)(turned, a->inputs, (const float *)&sums[k], &out[k]);
+}
+
+/* The rows of a leaf, as they lie in the desk, on its cells. */
 static TARGET lam_status KERNEL(begin_leaf)(const pass_row *row, size_t node, live_rows *out, desk *d,
                                             lam_error *error) {
     lam_status status = LAM_OK;
     const pass_job *job = row->job;
     const wavelets *w = job->input->basis;
-    const wavelet_node *a = &w->nodes[node];
-    const float *turned = w->padded + (size_t)a->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
+    const size_t n_cells = wavelet_cells(&job->reach, node, d->cells, d->work);
     size_t used = 0;
-    for (size_t word = 0; word < (w->n + 63) / 64; word++)
-        while (d->touched[word] != 0) {
-            const size_t p = word * 64 + (size_t)__builtin_ctzll(d->touched[word]);
-            const uint32_t b = job->leaf_of[p];
-            const wavelet_node *leaf = &w->nodes[b];
-            const float *columns = w->padded + (size_t)leaf->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
+    for (size_t c = 0; c < n_cells; c++) {
+        const uint32_t b = d->cells[c];
+        const wavelet_node *cell = &w->nodes[b];
+        const size_t p = KERNEL(next_touched)(d->touched, cell->begin, cell->begin + cell->n_elements);
+        if (p == cell->begin + cell->n_elements) continue;
+        if (cell->from_left > 0) {
+            KERNEL(gather_far)(row, &w->nodes[node], b, p, d, out->value[used].of);
+        } else {
             lanes sums[WAVELET_INPUTS] = {{0}};
-            for (size_t m = 0; m < leaf->inputs; m++) {
-                const size_t at = leaf->begin + m;
-                const uint64_t bit = 1ull << (at & 63);
-                if ((d->touched[at >> 6] & bit) == 0) continue;
-                d->touched[at >> 6] &= ~bit;
-                lanes x;
-                KERNEL(turn_lanes)(turned, a->inputs, (const float *)&d->dense[at], &x);
-                d->dense[at] = (lanes){0};
-                KERNEL(spread)(columns, leaf->inputs, m, &x, sums);
-            }
-            TRY(KERNEL(hand_up)(row, b, is_near(job, node, b), sums, &out->value[used], d, error));
-            out->cluster[used++] = b;
+            KERNEL(gather_leaf)(row, &w->nodes[node], cell, p, d, sums);
+            const bool emit = wavelet_is_near(&job->reach, node, b);
+            TRY(KERNEL(hand_up)(row, b, emit, sums, &out->value[used], d, error));
         }
+        out->cluster[used++] = b;
+    }
+    memset(d->touched, 0, (w->n + 63) / 64 * sizeof *d->touched);
     out->count = used;
 done:
     return status;

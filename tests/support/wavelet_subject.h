@@ -161,7 +161,7 @@ static inline csr pass_within(const subject *s, double reach, float threshold, c
     const wavelet_pass_input input = {.basis = &s->basis,
                                       .rows = &rows,
                                       .area = s->m.area,
-                                      .order = s->tree.order,
+                                      .tree = &s->tree,
                                       .threshold = threshold,
                                       .weight = weight,
                                       .centre = (const double(*)[3])s->centre,
