@@ -9,6 +9,7 @@
 enum { LINEAR = 3 };
 
 void wavelet_reach_free(wavelet_reach *r) {
+    free(r->reach);
     free(r->height);
     free(r->around);
     free(r->affine);
@@ -123,13 +124,15 @@ lam_status wavelet_reach_make(const wavelets *basis, const plane_tree *tree, con
                               const double (*centre)[3], double radii, wavelet_reach *out, lam_error *error) {
     lam_status status = LAM_OK;
     const wavelets *w = basis;
-    wavelet_reach r = {.basis = basis, .radii = radii};
+    wavelet_reach r = {.basis = basis};
     products *P = memory_allocate(w->n_nodes, sizeof *P, "wavelets", error);
+    r.reach = memory_allocate(w->n_nodes, sizeof *r.reach, "wavelets", error);
     r.height = memory_allocate(w->n_nodes, sizeof *r.height, "wavelets", error);
     r.around = memory_allocate(w->n_nodes, sizeof *r.around, "wavelets", error);
     r.affine = memory_allocate(w->n_nodes, sizeof *r.affine, "wavelets", error);
     r.place = memory_allocate(w->n, sizeof *r.place, "wavelets", error);
-    if (P == NULL || r.height == NULL || r.around == NULL || r.affine == NULL || r.place == NULL)
+    if (P == NULL || r.reach == NULL || r.height == NULL || r.around == NULL || r.affine == NULL ||
+        r.place == NULL)
         TRY(LAM_ERR_MEMORY);
     for (size_t t = 0; t < w->n_nodes; t++) {
         const wavelet_node *a = &w->nodes[t];
@@ -139,6 +142,7 @@ lam_status wavelet_reach_make(const wavelets *basis, const plane_tree *tree, con
             FAIL(error, LAM_ERR_ARGUMENT, "node %zu hands up %u numbers, must be at most %d", t,
                  (unsigned)a->scaling, LINEAR);
         surround(w, tree, t, area, centre, r.around);
+        r.reach[t] = frame == PLANE_ABOVE ? INFINITY : (1 + radii) * r.around[t].radius;
         if (a->from_left == 0) {
             r.n_leaves++;
             for (size_t k = 0; k < a->n_elements; k++) {

@@ -26,6 +26,7 @@ typedef struct wavelet_place {
 typedef struct wavelet_reach {
     const wavelets *basis;
     double radii;           /* a node looks so many of its radii around itself */
+    double *reach;          /* [n_nodes], from its middle: how far it looks */
     uint32_t *height;       /* [n_nodes], 0: leaves */
     wavelet_sphere *around; /* [n_nodes] */
     wavelet_affine *affine; /* [n_nodes] */
@@ -33,7 +34,9 @@ typedef struct wavelet_reach {
     size_t n_leaves;
 } wavelet_reach;
 
-/* area, centre [n], by element; tree: that the basis is of. Nodes hand up three numbers at most. Freed with
+/* area, centre [n], by element; tree: that the basis is of. A node of one plane looks so many of its radii
+ * around itself: far light is smooth there, and its wavelets are orthogonal to what is smooth. One of several
+ * planes, which face here and there, looks everywhere. Nodes hand up three numbers at most. Freed with
  * wavelet_reach_free. Errors: LAM_ERR_MEMORY, LAM_ERR_ARGUMENT. */
 lam_status wavelet_reach_make(const wavelets *basis, const plane_tree *tree, const double *area,
                               const double (*centre)[3], double radii, wavelet_reach *out, lam_error *error);
@@ -42,10 +45,9 @@ void wavelet_reach_free(wavelet_reach *r);
 /* Whether wavelets of node a look at cluster b. Where a is above others, and b too, what is near to those is
  * near to them. */
 static inline bool wavelet_is_near(const wavelet_reach *r, size_t a, size_t b) {
-    const wavelet_sphere *x = &r->around[a], *y = &r->around[b];
-    const double far = (1 + r->radii) * x->radius + y->radius;
+    const double *x = r->around[a].centre, *y = r->around[b].centre, far = r->reach[a] + r->around[b].radius;
     double apart = 0;
-    for (int d = 0; d < 3; d++) apart += (x->centre[d] - y->centre[d]) * (x->centre[d] - y->centre[d]);
+    for (int d = 0; d < 3; d++) apart += (x[d] - y[d]) * (x[d] - y[d]);
     return !(apart > far * far);
 }
 
