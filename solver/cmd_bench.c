@@ -34,7 +34,8 @@ static const option_row rows[] = {
      .kind = OPTION_TEXT,
      .offset = FIELD(scene),
      .value = "SCENE",
-     .doc = "formfactors: the open scene of throughput and resolution, every face an element (houses)"},
+     .doc = "formfactors: the open scene of throughput and resolution, every face an element (houses); "
+            "hierarchical: the only scene, divided where it is coarse"},
     {.name = "seed",
      .kind = OPTION_COUNT,
      .offset = FIELD(seed),
@@ -51,10 +52,9 @@ static const option_verb verb = {
         "(factorizations and two meshes beside the tables of the papers), stability (operators where "
         "numbers are hard), cities (sparse inverses, few emitters and Jacobi beside the tables of the "
         "thesis), service (lambertd under load beside servers that compute nothing and beside solves in "
-        "process; "
-        "wrk and nginx take part where they are installed). Not supported yet: hierarchical, reuse. Each "
-        "writes its tables "
-        "as CSV and JSON, its plots as SVG and PNG.",
+        "process; wrk and nginx take part where they are installed), hierarchical (that kind of operator "
+        "beside all others at equal error, and how it grows). Not supported yet: reuse. Each writes its "
+        "tables as CSV and JSON, its plots as SVG and PNG.",
     .options = rows,
     .min_arguments = 1,
     .max_arguments = OPTIONS_ARGUMENTS_MAX,

@@ -48,11 +48,13 @@ static void print_text(const scene_class *c, double epsilon, size_t rays) {
     if (c->entries >= 0)
         printf("%-18s%.3g entries, %.3g %%, at threshold %.3g\n", "sparse inverse", c->entries,
                100 * c->entries / ((double)c->n * (double)c->n), c->threshold);
+    if (c->numbers >= 0) printf("%-18s%.3g numbers an element\n", "hierarchical", c->numbers);
     printf("%-18s%s\n%-18s%s\n", "method", c->method, "reason", c->reason);
     print_cost("exact", c->exact_cost, c);
     print_cost("low-rank", c->low_rank_cost, c);
     print_cost("sparse", c->sparse_cost, c);
     print_cost("emitters", c->emitters_cost, c);
+    print_cost("hierarchical", c->hierarchical_cost, c);
 }
 
 static json_t *number_or_null(double x) {
@@ -64,14 +66,15 @@ static lam_status print_json(const scene_class *c, double epsilon, size_t rays, 
     char *text = NULL;
     const bool sparse = c->entries >= 0;
     json_t *root = json_pack(
-        "{s:I, s:f, s:o, s:{s:f, s:o, s:f}, s:o, s:{s:o, s:o, s:o, s:o}, s:s, s:s}", "elements",
+        "{s:I, s:f, s:o, s:{s:f, s:o, s:f}, s:o, s:o, s:{s:o, s:o, s:o, s:o, s:o}, s:s, s:s}", "elements",
         (json_int_t)c->n, "density", c->density, "rays",
         rays > 0 ? json_integer((json_int_t)rays) : json_null(), "rank", "epsilon", epsilon, "estimate",
         number_or_null(c->rank), "share", c->rank / (double)c->n, "sparse",
         sparse ? json_pack("{s:f, s:f}", "entries", c->entries, "threshold", c->threshold) : json_null(),
-        "numbers", "exact", number_or_null(c->exact_cost), "low-rank", number_or_null(c->low_rank_cost),
-        "sparse", number_or_null(c->sparse_cost), "emitters", number_or_null(c->emitters_cost), "method",
-        c->method, "reason", c->reason);
+        "hierarchical", c->numbers >= 0 ? json_pack("{s:f}", "numbers", c->numbers) : json_null(), "numbers",
+        "exact", number_or_null(c->exact_cost), "low-rank", number_or_null(c->low_rank_cost), "sparse",
+        number_or_null(c->sparse_cost), "emitters", number_or_null(c->emitters_cost), "hierarchical",
+        number_or_null(c->hierarchical_cost), "method", c->method, "reason", c->reason);
     if (root != NULL) text = json_dumps(root, JSON_INDENT(2));
     if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "the result cannot be written as JSON");
     puts(text);
@@ -127,6 +130,7 @@ int cmd_classify(int argc, char **argv) {
                          .sky = a->sky != NULL},
         .sky = a->sky,
         .method = "auto",
+        .factorizer = "auto",
         .emitters = a->emitters,
         .epsilon = a->epsilon,
         .threshold = a->threshold,

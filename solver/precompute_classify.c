@@ -1,4 +1,5 @@
 /* A scene's form factors, roughly, and what they say of the scene. */
+#include "solver/element_geometry.h"
 #include "solver/precompute_work.h"
 
 #include <math.h>
@@ -17,6 +18,7 @@ lam_status precompute_classify(const precompute_options *options, terminal *t, s
     lam_status status = LAM_OK;
     precompute_options o = *options;
     work w = {.options = &o, .t = t, .progress = terminal_progress(t), .memory = work_memory(options)};
+    element_geometry geometry = {0};
     o.form_factors.quality = "draft";
     TRY(o.from_store ? work_load_store(&w, error) : work_load_scene(&w, error));
     TRY(terminal_check(error));
@@ -32,7 +34,8 @@ lam_status precompute_classify(const precompute_options *options, terminal *t, s
         *rays_used = w.recipe.rays;
     }
     const emitter_source emitters = work_emitters(&w);
-    const build_problem problem = work_problem(&w, &emitters);
+    build_problem problem = work_problem(&w, &emitters);
+    TRY(element_geometry_add(&w.m, &geometry, &problem, error));
     const classify_options look = {.epsilon = o.epsilon,
                                    .threshold = o.threshold,
                                    .memory = work_left(&w),
@@ -45,6 +48,7 @@ lam_status precompute_classify(const precompute_options *options, terminal *t, s
         terminal_warn(t, "the rank at --epsilon %g counts the noise %.2g of %zu rays: give more --rays",
                       o.epsilon, noise, w.f.recipe.rays);
 done:
+    element_geometry_free(&geometry);
     work_free(&w);
     return status;
 }

@@ -60,10 +60,13 @@ lam_status work_build(work *w, lam_error *error) {
                                .correction = correction,
                                .memory = work_left(w),
                                .keep_factors = o->keep_factors,
+                               .low_rank = work_is_low_rank(o),
                                .seed = o->seed,
                                .progress = &w->progress};
-    if (strcmp(o->method, "2msc") == 0 || strcmp(o->method, "hierarchical") == 0)
-        TRY(element_geometry_add(&w->m, &geometry, &problem, error));
+    static const char *const geometric[] = {"2msc", "hierarchical", "auto"};
+    for (size_t k = 0; k < sizeof geometric / sizeof *geometric; k++)
+        if (strcmp(o->method, geometric[k]) == 0)
+            TRY(element_geometry_add(&w->m, &geometry, &problem, error));
     TRY(build_operator(&problem, &how, &w->op, &w->built, error));
     const double noise = recipe_noise(&w->f.recipe);
     const bool patches = w->built.coherence >= 0;

@@ -1,4 +1,5 @@
 /* The first stages of a precompute: what comes in, its mesh, and whether memory holds what is to come. */
+#include "solver/build/classify.h"
 #include "solver/output_file.h"
 #include "solver/precompute_work.h"
 #include "solver/scene/import.h"
@@ -63,15 +64,26 @@ static double elements_after(const mesh *m, const precompute_options *o) {
     return fmax(n, (double)how->elements);
 }
 
+bool work_is_low_rank(const precompute_options *o) {
+    return o->rank > 0 || o->keep_factors || o->precision != PANEL_F32 || strcmp(o->factorizer, "auto") != 0;
+}
+
+/* Whether the operator is going to be a hierarchical one: auto takes another one of large scenes where F is
+ * sparse and well known alone. */
+static bool is_hierarchical(const precompute_options *o, double n) {
+    if (strcmp(o->method, "auto") != 0) return strcmp(o->method, "hierarchical") == 0;
+    return n > CLASSIFY_SMALL && o->emitters == NULL && !work_is_low_rank(o);
+}
+
 /* What was asked for, and what the method makes of it. */
-static choice_request asked_of(const precompute_options *o) {
+static choice_request asked_of(const precompute_options *o, double n) {
     choice_request asked = o->form_factors;
-    asked.filtered = strcmp(o->method, "hierarchical") == 0;
+    asked.filtered = is_hierarchical(o, n);
     return asked;
 }
 
 recipe work_judge_recipe(const work *w, uint64_t seed) {
-    const choice_request asked = asked_of(w->options);
+    const choice_request asked = asked_of(w->options, (double)w->m.n);
     const recipe *of = &w->recipe;
     recipe r = recipe_of_judge(of, choice_rays(&asked), seed);
     if (w->options->from_store && r.method == RECIPE_RAYS && asked.rays != CHOICE_AUTO)
@@ -102,6 +114,7 @@ forecast work_forecast(const work *w, double n) {
                       .rank = likely_rank(o, n),
                       .emitters = w->emitters.s,
                       .sparse = strcmp(o->method, "sparse") == 0,
+                      .hierarchical = is_hierarchical(o, n),
                       .precision = o->precision};
 }
 
@@ -118,11 +131,12 @@ static lam_status check_memory(work *w, double n, lam_error *error) {
     if (n > 4e9)
         return status_fail(error, LAM_ERR_MEMORY, "%s: %.3g elements, must be below 4e9; refine less",
                            o->input, n);
-    const choice_request asked = asked_of(o);
+    const choice_request asked = asked_of(o, n);
     forecast f;
-    /* All pairs where they are affordable, and the disk in place of memory only where there is no other way.
-     */
-    const int disk_too = o->scratch != NULL, pairs_too = n <= CHOICE_PAIRS_MOST;
+    /* All pairs where they are affordable, or no more than the rays that would do, and the disk in place of
+     * memory only where there is no other way. */
+    const int disk_too = o->scratch != NULL,
+              pairs_too = n <= CHOICE_PAIRS_MOST || n <= (double)choice_rays(&asked);
     for (int way = 0; way <= 2 * disk_too + 1; way++) {
         const bool all_pairs = way % 2 == 0;
         if (all_pairs && !pairs_too) continue;

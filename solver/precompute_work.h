@@ -41,6 +41,9 @@ lam_status work_take_scratch(work *w, lam_error *error);
  * others. */
 recipe work_judge_recipe(const work *w, uint64_t seed);
 
+/* Whether something was asked for that operators of low rank alone have. */
+bool work_is_low_rank(const precompute_options *o);
+
 /* What n elements are going to take. */
 forecast work_forecast(const work *w, double n);
 

@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { KINDS = 5, EMITTERS_MOST = 32, PROBES = 100, PROBES_OF_LARGE = 32, LARGE = 5000, NAME = 16 };
+enum { KINDS = 6, EMITTERS_MOST = 32, PROBES = 100, PROBES_OF_LARGE = 32, LARGE = 5000, NAME = 16 };
 
-static const char *const kinds[KINDS] = {"exact", "low-rank", "2msc", "sparse", "emitters"};
+static const char *const kinds[KINDS] = {"exact", "low-rank", "2msc", "sparse", "hierarchical", "emitters"};
 
 static const double epsilon = .05, usual_threshold = 1e-4;
 

@@ -15,7 +15,7 @@ enum { RAYS = 512 };
 static const double accuracy = 7e-5, epsilon = .05, reflectance = .6;
 
 /* Elements up to which the reference is waited for, and its probes. */
-enum { JUDGED_MOST = 200000, PROBES = 16 };
+enum { JUDGED_MOST = 200000, PROBES = 16, PROBES_QUICK = 4 };
 
 /* The rank of HF at 163,840 elements and epsilon .05, which grows like the square root of n: the thesis needs
  * 3,981 for that box (table 3.5). */
@@ -112,7 +112,7 @@ static lam_status judge(const bench_run *run, const lowrank_scene *s, lowrank_ve
     const lowrank_case of = {.method = "hierarchical",
                              .factorizer = "auto",
                              .epsilon = epsilon,
-                             .probes = PROBES,
+                             .probes = run->scale == BENCH_QUICK ? PROBES_QUICK : PROBES,
                              .independent = &independent.F,
                              .first = first};
     TRY(lowrank_judge(run, s, &of, out, error));
@@ -191,7 +191,7 @@ done:
 
 lam_status hierarchical_growth(const bench_run *run, lam_error *error) {
     static const size_t sizes[3][SIZES] = {
-        {640, 2560, 0, 0}, {10240, 40960, 0, 0}, {10240, 40960, 163840, 655360}};
+        {320, 640, 0, 0}, {10240, 40960, 0, 0}, {10240, 40960, 163840, 655360}};
     lam_status status = LAM_OK;
     grown before = {.n = 0};
     table out = {.name = "growth",

@@ -8,7 +8,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PROBES = 64, PROBES_OF_LARGE = 24, LARGE = 5000, PAIRS_MOST = 24000, HUGE_SCENE = 60000 };
+enum {
+    PROBES_QUICK = 8,
+    PROBES = 64,
+    PROBES_OF_LARGE = 24,
+    LARGE = 5000,
+    PAIRS_MOST = 24000,
+    HUGE_SCENE = 60000
+};
 
 const char *const hierarchical_kinds[KINDS] = {"hierarchical", "low-rank", "2msc",
                                                "sparse",       "exact",    "emitters"};
@@ -164,7 +171,9 @@ lam_status hierarchical_of_scene(const bench_run *run, const lowrank_scene *s, k
                                      .factorizer = "auto",
                                      .epsilon = k <= 1 ? value : .05,
                                      .rank = two_meshes ? (size_t)(value * (double)s->m.n) : 0,
-                                     .probes = s->m.n > LARGE ? PROBES_OF_LARGE : PROBES,
+                                     .probes = run->scale == BENCH_QUICK ? PROBES_QUICK
+                                               : s->m.n > LARGE          ? PROBES_OF_LARGE
+                                                                         : PROBES,
                                      .threshold = strcmp(hierarchical_kinds[k], "sparse") == 0 ? value : 0,
                                      .correction = SPARSE_DELTA,
                                      .emitters =

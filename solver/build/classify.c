@@ -10,6 +10,9 @@
  * anywhere: measured, four times the time of a number of a panel. */
 static const double sparse_number = 4;
 
+/* What the transforms of a hierarchical operator cost, an element; its entries cost what sparse ones do. */
+static const double transform_numbers = 40;
+
 /* A low-rank operator of k columns has 2 n k numbers; k beyond n / 2 is no use, and a sparse inverse is at
  * least about as dense as F. */
 static const double dense_enough = 1. / sparse_number;
@@ -42,10 +45,12 @@ done:
     return status;
 }
 
-/* What is left out over what may be: of single elements epsilon, or as much as the low-rank operator leaves
- * out, of light from everywhere epsilon, which is what that operator keeps to. */
+/* What is left out over what may be: of light from everywhere epsilon, which is what low-rank and
+ * hierarchical operators keep to; of single elements epsilon too, or, where its rival is of low rank, as much
+ * as that leaves out. */
 static double excess(const sparse_sample *sample, const scene_class *c, double epsilon) {
-    return fmax(sample->single / fmax(c->tail, epsilon), sample->everywhere / epsilon);
+    const double single = isfinite(c->hierarchical_cost) ? epsilon : fmax(c->tail, epsilon);
+    return fmax(sample->single / single, sample->everywhere / epsilon);
 }
 
 /* The largest of some thresholds at which truncation alone leaves out no more than may be; 0: none. */
@@ -94,6 +99,36 @@ done:
     return status;
 }
 
+/* The hierarchical operator itself: nothing cheaper tells how much of it there is. */
+static lam_status look_at_hierarchical(const build_problem *p, const classify_options *options,
+                                       scene_class *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const build_options how = {.method = "hierarchical",
+                               .factorizer = "auto",
+                               .epsilon = options->epsilon,
+                               .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
+                               .seed = options->seed,
+                               .progress = options->progress};
+    const double n = (double)p->n;
+    lam_operator *op = NULL;
+    build_report report =
+        options->hierarchical != NULL ? *options->hierarchical_report : (build_report){.method = NULL};
+    operator_description about = {.density = -1};
+    TRY(build_hierarchical.build(p, &how, &op, &report, error));
+    operator_describe(op, &about);
+    out->numbers = about.density * n;
+    if (options->memory == 0 || lam_operator_bytes(op) <= options->memory)
+        out->hierarchical_cost = (sparse_number * out->numbers + transform_numbers) * n;
+    if (options->hierarchical != NULL) {
+        *options->hierarchical = op;
+        *options->hierarchical_report = report;
+        op = NULL;
+    }
+done:
+    lam_operator_close(op);
+    return status;
+}
+
 /* Few elements keep the whole inverse, whatever they see. */
 static bool is_small(const scene_class *c) {
     return c->n <= CLASSIFY_SMALL && isfinite(c->exact_cost);
@@ -103,6 +138,11 @@ static void choose(scene_class *c, bool emitters) {
     c->method = "low-rank";
     if (c->exact_cost <= c->low_rank_cost && isfinite(c->low_rank_cost)) c->method = "exact";
     if (c->sparse_cost < fmin(c->exact_cost, c->low_rank_cost)) c->method = "sparse";
+    /* A rank says nothing of the light of single elements: where there is a hierarchical operator it is no
+     * rival. */
+    if (isfinite(c->hierarchical_cost) &&
+        (c->hierarchical_cost <= fmin(c->exact_cost, c->sparse_cost) || strcmp(c->method, "low-rank") == 0))
+        c->method = "hierarchical";
     if (is_small(c)) c->method = "exact";
     if (emitters) c->method = "emitters";
 }
@@ -116,6 +156,8 @@ static void say(scene_class *c, double epsilon) {
         return;
     }
     if (c->rank >= 0) snprintf(rank, sizeof rank, ", rank estimate %.0f at epsilon %.3g", c->rank, epsilon);
+    if (strcmp(c->method, "hierarchical") == 0)
+        snprintf(rank, sizeof rank, ", %.3g numbers an element at epsilon %.3g", c->numbers, epsilon);
     int n =
         snprintf(c->reason, sizeof c->reason, "%s: F is %.3g %% dense%s", c->method, 100 * c->density, rank);
     const struct {
@@ -124,6 +166,7 @@ static void say(scene_class *c, double epsilon) {
     } all[] = {{"exact", c->exact_cost},
                {"low-rank", c->low_rank_cost},
                {"sparse", c->sparse_cost},
+               {"hierarchical", c->hierarchical_cost},
                {"emitters", c->emitters_cost}};
     enum { ALL = sizeof all / sizeof *all };
     double own = INFINITY;
@@ -149,20 +192,26 @@ lam_status classify_scene(const build_problem *problem, const classify_options *
                      .exact_cost = INFINITY,
                      .low_rank_cost = INFINITY,
                      .sparse_cost = INFINITY,
-                     .emitters_cost = INFINITY};
+                     .emitters_cost = INFINITY,
+                     .hierarchical_cost = INFINITY,
+                     .numbers = -1};
     if (problem->n <= CLASSIFY_EXACT_MOST && C * n * n <= numbers) c.exact_cost = n * n;
     if (problem->emitters != NULL) c.emitters_cost = n * (double)problem->emitters->s;
     const bool decided = problem->emitters != NULL || is_small(&c), open = c.density < dense_enough;
-    const bool sparse_too = open && (!decided || options->thorough);
+    if ((!decided || options->thorough) && problem->centre != NULL && problem->normal != NULL)
+        TRY(look_at_hierarchical(problem, options, &c, error));
+    const bool hierarchical = isfinite(c.hierarchical_cost),
+               noisy = problem->noise > options->epsilon && options->threshold == 0;
+    const bool sparse_too = open && (!decided || options->thorough) && !(hierarchical && noisy);
     /* Where the whole inverse may be the answer the rank decides; else it decides only against sparse. */
     const bool whole = isfinite(c.exact_cost) && !decided;
-    if (sparse_too || whole || options->thorough) {
+    if (options->thorough || (!hierarchical && (sparse_too || whole))) {
         TRY(look_at_rank(problem, options, &c, error));
         if (2 * n * c.rank <= numbers) c.low_rank_cost = 2 * n * c.rank;
     }
     if (sparse_too) {
-        const double most = fmin(fmin(c.exact_cost, c.low_rank_cost) / sparse_number, numbers / 2 / C);
-        TRY(look_at_inverse(problem, options, most, &c, error));
+        const double rival = hierarchical ? c.hierarchical_cost : fmin(c.exact_cost, c.low_rank_cost);
+        TRY(look_at_inverse(problem, options, fmin(rival / sparse_number, numbers / 2 / C), &c, error));
         if (c.entries >= 0 && 2 * C * c.entries <= numbers) c.sparse_cost = sparse_number * c.entries;
     }
     choose(&c, problem->emitters != NULL);

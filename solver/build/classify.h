@@ -6,7 +6,8 @@
 #include "solver/build/spectrum.h"
 
 /* What a query costs is what it reads, in numbers of a panel: 2 n k of a low-rank operator, n^2 of an exact
- * one, four for every entry of a sparse one, n s of emitters. */
+ * one, four for every entry of a sparse one, n s of emitters; of a hierarchical one four for every entry of
+ * its core and forty an element for the transforms. Per channel. */
 typedef struct scene_class {
     size_t n;
     double density;   /* of F */
@@ -14,8 +15,10 @@ typedef struct scene_class {
     double tail;      /* what that leaves out of S, |S - S_k|_F / |S|_F; negative likewise */
     double entries;   /* of a sparse inverse that leaves out as much; negative: not looked at, or too many */
     double threshold; /* of that; or as asked for */
-    double exact_cost, low_rank_cost, sparse_cost, emitters_cost; /* infinite: not to be had, or not known */
-    const char *method;                                           /* what suits it best */
+    double numbers;   /* an element of a hierarchical operator's core; negative: none was built */
+    /* infinite: not to be had, or not known */
+    double exact_cost, low_rank_cost, sparse_cost, emitters_cost, hierarchical_cost;
+    const char *method; /* what suits it best */
     char reason[256];
 } scene_class;
 
@@ -24,14 +27,21 @@ typedef struct classify_options {
     double threshold; /* of a sparse inverse; 0: what leaves out as much as epsilon does */
     size_t memory;    /* bytes an operator may use; 0: no limit */
     uint64_t seed;
-    bool thorough; /* looks at the rank also where it decides nothing */
+    bool thorough; /* looks also at what decides nothing */
+    /* The hierarchical operator, where one was built to see what it costs, and its report; closed by the
+     * caller. NULL: it is not wanted. */
+    lam_operator **hierarchical;
+    build_report *hierarchical_report;
     const progress *progress;
 } classify_options;
 
-/* Looks at F and some rows of the inverse: density, number of singular values (spectrum.h), entries of a
- * sparse inverse of the same error, and takes what answers fastest then. What cannot change the choice is
- * skipped unless thorough. Cost: at most 40 products of S with eight vectors, a few dozen with 32, and a
- * hundred rows of sparse inverses.
+/* Builds the hierarchical operator, which is as exact as epsilon says, and looks whether one of another kind
+ * that is so too answers faster: the whole inverse, or, where F is sparse and its samples are not so few that
+ * only the hierarchical one tells light from their noise, a sparse inverse, of which some rows are found.
+ * Where there is no geometry to build it by: the number of singular values (spectrum.h), and a sparse inverse
+ * that leaves out as much. What cannot change the choice is skipped unless thorough. Cost: that of the
+ * hierarchical operator, a hundred rows of sparse inverses, else at most 40 products of S with eight vectors
+ * and a few dozen with 32.
  * Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC, LAM_ERR_CANCELLED. */
 lam_status classify_scene(const build_problem *problem, const classify_options *options, scene_class *out,
                           lam_error *error);

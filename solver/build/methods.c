@@ -78,13 +78,24 @@ static lam_status build_auto(const build_problem *problem, const build_options *
                              build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
     scene_class looked;
+    lam_operator *hierarchical = NULL;
+    build_report made = *report;
     const classify_options look = {.epsilon = options->epsilon,
                                    .threshold = options->threshold,
                                    .memory = options->memory,
                                    .seed = options->seed,
-                                   .progress = options->progress};
-    TRY(classify_scene(problem, &look, &looked, error));
-    if (strcmp(looked.method, "low-rank") == 0 || options->rank > 0) {
+                                   .progress = options->progress,
+                                   .hierarchical = &hierarchical,
+                                   .hierarchical_report = &made};
+    build_problem seen = *problem;
+    if (options->low_rank) seen.centre = NULL; /* not to build what is not wanted */
+    TRY(classify_scene(&seen, &look, &looked, error));
+    if (strcmp(looked.method, "hierarchical") == 0) {
+        *op = hierarchical;
+        *report = made;
+        hierarchical = NULL;
+        memcpy(report->reason, looked.reason, sizeof report->reason);
+    } else if (strcmp(looked.method, "low-rank") == 0 || options->rank > 0) {
         TRY(build_by_rank(problem, options, &looked, op, report, error));
     } else if (strcmp(looked.method, "sparse") == 0) {
         build_options how = *options;
@@ -96,6 +107,7 @@ static lam_status build_auto(const build_problem *problem, const build_options *
         memcpy(report->reason, looked.reason, sizeof report->reason);
     }
 done:
+    lam_operator_close(hierarchical);
     return status;
 }
 

@@ -28,14 +28,14 @@ class Classify(unittest.TestCase):
 
     def test_auto_builds_what_classify_names(self):
         """With the form factors kept both see the same ones; a city is sparse, a room is not."""
-        for scene, method in (("city", "sparse"), ("cornell", "low-rank")):
+        for scene, method in (("city", "sparse"), ("cornell", "hierarchical")):
             store = self.path(f"{scene}.h5")
             must("precompute", self.path(f"{scene}.obj"), "-o", store, "--rays", 256, "--epsilon", .15, "--probes", 0,
                  "--keep-form-factors", "--quiet")
             found = self.look(f"{scene}.h5", "--epsilon", .15)
             with h5py.File(store) as file:
                 built = file["operator"].attrs
-                self.assertEqual(built["kind"].decode(), method.replace("-", "_"))
+                self.assertEqual(built["kind"].decode(), method)
                 self.assertIn(f"F is {100 * found['density']:.3g} % dense", built["reason"].decode())
                 entries = file["form_factors/indptr"][-1]
                 n = len(file["mesh/area"])

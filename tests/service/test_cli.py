@@ -153,7 +153,7 @@ class Usage(Case):
                 self.assertEqual(self.refused(2, wanted, *line.split()).stdout, "")
 
     def test_not_supported_yet(self):
-        for line in ("bench hierarchical",
+        for line in ("bench reuse",
                      "solve a.h5 -o b.glb",
                      *("precompute a.obj -o b.h5 " + option for option in (
                          "--keep-form-factors=compressed", 
