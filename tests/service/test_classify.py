@@ -75,7 +75,7 @@ class Classify(unittest.TestCase):
         found = self.look("city.obj", "--sky", "grid:4x3", "--emitters", "sky")
         self.assertEqual(found["method"], "emitters")
         self.assertEqual(found["numbers"]["emitters"], 12 * found["elements"])
-        self.assertLess(found["numbers"]["emitters"], found["numbers"]["sparse"])
+        self.assertLess(found["numbers"]["emitters"], found["numbers"]["hierarchical"])
 
     def test_small_scenes_keep_the_whole_inverse(self):
         must("generate", "box", "--divisions", 4, "-o", self.path("box.obj"))
