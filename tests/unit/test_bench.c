@@ -251,7 +251,7 @@ START_TEST(figures_of_cities_are_whole) {
     ck_assert_str_eq(h.plots, " bounces-1 bounces-3 tiles-1e-3 tiles-1e-4 tiles-1e-5 map singular-values"
                               " distribution");
     ck_assert_uint_eq(h.map_rows, MAP_SCENES);
-    ck_assert_uint_eq(h.kind_rows, 5 * MAP_MAIN);
+    ck_assert_uint_eq(h.kind_rows, 6 * MAP_MAIN);
 }
 END_TEST
 
