@@ -96,48 +96,35 @@ done:
     return status;
 }
 
-/* The next place where the desk's rows are not 0, from a position on and below last; last: there is none. */
-static inline TARGET size_t KERNEL(next_touched)(const uint64_t *touched, size_t from, size_t last) {
-    if (from >= last) return last;
-    size_t word = from >> 6;
-    uint64_t bits = touched[word] & (~0ull << (from & 63));
-    while (bits == 0) {
-        if (++word << 6 >= last) return last;
-        bits = touched[word];
-    }
-    const size_t p = (word << 6) + (size_t)__builtin_ctzll(bits);
-    return p < last ? p : last;
-}
-
 /* Rows on the elements of a leaf, as they lie in the desk, turned, become what its matrix makes of them. */
 static TARGET void KERNEL(gather_leaf)(const pass_row *row, const wavelet_node *a, const wavelet_node *leaf,
-                                       size_t p, const desk *d, lanes *sums) {
+                                       const uint32_t *p, size_t count, const desk *d, lanes *sums) {
     const wavelets *w = row->job->input->basis;
     const float *turned = w->padded + (size_t)a->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
     const float *columns = w->padded + (size_t)leaf->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
-    const size_t last = leaf->begin + leaf->n_elements;
-    for (; p < last; p = KERNEL(next_touched)(d->touched, p + 1, last)) {
+    for (size_t k = 0; k < count; k++) {
         lanes x;
-        KERNEL(turn_lanes)(turned, a->inputs, (const float *)&d->dense[p], &x);
-        d->dense[p] = (lanes){0};
-        KERNEL(spread)(columns, leaf->inputs, p - leaf->begin, &x, sums);
+        KERNEL(turn_lanes)(turned, a->inputs, (const float *)&d->dense[p[k]], &x);
+        d->dense[p[k]] = (lanes){0};
+        KERNEL(spread)(columns, leaf->inputs, p[k] - leaf->begin, &x, sums);
     }
 }
 
 /* Of a far cluster only what it hands up. */
-static TARGET void KERNEL(gather_far)(const pass_row *row, const wavelet_node *a, uint32_t b, size_t p,
-                                      const desk *d, lanes *out) {
+static TARGET void KERNEL(gather_far)(const pass_row *row, const wavelet_node *a, uint32_t b,
+                                      const uint32_t *p, size_t count, const desk *d, lanes *out) {
     const wavelet_reach *reach = &row->job->reach;
     const wavelets *w = reach->basis;
     const wavelet_affine *f = &reach->affine[b];
     const float *turned = w->padded + (size_t)a->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
-    const size_t last = w->nodes[b].begin + w->nodes[b].n_elements;
     lanes sums[SCALING] = {{0}};
-    for (; p < last; p = KERNEL(next_touched)(d->touched, p + 1, last)) {
-        const wavelet_place *at = &reach->place[p];
-        const lanes x = at->root * d->dense[p];
+    for (size_t e = 0; e < count; e++) {
+        const wavelet_place *at = &reach->place[p[e]];
+        const lanes x = at->root * d->dense[p[e]];
         const float u = at->u - f->u, v = at->v - f->v;
-        d->dense[p] = (lanes){0};
+        __builtin_prefetch(&d->dense[p[e + AHEAD]], 1);
+        __builtin_prefetch(&reach->place[p[e + AHEAD]]);
+        d->dense[p[e]] = (lanes){0};
         for (size_t k = 0; k < SCALING; k++) sums[k] += (f->of[k][0] + f->of[k][1] * u + f->of[k][2] * v) * x;
     }
     for (size_t k = 0; k < SCALING; k++)
@@ -150,24 +137,23 @@ static TARGET lam_status KERNEL(begin_leaf)(const pass_row *row, size_t node, li
     lam_status status = LAM_OK;
     const pass_job *job = row->job;
     const wavelets *w = job->input->basis;
-    const size_t n_cells = wavelet_cells(&job->reach, node, d->cells, d->work);
-    size_t used = 0;
-    for (size_t c = 0; c < n_cells; c++) {
+    const size_t n_cells = wavelet_cells(&job->reach, node, d->cells, d->work), n_lit = list_lit(job, d);
+    size_t used = 0, first = 0, last = 0;
+    for (size_t c = 0; c < n_cells && last < n_lit; c++, first = last) {
         const uint32_t b = d->cells[c];
         const wavelet_node *cell = &w->nodes[b];
-        const size_t p = KERNEL(next_touched)(d->touched, cell->begin, cell->begin + cell->n_elements);
-        if (p == cell->begin + cell->n_elements) continue;
+        while (last < n_lit && d->lit[last] < cell->begin + cell->n_elements) last++;
+        if (last == first) continue;
         if (cell->from_left > 0) {
-            KERNEL(gather_far)(row, &w->nodes[node], b, p, d, out->value[used].of);
+            KERNEL(gather_far)(row, &w->nodes[node], b, d->lit + first, last - first, d, out->value[used].of);
         } else {
             lanes sums[WAVELET_INPUTS] = {{0}};
-            KERNEL(gather_leaf)(row, &w->nodes[node], cell, p, d, sums);
+            KERNEL(gather_leaf)(row, &w->nodes[node], cell, d->lit + first, last - first, d, sums);
             const bool emit = wavelet_is_near(&job->reach, node, b);
             TRY(KERNEL(hand_up)(row, b, emit, sums, &out->value[used], d, error));
         }
         out->cluster[used++] = b;
     }
-    memset(d->touched, 0, (w->n + 63) / 64 * sizeof *d->touched);
     out->count = used;
 done:
     return status;

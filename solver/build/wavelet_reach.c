@@ -8,10 +8,16 @@
 
 enum { LINEAR = 3 };
 
+/* All elements of a node are in it. */
+typedef struct sphere {
+    double centre[3], radius;
+} sphere;
+/* Spheres are this much larger in single precision, so that one in another stays so. */
+static const double margin = 1 + 1e-5;
+
 void wavelet_reach_free(wavelet_reach *r) {
-    free(r->reach);
     free(r->height);
-    free(r->around);
+    free(r->extent);
     free(r->affine);
     free(r->place);
     *r = (wavelet_reach){.n_leaves = 0};
@@ -20,12 +26,12 @@ void wavelet_reach_free(wavelet_reach *r) {
 /* The middle of its children's spheres, and what holds both; of a leaf that of its elements, each as large as
  * a disk of its area. */
 static void surround(const wavelets *w, const plane_tree *tree, size_t t, const double *area,
-                     const double (*centre)[3], wavelet_sphere *around) {
+                     const double (*centre)[3], sphere *around) {
     const wavelet_node *a = &w->nodes[t];
-    wavelet_sphere *own = &around[t];
-    *own = (wavelet_sphere){.radius = 0};
+    sphere *own = &around[t];
+    *own = (sphere){.radius = 0};
     if (a->from_left > 0) {
-        const wavelet_sphere *parts[2] = {&around[a->left], &around[t - 1]};
+        const sphere *parts[2] = {&around[a->left], &around[t - 1]};
         for (int d = 0; d < 3; d++) own->centre[d] = .5 * (parts[0]->centre[d] + parts[1]->centre[d]);
         for (int k = 0; k < 2; k++) {
             double apart = 0;
@@ -42,6 +48,15 @@ static void surround(const wavelets *w, const plane_tree *tree, size_t t, const 
         for (int d = 0; d < 3; d++) apart += pow(own->centre[d] - centre[elements[k]][d], 2);
         own->radius = fmax(own->radius, sqrt(apart) + sqrt(.318 * area[elements[k]]));
     }
+}
+
+static wavelet_extent extent_of(const sphere *s, const wavelet_node *a, uint32_t height, double radii) {
+    wavelet_extent made = {.radius = (float)(margin * s->radius),
+                           .reach = (float)(margin * (1 + radii) * s->radius),
+                           .height = height,
+                           .left = a->from_left > 0 ? a->left : WAVELET_NONE};
+    for (int d = 0; d < 3; d++) made.centre[d] = (float)s->centre[d];
+    return made;
 }
 
 /* --- what nodes hand up -------------------------------------------------------------------------------- */
@@ -125,13 +140,13 @@ lam_status wavelet_reach_make(const wavelets *basis, const plane_tree *tree, con
     lam_status status = LAM_OK;
     const wavelets *w = basis;
     wavelet_reach r = {.basis = basis};
+    sphere *around = memory_allocate(w->n_nodes, sizeof *around, "wavelets", error);
     products *P = memory_allocate(w->n_nodes, sizeof *P, "wavelets", error);
-    r.reach = memory_allocate(w->n_nodes, sizeof *r.reach, "wavelets", error);
     r.height = memory_allocate(w->n_nodes, sizeof *r.height, "wavelets", error);
-    r.around = memory_allocate(w->n_nodes, sizeof *r.around, "wavelets", error);
+    r.extent = memory_allocate(w->n_nodes, sizeof *r.extent, "wavelets", error);
     r.affine = memory_allocate(w->n_nodes, sizeof *r.affine, "wavelets", error);
     r.place = memory_allocate(w->n, sizeof *r.place, "wavelets", error);
-    if (P == NULL || r.reach == NULL || r.height == NULL || r.around == NULL || r.affine == NULL ||
+    if (P == NULL || around == NULL || r.height == NULL || r.extent == NULL || r.affine == NULL ||
         r.place == NULL)
         TRY(LAM_ERR_MEMORY);
     for (size_t t = 0; t < w->n_nodes; t++) {
@@ -141,8 +156,7 @@ lam_status wavelet_reach_make(const wavelets *basis, const plane_tree *tree, con
         if (a->scaling > LINEAR)
             FAIL(error, LAM_ERR_ARGUMENT, "node %zu hands up %u numbers, must be at most %d", t,
                  (unsigned)a->scaling, LINEAR);
-        surround(w, tree, t, area, centre, r.around);
-        r.reach[t] = frame == PLANE_ABOVE ? INFINITY : (1 + radii) * r.around[t].radius;
+        surround(w, tree, t, area, centre, around);
         if (a->from_left == 0) {
             r.n_leaves++;
             for (size_t k = 0; k < a->n_elements; k++) {
@@ -157,12 +171,14 @@ lam_status wavelet_reach_make(const wavelets *basis, const plane_tree *tree, con
             const uint32_t left = r.height[a->left], right = r.height[t - 1];
             r.height[t] = 1 + (left > right ? left : right);
         }
+        r.extent[t] = extent_of(&around[t], a, r.height[t], frame == PLANE_ABOVE ? INFINITY : radii);
         turn_products(w, t, P, a->from_left == 0 ? (const double(*)[LINEAR])leaf : NULL, &P[t]);
         r.affine[t] = affine_of(a->scaling, &P[t], frame != PLANE_ABOVE);
     }
     *out = r;
     r = (wavelet_reach){.n_leaves = 0};
 done:
+    free(around);
     free(P);
     wavelet_reach_free(&r);
     return status;
@@ -183,12 +199,14 @@ size_t wavelet_cells(const wavelet_reach *r, size_t leaf, uint32_t *out, uint32_
     waiting[n_waiting++] = root;
     while (n_waiting > 0) {
         const uint32_t b = waiting[--n_waiting];
-        if (nodes[b].from_left == 0 || !wavelet_is_near(r, above[r->height[b]], b)) {
+        const wavelet_extent *e = &r->extent[b];
+        if (e->left == WAVELET_NONE || !wavelet_is_near(r, above[e->height], b)) {
             out[found++] = b;
             continue;
         }
+        __builtin_prefetch(&r->extent[b - 1]);
         waiting[n_waiting++] = b - 1;
-        waiting[n_waiting++] = nodes[b].left;
+        waiting[n_waiting++] = e->left;
     }
     return found;
 }

@@ -6,10 +6,13 @@
 #include "solver/build/plane_tree.h"
 #include "solver/operator/wavelets.h"
 
-/* All elements of a node are in it. */
-typedef struct wavelet_sphere {
-    double centre[3], radius;
-} wavelet_sphere;
+/* What a walk down the tree asks of a node, in half a line of the cache: a sphere that has all its elements,
+ * how far it looks from the middle of that, and where it stands. */
+typedef struct wavelet_extent {
+    float centre[3], radius, reach;
+    uint32_t height, left; /* WAVELET_NONE: it is a leaf */
+    uint32_t unused;
+} wavelet_extent;
 
 /* What a node hands up, as functions of its elements, A_p^1/2 (f0 + f1 (u_p - u) + f2 (v_p - v)) with places
  * u, v in its plane. */
@@ -26,9 +29,8 @@ typedef struct wavelet_place {
 typedef struct wavelet_reach {
     const wavelets *basis;
     double radii;           /* a node looks so many of its radii around itself */
-    double *reach;          /* [n_nodes], from its middle: how far it looks */
     uint32_t *height;       /* [n_nodes], 0: leaves */
-    wavelet_sphere *around; /* [n_nodes] */
+    wavelet_extent *extent; /* [n_nodes] */
     wavelet_affine *affine; /* [n_nodes] */
     wavelet_place *place;   /* [n] */
     size_t n_leaves;
@@ -45,9 +47,10 @@ void wavelet_reach_free(wavelet_reach *r);
 /* Whether wavelets of node a look at cluster b. Where a is above others, and b too, what is near to those is
  * near to them. */
 static inline bool wavelet_is_near(const wavelet_reach *r, size_t a, size_t b) {
-    const double *x = r->around[a].centre, *y = r->around[b].centre, far = r->reach[a] + r->around[b].radius;
-    double apart = 0;
-    for (int d = 0; d < 3; d++) apart += (x[d] - y[d]) * (x[d] - y[d]);
+    const wavelet_extent *x = &r->extent[a], *y = &r->extent[b];
+    const float far = x->reach + y->radius;
+    float apart = 0;
+    for (int d = 0; d < 3; d++) apart += (x->centre[d] - y->centre[d]) * (x->centre[d] - y->centre[d]);
     return !(apart > far * far);
 }
 
