@@ -45,14 +45,14 @@ static lam_status reflected_make(const build_problem *p, const float *rho, const
 
 static inline void add_to(sparse_row *r, uint32_t j, double x) {
     r->value[j] += x;
-    r->marked[j >> 6] |= (uint64_t)1 << (j & 63);
+    marks_add(&r->there, j);
 }
 
 void desk_free(desk *d) {
     free(d->sum.value);
-    free(d->sum.marked);
+    marks_free(&d->sum.there);
     free(d->next.value);
-    free(d->next.marked);
+    marks_free(&d->next.there);
     free(d->at);
     free(d->T);
     free(d->indices);
@@ -60,15 +60,14 @@ void desk_free(desk *d) {
 }
 
 lam_status desk_make(size_t n, desk *d, lam_error *error) {
-    *d = (desk){.n = n, .words = (n + 63) / 64};
+    *d = (desk){.n = n};
     d->sum.value = memory_allocate(n, sizeof *d->sum.value, "sparse inverse", error);
     d->next.value = memory_allocate(n, sizeof *d->next.value, "sparse inverse", error);
-    d->sum.marked = memory_allocate(d->words, sizeof *d->sum.marked, "sparse inverse", error);
-    d->next.marked = memory_allocate(d->words, sizeof *d->next.marked, "sparse inverse", error);
+    const bool marked = marks_make(n, 0, "sparse inverse", &d->sum.there, error) == LAM_OK &&
+                        marks_make(n, 0, "sparse inverse", &d->next.there, error) == LAM_OK;
     d->at = memory_allocate(n, sizeof *d->at, "sparse inverse", error);
     d->T = memory_allocate(n, sizeof *d->T, "sparse inverse", error);
-    const bool all = d->sum.value != NULL && d->next.value != NULL && d->sum.marked != NULL &&
-                     d->next.marked != NULL && d->at != NULL && d->T != NULL;
+    const bool all = marked && d->sum.value != NULL && d->next.value != NULL && d->at != NULL && d->T != NULL;
     return all ? LAM_OK : LAM_ERR_MEMORY;
 }
 
@@ -76,20 +75,18 @@ lam_status desk_make(size_t n, desk *d, lam_error *error) {
 static double take_bounce(desk *d, double threshold) {
     double removed = 0;
     d->n_T = 0;
-    for (size_t w = 0; w < d->words; w++) {
-        for (uint64_t bits = d->next.marked[w]; bits != 0; bits &= bits - 1) {
-            const uint32_t j = (uint32_t)(w * 64 + (size_t)__builtin_ctzll(bits));
-            const double t = d->next.value[j];
-            d->next.value[j] = 0;
-            if (t < threshold) {
-                removed += t;
-                continue;
-            }
-            d->at[d->n_T] = j;
-            d->T[d->n_T++] = t;
-            add_to(&d->sum, j, t);
+    const size_t count = marks_take(&d->next.there);
+    for (size_t k = 0; k < count; k++) {
+        const uint32_t j = d->next.there.taken[k];
+        const double t = d->next.value[j];
+        d->next.value[j] = 0;
+        if (t < threshold) {
+            removed += t;
+            continue;
         }
-        d->next.marked[w] = 0;
+        d->at[d->n_T] = j;
+        d->T[d->n_T++] = t;
+        add_to(&d->sum, j, t);
     }
     return removed;
 }
@@ -120,17 +117,13 @@ static bool desk_reserve(desk *d, size_t more) {
 }
 
 bool desk_put_sum(desk *d, uint64_t *entries) {
-    size_t count = 0;
-    for (size_t w = 0; w < d->words; w++) count += (size_t)__builtin_popcountll(d->sum.marked[w]);
+    const size_t count = marks_take(&d->sum.there);
     if (!desk_reserve(d, count)) return false;
-    for (size_t w = 0; w < d->words; w++) {
-        for (uint64_t bits = d->sum.marked[w]; bits != 0; bits &= bits - 1) {
-            const uint32_t j = (uint32_t)(w * 64 + (size_t)__builtin_ctzll(bits));
-            d->indices[d->used] = j;
-            d->data[d->used++] = (float)d->sum.value[j];
-            d->sum.value[j] = 0;
-        }
-        d->sum.marked[w] = 0;
+    for (size_t k = 0; k < count; k++) {
+        const uint32_t j = d->sum.there.taken[k];
+        d->indices[d->used] = j;
+        d->data[d->used++] = (float)d->sum.value[j];
+        d->sum.value[j] = 0;
     }
     *entries = count;
     return true;

@@ -4,6 +4,7 @@
 #define LAMBERT_BUILD_SPARSE_ROWS_H
 
 #include "solver/build/build.h"
+#include "solver/operator/marks.h"
 
 /* Entries of R F that reach the threshold, rows and columns by position, and what each row lacks. */
 typedef struct reflected {
@@ -30,13 +31,13 @@ void rows_job_end(rows_job *job);
 
 /* A row with most entries 0: where others are is marked, so that looking for them is no look at all. */
 typedef struct sparse_row {
-    double *value;    /* [n] */
-    uint64_t *marked; /* [words] */
+    double *value; /* [n] */
+    marks there;
 } sparse_row;
 
 /* What a thread works with. */
 typedef struct desk {
-    size_t n, words;
+    size_t n;
     sparse_row sum, next; /* of T so far, and T R F */
     uint32_t *at;         /* [n], where T is not 0, ascending */
     double *T;            /* [n], there */

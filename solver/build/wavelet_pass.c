@@ -1,5 +1,7 @@
 #include "solver/build/wavelet_pass.h"
 
+#include "solver/operator/marks.h"
+
 #include "store/status.h"
 
 #include <math.h>
@@ -62,9 +64,8 @@ typedef struct kept {
 
 /* What a thread works with. */
 typedef struct desk {
-    lanes *dense;      /* [n], rows of a leaf: all 0 between leaves */
-    uint64_t *touched; /* where they are not */
-    uint32_t *lit;     /* [n + AHEAD], the same as positions, ascending, and what may be looked at behind */
+    lanes *dense;           /* [n], rows of a leaf: all 0 between leaves */
+    marks lit;              /* where they are not; AHEAD numbers behind them may be looked at */
     uint32_t *cells, *work; /* of wavelet_cells */
     live_rows rows[2], near[2];
     kept *found;
@@ -102,17 +103,6 @@ static lam_status desk_keep(const pass_row *row, desk *d, uint32_t b, uint32_t i
     }
     d->found[d->n_found++] = i < j ? (kept){i, j, value} : (kept){j, i, value};
     return LAM_OK;
-}
-
-/* Takes the desk's touched positions off their map into its list; returns how many there are. */
-static size_t list_lit(const pass_job *job, desk *d) {
-    size_t count = 0;
-    for (size_t word = 0; word < (job->input->basis->n + 63) / 64; word++)
-        for (uint64_t bits = d->touched[word]; bits != 0; bits &= bits - 1)
-            d->lit[count++] = (uint32_t)(word * 64 + (size_t)__builtin_ctzll(bits));
-    memset(d->touched, 0, (job->input->basis->n + 63) / 64 * sizeof *d->touched);
-    memset(d->lit + count, 0, AHEAD * sizeof *d->lit);
-    return count;
 }
 
 static inline unsigned beyond_portable(const lanes *v, float least) {
@@ -169,7 +159,7 @@ static lam_status scatter_rows(const pass_job *job, size_t node, desk *d, lam_er
                 __builtin_prefetch(&d->dense[job->columns[rows.indices[lane][e + AHEAD]].position], 1);
             const size_t p = at->position;
             d->dense[p][lane] = root * at->over_root * rows.data[lane][e];
-            d->touched[p >> 6] |= 1ull << (p & 63);
+            marks_add(&d->lit, p);
         }
     }
 done:
@@ -299,8 +289,7 @@ done:
 
 static void desk_free(desk *d) {
     free(d->dense);
-    free(d->touched);
-    free(d->lit);
+    marks_free(&d->lit);
     free(d->cells);
     free(d->work);
     for (int k = 0; k < 2; k++) {
@@ -327,13 +316,11 @@ static lam_status desk_make(const pass_job *job, desk *d, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = job->input->basis->n;
     d->dense = aligned_lanes(n, sizeof *d->dense, error);
-    d->touched = memory_allocate((n + 63) / 64, sizeof *d->touched, "wavelets", error);
-    d->lit = memory_allocate(n + AHEAD, sizeof *d->lit, "wavelets", error);
+    TRY(marks_make(n, AHEAD, "wavelets", &d->lit, error));
     d->cells = memory_allocate(job->reach.n_leaves, sizeof *d->cells, "wavelets", error);
     d->work = memory_allocate(2 * (size_t)job->reach.height[job->input->basis->n_nodes - 1] + 4,
                               sizeof *d->work, "wavelets", error);
-    if (d->dense == NULL || d->touched == NULL || d->lit == NULL || d->cells == NULL || d->work == NULL)
-        TRY(LAM_ERR_MEMORY);
+    if (d->dense == NULL || d->cells == NULL || d->work == NULL) TRY(LAM_ERR_MEMORY);
     memset(d->dense, 0, n * sizeof *d->dense);
     for (int k = 0; k < 2; k++) {
         d->rows[k].cluster =

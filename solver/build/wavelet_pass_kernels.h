@@ -137,18 +137,19 @@ static TARGET lam_status KERNEL(begin_leaf)(const pass_row *row, size_t node, li
     lam_status status = LAM_OK;
     const pass_job *job = row->job;
     const wavelets *w = job->input->basis;
-    const size_t n_cells = wavelet_cells(&job->reach, node, d->cells, d->work), n_lit = list_lit(job, d);
+    const size_t n_cells = wavelet_cells(&job->reach, node, d->cells, d->work), n_lit = marks_take(&d->lit);
+    const uint32_t *lit = d->lit.taken;
     size_t used = 0, first = 0, last = 0;
     for (size_t c = 0; c < n_cells && last < n_lit; c++, first = last) {
         const uint32_t b = d->cells[c];
         const wavelet_node *cell = &w->nodes[b];
-        while (last < n_lit && d->lit[last] < cell->begin + cell->n_elements) last++;
+        while (last < n_lit && lit[last] < cell->begin + cell->n_elements) last++;
         if (last == first) continue;
         if (cell->from_left > 0) {
-            KERNEL(gather_far)(row, &w->nodes[node], b, d->lit + first, last - first, d, out->value[used].of);
+            KERNEL(gather_far)(row, &w->nodes[node], b, lit + first, last - first, d, out->value[used].of);
         } else {
             lanes sums[WAVELET_INPUTS] = {{0}};
-            KERNEL(gather_leaf)(row, &w->nodes[node], cell, d->lit + first, last - first, d, sums);
+            KERNEL(gather_leaf)(row, &w->nodes[node], cell, lit + first, last - first, d, sums);
             const bool emit = wavelet_is_near(&job->reach, node, b);
             TRY(KERNEL(hand_up)(row, b, emit, sums, &out->value[used], d, error));
         }

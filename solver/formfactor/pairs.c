@@ -5,6 +5,8 @@
 #include "solver/formfactor/neighbours.h"
 #include "solver/formfactor/pair_rows.h"
 
+#include "solver/operator/marks.h"
+
 #include <math.h>
 #include <omp.h>
 #include <stdio.h>
@@ -330,20 +332,16 @@ done:
 /* --- result -------------------------------------------------------------------------------------------- */
 
 /* Puts a row whose entries stand in any order in that of their indices, by way of a whole row of nothing. */
-static void sort_row(csr *rows, size_t i, size_t n, float *dense, uint64_t *touched) {
+static void sort_row(csr *rows, size_t i, float *dense, marks *there) {
     for (uint64_t p = rows->indptr[i]; p < rows->indptr[i + 1]; p++) {
         const uint32_t j = rows->indices[p];
         dense[j] = rows->data[p];
-        touched[j >> 6] |= 1ull << (j & 63);
+        marks_add(there, j);
     }
-    uint64_t at = rows->indptr[i];
-    for (size_t w = 0; w < (n + 63) / 64; w++) {
-        for (uint64_t bits = touched[w]; bits != 0; bits &= bits - 1) {
-            const size_t j = w * 64 + (size_t)__builtin_ctzll(bits);
-            rows->indices[at] = (uint32_t)j;
-            rows->data[at++] = dense[j];
-        }
-        touched[w] = 0;
+    const size_t count = marks_take(there);
+    for (size_t k = 0; k < count; k++) {
+        rows->indices[rows->indptr[i] + k] = there->taken[k];
+        rows->data[rows->indptr[i] + k] = dense[there->taken[k]];
     }
 }
 
@@ -353,18 +351,18 @@ static lam_status sort_rows(csr *rows, lam_error *error) {
 #pragma omp parallel
     {
         lam_error ignored;
+        marks there;
         float *dense = memory_allocate(n, sizeof *dense, "form factor rows", &ignored);
-        uint64_t *touched = memory_allocate((n + 63) / 64, sizeof *touched, "form factor rows", &ignored);
-        const bool enough = dense != NULL && touched != NULL;
+        const bool enough = marks_make(n, 0, "form factor rows", &there, &ignored) == LAM_OK && dense != NULL;
         if (!enough) {
 #pragma omp atomic write
             out_of_memory = true;
         }
 #pragma omp for schedule(dynamic, 16)
         for (size_t i = 0; i < n; i++)
-            if (enough) sort_row(rows, i, n, dense, touched);
+            if (enough) sort_row(rows, i, dense, &there);
         free(dense);
-        free(touched);
+        marks_free(&there);
     }
     return out_of_memory ? status_fail(error, LAM_ERR_MEMORY, "rows of %zu elements: out of memory", n)
                          : LAM_OK;

@@ -27,9 +27,8 @@ static lam_status pools_create(const row_maker *maker, size_t n_pools, row_pool 
     if (pools == NULL) return LAM_ERR_MEMORY;
     for (size_t t = 0; t < n_pools; t++) {
         pools[t].sums = memory_allocate(n, sizeof *pools[t].sums, "form factor rows", error);
-        pools[t].touched =
-            memory_allocate((n + 63) / 64, sizeof *pools[t].touched, "form factor rows", error);
-        if (pools[t].sums == NULL || pools[t].touched == NULL) return LAM_ERR_MEMORY;
+        if (pools[t].sums == NULL) return LAM_ERR_MEMORY;
+        if (marks_make(n, 0, "form factor rows", &pools[t].summed, error) != LAM_OK) return LAM_ERR_MEMORY;
         if (maker->sky == NULL) continue;
         pools[t].sky = memory_allocate(maker->sky->tiling.n_tiles + 1, sizeof *pools[t].sky,
                                        "the tiles of the sky", error);
@@ -41,7 +40,7 @@ static lam_status pools_create(const row_maker *maker, size_t n_pools, row_pool 
 static void pools_free(row_pool *pools, size_t n_pools) {
     for (size_t t = 0; pools != NULL && t < n_pools; t++) {
         free(pools[t].sums);
-        free(pools[t].touched);
+        marks_free(&pools[t].summed);
         free(pools[t].sky);
         free(pools[t].bytes);
     }
@@ -49,21 +48,17 @@ static void pools_free(row_pool *pools, size_t n_pools) {
 }
 
 /* Packs the sums with ascending columns and clears them. */
-static bool take_row(row_pool *pool, row_kind kind, size_t n, found_row *row) {
-    const size_t words = (n + 63) / 64;
-    size_t length = 0;
-    for (size_t w = 0; w < words; w++) length += (size_t)__builtin_popcountll(pool->touched[w]);
+static bool take_row(row_pool *pool, row_kind kind, found_row *row) {
+    const size_t length = marks_take(&pool->summed);
+    const uint32_t *columns = pool->summed.taken;
     if (!pool_reserve(pool, length * ROW_ENTRY_MOST)) return false;
     uint8_t *const begin = pool->bytes + pool->used, *to = begin;
     uint32_t next = 0;
-    for (size_t w = 0; w < words; w++) {
-        for (uint64_t bits = pool->touched[w]; bits != 0; bits &= bits - 1) {
-            const uint32_t j = (uint32_t)(w * 64 + (size_t)__builtin_ctzll(bits));
-            to = row_put(kind, to, j - next, (float)pool->sums[j]);
-            next = j + 1;
-            pool->sums[j] = 0;
-        }
-        pool->touched[w] = 0;
+    for (size_t k = 0; k < length; k++) {
+        const uint32_t j = columns[k];
+        to = row_put(kind, to, j - next, (float)pool->sums[j]);
+        next = j + 1;
+        pool->sums[j] = 0;
     }
     *row = (found_row){.n_bytes = (uint32_t)(to - begin), .n_entries = (uint32_t)length};
     pool->used += (size_t)(to - begin);
@@ -108,7 +103,7 @@ static void make_chunk(rows_run *run, size_t c, row_pool *pool) {
         const size_t i = run->order[position];
         maker->make(maker->context, i, pool, &run->leaving[i], &run->absorbed[i]);
         if (maker->sky != NULL) sky_bounce_put(maker->sky, i, pool->sky, maker->whole);
-        enough = take_row(pool, maker->kind, n, &run->rows->rows[i]);
+        enough = take_row(pool, maker->kind, &run->rows->rows[i]);
     }
     uint8_t *bytes = enough ? malloc(pool->used + 1) : NULL;
     if (bytes == NULL) {

@@ -8,14 +8,15 @@
 #include "solver/formfactor/scratch.h"
 #include "solver/formfactor/sky_bounce.h"
 #include "solver/formfactor/visibility.h"
+#include "solver/operator/marks.h"
 #include "solver/progress.h"
 #include "solver/scene/mesh.h"
 
 /* What one thread works with: the sums of the element it is at, and the packed rows of its chunk. */
 typedef struct row_pool {
-    double *sums;      /* [n], all zero between elements */
-    uint64_t *touched; /* bit set over elements: where sums were added to */
-    double *sky;       /* [m + 1], likewise zero: of the tiles of a sky and of the ground; NULL: none */
+    double *sums; /* [n], all zero between elements */
+    marks summed; /* where sums were added to */
+    double *sky;  /* [m + 1], likewise zero: of the tiles of a sky and of the ground; NULL: none */
     uint8_t *bytes;
     size_t used, capacity;
 } row_pool;
@@ -23,7 +24,7 @@ typedef struct row_pool {
 /* The element at hand sees this much more of another one. */
 static inline void row_pool_add(row_pool *pool, uint32_t seen, double weight) {
     pool->sums[seen] += weight;
-    pool->touched[seen >> 6] |= 1ull << (seen & 63);
+    marks_add(&pool->summed, seen);
 }
 
 _Static_assert((int)SKY_PACKET == VISIBILITY_PACKET, "packets go through the sky whole");
