@@ -9,12 +9,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Rays of a file's elements where there are too many for pairs. */
-enum { RAYS_OF_FILE = 1024 };
+/* Rays of all a file's elements together where there are too many for pairs, about, and of one at least. */
+enum { RAYS_OF_FILE = 1 << 27, RAYS_LEAST = 1024 };
 
 /* Quick takes every third of the first: a city and a Cornell box. */
 enum { QUICK_STEP = 3 };
-static const double accuracy_of_file = 7e-5;
 
 /* Elements of each scene; a file is refined to as many. */
 static const size_t elements_of[3] = {600, 2500, 8897};
@@ -33,10 +32,7 @@ static lam_status open_file(const bench_run *run, char name[64], lowrank_scene *
     if (dot != NULL && dot != name) *dot = '\0';
     recipe how = lowrank_recipe(run, m.n);
     if (how.method != RECIPE_PAIRS)
-        how = (recipe){.method = RECIPE_NEAR_PAIRS,
-                       .rays = RAYS_OF_FILE,
-                       .accuracy = accuracy_of_file,
-                       .seed = run->seed};
+        how.rays = m.n < RAYS_OF_FILE / RAYS_LEAST ? RAYS_OF_FILE / m.n : RAYS_LEAST;
     TRY(lowrank_open(run, name, &m, &how, out, error));
 done:
     mesh_free(&m);

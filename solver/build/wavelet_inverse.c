@@ -198,9 +198,10 @@ static inline void add(inverse_desk *d, uint32_t j, float value, size_t *count) 
     if (d->sum[j] == 0) d->sum[j] = 1e-30f;
 }
 
-/* Row i of R B. */
+/* Row i of R B, of which nothing is used below least_i times the weight of a column. */
 typedef struct scaled_rows {
     const csr *R, *B;
+    const float *weight, *least;
 } scaled_rows;
 
 static size_t make_scaled(const void *context, size_t i, inverse_desk *d) {
@@ -214,9 +215,9 @@ static size_t make_scaled(const void *context, size_t i, inverse_desk *d) {
     return count;
 }
 
-static bool keep_all(const void *context, size_t i, uint32_t j, float value) {
-    (void)context, (void)i, (void)j;
-    return fabsf(value) > 1e-20f;
+static bool keep_used(const void *context, size_t i, uint32_t j, float value) {
+    const scaled_rows *s = context;
+    return fabsf(value) >= s->least[i] * s->weight[j];
 }
 
 /* Row i of base + A B, B by size and over the weights of its columns. */
@@ -256,11 +257,31 @@ static bool keep_upper(const void *context, size_t i, uint32_t j, float value) {
     return j >= i && fabsf(value) > p->keep * p->weight[i] * p->weight[j];
 }
 
-/* out = R B, rows by size, over the weights of their columns. */
-static lam_status scale_rows(const product_job *job, const csr *R, const csr *B, csr *out, lam_error *error) {
-    const scaled_rows s = {R, B};
-    const row_rule rule = {make_scaled, keep_all, &s, true, true, "inverse"};
-    return make_rows(job, &rule, out, error);
+/* least_k: the least number of row k of B, over the weight of its column, that a product A B with a symmetric
+ * A makes use of: a term a_ik b_kj is left out below skip weight_i weight_j. */
+static void find_least(const product_job *job, const csr *A, float *least) {
+    const float skip = job->input->skipped * job->input->threshold;
+    for (size_t k = 0; k < A->n; k++) {
+        float most = 0;
+        for (uint64_t e = A->indptr[k]; e < A->indptr[k + 1]; e++)
+            most = fmaxf(most, fabsf(A->data[e]) * job->inverse_weight[A->indices[e]]);
+        least[k] = .999f * skip / most; /* infinite where nothing is */
+    }
+}
+
+/* out = R B, rows by size, over the weights of their columns, as far as A (R B) uses it. */
+static lam_status scale_rows(const product_job *job, const csr *R, const csr *B, const csr *A, csr *out,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    float *least = memory_allocate(A->n, sizeof *least, "wavelets", error);
+    if (least == NULL) TRY(LAM_ERR_MEMORY);
+    find_least(job, A, least);
+    const scaled_rows s = {R, B, job->weight, least};
+    const row_rule rule = {make_scaled, keep_used, &s, true, true, "inverse"};
+    TRY(make_rows(job, &rule, out, error));
+done:
+    free(least);
+    return status;
 }
 
 /* out: base + A B, both triangles. */
@@ -339,10 +360,10 @@ static lam_status run(const product_job *job, csr *out, wavelet_inverse_report *
     TRY(csr_mirror(input->S, &K, error));
     TRY(csr_mirror(input->S, &Z, error));
     while (Z.indptr[Z.n] > 0 && report->doublings < DOUBLINGS_MOST) {
-        TRY(scale_rows(job, &R, &K, &RK, error));
+        TRY(scale_rows(job, &R, &K, &Z, &RK, error));
         TRY(multiply(job, &Z, &RK, &K, &report->terms, &next_K, error));
         csr_free(&RK);
-        TRY(scale_rows(job, &R, &Z, &RZ, error));
+        TRY(scale_rows(job, &R, &Z, &Z, &RZ, error));
         TRY(multiply(job, &Z, &RZ, NULL, &report->terms, &next_Z, error));
         csr_free(&RZ);
         replace(&K, &next_K);
