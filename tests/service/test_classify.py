@@ -71,6 +71,25 @@ class Classify(unittest.TestCase):
         finer = self.look("cornell.obj", "--subdivide", 1)
         self.assertGreater(finer["elements"], 4 * 1250)
 
+    def test_what_low_rank_alone_has(self):
+        """Is asked for, and auto takes low rank, whatever else would answer faster."""
+        store = self.path("asked.h5")
+        for options in ("--rank", 40), ("--store-precision", "f16"), ("--factorizer", "hf"), ("--keep-factors",):
+            done = must("precompute", self.path("cornell.obj"), "-o", store, "--rays", 64, "--epsilon", .4, "--probes", 0,
+                        *options)
+            self.assertNotIn(f"does not use {options[0]}", done.stderr)
+            with h5py.File(store) as file:
+                self.assertEqual(file["operator"].attrs["kind"].decode(), "low_rank", options)
+
+    def test_noise_leaves_one_choice(self):
+        """Where rays are so few that their noise is more than epsilon, a sparse inverse would be of noise."""
+        found = self.look("city.obj")
+        self.assertEqual(found["method"], "hierarchical")
+        self.assertIsNone(found["sparse"])
+        finer = json.loads(must("classify", self.path("city.obj"), "--json").stdout)  # 4096 rays
+        self.assertEqual(finer["method"], "sparse")
+        self.assertLess(finer["numbers"]["sparse"], finer["numbers"]["hierarchical"])
+
     def test_few_emitters_are_the_answer_where_they_are_given(self):
         found = self.look("city.obj", "--sky", "grid:4x3", "--emitters", "sky")
         self.assertEqual(found["method"], "emitters")
