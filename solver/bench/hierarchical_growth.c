@@ -1,8 +1,6 @@
 /* Closed grey Cornell boxes of growing size: what a hierarchical operator takes, beside one of low rank. */
 #include "solver/bench/hierarchical.h"
 #include "solver/bench/scenes.h"
-#include "solver/bench/stats.h"
-#include "solver/clock.h"
 
 #include <math.h>
 #include <omp.h>
@@ -43,28 +41,6 @@ static const table_column columns[] = {
     {"uniform", "", "|B~ - 1| / |1| where E = 1 - rho s"},
 };
 
-static lam_status time_answers(const lam_operator *op, size_t solves, double *median, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = lam_operator_elements(op), bytes = lam_operator_work_bytes(op, 1);
-    double seconds[SOLVES];
-    float *E = memory_allocate(n, sizeof *E, "an answer", error);
-    float *B = memory_allocate(n, sizeof *B, "an answer", error);
-    void *work = memory_allocate(1, bytes, "an answer", error);
-    if (E == NULL || B == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < n; i++) E[i] = (float)(i % 7);
-    for (size_t k = 0; k < solves; k++) {
-        const double started = clock_seconds();
-        TRY(lam_operator_apply(op, 1, LAM_RADIOSITY, E, B, work, bytes, error));
-        seconds[k] = clock_seconds() - started;
-    }
-    *median = stats_median(seconds, solves);
-done:
-    free(E);
-    free(B);
-    free(work);
-    return status;
-}
-
 /* A folded operator of random numbers, whose speed does not depend on them; NaN where memory is too small. */
 static lam_status time_low_rank(const bench_run *run, const mesh *m, size_t k, double *median,
                                 lam_error *error) {
@@ -86,7 +62,7 @@ static lam_status time_low_rank(const bench_run *run, const mesh *m, size_t k, d
     factors[0] = factors[1] = NULL;
     TRY(operator_low_rank_create_folded(m->n, k, m->reflectance, Y, V, &op, error));
     lam_operator_set_threads(op, (size_t)omp_get_max_threads());
-    TRY(time_answers(op, numbers > LARGE_SOLVE ? SOLVES_OF_LARGE : SOLVES, median, error));
+    TRY(lowrank_time_answer(op, numbers > LARGE_SOLVE ? SOLVES_OF_LARGE : SOLVES, median, error));
 done:
     lam_operator_close(op);
     free(factors[0]);
@@ -152,7 +128,7 @@ static lam_status add_size(const bench_run *run, size_t elements, grown *before,
     const double n = (double)s.m.n;
     TRY(build_operator(&problem, &options, &op, &built, error));
     lam_operator_set_threads(op, (size_t)omp_get_max_threads());
-    TRY(time_answers(op, SOLVES, &query, error));
+    TRY(lowrank_time_answer(op, SOLVES, &query, error));
     TRY(lowrank_stored_bytes(op, &stored, error));
     operator_describe(op, &about);
     lam_operator_close(op);

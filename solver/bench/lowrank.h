@@ -76,6 +76,11 @@ typedef struct lowrank_verdict {
     double stored;         /* bytes of the operator in a store, where it was weighed */
 } lowrank_verdict;
 
+/* Median seconds of one radiosity, or of all emitters' light, in so many solves, LOWRANK_SOLVES_MOST at most.
+ */
+enum { LOWRANK_SOLVES_MOST = 31 };
+lam_status lowrank_time_answer(const lam_operator *op, size_t solves, double *median, lam_error *error);
+
 /* What an operator takes in a store: the size of one with nothing else in it, written and removed. */
 lam_status lowrank_stored_bytes(const lam_operator *op, double *bytes, lam_error *error);
 

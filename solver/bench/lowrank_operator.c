@@ -10,8 +10,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { SOLVES = 31 };
-
 build_problem lowrank_problem(const lowrank_scene *s) {
     return (build_problem){.n = s->m.n,
                            .n_channels = s->m.n_channels,
@@ -33,11 +31,10 @@ static lam_status answer(const lam_operator *op, const float *E, float *B, void 
     return lam_operator_apply(op, 1, LAM_RADIOSITY, E, B, work, bytes, error);
 }
 
-/* Median seconds of one radiosity. */
-static lam_status time_answer(const lam_operator *op, double *median, lam_error *error) {
+lam_status lowrank_time_answer(const lam_operator *op, size_t solves, double *median, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = lam_operator_elements(op) * lam_operator_channels(op);
-    double seconds[SOLVES];
+    double seconds[LOWRANK_SOLVES_MOST];
     float *E = NULL, *B = NULL;
     void *work = NULL;
     const size_t bytes = lam_operator_work_bytes(op, 1);
@@ -46,12 +43,12 @@ static lam_status time_answer(const lam_operator *op, double *median, lam_error 
     work = memory_allocate(1, bytes, "an answer", error);
     if (E == NULL || B == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < n; i++) E[i] = (float)(i % 7);
-    for (int k = 0; k < SOLVES; k++) {
+    for (size_t k = 0; k < solves; k++) {
         const double started = clock_seconds();
         TRY(answer(op, E, B, work, bytes, error));
         seconds[k] = clock_seconds() - started;
     }
-    *median = stats_median(seconds, SOLVES);
+    *median = stats_median(seconds, solves);
 done:
     free(E);
     free(B);
@@ -108,7 +105,7 @@ lam_status lowrank_judge(const bench_run *run, const lowrank_scene *s, const low
     problem.emitters = of->emitters;
     TRY(bench_check(run, error));
     TRY(build_operator(&problem, &how, &op, &verdict.built, error));
-    TRY(time_answer(op, &verdict.answer_seconds, error));
+    TRY(lowrank_time_answer(op, LOWRANK_SOLVES_MOST, &verdict.answer_seconds, error));
     TRY(judge_operator(op, &input, &verdict.judged, error));
     verdict.bytes = (double)lam_operator_bytes(op);
     if (of->weighed) TRY(lowrank_stored_bytes(op, &verdict.stored, error));
