@@ -106,6 +106,41 @@ START_TEST(reflectances_in_the_basis) {
 }
 END_TEST
 
+/* Terms that products leave out, and what of R B they make no use of, add up to little: entries that are
+ * there either way differ by less than a threshold. */
+START_TEST(what_is_skipped_is_small) {
+    subject s = subject_make(_i);
+    const size_t n = s.m.n;
+    float *rho = reflectance(&s, EACH_ITS_OWN), *weight = ones(&s.basis);
+    csr in = pass(&s, 0, weight, 2), some, all;
+    wavelet_inverse_report report;
+    wavelet_inverse_input input = {.basis = &s.basis,
+                                   .S = &in,
+                                   .rho = rho,
+                                   .weight = weight,
+                                   .threshold = 1e-3f,
+                                   .inner = .25f,
+                                   .skipped = .005f,
+                                   .n_threads = 1};
+    ck_ok(wavelet_inverse(&input, &some, &report, &error));
+    input.skipped = 0;
+    ck_ok(wavelet_inverse(&input, &all, &report, &error));
+    double *a = whole(&some), *b = whole(&all), most = 0;
+    for (size_t k = 0; k < n * n; k++)
+        if (a[k] != 0 && b[k] != 0) most = fmax(most, fabs(a[k] - b[k]));
+    ck_assert_double_gt(most, 0);
+    ck_assert_double_lt(most, (double)input.threshold);
+    csr_free(&in);
+    csr_free(&some);
+    csr_free(&all);
+    free(rho);
+    free(weight);
+    free(a);
+    free(b);
+    subject_free(&s);
+}
+END_TEST
+
 START_TEST(doubling_inverts) {
     subject s = subject_make(_i % SUBJECTS);
     const size_t n = s.m.n;
@@ -158,6 +193,7 @@ int main(void) {
     tcase_add_loop_test(tests, a_pass_finds_every_coefficient, 0, SUBJECTS);
     tcase_add_test(tests, a_pass_within_reach);
     tcase_add_loop_test(tests, reflectances_in_the_basis, 0, SUBJECTS * REFLECTANCES);
+    tcase_add_loop_test(tests, what_is_skipped_is_small, 0, SUBJECTS);
     tcase_add_loop_test(tests, doubling_inverts, 0, SUBJECTS * REFLECTANCES);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
