@@ -134,15 +134,14 @@ static bool is_small(const scene_class *c) {
     return c->n <= CLASSIFY_SMALL && isfinite(c->exact_cost);
 }
 
+/* A rank says nothing of the light of single elements: where there is a hierarchical operator, that and not
+ * low rank is what others must be faster than. */
 static void choose(scene_class *c, bool emitters) {
-    c->method = "low-rank";
-    if (c->exact_cost <= c->low_rank_cost && isfinite(c->low_rank_cost)) c->method = "exact";
-    if (c->sparse_cost < fmin(c->exact_cost, c->low_rank_cost)) c->method = "sparse";
-    /* A rank says nothing of the light of single elements: where there is a hierarchical operator it is no
-     * rival. */
-    if (isfinite(c->hierarchical_cost) &&
-        (c->hierarchical_cost <= fmin(c->exact_cost, c->sparse_cost) || strcmp(c->method, "low-rank") == 0))
-        c->method = "hierarchical";
+    const bool hierarchical = isfinite(c->hierarchical_cost);
+    const double rival = hierarchical ? c->hierarchical_cost : c->low_rank_cost;
+    c->method = hierarchical ? "hierarchical" : "low-rank";
+    if (c->exact_cost <= rival && isfinite(c->exact_cost)) c->method = "exact";
+    if (c->sparse_cost < fmin(c->exact_cost, rival)) c->method = "sparse";
     if (is_small(c)) c->method = "exact";
     if (emitters) c->method = "emitters";
 }
@@ -210,7 +209,7 @@ lam_status classify_scene(const build_problem *problem, const classify_options *
         if (2 * n * c.rank <= numbers) c.low_rank_cost = 2 * n * c.rank;
     }
     if (sparse_too) {
-        const double rival = hierarchical ? c.hierarchical_cost : fmin(c.exact_cost, c.low_rank_cost);
+        const double rival = fmin(c.exact_cost, hierarchical ? c.hierarchical_cost : c.low_rank_cost);
         TRY(look_at_inverse(problem, options, fmin(rival / sparse_number, numbers / 2 / C), &c, error));
         if (c.entries >= 0 && 2 * C * c.entries <= numbers) c.sparse_cost = sparse_number * c.entries;
     }

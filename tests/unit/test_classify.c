@@ -205,6 +205,54 @@ START_TEST(noise_is_neither) {
 }
 END_TEST
 
+/* Groups that see one other group each, of rank GROUPS and few entries: low rank is cheapest, but no rival of
+ * a hierarchical operator, which places that say nothing of who sees whom make a large one; a sparse inverse
+ * is. A look at all of it ends as the short one does. */
+START_TEST(low_rank_is_no_rival) {
+    enum { GROUPS = 20, OF_GROUP = N / GROUPS };
+    fixture f = {.m = {.n = N, .n_channels = 1}};
+    lam_error error = {0};
+    double(*centre)[3] = calloc(N, sizeof *centre);
+    float(*normal)[3] = calloc(N, sizeof *normal);
+    uint64_t state = 11;
+    f.F = (csr){.n = N, .indptr = calloc(N + 1, sizeof *f.F.indptr)};
+    ck_assert_int_eq(csr_reserve(&f.F, (size_t)N * OF_GROUP, &error), LAM_OK);
+    f.order = malloc(N * sizeof *f.order);
+    f.m.area = malloc(N * sizeof *f.m.area);
+    f.m.reflectance = malloc(N * sizeof *f.m.reflectance);
+    for (size_t i = 0; i < N; i++) {
+        f.F.indptr[i + 1] = f.F.indptr[i];
+        for (size_t k = 0; k < OF_GROUP; k++) {
+            f.F.indices[f.F.indptr[i + 1]] = (uint32_t)((i / OF_GROUP ^ 1) * OF_GROUP + k);
+            f.F.data[f.F.indptr[i + 1]++] = 1.f / OF_GROUP;
+        }
+        f.order[i] = (uint32_t)i;
+        f.m.area[i] = 1;
+        f.m.reflectance[i] = .5f;
+        normal[i][2] = 1;
+        for (int d = 0; d < 2; d++) {
+            state = state * 6364136223846793005u + 1442695040888963407u;
+            centre[i][d] = (double)(state >> 40);
+        }
+    }
+    build_problem p = *problem_of(&f);
+    p.centre = (const double(*)[3])centre;
+    p.normal = (const float(*)[3])normal;
+    classify_options how = usual;
+    scene_class brief, whole;
+    ck_assert_int_eq(classify_scene(&p, &how, &brief, &error), LAM_OK);
+    how.thorough = true;
+    ck_assert_int_eq(classify_scene(&p, &how, &whole, &error), LAM_OK);
+    ck_assert_double_lt(whole.low_rank_cost, whole.sparse_cost);
+    ck_assert_double_lt(whole.sparse_cost, whole.hierarchical_cost);
+    ck_assert_str_eq(brief.method, "sparse");
+    ck_assert_str_eq(whole.method, "sparse");
+    free(centre);
+    free(normal);
+    fixture_free(&f);
+}
+END_TEST
+
 START_TEST(a_threshold_that_is_given_stays) {
     fixture f = random_pairs(1, 0);
     classify_options how = usual;
@@ -226,6 +274,7 @@ int main(void) {
     tcase_add_test(cases, pairs_are_sparse);
     tcase_add_test(cases, crumbs_that_add_up_are_kept);
     tcase_add_test(cases, noise_is_neither);
+    tcase_add_test(cases, low_rank_is_no_rival);
     tcase_add_test(cases, a_threshold_that_is_given_stays);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
