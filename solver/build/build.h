@@ -55,7 +55,7 @@ typedef struct build_options {
     sparse_correction correction;
     size_t memory;     /* bytes it may use; 0: no limit */
     bool keep_factors; /* low-rank, 2msc: factored also for one channel */
-    bool low_rank;     /* auto: something was asked for that low rank alone has */
+    bool low_rank;     /* auto: as something was asked for that low rank alone has, nothing hierarchical */
     uint64_t seed;     /* of random sketches */
     const progress *progress;
 } build_options;

@@ -72,7 +72,7 @@ class Classify(unittest.TestCase):
         self.assertGreater(finer["elements"], 4 * 1250)
 
     def test_what_low_rank_alone_has(self):
-        """Is asked for, and auto takes low rank, whatever else would answer faster."""
+        """Is asked for, and auto takes low rank in place of what is hierarchical; by --rank anywhere."""
         store = self.path("asked.h5")
         for options in ("--rank", 40), ("--store-precision", "f16"), ("--factorizer", "hf"), ("--keep-factors",):
             done = must("precompute", self.path("cornell.obj"), "-o", store, "--rays", 64, "--epsilon", .4, "--probes", 0,
@@ -80,6 +80,12 @@ class Classify(unittest.TestCase):
             self.assertNotIn(f"does not use {options[0]}", done.stderr)
             with h5py.File(store) as file:
                 self.assertEqual(file["operator"].attrs["kind"].decode(), "low_rank", options)
+        for options, kind in ((("--rank", 40), "low_rank"), (("--store-precision", "f16"), "sparse")):
+            done = must("precompute", self.path("city.obj"), "-o", store, "--rays", 256, "--epsilon", .15, "--probes", 0,
+                        *options)
+            self.assertEqual(f"does not use --epsilon, {options[0]}" in done.stderr, kind == "sparse")
+            with h5py.File(store) as file:
+                self.assertEqual(file["operator"].attrs["kind"].decode(), kind, options)
 
     def test_noise_leaves_one_choice(self):
         """Where rays are so few that their noise is more than epsilon, a sparse inverse would be of noise."""
