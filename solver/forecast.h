@@ -21,8 +21,9 @@ typedef struct forecast {
     size_t rank;                 /* 0: not known yet */
     size_t emitters;             /* 0: another kind of operator */
     bool sparse;                 /* a sparse inverse, whose threshold rises until it fits */
-    bool hierarchical;           /* or one in wavelets */
-    panel_precision precision;   /* of an operator of low rank */
+    bool hierarchical;           /* or one in wavelets, of this epsilon */
+    double epsilon;
+    panel_precision precision; /* of an operator of low rank */
 } forecast;
 
 /* Bytes at the peak; an upper bound for the form factors, an estimate for the rest. */

@@ -115,6 +115,7 @@ forecast work_forecast(const work *w, double n) {
                       .emitters = w->emitters.s,
                       .sparse = strcmp(o->method, "sparse") == 0,
                       .hierarchical = is_hierarchical(o, n),
+                      .epsilon = o->epsilon,
                       .precision = o->precision};
 }
 

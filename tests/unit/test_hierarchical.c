@@ -1,6 +1,7 @@
 /* The hierarchical operator of boxes with exact form factors: how near it comes, and what it says of itself.
  */
 #include "solver/build/reference.h"
+#include "solver/forecast.h"
 #include "support/box_problem.h"
 #include "support/dense.h"
 
@@ -93,6 +94,13 @@ START_TEST(epsilon_is_what_it_costs) {
         operator_describe(op, &about);
         ck_assert_double_gt(about.density, 1.2 * density);
         density = about.density;
+        /* Half of it is stored, four bytes a number. */
+        const forecast f = {.n = n, .n_channels = 1, .hierarchical = true, .epsilon = epsilons[k]};
+        const forecast without = {.n = n, .n_channels = 1, .sparse = true};
+        const double stored = 2 * density * (double)n * (double)n;
+        const double foreseen = forecast_store_bytes(&f) - forecast_store_bytes(&without);
+        ck_assert_double_ge(foreseen, stored);
+        ck_assert_double_le(foreseen, 8 * stored);
         for (int light = 0; light < 3; light++)
             ck_assert_double_lt(indirect_error(problem, op, E + light * n), most[k]);
         ck_assert_double_eq_tol(report.threshold, .02 * epsilons[k], 1e-12);
