@@ -211,6 +211,7 @@ int cmd_precompute(int argc, char **argv) {
         .ground_albedo = f.ground_albedo,
         .probes = f.probes,
         .keep_form_factors = f.keep_form_factors != NULL,
+        .compress_form_factors = f.keep_form_factors != NULL && *f.keep_form_factors != '\0',
         .keep_factors = f.keep_factors,
         .method = f.method,
         .factorizer = f.factorizer,

@@ -11,6 +11,7 @@ void work_free(work *w) {
     mesh_free(&w->m);
     free(w->order);
     form_factors_free(&w->f);
+    compressed_free(&w->compressed);
     emitter_wish_free(&w->emitters);
     scratch_close(w->scratch, false);
     lam_operator_close(w->op);
@@ -145,6 +146,13 @@ lam_status precompute_run(const precompute_options *options, terminal *t, build_
 
     TRY(work_build(&w, error));
     TRY(terminal_check(error));
+
+    if (options->compress_form_factors) {
+        started = clock_seconds();
+        TRY(work_compress(&w, error));
+        log_stage(&w, "compress", started);
+        TRY(terminal_check(error));
+    }
 
     if (w.probes > 0) {
         started = clock_seconds();

@@ -24,6 +24,7 @@ typedef struct precompute_options {
     double ground_albedo;
     uint64_t probes;
     bool keep_form_factors;
+    bool compress_form_factors; /* those that are kept */
     const char *method, *factorizer;
     double epsilon, alpha;
     const char *budget;         /* "squares", ... */

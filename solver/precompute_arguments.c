@@ -123,9 +123,11 @@ static const option_row rows[] = {
      .kind = OPTION_OPTIONAL,
      .offset = FIELD(keep_form_factors),
      .value = "compressed",
-     .doc = "Keep them in the store (compressed is not supported yet)",
-     .choices = "",
-     .later = "compressed"},
+     .doc =
+         "Keep them in the store, for refined answers and to make other operators of; compressed: for "
+         "refined answers alone, by what small numbers may be left out of them in a basis of wavelets, which "
+         "certificates count",
+     .choices = "compressed"},
 
     {.kind = OPTION_HEADING, .doc = "operator"},
     {.name = "method",

@@ -68,9 +68,13 @@ lam_status work_save(work *w, lam_error *error) {
     TRY(mesh_save(&w->m, w->f.row_sums, s, error));
     if (o->reflectance >= 0) TRY(store_set_number(s, "/mesh", "reflectance_given", o->reflectance, error));
     TRY(terminal_check(error));
-    if (o->keep_form_factors && w->m.n > FORM_FACTORS_ROWS_MOST)
-        TRY(form_factors_gather(&w->f, w->m.area, error));
-    if (o->keep_form_factors) TRY(form_factors_save(&w->f, s, error));
+    if (w->compressed.n > 0) {
+        TRY(compressed_save(&w->compressed, s, error));
+        TRY(form_factors_save_about(&w->f, "compressed", s, error));
+    } else if (o->keep_form_factors) {
+        if (w->m.n > FORM_FACTORS_ROWS_MOST) TRY(form_factors_gather(&w->f, w->m.area, error));
+        TRY(form_factors_save(&w->f, s, error));
+    }
     if (w->f.sky.first_bounce != NULL) TRY(sky_bounce_save(&w->f.sky, s, error));
     TRY(terminal_check(error));
     TRY(operator_save(w->op, s, error));

@@ -2,6 +2,7 @@
 #ifndef LAMBERT_SOLVER_PRECOMPUTE_WORK_H
 #define LAMBERT_SOLVER_PRECOMPUTE_WORK_H
 
+#include "solver/build/compress.h"
 #include "solver/build/judge.h"
 #include "solver/emitter_wish.h"
 #include "solver/forecast.h"
@@ -17,8 +18,9 @@ typedef struct work {
     mesh m;
     uint32_t *order;
     form_factors f;
-    recipe recipe; /* of f */
-    bool large;    /* its rows and the judge's lie in the scratch folder */
+    compressed_factors compressed; /* of f; n is 0 where they are kept as they are, or not */
+    recipe recipe;                 /* of f */
+    bool large;                    /* its rows and the judge's lie in the scratch folder */
     size_t sky_tiles;
     size_t probes;
     emitter_wish emitters;
@@ -70,6 +72,10 @@ size_t work_left(const work *w);
 /* The operator and its errors: precompute_operator.c. */
 lam_status work_build(work *w, lam_error *error);
 lam_status work_judge(work *w, lam_error *error);
+
+/* Compresses the form factors where that was asked for and takes less than they do: precompute_compress.c.
+ */
+lam_status work_compress(work *w, lam_error *error);
 
 /* The sealed store: precompute_store.c. */
 lam_status work_save(work *w, lam_error *error);

@@ -167,7 +167,7 @@ done:
 
 lam_status hierarchical_growth(const bench_run *run, lam_error *error) {
     static const size_t sizes[3][SIZES] = {
-        {320, 640, 0, 0}, {10240, 40960, 0, 0}, {10240, 40960, 163840, 655360}};
+        {320, 640, 0, 0}, {10240, 40960, 163840, 0}, {10240, 40960, 163840, 655360}};
     lam_status status = LAM_OK;
     grown before = {.n = 0};
     table out = {.name = "growth",

@@ -149,6 +149,7 @@ lam_status wavelet_reach_make(const wavelets *basis, const plane_tree *tree, con
     if (P == NULL || around == NULL || r.height == NULL || r.extent == NULL || r.affine == NULL ||
         r.place == NULL)
         TRY(LAM_ERR_MEMORY);
+    wavelets_heights(w, r.height);
     for (size_t t = 0; t < w->n_nodes; t++) {
         const wavelet_node *a = &w->nodes[t];
         const uint32_t frame = tree->clusters[t].frame;
@@ -167,9 +168,6 @@ lam_status wavelet_reach_make(const wavelets *basis, const plane_tree *tree, con
                 leaf[k][0] = sqrt(area[i]);
                 for (int axis = 0; axis < 2; axis++) leaf[k][1 + axis] = leaf[k][0] * at[axis];
             }
-        } else {
-            const uint32_t left = r.height[a->left], right = r.height[t - 1];
-            r.height[t] = 1 + (left > right ? left : right);
         }
         r.extent[t] = extent_of(&around[t], a, r.height[t], frame == PLANE_ABOVE ? INFINITY : radii);
         turn_products(w, t, P, a->from_left == 0 ? (const double(*)[LINEAR])leaf : NULL, &P[t]);

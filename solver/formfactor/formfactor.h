@@ -107,6 +107,8 @@ lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_
 /* /form_factors of a store, rows or the upper triangle, as they are; its /sky apart, by sky_bounce_save and
  * sky_bounce_load. large as above. */
 lam_status form_factors_save(const form_factors *f, store *s, lam_error *error);
+/* All of that but the rows, and that they are stored so. */
+lam_status form_factors_save_about(const form_factors *f, const char *storage, store *s, lam_error *error);
 lam_status form_factors_load(store *s, const mesh *m, const large_place *large, form_factors *out,
                              lam_error *error);
 

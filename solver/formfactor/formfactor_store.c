@@ -8,19 +8,14 @@
 
 #define GROUP FORM_FACTORS_GROUP
 
-lam_status form_factors_save(const form_factors *f, store *s, lam_error *error) {
+lam_status form_factors_save_about(const form_factors *f, const char *storage, store *s, lam_error *error) {
     lam_status status = LAM_OK;
-    const bool rows = f->upper.indptr == NULL;
-    const csr *held = rows ? &f->F : &f->upper;
-    const size_t n = held->n, nnz = held->indptr[n];
-    TRY(store_write(s, GROUP "/indptr", STORE_U64, 1, (size_t[]){n + 1}, held->indptr, error));
-    TRY(store_write(s, GROUP "/indices", STORE_U32, 1, &nnz, held->indices, error));
-    TRY(store_write(s, GROUP "/data", STORE_F32, 1, &nnz, held->data, error));
+    const size_t n = f->upper.indptr == NULL ? f->F.n : f->upper.n;
     TRY(store_write(s, GROUP "/leaving", STORE_F64, 1, &n, f->leaving, error));
     TRY(store_write(s, GROUP "/absorbed", STORE_F64, 1, &n, f->absorbed, error));
     if (f->repair != NULL) TRY(store_write(s, GROUP "/repair", STORE_F64, 1, &n, f->repair, error));
     TRY(recipe_save(&f->recipe, &recipe_of_form_factors, s, error));
-    TRY(store_set_text(s, GROUP, "storage", rows ? "rows" : "upper", error));
+    TRY(store_set_text(s, GROUP, "storage", storage, error));
     if (f->pairs.accuracy > 0) TRY(store_set_number(s, GROUP, "accuracy_reached", f->pairs.accuracy, error));
     TRY(store_set_integer(s, GROUP, "closed", f->closed, error));
     TRY(store_set_number(s, GROUP, "leaving_share", f->leaving_share, error));
@@ -29,6 +24,15 @@ lam_status form_factors_save(const form_factors *f, store *s, lam_error *error) 
     TRY(store_set_number(s, GROUP, "reciprocity_error", f->reciprocity_error, error));
     TRY(store_set_number(s, GROUP, "repair_mean", f->repair_mean, error));
     TRY(store_set_number(s, GROUP, "repair_max", f->repair_max, error));
+done:
+    return status;
+}
+
+lam_status form_factors_save(const form_factors *f, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const bool rows = f->upper.indptr == NULL;
+    TRY(csr_save(rows ? &f->F : &f->upper, GROUP, s, error));
+    TRY(form_factors_save_about(f, rows ? "rows" : "upper", s, error));
 done:
     return status;
 }

@@ -9,16 +9,30 @@
 
 /* --- what lies in the store ---------------------------------------------------------------------------- */
 
-static lam_status read_storage(store *s, bool *rows, lam_error *error) {
+typedef enum storage { STORAGE_ROWS, STORAGE_UPPER, STORAGE_COMPRESSED, STORAGES } storage;
+
+static lam_status read_storage(store *s, storage *out, lam_error *error) {
+    static const char *const names[STORAGES] = {"rows", "upper", "compressed"};
     lam_status status = LAM_OK;
     char *text = NULL;
+    int k = 0;
     TRY(store_get_text(s, GROUP, "storage", &text, error));
-    *rows = strcmp(text, "rows") == 0;
-    if (!*rows && strcmp(text, "upper") != 0)
+    while (k < STORAGES && strcmp(text, names[k]) != 0) k++;
+    if (k == STORAGES)
         FAIL(error, LAM_ERR_UNSUPPORTED, "%s: /form_factors with storage '%.20s' is not supported yet",
              store_path(s), text);
+    *out = (storage)k;
 done:
     free(text);
+    return status;
+}
+
+lam_status form_factors_in_rows(store *s, bool *in_rows, lam_error *error) {
+    storage how = STORAGE_ROWS;
+    *in_rows = false;
+    if (!store_has(s, GROUP)) return LAM_OK;
+    const lam_status status = read_storage(s, &how, error);
+    *in_rows = status == LAM_OK && how != STORAGE_COMPRESSED;
     return status;
 }
 
@@ -95,8 +109,16 @@ done:
 lam_status form_factor_rows_read(store *s, size_t n, const double *area, const large_place *place, csr *held,
                                  bool *rows, double *row_sums, lam_error *error) {
     lam_status status = LAM_OK;
+    storage how = STORAGE_ROWS;
     *held = (csr){.n = n, .place = place};
-    TRY(read_storage(s, rows, error));
+    TRY(read_storage(s, &how, error));
+    if (how == STORAGE_COMPRESSED)
+        FAIL(error, LAM_ERR_UNSUPPORTED,
+             "%s: its form factors are compressed, which refines answers but makes no operator; precompute "
+             "the "
+             "scene again, or keep them with --keep-form-factors alone",
+             store_path(s));
+    *rows = how == STORAGE_ROWS;
     TRY(read_csr(s, held, error));
     TRY(*rows ? check_rows(s, held, row_sums, error) : check_upper(s, held, area, row_sums, error));
 done:
@@ -180,8 +202,14 @@ lam_status form_factors_size(store *s, size_t *kept, size_t *most, lam_error *er
     store_type type;
     size_t rows_of[STORE_MAX_RANK] = {0}, entries[STORE_MAX_RANK] = {0};
     int rank;
-    bool rows = true;
-    TRY(read_storage(s, &rows, error));
+    storage how = STORAGE_ROWS;
+    TRY(read_storage(s, &how, error));
+    const bool rows = how == STORAGE_ROWS;
+    if (how == STORAGE_COMPRESSED) {
+        TRY(compressed_size(s, kept, error));
+        *most = *kept;
+        goto done;
+    }
     TRY(store_array_info(s, GROUP "/indptr", &type, &rank, rows_of, error));
     TRY(store_array_info(s, GROUP "/data", &type, &rank, entries, error));
     const size_t entry = sizeof(uint32_t) + sizeof(float), row = sizeof(uint64_t) + 3 * sizeof(double);
@@ -191,8 +219,27 @@ done:
     return status;
 }
 
+/* Row sums of what was compressed are those of the mesh. */
+static lam_status open_compressed(store *s, lam_form_factors *f, lam_error *error) {
+    lam_status status = LAM_OK;
+    void *row_sums = NULL;
+    f->compressed = memory_allocate(1, sizeof *f->compressed, "form factors", error);
+    if (f->compressed == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(store_read(s, "/mesh/row_sums", STORE_F64, 1, (size_t[]){f->n}, &row_sums, error));
+    memcpy(f->row_sums, row_sums, f->n * sizeof *f->row_sums);
+    for (size_t i = 0; i < f->n; i++)
+        if (!(f->row_sums[i] >= 0 && f->row_sums[i] <= 1 + 1e-5))
+            FAIL(error, LAM_ERR_FORMAT, "%s: form factors of element %zu sum to %g, must be from 0 to 1",
+                 store_path(s), i, f->row_sums[i]);
+    TRY(compressed_load(s, f->n, f->area, f->compressed, error));
+done:
+    free(row_sums);
+    return status;
+}
+
 lam_status form_factors_open(store *s, lam_form_factors **out, lam_error *error) {
     lam_status status = LAM_OK;
+    storage how = STORAGE_ROWS;
     lam_form_factors *made = NULL;
     csr held = {.n = 0};
     size_t n = 0;
@@ -204,8 +251,16 @@ lam_status form_factors_open(store *s, lam_form_factors **out, lam_error *error)
     made = memory_allocate(1, sizeof *made, "form factors", error);
     if (made == NULL) TRY(LAM_ERR_MEMORY);
     TRY(read_area(s, &n, &made->area, error));
+    made->n = n;
     made->row_sums = memory_allocate(n, sizeof *made->row_sums, "form factors", error);
     if (made->row_sums == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(read_storage(s, &how, error));
+    if (how == STORAGE_COMPRESSED) {
+        TRY(open_compressed(s, made, error));
+        *out = made;
+        made = NULL;
+        goto done;
+    }
     TRY(form_factor_rows_read(s, n, made->area, NULL, &held, &rows, made->row_sums, error));
     if (rows) {
         made->F = held;
@@ -230,6 +285,7 @@ lam_status form_factors_of_rows(csr *F, const double *area, lam_form_factors **o
     made->area = memory_allocate(n, sizeof *made->area, "form factors", error);
     made->row_sums = memory_allocate(n, sizeof *made->row_sums, "form factors", error);
     if (made->area == NULL || made->row_sums == NULL) TRY(LAM_ERR_MEMORY);
+    made->n = n;
     memcpy(made->area, area, n * sizeof *area);
     for (size_t i = 0; i < n; i++)
         for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++) made->row_sums[i] += (double)F->data[p];
@@ -240,6 +296,29 @@ lam_status form_factors_of_rows(csr *F, const double *area, lam_form_factors **o
     made = NULL;
 done:
     csr_free(F);
+    lam_form_factors_close(made);
+    return status;
+}
+
+lam_status form_factors_of_compressed(compressed_factors *c, const double *area, const double *row_sums,
+                                      lam_form_factors **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = c->n;
+    lam_form_factors *made = memory_allocate(1, sizeof *made, "form factors", error);
+    if (made == NULL) TRY(LAM_ERR_MEMORY);
+    made->n = n;
+    made->area = memory_allocate(n, sizeof *made->area, "form factors", error);
+    made->row_sums = memory_allocate(n, sizeof *made->row_sums, "form factors", error);
+    made->compressed = memory_allocate(1, sizeof *made->compressed, "form factors", error);
+    if (made->area == NULL || made->row_sums == NULL || made->compressed == NULL) TRY(LAM_ERR_MEMORY);
+    memcpy(made->area, area, n * sizeof *area);
+    memcpy(made->row_sums, row_sums, n * sizeof *row_sums);
+    *made->compressed = *c;
+    *c = (compressed_factors){.n = 0};
+    *out = made;
+    made = NULL;
+done:
+    compressed_free(c);
     lam_form_factors_close(made);
     return status;
 }
@@ -262,10 +341,13 @@ void lam_form_factors_close(lam_form_factors *f) {
     free(f->area);
     free(f->row_sums);
     free(f->row_norms);
+    if (f->compressed != NULL) compressed_free(f->compressed);
+    free(f->compressed);
     free(f);
 }
 
 size_t lam_form_factors_bytes(const lam_form_factors *f) {
+    if (f->compressed != NULL) return compressed_bytes(f->compressed);
     return (size_t)f->F.indptr[f->F.n] * (sizeof *f->F.indices + sizeof *f->F.data) +
            (f->F.n + 1) * sizeof *f->F.indptr;
 }

@@ -3,6 +3,7 @@
 #ifndef LAMBERT_OPERATOR_FORM_FACTOR_ROWS_H
 #define LAMBERT_OPERATOR_FORM_FACTOR_ROWS_H
 
+#include "solver/operator/compressed.h"
 #include "solver/operator/csr.h"
 
 #include <math.h>
@@ -21,13 +22,15 @@ static inline float upper_factor(float exchange, double area) {
 lam_status form_factor_rows_read(store *s, size_t n, const double *area, const large_place *place, csr *held,
                                  bool *rows, double *row_sums, lam_error *error);
 
-/* F of an open store, as rows whatever the storage: what refined answers are judged by. */
+/* F of an open store, as rows or compressed: what refined answers are judged by. */
 struct lam_form_factors {
-    csr F;
-    double *area;      /* [n], m^2 */
-    double *row_sums;  /* [n], of F */
-    double *row_norms; /* [n], (sum_j F_ij^2 / A_j)^1/2 */
-    uint64_t longest;  /* entries of the longest row */
+    size_t n;
+    csr F;                          /* no rows where it is compressed */
+    double *area;                   /* [n], m^2 */
+    double *row_sums;               /* [n], of F */
+    double *row_norms;              /* [n], (sum_j F_ij^2 / A_j)^1/2; NULL where it is compressed */
+    uint64_t longest;               /* entries of the longest row */
+    compressed_factors *compressed; /* NULL: rows */
 };
 
 /* Loads them, or NULL where the store keeps none; freed by lam_form_factors_close. Errors as above. */
@@ -35,6 +38,13 @@ lam_status form_factors_open(store *s, lam_form_factors **out, lam_error *error)
 
 /* Of rows that are there already (taken over, also on an error) and areas [n] (copied). */
 lam_status form_factors_of_rows(csr *F, const double *area, lam_form_factors **out, lam_error *error);
+
+/* Of compressed ones (taken over, also on an error), finished, and areas and row sums of F [n] (copied). */
+lam_status form_factors_of_compressed(compressed_factors *c, const double *area, const double *row_sums,
+                                      lam_form_factors **out, lam_error *error);
+
+/* Whether the store has form factors as rows or pairs, not compressed ones. Errors: as store_get_text. */
+lam_status form_factors_in_rows(store *s, bool *in_rows, lam_error *error);
 
 /* Bytes that form_factors_open takes of a store that has them: for good, and at most on the way. Errors:
  * those of store_get_text and store_array_info, LAM_ERR_UNSUPPORTED. */

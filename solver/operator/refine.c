@@ -36,23 +36,34 @@ done:
     return status;
 }
 
+/* 1 - r_i less what rounding and compression may have made of it. */
+static double bounded_v(const refinement *s, size_t c, size_t i, const double *compression) {
+    const refine_column *col = &s->columns[c];
+    const double lost = compression != NULL ? (double)col->channel->rho[i] * compression[i] : 0;
+    return (1 - s->r[c * s->refiner->op->n + i] - col->error - lost) * (1 - 4 * REFINE_U);
+}
+
 /* w = E' + P for E' = 1, v = A w = 1 - r; kept where it is better than the bound that is there. */
-static void bound_by_light(const refinement *s, size_t c, refine_channel *channel) {
+static void bound_by_light(refinement *s, size_t c, refine_channel *channel) {
     const size_t n = s->refiner->op->n;
-    const double *P = s->P + c * n, *r = s->r + c * n, error = s->columns[c].error;
-    double w_least = INFINITY, w_most = 0, v_least = INFINITY;
+    const double *P = s->P + c * n, *compression = NULL;
+    double w_least = INFINITY, w_most = 0, v_least = INFINITY, largest;
+    if (s->scratch != NULL) {
+        double *const w = s->scratch + c * s->scratch_stride + 2 * n;
+        for (size_t i = 0; i < n; i++) w[i] = 1 + P[i];
+        compression = refinement_compression(s, c, false, w, &largest);
+    }
     for (size_t i = 0; i < n; i++) {
-        const double w = 1 + P[i], v = 1 - r[i] - error;
+        const double w = 1 + P[i], v = bounded_v(s, c, i, compression);
         w_least = fmin(w_least, w);
         w_most = fmax(w_most, w);
         v_least = fmin(v_least, v);
     }
     w_most *= 1 + 2 * REFINE_U;
-    v_least *= 1 - 4 * REFINE_U;
     if (!(w_least > 0 && v_least > 0 && w_most / v_least < channel->w_most / channel->v_least)) return;
     channel->w_most = w_most;
     channel->v_least = v_least;
-    for (size_t i = 0; i < n; i++) channel->v[i] = (1 - r[i] - error) * (1 - 4 * REFINE_U);
+    for (size_t i = 0; i < n; i++) channel->v[i] = bounded_v(s, c, i, compression);
 }
 
 static int by_falling_mean(const void *left, const void *right) {
@@ -66,8 +77,9 @@ static void prepare_judging(const lam_refiner *refiner, refine_channel *channel)
     channel->peak = 0;
     for (size_t i = 0; i < refiner->op->n; i++) {
         const double rho = (double)channel->rho[i];
+        const double norm = F->row_norms != NULL ? F->row_norms[i] : 0;
         channel->peak = fmax(channel->peak, rho * F->row_sums[i] / channel->v[i]);
-        channel->rows[i] = (refine_row){rho * F->row_norms[i] / channel->v[i], (uint32_t)i};
+        channel->rows[i] = (refine_row){rho * norm / channel->v[i], (uint32_t)i};
     }
     qsort(channel->rows, refiner->op->n, sizeof *channel->rows, by_falling_mean);
 }
@@ -178,9 +190,9 @@ lam_status lam_refiner_create(const lam_operator *op, const lam_form_factors *F,
     lam_refiner *made = NULL;
     if (op == NULL || F == NULL || out == NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "an operator, its form factors and a place for the refiner are needed");
-    if (F->F.n != op->n)
-        FAIL(error, LAM_ERR_ARGUMENT, "form factors of %zu elements do not go with an operator of %zu",
-             F->F.n, op->n);
+    if (F->n != op->n)
+        FAIL(error, LAM_ERR_ARGUMENT, "form factors of %zu elements do not go with an operator of %zu", F->n,
+             op->n);
     made = memory_allocate(1, sizeof *made, "refining", error);
     if (made == NULL) TRY(LAM_ERR_MEMORY);
     made->op = op;
@@ -297,8 +309,13 @@ static void find_irradiance(refinement *s, const int *exponents, const double *H
             largest = fmax(largest, fabs(s->q[c * n + i]));
             rounded = fmax(rounded, H0 != NULL ? REFINE_U * fabs(H) : 0);
         }
-        const double moved = refiner->row_most * col->bound +
-                             refiner->roundings * (largest - 2 * col->least * refiner->row_most);
+        double moved = refiner->row_most * col->bound +
+                       refiner->roundings * (largest - 2 * col->least * refiner->row_most);
+        if (s->scratch != NULL) {
+            double lost;
+            (void)refinement_compression(s, c, false, s->z + c * n, &lost);
+            moved += lost + refiner_product_rounding(refiner, refine_most(n, s->z + c * n));
+        }
         certificates[c / C] = fmax(certificates[c / C], ldexp(moved, exponents[c]) + rounded);
     }
 }
@@ -340,8 +357,9 @@ static lam_status refine_pass(refinement *s, size_t first, const request *asked,
         if (col->done) continue;
         FAIL(error, LAM_ERR_NUMERIC,
              "tolerance %g is not reached: vector %zu is certified to %.2g of its indirect light after %zu "
-             "products with the form factors; ask for less",
-             asked->tolerance, first + c / C, col->bound / col->P, col->passes);
+             "products with the form factors%s; ask for less",
+             asked->tolerance, first + c / C, col->bound / col->P, col->passes,
+             s->scratch != NULL ? ", which are compressed" : "");
     }
     for (size_t v = 0; v < s->n_vectors; v++) asked->certificates[first + v] = 0;
     if (asked->quantity == LAM_IRRADIANCE)

@@ -12,6 +12,11 @@
  * by Cauchy and Schwarz, and b_i = rho_i times that. k is large for few elements, those whose row of F is
  * held by few others (where walls meet): where those alone are in the way, F r is computed for them, and b_i
  * is what it is. What rounding may have changed in r is bounded beside it.
+ *
+ * Compressed form factors. Products are with F~, |F x - F~ x|_i <= delta_i(x) (compressed.h), and F itself is
+ * still what all is certified for: of the answer Q = P + r = R F~ (E' + P) what is left is
+ *     R F (E' + Q) - Q = R F~ r + R (F - F~)(E' + Q),   so   b_i = rho_i (s_i |r|_max + delta_i(r) +
+ * delta_i(E' + Q)). The last of these stays, however often r is made smaller.
  */
 #ifndef LAMBERT_OPERATOR_REFINE_H
 #define LAMBERT_OPERATOR_REFINE_H
@@ -92,6 +97,8 @@ typedef struct refinement {
     size_t work_bytes;
     refine_column *columns;
     bool *active, *again, *helped; /* [columns] */
+    double *scratch;               /* [columns][scratch_stride], of compressed form factors; NULL: rows */
+    size_t scratch_stride;
 } refinement;
 
 /* Room for so many vectors. Freed by refinement_free. Errors: LAM_ERR_MEMORY. */
@@ -125,6 +132,16 @@ static inline double refine_most(size_t n, const double *x) {
     }
     return largest;
 }
+
+/* What rounding may make of F x, by element, for an x of this maximum norm. */
+static inline double refiner_product_rounding(const lam_refiner *refiner, double x_most) {
+    const compressed_factors *c = refiner->F->compressed;
+    return (refiner->roundings * refiner->row_most + (c != NULL ? c->rounding : 0)) * x_most;
+}
+
+/* delta_i(x) of compressed form factors into what is returned, [n], of the column's scratch, with its
+ * largest; `second`: beside another that is there. */
+double *refinement_compression(refinement *s, size_t column, bool second, const double *x, double *largest);
 
 /* What rounding makes of lit + P + r, or of P + r. */
 double refinement_sum_rounding(const refinement *s, size_t column);

@@ -34,12 +34,22 @@ void refinement_free(refinement *s) {
     free(s->active);
     free(s->again);
     free(s->helped);
+    free(s->scratch);
     *s = (refinement){.n_columns = 0};
+}
+
+/* Doubles that a column of compressed form factors takes: what two lights lack, a light, what a product
+ * takes.
+ */
+static size_t scratch_of(const lam_refiner *refiner) {
+    const compressed_factors *c = refiner->F->compressed;
+    return c == NULL ? 0 : 3 * c->n + compressed_work(c);
 }
 
 size_t refinement_bytes(const lam_refiner *refiner) {
     const size_t C = refiner->op->n_channels, n = refiner->op->n;
-    return C * n * ((5 + 2 * REFINE_WINDOW) * sizeof(double) + 2 * sizeof(float));
+    return C * (n * ((5 + 2 * REFINE_WINDOW) * sizeof(double) + 2 * sizeof(float)) +
+                scratch_of(refiner) * sizeof(double));
 }
 
 static lam_status reserve(size_t rows, size_t row_bytes, void *out, lam_error *error) {
@@ -57,6 +67,7 @@ lam_status refinement_create(const lam_refiner *refiner, size_t n_vectors, refin
                     .n_vectors = n_vectors,
                     .n_columns = m,
                     .help = op->kind->apply != NULL,
+                    .scratch_stride = scratch_of(refiner),
                     .work_bytes = lam_operator_work_bytes(op, n_vectors)};
     const size_t helper_bytes = lam_operator_work_bytes(refiner_help(refiner), n_vectors);
     if (helper_bytes > s.work_bytes) s.work_bytes = helper_bytes;
@@ -65,7 +76,8 @@ lam_status refinement_create(const lam_refiner *refiner, size_t n_vectors, refin
         TRY(reserve(m, n * sizeof(double), rows[k], error));
     TRY(reserve(REFINE_WINDOW * m, n * sizeof(double), &s.kept_Z, error));
     TRY(reserve(REFINE_WINDOW * m, n * sizeof(double), &s.kept_Q, error));
-    if (m > 1) { /* one vector is multiplied where it lies */
+    if (s.scratch_stride > 0) TRY(reserve(m, s.scratch_stride * sizeof(double), &s.scratch, error));
+    if (m > 1 && s.scratch == NULL) { /* one vector is multiplied where it lies */
         TRY(reserve(n, CSR_DOUBLES_WIDTH * sizeof(double), &s.X, error));
         TRY(reserve(n, CSR_DOUBLES_WIDTH * sizeof(double), &s.Y, error));
     }
@@ -130,11 +142,17 @@ static void multiply_some(refinement *s, size_t m, const size_t *columns, const 
 }
 
 void refinement_multiply(refinement *s, const bool *chosen, const double *X, double *Y) {
+    const size_t n = s->refiner->op->n;
     size_t some[CSR_DOUBLES_WIDTH], m = 0;
     for (size_t c = 0; c < s->n_columns; c++) {
         if (!chosen[c]) continue;
-        some[m++] = c;
         s->columns[c].passes++;
+        if (s->scratch != NULL) {
+            compressed_multiply(s->refiner->F->compressed, X + c * n, Y + c * n, s->scratch,
+                                s->refiner->op->n_threads);
+            continue;
+        }
+        some[m++] = c;
         if (m < CSR_DOUBLES_WIDTH) continue;
         multiply_some(s, m, some, X, Y);
         m = 0;
@@ -195,8 +213,8 @@ void refinement_start(refinement *s) {
 
 /* --- one column ---------------------------------------------------------------------------------------- */
 
-/* r = R F (E' + P) - P from F (E' + P), and what rounding made of it. */
-static void restart(refinement *s, size_t c, const double *h) {
+/* r = R F (E' + P) - P from x = E' + P and h = F x, and what rounding made of it. */
+static void restart(refinement *s, size_t c, const double *x, const double *h) {
     refine_column *col = &s->columns[c];
     const lam_refiner *refiner = s->refiner;
     const size_t n = refiner->op->n;
@@ -210,7 +228,9 @@ static void restart(refinement *s, size_t c, const double *h) {
         const double all = (double)rho[i] * (fabs(h[i]) - 2 * col->least * refiner->row_most);
         largest = all > largest ? all : largest;
     }
-    col->error = refiner->roundings * largest + 2 * REFINE_U * refine_most(n, r);
+    const double product = s->scratch != NULL ? refiner_product_rounding(refiner, refine_most(n, x))
+                                              : refiner->roundings * largest;
+    col->error = product + 2 * REFINE_U * refine_most(n, r);
     col->n_kept = 0;
 }
 
@@ -229,7 +249,7 @@ static void find_residuals(refinement *s, bool *chosen) {
     refinement_multiply(s, chosen, s->z, s->q);
     for (size_t c = 0; c < s->n_columns; c++) {
         if (!chosen[c]) continue;
-        restart(s, c, s->q + c * n);
+        restart(s, c, s->z + c * n, s->q + c * n);
         s->columns[c].at_restart = INFINITY;
         (void)refinement_judge(s, c);
         s->columns[c].at_restart = s->columns[c].bound;
@@ -246,7 +266,7 @@ static void step(refinement *s, size_t c) {
     double *z = s->z + c * n, *q = s->q + c * n, *r = s->r + c * n;
     for (size_t i = 0; i < n; i++) q[i] = z[i] - (double)channel->rho[i] * q[i];
     double z_most = refine_most(n, z), q_most = refine_most(n, q);
-    double error = s->refiner->roundings * s->refiner->row_most * z_most + REFINE_U * q_most;
+    double error = refiner_product_rounding(s->refiner, z_most) + REFINE_U * q_most;
 
     const size_t n_kept = col->n_kept < REFINE_WINDOW ? col->n_kept : REFINE_WINDOW;
     for (size_t k = 0; k < n_kept; k++) {

@@ -15,6 +15,14 @@ void wavelets_free(wavelets *w) {
     *w = (wavelets){.n = 0};
 }
 
+void wavelets_heights(const wavelets *w, uint32_t *out) {
+    for (size_t t = 0; t < w->n_nodes; t++) {
+        const wavelet_node *a = &w->nodes[t];
+        out[t] = 0;
+        if (a->from_left > 0) out[t] = 1 + (out[a->left] > out[t - 1] ? out[a->left] : out[t - 1]);
+    }
+}
+
 /* --- making one ---------------------------------------------------------------------------------------- */
 
 static lam_status check_shapes(const wavelets *w, lam_error *error) {

@@ -50,6 +50,9 @@ typedef struct wavelets {
 
 void wavelets_free(wavelets *w);
 
+/* How many nodes are below each on the longest way to a leaf: out [n_nodes]; leaves: 0. */
+void wavelets_heights(const wavelets *w, uint32_t *out);
+
 /* From shapes, basis and the shape of every node in postorder ([n_nodes]; copied); shapes and basis are taken
  * over, also on an error. Errors: LAM_ERR_NUMERIC where the nodes are no tree of n elements, or a shape is
  * out of bounds or has a number that is not finite; LAM_ERR_MEMORY. */

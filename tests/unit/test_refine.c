@@ -2,11 +2,11 @@
  * both storages. */
 #include "solver/bench/scenes.h"
 #include "solver/bench/stability.h"
-#include "solver/formfactor/formfactor.h"
 #include "solver/operator/refine.h"
 #include "support/certified.h"
 #include "support/dense.h"
 #include "support/scene.h"
+#include "support/view.h"
 
 #include <omp.h>
 
@@ -102,39 +102,6 @@ START_TEST(hard_problems) {
 END_TEST
 
 /* --- scenes -------------------------------------------------------------------------------------------- */
-
-typedef struct view {
-    const char *name;
-    mesh m;
-    form_factors f;
-    uint32_t *order;
-} view;
-
-enum { CORNELL, CITY, TWO_SIDED, BLACK_FLOOR, SCENES };
-
-static view make_view(int which) {
-    view v = {.name = (const char *[]){"cornell, coloured", "city", "city, two-sided",
-                                       "rooms, black floors"}[which]};
-    generate_options how = {
-        .kind = "city", .variant = 1, .terrain = "flat", .elements = 500, .reflectance = -1, .seed = 1};
-    if (which == CORNELL || which == BLACK_FLOOR) how.kind = "cornell";
-    ck_ok(scene_generated(&how, &v.m, &error));
-    if (which == TWO_SIDED) ck_ok(mesh_make_two_sided(&v.m, &error));
-    if (which == BLACK_FLOOR)
-        for (size_t i = 0; i < v.m.n * v.m.n_channels; i++)
-            if (v.m.normal[i % v.m.n][2] > .5f) v.m.reflectance[i] = 0;
-    v.order = test_allocate(v.m.n, sizeof *v.order);
-    ck_ok(mesh_z_order(&v.m, v.order, &error));
-    const form_factor_options options = {.recipe = {.method = RECIPE_RAYS, .rays = 256, .seed = 3}};
-    ck_ok(form_factors_make(&v.m, v.order, &options, &v.f, &error));
-    return v;
-}
-
-static void view_free(view *v) {
-    form_factors_free(&v->f);
-    mesh_free(&v->m);
-    free(v->order);
-}
 
 START_TEST(scenes) {
     view v = make_view(_i);
