@@ -17,6 +17,7 @@ typedef struct forecast {
     bool scratch;                /* rows go to a scratch folder as they are found */
     bool large;                  /* and whole samples lie there, as memory is too small for them */
     bool keep;                   /* the store keeps the form factors */
+    bool compress;               /* compressed, where that takes less */
     bool exact;                  /* the whole inverse is built */
     size_t rank;                 /* 0: not known yet */
     size_t emitters;             /* 0: another kind of operator */

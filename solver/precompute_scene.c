@@ -110,6 +110,7 @@ forecast work_forecast(const work *w, double n) {
                       .scratch = o->scratch != NULL,
                       .large = w->large,
                       .keep = o->keep_form_factors,
+                      .compress = o->compress_form_factors,
                       .exact = strcmp(o->method, "exact") == 0,
                       .rank = likely_rank(o, n),
                       .emitters = w->emitters.s,

@@ -3,6 +3,7 @@
 #define LAMBERT_SOLVER_VERIFY_H
 
 #include "solver/formfactor/formfactor.h"
+#include "solver/operator/form_factor_rows.h"
 #include "solver/operator/operator.h"
 #include "solver/scene/mesh.h"
 #include "solver/terminal.h"

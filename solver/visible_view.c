@@ -16,6 +16,11 @@ lam_status visible_view_counts(store *s, size_t n, float **values, double *mean,
         FAIL(error, LAM_ERR_ARGUMENT, "%s: keeps no form factors; precompute it with --keep-form-factors",
              store_path(s));
     TRY(store_get_text(s, "/form_factors", "storage", &storage, error));
+    if (strcmp(storage, "compressed") == 0)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "%s: its form factors are compressed, which does not say who sees whom; precompute it with "
+             "--keep-form-factors alone",
+             store_path(s));
     TRY(store_read(s, "/form_factors/indptr", STORE_U64, 1, dims, &ends, error));
     TRY(store_read(s, "/form_factors/indices", STORE_U32, 1, entries, &columns, error));
     counts = memory_allocate(n, sizeof *counts, "counts", error);

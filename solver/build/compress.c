@@ -1,4 +1,4 @@
-#include "solver/build/compress.h"
+#include "solver/build/compress_bound.h"
 
 #include "solver/build/plane_tree.h"
 #include "solver/build/wavelet_basis.h"
@@ -15,16 +15,15 @@ enum { LEAF = 6 };
 /* Subtrees that threads share. */
 enum { PIECES = 24 };
 
-/* F is symmetric but for rounding to single precision, and so are numbers that are kept. Also where one of
- * S_pq and S_qp is kept and the other is below the threshold it counts as lost. */
-static const double asymmetry = 4e-7, beside_threshold = 1 + 1e-5;
+/* F is symmetric but for rounding to single precision: also where one of S_pq and S_qp is kept and the other
+ * is below the threshold it counts as lost. */
+static const double beside_threshold = 1 + 1e-5;
 
-/* Numbers from this share of epsilon on are kept, and, where F is a sample, from this share of its noise: a
- * quarter of what a hierarchical operator is cut at. */
-static const double share_of_epsilon = 2e-4, share_of_noise = .055 / 4;
+/* What an element's light may lack by one number, beside epsilon. */
+static const double share_of_epsilon = 4e-4;
 
-double compress_threshold(double epsilon, double noise) {
-    return fmax(share_of_epsilon * epsilon, share_of_noise * noise);
+double compress_threshold(double epsilon) {
+    return share_of_epsilon * epsilon;
 }
 
 /* Rows of a node in columns of coefficients, side by side. */
@@ -38,12 +37,14 @@ typedef struct kept_number {
 typedef struct compress_job {
     const compress_input *input;
     const wavelets *w;
-    const uint32_t *order, *position; /* [n] and back */
-    const uint8_t *class_of;          /* [n], of a coefficient */
-    size_t n_classes;
+    const compressed_factors *c;
+    const uint32_t *position;       /* [n], of an element */
+    const double *size_of;          /* [n], M of a coefficient's node, over A^1/2 of all */
+    const double *share;            /* [n_classes] */
     double (**up)[WAVELET_SCALING]; /* [n_nodes] -> [n], rows that wait for their sibling */
     double *lost;                   /* [n_nodes][n_classes], squares */
-    size_t done;
+    size_t done, n_kept;
+    bool given_up; /* there are too many */
 } compress_job;
 
 /* What a thread works with. */
@@ -111,7 +112,7 @@ static void begin_leaf(const compress_job *job, const wavelet_node *a, compress_
     const double *area = job->input->area;
     memset(d->turned, 0, job->w->n * sizeof *d->turned);
     for (size_t lane = 0; lane < a->n_elements; lane++) {
-        const size_t i = job->order[a->begin + lane];
+        const size_t i = job->c->order[a->begin + lane];
         for (uint64_t e = F->indptr[i]; e < F->indptr[i + 1]; e++) {
             const size_t j = F->indices[e];
             d->turned[job->position[j]][lane] = sqrt(area[i] / area[j]) * (double)F->data[e];
@@ -150,12 +151,19 @@ static lam_status keep(compress_desk *d, size_t i, size_t j, double value, lam_e
     return LAM_OK;
 }
 
+/* Row p of a node against column q. */
+typedef struct meeting {
+    double *lost; /* of the row's node and the column's class */
+    double least; /* is kept */
+    size_t q;
+} meeting;
+
 /* Number (p, q) of S: kept in the row that comes first, lost to that of p where it is small. */
-static inline lam_status settle(const compress_job *job, double *lost, size_t p, size_t q, double value,
-                                compress_desk *d, lam_error *error) {
-    const double magnitude = fabs(value), threshold = job->input->threshold;
-    if (magnitude < beside_threshold * threshold) lost[job->class_of[q]] += value * value;
-    return q >= p && magnitude >= threshold ? keep(d, p, q, value, error) : LAM_OK;
+static inline lam_status settle(const meeting *at, size_t p, double value, compress_desk *d,
+                                lam_error *error) {
+    const double magnitude = fabs(value);
+    if (magnitude < beside_threshold * at->least) *at->lost += value * value;
+    return at->q >= p && magnitude >= at->least ? keep(d, p, at->q, value, error) : LAM_OK;
 }
 
 static lam_status run_node(compress_job *job, size_t t, compress_desk *d, lam_error *error) {
@@ -164,7 +172,12 @@ static lam_status run_node(compress_job *job, size_t t, compress_desk *d, lam_er
     const wavelet_node *a = &w->nodes[t];
     const bool root = t + 1 == w->n_nodes;
     const float *columns = columns_of(w, t);
-    double *lost = job->lost + t * job->n_classes;
+    const uint8_t *class_of = job->c->class_of;
+    double *lost = job->lost + t * job->c->n_classes;
+    /* What a number adds to the error of light whose norm is 1, as large as its rows' wavelets and as much as
+     * light has of its column's, either way. */
+    const double own_size = job->size_of[root ? w->n - 1 : a->first];
+    const double own_share = job->share[class_of[root ? w->n - 1 : a->first]];
     double(*up)[WAVELET_SCALING] = NULL;
     if (a->from_left == 0)
         begin_leaf(job, a, d);
@@ -177,25 +190,31 @@ static lam_status run_node(compress_job *job, size_t t, compress_desk *d, lam_er
         for (size_t m = 0; m < a->inputs; m++)
             for (size_t k = 0; k < WAVELET_INPUTS; k++)
                 out[k] += (double)columns[m * WAVELET_INPUTS + k] * d->rows[q][m];
+        const double worth = fmax(own_size * job->share[class_of[q]], own_share * job->size_of[q]);
+        const meeting at = {.lost = &lost[class_of[q]], .least = job->input->threshold / worth, .q = q};
         for (size_t k = 0; k < a->scaling; k++) {
             if (root)
-                TRY(settle(job, lost, w->n - a->scaling + k, q, out[k], d, error));
+                TRY(settle(&at, w->n - a->scaling + k, out[k], d, error));
             else
                 up[q][k] = out[k];
         }
         for (size_t k = a->scaling; k < a->inputs; k++)
-            TRY(settle(job, lost, a->first + k - a->scaling, q, out[k], d, error));
+            TRY(settle(&at, a->first + k - a->scaling, out[k], d, error));
     }
 done:
     return status;
 }
 
-static lam_status told(compress_job *job, size_t elements, lam_error *error) {
+/* After a node: how far it is, and whether it is of use. */
+static lam_status told(compress_job *job, const wavelet_node *a, size_t kept, lam_error *error) {
     lam_status status = LAM_OK;
     const progress *p = job->input->progress;
 #pragma omp critical(compress_progress)
     {
-        job->done += elements;
+        job->done += a->from_left == 0 ? a->n_elements : 0;
+        job->n_kept += kept;
+        if (job->input->most > 0 && job->n_kept > job->input->most)
+            __atomic_store_n(&job->given_up, true, __ATOMIC_RELAXED);
         progress_report(p, "compressing", (double)job->done / (double)job->w->n);
         if (progress_cancelled(p)) status = status_fail(error, LAM_ERR_CANCELLED, "cancelled");
     }
@@ -207,8 +226,10 @@ static lam_status run_piece(compress_job *job, const wavelet_piece *piece, compr
     lam_status status = LAM_OK;
     if (d->rows == NULL) TRY(desk_make(job->w, d, error));
     for (size_t t = piece->first; t < piece->last; t++) {
+        const size_t before = d->n_kept;
+        if (__atomic_load_n(&job->given_up, __ATOMIC_RELAXED)) break;
         TRY(run_node(job, t, d, error));
-        if (job->w->nodes[t].from_left == 0) TRY(told(job, job->w->nodes[t].n_elements, error));
+        TRY(told(job, &job->w->nodes[t], d->n_kept - before, error));
     }
 done:
     return status;
@@ -250,9 +271,10 @@ static lam_status run_all(compress_job *job, compress_desk *desks, lam_error *er
         }
     }
     if (status != LAM_OK) goto done;
-    if (desks[0].rows == NULL) TRY(desk_make(w, &desks[0], error));
-    for (size_t t = 0; t < N; t++)
-        if (w->nodes[t].n_elements > most) TRY(run_node(job, t, &desks[0], error));
+    for (size_t t = 0; t < N && !job->given_up; t++) {
+        const wavelet_piece above = {(uint32_t)t, (uint32_t)t + 1};
+        if (w->nodes[t].n_elements > most) TRY(run_piece(job, &above, &desks[0], error));
+    }
 done:
     free(pieces);
     return status;
@@ -299,204 +321,63 @@ done:
     return status;
 }
 
-/* --- bounds -------------------------------------------------------------------------------------------- */
-
-/* What the bounds of a node are made of. */
-typedef struct node_sizes {
-    double wavelets, inputs; /* the largest norm at an element of its wavelets' values, of all it takes */
-    double rows;             /* Frobenius norm of the rows of its elements */
-} node_sizes;
-
-/* values [n][WAVELET_SCALING] of what nodes hand up, over A^1/2, at each position: those of the children
- * become those of their parent. */
-static void size_node(const wavelets *w, size_t t, const double *area, const uint32_t *order,
-                      double (*values)[WAVELET_SCALING], node_sizes *out) {
-    const wavelet_node *a = &w->nodes[t];
-    const bool root = t + 1 == w->n_nodes;
-    const float *columns = columns_of(w, t);
-    const size_t right = a->from_left > 0 ? w->nodes[t - 1].begin : 0;
-    for (size_t p = a->begin; p < a->begin + a->n_elements; p++) {
-        double in[WAVELET_INPUTS] = {0}, all = 0, own = 0;
-        size_t first = 0, count = 1;
-        if (a->from_left == 0) {
-            first = p - a->begin;
-            in[0] = 1 / sqrt(area[order[p]]);
-        } else {
-            first = p < right ? 0 : a->from_left;
-            count = p < right ? a->from_left : a->inputs - a->from_left;
-            memcpy(in, values[p], count * sizeof *in);
-        }
-        for (size_t m = 0; m < count; m++) all += in[m] * in[m];
-        for (size_t k = 0; k < a->inputs; k++) {
-            double value = 0;
-            for (size_t m = 0; m < count; m++)
-                value += (double)columns[(first + m) * WAVELET_INPUTS + k] * in[m];
-            if (k >= a->scaling || root) own += value * value;
-            if (k < a->scaling) values[p][k] = value;
-        }
-        out->wavelets = fmax(out->wavelets, sqrt(own));
-        out->inputs = fmax(out->inputs, sqrt(all));
-    }
-}
-
-/* max over shapes of |Q Q^T - 1|_F: they are rounded to single precision. */
-static double unorthogonal(const wavelets *w) {
-    const float *Q = w->basis;
-    double largest = 0;
-    for (size_t s = 0; s < w->n_shapes; s++) {
-        const size_t m = w->shapes[s].inputs;
-        double squares = 0;
-        for (size_t i = 0; i < m; i++)
-            for (size_t j = 0; j < m; j++) {
-                double sum = i == j ? -1 : 0;
-                for (size_t k = 0; k < m; k++) sum += (double)Q[i * m + k] * (double)Q[j * m + k];
-                squares += sum * sum;
-            }
-        largest = fmax(largest, sqrt(squares));
-        Q += m * m;
-    }
-    return largest;
-}
-
-static float rounded_up(double value) {
-    const float near = (float)value;
-    return (double)near < value ? nextafterf(near, INFINITY) : near;
-}
-
-/* bound_tk = M_t d_tk, and what rounding of S and of the basis adds: W^T W is 1 but for eta a level. On the
- * way to the coefficients that is eta of each node's inputs, and on the way back all levels' eta of the
- * light, which the rows of the leaf see. */
-static lam_status make_bounds(const compress_job *job, compressed_factors *c, lam_error *error) {
-    lam_status status = LAM_OK;
-    const wavelets *w = job->w;
-    const csr *F = job->input->F;
-    const double *area = job->input->area, eta = unorthogonal(w);
-    double(*values)[WAVELET_SCALING] = memory_allocate(w->n, sizeof *values, "form factors", error);
-    node_sizes *sizes = memory_allocate(w->n_nodes, sizeof *sizes, "form factors", error);
-    c->bound = memory_allocate(w->n_nodes, c->n_classes * sizeof *c->bound, "form factors", error);
-    if (values == NULL || sizes == NULL || c->bound == NULL) TRY(LAM_ERR_MEMORY);
-    const double levels = (double)(COMPRESSED_CLASS_HEIGHTS * c->n_classes + 1);
-    for (size_t t = 0; t < w->n_nodes; t++) {
-        const wavelet_node *a = &w->nodes[t];
-        node_sizes *own = &sizes[t];
-        *own = (node_sizes){.rows = 0};
-        size_node(w, t, area, c->order, values, own);
-        if (a->from_left > 0) {
-            own->rows = hypot(sizes[a->left].rows, sizes[t - 1].rows);
-        } else {
-            double squares = 0;
-            for (size_t p = a->begin; p < a->begin + a->n_elements; p++) {
-                const size_t i = c->order[p];
-                for (uint64_t e = F->indptr[i]; e < F->indptr[i + 1]; e++)
-                    squares += area[i] / area[F->indices[e]] * (double)F->data[e] * (double)F->data[e];
-            }
-            own->rows = sqrt(squares);
-        }
-        const double rounding = own->rows * (own->wavelets * asymmetry +
-                                             own->inputs * (eta + (a->from_left == 0 ? levels * eta : 0)));
-        for (size_t k = 0; k < c->n_classes; k++)
-            c->bound[t * c->n_classes + k] = rounded_up(
-                own->wavelets * sqrt(job->lost[t * c->n_classes + k]) * (1 + 1e-9) + rounding * (1 + 1e-9));
-    }
-done:
-    free(values);
-    free(sizes);
-    return status;
-}
-
-/* --- first light of groups ----------------------------------------------------------------------------- */
-
-/* The larger groups first, and those that shine before all others. */
-static lam_status choose_lit(const compress_input *input, compressed_factors *c, lam_error *error) {
-    lam_status status = LAM_OK;
-    double *size = memory_allocate(input->n_groups, sizeof *size, "form factors", error);
-    double whole = 0;
-    c->lit_group = memory_allocate(COMPRESS_LIT_MOST, sizeof *c->lit_group, "form factors", error);
-    if (size == NULL || c->lit_group == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < c->n; i++) {
-        size[input->group[i]] += input->area[i];
-        whole += input->area[i];
-    }
-    for (size_t g = 0; g < input->n_groups; g++)
-        if (size[g] > 0 && input->shines != NULL && input->shines[g]) size[g] += whole;
-    while (c->n_lit < COMPRESS_LIT_MOST) {
-        size_t largest = 0;
-        for (size_t g = 1; g < input->n_groups; g++)
-            if (size[g] > size[largest]) largest = g;
-        if (input->n_groups == 0 || !(size[largest] > 0)) break;
-        size[largest] = 0;
-        c->lit_group[c->n_lit++] = (uint32_t)largest;
-    }
-done:
-    free(size);
-    return status;
-}
-
-static lam_status light_groups(const compress_input *input, compressed_factors *c, lam_error *error) {
-    lam_status status = LAM_OK;
-    uint32_t *slot = memory_allocate(input->n_groups, sizeof *slot, "form factors", error);
-    TRY(choose_lit(input, c, error));
-    c->lit = memory_allocate(c->n_lit, c->n * sizeof *c->lit, "form factors", error);
-    if (slot == NULL || c->lit == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t g = 0; g < input->n_groups; g++) slot[g] = UINT32_MAX;
-    for (size_t g = 0; g < c->n_lit; g++) slot[c->lit_group[g]] = (uint32_t)g;
-    for (size_t i = 0; i < c->n; i++) {
-        double sums[COMPRESS_LIT_MOST] = {0};
-        for (uint64_t e = input->F->indptr[i]; e < input->F->indptr[i + 1]; e++) {
-            const uint32_t g = slot[input->group[input->F->indices[e]]];
-            if (g != UINT32_MAX) sums[g] += (double)input->F->data[e];
-        }
-        for (size_t g = 0; g < c->n_lit; g++) c->lit[g * c->n + i] = (float)sums[g];
-    }
-done:
-    free(slot);
-    return status;
-}
-
 /* --- all of it ----------------------------------------------------------------------------------------- */
 
-/* Of every coefficient the class of its node. */
-static lam_status spread_classes(const wavelets *w, uint8_t *of_coefficient, size_t *n_classes,
-                                 lam_error *error) {
-    uint8_t *of_node = memory_allocate(w->n_nodes, sizeof *of_node, "form factors", error);
-    lam_status status = LAM_OK;
-    if (of_node == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(compressed_classes(w, of_node, n_classes, error));
-    memset(of_coefficient, (int)(*n_classes - 1), w->n);
+/* Of every coefficient how large its node's wavelets are, beside light that is the same everywhere. */
+static void spread_sizes(const compressed_factors *c, const node_sizes *sizes, double *out) {
+    const wavelets *w = &c->basis;
+    const double root = sqrt(c->area);
+    for (size_t q = 0; q < w->n; q++) out[q] = root * sizes[w->n_nodes - 1].wavelets;
     for (size_t t = 0; t < w->n_nodes; t++)
-        memset(of_coefficient + w->nodes[t].first, of_node[t], w->nodes[t].inputs - w->nodes[t].scaling);
+        for (size_t k = 0; k < w->nodes[t].inputs - w->nodes[t].scaling; k++)
+            out[w->nodes[t].first + k] = root * sizes[t].wavelets;
+}
+
+/* Basis, order, groups and what depends on them. */
+static lam_status prepare(const compress_input *input, compressed_factors *c, lam_error *error) {
+    lam_status status = LAM_OK;
+    plane_tree tree = {.n = 0};
+    TRY(plane_tree_make(c->n, input->centre, input->normal, LEAF, &tree, error));
+    TRY(wavelet_basis_make(&tree, input->area, input->centre, &c->basis, error));
+    c->order = tree.order;
+    tree.order = NULL;
+    TRY(compress_light_groups(input, c, error));
+    TRY(compressed_place(c, input->area, input->group, error));
 done:
-    free(of_node);
+    plane_tree_free(&tree);
     return status;
 }
 
 lam_status compress_form_factors(const compress_input *input, compressed_factors *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = input->F->n;
-    plane_tree tree = {.n = 0};
     compressed_factors c = {.n = n};
-    compress_job job = {.input = input, .w = &c.basis};
+    compress_job job = {.input = input, .w = &c.basis, .c = &c};
+    double share[COMPRESSED_CLASSES_MOST], *size_of = NULL;
+    node_sizes *sizes = NULL;
     compress_desk *desks = memory_allocate(input->n_threads, sizeof *desks, "form factors", error);
     uint32_t *position = memory_allocate(n, sizeof *position, "form factors", error);
-    uint8_t *class_of = memory_allocate(n, sizeof *class_of, "form factors", error);
-    if (desks == NULL || position == NULL || class_of == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(plane_tree_make(n, input->centre, input->normal, LEAF, &tree, error));
-    TRY(wavelet_basis_make(&tree, input->area, input->centre, &c.basis, error));
-    c.order = tree.order;
-    tree.order = NULL;
+    if (desks == NULL || position == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(prepare(input, &c, error));
     for (size_t p = 0; p < n; p++) position[c.order[p]] = (uint32_t)p;
-    TRY(spread_classes(&c.basis, class_of, &c.n_classes, error));
-    job.order = c.order;
-    job.position = position;
-    job.class_of = class_of;
-    job.n_classes = c.n_classes;
+    sizes = memory_allocate(c.basis.n_nodes, sizeof *sizes, "form factors", error);
+    size_of = memory_allocate(n, sizeof *size_of, "form factors", error);
     job.up = memory_allocate(c.basis.n_nodes, sizeof *job.up, "form factors", error);
     job.lost = memory_allocate(c.basis.n_nodes, c.n_classes * sizeof *job.lost, "form factors", error);
-    if (job.up == NULL || job.lost == NULL) TRY(LAM_ERR_MEMORY);
+    if (sizes == NULL || size_of == NULL || job.up == NULL || job.lost == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(compress_sizes(input, &c, sizes, error));
+    TRY(compress_shares(input, &c, share, error));
+    spread_sizes(&c, sizes, size_of);
+    job.position = position;
+    job.size_of = size_of;
+    job.share = share;
     TRY(run_all(&job, desks, error));
+    if (job.given_up) {
+        *out = (compressed_factors){.n = 0};
+        goto done;
+    }
     TRY(gather(n, input->n_threads, desks, &c.S, error));
-    TRY(make_bounds(&job, &c, error));
-    TRY(light_groups(input, &c, error));
+    TRY(compress_bounds(sizes, job.lost, &c, error));
     *out = c;
     c = (compressed_factors){.n = 0};
 done:
@@ -506,8 +387,8 @@ done:
     free(job.lost);
     free(desks);
     free(position);
-    free(class_of);
-    plane_tree_free(&tree);
+    free(sizes);
+    free(size_of);
     compressed_free(&c);
     return status;
 }

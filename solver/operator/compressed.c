@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { CLASSES_MOST = 255, ROWS_AT_ONCE = 64 };
+enum { ROWS_AT_ONCE = 64 };
 
 /* Sums of bounds are taken this much wider, for their own rounding. */
 static const double margin = 1 + 1e-9;
@@ -33,16 +33,23 @@ void compressed_free(compressed_factors *c) {
     *c = (compressed_factors){.n = 0};
 }
 
-lam_status compressed_classes(const wavelets *w, uint8_t *class_of, size_t *n_classes, lam_error *error) {
+/* The class of every coefficient. */
+static lam_status find_classes(compressed_factors *c, lam_error *error) {
+    const wavelets *w = &c->basis;
     uint32_t *height = memory_allocate(w->n_nodes, sizeof *height, "form factors", error);
-    if (height == NULL) return LAM_ERR_MEMORY;
-    wavelets_heights(w, height);
-    const uint32_t top = height[w->n_nodes - 1] / COMPRESSED_CLASS_HEIGHTS;
-    *n_classes = (top < CLASSES_MOST ? top : CLASSES_MOST - 1) + 1;
-    for (size_t t = 0; t < w->n_nodes; t++) {
-        const size_t class = height[t] / COMPRESSED_CLASS_HEIGHTS;
-        class_of[t] = (uint8_t)(class < *n_classes ? class : *n_classes - 1);
+    c->class_of = memory_allocate(c->n, sizeof *c->class_of, "form factors", error);
+    if (height == NULL || c->class_of == NULL) {
+        free(height);
+        return LAM_ERR_MEMORY;
     }
+    wavelets_heights(w, height);
+    const uint32_t most = COMPRESSED_CLASSES_MOST - 1, root = height[w->n_nodes - 1];
+    const uint32_t top = root < most ? root : most;
+    c->n_classes = top + 1;
+    memset(c->class_of, (int)top, c->n);
+    for (size_t t = 0; t < w->n_nodes; t++)
+        memset(c->class_of + w->nodes[t].first, (int)(height[t] < top ? height[t] : top),
+               w->nodes[t].inputs - w->nodes[t].scaling);
     free(height);
     return LAM_OK;
 }
@@ -64,7 +71,7 @@ static lam_status find_lit(compressed_factors *c, const double *area, const uint
 
 /* Of a product, every step in norms: two transforms of at most eight terms a level, whose absolute values
  * have a norm of eight at most, and the sums of S, whose absolute values have its Frobenius norm at most. */
-static double rounding_of(const compressed_factors *c, uint32_t height) {
+static double rounding_of(const compressed_factors *c) {
     double squares = 0, least = INFINITY;
     uint64_t longest = 0;
     for (uint64_t e = 0; e < c->S.indptr[c->n]; e++) squares += (double)c->S.data[e] * (double)c->S.data[e];
@@ -73,33 +80,36 @@ static double rounding_of(const compressed_factors *c, uint32_t height) {
         longest = count > longest ? count : longest;
         least = fmin(least, c->root[i]);
     }
-    const double norm = fmax(sqrt(squares), 1), transform = 64 * (double)(height + 3);
+    const double norm = fmax(sqrt(squares), 1), transform = 64 * (double)(c->n_classes + 3);
     /* |W A^1/2 y| <= A^1/2 2 |x|_max */
     return 2 * sqrt(c->area) / least * (2 * transform + csr_doubles_roundings(longest)) * norm *
            (.5 * DBL_EPSILON);
 }
 
-lam_status compressed_finish(compressed_factors *c, const double *area, const uint32_t *group,
-                             lam_error *error) {
+lam_status compressed_place(compressed_factors *c, const double *area, const uint32_t *group,
+                            lam_error *error) {
     lam_status status = LAM_OK;
-    csr mirrored = {.n = 0};
-    size_t n_classes;
-    c->class_of = memory_allocate(c->basis.n_nodes, sizeof *c->class_of, "form factors", error);
     c->root = memory_allocate(c->n, sizeof *c->root, "form factors", error);
-    if (c->class_of == NULL || c->root == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(compressed_classes(&c->basis, c->class_of, &n_classes, error));
+    if (c->root == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(find_classes(c, error));
     TRY(find_lit(c, area, group, error));
-    TRY(csr_mirror(&c->S, &mirrored, error));
-    csr_free(&c->S);
-    c->S = mirrored;
     c->area = 0;
     for (size_t p = 0; p < c->n; p++) {
         c->root[p] = sqrt(area[c->order[p]]);
         c->area += area[p];
     }
-    c->rounding = rounding_of(c, (uint32_t)(COMPRESSED_CLASS_HEIGHTS * n_classes));
 done:
     return status;
+}
+
+lam_status compressed_finish(compressed_factors *c, lam_error *error) {
+    csr mirrored = {.n = 0};
+    const lam_status status = csr_mirror(&c->S, &mirrored, error);
+    if (status != LAM_OK) return status;
+    csr_free(&c->S);
+    c->S = mirrored;
+    c->rounding = rounding_of(c);
+    return LAM_OK;
 }
 
 /* --- products ------------------------------------------------------------------------------------------ */
@@ -143,18 +153,12 @@ void compressed_multiply(const compressed_factors *c, const double *x, double *y
         for (size_t i = 0; i < n; i++) y[i] += mean[g] * (double)c->lit[g * n + i];
 }
 
-/* |c_k| of every class. */
-static void class_norms(const compressed_factors *c, const double *coefficients, double *norms) {
-    const wavelets *w = &c->basis;
-    double all = 0;
+void compressed_norms(const compressed_factors *c, const double *x, double *norms, double *work) {
+    const size_t n = c->n;
+    double *from = work, *scratch = from + n, *mean = scratch + n, *slots = mean + c->n_lit, all = 0;
+    take_apart(c, x, mean, from, scratch, slots);
     for (size_t k = 0; k < c->n_classes; k++) norms[k] = 0;
-    for (size_t t = 0; t < w->n_nodes; t++) {
-        const wavelet_node *a = &w->nodes[t];
-        for (size_t k = 0; k < a->inputs - a->scaling; k++)
-            norms[c->class_of[t]] += coefficients[a->first + k] * coefficients[a->first + k];
-    }
-    for (size_t k = w->n - w->nodes[w->n_nodes - 1].scaling; k < w->n; k++)
-        norms[c->n_classes - 1] += coefficients[k] * coefficients[k];
+    for (size_t q = 0; q < n; q++) norms[c->class_of[q]] += from[q] * from[q];
     for (size_t k = 0; k < c->n_classes; k++) all += norms[k];
     /* The transform has rounded each by some of the whole. */
     for (size_t k = 0; k < c->n_classes; k++) norms[k] = margin * (sqrt(norms[k]) + 1e-12 * sqrt(all));
@@ -163,11 +167,11 @@ static void class_norms(const compressed_factors *c, const double *coefficients,
 double compressed_error(const compressed_factors *c, const double *x, double *out, double *work) {
     const wavelets *w = &c->basis;
     const size_t n = c->n;
-    double *from = work, *scratch = from + n, *mean = scratch + n, *slots = mean + c->n_lit;
-    double norms[CLASSES_MOST] = {0}, largest = 0;
-    take_apart(c, x, mean, from, scratch, slots);
-    class_norms(c, from, norms);
-    double *const sum = slots; /* [n_nodes], of a node and those above it */
+    /* As compressed_norms leaves it. */
+    const double *mean = work + 2 * n;
+    double *sum = work + 2 * n + c->n_lit; /* [n_nodes], of a node and those above it */
+    double norms[COMPRESSED_CLASSES_MOST] = {0}, largest = 0;
+    compressed_norms(c, x, norms, work);
     for (size_t t = w->n_nodes; t-- > 0;) {
         const wavelet_node *a = &w->nodes[t];
         double own = 0;
@@ -208,9 +212,8 @@ done:
     return status;
 }
 
-static lam_status check_numbers(store *s, const compressed_factors *c, const char *name, const float *values,
-                                size_t count, lam_error *error) {
-    (void)c;
+static lam_status check_numbers(store *s, const char *name, const float *values, size_t count,
+                                lam_error *error) {
     for (size_t k = 0; k < count; k++)
         if (!(values[k] >= 0 && values[k] < INFINITY))
             return status_fail(error, LAM_ERR_FORMAT, "%s: %s[%zu] = %g, must be at least 0", store_path(s),
@@ -237,8 +240,6 @@ done:
 static lam_status read_parts(store *s, size_t n, compressed_factors *c, lam_error *error) {
     lam_status status = LAM_OK;
     size_t bound[STORE_MAX_RANK] = {SIZE_MAX, SIZE_MAX}, lit[STORE_MAX_RANK] = {SIZE_MAX, n};
-    uint8_t *class_of = NULL;
-    size_t n_classes;
     void *data;
     *c = (compressed_factors){.n = n};
     TRY(csr_load(s, GROUP, n, &c->S, error));
@@ -253,22 +254,18 @@ static lam_status read_parts(store *s, size_t n, compressed_factors *c, lam_erro
     TRY(check_order(s, c, error));
     TRY(store_read(s, GROUP "/bound", STORE_F32, 2, bound, &data, error));
     c->bound = data;
-    class_of = memory_allocate(c->basis.n_nodes, sizeof *class_of, "form factors", error);
-    if (class_of == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(compressed_classes(&c->basis, class_of, &n_classes, error));
-    if (bound[0] != c->basis.n_nodes || bound[1] != n_classes)
-        FAIL(error, LAM_ERR_FORMAT, "%s: " GROUP "/bound is %zu x %zu, the basis wants %zu x %zu",
-             store_path(s), bound[0], bound[1], c->basis.n_nodes, n_classes);
-    c->n_classes = n_classes;
-    TRY(check_numbers(s, c, GROUP "/bound", c->bound, bound[0] * bound[1], error));
+    c->n_classes = bound[1];
+    if (bound[0] != c->basis.n_nodes)
+        FAIL(error, LAM_ERR_FORMAT, "%s: " GROUP "/bound has %zu rows, the basis has %zu nodes",
+             store_path(s), bound[0], c->basis.n_nodes);
+    TRY(check_numbers(s, GROUP "/bound", c->bound, bound[0] * bound[1], error));
     TRY(store_read(s, GROUP "/lit_group", STORE_U32, 1, lit, &data, error));
     c->lit_group = data;
     c->n_lit = lit[0];
     TRY(store_read(s, GROUP "/lit", STORE_F32, 2, lit, &data, error));
     c->lit = data;
-    TRY(check_numbers(s, c, GROUP "/lit", c->lit, c->n_lit * n, error));
+    TRY(check_numbers(s, GROUP "/lit", c->lit, c->n_lit * n, error));
 done:
-    free(class_of);
     return status;
 }
 
@@ -279,7 +276,12 @@ lam_status compressed_load(store *s, size_t n, const double *area, compressed_fa
     compressed_factors c = {.n = 0};
     TRY(read_parts(s, n, &c, error));
     TRY(store_read(s, "/mesh/group", STORE_U32, 1, (size_t[]){n}, &group, error));
-    TRY(compressed_finish(&c, area, group, error));
+    const size_t n_classes = c.n_classes;
+    TRY(compressed_place(&c, area, group, error));
+    if (n_classes != c.n_classes)
+        FAIL(error, LAM_ERR_FORMAT, "%s: " GROUP "/bound has %zu columns, must be %zu", store_path(s),
+             n_classes, c.n_classes);
+    TRY(compressed_finish(&c, error));
     *out = c;
     c = (compressed_factors){.n = 0};
 done:

@@ -15,8 +15,7 @@
 #include "solver/operator/csr.h"
 #include "solver/operator/wavelets.h"
 
-/* A node of height h (leaves: 0) is of class min(h / 2, number of classes - 1). */
-enum { COMPRESSED_CLASS_HEIGHTS = 2 };
+/* A node is of the class of its height (leaves: 0), the highest ones of the last class. */
 
 typedef struct compressed_factors {
     size_t n;
@@ -28,25 +27,29 @@ typedef struct compressed_factors {
     size_t n_lit;        /* groups whose first light is kept */
     uint32_t *lit_group; /* [n_lit] */
     float *lit;          /* [n_lit][n] F 1_g, by element */
-    /* Made by compressed_finish. */
-    uint8_t *class_of; /* [n_nodes] */
+    /* Made by compressed_place. */
+    uint8_t *class_of; /* [n], of a coefficient */
     double *root;      /* [n] A^1/2, by position */
     uint32_t *lit_of;  /* [n], by element: which of those groups; n_lit: none */
     double *lit_area;  /* [n_lit] */
     double area;       /* of all elements */
-    double rounding;   /* of a product, by element, over |x|_max */
+    double rounding;   /* of a product, by element, over |x|_max: by compressed_finish */
 } compressed_factors;
 
 void compressed_free(compressed_factors *c);
 
-/* The class of every node, [n_nodes]; returns how many there are, at most 255. Errors: LAM_ERR_MEMORY. */
-lam_status compressed_classes(const wavelets *w, uint8_t *class_of, size_t *n_classes, lam_error *error);
+/* Of classes at most. */
+enum { COMPRESSED_CLASSES_MOST = 255 };
 
-/* Mirrors S and makes the rest. area, group: [n], by element. Errors: LAM_ERR_MEMORY. */
-lam_status compressed_finish(compressed_factors *c, const double *area, const uint32_t *group,
-                             lam_error *error);
+/* n_classes and what elements need, from basis, order and lit_group. area, group: [n], by element. Errors:
+ * LAM_ERR_MEMORY. */
+lam_status compressed_place(compressed_factors *c, const double *area, const uint32_t *group,
+                            lam_error *error);
 
-/* /form_factors of a store; c is as it was made, not finished. Loading finishes it; group comes from /mesh.
+/* Of one that was placed: mirrors S, so that it multiplies. Errors: LAM_ERR_MEMORY. */
+lam_status compressed_finish(compressed_factors *c, lam_error *error);
+
+/* /form_factors of a store; c is not finished. Loading finishes it; group comes from /mesh.
  * Errors: as store_read; LAM_ERR_FORMAT, LAM_ERR_NUMERIC where parts do not fit together. */
 lam_status compressed_save(const compressed_factors *c, store *s, lam_error *error);
 lam_status compressed_load(store *s, size_t n, const double *area, compressed_factors *out, lam_error *error);
@@ -57,6 +60,9 @@ size_t compressed_bytes(const compressed_factors *c);
 
 /* Doubles of work for a product or a bound. */
 size_t compressed_work(const compressed_factors *c);
+
+/* |c_k| of light x, [n_classes]. */
+void compressed_norms(const compressed_factors *c, const double *x, double *norms, double *work);
 
 /* y ~ F x, both [n] by element. The bits do not depend on n_threads. */
 void compressed_multiply(const compressed_factors *c, const double *x, double *y, double *work,

@@ -22,6 +22,34 @@ static void apply(const scene *s) {
     free(work);
 }
 
+/* Form factors as they are kept: light refined by them is finite and certified, or refused in one line. */
+static void refine(const scene *s, const char *path) {
+    lam_error error = {.message = ""};
+    lam_form_factors *F = NULL;
+    lam_refiner *refiner = NULL;
+    const size_t count = s->n * s->n_channels;
+    if (s->n_emitters > 0 || count > MOST_VALUES) return;
+    const lam_status opened = lam_form_factors_open(path, &F, &error);
+    FUZZ_CHECK(opened == LAM_OK || (error.message[0] != '\0' && strchr(error.message, '\n') == NULL));
+    if (F == NULL) return;
+    double *E = calloc(count, sizeof *E), *out = calloc(count, sizeof *out), certificate = NAN;
+    size_t iterations;
+    FUZZ_CHECK(E != NULL && out != NULL);
+    for (size_t i = 0; i < count; i++) E[i] = 1;
+    if (lam_refiner_create(s->op, F, &refiner, &error) == LAM_OK &&
+        lam_refine(refiner, 1, LAM_RADIOSITY, E, NULL, NULL, .5, out, &certificate, &iterations, &error) ==
+            LAM_OK) {
+        FUZZ_CHECK(certificate >= 0 && isfinite(certificate));
+        for (size_t i = 0; i < count; i++) FUZZ_CHECK(isfinite(out[i]));
+    } else {
+        FUZZ_CHECK(error.message[0] != '\0' && strchr(error.message, '\n') == NULL);
+    }
+    lam_refiner_free(refiner);
+    lam_form_factors_close(F);
+    free(E);
+    free(out);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     char path[] = "/dev/shm/lambert-fuzz-XXXXXX";
     pthread_mutex_t stores = PTHREAD_MUTEX_INITIALIZER;
@@ -35,6 +63,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         lam_error error = {.message = ""};
         if (scene_open(&wish, &s, &error) == LAM_OK) {
             apply(s);
+            refine(s, path);
             scene_release(s);
         } else {
             FUZZ_CHECK(error.message[0] != '\0' && strchr(error.message, '\n') == NULL);

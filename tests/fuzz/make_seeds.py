@@ -44,9 +44,13 @@ with tempfile.TemporaryDirectory() as scratch:
     for k, how in enumerate((["exact"], ["low-rank", "--rank", 2], ["2msc", "--rank", 2], ["sparse", "--threshold", "1e-2"],
                              ["emitters", "--emitters", "sky", "--sky", "grid:2x2"],
                              ["low-rank", "--rank", 2, "--store-precision", "i8"],
-                             ["exact", "--keep-form-factors", "--sky", "grid:2x2"])):
+                             ["exact", "--keep-form-factors", "--sky", "grid:2x2"],
+                             ["hierarchical", "--keep-form-factors"])):
         run("precompute", "box.obj", "--rays", 64, "--probes", 0, "--quiet", "-o", folder / "store" / f"{k}.h5",
             "--method", *how)
+    run("generate", "box", "--divisions", 3, "-o", "box.obj")
+    run("precompute", "box.obj", "--probes", 0, "--quiet", "-o", folder / "store" / "compressed.h5", "--method",
+        "hierarchical", "--epsilon", .99, "--keep-form-factors=compressed")
 
 # What the importing process sends: a header, then points, elements, names, materials.
 header = struct.pack("<8sQ480s2048sQ7Q", b"lamsoup", 0, b"", b"", 0, 3, 1, 1, 2, 1, 2, 0)

@@ -156,7 +156,6 @@ class Usage(Case):
         for line in ("bench reuse",
                      "solve a.h5 -o b.glb",
                      *("precompute a.obj -o b.h5 " + option for option in (
-                         "--keep-form-factors=compressed", 
                          "--positions p.json",
                          "--path p.json --frames 3", "--reuse A", "--paths 9"))):
             with self.subTest(line):
