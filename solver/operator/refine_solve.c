@@ -220,16 +220,18 @@ static void restart(refinement *s, size_t c, const double *x, const double *h) {
     const size_t n = refiner->op->n;
     const float *rho = col->channel->rho;
     const double *P = s->P + c * n;
-    double *r = s->r + c * n, largest = 0;
+    double *r = s->r + c * n, largest = 0, rho_most = 0;
     for (size_t i = 0; i < n; i++) {
         const double bounced = (double)rho[i] * h[i];
         r[i] = bounced - P[i];
         /* Where E' + P is below 0, F |E' + P| is more than h. */
         const double all = (double)rho[i] * (fabs(h[i]) - 2 * col->least * refiner->row_most);
         largest = all > largest ? all : largest;
+        rho_most = fmax(rho_most, (double)rho[i]);
     }
-    const double product = s->scratch != NULL ? refiner_product_rounding(refiner, refine_most(n, x))
-                                              : refiner->roundings * largest;
+    const double product = s->scratch != NULL
+                               ? rho_most * refiner_product_rounding(refiner, refine_most(n, x))
+                               : refiner->roundings * largest;
     col->error = product + 2 * REFINE_U * refine_most(n, r);
     col->n_kept = 0;
 }
