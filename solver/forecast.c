@@ -101,15 +101,15 @@ static double hierarchical_numbers(const forecast *f) {
 static const double number_bytes = 32, number_store_bytes = 4, number_build_bytes = 130,
                     element_build_bytes = 2000;
 
-/* Numbers an element of compressed form factors, at most: measured 207 (a Cornell box of 10,229 elements) to
- * 885 (an atrium of 6,000) at epsilon .05, 326 at .025 in that box; where they were as many as F has they are
- * not kept. Bytes of a number and of an element while they are found. */
+/* Numbers an element of compressed form factors, at most: measured 255 (a Cornell box of 10,249 elements) to
+ * 885 (an atrium of 6,000) at epsilon .05, 902 at .0025 (a box of 40,978); where they were as many as F has
+ * they are not kept. Bytes of a number and of an element while they are found. */
 static const double compressed_most = 900, compressed_number_bytes = 26, compressed_element_bytes = 2500;
 
 static double compress_bytes(const forecast *f) {
     const double n = (double)f->n;
     if (!f->compress || recipe_noise(&f->recipe) > 0) return 0;
-    const double numbers = fmin(compressed_most * sqrt(.05 / f->epsilon), n / 2);
+    const double numbers = fmin(compressed_most * pow(.05 / f->epsilon, .25), n / 2);
     return n * (compressed_element_bytes + compressed_number_bytes * numbers);
 }
 
