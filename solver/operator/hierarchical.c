@@ -177,6 +177,12 @@ done:
 
 /* --- the products -------------------------------------------------------------------------------------- */
 
+/* Steps, coefficients and flags of some positions. */
+static size_t some_bytes(const wavelet_plan *plan) {
+    return 4 * PANEL_ALIGN + plan->n_steps * (sizeof(uint32_t) + 1) +
+           (plan->n_used + plan->n) * sizeof(uint32_t);
+}
+
 static size_t hierarchical_work_bytes(const lam_operator *op, size_t n_rhs) {
     const hierarchical *self = (const hierarchical *)op;
     const size_t used = self->plan.n_used, product = sparse_product_work(used, 1);
@@ -186,7 +192,8 @@ static size_t hierarchical_work_bytes(const lam_operator *op, size_t n_rhs) {
         !size_multiply(used, n_rhs * sizeof(float), &coefficients) ||
         !size_multiply(wavelet_plan_work(&self->plan), n_rhs * sizeof(float), &slots) ||
         !work_add(&total, vectors) || !work_add(&total, coefficients) || !work_add(&total, coefficients) ||
-        !work_add(&total, slots) || !work_add(&total, side) || !work_add(&total, product))
+        !work_add(&total, slots) || !work_add(&total, some_bytes(&self->plan)) || !work_add(&total, side) ||
+        !work_add(&total, product))
         return 0;
     return total;
 }
@@ -247,6 +254,55 @@ static void hierarchical_apply(const lam_operator *op, size_t n_rhs, const float
     apply(op, false, n_rhs, E, P, work);
 }
 
+/* Where more than one in so many steps is needed, the whole answer is as quick. */
+enum { SOME_STEPS = 4 };
+
+/* For some elements: what is above them in the tree, and the rows of K that it takes. */
+static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const float *E,
+                                        size_t n_selected, const uint32_t *selected, float *P, void *work) {
+    const hierarchical *self = (const hierarchical *)op;
+    const wavelet_plan *plan = &self->plan;
+    const size_t n = op->n, C = op->n_channels, used = plan->n_used, n_threads = op->n_threads;
+    float *X = work_take(&work, n_rhs * n * sizeof *X);
+    float *from = work_take(&work, n_rhs * used * sizeof *from);
+    float *to = work_take(&work, n_rhs * used * sizeof *to);
+    float *slots = work_take(&work, n_rhs * wavelet_plan_work(plan) * sizeof *slots);
+    float *side = work_take(&work, sliced_work(used, n_rhs) * sizeof *side);
+    uint32_t *steps = work_take(&work, plan->n_steps * sizeof *steps);
+    uint32_t *rows = work_take(&work, used * sizeof *rows);
+    uint32_t *positions = work_take(&work, n * sizeof *positions);
+    uint8_t *flags = work_take(&work, plan->n_steps);
+    size_t n_steps = plan->n_steps, n_rows = used;
+    memset(flags, 0, plan->n_steps);
+    const bool few = n_selected <= n;
+    for (size_t r = 0; few && r < n_selected; r++)
+        positions[r] = (uint32_t)operator_position(op, selected[r]);
+    if (few) n_steps = wavelet_plan_paths(plan, n_selected, positions, flags, steps);
+    const bool some = few && n_steps * SOME_STEPS < plan->n_steps;
+    if (some) n_rows = wavelet_plan_coefficients(plan, n_steps, steps, rows);
+    for (size_t c = 0; c < C; c++) {
+        const csr *K = &self->K[c].rows;
+        const float *left = self->left + c * n;
+        scale(n_rhs, n, self->root_area, E + c * n, C * n, X, n, n_threads);
+        wavelet_plan_forward(plan, n_rhs, X, from, slots, n_threads);
+        if (!some) {
+            multiply_core(self, c, n_rhs, from, to, side, work);
+            wavelet_plan_inverse(plan, n_rhs, to, X, slots, n_threads);
+        }
+        for (size_t v = 0; v < n_rhs; v++) {
+            if (some && sparse_product_by_columns(K, from + v * used))
+                multiply_core(self, c, 1, from + v * used, to, side, work);
+            else if (some)
+                sliced_multiply_rows(&self->fast[c], n_rows, rows, from + v * used, to);
+            if (some) wavelet_plan_inverse_some(plan, n_steps, steps, to, X + v * n, slots);
+            for (size_t r = 0; r < n_selected; r++) {
+                const size_t p = operator_position(op, selected[r]);
+                P[(v * C + c) * n_selected + r] = left[p] * X[v * n + p];
+            }
+        }
+    }
+}
+
 static void hierarchical_apply_adjoint(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work) {
     apply(op, true, n_rhs, g, w, work);
 }
@@ -272,6 +328,7 @@ const operator_kind operator_hierarchical = {
     .save = hierarchical_save,
     .work_bytes = hierarchical_work_bytes,
     .apply = hierarchical_apply,
+    .apply_selected = hierarchical_apply_selected,
     .apply_adjoint = hierarchical_apply_adjoint,
     .destroy = hierarchical_destroy,
     .describe = hierarchical_describe,

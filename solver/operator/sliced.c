@@ -12,6 +12,7 @@ enum { SHORT = 96, SLICES_AT_ONCE = 64, THREADS_WORTH = 100000 };
 
 void sliced_free(sliced_rows *s) {
     free(s->slices);
+    free(s->slice_of);
     free(s->long_rows);
     free(s->empty_rows);
     free(s->indices);
@@ -61,13 +62,15 @@ lam_status sliced_create(const csr *a, sliced_rows *out, lam_error *error) {
         entries += slices * l * SLICE_ROWS;
     }
     made.slices = memory_allocate(n_slices, sizeof *made.slices, "operator", error);
+    made.slice_of = memory_allocate(n, sizeof *made.slice_of, "operator", error);
     made.long_rows = memory_allocate(n - begin[SHORT + 1], sizeof *made.long_rows, "operator", error);
     made.empty_rows = memory_allocate(begin[1], sizeof *made.empty_rows, "operator", error);
     made.indices = memory_allocate(entries, sizeof *made.indices, "operator", error);
     made.data = memory_allocate(entries, sizeof *made.data, "operator", error);
-    if (made.slices == NULL || made.long_rows == NULL || made.empty_rows == NULL || made.indices == NULL ||
-        made.data == NULL)
+    if (made.slices == NULL || made.slice_of == NULL || made.long_rows == NULL || made.empty_rows == NULL ||
+        made.indices == NULL || made.data == NULL)
         TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < n; i++) made.slice_of[i] = SLICE_NONE;
     for (size_t i = 0; i < n; i++)
         if (length_of(a, i) > SHORT) made.long_rows[made.n_long++] = (uint32_t)i;
     made.n_empty = begin[1];
@@ -79,6 +82,7 @@ lam_status sliced_create(const csr *a, sliced_rows *out, lam_error *error) {
             slice *to = &made.slices[made.n_slices++];
             *to = (slice){.begin = used, .length = (uint32_t)l};
             fill_slice(a, sorted + k, count, &made, to);
+            for (size_t r = 0; r < count; r++) made.slice_of[sorted[k + r]] = (uint32_t)made.n_slices - 1;
             used += l * SLICE_ROWS;
         }
     *out = made;
@@ -275,5 +279,20 @@ void sliced_multiply(const sliced_rows *s, size_t m, const float *X, float *Y, f
 #pragma omp for schedule(static)
         for (size_t k = 0; k < s->n_empty; k++)
             for (size_t v = 0; v < m; v++) Y[v * n + s->empty_rows[k]] = 0;
+    }
+}
+
+void sliced_multiply_rows(const sliced_rows *s, size_t count, const uint32_t *rows, const float *x,
+                          float *y) {
+    const kernels run = kernels_of_cpu();
+    const csr *a = s->all;
+    for (size_t k = 0; k < count; k++) {
+        const uint32_t i = rows[k];
+        const uint64_t first = a->indptr[i];
+        const size_t length = length_of(a, i);
+        if (s->slice_of[i] != SLICE_NONE)
+            run.one(s, s->slice_of[i], s->slice_of[i] + 1, x, y);
+        else
+            y[i] = length > 0 ? run.one_long(a->indices + first, a->data + first, length, x) : 0;
     }
 }

@@ -13,6 +13,7 @@ void wavelet_plan_free(wavelet_plan *plan) {
     free(plan->steps);
     free(plan->matrices);
     free(plan->coefficient);
+    free(plan->leaves);
     free(plan->pieces);
     free(plan->above);
     *plan = (wavelet_plan){.n = 0};
@@ -164,6 +165,21 @@ done:
     return status;
 }
 
+/* Parents, and the steps that are leaves here. */
+static lam_status link_steps(wavelet_plan *plan, lam_error *error) {
+    plan->leaves = memory_allocate(plan->n_steps, sizeof *plan->leaves, "wavelets", error);
+    if (plan->leaves == NULL) return LAM_ERR_MEMORY;
+    for (size_t t = 0; t < plan->n_steps; t++) {
+        plan_step *a = &plan->steps[t];
+        a->parent = WAVELET_NONE;
+        if (a->from_left > 0)
+            plan->steps[a->left].parent = plan->steps[t - 1].parent = (uint32_t)t;
+        else
+            plan->leaves[plan->n_leaves++] = (uint32_t)t;
+    }
+    return LAM_OK;
+}
+
 /* The largest subtrees of at most PIECE_ELEMENTS elements, and what is above them. */
 static lam_status cut_pieces(wavelet_plan *plan, lam_error *error) {
     lam_status status = LAM_OK;
@@ -212,6 +228,7 @@ lam_status wavelet_plan_create(const wavelets *basis, const bool *used, wavelet_
         plan.steps[t].rows = plan.matrices + plan.steps[t].left;
         plan.steps[t].left = 0;
     }
+    TRY(link_steps(&plan, error));
     TRY(cut_pieces(&plan, error));
     *out = plan;
     plan = (wavelet_plan){.n = 0};
@@ -269,6 +286,21 @@ static transform *inverse_kernel(void) {
     return inverse_portable;
 }
 
+/* Whether all of a piece is 0. */
+static bool is_dark(const wavelet_plan *plan, const wavelet_piece *piece, const float *x) {
+    const plan_step *top = &plan->steps[piece->last - 1];
+    for (size_t p = top->begin; p < (size_t)top->begin + top->count; p++)
+        if (x[p] != 0) return false;
+    return true;
+}
+
+/* What a transform of a piece that is 0 leaves. */
+static void leave_dark(const wavelet_plan *plan, const wavelet_piece *piece, float *c, float *s) {
+    for (size_t t = piece->first; t < piece->last; t++)
+        memset(c + plan->steps[t].first, 0, plan->steps[t].own * sizeof *c);
+    memset(s + (piece->last - 1) * WAVELET_SCALING, 0, WAVELET_SCALING * sizeof *s);
+}
+
 void wavelet_plan_forward(const wavelet_plan *plan, size_t m, const float *X, float *C, float *work,
                           size_t n_threads) {
     transform *const run = forward_kernel();
@@ -279,7 +311,11 @@ void wavelet_plan_forward(const wavelet_plan *plan, size_t m, const float *X, fl
     for (size_t k = 0; k < m * n_pieces; k++) {
         const size_t v = k / n_pieces;
         const wavelet_piece *piece = &plan->pieces[k % n_pieces];
-        run(plan, piece->first, piece->last, NULL, X + v * plan->n, C + v * plan->n_used, work + v * room);
+        if (is_dark(plan, piece, X + v * plan->n))
+            leave_dark(plan, piece, C + v * plan->n_used, work + v * room);
+        else
+            run(plan, piece->first, piece->last, NULL, X + v * plan->n, C + v * plan->n_used,
+                work + v * room);
     }
     for (size_t v = 0; v < m; v++) {
         float *c = C + v * plan->n_used;
@@ -307,4 +343,52 @@ void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, fl
         const wavelet_piece *piece = &plan->pieces[k % n_pieces];
         run(plan, piece->first, piece->last, NULL, C + v * plan->n_used, X + v * plan->n, work + v * room);
     }
+}
+
+/* --- some positions ------------------------------------------------------------------------------------- */
+
+/* The leaf that takes a position. */
+static uint32_t leaf_of(const wavelet_plan *plan, uint32_t position) {
+    size_t low = 0, high = plan->n_leaves;
+    while (high - low > 1) {
+        const size_t middle = low + (high - low) / 2;
+        if (plan->steps[plan->leaves[middle]].begin <= position)
+            low = middle;
+        else
+            high = middle;
+    }
+    return plan->leaves[low];
+}
+
+size_t wavelet_plan_paths(const wavelet_plan *plan, size_t count, const uint32_t *positions, uint8_t *flags,
+                          uint32_t *out) {
+    size_t found = 0;
+    for (size_t k = 0; k < count; k++)
+        for (uint32_t t = leaf_of(plan, positions[k]); t != WAVELET_NONE && flags[t] == 0;
+             t = plan->steps[t].parent)
+            flags[t] = 1;
+    for (size_t t = 0; t < plan->n_steps; t++) {
+        if (flags[t] != 0) out[found++] = (uint32_t)t;
+        flags[t] = 0;
+    }
+    return found;
+}
+
+size_t wavelet_plan_coefficients(const wavelet_plan *plan, size_t n_steps, const uint32_t *steps,
+                                 uint32_t *out) {
+    const size_t scaling = plan->steps[plan->n_steps - 1].scaling;
+    size_t count = 0;
+    for (size_t k = 0; k < n_steps; k++)
+        for (size_t q = 0; q < plan->steps[steps[k]].own; q++)
+            out[count++] = plan->steps[steps[k]].first + (uint32_t)q;
+    for (size_t q = plan->n_used - scaling; q < plan->n_used; q++) out[count++] = (uint32_t)q;
+    return count;
+}
+
+void wavelet_plan_inverse_some(const wavelet_plan *plan, size_t n_steps, const uint32_t *steps,
+                               const float *C, float *X, float *work) {
+    const plan_step *root = &plan->steps[plan->n_steps - 1];
+    float *s = work + (plan->n_steps - 1) * WAVELET_SCALING;
+    for (size_t k = 0; k < root->scaling; k++) s[k] = C[plan->n_used - root->scaling + k];
+    inverse_kernel()(plan, 0, n_steps, steps, C, X, work);
 }

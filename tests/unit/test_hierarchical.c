@@ -172,6 +172,48 @@ START_TEST(it_wants_to_know_where_elements_are) {
 }
 END_TEST
 
+/* Some elements, chosen in any sequence, more than once, or more than there are, are what they are among all.
+ */
+START_TEST(some_elements) {
+    static const size_t counts[] = {1, 3, 40, 2500};
+    closed s = closed_make(room, 20, .5f);
+    const build_problem *problem = of(&s);
+    const size_t n = problem->n;
+    build_report report;
+    lam_operator *op = build(problem, .05, &report);
+    const size_t bytes = lam_operator_work_bytes(op, 3);
+    void *work = test_allocate(1, bytes);
+    float *E = test_allocate(3 * n, sizeof *E), *all = test_allocate(3 * n, sizeof *all),
+          *some = test_allocate(3 * 2500, sizeof *some);
+    uint32_t *which = test_allocate(2500, sizeof *which);
+    uint64_t seed = 4;
+    ck_assert_uint_eq(n, 2400);
+    E[n / 7] = 2; /* one element, a wall, all over */
+    for (size_t i = 0; i < n; i++) {
+        E[n + i] = problem->normal[i][2] > .5f ? 1 : 0;
+        E[2 * n + i] = (float)random_unit(&seed);
+    }
+    ck_ok(lam_operator_apply(op, 3, LAM_INDIRECT, E, all, work, bytes, &error));
+    for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) {
+        for (size_t r = 0; r < counts[k]; r++) which[r] = (uint32_t)(random_unit(&seed) * (double)n);
+        if (counts[k] == 3) which[2] = which[0];
+        memset(work, 0xA5, bytes);
+        ck_ok(lam_operator_apply_selected(op, 3, LAM_INDIRECT, E, NULL, counts[k], which, some, work, bytes,
+                                          &error));
+        for (size_t v = 0; v < 3; v++)
+            for (size_t r = 0; r < counts[k]; r++) ck_each(some[v * counts[k] + r] == all[v * n + which[r]]);
+        ck_assert(some[0] > 0);
+    }
+    free(E);
+    free(all);
+    free(some);
+    free(which);
+    free(work);
+    lam_operator_close(op);
+    closed_free(&s);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("hierarchical");
     TCase *tests = tcase_create("operator");
@@ -179,6 +221,7 @@ int main(void) {
     tcase_add_test(tests, epsilon_is_what_it_costs);
     tcase_add_test(tests, black_and_white);
     tcase_add_test(tests, noise_sets_the_threshold);
+    tcase_add_test(tests, some_elements);
     tcase_add_test(tests, it_wants_to_know_where_elements_are);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
