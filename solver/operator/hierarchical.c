@@ -3,6 +3,7 @@
  * is left. */
 #include "solver/operator/hierarchical.h"
 
+#include "solver/operator/even_light.h"
 #include "solver/operator/sliced.h"
 #include "solver/operator/sparse_product.h"
 #include "solver/operator/wavelet_plan.h"
@@ -23,6 +24,7 @@ typedef struct hierarchical {
     sliced_rows *fast; /* [C], the rows of K */
     float *root_area;  /* [n] A^1/2, by position */
     float *left;       /* [C][n] rho' A^-1/2, by position */
+    even_light even;
 } hierarchical;
 
 void hierarchical_arrays_free(hierarchical_arrays *arrays, size_t n_channels) {
@@ -40,6 +42,7 @@ static void hierarchical_destroy(lam_operator *op) {
     free(self->K);
     free(self->root_area);
     free(self->left);
+    even_light_free(&self->even);
     wavelet_plan_free(&self->plan);
     wavelets_free(&self->basis);
 }
@@ -70,6 +73,30 @@ static lam_status start(size_t n, size_t n_channels, const float *reflectance, c
     self = NULL;
 done:
     if (self != NULL) lam_operator_close(&self->base);
+    return status;
+}
+
+/* With what it lacks of even light. */
+static lam_status lift_even_light(hierarchical *self, lam_error *error) {
+    const size_t n = self->base.n, C = self->base.n_channels;
+    float *by = NULL;
+    if (self->even.missing == NULL) return LAM_OK;
+    by = memory_allocate(C, n * sizeof *by, "operator", error);
+    if (by == NULL) return LAM_ERR_MEMORY;
+    for (size_t c = 0; c < C; c++)
+        for (size_t p = 0; p < n; p++) by[c * n + p] = operator_reflectance_or_one(&self->base, c, p);
+    const lam_status status = even_light_lift(&self->even, by, error);
+    free(by);
+    return status;
+}
+
+lam_status operator_hierarchical_make_up(lam_operator *op, const double *missing, const double *light,
+                                         lam_error *error) {
+    lam_status status = LAM_OK;
+    hierarchical *self = (hierarchical *)op;
+    TRY(even_light_create(op->n, op->n_channels, missing, light, &self->even, error));
+    TRY(lift_even_light(self, error));
+done:
     return status;
 }
 
@@ -152,6 +179,8 @@ static lam_status hierarchical_load(store *s, size_t n, size_t n_channels, const
         snprintf(group, sizeof group, "/operator/K/%zu", c);
         TRY(half_matrix_load(s, group, n, &self->K[c], error));
     }
+    TRY(even_light_load(s, n, n_channels, &self->even, error));
+    TRY(lift_even_light(self, error));
     TRY(finish(self, error));
     *op = &self->base;
     self = NULL;
@@ -171,6 +200,7 @@ static lam_status hierarchical_save(const lam_operator *op, store *s, lam_error 
         snprintf(group, sizeof group, "/operator/K/%zu", c);
         TRY(half_matrix_save(&self->K[c], group, s, error));
     }
+    TRY(even_light_save(&self->even, s, error));
 done:
     return status;
 }
@@ -247,6 +277,11 @@ static void apply(const lam_operator *op, bool adjoint, size_t n_rhs, const floa
         multiply_core(self, c, n_rhs, from, to, side, work);
         wavelet_plan_inverse(plan, n_rhs, to, X, slots, n_threads);
         scale(n_rhs, n, adjoint ? root : left, X, n, out + c * n, C * n, n_threads);
+        for (size_t v = 0; v < n_rhs; v++) {
+            const size_t row = (v * C + c) * n;
+            const double sum = even_light_sum(&self->even, c, adjoint, root, in + row);
+            even_light_add(&self->even, c, adjoint, root, sum, out + row);
+        }
     }
 }
 
@@ -295,9 +330,13 @@ static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, co
             else if (some)
                 sliced_multiply_rows(&self->fast[c], n_rows, rows, from + v * used, to);
             if (some) wavelet_plan_inverse_some(plan, n_steps, steps, to, X + v * n, slots);
+            const even_light *even = &self->even;
+            const float *lift = even->missing != NULL ? even->lift + c * n : NULL;
+            const float sum = (float)even_light_sum(even, c, false, self->root_area, E + (v * C + c) * n);
             for (size_t r = 0; r < n_selected; r++) {
                 const size_t p = operator_position(op, selected[r]);
-                P[(v * C + c) * n_selected + r] = left[p] * X[v * n + p];
+                const float found = left[p] * X[v * n + p];
+                P[(v * C + c) * n_selected + r] = lift != NULL ? found + sum * lift[p] : found;
             }
         }
     }
@@ -317,6 +356,7 @@ static void hierarchical_describe(const lam_operator *op, operator_description *
         description->bytes +=
             (self->plan.n_used + 1) * sizeof(uint64_t) + stored * (sizeof(uint32_t) + sizeof(float));
     }
+    description->bytes += even_light_bytes(&self->even);
     description->bytes += wavelet_plan_bytes(&self->plan) + (1 + op->n_channels) * op->n * sizeof(float);
     description->precision = "f16"; /* of K in the store */
     description->density = entries / whole;

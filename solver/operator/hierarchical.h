@@ -22,6 +22,12 @@ lam_status operator_hierarchical_create(size_t n, size_t n_channels, const float
                                         const double *area, const uint32_t *order,
                                         hierarchical_arrays *arrays, lam_operator **op, lam_error *error);
 
+/* H += missing (sum_j A_j E_j) / light from now on (even_light.h): missing [C][n], by position, is what op
+ * lacks of the irradiance that a light E0 brings, light [C] the area-weighted sum of E0. Once at most.
+ * Errors: as even_light_create. */
+lam_status operator_hierarchical_make_up(lam_operator *op, const double *missing, const double *light,
+                                         lam_error *error);
+
 /* --- half a symmetric matrix in a store: hierarchical_store.c ------------------------------------------ */
 
 /* A symmetric matrix with its numbers in half precision, times scale. */

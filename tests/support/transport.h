@@ -147,7 +147,30 @@ static inline double transport_area(size_t element) {
     return root * root;
 }
 
-/* P = R' A^-1/2 W^T K W A^1/2, K random, symmetric and of few numbers, which half precision has. */
+/* P += R' missing 1^T A / light, missing of numbers that half precision has. */
+static inline void make_up_for_even_light(transport *t, const double *area, uint64_t *state) {
+    lam_error error = {.message = ""};
+    const size_t n = t->n, C = t->n_channels;
+    double *missing = test_allocate(C * n, sizeof *missing), *light = test_allocate(C, sizeof *light);
+    for (size_t c = 0; c < C; c++) {
+        light[c] = 50 + 100 * random_unit(state);
+        for (size_t p = 0; p < n; p++) missing[c * n + p] = floor(64 * random_unit(state) - 24) / 64;
+        for (size_t p = 0; p < n; p++)
+            for (size_t q = 0; q < n; q++) {
+                const size_t i = t->order != NULL ? t->order[p] : p, j = t->order != NULL ? t->order[q] : q;
+                const double by = rho_or_one(t->reflectance[c * n + i]) * missing[c * n + p];
+                t->P[(c * n + i) * n + j] += by * area[q] / light[c];
+                t->magnitude[(c * n + i) * n + j] += fabs(by) * area[q] / light[c];
+            }
+    }
+    ck_assert_msg(operator_hierarchical_make_up(t->op, missing, light, &error) == LAM_OK, "%s",
+                  error.message);
+    free(missing);
+    free(light);
+}
+
+/* P = R' A^-1/2 W^T K W A^1/2, K random, symmetric and of few numbers, which half precision has; of more
+ * channels it is made up for even light, too. */
 static inline void make_hierarchical(transport *t, uint64_t *state) {
     lam_error error = {.message = ""};
     const size_t n = t->n, C = t->n_channels, square = n * n;
@@ -202,6 +225,7 @@ static inline void make_hierarchical(transport *t, uint64_t *state) {
     ck_assert_msg(
         operator_hierarchical_create(n, C, t->reflectance, area, t->order, &arrays, &t->op, &error) == LAM_OK,
         "%s", error.message);
+    if (C > 1) make_up_for_even_light(t, area, state);
     free(W);
     free(size);
     free(area);

@@ -172,6 +172,43 @@ START_TEST(it_wants_to_know_where_elements_are) {
 }
 END_TEST
 
+/* Many small numbers that are left out are much of the light that is everywhere: it is given back, to E0 all
+ * of it, and a threshold that loses little leaves it as it is. */
+START_TEST(even_light_is_made_up_for) {
+    closed s = closed_make(room, 14, .5f);
+    const build_problem *problem = of(&s);
+    const size_t n = problem->n;
+    float *E = test_allocate(n, sizeof *E), *lit = test_allocate(n, sizeof *lit);
+    uint64_t seed = 8;
+    build_report report;
+    lam_operator *coarse, *fine;
+    /* An open scene: half of every row is gone, here and there, and what is left is noise. */
+    csr F = s.f.F;
+    for (size_t i = 0; i < n; i++)
+        for (uint64_t e = F.indptr[i]; e < F.indptr[i + 1]; e++) {
+            const size_t j = F.indices[e];
+            if ((i + j) * 2654435761u % 1000 < 800) F.data[e] = 0;
+        }
+    coarse = build(problem, .9, &report);
+    ck_assert_ptr_nonnull(strstr(report.reason, "what it lacks of even light is made up for"));
+    /* Half precision, of what was missing. */
+    ck_assert_double_lt(report.uniform_error, 1e-3);
+    for (size_t i = 0; i < n; i++) {
+        lit[i] = (float)random_unit(&seed);
+        E[i] = i % 2 == 0 ? 1.0f : .5f;
+    }
+    ck_assert_double_lt(indirect_error(problem, coarse, E), .1);
+    ck_assert_double_lt(indirect_error(problem, coarse, lit), .2);
+    fine = build(problem, .002, &report);
+    ck_assert_ptr_null(strstr(report.reason, "even light"));
+    free(E);
+    free(lit);
+    lam_operator_close(coarse);
+    lam_operator_close(fine);
+    closed_free(&s);
+}
+END_TEST
+
 /* Some elements, chosen in any sequence, more than once, or more than there are, are what they are among all.
  */
 START_TEST(some_elements) {
@@ -221,6 +258,7 @@ int main(void) {
     tcase_add_test(tests, epsilon_is_what_it_costs);
     tcase_add_test(tests, black_and_white);
     tcase_add_test(tests, noise_sets_the_threshold);
+    tcase_add_test(tests, even_light_is_made_up_for);
     tcase_add_test(tests, some_elements);
     tcase_add_test(tests, it_wants_to_know_where_elements_are);
     suite_add_tcase(suite, tests);
