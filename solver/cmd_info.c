@@ -118,10 +118,10 @@ static void print_text(const json_t *about) {
         print_value(origin[i], json_object_get(provenance, origin[i]));
     if (form_factors == NULL) return;
     print_value("form factors", json_object_get(form_factors, "method"));
-    print_value("kept as", json_object_get(form_factors, "storage"));
     if (json_integer_value(json_object_get(form_factors, "rays")) > 0)
         print_value("rays", json_object_get(form_factors, "rays"));
     print_value("resolution", json_object_get(form_factors, "resolution"));
+    print_value("kept as", json_object_get(form_factors, "storage"));
 }
 
 static lam_status info(const char *path, bool as_json, lam_error *error) {
