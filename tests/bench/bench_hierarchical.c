@@ -25,6 +25,10 @@ enum { MOST_PROBES = 96, ROUNDS = 31 };
 /* Of a lamp, over the scene's largest extent. */
 static const double lamp_width = .24;
 
+/* An answer of light all over, of one element's light, of light all over for some elements. */
+enum { WHOLE, FROM_ONE, FOR_SOME, WAYS, SOME = 100 };
+static const char *const way_names[WAYS] = {"whole", "from_one", "for_some"};
+
 enum { SINGLE, LAMP, RANDOM, GROUPS };
 static const char *const group_names[GROUPS] = {"single", "lamp", "random"};
 
@@ -138,6 +142,35 @@ done:
     return status;
 }
 
+static lam_status time_answers(const bench *b, const lam_operator *op, float *out, void *work, size_t bytes,
+                               lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = b->m.n;
+    double ms[ROUNDS];
+    uint32_t some[SOME];
+    uint64_t state = 9;
+    float *one = calloc(n, sizeof *one);
+    if (one == NULL) die("not enough memory");
+    one[n / 2] = 1;
+    for (size_t k = 0; k < SOME; k++) some[k] = (uint32_t)(unit(&state) * (double)n);
+    for (int way = 0; way < WAYS; way++) {
+        const float *E = way == FROM_ONE ? one : b->E + (b->n_probes - 1) * n;
+        for (size_t round = 0; round < ROUNDS; round++) {
+            const double started = clock_seconds();
+            if (way == FOR_SOME)
+                TRY(lam_operator_apply_selected(op, 1, LAM_RADIOSITY, E, NULL, SOME, some, out, work, bytes,
+                                                error));
+            else
+                TRY(lam_operator_apply(op, 1, LAM_RADIOSITY, E, out, work, bytes, error));
+            ms[round] = 1e3 * (clock_seconds() - started);
+        }
+        printf(",%.3f,%.3f", stats_median(ms, ROUNDS), stats_quantile(ms, ROUNDS, 0));
+    }
+done:
+    free(one);
+    return status;
+}
+
 static lam_status judge(const bench *b, const char *path, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = b->m.n;
@@ -145,7 +178,6 @@ static lam_status judge(const bench *b, const char *path, lam_error *error) {
     operator_description about;
     void *work = NULL;
     float *out = memory_allocate(n, sizeof *out, "bench", error);
-    double ms[ROUNDS];
     if (out == NULL) TRY(LAM_ERR_MEMORY);
     TRY(lam_operator_open(path, &op, error));
     if (op->n != n || op->n_channels != 1) die("a store of other elements, or of colours");
@@ -170,12 +202,8 @@ static lam_status judge(const bench *b, const char *path, lam_error *error) {
         }
         printf(",%.4f,%.4f", mean, most);
     }
-    for (size_t round = 0; round < ROUNDS; round++) {
-        const double started = clock_seconds();
-        TRY(lam_operator_apply(op, 1, LAM_RADIOSITY, b->E + (b->n_probes - 1) * n, out, work, bytes, error));
-        ms[round] = 1e3 * (clock_seconds() - started);
-    }
-    printf(",%.3f,%.3f\n", stats_median(ms, ROUNDS), stats_quantile(ms, ROUNDS, 0));
+    TRY(time_answers(b, op, out, work, bytes, error));
+    printf("\n");
     fflush(stdout);
 done:
     lam_operator_close(op);
@@ -211,7 +239,8 @@ int main(int argc, char **argv) {
     form_factors_free(&f);
     printf("store,n,kind,MB");
     for (int g = 0; g < GROUPS; g++) printf(",%s,%s_most", group_names[g], group_names[g]);
-    printf(",median_ms,best_ms\n");
+    for (int way = 0; way < WAYS; way++) printf(",%s_ms,%s_best_ms", way_names[way], way_names[way]);
+    printf("\n");
     for (int k = 6; k < argc; k++)
         if (judge(&b, argv[k], &error) != LAM_OK) die(error.message);
     mesh_free(&b.m);
