@@ -13,6 +13,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Numbers that a thread scales at once. */
+enum { BLOCK = 8192 };
+
 typedef struct hierarchical {
     lam_operator base;
     wavelets basis;
@@ -243,6 +246,19 @@ static void multiply_core(const hierarchical *self, size_t c, size_t m, const fl
     }
 }
 
+/* to_v = by from_v, element by element. */
+static void scale(size_t m, size_t n, const float *by, const float *from, size_t from_stride, float *to,
+                  size_t to_stride, size_t n_threads) {
+    const size_t blocks = (n + BLOCK - 1) / BLOCK;
+#pragma omp parallel for schedule(static) num_threads((int)n_threads) if (n_threads > 1 && m * blocks > 8)
+    for (size_t k = 0; k < m * blocks; k++) {
+        const size_t v = k / blocks, first = k % blocks * BLOCK, last = first + BLOCK < n ? first + BLOCK : n;
+        const float *x = from + v * from_stride;
+        float *y = to + v * to_stride;
+        for (size_t p = first; p < last; p++) y[p] = by[p] * x[p];
+    }
+}
+
 /* out = left W^T K W right in, left = R' A^-1/2 and right = A^1/2, or transposed. */
 static void apply(const lam_operator *op, bool adjoint, size_t n_rhs, const float *in, float *out,
                   void *work) {
@@ -256,10 +272,11 @@ static void apply(const lam_operator *op, bool adjoint, size_t n_rhs, const floa
     float *side = work_take(&work, sliced_work(plan->n_used, n_rhs) * sizeof *side);
     for (size_t c = 0; c < C; c++) {
         const float *left = self->left + c * n, *root = self->root_area;
-        const plan_vectors before = {adjoint ? left : root, C * n}, after = {adjoint ? root : left, C * n};
-        wavelet_plan_forward(plan, n_rhs, before, in + c * n, X, from, slots, n_threads);
+        scale(n_rhs, n, adjoint ? left : root, in + c * n, C * n, X, n, n_threads);
+        wavelet_plan_forward(plan, n_rhs, X, from, slots, n_threads);
         multiply_core(self, c, n_rhs, from, to, side, work);
-        wavelet_plan_inverse(plan, n_rhs, after, to, X, out + c * n, slots, n_threads);
+        wavelet_plan_inverse(plan, n_rhs, to, X, slots, n_threads);
+        scale(n_rhs, n, adjoint ? root : left, X, n, out + c * n, C * n, n_threads);
         for (size_t v = 0; v < n_rhs; v++) {
             const size_t row = (v * C + c) * n;
             const double sum = even_light_sum(&self->even, c, adjoint, root, in + row);
@@ -301,11 +318,11 @@ static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, co
     for (size_t c = 0; c < C; c++) {
         const csr *K = &self->K[c].rows;
         const float *left = self->left + c * n;
-        wavelet_plan_forward(plan, n_rhs, (plan_vectors){self->root_area, C * n}, E + c * n, X, from, slots,
-                             n_threads);
+        scale(n_rhs, n, self->root_area, E + c * n, C * n, X, n, n_threads);
+        wavelet_plan_forward(plan, n_rhs, X, from, slots, n_threads);
         if (!some) {
             multiply_core(self, c, n_rhs, from, to, side, work);
-            wavelet_plan_inverse(plan, n_rhs, (plan_vectors){left, n}, to, X, X, slots, n_threads);
+            wavelet_plan_inverse(plan, n_rhs, to, X, slots, n_threads);
         }
         for (size_t v = 0; v < n_rhs; v++) {
             if (some && sparse_product_by_columns(K, from + v * used))
@@ -318,7 +335,7 @@ static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, co
             const float sum = (float)even_light_sum(even, c, false, self->root_area, E + (v * C + c) * n);
             for (size_t r = 0; r < n_selected; r++) {
                 const size_t p = operator_position(op, selected[r]);
-                const float found = some ? left[p] * X[v * n + p] : X[v * n + p];
+                const float found = left[p] * X[v * n + p];
                 P[(v * C + c) * n_selected + r] = lift != NULL ? found + sum * lift[p] : found;
             }
         }

@@ -301,15 +301,8 @@ static void leave_dark(const wavelet_plan *plan, const wavelet_piece *piece, flo
     memset(s + (piece->last - 1) * WAVELET_SCALING, 0, WAVELET_SCALING * sizeof *s);
 }
 
-/* to = by from, where a piece is. */
-static void scale_piece(const wavelet_plan *plan, const wavelet_piece *piece, const float *by,
-                        const float *from, float *to) {
-    const plan_step *top = &plan->steps[piece->last - 1];
-    for (size_t p = top->begin; p < (size_t)top->begin + top->count; p++) to[p] = by[p] * from[p];
-}
-
-void wavelet_plan_forward(const wavelet_plan *plan, size_t m, plan_vectors of, const float *in, float *X,
-                          float *C, float *work, size_t n_threads) {
+void wavelet_plan_forward(const wavelet_plan *plan, size_t m, const float *X, float *C, float *work,
+                          size_t n_threads) {
     transform *const run = forward_kernel();
     const size_t room = wavelet_plan_work(plan), n_pieces = plan->n_pieces;
     const plan_step *root = &plan->steps[plan->n_steps - 1];
@@ -318,13 +311,11 @@ void wavelet_plan_forward(const wavelet_plan *plan, size_t m, plan_vectors of, c
     for (size_t k = 0; k < m * n_pieces; k++) {
         const size_t v = k / n_pieces;
         const wavelet_piece *piece = &plan->pieces[k % n_pieces];
-        float *const x = X + v * plan->n, *const c = C + v * plan->n_used, *const s = work + v * room;
-        if (is_dark(plan, piece, in + v * of.stride)) {
-            leave_dark(plan, piece, c, s);
-            continue;
-        }
-        scale_piece(plan, piece, of.by, in + v * of.stride, x);
-        run(plan, piece->first, piece->last, NULL, x, c, s);
+        if (is_dark(plan, piece, X + v * plan->n))
+            leave_dark(plan, piece, C + v * plan->n_used, work + v * room);
+        else
+            run(plan, piece->first, piece->last, NULL, X + v * plan->n, C + v * plan->n_used,
+                work + v * room);
     }
     for (size_t v = 0; v < m; v++) {
         float *c = C + v * plan->n_used;
@@ -334,8 +325,8 @@ void wavelet_plan_forward(const wavelet_plan *plan, size_t m, plan_vectors of, c
     }
 }
 
-void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, plan_vectors of, const float *C, float *X,
-                          float *out, float *work, size_t n_threads) {
+void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, float *X, float *work,
+                          size_t n_threads) {
     transform *const run = inverse_kernel();
     const size_t room = wavelet_plan_work(plan), n_pieces = plan->n_pieces;
     const plan_step *root = &plan->steps[plan->n_steps - 1];
@@ -350,9 +341,7 @@ void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, plan_vectors of, c
     for (size_t k = 0; k < m * n_pieces; k++) {
         const size_t v = k / n_pieces;
         const wavelet_piece *piece = &plan->pieces[k % n_pieces];
-        float *const x = X + v * plan->n;
-        run(plan, piece->first, piece->last, NULL, C + v * plan->n_used, x, work + v * room);
-        scale_piece(plan, piece, of.by, x, out + v * of.stride);
+        run(plan, piece->first, piece->last, NULL, C + v * plan->n_used, X + v * plan->n, work + v * room);
     }
 }
 

@@ -40,19 +40,14 @@ static inline size_t wavelet_plan_work(const wavelet_plan *plan) {
     return plan->n_steps * WAVELET_SCALING;
 }
 
-/* Vectors whose numbers are taken, or put down, times those of by [n]: vector v begins at v stride. */
-typedef struct plan_vectors {
-    const float *by;
-    size_t stride;
-} plan_vectors;
-
-/* C_v = W (by in_v) without what is not in use, C_v = C + v n_used; and out_v = by (W^T C_v). X, [m][n], gets
- * what is transformed, but for parts that are 0, which are passed over. The bits depend on neither m nor
- * n_threads. */
-void wavelet_plan_forward(const wavelet_plan *plan, size_t m, plan_vectors of, const float *in, float *X,
-                          float *C, float *work, size_t n_threads);
-void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, plan_vectors of, const float *C, float *X,
-                          float *out, float *work, size_t n_threads);
+/* What is 0 in X is passed over.
+ *
+ * C_v = W X_v without what is not in use: X_v = X + v n, C_v = C + v n_used; and X_v = W^T C_v. The bits
+ * depend on neither m nor n_threads. */
+void wavelet_plan_forward(const wavelet_plan *plan, size_t m, const float *X, float *C, float *work,
+                          size_t n_threads);
+void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, float *X, float *work,
+                          size_t n_threads);
 
 /* The steps that some positions are made by, ascending: out has room for n_steps, flags [n_steps] are 0 and
  * are 0 again. Returns their number. */

@@ -89,24 +89,13 @@ static inline void subject_free(subject *s) {
     wavelets_free(&s->basis);
 }
 
-/* m vectors through a plan or back, times `by` where they are by position; NULL: as they are. */
-static inline void run_plan(const wavelet_plan *plan, bool back, size_t m, const float *by, const float *from,
-                            float *to, size_t n_threads) {
-    float *work = test_allocate(m * wavelet_plan_work(plan), sizeof *work),
-          *X = test_allocate(m * plan->n, sizeof *X), *ones = test_allocate(plan->n, sizeof *ones);
-    for (size_t p = 0; p < plan->n; p++) ones[p] = 1;
-    const plan_vectors of = {by != NULL ? by : ones, plan->n};
-    if (back)
-        wavelet_plan_inverse(plan, m, of, from, X, to, work, n_threads);
-    else
-        wavelet_plan_forward(plan, m, of, from, X, to, work, n_threads);
-    free(work);
-    free(X);
-    free(ones);
-}
-
 static inline void transform(const subject *s, bool back, const float *from, float *to) {
-    run_plan(&s->plan, back, 1, NULL, from, to, 1);
+    float *work = test_allocate(wavelet_plan_work(&s->plan), sizeof *work);
+    if (back)
+        wavelet_plan_inverse(&s->plan, 1, from, to, work, 1);
+    else
+        wavelet_plan_forward(&s->plan, 1, from, to, work, 1);
+    free(work);
 }
 
 /* Column by column. */
