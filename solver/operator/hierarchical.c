@@ -112,7 +112,7 @@ static lam_status finish(hierarchical *self, lam_error *error) {
     TRY(wavelet_plan_create(&self->basis, used, &self->plan, error));
     for (size_t c = 0; c < C; c++) {
         TRY(half_matrix_compact(&self->K[c], self->plan.coefficient, self->plan.n_used, error));
-        TRY(sliced_create(&self->K[c].rows, &self->fast[c], error));
+        TRY(sliced_create(&self->K[c].rows, self->K[c].scale, &self->fast[c], error));
     }
 done:
     free(used);
@@ -353,8 +353,7 @@ static void hierarchical_describe(const lam_operator *op, operator_description *
     for (size_t c = 0; c < op->n_channels; c++) {
         const size_t stored = (size_t)self->K[c].rows.indptr[self->plan.n_used];
         entries += (double)stored;
-        description->bytes +=
-            (self->plan.n_used + 1) * sizeof(uint64_t) + stored * (sizeof(uint32_t) + sizeof(float));
+        description->bytes += sliced_bytes(&self->fast[c]);
     }
     description->bytes += even_light_bytes(&self->even);
     description->bytes += wavelet_plan_bytes(&self->plan) + (1 + op->n_channels) * op->n * sizeof(float);

@@ -2,10 +2,10 @@
 #include "solver/operator/panel_kernels.h"
 
 #include "solver/operator/half.h"
+#include "solver/operator/instruction_sets.h"
 
 #include <string.h>
 #if defined(__x86_64__)
-#include <cpuid.h>
 #include <immintrin.h>
 #endif
 
@@ -89,21 +89,12 @@ __attribute__((target("avx512f"))) static inline float lane_sum_avx512(__m512 x)
 #include "solver/operator/panel_kernels_each.h"
 #endif
 
-#if defined(__x86_64__)
-/* __builtin_cpu_supports does not know it everywhere. */
-static bool has_f16c(void) {
-    unsigned a, b, c, d;
-    return __get_cpuid(1, &a, &b, &c, &d) != 0 && (c & bit_F16C) != 0;
-}
-#endif
-
 const panel_kernels *panel_kernels_available(size_t index) {
     const panel_kernels *available[3];
     size_t count = 0;
 #if defined(__x86_64__)
     if (__builtin_cpu_supports("avx512f")) available[count++] = &kernels_avx512;
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && has_f16c())
-        available[count++] = &kernels_avx2;
+    if (cpu_has_avx2_set()) available[count++] = &kernels_avx2;
 #endif
     available[count++] = &kernels_portable;
     return index < count ? available[index] : NULL;

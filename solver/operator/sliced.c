@@ -1,5 +1,9 @@
 #include "solver/operator/sliced.h"
 
+#include "solver/operator/half.h"
+#include "solver/operator/instruction_sets.h"
+
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,8 +19,11 @@ void sliced_free(sliced_rows *s) {
     free(s->slice_of);
     free(s->long_rows);
     free(s->empty_rows);
+    free(s->long_begin);
     free(s->indices);
     free(s->data);
+    free(s->half_indices);
+    free(s->halves);
     *s = (sliced_rows){.n_slices = 0};
 }
 
@@ -36,23 +43,67 @@ static void sort_rows(const csr *a, uint32_t *sorted, size_t begin[SHORT + 2]) {
         if (length_of(a, i) <= SHORT) sorted[next[length_of(a, i)]++] = (uint32_t)i;
 }
 
-static void fill_slice(const csr *a, const uint32_t *rows, size_t count, sliced_rows *s, slice *to) {
-    for (size_t lane = 0; lane < SLICE_ROWS; lane++) {
-        const uint32_t i = rows[lane < count ? lane : count - 1];
-        const uint64_t from = a->indptr[i];
-        to->row[lane] = i;
-        for (size_t k = 0; k < to->length; k++) {
-            s->indices[to->begin + k * SLICE_ROWS + lane] = a->indices[from + k];
-            s->data[to->begin + k * SLICE_ROWS + lane] = a->data[from + k];
-        }
+/* Whether all numbers are scale, a power of two, times halves, and indices are of 16 bits. */
+static bool fits_halves(const csr *a, float scale) {
+    int exponent;
+    if (a->n > UINT16_MAX + (size_t)1 || !(scale > 0) || frexpf(scale, &exponent) != .5f) return false;
+    for (uint64_t e = 0; e < a->indptr[a->n]; e++)
+        if (scale * float_of_half(half_of_float(a->data[e] / scale)) != a->data[e]) return false;
+    return true;
+}
+
+/* Entry `from` of all becomes entry `to`. */
+static void put(sliced_rows *s, uint64_t to, uint64_t from) {
+    if (s->halves != NULL) {
+        s->half_indices[to] = (uint16_t)s->all->indices[from];
+        s->halves[to] = half_of_float(s->all->data[from] / s->scale);
+    } else {
+        s->indices[to] = s->all->indices[from];
+        s->data[to] = s->all->data[from];
     }
 }
 
-lam_status sliced_create(const csr *a, sliced_rows *out, lam_error *error) {
+static void fill_slice(const csr *a, const uint32_t *rows, size_t count, sliced_rows *s, slice *to) {
+    for (size_t lane = 0; lane < SLICE_ROWS; lane++) {
+        const uint32_t i = rows[lane < count ? lane : count - 1];
+        to->row[lane] = i;
+        for (size_t k = 0; k < to->length; k++) put(s, to->begin + k * SLICE_ROWS + lane, a->indptr[i] + k);
+    }
+}
+
+/* Room for the slices' entries and, of halves, those of long rows behind them. */
+static lam_status reserve(sliced_rows *s, size_t entries, size_t long_entries, bool halves,
+                          lam_error *error) {
+    if (halves) {
+        s->half_indices = memory_allocate(entries + long_entries, sizeof *s->half_indices, "operator", error);
+        s->halves = memory_allocate(entries + long_entries, sizeof *s->halves, "operator", error);
+        return s->half_indices != NULL && s->halves != NULL ? LAM_OK : LAM_ERR_MEMORY;
+    }
+    s->indices = memory_allocate(entries, sizeof *s->indices, "operator", error);
+    s->data = memory_allocate(entries, sizeof *s->data, "operator", error);
+    return s->indices != NULL && s->data != NULL ? LAM_OK : LAM_ERR_MEMORY;
+}
+
+/* Where long rows begin; entries: of slices. */
+static void place_long(sliced_rows *s, uint64_t entries) {
+    const csr *a = s->all;
+    for (size_t i = 0; i < a->n; i++) {
+        if (length_of(a, i) <= SHORT) continue;
+        const size_t k = s->n_long++;
+        s->slice_of[i] = SLICE_LONG | (uint32_t)k;
+        s->long_rows[k] = (uint32_t)i;
+        s->long_begin[k] = s->halves != NULL ? entries : a->indptr[i];
+        if (s->halves == NULL) continue;
+        for (size_t e = 0; e < length_of(a, i); e++) put(s, entries++, a->indptr[i] + e);
+    }
+}
+
+lam_status sliced_create(const csr *a, float scale, sliced_rows *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = a->n;
-    size_t begin[SHORT + 2], entries = 0, n_slices = 0;
-    sliced_rows made = {.all = a};
+    const bool halves = fits_halves(a, scale);
+    size_t begin[SHORT + 2], entries = 0, in_short = 0, n_slices = 0;
+    sliced_rows made = {.all = a, .scale = halves ? scale : 1};
     uint32_t *sorted = memory_allocate(n, sizeof *sorted, "operator", error);
     if (sorted == NULL) TRY(LAM_ERR_MEMORY);
     sort_rows(a, sorted, begin);
@@ -60,19 +111,19 @@ lam_status sliced_create(const csr *a, sliced_rows *out, lam_error *error) {
         const size_t slices = (begin[l + 1] - begin[l] + SLICE_ROWS - 1) / SLICE_ROWS;
         n_slices += slices;
         entries += slices * l * SLICE_ROWS;
+        in_short += (begin[l + 1] - begin[l]) * l;
     }
     made.slices = memory_allocate(n_slices, sizeof *made.slices, "operator", error);
     made.slice_of = memory_allocate(n, sizeof *made.slice_of, "operator", error);
     made.long_rows = memory_allocate(n - begin[SHORT + 1], sizeof *made.long_rows, "operator", error);
+    made.long_begin = memory_allocate(n - begin[SHORT + 1], sizeof *made.long_begin, "operator", error);
     made.empty_rows = memory_allocate(begin[1], sizeof *made.empty_rows, "operator", error);
-    made.indices = memory_allocate(entries, sizeof *made.indices, "operator", error);
-    made.data = memory_allocate(entries, sizeof *made.data, "operator", error);
-    if (made.slices == NULL || made.slice_of == NULL || made.long_rows == NULL || made.empty_rows == NULL ||
-        made.indices == NULL || made.data == NULL)
+    if (made.slices == NULL || made.slice_of == NULL || made.long_rows == NULL || made.long_begin == NULL ||
+        made.empty_rows == NULL)
         TRY(LAM_ERR_MEMORY);
+    TRY(reserve(&made, entries, (size_t)a->indptr[n] - in_short, halves, error));
     for (size_t i = 0; i < n; i++) made.slice_of[i] = SLICE_NONE;
-    for (size_t i = 0; i < n; i++)
-        if (length_of(a, i) > SHORT) made.long_rows[made.n_long++] = (uint32_t)i;
+    place_long(&made, entries);
     made.n_empty = begin[1];
     memcpy(made.empty_rows, sorted, begin[1] * sizeof *sorted);
     uint64_t used = 0;
@@ -100,144 +151,56 @@ static float sum_of_turns(float turns[SLICE_ROWS]) {
     return turns[0];
 }
 
-/* --- one vector: a lane for each row -------------------------------------------------------------------- */
-
-typedef void multiply_slices(const sliced_rows *s, size_t first, size_t last, const float *x, float *y);
-
-/* A long row: sixteen sums take turns. */
-typedef float multiply_long(const uint32_t *indices, const float *data, size_t count, const float *x);
-
-static float long_portable(const uint32_t *indices, const float *data, size_t count, const float *x) {
-    float turns[SLICE_ROWS] = {0};
-    for (size_t e = 0; e < count; e++) turns[e % SLICE_ROWS] += data[e] * x[indices[e]];
-    return sum_of_turns(turns);
-}
-
-static void slices_portable(const sliced_rows *s, size_t first, size_t last, const float *x, float *y) {
-    for (size_t k = first; k < last; k++) {
-        const slice *t = &s->slices[k];
-        float sums[SLICE_ROWS] = {0};
-        for (size_t e = 0; e < t->length; e++)
-            for (size_t lane = 0; lane < SLICE_ROWS; lane++) {
-                const uint64_t at = t->begin + e * SLICE_ROWS + lane;
-                sums[lane] += s->data[at] * x[s->indices[at]];
-            }
-        for (size_t lane = 0; lane < SLICE_ROWS; lane++) y[t->row[lane]] = sums[lane];
-    }
-}
-
-#if defined(__x86_64__)
-__attribute__((target("avx2,fma"))) static void slices_avx2(const sliced_rows *s, size_t first, size_t last,
-                                                            const float *x, float *y) {
-    for (size_t k = first; k < last; k++) {
-        const slice *t = &s->slices[k];
-        __m256 low = _mm256_setzero_ps(), high = low;
-        float sums[SLICE_ROWS];
-        for (size_t e = 0; e < t->length; e++) {
-            const uint64_t at = t->begin + e * SLICE_ROWS;
-            const __m256i j = _mm256_loadu_si256((const __m256i *)(const void *)(s->indices + at));
-            const __m256i l = _mm256_loadu_si256((const __m256i *)(const void *)(s->indices + at + 8));
-            low = _mm256_fmadd_ps(_mm256_loadu_ps(s->data + at), _mm256_i32gather_ps(x, j, 4), low);
-            high = _mm256_fmadd_ps(_mm256_loadu_ps(s->data + at + 8), _mm256_i32gather_ps(x, l, 4), high);
-        }
-        _mm256_storeu_ps(sums, low);
-        _mm256_storeu_ps(sums + 8, high);
-        for (size_t lane = 0; lane < SLICE_ROWS; lane++) y[t->row[lane]] = sums[lane];
-    }
-}
-
-__attribute__((target("avx2,fma"))) static float long_avx2(const uint32_t *indices, const float *data,
-                                                           size_t count, const float *x) {
-    __m256 low = _mm256_setzero_ps(), high = low;
-    float turns[SLICE_ROWS];
-    size_t e = 0;
-    for (; e + SLICE_ROWS <= count; e += SLICE_ROWS) {
-        const __m256i j = _mm256_loadu_si256((const __m256i *)(const void *)(indices + e));
-        const __m256i l = _mm256_loadu_si256((const __m256i *)(const void *)(indices + e + 8));
-        low = _mm256_fmadd_ps(_mm256_loadu_ps(data + e), _mm256_i32gather_ps(x, j, 4), low);
-        high = _mm256_fmadd_ps(_mm256_loadu_ps(data + e + 8), _mm256_i32gather_ps(x, l, 4), high);
-    }
-    _mm256_storeu_ps(turns, low);
-    _mm256_storeu_ps(turns + 8, high);
-    for (size_t k = 0; e < count; e++, k++) turns[k] = __builtin_fmaf(data[e], x[indices[e]], turns[k]);
-    return sum_of_turns(turns);
-}
-
-__attribute__((target("avx512f,fma"))) static float long_avx512(const uint32_t *indices, const float *data,
-                                                                size_t count, const float *x) {
-    __m512 sum = _mm512_setzero_ps();
-    float turns[SLICE_ROWS];
-    size_t e = 0;
-    for (; e + SLICE_ROWS <= count; e += SLICE_ROWS)
-        sum = _mm512_fmadd_ps(_mm512_loadu_ps(data + e),
-                              _mm512_i32gather_ps(_mm512_loadu_si512(indices + e), x, 4), sum);
-    _mm512_storeu_ps(turns, sum);
-    for (size_t k = 0; e < count; e++, k++) turns[k] = __builtin_fmaf(data[e], x[indices[e]], turns[k]);
-    return sum_of_turns(turns);
-}
-
-__attribute__((target("avx512f,fma"))) static void slices_avx512(const sliced_rows *s, size_t first,
-                                                                 size_t last, const float *x, float *y) {
-    for (size_t k = first; k < last; k++) {
-        const slice *t = &s->slices[k];
-        __m512 sum = _mm512_setzero_ps();
-        for (size_t e = 0; e < t->length; e++) {
-            const uint64_t at = t->begin + e * SLICE_ROWS;
-            const __m512i j = _mm512_loadu_si512(s->indices + at);
-            sum = _mm512_fmadd_ps(_mm512_loadu_ps(s->data + at), _mm512_i32gather_ps(j, x, 4), sum);
-        }
-        _mm512_i32scatter_ps(y, _mm512_loadu_si512(t->row), sum, 4);
-    }
-}
-#endif
-
-/* --- several: a lane for each vector ---------------------------------------------------------------------
- */
+/* --- kernels ------------------------------------------------------------------------------------------- */
 
 enum { WIDTH = 16 };
 
-typedef void multiply_wide(const sliced_rows *s, size_t first, size_t last, size_t m, const float *side,
-                           float *Y);
-typedef void multiply_long_wide(const uint32_t *indices, const float *data, size_t count, const float *side,
-                                float *sums);
+/* One vector: some slices, a long row; several: the same, side being [n][WIDTH]. */
+typedef struct kernels {
+    void (*one)(const sliced_rows *s, size_t first, size_t last, const float *x, float *y);
+    float (*one_long)(const sliced_rows *s, size_t k, const float *x);
+    void (*wide)(const sliced_rows *s, size_t first, size_t last, size_t m, const float *side, float *Y);
+    void (*wide_long)(const sliced_rows *s, size_t k, const float *side, float *sums);
+} kernels;
 
-#define KERNEL(name) name##_portable
-#define TARGET
-#define SCALAR_FMA(a, b, c) ((c) + (a) * (b))
-#include "solver/operator/sliced_wide.h"
+#define TARGET_AVX2 __attribute__((target("avx2,fma,f16c")))
+#define TARGET_AVX512 __attribute__((target("avx512f,fma,f16c")))
 
-#if defined(__x86_64__)
-#define KERNEL(name) name##_avx2
-#define TARGET __attribute__((target("avx2,fma")))
-#define SCALAR_FMA(a, b, c) __builtin_fmaf(a, b, c)
-#include "solver/operator/sliced_wide.h"
+#define FORM(name) name##_floats
+#define INDEX uint32_t
+#define VALUE float
+#define VALUE_OF(v) (v)
+#define INDICES(s) ((s)->indices)
+#define VALUES(s) ((s)->data)
+#define LONG_INDICES(s) ((s)->all->indices)
+#define LONG_VALUES(s) ((s)->all->data)
+#define INDEX_8(p) _mm256_loadu_si256((const __m256i *)(const void *)(p))
+#define VALUE_8(p) _mm256_loadu_ps(p)
+#define INDEX_16(p) _mm512_loadu_si512(p)
+#define VALUE_16(p) _mm512_loadu_ps(p)
+#include "solver/operator/sliced_kernels.h"
 
-#define KERNEL(name) name##_avx512
-#define TARGET __attribute__((target("avx512f,fma")))
-#define SCALAR_FMA(a, b, c) __builtin_fmaf(a, b, c)
-#include "solver/operator/sliced_wide.h"
-#endif
+#define FORM(name) name##_halves
+#define INDEX uint16_t
+#define VALUE uint16_t
+#define VALUE_OF(v) float_of_half(v)
+#define INDICES(s) ((s)->half_indices)
+#define VALUES(s) ((s)->halves)
+#define LONG_INDICES(s) ((s)->half_indices)
+#define LONG_VALUES(s) ((s)->halves)
+#define INDEX_8(p) _mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)(const void *)(p)))
+#define VALUE_8(p) _mm256_cvtph_ps(_mm_loadu_si128((const __m128i *)(const void *)(p)))
+#define INDEX_16(p) _mm512_cvtepu16_epi32(_mm256_loadu_si256((const __m256i *)(const void *)(p)))
+#define VALUE_16(p) _mm512_cvtph_ps(_mm256_loadu_si256((const __m256i *)(const void *)(p)))
+#include "solver/operator/sliced_kernels.h"
+
+/* The fastest for this CPU and these numbers. */
+static kernels kernels_for(const sliced_rows *s) {
+    return s->halves != NULL ? kernels_of_cpu_halves() : kernels_of_cpu_floats();
+}
 
 /* --- all of it -------------------------------------------------------------------------------------------
  */
-
-typedef struct kernels {
-    multiply_slices *one;
-    multiply_long *one_long;
-    multiply_wide *wide;
-    multiply_long_wide *wide_long;
-} kernels;
-
-static kernels kernels_of_cpu(void) {
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-        const bool avx512 = __builtin_cpu_supports("avx512f");
-        return (kernels){avx512 ? slices_avx512 : slices_avx2, avx512 ? long_avx512 : long_avx2,
-                         avx512 ? wide_avx512 : wide_avx2, avx512 ? wide_long_avx512 : wide_long_avx2};
-    }
-#endif
-    return (kernels){slices_portable, long_portable, wide_portable, wide_long_portable};
-}
 
 size_t sliced_work(size_t n, size_t m) {
     return m > 1 ? n * WIDTH : 0;
@@ -245,7 +208,7 @@ size_t sliced_work(size_t n, size_t m) {
 
 void sliced_multiply(const sliced_rows *s, size_t m, const float *X, float *Y, float *work,
                      size_t n_threads) {
-    const kernels run = kernels_of_cpu();
+    const kernels run = kernels_for(s);
     const csr *a = s->all;
     const size_t n = a->n;
     const float *x = m > 1 ? work : X;
@@ -259,13 +222,11 @@ void sliced_multiply(const sliced_rows *s, size_t m, const float *X, float *Y, f
 #pragma omp for schedule(dynamic, 4) nowait
         for (size_t k = 0; k < s->n_long; k++) {
             const uint32_t i = s->long_rows[k];
-            const uint64_t first = a->indptr[i];
-            const size_t count = length_of(a, i);
             float sums[WIDTH];
             if (m > 1)
-                run.wide_long(a->indices + first, a->data + first, count, x, sums);
+                run.wide_long(s, k, x, sums);
             else
-                sums[0] = run.one_long(a->indices + first, a->data + first, count, x);
+                sums[0] = run.one_long(s, k, x);
             for (size_t v = 0; v < m; v++) Y[v * n + i] = sums[v];
         }
 #pragma omp for schedule(dynamic, 1) nowait
@@ -284,15 +245,19 @@ void sliced_multiply(const sliced_rows *s, size_t m, const float *X, float *Y, f
 
 void sliced_multiply_rows(const sliced_rows *s, size_t count, const uint32_t *rows, const float *x,
                           float *y) {
-    const kernels run = kernels_of_cpu();
-    const csr *a = s->all;
+    const kernels run = kernels_for(s);
     for (size_t k = 0; k < count; k++) {
-        const uint32_t i = rows[k];
-        const uint64_t first = a->indptr[i];
-        const size_t length = length_of(a, i);
-        if (s->slice_of[i] != SLICE_NONE)
-            run.one(s, s->slice_of[i], s->slice_of[i] + 1, x, y);
+        const uint32_t i = rows[k], at = s->slice_of[i];
+        if (at == SLICE_NONE)
+            y[i] = 0;
+        else if ((at & SLICE_LONG) != 0)
+            y[i] = run.one_long(s, at & ~SLICE_LONG, x);
         else
-            y[i] = length > 0 ? run.one_long(a->indices + first, a->data + first, length, x) : 0;
+            run.one(s, at, at + 1, x, y);
     }
+}
+
+size_t sliced_bytes(const sliced_rows *s) {
+    const size_t entry = s->halves != NULL ? 2 * sizeof(uint16_t) : sizeof(uint32_t) + sizeof(float);
+    return (size_t)s->all->indptr[s->all->n] * entry + s->n_slices * sizeof *s->slices;
 }

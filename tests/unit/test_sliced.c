@@ -1,4 +1,5 @@
 /* Sparse rows in slices: empty, short and long ones, against double, and the same bits in any batch. */
+#include "solver/operator/half.h"
 #include "solver/operator/sliced.h"
 #include "support/dense.h"
 #include "support/suite.h"
@@ -31,6 +32,9 @@ static csr random_rows(uint64_t *state) {
     return a;
 }
 
+/* None; powers of two, and what is none. */
+static const float scales[] = {0, 1, 0x1p-9f, .3f};
+
 START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
     uint64_t state = 3;
     csr a = random_rows(&state);
@@ -38,7 +42,11 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
     float *X = test_allocate(VECTORS * N, sizeof *X), *one = test_allocate(N, sizeof *one),
           *Y = test_allocate(VECTORS * N, sizeof *Y);
     float *work = aligned_alloc(64, (sliced_work(N, VECTORS) + 16) * sizeof *work);
-    ck_ok(sliced_create(&a, &s, &error));
+    if (_i > 0)
+        for (uint64_t e = 0; e < a.indptr[N]; e++)
+            a.data[e] = scales[_i] * float_of_half(half_of_float(a.data[e] / scales[_i]));
+    ck_ok(sliced_create(&a, scales[_i], &s, &error));
+    ck_assert_int_eq(s.halves != NULL, _i == 1 || _i == 2);
     ck_assert_uint_gt(s.n_long, 3);
     ck_assert_uint_gt(s.n_slices, 20);
     ck_assert_uint_gt(s.n_empty, N / 4);
@@ -64,6 +72,18 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
              * pairs. */
             ck_each(fabs((double)Y[v * N + i] - sum) <= 101 * (FLT_EPSILON / 2) * size);
         }
+    /* In 16 bits and in 32 they are the same, and some rows are what they are among all. */
+    sliced_rows wide;
+    uint32_t rows[40];
+    ck_ok(sliced_create(&a, 0, &wide, &error));
+    sliced_multiply(&wide, 1, X, one, work, 1);
+    sliced_multiply(&s, 1, X, Y, work, 1);
+    ck_assert_mem_eq(one, Y, N * sizeof *one);
+    for (size_t k = 0; k < 40; k++) rows[k] = (uint32_t)(k * 17 + 7 * (k % 3));
+    for (size_t i = 0; i < N; i++) Y[i] = NAN;
+    sliced_multiply_rows(&s, 40, rows, X, Y);
+    for (size_t k = 0; k < 40; k++) ck_assert_float_eq(Y[rows[k]], one[rows[k]]);
+    sliced_free(&wide);
     sliced_free(&s);
     csr_free(&a);
     free(X);
@@ -76,7 +96,8 @@ END_TEST
 int main(void) {
     Suite *suite = suite_create("sliced rows");
     TCase *tests = tcase_create("products");
-    tcase_add_test(tests, products_are_right_and_do_not_depend_on_the_batch);
+    tcase_add_loop_test(tests, products_are_right_and_do_not_depend_on_the_batch, 0,
+                        sizeof scales / sizeof *scales);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
