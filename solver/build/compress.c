@@ -15,10 +15,6 @@ enum { LEAF = 6 };
 /* Subtrees that threads share. */
 enum { PIECES = 24 };
 
-/* F is symmetric but for rounding to single precision: also where one of S_pq and S_qp is kept and the other
- * is below the threshold it counts as lost. */
-static const double beside_threshold = 1 + 1e-5;
-
 /* What an element's light may lack by one number, beside epsilon. */
 static const double share_of_epsilon = 4e-4;
 
@@ -41,6 +37,7 @@ typedef struct compress_job {
     const uint32_t *position;       /* [n], of an element */
     const double *size_of;          /* [n], M of a coefficient's node, over A^1/2 of all */
     const double *share;            /* [n_classes] */
+    const node_sizes *sizes;        /* [n_nodes] */
     double (**up)[WAVELET_SCALING]; /* [n_nodes] -> [n], rows that wait for their sibling */
     double *lost;                   /* [n_nodes][n_classes], squares */
     size_t done, n_kept;
@@ -155,6 +152,8 @@ static lam_status keep(compress_desk *d, size_t i, size_t j, double value, lam_e
 typedef struct meeting {
     double *lost; /* of the row's node and the column's class */
     double least; /* is kept */
+    double
+        beside; /* counts as lost up to there: S_qp, which decides where q comes first, may be as far off */
     size_t q;
 } meeting;
 
@@ -162,7 +161,7 @@ typedef struct meeting {
 static inline lam_status settle(const meeting *at, size_t p, double value, compress_desk *d,
                                 lam_error *error) {
     const double magnitude = fabs(value);
-    if (magnitude < beside_threshold * at->least) *at->lost += value * value;
+    if (magnitude < at->beside) *at->lost += value * value;
     return at->q >= p && magnitude >= at->least ? keep(d, p, at->q, value, error) : LAM_OK;
 }
 
@@ -178,6 +177,7 @@ static lam_status run_node(compress_job *job, size_t t, compress_desk *d, lam_er
      * light has of its column's, either way. */
     const double own_size = job->size_of[root ? w->n - 1 : a->first];
     const double own_share = job->share[class_of[root ? w->n - 1 : a->first]];
+    const double asymmetry = COMPRESS_ASYMMETRY * job->sizes[t].rows;
     double(*up)[WAVELET_SCALING] = NULL;
     if (a->from_left == 0)
         begin_leaf(job, a, d);
@@ -191,7 +191,8 @@ static lam_status run_node(compress_job *job, size_t t, compress_desk *d, lam_er
             for (size_t k = 0; k < WAVELET_INPUTS; k++)
                 out[k] += (double)columns[m * WAVELET_INPUTS + k] * d->rows[q][m];
         const double worth = fmax(own_size * job->share[class_of[q]], own_share * job->size_of[q]);
-        const meeting at = {.lost = &lost[class_of[q]], .least = job->input->threshold / worth, .q = q};
+        const double least = job->input->threshold / worth;
+        const meeting at = {.lost = &lost[class_of[q]], .least = least, .beside = least + asymmetry, .q = q};
         for (size_t k = 0; k < a->scaling; k++) {
             if (root)
                 TRY(settle(&at, w->n - a->scaling + k, out[k], d, error));
@@ -371,6 +372,7 @@ lam_status compress_form_factors(const compress_input *input, compressed_factors
     job.position = position;
     job.size_of = size_of;
     job.share = share;
+    job.sizes = sizes;
     TRY(run_all(&job, desks, error));
     if (job.given_up) {
         *out = (compressed_factors){.n = 0};

@@ -8,9 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* F is symmetric but for rounding to single precision, and so are numbers that are kept. */
-static const double asymmetry = 4e-7;
-
 /* Of any class light may have this share of what it has most of. */
 static const double share_least = 1e-3;
 
@@ -201,8 +198,8 @@ lam_status compress_bounds(const node_sizes *sizes, const double *lost, compress
     for (size_t t = 0; t < w->n_nodes; t++) {
         const node_sizes *own = &sizes[t];
         const bool leaf = w->nodes[t].from_left == 0;
-        const double rounding =
-            own->rows * (own->wavelets * asymmetry + own->inputs * (leaf ? (1 + levels) * eta : eta));
+        const double rounding = own->rows * (own->wavelets * COMPRESS_ASYMMETRY +
+                                             own->inputs * (leaf ? (1 + levels) * eta : eta));
         for (size_t k = 0; k < K; k++)
             c->bound[t * K + k] = rounded_up(margin * (own->wavelets * sqrt(lost[t * K + k]) + rounding));
     }

@@ -5,6 +5,10 @@
 
 #include "solver/build/compress.h"
 
+/* F is symmetric but for rounding to single precision, and so are numbers that are kept: of the Frobenius
+ * norm of the rows that a number is made of. */
+#define COMPRESS_ASYMMETRY 4e-7
+
 /* Of the nodes of a basis. */
 typedef struct node_sizes {
     double wavelets, inputs; /* the largest norm at an element of its wavelets' values, of all it takes */
