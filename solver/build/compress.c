@@ -1,6 +1,7 @@
 #include "solver/build/compress_bound.h"
 
 #include "solver/build/plane_tree.h"
+#include "solver/build/subtrees.h"
 #include "solver/build/wavelet_basis.h"
 
 #include "store/status.h"
@@ -69,10 +70,6 @@ static lam_status desk_make(const wavelets *w, compress_desk *d, lam_error *erro
     return d->rows != NULL && d->turned != NULL && d->slots != NULL ? LAM_OK : LAM_ERR_MEMORY;
 }
 
-static const float *columns_of(const wavelets *w, size_t t) {
-    return w->padded + (size_t)w->nodes[t].shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
-}
-
 /* out = Q in, each entry being some rows side by side. */
 static void turn_columns(const float *columns, size_t inputs, const rows_of_node *const *in,
                          rows_of_node *out) {
@@ -95,7 +92,7 @@ static void transform_columns(const wavelets *w, const rows_of_node *x, rows_of_
             in[m] = a->from_left == 0  ? x + a->begin + m
                     : m < a->from_left ? slots + (size_t)a->left * WAVELET_SCALING + m
                                        : slots + (t - 1) * WAVELET_SCALING + m - a->from_left;
-        turn_columns(columns_of(w, t), a->inputs, in, out);
+        turn_columns(wavelet_columns(w, &w->nodes[t]), a->inputs, in, out);
         memcpy(slots + t * WAVELET_SCALING, out, a->scaling * sizeof *out);
         memcpy(c + a->first, out + a->scaling, (a->inputs - a->scaling) * sizeof *out);
     }
@@ -170,7 +167,7 @@ static lam_status run_node(compress_job *job, size_t t, compress_desk *d, lam_er
     const wavelets *w = job->w;
     const wavelet_node *a = &w->nodes[t];
     const bool root = t + 1 == w->n_nodes;
-    const float *columns = columns_of(w, t);
+    const float *columns = wavelet_columns(w, &w->nodes[t]);
     const uint8_t *class_of = job->c->class_of;
     double *lost = job->lost + t * job->c->n_classes;
     /* What a number adds to the error of light whose norm is 1, as large as its rows' wavelets and as much as
@@ -222,62 +219,25 @@ static lam_status told(compress_job *job, const wavelet_node *a, size_t kept, la
     return status;
 }
 
-static lam_status run_piece(compress_job *job, const wavelet_piece *piece, compress_desk *d,
-                            lam_error *error) {
+/* What all threads share, and what each has for itself. */
+typedef struct compress_team {
+    compress_job *job;
+    compress_desk *desks;
+} compress_team;
+
+static lam_status run_piece(void *context, wavelet_piece piece, size_t k, lam_error *error) {
     lam_status status = LAM_OK;
+    compress_team *team = context;
+    compress_job *job = team->job;
+    compress_desk *d = &team->desks[k];
     if (d->rows == NULL) TRY(desk_make(job->w, d, error));
-    for (size_t t = piece->first; t < piece->last; t++) {
+    for (size_t t = piece.first; t < piece.last; t++) {
         const size_t before = d->n_kept;
         if (__atomic_load_n(&job->given_up, __ATOMIC_RELAXED)) break;
         TRY(run_node(job, t, d, error));
         TRY(told(job, &job->w->nodes[t], d->n_kept - before, error));
     }
 done:
-    return status;
-}
-
-/* Whole subtrees, as many as PIECES or so, then what is above them. */
-static lam_status run_all(compress_job *job, compress_desk *desks, lam_error *error) {
-    lam_status status = LAM_OK;
-    const wavelets *w = job->w;
-    const size_t N = w->n_nodes, most = w->n / PIECES + LEAF;
-    wavelet_piece *pieces = memory_allocate(N, sizeof *pieces, "compressed form factors", error);
-    size_t n_pieces = 0, n_taken = 0;
-    int failed = 0;
-    if (pieces == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t t = 0; t < N; t++) {
-        const uint32_t parent = w->nodes[t].parent;
-        if (w->nodes[t].n_elements > most || (parent != WAVELET_NONE && w->nodes[parent].n_elements <= most))
-            continue;
-        size_t first = t;
-        while (w->nodes[first].from_left > 0) first = w->nodes[first].left;
-        pieces[n_pieces++] = (wavelet_piece){(uint32_t)first, (uint32_t)t + 1};
-    }
-#pragma omp parallel num_threads((int)job->input->n_threads)
-    {
-        compress_desk *mine = NULL;
-#pragma omp critical(compress_desks)
-        mine = &desks[n_taken++];
-#pragma omp for schedule(dynamic, 1)
-        for (size_t k = 0; k < n_pieces; k++) {
-            lam_error one = {.message = ""};
-            if (__atomic_load_n(&failed, __ATOMIC_RELAXED)) continue;
-            const lam_status now = run_piece(job, &pieces[k], mine, &one);
-            if (now == LAM_OK) continue;
-#pragma omp critical(compress_failed)
-            if (!failed) {
-                status = status_fail(error, now, "%s", one.message);
-                __atomic_store_n(&failed, 1, __ATOMIC_RELAXED);
-            }
-        }
-    }
-    if (status != LAM_OK) goto done;
-    for (size_t t = 0; t < N && !job->given_up; t++) {
-        const wavelet_piece above = {(uint32_t)t, (uint32_t)t + 1};
-        if (w->nodes[t].n_elements > most) TRY(run_piece(job, &above, &desks[0], error));
-    }
-done:
-    free(pieces);
     return status;
 }
 
@@ -373,7 +333,8 @@ lam_status compress_form_factors(const compress_input *input, compressed_factors
     job.size_of = size_of;
     job.share = share;
     job.sizes = sizes;
-    TRY(run_all(&job, desks, error));
+    compress_team team = {&job, desks};
+    TRY(subtrees_run(&c.basis, n / PIECES + LEAF, input->n_threads, run_piece, &team, error));
     if (job.given_up) {
         *out = (compressed_factors){.n = 0};
         goto done;

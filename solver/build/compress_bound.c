@@ -15,17 +15,13 @@ static const double margin = 1 + 1e-9;
 
 /* --- sizes of nodes ------------------------------------------------------------------------------------ */
 
-static const float *columns_of(const wavelets *w, size_t t) {
-    return w->padded + (size_t)w->nodes[t].shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
-}
-
 /* values [n][WAVELET_SCALING] of what nodes hand up, over A^1/2, at each position: those of the children
  * become those of their parent. */
 static void size_node(const wavelets *w, size_t t, const double *area, const uint32_t *order,
                       double (*values)[WAVELET_SCALING], node_sizes *out) {
     const wavelet_node *a = &w->nodes[t];
     const bool root = t + 1 == w->n_nodes;
-    const float *columns = columns_of(w, t);
+    const float *columns = wavelet_columns(w, &w->nodes[t]);
     const size_t right = a->from_left > 0 ? w->nodes[t - 1].begin : 0;
     for (size_t p = a->begin; p < a->begin + a->n_elements; p++) {
         double in[WAVELET_INPUTS] = {0}, all = 0, own = 0;

@@ -33,13 +33,9 @@ done:
 
 typedef float small[WAVELET_INPUTS][WAVELET_INPUTS];
 
-static const float *columns_of(const wavelets *w, const wavelet_node *a) {
-    return w->padded + (size_t)a->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
-}
-
 /* M = Q G Q^T */
 static void turn_both(const wavelets *w, const wavelet_node *a, const small G, small M) {
-    const float *columns = columns_of(w, a);
+    const float *columns = wavelet_columns(w, a);
     double half[WAVELET_INPUTS][WAVELET_INPUTS] = {{0}};
     for (size_t i = 0; i < a->inputs; i++)
         for (size_t k = 0; k < a->inputs; k++)
@@ -71,7 +67,7 @@ static lam_status couple_up(const wavelets *w, size_t t, size_t i, const float *
             break;
         }
         const wavelet_node *a = &w->nodes[w->nodes[t].parent];
-        const float *columns = columns_of(w, a);
+        const float *columns = wavelet_columns(w, a);
         const size_t at = a->left == t ? 0 : a->from_left;
         for (size_t k = 0; k < a->inputs; k++) {
             y[k] = 0;

@@ -1,5 +1,6 @@
 #include "solver/build/wavelet_pass.h"
 
+#include "solver/build/subtrees.h"
 #include "solver/operator/marks.h"
 
 #include "store/status.h"
@@ -354,60 +355,30 @@ static size_t piece_elements(const pass_job *job) {
     return job->input->basis->n / 64 + 8;
 }
 
-/* Nodes [first, last) one after the other. */
-static lam_status run_piece(pass_job *job, size_t first, size_t last, desk *d, lam_error *error) {
+/* What all threads share, and what each has for itself. */
+typedef struct pass_team {
+    pass_job *job;
+    desk *desks;
+} pass_team;
+
+/* Progress is told of whole subtrees: a node above them has been told of. */
+static lam_status run_piece(void *context, wavelet_piece piece, size_t k, lam_error *error) {
     lam_status status = LAM_OK;
-    for (size_t t = first; t < last; t++) TRY(run_node(job, t, d, error));
-    TRY(told(job, job->input->basis->nodes[last - 1].n_elements, error));
+    pass_team *team = context;
+    pass_job *job = team->job;
+    const size_t elements = job->input->basis->nodes[piece.last - 1].n_elements;
+    desk *d = &team->desks[k];
+    if (d->dense == NULL) TRY(desk_make(job, d, error));
+    for (size_t t = piece.first; t < piece.last; t++) TRY(run_node(job, t, d, error));
+    if (elements <= piece_elements(job)) TRY(told(job, elements, error));
 done:
     return status;
-}
-
-/* The first node of the subtree of t. */
-static size_t subtree_begin(const wavelets *w, size_t t) {
-    while (w->nodes[t].from_left > 0) t = w->nodes[t].left;
-    return t;
 }
 
 static lam_status run_all(pass_job *job, desk *desks, lam_error *error) {
-    lam_status status = LAM_OK;
-    const wavelets *w = job->input->basis;
-    const size_t N = w->n_nodes, most = piece_elements(job);
-    wavelet_piece *pieces = memory_allocate(N, sizeof *pieces, "wavelets", error);
-    size_t n_pieces = 0, n_taken = 0;
-    int failed = 0;
-    if (pieces == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t t = 0; t < N; t++)
-        if (w->nodes[t].n_elements <= most &&
-            (w->nodes[t].parent == WAVELET_NONE || w->nodes[w->nodes[t].parent].n_elements > most))
-            pieces[n_pieces++] = (wavelet_piece){(uint32_t)subtree_begin(w, t), (uint32_t)t + 1};
-#pragma omp parallel num_threads((int)job->input->n_threads)
-    {
-        desk *mine = NULL;
-#pragma omp critical(wavelet_pass_desks)
-        mine = &desks[n_taken++];
-#pragma omp for schedule(dynamic, 1)
-        for (size_t k = 0; k < n_pieces; k++) {
-            lam_error one = {.message = ""};
-            lam_status now;
-            if (__atomic_load_n(&failed, __ATOMIC_RELAXED)) continue;
-            now = mine->dense == NULL ? desk_make(job, mine, &one) : LAM_OK;
-            if (now == LAM_OK) now = run_piece(job, pieces[k].first, pieces[k].last, mine, &one);
-            if (now == LAM_OK) continue;
-#pragma omp critical(wavelet_pass_failed)
-            if (!failed) {
-                status = status_fail(error, now, "%s", one.message);
-                __atomic_store_n(&failed, 1, __ATOMIC_RELAXED);
-            }
-        }
-    }
-    if (status != LAM_OK) goto done;
-    if (desks[0].dense == NULL) TRY(desk_make(job, &desks[0], error));
-    for (size_t t = 0; t < N; t++)
-        if (w->nodes[t].n_elements > most) TRY(run_node(job, t, &desks[0], error));
-done:
-    free(pieces);
-    return status;
+    pass_team team = {job, desks};
+    return subtrees_run(job->input->basis, piece_elements(job), job->input->n_threads, run_piece, &team,
+                        error);
 }
 
 static int by_column(const void *left, const void *right) {

@@ -14,7 +14,7 @@ static inline TARGET void KERNEL(turn_lanes)(const float *columns, size_t inputs
 static TARGET void KERNEL(merge)(const wavelets *w, size_t node, const kept_rows *left,
                                  const kept_rows *right, live_rows *out) {
     const wavelet_node *a = &w->nodes[node];
-    const float *columns = w->padded + (size_t)a->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
+    const float *columns = wavelet_columns(w, a);
     size_t l = 0, r = 0, used = 0;
     while (l < left->count || r < right->count) {
         const uint32_t at_left = l < left->count ? left->cluster[l] : UINT32_MAX;
@@ -79,7 +79,7 @@ static TARGET lam_status KERNEL(promote)(const pass_row *row, uint32_t height, b
             continue;
         }
         const wavelet_node *node = &w->nodes[b];
-        const float *columns = w->padded + (size_t)node->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
+        const float *columns = wavelet_columns(w, node);
         lanes sums[WAVELET_INPUTS] = {{0}};
         for (; e < in->count && w->nodes[in->cluster[e]].parent == b; e++) {
             const bool is_left = in->cluster[e] == node->left;
@@ -100,8 +100,8 @@ done:
 static TARGET void KERNEL(gather_leaf)(const pass_row *row, const wavelet_node *a, const wavelet_node *leaf,
                                        const uint32_t *p, size_t count, const desk *d, lanes *sums) {
     const wavelets *w = row->job->input->basis;
-    const float *turned = w->padded + (size_t)a->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
-    const float *columns = w->padded + (size_t)leaf->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
+    const float *turned = wavelet_columns(w, a);
+    const float *columns = wavelet_columns(w, leaf);
     for (size_t k = 0; k < count; k++) {
         lanes x;
         KERNEL(turn_lanes)(turned, a->inputs, (const float *)&d->dense[p[k]], &x);
@@ -116,7 +116,7 @@ static TARGET void KERNEL(gather_far)(const pass_row *row, const wavelet_node *a
     const wavelet_reach *reach = &row->job->reach;
     const wavelets *w = reach->basis;
     const wavelet_affine *f = &reach->affine[b];
-    const float *turned = w->padded + (size_t)a->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
+    const float *turned = wavelet_columns(w, a);
     lanes sums[SCALING] = {{0}};
     for (size_t e = 0; e < count; e++) {
         const wavelet_place *at = &reach->place[p[e]];

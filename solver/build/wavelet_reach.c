@@ -122,7 +122,7 @@ static wavelet_affine affine_of(size_t scaling, const products *P, bool linear) 
 static void turn_products(const wavelets *w, size_t t, const products *inputs_of,
                           const double (*leaf)[LINEAR], products *out) {
     const wavelet_node *a = &w->nodes[t];
-    const float *columns = w->padded + (size_t)a->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
+    const float *columns = wavelet_columns(w, a);
     for (size_t k = 0; k < a->scaling; k++)
         for (size_t f = 0; f < LINEAR; f++) {
             out->of[k][f] = 0;

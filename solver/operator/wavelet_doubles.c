@@ -9,10 +9,6 @@ static void turn(const float *columns, size_t inputs, const double *in, double *
         for (size_t k = 0; k < WAVELET_INPUTS; k++) out[k] += (double)columns[m * WAVELET_INPUTS + k] * in[m];
 }
 
-static const float *columns_of(const wavelets *w, const wavelet_node *a) {
-    return w->padded + (size_t)a->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
-}
-
 void wavelet_doubles_forward(const wavelets *w, const double *x, double *c, double *work) {
     for (size_t t = 0; t < w->n_nodes; t++) {
         const wavelet_node *a = &w->nodes[t];
@@ -24,7 +20,7 @@ void wavelet_doubles_forward(const wavelets *w, const double *x, double *c, doub
             memcpy(in + a->from_left, work + (t - 1) * WAVELET_SCALING,
                    (a->inputs - a->from_left) * sizeof *in);
         }
-        turn(columns_of(w, a), a->inputs, in, out);
+        turn(wavelet_columns(w, a), a->inputs, in, out);
         memcpy(work + t * WAVELET_SCALING, out, a->scaling * sizeof *out);
         memcpy(c + a->first, out + a->scaling, (a->inputs - a->scaling) * sizeof *out);
     }
@@ -40,7 +36,7 @@ void wavelet_doubles_inverse(const wavelets *w, const double *c, double *x, doub
         double in[WAVELET_INPUTS], out[WAVELET_INPUTS];
         memcpy(in, work + t * WAVELET_SCALING, a->scaling * sizeof *in);
         memcpy(in + a->scaling, c + a->first, (a->inputs - a->scaling) * sizeof *in);
-        turn(columns_of(w, a) + WAVELET_INPUTS * WAVELET_INPUTS, a->inputs, in, out);
+        turn(wavelet_columns(w, a) + WAVELET_INPUTS * WAVELET_INPUTS, a->inputs, in, out);
         if (a->from_left == 0) {
             memcpy(x + a->begin, out, a->inputs * sizeof *out);
         } else {

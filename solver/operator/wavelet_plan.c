@@ -56,7 +56,7 @@ static uint64_t hash_subtree(const whole_table *t, size_t a) {
 /* rows [scaling][padded(count)] of node t from those of its children. */
 static void write_rows(const wavelets *w, size_t t, float *out) {
     const wavelet_node *a = &w->nodes[t];
-    const float *columns = w->padded + (size_t)a->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
+    const float *columns = wavelet_columns(w, a);
     const size_t width = padded(a->n_elements);
     memset(out, 0, a->scaling * width * sizeof *out);
     if (a->from_left == 0) {
@@ -150,7 +150,7 @@ static lam_status add_steps(wavelet_plan *plan, whole_table *table, const uint32
             step->left = (uint32_t)matrix; /* until matrices stay where they are */
             continue;
         }
-        step->columns = w->padded + (size_t)a->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
+        step->columns = wavelet_columns(w, a);
         step->rows = step->columns + WAVELET_INPUTS * WAVELET_INPUTS;
         step->inputs = (uint8_t)a->inputs;
         step->from_left = (uint8_t)a->from_left;

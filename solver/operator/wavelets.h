@@ -48,6 +48,11 @@ typedef struct wavelets {
     float *padded;       /* [n_shapes][2][8][8]: columns of the matrix, then its rows */
 } wavelets;
 
+/* The columns of a node's matrix, eight apart; its rows lie behind them. */
+static inline const float *wavelet_columns(const wavelets *w, const wavelet_node *a) {
+    return w->padded + (size_t)a->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
+}
+
 void wavelets_free(wavelets *w);
 
 /* How many nodes are below each on the longest way to a leaf: out [n_nodes]; leaves: 0. */
