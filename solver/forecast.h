@@ -23,6 +23,7 @@ typedef struct forecast {
     size_t emitters;             /* 0: another kind of operator */
     bool sparse;                 /* a sparse inverse, whose threshold rises until it fits */
     bool hierarchical;           /* or one in wavelets, of this epsilon */
+    bool streamed;               /* which asks for rows one after the other; none are held */
     double epsilon;
     panel_precision precision; /* of an operator of low rank */
 } forecast;

@@ -11,6 +11,7 @@ void work_free(work *w) {
     mesh_free(&w->m);
     free(w->order);
     form_factors_free(&w->f);
+    ray_rows_destroy(w->rays);
     compressed_free(&w->compressed);
     emitter_wish_free(&w->emitters);
     scratch_close(w->scratch, false);
@@ -119,6 +120,19 @@ done:
     return status;
 }
 
+lam_status work_begin_stream(work *w, lam_error *error) {
+    const form_factor_options how = {.recipe = w->recipe,
+                                     .progress = &w->progress,
+                                     .stage = "near pairs",
+                                     .sky = w->options->sky,
+                                     .ground_albedo = w->options->ground_albedo};
+    const lam_status status = ray_rows_create(&w->m, &how, &w->rays, error);
+    if (status == LAM_OK)
+        ray_rows_stream(w->rays, precompute_seed(w->options->form_factors.seed, 6), &w->stream);
+    w->f.recipe = w->recipe;
+    return status;
+}
+
 lam_status precompute_run(const precompute_options *options, terminal *t, build_report *report,
                           lam_error *error) {
     lam_status status = LAM_OK;
@@ -139,12 +153,13 @@ lam_status precompute_run(const precompute_options *options, terminal *t, build_
     TRY(announce(&w, error));
     if (!options->from_store) {
         started = clock_seconds();
-        TRY(work_trace(&w, error));
-        log_stage(&w, "form factors", started);
+        TRY(w.streamed ? work_begin_stream(&w, error) : work_trace(&w, error));
+        log_stage(&w, w.streamed ? "near pairs" : "form factors", started);
     }
-    log_form_factors(&w);
+    if (!w.streamed) log_form_factors(&w);
 
     TRY(work_build(&w, error));
+    if (w.streamed) log_form_factors(&w);
     TRY(terminal_check(error));
 
     if (options->compress_form_factors) {

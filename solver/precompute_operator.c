@@ -25,13 +25,15 @@ build_problem work_problem(const work *w, const emitter_source *emitters) {
                            .area = w->m.area,
                            .reflectance = w->m.reflectance,
                            .F = &w->f.F,
+                           .stream = NULL,
                            .order = w->order,
                            .noise = recipe_noise(&w->f.recipe)};
 }
 
 size_t work_left(const work *w) {
-    const double held = (w->f.F.place != NULL ? 0 : (double)w->f.F.indptr[w->m.n] * 8) + 400 * (double)w->m.n;
-    return (size_t)fmax(1, w->memory - held);
+    const csr *F = &w->f.F;
+    const double rows = F->place != NULL || F->indptr == NULL ? 0 : (double)F->indptr[w->m.n] * 8;
+    return (size_t)fmax(1, w->memory - rows - 400 * (double)w->m.n);
 }
 
 lam_status work_build(work *w, lam_error *error) {
@@ -67,14 +69,25 @@ lam_status work_build(work *w, lam_error *error) {
     for (size_t k = 0; k < sizeof geometric / sizeof *geometric; k++)
         if (strcmp(o->method, geometric[k]) == 0)
             TRY(element_geometry_add(&w->m, &geometry, &problem, error));
+    if (w->streamed) {
+        problem.F = NULL;
+        problem.stream = &w->stream;
+    }
     TRY(build_operator(&problem, &how, &w->op, &w->built, error));
+    if (w->streamed) {
+        form_factors_free(&w->f);
+        w->f = ray_rows_take(w->rays);
+        ray_rows_destroy(w->rays);
+        w->rays = NULL;
+    }
     const double noise = recipe_noise(&w->f.recipe);
     const bool patches = w->built.coherence >= 0;
     const bool hierarchical = w->built.uniform_error >= 0;
     const bool tried =
         !patches && !hierarchical && (w->built.factorizer != NULL || w->built.factorize_seconds > 0);
     if (hierarchical) {
-        terminal_log(w->t, "%-14s%8.2f s", "wavelets", w->built.factorize_seconds);
+        terminal_log(w->t, "%-14s%8.2f s", w->streamed ? "rays, wavelets" : "wavelets",
+                     w->built.factorize_seconds);
         terminal_log(w->t, "residual of light all over %.2g, of light that is 1 everywhere %.2g",
                      w->built.probe_residual, w->built.uniform_error);
     }
@@ -112,6 +125,18 @@ static void log_figures(terminal *t, const char *name, const error_group *g, boo
                  g->operator_indirect.mean);
 }
 
+/* Rows that were not held, once more: what an operator leaves out of them is told apart from their noise. */
+static lam_status trace_again(work *w, lam_error *error) {
+    const form_factor_options how = {
+        .recipe = w->recipe, .progress = &w->progress, .stage = "form factors once more for the judge"};
+    form_factors again = {.row_sums = NULL};
+    const lam_status status = form_factors_make(&w->m, w->order, &how, &again, error);
+    w->f.F = again.F;
+    again.F = (csr){.n = 0};
+    form_factors_free(&again);
+    return status;
+}
+
 /* Two more samples of F, their mean, and what they say of the operator. */
 lam_status work_judge(work *w, lam_error *error) {
     lam_status status = LAM_OK;
@@ -123,6 +148,7 @@ lam_status work_judge(work *w, lam_error *error) {
     const build_problem problem = work_problem(w, &emitters);
     uint64_t purpose = 0, seed;
     first_light *first = NULL;
+    if (w->streamed) TRY(trace_again(w, error));
     for (int h = 0; h < 2; h++) {
         /* Independent of what was factorized: kept form factors may have any seed. */
         do seed = precompute_seed(w->options->form_factors.seed, ++purpose);

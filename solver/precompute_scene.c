@@ -75,6 +75,21 @@ static bool is_hierarchical(const precompute_options *o, double n) {
     return n > CLASSIFY_SMALL && o->emitters == NULL && !work_is_low_rank(o);
 }
 
+/* Bytes of rows from which on they are rather found twice, where a judge needs them, than held. */
+static const double held_most = 0x1p28;
+
+bool work_streams(const work *w) {
+    const precompute_options *o = w->options;
+    const double n = (double)w->m.n, bytes = 8 * n * fmin(n, 2 * (double)w->recipe.rays);
+    const bool kept = o->keep_form_factors || o->compress_form_factors || o->from_store || o->scratch != NULL;
+    if (kept || !ray_rows_can(&w->recipe) || !(bytes > held_most)) return false;
+    if (strcmp(o->method, "auto") != 0) return strcmp(o->method, "hierarchical") == 0;
+    /* What auto would take without a look at F: the whole inverse is too large, a sparse one would be noise.
+     */
+    return is_hierarchical(o, n) && n > CLASSIFY_EXACT_MOST && o->threshold == 0 &&
+           recipe_noise(&w->recipe) > o->epsilon;
+}
+
 /* What was asked for, and what the method makes of it. */
 static choice_request asked_of(const precompute_options *o, double n) {
     choice_request asked = o->form_factors;
@@ -116,6 +131,7 @@ forecast work_forecast(const work *w, double n) {
                       .emitters = w->emitters.s,
                       .sparse = strcmp(o->method, "sparse") == 0,
                       .hierarchical = is_hierarchical(o, n),
+                      .streamed = w->streamed,
                       .epsilon = o->epsilon,
                       .precision = o->precision};
 }
@@ -144,6 +160,7 @@ static lam_status check_memory(work *w, double n, lam_error *error) {
         if (all_pairs && !pairs_too) continue;
         w->large = way >= 2;
         w->recipe = o->from_store ? w->f.recipe : choice_recipe(&asked, all_pairs);
+        w->streamed = work_streams(w);
         f = work_forecast(w, n);
         if (forecast_bytes(&f) <= w->memory) break;
     }

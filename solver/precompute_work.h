@@ -7,6 +7,7 @@
 #include "solver/emitter_wish.h"
 #include "solver/forecast.h"
 #include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/ray_rows.h"
 #include "solver/precompute.h"
 
 typedef struct work {
@@ -18,6 +19,9 @@ typedef struct work {
     mesh m;
     uint32_t *order;
     form_factors f;
+    bool streamed;                 /* rows of F are found as the operator asks for them; f has none */
+    ray_rows *rays;                /* of these, until the operator is built */
+    row_stream stream;             /* of rays */
     compressed_factors compressed; /* of f; n is 0 where they are kept as they are, or not */
     recipe recipe;                 /* of f */
     bool large;                    /* its rows and the judge's lie in the scratch folder */
@@ -61,6 +65,12 @@ double work_memory(const precompute_options *o);
 
 /* Form factors of a scene: precompute.c. */
 lam_status work_trace(work *w, lam_error *error);
+
+/* Whether nobody but a hierarchical operator asks for rows of F, and they would take much memory. */
+bool work_streams(const work *w);
+
+/* The rows of near pairs, if the recipe has any; the others are found while the operator is built. */
+lam_status work_begin_stream(work *w, lam_error *error);
 
 /* What methods are given; emitters: of work_emitters, as long as the problem is used. */
 emitter_source work_emitters(const work *w);

@@ -3,6 +3,7 @@
 #define LAMBERT_BUILD_BUILD_H
 
 #include "solver/build/factorizer.h"
+#include "solver/matrix/row_source.h"
 #include "solver/operator/csr.h"
 #include "solver/operator/operator.h"
 #include "solver/progress.h"
@@ -23,9 +24,10 @@ typedef struct build_problem {
     size_t n_channels;
     const double *area;       /* [n] */
     const float *reflectance; /* [C][n], in [0, 1) */
-    const csr *F;
-    const uint32_t *order; /* [n] */
-    double noise;          /* sampling error of S in the 2-norm, about; 0: not known */
+    const csr *F;             /* NULL where there is a stream, which hierarchical alone can use */
+    row_stream *stream;       /* NULL where there is F */
+    const uint32_t *order;    /* [n] */
+    double noise;             /* sampling error of S in the 2-norm, about; 0: not known */
     /* Only 2msc and hierarchical need these (hierarchical no surface); NULL elsewhere. */
     const double (*centre)[3];      /* [n] centroids, m */
     const float (*normal)[3];       /* [n] unit */

@@ -4,6 +4,8 @@
 #include "solver/operator/hierarchical.h"
 #include "solver/build/build.h"
 #include "solver/build/plane_tree.h"
+#include "solver/build/self_check.h"
+#include "solver/build/wavelet_balance.h"
 #include "solver/build/wavelet_basis.h"
 #include "solver/build/wavelet_inverse.h"
 #include "solver/build/wavelet_pass.h"
@@ -13,12 +15,10 @@
 #include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Elements of a leaf at most. */
 enum { LEAF = 6 };
-
-/* Random lights that an operator is tried on, and rows of a product that a thread takes at once. */
-enum { SELF_PROBES = 4, ROWS_AT_ONCE = 1024 };
 
 /* Coefficients are kept from this share of epsilon on. */
 static const double share_of_epsilon = .02;
@@ -62,101 +62,28 @@ static void place(const build_problem *problem, const uint32_t *order, size_t c,
     }
 }
 
-/* What an operator makes of light that is known. */
-typedef struct self_check {
-    float *E, *B;
-    double *x, *h;
-    void *work;
-    size_t work_bytes;
-} self_check;
-
-/* |E - (B~ - rho F B~)| / |E| and |B~ - 1| / |1| of one channel; h = F B~. */
-static void check_channel(const build_problem *problem, const self_check *s, size_t c, double *residual,
-                          double *from_one) {
-    const size_t n = problem->n;
-    const float *rho = problem->reflectance + c * n, *E = s->E + c * n, *B = s->B + c * n;
-    double left = 0, all = 0, off = 0, area = 0;
-    for (size_t i = 0; i < n; i++) s->x[i] = (double)B[i];
-#pragma omp parallel for schedule(dynamic, 1)
-    for (size_t first = 0; first < n; first += ROWS_AT_ONCE)
-        csr_multiply_rows(problem->F, first, first + ROWS_AT_ONCE < n ? first + ROWS_AT_ONCE : n, 1, s->x,
-                          s->h);
-    for (size_t i = 0; i < n; i++) {
-        const double r = (double)E[i] - (s->x[i] - (double)rho[i] * s->h[i]), a = problem->area[i];
-        left += a * r * r;
-        all += a * (double)E[i] * (double)E[i];
-        off += a * (s->x[i] - 1) * (s->x[i] - 1);
-        area += a;
+/* Row sums of F. */
+static void sum_rows(const csr *F, double *sums) {
+    for (size_t i = 0; i < F->n; i++) {
+        sums[i] = 0;
+        for (uint64_t e = F->indptr[i]; e < F->indptr[i + 1]; e++) sums[i] += (double)F->data[e];
     }
-    *residual = sqrt(left / all);
-    *from_one = sqrt(off / area);
-}
-
-/* Random light all over, then E = 1 - rho s. */
-static lam_status check_itself(const build_problem *problem, const lam_operator *op, uint64_t seed,
-                               build_report *report, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = problem->n, C = problem->n_channels;
-    self_check s = {.E = memory_allocate(C, n * sizeof *s.E, "self-check", error),
-                    .B = memory_allocate(C, n * sizeof *s.B, "self-check", error),
-                    .x = memory_allocate(n, sizeof *s.x, "self-check", error),
-                    .h = memory_allocate(n, sizeof *s.h, "self-check", error),
-                    .work_bytes = lam_operator_work_bytes(op, 1)};
-    s.work = memory_allocate(1, s.work_bytes, "self-check", error);
-    if (s.E == NULL || s.B == NULL || s.x == NULL || s.h == NULL || s.work == NULL) TRY(LAM_ERR_MEMORY);
-    report->probe_residual = report->uniform_error = 0;
-    for (size_t probe = 0; probe <= SELF_PROBES; probe++) {
-        double worst = 0;
-        for (size_t i = 0; i < n; i++) {
-            double sum = 0;
-            for (uint64_t e = problem->F->indptr[i]; e < problem->F->indptr[i + 1] && probe == SELF_PROBES;
-                 e++)
-                sum += (double)problem->F->data[e];
-            for (size_t c = 0; c < C; c++) {
-                seed = seed * 6364136223846793005u + 1442695040888963407u;
-                s.E[c * n + i] = probe < SELF_PROBES
-                                     ? (float)(seed >> 40) * 0x1p-24f
-                                     : (float)fmax(1 - (double)problem->reflectance[c * n + i] * sum, 0);
-            }
-        }
-        TRY(lam_operator_apply(op, 1, LAM_RADIOSITY, s.E, s.B, s.work, s.work_bytes, error));
-        for (size_t c = 0; c < C; c++) {
-            double residual, from_one;
-            check_channel(problem, &s, c, &residual, &from_one);
-            worst = fmax(worst, probe < SELF_PROBES ? residual : from_one);
-        }
-        if (probe < SELF_PROBES)
-            report->probe_residual += worst / SELF_PROBES;
-        else
-            report->uniform_error = worst;
-    }
-done:
-    free(s.E);
-    free(s.B);
-    free(s.x);
-    free(s.h);
-    free(s.work);
-    return status;
 }
 
 /* What the operator lacks where E = 1 - rho s, which makes B = 1 and H = s, the row sums of F: made up for
  * where it is much beside epsilon. share: of s, before. */
-static lam_status make_up(const build_problem *problem, double epsilon, const uint32_t *order,
-                          lam_operator *op, bool *made_up, lam_error *error) {
+static lam_status make_up(const build_problem *problem, const double *s, double epsilon,
+                          const uint32_t *order, lam_operator *op, bool *made_up, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n, C = problem->n_channels, bytes = lam_operator_work_bytes(op, 1);
     double share = 0;
-    double *s = memory_allocate(n, sizeof *s, "operator", error);
     double *missing = memory_allocate(C, n * sizeof *missing, "operator", error);
     double *light = memory_allocate(C, sizeof *light, "operator", error);
     float *E = memory_allocate(C, n * sizeof *E, "operator", error);
     float *H = memory_allocate(C, n * sizeof *H, "operator", error);
     void *work = memory_allocate(1, bytes, "operator", error);
-    if (s == NULL || missing == NULL || light == NULL || E == NULL || H == NULL || work == NULL)
-        TRY(LAM_ERR_MEMORY);
+    if (missing == NULL || light == NULL || E == NULL || H == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < n; i++) {
-        for (uint64_t e = problem->F->indptr[i]; e < problem->F->indptr[i + 1]; e++)
-            s[i] += (double)problem->F->data[e];
         for (size_t c = 0; c < C; c++)
             E[c * n + i] = (float)fmax(1 - (double)problem->reflectance[c * n + i] * s[i], 0);
     }
@@ -176,7 +103,6 @@ static lam_status make_up(const build_problem *problem, double epsilon, const ui
     *made_up = share > fmax(share_made_up * epsilon, least_made_up);
     if (*made_up) TRY(operator_hierarchical_make_up(op, missing, light, error));
 done:
-    free(s);
     free(missing);
     free(light);
     free(E);
@@ -196,20 +122,24 @@ static lam_status build(const build_problem *problem, const build_options *optio
     hierarchical_arrays arrays = {.K = memory_allocate(C, sizeof *arrays.K, "operator", error)};
     wavelet_inverse_report inverted = {.doublings = 0};
     csr S = {.n = 0};
-    row_source rows;
+    row_source held;
     lam_operator *made = NULL;
     float *weight = NULL, *rho = memory_allocate(n, sizeof *rho, "operator", error);
     double *area = memory_allocate(n, sizeof *area, "operator", error), entries = 0;
+    double *sums = memory_allocate(n, sizeof *sums, "operator", error);
+    const double *row_sums = sums;
+    row_stream *const stream = problem->stream;
     bool made_up = false;
-    if (arrays.K == NULL || rho == NULL || area == NULL) TRY(LAM_ERR_MEMORY);
+    if (arrays.K == NULL || rho == NULL || area == NULL || sums == NULL) TRY(LAM_ERR_MEMORY);
     if (problem->centre == NULL || problem->normal == NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "--method hierarchical: where elements are and face is not given");
     TRY(plane_tree_make(n, problem->centre, problem->normal, LEAF, &tree, error));
     TRY(wavelet_basis_make(&tree, problem->area, problem->centre, &arrays.basis, error));
     TRY(make_weights(&arrays.basis, &weight, error));
-    row_source_of_csr(&rows, problem->F);
+    if (stream == NULL) row_source_of_csr(&held, problem->F);
     const wavelet_pass_input pass = {.basis = &arrays.basis,
-                                     .rows = &rows,
+                                     .rows = stream != NULL ? &stream->rows : &held,
+                                     .one_sided = stream != NULL,
                                      .area = problem->area,
                                      .tree = &tree,
                                      .threshold = (float)threshold * (threshold > least ? share_of_S : 1),
@@ -219,6 +149,13 @@ static lam_status build(const build_problem *problem, const build_options *optio
                                      .n_threads = n_threads,
                                      .progress = options->progress};
     TRY(wavelet_pass(&pass, &S, error));
+    place(problem, tree.order, 0, area, rho);
+    if (stream != NULL) {
+        TRY(stream->close(stream->context, &row_sums, error));
+        TRY(wavelet_balance(&arrays.basis, tree.order, area, row_sums, pass.threshold, weight, &S, error));
+    } else {
+        sum_rows(problem->F, sums);
+    }
     report->factorize_seconds = clock_seconds() - started;
     for (size_t c = 0; c < C; c++) {
         place(problem, tree.order, c, area, rho);
@@ -237,19 +174,22 @@ static lam_status build(const build_problem *problem, const build_options *optio
     const size_t n_shapes = arrays.basis.n_shapes, n_nodes = arrays.basis.n_nodes;
     TRY(operator_hierarchical_create(n, C, problem->reflectance, area, tree.order, &arrays, &made, error));
     lam_operator_set_threads(made, n_threads);
-    TRY(make_up(problem, options->epsilon, tree.order, made, &made_up, error));
+    TRY(make_up(problem, row_sums, options->epsilon, tree.order, made, &made_up, error));
     report->method = "hierarchical";
     report->threshold = threshold;
     report->epsilon = -1;
     report->invert_seconds = clock_seconds() - started - report->factorize_seconds;
     snprintf(report->reason, sizeof report->reason,
-             "hierarchical: asked for by --method; threshold %.2g by %s, %.3g numbers an element (%.3g of "
+             "hierarchical: %s; threshold %.2g by %s, %.3g numbers an element (%.3g of "
              "F), %zu planes, "
              "%zu clusters of %zu shapes%s",
+             strcmp(options->method, "auto") == 0
+                 ? "too large for the whole inverse, too noisy for a sparse one"
+                 : "asked for by --method",
              threshold, threshold > least ? "--epsilon" : "the noise of the rays", entries / (double)(n * C),
              (double)S.indptr[n] / (double)n, tree.n_frames, n_nodes, n_shapes,
              made_up ? "; what it lacks of even light is made up for" : "");
-    TRY(check_itself(problem, made, options->seed, report, error));
+    TRY(self_check(problem, row_sums, made, options->seed, report, error));
     *op = made;
     made = NULL;
 done:
@@ -260,6 +200,7 @@ done:
     free(weight);
     free(rho);
     free(area);
+    free(sums);
     return status;
 }
 

@@ -111,6 +111,16 @@ done:
     return status;
 }
 
+/* Rows that nobody holds: only a hierarchical operator can be made of them. */
+static lam_status build_streamed(const build_problem *problem, const build_options *options,
+                                 lam_operator **op, build_report *report, lam_error *error) {
+    const char *method = options->method;
+    if (strcmp(method, "auto") != 0 && strcmp(method, "hierarchical") != 0)
+        return status_fail(error, LAM_ERR_ARGUMENT,
+                           "--method %.40s: needs rows of form factors that are held", method);
+    return build_hierarchical.build(problem, options, op, report, error);
+}
+
 lam_status build_operator(const build_problem *problem, const build_options *options, lam_operator **op,
                           build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
@@ -122,6 +132,10 @@ lam_status build_operator(const build_problem *problem, const build_options *opt
                              .probe_residual = -1,
                              .uniform_error = -1};
     TRY(check_options(options, error));
+    if (problem->stream != NULL) {
+        TRY(build_streamed(problem, options, op, report, error));
+        goto done;
+    }
     const bool chosen = strcmp(options->method, "auto") == 0;
     if (chosen && problem->emitters != NULL) {
         TRY(build_emitters.build(problem, options, op, report, error));

@@ -1,6 +1,7 @@
 #include "solver/build/wavelet_pass.h"
 
 #include "solver/build/subtrees.h"
+#include "solver/build/wavelet_details.h"
 #include "solver/operator/marks.h"
 
 #include "store/status.h"
@@ -16,6 +17,10 @@
 /* Rows side by side: what a node takes. */
 typedef float lanes __attribute__((vector_size(32)));
 typedef float lanes_unaligned __attribute__((vector_size(32), aligned(4), may_alias));
+
+/* Of rows that know one side a coefficient is half there: it is looked at from this share of the threshold on,
+ * for what noise may lack of that half. */
+static const float share_looked_at = .35f;
 
 /* So many numbers ahead memory is asked for what is going to be needed. */
 enum { AHEAD = 12 };
@@ -54,6 +59,8 @@ typedef struct pass_job {
     wavelet_reach reach;
     column_place *columns; /* [n], by element */
     kept_rows *kept;       /* [n_nodes], of what waits for its sibling */
+    details *details;      /* [n_nodes], likewise; NULL: rows know both sides */
+    float least;           /* of what is looked at, before weights */
     size_t done;           /* elements */
 } pass_job;
 
@@ -69,16 +76,24 @@ typedef struct desk {
     marks lit;              /* where they are not; AHEAD numbers behind them may be looked at */
     uint32_t *cells, *work; /* of wavelet_cells */
     live_rows rows[2], near[2];
+    details fresh, merged, joined; /* of a node: found at it, of its children, both */
+    size_t *runs;                  /* where those of each height begin in the first */
     kept *found;
     size_t n_found, capacity;
 } desk;
 
+/* What is wanted of a column's wavelets: what is above the threshold in those of the rows, what they are to
+ * the rows that are handed up. */
+enum { EMIT = 1, DETAILS = 2 };
+
 /* The node whose rows are on their way. */
 typedef struct pass_row {
     const pass_job *job;
+    size_t node;
+    unsigned wanted; /* of columns that its rows are handed up on: DETAILS, or nothing */
     uint32_t height;
     uint32_t first; /* coefficient of lane 0, were lanes of what is handed up coefficients too */
-    unsigned wavelet_lanes;
+    unsigned own_lanes; /* coefficients: wavelets; of the root, where rows know one side, all */
     float least; /* threshold times the weight of the node */
 } pass_row;
 
@@ -88,11 +103,15 @@ static void kept_rows_free(kept_rows *k) {
     *k = (kept_rows){.count = 0};
 }
 
-/* Puts down coefficient (i, j), i of the row's node and j of column node b. Of two nodes of one height each
- * finds the other: the earlier one keeps what they find, of itself the upper triangle. */
-static lam_status desk_keep(const pass_row *row, desk *d, uint32_t b, uint32_t i, uint32_t j, float value,
-                            lam_error *error) {
-    if (row->job->reach.height[b] == row->height && j < i) return LAM_OK;
+/* What the root would hand up are the last coefficients. */
+static inline uint32_t row_coefficient(const pass_row *row, unsigned lane) {
+    const wavelets *w = row->job->input->basis;
+    const uint32_t scaling = w->nodes[row->node].scaling;
+    return lane < scaling ? (uint32_t)w->n - scaling + lane : row->first + lane;
+}
+
+/* Puts down coefficient (i, j). */
+static lam_status desk_put(desk *d, uint32_t i, uint32_t j, float value, lam_error *error) {
     if (d->n_found == d->capacity) {
         const size_t capacity = d->capacity + d->capacity / 2 + 4096;
         kept *const more = realloc(d->found, capacity * sizeof *more);
@@ -104,6 +123,15 @@ static lam_status desk_keep(const pass_row *row, desk *d, uint32_t b, uint32_t i
     }
     d->found[d->n_found++] = i < j ? (kept){i, j, value} : (kept){j, i, value};
     return LAM_OK;
+}
+
+/* Of the row's node and column node b. Of two nodes of one height each finds the other: where rows know both
+ * sides the earlier one keeps what they find, of itself the upper triangle. */
+static lam_status desk_keep(const pass_row *row, desk *d, uint32_t b, uint32_t i, uint32_t j, float value,
+                            lam_error *error) {
+    const bool both_sides = row->job->details == NULL;
+    if (both_sides && row->job->reach.height[b] == row->height && j < i) return LAM_OK;
+    return desk_put(d, i, j, value, error);
 }
 
 static inline unsigned beyond_portable(const lanes *v, float least) {
@@ -129,17 +157,19 @@ static inline unsigned beyond_portable(const lanes *v, float least) {
 /* The fastest kernels for this CPU. */
 typedef struct pass_kernels {
     void (*merge)(const wavelets *, size_t, const kept_rows *, const kept_rows *, live_rows *);
-    lam_status (*promote)(const pass_row *, uint32_t, bool, const live_rows *, live_rows *, desk *,
+    lam_status (*promote)(const pass_row *, uint32_t, unsigned, const live_rows *, live_rows *, desk *,
                           lam_error *);
+    lam_status (*merge_details)(const pass_row *, const details *, const details *, details *, desk *,
+                                lam_error *);
     lam_status (*begin_leaf)(const pass_row *, size_t, live_rows *, desk *, lam_error *);
 } pass_kernels;
 
 static pass_kernels kernels_of_cpu(void) {
 #if defined(__x86_64__)
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
-        return (pass_kernels){merge_avx2, promote_avx2, begin_leaf_avx2};
+        return (pass_kernels){merge_avx2, promote_avx2, merge_details_avx2, begin_leaf_avx2};
 #endif
-    return (pass_kernels){merge_portable, promote_portable, begin_leaf_portable};
+    return (pass_kernels){merge_portable, promote_portable, merge_details_portable, begin_leaf_portable};
 }
 
 /* --- one node ------------------------------------------------------------------------------------------ */
@@ -159,7 +189,7 @@ static lam_status scatter_rows(const pass_job *job, size_t node, desk *d, lam_er
             if (e + AHEAD < rows.length[lane])
                 __builtin_prefetch(&d->dense[job->columns[rows.indices[lane][e + AHEAD]].position], 1);
             const size_t p = at->position;
-            d->dense[p][lane] = root * at->over_root * rows.data[lane][e];
+            d->dense[p][lane] += root * at->over_root * rows.data[lane][e];
             marks_add(&d->lit, p);
         }
     }
@@ -195,8 +225,7 @@ static lam_status end_at_root(const pass_row *row, size_t node, const live_rows 
     const size_t scaling = w->nodes[root].scaling;
     for (size_t lane = node == root ? 0 : a->scaling; rows->count > 0 && lane < a->inputs; lane++)
         for (size_t k = 0; k < scaling; k++) {
-            const uint32_t i = lane < a->scaling ? (uint32_t)(w->n - scaling + lane)
-                                                 : a->first + (uint32_t)(lane - a->scaling);
+            const uint32_t i = row_coefficient(row, (unsigned)lane);
             const uint32_t j = (uint32_t)(w->n - scaling + k);
             const float value = rows->value[0].of[k][lane];
             if (fabsf(value) > row->least * row->job->input->weight[root])
@@ -222,6 +251,25 @@ static void swap(live_rows **a, live_rows **b) {
     *b = swapped;
 }
 
+/* Finer columns of the children's rows, and what this node's rows found on their way: that stands in ascending
+ * runs, first that of a leaf itself, then one for each height. */
+static lam_status take_details(pass_job *job, const pass_row *row, desk *d, size_t n_heights,
+                               lam_error *error) {
+    lam_status status = LAM_OK;
+    details *all = &d->merged, *next = &d->joined;
+    for (size_t k = 0; k <= n_heights; k++) {
+        const size_t first = k == 0 ? 0 : d->runs[k - 1], last = k < n_heights ? d->runs[k] : d->fresh.count;
+        if (first == last) continue;
+        TRY(details_join(all, d->fresh.list + first, last - first, next, error));
+        details *const swapped = all;
+        all = next;
+        next = swapped;
+    }
+    TRY(details_copy(all, &job->details[row->node], error));
+done:
+    return status;
+}
+
 static lam_status run_node(pass_job *job, size_t node, desk *d, lam_error *error) {
     lam_status status = LAM_OK;
     const pass_kernels kernels = kernels_of_cpu();
@@ -229,17 +277,28 @@ static lam_status run_node(pass_job *job, size_t node, desk *d, lam_error *error
     const wavelet_node *a = &w->nodes[node];
     const uint32_t root = (uint32_t)w->n_nodes - 1, top = job->reach.height[root];
     const uint32_t keep_at = node == root ? UINT32_MAX : job->reach.height[a->parent] - 1;
+    const bool both_sides = job->details == NULL;
+    const unsigned every = (1u << a->inputs) - 1, handed = (1u << a->scaling) - 1;
     const pass_row row = {.job = job,
+                          .node = node,
+                          .wanted = both_sides || node == root ? 0 : DETAILS,
                           .height = job->reach.height[node],
                           .first = a->first - a->scaling,
-                          .wavelet_lanes = (1u << a->inputs) - (1u << a->scaling),
-                          .least = job->input->threshold * job->input->weight[node]};
+                          .own_lanes = both_sides || node != root ? every & ~handed : every,
+                          .least = job->least * job->input->weight[node]};
     live_rows *from = &d->rows[0], *to = &d->rows[1];
     uint32_t height = row.height;
+    d->fresh.count = d->merged.count = 0;
     if (a->from_left > 0) {
         kernels.merge(w, node, &job->kept[a->left], &job->kept[node - 1], from);
         kept_rows_free(&job->kept[a->left]);
         kept_rows_free(&job->kept[node - 1]);
+        if (!both_sides) {
+            TRY(kernels.merge_details(&row, &job->details[a->left], &job->details[node - 1], &d->merged, d,
+                                      error));
+            details_free(&job->details[a->left]);
+            details_free(&job->details[node - 1]);
+        }
     } else {
         TRY(scatter_rows(job, node, d, error));
         TRY(kernels.begin_leaf(&row, node, from, d, error));
@@ -248,12 +307,14 @@ static lam_status run_node(pass_job *job, size_t node, desk *d, lam_error *error
     live_rows *near = &d->near[0], *next = &d->near[1];
     take_near(job, node, from, near);
     for (uint32_t h = height; node != root && h <= keep_at; h++) {
-        TRY(kernels.promote(&row, h, false, from, to, d, error));
+        d->runs[h - height] = d->fresh.count;
+        TRY(kernels.promote(&row, h, row.wanted, from, to, d, error));
         swap(&from, &to);
     }
     if (node != root) TRY(keep_rows(from, a->scaling, w, &job->kept[node], error));
+    if (node != root && !both_sides) TRY(take_details(job, &row, d, keep_at + 1 - height, error));
     for (; height <= top; height++) {
-        TRY(kernels.promote(&row, height, true, near, next, d, error));
+        TRY(kernels.promote(&row, height, EMIT, near, next, d, error));
         swap(&near, &next);
     }
     TRY(end_at_root(&row, node, near, d, error));
@@ -266,7 +327,10 @@ done:
 static void job_free(pass_job *job) {
     for (size_t t = 0; job->kept != NULL && t < job->input->basis->n_nodes; t++)
         kept_rows_free(&job->kept[t]);
+    for (size_t t = 0; job->details != NULL && t < job->input->basis->n_nodes; t++)
+        details_free(&job->details[t]);
     free(job->kept);
+    free(job->details);
     free(job->columns);
     wavelet_reach_free(&job->reach);
 }
@@ -275,8 +339,11 @@ static lam_status job_make(const wavelet_pass_input *input, pass_job *job, lam_e
     lam_status status = LAM_OK;
     const wavelets *w = input->basis;
     const size_t N = w->n_nodes;
-    *job = (pass_job){.input = input};
+    *job = (pass_job){.input = input,
+                      .least = input->threshold * (input->one_sided ? share_looked_at : 1)};
     job->kept = memory_allocate(N, sizeof *job->kept, "wavelets", error);
+    if (input->one_sided) job->details = memory_allocate(N, sizeof *job->details, "wavelets", error);
+    if (input->one_sided && job->details == NULL) TRY(LAM_ERR_MEMORY);
     job->columns = memory_allocate(w->n, sizeof *job->columns, "wavelets", error);
     if (job->kept == NULL || job->columns == NULL) TRY(LAM_ERR_MEMORY);
     TRY(wavelet_reach_make(w, input->tree, input->area, input->centre, input->reach, &job->reach, error));
@@ -299,6 +366,10 @@ static void desk_free(desk *d) {
         free(d->near[k].cluster);
         free(d->near[k].value);
     }
+    details_free(&d->fresh);
+    details_free(&d->merged);
+    details_free(&d->joined);
+    free(d->runs);
     free(d->found);
     *d = (desk){.n_found = 0};
 }
@@ -321,7 +392,9 @@ static lam_status desk_make(const pass_job *job, desk *d, lam_error *error) {
     d->cells = memory_allocate(job->reach.n_leaves, sizeof *d->cells, "wavelets", error);
     d->work = memory_allocate(2 * (size_t)job->reach.height[job->input->basis->n_nodes - 1] + 4,
                               sizeof *d->work, "wavelets", error);
-    if (d->dense == NULL || d->cells == NULL || d->work == NULL) TRY(LAM_ERR_MEMORY);
+    d->runs = memory_allocate((size_t)job->reach.height[job->input->basis->n_nodes - 1] + 1, sizeof *d->runs,
+                              "wavelets", error);
+    if (d->dense == NULL || d->cells == NULL || d->work == NULL || d->runs == NULL) TRY(LAM_ERR_MEMORY);
     memset(d->dense, 0, n * sizeof *d->dense);
     for (int k = 0; k < 2; k++) {
         d->rows[k].cluster =
@@ -386,6 +459,33 @@ static int by_column(const void *left, const void *right) {
     return a->j < b->j ? -1 : a->j > b->j;
 }
 
+/* Of each coefficient what either side found, twice that on the diagonal: their sums, above the threshold. */
+static lam_status add_sides(const pass_job *job, csr *S, lam_error *error) {
+    const wavelets *w = job->input->basis;
+    uint64_t used = 0, p = 0;
+    float *weight = memory_allocate(w->n, sizeof *weight, "wavelets", error);
+    if (weight == NULL) return LAM_ERR_MEMORY;
+    for (size_t t = 0; t < w->n_nodes; t++) {
+        const wavelet_node *a = &w->nodes[t];
+        const size_t count = a->inputs - (t + 1 < w->n_nodes ? a->scaling : 0);
+        for (size_t k = 0; k < count; k++) weight[a->first + k] = job->input->weight[t];
+    }
+    for (size_t i = 0; i < w->n; i++) {
+        const uint64_t end = S->indptr[i + 1];
+        while (p < end) {
+            const uint32_t j = S->indices[p];
+            float sum = S->data[p++] * (j == i ? 2 : 1);
+            if (p < end && S->indices[p] == j) sum += S->data[p++];
+            if (!(fabsf(sum) > job->input->threshold * weight[i] * weight[j])) continue;
+            S->indices[used] = j;
+            S->data[used++] = sum;
+        }
+        S->indptr[i + 1] = used;
+    }
+    free(weight);
+    return csr_reserve(S, used, error);
+}
+
 /* All that was kept, by rows. */
 static lam_status gather(const pass_job *job, desk *desks, csr *out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -416,6 +516,7 @@ static lam_status gather(const pass_job *job, desk *desks, csr *out, lam_error *
             made.data[e] = all[e].value;
         }
     }
+    if (job->details != NULL) TRY(add_sides(job, &made, error));
     *out = made;
     made = (csr){.n = 0};
 done:

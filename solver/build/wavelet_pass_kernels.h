@@ -44,18 +44,38 @@ static inline TARGET void KERNEL(spread)(const float *columns, size_t inputs, si
     for (size_t k = 0; k < inputs; k++) out[k] += column[k] * *x;
 }
 
+/* What a column's wavelets are to the rows that are handed up: as far as that column looks. */
+static inline TARGET lam_status KERNEL(add_details)(const pass_row *row, uint32_t b, const lanes *out,
+                                                    desk *d, lam_error *error) {
+    const wavelet_node *node = &row->job->input->basis->nodes[b];
+    if (!wavelet_is_near(&row->job->reach, b, row->node)) return LAM_OK;
+    const lam_status status = details_reserve(&d->fresh, node->inputs - node->scaling, error);
+    if (status != LAM_OK) return status;
+    for (size_t k = node->scaling; k < node->inputs; k++) {
+        detail *const to = &d->fresh.list[d->fresh.count++];
+        *to = (detail){.j = node->first + (uint32_t)(k - node->scaling),
+                       .weight = row->job->input->weight[b]};
+        for (int lane = 0; lane < DETAIL_LANES; lane++) to->of[lane] = out[k][lane];
+    }
+    return LAM_OK;
+}
+
 /* Keeps what of a column's wavelets is above the threshold, and hands its scaling up. */
-static inline TARGET lam_status KERNEL(hand_up)(const pass_row *row, uint32_t b, bool emit, const lanes *out,
-                                                block *up, desk *d, lam_error *error) {
+static inline TARGET lam_status KERNEL(hand_up)(const pass_row *row, uint32_t b, unsigned wanted,
+                                                const lanes *out, block *up, desk *d, lam_error *error) {
     const wavelet_node *node = &row->job->input->basis->nodes[b];
     for (size_t k = 0; k < node->scaling; k++) up->of[k] = out[k];
-    if (!emit) return LAM_OK;
+    if (wanted & DETAILS) {
+        const lam_status status = KERNEL(add_details)(row, b, out, d, error);
+        if (status != LAM_OK) return status;
+    }
+    if (!(wanted & EMIT)) return LAM_OK;
     const float least = row->least * row->job->input->weight[b];
     for (size_t k = node->scaling; k < node->inputs; k++) {
-        unsigned beyond = BEYOND(&out[k], least) & row->wavelet_lanes;
+        unsigned beyond = BEYOND(&out[k], least) & row->own_lanes;
         for (; beyond != 0; beyond &= beyond - 1) {
-            const int lane = __builtin_ctz(beyond);
-            const uint32_t i = row->first + (uint32_t)lane, j = node->first + (uint32_t)(k - node->scaling);
+            const unsigned lane = (unsigned)__builtin_ctz(beyond);
+            const uint32_t i = row_coefficient(row, lane), j = node->first + (uint32_t)(k - node->scaling);
             const lam_status status = desk_keep(row, d, b, i, j, out[k][lane], error);
             if (status != LAM_OK) return status;
         }
@@ -63,10 +83,9 @@ static inline TARGET lam_status KERNEL(hand_up)(const pass_row *row, uint32_t b,
     return LAM_OK;
 }
 
-/* Rows on clusters of height below `height` go up to those of that height; emit: what of their wavelets is
- * above the threshold is kept. */
-static TARGET lam_status KERNEL(promote)(const pass_row *row, uint32_t height, bool emit, const live_rows *in,
-                                         live_rows *out, desk *d, lam_error *error) {
+/* Rows on clusters of height below `height` go up to those of that height. */
+static TARGET lam_status KERNEL(promote)(const pass_row *row, uint32_t height, unsigned wanted,
+                                         const live_rows *in, live_rows *out, desk *d, lam_error *error) {
     lam_status status = LAM_OK;
     const pass_job *job = row->job;
     const wavelets *w = job->input->basis;
@@ -88,10 +107,52 @@ static TARGET lam_status KERNEL(promote)(const pass_row *row, uint32_t height, b
             for (size_t m = 0; m < count; m++)
                 KERNEL(spread)(columns, node->inputs, first + m, &in->value[e].of[m], sums);
         }
-        TRY(KERNEL(hand_up)(row, b, emit, sums, &out->value[used], d, error));
+        TRY(KERNEL(hand_up)(row, b, wanted, sums, &out->value[used], d, error));
         out->cluster[used++] = b;
     }
     out->count = used;
+done:
+    return status;
+}
+
+/* Finer columns' wavelets, of the rows of both children: of its own wavelets what is above the threshold is
+ * kept (of the root of what it would hand up too), of what it hands up the rest. */
+static TARGET lam_status KERNEL(merge_details)(const pass_row *row, const details *left, const details *right,
+                                               details *out, desk *d, lam_error *error) {
+    lam_status status = LAM_OK;
+    const wavelets *w = row->job->input->basis;
+    const wavelet_node *a = &w->nodes[row->node];
+    const float *columns = wavelet_columns(w, a);
+    size_t l = 0, r = 0;
+    out->count = 0;
+    TRY(details_reserve(out, left->count + right->count, error));
+    while (l < left->count || r < right->count) {
+        const uint32_t at_left = l < left->count ? left->list[l].j : UINT32_MAX;
+        const uint32_t at_right = r < right->count ? right->list[r].j : UINT32_MAX;
+        const uint32_t j = at_left < at_right ? at_left : at_right;
+        float x[WAVELET_INPUTS] = {0}, weight = 0;
+        if (j == at_left) {
+            weight = left->list[l].weight;
+            for (size_t m = 0; m < a->from_left; m++) x[m] = left->list[l].of[m];
+            l++;
+        }
+        if (j == at_right) {
+            weight = right->list[r].weight;
+            for (size_t m = a->from_left; m < a->inputs; m++) x[m] = right->list[r].of[m - a->from_left];
+            r++;
+        }
+        lanes y;
+        KERNEL(turn_lanes)(columns, a->inputs, x, &y);
+        detail *const to = &out->list[out->count++];
+        *to = (detail){.j = j, .weight = weight};
+        for (int lane = 0; lane < DETAIL_LANES; lane++) to->of[lane] = y[lane];
+        const float least = row->least * weight;
+        unsigned beyond = BEYOND(&y, least) & row->own_lanes;
+        for (; beyond != 0; beyond &= beyond - 1) {
+            const unsigned lane = (unsigned)__builtin_ctz(beyond);
+            TRY(desk_put(d, row_coefficient(row, lane), j, y[lane], error));
+        }
+    }
 done:
     return status;
 }
@@ -150,8 +211,8 @@ static TARGET lam_status KERNEL(begin_leaf)(const pass_row *row, size_t node, li
         } else {
             lanes sums[WAVELET_INPUTS] = {{0}};
             KERNEL(gather_leaf)(row, &w->nodes[node], cell, lit + first, last - first, d, sums);
-            const bool emit = wavelet_is_near(&job->reach, node, b);
-            TRY(KERNEL(hand_up)(row, b, emit, sums, &out->value[used], d, error));
+            const unsigned emit = wavelet_is_near(&job->reach, node, b) ? EMIT : 0;
+            TRY(KERNEL(hand_up)(row, b, emit | row->wanted, sums, &out->value[used], d, error));
         }
         out->cluster[used++] = b;
     }

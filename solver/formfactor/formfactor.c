@@ -1,9 +1,10 @@
 #include "solver/formfactor/formfactor.h"
 
 #include "solver/clock.h"
+#include "solver/formfactor/closing.h"
 #include "solver/formfactor/hemicube.h"
-#include "solver/formfactor/pairs.h"
 #include "solver/formfactor/rays.h"
+#include "solver/formfactor/recipe_pairs.h"
 #include "solver/formfactor/repair.h"
 #include "solver/formfactor/rows.h"
 #include "solver/formfactor/upper.h"
@@ -11,11 +12,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-
-/* A scene is closed when less than this share of its rays leaves: in single precision a few rays slip between
- * elements that meet without sharing vertices, or start behind a neighbour and meet its back. Their share is
- * put back by the repair. */
-static const double crack_share = 1e-4;
 
 void form_factors_free(form_factors *f) {
     csr_free(&f->F);
@@ -26,15 +22,6 @@ void form_factors_free(form_factors *f) {
     free(f->repair);
     sky_bounce_free(&f->sky);
     *f = (form_factors){0};
-}
-
-static double area_mean(const mesh *m, const double *x) {
-    double sum = 0, total = 0;
-    for (size_t i = 0; i < m->n; i++) {
-        sum += m->area[i] * x[i];
-        total += m->area[i];
-    }
-    return total > 0 ? sum / total : 0;
 }
 
 lam_status form_factors_expand(form_factors *f, const double *area, lam_error *error) {
@@ -51,19 +38,12 @@ lam_status form_factors_gather(form_factors *f, const double *area, lam_error *e
     return upper_gather(&f->upper, area, error);
 }
 
-static void measure_leaving(form_factors *f, const mesh *m) {
-    f->leaving_share = area_mean(m, f->leaving);
-    f->absorbed_share = area_mean(m, f->absorbed);
-    f->closed = f->leaving_share < crack_share;
-}
-
 /* Repairs exchange areas by what their rays say leaves. */
 static lam_status close_upper(form_factors *f, const mesh *m, lam_error *error) {
     double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) return LAM_ERR_MEMORY;
-    measure_leaving(f, m);
-    for (size_t i = 0; i < m->n; i++)
-        outside[i] = (f->closed ? 0 : f->leaving[i]) + (f->absorbed_share < crack_share ? 0 : f->absorbed[i]);
+    closing_measure(f, m);
+    for (size_t i = 0; i < m->n; i++) outside[i] = closing_outside(f, i);
     const lam_status status = repair_close(&f->upper, m->area, outside, f, error);
     free(outside);
     return status;
@@ -107,36 +87,6 @@ done:
     return status;
 }
 
-/* Segments for all pairs that are partly hidden: an element's share is as many as finer plain rays would be,
- * the more the finer the accuracy by the law of their error, and a small scene has enough to keep it. */
-static double segments_most(size_t n, double accuracy) {
-    const double an_element = 32768, enough = 64e6, normal = 7e-5;
-    return fmax(an_element * (double)n, enough) * pow(normal / accuracy, 4. / 3);
-}
-
-/* Few elements need few segments to be as accurate as asked; half a second more makes their factors, which
- * are large, nearly ten times better. */
-static const double segments_least = 8e6;
-
-static lam_status find_pairs(const mesh *m, const visibility *v, const form_factor_options *options,
-                             double threshold, form_factors *f, csr *G, lam_error *error) {
-    const recipe *r = &options->recipe;
-    const pairs_options how = {.tolerance = recipe_tolerance(r),
-                               .accuracy = r->accuracy,
-                               .segments = VISIBILITY_PACKET,
-                               .segments_least = segments_least,
-                               .segments_most = segments_most(m->n, r->accuracy),
-                               .threshold = threshold,
-                               .keep_hidden = threshold > 0,
-                               .seed = r->seed,
-                               .progress = options->progress,
-                               .stage = options->stage,
-                               .scratch = options->scratch,
-                               .scratch_name = options->scratch_name,
-                               .recipe = r};
-    return pairs_exchange(m, v, &how, G, &f->pairs, &f->rows_kept, error);
-}
-
 static lam_status make_of_pairs(const mesh *m, const visibility *v, const uint32_t *order,
                                 const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
@@ -148,9 +98,9 @@ static lam_status make_of_pairs(const mesh *m, const visibility *v, const uint32
     if (outside == NULL) return LAM_ERR_MEMORY;
     TRY(rays_count(m, v, order, &silent, &counts, f->leaving, f->absorbed, error));
     found_rows_free(&counts);
-    TRY(find_pairs(m, v, options, 0, f, &f->upper, error));
-    measure_leaving(f, m);
-    if (!(f->closed && f->absorbed_share < crack_share)) {
+    TRY(recipe_pairs_find(m, v, options, 0, f, &f->upper, error));
+    closing_measure(f, m);
+    if (!closing_all_stays(f)) {
         /* What a row lacks goes outside: 1 - sum_j g_ij / A_i. */
         for (size_t i = 0; i < m->n; i++)
             for (uint64_t p = f->upper.indptr[i]; p < f->upper.indptr[i + 1]; p++) {
@@ -171,7 +121,7 @@ static lam_status make_of_near_pairs(const mesh *m, const visibility *v, const u
     lam_status status = LAM_OK;
     found_rows counts = {0};
     csr near = {0}, counted = {0};
-    TRY(find_pairs(m, v, options, recipe_near(&options->recipe), f, &near, error));
+    TRY(recipe_pairs_find(m, v, options, recipe_near(&options->recipe), f, &near, error));
     TRY(rays_count(m, v, order, options, &counts, f->leaving, f->absorbed, error));
     if (counts.kept > f->rows_kept) f->rows_kept = counts.kept;
     TRY(upper_merge(&counts, options->recipe.rays, m->area, options->large, &counted, error));
@@ -185,20 +135,6 @@ done:
     csr_free(&near);
     csr_free(&counted);
     return status;
-}
-
-/* What repaired rows leave outside, shared as the rays found it: those that left and those that met a back
- * face where the repair counts them. */
-static lam_status close_sky(form_factors *f, size_t n, lam_error *error) {
-    double *scale = memory_allocate(n, sizeof *scale, "the light of the sky", error);
-    if (scale == NULL) return LAM_ERR_MEMORY;
-    for (size_t i = 0; i < n; i++) {
-        const double outside = f->leaving[i] + (f->absorbed_share < crack_share ? 0 : f->absorbed[i]);
-        scale[i] = f->closed || outside <= 0 ? 0 : fmax(0, 1 - f->row_sums[i]) / outside;
-    }
-    sky_bounce_close(&f->sky, scale);
-    free(scale);
-    return LAM_OK;
 }
 
 lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_factor_options *asked,
@@ -230,7 +166,7 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
         TRY(make_of_near_pairs(m, v, order, options, &f, error));
         break;
     }
-    if (asked->sky != NULL) TRY(close_sky(&f, m->n, error));
+    if (asked->sky != NULL) TRY(closing_sky(&f, m->n, error));
     if (!options->upper) TRY(form_factors_expand(&f, m->area, error));
     *out = f;
     f = (form_factors){0};

@@ -3,54 +3,68 @@
 #include "solver/formfactor/row_pool.h"
 #include "solver/formfactor/sample.h"
 
-/* What the rays of every element share. */
-typedef struct ray_context {
-    const mesh *m;
-    const visibility *v;
-    size_t rays;
-    uint64_t seed;
-    const sky_bounce *sky;
-} ray_context;
+_Static_assert((int)SKY_PACKET == VISIBILITY_PACKET, "packets go through the sky whole");
+
+size_t rays_meet(const ray_context *c, const element_sampler *sampler, size_t element, size_t first,
+                 size_t last, uint32_t *met, ray_tally *tally, double *sky) {
+    static const double ones[VISIBILITY_PACKET] = {1, 1, 1, 1, 1, 1, 1, 1};
+    uint32_t self[VISIBILITY_PACKET];
+    size_t count = 0;
+    for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = (uint32_t)element;
+    for (size_t ray = first; ray < last; ray += VISIBILITY_PACKET) {
+        ray_packet rays;
+        hit_packet hits;
+        const size_t n = last - ray < VISIBILITY_PACKET ? last - ray : VISIBILITY_PACKET;
+        element_sampler_packet(sampler, (uint32_t)ray, &rays);
+        visibility_cast(c->v, &rays, n, self, 0, &hits);
+        unsigned leaving = 0;
+        for (size_t i = 0; i < n; i++) {
+            if (hits.element[i] == VISIBILITY_NOTHING) {
+                tally->left++;
+                leaving |= 1u << i;
+            } else if (hits.back[i]) {
+                tally->lost++;
+            } else {
+                met[count++] = hits.element[i];
+            }
+        }
+        if (c->sky != NULL && leaving != 0) sky_bounce_add(c->sky, rays.direction, leaving, ones, sky);
+    }
+    return count;
+}
+
+/* Rays whose hits are counted at once. */
+enum { AT_ONCE = 512 };
+
+/* The rays of every element, and how many they are. */
+typedef struct count_context {
+    ray_context rays;
+    size_t n_rays;
+} count_context;
 
 /* Traces one element: every ray counts 1. */
 static void trace_element(const void *context, size_t element, row_pool *pool, double *leaving,
                           double *absorbed) {
-    const ray_context *c = context;
+    const count_context *c = context;
     element_sampler sampler;
-    element_sampler_init(&sampler, c->m, c->v, element, c->seed);
-    uint32_t self[VISIBILITY_PACKET];
-    for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = (uint32_t)element;
-    static const double ones[VISIBILITY_PACKET] = {1, 1, 1, 1, 1, 1, 1, 1};
-    size_t left = 0, lost = 0;
-    for (size_t ray = 0; ray < c->rays; ray += VISIBILITY_PACKET) {
-        ray_packet rays;
-        hit_packet hits;
-        const size_t n = c->rays - ray < VISIBILITY_PACKET ? c->rays - ray : VISIBILITY_PACKET;
-        element_sampler_packet(&sampler, (uint32_t)ray, &rays);
-        visibility_cast(c->v, &rays, n, self, 0, &hits);
-        unsigned leaving_now = 0;
-        for (size_t i = 0; i < n; i++) {
-            const uint32_t hit = hits.element[i];
-            if (hit == VISIBILITY_NOTHING) {
-                left++;
-                leaving_now |= 1u << i;
-            } else if (hits.back[i]) {
-                lost++;
-            } else {
-                row_pool_add(pool, hit, 1);
-            }
-        }
-        row_pool_leave(pool, c->sky, &rays, leaving_now, ones);
+    ray_tally tally = {0};
+    uint32_t met[AT_ONCE];
+    element_sampler_init(&sampler, c->rays.m, c->rays.v, element, c->rays.seed);
+    for (size_t first = 0; first < c->n_rays; first += AT_ONCE) {
+        const size_t last = first + AT_ONCE < c->n_rays ? first + AT_ONCE : c->n_rays;
+        const size_t count = rays_meet(&c->rays, &sampler, element, first, last, met, &tally, pool->sky);
+        for (size_t k = 0; k < count; k++) row_pool_add(pool, met[k], 1);
     }
-    *leaving = (double)left / (double)c->rays;
-    *absorbed = (double)lost / (double)c->rays;
+    *leaving = (double)tally.left / (double)c->n_rays;
+    *absorbed = (double)tally.lost / (double)c->n_rays;
 }
 
 lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
                       const form_factor_options *options, found_rows *counts, double *leaving,
                       double *absorbed, lam_error *error) {
-    const ray_context context = {
-        .m = m, .v = v, .rays = options->recipe.rays, .seed = options->recipe.seed, .sky = options->bounce};
+    const count_context context = {
+        .rays = {.m = m, .v = v, .seed = options->recipe.seed, .sky = options->bounce},
+        .n_rays = options->recipe.rays};
     const row_maker maker = {.make = trace_element,
                              .context = &context,
                              .kind = ROW_COUNTS,

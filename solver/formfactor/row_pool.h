@@ -27,16 +27,10 @@ static inline void row_pool_add(row_pool *pool, uint32_t seen, double weight) {
     marks_add(&pool->summed, seen);
 }
 
-_Static_assert((int)SKY_PACKET == VISIBILITY_PACKET, "packets go through the sky whole");
-
 /* What the element at hand sends out through these rays of a packet leaves the scene. */
 static inline void row_pool_leave(row_pool *pool, const sky_bounce *sky, const ray_packet *rays,
                                   unsigned leaving, const double weight[VISIBILITY_PACKET]) {
-    uint32_t tile[SKY_PACKET];
-    if (sky == NULL || leaving == 0) return;
-    sky_tiling_find(&sky->tiling, rays->direction, tile);
-    for (int i = 0; i < VISIBILITY_PACKET; i++)
-        if ((leaving >> i & 1) != 0) pool->sky[tile[i]] += weight[i];
+    if (sky != NULL && leaving != 0) sky_bounce_add(sky, rays->direction, leaving, weight, pool->sky);
 }
 
 /* How one row is made: adds all that an element sees to the pool; leaving and absorbed are the shares that

@@ -37,6 +37,14 @@ void sky_bounce_free(sky_bounce *s) {
     *s = (sky_bounce){0};
 }
 
+void sky_bounce_add(const sky_bounce *s, const float direction[3][SKY_PACKET], unsigned leaving,
+                    const double weight[SKY_PACKET], double *sums) {
+    uint32_t tile[SKY_PACKET];
+    sky_tiling_find(&s->tiling, direction, tile);
+    for (int i = 0; i < SKY_PACKET; i++)
+        if ((leaving >> i & 1) != 0) sums[tile[i]] += weight[i];
+}
+
 void sky_bounce_put(sky_bounce *s, size_t element, double *sums, double whole) {
     const size_t m = s->tiling.n_tiles;
     for (size_t t = 0; t < m; t++)

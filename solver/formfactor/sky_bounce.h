@@ -21,6 +21,10 @@ lam_status sky_bounce_create(const char *tiling, char up, double ground_albedo, 
                              lam_error *error);
 void sky_bounce_free(sky_bounce *s);
 
+/* Of a packet those rays that leave the scene: each one's weight goes to its tile's of sums, [m + 1]. */
+void sky_bounce_add(const sky_bounce *s, const float direction[3][SKY_PACKET], unsigned leaving,
+                    const double weight[SKY_PACKET], double *sums);
+
 /* Takes what one element has found: sums, [m + 1], its weight on each tile and on the ground, of the whole of
  * what it sends out; zeroes them. Any threads at once, each element once. */
 void sky_bounce_put(sky_bounce *s, size_t element, double *sums, double whole);

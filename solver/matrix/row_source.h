@@ -37,4 +37,15 @@ lam_status row_source_get(row_source *source, const uint32_t *elements, size_t m
 /* How often all rows have been asked for. */
 double row_source_passes(const row_source *source);
 
+/* Rows of F that are found as they are asked for and not kept. */
+typedef struct row_stream {
+    row_source rows; /* of F1, one side: A F = A F1 + F1^T A; each once; entries in any sequence, an index any
+                        number of times */
+    /* After all of them, once: what rows of F sum to when they are scaled to close, [n], which lives as long
+     * as the stream. */
+    lam_status (*close)(void *context, const double **row_sums, lam_error *error);
+    void *context;     /* of close */
+    row_source others; /* then: rows of F by another sample; entries likewise */
+} row_stream;
+
 #endif

@@ -153,13 +153,14 @@ static inline float *ones(const wavelets *w) {
     return made;
 }
 
-static inline csr pass_within(const subject *s, double reach, float threshold, const float *weight,
-                              size_t n_threads) {
+static inline csr pass_of(const subject *s, const csr *F, bool one_sided, double reach, float threshold,
+                          const float *weight, size_t n_threads) {
     row_source rows;
     csr S = {.n = 0};
-    row_source_of_csr(&rows, &s->F);
+    row_source_of_csr(&rows, F);
     const wavelet_pass_input input = {.basis = &s->basis,
                                       .rows = &rows,
+                                      .one_sided = one_sided,
                                       .area = s->m.area,
                                       .tree = &s->tree,
                                       .threshold = threshold,
@@ -169,6 +170,11 @@ static inline csr pass_within(const subject *s, double reach, float threshold, c
                                       .n_threads = n_threads};
     ck_ok(wavelet_pass(&input, &S, &error));
     return S;
+}
+
+static inline csr pass_within(const subject *s, double reach, float threshold, const float *weight,
+                              size_t n_threads) {
+    return pass_of(s, &s->F, false, reach, threshold, weight, n_threads);
 }
 
 static inline csr pass(const subject *s, float threshold, const float *weight, size_t n_threads) {

@@ -68,6 +68,95 @@ START_TEST(a_pass_within_reach) {
 }
 END_TEST
 
+/* Half of F, or of every pair all of it on one side or the other. */
+static csr one_side(const subject *s, bool halves) {
+    const size_t n = s->m.n;
+    uint64_t used = 0;
+    csr F1 = {.n = n,
+              .indptr = test_allocate(n + 1, sizeof *F1.indptr),
+              .indices = test_allocate(s->F.indptr[n], sizeof *F1.indices),
+              .data = test_allocate(s->F.indptr[n], sizeof *F1.data)};
+    for (size_t i = 0; i < n; i++) {
+        for (uint64_t e = s->F.indptr[i]; e < s->F.indptr[i + 1]; e++) {
+            const uint32_t j = s->F.indices[e];
+            const size_t least = i < j ? i : j, most = i < j ? j : i;
+            if (!halves && ((least + 3 * most) % 2 == 0) != (i < j)) continue;
+            F1.indices[used] = j;
+            F1.data[used++] = (halves ? .5f : 1) * s->F.data[e];
+        }
+        F1.indptr[i + 1] = used;
+    }
+    return F1;
+}
+
+/* Rows that know one side of each pair give the coefficients that rows of both sides do. */
+START_TEST(a_pass_of_one_side) {
+    subject s = subject_make(_i % SUBJECTS);
+    const size_t n = s.m.n;
+    float *weight = ones(&s.basis);
+    double *S = dense_S(&s), *truth = in_basis(&s, S);
+    csr F1 = one_side(&s, _i < SUBJECTS);
+    csr found = pass_of(&s, &F1, true, INFINITY, 0, weight, 1);
+    csr again = pass_of(&s, &F1, true, INFINITY, 0, weight, 3);
+    double *all = whole(&found);
+    ck_assert_double_le(largest_difference(n * n, all, truth), 3 * TRANSFORM_U);
+    ck_assert_uint_eq(found.indptr[n], again.indptr[n]);
+    ck_assert_mem_eq(found.indices, again.indices, found.indptr[n] * sizeof *found.indices);
+    ck_assert_mem_eq(found.data, again.data, found.indptr[n] * sizeof *found.data);
+    csr_free(&again);
+    /* Above a threshold, by weights: all that is there of it where either side has half. */
+    for (size_t t = 0; t < s.basis.n_nodes; t++) weight[t] = t % 2 == 0 ? 1 : .5f;
+    csr both = pass(&s, .02f, weight, 1);
+    again = pass_of(&s, &F1, true, INFINITY, .02f, weight, 2);
+    double *some = whole(&again), *wanted = whole(&both);
+    size_t lost = 0;
+    for (size_t k = 0; k < n * n; k++) {
+        /* A side below .35 of the threshold counts as nothing. */
+        if (some[k] != 0 && wanted[k] != 0)
+            ck_each(fabs(some[k] - wanted[k]) < .35 * .02 + 1e-5);
+        else
+            ck_each(fmax(fabs(some[k]), fabs(wanted[k])) < 1.35 * .02 + 1e-5);
+        lost += fabs(some[k] - wanted[k]) > 1e-5;
+    }
+    if (_i < SUBJECTS) ck_assert_uint_lt(lost, 10); /* beside the threshold */
+    csr_free(&F1);
+    csr_free(&found);
+    csr_free(&again);
+    csr_free(&both);
+    free(weight);
+    free(S);
+    free(truth);
+    free(all);
+    free(some);
+    free(wanted);
+    subject_free(&s);
+}
+END_TEST
+
+/* So they do within a reach: what is left out is as small. */
+START_TEST(one_side_within_reach) {
+    subject s = subject_make(ROOM);
+    const size_t n = s.m.n;
+    float *weight = ones(&s.basis);
+    csr F1 = one_side(&s, true);
+    csr far = pass(&s, 0, weight, 1), near = pass_of(&s, &F1, true, 2, 0, weight, 2);
+    double *all = whole(&far), *some = whole(&near), lost = 0, kept = 0;
+    ck_assert_uint_lt(near.indptr[n], far.indptr[n]);
+    for (size_t k = 0; k < n * n; k++) {
+        lost += (all[k] - some[k]) * (all[k] - some[k]);
+        kept += some[k] * some[k];
+    }
+    ck_assert_double_lt(lost, 1e-4 * kept);
+    csr_free(&F1);
+    csr_free(&far);
+    csr_free(&near);
+    free(weight);
+    free(all);
+    free(some);
+    subject_free(&s);
+}
+END_TEST
+
 /* --- the inverse --------------------------------------------------------------------------------------- */
 
 enum { ONE_FOR_ALL, BLACK_IN_PARTS, EACH_ITS_OWN, REFLECTANCES };
@@ -192,6 +281,8 @@ int main(void) {
     tcase_set_timeout(tests, 300);
     tcase_add_loop_test(tests, a_pass_finds_every_coefficient, 0, SUBJECTS);
     tcase_add_test(tests, a_pass_within_reach);
+    tcase_add_loop_test(tests, a_pass_of_one_side, 0, 2 * SUBJECTS);
+    tcase_add_test(tests, one_side_within_reach);
     tcase_add_loop_test(tests, reflectances_in_the_basis, 0, SUBJECTS * REFLECTANCES);
     tcase_add_loop_test(tests, what_is_skipped_is_small, 0, SUBJECTS);
     tcase_add_loop_test(tests, doubling_inverts, 0, SUBJECTS * REFLECTANCES);
