@@ -65,6 +65,14 @@ static double trace_bytes(double n, const recipe *r, bool to_disk, bool large) {
     return fmax(sample, merging) + some;
 }
 
+/* Near pairs alone, where nothing else is held: measured 7 (a Cornell box of 163,687 elements) to 33 (a city
+ * of 39,999) an element at 512 rays; as found and in rows. */
+static const double near_share = .25, near_bytes = 17;
+
+static double stream_bytes(double n, const recipe *r) {
+    return r->method == RECIPE_NEAR_PAIRS ? n * fmin(n, near_share * (double)r->rays) * near_bytes : 0;
+}
+
 /* Of the rows of a sample, what lies in memory; those of pairs always do. */
 static double held_bytes(const forecast *f, double bytes, const recipe *r) {
     return f->large && r->method != RECIPE_PAIRS ? 0 : bytes;
@@ -91,9 +99,13 @@ static double emitter_bytes(const forecast *f) {
 
 /* Numbers an element of a hierarchical operator, at most: measured 26 to 66 at epsilon .05 where F is known
  * well (a Cornell box of 10,249 elements, a canopy of 2,500), fewer of larger scenes, and 114 at .003 in that
- * box. */
+ * box. Where the noise of rays is what bounds them (as an epsilon of nearly three times that) 40 of a city
+ * and 26 of Delft by 1,024 rays. */
+static const double noise_share = 2.7;
+
 static double hierarchical_numbers(const forecast *f) {
-    return 66 * sqrt(.05 / f->epsilon);
+    const double noise = recipe_noise(&f->recipe);
+    return 66 * sqrt(.05 / fmax(f->epsilon, noise_share * noise));
 }
 
 /* A number in memory: both triangles, as rows and as slices; in a store; and while it is built, beside two
@@ -135,9 +147,10 @@ double forecast_bytes(const forecast *f) {
                         : f->hierarchical
                             ? (element_build_bytes + number_build_bytes * hierarchical_numbers(f)) * n
                             : build;
-    double peak = fmax(trace, sample + fmax(made, operator_bytes(f) + compress_bytes(f)));
+    const double held = f->streamed ? stream_bytes(n, &f->recipe) : sample;
+    double peak = fmax(f->streamed ? held : trace, held + fmax(made, operator_bytes(f) + compress_bytes(f)));
     if (f->probes > 0) {
-        /* Two more samples and their mean; emissions, answers and the vectors of the iteration per probe. */
+        /* Two more samples and their mean, beside the first; emissions, answers and the vectors of the iteration per probe. */
         const double probes = (double)f->probes + 9;
         const recipe *r = &f->judge_recipe;
         const double references = held_bytes(f, reference_bytes(f), r);
@@ -164,8 +177,12 @@ static double sample_seconds(double n, const recipe *r, double rays_per_second, 
 forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n_threads) {
     const double n = (double)f->n;
     forecast_times times = {0};
-    if (!f->from_store) times.form_factors = sample_seconds(n, &f->recipe, rays_per_second, n_threads);
-    if (f->probes > 0) times.judge = 2 * sample_seconds(n, &f->judge_recipe, rays_per_second, n_threads);
+    const double once = sample_seconds(n, &f->recipe, rays_per_second, n_threads);
+    if (!f->from_store)
+        times.form_factors = f->streamed ? n * recipe_rays(n, &f->recipe) / rays_per_second : once;
+    if (f->probes > 0)
+        times.judge = 2 * sample_seconds(n, &f->judge_recipe, rays_per_second, n_threads) +
+                      (f->streamed ? once : 0);
     return times;
 }
 
@@ -299,6 +316,9 @@ lam_status forecast_check(const forecast *f, double limit, lam_error *error) {
     const char *disk = forecast_bytes(&cheaper) <= limit ? "--scratch DIR, or " : "";
     cheaper.scratch = f->scratch;
     cheaper.large = f->large;
+    cheaper.probes = 0;
+    const char *unjudged = forecast_bytes(&cheaper) <= limit ? "--probes 0, or " : "";
+    cheaper.probes = f->probes;
     cheaper.exact = false;
     while (forecast_bytes(&cheaper) > limit && sample_less(&cheaper.recipe)) {
         less = true;
@@ -316,8 +336,8 @@ lam_status forecast_check(const forecast *f, double limit, lam_error *error) {
         snprintf(advice, sizeof advice, "%s", method);
     }
     FAIL(error, LAM_ERR_MEMORY,
-         "%zu elements with %s%s need about %s of memory, --memory allows %s; fits: %s%s", f->n, asked, sky,
-         needs, allows, disk, advice);
+         "%zu elements with %s%s need about %s of memory, --memory allows %s; fits: %s%s%s", f->n, asked, sky,
+         needs, allows, unjudged, disk, advice);
 done:
     return status;
 }

@@ -76,7 +76,7 @@ static bool is_hierarchical(const precompute_options *o, double n) {
 }
 
 /* Bytes of rows from which on they are rather found twice, where a judge needs them, than held. */
-static const double held_most = 0x1p28;
+static const double held_most = 0x1p26;
 
 bool work_streams(const work *w) {
     const precompute_options *o = w->options;

@@ -20,7 +20,7 @@ typedef float lanes_unaligned __attribute__((vector_size(32), aligned(4), may_al
 
 /* Of rows that know one side a coefficient is half there: it is looked at from this share of the threshold on,
  * for what noise may lack of that half. */
-static const float share_looked_at = .35f;
+static const float share_looked_at = .2f;
 
 /* So many numbers ahead memory is asked for what is going to be needed. */
 enum { AHEAD = 12 };

@@ -179,8 +179,8 @@ static void find_row(ray_rows *r, size_t i, double *sky, filling *to) {
     for (size_t k = 0; k < near.count; k++)
         if (near.data[k] > 0) put(to, near.indices[k], .5 * (double)near.data[k]);
     r->own[i] = own;
-    r->f.leaving[i] = (double)tally.left * each;
-    r->f.absorbed[i] = (double)tally.lost * each;
+    r->f.leaving[i] = (double)tally.left / (double)rays;
+    r->f.absorbed[i] = (double)tally.lost / (double)rays;
     if (sky != NULL) sky_bounce_put(&r->f.sky, i, sky, (double)rays);
 }
 
