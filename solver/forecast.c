@@ -150,7 +150,8 @@ double forecast_bytes(const forecast *f) {
     const double held = f->streamed ? stream_bytes(n, &f->recipe) : sample;
     double peak = fmax(f->streamed ? held : trace, held + fmax(made, operator_bytes(f) + compress_bytes(f)));
     if (f->probes > 0) {
-        /* Two more samples and their mean, beside the first; emissions, answers and the vectors of the iteration per probe. */
+        /* Two more samples and their mean, beside the first; emissions, answers and the vectors of the
+         * iteration per probe. */
         const double probes = (double)f->probes + 9;
         const recipe *r = &f->judge_recipe;
         const double references = held_bytes(f, reference_bytes(f), r);
@@ -181,8 +182,8 @@ forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n
     if (!f->from_store)
         times.form_factors = f->streamed ? n * recipe_rays(n, &f->recipe) / rays_per_second : once;
     if (f->probes > 0)
-        times.judge = 2 * sample_seconds(n, &f->judge_recipe, rays_per_second, n_threads) +
-                      (f->streamed ? once : 0);
+        times.judge =
+            2 * sample_seconds(n, &f->judge_recipe, rays_per_second, n_threads) + (f->streamed ? once : 0);
     return times;
 }
 

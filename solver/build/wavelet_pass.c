@@ -18,8 +18,8 @@
 typedef float lanes __attribute__((vector_size(32)));
 typedef float lanes_unaligned __attribute__((vector_size(32), aligned(4), may_alias));
 
-/* Of rows that know one side a coefficient is half there: it is looked at from this share of the threshold on,
- * for what noise may lack of that half. */
+/* Of rows that know one side a coefficient is half there: it is looked at from this share of the threshold
+ * on, for what noise may lack of that half. */
 static const float share_looked_at = .2f;
 
 /* So many numbers ahead memory is asked for what is going to be needed. */
@@ -92,9 +92,9 @@ typedef struct pass_row {
     size_t node;
     unsigned wanted; /* of columns that its rows are handed up on: DETAILS, or nothing */
     uint32_t height;
-    uint32_t first; /* coefficient of lane 0, were lanes of what is handed up coefficients too */
+    uint32_t first;     /* coefficient of lane 0, were lanes of what is handed up coefficients too */
     unsigned own_lanes; /* coefficients: wavelets; of the root, where rows know one side, all */
-    float least; /* threshold times the weight of the node */
+    float least;        /* threshold times the weight of the node */
 } pass_row;
 
 static void kept_rows_free(kept_rows *k) {
@@ -251,8 +251,8 @@ static void swap(live_rows **a, live_rows **b) {
     *b = swapped;
 }
 
-/* Finer columns of the children's rows, and what this node's rows found on their way: that stands in ascending
- * runs, first that of a leaf itself, then one for each height. */
+/* Finer columns of the children's rows, and what this node's rows found on their way: that stands in
+ * ascending runs, first that of a leaf itself, then one for each height. */
 static lam_status take_details(pass_job *job, const pass_row *row, desk *d, size_t n_heights,
                                lam_error *error) {
     lam_status status = LAM_OK;
@@ -339,8 +339,7 @@ static lam_status job_make(const wavelet_pass_input *input, pass_job *job, lam_e
     lam_status status = LAM_OK;
     const wavelets *w = input->basis;
     const size_t N = w->n_nodes;
-    *job = (pass_job){.input = input,
-                      .least = input->threshold * (input->one_sided ? share_looked_at : 1)};
+    *job = (pass_job){.input = input, .least = input->threshold * (input->one_sided ? share_looked_at : 1)};
     job->kept = memory_allocate(N, sizeof *job->kept, "wavelets", error);
     if (input->one_sided) job->details = memory_allocate(N, sizeof *job->details, "wavelets", error);
     if (input->one_sided && job->details == NULL) TRY(LAM_ERR_MEMORY);

@@ -53,8 +53,8 @@ static inline TARGET lam_status KERNEL(add_details)(const pass_row *row, uint32_
     if (status != LAM_OK) return status;
     for (size_t k = node->scaling; k < node->inputs; k++) {
         detail *const to = &d->fresh.list[d->fresh.count++];
-        *to = (detail){.j = node->first + (uint32_t)(k - node->scaling),
-                       .weight = row->job->input->weight[b]};
+        *to =
+            (detail){.j = node->first + (uint32_t)(k - node->scaling), .weight = row->job->input->weight[b]};
         for (int lane = 0; lane < DETAIL_LANES; lane++) to->of[lane] = out[k][lane];
     }
     return LAM_OK;
