@@ -1,6 +1,8 @@
 /* Closed grey Cornell boxes of growing size: what a hierarchical operator takes, beside one of low rank. */
 #include "solver/bench/hierarchical.h"
 #include "solver/bench/scenes.h"
+#include "solver/clock.h"
+#include "solver/formfactor/ray_rows.h"
 
 #include <math.h>
 #include <omp.h>
@@ -24,10 +26,11 @@ static const double memory_share = .5;
 
 static const table_column columns[] = {
     {"elements", "", "n"},
-    {"form_factors_s", "s", "near pairs, 512 rays an element"},
-    {"wavelets_s", "s", "pass over F"},
+    {"near_pairs_s", "s", "pair by pair"},
+    {"wavelets_s", "s", "512 rays an element and the pass over what they find"},
     {"inverse_s", "s", "inverse and self-checks"},
     {"build_s", "s", "all of these"},
+    {"peak_mb", "MB", "of memory while it was built"},
     {"exponent", "", "p of build time ~ n^p since the size before"},
     {"numbers", "", "of K, upper triangle, an element"},
     {"stored_mb", "MB", "of the operator in a store"},
@@ -70,9 +73,9 @@ done:
     return status;
 }
 
-/* The same box by form factors of another seed. */
-static lam_status judge(const bench_run *run, const lowrank_scene *s, lowrank_verdict *out,
-                        lam_error *error) {
+/* The operator by form factors of another seed; those it was made of are found once more. */
+static lam_status judge(const bench_run *run, lowrank_scene *s, const recipe *own, lam_operator *op,
+                        error_report *out, lam_error *error) {
     lam_status status = LAM_OK;
     form_factors independent = {.row_sums = NULL};
     first_light *first = NULL;
@@ -82,16 +85,21 @@ static lam_status judge(const bench_run *run, const lowrank_scene *s, lowrank_ve
                                                 .seed = run->seed + 1000},
                                      .progress = run->progress,
                                      .stage = "independent form factors"};
+    TRY(lowrank_trace(run, s, own, error));
+    const build_problem problem = lowrank_problem(s);
     TRY(form_factors_make(&s->m, s->z_order, &how, &independent, error));
     TRY(form_factors_expand(&independent, s->m.area, error));
     TRY(first_light_create(&s->m, run->seed, &first, error));
-    const lowrank_case of = {.method = "hierarchical",
-                             .factorizer = "auto",
-                             .epsilon = epsilon,
-                             .probes = run->scale == BENCH_QUICK ? PROBES_QUICK : PROBES,
-                             .independent = &independent.F,
-                             .first = first};
-    TRY(lowrank_judge(run, s, &of, out, error));
+    const judge_input input = {.problem = &problem,
+                               .row_sums = s->f.row_sums,
+                               .emission = s->m.emission,
+                               .independent = &independent.F,
+                               .first_light = first_light_for_judge,
+                               .first_light_context = first,
+                               .probes = run->scale == BENCH_QUICK ? PROBES_QUICK : PROBES,
+                               .seed = run->seed,
+                               .progress = run->progress};
+    TRY(judge_operator(op, &input, out, error));
 done:
     first_light_destroy(first);
     form_factors_free(&independent);
@@ -118,34 +126,47 @@ static lam_status add_size(const bench_run *run, size_t elements, grown *before,
     lowrank_scene s = {.name = NULL};
     lam_operator *op = NULL;
     build_report built;
-    lowrank_verdict verdict = {.bytes = 0};
+    error_report judgement = {.has_total = false}, *const e = &judgement;
     double query, low_rank, stored;
     operator_description about = {.density = -1};
+    ray_rows *rays = NULL;
+    row_stream stream;
     TRY(bench_check(run, error));
     TRY(scene_generated(&box, &m, error));
-    TRY(lowrank_open(run, "closed cornell", &m, &how, &s, error));
-    const build_problem problem = lowrank_problem(&s);
+    TRY(lowrank_open(run, "closed cornell", &m, NULL, &s, error));
+    const form_factor_options look = {.recipe = how, .progress = run->progress, .stage = "near pairs"};
+    const double before_it = lowrank_begin_peak(), started = clock_seconds();
+    TRY(ray_rows_create(&s.m, &look, &rays, error));
+    const double near = clock_seconds() - started;
+    ray_rows_stream(rays, run->seed + 2000, &stream);
+    build_problem problem = lowrank_problem(&s);
+    problem.F = NULL;
+    problem.stream = &stream;
+    problem.noise = recipe_noise(&how);
     const double n = (double)s.m.n;
     TRY(build_operator(&problem, &options, &op, &built, error));
+    const double peak = lowrank_peak(before_it);
+    ray_rows_destroy(rays);
+    rays = NULL;
     lam_operator_set_threads(op, (size_t)omp_get_max_threads());
     TRY(lowrank_time_answer(op, SOLVES, &query, error));
     TRY(lowrank_stored_bytes(op, &stored, error));
     operator_describe(op, &about);
-    lam_operator_close(op);
-    op = NULL;
     const size_t rank = (size_t)(rank_known * sqrt(n / rank_known_at));
     const bool judged = s.m.n <= JUDGED_MOST;
-    if (judged) TRY(judge(run, &s, &verdict, error));
+    if (judged) TRY(judge(run, &s, &how, op, &judgement, error));
+    lam_operator_close(op);
+    op = NULL;
     form_factors_free(&s.f);
     s.f = (form_factors){.row_sums = NULL};
     TRY(time_low_rank(run, &s.m, rank, &low_rank, error));
-    const double build = s.seconds + built.factorize_seconds + built.invert_seconds;
-    const error_report *e = &verdict.judged;
+    const double build = near + built.factorize_seconds + built.invert_seconds;
     table_number(out, n);
-    table_number(out, s.seconds);
+    table_number(out, near);
     table_number(out, built.factorize_seconds);
     table_number(out, built.invert_seconds);
     table_number(out, build);
+    table_number(out, 1e-6 * peak);
     table_number(out, before->n > 0 ? log(build / before->build_s) / log(n / before->n) : NAN);
     table_number(out, .5 * about.density * n);
     table_number(out, 1e-6 * stored);
@@ -160,6 +181,7 @@ static lam_status add_size(const bench_run *run, size_t elements, grown *before,
     *before = (grown){.n = n, .build_s = build};
 done:
     lam_operator_close(op);
+    ray_rows_destroy(rays);
     lowrank_scene_free(&s);
     mesh_free(&m);
     return status;

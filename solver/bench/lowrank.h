@@ -20,9 +20,11 @@ typedef struct lowrank_scene {
 
 void lowrank_scene_free(lowrank_scene *s);
 
-/* Takes the mesh over and finds its form factors by a recipe; name is static. */
+/* Takes the mesh over and finds its form factors by a recipe, or leaves them for later where it is NULL; name
+ * is static. */
 lam_status lowrank_open(const bench_run *run, const char *name, mesh *m, const recipe *how,
                         lowrank_scene *out, lam_error *error);
+lam_status lowrank_trace(const bench_run *run, lowrank_scene *s, const recipe *how, lam_error *error);
 
 /* All pairs up to 24,000 elements, rays beyond. */
 recipe lowrank_recipe(const bench_run *run, size_t elements);
@@ -37,6 +39,11 @@ lam_status lowrank_room(const bench_run *run, size_t divisions, lowrank_scene *o
 /* The Cornell box with its blocks; a courtyard of two storeys with galleries. About so many elements. */
 lam_status lowrank_cornell(const bench_run *run, size_t elements, lowrank_scene *out, lam_error *error);
 lam_status lowrank_patio(const bench_run *run, size_t elements, lowrank_scene *out, lam_error *error);
+
+/* Bytes of memory now, from which on the most is watched anew (where the kernel does not do that, it is that
+ * of the whole run); and by how much that has passed them since. */
+double lowrank_begin_peak(void);
+double lowrank_peak(double before);
 
 /* One factorization, measured. */
 typedef struct lowrank_result {

@@ -45,13 +45,20 @@ lam_status lowrank_open(const bench_run *run, const char *name, mesh *m, const r
         mesh_centroid(&s.m, i, s.centre[i]);
     }
     TRY(mesh_surfaces(&s.m, s.surface, &n_surfaces, error));
-    TRY(formfactors_make_timed(run, &s.m, s.z_order, how, "form factors", &s.f, &s.seconds, error));
-    if (s.f.F.indptr == NULL) TRY(form_factors_expand(&s.f, s.m.area, error));
-    bench_say(run, "%s of %zu elements: form factors in %.1f s", name, s.m.n, s.seconds);
+    if (how != NULL) TRY(lowrank_trace(run, &s, how, error));
     *out = s;
     s = (lowrank_scene){0};
 done:
     lowrank_scene_free(&s);
+    return status;
+}
+
+lam_status lowrank_trace(const bench_run *run, lowrank_scene *s, const recipe *how, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(formfactors_make_timed(run, &s->m, s->z_order, how, "form factors", &s->f, &s->seconds, error));
+    if (s->f.F.indptr == NULL) TRY(form_factors_expand(&s->f, s->m.area, error));
+    bench_say(run, "%s of %zu elements: form factors in %.1f s", s->name, s->m.n, s->seconds);
+done:
     return status;
 }
 
@@ -234,12 +241,18 @@ static double memory_of(const char *name) {
     return 1024 * kib;
 }
 
-/* Lets the peak begin anew; where the kernel does not, peaks are those of the whole run. */
-static void reset_peak(void) {
+double lowrank_begin_peak(void) {
+    malloc_trim(0);
+    const double now = memory_of("VmRSS:");
     FILE *f = fopen("/proc/self/clear_refs", "w");
-    if (f == NULL) return;
+    if (f == NULL) return now;
     fputs("5", f);
     fclose(f);
+    return now;
+}
+
+double lowrank_peak(double before) {
+    return memory_of("VmHWM:") - before;
 }
 
 lam_status lowrank_factorize(const bench_run *run, const lowrank_scene *s, const char *name,
@@ -253,9 +266,7 @@ lam_status lowrank_factorize(const bench_run *run, const lowrank_scene *s, const
     if (repeats > REPEATS_MOST) repeats = REPEATS_MOST;
     row_source_of_csr(&rows, &s->f.F);
     TRY(scaled_init(&S, &rows, s->m.area, in_z_order ? s->z_order : s->mesh_order, error));
-    malloc_trim(0);
-    before = memory_of("VmRSS:");
-    reset_peak();
+    before = lowrank_begin_peak();
     for (size_t k = 0; k < repeats; k++) {
         TRY(bench_check(run, error));
         tall_factors_free(&f);
@@ -263,7 +274,7 @@ lam_status lowrank_factorize(const bench_run *run, const lowrank_scene *s, const
         TRY(factorize(name, &S, options, &f, &out->report, error));
         seconds[k] = clock_seconds() - started;
     }
-    out->peak = memory_of("VmHWM:") - before;
+    out->peak = lowrank_peak(before);
     out->seconds = stats_median(seconds, repeats);
     out->rank = f.rank;
     TRY(norm_of_error(&S, &f, run->progress, &out->real, error));

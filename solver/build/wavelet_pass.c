@@ -181,6 +181,8 @@ static lam_status scatter_rows(const pass_job *job, size_t node, desk *d, lam_er
     const wavelet_node *a = &input->basis->nodes[node];
     const uint32_t *elements = input->tree->order + a->begin;
     row_block rows = {0};
+    /* Where rows are found only now a leaf may take seconds. */
+    if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
     TRY(row_source_get(input->rows, elements, a->n_elements, &rows, error));
     for (size_t lane = 0; lane < a->n_elements; lane++) {
         const float root = job->reach.place[a->begin + lane].root;

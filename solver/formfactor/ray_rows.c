@@ -107,11 +107,13 @@ static bool is_near(const near_row *row, uint32_t element) {
     return first < row->count && row->indices[first] == element;
 }
 
-/* A block that is being filled: its entries stand one row after the other. */
+/* A block that is being filled: its entries stand one row after the other. Of more rays than there are
+ * elements hits are added up first. */
 typedef struct filling {
     uint32_t *indices;
     float *data;
     size_t used;
+    double *sums; /* [n], all 0 between rows; NULL: every hit is an entry */
 } filling;
 
 static void put(filling *to, uint32_t index, double value) {
@@ -119,24 +121,44 @@ static void put(filling *to, uint32_t index, double value) {
     to->data[to->used++] = (float)value;
 }
 
+static inline void put_hit(filling *to, uint32_t index, double value) {
+    if (to->sums != NULL)
+        to->sums[index] += value;
+    else
+        put(to, index, value);
+}
+
+/* What hits have added up to becomes entries. */
+static void put_sums(filling *to, size_t n) {
+    for (size_t j = 0; to->sums != NULL && j < n; j++) {
+        if (to->sums[j] > 0) put(to, (uint32_t)j, to->sums[j]);
+        to->sums[j] = 0;
+    }
+}
+
 static lam_status begin_block(const ray_rows *r, const uint32_t *elements, size_t m, row_block *out,
                               filling *to, lam_error *error) {
-    size_t most = m * r->f.recipe.rays;
+    const size_t n = r->m->n, rays = r->f.recipe.rays;
+    size_t most = m * (rays < n ? rays : n);
     for (size_t k = 0; k < m && r->near.n > 0; k++)
         most += (size_t)(r->near.indptr[elements[k] + 1] - r->near.indptr[elements[k]]);
     const uint32_t **indices = memory_allocate(m, sizeof *indices, "rows of form factors", error);
     const float **data = memory_allocate(m, sizeof *data, "rows of form factors", error);
     size_t *length = memory_allocate(m, sizeof *length, "rows of form factors", error);
     *to = (filling){.indices = malloc((most + 1) * sizeof *to->indices),
-                    .data = malloc((most + 1) * sizeof *to->data)};
+                    .data = malloc((most + 1) * sizeof *to->data),
+                    .sums = rays < n ? NULL : calloc(n, sizeof *to->sums)};
     *out = (row_block){.m = m,
                        .indices = indices,
                        .data = data,
                        .length = length,
                        .owned = {indices, data, length, to->indices, to->data}};
-    if (indices != NULL && data != NULL && length != NULL && to->indices != NULL && to->data != NULL)
+    if (indices != NULL && data != NULL && length != NULL && to->indices != NULL && to->data != NULL &&
+        (rays < n || to->sums != NULL))
         return LAM_OK;
     row_block_free(out);
+    free(to->sums);
+    to->sums = NULL;
     return status_fail(error, LAM_ERR_MEMORY, "rows of form factors: cannot allocate %zu x %zu bytes", most,
                        sizeof *to->indices + sizeof *to->data);
 }
@@ -171,11 +193,12 @@ static void find_row(ray_rows *r, size_t i, double *sky, filling *to) {
             const uint32_t j = met[k];
             if (j == i || is_near(&near, j)) continue; /* a plane does not see itself */
             const double mine = each * area[j] / (area[i] + area[j]);
-            put(to, j, mine);
+            put_hit(to, j, mine);
             own += mine;
             __atomic_fetch_add(&r->received[j], (uint64_t)((each - mine) / unit), __ATOMIC_RELAXED);
         }
     }
+    put_sums(to, r->m->n);
     for (size_t k = 0; k < near.count; k++)
         if (near.data[k] > 0) put(to, near.indices[k], .5 * (double)near.data[k]);
     r->own[i] = own;
@@ -199,6 +222,7 @@ static lam_status find_rows(void *context, const uint32_t *elements, size_t m, r
         find_row(r, elements[k], sky, &to);
         end_row(out, k, &to, first);
     }
+    free(to.sums);
     free(sky);
     return status;
 }
@@ -217,8 +241,9 @@ static void find_other_row(const ray_rows *r, size_t i, filling *to) {
         const size_t last = first + AT_ONCE < rays ? first + AT_ONCE : rays;
         const size_t count = rays_meet(&c, &sampler, i, first, last, met, &tally, NULL);
         for (size_t e = 0; e < count; e++)
-            if (met[e] != i && !is_near(&near, met[e])) put(to, met[e], 1 / (double)rays);
+            if (met[e] != i && !is_near(&near, met[e])) put_hit(to, met[e], 1 / (double)rays);
     }
+    put_sums(to, r->m->n);
     for (size_t e = 0; e < near.count; e++)
         if (near.data[e] > 0) put(to, near.indices[e], (double)near.data[e]);
     for (size_t e = begin; e < to->used; e++) sum += (double)to->data[e];
@@ -236,6 +261,7 @@ static lam_status find_other_rows(void *context, const uint32_t *elements, size_
         find_other_row(r, elements[k], &to);
         end_row(out, k, &to, first);
     }
+    free(to.sums);
     return status;
 }
 

@@ -21,7 +21,7 @@ lam_status recipe_pairs_find(const mesh *m, const visibility *v, const form_fact
     const pairs_options how = {.tolerance = recipe_tolerance(r),
                                .accuracy = r->accuracy,
                                .segments = VISIBILITY_PACKET,
-                               .segments_least = segments_least,
+                               .segments_least = threshold > 0 ? 0 : segments_least,
                                .segments_most = segments_most(m->n, r->accuracy),
                                .threshold = threshold,
                                .keep_hidden = threshold > 0,

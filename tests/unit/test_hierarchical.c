@@ -95,8 +95,12 @@ START_TEST(epsilon_is_what_it_costs) {
         ck_assert_double_gt(about.density, 1.2 * density);
         density = about.density;
         /* Half of it is stored, four bytes a number. */
-        const forecast f = {.n = n, .n_channels = 1, .hierarchical = true, .epsilon = epsilons[k]};
-        const forecast without = {.n = n, .n_channels = 1, .sparse = true};
+        const forecast f = {.n = n,
+                            .n_channels = 1,
+                            .recipe = {.method = RECIPE_PAIRS},
+                            .hierarchical = true,
+                            .epsilon = epsilons[k]};
+        const forecast without = {.n = n, .n_channels = 1, .recipe = f.recipe, .sparse = true};
         const double stored = 2 * density * (double)n * (double)n;
         const double foreseen = forecast_store_bytes(&f) - forecast_store_bytes(&without);
         ck_assert_double_ge(foreseen, stored);
