@@ -338,7 +338,7 @@ lam_status forecast_check(const forecast *f, double limit, lam_error *error) {
     }
     FAIL(error, LAM_ERR_MEMORY,
          "%zu elements with %s%s need about %s of memory, --memory allows %s; fits: %s%s%s", f->n, asked, sky,
-         needs, allows, unjudged, disk, advice);
+         needs, allows, disk, unjudged, advice);
 done:
     return status;
 }

@@ -123,7 +123,7 @@ class Streamed(unittest.TestCase):
     def test_too_little_memory(self):
         done = lambert("precompute", self.scene, "-o", self.path("no.h5"), *self.common, "--probes", 8, "--memory", "60M")
         self.assertEqual(done.returncode, 1)
-        self.assertIn("fits: --probes 0, or", done.stderr)
+        self.assertIn("--probes 0, or", done.stderr)
         self.assertFalse(self.path("no.h5").exists())
 
 
