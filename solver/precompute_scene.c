@@ -78,9 +78,10 @@ static bool is_hierarchical(const precompute_options *o, double n) {
 /* Bytes of rows from which on they are rather found twice, where a judge needs them, than held. */
 static const double held_most = 0x1p26;
 
-bool work_streams(const work *w) {
+/* Whether nobody but a hierarchical operator asks for rows of n elements, and they would take much memory. */
+static bool streams(const work *w, double n) {
     const precompute_options *o = w->options;
-    const double n = (double)w->m.n, bytes = 8 * n * fmin(n, 2 * (double)w->recipe.rays);
+    const double bytes = 8 * n * fmin(n, 2 * (double)w->recipe.rays);
     const bool kept = o->keep_form_factors || o->compress_form_factors || o->from_store || o->scratch != NULL;
     if (kept || !ray_rows_can(&w->recipe) || !(bytes > held_most)) return false;
     if (strcmp(o->method, "auto") != 0) return strcmp(o->method, "hierarchical") == 0;
@@ -160,7 +161,7 @@ static lam_status check_memory(work *w, double n, lam_error *error) {
         if (all_pairs && !pairs_too) continue;
         w->large = way >= 2;
         w->recipe = o->from_store ? w->f.recipe : choice_recipe(&asked, all_pairs);
-        w->streamed = work_streams(w);
+        w->streamed = streams(w, n);
         f = work_forecast(w, n);
         if (forecast_bytes(&f) <= w->memory) break;
     }

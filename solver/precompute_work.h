@@ -66,9 +66,6 @@ double work_memory(const precompute_options *o);
 /* Form factors of a scene: precompute.c. */
 lam_status work_trace(work *w, lam_error *error);
 
-/* Whether nobody but a hierarchical operator asks for rows of F, and they would take much memory. */
-bool work_streams(const work *w);
-
 /* The rows of near pairs, if the recipe has any; the others are found while the operator is built. */
 lam_status work_begin_stream(work *w, lam_error *error);
 

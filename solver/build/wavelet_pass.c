@@ -418,7 +418,8 @@ static lam_status told(pass_job *job, size_t elements, lam_error *error) {
 #pragma omp critical(wavelet_pass_progress)
     {
         job->done += elements;
-        progress_report(p, "wavelets", (double)job->done / (double)job->input->basis->n);
+        progress_report(p, job->input->one_sided ? "rays, wavelets" : "wavelets",
+                        (double)job->done / (double)job->input->basis->n);
         if (progress_cancelled(p)) status = status_fail(error, LAM_ERR_CANCELLED, "cancelled");
     }
     return status;
