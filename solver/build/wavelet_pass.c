@@ -2,6 +2,7 @@
 
 #include "solver/build/subtrees.h"
 #include "solver/build/wavelet_details.h"
+#include "solver/build/wavelet_kept.h"
 #include "solver/operator/marks.h"
 
 #include "store/status.h"
@@ -64,12 +65,6 @@ typedef struct pass_job {
     size_t done;           /* elements */
 } pass_job;
 
-/* A coefficient that is kept, above the diagonal or on it. */
-typedef struct kept {
-    uint32_t i, j;
-    float value;
-} kept;
-
 /* What a thread works with. */
 typedef struct desk {
     lanes *dense;           /* [n], rows of a leaf: all 0 between leaves */
@@ -78,8 +73,7 @@ typedef struct desk {
     live_rows rows[2], near[2];
     details fresh, merged, joined; /* of a node: found at it, of its children, both */
     size_t *runs;                  /* where those of each height begin in the first */
-    kept *found;
-    size_t n_found, capacity;
+    kept_list found;
 } desk;
 
 /* What is wanted of a column's wavelets: what is above the threshold in those of the rows, what they are to
@@ -110,28 +104,13 @@ static inline uint32_t row_coefficient(const pass_row *row, unsigned lane) {
     return lane < scaling ? (uint32_t)w->n - scaling + lane : row->first + lane;
 }
 
-/* Puts down coefficient (i, j). */
-static lam_status desk_put(desk *d, uint32_t i, uint32_t j, float value, lam_error *error) {
-    if (d->n_found == d->capacity) {
-        const size_t capacity = d->capacity + d->capacity / 2 + 4096;
-        kept *const more = realloc(d->found, capacity * sizeof *more);
-        if (more == NULL)
-            return status_fail(error, LAM_ERR_MEMORY, "wavelets: cannot allocate %zu x %zu bytes", capacity,
-                               sizeof *more);
-        d->found = more;
-        d->capacity = capacity;
-    }
-    d->found[d->n_found++] = i < j ? (kept){i, j, value} : (kept){j, i, value};
-    return LAM_OK;
-}
-
 /* Of the row's node and column node b. Of two nodes of one height each finds the other: where rows know both
  * sides the earlier one keeps what they find, of itself the upper triangle. */
 static lam_status desk_keep(const pass_row *row, desk *d, uint32_t b, uint32_t i, uint32_t j, float value,
                             lam_error *error) {
     const bool both_sides = row->job->details == NULL;
     if (both_sides && row->job->reach.height[b] == row->height && j < i) return LAM_OK;
-    return desk_put(d, i, j, value, error);
+    return kept_put(&d->found, i, j, value, error);
 }
 
 static inline unsigned beyond_portable(const lanes *v, float least) {
@@ -371,8 +350,8 @@ static void desk_free(desk *d) {
     details_free(&d->merged);
     details_free(&d->joined);
     free(d->runs);
-    free(d->found);
-    *d = (desk){.n_found = 0};
+    kept_free(&d->found);
+    *d = (desk){.dense = NULL};
 }
 
 static void *aligned_lanes(size_t count, size_t size, lam_error *error) {
@@ -456,74 +435,22 @@ static lam_status run_all(pass_job *job, desk *desks, lam_error *error) {
                         error);
 }
 
-static int by_column(const void *left, const void *right) {
-    const kept *a = left, *b = right;
-    return a->j < b->j ? -1 : a->j > b->j;
-}
-
-/* Of each coefficient what either side found, twice that on the diagonal: their sums, above the threshold. */
-static lam_status add_sides(const pass_job *job, csr *S, lam_error *error) {
-    const wavelets *w = job->input->basis;
-    uint64_t used = 0, p = 0;
-    float *weight = memory_allocate(w->n, sizeof *weight, "wavelets", error);
-    if (weight == NULL) return LAM_ERR_MEMORY;
-    for (size_t t = 0; t < w->n_nodes; t++) {
-        const wavelet_node *a = &w->nodes[t];
-        const size_t count = a->inputs - (t + 1 < w->n_nodes ? a->scaling : 0);
-        for (size_t k = 0; k < count; k++) weight[a->first + k] = job->input->weight[t];
-    }
-    for (size_t i = 0; i < w->n; i++) {
-        const uint64_t end = S->indptr[i + 1];
-        while (p < end) {
-            const uint32_t j = S->indices[p];
-            float sum = S->data[p++] * (j == i ? 2 : 1);
-            if (p < end && S->indices[p] == j) sum += S->data[p++];
-            if (!(fabsf(sum) > job->input->threshold * weight[i] * weight[j])) continue;
-            S->indices[used] = j;
-            S->data[used++] = sum;
-        }
-        S->indptr[i + 1] = used;
-    }
-    free(weight);
-    return csr_reserve(S, used, error);
-}
-
-/* All that was kept, by rows. */
 static lam_status gather(const pass_job *job, desk *desks, csr *out, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = job->input->basis->n;
-    csr made = {.n = n, .indptr = memory_allocate(n + 1, sizeof *made.indptr, "wavelets", error)};
-    kept *all = NULL;
-    if (made.indptr == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t k = 0; k < job->input->n_threads; k++)
-        for (size_t e = 0; e < desks[k].n_found; e++) made.indptr[desks[k].found[e].i + 1]++;
-    for (size_t i = 0; i < n; i++) made.indptr[i + 1] += made.indptr[i];
-    const size_t total = (size_t)made.indptr[n];
-    all = memory_allocate(total, sizeof *all, "wavelets", error);
-    made.indices = memory_allocate(total, sizeof *made.indices, "wavelets", error);
-    made.data = memory_allocate(total, sizeof *made.data, "wavelets", error);
-    if (all == NULL || made.indices == NULL || made.data == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t k = 0; k < job->input->n_threads; k++) {
-        for (size_t e = 0; e < desks[k].n_found; e++)
-            all[made.indptr[desks[k].found[e].i]++] = desks[k].found[e];
+    const wavelet_pass_input *input = job->input;
+    kept_list *lists = memory_allocate(input->n_threads, sizeof *lists, "wavelets", error);
+    if (lists == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < input->n_threads; k++) {
+        lists[k] = desks[k].found;
+        desks[k].found = (kept_list){.count = 0};
         desk_free(&desks[k]);
     }
-    memmove(made.indptr + 1, made.indptr, n * sizeof *made.indptr);
-    made.indptr[0] = 0;
-#pragma omp parallel for schedule(dynamic, 256) num_threads((int)job->input->n_threads)
-    for (size_t i = 0; i < n; i++) {
-        qsort(all + made.indptr[i], (size_t)(made.indptr[i + 1] - made.indptr[i]), sizeof *all, by_column);
-        for (uint64_t e = made.indptr[i]; e < made.indptr[i + 1]; e++) {
-            made.indices[e] = all[e].j;
-            made.data[e] = all[e].value;
-        }
-    }
-    if (job->details != NULL) TRY(add_sides(job, &made, error));
-    *out = made;
-    made = (csr){.n = 0};
+    TRY(kept_gather(input->basis->n, lists, input->n_threads, out, error));
+    if (input->one_sided) status = kept_add_sides(input->basis, input->weight, input->threshold, out, error);
+    if (status != LAM_OK) csr_free(out);
 done:
-    free(all);
-    csr_free(&made);
+    for (size_t k = 0; k < input->n_threads; k++) kept_free(&lists[k]);
+    free(lists);
     return status;
 }
 

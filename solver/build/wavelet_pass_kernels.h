@@ -150,7 +150,7 @@ static TARGET lam_status KERNEL(merge_details)(const pass_row *row, const detail
         unsigned beyond = BEYOND(&y, least) & row->own_lanes;
         for (; beyond != 0; beyond &= beyond - 1) {
             const unsigned lane = (unsigned)__builtin_ctz(beyond);
-            TRY(desk_put(d, row_coefficient(row, lane), j, y[lane], error));
+            TRY(kept_put(&d->found, row_coefficient(row, lane), j, y[lane], error));
         }
     }
 done:
