@@ -311,7 +311,7 @@ START_TEST(operators_are_as_good) {
         for (int k = 0; k < 2; k++) sums[k] += indirect_error(&problem, truth, ops[k], light);
     ck_assert_msg(sums[1] < 1.1 * sums[0], "%g of streamed rows, %g of held ones", sums[1] / 8, sums[0] / 8);
     /* One even light is exact as it was put there; other rows have their own noise. */
-    ck_assert_double_lt(reports[1].uniform_error, 1e-3);
+    ck_assert_double_lt(reports[1].uniform_error, _i < OPEN ? 2e-6 : 1e-3);
     ck_assert_double_lt(reports[1].probe_residual, .1);
     ck_assert_double_gt(reports[1].probe_residual, 0);
     reference_destroy(truth);

@@ -1,4 +1,5 @@
 /* F in a basis of wavelets and its inverse there, against dense matrices in double. */
+#include "solver/build/wavelet_balance.h"
 #include "support/wavelet_subject.h"
 
 /* --- the pass ------------------------------------------------------------------------------------------ */
@@ -157,6 +158,57 @@ START_TEST(one_side_within_reach) {
 }
 END_TEST
 
+/* S A^1/2 becomes A^1/2 s for whatever s is asked for, and nothing else of S changes; a threshold leaves out
+ * what is below it; where nothing leaves the last row is 1 on the diagonal. */
+START_TEST(one_even_light_is_put_in) {
+    subject s = subject_make(_i);
+    const size_t n = s.m.n;
+    float *weight = ones(&s.basis);
+    double *area = test_allocate(n, sizeof *area), *sums = test_allocate(n, sizeof *sums);
+    const double *W = dense_W(&s);
+    uint64_t seed = 5;
+    csr S = pass(&s, 0, weight, 1);
+    double *before = whole(&S), length = 0;
+    for (size_t p = 0; p < n; p++) area[p] = s.m.area[s.tree.order[p]];
+    for (size_t p = 0; p < n; p++) length += area[p];
+    for (size_t i = 0; i < n; i++) sums[i] = random_unit(&seed);
+    ck_ok(wavelet_balance(&s.basis, s.tree.order, area, sums, 0, weight, &S, &error));
+    double *after = whole(&S), *y = test_allocate(n, sizeof *y);
+    for (size_t k = 0; k < n * n; k++)
+        if (k % n != n - 1 && k / n != n - 1) ck_each(after[k] == before[k]);
+    for (size_t i = 0; i < n; i++)
+        for (size_t p = 0; p < n; p++) y[i] += W[i * n + p] * sqrt(area[p] / length) * sums[s.tree.order[p]];
+    const double sign = W[(n - 1) * n] > 0 ? 1 : -1;
+    size_t above = 0;
+    for (size_t i = 0; i < n; i++) {
+        ck_each(fabs(after[i * n + n - 1] - sign * y[i]) < TRANSFORM_U);
+        above += fabs(y[i]) > .02;
+    }
+    csr_free(&S);
+    S = pass(&s, 0, weight, 1);
+    ck_ok(wavelet_balance(&s.basis, s.tree.order, area, sums, .02f, weight, &S, &error));
+    double *some = whole(&S);
+    size_t kept = 0;
+    for (size_t i = 0; i < n; i++) kept += some[i * n + n - 1] != 0;
+    ck_assert_uint_gt(above, 1);
+    ck_assert_uint_eq(kept, above);
+    for (size_t i = 0; i < n; i++) sums[i] = 1;
+    ck_ok(wavelet_balance(&s.basis, s.tree.order, area, sums, 1e-5f, weight, &S, &error));
+    free(some);
+    some = whole(&S);
+    for (size_t i = 0; i < n; i++) ck_each(fabs(some[i * n + n - 1] - (i == n - 1)) < TRANSFORM_U);
+    csr_free(&S);
+    free(weight);
+    free(area);
+    free(sums);
+    free(before);
+    free(after);
+    free(some);
+    free(y);
+    subject_free(&s);
+}
+END_TEST
+
 /* --- the inverse --------------------------------------------------------------------------------------- */
 
 enum { ONE_FOR_ALL, BLACK_IN_PARTS, EACH_ITS_OWN, REFLECTANCES };
@@ -283,6 +335,7 @@ int main(void) {
     tcase_add_test(tests, a_pass_within_reach);
     tcase_add_loop_test(tests, a_pass_of_one_side, 0, 2 * SUBJECTS);
     tcase_add_test(tests, one_side_within_reach);
+    tcase_add_loop_test(tests, one_even_light_is_put_in, 0, SUBJECTS);
     tcase_add_loop_test(tests, reflectances_in_the_basis, 0, SUBJECTS * REFLECTANCES);
     tcase_add_loop_test(tests, what_is_skipped_is_small, 0, SUBJECTS);
     tcase_add_loop_test(tests, doubling_inverts, 0, SUBJECTS * REFLECTANCES);
