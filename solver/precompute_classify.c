@@ -17,7 +17,11 @@ lam_status precompute_classify(const precompute_options *options, terminal *t, s
                                size_t *rays_used, lam_error *error) {
     lam_status status = LAM_OK;
     precompute_options o = *options;
-    work w = {.options = &o, .t = t, .progress = terminal_progress(t), .memory = work_memory(options)};
+    work w = {.options = &o,
+              .t = t,
+              .progress = terminal_progress(t),
+              .memory = work_memory(options),
+              .holds = true};
     element_geometry geometry = {0};
     o.form_factors.quality = "draft";
     TRY(o.from_store ? work_load_store(&w, error) : work_load_scene(&w, error));

@@ -25,7 +25,6 @@ build_problem work_problem(const work *w, const emitter_source *emitters) {
                            .area = w->m.area,
                            .reflectance = w->m.reflectance,
                            .F = &w->f.F,
-                           .stream = NULL,
                            .order = w->order,
                            .noise = recipe_noise(&w->f.recipe)};
 }

@@ -83,7 +83,7 @@ static bool streams(const work *w, double n) {
     const precompute_options *o = w->options;
     const double bytes = 8 * n * fmin(n, 2 * (double)w->recipe.rays);
     const bool kept = o->keep_form_factors || o->compress_form_factors || o->from_store || o->scratch != NULL;
-    if (kept || !ray_rows_can(&w->recipe) || !(bytes > held_most)) return false;
+    if (kept || w->holds || !ray_rows_can(&w->recipe) || !(bytes > held_most)) return false;
     if (strcmp(o->method, "auto") != 0) return strcmp(o->method, "hierarchical") == 0;
     /* What auto would take without a look at F: the whole inverse is too large, a sparse one would be noise.
      */

@@ -19,6 +19,7 @@ typedef struct work {
     mesh m;
     uint32_t *order;
     form_factors f;
+    bool holds;                    /* somebody else asks for rows of F whatever the operator is */
     bool streamed;                 /* rows of F are found as the operator asks for them; f has none */
     ray_rows *rays;                /* of these, until the operator is built */
     row_stream stream;             /* of rays */

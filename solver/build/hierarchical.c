@@ -54,14 +54,6 @@ static lam_status make_weights(const wavelets *w, float **out, lam_error *error)
     return LAM_OK;
 }
 
-/* Areas and one channel's reflectances in the order of the tree. */
-static void place(const build_problem *problem, const uint32_t *order, size_t c, double *area, float *rho) {
-    for (size_t p = 0; p < problem->n; p++) {
-        area[p] = problem->area[order[p]];
-        rho[p] = problem->reflectance[c * problem->n + order[p]];
-    }
-}
-
 /* Row sums of F. */
 static void sum_rows(const csr *F, double *sums) {
     for (size_t i = 0; i < F->n; i++) {
@@ -149,7 +141,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
                                      .n_threads = n_threads,
                                      .progress = options->progress};
     TRY(wavelet_pass(&pass, &S, error));
-    place(problem, tree.order, 0, area, rho);
+    for (size_t p = 0; p < n; p++) area[p] = problem->area[tree.order[p]];
     if (stream != NULL) {
         TRY(stream->close(stream->context, &row_sums, error));
         TRY(wavelet_balance(&arrays.basis, tree.order, area, row_sums, pass.threshold, weight, &S, error));
@@ -158,7 +150,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
     }
     report->factorize_seconds = clock_seconds() - started;
     for (size_t c = 0; c < C; c++) {
-        place(problem, tree.order, c, area, rho);
+        for (size_t p = 0; p < n; p++) rho[p] = problem->reflectance[c * n + tree.order[p]];
         const wavelet_inverse_input inverse = {.basis = &arrays.basis,
                                                .S = &S,
                                                .rho = rho,

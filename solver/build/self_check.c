@@ -1,12 +1,14 @@
 #include "solver/build/self_check.h"
 
+#include "store/status.h"
+
 #include <math.h>
 #include <stdlib.h>
 
-/* Random lights that an operator is tried on; rows that are multiplied at once, and that are asked for at
- * once where F is not there. Of those one in so many, and no more than enough. */
-enum { PROBES = 4, LIGHTS = PROBES + 1, ROWS_AT_ONCE = 1024, OTHERS_AT_ONCE = 32, ONE_IN = 32 };
-enum { OTHERS_LEAST = 64, OTHERS_MOST = 2048 };
+/* Random lights that an operator is tried on, and rows that are multiplied at once. Where F is not there, one
+ * row in so many, and no more than enough. */
+enum { PROBES = 4, LIGHTS = PROBES + 1, ROWS_AT_ONCE = 1024 };
+enum { ONE_IN = 32, OTHERS_LEAST = 64, OTHERS_MOST = 2048 };
 
 /* Lights, the last one even, and their answers; h = F B~ of the random ones for `count` elements. */
 typedef struct check {
@@ -70,21 +72,25 @@ static lam_status multiply(const build_problem *problem, const check *s, lam_err
 static lam_status multiply_others(const build_problem *problem, const check *s, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n;
-    for (size_t first = 0; first < s->count; first += OTHERS_AT_ONCE) {
-        const size_t m = first + OTHERS_AT_ONCE < s->count ? OTHERS_AT_ONCE : s->count - first;
-        row_block rows;
-        TRY(row_source_get(&problem->stream->others, s->elements + first, m, &rows, error));
-        for (size_t v = 0; v < PROBES * problem->n_channels; v++)
-            for (size_t k = 0; k < m; k++) {
-                const float *B = s->B + v * n;
-                double sum = 0;
-                for (size_t e = 0; e < rows.length[k]; e++)
-                    sum += (double)rows.data[k][e] * (double)B[rows.indices[k][e]];
-                s->h[v * s->count + first + k] = sum;
-            }
-        row_block_free(&rows);
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t k = 0; k < s->count; k++) {
+        row_block row;
+        lam_error why = {.message = ""};
+        const lam_status one = row_source_get(&problem->stream->others, &s->elements[k], 1, &row, &why);
+        if (one != LAM_OK) {
+#pragma omp critical(self_check_failed)
+            status = status_fail(error, one, "%s", why.message);
+            continue;
+        }
+        for (size_t v = 0; v < PROBES * problem->n_channels; v++) {
+            const float *B = s->B + v * n;
+            double sum = 0;
+            for (size_t e = 0; e < row.length[0]; e++)
+                sum += (double)row.data[0][e] * (double)B[row.indices[0][e]];
+            s->h[v * s->count + k] = sum;
+        }
+        row_block_free(&row);
     }
-done:
     return status;
 }
 

@@ -39,14 +39,8 @@ lam_status wavelet_balance(const wavelets *w, const uint32_t *order, const doubl
     y = memory_allocate(n, sizeof *y, "wavelets", error);
     made.indptr = memory_allocate(n + 1, sizeof *made.indptr, "wavelets", error);
     if (x == NULL || y == NULL || made.indptr == NULL) TRY(LAM_ERR_MEMORY);
-    /* The root's constant may have either sign; where it is the last row is of the same. */
-    for (size_t p = 0; p < n; p++) {
-        x[p] = (float)sqrt(area[p]);
-        length += area[p];
-    }
-    TRY(turn(w, x, y, error));
-    const double over = copysign(1 / sqrt(length), (double)y[n - 1]);
-    for (size_t p = 0; p < n; p++) x[p] = (float)(sqrt(area[p]) * row_sums[order[p]] * over);
+    for (size_t p = 0; p < n; p++) length += area[p];
+    for (size_t p = 0; p < n; p++) x[p] = (float)(sqrt(area[p] / length) * row_sums[order[p]]);
     TRY(turn(w, x, y, error));
     for (size_t t = 0; t < w->n_nodes; t++) {
         const wavelet_node *a = &w->nodes[t];

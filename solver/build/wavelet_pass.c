@@ -29,6 +29,7 @@ enum { AHEAD = 12 };
 /* What a cluster hands up of several rows, and of as many as a node hands up: both at most linear functions.
  */
 enum { SCALING = 3 };
+_Static_assert((int)SCALING == (int)DETAIL_LANES, "of finer columns as many rows are handed up");
 typedef struct block {
     lanes of[SCALING];
 } block;

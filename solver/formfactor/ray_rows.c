@@ -166,6 +166,46 @@ static lam_status begin_block(const ray_rows *r, const uint32_t *elements, size_
 /* Rays that are cast at once. */
 enum { AT_ONCE = 512 };
 
+/* An element looking around, some rays at a time. */
+typedef struct glance {
+    ray_context rays;
+    near_row near;
+    element_sampler sampler;
+    size_t element, first, n_rays;
+    ray_tally tally;
+    uint32_t met[AT_ONCE]; /* far elements that the last of them met */
+} glance;
+
+static void glance_begin(const ray_rows *r, size_t element, uint64_t seed, const sky_bounce *sky, glance *g) {
+    g->rays = (ray_context){.m = r->m, .v = r->v, .seed = seed, .sky = sky};
+    g->near = near_of(r, element);
+    g->element = element;
+    g->first = 0;
+    g->n_rays = r->f.recipe.rays;
+    g->tally = (ray_tally){0};
+    element_sampler_init(&g->sampler, r->m, r->v, element, seed);
+}
+
+/* The next rays: how many elements they met that are not near, each once for each ray; false: there are none.
+ */
+static bool glance_on(glance *g, double *sky, size_t *count) {
+    if (g->first >= g->n_rays) return false;
+    const size_t last = g->first + AT_ONCE < g->n_rays ? g->first + AT_ONCE : g->n_rays;
+    const size_t all = rays_meet(&g->rays, &g->sampler, g->element, g->first, last, g->met, &g->tally, sky);
+    *count = 0;
+    for (size_t k = 0; k < all; k++) /* a plane does not see itself */
+        if (g->met[k] != g->element && !is_near(&g->near, g->met[k])) g->met[(*count)++] = g->met[k];
+    g->first = last;
+    return true;
+}
+
+/* What hits added up to, then this share of near pairs. */
+static void end_glance(const ray_rows *r, const glance *g, double share, filling *to) {
+    put_sums(to, r->m->n);
+    for (size_t k = 0; k < g->near.count; k++)
+        if (g->near.data[k] > 0) put(to, g->near.indices[k], share * (double)g->near.data[k]);
+}
+
 /* Row k of a block is what was put down since `first`. */
 static void end_row(row_block *block, size_t k, const filling *to, size_t first) {
     const uint32_t **indices = block->owned[0];
@@ -176,35 +216,24 @@ static void end_row(row_block *block, size_t k, const filling *to, size_t first)
 }
 
 static void find_row(ray_rows *r, size_t i, double *sky, filling *to) {
-    const size_t rays = r->f.recipe.rays;
-    const double *area = r->m->area, each = 1 / (double)rays;
-    const ray_context c = {
-        .m = r->m, .v = r->v, .seed = r->f.recipe.seed, .sky = sky != NULL ? &r->f.sky : NULL};
-    const near_row near = near_of(r, i);
-    element_sampler sampler;
-    ray_tally tally = {0};
-    uint32_t met[AT_ONCE];
+    const double *area = r->m->area, each = 1 / (double)r->f.recipe.rays;
+    glance g;
     double own = 0;
-    element_sampler_init(&sampler, r->m, r->v, i, c.seed);
-    for (size_t first = 0; first < rays; first += AT_ONCE) {
-        const size_t last = first + AT_ONCE < rays ? first + AT_ONCE : rays;
-        const size_t count = rays_meet(&c, &sampler, i, first, last, met, &tally, sky);
+    size_t count;
+    glance_begin(r, i, r->f.recipe.seed, sky != NULL ? &r->f.sky : NULL, &g);
+    while (glance_on(&g, sky, &count))
         for (size_t k = 0; k < count; k++) {
-            const uint32_t j = met[k];
-            if (j == i || is_near(&near, j)) continue; /* a plane does not see itself */
+            const uint32_t j = g.met[k];
             const double mine = each * area[j] / (area[i] + area[j]);
             put_hit(to, j, mine);
             own += mine;
             __atomic_fetch_add(&r->received[j], (uint64_t)((each - mine) / unit), __ATOMIC_RELAXED);
         }
-    }
-    put_sums(to, r->m->n);
-    for (size_t k = 0; k < near.count; k++)
-        if (near.data[k] > 0) put(to, near.indices[k], .5 * (double)near.data[k]);
+    end_glance(r, &g, .5, to);
     r->own[i] = own;
-    r->f.leaving[i] = (double)tally.left / (double)rays;
-    r->f.absorbed[i] = (double)tally.lost / (double)rays;
-    if (sky != NULL) sky_bounce_put(&r->f.sky, i, sky, (double)rays);
+    r->f.leaving[i] = (double)g.tally.left / (double)g.n_rays;
+    r->f.absorbed[i] = (double)g.tally.lost / (double)g.n_rays;
+    if (sky != NULL) sky_bounce_put(&r->f.sky, i, sky, (double)g.n_rays);
 }
 
 static lam_status find_rows(void *context, const uint32_t *elements, size_t m, row_block *out,
@@ -229,23 +258,15 @@ static lam_status find_rows(void *context, const uint32_t *elements, size_t m, r
 
 /* Scaled to the sum that rows of it have. */
 static void find_other_row(const ray_rows *r, size_t i, filling *to) {
-    const size_t rays = r->f.recipe.rays, begin = to->used;
-    const ray_context c = {.m = r->m, .v = r->v, .seed = r->other_seed};
-    const near_row near = near_of(r, i);
-    element_sampler sampler;
-    ray_tally tally = {0};
-    uint32_t met[AT_ONCE];
+    const size_t begin = to->used;
+    const double each = 1 / (double)r->f.recipe.rays;
+    glance g;
     double sum = 0;
-    element_sampler_init(&sampler, r->m, r->v, i, c.seed);
-    for (size_t first = 0; first < rays; first += AT_ONCE) {
-        const size_t last = first + AT_ONCE < rays ? first + AT_ONCE : rays;
-        const size_t count = rays_meet(&c, &sampler, i, first, last, met, &tally, NULL);
-        for (size_t e = 0; e < count; e++)
-            if (met[e] != i && !is_near(&near, met[e])) put_hit(to, met[e], 1 / (double)rays);
-    }
-    put_sums(to, r->m->n);
-    for (size_t e = 0; e < near.count; e++)
-        if (near.data[e] > 0) put(to, near.indices[e], (double)near.data[e]);
+    size_t count;
+    glance_begin(r, i, r->other_seed, NULL, &g);
+    while (glance_on(&g, NULL, &count))
+        for (size_t k = 0; k < count; k++) put_hit(to, g.met[k], each);
+    end_glance(r, &g, 1, to);
     for (size_t e = begin; e < to->used; e++) sum += (double)to->data[e];
     for (size_t e = begin; e < to->used; e++)
         to->data[e] = (float)((double)to->data[e] * r->f.row_sums[i] / sum);
