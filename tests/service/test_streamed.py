@@ -95,6 +95,10 @@ class Streamed(unittest.TestCase):
         held = must("precompute", large, "-o", path, "--rays", 512, "--probes", 0, "--keep-form-factors").stderr
         self.assertGreater(int(re.search(r"memory up to (\d+)M", held)[1]), int(forecast[1]) + 80)
         self.assertRegex(held, HELD)
+        # A look at the scene asks for rows itself, and counts them.
+        done = lambert("classify", large, "--rays", 512, "--memory", "130M")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("need about", done.stderr)
 
     def test_a_sky(self):
         path, held, scratch = self.path("sky.h5"), self.path("held-sky.h5"), self.path("scratch-sky")
