@@ -84,11 +84,19 @@ static void turn_back(batch_queue *queue, bool brief) {
     if (brief) queue->n_brief--;
 }
 
+/* How many jobs share the next pass at most. What is brief takes as long on its way to the client and back as
+ * in a pass: of those that do not fill one, half have it while the others are under way, and all come evenly.
+ * With as many as happen to be there it would be most of them in one and in the next the few who missed it.
+ */
+static size_t most_together(const batch_queue *queue, const batch_job *like) {
+    return like->brief && queue->n_waiting < BATCH_PASS ? BATCH_PASS / 2 : BATCH_PASS;
+}
+
 /* The vectors of the next pass: of this job and of all like it, first one of each, so that a long request
  * holds up no short one, then more of them in their order. */
-static size_t choose_parts(batch_job *like, batch_part parts[BATCH_PASS]) {
+static size_t choose_parts(batch_job *like, size_t most, batch_part parts[BATCH_PASS]) {
     size_t n_parts = 0, room = BATCH_PASS;
-    for (batch_job *job = like; job != NULL && room > 0; job = job->next) {
+    for (batch_job *job = like; job != NULL && n_parts < most; job = job->next) {
         if (job->key != like->key || job->pass != like->pass) continue;
         parts[n_parts++] = (batch_part){job, job->next_vector, 1};
         room--;
@@ -121,7 +129,7 @@ static void make_pass(batch_queue *queue, batch_job *like, batch_workspace *work
     batch_part parts[BATCH_PASS];
     const void *key = like->key;
     const bool brief = like->brief;
-    const size_t n_parts = choose_parts(like, parts);
+    const size_t n_parts = choose_parts(like, most_together(queue, like), parts);
     queue->passing[queue->n_passing++] = key;
     turn_to(queue, like);
     pthread_mutex_unlock(&queue->lock);
@@ -178,8 +186,8 @@ static void end(batch_queue *queue, batch_job *job, batch_workspace *workspace) 
 }
 
 /* What is computed is sent first, so that its client can go on. A pass is made once nothing is left to begin,
- * or as many have begun as it can hold: so all that queued while the last one ran shares the next, and nobody
- * waits for what has not come yet. */
+ * or as many have begun as may share it: so all that queued while the last one ran shares the next, and
+ * nobody waits for what has not come yet. */
 static void *serve(void *argument) {
     batch_queue *queue = argument;
     batch_workspace workspace = {0};

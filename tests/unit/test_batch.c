@@ -179,6 +179,35 @@ START_TEST(a_pass_holds_sixteen) {
 }
 END_TEST
 
+/* _i brief jobs that wait: at most half a pass has the next one, unless they fill a whole one. All are served
+ * in their order. */
+START_TEST(brief_ones_come_evenly) {
+    stage s;
+    job first, jobs[40];
+    const size_t n = (size_t)_i;
+    stage_open(&s, 1, MOST_JOBS);
+    ck_assert(submit(&s, &first, MOST_JOBS, 1, "scene"));
+    wait_for(&s.entered, 1);
+    for (size_t k = 0; k < n; k++) {
+        jobs[k] = (job){.stage = &s, .id = k, .wanted = 1, .key = "scene"};
+        jobs[k].job = (batch_job){
+            .begin = job_begin, .pass = job_pass, .end = job_end, .finish = job_finish, .brief = true};
+        ck_assert(batch_submit(s.queue, &jobs[k].job));
+    }
+    let_go(&s, MOST_PASSES);
+    wait_for(&s.finished, n + 1);
+    size_t served = 0, p = 1;
+    for (; served < n; p++) {
+        const size_t left = n - served, most = left >= BATCH_PASS ? BATCH_PASS : BATCH_PASS / 2;
+        ck_assert_uint_eq(s.n_parts[p], left < most ? left : most);
+        for (size_t k = 0; k < s.n_parts[p]; k++) ck_assert_uint_eq(s.ids[p][k], served + k);
+        served += s.n_parts[p];
+    }
+    ck_assert_uint_eq(s.n_passes, p);
+    stage_close(&s);
+}
+END_TEST
+
 /* What does not belong together does not go together; two threads let them go side by side. */
 START_TEST(keys_have_passes_of_their_own) {
     stage s;
@@ -338,6 +367,7 @@ int main(void) {
     tcase_add_loop_test(tests, what_queued_meanwhile_shares_a_pass, 1, 3);
     tcase_add_test(tests, a_long_request_holds_up_no_short_one);
     tcase_add_test(tests, a_pass_holds_sixteen);
+    tcase_add_loop_test(tests, brief_ones_come_evenly, 1, 41);
     tcase_add_test(tests, keys_have_passes_of_their_own);
     tcase_add_test(tests, who_wants_no_pass_waits_for_none);
     tcase_add_test(tests, places_are_counted);
