@@ -15,6 +15,7 @@ typedef enum service_server {
     SERVICE_READY,    /* the same bytes at once */
     SERVICE_SLEEPING, /* the same bytes after a sleep as long as a solve */
     SERVICE_AS_MANY,  /* likewise, with as many asleep at once as give as many answers as lambertd */
+    SERVICE_ABREAST,  /* likewise, with everybody asleep at once */
     SERVICE_NGINX,    /* the same bytes as a file */
     SERVICE_SERVERS
 } service_server;

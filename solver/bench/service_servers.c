@@ -9,8 +9,8 @@
 #include <time.h>
 #include <unistd.h>
 
-const char *const service_server_names[SERVICE_SERVERS] = {"lambertd", "ready", "sleeping", "as many",
-                                                           "nginx"};
+const char *const service_server_names[SERVICE_SERVERS] = {"lambertd", "ready",   "sleeping",
+                                                           "as many",  "abreast", "nginx"};
 
 /* A store of gigabytes from a slow disk. */
 static const double patience_s = 300;

@@ -19,7 +19,7 @@ static const table_column load_columns[] = {
     {"clients", "", "connections of wrk, each with one request at a time"},
     {"server", NULL,
      "lambertd; ready: the same bytes at once; sleeping: after a solve's time; as many: with "
-     "enough asleep at once for lambertd's pace; nginx: as a file"},
+     "enough asleep at once for lambertd's pace; abreast: with all; nginx: as a file"},
     {"p50_ms", "ms", "half of the answers came within"},
     {"p99_ms", "ms", "99 of 100 came within"},
     {"per_second", "1/s", "answers"},
