@@ -44,11 +44,11 @@ static void log_form_factors(work *w) {
                  "%.2g on average, at most %.2g",
                  how, 100 * f->leaving_share, f->closed ? " (closed)" : "", 100 * f->absorbed_share,
                  f->repair_mean, f->repair_max);
-    if (f->pairs.accuracy > f->recipe.accuracy)
+    if (f->pairs.accuracy > recipe_accuracy(&f->recipe))
         terminal_log(w->t,
                      "so much is partly hidden that it was found to a standard error of %.2g, not %.2g; "
                      "--quality high looks closer",
-                     f->pairs.accuracy, f->recipe.accuracy);
+                     f->pairs.accuracy, recipe_accuracy(&f->recipe));
     if (f->pairs.facing > 0) {
         const double all = .5 * (double)w->m.n * (double)(w->m.n - 1), facing = f->pairs.facing;
         terminal_log(w->t,

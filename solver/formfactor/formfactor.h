@@ -69,7 +69,7 @@ typedef struct form_factor_options {
  * pairs: pair by pair, magnitudes by mathematics, by rays only what is hidden of them. What a row lacks goes
  *   outside, or, where the scene is closed, is put back by the repair. Cost: O(n^2), about .3 us a pair that
  *   is facing; 9 bytes for each of those beside the rows.
- * near-pairs: the same for pairs of which a ray would hit one from the other, the others by rays.
+ * near-pairs: the same for pairs that rays know worst (recipe_near), the others by rays.
  *
  * With a sky, what a repaired row leaves outside is shared among its tiles, the ground and back faces as the
  * rays (of pairs: recipe.rays of them) found it: sum_j F_ij + sum_t first_bounce/pi <= 1, and = 1 where

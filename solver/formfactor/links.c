@@ -58,6 +58,9 @@ static double factor_bound(double area, double distance2) {
     return area < apart ? area / apart : 1;
 }
 
+/* Candidates above which near leaves are not looked between. */
+enum { CROWD = 16 };
+
 /* One step down: what is to be done with a pair of clusters. With is_task it stops at once when that is a
  * task of its own. */
 static void visit(walk *w, uint32_t a, uint32_t b, const uint32_t *candidates, size_t n_candidates) {
@@ -77,21 +80,29 @@ static void visit(walk *w, uint32_t a, uint32_t b, const uint32_t *candidates, s
     }
     if (cluster_faces_away(one, two, w->options->slack)) return;
     const double distance2 = cluster_distance2(one, two);
-    if (factor_bound(fmax(one->largest, two->largest), distance2) < w->options->threshold) {
+    const double mean_area = 2 / (1 / one->largest + 1 / two->largest);
+    if (factor_bound(mean_area, distance2) < w->options->threshold) {
         w->found->distant_pairs += pairs_between(one, two);
         return;
     }
+    const bool near = w->options->threshold > 0;
     const bool leaves = cluster_is_leaf(one) && cluster_is_leaf(two);
+    /* With so much in the way of what is around them, they are seldom free. */
+    if (near && leaves && n_candidates > CROWD) {
+        bag_add(w->found, a, b, false);
+        return;
+    }
     uint32_t within[SHAFT_CANDIDATES];
     shaft s;
     shaft_init(&s, one, two, w->options->slack);
     const size_t n_within = shaft_filter(&s, w->m, t, candidates, n_candidates, leaves, within);
     /* Beyond some elements of either the threshold may still cut. */
-    if (n_within == 0 && (w->options->threshold == 0 || leaves)) {
+    if (n_within == 0 && (!near || leaves)) {
         bag_add(w->found, a, b, true);
         return;
     }
-    if (n_within > 0 &&
+    /* The few pairs of near ones are looked at sooner than it is known of all in their clusters. */
+    if (n_within > 0 && !near &&
         look_is_hidden(w->l, t, one, two, factor_bound(fmax(one->area, two->area), distance2))) {
         w->found->hidden_pairs += pairs_between(one, two);
         return;

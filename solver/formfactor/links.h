@@ -20,7 +20,7 @@ typedef struct cluster_links {
 } cluster_links;
 
 typedef struct link_options {
-    double threshold; /* pairs whose larger factor is surely below it are left out */
+    double threshold; /* pairs whose mean factor, 2 g / (A_i + A_j), is surely below it are left out */
     double slack;     /* what rounding may move a point */
     const progress *progress;
 } link_options;

@@ -184,7 +184,8 @@ static bool is_even(const look *l, const joined *two) {
 }
 
 /* The exchange area that is not hidden. While the kernel varies too much over two pieces the larger is
- * halved, as often as splits allow. path tells the pieces' samples apart. */
+ * halved, as often as splits allow, unless one packet is all that their share of it asks for. path tells the
+ * pieces' samples apart. */
 static double seen_exchange(const look *l, const dissection *pair, const polygon *a, const polygon *b,
                             int splits, uint64_t path) {
     enum { MOST_SPLITS = 14 };
@@ -192,8 +193,8 @@ static double seen_exchange(const look *l, const dissection *pair, const polygon
     if (g <= 0) return 0;
     joined two = {.i = pair->i, .j = pair->j, .a = a, .b = b};
     pair_sampler_init(&two.sampler, l->seed + path, pair->i, pair->j);
-    if (splits == MOST_SPLITS || is_even(l, &two)) {
-        const double packets = ceil(g * pair->segments_per_area / VISIBILITY_PACKET);
+    const double packets = ceil(g * pair->segments_per_area / VISIBILITY_PACKET);
+    if (splits == MOST_SPLITS || packets <= 1 || is_even(l, &two)) {
         return g * seen_share(l, &two, (size_t)packets * VISIBILITY_PACKET);
     }
     const bool of_a = a->radius > b->radius;

@@ -11,7 +11,7 @@ typedef struct pairs_options {
     size_t segments; /* at least, between the elements of a pair that may be partly hidden; a multiple of 8 */
     /* For all mixed pairs, about: with more each pair is found less accurately, with fewer more so. */
     double segments_least, segments_most;
-    double threshold; /* only pairs of which one factor is above; 0: all */
+    double threshold; /* only pairs whose mean factor 2 g / (A_i + A_j) is above; 0: all */
     bool keep_hidden; /* hidden pairs that were looked at stay in the rows, with 0 */
     uint64_t seed;
     const progress *progress;

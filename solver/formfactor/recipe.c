@@ -46,7 +46,7 @@ void recipe_describe(const recipe *r, char text[64]) {
         snprintf(text, 64, "pair by pair to %g", r->accuracy);
         break;
     case RECIPE_NEAR_PAIRS:
-        snprintf(text, 64, "near pairs to %g, %zu rays an element", r->accuracy, r->rays);
+        snprintf(text, 64, "near pairs to %.2g, %zu rays an element", recipe_accuracy(r), r->rays);
         break;
     }
 }
@@ -101,6 +101,10 @@ double recipe_tolerance(const recipe *r) {
 
 double recipe_near(const recipe *r) {
     return 1 / (double)r->rays;
+}
+
+double recipe_accuracy(const recipe *r) {
+    return r->method == RECIPE_NEAR_PAIRS ? fmax(r->accuracy, .5 * recipe_near(r)) : r->accuracy;
 }
 
 size_t recipe_auto_rays(double epsilon, double share) {

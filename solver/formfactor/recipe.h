@@ -43,9 +43,15 @@ lam_status recipe_load(store *s, const recipe_names *names, recipe *out, lam_err
 /* Relative tolerance of unoccluded factors of pairs. */
 double recipe_tolerance(const recipe *r);
 
-/* Pairs are near when one of their unoccluded factors is above this: when a ray of an element would hit the
- * other. At 10,000 elements four times that pays as well, a lower one would not. */
+/* Pairs are near when the mean of their unoccluded factors, F_ij and F_ji weighted by A_i and A_j, is above
+ * this: when a ray of an element would hit the other. What rays leave of S = A^1/2 F A^-1/2 has the variance
+ * mean / (2 rays), so that a large element is not near to all the small ones that see it. At 10,000 elements
+ * four times that pays as well, a lower one would not. */
 double recipe_near(const recipe *r);
+
+/* What partly hidden pairs are found to: accuracy, of near ones not finer than half a ray's share. An element
+ * has ten or so; their variance is then some hundredths of that of the rays. */
+double recipe_accuracy(const recipe *r);
 
 /* Rays per element for a factorization bound epsilon: the sampling noise of a merged F has a 2-norm of about
  * sqrt(2/rays); share is what part of epsilon it may be. A power of two. */

@@ -215,7 +215,7 @@ START_TEST(threshold_keeps_what_is_above) {
             const double g = pair_exchange(&s->rules, &s->polygons[i], &s->polygons[j], 1e-4);
             double seen;
             held_pairs += held[p * n + q];
-            if (g / fmin(s->m.area[i], s->m.area[j]) < threshold) continue;
+            if (2 * g / (s->m.area[i] + s->m.area[j]) < threshold) continue;
             above++;
             if (held[p * n + q] == 0) ck_assert_int_eq(look_first(&s->look, i, j, g, &seen), LOOK_HIDDEN);
         }

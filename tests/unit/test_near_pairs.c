@@ -1,5 +1,7 @@
 /* Near pairs by mathematics and the others by rays: joined without counting anything twice. */
 #include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/pair.h"
+#include "solver/formfactor/recipe_pairs.h"
 #include "solver/scene/generate.h"
 #include "solver/scene/import.h"
 #include "support/box.h"
@@ -54,7 +56,7 @@ START_TEST(near_pairs_are_exact_and_nothing_is_counted_twice) {
             of_joined += (one - F) * (one - F);
             of_counted += pow(entry(&counted.F, i, j) - F, 2);
             /* Well above the threshold, whatever is hidden. */
-            if (F < 2 * recipe_near(&near)) continue;
+            if (2 * F * m.area[i] / (m.area[i] + m.area[j]) < 2 * recipe_near(&near)) continue;
             n_near++;
             worst_near = fmax(worst_near, fabs(one - F) / F);
         }
@@ -70,6 +72,48 @@ START_TEST(near_pairs_are_exact_and_nothing_is_counted_twice) {
     form_factors_free(&exact);
     form_factors_free(&joined);
     form_factors_free(&counted);
+    mesh_free(&m);
+}
+END_TEST
+
+/* Near are exactly those whose mean factor, of what nothing hides, is above the threshold: the plate, sixteen
+ * times as large as a cell, is near to a few of those that see it. */
+START_TEST(near_pairs_are_those_above_the_threshold) {
+    mesh m = room();
+    const double threshold = .004 * (1 + _i);
+    const form_factor_options how = {
+        .recipe = {.method = RECIPE_NEAR_PAIRS, .rays = RAYS, .accuracy = 7e-5, .seed = 2}};
+    form_factors f = {0};
+    csr G = {0};
+    visibility *v = NULL;
+    lam_error error = {0};
+    pair_rules rules;
+    polygon *polygons = malloc(m.n * sizeof *polygons);
+    ck_assert_ptr_nonnull(polygons);
+    for (size_t i = 0; i < m.n; i++) polygon_of_element(&m, i, &polygons[i]);
+    pair_rules_init(&rules);
+    ck_assert_int_eq(visibility_create(&m, &v, &error), LAM_OK);
+    ck_assert_msg(recipe_pairs_find(&m, v, &how, threshold, &f, &G, &error) == LAM_OK, "%s", error.message);
+    size_t n_near = 0, n_larger = 0;
+    for (size_t i = 0; i < m.n; i++) {
+        uint64_t p = G.indptr[i];
+        for (size_t j = i + 1; j < m.n; j++) {
+            const double g = pair_exchange(&rules, &polygons[i], &polygons[j], 1e-6);
+            const double mean = 2 * g / (m.area[i] + m.area[j]);
+            const bool there = p < G.indptr[i + 1] && G.indices[p] == j;
+            p += there;
+            if (fabs(mean - threshold) < 1e-4 * threshold) continue; /* to rounding */
+            ck_assert_int_eq(there, mean > threshold);
+            n_near += there;
+            n_larger += g / fmin(m.area[i], m.area[j]) > threshold;
+        }
+    }
+    ck_assert_uint_gt(n_near, 0);
+    ck_assert_uint_gt(n_larger, n_near);
+    visibility_destroy(v);
+    form_factors_free(&f);
+    csr_free(&G);
+    free(polygons);
     mesh_free(&m);
 }
 END_TEST
@@ -149,6 +193,7 @@ int main(void) {
     TCase *cases = tcase_create("near_pairs");
     tcase_set_timeout(cases, 300);
     tcase_add_test(cases, near_pairs_are_exact_and_nothing_is_counted_twice);
+    tcase_add_loop_test(cases, near_pairs_are_those_above_the_threshold, 0, 4);
     tcase_add_test(cases, the_mean_is_right);
     tcase_add_loop_test(cases, pairs_see_what_rays_see, 0, 2);
     suite_add_tcase(suite, cases);
