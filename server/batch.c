@@ -186,8 +186,8 @@ static void end(batch_queue *queue, batch_job *job, batch_workspace *workspace) 
 }
 
 /* What is computed is sent first, so that its client can go on. A pass is made once nothing is left to begin,
- * or as many have begun as may share it: so all that queued while the last one ran shares the next, and
- * nobody waits for what has not come yet. */
+ * or as many have begun as may share it: so what queued while the last one ran shares the next, brief jobs
+ * by halves, and nobody waits for what has not come yet. */
 static void *serve(void *argument) {
     batch_queue *queue = argument;
     batch_workspace workspace = {0};

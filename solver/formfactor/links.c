@@ -61,8 +61,7 @@ static double factor_bound(double area, double distance2) {
 /* Candidates above which near leaves are not looked between. */
 enum { CROWD = 16 };
 
-/* One step down: what is to be done with a pair of clusters. With is_task it stops at once when that is a
- * task of its own. */
+/* One step down: what is to be done with a pair of clusters. */
 static void visit(walk *w, uint32_t a, uint32_t b, const uint32_t *candidates, size_t n_candidates) {
     const cluster_tree *t = w->t;
     const cluster *one = &t->clusters[a], *two = &t->clusters[b];

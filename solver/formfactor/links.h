@@ -25,9 +25,9 @@ typedef struct link_options {
     const progress *progress;
 } link_options;
 
-/* Walks down the tree with itself. Skipped are clusters that face away, those beyond the threshold, and those
- * that are plainly hidden from each other. The result is the same for any number of threads.
- * Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. Freed by cluster_links_free. */
+/* Walks down the tree with itself. Skipped are clusters that face away, those beyond the threshold, and,
+ * where there is none, those that are plainly hidden from each other. The result is the same for any number
+ * of threads. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. Freed by cluster_links_free. */
 lam_status cluster_links_find(const mesh *m, const cluster_tree *t, const look *l,
                               const link_options *options, cluster_links *out, lam_error *error);
 void cluster_links_free(cluster_links *l);

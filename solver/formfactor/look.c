@@ -194,9 +194,8 @@ static double seen_exchange(const look *l, const dissection *pair, const polygon
     joined two = {.i = pair->i, .j = pair->j, .a = a, .b = b};
     pair_sampler_init(&two.sampler, l->seed + path, pair->i, pair->j);
     const double packets = ceil(g * pair->segments_per_area / VISIBILITY_PACKET);
-    if (splits == MOST_SPLITS || packets <= 1 || is_even(l, &two)) {
+    if (splits == MOST_SPLITS || packets <= 1 || is_even(l, &two))
         return g * seen_share(l, &two, (size_t)packets * VISIBILITY_PACKET);
-    }
     const bool of_a = a->radius > b->radius;
     polygon halves[2];
     double sum = 0;

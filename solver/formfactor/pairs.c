@@ -75,17 +75,6 @@ static double factor_of(const pairs_run *run, uint32_t i, uint32_t j, double g) 
     return 2 * g / (run->m->area[i] + run->m->area[j]);
 }
 
-/* Whether a pair is surely below the threshold: with both cosines 1, and all of the smaller where it comes
- * nearest to the larger. Spares the exact factor, which would show the same of nine in ten. */
-static bool is_distant(const pairs_run *run, uint32_t i, uint32_t j) {
-    const polygon *a = &run->polygons[i], *b = &run->polygons[j];
-    const polygon *large = a->radius > b->radius ? a : b, *small = large == a ? b : a;
-    if (run->options->threshold <= 0) return false;
-    const double apart = polygon_distance(large, small->centre) - small->radius;
-    const double most = run->m->area[i] * run->m->area[j] / (3.14159265358979323846 * apart * apart);
-    return apart > 0 && factor_of(run, i, j, most) < run->options->threshold;
-}
-
 /* A first look; where it suffices the pair is settled, and g becomes what is seen of it. */
 static int look_at(const pairs_run *run, uint32_t i, uint32_t j, double *g) {
     double seen;
@@ -111,7 +100,6 @@ static bool find_row(const pairs_run *run, uint32_t position, const leaf_reaches
             for (uint32_t c = 0; c < count; c++) {
                 const uint32_t j = run->tree.element[first + c];
                 double g = exchange[c];
-                if (g < 0 && is_distant(run, i, j)) continue;
                 if (g < 0)
                     g = pair_exchange(&run->rules, &run->polygons[i], &run->polygons[j],
                                       run->options->tolerance);

@@ -27,29 +27,6 @@ double polygon_area(const polygon *p) {
     return .5 * sqrt(dot(twice, twice));
 }
 
-double polygon_distance(const polygon *p, const double point[3]) {
-    double nearest2 = INFINITY, above = 0;
-    bool inside = true;
-    for (int c = 0; c < p->n; c++) {
-        const double *from = p->corner[c], *to = p->corner[(c + 1) % p->n];
-        double u[3], v[3], away2 = 0, beside = 0;
-        for (int d = 0; d < 3; d++) {
-            u[d] = to[d] - from[d];
-            v[d] = point[d] - from[d];
-        }
-        const double length2 = dot(u, u);
-        const double s = length2 > 0 ? fmin(fmax(dot(u, v) / length2, 0), 1) : 0;
-        for (int d = 0; d < 3; d++) {
-            away2 += (v[d] - s * u[d]) * (v[d] - s * u[d]);
-            beside += p->normal[d] * (u[(d + 1) % 3] * v[(d + 2) % 3] - u[(d + 2) % 3] * v[(d + 1) % 3]);
-        }
-        nearest2 = fmin(nearest2, away2);
-        inside = inside && beside >= 0;
-        above = dot(p->normal, v);
-    }
-    return inside ? fabs(above) : sqrt(nearest2);
-}
-
 static void measure_extent(polygon *p) {
     memset(p->centre, 0, sizeof p->centre);
     for (int c = 0; c < p->n; c++)

@@ -25,9 +25,6 @@ void polygon_in_front(const polygon *p, const polygon *other, polygon *out);
 
 double polygon_area(const polygon *p);
 
-/* From a point to the nearest one of a polygon, metres. */
-double polygon_distance(const polygon *p, const double point[3]);
-
 /* The halves of a triangle or a quad, cut across its longest side (the middle of the longer pair of sides).
  */
 void polygon_halve(const polygon *p, polygon halves[2]);

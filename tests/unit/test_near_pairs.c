@@ -77,7 +77,8 @@ START_TEST(near_pairs_are_exact_and_nothing_is_counted_twice) {
 END_TEST
 
 /* Near are exactly those whose mean factor, of what nothing hides, is above the threshold: the plate, sixteen
- * times as large as a cell, is near to a few of those that see it. */
+ * times as large as a cell, is near to a few of those that see it. What is seen of the partly hidden ones is
+ * found to half a ray's share. */
 START_TEST(near_pairs_are_those_above_the_threshold) {
     mesh m = room();
     const double threshold = .004 * (1 + _i);
@@ -92,26 +93,38 @@ START_TEST(near_pairs_are_those_above_the_threshold) {
     ck_assert_ptr_nonnull(polygons);
     for (size_t i = 0; i < m.n; i++) polygon_of_element(&m, i, &polygons[i]);
     pair_rules_init(&rules);
+    const recipe all = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 1e-5, .seed = 9};
+    form_factors exact = make(&m, &all);
     ck_assert_int_eq(visibility_create(&m, &v, &error), LAM_OK);
     ck_assert_msg(recipe_pairs_find(&m, v, &how, threshold, &f, &G, &error) == LAM_OK, "%s", error.message);
-    size_t n_near = 0, n_larger = 0;
+    size_t n_near = 0, n_larger = 0, n_partly = 0;
+    double off = 0;
     for (size_t i = 0; i < m.n; i++) {
         uint64_t p = G.indptr[i];
         for (size_t j = i + 1; j < m.n; j++) {
             const double g = pair_exchange(&rules, &polygons[i], &polygons[j], 1e-6);
             const double mean = 2 * g / (m.area[i] + m.area[j]);
             const bool there = p < G.indptr[i + 1] && G.indices[p] == j;
+            const double seen = m.area[i] * entry(&exact.F, i, j), smaller = fmin(m.area[i], m.area[j]);
+            if (there && seen > .01 * g && seen < .99 * g) {
+                off += pow(((double)G.data[p] - seen) / smaller, 2);
+                n_partly++;
+            }
             p += there;
             if (fabs(mean - threshold) < 1e-4 * threshold) continue; /* to rounding */
             ck_assert_int_eq(there, mean > threshold);
             n_near += there;
-            n_larger += g / fmin(m.area[i], m.area[j]) > threshold;
+            n_larger += g / smaller > threshold;
         }
     }
     ck_assert_uint_gt(n_near, 0);
     ck_assert_uint_gt(n_larger, n_near);
+    ck_assert_double_eq_tol(f.pairs.accuracy, .5 / RAYS, 1e-12);
+    ck_assert_double_le(off, (double)n_partly * pow(.5 / RAYS, 2));
+    ck_assert(n_partly > 0 || _i > 0);
     visibility_destroy(v);
     form_factors_free(&f);
+    form_factors_free(&exact);
     csr_free(&G);
     free(polygons);
     mesh_free(&m);

@@ -212,37 +212,6 @@ START_TEST(scale_and_place) {
 }
 END_TEST
 
-/* The nearest point of a triangle and of a quad, beside a search over points of them. */
-START_TEST(distance_is_to_the_nearest_point) {
-    enum { STEPS = 128, POINTS = 200 };
-    static const double corners[4][3] = {{0, 0, .2}, {2, .3, .2}, {1.6, 1.1, .2}, {.1, .8, .2}};
-    const polygon p = make(_i, corners);
-    uint64_t state = 7;
-    int inside = 0;
-    for (int k = 0; k < POINTS; k++) {
-        double point[3], least = INFINITY;
-        for (int d = 0; d < 3; d++) {
-            state = state * 6364136223846793005u + 1442695040888963407u;
-            point[d] = 3 * (double)(state >> 11) * 0x1p-53 - 1;
-        }
-        for (int u = 0; u <= STEPS; u++)
-            for (int w = 0; w <= STEPS; w++) {
-                double q[3], r2 = 0;
-                polygon_point(&p, (double)u / STEPS, (double)w / STEPS, q);
-                for (int d = 0; d < 3; d++) r2 += (q[d] - point[d]) * (q[d] - point[d]);
-                least = fmin(least, sqrt(r2));
-            }
-        const double found = polygon_distance(&p, point);
-        ck_assert_double_le(found, least + 1e-12);
-        /* No point of it is further than this from one that was tried. */
-        ck_assert_double_le(least, found + 4.0 / STEPS);
-        inside += fabs(found - fabs(point[2] - .2)) < 1e-12;
-    }
-    ck_assert_int_gt(inside, 0);
-    ck_assert_int_lt(inside, POINTS);
-}
-END_TEST
-
 int main(void) {
     Suite *suite = suite_create("pair");
     TCase *cases = tcase_create("pair");
@@ -254,7 +223,6 @@ int main(void) {
     tcase_add_test(cases, what_is_behind_is_not_seen);
     tcase_add_loop_test(cases, halves_sum_to_the_whole, 0, 2);
     tcase_add_test(cases, pieces_and_points_fill_the_polygon);
-    tcase_add_loop_test(cases, distance_is_to_the_nearest_point, 3, 5);
     tcase_add_test(cases, scale_and_place);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
