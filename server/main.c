@@ -1,9 +1,9 @@
 /* lambertd: reads stores, answers over HTTP what light they have, until a signal ends it. */
-#include "server/http.h"
-#include "server/json_memory.h"
-#include "server/listener.h"
-#include "server/map_guard.h"
-#include "server/routes.h"
+#include "server/http/http.h"
+#include "server/net/listener.h"
+#include "server/route/routes.h"
+#include "server/scene/map_guard.h"
+#include "solver/codec/json_memory.h"
 
 #include <errno.h>
 #include <malloc.h>

@@ -1,6 +1,6 @@
 /* `lambert`: finds the verb; the verbs are in cmd_*.c. */
-#include "solver/operator/core.h"
-#include "solver/verbs.h"
+#include "solver/linalg/core.h"
+#include "solver/verbs/verbs.h"
 
 #include <errno.h>
 #include <stdio.h>

@@ -45,7 +45,7 @@ run_ctest() {
 
 step "layers and layout"
 ./tests/layers.sh
-git ls-files '*.[ch]' | xargs clang-format --dry-run --Werror
+git ls-files '*.[ch]' '*.inc' | xargs clang-format --dry-run --Werror
 
 # Threads that wait should not spin while two of them share a core with a server and its clients.
 export OMP_WAIT_POLICY=passive

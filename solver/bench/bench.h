@@ -2,9 +2,9 @@
 #ifndef LAMBERT_BENCH_BENCH_H
 #define LAMBERT_BENCH_BENCH_H
 
+#include "solver/base/progress.h"
 #include "solver/bench/plot.h"
 #include "solver/bench/table.h"
-#include "solver/progress.h"
 
 /* Where results go, as soon as they are there. */
 typedef struct bench_sink {

@@ -4,9 +4,9 @@
 
 #include "solver/bench/bench.h"
 #include "solver/bench/lowrank.h"
-#include "solver/build/build.h"
-#include "solver/build/spectrum.h"
 #include "solver/formfactor/formfactor.h"
+#include "solver/method/method.h"
+#include "solver/method/spectrum.h"
 
 enum { CITY_VARIANTS = 3, CITY_SIZES = 3, CITY_TERRAINS = 3, CITY_THRESHOLDS = 3, CITY_SKIES = 3650 };
 

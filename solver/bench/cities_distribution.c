@@ -1,6 +1,6 @@
 /* Figure 4.4 of the thesis: most elements of M = (I - R F)^-1 are small, the smaller the darker the city. */
 #include "solver/bench/cities.h"
-#include "solver/build/columns.h"
+#include "solver/method/many_lights.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,9 +1,9 @@
 /* Tables 4.1 to 4.4 and 4.7 of the thesis: the sparse inverse, its time beside Jacobi's, its error; and the
  * light of few emitters (section 4.4.3). */
+#include "solver/base/clock.h"
 #include "solver/bench/cities.h"
 #include "solver/bench/formfactors.h"
-#include "solver/build/columns.h"
-#include "solver/clock.h"
+#include "solver/method/many_lights.h"
 
 #include <math.h>
 #include <omp.h>

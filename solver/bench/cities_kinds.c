@@ -1,6 +1,6 @@
 /* Every kind of operator on the four scenes of figure 5.1: what each takes, and whether auto picks well. */
 #include "solver/bench/cities.h"
-#include "solver/build/classify.h"
+#include "solver/method/classify.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 /* Cities under each tile of their sky alone, and how far a sparse inverse is off there. */
 #include "solver/bench/cities.h"
-#include "solver/build/reference.h"
+#include "solver/method/reference.h"
 
 #include <math.h>
 #include <stdlib.h>

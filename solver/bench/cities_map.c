@@ -1,6 +1,6 @@
 /* Figure 5.1 of the thesis: sparse or not against of low rank or not, and the kind of operator that suits. */
 #include "solver/bench/cities.h"
-#include "solver/build/classify.h"
+#include "solver/method/classify.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* Figure 4.1 of the thesis: why not to factorize a city. */
 #include "solver/bench/cities.h"
-#include "solver/build/classify.h"
-#include "solver/build/tsvd.h"
+#include "solver/method/classify.h"
+#include "solver/method/low_rank/tsvd.h"
 
 #include <math.h>
 #include <stdio.h>

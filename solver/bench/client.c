@@ -1,6 +1,6 @@
 #include "solver/bench/client.h"
 
-#include "solver/clock.h"
+#include "solver/base/clock.h"
 
 #include <errno.h>
 #include <netinet/in.h>

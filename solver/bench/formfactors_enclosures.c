@@ -1,6 +1,6 @@
 #include "solver/bench/formfactors.h"
 #include "solver/bench/formfactors_truths.h"
-#include "solver/build/reference.h"
+#include "solver/method/reference.h"
 
 #include <math.h>
 #include <stdlib.h>

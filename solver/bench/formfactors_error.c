@@ -1,7 +1,7 @@
 #include "solver/bench/formfactors.h"
 #include "solver/bench/scenes.h"
 #include "solver/bench/stats.h"
-#include "solver/build/reference.h"
+#include "solver/method/reference.h"
 
 #include <math.h>
 #include <stdlib.h>

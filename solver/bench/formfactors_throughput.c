@@ -1,9 +1,9 @@
+#include "solver/base/clock.h"
 #include "solver/bench/formfactors.h"
 #include "solver/bench/scenes.h"
 #include "solver/bench/stats.h"
-#include "solver/clock.h"
-#include "solver/formfactor/rays.h"
-#include "solver/formfactor/sample.h"
+#include "solver/formfactor/rays/rays.h"
+#include "solver/formfactor/visibility/sample.h"
 
 #include <omp.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* What other kinds of operator take for the error of a hierarchical one. */
-#include "solver/bench/hierarchical.h"
+#include "solver/bench/bench_hierarchical.h"
 
 #include <math.h>
 #include <string.h>

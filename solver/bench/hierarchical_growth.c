@@ -1,8 +1,8 @@
 /* Closed grey Cornell boxes of growing size: what a hierarchical operator takes, beside one of low rank. */
-#include "solver/bench/hierarchical.h"
+#include "solver/base/clock.h"
+#include "solver/bench/bench_hierarchical.h"
 #include "solver/bench/scenes.h"
-#include "solver/clock.h"
-#include "solver/formfactor/ray_rows.h"
+#include "solver/formfactor/rays/ray_rows.h"
 
 #include <math.h>
 #include <omp.h>

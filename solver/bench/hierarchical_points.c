@@ -1,7 +1,7 @@
 /* Every kind of operator on one scene: memory, build time and query time against total indirect error. */
+#include "solver/bench/bench_hierarchical.h"
 #include "solver/bench/formfactors.h"
-#include "solver/bench/hierarchical.h"
-#include "solver/build/classify.h"
+#include "solver/method/classify.h"
 
 #include <math.h>
 #include <stdio.h>

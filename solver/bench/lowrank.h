@@ -3,9 +3,9 @@
 #define LAMBERT_BENCH_LOWRANK_H
 
 #include "solver/bench/bench.h"
-#include "solver/build/judge.h"
-#include "solver/formfactor/first_light.h"
 #include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/pairs/first_light.h"
+#include "solver/method/judge.h"
 
 /* A scene with its form factors as a matrix. */
 typedef struct lowrank_scene {

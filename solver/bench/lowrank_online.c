@@ -1,11 +1,11 @@
 /* Tables 1 to 5 of Fernandez et al. 2011 at their sizes: V^T E by the index vector against a full V, and B~
  * in frames a second. V has one 1 a row in runs of n/k, Y is made up: neither time depends on the numbers.
  * Figures of GPUs are quoted; nothing ran on one. */
+#include "solver/base/clock.h"
 #include "solver/bench/lowrank.h"
 #include "solver/bench/stats.h"
-#include "solver/clock.h"
-#include "solver/matrix/dense.h"
-#include "solver/operator/segments.h"
+#include "solver/linalg/dense.h"
+#include "solver/linalg/segments.h"
 #include "solver/operator/two_mesh.h"
 
 #include <math.h>

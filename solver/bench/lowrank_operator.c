@@ -1,7 +1,7 @@
 /* One operator: built, timed and judged. */
+#include "solver/base/clock.h"
 #include "solver/bench/lowrank.h"
 #include "solver/bench/stats.h"
-#include "solver/clock.h"
 
 #include <errno.h>
 #include <stdio.h>

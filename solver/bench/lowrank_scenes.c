@@ -1,9 +1,9 @@
+#include "solver/base/clock.h"
 #include "solver/bench/formfactors.h"
 #include "solver/bench/lowrank.h"
 #include "solver/bench/scenes.h"
 #include "solver/bench/stats.h"
-#include "solver/build/norm.h"
-#include "solver/clock.h"
+#include "solver/method/low_rank/norm.h"
 #include "solver/scene/surfaces.h"
 
 #include <malloc.h>

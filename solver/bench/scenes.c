@@ -1,6 +1,6 @@
 #include "solver/bench/scenes.h"
 
-#include "solver/scene/import.h"
+#include "solver/scene/import/import.h"
 
 #include <errno.h>
 #include <stdio.h>

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_BENCH_SCENES_H
 #define LAMBERT_BENCH_SCENES_H
 
-#include "solver/scene/generate.h"
+#include "solver/scene/generate/generate.h"
 #include "solver/scene/mesh.h"
 
 /* A planar piece: a parallelogram, or the triangle that is half of it. Its front is where along x across

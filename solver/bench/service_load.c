@@ -1,5 +1,5 @@
 /* Load by wrk, which reports through the script that it is given. */
-#include "solver/bench/service.h"
+#include "solver/bench/bench_service.h"
 
 #include <errno.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* An optimizer in a loop on one keep-alive connection, and what an answer says of its own times. */
-#include "solver/bench/service.h"
+#include "solver/base/clock.h"
+#include "solver/bench/bench_service.h"
 #include "solver/bench/stats.h"
-#include "solver/clock.h"
 
 #include <math.h>
 #include <stdlib.h>

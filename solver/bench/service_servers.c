@@ -1,5 +1,5 @@
 /* The servers that are measured: started on free ports of the loopback, stopped whatever happens. */
-#include "solver/bench/service.h"
+#include "solver/bench/bench_service.h"
 
 #include <errno.h>
 #include <math.h>

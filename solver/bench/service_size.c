@@ -1,7 +1,7 @@
 /* One size of operator: in process and behind every server, in turns, as the machine's speed drifts. */
-#include "solver/bench/service.h"
+#include "solver/base/clock.h"
+#include "solver/bench/bench_service.h"
 #include "solver/bench/stats.h"
-#include "solver/clock.h"
 
 #include <errno.h>
 #include <math.h>

@@ -1,7 +1,7 @@
 /* Solves without HTTP around them. */
-#include "solver/bench/service.h"
+#include "solver/base/clock.h"
+#include "solver/bench/bench_service.h"
 #include "solver/bench/stats.h"
-#include "solver/clock.h"
 
 #include <math.h>
 #include <omp.h>

@@ -1,5 +1,5 @@
 /* What is served: an operator made up of random numbers, as its speed does not depend on them. */
-#include "solver/bench/service.h"
+#include "solver/bench/bench_service.h"
 #include "solver/operator/operator.h"
 #include "solver/scene/mesh.h"
 

@@ -1,8 +1,8 @@
 #include "solver/bench/stability.h"
 
 #include "solver/bench/scenes.h"
-#include "solver/build/reference.h"
 #include "solver/formfactor/formfactor.h"
+#include "solver/method/reference.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_BENCH_STABILITY_H
 #define LAMBERT_BENCH_STABILITY_H
 
-#include "solver/build/build.h"
+#include "solver/method/method.h"
 
 /* A problem as a matrix; all arrays owned. */
 typedef struct stability_problem {

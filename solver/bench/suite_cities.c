@@ -1,8 +1,8 @@
 /* lambert bench cities: chapter 4 of the thesis, on cities of the same kind and size. */
+#include "solver/base/clock.h"
 #include "solver/bench/cities.h"
 #include "solver/bench/formfactors.h"
 #include "solver/bench/scenes.h"
-#include "solver/clock.h"
 
 #include <stdlib.h>
 

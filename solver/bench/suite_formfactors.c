@@ -1,8 +1,8 @@
 /* lambert bench formfactors: how exact form factors are, what that costs, and how fast rays are. */
 #include "solver/bench/formfactors.h"
 
+#include "solver/base/clock.h"
 #include "solver/bench/scenes.h"
-#include "solver/clock.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* lambert bench hierarchical: that kind beside all others on every scene, and how it grows. */
+#include "solver/bench/bench_hierarchical.h"
 #include "solver/bench/cities.h"
 #include "solver/bench/formfactors.h"
-#include "solver/bench/hierarchical.h"
 #include "solver/bench/scenes.h"
 
 #include <libgen.h>

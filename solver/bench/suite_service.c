@@ -1,5 +1,5 @@
 /* lambert bench service: lambertd beside servers that compute nothing and beside solves without a server. */
-#include "solver/bench/service.h"
+#include "solver/bench/bench_service.h"
 
 #include <errno.h>
 #include <ftw.h>

@@ -3,8 +3,8 @@
 #ifndef LAMBERT_DAYLIGHT_SKY_MATRIX_H
 #define LAMBERT_DAYLIGHT_SKY_MATRIX_H
 
-#include "solver/formfactor/sky.h"
-#include "solver/progress.h"
+#include "solver/base/progress.h"
+#include "solver/daylight/sky_tiles.h"
 
 typedef struct sky_matrix {
     size_t n;          /* columns: hours */

@@ -2,10 +2,10 @@
 #ifndef LAMBERT_DAYLIGHT_YEAR_H
 #define LAMBERT_DAYLIGHT_YEAR_H
 
+#include "solver/base/progress.h"
 #include "solver/daylight/perez.h"
+#include "solver/daylight/sky_tiles.h"
 #include "solver/daylight/weather.h"
-#include "solver/formfactor/sky.h"
-#include "solver/progress.h"
 
 /* L [n_tiles] becomes the sky p without its sun, a mean over each tile (directions about 3 degrees apart,
  * each for its solid angle), scaled so that sum L cosine is diffuse. Where the model has no light at all

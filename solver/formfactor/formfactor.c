@@ -1,14 +1,14 @@
 #include "solver/formfactor/formfactor.h"
 
-#include "solver/clock.h"
-#include "solver/formfactor/closing.h"
-#include "solver/formfactor/hemicube.h"
-#include "solver/formfactor/rays.h"
-#include "solver/formfactor/recipe_pairs.h"
+#include "solver/base/clock.h"
+#include "solver/formfactor/leaving.h"
+#include "solver/formfactor/pairs/recipe_pairs.h"
+#include "solver/formfactor/rays/hemicube.h"
+#include "solver/formfactor/rays/rays.h"
 #include "solver/formfactor/repair.h"
-#include "solver/formfactor/rows.h"
-#include "solver/formfactor/upper.h"
-#include "solver/formfactor/visibility.h"
+#include "solver/formfactor/rows/row_merge.h"
+#include "solver/formfactor/rows/upper.h"
+#include "solver/formfactor/visibility/visibility.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -3,9 +3,9 @@
 #define LAMBERT_FORMFACTOR_FORMFACTOR_H
 
 #include "solver/formfactor/recipe.h"
-#include "solver/formfactor/scratch.h"
-#include "solver/formfactor/sky_bounce.h"
-#include "solver/operator/csr.h"
+#include "solver/formfactor/rows/scratch.h"
+#include "solver/formfactor/rows/sky_bounce.h"
+#include "solver/linalg/csr.h"
 #include "solver/scene/mesh.h"
 
 /* What was skipped and what was done, in pairs. */

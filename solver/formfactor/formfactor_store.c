@@ -1,7 +1,7 @@
 /* /form_factors of a store, in mesh order: rows F[i][.], or A_i F_ij for j > i. */
 #include "solver/formfactor/formfactor.h"
 
-#include "solver/operator/form_factor_rows.h"
+#include "solver/operator/refine/form_factor_rows.h"
 
 #include <stdlib.h>
 #include <string.h>

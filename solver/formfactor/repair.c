@@ -1,7 +1,7 @@
 #include "solver/formfactor/repair.h"
 
-#include "solver/formfactor/upper.h"
-#include "solver/operator/core.h"
+#include "solver/formfactor/rows/upper.h"
+#include "solver/linalg/core.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 #include "solver/formfactor/seen.h"
 
-#include "solver/formfactor/hemicube.h"
-#include "solver/formfactor/rays.h"
+#include "solver/formfactor/rays/hemicube.h"
+#include "solver/formfactor/rays/rays.h"
 
 #include <stdlib.h>
 

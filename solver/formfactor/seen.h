@@ -2,8 +2,8 @@
 #ifndef LAMBERT_FORMFACTOR_SEEN_H
 #define LAMBERT_FORMFACTOR_SEEN_H
 
+#include "solver/base/progress.h"
 #include "solver/formfactor/recipe.h"
-#include "solver/progress.h"
 #include "solver/scene/mesh.h"
 
 /* seen[k]: how many elements elements[k], which are all different, finds by the recipe, RECIPE_RAYS or

@@ -2,8 +2,8 @@
  * is stored: O(ns). Making, loading and saving; what it answers is in emitters_apply.c. */
 #include "solver/operator/emitters.h"
 
-#include "solver/operator/csr.h"
-#include "solver/operator/sky.h"
+#include "solver/linalg/csr.h"
+#include "solver/operator/sky_light.h"
 
 #include <math.h>
 #include <stdio.h>

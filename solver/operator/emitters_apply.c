@@ -1,7 +1,7 @@
 /* What an operator of few emitters answers: B = sum_k w_k B_k, its weights from an emission, its adjoint. */
 #include "solver/operator/emitters.h"
 
-#include "solver/operator/sky.h"
+#include "solver/operator/sky_light.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* kind "exact": the whole n x n matrix of every channel. O(n^2) memory and time; small scenes, and a judge of
  * the other kinds. */
+#include "solver/linalg/panel.h"
 #include "solver/operator/operator.h"
-#include "solver/operator/panel.h"
 
 #include <stdio.h>
 #include <stdlib.h>

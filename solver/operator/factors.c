@@ -1,6 +1,6 @@
 #include "solver/operator/factors.h"
 
-#include "solver/operator/panel_store.h"
+#include "solver/linalg/panel_store.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -5,7 +5,7 @@
 #ifndef LAMBERT_OPERATOR_FACTORS_H
 #define LAMBERT_OPERATOR_FACTORS_H
 
-#include "solver/operator/core.h"
+#include "solver/linalg/core.h"
 #include "solver/operator/operator.h"
 
 typedef struct factors {

@@ -3,10 +3,10 @@
  * is left. */
 #include "solver/operator/hierarchical.h"
 
-#include "solver/operator/even_light.h"
-#include "solver/operator/sliced.h"
-#include "solver/operator/sparse_product.h"
-#include "solver/operator/wavelet_plan.h"
+#include "solver/linalg/sliced.h"
+#include "solver/linalg/sparse_product.h"
+#include "solver/operator/mean_correction.h"
+#include "solver/operator/wavelet/wavelet_plan.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -2,9 +2,9 @@
 #ifndef LAMBERT_OPERATOR_HIERARCHICAL_H
 #define LAMBERT_OPERATOR_HIERARCHICAL_H
 
-#include "solver/operator/csr.h"
+#include "solver/linalg/csr.h"
 #include "solver/operator/operator.h"
-#include "solver/operator/wavelets.h"
+#include "solver/operator/wavelet/wavelets.h"
 
 /* H_c = A^-1/2 W^T K_c W A^1/2 E_c, with K_c = W A^1/2 F (I - R_c F)^-1 A^-1/2 W^T, symmetric whatever R is,
  * and all of it sparse but for what was left out of K. */
@@ -22,8 +22,8 @@ lam_status operator_hierarchical_create(size_t n, size_t n_channels, const float
                                         const double *area, const uint32_t *order,
                                         hierarchical_arrays *arrays, lam_operator **op, lam_error *error);
 
-/* H += missing (sum_j A_j E_j) / light from now on (even_light.h): missing [C][n], by position, is what op
- * lacks of the irradiance that a light E0 brings, light [C] the area-weighted sum of E0. Once at most.
+/* H += missing (sum_j A_j E_j) / light from now on (mean_correction.h): missing [C][n], by position, is what
+ * op lacks of the irradiance that a light E0 brings, light [C] the area-weighted sum of E0. Once at most.
  * Errors: as even_light_create. */
 lam_status operator_hierarchical_make_up(lam_operator *op, const double *missing, const double *light,
                                          lam_error *error);

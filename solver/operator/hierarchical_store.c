@@ -1,7 +1,7 @@
 /* A symmetric sparse matrix as its upper triangle: of each row how many, and for each number the step from
  * the one before it (from the diagonal for the first) and itself in half precision. A step beyond 65,535 is
  * made of several, of numbers that are 0. */
-#include "solver/operator/half.h"
+#include "solver/base/half.h"
 #include "solver/operator/hierarchical.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* kind "low_rank": B = E + P E with P of rank k (Aguerre 2016, eq. 2.8); V is [n][k]. */
+#include "solver/linalg/panel_store.h"
 #include "solver/operator/factors.h"
-#include "solver/operator/panel_store.h"
 
 #include <stdlib.h>
 

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_OPERATOR_OPERATOR_H
 #define LAMBERT_OPERATOR_OPERATOR_H
 
-#include "solver/operator/panel.h"
+#include "solver/linalg/panel.h"
 #include "store/store.h"
 
 #include <stdatomic.h>

@@ -3,7 +3,7 @@
  * what is stored of their columns. */
 #include "solver/operator/sparse.h"
 
-#include "solver/operator/sparse_product.h"
+#include "solver/linalg/sparse_product.h"
 
 #include <math.h>
 #include <stdio.h>

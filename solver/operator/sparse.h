@@ -2,7 +2,7 @@
 #ifndef LAMBERT_OPERATOR_SPARSE_H
 #define LAMBERT_OPERATOR_SPARSE_H
 
-#include "solver/operator/csr.h"
+#include "solver/linalg/csr.h"
 #include "solver/operator/operator.h"
 
 typedef struct sparse_arrays {

@@ -2,8 +2,8 @@
  * 2011, section 4). As low_rank, with a V of one entry a row, of which the index vector I is kept (eq. 7). */
 #include "solver/operator/two_mesh.h"
 
+#include "solver/linalg/segments.h"
 #include "solver/operator/factors.h"
-#include "solver/operator/segments.h"
 
 #include <stdlib.h>
 #include <string.h>

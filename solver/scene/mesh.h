@@ -2,7 +2,7 @@
 #ifndef LAMBERT_SCENE_MESH_H
 #define LAMBERT_SCENE_MESH_H
 
-#include "solver/progress.h"
+#include "solver/base/progress.h"
 #include "store/store.h"
 
 #include <stdint.h>

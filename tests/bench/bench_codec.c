@@ -5,11 +5,11 @@
  *
  * CSV, times are medians in milliseconds; round_trips counts the floats that come back as they were.
  */
-#include "server/codec_answer.h"
-#include "server/codec_json_writer.h"
-#include "server/codec_request.h"
+#include "solver/base/clock.h"
 #include "solver/bench/stats.h"
-#include "solver/clock.h"
+#include "solver/codec/answer.h"
+#include "solver/codec/json_writer.h"
+#include "solver/codec/request.h"
 
 #include <jansson.h>
 #include <stdio.h>

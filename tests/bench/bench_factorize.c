@@ -3,11 +3,11 @@
  *     bench_factorize STORE.h5 FACTORIZER epsilon=X|rank=K [alpha=X] [levels=N] [budget=RULE] [iterations=Q]
  *                     [order=mesh] [runs=N] [norm=0]
  */
+#include "solver/base/clock.h"
 #include "solver/bench/stats.h"
-#include "solver/build/build.h"
-#include "solver/build/norm.h"
-#include "solver/clock.h"
 #include "solver/formfactor/formfactor.h"
+#include "solver/method/low_rank/norm.h"
+#include "solver/method/method.h"
 
 #include <omp.h>
 #include <stdio.h>

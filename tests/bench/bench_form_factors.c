@@ -5,10 +5,10 @@
  *
  * Pairs, all or near ones, are those of normal quality. rows=1 in the environment expands the upper triangle
  * to rows, as an operator needs them. */
+#include "solver/base/clock.h"
 #include "solver/bench/stats.h"
-#include "solver/clock.h"
 #include "solver/formfactor/formfactor.h"
-#include "solver/scene/import.h"
+#include "solver/scene/import/import.h"
 #include "tests/bench/bench_recipe.h"
 
 #include <omp.h>

@@ -6,14 +6,14 @@
  * B - E = R H + D,  (I - R F') D = R F' (R H), with H the light that E itself gives: of single elements pair
  * by pair, of lamps (squares of a plane) by some of their elements for each element, of light all over by F',
  * as all that bounces on is. F' is of the recipe JUDGE. As CSV. */
+#include "solver/base/clock.h"
 #include "solver/bench/stats.h"
-#include "solver/build/reference.h"
-#include "solver/clock.h"
-#include "solver/formfactor/first_light.h"
 #include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/pairs/first_light.h"
+#include "solver/method/reference.h"
 
 #include "solver/operator/operator.h"
-#include "solver/scene/import.h"
+#include "solver/scene/import/import.h"
 #include "tests/bench/bench_recipe.h"
 
 #include <math.h>

@@ -8,9 +8,9 @@
  * CSV, times are medians. Ratios of one run are worth more than times: where sgemm_scaling, how much faster
  * OpenBLAS is with all threads, is far below their number, the machine was not free.
  */
+#include "solver/base/clock.h"
 #include "solver/bench/stats.h"
-#include "solver/clock.h"
-#include "solver/operator/panel.h"
+#include "solver/linalg/panel.h"
 
 #include <cblas.h>
 #include <omp.h>

@@ -7,9 +7,9 @@
  * turns in one run; beside other programs the best time says more than the median. `times` counts products
  * with F, `of_jacobi` is time over Jacobi's.
  */
+#include "solver/base/clock.h"
 #include "solver/bench/stats.h"
-#include "solver/clock.h"
-#include "solver/operator/refine.h"
+#include "solver/operator/refine/refine.h"
 
 #include <math.h>
 #include <omp.h>

@@ -6,12 +6,12 @@
  * with F_e, the light of the bright element itself, pair by pair and far more finely than the recipes do, and
  * F' of the recipe JUDGE (the one that is judged) and another seed for what bounces on: by then it comes from
  * everywhere, and its noise has averaged out. How much of it has not is printed beside. As CSV. */
+#include "solver/base/clock.h"
 #include "solver/bench/stats.h"
-#include "solver/build/reference.h"
-#include "solver/clock.h"
 #include "solver/formfactor/formfactor.h"
-#include "solver/formfactor/look.h"
-#include "solver/scene/import.h"
+#include "solver/formfactor/pairs/occlusion.h"
+#include "solver/method/reference.h"
+#include "solver/scene/import/import.h"
 #include "tests/bench/bench_recipe.h"
 
 #include <math.h>

@@ -3,8 +3,8 @@
  *
  *     bench_store STORE.h5 NxK [f32|f16|i8]        2 n k values: 320000x2000 in f32 are 5.1 GB
  */
-#include "solver/operator/half.h"
-#include "solver/operator/panel.h"
+#include "solver/base/half.h"
+#include "solver/linalg/panel.h"
 #include "store/store.h"
 
 #include <stdio.h>

@@ -1,7 +1,7 @@
 /* Operators of few emitters: their answers against sums in double, their transpose, what they can tell from
  * an emission, and what a store may not be. */
 #include "solver/operator/emitters.h"
-#include "solver/operator/sky.h"
+#include "solver/operator/sky_light.h"
 #include "support/failing_memory.h"
 #include "support/operator_file.h"
 #include "support/suite.h"

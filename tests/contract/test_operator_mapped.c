@@ -1,6 +1,6 @@
 /* Operators of a mapped store answer with the bits of copies, and live as long as they are open. */
 #include "solver/operator/operator.h"
-#include "solver/operator/sky.h"
+#include "solver/operator/sky_light.h"
 #include "store/store_map.h"
 #include "support/store_sample.h"
 #include "support/suite.h"

@@ -1,6 +1,6 @@
 /* Operators under other reflectances: the same bits as if their cores had been built so; what cannot be relit
  * is refused. What a relit operator computes is judged with every other kind, by the contract test. */
-#include "solver/operator/core.h"
+#include "solver/linalg/core.h"
 #include "support/failing_memory.h"
 #include "support/suite.h"
 #include "support/transport.h"

@@ -3,8 +3,8 @@
 #ifndef LAMBERT_TESTS_FUZZ_H
 #define LAMBERT_TESTS_FUZZ_H
 
-#include "server/codec_request.h"
-#include "server/problem.h"
+#include "solver/codec/problem.h"
+#include "solver/codec/request.h"
 
 #include <stdint.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 /* What a client may send to be pulled back. */
 #include "fuzz/fuzz.h"
-#include "server/codec_adjoint.h"
+#include "solver/codec/adjoint.h"
 
 #include <float.h>
 #include <math.h>

@@ -1,6 +1,6 @@
 /* What may come back from the process that reads scene files: the parent takes it only when it is sound. */
 #include "fuzz/fuzz.h"
-#include "solver/scene/soup.h"
+#include "solver/scene/import/imported_faces.h"
 
 #include <unistd.h>
 

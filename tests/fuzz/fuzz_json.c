@@ -1,6 +1,6 @@
 /* What a client may send as JSON: whatever it is, it ends in a request that is in range or in one problem. */
 #include "fuzz/fuzz.h"
-#include "server/codec_answer.h"
+#include "solver/codec/answer.h"
 
 #include <float.h>
 

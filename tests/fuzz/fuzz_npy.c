@@ -1,6 +1,6 @@
 /* What a client may send as NPY. */
 #include "fuzz/fuzz.h"
-#include "server/codec_request.h"
+#include "solver/codec/request.h"
 
 #include <float.h>
 

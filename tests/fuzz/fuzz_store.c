@@ -1,6 +1,6 @@
 /* What a store may hold: it opens and answers with finite light, or is refused in one line. */
 #include "fuzz/fuzz.h"
-#include "server/scene.h"
+#include "server/scene/scene.h"
 
 #include <math.h>
 #include <unistd.h>

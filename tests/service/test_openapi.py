@@ -14,7 +14,7 @@ from make_store import Scene
 
 N = 60
 METHODS = "get put post delete options head patch trace".split()
-ROUTES = pathlib.Path(__file__).resolve().parents[2] / "server" / "routes.c"
+ROUTES = pathlib.Path(__file__).resolve().parents[2] / "server" / "route" / "routes.c"
 
 
 def obj(required=(), patterns=None, /, **properties):

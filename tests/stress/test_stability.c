@@ -1,7 +1,7 @@
 /* Operators where numbers are hard: nothing ends in NaN, infinity, a radiosity more negative than the error
  * allows, or a crash; what cannot be done is refused with a remedy. */
 #include "solver/bench/stability.h"
-#include "solver/operator/panel.h"
+#include "solver/linalg/panel.h"
 #include "support/suite.h"
 
 #include <float.h>

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_TESTS_BOX_H
 #define LAMBERT_TESTS_BOX_H
 
-#include "solver/operator/csr.h"
+#include "solver/linalg/csr.h"
 #include "solver/scene/mesh.h"
 
 #include <check.h>

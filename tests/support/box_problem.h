@@ -2,7 +2,7 @@
 #ifndef LAMBERT_TESTS_BOX_PROBLEM_H
 #define LAMBERT_TESTS_BOX_PROBLEM_H
 
-#include "solver/build/build.h"
+#include "solver/method/method.h"
 #include "support/box.h"
 #include "support/suite.h"
 

@@ -2,9 +2,9 @@
 #ifndef LAMBERT_TESTS_CERTIFIED_H
 #define LAMBERT_TESTS_CERTIFIED_H
 
-#include "solver/build/reference.h"
-#include "solver/operator/form_factor_rows.h"
+#include "solver/method/reference.h"
 #include "solver/operator/operator.h"
+#include "solver/operator/refine/form_factor_rows.h"
 #include "support/suite.h"
 
 #include <float.h>

@@ -2,8 +2,8 @@
 #ifndef LAMBERT_TESTS_FOUND_H
 #define LAMBERT_TESTS_FOUND_H
 
-#include "solver/formfactor/found_rows.h"
-#include "solver/operator/csr.h"
+#include "solver/formfactor/rows/found_rows.h"
+#include "solver/linalg/csr.h"
 
 #include <check.h>
 #include <stdlib.h>

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_TESTS_RANDOM_BASIS_H
 #define LAMBERT_TESTS_RANDOM_BASIS_H
 
-#include "solver/operator/wavelets.h"
+#include "solver/operator/wavelet/wavelets.h"
 #include "support/dense.h"
 
 /* A tree of leaves with 1 to 7 elements, every node with a matrix of its own that is not far from one that

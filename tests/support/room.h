@@ -2,8 +2,8 @@
 #ifndef LAMBERT_TESTS_ROOM_H
 #define LAMBERT_TESTS_ROOM_H
 
-#include "solver/build/build.h"
-#include "solver/element_geometry.h"
+#include "solver/method/method.h"
+#include "solver/precompute/element_geometry.h"
 #include "support/box.h"
 
 typedef struct room {

@@ -2,8 +2,8 @@
 #ifndef LAMBERT_TESTS_SCENE_H
 #define LAMBERT_TESTS_SCENE_H
 
-#include "solver/scene/generate.h"
-#include "solver/scene/import.h"
+#include "solver/scene/generate/generate.h"
+#include "solver/scene/import/import.h"
 
 #include <check.h>
 #include <math.h>

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_TESTS_SUBJECT_H
 #define LAMBERT_TESTS_SUBJECT_H
 
-#include "solver/build/factorizer.h"
+#include "solver/method/low_rank/factorizer.h"
 #include "support/box_problem.h"
 
 #include <lapacke.h>

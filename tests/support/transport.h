@@ -3,9 +3,9 @@
 #ifndef LAMBERT_TESTS_TRANSPORT_H
 #define LAMBERT_TESTS_TRANSPORT_H
 
+#include "solver/linalg/panel.h"
 #include "solver/operator/hierarchical.h"
 #include "solver/operator/operator.h"
-#include "solver/operator/panel.h"
 #include "solver/operator/sparse.h"
 #include "support/dense.h"
 #include "support/random_basis.h"

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_TESTS_TWO_MESH_H
 #define LAMBERT_TESTS_TWO_MESH_H
 
-#include "solver/build/build.h"
+#include "solver/method/method.h"
 #include "support/room.h"
 #include "support/transport.h"
 

@@ -3,12 +3,12 @@
 #define LAMBERT_TESTS_WAVELET_SUBJECT_H
 
 #include "solver/bench/scenes.h"
-#include "solver/build/plane_tree.h"
-#include "solver/build/wavelet_basis.h"
-#include "solver/build/wavelet_inverse.h"
-#include "solver/build/wavelet_pass.h"
 #include "solver/formfactor/formfactor.h"
-#include "solver/operator/wavelet_plan.h"
+#include "solver/method/hierarchical/plane_tree.h"
+#include "solver/method/hierarchical/wavelet_basis.h"
+#include "solver/method/hierarchical/wavelet_inverse.h"
+#include "solver/method/hierarchical/wavelet_pass.h"
+#include "solver/operator/wavelet/wavelet_plan.h"
 #include "support/box_problem.h"
 #include "support/dense.h"
 #include "support/scene.h"

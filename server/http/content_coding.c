@@ -1,0 +1,161 @@
+#include "server/http/content_coding.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#define ZLIB_CONST
+#include <zlib.h>
+#include <zstd.h>
+
+/* The fastest of both: the answer should not wait for the last bytes it could save. */
+#define LEVEL 1
+
+/* A body is judged by this many pieces of it of this length, where it is much longer than they are. */
+#define N_SAMPLES 3
+#define SAMPLE ((size_t)16 << 10)
+
+/* Longer ones would keep a thread from solving for others for half a second and more; zlib counts in 32 bits.
+ */
+#define LONGEST ((size_t)64 << 20)
+
+static const char *const names[] = {"identity", "gzip", "zstd"};
+#define N_CODINGS (sizeof names / sizeof names[0])
+
+/* --- Accept-Encoding ---------------------------------------------------------------------------------- */
+
+/* The part of an element up to one of the stops, without space at its ends. */
+static const char *take_word(const char *at, const char *stops, const char **word, size_t *length) {
+    at += strspn(at, " \t");
+    *word = at;
+    at += strcspn(at, stops);
+    *length = (size_t)(at - *word);
+    while (*length > 0 && strchr(" \t", (*word)[*length - 1]) != NULL) --*length;
+    return at;
+}
+
+static bool is_word(const char *word, size_t length, const char *name) {
+    return strlen(name) == length && strncasecmp(word, name, length) == 0;
+}
+
+/* A weight in thousandths (0 to 1 with three decimals); what is no weight counts as 0. Not strtod: that would
+ * follow the locale, and read 0x1 and nan. */
+static int read_weight(const char *word, size_t length) {
+    int weight = 0, scale = 1000;
+    if (length == 0 || (word[0] != '0' && word[0] != '1') || (length > 1 && word[1] != '.')) return 0;
+    weight = (word[0] - '0') * scale;
+    for (size_t i = 2; i < length; i++) {
+        if (word[i] < '0' || word[i] > '9') return 0;
+        scale /= 10;
+        weight += (word[i] - '0') * scale;
+    }
+    return weight > 1000 ? 1000 : weight;
+}
+
+coding_choice coding_choose(const char *header) {
+    int weights[N_CODINGS] = {-1, -1, -1}, others = -1; /* -1: not named */
+    const char *at = header == NULL ? "" : header;
+    while (*at != '\0') {
+        const char *word, *value;
+        size_t length, value_length;
+        int weight = 1000;
+        at = take_word(at, ";,", &word, &length);
+        while (*at == ';') {
+            const char *key;
+            size_t key_length;
+            at = take_word(at + 1, "=;,", &key, &key_length);
+            if (*at != '=') continue;
+            at = take_word(at + 1, ";,", &value, &value_length);
+            if (is_word(key, key_length, "q")) weight = read_weight(value, value_length);
+        }
+        if (*at == ',') at++;
+        if (is_word(word, length, "*")) others = weight;
+        if (is_word(word, length, "x-gzip")) weights[CODING_GZIP] = weight;
+        for (size_t c = 0; c < N_CODINGS; c++)
+            if (is_word(word, length, names[c])) weights[c] = weight;
+    }
+    /* The body as it is may always be sent unless it is refused, by name or by the star, but only one that
+     * names it can like it more than a coding. */
+    coding_choice choice = {CODING_IDENTITY, false};
+    int best = weights[CODING_IDENTITY] > 0 ? weights[CODING_IDENTITY] : 0;
+    for (size_t c = 0; c < N_CODINGS; c++)
+        if (weights[c] < 0) weights[c] = others;
+    const bool refused = weights[CODING_IDENTITY] == 0;
+    for (int c = CODING_ZSTD; c > CODING_IDENTITY; c--) {
+        if (weights[c] <= 0 || weights[c] < best || (weights[c] == best && choice.coding != CODING_IDENTITY))
+            continue;
+        best = weights[c];
+        choice.coding = (content_coding)c;
+    }
+    choice.forced = refused && choice.coding != CODING_IDENTITY;
+    return choice;
+}
+
+const char *coding_name(content_coding coding) {
+    return names[coding];
+}
+
+/* --- the coders --------------------------------------------------------------------------------------- */
+
+/* Length of what was written; 0 when it did not fit or the coder failed. */
+static size_t code_gzip(const char *bytes, size_t length, char *out, size_t room) {
+    z_stream z = {0};
+    size_t written = 0;
+    /* 15 bits of window, and 16 for a gzip head. */
+    if (deflateInit2(&z, LEVEL, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) != Z_OK) return 0;
+    z.next_in = (const Bytef *)bytes;
+    z.avail_in = (uInt)length;
+    z.next_out = (Bytef *)out;
+    z.avail_out = (uInt)room;
+    if (deflate(&z, Z_FINISH) == Z_STREAM_END) written = room - z.avail_out;
+    deflateEnd(&z);
+    return written;
+}
+
+static size_t code_zstd(const char *bytes, size_t length, char *out, size_t room) {
+    size_t written = ZSTD_compress(out, room, bytes, length, LEVEL);
+    return ZSTD_isError(written) ? 0 : written;
+}
+
+static size_t code(content_coding coding, const char *bytes, size_t length, char *out, size_t room) {
+    return coding == CODING_GZIP ? code_gzip(bytes, length, out, room) : code_zstd(bytes, length, out, room);
+}
+
+static size_t worth(size_t length) {
+    return length / 5 * 4;
+}
+
+/* Whether pieces from all over the body shrink as much as the whole would have to. */
+static bool samples_shrink(content_coding coding, const buffer *b) {
+    char out[SAMPLE];
+    size_t coded = 0;
+    for (size_t i = 0; i < N_SAMPLES; i++) {
+        const size_t from = (b->length - SAMPLE) / (N_SAMPLES - 1) * i;
+        const size_t length = code(coding, b->bytes + from, SAMPLE, out, sizeof out);
+        coded += length == 0 ? SAMPLE : length;
+    }
+    return coded <= worth(N_SAMPLES * SAMPLE);
+}
+
+content_coding coding_apply(buffer *b, coding_choice choice) {
+    buffer made = {0};
+    if (choice.coding == CODING_IDENTITY || b->length > LONGEST) return CODING_IDENTITY;
+    if (!choice.forced) {
+        if (b->length < COMPRESS_LEAST) return CODING_IDENTITY;
+        if (b->length >= 4 * N_SAMPLES * SAMPLE && !samples_shrink(choice.coding, b)) return CODING_IDENTITY;
+    }
+    /* Where it has to shrink, no more room than that: a coder that fills it stops there. */
+    size_t room = worth(b->length);
+    if (choice.forced)
+        room = choice.coding == CODING_GZIP ? compressBound((uLong)b->length) + 32
+                                            : ZSTD_compressBound(b->length);
+    if (!buffer_reserve(&made, room)) return CODING_IDENTITY;
+    made.length = code(choice.coding, b->bytes == NULL ? "" : b->bytes, b->length, made.bytes, room);
+    if (made.length == 0) {
+        buffer_free(&made);
+        return CODING_IDENTITY;
+    }
+    buffer_free(b);
+    *b = made;
+    buffer_trim(b);
+    return choice.coding;
+}

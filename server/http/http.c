@@ -1,0 +1,404 @@
+#include "server/http/http_request.h"
+#include "server/net/access_log.h"
+#include "server/scene/map_guard.h"
+#include "server/scene/verifier.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+/* What libmicrohttpd may hold of a connection's head; bodies are ours. */
+#define CONNECTION_MEMORY (32u << 10)
+
+/* Once a request is refused, so much more of its body is read and dropped, so that its connection can go on.
+ */
+#define DROP_MAX ((uint64_t)1 << 20)
+
+/* --- checks of the head ------------------------------------------------------------------------------- */
+
+static void refuse_token(request *r) {
+    answer_refuse(&r->answer, 401, "a bearer token is needed: Authorization: Bearer TOKEN");
+}
+
+/* Whether the scene is in service; else it is refused, whatever the answer was. */
+static bool check_health(request *r) {
+    lam_error why;
+    bool news;
+    if (r->call.scene == NULL || !scene_damaged(r->call.scene, &why, &news)) return true;
+    if (news) verifier_tell(stderr, r->call.scene, &why);
+    answer_refuse(&r->answer, 503, "%.200s is out of service: %s", r->call.scene->name, why.message);
+    return false;
+}
+
+static bool check_scene(request *r) {
+    const variant_state variant = r->call.variant;
+    if (!r->match.has_name) return true;
+    r->call.scene = catalog_find(r->snapshot, r->match.name);
+    r->call.name = r->match.name;
+    if (r->call.scene != NULL) return check_health(r);
+    if (variant != VARIANT_SETTLED && r->match.route->subject == SERVED_OR_BUILT) return true;
+    if (variant == VARIANT_BUILDING)
+        answer_refuse(&r->answer, 503, "%.200s is being built", r->match.name);
+    else if (variant == VARIANT_FAILED)
+        answer_problem(&r->answer, &r->variant_why);
+    else if (atomic_load(&r->http->service->state) == SERVICE_LOADING)
+        answer_refuse(&r->answer, 503, "stores are being loaded");
+    else
+        answer_refuse(&r->answer, 404, "there is no scene %.200s; GET /v1/scenes lists them", r->match.name);
+    return false;
+}
+
+static bool check_type(request *r) {
+    const char *type = http_header(r, MHD_HTTP_HEADER_CONTENT_TYPE);
+    const char *encoding = http_header(r, MHD_HTTP_HEADER_CONTENT_ENCODING);
+    r->call.body_type = media_content_type(type);
+    r->call.accept = media_choose(http_header(r, MHD_HTTP_HEADER_ACCEPT));
+    if (r->call.body_type == MEDIA_OTHER)
+        answer_refuse(&r->answer, 415,
+                      "Content-Type is %.100s, must be application/json or application/x-npy", type);
+    else if (encoding != NULL && strcasecmp(encoding, "identity") != 0)
+        answer_refuse(&r->answer, 415, "Content-Encoding is %.100s, must be left out", encoding);
+    else
+        return true;
+    return false;
+}
+
+static void refuse_length(request *r) {
+    answer_refuse(&r->answer, 413, "the body is longer than %zu bytes (--max-body); send several requests",
+                  r->http->service->config->max_body);
+}
+
+static void refuse_to_hold(request *r, const char *what) {
+    answer_refuse(&r->answer, 503,
+                  "there is no room for %s: %zu bytes of bodies are held at once (--max-buffered)", what,
+                  r->http->service->config->max_buffered);
+}
+
+/* Whatever the head alone decides: route, method, token, scene, type, length; true when the body is wanted.
+ */
+static bool check_head(request *r, const char *method, uint64_t length) {
+    const service *s = r->http->service;
+    route_find(method, r->path, &r->match, &r->answer);
+    if (r->match.with_token && !token_matches(&s->token, http_header(r, MHD_HTTP_HEADER_AUTHORIZATION))) {
+        refuse_token(r);
+        return false;
+    }
+    if (r->match.route == NULL) return false;
+    /* The variant first: one that is built meanwhile is then in the snapshot. */
+    const variant_state variant =
+        r->match.has_name ? variants_state(s->variants, r->match.name, &r->variant_why) : VARIANT_SETTLED;
+    r->snapshot = catalog_acquire(s->catalog);
+    r->call =
+        (call){.service = s, .snapshot = r->snapshot, .variant = variant, .variant_why = &r->variant_why};
+    if (!check_scene(r)) return false;
+    if (r->match.route->body == BODY_NONE) return true;
+    if (!check_type(r)) return false;
+    if (length > s->config->max_body) {
+        refuse_length(r);
+        return false;
+    }
+    /* What is announced is not set aside, or a few who send slowly would keep out all others. */
+    const size_t held = atomic_load(&s->body_bytes);
+    if (length > 0 && (held > s->config->max_buffered || length > s->config->max_buffered - held)) {
+        refuse_to_hold(r, "the body");
+        return false;
+    }
+    return true;
+}
+
+/* Body bytes, counted; false with the answer made when there is no room for them. */
+static bool hold_body(request *r, const char *bytes, size_t count) {
+    service *s = r->http->service;
+    const size_t before = atomic_fetch_add(&s->body_bytes, count);
+    const bool room = before <= s->config->max_buffered && count <= s->config->max_buffered - before;
+    if (room && buffer_append(&r->body, bytes, count)) return true;
+    atomic_fetch_sub(&s->body_bytes, count);
+    if (room)
+        answer_refuse(&r->answer, 503, "not enough memory for the body");
+    else
+        refuse_to_hold(r, "the rest of the body");
+    return false;
+}
+
+static void drop_body(request *r) {
+    atomic_fetch_sub(&r->http->service->body_bytes, r->body.length);
+    buffer_free(&r->body);
+}
+
+/* --- solves ------------------------------------------------------------------------------------------- */
+
+static request *request_of(batch_job *job) {
+    return (request *)(void *)job;
+}
+
+static void made(request *r) {
+    http_finish_answer(r, false);
+    drop_body(r);
+}
+
+static bool begin_solve(batch_job *job, batch_workspace *workspace) {
+    request *r = request_of(job);
+    const route *to = r->match.route;
+    r->call.workspace = workspace;
+    map_guard_allow();
+    if (client_is_lost(r->client)) {
+        answer_refuse(&r->answer, 503, "its client went before it was begun");
+    } else if (to->steps != NULL) {
+        if (to->steps->begin(&r->call, &r->answer)) return true;
+    } else {
+        to->handle(&r->call, &r->answer);
+    }
+    (void)check_health(r); /* what was lost on the way makes the answer a wrong one */
+    made(r);
+    return false;
+}
+
+static void pass_solve(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
+    map_guard_allow();
+    request_of(parts[0].job)->match.route->steps->pass(parts, n_parts, workspace);
+}
+
+static void end_solve(batch_job *job, batch_workspace *workspace) {
+    request *r = request_of(job);
+    r->call.workspace = workspace;
+    r->match.route->steps->end(&r->call, &r->answer);
+    (void)check_health(r);
+    made(r);
+}
+
+/* A pass over so much takes about a millisecond, a body so long next to nothing where nothing is parsed. */
+#define BRIEF_OPERATOR ((size_t)32 << 20)
+#define BRIEF_BODY ((size_t)256 << 10)
+
+static bool is_brief(const call *c) {
+    return c->body_type == MEDIA_NPY && c->accept.type == MEDIA_NPY && c->length <= BRIEF_BODY &&
+           c->scene != NULL && lam_operator_bytes(c->scene->op) <= BRIEF_OPERATOR;
+}
+
+static void finish_solve(batch_job *job) {
+    request *r = request_of(job);
+    r->answered = true;
+    MHD_resume_connection(r->connection);
+}
+
+/* The whole request is here. */
+static enum MHD_Result handle(request *r) {
+    if (!r->answered) {
+        r->call.body = r->body.bytes == NULL ? "" : r->body.bytes;
+        r->call.length = r->body.length;
+        route_shortcut *shortcut = r->match.route->shortcut;
+        if (shortcut != NULL && shortcut(&r->call, &r->answer)) {
+            drop_body(r);
+        } else if (r->match.route->body == BODY_OF_SOLVE) {
+            /* Suspended first: the solve may be done before batch_submit returns. */
+            const solve_steps *steps = r->match.route->steps;
+            r->call.job = (batch_job){.begin = begin_solve,
+                                      .pass = steps != NULL ? pass_solve : NULL,
+                                      .end = end_solve,
+                                      .finish = finish_solve,
+                                      .brief = is_brief(&r->call)};
+            client_enter(r->http->service->connections, r->client, STAGE_SOLVE, 0);
+            MHD_suspend_connection(r->connection);
+            if (batch_submit(r->http->service->queue, &r->call.job)) return MHD_YES;
+            answer_refuse(&r->answer, 503, "%zu solves wait or run (--max-inflight); try again",
+                          r->http->service->config->max_inflight);
+            r->answered = true;
+            MHD_resume_connection(r->connection);
+            return MHD_YES;
+        } else {
+            r->match.route->handle(&r->call, &r->answer);
+        }
+        http_finish_answer(r, true);
+        r->answered = true;
+    }
+    return http_send_answer(r);
+}
+
+/* --- libmicrohttpd's callbacks ------------------------------------------------------------------------ */
+
+static request *begin_request(http *h, struct MHD_Connection *connection, const char *path,
+                              const char *method) {
+    request *r = calloc(1, sizeof *r);
+    if (r == NULL || (r->path = strdup(path)) == NULL) {
+        free(r);
+        return NULL;
+    }
+    r->http = h;
+    r->connection = connection;
+    const union MHD_ConnectionInfo *info =
+        MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
+    r->client = info != NULL ? info->socket_context : NULL;
+    request_id_choose(http_header(r, "X-Request-Id"), h->seed, h->next_id++, r->id);
+    r->accepted = coding_choose(http_header(r, MHD_HTTP_HEADER_ACCEPT_ENCODING));
+    client_enter(h->service->connections, r->client, STAGE_BODY, 0);
+    snprintf(r->method, sizeof r->method, "%s", method);
+    clock_gettime(CLOCK_MONOTONIC, &r->start);
+    r->match.label = route_label_count() - 1;
+    metrics_begin(h->service->metrics);
+    return r;
+}
+
+/* Bytes of body that the head announces; UINT64_MAX when they are not to be had as a number. */
+static uint64_t announced_length(const request *r) {
+    const char *text = http_header(r, MHD_HTTP_HEADER_CONTENT_LENGTH);
+    if (text == NULL) return 0;
+    char *end;
+    unsigned long long length = strtoull(text, &end, 10);
+    return *end == '\0' ? length : UINT64_MAX;
+}
+
+static enum MHD_Result on_head(http *h, struct MHD_Connection *connection, const char *path,
+                               const char *method, void **context) {
+    request *r = begin_request(h, connection, path, method);
+    if (r == NULL) return MHD_NO;
+    *context = r;
+    uint64_t length = announced_length(r);
+    r->answered = !check_head(r, method, length);
+    /* An answer that is sent before the body has come closes the connection. So the body of a refused request
+     * is read and dropped, unless it is long, or its client waits to be told whether to send it. */
+    if (r->answered && (length > DROP_MAX || http_header(r, MHD_HTTP_HEADER_EXPECT) != NULL))
+        return http_send_answer(r);
+    return MHD_YES;
+}
+
+static enum MHD_Result on_body(request *r, const char *bytes, size_t *size) {
+    const config *c = r->http->service->config;
+    r->received += *size;
+    client_received(r->http->service->connections, r->client, *size);
+    if (!r->answered && r->match.route->body == BODY_OF_SOLVE) {
+        if (r->received > c->max_body) {
+            refuse_length(r);
+            r->answered = true;
+            drop_body(r);
+        } else if (!hold_body(r, bytes, *size)) {
+            r->answered = true;
+            drop_body(r);
+        }
+    }
+    /* No answer can be sent in the middle of a body (libmicrohttpd): one without end is cut. */
+    if (r->received > c->max_body + DROP_MAX) return MHD_NO;
+    *size = 0;
+    return MHD_YES;
+}
+
+static enum MHD_Result on_request(void *context, struct MHD_Connection *connection, const char *path,
+                                  const char *method, const char *version, const char *bytes, size_t *size,
+                                  void **request_context) {
+    (void)version;
+    request *r = *request_context;
+    if (r == NULL) return on_head(context, connection, path, method, request_context);
+    if (*size > 0) return on_body(r, bytes, size);
+    return handle(r);
+}
+
+static void on_completed(void *context, struct MHD_Connection *connection, void **request_context,
+                         enum MHD_RequestTerminationCode code) {
+    (void)connection;
+    http *h = context;
+    request *r = *request_context;
+    if (r == NULL) return;
+    *request_context = NULL;
+    struct timespec end;
+    clock_gettime(CLOCK_MONOTONIC, &end);
+    client_enter(h->service->connections, r->client, STAGE_HEAD, 0);
+    double seconds = (double)(end.tv_sec - r->start.tv_sec) + 1e-9 * (double)(end.tv_nsec - r->start.tv_nsec);
+    unsigned status = r->queued && code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? r->answer.status : 0;
+    if (h->service->access_log != NULL)
+        access_log_write(h->service->access_log, &(access_entry){.id = r->id,
+                                                                 .method = r->method,
+                                                                 .path = r->path,
+                                                                 .status = status,
+                                                                 .received = (size_t)r->received,
+                                                                 .sent = r->sent,
+                                                                 .n_rhs = r->call.n_rhs,
+                                                                 .coding = coding_name(r->coding),
+                                                                 .ms = seconds * 1e3});
+    catalog_release(r->snapshot);
+    drop_body(r);
+    buffer_free(&r->answer.body);
+    free(r->answer.location);
+    size_t label = r->match.label;
+    free(r->path);
+    free(r);
+    metrics_end(h->service->metrics, label, status, seconds);
+}
+
+static void on_connection(void *context, struct MHD_Connection *connection, void **socket_context,
+                          enum MHD_ConnectionNotificationCode code) {
+    connections *all = ((http *)context)->service->connections;
+    if (code == MHD_CONNECTION_NOTIFY_STARTED) {
+        const union MHD_ConnectionInfo *info =
+            MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+        *socket_context = info != NULL ? connections_add(all, info->connect_fd) : NULL;
+        /* Nobody else watches this one. */
+        if (*socket_context == NULL)
+            MHD_set_connection_option(connection, MHD_CONNECTION_OPTION_TIMEOUT,
+                                      (unsigned)((http *)context)->service->config->timeout_s);
+    } else {
+        /* Its descriptor is still open. */
+        connections_remove(all, *socket_context);
+        *socket_context = NULL;
+    }
+}
+
+/* Routes resolve escapes themselves, so that %2F does not become a slash. */
+static size_t keep_escapes(void *context, struct MHD_Connection *connection, char *text) {
+    (void)context;
+    (void)connection;
+    return strlen(text);
+}
+
+lam_status http_start(service *s, int listen_fd, http **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    http *h = memory_allocate(1, sizeof *h, "HTTP", error);
+    if (h == NULL) {
+        close(listen_fd);
+        return LAM_ERR_MEMORY;
+    }
+    h->service = s;
+    h->listen_fd = listen_fd;
+    h->seed = request_id_seed();
+    h->next_id = 1;
+    connection_limits limits = {.timeout_s = s->config->timeout_s, .least_rate = s->config->min_rate};
+    TRY(connections_affordable(s->config->max_connections, &limits.most, error));
+    TRY(connections_start(&limits, &s->connections, error));
+    /* It has no time-out of its own: that would take a client for silent whose answer waits in a socket that
+     * is slow to empty. At its limit of connections, or with descriptors run out, the daemon stops accepting
+     * until one closes.
+     */
+    h->daemon = MHD_start_daemon(
+        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, on_request, h,
+        MHD_OPTION_LISTEN_SOCKET, listen_fd, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
+        MHD_OPTION_CONNECTION_LIMIT, (unsigned)limits.most, MHD_OPTION_NOTIFY_CONNECTION, on_connection, h,
+        MHD_OPTION_NOTIFY_COMPLETED, on_completed, h, MHD_OPTION_UNESCAPE_CALLBACK, keep_escapes, NULL,
+        MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, MHD_OPTION_END);
+    if (h->daemon == NULL) FAIL(error, LAM_ERR_IO, "the HTTP server cannot start");
+    h->listen_fd = -1;
+    *out = h;
+    h = NULL;
+done:
+    if (h != NULL) {
+        connections_stop(s->connections);
+        s->connections = NULL;
+        close(h->listen_fd);
+        free(h);
+    }
+    return status;
+}
+
+void http_quiesce(http *h) {
+    h->listen_fd = MHD_quiesce_daemon(h->daemon);
+    /* Refuses those who come now; closing the descriptor has to wait for the thread that may still use it. */
+    if (h->listen_fd >= 0) shutdown(h->listen_fd, SHUT_RDWR);
+}
+
+void http_stop(http *h) {
+    if (h == NULL) return;
+    MHD_stop_daemon(h->daemon);
+    connections_stop(h->service->connections);
+    h->service->connections = NULL;
+    if (h->listen_fd >= 0) close(h->listen_fd);
+    free(h);
+}

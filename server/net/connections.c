@@ -1,0 +1,311 @@
+#include "server/net/connections.h"
+
+#include <linux/sockios.h>
+#include <linux/tcp.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <sys/ioctl.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <time.h>
+
+/* Descriptors that are no connections: standard streams, the listening socket, those of epoll, stores that
+ * are read, the log, and what libraries open. */
+#define OTHER_DESCRIPTORS 64
+
+/* With all places taken, an idle client keeps its own for so long. */
+#define IDLE_GRACE_S 1.0
+
+/* So many of them at most lose it in a second. */
+#define PLACES 64
+
+typedef enum cut_reason { CUT_HEAD, CUT_BODY, CUT_ANSWER, CUT_PLACE, N_CUT_REASONS } cut_reason;
+static const char *const reasons[N_CUT_REASONS] = {"head", "body", "answer", "place"};
+
+struct client {
+    client *before, *after;
+    int fd;
+    connection_stage stage;
+    bool cut;
+    bool looked_at;  /* in this stage: seen is of it */
+    double since;    /* seconds, of the stage */
+    double deadline; /* put off by what moves */
+    uint64_t bytes;  /* received of a body, or to be sent of an answer */
+    uint64_t seen;   /* what tells that something moves, when it was last looked at */
+};
+
+struct connections {
+    pthread_mutex_t lock;
+    pthread_cond_t ending;
+    pthread_t thread;
+    connection_limits limits;
+    client *first;
+    size_t n_open;
+    uint64_t n_cut[N_CUT_REASONS];
+    bool ended;
+};
+
+static double now_s(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+lam_status connections_affordable(size_t wanted, size_t *most, lam_error *error) {
+    lam_status status = LAM_OK;
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_NOFILE, &limit) != 0) FAIL(error, LAM_ERR_IO, "the limit on open files is unknown");
+    const rlim_t needed = (rlim_t)wanted + OTHER_DESCRIPTORS;
+    if (limit.rlim_cur < needed) {
+        struct rlimit raised = limit;
+        raised.rlim_cur = limit.rlim_max < needed ? limit.rlim_max : needed;
+        if (setrlimit(RLIMIT_NOFILE, &raised) == 0) limit = raised;
+    }
+    if (limit.rlim_cur <= OTHER_DESCRIPTORS)
+        FAIL(error, LAM_ERR_IO, "only %llu files may be open (ulimit -n), must be more than %d",
+             (unsigned long long)limit.rlim_cur, OTHER_DESCRIPTORS);
+    *most = limit.rlim_cur < needed ? (size_t)(limit.rlim_cur - OTHER_DESCRIPTORS) : wanted;
+done:
+    return status;
+}
+
+/* --- what a client may take ---------------------------------------------------------------------------- */
+
+/* Bytes of all answers that the client's machine has acknowledged; false where the socket does not count. */
+static bool read_acknowledged(int fd, uint64_t *bytes) {
+    struct tcp_info info;
+    socklen_t size = sizeof info;
+    if (getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0 ||
+        size < offsetof(struct tcp_info, tcpi_bytes_acked) + sizeof info.tcpi_bytes_acked)
+        return false;
+    *bytes = info.tcpi_bytes_acked;
+    return true;
+}
+
+/* Bytes of an answer that were read since the last look. A socket in the file system tells only how many wait
+ * in it: there any change counts as enough, and the time for the whole is bounded. */
+static double measure_read(const connection_limits *limits, client *c, double now) {
+    uint64_t seen;
+    int waiting = 0;
+    const double enough = (double)limits->timeout_s * (double)limits->least_rate;
+    const bool counted = read_acknowledged(c->fd, &seen);
+    if (!counted) seen = ioctl(c->fd, SIOCOUTQ, &waiting) == 0 ? (uint64_t)waiting : 0;
+    const bool changed = c->looked_at && seen != c->seen;
+    const double read = !changed ? 0.0 : counted ? (double)(seen - c->seen) : enough;
+    c->looked_at = true;
+    c->seen = seen;
+    if (!counted && now - c->since > ((double)c->bytes + enough) / (double)limits->least_rate)
+        c->deadline = c->since;
+    return read;
+}
+
+/* Whether nothing of a request can come any more: its client has ended its side, and all it sent was taken.
+ * libmicrohttpd does not look for that in the middle of a head or a body. */
+static bool has_hung_up(const client *c) {
+    int unread = 0;
+    struct pollfd one = {.fd = c->fd, .events = POLLRDHUP};
+    return poll(&one, 1, 0) > 0 && (one.revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0 &&
+           ioctl(c->fd, FIONREAD, &unread) == 0 && unread == 0;
+}
+
+/* Whether c has had its time. Every byte that moves puts the deadline off by 1/rate, but never further than a
+ * time-out from now: who was fast may not be as slow as it likes from then on. */
+static bool is_over_time(const connection_limits *limits, client *c, double now, cut_reason *why) {
+    const double timeout = (double)limits->timeout_s;
+    double moved = 0.0;
+    switch (c->stage) {
+    case STAGE_SOLVE:
+        return false;
+    case STAGE_HEAD:
+    case STAGE_BODY:
+        *why = c->stage == STAGE_HEAD ? CUT_HEAD : CUT_BODY;
+        moved = (double)(c->bytes - c->seen);
+        c->seen = c->bytes;
+        /* Not at once: what was taken may be the whole request, which is being looked at. */
+        if (moved <= 0 && now - c->since > 1.0 && has_hung_up(c)) return true;
+        break;
+    case STAGE_ANSWER:
+        *why = CUT_ANSWER;
+        moved = measure_read(limits, c, now);
+        break;
+    }
+    c->deadline += moved / (double)limits->least_rate;
+    if (c->deadline > now + timeout) c->deadline = now + timeout;
+    return now > c->deadline;
+}
+
+/* With the lock: the descriptor is then still this client's. Whoever serves it finds it ended, and closes it.
+ */
+static void cut(connections *all, client *c, cut_reason why) {
+    /* What it did not read should not stay in the socket for as long as it likes. */
+    const struct linger none = {.l_onoff = 1, .l_linger = 0};
+    if (c->stage == STAGE_ANSWER) setsockopt(c->fd, SOL_SOCKET, SO_LINGER, &none, sizeof none);
+    c->cut = true;
+    all->n_cut[why]++;
+    shutdown(c->fd, SHUT_RDWR);
+}
+
+/* The client that has been silent between requests for longest, and longer than the grace; NULL if none. */
+static client *find_idle(const connections *all, double now) {
+    client *oldest = NULL;
+    for (client *c = all->first; c != NULL; c = c->after)
+        if (!c->cut && c->stage == STAGE_HEAD && now - c->since > IDLE_GRACE_S &&
+            (oldest == NULL || c->since < oldest->since))
+            oldest = c;
+    return oldest;
+}
+
+/* With the lock. O(open), and that again for each place that is made: a quarter of all. */
+static void sweep(connections *all) {
+    const double now = now_s();
+    cut_reason why = CUT_HEAD;
+    for (client *c = all->first; c != NULL; c = c->after)
+        if (!c->cut && is_over_time(&all->limits, c, now, &why)) cut(all, c, why);
+    if (all->n_open < all->limits.most) return;
+    for (size_t place = 0; place <= all->limits.most / 4 && place < PLACES; place++) {
+        client *idle = find_idle(all, now);
+        if (idle == NULL) return;
+        cut(all, idle, CUT_PLACE);
+    }
+}
+
+static void *watch(void *argument) {
+    connections *all = argument;
+    struct timespec next;
+    clock_gettime(CLOCK_MONOTONIC, &next);
+    pthread_mutex_lock(&all->lock);
+    while (!all->ended) {
+        next.tv_sec++;
+        while (!all->ended && pthread_cond_timedwait(&all->ending, &all->lock, &next) == 0) {
+        }
+        if (!all->ended) sweep(all);
+    }
+    pthread_mutex_unlock(&all->lock);
+    return NULL;
+}
+
+/* --- the list ------------------------------------------------------------------------------------------ */
+
+lam_status connections_start(const connection_limits *limits, connections **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    pthread_condattr_t monotonic;
+    sigset_t every, before;
+    connections *all = memory_allocate(1, sizeof *all, "connections", error);
+    if (all == NULL) return LAM_ERR_MEMORY;
+    all->limits = *limits;
+    pthread_mutex_init(&all->lock, NULL);
+    pthread_condattr_init(&monotonic);
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+    pthread_cond_init(&all->ending, &monotonic);
+    pthread_condattr_destroy(&monotonic);
+    sigfillset(&every);
+    pthread_sigmask(SIG_SETMASK, &every, &before);
+    const int failed = pthread_create(&all->thread, NULL, watch, all);
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    if (failed != 0) FAIL(error, LAM_ERR_MEMORY, "cannot start the thread that watches connections");
+    *out = all;
+    all = NULL;
+done:
+    if (all != NULL) {
+        pthread_cond_destroy(&all->ending);
+        pthread_mutex_destroy(&all->lock);
+        free(all);
+    }
+    return status;
+}
+
+void connections_stop(connections *all) {
+    if (all == NULL) return;
+    pthread_mutex_lock(&all->lock);
+    all->ended = true;
+    pthread_cond_signal(&all->ending);
+    pthread_mutex_unlock(&all->lock);
+    pthread_join(all->thread, NULL);
+    pthread_cond_destroy(&all->ending);
+    pthread_mutex_destroy(&all->lock);
+    free(all);
+}
+
+static void begin_stage(const connections *all, client *c, connection_stage stage, size_t bytes, double now) {
+    c->stage = stage;
+    c->since = now;
+    c->deadline = now + (double)all->limits.timeout_s;
+    c->bytes = bytes;
+    c->seen = 0;
+    c->looked_at = false;
+}
+
+client *connections_add(connections *all, int fd) {
+    client *c = calloc(1, sizeof *c);
+    if (c == NULL) return NULL;
+    c->fd = fd;
+    begin_stage(all, c, STAGE_HEAD, 0, now_s());
+    pthread_mutex_lock(&all->lock);
+    c->after = all->first;
+    if (all->first != NULL) all->first->before = c;
+    all->first = c;
+    all->n_open++;
+    pthread_mutex_unlock(&all->lock);
+    return c;
+}
+
+void connections_remove(connections *all, client *c) {
+    if (c == NULL) return;
+    pthread_mutex_lock(&all->lock);
+    if (c->before != NULL)
+        c->before->after = c->after;
+    else
+        all->first = c->after;
+    if (c->after != NULL) c->after->before = c->before;
+    all->n_open--;
+    pthread_mutex_unlock(&all->lock);
+    free(c);
+}
+
+void client_enter(connections *all, client *c, connection_stage stage, size_t bytes) {
+    if (c == NULL) return;
+    const double now = now_s();
+    pthread_mutex_lock(&all->lock);
+    begin_stage(all, c, stage, bytes, now);
+    pthread_mutex_unlock(&all->lock);
+}
+
+void client_received(connections *all, client *c, size_t bytes) {
+    if (c == NULL) return;
+    pthread_mutex_lock(&all->lock);
+    c->bytes += bytes;
+    pthread_mutex_unlock(&all->lock);
+}
+
+bool client_is_lost(const client *c) {
+    if (c == NULL) return false;
+    struct pollfd one = {.fd = c->fd};
+    return poll(&one, 1, 0) > 0 && (one.revents & (POLLERR | POLLHUP)) != 0;
+}
+
+bool connections_write(connections *all, buffer *b) {
+    uint64_t n_cut[N_CUT_REASONS];
+    pthread_mutex_lock(&all->lock);
+    const size_t n_open = all->n_open;
+    for (size_t r = 0; r < N_CUT_REASONS; r++) n_cut[r] = all->n_cut[r];
+    pthread_mutex_unlock(&all->lock);
+    bool written =
+        buffer_printf(b,
+                      "# HELP lambertd_connections Open connections.\n"
+                      "# TYPE lambertd_connections gauge\n"
+                      "lambertd_connections %zu\n"
+                      "# HELP lambertd_connections_most As many may be open.\n"
+                      "# TYPE lambertd_connections_most gauge\n"
+                      "lambertd_connections_most %zu\n"
+                      "# HELP lambertd_connections_cut_total Connections cut for what took too long, "
+                      "or to make place.\n"
+                      "# TYPE lambertd_connections_cut_total counter\n",
+                      n_open, all->limits.most);
+    for (size_t r = 0; r < N_CUT_REASONS; r++)
+        written = written && buffer_printf(b, "lambertd_connections_cut_total{why=\"%s\"} %llu\n", reasons[r],
+                                           (unsigned long long)n_cut[r]);
+    return written;
+}

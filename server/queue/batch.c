@@ -1,0 +1,289 @@
+#include "server/queue/batch.h"
+
+#include <pthread.h>
+#include <signal.h>
+#include <stdlib.h>
+
+typedef struct job_list {
+    batch_job *first, *last;
+} job_list;
+
+/* A job is in one list at a time, or in the hands of a thread. Over what a key names one pass is made at a
+ * time; what comes meanwhile waits for the next, together. Passes over several run side by side, so that a
+ * long one does not hold up the short. */
+struct batch_queue {
+    pthread_mutex_t lock;
+    pthread_cond_t changed;
+    job_list arrived, waiting, computed; /* to begin, to have a pass, to end */
+    size_t n_waiting;                    /* jobs */
+    size_t n_jobs;                       /* from submit to finish */
+    size_t max_jobs;
+    size_t n_brief;  /* threads that are at something brief, and then come back */
+    size_t n_idle;   /* threads that wait */
+    size_t n_called; /* of them: woken and not there yet */
+    bool closed;
+    const void **passing; /* [n_threads] keys of the passes that run */
+    size_t n_passing;
+    size_t n_threads;
+    pthread_t threads[];
+};
+
+static void list_add(job_list *list, batch_job *job) {
+    job->next = NULL;
+    if (list->last == NULL)
+        list->first = job;
+    else
+        list->last->next = job;
+    list->last = job;
+}
+
+static batch_job *list_take(job_list *list) {
+    batch_job *job = list->first;
+    if (job == NULL) return NULL;
+    list->first = job->next;
+    if (list->first == NULL) list->last = NULL;
+    return job;
+}
+
+/* With the lock: somebody is to look at the lists, if nobody is about to; who is busy looks before it waits.
+ */
+static void call_one(batch_queue *queue) {
+    if (queue->n_called > 0 || queue->n_idle == 0) return;
+    queue->n_called++;
+    pthread_cond_signal(&queue->changed);
+}
+
+static size_t left_of(const batch_job *job) {
+    return job->n_vectors - job->next_vector;
+}
+
+static bool is_passing(const batch_queue *queue, const void *key) {
+    for (size_t k = 0; k < queue->n_passing; k++)
+        if (queue->passing[k] == key) return true;
+    return false;
+}
+
+/* The job that waits longest of those that can have a pass now, or NULL. */
+static batch_job *find_ready(const batch_queue *queue) {
+    batch_job *job = queue->waiting.first;
+    while (job != NULL && is_passing(queue, job->key)) job = job->next;
+    return job;
+}
+
+/* With the lock: before a thread turns to a job and after it. While one is at something brief nobody is woken
+ * for what comes: it would be there no sooner, and then stand in the way on a core that a pass could use. So
+ * who turns to something long leaves what waits to another. */
+static void turn_to(batch_queue *queue, const batch_job *job) {
+    if (job->brief)
+        queue->n_brief++;
+    else if (queue->arrived.first != NULL || queue->computed.first != NULL || find_ready(queue) != NULL)
+        call_one(queue);
+}
+
+static void turn_back(batch_queue *queue, bool brief) {
+    if (brief) queue->n_brief--;
+}
+
+/* How many jobs share the next pass at most. What is brief takes as long on its way to the client and back as
+ * in a pass: of those that do not fill one, half have it while the others are under way, and all come evenly.
+ * With as many as happen to be there it would be most of them in one and in the next the few who missed it.
+ */
+static size_t most_together(const batch_queue *queue, const batch_job *like) {
+    return like->brief && queue->n_waiting < BATCH_PASS ? BATCH_PASS / 2 : BATCH_PASS;
+}
+
+/* The vectors of the next pass: of this job and of all like it, first one of each, so that a long request
+ * holds up no short one, then more of them in their order. */
+static size_t choose_parts(batch_job *like, size_t most, batch_part parts[BATCH_PASS]) {
+    size_t n_parts = 0, room = BATCH_PASS;
+    for (batch_job *job = like; job != NULL && n_parts < most; job = job->next) {
+        if (job->key != like->key || job->pass != like->pass) continue;
+        parts[n_parts++] = (batch_part){job, job->next_vector, 1};
+        room--;
+    }
+    for (size_t p = 0; p < n_parts && room > 0; p++) {
+        const size_t more = left_of(parts[p].job) - 1 < room ? left_of(parts[p].job) - 1 : room;
+        parts[p].count += more;
+        room -= more;
+    }
+    return n_parts;
+}
+
+/* After a pass: its jobs that want more go behind the others; those that have all are computed. */
+static void sort_waiting(batch_queue *queue, const batch_part *parts, size_t n_parts) {
+    job_list before = queue->waiting, again = {0};
+    queue->waiting = (job_list){0};
+    for (size_t p = 0; p < n_parts; p++) parts[p].job->next_vector += parts[p].count;
+    for (batch_job *job; (job = list_take(&before)) != NULL;) {
+        bool served = false;
+        for (size_t p = 0; p < n_parts; p++) served = served || parts[p].job == job;
+        const bool computed = served && left_of(job) == 0;
+        list_add(computed ? &queue->computed : served ? &again : &queue->waiting, job);
+        if (computed) queue->n_waiting--;
+    }
+    for (batch_job *job; (job = list_take(&again)) != NULL;) list_add(&queue->waiting, job);
+}
+
+/* With the lock, which is given back meanwhile. */
+static void make_pass(batch_queue *queue, batch_job *like, batch_workspace *workspace) {
+    batch_part parts[BATCH_PASS];
+    const void *key = like->key;
+    const bool brief = like->brief;
+    const size_t n_parts = choose_parts(like, most_together(queue, like), parts);
+    queue->passing[queue->n_passing++] = key;
+    turn_to(queue, like);
+    pthread_mutex_unlock(&queue->lock);
+    like->pass(parts, n_parts, workspace);
+    pthread_mutex_lock(&queue->lock);
+    turn_back(queue, brief);
+    size_t mine = 0;
+    while (queue->passing[mine] != key) mine++;
+    queue->passing[mine] = queue->passing[--queue->n_passing];
+    sort_waiting(queue, parts, n_parts);
+    /* This thread ends one of them itself: for a single client nobody need be woken. */
+    if (!brief && (queue->computed.first != queue->computed.last || queue->waiting.first != NULL))
+        pthread_cond_broadcast(&queue->changed);
+}
+
+/* With the lock, which is given back meanwhile. */
+static void finish(batch_queue *queue, batch_job *job) {
+    const bool brief = job->brief;
+    queue->n_jobs--;
+    turn_to(queue, job);
+    if (queue->closed && queue->n_jobs == 0) pthread_cond_broadcast(&queue->changed);
+    pthread_mutex_unlock(&queue->lock);
+    job->finish(job);
+    pthread_mutex_lock(&queue->lock);
+    turn_back(queue, brief);
+}
+
+/* With the lock, which is given back meanwhile. */
+static void begin(batch_queue *queue, batch_job *job, batch_workspace *workspace) {
+    const bool brief = job->brief;
+    turn_to(queue, job);
+    pthread_mutex_unlock(&queue->lock);
+    const bool waits = job->begin(job, workspace);
+    pthread_mutex_lock(&queue->lock);
+    turn_back(queue, brief);
+    if (!waits) {
+        finish(queue, job);
+        return;
+    }
+    job->next_vector = 0;
+    list_add(&queue->waiting, job);
+    queue->n_waiting++;
+}
+
+/* With the lock, which is given back meanwhile. */
+static void end(batch_queue *queue, batch_job *job, batch_workspace *workspace) {
+    const bool brief = job->brief;
+    turn_to(queue, job);
+    pthread_mutex_unlock(&queue->lock);
+    job->end(job, workspace);
+    pthread_mutex_lock(&queue->lock);
+    turn_back(queue, brief);
+    finish(queue, job);
+}
+
+/* What is computed is sent first, so that its client can go on. A pass is made once nothing is left to begin,
+ * or as many have begun as may share it: so what queued while the last one ran shares the next, brief jobs
+ * by halves, and nobody waits for what has not come yet. */
+static void *serve(void *argument) {
+    batch_queue *queue = argument;
+    batch_workspace workspace = {0};
+    pthread_mutex_lock(&queue->lock);
+    for (batch_job *job;;) {
+        batch_job *ready = find_ready(queue);
+        if ((job = list_take(&queue->computed)) != NULL)
+            end(queue, job, &workspace);
+        else if (ready != NULL && queue->n_waiting >= BATCH_PASS)
+            make_pass(queue, ready, &workspace);
+        else if ((job = list_take(&queue->arrived)) != NULL)
+            begin(queue, job, &workspace);
+        else if (ready != NULL)
+            make_pass(queue, ready, &workspace);
+        else if (queue->closed && queue->n_jobs == 0)
+            break;
+        else {
+            queue->n_idle++;
+            pthread_cond_wait(&queue->changed, &queue->lock);
+            queue->n_idle--;
+            if (queue->n_called > 0) queue->n_called--;
+        }
+    }
+    pthread_mutex_unlock(&queue->lock);
+    free(workspace.bytes);
+    return NULL;
+}
+
+lam_status batch_start(size_t n_threads, size_t max_jobs, batch_queue **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    sigset_t all, before;
+    batch_queue *queue = memory_allocate(1, sizeof *queue + n_threads * sizeof(pthread_t), "threads", error);
+    if (queue == NULL) return LAM_ERR_MEMORY;
+    pthread_mutex_init(&queue->lock, NULL);
+    pthread_cond_init(&queue->changed, NULL);
+    queue->passing = memory_allocate(n_threads, sizeof *queue->passing, "threads", error);
+    if (queue->passing == NULL) TRY(LAM_ERR_MEMORY);
+    queue->max_jobs = max_jobs;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    for (; queue->n_threads < n_threads; queue->n_threads++)
+        if (pthread_create(&queue->threads[queue->n_threads], NULL, serve, queue) != 0) break;
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    if (queue->n_threads < n_threads)
+        FAIL(error, LAM_ERR_MEMORY, "cannot start thread %zu of %zu; use fewer --threads",
+             queue->n_threads + 1, n_threads);
+    *out = queue;
+    queue = NULL;
+done:
+    if (queue != NULL) {
+        batch_close(queue);
+        batch_destroy(queue);
+    }
+    return status;
+}
+
+bool batch_submit(batch_queue *queue, batch_job *job) {
+    pthread_mutex_lock(&queue->lock);
+    const bool taken = !queue->closed && queue->n_jobs < queue->max_jobs;
+    if (taken) {
+        list_add(&queue->arrived, job);
+        queue->n_jobs++;
+        if (queue->n_brief == 0) call_one(queue);
+    }
+    pthread_mutex_unlock(&queue->lock);
+    return taken;
+}
+
+size_t batch_jobs(batch_queue *queue) {
+    pthread_mutex_lock(&queue->lock);
+    size_t n_jobs = queue->n_jobs;
+    pthread_mutex_unlock(&queue->lock);
+    return n_jobs;
+}
+
+void batch_close(batch_queue *queue) {
+    pthread_mutex_lock(&queue->lock);
+    queue->closed = true;
+    pthread_cond_broadcast(&queue->changed);
+    pthread_mutex_unlock(&queue->lock);
+    for (size_t i = 0; i < queue->n_threads; i++) pthread_join(queue->threads[i], NULL);
+}
+
+void batch_destroy(batch_queue *queue) {
+    if (queue == NULL) return;
+    pthread_cond_destroy(&queue->changed);
+    pthread_mutex_destroy(&queue->lock);
+    free(queue->passing);
+    free(queue);
+}
+
+void *batch_workspace_get(batch_workspace *workspace, size_t size) {
+    if (workspace->size < size) {
+        free(workspace->bytes);
+        workspace->bytes = malloc(size);
+        workspace->size = workspace->bytes == NULL ? 0 : size;
+    }
+    return workspace->bytes;
+}

@@ -1,0 +1,165 @@
+#include "server/queue/metrics.h"
+
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+/* Statuses that we give; 0 stands for a client that went. */
+static const unsigned statuses[] = {0,   200, 202, 204, 304, 400, 401, 404, 405,
+                                    409, 411, 413, 415, 422, 429, 500, 501, 503};
+#define N_STATUSES (sizeof statuses / sizeof statuses[0])
+
+/* Seconds; the last bucket has no bound. */
+static const double latencies[] = {.0005, .001, .0025, .005, .01, .025, .05, .1, .25, .5, 1, 2.5, 5, 10};
+#define N_LATENCIES (sizeof latencies / sizeof latencies[0])
+
+static const size_t batches[] = {1, 2, 4, 8, 16, 32, 64};
+#define N_BATCHES (sizeof batches / sizeof batches[0])
+
+typedef struct route_counts {
+    uint64_t by_status[N_STATUSES + 1]; /* the last: any other */
+    uint64_t by_latency[N_LATENCIES + 1];
+    double seconds;
+} route_counts;
+
+struct metrics {
+    pthread_mutex_t lock;
+    size_t n_labels;
+    const char *const *labels;
+    size_t in_flight;
+    uint64_t by_batch[N_BATCHES + 1];
+    uint64_t vectors;
+    route_counts routes[];
+};
+
+lam_status metrics_create(size_t n_labels, const char *const *labels, metrics **out, lam_error *error) {
+    metrics *m = memory_allocate(1, sizeof *m + n_labels * sizeof m->routes[0], "metrics", error);
+    if (m == NULL) return LAM_ERR_MEMORY;
+    m->n_labels = n_labels;
+    m->labels = labels;
+    pthread_mutex_init(&m->lock, NULL);
+    *out = m;
+    return LAM_OK;
+}
+
+void metrics_destroy(metrics *m) {
+    if (m == NULL) return;
+    pthread_mutex_destroy(&m->lock);
+    free(m);
+}
+
+void metrics_begin(metrics *m) {
+    pthread_mutex_lock(&m->lock);
+    m->in_flight++;
+    pthread_mutex_unlock(&m->lock);
+}
+
+void metrics_end(metrics *m, size_t label, unsigned status, double seconds) {
+    size_t s = 0, l = 0;
+    while (s < N_STATUSES && statuses[s] != status) s++;
+    while (l < N_LATENCIES && seconds > latencies[l]) l++;
+    pthread_mutex_lock(&m->lock);
+    m->in_flight--;
+    m->routes[label].by_status[s]++;
+    m->routes[label].by_latency[l]++;
+    m->routes[label].seconds += seconds;
+    pthread_mutex_unlock(&m->lock);
+}
+
+void metrics_pass(metrics *m, size_t n_rhs) {
+    size_t b = 0;
+    while (b < N_BATCHES && n_rhs > batches[b]) b++;
+    pthread_mutex_lock(&m->lock);
+    m->by_batch[b]++;
+    m->vectors += n_rhs;
+    pthread_mutex_unlock(&m->lock);
+}
+
+size_t metrics_in_flight(metrics *m) {
+    pthread_mutex_lock(&m->lock);
+    size_t in_flight = m->in_flight;
+    pthread_mutex_unlock(&m->lock);
+    return in_flight;
+}
+
+static bool write_head(buffer *b, const char *name, const char *type, const char *help) {
+    return buffer_printf(b, "# HELP %s %s\n# TYPE %s %s\n", name, help, name, type);
+}
+
+static bool write_requests(const metrics *m, buffer *b) {
+    static const char name[] = "lambertd_requests_total";
+    bool written = write_head(b, name, "counter", "Requests by route and status; 0: the client went before.");
+    for (size_t r = 0; r < m->n_labels; r++)
+        for (size_t s = 0; s <= N_STATUSES; s++) {
+            if (m->routes[r].by_status[s] == 0) continue;
+            char status[8] = "other";
+            if (s < N_STATUSES) snprintf(status, sizeof status, "%u", statuses[s]);
+            written = written && buffer_printf(b, "%s{route=\"%s\",status=\"%s\"} %llu\n", name, m->labels[r],
+                                               status, (unsigned long long)m->routes[r].by_status[s]);
+        }
+    return written;
+}
+
+static bool write_latencies(const metrics *m, buffer *b) {
+    static const char name[] = "lambertd_request_duration_seconds";
+    bool written = write_head(b, name, "histogram", "From a request's head to the last byte of its answer.");
+    for (size_t r = 0; r < m->n_labels; r++) {
+        const route_counts *counts = &m->routes[r];
+        uint64_t sum = 0;
+        for (size_t l = 0; l <= N_LATENCIES; l++) sum += counts->by_latency[l];
+        if (sum == 0) continue;
+        sum = 0;
+        for (size_t l = 0; l <= N_LATENCIES; l++) {
+            char bound[16] = "+Inf";
+            sum += counts->by_latency[l];
+            if (l < N_LATENCIES) snprintf(bound, sizeof bound, "%g", latencies[l]);
+            written = written && buffer_printf(b, "%s_bucket{route=\"%s\",le=\"%s\"} %llu\n", name,
+                                               m->labels[r], bound, (unsigned long long)sum);
+        }
+        written = written &&
+                  buffer_printf(b, "%s_sum{route=\"%s\"} %.9g\n%s_count{route=\"%s\"} %llu\n", name,
+                                m->labels[r], counts->seconds, name, m->labels[r], (unsigned long long)sum);
+    }
+    return written;
+}
+
+static bool write_batches(const metrics *m, buffer *b) {
+    static const char name[] = "lambertd_batch_size";
+    bool written = write_head(b, name, "histogram", "Vectors in one pass over an operator.");
+    uint64_t sum = 0;
+    for (size_t i = 0; i <= N_BATCHES; i++) {
+        char bound[16] = "+Inf";
+        sum += m->by_batch[i];
+        if (i < N_BATCHES) snprintf(bound, sizeof bound, "%zu", batches[i]);
+        written =
+            written && buffer_printf(b, "%s_bucket{le=\"%s\"} %llu\n", name, bound, (unsigned long long)sum);
+    }
+    return written && buffer_printf(b, "%s_sum %llu\n%s_count %llu\n", name, (unsigned long long)m->vectors,
+                                    name, (unsigned long long)sum);
+}
+
+static bool write_gauge(buffer *b, const char *name, const char *help, unsigned long long value) {
+    return write_head(b, name, "gauge", help) && buffer_printf(b, "%s %llu\n", name, value);
+}
+
+bool metrics_write(metrics *m, const metrics_gauges *gauges, buffer *b) {
+    pthread_mutex_lock(&m->lock);
+    bool written =
+        write_requests(m, b) && write_latencies(m, b) && write_batches(m, b) &&
+        write_gauge(b, "lambertd_in_flight", "Requests that are not answered yet.", m->in_flight) &&
+        write_gauge(b, "lambertd_queued", "Solves that wait or run.", gauges->queued) &&
+        write_gauge(b, "lambertd_body_bytes", "Bytes of request bodies held.", gauges->body_bytes) &&
+        write_gauge(b, "lambertd_scenes", "Scenes that are served.", gauges->n_scenes) &&
+        write_gauge(b, "lambertd_operator_bytes", "Bytes of operator held.", gauges->operator_bytes);
+    pthread_mutex_unlock(&m->lock);
+    return written;
+}
+
+bool metrics_write_stores(const metrics_stores *stores, buffer *b) {
+    return write_gauge(b, "lambertd_scenes_damaged", "Scenes out of service for damage.",
+                       stores->n_damaged) &&
+           write_gauge(b, "lambertd_scenes_unverified", "Scenes whose mapped blocks are still compared.",
+                       stores->n_unverified) &&
+           write_gauge(b, "lambertd_mapped_bytes", "Bytes of stores that are mapped, not copied.",
+                       stores->mapped_bytes);
+}

@@ -1,0 +1,26 @@
+/* GET /healthz: the process answers. GET /readyz: it has scenes to serve and will go on. */
+#include "server/route/routes.h"
+
+static void answer_state(answer *out, const char *state) {
+    buffer b = {0};
+    answer_json(out, &b, buffer_printf(&b, "{\"status\":\"%s\"}\n", state));
+}
+
+void get_healthz(call *in, answer *out) {
+    (void)in;
+    answer_state(out, "ok");
+}
+
+void get_readyz(call *in, answer *out) {
+    switch ((service_state)atomic_load(&in->service->state)) {
+    case SERVICE_READY:
+        answer_state(out, "ready");
+        break;
+    case SERVICE_LOADING:
+        answer_refuse(out, 503, "loading stores");
+        break;
+    case SERVICE_DRAINING:
+        answer_refuse(out, 503, "shutting down");
+        break;
+    }
+}

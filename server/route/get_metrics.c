@@ -1,0 +1,23 @@
+/* GET /metrics: Prometheus text. */
+#include "server/route/routes.h"
+
+void get_metrics(call *in, answer *out) {
+    const service *s = in->service;
+    const catalog_snapshot *snapshot = in->snapshot;
+    metrics_gauges gauges = {.queued = batch_jobs(s->queue), .body_bytes = atomic_load(&s->body_bytes)};
+    metrics_stores stores = {.mapped_bytes = 0};
+    buffer b = {0};
+    for (size_t i = 0; i < snapshot->n_scenes; i++) {
+        const scene *one = snapshot->scenes[i];
+        /* Of a variant only what its base does not lend. */
+        gauges.operator_bytes += one->base != NULL ? one->bytes : lam_operator_bytes(one->op);
+        stores.n_damaged += scene_damaged(one, NULL, NULL);
+        stores.n_unverified += !scene_verified(one);
+        stores.mapped_bytes += one->map != NULL && one->base == NULL ? store_map_bytes(one->map) : 0;
+    }
+    gauges.n_scenes = snapshot->n_scenes - stores.n_damaged;
+    const bool written = metrics_write(s->metrics, &gauges, &b) && metrics_write_stores(&stores, &b) &&
+                         connections_write(s->connections, &b);
+    answer_json(out, &b, written);
+    if (written) out->type = "text/plain; version=0.0.4; charset=utf-8";
+}

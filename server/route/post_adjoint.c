@@ -1,0 +1,163 @@
+/* POST /v1/scenes/NAME/adjoint: the gradient of a weighted sum of radiosities, by what shines and by what
+ * reflects. gradient.h has the formulas. */
+#include "server/route/routes.h"
+#include "server/scene/gradient.h"
+#include "solver/codec/adjoint.h"
+#include "solver/codec/answer.h"
+
+#include <string.h>
+
+/* All [C][n] but the narrow ones, in the thread's own memory. */
+typedef struct adjoint_memory {
+    float *w, *H, *H0, *v;
+    float *narrow; /* [C][m] of tiles, or [C][s] of emitters */
+    void *work;
+    size_t work_bytes;
+} adjoint_memory;
+
+static size_t narrow_width(const scene *s) {
+    return s->n_emitters > 0 ? s->n_emitters : s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
+}
+
+/* The next count floats behind *total bytes, aligned as malloc does. */
+static bool take(size_t count, size_t *at, size_t *total) {
+    size_t bytes;
+    *at = *total;
+    return size_multiply(count, sizeof(float), &bytes) && bytes < SIZE_MAX - 64 &&
+           !__builtin_add_overflow(*total, (bytes + 63) / 64 * 64, total);
+}
+
+static bool get_memory(call *in, const adjoint_request *request, adjoint_memory *memory, problem *why) {
+    const scene *s = in->scene;
+    const bool by_reflectance = adjoint_wants(request, GRADIENT_REFLECTANCE);
+    const size_t vector = s->n_channels * s->n,
+                 rows[] = {vector, by_reflectance ? vector : 0, by_reflectance && s->sky != NULL ? vector : 0,
+                           vector, s->n_channels * narrow_width(s)};
+    size_t at[5], total = 0, all;
+    bool fits = true;
+    for (size_t k = 0; k < 5; k++) fits = fits && take(rows[k], &at[k], &total);
+    memory->work_bytes = lam_operator_work_bytes(s->op, 1);
+    char *bytes = NULL;
+    if (fits && memory->work_bytes > 0 && !__builtin_add_overflow(total, memory->work_bytes, &all))
+        bytes = batch_workspace_get(in->workspace, all);
+    if (bytes == NULL) return problem_set(why, 503, "not enough memory to solve for a gradient");
+    float **const places[] = {&memory->w, &memory->H, &memory->H0, &memory->v, &memory->narrow};
+    for (size_t k = 0; k < 5; k++) *places[k] = (float *)(void *)(bytes + at[k]);
+    memory->work = bytes + total;
+    return true;
+}
+
+/* The irradiance of what shines, and that of its sky, *H0: NULL without one. */
+static bool solve_irradiance(const scene *s, const radiosity_request *light, adjoint_memory *memory,
+                             const float **H0, problem *why) {
+    lam_error error;
+    *H0 = NULL;
+    if (light->sky.values != NULL) {
+        lam_sky_irradiance(s->sky, s->n_channels, light->sky.values, memory->H0);
+        *H0 = memory->H0;
+    }
+    return lam_operator_apply_lit(s->op, 1, LAM_IRRADIANCE, light->E, *H0, memory->H, memory->work,
+                                  memory->work_bytes, &error) == LAM_OK ||
+           problem_set(why, 500, "%s", error.message);
+}
+
+/* Fills what is asked for: w, by reflectance H, by tile or emitter narrow. */
+static bool solve(const scene *s, const adjoint_request *request, adjoint_memory *memory, metrics *m,
+                  problem *why) {
+    const float *g = request->cotangent.E, *H0;
+    const size_t vector = s->n_channels * s->n;
+    lam_error error;
+    metrics_pass(m, 1);
+    if (s->n_emitters > 0)
+        return lam_operator_adjoint_emitters(s->op, 1, request->quantity, g, memory->narrow, memory->work,
+                                             memory->work_bytes, &error) == LAM_OK ||
+               problem_set(why, 500, "%s", error.message);
+    if (lam_operator_apply_adjoint(s->op, 1, request->quantity, g, memory->w, memory->work,
+                                   memory->work_bytes, &error) != LAM_OK)
+        return problem_set(why, 500, "%s", error.message);
+    if (adjoint_wants(request, GRADIENT_SKY)) {
+        gradient_of_sky_irradiance(request->quantity, vector, s->reflectance, g, memory->w, memory->v);
+        lam_sky_adjoint(s->sky, s->n_channels, memory->v, memory->narrow);
+    }
+    if (adjoint_wants(request, GRADIENT_REFLECTANCE)) {
+        metrics_pass(m, 1);
+        if (!solve_irradiance(s, &request->light, memory, &H0, why)) return false;
+        gradient_of_reflectance(request->quantity, vector, g, memory->w, memory->H, H0, memory->H);
+    }
+    return true;
+}
+
+/* --- the answer ----------------------------------------------------------------------------------------- */
+
+static const float *gradient_values(const scene *s, const adjoint_memory *memory, gradient_kind kind,
+                                    size_t *width) {
+    *width = kind == GRADIENT_EMISSION || kind == GRADIENT_REFLECTANCE ? s->n : narrow_width(s);
+    return kind == GRADIENT_EMISSION ? memory->w : kind == GRADIENT_REFLECTANCE ? memory->H : memory->narrow;
+}
+
+/* An array holds one gradient: the only one that was named. */
+static bool write_npy(const call *in, const adjoint_request *request, const adjoint_memory *memory, buffer *b,
+                      problem *why) {
+    const size_t C = in->scene->n_channels;
+    size_t width;
+    const float *values = gradient_values(in->scene, memory, request->named[0], &width);
+    const size_t dims[2] = {C, width};
+    if (!npy_write_header(b, in->accept.npy, C > 1 ? 2 : 1, C > 1 ? dims : &dims[1]))
+        return problem_set(why, 503, "not enough memory for the answer");
+    return answer_rows(b, &in->accept, C, width, values, why);
+}
+
+static bool write_json(const call *in, const adjoint_request *request, const adjoint_memory *memory,
+                       answer_notes *notes, buffer *b, problem *why) {
+    const scene *s = in->scene;
+    const double start = call_now_ms();
+    bool written = answer_head(b, s->n, s->n_channels, notes) && buffer_append_text(b, ",\"gradient\":{");
+    for (int kind = 0, count = 0; written && kind < GRADIENT_COUNT; kind++) {
+        size_t width;
+        if (!adjoint_wants(request, (gradient_kind)kind)) continue;
+        written = buffer_printf(b, "%s\"%s\":", count++ > 0 ? "," : "", gradient_name((gradient_kind)kind));
+        const float *values = gradient_values(s, memory, (gradient_kind)kind, &width);
+        if (written && !answer_rows(b, &in->accept, s->n_channels, width, values, why)) return false;
+    }
+    written = written && buffer_append(b, "}", 1);
+    notes->encode_ms = call_now_ms() - start;
+    return (written && answer_tail(b, notes)) || problem_set(why, 503, "not enough memory for the answer");
+}
+
+static bool read_body(const call *in, adjoint_request *request, problem *why) {
+    const codec_scene about = call_codec_scene(in);
+    if (in->body_type == MEDIA_JSON ? !codec_read_adjoint_json(&about, in->body, in->length, request, why)
+                                    : !codec_read_adjoint_npy(&about, in->body, in->length, request, why))
+        return false;
+    if (in->accept.type == MEDIA_JSON) return true;
+    if (request->n_named > 1)
+        return problem_set(why, 422, "an NPY answer holds one array; ask for one gradient, or for JSON");
+    request->wanted = 1u << request->named[0]; /* the sky would not be heard of */
+    return true;
+}
+
+void post_adjoint(call *in, answer *out) {
+    answer_notes notes = call_notes(in);
+    adjoint_request request = {0};
+    adjoint_memory memory = {0};
+    problem why = {0};
+    buffer b = {0};
+    const double start = call_now_ms();
+    bool good = read_body(in, &request, &why) && get_memory(in, &request, &memory, &why);
+    const double parsed = call_now_ms();
+    notes.parse_ms = parsed - start;
+    notes.quantity = request.quantity;
+    notes.has_error = false; /* the figures are of answers, not of gradients */
+    in->n_rhs = 1;
+    good = good && solve(in->scene, &request, &memory, in->service->metrics, &why);
+    notes.solve_ms = call_now_ms() - parsed;
+    if (good && (in->accept.type == MEDIA_NPY ? write_npy(in, &request, &memory, &b, &why)
+                                              : write_json(in, &request, &memory, &notes, &b, &why))) {
+        answer_json(out, &b, true);
+        if (in->accept.type == MEDIA_NPY) out->type = "application/x-npy";
+    } else {
+        answer_problem(out, &why);
+    }
+    buffer_free(&b);
+    adjoint_request_free(&request);
+}

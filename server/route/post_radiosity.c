@@ -1,0 +1,240 @@
+/* POST /v1/scenes/NAME/radiosity: emission in, light out. Reads on the thread that has the request, shares
+ * passes over the operator with other clients, writes on whichever thread is free. */
+#include "server/route/radiosity_figures.h"
+#include "server/route/refined_answer.h"
+#include "server/route/routes.h"
+#include "solver/codec/answer.h"
+#include "solver/codec/request.h"
+
+#include <stdlib.h>
+
+/* From begin to end. */
+typedef struct radiosity_solve {
+    radiosity_request request;
+    answer_notes notes;
+    answer_shape shape;
+    buffer answer;
+    float *out;             /* [n_rhs][C][n_values]: in the answer, where its encoding allows, or own */
+    float *own;             /* else NULL */
+    float *H0;              /* [n_rhs][C][n], what the sky gives; NULL where no vector is under one */
+    double *figures;        /* of reduce, in place of the answer's values; else NULL */
+    float *W;               /* [n_rhs][C][s], weights of the store's emitters; NULL where it has none */
+    refined_solve *refined; /* where a tolerance is asked for; else NULL */
+    problem why;            /* of a pass that failed */
+    bool failed;
+} radiosity_solve;
+
+static void solve_free(radiosity_solve *s) {
+    radiosity_request_free(&s->request);
+    buffer_free(&s->answer);
+    refined_free(s->refined, &s->notes);
+    free(s->own);
+    free(s->figures);
+    free(s->H0);
+    free(s->W);
+    free(s);
+}
+
+/* [n_rhs][C][width] floats, not cleared; NULL when memory is short. */
+static float *allocate_rows(const radiosity_solve *s, size_t width) {
+    size_t count;
+    if (!size_multiply(s->shape.n_rhs, s->shape.n_channels, &count) || !size_multiply(count, width, &count) ||
+        !size_multiply(count, sizeof(float), &count))
+        return NULL;
+    return malloc(count > 0 ? count : 1);
+}
+
+/* What the sky gives, or the weights of the store's emitters that an emission stands for. */
+static bool find_light(const scene *s, radiosity_solve *solve, problem *why) {
+    const radiosity_request *request = &solve->request;
+    const size_t C = s->n_channels, n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
+    lam_error error;
+    if (s->n_emitters == 0) {
+        if (request->sky.values == NULL) return true;
+        solve->H0 = allocate_rows(solve, s->n);
+        if (solve->H0 == NULL)
+            return problem_set(why, 503, "not enough memory for %zu skies", request->n_rhs);
+        lam_sky_irradiance(s->sky, request->n_rhs * C, request->sky.values, solve->H0);
+        return true;
+    }
+    solve->W = allocate_rows(solve, s->n_emitters);
+    if (solve->W == NULL)
+        return problem_set(why, 503, "not enough memory for the weights of %zu vectors", request->n_rhs);
+    const lam_status status = lam_operator_weights(s->op, request->n_rhs, request->E, n_tiles,
+                                                   request->sky.values, solve->W, &error);
+    if (status != LAM_OK) return problem_set(why, status == LAM_ERR_MEMORY ? 503 : 422, "%s", error.message);
+    for (size_t k = 0; request->emitters.values != NULL && k < request->n_rhs * C * s->n_emitters; k++)
+        solve->W[k] += request->emitters.values[k];
+    return true;
+}
+
+/* Room for the answer's values, where possible where they are sent from; figures come of values that are not.
+ */
+static bool find_room(call *in, radiosity_solve *s, problem *why) {
+    const reduce_request *reduce = &s->request.reduce;
+    if (reduce->on) {
+        s->figures = reduce_figures(reduce, s->shape.n_rhs, s->shape.n_channels);
+        s->out = s->own = allocate_rows(s, s->shape.n_values);
+        return (s->figures != NULL && s->own != NULL) ||
+               problem_set(why, 503, "not enough memory to reduce %zu vectors", s->shape.n_rhs);
+    }
+    if (!answer_begin(&s->answer, &s->shape, &in->accept, &s->notes, why)) return false;
+    s->out = answer_place(&s->answer, &s->shape, &in->accept);
+    if (s->out == NULL) s->out = s->own = allocate_rows(s, s->shape.n_values);
+    return s->out != NULL || problem_set(why, 503, "not enough memory to solve %zu vectors", s->shape.n_rhs);
+}
+
+static bool begin(call *in, answer *out) {
+    const scene *of = in->scene;
+    const codec_scene about = call_codec_scene(in);
+    problem why = {0};
+    radiosity_solve *s = calloc(1, sizeof *s);
+    if (s == NULL) {
+        answer_refuse(out, 503, "not enough memory for the request");
+        return false;
+    }
+    const double start = call_now_ms();
+    bool good = in->body_type == MEDIA_NPY ? codec_read_npy(&about, in->body, in->length, &s->request, &why)
+                                           : codec_read_json(&about, in->body, in->length, &s->request, &why);
+    const radiosity_request *request = &s->request;
+    s->notes = call_notes(in);
+    s->notes.quantity = request->quantity;
+    s->notes.parse_ms = call_now_ms() - start;
+    s->shape = (answer_shape){.n = of->n,
+                              .n_channels = of->n_channels,
+                              .n_rhs = request->n_rhs,
+                              .batch = request->batch,
+                              .n_values = request->select ? request->n_selected : of->n};
+    in->n_rhs = request->n_rhs;
+    good = good && figures_acceptable(in, request, &why);
+    /* One takes no pass and is answered at once. */
+    const bool linear = good && request->reduce.linear, refine = good && request->tolerance > 0;
+    good = linear   ? figures_linear(in, &s->request, &s->notes, &s->answer, &why)
+           : refine ? refined_begin(in, request, &s->notes, &s->refined, &why)
+                    : good && find_light(of, s, &why) && find_room(in, s, &why);
+    if (!good || linear) {
+        if (good)
+            answer_json(out, &s->answer, true);
+        else
+            answer_problem(out, &why);
+        solve_free(s);
+        return false;
+    }
+    in->state = s;
+    in->job.n_vectors = request->n_rhs;
+    /* Whole answers share passes; those of some elements, and of emitters, have passes of their own. What is
+     * refined takes many times as long: one such pass at a time, whoever asks, leaves the other threads to
+     * all others. */
+    in->job.key = refine                                  ? (const void *)in->service->queue
+                  : request->select || of->n_emitters > 0 ? (const void *)in
+                                                          : of->op;
+    return true;
+}
+
+/* The work area of a pass; NULL, and why, when memory is short. */
+static void *get_work(const scene *s, size_t n_rhs, batch_workspace *workspace, size_t *bytes, problem *why) {
+    *bytes = lam_operator_work_bytes(s->op, n_rhs);
+    void *work = *bytes > 0 ? batch_workspace_get(workspace, *bytes) : NULL;
+    if (work == NULL) problem_set(why, 503, "not enough memory to solve %zu vectors", n_rhs);
+    return work;
+}
+
+static lam_status pass_of_emitters(const scene *s, const radiosity_solve *solve, const batch_part *part,
+                                   float *out, void *work, size_t bytes, lam_error *error) {
+    const radiosity_request *request = &solve->request;
+    return lam_operator_apply_emitters(
+        s->op, part->count, request->quantity, solve->W + part->first * s->n_channels * s->n_emitters,
+        request->n_selected, request->select ? request->selected : NULL, out, work, bytes, error);
+}
+
+static lam_status pass_of_some(const scene *s, const radiosity_solve *solve, const batch_part *part,
+                               float *out, void *work, size_t bytes, lam_error *error) {
+    const radiosity_request *request = &solve->request;
+    const size_t before = part->first * s->n_channels * s->n;
+    return lam_operator_apply_selected(s->op, part->count, request->quantity, request->E + before,
+                                       solve->H0 != NULL ? solve->H0 + before : NULL, request->n_selected,
+                                       request->selected, out, work, bytes, error);
+}
+
+static void pass_refined(const batch_part *parts, size_t n_parts) {
+    for (size_t p = 0; p < n_parts; p++) {
+        call *in = call_of(parts[p].job);
+        radiosity_solve *s = in->state;
+        s->failed = s->failed || !refined_pass(in, &s->request, parts[p].first, parts[p].count, s->refined,
+                                               &s->notes, &s->answer, &s->why);
+    }
+}
+
+/* The parts are of one scene, or all to be refined; several only of whole answers. */
+static void pass(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
+    const call *first = call_of(parts[0].job);
+    const scene *s = first->scene;
+    lam_part shared[BATCH_PASS];
+    lam_error error = {.message = ""};
+    problem why = {0};
+    size_t count = 0, bytes = 0;
+    const double start = call_now_ms();
+    const radiosity_solve *one = first->state;
+    if (one->refined != NULL) {
+        pass_refined(parts, n_parts);
+        return;
+    }
+    for (size_t p = 0; p < n_parts; p++) {
+        const radiosity_solve *solve = call_of(parts[p].job)->state;
+        const size_t before = parts[p].first * s->n_channels * s->n;
+        shared[p] = (lam_part){.n_rhs = parts[p].count,
+                               .quantity = solve->request.quantity,
+                               .E = solve->request.E + before,
+                               .H0 = solve->H0 != NULL ? solve->H0 + before : NULL,
+                               .out = solve->out + parts[p].first * s->n_channels * solve->shape.n_values};
+        count += parts[p].count;
+    }
+    void *work = get_work(s, count, workspace, &bytes, &why);
+    if (work != NULL) {
+        const lam_status status =
+            s->n_emitters > 0     ? pass_of_emitters(s, one, parts, shared[0].out, work, bytes, &error)
+            : one->request.select ? pass_of_some(s, one, parts, shared[0].out, work, bytes, &error)
+                                  : lam_operator_apply_parts(s->op, n_parts, shared, work, bytes, &error);
+        if (status != LAM_OK) problem_set(&why, 500, "%s", error.message);
+    }
+    metrics_pass(first->service->metrics, count);
+    const double took = call_now_ms() - start;
+    for (size_t p = 0; p < n_parts; p++) {
+        radiosity_solve *solve = call_of(parts[p].job)->state;
+        solve->notes.solve_ms += took;
+        if (why.status == 0) continue;
+        solve->failed = true;
+        solve->why = why;
+    }
+}
+
+/* Whether the figures of what was solved, or the values themselves, are in the answer. */
+static bool write_answer(call *in, radiosity_solve *s) {
+    const double start = call_now_ms();
+    bool good = !s->failed;
+    if (s->refined != NULL)
+        return good && refined_end(in, &s->request, s->refined, &s->notes, &s->answer, &s->why);
+    if (s->figures != NULL)
+        return good && figures_add(in->scene, &s->request, 0, s->shape.n_rhs, s->own, s->figures, &s->why) &&
+               figures_write(in->scene, &s->request, s->figures, &s->notes, &s->answer, &s->why);
+    good = good && (s->own == NULL
+                        ? answer_placed(&s->answer, &s->shape, &s->why)
+                        : answer_add(&s->answer, &s->shape, &in->accept, 0, s->shape.n_rhs, s->own, &s->why));
+    s->notes.encode_ms = call_now_ms() - start;
+    return good && answer_end(&s->answer, &s->shape, &in->accept, &s->notes, &s->why);
+}
+
+static void end(call *in, answer *out) {
+    radiosity_solve *s = in->state;
+    if (write_answer(in, s)) {
+        answer_json(out, &s->answer, true);
+        if (in->accept.type == MEDIA_NPY) out->type = "application/x-npy";
+        if (s->refined != NULL) refined_answer_tell(&s->notes, s->request.n_rhs, out);
+    } else {
+        answer_problem(out, &s->why);
+    }
+    in->state = NULL;
+    solve_free(s);
+}
+
+const solve_steps post_radiosity = {begin, pass, end};

@@ -1,0 +1,131 @@
+#include "server/route/radiosity_figures.h"
+
+#include "solver/codec/group_figures.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* What the thread of all input and output may read of a body, and compute for it: well below a millisecond.
+ */
+#define QUICK_BODY ((size_t)32 << 10)
+#define QUICK_WORK ((size_t)100000)
+#define QUICK_BYTES ((size_t)1 << 20)
+
+bool figures_acceptable(const call *in, const radiosity_request *request, problem *why) {
+    return !request->reduce.on || in->accept.type == MEDIA_JSON ||
+           problem_set(why, 422, "reduce is answered in JSON; leave application/x-npy out of Accept");
+}
+
+bool figures_add(const scene *s, const radiosity_request *request, size_t first, size_t count, const float *x,
+                 double *figures, problem *why) {
+    const size_t n_values = count * s->n_channels * request->n_selected;
+    int bad = 0;
+    for (size_t i = 0; i < n_values; i++) bad |= !(fabsf(x[i]) <= FLT_MAX);
+    if (bad)
+        return problem_set(why, 422,
+                           "the answer passes the range of single precision (3.4e38); scale the emission");
+    return reduce_vectors(&request->reduce, &s->groups, s->area, s->n_channels, request->n_rhs, first, count,
+                          (reduce_values){.floats = x}, figures) ||
+           problem_set(why, 503, "not enough memory to reduce %zu vectors", count);
+}
+
+bool figures_write(const scene *s, const radiosity_request *request, const double *figures,
+                   const answer_notes *notes, buffer *b, problem *why) {
+    return (answer_head(b, s->n, s->n_channels, notes) && buffer_append_text(b, ",\"groups\":") &&
+            reduce_write(&request->reduce, s->n_channels, request->n_rhs, request->batch, figures, b) &&
+            answer_certificates(b, request->n_rhs, request->batch, notes) && answer_tail(b, notes)) ||
+           problem_set(why, 503, "not enough memory for the answer; ask for fewer vectors or groups");
+}
+
+/* *weights [n_rhs][C][s] of a store of few emitters, all that shines in them. */
+static bool weights_of(const call *in, radiosity_request *request, float **weights, problem *why) {
+    const scene *s = in->scene;
+    const size_t row = s->n_channels * s->n_emitters;
+    const codec_scene about = call_codec_scene(in);
+    size_t count;
+    lam_error error;
+    *weights = NULL;
+    if (s->n_emitters == 0 || (request->n_spots == 0 && request->n_dense == 0 && request->sky.values == NULL))
+        return true;
+    if (!radiosity_request_expand(request, &about, why)) return false;
+    if (size_multiply(request->n_rhs, row, &count))
+        *weights = memory_allocate(count, sizeof **weights, "weights", NULL);
+    if (*weights == NULL) return problem_set(why, 503, "not enough memory for %zu vectors", request->n_rhs);
+    const lam_status status = lam_operator_weights(s->op, request->n_rhs, request->E, about.n_tiles,
+                                                   request->sky.values, *weights, &error);
+    if (status != LAM_OK) return problem_set(why, status == LAM_ERR_MEMORY ? 503 : 422, "%s", error.message);
+    for (size_t k = 0; k < request->emitters.n * row; k++) (*weights)[k] += request->emitters.values[k];
+    return true;
+}
+
+/* The figures from rows, one a name. */
+static bool evaluate(const call *in, radiosity_request *request, adjoint_row *const *rows,
+                     answer_notes *notes, buffer *b, problem *why) {
+    const scene *s = in->scene;
+    const reduce_request *r = &request->reduce;
+    double *figures = reduce_figures(r, request->n_rhs, s->n_channels);
+    double *means = memory_allocate(request->n_rhs, s->n_channels * sizeof *means, "means", NULL);
+    float *weights = NULL;
+    bool good = figures != NULL && means != NULL;
+    if (!good) problem_set(why, 503, "not enough memory for the answer; ask for fewer vectors or groups");
+    if (good && !adjoint_row_tells(s, rows[0], request)) good = weights_of(in, request, &weights, why);
+    for (size_t k = 0; good && k < r->n_names; k++) {
+        adjoint_row_evaluate(s, rows[k], request, weights, means);
+        reduce_means(r, k, s->n_channels, request->n_rhs, rows[k]->area, means, figures);
+    }
+    const double solved = call_now_ms();
+    notes->solve_ms += solved;
+    good = good && figures_write(s, request, figures, notes, b, why);
+    free(figures);
+    free(means);
+    free(weights);
+    return good;
+}
+
+bool figures_linear(call *in, radiosity_request *request, answer_notes *notes, buffer *b, problem *why) {
+    adjoint_row *rows[ADJOINT_ROWS_OF_REQUEST];
+    notes->solve_ms = -call_now_ms();
+    if (!adjoint_rows_get(in->scene, request, in->workspace, rows, why)) return false;
+    const bool good = evaluate(in, request, rows, notes, b, why);
+    adjoint_rows_release(in->scene, request->reduce.n_names, rows);
+    return good;
+}
+
+bool quick_radiosity(call *in, answer *out) {
+    static const char word[] = "\"reduce\"";
+    const scene *s = in->scene;
+    if (in->body_type != MEDIA_JSON || in->accept.type != MEDIA_JSON || in->length > QUICK_BODY ||
+        memmem(in->body, in->length, word, sizeof word - 1) == NULL)
+        return false;
+    codec_scene about = call_codec_scene(in);
+    about.only_linear = true;
+    about.max_bytes = QUICK_BYTES;
+    answer_notes notes = call_notes(in);
+    radiosity_request request = {0};
+    problem why = {0};
+    buffer b = {0};
+    adjoint_row *rows[ADJOINT_ROWS_OF_REQUEST];
+    const double start = call_now_ms();
+    bool good = codec_read_json(&about, in->body, in->length, &request, &why) &&
+                adjoint_row_work(s, &request) <= QUICK_WORK / request.reduce.n_names &&
+                adjoint_rows_find(s, &request, rows);
+    if (good && !adjoint_row_tells(s, rows[0], &request)) {
+        adjoint_rows_release(s, request.reduce.n_names, rows);
+        good = false;
+    }
+    if (good) {
+        const double parsed = call_now_ms();
+        notes.parse_ms = parsed - start;
+        notes.solve_ms = -parsed;
+        notes.quantity = request.quantity;
+        in->n_rhs = request.n_rhs;
+        good = evaluate(in, &request, rows, &notes, &b, &why);
+        adjoint_rows_release(s, request.reduce.n_names, rows);
+        if (good) answer_json(out, &b, true);
+    }
+    buffer_free(&b);
+    radiosity_request_free(&request);
+    return good;
+}

@@ -1,0 +1,225 @@
+#include "server/route/refined_answer.h"
+
+#include "server/route/radiosity_figures.h"
+#include "solver/codec/group_figures.h"
+#include "solver/operator/emitters.h"
+#include "solver/operator/sky_light.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* What a pass works with; NULL where it is not needed. */
+typedef struct pass_memory {
+    double *E, *H0, *out; /* [BATCH_PASS][C][n] */
+    double *L;            /* [BATCH_PASS][C][m] */
+    double *some;         /* [BATCH_PASS][C][selected] */
+    float *start;         /* [BATCH_PASS][C][n], of a store of few emitters: its own answer */
+    float *W;             /* [BATCH_PASS][C][s], their weights */
+    void *work;
+    size_t work_bytes;
+} pass_memory;
+
+struct refined_solve {
+    answer_shape shape;
+    media_accept as;
+    double *certificates; /* [n_rhs] */
+    size_t *iterations;   /* [n_rhs] */
+    double *figures;      /* of reduce, in place of the values; else NULL */
+    bool made;            /* p is */
+    pass_memory p;
+};
+
+static void free_pass(pass_memory *p) {
+    free(p->E);
+    free(p->H0);
+    free(p->out);
+    free(p->L);
+    free(p->some);
+    free(p->start);
+    free(p->W);
+    free(p->work);
+}
+
+static bool get_pass(const scene *s, const radiosity_request *request, pass_memory *p, problem *why) {
+    const size_t vectors = request->n_rhs < BATCH_PASS ? request->n_rhs : BATCH_PASS,
+                 rows = vectors * s->n_channels;
+    const size_t row = s->n * sizeof(double);
+    const bool few = s->n_emitters > 0;
+    p->E = memory_allocate(rows, row, "E", NULL);
+    p->out = memory_allocate(rows, row, "B", NULL);
+    bool good = p->E != NULL && p->out != NULL;
+    if (few || request->sky.values != NULL) {
+        p->H0 = memory_allocate(rows, row, "H0", NULL);
+        good = good && p->H0 != NULL;
+    }
+    if (request->sky.values != NULL) {
+        p->L = memory_allocate(rows, lam_sky_tiles(s->sky) * sizeof *p->L, "L", NULL);
+        good = good && p->L != NULL;
+    }
+    if (request->select) {
+        p->some = memory_allocate(rows, request->n_selected * sizeof *p->some, "B", NULL);
+        good = good && p->some != NULL;
+    }
+    if (few) {
+        p->work_bytes = lam_operator_work_bytes(s->op, vectors);
+        p->start = memory_allocate(rows, s->n * sizeof *p->start, "B", NULL);
+        p->W = memory_allocate(rows, s->n_emitters * sizeof *p->W, "weights", NULL);
+        p->work = memory_allocate(p->work_bytes, 1, "work", NULL);
+        good = good && p->start != NULL && p->W != NULL && p->work != NULL;
+    }
+    return good || problem_set(why, 503, "not enough memory to refine %zu vectors", vectors);
+}
+
+static bool refuse(lam_status status, const lam_error *error, problem *why) {
+    const unsigned as = status == LAM_ERR_MEMORY || status == LAM_ERR_IO          ? 503
+                        : status == LAM_ERR_NUMERIC || status == LAM_ERR_ARGUMENT ? 422
+                                                                                  : 500;
+    return problem_set(why, as, "%s", error->message);
+}
+
+/* E and H0 of what weights of emitters send out, and the store's own answer to them as a start. */
+static bool light_emitters(const scene *s, const radiosity_request *request, size_t first, size_t count,
+                           pass_memory *p, problem *why) {
+    const size_t C = s->n_channels, weights = C * s->n_emitters;
+    const size_t n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
+    const float *L = request->sky.values;
+    lam_status status = LAM_OK;
+    lam_error error;
+    if (L != NULL) L += first * C * n_tiles;
+    TRY(lam_operator_weights(s->op, count, request->E + first * C * s->n, n_tiles, L, p->W, &error));
+    for (size_t k = 0; request->emitters.values != NULL && k < count * weights; k++)
+        p->W[k] += request->emitters.values[first * weights + k];
+    TRY(operator_emitters_light_double(s->op, count, p->W, p->E, p->H0, &error));
+    TRY(lam_operator_apply_emitters(s->op, count, LAM_INDIRECT, p->W, s->n, NULL, p->start, p->work,
+                                    p->work_bytes, &error));
+done:
+    return status == LAM_OK || refuse(status, &error, why);
+}
+
+static void light_any(const scene *s, const radiosity_request *request, size_t first, size_t count,
+                      pass_memory *p) {
+    const size_t C = s->n_channels, E_begin = first * C * s->n;
+    for (size_t k = 0; k < count * C * s->n; k++) p->E[k] = (double)request->E[E_begin + k];
+    if (p->L == NULL) return;
+    const size_t n_tiles = lam_sky_tiles(s->sky), L_begin = first * C * n_tiles;
+    for (size_t k = 0; k < count * C * n_tiles; k++) p->L[k] = (double)request->sky.values[L_begin + k];
+    sky_irradiance_double(s->sky, count * C, p->L, p->H0);
+}
+
+/* Vectors first ... first + count, refined and, where elements are selected, theirs; NULL with *why. */
+static const double *refine(const scene *s, const lam_refiner *refiner, const radiosity_request *request,
+                            size_t first, size_t count, pass_memory *p, double *certificates,
+                            size_t *iterations, problem *why) {
+    lam_error error;
+    if (s->n_emitters == 0)
+        light_any(s, request, first, count, p);
+    else if (!light_emitters(s, request, first, count, p, why))
+        return NULL;
+    const lam_status status = lam_refine(refiner, count, request->quantity, p->E, p->H0, p->start,
+                                         request->tolerance, p->out, certificates, iterations, &error);
+    if (status != LAM_OK) {
+        refuse(status, &error, why);
+        return NULL;
+    }
+    if (!request->select) return p->out;
+    for (size_t row = 0; row < count * s->n_channels; row++)
+        for (size_t k = 0; k < request->n_selected; k++)
+            p->some[row * request->n_selected + k] = p->out[row * s->n + request->selected[k]];
+    return p->some;
+}
+
+bool refined_begin(call *in, const radiosity_request *request, answer_notes *notes, refined_solve **out,
+                   problem *why) {
+    const scene *s = in->scene;
+    refined_solve *r = calloc(1, sizeof *r);
+    if (r == NULL) return problem_set(why, 503, "not enough memory for the request");
+    r->as = in->accept;
+    if (!r->as.npy_given) r->as.npy = NPY_F8;
+    r->shape = (answer_shape){.n = s->n,
+                              .n_channels = s->n_channels,
+                              .n_rhs = request->n_rhs,
+                              .batch = request->batch,
+                              .n_values = request->select ? request->n_selected : s->n};
+    r->certificates = memory_allocate(request->n_rhs, sizeof *r->certificates, "certificates", NULL);
+    r->iterations = memory_allocate(request->n_rhs, sizeof *r->iterations, "certificates", NULL);
+    notes->certificates = r->certificates;
+    notes->iterations = r->iterations;
+    *out = r;
+    if (request->reduce.on) r->figures = reduce_figures(&request->reduce, request->n_rhs, s->n_channels);
+    return (r->certificates != NULL && r->iterations != NULL &&
+            (r->figures != NULL || !request->reduce.on)) ||
+           problem_set(why, 503, "not enough memory for %zu certificates", request->n_rhs);
+}
+
+/* What refines; the first time of a scene takes as long as its form factors are large. */
+static bool find_refiner(const scene *s, const lam_refiner **refiner, problem *why) {
+    lam_error error;
+    const lam_status status = refined_get(s->refined, refiner, &error);
+    if (status != LAM_OK) return refuse(status, &error, why);
+    if (*refiner != NULL) return true;
+    problem_set(why, 422,
+                "scene %.80s keeps no form factors, which a tolerance needs; precompute it with "
+                "--keep-form-factors",
+                s->name);
+    snprintf(why->pointer, sizeof why->pointer, "/tolerance");
+    return false;
+}
+
+bool refined_pass(call *in, const radiosity_request *request, size_t first, size_t count, refined_solve *r,
+                  answer_notes *notes, buffer *b, problem *why) {
+    const scene *s = in->scene;
+    const lam_refiner *refiner = NULL;
+    const double begin = call_now_ms();
+    bool good = find_refiner(s, &refiner, why);
+    if (good && !r->made) {
+        r->made = true;
+        good = get_pass(s, request, &r->p, why) &&
+               (r->figures != NULL || answer_begin(b, &r->shape, &r->as, notes, why));
+    }
+    const double *x = good ? refine(s, refiner, request, first, count, &r->p, r->certificates + first,
+                                    r->iterations + first, why)
+                           : NULL;
+    const double solved = call_now_ms();
+    notes->solve_ms += solved - begin;
+    good = x != NULL;
+    if (good && r->figures != NULL)
+        good = reduce_vectors(&request->reduce, &s->groups, s->area, s->n_channels, request->n_rhs, first,
+                              count, (reduce_values){.doubles = x}, r->figures) ||
+               problem_set(why, 503, "not enough memory to reduce %zu vectors", count);
+    for (size_t v = 0; good && r->figures == NULL && v < count; v++) {
+        /* One by one: what a vector is rounded by is its own affair. */
+        double rounding = 0;
+        good = answer_add_doubles(b, &r->shape, &r->as, first + v, 1,
+                                  x + v * s->n_channels * r->shape.n_values, &rounding, why);
+        r->certificates[first + v] += rounding;
+    }
+    notes->encode_ms += call_now_ms() - solved;
+    if (good) metrics_pass(in->service->metrics, count);
+    return good;
+}
+
+bool refined_end(const call *in, const radiosity_request *request, const refined_solve *r,
+                 const answer_notes *notes, buffer *b, problem *why) {
+    if (r->figures != NULL) return figures_write(in->scene, request, r->figures, notes, b, why);
+    return answer_end(b, &r->shape, &r->as, notes, why);
+}
+
+void refined_free(refined_solve *r, answer_notes *notes) {
+    notes->certificates = NULL;
+    notes->iterations = NULL;
+    if (r == NULL) return;
+    free(r->certificates);
+    free(r->iterations);
+    free(r->figures);
+    free_pass(&r->p);
+    free(r);
+}
+
+void refined_answer_tell(const answer_notes *notes, size_t n_rhs, answer *out) {
+    out->refined = true;
+    for (size_t v = 0; v < n_rhs; v++) {
+        out->certificate = fmax(out->certificate, notes->certificates[v]);
+        if (notes->iterations[v] > out->iterations) out->iterations = notes->iterations[v];
+    }
+}

@@ -1,0 +1,28 @@
+/* What all requests share. */
+#ifndef LAMBERT_SERVER_ROUTE_SERVICE_H
+#define LAMBERT_SERVER_ROUTE_SERVICE_H
+
+#include "server/config.h"
+#include "server/net/connections.h"
+#include "server/net/token.h"
+#include "server/queue/batch.h"
+#include "server/queue/metrics.h"
+#include "server/scene/catalog.h"
+#include "server/scene/variants.h"
+
+typedef enum service_state { SERVICE_LOADING, SERVICE_READY, SERVICE_DRAINING } service_state;
+
+typedef struct service {
+    const config *config;
+    catalog *catalog;
+    variants *variants;
+    metrics *metrics;
+    batch_queue *queue;
+    token token;              /* empty: none is asked for */
+    FILE *access_log;         /* NULL: none */
+    atomic_int state;         /* a service_state */
+    connections *connections; /* from http_start to http_stop */
+    atomic_size_t body_bytes; /* of requests whose bodies are held */
+} service;
+
+#endif

@@ -1,0 +1,410 @@
+#include "server/scene/catalog.h"
+
+#include "server/scene/verifier.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <malloc.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+struct catalog {
+    const config *config;
+    FILE *out, *problems;
+    memory_ledger ledger;
+    verifier *verifier;
+    pthread_mutex_t lock;   /* of present */
+    pthread_mutex_t stores; /* held while a store is open */
+    catalog_snapshot *present;
+};
+
+/* A store to read: path[path_length] may be the ':' before its name. */
+typedef struct source {
+    char *path;
+    const char *name; /* NULL: the store's own; points behind path's NUL */
+} source;
+
+typedef struct source_list {
+    source *items;
+    size_t count, capacity;
+} source_list;
+
+static void free_sources(source_list *list) {
+    for (size_t i = 0; i < list->count; i++) free(list->items[i].path);
+    free(list->items);
+}
+
+static lam_status add_source(source_list *list, const char *folder, const char *argument, bool may_name,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    char *path = NULL;
+    if (list->count == list->capacity) {
+        size_t capacity = 2 * list->capacity + 8;
+        source *items = realloc(list->items, capacity * sizeof *items);
+        if (items == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", argument);
+        list->items = items;
+        list->capacity = capacity;
+    }
+    if (asprintf(&path, "%s%s%s", folder == NULL ? "" : folder, folder == NULL ? "" : "/", argument) < 0) {
+        path = NULL;
+        FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", argument);
+    }
+    source *added = &list->items[list->count++];
+    *added = (source){path, NULL};
+    /* A file whose own name has a colon is taken as it is. */
+    char *colon = may_name ? strrchr(path, ':') : NULL;
+    if (colon != NULL && colon[1] != '\0' && strchr(colon, '/') == NULL && access(path, F_OK) != 0) {
+        *colon = '\0';
+        added->name = colon + 1;
+    }
+done:
+    return status;
+}
+
+static int compare_names(const void *a, const void *b) {
+    return strcmp(*(char *const *)a, *(char *const *)b);
+}
+
+/* Every *.h5 of a folder, by name. */
+static lam_status add_folder(source_list *list, const char *folder, lam_error *error) {
+    lam_status status = LAM_OK;
+    struct dirent **entries = NULL;
+    char **names = NULL;
+    size_t count = 0;
+    int found = scandir(folder, &entries, NULL, NULL);
+    if (found < 0) FAIL(error, LAM_ERR_IO, "%s: cannot be read: %s", folder, strerror(errno));
+    names = memory_allocate((size_t)found, sizeof *names, folder, error);
+    if (names == NULL) {
+        status = LAM_ERR_MEMORY;
+        goto done;
+    }
+    for (int i = 0; i < found; i++) {
+        char *name = entries[i]->d_name;
+        size_t length = strlen(name);
+        if (name[0] != '.' && length > 3 && strcmp(name + length - 3, ".h5") == 0) names[count++] = name;
+    }
+    qsort(names, count, sizeof *names, compare_names);
+    for (size_t i = 0; i < count; i++) TRY(add_source(list, folder, names[i], false, error));
+done:
+    for (int i = 0; i < found; i++) free(entries[i]);
+    free(entries);
+    free(names);
+    return status;
+}
+
+lam_status catalog_create(const config *c, FILE *out, FILE *problems, catalog **made, lam_error *error) {
+    lam_status status = LAM_OK;
+    catalog *all = memory_allocate(1, sizeof *all, "catalog", error);
+    catalog_snapshot *empty = memory_allocate(1, sizeof *empty, "catalog", error);
+    if (all == NULL || empty == NULL) TRY(LAM_ERR_MEMORY);
+    atomic_init(&empty->references, 1);
+    all->config = c;
+    atomic_init(&all->ledger.taken, 0);
+    atomic_init(&all->ledger.room, 0); /* until it is known what the stores leave */
+    all->out = out;
+    all->problems = problems;
+    TRY(verifier_start(out, problems, &all->verifier, error));
+    all->present = empty;
+    empty = NULL;
+    pthread_mutex_init(&all->lock, NULL);
+    pthread_mutex_init(&all->stores, NULL);
+    *made = all;
+    all = NULL;
+done:
+    free(all);
+    free(empty);
+    return status;
+}
+
+void catalog_destroy(catalog *all) {
+    if (all == NULL) return;
+    verifier_stop(all->verifier);
+    catalog_release(all->present);
+    pthread_mutex_destroy(&all->lock);
+    pthread_mutex_destroy(&all->stores);
+    free(all);
+}
+
+catalog_snapshot *catalog_acquire(catalog *all) {
+    pthread_mutex_lock(&all->lock);
+    catalog_snapshot *snapshot = all->present;
+    atomic_fetch_add(&snapshot->references, 1);
+    pthread_mutex_unlock(&all->lock);
+    return snapshot;
+}
+
+void catalog_release(catalog_snapshot *snapshot) {
+    if (snapshot == NULL || atomic_fetch_sub(&snapshot->references, 1) != 1) return;
+    for (size_t i = 0; i < snapshot->n_scenes; i++) scene_release(snapshot->scenes[i]);
+    free(snapshot->scenes);
+    free(snapshot);
+}
+
+static int compare_to_name(const void *name, const void *entry) {
+    return strcmp(name, (*(scene *const *)entry)->name);
+}
+
+const scene *catalog_find(const catalog_snapshot *snapshot, const char *name) {
+    if (snapshot->n_scenes == 0) return NULL;
+    scene *const *found =
+        bsearch(name, snapshot->scenes, snapshot->n_scenes, sizeof *snapshot->scenes, compare_to_name);
+    return found == NULL ? NULL : *found;
+}
+
+/* The scene that was read from this source before, or NULL. */
+static scene *find_before(const catalog_snapshot *before, const source *from) {
+    for (size_t i = 0; i < before->n_scenes; i++) {
+        scene *s = before->scenes[i];
+        if (s->base == NULL && strcmp(s->path, from->path) == 0 && s->renamed == (from->name != NULL) &&
+            (from->name == NULL || strcmp(s->name, from->name) == 0))
+            return s;
+    }
+    return NULL;
+}
+
+/* Puts s where its name belongs, or returns the scene that has the name already. */
+static const scene *insert(catalog_snapshot *snapshot, scene *s) {
+    size_t at = 0;
+    while (at < snapshot->n_scenes && strcmp(snapshot->scenes[at]->name, s->name) < 0) at++;
+    if (at < snapshot->n_scenes && strcmp(snapshot->scenes[at]->name, s->name) == 0)
+        return snapshot->scenes[at];
+    memmove(snapshot->scenes + at + 1, snapshot->scenes + at,
+            (snapshot->n_scenes - at) * sizeof *snapshot->scenes);
+    snapshot->scenes[at] = s;
+    snapshot->n_scenes++;
+    return NULL;
+}
+
+/* What the scenes of a snapshot count for, and the largest work area of a thread. */
+static uint64_t memory_used(const catalog_snapshot *snapshot, size_t *work_bytes) {
+    uint64_t used = 0;
+    *work_bytes = 0;
+    for (size_t i = 0; i < snapshot->n_scenes; i++) {
+        const scene *s = snapshot->scenes[i];
+        used += s->memory;
+        if (s->work_bytes > *work_bytes) *work_bytes = s->work_bytes;
+    }
+    return used;
+}
+
+/* What they have come to hold since. */
+static uint64_t memory_grown(const catalog_snapshot *snapshot) {
+    uint64_t grown = 0;
+    for (size_t i = 0; i < snapshot->n_scenes; i++) grown += scene_grown(snapshot->scenes[i]);
+    return grown;
+}
+
+/* What --max-memory leaves beside the scenes, their work areas and this. */
+static uint64_t memory_left(const catalog *all, const catalog_snapshot *next, uint64_t grown) {
+    size_t work_bytes;
+    const uint64_t used =
+        memory_used(next, &work_bytes) + scene_work_memory(all->config->threads, work_bytes) + grown;
+    if (all->config->max_memory == 0) return UINT64_MAX;
+    return all->config->max_memory > used ? all->config->max_memory - used : 0;
+}
+
+/* The rest is for what scenes come to hold. */
+static void share_memory(catalog *all, const catalog_snapshot *present) {
+    const uint64_t left = memory_left(all, present, 0);
+    atomic_store(&all->ledger.room, left < SIZE_MAX ? (size_t)left : SIZE_MAX);
+}
+
+/* Whether a scene that is open fits with its work areas too; they are shared with the others'. */
+static lam_status check_work(const catalog *all, const catalog_snapshot *next, const scene *s,
+                             lam_error *error) {
+    const size_t threads = all->config->threads;
+    size_t work_bytes;
+    const uint64_t used = memory_used(next, &work_bytes) + memory_grown(next);
+    if (s->work_bytes > work_bytes) work_bytes = s->work_bytes;
+    const uint64_t wanted = used + s->memory + scene_work_memory(threads, work_bytes);
+    if (all->config->max_memory == 0 || wanted <= all->config->max_memory) return LAM_OK;
+    return status_fail(
+        error, LAM_ERR_MEMORY,
+        "%s: takes %llu bytes, and %zu threads %zu each to solve, of --max-memory %zu the other "
+        "stores have %llu",
+        s->path, (unsigned long long)s->memory, threads, work_bytes, all->config->max_memory,
+        (unsigned long long)used);
+}
+
+/* The scene of a source, as it is now. */
+static lam_status open_source(catalog *all, const catalog_snapshot *next, const source *from, scene *old,
+                              scene **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    scene *opened = NULL;
+    /* One that turned out to be damaged has to prove first that it no longer is. */
+    const bool verify = all->config->verify || (old != NULL && scene_damaged(old, NULL, NULL));
+    const scene_wish wish = {.path = from->path,
+                             .name = from->name,
+                             .verify = verify,
+                             .memory = memory_left(all, next, memory_grown(next)),
+                             .ledger = &all->ledger,
+                             .before = old,
+                             .threads = all->config->threads,
+                             .stores = &all->stores};
+    pthread_mutex_lock(&all->stores);
+    status = scene_open(&wish, &opened, error);
+    pthread_mutex_unlock(&all->stores);
+    TRY(status);
+    TRY(check_work(all, next, opened, error));
+    *out = opened;
+    opened = NULL;
+done:
+    if (opened != NULL) scene_release(opened);
+    return status;
+}
+
+static void load_source(catalog *all, catalog_snapshot *next, const catalog_snapshot *before,
+                        const source *from) {
+    lam_error error = {0};
+    scene *loaded = NULL, *old = find_before(before, from);
+    FILE *problems = all->problems;
+    if (open_source(all, next, from, old, &loaded, &error) != LAM_OK) {
+        if (old == NULL || check_work(all, next, old, NULL) != LAM_OK) {
+            /* Most messages begin with the path, some (out of memory) do not. */
+            bool named = strncmp(error.message, from->path, strlen(from->path)) == 0;
+            fprintf(problems, "refused %s%s%s\n", named ? "" : from->path, named ? "" : ": ", error.message);
+            return;
+        }
+        fprintf(problems, "kept the %s read before; %s cannot be read now: %s\n", old->name, from->path,
+                error.message);
+        loaded = scene_acquire(old);
+    }
+    const scene *taken = insert(next, loaded);
+    if (taken != NULL) {
+        fprintf(problems, "refused %s: the name %s is taken by %s; give it another: %s:NAME\n", from->path,
+                loaded->name, taken->path, from->path);
+        scene_release(loaded);
+        return;
+    }
+    fprintf(all->out, "serving %s: %zu elements, %zu channel%s, %s, from %s\n", loaded->name, loaded->n,
+            loaded->n_channels, loaded->n_channels == 1 ? "" : "s", lam_operator_kind(loaded->op),
+            loaded->path);
+    if (loaded != old) verifier_add(all->verifier, loaded);
+}
+
+/* --- variants ------------------------------------------------------------------------------------------ */
+
+/* A variant of a scene of this very snapshot? */
+static bool has_base_of(const catalog_snapshot *snapshot, const scene *variant) {
+    return catalog_find(snapshot, variant->base->name) == variant->base;
+}
+
+/* The variants in from whose base is still there. next has room. */
+static void keep_variants(catalog_snapshot *next, const catalog_snapshot *from) {
+    for (size_t i = 0; i < from->n_scenes; i++) {
+        scene *s = from->scenes[i];
+        if (s->base != NULL && has_base_of(next, s) && insert(next, s) == NULL) scene_acquire(s);
+    }
+}
+
+static void say_dropped(const catalog_snapshot *next, const catalog_snapshot *before, FILE *problems) {
+    for (size_t i = 0; i < before->n_scenes; i++) {
+        const scene *s = before->scenes[i];
+        if (s->base != NULL && catalog_find(next, s->name) != s)
+            fprintf(problems, "dropped %s: its store has changed, or another has its name\n", s->name);
+    }
+}
+
+/* The present scenes but for one, with room for one more. */
+static lam_status copy_without(const catalog_snapshot *present, const char *name, catalog_snapshot **out,
+                               lam_error *error) {
+    catalog_snapshot *made = memory_allocate(1, sizeof *made, "catalog", error);
+    if (made == NULL) return LAM_ERR_MEMORY;
+    atomic_init(&made->references, 1);
+    made->scenes = memory_allocate(present->n_scenes + 1, sizeof *made->scenes, "catalog", error);
+    if (made->scenes == NULL) {
+        free(made);
+        return LAM_ERR_MEMORY;
+    }
+    for (size_t i = 0; i < present->n_scenes; i++)
+        if (strcmp(present->scenes[i]->name, name) != 0)
+            made->scenes[made->n_scenes++] = scene_acquire(present->scenes[i]);
+    *out = made;
+    return LAM_OK;
+}
+
+lam_status catalog_put_variant(catalog *all, scene *variant, lam_error *error) {
+    lam_status status = LAM_OK;
+    catalog_snapshot *next = NULL;
+    pthread_mutex_lock(&all->lock);
+    const scene *taken = catalog_find(all->present, variant->name);
+    if (!has_base_of(all->present, variant))
+        FAIL(error, LAM_ERR_CANCELLED, "%s is not what it was", variant->base->name);
+    if (taken != NULL && taken->base == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "the name %s is taken by a store", variant->name);
+    TRY(copy_without(all->present, variant->name, &next, error));
+    TRY(check_work(all, next, variant, error));
+    (void)insert(next, variant);
+    variant = NULL;
+    catalog_snapshot *old = all->present;
+    all->present = next;
+    next = old;
+    share_memory(all, all->present);
+done:
+    pthread_mutex_unlock(&all->lock);
+    catalog_release(next);
+    if (variant != NULL) scene_release(variant);
+    return status;
+}
+
+lam_status catalog_remove_variant(catalog *all, const char *name, lam_error *error) {
+    lam_status status = LAM_OK;
+    catalog_snapshot *next = NULL;
+    pthread_mutex_lock(&all->lock);
+    const scene *found = catalog_find(all->present, name);
+    if (found == NULL || found->base == NULL) FAIL(error, LAM_ERR_ARGUMENT, "there is no variant %s", name);
+    TRY(copy_without(all->present, name, &next, error));
+    catalog_snapshot *old = all->present;
+    all->present = next;
+    next = old;
+    share_memory(all, all->present);
+done:
+    pthread_mutex_unlock(&all->lock);
+    catalog_release(next);
+    return status;
+}
+
+/* --- reading -------------------------------------------------------------------------------------------- */
+
+size_t catalog_reload(catalog *all) {
+    source_list sources = {0};
+    lam_error error = {0};
+    lam_status status = LAM_OK;
+    catalog_snapshot *before = catalog_acquire(all), *next = NULL;
+    if (all->config->max_memory > 0) atomic_store(&all->ledger.room, 0); /* nothing grows meanwhile */
+    for (size_t i = 0; i < all->config->n_stores; i++)
+        TRY(add_source(&sources, NULL, all->config->stores[i], true, &error));
+    if (all->config->stores_dir != NULL) TRY(add_folder(&sources, all->config->stores_dir, &error));
+    next = memory_allocate(1, sizeof *next, "catalog", &error);
+    if (next == NULL) TRY(LAM_ERR_MEMORY);
+    atomic_init(&next->references, 1);
+    const size_t most = sources.count + all->config->max_variants;
+    next->scenes = memory_allocate(most, sizeof *next->scenes, "catalog", &error);
+    if (next->scenes == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < sources.count; i++) load_source(all, next, before, &sources.items[i]);
+    pthread_mutex_lock(&all->lock);
+    catalog_snapshot *old = all->present;
+    keep_variants(next, old);               /* of the present: some may have come since before was taken */
+    atomic_fetch_add(&next->references, 1); /* ours, for what is said of it */
+    all->present = next;
+    pthread_mutex_unlock(&all->lock);
+    say_dropped(next, old, all->problems);
+    catalog_release(old);
+done:
+    if (status != LAM_OK) fprintf(all->problems, "%s\n", error.message);
+    catalog_release(next);
+    catalog_release(before);
+    free_sources(&sources);
+    /* What the old stores held goes back to the system: a daemon of months may not keep the most it ever had.
+     */
+    (void)malloc_trim(0);
+    fflush(all->out);
+    fflush(all->problems);
+    pthread_mutex_lock(&all->lock);
+    share_memory(all, all->present);
+    size_t served = all->present->n_scenes;
+    pthread_mutex_unlock(&all->lock);
+    return served;
+}

@@ -1,0 +1,20 @@
+#include "server/scene/gradient.h"
+
+void gradient_of_reflectance(lam_quantity quantity, size_t count, const float *g, const float *w,
+                             const float *H, const float *H0, float *out) {
+    for (size_t i = 0; i < count; i++) {
+        double sum = (double)w[i] * (double)H[i];
+        if (quantity == LAM_INDIRECT)
+            sum += (double)g[i] * ((double)H[i] - (H0 != NULL ? (double)H0[i] : 0.0));
+        out[i] = (float)sum;
+    }
+}
+
+void gradient_of_sky_irradiance(lam_quantity quantity, size_t count, const float *reflectance, const float *g,
+                                const float *w, float *out) {
+    for (size_t i = 0; i < count; i++) {
+        double sum = (double)reflectance[i] * (double)w[i];
+        if (quantity == LAM_IRRADIANCE) sum += (double)g[i];
+        out[i] = (float)sum;
+    }
+}

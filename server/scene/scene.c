@@ -1,0 +1,232 @@
+#include "server/scene/scene.h"
+
+#include "server/queue/batch.h"
+#include "server/scene/scene_description.h"
+#include "server/scene/scene_health.h"
+#include "solver/operator/operator.h"
+#include "solver/operator/sky_light.h"
+#include "store/store.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* What a scene may keep of adjoint rows. */
+#define ADJOINT_ROWS_BYTES ((size_t)256 << 20)
+
+/* The total error that an answer carries: the scene's own lights, else single elements, else none. */
+static void read_error(store *s, scene *made) {
+    static const char *const groups[] = {"/error/lights", "/error/single"};
+    for (size_t i = 0; i < 2 && !made->has_error; i++)
+        made->has_error =
+            store_has(s, groups[i]) && store_has_attribute(s, groups[i], "total_relative_mean") &&
+            store_has_attribute(s, groups[i], "total_indirect_mean") &&
+            store_get_number(s, groups[i], "total_relative_mean", &made->relative_mean, NULL) == LAM_OK &&
+            store_get_number(s, groups[i], "total_indirect_mean", &made->indirect_mean, NULL) == LAM_OK &&
+            isfinite(made->relative_mean) && isfinite(made->indirect_mean);
+}
+
+static lam_status read_groups(store *s, scene *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    void *group = NULL;
+    char **names = NULL;
+    size_t n_groups = 0;
+    lam_error cause;
+    TRY(store_read(s, "/mesh/group", STORE_U32, 1, (size_t[]){made->n}, &group, error));
+    TRY(store_read_texts(s, "/mesh/group_names", &n_groups, &names, error));
+    status = group_index_make(made->n, group, n_groups, names, &made->groups, &cause);
+    if (status != LAM_OK) FAIL(error, status, "%s: %s", made->path, cause.message);
+done:
+    free(group);
+    return status;
+}
+
+static lam_status read_area(store *s, scene *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    void *area = NULL;
+    TRY(store_read(s, "/mesh/area", STORE_F64, 1, (size_t[]){made->n}, &area, error));
+    made->area = area;
+    for (size_t i = 0; i < made->n; i++)
+        if (!(made->area[i] >= 0 && isfinite(made->area[i])))
+            FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/area[%zu] = %g, must be at least 0", made->path, i,
+                 made->area[i]);
+done:
+    return status;
+}
+
+/* The work area that a thread keeps for the passes it makes; vectors and answers are their requests'. */
+static size_t work_of(const scene *s) {
+    return lam_operator_work_bytes(s->op, BATCH_PASS);
+}
+
+uint64_t scene_work_memory(size_t n_threads, size_t work_bytes) {
+    return (uint64_t)n_threads * work_bytes;
+}
+
+/* How many times its bytes in the store an operator takes. A sparse one is kept by columns too; of a
+ * hierarchical one both triangles are kept twice, in rows and in slices, with numbers and indices of four
+ * bytes where the store has two. */
+static uint64_t expansion(const char *kind) {
+    return strcmp(kind, "sparse") == 0 ? 2 : strcmp(kind, "hierarchical") == 0 ? 8 : 1;
+}
+
+/* What a store counts for, found before anything large of it is read: the bytes of its operator, as it is
+ * kept, and its sky, mapped or read. */
+static lam_status memory_of(store *s, uint64_t *memory, uint64_t *operator_bytes, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *kind = NULL;
+    uint64_t sky = 0;
+    TRY(store_group_bytes(s, "/operator", operator_bytes, error));
+    if (store_has(s, "/sky")) TRY(store_group_bytes(s, "/sky", &sky, error));
+    TRY(store_get_text(s, "/operator", "kind", &kind, error));
+    *memory = *operator_bytes * expansion(kind) + sky;
+done:
+    free(kind);
+    return status;
+}
+
+/* A thread is woken for its part of a pass in about the time that it takes to go through so much; with less
+ * to do it only holds up the others. */
+#define LEAST_OF_THREAD ((size_t)8 << 20)
+
+static size_t threads_of(const lam_operator *op, size_t most) {
+    const size_t worth = lam_operator_bytes(op) / LEAST_OF_THREAD;
+    return worth < 1 ? 1 : worth < most ? worth : most;
+}
+
+static lam_status read_store(store *s, const scene_wish *wish, scene *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (!store_has(s, "/operator"))
+        FAIL(error, LAM_ERR_FORMAT, "%s: holds no operator; precompute it again", wish->path);
+    TRY(memory_of(s, &made->memory, &made->bytes, error));
+    if (made->memory > wish->memory)
+        FAIL(error, LAM_ERR_MEMORY, "%s: takes %llu bytes, of --max-memory %llu are left", wish->path,
+             (unsigned long long)made->memory, (unsigned long long)wish->memory);
+    TRY(store_verify_group(s, wish->verify ? "/" : "/mesh", error));
+    TRY(store_map_file(s, error));
+    TRY(operator_load(s, &made->op, error));
+    made->n = lam_operator_elements(made->op);
+    made->n_channels = lam_operator_channels(made->op);
+    made->reflectance = made->op->reflectance;
+    lam_operator_set_threads(made->op, threads_of(made->op, wish->threads));
+    TRY(sky_load(s, made->n, &made->sky, error));
+    made->n_emitters = lam_operator_emitters(made->op);
+    made->work_bytes = work_of(made);
+    TRY(read_groups(s, made, error));
+    TRY(read_area(s, made, error));
+    made->ledger = wish->ledger;
+    TRY(adjoint_rows_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
+    TRY(refined_create(s, made->op, wish->stores, made->ledger, &made->refined, error));
+    read_error(s, made);
+    TRY(scene_describe(s, made, &made->description, error));
+    if (store_map_bytes(store_map_of(s)) > 0) made->map = store_map_hold(store_map_of(s));
+    TRY(scene_health_create(made->path, made->map, wish->verify, &made->health, error));
+done:
+    return status;
+}
+
+/* Whether the store is what the scene so far was made of, and nothing speaks against that one. */
+static bool is_unchanged(const scene_wish *wish, const store *s) {
+    return wish->before != NULL && store_identity_same(&wish->before->identity, store_identity_of(s)) &&
+           !scene_damaged(wish->before, NULL, NULL);
+}
+
+lam_status scene_open(const scene_wish *wish, scene **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const char *path = wish->path;
+    store *s = NULL;
+    scene *made = memory_allocate(1, sizeof *made, path, error);
+    if (made == NULL) return LAM_ERR_MEMORY;
+    atomic_init(&made->references, 1);
+    made->path = strdup(path);
+    if (made->path == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", path);
+    TRY(store_open(path, &s, error));
+    made->identity = *store_identity_of(s);
+    if (is_unchanged(wish, s)) {
+        if (wish->verify) TRY(store_verify(s, error));
+        *out = scene_acquire(wish->before);
+        goto done;
+    }
+    made->renamed = wish->name != NULL;
+    if (wish->name != NULL)
+        made->name = strdup(wish->name);
+    else
+        TRY(store_get_text(s, "/", "name", &made->name, error));
+    if (made->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", path);
+    if (made->name[0] == '\0')
+        FAIL(error, LAM_ERR_FORMAT, "%s: the store's name is empty; give it one: %s:NAME", path, path);
+    TRY(read_store(s, wish, made, error));
+    *out = made;
+    made = NULL;
+done:
+    store_close(s);
+    if (made != NULL) scene_release(made);
+    return status;
+}
+
+lam_status scene_open_variant(scene *base, const char *name, const char *groups, lam_operator *op,
+                              scene **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    operator_description of_op;
+    scene *made = memory_allocate(1, sizeof *made, name, error);
+    if (made == NULL) {
+        lam_operator_close(op);
+        return LAM_ERR_MEMORY;
+    }
+    operator_describe(op, &of_op);
+    atomic_init(&made->references, 1);
+    made->base = scene_acquire(base);
+    made->path = base->path;
+    made->n = base->n;
+    made->n_channels = base->n_channels;
+    made->op = op;
+    made->reflectance = op->reflectance;
+    made->groups = base->groups;
+    made->area = base->area;
+    made->sky = base->sky;
+    made->map = base->map;
+    made->health = base->health;
+    made->work_bytes = base->work_bytes;
+    made->bytes = (uint64_t)base->n_channels * of_op.rank * of_op.rank * sizeof(float);
+    made->name = strdup(name);
+    if (made->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", name);
+    made->memory = made->bytes;
+    made->ledger = base->ledger;
+    TRY(adjoint_rows_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
+    TRY(refined_create_variant(base->refined, op, &made->refined, error));
+    TRY(scene_describe_variant(made, groups, &made->description, error));
+    *out = made;
+    made = NULL;
+done:
+    if (made != NULL) scene_release(made);
+    return status;
+}
+
+uint64_t scene_grown(const scene *s) {
+    return (uint64_t)refined_held(s->refined) + adjoint_rows_held(s->rows);
+}
+
+scene *scene_acquire(scene *s) {
+    atomic_fetch_add(&s->references, 1);
+    return s;
+}
+
+void scene_release(scene *s) {
+    if (atomic_fetch_sub(&s->references, 1) != 1) return;
+    refined_destroy(s->refined);
+    lam_operator_close(s->op);
+    adjoint_rows_destroy(s->rows);
+    if (s->base == NULL) {
+        lam_sky_close(s->sky);
+        group_index_free(&s->groups);
+        free(s->area);
+        scene_health_free(s->health);
+        store_map_release(s->map);
+        free(s->path);
+    } else {
+        scene_release(s->base);
+    }
+    free(s->description);
+    free(s->name);
+    free(s);
+}

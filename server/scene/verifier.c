@@ -1,0 +1,110 @@
+#include "server/scene/verifier.h"
+
+#include "server/scene/map_guard.h"
+
+#include <pthread.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+/* Requests go first: a tenth of a core is left while they want all of it. */
+#define NICENESS 10
+
+struct verifier {
+    FILE *out, *problems;
+    pthread_t thread;
+    pthread_mutex_t lock;
+    pthread_cond_t changed;
+    scene *first, **end; /* waiting, each held */
+    atomic_int stopped;
+};
+
+void verifier_tell(FILE *problems, const scene *s, const lam_error *why) {
+    fprintf(problems, "took %s out of service: %s\n", s->name, why->message);
+    fflush(problems);
+}
+
+static void verify(verifier *v, scene *s) {
+    lam_error error;
+    bool news;
+    /* Nobody else holds it: it was replaced while it waited. */
+    if (atomic_load(&s->references) == 1) return;
+    const lam_status status = scene_verify(s, &v->stopped, &error);
+    if (scene_damaged(s, &error, &news)) {
+        if (news) verifier_tell(v->problems, s, &error);
+    } else if (status == LAM_OK) {
+        fprintf(v->out, "verified %s: %zu bytes\n", s->name, store_map_bytes(s->map));
+        fflush(v->out);
+    }
+}
+
+static void *run(void *argument) {
+    verifier *v = argument;
+    (void)setpriority(PRIO_PROCESS, (id_t)gettid(), NICENESS);
+    map_guard_allow();
+    pthread_mutex_lock(&v->lock);
+    for (;;) {
+        while (v->first == NULL && atomic_load(&v->stopped) == 0) pthread_cond_wait(&v->changed, &v->lock);
+        if (atomic_load(&v->stopped) != 0) break;
+        scene *s = v->first;
+        v->first = s->next_to_verify;
+        if (v->first == NULL) v->end = &v->first;
+        pthread_mutex_unlock(&v->lock);
+        verify(v, s);
+        scene_release(s);
+        pthread_mutex_lock(&v->lock);
+    }
+    pthread_mutex_unlock(&v->lock);
+    return NULL;
+}
+
+lam_status verifier_start(FILE *out, FILE *problems, verifier **made, lam_error *error) {
+    lam_status status = LAM_OK;
+    sigset_t all, before;
+    verifier *v = memory_allocate(1, sizeof *v, "threads", error);
+    if (v == NULL) return LAM_ERR_MEMORY;
+    v->out = out;
+    v->problems = problems;
+    v->end = &v->first;
+    atomic_init(&v->stopped, 0);
+    pthread_mutex_init(&v->lock, NULL);
+    pthread_cond_init(&v->changed, NULL);
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    const int failed = pthread_create(&v->thread, NULL, run, v);
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    if (failed != 0) FAIL(error, LAM_ERR_MEMORY, "cannot start a thread that verifies stores");
+    *made = v;
+    v = NULL;
+done:
+    free(v);
+    return status;
+}
+
+void verifier_add(verifier *v, scene *s) {
+    if (scene_verified(s)) return;
+    s->next_to_verify = NULL;
+    pthread_mutex_lock(&v->lock);
+    *v->end = scene_acquire(s);
+    v->end = &s->next_to_verify;
+    pthread_cond_signal(&v->changed);
+    pthread_mutex_unlock(&v->lock);
+}
+
+void verifier_stop(verifier *v) {
+    if (v == NULL) return;
+    pthread_mutex_lock(&v->lock);
+    atomic_store(&v->stopped, 1);
+    pthread_cond_signal(&v->changed);
+    pthread_mutex_unlock(&v->lock);
+    pthread_join(v->thread, NULL);
+    while (v->first != NULL) {
+        scene *s = v->first;
+        v->first = s->next_to_verify;
+        scene_release(s);
+    }
+    pthread_cond_destroy(&v->changed);
+    pthread_mutex_destroy(&v->lock);
+    free(v);
+}

@@ -1,0 +1,156 @@
+#include "solver/codec/answer.h"
+
+#include "solver/base/half.h"
+#include "solver/codec/json_writer.h"
+#include "solver/codec/npy.h"
+#include "solver/codec/request.h"
+
+#include <float.h>
+#include <math.h>
+
+static bool no_memory(problem *why) {
+    return problem_set(why, 503,
+                       "not enough memory for the answer; ask for fewer vectors or select elements");
+}
+
+bool answer_head(buffer *b, size_t n, size_t n_channels, const answer_notes *notes) {
+    return buffer_append_text(b, "{\"scene\":") && json_write_text(b, notes->scene) &&
+           buffer_printf(b, ",\"elements\":%zu,\"channels\":%zu,\"quantity\":\"%s\"", n, n_channels,
+                         codec_quantity_name(notes->quantity));
+}
+
+bool answer_tail(buffer *b, const answer_notes *notes) {
+    return (!notes->has_error || notes->certificates != NULL ||
+            (buffer_append_text(b, ",\"error\":{\"relative_mean\":") &&
+             json_write_double(b, notes->relative_mean) && buffer_append_text(b, ",\"indirect_mean\":") &&
+             json_write_double(b, notes->indirect_mean) && buffer_append(b, "}", 1))) &&
+           buffer_printf(b, ",\"time_ms\":{\"parse\":%.3f,\"solve\":%.3f,\"encode\":%.3f}}\n",
+                         notes->parse_ms, notes->solve_ms, notes->encode_ms);
+}
+
+bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
+                  problem *why) {
+    if (as->type == MEDIA_NPY) {
+        size_t dims[3], rank = 0;
+        if (shape->batch) dims[rank++] = shape->n_rhs;
+        if (shape->n_channels > 1) dims[rank++] = shape->n_channels;
+        dims[rank++] = shape->n_values;
+        return npy_write_header(b, as->npy, rank, dims) || no_memory(why);
+    }
+    return (answer_head(b, shape->n, shape->n_channels, notes) &&
+            buffer_printf(b, ",\"%s\":%s", codec_quantity_name(notes->quantity), shape->batch ? "[" : "")) ||
+           no_memory(why);
+}
+
+/* Refuses what would be written as something else than it is. */
+static bool refuse_range(double limit, problem *why) {
+    if (limit < (double)FLT_MAX)
+        return problem_set(why, 422, "the answer passes the range of half precision (%g); ask for dtype=f4",
+                           limit);
+    return problem_set(why, 422,
+                       "the answer passes the range of single precision (3.4e38); scale the emission");
+}
+
+static bool check_range(const float *x, size_t count, float limit, problem *why) {
+    int bad = 0;
+    for (size_t i = 0; i < count; i++) bad |= !(fabsf(x[i]) <= limit);
+    return !bad || refuse_range((double)limit, why);
+}
+
+static bool add_row(buffer *b, const media_accept *as, const float *row, size_t n) {
+    if (as->type == MEDIA_NPY) return npy_write_values(b, as->npy, row, n);
+    return json_write_floats(b, row, n);
+}
+
+bool answer_rows(buffer *b, const media_accept *as, size_t n_channels, size_t n, const float *x,
+                 problem *why) {
+    const bool json = as->type == MEDIA_JSON, deep = json && n_channels > 1;
+    if (!check_range(x, n_channels * n, !json && as->npy == NPY_F2 ? HALF_MAX : FLT_MAX, why)) return false;
+    bool written = !deep || buffer_append(b, "[", 1);
+    for (size_t c = 0; written && c < n_channels; c++)
+        written = (!json || c == 0 || buffer_append(b, ",", 1)) && add_row(b, as, x + c * n, n);
+    return (written && (!deep || buffer_append(b, "]", 1))) || no_memory(why);
+}
+
+bool answer_add(buffer *b, const answer_shape *shape, const media_accept *as, size_t first, size_t count,
+                const float *x, problem *why) {
+    const size_t C = shape->n_channels, n = shape->n_values;
+    for (size_t r = 0; r < count; r++) {
+        if (as->type == MEDIA_JSON && first + r > 0 && !buffer_append(b, ",", 1)) return no_memory(why);
+        if (!answer_rows(b, as, C, n, x + r * C * n, why)) return false;
+    }
+    return true;
+}
+
+static size_t count_values(const answer_shape *shape) {
+    size_t count;
+    return size_multiply(shape->n_rhs, shape->n_channels, &count) &&
+                   size_multiply(count, shape->n_values, &count)
+               ? count
+               : SIZE_MAX;
+}
+
+float *answer_place(buffer *b, const answer_shape *shape, const media_accept *as) {
+    size_t bytes;
+    if (as->type != MEDIA_NPY || as->npy != NPY_F4 ||
+        !size_multiply(count_values(shape), sizeof(float), &bytes) || !buffer_reserve(b, bytes))
+        return NULL;
+    return (float *)(void *)(b->bytes + b->length);
+}
+
+bool answer_placed(buffer *b, const answer_shape *shape, problem *why) {
+    const size_t count = count_values(shape);
+    if (!check_range((const float *)(const void *)(b->bytes + b->length), count, FLT_MAX, why)) return false;
+    b->length += count * sizeof(float);
+    b->bytes[b->length] = '\0';
+    return true;
+}
+
+/* Behind the channels of a vector before, what stands between; each vector in brackets where there are
+ * several. */
+static bool before_row(buffer *b, const answer_shape *shape, size_t vector, size_t c) {
+    if (c > 0) return buffer_append(b, ",", 1);
+    return (vector == 0 || buffer_append(b, ",", 1)) && (shape->n_channels == 1 || buffer_append(b, "[", 1));
+}
+
+static bool behind_row(buffer *b, const answer_shape *shape, size_t c) {
+    return shape->n_channels == 1 || c + 1 < shape->n_channels || buffer_append(b, "]", 1);
+}
+
+bool answer_add_doubles(buffer *b, const answer_shape *shape, const media_accept *as, size_t first,
+                        size_t count, const double *x, double *rounding, problem *why) {
+    const size_t C = shape->n_channels, n = shape->n_values;
+    const bool json = as->type == MEDIA_JSON;
+    const double limit = json || as->npy == NPY_F8 ? DBL_MAX
+                         : as->npy == NPY_F4       ? (double)FLT_MAX
+                                                   : (double)HALF_MAX;
+    for (size_t i = 0; i < count * C * n; i++)
+        if (!(fabs(x[i]) <= limit)) return refuse_range(limit, why);
+    for (size_t row = 0; row < count * C; row++) {
+        const double *values = x + row * n;
+        const bool written = json ? before_row(b, shape, first + row / C, row % C) &&
+                                        json_write_doubles(b, values, n) && behind_row(b, shape, row % C)
+                                  : npy_write_doubles(b, as->npy, values, n, rounding);
+        if (!written) return no_memory(why);
+    }
+    return true;
+}
+
+bool answer_certificates(buffer *b, size_t n_rhs, bool batch, const answer_notes *notes) {
+    if (notes->certificates == NULL) return true;
+    bool written = buffer_append_text(b, ",\"certificate\":") &&
+                   (batch ? json_write_doubles(b, notes->certificates, n_rhs)
+                          : json_write_double(b, notes->certificates[0])) &&
+                   buffer_append_text(b, batch ? ",\"iterations\":[" : ",\"iterations\":");
+    for (size_t v = 0; written && v < n_rhs; v++)
+        written = buffer_printf(b, v > 0 ? ",%zu" : "%zu", notes->iterations[v]);
+    return written && (!batch || buffer_append(b, "]", 1));
+}
+
+bool answer_end(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
+                problem *why) {
+    if (as->type == MEDIA_NPY) return true;
+    return ((!shape->batch || buffer_append(b, "]", 1)) &&
+            answer_certificates(b, shape->n_rhs, shape->batch, notes) && answer_tail(b, notes)) ||
+           no_memory(why);
+}

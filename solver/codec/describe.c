@@ -1,0 +1,209 @@
+#include "solver/codec/describe.h"
+
+#include "store/status.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+json_t *describe_number(double x) {
+    if (!isfinite(x)) return json_null();
+    return fabs(x) < 0x1p53 && x == floor(x) ? json_integer((json_int_t)x) : json_real(x);
+}
+
+static void add_attribute(void *context, const char *name, const char *text, double number) {
+    json_t *object = context;
+    json_object_set_new(object, name, text != NULL ? json_string(text) : describe_number(number));
+}
+
+/* All attributes of a group as one object. */
+static lam_status attributes_of(store *s, const char *group, json_t **out, lam_error *error) {
+    json_t *object = json_object();
+    lam_status status = store_each_attribute(s, group, add_attribute, object, error);
+    if (status == LAM_OK)
+        *out = object;
+    else
+        json_decref(object);
+    return status;
+}
+
+/* Copies a member of one object to another, null where it is missing. */
+static void copy_member(json_t *to, const char *name, const json_t *from, const char *from_name) {
+    json_t *value = json_object_get(from, from_name);
+    json_object_set_new(to, name, value != NULL ? json_incref(value) : json_null());
+}
+
+static lam_status add_groups(store *s, size_t n, json_t *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    void *data = NULL;
+    char **names = NULL;
+    size_t *counts = NULL, n_groups = 0;
+    json_t *groups = NULL;
+    TRY(store_read(s, "/mesh/group", STORE_U32, 1, (size_t[]){n}, &data, error));
+    TRY(store_read_texts(s, "/mesh/group_names", &n_groups, &names, error));
+    counts = memory_allocate(n_groups, sizeof *counts, "group sizes", error);
+    if (counts == NULL) TRY(LAM_ERR_MEMORY);
+    const uint32_t *group = data;
+    for (size_t i = 0; i < n; i++) {
+        if (group[i] >= n_groups)
+            FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/group[%zu] = %u, must be below %zu", store_path(s), i,
+                 group[i], n_groups);
+        counts[group[i]]++;
+    }
+    groups = json_array();
+    for (size_t g = 0; g < n_groups; g++)
+        if (json_array_append_new(
+                groups, json_pack("{s:s, s:I}", "name", names[g], "elements", (json_int_t)counts[g])) != 0)
+            FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/group_names[%zu] is not UTF-8", store_path(s), g);
+    json_object_set(out, "groups", groups);
+done:
+    json_decref(groups);
+    free(counts);
+    free(names);
+    free(data);
+    return status;
+}
+
+/* rank or density: low-rank kinds have the one, the others the other. */
+static void add_size_figure(json_t *out, const json_t *operator_attributes, const char *kind) {
+    if (json_object_get(operator_attributes, "rank") != NULL)
+        copy_member(out, "rank", operator_attributes, "rank");
+    else if (json_object_get(operator_attributes, "density") != NULL)
+        copy_member(out, "density", operator_attributes, "density");
+    else if (strcmp(kind, "exact") == 0)
+        json_object_set_new(out, "density", json_integer(1));
+}
+
+static lam_status add_error(store *s, json_t *out, lam_error *error) {
+    static const char *const groups[] = {"single", "lights", "random"};
+    lam_status status = LAM_OK;
+    json_t *figures = NULL;
+    if (!store_has(s, "/error")) {
+        json_object_set_new(out, "error", json_object());
+        return LAM_OK;
+    }
+    TRY(attributes_of(s, "/error", &figures, error));
+    for (size_t i = 0; i < sizeof groups / sizeof groups[0]; i++) {
+        char path[32];
+        json_t *group = NULL;
+        snprintf(path, sizeof path, "/error/%s", groups[i]);
+        if (!store_has(s, path)) continue;
+        TRY(attributes_of(s, path, &group, error));
+        json_object_set_new(figures, groups[i], group);
+    }
+    json_object_set(out, "error", figures);
+done:
+    json_decref(figures);
+    return status;
+}
+
+static lam_status add_provenance(store *s, const json_t *root, json_t *out, lam_error *error) {
+    static const char *const members[] = {"tool", "command", "created", "seed", "unit"};
+    lam_status status = LAM_OK;
+    json_t *mesh = NULL, *form_factors = NULL, *provenance = json_object();
+    for (size_t i = 0; i < sizeof members / sizeof members[0]; i++)
+        copy_member(provenance, members[i], root, members[i]);
+    TRY(attributes_of(s, "/mesh", &mesh, error));
+    copy_member(provenance, "geometry_hash", mesh, "geometry_hash");
+    if (store_has(s, "/form_factors")) {
+        TRY(attributes_of(s, "/form_factors", &form_factors, error));
+        json_object_set(provenance, "form_factors", form_factors);
+    }
+    json_object_set(out, "provenance", provenance);
+done:
+    json_decref(form_factors);
+    json_decref(mesh);
+    json_decref(provenance);
+    return status;
+}
+
+/* Their names; null of another kind. */
+static lam_status add_emitters(store *s, const char *kind, json_t *out, lam_error *error) {
+    char **names = NULL;
+    size_t count = 0;
+    json_t *list = NULL;
+    lam_status status = LAM_OK;
+    if (strcmp(kind, "emitters") == 0) {
+        TRY(store_read_texts(s, "/operator/names", &count, &names, error));
+        list = json_array();
+        for (size_t k = 0; k < count; k++)
+            if (json_array_append_new(list, json_string(names[k])) != 0)
+                FAIL(error, LAM_ERR_FORMAT, "%s: /operator/names[%zu] is not UTF-8", store_path(s), k);
+    }
+    json_object_set(out, "emitters", list != NULL ? list : json_null());
+done:
+    json_decref(list);
+    free(names);
+    return status;
+}
+
+/* null where there is none. */
+static lam_status add_sky(store *s, json_t *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    json_t *attributes = NULL, *sky = NULL;
+    size_t dims[STORE_MAX_RANK];
+    store_type type;
+    int rank;
+    if (!store_has(s, "/sky")) {
+        json_object_set_new(out, "sky", json_null());
+        return LAM_OK;
+    }
+    TRY(attributes_of(s, "/sky", &attributes, error));
+    TRY(store_array_info(s, "/sky/first_bounce", &type, &rank, dims, error));
+    if (rank != 2)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /sky/first_bounce has %d dimensions, must have 2", store_path(s),
+             rank);
+    sky = json_object();
+    copy_member(sky, "tiling", attributes, "tiling");
+    json_object_set_new(sky, "tiles", json_integer((json_int_t)dims[0]));
+    copy_member(sky, "ground_albedo", attributes, "ground_albedo");
+    json_object_set(out, "sky", sky);
+done:
+    json_decref(attributes);
+    json_decref(sky);
+    return status;
+}
+
+lam_status describe_store(store *s, json_t **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    json_t *root = NULL, *operator_attributes = NULL, *made = json_object();
+    size_t dims[STORE_MAX_RANK];
+    store_type type;
+    int rank;
+    uint64_t bytes = 0;
+    TRY(attributes_of(s, "/", &root, error));
+    TRY(attributes_of(s, "/operator", &operator_attributes, error));
+    TRY(store_array_info(s, "/mesh/reflectance", &type, &rank, dims, error));
+    if (rank != 2)
+        FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/reflectance has %d dimensions, must have 2", store_path(s),
+             rank);
+    TRY(store_group_bytes(s, "/operator", &bytes, error));
+    copy_member(made, "name", root, "name");
+    json_object_set_new(made, "elements", json_integer((json_int_t)dims[1]));
+    json_object_set_new(made, "channels", json_integer((json_int_t)dims[0]));
+    const json_t *kind = json_object_get(operator_attributes, "kind");
+    if (!json_is_string(kind))
+        FAIL(error, LAM_ERR_FORMAT, "%s: /operator has no attribute \"kind\"", store_path(s));
+    copy_member(made, "kind", operator_attributes, "kind");
+    copy_member(made, "method", operator_attributes, "method");
+    copy_member(made, "reason", operator_attributes, "reason");
+    copy_member(made, "epsilon", operator_attributes, "epsilon");
+    add_size_figure(made, operator_attributes, json_string_value(kind));
+    /* Only kinds that have a choice say it. */
+    const json_t *precision = json_object_get(operator_attributes, "precision");
+    json_object_set_new(made, "precision",
+                        precision != NULL ? json_deep_copy(precision) : json_string("f32"));
+    json_object_set_new(made, "bytes", json_integer((json_int_t)bytes));
+    TRY(add_groups(s, dims[1], made, error));
+    TRY(add_emitters(s, json_string_value(kind), made, error));
+    TRY(add_sky(s, made, error));
+    TRY(add_error(s, made, error));
+    TRY(add_provenance(s, root, made, error));
+    *out = json_incref(made);
+done:
+    json_decref(made);
+    json_decref(root);
+    json_decref(operator_attributes);
+    return status;
+}

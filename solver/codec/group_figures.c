@@ -1,0 +1,184 @@
+#include "solver/codec/group_figures.h"
+
+#include "solver/codec/json_writer.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void reduce_request_free(reduce_request *r) {
+    buffer_free(&r->texts);
+    free(r->names);
+    *r = (reduce_request){0};
+}
+
+const char *reduce_statistic_name(reduce_statistic statistic) {
+    static const char *const names[REDUCE_COUNT] = {"mean", "sum", "min", "max", "uniformity", "variance"};
+    return names[statistic];
+}
+
+static const char *text_of(const reduce_request *r, size_t k) {
+    return r->texts.bytes + r->names[k].text;
+}
+
+bool reduce_request_add(reduce_request *r, const char *name, size_t length, const uint32_t *groups,
+                        size_t n_groups, problem *why) {
+    for (size_t k = 0; k < r->n_names; k++)
+        if (strlen(text_of(r, k)) == length && memcmp(text_of(r, k), name, length) == 0)
+            return problem_set(why, 422, "the group %.80s is given twice", text_of(r, k));
+    if (r->n_names == REDUCE_NAMES_MAX)
+        return problem_set(why, 422, "more than %d groups; send several requests", REDUCE_NAMES_MAX);
+    if ((r->n_names & (r->n_names - 1)) == 0) { /* a power of two is full */
+        size_t capacity = r->n_names == 0 ? 1 : 2 * r->n_names;
+        reduce_name *names = realloc(r->names, capacity * sizeof *names);
+        if (names == NULL) return problem_set(why, 503, "not enough memory for the groups of reduce");
+        r->names = names;
+    }
+    const size_t text = r->texts.length;
+    if (!buffer_append(&r->texts, name, length) || !buffer_append(&r->texts, "", 1))
+        return problem_set(why, 503, "not enough memory for the groups of reduce");
+    r->names[r->n_names++] = (reduce_name){.text = text, .groups = groups, .n_groups = n_groups};
+    return true;
+}
+
+/* --- elements ------------------------------------------------------------------------------------------ */
+
+/* begin[g]: where the elements of group g stand among those of all names; UINT32_MAX: they do not. */
+static uint32_t *places_of_groups(const reduce_request *r, const group_index *groups, size_t *count) {
+    uint32_t *begin = memory_allocate(groups->n_groups, sizeof *begin, "reduce", NULL);
+    if (begin == NULL) return NULL;
+    memset(begin, 0xff, groups->n_groups * sizeof *begin);
+    *count = 0;
+    for (size_t k = 0; k < r->n_names; k++)
+        for (size_t m = 0; m < r->names[k].n_groups; m++) {
+            const uint32_t g = r->names[k].groups[m];
+            if (begin[g] != UINT32_MAX) continue;
+            begin[g] = (uint32_t)*count;
+            *count += groups->start[g + 1] - groups->start[g];
+        }
+    return begin;
+}
+
+bool reduce_elements(const reduce_request *r, const group_index *groups, uint32_t **elements, size_t *count) {
+    uint32_t *begin = places_of_groups(r, groups, count);
+    uint32_t *all = begin != NULL ? memory_allocate(*count, sizeof *all, "reduce", NULL) : NULL;
+    if (all != NULL)
+        for (size_t g = 0; g < groups->n_groups; g++)
+            if (begin[g] != UINT32_MAX)
+                memcpy(all + begin[g], groups->elements + groups->start[g],
+                       (groups->start[g + 1] - groups->start[g]) * sizeof *all);
+    free(begin);
+    *elements = all;
+    return all != NULL;
+}
+
+/* --- figures ------------------------------------------------------------------------------------------- */
+
+double *reduce_figures(const reduce_request *r, size_t n_rhs, size_t n_channels) {
+    size_t count;
+    if (!size_multiply(r->n_names * r->n_with, n_channels, &count) || !size_multiply(count, n_rhs, &count))
+        return NULL;
+    return memory_allocate(count, sizeof(double), "reduce", NULL);
+}
+
+/* The figure of name k, statistic s, vector v and channel c. */
+static double *figure_at(const reduce_request *r, size_t k, size_t s, size_t n_rhs, size_t v,
+                         size_t n_channels, size_t c, double *figures) {
+    return figures + (((k * r->n_with + s) * n_rhs + v) * n_channels + c);
+}
+
+static double value_at(reduce_values x, size_t i) {
+    return x.doubles != NULL ? x.doubles[i] : (double)x.floats[i];
+}
+
+/* Every statistic of the elements of one name; x is in the order of reduce_elements, from x_begin on. */
+static void figures_of_name(const reduce_name *name, const group_index *groups, const uint32_t *begin,
+                            const double *area, reduce_values x, size_t x_begin, double out[REDUCE_COUNT]) {
+    double total = 0, sum = 0, squares = 0, low = INFINITY, high = -INFINITY;
+    for (size_t m = 0; m < name->n_groups; m++) {
+        const uint32_t g = name->groups[m], *elements = groups->elements + groups->start[g];
+        for (size_t e = 0; e < groups->start[g + 1] - groups->start[g]; e++) {
+            const double value = value_at(x, x_begin + begin[g] + e);
+            total += area[elements[e]];
+            sum += area[elements[e]] * value;
+            low = fmin(low, value);
+            high = fmax(high, value);
+        }
+    }
+    const double mean = sum / total;
+    for (size_t m = 0; m < name->n_groups; m++) {
+        const uint32_t g = name->groups[m], *elements = groups->elements + groups->start[g];
+        for (size_t e = 0; e < groups->start[g + 1] - groups->start[g]; e++) {
+            const double off = value_at(x, x_begin + begin[g] + e) - mean;
+            squares += area[elements[e]] * off * off;
+        }
+    }
+    const bool any = total > 0;
+    out[REDUCE_MEAN] = any ? mean : NAN;
+    out[REDUCE_SUM] = any ? sum : NAN;
+    out[REDUCE_MIN] = any ? low : NAN;
+    out[REDUCE_MAX] = any ? high : NAN;
+    out[REDUCE_UNIFORMITY] = any && mean != 0 ? low / mean : NAN;
+    out[REDUCE_VARIANCE] = any ? squares / total : NAN;
+}
+
+bool reduce_vectors(const reduce_request *r, const group_index *groups, const double *area, size_t n_channels,
+                    size_t n_rhs, size_t first, size_t count, reduce_values x, double *figures) {
+    size_t n_values;
+    uint32_t *begin = places_of_groups(r, groups, &n_values);
+    if (begin == NULL) return false;
+    for (size_t v = 0; v < count; v++)
+        for (size_t c = 0; c < n_channels; c++)
+            for (size_t k = 0; k < r->n_names; k++) {
+                double of_name[REDUCE_COUNT];
+                figures_of_name(&r->names[k], groups, begin, area, x, (v * n_channels + c) * n_values,
+                                of_name);
+                for (size_t s = 0; s < r->n_with; s++)
+                    *figure_at(r, k, s, n_rhs, first + v, n_channels, c, figures) = of_name[r->with[s]];
+            }
+    free(begin);
+    return true;
+}
+
+void reduce_means(const reduce_request *r, size_t k, size_t n_channels, size_t n_rhs, double area,
+                  const double *means, double *figures) {
+    for (size_t s = 0; s < r->n_with; s++)
+        for (size_t v = 0; v < n_rhs; v++)
+            for (size_t c = 0; c < n_channels; c++) {
+                const double mean = means[v * n_channels + c];
+                *figure_at(r, k, s, n_rhs, v, n_channels, c, figures) =
+                    area > 0 ? r->with[s] == REDUCE_SUM ? area * mean : mean : NAN;
+            }
+}
+
+/* --- the answer ---------------------------------------------------------------------------------------- */
+
+static bool write_one(buffer *b, double value) {
+    return isnan(value) ? buffer_append(b, "null", 4) : json_write_double(b, value);
+}
+
+static bool write_channels(buffer *b, const double *values, size_t n_channels) {
+    if (n_channels == 1) return write_one(b, values[0]);
+    bool written = buffer_append(b, "[", 1);
+    for (size_t c = 0; written && c < n_channels; c++)
+        written = (c == 0 || buffer_append(b, ",", 1)) && write_one(b, values[c]);
+    return written && buffer_append(b, "]", 1);
+}
+
+bool reduce_write(const reduce_request *r, size_t n_channels, size_t n_rhs, bool batch, const double *figures,
+                  buffer *b) {
+    bool written = buffer_append(b, "{", 1);
+    for (size_t k = 0; written && k < r->n_names; k++) {
+        written = (k == 0 || buffer_append(b, ",", 1)) && json_write_text(b, text_of(r, k)) &&
+                  buffer_append(b, ":{", 2);
+        for (size_t s = 0; written && s < r->n_with; s++) {
+            written = buffer_printf(b, "%s\"%s\":%s", s == 0 ? "" : ",", reduce_statistic_name(r->with[s]),
+                                    batch ? "[" : "");
+            for (size_t v = 0; written && v < n_rhs; v++, figures += n_channels)
+                written = (v == 0 || buffer_append(b, ",", 1)) && write_channels(b, figures, n_channels);
+            written = written && (!batch || buffer_append(b, "]", 1));
+        }
+        written = written && buffer_append(b, "}", 1);
+    }
+    return written && buffer_append(b, "}", 1);
+}

@@ -1,0 +1,82 @@
+#include "solver/codec/groups.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static int compare_names(const void *a, const void *b, void *names) {
+    char **all = names;
+    return strcmp(all[*(const uint32_t *)a], all[*(const uint32_t *)b]);
+}
+
+lam_status group_index_make(size_t n, const uint32_t *group, size_t n_groups, char **names, group_index *out,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    group_index index = {.n_groups = n_groups, .names = names};
+    index.start = memory_allocate(n_groups + 1, sizeof *index.start, "groups", error);
+    index.elements = memory_allocate(n, sizeof *index.elements, "groups", error);
+    index.sorted = memory_allocate(n_groups, sizeof *index.sorted, "groups", error);
+    if (index.start == NULL || index.elements == NULL || index.sorted == NULL) {
+        status = LAM_ERR_MEMORY;
+        goto done;
+    }
+    for (size_t i = 0; i < n; i++) {
+        if (group[i] >= n_groups)
+            FAIL(error, LAM_ERR_FORMAT, "/mesh/group[%zu] = %u, must be below the %zu names", i, group[i],
+                 n_groups);
+        index.start[group[i] + 1]++;
+    }
+    for (size_t g = 0; g < n_groups; g++) index.start[g + 1] += index.start[g];
+    /* start[g] serves as the place of the next element of g, which leaves it one group ahead. */
+    for (size_t i = 0; i < n; i++) index.elements[index.start[group[i]]++] = (uint32_t)i;
+    memmove(index.start + 1, index.start, n_groups * sizeof *index.start);
+    index.start[0] = 0;
+    for (size_t g = 0; g < n_groups; g++) index.sorted[g] = (uint32_t)g;
+    qsort_r(index.sorted, n_groups, sizeof *index.sorted, compare_names, names);
+    *out = index;
+done:
+    if (status != LAM_OK) group_index_free(&index);
+    return status;
+}
+
+void group_index_free(group_index *index) {
+    free(index->names);
+    free(index->start);
+    free(index->elements);
+    free(index->sorted);
+    *index = (group_index){0};
+}
+
+/* Compares a group's name with name[0..length) and, with dot, a '.' behind it; of the group's name only as
+ * much is looked at as the other is long when dot is set. */
+static int compare(const char *group, const char *name, size_t length, bool dot) {
+    int order = strncmp(group, name, length);
+    if (order != 0) return order;
+    unsigned char next = (unsigned char)group[length], wanted = dot ? '.' : '\0';
+    return next < wanted ? -1 : next > wanted;
+}
+
+/* The first place in sorted whose name is not before (or, with beyond, is after) the wanted one. */
+static size_t bound(const group_index *index, const char *name, size_t length, bool dot, bool beyond) {
+    size_t low = 0, high = index->n_groups;
+    while (low < high) {
+        size_t middle = low + (high - low) / 2;
+        int order = compare(index->names[index->sorted[middle]], name, length, dot);
+        if (order < 0 || (beyond && order == 0))
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+size_t group_index_find(const group_index *index, const char *name, size_t length, const uint32_t **groups) {
+    if (memchr(name, '\0', length) != NULL) return 0;
+    for (int dot = 0; dot < 2; dot++) {
+        size_t first = bound(index, name, length, dot, false);
+        size_t last = bound(index, name, length, dot, true);
+        if (first == last) continue;
+        *groups = index->sorted + first;
+        return last - first;
+    }
+    return 0;
+}

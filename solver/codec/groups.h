@@ -1,0 +1,27 @@
+/* The groups of a scene by name, and the elements of each. */
+#ifndef LAMBERT_CODEC_GROUPS_H
+#define LAMBERT_CODEC_GROUPS_H
+
+#include "store/status.h"
+
+#include <stdint.h>
+
+typedef struct group_index {
+    size_t n_groups;
+    char **names;       /* [n_groups], one block, owned */
+    uint32_t *start;    /* [n_groups + 1], into elements */
+    uint32_t *elements; /* [n]: those of group 0 in mesh order, of group 1, ... */
+    uint32_t *sorted;   /* [n_groups]: groups in the order of their names */
+} group_index;
+
+/* Takes names over, also on an error. group is [n]. Errors: LAM_ERR_FORMAT (a group that has no name). */
+lam_status group_index_make(size_t n, const uint32_t *group, size_t n_groups, char **names, group_index *out,
+                            lam_error *error);
+
+void group_index_free(group_index *index);
+
+/* The groups that a request means by a name: the one so called, or else all called `name.something` (an
+ * object of several materials). Returns how many; *groups points at their numbers, owned by index. */
+size_t group_index_find(const group_index *index, const char *name, size_t length, const uint32_t **groups);
+
+#endif

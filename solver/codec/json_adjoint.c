@@ -1,0 +1,139 @@
+/* The body of an adjoint request: two vectors, read as emissions are. */
+#include "solver/codec/adjoint.h"
+#include "solver/codec/json_parser.h"
+
+#include <string.h>
+
+void adjoint_request_free(adjoint_request *request) {
+    radiosity_request_free(&request->cotangent);
+    radiosity_request_free(&request->light);
+    *request = (adjoint_request){0};
+}
+
+const char *gradient_name(gradient_kind kind) {
+    static const char *const names[GRADIENT_COUNT] = {"emission", "reflectance", "sky", "emitters"};
+    return names[kind];
+}
+
+/* Whether the store has that gradient. */
+static bool check_gradient(parser *p, gradient_kind kind) {
+    const codec_scene *scene = p->scene;
+    switch (kind) {
+    case GRADIENT_EMISSION:
+        return true;
+    case GRADIENT_REFLECTANCE:
+        return scene->n_emitters == 0 ||
+               parser_refuse(p, 422, "%s: a store of few emitters tells no gradient by reflectance",
+                             parser_here(p));
+    case GRADIENT_SKY:
+        if (scene->n_emitters > 0)
+            return parser_refuse(p, 422, "%s: a store of few emitters tells those of its emitters only",
+                                 parser_here(p));
+        return scene->n_tiles > 0 ||
+               parser_refuse(p, 422, "%s: the store has no sky; precompute it with --sky", parser_here(p));
+    default:
+        return scene->n_emitters > 0 ||
+               parser_refuse(p, 422, "%s: the store has no precomputed emitters", parser_here(p));
+    }
+}
+
+static bool read_gradient_name(parser *p, adjoint_request *request) {
+    json_slice text;
+    if (!parser_expect(p, JSON_TEXT, "the name of a gradient")) return false;
+    if (!json_read_text(&p->r, &text)) return parser_fault(p);
+    for (int kind = 0; kind < GRADIENT_COUNT; kind++) {
+        const char *name = gradient_name((gradient_kind)kind);
+        if (strlen(name) != text.length || memcmp(name, text.bytes, text.length) != 0) continue;
+        for (size_t k = 0; k < request->n_named; k++)
+            if (request->named[k] == (gradient_kind)kind)
+                return parser_refuse(p, 422, "%s = \"%s\", which was listed before", parser_here(p), name);
+        request->named[request->n_named++] = (gradient_kind)kind;
+        return check_gradient(p, (gradient_kind)kind);
+    }
+    return parser_refuse(p, 422, "%s = \"%.*s\", must be emission, reflectance, sky or emitters",
+                         parser_here(p), text.length > 80 ? 80 : (int)text.length, text.bytes);
+}
+
+/* ["emission", ...] */
+static bool read_gradient(parser *p, adjoint_request *request) {
+    const size_t mark = p->pointer_length;
+    if (!parser_expect(p, JSON_ARRAY, "an array of emission, reflectance, sky or emitters")) return false;
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    for (size_t index = 0; json_next_element(&p->r); index++) {
+        parser_point_index(p, index);
+        if (!read_gradient_name(p, request)) return false;
+        p->pointer_length = mark;
+    }
+    if (!parser_closed(p)) return false;
+    return request->n_named > 0 || parser_refuse(p, 422, "%s is empty, must name a gradient", parser_here(p));
+}
+
+static bool read_body(parser *p, adjoint_request *request) {
+    static const char *const names[] = {"cotangent", "quantity", "gradient", "emission"};
+    enum { COTANGENT, QUANTITY, GRADIENT, EMISSION, N_NAMES };
+    unsigned seen = 0;
+    size_t which;
+    json_slice key;
+    if (!parser_expect(p, JSON_OBJECT, "an object")) return false;
+    if (!json_enter_object(&p->r)) return parser_fault(p);
+    while (parser_next_member(p, &key)) {
+        bool good = parser_known_member(p, &key, names, N_NAMES, &seen, &which);
+        if (!good) return false;
+        switch (which) {
+        case COTANGENT:
+        case EMISSION:
+            p->request = which == COTANGENT ? &request->cotangent : &request->light;
+            good = parser_read_emission(p);
+            break;
+        case QUANTITY:
+            good = parser_read_quantity(p, &request->quantity);
+            break;
+        default:
+            good = read_gradient(p, request);
+        }
+        if (!good) return false;
+        p->pointer_length = 0;
+    }
+    if (p->why->status != 0) return false;
+    if (!json_finish(&p->r)) return parser_fault(p);
+    if ((seen & 1u << COTANGENT) == 0) return parser_refuse(p, 422, "the body holds no cotangent");
+    for (size_t k = 0; k < request->n_named; k++)
+        if (request->named[k] == GRADIENT_REFLECTANCE && (seen & 1u << EMISSION) == 0)
+            return parser_refuse(p, 422,
+                                 "the gradient by reflectance needs an emission, the body holds none");
+    return true;
+}
+
+/* What is answered where these gradients are named. */
+static void settle(const codec_scene *scene, adjoint_request *request) {
+    if (request->n_named == 0) request->named[request->n_named++] = GRADIENT_EMISSION;
+    for (size_t k = 0; k < request->n_named; k++) {
+        if (request->named[k] == GRADIENT_EMISSION && scene->n_emitters > 0)
+            request->named[k] = GRADIENT_EMITTERS;
+        request->wanted |= 1u << request->named[k];
+        if (request->named[k] == GRADIENT_EMISSION && scene->n_tiles > 0)
+            request->wanted |= 1u << GRADIENT_SKY;
+    }
+}
+
+bool codec_read_adjoint_json(const codec_scene *scene, const char *text, size_t length,
+                             adjoint_request *request, problem *why) {
+    parser p;
+    request->cotangent.any_sign = true;
+    const bool good =
+        parser_begin(&p, scene, text, length, &request->cotangent, why) && read_body(&p, request);
+    if (!parser_end(&p, good) || !radiosity_request_expand(&request->cotangent, scene, why)) return false;
+    settle(scene, request);
+    return !adjoint_wants(request, GRADIENT_REFLECTANCE) ||
+           radiosity_request_expand(&request->light, scene, why);
+}
+
+bool codec_read_adjoint_npy(const codec_scene *scene, const char *bytes, size_t length,
+                            adjoint_request *request, problem *why) {
+    request->cotangent.any_sign = true;
+    if (!codec_read_npy(scene, bytes, length, &request->cotangent, why)) return false;
+    if (request->cotangent.batch)
+        return problem_set(why, 422, "the array holds a batch, must hold one cotangent");
+    settle(scene, request);
+    return true;
+}

@@ -1,0 +1,315 @@
+/* The emissions of a request: dense, sparse, by group, by sky. */
+#include "solver/codec/json_parser.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* --- numbers ------------------------------------------------------------------------------------------ */
+
+static inline float least_value(const parser *p) {
+    return p->request->any_sign ? -FLT_MAX : 0.0f;
+}
+
+static bool bad_value(parser *p, float value) {
+    int length = p->r.number.length > 40 ? 40 : (int)p->r.number.length;
+    const char *more = p->r.number.length > 40 ? "..." : "";
+    if (!isfinite(value))
+        return parser_refuse(p, 422, "%s = %.*s%s, must be within the range of single precision (3.4e38)",
+                             parser_here(p), length, p->r.number.bytes, more);
+    return parser_refuse(p, 422, "%s = %.*s%s, an emission must not be negative", parser_here(p), length,
+                         p->r.number.bytes, more);
+}
+
+/* One emission value. */
+static inline bool read_value(parser *p, float *value) {
+    if (json_peek(&p->r) != JSON_NUMBER) return parser_expect(p, JSON_NUMBER, "a number");
+    if (!json_read_float(&p->r, value)) return parser_fault(p);
+    return (*value >= least_value(p) && *value <= FLT_MAX) || bad_value(p, *value);
+}
+
+/* Inside an array that was entered: count values, then its end. */
+static bool read_rest_of_row(parser *p, float *row, size_t count, const char *of_what) {
+    const float least = least_value(p);
+    size_t i = json_read_plain_floats(&p->r, row, count);
+    for (; json_next_element(&p->r); i++, i += json_read_plain_floats(&p->r, row + i, count - i)) {
+        if (i == count)
+            return parser_refuse(p, 422, "%s holds more than %zu values, one for each %s", parser_here(p),
+                                 count, of_what);
+        if (json_peek(&p->r) != JSON_NUMBER) {
+            parser_point_index(p, i);
+            return parser_expect(p, JSON_NUMBER, "a number");
+        }
+        if (!json_read_float(&p->r, &row[i])) return parser_fault(p);
+        if (!(row[i] >= least && row[i] <= FLT_MAX)) {
+            parser_point_index(p, i);
+            return bad_value(p, row[i]);
+        }
+    }
+    if (!parser_closed(p)) return false;
+    return i == count || parser_refuse(p, 422, "%s holds %zu values, must be %zu, one for each %s",
+                                       parser_here(p), i, count, of_what);
+}
+
+/* A number for all channels, or one each. */
+static bool read_colour(parser *p, float *colour) {
+    size_t C = p->scene->n_channels;
+    if (json_peek(&p->r) == JSON_ARRAY) {
+        if (!json_enter_array(&p->r)) return parser_fault(p);
+        return read_rest_of_row(p, colour, C, "channel");
+    }
+    if (json_peek(&p->r) != JSON_NUMBER)
+        return parser_expect(p, JSON_NUMBER, "a number or one for each channel");
+    if (!read_value(p, &colour[0])) return false;
+    for (size_t c = 1; c < C; c++) colour[c] = colour[0];
+    return true;
+}
+
+/* Whether an index that was just read may stand in the list. */
+static bool check_element(parser *p, double index, size_t count, bool once) {
+    const size_t n = p->scene->n;
+    if (!(index >= 0.0 && index < (double)n && index == floor(index))) {
+        int length = p->r.number.length > 40 ? 40 : (int)p->r.number.length;
+        return parser_refuse(p, 422, "%s = %.*s, must be an integer from 0 to %zu", parser_here(p), length,
+                             p->r.number.bytes, n - 1);
+    }
+    if (count == n)
+        return parser_refuse(p, 422, "%s: more than the %zu elements of the scene", parser_here(p), n);
+    if (!once) return true;
+    switch (index_set_add(&p->seen, (uint32_t)index)) {
+    case INDEX_SET_ADDED:
+        return true;
+    case INDEX_SET_KNOWN:
+        return parser_refuse(p, 422, "%s = %.0f, an element that was listed before", parser_here(p), index);
+    case INDEX_SET_NO_MEMORY:
+        break;
+    }
+    return problem_set(p->why, 503, "not enough memory for a list of indices");
+}
+
+bool parser_read_elements(parser *p, index_list *elements, bool once) {
+    const size_t mark = p->pointer_length;
+    elements->count = 0;
+    if (once) index_set_clear(&p->seen);
+    if (!parser_expect(p, JSON_ARRAY, "an array of element indices")) return false;
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    while (json_next_element(&p->r)) {
+        double index;
+        parser_point_index(p, elements->count);
+        if (!parser_expect(p, JSON_NUMBER, "an element index")) return false;
+        if (!json_read_double(&p->r, &index)) return parser_fault(p);
+        if (!check_element(p, index, elements->count, once)) return false;
+        if (!parser_append(p, elements, &(uint32_t){(uint32_t)index}, 1)) return false;
+        p->pointer_length = mark;
+    }
+    return parser_closed(p);
+}
+
+/* --- emissions ---------------------------------------------------------------------------------------- */
+
+/* [e0, e1, ...] or C rows of it. */
+static bool read_dense(parser *p, float *E) {
+    size_t n = p->scene->n, C = p->scene->n_channels, mark = p->pointer_length, rows = 0;
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    if (json_look(&p->r) != JSON_ARRAY) {
+        if (!read_rest_of_row(p, E, n, "element")) return false;
+        for (size_t c = 1; c < C; c++) memcpy(E + c * n, E, n * sizeof *E);
+        return true;
+    }
+    while (json_next_element(&p->r)) {
+        if (rows == C)
+            return parser_refuse(p, 422, "%s holds more than %zu rows, one for each channel", parser_here(p),
+                                 C);
+        parser_point_index(p, rows);
+        if (!parser_expect(p, JSON_ARRAY, "an array of numbers")) return false;
+        if (!json_enter_array(&p->r)) return parser_fault(p);
+        if (!read_rest_of_row(p, E + rows * n, n, "element")) return false;
+        p->pointer_length = mark;
+        rows++;
+    }
+    if (!parser_closed(p)) return false;
+    return rows == C || parser_refuse(p, 422, "%s holds %zu rows, must be %zu, one for each channel",
+                                      parser_here(p), rows, C);
+}
+
+/* [v...] of the sparse form: each a number or C of them. */
+static bool read_values(parser *p, size_t *count) {
+    size_t n = p->scene->n, C = p->scene->n_channels, mark = p->pointer_length;
+    *count = 0;
+    if (!parser_expect(p, JSON_ARRAY, "an array of values")) return false;
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    while (json_next_element(&p->r)) {
+        if (*count == n)
+            return parser_refuse(p, 422, "%s holds more values than there are elements", parser_here(p));
+        if (*count == p->values_capacity) {
+            const size_t capacity = *count == 0 ? 64 : 2 * *count;
+            float *grown = realloc(p->values, capacity * C * sizeof *grown);
+            if (grown == NULL) return problem_set(p->why, 503, "not enough memory for a sparse emission");
+            p->values = grown;
+            p->values_capacity = capacity;
+        }
+        parser_point_index(p, *count);
+        if (!read_colour(p, p->values + *count * C)) return false;
+        p->pointer_length = mark;
+        (*count)++;
+    }
+    return parser_closed(p);
+}
+
+/* A refusal that says what is too large, at the value being read. */
+static bool refused_here(parser *p) {
+    memcpy(p->why->pointer, p->pointer, p->pointer_length);
+    p->why->pointer[p->pointer_length] = '\0';
+    return false;
+}
+
+/* {"lamp": v, ...} */
+static bool read_groups(parser *p) {
+    const group_index *groups = p->scene->groups;
+    const size_t mark = p->pointer_length;
+    json_slice key;
+    index_set_clear(&p->seen);
+    if (!parser_expect(p, JSON_OBJECT, "an object of group names and values")) return false;
+    if (!json_enter_object(&p->r)) return parser_fault(p);
+    while (parser_next_member(p, &key)) {
+        const uint32_t *found = NULL;
+        parser_point_key(p, key.bytes, key.length);
+        size_t n_found = group_index_find(groups, key.bytes, key.length, &found);
+        if (n_found == 0)
+            return parser_refuse(p, 422, "%s: the scene has no group of this name", parser_here(p));
+        if (!read_colour(p, p->colour)) return false;
+        for (size_t k = 0; k < n_found; k++) {
+            const index_set_result added = index_set_add(&p->seen, found[k]);
+            if (added == INDEX_SET_KNOWN)
+                return parser_refuse(p, 422, "%s: the group %s is given twice", parser_here(p),
+                                     groups->names[found[k]]);
+            if (added == INDEX_SET_NO_MEMORY)
+                return problem_set(p->why, 503, "not enough memory for a sparse emission");
+            if (!radiosity_request_spot(p->request, p->scene, found[k], true, p->colour, p->why))
+                return refused_here(p);
+        }
+        p->pointer_length = mark;
+    }
+    return p->why->status == 0;
+}
+
+/* Inside an array that was not entered yet: width values into row [C][width], each a number or C of them. */
+static bool read_side(parser *p, size_t width, const char *each, float *row) {
+    const size_t C = p->scene->n_channels, mark = p->pointer_length;
+    size_t t = 0;
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    for (; json_next_element(&p->r); t++) {
+        if (t == width)
+            return parser_refuse(p, 422, "%s holds more than %zu values, one for each %s", parser_here(p),
+                                 width, each);
+        parser_point_index(p, t);
+        if (!read_colour(p, p->colour)) return false;
+        for (size_t c = 0; c < C; c++) row[c * width + t] = p->colour[c];
+        p->pointer_length = mark;
+    }
+    if (!parser_closed(p)) return false;
+    return t == width || parser_refuse(p, 422, "%s holds %zu values, must be %zu, one for each %s",
+                                       parser_here(p), t, width, each);
+}
+
+/* One radiance a tile. */
+static bool read_sky(parser *p) {
+    float *L;
+    if (p->scene->n_tiles == 0)
+        return parser_refuse(p, 422, "%s: the store has no sky; precompute it with --sky", parser_here(p));
+    if (!parser_expect(p, JSON_ARRAY, "an array of radiances")) return false;
+    if (!radiosity_request_sky(p->request, p->scene, &L, p->why)) return refused_here(p);
+    return read_side(p, p->scene->n_tiles, "tile", L);
+}
+
+/* One weight an emitter. */
+static bool read_emitters(parser *p) {
+    float *W;
+    if (p->scene->n_emitters == 0)
+        return parser_refuse(p, 422, "%s: the store has no precomputed emitters", parser_here(p));
+    if (!parser_expect(p, JSON_ARRAY, "an array of weights")) return false;
+    if (!radiosity_request_emitters(p->request, p->scene, &W, p->why)) return refused_here(p);
+    return read_side(p, p->scene->n_emitters, "emitter", W);
+}
+
+static bool read_emission_object(parser *p) {
+    static const char *const names[] = {"elements", "values", "groups", "sky", "emitters"};
+    enum { ELEMENTS, VALUES, GROUPS, SKY, EMITTERS, N_NAMES };
+    const size_t C = p->scene->n_channels, mark = p->pointer_length;
+    size_t n_values = 0, which;
+    unsigned seen = 0;
+    json_slice key;
+    if (!json_enter_object(&p->r)) return parser_fault(p);
+    while (parser_next_member(p, &key)) {
+        bool good = parser_known_member(p, &key, names, N_NAMES, &seen, &which);
+        if (!good) return false;
+        if (p->request->any_sign && (which == SKY || which == EMITTERS))
+            return parser_refuse(p, 422, "%s: a cotangent is of elements or groups", parser_here(p));
+        switch (which) {
+        case ELEMENTS:
+            good = parser_read_elements(p, &p->elements, true);
+            break;
+        case VALUES:
+            good = read_values(p, &n_values);
+            break;
+        case GROUPS:
+            good = read_groups(p);
+            break;
+        case SKY:
+            good = read_sky(p);
+            break;
+        default:
+            good = read_emitters(p);
+        }
+        if (!good) return false;
+        p->pointer_length = mark;
+    }
+    if (p->why->status != 0) return false;
+    const bool sparse = (seen & (1u << ELEMENTS | 1u << VALUES)) != 0;
+    const bool groups = (seen & 1u << GROUPS) != 0, sky = (seen & 1u << SKY) != 0;
+    const bool emitters = (seen & 1u << EMITTERS) != 0;
+    const int ways = sparse + groups + emitters;
+    if (ways > 1 || (ways == 0 && !sky))
+        return parser_refuse(p, 422,
+                             "%s must hold either elements and values or groups or emitters, or a sky",
+                             parser_here(p));
+    if (sparse && ((seen & 1u << ELEMENTS) == 0 || (seen & 1u << VALUES) == 0))
+        return parser_refuse(p, 422, "%s must hold both elements and values", parser_here(p));
+    if (!sparse) return true;
+    if (p->elements.count != n_values)
+        return parser_refuse(p, 422, "%s holds %zu elements and %zu values, must be as many", parser_here(p),
+                             p->elements.count, n_values);
+    for (size_t i = 0; i < n_values; i++)
+        if (!radiosity_request_spot(p->request, p->scene, p->elements.values[i], false, p->values + i * C,
+                                    p->why))
+            return refused_here(p);
+    return true;
+}
+
+bool parser_read_emission(parser *p) {
+    float *E;
+    json_kind kind = json_peek(&p->r);
+    if (kind == JSON_NOTHING) return parser_fault(p);
+    if (kind != JSON_ARRAY && kind != JSON_OBJECT)
+        return parser_refuse(p, 422, "%s must be an array of numbers or an object", parser_here(p));
+    if (!radiosity_request_add(p->request, p->scene, p->why)) return refused_here(p);
+    if (kind == JSON_OBJECT) return read_emission_object(p);
+    if (p->scene->only_linear) return parser_not_linear(p);
+    if (!radiosity_request_dense(p->request, p->scene, &E, p->why)) return refused_here(p);
+    return read_dense(p, E);
+}
+
+bool parser_read_emissions(parser *p) {
+    size_t mark = p->pointer_length;
+    if (!parser_expect(p, JSON_ARRAY, "an array of emissions")) return false;
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    while (json_next_element(&p->r)) {
+        parser_point_index(p, p->request->n_rhs);
+        if (!parser_read_emission(p)) return false;
+        p->pointer_length = mark;
+    }
+    if (!parser_closed(p)) return false;
+    return p->request->n_rhs > 0 ||
+           parser_refuse(p, 422, "%s is empty, must hold an emission", parser_here(p));
+}

@@ -1,0 +1,164 @@
+#include "solver/codec/json_parser.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+void parser_point_key(parser *p, const char *key, size_t length) {
+    size_t at = p->pointer_length;
+    if (at + 2 * length + 2 > sizeof p->pointer) return;
+    p->pointer[at++] = '/';
+    for (size_t i = 0; i < length; i++) {
+        if (key[i] == '~' || key[i] == '/') {
+            p->pointer[at++] = '~';
+            p->pointer[at++] = key[i] == '~' ? '0' : '1';
+        } else {
+            p->pointer[at++] = key[i];
+        }
+    }
+    p->pointer_length = at;
+}
+
+void parser_point_index(parser *p, size_t index) {
+    char text[24];
+    int length = snprintf(text, sizeof text, "%zu", index);
+    parser_point_key(p, text, (size_t)length);
+}
+
+bool parser_refuse(parser *p, unsigned status, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(p->why->detail, sizeof p->why->detail, format, arguments);
+    va_end(arguments);
+    p->why->status = status;
+    p->pointer[p->pointer_length] = '\0';
+    memcpy(p->why->pointer, p->pointer, p->pointer_length + 1);
+    return false;
+}
+
+const char *parser_here(parser *p) {
+    p->pointer[p->pointer_length] = '\0';
+    return p->pointer_length == 0 ? "the body" : p->pointer + 1;
+}
+
+bool parser_fault(parser *p) {
+    if (p->r.no_memory) return problem_set(p->why, 503, "not enough memory to read the body");
+    return problem_set(p->why, 400, "the body is not JSON: %s, at byte %zu", p->r.fault,
+                       (size_t)(p->r.at - p->r.start));
+}
+
+bool parser_not_linear(parser *p) {
+    return problem_set(p->why, 503, "no linear reduction of sparse vectors");
+}
+
+bool parser_closed(parser *p) {
+    return p->r.fault == NULL || parser_fault(p);
+}
+
+bool parser_expect(parser *p, json_kind kind, const char *what) {
+    json_kind found = json_peek(&p->r);
+    if (found == JSON_NOTHING) return parser_fault(p);
+    return found == kind || parser_refuse(p, 422, "%s must be %s", parser_here(p), what);
+}
+
+bool parser_next_member(parser *p, json_slice *key) {
+    if (!json_next_member(&p->r, key)) {
+        parser_closed(p);
+        return false;
+    }
+    if (memchr(key->bytes, '\0', key->length) != NULL) {
+        parser_point_key(p, key->bytes, strnlen(key->bytes, key->length));
+        return parser_refuse(p, 422, "a NUL in a key of %s", parser_here(p));
+    }
+    return true;
+}
+
+/* Which of the names a key is; their number when none. */
+static size_t find_name(const json_slice *key, const char *const *names, size_t count) {
+    size_t i = 0;
+    while (i < count && (strlen(names[i]) != key->length || memcmp(names[i], key->bytes, key->length) != 0))
+        i++;
+    return i;
+}
+
+bool parser_known_member(parser *p, const json_slice *key, const char *const *names, size_t count,
+                         unsigned *seen, size_t *which) {
+    *which = find_name(key, names, count);
+    parser_point_key(p, key->bytes, key->length);
+    if (*which == count)
+        return parser_refuse(p, 422, "%s is not a member that can stand here", parser_here(p));
+    if (*seen & 1u << *which) return parser_refuse(p, 422, "%s is given twice", parser_here(p));
+    *seen |= 1u << *which;
+    return true;
+}
+
+bool parser_append(parser *p, index_list *list, const uint32_t *indices, size_t count) {
+    if (list->values == NULL || count > list->capacity - list->count) {
+        size_t capacity = list->capacity == 0 ? 64 : 2 * list->capacity;
+        if (capacity < list->count + count) capacity = list->count + count;
+        uint32_t *grown = realloc(list->values, capacity * sizeof *grown);
+        if (grown == NULL) return problem_set(p->why, 503, "not enough memory for a list of indices");
+        list->values = grown;
+        list->capacity = capacity;
+    }
+    if (count > 0) memcpy(list->values + list->count, indices, count * sizeof *indices);
+    list->count += count;
+    return true;
+}
+
+bool parser_read_group(parser *p, json_slice *name, const uint32_t **groups, size_t *n_groups) {
+    if (!parser_expect(p, JSON_TEXT, "a group name")) return false;
+    if (!json_read_text(&p->r, name)) return parser_fault(p);
+    *n_groups = group_index_find(p->scene->groups, name->bytes, name->length, groups);
+    return *n_groups > 0 ||
+           parser_refuse(p, 422, "%s = \"%.*s\", the scene has no group of this name", parser_here(p),
+                         name->length > 80 ? 80 : (int)name->length, name->bytes);
+}
+
+bool parser_read_quantity(parser *p, lam_quantity *quantity) {
+    json_slice text;
+    if (!parser_expect(p, JSON_TEXT, "\"radiosity\", \"irradiance\" or \"indirect\"")) return false;
+    if (!json_read_text(&p->r, &text)) return parser_fault(p);
+    for (int q = LAM_RADIOSITY; q <= LAM_INDIRECT; q++) {
+        const char *name = codec_quantity_name((lam_quantity)q);
+        if (strlen(name) == text.length && memcmp(name, text.bytes, text.length) == 0) {
+            *quantity = (lam_quantity)q;
+            return true;
+        }
+    }
+    return parser_refuse(p, 422, "%s = \"%.*s\", must be radiosity, irradiance or indirect", parser_here(p),
+                         text.length > 80 ? 80 : (int)text.length, text.bytes);
+}
+
+bool parser_begin(parser *p, const codec_scene *scene, const char *text, size_t length,
+                  radiosity_request *request, problem *why) {
+    *p = (parser){.scene = scene, .request = request, .why = why};
+    *why = (problem){0};
+    json_begin(&p->r, text, length);
+    p->colour = memory_allocate(scene->n_channels, sizeof *p->colour, "colour", NULL);
+    return p->colour != NULL || problem_set(why, 503, "not enough memory to read the body");
+}
+
+bool parser_fill_sides(parser *p) {
+    radiosity_request *request = p->request;
+    float *last;
+    return (request->sky.values == NULL || request->sky.n == request->n_rhs ||
+            radiosity_request_sky(request, p->scene, &last, p->why)) &&
+           (request->emitters.values == NULL || request->emitters.n == request->n_rhs ||
+            radiosity_request_emitters(request, p->scene, &last, p->why));
+}
+
+bool parser_end(parser *p, bool good) {
+    json_end(&p->r);
+    if (!good && (p->why->status == 422 || p->why->status == 501)) {
+        json_begin(&p->r, p->r.start, (size_t)(p->r.end - p->r.start));
+        if (!json_skip(&p->r) || !json_finish(&p->r)) parser_fault(p);
+        json_end(&p->r);
+    }
+    free(p->elements.values);
+    free(p->values);
+    free(p->colour);
+    index_set_free(&p->seen);
+    return good;
+}

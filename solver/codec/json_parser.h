@@ -1,0 +1,87 @@
+/* What the parts of codec_read_json share: where they are in a request, and how they refuse it. Private to
+ * the codec. Every function that returns false has filled why. */
+#ifndef LAMBERT_CODEC_JSON_PARSER_H
+#define LAMBERT_CODEC_JSON_PARSER_H
+
+#include "solver/codec/index_set.h"
+#include "solver/codec/json_reader.h"
+#include "solver/codec/request.h"
+
+/* Indices as they are read. */
+typedef struct index_list {
+    uint32_t *values;
+    size_t count, capacity;
+} index_list;
+
+typedef struct parser {
+    json_reader r;
+    const codec_scene *scene;
+    radiosity_request *request;
+    problem *why;
+    char pointer[sizeof((problem *)0)->pointer]; /* of the value being read */
+    size_t pointer_length;
+    /* Of sparse vectors, kept from one to the next; nothing is larger than what was read. */
+    index_list elements;
+    float *values; /* [values_capacity][C] */
+    size_t values_capacity;
+    float *colour;  /* [C] */
+    index_set seen; /* elements, or groups */
+} parser;
+
+/* Begins to read a text into request; parser_end frees what the parser holds and gives good back, with what
+ * is no JSON at all told before all else, wherever its fault lies. */
+bool parser_begin(parser *p, const codec_scene *scene, const char *text, size_t length,
+                  radiosity_request *request, problem *why);
+bool parser_end(parser *p, bool good);
+
+/* Skies and emitters of the vectors behind the last that has any, dark. */
+bool parser_fill_sides(parser *p);
+
+/* Goes into a member, or an array's element; the caller restores pointer_length. What does not fit is left
+ * out. */
+void parser_point_key(parser *p, const char *key, size_t length);
+void parser_point_index(parser *p, size_t index);
+
+/* The pointer as a reader of the message would say it: "emission/groups/lamp". */
+const char *parser_here(parser *p);
+
+/* Refuses what is being read; the text itself, when it is not JSON. */
+bool parser_refuse(parser *p, unsigned status, const char *format, ...) __attribute__((format(printf, 3, 4)));
+bool parser_fault(parser *p);
+
+/* Refuses what is not wrong, but no linear reduction of sparse vectors. */
+bool parser_not_linear(parser *p);
+
+/* Over the end of an array or object whose loop has ended. */
+bool parser_closed(parser *p);
+
+/* Whether a value of this kind comes next. */
+bool parser_expect(parser *p, json_kind kind, const char *what);
+
+/* The next member of an object; false at its end or on a refusal. */
+bool parser_next_member(parser *p, json_slice *key);
+
+/* Goes into a member of an object whose members are known; seen is a bit for each. */
+bool parser_known_member(parser *p, const json_slice *key, const char *const *names, size_t count,
+                         unsigned *seen, size_t *which);
+
+/* Appends; values is not NULL then, also for none. 503 when memory is short. */
+bool parser_append(parser *p, index_list *list, const uint32_t *indices, size_t count);
+
+/* What of a scene's groups the text that comes next means; name is valid until the next text is read. */
+bool parser_read_group(parser *p, json_slice *name, const uint32_t **groups, size_t *n_groups);
+
+/* [...] of element indices, each below n, at most n of them; those of an emission only once each. */
+bool parser_read_elements(parser *p, index_list *elements, bool once);
+
+/* The value of `quantity`. */
+bool parser_read_quantity(parser *p, lam_quantity *quantity);
+
+/* The value of `emission`, and of `emissions`; of `cotangent`, which has neither sky nor emitters. */
+bool parser_read_emission(parser *p);
+bool parser_read_emissions(parser *p);
+
+/* The value of `reduce`. */
+bool parser_read_reduce(parser *p);
+
+#endif

@@ -1,0 +1,30 @@
+/* Numbers and texts as JSON. Knows nothing of what they mean. No I/O. */
+#ifndef LAMBERT_CODEC_JSON_WRITER_H
+#define LAMBERT_CODEC_JSON_WRITER_H
+
+#include "solver/codec/buffer.h"
+
+#include <stdint.h>
+
+/* Longest text of one float; what it is written in. */
+#define JSON_FLOAT_MAX 16
+#define JSON_FLOAT_ROOM 32
+
+/* Writes the shortest decimal that reads back as the same float (in a few cases per thousand a longer one,
+ * never of more than 9 digits) and returns how many characters; value must be finite. No NUL is written; to
+ * has room for the longest. */
+size_t json_write_float(char *to, float value);
+
+/* Appends [v0,v1,...] of finite values; false when memory is short. */
+bool json_write_floats(buffer *b, const float *values, size_t count);
+
+/* Appends the shortest decimal that reads back as the same double; value must be finite. */
+bool json_write_double(buffer *b, double value);
+
+/* Appends [v0,v1,...] of them; false when memory is short. */
+bool json_write_doubles(buffer *b, const double *values, size_t count);
+
+/* Appends a text in quotes, escaped; bytes that are not UTF-8 become '?'. */
+bool json_write_text(buffer *b, const char *text);
+
+#endif

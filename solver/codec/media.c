@@ -1,0 +1,96 @@
+#include "solver/codec/media.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+/* One `name/name; key=value; ...` of a header, a piece at a time. */
+typedef struct cursor {
+    const char *at;
+} cursor;
+
+static void skip_space(cursor *c) {
+    while (*c->at == ' ' || *c->at == '\t') c->at++;
+}
+
+/* Copies up to one of the stop characters, without space at its ends or quotes around it. */
+static void take_piece(cursor *c, const char *stops, char *piece, size_t size) {
+    size_t length = 0;
+    skip_space(c);
+    if (*c->at == '"') {
+        for (c->at++; *c->at != '\0' && *c->at != '"'; c->at++) {
+            if (*c->at == '\\' && c->at[1] != '\0') c->at++;
+            if (length + 1 < size) piece[length++] = *c->at;
+        }
+        if (*c->at == '"') c->at++;
+    }
+    for (; *c->at != '\0' && strchr(stops, *c->at) == NULL; c->at++)
+        if (length + 1 < size) piece[length++] = *c->at;
+    while (length > 0 && (piece[length - 1] == ' ' || piece[length - 1] == '\t')) length--;
+    piece[length] = '\0';
+}
+
+media_type media_content_type(const char *header) {
+    char type[64];
+    if (header == NULL) return MEDIA_JSON;
+    take_piece(&(cursor){header}, ";,", type, sizeof type);
+    if (strcasecmp(type, "application/json") == 0) return MEDIA_JSON;
+    if (strcasecmp(type, "application/x-npy") == 0) return MEDIA_NPY;
+    return MEDIA_OTHER;
+}
+
+/* How much an element of Accept is liked, 0 to 1. */
+static double read_quality(const char *text) {
+    char *end;
+    double q = strtod(text, &end);
+    return end == text || !(q >= 0.0) ? 0.0 : q > 1.0 ? 1.0 : q;
+}
+
+static bool read_npy_type(const char *text, npy_type *type) {
+    static const char *const names[] = {[NPY_F2] = "f2", [NPY_F4] = "f4", [NPY_F8] = "f8"};
+    if (*text == '<') text++;
+    for (int t = NPY_F2; t <= NPY_F8; t++) {
+        if (strcasecmp(text, names[t]) != 0) continue;
+        *type = (npy_type)t;
+        return true;
+    }
+    return false;
+}
+
+media_accept media_choose(const char *header) {
+    media_accept chosen = {MEDIA_JSON, NPY_F4, false};
+    double json = -1.0, npy = 0.0; /* json below 0: not named */
+    bool npy_first = false;
+    cursor c = {header == NULL ? "" : header};
+    while (*c.at != '\0') {
+        char type[64];
+        double q = 1.0;
+        npy_type dtype = NPY_F4;
+        bool known = true, given = false;
+        take_piece(&c, ";,", type, sizeof type);
+        while (*c.at == ';') {
+            char key[16], value[32] = "";
+            c.at++;
+            take_piece(&c, "=;,", key, sizeof key);
+            if (*c.at == '=') {
+                c.at++;
+                take_piece(&c, ";,", value, sizeof value);
+            }
+            if (strcasecmp(key, "q") == 0)
+                q = read_quality(value);
+            else if (strcasecmp(key, "dtype") == 0)
+                given = known = read_npy_type(value, &dtype);
+        }
+        if (*c.at == ',') c.at++;
+        if (strcasecmp(type, "application/json") == 0) {
+            json = q;
+        } else if (strcasecmp(type, "application/x-npy") == 0 && known && q > npy) {
+            npy = q;
+            chosen.npy = dtype;
+            chosen.npy_given = given;
+            npy_first = json < 0.0;
+        }
+    }
+    if (npy > 0.0 && (npy > json || (npy >= json && npy_first))) chosen.type = MEDIA_NPY;
+    return chosen;
+}

@@ -1,0 +1,21 @@
+/* Arrays as NPY answers (little-endian, C order, format 1.0). No I/O. Reading them: request.h. */
+#ifndef LAMBERT_CODEC_NPY_H
+#define LAMBERT_CODEC_NPY_H
+
+#include "solver/codec/buffer.h"
+
+#include <stdint.h>
+
+typedef enum npy_type { NPY_F2, NPY_F4, NPY_F8 } npy_type;
+
+/* Appends the header of an array of this shape; false when memory is short. */
+bool npy_write_header(buffer *b, npy_type type, size_t rank, const size_t *shape);
+
+/* Appends values[0..count). */
+bool npy_write_values(buffer *b, npy_type type, const float *values, size_t count);
+
+/* The same of doubles, of which *rounding becomes the largest that a value was rounded by, if that is more
+ * than it was. */
+bool npy_write_doubles(buffer *b, npy_type type, const double *values, size_t count, double *rounding);
+
+#endif

@@ -1,0 +1,151 @@
+#include "solver/codec/request.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+void radiosity_request_free(radiosity_request *request) {
+    free(request->E);
+    free(request->spots);
+    free(request->colours);
+    free(request->sky.values);
+    free(request->emitters.values);
+    free(request->selected);
+    reduce_request_free(&request->reduce);
+    *request = (radiosity_request){0};
+}
+
+bool radiosity_request_add(radiosity_request *request, const codec_scene *scene, problem *why) {
+    if (request->n_rhs == scene->max_batch)
+        return problem_set(why, 422,
+                           "the batch holds more than %zu vectors (--max-batch); send several requests",
+                           scene->max_batch);
+    request->n_rhs++;
+    return true;
+}
+
+/* Room for `wanted` rows of `bytes` each within max_bytes, those beyond *n zeroed; doubles, so that a batch
+ * is copied a few times only. */
+static bool grow(float **values, size_t *n, size_t *capacity, size_t wanted, size_t bytes, size_t max_bytes,
+                 const char *what, problem *why) {
+    size_t size;
+    if (wanted > *capacity) {
+        size_t more = 2 * *capacity > wanted ? 2 * *capacity : wanted;
+        if (!size_multiply(bytes, more, &size) || size > max_bytes) {
+            more = max_bytes / bytes;
+            size = more * bytes;
+        }
+        float *grown = realloc(*values, size);
+        if (grown == NULL) return problem_set(why, 503, "not enough memory for %zu bytes of %s", size, what);
+        *values = grown;
+        *capacity = more;
+    }
+    memset((char *)*values + *n * bytes, 0, (wanted - *n) * bytes);
+    *n = wanted;
+    return true;
+}
+
+/* Vectors up to the last. */
+static bool grow_dense(radiosity_request *request, const codec_scene *scene, problem *why) {
+    size_t values, bytes, size;
+    if (!size_multiply(scene->n, scene->n_channels, &values) ||
+        !size_multiply(values, sizeof(float), &bytes) || !size_multiply(bytes, request->n_rhs, &size) ||
+        size > scene->max_bytes)
+        return problem_set(
+            why, 422,
+            "%zu vectors of %zu channels and %zu elements pass the %zu bytes that a request may "
+            "hold; send several requests",
+            request->n_rhs, scene->n_channels, scene->n, scene->max_bytes);
+    if (request->n_dense == request->n_rhs) return true;
+    return grow(&request->E, &request->n_dense, &request->dense_capacity, request->n_rhs, bytes,
+                scene->max_bytes, "emission", why);
+}
+
+bool radiosity_request_dense(radiosity_request *request, const codec_scene *scene, float **E, problem *why) {
+    if (!grow_dense(request, scene, why)) return false;
+    *E = request->E + (request->n_rhs - 1) * scene->n_channels * scene->n;
+    return true;
+}
+
+bool radiosity_request_spot(radiosity_request *request, const codec_scene *scene, uint32_t where,
+                            bool whole_group, const float *colour, problem *why) {
+    const size_t C = scene->n_channels, each = sizeof *request->spots + C * sizeof *colour;
+    if (request->n_spots == request->spots_capacity) {
+        size_t most = scene->max_bytes / each, more = request->n_spots == 0 ? 16 : 2 * request->n_spots;
+        if (more > most) more = most;
+        if (more <= request->n_spots)
+            return problem_set(why, 422,
+                               "the sparse vectors pass the %zu bytes that a request may hold; send several "
+                               "requests",
+                               scene->max_bytes);
+        emission_spot *spots = realloc(request->spots, more * sizeof *spots);
+        if (spots != NULL) request->spots = spots;
+        float *colours = realloc(request->colours, more * C * sizeof *colours);
+        if (colours != NULL) request->colours = colours;
+        if (spots == NULL || colours == NULL)
+            return problem_set(why, 503, "not enough memory for a sparse emission");
+        request->spots_capacity = more;
+    }
+    request->spots[request->n_spots] =
+        (emission_spot){.vector = (uint32_t)(request->n_rhs - 1), .where = where, .whole_group = whole_group};
+    memcpy(request->colours + request->n_spots * C, colour, C * sizeof *colour);
+    request->n_spots++;
+    return true;
+}
+
+bool radiosity_request_expand(radiosity_request *request, const codec_scene *scene, problem *why) {
+    const size_t n = scene->n, C = scene->n_channels;
+    if (!grow_dense(request, scene, why)) return false;
+    for (size_t k = 0; k < request->n_spots; k++) {
+        const emission_spot *spot = &request->spots[k];
+        const float *colour = request->colours + k * C;
+        const uint32_t *elements = &spot->where;
+        size_t count = 1;
+        if (spot->whole_group) {
+            elements = scene->groups->elements + scene->groups->start[spot->where];
+            count = scene->groups->start[spot->where + 1] - scene->groups->start[spot->where];
+        }
+        for (size_t c = 0; c < C; c++) {
+            float *E = request->E + (spot->vector * C + c) * n;
+            for (size_t e = 0; e < count; e++) E[elements[e]] = colour[c];
+        }
+    }
+    request->n_spots = 0;
+    return true;
+}
+
+static bool add_side(const radiosity_request *request, const codec_scene *scene, side_rows *side,
+                     size_t width, const char *what, float **row, problem *why) {
+    size_t values, bytes, size;
+    if (!size_multiply(width, scene->n_channels, &values) || !size_multiply(values, sizeof(float), &bytes) ||
+        !size_multiply(bytes, request->n_rhs, &size) || size > scene->max_bytes)
+        return problem_set(
+            why, 422,
+            "%zu times %zu channels of %zu %s pass the %zu bytes that a request may hold; send "
+            "several requests",
+            request->n_rhs, scene->n_channels, width, what, scene->max_bytes);
+    if (!grow(&side->values, &side->n, &side->capacity, request->n_rhs, bytes, scene->max_bytes, what, why))
+        return false;
+    *row = side->values + (request->n_rhs - 1) * values;
+    return true;
+}
+
+bool radiosity_request_sky(radiosity_request *request, const codec_scene *scene, float **row, problem *why) {
+    return add_side(request, scene, &request->sky, scene->n_tiles, "tiles", row, why);
+}
+
+bool radiosity_request_emitters(radiosity_request *request, const codec_scene *scene, float **row,
+                                problem *why) {
+    return add_side(request, scene, &request->emitters, scene->n_emitters, "emitters", row, why);
+}
+
+const char *codec_quantity_name(lam_quantity quantity) {
+    switch (quantity) {
+    case LAM_RADIOSITY:
+        return "radiosity";
+    case LAM_IRRADIANCE:
+        return "irradiance";
+    case LAM_INDIRECT:
+        return "indirect";
+    }
+    return "";
+}

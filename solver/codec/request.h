@@ -1,0 +1,98 @@
+/* Request bytes to emission vectors: what is asked of a scene. No I/O, so that it can be fuzzed.
+ * Knows nothing of HTTP but the status that a refusal has. */
+#ifndef LAMBERT_CODEC_REQUEST_H
+#define LAMBERT_CODEC_REQUEST_H
+
+#include "lambert/lambert.h"
+#include "solver/codec/group_figures.h"
+#include "solver/codec/groups.h"
+#include "solver/codec/problem.h"
+
+/* What a request is read against. */
+typedef struct codec_scene {
+    size_t n;
+    size_t n_channels;
+    const group_index *groups;
+    size_t n_tiles;    /* of the sky; 0: none */
+    size_t n_emitters; /* 0: none */
+    size_t max_batch;  /* vectors in a request */
+    size_t max_bytes;  /* of emission vectors in a request */
+    bool only_linear;  /* whatever is no linear reduction of sparse vectors is refused (503) before it costs
+                          more than its text */
+    size_t max_rows;   /* adjoint rows that the scene keeps: so many groups can be reduced by them */
+} codec_scene;
+
+/* Something that emits in a sparse vector: an element, or every element of a group. */
+typedef struct emission_spot {
+    uint32_t vector;
+    uint32_t where; /* an element, or a group of the scene */
+    bool whole_group;
+} emission_spot;
+
+/* What stands beside the emissions of some vectors: [n][C][width], for the first n of them. */
+typedef struct side_rows {
+    float *values; /* NULL: no vector has any */
+    size_t n, capacity;
+} side_rows;
+
+/* Starts zeroed. */
+typedef struct radiosity_request {
+    size_t n_rhs;
+    bool batch;           /* the answer is one level deeper, also for one vector */
+    bool any_sign;        /* values may be negative: a cotangent */
+    float *E;             /* [n_rhs][C][n], mesh order; NULL: the spots are all there is */
+    emission_spot *spots; /* of sparse vectors that are not in E yet */
+    float *colours;       /* [n_spots][C] */
+    size_t n_spots;
+    bool select; /* only these elements, in this order */
+    uint32_t *selected;
+    size_t n_selected;
+    lam_quantity quantity;
+    double tolerance; /* of a refined answer, above 0 and below 1; 0: none is asked for */
+
+    reduce_request reduce; /* figures of groups in place of vectors */
+    side_rows sky;         /* radiances of its tiles */
+    side_rows emitters;    /* their weights */
+
+    size_t n_dense, dense_capacity; /* vectors that E holds, and has room for */
+    size_t spots_capacity;
+} radiosity_request;
+
+void radiosity_request_free(radiosity_request *request);
+
+/* Both return false with *why filled; request must be freed either way.
+ * text[length] must be NUL. 400: not JSON, or not NPY; 422: what the contract lists; 501: not supported yet.
+ * E then holds every vector, but for a linear reduction of sparse vectors, which stay spots, so that reading
+ * it costs no more than the text is long. With any other reduction, select names the elements of its groups.
+ */
+bool codec_read_json(const codec_scene *scene, const char *text, size_t length, radiosity_request *request,
+                     problem *why);
+
+/* NPY format 1.0 to 3.0, little-endian <f4 or <f8, C order. For one channel [n], or a batch [m][n] or
+ * [m][1][n]; for more channels [n] (all alike), [C][n], or a batch [m][C][n]. */
+bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, radiosity_request *request,
+                    problem *why);
+
+/* One more vector, dark. */
+bool radiosity_request_add(radiosity_request *request, const codec_scene *scene, problem *why);
+
+/* Room in E for the last vector, zeroed: *E is its [C][n]; so is that of those before it that have none. */
+bool radiosity_request_dense(radiosity_request *request, const codec_scene *scene, float **E, problem *why);
+
+/* A spot of the last vector; colour is [C]. */
+bool radiosity_request_spot(radiosity_request *request, const codec_scene *scene, uint32_t where,
+                            bool whole_group, const float *colour, problem *why);
+
+/* Puts every vector into E, the spots with it. */
+bool radiosity_request_expand(radiosity_request *request, const codec_scene *scene, problem *why);
+
+/* The sky over the last vector, or the weights of its emitters, zeroed: *row is its [C][m], or [C][s]; so are
+ * those of the vectors before it that have none. */
+bool radiosity_request_sky(radiosity_request *request, const codec_scene *scene, float **row, problem *why);
+bool radiosity_request_emitters(radiosity_request *request, const codec_scene *scene, float **row,
+                                problem *why);
+
+/* The contract's word for a quantity. */
+const char *codec_quantity_name(lam_quantity quantity);
+
+#endif

@@ -1,0 +1,116 @@
+#include "solver/console/terminal.h"
+
+#include "solver/base/clock.h"
+
+#include <math.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+/* The one thing a signal handler may touch; nothing else in the project is static and mutable. */
+static volatile sig_atomic_t signal_came;
+
+static void signal_note(int number) {
+    (void)number;
+    signal_came = 1;
+}
+
+bool terminal_cancelled(void) {
+    return signal_came != 0;
+}
+
+void terminal_open(terminal *t, const char *verb, bool quiet, bool force_progress) {
+    *t = (terminal){.verb = verb, .nothing = "nothing was written", .quiet = quiet};
+    t->live = !quiet && (force_progress || isatty(STDERR_FILENO) == 1);
+    /* The second signal finds the default action again and ends the program at once. */
+    struct sigaction action = {.sa_handler = signal_note, .sa_flags = (int)SA_RESETHAND};
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    /* A file over the limit is then an error that is reported, and the partial file is removed. */
+    struct sigaction ignore = {.sa_handler = SIG_IGN};
+    sigemptyset(&ignore.sa_mask);
+    sigaction(SIGXFSZ, &ignore, NULL);
+}
+
+void terminal_clear(terminal *t) {
+    if (t->line_shown) fputs("\r\033[K", stderr);
+    t->line_shown = false;
+}
+
+static void format_seconds(double seconds, char *text, size_t size) {
+    long whole = lround(fmin(seconds, 1e8));
+    if (whole < 60)
+        snprintf(text, size, "%ld s", whole);
+    else if (whole < 3600)
+        snprintf(text, size, "%ld min %ld s", whole / 60, whole % 60);
+    else
+        snprintf(text, size, "%ld h %ld min", whole / 3600, whole % 3600 / 60);
+}
+
+static void show(void *context, const char *stage, double share) {
+    terminal *t = context;
+    double now = clock_seconds();
+    if (strncmp(t->stage, stage, sizeof t->stage - 1) != 0) {
+        snprintf(t->stage, sizeof t->stage, "%s", stage);
+        t->stage_started = now;
+        t->last_shown = 0;
+    }
+    if (share >= 1) {
+        terminal_clear(t);
+        return;
+    }
+    if (now - t->last_shown < 0.1) return;
+    t->last_shown = now;
+    char left[32] = "";
+    double elapsed = now - t->stage_started;
+    if (share > 0.01 && elapsed > 0.5) format_seconds(elapsed / share * (1 - share), left, sizeof left);
+    fprintf(stderr, "\r\033[K%s: %.0f %%%s%s", stage, 100 * fmax(share, 0), left[0] != '\0' ? ", left: " : "",
+            left);
+    t->line_shown = true;
+}
+
+static bool asked_to_stop(void *context) {
+    (void)context;
+    return terminal_cancelled();
+}
+
+progress terminal_progress(terminal *t) {
+    return (progress){.report = t->live ? show : NULL, .cancelled = asked_to_stop, .context = t};
+}
+
+void terminal_log(terminal *t, const char *format, ...) {
+    if (t->quiet) return;
+    va_list arguments;
+    terminal_clear(t);
+    va_start(arguments, format);
+    vfprintf(stderr, format, arguments);
+    va_end(arguments);
+    fputc('\n', stderr);
+}
+
+void terminal_warn(terminal *t, const char *format, ...) {
+    va_list arguments;
+    terminal_clear(t);
+    fprintf(stderr, "lambert %s: warning: ", t->verb);
+    va_start(arguments, format);
+    vfprintf(stderr, format, arguments);
+    va_end(arguments);
+    fputc('\n', stderr);
+}
+
+int terminal_fail(terminal *t, const lam_error *error) {
+    terminal_clear(t);
+    if (terminal_cancelled())
+        fprintf(stderr, "lambert %s: cancelled; %s\n", t->verb, t->nothing);
+    else
+        fprintf(stderr, "lambert %s: %s\n", t->verb,
+                error->message[0] != '\0' ? error->message : lam_status_text(error->status));
+    return 1;
+}
+
+lam_status terminal_check(lam_error *error) {
+    return terminal_cancelled() ? status_fail(error, LAM_ERR_CANCELLED, "cancelled") : LAM_OK;
+}

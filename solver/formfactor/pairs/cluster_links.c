@@ -1,0 +1,210 @@
+#include "solver/formfactor/pairs/cluster_links.h"
+
+#include "solver/formfactor/pairs/shaft.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* What one walk has found. */
+typedef struct bag {
+    cluster_link *links;
+    size_t n, capacity;
+    double hidden_pairs, distant_pairs;
+    bool out_of_memory;
+} bag;
+
+typedef struct walk {
+    const mesh *m;
+    const cluster_tree *t;
+    const look *l;
+    const link_options *options;
+    bag *found;
+} walk;
+
+void cluster_links_free(cluster_links *l) {
+    free(l->links);
+    free(l->of_cluster);
+    *l = (cluster_links){0};
+}
+
+static void bag_add(bag *b, uint32_t a, uint32_t c, bool open) {
+    if (b->n == b->capacity) {
+        const size_t capacity = b->capacity + b->capacity / 2 + 256;
+        cluster_link *links = realloc(b->links, capacity * sizeof *links);
+        if (links == NULL) {
+            b->out_of_memory = true;
+            return;
+        }
+        b->links = links;
+        b->capacity = capacity;
+    }
+    b->links[b->n++] = (cluster_link){a, c, open};
+}
+
+static double pairs_between(const cluster *a, const cluster *b) {
+    return (double)(a->last - a->first) * (double)(b->last - b->first);
+}
+
+static double extent2(const cluster *c) {
+    double sum = 0;
+    for (int d = 0; d < 3; d++) sum += (c->high[d] - c->low[d]) * (c->high[d] - c->low[d]);
+    return sum;
+}
+
+/* A bound on the factor from a point to a plane area at distance d: A / (pi d^2), at most 1. */
+static double factor_bound(double area, double distance2) {
+    const double apart = 3.14159265358979323846 * distance2;
+    return area < apart ? area / apart : 1;
+}
+
+/* Candidates above which near leaves are not looked between. */
+enum { CROWD = 16 };
+
+/* One step down: what is to be done with a pair of clusters. */
+static void visit(walk *w, uint32_t a, uint32_t b, const uint32_t *candidates, size_t n_candidates) {
+    const cluster_tree *t = w->t;
+    const cluster *one = &t->clusters[a], *two = &t->clusters[b];
+    if (w->found->out_of_memory) return;
+    if (a == b) {
+        if (one->plane) return;
+        if (cluster_is_leaf(one)) {
+            bag_add(w->found, a, a, false);
+            return;
+        }
+        visit(w, one->child[0], one->child[0], candidates, n_candidates);
+        visit(w, one->child[0], one->child[1], candidates, n_candidates);
+        visit(w, one->child[1], one->child[1], candidates, n_candidates);
+        return;
+    }
+    if (cluster_faces_away(one, two, w->options->slack)) return;
+    const double distance2 = cluster_distance2(one, two);
+    const double mean_area = 2 / (1 / one->largest + 1 / two->largest);
+    if (factor_bound(mean_area, distance2) < w->options->threshold) {
+        w->found->distant_pairs += pairs_between(one, two);
+        return;
+    }
+    const bool near = w->options->threshold > 0;
+    const bool leaves = cluster_is_leaf(one) && cluster_is_leaf(two);
+    /* With so much in the way of what is around them, they are seldom free. */
+    if (near && leaves && n_candidates > CROWD) {
+        bag_add(w->found, a, b, false);
+        return;
+    }
+    uint32_t within[SHAFT_CANDIDATES];
+    shaft s;
+    shaft_init(&s, one, two, w->options->slack);
+    const size_t n_within = shaft_filter(&s, w->m, t, candidates, n_candidates, leaves, within);
+    /* Beyond some elements of either the threshold may still cut. */
+    if (n_within == 0 && (!near || leaves)) {
+        bag_add(w->found, a, b, true);
+        return;
+    }
+    /* The few pairs of near ones are looked at sooner than it is known of all in their clusters. */
+    if (n_within > 0 && !near &&
+        look_is_hidden(w->l, t, one, two, factor_bound(fmax(one->area, two->area), distance2))) {
+        w->found->hidden_pairs += pairs_between(one, two);
+        return;
+    }
+    if (leaves) {
+        bag_add(w->found, a, b, false);
+        return;
+    }
+    const bool split_one = !cluster_is_leaf(one) && (cluster_is_leaf(two) || extent2(one) >= extent2(two));
+    for (int k = 0; k < 2; k++)
+        visit(w, split_one ? one->child[k] : a, split_one ? b : two->child[k], within, n_within);
+}
+
+/* --- tasks --------------------------------------------------------------------------------------------- */
+
+typedef struct task {
+    uint32_t a, b;
+} task;
+
+enum { TASKS_WANTED = 1024 };
+
+/* Pairs of clusters from halfway down, which together make the walk. */
+static size_t make_tasks(const cluster_tree *t, task tasks[TASKS_WANTED + 2]) {
+    size_t n = 1;
+    tasks[0] = (task){0, 0};
+    for (size_t at = 0; at < n && n + 2 <= TASKS_WANTED;) {
+        const task now = tasks[at];
+        const cluster *a = &t->clusters[now.a], *b = &t->clusters[now.b];
+        if (cluster_is_leaf(a) || cluster_is_leaf(b)) {
+            at++;
+            continue;
+        }
+        memmove(tasks + at, tasks + at + 1, (n - at - 1) * sizeof *tasks);
+        n--;
+        if (now.a == now.b) {
+            tasks[n++] = (task){a->child[0], a->child[0]};
+            tasks[n++] = (task){a->child[0], a->child[1]};
+            tasks[n++] = (task){a->child[1], a->child[1]};
+        } else {
+            const bool split_a = extent2(a) >= extent2(b);
+            for (int k = 0; k < 2; k++)
+                tasks[n++] = (task){split_a ? a->child[k] : now.a, split_a ? now.b : b->child[k]};
+        }
+    }
+    return n;
+}
+
+/* Links of one a stand together, ordered by where b begins. */
+static lam_status gather(const cluster_tree *t, const bag *bags, size_t n_bags, cluster_links *out,
+                         lam_error *error) {
+    lam_status status = LAM_OK;
+    cluster_links l = {0};
+    size_t *next = NULL;
+    for (size_t k = 0; k < n_bags; k++) {
+        if (bags[k].out_of_memory) FAIL(error, LAM_ERR_MEMORY, "links of clusters: out of memory");
+        l.n += bags[k].n;
+        l.hidden_pairs += bags[k].hidden_pairs;
+        l.distant_pairs += bags[k].distant_pairs;
+    }
+    l.links = memory_allocate(l.n, sizeof *l.links, "links of clusters", error);
+    l.of_cluster = memory_allocate(t->n_clusters + 1, sizeof *l.of_cluster, "links of clusters", error);
+    next = memory_allocate(t->n_clusters + 1, sizeof *next, "links of clusters", error);
+    if (l.links == NULL || l.of_cluster == NULL || next == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < n_bags; k++)
+        for (size_t p = 0; p < bags[k].n; p++) l.of_cluster[bags[k].links[p].a + 1]++;
+    for (size_t c = 0; c < t->n_clusters; c++) l.of_cluster[c + 1] += l.of_cluster[c];
+    memcpy(next, l.of_cluster, (t->n_clusters + 1) * sizeof *next);
+    for (size_t k = 0; k < n_bags; k++)
+        for (size_t p = 0; p < bags[k].n; p++) l.links[next[bags[k].links[p].a]++] = bags[k].links[p];
+    *out = l;
+    l = (cluster_links){0};
+done:
+    free(next);
+    cluster_links_free(&l);
+    return status;
+}
+
+lam_status cluster_links_find(const mesh *m, const cluster_tree *t, const look *l,
+                              const link_options *options, cluster_links *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    task tasks[TASKS_WANTED + 2];
+    const size_t n_tasks = make_tasks(t, tasks);
+    bag *bags = memory_allocate(n_tasks, sizeof *bags, "links of clusters", error);
+    if (bags == NULL) return LAM_ERR_MEMORY;
+    bool cancelled = false;
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t k = 0; k < n_tasks; k++) {
+        static const uint32_t root = 0;
+        bool stop;
+#pragma omp atomic read
+        stop = cancelled;
+        if (stop) continue;
+        walk w = {.m = m, .t = t, .l = l, .options = options, .found = &bags[k]};
+        visit(&w, tasks[k].a, tasks[k].b, &root, 1);
+        if (progress_cancelled(options->progress)) {
+#pragma omp atomic write
+            cancelled = true;
+        }
+    }
+    if (cancelled) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+    TRY(gather(t, bags, n_tasks, out, error));
+done:
+    for (size_t k = 0; k < n_tasks; k++) free(bags[k].links);
+    free(bags);
+    return status;
+}

@@ -1,0 +1,148 @@
+#include "solver/formfactor/pairs/first_light.h"
+
+#include "solver/formfactor/pairs/occlusion.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Bright elements that are all looked at; of more, as many stand for those that matter less. */
+enum { CLOSELY_MOST = 16, STAND_FOR_ALL = 96 };
+
+struct first_light {
+    const mesh *m;
+    visibility *v;
+    polygon *polygons;
+    pair_rules rules;
+    look look;
+};
+
+lam_status first_light_create(const mesh *m, uint64_t seed, first_light **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    first_light *l = memory_allocate(1, sizeof *l, "the light of few", error);
+    if (l == NULL) TRY(LAM_ERR_MEMORY);
+    l->m = m;
+    l->polygons = memory_allocate(m->n, sizeof *l->polygons, "the light of few", error);
+    if (l->polygons == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < m->n; i++) polygon_of_element(m, i, &l->polygons[i]);
+    pair_rules_init(&l->rules);
+    TRY(visibility_create(m, &l->v, error));
+    l->look = (look){.v = l->v,
+                     .area = m->area,
+                     .polygons = l->polygons,
+                     .rules = &l->rules,
+                     .tolerance = 1e-5,
+                     .accuracy = 3e-5,
+                     .segments = 64,
+                     .seed = seed};
+    *out = l;
+    l = NULL;
+done:
+    first_light_destroy(l);
+    return status;
+}
+
+void first_light_destroy(first_light *l) {
+    if (l == NULL) return;
+    visibility_destroy(l->v);
+    free(l->polygons);
+    free(l);
+}
+
+/* What of the exchange area of two elements is not hidden: looked at closely where the first look saw both.
+ */
+static double seen(const first_light *l, uint32_t e, uint32_t i, bool closely) {
+    double part;
+    if (e == i) return 0;
+    const uint32_t low = e < i ? e : i, high = e < i ? i : e;
+    const double g = pair_exchange(&l->rules, &l->polygons[e], &l->polygons[i], l->look.tolerance);
+    if (g <= 0) return 0;
+    const bool mixed = look_first(&l->look, low, high, g, &part) == LOOK_MIXED;
+    return mixed && closely ? look_closely(&l->look, low, high, g) : part;
+}
+
+/* cos cos' A A' / (pi r^2) from middle to middle. */
+static double kernel(const first_light *l, uint32_t e, uint32_t i) {
+    const polygon *p = &l->polygons[e], *q = &l->polygons[i];
+    double r2 = 0, leaving = 0, arriving = 0;
+    for (int d = 0; d < 3; d++) {
+        const double r = q->centre[d] - p->centre[d];
+        r2 += r * r;
+        leaving += r * p->normal[d];
+        arriving -= r * q->normal[d];
+    }
+    if (!(leaving > 0 && arriving > 0)) return 0;
+    return l->m->area[e] * l->m->area[i] * leaving * arriving / (M_PI * r2 * r2);
+}
+
+/* In [0, 1), of an element. */
+static double place(uint64_t x) {
+    x = (x + 1) * 0x9E3779B97F4A7C15u;
+    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
+    return (double)((x ^ (x >> 27)) >> 11) * 0x1p-53;
+}
+
+/* sum_e E_e g_ei of very many: those above a share of the whole one by one, of the others every so much of
+ * kernel. */
+static double of_many(const first_light *l, size_t count, const uint32_t *of, const float *E, uint32_t i,
+                      double *g) {
+    double all = 0, rest = 0, sum = 0, taken = 0, ratio = 0, passed = 0;
+    for (size_t k = 0; k < count; k++) all += g[k] = (double)E[of[k]] * kernel(l, of[k], i);
+    const double large = all / STAND_FOR_ALL;
+    for (size_t k = 0; k < count; k++) {
+        if (g[k] > large)
+            sum += (double)E[of[k]] * seen(l, of[k], i, false);
+        else
+            rest += g[k];
+    }
+    const double step = rest / STAND_FOR_ALL;
+    double at = step * place(i);
+    for (size_t k = 0; k < count && rest > 0; k++) {
+        if (g[k] > large) continue;
+        passed += g[k];
+        if (!(at < passed)) continue;
+        const double one = (double)E[of[k]] * seen(l, of[k], i, false) / g[k];
+        for (; at < passed; at += step, taken++) ratio += one;
+    }
+    return taken > 0 ? sum + rest * ratio / taken : sum;
+}
+
+lam_status first_light_of(const first_light *l, const float *E, double *H, bool *known, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = l->m->n;
+    size_t count = 0;
+    int failed = 0;
+    uint32_t *of = NULL;
+    for (size_t i = 0; i < n; i++) count += E[i] != 0;
+    *known = count <= FIRST_LIGHT_MOST;
+    if (!*known) return LAM_OK;
+    of = memory_allocate(count, sizeof *of, "the light of few", error);
+    if (of == NULL) TRY(LAM_ERR_MEMORY);
+    count = 0;
+    for (size_t i = 0; i < n; i++)
+        if (E[i] != 0) of[count++] = (uint32_t)i;
+#pragma omp parallel
+    {
+        double *g = malloc((count + 1) * sizeof *g);
+        if (g == NULL) __atomic_store_n(&failed, 1, __ATOMIC_RELAXED);
+#pragma omp for schedule(dynamic, 64)
+        for (size_t i = 0; i < n; i++) {
+            double sum = 0;
+            if (g == NULL) continue;
+            if (count <= CLOSELY_MOST)
+                for (size_t k = 0; k < count; k++)
+                    sum += (double)E[of[k]] * seen(l, of[k], (uint32_t)i, true);
+            else
+                sum = of_many(l, count, of, E, (uint32_t)i, g);
+            H[i] = sum / l->m->area[i];
+        }
+        free(g);
+    }
+    if (failed) FAIL(error, LAM_ERR_MEMORY, "the light of few: cannot allocate %zu numbers", count);
+done:
+    free(of);
+    return status;
+}
+
+lam_status first_light_for_judge(void *context, const float *E, double *H, bool *known, lam_error *error) {
+    return first_light_of(context, E, H, known, error);
+}

@@ -1,0 +1,154 @@
+#include "solver/formfactor/pairs/pair_rows.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static void block_free(pair_block *b) {
+    free(b->other);
+    free(b->exchange);
+    free(b->state);
+    *b = (pair_block){0};
+}
+
+lam_status pair_rows_create(size_t n, pair_rows *out, lam_error *error) {
+    pair_rows rows = {.n = n, .n_blocks = (n + PAIR_BLOCK_ROWS - 1) / PAIR_BLOCK_ROWS};
+    rows.blocks = memory_allocate(rows.n_blocks, sizeof *rows.blocks, "pairs", error);
+    if (rows.blocks == NULL) return LAM_ERR_MEMORY;
+    *out = rows;
+    return LAM_OK;
+}
+
+void pair_rows_free(pair_rows *rows) {
+    for (size_t b = 0; rows->blocks != NULL && b < rows->n_blocks; b++) block_free(&rows->blocks[b]);
+    free(rows->blocks);
+    *rows = (pair_rows){0};
+}
+
+/* Room for exactly so many pairs. */
+static bool block_resize(pair_block *b, size_t capacity) {
+    uint32_t *other = realloc(b->other, (capacity + 1) * sizeof *other);
+    if (other != NULL) b->other = other;
+    float *exchange = realloc(b->exchange, (capacity + 1) * sizeof *exchange);
+    if (exchange != NULL) b->exchange = exchange;
+    uint8_t *state = realloc(b->state, (capacity + 1) * sizeof *state);
+    if (state != NULL) b->state = state;
+    if (other == NULL || exchange == NULL || state == NULL) return false;
+    b->capacity = capacity;
+    return true;
+}
+
+bool pair_block_reserve(pair_block *b, size_t more) {
+    if (b->capacity - b->used >= more) return true;
+    return block_resize(b, b->capacity + b->capacity / 2 + more + 4096);
+}
+
+void pair_block_shrink(pair_block *b) {
+    block_resize(b, b->used); /* where that fails nothing is lost */
+}
+
+pair_state pair_rows_state(const pair_rows *rows, uint32_t p, uint32_t q) {
+    const uint32_t row = p < q ? p : q, wanted = p < q ? q : p;
+    const pair_block *b = &rows->blocks[row / PAIR_BLOCK_ROWS];
+    size_t low = b->begin[row % PAIR_BLOCK_ROWS];
+    const size_t end = b->begin[row % PAIR_BLOCK_ROWS + 1];
+    for (size_t high = end; low < high;) {
+        const size_t middle = low + (high - low) / 2;
+        if (b->other[middle] < wanted)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < end && b->other[low] == wanted ? (pair_state)(b->state[low] & ~PAIR_SETTLED) : PAIR_UNKNOWN;
+}
+
+/* --- on a disk ----------------------------------------------------------------------------------------- */
+
+lam_status pair_rows_open(scratch *s, const char *name, const char geometry[33], const recipe *r, size_t n,
+                          const uint32_t *order, row_file **out, lam_error *error) {
+    row_file_contents contents = {
+        .recipe = *r, .n = n, .block_rows = PAIR_BLOCK_ROWS, .kind = ROW_PAIRS, .sky = NULL};
+    memcpy(contents.geometry, geometry, sizeof contents.geometry);
+    return row_file_open(s, name, &contents, order, out, error);
+}
+
+/* A row's bytes: all positions, all exchange areas, all states. */
+lam_status pair_rows_append(const pair_rows *rows, size_t block, const uint32_t *order, row_file *f,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    const pair_block *b = &rows->blocks[block];
+    const size_t first = pair_rows_first(block), length = pair_rows_length(rows, block);
+    uint8_t *bytes = memory_allocate(b->used + 1, ROW_PAIR_BYTES, "pairs", error), *to = bytes;
+    found_row *found = memory_allocate(rows->n, sizeof *found, "pairs", error);
+    if (bytes == NULL || found == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t r = 0; r < length; r++) {
+        const size_t begin = b->begin[r], count = b->begin[r + 1] - begin;
+        found[order[first + r]] = (found_row){to, (uint32_t)(count * ROW_PAIR_BYTES), (uint32_t)count};
+        if (count == 0) continue;
+        memcpy(to, b->other + begin, count * sizeof *b->other);
+        memcpy(to + 4 * count, b->exchange + begin, count * sizeof *b->exchange);
+        memcpy(to + 8 * count, b->state + begin, count);
+        to += count * ROW_PAIR_BYTES;
+    }
+    TRY(row_file_append(f, block, found, NULL, NULL, error));
+done:
+    free(bytes);
+    free(found);
+    return status;
+}
+
+static lam_status read_block(const pair_rows *rows, size_t block, const uint32_t *order, const row_file *f,
+                             pair_block *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t first = pair_rows_first(block), length = pair_rows_length(rows, block);
+    pair_block fresh = {0};
+    void *data = NULL;
+    size_t total = 0;
+    found_row *found = memory_allocate(rows->n, sizeof *found, "pairs", error);
+    if (found == NULL) return LAM_ERR_MEMORY;
+    TRY(row_file_read(f, block, found, &data, error));
+    for (size_t r = 0; r < length; r++) total += found[order[first + r]].n_entries;
+    if (!block_resize(&fresh, total)) FAIL(error, LAM_ERR_MEMORY, "pairs: out of memory");
+    for (size_t r = 0; r < length; r++) {
+        const found_row *row = &found[order[first + r]];
+        const size_t count = row->n_entries;
+        fresh.begin[r] = fresh.used;
+        if (count == 0) continue;
+        memcpy(fresh.other + fresh.used, row->bytes, count * sizeof *fresh.other);
+        memcpy(fresh.exchange + fresh.used, row->bytes + 4 * count, count * sizeof *fresh.exchange);
+        memcpy(fresh.state + fresh.used, row->bytes + 8 * count, count);
+        fresh.used += count;
+    }
+    for (size_t r = length; r <= PAIR_BLOCK_ROWS; r++) fresh.begin[r] = fresh.used;
+    *out = fresh;
+    fresh = (pair_block){0};
+done:
+    block_free(&fresh);
+    free(data);
+    free(found);
+    return status;
+}
+
+lam_status pair_rows_fetch(pair_rows *rows, size_t block, const uint32_t *order, const row_file *f,
+                           lam_error *error) {
+    pair_block fresh;
+    const lam_status status = read_block(rows, block, order, f, &fresh, error);
+    if (status != LAM_OK) return status;
+    block_free(&rows->blocks[block]);
+    rows->blocks[block] = fresh;
+    return LAM_OK;
+}
+
+lam_status pair_rows_fetch_exchange(pair_rows *rows, size_t block, const uint32_t *order, const row_file *f,
+                                    lam_error *error) {
+    pair_block fresh, *held = &rows->blocks[block];
+    lam_status status = read_block(rows, block, order, f, &fresh, error);
+    if (status != LAM_OK) return status;
+    if (fresh.used != held->used)
+        status = status_fail(error, LAM_ERR_FORMAT,
+                             "the scratch folder holds %zu pairs of block %zu, must be %zu; remove its files",
+                             fresh.used, block, held->used);
+    else
+        memcpy(held->exchange, fresh.exchange, held->used * sizeof *held->exchange);
+    block_free(&fresh);
+    return status;
+}

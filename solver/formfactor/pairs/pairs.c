@@ -1,0 +1,470 @@
+#include "solver/formfactor/pairs/pairs.h"
+
+#include "solver/formfactor/pairs/cluster_links.h"
+#include "solver/formfactor/pairs/neighbours.h"
+#include "solver/formfactor/pairs/pair_far.h"
+#include "solver/formfactor/pairs/pair_rows.h"
+
+#include "solver/base/bitset.h"
+
+#include <math.h>
+#include <omp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct pairs_run {
+    const mesh *m;
+    const pairs_options *options;
+    pair_rules rules;
+    polygon *polygons; /* [n], by element */
+    look look;
+    cluster_tree tree;
+    uint32_t *leaf;   /* [n], the leaf of a position */
+    uint32_t *parent; /* of each cluster */
+    far_table far;
+    cluster_links links;
+    uint32_t (*neighbours)[NEIGHBOURS_MOST]; /* [n], by element */
+    pair_rows rows;
+} pairs_run;
+
+/* --- rows ---------------------------------------------------------------------------------------------- */
+
+/* What a leaf is linked with, itself or as part of a larger cluster: positions first ... last-1. */
+typedef struct reach {
+    uint32_t first, last;
+    bool open;
+} reach;
+
+/* A walk down to the leaves with all the reaches met on the way. */
+typedef struct leaf_reaches {
+    reach *reaches;
+    size_t n, capacity;
+} leaf_reaches;
+
+static int compare_reaches(const void *a, const void *b) {
+    const reach *one = a, *two = b;
+    return (one->first > two->first) - (one->first < two->first);
+}
+
+/* All that the leaf's ancestors and itself are linked with, by position; their positions do not overlap. */
+static bool find_reaches(const pairs_run *run, uint32_t leaf, leaf_reaches *out) {
+    out->n = 0;
+    for (uint32_t c = leaf;; c = run->parent[c]) {
+        const size_t first = run->links.of_cluster[c], last = run->links.of_cluster[c + 1];
+        if (out->n + (last - first) > out->capacity) {
+            const size_t capacity = 2 * (out->n + (last - first)) + 64;
+            reach *more = realloc(out->reaches, capacity * sizeof *more);
+            if (more == NULL) return false;
+            out->reaches = more;
+            out->capacity = capacity;
+        }
+        for (size_t k = first; k < last; k++) {
+            const cluster *b = &run->tree.clusters[run->links.links[k].b];
+            out->reaches[out->n++] = (reach){b->first, b->last, run->links.links[k].open};
+        }
+        if (c == 0) break;
+    }
+    if (out->n > 0) qsort(out->reaches, out->n, sizeof *out->reaches, compare_reaches);
+    return true;
+}
+
+/* The mean of F_ij and F_ji that rays know a pair by: two estimates by their inverse variances (upper.h)
+ * leave an error in S = A^1/2 F A^-1/2 of the variance this / (2 rays). */
+static double factor_of(const pairs_run *run, uint32_t i, uint32_t j, double g) {
+    return 2 * g / (run->m->area[i] + run->m->area[j]);
+}
+
+/* A first look; where it suffices the pair is settled, and g becomes what is seen of it. */
+static int look_at(const pairs_run *run, uint32_t i, uint32_t j, double *g) {
+    double seen;
+    const look_verdict verdict = look_first(&run->look, i, j, *g, &seen);
+    const int state = verdict == LOOK_OPEN ? PAIR_OPEN : verdict == LOOK_HIDDEN ? PAIR_HIDDEN : PAIR_MIXED;
+    if (!look_suffices(&run->look, i, j, *g)) return state;
+    *g = seen;
+    return state | PAIR_SETTLED;
+}
+
+/* The pairs of one position: magnitudes and, where something may be between, a first look. */
+static bool find_row(const pairs_run *run, uint32_t position, const leaf_reaches *to, pair_block *block) {
+    enum { PIECE = 64 };
+    const uint32_t i = run->tree.element[position];
+    for (size_t k = 0; k < to->n; k++) {
+        const reach *r = &to->reaches[k];
+        const uint32_t begin = r->first > position ? r->first : position + 1;
+        for (uint32_t first = begin; first < r->last; first += PIECE) {
+            double exchange[PIECE];
+            const uint32_t count = r->last - first < PIECE ? r->last - first : PIECE;
+            if (!pair_block_reserve(block, count)) return false;
+            far_row(&run->far, position, first, count, exchange);
+            for (uint32_t c = 0; c < count; c++) {
+                const uint32_t j = run->tree.element[first + c];
+                double g = exchange[c];
+                if (g < 0)
+                    g = pair_exchange(&run->rules, &run->polygons[i], &run->polygons[j],
+                                      run->options->tolerance);
+                if (!((float)g > 0) || factor_of(run, i, j, g) < run->options->threshold) continue;
+                const int state = r->open ? PAIR_CERTAIN : look_at(run, i, j, &g);
+                pair_block_add(block, first + c, (float)g, (uint8_t)state);
+            }
+        }
+    }
+    return true;
+}
+
+static bool find_block(pairs_run *run, size_t index, leaf_reaches *to) {
+    pair_block *block = &run->rows.blocks[index];
+    const size_t first = pair_rows_first(index), length = pair_rows_length(&run->rows, index);
+    bool enough = true;
+    for (size_t r = 0; r < length && enough; r++) {
+        const size_t at = first + r;
+        block->begin[r] = block->used;
+        if (r == 0 || run->leaf[at] != run->leaf[at - 1]) enough = find_reaches(run, run->leaf[at], to);
+        enough = enough && find_row(run, (uint32_t)at, to, block);
+    }
+    for (size_t r = length; r <= PAIR_BLOCK_ROWS; r++) block->begin[r] = block->used;
+    pair_block_shrink(block);
+    return enough;
+}
+
+/* --- refinement ---------------------------------------------------------------------------------------- */
+
+static pair_state state_of(const pairs_run *run, uint32_t i, uint32_t j) {
+    return pair_rows_state(&run->rows, run->tree.position[i], run->tree.position[j]);
+}
+
+/* Whether a pair next to this one, with either element replaced by a neighbour of it, came out otherwise. */
+static bool at_a_border(const pairs_run *run, uint32_t i, uint32_t j, pair_state state) {
+    for (int side = 0; side < 2; side++) {
+        const uint32_t kept = side == 0 ? i : j;
+        const uint32_t *others = run->neighbours[side == 0 ? j : i];
+        for (int k = 0; k < NEIGHBOURS_MOST && others[k] != UINT32_MAX; k++) {
+            if (others[k] == kept) continue;
+            const pair_state other = state_of(run, kept, others[k]);
+            if (other == PAIR_MIXED ||
+                (state == PAIR_OPEN ? other == PAIR_HIDDEN : other == PAIR_OPEN || other == PAIR_CERTAIN))
+                return true;
+        }
+    }
+    return false;
+}
+
+/* Whether a pair must be looked at closely. */
+static bool is_mixed(const pairs_run *run, uint32_t i, uint32_t j, uint8_t state) {
+    if (state == PAIR_CERTAIN || (state & PAIR_SETTLED) != 0) return false;
+    return state == PAIR_MIXED || at_a_border(run, i, j, (pair_state)state);
+}
+
+/* Segments that the accuracy asked for would take for the pairs of one block. */
+static double segments_of_block(const pairs_run *run, size_t index) {
+    const pair_block *block = &run->rows.blocks[index];
+    double sum = 0;
+    size_t r = 0;
+    for (size_t at = 0; at < block->used; at++) {
+        while (at >= block->begin[r + 1]) r++;
+        const uint32_t i = run->tree.element[pair_rows_first(index) + r],
+                       j = run->tree.element[block->other[at]];
+        if (is_mixed(run, i, j, block->state[at]))
+            sum += look_segments(&run->look, i, j, (double)block->exchange[at]);
+    }
+    return sum;
+}
+
+/* Where all mixed pairs together would take more segments than there may be, or fewer than there shall be at
+ * least, each gets its part of them: N segments leave an error of N^-3/4. */
+static lam_status share_segments(pairs_run *run, lam_error *error) {
+    const size_t n_blocks = run->rows.n_blocks;
+    double wanted = 0;
+    double *of_block = memory_allocate(n_blocks, sizeof *of_block, "pairs", error);
+    if (of_block == NULL) return LAM_ERR_MEMORY;
+#pragma omp parallel for schedule(dynamic, 4)
+    for (size_t b = 0; b < n_blocks; b++) of_block[b] = segments_of_block(run, b);
+    for (size_t b = 0; b < n_blocks; b++) wanted += of_block[b];
+    free(of_block);
+    const double cast = fmin(fmax(wanted, run->options->segments_least), run->options->segments_most);
+    if (wanted > 0) run->look.accuracy *= pow(wanted / cast, .75);
+    return LAM_OK;
+}
+
+/* What is hidden of the pairs of one block. States stay as they were found: neighbours ask for them. Where
+ * the exchange areas came from a scratch file nothing is looked at again. */
+static void refine_block(pairs_run *run, size_t index, bool known, pairs_report *sum) {
+    pair_block *block = &run->rows.blocks[index];
+    size_t r = 0;
+    for (size_t at = 0; at < block->used; at++) {
+        while (at >= block->begin[r + 1]) r++;
+        const pair_state state = (pair_state)(block->state[at] & ~PAIR_SETTLED);
+        const uint32_t i = run->tree.element[pair_rows_first(index) + r],
+                       j = run->tree.element[block->other[at]];
+        sum->facing++;
+        if (state == PAIR_CERTAIN) {
+            sum->certain++;
+        } else if (block->state[at] & PAIR_SETTLED) {
+            sum->settled++;
+        } else if (is_mixed(run, i, j, block->state[at])) {
+            sum->mixed++;
+            if (!known)
+                block->exchange[at] = (float)look_closely(&run->look, i, j, (double)block->exchange[at]);
+        } else if (state == PAIR_OPEN) {
+            sum->open++;
+        } else {
+            sum->hidden++;
+            block->exchange[at] = 0;
+        }
+    }
+}
+
+/* --- passes -------------------------------------------------------------------------------------------- */
+
+/* A walk over all blocks: what it finds, and what it adds to a file. */
+typedef struct pass {
+    pairs_run *run;
+    bool refine;
+    double share_before, share; /* of the work, for the progress line */
+    row_file *file;             /* NULL: none */
+    size_t finished, kept;      /* rows */
+    bool stop;
+    lam_status status;
+    lam_error error;
+    pairs_report report;
+} pass;
+
+static void pass_fail(pass *p, lam_status status, const lam_error *error) {
+#pragma omp critical(pairs_failure)
+    if (p->status == LAM_OK) {
+        p->status = status;
+        p->error = *error;
+    }
+#pragma omp atomic write
+    p->stop = true;
+}
+
+static void add_report(pairs_report *sum, const pairs_report *more) {
+    sum->facing += more->facing;
+    sum->certain += more->certain;
+    sum->settled += more->settled;
+    sum->open += more->open;
+    sum->hidden += more->hidden;
+    sum->mixed += more->mixed;
+}
+
+/* One block of a pass, found or fetched. */
+static lam_status pass_block(pass *p, size_t index, leaf_reaches *to, pairs_report *more, lam_error *error) {
+    pairs_run *run = p->run;
+    const bool known = p->file != NULL && row_file_has(p->file, index);
+    if (known) {
+        const lam_status status =
+            p->refine ? pair_rows_fetch_exchange(&run->rows, index, run->tree.element, p->file, error)
+                      : pair_rows_fetch(&run->rows, index, run->tree.element, p->file, error);
+        if (status != LAM_OK) return status;
+    } else if (!p->refine && !find_block(run, index, to)) {
+        return status_fail(error, LAM_ERR_MEMORY, "pairs of %zu elements: out of memory; use --quality draft",
+                           run->m->n);
+    }
+    if (p->refine) refine_block(run, index, known, more);
+    if (p->file == NULL || known) return LAM_OK;
+    lam_status status;
+#pragma omp critical(pairs_file)
+    status = pair_rows_append(&run->rows, index, run->tree.element, p->file, error);
+    return status;
+}
+
+static lam_status pass_run(pass *p, lam_error *error) {
+    pairs_run *run = p->run;
+    const pairs_options *o = run->options;
+    const size_t n_threads = (size_t)omp_get_max_threads();
+    leaf_reaches *reaches = memory_allocate(n_threads, sizeof *reaches, "pairs", error);
+    if (reaches == NULL) return LAM_ERR_MEMORY;
+    if (p->file != NULL) p->kept = row_file_kept(p->file);
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t b = 0; b < run->rows.n_blocks; b++) {
+        bool stop;
+        lam_error why = {0};
+        pairs_report more = {0};
+#pragma omp atomic read
+        stop = p->stop;
+        if (stop) continue;
+        const lam_status status = pass_block(p, b, &reaches[omp_get_thread_num()], &more, &why);
+        if (status != LAM_OK) pass_fail(p, status, &why);
+#pragma omp critical(pairs_progress)
+        {
+            add_report(&p->report, &more);
+            p->finished += pair_rows_length(&run->rows, b);
+            progress_report(o->progress, o->stage,
+                            p->share_before + p->share * (double)p->finished / (double)run->m->n);
+        }
+        if (progress_cancelled(o->progress))
+            pass_fail(p, status_fail(&why, LAM_ERR_CANCELLED, "cancelled"), &why);
+    }
+    for (size_t k = 0; k < n_threads; k++) free(reaches[k].reaches);
+    free(reaches);
+    if (p->status != LAM_OK && error != NULL) *error = p->error;
+    return p->status;
+}
+
+/* The file of a pass in the scratch folder; none without one. */
+static lam_status open_file(const pairs_run *run, const char *suffix, row_file **out, lam_error *error) {
+    const pairs_options *o = run->options;
+    char name[64], geometry[33];
+    if (o->scratch == NULL) return LAM_OK;
+    snprintf(name, sizeof name, "%s.%s", o->scratch_name, suffix);
+    mesh_geometry_hash(run->m, geometry);
+    return pair_rows_open(o->scratch, name, geometry, o->recipe, run->m->n, run->tree.element, out, error);
+}
+
+static lam_status run_passes(pairs_run *run, pairs_report *report, size_t *kept, lam_error *error) {
+    lam_status status = LAM_OK;
+    pass find = {.run = run, .share_before = .1, .share = .5},
+         refine = {.run = run, .refine = true, .share_before = .6, .share = .4};
+    TRY(open_file(run, "found", &find.file, error));
+    TRY(open_file(run, "seen", &refine.file, error));
+    TRY(pass_run(&find, error));
+    TRY(share_segments(run, error));
+    TRY(pass_run(&refine, error));
+    *report = refine.report;
+    report->accuracy = run->look.accuracy;
+    if (kept != NULL) *kept = find.kept;
+done:
+    row_file_close(find.file);
+    row_file_close(refine.file);
+    return status;
+}
+
+/* --- result -------------------------------------------------------------------------------------------- */
+
+/* Puts a row whose entries stand in any order in that of their indices, by way of a whole row of nothing. */
+static void sort_row(csr *rows, size_t i, float *dense, marks *there) {
+    for (uint64_t p = rows->indptr[i]; p < rows->indptr[i + 1]; p++) {
+        const uint32_t j = rows->indices[p];
+        dense[j] = rows->data[p];
+        marks_add(there, j);
+    }
+    const size_t count = marks_take(there);
+    for (size_t k = 0; k < count; k++) {
+        rows->indices[rows->indptr[i] + k] = there->taken[k];
+        rows->data[rows->indptr[i] + k] = dense[there->taken[k]];
+    }
+}
+
+static lam_status sort_rows(csr *rows, lam_error *error) {
+    const size_t n = rows->n;
+    bool out_of_memory = false;
+#pragma omp parallel
+    {
+        lam_error ignored;
+        marks there;
+        float *dense = memory_allocate(n, sizeof *dense, "form factor rows", &ignored);
+        const bool enough = marks_make(n, 0, "form factor rows", &there, &ignored) == LAM_OK && dense != NULL;
+        if (!enough) {
+#pragma omp atomic write
+            out_of_memory = true;
+        }
+#pragma omp for schedule(dynamic, 16)
+        for (size_t i = 0; i < n; i++)
+            if (enough) sort_row(rows, i, dense, &there);
+        free(dense);
+        marks_free(&there);
+    }
+    return out_of_memory ? status_fail(error, LAM_ERR_MEMORY, "rows of %zu elements: out of memory", n)
+                         : LAM_OK;
+}
+
+/* What is not zero, by element, above the diagonal, rows ascending. */
+static lam_status gather(const pairs_run *run, csr *G, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = run->m->n;
+    const bool keep = run->options->keep_hidden;
+    csr rows = {.n = n};
+    uint64_t *next = memory_allocate(n + 1, sizeof *next, "form factor rows", error);
+    rows.indptr = memory_allocate(n + 1, sizeof *rows.indptr, "form factor rows", error);
+    if (rows.indptr == NULL || next == NULL) TRY(LAM_ERR_MEMORY);
+    for (int fill = 0; fill < 2; fill++) {
+#pragma omp parallel for schedule(dynamic, 64)
+        for (size_t at = 0; at < n; at++) {
+            const pair_block *block = &run->rows.blocks[at / PAIR_BLOCK_ROWS];
+            const size_t *begin = &block->begin[at % PAIR_BLOCK_ROWS];
+            const uint32_t one = run->tree.element[at];
+            for (size_t p = begin[0]; p < begin[1]; p++) {
+                const float g = block->exchange[p];
+                const uint32_t two = run->tree.element[block->other[p]];
+                const uint32_t i = one < two ? one : two, j = one < two ? two : one;
+                if (!(g > 0 || keep)) continue;
+                if (fill == 0) {
+                    __atomic_fetch_add(&rows.indptr[i + 1], 1, __ATOMIC_RELAXED);
+                    continue;
+                }
+                const uint64_t there = __atomic_fetch_add(&next[i], 1, __ATOMIC_RELAXED);
+                rows.indices[there] = j;
+                rows.data[there] = g;
+            }
+        }
+        if (fill == 1) break;
+        for (size_t i = 0; i < n; i++) rows.indptr[i + 1] += rows.indptr[i];
+        memcpy(next, rows.indptr, (n + 1) * sizeof *next);
+        TRY(csr_reserve(&rows, rows.indptr[n], error));
+    }
+    TRY(sort_rows(&rows, error));
+    *G = rows;
+    rows = (csr){0};
+done:
+    free(next);
+    csr_free(&rows);
+    return status;
+}
+
+static lam_status find_parents(pairs_run *run, lam_error *error) {
+    const cluster_tree *t = &run->tree;
+    run->parent = memory_allocate(t->n_clusters, sizeof *run->parent, "pairs", error);
+    run->leaf = memory_allocate(t->n, sizeof *run->leaf, "pairs", error);
+    if (run->parent == NULL || run->leaf == NULL) return LAM_ERR_MEMORY;
+    for (size_t c = 0; c < t->n_clusters; c++) {
+        const cluster *one = &t->clusters[c];
+        if (cluster_is_leaf(one))
+            for (uint32_t p = one->first; p < one->last; p++) run->leaf[p] = (uint32_t)c;
+        else
+            for (int k = 0; k < 2; k++) run->parent[one->child[k]] = (uint32_t)c;
+    }
+    return LAM_OK;
+}
+
+lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_options *options, csr *G,
+                          pairs_report *report, size_t *kept, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = m->n;
+    const double slack = visibility_rounding(v);
+    pairs_run run = {.m = m, .options = options};
+    const link_options how = {.threshold = options->threshold, .slack = slack, .progress = options->progress};
+    pair_rules_init(&run.rules);
+    run.polygons = memory_allocate(n, sizeof *run.polygons, "pairs", error);
+    run.neighbours = memory_allocate(n, sizeof *run.neighbours, "pairs", error);
+    if (run.polygons == NULL || run.neighbours == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(pair_rows_create(n, &run.rows, error));
+    for (size_t i = 0; i < n; i++) polygon_of_element(m, i, &run.polygons[i]);
+    run.look = (look){.v = v,
+                      .area = m->area,
+                      .polygons = run.polygons,
+                      .rules = &run.rules,
+                      .tolerance = options->tolerance,
+                      .accuracy = options->accuracy,
+                      .segments = options->segments,
+                      .seed = options->seed};
+    TRY(neighbours_find(m, run.neighbours, error));
+    TRY(cluster_tree_build(m, slack, &run.tree, error));
+    TRY(far_table_build(run.polygons, &run.tree, &run.rules, options->tolerance, &run.far, error));
+    TRY(cluster_links_find(m, &run.tree, &run.look, &how, &run.links, error));
+    TRY(find_parents(&run, error));
+    TRY(run_passes(&run, report, kept, error));
+    report->hidden += run.links.hidden_pairs;
+    report->facing += run.links.hidden_pairs;
+    TRY(gather(&run, G, error));
+done:
+    pair_rows_free(&run.rows);
+    free(run.polygons);
+    free(run.neighbours);
+    free(run.parent);
+    free(run.leaf);
+    far_table_free(&run.far);
+    cluster_links_free(&run.links);
+    cluster_tree_free(&run.tree);
+    return status;
+}

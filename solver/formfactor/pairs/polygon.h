@@ -1,0 +1,39 @@
+/* A planar convex polygon in double: an element, or what of it lies in front of another's plane. */
+#ifndef LAMBERT_FORMFACTOR_PAIRS_POLYGON_H
+#define LAMBERT_FORMFACTOR_PAIRS_POLYGON_H
+
+#include "solver/scene/mesh.h"
+
+/* A quad cut by a plane has at most five corners; one more for the cut of a cut. */
+enum { POLYGON_CORNERS = 6 };
+
+typedef struct polygon {
+    int n;                             /* corners; below 3 it is empty */
+    double corner[POLYGON_CORNERS][3]; /* counter-clockwise seen from the front */
+    double normal[3];                  /* unit, towards the front */
+    double centre[3], radius;          /* of a sphere about all corners */
+    bool affine;                       /* a triangle or a parallelogram */
+} polygon;
+
+/* Takes normal, centre and radius from the corners, which must span an area. */
+void polygon_measure(polygon *p);
+
+void polygon_of_element(const mesh *m, size_t element, polygon *out);
+
+/* What of p lies in front of the plane of other; empty when nothing reaches further than rounding. */
+void polygon_in_front(const polygon *p, const polygon *other, polygon *out);
+
+double polygon_area(const polygon *p);
+
+/* The halves of a triangle or a quad, cut across its longest side (the middle of the longer pair of sides).
+ */
+void polygon_halve(const polygon *p, polygon halves[2]);
+
+/* Eight points of an affine polygon at (u, w) in the unit square, component by component. */
+void polygon_affine_points(const polygon *p, const double u[8], const double w[8], double points[3][8]);
+
+/* The point of a triangle or a quad at (u, w) in the unit square; returns how much area a unit of the square
+ * has there. */
+double polygon_point(const polygon *p, double u, double w, double point[3]);
+
+#endif

@@ -1,0 +1,122 @@
+#include "solver/formfactor/pairs/shaft.h"
+
+#include <math.h>
+
+static void add_plane(shaft *s, const double normal[3], double level) {
+    for (int d = 0; d < 3; d++) s->normal[s->n_planes][d] = normal[d];
+    s->level[s->n_planes++] = level;
+}
+
+/* In the plane of the axes u and v two rectangles have a hull; of its edges those that lead from one to the
+ * other are not of the common box. There is one for a quadrant where one rectangle reaches further along u
+ * and the other along v. */
+static void add_hull(shaft *s, const cluster *a, const cluster *b, int u, int v, double slack) {
+    for (int quadrant = 0; quadrant < 4; quadrant++) {
+        const double along_u = quadrant & 1 ? 1 : -1, along_v = quadrant & 2 ? 1 : -1;
+        const double a_u = along_u > 0 ? a->high[u] : a->low[u], a_v = along_v > 0 ? a->high[v] : a->low[v];
+        const double b_u = along_u > 0 ? b->high[u] : b->low[u], b_v = along_v > 0 ? b->high[v] : b->low[v];
+        const double du = along_u * (a_u - b_u), dv = along_v * (a_v - b_v);
+        if (!(du * dv < 0)) continue;
+        const double length = sqrt(du * du + dv * dv);
+        double normal[3] = {0};
+        normal[u] = along_u * fabs(dv) / length;
+        normal[v] = along_v * fabs(du) / length;
+        add_plane(s, normal, normal[u] * a_u + normal[v] * a_v - slack);
+    }
+}
+
+/* Only what is in front of a plane hides anything from it. */
+static void add_front(shaft *s, const cluster *c, double slack) {
+    if (!c->plane) return;
+    const double back[3] = {-c->normal[0], -c->normal[1], -c->normal[2]};
+    add_plane(s, back, -c->level - slack);
+}
+
+void shaft_init(shaft *s, const cluster *a, const cluster *b, double slack) {
+    s->n_planes = 0;
+    for (int d = 0; d < 3; d++) {
+        s->low[d] = fmin(a->low[d], b->low[d]) + slack;
+        s->high[d] = fmax(a->high[d], b->high[d]) - slack;
+    }
+    add_front(s, a, slack);
+    add_front(s, b, slack);
+    add_hull(s, a, b, 0, 1, slack);
+    add_hull(s, a, b, 1, 2, slack);
+    add_hull(s, a, b, 2, 0, slack);
+}
+
+bool shaft_misses_box(const shaft *s, const double low[3], const double high[3]) {
+    for (int d = 0; d < 3; d++)
+        if (low[d] >= s->high[d] || high[d] <= s->low[d]) return true;
+    for (int k = 0; k < s->n_planes; k++) {
+        double least = 0;
+        for (int d = 0; d < 3; d++) least += s->normal[k][d] * (s->normal[k][d] > 0 ? low[d] : high[d]);
+        if (least >= s->level[k]) return true;
+    }
+    return false;
+}
+
+bool shaft_misses_element(const shaft *s, const mesh *m, uint32_t element) {
+    const uint32_t *corner = m->elements[element];
+    const size_t corners = mesh_corners(m, element);
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t c = 0; c < corners; c++)
+        for (int d = 0; d < 3; d++) {
+            const double x = m->vertices[corner[c]][d];
+            low[d] = x < low[d] ? x : low[d];
+            high[d] = x > high[d] ? x : high[d];
+        }
+    for (int d = 0; d < 3; d++)
+        if (low[d] >= s->high[d] || high[d] <= s->low[d]) return true;
+    for (int k = 0; k < s->n_planes; k++) {
+        double least = INFINITY;
+        for (size_t c = 0; c < corners; c++) {
+            const double *x = m->vertices[corner[c]];
+            const double at = s->normal[k][0] * x[0] + s->normal[k][1] * x[1] + s->normal[k][2] * x[2];
+            least = at < least ? at : least;
+        }
+        if (least >= s->level[k]) return true;
+    }
+    return false;
+}
+
+static bool misses_leaf(const shaft *s, const mesh *m, const cluster_tree *t, const cluster *leaf) {
+    for (uint32_t p = leaf->first; p < leaf->last; p++)
+        if (!shaft_misses_element(s, m, t->element[p])) return false;
+    return true;
+}
+
+static double extent2(const double low[3], const double high[3]) {
+    double sum = 0;
+    for (int d = 0; d < 3; d++) sum += (high[d] - low[d]) * (high[d] - low[d]);
+    return sum;
+}
+
+size_t shaft_filter(const shaft *s, const mesh *m, const cluster_tree *t, const uint32_t *candidates,
+                    size_t n_candidates, bool finest, uint32_t out[SHAFT_CANDIDATES]) {
+    /* A piece is small enough to be kept whole when it is an eighth as long as the shaft: the shafts within
+     * this one take it apart further. */
+    enum { DEPTH = 128 };
+    const double small = finest ? 0 : extent2(s->low, s->high) / 64;
+    size_t n_out = 0;
+    for (size_t k = 0; k < n_candidates; k++) {
+        uint32_t stack[DEPTH];
+        size_t depth = 0;
+        stack[depth++] = candidates[k];
+        while (depth > 0) {
+            const uint32_t at = stack[--depth];
+            const cluster *c = &t->clusters[at];
+            if (shaft_misses_box(s, c->low, c->high)) continue;
+            if (cluster_is_leaf(c)) {
+                if (misses_leaf(s, m, t, c)) continue;
+            } else if (extent2(c->low, c->high) > small && depth + 2 <= DEPTH &&
+                       n_out + depth + (n_candidates - k) + 2 <= SHAFT_CANDIDATES) {
+                stack[depth++] = c->child[1];
+                stack[depth++] = c->child[0];
+                continue;
+            }
+            out[n_out++] = at;
+        }
+    }
+    return n_out;
+}

@@ -1,0 +1,76 @@
+/* One row of form factors as it was found, packed: for every entry the gap to the one before and its count,
+ * most often one byte for both, or its weight in single precision. */
+#ifndef LAMBERT_FORMFACTOR_ROWS_ROW_CODE_H
+#define LAMBERT_FORMFACTOR_ROWS_ROW_CODE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+/* ROW_PAIRS: of pairs taken one by one (pair_rows.h), not packed. */
+typedef enum row_kind { ROW_COUNTS, ROW_WEIGHTS, ROW_PAIRS } row_kind;
+
+/* Bytes of a pair: position, exchange area, state. */
+enum { ROW_PAIR_BYTES = 9 };
+
+/* Bytes of one entry at most: 33 bits of gap and 24 of count in groups of seven. */
+enum { ROW_ENTRY_MOST = 10 };
+
+static inline uint8_t *row_put_number(uint8_t *to, uint64_t x) {
+    for (; x >= 0x80; x >>= 7) *to++ = (uint8_t)(x | 0x80);
+    *to++ = (uint8_t)x;
+    return to;
+}
+
+static inline const uint8_t *row_get_number(const uint8_t *from, uint64_t *x) {
+    uint64_t byte = *from++;
+    *x = byte & 0x7F;
+    for (unsigned shift = 7; byte & 0x80; shift += 7) {
+        byte = *from++;
+        *x |= (byte & 0x7F) << shift;
+    }
+    return from;
+}
+
+/* Appends one entry: gap columns are left out before it. A count is a whole number from 1 to 2^24. */
+static inline uint8_t *row_put(row_kind kind, uint8_t *to, uint32_t gap, float value) {
+    if (kind == ROW_WEIGHTS) {
+        to = row_put_number(to, gap);
+        memcpy(to, &value, sizeof value);
+        return to + sizeof value;
+    }
+    const bool many = value > 1;
+    to = row_put_number(to, (uint64_t)gap << 1 | many);
+    return many ? row_put_number(to, (uint64_t)value - 2) : to;
+}
+
+/* Reads what row_put wrote; returns where the next entry begins. */
+static inline const uint8_t *row_get(row_kind kind, const uint8_t *from, uint32_t *gap, float *value) {
+    uint64_t x;
+    from = row_get_number(from, &x);
+    if (kind == ROW_WEIGHTS) {
+        *gap = (uint32_t)x;
+        memcpy(value, from, sizeof *value);
+        return from + sizeof *value;
+    }
+    *gap = (uint32_t)(x >> 1);
+    *value = 1;
+    if (x & 1) {
+        from = row_get_number(from, &x);
+        *value = (float)(x + 2);
+    }
+    return from;
+}
+
+/* A packed row. */
+typedef struct found_row {
+    const uint8_t *bytes;
+    uint32_t n_bytes, n_entries;
+} found_row;
+
+/* Whether a row that comes from a file can be read: whole entries, as many as stated, columns below n, values
+ * that are finite and above 0. */
+bool row_check(row_kind kind, const found_row *row, size_t n);
+
+#endif

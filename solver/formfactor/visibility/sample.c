@@ -1,0 +1,178 @@
+#include "solver/formfactor/visibility/sample.h"
+
+#include "solver/scene/plane.h"
+
+#include <math.h>
+
+/* Steps of the 4-d Kronecker sequence: frac(phi^-d), d = 1 ... 4, in units of 2^-32, where phi^5 = phi + 1
+ * (the generalised golden ratio; Roberts 2018). */
+static const uint32_t kronecker_step[4] = {3679390609u, 3152041523u, 2700274807u, 2313257605u};
+
+/* A well-mixed 64-bit value of x (the finalizer of SplitMix64; Steele et al. 2014). */
+static uint64_t mix(uint64_t x) {
+    x += 0x9E3779B97F4A7C15u;
+    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
+    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
+    return x ^ (x >> 31);
+}
+
+static void set_piece(element_sampler *s, int piece, const double *a, const double *b, const double *c,
+                      const visibility *v) {
+    visibility_recentre(v, a, s->corner[piece]);
+    for (int d = 0; d < 3; d++) {
+        s->edge[piece][0][d] = (float)(b[d] - a[d]);
+        s->edge[piece][1][d] = (float)(c[d] - a[d]);
+    }
+}
+
+void element_frame_init(element_frame *f, const mesh *m, size_t element) {
+    const double *a = m->vertices[m->elements[element][0]], *b = m->vertices[m->elements[element][1]];
+    const float *normal = m->normal[element];
+    double t[3], length = 0;
+    for (int d = 0; d < 3; d++) length += (b[d] - a[d]) * (b[d] - a[d]);
+    length = sqrt(length);
+    for (int d = 0; d < 3; d++) t[d] = (b[d] - a[d]) / length;
+    const double n[3] = {normal[0], normal[1], normal[2]};
+    for (int d = 0; d < 3; d++) {
+        f->normal[d] = normal[d];
+        f->tangent[d] = (float)t[d];
+        f->bitangent[d] = (float)(n[(d + 1) % 3] * t[(d + 2) % 3] - n[(d + 2) % 3] * t[(d + 1) % 3]);
+    }
+}
+
+void element_sampler_init(element_sampler *s, const mesh *m, const visibility *v, size_t element,
+                          uint64_t seed) {
+    const uint32_t *corner = m->elements[element];
+    const double *a = m->vertices[corner[0]], *b = m->vertices[corner[1]], *c = m->vertices[corner[2]];
+    s->parallelogram = false;
+    s->first_share = 1;
+    set_piece(s, 0, a, b, c, v);
+    if (mesh_corners(m, element) == 4) {
+        const double *e = m->vertices[corner[3]];
+        double off = 0, size = 0;
+        for (int d = 0; d < 3; d++) {
+            off += fabs(a[d] - b[d] + c[d] - e[d]);
+            size += fabs(c[d] - a[d]) + fabs(e[d] - b[d]);
+        }
+        s->parallelogram = off <= 1e-9 * size;
+        if (s->parallelogram) {
+            set_piece(s, 0, a, b, e, v);
+        } else {
+            const double first = triangle_area(a, b, c), second = triangle_area(a, c, e);
+            s->first_share = (float)(first / (first + second));
+            set_piece(s, 1, a, c, e, v);
+        }
+    }
+    element_frame_init(&s->frame, m, element);
+    uint64_t state = mix(seed) ^ mix((uint64_t)element + 1);
+    for (int d = 0; d < 4; d += 2) {
+        state = mix(state);
+        s->shift[d] = (uint32_t)state;
+        s->shift[d + 1] = (uint32_t)(state >> 32);
+    }
+}
+
+/* A 32-bit fraction as a float in [0, 1). */
+static inline float fraction(uint32_t x) {
+    return (float)(int32_t)(x >> 8) * 0x1p-24f; /* signed: converted four at once */
+}
+
+/* a where the mask is all ones, b where it is 0. */
+static inline float pick(uint32_t mask, float a, float b) {
+    union {
+        float value;
+        uint32_t bits;
+    } one = {.value = a}, two = {.value = b};
+    one.bits = (one.bits & mask) | (two.bits & ~mask);
+    return one.value;
+}
+
+/* Shirley and Chiu's concentric map of the square to the disc: it keeps neighbours together, so a sequence
+ * that is even in the square stays even in the disc. x, y in [-1, 1]; the sine and cosine of |angle| <= pi/4
+ * are Taylor polynomials good to 4e-8. */
+static inline void square_to_disc(float x, float y, float *dx, float *dy) {
+    /* Bits of the larger and the smaller coordinate are chosen by a mask: without branches eight are mapped
+     * at once. */
+    const uint32_t wide = -(uint32_t)(fabsf(x) > fabsf(y));
+    const float r = pick(wide, x, y), other = pick(wide, y, x);
+    const float ratio = other / (r + (float)(r == 0)); /* never by 0 */
+    const float t = .785398163f * ratio, t2 = t * t;
+    const float sine =
+        t * (1 + t2 * (-1.f / 6 + t2 * (1.f / 120 + t2 * (-1.f / 5040 + t2 * (1.f / 362880)))));
+    const float cosine = 1 + t2 * (-.5f + t2 * (1.f / 24 + t2 * (-1.f / 720 + t2 * (1.f / 40320))));
+    *dx = r * pick(wide, cosine, sine);
+    *dy = r * pick(wide, sine, cosine);
+}
+
+void element_sampler_point(const element_sampler *s, float u, float w, float point[3]) {
+    int piece = 0;
+    if (!s->parallelogram) {
+        /* The first coordinate chooses the triangle and is stretched again; then the square is folded. */
+        if (u < s->first_share) {
+            u = u / s->first_share;
+        } else {
+            u = (u - s->first_share) / (1 - s->first_share);
+            piece = 1;
+        }
+        if (u + w > 1) {
+            u = 1 - u;
+            w = 1 - w;
+        }
+    }
+    for (int d = 0; d < 3; d++)
+        point[d] = s->corner[piece][d] + u * s->edge[piece][0][d] + w * s->edge[piece][1][d];
+}
+
+/* The place of a low-discrepancy sequence (see kronecker_step). */
+void pair_sampler_init(pair_sampler *s, uint64_t seed, size_t i, size_t j) {
+    uint64_t state = mix(mix(seed) ^ mix((uint64_t)i + 1)) ^ mix((uint64_t)j + 0x100000001u);
+    for (int d = 0; d < 4; d += 2) {
+        state = mix(state);
+        s->shift[d] = (uint32_t)state;
+        s->shift[d + 1] = (uint32_t)(state >> 32);
+    }
+}
+
+void pair_sampler_place(const pair_sampler *s, uint32_t index, double x[4]) {
+    for (int d = 0; d < 4; d++) x[d] = (double)(s->shift[d] + index * kronecker_step[d]) * 0x1p-32;
+}
+
+void pair_sampler_packet(const pair_sampler *s, uint32_t first, double x[4][VISIBILITY_PACKET]) {
+    for (int d = 0; d < 4; d++)
+        for (uint32_t k = 0; k < VISIBILITY_PACKET; k++)
+            x[d][k] = (double)(s->shift[d] + (first + k) * kronecker_step[d]) * 0x1p-32;
+}
+
+void element_sampler_packet(const element_sampler *s, uint32_t first, ray_packet *rays) {
+    const element_frame *f = &s->frame;
+    float x[4][VISIBILITY_PACKET];
+    /* Told to, the compiler takes the rays four at a time; of itself it takes the axes. */
+    for (int d = 0; d < 4; d++)
+#pragma omp simd
+        for (uint32_t i = 0; i < VISIBILITY_PACKET; i++)
+            x[d][i] = fraction(s->shift[d] + (first + i) * kronecker_step[d]);
+
+    if (s->parallelogram) {
+        for (int d = 0; d < 3; d++)
+#pragma omp simd
+            for (int i = 0; i < VISIBILITY_PACKET; i++)
+                rays->origin[d][i] =
+                    s->corner[0][d] + x[0][i] * s->edge[0][0][d] + x[1][i] * s->edge[0][1][d];
+    } else {
+        for (int i = 0; i < VISIBILITY_PACKET; i++) {
+            float origin[3];
+            element_sampler_point(s, x[0][i], x[1][i], origin);
+            for (int d = 0; d < 3; d++) rays->origin[d][i] = origin[d];
+        }
+    }
+    float dx[VISIBILITY_PACKET], dy[VISIBILITY_PACKET], dz[VISIBILITY_PACKET];
+    for (int i = 0; i < VISIBILITY_PACKET; i++) {
+        square_to_disc(2 * x[2][i] - 1, 2 * x[3][i] - 1, &dx[i], &dy[i]);
+        const float left = 1 - dx[i] * dx[i] - dy[i] * dy[i];
+        dz[i] = sqrtf(left > 1e-12f ? left : 1e-12f);
+    }
+    for (int d = 0; d < 3; d++)
+#pragma omp simd
+        for (int i = 0; i < VISIBILITY_PACKET; i++)
+            rays->direction[d][i] = dx[i] * f->tangent[d] + dy[i] * f->bitangent[d] + dz[i] * f->normal[d];
+}

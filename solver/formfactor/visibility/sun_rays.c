@@ -1,0 +1,113 @@
+#include "solver/formfactor/visibility/sun_rays.h"
+
+#include "solver/formfactor/visibility/sample.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+struct sun_rays {
+    const mesh *m;
+    visibility *v;
+    size_t n_points, n_wanted;
+    uint32_t *wanted;   /* [n_wanted] */
+    float (*points)[3]; /* [n_wanted][n_points], recentred */
+};
+
+void sun_rays_free(sun_rays *s) {
+    if (s == NULL) return;
+    visibility_destroy(s->v);
+    free(s->wanted);
+    free(s->points);
+    free(s);
+}
+
+/* Point k of n: in strip k of the square, at the golden section across. */
+static void place(const element_sampler *area, const double turn[4], size_t k, size_t n, float point[3]) {
+    const double u = ((double)k + turn[0]) / (double)n;
+    double w = turn[1] + (double)k * .6180339887498949;
+    w -= floor(w);
+    element_sampler_point(area, (float)fmin(u, 1 - 0x1p-24), (float)fmin(w, 1 - 0x1p-24), point);
+}
+
+lam_status sun_rays_create(const mesh *m, size_t n_points, uint64_t seed, size_t n_wanted,
+                           const uint32_t *wanted, sun_rays **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t count;
+    sun_rays *s = memory_allocate(1, sizeof *s, "rays to the sun", error);
+    if (s == NULL) return LAM_ERR_MEMORY;
+    s->m = m;
+    s->n_points = n_points;
+    s->n_wanted = wanted != NULL ? n_wanted : m->n;
+    if (!size_multiply(s->n_wanted, n_points, &count))
+        FAIL(error, LAM_ERR_MEMORY, "rays to the sun: too many points");
+    s->wanted = memory_allocate(s->n_wanted, sizeof *s->wanted, "rays to the sun", error);
+    s->points = memory_allocate(count, sizeof *s->points, "rays to the sun", error);
+    if (s->wanted == NULL || s->points == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(visibility_create(m, &s->v, error));
+    for (size_t i = 0; i < s->n_wanted; i++) {
+        s->wanted[i] = wanted != NULL ? wanted[i] : (uint32_t)i;
+        element_sampler area;
+        pair_sampler dice;
+        double turn[4];
+        element_sampler_init(&area, m, s->v, s->wanted[i], seed);
+        pair_sampler_init(&dice, seed, s->wanted[i], s->wanted[i]);
+        pair_sampler_place(&dice, 0, turn);
+        for (size_t k = 0; k < n_points; k++) place(&area, turn, k, n_points, s->points[i * n_points + k]);
+    }
+    *out = s;
+    s = NULL;
+done:
+    sun_rays_free(s);
+    return status;
+}
+
+/* Rays of one packet, not yet cast. */
+typedef struct waiting {
+    size_t n;
+    ray_packet rays;
+    uint32_t self[VISIBILITY_PACKET];
+} waiting;
+
+static void cast(const sun_rays *s, waiting *w, const float cosine[], float *seen) {
+    hit_packet hits;
+    visibility_cast(s->v, &w->rays, w->n, w->self, 0, &hits);
+    for (size_t k = 0; k < w->n; k++)
+        if (hits.element[k] == VISIBILITY_NOTHING) seen[w->self[k]] += cosine[k] / (float)s->n_points;
+    w->n = 0;
+}
+
+/* Elements first ... end - 1 of those wanted, in one direction. */
+static void cast_block(const sun_rays *s, size_t first, size_t end, const double direction[3], float *seen) {
+    waiting w = {.n = 0};
+    float cosine[VISIBILITY_PACKET];
+    for (size_t i = first; i < end; i++) {
+        const uint32_t element = s->wanted[i];
+        const float *normal = s->m->normal[element];
+        const double facing = (double)normal[0] * direction[0] + (double)normal[1] * direction[1] +
+                              (double)normal[2] * direction[2];
+        seen[element] = 0;
+        if (facing <= 0) continue;
+        for (size_t k = 0; k < s->n_points; k++) {
+            for (int d = 0; d < 3; d++) {
+                w.rays.origin[d][w.n] = s->points[i * s->n_points + k][d];
+                w.rays.direction[d][w.n] = (float)direction[d];
+            }
+            cosine[w.n] = (float)facing;
+            w.self[w.n++] = element;
+            if (w.n == VISIBILITY_PACKET) cast(s, &w, cosine, seen);
+        }
+    }
+    if (w.n > 0) cast(s, &w, cosine, seen);
+}
+
+void sun_rays_cast(const sun_rays *s, size_t n_directions, const double (*direction)[3], float *const *seen) {
+    enum { TOGETHER = 256 }; /* elements whose rays share packets, whatever the threads */
+    const size_t n_blocks = (s->n_wanted + TOGETHER - 1) / TOGETHER;
+#pragma omp parallel for collapse(2) schedule(dynamic, 1)
+    for (size_t block = 0; block < n_blocks; block++)
+        for (size_t k = 0; k < n_directions; k++) {
+            const size_t first = block * TOGETHER;
+            const size_t end = first + TOGETHER < s->n_wanted ? first + TOGETHER : s->n_wanted;
+            cast_block(s, first, end, direction[k], seen[k]);
+        }
+}

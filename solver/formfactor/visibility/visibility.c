@@ -1,0 +1,466 @@
+#include "solver/formfactor/visibility/visibility.h"
+
+#include "solver/base/clock.h"
+#include "solver/scene/facet/facet_grid.h"
+
+#include <embree3/rtcore.h>
+
+#include <math.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Triangles and quads are two geometries; primitives leads from (geometry, primitive) to what was met. */
+enum { TRIANGLES, QUADS, N_GEOMETRIES };
+
+/* element: of a facet that is one alone; elsewhere MESH_NO_VERTEX, and the piece's grid knows. */
+typedef struct primitive {
+    uint32_t piece, facet, element;
+} primitive;
+
+struct visibility {
+    RTCDevice device;
+    RTCScene scene;
+    const mesh *mesh;
+    size_t n_fronts; /* elements in the scene: n, or n/2 when two-sided */
+    facets facets;   /* what is cast against */
+    facet_grids grids;
+    primitive *primitives[N_GEOMETRIES];
+    double centre[3];
+    float rounding; /* how far single precision may move a point of the scene */
+};
+
+static lam_status device_error(const visibility *v, const char *what, lam_error *error) {
+    enum RTCError code = rtcGetDeviceError(v->device);
+    if (code == RTC_ERROR_OUT_OF_MEMORY)
+        return status_fail(error, LAM_ERR_MEMORY, "Embree: %s: out of memory; use a smaller scene", what);
+    return status_fail(error, LAM_ERR_INTERNAL, "Embree: %s: error %d", what, (int)code);
+}
+
+/* Adds the triangles or the quads among the facets' pieces as one geometry with its own copy of the vertices.
+ */
+static lam_status add_geometry(visibility *v, int kind, lam_error *error) {
+    lam_status status = LAM_OK;
+    const mesh *m = v->mesh;
+    const facets *f = &v->facets;
+    const size_t corners = kind == TRIANGLES ? 3 : 4;
+    RTCGeometry geometry = NULL;
+    size_t count = 0;
+    for (size_t p = 0; p < f->n_pieces; p++) count += corner_count(f->pieces[p]) == corners;
+    if (count == 0) goto done;
+
+    v->primitives[kind] = memory_allocate(count, sizeof(primitive), "visibility", error);
+    if (v->primitives[kind] == NULL) return LAM_ERR_MEMORY;
+    geometry =
+        rtcNewGeometry(v->device, kind == TRIANGLES ? RTC_GEOMETRY_TYPE_TRIANGLE : RTC_GEOMETRY_TYPE_QUAD);
+    if (geometry == NULL) {
+        status = device_error(v, "new geometry", error);
+        goto done;
+    }
+    float *vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                              3 * sizeof(float), m->n_vertices);
+    uint32_t *indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0,
+                                                kind == TRIANGLES ? RTC_FORMAT_UINT3 : RTC_FORMAT_UINT4,
+                                                corners * sizeof(uint32_t), count);
+    if (vertices == NULL || indices == NULL) {
+        status = device_error(v, "geometry buffers", error);
+        goto done;
+    }
+    for (size_t i = 0; i < m->n_vertices; i++) visibility_recentre(v, m->vertices[i], vertices + 3 * i);
+    size_t prim = 0;
+    for (size_t p = 0; p < f->n_pieces; p++) {
+        if (corner_count(f->pieces[p]) != corners) continue;
+        for (size_t c = 0; c < corners; c++) indices[prim * corners + c] = f->pieces[p][c];
+        const uint32_t facet = f->piece_facet[p];
+        const bool alone = f->first[facet + 1] - f->first[facet] == 1;
+        v->primitives[kind][prim++] =
+            (primitive){.piece = (uint32_t)p,
+                        .facet = facet,
+                        .element = alone ? f->elements[f->first[facet]] : MESH_NO_VERTEX};
+    }
+    rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(v->scene, geometry, (unsigned)kind);
+done:
+    if (geometry != NULL) rtcReleaseGeometry(geometry);
+    return status;
+}
+
+static lam_status create(const mesh *m, bool join, visibility **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    visibility *v = memory_allocate(1, sizeof *v, "visibility", error);
+    if (v == NULL) return LAM_ERR_MEMORY;
+    v->mesh = m;
+    v->n_fronts = m->two_sided ? m->n / 2 : m->n;
+    double radius;
+    mesh_bounds(m, v->centre, &radius);
+    v->rounding = 4 * 0x1p-24f * (float)radius;
+    if (join)
+        TRY(facets_join(m, v->n_fronts, (double)v->rounding, &v->facets, error));
+    else
+        TRY(facets_alone(m, v->n_fronts, &v->facets, error));
+    TRY(facet_grids_create(m, &v->facets, &v->grids, error));
+
+    /* One thread: the hierarchy is built in a fraction of a second and rays bring their own threads. */
+    v->device = rtcNewDevice("threads=1,user_threads=0,set_affinity=0");
+    if (v->device == NULL) FAIL(error, LAM_ERR_INTERNAL, "Embree: cannot make a device");
+    v->scene = rtcNewScene(v->device);
+    if (v->scene == NULL) TRY(device_error(v, "new scene", error));
+    rtcSetSceneFlags(v->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+    rtcSetSceneBuildQuality(v->scene, RTC_BUILD_QUALITY_HIGH);
+    TRY(add_geometry(v, TRIANGLES, error));
+    TRY(add_geometry(v, QUADS, error));
+    rtcCommitScene(v->scene);
+    if (rtcGetDeviceError(v->device) != RTC_ERROR_NONE)
+        FAIL(error, LAM_ERR_INTERNAL, "Embree: cannot build the scene of %zu elements", m->n);
+    *out = v;
+    v = NULL;
+done:
+    visibility_destroy(v);
+    return status;
+}
+
+lam_status visibility_create(const mesh *m, visibility **out, lam_error *error) {
+    return create(m, true, out, error);
+}
+
+lam_status visibility_create_of_elements(const mesh *m, visibility **out, lam_error *error) {
+    return create(m, false, out, error);
+}
+
+void visibility_destroy(visibility *v) {
+    if (v == NULL) return;
+    if (v->scene != NULL) rtcReleaseScene(v->scene);
+    if (v->device != NULL) rtcReleaseDevice(v->device);
+    for (int kind = 0; kind < N_GEOMETRIES; kind++) free(v->primitives[kind]);
+    facets_free(&v->facets);
+    facet_grids_free(&v->grids);
+    free(v);
+}
+
+void visibility_recentre(const visibility *v, const double point[3], float recentred[3]) {
+    for (int d = 0; d < 3; d++) recentred[d] = (float)(point[d] - v->centre[d]);
+}
+
+void visibility_recentre_packet(const visibility *v, const double points[3][VISIBILITY_PACKET],
+                                float recentred[3][VISIBILITY_PACKET]) {
+    for (int d = 0; d < 3; d++)
+        for (int k = 0; k < VISIBILITY_PACKET; k++) recentred[d][k] = (float)(points[d][k] - v->centre[d]);
+}
+
+double visibility_rounding(const visibility *v) {
+    return (double)v->rounding;
+}
+
+/* What the filter must know beside Embree's own context, which it is handed back as. */
+typedef struct cast_context {
+    struct RTCIntersectContext embree;
+    const visibility *visibility;
+    bool cull_back;
+} cast_context;
+
+/* The component of a direction along a facet's normal: negative where the front is met. */
+static float along_normal(const visibility *v, uint32_t facet, float x, float y, float z) {
+    const float *normal = v->facets.normal[facet];
+    return normal[0] * x + normal[1] * y + normal[2] * z;
+}
+
+/* Packets of any width hold one array a member, in the order of those of eight: the place of each array. */
+enum {
+    RAY_DIRECTION = offsetof(struct RTCRay8, dir_x) / (8 * sizeof(float)),
+    RAY_DISTANCE = offsetof(struct RTCRay8, tfar) / (8 * sizeof(float)),
+    RAY_ID = offsetof(struct RTCRay8, id) / (8 * sizeof(unsigned)),
+    HIT_PRIMITIVE = offsetof(struct RTCHit8, primID) / (8 * sizeof(unsigned)),
+    HIT_GEOMETRY = offsetof(struct RTCHit8, geomID) / (8 * sizeof(unsigned)),
+};
+
+static uint32_t facet_of(const visibility *v, unsigned geometry, unsigned id) {
+    return v->primitives[geometry][id].facet;
+}
+
+/* The ray's own plane: a face in it, met where the ray starts, is either the element's other side modelled as
+ * a face of its own, or something that stands on the element and hides that ray anyway by its other faces. */
+static bool in_own_plane(const visibility *v, uint32_t facet, uint32_t own, float travelled) {
+    const float *n = v->facets.normal[own], *m = v->facets.normal[facet];
+    return travelled <= v->rounding && fabsf(n[0] * m[0] + n[1] * m[1] + n[2] * m[2]) > 1 - 1e-6f;
+}
+
+/* Refuses hits on the facet a ray leaves, whose index the ray carries as its id, on faces in the same
+ * place, and on culled backs. Nine rays of ten meet their own facet at distance 0: refusing that inside the
+ * traversal spares a second cast. */
+static void refuse_own_and_culled(const struct RTCFilterFunctionNArguments *args) {
+    const cast_context *context = (const cast_context *)args->context;
+    const visibility *v = context->visibility;
+    const size_t n = args->N;
+    const float *direction = (const float *)args->ray + RAY_DIRECTION * n;
+    const float *distance = (const float *)args->ray + RAY_DISTANCE * n;
+    const unsigned *own = (const unsigned *)args->ray + RAY_ID * n;
+    const unsigned *id = (const unsigned *)args->hit + HIT_PRIMITIVE * n;
+    const unsigned *geometry = (const unsigned *)args->hit + HIT_GEOMETRY * n;
+    for (size_t i = 0; i < n; i++) {
+        if (args->valid[i] == 0) continue;
+        const uint32_t facet = facet_of(v, geometry[i], id[i]);
+        const float cosine = along_normal(v, facet, direction[i], direction[n + i], direction[2 * n + i]);
+        if (facet == own[i] || (context->cull_back && cosine >= 0) ||
+            (own[i] != VISIBILITY_NOTHING && in_own_plane(v, facet, own[i], distance[i] * fabsf(cosine))))
+            args->valid[i] = 0;
+    }
+}
+
+static void packet_set(struct RTCRayHit8 *ray, const ray_packet *rays) {
+    memcpy(ray->ray.org_x, rays->origin[0], sizeof rays->origin[0]);
+    memcpy(ray->ray.org_y, rays->origin[1], sizeof rays->origin[1]);
+    memcpy(ray->ray.org_z, rays->origin[2], sizeof rays->origin[2]);
+    memcpy(ray->ray.dir_x, rays->direction[0], sizeof rays->direction[0]);
+    memcpy(ray->ray.dir_y, rays->direction[1], sizeof rays->direction[1]);
+    memcpy(ray->ray.dir_z, rays->direction[2], sizeof rays->direction[2]);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        ray->ray.tnear[i] = 0;
+        ray->ray.tfar[i] = INFINITY;
+        ray->ray.time[i] = 0;
+        ray->ray.mask[i] = 0xFFFFFFFFu;
+        ray->ray.flags[i] = 0;
+        ray->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+        ray->hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    }
+}
+
+/* A sheet modelled as two faces in one place is met at its front and at its back at once, and either may be
+ * found first. The front is what counts: looks for one where backs were met, and takes it instead. */
+static void prefer_fronts(const visibility *v, const float cosine[VISIBILITY_PACKET], cast_context *context,
+                          struct RTCRayHit8 *ray) {
+    struct RTCRayHit8 again = *ray;
+    int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
+    bool any = false;
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        active[i] = cosine[i] > 0 ? -1 : 0;
+        if (cosine[i] <= 0) continue;
+        any = true;
+        const float slack = v->rounding / cosine[i];
+        again.ray.tnear[i] = fmaxf(0, ray->ray.tfar[i] - slack);
+        again.ray.tfar[i] = ray->ray.tfar[i] + slack;
+        again.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    }
+    if (!any) return;
+    context->cull_back = true;
+    rtcIntersect8(active, v->scene, &context->embree, &again);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        if (cosine[i] <= 0 || again.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+        ray->hit.geomID[i] = again.hit.geomID[i];
+        ray->hit.primID[i] = again.hit.primID[i];
+        ray->hit.u[i] = again.hit.u[i];
+        ray->hit.v[i] = again.hit.v[i];
+        ray->ray.tfar[i] = again.ray.tfar[i];
+    }
+}
+
+/* What the rays of a packet met first: the facets and the components of the directions along their normals;
+ * VISIBILITY_NOTHING and 0 where there is nothing. */
+typedef struct met_packet {
+    uint32_t facet[VISIBILITY_PACKET];
+    float cosine[VISIBILITY_PACKET];
+} met_packet;
+
+static void look_up(const visibility *v, const struct RTCRayHit8 *ray, size_t n_rays, met_packet *met) {
+    for (size_t i = 0; i < n_rays; i++) {
+        met->facet[i] = VISIBILITY_NOTHING;
+        met->cosine[i] = 0;
+        if (ray->hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+        met->facet[i] = facet_of(v, ray->hit.geomID[i], ray->hit.primID[i]);
+        met->cosine[i] =
+            along_normal(v, met->facet[i], ray->ray.dir_x[i], ray->ray.dir_y[i], ray->ray.dir_z[i]);
+    }
+}
+
+/* Above its own facet's plane by more than rounding a ray cannot meet that plane again: no filter need ask
+ * at each of the hits, which would cost a third of all time. */
+static void lift(const visibility *v, const uint32_t *self, size_t n_rays, struct RTCRayHit8 *ray) {
+    const float height = 2 * v->rounding;
+    for (size_t i = 0; i < n_rays; i++) {
+        if (self[i] == VISIBILITY_NOTHING) continue;
+        const float *normal = v->mesh->normal[self[i]];
+        ray->ray.org_x[i] += height * normal[0];
+        ray->ray.org_y[i] += height * normal[1];
+        ray->ray.org_z[i] += height * normal[2];
+    }
+}
+
+/* Casts the rays of a packet that leave elements. The few that meet their own facet all the same, one that is
+ * not quite planar, or one in its place, go again from where they were, with the filter. */
+static void cast_lifted(const visibility *v, const ray_packet *rays, const uint32_t *self, size_t n_rays,
+                        cast_context *context, int active[VISIBILITY_PACKET], struct RTCRayHit8 *ray,
+                        met_packet *met) {
+    bool any = false;
+    lift(v, self, n_rays, ray);
+    context->embree.filter = NULL;
+    rtcIntersect8(active, v->scene, &context->embree, ray);
+    context->embree.filter = refuse_own_and_culled;
+    look_up(v, ray, n_rays, met);
+    for (size_t i = 0; i < n_rays; i++) {
+        const uint32_t own = ray->ray.id[i], facet = met->facet[i];
+        const bool again =
+            own != VISIBILITY_NOTHING && facet != VISIBILITY_NOTHING &&
+            (facet == own || in_own_plane(v, facet, own, ray->ray.tfar[i] * fabsf(met->cosine[i])));
+        active[i] = again ? -1 : 0;
+        any = any || again;
+        if (!again) continue;
+        ray->ray.org_x[i] = rays->origin[0][i];
+        ray->ray.org_y[i] = rays->origin[1][i];
+        ray->ray.org_z[i] = rays->origin[2][i];
+        ray->ray.tfar[i] = INFINITY;
+        ray->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    }
+    if (!any) return;
+    rtcIntersect8(active, v->scene, &context->embree, ray);
+    look_up(v, ray, n_rays, met);
+}
+
+void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
+                     unsigned how, hit_packet *hits) {
+    const bool two_sided = v->mesh->two_sided;
+    struct RTCRayHit8 ray __attribute__((aligned(32)));
+    int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
+    met_packet met = {{0}, {0}};
+    cast_context context = {.visibility = v, .cull_back = (how & VISIBILITY_CULL_BACK) != 0 && !two_sided};
+    rtcInitIntersectContext(&context.embree);
+    context.embree.filter = refuse_own_and_culled;
+    if ((how & VISIBILITY_TOGETHER) != 0) context.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    packet_set(&ray, rays);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        uint32_t own = self != NULL && i < n_rays ? self[i] : VISIBILITY_NOTHING;
+        if (own != VISIBILITY_NOTHING && own >= v->n_fronts) own -= (uint32_t)v->n_fronts;
+        ray.ray.id[i] = own == VISIBILITY_NOTHING ? own : v->facets.of_element[own];
+        active[i] = i < n_rays ? -1 : 0;
+    }
+    if (self != NULL && !context.cull_back) {
+        cast_lifted(v, rays, self, n_rays, &context, active, &ray, &met);
+    } else {
+        rtcIntersect8(active, v->scene, &context.embree, &ray);
+        look_up(v, &ray, n_rays, &met);
+    }
+
+    bool backs = false;
+    for (size_t i = 0; i < n_rays; i++) backs = backs || met.cosine[i] > 0;
+    if (backs && !two_sided) {
+        prefer_fronts(v, met.cosine, &context, &ray);
+        look_up(v, &ray, n_rays, &met);
+    }
+
+    uint32_t piece[VISIBILITY_PACKET], lane[VISIBILITY_PACKET], found[VISIBILITY_PACKET];
+    float u[VISIBILITY_PACKET], v_at[VISIBILITY_PACKET];
+    size_t open = 0;
+    for (size_t i = 0; i < n_rays; i++) {
+        const bool back = met.facet[i] != VISIBILITY_NOTHING && met.cosine[i] >= 0;
+        hits->distance[i] = ray.ray.tfar[i];
+        hits->back[i] = back && !two_sided;
+        hits->element[i] = VISIBILITY_NOTHING;
+        if (met.facet[i] == VISIBILITY_NOTHING) continue;
+        const primitive *p = &v->primitives[ray.hit.geomID[i]][ray.hit.primID[i]];
+        hits->element[i] = p->element;
+        if (p->element != MESH_NO_VERTEX) continue;
+        piece[open] = p->piece;
+        u[open] = ray.hit.u[i];
+        v_at[open] = ray.hit.v[i];
+        lane[open++] = (uint32_t)i;
+    }
+    if (open > 0) facet_grids_find(&v->grids, open, piece, u, v_at, found);
+    for (size_t k = 0; k < open; k++) hits->element[lane[k]] = found[k];
+    for (size_t i = 0; i < n_rays && two_sided; i++)
+        if (met.facet[i] != VISIBILITY_NOTHING && met.cosine[i] >= 0)
+            hits->element[i] += (uint32_t)v->n_fronts;
+}
+
+/* A packet of segments: the elements whose points each joins, by lane, which the segment carries as its id.
+ */
+typedef struct segment_context {
+    struct RTCIntersectContext embree;
+    const visibility *visibility;
+    uint32_t from[VISIBILITY_PACKET], to[VISIBILITY_PACKET]; /* facets */
+} segment_context;
+
+/* Refuses hits on the facets of the two elements that a segment joins and on faces in the same place. */
+static void refuse_both_ends(const struct RTCFilterFunctionNArguments *args) {
+    const segment_context *context = (const segment_context *)args->context;
+    const visibility *v = context->visibility;
+    const size_t n = args->N;
+    const float *direction = (const float *)args->ray + RAY_DIRECTION * n;
+    const float *distance = (const float *)args->ray + RAY_DISTANCE * n;
+    const unsigned *lane = (const unsigned *)args->ray + RAY_ID * n;
+    const unsigned *id = (const unsigned *)args->hit + HIT_PRIMITIVE * n;
+    const unsigned *geometry = (const unsigned *)args->hit + HIT_GEOMETRY * n;
+    for (size_t i = 0; i < n; i++) {
+        if (args->valid[i] == 0) continue;
+        const uint32_t facet = facet_of(v, geometry[i], id[i]);
+        const uint32_t from = context->from[lane[i]], to = context->to[lane[i]];
+        const float along =
+            fabsf(along_normal(v, facet, direction[i], direction[n + i], direction[2 * n + i]));
+        if (facet == from || facet == to || in_own_plane(v, facet, from, distance[i] * along) ||
+            in_own_plane(v, facet, to, (1 - distance[i]) * along))
+            args->valid[i] = 0;
+    }
+}
+
+unsigned visibility_blocked(const visibility *v, const ray_packet *segments, size_t n_segments,
+                            const uint32_t *from, const uint32_t *to) {
+    struct RTCRayHit8 packet __attribute__((aligned(32)));
+    int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
+    segment_context context = {.visibility = v};
+    rtcInitIntersectContext(&context.embree);
+    context.embree.filter = refuse_both_ends;
+    packet_set(&packet, segments);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        active[i] = i < n_segments ? -1 : 0;
+        packet.ray.tfar[i] = 1;
+        packet.ray.id[i] = (unsigned)i;
+        if (i >= n_segments) continue;
+        context.from[i] = v->facets.of_element[from[i] < v->n_fronts ? from[i] : from[i] - v->n_fronts];
+        context.to[i] = v->facets.of_element[to[i] < v->n_fronts ? to[i] : to[i] - v->n_fronts];
+    }
+    rtcOccluded8(active, v->scene, &context.embree, &packet.ray);
+    unsigned blocked = 0;
+    for (size_t i = 0; i < n_segments; i++) blocked |= (unsigned)(packet.ray.tfar[i] < 0) << i;
+    return blocked;
+}
+
+/* One packet of the bare loop; returns how many rays met their own facet, which nobody need ask. */
+static size_t cast_bare(const visibility *v, const ray_packet *rays, const float nearest[VISIBILITY_PACKET],
+                        uint32_t self, bool look) {
+    static const int active[VISIBILITY_PACKET]
+        __attribute__((aligned(32))) = {-1, -1, -1, -1, -1, -1, -1, -1};
+    struct RTCRayHit8 packet __attribute__((aligned(32)));
+    struct RTCIntersectContext context;
+    size_t own = 0;
+    rtcInitIntersectContext(&context);
+    packet_set(&packet, rays);
+    memcpy(packet.ray.tnear, nearest, sizeof packet.ray.tnear);
+    rtcIntersect8(active, v->scene, &context, &packet);
+    for (size_t i = 0; i < VISIBILITY_PACKET && look; i++)
+        own += packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID &&
+               facet_of(v, packet.hit.geomID[i], packet.hit.primID[i]) == v->facets.of_element[self];
+    return own;
+}
+
+lam_status visibility_bare_seconds(const visibility *v, const ray_packet *packets, const uint32_t *self,
+                                   size_t n_packets, double *seconds, size_t *own, lam_error *error) {
+    float(*nearest)[VISIBILITY_PACKET] = memory_allocate(n_packets, sizeof *nearest, "rays", error);
+    if (nearest == NULL) return LAM_ERR_MEMORY;
+#pragma omp parallel for schedule(static)
+    for (size_t p = 0; p < n_packets; p++)
+        for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+            const float cosine = along_normal(v, v->facets.of_element[self[p]], packets[p].direction[0][i],
+                                              packets[p].direction[1][i], packets[p].direction[2][i]);
+            nearest[p][i] = 2 * v->rounding / fmaxf(cosine, 1e-3f);
+        }
+    const double started = clock_seconds();
+#pragma omp parallel for schedule(dynamic, 256)
+    for (size_t p = 0; p < n_packets; p++) cast_bare(v, &packets[p], nearest[p], self[p], false);
+    *seconds = clock_seconds() - started;
+    if (own != NULL) {
+        size_t count = 0;
+#pragma omp parallel for schedule(dynamic, 256) reduction(+ : count)
+        for (size_t p = 0; p < n_packets; p++) count += cast_bare(v, &packets[p], nearest[p], self[p], true);
+        *own = count;
+    }
+    free(nearest);
+    return LAM_OK;
+}

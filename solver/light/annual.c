@@ -1,0 +1,277 @@
+#include "solver/light/annual.h"
+
+#include "solver/light/sunlight.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { AT_ONCE = 64 }; /* vectors in one go */
+
+lam_status annual_add(annual_wish *w, const char *item, lam_error *error) {
+    lam_status status = LAM_OK;
+    annual_figure f = {.high = INFINITY};
+    if (strcmp(item, "sum") == 0) {
+        f.is_sum = true;
+        snprintf(f.name, sizeof f.name, "sum");
+    } else if (strncmp(item, "autonomy=", 9) == 0) {
+        TRY(option_number("--annual autonomy:", item + 9, &f.low, error));
+        /* The dark would be autonomous at 0. */
+        if (f.low <= 0)
+            FAIL(error, LAM_ERR_ARGUMENT, "--annual %s: must be above 0, in the unit of the answer", item);
+        snprintf(f.name, sizeof f.name, "autonomy_%g", f.low);
+    } else if (strncmp(item, "useful=", 7) == 0) {
+        double bounds[2];
+        TRY(option_numbers("--annual useful:", item + 7, 2, true, bounds, NULL, error));
+        f.low = bounds[0];
+        f.high = bounds[1];
+        if (!(f.low >= 0 && f.low < f.high))
+            FAIL(error, LAM_ERR_ARGUMENT, "--annual %s: must be LOW,HIGH with 0 <= LOW < HIGH", item);
+        snprintf(f.name, sizeof f.name, "useful_%g_%g", f.low, f.high);
+    } else {
+        FAIL(error, LAM_ERR_ARGUMENT, "--annual %s: must be sum, autonomy=X or useful=LOW,HIGH", item);
+    }
+    for (size_t k = 0; k < w->n_figures; k++)
+        if (strcmp(w->figures[k].name, f.name) == 0)
+            FAIL(error, LAM_ERR_ARGUMENT, "--annual %s: asked for twice", item);
+    if (w->n_figures == ANNUAL_MOST)
+        FAIL(error, LAM_ERR_ARGUMENT, "--annual %s: more than %d figures", item, ANNUAL_MOST);
+    w->figures[w->n_figures++] = f;
+done:
+    return status;
+}
+
+lam_status annual_parse_occupied(const char *text, annual_wish *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    unsigned from = 0, to = 0;
+    int length = 0;
+    if (strspn(text, "0123456789-") != strlen(text) || sscanf(text, "%2u-%2u%n", &from, &to, &length) != 2 ||
+        text[length] != '\0' || from >= to || to > 24)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--occupied %s: must be FROM-TO, whole hours of the day with 0 <= FROM < TO <= 24", text);
+    w->from = from;
+    w->to = to;
+done:
+    return status;
+}
+
+bool annual_has_shares(const annual_wish *w) {
+    for (size_t k = 0; k < w->n_figures; k++)
+        if (!w->figures[k].is_sum) return true;
+    return false;
+}
+
+static bool all_count(const annual_wish *w) {
+    return w->from == 0 && w->to == 24;
+}
+
+static bool counts(const annual_wish *w, size_t vector) {
+    if (all_count(w)) return true;
+    const double middle = fmod(((double)vector + .5) * w->hours, 24);
+    return middle > w->from && middle < w->to;
+}
+
+/* Hours of the day want a batch that begins at midnight and holds whole days. */
+static lam_status check_days(const annual_wish *w, size_t n, lam_error *error) {
+    lam_status status = LAM_OK;
+    const double a_day = 24 / w->hours;
+    if (all_count(w)) goto done;
+    if (fabs(a_day - round(a_day)) > 1e-9 * a_day)
+        FAIL(error, LAM_ERR_ARGUMENT, "--occupied: vectors of %g hours do not make days of 24", w->hours);
+    if (n % (size_t)round(a_day) != 0)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--occupied: %zu vectors of %g hours are not whole days; it takes %zu a day, from midnight on",
+             n, w->hours, (size_t)round(a_day));
+done:
+    return status;
+}
+
+static bool any(const float *x, size_t count) {
+    for (size_t i = 0; i < count; i++)
+        if (x[i] > 0) return true;
+    return false;
+}
+
+/* How many numbers a vector has in E, L and W. */
+typedef struct widths {
+    size_t E, L, W;
+} widths;
+
+static widths widths_of(const lam_operator *op, const lam_sky *sky) {
+    const size_t C = lam_operator_channels(op);
+    return (widths){.E = C * lam_operator_elements(op),
+                    .L = sky != NULL ? C * lam_sky_tiles(sky) : 0,
+                    .W = C * lam_operator_emitters(op)};
+}
+
+static bool is_lit(const emission *light, const widths *width, size_t v) {
+    const size_t one = light->steady ? 0 : v;
+    return any(light->E + one * width->E, width->E) ||
+           (light->sun != NULL && sunlight_shines(light->sun, v)) ||
+           (light->L != NULL && any(light->L + v * width->L, width->L)) ||
+           (light->W != NULL && any(light->W + one * width->W, width->W));
+}
+
+/* The mean of n rows, summed in double; *out is freed with free(), NULL where there are none. */
+static lam_status mean_row(size_t n, size_t width, const float *rows, float **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    double *sum = NULL;
+    *out = NULL;
+    if (rows == NULL) goto done;
+    sum = memory_allocate(width, sizeof *sum, "the sum of a year", error);
+    *out = memory_allocate(width, sizeof **out, "the sum of a year", error);
+    if (sum == NULL || *out == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t v = 0; v < n; v++)
+        for (size_t i = 0; i < width; i++) sum[i] += (double)rows[v * width + i];
+    for (size_t i = 0; i < width; i++) (*out)[i] = (float)(sum[i] / (double)n);
+done:
+    free(sum);
+    return status;
+}
+
+/* A vector that is the mean of all. */
+static lam_status mean_of(const emission *light, const widths *width, emission *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = light->steady ? 1 : light->n_vectors;
+    emission e = {.n_vectors = 1};
+    TRY(mean_row(n, width->E, light->E, &e.E, error));
+    TRY(mean_row(light->n_vectors, width->L, light->L, &e.L, error));
+    TRY(mean_row(n, width->W, light->W, &e.W, error));
+    *out = e;
+    e = (emission){0};
+done:
+    emission_free(&e);
+    return status;
+}
+
+/* An answer under way. */
+typedef struct work {
+    const annual_wish *wish;
+    const lam_operator *op;
+    const lam_sky *sky;
+    lam_quantity quantity;
+    size_t n_selected;
+    const uint32_t *selected;
+    const progress *steps;
+    size_t row;  /* numbers of an answer: C times the elements wanted */
+    float *made; /* [n_figures][row] */
+} work;
+
+static lam_status make_sums(const work *w, const emission *light, lam_error *error) {
+    lam_status status = LAM_OK;
+    const widths width = widths_of(w->op, w->sky);
+    const double scale = (double)light->n_vectors * w->wish->hours / 1000;
+    emission mean = {0};
+    sunlight sun = {0};
+    emission_pass p = {0};
+    for (size_t k = 0; k < w->wish->n_figures; k++) {
+        if (!w->wish->figures[k].is_sum) continue;
+        float *to = w->made + k * w->row;
+        TRY(mean_of(light, &width, &mean, error));
+        if (light->sun != NULL) {
+            TRY(sunlight_mean(light->sun, w->steps, &sun, error));
+            mean.sun = &sun;
+        }
+        TRY(emission_pass_create(&mean, w->op, w->sky, w->quantity, w->n_selected, w->selected, 1, &p,
+                                 error));
+        TRY(emission_pass_solve(&p, 1, (const size_t[]){0}, to, error));
+        for (size_t i = 0; i < w->row; i++) to[i] = (float)((double)to[i] * scale);
+    }
+done:
+    emission_pass_free(&p);
+    sunlight_free(&sun);
+    emission_free(&mean);
+    return status;
+}
+
+/* Counts the hours of n answers x that a figure takes. */
+static void count_hours(const annual_figure *f, size_t n, size_t row, const float *x, uint32_t *count) {
+    for (size_t k = 0; k < n; k++)
+        for (size_t i = 0; i < row; i++) {
+            const double value = (double)x[k * row + i];
+            count[i] += value >= f->low && value <= f->high;
+        }
+}
+
+static lam_status make_shares(const work *w, const emission *light, const size_t *vectors, size_t n_vectors,
+                              annual_summary *sum, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n_figures = w->wish->n_figures, most = n_vectors < AT_ONCE ? n_vectors : AT_ONCE;
+    const size_t dark = sum->counted - n_vectors;
+    emission_pass p = {0};
+    uint32_t *count = memory_allocate(n_figures, w->row * sizeof *count, "hours", error);
+    float *x = memory_allocate(most + 1, w->row * sizeof *x, "hours", error);
+    if (count == NULL || x == NULL) TRY(LAM_ERR_MEMORY);
+    if (n_vectors > 0)
+        TRY(emission_pass_create(light, w->op, w->sky, w->quantity, w->n_selected, w->selected, most, &p,
+                                 error));
+    for (size_t first = 0; first < n_vectors; first += most) {
+        const size_t left = n_vectors - first, now = left < most ? left : most;
+        if (progress_cancelled(w->steps)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+        progress_report(w->steps, "hours", (double)first / (double)n_vectors);
+        TRY(emission_pass_solve(&p, now, vectors + first, x, error));
+        for (size_t k = 0; k < n_figures; k++)
+            if (!w->wish->figures[k].is_sum)
+                count_hours(&w->wish->figures[k], now, w->row, x, count + k * w->row);
+    }
+    for (size_t k = 0; k < n_figures; k++) {
+        const annual_figure *f = &w->wish->figures[k];
+        const size_t always = f->low <= 0 ? dark : 0; /* hours of exactly 0 */
+        for (size_t i = 0; i < w->row && !f->is_sum; i++)
+            w->made[k * w->row + i] =
+                (float)((double)(count[k * w->row + i] + always) / (double)sum->counted);
+    }
+done:
+    emission_pass_free(&p);
+    free(count);
+    free(x);
+    return status;
+}
+
+lam_status annual_apply(const annual_wish *wish, const emission *light, const lam_operator *op,
+                        const lam_sky *sky, lam_quantity quantity, size_t n_selected,
+                        const uint32_t *selected, const progress *steps, float **values,
+                        annual_summary *summary, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t C = lam_operator_channels(op), n = lam_operator_elements(op);
+    const widths width = widths_of(op, sky);
+    annual_summary sum = {.n = light->n_vectors};
+    work w = {.wish = wish,
+              .op = op,
+              .sky = sky,
+              .quantity = quantity,
+              .n_selected = n_selected,
+              .selected = selected,
+              .steps = steps,
+              .row = C * (selected != NULL ? n_selected : n)};
+    size_t *lit = NULL, n_lit = 0; /* vectors that are lit and count */
+    float *whole = NULL;
+    TRY(check_days(wish, light->n_vectors, error));
+    lit = memory_allocate(light->n_vectors, sizeof *lit, "hours", error);
+    w.made = memory_allocate(wish->n_figures, w.row * sizeof *w.made, "figures of the year", error);
+    if (lit == NULL || w.made == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t v = 0; v < light->n_vectors; v++) {
+        const bool shines = is_lit(light, &width, v), counted = counts(wish, v);
+        sum.counted += counted;
+        sum.lit += shines;
+        if (shines && counted) lit[n_lit++] = v;
+    }
+    if (sum.counted == 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "--occupied %g-%g: no vector of %g hours has its middle in these hours",
+             wish->from, wish->to, wish->hours);
+    TRY(make_sums(&w, light, error));
+    if (annual_has_shares(wish)) TRY(make_shares(&w, light, lit, n_lit, &sum, error));
+    if (selected != NULL) {
+        whole = memory_allocate(wish->n_figures * C, n * sizeof *whole, "figures of the year", error);
+        if (whole == NULL) TRY(LAM_ERR_MEMORY);
+        emission_scatter(wish->n_figures * C, n, n_selected, selected, w.made, whole);
+    }
+    *values = selected != NULL ? whole : w.made;
+    *summary = sum;
+done:
+    if (status != LAM_OK || selected != NULL) free(w.made);
+    if (status != LAM_OK) free(whole);
+    free(lit);
+    return status;
+}

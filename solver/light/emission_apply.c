@@ -1,0 +1,211 @@
+#include "solver/light/emission_apply.h"
+
+#include "solver/light/sunlight.h"
+#include "solver/operator/emitters.h"
+#include "solver/operator/sky_light.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { AT_ONCE = 64 }; /* vectors in one go of a whole answer */
+
+void emission_pass_free(emission_pass *p) {
+    free(p->work);
+    free(p->E);
+    free(p->L);
+    free(p->H0);
+    free(p->W);
+    free(p->sun);
+    free(p->sun_work);
+    *p = (emission_pass){0};
+}
+
+static lam_status reserve(size_t rows, size_t width, const char *what, float **out, lam_error *error) {
+    *out = memory_allocate(rows, width * sizeof **out, what, error);
+    return *out == NULL ? LAM_ERR_MEMORY : LAM_OK;
+}
+
+lam_status emission_pass_create(const emission *light, const lam_operator *op, const lam_sky *sky,
+                                lam_quantity quantity, size_t n_selected, const uint32_t *selected,
+                                size_t most, emission_pass *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = lam_operator_elements(op), C = lam_operator_channels(op), s = lam_operator_emitters(op);
+    emission_pass p = {.light = light,
+                       .op = op,
+                       .sky = sky,
+                       .quantity = quantity,
+                       .n_selected = n_selected,
+                       .selected = selected,
+                       .most = most,
+                       .work_bytes = lam_operator_work_bytes(op, most)};
+    p.work = memory_allocate(p.work_bytes, 1, "the work area of a solve", error);
+    if (p.work == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(reserve(most * C, n, "emissions", &p.E, error));
+    for (size_t k = 0; light->steady && k < most; k++) memcpy(p.E + k * C * n, light->E, C * n * sizeof *p.E);
+    if (light->L != NULL) TRY(reserve(most * C, lam_sky_tiles(sky), "skies", &p.L, error));
+    if (s > 0)
+        TRY(reserve(most * C, s, "weights of emitters", &p.W, error));
+    else if (light->L != NULL || light->sun != NULL)
+        TRY(reserve(most * C, n, "the light of the sky", &p.H0, error));
+    if (light->sun != NULL) {
+        TRY(reserve(most, n, "the sun", &p.sun, error));
+        TRY(reserve(1, sunlight_work(light->sun), "the sun", &p.sun_work, error));
+    }
+    *out = p;
+    p = (emission_pass){0};
+done:
+    emission_pass_free(&p);
+    return status;
+}
+
+/* Rows of a batch side by side. */
+static void gather(size_t n, const size_t *vectors, size_t width, const float *from, float *to) {
+    for (size_t k = 0; k < n; k++) memcpy(to + k * width, from + vectors[k] * width, width * sizeof *to);
+}
+
+/* The weights: those given and those told from E and L. */
+static lam_status find_weights(emission_pass *p, size_t n, const size_t *vectors, lam_error *error) {
+    lam_status status = LAM_OK;
+    const emission *e = p->light;
+    const size_t row = lam_operator_channels(p->op) * lam_operator_emitters(p->op);
+    TRY(lam_operator_weights(p->op, n, p->E, p->sky != NULL ? lam_sky_tiles(p->sky) : 0, p->L, p->W, error));
+    for (size_t k = 0; e->W != NULL && k < n * row; k++)
+        p->W[k] += e->W[(e->steady ? 0 : vectors[k / row] * row) + k % row];
+done:
+    return status;
+}
+
+/* H0 [n][C][elements] under the skies and the sun. */
+static void light_directly(emission_pass *p, size_t n, const size_t *vectors) {
+    const size_t C = lam_operator_channels(p->op), n_elements = lam_operator_elements(p->op);
+    if (p->L != NULL)
+        lam_sky_irradiance(p->sky, n * C, p->L, p->H0);
+    else
+        memset(p->H0, 0, n * C * n_elements * sizeof *p->H0);
+    if (p->sun == NULL) return;
+    sunlight_irradiance(p->light->sun, n, vectors, p->sun, p->sun_work);
+    for (size_t row = 0; row < n * C; row++)
+        for (size_t i = 0; i < n_elements; i++)
+            p->H0[row * n_elements + i] += p->sun[row / C * n_elements + i];
+}
+
+/* The sun on answers that cannot take it on its way: their direct light becomes exact, what bounces is not
+ * changed, nor is what is indirect. Rounding does not make light negative. */
+static void light_answers(emission_pass *p, size_t n, const size_t *vectors, float *out) {
+    const size_t C = lam_operator_channels(p->op), n_elements = lam_operator_elements(p->op);
+    const size_t width = p->selected != NULL ? p->n_selected : n_elements;
+    if (p->sun == NULL || p->quantity == LAM_INDIRECT) return;
+    sunlight_irradiance(p->light->sun, n, vectors, p->sun, p->sun_work);
+    for (size_t row = 0; row < n * C; row++)
+        for (size_t r = 0; r < width; r++) {
+            const size_t i = p->selected != NULL ? p->selected[r] : r;
+            const float *rho = p->op->reflectance + row % C * n_elements;
+            const float share = p->quantity == LAM_RADIOSITY ? rho[i] : 1;
+            float *x = out + row * width + r;
+            *x = fmaxf(*x + share * p->sun[row / C * n_elements + i], 0);
+        }
+}
+
+lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors, float *out,
+                               lam_error *error) {
+    lam_status status = LAM_OK;
+    const emission *e = p->light;
+    const size_t C = lam_operator_channels(p->op), n_elements = lam_operator_elements(p->op);
+    if (!e->steady) gather(n, vectors, C * n_elements, e->E, p->E);
+    if (e->L != NULL) gather(n, vectors, C * lam_sky_tiles(p->sky), e->L, p->L);
+    if (p->W != NULL) {
+        TRY(find_weights(p, n, vectors, error));
+        TRY(lam_operator_apply_emitters(p->op, n, p->quantity, p->W, p->n_selected, p->selected, out, p->work,
+                                        p->work_bytes, error));
+        light_answers(p, n, vectors, out);
+        goto done;
+    }
+    if (p->H0 != NULL) light_directly(p, n, vectors);
+    if (p->selected != NULL)
+        TRY(lam_operator_apply_selected(p->op, n, p->quantity, p->E, p->H0, p->n_selected, p->selected, out,
+                                        p->work, p->work_bytes, error));
+    else
+        TRY(lam_operator_apply_lit(p->op, n, p->quantity, p->E, p->H0, out, p->work, p->work_bytes, error));
+done:
+    return status;
+}
+
+lam_status emission_pass_light(emission_pass *p, size_t n, const size_t *vectors, double *E, double *H0,
+                               bool *H0_there, float *start, lam_error *error) {
+    lam_status status = LAM_OK;
+    const emission *e = p->light;
+    const size_t C = lam_operator_channels(p->op), n_elements = lam_operator_elements(p->op);
+    double *L = NULL;
+    if (!e->steady) gather(n, vectors, C * n_elements, e->E, p->E);
+    if (e->L != NULL) gather(n, vectors, C * lam_sky_tiles(p->sky), e->L, p->L);
+    *H0_there = p->W != NULL || p->H0 != NULL;
+    if (p->W != NULL) {
+        if (p->sun != NULL)
+            FAIL(error, LAM_ERR_UNSUPPORTED,
+                 "--tolerance beside --sun exact of a store of few emitters is not supported yet; use --sun "
+                 "tiles, or a store of another method");
+        TRY(find_weights(p, n, vectors, error));
+        TRY(operator_emitters_light_double(p->op, n, p->W, E, H0, error));
+        TRY(lam_operator_apply_emitters(p->op, n, LAM_INDIRECT, p->W, n_elements, NULL, start, p->work,
+                                        p->work_bytes, error));
+        goto done;
+    }
+    for (size_t k = 0; k < n * C * n_elements; k++) E[k] = (double)p->E[k];
+    if (!*H0_there) goto done;
+    memset(H0, 0, n * C * n_elements * sizeof *H0);
+    if (p->L != NULL) {
+        const size_t count = n * C * lam_sky_tiles(p->sky);
+        L = memory_allocate(count, sizeof *L, "skies", error);
+        if (L == NULL) TRY(LAM_ERR_MEMORY);
+        for (size_t k = 0; k < count; k++) L[k] = (double)p->L[k];
+        sky_irradiance_double(p->sky, n * C, L, H0);
+    }
+    if (p->sun == NULL) goto done;
+    sunlight_irradiance(e->sun, n, vectors, p->sun, p->sun_work);
+    for (size_t row = 0; row < n * C; row++)
+        for (size_t i = 0; i < n_elements; i++)
+            H0[row * n_elements + i] =
+                fmax(H0[row * n_elements + i] + (double)p->sun[row / C * n_elements + i], 0);
+done:
+    free(L);
+    return status;
+}
+
+void emission_scatter(size_t n_rows, size_t n, size_t n_selected, const uint32_t *selected, const float *from,
+                      float *to) {
+    for (size_t row = 0; row < n_rows; row++)
+        for (size_t r = 0; r < n_selected; r++) to[row * n + selected[r]] = from[row * n_selected + r];
+}
+
+lam_status emission_apply(const emission *e, const lam_operator *op, const lam_sky *sky,
+                          lam_quantity quantity, size_t n_selected, const uint32_t *selected,
+                          lam_status (*stop)(lam_error *error), float **values, lam_error *error) {
+    lam_status status = LAM_OK;
+    emission_pass p = {0};
+    const size_t C = lam_operator_channels(op), n = lam_operator_elements(op);
+    const size_t most = e->n_vectors < AT_ONCE ? e->n_vectors : AT_ONCE;
+    float *made = NULL, *some = NULL;
+    size_t count, vectors[AT_ONCE];
+    if (!size_multiply(n * C, e->n_vectors, &count))
+        FAIL(error, LAM_ERR_MEMORY, "%zu emissions are too many for memory", e->n_vectors);
+    made = memory_allocate(count, sizeof *made, "the solution", error);
+    if (made == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(emission_pass_create(e, op, sky, quantity, n_selected, selected, most, &p, error));
+    if (selected != NULL) TRY(reserve(most * C, n_selected, "the solution", &some, error));
+    for (size_t first = 0; first < e->n_vectors; first += most) {
+        const size_t left = e->n_vectors - first, now = left < most ? left : most;
+        float *to = made + first * C * n;
+        for (size_t k = 0; k < now; k++) vectors[k] = first + k;
+        TRY(emission_pass_solve(&p, now, vectors, selected != NULL ? some : to, error));
+        if (selected != NULL) emission_scatter(now * C, n, n_selected, selected, some, to);
+        if (stop != NULL) TRY(stop(error));
+    }
+    *values = made;
+    made = NULL;
+done:
+    free(made);
+    free(some);
+    emission_pass_free(&p);
+    return status;
+}

@@ -1,0 +1,126 @@
+#include "solver/light/sunlight.h"
+
+#include "solver/formfactor/rows/sky_bounce.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define SEED 20 /* of the points on the elements: the same in every hour and every run */
+
+void sunlight_free(sunlight *s) {
+    free(s->suns);
+    sun_rays_free(s->rays);
+    sky_tiling_free(&s->tiling);
+    free(s->ground);
+    free(s->given);
+    *s = (sunlight){0};
+}
+
+/* ground [n]: see sunlight_create. */
+static void find_ground(const sky_bounce *b, const mesh *m, float *ground) {
+    for (size_t i = 0; i < m->n; i++) {
+        const double up = (double)b->tiling.sign[2] * (double)m->normal[i][b->tiling.axis[2]];
+        double least = b->ground_albedo * fmax(0, 1 - up) / 2;
+        for (size_t t = 0; t < b->tiling.n_tiles; t++)
+            least = fmin(least, (double)b->first_bounce[t * m->n + i] / b->tiling.tiles[t].cosine);
+        ground[i] = (float)least;
+    }
+}
+
+lam_status sunlight_create(store *s, const mesh *m, year_sun *suns, size_t n_vectors, size_t n_points,
+                           size_t n_wanted, const uint32_t *wanted, const lam_sky *in_tiles, sunlight *out,
+                           lam_error *error) {
+    lam_status status = LAM_OK;
+    sunlight made = {.n_vectors = n_vectors, .n = m->n, .suns = suns, .sky = in_tiles};
+    sky_bounce bounce = {.n = 0};
+    made.ground = memory_allocate(m->n, sizeof *made.ground, "the light of the ground", error);
+    if (made.ground == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(sky_bounce_load(s, m->n, &bounce, error));
+    find_ground(&bounce, m, made.ground);
+    made.tiling = bounce.tiling;
+    bounce.tiling = (sky_tiling){0};
+    TRY(sun_rays_create(m, n_points, SEED, n_wanted, wanted, &made.rays, error));
+    *out = made;
+    made = (sunlight){0};
+done:
+    sky_bounce_free(&bounce);
+    sunlight_free(&made);
+    return status;
+}
+
+bool sunlight_shines(const sunlight *s, size_t vector) {
+    return s->given != NULL || s->suns[vector].horizontal > 0;
+}
+
+/* H less what the tile that holds the sun gives directly. */
+static void take_tile(const sunlight *s, const year_sun *sun, float *H, float *work) {
+    const size_t tile = year_sun_tile(&s->tiling, sun->direction);
+    float *L = work + s->n;
+    memset(L, 0, s->tiling.n_tiles * sizeof *L);
+    L[tile] = (float)(sun->horizontal / s->tiling.tiles[tile].cosine);
+    lam_sky_irradiance(s->sky, 1, L, work);
+    for (size_t i = 0; i < s->n; i++) H[i] -= work[i];
+}
+
+size_t sunlight_work(const sunlight *s) {
+    return s->n + s->tiling.n_tiles;
+}
+
+/* What the rays found becomes what is added. */
+static void finish(const sunlight *s, const year_sun *sun, float *H, float *work) {
+    for (size_t i = 0; i < s->n; i++)
+        H[i] = (float)((double)H[i] * sun->normal + (double)s->ground[i] * sun->horizontal);
+    if (s->sky != NULL) take_tile(s, sun, H, work);
+}
+
+void sunlight_irradiance(const sunlight *s, size_t n_vectors, const size_t *vectors, float *H, float *work) {
+    double direction[SUNLIGHT_MOST][3];
+    float *rows[SUNLIGHT_MOST] = {NULL};
+    size_t n = 0;
+    assert(n_vectors <= SUNLIGHT_MOST);
+    if (s->given != NULL) {
+        for (size_t k = 0; k < n_vectors; k++) memcpy(H + k * s->n, s->given, s->n * sizeof *H);
+        return;
+    }
+    memset(H, 0, n_vectors * s->n * sizeof *H);
+    for (size_t k = 0; k < n_vectors; k++) {
+        if (!sunlight_shines(s, vectors[k])) continue;
+        for (int d = 0; d < 3; d++)
+            direction[n][s->tiling.axis[d]] = (double)s->tiling.sign[d] * s->suns[vectors[k]].direction[d];
+        rows[n++] = H + k * s->n;
+    }
+    sun_rays_cast(s->rays, n, (const double(*)[3])direction, rows);
+    for (size_t k = 0; k < n_vectors; k++)
+        if (sunlight_shines(s, vectors[k])) finish(s, &s->suns[vectors[k]], H + k * s->n, work);
+}
+
+lam_status sunlight_mean(const sunlight *s, const progress *steps, sunlight *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    sunlight made = {.n_vectors = 1, .n = s->n};
+    double *sum = memory_allocate(s->n, sizeof *sum, "the sun of a year", error);
+    float *H = memory_allocate(SUNLIGHT_MOST, s->n * sizeof *H, "the sun of a year", error);
+    float *work = memory_allocate(sunlight_work(s), sizeof *work, "the sun of a year", error);
+    made.given = memory_allocate(s->n, sizeof *made.given, "the sun of a year", error);
+    if (sum == NULL || H == NULL || work == NULL || made.given == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t first = 0; first < s->n_vectors; first += SUNLIGHT_MOST) {
+        size_t now = 0, vectors[SUNLIGHT_MOST];
+        for (size_t v = first; v < s->n_vectors && v < first + SUNLIGHT_MOST; v++)
+            if (sunlight_shines(s, v)) vectors[now++] = v;
+        if (progress_cancelled(steps)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+        progress_report(steps, "rays to the sun", (double)first / (double)s->n_vectors);
+        sunlight_irradiance(s, now, vectors, H, work);
+        for (size_t k = 0; k < now; k++)
+            for (size_t i = 0; i < s->n; i++) sum[i] += (double)H[k * s->n + i];
+    }
+    for (size_t i = 0; i < s->n; i++) made.given[i] = (float)(sum[i] / (double)s->n_vectors);
+    *out = made;
+    made = (sunlight){0};
+done:
+    sunlight_free(&made);
+    free(sum);
+    free(H);
+    free(work);
+    return status;
+}

@@ -1,0 +1,124 @@
+#include "solver/light/weather_light.h"
+
+#include "solver/daylight/weather.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+void weather_skies_free(weather_skies *w) {
+    free(w->L);
+    free(w->suns);
+    *w = (weather_skies){0};
+}
+
+static void log_weather(terminal *t, const weather *w) {
+    const weather_hour *first = &w->hours[0], *last = &w->hours[w->n - 1];
+    terminal_log(t, "%s: %.2f degrees %s, %.2f %s, UTC%+g", w->place[0] != '\0' ? w->place : "a place",
+                 fabs(w->latitude), w->latitude < 0 ? "south" : "north", fabs(w->longitude),
+                 w->longitude < 0 ? "west" : "east", w->time_zone);
+    terminal_log(t, "%zu hours, %d-%02d-%02d to %d-%02d-%02d", w->n, first->year, first->month, first->day,
+                 last->year, last->month, last->day);
+    /* Clocks are set for political reasons, but not by more than this. */
+    const double apart = remainder(w->time_zone * 15 - w->longitude, 360);
+    if (fabs(apart) > 60)
+        terminal_warn(t,
+                      "the time zone UTC%+g is %.0f degrees from the longitude %g (east is positive here); "
+                      "is a sign wrong in the file?",
+                      w->time_zone, fabs(apart), w->longitude);
+}
+
+static void log_year(terminal *t, const year_summary *sum, bool photometric) {
+    terminal_log(t, "%zu hours with light, %zu with sun", sum->lit, sum->sunny);
+    terminal_log(t, "on a horizontal plane: diffuse %.1f + direct %.1f = %.1f kWh/m2", sum->diffuse * 1e-3,
+                 sum->direct * 1e-3, (sum->diffuse + sum->direct) * 1e-3);
+    if (photometric)
+        terminal_log(t, "in light: %.0f klx h, %.1f lm/W", sum->light * 1e-3,
+                     sum->light / (sum->diffuse + sum->direct));
+    if (sum->sunless > 0)
+        terminal_warn(t,
+                      "%zu hours have direct light (at most %g W/m2) though the sun is below the horizon in "
+                      "their middle; it is left out",
+                      sum->sunless, sum->left_out);
+}
+
+lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const year_wish *wish, terminal *t,
+                              weather_skies *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    weather w = {0};
+    weather_skies made = {0};
+    year_summary sum = {0};
+    size_t count = 0;
+    const progress steps = terminal_progress(t);
+    TRY(weather_read(path, &w, error));
+    if (!size_multiply(w.n, tiling->n_tiles, &count))
+        FAIL(error, LAM_ERR_MEMORY, "%s: too many hours of tiles for memory", path);
+    made.n = w.n;
+    made.L = memory_allocate(count, sizeof *made.L, "the skies", error);
+    made.suns = memory_allocate(w.n, sizeof *made.suns, "the suns", error);
+    if (made.L == NULL || made.suns == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(year_skies(&w, tiling, wish, &steps, made.L, made.suns, &sum, error));
+    if (sum.lit == 0)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "%s: the sky is dark all year: of %zu hours none has diffuse light, nor direct light of a sun "
+             "above the horizon; see its latitude, longitude and time zone, and whether it holds radiation",
+             path, w.n);
+    terminal_clear(t);
+    log_weather(t, &w);
+    log_year(t, &sum, wish->photometric);
+    *out = made;
+    made = (weather_skies){0};
+done:
+    weather_skies_free(&made);
+    weather_free(&w);
+    return status;
+}
+
+/* The tiling of a store's sky, without what it holds. */
+static lam_status load_tiling(store *s, sky_tiling *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *name = NULL, *up = NULL;
+    TRY(store_get_text(s, "/sky", "tiling", &name, error));
+    TRY(store_get_text(s, "/sky", "up", &up, error));
+    TRY(sky_tiling_create(name, up[0], out, error));
+done:
+    free(name);
+    free(up);
+    return status;
+}
+
+lam_status weather_light_add(const weather_wish *wish, store *s, const mesh *m, const lam_operator *op,
+                             const lam_sky *sky, size_t n_selected, const uint32_t *selected, terminal *t,
+                             emission *e, sunlight *sun, lam_error *error) {
+    lam_status status = LAM_OK;
+    sky_tiling tiling = {0};
+    weather_skies made = {0};
+    /* Few emitters answer nothing but their tiles: the sun bounces from those. */
+    const bool few = lam_operator_emitters(op) > 0;
+    if (sky == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "--weather %s: the store has no sky; precompute it with --sky",
+             wish->path);
+    TRY(load_tiling(s, &tiling, error));
+    if (tiling.n_tiles != lam_sky_tiles(sky))
+        FAIL(error, LAM_ERR_FORMAT, "%s: /sky has %zu tiles, %s has %zu", store_path(s), lam_sky_tiles(sky),
+             tiling.name, tiling.n_tiles);
+    const year_wish year = {.photometric = wish->photometric, .sun_in_tiles = few || !wish->exact};
+    TRY(weather_skies_read(wish->path, &tiling, &year, t, &made, error));
+    TRY(emission_add_skies(e, wish->path, m, tiling.n_tiles, made.n, made.L, error));
+    if (e->n_vectors != made.n)
+        FAIL(error, LAM_ERR_ARGUMENT, "%s: 1 hour beside %zu emissions", wish->path, e->n_vectors);
+    if (!wish->exact) goto done;
+    year_sun *suns = made.suns;
+    made.suns = NULL;
+    TRY(sunlight_create(s, m, suns, made.n, wish->sun_points, few ? n_selected : 0, few ? selected : NULL,
+                        few ? sky : NULL, sun, error));
+    e->sun = sun;
+    terminal_log(t,
+                 few ? "the sun: %zu rays an element and hour; what bounces of it comes from its tile, as a "
+                       "store of few emitters has it"
+                     : "the sun: %zu rays an element and hour, through all bounces",
+                 wish->sun_points);
+done:
+    weather_skies_free(&made);
+    sky_tiling_free(&tiling);
+    return status;
+}

@@ -1,0 +1,45 @@
+/* Sparse rows (CSR) in single precision with products in double. */
+#ifndef LAMBERT_LINALG_CSR_H
+#define LAMBERT_LINALG_CSR_H
+
+#include "store/large_file.h"
+#include "store/store.h"
+
+#include <stdint.h>
+
+typedef struct csr {
+    size_t n;          /* rows and columns */
+    uint64_t *indptr;  /* [n+1] */
+    uint32_t *indices; /* [nnz], ascending in a row */
+    float *data;       /* [nnz] */
+    /* Where indices and data lie: in memory where this is NULL, else in files there. */
+    const large_place *place;
+    large_file *files[2];
+} csr;
+
+void csr_free(csr *a);
+
+/* Gives indices and data room for so many entries, more or fewer than now, and keeps what is there; in
+ * memory, pages that are not written take none. Errors: LAM_ERR_MEMORY, LAM_ERR_IO; a is then as it was, but
+ * for room that one of the two may have more. */
+lam_status csr_reserve(csr *a, size_t entries, lam_error *error);
+
+/* Filling rows in any sequence. First indptr [n+1] holds in i + 1 how many entries row i gets: from it
+ * csr_begin_rows gives indices and data their room (LAM_ERR_MEMORY, naming what). Then an entry of row i goes
+ * to indptr[i]++, which so runs ahead to where row i + 1 begins, and csr_end_rows puts that right. */
+lam_status csr_begin_rows(csr *a, const char *what, lam_error *error);
+void csr_end_rows(csr *a);
+
+/* indptr ascending from 0 to nnz, indices ascending and below n, data finite. LAM_ERR_FORMAT names the row.
+ */
+lam_status csr_check(const csr *a, size_t nnz, const char *name, lam_error *error);
+
+/* The three arrays in a store: NAME/indptr [n+1] u64, NAME/indices u32, NAME/data f32. Loading fills n,
+ * checks that indptr ends where the others do and leaves the rest to csr_check. Errors: as store_read. */
+lam_status csr_save(const csr *a, const char *name, store *s, lam_error *error);
+lam_status csr_load(store *s, const char *name, size_t n, csr *out, lam_error *error);
+
+/* Y[first..last) = A X for rows first <= i < last: X and Y are [n][m] row-major, double. */
+void csr_multiply_rows(const csr *a, size_t first, size_t last, size_t m, const double *X, double *Y);
+
+#endif

@@ -1,0 +1,219 @@
+/* The two products of a panel: cut into blocks of rows whose order is fixed, so that neither batch nor
+ * threads change a bit. */
+#include "solver/linalg/panel_kernels.h"
+
+#include <omp.h>
+#include <string.h>
+
+/* Rows whose products are added in single precision before they join a sum in double. */
+#define PROJECT_BLOCK 128
+#define BLOCK_TILES (PROJECT_BLOCK / PANEL_TILE)
+/* So few vectors' sums stay in a near cache as they are. */
+#define MANY_VECTORS 4
+/* Slabs of rows whose sums in double are made apart, then added up in their order: at most so many, of at
+ * least so many rows. However many threads there are, these are the same. */
+#define MOST_SLABS 64
+#define SLAB_ROWS 512
+/* Rows of expand that a thread takes at a time. */
+#define EXPAND_BLOCK 64
+/* Bytes of a panel below which threads cost more than they bring. */
+#define THREADS_WORTH ((size_t)1 << 20)
+
+static size_t count_threads(const panel *a, size_t n_blocks) {
+    const size_t n_threads = a->n_threads < n_blocks ? a->n_threads : n_blocks;
+    return panel_bytes(a) < THREADS_WORTH || n_threads == 0 ? 1 : n_threads;
+}
+
+/* Whole blocks. */
+static size_t slab_rows(const panel *a) {
+    const size_t rows = a->n / MOST_SLABS + 1;
+    return rows < SLAB_ROWS ? SLAB_ROWS : (rows + PROJECT_BLOCK - 1) / PROJECT_BLOCK * PROJECT_BLOCK;
+}
+
+static size_t count_slabs(const panel *a) {
+    return a->n / slab_rows(a) + (a->n % slab_rows(a) > 0);
+}
+
+/* The sum; then of each thread a part in single precision, of each slab (of one when there is one thread) its
+ * sum. */
+size_t panel_work_bytes(const panel *a, size_t m) {
+    size_t count, total = 0;
+    if (m > PANEL_VECTORS) m = PANEL_VECTORS;
+    if (!size_multiply(a->stride, m, &count) || count > SIZE_MAX / sizeof(double)) return 0;
+    const size_t n_threads = count_threads(a, count_slabs(a)), n_sums = n_threads > 1 ? count_slabs(a) : 1;
+    for (size_t i = 0; i < n_threads; i++)
+        if (!work_add(&total, count * sizeof(float))) return 0;
+    for (size_t i = 0; i < n_sums + 1; i++)
+        if (!work_add(&total, count * sizeof(double))) return 0;
+    return total > 0 ? total : PANEL_ALIGN;
+}
+
+/* The tile that row i is in, and what follows it. */
+static panel_values tile_of(const panel *a, size_t i) {
+    const bool by_rows = a->layout == PANEL_ROWS;
+    const size_t row_step = by_rows ? a->k : a->stride;
+    const size_t at = i / PANEL_TILE * PANEL_TILE * row_step * panel_value_size(a->precision);
+    return (panel_values){.values = by_rows ? (const char *)a->rows + at : (const char *)a->data + at,
+                          .row_step = row_step,
+                          .n_chunks = a->stride / PANEL_CHUNK,
+                          .tail = by_rows ? a->k % PANEL_CHUNK : 0};
+}
+
+/* --- project ------------------------------------------------------------------------------------------ */
+
+/* Rows of a block that are needed: of each tile how many, which, and their numbers. */
+typedef struct block_rows {
+    size_t n_tiles, found;
+    size_t n_rows[BLOCK_TILES];
+    unsigned char which[BLOCK_TILES][PANEL_TILE];
+    float c[BLOCK_TILES][PANEL_TILE * PANEL_VECTORS]; /* [rows found][m] */
+} block_rows;
+
+/* Those where some vector is not 0, of rows first <= i < last. */
+static void find_rows(size_t first, size_t last, size_t m, const float *X, size_t x_stride, block_rows *out) {
+    out->n_tiles = (last - first + PANEL_TILE - 1) / PANEL_TILE;
+    out->found = 0;
+    for (size_t tile = 0; tile < out->n_tiles; tile++) {
+        const size_t begin = first + tile * PANEL_TILE;
+        const size_t end = last - begin < PANEL_TILE ? last : begin + PANEL_TILE;
+        size_t found = 0;
+        for (size_t i = begin; i < end; i++) {
+            bool any = false;
+            for (size_t v = 0; v < m; v++) {
+                float x = X[v * x_stride + i];
+                out->c[tile][found * m + v] = x;
+                any = any || x != 0.0f;
+            }
+            if (any) out->which[tile][found++] = (unsigned char)(i - begin);
+        }
+        out->n_rows[tile] = found;
+        out->found += found;
+    }
+}
+
+/* part += the rows of a block. Many vectors: a step of columns of all its tiles after another, so that theirs
+ * stay in the nearest cache; few: straight on through memory. */
+static void project_block(const panel *a, size_t first, size_t m, const block_rows *rows, float *part) {
+    const size_t n_chunks = a->stride / PANEL_CHUNK, step = m > MANY_VECTORS ? STEP_CHUNKS : n_chunks;
+    for (size_t q = 0; q < n_chunks; q += step)
+        for (size_t tile = 0; tile < rows->n_tiles; tile++) {
+            const panel_values from = tile_of(a, first + tile * PANEL_TILE);
+            if (rows->n_rows[tile] > 0)
+                a->kernels->project[a->layout][a->precision](&from, rows->n_rows[tile], rows->which[tile],
+                                                             rows->c[tile], m, q,
+                                                             n_chunks - q < step ? n_chunks : q + step, part);
+        }
+}
+
+/* total += the rows of a slab; part is 0 before and after. Whether there were any. */
+static bool project_slab(const panel *a, size_t slab, size_t m, const float *X, size_t x_stride, float *part,
+                         double *total) {
+    const size_t end = a->n - slab < slab_rows(a) ? a->n : slab + slab_rows(a);
+    bool any = false;
+    for (size_t first = slab; first < end; first += PROJECT_BLOCK) {
+        block_rows rows;
+        find_rows(first, end - first < PROJECT_BLOCK ? end : first + PROJECT_BLOCK, m, X, x_stride, &rows);
+        if (rows.found == 0) continue;
+        project_block(a, first, m, &rows, part);
+        a->kernels->flush(a->stride * m, part, total);
+        any = true;
+    }
+    return any;
+}
+
+static void project_pass(const panel *a, size_t m, const float *X, size_t x_stride, float *T, size_t t_stride,
+                         void *work) {
+    const size_t count = a->stride * m, n_slabs = count_slabs(a), n_threads = count_threads(a, n_slabs);
+    const size_t part_size = (count * sizeof(float) + PANEL_ALIGN - 1) / PANEL_ALIGN * PANEL_ALIGN;
+    double *total = work_take(&work, count * sizeof *total);
+    char *parts = work_take(&work, n_threads * part_size);
+    double *sums = work; /* of every slab, or of one at a time */
+    bool any[MOST_SLABS] = {false};
+    memset(total, 0, count * sizeof *total);
+#pragma omp parallel num_threads((int)n_threads) if (n_threads > 1)
+    {
+        float *part = (float *)(void *)(parts + (size_t)omp_get_thread_num() * part_size);
+        memset(part, 0, count * sizeof *part);
+#pragma omp for schedule(dynamic, 1)
+        for (size_t s = 0; s < n_slabs; s++) {
+            double *sum = n_threads > 1 ? sums + s * count : sums;
+            memset(sum, 0, count * sizeof *sum);
+            any[s] = project_slab(a, s * slab_rows(a), m, X, x_stride, part, sum);
+            for (size_t j = 0; j < count && any[s] && n_threads == 1; j++) total[j] += sum[j];
+        }
+    }
+    for (size_t s = 0; s < n_slabs && n_threads > 1; s++)
+        for (size_t j = 0; j < count && any[s]; j++) total[j] += sums[s * count + j];
+    for (size_t v = 0; v < m; v++)
+        for (size_t j = 0; j < a->k; j++) {
+            const double scale = a->scale != NULL ? (double)a->scale[j] : 1.0;
+            T[v * t_stride + j] =
+                (float)(scale * total[(j / PANEL_CHUNK * m + v) * PANEL_CHUNK + j % PANEL_CHUNK]);
+        }
+}
+
+void panel_project(const panel *a, size_t m, const float *X, size_t x_stride, float *T, size_t t_stride,
+                   void *work) {
+    for (size_t v = 0; v < m; v += PANEL_VECTORS)
+        project_pass(a, m - v < PANEL_VECTORS ? m - v : PANEL_VECTORS, X + v * x_stride, x_stride,
+                     T + v * t_stride, t_stride, work);
+}
+
+/* --- expand ------------------------------------------------------------------------------------------- */
+
+/* Which rows: n_rows of them, the first ones when rows is NULL. */
+typedef struct row_choice {
+    size_t n_rows;
+    const uint32_t *rows, *map;
+} row_choice;
+
+static size_t chosen_row(const row_choice *choice, size_t r) {
+    return choice->map != NULL ? choice->map[choice->rows[r]] : choice->rows[r];
+}
+
+static void expand_pass(const panel *a, size_t m, const float *T, size_t t_stride, const row_choice *choice,
+                        float *Y, size_t y_stride, void *work) {
+    const size_t n_rows = choice->n_rows;
+    const size_t n_blocks = n_rows / EXPAND_BLOCK + (n_rows % EXPAND_BLOCK > 0);
+    const size_t n_threads = count_threads(a, n_blocks);
+    float *t = work_take(&work, a->stride * m * sizeof *t);
+    for (size_t v = 0; v < m; v++)
+        for (size_t j = 0; j < a->stride; j++) {
+            float *t_vj = t + (j / PANEL_CHUNK * m + v) * PANEL_CHUNK + j % PANEL_CHUNK;
+            *t_vj = j < a->k ? T[v * t_stride + j] : 0.0f;
+            if (a->scale != NULL && j < a->k) *t_vj *= a->scale[j];
+        }
+#pragma omp parallel for schedule(static) num_threads((int)n_threads) if (n_threads > 1)
+    for (size_t b = 0; b < n_blocks; b++) {
+        const size_t first = b * EXPAND_BLOCK;
+        const size_t last = n_rows - first < EXPAND_BLOCK ? n_rows : first + EXPAND_BLOCK;
+        if (choice->rows == NULL) {
+            const panel_values from = tile_of(a, first);
+            a->kernels->expand[a->layout][a->precision](&from, last - first, m, t, Y + first, y_stride);
+        }
+        for (size_t r = first; r < last && choice->rows != NULL; r++) {
+            const size_t i = chosen_row(choice, r);
+            const panel_values from = tile_of(a, i);
+            a->kernels->expand_row[a->layout][a->precision](&from, i % PANEL_TILE, m, t, Y + r, y_stride);
+        }
+    }
+}
+
+static void expand(const panel *a, size_t m, const float *T, size_t t_stride, const row_choice *choice,
+                   float *Y, size_t y_stride, void *work) {
+    for (size_t v = 0; v < m; v += PANEL_VECTORS)
+        expand_pass(a, m - v < PANEL_VECTORS ? m - v : PANEL_VECTORS, T + v * t_stride, t_stride, choice,
+                    Y + v * y_stride, y_stride, work);
+}
+
+void panel_expand(const panel *a, size_t m, const float *T, size_t t_stride, float *Y, size_t y_stride,
+                  void *work) {
+    const row_choice all = {.n_rows = a->n};
+    expand(a, m, T, t_stride, &all, Y, y_stride, work);
+}
+
+void panel_expand_rows(const panel *a, size_t m, const float *T, size_t t_stride, size_t n_rows,
+                       const uint32_t *rows, const uint32_t *map, float *Y, size_t y_stride, void *work) {
+    const row_choice chosen = {.n_rows = n_rows, .rows = rows, .map = map};
+    expand(a, m, T, t_stride, &chosen, Y, y_stride, work);
+}

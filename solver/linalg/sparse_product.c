@@ -1,0 +1,124 @@
+#include "solver/linalg/sparse_product.h"
+
+#include "solver/linalg/csr_floats.h"
+#include "solver/linalg/panel.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { BATCH = 16 };
+
+/* Fewer multiplications than this in all are done by one thread. */
+enum { THREADS_WORTH = 200000 };
+
+/* By columns every product goes through memory, one after the other: that pays for vectors which touch less
+ * than one part of so many of all entries. */
+enum { SPARSE_SHARE = 8 };
+
+lam_status csr_transpose(const csr *a, csr *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = a->n, entries = (size_t)a->indptr[n];
+    csr made = {.n = n};
+    made.indptr = memory_allocate(n + 1, sizeof *made.indptr, "columns", error);
+    if (made.indptr == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t e = 0; e < entries; e++) made.indptr[a->indices[e] + 1]++;
+    TRY(csr_begin_rows(&made, "columns", error));
+    for (size_t i = 0; i < n; i++)
+        for (uint64_t e = a->indptr[i]; e < a->indptr[i + 1]; e++) {
+            const uint64_t to = made.indptr[a->indices[e]]++;
+            made.indices[to] = (uint32_t)i;
+            made.data[to] = a->data[e];
+        }
+    csr_end_rows(&made);
+    *out = made;
+    made = (csr){.n = 0};
+done:
+    csr_free(&made);
+    return status;
+}
+
+size_t sparse_product_work(size_t n, size_t m) {
+    size_t side, whole, total = 0;
+    if (!size_multiply(n, csr_floats_width(m) * sizeof(float), &side) ||
+        !size_multiply(n, sizeof(float), &whole) || !work_add(&total, side) || !work_add(&total, whole))
+        return 0;
+    return total;
+}
+
+bool sparse_product_by_columns(const csr *columns, const float *x) {
+    const uint64_t most = columns->indptr[columns->n] / SPARSE_SHARE;
+    uint64_t touched = 0;
+    for (size_t j = 0; j < columns->n; j++)
+        if (x[j] != 0) {
+            touched += columns->indptr[j + 1] - columns->indptr[j];
+            if (touched > most) return false;
+        }
+    return true;
+}
+
+static size_t row_of(const uint32_t *chosen, const uint32_t *map, size_t r) {
+    if (chosen == NULL) return r;
+    return map != NULL ? map[chosen[r]] : chosen[r];
+}
+
+/* y = A x by the columns of what is not 0. */
+static void by_columns(const csr *columns, const float *x, float *y) {
+    memset(y, 0, columns->n * sizeof *y);
+    for (size_t j = 0; j < columns->n; j++) {
+        const float x_j = x[j];
+        if (x_j == 0) continue;
+        for (uint64_t e = columns->indptr[j]; e < columns->indptr[j + 1]; e++)
+            y[columns->indices[e]] += columns->data[e] * x_j;
+    }
+}
+
+/* Vectors which[0] ... which[m - 1] by rows, side by side where there are several. */
+static void by_rows(const sparse_pair *A, size_t m, const size_t *which, const float *X, size_t x_stride,
+                    size_t n_rows, const uint32_t *chosen, const uint32_t *map, float *Y, size_t y_stride,
+                    float *side) {
+    const csr *a = A->rows;
+    const size_t n = a->n, width = csr_floats_width(m);
+    const float *x = X + which[0] * x_stride;
+    csr_float_row *row_product = csr_floats_row(width);
+    if (width > 1) {
+        for (size_t p = 0; p < n; p++)
+            for (size_t v = 0; v < width; v++) side[p * width + v] = v < m ? X[which[v] * x_stride + p] : 0;
+        x = side;
+    }
+    const bool many = A->n_threads > 1 && a->indptr[n] / n * n_rows * m > THREADS_WORTH;
+#pragma omp parallel for schedule(dynamic, 256) num_threads((int)A->n_threads) if (many)
+    for (size_t r = 0; r < n_rows; r++) {
+        const size_t i = row_of(chosen, map, r);
+        const uint64_t first = a->indptr[i];
+        float sums[CSR_FLOATS_WIDTH];
+        row_product(a->indices + first, a->data + first, a->indptr[i + 1] - first, x, sums);
+        for (size_t v = 0; v < m; v++) Y[which[v] * y_stride + r] = sums[v];
+    }
+}
+
+/* Few rows that touch less than n entries: putting vectors side by side would cost more than they do. */
+static bool rows_are_few(const csr *a, size_t n_rows) {
+    return (double)n_rows * (double)a->indptr[a->n] < (double)a->n * (double)a->n;
+}
+
+void sparse_product(const sparse_pair *A, size_t m, const float *X, size_t x_stride, size_t n_chosen,
+                    const uint32_t *chosen, const uint32_t *map, float *Y, size_t y_stride, void *work) {
+    const size_t n = A->rows->n, n_rows = chosen != NULL ? n_chosen : n;
+    float *side = work_take(&work, n * csr_floats_width(m) * sizeof *side);
+    float *whole = work_take(&work, n * sizeof *whole);
+    size_t dense[BATCH], n_dense = 0;
+    for (size_t v = 0; v < m; v++) {
+        const float *x = X + v * x_stride;
+        float *y = Y + v * y_stride;
+        if (!sparse_product_by_columns(A->columns, x)) {
+            dense[n_dense++] = v;
+            continue;
+        }
+        by_columns(A->columns, x, chosen != NULL ? whole : y);
+        for (size_t r = 0; chosen != NULL && r < n_rows; r++) y[r] = whole[row_of(chosen, map, r)];
+    }
+    if (n_dense == 0) return;
+    const size_t at_once = chosen != NULL && rows_are_few(A->rows, n_rows) ? 1 : n_dense;
+    for (size_t v = 0; v < n_dense; v += at_once)
+        by_rows(A, at_once, dense + v, X, x_stride, n_rows, chosen, map, Y, y_stride, side);
+}

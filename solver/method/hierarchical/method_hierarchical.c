@@ -1,0 +1,199 @@
+/* hierarchical: M - I in its symmetric scaling and in a basis of multiwavelets on a tree of clusters, where
+ * light between what is far apart, and its many bounces, are few numbers, and so is the light of neighbours.
+ */
+#include "solver/base/clock.h"
+#include "solver/method/hierarchical/plane_tree.h"
+#include "solver/method/hierarchical/self_check.h"
+#include "solver/method/hierarchical/wavelet_balance.h"
+#include "solver/method/hierarchical/wavelet_basis.h"
+#include "solver/method/hierarchical/wavelet_inverse.h"
+#include "solver/method/hierarchical/wavelet_pass.h"
+#include "solver/method/method.h"
+#include "solver/operator/hierarchical.h"
+
+#include <math.h>
+#include <omp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Elements of a leaf at most. */
+enum { LEAF = 6 };
+
+/* Coefficients are kept from this share of epsilon on. */
+static const double share_of_epsilon = .02;
+/* Coefficients below this share of the 2-norm of the sampling error, sqrt(2 / rays), are mostly that error.
+ */
+static const double share_of_noise = .055;
+/* A coefficient's weight falls with the elements below it to this power: what is fine is mostly noise. */
+static const double level_exponent = .25;
+/* S is kept to this share of the threshold, unless what is below is noise; products on the way to the second,
+ * terms of products to the third. */
+static const float share_of_S = .5f, share_inner = .25f, share_skipped = .005f;
+/* Over the cube root of the threshold: how many of its radii a node looks around itself. From eight radii on
+ * light moves no number of a node by more than a threshold of .0026, measured by leaving it out. */
+static const double reach = 1.2;
+
+/* Of even light's irradiance so much may be lacking: of epsilon, and what half precision costs anyway. */
+static const double share_made_up = .1, least_made_up = 5e-4;
+
+/* (elements below)^-level_exponent over its geometric mean, that of every coefficient. */
+static lam_status make_weights(const wavelets *w, float **out, lam_error *error) {
+    double sum = 0;
+    float *made = memory_allocate(w->n_nodes, sizeof *made, "wavelets", error);
+    if (made == NULL) return LAM_ERR_MEMORY;
+    for (size_t t = 0; t < w->n_nodes; t++) {
+        const wavelet_node *a = &w->nodes[t];
+        const size_t count = a->inputs - (t + 1 < w->n_nodes ? a->scaling : 0);
+        sum -= level_exponent * (double)count * log((double)a->n_elements);
+    }
+    const double mean = exp(sum / (double)w->n);
+    for (size_t t = 0; t < w->n_nodes; t++)
+        made[t] = (float)(pow((double)w->nodes[t].n_elements, -level_exponent) / mean);
+    *out = made;
+    return LAM_OK;
+}
+
+/* Row sums of F. */
+static void sum_rows(const csr *F, double *sums) {
+    for (size_t i = 0; i < F->n; i++) {
+        sums[i] = 0;
+        for (uint64_t e = F->indptr[i]; e < F->indptr[i + 1]; e++) sums[i] += (double)F->data[e];
+    }
+}
+
+/* What the operator lacks where E = 1 - rho s, which makes B = 1 and H = s, the row sums of F: made up for
+ * where it is much beside epsilon. share: of s, before. */
+static lam_status make_up(const build_problem *problem, const double *s, double epsilon,
+                          const uint32_t *order, lam_operator *op, bool *made_up, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = problem->n, C = problem->n_channels, bytes = lam_operator_work_bytes(op, 1);
+    double share = 0;
+    double *missing = memory_allocate(C, n * sizeof *missing, "operator", error);
+    double *light = memory_allocate(C, sizeof *light, "operator", error);
+    float *E = memory_allocate(C, n * sizeof *E, "operator", error);
+    float *H = memory_allocate(C, n * sizeof *H, "operator", error);
+    void *work = memory_allocate(1, bytes, "operator", error);
+    if (missing == NULL || light == NULL || E == NULL || H == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < n; i++) {
+        for (size_t c = 0; c < C; c++)
+            E[c * n + i] = (float)fmax(1 - (double)problem->reflectance[c * n + i] * s[i], 0);
+    }
+    TRY(lam_operator_apply(op, 1, LAM_IRRADIANCE, E, H, work, bytes, error));
+    for (size_t c = 0; c < C; c++) {
+        double lost = 0, all = 0;
+        for (size_t p = 0; p < n; p++) {
+            const size_t i = order[p];
+            const double d = s[i] - (double)H[c * n + i];
+            missing[c * n + p] = d;
+            lost += problem->area[i] * d * d;
+            all += problem->area[i] * s[i] * s[i];
+            light[c] += problem->area[i] * (double)E[c * n + i];
+        }
+        if (all > 0) share = fmax(share, sqrt(lost / all));
+    }
+    *made_up = share > fmax(share_made_up * epsilon, least_made_up);
+    if (*made_up) TRY(operator_hierarchical_make_up(op, missing, light, error));
+done:
+    free(missing);
+    free(light);
+    free(E);
+    free(H);
+    free(work);
+    return status;
+}
+
+static lam_status build(const build_problem *problem, const build_options *options, lam_operator **op,
+                        build_report *report, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = problem->n, C = problem->n_channels, n_threads = (size_t)omp_get_max_threads();
+    const double started = clock_seconds();
+    const double least = share_of_noise * problem->noise;
+    const double threshold = fmax(share_of_epsilon * options->epsilon, least);
+    plane_tree tree = {.n = 0};
+    hierarchical_arrays arrays = {.K = memory_allocate(C, sizeof *arrays.K, "operator", error)};
+    wavelet_inverse_report inverted = {.doublings = 0};
+    csr S = {.n = 0};
+    row_source held;
+    lam_operator *made = NULL;
+    float *weight = NULL, *rho = memory_allocate(n, sizeof *rho, "operator", error);
+    double *area = memory_allocate(n, sizeof *area, "operator", error), entries = 0;
+    double *sums = memory_allocate(n, sizeof *sums, "operator", error);
+    const double *row_sums = sums;
+    row_stream *const stream = problem->stream;
+    bool made_up = false;
+    if (arrays.K == NULL || rho == NULL || area == NULL || sums == NULL) TRY(LAM_ERR_MEMORY);
+    if (problem->centre == NULL || problem->normal == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "--method hierarchical: where elements are and face is not given");
+    TRY(plane_tree_make(n, problem->centre, problem->normal, LEAF, &tree, error));
+    TRY(wavelet_basis_make(&tree, problem->area, problem->centre, &arrays.basis, error));
+    TRY(make_weights(&arrays.basis, &weight, error));
+    if (stream == NULL) row_source_of_csr(&held, problem->F);
+    const wavelet_pass_input pass = {.basis = &arrays.basis,
+                                     .rows = stream != NULL ? &stream->rows : &held,
+                                     .one_sided = stream != NULL,
+                                     .area = problem->area,
+                                     .tree = &tree,
+                                     .threshold = (float)threshold * (threshold > least ? share_of_S : 1),
+                                     .weight = weight,
+                                     .centre = problem->centre,
+                                     .reach = reach / cbrt(threshold),
+                                     .n_threads = n_threads,
+                                     .progress = options->progress};
+    TRY(wavelet_pass(&pass, &S, error));
+    for (size_t p = 0; p < n; p++) area[p] = problem->area[tree.order[p]];
+    if (stream != NULL) {
+        TRY(stream->close(stream->context, &row_sums, error));
+        TRY(wavelet_balance(&arrays.basis, tree.order, area, row_sums, pass.threshold, weight, &S, error));
+    } else {
+        sum_rows(problem->F, sums);
+    }
+    report->factorize_seconds = clock_seconds() - started;
+    for (size_t c = 0; c < C; c++) {
+        for (size_t p = 0; p < n; p++) rho[p] = problem->reflectance[c * n + tree.order[p]];
+        const wavelet_inverse_input inverse = {.basis = &arrays.basis,
+                                               .S = &S,
+                                               .rho = rho,
+                                               .weight = weight,
+                                               .threshold = (float)threshold,
+                                               .inner = share_inner,
+                                               .skipped = share_skipped,
+                                               .n_threads = n_threads,
+                                               .progress = options->progress};
+        TRY(wavelet_inverse(&inverse, &arrays.K[c], &inverted, error));
+        entries += (double)arrays.K[c].indptr[n];
+    }
+    const size_t n_shapes = arrays.basis.n_shapes, n_nodes = arrays.basis.n_nodes;
+    TRY(operator_hierarchical_create(n, C, problem->reflectance, area, tree.order, &arrays, &made, error));
+    lam_operator_set_threads(made, n_threads);
+    TRY(make_up(problem, row_sums, options->epsilon, tree.order, made, &made_up, error));
+    report->method = "hierarchical";
+    report->threshold = threshold;
+    report->epsilon = -1;
+    report->invert_seconds = clock_seconds() - started - report->factorize_seconds;
+    snprintf(report->reason, sizeof report->reason,
+             "hierarchical: %s; threshold %.2g by %s, %.3g numbers an element (%.3g of "
+             "F), %zu planes, "
+             "%zu clusters of %zu shapes%s",
+             strcmp(options->method, "auto") == 0
+                 ? "too large for the whole inverse, too noisy for a sparse one"
+                 : "asked for by --method",
+             threshold, threshold > least ? "--epsilon" : "the noise of the rays", entries / (double)(n * C),
+             (double)S.indptr[n] / (double)n, tree.n_frames, n_nodes, n_shapes,
+             made_up ? "; what it lacks of even light is made up for" : "");
+    TRY(self_check(problem, row_sums, made, options->seed, report, error));
+    *op = made;
+    made = NULL;
+done:
+    lam_operator_close(made);
+    csr_free(&S);
+    hierarchical_arrays_free(&arrays, C);
+    plane_tree_free(&tree);
+    free(weight);
+    free(rho);
+    free(area);
+    free(sums);
+    return status;
+}
+
+const build_method build_hierarchical = {"hierarchical", build};

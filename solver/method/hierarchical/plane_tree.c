@@ -1,0 +1,330 @@
+#include "solver/method/hierarchical/plane_tree.h"
+
+#include "store/status.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Normals of a plane are this close in each coordinate, centroids this close to it, of the scene's extent. */
+static const double same_normal = 2e-3, same_plane = 1e-4;
+/* How far planes that face apart count as being, of the extent of what is split. */
+static const double facing_weight = .35;
+/* A cluster is cut where the gap is at least this share of the widest near its middle. */
+static const double wide_gap = .6;
+
+typedef struct key {
+    double value;
+    uint32_t element;
+} key;
+
+typedef struct maker {
+    const double (*centre)[3];
+    const float (*normal)[3];
+    size_t leaf_most;
+    double extent;
+    key *keys;           /* [n] */
+    uint32_t *group_end; /* [n_groups], where in the order groups end */
+    size_t n_groups;
+    plane_tree *tree;
+} maker;
+
+void plane_tree_free(plane_tree *tree) {
+    free(tree->order);
+    free(tree->clusters);
+    free(tree->frames);
+    *tree = (plane_tree){.n = 0};
+}
+
+static double dot3(const double *a, const double *b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static int by_value(const void *left, const void *right) {
+    const key *a = left, *b = right;
+    if (a->value != b->value) return a->value < b->value ? -1 : 1;
+    return a->element < b->element ? -1 : a->element > b->element;
+}
+
+static void sort_by_keys(maker *k, size_t begin, size_t end) {
+    qsort(k->keys + begin, end - begin, sizeof *k->keys, by_value);
+    for (size_t p = begin; p < end; p++) k->tree->order[p] = k->keys[p].element;
+}
+
+/* --- planes -------------------------------------------------------------------------------------------- */
+
+static void mean_normal(const maker *k, size_t begin, size_t end, double mean[3]) {
+    mean[0] = mean[1] = mean[2] = 0;
+    for (size_t p = begin; p < end; p++)
+        for (int d = 0; d < 3; d++) mean[d] += (double)k->normal[k->tree->order[p]][d];
+    const double length = sqrt(dot3(mean, mean));
+    for (int d = 0; d < 3; d++) mean[d] = length > 0 ? mean[d] / length : d == 2;
+}
+
+/* Elements whose normals go in small steps from one to the next, as those of a sphere do, are no plane. */
+static bool is_plane(const maker *k, size_t begin, size_t end) {
+    double mean[3], low = INFINITY, high = -INFINITY;
+    mean_normal(k, begin, end, mean);
+    for (size_t p = begin; p < end; p++) {
+        const uint32_t i = k->tree->order[p];
+        const double at = dot3(mean, k->centre[i]);
+        low = fmin(low, at);
+        high = fmax(high, at);
+        for (int d = 0; d < 3; d++)
+            if (fabs((double)k->normal[i][d] - mean[d]) > 2 * same_normal) return false;
+    }
+    return high - low <= 4 * same_plane * k->extent;
+}
+
+enum { PLANE_KEYS = 4 };
+
+/* Sorts a range by the coordinates of the normal, then by the offset, and cuts it where either leaps. */
+static void split_planes(maker *k, size_t begin, size_t end, int level) {
+    if (level == PLANE_KEYS) {
+        if (is_plane(k, begin, end)) {
+            k->group_end[k->n_groups++] = (uint32_t)end;
+        } else {
+            for (size_t p = begin; p < end; p++) k->group_end[k->n_groups++] = (uint32_t)(p + 1);
+        }
+        return;
+    }
+    double mean[3];
+    if (level == 3) mean_normal(k, begin, end, mean);
+    for (size_t p = begin; p < end; p++) {
+        const uint32_t i = k->tree->order[p];
+        k->keys[p] = (key){level < 3 ? (double)k->normal[i][level] : dot3(mean, k->centre[i]), i};
+    }
+    sort_by_keys(k, begin, end);
+    const double leap = level < 3 ? same_normal : same_plane * k->extent;
+    /* Deeper levels sort their range of the keys again: ends are found before they do. */
+    for (size_t first = begin; first < end;) {
+        size_t last = first + 1;
+        while (last < end && k->keys[last].value - k->keys[last - 1].value <= leap) last++;
+        split_planes(k, first, last, level + 1);
+        first = last;
+    }
+}
+
+/* --- trees --------------------------------------------------------------------------------------------- */
+
+static uint32_t add_cluster(maker *k, plane_cluster made) {
+    const size_t at = k->tree->n_clusters++;
+    k->tree->clusters[at] = made;
+    return (uint32_t)at;
+}
+
+/* Where a range sorted by value is cut: at a wide gap, the one nearest to its middle. */
+static size_t cut_of(const key *keys, size_t begin, size_t end) {
+    const size_t count = end - begin, middle = begin + count / 2, slack = count / 4;
+    double widest = 0;
+    size_t best = middle;
+    for (size_t p = middle - slack; p <= middle + slack; p++)
+        if (p > begin && p < end) widest = fmax(widest, keys[p].value - keys[p - 1].value);
+    for (size_t step = 0; step <= slack; step++)
+        for (int side = 0; side < 2; side++) {
+            best = side == 0 ? middle - step : middle + step;
+            if (best <= begin || best >= end) continue;
+            if (keys[best].value - keys[best - 1].value >= wide_gap * widest) return best;
+        }
+    return middle;
+}
+
+static double on_axis(const maker *k, const plane_frame *f, int axis, uint32_t i) {
+    const double offset[3] = {k->centre[i][0] - f->origin[0], k->centre[i][1] - f->origin[1],
+                              k->centre[i][2] - f->origin[2]};
+    return dot3(f->axis[axis], offset);
+}
+
+static void sort_on_axis(maker *k, const plane_frame *f, int axis, size_t begin, size_t end) {
+    for (size_t p = begin; p < end; p++) {
+        const uint32_t i = k->tree->order[p];
+        /* Rows of a grid are told apart by more than rounding. */
+        k->keys[p] = (key){on_axis(k, f, axis, i), i};
+    }
+    sort_by_keys(k, begin, end);
+}
+
+static double extent_on_axis(const maker *k, const plane_frame *f, int axis, size_t begin, size_t end) {
+    double low = INFINITY, high = -INFINITY;
+    for (size_t p = begin; p < end; p++) {
+        const double at = on_axis(k, f, axis, k->tree->order[p]);
+        low = fmin(low, at);
+        high = fmax(high, at);
+    }
+    return high - low;
+}
+
+/* Elements of a leaf row by row, so that congruent leaves are alike whatever rounding made of the sorting. */
+static void sort_leaf(maker *k, const plane_frame *f, size_t begin, size_t end) {
+    uint32_t *order = k->tree->order;
+    const double same = 1e-7 * k->extent;
+    for (size_t p = begin + 1; p < end; p++)
+        for (size_t q = p; q > begin; q--) {
+            const double rows = on_axis(k, f, 1, order[q]) - on_axis(k, f, 1, order[q - 1]);
+            const double along = on_axis(k, f, 0, order[q]) - on_axis(k, f, 0, order[q - 1]);
+            if (rows > same || (rows >= -same && along >= 0)) break;
+            const uint32_t swapped = order[q];
+            order[q] = order[q - 1];
+            order[q - 1] = swapped;
+        }
+}
+
+/* A plane or a part of it. */
+static uint32_t split_plane(maker *k, uint32_t frame, size_t begin, size_t end) {
+    const plane_frame *f = &k->tree->frames[frame];
+    plane_cluster made = {.begin = (uint32_t)begin, .end = (uint32_t)end, .frame = frame};
+    if (end - begin <= k->leaf_most) {
+        made.leaf = true;
+        sort_leaf(k, f, begin, end);
+        return add_cluster(k, made);
+    }
+    const int axis = extent_on_axis(k, f, 1, begin, end) > 1.0001 * extent_on_axis(k, f, 0, begin, end);
+    sort_on_axis(k, f, axis, begin, end);
+    const size_t cut = cut_of(k->keys, begin, end);
+    made.left = split_plane(k, frame, begin, cut);
+    (void)split_plane(k, frame, cut, end);
+    return add_cluster(k, made);
+}
+
+/* The axis of the plane that lies most along an axis of space, and the one across it. */
+static void set_frame(maker *k, size_t begin, size_t end, plane_frame *f) {
+    double normal[3], along[3] = {0, 0, 0};
+    int flattest = 0;
+    mean_normal(k, begin, end, normal);
+    for (int d = 1; d < 3; d++)
+        if (fabs(normal[d]) < fabs(normal[flattest]) - 1e-6) flattest = d;
+    along[flattest] = 1;
+    const double away = dot3(normal, along);
+    for (int d = 0; d < 3; d++) f->axis[0][d] = along[d] - away * normal[d];
+    const double length = sqrt(dot3(f->axis[0], f->axis[0]));
+    for (int d = 0; d < 3; d++) f->axis[0][d] /= length;
+    for (int d = 0; d < 3; d++)
+        f->axis[1][d] =
+            normal[(d + 1) % 3] * f->axis[0][(d + 2) % 3] - normal[(d + 2) % 3] * f->axis[0][(d + 1) % 3];
+    for (int d = 0; d < 3; d++) f->origin[d] = 0;
+    for (size_t p = begin; p < end; p++)
+        for (int d = 0; d < 3; d++) f->origin[d] += k->centre[k->tree->order[p]][d] / (double)(end - begin);
+}
+
+/* A group of planes: its range, where it is and where it faces. */
+typedef struct plane_place {
+    uint32_t begin, end;
+    double at[6];
+} plane_place;
+
+typedef struct plane_key {
+    double value;
+    plane_place place;
+} plane_key;
+
+static int by_plane(const void *left, const void *right) {
+    const plane_key *a = left, *b = right;
+    if (a->value != b->value) return a->value < b->value ? -1 : 1;
+    return a->place.begin < b->place.begin ? -1 : a->place.begin > b->place.begin;
+}
+
+/* Sorts planes into tree order: halves them where they differ most, by number. Later ranges follow. */
+static void order_planes(plane_key *planes, size_t count) {
+    double low[6], high[6], size = 0;
+    int longest = 0;
+    if (count < 2) return;
+    for (int d = 0; d < 6; d++) low[d] = INFINITY, high[d] = -INFINITY;
+    for (size_t g = 0; g < count; g++)
+        for (int d = 0; d < 6; d++) {
+            low[d] = fmin(low[d], planes[g].place.at[d]);
+            high[d] = fmax(high[d], planes[g].place.at[d]);
+        }
+    for (int d = 0; d < 3; d++) size = fmax(size, high[d] - low[d]);
+    for (int d = 0; d < 6; d++) {
+        const double here = (high[d] - low[d]) * (d < 3 ? 1 : facing_weight * size);
+        const double best = (high[longest] - low[longest]) * (longest < 3 ? 1 : facing_weight * size);
+        if (here > best) longest = d;
+    }
+    for (size_t g = 0; g < count; g++) planes[g].value = planes[g].place.at[longest];
+    qsort(planes, count, sizeof *planes, by_plane);
+    order_planes(planes, count / 2);
+    order_planes(planes + count / 2, count - count / 2);
+}
+
+/* The tree above planes [first, last), halved as order_planes did. */
+static uint32_t join_planes(maker *k, const uint32_t *begins, size_t first, size_t last) {
+    if (last - first == 1) return split_plane(k, (uint32_t)first, begins[first], begins[last]);
+    const size_t middle = first + (last - first) / 2;
+    plane_cluster made = {.begin = begins[first], .end = begins[last], .frame = PLANE_ABOVE};
+    made.left = join_planes(k, begins, first, middle);
+    (void)join_planes(k, begins, middle, last);
+    return add_cluster(k, made);
+}
+
+/* Brings the planes into tree order, and the elements with them; begins gets where each begins. */
+static lam_status place_planes(maker *k, uint32_t *begins, lam_error *error) {
+    lam_status status = LAM_OK;
+    plane_tree *tree = k->tree;
+    plane_key *planes = memory_allocate(k->n_groups, sizeof *planes, "clusters", error);
+    uint32_t *order = memory_allocate(tree->n, sizeof *order, "clusters", error);
+    if (planes == NULL || order == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t g = 0, begin = 0; g < k->n_groups; g++) {
+        plane_place *place = &planes[g].place;
+        *place = (plane_place){.begin = (uint32_t)begin, .end = k->group_end[g]};
+        for (size_t p = begin; p < place->end; p++)
+            for (int d = 0; d < 3; d++) {
+                const double share = 1 / (double)(place->end - begin);
+                place->at[d] += share * k->centre[tree->order[p]][d];
+                place->at[3 + d] += share * (double)k->normal[tree->order[p]][d];
+            }
+        begin = place->end;
+    }
+    order_planes(planes, k->n_groups);
+    size_t used = 0;
+    for (size_t g = 0; g < k->n_groups; g++) {
+        const size_t count = planes[g].place.end - planes[g].place.begin;
+        begins[g] = (uint32_t)used;
+        memcpy(order + used, tree->order + planes[g].place.begin, count * sizeof *order);
+        used += count;
+    }
+    begins[k->n_groups] = (uint32_t)used;
+    memcpy(tree->order, order, tree->n * sizeof *order);
+done:
+    free(planes);
+    free(order);
+    return status;
+}
+
+lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*normal)[3], size_t leaf_most,
+                           plane_tree *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    plane_tree tree = {.n = n};
+    maker k = {.centre = centre, .normal = normal, .leaf_most = leaf_most, .tree = &tree};
+    uint32_t *begins = NULL;
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    tree.order = memory_allocate(n, sizeof *tree.order, "clusters", error);
+    tree.clusters = memory_allocate(2 * n, sizeof *tree.clusters, "clusters", error);
+    k.keys = memory_allocate(n, sizeof *k.keys, "clusters", error);
+    k.group_end = memory_allocate(n, sizeof *k.group_end, "clusters", error);
+    if (tree.order == NULL || tree.clusters == NULL || k.keys == NULL || k.group_end == NULL)
+        TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < n; i++) {
+        tree.order[i] = (uint32_t)i;
+        for (int d = 0; d < 3; d++) {
+            low[d] = fmin(low[d], centre[i][d]);
+            high[d] = fmax(high[d], centre[i][d]);
+        }
+    }
+    for (int d = 0; d < 3; d++) k.extent = fmax(k.extent, high[d] - low[d]);
+    split_planes(&k, 0, n, 0);
+    begins = memory_allocate(k.n_groups + 1, sizeof *begins, "clusters", error);
+    tree.frames = memory_allocate(k.n_groups, sizeof *tree.frames, "clusters", error);
+    if (begins == NULL || tree.frames == NULL) TRY(LAM_ERR_MEMORY);
+    tree.n_frames = k.n_groups;
+    TRY(place_planes(&k, begins, error));
+    for (size_t g = 0; g < k.n_groups; g++) set_frame(&k, begins[g], begins[g + 1], &tree.frames[g]);
+    (void)join_planes(&k, begins, 0, k.n_groups);
+    *out = tree;
+    tree = (plane_tree){.n = 0};
+done:
+    free(k.keys);
+    free(k.group_end);
+    free(begins);
+    plane_tree_free(&tree);
+    return status;
+}

@@ -1,0 +1,252 @@
+#include "solver/method/hierarchical/wavelet_basis.h"
+
+#include "solver/base/array_grow.h"
+
+#include "store/status.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Moments of a function: its products with 1, u, v, u^2, uv, v^2 of its plane. */
+enum { MOMENTS = 6, LINEAR = 3 };
+
+/* What is left of a function after others are taken out of it counts from this share of the constant's length
+ * on: its own would be that of rounding errors where elements lie in a row. */
+static const double dependent = 1e-5;
+/* Congruent nodes share a matrix: entries differ by less. */
+static const double same_entry = 1e-5;
+
+typedef struct square {
+    double at[WAVELET_INPUTS][WAVELET_INPUTS];
+} square;
+
+typedef struct moments {
+    double of[WAVELET_INPUTS][MOMENTS];
+} moments;
+
+/* Moments about the middle of what the inputs span, in units of its size. */
+static void centre_moments(size_t inputs, const moments *M, moments *out) {
+    double whole = 0, u = 0, v = 0, size = 0;
+    for (size_t k = 0; k < inputs; k++) {
+        const double *m = M->of[k];
+        whole += m[0] * m[0];
+        u += m[0] * m[1];
+        v += m[0] * m[2];
+        size += m[0] * (m[3] + m[5]);
+    }
+    u /= whole;
+    v /= whole;
+    size = sqrt(fmax(size / whole - u * u - v * v, 0));
+    const double unit = size > 0 ? 1 / size : 0;
+    for (size_t k = 0; k < inputs; k++) {
+        const double *m = M->of[k];
+        double *to = out->of[k];
+        to[0] = m[0];
+        to[1] = unit * (m[1] - u * m[0]);
+        to[2] = unit * (m[2] - v * m[0]);
+        to[3] = unit * unit * (m[3] - 2 * u * m[1] + u * u * m[0]);
+        to[4] = unit * unit * (m[4] - u * m[2] - v * m[1] + u * v * m[0]);
+        to[5] = unit * unit * (m[5] - 2 * v * m[2] + v * v * m[0]);
+    }
+}
+
+/* Takes the first rows of Q out of x, twice for rounding's sake, and returns what is left of its length. */
+static double make_orthogonal(size_t inputs, size_t rows, const square *Q, double *x) {
+    double length = 0;
+    for (int again = 0; again < 2; again++)
+        for (size_t k = 0; k < rows; k++) {
+            double along = 0;
+            for (size_t j = 0; j < inputs; j++) along += Q->at[k][j] * x[j];
+            for (size_t j = 0; j < inputs; j++) x[j] -= along * Q->at[k][j];
+        }
+    for (size_t j = 0; j < inputs; j++) length += x[j] * x[j];
+    return sqrt(length);
+}
+
+/* Row `rows` of Q is x made orthogonal to those before, where more than `least` is left of it. */
+static bool add_row(size_t inputs, size_t rows, const double *x, double least, square *Q) {
+    double left[WAVELET_INPUTS];
+    memcpy(left, x, inputs * sizeof *left);
+    const double rest = make_orthogonal(inputs, rows, Q, left);
+    if (!(rest > least)) return false;
+    for (size_t j = 0; j < inputs; j++) Q->at[rows][j] = left[j] / rest;
+    return true;
+}
+
+/* Rows that make Q whole: of the unit vectors that of which most is left, the first of equals. */
+static void complete(size_t inputs, size_t rows, square *Q) {
+    for (; rows < inputs; rows++) {
+        double most = 0;
+        for (int pass = 0; pass < 2; pass++)
+            for (size_t e = 0; e < inputs; e++) {
+                double unit[WAVELET_INPUTS] = {0};
+                unit[e] = 1;
+                const double rest = make_orthogonal(inputs, rows, Q, unit);
+                if (pass == 0) {
+                    most = fmax(most, rest);
+                } else if (rest > .999 * most) {
+                    for (size_t j = 0; j < inputs; j++) Q->at[rows][j] = unit[j] / rest;
+                    break;
+                }
+            }
+    }
+}
+
+/* The matrix of a node, what it hands up first; wavelets are orthogonal to as many of the quadratic functions
+ * as they can be, one after the other. Returns how many it hands up. */
+static size_t make_square(size_t inputs, const moments *M, bool linear, square *Q) {
+    moments about;
+    size_t rows = 0, scaling = 0;
+    double constant = 0;
+    for (size_t j = 0; j < inputs; j++) constant += M->of[j][0] * M->of[j][0];
+    if (linear) {
+        centre_moments(inputs, M, &about);
+    } else {
+        about = *M;
+    }
+    for (size_t f = 0; f < (linear ? (size_t)MOMENTS : 1) && rows < inputs; f++) {
+        double x[WAVELET_INPUTS];
+        for (size_t j = 0; j < inputs; j++) x[j] = about.of[j][f];
+        rows += add_row(inputs, rows, x, f == 0 ? 0 : dependent * sqrt(constant), Q);
+        if (f < LINEAR) scaling = rows;
+    }
+    complete(inputs, rows, Q);
+    return scaling;
+}
+
+/* --- shapes that congruent nodes share ------------------------------------------------------------------ */
+
+typedef struct shape_table {
+    wavelet_shape *shapes;
+    float *basis;
+    size_t *begin; /* of each in basis */
+    size_t count, used, capacity, room;
+    uint32_t *slots; /* [n_slots] shape + 1, 0: empty */
+    size_t n_slots;
+} shape_table;
+
+static uint64_t hash_of(const wavelet_shape *s, const square *Q) {
+    uint64_t h = s->leaf + 2u * s->inputs + 32u * s->scaling;
+    for (size_t i = 0; i < s->inputs; i++)
+        for (size_t j = 0; j < s->inputs; j++) {
+            const int64_t rounded = (int64_t)floor(Q->at[i][j] * 1000 + .5);
+            h = (h ^ (uint64_t)rounded) * 0x9E3779B97F4A7C15u;
+            h ^= h >> 29;
+        }
+    return h;
+}
+
+static bool is_same(const shape_table *t, uint32_t k, const wavelet_shape *s, const square *Q) {
+    const wavelet_shape *other = &t->shapes[k];
+    const float *basis = t->basis + t->begin[k];
+    if (other->leaf != s->leaf || other->inputs != s->inputs || other->scaling != s->scaling) return false;
+    for (size_t i = 0; i < s->inputs; i++)
+        for (size_t j = 0; j < s->inputs; j++)
+            if (fabs((double)basis[i * s->inputs + j] - Q->at[i][j]) > same_entry) return false;
+    return true;
+}
+
+/* The number of a shape, which is new or one that is there. */
+static lam_status find_shape(shape_table *t, const wavelet_shape *s, const square *Q, uint32_t *out,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t slot = hash_of(s, Q) % t->n_slots;
+    for (; t->slots[slot] != 0; slot = (slot + 1) % t->n_slots) {
+        *out = t->slots[slot] - 1;
+        if (is_same(t, *out, s, Q)) goto done;
+    }
+    const size_t size = (size_t)s->inputs * s->inputs;
+    if (t->count == t->capacity) {
+        t->capacity = 2 * t->capacity + 64;
+        TRY(grow(&t->shapes, t->capacity, sizeof *t->shapes, error));
+        TRY(grow(&t->begin, t->capacity, sizeof *t->begin, error));
+    }
+    if (t->used + size > t->room) {
+        t->room = 2 * t->room + 64 * WAVELET_INPUTS;
+        TRY(grow(&t->basis, t->room, sizeof *t->basis, error));
+    }
+    t->shapes[t->count] = *s;
+    t->begin[t->count] = t->used;
+    for (size_t i = 0; i < s->inputs; i++)
+        for (size_t j = 0; j < s->inputs; j++) t->basis[t->used++] = (float)Q->at[i][j];
+    *out = (uint32_t)t->count++;
+    t->slots[slot] = *out + 1;
+done:
+    return status;
+}
+
+/* --- the basis ----------------------------------------------------------------------------------------- */
+
+static void moments_of_element(const plane_frame *f, double area, const double *centre, double *m) {
+    double at[2] = {0, 0};
+    for (int axis = 0; axis < 2; axis++)
+        for (int d = 0; d < 3; d++) at[axis] += f->axis[axis][d] * (centre[d] - f->origin[d]);
+    const double root = sqrt(area);
+    const double value[MOMENTS] = {1, at[0], at[1], at[0] * at[0], at[0] * at[1], at[1] * at[1]};
+    for (int k = 0; k < MOMENTS; k++) m[k] = root * value[k];
+}
+
+/* Moments of what a node hands up. */
+typedef struct handed {
+    size_t scaling;
+    double of[WAVELET_SCALING][MOMENTS];
+} handed;
+
+/* Inputs of a node and their moments. */
+static size_t gather(const plane_tree *tree, size_t t, const double *area, const double (*centre)[3],
+                     const handed *up, moments *M) {
+    const plane_cluster *c = &tree->clusters[t];
+    size_t inputs = 0;
+    if (c->leaf) {
+        for (size_t p = c->begin; p < c->end; p++) {
+            const uint32_t i = tree->order[p];
+            moments_of_element(&tree->frames[c->frame], area[i], centre[i], M->of[inputs++]);
+        }
+        return inputs;
+    }
+    const size_t children[2] = {c->left, t - 1};
+    for (int side = 0; side < 2; side++)
+        for (size_t k = 0; k < up[children[side]].scaling; k++)
+            memcpy(M->of[inputs++], up[children[side]].of[k], sizeof M->of[0]);
+    return inputs;
+}
+
+lam_status wavelet_basis_make(const plane_tree *tree, const double *area, const double (*centre)[3],
+                              wavelets *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t count = tree->n_clusters;
+    shape_table table = {.n_slots = 2 * count + 1};
+    handed *up = memory_allocate(count, sizeof *up, "wavelets", error);
+    uint32_t *node_shapes = memory_allocate(count, sizeof *node_shapes, "wavelets", error);
+    table.slots = memory_allocate(table.n_slots, sizeof *table.slots, "wavelets", error);
+    if (up == NULL || node_shapes == NULL || table.slots == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t t = 0; t < count; t++) {
+        moments M;
+        square Q;
+        const bool linear = tree->clusters[t].frame != PLANE_ABOVE;
+        const size_t inputs = gather(tree, t, area, centre, up, &M);
+        const size_t scaling = make_square(inputs, &M, linear, &Q);
+        const wavelet_shape shape = {tree->clusters[t].leaf, (uint32_t)inputs, (uint32_t)scaling};
+        TRY(find_shape(&table, &shape, &Q, &node_shapes[t], error));
+        up[t].scaling = scaling;
+        for (size_t k = 0; k < scaling; k++)
+            for (size_t f = 0; f < MOMENTS; f++) {
+                up[t].of[k][f] = 0;
+                for (size_t j = 0; j < inputs; j++) up[t].of[k][f] += Q.at[k][j] * M.of[j][f];
+            }
+    }
+    wavelet_shape *const shapes = table.shapes;
+    float *const basis = table.basis;
+    table.shapes = NULL;
+    table.basis = NULL;
+    TRY(wavelets_create(tree->n, count, node_shapes, table.count, shapes, basis, table.used, out, error));
+done:
+    free(table.shapes);
+    free(table.basis);
+    free(table.begin);
+    free(table.slots);
+    free(up);
+    free(node_shapes);
+    return status;
+}

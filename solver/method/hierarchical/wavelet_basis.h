@@ -1,0 +1,13 @@
+/* The multiwavelets of a cluster tree: on planes what is handed up are the constant and the linear functions,
+ * in the inner product of areas, above them the constants. */
+#ifndef LAMBERT_METHOD_HIERARCHICAL_WAVELET_BASIS_H
+#define LAMBERT_METHOD_HIERARCHICAL_WAVELET_BASIS_H
+
+#include "solver/method/hierarchical/plane_tree.h"
+#include "solver/operator/wavelet/wavelets.h"
+
+/* area, centre: [n], by element. out is freed with wavelets_free. Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC. */
+lam_status wavelet_basis_make(const plane_tree *tree, const double *area, const double (*centre)[3],
+                              wavelets *out, lam_error *error);
+
+#endif

@@ -1,0 +1,471 @@
+#include "solver/method/hierarchical/wavelet_pass.h"
+
+#include "solver/base/bitset.h"
+#include "solver/method/hierarchical/subtrees.h"
+#include "solver/method/hierarchical/wavelet_details.h"
+#include "solver/method/hierarchical/wavelet_kept.h"
+
+#include "store/status.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+/* Rows side by side: what a node takes. */
+typedef float lanes __attribute__((vector_size(32)));
+typedef float lanes_unaligned __attribute__((vector_size(32), aligned(4), may_alias));
+
+/* Of rows that know one side a coefficient is half there: it is looked at from this share of the threshold
+ * on, for what noise may lack of that half. */
+static const float share_looked_at = .2f;
+
+/* So many numbers ahead memory is asked for what is going to be needed. */
+enum { AHEAD = 12 };
+
+/* What a cluster hands up of several rows, and of as many as a node hands up: both at most linear functions.
+ */
+enum { SCALING = 3 };
+_Static_assert((int)SCALING == (int)DETAIL_LANES, "of finer columns as many rows are handed up");
+typedef struct block {
+    lanes of[SCALING];
+} block;
+typedef struct kept_block {
+    float of[SCALING][SCALING];
+} kept_block;
+
+/* Rows on clusters (nodes, ascending), of which all others are 0. */
+typedef struct live_rows {
+    size_t count;
+    uint32_t *cluster;
+    block *value;
+} live_rows;
+typedef struct kept_rows {
+    size_t count;
+    uint32_t *cluster;
+    kept_block *value;
+} kept_rows;
+
+/* Where the column of an element lies, and A^-1/2 of it. */
+typedef struct column_place {
+    uint32_t position;
+    float over_root;
+} column_place;
+
+/* What all threads share. */
+typedef struct pass_job {
+    const wavelet_pass_input *input;
+    wavelet_reach reach;
+    column_place *columns; /* [n], by element */
+    kept_rows *kept;       /* [n_nodes], of what waits for its sibling */
+    details *details;      /* [n_nodes], likewise; NULL: rows know both sides */
+    float least;           /* of what is looked at, before weights */
+    size_t done;           /* elements */
+} pass_job;
+
+/* What a thread works with. */
+typedef struct desk {
+    lanes *dense;           /* [n], rows of a leaf: all 0 between leaves */
+    marks lit;              /* where they are not; AHEAD numbers behind them may be looked at */
+    uint32_t *cells, *work; /* of wavelet_cells */
+    live_rows rows[2], near[2];
+    details fresh, merged, joined; /* of a node: found at it, of its children, both */
+    size_t *runs;                  /* where those of each height begin in the first */
+    kept_list found;
+} desk;
+
+/* What is wanted of a column's wavelets: what is above the threshold in those of the rows, what they are to
+ * the rows that are handed up. */
+enum { EMIT = 1, DETAILS = 2 };
+
+/* The node whose rows are on their way. */
+typedef struct pass_row {
+    const pass_job *job;
+    size_t node;
+    unsigned wanted; /* of columns that its rows are handed up on: DETAILS, or nothing */
+    uint32_t height;
+    uint32_t first;     /* coefficient of lane 0, were lanes of what is handed up coefficients too */
+    unsigned own_lanes; /* coefficients: wavelets; of the root, where rows know one side, all */
+    float least;        /* threshold times the weight of the node */
+} pass_row;
+
+static void kept_rows_free(kept_rows *k) {
+    free(k->cluster);
+    free(k->value);
+    *k = (kept_rows){.count = 0};
+}
+
+/* What the root would hand up are the last coefficients. */
+static inline uint32_t row_coefficient(const pass_row *row, unsigned lane) {
+    const wavelets *w = row->job->input->basis;
+    const uint32_t scaling = w->nodes[row->node].scaling;
+    return lane < scaling ? (uint32_t)w->n - scaling + lane : row->first + lane;
+}
+
+/* Of the row's node and column node b. Of two nodes of one height each finds the other: where rows know both
+ * sides the earlier one keeps what they find, of itself the upper triangle. */
+static lam_status desk_keep(const pass_row *row, desk *d, uint32_t b, uint32_t i, uint32_t j, float value,
+                            lam_error *error) {
+    const bool both_sides = row->job->details == NULL;
+    if (both_sides && row->job->reach.height[b] == row->height && j < i) return LAM_OK;
+    return kept_put(&d->found, i, j, value, error);
+}
+
+static inline unsigned beyond_portable(const lanes *v, float least) {
+    unsigned bits = 0;
+    for (int lane = 0; lane < WAVELET_INPUTS; lane++) bits |= (unsigned)(fabsf((*v)[lane]) > least) << lane;
+    return bits;
+}
+
+#define KERNEL(name) name##_portable
+#define TARGET
+#define BEYOND(v, x) beyond_portable(v, x)
+#include "solver/method/hierarchical/wavelet_pass_kernels.inc"
+
+#if defined(__x86_64__)
+#define KERNEL(name) name##_avx2
+#define TARGET __attribute__((target("avx2,fma")))
+#define BEYOND(v, x)                                                                                         \
+    (unsigned)_mm256_movemask_ps(_mm256_cmp_ps(                                                              \
+        _mm256_andnot_ps(_mm256_set1_ps(-0.0f), *(const __m256 *)(v)), _mm256_set1_ps(x), _CMP_GT_OQ))
+#include "solver/method/hierarchical/wavelet_pass_kernels.inc"
+#endif
+
+/* The fastest kernels for this CPU. */
+typedef struct pass_kernels {
+    void (*merge)(const wavelets *, size_t, const kept_rows *, const kept_rows *, live_rows *);
+    lam_status (*promote)(const pass_row *, uint32_t, unsigned, const live_rows *, live_rows *, desk *,
+                          lam_error *);
+    lam_status (*merge_details)(const pass_row *, const details *, const details *, details *, desk *,
+                                lam_error *);
+    lam_status (*begin_leaf)(const pass_row *, size_t, live_rows *, desk *, lam_error *);
+} pass_kernels;
+
+static pass_kernels kernels_of_cpu(void) {
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+        return (pass_kernels){merge_avx2, promote_avx2, merge_details_avx2, begin_leaf_avx2};
+#endif
+    return (pass_kernels){merge_portable, promote_portable, merge_details_portable, begin_leaf_portable};
+}
+
+/* --- one node ------------------------------------------------------------------------------------------ */
+
+/* Scaled rows of a leaf's elements, side by side in the desk. */
+static lam_status scatter_rows(const pass_job *job, size_t node, desk *d, lam_error *error) {
+    lam_status status = LAM_OK;
+    const wavelet_pass_input *input = job->input;
+    const wavelet_node *a = &input->basis->nodes[node];
+    const uint32_t *elements = input->tree->order + a->begin;
+    row_block rows = {0};
+    /* Where rows are found only now a leaf may take seconds. */
+    if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+    TRY(row_source_get(input->rows, elements, a->n_elements, &rows, error));
+    for (size_t lane = 0; lane < a->n_elements; lane++) {
+        const float root = job->reach.place[a->begin + lane].root;
+        for (size_t e = 0; e < rows.length[lane]; e++) {
+            const column_place *at = &job->columns[rows.indices[lane][e]];
+            if (e + AHEAD < rows.length[lane])
+                __builtin_prefetch(&d->dense[job->columns[rows.indices[lane][e + AHEAD]].position], 1);
+            const size_t p = at->position;
+            d->dense[p][lane] += root * at->over_root * rows.data[lane][e];
+            marks_add(&d->lit, p);
+        }
+    }
+done:
+    row_block_free(&rows);
+    return status;
+}
+
+/* What the node hands up waits for its sibling. */
+static lam_status keep_rows(const live_rows *rows, size_t scaling, const wavelets *w, kept_rows *out,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    out->count = rows->count;
+    out->cluster = memory_allocate(rows->count, sizeof *out->cluster, "wavelets", error);
+    out->value = memory_allocate(rows->count, sizeof *out->value, "wavelets", error);
+    if (out->cluster == NULL || out->value == NULL) TRY(LAM_ERR_MEMORY);
+    memcpy(out->cluster, rows->cluster, rows->count * sizeof *out->cluster);
+    for (size_t e = 0; e < rows->count; e++)
+        for (size_t k = 0; k < w->nodes[rows->cluster[e]].scaling; k++)
+            for (size_t lane = 0; lane < scaling; lane++)
+                out->value[e].of[k][lane] = rows->value[e].of[k][lane];
+done:
+    return status;
+}
+
+/* Coefficients whose column is what the root would hand up; of the root's own rows those too. */
+static lam_status end_at_root(const pass_row *row, size_t node, const live_rows *rows, desk *d,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    const wavelets *w = row->job->input->basis;
+    const uint32_t root = (uint32_t)w->n_nodes - 1;
+    const wavelet_node *a = &w->nodes[node];
+    const size_t scaling = w->nodes[root].scaling;
+    for (size_t lane = node == root ? 0 : a->scaling; rows->count > 0 && lane < a->inputs; lane++)
+        for (size_t k = 0; k < scaling; k++) {
+            const uint32_t i = row_coefficient(row, (unsigned)lane);
+            const uint32_t j = (uint32_t)(w->n - scaling + k);
+            const float value = rows->value[0].of[k][lane];
+            if (fabsf(value) > row->least * row->job->input->weight[root])
+                TRY(desk_keep(row, d, root, i, j, value, error));
+        }
+done:
+    return status;
+}
+
+/* Of all clusters those that are near. */
+static void take_near(const pass_job *job, size_t node, const live_rows *all, live_rows *out) {
+    out->count = 0;
+    for (size_t e = 0; e < all->count; e++) {
+        if (!wavelet_is_near(&job->reach, node, all->cluster[e])) continue;
+        out->cluster[out->count] = all->cluster[e];
+        out->value[out->count++] = all->value[e];
+    }
+}
+
+static void swap(live_rows **a, live_rows **b) {
+    live_rows *const swapped = *a;
+    *a = *b;
+    *b = swapped;
+}
+
+/* Finer columns of the children's rows, and what this node's rows found on their way: that stands in
+ * ascending runs, first that of a leaf itself, then one for each height. */
+static lam_status take_details(pass_job *job, const pass_row *row, desk *d, size_t n_heights,
+                               lam_error *error) {
+    lam_status status = LAM_OK;
+    details *all = &d->merged, *next = &d->joined;
+    for (size_t k = 0; k <= n_heights; k++) {
+        const size_t first = k == 0 ? 0 : d->runs[k - 1], last = k < n_heights ? d->runs[k] : d->fresh.count;
+        if (first == last) continue;
+        TRY(details_join(all, d->fresh.list + first, last - first, next, error));
+        details *const swapped = all;
+        all = next;
+        next = swapped;
+    }
+    TRY(details_copy(all, &job->details[row->node], error));
+done:
+    return status;
+}
+
+static lam_status run_node(pass_job *job, size_t node, desk *d, lam_error *error) {
+    lam_status status = LAM_OK;
+    const pass_kernels kernels = kernels_of_cpu();
+    const wavelets *w = job->input->basis;
+    const wavelet_node *a = &w->nodes[node];
+    const uint32_t root = (uint32_t)w->n_nodes - 1, top = job->reach.height[root];
+    const uint32_t keep_at = node == root ? UINT32_MAX : job->reach.height[a->parent] - 1;
+    const bool both_sides = job->details == NULL;
+    const unsigned every = (1u << a->inputs) - 1, handed = (1u << a->scaling) - 1;
+    const pass_row row = {.job = job,
+                          .node = node,
+                          .wanted = both_sides || node == root ? 0 : DETAILS,
+                          .height = job->reach.height[node],
+                          .first = a->first - a->scaling,
+                          .own_lanes = both_sides || node != root ? every & ~handed : every,
+                          .least = job->least * job->input->weight[node]};
+    live_rows *from = &d->rows[0], *to = &d->rows[1];
+    uint32_t height = row.height;
+    d->fresh.count = d->merged.count = 0;
+    if (a->from_left > 0) {
+        kernels.merge(w, node, &job->kept[a->left], &job->kept[node - 1], from);
+        kept_rows_free(&job->kept[a->left]);
+        kept_rows_free(&job->kept[node - 1]);
+        if (!both_sides) {
+            TRY(kernels.merge_details(&row, &job->details[a->left], &job->details[node - 1], &d->merged, d,
+                                      error));
+            details_free(&job->details[a->left]);
+            details_free(&job->details[node - 1]);
+        }
+    } else {
+        TRY(scatter_rows(job, node, d, error));
+        TRY(kernels.begin_leaf(&row, node, from, d, error));
+        height = 1;
+    }
+    live_rows *near = &d->near[0], *next = &d->near[1];
+    take_near(job, node, from, near);
+    for (uint32_t h = height; node != root && h <= keep_at; h++) {
+        d->runs[h - height] = d->fresh.count;
+        TRY(kernels.promote(&row, h, row.wanted, from, to, d, error));
+        swap(&from, &to);
+    }
+    if (node != root) TRY(keep_rows(from, a->scaling, w, &job->kept[node], error));
+    if (node != root && !both_sides) TRY(take_details(job, &row, d, keep_at + 1 - height, error));
+    for (; height <= top; height++) {
+        TRY(kernels.promote(&row, height, EMIT, near, next, d, error));
+        swap(&near, &next);
+    }
+    TRY(end_at_root(&row, node, near, d, error));
+done:
+    return status;
+}
+
+/* --- all of them --------------------------------------------------------------------------------------- */
+
+static void job_free(pass_job *job) {
+    for (size_t t = 0; job->kept != NULL && t < job->input->basis->n_nodes; t++)
+        kept_rows_free(&job->kept[t]);
+    for (size_t t = 0; job->details != NULL && t < job->input->basis->n_nodes; t++)
+        details_free(&job->details[t]);
+    free(job->kept);
+    free(job->details);
+    free(job->columns);
+    wavelet_reach_free(&job->reach);
+}
+
+static lam_status job_make(const wavelet_pass_input *input, pass_job *job, lam_error *error) {
+    lam_status status = LAM_OK;
+    const wavelets *w = input->basis;
+    const size_t N = w->n_nodes;
+    *job = (pass_job){.input = input, .least = input->threshold * (input->one_sided ? share_looked_at : 1)};
+    job->kept = memory_allocate(N, sizeof *job->kept, "wavelets", error);
+    if (input->one_sided) job->details = memory_allocate(N, sizeof *job->details, "wavelets", error);
+    if (input->one_sided && job->details == NULL) TRY(LAM_ERR_MEMORY);
+    job->columns = memory_allocate(w->n, sizeof *job->columns, "wavelets", error);
+    if (job->kept == NULL || job->columns == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(wavelet_reach_make(w, input->tree, input->area, input->centre, input->reach, &job->reach, error));
+    for (size_t p = 0; p < w->n; p++) {
+        const uint32_t i = input->tree->order[p];
+        job->columns[i] = (column_place){(uint32_t)p, (float)(1 / sqrt(input->area[i]))};
+    }
+done:
+    return status;
+}
+
+static void desk_free(desk *d) {
+    free(d->dense);
+    marks_free(&d->lit);
+    free(d->cells);
+    free(d->work);
+    for (int k = 0; k < 2; k++) {
+        free(d->rows[k].cluster);
+        free(d->rows[k].value);
+        free(d->near[k].cluster);
+        free(d->near[k].value);
+    }
+    details_free(&d->fresh);
+    details_free(&d->merged);
+    details_free(&d->joined);
+    free(d->runs);
+    kept_free(&d->found);
+    *d = (desk){.dense = NULL};
+}
+
+static void *aligned_lanes(size_t count, size_t size, lam_error *error) {
+    size_t bytes;
+    void *made = NULL;
+    if (size_multiply(count, size, &bytes) && bytes < SIZE_MAX / 2)
+        made = aligned_alloc(64, (bytes + 63) / 64 * 64);
+    if (made == NULL)
+        status_fail(error, LAM_ERR_MEMORY, "wavelets: cannot allocate %zu x %zu bytes", count, size);
+    return made;
+}
+
+static lam_status desk_make(const pass_job *job, desk *d, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = job->input->basis->n;
+    d->dense = aligned_lanes(n, sizeof *d->dense, error);
+    TRY(marks_make(n, AHEAD, "wavelets", &d->lit, error));
+    d->cells = memory_allocate(job->reach.n_leaves, sizeof *d->cells, "wavelets", error);
+    d->work = memory_allocate(2 * (size_t)job->reach.height[job->input->basis->n_nodes - 1] + 4,
+                              sizeof *d->work, "wavelets", error);
+    d->runs = memory_allocate((size_t)job->reach.height[job->input->basis->n_nodes - 1] + 1, sizeof *d->runs,
+                              "wavelets", error);
+    if (d->dense == NULL || d->cells == NULL || d->work == NULL || d->runs == NULL) TRY(LAM_ERR_MEMORY);
+    memset(d->dense, 0, n * sizeof *d->dense);
+    for (int k = 0; k < 2; k++) {
+        d->rows[k].cluster =
+            memory_allocate(job->reach.n_leaves, sizeof *d->rows[k].cluster, "wavelets", error);
+        d->rows[k].value = aligned_lanes(job->reach.n_leaves, sizeof *d->rows[k].value, error);
+        d->near[k].cluster =
+            memory_allocate(job->reach.n_leaves, sizeof *d->near[k].cluster, "wavelets", error);
+        d->near[k].value = aligned_lanes(job->reach.n_leaves, sizeof *d->near[k].value, error);
+        if (d->rows[k].cluster == NULL || d->rows[k].value == NULL || d->near[k].cluster == NULL ||
+            d->near[k].value == NULL)
+            TRY(LAM_ERR_MEMORY);
+    }
+done:
+    return status;
+}
+
+static lam_status told(pass_job *job, size_t elements, lam_error *error) {
+    lam_status status = LAM_OK;
+    const progress *p = job->input->progress;
+#pragma omp critical(wavelet_pass_progress)
+    {
+        job->done += elements;
+        progress_report(p, job->input->one_sided ? "rays, wavelets" : "wavelets",
+                        (double)job->done / (double)job->input->basis->n);
+        if (progress_cancelled(p)) status = status_fail(error, LAM_ERR_CANCELLED, "cancelled");
+    }
+    return status;
+}
+
+/* Subtrees of this many elements at most are a thread's at once. */
+static size_t piece_elements(const pass_job *job) {
+    return job->input->basis->n / 64 + 8;
+}
+
+/* What all threads share, and what each has for itself. */
+typedef struct pass_team {
+    pass_job *job;
+    desk *desks;
+} pass_team;
+
+/* Progress is told of whole subtrees: a node above them has been told of. */
+static lam_status run_piece(void *context, wavelet_piece piece, size_t k, lam_error *error) {
+    lam_status status = LAM_OK;
+    pass_team *team = context;
+    pass_job *job = team->job;
+    const size_t elements = job->input->basis->nodes[piece.last - 1].n_elements;
+    desk *d = &team->desks[k];
+    if (d->dense == NULL) TRY(desk_make(job, d, error));
+    for (size_t t = piece.first; t < piece.last; t++) TRY(run_node(job, t, d, error));
+    if (elements <= piece_elements(job)) TRY(told(job, elements, error));
+done:
+    return status;
+}
+
+static lam_status run_all(pass_job *job, desk *desks, lam_error *error) {
+    pass_team team = {job, desks};
+    return subtrees_run(job->input->basis, piece_elements(job), job->input->n_threads, run_piece, &team,
+                        error);
+}
+
+static lam_status gather(const pass_job *job, desk *desks, csr *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const wavelet_pass_input *input = job->input;
+    kept_list *lists = memory_allocate(input->n_threads, sizeof *lists, "wavelets", error);
+    if (lists == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < input->n_threads; k++) {
+        lists[k] = desks[k].found;
+        desks[k].found = (kept_list){.count = 0};
+        desk_free(&desks[k]);
+    }
+    TRY(kept_gather(input->basis->n, lists, input->n_threads, out, error));
+    if (input->one_sided) status = kept_add_sides(input->basis, input->weight, input->threshold, out, error);
+    if (status != LAM_OK) csr_free(out);
+done:
+    for (size_t k = 0; k < input->n_threads; k++) kept_free(&lists[k]);
+    free(lists);
+    return status;
+}
+
+lam_status wavelet_pass(const wavelet_pass_input *input, csr *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    pass_job job = {.input = input};
+    desk *desks = memory_allocate(input->n_threads, sizeof *desks, "wavelets", error);
+    if (desks == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(job_make(input, &job, error));
+    TRY(run_all(&job, desks, error));
+    TRY(gather(&job, desks, out, error));
+done:
+    for (size_t k = 0; desks != NULL && k < input->n_threads; k++) desk_free(&desks[k]);
+    free(desks);
+    job_free(&job);
+    return status;
+}

@@ -1,0 +1,512 @@
+#include "solver/method/judge.h"
+
+#include "solver/base/clock.h"
+#include "solver/method/reference.h"
+#include "solver/operator/emitters.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* All-over lights, and how many probes of a group tell the reference's own noise. */
+enum { RANDOM_PROBES = 8, NOISE_PROBES = 32 };
+
+/* Rows of a product that a thread takes at once. */
+enum { ROWS_AT_ONCE = 1024 };
+
+/* Residual at which a reference counts as converged: four digits below the smallest error worth printing. */
+static const double reference_tolerance = 1e-8;
+
+/* Indirect light below this share of all light is none: no ray found what the element sees, and what is left
+ * is what the reference's iteration did not converge to 0. */
+static const double dark = 1e-6;
+
+enum { SINGLE, LIGHTS, RANDOM, N_GROUPS };
+
+/* Emissions E with the operator's radiosity, both [m][C][n], and what is summed up for each of them. Group g
+ * has probes begin[g] ... begin[g + 1] - 1. */
+typedef struct probes {
+    size_t m;
+    size_t begin[N_GROUPS + 1];
+    float *E, *B;
+    float *W, *H0; /* [m][C][s], [m][C][n]: of an operator of emitters, else NULL */
+    double *B_norm, *indirect_norm, *error_norm; /* [m] squares, area-weighted, channels stacked */
+    double *first; /* [m][C][n], the light H that E itself gives, where known; NULL: of none */
+    bool *known;   /* [m] */
+} probes;
+
+static void probes_free(probes *p) {
+    free(p->E);
+    free(p->W);
+    free(p->H0);
+    free(p->B);
+    free(p->B_norm);
+    free(p->indirect_norm);
+    free(p->error_norm);
+    free(p->first);
+    free(p->known);
+    *p = (probes){0};
+}
+
+static lam_status probes_init(probes *p, const size_t counts[N_GROUPS], const build_problem *problem,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t vector = problem->n * problem->n_channels;
+    *p = (probes){0};
+    for (int g = 0; g < N_GROUPS; g++) p->begin[g + 1] = p->begin[g] + counts[g];
+    const size_t m = p->m = p->begin[N_GROUPS];
+    p->E = memory_allocate(m, vector * sizeof *p->E, "probes", error);
+    p->B = memory_allocate(m, vector * sizeof *p->B, "probes", error);
+    p->B_norm = memory_allocate(m, sizeof *p->B_norm, "probes", error);
+    p->indirect_norm = memory_allocate(m, sizeof *p->indirect_norm, "probes", error);
+    p->error_norm = memory_allocate(m, sizeof *p->error_norm, "probes", error);
+    if (p->E == NULL || p->B == NULL || p->B_norm == NULL || p->indirect_norm == NULL ||
+        p->error_norm == NULL)
+        TRY(LAM_ERR_MEMORY);
+done:
+    if (status != LAM_OK) probes_free(p);
+    return status;
+}
+
+/* The next value of a 64-bit generator (SplitMix64), in [0, 1). */
+static double next_random(uint64_t *state) {
+    uint64_t x = *state += 0x9E3779B97F4A7C15u;
+    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
+    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
+    return (double)((x ^ (x >> 31)) >> 11) * 0x1p-53;
+}
+
+/* One bright element a probe, drawn without repetition. */
+static lam_status single_emissions(const build_problem *problem, uint64_t seed, probes *p, lam_error *error) {
+    const size_t n = problem->n;
+    uint32_t *deck = memory_allocate(n, sizeof *deck, "probes", error);
+    if (deck == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < n; i++) deck[i] = (uint32_t)i;
+    for (size_t v = 0; v < p->begin[LIGHTS]; v++) {
+        const size_t other = v + (size_t)(next_random(&seed) * (double)(n - v));
+        const uint32_t element = deck[other];
+        deck[other] = deck[v];
+        for (size_t c = 0; c < problem->n_channels; c++)
+            p->E[(v * problem->n_channels + c) * n + element] = 1;
+    }
+    free(deck);
+    return LAM_OK;
+}
+
+static void random_emissions(const build_problem *problem, uint64_t seed, probes *p) {
+    const size_t vector = problem->n_channels * problem->n;
+    for (size_t i = p->begin[RANDOM] * vector; i < p->m * vector; i++) p->E[i] = (float)next_random(&seed);
+}
+
+/* out = quantity of the operator for every probe, a few at a time. */
+static lam_status apply(const lam_operator *op, const probes *p, lam_quantity quantity, float *out,
+                        lam_error *error) {
+    enum { AT_ONCE = 16 };
+    lam_status status = LAM_OK;
+    const size_t vector = lam_operator_elements(op) * lam_operator_channels(op);
+    const size_t n_batches = (p->m + AT_ONCE - 1) / AT_ONCE;
+    const size_t bytes = lam_operator_work_bytes(op, AT_ONCE);
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t b = 0; b < n_batches; b++) {
+        const size_t first = b * AT_ONCE, count = p->m - first < AT_ONCE ? p->m - first : AT_ONCE;
+        lam_error one = {0};
+        void *work = memory_allocate(1, bytes, "work area", &one);
+        lam_status result = LAM_ERR_MEMORY;
+        if (work != NULL && p->W != NULL)
+            result = lam_operator_apply_emitters(
+                op, count, quantity, p->W + first * lam_operator_emitters(op) * lam_operator_channels(op), 0,
+                NULL, out + first * vector, work, bytes, &one);
+        else if (work != NULL)
+            result = lam_operator_apply(op, count, quantity, p->E + first * vector, out + first * vector,
+                                        work, bytes, &one);
+        free(work);
+        if (result != LAM_OK) {
+#pragma omp critical(judge_apply)
+            {
+                status = result;
+                if (error != NULL) *error = one;
+            }
+        }
+    }
+    return status;
+}
+
+/* Finds out what light the probes themselves give, of which few elements shine. */
+static lam_status find_first_light(const judge_input *input, probes *p, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = input->problem->n, C = input->problem->n_channels;
+    if (input->first_light == NULL || p->W != NULL) return LAM_OK;
+    p->first = memory_allocate(p->m, C * n * sizeof *p->first, "probes", error);
+    p->known = memory_allocate(p->m, sizeof *p->known, "probes", error);
+    if (p->first == NULL || p->known == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t v = 0; v < p->begin[RANDOM]; v++)
+        for (size_t c = 0; c < C; c++) {
+            const float *E = p->E + v * C * n;
+            double *H = p->first + v * C * n;
+            if (c > 0 && memcmp(E, E + c * n, n * sizeof *E) == 0) {
+                memcpy(H + c * n, H, n * sizeof *H);
+                continue;
+            }
+            TRY(input->first_light(input->first_light_context, E + c * n, H + c * n, &p->known[v], error));
+            if (!p->known[v]) break;
+        }
+done:
+    return status;
+}
+
+/* Emissions of the probes for a reference: E, or what bounces on of the light R H that they are known to
+ * give. */
+static void reference_emission(const build_problem *problem, const csr *F, const probes *p, size_t v,
+                               size_t c, double *E, double *B, double *scratch) {
+    const size_t n = problem->n, C = problem->n_channels, at = (v * C + c) * n;
+    const float *rho = problem->reflectance + c * n;
+    const bool known = F != problem->F && p->known != NULL && p->known[v];
+    for (size_t i = 0; i < n; i++) {
+        E[i] = (double)p->E[at + i];
+        B[i] = (double)p->B[at + i];
+        if (known) scratch[i] = (double)rho[i] * p->first[at + i];
+    }
+    if (!known) return;
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t first = 0; first < n; first += ROWS_AT_ONCE)
+        csr_multiply_rows(F, first, first + ROWS_AT_ONCE < n ? first + ROWS_AT_ONCE : n, 1, scratch, E);
+    for (size_t i = 0; i < n; i++) {
+        B[i] = fmax(B[i] - (double)p->E[at + i] - scratch[i], 0);
+        E[i] *= (double)rho[i];
+    }
+}
+
+/* From what bounces on to all light. */
+static void add_first_light(const build_problem *problem, const csr *F, const probes *p, size_t v, size_t c,
+                            double *B) {
+    const size_t n = problem->n, at = (v * problem->n_channels + c) * n;
+    if (F == problem->F || p->known == NULL || !p->known[v]) return;
+    for (size_t i = 0; i < n; i++)
+        B[i] += (double)p->E[at + i] + (double)problem->reflectance[c * n + i] * p->first[at + i];
+}
+
+/* Calls visit, a channel at a time, with the converged B of the m probes which[]: B is [m][n]. */
+typedef void visit_reference(void *context, size_t channel, const double *B);
+
+static lam_status each_reference(const judge_input *input, const csr *F, const probes *p, const size_t *which,
+                                 size_t m, visit_reference *visit, void *context, lam_error *error) {
+    lam_status status = LAM_OK;
+    const build_problem *problem = input->problem;
+    const size_t n = problem->n, n_channels = problem->n_channels;
+    reference *r = NULL;
+    double *E = memory_allocate(m, n * sizeof *E, "reference emissions", error);
+    double *B = memory_allocate(m, n * sizeof *B, "reference solutions", error);
+    double *scratch = memory_allocate(n, sizeof *scratch, "reference solutions", error);
+    if (E == NULL || B == NULL || scratch == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t c = 0; c < n_channels; c++) {
+        for (size_t v = 0; v < m; v++)
+            reference_emission(problem, F, p, which[v], c, E + v * n, B + v * n, scratch);
+        if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+        TRY(reference_create(F, problem->area, problem->reflectance + c * n, REFERENCE_AUTO, &r, error));
+        TRY(reference_solve(r, m, E, B, reference_tolerance, input->progress, error));
+        reference_destroy(r);
+        r = NULL;
+        for (size_t v = 0; v < m; v++) add_first_light(problem, F, p, which[v], c, B + v * n);
+        visit(context, c, B);
+    }
+done:
+    reference_destroy(r);
+    free(E);
+    free(B);
+    free(scratch);
+    return status;
+}
+
+typedef struct comparison {
+    const build_problem *problem;
+    probes *p;
+} comparison;
+
+/* Adds one channel to |B|^2, |B - E|^2 and |B~ - B|^2 of every probe. */
+static void compare(void *context, size_t channel, const double *B) {
+    const comparison *c = context;
+    const size_t n = c->problem->n, n_channels = c->problem->n_channels;
+    for (size_t v = 0; v < c->p->m; v++) {
+        const float *E = c->p->E + (v * n_channels + channel) * n, *approximate = c->p->B + (E - c->p->E);
+        for (size_t i = 0; i < n; i++) {
+            const double b = B[v * n + i], a = c->problem->area[i];
+            c->p->B_norm[v] += a * b * b;
+            c->p->indirect_norm[v] += a * (b - (double)E[i]) * (b - (double)E[i]);
+            c->p->error_norm[v] += a * ((double)approximate[i] - b) * ((double)approximate[i] - b);
+        }
+    }
+}
+
+static void add_figure(error_figures *f, double x) {
+    f->mean += x;
+    f->std += x * x;
+    f->max = fmax(f->max, x);
+}
+
+static void finish_figure(error_figures *f, size_t count) {
+    if (count == 0) return;
+    f->mean /= (double)count;
+    f->std = sqrt(fmax(0, f->std / (double)count - f->mean * f->mean));
+}
+
+/* Relative and indirect figures of each group against one F. */
+static lam_status figures_against(const judge_input *input, const csr *F, probes *p,
+                                  error_figures *relative[N_GROUPS], error_figures *indirect[N_GROUPS],
+                                  lam_error *error) {
+    lam_status status = LAM_OK;
+    comparison c = {input->problem, p};
+    size_t *all = memory_allocate(p->m, sizeof *all, "probes", error);
+    if (all == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t v = 0; v < p->m; v++) all[v] = v;
+    memset(p->B_norm, 0, p->m * sizeof *p->B_norm);
+    memset(p->indirect_norm, 0, p->m * sizeof *p->indirect_norm);
+    memset(p->error_norm, 0, p->m * sizeof *p->error_norm);
+    TRY(each_reference(input, F, p, all, p->m, compare, &c, error));
+    for (int g = 0; g < N_GROUPS; g++) {
+        size_t bright = 0, lit = 0;
+        for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
+            if (p->B_norm[v] > 0) {
+                add_figure(relative[g], sqrt(p->error_norm[v] / p->B_norm[v]));
+                bright++;
+            }
+            /* An element that nothing sees has no indirect light to be wrong about. */
+            if (p->indirect_norm[v] > dark * dark * p->B_norm[v]) {
+                add_figure(indirect[g], sqrt(p->error_norm[v] / p->indirect_norm[v]));
+                lit++;
+            }
+        }
+        finish_figure(relative[g], bright);
+        finish_figure(indirect[g], lit);
+    }
+done:
+    free(all);
+    return status;
+}
+
+/* The converged solutions of one half of the independent sample: [m][C][n]. */
+typedef struct half_solutions {
+    size_t n, n_channels, m;
+    double *B;
+} half_solutions;
+
+static void keep_half(void *context, size_t channel, const double *B) {
+    const half_solutions *h = context;
+    for (size_t v = 0; v < h->m; v++)
+        memcpy(h->B + (v * h->n_channels + channel) * h->n, B + v * h->n, h->n * sizeof *B);
+}
+
+/* Half the distance between the halves' solutions, over the indirect light: the standard error of their mean.
+ * negative where there is no indirect light. */
+static double half_distance(const build_problem *problem, const float *E, const double *x, const double *y) {
+    double difference = 0, indirect = 0, all = 0;
+    for (size_t i = 0; i < problem->n_channels * problem->n; i++) {
+        const double a = problem->area[i % problem->n], mean = .5 * (x[i] + y[i]);
+        difference += a * .25 * (x[i] - y[i]) * (x[i] - y[i]);
+        indirect += a * (mean - (double)E[i]) * (mean - (double)E[i]);
+        all += a * mean * mean;
+    }
+    return indirect > dark * dark * all ? sqrt(difference / indirect) : -1;
+}
+
+static lam_status measure_noise(const judge_input *input, const probes *p, error_group *groups[N_GROUPS],
+                                lam_error *error) {
+    lam_status status = LAM_OK;
+    const build_problem *problem = input->problem;
+    const size_t vector = problem->n_channels * problem->n;
+    size_t which[N_GROUPS * NOISE_PROBES], m = 0;
+    for (int g = 0; g < N_GROUPS; g++)
+        for (size_t v = p->begin[g]; v < p->begin[g + 1] && v < p->begin[g] + NOISE_PROBES; v++)
+            which[m++] = v;
+    half_solutions half[2] = {{problem->n, problem->n_channels, m, NULL},
+                              {problem->n, problem->n_channels, m, NULL}};
+    for (int h = 0; h < 2; h++) {
+        half[h].B = memory_allocate(m, vector * sizeof *half[h].B, "reference noise", error);
+        if (half[h].B == NULL) TRY(LAM_ERR_MEMORY);
+        TRY(each_reference(input, input->halves[h], p, which, m, keep_half, &half[h], error));
+    }
+    size_t v = 0;
+    for (int g = 0; g < N_GROUPS; g++) {
+        double sum = 0;
+        size_t lit = 0;
+        for (; v < m && which[v] < p->begin[g + 1]; v++) {
+            const double noise = half_distance(problem, p->E + which[v] * vector, half[0].B + v * vector,
+                                               half[1].B + v * vector);
+            if (noise < 0) continue;
+            sum += noise;
+            lit++;
+        }
+        groups[g]->reference_noise = lit > 0 ? sum / (double)lit : 0;
+    }
+done:
+    free(half[0].B);
+    free(half[1].B);
+    return status;
+}
+
+/* Negative power over all power, and sum A E against sum A [(1 - rho) H + B (1 - s)], of each group. */
+static lam_status physics(const lam_operator *op, const judge_input *input, const probes *p,
+                          error_group *groups[N_GROUPS], lam_error *error) {
+    lam_status status = LAM_OK;
+    const build_problem *problem = input->problem;
+    const size_t n = problem->n, vector = n * problem->n_channels;
+    float *H = memory_allocate(p->m, vector * sizeof *H, "probes", error);
+    if (H == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(apply(op, p, LAM_IRRADIANCE, H, error));
+    for (int g = 0; g < N_GROUPS; g++) {
+        const double count = (double)(p->begin[g + 1] - p->begin[g]);
+        for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
+            double negative = 0, all = 0, emitted = 0, accounted = 0;
+            for (size_t i = 0; i < vector; i++) {
+                const double a = problem->area[i % n], b = (double)p->B[v * vector + i];
+                const double s = input->row_sums[i % n],
+                             direct = p->H0 != NULL ? (double)p->H0[v * vector + i] : 0;
+                const double h = (double)H[v * vector + i] - direct;
+                negative += a * fmax(-b, 0);
+                all += a * fabs(b);
+                emitted += a * (double)p->E[v * vector + i];
+                accounted += a * ((1 - (double)problem->reflectance[i]) * h + b * (1 - s));
+            }
+            if (all > 0) groups[g]->negative_share += negative / all / count;
+            if (emitted > 0) groups[g]->energy_balance += fabs(emitted - accounted) / emitted / count;
+        }
+    }
+done:
+    free(H);
+    return status;
+}
+
+/* Of an operator of emitters, some of them alone and all with random weights: E + rho H0 is what they send,
+ * as they stand in for elements. */
+static lam_status emitter_emissions(const lam_operator *op, const judge_input *input, probes *p,
+                                    lam_error *error) {
+    lam_status status = LAM_OK;
+    const build_problem *problem = input->problem;
+    const size_t s = lam_operator_emitters(op), C = problem->n_channels, vector = C * problem->n;
+    uint64_t seed = input->seed;
+    p->W = memory_allocate(p->m, s * C * sizeof *p->W, "probes", error);
+    p->H0 = memory_allocate(p->m, vector * sizeof *p->H0, "probes", error);
+    if (p->W == NULL || p->H0 == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t v = 0; v < p->m; v++)
+        for (size_t c = 0; c < C; c++)
+            for (size_t k = 0; k < s; k++)
+                p->W[(v * C + c) * s + k] = v >= p->begin[RANDOM]           ? (float)next_random(&seed)
+                                            : k == v * s / p->begin[LIGHTS] ? 1
+                                                                            : 0;
+    if (p->begin[RANDOM] > p->begin[LIGHTS])
+        TRY(lam_operator_weights(op, 1, input->emission, 0, NULL, p->W + p->begin[LIGHTS] * C * s, error));
+    TRY(operator_emitters_light(op, p->m, p->W, p->E, p->H0, error));
+    for (size_t v = 0; v < p->m; v++)
+        for (size_t i = 0; i < vector; i++)
+            p->E[v * vector + i] += problem->reflectance[i] * p->H0[v * vector + i];
+done:
+    return status;
+}
+
+/* Whether the scene has light of its own that the operator can answer. */
+static bool any_light(const lam_operator *op, const judge_input *input) {
+    if (lam_operator_emitters(op) > 0) {
+        const size_t s = lam_operator_emitters(op), C = input->problem->n_channels;
+        float *W = memory_allocate(s * C, sizeof *W, "weights", NULL);
+        bool any = W != NULL && lam_operator_weights(op, 1, input->emission, 0, NULL, W, NULL) == LAM_OK,
+             lit = false;
+        for (size_t k = 0; any && k < s * C; k++) lit = lit || W[k] > 0;
+        free(W);
+        return any && lit;
+    }
+    for (size_t i = 0; i < input->problem->n * input->problem->n_channels; i++)
+        if (input->emission[i] > 0) return true;
+    return false;
+}
+
+lam_status judge_operator(const lam_operator *op, const judge_input *input, error_report *report,
+                          lam_error *error) {
+    lam_status status = LAM_OK;
+    const build_problem *problem = input->problem;
+    const double start = clock_seconds();
+    const size_t vector = problem->n * problem->n_channels;
+    error_report found = {0};
+    error_group *groups[N_GROUPS] = {&found.single, &found.lights, &found.random};
+    error_figures *relative[N_GROUPS], *indirect[N_GROUPS];
+    probes p = {0};
+    const size_t s = lam_operator_emitters(op), most = s > 0 ? s : problem->n;
+    const size_t counts[N_GROUPS] = {input->probes < most ? input->probes : most, any_light(op, input),
+                                     RANDOM_PROBES};
+    TRY(probes_init(&p, counts, problem, error));
+    for (int g = 0; g < N_GROUPS; g++) groups[g]->probes = counts[g];
+    if (s > 0)
+        TRY(emitter_emissions(op, input, &p, error));
+    else
+        TRY(single_emissions(problem, input->seed, &p, error));
+    if (counts[LIGHTS] > 0 && s == 0)
+        memcpy(p.E + p.begin[LIGHTS] * vector, input->emission, vector * sizeof *p.E);
+    if (s == 0) random_emissions(problem, input->seed + 1, &p);
+
+    progress_report(input->progress, "judge", 0);
+    TRY(apply(op, &p, LAM_RADIOSITY, p.B, error));
+    TRY(physics(op, input, &p, groups, error));
+    for (int g = 0; g < N_GROUPS; g++) {
+        relative[g] = &groups[g]->operator_relative;
+        indirect[g] = &groups[g]->operator_indirect;
+    }
+    TRY(figures_against(input, problem->F, &p, relative, indirect, error));
+    progress_report(input->progress, "judge", .33);
+    if (input->independent != NULL) {
+        TRY(find_first_light(input, &p, error));
+        for (int g = 0; g < N_GROUPS; g++) {
+            relative[g] = &groups[g]->total_relative;
+            indirect[g] = &groups[g]->total_indirect;
+        }
+        TRY(figures_against(input, input->independent, &p, relative, indirect, error));
+        progress_report(input->progress, "judge", .67);
+        if (input->halves[0] != NULL) TRY(measure_noise(input, &p, groups, error));
+    }
+    progress_report(input->progress, "judge", 1);
+    found.has_total = input->independent != NULL;
+    found.seconds = clock_seconds() - start;
+    *report = found;
+done:
+    probes_free(&p);
+    return status;
+}
+
+static lam_status save_figures(store *s, const char *group, const char *what, const error_figures *f,
+                               lam_error *error) {
+    lam_status status = LAM_OK;
+    char name[64];
+    const char *const statistic[3] = {"mean", "std", "max"};
+    const double value[3] = {f->mean, f->std, f->max};
+    for (int i = 0; i < 3; i++) {
+        snprintf(name, sizeof name, "%s_%s", what, statistic[i]);
+        TRY(store_set_number(s, group, name, value[i], error));
+    }
+done:
+    return status;
+}
+
+static lam_status save_group(store *s, const char *name, const error_group *g, bool has_total,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    if (g->probes == 0) return LAM_OK;
+    TRY(store_set_integer(s, name, "probes", (int64_t)g->probes, error));
+    if (has_total) {
+        TRY(save_figures(s, name, "total_relative", &g->total_relative, error));
+        TRY(save_figures(s, name, "total_indirect", &g->total_indirect, error));
+        TRY(store_set_number(s, name, "reference_noise", g->reference_noise, error));
+    }
+    TRY(save_figures(s, name, "operator_relative", &g->operator_relative, error));
+    TRY(save_figures(s, name, "operator_indirect", &g->operator_indirect, error));
+    TRY(store_set_number(s, name, "negative_share", g->negative_share, error));
+    TRY(store_set_number(s, name, "energy_balance", g->energy_balance, error));
+done:
+    return status;
+}
+
+lam_status judge_save(const error_report *report, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(save_group(s, "/error/single", &report->single, report->has_total, error));
+    TRY(save_group(s, "/error/lights", &report->lights, report->has_total, error));
+    TRY(save_group(s, "/error/random", &report->random, report->has_total, error));
+done:
+    return status;
+}

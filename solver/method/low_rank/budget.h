@@ -1,0 +1,45 @@
+/* How the error of a hierarchical factorization is shared among the levels of its tree. */
+#ifndef LAMBERT_METHOD_LOW_RANK_BUDGET_H
+#define LAMBERT_METHOD_LOW_RANK_BUDGET_H
+
+#include "solver/method/low_rank/tsvd.h"
+
+enum { BUDGET_LEVELS_MOST = 20 };
+
+/* Why errors add in squares. Every node has Q = A V with V orthonormal: a leaf by its SVD, a parent because
+ * Q = (Q1|Q2) V_r = A diag(V1, V2) V_r. With W = diag(V1, V2), what a node leaves out is
+ *     A - Q V^T = A (I - W W^T) + (A W - A W V_r V_r^T) W^T:
+ * the first part lets only what is orthogonal to W through, the second only what is in W. For any x, split as
+ * x = y + W z with W^T y = 0, |(A - Q V^T) x| <= e_ch |y| + e_p |z| with e_p what its own truncation leaves,
+ * and |y|^2 + |z|^2 = |x|^2, so |A - Q V^T|_2^2 <= e_p^2 + |A (I - W W^T)|_2^2 <= e_p^2 + e_1^2 + e_2^2 by
+ * theorem 3.1 of the thesis; in the Frobenius norm both are equalities. Hence over all 2^l nodes of level l
+ * that leave p_l each, sum_l 2^l p_l^2 <= epsilon^2 keeps the bound. Eq. 3.10 asks for e_p + sqrt(2) e_ch. */
+typedef enum budget_rule {
+    BUDGET_SQUARES,   /* sum_l 2^l p_l^2 = epsilon^2 */
+    BUDGET_SUMS,      /* eqs. 3.10 and 3.11: e_p = alpha epsilon, e_ch = (1 - alpha) epsilon / sqrt(2) */
+    BUDGET_FROBENIUS, /* as squares, in the Frobenius norm: |S - Q V^T|_F <= epsilon */
+} budget_rule;
+
+typedef struct budget {
+    budget_rule rule;
+    double alpha; /* the root's share (of epsilon^2, or of epsilon where errors are summed), in (0, 1) */
+    /* Of squares: the part of what the root leaves that level l = 1 ... levels takes; together 1. */
+    double part[BUDGET_LEVELS_MOST + 1];
+} budget;
+
+/* Parts that fall by a ratio from level to level, but for the leaves where leaf > 0: those take it. */
+void budget_divide(budget *b, int levels, double ratio, double leaf);
+
+/* Whether any level has a part. */
+bool budget_divided(const budget *b);
+
+/* What a node of each level may leave out, p[0] of the root to p[levels] of a leaf. */
+void budget_share(const budget *b, double epsilon, int levels, double p[BUDGET_LEVELS_MOST + 1]);
+
+/* "squares", "sums", "frobenius"; false for any other name. */
+bool budget_rule_find(const char *name, budget_rule *rule);
+const char *budget_rule_name(budget_rule rule);
+
+truncation_norm budget_norm(budget_rule rule);
+
+#endif

@@ -1,0 +1,54 @@
+/* S ~ Q V^T, by any of the factorizers: what they are given, what they tell, and the list of them. */
+#ifndef LAMBERT_METHOD_LOW_RANK_FACTORIZER_H
+#define LAMBERT_METHOD_LOW_RANK_FACTORIZER_H
+
+#include "solver/base/progress.h"
+#include "solver/method/low_rank/budget.h"
+
+typedef struct factorizer_options {
+    double epsilon; /* |S - Q V^T|_2 <= epsilon (in the Frobenius norm where the budget says so) */
+    size_t rank;    /* > 0: exactly min(rank, n) columns, whatever they leave */
+    budget budget;  /* of HF; parts of 0: those that are expected to be fastest */
+    int levels;     /* of HF; negative: as many as are expected to be fastest */
+    int iterations; /* of RSI; negative: its default */
+    double noise;   /* sampling error of S in the 2-norm, about; 0: none known */
+    size_t memory;  /* bytes it may use beside S; 0: no limit */
+    uint64_t seed;  /* of random sketches */
+    const progress *progress;
+} factorizer_options;
+
+typedef struct factorizer_report {
+    const char *name;
+    int levels;                                 /* of HF, else 0 */
+    double left[BUDGET_LEVELS_MOST + 1];        /* what a node of each level might leave out */
+    double compression[BUDGET_LEVELS_MOST + 1]; /* rho_l: columns kept over columns given, by level */
+    double passes;                              /* how often all columns of S were read */
+} factorizer_report;
+
+/* One factorizer. out has rows of Q and V in positions, out->n = out->m = n, V orthonormal. Errors:
+ * LAM_ERR_MEMORY, LAM_ERR_NUMERIC, LAM_ERR_CANCELLED, those of the source. */
+typedef struct factorizer {
+    const char *name;
+    lam_status (*factorize)(const scaled_matrix *S, const factorizer_options *options, tall_factors *out,
+                            factorizer_report *report, lam_error *error);
+} factorizer;
+
+/* thesis chapter 3, algorithm 4; Aguerre and Fernandez 2016. One pass, and at most a third of one for
+ * samples. */
+extern const factorizer factorizer_hf;
+/* The whole S by its eigenvectors: the best there is at any rank. One pass, O(n^3). */
+extern const factorizer factorizer_svd;
+/* Randomized subspace iteration (thesis, algorithm 2; Halko et al. 2011). 2 + iterations passes or more. */
+extern const factorizer factorizer_rsi;
+/* Sub-Gaussian randomized SVD (thesis, algorithm 3; Aizenbud and Averbuch 2016). 2 passes or more. */
+extern const factorizer factorizer_sgrsvd;
+
+/* Factorizes S by the factorizer of this name; "auto" takes the one that is expected to be fastest at the
+ * same bound. Errors: LAM_ERR_ARGUMENT for another name, those of the factorizer. */
+lam_status factorize(const char *name, const scaled_matrix *S, const factorizer_options *options,
+                     tall_factors *out, factorizer_report *report, lam_error *error);
+
+/* Whether "auto" or a factorizer has this name. */
+bool factorizer_exists(const char *name);
+
+#endif

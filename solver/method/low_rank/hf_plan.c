@@ -1,0 +1,254 @@
+/* How many levels of the hierarchical factorization are fastest: eqs. 3.16 to 3.19 of the thesis, with the
+ * compression that samples of the matrix show in place of one guess for all levels. */
+#include "solver/method/low_rank/hf.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Columns of a sample: at most SAMPLE, and of all no more than one in SAMPLE_PART, as they are read twice;
+ * how often it is halved, and from how many places there is one. */
+enum { SAMPLE = 512, SAMPLE_LEAST = 64, SAMPLE_PART = 20, HALVINGS = 3, PLACES = 6, SIZES = HALVINGS + 1 };
+/* Leaves have no fewer and no more columns than these, or the eigenvectors of one cost more than all. */
+enum { LEAF_LEAST = 64, LEAF_MOST = 16384 };
+
+/* What one core does in a second, about: products of BLAS (flops, two a product), scattered products of
+ * sparse rows, and the cube of the columns whose eigenvectors are found. Only ratios decide. */
+static const double blas_rate = 9e10, scatter_rate = 1e9, axpy_rate = 8e9, eigen_rate = 1e10;
+
+/* A row with more entries than this share of the columns is spread out (tsvd.c). */
+static const double spread_above = 1. / 5;
+
+struct hf_forecast {
+    size_t n;                             /* rows of S */
+    size_t sizes[SIZES];                  /* columns, falling by halves; 0: none */
+    double values[PLACES][SIZES][SAMPLE]; /* squares of the singular values, ascending */
+    double entries;                       /* of a row that has any in the largest sample, mean */
+    double filled;                        /* share of such rows */
+    double noise, edge;                   /* of the rays: see find_noise; 0: none is seen */
+};
+
+/* Noise of rays is about as long in every column and in no relation to that of others: the singular values of
+ * m columns of it form a plateau around that length, where those of light fall on. noise is its height, edge
+ * what an eighth of a sample's values pass: above, they are taken for light's. */
+static void find_noise(hf_forecast *f) {
+    enum { STEEP = 2 };
+    const size_t m = f->sizes[0];
+    for (size_t place = 0; place < PLACES; place++) {
+        const double *values = f->values[place][0], low = values[m / 8], middle = values[m / 2];
+        if (!(low > 0) || middle > STEEP * low) {
+            f->noise = f->edge = 0;
+            return;
+        }
+        f->noise += sqrt(values[m / 4]) / PLACES;
+        f->edge += sqrt(values[m - 1 - m / 8]) / PLACES;
+    }
+}
+
+lam_status hf_forecast_create(const scaled_matrix *S, hf_forecast **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    sparse_block block = {0};
+    size_t filled = 0, entries = 0;
+    hf_forecast *f = memory_allocate(1, sizeof *f, "factorization", error);
+    if (f == NULL) return LAM_ERR_MEMORY;
+    f->n = S->n;
+    size_t most = S->n / SAMPLE_PART;
+    if (most > SAMPLE) most = SAMPLE;
+    if (most < SAMPLE_LEAST) most = S->n < SAMPLE_LEAST ? S->n : SAMPLE_LEAST;
+    for (size_t k = 0; k < SIZES && most >> k > 0; k++) f->sizes[k] = most >> k;
+    for (size_t place = 0; place < PLACES; place++) {
+        const size_t first = (S->n - most) * (2 * place + 1) / (2 * PLACES);
+        TRY(scaled_block(S, first, first + most, &block, error));
+        for (size_t k = 0; k < SIZES && f->sizes[k] > 0; k++)
+            TRY(tsvd_values(&block, f->sizes[k], f->values[place][k], error));
+        for (size_t i = 0; i < S->n; i++) filled += block.indptr[i + 1] > block.indptr[i];
+        entries += block.indptr[S->n];
+        sparse_block_free(&block);
+    }
+    find_noise(f);
+    f->filled = (double)filled / (double)(PLACES * S->n);
+    f->entries = filled > 0 ? (double)entries / (double)filled : 0;
+    *out = f;
+    f = NULL;
+done:
+    sparse_block_free(&block);
+    free(f);
+    return status;
+}
+
+void hf_forecast_free(hf_forecast *f) {
+    free(f);
+}
+
+/* Columns kept of sample size k, mean of the places. */
+static double sample_rank(const hf_forecast *f, size_t k, double p) {
+    size_t sum = 0;
+    for (size_t place = 0; place < PLACES; place++) {
+        const double *values = f->values[place][k];
+        size_t low = 0, high = f->sizes[k]; /* values[low-1] < p^2 <= values[high] */
+        while (low < high) {
+            const size_t middle = (low + high) / 2;
+            if (values[middle] >= p * p)
+                high = middle;
+            else
+                low = middle + 1;
+        }
+        sum += f->sizes[k] - low;
+    }
+    return (double)sum / PLACES;
+}
+
+/* rank ~ m^b from size to size, at most in proportion to m: what neighbours across the edges between surfaces
+ * exchange is of many ranks, and adds up as the edges do. */
+static const double steepest = 1;
+
+/* How many singular values of light, without noise, m columns have of at least p. */
+static double rank_of_light(const hf_forecast *f, double m, double p) {
+    size_t least = 0, k = 0;
+    while (least + 1 < SIZES && f->sizes[least + 1] > 0) least++;
+    while (k < least && (double)f->sizes[k + 1] >= m) k++;
+    const double known = (double)f->sizes[k], rank = fmax(1, sample_rank(f, k, p));
+    if (m <= known) return rank * m / known;
+    /* Over all sizes: that two places are unlike often weighs more than a step of two. */
+    const double low = fmax(1, sample_rank(f, least, p));
+    const double b = k < least ? log(rank / low) / log(known / (double)f->sizes[least]) : 1;
+    return rank * pow(m / known, fmin(steepest, fmax(0, b)));
+}
+
+/* How many values of m columns are the noise's and at least p: more columns widen the plateau as 1 +
+ * sqrt(m/n) does (Marchenko and Pastur 1967). */
+static double rank_of_noise(const hf_forecast *f, double m, double p) {
+    const double n = (double)f->n, known = (double)f->sizes[0];
+    const double here = p * (1 + sqrt(known / n)) / (1 + sqrt(m / n));
+    if (here >= f->edge) return 0;
+    return m * (sample_rank(f, 0, here) - sample_rank(f, 0, f->edge)) / known;
+}
+
+double hf_forecast_rank(const hf_forecast *f, double m, double p) {
+    return fmin(m, rank_of_light(f, m, fmax(p, f->edge)) + rank_of_noise(f, m, p));
+}
+
+/* Of a node whose halves were truncated before. What noise they kept, a part of each of their columns, is
+ * still there and adds to the square of each value. */
+static double rank_of_node(const hf_forecast *f, double m, double given, double p) {
+    const double light = p * p - f->noise * f->noise;
+    return light > 0 ? fmin(given, rank_of_light(f, m, sqrt(light))) : given;
+}
+
+/* Eigenvectors of a Gram matrix of c columns of which r are kept: all of them, or, where they are few, four
+ * products with twice as many vectors and, before, one attempt with half of those (gram_leading). */
+static double seconds_of_eigenvectors(double c, double r) {
+    const double all = c * c * c / eigen_rate, few = 2 * c * c * 3 * r * 4 / blas_rate;
+    return 2 * r < c / 3 && few < all ? few : all;
+}
+
+/* A truncated SVD of n x c, kept r, of dense columns. */
+static double seconds_of_node(double n, double c, double r) {
+    return (n * c * c + 2 * n * c * r) / blas_rate + seconds_of_eigenvectors(c, r);
+}
+
+static double seconds_of_leaf(const hf_forecast *f, double n, double m, double r) {
+    const double entries = f->entries * m / (double)f->sizes[0], rows = f->filled * n;
+    if (entries > spread_above * m) return seconds_of_node(rows, m, r);
+    return rows * (entries * entries / 2 / scatter_rate + entries * r / axpy_rate) +
+           seconds_of_eigenvectors(m, r);
+}
+
+double hf_forecast_seconds(const hf_forecast *f, const factorizer_options *options, hf_plan *plan) {
+    const double n = (double)f->n;
+    double seconds = 0, below = 0;
+    const int levels = plan->levels;
+    for (int l = levels; l >= 0; l--) {
+        const double m = ldexp(n, -l), nodes = ldexp(1, l), given = l == levels ? m : 2 * below;
+        plan->kept[l] = below = given;
+        if (l > 0 && l < levels && plan->left[l] <= 0 && options->rank == 0) continue; /* no nodes */
+        const double rank = options->rank > 0 ? (double)options->rank
+                            : l == levels     ? hf_forecast_rank(f, m, plan->left[l])
+                                              : rank_of_node(f, m, given, plan->left[l]);
+        const double kept = fmin(given, rank);
+        seconds += nodes * (l == levels ? seconds_of_leaf(f, n, m, kept)
+                                        : seconds_of_node(n, given, kept) + m * given * kept / blas_rate);
+        plan->kept[l] = below = kept;
+    }
+    return seconds;
+}
+
+/* The plan with so much moved from a level's part of the budget to another's, where that is faster. */
+static bool move(const hf_forecast *f, const factorizer_options *options, int from, int to, double part,
+                 budget *shares, hf_plan *plan, double *seconds) {
+    budget tried = *shares;
+    hf_plan other = *plan;
+    tried.part[from] = part < tried.part[from] ? tried.part[from] - part : 0;
+    tried.part[to] += shares->part[from] - tried.part[from];
+    budget_share(&tried, options->epsilon, plan->levels, other.left);
+    const double takes = hf_forecast_seconds(f, options, &other);
+    if (takes > .999 * *seconds) return false;
+    *seconds = takes;
+    *shares = tried;
+    *plan = other;
+    return true;
+}
+
+/* Moves parts of the budget from level to level, all at first, then less, as long as that is faster; shares
+ * has been tried and takes so many seconds. */
+static double improve(const hf_forecast *f, const factorizer_options *options, budget *shares, hf_plan *plan,
+                      double seconds) {
+    static const double steps[] = {1, .3, .1, .03};
+    enum { STEPS = sizeof steps / sizeof *steps, ROUNDS = 8 };
+    for (size_t s = 0; s < STEPS; s++)
+        for (int round = 0, better = 1; round < ROUNDS && better; round++) {
+            better = 0;
+            for (int from = 1; from <= plan->levels; from++)
+                for (int to = 1; to <= plan->levels; to++)
+                    if (from != to && shares->part[from] > 0)
+                        better |= move(f, options, from, to, steps[s], shares, plan, &seconds);
+        }
+    return seconds;
+}
+
+/* The best of some ways to share the budget among so many levels. */
+static double divide(const hf_forecast *f, const factorizer_options *options, budget *shares, hf_plan *plan) {
+    static const double ratios[] = {.5, 1}, leaves[] = {0, .5, .9};
+    enum { RATIOS = sizeof ratios / sizeof *ratios, LEAVES = sizeof leaves / sizeof *leaves };
+    double least = INFINITY;
+    const int levels = plan->levels;
+    for (size_t k = 0; k < RATIOS * LEAVES; k++) {
+        budget tried = {.rule = options->budget.rule, .alpha = options->budget.alpha};
+        hf_plan other = {.levels = levels};
+        budget_divide(&tried, levels, ratios[k % RATIOS], leaves[k / RATIOS]);
+        budget_share(&tried, options->epsilon, levels, other.left);
+        const double seconds = hf_forecast_seconds(f, options, &other);
+        if (seconds >= least) continue;
+        least = seconds;
+        *shares = tried;
+        *plan = other;
+    }
+    return least;
+}
+
+hf_plan hf_forecast_plan(const hf_forecast *f, const factorizer_options *options) {
+    /* A way to share that is this much slower than the best of another number of levels is not improved. */
+    static const double hopeless = 3;
+    const bool shared = options->budget.rule == BUDGET_SUMS || budget_divided(&options->budget);
+    hf_plan best = {.levels = 0};
+    double least = INFINITY;
+    for (int levels = 0; levels <= BUDGET_LEVELS_MOST; levels++) {
+        const size_t columns = f->n >> levels;
+        if (options->levels >= 0 && levels != options->levels) continue;
+        if (options->levels < 0 && levels > 0 && columns < LEAF_LEAST) break;
+        if (options->levels < 0 && columns > LEAF_MOST) continue;
+        hf_plan plan = {.levels = levels};
+        budget shares = options->budget;
+        double seconds;
+        if (shared) {
+            budget_share(&shares, options->epsilon, levels, plan.left);
+            seconds = hf_forecast_seconds(f, options, &plan);
+        } else {
+            seconds = divide(f, options, &shares, &plan);
+            if (seconds < hopeless * least) seconds = improve(f, options, &shares, &plan, seconds);
+        }
+        if (seconds >= least) continue;
+        least = seconds;
+        best = plan;
+    }
+    return best;
+}

@@ -1,0 +1,297 @@
+#include "solver/method/low_rank/tsvd.h"
+
+#include "solver/base/parallel.h"
+#include "solver/linalg/dense.h"
+#include "solver/method/low_rank/gram.h"
+#include "store/status.h"
+
+#include <limits.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Above this share of the largest singular value the eigenvalues of a Gram matrix in single precision are
+ * good to a few per cent (it is useless below the root of its rounding, 2.4e-4). */
+static const double single_share = 2e-3;
+
+/* A row of a sparse block with more than this share of its entries goes to BLAS, which makes that many more
+ * products in the same time. */
+static const double spread_above = 1. / 5;
+
+/* Rows spread out at a time; columns from which on few eigenvectors are looked for before all. */
+enum { PANEL = 1024, LEADING_LEAST = 768 };
+
+/* Rows of parts joined at a time, and by one thread. */
+enum { JOINED = 4096, JOINED_PIECE = 256 };
+
+void tall_factors_free(tall_factors *f) {
+    free(f->Q);
+    free(f->V);
+    *f = (tall_factors){0};
+}
+
+size_t truncation_rank(const truncation *keep, size_t m, const double *values) {
+    const double kept = keep->epsilon * keep->epsilon;
+    size_t rank = 0;
+    if (keep->rank > 0) return keep->rank < m ? keep->rank : m;
+    if (keep->norm == TRUNCATION_FROBENIUS) {
+        double dropped = 0;
+        for (rank = m; rank > 0; rank--) {
+            dropped += fmax(values[m - rank], 0);
+            if (dropped > kept) break;
+        }
+        return rank;
+    }
+    const size_t round = keep->round > 0 ? keep->round : 1;
+    while (rank < m && values[m - 1 - rank] >= kept) rank++;
+    while (rank < m && rank % round != 0 && values[m - 1 - rank] >= kept / 4) rank++;
+    return rank;
+}
+
+/* Whether a truncation may be made by a Gram matrix in single precision at all. */
+static bool may_be_single(const truncation *keep) {
+    return keep->rank == 0 && keep->norm == TRUNCATION_SPECTRAL && keep->epsilon >= 1e-3;
+}
+
+/* V [m][rank] from the eigenvectors, largest first. */
+static lam_status take_vectors(const gram *g, size_t rank, float **V, lam_error *error) {
+    const size_t m = g->m;
+    float *v = memory_allocate(m, rank * sizeof *v, "factorization", error);
+    if (v == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < m; i++)
+        for (size_t c = 0; c < rank; c++) {
+            const size_t at = (m - 1 - c) * m + i;
+            v[i * rank + c] = g->single != NULL ? g->single[at] : (float)g->full[at];
+        }
+    *V = v;
+    return LAM_OK;
+}
+
+/* --- dense and sparse blocks -----------------------------------------------------------------------------
+ */
+
+/* One of three. */
+typedef struct tall_block {
+    size_t n, m;
+    const float *dense;         /* [n][m] */
+    const sparse_block *sparse; /* or this */
+    const tall_factors *parts;  /* or their Q, side by side: m is the sum of their ranks */
+    size_t count;
+} tall_block;
+
+static size_t row_length(const sparse_block *A, size_t i) {
+    return (size_t)(A->indptr[i + 1] - A->indptr[i]);
+}
+
+static void spread_row(const sparse_block *A, size_t i, float *row) {
+    memset(row, 0, A->m * sizeof *row);
+    for (uint64_t p = A->indptr[i]; p < A->indptr[i + 1]; p++) row[A->columns[p]] = A->data[p];
+}
+
+typedef struct join_job {
+    const tall_block *A;
+    size_t first, rows;
+    float *panel;
+} join_job;
+
+/* Some of the rows first ... first+rows-1 of the parts, joined. */
+static void join_piece(const void *context, size_t piece) {
+    const join_job *j = context;
+    for (size_t i = piece * JOINED_PIECE; i < j->rows && i < (piece + 1) * JOINED_PIECE; i++) {
+        float *to = j->panel + i * j->A->m;
+        for (size_t k = 0; k < j->A->count; k++) {
+            const size_t width = j->A->parts[k].rank;
+            if (width > 0) memcpy(to, j->A->parts[k].Q + (j->first + i) * width, width * sizeof *to);
+            to += width;
+        }
+    }
+}
+
+/* Calls for the rows of the parts, joined, a panel at a time. */
+static lam_status each_panel(const tall_block *A,
+                             lam_status (*take)(void *context, size_t first, size_t rows, const float *panel,
+                                                lam_error *error),
+                             void *context, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t most = A->n < JOINED ? A->n : JOINED;
+    float *panel = memory_allocate(most, A->m * sizeof *panel, "factorization", error);
+    if (panel == NULL) return LAM_ERR_MEMORY;
+    for (size_t first = 0; first < A->n; first += most) {
+        const size_t rows = A->n - first < most ? A->n - first : most;
+        const join_job job = {A, first, rows, panel};
+        pieces_run(join_piece, &job, (rows + JOINED_PIECE - 1) / JOINED_PIECE);
+        TRY(take(context, first, rows, panel, error));
+    }
+done:
+    free(panel);
+    return status;
+}
+
+static lam_status add_panel(void *context, size_t first, size_t rows, const float *panel, lam_error *error) {
+    (void)first;
+    return gram_add(context, rows, panel, error);
+}
+
+static lam_status gram_of(const tall_block *A, gram *g, lam_error *error) {
+    if (A->dense != NULL) return gram_add(g, A->n, A->dense, error);
+    return A->sparse != NULL ? gram_add_sparse(g, A->sparse, error) : each_panel(A, add_panel, g, error);
+}
+
+/* q = sum_c A_ic V_c. */
+static void project_row(const sparse_block *A, size_t i, size_t k, const float *V, float *q) {
+    memset(q, 0, k * sizeof *q);
+    for (uint64_t p = A->indptr[i]; p < A->indptr[i + 1]; p++) {
+        const float a = A->data[p], *v = V + A->columns[p] * k;
+#pragma omp simd
+        for (size_t c = 0; c < k; c++) q[c] += a * v[c];
+    }
+}
+
+typedef struct sparse_projection {
+    const sparse_block *A;
+    size_t k;
+    const float *V;
+    float *Q;
+} sparse_projection;
+
+static bool is_thin(const sparse_block *A, size_t i) {
+    return (double)row_length(A, i) <= spread_above * (double)A->m;
+}
+
+static void project_thin_rows(const void *context, size_t piece) {
+    const sparse_projection *p = context;
+    for (size_t i = piece * PANEL; i < p->A->n && i < (piece + 1) * PANEL; i++)
+        if (is_thin(p->A, i)) project_row(p->A, i, p->k, p->V, p->Q + i * p->k);
+}
+
+/* Q = A V of a panel. */
+typedef struct projection {
+    size_t m, k;
+    const float *V;
+    float *Q;
+} projection;
+
+static lam_status project_panel(void *context, size_t first, size_t rows, const float *panel,
+                                lam_error *error) {
+    (void)error;
+    const projection *p = context;
+    dense_multiply(rows, p->m, p->k, panel, p->V, false, p->Q + first * p->k);
+    return LAM_OK;
+}
+
+/* Q = A V, [n][k]. */
+static lam_status project(const tall_block *A, size_t k, const float *V, float *Q, lam_error *error) {
+    const size_t m = A->m;
+    if (A->dense != NULL) {
+        dense_multiply(A->n, m, k, A->dense, V, false, Q);
+        return LAM_OK;
+    }
+    if (A->sparse == NULL) {
+        projection p = {.m = m, .k = k, .V = V, .Q = Q};
+        return each_panel(A, project_panel, &p, error);
+    }
+    const sparse_projection thin = {A->sparse, k, V, Q};
+    pieces_run(project_thin_rows, &thin, (A->n + PANEL - 1) / PANEL);
+    float *panel = memory_allocate(PANEL, m * sizeof *panel, "factorization", error);
+    if (panel == NULL) return LAM_ERR_MEMORY;
+    for (size_t first = 0; first < A->n;) {
+        size_t rows = 0;
+        if (is_thin(A->sparse, first)) {
+            first++;
+            continue;
+        }
+        /* As many rows in a row as have much in them. */
+        while (rows < PANEL && first + rows < A->n && !is_thin(A->sparse, first + rows)) {
+            spread_row(A->sparse, first + rows, panel + rows * m);
+            rows++;
+        }
+        dense_multiply(rows, m, k, panel, V, false, Q + first * k);
+        first += rows;
+    }
+    free(panel);
+    return LAM_OK;
+}
+
+/* V by all eigenvectors of A^T A, in single precision where that is enough; g is its Gram matrix in single
+ * precision, or empty. */
+static lam_status decompose(const tall_block *A, const truncation *keep, gram *g, float **V, size_t *rank,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t m = A->m;
+    double *values = memory_allocate(m, sizeof *values, "factorization", error);
+    if (values == NULL) return LAM_ERR_MEMORY;
+    for (;;) {
+        const bool single = g->single != NULL;
+        if (!single) {
+            TRY(gram_create(m, false, g, error));
+            TRY(gram_of(A, g, error));
+        }
+        TRY(gram_eigen(g, true, values, error));
+        if (!single || m == 0 || keep->epsilon >= single_share * sqrt(fmax(values[m - 1], 0))) break;
+        gram_free(g);
+    }
+    *rank = truncation_rank(keep, m, values);
+    TRY(take_vectors(g, *rank, V, error));
+done:
+    free(values);
+    return status;
+}
+
+static lam_status factorize(const tall_block *A, const truncation *keep, tall_factors *out,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    tall_factors f = {.n = A->n, .m = A->m};
+    gram g = {0};
+    if (A->n > INT_MAX || A->m > INT_MAX)
+        FAIL(error, LAM_ERR_ARGUMENT, "a block of %zu x %zu is beyond LAPACK's integers", A->n, A->m);
+    if (may_be_single(keep)) {
+        TRY(gram_create(A->m, true, &g, error));
+        TRY(gram_of(A, &g, error));
+        /* |A| is at most 1 here and hardly ever more. */
+        if (A->m >= LEADING_LEAST && keep->epsilon >= single_share)
+            TRY(gram_leading(&g, keep->epsilon * keep->epsilon, keep->guess, &f.V, &f.rank, error));
+    }
+    if (f.V == NULL) TRY(decompose(A, keep, &g, &f.V, &f.rank, error));
+    gram_free(&g);
+    f.Q = memory_allocate(A->n, f.rank * sizeof *f.Q, "factorization", error);
+    if (f.Q == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(project(A, f.rank, f.V, f.Q, error)); /* Q = A V */
+    *out = f;
+    f = (tall_factors){0};
+done:
+    gram_free(&g);
+    tall_factors_free(&f);
+    return status;
+}
+
+lam_status tsvd(size_t n, size_t m, const float *A, const truncation *keep, tall_factors *out,
+                lam_error *error) {
+    const tall_block block = {.n = n, .m = m, .dense = A};
+    return factorize(&block, keep, out, error);
+}
+
+lam_status tsvd_joined(size_t count, const tall_factors *parts, const truncation *keep, tall_factors *out,
+                       lam_error *error) {
+    tall_block block = {.parts = parts, .count = count};
+    for (size_t k = 0; k < count; k++) {
+        if (parts[k].n > block.n) block.n = parts[k].n;
+        block.m += parts[k].rank;
+    }
+    return factorize(&block, keep, out, error);
+}
+
+lam_status tsvd_sparse(const sparse_block *A, const truncation *keep, tall_factors *out, lam_error *error) {
+    const tall_block block = {.n = A->n, .m = A->m, .sparse = A};
+    return factorize(&block, keep, out, error);
+}
+
+lam_status tsvd_values(const sparse_block *A, size_t m, double *values, lam_error *error) {
+    lam_status status = LAM_OK;
+    gram g = {0};
+    TRY(gram_create(m, true, &g, error));
+    TRY(gram_add_sparse(&g, A, error));
+    TRY(gram_eigen(&g, false, values, error));
+done:
+    gram_free(&g);
+    return status;
+}

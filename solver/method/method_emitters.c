@@ -1,0 +1,128 @@
+/* emitters: where only a few things can shine, the light of each of them is all there is to know (Aguerre
+ * 2016, section 4.4.3). */
+#include "solver/operator/emitters.h"
+
+#include "solver/base/clock.h"
+#include "solver/method/many_lights.h"
+#include "solver/method/method.h"
+#include "solver/operator/sky_light.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Residual at which the light of an emitter counts as converged: a few units of single precision. */
+static const double tolerance = 1e-6;
+
+static lam_status copy_names(const emitter_source *from, char ***names, lam_error *error) {
+    size_t bytes = from->s * sizeof(char *);
+    for (size_t k = 0; k < from->s; k++) bytes += strlen(from->names[k]) + 1;
+    *names = memory_allocate(bytes, 1, "names of emitters", error);
+    if (*names == NULL) return LAM_ERR_MEMORY;
+    char *text = (char *)(*names + from->s);
+    for (size_t k = 0; k < from->s; k++) {
+        (*names)[k] = text;
+        text = stpcpy(text, from->names[k]) + 1;
+    }
+    return LAM_OK;
+}
+
+/* What the elements themselves send out, without the zeros. */
+static lam_status gather_emission(const build_problem *problem, emitter_arrays *a, lam_error *error) {
+    const size_t n = problem->n, C = problem->n_channels, s = a->s;
+    const float *E = problem->emitters->E;
+    uint64_t entries = 0, at = 0;
+    for (size_t k = 0; k < s * C * n; k++) entries += E[k] > 0;
+    a->ends = memory_allocate(C * s + 1, sizeof *a->ends, "emissions", error);
+    a->elements = memory_allocate((size_t)entries, sizeof *a->elements, "emissions", error);
+    a->values = memory_allocate((size_t)entries, sizeof *a->values, "emissions", error);
+    if (a->ends == NULL || a->elements == NULL || a->values == NULL) return LAM_ERR_MEMORY;
+    for (size_t row = 0; row < C * s; row++) {
+        const float *of_one = E + (row % s * C + row / s) * n;
+        for (size_t i = 0; i < n; i++) {
+            if (!(of_one[i] > 0)) continue;
+            a->elements[at] = (uint32_t)i;
+            a->values[at++] = of_one[i];
+        }
+        a->ends[row + 1] = at;
+    }
+    return LAM_OK;
+}
+
+/* The sky's radiances with the channels first, and the sky. */
+static lam_status gather_sky(const build_problem *problem, emitter_arrays *a, lam_error *error) {
+    const emitter_source *from = problem->emitters;
+    const size_t C = problem->n_channels, s = a->s, m = from->n_tiles;
+    if (from->L == NULL) return LAM_OK;
+    a->n_tiles = m;
+    a->L = memory_allocate(C * s, m * sizeof *a->L, "radiances", error);
+    if (a->L == NULL) return LAM_ERR_MEMORY;
+    for (size_t row = 0; row < C * s; row++)
+        memcpy(a->L + row * m, from->L + (row % s * C + row / s) * m, m * sizeof *a->L);
+    return sky_create(m, problem->n, from->first_bounce, &a->sky, error);
+}
+
+/* Two arrays [s][n] of one channel: what is emitted, and what the sky gives directly. */
+static void light_of_channel(const build_problem *problem, const emitter_arrays *a, size_t c, float *E,
+                             float *H0) {
+    const size_t n = problem->n, s = a->s;
+    for (size_t k = 0; k < s; k++)
+        memcpy(E + k * n, problem->emitters->E + (k * problem->n_channels + c) * n, n * sizeof *E);
+    if (H0 != NULL) lam_sky_irradiance(a->sky, s, a->L + c * s * a->n_tiles, H0);
+}
+
+static lam_status build(const build_problem *problem, const build_options *options, lam_operator **op,
+                        build_report *report, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = problem->n, C = problem->n_channels;
+    const double started = clock_seconds();
+    emitter_arrays a = {.s = 0};
+    float *E = NULL, *H0 = NULL;
+    double residual = 0;
+    size_t sweeps = 0;
+    if (problem->emitters == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "--method emitters: give --emitters FILE, group=NAME or sky");
+    const size_t s = a.s = problem->emitters->s;
+    TRY(copy_names(problem->emitters, &a.names, error));
+    TRY(gather_emission(problem, &a, error));
+    TRY(gather_sky(problem, &a, error));
+    a.T = memory_allocate(C * s, n * sizeof *a.T, "light of emitters", error);
+    E = memory_allocate(s, n * sizeof *E, "emissions", error);
+    if (a.T == NULL || E == NULL) TRY(LAM_ERR_MEMORY);
+    if (a.L != NULL) {
+        H0 = memory_allocate(s, n * sizeof *H0, "light of the sky", error);
+        if (H0 == NULL) TRY(LAM_ERR_MEMORY);
+    }
+    for (size_t c = 0; c < C; c++) {
+        columns_report made;
+        light_of_channel(problem, &a, c, E, H0);
+        const light_columns columns = {.n = n,
+                                       .F = problem->F,
+                                       .area = problem->area,
+                                       .rho = problem->reflectance + c * n,
+                                       .m = s,
+                                       .E = E,
+                                       .H0 = H0,
+                                       .progress = options->progress,
+                                       .stage = "emitters"};
+        TRY(columns_solve(&columns, tolerance, a.T + c * s * n, &made, error));
+        residual = made.residual > residual ? made.residual : residual;
+        sweeps = made.sweeps > sweeps ? made.sweeps : sweeps;
+    }
+    TRY(operator_emitters_create(n, C, problem->reflectance, &a, op, error));
+    report->method = "emitters";
+    report->epsilon = -1;
+    report->residual = residual;
+    report->sweeps = sweeps;
+    report->invert_seconds = clock_seconds() - started;
+    snprintf(report->reason, sizeof report->reason,
+             "emitters: %zu asked for by --emitters, each converged to %.2g in %zu sweeps", s, residual,
+             sweeps);
+done:
+    emitter_arrays_free(&a);
+    free(E);
+    free(H0);
+    return status;
+}
+
+const build_method build_emitters = {"emitters", build};

@@ -1,0 +1,29 @@
+/* The judge of all: radiosity in double, by dense LU or by converged iteration. Slow, exact, obvious. */
+#ifndef LAMBERT_METHOD_REFERENCE_H
+#define LAMBERT_METHOD_REFERENCE_H
+
+#include "solver/base/progress.h"
+#include "solver/linalg/csr.h"
+
+/* Up to this many elements a reference is a dense LU. */
+#define REFERENCE_DENSE_ELEMENTS 8192
+
+/* The solver of B = E + R F B for one channel and one F. */
+typedef struct reference reference;
+
+typedef enum reference_way { REFERENCE_AUTO, REFERENCE_DENSE, REFERENCE_ITERATED } reference_way;
+
+/* F (with reciprocity: A_i F_ij = A_j F_ji), area and reflectance must outlive it.
+ * Dense: factorizes I - R F, O(n^3). Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC. */
+lam_status reference_create(const csr *F, const double *area, const float *reflectance, reference_way way,
+                            reference **out, lam_error *error);
+void reference_destroy(reference *r);
+
+/* B of m emissions, both [m][n]. B holds a guess on entry (E will do), which an iteration starts from.
+ * Iterated: conjugate gradients on the symmetric form I - R^1/2 S R^1/2, S = A^1/2 F A^-1/2, safe for a
+ * reflectance of 0, until each vector's residual is below tolerance times its solution.
+ * Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC (no convergence), LAM_ERR_CANCELLED. */
+lam_status reference_solve(const reference *r, size_t m, const double *E, double *B, double tolerance,
+                           const progress *p, lam_error *error);
+
+#endif

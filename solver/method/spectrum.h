@@ -1,0 +1,33 @@
+/* How the singular values of S fall, without finding one of them. */
+#ifndef LAMBERT_METHOD_SPECTRUM_H
+#define LAMBERT_METHOD_SPECTRUM_H
+
+#include "solver/base/progress.h"
+#include "solver/linalg/scaled.h"
+
+/* Where the singular values of S, n of them, lie: count[k] of them about value[k]. */
+typedef struct spectrum {
+    size_t nodes;
+    double *value; /* [nodes], falling */
+    double *count; /* [nodes], together n */
+} spectrum;
+
+void spectrum_free(spectrum *s);
+
+/* Stochastic Lanczos quadrature (Golub and Meurant 2010, ch. 11): a random unit vector meets all
+ * eigenvectors of S alike, so the Gauss rule that Lanczos steps from it lead to counts eigenvalues; eight
+ * vectors go together and their rules are put together. The number above x is right to a few hundredths of
+ * itself where the values lie close, and is of no use for the few largest one by one. Cost: `steps` products
+ * of S with eight vectors, memory for 24 n numbers. Deterministic in seed.
+ * Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC, LAM_ERR_CANCELLED, those of the source of S. */
+lam_status spectrum_find(const scaled_matrix *S, size_t steps, uint64_t seed, const progress *told,
+                         spectrum *out, lam_error *error);
+
+/* About how many singular values are above x. Between two nodes the count is taken to change evenly. */
+double spectrum_above(const spectrum *s, double x);
+
+/* Sum of the squares of those up to x over that of all: the square of |S - S_k|_F / |S|_F for the best S_k
+ * that keeps what is above x. 0 where S is 0. */
+double spectrum_tail(const spectrum *s, double x);
+
+#endif

@@ -1,0 +1,125 @@
+#include "solver/operator/mean_correction.h"
+
+#include "solver/base/half.h"
+
+#include "store/status.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void even_light_free(even_light *e) {
+    free(e->missing);
+    free(e->light);
+    free(e->lift);
+    *e = (even_light){.n = 0};
+}
+
+static lam_status check(const even_light *e, lam_error *error) {
+    lam_status status = LAM_OK;
+    for (size_t k = 0; k < e->n * e->n_channels; k++)
+        if (!isfinite(e->missing[k]))
+            FAIL(error, LAM_ERR_NUMERIC, "missing[%zu] = %g, must be finite", k, (double)e->missing[k]);
+    for (size_t c = 0; c < e->n_channels; c++)
+        if (!(e->light[c] > 0 && e->light[c] < INFINITY))
+            FAIL(error, LAM_ERR_NUMERIC, "even_light[%zu] = %g, must be above 0", c, e->light[c]);
+done:
+    return status;
+}
+
+static lam_status reserve(size_t n, size_t n_channels, even_light *e, lam_error *error) {
+    *e = (even_light){.n = n,
+                      .n_channels = n_channels,
+                      .missing = memory_allocate(n_channels, n * sizeof *e->missing, "operator", error),
+                      .light = memory_allocate(n_channels, sizeof *e->light, "operator", error)};
+    return e->missing != NULL && e->light != NULL ? LAM_OK : LAM_ERR_MEMORY;
+}
+
+lam_status even_light_create(size_t n, size_t n_channels, const double *missing, const double *light,
+                             even_light *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    even_light e = {.n = 0};
+    TRY(reserve(n, n_channels, &e, error));
+    for (size_t k = 0; k < n * n_channels; k++)
+        e.missing[k] = float_of_half(half_of_float((float)missing[k]));
+    memcpy(e.light, light, n_channels * sizeof *light);
+    TRY(check(&e, error));
+    *out = e;
+    e = (even_light){.n = 0};
+done:
+    even_light_free(&e);
+    return status;
+}
+
+lam_status even_light_save(const even_light *e, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    uint16_t *halves = NULL;
+    const size_t count = e->n * e->n_channels;
+    if (e->missing == NULL) return LAM_OK;
+    halves = memory_allocate(count, sizeof *halves, "operator", error);
+    if (halves == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < count; k++) halves[k] = half_of_float(e->missing[k]);
+    TRY(store_write(s, "/operator/missing", STORE_F16, 2, (size_t[]){e->n_channels, e->n}, halves, error));
+    TRY(store_write(s, "/operator/even_light", STORE_F64, 1, &e->n_channels, e->light, error));
+done:
+    free(halves);
+    return status;
+}
+
+lam_status even_light_load(store *s, size_t n, size_t n_channels, even_light *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    even_light e = {.n = 0};
+    void *halves = NULL, *light = NULL;
+    if (!store_has(s, "/operator/missing")) {
+        *out = e;
+        return LAM_OK;
+    }
+    TRY(reserve(n, n_channels, &e, error));
+    TRY(store_read(s, "/operator/missing", STORE_F16, 2, (size_t[]){n_channels, n}, &halves, error));
+    TRY(store_read(s, "/operator/even_light", STORE_F64, 1, (size_t[]){n_channels}, &light, error));
+    for (size_t k = 0; k < n * n_channels; k++) e.missing[k] = float_of_half(((const uint16_t *)halves)[k]);
+    memcpy(e.light, light, n_channels * sizeof *e.light);
+    TRY(check(&e, error));
+    *out = e;
+    e = (even_light){.n = 0};
+done:
+    free(halves);
+    free(light);
+    even_light_free(&e);
+    return status;
+}
+
+double even_light_sum(const even_light *e, size_t c, bool adjoint, const float *root, const float *x) {
+    double sum = 0;
+    if (e->missing == NULL) return 0;
+    const float *lift = e->lift + c * e->n;
+    if (adjoint) {
+        for (size_t p = 0; p < e->n; p++) sum += (double)lift[p] * (double)x[p];
+    } else {
+        for (size_t p = 0; p < e->n; p++) sum += (double)(root[p] * root[p]) * (double)x[p];
+    }
+    return sum / e->light[c];
+}
+
+void even_light_add(const even_light *e, size_t c, bool adjoint, const float *root, double sum, float *y) {
+    const float factor = (float)sum;
+    if (e->missing == NULL || factor == 0) return;
+    const float *lift = e->lift + c * e->n;
+    if (adjoint) {
+        for (size_t p = 0; p < e->n; p++) y[p] += factor * (root[p] * root[p]);
+    } else {
+        for (size_t p = 0; p < e->n; p++) y[p] += factor * lift[p];
+    }
+}
+
+lam_status even_light_lift(even_light *e, const float *by, lam_error *error) {
+    if (e->missing == NULL) return LAM_OK;
+    e->lift = memory_allocate(e->n_channels, e->n * sizeof *e->lift, "operator", error);
+    if (e->lift == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < e->n * e->n_channels; k++) e->lift[k] = by[k] * e->missing[k];
+    return LAM_OK;
+}
+
+size_t even_light_bytes(const even_light *e) {
+    return e->missing != NULL ? e->n * e->n_channels * sizeof *e->lift : 0;
+}

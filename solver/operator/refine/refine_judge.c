@@ -1,0 +1,160 @@
+/* How far a refined answer may be from the true one, and whether that is enough: the certificate of refine.h.
+ */
+#include "solver/operator/refine/refine.h"
+
+#include "solver/linalg/csr_doubles.h"
+
+#include <math.h>
+#include <string.h>
+
+/* w = E' + P with |r| below this is as good as A^-1 1: the certificate is at most 1.05 times as wide. */
+static const double weights_good = .02;
+enum { WEIGHTS_PASSES_MOST = 300 };
+
+/* Where compression alone keeps a bound up to this above what it leaves, no more steps are made. */
+static const double compressed_rest = 1.1;
+
+/* Bounds are taken this much wider, for their own rounding: it grows with n at most, 2^32 2^-53. */
+#define BOUND_MARGIN 1.000001
+
+/* Rows of F are multiplied for a certificate alone where they are less than this share of F: a whole product
+ * would bring the answer nearer instead. */
+enum { SHARE_OF_ROWS = 8 };
+
+double refinement_sum_rounding(const refinement *s, size_t column) {
+    /* fl(P + r) is within u of itself, fl(E + fl(rho H0)) within 2u of E', which is at most 1, and fl(E' + P)
+     * within u of itself; E' + 0 is E'. */
+    const double P = s->columns[column].P;
+    return REFINE_U *
+           (P + (s->count_sum ? (s->columns[column].lit_rounded ? 2 : 0) + (P > 0 ? 1 + P : 0) : 0));
+}
+
+/* (sum A x^2)^1/2 of an x of this maximum norm; squares of what is tiny would vanish. */
+static double area_norm(size_t n, const double *area, const double *x, double largest) {
+    if (!(largest > 0)) return 0;
+    const double scale = 1 / largest;
+    double sum = 0;
+    if (!isfinite(scale)) return INFINITY;
+#pragma omp simd reduction(+ : sum)
+    for (size_t i = 0; i < n; i++) sum += area[i] * (scale * x[i]) * (scale * x[i]);
+    return largest * sqrt(sum);
+}
+
+/* The first rows in falling order of rho k / v, as many as have more than `allowed`; 0 where they are too
+ * large a share of F. */
+static size_t rows_in_question(const lam_refiner *refiner, const refine_channel *channel, double norm,
+                               double allowed) {
+    const csr *F = &refiner->F->F;
+    const uint64_t room = F->indptr[F->n] / SHARE_OF_ROWS;
+    uint64_t entries = 0;
+    size_t count = 0;
+    for (; count < F->n && channel->rows[count].mean * norm > allowed; count++) {
+        const size_t i = channel->rows[count].element;
+        entries += F->indptr[i + 1] - F->indptr[i];
+        if (entries > room) return 0;
+    }
+    return count;
+}
+
+/* max_i rho_i |(F r)_i| / v_i of the first rows, and what rounding adds. */
+static double largest_of_rows(const lam_refiner *refiner, const refine_channel *channel, size_t count,
+                              const double *r, double r_most) {
+    const csr *F = &refiner->F->F;
+    csr_double_row *const multiply = csr_doubles_row(1);
+    const double rounded = refiner->roundings * refiner->row_most * r_most;
+    double largest = 0;
+#pragma omp parallel for schedule(dynamic, 16) num_threads((int)refiner->op->n_threads)                      \
+    reduction(max                                                                                            \
+              : largest) if (refiner->op->n_threads > 1)
+    for (size_t k = 0; k < count; k++) {
+        const size_t i = channel->rows[k].element;
+        const uint64_t begin = F->indptr[i];
+        double h;
+        multiply(F->indices + begin, F->data + begin, F->indptr[i + 1] - begin, r, &h);
+        largest = fmax(largest, (double)channel->rho[i] * (fabs(h) + rounded) / channel->v[i]);
+    }
+    return largest;
+}
+
+double refine_left(const lam_refiner *refiner, const refine_channel *channel, const double *r, double r_most,
+                   double allowed) {
+    const size_t n = refiner->op->n;
+    const double scale = BOUND_MARGIN * channel->w_most, peak = channel->peak * r_most;
+    const double norm = area_norm(n, refiner->F->area, r, r_most);
+    double largest = fmin(channel->rows[0].mean * norm, peak);
+    if (!(scale * largest > allowed)) return scale * largest;
+    const size_t count = rows_in_question(refiner, channel, norm, allowed / scale);
+    if (count > 0) {
+        largest = largest_of_rows(refiner, channel, count, r, r_most);
+        if (count < n) largest = fmax(largest, fmin(channel->rows[count].mean * norm, peak));
+    }
+    return scale * largest;
+}
+
+double *refinement_compression(refinement *s, size_t column, bool second, const double *x, double *largest) {
+    const size_t n = s->refiner->op->n;
+    double *const out = s->scratch + column * s->scratch_stride + (second ? n : 0);
+    *largest =
+        compressed_error(s->refiner->F->compressed, x, out, s->scratch + column * s->scratch_stride + 3 * n);
+    return out;
+}
+
+/* The same bound of compressed form factors, with its share that stays. */
+static double left_compressed(refinement *s, size_t c, double r_most, double *stays) {
+    const refine_channel *channel = s->columns[c].channel;
+    const size_t n = s->refiner->op->n;
+    const double *row_sums = s->refiner->F->row_sums, *r = s->r + c * n;
+    double *const light = s->scratch + c * s->scratch_stride + 2 * n;
+    double unused, all = 0, own = 0;
+    for (size_t i = 0; i < n; i++) light[i] = s->lit[c * n + i] + s->P[c * n + i] + r[i];
+    const double *of_light = refinement_compression(s, c, false, light, &unused);
+    const double *of_r = refinement_compression(s, c, true, r, &unused);
+    for (size_t i = 0; i < n; i++) {
+        const double share = (double)channel->rho[i] / channel->v[i];
+        own = fmax(own, share * of_light[i]);
+        all = fmax(all, share * (row_sums[i] * r_most + of_r[i] + of_light[i]));
+    }
+    *stays = BOUND_MARGIN * channel->w_most * own;
+    return BOUND_MARGIN * channel->w_most * all;
+}
+
+bool refinement_judge(refinement *s, size_t c) {
+    refine_column *col = &s->columns[c];
+    const refine_channel *channel = col->channel;
+    const size_t n = s->refiner->op->n;
+    const double *P = s->P + c * n, *r = s->r + c * n;
+    col->r = refine_most(n, r);
+    if (s->weights) {
+        col->done = col->r + col->error <= weights_good;
+        col->stuck = !col->done && col->passes >= WEIGHTS_PASSES_MOST;
+        return false;
+    }
+    double answer = 0;
+    for (size_t i = 0; i < n; i++) {
+        const double sum = P[i] + r[i];
+        answer = sum > answer ? sum : answer;
+    }
+    col->P = answer;
+    /* The client's B~ - E' may be less than P by what rounding made of B~. */
+    const double sum = refinement_sum_rounding(s, c), wanted = s->tolerance * (answer - sum);
+    const double rounded = BOUND_MARGIN * channel->w_most * col->error / channel->v_least;
+    double stays = 0;
+    const double left = s->scratch != NULL
+                            ? left_compressed(s, c, col->r, &stays)
+                            : refine_left(s->refiner, channel, r, col->r, wanted - rounded - sum);
+    col->bound = left + rounded + sum;
+    col->done = col->bound <= wanted || (answer == 0 && left + rounded == 0);
+    if (col->done) return false;
+    if (col->passes >= REFINE_PASSES_MOST || (stays > 0 && left <= compressed_rest * stays))
+        col->stuck = true;
+    if (left > rounded) return false;
+    /* Only rounding is left: less of it where r is found anew, unless that was so the last time. Where there
+     * is far less light than P began with, none if E' is not seen, that is what the rounding is of. */
+    if (!col->from_dark && answer < 1e-6 * col->P_first) {
+        col->from_dark = true;
+        memset(s->P + c * n, 0, n * sizeof *P);
+    } else {
+        col->stuck = !(col->bound <= .5 * col->at_restart);
+    }
+    return !col->stuck;
+}

@@ -1,0 +1,394 @@
+#include "solver/operator/wavelet/wavelet_plan.h"
+
+#include "store/status.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Elements of a piece at most: several for each thread, each worth a thread's while; of a subtree in one
+ * matrix. */
+enum { PIECE_ELEMENTS = 4096, WHOLE_ELEMENTS = 96 };
+
+void wavelet_plan_free(wavelet_plan *plan) {
+    free(plan->steps);
+    free(plan->matrices);
+    free(plan->coefficient);
+    free(plan->leaves);
+    free(plan->pieces);
+    free(plan->above);
+    *plan = (wavelet_plan){.n = 0};
+}
+
+static size_t padded(size_t count) {
+    return (count + WAVELET_INPUTS - 1) / WAVELET_INPUTS * WAVELET_INPUTS;
+}
+
+/* --- subtrees in one matrix ------------------------------------------------------------------------------
+ */
+
+/* Subtrees of the same shapes in the same order have the same matrix. */
+typedef struct whole_table {
+    const wavelets *basis;
+    const uint32_t *begin; /* [n_nodes], the first node of a subtree */
+    uint32_t *slots;       /* [n_slots] node + 1, 0: empty */
+    size_t *matrix;        /* [n_nodes], where that of the first such subtree is */
+    size_t n_slots, used, room;
+    float *matrices;
+} whole_table;
+
+static bool same_subtree(const whole_table *t, size_t a, size_t b) {
+    const size_t count = a - t->begin[a];
+    if (b - t->begin[b] != count) return false;
+    for (size_t k = 0; k <= count; k++)
+        if (t->basis->nodes[a - k].shape != t->basis->nodes[b - k].shape) return false;
+    return true;
+}
+
+static uint64_t hash_subtree(const whole_table *t, size_t a) {
+    uint64_t h = 1;
+    for (size_t k = t->begin[a]; k <= a; k++) {
+        h = (h ^ t->basis->nodes[k].shape) * 0x9E3779B97F4A7C15u;
+        h ^= h >> 29;
+    }
+    return h;
+}
+
+/* rows [scaling][padded(count)] of node t from those of its children. */
+static void write_rows(const wavelets *w, size_t t, float *out) {
+    const wavelet_node *a = &w->nodes[t];
+    const float *columns = wavelet_columns(w, a);
+    const size_t width = padded(a->n_elements);
+    memset(out, 0, a->scaling * width * sizeof *out);
+    if (a->from_left == 0) {
+        for (size_t k = 0; k < a->scaling; k++)
+            for (size_t m = 0; m < a->inputs; m++) out[k * width + m] = columns[m * WAVELET_INPUTS + k];
+        return;
+    }
+    const size_t children[2] = {a->left, t - 1};
+    for (int side = 0; side < 2; side++) {
+        float below[WAVELET_SCALING * WHOLE_ELEMENTS];
+        const wavelet_node *child = &w->nodes[children[side]];
+        const size_t child_width = padded(child->n_elements), shift = child->begin - a->begin;
+        write_rows(w, children[side], below);
+        for (size_t k = 0; k < a->scaling; k++)
+            for (size_t p = 0; p < child->n_elements; p++) {
+                double sum = 0;
+                for (size_t m = 0; m < child->scaling; m++)
+                    sum += (double)columns[((side == 0 ? 0 : a->from_left) + m) * WAVELET_INPUTS + k] *
+                           (double)below[m * child_width + p];
+                out[k * width + shift + p] = (float)sum;
+            }
+    }
+}
+
+static lam_status find_matrix(whole_table *table, size_t t, size_t *out, lam_error *error) {
+    size_t slot = hash_subtree(table, t) % table->n_slots;
+    for (; table->slots[slot] != 0; slot = (slot + 1) % table->n_slots) {
+        const size_t other = table->slots[slot] - 1;
+        *out = table->matrix[other];
+        if (same_subtree(table, t, other)) return LAM_OK;
+    }
+    const wavelet_node *a = &table->basis->nodes[t];
+    const size_t size = a->scaling * padded(a->n_elements);
+    if (table->used + size > table->room) {
+        const size_t room = 2 * table->room + 4096 + size;
+        float *const more = realloc(table->matrices, room * sizeof *more);
+        if (more == NULL)
+            return status_fail(error, LAM_ERR_MEMORY, "wavelets: cannot allocate %zu x %zu bytes", room,
+                               sizeof *more);
+        table->matrices = more;
+        table->room = room;
+    }
+    write_rows(table->basis, t, table->matrices + table->used);
+    *out = table->matrix[t] = table->used;
+    table->slots[slot] = (uint32_t)t + 1;
+    table->used += size;
+    return LAM_OK;
+}
+
+/* --- the plan ----------------------------------------------------------------------------------------------
+ */
+
+static size_t own_of(const wavelet_node *a) {
+    return a->inputs - a->scaling;
+}
+
+/* Coefficients in use below and in every node, and the first node of its subtree. */
+static void count_used(const wavelets *w, const bool *used, uint32_t *below, uint32_t *own, uint32_t *begin) {
+    for (size_t t = 0; t < w->n_nodes; t++) {
+        const wavelet_node *a = &w->nodes[t];
+        own[t] = 0;
+        for (size_t k = 0; k < own_of(a); k++) own[t] += used[a->first + k];
+        below[t] = own[t];
+        begin[t] = (uint32_t)t;
+        if (a->from_left == 0) continue;
+        below[t] += below[a->left] + below[t - 1];
+        begin[t] = begin[a->left];
+    }
+}
+
+/* The root, whose last coefficients are what it hands up, is never part of a matrix. */
+static bool is_whole(const wavelets *w, const uint32_t *below, size_t t) {
+    return below[t] == 0 && w->nodes[t].n_elements <= WHOLE_ELEMENTS && t + 1 < w->n_nodes;
+}
+
+static lam_status add_steps(wavelet_plan *plan, whole_table *table, const uint32_t *below,
+                            const uint32_t *own, uint32_t *step_of, lam_error *error) {
+    lam_status status = LAM_OK;
+    const wavelets *w = table->basis;
+    for (size_t t = 0; t < w->n_nodes; t++) {
+        const wavelet_node *a = &w->nodes[t];
+        const bool whole = is_whole(w, below, t);
+        if (whole && is_whole(w, below, a->parent)) continue;
+        plan_step *step = &plan->steps[plan->n_steps];
+        *step = (plan_step){
+            .begin = a->begin, .count = a->n_elements, .scaling = (uint8_t)a->scaling, .whole = whole};
+        step_of[t] = (uint32_t)plan->n_steps++;
+        if (whole) {
+            size_t matrix = 0;
+            TRY(find_matrix(table, t, &matrix, error));
+            step->left = (uint32_t)matrix; /* until matrices stay where they are */
+            continue;
+        }
+        step->columns = wavelet_columns(w, a);
+        step->rows = step->columns + WAVELET_INPUTS * WAVELET_INPUTS;
+        step->inputs = (uint8_t)a->inputs;
+        step->from_left = (uint8_t)a->from_left;
+        step->left = a->from_left > 0 ? step_of[a->left] : 0;
+        step->first = (uint32_t)plan->n_used;
+        step->own = own[t] > 0 ? (uint8_t)own_of(a) : 0;
+        for (size_t k = 0; k < step->own; k++) plan->coefficient[plan->n_used++] = a->first + (uint32_t)k;
+    }
+    const size_t scaling = w->nodes[w->n_nodes - 1].scaling;
+    for (size_t k = w->n - scaling; k < w->n; k++) plan->coefficient[plan->n_used++] = (uint32_t)k;
+done:
+    return status;
+}
+
+/* Parents, and the steps that are leaves here. */
+static lam_status link_steps(wavelet_plan *plan, lam_error *error) {
+    plan->leaves = memory_allocate(plan->n_steps, sizeof *plan->leaves, "wavelets", error);
+    if (plan->leaves == NULL) return LAM_ERR_MEMORY;
+    for (size_t t = 0; t < plan->n_steps; t++) {
+        plan_step *a = &plan->steps[t];
+        a->parent = WAVELET_NONE;
+        if (a->from_left > 0)
+            plan->steps[a->left].parent = plan->steps[t - 1].parent = (uint32_t)t;
+        else
+            plan->leaves[plan->n_leaves++] = (uint32_t)t;
+    }
+    return LAM_OK;
+}
+
+/* The largest subtrees of at most PIECE_ELEMENTS elements, and what is above them. */
+static lam_status cut_pieces(wavelet_plan *plan, lam_error *error) {
+    lam_status status = LAM_OK;
+    uint32_t *begin = memory_allocate(plan->n_steps, sizeof *begin, "wavelets", error);
+    plan->pieces = memory_allocate(plan->n_steps, sizeof *plan->pieces, "wavelets", error);
+    plan->above = memory_allocate(plan->n_steps, sizeof *plan->above, "wavelets", error);
+    if (begin == NULL || plan->pieces == NULL || plan->above == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t t = 0; t < plan->n_steps; t++) {
+        const plan_step *a = &plan->steps[t];
+        begin[t] = a->from_left > 0 ? begin[a->left] : (uint32_t)t;
+        if (a->count > PIECE_ELEMENTS) {
+            plan->above[plan->n_above++] = (uint32_t)t;
+            continue;
+        }
+        while (plan->n_pieces > 0 && plan->pieces[plan->n_pieces - 1].first >= begin[t]) plan->n_pieces--;
+        plan->pieces[plan->n_pieces++] = (wavelet_piece){begin[t], (uint32_t)t + 1};
+    }
+done:
+    free(begin);
+    return status;
+}
+
+lam_status wavelet_plan_create(const wavelets *basis, const bool *used, wavelet_plan *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t N = basis->n_nodes;
+    wavelet_plan plan = {.n = basis->n};
+    uint32_t *below = memory_allocate(N, sizeof *below, "wavelets", error);
+    uint32_t *own = memory_allocate(N, sizeof *own, "wavelets", error);
+    uint32_t *begin = memory_allocate(N, sizeof *begin, "wavelets", error);
+    uint32_t *step_of = memory_allocate(N, sizeof *step_of, "wavelets", error);
+    whole_table table = {.basis = basis, .begin = begin, .n_slots = 2 * N + 1};
+    table.slots = memory_allocate(table.n_slots, sizeof *table.slots, "wavelets", error);
+    table.matrix = memory_allocate(N, sizeof *table.matrix, "wavelets", error);
+    plan.steps = memory_allocate(N, sizeof *plan.steps, "wavelets", error);
+    plan.coefficient = memory_allocate(basis->n, sizeof *plan.coefficient, "wavelets", error);
+    if (below == NULL || own == NULL || begin == NULL || step_of == NULL || table.slots == NULL ||
+        table.matrix == NULL || plan.steps == NULL || plan.coefficient == NULL)
+        TRY(LAM_ERR_MEMORY);
+    count_used(basis, used, below, own, begin);
+    TRY(add_steps(&plan, &table, below, own, step_of, error));
+    plan.matrices = table.matrices;
+    plan.n_numbers = table.used;
+    table.matrices = NULL;
+    for (size_t t = 0; t < plan.n_steps; t++) {
+        if (!plan.steps[t].whole) continue;
+        plan.steps[t].rows = plan.matrices + plan.steps[t].left;
+        plan.steps[t].left = 0;
+    }
+    TRY(link_steps(&plan, error));
+    TRY(cut_pieces(&plan, error));
+    *out = plan;
+    plan = (wavelet_plan){.n = 0};
+done:
+    free(below);
+    free(own);
+    free(begin);
+    free(step_of);
+    free(table.slots);
+    free(table.matrix);
+    free(table.matrices);
+    wavelet_plan_free(&plan);
+    return status;
+}
+
+size_t wavelet_plan_bytes(const wavelet_plan *plan) {
+    return plan->n_steps * sizeof *plan->steps + plan->n_numbers * sizeof *plan->matrices;
+}
+
+/* --- the transforms ----------------------------------------------------------------------------------------
+ */
+
+#define KERNEL(name) name##_portable
+#define TARGET
+#include "solver/operator/wavelet/wavelet_kernels.inc"
+
+#if defined(__x86_64__)
+#define KERNEL(name) name##_avx2
+#define TARGET __attribute__((target("avx2,fma")))
+#include "solver/operator/wavelet/wavelet_kernels.inc"
+#endif
+
+typedef void transform(const wavelet_plan *plan, size_t first, size_t last, const uint32_t *which,
+                       const float *from, float *to, float *s);
+
+static bool has_avx2(void) {
+#if defined(__x86_64__)
+    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+#else
+    return false;
+#endif
+}
+
+static transform *forward_kernel(void) {
+#if defined(__x86_64__)
+    if (has_avx2()) return forward_avx2;
+#endif
+    return forward_portable;
+}
+
+static transform *inverse_kernel(void) {
+#if defined(__x86_64__)
+    if (has_avx2()) return inverse_avx2;
+#endif
+    return inverse_portable;
+}
+
+/* Whether all of a piece is 0. */
+static bool is_dark(const wavelet_plan *plan, const wavelet_piece *piece, const float *x) {
+    const plan_step *top = &plan->steps[piece->last - 1];
+    for (size_t p = top->begin; p < (size_t)top->begin + top->count; p++)
+        if (x[p] != 0) return false;
+    return true;
+}
+
+/* What a transform of a piece that is 0 leaves. */
+static void leave_dark(const wavelet_plan *plan, const wavelet_piece *piece, float *c, float *s) {
+    for (size_t t = piece->first; t < piece->last; t++)
+        memset(c + plan->steps[t].first, 0, plan->steps[t].own * sizeof *c);
+    memset(s + (piece->last - 1) * WAVELET_SCALING, 0, WAVELET_SCALING * sizeof *s);
+}
+
+void wavelet_plan_forward(const wavelet_plan *plan, size_t m, const float *X, float *C, float *work,
+                          size_t n_threads) {
+    transform *const run = forward_kernel();
+    const size_t room = wavelet_plan_work(plan), n_pieces = plan->n_pieces;
+    const plan_step *root = &plan->steps[plan->n_steps - 1];
+#pragma omp parallel for schedule(dynamic, 1)                                                                \
+    num_threads((int)n_threads) if (n_threads > 1 && m * n_pieces > 1)
+    for (size_t k = 0; k < m * n_pieces; k++) {
+        const size_t v = k / n_pieces;
+        const wavelet_piece *piece = &plan->pieces[k % n_pieces];
+        if (is_dark(plan, piece, X + v * plan->n))
+            leave_dark(plan, piece, C + v * plan->n_used, work + v * room);
+        else
+            run(plan, piece->first, piece->last, NULL, X + v * plan->n, C + v * plan->n_used,
+                work + v * room);
+    }
+    for (size_t v = 0; v < m; v++) {
+        float *c = C + v * plan->n_used;
+        const float *s = work + v * room + (plan->n_steps - 1) * WAVELET_SCALING;
+        run(plan, 0, plan->n_above, plan->above, X + v * plan->n, c, work + v * room);
+        for (size_t k = 0; k < root->scaling; k++) c[plan->n_used - root->scaling + k] = s[k];
+    }
+}
+
+void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, float *X, float *work,
+                          size_t n_threads) {
+    transform *const run = inverse_kernel();
+    const size_t room = wavelet_plan_work(plan), n_pieces = plan->n_pieces;
+    const plan_step *root = &plan->steps[plan->n_steps - 1];
+    for (size_t v = 0; v < m; v++) {
+        const float *c = C + v * plan->n_used;
+        float *s = work + v * room + (plan->n_steps - 1) * WAVELET_SCALING;
+        for (size_t k = 0; k < root->scaling; k++) s[k] = c[plan->n_used - root->scaling + k];
+        run(plan, 0, plan->n_above, plan->above, c, X + v * plan->n, work + v * room);
+    }
+#pragma omp parallel for schedule(dynamic, 1)                                                                \
+    num_threads((int)n_threads) if (n_threads > 1 && m * n_pieces > 1)
+    for (size_t k = 0; k < m * n_pieces; k++) {
+        const size_t v = k / n_pieces;
+        const wavelet_piece *piece = &plan->pieces[k % n_pieces];
+        run(plan, piece->first, piece->last, NULL, C + v * plan->n_used, X + v * plan->n, work + v * room);
+    }
+}
+
+/* --- some positions ------------------------------------------------------------------------------------- */
+
+/* The leaf that takes a position. */
+static uint32_t leaf_of(const wavelet_plan *plan, uint32_t position) {
+    size_t low = 0, high = plan->n_leaves;
+    while (high - low > 1) {
+        const size_t middle = low + (high - low) / 2;
+        if (plan->steps[plan->leaves[middle]].begin <= position)
+            low = middle;
+        else
+            high = middle;
+    }
+    return plan->leaves[low];
+}
+
+size_t wavelet_plan_paths(const wavelet_plan *plan, size_t count, const uint32_t *positions, uint8_t *flags,
+                          uint32_t *out) {
+    size_t found = 0;
+    for (size_t k = 0; k < count; k++)
+        for (uint32_t t = leaf_of(plan, positions[k]); t != WAVELET_NONE && flags[t] == 0;
+             t = plan->steps[t].parent)
+            flags[t] = 1;
+    for (size_t t = 0; t < plan->n_steps; t++) {
+        if (flags[t] != 0) out[found++] = (uint32_t)t;
+        flags[t] = 0;
+    }
+    return found;
+}
+
+size_t wavelet_plan_coefficients(const wavelet_plan *plan, size_t n_steps, const uint32_t *steps,
+                                 uint32_t *out) {
+    const size_t scaling = plan->steps[plan->n_steps - 1].scaling;
+    size_t count = 0;
+    for (size_t k = 0; k < n_steps; k++)
+        for (size_t q = 0; q < plan->steps[steps[k]].own; q++)
+            out[count++] = plan->steps[steps[k]].first + (uint32_t)q;
+    for (size_t q = plan->n_used - scaling; q < plan->n_used; q++) out[count++] = (uint32_t)q;
+    return count;
+}
+
+void wavelet_plan_inverse_some(const wavelet_plan *plan, size_t n_steps, const uint32_t *steps,
+                               const float *C, float *X, float *work) {
+    const plan_step *root = &plan->steps[plan->n_steps - 1];
+    float *s = work + (plan->n_steps - 1) * WAVELET_SCALING;
+    for (size_t k = 0; k < root->scaling; k++) s[k] = C[plan->n_used - root->scaling + k];
+    inverse_kernel()(plan, 0, n_steps, steps, C, X, work);
+}

@@ -1,0 +1,108 @@
+#include "solver/precompute/emitter_list.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+void emitter_wish_free(emitter_wish *w) {
+    free(w->names);
+    emission_free(&w->light);
+    *w = (emitter_wish){.s = 0};
+}
+
+/* Room for s names of at most so many bytes. */
+static lam_status reserve_names(size_t s, size_t each, emitter_wish *w, lam_error *error) {
+    w->names = memory_allocate(s, sizeof *w->names + each, "names of emitters", error);
+    if (w->names == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < s; k++) w->names[k] = (char *)(w->names + s) + k * each;
+    w->s = s;
+    return LAM_OK;
+}
+
+static lam_status number_names(const char *what, size_t s, emitter_wish *w, lam_error *error) {
+    enum { EACH = 40 };
+    const lam_status status = reserve_names(s, EACH, w, error);
+    for (size_t k = 0; status == LAM_OK && k < s; k++) snprintf(w->names[k], EACH, "%s %zu", what, k);
+    return status;
+}
+
+static lam_status read_sky(const mesh *m, size_t n_tiles, emitter_wish *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t C = m->n_channels;
+    if (n_tiles == 0)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--emitters sky: there is no sky; give --sky tregenza, reinhart:MF or grid:AxB too");
+    TRY(number_names("tile", n_tiles, w, error));
+    TRY(emission_allocate("--emitters sky", C, m->n, n_tiles, &w->light.E, error));
+    TRY(emission_allocate("--emitters sky", C, n_tiles, n_tiles, &w->light.L, error));
+    w->light.n_vectors = n_tiles;
+    for (size_t t = 0; t < n_tiles; t++)
+        for (size_t c = 0; c < C; c++) w->light.L[(t * C + c) * n_tiles + t] = 1;
+done:
+    return status;
+}
+
+typedef struct filling {
+    const mesh *m;
+    float *E; /* [C][n] */
+} filling;
+
+static void fill_group(void *context, size_t group) {
+    const filling *f = context;
+    for (size_t c = 0; c < f->m->n_channels; c++)
+        for (size_t i = 0; i < f->m->n; i++)
+            if (f->m->group[i] == group) f->E[c * f->m->n + i] = 1;
+}
+
+/* names: NAME,NAME,... */
+static lam_status read_groups(const char *names, const mesh *m, emitter_wish *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t vector = m->n_channels * m->n;
+    size_t s = 1, longest = strlen(names) + 1, k = 0;
+    for (const char *at = names; *at != '\0'; at++) s += *at == ',';
+    TRY(reserve_names(s, longest, w, error));
+    TRY(emission_allocate("--emitters", m->n_channels, m->n, s, &w->light.E, error));
+    w->light.n_vectors = s;
+    for (const char *at = names; k < s; k++) {
+        const size_t length = strcspn(at, ",");
+        filling f = {m, w->light.E + k * vector};
+        memcpy(w->names[k], at, length);
+        if (emission_match_groups(m, w->names[k], fill_group, &f) == 0)
+            FAIL(error, LAM_ERR_ARGUMENT,
+                 "--emitters group=%.200s: the scene has no group \"%.60s\"; solve STORE names all there are",
+                 names, w->names[k]);
+        at += length + 1;
+    }
+done:
+    return status;
+}
+
+static bool is_lit(const emission *e, size_t k, size_t vector, size_t tiles) {
+    for (size_t i = 0; i < vector; i++)
+        if (e->E[k * vector + i] > 0) return true;
+    for (size_t t = 0; e->L != NULL && t < tiles; t++)
+        if (e->L[k * tiles + t] > 0) return true;
+    return false;
+}
+
+lam_status emitter_wish_read(const char *text, const mesh *m, size_t n_tiles, emitter_wish *out,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    emitter_wish made = {.s = 0};
+    if (strcmp(text, "sky") == 0) {
+        TRY(read_sky(m, n_tiles, &made, error));
+    } else if (strncmp(text, "group=", 6) == 0) {
+        TRY(read_groups(text + 6, m, &made, error));
+    } else {
+        TRY(emission_read(text, m, (emission_sources){.n_tiles = n_tiles}, &made.light, error));
+        TRY(number_names("emitter", made.light.n_vectors, &made, error));
+    }
+    for (size_t k = 0; k < made.s; k++)
+        if (!is_lit(&made.light, k, m->n * m->n_channels, n_tiles * m->n_channels))
+            FAIL(error, LAM_ERR_ARGUMENT, "--emitters %.200s: emitter %zu sends nothing out", text, k);
+    *out = made;
+    made = (emitter_wish){.s = 0};
+done:
+    emitter_wish_free(&made);
+    return status;
+}

@@ -1,0 +1,62 @@
+/* What a precomputation will take, told before it begins: memory, time, room on the disk. */
+#ifndef LAMBERT_PRECOMPUTE_FORECAST_H
+#define LAMBERT_PRECOMPUTE_FORECAST_H
+
+#include "solver/formfactor/recipe.h"
+#include "solver/formfactor/rows/scratch.h"
+#include "solver/linalg/panel.h"
+
+#include <stdint.h>
+
+typedef struct forecast {
+    size_t n, n_channels;
+    size_t sky_tiles;            /* 0: no sky */
+    recipe recipe, judge_recipe; /* of the form factors and of the judge's samples */
+    size_t probes;               /* 0: no independent samples */
+    bool from_store;             /* form factors are there already */
+    bool scratch;                /* rows go to a scratch folder as they are found */
+    bool large;                  /* and whole samples lie there, as memory is too small for them */
+    bool keep;                   /* the store keeps the form factors */
+    bool compress;               /* compressed, where that takes less */
+    bool exact;                  /* the whole inverse is built */
+    size_t rank;                 /* 0: not known yet */
+    size_t emitters;             /* 0: another kind of operator */
+    bool sparse;                 /* a sparse inverse, whose threshold rises until it fits */
+    bool hierarchical;           /* or one in wavelets, of this epsilon */
+    bool streamed;               /* which asks for rows one after the other; none are held */
+    double epsilon;
+    panel_precision precision; /* of an operator of low rank */
+} forecast;
+
+/* Bytes at the peak; an upper bound for the form factors, an estimate for the rest. */
+double forecast_bytes(const forecast *f);
+
+/* LAM_ERR_MEMORY when that passes limit; the message names the option that would make it fit. */
+lam_status forecast_check(const forecast *f, double limit, lam_error *error);
+
+/* Seconds that finding the form factors takes, and those of the judge: from rays a second, measured, and from
+ * what each thread needs for the rest, which was measured once. */
+typedef struct forecast_times {
+    double form_factors, judge;
+} forecast_times;
+forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n_threads);
+
+/* Bytes of the store and of the scratch folder: upper bounds for form factors, an estimate for the operator.
+ */
+double forecast_store_bytes(const forecast *f);
+double forecast_scratch_bytes(const forecast *f);
+
+/* LAM_ERR_IO when the disks cannot hold that; the message names the option that would make it fit. scratch
+ * may be NULL. What an earlier run has left there counts as free. */
+lam_status forecast_check_disk(const forecast *f, const char *output, const scratch *rows,
+                               const char *scratch_folder, lam_error *error);
+
+/* "812M", "2.4G", "3 min 20 s" */
+void forecast_format_bytes(double bytes, char text[32]);
+void forecast_format_seconds(double seconds, char text[32]);
+
+/* Bytes that are free: MemAvailable of /proc/meminfo, less where a control group allows less; 0 when unknown.
+ */
+uint64_t memory_available(void);
+
+#endif

@@ -1,0 +1,129 @@
+#include "solver/precompute/precision_loss.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Probes of each sort. */
+enum { PROBES = 8 };
+
+/* The next value of a 64-bit generator (SplitMix64), in [0, 1). */
+static double next_random(uint64_t *state) {
+    uint64_t x = *state += 0x9E3779B97F4A7C15u;
+    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
+    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
+    return (double)((x ^ (x >> 31)) >> 11) * 0x1p-53;
+}
+
+static lam_status apply(const lam_operator *op, const float *E, float *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t bytes = lam_operator_work_bytes(op, 2 * PROBES);
+    void *work = memory_allocate(bytes, 1, "the work area of a solve", error);
+    if (work == NULL) return LAM_ERR_MEMORY;
+    TRY(lam_operator_apply(op, 2 * PROBES, LAM_INDIRECT, E, out, work, bytes, error));
+done:
+    free(work);
+    return status;
+}
+
+/* |b - a|/|a| of one vector; 0 where nothing bounces. */
+static double difference(const lam_operator *op, const double *area, const float *a, const float *b) {
+    const size_t n = lam_operator_elements(op), count = n * lam_operator_channels(op);
+    double whole = 0, off = 0;
+    for (size_t i = 0; i < count; i++) {
+        const double x = (double)a[i], d = (double)b[i] - x;
+        whole += area[i % n] * x * x;
+        off += area[i % n] * d * d;
+    }
+    return whole > 0 ? sqrt(off / whole) : 0;
+}
+
+lam_status narrow_measure(const lam_operator *op, const lam_operator *narrow, const double *area,
+                          uint64_t seed, narrow_loss *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = lam_operator_elements(op), n_channels = lam_operator_channels(op),
+                 vector = n * n_channels;
+    float *E = memory_allocate(2 * PROBES, vector * sizeof *E, "probes", error);
+    float *before = memory_allocate(2 * PROBES, vector * sizeof *before, "probes", error);
+    float *after = memory_allocate(2 * PROBES, vector * sizeof *after, "probes", error);
+    if (E == NULL || before == NULL || after == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t v = 0; v < PROBES; v++) {
+        const size_t bright = (size_t)(next_random(&seed) * (double)n);
+        for (size_t c = 0; c < n_channels; c++) E[v * vector + c * n + bright] = 1;
+        for (size_t i = 0; i < vector; i++) E[(PROBES + v) * vector + i] = (float)next_random(&seed);
+    }
+    TRY(apply(op, E, before, error));
+    TRY(apply(narrow, E, after, error));
+    *out = (narrow_loss){0};
+    for (size_t v = 0; v < PROBES; v++) {
+        out->single += difference(op, area, before + v * vector, after + v * vector) / PROBES;
+        out->random +=
+            difference(op, area, before + (PROBES + v) * vector, after + (PROBES + v) * vector) / PROBES;
+    }
+done:
+    free(E);
+    free(before);
+    free(after);
+    return status;
+}
+
+lam_status narrow_replace(lam_operator **op, panel_precision precision, const double *area, uint64_t seed,
+                          terminal *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    lam_operator *made = NULL;
+    narrow_loss loss;
+    if ((*op)->kind->narrow == NULL || precision == PANEL_F32) return LAM_OK;
+    const size_t before = lam_operator_bytes(*op);
+    TRY(operator_narrow(*op, precision, &made, error));
+    TRY(narrow_measure(*op, made, area, seed, &loss, error));
+    lam_operator_close(*op);
+    *op = made;
+    made = NULL;
+    terminal_log(
+        t,
+        "%s takes %.0f %% of the memory of f32 and adds %.2g to the indirect error of single elements, "
+        "%.2g of light all over",
+        panel_precision_name(precision),
+        100 * (double)lam_operator_bytes(*op) / (double)(before > 0 ? before : 1), loss.single, loss.random);
+done:
+    lam_operator_close(made);
+    return status;
+}
+
+/* Errors that have nothing to do with each other add in squares: a tenth makes the whole half a percent
+ * larger. */
+static bool fits(const narrow_loss *loss, const error_report *errors) {
+    return loss->single <= .1 * errors->single.operator_indirect.mean &&
+           loss->random <= .1 * errors->random.operator_indirect.mean;
+}
+
+lam_status narrow_advise(const lam_operator *op, const error_report *errors, const double *area,
+                         uint64_t seed, terminal *t, lam_error *error) {
+    static const panel_precision narrowest_first[] = {PANEL_I8, PANEL_F16};
+    lam_status status = LAM_OK;
+    lam_operator *made = NULL;
+    operator_description about;
+    operator_describe(op, &about);
+    if (op->kind->narrow == NULL || about.rank == 0 || errors->single.probes == 0 ||
+        errors->random.probes == 0 || t->quiet)
+        return LAM_OK;
+    for (size_t i = 0; i < sizeof narrowest_first / sizeof *narrowest_first; i++) {
+        narrow_loss loss;
+        const panel_precision precision = narrowest_first[i];
+        TRY(operator_narrow(op, precision, &made, error));
+        TRY(narrow_measure(op, made, area, seed, &loss, error));
+        if (fits(&loss, errors)) {
+            terminal_log(
+                t,
+                "--store-precision %s would add %.2g to an indirect error of %.2g and take %.0f %% of "
+                "the memory",
+                panel_precision_name(precision), loss.single, errors->single.operator_indirect.mean,
+                100 * (double)lam_operator_bytes(made) / (double)about.bytes);
+            break;
+        }
+        lam_operator_close(made);
+        made = NULL;
+    }
+done:
+    lam_operator_close(made);
+    return status;
+}

@@ -1,0 +1,87 @@
+#include "solver/render/tone.h"
+
+#include <math.h>
+
+/* Luminances from 2^LOWEST on, BINS_PER_OCTAVE bins each octave; bin 0 holds all that is darker. */
+#define LOWEST (-48)
+#define BINS_PER_OCTAVE 20
+
+/* Where the curve leaves the diagonal. */
+#define KNEE 0.7f
+
+/* How many times brighter than the screen a colour is when it has lost most of its hue. */
+#define WHITENING 6.0f
+
+float tone_luminance(const float *values, size_t n_channels) {
+    if (n_channels == 1) return values[0];
+    if (n_channels == 3) return 0.2126f * values[0] + 0.7152f * values[1] + 0.0722f * values[2];
+    float sum = 0;
+    for (size_t c = 0; c < n_channels; c++) sum += values[c];
+    return sum / (float)n_channels;
+}
+
+void tone_histogram_add(tone_histogram *h, float luminance) {
+    double bin = luminance > 0 ? (log2((double)luminance) - LOWEST) * BINS_PER_OCTAVE : 0;
+    h->counts[bin < 0 ? 0 : bin >= TONE_BINS ? TONE_BINS - 1 : (size_t)bin]++;
+    h->total++;
+}
+
+double tone_histogram_quantile(const tone_histogram *h, double share) {
+    double below = 0;
+    for (size_t bin = 0; bin < TONE_BINS; bin++) {
+        below += (double)h->counts[bin];
+        if (h->counts[bin] > 0 && below >= share * (double)h->total)
+            return bin == 0 ? 0 : exp2(LOWEST + ((double)bin + .5) / BINS_PER_OCTAVE);
+    }
+    return 0;
+}
+
+double tone_exposure(const tone_histogram *h) {
+    /* The bright parts just reach the shoulder; where the middle would then be lost in the dark, it is raised
+     * half the way and the bright parts go into the shoulder. */
+    const double bright = tone_histogram_quantile(h, .95), middle = tone_histogram_quantile(h, .5);
+    if (!(bright > 0)) return 1;
+    const double for_bright = .75 / bright;
+    if (!(middle > 0) || .18 / middle <= for_bright) return for_bright;
+    return fmin(sqrt(for_bright * .18 / middle), 4 * for_bright);
+}
+
+float tone_curve(float x) {
+    if (!(x > 0)) return 0;
+    if (x <= KNEE) return x;
+    return 1 - (1 - KNEE) * expf(-(x - KNEE) / (1 - KNEE));
+}
+
+void tone_color(float rgb[3]) {
+    const float largest = fmaxf(rgb[0], fmaxf(rgb[1], rgb[2]));
+    if (!(largest > KNEE)) {
+        for (int c = 0; c < 3; c++) rgb[c] = fmaxf(rgb[c], 0);
+        return;
+    }
+    const float excess = (largest - KNEE) / WHITENING;
+    const float shown = tone_curve(largest), white = 1 - expf(-excess * excess);
+    for (int c = 0; c < 3; c++) rgb[c] = shown * ((1 - white) * fmaxf(rgb[c], 0) / largest + white);
+}
+
+unsigned char tone_encode(float linear) {
+    /* IEC 61966-2-1 */
+    float x = linear > 0 ? fminf(linear, 1) : 0;
+    float encoded = x <= 0.0031308f ? 12.92f * x : 1.055f * powf(x, 1 / 2.4f) - 0.055f;
+    return (unsigned char)(255 * encoded + .5f);
+}
+
+float tone_decode(float encoded) {
+    return encoded <= 0.04045f ? encoded / 12.92f : powf((encoded + 0.055f) / 1.055f, 2.4f);
+}
+
+void tone_false_color(float t, float rgb[3]) {
+    /* Hue turns from violet to yellow while lightness (CIE L*) rises evenly from about 13 to 90. */
+    static const float stops[][3] = {{.230f, .010f, .330f}, {.270f, .180f, .480f}, {.215f, .330f, .545f},
+                                     {.150f, .460f, .550f}, {.120f, .585f, .540f}, {.220f, .710f, .465f},
+                                     {.480f, .815f, .310f}, {.750f, .875f, .150f}, {.985f, .905f, .145f}};
+    const int last = (int)(sizeof stops / sizeof stops[0]) - 1;
+    const float place = (t > 0 ? fminf(t, 1) : 0) * (float)last;
+    const int below = place >= (float)last ? last - 1 : (int)place;
+    const float share = place - (float)below;
+    for (int c = 0; c < 3; c++) rgb[c] = (1 - share) * stops[below][c] + share * stops[below + 1][c];
+}

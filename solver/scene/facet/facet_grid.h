@@ -1,0 +1,39 @@
+/* Which element of a facet holds a point: a grid laid along the facet's elements. Knows no light. */
+#ifndef LAMBERT_SCENE_FACET_FACET_GRID_H
+#define LAMBERT_SCENE_FACET_FACET_GRID_H
+
+#include "solver/scene/facet/facets.h"
+
+/* Where a piece lies in its facet's grid: x = x[0] + u x[1] + v x[2], y likewise, for the piece's barycentric
+ * u and v, the shares of its second and last corner. */
+typedef struct piece_place {
+    float x[3], y[3];
+    uint32_t grid;
+} piece_place;
+
+typedef struct facet_grid facet_grid;
+
+typedef struct facet_grids {
+    piece_place *pieces; /* [n_pieces]; nothing where a facet is one element */
+    facet_grid *grids;
+    size_t n_grids;
+    uint32_t *cells;
+    struct facet_candidate *candidates;
+    size_t n_cells, n_candidates, cell_capacity, candidate_capacity;
+} facet_grids;
+
+/* Freed by facet_grids_free. Cost: O(n). Errors: LAM_ERR_MEMORY. */
+lam_status facet_grids_create(const mesh *m, const facets *f, facet_grids *out, lam_error *error);
+void facet_grids_free(facet_grids *g);
+
+/* Points looked up at once, at most. */
+#define FACET_SEARCHES 16
+
+/* element[i], i < n: the one at (u, v) of a piece, of its facet whatever u and v are. The facets have more
+ * than one element. A point within about
+ * 1e-5 of an element's width from its border may go to the neighbour. Cost: O(1) each, two or three lines of
+ * memory. */
+void facet_grids_find(const facet_grids *g, size_t n, const uint32_t *piece, const float *u, const float *v,
+                      uint32_t *element);
+
+#endif

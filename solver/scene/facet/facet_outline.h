@@ -1,0 +1,28 @@
+/* Outlines of joined elements, cut into few pieces. Private to facets.c. */
+#ifndef LAMBERT_SCENE_FACET_FACET_OUTLINE_H
+#define LAMBERT_SCENE_FACET_FACET_OUTLINE_H
+
+#include "solver/scene/facet/facet_sides.h"
+
+typedef struct outlines {
+    const mesh *m;
+    size_t n_elements;
+    const uint32_t *place; /* [n_vertices], one vertex for all that are at the same point */
+    double flat;           /* metres: how far off a line a vertex may be left out */
+    size_t n_parts;
+    const uint32_t *part;      /* [n_elements] */
+    const uint32_t *size;      /* [n_parts], elements */
+    const double (*normal)[3]; /* [n_parts], unit */
+    const double *area;        /* [n_parts] */
+    bool *alone;               /* [n_parts], not to be joined; set where there is no outline to join to */
+    const side *sides;         /* sorted by part */
+    size_t n_sides;
+    uint32_t (*pieces)[4]; /* result, freed by the caller: those of joined parts, as in facets */
+    uint32_t *piece_part;
+    size_t n_pieces, piece_capacity, owner_capacity;
+} outlines;
+
+/* Cost: O(sides), and for each part the square of its outline's corners. Errors: LAM_ERR_MEMORY. */
+lam_status outlines_cut(outlines *o, lam_error *error);
+
+#endif

@@ -1,0 +1,251 @@
+/* glTF, PLY, STL and whatever else libassimp reads, to a soup: the only user of it. Runs in the child. */
+#include "solver/scene/import/imported_faces.h"
+
+#include <assimp/cimport.h>
+#include <assimp/config.h>
+#include <assimp/material.h>
+#include <assimp/scene.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+typedef struct assimp_state {
+    const struct aiScene *scene;
+    soup *s;
+    const char *path;
+    bool gltf;
+    uint32_t *materials; /* library's index -> ours, or TABLE_NONE */
+    uint32_t *corners;
+    size_t corner_capacity;
+} assimp_state;
+
+typedef struct affine {
+    double a[3][4];
+} affine;
+
+static affine affine_of(const struct aiMatrix4x4 *t) {
+    return (affine){
+        {{t->a1, t->a2, t->a3, t->a4}, {t->b1, t->b2, t->b3, t->b4}, {t->c1, t->c2, t->c3, t->c4}}};
+}
+
+static affine affine_product(const affine *x, const affine *y) {
+    affine out;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 4; j++)
+            out.a[i][j] = x->a[i][0] * y->a[0][j] + x->a[i][1] * y->a[1][j] + x->a[i][2] * y->a[2][j] +
+                          (j == 3 ? x->a[i][3] : 0);
+    return out;
+}
+
+static bool is_mirrored(const affine *t) {
+    const double(*a)[4] = t->a;
+    return a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) -
+               a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
+               a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]) <
+           0;
+}
+
+/* --- materials ----------------------------------------------------------------------------------------- */
+
+static bool colour_of(const struct aiMaterial *m, const char *key, double out[3]) {
+    struct aiColor4D c;
+    if (aiGetMaterialColor(m, key, 0, 0, &c) != aiReturn_SUCCESS) return false;
+    out[0] = c.r, out[1] = c.g, out[2] = c.b;
+    return true;
+}
+
+static const char colour_base[] = "$clr.base", colour_diffuse[] = "$clr.diffuse",
+                  colour_emissive[] = "$clr.emissive", emissive_intensity[] = "$mat.emissiveIntensity";
+
+/* Whether the library made this material up for faces that have none: it bears its default name, or none; in
+ * a glTF, whose materials may be nameless, it is the last one. */
+static bool is_made_up(const assimp_state *a, unsigned index, const char *name) {
+    if (strcmp(name, AI_DEFAULT_MATERIAL_NAME) == 0) return true;
+    return name[0] == '\0' && (!a->gltf || index + 1 == a->scene->mNumMaterials);
+}
+
+static lam_status read_material(assimp_state *a, unsigned index, lam_error *error) {
+    lam_status status = LAM_OK;
+    const struct aiMaterial *m = a->scene->mMaterials[index];
+    struct aiString given = {0};
+    char name[MAXLEN + 32];
+    ai_real strength = 1;
+    aiGetMaterialString(m, AI_MATKEY_NAME, &given);
+    snprintf(name, sizeof name, "%s", given.data);
+    a->materials[index] = TABLE_NONE;
+    if (is_made_up(a, index, name)) return LAM_OK;
+    if (name[0] == '\0') snprintf(name, sizeof name, "material-%u", index);
+    TRY(soup_add_material(a->s, name, strlen(name), &a->materials[index], error));
+    soup_material *v = &a->s->values[a->materials[index]];
+    soup_material fresh = {.defined = 1};
+    fresh.has_diffuse =
+        colour_of(m, colour_base, fresh.diffuse) || colour_of(m, colour_diffuse, fresh.diffuse);
+    colour_of(m, colour_emissive, fresh.emission);
+    if (aiGetMaterialFloatArray(m, emissive_intensity, 0, 0, &strength, NULL) == aiReturn_SUCCESS)
+        for (int c = 0; c < 3; c++) fresh.emission[c] *= strength;
+    if (v->defined && memcmp(v, &fresh, sizeof fresh) != 0) { /* two materials of one name */
+        const size_t length = strlen(name);
+        snprintf(name + length, sizeof name - length, "-%u", index);
+        TRY(soup_add_material(a->s, name, strlen(name), &a->materials[index], error));
+        v = &a->s->values[a->materials[index]];
+    }
+    *v = fresh;
+    if (aiGetMaterialTextureCount(m, aiTextureType_DIFFUSE) > 0 ||
+        aiGetMaterialTextureCount(m, aiTextureType_BASE_COLOR) > 0 ||
+        aiGetMaterialTextureCount(m, aiTextureType_EMISSIVE) > 0)
+        soup_warn(&a->s->warnings, "%s: the texture of material '%s' is ignored", a->path, name);
+done:
+    return status;
+}
+
+/* --- nodes --------------------------------------------------------------------------------------------- */
+
+/* A node's own name: the library makes some up, such as <STL_BINARY>, or nodes[3] in a glTF. */
+static lam_status name_of_node(assimp_state *a, const struct aiNode *node, uint32_t *object,
+                               lam_error *error) {
+    const char *name = node->mName.data;
+    unsigned number;
+    int end = 0;
+    *object = TABLE_NONE;
+    if (name[0] == '\0' || name[0] == '<') return LAM_OK;
+    if (a->gltf && sscanf(name, "nodes[%u]%n", &number, &end) == 1 && end > 0 && name[end] == '\0')
+        return LAM_OK;
+    return name_table_add(&a->s->objects, name, strlen(name), object, error);
+}
+
+static lam_status read_mesh(assimp_state *a, const struct aiMesh *m, const affine *t, uint32_t object,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t base = a->s->n_vertices;
+    const bool mirrored = is_mirrored(t); /* turns faces inside out, unless they are read backwards */
+    if (base + m->mNumVertices >= TABLE_NONE)
+        FAIL(error, LAM_ERR_FORMAT, "%s: more than %u vertices", a->path, TABLE_NONE - 1);
+    for (unsigned v = 0; v < m->mNumVertices; v++) {
+        const double p[3] = {m->mVertices[v].x, m->mVertices[v].y, m->mVertices[v].z};
+        double world[3];
+        for (int k = 0; k < 3; k++)
+            world[k] = t->a[k][0] * p[0] + t->a[k][1] * p[1] + t->a[k][2] * p[2] + t->a[k][3];
+        TRY(soup_add_vertex(a->s, world, error));
+    }
+    for (unsigned f = 0; f < m->mNumFaces; f++) {
+        const unsigned n = m->mFaces[f].mNumIndices;
+        if (n < 3) continue; /* a point or a line */
+        uint32_t *grown =
+            array_grow(a->corners, &a->corner_capacity, n, sizeof *a->corners, "face corners", error);
+        if (grown == NULL) TRY(LAM_ERR_MEMORY);
+        a->corners = grown;
+        for (unsigned k = 0; k < n; k++) {
+            const unsigned corner = m->mFaces[f].mIndices[mirrored ? n - 1 - k : k];
+            if (corner >= m->mNumVertices)
+                FAIL(error, LAM_ERR_FORMAT, "%s: face %u of mesh '%.100s' refers to vertex %u, there are %u",
+                     a->path, f, m->mName.data, corner, m->mNumVertices);
+            a->corners[k] = (uint32_t)(base + corner);
+        }
+        const uint32_t material =
+            m->mMaterialIndex < a->scene->mNumMaterials ? a->materials[m->mMaterialIndex] : TABLE_NONE;
+        TRY(soup_add_polygon(a->s, a->corners, n, object, material, 0, error));
+    }
+done:
+    return status;
+}
+
+static lam_status read_node(assimp_state *a, const struct aiNode *node, const affine *parent,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    const affine own = affine_of(&node->mTransformation), t = affine_product(parent, &own);
+    uint32_t object = TABLE_NONE;
+    if (node->mNumMeshes > 0) TRY(name_of_node(a, node, &object, error));
+    for (unsigned i = 0; i < node->mNumMeshes; i++)
+        if (node->mMeshes[i] < a->scene->mNumMeshes)
+            TRY(read_mesh(a, a->scene->mMeshes[node->mMeshes[i]], &t, object, error));
+    for (unsigned i = 0; i < node->mNumChildren; i++) TRY(read_node(a, node->mChildren[i], &t, error));
+done:
+    return status;
+}
+
+/* --- files --------------------------------------------------------------------------------------------- */
+
+static uint32_t little_endian(const char *bytes) {
+    const unsigned char *b = (const unsigned char *)bytes;
+    return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
+}
+
+static void put_little_endian(char *bytes, uint32_t x) {
+    for (int k = 0; k < 4; k++) bytes[k] = (char)(x >> 8 * k & 255);
+}
+
+/* Some writers of GLB forget to pad chunks to 4 bytes, which the library refuses: *out is a padded copy,
+ * freed by the caller, or NULL when the file is no GLB or needs none. */
+static lam_status glb_padded(const char *glb, size_t length, char **out, size_t *out_length,
+                             lam_error *error) {
+    size_t chunks = 0, uneven = 0, to = 12;
+    *out = NULL;
+    if (length < 12 || length > UINT32_MAX / 2 || memcmp(glb, "glTF", 4) != 0) return LAM_OK;
+    for (size_t at = 12; length - at >= 8; chunks++) {
+        const size_t size = little_endian(glb + at);
+        if (size > length - at - 8) return LAM_OK; /* truncated: the library says so */
+        uneven += size % 4 != 0;
+        at += 8 + size;
+    }
+    if (uneven == 0) return LAM_OK;
+    char *padded = memory_allocate(length + 3 * chunks, 1, "GLB", error);
+    if (padded == NULL) return LAM_ERR_MEMORY;
+    for (size_t at = 12; length - at >= 8;) {
+        const uint32_t size = little_endian(glb + at), pad = (4 - size % 4) % 4;
+        memcpy(padded + to, glb + at, 8 + size);
+        put_little_endian(padded + to, size + pad);
+        memset(padded + to + 8 + size, memcmp(glb + at + 4, "JSON", 4) == 0 ? ' ' : 0, pad);
+        at += 8 + size;
+        to += 8 + size + pad;
+    }
+    memcpy(padded, glb, 12);
+    put_little_endian(padded + 8, (uint32_t)to);
+    *out = padded;
+    *out_length = to;
+    return LAM_OK;
+}
+
+static const struct aiScene *import_scene(const char *path, const char *padded, size_t padded_length) {
+    struct aiPropertyStore *properties = aiCreatePropertyStore();
+    if (properties == NULL) return NULL;
+    aiSetImportPropertyInteger(properties, AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, 1);
+    /* No post-processing: it joins, reorders and triangulates. */
+    const struct aiScene *scene =
+        padded != NULL
+            ? aiImportFileFromMemoryWithProperties(padded, (unsigned)padded_length, 0, "glb", properties)
+            : aiImportFileExWithProperties(path, 0, NULL, properties);
+    aiReleasePropertyStore(properties);
+    return scene;
+}
+
+lam_status assimp_read(const char *path, soup *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const char *dot = strrchr(path, '.');
+    assimp_state a = {.s = s, .path = path};
+    static const char strength[] = "KHR_materials_emissive_strength";
+    char *bytes = NULL, *padded = NULL;
+    size_t length = 0, padded_length = 0;
+    a.gltf = dot != NULL && (strcasecmp(dot, ".gltf") == 0 || strcasecmp(dot, ".glb") == 0);
+    TRY(file_text(path, &bytes, &length, error));
+    if (a.gltf) TRY(glb_padded(bytes, length, &padded, &padded_length, error));
+    if (a.gltf && memmem(bytes, length, strength, sizeof strength - 1) != NULL)
+        soup_warn(&s->warnings, "%s: %s is not read; emissions are the plain emissive factors", path,
+                  strength);
+    a.scene = import_scene(path, padded, padded_length);
+    if (a.scene == NULL)
+        FAIL(error, LAM_ERR_FORMAT, "%s: not a scene that can be read: %.300s", path, aiGetErrorString());
+    a.materials = memory_allocate(a.scene->mNumMaterials, sizeof *a.materials, "materials", error);
+    if (a.materials == NULL) TRY(LAM_ERR_MEMORY);
+    for (unsigned i = 0; i < a.scene->mNumMaterials; i++) TRY(read_material(&a, i, error));
+    const affine unit = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
+    if (a.scene->mRootNode != NULL) TRY(read_node(&a, a.scene->mRootNode, &unit, error));
+done:
+    if (a.scene != NULL) aiReleaseImport(a.scene);
+    free(a.materials);
+    free(a.corners);
+    free(bytes);
+    free(padded);
+    return status;
+}

@@ -1,0 +1,253 @@
+/* What the importer's child read, turned into a mesh: groups, materials, units. */
+#include "solver/scene/import/import.h"
+#include "solver/scene/import/imported_faces.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+/* What faces get whose file names no diffuse colour, and what a diffuse value of 1 or more becomes. */
+static const double default_reflectance = .5;
+static const double largest_reflectance = .999;
+
+static const char *extension_of(const char *path) {
+    const char *slash = strrchr(path, '/'), *dot = strrchr(path, '.');
+    return dot == NULL || (slash != NULL && dot < slash) ? "" : dot + 1;
+}
+
+static void stem_of(const char *path, char *out, size_t size) {
+    const char *slash = strrchr(path, '/'), *name = slash == NULL ? path : slash + 1;
+    const char *dot = strrchr(name, '.');
+    const size_t length = dot == NULL || dot == name ? strlen(name) : (size_t)(dot - name);
+    snprintf(out, size, "%.*s", (int)(length < size ? length : size - 1), name);
+}
+
+/* --- materials ----------------------------------------------------------------------------------------- */
+
+/* Checks and clamps the values of the materials that faces use; soup values become final. */
+static lam_status settle_materials(soup *s, const char *path, const bool *used, import_report *report,
+                                   lam_error *error) {
+    lam_status status = LAM_OK;
+    for (size_t i = 0; i < s->materials.n; i++) {
+        soup_material *v = &s->values[i];
+        const char *name = name_table_get(&s->materials, i);
+        bool clamped = false;
+        if (!used[i]) continue;
+        if (!v->has_diffuse) {
+            soup_warn(&s->warnings, "%s: material '%s' %s; its reflectance is set to %g", path, name,
+                      v->defined ? "has no diffuse colour" : "is not defined", default_reflectance);
+            for (int c = 0; c < 3; c++) v->diffuse[c] = default_reflectance;
+        }
+        for (int c = 0; c < 3; c++) {
+            if (!(v->diffuse[c] >= 0) || !isfinite(v->diffuse[c]))
+                FAIL(error, LAM_ERR_FORMAT, "%s: material '%s': diffuse value %g, must be in [0, 1)", path,
+                     name, v->diffuse[c]);
+            if (!(v->emission[c] >= 0) || !(v->emission[c] < (double)FLT_MAX))
+                FAIL(error, LAM_ERR_FORMAT,
+                     "%s: material '%s': emission %g, must not be negative and must be finite", path, name,
+                     v->emission[c]);
+            if ((float)v->diffuse[c] >= 1) clamped = true;
+            v->diffuse[c] = (float)v->diffuse[c] >= 1 ? largest_reflectance : v->diffuse[c];
+        }
+        if (!clamped) continue;
+        report->clamped++;
+        soup_warn(&s->warnings, "%s: material '%s': a diffuse value of 1 or more is clamped to %g", path,
+                  name, largest_reflectance);
+    }
+done:
+    return status;
+}
+
+static bool is_grey(const double v[3]) {
+    return (float)v[0] == (float)v[1] && (float)v[1] == (float)v[2];
+}
+
+/* Fills reflectance, emission and the number of channels of m. */
+static lam_status apply_materials(soup *s, const char *path, const import_options *options, mesh *m,
+                                  import_report *report, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t unnamed = 0;
+    bool *used = memory_allocate(s->materials.n, sizeof *used, "materials", error);
+    if (used == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < s->n_elements; i++)
+        if (s->elements[i].material == TABLE_NONE)
+            unnamed++;
+        else
+            used[s->elements[i].material] = true;
+    const bool overridden = options->reflectance >= 0;
+    for (size_t i = 0; overridden && i < s->materials.n; i++) {
+        s->values[i].has_diffuse = 1;
+        for (int c = 0; c < 3; c++) s->values[i].diffuse[c] = options->reflectance;
+    }
+    if (unnamed > 0 && !overridden)
+        soup_warn(&s->warnings, "%s: %zu faces have no material; their reflectance is set to %g", path,
+                  unnamed, default_reflectance);
+    TRY(settle_materials(s, path, used, report, error));
+    m->n_channels = 1;
+    for (size_t i = 0; i < s->materials.n; i++)
+        if (used[i] && (!is_grey(s->values[i].diffuse) || !is_grey(s->values[i].emission))) m->n_channels = 3;
+    m->reflectance = memory_allocate(m->n * m->n_channels, sizeof *m->reflectance, "reflectances", error);
+    m->emission = memory_allocate(m->n * m->n_channels, sizeof *m->emission, "emissions", error);
+    if (m->reflectance == NULL || m->emission == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t c = 0; c < m->n_channels; c++)
+        for (size_t i = 0; i < m->n; i++) {
+            const uint32_t material = s->elements[i].material;
+            const soup_material *v = material == TABLE_NONE ? NULL : &s->values[material];
+            m->emission[c * m->n + i] = v == NULL ? 0.f : (float)v->emission[c];
+            m->reflectance[c * m->n + i] = v != NULL    ? (float)v->diffuse[c]
+                                           : overridden ? (float)options->reflectance
+                                                        : (float)default_reflectance;
+        }
+done:
+    free(used);
+    return status;
+}
+
+/* --- groups -------------------------------------------------------------------------------------------- */
+
+/* The texts of a table as one block: pointers, then what they point to. */
+static char **name_block(const name_table *names, lam_error *error) {
+    char **block = memory_allocate(1, names->n * sizeof *block + names->text_bytes, "group names", error);
+    if (block == NULL) return NULL;
+    char *text = (char *)(block + names->n);
+    if (names->text_bytes > 0) memcpy(text, names->text, names->text_bytes);
+    for (size_t i = 0; i < names->n; i++) block[i] = text + names->start[i];
+    return block;
+}
+
+/* Names every element's group by the contract: the object's name, `object.material` where an object has
+ * several materials, the material's without an object, the scene's without either. Equal names are one group.
+ */
+static lam_status name_groups(const soup *s, mesh *m, lam_error *error) {
+    lam_status status = LAM_OK;
+    name_table names = {0};
+    char *joined = NULL;
+    size_t joined_capacity = 0;
+    const uint32_t several = TABLE_NONE - 1, unseen = TABLE_NONE - 2; /* no material has these indices */
+    uint32_t *only = memory_allocate(s->objects.n, sizeof *only, "groups", error);
+    m->group = memory_allocate(m->n, sizeof *m->group, "groups", error);
+    if (only == NULL || m->group == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t o = 0; o < s->objects.n; o++) only[o] = unseen;
+    for (size_t i = 0; i < m->n; i++) {
+        const struct soup_element *e = &s->elements[i];
+        if (e->object == TABLE_NONE) continue;
+        if (only[e->object] == unseen)
+            only[e->object] = e->material;
+        else if (only[e->object] != e->material)
+            only[e->object] = several;
+    }
+    for (size_t i = 0; i < m->n; i++) {
+        const struct soup_element *e = &s->elements[i];
+        const char *material =
+            e->material == TABLE_NONE ? "default" : name_table_get(&s->materials, e->material);
+        const char *name = e->object != TABLE_NONE     ? name_table_get(&s->objects, e->object)
+                           : e->material != TABLE_NONE ? material
+                                                       : m->name;
+        if (e->object != TABLE_NONE && only[e->object] == several) {
+            const size_t length = strlen(name) + 1 + strlen(material) + 1;
+            char *grown = array_grow(joined, &joined_capacity, length, 1, "groups", error);
+            if (grown == NULL) TRY(LAM_ERR_MEMORY);
+            joined = grown;
+            snprintf(joined, length, "%s.%s", name, material);
+            name = joined;
+        }
+        TRY(name_table_add(&names, name, strlen(name), &m->group[i], error));
+    }
+    m->n_groups = names.n;
+    m->group_names = name_block(&names, error);
+    if (m->group_names == NULL) TRY(LAM_ERR_MEMORY);
+done:
+    free(only);
+    free(joined);
+    name_table_free(&names);
+    return status;
+}
+
+/* --- geometry ------------------------------------------------------------------------------------------ */
+
+static lam_status copy_geometry(soup *s, const char *path, double unit, mesh *m, lam_error *error) {
+    lam_status status = LAM_OK;
+    m->n = s->n_elements;
+    m->elements = memory_allocate(m->n, sizeof *m->elements, "elements", error);
+    if (m->elements == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < m->n; i++) memcpy(m->elements[i], s->elements[i].corners, sizeof *m->elements);
+    m->n_vertices = s->points.n;
+    m->vertices = s->points.points; /* taken over */
+    s->points.points = NULL;
+    for (size_t v = 0; v < m->n_vertices; v++)
+        for (int k = 0; k < 3; k++) {
+            m->vertices[v][k] *= unit;
+            if (!(fabs(m->vertices[v][k]) < 1e30))
+                FAIL(error, LAM_ERR_ARGUMENT, "%s: vertex %zu: coordinate %g m with --unit %g is too large",
+                     path, v, m->vertices[v][k], unit);
+        }
+    TRY(mesh_measure(m, error));
+done:
+    return status;
+}
+
+/* Formats in single precision lose the shape of a small scene far from the origin; the text of an OBJ does
+ * not. */
+static void warn_of_lost_precision(soup *s, const char *path, const mesh *m) {
+    double centre[3], radius, farthest = 0;
+    mesh_bounds(m, centre, &radius);
+    for (int k = 0; k < 3; k++) farthest = fmax(farthest, fabs(centre[k]));
+    if (farthest * 0x1p-23 > 1e-4 * 2 * radius)
+        soup_warn(
+            &s->warnings,
+            "%s: coordinates near %g m are kept to %.2g m in single precision; move the scene to the origin",
+            path, farthest, farthest * 0x1p-23);
+}
+
+static lam_status check_options(const import_options *options, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (!(options->unit > 0) || !isfinite(options->unit))
+        FAIL(error, LAM_ERR_ARGUMENT, "unit = %g metres, must be positive", options->unit);
+    if (options->up != 0 && options->up != 'x' && options->up != 'y' && options->up != 'z')
+        FAIL(error, LAM_ERR_ARGUMENT, "up = '%c', must be x, y or z", options->up);
+    if (isnan(options->reflectance) || (options->reflectance >= 0 && (float)options->reflectance >= 1))
+        FAIL(error, LAM_ERR_ARGUMENT, "reflectance = %g, must be below 1", options->reflectance);
+done:
+    return status;
+}
+
+lam_status scene_import(const char *path, const import_options *options, mesh *m, import_report *report,
+                        lam_error *error) {
+    lam_status status = LAM_OK;
+    soup s = {0};
+    mesh made = {0};
+    import_report told = {0};
+    const char *extension = extension_of(path);
+    const bool is_obj = strcasecmp(extension, "obj") == 0;
+    const bool is_gltf = strcasecmp(extension, "gltf") == 0 || strcasecmp(extension, "glb") == 0;
+    const child_limits limits = {
+        .cpu_seconds = options->cpu_seconds > 0 ? options->cpu_seconds : 120,
+        .memory_bytes = options->memory_bytes > 0 ? options->memory_bytes : (size_t)8 << 30,
+    };
+    TRY(check_options(options, error));
+    TRY(import_in_child(is_obj ? obj_read : assimp_read, path, &limits, &s, error));
+    stem_of(path, made.name, sizeof made.name);
+    made.unit = options->unit;
+    made.up = options->up != 0 ? options->up : is_gltf ? 'y' : 'z';
+    TRY(copy_geometry(&s, path, options->unit, &made, error));
+    TRY(name_groups(&s, &made, error));
+    TRY(apply_materials(&s, path, options, &made, &told, error));
+    if (!is_obj) warn_of_lost_precision(&s, path, &made);
+    mesh_geometry_hash(&made, made.source_hash);
+    told.dropped_faces = s.dropped;
+    if (s.warnings.omitted > 0)
+        snprintf(told.warnings, sizeof told.warnings, "%.*s\n%llu more warnings",
+                 (int)sizeof told.warnings - 64, s.warnings.text, (unsigned long long)s.warnings.omitted);
+    else
+        snprintf(told.warnings, sizeof told.warnings, "%s", s.warnings.text);
+    *m = made;
+    made = (mesh){0};
+    if (report != NULL) *report = told;
+done:
+    mesh_free(&made);
+    soup_free(&s);
+    return status;
+}

@@ -1,0 +1,27 @@
+/* Scene files to meshes: the parent side. The importing library runs in a child process with limits. */
+#ifndef LAMBERT_SCENE_IMPORT_IMPORT_H
+#define LAMBERT_SCENE_IMPORT_IMPORT_H
+
+#include "solver/scene/mesh.h"
+
+typedef struct import_options {
+    double unit;          /* metres per unit of the file; 1 */
+    char up;              /* 'x', 'y', 'z', or 0: y for glTF, z otherwise */
+    double reflectance;   /* for every face, grey; negative: the file's own */
+    unsigned cpu_seconds; /* limit for the child; 0 gives 120 */
+    size_t memory_bytes;  /* limit for the child; 0 gives 8 GiB */
+} import_options;
+
+typedef struct import_report {
+    size_t dropped_faces; /* of zero area */
+    size_t clamped;       /* materials whose diffuse value was 1 or more */
+    char warnings[2048];  /* one line each, '\n' between them; cut with a count when there are more */
+} import_report;
+
+/* Reads OBJ+MTL, glTF/GLB, PLY, STL. m is filled and owned by the caller (mesh_free).
+ * Every failure is one line that names the file and the place: unreadable, unknown format, missing MTL,
+ * non-finite coordinate, empty scene, a crash, time-out or memory limit of the child. */
+lam_status scene_import(const char *path, const import_options *options, mesh *m, import_report *report,
+                        lam_error *error);
+
+#endif

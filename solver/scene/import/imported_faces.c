@@ -1,0 +1,170 @@
+#include "solver/scene/import/imported_faces.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+void soup_warn(soup_warnings *w, const char *format, ...) {
+    const size_t used = strlen(w->text), room = sizeof w->text - used;
+    va_list arguments;
+    if (w->omitted > 0 || room < 3) { /* once one is left out, so are the later ones */
+        w->omitted++;
+        return;
+    }
+    char *line = w->text + used;
+    const size_t gap = used > 0 ? 1 : 0;
+    va_start(arguments, format);
+    const int length = vsnprintf(line + gap, room - gap, format, arguments);
+    va_end(arguments);
+    if (length < 0 || (size_t)length >= room - gap) {
+        *line = '\0';
+        w->omitted++;
+        return;
+    }
+    if (gap == 1) *line = '\n';
+    for (line += gap; *line != '\0'; line++)
+        if ((unsigned char)*line < 0x20 || *line == 0x7f) *line = '?';
+}
+
+void soup_free(soup *s) {
+    free(s->vertices);
+    free(s->corners);
+    free(s->polygons);
+    free(s->elements);
+    free(s->values);
+    point_table_free(&s->points);
+    name_table_free(&s->objects);
+    name_table_free(&s->materials);
+    *s = (soup){0};
+}
+
+lam_status soup_add_vertex(soup *s, const double vertex[3], lam_error *error) {
+    void *grown = array_grow(s->vertices, &s->vertex_capacity, s->n_vertices + 1, sizeof *s->vertices,
+                             "vertices", error);
+    if (grown == NULL) return LAM_ERR_MEMORY;
+    s->vertices = grown;
+    memcpy(s->vertices[s->n_vertices++], vertex, sizeof *s->vertices);
+    return LAM_OK;
+}
+
+lam_status soup_add_polygon(soup *s, const uint32_t *corners, size_t n, uint32_t object, uint32_t material,
+                            uint32_t line, lam_error *error) {
+    void *grown = array_grow(s->corners, &s->corner_capacity, s->n_corners + n, sizeof *s->corners,
+                             "face corners", error);
+    if (grown == NULL) return LAM_ERR_MEMORY;
+    s->corners = grown;
+    grown =
+        array_grow(s->polygons, &s->polygon_capacity, s->n_polygons + 1, sizeof *s->polygons, "faces", error);
+    if (grown == NULL) return LAM_ERR_MEMORY;
+    s->polygons = grown;
+    memcpy(s->corners + s->n_corners, corners, n * sizeof *corners);
+    s->polygons[s->n_polygons++] = (struct soup_polygon){s->n_corners, (uint32_t)n, object, material, line};
+    s->n_corners += n;
+    return LAM_OK;
+}
+
+lam_status soup_add_material(soup *s, const char *name, size_t length, uint32_t *index, lam_error *error) {
+    const size_t before = s->materials.n;
+    lam_status status = name_table_add(&s->materials, name, length, index, error);
+    if (status != LAM_OK || s->materials.n == before) return status;
+    void *grown =
+        array_grow(s->values, &s->value_capacity, s->materials.n, sizeof *s->values, "materials", error);
+    if (grown == NULL) return LAM_ERR_MEMORY;
+    s->values = grown;
+    s->values[*index] = (soup_material){0};
+    return LAM_OK;
+}
+
+static lam_status add_element(soup *s, const uint32_t piece[4], const struct soup_polygon *polygon,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    struct soup_element element = {{0, 0, 0, TABLE_NONE}, polygon->object, polygon->material};
+    for (int k = 0; k < 4 && piece[k] != TABLE_NONE; k++)
+        TRY(point_table_add(&s->points, s->vertices[piece[k]], &element.corners[k], error));
+    void *grown = array_grow(s->elements, &s->element_capacity, s->n_elements + 1, sizeof *s->elements,
+                             "elements", error);
+    if (grown == NULL) TRY(LAM_ERR_MEMORY);
+    s->elements = grown;
+    s->elements[s->n_elements++] = element;
+done:
+    return status;
+}
+
+/* Checks what every format can get wrong; extent is the diagonal of the box around what faces use. */
+static lam_status check_polygons(const soup *s, const char *path, double *extent, lam_error *error) {
+    lam_status status = LAM_OK;
+    double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+    for (size_t v = 0; v < s->n_vertices; v++)
+        for (int k = 0; k < 3; k++)
+            if (!(fabs(s->vertices[v][k]) < 1e30)) /* squares of what is larger would overflow */
+                FAIL(error, LAM_ERR_FORMAT, "%s: vertex %zu: coordinate %g is not a usable number", path, v,
+                     s->vertices[v][k]);
+    for (size_t i = 0; i < s->n_polygons; i++) {
+        const struct soup_polygon *polygon = &s->polygons[i];
+        for (size_t c = 0; c < polygon->n_corners; c++) {
+            const uint32_t v = s->corners[polygon->first + c];
+            if (v >= s->n_vertices && polygon->line > 0)
+                FAIL(error, LAM_ERR_FORMAT, "%s:%u: face refers to vertex %zu, there are %zu", path,
+                     polygon->line, (size_t)v + 1, s->n_vertices);
+            if (v >= s->n_vertices)
+                FAIL(error, LAM_ERR_FORMAT, "%s: face %zu refers to vertex %u, there are %zu", path, i, v,
+                     s->n_vertices);
+            for (int k = 0; k < 3; k++) {
+                low[k] = fmin(low[k], s->vertices[v][k]);
+                high[k] = fmax(high[k], s->vertices[v][k]);
+            }
+        }
+    }
+    if (s->n_polygons == 0) FAIL(error, LAM_ERR_FORMAT, "%s: the scene is empty: it has no faces", path);
+    *extent = sqrt((high[0] - low[0]) * (high[0] - low[0]) + (high[1] - low[1]) * (high[1] - low[1]) +
+                   (high[2] - low[2]) * (high[2] - low[2]));
+done:
+    return status;
+}
+
+lam_status soup_split(soup *s, const char *path, lam_error *error) {
+    lam_status status = LAM_OK;
+    polygon_scratch scratch = {0};
+    double extent = 0;
+    TRY(check_polygons(s, path, &extent, error));
+    for (size_t i = 0; i < s->n_polygons; i++) {
+        const struct soup_polygon *polygon = &s->polygons[i];
+        TRY(polygon_split((const double(*)[3])s->vertices, s->corners + polygon->first, polygon->n_corners,
+                          1e-14 * extent * extent, false, &scratch, error));
+        if (scratch.n_pieces == 0) s->dropped++;
+        for (size_t p = 0; p < scratch.n_pieces; p++) TRY(add_element(s, scratch.pieces[p], polygon, error));
+    }
+    if (s->n_elements == 0)
+        FAIL(error, LAM_ERR_FORMAT, "%s: the scene is empty: none of its %zu faces has an area", path,
+             s->n_polygons);
+done:
+    polygon_scratch_free(&scratch);
+    return status;
+}
+
+lam_status file_text(const char *path, char **out, size_t *out_length, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *text = NULL;
+    size_t capacity = 0, length = 0, got = 1;
+    FILE *file = fopen(path, "rb");
+    if (file == NULL) FAIL(error, LAM_ERR_IO, "%s: cannot read: %s", path, strerror(errno));
+    while (got > 0) {
+        char *grown = array_grow(text, &capacity, length + 65536, 1, path, error);
+        if (grown == NULL) TRY(LAM_ERR_MEMORY);
+        text = grown;
+        got = fread(text + length, 1, capacity - length - 1, file);
+        length += got;
+    }
+    if (ferror(file)) FAIL(error, LAM_ERR_IO, "%s: cannot read: %s", path, strerror(errno));
+    text[length] = '\0';
+    *out = text;
+    *out_length = length;
+    text = NULL;
+done:
+    if (file != NULL) fclose(file);
+    free(text);
+    return status;
+}

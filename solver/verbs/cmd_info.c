@@ -1,0 +1,158 @@
+/* lambert info: what a store holds, how large and how exact it is. */
+#include "solver/codec/describe.h"
+#include "solver/console/options.h"
+#include "solver/console/terminal.h"
+#include "solver/verbs/verbs.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct fields {
+    bool json;
+} fields;
+
+static const option_row rows[] = {
+    {.name = "json",
+     .kind = OPTION_FLAG,
+     .offset = offsetof(fields, json),
+     .doc = "As GET /v1/scenes/NAME of lambertd answers"},
+    {0},
+};
+
+static const option_verb verb = {
+    .name = "info",
+    .arguments = "STORE",
+    .summary = "Say what a store holds, its size, its measured errors, and why its method was chosen.",
+    .options = rows,
+    .min_arguments = 1,
+    .max_arguments = 1,
+};
+
+static void print_value(const char *label, const json_t *value) {
+    if (value == NULL || json_is_null(value)) return;
+    printf("%-18s", label);
+    if (json_is_string(value))
+        printf("%s\n", json_string_value(value));
+    else if (json_is_integer(value))
+        printf("%" JSON_INTEGER_FORMAT "\n", json_integer_value(value));
+    else
+        printf("%.4g\n", json_number_value(value));
+}
+
+static void print_bytes(double bytes) {
+    static const char *const units[] = {"bytes", "KiB", "MiB", "GiB", "TiB"};
+    size_t unit = 0;
+    for (; bytes >= 1024 && unit < 4; unit++) bytes /= 1024;
+    printf("%-18s%.4g %s\n", "operator", bytes, units[unit]);
+}
+
+/* One line of figures, mean and largest, for the light of a group of probes. */
+static void print_figures(const char *name, const json_t *group, const char *against) {
+    char key[64];
+    double value[4];
+    static const char *const figures[] = {"relative_mean", "relative_max", "indirect_mean", "indirect_max"};
+    for (int i = 0; i < 4; i++) {
+        snprintf(key, sizeof key, "%s_%s", against, figures[i]);
+        const json_t *figure = json_object_get(group, key);
+        if (!json_is_number(figure)) return;
+        value[i] = json_number_value(figure);
+    }
+    printf("  %-8s%-10s%12.3g%12.3g%12.3g%12.3g\n", name, against, value[0], value[1], value[2], value[3]);
+}
+
+static void print_error(const json_t *figures) {
+    static const char *const names[] = {"single", "lights", "random"};
+    if (json_object_size(figures) == 0) {
+        puts("errors            not measured (--probes 0)");
+        return;
+    }
+    printf("errors            %12s%12s%12s%12s\n", "relative", "largest", "indirect", "largest");
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        const json_t *group = json_object_get(figures, names[i]);
+        print_figures(names[i], group, "total");
+        print_figures(names[i], group, "operator");
+    }
+    puts("  total: against an independent sample of the form factors; operator: against the very sample it "
+         "was "
+         "built from");
+}
+
+/* A screen's worth: a city has hundreds of groups. */
+static void print_groups(const json_t *groups) {
+    enum { MOST = 20 };
+    const size_t count = json_array_size(groups), shown = count <= MOST ? count : MOST - 1;
+    for (size_t i = 0; i < shown; i++) {
+        const json_t *group = json_array_get(groups, i);
+        const json_int_t elements = json_integer_value(json_object_get(group, "elements"));
+        printf("%-18s%s, %" JSON_INTEGER_FORMAT " element%s\n", i == 0 ? "groups" : "",
+               json_string_value(json_object_get(group, "name")), elements, elements == 1 ? "" : "s");
+    }
+    if (shown < count) printf("%-18sand %zu more (--json names them)\n", "", count - shown);
+}
+
+static void print_sky(const json_t *sky) {
+    if (!json_is_object(sky)) return;
+    const char *tiling = json_string_value(json_object_get(sky, "tiling"));
+    printf("%-18s%s, %" JSON_INTEGER_FORMAT " tiles, ground albedo %g\n", "sky",
+           tiling != NULL ? tiling : "?", json_integer_value(json_object_get(sky, "tiles")),
+           json_number_value(json_object_get(sky, "ground_albedo")));
+}
+
+static void print_text(const json_t *about) {
+    static const char *const plain[] = {"name",   "elements", "channels", "kind",
+                                        "method", "reason",   "epsilon"};
+    for (size_t i = 0; i < sizeof plain / sizeof plain[0]; i++)
+        print_value(plain[i], json_object_get(about, plain[i]));
+    print_value("rank", json_object_get(about, "rank"));
+    print_value("density", json_object_get(about, "density"));
+    print_value("precision", json_object_get(about, "precision"));
+    print_bytes(json_number_value(json_object_get(about, "bytes")));
+    print_groups(json_object_get(about, "groups"));
+    print_sky(json_object_get(about, "sky"));
+    print_error(json_object_get(about, "error"));
+    const json_t *provenance = json_object_get(about, "provenance");
+    const json_t *form_factors = json_object_get(provenance, "form_factors");
+    static const char *const origin[] = {"tool", "command", "created", "seed", "unit", "geometry_hash"};
+    for (size_t i = 0; i < sizeof origin / sizeof origin[0]; i++)
+        print_value(origin[i], json_object_get(provenance, origin[i]));
+    if (form_factors == NULL) return;
+    print_value("form factors", json_object_get(form_factors, "method"));
+    if (json_integer_value(json_object_get(form_factors, "rays")) > 0)
+        print_value("rays", json_object_get(form_factors, "rays"));
+    print_value("resolution", json_object_get(form_factors, "resolution"));
+    print_value("kept as", json_object_get(form_factors, "storage"));
+}
+
+static lam_status info(const char *path, bool as_json, lam_error *error) {
+    lam_status status = LAM_OK;
+    store *s = NULL;
+    json_t *about = NULL;
+    char *text = NULL;
+    TRY(store_open(path, &s, error));
+    TRY(describe_store(s, &about, error));
+    if (as_json) {
+        text = json_dumps(about, JSON_INDENT(2));
+        if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory to describe it", path);
+        puts(text);
+    } else {
+        print_text(about);
+    }
+done:
+    free(text);
+    json_decref(about);
+    store_close(s);
+    return status;
+}
+
+int cmd_info(int argc, char **argv) {
+    fields f = {0};
+    option_result given = {0};
+    lam_error error = {0};
+    terminal term;
+    int code = options_parse(&verb, argc, argv, &f, &given);
+    if (code != OPTIONS_GO) return code;
+    terminal_open(&term, verb.name, false, false);
+    if (info(given.arguments[0], f.json, &error) != LAM_OK) return terminal_fail(&term, &error);
+    return 0;
+}

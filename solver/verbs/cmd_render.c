@@ -1,0 +1,398 @@
+/* lambert render: a picture of a store under any lighting. */
+#include "solver/base/atomic_file.h"
+#include "solver/console/terminal.h"
+#include "solver/light/emission_apply.h"
+#include "solver/operator/operator.h"
+#include "solver/operator/sky_light.h"
+#include "solver/render/patch_view.h"
+#include "solver/render/picture.h"
+#include "solver/render/visible_view.h"
+#include "solver/verbs/verbs.h"
+
+#include <math.h>
+#include <omp.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct camera_option {
+    bool given;
+    double eye[3], target[3], fov;
+} camera_option;
+
+typedef struct size_option {
+    size_t width, height;
+} size_option;
+
+typedef struct fields {
+    option_list emit;
+    const char *emission, *sky;
+    const char *quantity;
+    camera_option camera;
+    size_option size;
+    double exposure;
+    bool false_color;
+    bool smooth;
+    const char *output;
+} fields;
+
+static lam_status parse_camera(const char *text, void *field, lam_error *error) {
+    lam_status status = LAM_OK;
+    camera_option *option = field;
+    double numbers[7];
+    camera ignored;
+    TRY(option_numbers("--camera", text, 7, true, numbers, NULL, error));
+    TRY(camera_look(numbers, numbers + 3, numbers[6], 1, 'z', &ignored, error));
+    option->given = true;
+    memcpy(option->eye, numbers, sizeof option->eye);
+    memcpy(option->target, numbers + 3, sizeof option->target);
+    option->fov = numbers[6];
+done:
+    return status;
+}
+
+static lam_status parse_size(const char *text, void *field, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_option *option = field;
+    const char *x = strchr(text, 'x');
+    char width_text[24];
+    uint64_t width, height;
+    if (x == NULL || (size_t)(x - text) >= sizeof width_text)
+        FAIL(error, LAM_ERR_ARGUMENT, "--size %s: must be WxH pixels, such as 640x480", text);
+    memcpy(width_text, text, (size_t)(x - text));
+    width_text[x - text] = '\0';
+    if (option_count("--size", width_text, &width, NULL) != LAM_OK ||
+        option_count("--size", x + 1, &height, NULL) != LAM_OK)
+        FAIL(error, LAM_ERR_ARGUMENT, "--size %s: must be WxH pixels, such as 640x480", text);
+    TRY(image_check_size(width, height, error));
+    *option = (size_option){width, height};
+done:
+    return status;
+}
+
+#define FIELD(member) offsetof(fields, member)
+static const option_row rows[] = {
+    {.name = "output",
+     .letter = 'o',
+     .kind = OPTION_TEXT,
+     .offset = FIELD(output),
+     .value = "IMAGE.png",
+     .doc = "Where the picture goes"},
+    {.kind = OPTION_HEADING, .doc = "light (without: the scene's own)"},
+    {.name = "emit",
+     .kind = OPTION_LIST,
+     .offset = FIELD(emit),
+     .value = "GROUP=V[,V,V]",
+     .doc = "A group emits V W/m2, one number or one per channel; again for more groups"},
+    {.name = "emission",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(emission),
+     .value = "FILE.npy|.json",
+     .doc = "One emission from a file"},
+    {.name = "sky",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(sky),
+     .value = "FILE.npy",
+     .doc = "Radiances of the sky's tiles, W/(m2 sr): [m] or [C][m]; alone or beside one of the others"},
+    {.kind = OPTION_HEADING, .doc = "view"},
+    {.name = "quantity",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(quantity),
+     .value = "NAME",
+     .doc = "radiosity (the default), irradiance or indirect; of --method 2msc, which need no light: "
+            "coherence, from black for that of the least coherent patch to white for 1, or patch, a colour "
+            "for each; of a store with form factors: visible, how many elements each one sees",
+     .choices = "radiosity|irradiance|indirect|coherence|patch|visible"},
+    {.name = "camera",
+     .kind = OPTION_CUSTOM,
+     .offset = FIELD(camera),
+     .value = "EYE,TARGET,FOV",
+     .doc = "x,y,z,x,y,z,degrees: from where, to where, how high the picture is (chosen to show the scene)",
+     .parse = parse_camera},
+    {.name = "size",
+     .kind = OPTION_CUSTOM,
+     .offset = FIELD(size),
+     .value = "WxH",
+     .doc = "Pixels (640x640)",
+     .parse = parse_size},
+    {.name = "exposure",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(exposure),
+     .value = "EV",
+     .doc = "Twice as bright for each 1 (0)",
+     .low = -60,
+     .high = 60},
+    {.name = "false-color",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(false_color),
+     .doc = "Colours for values, with a legend"},
+    {.name = "smooth", .kind = OPTION_FLAG, .offset = FIELD(smooth), .doc = "Interpolate within a surface"},
+    {.name = "animate", .kind = OPTION_LATER, .value = "FRAMES.npy", .doc = "(not supported yet)"},
+    {0},
+};
+
+static const option_verb verb = {
+    .name = "render",
+    .arguments = "STORE -o IMAGE.png",
+    .summary = "Draws what a store answers: every element in the light it gives back, seen by a camera. Back "
+               "faces are looked through.",
+    .options = rows,
+    .min_arguments = 1,
+    .max_arguments = 1,
+};
+
+static float luminance_of(const mesh *m, const float *values, size_t i) {
+    float channels[3] = {0, 0, 0};
+    for (size_t c = 0; c < m->n_channels && c < 3; c++) channels[c] = values[c * m->n + i];
+    return tone_luminance(channels, m->n_channels);
+}
+
+/* Which elements have light at all, and which show mostly their own. */
+static void mark(const mesh *m, const float *values, const float *E, bool emission_shows, bool *lit,
+                 bool *glows) {
+    float largest = 0;
+    for (size_t i = 0; i < m->n; i++) largest = fmaxf(largest, luminance_of(m, values, i));
+    for (size_t i = 0; i < m->n; i++) {
+        const float shown = luminance_of(m, values, i);
+        lit[i] = shown > 1e-6f * largest;
+        glows[i] = emission_shows && luminance_of(m, E, i) > .5f * shown;
+    }
+}
+
+/* The next number whose quarters are short. */
+static double round_up(double x) {
+    static const double steps[] = {1, 1.2, 1.6, 2, 2.4, 2.8, 3.2, 4, 4.8, 6, 8, 10};
+    if (!(x > 0)) return 1;
+    const double unit = pow(10, floor(log10(x)));
+    size_t i = 0;
+    while (i + 1 < sizeof steps / sizeof steps[0] && steps[i] * unit < x) i++;
+    return steps[i] * unit;
+}
+
+/* The columns of the picture that show the scene. */
+static size_t view_width(const fields *f) {
+    return f->size.width - (f->false_color ? picture_legend_width(f->size.width, f->size.height) : 0);
+}
+
+/* A store, what its elements show, and from where they are seen. */
+typedef struct view {
+    store *s;
+    mesh m;
+    float *values; /* [1 or 3][n] */
+    bool *lit;     /* [n]: elements that a chosen camera is to show */
+    bool *glows;   /* [n]: see picture_scene */
+    visibility *seen;
+    shade *shown;
+    picture_scene scene;
+    camera camera;
+} view;
+
+static void view_close(view *v) {
+    shade_destroy(v->shown);
+    visibility_destroy(v->seen);
+    free(v->lit);
+    free(v->glows);
+    free(v->values);
+    mesh_free(&v->m);
+    store_close(v->s);
+}
+
+/* All but what the elements show, and so nothing that costs much. */
+static lam_status view_open(const char *path, const fields *f, view *v, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(output_file_check(f->output, error));
+    TRY(store_open(path, &v->s, error));
+    TRY(mesh_load(v->s, &v->m, NULL, error));
+    v->lit = memory_allocate(v->m.n, sizeof *v->lit, "lit elements", error);
+    v->glows = memory_allocate(v->m.n, sizeof *v->glows, "glowing elements", error);
+    if (v->lit == NULL || v->glows == NULL) TRY(LAM_ERR_MEMORY);
+done:
+    return status;
+}
+
+/* The scene and the camera of a view whose values are there. */
+static lam_status view_aim(const fields *f, size_t n_channels, bool smooth, view *v, lam_error *error) {
+    lam_status status = LAM_OK;
+    const double aspect = (double)view_width(f) / (double)f->size.height;
+    const camera_option *given = &f->camera;
+    TRY(visibility_create(&v->m, &v->seen, error));
+    TRY(shade_create(&v->m, n_channels, v->values, smooth, &v->shown, error));
+    v->scene = (picture_scene){.mesh = &v->m, .visibility = v->seen, .shade = v->shown, .glows = v->glows};
+    if (given->given)
+        TRY(camera_look(given->eye, given->target, given->fov, aspect, v->m.up, &v->camera, error));
+    else
+        TRY(camera_choose(&v->m, v->seen, v->lit, aspect, &v->camera, error));
+done:
+    return status;
+}
+
+/* What fits the light that is seen. */
+static picture_look look_of_light(const fields *f, const view *v) {
+    tone_histogram histogram = {0};
+    picture_look look = {.width = view_width(f)};
+    picture_measure(&v->scene, &v->camera, &histogram);
+    if (f->false_color)
+        look.range = round_up(tone_histogram_quantile(&histogram, .99) / exp2(f->exposure));
+    else
+        look.exposure = tone_exposure(&histogram) * exp2(f->exposure);
+    return look;
+}
+
+static lam_status draw(const fields *f, const view *v, const picture_look *look, terminal *t,
+                       lam_error *error) {
+    lam_status status = LAM_OK;
+    const progress how = terminal_progress(t);
+    const camera *c = &v->camera;
+    image picture = {0};
+    const size_t channels = look->range > 0 || shade_channels(v->shown) == 3 ? 3 : 1;
+    TRY(image_create(f->size.width, f->size.height, channels, &picture, error));
+    TRY(picture_draw(&v->scene, c, look, &how, &picture, error));
+    if (look->range > 0) picture_legend(look->range, &picture);
+    TRY(image_write_png(&picture, f->output, error));
+    terminal_log(t, "camera %.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.4g", c->eye[0], c->eye[1], c->eye[2],
+                 c->eye[0] + c->forward[0], c->eye[1] + c->forward[1], c->eye[2] + c->forward[2],
+                 2 * atan(c->tan_y) * 180 / M_PI);
+done:
+    image_free(&picture);
+    return status;
+}
+
+static lam_status render(const char *path, const fields *f, terminal *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    view v = {.s = NULL};
+    lam_operator *op = NULL;
+    lam_sky *sky = NULL;
+    emission light = {0};
+    bool own = false;
+
+    TRY(view_open(path, f, &v, error));
+    TRY(sky_load(v.s, v.m.n, &sky, error));
+    const emission_wish wish = {.items = &f->emit, .path = f->emission, .sky = f->sky};
+    TRY(operator_load(v.s, &op, error));
+    TRY(emission_choose(&v.m, emission_sources_of(op, sky), &wish, &light, &own, error));
+    if (light.n_vectors != 1)
+        FAIL(error, LAM_ERR_ARGUMENT, "%s: holds %zu emissions, a picture shows exactly 1",
+             f->emission != NULL ? f->emission : f->sky, light.n_vectors);
+    lam_operator_set_threads(op, (size_t)omp_get_max_threads());
+    TRY(terminal_check(error));
+    const lam_quantity quantity = strcmp(f->quantity, "irradiance") == 0 ? LAM_IRRADIANCE
+                                  : strcmp(f->quantity, "indirect") == 0 ? LAM_INDIRECT
+                                                                         : LAM_RADIOSITY;
+    TRY(emission_apply(&light, op, sky, quantity, 0, NULL, NULL, &v.values, error));
+    mark(&v.m, v.values, light.E, quantity == LAM_RADIOSITY, v.lit, v.glows);
+    if (own && memchr(v.glows, true, v.m.n) == NULL && memchr(v.lit, true, v.m.n) == NULL)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "%s: the scene has no light of its own; give --emit GROUP=V, --emission or --sky", path);
+    TRY(view_aim(f, v.m.n_channels, f->smooth, &v, error));
+    const picture_look look = look_of_light(f, &v);
+    TRY(draw(f, &v, &look, t, error));
+    if (f->false_color)
+        terminal_log(t, "colours from 0 to %g W/m2", look.range);
+    else
+        terminal_log(t, "white is about %.3g W/m2", 1 / look.exposure);
+done:
+    view_close(&v);
+    emission_free(&light);
+    lam_operator_close(op);
+    lam_sky_close(sky);
+    return status;
+}
+
+static bool is_visible(const fields *f) {
+    return strcmp(f->quantity, "visible") == 0;
+}
+
+static bool needs_no_light(const fields *f) {
+    return strcmp(f->quantity, "coherence") == 0 || strcmp(f->quantity, "patch") == 0 || is_visible(f);
+}
+
+/* The values of --quantity visible, in colours up to the largest. */
+static lam_status visible_values(const fields *f, store *s, size_t n, terminal *t, float **values,
+                                 picture_look *look, lam_error *error) {
+    lam_status status = LAM_OK;
+    double mean, most;
+    TRY(visible_view_counts(s, n, values, &mean, &most, error));
+    *look = (picture_look){.width = view_width(f), .range = most > 0 ? round_up(most) : 1};
+    terminal_log(t, "an element sees %.3g others on average, %.6g at most; colours from 0 to %g", mean, most,
+                 look->range);
+done:
+    return status;
+}
+
+/* The values of --quantity coherence or patch, one channel or three, and how to show them. The least coherent
+ * patch is a little above black, so that it is seen. */
+static lam_status patch_values(const fields *f, store *s, size_t n, terminal *t, float **values,
+                               picture_look *look, lam_error *error) {
+    lam_status status = LAM_OK;
+    float smallest;
+    size_t n_patches;
+    *look = (picture_look){.width = view_width(f), .plain = true};
+    if (strcmp(f->quantity, "patch") == 0) {
+        TRY(patch_view_colors(s, values, &n_patches, error));
+        terminal_log(t, "%zu patches", n_patches);
+        return LAM_OK;
+    }
+    TRY(patch_view_coherence(s, values, &smallest, error));
+    if (f->false_color) {
+        *look = (picture_look){.width = view_width(f), .range = 1};
+        terminal_log(t, "colours from coherence 0 to 1");
+        return LAM_OK;
+    }
+    for (size_t i = 0; i < n; i++) {
+        const float share = smallest < 1 ? ((*values)[i] - smallest) / (1 - smallest) : 1;
+        (*values)[i] = tone_decode(.06f + .94f * share);
+    }
+    terminal_log(t, "black is coherence %.3g, white 1", (double)smallest);
+done:
+    return status;
+}
+
+static lam_status render_unlit(const char *path, const fields *f, terminal *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    view v = {.s = NULL};
+    picture_look look;
+    TRY(view_open(path, f, &v, error));
+    if (is_visible(f))
+        TRY(visible_values(f, v.s, v.m.n, t, &v.values, &look, error));
+    else
+        TRY(patch_values(f, v.s, v.m.n, t, &v.values, &look, error));
+    memset(v.lit, true, v.m.n);
+    TRY(view_aim(f, strcmp(f->quantity, "patch") == 0 ? 3 : 1, false, &v, error));
+    TRY(draw(f, &v, &look, t, error));
+done:
+    view_close(&v);
+    return status;
+}
+
+/* Names the options that a picture without light has no use for. */
+static void log_unused(const fields *f, const option_result *given, terminal *t) {
+    static const char *const of_light[] = {"emit", "emission", "sky", "exposure", "smooth", "false-color"};
+    const size_t count = strcmp(f->quantity, "coherence") == 0 ? 5 : 6;
+    for (size_t i = 0; i < count; i++)
+        if (options_given(&verb, given, of_light[i]))
+            terminal_log(t, "--quantity %s does not use --%s", f->quantity, of_light[i]);
+}
+
+int cmd_render(int argc, char **argv) {
+    fields f = {.quantity = "radiosity", .size = {640, 640}};
+    option_result result = {0};
+    lam_error error = {0};
+    terminal t;
+    char extension[16];
+    int go = options_parse(&verb, argc, argv, &f, &result);
+    if (go != OPTIONS_GO) return go;
+    if (f.output == NULL) return options_usage(verb.name, "give -o IMAGE.png");
+    output_file_extension(f.output, extension);
+    if (strcmp(extension, "png") != 0) return options_usage(verb.name, "-o %s: must end in .png", f.output);
+    if (f.emit.count > 0 && f.emission != NULL)
+        return options_usage(verb.name, "give --emit or --emission, not both");
+    terminal_open(&t, verb.name, false, false);
+    if (needs_no_light(&f)) {
+        if (strcmp(f.quantity, "patch") == 0) f.false_color = false; /* and no room for a legend */
+        if (is_visible(&f)) f.false_color = true;
+        if (render_unlit(result.arguments[0], &f, &t, &error) != LAM_OK) return terminal_fail(&t, &error);
+        log_unused(&f, &result, &t);
+        return 0;
+    }
+    return render(result.arguments[0], &f, &t, &error) == LAM_OK ? 0 : terminal_fail(&t, &error);
+}

@@ -1,0 +1,175 @@
+/* lambert sky: turns a weather file or a sky matrix of Radiance into the radiance of the tiles of a sky, hour
+ * by hour. */
+#include "solver/base/atomic_file.h"
+#include "solver/console/options.h"
+#include "solver/console/terminal.h"
+#include "solver/daylight/sky_matrix.h"
+#include "solver/light/npy_file.h"
+#include "solver/light/weather_light.h"
+#include "solver/verbs/verbs.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define WHITE_EFFICACY 179. /* lm/W of equal-energy white in Radiance */
+
+typedef struct fields {
+    const char *output, *tiles, *model;
+    bool photometric;
+} fields;
+
+static lam_status parse_tiles(const char *text, void *field, lam_error *error) {
+    lam_status status = LAM_OK;
+    sky_tiling tiling = {0};
+    const char **tiles = field;
+    lam_error why = {0};
+    if (strcmp(text, "tregenza") != 0 && strncmp(text, "reinhart:", 9) != 0 && strncmp(text, "grid:", 5) != 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "--tiles %.60s: must be tregenza, reinhart:MF or grid:AxB", text);
+    status = sky_tiling_create(text, 'z', &tiling, &why);
+    if (status != LAM_OK) FAIL(error, status, "--tiles %s", why.message);
+    *tiles = text;
+done:
+    sky_tiling_free(&tiling);
+    return status;
+}
+
+#define FIELD(member) offsetof(fields, member)
+static const option_row rows[] = {
+    {.name = "output",
+     .letter = 'o',
+     .kind = OPTION_TEXT,
+     .offset = FIELD(output),
+     .value = "SKY.npy",
+     .doc =
+         "Where the skies go: float32 [hours][tiles], W/(m2 sr), the batch that `lambert solve --sky` takes "
+         "for a store of one channel; for three repeat each row three times, [hours][3][tiles], as a matrix "
+         "whose components differ gives them"},
+    {.name = "tiles",
+     .kind = OPTION_CUSTOM,
+     .offset = FIELD(tiles),
+     .value = "tregenza|reinhart:MF|grid:AxB",
+     .doc = "The tiles of the store's --sky: 145, 144 MF^2 + 1, or A sectors by B bands (tregenza, or those "
+            "that the matrix has, which cannot be others)",
+     .parse = parse_tiles},
+    {.name = "model",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(model),
+     .value = "perez",
+     .doc = "The all-weather sky of Perez, Seals and Michalsky, 1993 (perez)",
+     .choices = "perez"},
+    {.name = "photometric",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(photometric),
+     .doc = "In cd/m2, by the luminous efficacies of Perez and others, 1990; without a dew point (a .wea has "
+            "none) there are 2 cm of water in the air. A matrix is taken times 179 lm/W, by which gendaymtx "
+            "-O0 divides light"},
+    {.kind = OPTION_HEADING,
+     .doc =
+         "An hour's sky is as bright as the diffuse light in the file, and the sun is in the one tile that "
+         "holds it: both give a horizontal plane exactly what the file says. The sun is taken in the middle "
+         "of the hour; direct light of a sun that is then below the horizon is left out. A .wea is of the "
+         "year 2001, or 2000 where it has a 29 February"},
+    {.kind = OPTION_HEADING,
+     .doc =
+         "A sky matrix of Radiance (gendaymtx, genskyvec) is taken as it is: ascii, float or double, rows of "
+         "the ground and of the patches, a column an hour. The ground's row is left out: the store's "
+         "--ground-albedo takes its place"},
+    {0},
+};
+
+static const option_verb verb = {
+    .name = "sky",
+    .arguments = "WEATHER.epw|.wea|MATRIX.mtx -o SKY.npy",
+    .summary = "Turn the weather of a year, or a sky matrix of Radiance, into the radiance of the tiles of a "
+               "sky, hour by hour.",
+    .options = rows,
+    .min_arguments = 1,
+    .max_arguments = 1,
+};
+
+static lam_status make_skies(const char *path, const fields *f, terminal *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    sky_tiling tiling = {0};
+    weather_skies made = {0};
+    output_file file = {0};
+    TRY(output_file_check(f->output, error));
+    TRY(sky_tiling_create(f->tiles != NULL ? f->tiles : "tregenza", 'z', &tiling, error));
+    const year_wish wish = {.photometric = f->photometric, .sun_in_tiles = true};
+    TRY(weather_skies_read(path, &tiling, &wish, t, &made, error));
+    TRY(output_file_open(f->output, &file, error));
+    npy_write(file.stream, 2, (const size_t[2]){made.n, tiling.n_tiles}, made.L);
+    TRY(output_file_commit(&file, error));
+    printf("%s: %zu skies of %zu tiles (%s), %s\n", f->output, made.n, tiling.n_tiles, tiling.name,
+           f->photometric ? "cd/m2" : "W/(m2 sr)");
+done:
+    output_file_abort(&file);
+    weather_skies_free(&made);
+    sky_tiling_free(&tiling);
+    return status;
+}
+
+/* Times a factor; what a horizontal plane receives of each channel in all hours. */
+static void weigh(sky_matrix *m, double factor, double received[3], bool *lit) {
+    const size_t n_tiles = m->tiling.n_tiles;
+    for (size_t k = 0; k < m->n * m->n_channels * n_tiles; k++) {
+        const double value = (double)m->L[k] * factor;
+        m->L[k] = (float)value;
+        received[k / n_tiles % m->n_channels] += value * m->tiling.tiles[k % n_tiles].cosine;
+        *lit = *lit || value > 0;
+    }
+}
+
+static lam_status convert_matrix(const char *path, const fields *f, terminal *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    sky_matrix m = {0};
+    output_file file = {0};
+    const progress steps = terminal_progress(t);
+    double received[3] = {0};
+    bool lit = false;
+    TRY(output_file_check(f->output, error));
+    TRY(sky_matrix_read(path, f->tiles, &steps, &m, error));
+    weigh(&m, f->photometric ? WHITE_EFFICACY : 1, received, &lit);
+    terminal_clear(t);
+    if (!lit) FAIL(error, LAM_ERR_ARGUMENT, "%s: the sky is dark in all %zu columns", path, m.n);
+    for (size_t c = 0; c < m.n_channels; c++)
+        terminal_log(t, "on a horizontal plane%s: %.1f %s, if a column is an hour",
+                     m.n_channels == 1 ? ""
+                     : c == 0          ? ", first component"
+                     : c == 1          ? ", second"
+                                       : ", third",
+                     received[c] * 1e-3, f->photometric ? "klx h" : "kWh/m2");
+    TRY(output_file_open(f->output, &file, error));
+    if (m.n_channels == 1)
+        npy_write(file.stream, 2, (const size_t[2]){m.n, m.tiling.n_tiles}, m.L);
+    else
+        npy_write(file.stream, 3, (const size_t[3]){m.n, m.n_channels, m.tiling.n_tiles}, m.L);
+    TRY(output_file_commit(&file, error));
+    printf("%s: %zu skies of %zu tiles (%s), %s%s\n", f->output, m.n, m.tiling.n_tiles, m.tiling.name,
+           m.n_channels == 1 ? "" : "three components, ", f->photometric ? "cd/m2" : "W/(m2 sr)");
+done:
+    output_file_abort(&file);
+    sky_matrix_free(&m);
+    return status;
+}
+
+int cmd_sky(int argc, char **argv) {
+    fields f = {.model = "perez"};
+    option_result given = {0};
+    lam_error error = {0};
+    terminal term;
+    char extension[16];
+    const int code = options_parse(&verb, argc, argv, &f, &given);
+    if (code != OPTIONS_GO) return code;
+    const char *path = given.arguments[0];
+    if (f.output == NULL) return options_usage(verb.name, "no -o SKY.npy given");
+    output_file_extension(f.output, extension);
+    if (strcmp(extension, "npy") != 0) return options_usage(verb.name, "-o %s: must end in .npy", f.output);
+    const bool matrix = sky_matrix_is_named(path);
+    if (!matrix && !weather_is_named(path))
+        return options_usage(verb.name, "%s: must end in .epw or .wea, or in .mtx or .smx", path);
+    terminal_open(&term, verb.name, false, false);
+    const lam_status status = (matrix ? convert_matrix : make_skies)(path, &f, &term, &error);
+    return status == LAM_OK ? 0 : terminal_fail(&term, &error);
+}

@@ -1,0 +1,346 @@
+/* lambert solve: lights a store and writes what it answers. */
+#include "solver/base/atomic_file.h"
+#include "solver/console/terminal.h"
+#include "solver/light/annual.h"
+#include "solver/light/emission_refine.h"
+#include "solver/light/weather_light.h"
+#include "solver/operator/operator.h"
+#include "solver/operator/sky_light.h"
+#include "solver/output/output.h"
+#include "solver/verbs/verbs.h"
+
+#include <math.h>
+#include <omp.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct fields {
+    option_list emit, reduce, annual;
+    const char *emission, *sky, *weather, *sun, *quantity, *output, *occupied;
+    double hours, tolerance;
+    uint64_t sun_points;
+    bool photometric;
+} fields;
+
+#define FIELD(member) offsetof(fields, member)
+static const option_row rows[] = {
+    {.name = "output",
+     .letter = 'o',
+     .kind = OPTION_TEXT,
+     .offset = FIELD(output),
+     .value = "FILE",
+     .doc = ".npy, .json, .csv, .ply or .vtu; without it the mean of every group is printed"},
+    {.kind = OPTION_HEADING, .doc = "light (without: the scene's own)"},
+    {.name = "emit",
+     .kind = OPTION_LIST,
+     .offset = FIELD(emit),
+     .value = "GROUP=V[,V,V]",
+     .doc = "A group emits V W/m2, one number or one per channel; again for more groups"},
+    {.name = "emission",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(emission),
+     .value = "FILE.npy|.json",
+     .doc = "One emission or a batch from a file"},
+    {.name = "sky",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(sky),
+     .value = "FILE.npy",
+     .doc = "Radiances of the sky's tiles, W/(m2 sr): [m], [C][m] or a batch; alone or beside the others"},
+    {.name = "weather",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(weather),
+     .value = "FILE.epw|.wea",
+     .doc = "The hours of a weather file in place of --sky: what `lambert sky` makes of it for the store's "
+            "tiles"},
+    {.name = "sun",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(sun),
+     .value = "tiles|exact",
+     .doc =
+         "Of --weather: in the tile that holds it (tiles), or itself, with the shadows it throws, by rays at "
+         "the store's mesh. A store of few emitters has direct light exact and bounces from the tile",
+     .choices = "tiles|exact"},
+    {.name = "sun-points",
+     .kind = OPTION_COUNT,
+     .offset = FIELD(sun_points),
+     .value = "N",
+     .doc = "Of --sun exact: points of an element that look for the sun, each hour (4)",
+     .low = 1,
+     .high = SUN_RAYS_MOST},
+    {.name = "photometric",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(photometric),
+     .doc = "Of --weather: in light, lux, as `lambert sky --photometric`"},
+    {.kind = OPTION_HEADING, .doc = "answer"},
+    {.name = "quantity",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(quantity),
+     .value = "NAME",
+     .doc = "radiosity (the default), irradiance (that of --annual) or indirect",
+     .choices = "radiosity|irradiance|indirect"},
+    {.name = "reduce",
+     .kind = OPTION_LIST,
+     .offset = FIELD(reduce),
+     .value = "GROUP=FIGURE",
+     .doc = "mean, sum, min, max, uniformity or variance of a group; again for more"},
+    {.name = "tolerance",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(tolerance),
+     .value = "X",
+     .doc = "Refines the answer in double until its certified error is at most X times the largest indirect "
+            "light, "
+            "and writes double; of a store that keeps its form factors",
+     .low = 0,
+     .high = 1,
+     .low_open = true,
+     .high_open = true},
+    {.kind = OPTION_HEADING,
+     .doc = "a year: figures an element of a batch of skies or emissions, in place of the batch"},
+    {.name = "annual",
+     .kind = OPTION_LIST,
+     .offset = FIELD(annual),
+     .value = "FIGURE",
+     .doc = "sum: over all hours, in 1000 h (kWh/m2 of W/m2, klx h of lx); autonomy=X: share of the hours "
+            "(0 to 1) with at least X; useful=LOW,HIGH: share with LOW to HIGH, both within (100,2000 lx); "
+            "again for more. X, LOW and HIGH are in the unit of the answer: lx where the skies are cd/m2"},
+    {.name = "occupied",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(occupied),
+     .value = "FROM-TO",
+     .doc = "Hours of the day, of standard time, that shares are of, 8-18 say; the batch is whole days from "
+            "midnight on (all)"},
+    {.name = "hours-per-vector",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(hours),
+     .value = "H",
+     .doc = "How long each vector of the batch lasts (1)",
+     .low = 0,
+     .low_open = true,
+     .high = 8784},
+    {0},
+};
+
+static const option_verb verb = {
+    .name = "solve",
+    .arguments = "STORE",
+    .summary = "Light a store and write its radiosity, irradiance or indirect light, element by element.",
+    .options = rows,
+    .min_arguments = 1,
+    .max_arguments = 1,
+};
+
+static lam_quantity quantity_of(const char *name) {
+    if (strcmp(name, "irradiance") == 0) return LAM_IRRADIANCE;
+    if (strcmp(name, "indirect") == 0) return LAM_INDIRECT;
+    return LAM_RADIOSITY;
+}
+
+static bool is_dark(const emission *light, size_t count) {
+    for (size_t i = 0; i < count; i++)
+        if (light->E[i] > 0) return false;
+    return true;
+}
+
+/* The mean total error for the scene's own lights, or for single elements; negative where there is none. */
+static void stated_error(store *s, double *relative, double *indirect) {
+    static const char *const groups[] = {"/error/lights", "/error/single"};
+    *relative = *indirect = -1;
+    for (size_t i = 0; i < sizeof groups / sizeof groups[0]; i++) {
+        if (!store_has(s, groups[i]) || !store_has_attribute(s, groups[i], "total_relative_mean")) continue;
+        if (store_get_number(s, groups[i], "total_relative_mean", relative, NULL) == LAM_OK &&
+            store_get_number(s, groups[i], "total_indirect_mean", indirect, NULL) == LAM_OK)
+            return;
+        *relative = *indirect = -1;
+    }
+}
+
+/* The elements that some reduction is about, *selected freed with free(); NULL where all are wanted. */
+static lam_status wanted_elements(const mesh *m, const reduction *reductions, size_t n_reductions,
+                                  size_t *n_selected, uint32_t **selected, lam_error *error) {
+    *selected = NULL;
+    *n_selected = 0;
+    if (n_reductions == 0) return LAM_OK;
+    *selected = memory_allocate(m->n, sizeof **selected, "the elements wanted", error);
+    if (*selected == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < m->n; i++) {
+        bool inside = false;
+        for (size_t r = 0; r < n_reductions; r++) inside = inside || reductions[r].inside[m->group[i]];
+        if (inside) (*selected)[(*n_selected)++] = (uint32_t)i;
+    }
+    return LAM_OK;
+}
+
+/* Figures of the year in place of the batch; *values is freed with free(). */
+static lam_status solve_year(const annual_wish *wish, const emission *light, const lam_operator *op,
+                             const lam_sky *sky, size_t n_selected, const uint32_t *selected, terminal *t,
+                             solution *out, float **values, lam_error *error) {
+    lam_status status = LAM_OK;
+    const progress steps = terminal_progress(t);
+    annual_summary sum = {0};
+    TRY(annual_apply(wish, light, op, sky, quantity_of(out->quantity), n_selected, selected, &steps, values,
+                     &sum, error));
+    terminal_log(t, "a year of %s: %zu vectors of %g h, %zu with light", out->quantity, sum.n, wish->hours,
+                 sum.lit);
+    if (annual_has_shares(wish)) terminal_log(t, "shares are of %zu vectors", sum.counted);
+    if (sum.lit == 0) terminal_warn(t, "no vector has any light");
+    out->n_vectors = wish->n_figures;
+    out->batch = true;
+done:
+    return status;
+}
+
+/* What came of refining, for the log and the file. */
+static void tell_refined(const refined_light *refined, solution *out, double tolerance, terminal *t) {
+    double certificate = 0;
+    size_t iterations = 0;
+    out->refined = refined->values;
+    out->certificates = refined->certificates;
+    out->iterations = refined->iterations;
+    for (size_t v = 0; v < out->n_vectors; v++) {
+        certificate = fmax(certificate, refined->certificates[v]);
+        if (refined->iterations[v] > iterations) iterations = refined->iterations[v];
+    }
+    terminal_log(t,
+                 "refined to %g: no %s is further than %.3g from that of the store's form factors; %zu "
+                 "iteration%s%s",
+                 tolerance, out->quantity, certificate, iterations, iterations == 1 ? "" : "s",
+                 out->n_vectors > 1 ? " at most" : "");
+}
+
+static lam_status solve(const char *path, const fields *f, const annual_wish *year, reduction *reductions,
+                        terminal *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    store *s = NULL;
+    mesh m = {0};
+    lam_operator *op = NULL;
+    lam_sky *sky = NULL;
+    emission light = {0};
+    double *row_sums = NULL;
+    float *values = NULL;
+    refined_light refined = {0};
+    char *scene = NULL;
+    uint32_t *selected = NULL;
+    size_t n_selected = 0;
+    sunlight sun = {0};
+    bool own = false;
+    const char *names[ANNUAL_MOST];
+    for (size_t k = 0; k < year->n_figures; k++) names[k] = year->figures[k].name;
+    if (f->output != NULL) TRY(output_file_check(f->output, error));
+    TRY(store_open(path, &s, error));
+    TRY(store_get_text(s, "/", "name", &scene, error));
+    TRY(mesh_load(s, &m, &row_sums, error));
+    for (size_t i = 0; i < f->reduce.count; i++) TRY(reduce_bind(&reductions[i], &m, error));
+    TRY(sky_load(s, m.n, &sky, error));
+    const emission_wish wish = {
+        .items = &f->emit, .path = f->emission, .sky = f->sky, .other = f->weather != NULL};
+    TRY(operator_load(s, &op, error));
+    TRY(emission_choose(&m, emission_sources_of(op, sky), &wish, &light, &own, error));
+    if (own && is_dark(&light, m.n * m.n_channels))
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s", path,
+             sky != NULL ? ", --sky FILE or --weather FILE" : "");
+    if (own) terminal_log(t, "no --emit, --emission, --sky or --weather: the scene's own light");
+    /* With --reduce only figures are written, with -o too. */
+    TRY(wanted_elements(&m, reductions, f->reduce.count, &n_selected, &selected, error));
+    if (f->weather != NULL) {
+        const weather_wish hours = {.path = f->weather,
+                                    .photometric = f->photometric,
+                                    .exact = strcmp(f->sun, "exact") == 0,
+                                    .sun_points = (size_t)f->sun_points};
+        TRY(weather_light_add(&hours, s, &m, op, sky, n_selected, selected, t, &light, &sun, error));
+    }
+    if (year->n_figures > 0 && !light.batch)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--annual is of a batch, one vector an hour, and this is one light; give --sky [hours][tiles] "
+             "or --weather");
+    lam_operator_set_threads(op, (size_t)omp_get_max_threads());
+    TRY(terminal_check(error));
+    solution out = {.m = &m,
+                    .scene = scene,
+                    .quantity = f->quantity,
+                    .n_vectors = light.n_vectors,
+                    .batch = light.batch,
+                    .reductions = reductions,
+                    .n_reductions = f->reduce.count};
+    if (year->n_figures > 0) {
+        out.names = names;
+        TRY(solve_year(year, &light, op, sky, n_selected, selected, t, &out, &values, error));
+    } else if (f->tolerance > 0) {
+        TRY(emission_refine(&light, path, op, sky, quantity_of(f->quantity), f->tolerance, terminal_check,
+                            &refined, error));
+        tell_refined(&refined, &out, f->tolerance, t);
+    } else {
+        TRY(emission_apply(&light, op, sky, quantity_of(f->quantity), n_selected, selected, terminal_check,
+                           &values, error));
+    }
+    out.values = values;
+    out.relative = out.indirect = -1;
+    if (f->tolerance == 0) stated_error(s, &out.relative, &out.indirect);
+    if (f->output != NULL)
+        TRY(output_write(&out, f->output, error));
+    else
+        TRY(output_print(&out, error));
+done:
+    free(scene);
+    free(selected);
+    free(values);
+    refined_light_free(&refined);
+    free(row_sums);
+    emission_free(&light);
+    sunlight_free(&sun);
+    lam_operator_close(op);
+    lam_sky_close(sky);
+    mesh_free(&m);
+    store_close(s);
+    return status;
+}
+
+/* The figures of --annual and the options that are about them. */
+static lam_status read_year(const fields *f, annual_wish *year, lam_error *error) {
+    lam_status status = LAM_OK;
+    for (size_t i = 0; i < f->annual.count; i++) TRY(annual_add(year, f->annual.items[i], error));
+    if (f->annual.count == 0 && f->hours > 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "--hours-per-vector is for --annual");
+    if (!annual_has_shares(year) && f->occupied != NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "--occupied is for --annual autonomy=X and useful=LOW,HIGH");
+    if (f->hours > 0) year->hours = f->hours;
+    if (f->occupied != NULL) TRY(annual_parse_occupied(f->occupied, year, error));
+done:
+    return status;
+}
+
+int cmd_solve(int argc, char **argv) {
+    fields f = {.sun = "tiles", .sun_points = 4};
+    option_result given = {0};
+    lam_error error = {0};
+    terminal term;
+    annual_wish year = {.hours = 1, .from = 0, .to = 24};
+    int code = options_parse(&verb, argc, argv, &f, &given);
+    if (code != OPTIONS_GO) return code;
+    if (f.emit.count > 0 && f.emission != NULL)
+        return options_usage(verb.name, "give --emit or --emission, not both");
+    if (f.sky != NULL && f.weather != NULL)
+        return options_usage(verb.name, "give --sky or --weather, not both");
+    if (f.weather != NULL && !weather_is_named(f.weather))
+        return options_usage(verb.name, "--weather %s: must end in .epw or .wea", f.weather);
+    if (f.weather == NULL && (f.photometric || options_given(&verb, &given, "sun")))
+        return options_usage(verb.name, "--sun and --photometric are for --weather");
+    if (strcmp(f.sun, "exact") != 0 && options_given(&verb, &given, "sun-points"))
+        return options_usage(verb.name, "--sun-points is for --sun exact");
+    if (f.tolerance > 0 && f.annual.count > 0)
+        return options_usage(verb.name, "--tolerance is not for --annual");
+    if (emission_check_items(&f.emit, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
+    if (f.output != NULL && output_check(f.output, f.reduce.count > 0, &error) != LAM_OK)
+        return options_usage(verb.name, "%s", error.message);
+    if (read_year(&f, &year, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
+    /* What a place receives is what a study of daylight asks for. */
+    if (f.quantity == NULL) f.quantity = year.n_figures > 0 ? "irradiance" : "radiosity";
+    reduction reductions[OPTION_LIST_MAX] = {0};
+    for (size_t i = 0; i < f.reduce.count; i++)
+        if (reduce_parse(f.reduce.items[i], &reductions[i], &error) != LAM_OK)
+            return options_usage(verb.name, "%s", error.message);
+    terminal_open(&term, verb.name, false, false);
+    const lam_status status = solve(given.arguments[0], &f, &year, reductions, &term, &error);
+    for (size_t i = 0; i < f.reduce.count; i++) reduce_free(&reductions[i]);
+    return status == LAM_OK ? 0 : terminal_fail(&term, &error);
+}

@@ -1,0 +1,121 @@
+/* lambert verify: tests what a store promises, one line a check. */
+#include "solver/console/options.h"
+#include "solver/verbs/verbs.h"
+#include "solver/verify/verify.h"
+
+#include <jansson.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct fields {
+    uint64_t probes;
+    bool json;
+} fields;
+
+#define FIELD(member) offsetof(fields, member)
+static const option_row rows[] = {
+    {.name = "probes",
+     .kind = OPTION_COUNT,
+     .offset = FIELD(probes),
+     .value = "P",
+     .doc = "Single elements that the error is measured again with (16; 0: not at all)",
+     .low = 0,
+     .high = 1e6},
+    {.name = "json", .kind = OPTION_FLAG, .offset = FIELD(json), .doc = "The checks as JSON"},
+    {0},
+};
+
+static const option_verb verb = {
+    .name = "verify",
+    .arguments = "STORE [SCENE]",
+    .summary =
+        "Check a store: checksums, invariants, its stated error, and whether SCENE is still what it was "
+        "made from. Exit status 1 when something is broken.",
+    .options = rows,
+    .min_arguments = 1,
+    .max_arguments = 2,
+};
+
+static const struct {
+    const char *name;
+    verify_check *run;
+} checks[] = {
+    {"checksums", verify_checksums},
+    {"mesh", verify_mesh},
+    {"form factors", verify_form_factors},
+    {"sky", verify_sky},
+    {"operator", verify_operator},
+    {"linearity", verify_linearity},
+    {"energy", verify_energy},
+    {"error", verify_error},
+    {"scene", verify_scene},
+};
+#define N_CHECKS (sizeof checks / sizeof checks[0])
+
+static const char *const words[] = {"ok", "BROKEN", "skipped"};
+
+static lam_status print_json(const char *path, const check *done, bool broken, lam_error *error) {
+    lam_status status = LAM_OK;
+    json_t *list = json_array();
+    for (size_t i = 0; i < N_CHECKS; i++)
+        json_array_append_new(list, json_pack("{s:s, s:s, s:s}", "name", done[i].name, "result",
+                                              words[done[i].verdict], "detail", done[i].detail));
+    json_t *root = json_pack("{s:s, s:b, s:o}", "store", path, "ok", !broken, "checks", list);
+    char *text = json_dumps(root, JSON_INDENT(2));
+    if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: the result cannot be written as JSON", path);
+    puts(text);
+done:
+    free(text);
+    json_decref(root);
+    return status;
+}
+
+static lam_status verify(const char *path, const fields *f, examination *e, bool *broken, terminal *t,
+                         lam_error *error) {
+    lam_status status = LAM_OK;
+    check done[N_CHECKS] = {0};
+    TRY(store_open(path, &e->s, error));
+    for (size_t i = 0; i < N_CHECKS; i++) {
+        lam_error one = {0};
+        done[i].name = checks[i].name;
+        status = checks[i].run(e, &done[i], &one);
+        terminal_clear(t);
+        if (status != LAM_OK) {
+            *error = one;
+            goto done;
+        }
+        TRY(terminal_check(error));
+        *broken = *broken || done[i].verdict == VERDICT_BROKEN;
+        if (!f->json) {
+            printf("%-8s%-14s%s\n", words[done[i].verdict], done[i].name, done[i].detail);
+            fflush(stdout);
+        }
+    }
+    if (f->json) TRY(print_json(path, done, *broken, error));
+done:
+    return status;
+}
+
+int cmd_verify(int argc, char **argv) {
+    fields f = {.probes = 16};
+    option_result given = {0};
+    lam_error error = {0};
+    terminal term;
+    bool broken = false;
+    int code = options_parse(&verb, argc, argv, &f, &given);
+    if (code != OPTIONS_GO) return code;
+    terminal_open(&term, verb.name, false, false);
+    term.nothing = "not every check was made";
+    const progress how = terminal_progress(&term);
+    examination e = {
+        .scene = given.n_arguments > 1 ? given.arguments[1] : NULL, .probes = f.probes, .progress = &how};
+    const lam_status status = verify(given.arguments[0], &f, &e, &broken, &term, &error);
+    examination_free(&e);
+    if (status != LAM_OK) return terminal_fail(&term, &error);
+    if (broken) {
+        status_fail(&error, LAM_ERR_DAMAGED, "%s: broken, see the checks above", given.arguments[0]);
+        return terminal_fail(&term, &error);
+    }
+    return 0;
+}

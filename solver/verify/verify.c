@@ -1,0 +1,264 @@
+/* Checks of the file and the mesh, the form factors, and the scene it came from. */
+#include "solver/verify/verify.h"
+
+#include "solver/scene/import/import.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+void examination_free(examination *e) {
+    lam_operator_close(e->op);
+    form_factors_free(&e->f);
+    free(e->row_sums);
+    mesh_free(&e->m);
+    store_close(e->s);
+}
+
+void check_say(check *c, verdict v, const char *format, ...) {
+    va_list arguments;
+    c->verdict = v;
+    va_start(arguments, format);
+    vsnprintf(c->detail, sizeof c->detail, format, arguments);
+    va_end(arguments);
+}
+
+lam_status check_failed(check *c, lam_status status, const lam_error *error) {
+    if (status == LAM_OK) return LAM_OK;
+    if (status == LAM_ERR_MEMORY || status == LAM_ERR_CANCELLED || status == LAM_ERR_INTERNAL) return status;
+    check_say(c, VERDICT_BROKEN, "%s", error->message);
+    return LAM_OK;
+}
+
+lam_status verify_checksums(examination *e, check *c, lam_error *error) {
+    check_say(c, VERDICT_OK, "every dataset is as it was written");
+    return check_failed(c, store_verify(e->s, error), error);
+}
+
+/* --- mesh ------------------------------------------------------------------------------------------------
+ */
+
+/* Areas and normals against those of the vertices; the first that differs is named. */
+static lam_status measure_again(const mesh *m, check *c, lam_error *error) {
+    lam_status status = LAM_OK;
+    mesh again = *m;
+    again.area = NULL;
+    again.normal = NULL;
+    TRY(mesh_measure(&again, error));
+    for (size_t i = 0; i < m->n; i++) {
+        /* Stored in double and computed by the same sums: only the last bits may differ. */
+        if (fabs(again.area[i] - m->area[i]) > 1e-9 * again.area[i]) {
+            check_say(c, VERDICT_BROKEN, "area[%zu] = %.9g m2, its vertices give %.9g", i, m->area[i],
+                      again.area[i]);
+            break;
+        }
+        double turned = 0;
+        for (int k = 0; k < 3; k++) turned += (double)again.normal[i][k] * (double)m->normal[i][k];
+        if (fabs(turned - 1) > 1e-5) {
+            check_say(c, VERDICT_BROKEN, "normal[%zu] is not that of its vertices", i);
+            break;
+        }
+    }
+done:
+    free(again.area);
+    free(again.normal);
+    return status;
+}
+
+lam_status verify_mesh(examination *e, check *c, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *recorded = NULL, hash[33];
+    const lam_status loaded = mesh_load(e->s, &e->m, &e->row_sums, error);
+    if (loaded != LAM_OK) return check_failed(c, loaded, error);
+    e->has_mesh = true;
+    const mesh *m = &e->m;
+    check_say(c, VERDICT_OK, "%zu elements, %zu vertices, %zu groups", m->n, m->n_vertices, m->n_groups);
+    TRY(store_get_text(e->s, "/mesh", "geometry_hash", &recorded, error));
+    mesh_geometry_hash(m, hash);
+    if (strcmp(recorded, hash) != 0)
+        check_say(c, VERDICT_BROKEN, "geometry_hash is %.32s, the mesh gives %s", recorded, hash);
+    for (size_t i = 0; i < m->n && c->verdict == VERDICT_OK; i++)
+        if (!(e->row_sums[i] >= 0 && e->row_sums[i] <= 1 + 1e-6))
+            check_say(c, VERDICT_BROKEN, "row_sums[%zu] = %.9g, must be from 0 to 1", i, e->row_sums[i]);
+    for (size_t i = 0; i < m->n_channels * m->n && c->verdict == VERDICT_OK; i++) {
+        const double rho = (double)m->reflectance[i], emitted = (double)m->emission[i];
+        if (!(rho >= 0 && rho < 1))
+            check_say(c, VERDICT_BROKEN, "reflectance[%zu] = %g, must be at least 0 and below 1", i, rho);
+        if (!(emitted >= 0 && isfinite(emitted)))
+            check_say(c, VERDICT_BROKEN, "emission[%zu] = %g, must be at least 0", i, emitted);
+    }
+    if (c->verdict == VERDICT_OK) TRY(measure_again(m, c, error));
+done:
+    free(recorded);
+    return check_failed(c, status, error);
+}
+
+/* --- form factors ----------------------------------------------------------------------------------------
+ */
+
+static int compare_index(const void *a, const void *b) {
+    const uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* F[i][j], by search in row i. */
+static double entry(const csr *F, size_t i, uint32_t j) {
+    const uint32_t *first = F->indices + F->indptr[i];
+    const uint32_t *at =
+        bsearch(&j, first, (size_t)(F->indptr[i + 1] - F->indptr[i]), sizeof j, compare_index);
+    return at == NULL ? 0 : (double)F->data[F->indptr[i] + (uint64_t)(at - first)];
+}
+
+/* Of compressed ones what light that is 1 everywhere brings, within what they say of themselves. */
+static lam_status verify_compressed(examination *e, check *c, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = e->m.n;
+    lam_form_factors *F = NULL;
+    double *one = memory_allocate(n, sizeof *one, "form factors", error), *work = NULL, most;
+    double *sums = memory_allocate(n, sizeof *sums, "form factors", error);
+    double *bound = memory_allocate(n, sizeof *bound, "form factors", error);
+    if (one == NULL || sums == NULL || bound == NULL) TRY(LAM_ERR_MEMORY);
+    status = form_factors_open(e->s, &F, error);
+    if (status != LAM_OK) {
+        status = check_failed(c, status, error);
+        goto done;
+    }
+    /* By S alone: what groups send is kept beside it, and would be all of this light. */
+    compressed_factors *held = F->compressed;
+    held->n_lit = 0;
+    work = memory_allocate(compressed_work(held), sizeof *work, "form factors", error);
+    if (work == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < n; i++) one[i] = 1;
+    compressed_multiply(held, one, sums, work, 1);
+    most = compressed_error(held, one, bound, work);
+    for (size_t i = 0; i < n; i++)
+        if (!(fabs(sums[i] - e->row_sums[i]) <= bound[i] + held->rounding + 1e-6)) {
+            check_say(c, VERDICT_BROKEN, "row %zu sums to %.9g within %.2g, /mesh/row_sums says %.9g", i,
+                      sums[i], bound[i], e->row_sums[i]);
+            goto done;
+        }
+    check_say(c, VERDICT_OK,
+              "compressed, rows sum to what /mesh/row_sums says within their bounds, %.2g at most", most);
+done:
+    lam_form_factors_close(F);
+    free(one);
+    free(sums);
+    free(bound);
+    free(work);
+    return status;
+}
+
+lam_status verify_form_factors(examination *e, check *c, lam_error *error) {
+    bool in_rows = false;
+    if (!e->has_mesh || !store_has(e->s, "/form_factors")) {
+        check_say(c, VERDICT_SKIPPED, e->has_mesh ? "none are kept" : "no mesh to compare with");
+        return LAM_OK;
+    }
+    lam_status loaded = form_factors_in_rows(e->s, &in_rows, error);
+    if (loaded == LAM_OK && !in_rows) return verify_compressed(e, c, error);
+    if (loaded == LAM_OK) loaded = form_factors_load(e->s, &e->m, NULL, &e->f, error);
+    if (loaded == LAM_OK) loaded = form_factors_expand(&e->f, e->m.area, error);
+    if (loaded != LAM_OK) return check_failed(c, loaded, error);
+    const csr *F = &e->f.F;
+    const double *A = e->m.area;
+    double worst = 0;
+    for (size_t i = 0; i < F->n; i++) {
+        double sum = 0;
+        for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++) {
+            const uint32_t j = F->indices[p];
+            const double there = A[i] * (double)F->data[p], back = A[j] * entry(F, j, (uint32_t)i);
+            sum += (double)F->data[p];
+            if (there > 0 || back > 0) worst = fmax(worst, fabs(there - back) / fmax(there, back));
+            if (j == i && F->data[p] > 0) {
+                check_say(c, VERDICT_BROKEN, "F[%zu][%zu] = %g: a plane cannot see itself", i, i,
+                          (double)F->data[p]);
+                return LAM_OK;
+            }
+        }
+        /* Single precision rounds each of the row's entries by 6e-8 of itself. */
+        if (sum > 1 + 1e-6 || fabs(sum - e->row_sums[i]) > 1e-6) {
+            check_say(c, VERDICT_BROKEN, "row %zu sums to %.9g, /mesh/row_sums says %.9g", i, sum,
+                      e->row_sums[i]);
+            return LAM_OK;
+        }
+    }
+    check_say(c, worst <= 1e-6 ? VERDICT_OK : VERDICT_BROKEN,
+              "reciprocity within %.2g (at most 1e-6), rows sum "
+              "to at most 1",
+              worst);
+    return LAM_OK;
+}
+
+/* --- the scene -------------------------------------------------------------------------------------------
+ */
+
+/* Per group: area, then area times reflectance and emission of every channel. Refinement changes none. */
+static double *group_content(const mesh *m, size_t width, lam_error *error) {
+    double *content = memory_allocate(m->n_groups, width * sizeof *content, "groups", error);
+    if (content == NULL) return NULL;
+    for (size_t i = 0; i < m->n; i++) {
+        double *of = content + m->group[i] * width;
+        of[0] += m->area[i];
+        for (size_t k = 0; k < m->n_channels; k++) {
+            of[1 + 2 * k] += m->area[i] * (double)m->reflectance[k * m->n + i];
+            of[2 + 2 * k] += m->area[i] * (double)m->emission[k * m->n + i];
+        }
+    }
+    return content;
+}
+
+/* The same groups with the same materials; sides counts a two-sided face twice. */
+static lam_status compare_groups(const mesh *stored, const mesh *now, check *c, lam_error *error) {
+    lam_status status = LAM_OK;
+    const double sides = stored->two_sided ? 2 : 1;
+    const size_t width = 1 + 2 * stored->n_channels;
+    double *a = NULL, *b = NULL;
+    if (stored->n_groups != now->n_groups || stored->n_channels != now->n_channels) {
+        check_say(c, VERDICT_BROKEN, "stale: %zu groups in %zu channels, the scene has %zu in %zu",
+                  stored->n_groups, stored->n_channels, now->n_groups, now->n_channels);
+        return LAM_OK;
+    }
+    a = group_content(stored, width, error);
+    b = group_content(now, width, error);
+    if (a == NULL || b == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t g = 0; g < stored->n_groups && c->verdict == VERDICT_OK; g++) {
+        bool same = strcmp(stored->group_names[g], now->group_names[g]) == 0;
+        /* Sums over other pieces of the same faces. */
+        for (size_t k = 0; k < width; k++)
+            same = same && fabs(a[g * width + k] - sides * b[g * width + k]) <=
+                               1e-5 * fmax(fabs(a[g * width + k]), 1e-6 * a[g * width]);
+        if (!same)
+            check_say(c, VERDICT_BROKEN, "stale: group %s has another material or size in the scene",
+                      stored->group_names[g]);
+    }
+done:
+    free(a);
+    free(b);
+    return status;
+}
+
+lam_status verify_scene(examination *e, check *c, lam_error *error) {
+    lam_status status = LAM_OK;
+    mesh now = {0};
+    import_report report;
+    double reflectance = -1;
+    if (e->scene == NULL || !e->has_mesh) {
+        check_say(c, VERDICT_SKIPPED, e->scene == NULL ? "no scene given" : "no mesh to compare with");
+        return LAM_OK;
+    }
+    if (store_has_attribute(e->s, "/mesh", "reflectance_given"))
+        TRY(store_get_number(e->s, "/mesh", "reflectance_given", &reflectance, error));
+    const import_options how = {.unit = e->m.unit, .up = e->m.up, .reflectance = reflectance};
+    TRY(scene_import(e->scene, &how, &now, &report, error));
+    check_say(c, VERDICT_OK, "%s has the same geometry and materials", e->scene);
+    if (strcmp(now.source_hash, e->m.source_hash) != 0)
+        check_say(c, VERDICT_BROKEN, "stale: %s has another geometry (%s, stored: %s)", e->scene,
+                  now.source_hash, e->m.source_hash);
+    else
+        TRY(compare_groups(&e->m, &now, c, error));
+done:
+    mesh_free(&now);
+    return check_failed(c, status, error);
+}

@@ -1,0 +1,341 @@
+/* Checks of the operator: finite, linear, energy, and its error measured again. */
+#include "solver/formfactor/pairs/first_light.h"
+#include "solver/method/judge.h"
+#include "solver/operator/emitters.h"
+#include "solver/operator/two_mesh.h"
+#include "solver/precompute/forecast.h"
+#include "solver/precompute/precompute.h"
+#include "solver/verify/verify.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Of what a single-precision product over n terms may round, relative to the largest value. */
+static const double rounding = 1e-5;
+
+/* Numbers of one emission: a channel has one for each element, or, of an operator of emitters, a weight each.
+ */
+static size_t input_size(const examination *e) {
+    const size_t s = lam_operator_emitters(e->op);
+    return e->m.n_channels * (s > 0 ? s : e->m.n);
+}
+
+static lam_status apply(const examination *e, size_t m, lam_quantity quantity, const float *E, float **out,
+                        lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t bytes = lam_operator_work_bytes(e->op, m);
+    float *values = memory_allocate(e->m.n * e->m.n_channels, m * sizeof *values, "a solution", error);
+    void *area = memory_allocate(bytes, 1, "the work area of a solve", error);
+    if (values == NULL || area == NULL) TRY(LAM_ERR_MEMORY);
+    if (lam_operator_emitters(e->op) > 0)
+        TRY(lam_operator_apply_emitters(e->op, m, quantity, E, 0, NULL, values, area, bytes, error));
+    else
+        TRY(lam_operator_apply(e->op, m, quantity, E, values, area, bytes, error));
+    *out = values;
+    values = NULL;
+done:
+    free(values);
+    free(area);
+    return status;
+}
+
+static bool skip(const examination *e, check *c) {
+    if (e->has_mesh && e->op != NULL) return false;
+    check_say(c, VERDICT_SKIPPED, "no operator to test");
+    return true;
+}
+
+/* Of two meshes: every weight is A_j / A_p to single precision (absent ones: areas are equal), or power would
+ * be lost. */
+static void check_patches(const examination *e, check *c) {
+    static const double allowed = 1e-6;
+    operator_patches patches;
+    if (!operator_patches_of(e->op, &patches)) return;
+    for (size_t p = 0; p < patches.k && c->verdict == VERDICT_OK; p++) {
+        const double count = (double)(patches.begin[p + 1] - patches.begin[p]);
+        double area = 0;
+        for (uint64_t j = patches.begin[p]; j < patches.begin[p + 1]; j++)
+            area += e->m.area[patches.order != NULL ? patches.order[j] : j];
+        for (uint64_t j = patches.begin[p]; j < patches.begin[p + 1] && c->verdict == VERDICT_OK; j++) {
+            const size_t i = patches.order != NULL ? patches.order[j] : (size_t)j;
+            const double weight = patches.weight != NULL ? (double)patches.weight[j] : 1 / count;
+            if (!(fabs(weight * area / e->m.area[i] - 1) <= allowed))
+                check_say(c, VERDICT_BROKEN, "element %zu weighs %.7g in patch %zu, its area is %.7g of it",
+                          i, weight, p, e->m.area[i] / area);
+        }
+    }
+}
+
+lam_status verify_operator(examination *e, check *c, lam_error *error) {
+    static const lam_quantity quantities[] = {LAM_RADIOSITY, LAM_IRRADIANCE, LAM_INDIRECT};
+    lam_status status = LAM_OK;
+    float *E = NULL, *out = NULL;
+    operator_description about;
+    if (!e->has_mesh) {
+        check_say(c, VERDICT_SKIPPED, "no mesh to light");
+        return LAM_OK;
+    }
+    TRY(operator_load(e->s, &e->op, error));
+    operator_describe(e->op, &about);
+    check_say(c, VERDICT_OK, "%s, %s, %zu bytes, finite", lam_operator_kind(e->op),
+              about.precision != NULL ? about.precision : "f32", about.bytes);
+    check_patches(e, c);
+    /* Light everywhere: a value that is not finite anywhere in the operator shows in the answer. */
+    const size_t count = e->m.n * e->m.n_channels, inputs = input_size(e);
+    E = memory_allocate(inputs, sizeof *E, "an emission", error);
+    if (E == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < inputs; i++) E[i] = 1;
+    for (size_t q = 0; q < 3 && c->verdict == VERDICT_OK; q++) {
+        free(out);
+        out = NULL;
+        TRY(apply(e, 1, quantities[q], E, &out, error));
+        for (size_t i = 0; i < count && c->verdict == VERDICT_OK; i++)
+            if (!isfinite(out[i]))
+                check_say(c, VERDICT_BROKEN, "the answer of element %zu is not finite", i % e->m.n);
+    }
+done:
+    free(E);
+    free(out);
+    return check_failed(c, status, error);
+}
+
+lam_status verify_linearity(examination *e, check *c, lam_error *error) {
+    lam_status status = LAM_OK;
+    float *E = NULL, *out = NULL;
+    if (skip(e, c)) return LAM_OK;
+    const size_t count = e->m.n * e->m.n_channels, inputs = input_size(e);
+    uint64_t state = 1;
+    E = memory_allocate(inputs, 3 * sizeof *E, "emissions", error);
+    if (E == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < inputs; i++) {
+        E[i] = (float)(precompute_seed(state, 1) >> 40) * 0x1p-24f;
+        E[inputs + i] = (float)(precompute_seed(state, 2) >> 40) * 0x1p-24f;
+        E[2 * inputs + i] = E[i] + 2 * E[inputs + i];
+        state++;
+    }
+    TRY(apply(e, 3, LAM_RADIOSITY, E, &out, error));
+    double worst = 0, largest = 0;
+    for (size_t i = 0; i < count; i++) {
+        const double expected = (double)out[i] + 2 * (double)out[count + i];
+        worst = fmax(worst, fabs((double)out[2 * count + i] - expected));
+        largest = fmax(largest, fabs(expected));
+    }
+    check_say(c, worst <= rounding * largest ? VERDICT_OK : VERDICT_BROKEN,
+              "M(E1 + 2 E2) = M E1 + 2 M E2 within %.2g of the largest (at most %g)",
+              largest > 0 ? worst / largest : 0, rounding);
+done:
+    free(E);
+    free(out);
+    return check_failed(c, status, error);
+}
+
+static bool stated(store *s, const char *group, const char *name, double *value) {
+    return store_has(s, group) && store_has_attribute(s, group, name) &&
+           store_get_number(s, group, name, value, NULL) == LAM_OK;
+}
+
+/* How far the power may be out of balance; negative when the store states nothing. For the scene's own light
+ * the store says it; for light everywhere it follows from the error of all-over light: off by h in H is off
+ * by sum A (1 - rho s) h <= |A|^1/2 |h|, twice because the stated error weighs H by the reflectance. */
+static double allowed_imbalance(store *s, bool own, double emitted, double area, double received) {
+    double value;
+    if (own && stated(s, "/error/lights", "energy_balance", &value))
+        return (1.1 * value + rounding) * emitted;
+    if (!own && stated(s, "/error/random", "operator_indirect_max", &value))
+        return 2 * value * sqrt(area * received) + rounding * emitted;
+    return -1;
+}
+
+/* What is tested for its energy: the scene's own light, or light everywhere, or all emitters at once, whose
+ * sky counts as what the elements reflect of it (E + rho H0) and is taken out of what they receive. */
+typedef struct lit {
+    bool own;
+    const char *name;
+    float *input, *E, *H0; /* H0 NULL: no sky */
+} lit;
+
+static lam_status light_up(const examination *e, lit *l, lam_error *error) {
+    lam_status status = LAM_OK;
+    const mesh *m = &e->m;
+    const size_t count = m->n * m->n_channels, inputs = input_size(e);
+    l->E = memory_allocate(count, sizeof *l->E, "an emission", error);
+    l->input = memory_allocate(inputs, sizeof *l->input, "an emission", error);
+    if (l->E == NULL || l->input == NULL) TRY(LAM_ERR_MEMORY);
+    if (lam_operator_emitters(e->op) > 0) {
+        l->name = "all emitters";
+        l->H0 = memory_allocate(count, sizeof *l->H0, "an emission", error);
+        if (l->H0 == NULL) TRY(LAM_ERR_MEMORY);
+        for (size_t k = 0; k < inputs; k++) l->input[k] = 1;
+        TRY(operator_emitters_light(e->op, 1, l->input, l->E, l->H0, error));
+        for (size_t i = 0; i < count; i++) l->E[i] += m->reflectance[i] * l->H0[i];
+        goto done;
+    }
+    for (size_t i = 0; i < count; i++) l->own = l->own || m->emission[i] > 0;
+    for (size_t i = 0; i < count; i++) l->input[i] = l->E[i] = l->own ? m->emission[i] : 1;
+    l->name = l->own ? "the scene's own light" : "light everywhere";
+done:
+    return status;
+}
+
+/* sum A E = sum A [(1 - rho) H + B (1 - s)], s the row sums: what is emitted is absorbed or leaves. */
+lam_status verify_energy(examination *e, check *c, lam_error *error) {
+    lam_status status = LAM_OK;
+    float *B = NULL, *H = NULL;
+    lit light = {.own = false};
+    if (skip(e, c)) return LAM_OK;
+    const mesh *m = &e->m;
+    const size_t count = m->n * m->n_channels;
+    double emitted = 0, accounted = 0, area = 0, received = 0;
+    TRY(light_up(e, &light, error));
+    TRY(apply(e, 1, LAM_RADIOSITY, light.input, &B, error));
+    TRY(apply(e, 1, LAM_IRRADIANCE, light.input, &H, error));
+    for (size_t i = 0; i < count; i++) {
+        const double direct = light.H0 != NULL ? (double)light.H0[i] : 0;
+        const double a = m->area[i % m->n], h = (double)H[i] - direct;
+        emitted += a * (double)light.E[i];
+        accounted += a * ((1 - (double)m->reflectance[i]) * h + (double)B[i] * (1 - e->row_sums[i % m->n]));
+        area += a;
+        received += a * h * h;
+    }
+    const double off = fabs(emitted - accounted);
+    const double allowed = allowed_imbalance(e->s, light.own, emitted, area, received);
+    if (allowed < 0)
+        check_say(c, VERDICT_SKIPPED, "off by %.2g of the power; the store states no error to compare with",
+                  off / emitted);
+    else
+        check_say(c, off <= allowed ? VERDICT_OK : VERDICT_BROKEN,
+                  "emitted = absorbed + left within %.2g of %s (at most %.2g)", off / emitted, light.name,
+                  allowed / emitted);
+done:
+    free(light.E);
+    free(light.H0);
+    free(light.input);
+    free(B);
+    free(H);
+    return check_failed(c, status, error);
+}
+
+/* --- error -----------------------------------------------------------------------------------------------
+ */
+
+/* One figure, stated and measured again over n probes of another draw: means differ by the standard error of
+ * either, lights (one probe) by the noise of the samples they were measured against. */
+static void compare_figure(store *s, const char *group, const char *against, const error_figures *again,
+                           size_t probes, double noise, check *c) {
+    char key[64];
+    double mean, std, max;
+    char path[32];
+    const char *const ends[] = {"mean", "std", "max"};
+    double *const values[] = {&mean, &std, &max};
+    snprintf(path, sizeof path, "/error/%s", group);
+    for (int k = 0; k < 3; k++) {
+        snprintf(key, sizeof key, "%s_indirect_%s", against, ends[k]);
+        if (!store_has(s, path) || store_get_number(s, path, key, values[k], NULL) != LAM_OK) return;
+    }
+    const double spread = fmax(std, again->std) / sqrt((double)probes);
+    const double allowed = 1.1 * mean + 6 * spread + 3 * noise + rounding;
+    if (!(again->mean <= allowed))
+        check_say(c, VERDICT_BROKEN, "%s: %s indirect error %.3g, stated %.3g (at most %.3g)", group, against,
+                  again->mean, mean, allowed);
+}
+
+/* A hemicube's judge takes as many rays as precompute does at defaults for the recorded epsilon: with other
+ * options it may have taken others, and compare_figure allows for the noise that goes with the number. */
+static size_t judge_rays(const examination *e) {
+    double epsilon = .05;
+    if (store_has_attribute(e->s, "/operator", "epsilon") &&
+        store_get_number(e->s, "/operator", "epsilon", &epsilon, NULL) != LAM_OK)
+        epsilon = .05;
+    return recipe_auto_rays(epsilon, .25);
+}
+
+static lam_status read_recipe(examination *e, recipe *out, lam_error *error) {
+    if (e->f.F.indptr == NULL) return recipe_load(e->s, &recipe_of_operator, out, error);
+    *out = e->f.recipe;
+    return LAM_OK;
+}
+
+/* Purposes 1 to 3 belong to precompute: the samples of these are new to the operator and to its figures. */
+static recipe recipe_again(const examination *e, const recipe *of, uint64_t half) {
+    return recipe_of_judge(of, judge_rays(e), precompute_seed(of->seed, 11 + half));
+}
+
+static lam_status measure_again(examination *e, const recipe *from, error_report *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}}, mean = {.row_sums = NULL};
+    form_factor_options how = {.recipe = *from, .progress = e->progress, .stage = "form factors"};
+    first_light *first = NULL;
+    uint32_t *order = memory_allocate(e->m.n, sizeof *order, "the order of the elements", error);
+    if (order == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(mesh_z_order(&e->m, order, error));
+    if (e->f.F.indptr == NULL) TRY(form_factors_make(&e->m, order, &how, &e->f, error));
+    for (uint64_t h = 0; h < 2; h++) {
+        how.recipe = recipe_again(e, from, h);
+        TRY(form_factors_make(&e->m, order, &how, &half[h], error));
+    }
+    TRY(form_factors_mean(&half[0], &half[1], &mean, error));
+    const build_problem problem = {.n = e->m.n,
+                                   .n_channels = e->m.n_channels,
+                                   .area = e->m.area,
+                                   .reflectance = e->m.reflectance,
+                                   .F = &e->f.F,
+                                   .order = order};
+    if (recipe_noise(from) > 0)
+        TRY(first_light_create(&e->m, precompute_seed(from->seed, 14), &first, error));
+    const judge_input input = {.problem = &problem,
+                               .row_sums = e->f.row_sums,
+                               .first_light = first != NULL ? first_light_for_judge : NULL,
+                               .first_light_context = first,
+                               .emission = e->m.emission,
+                               .independent = &mean.F,
+                               .halves = {&half[0].F, &half[1].F},
+                               .probes = e->probes,
+                               .seed = precompute_seed(from->seed, 13),
+                               .progress = e->progress};
+    TRY(judge_operator(e->op, &input, out, error));
+done:
+    first_light_destroy(first);
+    free(order);
+    form_factors_free(&half[0]);
+    form_factors_free(&half[1]);
+    form_factors_free(&mean);
+    return status;
+}
+
+lam_status verify_error(examination *e, check *c, lam_error *error) {
+    lam_status status = LAM_OK;
+    error_report again = {.seconds = 0};
+    recipe from = {.rays = 0};
+    if (skip(e, c)) return LAM_OK;
+    if (e->probes == 0 || !store_has(e->s, "/error/single")) {
+        check_say(c, VERDICT_SKIPPED, e->probes == 0 ? "not measured again (--probes 0)" : "none is stated");
+        return LAM_OK;
+    }
+    if (e->probes > e->m.n) e->probes = e->m.n;
+    TRY(read_recipe(e, &from, error));
+    const uint64_t available = memory_available();
+    const forecast f = {.n = e->m.n,
+                        .n_channels = e->m.n_channels,
+                        .recipe = from,
+                        .judge_recipe = recipe_again(e, &from, 0),
+                        .probes = e->probes,
+                        .rank = 1};
+    if (available > 0) TRY(forecast_check(&f, .7 * (double)available, error));
+    TRY(measure_again(e, &from, &again, error));
+    check_say(c, VERDICT_OK, "single elements: total indirect %.3g, operator indirect %.3g, as stated",
+              again.single.total_indirect.mean, again.single.operator_indirect.mean);
+    const struct {
+        const char *name;
+        const error_group *group;
+    } groups[] = {{"single", &again.single}, {"lights", &again.lights}, {"random", &again.random}};
+    for (size_t i = 0; i < sizeof groups / sizeof groups[0]; i++) {
+        const error_group *g = groups[i].group;
+        if (g->probes == 0) continue;
+        compare_figure(e->s, groups[i].name, "total", &g->total_indirect, g->probes, g->reference_noise, c);
+        compare_figure(e->s, groups[i].name, "operator", &g->operator_indirect, g->probes, 0, c);
+    }
+done:
+    return check_failed(c, status, error);
+}

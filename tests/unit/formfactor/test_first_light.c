@@ -1,0 +1,105 @@
+/* The light of few elements: against exact form factors where nothing is between, and those of all pairs
+ * where there is. */
+#include "solver/bench/scenes.h"
+#include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/pairs/first_light.h"
+#include "support/box_problem.h"
+#include "support/dense.h"
+#include "support/scene.h"
+
+#include <math.h>
+
+static lam_error error;
+
+#define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
+
+/* |H - F E| over |F E|, by area. */
+static double off(const mesh *m, const csr *F, const float *E) {
+    first_light *l = NULL;
+    double *H = test_allocate(m->n, sizeof *H), wrong = 0, all = 0;
+    bool known = false;
+    ck_ok(first_light_create(m, 1, &l, &error));
+    ck_ok(first_light_of(l, E, H, &known, &error));
+    ck_assert(known);
+    for (size_t i = 0; i < m->n; i++) {
+        double truth = 0;
+        for (uint64_t e = F->indptr[i]; e < F->indptr[i + 1]; e++)
+            truth += (double)F->data[e] * (double)E[F->indices[e]];
+        wrong += m->area[i] * (H[i] - truth) * (H[i] - truth);
+        all += m->area[i] * truth * truth;
+    }
+    first_light_destroy(l);
+    free(H);
+    return sqrt(wrong / all);
+}
+
+/* One element; a patch of 100; a whole wall, in which some are brighter. */
+START_TEST(a_box) {
+    fixture f = fixture_box(room, 12, .5f);
+    float *E = test_allocate(f.m.n, sizeof *E);
+    E[200] = 3;
+    /* A relative tolerance of 1e-5 a pair, single precision in F. */
+    ck_assert_double_lt(off(&f.m, &f.F, E), 2e-5);
+    for (size_t i = 150; i < 250; i++) E[i] = 1 + (float)(i % 3);
+    ck_assert_double_lt(off(&f.m, &f.F, E), .003);
+    for (size_t i = 0; i < 280; i++) E[i] = 1 + (float)(i % 7);
+    ck_assert_double_lt(off(&f.m, &f.F, E), .003);
+    free(E);
+    fixture_free(&f);
+}
+END_TEST
+
+START_TEST(shadows) {
+    const generate_options how = {.kind = "cornell", .elements = 2000, .reflectance = .5, .seed = 1};
+    const form_factor_options options = {
+        .recipe = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 7e-6, .seed = 3}};
+    mesh m;
+    form_factors f;
+    ck_ok(scene_generated(&how, &m, &error));
+    uint32_t *order = test_allocate(m.n, sizeof *order);
+    float *E = test_allocate(m.n, sizeof *E);
+    ck_ok(mesh_z_order(&m, order, &error));
+    ck_ok(form_factors_make(&m, order, &options, &f, &error));
+    E[order[m.n / 3]] = 1;
+    ck_assert_double_lt(off(&m, &f.F, E), .01);
+    for (size_t k = 0; k < 300; k++) E[order[m.n / 2 + k]] = 1;
+    ck_assert_double_lt(off(&m, &f.F, E), .02);
+    form_factors_free(&f);
+    mesh_free(&m);
+    free(order);
+    free(E);
+}
+END_TEST
+
+/* Of too many nothing is said, and nothing written. */
+START_TEST(too_many) {
+    mesh m = box_mesh(unit_cube, 53, .5f); /* 16,854 elements */
+    first_light *l = NULL;
+    float *E = test_allocate(m.n, sizeof *E);
+    double *H = test_allocate(m.n, sizeof *H);
+    bool known = true;
+    for (size_t i = 0; i < m.n; i++) {
+        E[i] = 1;
+        H[i] = 77;
+    }
+    ck_ok(first_light_create(&m, 1, &l, &error));
+    ck_ok(first_light_of(l, E, H, &known, &error));
+    ck_assert(!known);
+    for (size_t i = 0; i < m.n; i++) ck_each(H[i] == 77);
+    first_light_destroy(l);
+    free(E);
+    free(H);
+    mesh_free(&m);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("the light of few");
+    TCase *tests = tcase_create("light");
+    tcase_set_timeout(tests, 300);
+    tcase_add_test(tests, a_box);
+    tcase_add_test(tests, shadows);
+    tcase_add_test(tests, too_many);
+    suite_add_tcase(suite, tests);
+    return suite_run(suite);
+}

@@ -1,0 +1,282 @@
+/* Emissions by group, by file, and the figures over groups, on a mesh made by hand. */
+#include "solver/light/emission.h"
+#include "solver/light/npy_file.h"
+#include "solver/light/result_figures.h"
+#include "support/suite.h"
+
+#include <math.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { N = 4, N_TILES = 2 };
+
+static double area[N] = {1, 2, 3, 4};
+static uint32_t group[N] = {0, 1, 1, 2};
+static char *names[] = {(char[]){"lamp"}, (char[]){"table.top"}, (char[]){"table.leg"}};
+static float dark[3 * N];
+
+static mesh hand_made(size_t n_channels) {
+    return (mesh){.n = N,
+                  .area = area,
+                  .group = group,
+                  .n_groups = 3,
+                  .group_names = names,
+                  .n_channels = n_channels,
+                  .emission = dark};
+}
+
+static lam_status by_groups(const mesh *m, const char *one, const char *two, emission *e, lam_error *error) {
+    option_list items = {.items = {one, two}, .count = two == NULL ? 1 : 2};
+    return emission_from_groups(m, &items, e, error);
+}
+
+START_TEST(test_groups) {
+    const mesh m = hand_made(1), colour = hand_made(3);
+    emission e = {0};
+    lam_error error;
+    ck_assert_int_eq(by_groups(&m, "lamp=2", "table=3", &e, &error), LAM_OK);
+    ck_assert(e.n_vectors == 1 && !e.batch);
+    ck_assert_mem_eq(e.E, ((float[]){2, 3, 3, 3}), 4 * sizeof(float));
+    emission_free(&e);
+    ck_assert_int_eq(by_groups(&m, "table.leg=1", "table.leg=5", &e, &error), LAM_OK);
+    ck_assert_mem_eq(e.E, ((float[]){0, 0, 0, 5}), 4 * sizeof(float));
+    emission_free(&e);
+    ck_assert_int_eq(by_groups(&colour, "lamp=1,2,3", "table=4", &e, &error), LAM_OK);
+    ck_assert_mem_eq(e.E, ((float[]){1, 4, 4, 4, 2, 4, 4, 4, 3, 4, 4, 4}), 12 * sizeof(float));
+    emission_free(&e);
+    static const char *const bad[] = {"tab=1", "table.=1", "lamp",     "=1",
+                                      "lamp=", "lamp=-1",  "lamp=1,2", "lamp=1e39"};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        ck_assert_msg(by_groups(&colour, bad[i], NULL, &e, &error) == LAM_ERR_ARGUMENT, "'%s' was read",
+                      bad[i]);
+        ck_assert_ptr_null(e.E);
+    }
+}
+END_TEST
+
+static lam_status by_json(const mesh *m, const char *text, emission *e, lam_error *error) {
+    char path[] = "/tmp/test-emission-XXXXXX.json";
+    int descriptor = mkstemps(path, 5);
+    ck_assert_int_ge(descriptor, 0);
+    ck_assert_int_eq(write(descriptor, text, strlen(text)), (ssize_t)strlen(text));
+    close(descriptor);
+    lam_status status = emission_read(path, m, (emission_sources){.n_tiles = N_TILES}, e, error);
+    unlink(path);
+    return status;
+}
+
+START_TEST(test_json) {
+    static const struct {
+        size_t n_channels, n_vectors;
+        bool batch;
+        const char *text;
+        float E[12];
+    } good[] = {
+        {1, 1, false, "[1,2,3,4]", {1, 2, 3, 4}},
+        {1, 1, false, "[[1,2,3,4]]", {1, 2, 3, 4}},
+        {1, 2, true, "[[1,2,3,4],[5,6,7,8]]", {1, 2, 3, 4, 5, 6, 7, 8}},
+        {3, 1, false, "[1,2,3,4]", {1, 2, 3, 4, 1, 2, 3, 4, 1, 2, 3, 4}},
+        {3, 1, false, "[[1,2,3,4],[5,6,7,8],[9,1,2,3]]", {1, 2, 3, 4, 5, 6, 7, 8, 9, 1, 2, 3}},
+        {1, 1, false, "{\"elements\":[3,0],\"values\":[5,[6]]}", {6, 0, 0, 5}},
+        {3, 1, false, "{\"elements\":[1],\"values\":[[1,2,3]]}", {0, 1, 0, 0, 0, 2, 0, 0, 0, 3, 0, 0}},
+        {1, 1, false, "{\"groups\":{\"table\":2,\"lamp\":1}}", {1, 2, 2, 2}},
+        {1, 1, false, "{\"emission\":{\"groups\":{\"lamp\":1}}}", {1}},
+        {1, 2, true, "{\"emissions\":[[1,0,0,0],{\"groups\":{\"lamp\":7}}]}", {1, 0, 0, 0, 7}},
+        {1, 1, true, "{\"emissions\":[[1,0,0,0]]}", {1}},
+    };
+    static const char *const bad[] = {"",
+                                      "7",
+                                      "null",
+                                      "{}",
+                                      "[]",
+                                      "[1,2,3]",
+                                      "[1,2,3,-4]",
+                                      "[1,2,3,1e39]",
+                                      "[1,2,3,\"4\"]",
+                                      "[[1,2],[3,4]]",
+                                      "[1,2,3,NaN]",
+                                      "{\"elements\":[4],\"values\":[1]}",
+                                      "{\"elements\":[-1],\"values\":[1]}",
+                                      "{\"elements\":[1.5],\"values\":[1]}",
+                                      "{\"elements\":[1]}",
+                                      "{\"values\":[1]}",
+                                      "{\"elements\":[1],\"values\":[1,2]}",
+                                      "{\"elements\":[1],\"values\":[[1,2]]}",
+                                      "{\"groups\":[1]}",
+                                      "{\"groups\":{\"none\":1}}",
+                                      "{\"groups\":{\"lamp\":null}}",
+                                      "{\"groups\":{},\"elements\":[],\"values\":[]}",
+                                      "{\"sky\":[1]}",
+                                      "{\"sky\":[1,2,3]}",
+                                      "{\"sky\":[1,-2]}",
+                                      "{\"sky\":[1,null]}",
+                                      "{\"sky\":[1,[1,2]]}",
+                                      "{\"sky\":7}",
+                                      "{\"sky\":[1,2],\"emitters\":[1]}",
+                                      "{\"sky\":[1,2],\"values\":[1]}",
+                                      "{\"sky\":[1,2],\"other\":1}",
+                                      "{\"emitters\":[1]}",
+                                      "{\"emissions\":[]}",
+                                      "{\"emissions\":{}}",
+                                      "{\"emission\":[1,2,3,4],\"emissions\":[[1,2,3,4]]}",
+                                      "{\"groups\":{\"lamp\":1},\"other\":1}",
+                                      "[1,2,3,4]x"};
+    lam_error error;
+    for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
+        const mesh m = hand_made(good[i].n_channels);
+        emission e = {0};
+        ck_assert_msg(by_json(&m, good[i].text, &e, &error) == LAM_OK, "%s: %s", good[i].text, error.message);
+        ck_assert_uint_eq(e.n_vectors, good[i].n_vectors);
+        ck_assert_int_eq(e.batch, good[i].batch);
+        ck_assert_mem_eq(e.E, good[i].E, e.n_vectors * m.n_channels * N * sizeof(float));
+        emission_free(&e);
+    }
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        const mesh m = hand_made(1);
+        emission e = {0};
+        ck_assert_msg(by_json(&m, bad[i], &e, &error) != LAM_OK, "was read: %s", bad[i]);
+        ck_assert_ptr_null(e.E);
+        ck_assert_ptr_nonnull(strstr(error.message, ".json"));
+    }
+}
+END_TEST
+
+START_TEST(test_json_skies) {
+    const mesh m = hand_made(1), colour = hand_made(3);
+    emission e = {0};
+    lam_error error;
+    ck_assert_int_eq(by_json(&m, "[1,2,3,4]", &e, &error), LAM_OK);
+    ck_assert_ptr_null(e.L);
+    emission_free(&e);
+    ck_assert_int_eq(by_json(&m, "{\"sky\":[5,6]}", &e, &error), LAM_OK);
+    ck_assert_mem_eq(e.E, ((float[N]){0}), sizeof(float[N]));
+    ck_assert_mem_eq(e.L, ((float[]){5, 6}), 2 * sizeof(float));
+    emission_free(&e);
+    ck_assert_int_eq(by_json(&colour, "{\"sky\":[5,[6,7,8]],\"groups\":{\"lamp\":1}}", &e, &error), LAM_OK);
+    ck_assert_mem_eq(e.E, ((float[]){1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}), 12 * sizeof(float));
+    ck_assert_mem_eq(e.L, ((float[]){5, 6, 5, 7, 5, 8}), 6 * sizeof(float));
+    emission_free(&e);
+    /* In a batch one without a sky is under a dark one. */
+    ck_assert_int_eq(by_json(&m,
+                             "{\"emissions\":[[1,2,3,4],{\"elements\":[1],\"values\":[9],\"sky\":[5,6]},"
+                             "{\"groups\":{\"lamp\":7}}]}",
+                             &e, &error),
+                     LAM_OK);
+    ck_assert_mem_eq(e.E, ((float[]){1, 2, 3, 4, 0, 9, 0, 0, 7, 0, 0, 0}), 12 * sizeof(float));
+    ck_assert_mem_eq(e.L, ((float[]){0, 0, 5, 6, 0, 0}), 6 * sizeof(float));
+    emission_free(&e);
+}
+END_TEST
+
+/* Puts three dark emissions, or one, under a sky of this shape whose values count from 1. */
+static lam_status under_sky(const mesh *m, size_t n_vectors, int rank, const size_t *dims, emission *e,
+                            lam_error *error) {
+    char path[] = "/tmp/test-emission-XXXXXX.npy";
+    float values[64];
+    int descriptor = mkstemps(path, 4);
+    FILE *stream = fdopen(descriptor, "wb");
+    for (size_t i = 0; i < 64; i++) values[i] = (float)(i + 1);
+    npy_write(stream, rank, dims, values);
+    ck_assert_int_eq(fclose(stream), 0);
+    *e = (emission){.n_vectors = n_vectors};
+    ck_assert_int_eq(emission_allocate(path, m->n_channels, N, n_vectors, &e->E, error), LAM_OK);
+    e->E[1] = 3;
+    const lam_status status = emission_add_sky(e, path, m, N_TILES, error);
+    unlink(path);
+    return status;
+}
+
+START_TEST(test_skies_from_files) {
+    const mesh m = hand_made(1), colour = hand_made(3);
+    emission e;
+    lam_error error;
+    ck_assert_int_eq(under_sky(&m, 1, 1, (size_t[]){2}, &e, &error), LAM_OK);
+    ck_assert(e.n_vectors == 1 && !e.batch);
+    ck_assert_mem_eq(e.L, ((float[]){1, 2}), 2 * sizeof(float));
+    emission_free(&e);
+    ck_assert_int_eq(under_sky(&colour, 1, 1, (size_t[]){2}, &e, &error), LAM_OK);
+    ck_assert_mem_eq(e.L, ((float[]){1, 2, 1, 2, 1, 2}), 6 * sizeof(float));
+    emission_free(&e);
+    ck_assert_int_eq(under_sky(&colour, 1, 2, (size_t[]){3, 2}, &e, &error), LAM_OK);
+    ck_assert(e.n_vectors == 1 && !e.batch);
+    ck_assert_mem_eq(e.L, ((float[]){1, 2, 3, 4, 5, 6}), 6 * sizeof(float));
+    emission_free(&e);
+    /* One emission under two skies. */
+    ck_assert_int_eq(under_sky(&m, 1, 2, (size_t[]){2, 2}, &e, &error), LAM_OK);
+    ck_assert(e.n_vectors == 2 && e.batch);
+    ck_assert_mem_eq(e.L, ((float[]){1, 2, 3, 4}), 4 * sizeof(float));
+    ck_assert(e.steady);
+    ck_assert_mem_eq(e.E, ((float[]){0, 3, 0, 0}), 4 * sizeof(float));
+    emission_free(&e);
+    /* Three emissions under one sky, and under three. */
+    ck_assert_int_eq(under_sky(&m, 3, 1, (size_t[]){2}, &e, &error), LAM_OK);
+    ck_assert(!e.steady);
+    ck_assert_mem_eq(e.L, ((float[]){1, 2, 1, 2, 1, 2}), 6 * sizeof(float));
+    emission_free(&e);
+    ck_assert_int_eq(under_sky(&colour, 3, 3, (size_t[]){3, 3, 2}, &e, &error), LAM_OK);
+    ck_assert_float_eq(e.L[17], 18);
+    emission_free(&e);
+    static const struct {
+        size_t n_channels, n_vectors;
+        int rank;
+        size_t dims[3];
+        const char *says;
+    } bad[] = {{1, 1, 1, {3}, "rows of 3 values, the store has 2 tiles"},
+               {3, 1, 2, {2, 2}, "shape"},
+               {1, 3, 2, {2, 2}, "2 skies beside 3 emissions"},
+               {1, 1, 2, {0, 2}, "empty"}};
+    for (size_t k = 0; k < sizeof bad / sizeof bad[0]; k++) {
+        const mesh *of = bad[k].n_channels == 1 ? &m : &colour;
+        ck_assert_int_eq(under_sky(of, bad[k].n_vectors, bad[k].rank, bad[k].dims, &e, &error),
+                         LAM_ERR_ARGUMENT);
+        ck_assert_msg(strstr(error.message, bad[k].says) != NULL, "%s", error.message);
+        ck_assert_ptr_null(e.L);
+        emission_free(&e);
+    }
+}
+END_TEST
+
+START_TEST(test_reduce) {
+    const mesh m = hand_made(1);
+    const float x[N] = {9, 1, 3, 2};
+    reduction r = {0};
+    lam_error error;
+    double out[REDUCE_COUNT];
+    ck_assert_int_eq(reduce_parse("table=mean,variance", &r, &error), LAM_OK);
+    ck_assert(r.wanted[REDUCE_MEAN] && r.wanted[REDUCE_VARIANCE] && !r.wanted[REDUCE_SUM]);
+    ck_assert_int_eq(reduce_bind(&r, &m, &error), LAM_OK);
+    reduce_compute(&m, r.inside, x, out);
+    /* areas 2, 3, 4 and values 1, 3, 2: sum 19, mean 19/9 */
+    ck_assert_double_eq_tol(out[REDUCE_SUM], 19, 1e-12);
+    ck_assert_double_eq_tol(out[REDUCE_MEAN], 19. / 9, 1e-12);
+    ck_assert_double_eq(out[REDUCE_MIN], 1);
+    ck_assert_double_eq(out[REDUCE_MAX], 3);
+    ck_assert_double_eq_tol(out[REDUCE_UNIFORMITY], 9. / 19, 1e-12);
+    /* (2 + 27 + 16)/9 - (19/9)^2 */
+    ck_assert_double_eq_tol(out[REDUCE_VARIANCE], 5 - 361. / 81, 1e-12);
+    const bool none[3] = {false, false, false};
+    reduce_compute(&m, none, x, out);
+    ck_assert(isnan(out[REDUCE_MEAN]) && isnan(out[REDUCE_MIN]));
+    reduce_free(&r);
+    static const char *const bad[] = {
+        "table", "=mean", "table=", "table=mean,", "table=median", "table=mean;max"};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        ck_assert_msg(reduce_parse(bad[i], &r, &error) == LAM_ERR_ARGUMENT, "'%s' was read", bad[i]);
+    ck_assert_int_eq(reduce_parse("chair=mean", &r, &error), LAM_OK);
+    ck_assert_int_eq(reduce_bind(&r, &m, &error), LAM_ERR_ARGUMENT);
+    reduce_free(&r);
+}
+END_TEST
+
+int main(void) {
+    Suite *s = suite_create("emission");
+    TCase *c = tcase_create("all");
+    tcase_set_timeout(c, 60);
+    tcase_add_test(c, test_groups);
+    tcase_add_test(c, test_json);
+    tcase_add_test(c, test_json_skies);
+    tcase_add_test(c, test_skies_from_files);
+    tcase_add_test(c, test_reduce);
+    suite_add_tcase(s, c);
+    return suite_run(s);
+}

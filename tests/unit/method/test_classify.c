@@ -1,0 +1,281 @@
+/* What decides the kind of an operator: rows of inverses, how much of them may go, and the choice. */
+#include "solver/method/classify.h"
+#include "solver/method/reference.h"
+#include "solver/method/sparse/sparse_inverse.h"
+#include "support/box_problem.h"
+
+#include <math.h>
+#include <string.h>
+
+/* A room whose elements reflect unlike, some not at all. */
+static fixture uneven_room(void) {
+    fixture f = fixture_box(room, 4, .5f);
+    for (size_t i = 0; i < f.m.n; i++) f.m.reflectance[i] = i % 7 == 0 ? 0 : .3f + .1f * (float)(i % 5);
+    return f;
+}
+
+/* Rows against columns of the inverse by LU in double. A row of what does not reflect is kept as if it did.
+ * Allowed is what conjugate gradients to 1e-5 leave, of the largest entry. */
+START_TEST(rows_are_those_of_the_inverse) {
+    fixture f = uneven_room();
+    const build_problem *p = problem_of(&f);
+    const size_t n = p->n;
+    lam_error error = {0};
+    inverse_rows rows;
+    reference *r = NULL;
+    double *E = calloc(n * n, sizeof *E), *B = calloc(n * n, sizeof *B), *H = calloc(n * n, sizeof *H);
+    for (size_t j = 0; j < n; j++) E[j * n + j] = 1;
+    ck_assert_msg(inverse_rows_find(p, p->reflectance, NULL, &rows, &error) == LAM_OK, "%s", error.message);
+    ck_assert_int_eq(reference_create(p->F, p->area, p->reflectance, REFERENCE_DENSE, &r, &error), LAM_OK);
+    ck_assert_int_eq(reference_solve(r, n, E, B, 0, NULL, &error), LAM_OK);
+    for (size_t j = 0; j < n; j++) csr_multiply_rows(p->F, 0, n, 1, B + j * n, H + j * n);
+    double square = 0;
+    for (size_t k = 0; k < rows.count; k++) {
+        const size_t i = p->order[k * n / rows.count];
+        for (size_t position = 0; position < n; position++) {
+            const size_t j = p->order[position];
+            const double rho = f.m.reflectance[i] > 0 ? (double)f.m.reflectance[i] : 1;
+            const double truth = rho * H[j * n + i];
+            square += truth * truth;
+            ck_assert_double_eq_tol((double)rows.rows[k * n + position], truth, 1e-5);
+        }
+    }
+    ck_assert_double_eq_tol(rows.square, square, 1e-4 * square);
+    inverse_rows_free(&rows);
+    reference_destroy(r);
+    free(E);
+    free(B);
+    free(H);
+    fixture_free(&f);
+}
+END_TEST
+
+/* All thresholds between nothing kept and all of it; a sparse inverse leaves out more than what is small in
+ * the end, and its entries are counted as they are. */
+START_TEST(samples_tell_of_the_whole) {
+    fixture f = uneven_room();
+    const build_problem *p = problem_of(&f);
+    lam_error error = {0};
+    inverse_rows rows;
+    sparse_sample made, last = {.entries = 0, .single = 2, .everywhere = 2};
+    ck_assert_int_eq(inverse_rows_find(p, p->reflectance, NULL, &rows, &error), LAM_OK);
+    const sparse_sample none = inverse_rows_truncated(&rows, 10), all = inverse_rows_truncated(&rows, 0);
+    ck_assert_double_eq(none.entries, 0);
+    ck_assert_double_eq_tol(none.single, 1, 1e-9);
+    ck_assert_double_eq_tol(none.everywhere, 1, 1e-9);
+    ck_assert_double_eq_tol(all.entries, (double)(p->n * p->n), 1e-6 * (double)(p->n * p->n));
+    ck_assert_double_eq(all.single, 0);
+    for (double threshold = .1; threshold > 1e-9; threshold /= 10) {
+        const sparse_sample cut = inverse_rows_truncated(&rows, threshold);
+        ck_assert_int_eq(sparse_inverse_sample(p, p->reflectance, threshold, &rows, &made, &error), LAM_OK);
+        ck_assert_double_le(made.entries, cut.entries);
+        ck_assert_double_ge(made.single, cut.single - 1e-6);
+        ck_assert_double_ge(made.everywhere, cut.everywhere - 1e-6);
+        ck_assert_double_ge(made.entries, last.entries);
+        ck_assert_double_le(made.single, last.single + 1e-6);
+        last = made;
+    }
+    ck_assert_double_le(last.single, 1e-4);
+    ck_assert_double_le(last.everywhere, 1e-4);
+    sparse_inverse whole;
+    double entries;
+    ck_assert_int_eq(sparse_inverse_rows(p, p->reflectance, 1e-2, 0, NULL, &whole, &error), LAM_OK);
+    ck_assert_int_eq(sparse_inverse_sample(p, p->reflectance, 1e-2, &rows, &made, &error), LAM_OK);
+    entries = (double)whole.M.indptr[p->n];
+    ck_assert_double_eq_tol(made.entries, entries, .2 * entries); /* a third of the rows, in order */
+    sparse_inverse_free(&whole);
+    inverse_rows_free(&rows);
+    fixture_free(&f);
+}
+END_TEST
+
+/* --- the choice ------------------------------------------------------------------------------------------
+ */
+
+enum { N = 1200, EACH = 330 };
+
+/* F of N like elements: one neighbour takes the share near of what each sees, and as many others as each
+ * says, met at random in pairs, take the rest alike. */
+static fixture random_pairs(size_t each, float near) {
+    fixture f = {.m = {.n = N, .n_channels = 1}};
+    float *dense = calloc((size_t)N * N, sizeof *dense);
+    uint64_t state = 7;
+    uint32_t partner[N];
+    for (size_t i = 0; i < N; i++) dense[i * N + (i ^ 1u)] = near;
+    for (size_t round = 0; round < each; round++) {
+        for (uint32_t i = 0; i < N; i++) partner[i] = i;
+        for (size_t i = N - 1; i > 0; i--) {
+            state = state * 6364136223846793005u + 1442695040888963407u;
+            const size_t j = (size_t)(state >> 33) % (i + 1);
+            const uint32_t swap = partner[i];
+            partner[i] = partner[j];
+            partner[j] = swap;
+        }
+        for (size_t i = 0; i + 1 < N; i += 2) {
+            dense[(size_t)partner[i] * N + partner[i + 1]] += (1 - near) / (float)each;
+            dense[(size_t)partner[i + 1] * N + partner[i]] += (1 - near) / (float)each;
+        }
+    }
+    lam_error error = {0};
+    size_t entries = 0;
+    for (size_t k = 0; k < (size_t)N * N; k++) entries += dense[k] > 0;
+    f.F = (csr){.n = N, .indptr = calloc(N + 1, sizeof *f.F.indptr)};
+    ck_assert_int_eq(csr_reserve(&f.F, entries, &error), LAM_OK);
+    f.order = malloc(N * sizeof *f.order);
+    f.m.area = malloc(N * sizeof *f.m.area);
+    f.m.reflectance = malloc(N * sizeof *f.m.reflectance);
+    for (size_t i = 0; i < N; i++) {
+        f.F.indptr[i + 1] = f.F.indptr[i];
+        for (size_t j = 0; j < N; j++) {
+            if (!(dense[i * N + j] > 0)) continue;
+            f.F.indices[f.F.indptr[i + 1]] = (uint32_t)j;
+            f.F.data[f.F.indptr[i + 1]++] = dense[i * N + j];
+        }
+        f.order[i] = (uint32_t)i;
+        f.m.area[i] = 1;
+        f.m.reflectance[i] = .5f;
+    }
+    free(dense);
+    return f;
+}
+
+static scene_class classified(fixture *f, const classify_options *options) {
+    lam_error error = {0};
+    scene_class c;
+    ck_assert_msg(classify_scene(problem_of(f), options, &c, &error) == LAM_OK, "%s", error.message);
+    printf("%s\n", c.reason);
+    ck_assert_int_eq(strncmp(c.reason, c.method, strlen(c.method)), 0);
+    return c;
+}
+
+static const classify_options usual = {.epsilon = .05, .seed = 1};
+
+/* The four corners of the map. A box: dense, and smooth. */
+START_TEST(a_box_is_of_low_rank) {
+    fixture f = fixture_box(unit_cube, 15, .5f);
+    const scene_class c = classified(&f, &usual);
+    ck_assert_str_eq(c.method, "low-rank");
+    ck_assert_double_gt(c.density, .5);
+    ck_assert_double_lt(c.rank, .5 * (double)c.n); /* else the whole inverse is smaller */
+    ck_assert_double_lt(c.entries, 0);             /* F is too dense: not looked at */
+    fixture_free(&f);
+}
+END_TEST
+
+/* Each sees one other: 2 n numbers, and every singular value is 1. */
+START_TEST(pairs_are_sparse) {
+    fixture f = random_pairs(1, 0);
+    const scene_class c = classified(&f, &usual);
+    ck_assert_str_eq(c.method, "sparse");
+    ck_assert_double_eq_tol(c.rank, N, 1e-3 * N);
+    ck_assert_double_eq_tol(c.entries, 2 * N, 1e-6 * N); /* it and, by way of it, itself */
+    ck_assert_double_gt(c.threshold, 0);
+    ck_assert_double_eq(c.sparse_cost, 4 * c.entries);
+    fixture_free(&f);
+}
+END_TEST
+
+/* Half of the light comes in crumbs. Without them single elements are right to .1, the crumbs' 1 / sqrt(100)
+ * of the other half, but light from everywhere lacks a half: they must stay, and nothing is sparse. */
+START_TEST(crumbs_that_add_up_are_kept) {
+    fixture f = random_pairs(100, .5f);
+    classify_options how = usual;
+    how.epsilon = .15;
+    const scene_class c = classified(&f, &how);
+    ck_assert(c.entries < 0 || c.entries > 100. * N);
+    fixture_free(&f);
+}
+END_TEST
+
+/* A quarter of all others, without order: neither. Their singular values lie within 2 / sqrt(EACH) = .11 (the
+ * semicircle law), and most of them above .035. */
+START_TEST(noise_is_neither) {
+    fixture f = random_pairs(EACH, 0);
+    classify_options how = usual;
+    scene_class c = classified(&f, &how);
+    ck_assert_str_eq(c.method, "exact");
+    const double x = .035 / (2 / sqrt(EACH)),
+                 above = 1 - 2 / M_PI * (x * sqrt(1 - x * x) + asin(x)); /* of the semicircle */
+    ck_assert_double_eq_tol(c.rank, above * N, .06 * N);
+    how.memory = N * N; /* bytes: a quarter of the whole inverse */
+    c = classified(&f, &how);
+    ck_assert(!isfinite(c.exact_cost));
+    ck_assert_str_eq(c.method, "low-rank");
+    fixture_free(&f);
+}
+END_TEST
+
+/* Groups that see one other group each, of rank GROUPS and few entries: low rank is cheapest, but no rival of
+ * a hierarchical operator, which places that say nothing of who sees whom make a large one; a sparse inverse
+ * is. A look at all of it ends as the short one does. */
+START_TEST(low_rank_is_no_rival) {
+    enum { GROUPS = 20, OF_GROUP = N / GROUPS };
+    fixture f = {.m = {.n = N, .n_channels = 1}};
+    lam_error error = {0};
+    double(*centre)[3] = calloc(N, sizeof *centre);
+    float(*normal)[3] = calloc(N, sizeof *normal);
+    uint64_t state = 11;
+    f.F = (csr){.n = N, .indptr = calloc(N + 1, sizeof *f.F.indptr)};
+    ck_assert_int_eq(csr_reserve(&f.F, (size_t)N * OF_GROUP, &error), LAM_OK);
+    f.order = malloc(N * sizeof *f.order);
+    f.m.area = malloc(N * sizeof *f.m.area);
+    f.m.reflectance = malloc(N * sizeof *f.m.reflectance);
+    for (size_t i = 0; i < N; i++) {
+        f.F.indptr[i + 1] = f.F.indptr[i];
+        for (size_t k = 0; k < OF_GROUP; k++) {
+            f.F.indices[f.F.indptr[i + 1]] = (uint32_t)((i / OF_GROUP ^ 1) * OF_GROUP + k);
+            f.F.data[f.F.indptr[i + 1]++] = 1.f / OF_GROUP;
+        }
+        f.order[i] = (uint32_t)i;
+        f.m.area[i] = 1;
+        f.m.reflectance[i] = .5f;
+        normal[i][2] = 1;
+        for (int d = 0; d < 2; d++) {
+            state = state * 6364136223846793005u + 1442695040888963407u;
+            centre[i][d] = (double)(state >> 40);
+        }
+    }
+    build_problem p = *problem_of(&f);
+    p.centre = (const double(*)[3])centre;
+    p.normal = (const float(*)[3])normal;
+    classify_options how = usual;
+    scene_class brief, whole;
+    ck_assert_int_eq(classify_scene(&p, &how, &brief, &error), LAM_OK);
+    how.thorough = true;
+    ck_assert_int_eq(classify_scene(&p, &how, &whole, &error), LAM_OK);
+    ck_assert_double_lt(whole.low_rank_cost, whole.sparse_cost);
+    ck_assert_double_lt(whole.sparse_cost, whole.hierarchical_cost);
+    ck_assert_str_eq(brief.method, "sparse");
+    ck_assert_str_eq(whole.method, "sparse");
+    free(centre);
+    free(normal);
+    fixture_free(&f);
+}
+END_TEST
+
+START_TEST(a_threshold_that_is_given_stays) {
+    fixture f = random_pairs(1, 0);
+    classify_options how = usual;
+    how.threshold = 1e-3;
+    const scene_class c = classified(&f, &how);
+    ck_assert_double_eq(c.threshold, 1e-3);
+    ck_assert_double_gt(c.entries, 0);
+    fixture_free(&f);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("classify");
+    TCase *cases = tcase_create("classify");
+    tcase_set_timeout(cases, 240);
+    tcase_add_test(cases, rows_are_those_of_the_inverse);
+    tcase_add_test(cases, samples_tell_of_the_whole);
+    tcase_add_test(cases, a_box_is_of_low_rank);
+    tcase_add_test(cases, pairs_are_sparse);
+    tcase_add_test(cases, crumbs_that_add_up_are_kept);
+    tcase_add_test(cases, noise_is_neither);
+    tcase_add_test(cases, low_rank_is_no_rival);
+    tcase_add_test(cases, a_threshold_that_is_given_stays);
+    suite_add_tcase(suite, cases);
+    return suite_run(suite);
+}

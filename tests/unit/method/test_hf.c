@@ -1,0 +1,225 @@
+/* HF against a dense SVD in double: its bound, how its levels share it, and what it foresees. */
+#include "solver/method/low_rank/gram.h"
+#include "solver/method/low_rank/hf.h"
+#include "solver/method/low_rank/norm.h"
+#include "support/subject.h"
+#include "support/transport.h"
+
+#include <omp.h>
+
+START_TEST(shares_fill_the_budget) {
+    const double alphas[] = {.1, .5, .9}, ratios[] = {.5, 1, 4};
+    for (int a = 0; a < 3; a++)
+        for (int r = 0; r < 3; r++)
+            for (int levels = 0; levels <= 8; levels++) {
+                budget b = {.rule = BUDGET_SQUARES, .alpha = alphas[a]};
+                budget_divide(&b, levels, ratios[r], levels % 3 * .3);
+                double p[BUDGET_LEVELS_MOST + 1], sum = 0;
+                budget_share(&b, .1, levels, p);
+                for (int l = 0; l <= levels; l++) sum += ldexp(p[l] * p[l], l);
+                ck_assert_double_eq_tol(sum, .01, 1e-12); /* sum_l 2^l p_l^2 = epsilon^2 */
+                if (levels > 0) ck_assert_double_eq_tol(p[0] * p[0], alphas[a] * .01, 1e-12);
+            }
+    /* Eq. 3.20: e_p = epsilon / 2, e_ch = epsilon / (2 sqrt(2)). */
+    const budget sums = {.rule = BUDGET_SUMS, .alpha = .5};
+    double p[BUDGET_LEVELS_MOST + 1];
+    budget_share(&sums, .1, 1, p);
+    ck_assert_double_eq_tol(p[0], .05, 1e-12);
+    ck_assert_double_eq_tol(p[1], .1 / (2 * sqrt(2)), 1e-12);
+    budget_rule rule;
+    for (int k = 0; k <= BUDGET_FROBENIUS; k++) {
+        ck_assert(budget_rule_find(budget_rule_name((budget_rule)k), &rule));
+        ck_assert_int_eq((int)rule, k);
+    }
+    ck_assert(!budget_rule_find("cubes", &rule));
+}
+END_TEST
+
+static const budget_rule rules[] = {BUDGET_SQUARES, BUDGET_SUMS, BUDGET_FROBENIUS};
+
+START_TEST(hf_keeps_its_bound) {
+    subject s;
+    lam_error error = {0};
+    subject_make(&s, room, 5); /* 150 elements, areas differ from face to face */
+    const double epsilons[] = {.3, .1, .01, 1e-4}, alphas[] = {.1, .5, .9};
+    for (int e = 0; e < 4; e++)
+        for (int a = 0; a < 3; a++)
+            for (int levels = 0; levels <= 4; levels++) {
+                factorizer_options options = {.epsilon = epsilons[e],
+                                              .budget = {.rule = rules[_i], .alpha = alphas[a]},
+                                              .levels = levels};
+                budget_divide(&options.budget, levels, levels % 2 ? .5 : 2, 0);
+                if (levels > 1 && a != 1) { /* a level without nodes: four are joined at once */
+                    options.budget.part[levels] += options.budget.part[1];
+                    options.budget.part[1] = 0;
+                }
+                factorizer_report report;
+                tall_factors f = factors_of(&s, "hf", &options, &report);
+                double *values = values_of_difference(&s.S, &f), squares = 0, lanczos, frobenius;
+                for (size_t i = 0; i < s.S.n; i++) squares += values[i] * values[i];
+                const double norm = rules[_i] == BUDGET_FROBENIUS ? sqrt(squares) : values[0];
+                /* Rounding of the factors: 1e-6 of |S| = 1; sqrt(n) of that in the Frobenius norm. */
+                ck_assert_msg(norm <= epsilons[e] + (rules[_i] == BUDGET_FROBENIUS ? 3e-5 : 2e-6),
+                              "epsilon %g, alpha %g, %d levels: error %g", epsilons[e], alphas[a], levels,
+                              norm);
+                ck_assert_int_eq(norm_of_error(&s.S, &f, NULL, &lanczos, &error), LAM_OK);
+                ck_assert_msg(lanczos <= values[0] * 1.0001 + 1e-7 && lanczos >= .97 * values[0] - 1e-6,
+                              "norm %g, found %g", values[0], lanczos);
+                /* sqrt(|S|_F^2 - |Q|_F^2) loses what squares of single precision lose. */
+                ck_assert_int_eq(norm_of_error_frobenius(&s.S, &f, &frobenius, &error), LAM_OK);
+                ck_assert_double_eq_tol(frobenius, sqrt(squares), 1e-5 + 2e-5 / (1e-3 + sqrt(squares)));
+                check_orthonormal(&f);
+                ck_assert_int_eq(report.levels, levels);
+                ck_assert_double_eq(report.passes, 1);
+                tall_factors_free(&f);
+                free(values);
+            }
+    subject_free(&s);
+}
+END_TEST
+
+/* What a node leaves out is orthogonal to what its parent drops: with all of a level's error in one place the
+ * bound of squares is nearly reached, and that of sums is far. */
+START_TEST(errors_add_in_squares) {
+    subject s;
+    subject_make(&s, unit_cube, 5);
+    for (int levels = 1; levels <= 3; levels++) {
+        factorizer_options options = {
+            .epsilon = .2, .budget = {.rule = BUDGET_SQUARES, .alpha = .5}, .levels = levels};
+        budget_divide(&options.budget, levels, 1, 0);
+        tall_factors f = factors_of(&s, "hf", &options, NULL);
+        const double norm = norm_of_difference(&s.S, &f);
+        double p[BUDGET_LEVELS_MOST + 1], sum = 0;
+        budget_share(&options.budget, options.epsilon, levels, p);
+        for (int l = 0; l <= levels; l++) sum += p[l] * pow(2, .5 * l);
+        ck_assert_double_le(norm, .2 + 2e-6);
+        ck_assert_double_gt(sum, .2 * 1.3); /* which eq. 3.10 would not allow */
+        ck_assert_double_gt(norm, .3 * .2); /* it is used */
+        tall_factors_free(&f);
+    }
+    subject_free(&s);
+}
+END_TEST
+
+/* The rank at a bound is not far above the best there is. */
+START_TEST(hf_rank_is_near_the_best) {
+    subject s;
+    subject_make(&s, unit_cube, 6);
+    double *values = values_of_difference(&s.S, NULL);
+    const factorizer_options options = {.epsilon = .1, .budget = {.alpha = .5}, .levels = -1};
+    tall_factors f = factors_of(&s, "hf", &options, NULL);
+    /* The root keeps every singular value above sqrt(.5) .1, which cannot be more than S has above that less
+     * what was cut before (Weyl), and up to 63 more above half of it. */
+    size_t most = 0;
+    while (most < s.S.n && values[most] >= sqrt(.5) * .1) most++;
+    ck_assert_uint_le(f.rank, most + 63);
+    ck_assert_double_le(norm_of_difference(&s.S, &f), .1);
+    tall_factors_free(&f);
+    free(values);
+    subject_free(&s);
+}
+END_TEST
+
+START_TEST(bits_do_not_depend_on_threads) {
+    subject s;
+    subject_make(&s, room, 6);
+    const int before = omp_get_max_threads();
+    factorizer_options options = {.epsilon = .05, .budget = {.alpha = .5}, .levels = 3};
+    budget_divide(&options.budget, 3, 1, 0);
+    tall_factors f[2];
+    for (int k = 0; k < 2; k++) {
+        omp_set_num_threads(k == 0 ? 1 : 3);
+        f[k] = factors_of(&s, "hf", &options, NULL);
+    }
+    omp_set_num_threads(before);
+    ck_assert_uint_eq(f[0].rank, f[1].rank);
+    ck_assert_mem_eq(f[0].Q, f[1].Q, f[0].n * f[0].rank * sizeof *f[0].Q);
+    ck_assert_mem_eq(f[0].V, f[1].V, f[0].n * f[0].rank * sizeof *f[0].V);
+    for (int k = 0; k < 2; k++) tall_factors_free(&f[k]);
+    subject_free(&s);
+}
+END_TEST
+
+START_TEST(forecast_knows_the_samples) {
+    subject s;
+    lam_error error = {0};
+    hf_forecast *forecast = NULL;
+    subject_make(&s, unit_cube, 3); /* 54 elements: the sample is all */
+    double *values = values_of_difference(&s.S, NULL);
+    ck_assert_int_eq(hf_forecast_create(&s.S, &forecast, &error), LAM_OK);
+    for (double p = .3; p > .02; p *= .7) {
+        size_t kept = 0;
+        while (kept < s.S.n && values[kept] >= p) kept++;
+        ck_assert_double_eq_tol(hf_forecast_rank(forecast, (double)s.S.n, p), (double)kept, 1.5);
+    }
+    const factorizer_options options = {.epsilon = .1, .budget = {.alpha = .5}, .levels = -1};
+    hf_plan plan = hf_forecast_plan(forecast, &options), other = {.levels = 0, .left = {.1}};
+    ck_assert_double_le(hf_forecast_seconds(forecast, &options, &plan),
+                        hf_forecast_seconds(forecast, &options, &other));
+    hf_forecast_free(forecast);
+    free(values);
+    subject_free(&s);
+}
+END_TEST
+
+/* How often rays hit what they meet so often on average (Knuth 1969). */
+static int poisson(double mean, uint64_t *state) {
+    int count = 0;
+    for (double left = exp(-mean), at = random_unit(state); at > left; at *= random_unit(state)) count++;
+    return count;
+}
+
+/* Entries of a symmetric F as so many rays from each of the two elements count them. */
+static void count_rays(csr *F, double rays) {
+    uint64_t state = 9;
+    for (size_t i = 0; i < F->n; i++)
+        for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++) {
+            const size_t j = F->indices[p];
+            if (i < j) F->data[p] = (float)(poisson((double)F->data[p] * 2 * rays, &state) / (2 * rays));
+            for (uint64_t q = F->indptr[j]; i > j && q < F->indptr[j + 1]; q++)
+                if (F->indices[q] == i) F->data[p] = F->data[q];
+        }
+}
+
+/* Values of noise spread as columns become more: what few columns of it do not pass, many do. A forecast that
+ * forgets it promises ranks that HF then does not find. */
+START_TEST(forecast_knows_noise) {
+    enum { RAYS = 40 };
+    subject s;
+    lam_error error = {0};
+    hf_forecast *forecast = NULL;
+    sparse_block block = {0};
+    subject_make(&s, unit_cube, 15);
+    count_rays(&s.f.F, RAYS);
+    ck_assert_int_eq(hf_forecast_create(&s.S, &forecast, &error), LAM_OK);
+    const size_t m = s.S.n / 2;
+    double *values = malloc(m * sizeof *values);
+    ck_assert_int_eq(scaled_block(&s.S, 0, m, &block, &error), LAM_OK);
+    ck_assert_int_eq(tsvd_values(&block, m, values, &error), LAM_OK);
+    const double noise = sqrt(1. / (2 * RAYS)); /* the length of a column of it: the rows of F sum to 1 */
+    for (double p = 1.6 * noise; p > .5 * noise; p -= .1 * noise) {
+        size_t kept = 0;
+        while (kept < m && values[m - 1 - kept] >= p * p) kept++;
+        ck_assert_double_ge(hf_forecast_rank(forecast, (double)m, p), .95 * (double)kept);
+    }
+    free(values);
+    sparse_block_free(&block);
+    hf_forecast_free(forecast);
+    subject_free(&s);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("hf");
+    TCase *cases = tcase_create("hf");
+    tcase_set_timeout(cases, 300);
+    tcase_add_test(cases, shares_fill_the_budget);
+    tcase_add_loop_test(cases, hf_keeps_its_bound, 0, 3);
+    tcase_add_test(cases, errors_add_in_squares);
+    tcase_add_test(cases, hf_rank_is_near_the_best);
+    tcase_add_test(cases, bits_do_not_depend_on_threads);
+    tcase_add_test(cases, forecast_knows_the_samples);
+    tcase_add_test(cases, forecast_knows_noise);
+    suite_add_tcase(suite, cases);
+    return suite_run(suite);
+}

@@ -1,0 +1,270 @@
+/* The hierarchical operator of boxes with exact form factors: how near it comes, and what it says of itself.
+ */
+#include "solver/method/reference.h"
+#include "solver/precompute/forecast.h"
+#include "support/box_problem.h"
+#include "support/dense.h"
+
+#include <math.h>
+
+static lam_error error;
+
+#define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
+
+/* A box and where its elements are. */
+typedef struct closed {
+    fixture f;
+    build_problem problem;
+    double (*centre)[3];
+} closed;
+
+static closed closed_make(const double size[3], unsigned divisions, float reflectance) {
+    closed s = {.f = fixture_box(size, divisions, reflectance)};
+    s.problem = *problem_of(&s.f);
+    s.problem.F = &s.f.F;
+    s.centre = test_allocate(s.f.m.n, sizeof *s.centre);
+    for (size_t i = 0; i < s.f.m.n; i++) mesh_centroid(&s.f.m, i, s.centre[i]);
+    return s;
+}
+
+/* The problem as it lies now. */
+static const build_problem *of(closed *s) {
+    s->problem = *problem_of(&s->f);
+    s->problem.centre = (const double(*)[3])s->centre;
+    s->problem.normal = (const float(*)[3])s->f.m.normal;
+    return &s->problem;
+}
+
+static void closed_free(closed *s) {
+    free(s->centre);
+    fixture_free(&s->f);
+}
+
+static lam_operator *build(const build_problem *problem, double epsilon, build_report *report) {
+    const build_options options = {
+        .method = "hierarchical", .factorizer = "auto", .epsilon = epsilon, .budget = {.alpha = .5}};
+    lam_operator *op = NULL;
+    ck_ok(build_operator(problem, &options, &op, report, &error));
+    return op;
+}
+
+/* |B~ - B| / |B - E| by area, against a dense LU. */
+static double indirect_error(const build_problem *problem, const lam_operator *op, const float *E) {
+    const size_t n = problem->n;
+    reference *r = NULL;
+    double *e = test_allocate(n, sizeof *e), *B = test_allocate(n, sizeof *B), wrong = 0, all = 0;
+    float *out = test_allocate(n, sizeof *out);
+    const size_t bytes = lam_operator_work_bytes(op, 1);
+    void *work = test_allocate(1, bytes);
+    for (size_t i = 0; i < n; i++) e[i] = (double)E[i];
+    ck_ok(reference_create(problem->F, problem->area, problem->reflectance, REFERENCE_DENSE, &r, &error));
+    ck_ok(reference_solve(r, 1, e, B, 1e-12, NULL, &error));
+    ck_ok(lam_operator_apply(op, 1, LAM_RADIOSITY, E, out, work, bytes, &error));
+    for (size_t i = 0; i < n; i++) {
+        wrong += problem->area[i] * ((double)out[i] - B[i]) * ((double)out[i] - B[i]);
+        all += problem->area[i] * (B[i] - e[i]) * (B[i] - e[i]);
+    }
+    reference_destroy(r);
+    free(e);
+    free(B);
+    free(out);
+    free(work);
+    return sqrt(wrong / all);
+}
+
+/* One element, a part of a wall, all of it: a smaller epsilon keeps more and is nearer, and error goes with
+ * it. */
+START_TEST(epsilon_is_what_it_costs) {
+    closed s = closed_make(room, 14, .7f); /* 1,176 elements */
+    const build_problem *problem = of(&s);
+    const size_t n = problem->n;
+    const double epsilons[] = {.1, .02, .002}, most[3] = {.12, .04, .006};
+    float *E = test_allocate(3 * n, sizeof *E);
+    uint64_t seed = 2;
+    double density = 0;
+    E[n / 5] = 1;
+    for (size_t i = 0; i < n; i++) {
+        E[n + i] = i > n / 2 && i < n / 2 + 40 ? 1 : 0;
+        E[2 * n + i] = (float)random_unit(&seed);
+    }
+    for (int k = 0; k < 3; k++) {
+        build_report report;
+        operator_description about;
+        lam_operator *op = build(problem, epsilons[k], &report);
+        operator_describe(op, &about);
+        ck_assert_double_gt(about.density, 1.2 * density);
+        density = about.density;
+        /* Half of it is stored, four bytes a number. */
+        const forecast f = {.n = n,
+                            .n_channels = 1,
+                            .recipe = {.method = RECIPE_PAIRS},
+                            .hierarchical = true,
+                            .epsilon = epsilons[k]};
+        const forecast without = {.n = n, .n_channels = 1, .recipe = f.recipe, .sparse = true};
+        const double stored = 2 * density * (double)n * (double)n;
+        const double foreseen = forecast_store_bytes(&f) - forecast_store_bytes(&without);
+        ck_assert_double_ge(foreseen, stored);
+        ck_assert_double_le(foreseen, 8 * stored);
+        for (int light = 0; light < 3; light++)
+            ck_assert_double_lt(indirect_error(problem, op, E + light * n), most[k]);
+        ck_assert_double_eq_tol(report.threshold, .02 * epsilons[k], 1e-12);
+        ck_assert_double_lt(report.uniform_error, .1 * epsilons[k]);
+        ck_assert_double_lt(report.probe_residual, epsilons[k]);
+        ck_assert_str_eq(report.method, "hierarchical");
+        ck_assert_ptr_nonnull(strstr(report.reason, "6 planes"));
+        lam_operator_close(op);
+    }
+    free(E);
+    closed_free(&s);
+}
+END_TEST
+
+/* Where nothing reflects irradiance is there all the same, and where nearly all does nothing grows. */
+START_TEST(black_and_white) {
+    closed s = closed_make(unit_cube, 8, .97f);
+    const build_problem *problem = of(&s);
+    const size_t n = problem->n;
+    build_report report;
+    for (size_t i = 0; i < n; i += 3) s.f.m.reflectance[i] = 0;
+    lam_operator *op = build(problem, .002, &report);
+    float *E = test_allocate(n, sizeof *E), *H = test_allocate(n, sizeof *H);
+    double *B = test_allocate(n, sizeof *B), *truth = test_allocate(n, sizeof *truth), largest = 0;
+    void *work = test_allocate(1, lam_operator_work_bytes(op, 1));
+    for (size_t i = 0; i < n; i++) E[i] = i % 5 == 0 ? 1 : 0;
+    ck_assert_double_lt(indirect_error(problem, op, E), .01);
+    ck_ok(lam_operator_apply(op, 1, LAM_RADIOSITY, E, H, work, lam_operator_work_bytes(op, 1), &error));
+    for (size_t i = 0; i < n; i++) {
+        if (i % 3 == 0) ck_each(H[i] == E[i]);
+        B[i] = (double)H[i];
+    }
+    csr_multiply_rows(problem->F, 0, n, 1, B, truth);
+    ck_ok(lam_operator_apply(op, 1, LAM_IRRADIANCE, E, H, work, lam_operator_work_bytes(op, 1), &error));
+    for (size_t i = 0; i < n; i++) largest = fmax(largest, truth[i]);
+    for (size_t i = 0; i < n; i++) ck_each(fabs((double)H[i] - truth[i]) < .02 * largest);
+    lam_operator_close(op);
+    free(E);
+    free(H);
+    free(B);
+    free(truth);
+    free(work);
+    closed_free(&s);
+}
+END_TEST
+
+/* What is below the noise of rays is not kept, whatever epsilon asks for. */
+START_TEST(noise_sets_the_threshold) {
+    closed s = closed_make(unit_cube, 6, .5f);
+    build_report report;
+    (void)of(&s);
+    s.problem.noise = .2;
+    lam_operator_close(build(&s.problem, .01, &report));
+    ck_assert_double_eq_tol(report.threshold, .055 * .2, 1e-12);
+    ck_assert_ptr_nonnull(strstr(report.reason, "noise"));
+    closed_free(&s);
+}
+END_TEST
+
+START_TEST(it_wants_to_know_where_elements_are) {
+    closed s = closed_make(unit_cube, 2, .5f);
+    const build_options options = {
+        .method = "hierarchical", .factorizer = "auto", .epsilon = .05, .budget = {.alpha = .5}};
+    build_report report;
+    lam_operator *op = NULL;
+    ck_assert_int_eq(build_operator(problem_of(&s.f), &options, &op, &report, &error), LAM_ERR_ARGUMENT);
+    ck_assert_ptr_null(op);
+    closed_free(&s);
+}
+END_TEST
+
+/* Many small numbers that are left out are much of the light that is everywhere: it is given back, to E0 all
+ * of it, and a threshold that loses little leaves it as it is. */
+START_TEST(even_light_is_made_up_for) {
+    closed s = closed_make(room, 14, .5f);
+    const build_problem *problem = of(&s);
+    const size_t n = problem->n;
+    float *E = test_allocate(n, sizeof *E), *lit = test_allocate(n, sizeof *lit);
+    uint64_t seed = 8;
+    build_report report;
+    lam_operator *coarse, *fine;
+    /* An open scene: half of every row is gone, here and there, and what is left is noise. */
+    csr F = s.f.F;
+    for (size_t i = 0; i < n; i++)
+        for (uint64_t e = F.indptr[i]; e < F.indptr[i + 1]; e++) {
+            const size_t j = F.indices[e];
+            if ((i + j) * 2654435761u % 1000 < 800) F.data[e] = 0;
+        }
+    coarse = build(problem, .9, &report);
+    ck_assert_ptr_nonnull(strstr(report.reason, "what it lacks of even light is made up for"));
+    /* Half precision, of what was missing. */
+    ck_assert_double_lt(report.uniform_error, 1e-3);
+    for (size_t i = 0; i < n; i++) {
+        lit[i] = (float)random_unit(&seed);
+        E[i] = i % 2 == 0 ? 1.0f : .5f;
+    }
+    ck_assert_double_lt(indirect_error(problem, coarse, E), .1);
+    ck_assert_double_lt(indirect_error(problem, coarse, lit), .2);
+    fine = build(problem, .002, &report);
+    ck_assert_ptr_null(strstr(report.reason, "even light"));
+    free(E);
+    free(lit);
+    lam_operator_close(coarse);
+    lam_operator_close(fine);
+    closed_free(&s);
+}
+END_TEST
+
+/* Some elements, chosen in any sequence, more than once, or more than there are, are what they are among all.
+ */
+START_TEST(some_elements) {
+    static const size_t counts[] = {1, 3, 40, 2500};
+    closed s = closed_make(room, 20, .5f);
+    const build_problem *problem = of(&s);
+    const size_t n = problem->n;
+    build_report report;
+    lam_operator *op = build(problem, .05, &report);
+    const size_t bytes = lam_operator_work_bytes(op, 3);
+    void *work = test_allocate(1, bytes);
+    float *E = test_allocate(3 * n, sizeof *E), *all = test_allocate(3 * n, sizeof *all),
+          *some = test_allocate(3 * 2500, sizeof *some);
+    uint32_t *which = test_allocate(2500, sizeof *which);
+    uint64_t seed = 4;
+    ck_assert_uint_eq(n, 2400);
+    E[n / 7] = 2; /* one element, a wall, all over */
+    for (size_t i = 0; i < n; i++) {
+        E[n + i] = problem->normal[i][2] > .5f ? 1 : 0;
+        E[2 * n + i] = (float)random_unit(&seed);
+    }
+    ck_ok(lam_operator_apply(op, 3, LAM_INDIRECT, E, all, work, bytes, &error));
+    for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) {
+        for (size_t r = 0; r < counts[k]; r++) which[r] = (uint32_t)(random_unit(&seed) * (double)n);
+        if (counts[k] == 3) which[2] = which[0];
+        memset(work, 0xA5, bytes);
+        ck_ok(lam_operator_apply_selected(op, 3, LAM_INDIRECT, E, NULL, counts[k], which, some, work, bytes,
+                                          &error));
+        for (size_t v = 0; v < 3; v++)
+            for (size_t r = 0; r < counts[k]; r++) ck_each(some[v * counts[k] + r] == all[v * n + which[r]]);
+        ck_assert(some[0] > 0);
+    }
+    free(E);
+    free(all);
+    free(some);
+    free(which);
+    free(work);
+    lam_operator_close(op);
+    closed_free(&s);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("hierarchical");
+    TCase *tests = tcase_create("operator");
+    tcase_set_timeout(tests, 300);
+    tcase_add_test(tests, epsilon_is_what_it_costs);
+    tcase_add_test(tests, black_and_white);
+    tcase_add_test(tests, noise_sets_the_threshold);
+    tcase_add_test(tests, even_light_is_made_up_for);
+    tcase_add_test(tests, some_elements);
+    tcase_add_test(tests, it_wants_to_know_where_elements_are);
+    suite_add_tcase(suite, tests);
+    return suite_run(suite);
+}

@@ -1,0 +1,344 @@
+/* F in a basis of wavelets and its inverse there, against dense matrices in double. */
+#include "solver/method/hierarchical/wavelet_balance.h"
+#include "support/wavelet_subject.h"
+
+/* --- the pass ------------------------------------------------------------------------------------------ */
+
+START_TEST(a_pass_finds_every_coefficient) {
+    subject s = subject_make(_i);
+    const size_t n = s.m.n;
+    float *weight = ones(&s.basis);
+    double *S = dense_S(&s), *truth = in_basis(&s, S);
+    csr found = pass(&s, 0, weight, 1), again = pass(&s, 0, weight, 3);
+    double *all = whole(&found);
+    /* |S| <= 1: rows and columns are transformed once each. */
+    ck_assert_double_le(largest_difference(n * n, all, truth), 2 * TRANSFORM_U);
+    ck_assert_uint_eq(found.indptr[n], again.indptr[n]);
+    ck_assert_mem_eq(found.indices, again.indices, found.indptr[n] * sizeof *found.indices);
+    ck_assert_mem_eq(found.data, again.data, found.indptr[n] * sizeof *found.data);
+    csr_free(&again);
+    /* What is above a threshold, and nothing else. */
+    for (size_t t = 0; t < s.basis.n_nodes; t++) weight[t] = t % 2 == 0 ? 1 : .5f;
+    again = pass(&s, .02f, weight, 2);
+    double *some = whole(&again);
+    size_t kept = 0;
+    for (size_t t = 0; t < s.basis.n_nodes; t++)
+        for (size_t u = 0; u < s.basis.n_nodes; u++) {
+            const wavelet_node *a = &s.basis.nodes[t], *b = &s.basis.nodes[u];
+            for (size_t i = a->first; i < a->first + a->inputs - a->scaling; i++)
+                for (size_t j = b->first; j < b->first + b->inputs - b->scaling; j++) {
+                    const double limit = .02 * (double)weight[t] * (double)weight[u],
+                                 size = fabs(all[i * n + j]);
+                    if (fabs(size - limit) < 1e-6) continue;
+                    ck_each((some[i * n + j] != 0) == (size > limit));
+                    kept += size > limit;
+                }
+        }
+    ck_assert_uint_gt(kept, n);
+    csr_free(&found);
+    csr_free(&again);
+    free(weight);
+    free(S);
+    free(truth);
+    free(all);
+    free(some);
+    subject_free(&s);
+}
+END_TEST
+
+/* A finite reach leaves out coefficients, and of coarse ones parts, that are small together. */
+START_TEST(a_pass_within_reach) {
+    subject s = subject_make(ROOM);
+    const size_t n = s.m.n;
+    float *weight = ones(&s.basis);
+    csr far = pass(&s, 0, weight, 1), near = pass_within(&s, 2, 0, weight, 2);
+    double *all = whole(&far), *some = whole(&near), lost = 0, kept = 0;
+    ck_assert_uint_lt(near.indptr[n], far.indptr[n]);
+    for (size_t k = 0; k < n * n; k++) {
+        lost += (all[k] - some[k]) * (all[k] - some[k]);
+        kept += some[k] * some[k];
+    }
+    ck_assert_double_gt(kept, 0);
+    ck_assert_double_lt(lost, 1e-4 * kept);
+    csr_free(&far);
+    csr_free(&near);
+    free(weight);
+    free(all);
+    free(some);
+    subject_free(&s);
+}
+END_TEST
+
+/* Half of F, or of every pair all of it on one side or the other. */
+static csr one_side(const subject *s, bool halves) {
+    const size_t n = s->m.n;
+    uint64_t used = 0;
+    csr F1 = {.n = n,
+              .indptr = test_allocate(n + 1, sizeof *F1.indptr),
+              .indices = test_allocate(s->F.indptr[n], sizeof *F1.indices),
+              .data = test_allocate(s->F.indptr[n], sizeof *F1.data)};
+    for (size_t i = 0; i < n; i++) {
+        for (uint64_t e = s->F.indptr[i]; e < s->F.indptr[i + 1]; e++) {
+            const uint32_t j = s->F.indices[e];
+            const size_t least = i < j ? i : j, most = i < j ? j : i;
+            if (!halves && ((least + 3 * most) % 2 == 0) != (i < j)) continue;
+            F1.indices[used] = j;
+            F1.data[used++] = (halves ? .5f : 1) * s->F.data[e];
+        }
+        F1.indptr[i + 1] = used;
+    }
+    return F1;
+}
+
+/* Rows that know one side of each pair give the coefficients that rows of both sides do. */
+START_TEST(a_pass_of_one_side) {
+    subject s = subject_make(_i % SUBJECTS);
+    const size_t n = s.m.n;
+    float *weight = ones(&s.basis);
+    double *S = dense_S(&s), *truth = in_basis(&s, S);
+    csr F1 = one_side(&s, _i < SUBJECTS);
+    csr found = pass_of(&s, &F1, true, INFINITY, 0, weight, 1);
+    csr again = pass_of(&s, &F1, true, INFINITY, 0, weight, 3);
+    double *all = whole(&found);
+    ck_assert_double_le(largest_difference(n * n, all, truth), 3 * TRANSFORM_U);
+    ck_assert_uint_eq(found.indptr[n], again.indptr[n]);
+    ck_assert_mem_eq(found.indices, again.indices, found.indptr[n] * sizeof *found.indices);
+    ck_assert_mem_eq(found.data, again.data, found.indptr[n] * sizeof *found.data);
+    csr_free(&again);
+    /* Above a threshold, by weights: all that is there of it where either side has half. */
+    for (size_t t = 0; t < s.basis.n_nodes; t++) weight[t] = t % 2 == 0 ? 1 : .5f;
+    csr both = pass(&s, .02f, weight, 1);
+    again = pass_of(&s, &F1, true, INFINITY, .02f, weight, 2);
+    double *some = whole(&again), *wanted = whole(&both);
+    size_t lost = 0;
+    for (size_t k = 0; k < n * n; k++) {
+        /* A side below a fifth of the threshold counts as nothing. */
+        if (some[k] != 0 && wanted[k] != 0)
+            ck_each(fabs(some[k] - wanted[k]) < .2 * .02 + 1e-5);
+        else
+            ck_each(fmax(fabs(some[k]), fabs(wanted[k])) < 1.2 * .02 + 1e-5);
+        lost += fabs(some[k] - wanted[k]) > 1e-5;
+    }
+    if (_i < SUBJECTS) ck_assert_uint_lt(lost, 10); /* beside the threshold */
+    csr_free(&F1);
+    csr_free(&found);
+    csr_free(&again);
+    csr_free(&both);
+    free(weight);
+    free(S);
+    free(truth);
+    free(all);
+    free(some);
+    free(wanted);
+    subject_free(&s);
+}
+END_TEST
+
+/* So they do within a reach: what is left out is as small. */
+START_TEST(one_side_within_reach) {
+    subject s = subject_make(ROOM);
+    const size_t n = s.m.n;
+    float *weight = ones(&s.basis);
+    csr F1 = one_side(&s, true);
+    csr far = pass(&s, 0, weight, 1), near = pass_of(&s, &F1, true, 2, 0, weight, 2);
+    double *all = whole(&far), *some = whole(&near), lost = 0, kept = 0;
+    ck_assert_uint_lt(near.indptr[n], far.indptr[n]);
+    for (size_t k = 0; k < n * n; k++) {
+        lost += (all[k] - some[k]) * (all[k] - some[k]);
+        kept += some[k] * some[k];
+    }
+    ck_assert_double_lt(lost, 1e-4 * kept);
+    csr_free(&F1);
+    csr_free(&far);
+    csr_free(&near);
+    free(weight);
+    free(all);
+    free(some);
+    subject_free(&s);
+}
+END_TEST
+
+/* S A^1/2 becomes A^1/2 s for whatever s is asked for, and nothing else of S changes; a threshold leaves out
+ * what is below it; where nothing leaves the last row is 1 on the diagonal. */
+START_TEST(one_even_light_is_put_in) {
+    subject s = subject_make(_i);
+    const size_t n = s.m.n;
+    float *weight = ones(&s.basis);
+    double *area = test_allocate(n, sizeof *area), *sums = test_allocate(n, sizeof *sums);
+    const double *W = dense_W(&s);
+    uint64_t seed = 5;
+    csr S = pass(&s, 0, weight, 1);
+    double *before = whole(&S), length = 0;
+    for (size_t p = 0; p < n; p++) area[p] = s.m.area[s.tree.order[p]];
+    for (size_t p = 0; p < n; p++) length += area[p];
+    for (size_t i = 0; i < n; i++) sums[i] = random_unit(&seed);
+    ck_ok(wavelet_balance(&s.basis, s.tree.order, area, sums, 0, weight, &S, &error));
+    double *after = whole(&S), *y = test_allocate(n, sizeof *y);
+    for (size_t k = 0; k < n * n; k++)
+        if (k % n != n - 1 && k / n != n - 1) ck_each(after[k] == before[k]);
+    for (size_t i = 0; i < n; i++)
+        for (size_t p = 0; p < n; p++) y[i] += W[i * n + p] * sqrt(area[p] / length) * sums[s.tree.order[p]];
+    const double sign = W[(n - 1) * n] > 0 ? 1 : -1;
+    size_t above = 0;
+    for (size_t i = 0; i < n; i++) {
+        ck_each(fabs(after[i * n + n - 1] - sign * y[i]) < TRANSFORM_U);
+        above += fabs(y[i]) > .02;
+    }
+    csr_free(&S);
+    S = pass(&s, 0, weight, 1);
+    ck_ok(wavelet_balance(&s.basis, s.tree.order, area, sums, .02f, weight, &S, &error));
+    double *some = whole(&S);
+    size_t kept = 0;
+    for (size_t i = 0; i < n; i++) kept += some[i * n + n - 1] != 0;
+    ck_assert_uint_gt(above, 1);
+    ck_assert_uint_eq(kept, above);
+    for (size_t i = 0; i < n; i++) sums[i] = 1;
+    ck_ok(wavelet_balance(&s.basis, s.tree.order, area, sums, 1e-5f, weight, &S, &error));
+    free(some);
+    some = whole(&S);
+    for (size_t i = 0; i < n; i++) ck_each(fabs(some[i * n + n - 1] - (i == n - 1)) < TRANSFORM_U);
+    csr_free(&S);
+    free(weight);
+    free(area);
+    free(sums);
+    free(before);
+    free(after);
+    free(some);
+    free(y);
+    subject_free(&s);
+}
+END_TEST
+
+/* --- the inverse --------------------------------------------------------------------------------------- */
+
+enum { ONE_FOR_ALL, BLACK_IN_PARTS, EACH_ITS_OWN, REFLECTANCES };
+
+static float *reflectance(const subject *s, int which) {
+    float *rho = test_allocate(s->m.n, sizeof *rho);
+    uint64_t seed = 17;
+    for (size_t p = 0; p < s->m.n; p++) {
+        const uint32_t i = s->tree.order[p];
+        rho[p] = which == ONE_FOR_ALL                     ? .8f
+                 : which == EACH_ITS_OWN                  ? (float)(.95 * random_unit(&seed))
+                 : s->m.normal[i][2] > .5f || i % 50 == 0 ? 0
+                                                          : .6f;
+    }
+    return rho;
+}
+
+START_TEST(reflectances_in_the_basis) {
+    subject s = subject_make(_i % SUBJECTS);
+    const size_t n = s.m.n;
+    float *rho = reflectance(&s, _i / SUBJECTS);
+    csr found;
+    double *R = test_allocate(n * n, sizeof *R);
+    for (size_t p = 0; p < n; p++) R[p * n + p] = (double)rho[p];
+    double *truth = in_basis(&s, R);
+    ck_ok(wavelet_diagonal(&s.basis, rho, &found, &error));
+    double *all = whole(&found);
+    ck_assert_double_le(largest_difference(n * n, all, truth), 1e-6 + 2 * TRANSFORM_U);
+    if (_i / SUBJECTS == ONE_FOR_ALL) ck_assert_uint_eq(found.indptr[n], n);
+    csr_free(&found);
+    free(rho);
+    free(R);
+    free(truth);
+    free(all);
+    subject_free(&s);
+}
+END_TEST
+
+/* Terms that products leave out, and what of R B they make no use of, add up to little: entries that are
+ * there either way differ by less than a threshold. */
+START_TEST(what_is_skipped_is_small) {
+    subject s = subject_make(_i);
+    const size_t n = s.m.n;
+    float *rho = reflectance(&s, EACH_ITS_OWN), *weight = ones(&s.basis);
+    csr in = pass(&s, 0, weight, 2), some, all;
+    wavelet_inverse_report report;
+    wavelet_inverse_input input = {.basis = &s.basis,
+                                   .S = &in,
+                                   .rho = rho,
+                                   .weight = weight,
+                                   .threshold = 1e-3f,
+                                   .inner = .25f,
+                                   .skipped = .005f,
+                                   .n_threads = 1};
+    ck_ok(wavelet_inverse(&input, &some, &report, &error));
+    input.skipped = 0;
+    ck_ok(wavelet_inverse(&input, &all, &report, &error));
+    double *a = whole(&some), *b = whole(&all), most = 0;
+    for (size_t k = 0; k < n * n; k++)
+        if (a[k] != 0 && b[k] != 0) most = fmax(most, fabs(a[k] - b[k]));
+    ck_assert_double_gt(most, 0);
+    ck_assert_double_lt(most, (double)input.threshold);
+    csr_free(&in);
+    csr_free(&some);
+    csr_free(&all);
+    free(rho);
+    free(weight);
+    free(a);
+    free(b);
+    subject_free(&s);
+}
+END_TEST
+
+START_TEST(doubling_inverts) {
+    subject s = subject_make(_i % SUBJECTS);
+    const size_t n = s.m.n;
+    float *rho = reflectance(&s, _i / SUBJECTS), *weight = ones(&s.basis);
+    double *S = dense_S(&s), *A = test_allocate(n * n, sizeof *A), *K = test_allocate(n * n, sizeof *K);
+    csr in = pass(&s, 0, weight, 2), found, again;
+    wavelet_inverse_report report;
+    wavelet_inverse_input input = {.basis = &s.basis,
+                                   .S = &in,
+                                   .rho = rho,
+                                   .weight = weight,
+                                   .threshold = 1e-6f,
+                                   .inner = .01f,
+                                   .skipped = .001f,
+                                   .n_threads = 1};
+    ck_ok(wavelet_inverse(&input, &found, &report, &error));
+    /* K = S (I - R S)^-1 */
+    for (size_t p = 0; p < n; p++)
+        for (size_t q = 0; q < n; q++) A[p * n + q] = (p == q ? 1 : 0) - (double)rho[p] * S[p * n + q];
+    invert(n, A);
+    for (size_t p = 0; p < n; p++)
+        for (size_t k = 0; k < n; k++)
+            for (size_t q = 0; q < n; q++) K[p * n + q] += S[p * n + k] * A[k * n + q];
+    double *truth = in_basis(&s, K), *all = whole(&found);
+    /* What is left out is below 1e-6 an entry; of single precision |A|^-1 and its square is at most 25 times.
+     */
+    ck_assert_double_le(largest_difference(n * n, all, truth), 1e-4);
+    input.n_threads = 3;
+    ck_ok(wavelet_inverse(&input, &again, &report, &error));
+    ck_assert_mem_eq(found.indptr, again.indptr, (n + 1) * sizeof *found.indptr);
+    ck_assert_mem_eq(found.data, again.data, found.indptr[n] * sizeof *found.data);
+    csr_free(&in);
+    csr_free(&found);
+    csr_free(&again);
+    free(rho);
+    free(weight);
+    free(S);
+    free(A);
+    free(K);
+    free(truth);
+    free(all);
+    subject_free(&s);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("wavelet pass");
+    TCase *tests = tcase_create("wavelet pass");
+    tcase_set_timeout(tests, 300);
+    tcase_add_loop_test(tests, a_pass_finds_every_coefficient, 0, SUBJECTS);
+    tcase_add_test(tests, a_pass_within_reach);
+    tcase_add_loop_test(tests, a_pass_of_one_side, 0, 2 * SUBJECTS);
+    tcase_add_test(tests, one_side_within_reach);
+    tcase_add_loop_test(tests, one_even_light_is_put_in, 0, SUBJECTS);
+    tcase_add_loop_test(tests, reflectances_in_the_basis, 0, SUBJECTS * REFLECTANCES);
+    tcase_add_loop_test(tests, what_is_skipped_is_small, 0, SUBJECTS);
+    tcase_add_loop_test(tests, doubling_inverts, 0, SUBJECTS * REFLECTANCES);
+    suite_add_tcase(suite, tests);
+    return suite_run(suite);
+}

@@ -1,0 +1,126 @@
+/* Forecasts: bounds hold for what is really made, and what does not fit is refused with what would. */
+#include "solver/formfactor/rays/hemicube.h"
+#include "solver/formfactor/rays/rays.h"
+#include "solver/precompute/forecast.h"
+#include "support/box.h"
+#include "support/scene.h"
+#include "support/suite.h"
+
+static const recipe recipes[] = {{.method = RECIPE_RAYS, .rays = 16, .seed = 1},
+                                 {.method = RECIPE_RAYS, .rays = 300, .seed = 1},
+                                 {.method = RECIPE_RAYS, .rays = 20000, .seed = 1},
+                                 {.method = RECIPE_HEMICUBE, .resolution = 16},
+                                 {.method = RECIPE_HEMICUBE, .resolution = 64}};
+
+/* A file of all rows, and a store of them, are no larger than forecast, and not much smaller. */
+START_TEST(files_are_within_the_forecast) {
+    enum { DIVISIONS = 10, N = 6 * DIVISIONS * DIVISIONS };
+    char folder[64];
+    folder_make(folder);
+    const double size[3] = {1, 2, 1};
+    mesh m = box_mesh(size, DIVISIONS, .5f);
+    uint32_t order[N];
+    double leaving[N], absorbed[N];
+    found_rows rows = {0};
+    hemicube h = {0};
+    visibility *v = NULL;
+    lam_error error = {0};
+    scratch *kept = NULL;
+    for (uint32_t i = 0; i < N; i++) order[i] = i;
+    ck_assert_int_eq(scratch_open(folder, &kept, &error), LAM_OK);
+    ck_assert_int_eq(visibility_create(&m, &v, &error), LAM_OK);
+    const form_factor_options how = {.recipe = recipes[_i], .scratch = kept, .scratch_name = "a.rows"};
+    if (how.recipe.method == RECIPE_HEMICUBE) {
+        ck_assert_int_eq(hemicube_create(how.recipe.resolution, &h, &error), LAM_OK);
+        ck_assert_int_eq(hemicube_trace(&h, &m, v, order, &how, &rows, leaving, absorbed, &error), LAM_OK);
+    } else {
+        ck_assert_int_eq(rays_count(&m, v, order, &how, &rows, leaving, absorbed, &error), LAM_OK);
+    }
+    const forecast f = {.n = N, .n_channels = 1, .recipe = how.recipe, .scratch = true, .keep = true};
+    const double used = (double)scratch_used_bytes(kept), most = forecast_scratch_bytes(&f);
+    /* Beside rows: one head of the file and one of 40 bytes for each block. */
+    ck_assert_double_le(used, most + 4096);
+    ck_assert_double_ge(used, most / 4);
+    size_t entries = 0;
+    for (size_t i = 0; i < N; i++) entries += rows.rows[i].n_entries;
+    ck_assert_double_ge(forecast_store_bytes(&f), 8 * (double)entries);
+    found_rows_free(&rows);
+    hemicube_free(&h);
+    visibility_destroy(v);
+    scratch_close(kept, true);
+    mesh_free(&m);
+    folder_remove(folder);
+}
+END_TEST
+
+/* Two matrices of 4, 2 or 1 bytes a value; the whole inverse has no choice. */
+START_TEST(fewer_bits_take_less_of_the_disk) {
+    forecast f = {.n = 5000, .n_channels = 1, .recipe = {.method = RECIPE_RAYS, .rays = 512}, .rank = 100};
+    const double single = forecast_store_bytes(&f), all = 2. * 5000 * 100;
+    f.precision = PANEL_BF16;
+    ck_assert_double_eq(single - forecast_store_bytes(&f), 2 * all);
+    f.precision = PANEL_I8;
+    ck_assert_double_eq(single - forecast_store_bytes(&f), 3 * all);
+    f.exact = true;
+    const double inverse = forecast_store_bytes(&f);
+    f.precision = PANEL_F32;
+    ck_assert_double_eq(forecast_store_bytes(&f), inverse);
+}
+END_TEST
+
+START_TEST(more_work_takes_longer) {
+    forecast f = {.n = 100000, .n_channels = 1, .recipe = recipes[1], .judge_recipe = recipes[1]};
+    const forecast_times one = forecast_seconds(&f, 1e7, 2);
+    ck_assert_double_ge(one.form_factors, 100000 * 300 / 1e7);
+    ck_assert_double_eq(one.judge, 0);
+    f.probes = 8;
+    ck_assert_double_eq(forecast_seconds(&f, 1e7, 2).judge, 2 * one.form_factors);
+    ck_assert_double_gt(forecast_seconds(&f, 5e6, 2).form_factors, one.form_factors);
+    f.from_store = true;
+    ck_assert_double_eq(forecast_seconds(&f, 1e7, 2).form_factors, 0);
+}
+END_TEST
+
+START_TEST(what_does_not_fit_is_refused) {
+    char folder[64], output[128];
+    folder_make(folder);
+    snprintf(output, sizeof output, "%s/a.h5", folder);
+    lam_error error = {0};
+    scratch *kept = NULL;
+    ck_assert_int_eq(scratch_open(folder, &kept, &error), LAM_OK);
+    forecast f = {.n = 1000, .n_channels = 1, .recipe = recipes[1], .scratch = true, .keep = true};
+    ck_assert_msg(forecast_check_disk(&f, output, kept, folder, &error) == LAM_OK, "%s", error.message);
+    f.n = (size_t)1 << 42; /* 2^42 rows of 300 entries: petabytes */
+    ck_assert_int_eq(forecast_check_disk(&f, output, NULL, NULL, &error), LAM_ERR_IO);
+    ck_assert_ptr_nonnull(strstr(error.message, output));
+    ck_assert_ptr_nonnull(strstr(error.message, "--keep-form-factors"));
+    ck_assert_int_eq(forecast_check_disk(&f, output, kept, folder, &error), LAM_ERR_IO);
+    ck_assert_ptr_nonnull(strstr(error.message, "--scratch"));
+    scratch_close(kept, true);
+    folder_remove(folder);
+
+    /* Hemicubes of a small scene see everything: packed weights and the triangle pass the rows themselves. */
+    forecast dense = {.n = 5000, .n_channels = 1, .recipe = recipes[4], .rank = 8};
+    const double without = forecast_bytes(&dense);
+    dense.scratch = true;
+    const double with = forecast_bytes(&dense);
+    dense.scratch = false;
+    ck_assert_double_lt(with, without);
+    ck_assert_int_eq(forecast_check(&dense, (with + without) / 2, &error), LAM_ERR_MEMORY);
+    ck_assert_ptr_nonnull(strstr(error.message, "--scratch DIR"));
+    ck_assert_int_eq(forecast_check(&dense, with / 8, &error), LAM_ERR_MEMORY);
+    ck_assert_ptr_null(strstr(error.message, "--scratch"));
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("forecast");
+    TCase *cases = tcase_create("forecast");
+    tcase_set_timeout(cases, 300);
+    tcase_add_loop_test(cases, files_are_within_the_forecast, 0, sizeof recipes / sizeof *recipes);
+    tcase_add_test(cases, fewer_bits_take_less_of_the_disk);
+    tcase_add_test(cases, more_work_takes_longer);
+    tcase_add_test(cases, what_does_not_fit_is_refused);
+    suite_add_tcase(suite, cases);
+    return suite_run(suite);
+}

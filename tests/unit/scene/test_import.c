@@ -1,0 +1,440 @@
+#include "support/suite.h"
+
+#include "solver/scene/import/imported_faces.h"
+#include "support/scene.h"
+
+/* A folder that each test has to itself. */
+static char folder[64];
+
+static void setup(void) {
+    folder_make(folder);
+}
+
+static void teardown(void) {
+    folder_remove(folder);
+}
+
+/* Imports a text as scene.obj; on LAM_OK m is the caller's. */
+static lam_status import_text(const char *text, mesh *m, import_report *report, lam_error *error) {
+    char path[256];
+    const import_options options = import_plain();
+    file_write(folder, "scene.obj", text, path);
+    return scene_import(path, &options, m, report, error);
+}
+
+static mesh good_text(const char *text, import_report *report) {
+    mesh m = {0};
+    lam_error error = {0};
+    ck_assert_msg(import_text(text, &m, report, &error) == LAM_OK, "%s", error.message);
+    return m;
+}
+
+/* The text is refused with a message that names the file and says this. */
+static void bad_text(const char *text, const char *says) {
+    mesh m = {0};
+    lam_error error = {0};
+    ck_assert_int_eq(import_text(text, &m, NULL, &error), LAM_ERR_FORMAT);
+    ck_assert_msg(strstr(error.message, folder) != NULL && strstr(error.message, says) != NULL, "%s",
+                  error.message);
+    ck_assert_ptr_null(m.vertices);
+}
+
+static void write_mtl(const char *text) {
+    char path[256];
+    file_write(folder, "scene.mtl", text, path);
+}
+
+#define SQUARE "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+
+/* --- groups -------------------------------------------------------------------------------------------- */
+
+START_TEST(groups_follow_objects_then_materials) {
+    import_report report;
+    write_mtl("newmtl red\nKd .6 .1 .1\nnewmtl grey paint\nKd .5 .5 .5\n");
+    mesh m =
+        good_text("mtllib scene.mtl\n" SQUARE "f 1 2 3\n" /* neither object nor material: the file's stem */
+                  "usemtl red\nf 1 2 4\n"                 /* no object: the material */
+                  "g roof  tiles\nf 1 3 4\n"              /* a group, as written */
+                  "o house\nf 2 3 4\n" /* an object of two materials, whatever its groups */
+                  "g wall\nusemtl grey paint\nf 1 2 3 4\n"
+                  "o roof  tiles\nusemtl red\nf 1 2 3\n" /* the same name again */
+                  "o mixed.thing\nf 4 3 2 1\n",
+                  &report);
+    const struct {
+        const char *name;
+        size_t n;
+    } expected[] = {
+        {"scene", 1},      {"red", 1}, {"roof  tiles", 2}, {"house.red", 1}, {"house.grey paint", 1},
+        {"mixed.thing", 1}};
+    ck_assert_uint_eq(m.n_groups, 6);
+    for (size_t g = 0; g < 6; g++) {
+        size_t n;
+        group_area(&m, expected[g].name, &n);
+        ck_assert_uint_eq(n, expected[g].n);
+    }
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(gltf_groups_are_nodes) {
+    mesh m = {0};
+    import_report report;
+    lam_error error = {0};
+    ck_assert_msg(import_fixture("meshes/TestScene.gltf", &m, &report, &error) == LAM_OK, "%s",
+                  error.message);
+    /* two nodes called Cube, with a material each */
+    const char *const names[] = {
+        "Cube.Default-Material", "Cube.ConstantMat", "Sphere", "Plane", "Cylinder", "d8 (1)", "d8"};
+    ck_assert_uint_eq(m.n_groups, 7);
+    for (size_t g = 0; g < 7; g++) ck_assert_uint_lt(group_find(&m, names[g]), 7);
+    ck_assert_double_eq_tol(group_area(&m, "Plane", NULL), 100, 1e-3);
+    ck_assert_double_eq_tol(group_area(&m, "Cube.ConstantMat", NULL), 6, 1e-5);
+    ck_assert_double_eq_tol(group_area(&m, "d8", NULL), group_area(&m, "d8 (1)", NULL), 1e-4);
+    size_t lit = 0;
+    for (size_t i = 0; i < m.n; i++)
+        if (m.group[i] == group_find(&m, "Sphere")) {
+            ck_assert_float_eq_tol(m.emission[i], .801471f, 1e-5f);
+            ck_assert_float_eq_tol(m.reflectance[m.n + i], .311419f, 1e-5f);
+            lit++;
+        }
+    ck_assert_uint_eq(lit, 768);
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(mirrored_nodes_keep_their_fronts) {
+    /* One triangle that looks along z, in a plain node and in one mirrored in x. */
+    static const char gltf[] =
+        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0,1]}],"
+        "\"nodes\":[{\"name\":\"plain\",\"mesh\":0},"
+        "{\"name\":\"mirrored\",\"mesh\":0,\"scale\":[-2,1,1],\"translation\":[0,0,3]}],"
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\","
+        "\"min\":[0,0,0],\"max\":[1,1,0]}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],"
+        "\"buffers\":[{\"byteLength\":36,\"uri\":\"data:application/"
+        "octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}]}";
+    char path[256];
+    import_report report;
+    file_write(folder, "mirror.gltf", gltf, path);
+    mesh m = import_good(path, &report);
+    ck_assert_uint_eq(m.n, 2);
+    ck_assert_double_eq(group_area(&m, "plain", NULL), .5);
+    ck_assert_double_eq(group_area(&m, "mirrored", NULL), 1);
+    for (size_t i = 0; i < 2; i++) ck_assert_float_eq(m.normal[i][2], 1);
+    mesh_free(&m);
+}
+END_TEST
+
+/* --- materials ----------------------------------------------------------------------------------------- */
+
+START_TEST(diffuse_of_one_or_more_is_clamped_with_a_warning) {
+    import_report report;
+    write_mtl("newmtl snow\nKd 1 1 1\nnewmtl too bright\nKd .2 1.5 .1\nKe 3 2 1\nnewmtl unused\nKd 9 9 9\n");
+    mesh m =
+        good_text("mtllib scene.mtl\n" SQUARE "usemtl snow\nf 1 2 3\nusemtl too bright\nf 1 3 4\n", &report);
+    ck_assert_uint_eq(report.clamped, 2);
+    ck_assert_ptr_nonnull(strstr(report.warnings, "material 'snow'"));
+    ck_assert_ptr_nonnull(strstr(report.warnings, "material 'too bright'"));
+    ck_assert_ptr_null(strstr(report.warnings, "unused"));
+    ck_assert_uint_eq(m.n_channels, 3);
+    const float reflectance[3][2] = {{.999f, .2f}, {.999f, .999f}, {.999f, .1f}};
+    for (size_t c = 0; c < 3; c++)
+        for (size_t i = 0; i < 2; i++) {
+            ck_assert_float_eq(m.reflectance[c * 2 + i], reflectance[c][i]);
+            ck_assert_float_eq(m.emission[c * 2 + i], i == 1 ? 3.f - (float)c : 0.f);
+        }
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(missing_colours_have_a_default_and_a_warning) {
+    import_report report;
+    write_mtl("newmtl bare\nKs 1 1 1\nnewmtl grey\nKd .25 .25 .25\n");
+    mesh m = good_text("mtllib scene.mtl\n" SQUARE "f 1 2 3\nf 1 3 4\nusemtl bare\nf 1 2 4\n"
+                       "usemtl unheard\nf 2 3 4\nusemtl grey\nf 1 2 3 4\n",
+                       &report);
+    ck_assert_ptr_nonnull(strstr(report.warnings, "2 faces have no material"));
+    ck_assert_ptr_nonnull(strstr(report.warnings, "'bare' has no diffuse colour"));
+    ck_assert_ptr_nonnull(strstr(report.warnings, "'unheard' is not defined"));
+    ck_assert_uint_eq(m.n_channels, 1);
+    for (size_t i = 0; i < 5; i++) ck_assert_float_eq(m.reflectance[i], i == 4 ? .25f : .5f);
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(bad_colours_are_errors) {
+    const char *const scene = "mtllib scene.mtl\n" SQUARE "usemtl a b\nf 1 2 3\n";
+    write_mtl("newmtl a b\nKd .5 -.1 .5\n");
+    bad_text(scene, "material 'a b': diffuse value -0.1");
+    write_mtl("newmtl a b\nKd .5 nan .5\n");
+    bad_text(scene, "material 'a b': diffuse value nan");
+    write_mtl("newmtl a b\nKd .5 .5 .5\nKe 0 1e999 0\n");
+    bad_text(scene, "material 'a b': emission inf");
+    write_mtl("newmtl a b\nKd .5 .5 .5\nKe 0 0 -1\n");
+    bad_text(scene, "material 'a b': emission -1");
+    write_mtl("\nnewmtl a b\nKd spectral x.rfl\n");
+    bad_text(scene, "scene.mtl:3: 'spectral x.rfl' is not a colour");
+}
+END_TEST
+
+START_TEST(reflectance_option_overrides_but_keeps_emission) {
+    char path[256];
+    import_report report;
+    lam_error error = {0};
+    mesh m = {0};
+    import_options options = {.unit = 1, .reflectance = .3};
+    write_mtl("newmtl lamp\nKd 2 .1 .1\nKe 3 2 1\n");
+    file_write(folder, "scene.obj", "mtllib scene.mtl\n" SQUARE "f 1 2 3\nusemtl lamp\nf 1 3 4\n", path);
+    ck_assert_msg(scene_import(path, &options, &m, &report, &error) == LAM_OK, "%s", error.message);
+    ck_assert_str_eq(report.warnings, "");
+    ck_assert_uint_eq(m.n_channels, 3);
+    for (size_t i = 0; i < 6; i++) ck_assert_float_eq(m.reflectance[i], .3f);
+    ck_assert_float_eq(m.emission[3], 2);
+    mesh_free(&m);
+    options.reflectance = 1;
+    ck_assert_int_eq(scene_import(path, &options, &m, &report, &error), LAM_ERR_ARGUMENT);
+}
+END_TEST
+
+START_TEST(missing_material_files_are_named_with_their_line) {
+    char path[256];
+    bad_text(SQUARE "mtllib nowhere.mtl\nf 1 2 3\n",
+             "scene.obj:5: the material file 'nowhere.mtl' is missing");
+    write_mtl("newmtl a\nKd .1 .1 .1\n");
+    bad_text("mtllib scene.mtl nowhere.mtl\n" SQUARE "f 1 2 3\n",
+             "scene.obj:1: the material file 'nowhere.mtl'");
+    file_write(folder, "with a blank.mtl", "newmtl b\nKd .2 .2 .2\n", path);
+    import_report report;
+    mesh m = good_text("mtllib with a blank.mtl\nmtllib scene.mtl with\\ a\\ blank.mtl\n" SQUARE
+                       "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n",
+                       &report);
+    ck_assert_float_eq(m.reflectance[0], .1f);
+    ck_assert_float_eq(m.reflectance[1], .2f);
+    mesh_free(&m);
+}
+END_TEST
+
+/* --- geometry ------------------------------------------------------------------------------------------ */
+
+START_TEST(planar_convex_quads_stay_and_others_become_triangles) {
+    import_report report;
+    mesh m = good_text(SQUARE "v 0 1 .5\nv .5 .5 0\nv .5 0 0\n"
+                              "f 1 2 3 4\n"   /* a quad */
+                              "f 1 2 3 5\n"   /* not planar: two triangles */
+                              "f 1 2 3 6\n"   /* a straight corner at 6: one triangle */
+                              "f 1 7 2 3 4\n" /* a straight corner at 7: a quad again */
+                              "f 1 2 2 3\n"   /* a corner twice: a triangle */
+                              "f 1 3 4 4 4\n" /* and again */
+                              "f 1 2 1 2\nf 1 7 2\nf 3 3 3\nf 1 2\np 1\nl 1 2 3\n",
+                       &report);
+    ck_assert_uint_eq(m.n, 7);
+    size_t quads = 0;
+    for (size_t i = 0; i < m.n; i++) quads += m.elements[i][3] != MESH_NO_VERTEX;
+    ck_assert_uint_eq(quads, 2);
+    ck_assert_uint_eq(report.dropped_faces, 4);
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(concave_polygons_keep_area_and_side) {
+    /* Polygons in the plane and their areas: an arrow head, an L, a comb, a spiral, a square with a notch. */
+    static const struct {
+        double area;
+        size_t n;
+        double p[20][2];
+    } shapes[] = {
+        {1, 4, {{0, 0}, {2, 1}, {0, 2}, {1, 1}}},
+        {3, 6, {{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}}},
+        {6 - 2 * .5,
+         12,
+         {{0, 0},
+          {6, 0},
+          {6, 1},
+          {5, 1},
+          {5, .5},
+          {4, .5},
+          {4, 1},
+          {2, 1},
+          {2, .5},
+          {1, .5},
+          {1, 1},
+          {0, 1}}},
+        {14,
+         12,
+         {{0, 0},
+          {5, 0},
+          {5, 5},
+          {1, 5},
+          {1, 2},
+          {2, 2},
+          {2, 4},
+          {4, 4},
+          {4, 1},
+          {0, 1},
+          {0, .75},
+          {0, .25}}},
+        {4 - 2 * 1.75 / 2, 5, {{0, 0}, {2, 0}, {2, 2}, {1, .25}, {0, 2}}},
+        {4 - .125, 7, {{0, 0}, {2, 0}, {2, 2}, {1.25, 2}, {1, 1.5}, {.75, 2}, {0, 2}}},
+    };
+    for (size_t s = 0; s < sizeof shapes / sizeof *shapes; s++)
+        for (int turned = 0; turned < 3; turned++) {
+            char text[4096] = "";
+            size_t used = 0;
+            /* in the plane across (1, 2, 2) / 3, far from the origin: u = (2, 1, -2) / 3, w = (-2, 2, -1) / 3
+             */
+            for (size_t i = 0; i < shapes[s].n; i++) {
+                const double *p = shapes[s].p[(i + (size_t)turned * 2) % shapes[s].n];
+                used += (size_t)snprintf(text + used, sizeof text - used, "v %.17g %.17g %.17g\n",
+                                         84878.468 + (2 * p[0] - 2 * p[1]) / 3,
+                                         447586.999 + (p[0] + 2 * p[1]) / 3, (-2 * p[0] - p[1]) / 3);
+            }
+            used += (size_t)snprintf(text + used, sizeof text - used, "f");
+            for (size_t i = 0; i < shapes[s].n; i++)
+                used += (size_t)snprintf(text + used, sizeof text - used, " %zu", i + 1);
+            snprintf(text + used, sizeof text - used, "\n");
+            import_report report;
+            mesh m = good_text(text, &report);
+            /* Coordinates round at 447587 * 2^-53 = 5e-11. Pieces of one plane whose normals agree do not
+             * overlap when their areas sum up to the polygon's. */
+            ck_assert_double_eq_tol(total_area(&m), shapes[s].area, 1e-8);
+            for (size_t i = 0; i < m.n; i++) {
+                ck_assert_float_eq_tol(m.normal[i][0], 1.f / 3, 1e-6f);
+                ck_assert_float_eq_tol(m.normal[i][1], 2.f / 3, 1e-6f);
+            }
+            ck_assert_str_eq(strstr(report.warnings, "precision") == NULL ? "" : report.warnings, "");
+            mesh_free(&m);
+        }
+}
+END_TEST
+
+START_TEST(coordinates_are_scaled_but_not_turned) {
+    char path[256];
+    lam_error error = {0};
+    mesh m = {0};
+    import_options options = {.unit = .001, .up = 'x', .reflectance = -1};
+    file_write(folder, "scene.obj",
+               "v 0 0 0 .5\r\nv 2000 0 0 1 1 1\r\n  v\t0 3000 \\\r\n 1000\r\n# v x\r\nf -3/1/1 -2//2 -1\r\n",
+               path);
+    ck_assert_msg(scene_import(path, &options, &m, NULL, &error) == LAM_OK, "%s", error.message);
+    ck_assert_uint_eq(m.n_vertices, 3);
+    ck_assert_double_eq(m.vertices[1][0], 2000 * .001);
+    ck_assert_double_eq(m.vertices[2][1], 3000 * .001);
+    ck_assert_double_eq(m.vertices[2][2], 1000 * .001);
+    ck_assert_int_eq(m.up, 'x');
+    ck_assert_double_eq(m.unit, .001);
+    ck_assert_str_eq(m.name, "scene");
+    char hash[33];
+    mesh_geometry_hash(&m, hash);
+    ck_assert_str_eq(m.source_hash, hash);
+    mesh_free(&m);
+    const double units[] = {0, -1, NAN, INFINITY};
+    for (size_t i = 0; i < 4; i++) {
+        options.unit = units[i];
+        ck_assert_int_eq(scene_import(path, &options, &m, NULL, &error), LAM_ERR_ARGUMENT);
+    }
+}
+END_TEST
+
+START_TEST(single_precision_far_from_the_origin_is_told) {
+    char path[256];
+    import_report report;
+    const char *const triangle = "solid s\nfacet normal 0 0 1\nouter loop\nvertex %s0 0 0\nvertex %s1 0 0\n"
+                                 "vertex %s0 1 0\nendloop\nendfacet\nendsolid s\n";
+    char text[512];
+    snprintf(text, sizeof text, triangle, "44758", "44758", "44758");
+    file_write(folder, "far.stl", text, path);
+    mesh m = import_good(path, &report);
+    ck_assert_ptr_nonnull(strstr(report.warnings, "single precision"));
+    mesh_free(&m);
+    snprintf(text, sizeof text, triangle, "4", "4", "4");
+    file_write(folder, "near.stl", text, path);
+    m = import_good(path, &report);
+    ck_assert_ptr_null(strstr(report.warnings, "single precision"));
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(bad_geometry_is_refused_by_line) {
+    bad_text("", "scene is empty");
+    bad_text("f 1 2 3\n", "scene.obj:1: face refers to vertex 1, there are 0");
+    bad_text(SQUARE "f 1 2 9\n", "scene.obj:5: face refers to vertex 9, there are 4");
+    bad_text(SQUARE "f 1 2 99999999999999999999\n", "scene.obj:5: vertex index 99999999999999999999");
+    bad_text(SQUARE "f 1 2 4294967296\n", "scene.obj:5: vertex index 4294967296");
+    bad_text(SQUARE "f 1 two 3\n", "scene.obj:5: 'two 3' is not a vertex");
+    bad_text(SQUARE "f 1 2.5 3\n", "scene.obj:5");
+    bad_text(SQUARE "f 0 1 2\n", "scene.obj:5: vertex index 0");
+    bad_text("v 0 0\n", "scene.obj:1: a vertex needs three numbers");
+    bad_text("v 0 0 0\nv 1 inf 0\nv 0 1 0\nf 1 2 3\n", "scene.obj:2: vertex coordinate inf");
+    bad_text("v 0 0 0\nv 1 1e999 0\nv 0 1 0\nf 1 2 3\n", "scene.obj:2: vertex coordinate inf");
+    bad_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "none of its 1 faces has an area");
+    bad_text("v 0 0 0\nv 1 0 0\nv .5 1e-15 0\nf 1 2 3\n", "none of its 1 faces has an area");
+}
+END_TEST
+
+START_TEST(files_that_cannot_be_read_are_named) {
+    const import_options options = import_plain();
+    mesh m = {0};
+    lam_error error = {0};
+    char path[256];
+    const char *const names[] = {"missing.obj", "missing.glb", "missing"};
+    for (size_t i = 0; i < 3; i++) {
+        snprintf(path, sizeof path, "%s/%s", folder, names[i]);
+        ck_assert_int_eq(scene_import(path, &options, &m, NULL, &error), LAM_ERR_IO);
+        ck_assert_msg(strstr(error.message, path) != NULL && strstr(error.message, "No such file") != NULL,
+                      "%s", error.message);
+    }
+    ck_assert_int_eq(scene_import(folder, &options, &m, NULL, &error), LAM_ERR_IO);
+    file_write(folder, "scene.txt", "hello", path);
+    ck_assert_int_eq(scene_import(path, &options, &m, NULL, &error), LAM_ERR_FORMAT);
+    ck_assert_ptr_nonnull(strstr(error.message, path));
+}
+END_TEST
+
+START_TEST(warnings_are_cut_with_a_count) {
+    static char mtl[20000], obj[20000] = "mtllib scene.mtl\n" SQUARE;
+    size_t mtl_used = 0, obj_used = strlen(obj);
+    for (int i = 0; i < 200; i++) {
+        mtl_used += (size_t)snprintf(mtl + mtl_used, sizeof mtl - mtl_used, "newmtl bright%d\nKd 1 1 1\n", i);
+        obj_used +=
+            (size_t)snprintf(obj + obj_used, sizeof obj - obj_used, "usemtl bright%d\nf 1 2 3 4\n", i);
+    }
+    import_report report;
+    write_mtl(mtl);
+    mesh m = good_text(obj, &report);
+    ck_assert_uint_eq(report.clamped, 200);
+    ck_assert_uint_eq(m.n_groups, 200);
+    unsigned lines = 0, more = 0;
+    for (const char *line = report.warnings; line != NULL; line = strchr(line, '\n')) {
+        line += *line == '\n';
+        if (sscanf(line, "%u more warnings", &more) != 1) lines++;
+        if (*line == '\0') break;
+    }
+    ck_assert_uint_eq(lines + more, 200);
+    mesh_free(&m);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("import");
+    TCase *tests = tcase_create("import");
+    tcase_set_timeout(tests, 300);
+    tcase_add_checked_fixture(tests, setup, teardown);
+    tcase_add_test(tests, groups_follow_objects_then_materials);
+    tcase_add_test(tests, gltf_groups_are_nodes);
+    tcase_add_test(tests, mirrored_nodes_keep_their_fronts);
+    tcase_add_test(tests, diffuse_of_one_or_more_is_clamped_with_a_warning);
+    tcase_add_test(tests, missing_colours_have_a_default_and_a_warning);
+    tcase_add_test(tests, bad_colours_are_errors);
+    tcase_add_test(tests, reflectance_option_overrides_but_keeps_emission);
+    tcase_add_test(tests, missing_material_files_are_named_with_their_line);
+    tcase_add_test(tests, planar_convex_quads_stay_and_others_become_triangles);
+    tcase_add_test(tests, concave_polygons_keep_area_and_side);
+    tcase_add_test(tests, coordinates_are_scaled_but_not_turned);
+    tcase_add_test(tests, single_precision_far_from_the_origin_is_told);
+    tcase_add_test(tests, bad_geometry_is_refused_by_line);
+    tcase_add_test(tests, files_that_cannot_be_read_are_named);
+    tcase_add_test(tests, warnings_are_cut_with_a_count);
+    suite_add_tcase(suite, tests);
+    return suite_run(suite);
+}

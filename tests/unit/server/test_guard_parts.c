@@ -1,0 +1,216 @@
+/* What the daemon tells connections, answers and requests apart by: who is cut and who is not, entity tags,
+ * request ids. */
+#include "server/http/etag.h"
+#include "server/http/request_id.h"
+#include "server/net/connections.h"
+#include "support/suite.h"
+
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+typedef struct pair {
+    int ours, theirs;
+    client *c;
+} pair;
+
+static pair open_pair(connections *all) {
+    int fds[2];
+    ck_assert_int_eq(socketpair(AF_UNIX, SOCK_STREAM, 0, fds), 0);
+    pair p = {fds[0], fds[1], connections_add(all, fds[0])};
+    ck_assert_ptr_nonnull(p.c);
+    return p;
+}
+
+/* Whether the client sees an end, now. */
+static bool is_cut(const pair *p) {
+    char byte;
+    return recv(p->theirs, &byte, 1, MSG_DONTWAIT) == 0;
+}
+
+static void wait_cut(const pair *p) {
+    char byte;
+    ck_assert_int_eq(recv(p->theirs, &byte, 1, 0), 0);
+}
+
+static void close_pair(connections *all, pair *p) {
+    connections_remove(all, p->c);
+    close(p->ours);
+    close(p->theirs);
+}
+
+static connections *start(size_t most, size_t timeout_s, size_t least_rate) {
+    connections *all = NULL;
+    lam_error error;
+    const connection_limits limits = {most, timeout_s, least_rate};
+    ck_assert_int_eq(connections_start(&limits, &all, &error), LAM_OK);
+    return all;
+}
+
+static void expect_count(connections *all, const char *line) {
+    buffer b = {0};
+    ck_assert(connections_write(all, &b));
+    ck_assert_msg(strstr(b.bytes, line) != NULL, "%s is not in\n%s", line, b.bytes);
+    buffer_free(&b);
+}
+
+/* In the order in which the last is cut; those that are never cut are looked at when all others are. */
+START_TEST(each_stage_has_its_time) {
+    connections *all = start(100, 1, 1 << 10);
+    pair head = open_pair(all), body = open_pair(all), solve = open_pair(all), quick = open_pair(all),
+         large = open_pair(all), next = open_pair(all);
+    client_enter(all, body.c, STAGE_BODY, 0);
+    client_enter(all, solve.c, STAGE_SOLVE, 0);
+    /* A MiB has come, at the least rate the bytes of 1024 seconds: they are worth a time-out all the same. */
+    client_enter(all, quick.c, STAGE_BODY, 0);
+    client_received(all, quick.c, 1 << 20);
+    client_enter(all, large.c, STAGE_ANSWER, 100);
+    client_enter(all, next.c, STAGE_SOLVE, 0);
+    wait_cut(&head);
+    wait_cut(&body);
+    wait_cut(&large);
+    wait_cut(&quick);
+    ck_assert(!is_cut(&solve));
+    /* The time of a stage begins with it: this one has just entered. */
+    client_enter(all, next.c, STAGE_HEAD, 0);
+    ck_assert(!is_cut(&next));
+    wait_cut(&next);
+    ck_assert(!is_cut(&solve));
+    expect_count(all, "\nlambertd_connections 6\n");
+    expect_count(all, "_cut_total{why=\"head\"} 2\n");
+    expect_count(all, "_cut_total{why=\"body\"} 2\n");
+    expect_count(all, "_cut_total{why=\"answer\"} 1\n");
+    pair *every[] = {&head, &body, &solve, &quick, &large, &next};
+    for (size_t i = 0; i < sizeof every / sizeof every[0]; i++) close_pair(all, every[i]);
+    expect_count(all, "\nlambertd_connections 0\n");
+    connections_stop(all);
+}
+END_TEST
+
+START_TEST(a_body_that_moves_is_cut_for_its_rate_alone) {
+    connections *all = start(100, 3, 1 << 20);
+    pair slow = open_pair(all), fast = open_pair(all);
+    client_enter(all, slow.c, STAGE_BODY, 0);
+    client_enter(all, fast.c, STAGE_BODY, 0);
+    while (!is_cut(&slow)) {
+        client_received(all, slow.c, 1);
+        client_received(all, fast.c, 1 << 20);
+        usleep(1000);
+    }
+    ck_assert(!is_cut(&fast));
+    close_pair(all, &slow);
+    close_pair(all, &fast);
+    connections_stop(all);
+}
+END_TEST
+
+START_TEST(idle_clients_make_place_and_no_others) {
+    connections *all = start(4, 3600, 1);
+    pair solve = open_pair(all), old = open_pair(all), body = open_pair(all);
+    client_enter(all, solve.c, STAGE_SOLVE, 0);
+    client_enter(all, body.c, STAGE_BODY, 0);
+    usleep(2500000);
+    ck_assert(!is_cut(&old));
+    pair late = open_pair(all);
+    wait_cut(&old);
+    ck_assert(!is_cut(&solve) && !is_cut(&body));
+    expect_count(all, "_cut_total{why=\"place\"} 1\n");
+    close_pair(all, &solve);
+    close_pair(all, &old);
+    close_pair(all, &body);
+    close_pair(all, &late);
+    connections_stop(all);
+}
+END_TEST
+
+START_TEST(who_is_lost) {
+    connections *all = start(10, 1, 1);
+    pair half = open_pair(all), gone = open_pair(all);
+    ck_assert(!client_is_lost(half.c) && !client_is_lost(gone.c) && !client_is_lost(NULL));
+    shutdown(half.theirs, SHUT_WR);
+    ck_assert(!client_is_lost(half.c));
+    close(gone.theirs);
+    ck_assert(client_is_lost(gone.c));
+    gone.theirs = -1;
+    close_pair(all, &half);
+    close_pair(all, &gone);
+    connections_stop(all);
+}
+END_TEST
+
+START_TEST(as_many_as_files_may_be_open) {
+    struct rlimit before;
+    lam_error error;
+    size_t most = 0;
+    ck_assert_int_eq(getrlimit(RLIMIT_NOFILE, &before), 0);
+    struct rlimit low = {100, before.rlim_max < 300 ? before.rlim_max : 300};
+    ck_assert_int_eq(setrlimit(RLIMIT_NOFILE, &low), 0);
+    ck_assert_int_eq(connections_affordable(10, &most, &error), LAM_OK);
+    ck_assert_uint_eq(most, 10);
+    ck_assert_int_eq(getrlimit(RLIMIT_NOFILE, &before), 0);
+    ck_assert_uint_eq(before.rlim_cur, 100);
+    /* The soft limit is raised, up to the hard one. */
+    ck_assert_int_eq(connections_affordable(1000, &most, &error), LAM_OK);
+    ck_assert_uint_eq(most, (size_t)low.rlim_max - 64);
+    low = (struct rlimit){64, 64};
+    ck_assert_int_eq(setrlimit(RLIMIT_NOFILE, &low), 0);
+    ck_assert_int_eq(connections_affordable(10, &most, &error), LAM_ERR_IO);
+    ck_assert_ptr_nonnull(strstr(error.message, "ulimit -n"));
+}
+END_TEST
+
+START_TEST(tags) {
+    char plain[ETAG_MAX], coded[ETAG_MAX], other[ETAG_MAX];
+    etag_make(etag_hash("abc", 3), "identity", plain);
+    etag_make(etag_hash("abc", 3), "gzip", coded);
+    etag_make(etag_hash("abd", 3), "identity", other);
+    ck_assert_uint_eq(strlen(plain), 18);
+    ck_assert(strcmp(plain, other) != 0 && strcmp(plain, coded) != 0);
+    char header[200];
+    snprintf(header, sizeof header, "%s , W/%s", other, plain);
+    ck_assert(etag_is_listed(header, plain) && etag_is_listed(header, other) &&
+              !etag_is_listed(header, coded));
+    /* What stands inside a quoted tag is no tag. */
+    snprintf(header, sizeof header, "\"x, %.17s", plain + 1);
+    ck_assert(!etag_is_listed(header, plain));
+    static const char *const none[] = {"", ",", "\"", "W/", "W/\"", "\"\"", "a", "x*", " ", NULL};
+    for (size_t i = 0; i < sizeof none / sizeof none[0]; i++) ck_assert(!etag_is_listed(none[i], plain));
+    ck_assert(etag_is_listed("*", plain) && etag_is_listed(" ,\t*", plain));
+}
+END_TEST
+
+START_TEST(ids) {
+    char id[REQUEST_ID_MAX + 1], again[REQUEST_ID_MAX + 1], longest[REQUEST_ID_MAX + 2];
+    memset(longest, 'x', sizeof longest);
+    longest[REQUEST_ID_MAX + 1] = '\0';
+    request_id_choose(longest + 1, 1, 1, id);
+    ck_assert_str_eq(id, longest + 1);
+    static const char *const bad[] = {NULL, "", "a b", "a\n", "\"", "{}", "\x80", "a\\"};
+    request_id_choose(longest, UINT64_MAX, UINT64_MAX, id);
+    ck_assert_str_eq(id, "ffffffffffff-18446744073709551615");
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        request_id_choose(bad[i], 7, i, id);
+        request_id_choose(bad[i], 7, i + 1, again);
+        ck_assert_str_ne(id, again);
+        ck_assert_ptr_null(strpbrk(id, " \n\"{}\\"));
+    }
+    ck_assert(request_id_seed() != request_id_seed());
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("guard_parts");
+    TCase *all = tcase_create("all");
+    tcase_set_timeout(all, 120);
+    tcase_add_test(all, each_stage_has_its_time);
+    tcase_add_test(all, a_body_that_moves_is_cut_for_its_rate_alone);
+    tcase_add_test(all, idle_clients_make_place_and_no_others);
+    tcase_add_test(all, who_is_lost);
+    tcase_add_test(all, tags);
+    tcase_add_test(all, ids);
+    /* Last: in a process that is not forked the limit stays. */
+    tcase_add_test(all, as_many_as_files_may_be_open);
+    suite_add_tcase(suite, all);
+    return suite_run(suite);
+}
