@@ -4,8 +4,8 @@
 #include "solver/base/clock.h"
 #include "solver/method/hierarchical/plane_tree.h"
 #include "solver/method/hierarchical/self_check.h"
-#include "solver/method/hierarchical/wavelet_balance.h"
 #include "solver/method/hierarchical/wavelet_basis.h"
+#include "solver/method/hierarchical/wavelet_entries.h"
 #include "solver/method/hierarchical/wavelet_inverse.h"
 #include "solver/method/hierarchical/wavelet_pass.h"
 #include "solver/method/method.h"
@@ -144,7 +144,8 @@ static lam_status build(const build_problem *problem, const build_options *optio
     for (size_t p = 0; p < n; p++) area[p] = problem->area[tree.order[p]];
     if (stream != NULL) {
         TRY(stream->close(stream->context, &row_sums, error));
-        TRY(wavelet_balance(&arrays.basis, tree.order, area, row_sums, pass.threshold, weight, &S, error));
+        TRY(wavelet_impose_row_sums(&arrays.basis, tree.order, area, row_sums, pass.threshold, weight, &S,
+                                    error));
     } else {
         sum_rows(problem->F, sums);
     }

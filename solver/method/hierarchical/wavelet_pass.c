@@ -2,8 +2,7 @@
 
 #include "solver/base/bitset.h"
 #include "solver/method/hierarchical/subtrees.h"
-#include "solver/method/hierarchical/wavelet_details.h"
-#include "solver/method/hierarchical/wavelet_kept.h"
+#include "solver/method/hierarchical/wavelet_entries.h"
 
 #include "store/status.h"
 
@@ -15,21 +14,20 @@
 #include <immintrin.h>
 #endif
 
-/* Rows side by side: what a node takes. */
+/* Up to WAVELET_INPUTS rows of one node side by side: lane k is the row of its function k. */
 typedef float lanes __attribute__((vector_size(32)));
 typedef float lanes_unaligned __attribute__((vector_size(32), aligned(4), may_alias));
 
-/* Of rows that know one side a coefficient is half there: it is looked at from this share of the threshold
- * on, for what noise may lack of that half. */
-static const float share_looked_at = .2f;
+/* Of one-sided rows each coefficient is a sum S1_ij + S1_ji of two that are found apart, each noisy: either
+ * is kept above this share of the threshold, and their sum is compared with the whole. */
+static const float one_sided_share = .2f;
 
-/* So many numbers ahead memory is asked for what is going to be needed. */
+/* Prefetch distance, in entries. */
 enum { AHEAD = 12 };
 
-/* What a cluster hands up of several rows, and of as many as a node hands up: both at most linear functions.
- */
-enum { SCALING = 3 };
-_Static_assert((int)SCALING == (int)DETAIL_LANES, "of finer columns as many rows are handed up");
+/* Rows on the scaling functions of a column cluster (constant and linear, three at most): all rows of a node
+ * (block), or its scaling rows alone (kept_block). */
+enum { SCALING = ENTRY_LANES };
 typedef struct block {
     lanes of[SCALING];
 } block;
@@ -37,7 +35,7 @@ typedef struct kept_block {
     float of[SCALING][SCALING];
 } kept_block;
 
-/* Rows on clusters (nodes, ascending), of which all others are 0. */
+/* The rows of a node on column clusters (nodes, ascending); they are 0 on all others. */
 typedef struct live_rows {
     size_t count;
     uint32_t *cluster;
@@ -49,46 +47,47 @@ typedef struct kept_rows {
     kept_block *value;
 } kept_rows;
 
-/* Where the column of an element lies, and A^-1/2 of it. */
+/* Position of an element, and its A^-1/2. */
 typedef struct column_place {
     uint32_t position;
     float over_root;
 } column_place;
 
-/* What all threads share. */
+/* Shared by all threads. */
 typedef struct pass_job {
     const wavelet_pass_input *input;
     wavelet_reach reach;
     column_place *columns; /* [n], by element */
-    kept_rows *kept;       /* [n_nodes], of what waits for its sibling */
-    details *details;      /* [n_nodes], likewise; NULL: rows know both sides */
-    float least;           /* of what is looked at, before weights */
+    kept_rows *kept;       /* [n_nodes], scaling rows that wait for those of the sibling */
+    fine_columns *fine;    /* [n_nodes], their finer columns; NULL: rows are two-sided */
+    float least;           /* a coefficient is kept above it times both weights */
     size_t done;           /* elements */
 } pass_job;
 
-/* What a thread works with. */
-typedef struct desk {
-    lanes *dense;           /* [n], rows of a leaf: all 0 between leaves */
-    marks lit;              /* where they are not; AHEAD numbers behind them may be looked at */
+/* The working area of one thread. */
+typedef struct pass_work {
+    lanes *dense;           /* [n], rows of a leaf by position: all 0 between leaves */
+    marks lit;              /* positions where they are not 0; AHEAD numbers behind these may be read */
     uint32_t *cells, *work; /* of wavelet_cells */
-    live_rows rows[2], near[2];
-    details fresh, merged, joined; /* of a node: found at it, of its children, both */
-    size_t *runs;                  /* where those of each height begin in the first */
-    kept_list found;
-} desk;
+    live_rows rows[2];      /* of the scaling functions, before and after a level */
+    live_rows near[2];      /* of the wavelets, on near clusters alone */
+    fine_columns fresh, merged, joined; /* finer columns that a node adds, those of its children, both */
+    size_t *runs;                       /* [heights], where each height begins in `fresh` */
+    coefficient_list found;
+} pass_work;
 
-/* What is wanted of a column's wavelets: what is above the threshold in those of the rows, what they are to
- * the rows that are handed up. */
-enum { EMIT = 1, DETAILS = 2 };
+/* What happens to the rows at a column's wavelets: KEEP stores coefficients above the threshold, CARRY adds
+ * finer columns. */
+enum { KEEP = 1, CARRY = 2 };
 
-/* The node whose rows are on their way. */
+/* The node whose rows are transformed. */
 typedef struct pass_row {
     const pass_job *job;
     size_t node;
-    unsigned wanted; /* of columns that its rows are handed up on: DETAILS, or nothing */
+    unsigned wanted; /* at columns that its scaling rows pass: CARRY or 0 */
     uint32_t height;
-    uint32_t first;     /* coefficient of lane 0, were lanes of what is handed up coefficients too */
-    unsigned own_lanes; /* coefficients: wavelets; of the root, where rows know one side, all */
+    uint32_t first;     /* the coefficient of lane k is first + k, for a wavelet k */
+    unsigned own_lanes; /* bits of the lanes that are coefficients: wavelets; all of a one-sided root */
     float least;        /* threshold times the weight of the node */
 } pass_row;
 
@@ -98,20 +97,20 @@ static void kept_rows_free(kept_rows *k) {
     *k = (kept_rows){.count = 0};
 }
 
-/* What the root would hand up are the last coefficients. */
+/* The scaling functions of the root are the last coefficients. */
 static inline uint32_t row_coefficient(const pass_row *row, unsigned lane) {
     const wavelets *w = row->job->input->basis;
     const uint32_t scaling = w->nodes[row->node].scaling;
     return lane < scaling ? (uint32_t)w->n - scaling + lane : row->first + lane;
 }
 
-/* Of the row's node and column node b. Of two nodes of one height each finds the other: where rows know both
- * sides the earlier one keeps what they find, of itself the upper triangle. */
-static lam_status desk_keep(const pass_row *row, desk *d, uint32_t b, uint32_t i, uint32_t j, float value,
-                            lam_error *error) {
-    const bool both_sides = row->job->details == NULL;
-    if (both_sides && row->job->reach.height[b] == row->height && j < i) return LAM_OK;
-    return kept_put(&d->found, i, j, value, error);
+/* Coefficient (i, j) of the row's node and column node b. Two nodes of one height find each other: of
+ * two-sided rows the one with i <= j is kept. */
+static lam_status keep_coefficient(const pass_row *row, pass_work *d, uint32_t b, uint32_t i, uint32_t j,
+                                   float value, lam_error *error) {
+    const bool two_sided = row->job->fine == NULL;
+    if (two_sided && row->job->reach.height[b] == row->height && j < i) return LAM_OK;
+    return coefficient_list_add(&d->found, i, j, value, error);
 }
 
 static inline unsigned beyond_portable(const lanes *v, float least) {
@@ -137,31 +136,29 @@ static inline unsigned beyond_portable(const lanes *v, float least) {
 /* The fastest kernels for this CPU. */
 typedef struct pass_kernels {
     void (*merge)(const wavelets *, size_t, const kept_rows *, const kept_rows *, live_rows *);
-    lam_status (*promote)(const pass_row *, uint32_t, unsigned, const live_rows *, live_rows *, desk *,
+    lam_status (*promote)(const pass_row *, uint32_t, unsigned, const live_rows *, live_rows *, pass_work *,
                           lam_error *);
-    lam_status (*merge_details)(const pass_row *, const details *, const details *, details *, desk *,
-                                lam_error *);
-    lam_status (*begin_leaf)(const pass_row *, size_t, live_rows *, desk *, lam_error *);
+    lam_status (*merge_fine_columns)(const pass_row *, const fine_columns *, const fine_columns *,
+                                     fine_columns *, pass_work *, lam_error *);
+    lam_status (*begin_leaf)(const pass_row *, size_t, live_rows *, pass_work *, lam_error *);
 } pass_kernels;
 
 static pass_kernels kernels_of_cpu(void) {
 #if defined(__x86_64__)
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
-        return (pass_kernels){merge_avx2, promote_avx2, merge_details_avx2, begin_leaf_avx2};
+        return (pass_kernels){merge_avx2, promote_avx2, merge_fine_columns_avx2, begin_leaf_avx2};
 #endif
-    return (pass_kernels){merge_portable, promote_portable, merge_details_portable, begin_leaf_portable};
+    return (pass_kernels){merge_portable, promote_portable, merge_fine_columns_portable, begin_leaf_portable};
 }
 
-/* --- one node ------------------------------------------------------------------------------------------ */
-
-/* Scaled rows of a leaf's elements, side by side in the desk. */
-static lam_status scatter_rows(const pass_job *job, size_t node, desk *d, lam_error *error) {
+/* Rows S_ij = A_i^1/2 F_ij A_j^-1/2 of a leaf's elements, one a lane, into `dense`. */
+static lam_status scatter_rows(const pass_job *job, size_t node, pass_work *d, lam_error *error) {
     lam_status status = LAM_OK;
     const wavelet_pass_input *input = job->input;
     const wavelet_node *a = &input->basis->nodes[node];
     const uint32_t *elements = input->tree->order + a->begin;
     row_block rows = {0};
-    /* Where rows are found only now a leaf may take seconds. */
+    /* A row source that traces rays may take seconds for a leaf. */
     if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
     TRY(row_source_get(input->rows, elements, a->n_elements, &rows, error));
     for (size_t lane = 0; lane < a->n_elements; lane++) {
@@ -180,7 +177,7 @@ done:
     return status;
 }
 
-/* What the node hands up waits for its sibling. */
+/* Stores the scaling rows of a node until its sibling is done. */
 static lam_status keep_rows(const live_rows *rows, size_t scaling, const wavelets *w, kept_rows *out,
                             lam_error *error) {
     lam_status status = LAM_OK;
@@ -197,8 +194,9 @@ done:
     return status;
 }
 
-/* Coefficients whose column is what the root would hand up; of the root's own rows those too. */
-static lam_status end_at_root(const pass_row *row, size_t node, const live_rows *rows, desk *d,
+/* Coefficients at the scaling functions of the root, of the wavelets of a node, and of all rows of the root.
+ */
+static lam_status end_at_root(const pass_row *row, size_t node, const live_rows *rows, pass_work *d,
                               lam_error *error) {
     lam_status status = LAM_OK;
     const wavelets *w = row->job->input->basis;
@@ -211,13 +209,13 @@ static lam_status end_at_root(const pass_row *row, size_t node, const live_rows 
             const uint32_t j = (uint32_t)(w->n - scaling + k);
             const float value = rows->value[0].of[k][lane];
             if (fabsf(value) > row->least * row->job->input->weight[root])
-                TRY(desk_keep(row, d, root, i, j, value, error));
+                TRY(keep_coefficient(row, d, root, i, j, value, error));
         }
 done:
     return status;
 }
 
-/* Of all clusters those that are near. */
+/* out: the rows on clusters that are near the node. */
 static void take_near(const pass_job *job, size_t node, const live_rows *all, live_rows *out) {
     out->count = 0;
     for (size_t e = 0; e < all->count; e++) {
@@ -233,40 +231,40 @@ static void swap(live_rows **a, live_rows **b) {
     *b = swapped;
 }
 
-/* Finer columns of the children's rows, and what this node's rows found on their way: that stands in
- * ascending runs, first that of a leaf itself, then one for each height. */
-static lam_status take_details(pass_job *job, const pass_row *row, desk *d, size_t n_heights,
-                               lam_error *error) {
+/* Stores the finer columns of a node's scaling rows: those of its children, and those that its own rows
+ * passed, which stand in `fresh` as ascending runs, first of leaf columns, then of each height. */
+static lam_status carry_fine_columns(pass_job *job, const pass_row *row, pass_work *d, size_t n_heights,
+                                     lam_error *error) {
     lam_status status = LAM_OK;
-    details *all = &d->merged, *next = &d->joined;
+    fine_columns *all = &d->merged, *next = &d->joined;
     for (size_t k = 0; k <= n_heights; k++) {
         const size_t first = k == 0 ? 0 : d->runs[k - 1], last = k < n_heights ? d->runs[k] : d->fresh.count;
         if (first == last) continue;
-        TRY(details_join(all, d->fresh.list + first, last - first, next, error));
-        details *const swapped = all;
+        TRY(fine_columns_union(all, d->fresh.list + first, last - first, next, error));
+        fine_columns *const swapped = all;
         all = next;
         next = swapped;
     }
-    TRY(details_copy(all, &job->details[row->node], error));
+    TRY(fine_columns_copy(all, &job->fine[row->node], error));
 done:
     return status;
 }
 
-static lam_status run_node(pass_job *job, size_t node, desk *d, lam_error *error) {
+static lam_status run_node(pass_job *job, size_t node, pass_work *d, lam_error *error) {
     lam_status status = LAM_OK;
     const pass_kernels kernels = kernels_of_cpu();
     const wavelets *w = job->input->basis;
     const wavelet_node *a = &w->nodes[node];
     const uint32_t root = (uint32_t)w->n_nodes - 1, top = job->reach.height[root];
     const uint32_t keep_at = node == root ? UINT32_MAX : job->reach.height[a->parent] - 1;
-    const bool both_sides = job->details == NULL;
-    const unsigned every = (1u << a->inputs) - 1, handed = (1u << a->scaling) - 1;
+    const bool two_sided = job->fine == NULL;
+    const unsigned every = (1u << a->inputs) - 1, scaling_lanes = (1u << a->scaling) - 1;
     const pass_row row = {.job = job,
                           .node = node,
-                          .wanted = both_sides || node == root ? 0 : DETAILS,
+                          .wanted = two_sided || node == root ? 0 : CARRY,
                           .height = job->reach.height[node],
                           .first = a->first - a->scaling,
-                          .own_lanes = both_sides || node != root ? every & ~handed : every,
+                          .own_lanes = two_sided || node != root ? every & ~scaling_lanes : every,
                           .least = job->least * job->input->weight[node]};
     live_rows *from = &d->rows[0], *to = &d->rows[1];
     uint32_t height = row.height;
@@ -275,11 +273,11 @@ static lam_status run_node(pass_job *job, size_t node, desk *d, lam_error *error
         kernels.merge(w, node, &job->kept[a->left], &job->kept[node - 1], from);
         kept_rows_free(&job->kept[a->left]);
         kept_rows_free(&job->kept[node - 1]);
-        if (!both_sides) {
-            TRY(kernels.merge_details(&row, &job->details[a->left], &job->details[node - 1], &d->merged, d,
-                                      error));
-            details_free(&job->details[a->left]);
-            details_free(&job->details[node - 1]);
+        if (!two_sided) {
+            TRY(kernels.merge_fine_columns(&row, &job->fine[a->left], &job->fine[node - 1], &d->merged, d,
+                                           error));
+            fine_columns_free(&job->fine[a->left]);
+            fine_columns_free(&job->fine[node - 1]);
         }
     } else {
         TRY(scatter_rows(job, node, d, error));
@@ -294,9 +292,9 @@ static lam_status run_node(pass_job *job, size_t node, desk *d, lam_error *error
         swap(&from, &to);
     }
     if (node != root) TRY(keep_rows(from, a->scaling, w, &job->kept[node], error));
-    if (node != root && !both_sides) TRY(take_details(job, &row, d, keep_at + 1 - height, error));
+    if (node != root && !two_sided) TRY(carry_fine_columns(job, &row, d, keep_at + 1 - height, error));
     for (; height <= top; height++) {
-        TRY(kernels.promote(&row, height, EMIT, near, next, d, error));
+        TRY(kernels.promote(&row, height, KEEP, near, next, d, error));
         swap(&near, &next);
     }
     TRY(end_at_root(&row, node, near, d, error));
@@ -304,15 +302,13 @@ done:
     return status;
 }
 
-/* --- all of them --------------------------------------------------------------------------------------- */
-
 static void job_free(pass_job *job) {
     for (size_t t = 0; job->kept != NULL && t < job->input->basis->n_nodes; t++)
         kept_rows_free(&job->kept[t]);
-    for (size_t t = 0; job->details != NULL && t < job->input->basis->n_nodes; t++)
-        details_free(&job->details[t]);
+    for (size_t t = 0; job->fine != NULL && t < job->input->basis->n_nodes; t++)
+        fine_columns_free(&job->fine[t]);
     free(job->kept);
-    free(job->details);
+    free(job->fine);
     free(job->columns);
     wavelet_reach_free(&job->reach);
 }
@@ -321,10 +317,10 @@ static lam_status job_make(const wavelet_pass_input *input, pass_job *job, lam_e
     lam_status status = LAM_OK;
     const wavelets *w = input->basis;
     const size_t N = w->n_nodes;
-    *job = (pass_job){.input = input, .least = input->threshold * (input->one_sided ? share_looked_at : 1)};
+    *job = (pass_job){.input = input, .least = input->threshold * (input->one_sided ? one_sided_share : 1)};
     job->kept = memory_allocate(N, sizeof *job->kept, "wavelets", error);
-    if (input->one_sided) job->details = memory_allocate(N, sizeof *job->details, "wavelets", error);
-    if (input->one_sided && job->details == NULL) TRY(LAM_ERR_MEMORY);
+    if (input->one_sided) job->fine = memory_allocate(N, sizeof *job->fine, "wavelets", error);
+    if (input->one_sided && job->fine == NULL) TRY(LAM_ERR_MEMORY);
     job->columns = memory_allocate(w->n, sizeof *job->columns, "wavelets", error);
     if (job->kept == NULL || job->columns == NULL) TRY(LAM_ERR_MEMORY);
     TRY(wavelet_reach_make(w, input->tree, input->area, input->centre, input->reach, &job->reach, error));
@@ -336,7 +332,7 @@ done:
     return status;
 }
 
-static void desk_free(desk *d) {
+static void pass_work_free(pass_work *d) {
     free(d->dense);
     marks_free(&d->lit);
     free(d->cells);
@@ -347,12 +343,12 @@ static void desk_free(desk *d) {
         free(d->near[k].cluster);
         free(d->near[k].value);
     }
-    details_free(&d->fresh);
-    details_free(&d->merged);
-    details_free(&d->joined);
+    fine_columns_free(&d->fresh);
+    fine_columns_free(&d->merged);
+    fine_columns_free(&d->joined);
     free(d->runs);
-    kept_free(&d->found);
-    *d = (desk){.dense = NULL};
+    coefficient_list_free(&d->found);
+    *d = (pass_work){.dense = NULL};
 }
 
 static void *aligned_lanes(size_t count, size_t size, lam_error *error) {
@@ -365,7 +361,7 @@ static void *aligned_lanes(size_t count, size_t size, lam_error *error) {
     return made;
 }
 
-static lam_status desk_make(const pass_job *job, desk *d, lam_error *error) {
+static lam_status pass_work_make(const pass_job *job, pass_work *d, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = job->input->basis->n;
     d->dense = aligned_lanes(n, sizeof *d->dense, error);
@@ -392,7 +388,7 @@ done:
     return status;
 }
 
-static lam_status told(pass_job *job, size_t elements, lam_error *error) {
+static lam_status report_done(pass_job *job, size_t elements, lam_error *error) {
     lam_status status = LAM_OK;
     const progress *p = job->input->progress;
 #pragma omp critical(wavelet_pass_progress)
@@ -405,52 +401,52 @@ static lam_status told(pass_job *job, size_t elements, lam_error *error) {
     return status;
 }
 
-/* Subtrees of this many elements at most are a thread's at once. */
+/* A thread takes subtrees of at most this many elements at a time. */
 static size_t piece_elements(const pass_job *job) {
     return job->input->basis->n / 64 + 8;
 }
 
-/* What all threads share, and what each has for itself. */
 typedef struct pass_team {
     pass_job *job;
-    desk *desks;
+    pass_work *works;
 } pass_team;
 
-/* Progress is told of whole subtrees: a node above them has been told of. */
+/* Progress counts whole subtrees; nodes above them add nothing. */
 static lam_status run_piece(void *context, wavelet_piece piece, size_t k, lam_error *error) {
     lam_status status = LAM_OK;
     pass_team *team = context;
     pass_job *job = team->job;
     const size_t elements = job->input->basis->nodes[piece.last - 1].n_elements;
-    desk *d = &team->desks[k];
-    if (d->dense == NULL) TRY(desk_make(job, d, error));
+    pass_work *d = &team->works[k];
+    if (d->dense == NULL) TRY(pass_work_make(job, d, error));
     for (size_t t = piece.first; t < piece.last; t++) TRY(run_node(job, t, d, error));
-    if (elements <= piece_elements(job)) TRY(told(job, elements, error));
+    if (elements <= piece_elements(job)) TRY(report_done(job, elements, error));
 done:
     return status;
 }
 
-static lam_status run_all(pass_job *job, desk *desks, lam_error *error) {
-    pass_team team = {job, desks};
+static lam_status run_all(pass_job *job, pass_work *works, lam_error *error) {
+    pass_team team = {job, works};
     return subtrees_run(job->input->basis, piece_elements(job), job->input->n_threads, run_piece, &team,
                         error);
 }
 
-static lam_status gather(const pass_job *job, desk *desks, csr *out, lam_error *error) {
+static lam_status collect(const pass_job *job, pass_work *works, csr *out, lam_error *error) {
     lam_status status = LAM_OK;
     const wavelet_pass_input *input = job->input;
-    kept_list *lists = memory_allocate(input->n_threads, sizeof *lists, "wavelets", error);
+    coefficient_list *lists = memory_allocate(input->n_threads, sizeof *lists, "wavelets", error);
     if (lists == NULL) return LAM_ERR_MEMORY;
     for (size_t k = 0; k < input->n_threads; k++) {
-        lists[k] = desks[k].found;
-        desks[k].found = (kept_list){.count = 0};
-        desk_free(&desks[k]);
+        lists[k] = works[k].found;
+        works[k].found = (coefficient_list){.count = 0};
+        pass_work_free(&works[k]);
     }
-    TRY(kept_gather(input->basis->n, lists, input->n_threads, out, error));
-    if (input->one_sided) status = kept_add_sides(input->basis, input->weight, input->threshold, out, error);
+    TRY(coefficient_lists_join(input->basis->n, lists, input->n_threads, out, error));
+    if (input->one_sided)
+        status = wavelet_add_transpose(input->basis, input->weight, input->threshold, out, error);
     if (status != LAM_OK) csr_free(out);
 done:
-    for (size_t k = 0; k < input->n_threads; k++) kept_free(&lists[k]);
+    for (size_t k = 0; k < input->n_threads; k++) coefficient_list_free(&lists[k]);
     free(lists);
     return status;
 }
@@ -458,14 +454,14 @@ done:
 lam_status wavelet_pass(const wavelet_pass_input *input, csr *out, lam_error *error) {
     lam_status status = LAM_OK;
     pass_job job = {.input = input};
-    desk *desks = memory_allocate(input->n_threads, sizeof *desks, "wavelets", error);
-    if (desks == NULL) TRY(LAM_ERR_MEMORY);
+    pass_work *works = memory_allocate(input->n_threads, sizeof *works, "wavelets", error);
+    if (works == NULL) TRY(LAM_ERR_MEMORY);
     TRY(job_make(input, &job, error));
-    TRY(run_all(&job, desks, error));
-    TRY(gather(&job, desks, out, error));
+    TRY(run_all(&job, works, error));
+    TRY(collect(&job, works, out, error));
 done:
-    for (size_t k = 0; desks != NULL && k < input->n_threads; k++) desk_free(&desks[k]);
-    free(desks);
+    for (size_t k = 0; works != NULL && k < input->n_threads; k++) pass_work_free(&works[k]);
+    free(works);
     job_free(&job);
     return status;
 }

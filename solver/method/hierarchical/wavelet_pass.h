@@ -1,4 +1,6 @@
-/* S = A^1/2 F A^-1/2 in a basis of wavelets, in one pass over the rows of F, of which none is held. */
+/* W S W^T, the transport matrix S = A^1/2 F A^-1/2 in a multiwavelet basis W: the standard form of Beylkin,
+ * Coifman and Rokhlin 1991, for radiosity Gortler et al. 1993. One pass over the rows of F finds it; no row
+ * is held. */
 #ifndef LAMBERT_METHOD_HIERARCHICAL_WAVELET_PASS_H
 #define LAMBERT_METHOD_HIERARCHICAL_WAVELET_PASS_H
 
@@ -8,28 +10,32 @@
 
 typedef struct wavelet_pass_input {
     const wavelets *basis;
-    row_source *rows; /* of F, in which A_i F_ij = A_j F_ji; one_sided: of F1, A F = A F1 + F1^T A,
-                         any entry any number of times, each row asked for once */
+    row_source *rows; /* of F, with A_i F_ij = A_j F_ji; one_sided: of an F1 with A F = A F1 + F1^T A,
+                         whose rows may list a column several times and are asked for once */
     bool one_sided;
     const double *area;        /* [n], by element */
-    const plane_tree *tree;    /* that the basis is of */
-    float threshold;           /* a coefficient (i, j) is kept from threshold weight_i weight_j on */
-    const float *weight;       /* [n_nodes], of the coefficients of a node */
+    const plane_tree *tree;    /* of the basis */
+    float threshold;           /* coefficient (i, j) is kept above threshold weight_i weight_j */
+    const float *weight;       /* [n_nodes], of all coefficients of a node */
     const double (*centre)[3]; /* [n], by element */
-    double reach; /* wavelets of a node see clusters within so many of its radii; INFINITY: all */
+    double reach; /* coefficients of a node with clusters beyond this many of its radii are taken as 0;
+                     INFINITY: none */
     size_t n_threads;
     const progress *progress;
 } wavelet_pass_input;
 
-/* The upper triangle of W S W^T, the diagonal included; freed by the caller with csr_free.
+/* out: the upper triangle of W S W^T with its diagonal, freed by the caller with csr_free.
  *
- * Rows come leaf by leaf. Of every node the rows of what it hands up meet the columns of clusters of the same
- * height alone; those of its wavelets go on to all coarser columns, and there are final. Finer columns are
- * the transposed of what finer rows find; where rows are one-sided nobody else finds them, and what is handed
- * up takes them along, as far as they look (wavelet_details.h). Rows of a leaf begin on clusters that are the
- * coarser the farther they are (wavelet_reach.h). The bits do not depend on n_threads. Cost: about nnz(F),
- * and a few hundred clusters of each level of a leaf. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED, those of
- * rows. */
+ * Let Phi_a and Psi_a be the scaling functions and wavelets of node a: [Phi_a; Psi_a] = Q_a [Phi_left;
+ * Phi_right]. Nodes run in postorder. Node a forms the rows Q_a [Phi_left S; Phi_right S] on the scaling
+ * functions of column clusters, and coarsens these columns level by level by the same Q_b. The rows Psi_a S
+ * give on their way the coefficients Psi_a S Psi_b^T of all b that are no finer than a, which are final; the
+ * rows Phi_a S stop below the height of a's parent and wait for the sibling. Finer b follow from the symmetry
+ * of S. Of a one-sided F1, Psi_a S1 Psi_b^T for b finer than a is not the transpose of anything that was
+ * found. So Phi_a S1 Psi_b^T is carried up with the scaling rows (fine_column in wavelet_entries.h), and W S
+ * W^T is the result plus its transpose. A leaf's rows begin on clusters that are the coarser the farther away
+ * they are (wavelet_reach.h). The bits do not depend on n_threads. Cost: about nnz(F), and a few hundred
+ * clusters for each leaf and level. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED, those of rows. */
 lam_status wavelet_pass(const wavelet_pass_input *input, csr *out, lam_error *error);
 
 #endif

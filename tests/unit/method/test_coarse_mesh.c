@@ -1,6 +1,5 @@
 /* The coarse mesh of 2MSC: coherence, splitting, assignment. */
 #include "solver/method/two_mesh/coarse_mesh.h"
-#include "solver/method/two_mesh/coherence.h"
 #include "support/room.h"
 #include "support/suite.h"
 
@@ -35,7 +34,7 @@ static coarse_mesh create(const build_problem *problem, coarse_options options) 
 /* --- coherence ----------------------------------------------------------------------------------------- */
 
 /* Elements 0 ... 5 see group 0 by a, group 1 by b, each group of area 1. */
-static view_figures figures_of(const double (*F)[2], const double *area, size_t count) {
+static coherence_figures figures_of(const double (*F)[2], const double *area, size_t count) {
     float v[12];
     uint32_t elements[6];
     for (size_t i = 0; i < count; i++) {
@@ -43,13 +42,13 @@ static view_figures figures_of(const double (*F)[2], const double *area, size_t 
         v[2 * i] = (float)F[i][0];
         v[2 * i + 1] = (float)F[i][1];
     }
-    const views all = {.n_groups = 2, .v = v};
-    return views_measure(&all, area, elements, count);
+    const group_views all = {.n_groups = 2, .v = v};
+    return coherence_measure(&all, area, elements, count);
 }
 
 START_TEST(coherence_is_one_where_all_see_the_same) {
     const double same[3][2] = {{.3, .6}, {.3, .6}, {.3, .6}}, area[3] = {1, .25, 7}, nothing[3][2] = {{0}};
-    const view_figures alike = figures_of(same, area, 3), dark = figures_of(nothing, area, 3);
+    const coherence_figures alike = figures_of(same, area, 3), dark = figures_of(nothing, area, 3);
     ck_assert(alike.coherence == 1 && alike.loss == 0 && alike.area == 8.25);
     ck_assert(dark.coherence == 1 && dark.loss == 0);
 }

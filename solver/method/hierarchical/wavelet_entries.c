@@ -1,0 +1,201 @@
+#include "solver/method/hierarchical/wavelet_entries.h"
+
+#include "solver/operator/wavelet/wavelet_plan.h"
+
+#include "store/status.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void coefficient_list_free(coefficient_list *k) {
+    free(k->list);
+    *k = (coefficient_list){.count = 0};
+}
+
+lam_status coefficient_list_add(coefficient_list *k, uint32_t i, uint32_t j, float value, lam_error *error) {
+    if (k->count == k->capacity) {
+        const size_t capacity = k->capacity + k->capacity / 2 + 4096;
+        coefficient *const more = realloc(k->list, capacity * sizeof *more);
+        if (more == NULL)
+            return status_fail(error, LAM_ERR_MEMORY, "wavelets: cannot allocate %zu x %zu bytes", capacity,
+                               sizeof *more);
+        k->list = more;
+        k->capacity = capacity;
+    }
+    k->list[k->count++] = i < j ? (coefficient){i, j, value} : (coefficient){j, i, value};
+    return LAM_OK;
+}
+
+static int by_column(const void *left, const void *right) {
+    const coefficient *a = left, *b = right;
+    return a->j < b->j ? -1 : a->j > b->j;
+}
+
+lam_status coefficient_lists_join(size_t n, coefficient_list *lists, size_t n_lists, csr *out,
+                                  lam_error *error) {
+    lam_status status = LAM_OK;
+    csr made = {.n = n, .indptr = memory_allocate(n + 1, sizeof *made.indptr, "wavelets", error)};
+    coefficient *all = NULL;
+    if (made.indptr == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < n_lists; k++)
+        for (size_t e = 0; e < lists[k].count; e++) made.indptr[lists[k].list[e].i + 1]++;
+    TRY(csr_begin_rows(&made, "wavelets", error));
+    all = memory_allocate((size_t)made.indptr[n], sizeof *all, "wavelets", error);
+    if (all == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < n_lists; k++) {
+        for (size_t e = 0; e < lists[k].count; e++) all[made.indptr[lists[k].list[e].i]++] = lists[k].list[e];
+        coefficient_list_free(&lists[k]);
+    }
+    csr_end_rows(&made);
+#pragma omp parallel for schedule(dynamic, 256) num_threads((int)n_lists)
+    for (size_t i = 0; i < n; i++) {
+        qsort(all + made.indptr[i], (size_t)(made.indptr[i + 1] - made.indptr[i]), sizeof *all, by_column);
+        for (uint64_t e = made.indptr[i]; e < made.indptr[i + 1]; e++) {
+            made.indices[e] = all[e].j;
+            made.data[e] = all[e].value;
+        }
+    }
+    *out = made;
+    made = (csr){.n = 0};
+done:
+    free(all);
+    csr_free(&made);
+    return status;
+}
+
+lam_status wavelet_add_transpose(const wavelets *w, const float *weight, float threshold, csr *S,
+                                 lam_error *error) {
+    uint64_t used = 0, p = 0;
+    float *of =
+        memory_allocate(w->n, sizeof *of, "wavelets", error); /* by coefficient, the weight of its node */
+    if (of == NULL) return LAM_ERR_MEMORY;
+    for (size_t t = 0; t < w->n_nodes; t++) {
+        const wavelet_node *a = &w->nodes[t];
+        const size_t count = a->inputs - (t + 1 < w->n_nodes ? a->scaling : 0);
+        for (size_t k = 0; k < count; k++) of[a->first + k] = weight[t];
+    }
+    for (size_t i = 0; i < w->n; i++) {
+        const uint64_t end = S->indptr[i + 1];
+        while (p < end) {
+            const uint32_t j = S->indices[p];
+            float sum = S->data[p++] * (j == i ? 2 : 1);
+            if (p < end && S->indices[p] == j) sum += S->data[p++];
+            if (!(fabsf(sum) > threshold * of[i] * of[j])) continue;
+            S->indices[used] = j;
+            S->data[used++] = sum;
+        }
+        S->indptr[i + 1] = used;
+    }
+    free(of);
+    return csr_reserve(S, used, error);
+}
+
+/* c = W x. */
+static lam_status transform(const wavelets *w, const float *x, float *c, lam_error *error) {
+    lam_status status = LAM_OK;
+    wavelet_plan plan = {0};
+    bool *used = memory_allocate(w->n, sizeof *used, "wavelets", error);
+    float *work = NULL;
+    if (used == NULL) TRY(LAM_ERR_MEMORY);
+    memset(used, true, w->n * sizeof *used);
+    TRY(wavelet_plan_create(w, used, &plan, error));
+    work = memory_allocate(wavelet_plan_work(&plan), sizeof *work, "wavelets", error);
+    if (work == NULL) TRY(LAM_ERR_MEMORY);
+    wavelet_plan_forward(&plan, 1, x, c, work, 1);
+done:
+    wavelet_plan_free(&plan);
+    free(used);
+    free(work);
+    return status;
+}
+
+lam_status wavelet_impose_row_sums(const wavelets *w, const uint32_t *order, const double *area,
+                                   const double *row_sums, float threshold, const float *weight, csr *S,
+                                   lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = w->n;
+    const wavelet_node *root = &w->nodes[w->n_nodes - 1];
+    double length = 0;
+    csr made = {.n = n};
+    float *x = NULL, *y = NULL;
+    if (root->scaling != 1) goto done;
+    x = memory_allocate(n, sizeof *x, "wavelets", error);
+    y = memory_allocate(n, sizeof *y, "wavelets", error);
+    made.indptr = memory_allocate(n + 1, sizeof *made.indptr, "wavelets", error);
+    if (x == NULL || y == NULL || made.indptr == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t p = 0; p < n; p++) length += area[p];
+    for (size_t p = 0; p < n; p++) x[p] = (float)(sqrt(area[p] / length) * row_sums[order[p]]);
+    TRY(transform(w, x, y, error));
+    for (size_t t = 0; t < w->n_nodes; t++) {
+        const wavelet_node *a = &w->nodes[t];
+        const float least = threshold * weight[t] * weight[w->n_nodes - 1];
+        for (size_t k = 0; k < a->inputs - a->scaling; k++)
+            if (!(fabsf(y[a->first + k]) > least)) y[a->first + k] = 0;
+    }
+    /* Entry n - 1, if a row has it, is the last of the row. */
+    for (size_t i = 0; i < n; i++) {
+        uint64_t end = S->indptr[i + 1];
+        if (end > S->indptr[i] && S->indices[end - 1] == n - 1) end--;
+        made.indptr[i + 1] = made.indptr[i] + (end - S->indptr[i]) + (y[i] != 0);
+    }
+    TRY(csr_reserve(&made, made.indptr[n], error));
+    for (size_t i = 0; i < n; i++) {
+        const uint64_t to = made.indptr[i], last = made.indptr[i + 1], count = last - to - (y[i] != 0);
+        if (count > 0) memcpy(made.indices + to, S->indices + S->indptr[i], count * sizeof *made.indices);
+        if (count > 0) memcpy(made.data + to, S->data + S->indptr[i], count * sizeof *made.data);
+        if (y[i] == 0) continue;
+        made.indices[last - 1] = (uint32_t)(n - 1);
+        made.data[last - 1] = y[i];
+    }
+    csr_free(S);
+    *S = made;
+    made = (csr){.n = 0};
+done:
+    free(x);
+    free(y);
+    csr_free(&made);
+    return status;
+}
+
+void fine_columns_free(fine_columns *d) {
+    free(d->list);
+    *d = (fine_columns){.count = 0};
+}
+
+lam_status fine_columns_reserve(fine_columns *d, size_t more, lam_error *error) {
+    if (d->capacity - d->count >= more) return LAM_OK;
+    const size_t capacity = d->count + more + d->capacity / 2 + 64;
+    fine_column *const list = realloc(d->list, capacity * sizeof *list);
+    if (list == NULL)
+        return status_fail(error, LAM_ERR_MEMORY, "wavelets: cannot allocate %zu x %zu bytes", capacity,
+                           sizeof *list);
+    d->list = list;
+    d->capacity = capacity;
+    return LAM_OK;
+}
+
+lam_status fine_columns_union(const fine_columns *a, const fine_column *b, size_t b_count, fine_columns *into,
+                              lam_error *error) {
+    into->count = 0;
+    const lam_status status = fine_columns_reserve(into, a->count + b_count, error);
+    if (status != LAM_OK) return status;
+    size_t p = 0, q = 0;
+    while (p < a->count || q < b_count) {
+        const bool from_a = q == b_count || (p < a->count && a->list[p].j < b[q].j);
+        into->list[into->count++] = from_a ? a->list[p++] : b[q++];
+    }
+    return LAM_OK;
+}
+
+lam_status fine_columns_copy(const fine_columns *from, fine_columns *out, lam_error *error) {
+    *out = (fine_columns){.count = from->count, .capacity = from->count};
+    if (from->count == 0) return LAM_OK;
+    out->list = memory_allocate(from->count, sizeof *out->list, "wavelets", error);
+    if (out->list == NULL) {
+        *out = (fine_columns){.count = 0};
+        return LAM_ERR_MEMORY;
+    }
+    memcpy(out->list, from->list, from->count * sizeof *out->list);
+    return LAM_OK;
+}
