@@ -4,9 +4,8 @@
 #include "solver/light/emission_apply.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky_light.h"
-#include "solver/render/patch_view.h"
 #include "solver/render/picture.h"
-#include "solver/render/visible_view.h"
+#include "solver/render/store_view.h"
 #include "solver/verbs/verbs.h"
 
 #include <math.h>
@@ -311,7 +310,7 @@ static lam_status visible_values(const fields *f, store *s, size_t n, terminal *
                                  picture_look *look, lam_error *error) {
     lam_status status = LAM_OK;
     double mean, most;
-    TRY(visible_view_counts(s, n, values, &mean, &most, error));
+    TRY(store_view_visible(s, n, values, &mean, &most, error));
     *look = (picture_look){.width = view_width(f), .range = most > 0 ? round_up(most) : 1};
     terminal_log(t, "an element sees %.3g others on average, %.6g at most; colours from 0 to %g", mean, most,
                  look->range);
@@ -328,11 +327,11 @@ static lam_status patch_values(const fields *f, store *s, size_t n, terminal *t,
     size_t n_patches;
     *look = (picture_look){.width = view_width(f), .plain = true};
     if (strcmp(f->quantity, "patch") == 0) {
-        TRY(patch_view_colors(s, values, &n_patches, error));
+        TRY(store_view_patches(s, values, &n_patches, error));
         terminal_log(t, "%zu patches", n_patches);
         return LAM_OK;
     }
-    TRY(patch_view_coherence(s, values, &smallest, error));
+    TRY(store_view_coherence(s, values, &smallest, error));
     if (f->false_color) {
         *look = (picture_look){.width = view_width(f), .range = 1};
         terminal_log(t, "colours from coherence 0 to 1");

@@ -1,10 +1,11 @@
-#include "solver/render/patch_view.h"
+#include "solver/render/store_view.h"
 
 #include "solver/operator/two_mesh.h"
 #include "solver/render/tone.h"
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 static lam_status load_patches(store *s, lam_operator **op, operator_patches *patches, lam_error *error) {
     lam_status status = LAM_OK;
@@ -25,7 +26,7 @@ static size_t element_at(const operator_patches *patches, uint64_t position) {
     return patches->order != NULL ? patches->order[position] : (size_t)position;
 }
 
-lam_status patch_view_coherence(store *s, float **values, float *smallest, lam_error *error) {
+lam_status store_view_coherence(store *s, float **values, float *smallest, lam_error *error) {
     lam_status status = LAM_OK;
     lam_operator *op = NULL;
     operator_patches patches;
@@ -61,7 +62,7 @@ static void color_of(size_t patch, float rgb[3]) {
     }
 }
 
-lam_status patch_view_colors(store *s, float **values, size_t *n_patches, lam_error *error) {
+lam_status store_view_patches(store *s, float **values, size_t *n_patches, lam_error *error) {
     lam_status status = LAM_OK;
     lam_operator *op = NULL;
     operator_patches patches;
@@ -82,5 +83,51 @@ lam_status patch_view_colors(store *s, float **values, size_t *n_patches, lam_er
 done:
     free(colors);
     lam_operator_close(op);
+    return status;
+}
+
+lam_status store_view_visible(store *s, size_t n, float **values, double *mean, double *most,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    void *ends = NULL, *columns = NULL;
+    char *storage = NULL;
+    float *counts = NULL;
+    size_t dims[STORE_MAX_RANK] = {n + 1}, entries[STORE_MAX_RANK] = {SIZE_MAX};
+    if (!store_has(s, "/form_factors"))
+        FAIL(error, LAM_ERR_ARGUMENT, "%s: keeps no form factors; precompute it with --keep-form-factors",
+             store_path(s));
+    TRY(store_get_text(s, "/form_factors", "storage", &storage, error));
+    if (strcmp(storage, "compressed") == 0)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "%s: its form factors are compressed, which does not say who sees whom; precompute it with "
+             "--keep-form-factors alone",
+             store_path(s));
+    TRY(store_read(s, "/form_factors/indptr", STORE_U64, 1, dims, &ends, error));
+    TRY(store_read(s, "/form_factors/indices", STORE_U32, 1, entries, &columns, error));
+    counts = memory_allocate(n, sizeof *counts, "counts", error);
+    if (counts == NULL) TRY(LAM_ERR_MEMORY);
+    const uint64_t *row = ends;
+    const uint32_t *column = columns;
+    const bool upper = strcmp(storage, "upper") == 0; /* each pair once, and both see */
+    for (size_t i = 0; i < n; i++)
+        for (uint64_t e = row[i]; e < row[i + 1]; e++) {
+            if (row[i + 1] > entries[0] || column[e] >= n)
+                FAIL(error, LAM_ERR_FORMAT, "%s: /form_factors: row %zu goes beyond what is there",
+                     store_path(s), i);
+            counts[i]++;
+            if (upper) counts[column[e]]++;
+        }
+    *mean = *most = 0;
+    for (size_t i = 0; i < n; i++) {
+        *mean += (double)counts[i] / (double)n;
+        *most = (double)counts[i] > *most ? (double)counts[i] : *most;
+    }
+    *values = counts;
+    counts = NULL;
+done:
+    free(ends);
+    free(columns);
+    free(storage);
+    free(counts);
     return status;
 }
