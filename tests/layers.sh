@@ -10,7 +10,7 @@ below_linalg="lambert/ store/ solver/base/"
 below_operator="$below_linalg solver/linalg/"
 operator="$below_operator solver/operator/"
 scene="$below_linalg solver/scene/"
-formfactor="$operator solver/daylight/ $scene solver/formfactor/formfactor.h solver/formfactor/recipe.h solver/formfactor/leaving.h"
+formfactor="$operator solver/daylight/ $scene solver/formfactor/formfactor.h solver/formfactor/recipe.h solver/formfactor/leaving.h solver/formfactor/scratch.h solver/formfactor/sky_bounce.h"
 method="$operator solver/method/"
 
 # folder: the prefixes that its files may include beside their own folder

@@ -2,7 +2,7 @@
 #include "solver/bench/cities.h"
 #include "solver/bench/formfactors.h"
 #include "solver/bench/scenes.h"
-#include "solver/formfactor/seen.h"
+#include "solver/formfactor/formfactor.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -31,7 +31,8 @@ static lam_status density_of(const bench_run *run, const mesh *m, const recipe *
                              size_t count, size_t *seen, double *density, double *deviation,
                              lam_error *error) {
     double sum = 0, squares = 0;
-    const lam_status status = seen_count(m, how, rows, count, run->progress, "elements seen", seen, error);
+    const lam_status status =
+        form_factors_count_seen(m, how, rows, count, run->progress, "elements seen", seen, error);
     if (status != LAM_OK) return status;
     for (size_t k = 0; k < count; k++) {
         const double x = 100 * (double)seen[k] / (double)m->n;

@@ -3,8 +3,8 @@
 #define LAMBERT_FORMFACTOR_FORMFACTOR_H
 
 #include "solver/formfactor/recipe.h"
-#include "solver/formfactor/rows/scratch.h"
-#include "solver/formfactor/rows/sky_bounce.h"
+#include "solver/formfactor/scratch.h"
+#include "solver/formfactor/sky_bounce.h"
 #include "solver/linalg/csr.h"
 #include "solver/scene/mesh.h"
 
@@ -98,6 +98,13 @@ lam_status form_factors_gather(form_factors *f, const double *area, lam_error *e
  * for a forecast. order as above. Errors as of form_factors_make. */
 lam_status form_factors_ray_rate(const mesh *m, const uint32_t *order, double *rays_per_second,
                                  lam_error *error);
+
+/* seen[k]: how many elements elements[k], which are all different, finds by the recipe, RECIPE_RAYS or
+ * RECIPE_HEMICUBE: entries of the row as it is found, before the two estimates of a pair are merged, which is
+ * how "Aguerre 2016, table 4.1" counts. The same for any number of threads. Cost: that of count rows.
+ * Errors: LAM_ERR_ARGUMENT for another recipe, LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+lam_status form_factors_count_seen(const mesh *m, const recipe *how, const uint32_t *elements, size_t count,
+                                   const progress *steps, const char *stage, size_t *seen, lam_error *error);
 
 /* The mean of the rows of two independent samples of the same mesh: a reference with half the variance,
  * without a sky. */

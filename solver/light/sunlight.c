@@ -1,6 +1,6 @@
 #include "solver/light/sunlight.h"
 
-#include "solver/formfactor/rows/sky_bounce.h"
+#include "solver/formfactor/sky_bounce.h"
 
 #include <assert.h>
 #include <math.h>

@@ -42,4 +42,12 @@ lam_status csr_load(store *s, const char *name, size_t n, csr *out, lam_error *e
 /* Y[first..last) = A X for rows first <= i < last: X and Y are [n][m] row-major, double. */
 void csr_multiply_rows(const csr *a, size_t first, size_t last, size_t m, const double *X, double *Y);
 
+/* out = u A + w B, without entries that come to 0; the caller frees it with csr_free. Both have n rows.
+ * It lies where A does. Cost: O(nnz). Errors: LAM_ERR_MEMORY, LAM_ERR_IO. */
+lam_status csr_combine(const csr *A, float u, const csr *B, float w, csr *out, lam_error *error);
+
+/* A with the entries of B in place of its own, and in place of nothing; those that are 0 in B are left out.
+ */
+lam_status csr_replace(const csr *A, const csr *B, csr *out, lam_error *error);
+
 #endif

@@ -3,7 +3,7 @@
 #define LAMBERT_PRECOMPUTE_FORECAST_H
 
 #include "solver/formfactor/recipe.h"
-#include "solver/formfactor/rows/scratch.h"
+#include "solver/formfactor/scratch.h"
 #include "solver/linalg/panel.h"
 
 #include <stdint.h>

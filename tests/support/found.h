@@ -2,7 +2,7 @@
 #ifndef LAMBERT_TESTS_FOUND_H
 #define LAMBERT_TESTS_FOUND_H
 
-#include "solver/formfactor/rows/found_rows.h"
+#include "solver/formfactor/rows/row_code.h"
 #include "solver/linalg/csr.h"
 
 #include <check.h>

@@ -3,7 +3,7 @@
 #define LAMBERT_TESTS_SQUARE_H
 
 #include "solver/formfactor/formfactor.h"
-#include "solver/formfactor/rows/found_rows.h"
+#include "solver/formfactor/rows/row_code.h"
 
 #include <check.h>
 #include <stdlib.h>

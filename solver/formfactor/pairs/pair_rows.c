@@ -1,5 +1,7 @@
 #include "solver/formfactor/pairs/pair_rows.h"
 
+#include "solver/base/bitset.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -150,5 +152,88 @@ lam_status pair_rows_fetch_exchange(pair_rows *rows, size_t block, const uint32_
     else
         memcpy(held->exchange, fresh.exchange, held->used * sizeof *held->exchange);
     block_free(&fresh);
+    return status;
+}
+
+/* --- as sparse rows --------------------------------------------------------------------------------------
+ */
+
+/* Puts a row whose entries stand in any order in that of their indices, by way of a whole row of nothing. */
+static void sort_row(csr *rows, size_t i, float *dense, marks *there) {
+    for (uint64_t p = rows->indptr[i]; p < rows->indptr[i + 1]; p++) {
+        const uint32_t j = rows->indices[p];
+        dense[j] = rows->data[p];
+        marks_add(there, j);
+    }
+    const size_t count = marks_take(there);
+    for (size_t k = 0; k < count; k++) {
+        rows->indices[rows->indptr[i] + k] = there->taken[k];
+        rows->data[rows->indptr[i] + k] = dense[there->taken[k]];
+    }
+}
+
+static lam_status sort_rows(csr *rows, lam_error *error) {
+    const size_t n = rows->n;
+    bool out_of_memory = false;
+#pragma omp parallel
+    {
+        lam_error ignored;
+        marks there;
+        float *dense = memory_allocate(n, sizeof *dense, "form factor rows", &ignored);
+        const bool enough = marks_make(n, 0, "form factor rows", &there, &ignored) == LAM_OK && dense != NULL;
+        if (!enough) {
+#pragma omp atomic write
+            out_of_memory = true;
+        }
+#pragma omp for schedule(dynamic, 16)
+        for (size_t i = 0; i < n; i++)
+            if (enough) sort_row(rows, i, dense, &there);
+        free(dense);
+        marks_free(&there);
+    }
+    return out_of_memory ? status_fail(error, LAM_ERR_MEMORY, "rows of %zu elements: out of memory", n)
+                         : LAM_OK;
+}
+
+/* What is not zero, by element, above the diagonal, rows ascending. */
+lam_status pair_rows_gather(const pair_rows *found, const uint32_t *order, bool keep_hidden, csr *G,
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = found->n;
+    csr rows = {.n = n};
+    uint64_t *next = memory_allocate(n + 1, sizeof *next, "form factor rows", error);
+    rows.indptr = memory_allocate(n + 1, sizeof *rows.indptr, "form factor rows", error);
+    if (rows.indptr == NULL || next == NULL) TRY(LAM_ERR_MEMORY);
+    for (int fill = 0; fill < 2; fill++) {
+#pragma omp parallel for schedule(dynamic, 64)
+        for (size_t at = 0; at < n; at++) {
+            const pair_block *block = &found->blocks[at / PAIR_BLOCK_ROWS];
+            const size_t *begin = &block->begin[at % PAIR_BLOCK_ROWS];
+            const uint32_t one = order[at];
+            for (size_t p = begin[0]; p < begin[1]; p++) {
+                const float g = block->exchange[p];
+                const uint32_t two = order[block->other[p]];
+                const uint32_t i = one < two ? one : two, j = one < two ? two : one;
+                if (!(g > 0 || keep_hidden)) continue;
+                if (fill == 0) {
+                    __atomic_fetch_add(&rows.indptr[i + 1], 1, __ATOMIC_RELAXED);
+                    continue;
+                }
+                const uint64_t there = __atomic_fetch_add(&next[i], 1, __ATOMIC_RELAXED);
+                rows.indices[there] = j;
+                rows.data[there] = g;
+            }
+        }
+        if (fill == 1) break;
+        for (size_t i = 0; i < n; i++) rows.indptr[i + 1] += rows.indptr[i];
+        memcpy(next, rows.indptr, (n + 1) * sizeof *next);
+        TRY(csr_reserve(&rows, rows.indptr[n], error));
+    }
+    TRY(sort_rows(&rows, error));
+    *G = rows;
+    rows = (csr){0};
+done:
+    free(next);
+    csr_free(&rows);
     return status;
 }

@@ -5,6 +5,7 @@
 #define LAMBERT_FORMFACTOR_PAIRS_PAIR_ROWS_H
 
 #include "solver/formfactor/rows/row_file.h"
+#include "solver/linalg/csr.h"
 
 /* What is known of a pair, and beside it that no more need be known. */
 typedef enum pair_state { PAIR_UNKNOWN, PAIR_CERTAIN, PAIR_OPEN, PAIR_HIDDEN, PAIR_MIXED } pair_state;
@@ -62,5 +63,9 @@ lam_status pair_rows_fetch(pair_rows *rows, size_t block, const uint32_t *order,
 /* Only the exchange areas of a block that is there already: other threads may read its states. */
 lam_status pair_rows_fetch_exchange(pair_rows *rows, size_t block, const uint32_t *order, const row_file *f,
                                     lam_error *error);
+
+/* What is not zero, by element, above the diagonal, rows ascending; with keep_hidden the zeros too. */
+lam_status pair_rows_gather(const pair_rows *found, const uint32_t *order, bool keep_hidden, csr *G,
+                            lam_error *error);
 
 #endif

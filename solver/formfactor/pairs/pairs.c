@@ -1,17 +1,16 @@
 #include "solver/formfactor/pairs/pairs.h"
 
 #include "solver/formfactor/pairs/cluster_links.h"
-#include "solver/formfactor/pairs/neighbours.h"
 #include "solver/formfactor/pairs/pair_far.h"
 #include "solver/formfactor/pairs/pair_rows.h"
-
-#include "solver/base/bitset.h"
 
 #include <math.h>
 #include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+enum { NEIGHBOURS_MOST = 12 };
 
 typedef struct pairs_run {
     const mesh *m;
@@ -330,86 +329,51 @@ done:
     return status;
 }
 
-/* --- result -------------------------------------------------------------------------------------------- */
+typedef struct edge_use {
+    uint32_t low, high, element;
+} edge_use;
 
-/* Puts a row whose entries stand in any order in that of their indices, by way of a whole row of nothing. */
-static void sort_row(csr *rows, size_t i, float *dense, marks *there) {
-    for (uint64_t p = rows->indptr[i]; p < rows->indptr[i + 1]; p++) {
-        const uint32_t j = rows->indices[p];
-        dense[j] = rows->data[p];
-        marks_add(there, j);
-    }
-    const size_t count = marks_take(there);
-    for (size_t k = 0; k < count; k++) {
-        rows->indices[rows->indptr[i] + k] = there->taken[k];
-        rows->data[rows->indptr[i] + k] = dense[there->taken[k]];
+static int compare_edges(const void *a, const void *b) {
+    const edge_use *one = a, *two = b;
+    if (one->low != two->low) return one->low < two->low ? -1 : 1;
+    if (one->high != two->high) return one->high < two->high ? -1 : 1;
+    return one->element < two->element ? -1 : one->element > two->element;
+}
+
+static void add_neighbour(uint32_t list[NEIGHBOURS_MOST], uint32_t element) {
+    for (int k = 0; k < NEIGHBOURS_MOST; k++) {
+        if (list[k] == element) return;
+        if (list[k] == UINT32_MAX) {
+            list[k] = element;
+            return;
+        }
     }
 }
 
-static lam_status sort_rows(csr *rows, lam_error *error) {
-    const size_t n = rows->n;
-    bool out_of_memory = false;
-#pragma omp parallel
-    {
-        lam_error ignored;
-        marks there;
-        float *dense = memory_allocate(n, sizeof *dense, "form factor rows", &ignored);
-        const bool enough = marks_make(n, 0, "form factor rows", &there, &ignored) == LAM_OK && dense != NULL;
-        if (!enough) {
-#pragma omp atomic write
-            out_of_memory = true;
+/* neighbours is [n]: the elements that have two vertices of an edge in common, UINT32_MAX where there are no
+ * more. */
+static lam_status neighbours_find(const mesh *m, uint32_t (*neighbours)[NEIGHBOURS_MOST], lam_error *error) {
+    size_t n_edges = 0;
+    edge_use *edges = memory_allocate(m->n, 4 * sizeof *edges, "neighbours", error);
+    if (edges == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < m->n; i++) {
+        const uint32_t *corner = m->elements[i];
+        const size_t corners = mesh_corners(m, i);
+        for (size_t c = 0; c < corners; c++) {
+            const uint32_t a = corner[c], b = corner[(c + 1) % corners];
+            edges[n_edges++] = (edge_use){a < b ? a : b, a < b ? b : a, (uint32_t)i};
         }
-#pragma omp for schedule(dynamic, 16)
-        for (size_t i = 0; i < n; i++)
-            if (enough) sort_row(rows, i, dense, &there);
-        free(dense);
-        marks_free(&there);
     }
-    return out_of_memory ? status_fail(error, LAM_ERR_MEMORY, "rows of %zu elements: out of memory", n)
-                         : LAM_OK;
-}
-
-/* What is not zero, by element, above the diagonal, rows ascending. */
-static lam_status gather(const pairs_run *run, csr *G, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = run->m->n;
-    const bool keep = run->options->keep_hidden;
-    csr rows = {.n = n};
-    uint64_t *next = memory_allocate(n + 1, sizeof *next, "form factor rows", error);
-    rows.indptr = memory_allocate(n + 1, sizeof *rows.indptr, "form factor rows", error);
-    if (rows.indptr == NULL || next == NULL) TRY(LAM_ERR_MEMORY);
-    for (int fill = 0; fill < 2; fill++) {
-#pragma omp parallel for schedule(dynamic, 64)
-        for (size_t at = 0; at < n; at++) {
-            const pair_block *block = &run->rows.blocks[at / PAIR_BLOCK_ROWS];
-            const size_t *begin = &block->begin[at % PAIR_BLOCK_ROWS];
-            const uint32_t one = run->tree.element[at];
-            for (size_t p = begin[0]; p < begin[1]; p++) {
-                const float g = block->exchange[p];
-                const uint32_t two = run->tree.element[block->other[p]];
-                const uint32_t i = one < two ? one : two, j = one < two ? two : one;
-                if (!(g > 0 || keep)) continue;
-                if (fill == 0) {
-                    __atomic_fetch_add(&rows.indptr[i + 1], 1, __ATOMIC_RELAXED);
-                    continue;
-                }
-                const uint64_t there = __atomic_fetch_add(&next[i], 1, __ATOMIC_RELAXED);
-                rows.indices[there] = j;
-                rows.data[there] = g;
-            }
+    qsort(edges, n_edges, sizeof *edges, compare_edges);
+    memset(neighbours, 0xff, m->n * sizeof *neighbours);
+    for (size_t e = 0; e + 1 < n_edges; e++)
+        for (size_t f = e + 1; f < n_edges && edges[f].low == edges[e].low && edges[f].high == edges[e].high;
+             f++) {
+            add_neighbour(neighbours[edges[e].element], edges[f].element);
+            add_neighbour(neighbours[edges[f].element], edges[e].element);
         }
-        if (fill == 1) break;
-        for (size_t i = 0; i < n; i++) rows.indptr[i + 1] += rows.indptr[i];
-        memcpy(next, rows.indptr, (n + 1) * sizeof *next);
-        TRY(csr_reserve(&rows, rows.indptr[n], error));
-    }
-    TRY(sort_rows(&rows, error));
-    *G = rows;
-    rows = (csr){0};
-done:
-    free(next);
-    csr_free(&rows);
-    return status;
+    free(edges);
+    return LAM_OK;
 }
 
 static lam_status find_parents(pairs_run *run, lam_error *error) {
@@ -456,7 +420,7 @@ lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_option
     TRY(run_passes(&run, report, kept, error));
     report->hidden += run.links.hidden_pairs;
     report->facing += run.links.hidden_pairs;
-    TRY(gather(&run, G, error));
+    TRY(pair_rows_gather(&run.rows, run.tree.element, options->keep_hidden, G, error));
 done:
     pair_rows_free(&run.rows);
     free(run.polygons);
@@ -467,4 +431,37 @@ done:
     cluster_links_free(&run.links);
     cluster_tree_free(&run.tree);
     return status;
+}
+
+/* Segments for all pairs that are partly hidden (of near ones as many as rays): an element's share is as many
+ * as finer plain rays would be, the more the finer the accuracy by the law of their error, and a small scene
+ * has enough to keep it. */
+static double segments_most(size_t n, double accuracy) {
+    const double an_element = 32768, enough = 64e6, normal = 7e-5;
+    return fmax(an_element * (double)n, enough) * pow(normal / accuracy, 4. / 3);
+}
+
+/* Few elements need few segments to be as accurate as asked; half a second more makes their factors, which
+ * are large, nearly ten times better. */
+static const double segments_least = 8e6;
+
+lam_status pairs_find(const mesh *m, const visibility *v, const form_factor_options *options,
+                      double threshold, form_factors *f, csr *G, lam_error *error) {
+    const recipe *r = &options->recipe;
+    const bool near = threshold > 0;
+    const pairs_options how = {.tolerance = recipe_tolerance(r),
+                               .accuracy = recipe_accuracy(r),
+                               .segments = VISIBILITY_PACKET,
+                               .segments_least = near ? 0 : segments_least,
+                               .segments_most =
+                                   near ? (double)m->n * (double)r->rays : segments_most(m->n, r->accuracy),
+                               .threshold = threshold,
+                               .keep_hidden = near,
+                               .seed = r->seed,
+                               .progress = options->progress,
+                               .stage = options->stage,
+                               .scratch = options->scratch,
+                               .scratch_name = options->scratch_name,
+                               .recipe = r};
+    return pairs_exchange(m, v, &how, G, &f->pairs, &f->rows_kept, error);
 }

@@ -31,4 +31,10 @@ typedef struct pairs_options {
 lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_options *options, csr *G,
                           pairs_report *report, size_t *kept, lam_error *error);
 
+/* The exchange areas of all pairs whose unoccluded mean factor is above `threshold` as an upper triangle,
+ * which the caller frees: of threshold 0 without those that are hidden, else with a 0 for them. Fills
+ * f->pairs and rows_kept. Errors: as of form_factors_make. */
+lam_status pairs_find(const mesh *m, const visibility *v, const form_factor_options *options,
+                      double threshold, form_factors *f, csr *G, lam_error *error);
+
 #endif

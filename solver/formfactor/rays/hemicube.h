@@ -4,7 +4,7 @@
 #define LAMBERT_FORMFACTOR_RAYS_HEMICUBE_H
 
 #include "solver/formfactor/formfactor.h"
-#include "solver/formfactor/rows/found_rows.h"
+#include "solver/formfactor/rows/row_code.h"
 #include "solver/formfactor/visibility/visibility.h"
 
 /* The delta form factors, the same for every element. The top spans [-1, 1]^2 at height 1 in resolution x

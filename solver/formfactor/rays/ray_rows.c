@@ -1,7 +1,7 @@
 #include "solver/formfactor/rays/ray_rows.h"
 
 #include "solver/formfactor/leaving.h"
-#include "solver/formfactor/pairs/recipe_pairs.h"
+#include "solver/formfactor/pairs/pairs.h"
 #include "solver/formfactor/rays/rays.h"
 #include "solver/formfactor/rows/upper.h"
 #include "solver/formfactor/visibility/visibility.h"
@@ -62,7 +62,7 @@ lam_status ray_rows_create(const mesh *m, const form_factor_options *options, ra
         TRY(sky_bounce_create(options->sky, m->up, options->ground_albedo, n, &r->f.sky, error));
     TRY(visibility_create(m, &r->v, error));
     if (options->recipe.method == RECIPE_NEAR_PAIRS) {
-        TRY(recipe_pairs_find(m, r->v, options, recipe_near(&options->recipe), &r->f, &r->near, error));
+        TRY(pairs_find(m, r->v, options, recipe_near(&options->recipe), &r->f, &r->near, error));
         TRY(upper_expand(&r->near, m->area, r->near_sums, error));
     }
     *out = r;

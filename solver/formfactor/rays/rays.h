@@ -3,7 +3,7 @@
 #define LAMBERT_FORMFACTOR_RAYS_RAYS_H
 
 #include "solver/formfactor/formfactor.h"
-#include "solver/formfactor/rows/found_rows.h"
+#include "solver/formfactor/rows/row_code.h"
 #include "solver/formfactor/visibility/sample.h"
 #include "solver/formfactor/visibility/visibility.h"
 

@@ -1,6 +1,8 @@
 #include "solver/formfactor/rows/row_code.h"
 
 #include <math.h>
+#include <stdlib.h>
+#include <sys/mman.h>
 
 /* row_get_number within end; NULL where the number does not end. */
 static const uint8_t *get_number_within(const uint8_t *from, const uint8_t *end, uint64_t *x) {
@@ -50,4 +52,12 @@ bool row_check(row_kind kind, const found_row *row, size_t n) {
         if (column > n) return false;
     }
     return at == end;
+}
+
+void found_rows_free(found_rows *rows) {
+    for (size_t c = 0; c < rows->n_chunks; c++) free(rows->chunks[c]);
+    free(rows->chunks);
+    free(rows->rows);
+    if (rows->map != NULL) munmap((void *)(uintptr_t)rows->map, rows->map_bytes);
+    *rows = (found_rows){0};
 }

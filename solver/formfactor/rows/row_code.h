@@ -3,8 +3,8 @@
 #ifndef LAMBERT_FORMFACTOR_ROWS_ROW_CODE_H
 #define LAMBERT_FORMFACTOR_ROWS_ROW_CODE_H
 
-#include <stdbool.h>
-#include <stddef.h>
+#include "store/status.h"
+
 #include <stdint.h>
 #include <string.h>
 
@@ -72,5 +72,19 @@ typedef struct found_row {
 /* Whether a row that comes from a file can be read: whole entries, as many as stated, columns below n, values
  * that are finite and above 0. */
 bool row_check(row_kind kind, const found_row *row, size_t n);
+
+/* One-sided rows of form factors as they were found, packed, wherever their bytes lie. */
+typedef struct found_rows {
+    size_t n;
+    row_kind kind;
+    found_row *rows; /* [n], mesh order */
+    size_t n_chunks;
+    void **chunks; /* [n_chunks], where the bytes are in memory */
+    const void *map;
+    size_t map_bytes; /* where they are in a file */
+    size_t kept;      /* rows that were there from an earlier run */
+} found_rows;
+
+void found_rows_free(found_rows *rows);
 
 #endif

@@ -4,9 +4,9 @@
 #define LAMBERT_FORMFACTOR_ROWS_ROW_FILE_H
 
 #include "solver/formfactor/recipe.h"
-#include "solver/formfactor/rows/found_rows.h"
-#include "solver/formfactor/rows/scratch.h"
-#include "solver/formfactor/rows/sky_bounce.h"
+#include "solver/formfactor/rows/row_code.h"
+#include "solver/formfactor/scratch.h"
+#include "solver/formfactor/sky_bounce.h"
 
 typedef struct row_file row_file;
 

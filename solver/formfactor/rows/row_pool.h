@@ -6,9 +6,9 @@
 #include "solver/base/bitset.h"
 #include "solver/base/progress.h"
 #include "solver/formfactor/recipe.h"
-#include "solver/formfactor/rows/found_rows.h"
-#include "solver/formfactor/rows/scratch.h"
-#include "solver/formfactor/rows/sky_bounce.h"
+#include "solver/formfactor/rows/row_code.h"
+#include "solver/formfactor/scratch.h"
+#include "solver/formfactor/sky_bounce.h"
 #include "solver/formfactor/visibility/visibility.h"
 #include "solver/scene/mesh.h"
 

@@ -3,7 +3,7 @@
 #ifndef LAMBERT_FORMFACTOR_ROWS_UPPER_H
 #define LAMBERT_FORMFACTOR_ROWS_UPPER_H
 
-#include "solver/formfactor/rows/found_rows.h"
+#include "solver/formfactor/rows/row_code.h"
 #include "solver/linalg/csr.h"
 #include "solver/operator/refine/form_factor_rows.h"
 

@@ -1,6 +1,6 @@
 /* Hemicubes: delta form factors, what one centroid sees against closed forms, and the invariants. */
+#include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/rays/hemicube.h"
-#include "solver/formfactor/seen.h"
 #include "support/box.h"
 #include "support/found.h"
 #include "support/plates.h"
@@ -290,17 +290,20 @@ START_TEST(some_rows_are_those_of_all) {
     ck_assert_uint_eq(m.n, 54);
     for (size_t w = 0; w < 2; w++) {
         size_t all[54], some[CHOSEN];
-        ck_assert_msg(seen_count(&m, &ways[w], order, 54, NULL, "all", all, &error) == LAM_OK, "%s",
-                      error.message);
-        ck_assert_msg(seen_count(&m, &ways[w], chosen, CHOSEN, NULL, "some", some, &error) == LAM_OK, "%s",
-                      error.message);
+        ck_assert_msg(form_factors_count_seen(&m, &ways[w], order, 54, NULL, "all", all, &error) == LAM_OK,
+                      "%s", error.message);
+        ck_assert_msg(form_factors_count_seen(&m, &ways[w], chosen, CHOSEN, NULL, "some", some, &error) ==
+                          LAM_OK,
+                      "%s", error.message);
         for (size_t k = 0; k < CHOSEN; k++) ck_assert_uint_eq(some[k], all[chosen[k]]);
         if (w == 0) /* all but its own wall, nine elements, and every one is larger than a pixel */
             for (size_t i = 0; i < 54; i++) ck_assert_uint_eq(all[i], 45);
     }
     size_t none[CHOSEN];
-    ck_assert_int_eq(seen_count(&m, &ways[2], chosen, CHOSEN, NULL, "none", none, &error), LAM_ERR_ARGUMENT);
-    ck_assert_int_eq(seen_count(&m, &ways[0], chosen, 0, NULL, "none", none, &error), LAM_ERR_ARGUMENT);
+    ck_assert_int_eq(form_factors_count_seen(&m, &ways[2], chosen, CHOSEN, NULL, "none", none, &error),
+                     LAM_ERR_ARGUMENT);
+    ck_assert_int_eq(form_factors_count_seen(&m, &ways[0], chosen, 0, NULL, "none", none, &error),
+                     LAM_ERR_ARGUMENT);
     mesh_free(&m);
 }
 END_TEST

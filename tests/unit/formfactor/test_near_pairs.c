@@ -1,7 +1,7 @@
 /* Near pairs by mathematics and the others by rays: joined without counting anything twice. */
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/pairs/pair_factor.h"
-#include "solver/formfactor/pairs/recipe_pairs.h"
+#include "solver/formfactor/pairs/pairs.h"
 #include "solver/scene/generate/generate.h"
 #include "solver/scene/import/import.h"
 #include "support/box.h"
@@ -96,7 +96,7 @@ START_TEST(near_pairs_are_those_above_the_threshold) {
     const recipe all = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 1e-5, .seed = 9};
     form_factors exact = make(&m, &all);
     ck_assert_int_eq(visibility_create(&m, &v, &error), LAM_OK);
-    ck_assert_msg(recipe_pairs_find(&m, v, &how, threshold, &f, &G, &error) == LAM_OK, "%s", error.message);
+    ck_assert_msg(pairs_find(&m, v, &how, threshold, &f, &G, &error) == LAM_OK, "%s", error.message);
     size_t n_near = 0, n_larger = 0, n_partly = 0;
     double off = 0;
     for (size_t i = 0; i < m.n; i++) {

@@ -1,7 +1,7 @@
 /* Rows that rays find as they are asked for: what both sides of each pair make together is what merging makes
  * of rows that are held. */
 #include "solver/bench/scenes.h"
-#include "solver/formfactor/pairs/recipe_pairs.h"
+#include "solver/formfactor/pairs/pairs.h"
 #include "solver/formfactor/rays/ray_rows.h"
 #include "solver/formfactor/rays/rays.h"
 #include "solver/formfactor/rows/upper.h"
@@ -97,7 +97,7 @@ static double *merged(const subject *s) {
             G[i * n + upper.indices[e]] = G[upper.indices[e] * n + i] = (double)upper.data[e];
     if (r->method == RECIPE_NEAR_PAIRS) {
         form_factors f = {.recipe = *r};
-        ck_ok(recipe_pairs_find(&s->m, v, &s->how, recipe_near(r), &f, &near, &error));
+        ck_ok(pairs_find(&s->m, v, &s->how, recipe_near(r), &f, &near, &error));
         ck_assert_uint_gt(near.indptr[n], n);
         for (size_t i = 0; i < n; i++)
             for (uint64_t e = near.indptr[i]; e < near.indptr[i + 1]; e++)

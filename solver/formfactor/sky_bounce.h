@@ -1,6 +1,6 @@
 /* What every element receives directly from each tile of a sky: bins that rays fill, and what they become. */
-#ifndef LAMBERT_FORMFACTOR_ROWS_SKY_BOUNCE_H
-#define LAMBERT_FORMFACTOR_ROWS_SKY_BOUNCE_H
+#ifndef LAMBERT_FORMFACTOR_SKY_BOUNCE_H
+#define LAMBERT_FORMFACTOR_SKY_BOUNCE_H
 
 #include "solver/daylight/sky_tiles.h"
 #include "store/store.h"

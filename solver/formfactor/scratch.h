@@ -1,7 +1,7 @@
 /* A folder where long work keeps what it has finished, so that the same command goes on there. It belongs to
  * one run at a time. Knows file names, not what is in the files. */
-#ifndef LAMBERT_FORMFACTOR_ROWS_SCRATCH_H
-#define LAMBERT_FORMFACTOR_ROWS_SCRATCH_H
+#ifndef LAMBERT_FORMFACTOR_SCRATCH_H
+#define LAMBERT_FORMFACTOR_SCRATCH_H
 
 #include "store/large_file.h"
 

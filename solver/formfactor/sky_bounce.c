@@ -1,4 +1,4 @@
-#include "solver/formfactor/rows/sky_bounce.h"
+#include "solver/formfactor/sky_bounce.h"
 
 #include <math.h>
 #include <stdlib.h>

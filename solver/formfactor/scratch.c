@@ -1,4 +1,4 @@
-#include "solver/formfactor/rows/scratch.h"
+#include "solver/formfactor/scratch.h"
 
 #include <assert.h>
 #include <dirent.h>

@@ -1,0 +1,207 @@
+/* How form factors are made: by rays, hemicubes, pairs or near pairs. The only file that knows all sub-rooms.
+ */
+#include "solver/formfactor/formfactor.h"
+
+#include "solver/base/clock.h"
+#include "solver/formfactor/leaving.h"
+#include "solver/formfactor/pairs/pairs.h"
+#include "solver/formfactor/rays/hemicube.h"
+#include "solver/formfactor/rays/rays.h"
+#include "solver/formfactor/repair.h"
+#include "solver/formfactor/rows/upper.h"
+#include "solver/formfactor/visibility/visibility.h"
+#include "solver/linalg/csr.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Repairs exchange areas by what their rays say leaves. */
+static lam_status close_upper(form_factors *f, const mesh *m, lam_error *error) {
+    double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
+    if (outside == NULL) return LAM_ERR_MEMORY;
+    closing_measure(f, m);
+    for (size_t i = 0; i < m->n; i++) outside[i] = closing_outside(f, i);
+    const lam_status status = repair_close(&f->upper, m->area, outside, f, error);
+    free(outside);
+    return status;
+}
+
+/* From one-sided rows, which are freed, whose entries are F_ij times rays, to the upper triangle. */
+static lam_status form_factors_finish(form_factors *f, const mesh *m, found_rows *rows, size_t rays,
+                                      const large_place *place, lam_error *error) {
+    lam_status status = LAM_OK;
+    f->rows_kept = rows->kept;
+    TRY(upper_merge(rows, rays, m->area, place, &f->upper, error));
+    found_rows_free(rows);
+    TRY(close_upper(f, m, error));
+done:
+    return status;
+}
+
+static lam_status make_of_rays(const mesh *m, const visibility *v, const uint32_t *order,
+                               const form_factor_options *options, form_factors *f, lam_error *error) {
+    lam_status status = LAM_OK;
+    found_rows counts = {0};
+    TRY(rays_count(m, v, order, options, &counts, f->leaving, f->absorbed, error));
+    TRY(form_factors_finish(f, m, &counts, options->recipe.rays, options->large, error));
+done:
+    found_rows_free(&counts);
+    return status;
+}
+
+static lam_status make_of_hemicubes(const mesh *m, const visibility *v, const uint32_t *order,
+                                    const form_factor_options *options, form_factors *f, lam_error *error) {
+    lam_status status = LAM_OK;
+    hemicube h = {0};
+    found_rows rows = {0};
+    TRY(hemicube_create(options->recipe.resolution, &h, error));
+    TRY(hemicube_trace(&h, m, v, order, options, &rows, f->leaving, f->absorbed, error));
+    /* The weights are form factors already, as if one ray had been cast. */
+    TRY(form_factors_finish(f, m, &rows, 1, options->large, error));
+done:
+    hemicube_free(&h);
+    found_rows_free(&rows);
+    return status;
+}
+
+static lam_status make_of_pairs(const mesh *m, const visibility *v, const uint32_t *order,
+                                const form_factor_options *options, form_factors *f, lam_error *error) {
+    lam_status status = LAM_OK;
+    found_rows counts = {0};
+    form_factor_options silent = *options;
+    silent.progress = NULL;
+    silent.scratch = NULL;
+    double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
+    if (outside == NULL) return LAM_ERR_MEMORY;
+    TRY(rays_count(m, v, order, &silent, &counts, f->leaving, f->absorbed, error));
+    found_rows_free(&counts);
+    TRY(pairs_find(m, v, options, 0, f, &f->upper, error));
+    closing_measure(f, m);
+    if (!closing_all_stays(f)) {
+        /* What a row lacks goes outside: 1 - sum_j g_ij / A_i. */
+        for (size_t i = 0; i < m->n; i++)
+            for (uint64_t p = f->upper.indptr[i]; p < f->upper.indptr[i + 1]; p++) {
+                outside[i] += (double)f->upper.data[p];
+                outside[f->upper.indices[p]] += (double)f->upper.data[p];
+            }
+        for (size_t i = 0; i < m->n; i++) outside[i] = fmax(0, 1 - outside[i] / m->area[i]);
+    }
+    TRY(repair_close(&f->upper, m->area, outside, f, error));
+done:
+    found_rows_free(&counts);
+    free(outside);
+    return status;
+}
+
+static lam_status make_of_near_pairs(const mesh *m, const visibility *v, const uint32_t *order,
+                                     const form_factor_options *options, form_factors *f, lam_error *error) {
+    lam_status status = LAM_OK;
+    found_rows counts = {0};
+    csr near = {0}, counted = {0};
+    TRY(pairs_find(m, v, options, recipe_near(&options->recipe), f, &near, error));
+    TRY(rays_count(m, v, order, options, &counts, f->leaving, f->absorbed, error));
+    if (counts.kept > f->rows_kept) f->rows_kept = counts.kept;
+    TRY(upper_merge(&counts, options->recipe.rays, m->area, options->large, &counted, error));
+    found_rows_free(&counts);
+    TRY(csr_replace(&counted, &near, &f->upper, error));
+    csr_free(&near);
+    csr_free(&counted);
+    TRY(close_upper(f, m, error));
+done:
+    found_rows_free(&counts);
+    csr_free(&near);
+    csr_free(&counted);
+    return status;
+}
+
+lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_factor_options *asked,
+                             form_factors *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    visibility *v = NULL;
+    form_factor_options own = *asked;
+    const form_factor_options *const options = &own;
+    form_factors f = {.recipe = options->recipe};
+    TRY(recipe_check(&options->recipe, error));
+    f.leaving = memory_allocate(m->n, sizeof *f.leaving, "form factors", error);
+    f.absorbed = memory_allocate(m->n, sizeof *f.absorbed, "form factors", error);
+    if (f.leaving == NULL || f.absorbed == NULL) TRY(LAM_ERR_MEMORY);
+    if (asked->sky != NULL)
+        TRY(sky_bounce_create(asked->sky, m->up, asked->ground_albedo, m->n, &f.sky, error));
+    own.bounce = asked->sky != NULL ? &f.sky : NULL;
+    TRY(visibility_create(m, &v, error));
+    switch (options->recipe.method) {
+    case RECIPE_RAYS:
+        TRY(make_of_rays(m, v, order, options, &f, error));
+        break;
+    case RECIPE_HEMICUBE:
+        TRY(make_of_hemicubes(m, v, order, options, &f, error));
+        break;
+    case RECIPE_PAIRS:
+        TRY(make_of_pairs(m, v, order, options, &f, error));
+        break;
+    case RECIPE_NEAR_PAIRS:
+        TRY(make_of_near_pairs(m, v, order, options, &f, error));
+        break;
+    }
+    if (asked->sky != NULL) TRY(closing_sky(&f, m->n, error));
+    if (!options->upper) TRY(form_factors_expand(&f, m->area, error));
+    *out = f;
+    f = (form_factors){0};
+done:
+    visibility_destroy(v);
+    form_factors_free(&f);
+    return status;
+}
+
+lam_status form_factors_ray_rate(const mesh *m, const uint32_t *order, double *rays_per_second,
+                                 lam_error *error) {
+    enum { ELEMENTS = 256, RAYS = 512, LONG_ENOUGH = 16 };
+    static const double trial_seconds = .02;
+    lam_status status = LAM_OK;
+    visibility *v = NULL;
+    TRY(visibility_create(m, &v, error));
+    rays_cast_some(m, v, order, ELEMENTS, VISIBILITY_PACKET); /* threads start, caches fill */
+    size_t cast = 0;
+    const double started = clock_seconds();
+    double seconds = 0;
+    for (int k = 0; k < LONG_ENOUGH && seconds < trial_seconds; k++) {
+        rays_cast_some(m, v, order, ELEMENTS, RAYS);
+        cast += ELEMENTS * RAYS;
+        seconds = clock_seconds() - started;
+    }
+    *rays_per_second = (double)cast / fmax(seconds, 1e-6);
+done:
+    visibility_destroy(v);
+    return status;
+}
+
+lam_status form_factors_count_seen(const mesh *m, const recipe *how, const uint32_t *elements, size_t count,
+                                   const progress *steps, const char *stage, size_t *seen, lam_error *error) {
+    lam_status status = LAM_OK;
+    visibility *v = NULL;
+    hemicube h = {0};
+    found_rows rows = {0};
+    double *outside = memory_allocate(m->n, 2 * sizeof *outside, "rows of form factors", error);
+    if (outside == NULL) return LAM_ERR_MEMORY;
+    const form_factor_options options = {
+        .recipe = *how, .progress = steps, .stage = stage, .only_first = count};
+    if (how->method != RECIPE_RAYS && how->method != RECIPE_HEMICUBE)
+        FAIL(error, LAM_ERR_ARGUMENT, "elements seen: must be counted by rays or by hemicubes");
+    if (count < 1 || count > m->n)
+        FAIL(error, LAM_ERR_ARGUMENT, "elements seen: by %zu of %zu elements; must be by 1 to all", count,
+             m->n);
+    TRY(visibility_create(m, &v, error));
+    if (how->method == RECIPE_HEMICUBE) {
+        TRY(hemicube_create(how->resolution, &h, error));
+        TRY(hemicube_trace(&h, m, v, elements, &options, &rows, outside, outside + m->n, error));
+    } else {
+        TRY(rays_count(m, v, elements, &options, &rows, outside, outside + m->n, error));
+    }
+    for (size_t k = 0; k < count; k++) seen[k] = rows.rows[elements[k]].n_entries;
+done:
+    free(outside);
+    found_rows_free(&rows);
+    hemicube_free(&h);
+    visibility_destroy(v);
+    return status;
+}
