@@ -1,8 +1,8 @@
 /* `lambert`: finds the verb; the verbs are in cmd_*.c. */
+#include "solver/console/terminal.h"
 #include "solver/linalg/core.h"
 #include "solver/verbs/verbs.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -35,16 +35,6 @@ static void print_help(void) {
          "explains a verb. Exit status: 0 done, 1 it failed, 2 wrong usage.");
 }
 
-/* What was printed counts only once it is out: a full disk behind standard output is a failure. */
-static int finish(const char *name, int status) {
-    errno = 0;
-    if (fflush(stdout) == 0 && !ferror(stdout)) return status;
-    /* Where what is refused was longer than a buffer, the reason is gone: one more byte brings it back. */
-    if (errno == 0 && putchar('\n') != EOF) fflush(stdout);
-    fprintf(stderr, "lambert %s: cannot write to standard output: %s\n", name, strerror(errno));
-    return 1;
-}
-
 int main(int argc, char **argv) {
     if (argc < 2) {
         fputs("lambert: no verb given; see lambert --help\n", stderr);
@@ -53,15 +43,15 @@ int main(int argc, char **argv) {
     core_keep_thread_limit();
     if (strcmp(argv[1], "--help") == 0) {
         print_help();
-        return finish("--help", 0);
+        return terminal_finish("--help", 0);
     }
     if (strcmp(argv[1], "--version") == 0) {
         puts("lambert " LAMBERT_VERSION);
-        return finish("--version", 0);
+        return terminal_finish("--version", 0);
     }
     for (size_t i = 0; i < sizeof verbs / sizeof verbs[0]; i++) {
         if (strcmp(argv[1], verbs[i].name) != 0) continue;
-        if (verbs[i].run != NULL) return finish(verbs[i].name, verbs[i].run(argc - 1, argv + 1));
+        if (verbs[i].run != NULL) return terminal_finish(verbs[i].name, verbs[i].run(argc - 1, argv + 1));
         fprintf(stderr, "lambert %s: not supported yet\n", verbs[i].name);
         return 2;
     }

@@ -2,6 +2,7 @@
 
 #include "solver/base/clock.h"
 
+#include <errno.h>
 #include <math.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -113,4 +114,13 @@ int terminal_fail(terminal *t, const lam_error *error) {
 
 lam_status terminal_check(lam_error *error) {
     return terminal_cancelled() ? status_fail(error, LAM_ERR_CANCELLED, "cancelled") : LAM_OK;
+}
+
+int terminal_finish(const char *verb, int status) {
+    errno = 0;
+    if (fflush(stdout) == 0 && !ferror(stdout)) return status;
+    /* A refused write longer than the buffer leaves no reason behind: one more byte brings it back. */
+    if (errno == 0 && putchar('\n') != EOF) fflush(stdout);
+    fprintf(stderr, "lambert %s: cannot write to standard output: %s\n", verb, strerror(errno));
+    return 1;
 }

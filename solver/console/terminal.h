@@ -36,6 +36,10 @@ void terminal_clear(terminal *t);
 /* Says why a verb failed, in one line ("cancelled; ..." when a signal came); returns its exit status. */
 int terminal_fail(terminal *t, const lam_error *error);
 
+/* The exit status of a verb once its standard output is out: 1 instead of status where that cannot be
+ * written. */
+int terminal_finish(const char *verb, int status);
+
 /* Whether SIGINT or SIGTERM came. */
 bool terminal_cancelled(void);
 
