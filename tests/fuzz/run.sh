@@ -15,8 +15,7 @@ if [ ${#names[@]} -eq 0 ]; then
     done
 fi
 build=build/fuzz
-cmake -S . -B "$build" -DCMAKE_C_COMPILER=clang -DCMAKE_BUILD_TYPE=RelWithDebInfo -DLAMBERT_FUZZ=ON \
-    -DLAMBERT_SANITIZE=address,undefined >/dev/null
+cmake --preset fuzz >/dev/null
 cmake --build "$build" -j "$(nproc)" --target lambert "${names[@]/#/fuzz_}" >/dev/null
 /usr/bin/python3 tests/fuzz/make_seeds.py "$PWD/$build/lambert" "$build/seeds"
 export ASAN_OPTIONS=detect_leaks=1 LSAN_OPTIONS=suppressions=$PWD/tests/support/lsan.supp:print_suppressions=0
