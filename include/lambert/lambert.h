@@ -6,6 +6,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+#pragma GCC visibility push(default)
+
 /* Every status and its text, once. Any status but LAM_OK leaves outputs untouched. */
 #define LAM_STATUS_LIST(X)                                                                                   \
     X(LAM_OK, "done")                                                                                        \
@@ -196,5 +201,10 @@ void lam_sky_irradiance(const lam_sky *sky, size_t n_rows, const float *L, float
 /* L = first_bounce g, its transpose: what a sum over g of H0 says of every tile. g is [n_rows][n], L is
  * [n_rows][m]. */
 void lam_sky_adjoint(const lam_sky *sky, size_t n_rows, const float *g, float *L);
+
+#pragma GCC visibility pop
+#ifdef __cplusplus
+}
+#endif
 
 #endif
