@@ -10,20 +10,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Elements of a leaf at most, as those of a hierarchical operator. */
+/* Elements of a leaf at most, as in the hierarchical operator. */
 enum { LEAF = 6 };
 
-/* Subtrees that threads share. */
+/* Threads take subtrees of n / PIECES elements. */
 enum { PIECES = 24 };
 
-/* What an element's light may lack by one number, beside epsilon. */
+/* The threshold over epsilon. */
 static const double share_of_epsilon = 4e-4;
 
 double compress_threshold(double epsilon) {
     return share_of_epsilon * epsilon;
 }
 
-/* Rows of a node in columns of coefficients, side by side. */
+/* One column of the rows of a node: a lane is the row of one of its functions. */
 typedef double rows_of_node[WAVELET_INPUTS];
 
 typedef struct kept_number {
@@ -35,34 +35,34 @@ typedef struct compress_job {
     const compress_input *input;
     const wavelets *w;
     const compressed_factors *c;
-    const uint32_t *position;       /* [n], of an element */
-    const double *size_of;          /* [n], M of a coefficient's node, over A^1/2 of all */
-    const double *share;            /* [n_classes] */
-    const node_sizes *sizes;        /* [n_nodes] */
-    double (**up)[WAVELET_SCALING]; /* [n_nodes] -> [n], rows that wait for their sibling */
-    double *lost;                   /* [n_nodes][n_classes], squares */
+    const uint32_t *position; /* [n], element -> position */
+    const double *size_of;    /* [n], by coefficient: node_sizes.wavelets times (area of the scene)^1/2 */
+    const double *share;      /* [n_classes] */
+    const node_sizes *sizes;  /* [n_nodes] */
+    double (**up)[WAVELET_SCALING]; /* [n_nodes] -> [n], scaling rows that wait for those of the sibling */
+    double *lost;                   /* [n_nodes][n_classes], sum of squares of dropped coefficients */
     size_t done, n_kept;
-    bool given_up; /* there are too many */
+    bool given_up; /* more than `most` are kept */
 } compress_job;
 
-/* What a thread works with. */
-typedef struct compress_desk {
+/* The working area of one thread. */
+typedef struct compress_work {
     rows_of_node *rows;   /* [n], by position or coefficient */
     rows_of_node *turned; /* [n] */
     rows_of_node *slots;  /* [n_nodes][WAVELET_SCALING] */
     kept_number *kept;
     size_t n_kept, capacity;
-} compress_desk;
+} compress_work;
 
-static void desk_free(compress_desk *d) {
+static void work_free(compress_work *d) {
     free(d->rows);
     free(d->turned);
     free(d->slots);
     free(d->kept);
-    *d = (compress_desk){.n_kept = 0};
+    *d = (compress_work){.n_kept = 0};
 }
 
-static lam_status desk_make(const wavelets *w, compress_desk *d, lam_error *error) {
+static lam_status work_make(const wavelets *w, compress_work *d, lam_error *error) {
     d->rows = memory_allocate(w->n, sizeof *d->rows, "compressed form factors", error);
     d->turned = memory_allocate(w->n, sizeof *d->turned, "compressed form factors", error);
     d->slots =
@@ -70,7 +70,7 @@ static lam_status desk_make(const wavelets *w, compress_desk *d, lam_error *erro
     return d->rows != NULL && d->turned != NULL && d->slots != NULL ? LAM_OK : LAM_ERR_MEMORY;
 }
 
-/* out = Q in, each entry being some rows side by side. */
+/* out = Q in; an entry holds one column of all rows. */
 static void turn_columns(const float *columns, size_t inputs, const rows_of_node *const *in,
                          rows_of_node *out) {
     memset(out, 0, inputs * sizeof *out);
@@ -81,7 +81,7 @@ static void turn_columns(const float *columns, size_t inputs, const rows_of_node
         }
 }
 
-/* Rows by position become rows by coefficient: W on the right. */
+/* Columns by position become columns by coefficient: c = x W^T. */
 static void transform_columns(const wavelets *w, const rows_of_node *x, rows_of_node *slots,
                               rows_of_node *c) {
     for (size_t t = 0; t < w->n_nodes; t++) {
@@ -100,8 +100,8 @@ static void transform_columns(const wavelets *w, const rows_of_node *x, rows_of_
     memcpy(c + w->n - scaling, slots + (w->n_nodes - 1) * WAVELET_SCALING, scaling * sizeof *c);
 }
 
-/* Rows of a leaf's elements, A_i^1/2 F_ij A_j^-1/2, in columns of coefficients. */
-static void begin_leaf(const compress_job *job, const wavelet_node *a, compress_desk *d) {
+/* Rows A_i^1/2 F_ij A_j^-1/2 of a leaf's elements, times W^T. */
+static void begin_leaf(const compress_job *job, const wavelet_node *a, compress_work *d) {
     const csr *F = job->input->F;
     const double *area = job->input->area;
     memset(d->turned, 0, job->w->n * sizeof *d->turned);
@@ -115,8 +115,8 @@ static void begin_leaf(const compress_job *job, const wavelet_node *a, compress_
     transform_columns(job->w, d->turned, d->slots, d->rows);
 }
 
-/* Rows that its two children hand up. */
-static void take_children(const compress_job *job, size_t t, compress_desk *d) {
+/* The scaling rows of both children. */
+static void take_children(const compress_job *job, size_t t, compress_work *d) {
     const wavelet_node *a = &job->w->nodes[t];
     double(*const left)[WAVELET_SCALING] = job->up[a->left];
     double(*const right)[WAVELET_SCALING] = job->up[t - 1];
@@ -130,7 +130,7 @@ static void take_children(const compress_job *job, size_t t, compress_desk *d) {
     job->up[a->left] = job->up[t - 1] = NULL;
 }
 
-static lam_status keep(compress_desk *d, size_t i, size_t j, double value, lam_error *error) {
+static lam_status keep(compress_work *d, size_t i, size_t j, double value, lam_error *error) {
     if (d->n_kept == d->capacity) {
         const size_t capacity = d->capacity + d->capacity / 2 + 4096;
         kept_number *const more = realloc(d->kept, capacity * sizeof *more);
@@ -145,24 +145,24 @@ static lam_status keep(compress_desk *d, size_t i, size_t j, double value, lam_e
     return LAM_OK;
 }
 
-/* Row p of a node against column q. */
-typedef struct meeting {
-    double *lost; /* of the row's node and the column's class */
-    double least; /* is kept */
-    double
-        beside; /* counts as lost up to there: S_qp, which decides where q comes first, may be as far off */
+/* The rows of a node at column q. */
+typedef struct entry_rule {
+    double *lost;  /* of the row's node and the column's class */
+    double least;  /* a coefficient of this magnitude is kept */
+    double beside; /* a coefficient below this counts as dropped: S_qp, which decides if q < p, may differ by
+                      the asymmetry */
     size_t q;
-} meeting;
+} entry_rule;
 
-/* Number (p, q) of S: kept in the row that comes first, lost to that of p where it is small. */
-static inline lam_status settle(const meeting *at, size_t p, double value, compress_desk *d,
-                                lam_error *error) {
+/* Coefficient S_pq: kept in the upper triangle, added to the dropped ones of row p if it is small. */
+static inline lam_status keep_or_drop(const entry_rule *at, size_t p, double value, compress_work *d,
+                                      lam_error *error) {
     const double magnitude = fabs(value);
     if (magnitude < at->beside) *at->lost += value * value;
     return at->q >= p && magnitude >= at->least ? keep(d, p, at->q, value, error) : LAM_OK;
 }
 
-static lam_status run_node(compress_job *job, size_t t, compress_desk *d, lam_error *error) {
+static lam_status run_node(compress_job *job, size_t t, compress_work *d, lam_error *error) {
     lam_status status = LAM_OK;
     const wavelets *w = job->w;
     const wavelet_node *a = &w->nodes[t];
@@ -170,8 +170,8 @@ static lam_status run_node(compress_job *job, size_t t, compress_desk *d, lam_er
     const float *columns = wavelet_columns(w, &w->nodes[t]);
     const uint8_t *class_of = job->c->class_of;
     double *lost = job->lost + t * job->c->n_classes;
-    /* What a number adds to the error of light whose norm is 1, as large as its rows' wavelets and as much as
-     * light has of its column's, either way. */
+    /* Dropping S_pq changes F B by at most the size of p's wavelets times the share of B in q's class, and
+     * with p and q exchanged. */
     const double own_size = job->size_of[root ? w->n - 1 : a->first];
     const double own_share = job->share[class_of[root ? w->n - 1 : a->first]];
     const double asymmetry = COMPRESS_ASYMMETRY * job->sizes[t].rows;
@@ -189,22 +189,23 @@ static lam_status run_node(compress_job *job, size_t t, compress_desk *d, lam_er
                 out[k] += (double)columns[m * WAVELET_INPUTS + k] * d->rows[q][m];
         const double worth = fmax(own_size * job->share[class_of[q]], own_share * job->size_of[q]);
         const double least = job->input->threshold / worth;
-        const meeting at = {.lost = &lost[class_of[q]], .least = least, .beside = least + asymmetry, .q = q};
+        const entry_rule at = {
+            .lost = &lost[class_of[q]], .least = least, .beside = least + asymmetry, .q = q};
         for (size_t k = 0; k < a->scaling; k++) {
             if (root)
-                TRY(settle(&at, w->n - a->scaling + k, out[k], d, error));
+                TRY(keep_or_drop(&at, w->n - a->scaling + k, out[k], d, error));
             else
                 up[q][k] = out[k];
         }
         for (size_t k = a->scaling; k < a->inputs; k++)
-            TRY(settle(&at, a->first + k - a->scaling, out[k], d, error));
+            TRY(keep_or_drop(&at, a->first + k - a->scaling, out[k], d, error));
     }
 done:
     return status;
 }
 
-/* After a node: how far it is, and whether it is of use. */
-static lam_status told(compress_job *job, const wavelet_node *a, size_t kept, lam_error *error) {
+/* Reports progress after a node, and gives up when too many coefficients are kept. */
+static lam_status report_node(compress_job *job, const wavelet_node *a, size_t kept, lam_error *error) {
     lam_status status = LAM_OK;
     const progress *p = job->input->progress;
 #pragma omp critical(compress_progress)
@@ -219,23 +220,22 @@ static lam_status told(compress_job *job, const wavelet_node *a, size_t kept, la
     return status;
 }
 
-/* What all threads share, and what each has for itself. */
 typedef struct compress_team {
     compress_job *job;
-    compress_desk *desks;
+    compress_work *works;
 } compress_team;
 
 static lam_status run_piece(void *context, wavelet_piece piece, size_t k, lam_error *error) {
     lam_status status = LAM_OK;
     compress_team *team = context;
     compress_job *job = team->job;
-    compress_desk *d = &team->desks[k];
-    if (d->rows == NULL) TRY(desk_make(job->w, d, error));
+    compress_work *d = &team->works[k];
+    if (d->rows == NULL) TRY(work_make(job->w, d, error));
     for (size_t t = piece.first; t < piece.last; t++) {
         const size_t before = d->n_kept;
         if (__atomic_load_n(&job->given_up, __ATOMIC_RELAXED)) break;
         TRY(run_node(job, t, d, error));
-        TRY(told(job, &job->w->nodes[t], d->n_kept - before, error));
+        TRY(report_node(job, &job->w->nodes[t], d->n_kept - before, error));
     }
 done:
     return status;
@@ -246,22 +246,22 @@ static int by_column(const void *left, const void *right) {
     return a->j < b->j ? -1 : a->j > b->j;
 }
 
-/* All that was kept, by rows. */
-static lam_status gather(size_t n, size_t n_desks, compress_desk *desks, csr *out, lam_error *error) {
+/* out: all coefficients that were kept, as a CSR matrix. */
+static lam_status collect(size_t n, size_t n_works, compress_work *works, csr *out, lam_error *error) {
     lam_status status = LAM_OK;
     csr made = {.n = n, .indptr = memory_allocate(n + 1, sizeof *made.indptr, "form factors", error)};
     kept_number *row = memory_allocate(n, sizeof *row, "form factors", error);
     if (made.indptr == NULL || row == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t k = 0; k < n_desks; k++)
-        for (size_t e = 0; e < desks[k].n_kept; e++) made.indptr[desks[k].kept[e].i + 1]++;
+    for (size_t k = 0; k < n_works; k++)
+        for (size_t e = 0; e < works[k].n_kept; e++) made.indptr[works[k].kept[e].i + 1]++;
     TRY(csr_begin_rows(&made, "form factors", error));
-    for (size_t k = 0; k < n_desks; k++) {
-        for (size_t e = 0; e < desks[k].n_kept; e++) {
-            const kept_number *a = &desks[k].kept[e];
+    for (size_t k = 0; k < n_works; k++) {
+        for (size_t e = 0; e < works[k].n_kept; e++) {
+            const kept_number *a = &works[k].kept[e];
             made.indices[made.indptr[a->i]] = a->j;
             made.data[made.indptr[a->i]++] = a->value;
         }
-        desk_free(&desks[k]);
+        work_free(&works[k]);
     }
     csr_end_rows(&made);
     for (size_t i = 0; i < n; i++) {
@@ -282,9 +282,7 @@ done:
     return status;
 }
 
-/* --- all of it ----------------------------------------------------------------------------------------- */
-
-/* Of every coefficient how large its node's wavelets are, beside light that is the same everywhere. */
+/* out [n]: node_sizes.wavelets of each coefficient's node, relative to the constant function of norm 1. */
 static void spread_sizes(const compressed_factors *c, const node_sizes *sizes, double *out) {
     const wavelets *w = &c->basis;
     const double root = sqrt(c->area);
@@ -294,7 +292,7 @@ static void spread_sizes(const compressed_factors *c, const node_sizes *sizes, d
             out[w->nodes[t].first + k] = root * sizes[t].wavelets;
 }
 
-/* Basis, order, groups and what depends on them. */
+/* Basis, order, groups and direct illumination of c. */
 static lam_status prepare(const compress_input *input, compressed_factors *c, lam_error *error) {
     lam_status status = LAM_OK;
     plane_tree tree = {.n = 0};
@@ -316,9 +314,9 @@ lam_status compress_form_factors(const compress_input *input, compressed_factors
     compress_job job = {.input = input, .w = &c.basis, .c = &c};
     double share[COMPRESSED_CLASSES_MOST], *size_of = NULL;
     node_sizes *sizes = NULL;
-    compress_desk *desks = memory_allocate(input->n_threads, sizeof *desks, "form factors", error);
+    compress_work *works = memory_allocate(input->n_threads, sizeof *works, "form factors", error);
     uint32_t *position = memory_allocate(n, sizeof *position, "form factors", error);
-    if (desks == NULL || position == NULL) TRY(LAM_ERR_MEMORY);
+    if (works == NULL || position == NULL) TRY(LAM_ERR_MEMORY);
     TRY(prepare(input, &c, error));
     for (size_t p = 0; p < n; p++) position[c.order[p]] = (uint32_t)p;
     sizes = memory_allocate(c.basis.n_nodes, sizeof *sizes, "form factors", error);
@@ -333,22 +331,22 @@ lam_status compress_form_factors(const compress_input *input, compressed_factors
     job.size_of = size_of;
     job.share = share;
     job.sizes = sizes;
-    compress_team team = {&job, desks};
+    compress_team team = {&job, works};
     TRY(subtrees_run(&c.basis, n / PIECES + LEAF, input->n_threads, run_piece, &team, error));
     if (job.given_up) {
         *out = (compressed_factors){.n = 0};
         goto done;
     }
-    TRY(gather(n, input->n_threads, desks, &c.S, error));
+    TRY(collect(n, input->n_threads, works, &c.S, error));
     TRY(compress_bounds(sizes, job.lost, &c, error));
     *out = c;
     c = (compressed_factors){.n = 0};
 done:
-    for (size_t k = 0; desks != NULL && k < input->n_threads; k++) desk_free(&desks[k]);
+    for (size_t k = 0; works != NULL && k < input->n_threads; k++) work_free(&works[k]);
     for (size_t t = 0; job.up != NULL && t < c.basis.n_nodes; t++) free(job.up[t]);
     free(job.up);
     free(job.lost);
-    free(desks);
+    free(works);
     free(position);
     free(sizes);
     free(size_of);

@@ -8,15 +8,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of any class light may have this share of what it has most of. */
+/* The least share of a class, over the largest share. */
 static const double share_least = 1e-3;
 
 static const double margin = 1 + 1e-9;
 
-/* --- sizes of nodes ------------------------------------------------------------------------------------ */
-
-/* values [n][WAVELET_SCALING] of what nodes hand up, over A^1/2, at each position: those of the children
- * become those of their parent. */
+/* values [n][WAVELET_SCALING]: the scaling functions at each position over A^1/2; those of the children
+ * become those of node t. */
 static void size_node(const wavelets *w, size_t t, const double *area, const uint32_t *order,
                       double (*values)[WAVELET_SCALING], node_sizes *out) {
     const wavelet_node *a = &w->nodes[t];
@@ -47,7 +45,7 @@ static void size_node(const wavelets *w, size_t t, const double *area, const uin
     }
 }
 
-/* Of A_i^1/2 F_ij A_j^-1/2, the elements of a leaf. */
+/* Frobenius norm of A_i^1/2 F_ij A_j^-1/2 over the elements of a leaf. */
 static double rows_of_leaf(const compress_input *input, const wavelet_node *a, const uint32_t *order) {
     const csr *F = input->F;
     double squares = 0;
@@ -75,9 +73,7 @@ lam_status compress_sizes(const compress_input *input, const compressed_factors 
     return LAM_OK;
 }
 
-/* --- first light of groups ----------------------------------------------------------------------------- */
-
-/* The larger groups first, and those that shine before all others. */
+/* Chooses groups by descending area, emitters before all others. */
 static lam_status choose_lit(const compress_input *input, compressed_factors *c, lam_error *error) {
     lam_status status = LAM_OK;
     double *size = memory_allocate(input->n_groups, sizeof *size, "form factors", error);
@@ -124,8 +120,6 @@ done:
     return status;
 }
 
-/* --- how much of each class light has ------------------------------------------------------------------ */
-
 lam_status compress_shares(const compress_input *input, const compressed_factors *c, double *share,
                            lam_error *error) {
     lam_status status = LAM_OK;
@@ -155,9 +149,7 @@ done:
     return status;
 }
 
-/* --- bounds -------------------------------------------------------------------------------------------- */
-
-/* max over shapes of |Q Q^T - 1|_F: they are rounded to single precision. */
+/* max over shapes of |Q Q^T - 1|_F, which rounding to single precision leaves above 0. */
 static double unorthogonal(const wavelets *w) {
     const float *Q = w->basis;
     double largest = 0;
@@ -181,9 +173,9 @@ static float rounded_up(double value) {
     return (double)near < value ? nextafterf(near, INFINITY) : near;
 }
 
-/* bound_tk = M_t d_tk, and what rounding of S and of the basis adds: W^T W is 1 but for eta a level. On the
- * way to the coefficients that is eta of each node's inputs, and on the way back all levels' eta of the
- * light, which the rows of the leaf see. */
+/* bound_tk = M_t d_tk + rounding, M_t the size of the node's wavelets, d_tk the norm of its dropped
+ * coefficients in class k. W^T W differs from 1 by eta a level: forward this is eta of each node's inputs,
+ * backward eta of all levels in the radiosity that the rows of a leaf multiply. */
 lam_status compress_bounds(const node_sizes *sizes, const double *lost, compressed_factors *c,
                            lam_error *error) {
     const wavelets *w = &c->basis;

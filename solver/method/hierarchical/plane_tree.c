@@ -6,11 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Normals of a plane are this close in each coordinate, centroids this close to it, of the scene's extent. */
+/* Elements of one plane: normals differ by at most this in each coordinate, offsets by this share of the
+ * extent of the scene. */
 static const double same_normal = 2e-3, same_plane = 1e-4;
-/* How far planes that face apart count as being, of the extent of what is split. */
+/* A difference of normals of 1 counts as this share of the extent of the planes that are split. */
 static const double facing_weight = .35;
-/* A cluster is cut where the gap is at least this share of the widest near its middle. */
+/* A gap counts as wide if it is at least this share of the widest one near the middle of a cluster. */
 static const double wide_gap = .6;
 
 typedef struct key {
@@ -51,8 +52,6 @@ static void sort_by_keys(maker *k, size_t begin, size_t end) {
     for (size_t p = begin; p < end; p++) k->tree->order[p] = k->keys[p].element;
 }
 
-/* --- planes -------------------------------------------------------------------------------------------- */
-
 static void mean_normal(const maker *k, size_t begin, size_t end, double mean[3]) {
     mean[0] = mean[1] = mean[2] = 0;
     for (size_t p = begin; p < end; p++)
@@ -61,7 +60,7 @@ static void mean_normal(const maker *k, size_t begin, size_t end, double mean[3]
     for (int d = 0; d < 3; d++) mean[d] = length > 0 ? mean[d] / length : d == 2;
 }
 
-/* Elements whose normals go in small steps from one to the next, as those of a sphere do, are no plane. */
+/* False for elements whose normals drift in small steps, as those of a sphere do. */
 static bool is_plane(const maker *k, size_t begin, size_t end) {
     double mean[3], low = INFINITY, high = -INFINITY;
     mean_normal(k, begin, end, mean);
@@ -78,7 +77,8 @@ static bool is_plane(const maker *k, size_t begin, size_t end) {
 
 enum { PLANE_KEYS = 4 };
 
-/* Sorts a range by the coordinates of the normal, then by the offset, and cuts it where either leaps. */
+/* Splits a range into planes: sorted by the three coordinates of the normal in turn, then by the offset, it
+ * is cut wherever the key jumps. */
 static void split_planes(maker *k, size_t begin, size_t end, int level) {
     if (level == PLANE_KEYS) {
         if (is_plane(k, begin, end)) {
@@ -96,7 +96,7 @@ static void split_planes(maker *k, size_t begin, size_t end, int level) {
     }
     sort_by_keys(k, begin, end);
     const double leap = level < 3 ? same_normal : same_plane * k->extent;
-    /* Deeper levels sort their range of the keys again: ends are found before they do. */
+    /* The recursion overwrites keys [first, last), which are not read again. */
     for (size_t first = begin; first < end;) {
         size_t last = first + 1;
         while (last < end && k->keys[last].value - k->keys[last - 1].value <= leap) last++;
@@ -105,15 +105,13 @@ static void split_planes(maker *k, size_t begin, size_t end, int level) {
     }
 }
 
-/* --- trees --------------------------------------------------------------------------------------------- */
-
 static uint32_t add_cluster(maker *k, plane_cluster made) {
     const size_t at = k->tree->n_clusters++;
     k->tree->clusters[at] = made;
     return (uint32_t)at;
 }
 
-/* Where a range sorted by value is cut: at a wide gap, the one nearest to its middle. */
+/* The cut of a range sorted by value: the wide gap nearest to its middle. */
 static size_t cut_of(const key *keys, size_t begin, size_t end) {
     const size_t count = end - begin, middle = begin + count / 2, slack = count / 4;
     double widest = 0;
@@ -138,7 +136,6 @@ static double on_axis(const maker *k, const plane_frame *f, int axis, uint32_t i
 static void sort_on_axis(maker *k, const plane_frame *f, int axis, size_t begin, size_t end) {
     for (size_t p = begin; p < end; p++) {
         const uint32_t i = k->tree->order[p];
-        /* Rows of a grid are told apart by more than rounding. */
         k->keys[p] = (key){on_axis(k, f, axis, i), i};
     }
     sort_by_keys(k, begin, end);
@@ -154,7 +151,8 @@ static double extent_on_axis(const maker *k, const plane_frame *f, int axis, siz
     return high - low;
 }
 
-/* Elements of a leaf row by row, so that congruent leaves are alike whatever rounding made of the sorting. */
+/* Sorts the elements of a leaf row by row with a tolerance, so that congruent leaves get the same matrix in
+ * spite of rounding. */
 static void sort_leaf(maker *k, const plane_frame *f, size_t begin, size_t end) {
     uint32_t *order = k->tree->order;
     const double same = 1e-7 * k->extent;
@@ -169,7 +167,7 @@ static void sort_leaf(maker *k, const plane_frame *f, size_t begin, size_t end) 
         }
 }
 
-/* A plane or a part of it. */
+/* Clusters of a plane or a part of it; returns the topmost. */
 static uint32_t split_plane(maker *k, uint32_t frame, size_t begin, size_t end) {
     const plane_frame *f = &k->tree->frames[frame];
     plane_cluster made = {.begin = (uint32_t)begin, .end = (uint32_t)end, .frame = frame};
@@ -186,7 +184,7 @@ static uint32_t split_plane(maker *k, uint32_t frame, size_t begin, size_t end) 
     return add_cluster(k, made);
 }
 
-/* The axis of the plane that lies most along an axis of space, and the one across it. */
+/* Axis 0 is the coordinate axis most nearly in the plane, projected into it; axis 1 is normal x axis 0. */
 static void set_frame(maker *k, size_t begin, size_t end, plane_frame *f) {
     double normal[3], along[3] = {0, 0, 0};
     int flattest = 0;
@@ -206,7 +204,7 @@ static void set_frame(maker *k, size_t begin, size_t end, plane_frame *f) {
         for (int d = 0; d < 3; d++) f->origin[d] += k->centre[k->tree->order[p]][d] / (double)(end - begin);
 }
 
-/* A group of planes: its range, where it is and where it faces. */
+/* A plane: its range of positions, its mean centre and its mean normal. */
 typedef struct plane_place {
     uint32_t begin, end;
     double at[6];
@@ -223,7 +221,8 @@ static int by_plane(const void *left, const void *right) {
     return a->place.begin < b->place.begin ? -1 : a->place.begin > b->place.begin;
 }
 
-/* Sorts planes into tree order: halves them where they differ most, by number. Later ranges follow. */
+/* Sorts planes into tree order: along the coordinate of centre or normal in which they differ most, then each
+ * half. */
 static void order_planes(plane_key *planes, size_t count) {
     double low[6], high[6], size = 0;
     int longest = 0;
@@ -246,7 +245,7 @@ static void order_planes(plane_key *planes, size_t count) {
     order_planes(planes + count / 2, count - count / 2);
 }
 
-/* The tree above planes [first, last), halved as order_planes did. */
+/* The clusters of planes [first, last), halved as by order_planes; returns the topmost. */
 static uint32_t join_planes(maker *k, const uint32_t *begins, size_t first, size_t last) {
     if (last - first == 1) return split_plane(k, (uint32_t)first, begins[first], begins[last]);
     const size_t middle = first + (last - first) / 2;
@@ -256,7 +255,7 @@ static uint32_t join_planes(maker *k, const uint32_t *begins, size_t first, size
     return add_cluster(k, made);
 }
 
-/* Brings the planes into tree order, and the elements with them; begins gets where each begins. */
+/* Brings planes and their elements into tree order; begins [n_groups + 1] gets the first position of each. */
 static lam_status place_planes(maker *k, uint32_t *begins, lam_error *error) {
     lam_status status = LAM_OK;
     plane_tree *tree = k->tree;

@@ -1,5 +1,5 @@
-/* A binary tree of clusters over the elements of any mesh: planes first, halved along their longer side down
- * to a few elements; planes are joined by where they are and where they face. */
+/* A binary tree of clusters over the elements of a mesh. Elements in one plane are halved across their longer
+ * side down to a few elements a leaf; above, planes are joined by position and normal. */
 #ifndef LAMBERT_METHOD_HIERARCHICAL_PLANE_TREE_H
 #define LAMBERT_METHOD_HIERARCHICAL_PLANE_TREE_H
 
@@ -9,16 +9,16 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Where on a plane: (p - origin) . axis. */
+/* Coordinates in a plane: (p - origin) . axis. */
 typedef struct plane_frame {
     double origin[3], axis[2][3];
 } plane_frame;
 
-/* Positions [begin, end). A node of children has them before it, the right one next to it. */
+/* Positions [begin, end). Children stand before their parent, the right one directly before it. */
 typedef struct plane_cluster {
     uint32_t begin, end, left;
     bool leaf;
-    uint32_t frame; /* of its plane; PLANE_ABOVE: it has several */
+    uint32_t frame; /* the frame of its plane; PLANE_ABOVE: several planes */
 } plane_cluster;
 
 #define PLANE_ABOVE UINT32_MAX
@@ -32,8 +32,8 @@ typedef struct plane_tree {
 
 void plane_tree_free(plane_tree *tree);
 
-/* centre [n], normal [n] unit; leaves have at most leaf_most elements. The same for the same mesh. Cost:
- * O(n log n). Errors: LAM_ERR_MEMORY. */
+/* centre [n], unit normal [n]; a leaf has at most leaf_most elements. Deterministic. Cost: O(n log n).
+ * Errors: LAM_ERR_MEMORY. */
 lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*normal)[3], size_t leaf_most,
                            plane_tree *out, lam_error *error);
 

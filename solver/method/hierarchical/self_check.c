@@ -5,18 +5,18 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Random lights that an operator is tried on, and rows that are multiplied at once. Where F is not there, one
- * row in so many, and no more than enough. */
-enum { PROBES = 4, LIGHTS = PROBES + 1, ROWS_AT_ONCE = 1024 };
+/* Random emissions, all emissions, rows of F that a thread multiplies at a time. */
+enum { PROBES = 4, EMISSIONS = PROBES + 1, ROWS_AT_ONCE = 1024 };
+/* Of streamed F one row in ONE_IN is used, within these limits. */
 enum { ONE_IN = 32, OTHERS_LEAST = 64, OTHERS_MOST = 2048 };
 
-/* Lights, the last one even, and their answers; h = F B~ of the random ones for `count` elements. */
+/* Emissions, of which the last gives uniform radiosity, their answers, and h = F B~ of the random ones. */
 typedef struct check {
-    float *E, *B; /* [LIGHTS][C][n] */
-    double *h;    /* [PROBES][C][count] */
+    float *E, *B; /* [EMISSIONS][C][n] */
+    double *h;    /* [PROBES][C][count], at `elements` */
     void *work;
     size_t work_bytes, count;
-    uint32_t *elements; /* [count]; NULL: all of them, in their order */
+    uint32_t *elements; /* [count]; NULL: all of them in mesh order */
 } check;
 
 static void check_free(check *s) {
@@ -38,9 +38,9 @@ static lam_status check_make(const build_problem *problem, const lam_operator *o
                              lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n, C = problem->n_channels;
-    *s = (check){.work_bytes = lam_operator_work_bytes(op, LIGHTS), .count = rows_tried(problem)};
-    s->E = memory_allocate(LIGHTS * C, n * sizeof *s->E, "self-check", error);
-    s->B = memory_allocate(LIGHTS * C, n * sizeof *s->B, "self-check", error);
+    *s = (check){.work_bytes = lam_operator_work_bytes(op, EMISSIONS), .count = rows_tried(problem)};
+    s->E = memory_allocate(EMISSIONS * C, n * sizeof *s->E, "self-check", error);
+    s->B = memory_allocate(EMISSIONS * C, n * sizeof *s->B, "self-check", error);
     s->h = memory_allocate(PROBES * C, s->count * sizeof *s->h, "self-check", error);
     s->work = memory_allocate(1, s->work_bytes, "self-check", error);
     if (s->E == NULL || s->B == NULL || s->h == NULL || s->work == NULL) TRY(LAM_ERR_MEMORY);
@@ -68,7 +68,7 @@ static lam_status multiply(const build_problem *problem, const check *s, lam_err
     return LAM_OK;
 }
 
-/* h of those elements whose other rows are asked for. */
+/* h of some elements, by rows of the independent sample. */
 static lam_status multiply_others(const build_problem *problem, const check *s, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n;
@@ -94,9 +94,9 @@ static lam_status multiply_others(const build_problem *problem, const check *s, 
     return status;
 }
 
-/* |E - (B~ - rho F B~)| / |E| of one light and channel. */
-static double residual(const build_problem *problem, const check *s, size_t light, size_t c) {
-    const size_t n = problem->n, v = light * problem->n_channels + c;
+/* |E - (B~ - rho F B~)| / |E| of one emission and channel. */
+static double residual(const build_problem *problem, const check *s, size_t e, size_t c) {
+    const size_t n = problem->n, v = e * problem->n_channels + c;
     const float *rho = problem->reflectance + c * n, *E = s->E + v * n, *B = s->B + v * n;
     double left = 0, all = 0;
     for (size_t k = 0; k < s->count; k++) {
@@ -108,8 +108,8 @@ static double residual(const build_problem *problem, const check *s, size_t ligh
     return sqrt(left / all);
 }
 
-/* |B~ - 1| / |1| of the even light. */
-static double from_one(const build_problem *problem, const check *s, size_t c) {
+/* |B~ - 1| / |1| of the last emission. */
+static double uniform_error(const build_problem *problem, const check *s, size_t c) {
     const size_t n = problem->n;
     const float *B = s->B + (PROBES * problem->n_channels + c) * n;
     double off = 0, area = 0;
@@ -126,25 +126,24 @@ lam_status self_check(const build_problem *problem, const double *row_sums, cons
     const size_t n = problem->n, C = problem->n_channels;
     check s;
     TRY(check_make(problem, op, &s, error));
-    for (size_t light = 0; light < LIGHTS; light++)
+    for (size_t e = 0; e < EMISSIONS; e++)
         for (size_t i = 0; i < n; i++)
             for (size_t c = 0; c < C; c++) {
                 seed = seed * 6364136223846793005u + 1442695040888963407u;
-                s.E[(light * C + c) * n + i] =
-                    light < PROBES
-                        ? (float)(seed >> 40) * 0x1p-24f
-                        : (float)fmax(1 - (double)problem->reflectance[c * n + i] * row_sums[i], 0);
+                s.E[(e * C + c) * n + i] =
+                    e < PROBES ? (float)(seed >> 40) * 0x1p-24f
+                               : (float)fmax(1 - (double)problem->reflectance[c * n + i] * row_sums[i], 0);
             }
-    TRY(lam_operator_apply(op, LIGHTS, LAM_RADIOSITY, s.E, s.B, s.work, s.work_bytes, error));
+    TRY(lam_operator_apply(op, EMISSIONS, LAM_RADIOSITY, s.E, s.B, s.work, s.work_bytes, error));
     TRY(problem->stream == NULL ? multiply(problem, &s, error) : multiply_others(problem, &s, error));
     report->probe_residual = report->uniform_error = 0;
-    for (size_t light = 0; light < PROBES; light++) {
+    for (size_t e = 0; e < PROBES; e++) {
         double worst = 0;
-        for (size_t c = 0; c < C; c++) worst = fmax(worst, residual(problem, &s, light, c));
+        for (size_t c = 0; c < C; c++) worst = fmax(worst, residual(problem, &s, e, c));
         report->probe_residual += worst / PROBES;
     }
     for (size_t c = 0; c < C; c++)
-        report->uniform_error = fmax(report->uniform_error, from_one(problem, &s, c));
+        report->uniform_error = fmax(report->uniform_error, uniform_error(problem, &s, c));
 done:
     check_free(&s);
     return status;

@@ -4,7 +4,7 @@
 
 #include <stdlib.h>
 
-/* The first node of the subtree of t. */
+/* The first node of the subtree of t in postorder. */
 static size_t subtree_begin(const wavelets *w, size_t t) {
     while (w->nodes[t].from_left > 0) t = w->nodes[t].left;
     return t;
@@ -32,7 +32,7 @@ lam_status subtrees_run(const wavelets *w, size_t most, size_t n_threads, run_su
 #pragma omp parallel num_threads((int)n_threads)
     {
         size_t mine;
-#pragma omp critical(subtrees_desks)
+#pragma omp critical(subtrees_threads)
         mine = n_taken++;
 #pragma omp for schedule(dynamic, 1)
         for (size_t k = 0; k < n_pieces; k++) {

@@ -8,13 +8,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Moments of a function: its products with 1, u, v, u^2, uv, v^2 of its plane. */
+/* Moments of a function: its products with A^1/2 times 1, u, v, u^2, uv, v^2, u and v being coordinates in
+ * the plane. */
 enum { MOMENTS = 6, LINEAR = 3 };
 
-/* What is left of a function after others are taken out of it counts from this share of the constant's length
- * on: its own would be that of rounding errors where elements lie in a row. */
+/* A function is linearly dependent on others if less than this share of the constant's norm is left of it
+ * after orthogonalization. Its own norm is no measure: of elements in one row it is a rounding error. */
 static const double dependent = 1e-5;
-/* Congruent nodes share a matrix: entries differ by less. */
+/* Nodes whose matrices differ by less in every entry share one. */
 static const double same_entry = 1e-5;
 
 typedef struct square {
@@ -25,7 +26,7 @@ typedef struct moments {
     double of[WAVELET_INPUTS][MOMENTS];
 } moments;
 
-/* Moments about the middle of what the inputs span, in units of its size. */
+/* out: the moments about the centroid of the inputs, in units of their radius of gyration. */
 static void centre_moments(size_t inputs, const moments *M, moments *out) {
     double whole = 0, u = 0, v = 0, size = 0;
     for (size_t k = 0; k < inputs; k++) {
@@ -51,7 +52,8 @@ static void centre_moments(size_t inputs, const moments *M, moments *out) {
     }
 }
 
-/* Takes the first rows of Q out of x, twice for rounding's sake, and returns what is left of its length. */
+/* Orthogonalizes x against the first rows of Q, twice because of rounding, and returns the norm that is left.
+ */
 static double make_orthogonal(size_t inputs, size_t rows, const square *Q, double *x) {
     double length = 0;
     for (int again = 0; again < 2; again++)
@@ -64,7 +66,8 @@ static double make_orthogonal(size_t inputs, size_t rows, const square *Q, doubl
     return sqrt(length);
 }
 
-/* Row `rows` of Q is x made orthogonal to those before, where more than `least` is left of it. */
+/* Appends x, orthogonalized and normalized, as row `rows` of Q; false if no more than `least` is left of it.
+ */
 static bool add_row(size_t inputs, size_t rows, const double *x, double least, square *Q) {
     double left[WAVELET_INPUTS];
     memcpy(left, x, inputs * sizeof *left);
@@ -74,7 +77,8 @@ static bool add_row(size_t inputs, size_t rows, const double *x, double least, s
     return true;
 }
 
-/* Rows that make Q whole: of the unit vectors that of which most is left, the first of equals. */
+/* Completes Q to a square: each further row is made of the unit vector of which most is left, the first of
+ * equals. */
 static void complete(size_t inputs, size_t rows, square *Q) {
     for (; rows < inputs; rows++) {
         double most = 0;
@@ -93,8 +97,9 @@ static void complete(size_t inputs, size_t rows, square *Q) {
     }
 }
 
-/* The matrix of a node, what it hands up first; wavelets are orthogonal to as many of the quadratic functions
- * as they can be, one after the other. Returns how many it hands up. */
+/* The matrix Q of a node, its scaling functions first. The wavelets are orthogonal to the scaling functions
+ * and, as far as there are enough inputs, one after the other to the quadratic functions. Returns the number
+ * of scaling functions. */
 static size_t make_square(size_t inputs, const moments *M, bool linear, square *Q) {
     moments about;
     size_t rows = 0, scaling = 0;
@@ -115,12 +120,10 @@ static size_t make_square(size_t inputs, const moments *M, bool linear, square *
     return scaling;
 }
 
-/* --- shapes that congruent nodes share ------------------------------------------------------------------ */
-
 typedef struct shape_table {
     wavelet_shape *shapes;
     float *basis;
-    size_t *begin; /* of each in basis */
+    size_t *begin; /* [count], where the matrix of each begins in basis */
     size_t count, used, capacity, room;
     uint32_t *slots; /* [n_slots] shape + 1, 0: empty */
     size_t n_slots;
@@ -147,7 +150,7 @@ static bool is_same(const shape_table *t, uint32_t k, const wavelet_shape *s, co
     return true;
 }
 
-/* The number of a shape, which is new or one that is there. */
+/* out: the number of a shape, which is added if it is new. */
 static lam_status find_shape(shape_table *t, const wavelet_shape *s, const square *Q, uint32_t *out,
                              lam_error *error) {
     lam_status status = LAM_OK;
@@ -176,8 +179,6 @@ done:
     return status;
 }
 
-/* --- the basis ----------------------------------------------------------------------------------------- */
-
 static void moments_of_element(const plane_frame *f, double area, const double *centre, double *m) {
     double at[2] = {0, 0};
     for (int axis = 0; axis < 2; axis++)
@@ -187,15 +188,15 @@ static void moments_of_element(const plane_frame *f, double area, const double *
     for (int k = 0; k < MOMENTS; k++) m[k] = root * value[k];
 }
 
-/* Moments of what a node hands up. */
-typedef struct handed {
+/* Moments of the scaling functions of a node. */
+typedef struct scaling_moments {
     size_t scaling;
     double of[WAVELET_SCALING][MOMENTS];
-} handed;
+} scaling_moments;
 
 /* Inputs of a node and their moments. */
-static size_t gather(const plane_tree *tree, size_t t, const double *area, const double (*centre)[3],
-                     const handed *up, moments *M) {
+static size_t gather_inputs(const plane_tree *tree, size_t t, const double *area, const double (*centre)[3],
+                            const scaling_moments *up, moments *M) {
     const plane_cluster *c = &tree->clusters[t];
     size_t inputs = 0;
     if (c->leaf) {
@@ -217,7 +218,7 @@ lam_status wavelet_basis_make(const plane_tree *tree, const double *area, const 
     lam_status status = LAM_OK;
     const size_t count = tree->n_clusters;
     shape_table table = {.n_slots = 2 * count + 1};
-    handed *up = memory_allocate(count, sizeof *up, "wavelets", error);
+    scaling_moments *up = memory_allocate(count, sizeof *up, "wavelets", error);
     uint32_t *node_shapes = memory_allocate(count, sizeof *node_shapes, "wavelets", error);
     table.slots = memory_allocate(table.n_slots, sizeof *table.slots, "wavelets", error);
     if (up == NULL || node_shapes == NULL || table.slots == NULL) TRY(LAM_ERR_MEMORY);
@@ -225,7 +226,7 @@ lam_status wavelet_basis_make(const plane_tree *tree, const double *area, const 
         moments M;
         square Q;
         const bool linear = tree->clusters[t].frame != PLANE_ABOVE;
-        const size_t inputs = gather(tree, t, area, centre, up, &M);
+        const size_t inputs = gather_inputs(tree, t, area, centre, up, &M);
         const size_t scaling = make_square(inputs, &M, linear, &Q);
         const wavelet_shape shape = {tree->clusters[t].leaf, (uint32_t)inputs, (uint32_t)scaling};
         TRY(find_shape(&table, &shape, &Q, &node_shapes[t], error));

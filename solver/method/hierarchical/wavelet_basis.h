@@ -1,5 +1,6 @@
-/* The multiwavelets of a cluster tree: on planes what is handed up are the constant and the linear functions,
- * in the inner product of areas, above them the constants. */
+/* Makes the multiwavelet basis (Gortler et al. 1993) of a cluster tree: the scaling functions of
+ * a node in one plane are the constant and the two linear functions times A^1/2, those of a node above planes
+ * the constant. */
 #ifndef LAMBERT_METHOD_HIERARCHICAL_WAVELET_BASIS_H
 #define LAMBERT_METHOD_HIERARCHICAL_WAVELET_BASIS_H
 

@@ -1,4 +1,7 @@
-/* W R W^T: what a diagonal matrix is in a basis of wavelets. */
+/* W R W^T, a diagonal matrix R in a wavelet basis. Node t holds G_t = Phi_t R Phi_t^T; with Q_t its matrix,
+ *     Q_t diag(G_left, G_right) Q_t^T = [Phi_t; Psi_t] R [Phi_t; Psi_t]^T
+ * has the coefficients of its own wavelets and G_t, and Psi_t R Phi_t^T is carried up to those of its
+ * ancestors. */
 #include "solver/method/hierarchical/wavelet_inverse.h"
 
 #include "solver/base/array_grow.h"
@@ -7,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Entries below this are rounding. */
+/* Smaller entries are rounding errors. */
 static const float no_coupling = 1e-6f;
 
 typedef struct entries {
@@ -34,7 +37,7 @@ done:
 typedef float small[WAVELET_INPUTS][WAVELET_INPUTS];
 
 /* M = Q G Q^T */
-static void turn_both(const wavelets *w, const wavelet_node *a, const small G, small M) {
+static void transform_both(const wavelets *w, const wavelet_node *a, const small G, small M) {
     const float *columns = wavelet_columns(w, a);
     double half[WAVELET_INPUTS][WAVELET_INPUTS] = {{0}};
     for (size_t i = 0; i < a->inputs; i++)
@@ -50,13 +53,13 @@ static void turn_both(const wavelets *w, const wavelet_node *a, const small G, s
         }
 }
 
-/* What wavelet i of node t shares with functions above: x, by what t hands up, is turned at every node on the
- * way. */
-static lam_status couple_up(const wavelets *w, size_t t, size_t i, const float *handed, entries *to,
+/* Entries of wavelet i of node t with all ancestors: scaling [t's] is Psi_i R Phi_t^T, which the matrix of
+ * each ancestor in turn splits into its wavelets and its scaling functions. */
+static lam_status couple_up(const wavelets *w, size_t t, size_t i, const float *scaling, entries *to,
                             lam_error *error) {
     lam_status status = LAM_OK;
     float x[WAVELET_SCALING], y[WAVELET_INPUTS];
-    memcpy(x, handed, w->nodes[t].scaling * sizeof *x);
+    memcpy(x, scaling, w->nodes[t].scaling * sizeof *x);
     for (;;) {
         float most = 0;
         for (size_t k = 0; k < w->nodes[t].scaling; k++) most = fmaxf(most, fabsf(x[k]));
@@ -83,7 +86,7 @@ done:
     return status;
 }
 
-/* Entries whose columns ascend in a row, as they come. */
+/* out: the entries as a CSR matrix; within a row they come with ascending columns. */
 static lam_status by_rows(const entries *from, size_t n, csr *out, lam_error *error) {
     lam_status status = LAM_OK;
     csr made = {.n = n, .indptr = memory_allocate(n + 1, sizeof *made.indptr, "wavelets", error)};
@@ -119,7 +122,7 @@ lam_status wavelet_diagonal(const wavelets *w, const float *rho, csr *out, lam_e
         for (size_t i = 0; a->from_left > 0 && i < a->inputs - a->from_left; i++)
             for (size_t j = 0; j < a->inputs - a->from_left; j++)
                 G[a->from_left + i][a->from_left + j] = up[t - 1][i][j];
-        turn_both(w, a, G, M);
+        transform_both(w, a, G, M);
         for (size_t i = 0; i < a->scaling; i++)
             for (size_t j = 0; j < a->scaling; j++) up[t][i][j] = M[i][j];
         for (size_t i = a->scaling; i < a->inputs; i++) {

@@ -10,10 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* 2^24 bounces: where as much as all but 1e-6 is reflected. */
+/* 2^24 bounces suffice up to rho = 1 - 1e-6. */
 enum { DOUBLINGS_MOST = 24 };
 
-/* The weight of every coefficient. */
+/* weight [n_nodes] by coefficient. */
 static lam_status spread_weights(const wavelets *w, const float *weight, float **out, lam_error *error) {
     float *made = memory_allocate(w->n, sizeof *made, "wavelets", error);
     if (made == NULL) return LAM_ERR_MEMORY;
@@ -27,8 +27,6 @@ static lam_status spread_weights(const wavelets *w, const float *weight, float *
     return LAM_OK;
 }
 
-/* --- products ------------------------------------------------------------------------------------------ */
-
 /* A row that grows. */
 typedef struct row_store {
     uint32_t *indices;
@@ -36,18 +34,18 @@ typedef struct row_store {
     size_t used, capacity;
 } row_store;
 
-/* What a thread works with: a row in full, and rows that are done. */
-typedef struct inverse_desk {
+/* The working area of one thread: the row that it sums up, and rows that are done. */
+typedef struct inverse_work {
     float *sum;      /* [n], all 0 between rows */
-    uint32_t *where; /* [n], where it is not */
+    uint32_t *where; /* [n], columns where sum is not 0 */
     row_store done;
-} inverse_desk;
+} inverse_work;
 
 typedef struct product_job {
     const wavelet_inverse_input *input;
     const float *weight; /* [n], of coefficients */
     float *inverse_weight;
-    inverse_desk *desks; /* [n_threads] */
+    inverse_work *works; /* [n_threads] */
 } product_job;
 
 typedef struct numbered {
@@ -67,31 +65,31 @@ static int by_index(const void *left, const void *right) {
     return a->index < b->index ? -1 : a->index > b->index;
 }
 
-/* Rows that threads make, a block of them at a time, put one behind the other. */
+/* Threads take blocks of rows; the rows of a thread stand one behind the other in its area. */
 enum { ROWS_AT_ONCE = 256 };
 
 typedef struct made_rows {
-    uint32_t *owner; /* [blocks], whose desk */
-    size_t *begin;   /* [blocks], where in it */
+    uint32_t *owner; /* [blocks], the thread that made it */
+    size_t *begin;   /* [blocks], where it begins among the rows of that thread */
     size_t *length;  /* [n] */
 } made_rows;
 
-/* What makes row i in the desk's sum and lists where in where[0 ... count). */
-typedef size_t make_row(const void *context, size_t i, inverse_desk *d);
-/* What of it is stored: returns whether entry j of row i is. */
+/* Sums row i up in d->sum, lists its columns in d->where[0 ... count) and returns count. */
+typedef size_t make_row(const void *context, size_t i, inverse_work *d);
+/* True if entry j of row i is stored. */
 typedef bool keep_entry(const void *context, size_t i, uint32_t j, float value);
 
 typedef struct row_rule {
     make_row *make;
     keep_entry *keep;
     const void *context;
-    bool by_size; /* else by index */
-    bool divided; /* stored over the weight of its column */
+    bool by_size; /* entries by descending magnitude, else by column */
+    bool divided; /* entries are stored over the weight of their column */
     const char *stage;
 } row_rule;
 
 static lam_status store_row(const product_job *job, const row_rule *rule, size_t i, size_t count,
-                            inverse_desk *d, numbered *row, size_t *length, lam_error *error) {
+                            inverse_work *d, numbered *row, size_t *length, lam_error *error) {
     lam_status status = LAM_OK;
     size_t used = 0;
     for (size_t k = 0; k < count; k++) {
@@ -127,7 +125,7 @@ static lam_status collect(const product_job *job, const made_rows *made, size_t 
     if (all.indices == NULL || all.data == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t first = 0; first < n; first += ROWS_AT_ONCE) {
         const size_t block = first / ROWS_AT_ONCE, last = first + ROWS_AT_ONCE < n ? first + ROWS_AT_ONCE : n;
-        const row_store *from = &job->desks[made->owner[block]].done;
+        const row_store *from = &job->works[made->owner[block]].done;
         const size_t count = (size_t)(all.indptr[last] - all.indptr[first]);
         if (count == 0) continue;
         memcpy(all.indices + all.indptr[first], from->indices + made->begin[block],
@@ -141,7 +139,7 @@ done:
     return status;
 }
 
-/* All rows by a rule. */
+/* out: all rows by a rule; the bits do not depend on the number of threads. */
 static lam_status make_rows(const product_job *job, const row_rule *rule, csr *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = job->input->basis->n, blocks = (n + ROWS_AT_ONCE - 1) / ROWS_AT_ONCE;
@@ -152,13 +150,13 @@ static lam_status make_rows(const product_job *job, const row_rule *rule, csr *o
                       .length = memory_allocate(n, sizeof *made.length, "wavelets", error)};
     numbered *rows = memory_allocate(job->input->n_threads * n, sizeof *rows, "wavelets", error);
     if (made.owner == NULL || made.begin == NULL || made.length == NULL || rows == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t k = 0; k < job->input->n_threads; k++) job->desks[k].done.used = 0;
+    for (size_t k = 0; k < job->input->n_threads; k++) job->works[k].done.used = 0;
 #pragma omp parallel num_threads((int)job->input->n_threads)
     {
         size_t mine = 0;
-#pragma omp critical(wavelet_inverse_desks)
+#pragma omp critical(wavelet_inverse_works)
         mine = n_taken++;
-        inverse_desk *d = &job->desks[mine];
+        inverse_work *d = &job->works[mine];
 #pragma omp for schedule(dynamic, 1)
         for (size_t block = 0; block < blocks; block++) {
             lam_error one = {.message = ""};
@@ -170,7 +168,7 @@ static lam_status make_rows(const product_job *job, const row_rule *rule, csr *o
                  i++)
                 now = store_row(job, rule, i, rule->make(rule->context, i, d), d, rows + mine * n,
                                 &made.length[i], &one);
-#pragma omp critical(wavelet_inverse_told)
+#pragma omp critical(wavelet_inverse_progress)
             {
                 progress_report(job->input->progress, rule->stage, (double)++n_done / (double)blocks);
                 if (now == LAM_OK && progress_cancelled(job->input->progress))
@@ -191,20 +189,20 @@ done:
     return status;
 }
 
-static inline void add(inverse_desk *d, uint32_t j, float value, size_t *count) {
-    /* A sum that comes back to 0 stays listed, so that no place is listed twice. */
+static inline void add(inverse_work *d, uint32_t j, float value, size_t *count) {
+    /* A sum that cancels to 0 is set to 1e-30, so that its column is not listed twice. */
     if (d->sum[j] == 0) d->where[(*count)++] = j;
     d->sum[j] += value;
     if (d->sum[j] == 0) d->sum[j] = 1e-30f;
 }
 
-/* Row i of R B, of which nothing is used below least_i times the weight of a column. */
+/* Row i of R B. Entries below least_i weight_j enter no term of the product A (R B) and are dropped. */
 typedef struct scaled_rows {
     const csr *R, *B;
     const float *weight, *least;
 } scaled_rows;
 
-static size_t make_scaled(const void *context, size_t i, inverse_desk *d) {
+static size_t make_scaled(const void *context, size_t i, inverse_work *d) {
     const scaled_rows *s = context;
     size_t count = 0;
     for (uint64_t e = s->R->indptr[i]; e < s->R->indptr[i + 1]; e++) {
@@ -220,15 +218,16 @@ static bool keep_used(const void *context, size_t i, uint32_t j, float value) {
     return fabsf(value) >= s->least[i] * s->weight[j];
 }
 
-/* Row i of base + A B, B by size and over the weights of its columns. */
+/* Row i of base + A B. Rows of B are sorted by magnitude over the weight of the column, so that the loop over
+ * a row ends at the first term that may be left out. */
 typedef struct product_rows {
-    const csr *A, *B, *base; /* base: NULL or all of a symmetric one */
+    const csr *A, *B, *base; /* base: NULL or symmetric, both triangles */
     const float *weight, *inverse_weight;
     float keep, skip;
     double *terms;
 } product_rows;
 
-static size_t make_product(const void *context, size_t i, inverse_desk *d) {
+static size_t make_product(const void *context, size_t i, inverse_work *d) {
     const product_rows *p = context;
     size_t count = 0, terms = 0;
     const float skip = p->skip * p->weight[i];
@@ -245,7 +244,7 @@ static size_t make_product(const void *context, size_t i, inverse_desk *d) {
             if (p->B->indices[f] >= i) add(d, p->B->indices[f], a * p->B->data[f], &count);
         terms += (size_t)(f - p->B->indptr[k]);
     }
-    /* In units of the weight of the column until now. */
+    /* Until here sums are over the weight of their column. */
     for (size_t k = 0; k < count; k++) d->sum[d->where[k]] *= p->weight[d->where[k]];
 #pragma omp atomic
     *p->terms += (double)terms;
@@ -257,19 +256,20 @@ static bool keep_upper(const void *context, size_t i, uint32_t j, float value) {
     return j >= i && fabsf(value) > p->keep * p->weight[i] * p->weight[j];
 }
 
-/* least_k: the least number of row k of B, over the weight of its column, that a product A B with a symmetric
- * A makes use of: a term a_ik b_kj is left out below skip weight_i weight_j. */
+/* least_k = skip / max_i |a_ik| / weight_i: a term a_ik b_kj is left out below skip weight_i weight_j, so
+ * that no row of A B uses an entry of row k of B with |b_kj| < least_k weight_j. A is symmetric. */
 static void find_least(const product_job *job, const csr *A, float *least) {
     const float skip = job->input->skipped * job->input->threshold;
     for (size_t k = 0; k < A->n; k++) {
         float most = 0;
         for (uint64_t e = A->indptr[k]; e < A->indptr[k + 1]; e++)
             most = fmaxf(most, fabsf(A->data[e]) * job->inverse_weight[A->indices[e]]);
-        least[k] = .999f * skip / most; /* infinite where nothing is */
+        least[k] = .999f * skip / most; /* infinite where row k of A is empty */
     }
 }
 
-/* out = R B, rows by size, over the weights of their columns, as far as A (R B) uses it. */
+/* out = R B without entries that A (R B) does not use, rows sorted by magnitude over the weight of the
+ * column. */
 static lam_status scale_rows(const product_job *job, const csr *R, const csr *B, const csr *A, csr *out,
                              lam_error *error) {
     lam_status status = LAM_OK;
@@ -284,7 +284,7 @@ done:
     return status;
 }
 
-/* out: base + A B, both triangles. */
+/* out = base + A B, both triangles. */
 static lam_status multiply(const product_job *job, const csr *A, const csr *B, const csr *base, double *terms,
                            csr *out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -306,19 +306,17 @@ done:
     return status;
 }
 
-/* --- doubling ------------------------------------------------------------------------------------------ */
-
-static void desks_free(inverse_desk *desks, size_t count) {
-    for (size_t k = 0; desks != NULL && k < count; k++) {
-        free(desks[k].sum);
-        free(desks[k].where);
-        free(desks[k].done.indices);
-        free(desks[k].done.data);
+static void works_free(inverse_work *works, size_t count) {
+    for (size_t k = 0; works != NULL && k < count; k++) {
+        free(works[k].sum);
+        free(works[k].where);
+        free(works[k].done.indices);
+        free(works[k].done.data);
     }
-    free(desks);
+    free(works);
 }
 
-/* What of the upper triangle of a is above the threshold. */
+/* out: entries of the upper triangle of a above the threshold. */
 static lam_status final_upper(const product_job *job, const csr *a, csr *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = a->n;
@@ -393,17 +391,17 @@ lam_status wavelet_inverse(const wavelet_inverse_input *input, csr *out, wavelet
     TRY(spread_weights(input->basis, input->weight, &weight, error));
     job.weight = weight;
     job.inverse_weight = memory_allocate(n, sizeof *job.inverse_weight, "wavelets", error);
-    job.desks = memory_allocate(input->n_threads, sizeof *job.desks, "wavelets", error);
-    if (job.inverse_weight == NULL || job.desks == NULL) TRY(LAM_ERR_MEMORY);
+    job.works = memory_allocate(input->n_threads, sizeof *job.works, "wavelets", error);
+    if (job.inverse_weight == NULL || job.works == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < n; i++) job.inverse_weight[i] = 1 / weight[i];
     for (size_t k = 0; k < input->n_threads; k++) {
-        job.desks[k].sum = memory_allocate(n, sizeof *job.desks[k].sum, "wavelets", error);
-        job.desks[k].where = memory_allocate(n, sizeof *job.desks[k].where, "wavelets", error);
-        if (job.desks[k].sum == NULL || job.desks[k].where == NULL) TRY(LAM_ERR_MEMORY);
+        job.works[k].sum = memory_allocate(n, sizeof *job.works[k].sum, "wavelets", error);
+        job.works[k].where = memory_allocate(n, sizeof *job.works[k].where, "wavelets", error);
+        if (job.works[k].sum == NULL || job.works[k].where == NULL) TRY(LAM_ERR_MEMORY);
     }
     TRY(run(&job, out, report, error));
 done:
-    desks_free(job.desks, input->n_threads);
+    works_free(job.works, input->n_threads);
     free(job.inverse_weight);
     free(weight);
     return status;

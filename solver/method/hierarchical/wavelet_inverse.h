@@ -1,5 +1,7 @@
-/* K = S (I - R S)^-1 in a basis of wavelets, by repeated doubling of its Neumann series, where R is what
- * elements reflect. All matrices are symmetric and kept as their upper triangles. */
+/* K = S (I - R S)^-1 in a wavelet basis, R being the diagonal matrix of reflectances, by doubling of its
+ * Neumann series K_2m = K_m + Z_m R K_m,  Z_2m = Z_m R Z_m,   K_1 = Z_1 = S, with K_m the sum of m bounces
+ * and Z_m = S (R S)^(m-1). Both are symmetric, and nothing is divided by R. Small entries are dropped after
+ * every product, so that matrices stay sparse. */
 #ifndef LAMBERT_METHOD_HIERARCHICAL_WAVELET_INVERSE_H
 #define LAMBERT_METHOD_HIERARCHICAL_WAVELET_INVERSE_H
 
@@ -12,25 +14,25 @@ typedef struct wavelet_inverse_input {
     const csr *S;
     const float *rho;    /* [n], by position, in [0, 1) */
     const float *weight; /* [n_nodes] */
-    float threshold;     /* K is kept from threshold weight_i weight_j on */
-    float inner;         /* of that, what products are kept from on the way */
-    float skipped;       /* of that, the largest term that a product may leave out */
+    float threshold;     /* K_ij is kept above threshold weight_i weight_j */
+    float inner;         /* entries of products are kept above this share of it */
+    float skipped;       /* terms of products are left out below this share of it */
     size_t n_threads;
     const progress *progress;
 } wavelet_inverse_input;
 
 typedef struct wavelet_inverse_report {
-    size_t doublings; /* 2^doublings bounces and more are in it */
+    size_t doublings; /* the series has 2^doublings bounces */
     double terms;     /* multiplications and additions */
 } wavelet_inverse_report;
 
-/* out: freed with csr_free. With K_m the sum of m bounces and Z_m = S (R S)^(m-1): K_2m = K_m + Z_m R K_m and
- * Z_2m = Z_m R Z_m, so that rho = 0 divides nothing. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+/* out: the upper triangle of K, freed with csr_free. Doubling ends when Z has no entry above its threshold.
+ * Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
 lam_status wavelet_inverse(const wavelet_inverse_input *input, csr *out, wavelet_inverse_report *report,
                            lam_error *error);
 
-/* W R W^T: the upper triangle; only nodes and those above them meet, and nothing does where rho is the same
- * all over a node. */
+/* The upper triangle of W R W^T. Only functions of a node and of its ancestors couple, and none do where rho
+ * is constant on the node. */
 lam_status wavelet_diagonal(const wavelets *w, const float *rho, csr *out, lam_error *error);
 
 #endif

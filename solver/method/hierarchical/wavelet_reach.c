@@ -8,11 +8,12 @@
 
 enum { LINEAR = 3 };
 
-/* All elements of a node are in it. */
+/* Bounds all elements of a node. */
 typedef struct sphere {
     double centre[3], radius;
 } sphere;
-/* Spheres are this much larger in single precision, so that one in another stays so. */
+/* Spheres are enlarged by this before they are rounded to single precision, so that nested ones stay nested.
+ */
 static const double margin = 1 + 1e-5;
 
 void wavelet_reach_free(wavelet_reach *r) {
@@ -23,10 +24,10 @@ void wavelet_reach_free(wavelet_reach *r) {
     *r = (wavelet_reach){.n_leaves = 0};
 }
 
-/* The middle of its children's spheres, and what holds both; of a leaf that of its elements, each as large as
- * a disk of its area. */
-static void surround(const wavelets *w, const plane_tree *tree, size_t t, const double *area,
-                     const double (*centre)[3], sphere *around) {
+/* The bounding sphere of a node: about the midpoint of its children's centres, or, for a leaf, about the mean
+ * centre of its elements, each taken as a disk of its area (.318 = 1 / pi). */
+static void bounding_sphere(const wavelets *w, const plane_tree *tree, size_t t, const double *area,
+                            const double (*centre)[3], sphere *around) {
     const wavelet_node *a = &w->nodes[t];
     sphere *own = &around[t];
     *own = (sphere){.radius = 0};
@@ -59,9 +60,7 @@ static wavelet_extent extent_of(const sphere *s, const wavelet_node *a, uint32_t
     return made;
 }
 
-/* --- what nodes hand up -------------------------------------------------------------------------------- */
-
-/* Of a function that is handed up: its products with A^1/2, A^1/2 u, A^1/2 v. */
+/* Products of each scaling function with A^1/2, A^1/2 u, A^1/2 v. */
 typedef struct products {
     double of[LINEAR][LINEAR];
 } products;
@@ -74,7 +73,7 @@ static void place_element(const plane_frame *f, double area, const double *centr
     *out = (wavelet_place){(float)sqrt(area), (float)at[0], (float)at[1]};
 }
 
-/* x = G^-1 b of a symmetric G [m][m], m at most 3; b is lost. */
+/* b = G^-1 b for a symmetric G [m][m], m <= 3, by Gauss-Jordan elimination; G is overwritten. */
 static void solve(size_t m, double G[LINEAR][LINEAR], double b[LINEAR][LINEAR]) {
     for (size_t k = 0; k < m; k++)
         for (size_t i = 0; i < m; i++) {
@@ -87,8 +86,8 @@ static void solve(size_t m, double G[LINEAR][LINEAR], double b[LINEAR][LINEAR]) 
         for (size_t j = 0; j < LINEAR; j++) b[k][j] /= G[k][k];
 }
 
-/* With M the products of what is handed up with 1, u, v about the node's middle, in units of its size: what
- * is handed up spans those functions there, so it is C (1, u, v) with C M^T = I, C = (M M^T)^-1 M. */
+/* Coefficients C of the scaling functions Phi = C (1, u, v), u and v about the node's centroid in units of
+ * its size. With M = <Phi, (1, u, v)> orthonormality is C M^T = I, so that C = (M M^T)^-1 M. */
 static wavelet_affine affine_of(size_t scaling, const products *P, bool linear) {
     double whole = 0, middle[2] = {0, 0}, size = 0, M[LINEAR][LINEAR], G[LINEAR][LINEAR];
     wavelet_affine made = {.u = 0};
@@ -118,9 +117,9 @@ static wavelet_affine affine_of(size_t scaling, const products *P, bool linear) 
     return made;
 }
 
-/* Products of what a node hands up, from those of its inputs. */
-static void turn_products(const wavelets *w, size_t t, const products *inputs_of,
-                          const double (*leaf)[LINEAR], products *out) {
+/* Products of the scaling functions of a node from those of its inputs: P = Q P_inputs. */
+static void transform_products(const wavelets *w, size_t t, const products *inputs_of,
+                               const double (*leaf)[LINEAR], products *out) {
     const wavelet_node *a = &w->nodes[t];
     const float *columns = wavelet_columns(w, a);
     for (size_t k = 0; k < a->scaling; k++)
@@ -155,9 +154,9 @@ lam_status wavelet_reach_make(const wavelets *basis, const plane_tree *tree, con
         const uint32_t frame = tree->clusters[t].frame;
         double leaf[WAVELET_INPUTS][LINEAR];
         if (a->scaling > LINEAR)
-            FAIL(error, LAM_ERR_ARGUMENT, "node %zu hands up %u numbers, must be at most %d", t,
+            FAIL(error, LAM_ERR_ARGUMENT, "node %zu has %u scaling functions, must have at most %d", t,
                  (unsigned)a->scaling, LINEAR);
-        surround(w, tree, t, area, centre, around);
+        bounding_sphere(w, tree, t, area, centre, around);
         if (a->from_left == 0) {
             r.n_leaves++;
             for (size_t k = 0; k < a->n_elements; k++) {
@@ -170,7 +169,7 @@ lam_status wavelet_reach_make(const wavelets *basis, const plane_tree *tree, con
             }
         }
         r.extent[t] = extent_of(&around[t], a, r.height[t], frame == PLANE_ABOVE ? INFINITY : radii);
-        turn_products(w, t, P, a->from_left == 0 ? (const double(*)[LINEAR])leaf : NULL, &P[t]);
+        transform_products(w, t, P, a->from_left == 0 ? (const double(*)[LINEAR])leaf : NULL, &P[t]);
         r.affine[t] = affine_of(a->scaling, &P[t], frame != PLANE_ABOVE);
     }
     *out = r;
@@ -182,12 +181,11 @@ done:
     return status;
 }
 
-/* --- where rows begin ---------------------------------------------------------------------------------- */
-
 size_t wavelet_cells(const wavelet_reach *r, size_t leaf, uint32_t *out, uint32_t *work) {
     const wavelet_node *nodes = r->basis->nodes;
     const uint32_t root = (uint32_t)r->basis->n_nodes - 1, top = r->height[root];
-    uint32_t *const above = work, *const waiting = work + top + 1; /* by height; depth first, left to right */
+    uint32_t *const above = work, *const waiting =
+                                      work + top + 1; /* above[h]: ancestor of height <= h; waiting: stack */
     size_t found = 0, n_waiting = 0;
     uint32_t a = (uint32_t)leaf;
     for (uint32_t h = 0; h <= top; h++) {

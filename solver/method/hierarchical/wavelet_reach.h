@@ -1,34 +1,37 @@
-/* How far the nodes of a tree look, and the clusters that the rows of a leaf begin on: near ones leaf by
- * leaf, and the farther the coarser, as no node that the rows go up to is going to tell their parts apart. */
+/* Near and far: a cluster b is near node a if it lies within a multiple of a's radius. Wavelets have
+ * vanishing moments and F is smooth in the distance, so that coefficients of a with far clusters are
+ * negligible (Gortler et al. 1993). The rows of a leaf therefore begin on clusters that are the
+ * coarser the farther away they are. */
 #ifndef LAMBERT_METHOD_HIERARCHICAL_WAVELET_REACH_H
 #define LAMBERT_METHOD_HIERARCHICAL_WAVELET_REACH_H
 
 #include "solver/method/hierarchical/plane_tree.h"
 #include "solver/operator/wavelet/wavelets.h"
 
-/* What a walk down the tree asks of a node, in half a line of the cache: a sphere that has all its elements,
- * how far it looks from the middle of that, and where it stands. */
+/* A node as the walk down the tree needs it, in half a cache line: a sphere around all its elements, and the
+ * distance from its centre below which the surface of another sphere is near. */
 typedef struct wavelet_extent {
     float centre[3], radius, reach;
-    uint32_t height, left; /* WAVELET_NONE: it is a leaf */
+    uint32_t height, left; /* left child; WAVELET_NONE: a leaf */
     uint32_t unused;
 } wavelet_extent;
 
-/* What a node hands up, as functions of its elements, A_p^1/2 (f0 + f1 (u_p - u) + f2 (v_p - v)) with places
- * u, v in its plane. */
+/* The scaling functions of a node in closed form: function k at position p is
+ *     A_p^1/2 (of[k][0] + of[k][1] (u_p - u) + of[k][2] (v_p - v)),
+ * u_p, v_p being the coordinates of the element in the plane of the node. */
 typedef struct wavelet_affine {
     float of[3][3];
     float u, v;
 } wavelet_affine;
 
-/* An element by position: A^1/2 and its place in its plane. */
+/* An element by position: A^1/2 and its coordinates in its plane. */
 typedef struct wavelet_place {
     float root, u, v;
 } wavelet_place;
 
 typedef struct wavelet_reach {
     const wavelets *basis;
-    double radii;           /* a node looks so many of its radii around itself */
+    double radii;           /* near: within this many radii of a node */
     uint32_t *height;       /* [n_nodes], 0: leaves */
     wavelet_extent *extent; /* [n_nodes] */
     wavelet_affine *affine; /* [n_nodes] */
@@ -36,16 +39,17 @@ typedef struct wavelet_reach {
     size_t n_leaves;
 } wavelet_reach;
 
-/* area, centre [n], by element; tree: that the basis is of. A node of one plane looks so many of its radii
- * around itself: far light is smooth there, and its wavelets are orthogonal to what is smooth. One of several
- * planes, which face here and there, looks everywhere. Nodes hand up three numbers at most. Freed with
- * wavelet_reach_free. Errors: LAM_ERR_MEMORY, LAM_ERR_ARGUMENT. */
+/* area, centre [n], by element; tree: of the basis. The reach of a node in one plane is `radii` times its
+ * radius: its wavelets are orthogonal to the linear functions, and irradiance from far away is nearly linear
+ * there. A node above planes has wavelets of constants only, and normals that differ: everything is near it.
+ * A node has three scaling functions at most. Freed with wavelet_reach_free. Errors: LAM_ERR_MEMORY,
+ * LAM_ERR_ARGUMENT. */
 lam_status wavelet_reach_make(const wavelets *basis, const plane_tree *tree, const double *area,
                               const double (*centre)[3], double radii, wavelet_reach *out, lam_error *error);
 void wavelet_reach_free(wavelet_reach *r);
 
-/* Whether wavelets of node a look at cluster b. Where a is above others, and b too, what is near to those is
- * near to them. */
+/* True if cluster b is near node a. If b is near a, then the parent of b is near a, and b is near the parent
+ * of a. */
 static inline bool wavelet_is_near(const wavelet_reach *r, size_t a, size_t b) {
     const wavelet_extent *x = &r->extent[a], *y = &r->extent[b];
     const float far = x->reach + y->radius;
@@ -54,9 +58,9 @@ static inline bool wavelet_is_near(const wavelet_reach *r, size_t a, size_t b) {
     return !(apart > far * far);
 }
 
-/* Clusters that share out all positions, ascending: a node b is divided unless the highest node above `leaf`
- * that is no higher than b looks past it. out has room for n_leaves, work for twice the root's height and
- * four. Returns their number. */
+/* The cells of a leaf: clusters that partition all positions, in ascending order. A node b is divided while
+ * it is near the highest ancestor of `leaf` that is no higher than b: no ancestor needs its finer columns
+ * otherwise. out has room for n_leaves, work for 2 height(root) + 4 numbers. Returns their number. */
 size_t wavelet_cells(const wavelet_reach *r, size_t leaf, uint32_t *out, uint32_t *work);
 
 #endif

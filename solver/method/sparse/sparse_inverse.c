@@ -5,10 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Rows that a thread takes at a time. */
+/* Rows that a thread computes at a time. */
 enum { BLOCK = 64 };
 
-/* Rows BLOCK b ... as they were found, until all are put together. */
+/* Rows b BLOCK ... b BLOCK + BLOCK - 1, until all are concatenated. */
 typedef struct found_block {
     uint32_t *indices;
     float *data;
@@ -18,9 +18,9 @@ typedef struct found_block {
 typedef struct gathering {
     const rows_job *job;
     found_block *blocks;
-    uint64_t *lengths; /* [n + 1], of row - 1 */
+    uint64_t *lengths; /* [n + 1], lengths[row + 1] is the length of a row */
     double *discarded;
-    size_t bounces, entries, most; /* entries so far and at most */
+    size_t bounces, entries, most; /* most: limit of entries, 0: none */
     bool stop;
     lam_status status;
     lam_error error;
@@ -36,16 +36,16 @@ static void gather_fail(gathering *g, lam_status status, const lam_error *error)
     g->stop = true;
 }
 
-static lam_status gather_block(gathering *g, size_t b, desk *d, lam_error *error) {
+static lam_status gather_block(gathering *g, size_t b, row_work *d, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = d->n, first = b * BLOCK, last = first + BLOCK < n ? first + BLOCK : n;
     size_t most = 0, entries;
     d->used = 0;
     for (size_t row = first; row < last; row++) {
         size_t bounces;
-        desk_make_row(g->job, row, d, &g->discarded[row], &bounces);
+        row_work_compute(g->job, row, d, &g->discarded[row], &bounces);
         if (bounces > most) most = bounces;
-        if (!desk_put_sum(d, &g->lengths[row + 1]))
+        if (!row_work_store(d, &g->lengths[row + 1]))
             FAIL(error, LAM_ERR_MEMORY, "sparse inverse: out of memory");
     }
     found_block *block = &g->blocks[b];
@@ -72,14 +72,14 @@ done:
     return status;
 }
 
-static lam_status gather_all(gathering *g, size_t n, const progress *told, lam_error *error) {
+static lam_status gather_all(gathering *g, size_t n, const progress *p, lam_error *error) {
     const size_t n_blocks = (n + BLOCK - 1) / BLOCK;
     size_t done_blocks = 0;
 #pragma omp parallel
     {
-        desk d;
+        row_work d;
         lam_error own = {.message = ""};
-        if (desk_make(n, &d, &own) != LAM_OK) gather_fail(g, LAM_ERR_MEMORY, &own);
+        if (row_work_make(n, &d, &own) != LAM_OK) gather_fail(g, LAM_ERR_MEMORY, &own);
 #pragma omp for schedule(dynamic, 1)
         for (size_t b = 0; b < n_blocks; b++) {
             bool stop;
@@ -90,21 +90,21 @@ static lam_status gather_all(gathering *g, size_t n, const progress *told, lam_e
             if (found != LAM_OK) gather_fail(g, found, &own);
 #pragma omp critical(sparse_inverse_progress)
             {
-                progress_report(told, "sparse inverse", (double)++done_blocks / (double)n_blocks);
-                if (progress_cancelled(told)) stop = true;
+                progress_report(p, "sparse inverse", (double)++done_blocks / (double)n_blocks);
+                if (progress_cancelled(p)) stop = true;
             }
             if (stop) {
                 (void)status_fail(&own, LAM_ERR_CANCELLED, "cancelled");
                 gather_fail(g, LAM_ERR_CANCELLED, &own);
             }
         }
-        desk_free(&d);
+        row_work_free(&d);
     }
     if (g->status != LAM_OK) *error = g->error;
     return g->status;
 }
 
-/* Blocks go one after the other, each freed as it is copied. */
+/* Concatenates the blocks; each is freed once it is copied. */
 static lam_status put_together(gathering *g, size_t n, csr *M, lam_error *error) {
     lam_status status = LAM_OK;
     *M = (csr){.n = n, .indptr = g->lengths};
@@ -125,7 +125,7 @@ done:
 }
 
 lam_status sparse_inverse_rows(const build_problem *problem, const float *rho, double threshold,
-                               size_t memory, const progress *told, sparse_inverse *out, lam_error *error) {
+                               size_t memory, const progress *p, sparse_inverse *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n, n_blocks = (n + BLOCK - 1) / BLOCK;
     rows_job job;
@@ -136,7 +136,7 @@ lam_status sparse_inverse_rows(const build_problem *problem, const float *rho, d
     g.lengths = memory_allocate(n + 1, sizeof *g.lengths, "sparse inverse", error);
     g.discarded = memory_allocate(n, sizeof *g.discarded, "sparse inverse", error);
     if (g.blocks == NULL || g.lengths == NULL || g.discarded == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(gather_all(&g, n, told, error));
+    TRY(gather_all(&g, n, p, error));
     TRY(put_together(&g, n, &out->M, error));
     out->discarded = g.discarded;
     out->bounces = g.bounces;

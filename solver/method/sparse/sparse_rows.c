@@ -48,7 +48,7 @@ static inline void add_to(sparse_row *r, uint32_t j, double x) {
     marks_add(&r->there, j);
 }
 
-void desk_free(desk *d) {
+void row_work_free(row_work *d) {
     free(d->sum.value);
     marks_free(&d->sum.there);
     free(d->next.value);
@@ -59,8 +59,8 @@ void desk_free(desk *d) {
     free(d->data);
 }
 
-lam_status desk_make(size_t n, desk *d, lam_error *error) {
-    *d = (desk){.n = n};
+lam_status row_work_make(size_t n, row_work *d, lam_error *error) {
+    *d = (row_work){.n = n};
     d->sum.value = memory_allocate(n, sizeof *d->sum.value, "sparse inverse", error);
     d->next.value = memory_allocate(n, sizeof *d->next.value, "sparse inverse", error);
     const bool marked = marks_make(n, 0, "sparse inverse", &d->sum.there, error) == LAM_OK &&
@@ -71,8 +71,8 @@ lam_status desk_make(size_t n, desk *d, lam_error *error) {
     return all ? LAM_OK : LAM_ERR_MEMORY;
 }
 
-/* T = remove(next, threshold), added to the sum; next is 0 again. Returns what was removed. */
-static double take_bounce(desk *d, double threshold) {
+/* T = drop(next, threshold); sum += T; next = 0. Returns the sum of what was dropped. */
+static double drop_small(row_work *d, double threshold) {
     double removed = 0;
     d->n_T = 0;
     const size_t count = marks_take(&d->next.there);
@@ -91,8 +91,8 @@ static double take_bounce(desk *d, double threshold) {
     return removed;
 }
 
-/* next = T R F; returns what R F lacks of it. */
-static double bounce(desk *d, const reflected *RF) {
+/* next = T drop(R F). Returns the sum that was dropped with entries of R F. */
+static double bounce(row_work *d, const reflected *RF) {
     double lost = 0;
     for (size_t k = 0; k < d->n_T; k++) {
         const uint32_t row = d->at[k];
@@ -104,7 +104,7 @@ static double bounce(desk *d, const reflected *RF) {
     return lost;
 }
 
-static bool desk_reserve(desk *d, size_t more) {
+static bool row_work_reserve(row_work *d, size_t more) {
     if (d->capacity - d->used >= more) return true;
     const size_t capacity = d->used + more + d->capacity / 2 + 4096;
     uint32_t *indices = realloc(d->indices, capacity * sizeof *indices);
@@ -116,9 +116,9 @@ static bool desk_reserve(desk *d, size_t more) {
     return true;
 }
 
-bool desk_put_sum(desk *d, uint64_t *entries) {
+bool row_work_store(row_work *d, uint64_t *entries) {
     const size_t count = marks_take(&d->sum.there);
-    if (!desk_reserve(d, count)) return false;
+    if (!row_work_reserve(d, count)) return false;
     for (size_t k = 0; k < count; k++) {
         const uint32_t j = d->sum.there.taken[k];
         d->indices[d->used] = j;
@@ -129,16 +129,16 @@ bool desk_put_sum(desk *d, uint64_t *entries) {
     return true;
 }
 
-void desk_make_row(const rows_job *job, size_t row, desk *d, double *discarded, size_t *bounces) {
+void row_work_compute(const rows_job *job, size_t row, row_work *d, double *discarded, size_t *bounces) {
     const csr *F = job->problem->F;
     const size_t i = job->problem->order[row];
     const double rho = job->rho[i] > 0 ? (double)job->rho[i] : 1;
     for (uint64_t e = F->indptr[i]; e < F->indptr[i + 1]; e++)
         add_to(&d->next, job->position[F->indices[e]], rho * (double)F->data[e]);
-    *discarded = take_bounce(d, job->threshold);
+    *discarded = drop_small(d, job->threshold);
     for (*bounces = 1; d->n_T > 0; ++*bounces) {
         *discarded += bounce(d, &job->RF);
-        *discarded += take_bounce(d, job->threshold);
+        *discarded += drop_small(d, job->threshold);
     }
 }
 

@@ -1,12 +1,12 @@
-/* One row of a sparse inverse after the other, by as many threads as there are desks. Private to
- * solver/method/sparse/sparse_*.c. */
+/* Computes single rows of a sparse inverse; a thread has one working area. Private to sparse_*.c. */
 #ifndef LAMBERT_METHOD_SPARSE_SPARSE_ROWS_H
 #define LAMBERT_METHOD_SPARSE_SPARSE_ROWS_H
 
 #include "solver/base/bitset.h"
 #include "solver/method/method.h"
 
-/* Entries of R F that reach the threshold, rows and columns by position, and what each row lacks. */
+/* R F without its entries below the threshold, rows and columns by position, and the sum dropped from each
+ * row. */
 typedef struct reflected {
     size_t n;
     uint64_t *indptr;
@@ -15,7 +15,7 @@ typedef struct reflected {
     double *lost; /* [n] */
 } reflected;
 
-/* All that the threads share. */
+/* Shared by all threads. */
 typedef struct rows_job {
     const build_problem *problem;
     const float *rho;
@@ -29,33 +29,33 @@ lam_status rows_job_begin(const build_problem *problem, const float *rho, double
                           lam_error *error);
 void rows_job_end(rows_job *job);
 
-/* A row with most entries 0: where others are is marked, so that looking for them is no look at all. */
+/* A dense row, most entries of which are 0, with the set of the others. */
 typedef struct sparse_row {
     double *value; /* [n] */
     marks there;
 } sparse_row;
 
-/* What a thread works with. */
-typedef struct desk {
+/* The working area of one thread. */
+typedef struct row_work {
     size_t n;
-    sparse_row sum, next; /* of T so far, and T R F */
-    uint32_t *at;         /* [n], where T is not 0, ascending */
-    double *T;            /* [n], there */
+    sparse_row sum, next; /* sum of all T, and T R F */
+    uint32_t *at;         /* [n], columns where T is not 0, ascending */
+    double *T;            /* [n], the values there */
     size_t n_T;
     /* Rows that are done, one after the other. */
     uint32_t *indices;
     float *data;
     size_t used, capacity;
-} desk;
+} row_work;
 
-lam_status desk_make(size_t n, desk *d, lam_error *error);
-void desk_free(desk *d);
+lam_status row_work_make(size_t n, row_work *d, lam_error *error);
+void row_work_free(row_work *d);
 
-/* Makes the row at a position of M~ - I in the desk's sum: the first bounce is the whole row of F, with 1
- * where nothing reflects. */
-void desk_make_row(const rows_job *job, size_t row, desk *d, double *discarded, size_t *bounces);
+/* Sums the row of M~ - I at a position up in d->sum. The first bounce is the whole row of R F, with 1 in
+ * place of rho = 0. */
+void row_work_compute(const rows_job *job, size_t row, row_work *d, double *discarded, size_t *bounces);
 
-/* Puts the sum behind the rows that are done, and clears it; false where memory is out. */
-bool desk_put_sum(desk *d, uint64_t *entries);
+/* Appends d->sum to the rows that are done and clears it; false if memory is short. */
+bool row_work_store(row_work *d, uint64_t *entries);
 
 #endif

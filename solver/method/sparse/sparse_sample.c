@@ -1,4 +1,4 @@
-/* A sparse inverse told from some of its rows. */
+/* Estimates the size and the error of a sparse inverse from a sample of its rows. */
 #include "solver/method/many_lights.h"
 #include "solver/method/sparse/sparse_inverse.h"
 #include "solver/method/sparse/sparse_rows.h"
@@ -12,21 +12,21 @@ lam_status sparse_inverse_forecast(const build_problem *problem, const float *rh
                                    double *entries, lam_error *error) {
     lam_status status = LAM_OK;
     rows_job job;
-    desk d = {.n = 0};
+    row_work d = {.n = 0};
     const size_t n = problem->n, sampled = n < SAMPLED ? n : SAMPLED;
     TRY(rows_job_begin(problem, rho, threshold, &job, error));
-    TRY(desk_make(n, &d, error));
+    TRY(row_work_make(n, &d, error));
     for (size_t k = 0; k < sampled; k++) {
         double discarded;
         size_t bounces;
         uint64_t count;
-        desk_make_row(&job, k * n / sampled, &d, &discarded, &bounces);
-        if (!desk_put_sum(&d, &count)) FAIL(error, LAM_ERR_MEMORY, "sparse inverse: out of memory");
+        row_work_compute(&job, k * n / sampled, &d, &discarded, &bounces);
+        if (!row_work_store(&d, &count)) FAIL(error, LAM_ERR_MEMORY, "sparse inverse: out of memory");
     }
     *entries = (double)d.used * (double)n / (double)sampled;
 done:
     rows_job_end(&job);
-    desk_free(&d);
+    row_work_free(&d);
     return status;
 }
 
@@ -35,9 +35,9 @@ void inverse_rows_free(inverse_rows *r) {
     *r = (inverse_rows){.rows = NULL};
 }
 
-/* Of the light T_i [n] that one element i sends out, (M - I)_ji with 1 in place of rho_j where nothing
- * reflects, to the row i: (M - I)_ij = rho'_i H_ji A_j / A_i. */
-static void turn_into_row(const build_problem *p, const float *rho, size_t i, const float *T, float *row) {
+/* Column i of M - I, T [n] = (M - I)_ji, to its row i: with H_ji = T_j / rho'_j, (M - I)_ij = rho'_i H_ji A_j
+ * / A_i, where rho' is rho, or 1 in place of 0. */
+static void column_to_row(const build_problem *p, const float *rho, size_t i, const float *T, float *row) {
     const double own = rho[i] > 0 ? (double)rho[i] : 1;
     for (size_t position = 0; position < p->n; position++) {
         const size_t j = p->order[position];
@@ -46,7 +46,7 @@ static void turn_into_row(const build_problem *p, const float *rho, size_t i, co
     }
 }
 
-lam_status inverse_rows_find(const build_problem *problem, const float *rho, const progress *told,
+lam_status inverse_rows_find(const build_problem *problem, const float *rho, const progress *p,
                              inverse_rows *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n, count = n < COMPARED ? n : COMPARED;
@@ -63,11 +63,11 @@ lam_status inverse_rows_find(const build_problem *problem, const float *rho, con
                                 .rho = rho,
                                 .m = count,
                                 .E = E,
-                                .progress = told,
-                                .stage = "look at the inverse"};
+                                .progress = p,
+                                .stage = "sample the inverse"};
     TRY(columns_solve(&unit, 1e-5, T, &report, error));
     for (size_t k = 0; k < count; k++)
-        turn_into_row(problem, rho, problem->order[k * n / count], T + k * n, found.rows + k * n);
+        column_to_row(problem, rho, problem->order[k * n / count], T + k * n, found.rows + k * n);
     for (size_t k = 0; k < count * n; k++) {
         found.square += (double)found.rows[k] * (double)found.rows[k];
         found.sum += (double)found.rows[k];
@@ -81,7 +81,7 @@ done:
     return status;
 }
 
-/* From what is missing, its squares and its sum. */
+/* square, sum: of M - M~ over the sampled rows. */
 static sparse_sample sample_of(const inverse_rows *r, double entries, double square, double sum) {
     return (sparse_sample){.entries = entries * (double)r->n / (double)r->count,
                            .single = r->square > 0 ? sqrt(square / r->square) : 0,
@@ -114,9 +114,9 @@ lam_status sparse_inverse_sample(const build_problem *problem, const float *rho,
     TRY(rows_job_begin(problem, rho, threshold, &job, error));
 #pragma omp parallel
     {
-        desk d;
+        row_work d;
         lam_error own = {.message = ""};
-        const bool ready = desk_make(n, &d, &own) == LAM_OK;
+        const bool ready = row_work_make(n, &d, &own) == LAM_OK;
 #pragma omp for schedule(dynamic, 1)
         for (size_t k = 0; k < truth->count; k++) {
             const float *row = truth->rows + k * n;
@@ -124,8 +124,8 @@ lam_status sparse_inverse_sample(const build_problem *problem, const float *rho,
             size_t bounces;
             uint64_t length = 0;
             d.used = 0;
-            if (ready) desk_make_row(&job, k * n / truth->count, &d, &discarded, &bounces);
-            if (!ready || !desk_put_sum(&d, &length)) {
+            if (ready) row_work_compute(&job, k * n / truth->count, &d, &discarded, &bounces);
+            if (!ready || !row_work_store(&d, &length)) {
 #pragma omp atomic write
                 failed = true;
                 continue;
@@ -138,10 +138,10 @@ lam_status sparse_inverse_sample(const build_problem *problem, const float *rho,
                 lack[2] += x;
             }
         }
-        desk_free(&d);
+        row_work_free(&d);
     }
     if (failed) FAIL(error, LAM_ERR_MEMORY, "sparse inverse: out of memory");
-    for (size_t k = 0; k < truth->count; k++) { /* in order: the same for any number of threads */
+    for (size_t k = 0; k < truth->count; k++) { /* in order, so that the bits do not depend on threads */
         entries += missing[3 * k];
         square += missing[3 * k + 1];
         sum += missing[3 * k + 2];

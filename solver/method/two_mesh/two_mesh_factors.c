@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Areas of a patch are equal where they differ by no more than a few roundings of single precision. */
+/* Areas within a patch count as equal if they differ by a few roundings of single precision. */
 static const double equal_areas = 0x1p-22;
 
 /* V_jp by position, in double: A_j / A_p. */
@@ -101,8 +101,8 @@ typedef struct remainder {
     double *x, *y; /* [n] */
 } remainder_product;
 
-/* x -= W W^T x, W_jp = (A_j / A_p)^1/2; x by position on the curve of S. */
-static void take_off_patches(const remainder_product *D, double *x) {
+/* x -= W W^T x, W_jp = (A_j / A_p)^1/2; x in the order of S. */
+static void subtract_patches(const remainder_product *D, double *x) {
     const coarse_mesh *mesh = D->mesh;
     const uint32_t *position = D->S->position;
     for (size_t p = 0; p < mesh->k; p++) {
@@ -119,10 +119,10 @@ static lam_status remainder_square(void *context, const double *q, double *w, la
     lam_status status = LAM_OK;
     const remainder_product *D = context;
     for (size_t i = 0; i < D->mesh->n; i++) D->x[i] = q[i];
-    take_off_patches(D, D->x);
+    subtract_patches(D, D->x);
     TRY(scaled_multiply_double(D->S, D->x, D->y, error));
     TRY(scaled_multiply_double(D->S, D->y, w, error));
-    take_off_patches(D, w);
+    subtract_patches(D, w);
 done:
     return status;
 }
