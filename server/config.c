@@ -1,156 +1,173 @@
 #include "server/config.h"
 
-#include <ctype.h>
-#include <errno.h>
-#include <getopt.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
+#include "solver/base/options.h"
+
+#include <stdio.h>
 #include <unistd.h>
 
-typedef enum option_kind {
-    OPTION_TEXT,
-    OPTION_COUNT,
-    OPTION_SIZE, /* bytes, with K, M, G, T for powers of 1024 */
-    OPTION_FLAG,
-    OPTION_FUTURE_FLAG /* of the contract, refused until it is there */
-} option_kind;
-
-typedef struct option_row {
-    const char *name;
-    option_kind kind;
-    const char *argument;
-    size_t offset;
-    size_t least, most;
-    size_t preset; /* of OPTION_COUNT and OPTION_SIZE */
-    const char *help;
-} option_row;
+_Static_assert(sizeof(size_t) == sizeof(uint64_t), "counts and sizes of the tables are uint64_t");
 
 #define AT(member) offsetof(config, member)
+#define SIZE_MOST 0x1p59
 
-static const option_row rows[] = {
-    {"stores", OPTION_TEXT, "DIR", AT(stores_dir), 0, 0, 0, "serve every *.h5 of a folder"},
-    {"listen", OPTION_TEXT, "HOST:PORT", AT(listen_address), 0, 0, 0,
-     "where to listen (127.0.0.1:8317); port 0 takes a free one"},
-    {"unix", OPTION_TEXT, "PATH", AT(unix_path), 0, 0, 0, "listen on a socket in the file system instead"},
-    {"threads", OPTION_COUNT, "T", AT(threads), 1, 4096, 0, "threads that solve (as many as cores)"},
-    {"max-body", OPTION_SIZE, "BYTES", AT(max_body), 1, SIZE_MAX / 16, (size_t)256 << 20,
-     "longest request body (256M)"},
-    {"max-batch", OPTION_COUNT, "N", AT(max_batch), 1, 1u << 20, 1024, "most vectors in a request (1024)"},
-    {"max-inflight", OPTION_COUNT, "N", AT(max_inflight), 1, 1u << 20, 256,
-     "most solves that wait or run; more are answered 503 (256)"},
-    {"max-buffered", OPTION_SIZE, "BYTES", AT(max_buffered), 1, SIZE_MAX / 16, 0,
-     "most bytes of request bodies held at once; more are answered 503 (4 times --max-body)"},
-    {"max-connections", OPTION_COUNT, "N", AT(max_connections), 1, 1u << 16, 1000,
-     "most open connections; then idle ones are closed for others (1000)"},
-    {"max-memory", OPTION_SIZE, "SIZE", AT(max_memory), 1, SIZE_MAX / 16, 0,
-     "refuse stores that, with the threads' work areas, take more than so much"},
-    {"max-variants", OPTION_COUNT, "N", AT(max_variants), 0, 4096, 0,
-     "most variants of reflectance that clients may have made (0); they need --token-file"},
-    {"timeout", OPTION_COUNT, "SECONDS", AT(timeout_s), 1, 86400, 60,
-     "close a connection that is idle, or whose next request has not all of its head, for so long (60)"},
-    {"min-rate", OPTION_SIZE, "BYTES", AT(min_rate), 1, SIZE_MAX / 16, (size_t)16 << 10,
-     "a second, on average over --timeout, that a body has to come and an answer to be read (16K)"},
-    {"token-file", OPTION_TEXT, "FILE", AT(token_file), 0, 0, 0,
-     "ask for the bearer token in this file under /v1"},
-    {"access-log", OPTION_TEXT, "-|FILE", AT(access_log), 0, 0, 0, "one JSON line for each request"},
-    {"verify", OPTION_FLAG, NULL, AT(verify), 0, 0, 0,
-     "compare all of a store with its checksums before it is served"},
-    {"lock", OPTION_FUTURE_FLAG, NULL, 0, 0, 0, 0, "not supported yet"},
-    {"no-viewer", OPTION_FLAG, NULL, AT(no_viewer), 0, 0, 0, "no page at / (there is none yet)"},
-    {"help", OPTION_FLAG, NULL, AT(help), 0, 0, 0, "print this and exit"},
-    {"version", OPTION_FLAG, NULL, AT(version), 0, 0, 0, "print the version and exit"},
+static const option_row store_rows[] = {
+    {.name = "stores",
+     .kind = OPTION_TEXT,
+     .offset = AT(stores_dir),
+     .argument = "DIR",
+     .help = "Serve every *.h5 file of a folder"},
+    {.name = "verify",
+     .kind = OPTION_FLAG,
+     .offset = AT(verify),
+     .help = "Compare all of a store with its checksums before it is served"},
+    {.name = "max-memory",
+     .kind = OPTION_SIZE,
+     .offset = AT(max_memory),
+     .argument = "SIZE",
+     .otherwise = "no limit",
+     .least = 1,
+     .most = SIZE_MOST,
+     .help = "Refuse stores that, with the work areas of the threads, take more memory than this"},
+    {.name = "max-variants",
+     .kind = OPTION_COUNT,
+     .offset = AT(max_variants),
+     .argument = "N",
+     .preset = "0",
+     .least = 0,
+     .most = 4096,
+     .help = "Most variants of reflectance that clients may create; they need --token-file"},
+    {0},
 };
-#define N_ROWS (sizeof rows / sizeof rows[0])
+static const option_row connection_rows[] = {
+    {.name = "listen",
+     .kind = OPTION_TEXT,
+     .offset = AT(listen_address),
+     .argument = "HOST:PORT",
+     .preset = "127.0.0.1:8317",
+     .help = "Address to listen on; port 0 takes a free one"},
+    {.name = "unix",
+     .kind = OPTION_TEXT,
+     .offset = AT(unix_path),
+     .argument = "PATH",
+     .help = "Listen on a socket in the file system instead"},
+    {.name = "token-file",
+     .kind = OPTION_TEXT,
+     .offset = AT(token_file),
+     .argument = "FILE",
+     .help = "Ask for the bearer token in this file under /v1"},
+    {.name = "access-log",
+     .kind = OPTION_TEXT,
+     .offset = AT(access_log),
+     .argument = "-|FILE",
+     .help = "Write one line of JSON for each request"},
+    {0},
+};
+static const option_row limit_rows[] = {
+    {.name = "threads",
+     .kind = OPTION_COUNT,
+     .offset = AT(threads),
+     .argument = "T",
+     .otherwise = "one per core",
+     .least = 1,
+     .most = 4096,
+     .help = "Threads that solve"},
+    {.name = "max-body",
+     .kind = OPTION_SIZE,
+     .offset = AT(max_body),
+     .argument = "SIZE",
+     .preset = "256M",
+     .least = 1,
+     .most = SIZE_MOST,
+     .help = "Longest request body"},
+    {.name = "max-batch",
+     .kind = OPTION_COUNT,
+     .offset = AT(max_batch),
+     .argument = "N",
+     .preset = "1024",
+     .least = 1,
+     .most = 1 << 20,
+     .help = "Most vectors in a request"},
+    {.name = "max-inflight",
+     .kind = OPTION_COUNT,
+     .offset = AT(max_inflight),
+     .argument = "N",
+     .preset = "256",
+     .least = 1,
+     .most = 1 << 20,
+     .help = "Most solves that wait or run; further ones are answered 503"},
+    {.name = "max-buffered",
+     .kind = OPTION_SIZE,
+     .offset = AT(max_buffered),
+     .argument = "SIZE",
+     .otherwise = "4 times --max-body",
+     .least = 1,
+     .most = SIZE_MOST,
+     .help = "Most bytes of request bodies held at once; further ones are answered 503"},
+    {.name = "max-connections",
+     .kind = OPTION_COUNT,
+     .offset = AT(max_connections),
+     .argument = "N",
+     .preset = "1000",
+     .least = 1,
+     .most = 1 << 16,
+     .help = "Most open connections; above this, idle ones are closed for new ones"},
+    {.name = "timeout",
+     .kind = OPTION_COUNT,
+     .offset = AT(timeout_s),
+     .argument = "SECONDS",
+     .preset = "60",
+     .unit = "s",
+     .least = 1,
+     .most = 86400,
+     .help =
+         "Close a connection that is idle, or whose next request lacks a part of its head, for this long"},
+    {.name = "min-rate",
+     .kind = OPTION_SIZE,
+     .offset = AT(min_rate),
+     .argument = "SIZE",
+     .preset = "16K",
+     .unit = "a second",
+     .least = 1,
+     .most = SIZE_MOST,
+     .help = "Slowest rate, on average over --timeout, at which a client may send a body or read an answer"},
+    {0},
+};
+static const option_row other_rows[] = {
+    {.name = "version", .kind = OPTION_FLAG, .offset = AT(version), .help = "Print the version and stop"},
+    {0},
+};
 
-static lam_status read_number(const option_row *row, const char *text, size_t *value, lam_error *error) {
-    lam_status status = LAM_OK;
-    char *end;
-    errno = 0;
-    unsigned long long number = strtoull(text, &end, 10);
-    size_t scaled = (size_t)number;
-    bool good = isdigit((unsigned char)text[0]) && errno == 0 && number <= SIZE_MAX;
-    if (good && row->kind == OPTION_SIZE && *end != '\0') {
-        static const char units[] = "KMGT";
-        const char *unit = strchr(units, toupper((unsigned char)*end));
-        good = unit != NULL &&
-               (end[1] == '\0' || strcasecmp(end + 1, "B") == 0 || strcasecmp(end + 1, "iB") == 0);
-        for (const char *u = units; good && u <= unit; u++) good = size_multiply(scaled, 1024, &scaled);
-    } else if (*end != '\0') {
-        good = false;
-    }
-    if (!good)
-        FAIL(error, LAM_ERR_ARGUMENT, "--%s %s: must be a number%s", row->name, text,
-             row->kind == OPTION_SIZE ? " of bytes, such as 4096 or 256M" : "");
-    if (scaled < row->least || scaled > row->most)
-        FAIL(error, LAM_ERR_ARGUMENT, "--%s %s: must be from %zu to %zu", row->name, text, row->least,
-             row->most);
-    *value = scaled;
-done:
-    return status;
-}
+static const option_command daemon_command = {
+    .name = "lambertd",
+    .arguments = "STORE.h5[:NAME] ... | --stores DIR",
+    .summary = "Answer over HTTP the radiosity of scenes under any emission.",
+    .notes = "SIGHUP reads the stores again; SIGTERM finishes running requests and exits.",
+    .most_arguments = SIZE_MAX,
+};
 
-static lam_status read_option(config *c, const option_row *row, const char *text, lam_error *error) {
-    lam_status status = LAM_OK;
-    void *member = (char *)c + row->offset;
-    switch (row->kind) {
-    case OPTION_TEXT:
-        *(const char **)member = text;
-        break;
-    case OPTION_COUNT:
-    case OPTION_SIZE:
-        TRY(read_number(row, text, member, error));
-        break;
-    case OPTION_FLAG:
-        *(bool *)member = true;
-        break;
-    case OPTION_FUTURE_FLAG:
-        FAIL(error, LAM_ERR_UNSUPPORTED, "--%s: not supported yet", row->name);
+int config_read(config *c, int argc, char **argv) {
+    const option_table tables[] = {{"stores", store_rows, c},
+                                   {"connections", connection_rows, c},
+                                   {"limits", limit_rows, c},
+                                   {"other", other_rows, c},
+                                   {0}};
+    option_result given;
+    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    *c = (config){.threads = cores > 0 ? (size_t)cores : 1};
+    const int code = options_parse(&daemon_command, tables, argc, argv, &given);
+    if (code != OPTIONS_GO) return code;
+    if (c->version) {
+        puts("lambertd " LAMBERT_VERSION);
+        return 0;
     }
-done:
-    return status;
-}
-
-lam_status config_read(config *c, int argc, char **argv, lam_error *error) {
-    lam_status status = LAM_OK;
-    struct option options[N_ROWS + 1] = {0};
-    long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    *c = (config){.listen_address = "127.0.0.1:8317"};
-    for (size_t i = 0; i < N_ROWS; i++) {
-        bool flag = rows[i].kind == OPTION_FLAG || rows[i].kind == OPTION_FUTURE_FLAG;
-        options[i] = (struct option){rows[i].name, flag ? no_argument : required_argument, NULL, 0};
-        if (rows[i].preset > 0) *(size_t *)(void *)((char *)c + rows[i].offset) = rows[i].preset;
-    }
-    c->threads = cores > 0 ? (size_t)cores : 1;
-    opterr = 0;
-    for (;;) {
-        int which = -1, before = optind;
-        int found = getopt_long(argc, argv, ":", options, &which);
-        if (found == -1) break;
-        if (found == ':') FAIL(error, LAM_ERR_ARGUMENT, "%s: needs an argument (see --help)", argv[before]);
-        if (found == '?') FAIL(error, LAM_ERR_ARGUMENT, "%s: no such option (see --help)", argv[before]);
-        TRY(read_option(c, &rows[which], optarg, error));
-    }
-    c->stores = argv + optind;
-    c->n_stores = (size_t)(argc - optind);
-    if (c->n_stores == 0 && c->stores_dir == NULL && !c->help && !c->version)
-        FAIL(error, LAM_ERR_ARGUMENT, "no store is given: lambertd STORE.h5[:NAME] ... or --stores DIR");
+    c->stores = given.arguments;
+    c->n_stores = given.n_arguments;
+    if (c->n_stores == 0 && c->stores_dir == NULL)
+        return options_usage(daemon_command.name, "no store is given; usage: lambertd %s",
+                             daemon_command.arguments);
     if (c->max_buffered == 0) c->max_buffered = 4 * c->max_body;
     if (c->max_buffered < c->max_body)
-        FAIL(error, LAM_ERR_ARGUMENT, "--max-buffered %zu: must be at least --max-body (%zu)",
-             c->max_buffered, c->max_body);
-done:
-    return status;
-}
-
-void config_print_help(FILE *to) {
-    fprintf(to, "Usage: lambertd STORE.h5[:NAME] ... | --stores DIR [OPTION ...]\n"
-                "Answers over HTTP what light a scene's surfaces have under any emission.\n\n");
-    for (size_t i = 0; i < N_ROWS; i++) {
-        char left[64];
-        snprintf(left, sizeof left, "--%s%s%s", rows[i].name, rows[i].argument == NULL ? "" : " ",
-                 rows[i].argument == NULL ? "" : rows[i].argument);
-        fprintf(to, "  %-24s %s\n", left, rows[i].help);
-    }
-    fprintf(to, "\nSIGHUP reads the stores again; SIGTERM finishes what runs and exits.\n");
+        return options_usage(daemon_command.name, "--max-buffered %zu: must be at least --max-body (%zu)",
+                             c->max_buffered, c->max_body);
+    return OPTIONS_GO;
 }

@@ -1,4 +1,4 @@
-/* The options of lambertd: one table that reads the command line and makes --help. */
+/* The options of lambertd. */
 #ifndef LAMBERT_SERVER_CONFIG_H
 #define LAMBERT_SERVER_CONFIG_H
 
@@ -23,17 +23,13 @@ typedef struct config {
     size_t min_rate; /* bytes a second that a client has to send and to read */
     size_t max_variants;
     bool verify;
-    bool no_viewer;
-    bool help;
     bool version;
     char **stores; /* the other arguments: STORE.h5 or STORE.h5:NAME */
     size_t n_stores;
 } config;
 
-/* Fills c with defaults and what argv says; its texts stay owned by argv, whose order may change.
- * Errors: LAM_ERR_ARGUMENT, LAM_ERR_UNSUPPORTED. */
-lam_status config_read(config *c, int argc, char **argv, lam_error *error);
-
-void config_print_help(FILE *to);
+/* Fills c from presets and argv, whose order may change; texts stay in argv. Returns OPTIONS_GO, or the exit
+ * status after --help or wrong usage. */
+int config_read(config *c, int argc, char **argv);
 
 #endif

@@ -3,6 +3,7 @@
 #include "server/net/listener.h"
 #include "server/route/routes.h"
 #include "server/scene/map_guard.h"
+#include "solver/base/options.h"
 #include "solver/codec/json_memory.h"
 
 #include <errno.h>
@@ -13,18 +14,11 @@
 #include <time.h>
 #include <unistd.h>
 
-#define EXIT_USAGE 2
-
 /* Between its loops OpenMP's threads spin unless told otherwise before the program starts: on a machine that
  * also has clients to talk to, they should sleep. So the program starts once more. */
 static void let_threads_sleep(char **argv) {
     if (getenv("OMP_WAIT_POLICY") != NULL || setenv("OMP_WAIT_POLICY", "passive", 1) != 0) return;
     execv("/proc/self/exe", argv);
-}
-
-static int complain(const lam_error *error, int code) {
-    fprintf(stderr, "lambertd: %s\n", error->message);
-    return code;
 }
 
 /* Threads that allocate little need no heaps of their own: what each keeps of its own busiest moment made the
@@ -131,13 +125,9 @@ int main(int argc, char **argv) {
     sigset_t signals = block_signals();
     map_guard_install();
     json_memory_install();
-    if (config_read(&c, argc, argv, &error) != LAM_OK) return complain(&error, EXIT_USAGE);
-    if (c.help || c.version) {
-        if (c.help)
-            config_print_help(stdout);
-        else
-            printf("lambertd %s\n", LAMBERT_VERSION);
-        return fflush(stdout) == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
-    }
-    return run(&c, &signals, &error) == LAM_OK ? EXIT_SUCCESS : complain(&error, EXIT_FAILURE);
+    const int code = config_read(&c, argc, argv);
+    if (code != OPTIONS_GO) return fflush(stdout) == 0 ? code : EXIT_FAILURE;
+    if (run(&c, &signals, &error) == LAM_OK) return EXIT_SUCCESS;
+    fprintf(stderr, "lambertd: %s\n", error.message);
+    return EXIT_FAILURE;
 }

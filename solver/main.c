@@ -1,5 +1,5 @@
 /* `lambert`: finds the verb; the verbs are in cmd_*.c. */
-#include "solver/console/terminal.h"
+#include "solver/base/terminal.h"
 #include "solver/linalg/core.h"
 #include "solver/verbs/verbs.h"
 
@@ -8,7 +8,7 @@
 
 typedef struct verb {
     const char *name;
-    int (*run)(int argc, char **argv); /* NULL: not supported yet */
+    int (*run)(int argc, char **argv);
     const char *summary;
 } verb;
 
@@ -43,17 +43,15 @@ int main(int argc, char **argv) {
     core_keep_thread_limit();
     if (strcmp(argv[1], "--help") == 0) {
         print_help();
-        return terminal_finish("--help", 0);
+        return terminal_finish("lambert", 0);
     }
     if (strcmp(argv[1], "--version") == 0) {
         puts("lambert " LAMBERT_VERSION);
-        return terminal_finish("--version", 0);
+        return terminal_finish("lambert", 0);
     }
     for (size_t i = 0; i < sizeof verbs / sizeof verbs[0]; i++) {
         if (strcmp(argv[1], verbs[i].name) != 0) continue;
-        if (verbs[i].run != NULL) return terminal_finish(verbs[i].name, verbs[i].run(argc - 1, argv + 1));
-        fprintf(stderr, "lambert %s: not supported yet\n", verbs[i].name);
-        return 2;
+        return terminal_finish("lambert", verbs[i].run(argc - 1, argv + 1));
     }
     fputs("lambert: ", stderr);
     for (const char *c = argv[1]; *c != '\0'; c++)

@@ -44,7 +44,7 @@ bench_suite_run bench_formfactors, bench_lowrank, bench_stability, bench_cities,
 
 typedef struct bench_suite {
     const char *name;
-    bench_suite_run *run; /* NULL: not supported yet */
+    bench_suite_run *run;
 } bench_suite;
 
 /* The suites of the contract; the last has no name. */

@@ -2,8 +2,8 @@
 #ifndef LAMBERT_BENCH_BENCH_FILES_H
 #define LAMBERT_BENCH_BENCH_FILES_H
 
+#include "solver/base/terminal.h"
 #include "solver/bench/bench.h"
-#include "solver/console/terminal.h"
 
 typedef struct bench_files {
     const char *folder;

@@ -1,12 +1,14 @@
 /* `lambert-bench`: runs suites of measurements. */
+#include "solver/base/options.h"
 #include "solver/bench/bench_files.h"
-#include "solver/console/options.h"
 #include "solver/linalg/core.h"
 #include "solver/precompute/forecast.h"
 
 #include <omp.h>
 #include <stdio.h>
 #include <string.h>
+
+#define SUITES_MOST 8
 
 typedef struct fields {
     const char *output, *scene;
@@ -20,32 +22,34 @@ static const option_row rows[] = {
      .letter = 'o',
      .kind = OPTION_TEXT,
      .offset = FIELD(output),
-     .value = "DIR",
-     .doc = "Folder of the results, made where it is missing (lambert-bench)"},
+     .argument = "DIR",
+     .preset = "lambert-bench",
+     .help = "Folder of the results; it is made if it is missing"},
     {.name = "full",
      .kind = OPTION_FLAG,
      .offset = FIELD(full),
-     .doc = "More settings, larger scenes, more seeds: half an hour instead of minutes"},
+     .help = "More settings, larger scenes, more seeds: half an hour instead of minutes"},
     {.name = "quick",
      .kind = OPTION_FLAG,
      .offset = FIELD(quick),
-     .doc = "Small scenes only, in seconds: to see that it works; the figures say little"},
+     .help = "Small scenes only, in seconds: to see that it works; the figures say little"},
     {.name = "scene",
      .kind = OPTION_TEXT,
      .offset = FIELD(scene),
-     .value = "SCENE",
-     .doc = "formfactors: the open scene of throughput and resolution, every face an element (houses); "
-            "hierarchical: the only scene, divided where it is coarse"},
+     .argument = "SCENE",
+     .help = "formfactors: the open scene of throughput and resolution, every face an element (houses); "
+             "hierarchical: the only scene, divided where it is coarse"},
     {.name = "seed",
      .kind = OPTION_COUNT,
      .offset = FIELD(seed),
-     .value = "S",
-     .doc = "Of all that is sampled (1)"},
+     .argument = "S",
+     .preset = "1",
+     .help = "Seed of all sampling"},
     {0},
 };
 
-static const option_verb verb = {
-    .name = "bench",
+static const option_command command = {
+    .name = "lambert bench",
     .arguments = "SUITE... [-o DIR]",
     .summary =
         "Measure. Suites: formfactors (error against exact values and time, throughput of rays), lowrank "
@@ -53,40 +57,39 @@ static const option_verb verb = {
         "numbers are hard), cities (sparse inverses, few emitters and Jacobi beside the tables of the "
         "thesis), service (lambertd under load beside servers that compute nothing and beside solves in "
         "process; wrk and nginx take part where they are installed), hierarchical (that kind of operator "
-        "beside all others at equal error, and how it grows). Not supported yet: reuse. Each writes its "
+        "beside all others at equal error, and how it grows). Each writes its "
         "tables as CSV and JSON, its plots as SVG and PNG.",
-    .options = rows,
-    .min_arguments = 1,
-    .max_arguments = OPTIONS_ARGUMENTS_MAX,
+    .least_arguments = 1,
+    .most_arguments = SUITES_MOST,
 };
 
 /* Usage errors of any suite come before the first is run. */
-static int find_suites(const option_result *given, const bench_suite *found[OPTIONS_ARGUMENTS_MAX]) {
+static int find_suites(const option_result *given, const bench_suite *found[SUITES_MOST]) {
     for (size_t i = 0; i < given->n_arguments; i++) {
         const bench_suite *s = bench_suites;
         while (s->name != NULL && strcmp(s->name, given->arguments[i]) != 0) s++;
         if (s->name == NULL)
-            return options_usage(verb.name, "%s: no such suite; see lambert bench --help",
+            return options_usage(command.name, "%s: no such suite; see lambert bench --help",
                                  given->arguments[i]);
-        if (s->run == NULL) return options_usage(verb.name, "%s is not supported yet", s->name);
         found[i] = s;
     }
     return OPTIONS_GO;
 }
 
 static int measure(int argc, char **argv) {
-    fields f = {.output = "lambert-bench", .seed = 1};
+    fields f = {0};
     option_result given = {0};
-    const bench_suite *suites[OPTIONS_ARGUMENTS_MAX] = {NULL};
+    const bench_suite *suites[SUITES_MOST] = {NULL};
     lam_error error = {0};
     terminal t;
-    int code = options_parse(&verb, argc, argv, &f, &given);
+    const option_table tables[] = {{NULL, rows, &f}, {0}};
+    int code = options_parse(&command, tables, argc, argv, &given);
     if (code != OPTIONS_GO) return code;
-    if (f.full && f.quick) return options_usage(verb.name, "--full and --quick exclude each other");
+    if (f.full && f.quick) return options_usage(command.name, "--full and --quick exclude each other");
     code = find_suites(&given, suites);
     if (code != OPTIONS_GO) return code;
 
-    terminal_open(&t, verb.name, false, false);
+    terminal_open(&t, command.name, false, false);
     t.nothing = "files that were finished stay";
     const progress how = terminal_progress(&t);
     const bench_scale scale = f.full ? BENCH_FULL : f.quick ? BENCH_QUICK : BENCH_DEFAULT;
@@ -116,5 +119,5 @@ static int measure(int argc, char **argv) {
 
 int main(int argc, char **argv) {
     core_keep_thread_limit();
-    return terminal_finish(verb.name, measure(argc, argv));
+    return terminal_finish(command.name, measure(argc, argv));
 }

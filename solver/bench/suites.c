@@ -9,7 +9,6 @@ const bench_suite bench_suites[] = {
     {"cities", bench_cities},
     {"service", bench_service},
     {"hierarchical", bench_hierarchical},
-    {"reuse", NULL},
     {NULL, NULL},
 };
 

@@ -3,7 +3,7 @@
 #define LAMBERT_LIGHT_EMISSION_H
 
 #include "lambert/lambert.h"
-#include "solver/console/options.h"
+#include "solver/base/options.h"
 #include "solver/scene/mesh.h"
 
 /* A batch of emissions: E is [n_vectors][C][n] in mesh order, W/m^2, never negative. */

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_LIGHT_WEATHER_LIGHT_H
 #define LAMBERT_LIGHT_WEATHER_LIGHT_H
 
-#include "solver/console/terminal.h"
+#include "solver/base/terminal.h"
 #include "solver/daylight/year.h"
 #include "solver/light/emission.h"
 #include "solver/light/sunlight.h"

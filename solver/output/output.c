@@ -1,7 +1,7 @@
 #include "solver/output/output.h"
 
 #include "solver/base/atomic_file.h"
-#include "solver/console/options.h"
+#include "solver/base/options.h"
 #include "solver/light/npy_file.h"
 
 #include <string.h>
@@ -10,9 +10,6 @@ lam_status output_check(const char *path, bool reduced, lam_error *error) {
     lam_status status = LAM_OK;
     char extension[16];
     output_file_extension(path, extension);
-    if (strcmp(extension, "glb") == 0)
-        FAIL(error, LAM_ERR_UNSUPPORTED, "-o %s is not supported yet: write npy, json, csv, ply or vtu",
-             path);
     if (!option_among(extension, "npy|json|csv|ply|vtu"))
         FAIL(error, LAM_ERR_ARGUMENT, "-o %s: must end in .npy, .json, .csv, .ply or .vtu", path);
     if (reduced && !option_among(extension, "json|csv"))

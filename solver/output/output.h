@@ -24,8 +24,8 @@ typedef struct solution {
     double relative, indirect; /* mean error that the store states; negative: not measured */
 } solution;
 
-/* Whether a file of this name can be written; LAM_ERR_ARGUMENT names the extensions that can,
- * LAM_ERR_UNSUPPORTED those still to come. Reductions go into JSON and CSV only. */
+/* Whether a file of this name can be written; LAM_ERR_ARGUMENT names the extensions that can.
+ * Reductions go into JSON and CSV only. */
 lam_status output_check(const char *path, bool reduced, lam_error *error);
 
 /* Writes path in the format of its extension, whole or not at all. */

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_PRECOMPUTE_PRECISION_LOSS_H
 #define LAMBERT_PRECOMPUTE_PRECISION_LOSS_H
 
-#include "solver/console/terminal.h"
+#include "solver/base/terminal.h"
 #include "solver/method/judge.h"
 
 /* Mean of |P' - P|/|P| for the bounced light P, area-weighted, channels stacked. */

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_PRECOMPUTE_PRECOMPUTE_H
 #define LAMBERT_PRECOMPUTE_PRECOMPUTE_H
 
-#include "solver/console/terminal.h"
+#include "solver/base/terminal.h"
 #include "solver/method/classify.h"
 #include "solver/precompute/recipe_choice.h"
 #include "solver/scene/mesh.h"

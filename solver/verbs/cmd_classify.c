@@ -19,17 +19,24 @@ typedef struct fields {
 static const char *const taken[] = {"subdivide",   "max-edge", "elements", "unit",     "up",      "two-sided",
                                     "reflectance", "rays",     "sky",      "emitters", "epsilon", "threshold",
                                     "threads",     "memory",   "seed",     "quiet",    "progress"};
-enum { TAKEN = sizeof taken / sizeof *taken, OWN = 1 };
+enum { TAKEN = sizeof taken / sizeof *taken };
 
-static const option_row json_row = {
-    .name = "json", .kind = OPTION_FLAG, .offset = offsetof(fields, json), .doc = "The same as JSON"};
+static const option_row own_rows[] = {
+    {.name = "json", .kind = OPTION_FLAG, .offset = offsetof(fields, json), .help = "Print JSON"},
+    {0},
+};
 
-static void take_rows(option_row rows[TAKEN + OWN + 1]) {
+static bool is_taken(const char *name) {
+    for (size_t k = 0; k < TAKEN; k++)
+        if (strcmp(name, taken[k]) == 0) return true;
+    return false;
+}
+
+static void take_rows(const option_table *tables, option_row rows[TAKEN + 1]) {
     size_t n = 0;
-    for (const option_row *row = precompute_verb.options; row->name != NULL || row->doc != NULL; row++)
-        for (size_t k = 0; k < TAKEN && row->name != NULL; k++)
-            if (strcmp(row->name, taken[k]) == 0) rows[n++] = *row;
-    rows[n++] = json_row;
+    for (; tables->rows != NULL; tables++)
+        for (const option_row *row = tables->rows; row->name != NULL; row++)
+            if (is_taken(row->name)) rows[n++] = *row;
     rows[n] = (option_row){0};
 }
 
@@ -85,28 +92,28 @@ done:
 }
 
 int cmd_classify(int argc, char **argv) {
-    fields f = {
-        .of_scene = {
-            .unit = 1, .reflectance = -1, .rays = OPTION_AUTO, .epsilon = .05, .seed = 1, .probes = 0}};
+    fields f = {0};
     const precompute_arguments *a = &f.of_scene;
-    option_row rows[TAKEN + OWN + 1];
-    take_rows(rows);
-    const option_verb verb = {
-        .name = "classify",
+    option_table of_precompute[PRECOMPUTE_TABLES];
+    option_row rows[TAKEN + 1];
+    precompute_tables(&f.of_scene, of_precompute);
+    take_rows(of_precompute, rows);
+    const option_table tables[] = {{NULL, rows, &f.of_scene}, {NULL, own_rows, &f}, {0}};
+    static const option_command verb = {
+        .name = "lambert classify",
         .arguments = "SCENE",
         .summary =
             "Say how dense a scene's form factors are, how many singular values matter, and which operator "
             "--method auto would build; of a store that keeps form factors these are taken.",
-        .options = rows,
-        .min_arguments = 1,
-        .max_arguments = 1,
+        .least_arguments = 1,
+        .most_arguments = 1,
     };
     option_result given = {0};
     lam_error error = {0};
     terminal term;
     scene_class found;
     size_t rays = 0;
-    const int code = options_parse(&verb, argc, argv, &f, &given);
+    const int code = options_parse(&verb, tables, argc, argv, &given);
     if (code != OPTIONS_GO) return code;
     if ((a->subdivide > 0) + (a->max_edge > 0) + (a->elements > 0) > 1)
         return options_usage(verb.name, "--subdivide, --max-edge and --elements exclude each other");
@@ -122,7 +129,7 @@ int cmd_classify(int argc, char **argv) {
         .unit = a->unit,
         .up = a->up != NULL ? a->up[0] : 0,
         .two_sided = a->two_sided,
-        .reflectance = a->reflectance,
+        .reflectance = options_given(&given, "reflectance") ? a->reflectance : -1,
         .form_factors = {.quality = "draft",
                          .epsilon = a->epsilon,
                          .rays = a->rays,
@@ -133,7 +140,7 @@ int cmd_classify(int argc, char **argv) {
         .factorizer = "auto",
         .emitters = a->emitters,
         .epsilon = a->epsilon,
-        .threshold = a->threshold,
+        .threshold = options_given(&given, "threshold") ? a->threshold : 0,
         .seed = a->seed,
         .memory = a->memory,
     };

@@ -1,7 +1,7 @@
 /* lambert generate: writes one of the known scenes. */
 #include "solver/base/atomic_file.h"
-#include "solver/console/options.h"
-#include "solver/console/terminal.h"
+#include "solver/base/options.h"
+#include "solver/base/terminal.h"
 #include "solver/scene/generate/generate.h"
 #include "solver/verbs/verbs.h"
 
@@ -34,76 +34,86 @@ static const option_row rows[] = {
      .letter = 'o',
      .kind = OPTION_TEXT,
      .offset = FIELD(output),
-     .value = "SCENE.obj",
-     .doc = "Where the scene goes; its materials go beside it"},
+     .argument = "SCENE.obj",
+     .help = "Where the scene goes; its materials go beside it"},
     {.name = "elements",
      .kind = OPTION_COUNT,
      .offset = FIELD(elements),
-     .value = "N",
-     .doc = "About this many faces",
-     .low = 1,
-     .high = 1e9},
+     .argument = "N",
+     .least = 1,
+     .most = 1e9,
+     .help = "About this many faces"},
     {.name = "reflectance",
      .kind = OPTION_NUMBER,
      .offset = FIELD(reflectance),
-     .value = "X",
-     .doc = "Of every face, grey",
-     .low = 0,
-     .high = 1,
-     .high_open = true},
+     .argument = "X",
+     .least = 0,
+     .most = 1,
+     .below = true,
+     .help = "Grey reflectance of every face"},
     {.name = "seed",
      .kind = OPTION_COUNT,
      .offset = FIELD(seed),
-     .value = "S",
-     .doc = "Of what is random in city, rooms, maze and canopy (1)"},
-    {.kind = OPTION_HEADING, .doc = "box"},
+     .argument = "S",
+     .preset = "1",
+     .help = "Seed of the random parts of city, rooms, maze and canopy"},
+    {0},
+};
+static const option_row box_rows[] = {
     {.name = "divisions",
      .kind = OPTION_COUNT,
      .offset = FIELD(divisions),
-     .value = "M",
-     .doc = "Exactly 6 M^2 faces",
-     .low = 1,
-     .high = 10000},
+     .argument = "M",
+     .least = 1,
+     .most = 10000,
+     .help = "Exactly 6 M^2 faces"},
     {.name = "size",
      .kind = OPTION_CUSTOM,
      .offset = FIELD(size),
-     .value = "X,Y,Z",
-     .doc = "Metres (1,1,1)",
-     .parse = parse_size},
-    {.kind = OPTION_HEADING, .doc = "cornell"},
-    {.name = "closed", .kind = OPTION_FLAG, .offset = FIELD(closed), .doc = "With a front wall"},
-    {.kind = OPTION_HEADING, .doc = "city"},
+     .argument = "X,Y,Z",
+     .preset = "1,1,1",
+     .unit = "m",
+     .parse = parse_size,
+     .help = "Lengths of the edges"},
+    {0},
+};
+static const option_row cornell_rows[] = {
+    {.name = "closed", .kind = OPTION_FLAG, .offset = FIELD(closed), .help = "Add a front wall"},
+    {0},
+};
+static const option_row city_rows[] = {
     {.name = "variant",
      .kind = OPTION_CHOICE,
      .offset = FIELD(variant),
-     .value = "1|2|3",
-     .doc = "Flat houses; up to middle-high; with skyscrapers (1)",
-     .choices = "1|2|3"},
+     .choices = "1|2|3",
+     .preset = "1",
+     .help = "1: flat houses; 2: houses up to middle height; 3: with skyscrapers"},
     {.name = "terrain",
      .kind = OPTION_CHOICE,
      .offset = FIELD(terrain),
-     .value = "flat|valley|hill",
-     .doc = "What it stands on (flat)",
-     .choices = "flat|valley|hill"},
+     .choices = "flat|valley|hill",
+     .preset = "flat",
+     .help = "Shape of the ground"},
     {0},
 };
 
-static const option_verb verb = {
-    .name = "generate",
+static const option_command verb = {
+    .name = "lambert generate",
     .arguments = "box|city|cornell|furnace|rooms|anechoic|patio|atrium|maze|canopy -o SCENE.obj",
     .summary = "Write one of the known scenes as OBJ and MTL, z up, in metres.",
-    .options = rows,
-    .min_arguments = 1,
-    .max_arguments = 1,
+    .least_arguments = 1,
+    .most_arguments = 1,
 };
 
 int cmd_generate(int argc, char **argv) {
-    fields f = {.size = {1, 1, 1}, .reflectance = -1, .seed = 1, .variant = "1", .terrain = "flat"};
+    fields f = {0};
     option_result given = {0};
     lam_error error = {0};
     terminal term;
     size_t faces = 0;
-    int code = options_parse(&verb, argc, argv, &f, &given);
+    const option_table tables[] = {
+        {NULL, rows, &f}, {"box", box_rows, &f}, {"cornell", cornell_rows, &f}, {"city", city_rows, &f}, {0}};
+    int code = options_parse(&verb, tables, argc, argv, &given);
     if (code != OPTIONS_GO) return code;
     const char *kind = given.arguments[0];
     if (!option_among(kind, "box|city|cornell|furnace|rooms|anechoic|patio|atrium|maze|canopy"))
@@ -114,13 +124,11 @@ int cmd_generate(int argc, char **argv) {
     if (f.output == NULL) return options_usage(verb.name, "no -o SCENE.obj given");
     if (f.divisions != 0 && f.elements != 0)
         return options_usage(verb.name, "--divisions and --elements exclude each other");
-    if (options_given(&verb, &given, "closed") && strcmp(kind, "cornell") != 0)
+    if (options_given(&given, "closed") && strcmp(kind, "cornell") != 0)
         return options_usage(verb.name, "--closed: only for cornell");
-    if (strcmp(kind, "box") != 0 &&
-        (options_given(&verb, &given, "size") || options_given(&verb, &given, "divisions")))
+    if (strcmp(kind, "box") != 0 && (options_given(&given, "size") || options_given(&given, "divisions")))
         return options_usage(verb.name, "--size and --divisions: only for box");
-    if (strcmp(kind, "city") != 0 &&
-        (options_given(&verb, &given, "variant") || options_given(&verb, &given, "terrain")))
+    if (strcmp(kind, "city") != 0 && (options_given(&given, "variant") || options_given(&given, "terrain")))
         return options_usage(verb.name, "--variant and --terrain: only for city");
     char extension[16];
     output_file_extension(f.output, extension);
@@ -134,7 +142,7 @@ int cmd_generate(int argc, char **argv) {
                                 .variant = (unsigned)(f.variant[0] - '0'),
                                 .terrain = f.terrain,
                                 .elements = f.elements,
-                                .reflectance = f.reflectance,
+                                .reflectance = options_given(&given, "reflectance") ? f.reflectance : -1,
                                 .seed = f.seed};
     if (output_file_check(f.output, &error) != LAM_OK) return terminal_fail(&term, &error);
     lam_status status = scene_generate(&options, f.output, &faces, &error);

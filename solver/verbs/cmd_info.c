@@ -1,7 +1,7 @@
 /* lambert info: what a store holds, how large and how exact it is. */
+#include "solver/base/options.h"
+#include "solver/base/terminal.h"
 #include "solver/codec/describe.h"
-#include "solver/console/options.h"
-#include "solver/console/terminal.h"
 #include "solver/verbs/verbs.h"
 
 #include <stdio.h>
@@ -16,17 +16,16 @@ static const option_row rows[] = {
     {.name = "json",
      .kind = OPTION_FLAG,
      .offset = offsetof(fields, json),
-     .doc = "As GET /v1/scenes/NAME of lambertd answers"},
+     .help = "Print JSON, the same as lambertd answers to GET /v1/scenes/NAME"},
     {0},
 };
 
-static const option_verb verb = {
-    .name = "info",
+static const option_command verb = {
+    .name = "lambert info",
     .arguments = "STORE",
     .summary = "Say what a store holds, its size, its measured errors, and why its method was chosen.",
-    .options = rows,
-    .min_arguments = 1,
-    .max_arguments = 1,
+    .least_arguments = 1,
+    .most_arguments = 1,
 };
 
 static void print_value(const char *label, const json_t *value) {
@@ -150,7 +149,8 @@ int cmd_info(int argc, char **argv) {
     option_result given = {0};
     lam_error error = {0};
     terminal term;
-    int code = options_parse(&verb, argc, argv, &f, &given);
+    const option_table tables[] = {{NULL, rows, &f}, {0}};
+    int code = options_parse(&verb, tables, argc, argv, &given);
     if (code != OPTIONS_GO) return code;
     terminal_open(&term, verb.name, false, false);
     if (info(given.arguments[0], f.json, &error) != LAM_OK) return terminal_fail(&term, &error);

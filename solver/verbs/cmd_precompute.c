@@ -52,31 +52,32 @@ static int check_together(const precompute_arguments *f, const option_result *gi
     const char *input = given->arguments[0];
     static const char *const of_mesh[] = {"subdivide", "max-edge", "elements", "unit", "up", "two-sided"};
     const int refinements = (f->subdivide > 0) + (f->max_edge > 0) + (f->elements > 0);
-    if (f->output == NULL) return options_usage(precompute_verb.name, "no -o STORE.h5 given");
+    if (f->output == NULL) return options_usage(precompute_command.name, "no -o STORE.h5 given");
     if (refinements > 1)
-        return options_usage(precompute_verb.name,
+        return options_usage(precompute_command.name,
                              "--subdivide, --max-edge and --elements exclude each other");
     static const char *const of_sky[] = {"sky", "ground-albedo"};
     for (size_t i = 0; from_store && i < 2; i++)
-        if (options_given(&precompute_verb, given, of_sky[i]))
-            return options_usage(precompute_verb.name,
+        if (options_given(given, of_sky[i]))
+            return options_usage(precompute_command.name,
                                  "--%s: a store keeps the sky it has; precompute from its scene instead",
                                  of_sky[i]);
     for (size_t i = 0; from_store && i < sizeof of_mesh / sizeof of_mesh[0]; i++)
-        if (options_given(&precompute_verb, given, of_mesh[i]))
-            return options_usage(precompute_verb.name,
+        if (options_given(given, of_mesh[i]))
+            return options_usage(precompute_command.name,
                                  "--%s: the mesh of a store is fixed; precompute from its scene instead",
                                  of_mesh[i]);
     static const char *const factorizing[] = {"auto", "low-rank", NULL};
     if (strcmp(f->factorizer, "qr") == 0 && is_among(f->method, factorizing))
-        return options_usage(precompute_verb.name, "--factorizer qr: goes with --method 2msc only");
+        return options_usage(precompute_command.name, "--factorizer qr: goes with --method 2msc only");
     if (strcmp(f->method, "emitters") == 0 && f->emitters == NULL)
-        return options_usage(precompute_verb.name,
+        return options_usage(precompute_command.name,
                              "--method emitters: give --emitters FILE, group=NAME or sky");
     if (f->resolution % 2 != 0)
-        return options_usage(precompute_verb.name, "--resolution %" PRIu64 ": must be even", f->resolution);
+        return options_usage(precompute_command.name, "--resolution %" PRIu64 ": must be even",
+                             f->resolution);
     if (!from_store && same_file(input, f->output))
-        return options_usage(precompute_verb.name, "-o %s: is the scene itself", f->output);
+        return options_usage(precompute_command.name, "-o %s: is the scene itself", f->output);
     return 0;
 }
 
@@ -137,10 +138,8 @@ static void list_add(name_list *list, const char *name) {
 static void log_unused(terminal *t, const option_result *given, const build_report *built,
                        const precompute_arguments *f, bool from_store) {
     name_list of_form_factors = {""}, of_method = {""};
-    for (size_t i = 0; precompute_verb.options[i].name != NULL || precompute_verb.options[i].doc != NULL;
-         i++) {
-        const char *name = precompute_verb.options[i].name;
-        if (name == NULL || !options_given(&precompute_verb, given, name)) continue;
+    for (size_t i = 0; i < given->n_given; i++) {
+        const char *name = given->given[i];
         if (unused_by_form_factors(name, f, from_store)) list_add(&of_form_factors, name);
         if (unused_by_method(name, f, built)) list_add(&of_method, name);
     }
@@ -151,30 +150,15 @@ static void log_unused(terminal *t, const option_result *given, const build_repo
 }
 
 int cmd_precompute(int argc, char **argv) {
-    precompute_arguments f = {.unit = 1,
-                              .reflectance = -1,
-                              .rays = OPTION_AUTO,
-                              .form_factors = "rays",
-                              .resolution = 512,
-                              .quality = "normal",
-                              .method = "auto",
-                              .factorizer = "auto",
-                              .precision = "f32",
-                              .assign = "inclusion",
-                              .threshold = 1e-4,
-                              .correction = "delta",
-                              .epsilon = .05,
-                              .alpha = .5,
-                              .budget = "squares",
-                              .levels = OPTION_AUTO,
-                              .seed = 1,
-                              .probes = PRECOMPUTE_AUTO};
+    precompute_arguments f = {0};
+    option_table tables[PRECOMPUTE_TABLES];
     option_result given = {0};
     lam_error error = {0};
     terminal term;
     build_report built = {0};
     char *command = command_line(argc, argv), *continues = NULL;
-    int code = options_parse(&precompute_verb, argc, argv, &f, &given);
+    precompute_tables(&f, tables);
+    int code = options_parse(&precompute_command, tables, argc, argv, &given);
     const bool from_store = code == OPTIONS_GO && precompute_takes_as_store(given.arguments[0]);
     if (code == OPTIONS_GO && check_together(&f, &given, from_store) != 0) code = 2;
     if (code != OPTIONS_GO) {
@@ -184,7 +168,7 @@ int cmd_precompute(int argc, char **argv) {
     if (f.scratch != NULL && command != NULL &&
         asprintf(&continues, "what was finished stays in %s; to go on: %s", f.scratch, command) < 0)
         continues = NULL;
-    terminal_open(&term, precompute_verb.name, f.quiet, f.progress);
+    terminal_open(&term, precompute_command.name, f.quiet, f.progress);
     panel_precision precision = PANEL_F32;
     (void)panel_precision_find(f.precision, &precision);    /* one of the choices */
     if (f.threads > 0) omp_set_num_threads((int)f.threads); /* OpenBLAS asks OpenMP too */
@@ -199,7 +183,7 @@ int cmd_precompute(int argc, char **argv) {
         .unit = f.unit,
         .up = f.up != NULL ? f.up[0] : 0,
         .two_sided = f.two_sided,
-        .reflectance = f.reflectance,
+        .reflectance = options_given(&given, "reflectance") ? f.reflectance : -1,
         /* Beside hemicubes only the judge casts rays, and --quality is not about the judge. */
         .form_factors = {.quality = is_hemicube(&f) ? "normal" : f.quality,
                          .epsilon = f.epsilon,
@@ -225,9 +209,7 @@ int cmd_precompute(int argc, char **argv) {
         .coherence = f.coherence,
         .min_area = f.min_area,
         .proximity = strcmp(f.assign, "proximity") == 0,
-        .threshold = strcmp(f.method, "auto") == 0 && !options_given(&precompute_verb, &given, "threshold")
-                         ? 0
-                         : f.threshold,
+        .threshold = strcmp(f.method, "auto") == 0 && !options_given(&given, "threshold") ? 0 : f.threshold,
         .correction = f.correction,
         .emitters = f.emitters,
         .memory = f.memory,

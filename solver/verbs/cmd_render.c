@@ -1,6 +1,6 @@
 /* lambert render: a picture of a store under any lighting. */
 #include "solver/base/atomic_file.h"
-#include "solver/console/terminal.h"
+#include "solver/base/terminal.h"
 #include "solver/light/emission_apply.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky_light.h"
@@ -75,69 +75,78 @@ static const option_row rows[] = {
      .letter = 'o',
      .kind = OPTION_TEXT,
      .offset = FIELD(output),
-     .value = "IMAGE.png",
-     .doc = "Where the picture goes"},
-    {.kind = OPTION_HEADING, .doc = "light (without: the scene's own)"},
+     .argument = "IMAGE.png",
+     .help = "Where the picture goes"},
+    {0},
+};
+static const option_row light_rows[] = {
     {.name = "emit",
      .kind = OPTION_LIST,
      .offset = FIELD(emit),
-     .value = "GROUP=V[,V,V]",
-     .doc = "A group emits V W/m2, one number or one per channel; again for more groups"},
+     .argument = "GROUP=V[,V,V]",
+     .unit = "W/m2",
+     .help = "A group emits V W/m2, one number or one per channel; may be repeated"},
     {.name = "emission",
      .kind = OPTION_TEXT,
      .offset = FIELD(emission),
-     .value = "FILE.npy|.json",
-     .doc = "One emission from a file"},
+     .argument = "FILE.npy|.json",
+     .help = "One emission from a file"},
     {.name = "sky",
      .kind = OPTION_TEXT,
      .offset = FIELD(sky),
-     .value = "FILE.npy",
-     .doc = "Radiances of the sky's tiles, W/(m2 sr): [m] or [C][m]; alone or beside one of the others"},
-    {.kind = OPTION_HEADING, .doc = "view"},
+     .argument = "FILE.npy",
+     .help =
+         "Radiances of the tiles of the sky, W/(m2 sr): [m] or [C][m]; alone or added to the other light"},
+    {0},
+};
+static const option_row view_rows[] = {
     {.name = "quantity",
      .kind = OPTION_CHOICE,
      .offset = FIELD(quantity),
-     .value = "NAME",
-     .doc = "radiosity (the default), irradiance or indirect; of --method 2msc, which need no light: "
-            "coherence, from black for that of the least coherent patch to white for 1, or patch, a colour "
-            "for each; of a store with form factors: visible, how many elements each one sees",
-     .choices = "radiosity|irradiance|indirect|coherence|patch|visible"},
+     .argument = "NAME",
+     .choices = "radiosity|irradiance|indirect|coherence|patch|visible",
+     .preset = "radiosity",
+     .help = "radiosity, irradiance or indirect light; or, without any light, of a store of --method 2msc: "
+             "coherence, from black for the least coherent patch to white for 1, or patch, with a colour for "
+             "each; of a store with form factors: visible, the number of elements that each element sees"},
     {.name = "camera",
      .kind = OPTION_CUSTOM,
      .offset = FIELD(camera),
-     .value = "EYE,TARGET,FOV",
-     .doc = "x,y,z,x,y,z,degrees: from where, to where, how high the picture is (chosen to show the scene)",
-     .parse = parse_camera},
+     .argument = "EYE,TARGET,FOV",
+     .otherwise = "a camera that shows the whole scene",
+     .parse = parse_camera,
+     .help = "x,y,z,x,y,z,degrees: position of the eye, point that it looks at, vertical field of view"},
     {.name = "size",
      .kind = OPTION_CUSTOM,
      .offset = FIELD(size),
-     .value = "WxH",
-     .doc = "Pixels (640x640)",
-     .parse = parse_size},
+     .argument = "WxH",
+     .preset = "640x640",
+     .unit = "pixels",
+     .parse = parse_size,
+     .help = "Size of the picture"},
     {.name = "exposure",
      .kind = OPTION_NUMBER,
      .offset = FIELD(exposure),
-     .value = "EV",
-     .doc = "Twice as bright for each 1 (0)",
-     .low = -60,
-     .high = 60},
+     .argument = "EV",
+     .preset = "0",
+     .least = -60,
+     .most = 60,
+     .help = "Each step of 1 doubles the brightness"},
     {.name = "false-color",
      .kind = OPTION_FLAG,
      .offset = FIELD(false_color),
-     .doc = "Colours for values, with a legend"},
-    {.name = "smooth", .kind = OPTION_FLAG, .offset = FIELD(smooth), .doc = "Interpolate within a surface"},
-    {.name = "animate", .kind = OPTION_LATER, .value = "FRAMES.npy", .doc = "(not supported yet)"},
+     .help = "Draw values as colours, with a legend"},
+    {.name = "smooth", .kind = OPTION_FLAG, .offset = FIELD(smooth), .help = "Interpolate within a surface"},
     {0},
 };
 
-static const option_verb verb = {
-    .name = "render",
+static const option_command verb = {
+    .name = "lambert render",
     .arguments = "STORE -o IMAGE.png",
-    .summary = "Draws what a store answers: every element in the light it gives back, seen by a camera. Back "
-               "faces are looked through.",
-    .options = rows,
-    .min_arguments = 1,
-    .max_arguments = 1,
+    .summary = "Draw the answer of a store: the radiosity of every element, seen by a camera. Back faces are "
+               "transparent.",
+    .least_arguments = 1,
+    .most_arguments = 1,
 };
 
 static float luminance_of(const mesh *m, const float *values, size_t i) {
@@ -368,17 +377,21 @@ static void log_unused(const fields *f, const option_result *given, terminal *t)
     static const char *const of_light[] = {"emit", "emission", "sky", "exposure", "smooth", "false-color"};
     const size_t count = strcmp(f->quantity, "coherence") == 0 ? 5 : 6;
     for (size_t i = 0; i < count; i++)
-        if (options_given(&verb, given, of_light[i]))
+        if (options_given(given, of_light[i]))
             terminal_log(t, "--quantity %s does not use --%s", f->quantity, of_light[i]);
 }
 
 int cmd_render(int argc, char **argv) {
-    fields f = {.quantity = "radiosity", .size = {640, 640}};
+    fields f = {0};
     option_result result = {0};
     lam_error error = {0};
     terminal t;
     char extension[16];
-    int go = options_parse(&verb, argc, argv, &f, &result);
+    const option_table tables[] = {{NULL, rows, &f},
+                                   {"light (preset: the emission in the scene)", light_rows, &f},
+                                   {"view", view_rows, &f},
+                                   {0}};
+    int go = options_parse(&verb, tables, argc, argv, &result);
     if (go != OPTIONS_GO) return go;
     if (f.output == NULL) return options_usage(verb.name, "give -o IMAGE.png");
     output_file_extension(f.output, extension);

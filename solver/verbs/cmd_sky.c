@@ -1,8 +1,8 @@
 /* lambert sky: turns a weather file or a sky matrix of Radiance into the radiance of the tiles of a sky, hour
  * by hour. */
 #include "solver/base/atomic_file.h"
-#include "solver/console/options.h"
-#include "solver/console/terminal.h"
+#include "solver/base/options.h"
+#include "solver/base/terminal.h"
 #include "solver/daylight/sky_matrix.h"
 #include "solver/light/npy_file.h"
 #include "solver/light/weather_light.h"
@@ -41,52 +41,47 @@ static const option_row rows[] = {
      .letter = 'o',
      .kind = OPTION_TEXT,
      .offset = FIELD(output),
-     .value = "SKY.npy",
-     .doc =
-         "Where the skies go: float32 [hours][tiles], W/(m2 sr), the batch that `lambert solve --sky` takes "
-         "for a store of one channel; for three repeat each row three times, [hours][3][tiles], as a matrix "
-         "whose components differ gives them"},
+     .argument = "SKY.npy",
+     .help = "Where the skies go: float32 [hours][tiles], W/(m2 sr), the batch that `lambert solve --sky` "
+             "takes for a store of one channel. A store of three channels takes [hours][3][tiles], every row "
+             "three times; a matrix whose components differ is written so"},
     {.name = "tiles",
      .kind = OPTION_CUSTOM,
      .offset = FIELD(tiles),
-     .value = "tregenza|reinhart:MF|grid:AxB",
-     .doc = "The tiles of the store's --sky: 145, 144 MF^2 + 1, or A sectors by B bands (tregenza, or those "
-            "that the matrix has, which cannot be others)",
-     .parse = parse_tiles},
+     .argument = "tregenza|reinhart:MF|grid:AxB",
+     .otherwise = "tregenza, or the tiles of the matrix, which cannot be changed",
+     .parse = parse_tiles,
+     .help = "Tiles of the --sky of the store: 145, 144 MF^2 + 1, or A sectors by B bands"},
     {.name = "model",
      .kind = OPTION_CHOICE,
      .offset = FIELD(model),
-     .value = "perez",
-     .doc = "The all-weather sky of Perez, Seals and Michalsky, 1993 (perez)",
-     .choices = "perez"},
+     .choices = "perez",
+     .preset = "perez",
+     .help = "The all-weather sky of Perez, Seals and Michalsky 1993"},
     {.name = "photometric",
      .kind = OPTION_FLAG,
      .offset = FIELD(photometric),
-     .doc = "In cd/m2, by the luminous efficacies of Perez and others, 1990; without a dew point (a .wea has "
-            "none) there are 2 cm of water in the air. A matrix is taken times 179 lm/W, by which gendaymtx "
-            "-O0 divides light"},
-    {.kind = OPTION_HEADING,
-     .doc =
-         "An hour's sky is as bright as the diffuse light in the file, and the sun is in the one tile that "
-         "holds it: both give a horizontal plane exactly what the file says. The sun is taken in the middle "
-         "of the hour; direct light of a sun that is then below the horizon is left out. A .wea is of the "
-         "year 2001, or 2000 where it has a 29 February"},
-    {.kind = OPTION_HEADING,
-     .doc =
-         "A sky matrix of Radiance (gendaymtx, genskyvec) is taken as it is: ascii, float or double, rows of "
-         "the ground and of the patches, a column an hour. The ground's row is left out: the store's "
-         "--ground-albedo takes its place"},
+     .help = "In cd/m2, by the luminous efficacies of Perez et al. 1990. Without a dew point (a .wea file "
+             "has none) the air holds 2 cm of water. A matrix is multiplied by 179 lm/W, by which gendaymtx "
+             "-O0 divides light"},
     {0},
 };
 
-static const option_verb verb = {
-    .name = "sky",
+static const option_command verb = {
+    .name = "lambert sky",
     .arguments = "WEATHER.epw|.wea|MATRIX.mtx -o SKY.npy",
     .summary = "Turn the weather of a year, or a sky matrix of Radiance, into the radiance of the tiles of a "
                "sky, hour by hour.",
-    .options = rows,
-    .min_arguments = 1,
-    .max_arguments = 1,
+    .notes =
+        "The sky of an hour is as bright as the diffuse light in the file, and the one tile that holds the "
+        "sun has the direct light: a horizontal plane receives exactly what the file states. The sun stands "
+        "where it is in the middle of the hour; direct light of a sun that is below the horizon then is left "
+        "out. A .wea file is of the year 2001, or of 2000 if it has a 29 February.\n"
+        "A sky matrix of Radiance (gendaymtx, genskyvec) is taken as it is: ascii, float or double, with a "
+        "row for the ground and for each patch, and a column for each hour. The row of the ground is left "
+        "out: --ground-albedo of the store takes its place.",
+    .least_arguments = 1,
+    .most_arguments = 1,
 };
 
 static lam_status make_skies(const char *path, const fields *f, terminal *t, lam_error *error) {
@@ -155,12 +150,13 @@ done:
 }
 
 int cmd_sky(int argc, char **argv) {
-    fields f = {.model = "perez"};
+    fields f = {0};
     option_result given = {0};
     lam_error error = {0};
     terminal term;
     char extension[16];
-    const int code = options_parse(&verb, argc, argv, &f, &given);
+    const option_table tables[] = {{NULL, rows, &f}, {0}};
+    int code = options_parse(&verb, tables, argc, argv, &given);
     if (code != OPTIONS_GO) return code;
     const char *path = given.arguments[0];
     if (f.output == NULL) return options_usage(verb.name, "no -o SKY.npy given");

@@ -1,6 +1,6 @@
 /* lambert solve: lights a store and writes what it answers. */
 #include "solver/base/atomic_file.h"
-#include "solver/console/terminal.h"
+#include "solver/base/terminal.h"
 #include "solver/light/annual.h"
 #include "solver/light/emission_refine.h"
 #include "solver/light/weather_light.h"
@@ -28,105 +28,115 @@ static const option_row rows[] = {
      .letter = 'o',
      .kind = OPTION_TEXT,
      .offset = FIELD(output),
-     .value = "FILE",
-     .doc = ".npy, .json, .csv, .ply or .vtu; without it the mean of every group is printed"},
-    {.kind = OPTION_HEADING, .doc = "light (without: the scene's own)"},
+     .argument = "FILE",
+     .help = ".npy, .json, .csv, .ply or .vtu; without it the mean of every group is printed"},
+    {0},
+};
+static const option_row light_rows[] = {
     {.name = "emit",
      .kind = OPTION_LIST,
      .offset = FIELD(emit),
-     .value = "GROUP=V[,V,V]",
-     .doc = "A group emits V W/m2, one number or one per channel; again for more groups"},
+     .argument = "GROUP=V[,V,V]",
+     .unit = "W/m2",
+     .help = "A group emits V W/m2, one number or one per channel; may be repeated"},
     {.name = "emission",
      .kind = OPTION_TEXT,
      .offset = FIELD(emission),
-     .value = "FILE.npy|.json",
-     .doc = "One emission or a batch from a file"},
+     .argument = "FILE.npy|.json",
+     .help = "One emission or a batch from a file"},
     {.name = "sky",
      .kind = OPTION_TEXT,
      .offset = FIELD(sky),
-     .value = "FILE.npy",
-     .doc = "Radiances of the sky's tiles, W/(m2 sr): [m], [C][m] or a batch; alone or beside the others"},
+     .argument = "FILE.npy",
+     .help = "Radiances of the tiles of the sky, W/(m2 sr): [m], [C][m] or a batch; alone or added to the "
+             "other light"},
     {.name = "weather",
      .kind = OPTION_TEXT,
      .offset = FIELD(weather),
-     .value = "FILE.epw|.wea",
-     .doc = "The hours of a weather file in place of --sky: what `lambert sky` makes of it for the store's "
-            "tiles"},
+     .argument = "FILE.epw|.wea",
+     .help = "The hours of a weather file in place of --sky, as `lambert sky` converts them to the tiles of "
+             "the store"},
     {.name = "sun",
      .kind = OPTION_CHOICE,
      .offset = FIELD(sun),
-     .value = "tiles|exact",
-     .doc =
-         "Of --weather: in the tile that holds it (tiles), or itself, with the shadows it throws, by rays at "
-         "the store's mesh. A store of few emitters has direct light exact and bounces from the tile",
-     .choices = "tiles|exact"},
+     .choices = "tiles|exact",
+     .preset = "tiles",
+     .help = "Sun of --weather. tiles: the light of the tile that holds the sun. exact: the sun itself and "
+             "its shadows, by rays at the mesh of the store; a store of few emitters then has exact direct "
+             "light and takes the bounces from the tile"},
     {.name = "sun-points",
      .kind = OPTION_COUNT,
      .offset = FIELD(sun_points),
-     .value = "N",
-     .doc = "Of --sun exact: points of an element that look for the sun, each hour (4)",
-     .low = 1,
-     .high = SUN_RAYS_MOST},
+     .argument = "N",
+     .preset = "4",
+     .least = 1,
+     .most = SUN_RAYS_MOST,
+     .help = "--sun exact: points of an element that are tested for the sun in each hour"},
     {.name = "photometric",
      .kind = OPTION_FLAG,
      .offset = FIELD(photometric),
-     .doc = "Of --weather: in light, lux, as `lambert sky --photometric`"},
-    {.kind = OPTION_HEADING, .doc = "answer"},
+     .help = "--weather in lux, as `lambert sky --photometric`"},
+    {0},
+};
+static const option_row answer_rows[] = {
     {.name = "quantity",
      .kind = OPTION_CHOICE,
      .offset = FIELD(quantity),
-     .value = "NAME",
-     .doc = "radiosity (the default), irradiance (that of --annual) or indirect",
-     .choices = "radiosity|irradiance|indirect"},
+     .choices = "radiosity|irradiance|indirect",
+     .otherwise = "radiosity; irradiance with --annual",
+     .argument = "NAME",
+     .help = "radiosity, irradiance or indirect"},
     {.name = "reduce",
      .kind = OPTION_LIST,
      .offset = FIELD(reduce),
-     .value = "GROUP=FIGURE",
-     .doc = "mean, sum, min, max, uniformity or variance of a group; again for more"},
+     .argument = "GROUP=FIGURE",
+     .help = "mean, sum, min, max, uniformity or variance of a group; may be repeated"},
     {.name = "tolerance",
      .kind = OPTION_NUMBER,
      .offset = FIELD(tolerance),
-     .value = "X",
-     .doc = "Refines the answer in double until its certified error is at most X times the largest indirect "
-            "light, "
-            "and writes double; of a store that keeps its form factors",
-     .low = 0,
-     .high = 1,
-     .low_open = true,
-     .high_open = true},
-    {.kind = OPTION_HEADING,
-     .doc = "a year: figures an element of a batch of skies or emissions, in place of the batch"},
+     .argument = "X",
+     .least = 0,
+     .most = 1,
+     .above = true,
+     .below = true,
+     .help = "Refine the answer in double until its certified error is at most X times the largest indirect "
+             "light, and write double; the store must keep its form factors"},
+    {0},
+};
+static const option_row year_rows[] = {
     {.name = "annual",
      .kind = OPTION_LIST,
      .offset = FIELD(annual),
-     .value = "FIGURE",
-     .doc = "sum: over all hours, in 1000 h (kWh/m2 of W/m2, klx h of lx); autonomy=X: share of the hours "
-            "(0 to 1) with at least X; useful=LOW,HIGH: share with LOW to HIGH, both within (100,2000 lx); "
-            "again for more. X, LOW and HIGH are in the unit of the answer: lx where the skies are cd/m2"},
+     .argument = "FIGURE",
+     .help = "sum: over all hours, in 1000 h (kWh/m2 from W/m2, klx h from lx); autonomy=X: share of the "
+             "hours (0 to 1) with at least X; useful=LOW,HIGH: share of the hours with LOW to HIGH, both "
+             "included (100,2000 lx); may be repeated. X, LOW and HIGH are in the unit of the answer: lx if "
+             "the skies are in cd/m2"},
     {.name = "occupied",
      .kind = OPTION_TEXT,
      .offset = FIELD(occupied),
-     .value = "FROM-TO",
-     .doc = "Hours of the day, of standard time, that shares are of, 8-18 say; the batch is whole days from "
-            "midnight on (all)"},
+     .argument = "FROM-TO",
+     .otherwise = "all",
+     .help = "Hours of the day in standard time that shares refer to, such as 8-18; the batch must be whole "
+             "days from midnight on"},
     {.name = "hours-per-vector",
      .kind = OPTION_NUMBER,
      .offset = FIELD(hours),
-     .value = "H",
-     .doc = "How long each vector of the batch lasts (1)",
-     .low = 0,
-     .low_open = true,
-     .high = 8784},
+     .argument = "H",
+     .otherwise = "1",
+     .least = 0,
+     .above = true,
+     .most = 8784,
+     .help = "Duration of each vector of the batch"},
     {0},
 };
 
-static const option_verb verb = {
-    .name = "solve",
+static const option_command verb = {
+    .name = "lambert solve",
     .arguments = "STORE",
     .summary = "Light a store and write its radiosity, irradiance or indirect light, element by element.",
-    .options = rows,
-    .min_arguments = 1,
-    .max_arguments = 1,
+    .least_arguments = 1,
+    .most_arguments = 1,
 };
 
 static lam_quantity quantity_of(const char *name) {
@@ -310,12 +320,19 @@ done:
 }
 
 int cmd_solve(int argc, char **argv) {
-    fields f = {.sun = "tiles", .sun_points = 4};
+    fields f = {0};
     option_result given = {0};
     lam_error error = {0};
     terminal term;
     annual_wish year = {.hours = 1, .from = 0, .to = 24};
-    int code = options_parse(&verb, argc, argv, &f, &given);
+    const option_table tables[] = {
+        {NULL, rows, &f},
+        {"light (preset: the emission in the scene)", light_rows, &f},
+        {"answer", answer_rows, &f},
+        {"a year: figures of each element over a batch of skies or emissions, in place of the batch",
+         year_rows, &f},
+        {0}};
+    int code = options_parse(&verb, tables, argc, argv, &given);
     if (code != OPTIONS_GO) return code;
     if (f.emit.count > 0 && f.emission != NULL)
         return options_usage(verb.name, "give --emit or --emission, not both");
@@ -323,9 +340,9 @@ int cmd_solve(int argc, char **argv) {
         return options_usage(verb.name, "give --sky or --weather, not both");
     if (f.weather != NULL && !weather_is_named(f.weather))
         return options_usage(verb.name, "--weather %s: must end in .epw or .wea", f.weather);
-    if (f.weather == NULL && (f.photometric || options_given(&verb, &given, "sun")))
+    if (f.weather == NULL && (f.photometric || options_given(&given, "sun")))
         return options_usage(verb.name, "--sun and --photometric are for --weather");
-    if (strcmp(f.sun, "exact") != 0 && options_given(&verb, &given, "sun-points"))
+    if (strcmp(f.sun, "exact") != 0 && options_given(&given, "sun-points"))
         return options_usage(verb.name, "--sun-points is for --sun exact");
     if (f.tolerance > 0 && f.annual.count > 0)
         return options_usage(verb.name, "--tolerance is not for --annual");

@@ -1,5 +1,5 @@
 /* lambert verify: tests what a store promises, one line a check. */
-#include "solver/console/options.h"
+#include "solver/base/options.h"
 #include "solver/verbs/verbs.h"
 #include "solver/verify/verify.h"
 
@@ -18,23 +18,23 @@ static const option_row rows[] = {
     {.name = "probes",
      .kind = OPTION_COUNT,
      .offset = FIELD(probes),
-     .value = "P",
-     .doc = "Single elements that the error is measured again with (16; 0: not at all)",
-     .low = 0,
-     .high = 1e6},
-    {.name = "json", .kind = OPTION_FLAG, .offset = FIELD(json), .doc = "The checks as JSON"},
+     .argument = "P",
+     .preset = "16",
+     .help = "Single elements that the error is measured again with; 0: no measurement",
+     .least = 0,
+     .most = 1e6},
+    {.name = "json", .kind = OPTION_FLAG, .offset = FIELD(json), .help = "Print the checks as JSON"},
     {0},
 };
 
-static const option_verb verb = {
-    .name = "verify",
+static const option_command verb = {
+    .name = "lambert verify",
     .arguments = "STORE [SCENE]",
     .summary =
         "Check a store: checksums, invariants, its stated error, and whether SCENE is still what it was "
         "made from. Exit status 1 when something is broken.",
-    .options = rows,
-    .min_arguments = 1,
-    .max_arguments = 2,
+    .least_arguments = 1,
+    .most_arguments = 2,
 };
 
 static const struct {
@@ -98,12 +98,13 @@ done:
 }
 
 int cmd_verify(int argc, char **argv) {
-    fields f = {.probes = 16};
+    fields f = {0};
     option_result given = {0};
     lam_error error = {0};
     terminal term;
     bool broken = false;
-    int code = options_parse(&verb, argc, argv, &f, &given);
+    const option_table tables[] = {{NULL, rows, &f}, {0}};
+    int code = options_parse(&verb, tables, argc, argv, &given);
     if (code != OPTIONS_GO) return code;
     terminal_open(&term, verb.name, false, false);
     term.nothing = "not every check was made";

@@ -1,8 +1,8 @@
-/* What the command line of lambert precompute may say: one row an option, which --help prints. */
+/* The options of lambert precompute, one row for each. */
 #ifndef LAMBERT_VERBS_PRECOMPUTE_ARGUMENTS_H
 #define LAMBERT_VERBS_PRECOMPUTE_ARGUMENTS_H
 
-#include "solver/console/options.h"
+#include "solver/base/options.h"
 
 /* The values of the options; texts point into argv. */
 typedef struct precompute_arguments {
@@ -26,6 +26,11 @@ typedef struct precompute_arguments {
     bool keep_factors, quiet, progress;
 } precompute_arguments;
 
-extern const option_verb precompute_verb;
+enum { PRECOMPUTE_TABLES = 6 };
+
+/* The tables of options, the last of which has no rows, that fill f. */
+void precompute_tables(precompute_arguments *f, option_table tables[PRECOMPUTE_TABLES]);
+
+extern const option_command precompute_command;
 
 #endif

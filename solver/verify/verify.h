@@ -2,7 +2,7 @@
 #ifndef LAMBERT_VERIFY_VERIFY_H
 #define LAMBERT_VERIFY_VERIFY_H
 
-#include "solver/console/terminal.h"
+#include "solver/base/terminal.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/refine/form_factor_rows.h"

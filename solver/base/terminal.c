@@ -1,4 +1,4 @@
-#include "solver/console/terminal.h"
+#include "solver/base/terminal.h"
 
 #include "solver/base/clock.h"
 
@@ -22,8 +22,8 @@ bool terminal_cancelled(void) {
     return signal_came != 0;
 }
 
-void terminal_open(terminal *t, const char *verb, bool quiet, bool force_progress) {
-    *t = (terminal){.verb = verb, .nothing = "nothing was written", .quiet = quiet};
+void terminal_open(terminal *t, const char *program, bool quiet, bool force_progress) {
+    *t = (terminal){.program = program, .nothing = "nothing was written", .quiet = quiet};
     t->live = !quiet && (force_progress || isatty(STDERR_FILENO) == 1);
     /* The second signal finds the default action again and ends the program at once. */
     struct sigaction action = {.sa_handler = signal_note, .sa_flags = (int)SA_RESETHAND};
@@ -95,7 +95,7 @@ void terminal_log(terminal *t, const char *format, ...) {
 void terminal_warn(terminal *t, const char *format, ...) {
     va_list arguments;
     terminal_clear(t);
-    fprintf(stderr, "lambert %s: warning: ", t->verb);
+    fprintf(stderr, "%s: warning: ", t->program);
     va_start(arguments, format);
     vfprintf(stderr, format, arguments);
     va_end(arguments);
@@ -105,9 +105,9 @@ void terminal_warn(terminal *t, const char *format, ...) {
 int terminal_fail(terminal *t, const lam_error *error) {
     terminal_clear(t);
     if (terminal_cancelled())
-        fprintf(stderr, "lambert %s: cancelled; %s\n", t->verb, t->nothing);
+        fprintf(stderr, "%s: cancelled; %s\n", t->program, t->nothing);
     else
-        fprintf(stderr, "lambert %s: %s\n", t->verb,
+        fprintf(stderr, "%s: %s\n", t->program,
                 error->message[0] != '\0' ? error->message : lam_status_text(error->status));
     return 1;
 }
@@ -116,11 +116,11 @@ lam_status terminal_check(lam_error *error) {
     return terminal_cancelled() ? status_fail(error, LAM_ERR_CANCELLED, "cancelled") : LAM_OK;
 }
 
-int terminal_finish(const char *verb, int status) {
+int terminal_finish(const char *program, int status) {
     errno = 0;
     if (fflush(stdout) == 0 && !ferror(stdout)) return status;
     /* A refused write longer than the buffer leaves no reason behind: one more byte brings it back. */
     if (errno == 0 && putchar('\n') != EOF) fflush(stdout);
-    fprintf(stderr, "lambert %s: cannot write to standard output: %s\n", verb, strerror(errno));
+    fprintf(stderr, "%s: cannot write to standard output: %s\n", program, strerror(errno));
     return 1;
 }

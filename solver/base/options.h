@@ -1,0 +1,110 @@
+/* Command lines of both programs: tables of rows, from which options are read, checked and explained
+ * (--help). A row is the only place where an option's name, preset, unit, limits and help stand. Knows no
+ * verb. */
+#ifndef LAMBERT_BASE_OPTIONS_H
+#define LAMBERT_BASE_OPTIONS_H
+
+#include "store/status.h"
+
+#include <stdint.h>
+
+/* The result of options_parse when the program should go on; any other result is its exit status. */
+#define OPTIONS_GO (-1)
+
+/* The value of a count that is given as the word auto. */
+#define OPTION_AUTO UINT64_MAX
+
+#define OPTION_LIST_MAX 256
+
+typedef enum option_kind {
+    OPTION_FLAG,       /* bool */
+    OPTION_TEXT,       /* const char * */
+    OPTION_LIST,       /* option_list: the option may be given several times */
+    OPTION_NUMBER,     /* double within limits */
+    OPTION_COUNT,      /* uint64_t within limits */
+    OPTION_COUNT_AUTO, /* the same, or the word auto */
+    OPTION_SIZE,       /* uint64_t: bytes, with K, M, G or T for powers of 1024 */
+    OPTION_CHOICE,     /* const char *, one of choices */
+    OPTION_OPTIONAL,   /* const char *, one of choices; "" where the value is left out */
+    OPTION_CUSTOM      /* the type that the row's parse fills */
+} option_kind;
+
+typedef struct option_list {
+    const char *items[OPTION_LIST_MAX];
+    size_t count;
+} option_list;
+
+/* One option. Its value goes offset bytes into the struct of the table that the row stands in. */
+typedef struct option_row {
+    const char *name; /* without dashes */
+    char letter;      /* 'o' for -o; 0: none */
+    option_kind kind;
+    size_t offset;
+    const char *argument; /* the name of the value in --help; NULL for a choice: its words */
+    const char *preset;   /* the value of an option that is not given, as a user would write it; NULL: none */
+    const char *otherwise; /* --help where there is no preset: what the program takes then */
+    const char *unit;
+    double least, most;  /* limits; both 0: none, most at or below least: no upper limit */
+    bool above, below;   /* the value must lie above least, below most */
+    const char *choices; /* "rays|hemicube" */
+    lam_status (*parse)(const char *text, void *field, lam_error *error);
+    const char *help;
+} option_row;
+
+/* Rows under one heading, and the struct that they fill. Several tables may fill one struct; one name may
+ * stand in several tables, and each of them gets the value. */
+typedef struct option_table {
+    const char *heading;    /* of --help; NULL for the first */
+    const option_row *rows; /* the last row has no name */
+    void *fields;
+} option_table;
+
+typedef struct option_command {
+    const char *name;      /* "lambert solve", with which messages begin */
+    const char *arguments; /* "STORE", for --help */
+    const char *summary;
+    const char *notes;   /* after the options; may be NULL */
+    const char *version; /* the answer to --version; NULL: no such option */
+    size_t least_arguments, most_arguments;
+} option_command;
+
+#define OPTIONS_GIVEN_MAX 128
+
+typedef struct option_result {
+    char **arguments; /* they stand in argv */
+    size_t n_arguments;
+    const char *given[OPTIONS_GIVEN_MAX]; /* names of options of the command line */
+    size_t n_given;
+} option_result;
+
+/* Fills the structs of the tables (the last has no rows) with presets and then from argv; a field without a
+ * preset keeps its value. Texts stay in argv, whose order changes. Wrong usage is one line on standard error
+ * and 2; --help goes to standard output and gives 0. */
+int options_parse(const option_command *command, const option_table *tables, int argc, char **argv,
+                  option_result *result);
+
+/* True if the option was on the command line. */
+bool options_given(const option_result *result, const char *name);
+
+/* Prints "NAME: ..." as one line on standard error; returns 2, the status of wrong usage. */
+int options_usage(const char *name, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/* Prints --help on standard output, at most 80 columns wide. */
+void options_help(const option_command *command, const option_table *tables);
+
+/* Strict readers: the whole text must be a finite number. A message begins with the text `what`. */
+lam_status option_number(const char *what, const char *text, double *value, lam_error *error);
+lam_status option_count(const char *what, const char *text, uint64_t *value, lam_error *error);
+lam_status option_size(const char *what, const char *text, uint64_t *bytes, lam_error *error);
+
+/* Exactly count, or at least 1 and at most count, numbers between commas; *found is how many. */
+lam_status option_numbers(const char *what, const char *text, size_t count, bool exactly, double *values,
+                          size_t *found, lam_error *error);
+
+/* Reads text as the value of a row into field, within the row's limits. */
+lam_status option_read(const option_row *row, const char *text, void *field, lam_error *error);
+
+/* True if word is one of the words of "a|b|c". */
+bool option_among(const char *word, const char *words);
+
+#endif
