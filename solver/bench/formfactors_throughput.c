@@ -79,7 +79,7 @@ static lam_status one_pass(const bench_run *run, const prepared *s, size_t pass,
                            size_t *own, lam_error *error) {
     lam_status status = LAM_OK;
     const form_factor_options how = {.recipe = formfactors_rays(s->rays, run->seed)};
-    found_rows counts = {0};
+    packed_rows counts = {0};
     form_factors f = {.row_sums = NULL};
     double *leaving = memory_allocate(s->m.n, sizeof *leaving, "form factors", error);
     double *absorbed = memory_allocate(s->m.n, sizeof *absorbed, "form factors", error);
@@ -94,7 +94,7 @@ static lam_status one_pass(const bench_run *run, const prepared *s, size_t pass,
     TRY(form_factors_make(&s->m, s->order, &how, &f, error));
     times->whole[pass] = clock_seconds() - started;
 done:
-    found_rows_free(&counts);
+    packed_rows_free(&counts);
     form_factors_free(&f);
     free(leaving);
     free(absorbed);

@@ -57,8 +57,8 @@ void year_add_sun(const sky_tiling *s, const double sun[3], double horizontal, d
 }
 
 /* One hour: L [n_tiles]. */
-static void make_hour(const weather *w, const weather_hour *h, const sky_tiling *s, const year_wish *wish,
-                      double *L, year_sun *seen, year_summary *sum) {
+static void make_hour(const weather *w, const weather_hour *h, const sky_tiling *s,
+                      const year_options *options, double *L, year_sun *seen, year_summary *sum) {
     const sun_position sun =
         sun_at(w->latitude, w->longitude, w->time_zone, h->year, h->month, h->day, h->hour);
     const bool up = sun.direction[2] > 0;
@@ -77,15 +77,15 @@ static void make_hour(const weather *w, const weather_hour *h, const sky_tiling 
     if (!(h->diffuse > 0 || horizontal > 0)) return;
     const perez_sky p = perez_sky_of(&sun, direct, h->diffuse);
     const double water = perez_water(h->dew_point);
-    const double diffuse_light = h->diffuse * (wish->photometric ? perez_diffuse_efficacy(&p, water) : 1);
-    const double direct_light = horizontal * (wish->photometric ? perez_direct_efficacy(&p, water) : 1);
+    const double diffuse_light = h->diffuse * (options->photometric ? perez_diffuse_efficacy(&p, water) : 1);
+    const double direct_light = horizontal * (options->photometric ? perez_direct_efficacy(&p, water) : 1);
     if (diffuse_light > 0) year_add_sky(s, &p, &sun, diffuse_light, L);
     if (horizontal > 0) {
         const double most = w->direct_is_horizontal ? 1367 / (sun.distance * sun.distance) : INFINITY;
         seen->horizontal = direct_light;
         seen->normal = direct_light / horizontal * fmin(direct, most);
     }
-    if (direct_light > 0 && wish->sun_in_tiles) year_add_sun(s, sun.direction, direct_light, L);
+    if (direct_light > 0 && options->sun_in_tiles) year_add_sun(s, sun.direction, direct_light, L);
     sum->diffuse += h->diffuse;
     sum->direct += horizontal;
     sum->light += diffuse_light + direct_light;
@@ -93,8 +93,9 @@ static void make_hour(const weather *w, const weather_hour *h, const sky_tiling 
     sum->sunny += horizontal > 0;
 }
 
-lam_status year_skies(const weather *w, const sky_tiling *s, const year_wish *wish, const progress *steps,
-                      float *L, year_sun *suns, year_summary *summary, lam_error *error) {
+lam_status year_skies(const weather *w, const sky_tiling *s, const year_options *options,
+                      const progress *steps, float *L, year_sun *suns, year_summary *summary,
+                      lam_error *error) {
     enum { BETWEEN_REPORTS = 64 };
     lam_status status = LAM_OK;
     year_summary sum = {0};
@@ -106,7 +107,7 @@ lam_status year_skies(const weather *w, const sky_tiling *s, const year_wish *wi
             if (progress_cancelled(steps)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
             progress_report(steps, "skies", (double)i / (double)w->n);
         }
-        make_hour(w, &w->hours[i], s, wish, hour, &seen, &sum);
+        make_hour(w, &w->hours[i], s, options, hour, &seen, &sum);
         if (suns != NULL) suns[i] = seen;
         for (size_t t = 0; t < s->n_tiles; t++) L[i * s->n_tiles + t] = (float)hour[t];
     }

@@ -43,14 +43,15 @@ typedef struct year_sun {
 } year_sun;
 
 /* What is made of a year. */
-typedef struct year_wish {
+typedef struct year_options {
     bool photometric;  /* cd/m2 and lux */
     bool sun_in_tiles; /* each sun in the tile that holds it */
-} year_wish;
+} year_options;
 
 /* L [w->n][n_tiles], W/(m2 sr), or cd/m2; suns [w->n], or NULL for none. Errors: LAM_ERR_MEMORY,
  * LAM_ERR_CANCELLED. */
-lam_status year_skies(const weather *w, const sky_tiling *s, const year_wish *wish, const progress *steps,
-                      float *L, year_sun *suns, year_summary *summary, lam_error *error);
+lam_status year_skies(const weather *w, const sky_tiling *s, const year_options *options,
+                      const progress *steps, float *L, year_sun *suns, year_summary *summary,
+                      lam_error *error);
 
 #endif

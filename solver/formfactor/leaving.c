@@ -3,9 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* A scene is closed when less than this share of its rays leaves: in single precision a few rays slip between
- * elements that meet without sharing vertices, or start behind a neighbour and meet its back. Their share is
- * put back by the repair. */
+/* A scene is closed where a smaller share of its rays than this leaves. In single precision a few rays slip
+ * between elements that meet without sharing vertices, or start behind a neighbour and hit its back. The
+ * repair distributes their share over the row. */
 static const double crack_share = 1e-4;
 
 static double area_mean(const mesh *m, const double *x) {
@@ -17,7 +17,7 @@ static double area_mean(const mesh *m, const double *x) {
     return total > 0 ? sum / total : 0;
 }
 
-void closing_measure(form_factors *f, const mesh *m) {
+void leaving_measure(form_factors *f, const mesh *m) {
     f->leaving_share = area_mean(m, f->leaving);
     f->absorbed_share = area_mean(m, f->absorbed);
     f->closed = f->leaving_share < crack_share;
@@ -27,15 +27,15 @@ static double absorbed(const form_factors *f, size_t element) {
     return f->absorbed_share < crack_share ? 0 : f->absorbed[element];
 }
 
-bool closing_all_stays(const form_factors *f) {
+bool leaving_nothing(const form_factors *f) {
     return f->closed && f->absorbed_share < crack_share;
 }
 
-double closing_outside(const form_factors *f, size_t element) {
+double leaving_outside(const form_factors *f, size_t element) {
     return (f->closed ? 0 : f->leaving[element]) + absorbed(f, element);
 }
 
-lam_status closing_sky(form_factors *f, size_t n, lam_error *error) {
+lam_status leaving_to_sky(form_factors *f, size_t n, lam_error *error) {
     double *scale = memory_allocate(n, sizeof *scale, "the light of the sky", error);
     if (scale == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < n; i++) {

@@ -19,65 +19,65 @@
 static lam_status close_upper(form_factors *f, const mesh *m, lam_error *error) {
     double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) return LAM_ERR_MEMORY;
-    closing_measure(f, m);
-    for (size_t i = 0; i < m->n; i++) outside[i] = closing_outside(f, i);
+    leaving_measure(f, m);
+    for (size_t i = 0; i < m->n; i++) outside[i] = leaving_outside(f, i);
     const lam_status status = repair_close(&f->upper, m->area, outside, f, error);
     free(outside);
     return status;
 }
 
 /* From one-sided rows, which are freed, whose entries are F_ij times rays, to the upper triangle. */
-static lam_status form_factors_finish(form_factors *f, const mesh *m, found_rows *rows, size_t rays,
-                                      const large_place *place, lam_error *error) {
+static lam_status merge_and_repair(form_factors *f, const mesh *m, packed_rows *rows, size_t rays,
+                                   const large_place *place, lam_error *error) {
     lam_status status = LAM_OK;
     f->rows_kept = rows->kept;
     TRY(upper_merge(rows, rays, m->area, place, &f->upper, error));
-    found_rows_free(rows);
+    packed_rows_free(rows);
     TRY(close_upper(f, m, error));
 done:
     return status;
 }
 
-static lam_status make_of_rays(const mesh *m, const visibility *v, const uint32_t *order,
+static lam_status make_by_rays(const mesh *m, const visibility *v, const uint32_t *order,
                                const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
-    found_rows counts = {0};
+    packed_rows counts = {0};
     TRY(rays_count(m, v, order, options, &counts, f->leaving, f->absorbed, error));
-    TRY(form_factors_finish(f, m, &counts, options->recipe.rays, options->large, error));
+    TRY(merge_and_repair(f, m, &counts, options->recipe.rays, options->large, error));
 done:
-    found_rows_free(&counts);
+    packed_rows_free(&counts);
     return status;
 }
 
-static lam_status make_of_hemicubes(const mesh *m, const visibility *v, const uint32_t *order,
+static lam_status make_by_hemicubes(const mesh *m, const visibility *v, const uint32_t *order,
                                     const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
     hemicube h = {0};
-    found_rows rows = {0};
+    packed_rows rows = {0};
     TRY(hemicube_create(options->recipe.resolution, &h, error));
     TRY(hemicube_trace(&h, m, v, order, options, &rows, f->leaving, f->absorbed, error));
     /* The weights are form factors already, as if one ray had been cast. */
-    TRY(form_factors_finish(f, m, &rows, 1, options->large, error));
+    TRY(merge_and_repair(f, m, &rows, 1, options->large, error));
 done:
     hemicube_free(&h);
-    found_rows_free(&rows);
+    packed_rows_free(&rows);
     return status;
 }
 
-static lam_status make_of_pairs(const mesh *m, const visibility *v, const uint32_t *order,
+static lam_status make_by_pairs(const mesh *m, const visibility *v, const uint32_t *order,
                                 const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
-    found_rows counts = {0};
+    packed_rows counts = {0};
     form_factor_options silent = *options;
     silent.progress = NULL;
     silent.scratch = NULL;
     double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) return LAM_ERR_MEMORY;
     TRY(rays_count(m, v, order, &silent, &counts, f->leaving, f->absorbed, error));
-    found_rows_free(&counts);
+    packed_rows_free(&counts);
     TRY(pairs_find(m, v, options, 0, f, &f->upper, error));
-    closing_measure(f, m);
-    if (!closing_all_stays(f)) {
+    leaving_measure(f, m);
+    if (!leaving_nothing(f)) {
         /* What a row lacks goes outside: 1 - sum_j g_ij / A_i. */
         for (size_t i = 0; i < m->n; i++)
             for (uint64_t p = f->upper.indptr[i]; p < f->upper.indptr[i + 1]; p++) {
@@ -88,27 +88,27 @@ static lam_status make_of_pairs(const mesh *m, const visibility *v, const uint32
     }
     TRY(repair_close(&f->upper, m->area, outside, f, error));
 done:
-    found_rows_free(&counts);
+    packed_rows_free(&counts);
     free(outside);
     return status;
 }
 
-static lam_status make_of_near_pairs(const mesh *m, const visibility *v, const uint32_t *order,
+static lam_status make_by_near_pairs(const mesh *m, const visibility *v, const uint32_t *order,
                                      const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
-    found_rows counts = {0};
+    packed_rows counts = {0};
     csr near = {0}, counted = {0};
     TRY(pairs_find(m, v, options, recipe_near(&options->recipe), f, &near, error));
     TRY(rays_count(m, v, order, options, &counts, f->leaving, f->absorbed, error));
     if (counts.kept > f->rows_kept) f->rows_kept = counts.kept;
     TRY(upper_merge(&counts, options->recipe.rays, m->area, options->large, &counted, error));
-    found_rows_free(&counts);
+    packed_rows_free(&counts);
     TRY(csr_replace(&counted, &near, &f->upper, error));
     csr_free(&near);
     csr_free(&counted);
     TRY(close_upper(f, m, error));
 done:
-    found_rows_free(&counts);
+    packed_rows_free(&counts);
     csr_free(&near);
     csr_free(&counted);
     return status;
@@ -131,19 +131,19 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
     TRY(visibility_create(m, &v, error));
     switch (options->recipe.method) {
     case RECIPE_RAYS:
-        TRY(make_of_rays(m, v, order, options, &f, error));
+        TRY(make_by_rays(m, v, order, options, &f, error));
         break;
     case RECIPE_HEMICUBE:
-        TRY(make_of_hemicubes(m, v, order, options, &f, error));
+        TRY(make_by_hemicubes(m, v, order, options, &f, error));
         break;
     case RECIPE_PAIRS:
-        TRY(make_of_pairs(m, v, order, options, &f, error));
+        TRY(make_by_pairs(m, v, order, options, &f, error));
         break;
     case RECIPE_NEAR_PAIRS:
-        TRY(make_of_near_pairs(m, v, order, options, &f, error));
+        TRY(make_by_near_pairs(m, v, order, options, &f, error));
         break;
     }
-    if (asked->sky != NULL) TRY(closing_sky(&f, m->n, error));
+    if (asked->sky != NULL) TRY(leaving_to_sky(&f, m->n, error));
     if (!options->upper) TRY(form_factors_expand(&f, m->area, error));
     *out = f;
     f = (form_factors){0};
@@ -180,7 +180,7 @@ lam_status form_factors_count_seen(const mesh *m, const recipe *how, const uint3
     lam_status status = LAM_OK;
     visibility *v = NULL;
     hemicube h = {0};
-    found_rows rows = {0};
+    packed_rows rows = {0};
     double *outside = memory_allocate(m->n, 2 * sizeof *outside, "rows of form factors", error);
     if (outside == NULL) return LAM_ERR_MEMORY;
     const form_factor_options options = {
@@ -200,7 +200,7 @@ lam_status form_factors_count_seen(const mesh *m, const recipe *how, const uint3
     for (size_t k = 0; k < count; k++) seen[k] = rows.rows[elements[k]].n_entries;
 done:
     free(outside);
-    found_rows_free(&rows);
+    packed_rows_free(&rows);
     hemicube_free(&h);
     visibility_destroy(v);
     return status;

@@ -41,8 +41,8 @@ static void log_year(terminal *t, const year_summary *sum, bool photometric) {
                       sum->sunless, sum->left_out);
 }
 
-lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const year_wish *wish, terminal *t,
-                              weather_skies *out, lam_error *error) {
+lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const year_options *wish,
+                              terminal *t, weather_skies *out, lam_error *error) {
     lam_status status = LAM_OK;
     weather w = {0};
     weather_skies made = {0};
@@ -101,7 +101,7 @@ lam_status weather_light_add(const weather_wish *wish, store *s, const mesh *m, 
     if (tiling.n_tiles != lam_sky_tiles(sky))
         FAIL(error, LAM_ERR_FORMAT, "%s: /sky has %zu tiles, %s has %zu", store_path(s), lam_sky_tiles(sky),
              tiling.name, tiling.n_tiles);
-    const year_wish year = {.photometric = wish->photometric, .sun_in_tiles = few || !wish->exact};
+    const year_options year = {.photometric = wish->photometric, .sun_in_tiles = few || !wish->exact};
     TRY(weather_skies_read(wish->path, &tiling, &year, t, &made, error));
     TRY(emission_add_skies(e, wish->path, m, tiling.n_tiles, made.n, made.L, error));
     if (e->n_vectors != made.n)

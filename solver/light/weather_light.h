@@ -17,8 +17,8 @@ void weather_skies_free(weather_skies *w);
 
 /* Reads a file, makes its hours and says on the terminal what they are. Errors: those of the file,
  * LAM_ERR_ARGUMENT where no hour has any light, LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
-lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const year_wish *wish, terminal *t,
-                              weather_skies *out, lam_error *error);
+lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const year_options *wish,
+                              terminal *t, weather_skies *out, lam_error *error);
 
 /* What a command line asks for. */
 typedef struct weather_wish {

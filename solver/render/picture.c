@@ -42,8 +42,8 @@ static void aim(const picture_scene *scene, const camera *c, double x, double y,
 }
 
 /* The values at the point where the ray through (x, y) meets the plane of an element, in double. */
-static void look(const picture_scene *scene, const camera *c, double x, double y, uint32_t element,
-                 float *values) {
+static void values_at(const picture_scene *scene, const camera *c, double x, double y, uint32_t element,
+                      float *values) {
     const mesh *m = scene->mesh;
     const double *corner = m->vertices[m->elements[element][0]];
     double direction[3], point[3], along = 0, away = 0;
@@ -78,7 +78,7 @@ void picture_measure(const picture_scene *scene, const camera *c, tone_histogram
             for (size_t i = 0; i < count; i++) {
                 float values[SHADE_MAX_CHANNELS];
                 if (hits.element[i] == VISIBILITY_NOTHING) continue;
-                look(scene, c, ((double)(first + i) + .5) / (double)width, v, hits.element[i], values);
+                values_at(scene, c, ((double)(first + i) + .5) / (double)width, v, hits.element[i], values);
                 shown++;
                 tone_histogram_add(&all, tone_luminance(values, channels));
                 if (!scene->glows[hits.element[i]]) tone_histogram_add(h, tone_luminance(values, channels));
@@ -88,7 +88,7 @@ void picture_measure(const picture_scene *scene, const camera *c, tone_histogram
 }
 
 /* Adds what a ray shows, as the screen should show it, to a pixel's sum. */
-static void add_sample(const picture_scene *scene, const camera *c, const picture_look *how, double x,
+static void add_sample(const picture_scene *scene, const camera *c, const picture_options *how, double x,
                        double y, uint32_t element, size_t channels_out, float *sum) {
     float values[SHADE_MAX_CHANNELS], rgb[3];
     if (element == VISIBILITY_NOTHING) {
@@ -96,7 +96,7 @@ static void add_sample(const picture_scene *scene, const camera *c, const pictur
         return;
     }
     const size_t channels = shade_channels(scene->shade);
-    look(scene, c, x, y, element, values);
+    values_at(scene, c, x, y, element, values);
     if (how->range > 0) {
         tone_false_color((float)(tone_luminance(values, channels) / how->range), rgb);
         for (size_t k = 0; k < channels_out; k++) sum[k] += tone_decode(rgb[k]);
@@ -115,7 +115,7 @@ static void add_sample(const picture_scene *scene, const camera *c, const pictur
     for (size_t k = 0; k < channels_out; k++) sum[k] += values[channels == 3 ? k : 0];
 }
 
-static void draw_pixel(const picture_scene *scene, const camera *c, const picture_look *how, size_t px,
+static void draw_pixel(const picture_scene *scene, const camera *c, const picture_options *how, size_t px,
                        size_t py, image *picture) {
     double x[SAMPLES], y[SAMPLES];
     uint32_t element[SAMPLES];
@@ -156,7 +156,7 @@ static void draw_pixel(const picture_scene *scene, const camera *c, const pictur
     for (size_t k = 0; k < picture->channels; k++) pixel[k] = tone_encode(sum[k] / SAMPLES);
 }
 
-lam_status picture_draw(const picture_scene *scene, const camera *c, const picture_look *how,
+lam_status picture_draw(const picture_scene *scene, const camera *c, const picture_options *how,
                         const progress *waiting, image *picture, lam_error *error) {
     const size_t across = (how->width + TILE - 1) / TILE, down = (picture->height + TILE - 1) / TILE;
     size_t drawn = 0;

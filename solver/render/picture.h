@@ -17,20 +17,20 @@ typedef struct picture_scene {
 
 /* How values become colours: exposed and toned, or, with range > 0, false colour from 0 to range, or, with
  * plain, as they are: display-linear from 0 to 1. */
-typedef struct picture_look {
+typedef struct picture_options {
     double exposure;
     double range;
     bool plain;
     size_t width; /* columns drawn on, from the left; a legend takes the others */
-} picture_look;
+} picture_options;
 
 /* Gathers what a coarse picture of this camera and aspect shows, without what glows by itself
  * (with it where there is nothing else). */
 void picture_measure(const picture_scene *scene, const camera *c, tone_histogram *h);
 
 /* Draws; picture has been created, with 1 channel or 3 (needed for colour). Errors: LAM_ERR_CANCELLED. */
-lam_status picture_draw(const picture_scene *scene, const camera *c, const picture_look *look,
-                        const progress *how, image *picture, lam_error *error);
+lam_status picture_draw(const picture_scene *scene, const camera *c, const picture_options *how,
+                        const progress *waiting, image *picture, lam_error *error);
 
 /* The columns that a legend takes at the right of a picture; 0 where the picture is too small for one. */
 size_t picture_legend_width(size_t width, size_t height);

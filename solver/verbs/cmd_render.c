@@ -235,9 +235,9 @@ done:
 }
 
 /* What fits the light that is seen. */
-static picture_look look_of_light(const fields *f, const view *v) {
+static picture_options look_of_light(const fields *f, const view *v) {
     tone_histogram histogram = {0};
-    picture_look look = {.width = view_width(f)};
+    picture_options look = {.width = view_width(f)};
     picture_measure(&v->scene, &v->camera, &histogram);
     if (f->false_color)
         look.range = round_up(tone_histogram_quantile(&histogram, .99) / exp2(f->exposure));
@@ -246,7 +246,7 @@ static picture_look look_of_light(const fields *f, const view *v) {
     return look;
 }
 
-static lam_status draw(const fields *f, const view *v, const picture_look *look, terminal *t,
+static lam_status draw(const fields *f, const view *v, const picture_options *look, terminal *t,
                        lam_error *error) {
     lam_status status = LAM_OK;
     const progress how = terminal_progress(t);
@@ -292,7 +292,7 @@ static lam_status render(const char *path, const fields *f, terminal *t, lam_err
         FAIL(error, LAM_ERR_ARGUMENT,
              "%s: the scene has no light of its own; give --emit GROUP=V, --emission or --sky", path);
     TRY(view_aim(f, v.m.n_channels, f->smooth, &v, error));
-    const picture_look look = look_of_light(f, &v);
+    const picture_options look = look_of_light(f, &v);
     TRY(draw(f, &v, &look, t, error));
     if (f->false_color)
         terminal_log(t, "colours from 0 to %g W/m2", look.range);
@@ -316,11 +316,11 @@ static bool needs_no_light(const fields *f) {
 
 /* The values of --quantity visible, in colours up to the largest. */
 static lam_status visible_values(const fields *f, store *s, size_t n, terminal *t, float **values,
-                                 picture_look *look, lam_error *error) {
+                                 picture_options *look, lam_error *error) {
     lam_status status = LAM_OK;
     double mean, most;
     TRY(store_view_visible(s, n, values, &mean, &most, error));
-    *look = (picture_look){.width = view_width(f), .range = most > 0 ? round_up(most) : 1};
+    *look = (picture_options){.width = view_width(f), .range = most > 0 ? round_up(most) : 1};
     terminal_log(t, "an element sees %.3g others on average, %.6g at most; colours from 0 to %g", mean, most,
                  look->range);
 done:
@@ -330,11 +330,11 @@ done:
 /* The values of --quantity coherence or patch, one channel or three, and how to show them. The least coherent
  * patch is a little above black, so that it is seen. */
 static lam_status patch_values(const fields *f, store *s, size_t n, terminal *t, float **values,
-                               picture_look *look, lam_error *error) {
+                               picture_options *look, lam_error *error) {
     lam_status status = LAM_OK;
     float smallest;
     size_t n_patches;
-    *look = (picture_look){.width = view_width(f), .plain = true};
+    *look = (picture_options){.width = view_width(f), .plain = true};
     if (strcmp(f->quantity, "patch") == 0) {
         TRY(store_view_patches(s, values, &n_patches, error));
         terminal_log(t, "%zu patches", n_patches);
@@ -342,7 +342,7 @@ static lam_status patch_values(const fields *f, store *s, size_t n, terminal *t,
     }
     TRY(store_view_coherence(s, values, &smallest, error));
     if (f->false_color) {
-        *look = (picture_look){.width = view_width(f), .range = 1};
+        *look = (picture_options){.width = view_width(f), .range = 1};
         terminal_log(t, "colours from coherence 0 to 1");
         return LAM_OK;
     }
@@ -358,7 +358,7 @@ done:
 static lam_status render_unlit(const char *path, const fields *f, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
     view v = {.s = NULL};
-    picture_look look;
+    picture_options look;
     TRY(view_open(path, f, &v, error));
     if (is_visible(f))
         TRY(visible_values(f, v.s, v.m.n, t, &v.values, &look, error));

@@ -91,7 +91,7 @@ static lam_status make_skies(const char *path, const fields *f, terminal *t, lam
     output_file file = {0};
     TRY(output_file_check(f->output, error));
     TRY(sky_tiling_create(f->tiles != NULL ? f->tiles : "tregenza", 'z', &tiling, error));
-    const year_wish wish = {.photometric = f->photometric, .sun_in_tiles = true};
+    const year_options wish = {.photometric = f->photometric, .sun_in_tiles = true};
     TRY(weather_skies_read(path, &tiling, &wish, t, &made, error));
     TRY(output_file_open(f->output, &file, error));
     npy_write(file.stream, 2, (const size_t[2]){made.n, tiling.n_tiles}, made.L);

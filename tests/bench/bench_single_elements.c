@@ -28,13 +28,14 @@ typedef struct bench {
     double *B;     /* [n_probes][n], the reference without E */
 } bench;
 
-/* rho F_e of one probe: every pair looked at by at least 256 segments where anything may be between. */
-static void first_bounce(const bench *b, const look *l, uint32_t e, double *out) {
+/* rho F_e of one probe: at least 256 visibility segments for each partly occluded pair. */
+static void first_bounce(const bench *b, const occlusion *o, uint32_t e, double *out) {
 #pragma omp parallel for schedule(dynamic, 256)
     for (size_t i = 0; i < b->m.n; i++) {
         const uint32_t j = (uint32_t)i;
-        double g = j == e ? 0 : pair_exchange(l->rules, &l->polygons[e], &l->polygons[j], l->tolerance);
-        if (g > 0) g = look_closely(l, e < j ? e : j, e < j ? j : e, g);
+        double g =
+            j == e ? 0 : pair_factor_exchange(o->rules, &o->polygons[e], &o->polygons[j], o->tolerance);
+        if (g > 0) g = occlusion_estimate(o, e < j ? e : j, e < j ? j : e, g);
         out[i] = (double)b->m.reflectance[i] * g / b->m.area[i];
     }
 }
@@ -42,21 +43,21 @@ static void first_bounce(const bench *b, const look *l, uint32_t e, double *out)
 static lam_status find_first_bounces(bench *b, lam_error *error) {
     lam_status status = LAM_OK;
     visibility *v = NULL;
-    pair_rules rules;
+    pair_factor_rules rules;
     polygon *polygons = memory_allocate(b->m.n, sizeof *polygons, "bench", error);
     if (polygons == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < b->m.n; i++) polygon_of_element(&b->m, i, &polygons[i]);
-    pair_rules_init(&rules);
+    pair_factor_rules_init(&rules);
     TRY(visibility_create(&b->m, &v, error));
-    const look l = {.v = v,
-                    .area = b->m.area,
-                    .polygons = polygons,
-                    .rules = &rules,
-                    .tolerance = 1e-6,
-                    .accuracy = 7e-6,
-                    .segments = 256,
-                    .seed = 12345};
-    for (size_t k = 0; k < b->n_probes; k++) first_bounce(b, &l, b->probe[k], b->first + k * b->m.n);
+    const occlusion o = {.v = v,
+                         .area = b->m.area,
+                         .polygons = polygons,
+                         .rules = &rules,
+                         .tolerance = 1e-6,
+                         .accuracy = 7e-6,
+                         .segments = 256,
+                         .seed = 12345};
+    for (size_t k = 0; k < b->n_probes; k++) first_bounce(b, &o, b->probe[k], b->first + k * b->m.n);
 done:
     visibility_destroy(v);
     free(polygons);

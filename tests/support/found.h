@@ -9,7 +9,7 @@
 #include <stdlib.h>
 
 /* The caller frees the result with csr_free. */
-static inline csr found_unpack(const found_rows *found) {
+static inline csr found_unpack(const packed_rows *found) {
     csr rows = {.n = found->n, .indptr = calloc(found->n + 1, sizeof(uint64_t))};
     ck_assert_ptr_nonnull(rows.indptr);
     for (size_t i = 0; i < found->n; i++) rows.indptr[i + 1] = rows.indptr[i] + found->rows[i].n_entries;

@@ -19,7 +19,7 @@ typedef struct square {
     float *values; /* [n][n] */
     double *area;
     uint8_t *bytes;
-    found_rows found;
+    packed_rows found;
 } square;
 
 static inline square square_make(size_t n, row_kind kind, uint64_t seed) {
@@ -28,7 +28,7 @@ static inline square square_make(size_t n, row_kind kind, uint64_t seed) {
                 .area = malloc(n * sizeof(double)),
                 .bytes = malloc(n * n * ROW_ENTRY_MOST)};
     ck_assert(s.values != NULL && s.area != NULL && s.bytes != NULL);
-    s.found = (found_rows){.n = n, .kind = kind, .rows = calloc(n, sizeof *s.found.rows)};
+    s.found = (packed_rows){.n = n, .kind = kind, .rows = calloc(n, sizeof *s.found.rows)};
     ck_assert_ptr_nonnull(s.found.rows);
     uint8_t *to = s.bytes;
     for (size_t i = 0; i < n; i++) {
@@ -54,7 +54,7 @@ static inline void square_free(square *s) {
     free(s->values);
     free(s->area);
     free(s->bytes);
-    found_rows_free(&s->found);
+    packed_rows_free(&s->found);
 }
 
 static inline void same_rows(const csr *a, const csr *b) {

@@ -17,8 +17,8 @@ typedef struct bag {
 typedef struct walk {
     const mesh *m;
     const cluster_tree *t;
-    const look *l;
-    const link_options *options;
+    const occlusion *o;
+    const cluster_link_options *options;
     bag *found;
 } walk;
 
@@ -102,7 +102,7 @@ static void visit(walk *w, uint32_t a, uint32_t b, const uint32_t *candidates, s
     }
     /* The few pairs of near ones are looked at sooner than it is known of all in their clusters. */
     if (n_within > 0 && !near &&
-        look_is_hidden(w->l, t, one, two, factor_bound(fmax(one->area, two->area), distance2))) {
+        occlusion_is_total(w->o, t, one, two, factor_bound(fmax(one->area, two->area), distance2))) {
         w->found->hidden_pairs += pairs_between(one, two);
         return;
     }
@@ -179,8 +179,8 @@ done:
     return status;
 }
 
-lam_status cluster_links_find(const mesh *m, const cluster_tree *t, const look *l,
-                              const link_options *options, cluster_links *out, lam_error *error) {
+lam_status cluster_links_find(const mesh *m, const cluster_tree *t, const occlusion *o,
+                              const cluster_link_options *options, cluster_links *out, lam_error *error) {
     lam_status status = LAM_OK;
     task tasks[TASKS_WANTED + 2];
     const size_t n_tasks = make_tasks(t, tasks);
@@ -194,7 +194,7 @@ lam_status cluster_links_find(const mesh *m, const cluster_tree *t, const look *
 #pragma omp atomic read
         stop = cancelled;
         if (stop) continue;
-        walk w = {.m = m, .t = t, .l = l, .options = options, .found = &bags[k]};
+        walk w = {.m = m, .t = t, .o = o, .options = options, .found = &bags[k]};
         visit(&w, tasks[k].a, tasks[k].b, &root, 1);
         if (progress_cancelled(options->progress)) {
 #pragma omp atomic write

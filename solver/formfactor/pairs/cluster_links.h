@@ -19,17 +19,17 @@ typedef struct cluster_links {
     double distant_pairs; /* beyond the threshold */
 } cluster_links;
 
-typedef struct link_options {
+typedef struct cluster_link_options {
     double threshold; /* pairs whose mean factor, 2 g / (A_i + A_j), is surely below it are left out */
     double slack;     /* what rounding may move a point */
     const progress *progress;
-} link_options;
+} cluster_link_options;
 
 /* Walks down the tree with itself. Skipped are clusters that face away, those beyond the threshold, and,
  * where there is none, those that are plainly hidden from each other. The result is the same for any number
  * of threads. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. Freed by cluster_links_free. */
-lam_status cluster_links_find(const mesh *m, const cluster_tree *t, const look *l,
-                              const link_options *options, cluster_links *out, lam_error *error);
+lam_status cluster_links_find(const mesh *m, const cluster_tree *t, const occlusion *o,
+                              const cluster_link_options *options, cluster_links *out, lam_error *error);
 void cluster_links_free(cluster_links *l);
 
 #endif

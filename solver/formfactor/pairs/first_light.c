@@ -12,8 +12,8 @@ struct first_light {
     const mesh *m;
     visibility *v;
     polygon *polygons;
-    pair_rules rules;
-    look look;
+    pair_factor_rules rules;
+    occlusion occlusion;
 };
 
 lam_status first_light_create(const mesh *m, uint64_t seed, first_light **out, lam_error *error) {
@@ -24,16 +24,16 @@ lam_status first_light_create(const mesh *m, uint64_t seed, first_light **out, l
     l->polygons = memory_allocate(m->n, sizeof *l->polygons, "the light of few", error);
     if (l->polygons == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < m->n; i++) polygon_of_element(m, i, &l->polygons[i]);
-    pair_rules_init(&l->rules);
+    pair_factor_rules_init(&l->rules);
     TRY(visibility_create(m, &l->v, error));
-    l->look = (look){.v = l->v,
-                     .area = m->area,
-                     .polygons = l->polygons,
-                     .rules = &l->rules,
-                     .tolerance = 1e-5,
-                     .accuracy = 3e-5,
-                     .segments = 64,
-                     .seed = seed};
+    l->occlusion = (occlusion){.v = l->v,
+                               .area = m->area,
+                               .polygons = l->polygons,
+                               .rules = &l->rules,
+                               .tolerance = 1e-5,
+                               .accuracy = 3e-5,
+                               .segments = 64,
+                               .seed = seed};
     *out = l;
     l = NULL;
 done:
@@ -54,10 +54,11 @@ static double seen(const first_light *l, uint32_t e, uint32_t i, bool closely) {
     double part;
     if (e == i) return 0;
     const uint32_t low = e < i ? e : i, high = e < i ? i : e;
-    const double g = pair_exchange(&l->rules, &l->polygons[e], &l->polygons[i], l->look.tolerance);
+    const double g =
+        pair_factor_exchange(&l->rules, &l->polygons[e], &l->polygons[i], l->occlusion.tolerance);
     if (g <= 0) return 0;
-    const bool mixed = look_first(&l->look, low, high, g, &part) == LOOK_MIXED;
-    return mixed && closely ? look_closely(&l->look, low, high, g) : part;
+    const bool mixed = occlusion_test(&l->occlusion, low, high, g, &part) == OCCLUSION_PARTIAL;
+    return mixed && closely ? occlusion_estimate(&l->occlusion, low, high, g) : part;
 }
 
 /* cos cos' A A' / (pi r^2) from middle to middle. */

@@ -7,16 +7,17 @@
 
 enum { SEGMENTS_MOST = 1 << 22 };
 
-/* Segments that leave the factor F a standard error of about accuracy: those of this sequence leave the seen
- * share one of about 1.6 N^-3/4 (measured on a plate between two plates, from 16 to 165,000). */
-static size_t segments_for(const look *l, double F, double accuracy) {
+/* The number N of segments with 1.6 F N^-3/4 = accuracy. N segments of the low-discrepancy sequence estimate
+ * the visible share with a standard error of about 1.6 N^-3/4 (measured on a plate between two plates, for N
+ * from 16 to 165,000). */
+static size_t segments_for(const occlusion *o, double F, double accuracy) {
     const double wanted = fmin(pow(1.6 * F / accuracy, 4. / 3), SEGMENTS_MOST);
     const size_t packets = ((size_t)wanted + VISIBILITY_PACKET - 1) / VISIBILITY_PACKET;
     const size_t segments = packets * VISIBILITY_PACKET;
-    return segments > l->segments ? segments : l->segments;
+    return segments > o->segments ? segments : o->segments;
 }
 
-/* Segments of the first look: one packet, more for a factor that matters more. */
+/* Segments of an occlusion test: a packet for each .001 of the factor, from one packet to MOST segments. */
 static size_t first_segments(double F) {
     enum { MOST = 256 };
     const double packets = ceil(fmin(F / 1e-3, MOST / VISIBILITY_PACKET));
@@ -24,26 +25,27 @@ static size_t first_segments(double F) {
 }
 
 /* The larger of F_ij and F_ji. */
-static double factor_of(const look *l, uint32_t i, uint32_t j, double g) {
-    return g / fmin(l->area[i], l->area[j]);
+static double factor_of(const occlusion *o, uint32_t i, uint32_t j, double g) {
+    return g / fmin(o->area[i], o->area[j]);
 }
 
-/* Eight segments, from points of elements to points of others, and the kernel of each: cos cos' / r^2 times
- * the areas that the two points stand for. */
-typedef struct bundle {
+/* A packet of segments between points of two elements, and the kernel of each: K = cos cos' / r^2 times the
+ * areas that the two points stand for. */
+typedef struct segment_bundle {
     ray_packet segments;
     uint32_t from[VISIBILITY_PACKET], to[VISIBILITY_PACKET];
     double kernel[VISIBILITY_PACKET];
-} bundle;
+} segment_bundle;
 
-/* Lane k joins the point x[0], x[1] of a, the polygon of i or a piece of it, with x[2], x[3] of b. */
-static void bundle_set(bundle *s, const look *l, int k, uint32_t i, const polygon *a, uint32_t j,
-                       const polygon *b, const double x[4]) {
+/* Sets lane k to the segment from the point (x[0], x[1]) of a, the polygon of i or a piece of it, to the
+ * point (x[2], x[3]) of b. */
+static void segment_set(segment_bundle *s, const occlusion *o, int k, uint32_t i, const polygon *a,
+                        uint32_t j, const polygon *b, const double x[4]) {
     double points[2][3], r2 = 0, leaving = 0, arriving = 0;
     float origin[3], end[3];
     const double area = polygon_point(a, x[0], x[1], points[0]) * polygon_point(b, x[2], x[3], points[1]);
-    visibility_recentre(l->v, points[0], origin);
-    visibility_recentre(l->v, points[1], end);
+    visibility_recentre(o->v, points[0], origin);
+    visibility_recentre(o->v, points[1], end);
     for (int d = 0; d < 3; d++) {
         const double r = points[1][d] - points[0][d];
         r2 += r * r;
@@ -58,22 +60,22 @@ static void bundle_set(bundle *s, const look *l, int k, uint32_t i, const polygo
 }
 
 /* Two elements, or pieces of them, and the sequence of points on them. */
-typedef struct joined {
+typedef struct piece_pair {
     uint32_t i, j;
     const polygon *a, *b;
     pair_sampler sampler;
-} joined;
+} piece_pair;
 
-/* The same as bundle_set for all lanes of two affine polygons, the areas left out: they are the same for all
- * points of such a polygon, and only ratios of kernels count. */
-static void bundle_of_affine(bundle *s, const look *l, const joined *two, size_t first) {
+/* segment_set for all lanes of two affine polygons, without the areas: these are the same for all points of
+ * an affine polygon, and only ratios of kernels count. */
+static void segments_of_affine(segment_bundle *s, const occlusion *o, const piece_pair *two, size_t first) {
     double x[4][VISIBILITY_PACKET], from[3][VISIBILITY_PACKET], to[3][VISIBILITY_PACKET];
     float end[3][VISIBILITY_PACKET];
     pair_sampler_packet(&two->sampler, (uint32_t)first, x);
     polygon_affine_points(two->a, x[0], x[1], from);
     polygon_affine_points(two->b, x[2], x[3], to);
-    visibility_recentre_packet(l->v, from, s->segments.origin);
-    visibility_recentre_packet(l->v, to, end);
+    visibility_recentre_packet(o->v, from, s->segments.origin);
+    visibility_recentre_packet(o->v, to, end);
     for (int d = 0; d < 3; d++)
         for (int k = 0; k < VISIBILITY_PACKET; k++)
             s->segments.direction[d][k] = end[d][k] - s->segments.origin[d][k];
@@ -89,41 +91,42 @@ static void bundle_of_affine(bundle *s, const look *l, const joined *two, size_t
     }
 }
 
-static void bundle_of(bundle *s, const look *l, const joined *two, size_t first) {
+static void segments_of(segment_bundle *s, const occlusion *o, const piece_pair *two, size_t first) {
     if (two->a->affine && two->b->affine) {
-        bundle_of_affine(s, l, two, first);
+        segments_of_affine(s, o, two, first);
         return;
     }
     for (int k = 0; k < VISIBILITY_PACKET; k++) {
         double x[4];
         pair_sampler_place(&two->sampler, (uint32_t)first + (uint32_t)k, x);
-        bundle_set(s, l, k, two->i, two->a, two->j, two->b, x);
+        segment_set(s, o, k, two->i, two->a, two->j, two->b, x);
     }
 }
 
 /* Casts segments first ... first+7; returns which are blocked. */
-static unsigned cast(const look *l, const joined *two, size_t first, double kernel[VISIBILITY_PACKET]) {
-    bundle s;
-    bundle_of(&s, l, two, first);
+static unsigned cast(const occlusion *o, const piece_pair *two, size_t first,
+                     double kernel[VISIBILITY_PACKET]) {
+    segment_bundle s;
+    segments_of(&s, o, two, first);
     memcpy(kernel, s.kernel, sizeof s.kernel);
-    return visibility_blocked(l->v, &s.segments, VISIBILITY_PACKET, s.from, s.to);
+    return visibility_blocked(o->v, &s.segments, VISIBILITY_PACKET, s.from, s.to);
 }
 
-bool look_suffices(const look *l, uint32_t i, uint32_t j, double g) {
-    return segments_for(l, factor_of(l, i, j, g), l->accuracy) <= VISIBILITY_PACKET;
+bool occlusion_test_suffices(const occlusion *o, uint32_t i, uint32_t j, double g) {
+    return segments_for(o, factor_of(o, i, j, g), o->accuracy) <= VISIBILITY_PACKET;
 }
 
-look_verdict look_first(const look *l, uint32_t i, uint32_t j, double g, double *seen) {
-    const size_t segments = first_segments(factor_of(l, i, j, g));
+occlusion_verdict occlusion_test(const occlusion *o, uint32_t i, uint32_t j, double g, double *seen) {
+    const size_t segments = first_segments(factor_of(o, i, j, g));
     double part = 0, all = 0;
     bool any_open = false, any_blocked = false;
-    joined two = {.i = i, .j = j, .a = &l->polygons[i], .b = &l->polygons[j]};
-    pair_sampler_init(&two.sampler, l->seed, i, j);
+    piece_pair two = {.i = i, .j = j, .a = &o->polygons[i], .b = &o->polygons[j]};
+    pair_sampler_init(&two.sampler, o->seed, i, j);
     for (size_t first = 0; first < segments && !(any_open && any_blocked); first += VISIBILITY_PACKET) {
         double kernel[VISIBILITY_PACKET];
-        const unsigned blocked = cast(l, &two, first, kernel);
+        const unsigned blocked = cast(o, &two, first, kernel);
         for (int k = 0; k < VISIBILITY_PACKET; k++) {
-            if (kernel[k] <= 0) continue; /* behind either element: it says nothing */
+            if (kernel[k] <= 0) continue; /* behind either element */
             any_open = any_open || (blocked >> k & 1) == 0;
             any_blocked = any_blocked || (blocked >> k & 1) != 0;
             all += kernel[k];
@@ -131,16 +134,16 @@ look_verdict look_first(const look *l, uint32_t i, uint32_t j, double g, double 
         }
     }
     *seen = all > 0 ? g * part / all : g;
-    if (any_open == any_blocked) return LOOK_MIXED;
-    return any_open ? LOOK_OPEN : LOOK_HIDDEN;
+    if (any_open == any_blocked) return OCCLUSION_PARTIAL;
+    return any_open ? OCCLUSION_NONE : OCCLUSION_TOTAL;
 }
 
-/* Share of two pieces that is seen: sum k V / sum k. */
-static double seen_share(const look *l, const joined *two, size_t n_segments) {
+/* The visible share of two pieces: sum K V / sum K. */
+static double visible_share(const occlusion *o, const piece_pair *two, size_t n_segments) {
     double seen = 0, all = 0;
     for (size_t first = 0; first < n_segments; first += VISIBILITY_PACKET) {
         double kernel[VISIBILITY_PACKET];
-        const unsigned blocked = cast(l, two, first, kernel);
+        const unsigned blocked = cast(o, two, first, kernel);
         for (int k = 0; k < VISIBILITY_PACKET; k++) {
             all += kernel[k];
             if ((blocked >> k & 1) == 0) seen += kernel[k];
@@ -149,20 +152,19 @@ static double seen_share(const look *l, const joined *two, size_t n_segments) {
     return all > 0 ? seen / all : 0;
 }
 
-/* A pair that is looked at in pieces. */
-typedef struct dissection {
+/* A pair that is estimated piece by piece. */
+typedef struct segment_budget {
     uint32_t i, j;
-    double segments_per_area; /* of exchange: each piece gets its share of the pair's segments */
-} dissection;
+    double segments_per_area; /* segments for each m^2 of exchange area: pieces share the pair's segments */
+} segment_budget;
 
-/* How many segments out of one are worth something: (sum k)^2 / (N sum k^2), 1 where the kernel is the same
- * everywhere. */
-static double worth(const look *l, const joined *two) {
+/* Effective sample size over sample size, (sum K)^2 / (N sum K^2): 1 where the kernel is constant. */
+static double effective_share(const occlusion *o, const piece_pair *two) {
     enum { SEGMENTS = 64 };
     double sum = 0, sum2 = 0;
     for (size_t first = 0; first < SEGMENTS; first += VISIBILITY_PACKET) {
-        bundle s;
-        bundle_of(&s, l, two, first);
+        segment_bundle s;
+        segments_of(&s, o, two, first);
         for (int k = 0; k < VISIBILITY_PACKET; k++) {
             sum += s.kernel[k];
             sum2 += s.kernel[k] * s.kernel[k];
@@ -171,80 +173,82 @@ static double worth(const look *l, const joined *two) {
     return sum2 > 0 ? sum * sum / (SEGMENTS * sum2) : 0;
 }
 
-/* Whether the kernel varies little enough over two pieces. Where they nearly touch it is so steep that a few
- * segments need not even notice. */
-static bool is_even(const look *l, const joined *two) {
+/* True where the kernel varies little over two pieces. Pieces that nearly touch are excluded by their
+ * distance: their kernel is so steep that a few segments may miss the peak. */
+static bool kernel_is_even(const occlusion *o, const piece_pair *two) {
     const double enough = .4, size = two->a->radius + two->b->radius;
     double apart2 = 0;
     for (int d = 0; d < 3; d++) {
         const double r = two->a->centre[d] - two->b->centre[d];
         apart2 += r * r;
     }
-    return apart2 > .5 * size * size && worth(l, two) > enough;
+    return apart2 > .5 * size * size && effective_share(o, two) > enough;
 }
 
-/* The exchange area that is not hidden. While the kernel varies too much over two pieces the larger is
- * halved, as often as splits allow, unless one packet is all that their share of it asks for. path tells the
- * pieces' samples apart. */
-static double seen_exchange(const look *l, const dissection *pair, const polygon *a, const polygon *b,
-                            int splits, uint64_t path) {
+/* The visible exchange area of two pieces, g sum K V / sum K. Where the kernel varies too much the larger
+ * piece is halved first, at most MOST_SPLITS times and only while the pieces' share of the segments is more
+ * than a packet. path makes the samples of different pieces independent. */
+static double visible_exchange(const occlusion *o, const segment_budget *pair, const polygon *a,
+                               const polygon *b, int splits, uint64_t path) {
     enum { MOST_SPLITS = 14 };
-    const double g = pair_exchange(l->rules, a, b, l->tolerance);
+    const double g = pair_factor_exchange(o->rules, a, b, o->tolerance);
     if (g <= 0) return 0;
-    joined two = {.i = pair->i, .j = pair->j, .a = a, .b = b};
-    pair_sampler_init(&two.sampler, l->seed + path, pair->i, pair->j);
+    piece_pair two = {.i = pair->i, .j = pair->j, .a = a, .b = b};
+    pair_sampler_init(&two.sampler, o->seed + path, pair->i, pair->j);
     const double packets = ceil(g * pair->segments_per_area / VISIBILITY_PACKET);
-    if (splits == MOST_SPLITS || packets <= 1 || is_even(l, &two))
-        return g * seen_share(l, &two, (size_t)packets * VISIBILITY_PACKET);
+    if (splits == MOST_SPLITS || packets <= 1 || kernel_is_even(o, &two))
+        return g * visible_share(o, &two, (size_t)packets * VISIBILITY_PACKET);
     const bool of_a = a->radius > b->radius;
     polygon halves[2];
     double sum = 0;
     polygon_halve(of_a ? a : b, halves);
     for (uint64_t h = 0; h < 2; h++)
-        sum += seen_exchange(l, pair, of_a ? &halves[h] : a, of_a ? b : &halves[h], splits + 1,
-                             path * 3 + h + 1);
+        sum += visible_exchange(o, pair, of_a ? &halves[h] : a, of_a ? b : &halves[h], splits + 1,
+                                path * 3 + h + 1);
     return sum;
 }
 
-/* Where what is seen of a large factor is still above .1, its own error counts, not the absolute one: the
- * accuracy that suffices, from a few segments. */
-static double accuracy_for(const look *l, uint32_t i, uint32_t j, double F) {
+/* The standard error to reach: o->accuracy, relaxed to 10 F V o->accuracy where the visible factor F V, by
+ * PILOT segments, is above .1. */
+static double accuracy_for(const occlusion *o, uint32_t i, uint32_t j, double F) {
     enum { PILOT = 64 };
-    if (F <= .1) return l->accuracy;
-    joined two = {.i = i, .j = j, .a = &l->polygons[i], .b = &l->polygons[j]};
-    pair_sampler_init(&two.sampler, l->seed, i, j);
-    return l->accuracy * fmax(1, 10 * F * seen_share(l, &two, PILOT));
+    if (F <= .1) return o->accuracy;
+    piece_pair two = {.i = i, .j = j, .a = &o->polygons[i], .b = &o->polygons[j]};
+    pair_sampler_init(&two.sampler, o->seed, i, j);
+    return o->accuracy * fmax(1, 10 * F * visible_share(o, &two, PILOT));
 }
 
-double look_segments(const look *l, uint32_t i, uint32_t j, double g) {
-    /* Half of a factor above .1 may be seen: see accuracy_for. */
-    const double F = factor_of(l, i, j, g);
-    return (double)segments_for(l, F, l->accuracy * fmax(1, 5 * F));
+double occlusion_segments(const occlusion *o, uint32_t i, uint32_t j, double g) {
+    /* As accuracy_for, with half of the factor visible. */
+    const double F = factor_of(o, i, j, g);
+    return (double)segments_for(o, F, o->accuracy * fmax(1, 5 * F));
 }
 
-double look_closely(const look *l, uint32_t i, uint32_t j, double g) {
-    const double F = factor_of(l, i, j, g), accuracy = accuracy_for(l, i, j, F);
-    const dissection pair = {.i = i, .j = j, .segments_per_area = (double)segments_for(l, F, accuracy) / g};
-    /* The pieces sum to the whole within the tolerance; nothing between may raise it. */
-    return fmin(g, seen_exchange(l, &pair, &l->polygons[i], &l->polygons[j], 0, 0));
+double occlusion_estimate(const occlusion *o, uint32_t i, uint32_t j, double g) {
+    const double F = factor_of(o, i, j, g), accuracy = accuracy_for(o, i, j, F);
+    const segment_budget pair = {
+        .i = i, .j = j, .segments_per_area = (double)segments_for(o, F, accuracy) / g};
+    /* The exchange areas of the pieces sum to g only within the tolerance, and occlusion never adds. */
+    return fmin(g, visible_exchange(o, &pair, &o->polygons[i], &o->polygons[j], 0, 0));
 }
 
-bool look_is_hidden(const look *l, const cluster_tree *t, const cluster *a, const cluster *b, double factor) {
+bool occlusion_is_total(const occlusion *o, const cluster_tree *t, const cluster *a, const cluster *b,
+                        double factor) {
     enum { LEAST = 128, MOST = 1024 };
-    const double wanted = factor / l->accuracy;
+    const double wanted = factor / o->accuracy;
     if (wanted > MOST) return false;
     const size_t segments = wanted > LEAST ? (size_t)wanted : LEAST;
     const uint32_t n_a = a->last - a->first, n_b = b->last - b->first;
-    /* One by one they would be cheaper. */
+    /* Testing the pairs one by one is cheaper. */
     if ((double)VISIBILITY_PACKET * n_a * n_b < (double)segments) return false;
     size_t blocked = 0;
     pair_sampler sampler, elements;
-    pair_sampler_init(&sampler, l->seed, a->first, b->first);
-    pair_sampler_init(&elements, ~l->seed, a->first, b->first);
+    pair_sampler_init(&sampler, o->seed, a->first, b->first);
+    pair_sampler_init(&elements, ~o->seed, a->first, b->first);
     for (uint32_t index = 0; blocked < segments; index += VISIBILITY_PACKET) {
-        /* Clusters of which few elements face each other are better taken apart. */
+        /* Clusters with few elements that face each other are better split. */
         if (index > 64 && blocked < index / 4) return false;
-        bundle s;
+        segment_bundle s;
         unsigned facing = 0;
         for (uint32_t k = 0; k < VISIBILITY_PACKET; k++) {
             double which[4], x[4];
@@ -252,11 +256,11 @@ bool look_is_hidden(const look *l, const cluster_tree *t, const cluster *a, cons
             pair_sampler_place(&sampler, index + k, x);
             const uint32_t i = t->element[a->first + (uint32_t)(which[0] * n_a)];
             const uint32_t j = t->element[b->first + (uint32_t)(which[1] * n_b)];
-            bundle_set(&s, l, (int)k, i, &l->polygons[i], j, &l->polygons[j], x);
+            segment_set(&s, o, (int)k, i, &o->polygons[i], j, &o->polygons[j], x);
             facing |= (unsigned)(s.kernel[k] > 0) << k;
         }
-        /* A segment behind either element says nothing. */
-        if ((facing & ~visibility_blocked(l->v, &s.segments, VISIBILITY_PACKET, s.from, s.to)) != 0)
+        /* Segments behind either element do not count. */
+        if ((facing & ~visibility_blocked(o->v, &s.segments, VISIBILITY_PACKET, s.from, s.to)) != 0)
             return false;
         blocked += (size_t)__builtin_popcount(facing);
     }

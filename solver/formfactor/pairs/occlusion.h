@@ -1,4 +1,6 @@
-/* What is hidden of a pair of elements, or of clusters: segments between points of the two. */
+/* Occlusion of a pair of elements or of clusters, estimated by visibility segments between points of the two:
+ *     A_i F_ij ~ g sum_k K_k V_k / sum_k K_k,   K = cos cos' / (pi r^2),   V = 1 where segment k is not
+ * blocked with g the unoccluded exchange area of pair_factor.h. Knows no rows. */
 #ifndef LAMBERT_FORMFACTOR_PAIRS_OCCLUSION_H
 #define LAMBERT_FORMFACTOR_PAIRS_OCCLUSION_H
 
@@ -6,37 +8,38 @@
 #include "solver/formfactor/pairs/pair_factor.h"
 #include "solver/formfactor/visibility/visibility.h"
 
-/* What is looked at. */
-typedef struct look {
+/* The scene and the accuracy of its occlusion tests. All of it is only read, by any number of threads. */
+typedef struct occlusion {
     const visibility *v;
     const double *area;      /* [n] */
     const polygon *polygons; /* [n] */
-    const pair_rules *rules;
+    const pair_factor_rules *rules;
     double tolerance; /* of the unoccluded factor, relative */
-    double accuracy;  /* of a factor that is partly hidden: standard error */
-    size_t segments;  /* at least, where it may be partly hidden; a multiple of VISIBILITY_PACKET */
+    double accuracy;  /* standard error of the factor of a partly occluded pair */
+    size_t segments;  /* the least that occlusion_estimate casts; a multiple of VISIBILITY_PACKET */
     uint64_t seed;
-} look;
+} occlusion;
 
-typedef enum look_verdict { LOOK_OPEN, LOOK_HIDDEN, LOOK_MIXED } look_verdict;
+typedef enum occlusion_verdict { OCCLUSION_NONE, OCCLUSION_TOTAL, OCCLUSION_PARTIAL } occlusion_verdict;
 
-/* Whether the first look at a pair says as much of it as accuracy asks. */
-bool look_suffices(const look *l, uint32_t i, uint32_t j, double g);
+/* The occlusion test of the pair i, j whose unoccluded exchange area is g > 0: eight segments, up to 256 for
+ * a large factor, until one is blocked and one is not. seen is the estimate of the visible part of g. */
+occlusion_verdict occlusion_test(const occlusion *o, uint32_t i, uint32_t j, double g, double *seen);
 
-/* A first look at the pair i, j whose unoccluded exchange area is g > 0: eight segments, more for a factor
- * that matters more, until two disagree. seen: what of g they say is not hidden. */
-look_verdict look_first(const look *l, uint32_t i, uint32_t j, double g, double *seen);
+/* True where eight segments already reach o->accuracy, because the factor is small: seen is then final. */
+bool occlusion_test_suffices(const occlusion *o, uint32_t i, uint32_t j, double g);
 
-/* About how many segments look_closely will cast. */
-double look_segments(const look *l, uint32_t i, uint32_t j, double g);
+/* The visible part of g, never more than g. Its standard error is o->accuracy as a factor; for a visible
+ * factor F above .1 it is 10 F times that. */
+double occlusion_estimate(const occlusion *o, uint32_t i, uint32_t j, double g);
 
-/* What of g is not hidden, never more than g. The standard error is about accuracy, of a factor F above
- * .1 about 10 F accuracy: of segments enough, each weighted with the kernel. */
-double look_closely(const look *l, uint32_t i, uint32_t j, double g);
+/* About how many segments occlusion_estimate will cast. */
+double occlusion_segments(const occlusion *o, uint32_t i, uint32_t j, double g);
 
-/* Whether a hundred and more segments between two clusters, the more the larger factor (of a point of one to
- * the other) is, are all blocked: what may be seen all the same is about accuracy. False for a factor that
- * would need very many. */
-bool look_is_hidden(const look *l, const cluster_tree *t, const cluster *a, const cluster *b, double factor);
+/* True where all of 128 to 1,024 segments between two clusters are blocked: as many as the largest factor
+ * from a point of one to the other asks for, so that the visible part is about o->accuracy at most. False for
+ * factors that would ask for more. */
+bool occlusion_is_total(const occlusion *o, const cluster_tree *t, const cluster *a, const cluster *b,
+                        double factor);
 
 #endif

@@ -16,7 +16,7 @@ static void subtract(const double *a, const double *b, double *out) {
 /* --- rules --------------------------------------------------------------------------------------------- */
 
 /* Gauss and Legendre: Newton's iteration for the roots of P_n. */
-static void gauss_init(pair_gauss *g, int n) {
+static void gauss_init(gauss_rule *g, int n) {
     g->n = n;
     for (int k = 0; k < n; k++) {
         double x = cos(pi * (k + .75) / (n + .5)), derivative = 1;
@@ -37,13 +37,13 @@ static void gauss_init(pair_gauss *g, int n) {
     }
 }
 
-void pair_rules_init(pair_rules *rules) {
-    static const int nodes[PAIR_GAUSS_RULES] = {1, 2, 3, 4, 8, 16, 24};
-    for (int r = 0; r < PAIR_GAUSS_RULES; r++) gauss_init(&rules->gauss[r], nodes[r]);
+void pair_factor_rules_init(pair_factor_rules *rules) {
+    static const int nodes[GAUSS_RULES] = {1, 2, 3, 4, 8, 16, 24};
+    for (int r = 0; r < GAUSS_RULES; r++) gauss_init(&rules->gauss[r], nodes[r]);
     /* s = 1/(1 + exp(-pi sinh t)), ds = pi cosh t s (1 - s) dt */
     const double step = 1. / 16;
-    for (int k = 0; k < PAIR_STEEP_NODES; k++) {
-        const double t = step * (k - PAIR_STEEP_NODES / 2);
+    for (int k = 0; k < STEEP_NODES; k++) {
+        const double t = step * (k - STEEP_NODES / 2);
         const double s = 1 / (1 + exp(-pi * sinh(t))), rest = 1 / (1 + exp(pi * sinh(t)));
         rules->steep_node[k] = s;
         rules->steep_weight[k] = step * pi * cosh(t) * s * rest;
@@ -130,7 +130,7 @@ static double distance_to_edge(const double point[3], const edge *e) {
 }
 
 /* Quadrature over edge one, the shorter, of what is known over edge two. */
-static double skew_edges(const pair_rules *rules, const edge *one, const edge *two, double cosine) {
+static double skew_edges(const pair_factor_rules *rules, const edge *one, const edge *two, double cosine) {
     double places[3], ends[5] = {0};
     const int n_places = steep_places(one, two, cosine, places);
     /* The distance of the edges is reached at one of those places or at an end. */
@@ -145,7 +145,7 @@ static double skew_edges(const pair_rules *rules, const edge *one, const edge *t
     /* A singularity at distance delta of the unit interval leaves n Gauss nodes an error of
      * (2 delta + sqrt(1 + 4 delta^2))^-2n: below 1e-9 for these. */
     const double delta = nearest / one->length;
-    const pair_gauss *gauss = delta > 1 ? &rules->gauss[4] : delta > .4 ? &rules->gauss[5] : &rules->gauss[6];
+    const gauss_rule *gauss = delta > 1 ? &rules->gauss[4] : delta > .4 ? &rules->gauss[5] : &rules->gauss[6];
     if (delta > .25) {
         for (int k = 0; k < gauss->n; k++)
             sum += gauss->weight[k] * point_to_edge(one, two, gauss->node[k] * one->length);
@@ -156,7 +156,7 @@ static double skew_edges(const pair_rules *rules, const edge *one, const edge *t
     for (int piece = 0; piece <= n_places; piece++) {
         const double length = ends[piece + 1] - ends[piece];
         double part = 0;
-        for (int k = 0; k < PAIR_STEEP_NODES; k++)
+        for (int k = 0; k < STEEP_NODES; k++)
             part +=
                 rules->steep_weight[k] * point_to_edge(one, two, ends[piece] + rules->steep_node[k] * length);
         sum += part * length;
@@ -166,7 +166,7 @@ static double skew_edges(const pair_rules *rules, const edge *one, const edge *t
 
 /* Double integral of ln r^2. The closed form for parallel edges loses the ratio of their lengths to rounding.
  */
-static double two_edges(const pair_rules *rules, const edge *a, const edge *b, double cosine) {
+static double two_edges(const pair_factor_rules *rules, const edge *a, const edge *b, double cosine) {
     const edge *one = a->length <= b->length ? a : b, *two = one == a ? b : a;
     double off[3];
     for (int d = 0; d < 3; d++) off[d] = one->along[d] - cosine * two->along[d];
@@ -176,7 +176,7 @@ static double two_edges(const pair_rules *rules, const edge *a, const edge *b, d
 
 /* A F = 1/(4 pi) sum over edges of cos(d, d') integral integral ln r^2 ds dt. Any unit of length does, as the
  * edges of each polygon sum to 0: the one taken keeps the logarithms small. */
-static double contour(const pair_rules *rules, const polygon *a, const polygon *b, double distance) {
+static double contour(const pair_factor_rules *rules, const polygon *a, const polygon *b, double distance) {
     const double scale = 1 / fmax(distance, a->radius + b->radius);
     edge of_a[POLYGON_CORNERS], of_b[POLYGON_CORNERS];
     polygon near_a = *a, near_b = *b;
@@ -206,7 +206,7 @@ typedef struct cubature_points {
 
 /* The square (u, w) -> first + u one + w two, weights of sum area. */
 static void map_square(const double *first, const double *one, const double *two, double area,
-                       const pair_gauss *g, cubature_points *points) {
+                       const gauss_rule *g, cubature_points *points) {
     for (int i = 0; i < g->n; i++)
         for (int j = 0; j < g->n; j++) {
             const int at = points->n++;
@@ -219,7 +219,7 @@ static void map_square(const double *first, const double *one, const double *two
 
 /* The square folded to a triangle: (u, w) -> u (1 - w), u w, of area 2 A u du dw. */
 static void map_triangle(const double *first, const double *one, const double *two, double area,
-                         const pair_gauss *g, cubature_points *points) {
+                         const gauss_rule *g, cubature_points *points) {
     for (int i = 0; i < g->n; i++)
         for (int j = 0; j < g->n; j++) {
             const double u = g->node[i], w = g->node[j];
@@ -230,7 +230,7 @@ static void map_triangle(const double *first, const double *one, const double *t
         }
 }
 
-static void set_points(const polygon *p, const pair_gauss *g, cubature_points *points) {
+static void set_points(const polygon *p, const gauss_rule *g, cubature_points *points) {
     points->n = 0;
     if (p->n == 4 && p->affine) {
         map_square(p->corner[0], p->corner[1], p->corner[3], polygon_area(p), g, points);
@@ -247,7 +247,7 @@ static void set_points(const polygon *p, const pair_gauss *g, cubature_points *p
 }
 
 /* A F = integral integral cos cos' / (pi r^2) */
-static double cubature(const polygon *a, const polygon *b, const pair_gauss *g) {
+static double cubature(const polygon *a, const polygon *b, const gauss_rule *g) {
     cubature_points of_a, of_b;
     set_points(a, g, &of_a);
     set_points(b, g, &of_b);
@@ -268,20 +268,21 @@ static double cubature(const polygon *a, const polygon *b, const pair_gauss *g) 
 
 /* A singularity q half-widths away leaves n Gauss nodes an error of about (2 q)^-2n in each of the four
  * directions, times what the fourth power of the distance brings. */
-double pair_far_enough(int nodes, double tolerance) {
+double pair_factor_distance(int nodes, double tolerance) {
     return fmax(2, .5 * pow(.03 * tolerance, -.5 / nodes));
 }
 
 /* The rule that is far enough; NULL: none of those that pay. */
-static const pair_gauss *far_rule(const pair_rules *rules, const polygon *a, const polygon *b,
+static const gauss_rule *far_rule(const pair_factor_rules *rules, const polygon *a, const polygon *b,
                                   double distance, double tolerance) {
     const double wide = fmax(a->radius, b->radius), q = (distance - wide) / wide;
-    for (int r = 0; r < PAIR_FAR_RULES && q > 2; r++)
-        if (q >= pair_far_enough(rules->gauss[r].n, tolerance)) return &rules->gauss[r];
+    for (int r = 0; r < CUBATURE_RULES && q > 2; r++)
+        if (q >= pair_factor_distance(rules->gauss[r].n, tolerance)) return &rules->gauss[r];
     return NULL;
 }
 
-double pair_exchange(const pair_rules *rules, const polygon *a, const polygon *b, double tolerance) {
+double pair_factor_exchange(const pair_factor_rules *rules, const polygon *a, const polygon *b,
+                            double tolerance) {
     polygon seen_a, seen_b;
     polygon_in_front(b, a, &seen_b);
     if (seen_b.n == 0) return 0;
@@ -290,6 +291,6 @@ double pair_exchange(const pair_rules *rules, const polygon *a, const polygon *b
     double r[3];
     subtract(seen_a.centre, seen_b.centre, r);
     const double distance = sqrt(dot(r, r));
-    const pair_gauss *far = far_rule(rules, &seen_a, &seen_b, distance, tolerance);
+    const gauss_rule *far = far_rule(rules, &seen_a, &seen_b, distance, tolerance);
     return far != NULL ? cubature(&seen_a, &seen_b, far) : contour(rules, &seen_a, &seen_b, distance);
 }

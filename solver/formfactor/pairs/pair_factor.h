@@ -4,31 +4,32 @@
 
 #include "solver/formfactor/pairs/polygon.h"
 
-enum { PAIR_GAUSS_MOST = 24, PAIR_GAUSS_RULES = 7, PAIR_FAR_RULES = 4, PAIR_STEEP_NODES = 105 };
+enum { GAUSS_NODES_MOST = 24, GAUSS_RULES = 7, CUBATURE_RULES = 4, STEEP_NODES = 105 };
 
 /* Nodes on [0, 1] and their weights. */
-typedef struct pair_gauss {
+typedef struct gauss_rule {
     int n;
-    double node[PAIR_GAUSS_MOST], weight[PAIR_GAUSS_MOST];
-} pair_gauss;
+    double node[GAUSS_NODES_MOST], weight[GAUSS_NODES_MOST];
+} gauss_rule;
 
 /* Integration rules, made once and then shared by any number of threads. */
-typedef struct pair_rules {
-    pair_gauss gauss[PAIR_GAUSS_RULES]; /* 1, 2, 3, 4, 8, 16, 24 nodes */
+typedef struct pair_factor_rules {
+    gauss_rule gauss[GAUSS_RULES]; /* 1, 2, 3, 4, 8, 16, 24 nodes */
     /* tanh-sinh (Takahasi and Mori 1974), for integrands that are steep at an end */
-    double steep_node[PAIR_STEEP_NODES], steep_weight[PAIR_STEEP_NODES];
-} pair_rules;
+    double steep_node[STEEP_NODES], steep_weight[STEEP_NODES];
+} pair_factor_rules;
 
-void pair_rules_init(pair_rules *rules);
+void pair_factor_rules_init(pair_factor_rules *rules);
 
 /* How many radii (of the larger) beyond one the centres of two polygons must be apart for a product rule of
  * nodes x nodes points on either to keep the relative tolerance. */
-double pair_far_enough(int nodes, double tolerance);
+double pair_factor_distance(int nodes, double tolerance);
 
 /* A_a F_ab = A_b F_ba, m^2, of two polygons with nothing between them: each sees what of the other lies in
  * front of its plane. To the relative tolerance, at best 1e-8 (and 1e-10 of A_a), wherever they lie:
  * touching, crossing one another's planes, or far apart. Contour integral (Sparrow 1963) when near, cubature
  * of the kernel when far. Cost: about 0.1 us far, 1 near, 100 for touching edges that are not parallel. */
-double pair_exchange(const pair_rules *rules, const polygon *a, const polygon *b, double tolerance);
+double pair_factor_exchange(const pair_factor_rules *rules, const polygon *a, const polygon *b,
+                            double tolerance);
 
 #endif

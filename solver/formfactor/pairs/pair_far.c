@@ -8,7 +8,7 @@
 
 enum { COLUMNS = 3 + 3 + 1 + 4 * 3 + (3 + 1) * (4 + 9) };
 
-static void share_out(far_table *t) {
+static void share_out(pair_far_table *t) {
     double *next = t->block;
     const size_t stride = t->stride;
     for (int d = 0; d < 3; d++, next += stride) t->centre[d] = next;
@@ -17,7 +17,7 @@ static void share_out(far_table *t) {
     next += stride;
     for (int c = 0; c < 4; c++)
         for (int d = 0; d < 3; d++, next += stride) t->corner[c][d] = next;
-    for (int r = 0; r < FAR_RULES; r++)
+    for (int r = 0; r < PAIR_FAR_RULES; r++)
         for (int p = 0; p < t->rule[r].points; p++) {
             for (int d = 0; d < 3; d++, next += stride) t->rule[r].point[p][d] = next;
             t->rule[r].weight[p] = next;
@@ -27,7 +27,7 @@ static void share_out(far_table *t) {
 
 /* A product rule over the unit square, mapped to the polygon: bilinear, or folded to a triangle, (u, w) ->
  * u (1 - w), u w; weighted with the area that a unit of the square has there. */
-static void set_points(far_rule_points *rule, size_t at, const polygon *p, const pair_gauss *g) {
+static void set_points(pair_far_points *rule, size_t at, const polygon *p, const gauss_rule *g) {
     const double share = 1 / sqrt(3.14159265358979323846); /* half of the kernel's 1/pi */
     const double *first = p->corner[0], *one = p->corner[1], *two = p->corner[2];
     const double twice_area = 2 * polygon_area(p);
@@ -48,7 +48,7 @@ static void set_points(far_rule_points *rule, size_t at, const polygon *p, const
         }
 }
 
-static void set_element(far_table *t, size_t at, const polygon *p, const pair_rules *rules) {
+static void set_element(pair_far_table *t, size_t at, const polygon *p, const pair_factor_rules *rules) {
     const int last = p->n == 3 ? 2 : 3;
     for (int d = 0; d < 3; d++) {
         t->centre[d][at] = p->centre[d];
@@ -56,21 +56,22 @@ static void set_element(far_table *t, size_t at, const polygon *p, const pair_ru
         for (int c = 0; c < 4; c++) t->corner[c][d][at] = p->corner[c < last ? c : last][d];
     }
     t->radius[at] = p->radius;
-    for (int r = 0; r < FAR_RULES; r++) set_points(&t->rule[r], at, p, &rules->gauss[r + 1]);
+    for (int r = 0; r < PAIR_FAR_RULES; r++) set_points(&t->rule[r], at, p, &rules->gauss[r + 1]);
 }
 
-lam_status far_table_build(const polygon *polygons, const cluster_tree *tree, const pair_rules *rules,
-                           double tolerance, far_table *out, lam_error *error) {
-    far_table t = {.n = tree->n, .stride = tree->n + FAR_LANES};
+lam_status pair_far_table_build(const polygon *polygons, const cluster_tree *tree,
+                                const pair_factor_rules *rules, double tolerance, pair_far_table *out,
+                                lam_error *error) {
+    pair_far_table t = {.n = tree->n, .stride = tree->n + PAIR_FAR_LANES};
     size_t count;
     if (!size_multiply(t.stride, COLUMNS, &count))
         return status_fail(error, LAM_ERR_MEMORY, "%zu elements are too many", t.n);
     t.block = memory_allocate(count, sizeof *t.block, "pairs", error);
     if (t.block == NULL) return LAM_ERR_MEMORY;
-    for (int r = 0; r < FAR_RULES; r++) {
+    for (int r = 0; r < PAIR_FAR_RULES; r++) {
         const int nodes = rules->gauss[r + 1].n;
         t.rule[r].points = nodes * nodes;
-        t.rule[r].closest = 1 + pair_far_enough(nodes, tolerance);
+        t.rule[r].closest = 1 + pair_factor_distance(nodes, tolerance);
     }
     share_out(&t);
     for (size_t at = 0; at < t.n; at++) set_element(&t, at, &polygons[tree->element[at]], rules);
@@ -79,9 +80,9 @@ lam_status far_table_build(const polygon *polygons, const cluster_tree *tree, co
     return LAM_OK;
 }
 
-void far_table_free(far_table *t) {
+void pair_far_table_free(pair_far_table *t) {
     free(t->block);
-    *t = (far_table){0};
+    *t = (pair_far_table){0};
 }
 
 /* --- kernels ------------------------------------------------------------------------------------------- */
@@ -124,16 +125,16 @@ typedef long long mask_plain __attribute__((vector_size(16)));
 #undef lane
 #undef mask
 
-void far_row(const far_table *t, size_t i, size_t first, size_t count, double *g) {
+void pair_far_row(const pair_far_table *t, size_t i, size_t first, size_t count, double *g) {
 #if defined(__x86_64__)
     if (__builtin_cpu_supports("avx512dq")) {
-        far_row_avx512(t, i, first, count, g);
+        pair_far_row_avx512(t, i, first, count, g);
         return;
     }
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-        far_row_avx2(t, i, first, count, g);
+        pair_far_row_avx2(t, i, first, count, g);
         return;
     }
 #endif
-    far_row_plain(t, i, first, count, g);
+    pair_far_row_plain(t, i, first, count, g);
 }

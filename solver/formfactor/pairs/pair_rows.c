@@ -80,11 +80,11 @@ lam_status pair_rows_append(const pair_rows *rows, size_t block, const uint32_t 
     const pair_block *b = &rows->blocks[block];
     const size_t first = pair_rows_first(block), length = pair_rows_length(rows, block);
     uint8_t *bytes = memory_allocate(b->used + 1, ROW_PAIR_BYTES, "pairs", error), *to = bytes;
-    found_row *found = memory_allocate(rows->n, sizeof *found, "pairs", error);
+    packed_row *found = memory_allocate(rows->n, sizeof *found, "pairs", error);
     if (bytes == NULL || found == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t r = 0; r < length; r++) {
         const size_t begin = b->begin[r], count = b->begin[r + 1] - begin;
-        found[order[first + r]] = (found_row){to, (uint32_t)(count * ROW_PAIR_BYTES), (uint32_t)count};
+        found[order[first + r]] = (packed_row){to, (uint32_t)(count * ROW_PAIR_BYTES), (uint32_t)count};
         if (count == 0) continue;
         memcpy(to, b->other + begin, count * sizeof *b->other);
         memcpy(to + 4 * count, b->exchange + begin, count * sizeof *b->exchange);
@@ -105,13 +105,13 @@ static lam_status read_block(const pair_rows *rows, size_t block, const uint32_t
     pair_block fresh = {0};
     void *data = NULL;
     size_t total = 0;
-    found_row *found = memory_allocate(rows->n, sizeof *found, "pairs", error);
+    packed_row *found = memory_allocate(rows->n, sizeof *found, "pairs", error);
     if (found == NULL) return LAM_ERR_MEMORY;
     TRY(row_file_read(f, block, found, &data, error));
     for (size_t r = 0; r < length; r++) total += found[order[first + r]].n_entries;
     if (!block_resize(&fresh, total)) FAIL(error, LAM_ERR_MEMORY, "pairs: out of memory");
     for (size_t r = 0; r < length; r++) {
-        const found_row *row = &found[order[first + r]];
+        const packed_row *row = &found[order[first + r]];
         const size_t count = row->n_entries;
         fresh.begin[r] = fresh.used;
         if (count == 0) continue;

@@ -15,13 +15,13 @@ enum { NEIGHBOURS_MOST = 12 };
 typedef struct pairs_run {
     const mesh *m;
     const pairs_options *options;
-    pair_rules rules;
+    pair_factor_rules rules;
     polygon *polygons; /* [n], by element */
-    look look;
+    occlusion occlusion;
     cluster_tree tree;
     uint32_t *leaf;   /* [n], the leaf of a position */
     uint32_t *parent; /* of each cluster */
-    far_table far;
+    pair_far_table far;
     cluster_links links;
     uint32_t (*neighbours)[NEIGHBOURS_MOST]; /* [n], by element */
     pair_rows rows;
@@ -77,9 +77,11 @@ static double factor_of(const pairs_run *run, uint32_t i, uint32_t j, double g) 
 /* A first look; where it suffices the pair is settled, and g becomes what is seen of it. */
 static int look_at(const pairs_run *run, uint32_t i, uint32_t j, double *g) {
     double seen;
-    const look_verdict verdict = look_first(&run->look, i, j, *g, &seen);
-    const int state = verdict == LOOK_OPEN ? PAIR_OPEN : verdict == LOOK_HIDDEN ? PAIR_HIDDEN : PAIR_MIXED;
-    if (!look_suffices(&run->look, i, j, *g)) return state;
+    const occlusion_verdict verdict = occlusion_test(&run->occlusion, i, j, *g, &seen);
+    const int state = verdict == OCCLUSION_NONE    ? PAIR_OPEN
+                      : verdict == OCCLUSION_TOTAL ? PAIR_HIDDEN
+                                                   : PAIR_MIXED;
+    if (!occlusion_test_suffices(&run->occlusion, i, j, *g)) return state;
     *g = seen;
     return state | PAIR_SETTLED;
 }
@@ -95,13 +97,13 @@ static bool find_row(const pairs_run *run, uint32_t position, const leaf_reaches
             double exchange[PIECE];
             const uint32_t count = r->last - first < PIECE ? r->last - first : PIECE;
             if (!pair_block_reserve(block, count)) return false;
-            far_row(&run->far, position, first, count, exchange);
+            pair_far_row(&run->far, position, first, count, exchange);
             for (uint32_t c = 0; c < count; c++) {
                 const uint32_t j = run->tree.element[first + c];
                 double g = exchange[c];
                 if (g < 0)
-                    g = pair_exchange(&run->rules, &run->polygons[i], &run->polygons[j],
-                                      run->options->tolerance);
+                    g = pair_factor_exchange(&run->rules, &run->polygons[i], &run->polygons[j],
+                                             run->options->tolerance);
                 if (!((float)g > 0) || factor_of(run, i, j, g) < run->options->threshold) continue;
                 const int state = r->open ? PAIR_CERTAIN : look_at(run, i, j, &g);
                 pair_block_add(block, first + c, (float)g, (uint8_t)state);
@@ -164,7 +166,7 @@ static double segments_of_block(const pairs_run *run, size_t index) {
         const uint32_t i = run->tree.element[pair_rows_first(index) + r],
                        j = run->tree.element[block->other[at]];
         if (is_mixed(run, i, j, block->state[at]))
-            sum += look_segments(&run->look, i, j, (double)block->exchange[at]);
+            sum += occlusion_segments(&run->occlusion, i, j, (double)block->exchange[at]);
     }
     return sum;
 }
@@ -181,7 +183,7 @@ static lam_status share_segments(pairs_run *run, lam_error *error) {
     for (size_t b = 0; b < n_blocks; b++) wanted += of_block[b];
     free(of_block);
     const double cast = fmin(fmax(wanted, run->options->segments_least), run->options->segments_most);
-    if (wanted > 0) run->look.accuracy *= pow(wanted / cast, .75);
+    if (wanted > 0) run->occlusion.accuracy *= pow(wanted / cast, .75);
     return LAM_OK;
 }
 
@@ -203,7 +205,8 @@ static void refine_block(pairs_run *run, size_t index, bool known, pairs_report 
         } else if (is_mixed(run, i, j, block->state[at])) {
             sum->mixed++;
             if (!known)
-                block->exchange[at] = (float)look_closely(&run->look, i, j, (double)block->exchange[at]);
+                block->exchange[at] =
+                    (float)occlusion_estimate(&run->occlusion, i, j, (double)block->exchange[at]);
         } else if (state == PAIR_OPEN) {
             sum->open++;
         } else {
@@ -321,7 +324,7 @@ static lam_status run_passes(pairs_run *run, pairs_report *report, size_t *kept,
     TRY(share_segments(run, error));
     TRY(pass_run(&refine, error));
     *report = refine.report;
-    report->accuracy = run->look.accuracy;
+    report->accuracy = run->occlusion.accuracy;
     if (kept != NULL) *kept = find.kept;
 done:
     row_file_close(find.file);
@@ -397,25 +400,26 @@ lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_option
     const size_t n = m->n;
     const double slack = visibility_rounding(v);
     pairs_run run = {.m = m, .options = options};
-    const link_options how = {.threshold = options->threshold, .slack = slack, .progress = options->progress};
-    pair_rules_init(&run.rules);
+    const cluster_link_options how = {
+        .threshold = options->threshold, .slack = slack, .progress = options->progress};
+    pair_factor_rules_init(&run.rules);
     run.polygons = memory_allocate(n, sizeof *run.polygons, "pairs", error);
     run.neighbours = memory_allocate(n, sizeof *run.neighbours, "pairs", error);
     if (run.polygons == NULL || run.neighbours == NULL) TRY(LAM_ERR_MEMORY);
     TRY(pair_rows_create(n, &run.rows, error));
     for (size_t i = 0; i < n; i++) polygon_of_element(m, i, &run.polygons[i]);
-    run.look = (look){.v = v,
-                      .area = m->area,
-                      .polygons = run.polygons,
-                      .rules = &run.rules,
-                      .tolerance = options->tolerance,
-                      .accuracy = options->accuracy,
-                      .segments = options->segments,
-                      .seed = options->seed};
+    run.occlusion = (occlusion){.v = v,
+                                .area = m->area,
+                                .polygons = run.polygons,
+                                .rules = &run.rules,
+                                .tolerance = options->tolerance,
+                                .accuracy = options->accuracy,
+                                .segments = options->segments,
+                                .seed = options->seed};
     TRY(neighbours_find(m, run.neighbours, error));
     TRY(cluster_tree_build(m, slack, &run.tree, error));
-    TRY(far_table_build(run.polygons, &run.tree, &run.rules, options->tolerance, &run.far, error));
-    TRY(cluster_links_find(m, &run.tree, &run.look, &how, &run.links, error));
+    TRY(pair_far_table_build(run.polygons, &run.tree, &run.rules, options->tolerance, &run.far, error));
+    TRY(cluster_links_find(m, &run.tree, &run.occlusion, &how, &run.links, error));
     TRY(find_parents(&run, error));
     TRY(run_passes(&run, report, kept, error));
     report->hidden += run.links.hidden_pairs;
@@ -427,7 +431,7 @@ done:
     free(run.neighbours);
     free(run.parent);
     free(run.leaf);
-    far_table_free(&run.far);
+    pair_far_table_free(&run.far);
     cluster_links_free(&run.links);
     cluster_tree_free(&run.tree);
     return status;

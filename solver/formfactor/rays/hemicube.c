@@ -170,7 +170,7 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
 }
 
 lam_status hemicube_trace(const hemicube *h, const mesh *m, const visibility *v, const uint32_t *order,
-                          const form_factor_options *options, found_rows *rows, double *leaving,
+                          const form_factor_options *options, packed_rows *rows, double *leaving,
                           double *absorbed, lam_error *error) {
     const cube_context context = {.h = h, .m = m, .v = v, .sky = options->bounce};
     const row_maker maker = {.make = trace_element,
@@ -187,5 +187,5 @@ lam_status hemicube_trace(const hemicube *h, const mesh *m, const visibility *v,
                              .only_first = options->only_first,
                              .scratch = options->scratch,
                              .scratch_name = options->scratch_name};
-    return rows_make(&maker, order, rows, leaving, absorbed, error);
+    return row_pool_make(&maker, order, rows, leaving, absorbed, error);
 }

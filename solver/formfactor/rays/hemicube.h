@@ -30,9 +30,9 @@ double hemicube_weight(const hemicube *h, int face, size_t row, size_t column);
 
 /* rows gets, for every element, the weight of the pixels through which its centroid sees each other one;
  * leaving and absorbed, [n], the weight of those that show nothing or a back face. The caller frees rows with
- * found_rows_free. Cost: 3 resolution^2 rays an element. */
+ * packed_rows_free. Cost: 3 resolution^2 rays an element. */
 lam_status hemicube_trace(const hemicube *h, const mesh *m, const visibility *v, const uint32_t *order,
-                          const form_factor_options *options, found_rows *rows, double *leaving,
+                          const form_factor_options *options, packed_rows *rows, double *leaving,
                           double *absorbed, lam_error *error);
 
 #endif

@@ -167,16 +167,17 @@ static lam_status begin_block(const ray_rows *r, const uint32_t *elements, size_
 enum { AT_ONCE = 512 };
 
 /* An element looking around, some rays at a time. */
-typedef struct glance {
+typedef struct ray_batch {
     ray_context rays;
     near_row near;
     element_sampler sampler;
     size_t element, first, n_rays;
     ray_tally tally;
     uint32_t met[AT_ONCE]; /* far elements that the last of them met */
-} glance;
+} ray_batch;
 
-static void glance_begin(const ray_rows *r, size_t element, uint64_t seed, const sky_bounce *sky, glance *g) {
+static void ray_batch_begin(const ray_rows *r, size_t element, uint64_t seed, const sky_bounce *sky,
+                            ray_batch *g) {
     g->rays = (ray_context){.m = r->m, .v = r->v, .seed = seed, .sky = sky};
     g->near = near_of(r, element);
     g->element = element;
@@ -188,7 +189,7 @@ static void glance_begin(const ray_rows *r, size_t element, uint64_t seed, const
 
 /* The next rays: how many elements they met that are not near, each once for each ray; false: there are none.
  */
-static bool glance_on(glance *g, double *sky, size_t *count) {
+static bool ray_batch_next(ray_batch *g, double *sky, size_t *count) {
     if (g->first >= g->n_rays) return false;
     const size_t last = g->first + AT_ONCE < g->n_rays ? g->first + AT_ONCE : g->n_rays;
     const size_t all = rays_meet(&g->rays, &g->sampler, g->element, g->first, last, g->met, &g->tally, sky);
@@ -200,7 +201,7 @@ static bool glance_on(glance *g, double *sky, size_t *count) {
 }
 
 /* What hits added up to, then this share of near pairs. */
-static void end_glance(const ray_rows *r, const glance *g, double share, filling *to) {
+static void ray_batch_end(const ray_rows *r, const ray_batch *g, double share, filling *to) {
     put_sums(to, r->m->n);
     for (size_t k = 0; k < g->near.count; k++)
         if (g->near.data[k] > 0) put(to, g->near.indices[k], share * (double)g->near.data[k]);
@@ -217,11 +218,11 @@ static void end_row(row_block *block, size_t k, const filling *to, size_t first)
 
 static void find_row(ray_rows *r, size_t i, double *sky, filling *to) {
     const double *area = r->m->area, each = 1 / (double)r->f.recipe.rays;
-    glance g;
+    ray_batch g;
     double own = 0;
     size_t count;
-    glance_begin(r, i, r->f.recipe.seed, sky != NULL ? &r->f.sky : NULL, &g);
-    while (glance_on(&g, sky, &count))
+    ray_batch_begin(r, i, r->f.recipe.seed, sky != NULL ? &r->f.sky : NULL, &g);
+    while (ray_batch_next(&g, sky, &count))
         for (size_t k = 0; k < count; k++) {
             const uint32_t j = g.met[k];
             const double mine = each * area[j] / (area[i] + area[j]);
@@ -229,7 +230,7 @@ static void find_row(ray_rows *r, size_t i, double *sky, filling *to) {
             own += mine;
             __atomic_fetch_add(&r->received[j], (uint64_t)((each - mine) / unit), __ATOMIC_RELAXED);
         }
-    end_glance(r, &g, .5, to);
+    ray_batch_end(r, &g, .5, to);
     r->own[i] = own;
     r->f.leaving[i] = (double)g.tally.left / (double)g.n_rays;
     r->f.absorbed[i] = (double)g.tally.lost / (double)g.n_rays;
@@ -260,13 +261,13 @@ static lam_status find_rows(void *context, const uint32_t *elements, size_t m, r
 static void find_other_row(const ray_rows *r, size_t i, filling *to) {
     const size_t begin = to->used;
     const double each = 1 / (double)r->f.recipe.rays;
-    glance g;
+    ray_batch g;
     double sum = 0;
     size_t count;
-    glance_begin(r, i, r->other_seed, NULL, &g);
-    while (glance_on(&g, NULL, &count))
+    ray_batch_begin(r, i, r->other_seed, NULL, &g);
+    while (ray_batch_next(&g, NULL, &count))
         for (size_t k = 0; k < count; k++) put_hit(to, g.met[k], each);
-    end_glance(r, &g, 1, to);
+    ray_batch_end(r, &g, 1, to);
     for (size_t e = begin; e < to->used; e++) sum += (double)to->data[e];
     for (size_t e = begin; e < to->used; e++)
         to->data[e] = (float)((double)to->data[e] * r->f.row_sums[i] / sum);
@@ -297,10 +298,10 @@ static lam_status close_rows(void *context, const double **row_sums, lam_error *
     f->row_sums = memory_allocate(n, sizeof *f->row_sums, "row sums", error);
     f->repair = memory_allocate(n, sizeof *f->repair, "row sums", error);
     if (f->row_sums == NULL || f->repair == NULL) TRY(LAM_ERR_MEMORY);
-    closing_measure(f, r->m);
+    leaving_measure(f, r->m);
     for (size_t i = 0; i < n; i++) {
         const double sum = r->near_sums[i] + r->own[i] + (double)r->received[i] * unit;
-        const double all = sum + closing_outside(f, i);
+        const double all = sum + leaving_outside(f, i);
         /* A row that sees nothing has nothing to close. */
         f->row_sums[i] = sum > 0 ? sum / all : 0;
         f->repair[i] = all - 1;
@@ -309,7 +310,7 @@ static lam_status close_rows(void *context, const double **row_sums, lam_error *
         total_area += r->m->area[i];
     }
     f->repair_mean = changed / total_area;
-    if (f->sky.n > 0) TRY(closing_sky(f, n, error));
+    if (f->sky.n > 0) TRY(leaving_to_sky(f, n, error));
     *row_sums = f->row_sums;
 done:
     return status;

@@ -60,7 +60,7 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
 }
 
 lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
-                      const form_factor_options *options, found_rows *counts, double *leaving,
+                      const form_factor_options *options, packed_rows *counts, double *leaving,
                       double *absorbed, lam_error *error) {
     const count_context context = {
         .rays = {.m = m, .v = v, .seed = options->recipe.seed, .sky = options->bounce},
@@ -79,7 +79,7 @@ lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
                              .only_first = options->only_first,
                              .scratch = options->scratch,
                              .scratch_name = options->scratch_name};
-    return rows_make(&maker, order, counts, leaving, absorbed, error);
+    return row_pool_make(&maker, order, counts, leaving, absorbed, error);
 }
 
 void rays_cast_some(const mesh *m, const visibility *v, const uint32_t *order, size_t n_elements,

@@ -8,9 +8,9 @@
 #include "solver/formfactor/visibility/visibility.h"
 
 /* counts gets rows of hits; leaving and absorbed, [n], the shares that met nothing or a back face. The caller
- * frees counts with found_rows_free. */
+ * frees counts with packed_rows_free. */
 lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
-                      const form_factor_options *options, found_rows *counts, double *leaving,
+                      const form_factor_options *options, packed_rows *counts, double *leaving,
                       double *absorbed, lam_error *error);
 
 /* What the rays of every element share. */

@@ -13,7 +13,7 @@ static const uint8_t *get_number_within(const uint8_t *from, const uint8_t *end,
 }
 
 /* Positions ascend below n, exchange areas are finite and not negative. */
-static bool check_pairs(const found_row *row, size_t n) {
+static bool check_pairs(const packed_row *row, size_t n) {
     const size_t count = row->n_entries;
     if (row->n_bytes != count * ROW_PAIR_BYTES) return false;
     for (size_t e = 0; e < count; e++) {
@@ -27,7 +27,7 @@ static bool check_pairs(const found_row *row, size_t n) {
     return true;
 }
 
-bool row_check(row_kind kind, const found_row *row, size_t n) {
+bool row_check(row_kind kind, const packed_row *row, size_t n) {
     if (kind == ROW_PAIRS) return check_pairs(row, n);
     const uint8_t *at = row->bytes, *const end = at + row->n_bytes;
     uint64_t column = 0; /* the smallest that may come */
@@ -54,10 +54,10 @@ bool row_check(row_kind kind, const found_row *row, size_t n) {
     return at == end;
 }
 
-void found_rows_free(found_rows *rows) {
+void packed_rows_free(packed_rows *rows) {
     for (size_t c = 0; c < rows->n_chunks; c++) free(rows->chunks[c]);
     free(rows->chunks);
     free(rows->rows);
     if (rows->map != NULL) munmap((void *)(uintptr_t)rows->map, rows->map_bytes);
-    *rows = (found_rows){0};
+    *rows = (packed_rows){0};
 }

@@ -64,27 +64,27 @@ static inline const uint8_t *row_get(row_kind kind, const uint8_t *from, uint32_
 }
 
 /* A packed row. */
-typedef struct found_row {
+typedef struct packed_row {
     const uint8_t *bytes;
     uint32_t n_bytes, n_entries;
-} found_row;
+} packed_row;
 
 /* Whether a row that comes from a file can be read: whole entries, as many as stated, columns below n, values
  * that are finite and above 0. */
-bool row_check(row_kind kind, const found_row *row, size_t n);
+bool row_check(row_kind kind, const packed_row *row, size_t n);
 
 /* One-sided rows of form factors as they were found, packed, wherever their bytes lie. */
-typedef struct found_rows {
+typedef struct packed_rows {
     size_t n;
     row_kind kind;
-    found_row *rows; /* [n], mesh order */
+    packed_row *rows; /* [n], mesh order */
     size_t n_chunks;
     void **chunks; /* [n_chunks], where the bytes are in memory */
     const void *map;
     size_t map_bytes; /* where they are in a file */
     size_t kept;      /* rows that were there from an earlier run */
-} found_rows;
+} packed_rows;
 
-void found_rows_free(found_rows *rows);
+void packed_rows_free(packed_rows *rows);
 
 #endif

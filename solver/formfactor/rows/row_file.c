@@ -169,7 +169,7 @@ static bool check_block(const row_file *f, size_t block, const void *data, size_
     const row_head *heads = data;
     uint64_t at = n_rows * sizeof *heads;
     for (size_t r = 0; r < n_rows; r++) {
-        const found_row row = {(const uint8_t *)data + at, heads[r].n_bytes, heads[r].n_entries};
+        const packed_row row = {(const uint8_t *)data + at, heads[r].n_bytes, heads[r].n_entries};
         at += row.n_bytes;
         if (at > bytes || !row_check(f->contents.kind, &row, f->contents.n)) return false;
         if (!(heads[r].leaving >= 0 && heads[r].leaving <= 1 + 1e-9) ||
@@ -253,7 +253,7 @@ size_t row_file_kept(const row_file *f) {
 /* --- writing and reading -----------------------------------------------------------------------------------
  */
 
-lam_status row_file_read(const row_file *f, size_t block, found_row *rows, void **data, lam_error *error) {
+lam_status row_file_read(const row_file *f, size_t block, packed_row *rows, void **data, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t first = block_first(f, block), n_rows = block_length(f, block);
     block_head head;
@@ -266,7 +266,7 @@ lam_status row_file_read(const row_file *f, size_t block, found_row *rows, void 
     for (size_t r = 0; r < n_rows; r++) {
         row_head row;
         memcpy(&row, bytes + r * sizeof row, sizeof row);
-        rows[f->order[first + r]] = (found_row){bytes + at, row.n_bytes, row.n_entries};
+        rows[f->order[first + r]] = (packed_row){bytes + at, row.n_bytes, row.n_entries};
         at += row.n_bytes;
     }
     *data = bytes;
@@ -276,7 +276,7 @@ done:
     return status;
 }
 
-lam_status row_file_append(row_file *f, size_t block, const found_row *rows, const double *leaving,
+lam_status row_file_append(row_file *f, size_t block, const packed_row *rows, const double *leaving,
                            const double *absorbed, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t first = block_first(f, block), n_rows = block_length(f, block);
@@ -315,7 +315,7 @@ done:
     return status;
 }
 
-lam_status row_file_map(row_file *f, found_rows *rows, double *leaving, double *absorbed, lam_error *error) {
+lam_status row_file_map(row_file *f, packed_rows *rows, double *leaving, double *absorbed, lam_error *error) {
     lam_status status = LAM_OK;
     void *map = mmap(NULL, f->end, PROT_READ, MAP_SHARED, f->fd, 0);
     if (map == MAP_FAILED) FAIL(error, LAM_ERR_IO, "%s: %s", f->path, strerror(errno));
@@ -330,7 +330,7 @@ lam_status row_file_map(row_file *f, found_rows *rows, double *leaving, double *
             memcpy(&head, data + r * sizeof head, sizeof head);
             leaving[i] = head.leaving;
             absorbed[i] = head.absorbed;
-            rows->rows[i] = (found_row){at, head.n_bytes, head.n_entries};
+            rows->rows[i] = (packed_row){at, head.n_bytes, head.n_entries};
             at += head.n_bytes;
         }
         for (size_t r = 0; r < n_rows && f->contents.sky != NULL; r++, at += sky_bytes(f))

@@ -33,17 +33,17 @@ bool row_file_has(const row_file *f, size_t block);
 size_t row_file_kept(const row_file *f);
 
 /* Reads a block that is there: rows, by element, point into data, which the caller frees. */
-lam_status row_file_read(const row_file *f, size_t block, found_row *rows, void **data, lam_error *error);
+lam_status row_file_read(const row_file *f, size_t block, packed_row *rows, void **data, lam_error *error);
 
 /* Appends a block, whose rows (by element), leaving, absorbed (or neither) and bins of the sky are there. One
  * thread at a time. On LAM_ERR_IO (a full disk) the file holds the blocks it held. Flushed to the disk every
  * few seconds.
  */
-lam_status row_file_append(row_file *f, size_t block, const found_row *rows, const double *leaving,
+lam_status row_file_append(row_file *f, size_t block, const packed_row *rows, const double *leaving,
                            const double *absorbed, lam_error *error);
 
 /* When all blocks are there: rows->rows point into a mapping of the file, which rows owns from then on;
  * leaving, absorbed, [n], and the bins of the sky are filled. */
-lam_status row_file_map(row_file *f, found_rows *rows, double *leaving, double *absorbed, lam_error *error);
+lam_status row_file_map(row_file *f, packed_rows *rows, double *leaving, double *absorbed, lam_error *error);
 
 #endif

@@ -48,7 +48,7 @@ static void pools_free(row_pool *pools, size_t n_pools) {
 }
 
 /* Packs the sums with ascending columns and clears them. */
-static bool take_row(row_pool *pool, row_kind kind, found_row *row) {
+static bool take_row(row_pool *pool, row_kind kind, packed_row *row) {
     const size_t length = marks_take(&pool->summed);
     const uint32_t *columns = pool->summed.taken;
     if (!pool_reserve(pool, length * ROW_ENTRY_MOST)) return false;
@@ -60,7 +60,7 @@ static bool take_row(row_pool *pool, row_kind kind, found_row *row) {
         next = j + 1;
         pool->sums[j] = 0;
     }
-    *row = (found_row){.n_bytes = (uint32_t)(to - begin), .n_entries = (uint32_t)length};
+    *row = (packed_row){.n_bytes = (uint32_t)(to - begin), .n_entries = (uint32_t)length};
     pool->used += (size_t)(to - begin);
     return true;
 }
@@ -69,7 +69,7 @@ static bool take_row(row_pool *pool, row_kind kind, found_row *row) {
 typedef struct rows_run {
     const row_maker *maker;
     const uint32_t *order;
-    found_rows *rows;
+    packed_rows *rows;
     size_t n_wanted; /* elements of the order whose rows are made */
     double *leaving, *absorbed;
     row_file *file;         /* NULL: all in memory */
@@ -117,7 +117,7 @@ static void make_chunk(rows_run *run, size_t c, row_pool *pool) {
     if (pool->used > 0) memcpy(bytes, pool->bytes, pool->used);
     run->rows->chunks[c] = bytes;
     for (size_t position = first; position < last; position++) {
-        found_row *row = &run->rows->rows[run->order[position]];
+        packed_row *row = &run->rows->rows[run->order[position]];
         row->bytes = bytes;
         bytes += row->n_bytes;
     }
@@ -143,7 +143,7 @@ static void finish_chunk(rows_run *run, size_t c) {
     if (status != LAM_OK) run_fail(run, status, &error);
 }
 
-static void tell_progress(rows_run *run, size_t elements) {
+static void report_rows(rows_run *run, size_t elements) {
     const row_maker *maker = run->maker;
 #pragma omp critical(rows_progress)
     {
@@ -171,12 +171,12 @@ static size_t at_least_one(size_t x) {
     return x < 1 ? 1 : x;
 }
 
-lam_status rows_make(const row_maker *maker, const uint32_t *order, found_rows *rows, double *leaving,
-                     double *absorbed, lam_error *error) {
+lam_status row_pool_make(const row_maker *maker, const uint32_t *order, packed_rows *rows, double *leaving,
+                         double *absorbed, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = maker->m->n, n_pools = (size_t)omp_get_max_threads();
     row_pool *pools = NULL;
-    found_rows found = {.n = n, .kind = maker->kind};
+    packed_rows found = {.n = n, .kind = maker->kind};
     const bool some = maker->only_first > 0 && maker->only_first < n && maker->scratch == NULL;
     const size_t n_wanted = some ? maker->only_first : n;
     rows_run run = {.maker = maker,
@@ -211,7 +211,7 @@ lam_status rows_make(const row_maker *maker, const uint32_t *order, found_rows *
         make_chunk(&run, c, &pools[omp_get_thread_num()]);
         if (found.chunks[c] == NULL) continue;
         finish_chunk(&run, c);
-        tell_progress(&run, c + 1 < n_chunks ? run.chunk : n_wanted - c * run.chunk);
+        report_rows(&run, c + 1 < n_chunks ? run.chunk : n_wanted - c * run.chunk);
     }
     if (run.status != LAM_OK) {
         if (error != NULL) *error = run.error;
@@ -219,11 +219,11 @@ lam_status rows_make(const row_maker *maker, const uint32_t *order, found_rows *
     }
     if (run.file != NULL) TRY(row_file_map(run.file, &found, leaving, absorbed, error));
     *rows = found;
-    found = (found_rows){0};
+    found = (packed_rows){0};
 done:
     pools_free(pools, n_pools);
     free(run.left);
     row_file_close(run.file);
-    found_rows_free(&found);
+    packed_rows_free(&found);
     return status;
 }

@@ -54,10 +54,10 @@ typedef struct row_maker {
 
 /* Makes the rows of all elements, or of the first of the order; the same for any number of threads, with a
  * scratch folder and without, and whatever of them was there already. order is [n], the sequence in which
- * elements are worked on; leaving and absorbed are [n]. The caller frees rows with found_rows_free. Errors:
+ * elements are worked on; leaving and absorbed are [n]. The caller frees rows with packed_rows_free. Errors:
  * LAM_ERR_MEMORY, LAM_ERR_CANCELLED, and those of row_file.h; what is in the scratch folder by then stays
  * there. */
-lam_status rows_make(const row_maker *maker, const uint32_t *order, found_rows *rows, double *leaving,
-                     double *absorbed, lam_error *error);
+lam_status row_pool_make(const row_maker *maker, const uint32_t *order, packed_rows *rows, double *leaving,
+                         double *absorbed, lam_error *error);
 
 #endif

@@ -11,21 +11,22 @@ static size_t panel_entries(size_t all) {
     return some < PANEL_LEAST ? PANEL_LEAST : some > PANEL_MOST ? PANEL_MOST : some;
 }
 
-typedef struct column_entry {
+typedef struct transpose_entry {
     uint32_t column, row;
     float value;
-} column_entry;
+} transpose_entry;
 
 /* Entries of some consecutive rows, as they come. */
-typedef struct column_slice {
-    column_entry *entries;
+typedef struct transpose_slice {
+    transpose_entry *entries;
     size_t count, capacity;
     bool failed; /* out of memory: what was pushed since is lost */
-} column_slice;
+} transpose_slice;
 
-static void column_push_grown(column_slice *slice, column_entry entry) {
+static void transpose_push_grown(transpose_slice *slice, transpose_entry entry) {
     const size_t capacity = slice->capacity + slice->capacity / 2 + 1024;
-    column_entry *entries = slice->failed ? NULL : realloc(slice->entries, capacity * sizeof *slice->entries);
+    transpose_entry *entries =
+        slice->failed ? NULL : realloc(slice->entries, capacity * sizeof *slice->entries);
     if (entries == NULL) {
         slice->failed = true;
         return;
@@ -35,54 +36,54 @@ static void column_push_grown(column_slice *slice, column_entry entry) {
     slice->entries[slice->count++] = entry;
 }
 
-static inline void column_push(column_slice *slice, uint32_t column, uint32_t row, float value) {
-    const column_entry entry = {column, row, value};
+static inline void transpose_push(transpose_slice *slice, uint32_t column, uint32_t row, float value) {
+    const transpose_entry entry = {column, row, value};
     if (slice->count < slice->capacity)
         slice->entries[slice->count++] = entry;
     else
-        column_push_grown(slice, entry);
+        transpose_push_grown(slice, entry);
 }
 
-enum { COLUMN_SLICES = 32 };
+enum { TRANSPOSE_SLICES = 32 };
 
 /* Columns first ... last-1: column j has the entries start[j-first] ... start[j-first+1]-1, rows ascending.
  */
-typedef struct columns {
+typedef struct transpose {
     size_t first, last;
     size_t *start;
     uint32_t *rows;
     float *values;
     size_t start_capacity, entry_capacity;
-    column_slice slices[COLUMN_SLICES];
-    size_t *next; /* [COLUMN_SLICES][last - first] */
-} columns;
+    transpose_slice slices[TRANSPOSE_SLICES];
+    size_t *next; /* [TRANSPOSE_SLICES][last - first] */
+} transpose;
 
 /* Pushes the entries of one row that lie in columns first ... last-1. Rows come from many threads, each row
  * once. */
-typedef void column_source(void *context, size_t row, size_t first, size_t last, column_slice *to);
+typedef void transpose_source(void *context, size_t row, size_t first, size_t last, transpose_slice *to);
 
-static void columns_free(columns *c) {
-    for (size_t s = 0; s < COLUMN_SLICES; s++) free(c->slices[s].entries);
+static void transpose_free(transpose *c) {
+    for (size_t s = 0; s < TRANSPOSE_SLICES; s++) free(c->slices[s].entries);
     free(c->start);
     free(c->rows);
     free(c->values);
     free(c->next);
-    *c = (columns){0};
+    *c = (transpose){0};
 }
 
-static lam_status reserve_columns(columns *c, size_t width, lam_error *error) {
+static lam_status reserve_columns(transpose *c, size_t width, lam_error *error) {
     if (width + 1 <= c->start_capacity) return LAM_OK;
     free(c->start);
     free(c->next);
     c->start_capacity = 0;
     c->start = memory_allocate(width + 1, sizeof *c->start, "form factors", error);
-    c->next = memory_allocate(width, COLUMN_SLICES * sizeof *c->next, "form factors", error);
+    c->next = memory_allocate(width, TRANSPOSE_SLICES * sizeof *c->next, "form factors", error);
     if (c->start == NULL || c->next == NULL) return LAM_ERR_MEMORY;
     c->start_capacity = width + 1;
     return LAM_OK;
 }
 
-static lam_status reserve_entries(columns *c, size_t count, lam_error *error) {
+static lam_status reserve_entries(transpose *c, size_t count, lam_error *error) {
     if (count <= c->entry_capacity) return LAM_OK;
     free(c->rows);
     free(c->values);
@@ -97,46 +98,46 @@ static lam_status reserve_entries(columns *c, size_t count, lam_error *error) {
 
 /* Collects columns first ... last-1 of rows row_first ... row_last-1; what c held before is replaced, its
  * memory used again. The same for any number of threads. Memory: 20 bytes an entry. LAM_ERR_MEMORY. */
-static lam_status columns_collect(columns *c, size_t row_first, size_t row_last, size_t first, size_t last,
-                                  column_source *source, void *context, lam_error *error) {
+static lam_status transpose_collect(transpose *c, size_t row_first, size_t row_last, size_t first,
+                                    size_t last, transpose_source *source, void *context, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t width = last - first, n_rows = row_last > row_first ? row_last - row_first : 0;
     TRY(reserve_columns(c, width, error));
     c->first = first;
     c->last = last;
-    memset(c->next, 0, width * COLUMN_SLICES * sizeof *c->next);
+    memset(c->next, 0, width * TRANSPOSE_SLICES * sizeof *c->next);
     /* next[slice][column]: how many; later where the next one goes. */
 #pragma omp parallel for schedule(dynamic, 1)
-    for (size_t s = 0; s < COLUMN_SLICES; s++) {
-        column_slice *slice = &c->slices[s];
+    for (size_t s = 0; s < TRANSPOSE_SLICES; s++) {
+        transpose_slice *slice = &c->slices[s];
         size_t *count = c->next + s * width;
         slice->count = 0;
         slice->failed = false;
-        const size_t end = row_first + (s + 1) * n_rows / COLUMN_SLICES;
-        for (size_t row = row_first + s * n_rows / COLUMN_SLICES; row < end; row++)
+        const size_t end = row_first + (s + 1) * n_rows / TRANSPOSE_SLICES;
+        for (size_t row = row_first + s * n_rows / TRANSPOSE_SLICES; row < end; row++)
             source(context, row, first, last, slice);
         for (size_t e = 0; e < slice->count; e++) count[slice->entries[e].column - first]++;
     }
     size_t total = 0;
     for (size_t j = 0; j < width; j++) {
         c->start[j] = total;
-        for (size_t s = 0; s < COLUMN_SLICES; s++) {
+        for (size_t s = 0; s < TRANSPOSE_SLICES; s++) {
             const size_t count = c->next[s * width + j];
             c->next[s * width + j] = total;
             total += count;
         }
     }
     c->start[width] = total;
-    for (size_t s = 0; s < COLUMN_SLICES; s++)
+    for (size_t s = 0; s < TRANSPOSE_SLICES; s++)
         if (c->slices[s].failed)
             FAIL(error, LAM_ERR_MEMORY, "form factors: out of memory; use fewer --rays or a smaller scene");
     TRY(reserve_entries(c, total, error));
 #pragma omp parallel for schedule(dynamic, 1)
-    for (size_t s = 0; s < COLUMN_SLICES; s++) {
-        const column_slice *slice = &c->slices[s];
+    for (size_t s = 0; s < TRANSPOSE_SLICES; s++) {
+        const transpose_slice *slice = &c->slices[s];
         size_t *next = c->next + s * width;
         for (size_t e = 0; e < slice->count; e++) {
-            const column_entry *entry = &slice->entries[e];
+            const transpose_entry *entry = &slice->entries[e];
             const size_t at = next[entry->column - first]++;
             c->rows[at] = entry->row;
             c->values[at] = entry->value;
@@ -156,7 +157,7 @@ typedef struct row_cursor {
 } row_cursor;
 
 typedef struct merge_run {
-    const found_rows *rows;
+    const packed_rows *rows;
     row_cursor *cursors; /* [n] */
 } merge_run;
 
@@ -172,7 +173,7 @@ static inline uint32_t cursor_read(row_cursor *c, row_kind kind, float *value) {
 }
 
 /* c_ji of row j for the columns i < j of a panel. */
-static void take_below(void *context, size_t row, size_t first, size_t last, column_slice *to) {
+static void take_below(void *context, size_t row, size_t first, size_t last, transpose_slice *to) {
     const merge_run *run = context;
     const row_kind kind = run->rows->kind;
     const size_t end = last < row ? last : row;
@@ -183,14 +184,14 @@ static void take_below(void *context, size_t row, size_t first, size_t last, col
         float value = 0;
         const uint32_t column = cursor_read(&ahead, kind, &value);
         if (column >= end) break;
-        column_push(to, column, (uint32_t)row, value);
+        transpose_push(to, column, (uint32_t)row, value);
         c = ahead;
     }
     run->cursors[row] = c;
 }
 
 /* Row i above the diagonal: its own c_ij and the c_ji of the others; returns how many entries there are. */
-static size_t merge_row(const merge_run *run, const columns *below, size_t i, uint32_t *indices,
+static size_t merge_row(const merge_run *run, const transpose *below, size_t i, uint32_t *indices,
                         float *sums) {
     const row_kind kind = run->rows->kind;
     row_cursor c = run->cursors[i];
@@ -252,11 +253,11 @@ static lam_status room_reserve(merge_room *room, size_t n_rows, size_t n_entries
 }
 
 /* Rows first ... last-1 of g, after all before them. */
-static lam_status merge_panel(merge_run *run, columns *below, merge_room *room, size_t first, size_t last,
+static lam_status merge_panel(merge_run *run, transpose *below, merge_room *room, size_t first, size_t last,
                               size_t rays, const double *area, csr *g, lam_error *error) {
     lam_status status = LAM_OK;
     size_t n_entries = 0;
-    TRY(columns_collect(below, first + 1, g->n, first, last, take_below, run, error));
+    TRY(transpose_collect(below, first + 1, g->n, first, last, take_below, run, error));
     TRY(room_reserve(room, last - first, 0, error));
     for (size_t i = first; i < last; i++) {
         room->start[i - first] = n_entries;
@@ -287,12 +288,12 @@ done:
     return status;
 }
 
-lam_status upper_merge(const found_rows *rows, size_t rays, const double *area, const large_place *place,
+lam_status upper_merge(const packed_rows *rows, size_t rays, const double *area, const large_place *place,
                        csr *upper, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = rows->n;
     merge_run run = {.rows = rows};
-    columns below = {0};
+    transpose below = {0};
     merge_room room = {0};
     csr g = {.n = n, .place = place};
     size_t n_found = 0;
@@ -315,7 +316,7 @@ lam_status upper_merge(const found_rows *rows, size_t rays, const double *area, 
     g = (csr){0};
 done:
     free(run.cursors);
-    columns_free(&below);
+    transpose_free(&below);
     room_free(&room);
     csr_free(&g);
     return status;
@@ -330,29 +331,30 @@ typedef struct expand_run {
 } expand_run;
 
 /* The entries of a row in the columns of a panel; panels come from the last to the first. */
-static void take_last(void *context, size_t row, size_t first, size_t last, column_slice *to) {
+static void take_last(void *context, size_t row, size_t first, size_t last, transpose_slice *to) {
     const expand_run *run = context;
     const csr *g = run->g;
     const uint64_t end = run->ends[row];
     uint64_t begin = end;
     (void)last; /* all from there on are taken */
     while (begin > g->indptr[row] && g->indices[begin - 1] >= first) begin--;
-    for (uint64_t p = begin; p < end; p++) column_push(to, g->indices[p], (uint32_t)row, g->data[p]);
+    for (uint64_t p = begin; p < end; p++) transpose_push(to, g->indices[p], (uint32_t)row, g->data[p]);
     run->ends[row] = begin;
 }
 
 /* How many entries columns have. */
 static lam_status count_columns(const csr *g, uint64_t *counts, lam_error *error) {
     const size_t n = g->n;
-    uint32_t *of_slices = memory_allocate(n, COLUMN_SLICES * sizeof *of_slices, "form factors", error);
+    uint32_t *of_slices = memory_allocate(n, TRANSPOSE_SLICES * sizeof *of_slices, "form factors", error);
     if (of_slices == NULL) return LAM_ERR_MEMORY;
 #pragma omp parallel for schedule(dynamic, 1)
-    for (size_t s = 0; s < COLUMN_SLICES; s++) {
+    for (size_t s = 0; s < TRANSPOSE_SLICES; s++) {
         uint32_t *count = of_slices + s * n;
-        const uint64_t begin = g->indptr[n] * s / COLUMN_SLICES, end = g->indptr[n] * (s + 1) / COLUMN_SLICES;
+        const uint64_t begin = g->indptr[n] * s / TRANSPOSE_SLICES,
+                       end = g->indptr[n] * (s + 1) / TRANSPOSE_SLICES;
         for (uint64_t p = begin; p < end; p++) count[g->indices[p]]++;
     }
-    for (size_t s = 0; s < COLUMN_SLICES; s++)
+    for (size_t s = 0; s < TRANSPOSE_SLICES; s++)
         for (size_t j = 0; j < n; j++) counts[j] += of_slices[s * n + j];
     free(of_slices);
     return LAM_OK;
@@ -362,7 +364,7 @@ lam_status upper_expand(csr *upper, const double *area, double *row_sums, lam_er
     lam_status status = LAM_OK;
     const size_t n = upper->n, nnz = upper->indptr[n];
     expand_run run = {.g = upper};
-    columns below = {0};
+    transpose below = {0};
     merge_room room = {0};
     uint64_t *indptr = memory_allocate(n + 1, sizeof *indptr, "form factors", error);
     run.ends = memory_allocate(n, sizeof *run.ends, "form factors", error);
@@ -382,7 +384,7 @@ lam_status upper_expand(csr *upper, const double *area, double *row_sums, lam_er
     for (size_t last = n, first; last > 0; last = first) {
         first = last - 1;
         while (first > 0 && indptr[last] - indptr[first - 1] <= panel) first--;
-        TRY(columns_collect(&below, 0, last, first, last, take_last, &run, error));
+        TRY(transpose_collect(&below, 0, last, first, last, take_last, &run, error));
         const uint64_t begin = upper->indptr[first], count = upper->indptr[last] - begin;
         TRY(room_reserve(&room, 0, count, error));
         if (count > 0) memcpy(room.indices, indices + begin, count * sizeof *indices);
@@ -411,7 +413,7 @@ lam_status upper_expand(csr *upper, const double *area, double *row_sums, lam_er
 done:
     free(indptr);
     free(run.ends);
-    columns_free(&below);
+    transpose_free(&below);
     room_free(&room);
     return status;
 }

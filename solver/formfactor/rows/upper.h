@@ -12,7 +12,7 @@
  * which weighs the two estimates of g, of variance ~ A_i g/rays and ~ A_j g/rays, by their inverse variances.
  * A few columns at a time: beside rows and upper, which the caller frees with csr_free, it takes about 100
  * MB; with a place, upper lies there. The same for any number of threads. LAM_ERR_MEMORY, LAM_ERR_IO. */
-lam_status upper_merge(const found_rows *rows, size_t rays, const double *area, const large_place *place,
+lam_status upper_merge(const packed_rows *rows, size_t rays, const double *area, const large_place *place,
                        csr *upper, lam_error *error);
 
 /* Turns exchange areas into the rows of F, in place: upper becomes F. Beside F it takes about 100 MB.

@@ -261,7 +261,7 @@ typedef struct met_packet {
     float cosine[VISIBILITY_PACKET];
 } met_packet;
 
-static void look_up(const visibility *v, const struct RTCRayHit8 *ray, size_t n_rays, met_packet *met) {
+static void facets_met(const visibility *v, const struct RTCRayHit8 *ray, size_t n_rays, met_packet *met) {
     for (size_t i = 0; i < n_rays; i++) {
         met->facet[i] = VISIBILITY_NOTHING;
         met->cosine[i] = 0;
@@ -295,7 +295,7 @@ static void cast_lifted(const visibility *v, const ray_packet *rays, const uint3
     context->embree.filter = NULL;
     rtcIntersect8(active, v->scene, &context->embree, ray);
     context->embree.filter = refuse_own_and_culled;
-    look_up(v, ray, n_rays, met);
+    facets_met(v, ray, n_rays, met);
     for (size_t i = 0; i < n_rays; i++) {
         const uint32_t own = ray->ray.id[i], facet = met->facet[i];
         const bool again =
@@ -312,7 +312,7 @@ static void cast_lifted(const visibility *v, const ray_packet *rays, const uint3
     }
     if (!any) return;
     rtcIntersect8(active, v->scene, &context->embree, ray);
-    look_up(v, ray, n_rays, met);
+    facets_met(v, ray, n_rays, met);
 }
 
 void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
@@ -336,14 +336,14 @@ void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays,
         cast_lifted(v, rays, self, n_rays, &context, active, &ray, &met);
     } else {
         rtcIntersect8(active, v->scene, &context.embree, &ray);
-        look_up(v, &ray, n_rays, &met);
+        facets_met(v, &ray, n_rays, &met);
     }
 
     bool backs = false;
     for (size_t i = 0; i < n_rays; i++) backs = backs || met.cosine[i] > 0;
     if (backs && !two_sided) {
         prefer_fronts(v, met.cosine, &context, &ray);
-        look_up(v, &ray, n_rays, &met);
+        facets_met(v, &ray, n_rays, &met);
     }
 
     uint32_t piece[VISIBILITY_PACKET], lane[VISIBILITY_PACKET], found[VISIBILITY_PACKET];
@@ -424,7 +424,7 @@ unsigned visibility_blocked(const visibility *v, const ray_packet *segments, siz
 
 /* One packet of the bare loop; returns how many rays met their own facet, which nobody need ask. */
 static size_t cast_bare(const visibility *v, const ray_packet *rays, const float nearest[VISIBILITY_PACKET],
-                        uint32_t self, bool look) {
+                        uint32_t self, bool count) {
     static const int active[VISIBILITY_PACKET]
         __attribute__((aligned(32))) = {-1, -1, -1, -1, -1, -1, -1, -1};
     struct RTCRayHit8 packet __attribute__((aligned(32)));
@@ -434,7 +434,7 @@ static size_t cast_bare(const visibility *v, const ray_packet *rays, const float
     packet_set(&packet, rays);
     memcpy(packet.ray.tnear, nearest, sizeof packet.ray.tnear);
     rtcIntersect8(active, v->scene, &context, &packet);
-    for (size_t i = 0; i < VISIBILITY_PACKET && look; i++)
+    for (size_t i = 0; i < VISIBILITY_PACKET && count; i++)
         own += packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID &&
                facet_of(v, packet.hit.geomID[i], packet.hit.primID[i]) == v->facets.of_element[self];
     return own;

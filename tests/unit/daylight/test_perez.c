@@ -281,7 +281,7 @@ START_TEST(year) {
     sky_tiling s = tiles_of("tregenza", 'z');
     float L[N][145], light[N][145], flat[N][145];
     double sums[N] = {0}, horizontal[N] = {0};
-    const year_wish plain = {.sun_in_tiles = true}, bright = {.sun_in_tiles = true, .photometric = true};
+    const year_options plain = {.sun_in_tiles = true}, bright = {.sun_in_tiles = true, .photometric = true};
     year_summary sum = {0}, lit = {0}, other = {0};
     year_sun suns[N];
     lam_error error = {0};
@@ -302,7 +302,8 @@ START_TEST(year) {
     ck_assert_double_eq_tol(sum.light, sum.direct + 407, 1e-9);
     /* Skies without their suns, and the suns beside them. */
     ck_assert_int_eq(
-        year_skies(&w, &s, &(year_wish){.photometric = false}, NULL, flat[0], suns, &other, &error), LAM_OK);
+        year_skies(&w, &s, &(year_options){.photometric = false}, NULL, flat[0], suns, &other, &error),
+        LAM_OK);
     for (size_t i = 0; i < N; i++) {
         double whole[145];
         const bool sunny = i == 3 || i == 5;
@@ -350,7 +351,7 @@ START_TEST(cancelled) {
     float L = 7;
     year_summary sum = {.lit = 77};
     lam_error error = {0};
-    ck_assert_int_eq(year_skies(&w, &s, &(year_wish){.sun_in_tiles = true}, &(progress){.cancelled = stop},
+    ck_assert_int_eq(year_skies(&w, &s, &(year_options){.sun_in_tiles = true}, &(progress){.cancelled = stop},
                                 &L, NULL, &sum, &error),
                      LAM_ERR_CANCELLED);
     ck_assert_uint_eq(sum.lit, 77);

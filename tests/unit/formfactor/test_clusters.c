@@ -47,30 +47,30 @@ typedef struct site {
     mesh m;
     visibility *v;
     polygon *polygons;
-    pair_rules rules;
+    pair_factor_rules rules;
     cluster_tree tree;
-    look look;
+    occlusion occlusion;
 } site;
 
 static site *site_open(void) {
     static site s; /* a test's process has one */
     lam_error error = {0};
     s.m = room();
-    pair_rules_init(&s.rules);
+    pair_factor_rules_init(&s.rules);
     s.polygons = malloc(s.m.n * sizeof *s.polygons);
     ck_assert_ptr_nonnull(s.polygons);
     for (size_t i = 0; i < s.m.n; i++) polygon_of_element(&s.m, i, &s.polygons[i]);
     ck_assert_msg(visibility_create(&s.m, &s.v, &error) == LAM_OK, "%s", error.message);
     ck_assert_msg(cluster_tree_build(&s.m, visibility_rounding(s.v), &s.tree, &error) == LAM_OK, "%s",
                   error.message);
-    s.look = (look){.v = s.v,
-                    .area = s.m.area,
-                    .polygons = s.polygons,
-                    .rules = &s.rules,
-                    .tolerance = 1e-6,
-                    .accuracy = 1e-4,
-                    .segments = 8,
-                    .seed = 5};
+    s.occlusion = (occlusion){.v = s.v,
+                              .area = s.m.area,
+                              .polygons = s.polygons,
+                              .rules = &s.rules,
+                              .tolerance = 1e-6,
+                              .accuracy = 1e-4,
+                              .segments = 8,
+                              .seed = 5};
     return &s;
 }
 
@@ -146,12 +146,13 @@ START_TEST(links_are_right) {
     site *s = site_open();
     const size_t n = s->m.n;
     const cluster_tree *t = &s->tree;
-    const link_options how = {.slack = visibility_rounding(s->v)};
+    const cluster_link_options how = {.slack = visibility_rounding(s->v)};
     cluster_links l;
     lam_error error = {0};
     uint8_t *held = calloc(n * n, 1);
     ck_assert_ptr_nonnull(held);
-    ck_assert_msg(cluster_links_find(&s->m, t, &s->look, &how, &l, &error) == LAM_OK, "%s", error.message);
+    ck_assert_msg(cluster_links_find(&s->m, t, &s->occlusion, &how, &l, &error) == LAM_OK, "%s",
+                  error.message);
     for (size_t k = 0; k < l.n; k++) {
         const cluster *a = &t->clusters[l.links[k].a], *b = &t->clusters[l.links[k].b];
         for (uint32_t p = a->first; p < a->last; p++)
@@ -168,12 +169,12 @@ START_TEST(links_are_right) {
         for (uint32_t q = p + 1; q < n; q++) {
             const uint32_t i = t->element[p], j = t->element[q];
             double seen;
-            const double g = pair_exchange(&s->rules, &s->polygons[i], &s->polygons[j], 1e-4);
+            const double g = pair_factor_exchange(&s->rules, &s->polygons[i], &s->polygons[j], 1e-4);
             if (g <= 0) continue;
             /* Other segments than those that decided, many times over. */
-            look other = s->look;
+            occlusion other = s->occlusion;
             for (other.seed = 100; held[p * n + q] != 1 && other.seed < 104; other.seed++) {
-                look_first(&other, i, j, g, &seen);
+                occlusion_test(&other, i, j, g, &seen);
                 if (held[p * n + q] == 2) ck_assert_double_eq_tol(seen, g, 1e-12 * g);
                 if (held[p * n + q] == 0) lost += seen / s->m.area[i] / 4;
             }
@@ -184,7 +185,7 @@ START_TEST(links_are_right) {
     ck_assert_uint_gt(missing, 0);
     ck_assert_double_gt(l.hidden_pairs, 0);
     /* What is lost of all the pairs that are called hidden is, for an element, far less than the accuracy. */
-    ck_assert_double_le(lost / (double)n, .1 * s->look.accuracy);
+    ck_assert_double_le(lost / (double)n, .1 * s->occlusion.accuracy);
     cluster_links_free(&l);
     free(held);
     site_close(s);
@@ -197,12 +198,13 @@ START_TEST(threshold_keeps_what_is_above) {
     const size_t n = s->m.n;
     const cluster_tree *t = &s->tree;
     const double threshold = .02;
-    const link_options how = {.threshold = threshold, .slack = visibility_rounding(s->v)};
+    const cluster_link_options how = {.threshold = threshold, .slack = visibility_rounding(s->v)};
     cluster_links l;
     lam_error error = {0};
     uint8_t *held = calloc(n * n, 1);
     ck_assert_ptr_nonnull(held);
-    ck_assert_msg(cluster_links_find(&s->m, t, &s->look, &how, &l, &error) == LAM_OK, "%s", error.message);
+    ck_assert_msg(cluster_links_find(&s->m, t, &s->occlusion, &how, &l, &error) == LAM_OK, "%s",
+                  error.message);
     for (size_t k = 0; k < l.n; k++) {
         const cluster *a = &t->clusters[l.links[k].a], *b = &t->clusters[l.links[k].b];
         for (uint32_t p = a->first; p < a->last; p++)
@@ -212,12 +214,13 @@ START_TEST(threshold_keeps_what_is_above) {
     for (uint32_t p = 0; p < n; p++)
         for (uint32_t q = p + 1; q < n; q++) {
             const uint32_t i = t->element[p], j = t->element[q];
-            const double g = pair_exchange(&s->rules, &s->polygons[i], &s->polygons[j], 1e-4);
+            const double g = pair_factor_exchange(&s->rules, &s->polygons[i], &s->polygons[j], 1e-4);
             double seen;
             held_pairs += held[p * n + q];
             if (2 * g / (s->m.area[i] + s->m.area[j]) < threshold) continue;
             above++;
-            if (held[p * n + q] == 0) ck_assert_int_eq(look_first(&s->look, i, j, g, &seen), LOOK_HIDDEN);
+            if (held[p * n + q] == 0)
+                ck_assert_int_eq(occlusion_test(&s->occlusion, i, j, g, &seen), OCCLUSION_TOTAL);
         }
     ck_assert_uint_gt(above, 0);
     ck_assert_uint_lt(held_pairs, n * n / 4); /* and much of what is below is left out */
@@ -228,25 +231,25 @@ START_TEST(threshold_keeps_what_is_above) {
 }
 END_TEST
 
-/* Rows by the vector units are pair_exchange's numbers. */
+/* Rows by the vector units are pair_factor_exchange's numbers. */
 START_TEST(far_rows_are_pair_exchange) {
     static const double tolerances[] = {1e-4, 1e-6};
     site *s = site_open();
     const size_t n = s->m.n;
-    double *g = malloc((n + FAR_LANES) * sizeof *g);
+    double *g = malloc((n + PAIR_FAR_LANES) * sizeof *g);
     ck_assert_ptr_nonnull(g);
-    far_table table;
+    pair_far_table table;
     lam_error error = {0};
     const double tolerance = tolerances[_i];
     size_t close = 0, far = 0;
-    ck_assert_msg(far_table_build(s->polygons, &s->tree, &s->rules, tolerance, &table, &error) == LAM_OK,
+    ck_assert_msg(pair_far_table_build(s->polygons, &s->tree, &s->rules, tolerance, &table, &error) == LAM_OK,
                   "%s", error.message);
     for (size_t p = 0; p < n; p++) {
-        far_row(&table, p, 0, n, g);
+        pair_far_row(&table, p, 0, n, g);
         for (size_t q = 0; q < n; q++) {
             const uint32_t i = s->tree.element[p], j = s->tree.element[q];
             const double exact =
-                i == j ? 0 : pair_exchange(&s->rules, &s->polygons[i], &s->polygons[j], 1e-8);
+                i == j ? 0 : pair_factor_exchange(&s->rules, &s->polygons[i], &s->polygons[j], 1e-8);
             close += g[q] < 0;
             if (g[q] < 0) continue;
             far += g[q] > 0;
@@ -255,7 +258,7 @@ START_TEST(far_rows_are_pair_exchange) {
     }
     ck_assert_uint_gt(far, n);
     ck_assert_uint_gt(close, n);
-    far_table_free(&table);
+    pair_far_table_free(&table);
     free(g);
     site_close(s);
 }

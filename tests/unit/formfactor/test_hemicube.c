@@ -95,7 +95,7 @@ enum { N_VIEWS = sizeof views / sizeof *views };
 static csr trace_rows(const mesh *m, size_t resolution, double *leaving, double *absorbed) {
     hemicube h = cube(resolution);
     visibility *v = NULL;
-    found_rows found = {0};
+    packed_rows found = {0};
     lam_error error = {0};
     const form_factor_options how = {.recipe = {.method = RECIPE_HEMICUBE, .resolution = resolution}};
     const uint32_t order[4] = {0, 1, 2, 3};
@@ -106,7 +106,7 @@ static csr trace_rows(const mesh *m, size_t resolution, double *leaving, double 
     visibility_destroy(v);
     hemicube_free(&h);
     const csr rows = found_unpack(&found);
-    found_rows_free(&found);
+    packed_rows_free(&found);
     return rows;
 }
 

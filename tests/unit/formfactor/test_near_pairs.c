@@ -88,11 +88,11 @@ START_TEST(near_pairs_are_those_above_the_threshold) {
     csr G = {0};
     visibility *v = NULL;
     lam_error error = {0};
-    pair_rules rules;
+    pair_factor_rules rules;
     polygon *polygons = malloc(m.n * sizeof *polygons);
     ck_assert_ptr_nonnull(polygons);
     for (size_t i = 0; i < m.n; i++) polygon_of_element(&m, i, &polygons[i]);
-    pair_rules_init(&rules);
+    pair_factor_rules_init(&rules);
     const recipe all = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 1e-5, .seed = 9};
     form_factors exact = make(&m, &all);
     ck_assert_int_eq(visibility_create(&m, &v, &error), LAM_OK);
@@ -102,7 +102,7 @@ START_TEST(near_pairs_are_those_above_the_threshold) {
     for (size_t i = 0; i < m.n; i++) {
         uint64_t p = G.indptr[i];
         for (size_t j = i + 1; j < m.n; j++) {
-            const double g = pair_exchange(&rules, &polygons[i], &polygons[j], 1e-6);
+            const double g = pair_factor_exchange(&rules, &polygons[i], &polygons[j], 1e-6);
             const double mean = 2 * g / (m.area[i] + m.area[j]);
             const bool there = p < G.indptr[i + 1] && G.indices[p] == j;
             const double seen = m.area[i] * entry(&exact.F, i, j), smaller = fmin(m.area[i], m.area[j]);

@@ -25,9 +25,9 @@ static polygon wall(double at, double y0, double y1, double z0, double z1) {
 }
 
 static double form_factor(const polygon *a, const polygon *b) {
-    pair_rules rules;
-    pair_rules_init(&rules);
-    return pair_exchange(&rules, a, b, 1e-8) / polygon_area(a);
+    pair_factor_rules rules;
+    pair_factor_rules_init(&rules);
+    return pair_factor_exchange(&rules, a, b, 1e-8) / polygon_area(a);
 }
 
 /* The figures have twelve digits behind the point; eight digits are promised. */
@@ -143,8 +143,8 @@ END_TEST
 /* Distances from touching to far, along which the methods change: the halves of a polygon sum to the whole,
  * which neither method knows of, and both directions agree. */
 START_TEST(halves_sum_to_the_whole) {
-    pair_rules rules;
-    pair_rules_init(&rules);
+    pair_factor_rules rules;
+    pair_factor_rules_init(&rules);
     /* Skew, so that no edges are parallel. */
     const double low[4][3] = {{0, 0, 0}, {1, .1, 0}, {1.2, 1.1, 0}, {-.1, .9, 0}};
     const double high[3][3] = {{0, .1, .2}, {.3, 1, .25}, {1, .2, .9}};
@@ -157,11 +157,11 @@ START_TEST(halves_sum_to_the_whole) {
         for (int d = 0; d < 3; d++) one[2][d] = two[1][d] = .37 * moved[1][d] + .63 * moved[2][d];
         const polygon a = make(4, low), whole = make(3, (const double(*)[3])moved),
                       first = make(3, (const double(*)[3])one), second = make(3, (const double(*)[3])two);
-        const double g = pair_exchange(&rules, &a, &whole, 1e-8);
+        const double g = pair_factor_exchange(&rules, &a, &whole, 1e-8);
         const double parts =
-            pair_exchange(&rules, &a, &first, 1e-8) + pair_exchange(&rules, &a, &second, 1e-8);
+            pair_factor_exchange(&rules, &a, &first, 1e-8) + pair_factor_exchange(&rules, &a, &second, 1e-8);
         ck_assert_msg(g > 0 && fabs(parts - g) <= 2e-8 * g, "gap %g: %.12g, halves %.12g", gap, g, parts);
-        const double back = pair_exchange(&rules, &whole, &a, 1e-8);
+        const double back = pair_factor_exchange(&rules, &whole, &a, 1e-8);
         ck_assert_msg(fabs(back - g) <= 2e-8 * g, "gap %g: %.12g, back %.12g", gap, g, back);
     }
 }

@@ -87,7 +87,7 @@ static double *merged(const subject *s) {
     const recipe *r = &s->how.recipe;
     double *G = test_allocate(n * n, sizeof *G), *out = test_allocate(2 * n, sizeof *out);
     visibility *v;
-    found_rows counts = {0};
+    packed_rows counts = {0};
     csr upper, near;
     ck_ok(visibility_create(&s->m, &v, &error));
     ck_ok(rays_count(&s->m, v, s->order, &s->how, &counts, out, out + n, &error));
@@ -106,7 +106,7 @@ static double *merged(const subject *s) {
         form_factors_free(&f);
     }
     csr_free(&upper);
-    found_rows_free(&counts);
+    packed_rows_free(&counts);
     visibility_destroy(v);
     free(out);
     return G;

@@ -42,10 +42,10 @@ START_TEST(packed_rows_come_back) {
         ck_assert(value == (e == entries - 1 ? 1 : kind == ROW_COUNTS ? counts[c] : 1 / counts[c]));
     }
     ck_assert_ptr_eq(at, to);
-    const found_row row = {bytes, (uint32_t)(to - bytes), entries};
+    const packed_row row = {bytes, (uint32_t)(to - bytes), entries};
     ck_assert(row_check(kind, &row, columns));
     ck_assert(!row_check(kind, &row, columns - 1));
-    found_row cut = row;
+    packed_row cut = row;
     for (cut.n_bytes = 0; cut.n_bytes < row.n_bytes; cut.n_bytes++)
         ck_assert(!row_check(kind, &cut, columns));
     cut = row;
@@ -102,7 +102,7 @@ static void append_missing(opened *o, const square *s) {
 }
 
 static void check_all(opened *o, const square *s) {
-    found_rows back = {.n = s->n, .kind = s->found.kind, .rows = calloc(s->n, sizeof *back.rows)};
+    packed_rows back = {.n = s->n, .kind = s->found.kind, .rows = calloc(s->n, sizeof *back.rows)};
     double leaving[FILE_ROWS], absorbed[FILE_ROWS];
     ck_assert_ptr_nonnull(back.rows);
     ck_assert_msg(row_file_map(o->file, &back, leaving, absorbed, &o->error) == LAM_OK, "%s",
@@ -113,7 +113,7 @@ static void check_all(opened *o, const square *s) {
     ck_assert_mem_eq(absorbed, o->absorbed, sizeof absorbed);
     csr_free(&is);
     csr_free(&wanted);
-    found_rows_free(&back);
+    packed_rows_free(&back);
 }
 
 static size_t file_size(const char *path) {

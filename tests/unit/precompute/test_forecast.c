@@ -21,7 +21,7 @@ START_TEST(files_are_within_the_forecast) {
     mesh m = box_mesh(size, DIVISIONS, .5f);
     uint32_t order[N];
     double leaving[N], absorbed[N];
-    found_rows rows = {0};
+    packed_rows rows = {0};
     hemicube h = {0};
     visibility *v = NULL;
     lam_error error = {0};
@@ -44,7 +44,7 @@ START_TEST(files_are_within_the_forecast) {
     size_t entries = 0;
     for (size_t i = 0; i < N; i++) entries += rows.rows[i].n_entries;
     ck_assert_double_ge(forecast_store_bytes(&f), 8 * (double)entries);
-    found_rows_free(&rows);
+    packed_rows_free(&rows);
     hemicube_free(&h);
     visibility_destroy(v);
     scratch_close(kept, true);
