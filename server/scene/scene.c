@@ -63,13 +63,6 @@ uint64_t scene_work_memory(size_t n_threads, size_t work_bytes) {
     return (uint64_t)n_threads * work_bytes;
 }
 
-/* How many times its bytes in the store an operator takes. A sparse one is kept by columns too; of a
- * hierarchical one both triangles are kept twice, in rows and in slices, with numbers and indices of four
- * bytes where the store has two. */
-static uint64_t expansion(const char *kind) {
-    return strcmp(kind, "sparse") == 0 ? 2 : strcmp(kind, "hierarchical") == 0 ? 8 : 1;
-}
-
 /* What a store counts for, found before anything large of it is read: the bytes of its operator, as it is
  * kept, and its sky, mapped or read. */
 static lam_status memory_of(store *s, uint64_t *memory, uint64_t *operator_bytes, lam_error *error) {
@@ -79,7 +72,7 @@ static lam_status memory_of(store *s, uint64_t *memory, uint64_t *operator_bytes
     TRY(store_group_bytes(s, "/operator", operator_bytes, error));
     if (store_has(s, "/sky")) TRY(store_group_bytes(s, "/sky", &sky, error));
     TRY(store_get_text(s, "/operator", "kind", &kind, error));
-    *memory = *operator_bytes * expansion(kind) + sky;
+    *memory = operator_unpacked_bytes(kind, *operator_bytes) + sky;
 done:
     free(kind);
     return status;

@@ -1,5 +1,4 @@
-/* The two 16-bit forms of a float: IEEE half precision (f16) and the upper half of a float (bf16). Software,
- * exact: what an instruction does for f16 is bit for bit the same. */
+/* IEEE half precision (f16) in software: bit for bit what the instructions of the processor give. */
 #ifndef LAMBERT_BASE_HALF_H
 #define LAMBERT_BASE_HALF_H
 
@@ -38,16 +37,6 @@ static inline float float_of_half(uint16_t half) {
     if (magnitude >= 0x7c00u) return float_of_bits(sign | 0x7f800000u | magnitude << 13);
     /* Its exponent is 112 too small for a float; a multiplication makes subnormal ones right, too. */
     return float_of_bits(sign | float_bits(float_of_bits(magnitude << 13) * 0x1p112f));
-}
-
-/* The nearest bf16 of a finite x, ties to even; it may become infinity. */
-static inline uint16_t bfloat_of_float(float x) {
-    const uint32_t bits = float_bits(x);
-    return (uint16_t)((bits + 0x7fffu + (bits >> 16 & 1)) >> 16);
-}
-
-static inline float float_of_bfloat(uint16_t bfloat) {
-    return float_of_bits((uint32_t)bfloat << 16);
 }
 
 #endif

@@ -1,5 +1,6 @@
 #include "solver/codec/describe.h"
 
+#include "solver/operator/operator.h"
 #include "store/status.h"
 
 #include <math.h>
@@ -65,13 +66,14 @@ done:
     return status;
 }
 
-/* rank or density: low-rank kinds have the one, the others the other. */
+/* A store states a rank or a density; the density of a kind that stores everything is 1. */
 static void add_size_figure(json_t *out, const json_t *operator_attributes, const char *kind) {
+    const operator_kind *known = operator_kind_find(kind);
     if (json_object_get(operator_attributes, "rank") != NULL)
         copy_member(out, "rank", operator_attributes, "rank");
     else if (json_object_get(operator_attributes, "density") != NULL)
         copy_member(out, "density", operator_attributes, "density");
-    else if (strcmp(kind, "exact") == 0)
+    else if (known != NULL && known->whole)
         json_object_set_new(out, "density", json_integer(1));
 }
 
@@ -118,13 +120,13 @@ done:
     return status;
 }
 
-/* Their names; null of another kind. */
-static lam_status add_emitters(store *s, const char *kind, json_t *out, lam_error *error) {
+/* The names of the emitters; null where the operator has none. */
+static lam_status add_emitters(store *s, json_t *out, lam_error *error) {
     char **names = NULL;
     size_t count = 0;
     json_t *list = NULL;
     lam_status status = LAM_OK;
-    if (strcmp(kind, "emitters") == 0) {
+    if (store_has(s, "/operator/names")) {
         TRY(store_read_texts(s, "/operator/names", &count, &names, error));
         list = json_array();
         for (size_t k = 0; k < count; k++)
@@ -196,7 +198,7 @@ lam_status describe_store(store *s, json_t **out, lam_error *error) {
                         precision != NULL ? json_deep_copy(precision) : json_string("f32"));
     json_object_set_new(made, "bytes", json_integer((json_int_t)bytes));
     TRY(add_groups(s, dims[1], made, error));
-    TRY(add_emitters(s, json_string_value(kind), made, error));
+    TRY(add_emitters(s, made, error));
     TRY(add_sky(s, made, error));
     TRY(add_error(s, made, error));
     TRY(add_provenance(s, root, made, error));

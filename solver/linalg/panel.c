@@ -20,7 +20,7 @@
 static const struct {
     const char *name;
     size_t size;
-} precisions[PANEL_PRECISIONS] = {{"f32", 4}, {"f16", 2}, {"bf16", 2}, {"i8", 1}};
+} precisions[PANEL_PRECISIONS] = {{"f32", 4}, {"f16", 2}, {"i8", 1}};
 
 const char *panel_precision_name(panel_precision precision) {
     return precisions[precision].name;
@@ -58,8 +58,6 @@ static float value_as_float(panel_precision precision, const void *values, size_
         return ((const float *)values)[j];
     case PANEL_F16:
         return float_of_half(((const uint16_t *)values)[j]);
-    case PANEL_BF16:
-        return float_of_bfloat(((const uint16_t *)values)[j]);
     case PANEL_I8:
         return (float)((const int8_t *)values)[j];
     }
@@ -68,7 +66,6 @@ static float value_as_float(panel_precision precision, const void *values, size_
 
 /* Whether all are finite: no exponent has all its bits. */
 static bool all_finite(panel_precision precision, size_t count, const void *values) {
-    static const uint16_t exponent[PANEL_PRECISIONS] = {0, 0x7c00, 0x7f80, 0};
     bool good = true;
     switch (precision) {
     case PANEL_F32:
@@ -76,9 +73,7 @@ static bool all_finite(panel_precision precision, size_t count, const void *valu
             good &= (((const uint32_t *)values)[j] & 0x7f800000u) != 0x7f800000u;
         break;
     case PANEL_F16:
-    case PANEL_BF16:
-        for (size_t j = 0; j < count; j++)
-            good &= (((const uint16_t *)values)[j] & exponent[precision]) != exponent[precision];
+        for (size_t j = 0; j < count; j++) good &= (((const uint16_t *)values)[j] & 0x7c00u) != 0x7c00u;
         break;
     case PANEL_I8:
         break;
@@ -240,8 +235,8 @@ static bool find_scale(const panel *a, panel_precision precision, float *row, fl
     return any;
 }
 
-/* values = row / scale, rounded; false where one is beyond the precision. */
-static bool round_row(const float *row, const float *scale, panel_precision precision, size_t k,
+/* values = row / scale, rounded. */
+static void round_row(const float *row, const float *scale, panel_precision precision, size_t k,
                       void *values) {
     for (size_t j = 0; j < k; j++) {
         const float x = scale != NULL ? row[j] / scale[j] : row[j];
@@ -249,12 +244,9 @@ static bool round_row(const float *row, const float *scale, panel_precision prec
             ((float *)values)[j] = x;
         else if (precision == PANEL_F16)
             ((uint16_t *)values)[j] = half_of_float(x);
-        else if (precision == PANEL_BF16)
-            ((uint16_t *)values)[j] = bfloat_of_float(x);
         else
             ((int8_t *)values)[j] = (int8_t)fmaxf(-I8_STEPS, fminf(I8_STEPS, rintf(x)));
     }
-    return all_finite(precision, k, values);
 }
 
 lam_status panel_convert(const panel *a, panel_precision precision, const char *name, panel *out,
@@ -275,12 +267,7 @@ lam_status panel_convert(const panel *a, panel_precision precision, const char *
     for (size_t i = 0; i < a->n; i++) {
         float *values = row + a->k;
         get_row(a, i, row);
-        if (!round_row(row, made.scale, precision, a->k, values)) {
-            size_t j = 0;
-            while (isfinite(value_as_float(precision, values, j))) j++;
-            FAIL(error, LAM_ERR_NUMERIC, "%s[%zu][%zu] = %g is beyond %s; keep it in f32", name, i, j,
-                 (double)row[j], panel_precision_name(precision));
-        }
+        round_row(row, made.scale, precision, a->k, values);
         put_row(&made, i, values);
     }
     *out = made;

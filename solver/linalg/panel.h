@@ -23,9 +23,9 @@
 /* Work areas are handed out in pieces of this alignment, in bytes. */
 #define PANEL_ALIGN 64
 
-/* How values are kept: float, IEEE half precision, the upper half of a float, signed bytes. */
-typedef enum panel_precision { PANEL_F32, PANEL_F16, PANEL_BF16, PANEL_I8 } panel_precision;
-enum { PANEL_PRECISIONS = 4 };
+/* How values are kept: float, IEEE half precision, signed bytes. */
+typedef enum panel_precision { PANEL_F32, PANEL_F16, PANEL_I8 } panel_precision;
+enum { PANEL_PRECISIONS = 3 };
 
 /* Where a value is: PANEL_TILES as above, PANEL_ROWS as in a store. Both give the same bits. */
 typedef enum panel_layout { PANEL_TILES, PANEL_ROWS } panel_layout;
@@ -51,7 +51,7 @@ typedef struct panel {
     const panel_kernels *kernels; /* for this CPU */
 } panel;
 
-/* The contract's names "f32", "f16", "bf16", "i8"; false for another. */
+/* The contract's names "f32", "f16", "i8"; false for another. */
 const char *panel_precision_name(panel_precision precision);
 bool panel_precision_find(const char *name, panel_precision *precision);
 /* Bytes of a value. */
@@ -75,7 +75,7 @@ lam_status panel_view(size_t n, size_t k, panel_precision precision, const void 
 /* out: what a, in single precision, becomes in another one. f16 gets a scale where a column would pass its
  * range, powers of two; i8 always one, the largest magnitude of a column over 127. Every value is off by at
  * most half a unit in its last place (f16: at least 2^-25 of the column's scale), i8 by half a scale.
- * Errors: LAM_ERR_MEMORY; LAM_ERR_NUMERIC where a value is beyond bf16. */
+ * Errors: LAM_ERR_MEMORY. */
 lam_status panel_convert(const panel *a, panel_precision precision, const char *name, panel *out,
                          lam_error *error);
 

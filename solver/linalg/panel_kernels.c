@@ -32,7 +32,6 @@ static inline float lane_sum_portable(lane4 x) {
 #define EACH_OF_4(f, p) ((lane4){f((p)[0]), f((p)[1]), f((p)[2]), f((p)[3])})
 #define LOAD_F32(p) (*(const lane4_anywhere *)(p))
 #define LOAD_F16(p) EACH_OF_4(float_of_half, p)
-#define LOAD_BF16(p) EACH_OF_4(float_of_bfloat, p)
 #define LOAD_I8(p) EACH_OF_4((float), p)
 #define ROW_TILE 2
 #define VECTOR_TILE 1
@@ -57,7 +56,6 @@ __attribute__((target("avx2,fma"))) static inline float lane_sum_avx2(__m256 x) 
 #define LANE_SUM(x) lane_sum_avx2(x)
 #define LOAD_F32(p) _mm256_loadu_ps(p)
 #define LOAD_F16(p) _mm256_cvtph_ps(LOAD_128(p))
-#define LOAD_BF16(p) _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_cvtepu16_epi32(LOAD_128(p)), 16))
 #define LOAD_I8(p)                                                                                           \
     _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(_mm_loadl_epi64((const __m128i *)(const void *)(p))))
 #define ROW_TILE 4
@@ -81,7 +79,6 @@ __attribute__((target("avx512f"))) static inline float lane_sum_avx512(__m512 x)
 #define LANE_SUM(x) lane_sum_avx512(x)
 #define LOAD_F32(p) _mm512_loadu_ps(p)
 #define LOAD_F16(p) _mm512_cvtph_ps(LOAD_256(p))
-#define LOAD_BF16(p) _mm512_castsi512_ps(_mm512_slli_epi32(_mm512_cvtepu16_epi32(LOAD_256(p)), 16))
 #define LOAD_I8(p) _mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(LOAD_128(p)))
 #define ROW_TILE 4
 #define VECTOR_TILE 4

@@ -4,27 +4,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What a panel of a precision is in a file: bf16 as u16 with the attribute encoding. */
-static const store_type panel_types[PANEL_PRECISIONS] = {STORE_F32, STORE_F16, STORE_U16, STORE_I8};
+/* The type of a panel of each precision in a file. */
+static const store_type panel_types[PANEL_PRECISIONS] = {STORE_F32, STORE_F16, STORE_I8};
 
 static lam_status read_precision(store *s, const char *name, panel_precision *precision, lam_error *error) {
     lam_status status = LAM_OK;
     store_type type;
     int rank;
     size_t dims[STORE_MAX_RANK], p = 0;
-    char *encoding = NULL;
     TRY(store_array_info(s, name, &type, &rank, dims, error));
     while (p < PANEL_PRECISIONS && panel_types[p] != type) p++;
     if (p == PANEL_PRECISIONS)
-        FAIL(error, LAM_ERR_FORMAT, "%s: %s must be of f32, f16, bf16 or i8", store_path(s), name);
-    if (store_has_attribute(s, name, "encoding")) TRY(store_get_text(s, name, "encoding", &encoding, error));
-    if (encoding != NULL ? p != PANEL_BF16 || strcmp(encoding, "bf16") != 0 : p == PANEL_BF16)
-        FAIL(error, LAM_ERR_FORMAT,
-             "%s: %s has the encoding '%s', must be 'bf16' where it is of u16 and none elsewhere",
-             store_path(s), name, encoding != NULL ? encoding : "");
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s must be of f32, f16 or i8", store_path(s), name);
     *precision = (panel_precision)p;
 done:
-    free(encoding);
     return status;
 }
 
@@ -77,7 +70,6 @@ lam_status panel_save(const panel *a, store *s, const char *name, lam_error *err
     if (values == NULL) TRY(LAM_ERR_MEMORY);
     panel_copy_values(a, values);
     TRY(store_write(s, name, panel_types[a->precision], 2, dims, values, error));
-    if (a->precision == PANEL_BF16) TRY(store_set_text(s, name, "encoding", "bf16", error));
     snprintf(scale_name, sizeof scale_name, "%s_scale", name);
     if (a->scale != NULL) TRY(store_write(s, scale_name, STORE_F32, 1, &a->k, a->scale, error));
 done:

@@ -146,4 +146,5 @@ const operator_kind operator_exact = {
     .set_threads = exact_set_threads,
     .destroy = exact_destroy,
     .describe = exact_describe,
+    .whole = true,
 };

@@ -371,4 +371,7 @@ const operator_kind operator_hierarchical = {
     .apply_adjoint = hierarchical_apply_adjoint,
     .destroy = hierarchical_destroy,
     .describe = hierarchical_describe,
+    /* Both triangles twice, in rows and in slices, with values and indices of four bytes where the store has
+     * two. */
+    .unpacked = 8,
 };

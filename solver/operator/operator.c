@@ -15,6 +15,11 @@ const operator_kind *operator_kind_find(const char *name) {
     return NULL;
 }
 
+uint64_t operator_unpacked_bytes(const char *kind, uint64_t stored) {
+    const operator_kind *found = operator_kind_find(kind);
+    return found != NULL && found->unpacked > 0 ? found->unpacked * stored : stored;
+}
+
 static lam_status check_reflectance(size_t n, size_t n_channels, const float *reflectance, lam_error *error) {
     lam_status status = LAM_OK;
     for (size_t i = 0; i < n * n_channels; i++)

@@ -17,7 +17,7 @@ typedef struct operator_description {
     size_t bytes;          /* of the arrays a solve reads */
 } operator_description;
 
-/* One kind: a const table at the end of its file, listed in operator.c.
+/* One kind: a const table at the end of its file, listed in operator.c, which is all that knows its name.
  *
  * A kind computes the bounced light P = rho' (M~ - I)/rho E, one row per position, where rho'_i = rho_i, or 1
  * where rho_i = 0 (contract, /operator, last line): B_i = E_i + P_i where rho_i > 0, else E_i, and
@@ -25,12 +25,13 @@ typedef struct operator_description {
  * adjoint P^T cannot fail, allocate nothing, and give a vector the same bits in any batch; the adjoint may
  * overwrite g. work is aligned to a cache line; work_bytes is 0 when it overflows, and only then.
  *
- * What a kind may leave NULL: apply and apply_adjoint, where it answers for its own emitters only
+ * A kind may leave NULL: apply and apply_adjoint, where it answers for its own emitters only
  * (emitters_apply.c); apply_selected, the rows of apply for the n_selected elements selected
  * (operator_position says where they are), P being [n_rhs][C][n_selected] (without it all rows are computed);
  * set_threads, which passes n_threads on to its arrays; narrow, which makes the operator again with its large
  * arrays in another precision, all of its own; relight, which makes it again under other reflectances, its
- * large arrays those of op. */
+ * large arrays those of op; check, which compares the operator with the areas of its mesh and, where they
+ * disagree, writes the reason to detail and returns false. */
 #define OPERATOR_PASS 16 /* a larger batch is cut into passes */
 
 typedef struct operator_kind {
@@ -50,6 +51,9 @@ typedef struct operator_kind {
                           lam_operator **out, lam_error *error);
     void (*destroy)(lam_operator *op);
     void (*describe)(const lam_operator *op, operator_description *description);
+    bool (*check)(const lam_operator *op, const double *area, char *detail, size_t size);
+    unsigned unpacked; /* bytes of memory that a byte of its arrays in a store takes once loaded; 0: one */
+    bool whole;        /* all n^2 coefficients are stored: density 1 where the store states none */
 } operator_kind;
 
 struct lam_operator {
@@ -71,6 +75,10 @@ extern const operator_kind operator_hierarchical;
 
 /* The kind of this name, or NULL. */
 const operator_kind *operator_kind_find(const char *name);
+
+/* Bytes of memory that an operator of this kind takes of so many bytes of /operator; an unknown kind, which
+ * operator_load refuses, counts once. */
+uint64_t operator_unpacked_bytes(const char *kind, uint64_t stored);
 
 /* Fills the shared part (copies reflectance) of a zeroed operator; kind->destroy frees what the kind added.
  * Errors: LAM_ERR_NUMERIC names a reflectance outside [0, 1), LAM_ERR_ARGUMENT, LAM_ERR_MEMORY. */

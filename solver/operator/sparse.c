@@ -198,4 +198,5 @@ const operator_kind operator_sparse = {
     .apply_selected = sparse_apply_selected,
     .destroy = sparse_destroy,
     .describe = sparse_describe,
+    .unpacked = 2, /* by columns too */
 };

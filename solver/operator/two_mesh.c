@@ -5,6 +5,8 @@
 #include "solver/linalg/segments.h"
 #include "solver/operator/factors.h"
 
+#include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -216,6 +218,27 @@ static void two_mesh_describe(const lam_operator *op, operator_description *desc
     description->bytes += segments_bytes(&self->V);
 }
 
+/* Every weight is A_j / A_p to single precision (absent ones: areas are equal), or power would be lost. */
+static bool two_mesh_check(const lam_operator *op, const double *area, char *detail, size_t size) {
+    static const double allowed = 1e-6;
+    const segments *V = &((const two_mesh *)op)->V;
+    for (size_t p = 0; p < ((const two_mesh *)op)->f.left.k; p++) {
+        const double count = (double)(V->begin[p + 1] - V->begin[p]);
+        double whole = 0;
+        for (uint64_t j = V->begin[p]; j < V->begin[p + 1]; j++)
+            whole += area[op->order != NULL ? op->order[j] : j];
+        for (uint64_t j = V->begin[p]; j < V->begin[p + 1]; j++) {
+            const size_t i = op->order != NULL ? op->order[j] : (size_t)j;
+            const double weight = V->weight != NULL ? (double)V->weight[j] : 1 / count;
+            if (fabs(weight * whole / area[i] - 1) <= allowed) continue;
+            snprintf(detail, size, "element %zu weighs %.7g in patch %zu, its area is %.7g of it", i, weight,
+                     p, area[i] / whole);
+            return false;
+        }
+    }
+    return true;
+}
+
 const operator_kind operator_two_mesh = {
     .name = "two_mesh",
     .load = two_mesh_load,
@@ -229,6 +252,7 @@ const operator_kind operator_two_mesh = {
     .relight = two_mesh_relight,
     .destroy = two_mesh_destroy,
     .describe = two_mesh_describe,
+    .check = two_mesh_check,
 };
 
 bool operator_patches_of(const lam_operator *op, operator_patches *patches) {

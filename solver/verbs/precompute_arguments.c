@@ -201,9 +201,9 @@ static const option_row operator_rows[] = {
      .kind = OPTION_CHOICE,
      .offset = FIELD(precision),
      .preset = "f32",
-     .choices = "f32|f16|bf16|i8",
-     .help = "Format of the numbers of a stored low-rank operator; f16 and bf16 take half of the memory and "
-             "time, i8 a quarter"},
+     .choices = "f32|f16|i8",
+     .help = "Format of the numbers of a stored low-rank operator; f16 takes half of the memory and time, i8 "
+             "a quarter"},
     {.name = "coherence",
      .kind = OPTION_NUMBER,
      .offset = FIELD(coherence),

@@ -2,7 +2,6 @@
 #include "solver/formfactor/pairs/first_light.h"
 #include "solver/method/judge.h"
 #include "solver/operator/emitters.h"
-#include "solver/operator/two_mesh.h"
 #include "solver/precompute/forecast.h"
 #include "solver/precompute/precompute.h"
 #include "solver/verify/verify.h"
@@ -47,32 +46,12 @@ static bool skip(const examination *e, check *c) {
     return true;
 }
 
-/* Of two meshes: every weight is A_j / A_p to single precision (absent ones: areas are equal), or power would
- * be lost. */
-static void check_patches(const examination *e, check *c) {
-    static const double allowed = 1e-6;
-    operator_patches patches;
-    if (!operator_patches_of(e->op, &patches)) return;
-    for (size_t p = 0; p < patches.k && c->verdict == VERDICT_OK; p++) {
-        const double count = (double)(patches.begin[p + 1] - patches.begin[p]);
-        double area = 0;
-        for (uint64_t j = patches.begin[p]; j < patches.begin[p + 1]; j++)
-            area += e->m.area[patches.order != NULL ? patches.order[j] : j];
-        for (uint64_t j = patches.begin[p]; j < patches.begin[p + 1] && c->verdict == VERDICT_OK; j++) {
-            const size_t i = patches.order != NULL ? patches.order[j] : (size_t)j;
-            const double weight = patches.weight != NULL ? (double)patches.weight[j] : 1 / count;
-            if (!(fabs(weight * area / e->m.area[i] - 1) <= allowed))
-                check_say(c, VERDICT_BROKEN, "element %zu weighs %.7g in patch %zu, its area is %.7g of it",
-                          i, weight, p, e->m.area[i] / area);
-        }
-    }
-}
-
 lam_status verify_operator(examination *e, check *c, lam_error *error) {
     static const lam_quantity quantities[] = {LAM_RADIOSITY, LAM_IRRADIANCE, LAM_INDIRECT};
     lam_status status = LAM_OK;
     float *E = NULL, *out = NULL;
     operator_description about;
+    char detail[256];
     if (!e->has_mesh) {
         check_say(c, VERDICT_SKIPPED, "no mesh to light");
         return LAM_OK;
@@ -81,7 +60,8 @@ lam_status verify_operator(examination *e, check *c, lam_error *error) {
     operator_describe(e->op, &about);
     check_say(c, VERDICT_OK, "%s, %s, %zu bytes, finite", lam_operator_kind(e->op),
               about.precision != NULL ? about.precision : "f32", about.bytes);
-    check_patches(e, c);
+    if (e->op->kind->check != NULL && !e->op->kind->check(e->op, e->m.area, detail, sizeof detail))
+        check_say(c, VERDICT_BROKEN, "%s", detail);
     /* Light everywhere: a value that is not finite anywhere in the operator shows in the answer. */
     const size_t count = e->m.n * e->m.n_channels, inputs = input_size(e);
     E = memory_allocate(inputs, sizeof *E, "an emission", error);

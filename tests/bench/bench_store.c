@@ -43,7 +43,7 @@ static void fill(size_t n, size_t k, int precision, unsigned seed, void *values)
 
 static void write_matrix(store *s, const char *name, size_t n, size_t k, int precision, unsigned seed,
                          void *values, lam_error *error) {
-    static const store_type types[PANEL_PRECISIONS] = {STORE_F32, STORE_F16, STORE_U16, STORE_I8};
+    static const store_type types[PANEL_PRECISIONS] = {STORE_F32, STORE_F16, STORE_I8};
     char scale_name[48];
     fill(n, k, precision, seed, values);
     need(store_write(s, name, types[precision], 2, (size_t[]){n, k}, values, error), error);
@@ -91,7 +91,7 @@ int main(int argc, char **argv) {
     size_t n = 0, k = 0;
     store *s = NULL;
     if (argc < 3 || sscanf(argv[2], "%zux%zu", &n, &k) != 2 || n == 0 || k == 0 ||
-        (argc > 3 && (!panel_precision_find(argv[3], &precision) || precision == PANEL_BF16)))
+        (argc > 3 && !panel_precision_find(argv[3], &precision)))
         die("STORE.h5 NxK [f32|f16|i8]");
     need(store_create(argv[1], &s, &error), &error);
     need(store_set_text(s, "/", "name", "big", &error), &error);

@@ -48,7 +48,6 @@ typedef struct subject {
 static const subject subjects[] = {
     {"low_rank, folded", false, false, PANEL_F32, 2},
     {"low_rank, folded, f16", false, false, PANEL_F16, 2},
-    {"low_rank, folded, bf16", false, false, PANEL_BF16, 2},
     {"low_rank, folded, i8", false, false, PANEL_I8, 2},
     {"low_rank, factored", true, false, PANEL_F32, 2},
     {"low_rank, factored, i8", true, false, PANEL_I8, 2},

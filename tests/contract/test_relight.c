@@ -98,7 +98,7 @@ static void check_same_bits(const lam_operator *one, const lam_operator *other) 
 /* Which reflectances change is all that differs, so a relit operator is, bit for bit, the one built: 0 or not
  * before and after stand beside each other in random_reflectance. */
 START_TEST(the_bits_are_those_of_an_operator_built_so) {
-    static const panel_precision precisions[] = {PANEL_F32, PANEL_F16, PANEL_BF16, PANEL_I8};
+    static const panel_precision precisions[] = {PANEL_F32, PANEL_F16, PANEL_I8};
     const bool two_mesh = _i % 2 == 1;
     const panel_precision precision = precisions[_i / 4];
     factors_of_test f = make_factors(_i / 2 % 2 == 1 ? 3 : 1);

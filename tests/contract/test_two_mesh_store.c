@@ -10,9 +10,9 @@ typedef struct recipe {
     size_t I_size, weight_size, coherence_size, left[2]; /* weight and coherence: 0 leaves them out */
     uint64_t begin[3];
     float weight, coherence, left_value;
-    bool bf16;                     /* Y is of u16 */
-    const char *encoding, *claims; /* of Y; of /operator's precision; NULL: no such attribute */
-    const char *word;              /* NULL: it is good */
+    bool whole;         /* Y is of u16 */
+    const char *claims; /* /operator's precision; NULL: no such attribute */
+    const char *word;   /* NULL: it is good */
 } recipe;
 
 static const recipe recipes[] = {
@@ -21,8 +21,7 @@ static const recipe recipes[] = {
     {.what = "good, weighted", .weight_size = 6, .weight = .5f},
     {.what = "good, coherence", .coherence_size = 2, .coherence = 1},
     {.what = "a patch without elements", .begin = {0, 6, 6}},
-    {.what = "good, bf16", .bf16 = true, .encoding = "bf16", .claims = "bf16"},
-    {.what = "u16 without encoding", .bf16 = true, .word = "/operator/Y has the encoding ''"},
+    {.what = "whole numbers", .whole = true, .word = "/operator/Y must be of f32, f16 or i8"},
     {.what = "another precision said", .claims = "i8", .word = "precision 'i8', its arrays are of f32"},
     {.what = "no form", .no_form = true, .word = "form"},
     {.what = "no I", .no_I = true, .word = "/operator/I"},
@@ -64,12 +63,11 @@ static void write_recipe(const recipe *r) {
     ck_ok(store_set_text(s, "/operator", "kind", "two_mesh", &error));
     if (!r->no_form)
         ck_ok(store_set_text(s, "/operator", "form", r->factored ? "factored" : "folded", &error));
-    if (r->bf16)
+    if (r->whole)
         ck_ok(store_write(s, "/operator/Y", STORE_U16, 2, left, (uint16_t[12]){0}, &error));
     else
         write_floats(s, r->factored ? "/operator/U" : "/operator/Y", 2, left, .1f,
                      r->left_value != 0 ? r->left_value : .1f);
-    if (r->encoding != NULL) ck_ok(store_set_text(s, "/operator/Y", "encoding", r->encoding, &error));
     if (r->claims != NULL) ck_ok(store_set_text(s, "/operator", "precision", r->claims, &error));
     if (!r->no_I)
         ck_ok(

@@ -94,8 +94,6 @@ class Store:
     @staticmethod
     def read(operator, name):
         values = operator[name][()]
-        if operator[name].attrs.get("encoding") == b"bf16":
-            values = (values.astype("<u4") << 16).view("<f4")
         values = values.astype(float)
         return values * operator[name + "_scale"][()] if name + "_scale" in operator else values
 
@@ -164,7 +162,6 @@ class StoreTest(unittest.TestCase):
             "exact": ("0.5 0.5 0.5", "exact"),
             "exact_colour": ("0.6 0.1 0.1", "exact"),
             "folded_f16": ("0.5 0.5 0.5", "low-rank"),
-            "folded_bf16": ("0.5 0.5 0.5", "low-rank"),
             "folded_i8": ("0.5 0.5 0.5", "low-rank"),
             "factored_i8": ("0.6 0.1 0.1", "low-rank"),
         }
@@ -225,7 +222,7 @@ class StoreTest(unittest.TestCase):
             }
             form, _, precision = name.partition("_")
             if form != "exact":
-                value = {"": "<f4", "f16": "<f2", "bf16": "<u2", "i8": "|i1"}[precision]
+                value = {"": "<f4", "f16": "<f2", "i8": "|i1"}[precision]
                 for array in ("Y", "V") if form == "folded" else ("U", "V"):
                     expected["/operator/" + array] = ((n, k), value)
                     if precision == "i8" or f"operator/{array}_scale" in f and precision == "f16":

@@ -45,8 +45,7 @@ typedef struct file_recipe {
     const char *narrow;     /* these datasets (names after each other) are of narrow_type, all of fill */
     store_type narrow_type;
     uint16_t fill;
-    const char *encoding; /* of those; NULL: none */
-    const char *scales;   /* these have a scale of scale_size (0: 2) numbers that are scale */
+    const char *scales; /* these have a scale of scale_size (0: 2) numbers that are scale */
     float scale;
     size_t scale_size;
     const char *precision; /* the attribute; NULL: none */
@@ -83,7 +82,6 @@ static inline void write_array(store *s, const file_recipe *r, const char *name,
             memcpy((char *)values + i * store_type_size(r->narrow_type), &r->fill,
                    store_type_size(r->narrow_type) < 2 ? 1 : 2);
         ck_ok(store_write(s, name, r->narrow_type, rank, dims, values, &error));
-        if (r->encoding != NULL) ck_ok(store_set_text(s, name, "encoding", r->encoding, &error));
         free(values);
         return;
     }

@@ -22,7 +22,7 @@
 
 /* An operator and what it should be. */
 typedef struct transport {
-    const char *name;
+    const char *name, *kind;
     size_t n, n_channels, k;
     float *reflectance; /* [C][n] */
     double *F;          /* [n][n] form factors of the truth, that all channels share */
@@ -42,34 +42,47 @@ static inline double sum_roundings(size_t count) {
     return (count < 128 ? (double)count : 128.0) + 6.0;
 }
 
+/* Every variant that the contract test judges: its name, its kind, the precision of its large arrays, and who
+ * makes it. "3 channels", "folded" and "relit" in a name say so of the variant. */
+#define TRANSPORT_LIST(X)                                                                                    \
+    X(EXACT, "exact", "exact", PANEL_F32, make_exact)                                                        \
+    X(EXACT_COLOUR, "exact, 3 channels", "exact", PANEL_F32, make_exact)                                     \
+    X(FOLDED, "folded", "low_rank", PANEL_F32, make_low_rank)                                                \
+    X(FACTORED, "factored", "low_rank", PANEL_F32, make_low_rank)                                            \
+    X(FACTORED_COLOUR, "factored, 3 channels", "low_rank", PANEL_F32, make_low_rank)                         \
+    X(FOLDED_F16, "folded, f16", "low_rank", PANEL_F16, make_low_rank)                                       \
+    X(FOLDED_I8, "folded, i8", "low_rank", PANEL_I8, make_low_rank)                                          \
+    X(FACTORED_COLOUR_I8, "factored, 3 channels, i8", "low_rank", PANEL_I8, make_low_rank)                   \
+    X(TWO_MESH, "two meshes, folded", "two_mesh", PANEL_F32, make_low_rank)                                  \
+    X(TWO_MESH_COLOUR, "two meshes, 3 channels", "two_mesh", PANEL_F32, make_low_rank)                       \
+    X(TWO_MESH_F16, "two meshes, folded, f16", "two_mesh", PANEL_F16, make_low_rank)                         \
+    X(TWO_MESH_I8, "two meshes, folded, i8", "two_mesh", PANEL_I8, make_low_rank)                            \
+    X(TWO_MESH_COLOUR_I8, "two meshes, 3 channels, i8", "two_mesh", PANEL_I8, make_low_rank)                 \
+    X(SPARSE, "sparse, with delta", "sparse", PANEL_F32, make_sparse)                                        \
+    X(SPARSE_COLOUR, "sparse, 3 channels", "sparse", PANEL_F32, make_sparse)                                 \
+    X(HIERARCHICAL, "hierarchical", "hierarchical", PANEL_F32, make_hierarchical)                            \
+    X(HIERARCHICAL_COLOUR, "hierarchical, 3 channels", "hierarchical", PANEL_F32, make_hierarchical)         \
+    X(RELIT, "relit", "low_rank", PANEL_F32, make_low_rank)                                                  \
+    X(RELIT_COLOUR_F16, "relit, 3 channels, f16", "low_rank", PANEL_F16, make_low_rank)                      \
+    X(RELIT_TWO_MESH_F16, "two meshes, relit, f16", "two_mesh", PANEL_F16, make_low_rank)                    \
+    X(RELIT_TWO_MESH_COLOUR, "two meshes, relit, 3 channels", "two_mesh", PANEL_F32, make_low_rank)
+
 typedef enum transport_kind {
-    TRANSPORT_EXACT,
-    TRANSPORT_EXACT_COLOUR,
-    TRANSPORT_FOLDED,
-    TRANSPORT_FACTORED,
-    TRANSPORT_FACTORED_COLOUR,
-    TRANSPORT_FOLDED_F16,
-    TRANSPORT_FOLDED_BF16,
-    TRANSPORT_FOLDED_I8,
-    TRANSPORT_FACTORED_COLOUR_I8,
-    TRANSPORT_TWO_MESH,
-    TRANSPORT_TWO_MESH_COLOUR,
-    TRANSPORT_TWO_MESH_F16,
-    TRANSPORT_TWO_MESH_BF16,
-    TRANSPORT_TWO_MESH_I8,
-    TRANSPORT_TWO_MESH_COLOUR_I8,
-    TRANSPORT_SPARSE,
-    TRANSPORT_SPARSE_COLOUR,
-    TRANSPORT_HIERARCHICAL,
-    TRANSPORT_HIERARCHICAL_COLOUR,
-    TRANSPORT_RELIT,
-    TRANSPORT_RELIT_COLOUR_F16,
-    TRANSPORT_RELIT_TWO_MESH_F16,
-    TRANSPORT_RELIT_TWO_MESH_COLOUR,
-    TRANSPORT_KINDS
+#define TRANSPORT_ENUMERATOR(id, name, kind, precision, make) TRANSPORT_##id,
+    TRANSPORT_LIST(TRANSPORT_ENUMERATOR) TRANSPORT_KINDS
 } transport_kind;
 
-static inline void make_exact(transport *t, const double *F) {
+/* The random parts that a maker may use: F = U V^T of rank k; begin: of a coarse mesh, NULL for other kinds.
+ */
+typedef struct transport_parts {
+    const double *F;
+    const float *U, *V;
+    const uint64_t *begin;
+    uint64_t *state; /* of the random numbers to come */
+} transport_parts;
+
+static inline void make_exact(transport *t, const transport_parts *parts) {
+    const double *F = parts->F;
     lam_error error = {.message = ""};
     size_t n = t->n, square = n * n;
     float *P = test_allocate(t->n_channels * square, sizeof *P);
@@ -93,7 +106,8 @@ static inline void make_exact(transport *t, const double *F) {
 
 /* Every third entry of the inverse; grey also what was left out of each row, spread by weights, and rows 20
  * to 29 without any entry. */
-static inline void make_sparse(transport *t, const double *F) {
+static inline void make_sparse(transport *t, const transport_parts *parts) {
+    const double *F = parts->F;
     lam_error error = {.message = ""};
     const size_t n = t->n, C = t->n_channels;
     sparse_arrays arrays = {.M = test_allocate(C, sizeof *arrays.M)};
@@ -171,7 +185,8 @@ static inline void make_up_for_even_light(transport *t, const double *area, uint
 
 /* P = R' A^-1/2 W^T K W A^1/2, K random, symmetric and of few numbers, which half precision has; of more
  * channels it is made up for even light, too. */
-static inline void make_hierarchical(transport *t, uint64_t *state) {
+static inline void make_hierarchical(transport *t, const transport_parts *parts) {
+    uint64_t *state = parts->state;
     lam_error error = {.message = ""};
     const size_t n = t->n, C = t->n_channels, square = n * n;
     hierarchical_arrays arrays = {.K = test_allocate(C, sizeof *arrays.K)};
@@ -309,8 +324,11 @@ static inline lam_status create_two_mesh(const transport *t, float *left, const 
 
 /* Y = -rho' U core for one channel, magnitude |U| |core| |V|^T rho' for all. With I, V is that of two meshes.
  */
-static inline void make_low_rank(transport *t, const double *F, const float *U, const float *V, bool folded,
-                                 const uint64_t *begin) {
+static inline void make_low_rank(transport *t, const transport_parts *parts) {
+    const double *F = parts->F;
+    const float *U = parts->U, *V = parts->V;
+    const uint64_t *begin = parts->begin;
+    const bool folded = strstr(t->name, "folded") != NULL;
     lam_error error = {.message = ""};
     size_t n = t->n, k = t->k;
     float *core = test_allocate(t->n_channels * k * k, sizeof *core), *Y = test_allocate(n * k, sizeof *Y);
@@ -378,14 +396,13 @@ static inline void make_low_rank(transport *t, const double *F, const float *U, 
 
 /* In place of an operator made for its reflectances, one that was made for others and relit. The cores of
  * both are in double until they are rounded once: nothing is added to the roundings. */
-static inline void relight(transport *t, const double *F, const float *U, const float *V,
-                           const uint64_t *begin, uint64_t *state) {
+static inline void relight(transport *t, const transport_parts *parts) {
     lam_error error = {.message = ""};
     transport first = *t;
-    first.reflectance = random_reflectance(t->n, t->n_channels, state);
+    first.reflectance = random_reflectance(t->n, t->n_channels, parts->state);
     first.P = test_allocate(t->n_channels * t->n * t->n, sizeof *first.P);
     first.magnitude = test_allocate(t->n_channels * t->n * t->n, sizeof *first.magnitude);
-    make_low_rank(&first, F, U, V, false, begin);
+    make_low_rank(&first, parts);
     ck_assert(operator_set_order(first.op, t->order, &error) == LAM_OK);
     lam_operator_close(t->op);
     ck_assert_msg(operator_relight(first.op, t->reflectance, NULL, &t->op, &error) == LAM_OK, "%s",
@@ -399,37 +416,19 @@ static inline void relight(transport *t, const double *F, const float *U, const 
 /* An operator of a kind with its truth; ordered: its rows are in a random order inside. */
 static inline transport transport_make(transport_kind kind, bool ordered) {
     static const struct {
-        const char *name;
+        const char *name, *kind;
         panel_precision precision;
-    } kinds[] = {{"exact", PANEL_F32},
-                 {"exact, 3 channels", PANEL_F32},
-                 {"folded", PANEL_F32},
-                 {"factored", PANEL_F32},
-                 {"factored, 3 channels", PANEL_F32},
-                 {"folded, f16", PANEL_F16},
-                 {"folded, bf16", PANEL_BF16},
-                 {"folded, i8", PANEL_I8},
-                 {"factored, 3 channels, i8", PANEL_I8},
-                 {"two meshes, folded", PANEL_F32},
-                 {"two meshes, 3 channels", PANEL_F32},
-                 {"two meshes, folded, f16", PANEL_F16},
-                 {"two meshes, folded, bf16", PANEL_BF16},
-                 {"two meshes, folded, i8", PANEL_I8},
-                 {"two meshes, 3 channels, i8", PANEL_I8},
-                 {"sparse, with delta", PANEL_F32},
-                 {"sparse, 3 channels", PANEL_F32},
-                 {"hierarchical", PANEL_F32},
-                 {"hierarchical, 3 channels", PANEL_F32},
-                 {"relit", PANEL_F32},
-                 {"relit, 3 channels, f16", PANEL_F16},
-                 {"two meshes, relit, f16", PANEL_F16},
-                 {"two meshes, relit, 3 channels", PANEL_F32}};
+        void (*make)(transport *t, const transport_parts *parts);
+    } kinds[] = {
+#define TRANSPORT_ROW(id, name, kind, precision, make) {name, kind, precision, make},
+        TRANSPORT_LIST(TRANSPORT_ROW)};
     lam_error error = {.message = ""};
     uint64_t state = 11 + (uint64_t)kind;
     const bool colour = strstr(kinds[kind].name, "3 channels") != NULL;
-    const bool two_mesh = strncmp(kinds[kind].name, "two meshes", 10) == 0;
+    const bool two_mesh = strcmp(kinds[kind].kind, "two_mesh") == 0;
     uint64_t begin[64] = {0};
     transport t = {.name = kinds[kind].name,
+                   .kind = kinds[kind].kind,
                    .n = 151,
                    .k = 21,
                    .n_channels = colour ? 3 : 1,
@@ -452,16 +451,10 @@ static inline transport transport_make(transport_kind kind, bool ordered) {
     t.reflectance = random_reflectance(n, t.n_channels, &state);
     t.P = test_allocate(t.n_channels * n * n, sizeof *t.P);
     t.magnitude = test_allocate(t.n_channels * n * n, sizeof *t.magnitude);
-    if (kind == TRANSPORT_EXACT || kind == TRANSPORT_EXACT_COLOUR)
-        make_exact(&t, F);
-    else if (kind == TRANSPORT_SPARSE || kind == TRANSPORT_SPARSE_COLOUR)
-        make_sparse(&t, F);
-    else if (kind == TRANSPORT_HIERARCHICAL || kind == TRANSPORT_HIERARCHICAL_COLOUR)
-        make_hierarchical(&t, &state);
-    else
-        make_low_rank(&t, F, U, V, strstr(t.name, "folded") != NULL, two_mesh ? begin : NULL);
+    const transport_parts parts = {F, U, V, two_mesh ? begin : NULL, &state};
+    kinds[kind].make(&t, &parts);
     if (strstr(t.name, "relit") != NULL)
-        relight(&t, F, U, V, two_mesh ? begin : NULL, &state);
+        relight(&t, &parts);
     else if (ordered)
         ck_assert(operator_set_order(t.op, t.order, &error) == LAM_OK);
     t.F = F;

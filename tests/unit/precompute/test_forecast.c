@@ -57,7 +57,7 @@ END_TEST
 START_TEST(fewer_bits_take_less_of_the_disk) {
     forecast f = {.n = 5000, .n_channels = 1, .recipe = {.method = RECIPE_RAYS, .rays = 512}, .rank = 100};
     const double single = forecast_store_bytes(&f), all = 2. * 5000 * 100;
-    f.precision = PANEL_BF16;
+    f.precision = PANEL_F16;
     ck_assert_double_eq(single - forecast_store_bytes(&f), 2 * all);
     f.precision = PANEL_I8;
     ck_assert_double_eq(single - forecast_store_bytes(&f), 3 * all);
