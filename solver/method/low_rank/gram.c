@@ -10,11 +10,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A row of a sparse block with more than this share of its entries goes to BLAS, which makes that many more
- * products in the same time. */
+/* A sparse row with more than this share of nonzero entries is expanded and left to BLAS, whose products are
+ * that much faster. */
 static const double spread_above = 1. / 5;
 
-/* Rows spread out at a time. */
+/* Rows expanded at a time. */
 enum { PANEL = 1024 };
 
 /* Columns of a tile of the Gram matrix that stays in the cache while sparse rows are added to it. */
@@ -44,7 +44,7 @@ lam_status gram_add(gram *g, size_t n, const float *A, lam_error *error) {
 /* --- sparse rows -----------------------------------------------------------------------------------------
  */
 
-/* The rows with few entries, and where the entries of each tile begin in them. */
+/* Rows with few entries, and the first entry of each tile in each of them. */
 typedef struct thin_rows {
     size_t n, tiles;
     uint64_t *begin; /* [n][tiles + 1] */
@@ -57,7 +57,7 @@ typedef struct thin_job {
 } thin_job;
 
 /* g_c += a_q x and h_c += a_q y at the columns c of entries first <= q < last: two rows of the tile share
- * what is read. */
+ * each load. */
 static inline void add_two(const sparse_block *A, uint64_t first, uint64_t last, float x, float y,
                            float *restrict g, float *restrict h) {
     for (uint64_t q = first; q < last; q++) {
@@ -99,7 +99,7 @@ static void add_double(gram *g, const sparse_block *A, uint64_t p, uint64_t p_en
     }
 }
 
-/* One tile of g from every row; pieces count the tiles of the upper triangle. */
+/* Adds every row to one tile of g; piece is the number of the tile in the upper triangle. */
 static void add_tile(const void *context, size_t piece) {
     const thin_job *job = context;
     const thin_rows *rows = &job->rows;
@@ -160,8 +160,8 @@ done:
 /* --- eigenvectors ----------------------------------------------------------------------------------------
  */
 
-/* As LAPACKE_ssyevd, whose own query for the size of the work area comes back rounded to single precision,
- * too small from about 2,900 columns on. The sizes are those of LAPACK's manual for ssyevd. */
+/* LAPACKE_ssyevd asks LAPACK for the size of the work area, which comes back rounded to single precision: too
+ * small from about 2,900 columns on. The sizes here are those of the manual of ssyevd. */
 static lapack_int eigen_single(size_t m, char job, float *G, float *w) {
     const bool vectors = job == 'V';
     const size_t n_work = vectors ? 1 + 6 * m + 2 * m * m : 1 + 2 * m, n_integers = vectors ? 3 + 5 * m : 1;
@@ -176,7 +176,7 @@ static lapack_int eigen_single(size_t m, char job, float *G, float *w) {
     return info;
 }
 
-/* Rows of ours are columns of LAPACK's, our upper triangle its lower. */
+/* LAPACK is column-major: our upper triangle is its lower one. */
 lam_status gram_eigen(gram *g, bool vectors, double *values, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t m = g->m;

@@ -4,19 +4,19 @@
 
 #include "solver/linalg/scaled.h"
 
-/* [m][m], of which j >= i is set; in single precision or in double, one of the two. */
+/* [m][m], entries j >= i alone; in single precision or in double, one of the two. */
 typedef struct gram {
     size_t m;
     float *single;
     double *full;
 } gram;
 
-/* Zero. Errors: LAM_ERR_MEMORY. */
+/* Makes a zero matrix. Errors: LAM_ERR_MEMORY. */
 lam_status gram_create(size_t m, bool single, gram *g, lam_error *error);
 void gram_free(gram *g);
 
-/* g += A^T A of A [n][m], or of the first m columns of a sparse block. A row of it with few entries costs
- * their squares. Errors: LAM_ERR_MEMORY. */
+/* g += A^T A of A [n][m], or of the first m columns of a sparse block. A row with few entries costs
+ * the square of their number. Errors: LAM_ERR_MEMORY. */
 lam_status gram_add(gram *g, size_t n, const float *A, lam_error *error);
 lam_status gram_add_sparse(gram *g, const sparse_block *A, lam_error *error);
 
@@ -24,11 +24,11 @@ lam_status gram_add_sparse(gram *g, const sparse_block *A, lam_error *error);
  * O(m^3). Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC. */
 lam_status gram_eigen(gram *g, bool vectors, double *values, lam_error *error);
 
-/* V [m][*rank], freed by the caller, orthonormal: about the eigenvectors whose values are at least floor, by
- * subspace iteration, so that no vector orthogonal to V has x^T G x above floor |x|^2 (measured by Lanczos
- * steps, to about a per cent). *rank is 0 and *V NULL where they turn out to be many: then gram_eigen is
- * cheaper. Of a gram in single precision, whose other half it sets. guess is about how many they are, 0: not
- * known. Cost: O(m^2 rank). Errors as above. */
+/* V [m][*rank], orthonormal, freed by the caller: approximate eigenvectors of the eigenvalues above floor, by
+ * subspace iteration until x^T G x <= floor |x|^2 for every x orthogonal to V (checked by Lanczos steps, to
+ * about a per cent). *rank is 0 and *V NULL if they are so many that gram_eigen is cheaper. g is in single
+ * precision; its lower half is set too. guess is their expected number, 0: unknown. Cost: O(m^2 rank). Errors
+ * as above. */
 lam_status gram_leading(gram *g, double floor, size_t guess, float **V, size_t *rank, lam_error *error);
 
 #endif

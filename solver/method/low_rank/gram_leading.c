@@ -1,4 +1,4 @@
-/* The leading eigenvectors of a Gram matrix where they are few, by subspace iteration. */
+/* The leading eigenvectors of a Gram matrix by subspace iteration, for when they are few. */
 #include "solver/linalg/dense.h"
 #include "solver/method/low_rank/gram.h"
 #include "solver/method/low_rank/norm.h"
@@ -12,14 +12,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The first guess is so many eigenvectors; with more than GIVE_UP of all the whole decomposition is cheaper.
- */
+/* The first guess is m / FIRST_GUESS eigenvectors; above m / GIVE_UP the full decomposition is cheaper. */
 enum { FIRST_GUESS = 16, GIVE_UP = 3, ITERATIONS = 3 };
 
-/* Ritz values come from below; this much under the floor they count. */
+/* Ritz values approach eigenvalues from below: they are kept from this share of the floor on. */
 static const double slack = .9;
 
-/* Sets the other half too. */
+/* Copies the upper half to the lower one. */
 static void fill_symmetric(gram *g) {
     for (size_t i = 0; i < g->m; i++)
         for (size_t j = 0; j < i; j++) g->single[i * g->m + j] = g->single[j * g->m + i];
@@ -142,7 +141,7 @@ lam_status gram_leading(gram *g, double floor, size_t guess, float **V, size_t *
     *V = NULL;
     *rank = 0;
     fill_symmetric(g);
-    /* A quarter more than are expected, or the iteration is slow. */
+    /* A quarter more than expected, so that the iteration converges fast. */
     for (size_t w = guess > 0 ? guess + guess / 4 + 8 : m / FIRST_GUESS;
          w * GIVE_UP <= m && *V == NULL && w > 0; w *= 2)
         TRY(attempt(m, g->single, w, floor, V, rank, error));

@@ -1,4 +1,5 @@
-/* The hierarchical factorization (Aguerre and Fernandez 2016; thesis chapter 3, algorithm 4). */
+/* The hierarchical factorization (Aguerre 2016, algorithm 4; Aguerre and Fernández 2016): columns are split
+ * in a binary tree, leaves are truncated SVDs, and a node truncates (Q1 | Q2) of its children. */
 #include "solver/method/low_rank/hf.h"
 
 #include "solver/linalg/dense.h"
@@ -8,9 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* At the root the rank goes up to a multiple of ROOT_ROUND where the spectrum still has something to give:
- * the online kernels work in vectors and panels of that width, and the tail of the spectrum is steep (on the
- * Cornell box 6 % more columns take 20 % off the error). */
+/* The rank at the root is rounded up to a multiple of ROOT_ROUND, as far as singular values are at least
+ * epsilon / 2: the kernels of the online phase work in panels of that width, and the tail of the spectrum is
+ * steep (on the Cornell box 6 % more columns reduce the error by 20 %). */
 enum { ROOT_ROUND = 64 };
 
 typedef struct hf_run {
@@ -18,7 +19,7 @@ typedef struct hf_run {
     const factorizer_options *options;
     hf_plan plan;
     const hf_forecast *forecast; /* or NULL */
-    int alone;                   /* levels whose nodes are made one after the other */
+    int alone;                   /* levels whose nodes are computed one after the other */
     size_t columns_done;
     size_t given[BUDGET_LEVELS_MOST + 1], kept[BUDGET_LEVELS_MOST + 1]; /* columns, by level */
     lam_status status;                                                  /* the first failure of a task */
@@ -37,8 +38,8 @@ static void count_columns(hf_run *run, int level, size_t given, size_t kept) {
     __atomic_fetch_add(&run->kept[level], kept, __ATOMIC_RELAXED);
 }
 
-/* (Q1 | Q2 | ...) = Q_r V_r^T and V = (V1 V_r1 ; V2 V_r2 ; ...), eqs. 3.3, 3.5, 3.6, of two or more parts,
- * whose arrays go as soon as they are used. */
+/* (Q1 | Q2 | ...) ~ Q_r V_r^T and V = (V1 V_r1 ; V2 V_r2 ; ...), Aguerre 2016, eqs. 3.3, 3.5, 3.6, for two or
+ * more parts, whose arrays are freed once they are used. */
 static lam_status combine(size_t count, tall_factors *parts, const truncation *keep, tall_factors *out,
                           lam_error *error) {
     lam_status status = LAM_OK;
@@ -72,7 +73,8 @@ done:
     return status;
 }
 
-/* The same by a team, in which BLAS and LAPACK work alone, so that the bits do not depend on its size. */
+/* The same inside a parallel region, where BLAS and LAPACK use one thread each, so that the bits do not
+ * depend on the number of threads. */
 static lam_status combine_in_team(size_t count, tall_factors *parts, const truncation *keep,
                                   tall_factors *out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -122,20 +124,18 @@ static lam_status failure(hf_run *run, lam_error *error) {
     return status;
 }
 
-/* --- the tree --------------------------------------------------------------------------------------------
- *
- * A level whose nodes may leave out nothing has none: the nodes below go to the next level above that has. */
-
+/* The next level that has nodes. A level with error bound 0 has none: its children go to the next level
+ * above. */
 static int level_below(const hf_run *run, int level) {
     do level++;
     while (level < run->plan.levels && run->plan.left[level] <= 0 && run->options->rank == 0);
     return level < run->plan.levels ? level : run->plan.levels;
 }
 
-static lam_status gather(hf_run *run, size_t first, size_t last, int level, int below, tall_factors *parts,
-                         lam_error *error);
+static lam_status factorize_below(hf_run *run, size_t first, size_t last, int level, int below,
+                                  tall_factors *parts, lam_error *error);
 
-/* Columns first ... last-1 (algorithm 4, HF). */
+/* Factorizes columns first ... last-1 (algorithm 4, HF). */
 static lam_status node(hf_run *run, size_t first, size_t last, int level, tall_factors *out,
                        lam_error *error) {
     lam_status status = LAM_OK;
@@ -151,7 +151,7 @@ static lam_status node(hf_run *run, size_t first, size_t last, int level, tall_f
     count = (size_t)1 << (below - level);
     parts = memory_allocate(count, sizeof *parts, "factorization", error);
     if (parts == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(gather(run, first, last, level, below, parts, error));
+    TRY(factorize_below(run, first, last, level, below, parts, error));
     for (size_t k = 0; k < count; k++) given += parts[k].rank;
     TRY(combine_in_team(count, parts, &keep, out, error));
     count_columns(run, level, given, out->rank);
@@ -161,45 +161,46 @@ done:
     return status;
 }
 
-/* As a task, which has nobody to return to. */
-static void gather_task(hf_run *run, size_t first, size_t last, int level, int below, tall_factors *parts) {
+/* The same as an OpenMP task, which reports failure in run. */
+static void factorize_below_task(hf_run *run, size_t first, size_t last, int level, int below,
+                                 tall_factors *parts) {
     lam_error why = {0};
-    const lam_status mine = gather(run, first, last, level, below, parts, &why);
+    const lam_status mine = factorize_below(run, first, last, level, below, parts, &why);
     if (mine != LAM_OK) fail(run, mine, &why);
 }
 
-/* The nodes of a level below into parts, [2^(below - level)]; a range too short for as many leaves some as
- * they are. Above the level where memory is enough for a subtree of each thread they are made one after the
- * other, each by all threads; from there on siblings side by side. */
-static lam_status gather(hf_run *run, size_t first, size_t last, int level, int below, tall_factors *parts,
-                         lam_error *error) {
+/* Factorizes the descendants at level `below` into parts [2^(below - level)]; of a range too short for so
+ * many some stay empty. Above level run->alone, where memory does not hold a subtree for each thread, nodes
+ * are computed one after the other, each by all threads; from there on siblings are tasks. */
+static lam_status factorize_below(hf_run *run, size_t first, size_t last, int level, int below,
+                                  tall_factors *parts, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t middle = first + (last - first) / 2;
     const bool in_team = omp_get_level() > 0;
     if (!in_team && level >= run->alone) {
 #pragma omp parallel
 #pragma omp single
-        status = gather(run, first, last, level, below, parts, error);
+        status = factorize_below(run, first, last, level, below, parts, error);
         return status;
     }
     if (level == below || last - first < 2) return node(run, first, last, below, parts, error);
     tall_factors *others = parts + ((size_t)1 << (below - level - 1));
     if (!in_team) {
-        TRY(gather(run, first, middle, level + 1, below, parts, error));
-        TRY(gather(run, middle, last, level + 1, below, others, error));
+        TRY(factorize_below(run, first, middle, level + 1, below, parts, error));
+        TRY(factorize_below(run, middle, last, level + 1, below, others, error));
         goto done;
     }
 #pragma omp task
-    gather_task(run, first, middle, level + 1, below, parts);
-    gather_task(run, middle, last, level + 1, below, others);
+    factorize_below_task(run, first, middle, level + 1, below, parts);
+    factorize_below_task(run, middle, last, level + 1, below, others);
 #pragma omp taskwait
     status = failure(run, error);
 done:
     return status;
 }
 
-/* Bytes that a thread holds which makes a subtree from this level on: on the way down, each level's finished
- * half; a leaf's columns, Gram matrix and result. */
+/* Bytes of a thread that computes a subtree from this level on: the finished half of each level, and the
+ * columns, Gram matrix and result of a leaf. */
 static double subtree_bytes(const hf_run *run, int level) {
     const double n = (double)run->S->n, levels = run->plan.levels, m = ldexp(n, -run->plan.levels);
     double halves = n * run->plan.kept[level];
@@ -208,8 +209,7 @@ static double subtree_bytes(const hf_run *run, int level) {
     return sizeof(float) * (halves + m * m + 2 * m * n * run->S->rows->density);
 }
 
-/* Levels that are made one node after the other, because memory is too small for as many subtrees as there
- * are threads. */
+/* The number of levels below which memory holds a subtree for each thread. */
 static int levels_alone(const hf_run *run) {
     const double threads = omp_get_max_threads();
     int level = 0;

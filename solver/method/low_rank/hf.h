@@ -1,31 +1,33 @@
-/* The hierarchical factorization's own choice: how many levels. */
+/* The hierarchical factorization: forecast of ranks and time, and the choice of levels and error bounds by
+ * it. */
 #ifndef LAMBERT_METHOD_LOW_RANK_HF_H
 #define LAMBERT_METHOD_LOW_RANK_HF_H
 
 #include "solver/method/low_rank/factorizer.h"
 
-/* What some columns of S are expected to keep: the rank of m neighbouring columns at a threshold, from the
- * singular values of a few samples of them. */
+/* Forecasts the rank of m neighbouring columns of S at a threshold, from the singular values of a few
+ * samples. */
 typedef struct hf_forecast hf_forecast;
 
-/* Takes the samples, from some places on the curve. Freed by hf_forecast_free. Cost: as a leaf or two. */
+/* Takes samples at a few places of the column order. Freed by hf_forecast_free. Cost: about that of two
+ * leaves. */
 lam_status hf_forecast_create(const scaled_matrix *S, hf_forecast **out, lam_error *error);
 void hf_forecast_free(hf_forecast *f);
 
-/* How many of m columns a truncation at p keeps, about. */
+/* Forecasts the number of m columns that a truncation at p keeps. */
 double hf_forecast_rank(const hf_forecast *f, double m, double p);
 
 typedef struct hf_plan {
     int levels;
-    double left[BUDGET_LEVELS_MOST + 1]; /* what a node of each level may leave out */
-    double kept[BUDGET_LEVELS_MOST + 1]; /* columns it is expected to keep */
+    double left[BUDGET_LEVELS_MOST + 1]; /* error bound of a node, by level */
+    double kept[BUDGET_LEVELS_MOST + 1]; /* forecast rank of a node, by level */
 } hf_plan;
 
-/* Seconds, about, on one core: eq. 3.16 with the rank of each level in place of rho, and with what a Gram
- * matrix, eigenvectors and a product each take. Fills in kept. */
+/* Forecast of seconds on one core: Aguerre 2016, eq. 3.16 with the rank of each level in place of rho, and
+ * with separate rates of Gram matrices, eigenvectors and products. Sets plan->kept. */
 double hf_forecast_seconds(const hf_forecast *f, const factorizer_options *options, hf_plan *plan);
 
-/* The plan that is forecast to be fastest; what options give is kept. */
+/* The plan with the least forecast time, within what options prescribe. */
 hf_plan hf_forecast_plan(const hf_forecast *f, const factorizer_options *options);
 
 #endif

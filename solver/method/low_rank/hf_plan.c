@@ -1,21 +1,21 @@
-/* How many levels of the hierarchical factorization are fastest: eqs. 3.16 to 3.19 of the thesis, with the
- * compression that samples of the matrix show in place of one guess for all levels. */
+/* Chooses the levels of the hierarchical factorization by forecast time: Aguerre 2016, eqs. 3.16 to 3.19,
+ * with the compression measured on samples of the matrix in place of one rho for all levels. */
 #include "solver/method/low_rank/hf.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-/* Columns of a sample: at most SAMPLE, and of all no more than one in SAMPLE_PART, as they are read twice;
- * how often it is halved, and from how many places there is one. */
+/* A sample has at most SAMPLE columns and at most n / SAMPLE_PART, as they are read twice. It is taken at
+ * PLACES places and halved HALVINGS times. */
 enum { SAMPLE = 512, SAMPLE_LEAST = 64, SAMPLE_PART = 20, HALVINGS = 3, PLACES = 6, SIZES = HALVINGS + 1 };
-/* Leaves have no fewer and no more columns than these, or the eigenvectors of one cost more than all. */
+/* Least and most columns of a leaf: beyond these the eigenvectors of a leaf dominate. */
 enum { LEAF_LEAST = 64, LEAF_MOST = 16384 };
 
-/* What one core does in a second, about: products of BLAS (flops, two a product), scattered products of
- * sparse rows, and the cube of the columns whose eigenvectors are found. Only ratios decide. */
+/* Rates of one core per second: flops of BLAS, scattered products of sparse rows, flops of adding scaled
+ * rows, and cubed columns of eigenvector problems. Only their ratios matter. */
 static const double blas_rate = 9e10, scatter_rate = 1e9, axpy_rate = 8e9, eigen_rate = 1e10;
 
-/* A row with more entries than this share of the columns is spread out (tsvd.c). */
+/* A row with a larger share of entries is expanded (tsvd.c). */
 static const double spread_above = 1. / 5;
 
 struct hf_forecast {
@@ -24,12 +24,12 @@ struct hf_forecast {
     double values[PLACES][SIZES][SAMPLE]; /* squares of the singular values, ascending */
     double entries;                       /* of a row that has any in the largest sample, mean */
     double filled;                        /* share of such rows */
-    double noise, edge;                   /* of the rays: see find_noise; 0: none is seen */
+    double noise, edge;                   /* sampling noise, see find_noise; 0: none found */
 };
 
-/* Noise of rays is about as long in every column and in no relation to that of others: the singular values of
- * m columns of it form a plateau around that length, where those of light fall on. noise is its height, edge
- * what an eighth of a sample's values pass: above, they are taken for light's. */
+/* Sampling noise is independent between columns and of equal norm: the singular values of m columns of noise
+ * form a plateau at that norm, while those of smooth transport fall. noise is the height of the plateau;
+ * singular values above edge, the upper eighth, are attributed to transport. */
 static void find_noise(hf_forecast *f) {
     enum { STEEP = 2 };
     const size_t m = f->sizes[0];
@@ -79,7 +79,7 @@ void hf_forecast_free(hf_forecast *f) {
     free(f);
 }
 
-/* Columns kept of sample size k, mean of the places. */
+/* Rank of a sample of size number k at p, mean over places. */
 static double sample_rank(const hf_forecast *f, size_t k, double p) {
     size_t sum = 0;
     for (size_t place = 0; place < PLACES; place++) {
@@ -97,25 +97,25 @@ static double sample_rank(const hf_forecast *f, size_t k, double p) {
     return (double)sum / PLACES;
 }
 
-/* rank ~ m^b from size to size, at most in proportion to m: what neighbours across the edges between surfaces
- * exchange is of many ranks, and adds up as the edges do. */
+/* The largest b in rank ~ m^b: transport between neighbours across edges has high rank, in proportion to the
+ * number of edges. */
 static const double steepest = 1;
 
-/* How many singular values of light, without noise, m columns have of at least p. */
+/* The number of singular values of transport without noise, of m columns, above p. */
 static double rank_of_light(const hf_forecast *f, double m, double p) {
     size_t least = 0, k = 0;
     while (least + 1 < SIZES && f->sizes[least + 1] > 0) least++;
     while (k < least && (double)f->sizes[k + 1] >= m) k++;
     const double known = (double)f->sizes[k], rank = fmax(1, sample_rank(f, k, p));
     if (m <= known) return rank * m / known;
-    /* Over all sizes: that two places are unlike often weighs more than a step of two. */
+    /* The exponent is fitted over all sizes, as places differ more than one halving does. */
     const double low = fmax(1, sample_rank(f, least, p));
     const double b = k < least ? log(rank / low) / log(known / (double)f->sizes[least]) : 1;
     return rank * pow(m / known, fmin(steepest, fmax(0, b)));
 }
 
-/* How many values of m columns are the noise's and at least p: more columns widen the plateau as 1 +
- * sqrt(m/n) does (Marchenko and Pastur 1967). */
+/* The number of singular values of noise, of m columns, above p: the plateau widens as 1 + sqrt(m/n)
+ * (Marchenko and Pastur 1967). */
 static double rank_of_noise(const hf_forecast *f, double m, double p) {
     const double n = (double)f->n, known = (double)f->sizes[0];
     const double here = p * (1 + sqrt(known / n)) / (1 + sqrt(m / n));
@@ -127,21 +127,21 @@ double hf_forecast_rank(const hf_forecast *f, double m, double p) {
     return fmin(m, rank_of_light(f, m, fmax(p, f->edge)) + rank_of_noise(f, m, p));
 }
 
-/* Of a node whose halves were truncated before. What noise they kept, a part of each of their columns, is
- * still there and adds to the square of each value. */
+/* The rank of a node whose halves were truncated before. The noise in the columns that they kept adds to the
+ * square of each singular value. */
 static double rank_of_node(const hf_forecast *f, double m, double given, double p) {
     const double light = p * p - f->noise * f->noise;
     return light > 0 ? fmin(given, rank_of_light(f, m, sqrt(light))) : given;
 }
 
-/* Eigenvectors of a Gram matrix of c columns of which r are kept: all of them, or, where they are few, four
- * products with twice as many vectors and, before, one attempt with half of those (gram_leading). */
+/* Eigenvectors of a Gram matrix of c columns, r of which are kept: all of them, or, if they are few, four
+ * products with 2 r vectors after one attempt with r (gram_leading). */
 static double seconds_of_eigenvectors(double c, double r) {
     const double all = c * c * c / eigen_rate, few = 2 * c * c * 3 * r * 4 / blas_rate;
     return 2 * r < c / 3 && few < all ? few : all;
 }
 
-/* A truncated SVD of n x c, kept r, of dense columns. */
+/* A truncated SVD of dense n x c to rank r. */
 static double seconds_of_node(double n, double c, double r) {
     return (n * c * c + 2 * n * c * r) / blas_rate + seconds_of_eigenvectors(c, r);
 }
@@ -172,7 +172,7 @@ double hf_forecast_seconds(const hf_forecast *f, const factorizer_options *optio
     return seconds;
 }
 
-/* The plan with so much moved from a level's part of the budget to another's, where that is faster. */
+/* Moves a part of the budget from one level to another if that is forecast to be faster; true if it is. */
 static bool move(const hf_forecast *f, const factorizer_options *options, int from, int to, double part,
                  budget *shares, hf_plan *plan, double *seconds) {
     budget tried = *shares;
@@ -188,8 +188,8 @@ static bool move(const hf_forecast *f, const factorizer_options *options, int fr
     return true;
 }
 
-/* Moves parts of the budget from level to level, all at first, then less, as long as that is faster; shares
- * has been tried and takes so many seconds. */
+/* Moves parts of the budget between levels, large ones first, as long as that is faster. seconds is the time
+ * of the given shares; returns the time of the improved ones. */
 static double improve(const hf_forecast *f, const factorizer_options *options, budget *shares, hf_plan *plan,
                       double seconds) {
     static const double steps[] = {1, .3, .1, .03};
@@ -205,7 +205,7 @@ static double improve(const hf_forecast *f, const factorizer_options *options, b
     return seconds;
 }
 
-/* The best of some ways to share the budget among so many levels. */
+/* Tries some divisions of the budget among the levels of plan; returns the time of the best. */
 static double divide(const hf_forecast *f, const factorizer_options *options, budget *shares, hf_plan *plan) {
     static const double ratios[] = {.5, 1}, leaves[] = {0, .5, .9};
     enum { RATIOS = sizeof ratios / sizeof *ratios, LEAVES = sizeof leaves / sizeof *leaves };
@@ -226,7 +226,7 @@ static double divide(const hf_forecast *f, const factorizer_options *options, bu
 }
 
 hf_plan hf_forecast_plan(const hf_forecast *f, const factorizer_options *options) {
-    /* A way to share that is this much slower than the best of another number of levels is not improved. */
+    /* A division this much slower than the best of another number of levels is not improved. */
     static const double hopeless = 3;
     const bool shared = options->budget.rule == BUDGET_SUMS || budget_divided(&options->budget);
     hf_plan best = {.levels = 0};

@@ -1,12 +1,12 @@
-/* Randomized subspace iteration (Halko, Martinsson and Tropp 2011; thesis, algorithm 2; without iterations it
- * is algorithm 1): an orthonormal X whose span nearly holds what S does to a random sketch, then S ~ (S X)
- * X^T. S is symmetric, so one product serves as A and as A*. */
+/* Randomized subspace iteration (Halko et al. 2011; Aguerre 2016, algorithm 2, without iterations algorithm
+ * 1): S ~ (S X) X^T with an orthonormal basis X of S^(q+1) Omega, Omega a random matrix. S is symmetric,
+ * so that one product serves as A and as A*. */
 #include "solver/method/low_rank/sketch.h"
 #include "store/status.h"
 
 #include <stdlib.h>
 
-/* One iteration takes a third off the error, a second one 6 %. */
+/* The first iteration reduces the error by a third, a second one by 6 %. */
 enum { ITERATIONS = 1 };
 
 /* 2 + iterations passes. */

@@ -1,4 +1,4 @@
-/* The sub-Gaussian randomized SVD (Aizenbud and Averbuch 2016; thesis, algorithm 3): sketches by sparse
+/* The sub-Gaussian randomized SVD (Aizenbud and Averbuch 2016; Aguerre 2016, algorithm 3): sketches by sparse
  * Gaussian matrices, and S X found from a sketch of S by least squares instead of by another pass. As both
  * sketches can be taken at once, one pass is enough where the thesis has two. */
 #include "solver/linalg/dense.h"
@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* How many times l_2 rows the sketches have. */
+/* Rows of the sketches over l_2. */
 enum { WIDER = 2 };
 
 /* X = Omega_1^* Omega_1'^*, [n][l2]: row i is a sum of a few rows of Omega_1'^*, [k1][l2]. */

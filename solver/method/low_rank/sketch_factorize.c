@@ -1,4 +1,4 @@
-/* From bases to factors, at a rank or at a bound. */
+/* Factors Q V^T from a sketched basis, at a given rank or error bound. */
 #include "solver/linalg/dense.h"
 #include "solver/method/low_rank/norm.h"
 #include "solver/method/low_rank/sketch.h"
@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Vectors of a basis beyond the columns that are kept (twice as many where S X is only guessed); the first
- * guess where only a bound is given: at least this many, and a twelfth of the elements. */
+/* A basis has OVERSAMPLING vectors beyond the rank (and twice the rank if B is only close to S X). Given a
+ * bound alone, it begins with max(BASIS_LEAST, n / BASIS_SHARE) vectors. */
 enum { OVERSAMPLING = 16, BASIS_LEAST = 64, BASIS_SHARE = 12 };
 
 void sketch_basis_free(sketch_basis *b) {
@@ -40,7 +40,7 @@ done:
     return status;
 }
 
-/* Columns of zeros up to a rank that the matrix does not have. */
+/* Appends columns of zeros up to `rank`. */
 static lam_status pad(tall_factors *f, size_t rank, lam_error *error) {
     lam_status status = LAM_OK;
     float **const both[] = {&f->Q, &f->V};
@@ -67,17 +67,18 @@ static double column_norm(const tall_factors *f, size_t c) {
     return sqrt(sum);
 }
 
-/* No singular value of S is above 1. */
+/* Scales columns of Q longer than 1 to length 1: no singular value of S is above 1. */
 static void cut_to_one(tall_factors *f) {
     for (size_t c = 0; c < f->rank; c++) {
         const double size = column_norm(f, c);
-        if (size <= 1) break; /* they fall */
+        if (size <= 1) break; /* the lengths descend */
         for (size_t i = 0; i < f->n; i++)
             f->Q[i * f->rank + c] = (float)((double)f->Q[i * f->rank + c] / size);
     }
 }
 
-/* The size of a basis at which singular values that fall like the last half of these reach a bound. */
+/* *m: the size of a basis at which the singular values reach a bound, extrapolated from the last half of
+ * these. */
 static lam_status larger_basis(const sketch_basis *b, double bound, size_t *m, lam_error *error) {
     lam_status status = LAM_OK;
     tall_factors f = {0};

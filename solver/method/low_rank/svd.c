@@ -1,4 +1,4 @@
-/* The whole of S by its eigenvectors: S = X L X^T, so Q = X L and V = X, ordered by |l|: its singular value
+/* All eigenvectors of S: S = X L X^T, so that Q = X L and V = X, ordered by |l|, are its singular value
  * decomposition. The best approximation of any rank (Eckart and Young 1936), in n^2 memory and n^3 time. */
 #include "solver/method/low_rank/factorizer.h"
 
@@ -8,7 +8,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* A pair of LAPACK and its absolute value. */
+/* An eigenvalue and the index of its vector in the output of LAPACK. */
 typedef struct eigenvalue {
     float value;
     uint32_t index;

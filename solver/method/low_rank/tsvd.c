@@ -10,15 +10,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Above this share of the largest singular value the eigenvalues of a Gram matrix in single precision are
- * good to a few per cent (it is useless below the root of its rounding, 2.4e-4). */
+/* Above this share of the largest singular value, eigenvalues of a Gram matrix in single precision are
+ * accurate to a few per cent (below 2.4e-4, the root of its rounding, they are useless). */
 static const double single_share = 2e-3;
 
-/* A row of a sparse block with more than this share of its entries goes to BLAS, which makes that many more
- * products in the same time. */
+/* A sparse row with more than this share of nonzero entries is expanded and left to BLAS, whose products are
+ * that much faster. */
 static const double spread_above = 1. / 5;
 
-/* Rows spread out at a time; columns from which on few eigenvectors are looked for before all. */
+/* Rows expanded at a time; columns from which on leading eigenvectors are tried before all. */
 enum { PANEL = 1024, LEADING_LEAST = 768 };
 
 /* Rows of parts joined at a time, and by one thread. */
@@ -48,7 +48,7 @@ size_t truncation_rank(const truncation *keep, size_t m, const double *values) {
     return rank;
 }
 
-/* Whether a truncation may be made by a Gram matrix in single precision at all. */
+/* True if a Gram matrix in single precision may be accurate enough. */
 static bool may_be_single(const truncation *keep) {
     return keep->rank == 0 && keep->norm == TRUNCATION_SPECTRAL && keep->epsilon >= 1e-3;
 }
@@ -70,12 +70,12 @@ static lam_status take_vectors(const gram *g, size_t rank, float **V, lam_error 
 /* --- dense and sparse blocks -----------------------------------------------------------------------------
  */
 
-/* One of three. */
+/* A dense block, a sparse one, or the Q of several parts side by side. */
 typedef struct tall_block {
     size_t n, m;
     const float *dense;         /* [n][m] */
     const sparse_block *sparse; /* or this */
-    const tall_factors *parts;  /* or their Q, side by side: m is the sum of their ranks */
+    const tall_factors *parts;  /* or these; m is the sum of their ranks */
     size_t count;
 } tall_block;
 
@@ -94,7 +94,7 @@ typedef struct join_job {
     float *panel;
 } join_job;
 
-/* Some of the rows first ... first+rows-1 of the parts, joined. */
+/* Copies piece number `piece` of rows first ... first+rows-1 of the parts side by side. */
 static void join_piece(const void *context, size_t piece) {
     const join_job *j = context;
     for (size_t i = piece * JOINED_PIECE; i < j->rows && i < (piece + 1) * JOINED_PIECE; i++) {
@@ -107,7 +107,7 @@ static void join_piece(const void *context, size_t piece) {
     }
 }
 
-/* Calls for the rows of the parts, joined, a panel at a time. */
+/* Calls take for the rows of the parts side by side, a panel at a time. */
 static lam_status each_panel(const tall_block *A,
                              lam_status (*take)(void *context, size_t first, size_t rows, const float *panel,
                                                 lam_error *error),
@@ -200,7 +200,7 @@ static lam_status project(const tall_block *A, size_t k, const float *V, float *
             first++;
             continue;
         }
-        /* As many rows in a row as have much in them. */
+        /* A run of rows with many entries. */
         while (rows < PANEL && first + rows < A->n && !is_thin(A->sparse, first + rows)) {
             spread_row(A->sparse, first + rows, panel + rows * m);
             rows++;
@@ -212,8 +212,8 @@ static lam_status project(const tall_block *A, size_t k, const float *V, float *
     return LAM_OK;
 }
 
-/* V by all eigenvectors of A^T A, in single precision where that is enough; g is its Gram matrix in single
- * precision, or empty. */
+/* V from all eigenvectors of A^T A, in single precision if that is accurate enough. g is the Gram matrix in
+ * single precision, or empty. */
 static lam_status decompose(const tall_block *A, const truncation *keep, gram *g, float **V, size_t *rank,
                             lam_error *error) {
     lam_status status = LAM_OK;
@@ -247,7 +247,7 @@ static lam_status factorize(const tall_block *A, const truncation *keep, tall_fa
     if (may_be_single(keep)) {
         TRY(gram_create(A->m, true, &g, error));
         TRY(gram_of(A, &g, error));
-        /* |A| is at most 1 here and hardly ever more. */
+        /* Blocks of S have |A| <= 1. */
         if (A->m >= LEADING_LEAST && keep->epsilon >= single_share)
             TRY(gram_leading(&g, keep->epsilon * keep->epsilon, keep->guess, &f.V, &f.rank, error));
     }

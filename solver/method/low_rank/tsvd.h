@@ -4,9 +4,9 @@
 
 #include "solver/linalg/scaled.h"
 
-/* A ~ Q V^T: Q is [n][rank], V is [m][rank] with orthonormal columns, by falling singular value. Both freed
- * by tall_factors_free. Since Q = A V, what is left out, A (I - V V^T), has only rows orthogonal to V's
- * columns. */
+/* A ~ Q V^T: Q is [n][rank], V is [m][rank] with orthonormal columns, by descending singular value. Both
+ * freed by tall_factors_free. Since Q = A V, the rows of the remainder A (I - V V^T) are orthogonal to the
+ * columns of V. */
 typedef struct tall_factors {
     size_t n, m, rank;
     float *Q;
@@ -17,15 +17,16 @@ void tall_factors_free(tall_factors *f);
 
 typedef enum truncation_norm { TRUNCATION_SPECTRAL, TRUNCATION_FROBENIUS } truncation_norm;
 
-/* What is kept. Spectral: every singular value of at least epsilon (thesis, algorithm 4, TSVD), so that
- * |A - Q V^T|_2 < epsilon; then, up to the next multiple of round, those of at least epsilon / 2. Frobenius:
- * as few as leave |A - Q V^T|_F <= epsilon. With rank > 0 exactly min(rank, m) columns are kept instead. */
+/* The truncation rule. Spectral: every singular value of at least epsilon is kept (Aguerre 2016, algorithm 4,
+ * TSVD), so that |A - Q V^T|_2 < epsilon; then, up to the next multiple of round, those of at least epsilon
+ * / 2. Frobenius: as few as leave |A - Q V^T|_F <= epsilon. With rank > 0 exactly min(rank, m) columns are
+ * kept instead. */
 typedef struct truncation {
     truncation_norm norm;
     double epsilon;
     size_t rank;
     size_t round; /* 0 or 1: none */
-    size_t guess; /* about how many columns will be kept; 0: not known */
+    size_t guess; /* expected rank; 0: unknown */
 } truncation;
 
 /* Factorizes A, [n][m]. The Gram matrix squares the condition: it is formed in double unless epsilon is above
@@ -33,18 +34,18 @@ typedef struct truncation {
 lam_status tsvd(size_t n, size_t m, const float *A, const truncation *keep, tall_factors *out,
                 lam_error *error);
 
-/* The same of (Q_1 | Q_2 | ...) of some factors, one of which must be there, empty ones left out; it is never
- * put together as a whole. */
+/* The same of A = (Q_1 | Q_2 | ...), which is never formed as a whole. Empty parts are skipped; one must not
+ * be. */
 lam_status tsvd_joined(size_t count, const tall_factors *parts, const truncation *keep, tall_factors *out,
                        lam_error *error);
 
-/* The same of sparse columns: rows with few entries cost the squares of those, not m^2. */
+/* The same of a sparse block: a row with few entries costs the square of their number, not m^2. */
 lam_status tsvd_sparse(const sparse_block *A, const truncation *keep, tall_factors *out, lam_error *error);
 
 /* The squares of the singular values of the first m columns of A, ascending, into values [m]. */
 lam_status tsvd_values(const sparse_block *A, size_t m, double *values, lam_error *error);
 
-/* How many of the singular values whose squares, ascending, are values [m] a truncation keeps. */
+/* The rank that a truncation keeps; values [m] are the squares of the singular values, ascending. */
 size_t truncation_rank(const truncation *keep, size_t m, const double *values);
 
 #endif
