@@ -1,6 +1,5 @@
 /* lambertd: reads stores, answers over HTTP what light they have, until a signal ends it. */
 #include "server/http/http.h"
-#include "server/net/listener.h"
 #include "server/route/routes.h"
 #include "server/scene/map_guard.h"
 #include "solver/base/options.h"
@@ -91,8 +90,9 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     TRY(catalog_create(c, stdout, stderr, &s.catalog, error));
     TRY(variants_start(c, s.catalog, &s.variants, error));
     TRY(batch_start(c->threads, c->max_inflight, &s.queue, error));
-    TRY(c->unix_path != NULL ? listener_unix(c->unix_path, &listen_fd, where, sizeof where, error)
-                             : listener_tcp(c->listen_address, &listen_fd, where, sizeof where, error));
+    TRY(c->unix_path != NULL
+            ? connections_listen_unix(c->unix_path, &listen_fd, where, sizeof where, error)
+            : connections_listen_tcp(c->listen_address, &listen_fd, where, sizeof where, error));
     bound = true;
     TRY(http_start(&s, listen_fd, &h, error));
     if (catalog_reload(s.catalog) == 0) FAIL(error, LAM_ERR_IO, "no store can be served");

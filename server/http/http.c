@@ -1,13 +1,22 @@
+#include "server/http/http.h"
+
 #include "server/http/http_request.h"
-#include "server/net/access_log.h"
 #include "server/scene/map_guard.h"
 #include "server/scene/verifier.h"
+#include "solver/codec/json_writer.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
+
+struct http {
+    service *service;
+    struct MHD_Daemon *daemon;
+    uint64_t seed, next_id;
+    int listen_fd; /* after http_quiesce; before, the daemon's */
+};
 
 /* What libmicrohttpd may hold of a connection's head; bodies are ours. */
 #define CONNECTION_MEMORY (32u << 10)
@@ -38,12 +47,12 @@ static bool check_scene(request *r) {
     r->call.scene = catalog_find(r->snapshot, r->match.name);
     r->call.name = r->match.name;
     if (r->call.scene != NULL) return check_health(r);
-    if (variant != VARIANT_SETTLED && r->match.route->subject == SERVED_OR_BUILT) return true;
+    if (variant != VARIANT_SETTLED && r->match.route->also_built) return true;
     if (variant == VARIANT_BUILDING)
         answer_refuse(&r->answer, 503, "%.200s is being built", r->match.name);
     else if (variant == VARIANT_FAILED)
         answer_problem(&r->answer, &r->variant_why);
-    else if (atomic_load(&r->http->service->state) == SERVICE_LOADING)
+    else if (atomic_load(&r->service->state) == SERVICE_LOADING)
         answer_refuse(&r->answer, 503, "stores are being loaded");
     else
         answer_refuse(&r->answer, 404, "there is no scene %.200s; GET /v1/scenes lists them", r->match.name);
@@ -67,19 +76,19 @@ static bool check_type(request *r) {
 
 static void refuse_length(request *r) {
     answer_refuse(&r->answer, 413, "the body is longer than %zu bytes (--max-body); send several requests",
-                  r->http->service->config->max_body);
+                  r->service->config->max_body);
 }
 
 static void refuse_to_hold(request *r, const char *what) {
     answer_refuse(&r->answer, 503,
                   "there is no room for %s: %zu bytes of bodies are held at once (--max-buffered)", what,
-                  r->http->service->config->max_buffered);
+                  r->service->config->max_buffered);
 }
 
 /* Whatever the head alone decides: route, method, token, scene, type, length; true when the body is wanted.
  */
 static bool check_head(request *r, const char *method, uint64_t length) {
-    const service *s = r->http->service;
+    const service *s = r->service;
     route_find(method, r->path, &r->match, &r->answer);
     if (r->match.with_token && !token_matches(&s->token, http_header(r, MHD_HTTP_HEADER_AUTHORIZATION))) {
         refuse_token(r);
@@ -93,7 +102,7 @@ static bool check_head(request *r, const char *method, uint64_t length) {
     r->call =
         (call){.service = s, .snapshot = r->snapshot, .variant = variant, .variant_why = &r->variant_why};
     if (!check_scene(r)) return false;
-    if (r->match.route->body == BODY_NONE) return true;
+    if (!r->match.route->with_body) return true;
     if (!check_type(r)) return false;
     if (length > s->config->max_body) {
         refuse_length(r);
@@ -110,7 +119,7 @@ static bool check_head(request *r, const char *method, uint64_t length) {
 
 /* Body bytes, counted; false with the answer made when there is no room for them. */
 static bool hold_body(request *r, const char *bytes, size_t count) {
-    service *s = r->http->service;
+    service *s = r->service;
     const size_t before = atomic_fetch_add(&s->body_bytes, count);
     const bool room = before <= s->config->max_buffered && count <= s->config->max_buffered - before;
     if (room && buffer_append(&r->body, bytes, count)) return true;
@@ -123,14 +132,15 @@ static bool hold_body(request *r, const char *bytes, size_t count) {
 }
 
 static void drop_body(request *r) {
-    atomic_fetch_sub(&r->http->service->body_bytes, r->body.length);
+    atomic_fetch_sub(&r->service->body_bytes, r->body.length);
     buffer_free(&r->body);
 }
 
 /* --- solves ------------------------------------------------------------------------------------------- */
 
+/* The request that a job is part of. */
 static request *request_of(batch_job *job) {
-    return (request *)(void *)job;
+    return (request *)(void *)((char *)call_of(job) - offsetof(request, call));
 }
 
 static void made(request *r) {
@@ -191,7 +201,7 @@ static enum MHD_Result handle(request *r) {
         route_shortcut *shortcut = r->match.route->shortcut;
         if (shortcut != NULL && shortcut(&r->call, &r->answer)) {
             drop_body(r);
-        } else if (r->match.route->body == BODY_OF_SOLVE) {
+        } else if (r->match.route->with_body) {
             /* Suspended first: the solve may be done before batch_submit returns. */
             const solve_steps *steps = r->match.route->steps;
             r->call.job = (batch_job){.begin = begin_solve,
@@ -199,11 +209,11 @@ static enum MHD_Result handle(request *r) {
                                       .end = end_solve,
                                       .finish = finish_solve,
                                       .brief = is_brief(&r->call)};
-            client_enter(r->http->service->connections, r->client, STAGE_SOLVE, 0);
+            client_enter(r->service->connections, r->client, STAGE_SOLVE, 0);
             MHD_suspend_connection(r->connection);
-            if (batch_submit(r->http->service->queue, &r->call.job)) return MHD_YES;
+            if (batch_submit(r->service->queue, &r->call.job)) return MHD_YES;
             answer_refuse(&r->answer, 503, "%zu solves wait or run (--max-inflight); try again",
-                          r->http->service->config->max_inflight);
+                          r->service->config->max_inflight);
             r->answered = true;
             MHD_resume_connection(r->connection);
             return MHD_YES;
@@ -225,7 +235,7 @@ static request *begin_request(http *h, struct MHD_Connection *connection, const 
         free(r);
         return NULL;
     }
-    r->http = h;
+    r->service = h->service;
     r->connection = connection;
     const union MHD_ConnectionInfo *info =
         MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
@@ -264,10 +274,10 @@ static enum MHD_Result on_head(http *h, struct MHD_Connection *connection, const
 }
 
 static enum MHD_Result on_body(request *r, const char *bytes, size_t *size) {
-    const config *c = r->http->service->config;
+    const config *c = r->service->config;
     r->received += *size;
-    client_received(r->http->service->connections, r->client, *size);
-    if (!r->answered && r->match.route->body == BODY_OF_SOLVE) {
+    client_received(r->service->connections, r->client, *size);
+    if (!r->answered && r->match.route->with_body) {
         if (r->received > c->max_body) {
             refuse_length(r);
             r->answered = true;
@@ -293,6 +303,33 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *connecti
     return handle(r);
 }
 
+/* Writes one line of JSON to the access log and flushes it. status 0: the client left before it was answered.
+ */
+static void log_request(const request *r, unsigned status, double ms) {
+    FILE *log = r->service->access_log;
+    buffer b = {0};
+    struct timespec now;
+    struct tm utc;
+    char stamp[32];
+    clock_gettime(CLOCK_REALTIME, &now);
+    gmtime_r(&now.tv_sec, &utc);
+    strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%S", &utc);
+    bool written =
+        buffer_printf(&b, "{\"time\":\"%s.%03ldZ\",\"id\":", stamp, now.tv_nsec / 1000000) &&
+        json_write_text(&b, r->id) && buffer_append_text(&b, ",\"method\":") &&
+        json_write_text(&b, r->method) && buffer_append_text(&b, ",\"path\":") &&
+        json_write_text(&b, r->path) &&
+        buffer_printf(&b,
+                      ",\"status\":%u,\"received\":%zu,\"sent\":%zu,\"coding\":\"%s\",\"vectors\":%zu,"
+                      "\"ms\":%.3f}\n",
+                      status, (size_t)r->received, r->sent, coding_name(r->coding), r->call.n_rhs, ms);
+    if (written) {
+        fwrite(b.bytes, 1, b.length, log);
+        fflush(log);
+    }
+    buffer_free(&b);
+}
+
 static void on_completed(void *context, struct MHD_Connection *connection, void **request_context,
                          enum MHD_RequestTerminationCode code) {
     (void)connection;
@@ -305,16 +342,7 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     client_enter(h->service->connections, r->client, STAGE_HEAD, 0);
     double seconds = (double)(end.tv_sec - r->start.tv_sec) + 1e-9 * (double)(end.tv_nsec - r->start.tv_nsec);
     unsigned status = r->queued && code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? r->answer.status : 0;
-    if (h->service->access_log != NULL)
-        access_log_write(h->service->access_log, &(access_entry){.id = r->id,
-                                                                 .method = r->method,
-                                                                 .path = r->path,
-                                                                 .status = status,
-                                                                 .received = (size_t)r->received,
-                                                                 .sent = r->sent,
-                                                                 .n_rhs = r->call.n_rhs,
-                                                                 .coding = coding_name(r->coding),
-                                                                 .ms = seconds * 1e3});
+    if (h->service->access_log != NULL) log_request(r, status, seconds * 1e3);
     catalog_release(r->snapshot);
     drop_body(r);
     buffer_free(&r->answer.body);

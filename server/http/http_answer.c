@@ -60,7 +60,7 @@ static bool add_headers(const request *r, size_t length, struct MHD_Response *re
         good = good && add(response, MHD_HTTP_HEADER_VARY, MHD_HTTP_HEADER_ACCEPT_ENCODING);
     if (r->coding != CODING_IDENTITY && a->status != MHD_HTTP_NOT_MODIFIED)
         good = good && add(response, MHD_HTTP_HEADER_CONTENT_ENCODING, coding_name(r->coding));
-    if (atomic_load(&r->http->service->state) == SERVICE_DRAINING)
+    if (atomic_load(&r->service->state) == SERVICE_DRAINING)
         good = good && add(response, MHD_HTTP_HEADER_CONNECTION, "close");
     return good;
 }
@@ -84,7 +84,7 @@ enum MHD_Result http_send_answer(request *r) {
     if (response == NULL) return MHD_NO;
     a->body = (buffer){0};
     const bool good = add_headers(r, length, response);
-    client_enter(r->http->service->connections, r->client, STAGE_ANSWER, r->sent);
+    client_enter(r->service->connections, r->client, STAGE_ANSWER, r->sent);
     enum MHD_Result result = good ? MHD_queue_response(r->connection, a->status, response) : MHD_NO;
     MHD_destroy_response(response);
     r->queued = result == MHD_YES;

@@ -30,7 +30,16 @@ typedef struct connection_limits {
  * Errors: LAM_ERR_IO, when there is room for none. */
 lam_status connections_affordable(size_t wanted, size_t *most, lam_error *error);
 
-/* Starts a thread that looks once a second. */
+/* Listens on address, HOST:PORT ([...]:PORT for IPv6). where: the URL for clients, with the port that was
+ * taken. The caller closes *fd. Errors: LAM_ERR_ARGUMENT, LAM_ERR_IO. */
+lam_status connections_listen_tcp(const char *address, int *fd, char *where, size_t where_size,
+                                  lam_error *error);
+
+/* Listens on a socket at path, which the caller unlinks in the end; one without a listener is replaced. */
+lam_status connections_listen_unix(const char *path, int *fd, char *where, size_t where_size,
+                                   lam_error *error);
+
+/* Starts a thread that checks all connections once a second. */
 lam_status connections_start(const connection_limits *limits, connections **out, lam_error *error);
 
 /* Ends the thread and frees all; none may be open. */

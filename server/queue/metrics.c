@@ -6,7 +6,7 @@
 
 /* Statuses that we give; 0 stands for a client that went. */
 static const unsigned statuses[] = {0,   200, 202, 204, 304, 400, 401, 404, 405,
-                                    409, 411, 413, 415, 422, 429, 500, 501, 503};
+                                    409, 411, 413, 415, 422, 429, 500, 503};
 #define N_STATUSES (sizeof statuses / sizeof statuses[0])
 
 /* Seconds; the last bucket has no bound. */

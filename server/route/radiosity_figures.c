@@ -1,5 +1,8 @@
 #include "server/route/radiosity_figures.h"
 
+#include "server/route/routes.h"
+#include "server/scene/adjoint_rows.h"
+
 #include "solver/codec/group_figures.h"
 
 #include <float.h>
@@ -70,7 +73,7 @@ static bool evaluate(const call *in, radiosity_request *request, adjoint_row *co
     float *weights = NULL;
     bool good = figures != NULL && means != NULL;
     if (!good) problem_set(why, 503, "not enough memory for the answer; ask for fewer vectors or groups");
-    if (good && !adjoint_row_tells(s, rows[0], request)) good = weights_of(in, request, &weights, why);
+    if (good && !adjoint_row_suffices(s, rows[0], request)) good = weights_of(in, request, &weights, why);
     for (size_t k = 0; good && k < r->n_names; k++) {
         adjoint_row_evaluate(s, rows[k], request, weights, means);
         reduce_means(r, k, s->n_channels, request->n_rhs, rows[k]->area, means, figures);
@@ -111,7 +114,7 @@ bool quick_radiosity(call *in, answer *out) {
     bool good = codec_read_json(&about, in->body, in->length, &request, &why) &&
                 adjoint_row_work(s, &request) <= QUICK_WORK / request.reduce.n_names &&
                 adjoint_rows_find(s, &request, rows);
-    if (good && !adjoint_row_tells(s, rows[0], &request)) {
+    if (good && !adjoint_row_suffices(s, rows[0], &request)) {
         adjoint_rows_release(s, request.reduce.n_names, rows);
         good = false;
     }

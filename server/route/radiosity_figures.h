@@ -2,7 +2,7 @@
 #ifndef LAMBERT_SERVER_ROUTE_RADIOSITY_FIGURES_H
 #define LAMBERT_SERVER_ROUTE_RADIOSITY_FIGURES_H
 
-#include "server/route/routes.h"
+#include "server/route/call.h"
 #include "solver/codec/answer.h"
 
 /* Whether the answer can be what the client accepts: figures are JSON. */

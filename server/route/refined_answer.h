@@ -2,7 +2,7 @@
 #ifndef LAMBERT_SERVER_ROUTE_REFINED_ANSWER_H
 #define LAMBERT_SERVER_ROUTE_REFINED_ANSWER_H
 
-#include "server/route/routes.h"
+#include "server/route/call.h"
 #include "solver/codec/answer.h"
 #include "solver/codec/request.h"
 

@@ -1,30 +1,31 @@
 #include "server/route/routes.h"
 
-#include <stdarg.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
-/* Emission vectors of one request, in bytes: a short sparse text may ask for many long ones. */
-#define LEAST_EMISSION_LIMIT ((size_t)1 << 30)
-
+/* Routes of one pattern follow each other. */
 static const route routes[] = {
-    {"GET", "/healthz", get_healthz, NULL, BODY_NONE, OPEN, SERVED, NULL},
-    {"GET", "/readyz", get_readyz, NULL, BODY_NONE, OPEN, SERVED, NULL},
-    {"GET", "/metrics", get_metrics, NULL, BODY_NONE, OPEN, SERVED, NULL},
-    {"GET", "/v1/scenes", get_scenes, NULL, BODY_NONE, WITH_TOKEN, SERVED, NULL},
-    {"GET", "/v1/scenes/{name}", get_scene, NULL, BODY_NONE, WITH_TOKEN, SERVED_OR_BUILT, NULL},
-    {"DELETE", "/v1/scenes/{name}", delete_scene, NULL, BODY_NONE, WITH_TOKEN, SERVED_OR_BUILT, NULL},
-    {"GET", "/v1/scenes/{name}/mesh", not_yet, NULL, BODY_NONE, WITH_TOKEN, SERVED, NULL},
-    {"POST", "/v1/scenes/{name}/radiosity", NULL, &post_radiosity, BODY_OF_SOLVE, WITH_TOKEN, SERVED,
-     quick_radiosity},
-    {"POST", "/v1/scenes/{name}/adjoint", post_adjoint, NULL, BODY_OF_SOLVE, WITH_TOKEN, SERVED, NULL},
-    {"PUT", "/v1/scenes/{name}/reflectance", put_reflectance, NULL, BODY_OF_SOLVE, WITH_TOKEN, SERVED, NULL},
-    {"DELETE", "/v1/scenes/{name}/reflectance", delete_reflectance, NULL, BODY_OF_SOLVE, WITH_TOKEN,
-     SERVED_OR_BUILT, NULL},
-    {"GET", "/v1/openapi.json", get_openapi, NULL, BODY_NONE, WITH_TOKEN, SERVED, NULL},
-    {"GET", "/", not_yet, NULL, BODY_NONE, OPEN, SERVED, NULL},
+    {.method = "GET", .pattern = "/healthz", .handle = get_healthz, .open = true},
+    {.method = "GET", .pattern = "/readyz", .handle = get_readyz, .open = true},
+    {.method = "GET", .pattern = "/metrics", .handle = get_metrics, .open = true},
+    {.method = "GET", .pattern = "/v1/scenes", .handle = get_scenes},
+    {.method = "GET", .pattern = "/v1/scenes/{name}", .handle = get_scene, .also_built = true},
+    {.method = "DELETE", .pattern = "/v1/scenes/{name}", .handle = delete_scene, .also_built = true},
+    {.method = "POST",
+     .pattern = "/v1/scenes/{name}/radiosity",
+     .steps = &post_radiosity,
+     .shortcut = quick_radiosity,
+     .with_body = true},
+    {.method = "POST", .pattern = "/v1/scenes/{name}/adjoint", .handle = post_adjoint, .with_body = true},
+    {.method = "PUT",
+     .pattern = "/v1/scenes/{name}/reflectance",
+     .handle = put_reflectance,
+     .with_body = true},
+    {.method = "DELETE",
+     .pattern = "/v1/scenes/{name}/reflectance",
+     .handle = delete_reflectance,
+     .with_body = true,
+     .also_built = true},
+    {.method = "GET", .pattern = "/v1/openapi.json", .handle = get_openapi},
 };
 #define N_ROUTES (sizeof routes / sizeof routes[0])
 
@@ -43,7 +44,7 @@ static int hex_digit(char c) {
     return -1;
 }
 
-/* Resolves %XX; "" for what no scene can be called. */
+/* Resolves %XX; "" for a name that no scene can have. */
 static void decode_name(const char *raw, size_t length, char name[ROUTE_NAME_MAX]) {
     size_t count = 0;
     for (size_t i = 0; i < length; i++) {
@@ -63,7 +64,7 @@ static void decode_name(const char *raw, size_t length, char name[ROUTE_NAME_MAX
     name[count] = '\0';
 }
 
-/* Whether a path follows a pattern; {name} is one segment, not empty. */
+/* True if a path matches a pattern; {name} is one segment, not empty. */
 static bool match_path(const char *pattern, const char *path, route_match *match) {
     static const char hole[] = "{name}";
     match->has_name = false;
@@ -89,9 +90,9 @@ void route_find(const char *method, const char *path, route_match *match, answer
     *match = (route_match){.label = N_ROUTES};
     for (size_t i = 0; i < N_ROUTES; i++) {
         if (!match_path(routes[i].pattern, path, match)) continue;
-        /* Routes of one pattern follow each other and share the label of the first. */
+        /* Routes of one pattern share the label of the first. */
         if (match->label == N_ROUTES) match->label = i;
-        match->with_token = routes[i].access == WITH_TOKEN;
+        match->with_token = !routes[i].open;
         if (strcmp(routes[i].method, wanted) == 0) {
             match->route = &routes[i];
             return;
@@ -106,67 +107,4 @@ void route_find(const char *method, const char *path, route_match *match, answer
         answer_refuse(out, 405, "%.120s: the method is %.20s, must be %s", path, method, allow);
         memcpy(out->allow, allow, sizeof allow);
     }
-}
-
-/* --- answers ------------------------------------------------------------------------------------------ */
-
-void answer_problem(answer *out, const problem *what) {
-    buffer_free(&out->body);
-    out->status = what->status;
-    out->type = "application/problem+json";
-    out->retry_after = what->status == 503 ? 1 : 0;
-    if (problem_write(what, &out->body)) return;
-    /* No memory for a body: the status has to do. */
-    buffer_free(&out->body);
-    out->status = 503;
-    out->retry_after = 1;
-}
-
-void answer_refuse(answer *out, unsigned status, const char *format, ...) {
-    problem what = {.status = status};
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(what.detail, sizeof what.detail, format, arguments);
-    va_end(arguments);
-    answer_problem(out, &what);
-}
-
-void answer_json(answer *out, buffer *b, bool written) {
-    if (!written) {
-        buffer_free(b);
-        answer_refuse(out, 503, "not enough memory for the answer");
-        return;
-    }
-    *out = (answer){.status = 200, .type = "application/json", .body = *b};
-    *b = (buffer){0};
-}
-
-/* --- calls -------------------------------------------------------------------------------------------- */
-
-codec_scene call_codec_scene(const call *in) {
-    const scene *s = in->scene;
-    const config *c = in->service->config;
-    return (codec_scene){.n = s->n,
-                         .n_channels = s->n_channels,
-                         .groups = &s->groups,
-                         .n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0,
-                         .n_emitters = s->n_emitters,
-                         .max_batch = c->max_batch,
-                         .max_bytes =
-                             4 * c->max_body > LEAST_EMISSION_LIMIT ? 4 * c->max_body : LEAST_EMISSION_LIMIT,
-                         .max_rows = adjoint_rows_capacity(s)};
-}
-
-answer_notes call_notes(const call *in) {
-    const scene *s = in->scene;
-    return (answer_notes){.scene = s->name,
-                          .has_error = s->has_error,
-                          .relative_mean = s->relative_mean,
-                          .indirect_mean = s->indirect_mean};
-}
-
-double call_now_ms(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
 }

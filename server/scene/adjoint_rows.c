@@ -1,153 +1,92 @@
 #include "server/scene/adjoint_rows.h"
 
-#include "server/queue/batch.h"
-#include "server/scene/emitter_weights.h"
 #include "server/scene/gradient.h"
 #include "server/scene/scene.h"
 
 #include <math.h>
-#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
-struct adjoint_rows {
-    pthread_mutex_t lock; /* held for a walk over the list, never while anything is computed */
-    adjoint_row *first;
-    uint64_t uses;
-    size_t bytes, max_bytes;
-    memory_ledger *ledger;
-    emitter_weights *told; /* once made, for good; NULL: not yet, or not worth it */
-};
-
-/* --- the list ------------------------------------------------------------------------------------------- */
-
-lam_status adjoint_rows_create(size_t max_bytes, memory_ledger *ledger, adjoint_rows **out,
-                               lam_error *error) {
-    adjoint_rows *rows = memory_allocate(1, sizeof *rows, "adjoint rows", error);
-    if (rows == NULL) return LAM_ERR_MEMORY;
-    pthread_mutex_init(&rows->lock, NULL);
-    rows->max_bytes = max_bytes;
-    rows->ledger = ledger;
-    *out = rows;
-    return LAM_OK;
-}
-
-static void row_free(adjoint_row *row) {
-    if (row == NULL) return;
-    free(row->w);
-    free(row->of_group);
-    free(row->tiles);
-    free(row->emitters);
-    free(row);
-}
-
-void adjoint_rows_destroy(adjoint_rows *rows) {
-    if (rows == NULL) return;
-    for (adjoint_row *row = rows->first, *next; row != NULL; row = next) {
-        next = row->next;
-        row_free(row);
-    }
-    memory_ledger_give_back(rows->ledger, rows->bytes);
-    emitter_weights_free(rows->told);
-    pthread_mutex_destroy(&rows->lock);
-    free(rows);
-}
-
-size_t adjoint_rows_held(adjoint_rows *rows) {
-    pthread_mutex_lock(&rows->lock);
-    const size_t held = rows->bytes;
-    pthread_mutex_unlock(&rows->lock);
-    return held;
-}
-
-/* The lock is held. Names that mean the same groups share a row. */
-static adjoint_row *find_locked(adjoint_rows *rows, const reduce_name *name, lam_quantity quantity) {
-    for (adjoint_row *row = rows->first; row != NULL; row = row->next)
-        if (row->groups == name->groups && row->n_groups == name->n_groups && row->quantity == quantity) {
-            row->references++;
-            row->used = ++rows->uses;
-            return row;
-        }
-    return NULL;
-}
-
-/* The lock is held. */
-static void release_locked(adjoint_row *row) {
-    if (row != NULL && --row->references == 0) row_free(row);
-}
-
-/* The lock is held, and there is a row: the one unused for longest goes. Who still uses it frees it. */
-static void evict_locked(adjoint_rows *rows) {
-    adjoint_row **oldest = &rows->first;
-    for (adjoint_row **at = oldest; *at != NULL; at = &(*at)->next)
-        if ((*at)->used < (*oldest)->used) oldest = at;
-    adjoint_row *gone = *oldest;
-    *oldest = gone->next;
-    rows->bytes -= gone->bytes;
-    memory_ledger_give_back(rows->ledger, gone->bytes);
-    release_locked(gone);
-}
-
-/* The lock is held: whether there is room for a row, others going for it. The only one may be as large as it
- * likes. */
-static bool make_room_locked(adjoint_rows *rows, size_t bytes) {
-    while (rows->first != NULL && rows->bytes + bytes > rows->max_bytes) evict_locked(rows);
-    while (!memory_ledger_take(rows->ledger, bytes)) {
-        if (rows->first == NULL) return false;
-        evict_locked(rows);
-    }
-    return true;
-}
-
-/* Puts a new row into the list, where there is room, which holds one reference, the caller another; or gives
- * back the one that somebody else made meanwhile. */
-static adjoint_row *publish(adjoint_rows *rows, adjoint_row *made, const reduce_name *name) {
-    pthread_mutex_lock(&rows->lock);
-    adjoint_row *known = find_locked(rows, name, made->quantity);
-    if (known == NULL) {
-        const bool kept = make_room_locked(rows, made->bytes);
-        made->references = kept ? 2 : 1;
-        made->used = ++rows->uses;
-        if (kept) {
-            made->next = rows->first;
-            rows->first = made;
-            rows->bytes += made->bytes;
-        }
-    }
-    pthread_mutex_unlock(&rows->lock);
-    if (known == NULL) return made;
-    row_free(made);
-    return known;
-}
+/* Limits of trying all groups and tiles: numbers read (some tenths of a second) and weights kept. */
+#define MOST_WORK ((double)(1u << 28))
+#define MOST_WEIGHTS ((double)(1u << 24))
 
 void adjoint_rows_release(const scene *s, size_t count, adjoint_row **rows) {
-    pthread_mutex_lock(&s->rows->lock);
-    for (size_t k = 0; k < count; k++) release_locked(rows[k]);
-    pthread_mutex_unlock(&s->rows->lock);
-}
-
-/* Finds what is there, NULL for the others; whether that is all. */
-static bool find_all(const scene *s, const radiosity_request *request, adjoint_row **rows) {
-    bool all = true;
-    pthread_mutex_lock(&s->rows->lock);
-    for (size_t k = 0; k < request->reduce.n_names; k++) {
-        rows[k] = find_locked(s->rows, &request->reduce.names[k], request->quantity);
-        all = all && rows[k] != NULL;
-    }
-    pthread_mutex_unlock(&s->rows->lock);
-    return all;
+    row_cache_release(s->rows, count, rows);
 }
 
 bool adjoint_rows_find(const scene *s, const radiosity_request *request, adjoint_row **rows) {
-    if (find_all(s, request, rows)) return true;
-    adjoint_rows_release(s, request->reduce.n_names, rows);
+    const reduce_request *reduce = &request->reduce;
+    if (row_cache_find(s->rows, reduce->n_names, reduce->names, request->quantity, rows)) return true;
+    adjoint_rows_release(s, reduce->n_names, rows);
     return false;
 }
 
-/* --- new rows ------------------------------------------------------------------------------------------- */
-
 static size_t tiles_of(const scene *s) {
     return s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
+}
+
+/* True if there are few enough to try all groups and tiles. */
+static bool emitter_weights_worth(const scene *s) {
+    const double C = (double)s->n_channels, count = (double)(s->groups.n_groups + tiles_of(s));
+    return count * C * C * (double)(s->n + tiles_of(s)) <= MOST_WORK &&
+           count * C * (double)s->n_emitters <= MOST_WEIGHTS;
+}
+
+/* weights [s]: emitters whose sum is this E and L (either NULL) of channel c alone; the first is NaN if there
+ * are none. all: [C][s], scratch. */
+static void find_weights(const scene *s, size_t c, const float *E, const float *L, float *all,
+                         float *weights) {
+    const size_t n_emitters = s->n_emitters;
+    if (lam_operator_weights(s->op, 1, E, tiles_of(s), L, all, NULL) == LAM_OK)
+        memcpy(weights, all + c * n_emitters, n_emitters * sizeof *weights);
+    else
+        weights[0] = NAN;
+}
+
+static void find_group_weights(const scene *s, float *E, float *all, float *weights) {
+    const group_index *groups = &s->groups;
+    for (size_t g = 0; g < groups->n_groups; g++)
+        for (size_t c = 0; c < s->n_channels; c++, weights += s->n_emitters) {
+            for (size_t e = groups->start[g]; e < groups->start[g + 1]; e++)
+                E[c * s->n + groups->elements[e]] = 1;
+            find_weights(s, c, E, NULL, all, weights);
+            for (size_t e = groups->start[g]; e < groups->start[g + 1]; e++)
+                E[c * s->n + groups->elements[e]] = 0;
+        }
+}
+
+static void find_tile_weights(const scene *s, float *L, float *all, float *weights) {
+    const size_t m = tiles_of(s);
+    for (size_t t = 0; t < m; t++)
+        for (size_t c = 0; c < s->n_channels; c++, weights += s->n_emitters) {
+            L[c * m + t] = 1;
+            find_weights(s, c, NULL, L, all, weights);
+            L[c * m + t] = 0;
+        }
+}
+
+/* NULL when memory is short. O(n C) for each group and tile. */
+static emitter_weights *emitter_weights_make(const scene *s) {
+    const size_t C = s->n_channels, row = C * s->n_emitters, m = tiles_of(s);
+    emitter_weights *made = memory_allocate(1, sizeof *made, "weights", NULL);
+    float *E = memory_allocate(C, (s->n > m ? s->n : m) * sizeof *E, "weights", NULL);
+    float *all = memory_allocate(row, sizeof *all, "weights", NULL);
+    if (made != NULL) {
+        made->of_group = memory_allocate(s->groups.n_groups, row * sizeof(float), "weights", NULL);
+        made->of_tile = memory_allocate(m, row * sizeof(float), "weights", NULL);
+    }
+    const bool good =
+        made != NULL && made->of_group != NULL && made->of_tile != NULL && E != NULL && all != NULL;
+    if (good) {
+        find_group_weights(s, E, all, made->of_group);
+        find_tile_weights(s, E, all, made->of_tile);
+    } else {
+        emitter_weights_free(made);
+    }
+    free(E);
+    free(all);
+    return good ? made : NULL;
 }
 
 static size_t row_bytes(const scene *s) {
@@ -157,7 +96,7 @@ static size_t row_bytes(const scene *s) {
 }
 
 size_t adjoint_rows_capacity(const scene *s) {
-    const size_t count = s->rows->max_bytes / row_bytes(s);
+    const size_t count = row_cache_limit(s->rows) / row_bytes(s);
     return count < ADJOINT_ROWS_OF_REQUEST ? count : ADJOINT_ROWS_OF_REQUEST;
 }
 
@@ -176,11 +115,11 @@ static adjoint_row *row_allocate(const scene *s, const reduce_name *name, lam_qu
     row->tiles = memory_allocate(C, tiles_of(s) * sizeof *row->tiles, "a row", NULL);
     const bool good = *numbers != NULL && row->of_group != NULL && row->tiles != NULL;
     if (good) return row;
-    row_free(row);
+    adjoint_row_free(row);
     return NULL;
 }
 
-/* g = A 1_group / sum A in every channel, [C][n]; gives sum A. */
+/* g = A 1_group / sum A in every channel, [C][n]; returns sum A. */
 static double write_cotangent(const scene *s, const reduce_name *name, float *g) {
     const group_index *groups = &s->groups;
     double total = 0;
@@ -203,7 +142,7 @@ static double product(const float *a, const float *x, size_t count) {
     return sum;
 }
 
-/* w is [C][n], g becomes dJ/dH0. */
+/* w is [C][n]; g is overwritten by dJ/dH0. */
 static void fill_from_elements(const scene *s, const float *w, float *g, adjoint_row *row) {
     const size_t n = s->n, C = s->n_channels, n_groups = s->groups.n_groups;
     memcpy(row->w, w, C * n * sizeof *w);
@@ -219,8 +158,8 @@ static void fill_from_elements(const scene *s, const float *w, float *g, adjoint
     lam_sky_adjoint(s->sky, C, g, row->tiles);
 }
 
-/* w is [C][s]; of groups and tiles whose weights are not told it says nothing: NaN. */
-static void fill_from_emitters(const scene *s, const emitter_weights *told, const float *w,
+/* w is [C][s]; entries of groups and tiles without weights become NaN. */
+static void fill_from_emitters(const scene *s, const emitter_weights *weights, const float *w,
                                adjoint_row *row) {
     const size_t n_emitters = s->n_emitters, C = s->n_channels, m = tiles_of(s);
     const size_t n_groups = s->groups.n_groups;
@@ -228,39 +167,30 @@ static void fill_from_emitters(const scene *s, const emitter_weights *told, cons
     for (size_t c = 0; c < C; c++) {
         for (size_t h = 0; h < n_groups; h++)
             row->of_group[c * n_groups + h] =
-                told == NULL
+                weights == NULL
                     ? NAN
-                    : product(told->of_group + (h * C + c) * n_emitters, w + c * n_emitters, n_emitters);
+                    : product(weights->of_group + (h * C + c) * n_emitters, w + c * n_emitters, n_emitters);
         for (size_t t = 0; t < m; t++)
-            row->tiles[c * m + t] = told == NULL ? NAN
-                                                 : (float)product(told->of_tile + (t * C + c) * n_emitters,
-                                                                  w + c * n_emitters, n_emitters);
+            row->tiles[c * m + t] = weights == NULL
+                                        ? NAN
+                                        : (float)product(weights->of_tile + (t * C + c) * n_emitters,
+                                                         w + c * n_emitters, n_emitters);
     }
 }
 
-/* Those of a store of emitters, made by the first who needs them; false when memory is short. */
-static bool get_told(const scene *s, const emitter_weights **told) {
-    adjoint_rows *rows = s->rows;
-    *told = NULL;
+/* The weights of a store of emitters, made when first needed; false when memory is short. */
+static bool get_weights(const scene *s, const emitter_weights **weights) {
+    *weights = NULL;
     if (s->n_emitters == 0 || !emitter_weights_worth(s)) return true;
-    pthread_mutex_lock(&rows->lock);
-    *told = rows->told;
-    pthread_mutex_unlock(&rows->lock);
-    if (*told != NULL) return true;
+    *weights = row_cache_weights(s->rows);
+    if (*weights != NULL) return true;
     emitter_weights *made = emitter_weights_make(s);
     if (made == NULL) return false;
-    pthread_mutex_lock(&rows->lock);
-    if (rows->told == NULL) {
-        rows->told = made;
-        made = NULL;
-    }
-    *told = rows->told;
-    pthread_mutex_unlock(&rows->lock);
-    emitter_weights_free(made);
+    *weights = row_cache_set_weights(s->rows, made);
     return true;
 }
 
-/* Makes the rows of some names by one pass over the operator, and publishes them. */
+/* Computes the rows of some names by one pass over the operator and adds them to the cache. */
 static bool make_rows(const scene *s, const radiosity_request *request, size_t count, const size_t *which,
                       batch_workspace *workspace, adjoint_row **rows, problem *why) {
     const size_t n = s->n, C = s->n_channels, width = s->n_emitters > 0 ? s->n_emitters : n;
@@ -268,7 +198,7 @@ static bool make_rows(const scene *s, const radiosity_request *request, size_t c
     size_t g_bytes, w_bytes, total;
     lam_error error;
     char *bytes = NULL;
-    const emitter_weights *told;
+    const emitter_weights *weights;
     adjoint_row *made[BATCH_PASS] = {NULL};
     double area[BATCH_PASS];
     bool allocated, good = false;
@@ -281,7 +211,7 @@ static bool make_rows(const scene *s, const radiosity_request *request, size_t c
             !__builtin_add_overflow(total, work_bytes, &total))
             bytes = batch_workspace_get(workspace, total);
     }
-    allocated = bytes != NULL && get_told(s, &told);
+    allocated = bytes != NULL && get_weights(s, &weights);
     for (size_t k = 0; allocated && k < count; k++)
         allocated = (made[k] = row_allocate(s, &request->reduce.names[which[k]], request->quantity)) != NULL;
     if (!allocated) {
@@ -303,15 +233,15 @@ static bool make_rows(const scene *s, const radiosity_request *request, size_t c
     for (size_t k = 0; k < count; k++) {
         made[k]->area = area[k];
         if (s->n_emitters > 0)
-            fill_from_emitters(s, told, w + k * C * width, made[k]);
+            fill_from_emitters(s, weights, w + k * C * width, made[k]);
         else
             fill_from_elements(s, w + k * C * width, g + k * C * n, made[k]);
-        rows[which[k]] = publish(s->rows, made[k], &request->reduce.names[which[k]]);
+        rows[which[k]] = row_cache_publish(s->rows, made[k], &request->reduce.names[which[k]]);
         made[k] = NULL;
     }
     good = true;
 done:
-    for (size_t k = 0; k < count; k++) row_free(made[k]);
+    for (size_t k = 0; k < count; k++) adjoint_row_free(made[k]);
     return good;
 }
 
@@ -320,7 +250,7 @@ bool adjoint_rows_get(const scene *s, const radiosity_request *request, batch_wo
     const size_t n_names = request->reduce.n_names;
     size_t which[BATCH_PASS], count = 0;
     bool good = true;
-    find_all(s, request, rows);
+    (void)row_cache_find(s->rows, n_names, request->reduce.names, request->quantity, rows);
     for (size_t k = 0; good && k < n_names; k++) {
         if (rows[k] == NULL) which[count++] = k;
         if (count == BATCH_PASS || (count > 0 && k + 1 == n_names)) {
@@ -332,14 +262,12 @@ bool adjoint_rows_get(const scene *s, const radiosity_request *request, batch_wo
     return good;
 }
 
-/* --- products ------------------------------------------------------------------------------------------- */
-
 size_t adjoint_row_work(const scene *s, const radiosity_request *request) {
     return s->n_channels * (request->n_rhs + request->n_spots + request->sky.n * tiles_of(s) +
                             request->emitters.n * s->n_emitters);
 }
 
-bool adjoint_row_tells(const scene *s, const adjoint_row *row, const radiosity_request *request) {
+bool adjoint_row_suffices(const scene *s, const adjoint_row *row, const radiosity_request *request) {
     const size_t C = s->n_channels, m = tiles_of(s);
     if (row->emitters == NULL) return true;
     if (request->n_dense > 0) return false;
@@ -355,7 +283,8 @@ bool adjoint_row_tells(const scene *s, const adjoint_row *row, const radiosity_r
     return true;
 }
 
-/* means += what the spots and the skies give; dark ones nothing, also where the row says NaN. */
+/* means += contributions of spots and skies. Those of value 0 are skipped, so that NaN of the row does no
+ * harm. */
 static void add_spots(const scene *s, const adjoint_row *row, const radiosity_request *request,
                       double *means) {
     const size_t n = s->n, C = s->n_channels, m = tiles_of(s);

@@ -235,16 +235,16 @@ static lam_status open_source(catalog *all, const catalog_snapshot *next, const 
     scene *opened = NULL;
     /* One that turned out to be damaged has to prove first that it no longer is. */
     const bool verify = all->config->verify || (old != NULL && scene_damaged(old, NULL, NULL));
-    const scene_wish wish = {.path = from->path,
-                             .name = from->name,
-                             .verify = verify,
-                             .memory = memory_left(all, next, memory_grown(next)),
-                             .ledger = &all->ledger,
-                             .before = old,
-                             .threads = all->config->threads,
-                             .stores = &all->stores};
+    const scene_options options = {.path = from->path,
+                                   .name = from->name,
+                                   .verify = verify,
+                                   .memory = memory_left(all, next, memory_grown(next)),
+                                   .ledger = &all->ledger,
+                                   .before = old,
+                                   .threads = all->config->threads,
+                                   .stores = &all->stores};
     pthread_mutex_lock(&all->stores);
-    status = scene_open(&wish, &opened, error);
+    status = scene_open(&options, &opened, error);
     pthread_mutex_unlock(&all->stores);
     TRY(status);
     TRY(check_work(all, next, opened, error));

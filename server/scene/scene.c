@@ -1,8 +1,8 @@
 #include "server/scene/scene.h"
 
 #include "server/queue/batch.h"
-#include "server/scene/scene_description.h"
-#include "server/scene/scene_health.h"
+#include "server/scene/map_guard.h"
+#include "solver/codec/describe.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky_light.h"
 #include "store/store.h"
@@ -13,6 +13,82 @@
 
 /* What a scene may keep of adjoint rows. */
 #define ADJOINT_ROWS_BYTES ((size_t)256 << 20)
+
+enum { HEALTH_UNKNOWN, HEALTH_SOUND, HEALTH_DAMAGED };
+
+struct scene_health {
+    atomic_int state;
+    atomic_bool reported;
+    map_range *guard; /* NULL: nothing is mapped */
+    lam_error damage; /* of HEALTH_DAMAGED, written before the state is */
+};
+
+static void scene_health_free(scene_health *health) {
+    if (health == NULL) return;
+    map_guard_remove(health->guard);
+    free(health);
+}
+
+/* Guards the mapping (NULL: none). sound: it has been compared with its checksums already. Freed by
+ * scene_health_free while the mapping still exists. Errors: LAM_ERR_MEMORY. */
+static lam_status scene_health_create(const char *path, const store_map *map, bool sound, scene_health **out,
+                                      lam_error *error) {
+    lam_status status = LAM_OK;
+    scene_health *made = memory_allocate(1, sizeof *made, path, error);
+    if (made == NULL) return LAM_ERR_MEMORY;
+    atomic_init(&made->state, sound || map == NULL ? HEALTH_SOUND : HEALTH_UNKNOWN);
+    atomic_init(&made->reported, false);
+    if (map != NULL) {
+        const void *begin;
+        size_t bytes;
+        store_map_range(map, &begin, &bytes);
+        made->guard = map_guard_add(begin, bytes);
+        if (made->guard == NULL)
+            FAIL(error, LAM_ERR_MEMORY, "%s: more than %d stores are mapped; serve fewer", path,
+                 MAP_GUARD_RANGES);
+    }
+    *out = made;
+    made = NULL;
+done:
+    scene_health_free(made);
+    return status;
+}
+
+/* *text: the description of the store under the name that it is served by, one line of JSON, freed by the
+ * caller. */
+static lam_status describe_scene(store *s, const scene *loaded, char **text, lam_error *error) {
+    lam_status status = LAM_OK;
+    json_t *made = NULL;
+    TRY(describe_store(s, &made, error));
+    if (json_object_set_new(made, "name", json_string(loaded->name)) != 0)
+        FAIL(error, LAM_ERR_FORMAT, "%s: its name is not UTF-8; give it one: %s:NAME", loaded->path,
+             loaded->path);
+    char *written = json_dumps(made, JSON_COMPACT);
+    if (written == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory to describe it", loaded->path);
+    *text = written;
+done:
+    json_decref(made);
+    return status;
+}
+
+/* The description of the base with the name, bytes and reflectances of the variant (groups, a JSON object as
+ * text) and without error figures. */
+static lam_status describe_variant(const scene *variant, const char *groups, char **text, lam_error *error) {
+    lam_status status = LAM_OK;
+    json_t *made = json_loads(variant->base->description, 0, NULL);
+    char *written = NULL;
+    if (made != NULL && json_object_set_new(made, "name", json_string(variant->name)) == 0 &&
+        json_object_set_new(made, "bytes", json_integer((json_int_t)variant->bytes)) == 0 &&
+        json_object_set_new(made, "error", json_object()) == 0 &&
+        json_object_set_new(made, "variant_of", json_string(variant->base->name)) == 0 &&
+        json_object_set_new(made, "reflectance", json_loads(groups, 0, NULL)) == 0)
+        written = json_dumps(made, JSON_COMPACT);
+    if (written == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory to describe it", variant->name);
+    *text = written;
+done:
+    json_decref(made);
+    return status;
+}
 
 /* The total error that an answer carries: the scene's own lights, else single elements, else none. */
 static void read_error(store *s, scene *made) {
@@ -87,46 +163,46 @@ static size_t threads_of(const lam_operator *op, size_t most) {
     return worth < 1 ? 1 : worth < most ? worth : most;
 }
 
-static lam_status read_store(store *s, const scene_wish *wish, scene *made, lam_error *error) {
+static lam_status read_store(store *s, const scene_options *options, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
     if (!store_has(s, "/operator"))
-        FAIL(error, LAM_ERR_FORMAT, "%s: holds no operator; precompute it again", wish->path);
+        FAIL(error, LAM_ERR_FORMAT, "%s: holds no operator; precompute it again", options->path);
     TRY(memory_of(s, &made->memory, &made->bytes, error));
-    if (made->memory > wish->memory)
-        FAIL(error, LAM_ERR_MEMORY, "%s: takes %llu bytes, of --max-memory %llu are left", wish->path,
-             (unsigned long long)made->memory, (unsigned long long)wish->memory);
-    TRY(store_verify_group(s, wish->verify ? "/" : "/mesh", error));
+    if (made->memory > options->memory)
+        FAIL(error, LAM_ERR_MEMORY, "%s: takes %llu bytes, of --max-memory %llu are left", options->path,
+             (unsigned long long)made->memory, (unsigned long long)options->memory);
+    TRY(store_verify_group(s, options->verify ? "/" : "/mesh", error));
     TRY(store_map_file(s, error));
     TRY(operator_load(s, &made->op, error));
     made->n = lam_operator_elements(made->op);
     made->n_channels = lam_operator_channels(made->op);
     made->reflectance = made->op->reflectance;
-    lam_operator_set_threads(made->op, threads_of(made->op, wish->threads));
+    lam_operator_set_threads(made->op, threads_of(made->op, options->threads));
     TRY(sky_load(s, made->n, &made->sky, error));
     made->n_emitters = lam_operator_emitters(made->op);
     made->work_bytes = work_of(made);
     TRY(read_groups(s, made, error));
     TRY(read_area(s, made, error));
-    made->ledger = wish->ledger;
-    TRY(adjoint_rows_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
-    TRY(refined_create(s, made->op, wish->stores, made->ledger, &made->refined, error));
+    made->ledger = options->ledger;
+    TRY(row_cache_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
+    TRY(refined_create(s, made->op, options->stores, made->ledger, &made->refined, error));
     read_error(s, made);
-    TRY(scene_describe(s, made, &made->description, error));
+    TRY(describe_scene(s, made, &made->description, error));
     if (store_map_bytes(store_map_of(s)) > 0) made->map = store_map_hold(store_map_of(s));
-    TRY(scene_health_create(made->path, made->map, wish->verify, &made->health, error));
+    TRY(scene_health_create(made->path, made->map, options->verify, &made->health, error));
 done:
     return status;
 }
 
 /* Whether the store is what the scene so far was made of, and nothing speaks against that one. */
-static bool is_unchanged(const scene_wish *wish, const store *s) {
-    return wish->before != NULL && store_identity_same(&wish->before->identity, store_identity_of(s)) &&
-           !scene_damaged(wish->before, NULL, NULL);
+static bool is_unchanged(const scene_options *options, const store *s) {
+    return options->before != NULL && store_identity_same(&options->before->identity, store_identity_of(s)) &&
+           !scene_damaged(options->before, NULL, NULL);
 }
 
-lam_status scene_open(const scene_wish *wish, scene **out, lam_error *error) {
+lam_status scene_open(const scene_options *options, scene **out, lam_error *error) {
     lam_status status = LAM_OK;
-    const char *path = wish->path;
+    const char *path = options->path;
     store *s = NULL;
     scene *made = memory_allocate(1, sizeof *made, path, error);
     if (made == NULL) return LAM_ERR_MEMORY;
@@ -135,20 +211,20 @@ lam_status scene_open(const scene_wish *wish, scene **out, lam_error *error) {
     if (made->path == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", path);
     TRY(store_open(path, &s, error));
     made->identity = *store_identity_of(s);
-    if (is_unchanged(wish, s)) {
-        if (wish->verify) TRY(store_verify(s, error));
-        *out = scene_acquire(wish->before);
+    if (is_unchanged(options, s)) {
+        if (options->verify) TRY(store_verify(s, error));
+        *out = scene_acquire(options->before);
         goto done;
     }
-    made->renamed = wish->name != NULL;
-    if (wish->name != NULL)
-        made->name = strdup(wish->name);
+    made->renamed = options->name != NULL;
+    if (options->name != NULL)
+        made->name = strdup(options->name);
     else
         TRY(store_get_text(s, "/", "name", &made->name, error));
     if (made->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", path);
     if (made->name[0] == '\0')
         FAIL(error, LAM_ERR_FORMAT, "%s: the store's name is empty; give it one: %s:NAME", path, path);
-    TRY(read_store(s, wish, made, error));
+    TRY(read_store(s, options, made, error));
     *out = made;
     made = NULL;
 done:
@@ -185,9 +261,9 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
     if (made->name == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", name);
     made->memory = made->bytes;
     made->ledger = base->ledger;
-    TRY(adjoint_rows_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
+    TRY(row_cache_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
     TRY(refined_create_variant(base->refined, op, &made->refined, error));
-    TRY(scene_describe_variant(made, groups, &made->description, error));
+    TRY(describe_variant(made, groups, &made->description, error));
     *out = made;
     made = NULL;
 done:
@@ -196,7 +272,7 @@ done:
 }
 
 uint64_t scene_grown(const scene *s) {
-    return (uint64_t)refined_held(s->refined) + adjoint_rows_held(s->rows);
+    return (uint64_t)refined_held(s->refined) + row_cache_held(s->rows);
 }
 
 scene *scene_acquire(scene *s) {
@@ -208,7 +284,7 @@ void scene_release(scene *s) {
     if (atomic_fetch_sub(&s->references, 1) != 1) return;
     refined_destroy(s->refined);
     lam_operator_close(s->op);
-    adjoint_rows_destroy(s->rows);
+    row_cache_destroy(s->rows);
     if (s->base == NULL) {
         lam_sky_close(s->sky);
         group_index_free(&s->groups);
@@ -222,4 +298,43 @@ void scene_release(scene *s) {
     free(s->description);
     free(s->name);
     free(s);
+}
+
+lam_status scene_verify(scene *s, const atomic_int *cancel, lam_error *error) {
+    scene_health *health = s->health;
+    lam_error damage;
+    if (scene_verified(s)) return LAM_OK;
+    const lam_status status = store_map_verify(s->map, cancel, &damage);
+    if (status == LAM_OK) atomic_store(&health->state, HEALTH_SOUND);
+    if (status == LAM_ERR_DAMAGED) {
+        health->damage = damage;
+        atomic_store(&health->state, HEALTH_DAMAGED);
+    }
+    if (status != LAM_OK && error != NULL) *error = damage;
+    return status;
+}
+
+bool scene_verified(const scene *s) {
+    return atomic_load(&s->health->state) != HEALTH_UNKNOWN;
+}
+
+bool scene_damaged(const scene *s, lam_error *why, bool *news) {
+    scene_health *health = s->health;
+    size_t offset;
+    lam_error unused;
+    if (why == NULL) why = &unused;
+    /* Lost pages first: a comparison finds the zeros in their place too, but does not know why. */
+    if (map_guard_lost(health->guard, &offset))
+        store_map_name(s->map, offset, "cannot be read any more", why);
+    else if (atomic_load(&health->state) == HEALTH_DAMAGED)
+        *why = health->damage;
+    else if (s->map != NULL && store_map_changed(s->map))
+        (void)status_fail(why, LAM_ERR_DAMAGED,
+                          "%s: was changed since it was mapped; put a new file in its place by renaming, and "
+                          "have the stores read again (SIGHUP)",
+                          s->path);
+    else
+        return false;
+    if (news != NULL) *news = !atomic_exchange(&health->reported, true);
+    return true;
 }

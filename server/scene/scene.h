@@ -4,8 +4,8 @@
 #define LAMBERT_SERVER_SCENE_SCENE_H
 
 #include "lambert/lambert.h"
-#include "server/scene/adjoint_rows.h"
 #include "server/scene/refined.h"
+#include "server/scene/row_cache.h"
 #include "solver/codec/groups.h"
 #include "store/store_map.h"
 
@@ -40,7 +40,7 @@ struct scene {
     bool has_error;    /* the store's total error, of its own lights or else of single elements */
     double relative_mean, indirect_mean;
     memory_ledger *ledger; /* of what is held beyond memory; or NULL */
-    adjoint_rows *rows;    /* what reduces by a product; any thread */
+    row_cache *rows;       /* what reduces by a product; any thread */
     refined *refined;      /* what refining its answers takes, found when it is first asked for */
     store_map *map;        /* held; NULL: nothing is mapped */
     scene_health *health;
@@ -48,7 +48,7 @@ struct scene {
 };
 
 /* How a store is opened. */
-typedef struct scene_wish {
+typedef struct scene_options {
     const char *path, *name; /* name NULL: the store's own */
     bool verify;     /* compare everything in the file with its checksums first, also what is not read */
     uint64_t memory; /* what it may count for; UINT64_MAX: anything */
@@ -56,15 +56,14 @@ typedef struct scene_wish {
     scene *before;           /* the scene of this path and name so far, or NULL */
     size_t threads;          /* that one answer may use */
     pthread_mutex_t *stores; /* outlives the scene: whoever opens a store holds it, the caller of this too */
-} scene_wish;
+} scene_options;
 
 /* Opens a store; its file is closed again before this returns, but for what is mapped. Verified here: headers
  * and checksums of checksums, /mesh, and whatever is not mapped. What is mapped is left to scene_verify,
- * unless wish->verify. When the file is still that of wish->before, and no damage of it is known, that is
- * given out again.
- * Errors: as store_open and operator_load; LAM_ERR_MEMORY names the sizes where it does not fit. Each names
- * the path. One thread at a time. */
-lam_status scene_open(const scene_wish *wish, scene **out, lam_error *error);
+ * unless options->verify. When the file is still that of options->before, and no damage of it is known, that
+ * is given out again. Errors: as store_open and operator_load; LAM_ERR_MEMORY names the sizes where it does
+ * not fit. Each names the path. One thread at a time. */
+lam_status scene_open(const scene_options *options, scene **out, lam_error *error);
 
 /* What a scene has come to hold since it was opened, of its ledger. Any thread. */
 uint64_t scene_grown(const scene *s);

@@ -58,10 +58,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     close(fd);
     for (int verify = 0; verify < 2; verify++) {
         scene *s = NULL;
-        const scene_wish wish = {
+        const scene_options options = {
             .path = path, .verify = verify == 1, .memory = UINT64_MAX, .threads = 1, .stores = &stores};
         lam_error error = {.message = ""};
-        if (scene_open(&wish, &s, &error) == LAM_OK) {
+        if (scene_open(&options, &s, &error) == LAM_OK) {
             apply(s);
             refine(s, path);
             scene_release(s);

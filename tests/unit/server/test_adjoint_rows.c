@@ -52,12 +52,12 @@ static void setup(fixture *f, size_t rows) {
     ck_assert_ptr_nonnull(f->s.area);
     memcpy(f->s.area, area, sizeof area);
     atomic_init(&f->ledger.room, SIZE_MAX);
-    ck_assert_int_eq(adjoint_rows_create(rows * row_size, &f->ledger, &f->s.rows, NULL), LAM_OK);
+    ck_assert_int_eq(row_cache_create(rows * row_size, &f->ledger, &f->s.rows, NULL), LAM_OK);
     ck_assert_uint_eq(adjoint_rows_capacity(&f->s), rows);
 }
 
 static void teardown(fixture *f) {
-    adjoint_rows_destroy(f->s.rows);
+    row_cache_destroy(f->s.rows);
     ck_assert_uint_eq(atomic_load(&f->ledger.taken), 0);
     lam_operator_close(f->s.op);
     group_index_free(&f->s.groups);
@@ -106,7 +106,7 @@ static double mean_of(const fixture *f, size_t g, lam_quantity quantity, size_t 
 /* Whether the row answers as it should. */
 static void judge(const fixture *f, const adjoint_row *row, const radiosity_request *request, size_t g) {
     double means[2 * C];
-    ck_assert(adjoint_row_tells(&f->s, row, request));
+    ck_assert(adjoint_row_suffices(&f->s, row, request));
     adjoint_row_evaluate(&f->s, row, request, NULL, means);
     ck_assert_uint_eq(adjoint_row_work(&f->s, request), C * (2 + 2));
     for (size_t c = 0; c < C; c++) {
@@ -188,7 +188,7 @@ START_TEST(a_ledger_without_room) {
         judge(&f, row, &requests[g], g);
         adjoint_rows_release(&f.s, 1, &row);
         ck_assert_uint_eq(atomic_load(&f.ledger.taken), (g < 1 ? 1 : 2) * row_size);
-        ck_assert_uint_eq(adjoint_rows_held(f.s.rows), atomic_load(&f.ledger.taken));
+        ck_assert_uint_eq(row_cache_held(f.s.rows), atomic_load(&f.ledger.taken));
     }
     ck_assert(!adjoint_rows_find(&f.s, &requests[1], &again));
     ck_assert(adjoint_rows_find(&f.s, &requests[3], &again));

@@ -1,7 +1,6 @@
 /* What the daemon tells connections, answers and requests apart by: who is cut and who is not, entity tags,
  * request ids. */
-#include "server/http/etag.h"
-#include "server/http/request_id.h"
+#include "server/http/http_fields.h"
 #include "server/net/connections.h"
 #include "support/suite.h"
 

@@ -1,0 +1,69 @@
+/* What a handler gets and gives back: the call and the answer. Knows no HTTP library and no route. */
+#ifndef LAMBERT_SERVER_ROUTE_CALL_H
+#define LAMBERT_SERVER_ROUTE_CALL_H
+
+#include "server/route/service.h"
+#include "solver/base/clock.h"
+#include "solver/codec/answer.h"
+#include "solver/codec/media.h"
+#include "solver/codec/problem.h"
+#include "solver/codec/request.h"
+
+#include <stddef.h>
+
+/* A request that has passed its checks, with its whole body. */
+typedef struct call {
+    batch_job job; /* of a route with a body */
+    const service *service;
+    const catalog_snapshot *snapshot;
+    const scene *scene;         /* of a route with {name}; NULL for a variant that is not served yet */
+    const char *name;           /* its name in the request */
+    variant_state variant;      /* when the request came */
+    const problem *variant_why; /* of a variant that failed */
+    media_type body_type;
+    media_accept accept;
+    const char *body; /* body[length] is NUL */
+    size_t length;
+    batch_workspace *workspace; /* of a route with a body */
+    void *state;                /* of a route with solve_steps: its own, from begin to end */
+    size_t n_rhs;               /* set by the handler, for the log */
+} call;
+
+/* Zero at the start. The sender takes the body over. */
+typedef struct answer {
+    unsigned status;
+    const char *type; /* static */
+    buffer body;
+    char allow[32];       /* of a 405 */
+    unsigned retry_after; /* of a 503: seconds; 0: no header */
+    bool refined;         /* certificate and iterations are set: the largest of its vectors */
+    double certificate;
+    size_t iterations;
+    char *location; /* of a 202, owned; or NULL */
+    bool cacheable; /* gets an ETag */
+} answer;
+
+/* The call that a job is part of. */
+static inline call *call_of(batch_job *job) {
+    return (call *)(void *)((char *)job - offsetof(call, job));
+}
+
+/* Makes the answer a problem document. */
+void answer_problem(answer *out, const problem *what);
+void answer_refuse(answer *out, unsigned status, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+/* Makes the answer the JSON in b (taken over), or 503 if it could not be written. */
+void answer_json(answer *out, buffer *b, bool written);
+
+/* The scene as a body is read against, and the notes of an answer beside its numbers, for a route with
+ * {name}. */
+codec_scene call_codec_scene(const call *in);
+answer_notes call_notes(const call *in);
+
+/* Milliseconds of a monotonic clock. */
+static inline double call_now_ms(void) {
+    return 1e3 * clock_seconds();
+}
+
+#endif
