@@ -1,4 +1,5 @@
-/* /form_factors of a store, in mesh order: rows F[i][.], or A_i F_ij for j > i. */
+/* Form factors once they are made: rows and upper triangle, the mean of two samples, and /form_factors of a
+ * store, in mesh order: rows F[i][.], or A_i F_ij for j > i. */
 #include "solver/formfactor/formfactor.h"
 
 #include "solver/formfactor/rows/upper.h"

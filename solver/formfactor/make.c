@@ -1,5 +1,4 @@
-/* How form factors are made: by rays, hemicubes, pairs or near pairs. The only file that knows all sub-rooms.
- */
+/* Makes form factors by rays, hemicubes, pairs or near pairs. The only file that knows all sub-rooms. */
 #include "solver/formfactor/formfactor.h"
 
 #include "solver/base/clock.h"
@@ -15,7 +14,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Repairs exchange areas by what their rays say leaves. */
+/* Repairs exchange areas with the shares of the rays that leave. */
 static lam_status close_upper(form_factors *f, const mesh *m, lam_error *error) {
     double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) return LAM_ERR_MEMORY;
@@ -26,7 +25,8 @@ static lam_status close_upper(form_factors *f, const mesh *m, lam_error *error) 
     return status;
 }
 
-/* From one-sided rows, which are freed, whose entries are F_ij times rays, to the upper triangle. */
+/* Merges one-sided rows, whose entries are F_ij times rays, into the repaired upper triangle; frees the rows.
+ */
 static lam_status merge_and_repair(form_factors *f, const mesh *m, packed_rows *rows, size_t rays,
                                    const large_place *place, lam_error *error) {
     lam_status status = LAM_OK;
@@ -78,7 +78,7 @@ static lam_status make_by_pairs(const mesh *m, const visibility *v, const uint32
     TRY(pairs_find(m, v, options, 0, f, &f->upper, error));
     leaving_measure(f, m);
     if (!leaving_nothing(f)) {
-        /* What a row lacks goes outside: 1 - sum_j g_ij / A_i. */
+        /* outside_i = 1 - sum_j g_ij / A_i */
         for (size_t i = 0; i < m->n; i++)
             for (uint64_t p = f->upper.indptr[i]; p < f->upper.indptr[i + 1]; p++) {
                 outside[i] += (double)f->upper.data[p];
@@ -160,7 +160,7 @@ lam_status form_factors_ray_rate(const mesh *m, const uint32_t *order, double *r
     lam_status status = LAM_OK;
     visibility *v = NULL;
     TRY(visibility_create(m, &v, error));
-    rays_cast_some(m, v, order, ELEMENTS, VISIBILITY_PACKET); /* threads start, caches fill */
+    rays_cast_some(m, v, order, ELEMENTS, VISIBILITY_PACKET); /* starts threads and fills caches */
     size_t cast = 0;
     const double started = clock_seconds();
     double seconds = 0;

@@ -37,7 +37,7 @@ lam_status recipe_check(const recipe *r, lam_error *error) {
 void recipe_describe(const recipe *r, char text[64]) {
     switch (r->method) {
     case RECIPE_RAYS:
-        snprintf(text, 64, "%zu rays an element", r->rays);
+        snprintf(text, 64, "%zu rays per element", r->rays);
         break;
     case RECIPE_HEMICUBE:
         snprintf(text, 64, "hemicubes of %zu pixels", r->resolution);
@@ -46,7 +46,7 @@ void recipe_describe(const recipe *r, char text[64]) {
         snprintf(text, 64, "pair by pair to %g", r->accuracy);
         break;
     case RECIPE_NEAR_PAIRS:
-        snprintf(text, 64, "near pairs to %.2g, %zu rays an element", recipe_accuracy(r), r->rays);
+        snprintf(text, 64, "near pairs to %.2g, %zu rays per element", recipe_accuracy(r), r->rays);
         break;
     }
 }
@@ -116,8 +116,8 @@ size_t recipe_auto_rays(double epsilon, double share) {
 }
 
 double recipe_noise(const recipe *r) {
-    /* Independent rays, the two estimates of a pair merged. A hemicube samples nothing; of pairs only what is
-     * partly hidden is sampled, far more finely. */
+    /* For independent rays, after merging the two estimates of a pair. A hemicube samples nothing, and of
+     * pairs only the partly occluded ones are sampled, far more finely. */
     return r->method == RECIPE_RAYS || r->method == RECIPE_NEAR_PAIRS ? sqrt(2 / (double)r->rays) : 0;
 }
 

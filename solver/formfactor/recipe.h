@@ -1,4 +1,4 @@
-/* How form factors are found: all that it takes to find the same ones again. */
+/* The parameters that determine form factors: the same recipe on the same mesh gives the same bits. */
 #ifndef LAMBERT_FORMFACTOR_RECIPE_H
 #define LAMBERT_FORMFACTOR_RECIPE_H
 
@@ -9,27 +9,28 @@ typedef enum recipe_method { RECIPE_RAYS, RECIPE_HEMICUBE, RECIPE_PAIRS, RECIPE_
 
 typedef struct recipe {
     recipe_method method;
-    size_t rays;       /* from every element; of pairs: those that only find what leaves the scene */
+    size_t rays;       /* from every element; for pairs they only find the share that leaves the scene */
     size_t resolution; /* of a hemicube: pixels along its top, even; else 0 */
-    double accuracy;   /* of (near) pairs: standard error of a factor that is partly hidden; else 0 */
-    uint64_t seed;     /* of all that is sampled */
+    double accuracy;   /* of (near) pairs: standard error of the factor of a partly occluded pair; else 0 */
+    uint64_t seed;     /* of all samples */
 } recipe;
 
 enum { RECIPE_RAYS_MOST = 1 << 24, RECIPE_RESOLUTION_LEAST = 4, RECIPE_RESOLUTION_MOST = 4096 };
 
-/* Rays beside pairs that only ask whether a scene is closed and whether its faces are turned. */
+/* Rays beside pairs without a sky: they only find whether the scene is closed and has turned faces. */
 enum { RECIPE_RAYS_FEW = 256 };
 
 /* "rays", "hemicube", "pairs", "near-pairs" */
 const char *recipe_name(recipe_method method);
 
-/* LAM_ERR_ARGUMENT for what is out of bounds, naming the option. */
+/* LAM_ERR_ARGUMENT for a value out of bounds, naming the option. */
 lam_status recipe_check(const recipe *r, lam_error *error);
 
-/* "4096 rays an element": for a log. */
+/* "4096 rays per element": for a log. */
 void recipe_describe(const recipe *r, char text[64]);
 
-/* The attributes of one group that hold a recipe; resolution and accuracy only where the method has one. */
+/* The names of a recipe's attributes in a group; rays, resolution and accuracy are called the same in each.
+ */
 typedef struct recipe_names {
     const char *group, *method, *seed;
 } recipe_names;
@@ -40,28 +41,30 @@ lam_status recipe_save(const recipe *r, const recipe_names *names, store *s, lam
 /* LAM_ERR_FORMAT when it is missing or out of bounds. */
 lam_status recipe_load(store *s, const recipe_names *names, recipe *out, lam_error *error);
 
-/* Relative tolerance of unoccluded factors of pairs. */
+/* The relative tolerance of the unoccluded factors of pairs. */
 double recipe_tolerance(const recipe *r);
 
-/* Pairs are near when the mean of their unoccluded factors, F_ij and F_ji weighted by A_i and A_j, is above
- * this: when a ray of an element would hit the other. What rays leave of S = A^1/2 F A^-1/2 has the variance
- * mean / (2 rays), so that a large element is not near to all the small ones that see it. At 10,000 elements
- * four times that pays as well, a lower one would not. */
+/* The threshold of the near field: 1/rays. A pair is near where the mean of its unoccluded factors,
+ * 2 A_i F_ij / (A_i + A_j), is above it, so that about one ray of an element hits the other. The sampling
+ * noise of rays in S = A^1/2 F A^-1/2 has the variance mean / (2 rays). The mean, not the larger factor,
+ * keeps a large element from being near to all the small ones that see it. */
 double recipe_near(const recipe *r);
 
-/* What partly hidden pairs are found to: accuracy, of near ones not finer than half a ray's share. An element
- * has ten or so; their variance is then some hundredths of that of the rays. */
+/* The standard error of the factor of a partly occluded pair: accuracy, and for near pairs at least half of
+ * 1/rays. An element has about ten of those, so that their variance is some hundredths of that of its rays.
+ */
 double recipe_accuracy(const recipe *r);
 
-/* Rays per element for a factorization bound epsilon: the sampling noise of a merged F has a 2-norm of about
- * sqrt(2/rays); share is what part of epsilon it may be. A power of two. */
+/* Rays per element, a power of two, whose sampling noise, sqrt(2/rays) in the 2-norm of the merged S, is at
+ * most share times epsilon, the bound of a factorization. */
 size_t recipe_auto_rays(double epsilon, double share);
 
-/* The 2-norm of the sampling error of S, about; 0 where it is not known or negligible. */
+/* About the 2-norm of the sampling noise in S; 0 where it is unknown or negligible. */
 double recipe_noise(const recipe *r);
 
-/* The recipe of an independent sample that another one is judged by: its like with another seed; of rays
- * beside hemicubes, which would only repeat themselves; of pairs without the rays that only a sky needs. */
+/* The recipe of the independent sample that another one is judged by: the same with another seed. For
+ * hemicubes, which would only repeat themselves, it is rays; for pairs it omits the rays that only a sky
+ * needs. */
 recipe recipe_of_judge(const recipe *judged, size_t rays_beside_hemicubes, uint64_t seed);
 
 #endif

@@ -7,19 +7,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Sweeps end when every row is this close to 1 (single precision rows cannot hold more), or when they are
- * spent: what is left over goes to the outside. */
+/* Sweeps end when every row sum is this close to its target (single precision cannot hold more), or after the
+ * last: the remaining difference goes outside. */
 static const double sweep_tolerance = 2e-8;
 enum { MAX_SWEEPS = 200 };
 
-/* Extrapolated sweeps: how many steps are looked back on, how many are tried, and by what the worst row may
- * grow on the way. */
+/* Of Anderson's extrapolation: previous steps that are kept, sweeps that are tried, and the factor by which
+ * the worst row may exceed the best one so far. */
 enum { STEPS = 5, MAX_STEPS = 60, GROWTH_MOST = 4 };
-/* What is added to the diagonal of their products: steps that are nearly alike share what they explain. */
+/* Added to the unit diagonal of the normal equations, which nearly parallel steps make singular. */
 static const double alike = 1e-11;
 
-/* Rows are cut into slices that do not depend on the number of threads: each adds what its rows send to
- * others into sums of its own, which are then added in their order. */
+/* Rows are cut into slices that do not depend on the number of threads. Each slice adds to sums of its own,
+ * which are then added in the order of the slices. */
 enum { SLICES = 32 };
 
 typedef struct sums {
@@ -40,7 +40,7 @@ static lam_status sums_init(sums *s, const csr *G, lam_error *error) {
     return LAM_OK;
 }
 
-/* total_i = sum over slices; a slice has nothing for rows before its own. */
+/* total_i = sum over slices; a slice of the upper triangle adds nothing to rows before its first. */
 static void sums_add(const sums *s, double *total) {
 #pragma omp parallel for schedule(static)
     for (size_t i = 0; i < s->n; i++) {
@@ -73,14 +73,14 @@ static void scaled_row_sums(const csr *G, sums *s, const double *area, const dou
     for (size_t i = 0; i < s->n; i++) r[i] = d[i] * (area[i] * outside[i] + r[i]);
 }
 
-/* A scaling on its way: d, its row sums r, and the worst of |r_i / A_i - 1|. */
+/* A scaling d in progress, its row sums r, and the largest |r_i / A_i - 1|. */
 typedef struct scaling {
     const csr *G;
     sums *s;
     const double *area, *outside;
     double *d, *r;
     double worst;
-    size_t products; /* row sums taken */
+    size_t products; /* with G */
 } scaling;
 
 static void measure(scaling *c) {
@@ -91,8 +91,8 @@ static void measure(scaling *c) {
         if (c->r[i] > 0) c->worst = fmax(c->worst, fabs(c->r[i] / c->area[i] - 1));
 }
 
-/* d_i <- d_i sqrt(A_i / r_i) until r_i = A_i; the root damps the sweep so that it also settles where light
- * goes to and fro between two sets (facing plates). Ends measured. */
+/* d_i <- d_i sqrt(A_i / r_i) until r_i = A_i. The root damps the sweep: without it d oscillates where F is
+ * bipartite (two facing plates). Leaves r and worst up to date. */
 static void sweep(scaling *c) {
     measure(c);
     for (int count = 0; count < MAX_SWEEPS && c->worst > sweep_tolerance; count++) {
@@ -102,10 +102,10 @@ static void sweep(scaling *c) {
     }
 }
 
-/* The last steps of x = log d and the changes of what a sweep would add to it, f = log(A / r) / 2. */
+/* The last steps of x = log d and of f = log(A / r) / 2, which a sweep adds to x. */
 typedef struct history {
     size_t n, held, next;
-    double *x, *f;                 /* [n] before the step that is being taken */
+    double *x, *f;                 /* [n], before the present step */
     double *dx[STEPS], *df[STEPS]; /* [n] each */
 } history;
 

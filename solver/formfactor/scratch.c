@@ -12,7 +12,7 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
-/* Three samples of three files each, and room. */
+/* Three samples of three files each, and some more. */
 enum { MAX_FILES = 16, MAX_NAME = 64 };
 
 struct scratch {
@@ -98,7 +98,7 @@ uint64_t scratch_free_bytes(const scratch *s) {
 void scratch_close(scratch *s, bool done) {
     if (s == NULL) return;
     for (size_t k = 0; done && k < s->n_files; k++) unlinkat(s->place.folder, s->files[k], 0);
-    if (s->made) rmdir(s->folder); /* stays where something is in it */
+    if (s->made) rmdir(s->folder); /* fails where it is not empty */
     if (s->place.folder >= 0) close(s->place.folder);
     free(s->folder);
     free(s);

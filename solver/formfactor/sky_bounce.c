@@ -53,9 +53,9 @@ void sky_bounce_put(sky_bounce *s, size_t element, double *sums, double whole) {
     memset(sums, 0, (m + 1) * sizeof *sums);
 }
 
-/* The ground, an infinite diffuse plane that nothing stands on, receives H_g = sum_t c_t L_t, c_t the tile's
- * integral of the cosine to the zenith, and returns the radiance a H_g / pi. So
- *     H0_i = pi sum_t F_it L_t + pi F_ig a H_g / pi = sum_t pi (F_it + F_ig a c_t / pi) L_t. */
+/* The ground, an unoccluded infinite diffuse plane, receives H_g = sum_t c_t L_t, with c_t the tile's
+ * integral of the cosine to the zenith, and reflects the radiance a H_g / pi. So H0_i = pi sum_t F_it L_t +
+ * pi F_ig a H_g / pi = sum_t pi (F_it + F_ig a c_t / pi) L_t. */
 void sky_bounce_close(sky_bounce *s, const double *scale) {
     const size_t n = s->n;
 #pragma omp parallel for schedule(static, 4)

@@ -543,7 +543,7 @@ class Stores(Case):
         self.assertRegex(must("info", kept).stdout, r"(?m)^form factors +pairs$")
         # Rays asked for by number are rays.
         done = must("precompute", self.box, "-o", bare, *common, "--rays", 64)
-        self.assertIn("64 rays an element", done.stderr)
+        self.assertIn("64 rays per element", done.stderr)
         done = lambert("precompute", self.box, "-o", bare, *common, "--memory", "100K")
         self.assertEqual(done.returncode, 1)
         self.assertIn("with near-pairs need about", done.stderr)

@@ -52,16 +52,16 @@ static double extent2(const cluster *c) {
     return sum;
 }
 
-/* A bound on the factor from a point to a plane area at distance d: A / (pi d^2), at most 1. */
+/* A bound on the factor from a point to an area at distance d: A / (pi d^2), at most 1. */
 static double factor_bound(double area, double distance2) {
     const double apart = 3.14159265358979323846 * distance2;
     return area < apart ? area / apart : 1;
 }
 
-/* Candidates above which near leaves are not looked between. */
+/* With more candidates than this, the shaft between two leaves of the near field is not built. */
 enum { CROWD = 16 };
 
-/* One step down: what is to be done with a pair of clusters. */
+/* Links a pair of clusters, drops it, or descends into its children. */
 static void visit(walk *w, uint32_t a, uint32_t b, const uint32_t *candidates, size_t n_candidates) {
     const cluster_tree *t = w->t;
     const cluster *one = &t->clusters[a], *two = &t->clusters[b];
@@ -86,7 +86,7 @@ static void visit(walk *w, uint32_t a, uint32_t b, const uint32_t *candidates, s
     }
     const bool near = w->options->threshold > 0;
     const bool leaves = cluster_is_leaf(one) && cluster_is_leaf(two);
-    /* With so much in the way of what is around them, they are seldom free. */
+    /* A shaft with so many candidates is seldom empty. */
     if (near && leaves && n_candidates > CROWD) {
         bag_add(w->found, a, b, false);
         return;
@@ -95,12 +95,12 @@ static void visit(walk *w, uint32_t a, uint32_t b, const uint32_t *candidates, s
     shaft s;
     shaft_init(&s, one, two, w->options->slack);
     const size_t n_within = shaft_filter(&s, w->m, t, candidates, n_candidates, leaves, within);
-    /* Beyond some elements of either the threshold may still cut. */
+    /* With a threshold even an open link descends to the leaves: some of its pairs may be below it. */
     if (n_within == 0 && (!near || leaves)) {
         bag_add(w->found, a, b, true);
         return;
     }
-    /* The few pairs of near ones are looked at sooner than it is known of all in their clusters. */
+    /* The near field has so few pairs that testing each is cheaper than testing clusters. */
     if (n_within > 0 && !near &&
         occlusion_is_total(w->o, t, one, two, factor_bound(fmax(one->area, two->area), distance2))) {
         w->found->hidden_pairs += pairs_between(one, two);
@@ -123,7 +123,7 @@ typedef struct task {
 
 enum { TASKS_WANTED = 1024 };
 
-/* Pairs of clusters from halfway down, which together make the walk. */
+/* Splits the descent into pairs of clusters that threads take one by one. */
 static size_t make_tasks(const cluster_tree *t, task tasks[TASKS_WANTED + 2]) {
     size_t n = 1;
     tasks[0] = (task){0, 0};
@@ -149,7 +149,7 @@ static size_t make_tasks(const cluster_tree *t, task tasks[TASKS_WANTED + 2]) {
     return n;
 }
 
-/* Links of one a stand together, ordered by where b begins. */
+/* Sorts the links of all tasks by a. */
 static lam_status gather(const cluster_tree *t, const bag *bags, size_t n_bags, cluster_links *out,
                          lam_error *error) {
     lam_status status = LAM_OK;

@@ -1,32 +1,33 @@
-/* Which clusters see which: the pairs of clusters that together hold every pair of elements which may
- * exchange light, each with what is known of all of its pairs at once. */
+/* Links: pairs of clusters that together cover every pair of elements which may exchange light (Hanrahan et
+ * al. 1991), marked open where their shaft is empty. */
 #ifndef LAMBERT_FORMFACTOR_PAIRS_CLUSTER_LINKS_H
 #define LAMBERT_FORMFACTOR_PAIRS_CLUSTER_LINKS_H
 
 #include "solver/formfactor/pairs/occlusion.h"
 
-/* Every element of a with every element of b, whose positions are greater; a == b: each pair within it. */
+/* All pairs of an element of a with an element of b, whose positions are greater; a == b: all pairs within
+ * it. */
 typedef struct cluster_link {
     uint32_t a, b;
-    bool open; /* nothing is between any two of them */
+    bool open; /* no element occludes any of these pairs */
 } cluster_link;
 
 typedef struct cluster_links {
-    cluster_link *links; /* those of one a together */
+    cluster_link *links; /* sorted by a */
     size_t n;
     size_t *of_cluster;   /* [n_clusters + 1]: where the links of each a begin */
-    double hidden_pairs;  /* of elements, in clusters that do not see each other */
-    double distant_pairs; /* beyond the threshold */
+    double hidden_pairs;  /* of elements, in clusters that are totally occluded from each other */
+    double distant_pairs; /* of elements, below the threshold */
 } cluster_links;
 
 typedef struct cluster_link_options {
-    double threshold; /* pairs whose mean factor, 2 g / (A_i + A_j), is surely below it are left out */
-    double slack;     /* what rounding may move a point */
+    double threshold; /* leaves out pairs whose mean factor 2 g / (A_i + A_j) is provably below; 0: none */
+    double slack;     /* the distance by which rounding may move a point */
     const progress *progress;
 } cluster_link_options;
 
-/* Walks down the tree with itself. Skipped are clusters that face away, those beyond the threshold, and,
- * where there is none, those that are plainly hidden from each other. The result is the same for any number
+/* Descends through pairs of clusters of the tree. Clusters that face away or are below the threshold get no
+ * link, nor, without a threshold, do clusters that occlusion_is_total. The result is the same for any number
  * of threads. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. Freed by cluster_links_free. */
 lam_status cluster_links_find(const mesh *m, const cluster_tree *t, const occlusion *o,
                               const cluster_link_options *options, cluster_links *out, lam_error *error);

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What a cluster is split by: the middle of an element and its normal. */
+/* The coordinates that clusters are split by: an element's centroid and its normal. */
 typedef struct feature {
     double centre[3], normal[3];
 } feature;
@@ -55,13 +55,13 @@ static void measure_directions(const builder *b, cluster *c) {
     for (uint32_t p = c->first; p < c->last; p++)
         for (int d = 0; d < 3; d++) sum[d] += b->features[b->tree.element[p]].normal[d];
     const double length = sqrt(dot(sum, sum));
-    c->spread = 3.2; /* anything */
+    c->spread = 3.2; /* above pi: no bound */
     if (length < 1e-6 * (c->last - c->first)) return;
     for (int d = 0; d < 3; d++) c->normal[d] = sum[d] / length;
     double least = 1;
     for (uint32_t p = c->first; p < c->last; p++)
         least = fmin(least, dot(b->features[b->tree.element[p]].normal, c->normal));
-    /* Normals are of single precision: 1e-3 radians hide in their cosine's rounding. */
+    /* Normals are in single precision: the rounding of a cosine near 1 is an angle of up to 1e-3. */
     c->spread = acos(fmax(least, -1)) + 1e-3;
     if (least < 1 - 1e-9) return;
     double low = INFINITY, high = -INFINITY;
@@ -77,8 +77,8 @@ static void measure_directions(const builder *b, cluster *c) {
     c->plane = high - low <= b->slack;
 }
 
-/* The coordinate to split by, 0 ... 2 of the centre or 3 ... 5 of the normal, and its middle; -1: all alike.
- */
+/* The coordinate to split by, 0 ... 2 of the centroid or 3 ... 5 of the normal, and its middle; -1: all are
+ * equal. */
 static int longest_extent(const builder *b, const cluster *c, double *middle) {
     double low[6], high[6];
     for (int d = 0; d < 6; d++) {
@@ -99,7 +99,7 @@ static int longest_extent(const builder *b, const cluster *c, double *middle) {
     int best = -1;
     double most = 0;
     for (int d = 0; d < 6; d++) {
-        /* Directions one radian apart weigh as much as places the cluster's size apart. */
+        /* A difference of 1 in a normal counts as much as the cluster's diagonal. */
         const double extent = d < 3 ? high[d] - low[d] : (high[d] - low[d]) * (size > 0 ? size : 1);
         if (!(extent > most)) continue;
         most = extent;
@@ -109,7 +109,7 @@ static int longest_extent(const builder *b, const cluster *c, double *middle) {
     return best;
 }
 
-/* Orders a cluster's positions into two halves; returns where the second begins. Stable. */
+/* Partitions a cluster's positions at the middle, stably; returns where the second part begins. */
 static uint32_t split(builder *b, const cluster *c) {
     double middle = 0;
     const int by = longest_extent(b, c, &middle);
@@ -182,8 +182,9 @@ static double reach(const cluster *box, const double normal[3]) {
     return most;
 }
 
-/* Whether nothing of b lies in front of any element of a: by a's plane, or by the cone of its normals and the
- * cone of directions from a's box to b's. */
+/* True where no point of b lies in front of any element of a: by a's plane, or because the angle between a's
+ * mean normal and the direction to b exceeds pi/2 by more than the cone of a's normals and that of the
+ * directions. */
 static bool behind(const cluster *a, const cluster *b, double slack) {
     if (a->plane) return reach(b, a->normal) <= a->level + slack;
     double apart[3], size = 0;

@@ -5,7 +5,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Bright elements that are all looked at; of more, as many stand for those that matter less. */
+/* CLOSELY_MOST: bright elements that are estimated one by one. STAND_FOR_ALL: above that, 1 over the share of
+ * the light from which on an element counts by itself, and the size of the sample of the others. */
 enum { CLOSELY_MOST = 16, STAND_FOR_ALL = 96 };
 
 struct first_light {
@@ -48,8 +49,8 @@ void first_light_destroy(first_light *l) {
     free(l);
 }
 
-/* What of the exchange area of two elements is not hidden: looked at closely where the first look saw both.
- */
+/* The visible part of the exchange area of two elements; closely: by occlusion_estimate where the test is
+ * mixed. */
 static double seen(const first_light *l, uint32_t e, uint32_t i, bool closely) {
     double part;
     if (e == i) return 0;
@@ -61,7 +62,7 @@ static double seen(const first_light *l, uint32_t e, uint32_t i, bool closely) {
     return mixed && closely ? occlusion_estimate(&l->occlusion, low, high, g) : part;
 }
 
-/* cos cos' A A' / (pi r^2) from middle to middle. */
+/* cos cos' A A' / (pi r^2) between the centroids. */
 static double kernel(const first_light *l, uint32_t e, uint32_t i) {
     const polygon *p = &l->polygons[e], *q = &l->polygons[i];
     double r2 = 0, leaving = 0, arriving = 0;
@@ -82,8 +83,8 @@ static double place(uint64_t x) {
     return (double)((x ^ (x >> 27)) >> 11) * 0x1p-53;
 }
 
-/* sum_e E_e g_ei of very many: those above a share of the whole one by one, of the others every so much of
- * kernel. */
+/* sum_e E_e g_ei over many bright elements. Those above 1/STAND_FOR_ALL of all sum_e E_e K_ei one by one; the
+ * others by systematic sampling in proportion to E_e K_ei: rest times the mean of g / K over the sample. */
 static double of_many(const first_light *l, size_t count, const uint32_t *of, const float *E, uint32_t i,
                       double *g) {
     double all = 0, rest = 0, sum = 0, taken = 0, ratio = 0, passed = 0;

@@ -87,9 +87,9 @@ static double parallel_edges(const edge *one, const edge *two, double cosine) {
            twice_integrated(x + one->length - two->length, h) + twice_integrated(x - two->length, h);
 }
 
-/* Integral of ln r^2 from a point at place s of edge one over edge two: with x along edge two and h its
- * distance, x ln(x^2 + h^2) - 2 x + 2 h atan(x/h) between the ends; the two arcs are the one angle that the
- * edge fills. */
+/* Integral of ln r^2 over edge two from the point at s on edge one: with x along edge two and h the distance
+ * from its line, x ln(x^2 + h^2) - 2 x + 2 h atan(x/h) between the ends. The two atan are one atan2, the
+ * angle that the edge subtends. */
 static double point_to_edge(const edge *one, const edge *two, double s) {
     double v[3];
     for (int d = 0; d < 3; d++) v[d] = one->from[d] + s * one->along[d] - two->from[d];
@@ -100,8 +100,8 @@ static double point_to_edge(const edge *one, const edge *two, double s) {
            2 * h * atan2(h * two->length, h2 - a * b);
 }
 
-/* Places on edge one, in (0, length), where the integrand over it may be steep: nearest to edge two's line
- * and to its ends. */
+/* The places on edge one, in (0, length), where the integrand may be steep: the points nearest to the line of
+ * edge two and to its two ends. */
 static int steep_places(const edge *one, const edge *two, double cosine, double places[3]) {
     double v[3], candidates[3];
     subtract(two->from, one->from, v);
@@ -129,11 +129,11 @@ static double distance_to_edge(const double point[3], const edge *e) {
     return sqrt(dot(v, v));
 }
 
-/* Quadrature over edge one, the shorter, of what is known over edge two. */
+/* Quadrature over edge one, the shorter, of the closed form over edge two. */
 static double skew_edges(const pair_factor_rules *rules, const edge *one, const edge *two, double cosine) {
     double places[3], ends[5] = {0};
     const int n_places = steep_places(one, two, cosine, places);
-    /* The distance of the edges is reached at one of those places or at an end. */
+    /* The distance of the edges is attained at one of those places or at an end. */
     double nearest = INFINITY;
     for (int p = -1; p <= n_places; p++) {
         const double s = p < 0 ? 0 : p == n_places ? one->length : places[p];
@@ -174,8 +174,8 @@ static double two_edges(const pair_factor_rules *rules, const edge *a, const edg
     return skew_edges(rules, one, two, cosine);
 }
 
-/* A F = 1/(4 pi) sum over edges of cos(d, d') integral integral ln r^2 ds dt. Any unit of length does, as the
- * edges of each polygon sum to 0: the one taken keeps the logarithms small. */
+/* A F = 1/(4 pi) sum over edges of cos(d, d') integral integral ln r^2 ds dt. The edges of each polygon sum
+ * to 0, so that any unit of length gives the same; the one chosen keeps the logarithms small. */
 static double contour(const pair_factor_rules *rules, const polygon *a, const polygon *b, double distance) {
     const double scale = 1 / fmax(distance, a->radius + b->radius);
     edge of_a[POLYGON_CORNERS], of_b[POLYGON_CORNERS];
@@ -198,7 +198,7 @@ static double contour(const pair_factor_rules *rules, const polygon *a, const po
 
 enum { POINTS_MOST = (POLYGON_CORNERS - 2) * 16 };
 
-/* Component by component, for the vector units. */
+/* One array for each component, for vector instructions. */
 typedef struct cubature_points {
     int n;
     double x[3][POINTS_MOST], weight[POINTS_MOST];
@@ -266,13 +266,13 @@ static double cubature(const polygon *a, const polygon *b, const gauss_rule *g) 
     return fmax(sum / pi, 0);
 }
 
-/* A singularity q half-widths away leaves n Gauss nodes an error of about (2 q)^-2n in each of the four
- * directions, times what the fourth power of the distance brings. */
+/* The error of n Gauss nodes is about (2 q)^-2n in each of the four directions for a singularity q
+ * half-widths away. The fourth power of the distance multiplies it by about 1/.03. */
 double pair_factor_distance(int nodes, double tolerance) {
     return fmax(2, .5 * pow(.03 * tolerance, -.5 / nodes));
 }
 
-/* The rule that is far enough; NULL: none of those that pay. */
+/* The cheapest rule that keeps the tolerance at this distance; NULL: the contour integral is cheaper. */
 static const gauss_rule *far_rule(const pair_factor_rules *rules, const polygon *a, const polygon *b,
                                   double distance, double tolerance) {
     const double wide = fmax(a->radius, b->radius), q = (distance - wide) / wide;

@@ -1,4 +1,7 @@
-/* The unoccluded form factor of two planar convex polygons by mathematics: no rays, no noise. */
+/* The unoccluded exchange area of two planar convex polygons by quadrature, without sampling noise:
+ *     A_a F_ab = integral integral cos cos' / (pi r^2) = 1/(4 pi) sum over edges of cos(d, d') integral
+ * integral ln r^2 the double area integral where they are far apart, the double contour integral (Sparrow
+ * 1963) where they are near. */
 #ifndef LAMBERT_FORMFACTOR_PAIRS_PAIR_FACTOR_H
 #define LAMBERT_FORMFACTOR_PAIRS_PAIR_FACTOR_H
 
@@ -12,7 +15,7 @@ typedef struct gauss_rule {
     double node[GAUSS_NODES_MOST], weight[GAUSS_NODES_MOST];
 } gauss_rule;
 
-/* Integration rules, made once and then shared by any number of threads. */
+/* Integration rules; immutable after pair_factor_rules_init. */
 typedef struct pair_factor_rules {
     gauss_rule gauss[GAUSS_RULES]; /* 1, 2, 3, 4, 8, 16, 24 nodes */
     /* tanh-sinh (Takahasi and Mori 1974), for integrands that are steep at an end */
@@ -21,14 +24,13 @@ typedef struct pair_factor_rules {
 
 void pair_factor_rules_init(pair_factor_rules *rules);
 
-/* How many radii (of the larger) beyond one the centres of two polygons must be apart for a product rule of
- * nodes x nodes points on either to keep the relative tolerance. */
+/* q: a product rule of nodes x nodes points on each polygon keeps the relative tolerance where the centres
+ * are 1 + q radii of the larger polygon apart. */
 double pair_factor_distance(int nodes, double tolerance);
 
-/* A_a F_ab = A_b F_ba, m^2, of two polygons with nothing between them: each sees what of the other lies in
- * front of its plane. To the relative tolerance, at best 1e-8 (and 1e-10 of A_a), wherever they lie:
- * touching, crossing one another's planes, or far apart. Contour integral (Sparrow 1963) when near, cubature
- * of the kernel when far. Cost: about 0.1 us far, 1 near, 100 for touching edges that are not parallel. */
+/* A_a F_ab = A_b F_ba, m^2, without occlusion: only the part of each polygon in front of the other's plane
+ * counts. To the relative tolerance, at best 1e-8 (and 1e-10 of A_a), also where they touch or cross one
+ * another's planes. Cost: about 0.1 us far, 1 us near, 100 us for touching edges that are not parallel. */
 double pair_factor_exchange(const pair_factor_rules *rules, const polygon *a, const polygon *b,
                             double tolerance);
 

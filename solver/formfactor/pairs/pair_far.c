@@ -25,8 +25,8 @@ static void share_out(pair_far_table *t) {
         }
 }
 
-/* A product rule over the unit square, mapped to the polygon: bilinear, or folded to a triangle, (u, w) ->
- * u (1 - w), u w; weighted with the area that a unit of the square has there. */
+/* Maps a product rule from the unit square to the polygon: bilinearly, or to a triangle by (u, w) -> u (1 -
+ * w), u w. The weights carry the Jacobian. */
 static void set_points(pair_far_points *rule, size_t at, const polygon *p, const gauss_rule *g) {
     const double share = 1 / sqrt(3.14159265358979323846); /* half of the kernel's 1/pi */
     const double *first = p->corner[0], *one = p->corner[1], *two = p->corner[2];

@@ -26,7 +26,7 @@ void pair_rows_free(pair_rows *rows) {
     *rows = (pair_rows){0};
 }
 
-/* Room for exactly so many pairs. */
+/* Sets the capacity. */
 static bool block_resize(pair_block *b, size_t capacity) {
     uint32_t *other = realloc(b->other, (capacity + 1) * sizeof *other);
     if (other != NULL) b->other = other;
@@ -45,7 +45,7 @@ bool pair_block_reserve(pair_block *b, size_t more) {
 }
 
 void pair_block_shrink(pair_block *b) {
-    block_resize(b, b->used); /* where that fails nothing is lost */
+    block_resize(b, b->used); /* nothing is lost where that fails */
 }
 
 pair_state pair_rows_state(const pair_rows *rows, uint32_t p, uint32_t q) {
@@ -158,7 +158,7 @@ lam_status pair_rows_fetch_exchange(pair_rows *rows, size_t block, const uint32_
 /* --- as sparse rows --------------------------------------------------------------------------------------
  */
 
-/* Puts a row whose entries stand in any order in that of their indices, by way of a whole row of nothing. */
+/* Sorts the entries of a row by index, through a dense row and a bitset: O(entries + n/64). */
 static void sort_row(csr *rows, size_t i, float *dense, marks *there) {
     for (uint64_t p = rows->indptr[i]; p < rows->indptr[i + 1]; p++) {
         const uint32_t j = rows->indices[p];

@@ -1,13 +1,14 @@
-/* What is known of pairs of elements, in rows by position in a cluster tree's order: a row holds the pairs
- * with greater positions. Rows stand in blocks, each finished as a whole by one thread, kept by a scratch
- * file. */
+/* Exchange areas and states of pairs of elements, in rows by position in a cluster tree's order: a row holds
+ * the pairs with greater positions. One thread computes a whole block of rows, which a scratch file may keep.
+ */
 #ifndef LAMBERT_FORMFACTOR_PAIRS_PAIR_ROWS_H
 #define LAMBERT_FORMFACTOR_PAIRS_PAIR_ROWS_H
 
 #include "solver/formfactor/rows/row_file.h"
 #include "solver/linalg/csr.h"
 
-/* What is known of a pair, and beside it that no more need be known. */
+/* The occlusion of a pair: CERTAIN by an empty shaft, OPEN, HIDDEN or MIXED by an occlusion test. The flag
+ * SETTLED beside it: the test was accurate enough. */
 typedef enum pair_state { PAIR_UNKNOWN, PAIR_CERTAIN, PAIR_OPEN, PAIR_HIDDEN, PAIR_MIXED } pair_state;
 enum { PAIR_SETTLED = 8, PAIR_BLOCK_ROWS = 64 };
 
@@ -38,7 +39,7 @@ static inline size_t pair_rows_length(const pair_rows *rows, size_t block) {
     return rest < PAIR_BLOCK_ROWS ? rest : PAIR_BLOCK_ROWS;
 }
 
-/* Room for so many more pairs; false where there is no memory. Then one after the other may be added. */
+/* Makes room for that many more pair_block_add; false where there is no memory. */
 bool pair_block_reserve(pair_block *b, size_t more);
 static inline void pair_block_add(pair_block *b, uint32_t other, float exchange, uint8_t state) {
     b->other[b->used] = other;
@@ -46,13 +47,13 @@ static inline void pair_block_add(pair_block *b, uint32_t other, float exchange,
     b->state[b->used++] = state;
 }
 
-/* Gives back what a block has reserved and not used. */
+/* Returns reserved and unused memory. */
 void pair_block_shrink(pair_block *b);
 
 /* The state of the pair of two positions; PAIR_UNKNOWN where it is in no row. */
 pair_state pair_rows_state(const pair_rows *rows, uint32_t p, uint32_t q);
 
-/* A scratch file of such rows: blocks go there and come back. order is the tree's, position to element. */
+/* A scratch file of such rows, and its blocks written and read. order is the tree's, position to element. */
 lam_status pair_rows_open(scratch *s, const char *name, const char geometry[33], const recipe *r, size_t n,
                           const uint32_t *order, row_file **out, lam_error *error);
 lam_status pair_rows_append(const pair_rows *rows, size_t block, const uint32_t *order, row_file *f,
@@ -60,11 +61,12 @@ lam_status pair_rows_append(const pair_rows *rows, size_t block, const uint32_t 
 lam_status pair_rows_fetch(pair_rows *rows, size_t block, const uint32_t *order, const row_file *f,
                            lam_error *error);
 
-/* Only the exchange areas of a block that is there already: other threads may read its states. */
+/* Reads only the exchange areas of a block, while other threads may read its states. */
 lam_status pair_rows_fetch_exchange(pair_rows *rows, size_t block, const uint32_t *order, const row_file *f,
                                     lam_error *error);
 
-/* What is not zero, by element, above the diagonal, rows ascending; with keep_hidden the zeros too. */
+/* The upper triangle of exchange areas in mesh order; keep_hidden keeps zeros as entries. Freed by csr_free.
+ */
 lam_status pair_rows_gather(const pair_rows *found, const uint32_t *order, bool keep_hidden, csr *G,
                             lam_error *error);
 

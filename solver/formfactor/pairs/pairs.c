@@ -29,13 +29,13 @@ typedef struct pairs_run {
 
 /* --- rows ---------------------------------------------------------------------------------------------- */
 
-/* What a leaf is linked with, itself or as part of a larger cluster: positions first ... last-1. */
+/* The positions first ... last-1 of a cluster that a leaf, or an ancestor of it, is linked with. */
 typedef struct reach {
     uint32_t first, last;
     bool open;
 } reach;
 
-/* A walk down to the leaves with all the reaches met on the way. */
+/* All the partners of a leaf; room that is used again for the next one. */
 typedef struct leaf_reaches {
     reach *reaches;
     size_t n, capacity;
@@ -46,7 +46,7 @@ static int compare_reaches(const void *a, const void *b) {
     return (one->first > two->first) - (one->first < two->first);
 }
 
-/* All that the leaf's ancestors and itself are linked with, by position; their positions do not overlap. */
+/* The links of a leaf and of its ancestors, sorted by position; their positions do not overlap. */
 static bool find_reaches(const pairs_run *run, uint32_t leaf, leaf_reaches *out) {
     out->n = 0;
     for (uint32_t c = leaf;; c = run->parent[c]) {
@@ -68,13 +68,14 @@ static bool find_reaches(const pairs_run *run, uint32_t leaf, leaf_reaches *out)
     return true;
 }
 
-/* The mean of F_ij and F_ji that rays know a pair by: two estimates by their inverse variances (upper.h)
- * leave an error in S = A^1/2 F A^-1/2 of the variance this / (2 rays). */
+/* The mean factor of a pair, (A_i F_ij + A_j F_ji) / (A_i + A_j). Two ray estimates merged by their inverse
+ * variances (upper.h) have the variance this / (2 rays) in S = A^1/2 F A^-1/2. */
 static double factor_of(const pairs_run *run, uint32_t i, uint32_t j, double g) {
     return 2 * g / (run->m->area[i] + run->m->area[j]);
 }
 
-/* A first look; where it suffices the pair is settled, and g becomes what is seen of it. */
+/* The occlusion test of a pair; where it is accurate enough the pair is settled and g becomes its visible
+ * part. */
 static int look_at(const pairs_run *run, uint32_t i, uint32_t j, double *g) {
     double seen;
     const occlusion_verdict verdict = occlusion_test(&run->occlusion, i, j, *g, &seen);
@@ -86,7 +87,7 @@ static int look_at(const pairs_run *run, uint32_t i, uint32_t j, double *g) {
     return state | PAIR_SETTLED;
 }
 
-/* The pairs of one position: magnitudes and, where something may be between, a first look. */
+/* The pairs of one position: unoccluded exchange areas and, unless the shaft was empty, occlusion tests. */
 static bool find_row(const pairs_run *run, uint32_t position, const leaf_reaches *to, pair_block *block) {
     enum { PIECE = 64 };
     const uint32_t i = run->tree.element[position];
@@ -134,7 +135,8 @@ static pair_state state_of(const pairs_run *run, uint32_t i, uint32_t j) {
     return pair_rows_state(&run->rows, run->tree.position[i], run->tree.position[j]);
 }
 
-/* Whether a pair next to this one, with either element replaced by a neighbour of it, came out otherwise. */
+/* True where a neighbouring pair, with either element replaced by one that shares an edge with it, is mixed
+ * or has the opposite state: a shadow edge may cross this pair. */
 static bool at_a_border(const pairs_run *run, uint32_t i, uint32_t j, pair_state state) {
     for (int side = 0; side < 2; side++) {
         const uint32_t kept = side == 0 ? i : j;
@@ -150,13 +152,13 @@ static bool at_a_border(const pairs_run *run, uint32_t i, uint32_t j, pair_state
     return false;
 }
 
-/* Whether a pair must be looked at closely. */
+/* True where a pair gets occlusion_estimate. */
 static bool is_mixed(const pairs_run *run, uint32_t i, uint32_t j, uint8_t state) {
     if (state == PAIR_CERTAIN || (state & PAIR_SETTLED) != 0) return false;
     return state == PAIR_MIXED || at_a_border(run, i, j, (pair_state)state);
 }
 
-/* Segments that the accuracy asked for would take for the pairs of one block. */
+/* The number of segments that the mixed pairs of one block take at the accuracy asked for. */
 static double segments_of_block(const pairs_run *run, size_t index) {
     const pair_block *block = &run->rows.blocks[index];
     double sum = 0;
@@ -171,8 +173,8 @@ static double segments_of_block(const pairs_run *run, size_t index) {
     return sum;
 }
 
-/* Where all mixed pairs together would take more segments than there may be, or fewer than there shall be at
- * least, each gets its part of them: N segments leave an error of N^-3/4. */
+/* Scales the accuracy so that all mixed pairs together take between segments_least and segments_most
+ * segments: the error of N segments is proportional to N^-3/4. */
 static lam_status share_segments(pairs_run *run, lam_error *error) {
     const size_t n_blocks = run->rows.n_blocks;
     double wanted = 0;
@@ -187,8 +189,8 @@ static lam_status share_segments(pairs_run *run, lam_error *error) {
     return LAM_OK;
 }
 
-/* What is hidden of the pairs of one block. States stay as they were found: neighbours ask for them. Where
- * the exchange areas came from a scratch file nothing is looked at again. */
+/* Estimates the mixed pairs of one block. States stay unchanged, because at_a_border reads them. known: the
+ * exchange areas come from a scratch file and are only counted. */
 static void refine_block(pairs_run *run, size_t index, bool known, pairs_report *sum) {
     pair_block *block = &run->rows.blocks[index];
     size_t r = 0;
@@ -218,7 +220,7 @@ static void refine_block(pairs_run *run, size_t index, bool known, pairs_report 
 
 /* --- passes -------------------------------------------------------------------------------------------- */
 
-/* A walk over all blocks: what it finds, and what it adds to a file. */
+/* One pass over all blocks, either of tests or of estimates, and its scratch file. */
 typedef struct pass {
     pairs_run *run;
     bool refine;
@@ -250,7 +252,7 @@ static void add_report(pairs_report *sum, const pairs_report *more) {
     sum->mixed += more->mixed;
 }
 
-/* One block of a pass, found or fetched. */
+/* Computes one block of a pass, or reads it from the file. */
 static lam_status pass_block(pass *p, size_t index, leaf_reaches *to, pairs_report *more, lam_error *error) {
     pairs_run *run = p->run;
     const bool known = p->file != NULL && row_file_has(p->file, index);
@@ -353,8 +355,7 @@ static void add_neighbour(uint32_t list[NEIGHBOURS_MOST], uint32_t element) {
     }
 }
 
-/* neighbours is [n]: the elements that have two vertices of an edge in common, UINT32_MAX where there are no
- * more. */
+/* neighbours, [n]: the elements that share both vertices of an edge, then UINT32_MAX. */
 static lam_status neighbours_find(const mesh *m, uint32_t (*neighbours)[NEIGHBOURS_MOST], lam_error *error) {
     size_t n_edges = 0;
     edge_use *edges = memory_allocate(m->n, 4 * sizeof *edges, "neighbours", error);
@@ -437,16 +438,15 @@ done:
     return status;
 }
 
-/* Segments for all pairs that are partly hidden (of near ones as many as rays): an element's share is as many
- * as finer plain rays would be, the more the finer the accuracy by the law of their error, and a small scene
- * has enough to keep it. */
+/* The bound on segments for all mixed pairs: 32,768 per element and at least 64 million at the accuracy of
+ * normal quality, 7e-5, scaled by the law of their error, N ~ accuracy^-4/3. */
 static double segments_most(size_t n, double accuracy) {
     const double an_element = 32768, enough = 64e6, normal = 7e-5;
     return fmax(an_element * (double)n, enough) * pow(normal / accuracy, 4. / 3);
 }
 
-/* Few elements need few segments to be as accurate as asked; half a second more makes their factors, which
- * are large, nearly ten times better. */
+/* Few elements need few segments for the accuracy asked for. Half a second more makes their large factors
+ * nearly ten times more accurate. */
 static const double segments_least = 8e6;
 
 lam_status pairs_find(const mesh *m, const visibility *v, const form_factor_options *options,

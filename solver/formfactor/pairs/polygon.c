@@ -66,7 +66,7 @@ void polygon_in_front(const polygon *p, const polygon *other, polygon *out) {
         height[c] = dot(r, other->normal);
         most = fmax(most, height[c]);
     }
-    /* Corners that lie in the plane itself are moved off it by rounding; nothing is seen of so little. */
+    /* Rounding moves corners of the plane itself off it. */
     const double rounding = 1e-12 * (p->radius + other->radius);
     polygon made = *p;
     made.n = 0;
@@ -113,8 +113,7 @@ void polygon_halve(const polygon *p, polygon halves[2]) {
         polygon *out = &halves[h];
         *out = (polygon){.n = p->n};
         memcpy(out->normal, p->normal, sizeof out->normal);
-        /* Both halves go round as the whole does: first half from the cut side's begin, second from its end.
-         */
+        /* Both halves keep the orientation: the first holds the begin of the cut side, the second its end. */
         if (h == 0) {
             memcpy(out->corner[0], p->corner[cut], sizeof middle);
             memcpy(out->corner[1], middle, sizeof middle);

@@ -1,4 +1,4 @@
-/* A planar convex polygon in double: an element, or what of it lies in front of another's plane. */
+/* A planar convex polygon in double: an element, or the part of it in front of another one's plane. */
 #ifndef LAMBERT_FORMFACTOR_PAIRS_POLYGON_H
 #define LAMBERT_FORMFACTOR_PAIRS_POLYGON_H
 
@@ -15,25 +15,23 @@ typedef struct polygon {
     bool affine;                       /* a triangle or a parallelogram */
 } polygon;
 
-/* Takes normal, centre and radius from the corners, which must span an area. */
+/* Sets normal, centre, radius and affine from the corners, which must span an area. */
 void polygon_measure(polygon *p);
 
 void polygon_of_element(const mesh *m, size_t element, polygon *out);
 
-/* What of p lies in front of the plane of other; empty when nothing reaches further than rounding. */
+/* The part of p in front of the plane of other; empty where no corner is in front by more than rounding. */
 void polygon_in_front(const polygon *p, const polygon *other, polygon *out);
 
 double polygon_area(const polygon *p);
 
-/* The halves of a triangle or a quad, cut across its longest side (the middle of the longer pair of sides).
- */
+/* Cuts a triangle in the middle of its longest side, a quad in the middle of its longer pair of sides. */
 void polygon_halve(const polygon *p, polygon halves[2]);
 
-/* Eight points of an affine polygon at (u, w) in the unit square, component by component. */
+/* Eight points of an affine polygon at (u, w) in the unit square, one array for each component. */
 void polygon_affine_points(const polygon *p, const double u[8], const double w[8], double points[3][8]);
 
-/* The point of a triangle or a quad at (u, w) in the unit square; returns how much area a unit of the square
- * has there. */
+/* The point of a triangle or a quad at (u, w) in the unit square; returns the Jacobian of the map there. */
 double polygon_point(const polygon *p, double u, double w, double point[3]);
 
 #endif

@@ -7,9 +7,9 @@ static void add_plane(shaft *s, const double normal[3], double level) {
     s->level[s->n_planes++] = level;
 }
 
-/* In the plane of the axes u and v two rectangles have a hull; of its edges those that lead from one to the
- * other are not of the common box. There is one for a quadrant where one rectangle reaches further along u
- * and the other along v. */
+/* Adds the planes of the hull that are not planes of the common box. Projected to the axes u and v, the hull
+ * of two rectangles has an edge from one to the other in each quadrant where one reaches further along u and
+ * the other further along v. */
 static void add_hull(shaft *s, const cluster *a, const cluster *b, int u, int v, double slack) {
     for (int quadrant = 0; quadrant < 4; quadrant++) {
         const double along_u = quadrant & 1 ? 1 : -1, along_v = quadrant & 2 ? 1 : -1;
@@ -25,7 +25,7 @@ static void add_hull(shaft *s, const cluster *a, const cluster *b, int u, int v,
     }
 }
 
-/* Only what is in front of a plane hides anything from it. */
+/* Only elements in front of a cluster's plane occlude its elements. */
 static void add_front(shaft *s, const cluster *c, double slack) {
     if (!c->plane) return;
     const double back[3] = {-c->normal[0], -c->normal[1], -c->normal[2]};
@@ -94,8 +94,7 @@ static double extent2(const double low[3], const double high[3]) {
 
 size_t shaft_filter(const shaft *s, const mesh *m, const cluster_tree *t, const uint32_t *candidates,
                     size_t n_candidates, bool finest, uint32_t out[SHAFT_CANDIDATES]) {
-    /* A piece is small enough to be kept whole when it is an eighth as long as the shaft: the shafts within
-     * this one take it apart further. */
+    /* Clusters of an eighth of the shaft's diagonal are kept whole: the shafts inside this one split them. */
     enum { DEPTH = 128 };
     const double small = finest ? 0 : extent2(s->low, s->high) / 64;
     size_t n_out = 0;
