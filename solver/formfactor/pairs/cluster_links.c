@@ -115,8 +115,6 @@ static void visit(walk *w, uint32_t a, uint32_t b, const uint32_t *candidates, s
         visit(w, split_one ? one->child[k] : a, split_one ? b : two->child[k], within, n_within);
 }
 
-/* --- tasks --------------------------------------------------------------------------------------------- */
-
 typedef struct task {
     uint32_t a, b;
 } task;

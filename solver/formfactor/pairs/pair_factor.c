@@ -13,8 +13,6 @@ static void subtract(const double *a, const double *b, double *out) {
     for (int d = 0; d < 3; d++) out[d] = a[d] - b[d];
 }
 
-/* --- rules --------------------------------------------------------------------------------------------- */
-
 /* Gauss and Legendre: Newton's iteration for the roots of P_n. */
 static void gauss_init(gauss_rule *g, int n) {
     g->n = n;
@@ -49,8 +47,6 @@ void pair_factor_rules_init(pair_factor_rules *rules) {
         rules->steep_weight[k] = step * pi * cosh(t) * s * rest;
     }
 }
-
-/* --- near: the contour integral ------------------------------------------------------------------------ */
 
 typedef struct edge {
     double from[3], along[3]; /* along: unit */
@@ -193,8 +189,6 @@ static double contour(const pair_factor_rules *rules, const polygon *a, const po
         }
     return fmax(sum / (4 * pi * scale * scale), 0);
 }
-
-/* --- far: cubature of the kernel ----------------------------------------------------------------------- */
 
 enum { POINTS_MOST = (POLYGON_CORNERS - 2) * 16 };
 

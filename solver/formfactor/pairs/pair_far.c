@@ -4,8 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* --- table --------------------------------------------------------------------------------------------- */
-
 enum { COLUMNS = 3 + 3 + 1 + 4 * 3 + (3 + 1) * (4 + 9) };
 
 static void share_out(pair_far_table *t) {
@@ -84,8 +82,6 @@ void pair_far_table_free(pair_far_table *t) {
     free(t->block);
     *t = (pair_far_table){0};
 }
-
-/* --- kernels ------------------------------------------------------------------------------------------- */
 
 #if defined(__x86_64__)
 typedef double lane_avx512 __attribute__((vector_size(64)));

@@ -63,8 +63,6 @@ pair_state pair_rows_state(const pair_rows *rows, uint32_t p, uint32_t q) {
     return low < end && b->other[low] == wanted ? (pair_state)(b->state[low] & ~PAIR_SETTLED) : PAIR_UNKNOWN;
 }
 
-/* --- on a disk ----------------------------------------------------------------------------------------- */
-
 lam_status pair_rows_open(scratch *s, const char *name, const char geometry[33], const recipe *r, size_t n,
                           const uint32_t *order, row_file **out, lam_error *error) {
     row_file_contents contents = {
@@ -154,9 +152,6 @@ lam_status pair_rows_fetch_exchange(pair_rows *rows, size_t block, const uint32_
     block_free(&fresh);
     return status;
 }
-
-/* --- as sparse rows --------------------------------------------------------------------------------------
- */
 
 /* Sorts the entries of a row by index, through a dense row and a bitset: O(entries + n/64). */
 static void sort_row(csr *rows, size_t i, float *dense, marks *there) {

@@ -27,8 +27,6 @@ typedef struct pairs_run {
     pair_rows rows;
 } pairs_run;
 
-/* --- rows ---------------------------------------------------------------------------------------------- */
-
 /* The positions first ... last-1 of a cluster that a leaf, or an ancestor of it, is linked with. */
 typedef struct reach {
     uint32_t first, last;
@@ -129,8 +127,6 @@ static bool find_block(pairs_run *run, size_t index, leaf_reaches *to) {
     return enough;
 }
 
-/* --- refinement ---------------------------------------------------------------------------------------- */
-
 static pair_state state_of(const pairs_run *run, uint32_t i, uint32_t j) {
     return pair_rows_state(&run->rows, run->tree.position[i], run->tree.position[j]);
 }
@@ -217,8 +213,6 @@ static void refine_block(pairs_run *run, size_t index, bool known, pairs_report 
         }
     }
 }
-
-/* --- passes -------------------------------------------------------------------------------------------- */
 
 /* One pass over all blocks, either of tests or of estimates, and its scratch file. */
 typedef struct pass {

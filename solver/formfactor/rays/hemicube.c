@@ -6,9 +6,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* --- delta form factors ----------------------------------------------------------------------------------
- */
-
 /* The density on top, 1 / (pi (x^2 + y^2 + 1)^2), integrated over [0, x] x [0, y]. */
 static double top_integral(double x, double y) {
     const double u = sqrt(1 + x * x), w = sqrt(1 + y * y);
@@ -21,8 +18,8 @@ static double side_integral(double y, double z) {
     return -atan(y / u) / (2 * M_PI * u);
 }
 
-/* table[row][column] = the integral over that pixel, exact: the centre's density times dA, as in the source,
- * would not sum to 1. */
+/* table[row][column] = the exact integral over that pixel. The density at its centre times dA, as in Cohen
+ * and Greenberg 1985, would not sum to 1. */
 static void fill_table(double *table, size_t half, double (*integral)(double, double)) {
     const double width = 1 / (double)half;
     for (size_t row = 0; row < half; row++) {
@@ -64,7 +61,7 @@ size_t hemicube_rows(const hemicube *h, int face) {
     return face == HEMICUBE_TOP ? h->resolution : h->resolution / 2;
 }
 
-/* Pixels of a whole face counted from its middle line. */
+/* The distance of a pixel from the middle line of a face. */
 static size_t from_middle(size_t pixel, size_t half) {
     return pixel < half ? half - 1 - pixel : pixel - half;
 }
@@ -75,10 +72,7 @@ double hemicube_weight(const hemicube *h, int face, size_t row, size_t column) {
                                 : h->side[row * half + across];
 }
 
-/* --- rows ------------------------------------------------------------------------------------------------
- */
-
-/* What the hemicubes of every element share. */
+/* The context that the hemicubes of all elements share. */
 typedef struct cube_context {
     const hemicube *h;
     const mesh *m;
@@ -86,12 +80,12 @@ typedef struct cube_context {
     const sky_bounce *sky;
 } cube_context;
 
-/* Where a face is in the scene: pixels lie at forward + x across + y up from the centroid. */
+/* A face in the scene: pixels lie at forward + x across + y up from the centroid. */
 typedef struct cube_face {
     float forward[3], across[3], up[3];
 } cube_face;
 
-/* The sides look along the tangent, the bitangent, and against them. */
+/* Sides 1 to 4 face along the tangent, the bitangent, and against them. */
 static cube_face place_face(const element_frame *frame, int face) {
     cube_face f;
     const bool along_tangent = face % 2 == 1;
@@ -119,7 +113,7 @@ static void aim(const cube_face *f, float y, size_t column, size_t resolution, r
     }
 }
 
-/* F[i][j] ~ the sum of the weights of the pixels whose centres show j. */
+/* F_ij = the sum of the weights of the pixels whose centres show j. */
 static void trace_element(const void *context, size_t element, row_pool *pool, double *leaving,
                           double *absorbed) {
     const cube_context *c = context;

@@ -1,5 +1,5 @@
-/* Hemicubes: what an element's centroid sees through the pixels of half a cube, each pixel weighted with its
- * delta form factor (Cohen and Greenberg 1985). Deterministic: there is no sampling noise, but aliasing. */
+/* Hemicubes (Cohen and Greenberg 1985): F_ij = the sum of the delta form factors of the pixels of half a cube
+ * around element i's centroid that show j. Deterministic: aliasing in place of sampling noise. */
 #ifndef LAMBERT_FORMFACTOR_RAYS_HEMICUBE_H
 #define LAMBERT_FORMFACTOR_RAYS_HEMICUBE_H
 
@@ -24,13 +24,13 @@ void hemicube_free(hemicube *h);
 /* Rows of a face: as many as columns on top, half of that on a side. */
 size_t hemicube_rows(const hemicube *h, int face);
 
-/* The share of all that a plane element receives from everywhere which comes through one pixel: > 0, together
- * 1. Columns run across a face, rows up a side from the horizon. */
+/* The delta form factor of one pixel; all together sum to 1. Columns run across a face, rows up a side from
+ * the horizon. */
 double hemicube_weight(const hemicube *h, int face, size_t row, size_t column);
 
-/* rows gets, for every element, the weight of the pixels through which its centroid sees each other one;
- * leaving and absorbed, [n], the weight of those that show nothing or a back face. The caller frees rows with
- * packed_rows_free. Cost: 3 resolution^2 rays an element. */
+/* The rows of all elements, F_ij one-sided; leaving and absorbed, [n], are the weights of the pixels that
+ * show nothing or a back face. The caller frees rows with packed_rows_free. Cost: 3 resolution^2 rays per
+ * element. Errors: those of row_pool_make. */
 lam_status hemicube_trace(const hemicube *h, const mesh *m, const visibility *v, const uint32_t *order,
                           const form_factor_options *options, packed_rows *rows, double *leaving,
                           double *absorbed, lam_error *error);

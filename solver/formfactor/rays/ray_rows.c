@@ -9,17 +9,18 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* What rows receive is added up in whole numbers of this size: in any sequence it is the same. */
+/* Contributions to other rows are summed as integer multiples of this, so that their order does not matter.
+ */
 static const double unit = 0x1p-44;
 
 struct ray_rows {
     const mesh *m;
     visibility *v;
-    form_factors f;     /* what is known already */
-    csr near;           /* rows of F, of near pairs alone, 0 where they are hidden; n is 0: none */
-    double *near_sums;  /* [n] */
-    double *own;        /* [n], of F1, far pairs alone */
-    uint64_t *received; /* [n], likewise of A^-1 F1^T A, in units */
+    form_factors f;     /* everything but the rows */
+    csr near;           /* rows of F with the near pairs only, 0 where they are hidden; n is 0: none */
+    double *near_sums;  /* [n], row sums of near */
+    double *own;        /* [n], row sums of F1 without near pairs */
+    uint64_t *received; /* [n], row sums of A^-1 (A F1)^T without near pairs, in units */
     uint64_t other_seed;
 };
 
@@ -72,9 +73,7 @@ done:
     return status;
 }
 
-/* --- rows ---------------------------------------------------------------------------------------------- */
-
-/* The near partners of an element, ascending, and of all elements those that may be among them. */
+/* The near partners of an element, ascending, and a filter of 1,024 bits over their indices. */
 typedef struct near_row {
     const uint32_t *indices;
     const float *data;
@@ -107,8 +106,7 @@ static bool is_near(const near_row *row, uint32_t element) {
     return first < row->count && row->indices[first] == element;
 }
 
-/* A block that is being filled: its entries stand one row after the other. Of more rays than there are
- * elements hits are added up first. */
+/* A block that is being filled, row by row. Hits are summed first where there are more rays than elements. */
 typedef struct filling {
     uint32_t *indices;
     float *data;
@@ -128,7 +126,7 @@ static inline void put_hit(filling *to, uint32_t index, double value) {
         put(to, index, value);
 }
 
-/* What hits have added up to becomes entries. */
+/* Turns summed hits into entries. */
 static void put_sums(filling *to, size_t n) {
     for (size_t j = 0; to->sums != NULL && j < n; j++) {
         if (to->sums[j] > 0) put(to, (uint32_t)j, to->sums[j]);
@@ -163,17 +161,17 @@ static lam_status begin_block(const ray_rows *r, const uint32_t *elements, size_
                        sizeof *to->indices + sizeof *to->data);
 }
 
-/* Rays that are cast at once. */
+/* Rays of a batch. */
 enum { AT_ONCE = 512 };
 
-/* An element looking around, some rays at a time. */
+/* The rays of an element, batch by batch. */
 typedef struct ray_batch {
     ray_context rays;
     near_row near;
     element_sampler sampler;
     size_t element, first, n_rays;
     ray_tally tally;
-    uint32_t met[AT_ONCE]; /* far elements that the last of them met */
+    uint32_t met[AT_ONCE]; /* elements that the last batch hit, without near ones */
 } ray_batch;
 
 static void ray_batch_begin(const ray_rows *r, size_t element, uint64_t seed, const sky_bounce *sky,
@@ -187,8 +185,7 @@ static void ray_batch_begin(const ray_rows *r, size_t element, uint64_t seed, co
     element_sampler_init(&g->sampler, r->m, r->v, element, seed);
 }
 
-/* The next rays: how many elements they met that are not near, each once for each ray; false: there are none.
- */
+/* Casts the next batch; count is the number of entries of met. False after the last one. */
 static bool ray_batch_next(ray_batch *g, double *sky, size_t *count) {
     if (g->first >= g->n_rays) return false;
     const size_t last = g->first + AT_ONCE < g->n_rays ? g->first + AT_ONCE : g->n_rays;
@@ -200,14 +197,14 @@ static bool ray_batch_next(ray_batch *g, double *sky, size_t *count) {
     return true;
 }
 
-/* What hits added up to, then this share of near pairs. */
+/* Ends a row: summed hits, then the near pairs times share. */
 static void ray_batch_end(const ray_rows *r, const ray_batch *g, double share, filling *to) {
     put_sums(to, r->m->n);
     for (size_t k = 0; k < g->near.count; k++)
         if (g->near.data[k] > 0) put(to, g->near.indices[k], share * (double)g->near.data[k]);
 }
 
-/* Row k of a block is what was put down since `first`. */
+/* Row k of a block has the entries from first on. */
 static void end_row(row_block *block, size_t k, const filling *to, size_t first) {
     const uint32_t **indices = block->owned[0];
     const float **data = block->owned[1];
@@ -257,7 +254,7 @@ static lam_status find_rows(void *context, const uint32_t *elements, size_t m, r
     return status;
 }
 
-/* Scaled to the sum that rows of it have. */
+/* The row of the other seed, scaled to row_sums. */
 static void find_other_row(const ray_rows *r, size_t i, filling *to) {
     const size_t begin = to->used;
     const double each = 1 / (double)r->f.recipe.rays;
@@ -286,8 +283,6 @@ static lam_status find_other_rows(void *context, const uint32_t *elements, size_
     free(to.sums);
     return status;
 }
-
-/* --- closing ------------------------------------------------------------------------------------------- */
 
 static lam_status close_rows(void *context, const double **row_sums, lam_error *error) {
     lam_status status = LAM_OK;

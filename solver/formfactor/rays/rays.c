@@ -36,13 +36,13 @@ size_t rays_meet(const ray_context *c, const element_sampler *sampler, size_t el
 /* Rays whose hits are counted at once. */
 enum { AT_ONCE = 512 };
 
-/* The rays of every element, and how many they are. */
+/* The context of a row_maker that counts rays. */
 typedef struct count_context {
     ray_context rays;
     size_t n_rays;
 } count_context;
 
-/* Traces one element: every ray counts 1. */
+/* Traces one element; every ray has the weight 1. */
 static void trace_element(const void *context, size_t element, row_pool *pool, double *leaving,
                           double *absorbed) {
     const count_context *c = context;

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <sys/mman.h>
 
-/* row_get_number within end; NULL where the number does not end. */
+/* row_get_number that reads no byte from end on; NULL for a number that does not end before. */
 static const uint8_t *get_number_within(const uint8_t *from, const uint8_t *end, uint64_t *x) {
     const uint8_t *last = from;
     while (last < end && (*last & 0x80)) last++;

@@ -1,5 +1,5 @@
-/* One row of form factors as it was found, packed: for every entry the gap to the one before and its count,
- * most often one byte for both, or its weight in single precision. */
+/* One-sided rows of form factors, packed: for every entry the gap to the column before, and either its count
+ * of rays (most often one byte for both) or its weight in single precision. */
 #ifndef LAMBERT_FORMFACTOR_ROWS_ROW_CODE_H
 #define LAMBERT_FORMFACTOR_ROWS_ROW_CODE_H
 
@@ -8,7 +8,7 @@
 #include <stdint.h>
 #include <string.h>
 
-/* ROW_PAIRS: of pairs taken one by one (pair_rows.h), not packed. */
+/* ROW_PAIRS: rows of pair_rows.h, not packed. */
 typedef enum row_kind { ROW_COUNTS, ROW_WEIGHTS, ROW_PAIRS } row_kind;
 
 /* Bytes of a pair: position, exchange area, state. */
@@ -33,7 +33,7 @@ static inline const uint8_t *row_get_number(const uint8_t *from, uint64_t *x) {
     return from;
 }
 
-/* Appends one entry: gap columns are left out before it. A count is a whole number from 1 to 2^24. */
+/* Appends one entry, gap columns behind the one before. A count is a whole number from 1 to 2^24. */
 static inline uint8_t *row_put(row_kind kind, uint8_t *to, uint32_t gap, float value) {
     if (kind == ROW_WEIGHTS) {
         to = row_put_number(to, gap);
@@ -69,20 +69,20 @@ typedef struct packed_row {
     uint32_t n_bytes, n_entries;
 } packed_row;
 
-/* Whether a row that comes from a file can be read: whole entries, as many as stated, columns below n, values
- * that are finite and above 0. */
+/* True where a row from a file is valid: whole entries, as many as stated, columns below n, finite values
+ * above 0. */
 bool row_check(row_kind kind, const packed_row *row, size_t n);
 
-/* One-sided rows of form factors as they were found, packed, wherever their bytes lie. */
+/* The packed rows of all elements, in memory or in a mapped file. */
 typedef struct packed_rows {
     size_t n;
     row_kind kind;
     packed_row *rows; /* [n], mesh order */
     size_t n_chunks;
-    void **chunks; /* [n_chunks], where the bytes are in memory */
+    void **chunks; /* [n_chunks], the bytes in memory */
     const void *map;
-    size_t map_bytes; /* where they are in a file */
-    size_t kept;      /* rows that were there from an earlier run */
+    size_t map_bytes; /* the bytes in a file */
+    size_t kept;      /* rows that came from an interrupted run */
 } packed_rows;
 
 void packed_rows_free(packed_rows *rows);

@@ -11,20 +11,20 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* The file: a header, then blocks in the order in which they were finished, each a block_head, a row_head for
- * every row, the packed rows, and with a sky what each row leaves to the ground (f64) and to its tiles (f32).
- * All little-endian, as they lie in memory. */
+/* The file: a header, then blocks in the order in which they were finished. Each block is a block_head, a
+ * row_head for every row, the packed rows, and with a sky the shares of each row's rays on the ground (f64)
+ * and on the tiles (f32). All numbers are little-endian, as in memory. */
 #define MAGIC "lambert rows\n"
 enum { FORMAT_VERSION = 1 };
 
-/* What is on the disk may be that much older than what was finished when the power fails. */
+/* A power failure loses at most the blocks of this time. */
 static const double flush_seconds = 5;
 
-/* Fields are whole machine words or texts: there is no padding to be hashed. */
+/* Every field is a machine word or a text of whole words, so that no padding is hashed. */
 typedef struct file_head {
     char magic[16];
     uint64_t version;
-    char tool[32];     /* another version may look around in another way */
+    char tool[32];     /* the version: another one may sample differently */
     char geometry[40]; /* 32 digits */
     uint64_t n, block_rows, kind;
     uint64_t method, rays, resolution, seed;
@@ -52,7 +52,7 @@ struct row_file {
     const uint32_t *order;
     row_file_contents contents;
     size_t n_blocks, n_there, kept;
-    uint64_t *offset; /* [n_blocks], of what follows a block's head; 0: not there */
+    uint64_t *offset; /* [n_blocks], of the bytes behind a block's head; 0: missing */
     uint64_t end;     /* of the last whole block */
     double flushed;   /* clock_seconds */
 };
@@ -66,7 +66,7 @@ static size_t block_length(const row_file *f, size_t block) {
     return rest < f->contents.block_rows ? rest : f->contents.block_rows;
 }
 
-/* Bytes of what one row leaves to the sky and the ground. */
+/* Bytes of one row's shares on the ground and the tiles. */
 static size_t sky_bytes(const row_file *f) {
     const sky_bounce *sky = f->contents.sky;
     return sky == NULL ? 0 : sizeof(double) + sky->tiling.n_tiles * sizeof(float);
@@ -114,9 +114,6 @@ static lam_status file_failed(const row_file *f, lam_error *error) {
                        f->path, strerror(errno), f->n_there, f->n_blocks);
 }
 
-/* --- opening -----------------------------------------------------------------------------------------------
- */
-
 static void head_fill(const row_file_contents *c, file_head *head) {
     memset(head, 0, sizeof *head);
     memcpy(head->magic, MAGIC, sizeof MAGIC);
@@ -136,7 +133,7 @@ static void head_fill(const row_file_contents *c, file_head *head) {
     head->checksum = store_checksum(head, offsetof(file_head, checksum));
 }
 
-/* Compares the header with ours; a file that ends within it was cut short before anything was in it. */
+/* Compares the header with ours. A file that ends inside the header holds no rows yet and gets ours. */
 static lam_status check_head(row_file *f, uint64_t size, lam_error *error) {
     lam_status status = LAM_OK;
     file_head ours, theirs;
@@ -145,7 +142,7 @@ static lam_status check_head(row_file *f, uint64_t size, lam_error *error) {
     const size_t there = size < sizeof theirs ? (size_t)size : sizeof theirs;
     if (!read_all(f->fd, &theirs, there, 0)) TRY(file_failed(f, error));
     if (memcmp(theirs.magic, ours.magic, there < sizeof ours.magic ? there : sizeof ours.magic) != 0)
-        FAIL(error, LAM_ERR_ARGUMENT, "%s: is no scratch file of lambert; use another folder", f->path);
+        FAIL(error, LAM_ERR_ARGUMENT, "%s: is not a scratch file of lambert; use another folder", f->path);
     if (there == sizeof theirs && memcmp(&theirs, &ours, sizeof ours) != 0) {
         const bool whole = theirs.checksum == store_checksum(&theirs, offsetof(file_head, checksum));
         FAIL(error, LAM_ERR_ARGUMENT,
@@ -155,7 +152,7 @@ static lam_status check_head(row_file *f, uint64_t size, lam_error *error) {
                  ? "holds the rows of another scene"
              : theirs.version != ours.version || memcmp(theirs.tool, ours.tool, sizeof ours.tool)
                  ? "was made by another version of lambert"
-                 : "holds rows that were found with other options");
+                 : "holds the rows of a run with other options");
     }
     if (there < sizeof theirs && !write_all(f->fd, &ours, sizeof ours, 0)) TRY(file_failed(f, error));
     f->end = sizeof ours;
@@ -163,7 +160,7 @@ done:
     return status;
 }
 
-/* Whether the rows of a block that was read can be used. */
+/* True where the rows of a block that was read are valid. */
 static bool check_block(const row_file *f, size_t block, const void *data, size_t bytes) {
     const size_t n_rows = block_length(f, block);
     const row_head *heads = data;
@@ -179,7 +176,7 @@ static bool check_block(const row_file *f, size_t block, const void *data, size_
     return at + n_rows * sky_bytes(f) == bytes;
 }
 
-/* Finds the whole blocks and cuts off what is behind them. */
+/* Finds the whole blocks and truncates the file behind them. */
 static lam_status find_blocks(row_file *f, uint64_t size, lam_error *error) {
     lam_status status = LAM_OK;
     char *data = NULL;
@@ -223,7 +220,7 @@ lam_status row_file_open(scratch *s, const char *name, const row_file_contents *
     if (f->offset == NULL) TRY(LAM_ERR_MEMORY);
     TRY(scratch_file(s, name, &f->fd, &f->path, error));
     if (fstat(f->fd, &about) != 0) TRY(file_failed(f, error));
-    if (!S_ISREG(about.st_mode)) FAIL(error, LAM_ERR_IO, "%s: is no file", f->path);
+    if (!S_ISREG(about.st_mode)) FAIL(error, LAM_ERR_IO, "%s: is not a regular file", f->path);
     TRY(check_head(f, (uint64_t)about.st_size, error));
     TRY(find_blocks(f, (uint64_t)about.st_size, error));
     f->flushed = clock_seconds();
@@ -249,9 +246,6 @@ bool row_file_has(const row_file *f, size_t block) {
 size_t row_file_kept(const row_file *f) {
     return f->kept;
 }
-
-/* --- writing and reading -----------------------------------------------------------------------------------
- */
 
 lam_status row_file_read(const row_file *f, size_t block, packed_row *rows, void **data, lam_error *error) {
     lam_status status = LAM_OK;
@@ -300,7 +294,7 @@ lam_status row_file_append(row_file *f, size_t block, const packed_row *rows, co
     head->own = store_checksum(head, offsetof(block_head, own));
     if (!write_all(f->fd, data, at, f->end)) {
         status = file_failed(f, error);
-        if (ftruncate(f->fd, (off_t)f->end) != 0) goto done; /* the next run will cut it off */
+        if (ftruncate(f->fd, (off_t)f->end) != 0) goto done; /* then the next run truncates it */
         goto done;
     }
     f->offset[block] = f->end + sizeof *head;

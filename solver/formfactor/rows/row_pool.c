@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Between two looks at the cancel flag and the progress line: at most so many elements, and about so many
- * rays. A block on the disk takes about a tenth of a second. */
+/* A chunk, after which a thread reports progress and checks for cancellation, has at most CHUNK_MOST elements
+ * and about CHUNK_RAYS rays. A block on the disk takes about a tenth of a second. */
 enum { CHUNK_MOST = 16, CHUNK_RAYS = 1 << 18, BLOCK_RAYS = 1 << 20 };
 
 static bool pool_reserve(row_pool *p, size_t more) {
@@ -70,11 +70,11 @@ typedef struct rows_run {
     const row_maker *maker;
     const uint32_t *order;
     packed_rows *rows;
-    size_t n_wanted; /* elements of the order whose rows are made */
+    size_t n_wanted; /* elements of the order whose rows are computed */
     double *leaving, *absorbed;
     row_file *file;         /* NULL: all in memory */
     size_t chunk, of_block; /* elements in a chunk, chunks in a block */
-    size_t *left;           /* [blocks], chunks that are still missing */
+    size_t *left;           /* [blocks], chunks that are not finished */
     size_t finished;        /* elements */
     bool stop;
     lam_status status;
@@ -91,7 +91,7 @@ static void run_fail(rows_run *run, lam_status status, const lam_error *error) {
     run->stop = true;
 }
 
-/* Finds the rows of a chunk; their bytes become a chunk of run->rows. */
+/* Computes the rows of a chunk; their bytes become a chunk of run->rows. */
 static void make_chunk(rows_run *run, size_t c, row_pool *pool) {
     const row_maker *maker = run->maker;
     const size_t n = run->rows->n, first = c * run->chunk,
@@ -123,7 +123,7 @@ static void make_chunk(rows_run *run, size_t c, row_pool *pool) {
     }
 }
 
-/* After a chunk: when it was the last of its block, the block goes to the file and out of memory. */
+/* Writes a block to the file and frees its memory when its last chunk is finished. */
 static void finish_chunk(rows_run *run, size_t c) {
     lam_error error = {0};
     lam_status status = LAM_OK;

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Entries of the rows that are worked on at once, at most: some tens of megabytes. */
+/* The most entries of a panel, the rows that are merged or expanded at once: some tens of megabytes. */
 enum { PANEL_LEAST = 1 << 16, PANEL_MOST = 1 << 21, PANELS = 64 };
 
 static size_t panel_entries(size_t all) {
@@ -16,11 +16,11 @@ typedef struct transpose_entry {
     float value;
 } transpose_entry;
 
-/* Entries of some consecutive rows, as they come. */
+/* The entries of some consecutive rows, row by row. */
 typedef struct transpose_slice {
     transpose_entry *entries;
     size_t count, capacity;
-    bool failed; /* out of memory: what was pushed since is lost */
+    bool failed; /* out of memory: entries are missing */
 } transpose_slice;
 
 static void transpose_push_grown(transpose_slice *slice, transpose_entry entry) {
@@ -46,8 +46,8 @@ static inline void transpose_push(transpose_slice *slice, uint32_t column, uint3
 
 enum { TRANSPOSE_SLICES = 32 };
 
-/* Columns first ... last-1: column j has the entries start[j-first] ... start[j-first+1]-1, rows ascending.
- */
+/* Columns first ... last-1 of a sparse matrix: column j has the entries start[j-first] ...
+ * start[j-first+1]-1, rows ascending. */
 typedef struct transpose {
     size_t first, last;
     size_t *start;
@@ -58,8 +58,8 @@ typedef struct transpose {
     size_t *next; /* [TRANSPOSE_SLICES][last - first] */
 } transpose;
 
-/* Pushes the entries of one row that lie in columns first ... last-1. Rows come from many threads, each row
- * once. */
+/* Pushes the entries of one row that lie in columns first ... last-1. Called from many threads, once for each
+ * row. */
 typedef void transpose_source(void *context, size_t row, size_t first, size_t last, transpose_slice *to);
 
 static void transpose_free(transpose *c) {
@@ -96,8 +96,8 @@ static lam_status reserve_entries(transpose *c, size_t count, lam_error *error) 
     return LAM_OK;
 }
 
-/* Collects columns first ... last-1 of rows row_first ... row_last-1; what c held before is replaced, its
- * memory used again. The same for any number of threads. Memory: 20 bytes an entry. LAM_ERR_MEMORY. */
+/* Transposes columns first ... last-1 of rows row_first ... row_last-1 into c, whose memory is used again.
+ * The same for any number of threads. Memory: 20 bytes per entry. Errors: LAM_ERR_MEMORY. */
 static lam_status transpose_collect(transpose *c, size_t row_first, size_t row_last, size_t first,
                                     size_t last, transpose_source *source, void *context, lam_error *error) {
     lam_status status = LAM_OK;
@@ -106,7 +106,7 @@ static lam_status transpose_collect(transpose *c, size_t row_first, size_t row_l
     c->first = first;
     c->last = last;
     memset(c->next, 0, width * TRANSPOSE_SLICES * sizeof *c->next);
-    /* next[slice][column]: how many; later where the next one goes. */
+    /* next[slice][column]: first the number of entries, then the place of the next one. */
 #pragma omp parallel for schedule(dynamic, 1)
     for (size_t s = 0; s < TRANSPOSE_SLICES; s++) {
         transpose_slice *slice = &c->slices[s];
@@ -147,13 +147,11 @@ done:
     return status;
 }
 
-/* --- merging -----------------------------------------------------------------------------------------------
+/* The place up to which a row has been read: below the diagonal a panel of columns at a time, then above it.
  */
-
-/* How far a row has been read: below the diagonal a panel of columns at a time, then above it. */
 typedef struct row_cursor {
     const uint8_t *at;
-    uint32_t next, left; /* the smallest column that may come; entries */
+    uint32_t next, left; /* the smallest possible next column; entries not yet read */
 } row_cursor;
 
 typedef struct merge_run {
@@ -178,7 +176,7 @@ static void take_below(void *context, size_t row, size_t first, size_t last, tra
     const row_kind kind = run->rows->kind;
     const size_t end = last < row ? last : row;
     row_cursor c = run->cursors[row];
-    (void)first; /* all before is read */
+    (void)first; /* columns before it have been read */
     for (;;) {
         row_cursor ahead = c;
         float value = 0;
@@ -190,7 +188,7 @@ static void take_below(void *context, size_t row, size_t first, size_t last, tra
     run->cursors[row] = c;
 }
 
-/* Row i above the diagonal: its own c_ij and the c_ji of the others; returns how many entries there are. */
+/* Row i above the diagonal: c_ij + c_ji; returns the number of entries. */
 static size_t merge_row(const merge_run *run, const transpose *below, size_t i, uint32_t *indices,
                         float *sums) {
     const row_kind kind = run->rows->kind;
@@ -199,7 +197,7 @@ static size_t merge_row(const merge_run *run, const transpose *below, size_t i, 
     const size_t q_end = below->start[i - below->first + 1];
     float value = 0;
     uint32_t own = cursor_read(&c, kind, &value);
-    if (own == i) own = cursor_read(&c, kind, &value); /* a plane does not see itself */
+    if (own == i) own = cursor_read(&c, kind, &value); /* F_ii = 0: elements are planar */
     while (own != UINT32_MAX || q < q_end) {
         const uint32_t other = q < q_end ? below->rows[q] : UINT32_MAX, j = own < other ? own : other;
         float sum = 0;
@@ -214,7 +212,7 @@ static size_t merge_row(const merge_run *run, const transpose *below, size_t i, 
     return length;
 }
 
-/* Rows that are merged before they are put in place. */
+/* Room for the rows of a panel before they are copied to their place. */
 typedef struct merge_room {
     size_t *start, *length; /* [width] */
     uint32_t *indices;
@@ -280,7 +278,7 @@ static lam_status merge_panel(merge_run *run, transpose *below, merge_room *room
 #pragma omp parallel for schedule(static)
     for (size_t i = first; i < last; i++) {
         const size_t from = room->start[i - first], length = room->length[i - first];
-        if (length == 0) continue; /* nothing may have been allocated */
+        if (length == 0) continue; /* the arrays may be NULL */
         memcpy(g->indices + g->indptr[i], room->indices + from, length * sizeof *g->indices);
         memcpy(g->data + g->indptr[i], room->data + from, length * sizeof *g->data);
     }
@@ -304,7 +302,7 @@ lam_status upper_merge(const packed_rows *rows, size_t rays, const double *area,
         run.cursors[i] = (row_cursor){rows->rows[i].bytes, 0, rows->rows[i].n_entries};
         n_found += rows->rows[i].n_entries;
     }
-    TRY(csr_reserve(&g, n_found, error)); /* as many as are found at most */
+    TRY(csr_reserve(&g, n_found, error)); /* an upper bound */
     const size_t panel = panel_entries(n_found);
     for (size_t first = 0, last; first < n; first = last) {
         size_t n_entries = 0;
@@ -322,12 +320,9 @@ done:
     return status;
 }
 
-/* --- expanding ---------------------------------------------------------------------------------------------
- */
-
 typedef struct expand_run {
     const csr *g;
-    uint64_t *ends; /* [n], where the entries of a row end that no panel has taken yet */
+    uint64_t *ends; /* [n], the end of a row's entries that no panel has taken yet */
 } expand_run;
 
 /* The entries of a row in the columns of a panel; panels come from the last to the first. */
@@ -336,13 +331,13 @@ static void take_last(void *context, size_t row, size_t first, size_t last, tran
     const csr *g = run->g;
     const uint64_t end = run->ends[row];
     uint64_t begin = end;
-    (void)last; /* all from there on are taken */
+    (void)last; /* columns from there on have been taken */
     while (begin > g->indptr[row] && g->indices[begin - 1] >= first) begin--;
     for (uint64_t p = begin; p < end; p++) transpose_push(to, g->indices[p], (uint32_t)row, g->data[p]);
     run->ends[row] = begin;
 }
 
-/* How many entries columns have. */
+/* Adds the number of entries of each column to counts. */
 static lam_status count_columns(const csr *g, uint64_t *counts, lam_error *error) {
     const size_t n = g->n;
     uint32_t *of_slices = memory_allocate(n, TRANSPOSE_SLICES * sizeof *of_slices, "form factors", error);
@@ -378,8 +373,8 @@ lam_status upper_expand(csr *upper, const double *area, double *row_sums, lam_er
     uint32_t *const indices = upper->indices;
     float *const data = upper->data;
 
-    /* Row i of F begins at or behind where row i of the triangle did: from the last row to the first, what is
-     * overwritten has been taken before. */
+    /* Row i of F begins at or behind the begin of row i of the triangle: from the last row to the first,
+     * entries are read before they are overwritten. */
     const size_t panel = panel_entries(2 * nnz);
     for (size_t last = n, first; last > 0; last = first) {
         first = last - 1;
@@ -418,10 +413,8 @@ done:
     return status;
 }
 
-/* --- gathering ---------------------------------------------------------------------------------------------
- */
-
-/* The g that gives both factors: as close to A_i F_ij as two roundings leave it, so within two steps. */
+/* The g whose two quotients by upper_factor are exactly F_ij and F_ji. Two roundings leave it within two
+ * floats of A_i F_ij. */
 static float exchange_of(float forward, float backward, double area_i, double area_j) {
     const float middle = (float)((double)forward * area_i);
     float up = middle, down = middle;
@@ -437,7 +430,8 @@ static float exchange_of(float forward, float backward, double area_i, double ar
 lam_status upper_gather(csr *F, const double *area, lam_error *error) {
     const size_t n = F->n;
     uint64_t used = 0, p = 0;
-    /* Row j has its entries below the diagonal in the order in which the rows above come to them. */
+    /* mirror[j]: the next entry of row j below the diagonal; the rows above reach these entries in their
+     * order. */
     uint64_t *mirror = memory_allocate(n, sizeof *mirror, "form factors", error);
     if (mirror == NULL) return LAM_ERR_MEMORY;
     memcpy(mirror, F->indptr, n * sizeof *mirror);
@@ -447,7 +441,7 @@ lam_status upper_gather(csr *F, const double *area, lam_error *error) {
             const uint32_t j = F->indices[p];
             if (j <= i) continue;
             const uint64_t q = mirror[j]++;
-            const float backward = F->indices[q] == i ? F->data[q] : -1; /* -1: none that could be met */
+            const float backward = F->indices[q] == i ? F->data[q] : -1; /* -1: F_ji is missing */
             F->data[used] = exchange_of(F->data[p], backward, area[i], area[j]);
             F->indices[used++] = j;
         }

@@ -87,12 +87,11 @@ static inline float pick(uint32_t mask, float a, float b) {
     return one.value;
 }
 
-/* Shirley and Chiu's concentric map of the square to the disc: it keeps neighbours together, so a sequence
- * that is even in the square stays even in the disc. x, y in [-1, 1]; the sine and cosine of |angle| <= pi/4
- * are Taylor polynomials good to 4e-8. */
+/* The concentric map of the square to the disc (Shirley and Chiu 1997), which is continuous and preserves
+ * area and so low discrepancy. x, y in [-1, 1]; the sine and cosine of |angle| <= pi/4 are Taylor polynomials
+ * to 4e-8. */
 static inline void square_to_disc(float x, float y, float *dx, float *dy) {
-    /* Bits of the larger and the smaller coordinate are chosen by a mask: without branches eight are mapped
-     * at once. */
+    /* Masks in place of branches let the compiler map eight points at once. */
     const uint32_t wide = -(uint32_t)(fabsf(x) > fabsf(y));
     const float r = pick(wide, x, y), other = pick(wide, y, x);
     const float ratio = other / (r + (float)(r == 0)); /* never by 0 */
@@ -107,7 +106,7 @@ static inline void square_to_disc(float x, float y, float *dx, float *dy) {
 void element_sampler_point(const element_sampler *s, float u, float w, float point[3]) {
     int piece = 0;
     if (!s->parallelogram) {
-        /* The first coordinate chooses the triangle and is stretched again; then the square is folded. */
+        /* u chooses the triangle and is rescaled to [0, 1); then the square is folded along its diagonal. */
         if (u < s->first_share) {
             u = u / s->first_share;
         } else {
@@ -123,7 +122,7 @@ void element_sampler_point(const element_sampler *s, float u, float w, float poi
         point[d] = s->corner[piece][d] + u * s->edge[piece][0][d] + w * s->edge[piece][1][d];
 }
 
-/* The place of a low-discrepancy sequence (see kronecker_step). */
+/* The start of the Kronecker sequence for a pair. */
 void pair_sampler_init(pair_sampler *s, uint64_t seed, size_t i, size_t j) {
     uint64_t state = mix(mix(seed) ^ mix((uint64_t)i + 1)) ^ mix((uint64_t)j + 0x100000001u);
     for (int d = 0; d < 4; d += 2) {
@@ -146,7 +145,7 @@ void pair_sampler_packet(const pair_sampler *s, uint32_t first, double x[4][VISI
 void element_sampler_packet(const element_sampler *s, uint32_t first, ray_packet *rays) {
     const element_frame *f = &s->frame;
     float x[4][VISIBILITY_PACKET];
-    /* Told to, the compiler takes the rays four at a time; of itself it takes the axes. */
+    /* Without the pragma the compiler vectorizes over the axes, not over the rays. */
     for (int d = 0; d < 4; d++)
 #pragma omp simd
         for (uint32_t i = 0; i < VISIBILITY_PACKET; i++)

@@ -21,7 +21,7 @@ void sun_rays_free(sun_rays *s) {
     free(s);
 }
 
-/* Point k of n: in strip k of the square, at the golden section across. */
+/* Point k of n, a Kronecker lattice: in strip k along u, at multiples of the golden section along w. */
 static void place(const element_sampler *area, const double turn[4], size_t k, size_t n, float point[3]) {
     const double u = ((double)k + turn[0]) / (double)n;
     double w = turn[1] + (double)k * .6180339887498949;
@@ -61,7 +61,7 @@ done:
     return status;
 }
 
-/* Rays of one packet, not yet cast. */
+/* The rays of a packet that is being filled. */
 typedef struct waiting {
     size_t n;
     ray_packet rays;
@@ -76,7 +76,7 @@ static void cast(const sun_rays *s, waiting *w, const float cosine[], float *see
     w->n = 0;
 }
 
-/* Elements first ... end - 1 of those wanted, in one direction. */
+/* Casts the rays of the wanted elements first ... end - 1 in one direction. */
 static void cast_block(const sun_rays *s, size_t first, size_t end, const double direction[3], float *seen) {
     waiting w = {.n = 0};
     float cosine[VISIBILITY_PACKET];
@@ -101,7 +101,7 @@ static void cast_block(const sun_rays *s, size_t first, size_t end, const double
 }
 
 void sun_rays_cast(const sun_rays *s, size_t n_directions, const double (*direction)[3], float *const *seen) {
-    enum { TOGETHER = 256 }; /* elements whose rays share packets, whatever the threads */
+    enum { TOGETHER = 256 }; /* elements whose rays share packets, independently of threads */
     const size_t n_blocks = (s->n_wanted + TOGETHER - 1) / TOGETHER;
 #pragma omp parallel for collapse(2) schedule(dynamic, 1)
     for (size_t block = 0; block < n_blocks; block++)

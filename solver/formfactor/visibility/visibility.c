@@ -10,10 +10,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Triangles and quads are two geometries; primitives leads from (geometry, primitive) to what was met. */
+/* Triangles and quads are two Embree geometries; primitives maps (geometry, primitive) to facets and
+ * elements. */
 enum { TRIANGLES, QUADS, N_GEOMETRIES };
 
-/* element: of a facet that is one alone; elsewhere MESH_NO_VERTEX, and the piece's grid knows. */
+/* element: the only element of its facet, else MESH_NO_VERTEX: then the piece's grid finds the element. */
 typedef struct primitive {
     uint32_t piece, facet, element;
 } primitive;
@@ -23,11 +24,11 @@ struct visibility {
     RTCScene scene;
     const mesh *mesh;
     size_t n_fronts; /* elements in the scene: n, or n/2 when two-sided */
-    facets facets;   /* what is cast against */
+    facets facets;   /* the primitives of the acceleration structure */
     facet_grids grids;
     primitive *primitives[N_GEOMETRIES];
     double centre[3];
-    float rounding; /* how far single precision may move a point of the scene */
+    float rounding; /* see visibility_rounding */
 };
 
 static lam_status device_error(const visibility *v, const char *what, lam_error *error) {
@@ -101,7 +102,7 @@ static lam_status create(const mesh *m, bool join, visibility **out, lam_error *
         TRY(facets_alone(m, v->n_fronts, &v->facets, error));
     TRY(facet_grids_create(m, &v->facets, &v->grids, error));
 
-    /* One thread: the hierarchy is built in a fraction of a second and rays bring their own threads. */
+    /* One thread: the hierarchy is built in a fraction of a second, and rays are cast by our own threads. */
     v->device = rtcNewDevice("threads=1,user_threads=0,set_affinity=0");
     if (v->device == NULL) FAIL(error, LAM_ERR_INTERNAL, "Embree: cannot make a device");
     v->scene = rtcNewScene(v->device);
@@ -152,20 +153,20 @@ double visibility_rounding(const visibility *v) {
     return (double)v->rounding;
 }
 
-/* What the filter must know beside Embree's own context, which it is handed back as. */
+/* The data of the filter. Embree's context comes first, because the filter gets it as a pointer to that. */
 typedef struct cast_context {
     struct RTCIntersectContext embree;
     const visibility *visibility;
     bool cull_back;
 } cast_context;
 
-/* The component of a direction along a facet's normal: negative where the front is met. */
+/* The component of a direction along a facet's normal: negative where the ray hits the front. */
 static float along_normal(const visibility *v, uint32_t facet, float x, float y, float z) {
     const float *normal = v->facets.normal[facet];
     return normal[0] * x + normal[1] * y + normal[2] * z;
 }
 
-/* Packets of any width hold one array a member, in the order of those of eight: the place of each array. */
+/* The places of the arrays in Embree's packets, in units of the width: the same for packets of any width. */
 enum {
     RAY_DIRECTION = offsetof(struct RTCRay8, dir_x) / (8 * sizeof(float)),
     RAY_DISTANCE = offsetof(struct RTCRay8, tfar) / (8 * sizeof(float)),
@@ -178,16 +179,17 @@ static uint32_t facet_of(const visibility *v, unsigned geometry, unsigned id) {
     return v->primitives[geometry][id].facet;
 }
 
-/* The ray's own plane: a face in it, met where the ray starts, is either the element's other side modelled as
- * a face of its own, or something that stands on the element and hides that ray anyway by its other faces. */
+/* True for a hit in the ray's own plane at its origin: either the element's other side, modelled as a face of
+ * its own, or the bottom of an object that stands on the element and occludes the ray by its other faces
+ * anyway. */
 static bool in_own_plane(const visibility *v, uint32_t facet, uint32_t own, float travelled) {
     const float *n = v->facets.normal[own], *m = v->facets.normal[facet];
     return travelled <= v->rounding && fabsf(n[0] * m[0] + n[1] * m[1] + n[2] * m[2]) > 1 - 1e-6f;
 }
 
-/* Refuses hits on the facet a ray leaves, whose index the ray carries as its id, on faces in the same
- * place, and on culled backs. Nine rays of ten meet their own facet at distance 0: refusing that inside the
- * traversal spares a second cast. */
+/* Rejects hits on the facet that a ray leaves, whose index is the ray's id, on faces in its plane, and on
+ * culled backs. Nine rays of ten hit their own facet at distance 0: rejecting that inside the traversal
+ * avoids a second cast. */
 static void refuse_own_and_culled(const struct RTCFilterFunctionNArguments *args) {
     const cast_context *context = (const cast_context *)args->context;
     const visibility *v = context->visibility;
@@ -225,8 +227,8 @@ static void packet_set(struct RTCRayHit8 *ray, const ray_packet *rays) {
     }
 }
 
-/* A sheet modelled as two faces in one place is met at its front and at its back at once, and either may be
- * found first. The front is what counts: looks for one where backs were met, and takes it instead. */
+/* A sheet modelled as two faces in one place is hit at its front and at its back at the same distance. Where
+ * a back was found, casts again for a front within rounding and prefers it. */
 static void prefer_fronts(const visibility *v, const float cosine[VISIBILITY_PACKET], cast_context *context,
                           struct RTCRayHit8 *ray) {
     struct RTCRayHit8 again = *ray;
@@ -254,8 +256,8 @@ static void prefer_fronts(const visibility *v, const float cosine[VISIBILITY_PAC
     }
 }
 
-/* What the rays of a packet met first: the facets and the components of the directions along their normals;
- * VISIBILITY_NOTHING and 0 where there is nothing. */
+/* The facets that a packet's rays hit first, and the components of the directions along their normals;
+ * VISIBILITY_NOTHING and 0 for rays that hit nothing. */
 typedef struct met_packet {
     uint32_t facet[VISIBILITY_PACKET];
     float cosine[VISIBILITY_PACKET];
@@ -272,8 +274,8 @@ static void facets_met(const visibility *v, const struct RTCRayHit8 *ray, size_t
     }
 }
 
-/* Above its own facet's plane by more than rounding a ray cannot meet that plane again: no filter need ask
- * at each of the hits, which would cost a third of all time. */
+/* Moves origins above their own facet's plane by more than rounding, so that rays cannot hit it and the cast
+ * needs no filter, which would take a third of all time. */
 static void lift(const visibility *v, const uint32_t *self, size_t n_rays, struct RTCRayHit8 *ray) {
     const float height = 2 * v->rounding;
     for (size_t i = 0; i < n_rays; i++) {
@@ -285,8 +287,9 @@ static void lift(const visibility *v, const uint32_t *self, size_t n_rays, struc
     }
 }
 
-/* Casts the rays of a packet that leave elements. The few that meet their own facet all the same, one that is
- * not quite planar, or one in its place, go again from where they were, with the filter. */
+/* Casts the rays of a packet that leave elements, lifted and without the filter. The few that hit their own
+ * facet nevertheless (not quite planar), or one in its plane, are cast again from their origin, with the
+ * filter. */
 static void cast_lifted(const visibility *v, const ray_packet *rays, const uint32_t *self, size_t n_rays,
                         cast_context *context, int active[VISIBILITY_PACKET], struct RTCRayHit8 *ray,
                         met_packet *met) {
@@ -370,15 +373,14 @@ void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays,
             hits->element[i] += (uint32_t)v->n_fronts;
 }
 
-/* A packet of segments: the elements whose points each joins, by lane, which the segment carries as its id.
- */
+/* The data of the filter of segments: the facets at both ends, by lane, which is the segment's id. */
 typedef struct segment_context {
     struct RTCIntersectContext embree;
     const visibility *visibility;
     uint32_t from[VISIBILITY_PACKET], to[VISIBILITY_PACKET]; /* facets */
 } segment_context;
 
-/* Refuses hits on the facets of the two elements that a segment joins and on faces in the same place. */
+/* Rejects hits on the facets at both ends of a segment and on faces in their planes at the ends. */
 static void refuse_both_ends(const struct RTCFilterFunctionNArguments *args) {
     const segment_context *context = (const segment_context *)args->context;
     const visibility *v = context->visibility;
@@ -422,7 +424,7 @@ unsigned visibility_blocked(const visibility *v, const ray_packet *segments, siz
     return blocked;
 }
 
-/* One packet of the bare loop; returns how many rays met their own facet, which nobody need ask. */
+/* One packet of the bare loop; with count, returns how many rays hit their own facet. */
 static size_t cast_bare(const visibility *v, const ray_packet *rays, const float nearest[VISIBILITY_PACKET],
                         uint32_t self, bool count) {
     static const int active[VISIBILITY_PACKET]
