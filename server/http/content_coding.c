@@ -7,23 +7,20 @@
 #include <zlib.h>
 #include <zstd.h>
 
-/* The fastest of both: the answer should not wait for the last bytes it could save. */
+/* The fastest level of both. */
 #define LEVEL 1
 
-/* A body is judged by this many pieces of it of this length, where it is much longer than they are. */
+/* A much longer body is judged by this many samples of this length. */
 #define N_SAMPLES 3
 #define SAMPLE ((size_t)16 << 10)
 
-/* Longer ones would keep a thread from solving for others for half a second and more; zlib counts in 32 bits.
- */
+/* Longer bodies would occupy a thread for more than half a second; zlib counts in 32 bits. */
 #define LONGEST ((size_t)64 << 20)
 
 static const char *const names[] = {"identity", "gzip", "zstd"};
 #define N_CODINGS (sizeof names / sizeof names[0])
 
-/* --- Accept-Encoding ---------------------------------------------------------------------------------- */
-
-/* The part of an element up to one of the stops, without space at its ends. */
+/* *word: the text up to one of the stops, without white space at its ends. */
 static const char *take_word(const char *at, const char *stops, const char **word, size_t *length) {
     at += strspn(at, " \t");
     *word = at;
@@ -37,8 +34,8 @@ static bool is_word(const char *word, size_t length, const char *name) {
     return strlen(name) == length && strncasecmp(word, name, length) == 0;
 }
 
-/* A weight in thousandths (0 to 1 with three decimals); what is no weight counts as 0. Not strtod: that would
- * follow the locale, and read 0x1 and nan. */
+/* A weight in thousandths (0 to 1 with three decimals); anything else is 0. strtod would follow the locale
+ * and accept 0x1 and nan. */
 static int read_weight(const char *word, size_t length) {
     int weight = 0, scale = 1000;
     if (length == 0 || (word[0] != '0' && word[0] != '1') || (length > 1 && word[1] != '.')) return 0;
@@ -73,8 +70,8 @@ coding_choice coding_choose(const char *header) {
         for (size_t c = 0; c < N_CODINGS; c++)
             if (is_word(word, length, names[c])) weights[c] = weight;
     }
-    /* The body as it is may always be sent unless it is refused, by name or by the star, but only one that
-     * names it can like it more than a coding. */
+    /* Identity is acceptable unless its name or the star has weight 0, and preferred to a coding only by its
+     * name. */
     coding_choice choice = {CODING_IDENTITY, false};
     int best = weights[CODING_IDENTITY] > 0 ? weights[CODING_IDENTITY] : 0;
     for (size_t c = 0; c < N_CODINGS; c++)
@@ -94,9 +91,7 @@ const char *coding_name(content_coding coding) {
     return names[coding];
 }
 
-/* --- the coders --------------------------------------------------------------------------------------- */
-
-/* Length of what was written; 0 when it did not fit or the coder failed. */
+/* The compressed length; 0 if it does not fit or the coder failed. */
 static size_t code_gzip(const char *bytes, size_t length, char *out, size_t room) {
     z_stream z = {0};
     size_t written = 0;
@@ -124,7 +119,7 @@ static size_t worth(size_t length) {
     return length / 5 * 4;
 }
 
-/* Whether pieces from all over the body shrink as much as the whole would have to. */
+/* True if samples spread over the body shrink as much as the whole has to. */
 static bool samples_shrink(content_coding coding, const buffer *b) {
     char out[SAMPLE];
     size_t coded = 0;
@@ -143,7 +138,7 @@ content_coding coding_apply(buffer *b, coding_choice choice) {
         if (b->length < COMPRESS_LEAST) return CODING_IDENTITY;
         if (b->length >= 4 * N_SAMPLES * SAMPLE && !samples_shrink(choice.coding, b)) return CODING_IDENTITY;
     }
-    /* Where it has to shrink, no more room than that: a coder that fills it stops there. */
+    /* If it has to shrink, the room is the limit: a coder that fills it stops there. */
     size_t room = worth(b->length);
     if (choice.forced)
         room = choice.coding == CODING_GZIP ? compressBound((uLong)b->length) + 32

@@ -7,23 +7,22 @@
 typedef enum content_coding { CODING_IDENTITY, CODING_GZIP, CODING_ZSTD } content_coding;
 
 typedef struct coding_choice {
-    content_coding coding; /* the one liked best; zstd of two that are liked alike */
-    bool forced;           /* the client does not take the body as it is */
+    content_coding coding; /* the one of highest weight; zstd of equal ones */
+    bool forced;           /* the client does not accept identity */
 } coding_choice;
 
-/* Shorter bodies do not pay: they fit one packet as they are. */
+/* Shorter bodies are not compressed: they fit one packet. */
 #define COMPRESS_LEAST ((size_t)1 << 10)
 
-/* What an Accept-Encoding header (or NULL) asks for. Identity where it asks for what we do not have. */
+/* The coding that an Accept-Encoding header (or NULL) asks for; identity if it asks for others than these. */
 coding_choice coding_choose(const char *header);
 
 /* The name of a coding in Content-Encoding. */
 const char *coding_name(content_coding coding);
 
-/* Puts the coded bytes in place of those of b when that leaves at most four fifths of them, or is forced;
- * returns the coding that b then has. Identity also when memory is short or b is longer than 64 MiB. Of long
- * bodies samples are coded first, so that those that do not shrink (raw numbers) cost little. O(length) at
- * about 100 (gzip) or 300 (zstd) MB/s. */
+/* Compresses b if that leaves at most four fifths of its length, or is forced; returns its coding. Identity
+ * also if memory is short or b is longer than 64 MiB. Samples of long bodies are compressed first, so that
+ * those that do not shrink (raw numbers) cost little. O(length) at about 100 (gzip) or 300 (zstd) MB/s. */
 content_coding coding_apply(buffer *b, coding_choice choice);
 
 #endif

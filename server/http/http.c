@@ -18,25 +18,23 @@ struct http {
     int listen_fd; /* after http_quiesce; before, the daemon's */
 };
 
-/* What libmicrohttpd may hold of a connection's head; bodies are ours. */
+/* Memory of libmicrohttpd for the head of a request; bodies are in request.body. */
 #define CONNECTION_MEMORY (32u << 10)
 
-/* Once a request is refused, so much more of its body is read and dropped, so that its connection can go on.
+/* The rest of a refused body is read and dropped up to this length, so that its connection can be used again.
  */
 #define DROP_MAX ((uint64_t)1 << 20)
-
-/* --- checks of the head ------------------------------------------------------------------------------- */
 
 static void refuse_token(request *r) {
     answer_refuse(&r->answer, 401, "a bearer token is needed: Authorization: Bearer TOKEN");
 }
 
-/* Whether the scene is in service; else it is refused, whatever the answer was. */
+/* False, with 503 in place of any answer, if the scene is out of service. */
 static bool check_health(request *r) {
     lam_error why;
     bool news;
     if (r->call.scene == NULL || !scene_damaged(r->call.scene, &why, &news)) return true;
-    if (news) verifier_tell(stderr, r->call.scene, &why);
+    if (news) verifier_report_damage(stderr, r->call.scene, &why);
     answer_refuse(&r->answer, 503, "%.200s is out of service: %s", r->call.scene->name, why.message);
     return false;
 }
@@ -85,8 +83,7 @@ static void refuse_to_hold(request *r, const char *what) {
                   r->service->config->max_buffered);
 }
 
-/* Whatever the head alone decides: route, method, token, scene, type, length; true when the body is wanted.
- */
+/* The checks of the head: route, method, token, scene, type, length. True if the body is to be read. */
 static bool check_head(request *r, const char *method, uint64_t length) {
     const service *s = r->service;
     route_find(method, r->path, &r->match, &r->answer);
@@ -95,7 +92,7 @@ static bool check_head(request *r, const char *method, uint64_t length) {
         return false;
     }
     if (r->match.route == NULL) return false;
-    /* The variant first: one that is built meanwhile is then in the snapshot. */
+    /* The state of the variant before the snapshot: a variant built in between is then in the snapshot. */
     const variant_state variant =
         r->match.has_name ? variants_state(s->variants, r->match.name, &r->variant_why) : VARIANT_SETTLED;
     r->snapshot = catalog_acquire(s->catalog);
@@ -108,7 +105,7 @@ static bool check_head(request *r, const char *method, uint64_t length) {
         refuse_length(r);
         return false;
     }
-    /* What is announced is not set aside, or a few who send slowly would keep out all others. */
+    /* Announced bytes are not reserved: otherwise a few slow clients would exclude all others. */
     const size_t held = atomic_load(&s->body_bytes);
     if (length > 0 && (held > s->config->max_buffered || length > s->config->max_buffered - held)) {
         refuse_to_hold(r, "the body");
@@ -117,7 +114,7 @@ static bool check_head(request *r, const char *method, uint64_t length) {
     return true;
 }
 
-/* Body bytes, counted; false with the answer made when there is no room for them. */
+/* Appends to the body and counts its bytes; false, with the answer made, if there is no room. */
 static bool hold_body(request *r, const char *bytes, size_t count) {
     service *s = r->service;
     const size_t before = atomic_fetch_add(&s->body_bytes, count);
@@ -136,14 +133,12 @@ static void drop_body(request *r) {
     buffer_free(&r->body);
 }
 
-/* --- solves ------------------------------------------------------------------------------------------- */
-
 /* The request that a job is part of. */
 static request *request_of(batch_job *job) {
     return (request *)(void *)((char *)call_of(job) - offsetof(request, call));
 }
 
-static void made(request *r) {
+static void finish_answer(request *r) {
     http_finish_answer(r, false);
     drop_body(r);
 }
@@ -154,14 +149,14 @@ static bool begin_solve(batch_job *job, batch_workspace *workspace) {
     r->call.workspace = workspace;
     map_guard_allow();
     if (client_is_lost(r->client)) {
-        answer_refuse(&r->answer, 503, "its client went before it was begun");
+        answer_refuse(&r->answer, 503, "the client left before the solve began");
     } else if (to->steps != NULL) {
         if (to->steps->begin(&r->call, &r->answer)) return true;
     } else {
         to->handle(&r->call, &r->answer);
     }
-    (void)check_health(r); /* what was lost on the way makes the answer a wrong one */
-    made(r);
+    (void)check_health(r); /* an answer from lost pages is wrong */
+    finish_answer(r);
     return false;
 }
 
@@ -175,10 +170,10 @@ static void end_solve(batch_job *job, batch_workspace *workspace) {
     r->call.workspace = workspace;
     r->match.route->steps->end(&r->call, &r->answer);
     (void)check_health(r);
-    made(r);
+    finish_answer(r);
 }
 
-/* A pass over so much takes about a millisecond, a body so long next to nothing where nothing is parsed. */
+/* A pass over this operator takes about a millisecond; reading a body of this length as NPY takes less. */
 #define BRIEF_OPERATOR ((size_t)32 << 20)
 #define BRIEF_BODY ((size_t)256 << 10)
 
@@ -193,7 +188,7 @@ static void finish_solve(batch_job *job) {
     MHD_resume_connection(r->connection);
 }
 
-/* The whole request is here. */
+/* The whole request has arrived. */
 static enum MHD_Result handle(request *r) {
     if (!r->answered) {
         r->call.body = r->body.bytes == NULL ? "" : r->body.bytes;
@@ -202,7 +197,7 @@ static enum MHD_Result handle(request *r) {
         if (shortcut != NULL && shortcut(&r->call, &r->answer)) {
             drop_body(r);
         } else if (r->match.route->with_body) {
-            /* Suspended first: the solve may be done before batch_submit returns. */
+            /* Suspended before batch_submit, as the solve may finish before that returns. */
             const solve_steps *steps = r->match.route->steps;
             r->call.job = (batch_job){.begin = begin_solve,
                                       .pass = steps != NULL ? pass_solve : NULL,
@@ -226,8 +221,6 @@ static enum MHD_Result handle(request *r) {
     return http_send_answer(r);
 }
 
-/* --- libmicrohttpd's callbacks ------------------------------------------------------------------------ */
-
 static request *begin_request(http *h, struct MHD_Connection *connection, const char *path,
                               const char *method) {
     request *r = calloc(1, sizeof *r);
@@ -250,7 +243,7 @@ static request *begin_request(http *h, struct MHD_Connection *connection, const 
     return r;
 }
 
-/* Bytes of body that the head announces; UINT64_MAX when they are not to be had as a number. */
+/* The Content-Length; UINT64_MAX if it is not a number. */
 static uint64_t announced_length(const request *r) {
     const char *text = http_header(r, MHD_HTTP_HEADER_CONTENT_LENGTH);
     if (text == NULL) return 0;
@@ -266,8 +259,8 @@ static enum MHD_Result on_head(http *h, struct MHD_Connection *connection, const
     *context = r;
     uint64_t length = announced_length(r);
     r->answered = !check_head(r, method, length);
-    /* An answer that is sent before the body has come closes the connection. So the body of a refused request
-     * is read and dropped, unless it is long, or its client waits to be told whether to send it. */
+    /* An answer sent before the end of the body closes the connection. So the body of a refused request is
+     * read and dropped, unless it is long or its client waits for 100 Continue. */
     if (r->answered && (length > DROP_MAX || http_header(r, MHD_HTTP_HEADER_EXPECT) != NULL))
         return http_send_answer(r);
     return MHD_YES;
@@ -287,7 +280,7 @@ static enum MHD_Result on_body(request *r, const char *bytes, size_t *size) {
             drop_body(r);
         }
     }
-    /* No answer can be sent in the middle of a body (libmicrohttpd): one without end is cut. */
+    /* libmicrohttpd sends no answer in the middle of a body: the connection of one without end is closed. */
     if (r->received > c->max_body + DROP_MAX) return MHD_NO;
     *size = 0;
     return MHD_YES;
@@ -360,18 +353,18 @@ static void on_connection(void *context, struct MHD_Connection *connection, void
         const union MHD_ConnectionInfo *info =
             MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
         *socket_context = info != NULL ? connections_add(all, info->connect_fd) : NULL;
-        /* Nobody else watches this one. */
+        /* Without a client of `connections`, libmicrohttpd has to apply the time limit. */
         if (*socket_context == NULL)
             MHD_set_connection_option(connection, MHD_CONNECTION_OPTION_TIMEOUT,
                                       (unsigned)((http *)context)->service->config->timeout_s);
     } else {
-        /* Its descriptor is still open. */
+        /* The descriptor is still open. */
         connections_remove(all, *socket_context);
         *socket_context = NULL;
     }
 }
 
-/* Routes resolve escapes themselves, so that %2F does not become a slash. */
+/* Escapes stay in the path, so that %2F does not become a slash; route_find resolves them. */
 static size_t keep_escapes(void *context, struct MHD_Connection *connection, char *text) {
     (void)context;
     (void)connection;
@@ -392,10 +385,8 @@ lam_status http_start(service *s, int listen_fd, http **out, lam_error *error) {
     connection_limits limits = {.timeout_s = s->config->timeout_s, .least_rate = s->config->min_rate};
     TRY(connections_affordable(s->config->max_connections, &limits.most, error));
     TRY(connections_start(&limits, &s->connections, error));
-    /* It has no time-out of its own: that would take a client for silent whose answer waits in a socket that
-     * is slow to empty. At its limit of connections, or with descriptors run out, the daemon stops accepting
-     * until one closes.
-     */
+    /* No time-out of libmicrohttpd: it would close a client whose answer waits in a slow socket. At its limit
+     * of connections, or out of descriptors, the daemon accepts none until one closes. */
     h->daemon = MHD_start_daemon(
         MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, on_request, h,
         MHD_OPTION_LISTEN_SOCKET, listen_fd, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)CONNECTION_MEMORY,
@@ -418,7 +409,8 @@ done:
 
 void http_quiesce(http *h) {
     h->listen_fd = MHD_quiesce_daemon(h->daemon);
-    /* Refuses those who come now; closing the descriptor has to wait for the thread that may still use it. */
+    /* New connections are refused from here on; the descriptor is closed later, as the I/O thread may still
+     * use it. */
     if (h->listen_fd >= 0) shutdown(h->listen_fd, SHUT_RDWR);
 }
 

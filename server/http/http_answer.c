@@ -1,10 +1,11 @@
-/* How answers are sent: coding, entity tag, headers. */
+/* Sends answers: content coding, entity tag, headers. */
 #include "server/http/http_request.h"
 
 #include <stdio.h>
 #include <string.h>
 
-/* Coding this takes a millisecond or two, in which no other client is served. */
+/* The longest body that the I/O thread compresses, in a millisecond or two; no other client is served
+ * meanwhile. */
 #define IO_THREAD_MAX ((size_t)128 << 10)
 
 const char *http_header(const request *r, const char *name) {
@@ -13,14 +14,14 @@ const char *http_header(const request *r, const char *name) {
 
 void http_finish_answer(request *r, bool on_io_thread) {
     answer *a = &r->answer;
-    /* The tag is of the bytes before they are coded: it is needed whatever the coder makes of them. */
+    /* The tag is that of the bytes before compression. */
     const uint64_t hash = a->cacheable ? etag_hash(a->body.bytes, a->body.length) : 0;
     if (!on_io_thread || a->body.length <= IO_THREAD_MAX) r->coding = coding_apply(&a->body, r->accepted);
     if (a->cacheable) etag_make(hash, coding_name(r->coding), r->etag);
 }
 
-/* Whether the client has these very bytes: it is told so. They are handed on all the same, for their length;
- * libmicrohttpd leaves them out, as of HEAD. */
+/* True if the client has these bytes (304). The body is still passed to libmicrohttpd for its length, which
+ * leaves it out as for HEAD. */
 static bool is_known(const request *r) {
     return r->etag[0] != '\0' && r->answer.status == 200 &&
            etag_is_listed(http_header(r, MHD_HTTP_HEADER_IF_NONE_MATCH), r->etag);
@@ -30,8 +31,8 @@ static bool add(struct MHD_Response *response, const char *name, const char *val
     return MHD_add_response_header(response, name, value) == MHD_YES;
 }
 
-/* NPY has no place for what a refined answer carries. */
-static bool say_refined(struct MHD_Response *response, const answer *a) {
+/* Headers of a refined answer: NPY has no place for these figures. */
+static bool add_refined(struct MHD_Response *response, const answer *a) {
     char certificate[32], iterations[24];
     snprintf(certificate, sizeof certificate, "%.17g", a->certificate);
     snprintf(iterations, sizeof iterations, "%zu", a->iterations);
@@ -45,7 +46,7 @@ static bool add_headers(const request *r, size_t length, struct MHD_Response *re
     if (a->type != NULL) good = good && add(response, MHD_HTTP_HEADER_CONTENT_TYPE, a->type);
     if (a->allow[0] != '\0') good = good && add(response, MHD_HTTP_HEADER_ALLOW, a->allow);
     if (a->location != NULL) good = good && add(response, MHD_HTTP_HEADER_LOCATION, a->location);
-    if (a->refined) good = good && say_refined(response, a);
+    if (a->refined) good = good && add_refined(response, a);
     if (a->retry_after > 0) {
         char seconds[16];
         snprintf(seconds, sizeof seconds, "%u", a->retry_after);
@@ -55,7 +56,7 @@ static bool add_headers(const request *r, size_t length, struct MHD_Response *re
     if (r->etag[0] != '\0')
         good = good && add(response, MHD_HTTP_HEADER_ETAG, r->etag) &&
                add(response, MHD_HTTP_HEADER_CACHE_CONTROL, "no-cache");
-    /* Also where it was not coded, as another client may get it otherwise. */
+    /* Also for a body that was not compressed, as another client may get it compressed. */
     if (r->coding != CODING_IDENTITY || r->etag[0] != '\0' || length >= COMPRESS_LEAST)
         good = good && add(response, MHD_HTTP_HEADER_VARY, MHD_HTTP_HEADER_ACCEPT_ENCODING);
     if (r->coding != CODING_IDENTITY && a->status != MHD_HTTP_NOT_MODIFIED)

@@ -104,14 +104,14 @@ done:
     return status;
 }
 
-/* Descriptors that are no connections: standard streams, the listening socket, those of epoll, stores that
- * are read, the log, and what libraries open. */
+/* Descriptors for other than connections: standard streams, the listening socket, epoll, stores being read,
+ * the log, libraries. */
 #define OTHER_DESCRIPTORS 64
 
-/* With all places taken, an idle client keeps its own for so long. */
+/* When all connections are in use, an idle one is kept for this time. */
 #define IDLE_GRACE_S 1.0
 
-/* So many of them at most lose it in a second. */
+/* Idle connections closed in a second, at most. */
 #define PLACES 64
 
 typedef enum cut_reason { CUT_HEAD, CUT_BODY, CUT_ANSWER, CUT_PLACE, N_CUT_REASONS } cut_reason;
@@ -122,11 +122,11 @@ struct client {
     int fd;
     connection_stage stage;
     bool cut;
-    bool looked_at;  /* in this stage: seen is of it */
-    double since;    /* seconds, of the stage */
-    double deadline; /* put off by what moves */
+    bool checked;    /* seen was set in this stage */
+    double since;    /* seconds, begin of the stage */
+    double deadline; /* extended by bytes that move */
     uint64_t bytes;  /* received of a body, or to be sent of an answer */
-    uint64_t seen;   /* what tells that something moves, when it was last looked at */
+    uint64_t seen;   /* the counter of bytes when it was last checked */
 };
 
 struct connections {
@@ -164,9 +164,7 @@ done:
     return status;
 }
 
-/* --- what a client may take ---------------------------------------------------------------------------- */
-
-/* Bytes of all answers that the client's machine has acknowledged; false where the socket does not count. */
+/* *bytes: bytes that the client's machine has acknowledged; false if the socket does not count them. */
 static bool read_acknowledged(int fd, uint64_t *bytes) {
     struct tcp_info info;
     socklen_t size = sizeof info;
@@ -177,25 +175,25 @@ static bool read_acknowledged(int fd, uint64_t *bytes) {
     return true;
 }
 
-/* Bytes of an answer that were read since the last look. A socket in the file system tells only how many wait
- * in it: there any change counts as enough, and the time for the whole is bounded. */
+/* Bytes of an answer that were read since the last check. A Unix socket reports only the bytes waiting in it:
+ * any change then counts as enough, and the time for the whole answer is limited. */
 static double measure_read(const connection_limits *limits, client *c, double now) {
     uint64_t seen;
     int waiting = 0;
     const double enough = (double)limits->timeout_s * (double)limits->least_rate;
     const bool counted = read_acknowledged(c->fd, &seen);
     if (!counted) seen = ioctl(c->fd, SIOCOUTQ, &waiting) == 0 ? (uint64_t)waiting : 0;
-    const bool changed = c->looked_at && seen != c->seen;
+    const bool changed = c->checked && seen != c->seen;
     const double read = !changed ? 0.0 : counted ? (double)(seen - c->seen) : enough;
-    c->looked_at = true;
+    c->checked = true;
     c->seen = seen;
     if (!counted && now - c->since > ((double)c->bytes + enough) / (double)limits->least_rate)
         c->deadline = c->since;
     return read;
 }
 
-/* Whether nothing of a request can come any more: its client has ended its side, and all it sent was taken.
- * libmicrohttpd does not look for that in the middle of a head or a body. */
+/* True if the client has ended its sending and all it sent was received. libmicrohttpd does not check this in
+ * the middle of a head or a body. */
 static bool has_hung_up(const client *c) {
     int unread = 0;
     struct pollfd one = {.fd = c->fd, .events = POLLRDHUP};
@@ -203,8 +201,8 @@ static bool has_hung_up(const client *c) {
            ioctl(c->fd, FIONREAD, &unread) == 0 && unread == 0;
 }
 
-/* Whether c has had its time. Every byte that moves puts the deadline off by 1/rate, but never further than a
- * time-out from now: who was fast may not be as slow as it likes from then on. */
+/* True if c is past its deadline. Every byte that moves extends the deadline by 1/rate, to at most one
+ * time-out from now, so that a client cannot save up time. */
 static bool is_over_time(const connection_limits *limits, client *c, double now, cut_reason *why) {
     const double timeout = (double)limits->timeout_s;
     double moved = 0.0;
@@ -216,7 +214,7 @@ static bool is_over_time(const connection_limits *limits, client *c, double now,
         *why = c->stage == STAGE_HEAD ? CUT_HEAD : CUT_BODY;
         moved = (double)(c->bytes - c->seen);
         c->seen = c->bytes;
-        /* Not at once: what was taken may be the whole request, which is being looked at. */
+        /* Not at once: the received bytes may be a whole request that is being processed. */
         if (moved <= 0 && now - c->since > 1.0 && has_hung_up(c)) return true;
         break;
     case STAGE_ANSWER:
@@ -229,10 +227,10 @@ static bool is_over_time(const connection_limits *limits, client *c, double now,
     return now > c->deadline;
 }
 
-/* With the lock: the descriptor is then still this client's. Whoever serves it finds it ended, and closes it.
- */
+/* With the lock, so that the descriptor still belongs to this client. The thread that serves it finds the
+ * socket shut down and closes it. */
 static void cut(connections *all, client *c, cut_reason why) {
-    /* What it did not read should not stay in the socket for as long as it likes. */
+    /* Discards unread bytes of the answer, which would otherwise stay in the socket. */
     const struct linger none = {.l_onoff = 1, .l_linger = 0};
     if (c->stage == STAGE_ANSWER) setsockopt(c->fd, SOL_SOCKET, SO_LINGER, &none, sizeof none);
     c->cut = true;
@@ -240,7 +238,7 @@ static void cut(connections *all, client *c, cut_reason why) {
     shutdown(c->fd, SHUT_RDWR);
 }
 
-/* The client that has been silent between requests for longest, and longer than the grace; NULL if none. */
+/* The client that has been idle between requests for longest, and longer than IDLE_GRACE_S; NULL if none. */
 static client *find_idle(const connections *all, double now) {
     client *oldest = NULL;
     for (client *c = all->first; c != NULL; c = c->after)
@@ -250,7 +248,8 @@ static client *find_idle(const connections *all, double now) {
     return oldest;
 }
 
-/* With the lock. O(open), and that again for each place that is made: a quarter of all. */
+/* With the lock. Closes what is past its deadline and, if all connections are in use, at most a quarter of
+ * them that are idle. O(open) for each one closed. */
 static void sweep(connections *all) {
     const double now = now_s();
     cut_reason why = CUT_HEAD;
@@ -278,8 +277,6 @@ static void *watch(void *argument) {
     pthread_mutex_unlock(&all->lock);
     return NULL;
 }
-
-/* --- the list ------------------------------------------------------------------------------------------ */
 
 lam_status connections_start(const connection_limits *limits, connections **out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -327,7 +324,7 @@ static void begin_stage(const connections *all, client *c, connection_stage stag
     c->deadline = now + (double)all->limits.timeout_s;
     c->bytes = bytes;
     c->seen = 0;
-    c->looked_at = false;
+    c->checked = false;
 }
 
 client *connections_add(connections *all, int fd) {
@@ -384,18 +381,17 @@ bool connections_write(connections *all, buffer *b) {
     const size_t n_open = all->n_open;
     for (size_t r = 0; r < N_CUT_REASONS; r++) n_cut[r] = all->n_cut[r];
     pthread_mutex_unlock(&all->lock);
-    bool written =
-        buffer_printf(b,
-                      "# HELP lambertd_connections Open connections.\n"
-                      "# TYPE lambertd_connections gauge\n"
-                      "lambertd_connections %zu\n"
-                      "# HELP lambertd_connections_most As many may be open.\n"
-                      "# TYPE lambertd_connections_most gauge\n"
-                      "lambertd_connections_most %zu\n"
-                      "# HELP lambertd_connections_cut_total Connections cut for what took too long, "
-                      "or to make place.\n"
-                      "# TYPE lambertd_connections_cut_total counter\n",
-                      n_open, all->limits.most);
+    bool written = buffer_printf(b,
+                                 "# HELP lambertd_connections Open connections.\n"
+                                 "# TYPE lambertd_connections gauge\n"
+                                 "lambertd_connections %zu\n"
+                                 "# HELP lambertd_connections_most Limit of open connections.\n"
+                                 "# TYPE lambertd_connections_most gauge\n"
+                                 "lambertd_connections_most %zu\n"
+                                 "# HELP lambertd_connections_cut_total Connections closed at a time limit, "
+                                 "or to make room.\n"
+                                 "# TYPE lambertd_connections_cut_total counter\n",
+                                 n_open, all->limits.most);
     for (size_t r = 0; r < N_CUT_REASONS; r++)
         written = written && buffer_printf(b, "lambertd_connections_cut_total{why=\"%s\"} %llu\n", reasons[r],
                                            (unsigned long long)n_cut[r]);

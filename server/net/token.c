@@ -33,7 +33,7 @@ bool token_matches(const token *expected, const char *authorization) {
     const char *given = authorization + sizeof scheme - 1;
     while (*given == ' ') given++;
     size_t length = strlen(given);
-    /* Always as many steps as what was given is long. */
+    /* The number of steps depends on the given length alone. */
     unsigned char difference = length != expected->length;
     for (size_t i = 0; i < length; i++)
         difference |= (unsigned char)given[i] ^ (unsigned char)expected->bytes[i % expected->length];

@@ -1,4 +1,4 @@
-/* The bearer token that clients must show. */
+/* The bearer token that clients must send. */
 #ifndef LAMBERT_SERVER_NET_TOKEN_H
 #define LAMBERT_SERVER_NET_TOKEN_H
 
@@ -15,8 +15,8 @@ typedef struct token {
  * long). */
 lam_status token_read(const char *path, token *out, lam_error *error);
 
-/* Whether an Authorization header (or NULL) shows the token; in a time that does not depend on how much of it
- * is right. True when there is none. */
+/* True if an Authorization header (or NULL) carries the token, or none is expected. The time does not depend
+ * on how many characters are right. */
 bool token_matches(const token *expected, const char *authorization);
 
 #endif

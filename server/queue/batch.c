@@ -8,19 +8,19 @@ typedef struct job_list {
     batch_job *first, *last;
 } job_list;
 
-/* A job is in one list at a time, or in the hands of a thread. Over what a key names one pass is made at a
- * time; what comes meanwhile waits for the next, together. Passes over several run side by side, so that a
- * long one does not hold up the short. */
+/* A job is in one of the three lists, or a thread runs one of its functions. Of the jobs of one key (one
+ * operator) one pass runs at a time, and jobs that arrive meanwhile share the next one. Passes of different
+ * keys run in parallel, so that a long one does not delay short ones. */
 struct batch_queue {
     pthread_mutex_t lock;
     pthread_cond_t changed;
-    job_list arrived, waiting, computed; /* to begin, to have a pass, to end */
+    job_list arrived, waiting, computed; /* before begin, before or between passes, before end */
     size_t n_waiting;                    /* jobs */
     size_t n_jobs;                       /* from submit to finish */
     size_t max_jobs;
-    size_t n_brief;  /* threads that are at something brief, and then come back */
-    size_t n_idle;   /* threads that wait */
-    size_t n_called; /* of them: woken and not there yet */
+    size_t n_brief; /* threads that run a function of a brief job */
+    size_t n_idle;  /* threads that wait for `changed` */
+    size_t n_woken; /* idle threads that were signalled and have not run yet */
     bool closed;
     const void **passing; /* [n_threads] keys of the passes that run */
     size_t n_passing;
@@ -45,11 +45,11 @@ static batch_job *list_take(job_list *list) {
     return job;
 }
 
-/* With the lock: somebody is to look at the lists, if nobody is about to; who is busy looks before it waits.
- */
-static void call_one(batch_queue *queue) {
-    if (queue->n_called > 0 || queue->n_idle == 0) return;
-    queue->n_called++;
+/* With the lock: wakes an idle thread, unless one is already woken. A busy thread reads the lists before it
+ * waits. */
+static void wake_one(batch_queue *queue) {
+    if (queue->n_woken > 0 || queue->n_idle == 0) return;
+    queue->n_woken++;
     pthread_cond_signal(&queue->changed);
 }
 
@@ -63,37 +63,37 @@ static bool is_passing(const batch_queue *queue, const void *key) {
     return false;
 }
 
-/* The job that waits longest of those that can have a pass now, or NULL. */
+/* The longest waiting job whose key has no pass now, or NULL. */
 static batch_job *find_ready(const batch_queue *queue) {
     batch_job *job = queue->waiting.first;
     while (job != NULL && is_passing(queue, job->key)) job = job->next;
     return job;
 }
 
-/* With the lock: before a thread turns to a job and after it. While one is at something brief nobody is woken
- * for what comes: it would be there no sooner, and then stand in the way on a core that a pass could use. So
- * who turns to something long leaves what waits to another. */
-static void turn_to(batch_queue *queue, const batch_job *job) {
+/* With the lock, before and after a thread runs a function of a job. While a thread runs a brief one,
+ * arriving jobs wake nobody: another thread would be there no sooner than this one, and then compete with a
+ * pass for a core. A thread that begins a long one wakes another for the jobs that are left. */
+static void enter_function(batch_queue *queue, const batch_job *job) {
     if (job->brief)
         queue->n_brief++;
     else if (queue->arrived.first != NULL || queue->computed.first != NULL || find_ready(queue) != NULL)
-        call_one(queue);
+        wake_one(queue);
 }
 
-static void turn_back(batch_queue *queue, bool brief) {
+static void leave_function(batch_queue *queue, bool brief) {
     if (brief) queue->n_brief--;
 }
 
-/* How many jobs share the next pass at most. What is brief takes as long on its way to the client and back as
- * in a pass: of those that do not fill one, half have it while the others are under way, and all come evenly.
- * With as many as happen to be there it would be most of them in one and in the next the few who missed it.
- */
+/* The most jobs in the next pass. The round trip of a brief job to its client takes about as long as a pass.
+ * If the waiting ones do not fill a pass, it takes half of BATCH_PASS: the others travel meanwhile, and
+ * passes stay evenly filled. Without this limit passes of most jobs would alternate with passes of the few
+ * that came too late. */
 static size_t most_together(const batch_queue *queue, const batch_job *like) {
     return like->brief && queue->n_waiting < BATCH_PASS ? BATCH_PASS / 2 : BATCH_PASS;
 }
 
-/* The vectors of the next pass: of this job and of all like it, first one of each, so that a long request
- * holds up no short one, then more of them in their order. */
+/* The vectors of the next pass, from all jobs with the key and pass of `like`: first one of each job, so that
+ * a long request delays no short one, then the rest in their order. Returns the number of parts. */
 static size_t choose_parts(batch_job *like, size_t most, batch_part parts[BATCH_PASS]) {
     size_t n_parts = 0, room = BATCH_PASS;
     for (batch_job *job = like; job != NULL && n_parts < most; job = job->next) {
@@ -109,7 +109,7 @@ static size_t choose_parts(batch_job *like, size_t most, batch_part parts[BATCH_
     return n_parts;
 }
 
-/* After a pass: its jobs that want more go behind the others; those that have all are computed. */
+/* After a pass: its jobs move to `computed` if all their vectors are, otherwise to the end of `waiting`. */
 static void sort_waiting(batch_queue *queue, const batch_part *parts, size_t n_parts) {
     job_list before = queue->waiting, again = {0};
     queue->waiting = (job_list){0};
@@ -124,47 +124,47 @@ static void sort_waiting(batch_queue *queue, const batch_part *parts, size_t n_p
     for (batch_job *job; (job = list_take(&again)) != NULL;) list_add(&queue->waiting, job);
 }
 
-/* With the lock, which is given back meanwhile. */
+/* With the lock, which is released meanwhile. */
 static void make_pass(batch_queue *queue, batch_job *like, batch_workspace *workspace) {
     batch_part parts[BATCH_PASS];
     const void *key = like->key;
     const bool brief = like->brief;
     const size_t n_parts = choose_parts(like, most_together(queue, like), parts);
     queue->passing[queue->n_passing++] = key;
-    turn_to(queue, like);
+    enter_function(queue, like);
     pthread_mutex_unlock(&queue->lock);
     like->pass(parts, n_parts, workspace);
     pthread_mutex_lock(&queue->lock);
-    turn_back(queue, brief);
+    leave_function(queue, brief);
     size_t mine = 0;
     while (queue->passing[mine] != key) mine++;
     queue->passing[mine] = queue->passing[--queue->n_passing];
     sort_waiting(queue, parts, n_parts);
-    /* This thread ends one of them itself: for a single client nobody need be woken. */
+    /* This thread ends one of the jobs itself: a single one needs no other thread. */
     if (!brief && (queue->computed.first != queue->computed.last || queue->waiting.first != NULL))
         pthread_cond_broadcast(&queue->changed);
 }
 
-/* With the lock, which is given back meanwhile. */
+/* With the lock, which is released meanwhile. */
 static void finish(batch_queue *queue, batch_job *job) {
     const bool brief = job->brief;
     queue->n_jobs--;
-    turn_to(queue, job);
+    enter_function(queue, job);
     if (queue->closed && queue->n_jobs == 0) pthread_cond_broadcast(&queue->changed);
     pthread_mutex_unlock(&queue->lock);
     job->finish(job);
     pthread_mutex_lock(&queue->lock);
-    turn_back(queue, brief);
+    leave_function(queue, brief);
 }
 
-/* With the lock, which is given back meanwhile. */
+/* With the lock, which is released meanwhile. */
 static void begin(batch_queue *queue, batch_job *job, batch_workspace *workspace) {
     const bool brief = job->brief;
-    turn_to(queue, job);
+    enter_function(queue, job);
     pthread_mutex_unlock(&queue->lock);
     const bool waits = job->begin(job, workspace);
     pthread_mutex_lock(&queue->lock);
-    turn_back(queue, brief);
+    leave_function(queue, brief);
     if (!waits) {
         finish(queue, job);
         return;
@@ -174,20 +174,20 @@ static void begin(batch_queue *queue, batch_job *job, batch_workspace *workspace
     queue->n_waiting++;
 }
 
-/* With the lock, which is given back meanwhile. */
+/* With the lock, which is released meanwhile. */
 static void end(batch_queue *queue, batch_job *job, batch_workspace *workspace) {
     const bool brief = job->brief;
-    turn_to(queue, job);
+    enter_function(queue, job);
     pthread_mutex_unlock(&queue->lock);
     job->end(job, workspace);
     pthread_mutex_lock(&queue->lock);
-    turn_back(queue, brief);
+    leave_function(queue, brief);
     finish(queue, job);
 }
 
-/* What is computed is sent first, so that its client can go on. A pass is made once nothing is left to begin,
- * or as many have begun as may share it: so what queued while the last one ran shares the next, brief jobs
- * by halves, and nobody waits for what has not come yet. */
+/* A thread of the queue. Computed jobs come first, so that their clients can go on. A pass begins when no job
+ * is left to begin or a full pass waits: jobs that arrived during one pass share the next, and none waits for
+ * jobs that have not arrived. */
 static void *serve(void *argument) {
     batch_queue *queue = argument;
     batch_workspace workspace = {0};
@@ -208,7 +208,7 @@ static void *serve(void *argument) {
             queue->n_idle++;
             pthread_cond_wait(&queue->changed, &queue->lock);
             queue->n_idle--;
-            if (queue->n_called > 0) queue->n_called--;
+            if (queue->n_woken > 0) queue->n_woken--;
         }
     }
     pthread_mutex_unlock(&queue->lock);
@@ -250,7 +250,7 @@ bool batch_submit(batch_queue *queue, batch_job *job) {
     if (taken) {
         list_add(&queue->arrived, job);
         queue->n_jobs++;
-        if (queue->n_brief == 0) call_one(queue);
+        if (queue->n_brief == 0) wake_one(queue);
     }
     pthread_mutex_unlock(&queue->lock);
     return taken;

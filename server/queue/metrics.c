@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* Statuses that we give; 0 stands for a client that went. */
+/* Statuses of answers; 0 stands for a client that left. */
 static const unsigned statuses[] = {0,   200, 202, 204, 304, 400, 401, 404, 405,
                                     409, 411, 413, 415, 422, 429, 500, 503};
 #define N_STATUSES (sizeof statuses / sizeof statuses[0])
@@ -88,7 +88,8 @@ static bool write_head(buffer *b, const char *name, const char *type, const char
 
 static bool write_requests(const metrics *m, buffer *b) {
     static const char name[] = "lambertd_requests_total";
-    bool written = write_head(b, name, "counter", "Requests by route and status; 0: the client went before.");
+    bool written =
+        write_head(b, name, "counter", "Requests by route and status; 0: the client left before the answer.");
     for (size_t r = 0; r < m->n_labels; r++)
         for (size_t s = 0; s <= N_STATUSES; s++) {
             if (m->routes[r].by_status[s] == 0) continue;

@@ -1,4 +1,4 @@
-/* What the daemon counts, as Prometheus text. Any thread. */
+/* Counters of the daemon as Prometheus text. Any thread. */
 #ifndef LAMBERT_SERVER_QUEUE_METRICS_H
 #define LAMBERT_SERVER_QUEUE_METRICS_H
 
@@ -9,32 +9,32 @@
 
 typedef struct metrics metrics;
 
-/* labels[n_labels] are the routes, static; a route is known by its place among them. */
+/* labels [n_labels] are the routes, static; a label is an index into them. */
 lam_status metrics_create(size_t n_labels, const char *const *labels, metrics **out, lam_error *error);
 void metrics_destroy(metrics *m);
 
-/* A request has come; has been answered (status 0: its client went before). */
+/* A request arrived; it was answered (status 0: its client left before). */
 void metrics_begin(metrics *m);
 void metrics_end(metrics *m, size_t label, unsigned status, double seconds);
 
-/* Vectors that one pass over an operator served. */
+/* Counts a pass over an operator by its number of vectors. */
 void metrics_pass(metrics *m, size_t n_rhs);
 
-/* Requests that have come and are not answered yet. */
+/* Requests that are not answered yet. */
 size_t metrics_in_flight(metrics *m);
 
-/* What others know. */
+/* Figures that the caller knows. */
 typedef struct metrics_gauges {
     size_t n_scenes;
     uint64_t operator_bytes;
     size_t queued;     /* solves that wait or run */
-    size_t body_bytes; /* held of requests */
+    size_t body_bytes; /* of requests, held in memory */
 } metrics_gauges;
 
 /* Appends the text. */
 bool metrics_write(metrics *m, const metrics_gauges *gauges, buffer *b);
 
-/* What is known of the scenes' mapped stores. */
+/* Figures of the scenes' mapped stores. */
 typedef struct metrics_stores {
     size_t n_damaged, n_unverified; /* scenes out of service; scenes still being compared */
     uint64_t mapped_bytes;

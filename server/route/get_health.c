@@ -1,4 +1,5 @@
-/* GET /healthz: the process answers. GET /readyz: it has scenes to serve and will go on. */
+/* GET /healthz: 200 while the process answers. GET /readyz: 200 while it serves scenes, 503 while it loads or
+ * drains. */
 #include "server/route/routes.h"
 
 static void answer_state(answer *out, const char *state) {

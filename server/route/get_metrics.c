@@ -9,7 +9,7 @@ void get_metrics(call *in, answer *out) {
     buffer b = {0};
     for (size_t i = 0; i < snapshot->n_scenes; i++) {
         const scene *one = snapshot->scenes[i];
-        /* Of a variant only what its base does not lend. */
+        /* Of a variant only the memory that is not its base's. */
         gauges.operator_bytes += one->base != NULL ? one->bytes : lam_operator_bytes(one->op);
         stores.n_damaged += scene_damaged(one, NULL, NULL);
         stores.n_unverified += !scene_verified(one);

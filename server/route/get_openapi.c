@@ -1,5 +1,4 @@
-/* GET /v1/openapi.json: the description of all routes, server/route/openapi.json as it was when this was
- * built. */
+/* GET /v1/openapi.json: the description of all routes, the file server/route/openapi.json. */
 #include "server/route/openapi.h"
 #include "server/route/routes.h"
 

@@ -1,5 +1,5 @@
-/* POST /v1/scenes/NAME/adjoint: the gradient of a weighted sum of radiosities, by what shines and by what
- * reflects. gradient.h has the formulas. */
+/* POST /v1/scenes/NAME/adjoint: gradients of J = g . q by emission, reflectance, sky and emitters. gradient.h
+ * has the formulas. */
 #include "server/route/routes.h"
 #include "server/scene/gradient.h"
 #include "solver/codec/adjoint.h"
@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-/* All [C][n] but the narrow ones, in the thread's own memory. */
+/* Arrays [C][n] in the workspace of the thread. */
 typedef struct adjoint_memory {
     float *w, *H, *H0, *v;
     float *narrow; /* [C][m] of tiles, or [C][s] of emitters */
@@ -19,7 +19,7 @@ static size_t narrow_width(const scene *s) {
     return s->n_emitters > 0 ? s->n_emitters : s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
 }
 
-/* The next count floats behind *total bytes, aligned as malloc does. */
+/* *at: the offset of count floats behind *total bytes, aligned to 64 bytes; false on overflow. */
 static bool take(size_t count, size_t *at, size_t *total) {
     size_t bytes;
     *at = *total;
@@ -47,7 +47,7 @@ static bool get_memory(call *in, const adjoint_request *request, adjoint_memory 
     return true;
 }
 
-/* The irradiance of what shines, and that of its sky, *H0: NULL without one. */
+/* Irradiance H of the emission and its sky; *H0 is that of the sky alone, NULL without one. */
 static bool solve_irradiance(const scene *s, const radiosity_request *light, adjoint_memory *memory,
                              const float **H0, problem *why) {
     lam_error error;
@@ -61,7 +61,7 @@ static bool solve_irradiance(const scene *s, const radiosity_request *light, adj
            problem_set(why, 500, "%s", error.message);
 }
 
-/* Fills what is asked for: w, by reflectance H, by tile or emitter narrow. */
+/* Computes the gradients asked for: by emission in w, by reflectance in H, by tile or emitter in narrow. */
 static bool solve(const scene *s, const adjoint_request *request, adjoint_memory *memory, metrics *m,
                   problem *why) {
     const float *g = request->cotangent.E, *H0;
@@ -87,15 +87,13 @@ static bool solve(const scene *s, const adjoint_request *request, adjoint_memory
     return true;
 }
 
-/* --- the answer ----------------------------------------------------------------------------------------- */
-
 static const float *gradient_values(const scene *s, const adjoint_memory *memory, gradient_kind kind,
                                     size_t *width) {
     *width = kind == GRADIENT_EMISSION || kind == GRADIENT_REFLECTANCE ? s->n : narrow_width(s);
     return kind == GRADIENT_EMISSION ? memory->w : kind == GRADIENT_REFLECTANCE ? memory->H : memory->narrow;
 }
 
-/* An array holds one gradient: the only one that was named. */
+/* An array holds one gradient, the one that was named. */
 static bool write_npy(const call *in, const adjoint_request *request, const adjoint_memory *memory, buffer *b,
                       problem *why) {
     const size_t C = in->scene->n_channels;
@@ -132,7 +130,7 @@ static bool read_body(const call *in, adjoint_request *request, problem *why) {
     if (in->accept.type == MEDIA_JSON) return true;
     if (request->n_named > 1)
         return problem_set(why, 422, "an NPY answer holds one array; ask for one gradient, or for JSON");
-    request->wanted = 1u << request->named[0]; /* the sky would not be heard of */
+    request->wanted = 1u << request->named[0]; /* an NPY answer has no gradient by sky */
     return true;
 }
 
@@ -147,7 +145,7 @@ void post_adjoint(call *in, answer *out) {
     const double parsed = call_now_ms();
     notes.parse_ms = parsed - start;
     notes.quantity = request.quantity;
-    notes.has_error = false; /* the figures are of answers, not of gradients */
+    notes.has_error = false; /* error figures are of answers, not of gradients */
     in->n_rhs = 1;
     good = good && solve(in->scene, &request, &memory, in->service->metrics, &why);
     notes.solve_ms = call_now_ms() - parsed;

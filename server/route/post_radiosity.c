@@ -1,5 +1,5 @@
-/* POST /v1/scenes/NAME/radiosity: emission in, light out. Reads on the thread that has the request, shares
- * passes over the operator with other clients, writes on whichever thread is free. */
+/* POST /v1/scenes/NAME/radiosity: emission in, radiosity out. begin reads the body, pass computes vectors
+ * together with those of other clients, end writes the answer; each on any thread. */
 #include "server/route/radiosity_figures.h"
 #include "server/route/refined_answer.h"
 #include "server/route/routes.h"
@@ -8,18 +8,18 @@
 
 #include <stdlib.h>
 
-/* From begin to end. */
+/* The state of a solve from begin to end. */
 typedef struct radiosity_solve {
     radiosity_request request;
     answer_notes notes;
     answer_shape shape;
     buffer answer;
-    float *out;             /* [n_rhs][C][n_values]: in the answer, where its encoding allows, or own */
-    float *own;             /* else NULL */
-    float *H0;              /* [n_rhs][C][n], what the sky gives; NULL where no vector is under one */
-    double *figures;        /* of reduce, in place of the answer's values; else NULL */
-    float *W;               /* [n_rhs][C][s], weights of the store's emitters; NULL where it has none */
-    refined_solve *refined; /* where a tolerance is asked for; else NULL */
+    float *out;             /* [n_rhs][C][n_values]: inside `answer` if its encoding allows, else own */
+    float *own;             /* or NULL */
+    float *H0;              /* [n_rhs][C][n], direct irradiance of the sky; NULL if no vector has a sky */
+    double *figures;        /* of reduce, in place of values; else NULL */
+    float *W;               /* [n_rhs][C][s], weights of a store of emitters; else NULL */
+    refined_solve *refined; /* for a request with a tolerance; else NULL */
     problem why;            /* of a pass that failed */
     bool failed;
 } radiosity_solve;
@@ -35,7 +35,7 @@ static void solve_free(radiosity_solve *s) {
     free(s);
 }
 
-/* [n_rhs][C][width] floats, not cleared; NULL when memory is short. */
+/* [n_rhs][C][width] floats, not cleared; NULL if memory is short. */
 static float *allocate_rows(const radiosity_solve *s, size_t width) {
     size_t count;
     if (!size_multiply(s->shape.n_rhs, s->shape.n_channels, &count) || !size_multiply(count, width, &count) ||
@@ -44,7 +44,7 @@ static float *allocate_rows(const radiosity_solve *s, size_t width) {
     return malloc(count > 0 ? count : 1);
 }
 
-/* What the sky gives, or the weights of the store's emitters that an emission stands for. */
+/* Computes the direct irradiance of skies, or, for a store of emitters, the weights of these. */
 static bool find_light(const scene *s, radiosity_solve *solve, problem *why) {
     const radiosity_request *request = &solve->request;
     const size_t C = s->n_channels, n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0;
@@ -68,8 +68,8 @@ static bool find_light(const scene *s, radiosity_solve *solve, problem *why) {
     return true;
 }
 
-/* Room for the answer's values, where possible where they are sent from; figures come of values that are not.
- */
+/* Allocates the values of the answer, if possible inside the body that is sent. With reduce the values are
+ * scratch for the figures. */
 static bool find_room(call *in, radiosity_solve *s, problem *why) {
     const reduce_request *reduce = &s->request.reduce;
     if (reduce->on) {
@@ -107,7 +107,7 @@ static bool begin(call *in, answer *out) {
                               .n_values = request->select ? request->n_selected : of->n};
     in->n_rhs = request->n_rhs;
     good = good && figures_acceptable(in, request, &why);
-    /* One takes no pass and is answered at once. */
+    /* A linear reduction takes no pass and is answered at once. */
     const bool linear = good && request->reduce.linear, refine = good && request->tolerance > 0;
     good = linear   ? figures_linear(in, &s->request, &s->notes, &s->answer, &why)
            : refine ? refined_begin(in, request, &s->notes, &s->refined, &why)
@@ -122,16 +122,16 @@ static bool begin(call *in, answer *out) {
     }
     in->state = s;
     in->job.n_vectors = request->n_rhs;
-    /* Whole answers share passes; those of some elements, and of emitters, have passes of their own. What is
-     * refined takes many times as long: one such pass at a time, whoever asks, leaves the other threads to
-     * all others. */
+    /* Answers for all elements share passes. Answers for selected elements, and of emitters, have passes of
+     * their own. Refined answers take many times as long: one common key lets one such pass run at a time,
+     * and leaves the other threads to other requests. */
     in->job.key = refine                                  ? (const void *)in->service->queue
                   : request->select || of->n_emitters > 0 ? (const void *)in
                                                           : of->op;
     return true;
 }
 
-/* The work area of a pass; NULL, and why, when memory is short. */
+/* The work area of a pass; NULL and *why if memory is short. */
 static void *get_work(const scene *s, size_t n_rhs, batch_workspace *workspace, size_t *bytes, problem *why) {
     *bytes = lam_operator_work_bytes(s->op, n_rhs);
     void *work = *bytes > 0 ? batch_workspace_get(workspace, *bytes) : NULL;
@@ -147,8 +147,8 @@ static lam_status pass_of_emitters(const scene *s, const radiosity_solve *solve,
         request->n_selected, request->select ? request->selected : NULL, out, work, bytes, error);
 }
 
-static lam_status pass_of_some(const scene *s, const radiosity_solve *solve, const batch_part *part,
-                               float *out, void *work, size_t bytes, lam_error *error) {
+static lam_status pass_of_selected(const scene *s, const radiosity_solve *solve, const batch_part *part,
+                                   float *out, void *work, size_t bytes, lam_error *error) {
     const radiosity_request *request = &solve->request;
     const size_t before = part->first * s->n_channels * s->n;
     return lam_operator_apply_selected(s->op, part->count, request->quantity, request->E + before,
@@ -165,7 +165,7 @@ static void pass_refined(const batch_part *parts, size_t n_parts) {
     }
 }
 
-/* The parts are of one scene, or all to be refined; several only of whole answers. */
+/* Parts are of one scene, or all of them refined. There are several only for answers for all elements. */
 static void pass(const batch_part *parts, size_t n_parts, batch_workspace *workspace) {
     const call *first = call_of(parts[0].job);
     const scene *s = first->scene;
@@ -193,7 +193,7 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
     if (work != NULL) {
         const lam_status status =
             s->n_emitters > 0     ? pass_of_emitters(s, one, parts, shared[0].out, work, bytes, &error)
-            : one->request.select ? pass_of_some(s, one, parts, shared[0].out, work, bytes, &error)
+            : one->request.select ? pass_of_selected(s, one, parts, shared[0].out, work, bytes, &error)
                                   : lam_operator_apply_parts(s->op, n_parts, shared, work, bytes, &error);
         if (status != LAM_OK) problem_set(&why, 500, "%s", error.message);
     }
@@ -208,7 +208,7 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
     }
 }
 
-/* Whether the figures of what was solved, or the values themselves, are in the answer. */
+/* Writes figures or values into the answer; false with s->why. */
 static bool write_answer(call *in, radiosity_solve *s) {
     const double start = call_now_ms();
     bool good = !s->failed;
@@ -229,7 +229,7 @@ static void end(call *in, answer *out) {
     if (write_answer(in, s)) {
         answer_json(out, &s->answer, true);
         if (in->accept.type == MEDIA_NPY) out->type = "application/x-npy";
-        if (s->refined != NULL) refined_answer_tell(&s->notes, s->request.n_rhs, out);
+        if (s->refined != NULL) refined_set_headers(&s->notes, s->request.n_rhs, out);
     } else {
         answer_problem(out, &s->why);
     }

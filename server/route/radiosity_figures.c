@@ -10,8 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What the thread of all input and output may read of a body, and compute for it: well below a millisecond.
- */
+/* Limits of a request that the I/O thread answers itself, well below a millisecond: bytes of the body,
+ * products, bytes of emission. */
 #define QUICK_BODY ((size_t)32 << 10)
 #define QUICK_WORK ((size_t)100000)
 #define QUICK_BYTES ((size_t)1 << 20)
@@ -42,7 +42,7 @@ bool figures_write(const scene *s, const radiosity_request *request, const doubl
            problem_set(why, 503, "not enough memory for the answer; ask for fewer vectors or groups");
 }
 
-/* *weights [n_rhs][C][s] of a store of few emitters, all that shines in them. */
+/* *weights [n_rhs][C][s]: the whole emission of each vector as weights of emitters; NULL if not needed. */
 static bool weights_of(const call *in, radiosity_request *request, float **weights, problem *why) {
     const scene *s = in->scene;
     const size_t row = s->n_channels * s->n_emitters;
@@ -63,7 +63,7 @@ static bool weights_of(const call *in, radiosity_request *request, float **weigh
     return true;
 }
 
-/* The figures from rows, one a name. */
+/* Computes and writes the figures from rows, one for each name. */
 static bool evaluate(const call *in, radiosity_request *request, adjoint_row *const *rows,
                      answer_notes *notes, buffer *b, problem *why) {
     const scene *s = in->scene;

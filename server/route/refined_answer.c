@@ -9,13 +9,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What a pass works with; NULL where it is not needed. */
+/* Arrays of a pass; NULL if not needed. */
 typedef struct pass_memory {
     double *E, *H0, *out; /* [BATCH_PASS][C][n] */
     double *L;            /* [BATCH_PASS][C][m] */
     double *some;         /* [BATCH_PASS][C][selected] */
-    float *start;         /* [BATCH_PASS][C][n], of a store of few emitters: its own answer */
-    float *W;             /* [BATCH_PASS][C][s], their weights */
+    float *start; /* [BATCH_PASS][C][n], of a store of emitters: its own answer, the start of the iteration */
+    float *W;     /* [BATCH_PASS][C][s], weights of emitters */
     void *work;
     size_t work_bytes;
 } pass_memory;
@@ -26,11 +26,11 @@ struct refined_solve {
     double *certificates; /* [n_rhs] */
     size_t *iterations;   /* [n_rhs] */
     double *figures;      /* of reduce, in place of the values; else NULL */
-    bool made;            /* p is */
+    bool made;            /* p is allocated */
     pass_memory p;
 };
 
-static void free_pass(pass_memory *p) {
+static void pass_memory_free(pass_memory *p) {
     free(p->E);
     free(p->H0);
     free(p->out);
@@ -41,7 +41,8 @@ static void free_pass(pass_memory *p) {
     free(p->work);
 }
 
-static bool get_pass(const scene *s, const radiosity_request *request, pass_memory *p, problem *why) {
+static bool pass_memory_allocate(const scene *s, const radiosity_request *request, pass_memory *p,
+                                 problem *why) {
     const size_t vectors = request->n_rhs < BATCH_PASS ? request->n_rhs : BATCH_PASS,
                  rows = vectors * s->n_channels;
     const size_t row = s->n * sizeof(double);
@@ -78,7 +79,7 @@ static bool refuse(lam_status status, const lam_error *error, problem *why) {
     return problem_set(why, as, "%s", error->message);
 }
 
-/* E and H0 of what weights of emitters send out, and the store's own answer to them as a start. */
+/* E and H0 of the weights of emitters, and the store's own answer to these as the start of the iteration. */
 static bool light_emitters(const scene *s, const radiosity_request *request, size_t first, size_t count,
                            pass_memory *p, problem *why) {
     const size_t C = s->n_channels, weights = C * s->n_emitters;
@@ -107,7 +108,7 @@ static void light_any(const scene *s, const radiosity_request *request, size_t f
     sky_irradiance_double(s->sky, count * C, p->L, p->H0);
 }
 
-/* Vectors first ... first + count, refined and, where elements are selected, theirs; NULL with *why. */
+/* Refines vectors first ... first + count; returns them, or their selected elements, or NULL with *why. */
 static const double *refine(const scene *s, const lam_refiner *refiner, const radiosity_request *request,
                             size_t first, size_t count, pass_memory *p, double *certificates,
                             size_t *iterations, problem *why) {
@@ -152,7 +153,7 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
            problem_set(why, 503, "not enough memory for %zu certificates", request->n_rhs);
 }
 
-/* What refines; the first time of a scene takes as long as its form factors are large. */
+/* The refiner of a scene; its first use reads the form factors. */
 static bool find_refiner(const scene *s, const lam_refiner **refiner, problem *why) {
     lam_error error;
     const lam_status status = refined_get(s->refined, refiner, &error);
@@ -174,7 +175,7 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
     bool good = find_refiner(s, &refiner, why);
     if (good && !r->made) {
         r->made = true;
-        good = get_pass(s, request, &r->p, why) &&
+        good = pass_memory_allocate(s, request, &r->p, why) &&
                (r->figures != NULL || answer_begin(b, &r->shape, &r->as, notes, why));
     }
     const double *x = good ? refine(s, refiner, request, first, count, &r->p, r->certificates + first,
@@ -188,7 +189,7 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
                               count, (reduce_values){.doubles = x}, r->figures) ||
                problem_set(why, 503, "not enough memory to reduce %zu vectors", count);
     for (size_t v = 0; good && r->figures == NULL && v < count; v++) {
-        /* One by one: what a vector is rounded by is its own affair. */
+        /* One by one: each vector has its own rounding error, which counts in its certificate. */
         double rounding = 0;
         good = answer_add_doubles(b, &r->shape, &r->as, first + v, 1,
                                   x + v * s->n_channels * r->shape.n_values, &rounding, why);
@@ -212,11 +213,11 @@ void refined_free(refined_solve *r, answer_notes *notes) {
     free(r->certificates);
     free(r->iterations);
     free(r->figures);
-    free_pass(&r->p);
+    pass_memory_free(&r->p);
     free(r);
 }
 
-void refined_answer_tell(const answer_notes *notes, size_t n_rhs, answer *out) {
+void refined_set_headers(const answer_notes *notes, size_t n_rhs, answer *out) {
     out->refined = true;
     for (size_t v = 0; v < n_rhs; v++) {
         out->certificate = fmax(out->certificate, notes->certificates[v]);

@@ -1,4 +1,4 @@
-/* The part of POST .../radiosity that is asked for a tolerance. */
+/* Radiosity requests with a tolerance: refined in double until the error is certified. */
 #ifndef LAMBERT_SERVER_ROUTE_REFINED_ANSWER_H
 #define LAMBERT_SERVER_ROUTE_REFINED_ANSWER_H
 
@@ -6,28 +6,28 @@
 #include "solver/codec/answer.h"
 #include "solver/codec/request.h"
 
-/* One such request, from begin to end. */
+/* The state of one request from begin to end. */
 typedef struct refined_solve refined_solve;
 
 /* Begins the answer; the certificates in notes are freed by refined_free. Errors: 503. */
 bool refined_begin(call *in, const radiosity_request *request, answer_notes *notes, refined_solve **out,
                    problem *why);
 
-/* Refines vectors first ... first + count, at most BATCH_PASS, and writes them to b, one pass after the other
- * in their order. Once this was false the others are not tried. Errors: 422 where the store keeps no form
- * factors, the tolerance is more than can be certified or the store's emitters cannot give the emission; 503
- * when memory is short or the store's file has changed; 500 when it is damaged. */
+/* Refines vectors first ... first + count, at most BATCH_PASS, and appends them to b; passes come in order,
+ * and none after one that failed. Errors: 422 if the store keeps no form factors, the tolerance cannot be
+ * certified or the store's emitters cannot give the emission; 503 if memory is short or the store's file has
+ * changed; 500 if it is damaged. */
 bool refined_pass(call *in, const radiosity_request *request, size_t first, size_t count, refined_solve *r,
                   answer_notes *notes, buffer *b, problem *why);
 
-/* The rest of the answer. */
+/* Writes the end of the answer. */
 bool refined_end(const call *in, const radiosity_request *request, const refined_solve *r,
                  const answer_notes *notes, buffer *b, problem *why);
 
-/* Either may be empty. */
+/* r may be NULL. */
 void refined_free(refined_solve *r, answer_notes *notes);
 
-/* What goes beside the body: the largest of certificates and iterations. */
-void refined_answer_tell(const answer_notes *notes, size_t n_rhs, answer *out);
+/* Sets the header figures of the answer: the largest certificate and number of iterations. */
+void refined_set_headers(const answer_notes *notes, size_t n_rhs, answer *out);
 
 #endif

@@ -10,10 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Longest body: every group of a large scene by a long name. */
+/* Longest body: enough for every group of a large scene by a long name. */
 #define BODY_MOST ((size_t)8 << 20)
 
-/* Whatever does not depend on the body. */
+/* The checks that do not depend on the body. */
 static bool check_scene(const call *in, problem *why) {
     const scene *s = in->scene;
     if (in->service->config->max_variants == 0)
@@ -33,13 +33,13 @@ static bool check_scene(const call *in, problem *why) {
     return true;
 }
 
-/* What stands in a URL as it is: letters, digits and these. */
+/* True for characters that need no escape in a path: letters, digits and these. */
 static bool is_plain(char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
            (c != '\0' && strchr("-._~@", c) != NULL);
 }
 
-/* The path of a scene; NULL when memory is short. */
+/* The path of a scene; NULL if memory is short. */
 static char *path_of(const char *name) {
     static const char before[] = "/v1/scenes/";
     char *path = malloc(sizeof before + 3 * strlen(name)), *to = path;
@@ -51,14 +51,14 @@ static char *path_of(const char *name) {
     return path;
 }
 
-/* The scene as the snapshot has it, to be held. */
+/* The scene without const, to be held. */
 static scene *scene_of(const call *in) {
     size_t i = 0;
     while (in->snapshot->scenes[i] != in->scene) i++;
     return in->snapshot->scenes[i];
 }
 
-/* The reflectances of request are handed on. */
+/* Queues the variant; takes over the reflectances of request. */
 static bool put(const call *in, reflectance_request *request, char **location, problem *why) {
     char name[ROUTE_NAME_MAX];
     float *reflectance = request->reflectance;

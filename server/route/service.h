@@ -1,4 +1,4 @@
-/* What all requests share. */
+/* State that all requests share. */
 #ifndef LAMBERT_SERVER_ROUTE_SERVICE_H
 #define LAMBERT_SERVER_ROUTE_SERVICE_H
 
@@ -18,11 +18,11 @@ typedef struct service {
     variants *variants;
     metrics *metrics;
     batch_queue *queue;
-    token token;              /* empty: none is asked for */
+    token token;              /* empty: none is needed */
     FILE *access_log;         /* NULL: none */
     atomic_int state;         /* a service_state */
     connections *connections; /* from http_start to http_stop */
-    atomic_size_t body_bytes; /* of requests whose bodies are held */
+    atomic_size_t body_bytes; /* bytes of request bodies in memory */
 } service;
 
 #endif

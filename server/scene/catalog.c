@@ -102,7 +102,7 @@ lam_status catalog_create(const config *c, FILE *out, FILE *problems, catalog **
     atomic_init(&empty->references, 1);
     all->config = c;
     atomic_init(&all->ledger.taken, 0);
-    atomic_init(&all->ledger.room, 0); /* until it is known what the stores leave */
+    atomic_init(&all->ledger.room, 0); /* until the memory of the stores is known */
     all->out = out;
     all->problems = problems;
     TRY(verifier_start(out, problems, &all->verifier, error));
@@ -164,7 +164,7 @@ static scene *find_before(const catalog_snapshot *before, const source *from) {
     return NULL;
 }
 
-/* Puts s where its name belongs, or returns the scene that has the name already. */
+/* Inserts s by its name; returns the scene that has this name already, else NULL. */
 static const scene *insert(catalog_snapshot *snapshot, scene *s) {
     size_t at = 0;
     while (at < snapshot->n_scenes && strcmp(snapshot->scenes[at]->name, s->name) < 0) at++;
@@ -177,7 +177,7 @@ static const scene *insert(catalog_snapshot *snapshot, scene *s) {
     return NULL;
 }
 
-/* What the scenes of a snapshot count for, and the largest work area of a thread. */
+/* Memory of the scenes of a snapshot, and their largest work area of a thread. */
 static uint64_t memory_used(const catalog_snapshot *snapshot, size_t *work_bytes) {
     uint64_t used = 0;
     *work_bytes = 0;
@@ -189,14 +189,14 @@ static uint64_t memory_used(const catalog_snapshot *snapshot, size_t *work_bytes
     return used;
 }
 
-/* What they have come to hold since. */
+/* Memory that they have taken since they were opened. */
 static uint64_t memory_grown(const catalog_snapshot *snapshot) {
     uint64_t grown = 0;
     for (size_t i = 0; i < snapshot->n_scenes; i++) grown += scene_grown(snapshot->scenes[i]);
     return grown;
 }
 
-/* What --max-memory leaves beside the scenes, their work areas and this. */
+/* The rest of --max-memory beside the scenes, their work areas and `grown`. */
 static uint64_t memory_left(const catalog *all, const catalog_snapshot *next, uint64_t grown) {
     size_t work_bytes;
     const uint64_t used =
@@ -205,13 +205,13 @@ static uint64_t memory_left(const catalog *all, const catalog_snapshot *next, ui
     return all->config->max_memory > used ? all->config->max_memory - used : 0;
 }
 
-/* The rest is for what scenes come to hold. */
+/* The ledger gets the rest of --max-memory. */
 static void share_memory(catalog *all, const catalog_snapshot *present) {
     const uint64_t left = memory_left(all, present, 0);
     atomic_store(&all->ledger.room, left < SIZE_MAX ? (size_t)left : SIZE_MAX);
 }
 
-/* Whether a scene that is open fits with its work areas too; they are shared with the others'. */
+/* Checks that an open scene fits into --max-memory with its work areas, which all scenes share. */
 static lam_status check_work(const catalog *all, const catalog_snapshot *next, const scene *s,
                              lam_error *error) {
     const size_t threads = all->config->threads;
@@ -228,12 +228,12 @@ static lam_status check_work(const catalog *all, const catalog_snapshot *next, c
         (unsigned long long)used);
 }
 
-/* The scene of a source, as it is now. */
+/* Opens the store of a source and checks its memory. */
 static lam_status open_source(catalog *all, const catalog_snapshot *next, const source *from, scene *old,
                               scene **out, lam_error *error) {
     lam_status status = LAM_OK;
     scene *opened = NULL;
-    /* One that turned out to be damaged has to prove first that it no longer is. */
+    /* A store that was damaged is verified as a whole first. */
     const bool verify = all->config->verify || (old != NULL && scene_damaged(old, NULL, NULL));
     const scene_options options = {.path = from->path,
                                    .name = from->name,
@@ -284,14 +284,12 @@ static void load_source(catalog *all, catalog_snapshot *next, const catalog_snap
     if (loaded != old) verifier_add(all->verifier, loaded);
 }
 
-/* --- variants ------------------------------------------------------------------------------------------ */
-
-/* A variant of a scene of this very snapshot? */
+/* True if the base of a variant is a scene of this snapshot. */
 static bool has_base_of(const catalog_snapshot *snapshot, const scene *variant) {
     return catalog_find(snapshot, variant->base->name) == variant->base;
 }
 
-/* The variants in from whose base is still there. next has room. */
+/* Adds the variants in `from` whose base is in next, which has room for them. */
 static void keep_variants(catalog_snapshot *next, const catalog_snapshot *from) {
     for (size_t i = 0; i < from->n_scenes; i++) {
         scene *s = from->scenes[i];
@@ -299,7 +297,7 @@ static void keep_variants(catalog_snapshot *next, const catalog_snapshot *from) 
     }
 }
 
-static void say_dropped(const catalog_snapshot *next, const catalog_snapshot *before, FILE *problems) {
+static void report_dropped(const catalog_snapshot *next, const catalog_snapshot *before, FILE *problems) {
     for (size_t i = 0; i < before->n_scenes; i++) {
         const scene *s = before->scenes[i];
         if (s->base != NULL && catalog_find(next, s->name) != s)
@@ -307,7 +305,7 @@ static void say_dropped(const catalog_snapshot *next, const catalog_snapshot *be
     }
 }
 
-/* The present scenes but for one, with room for one more. */
+/* A copy of the present snapshot without the scene of this name, with room for one more. */
 static lam_status copy_without(const catalog_snapshot *present, const char *name, catalog_snapshot **out,
                                lam_error *error) {
     catalog_snapshot *made = memory_allocate(1, sizeof *made, "catalog", error);
@@ -366,14 +364,12 @@ done:
     return status;
 }
 
-/* --- reading -------------------------------------------------------------------------------------------- */
-
 size_t catalog_reload(catalog *all) {
     source_list sources = {0};
     lam_error error = {0};
     lam_status status = LAM_OK;
     catalog_snapshot *before = catalog_acquire(all), *next = NULL;
-    if (all->config->max_memory > 0) atomic_store(&all->ledger.room, 0); /* nothing grows meanwhile */
+    if (all->config->max_memory > 0) atomic_store(&all->ledger.room, 0); /* no scene grows meanwhile */
     for (size_t i = 0; i < all->config->n_stores; i++)
         TRY(add_source(&sources, NULL, all->config->stores[i], true, &error));
     if (all->config->stores_dir != NULL) TRY(add_folder(&sources, all->config->stores_dir, &error));
@@ -386,18 +382,18 @@ size_t catalog_reload(catalog *all) {
     for (size_t i = 0; i < sources.count; i++) load_source(all, next, before, &sources.items[i]);
     pthread_mutex_lock(&all->lock);
     catalog_snapshot *old = all->present;
-    keep_variants(next, old);               /* of the present: some may have come since before was taken */
-    atomic_fetch_add(&next->references, 1); /* ours, for what is said of it */
+    keep_variants(next, old); /* of the present snapshot, as variants may have been added after `before` */
+    atomic_fetch_add(&next->references, 1); /* our own reference, for the report */
     all->present = next;
     pthread_mutex_unlock(&all->lock);
-    say_dropped(next, old, all->problems);
+    report_dropped(next, old, all->problems);
     catalog_release(old);
 done:
     if (status != LAM_OK) fprintf(all->problems, "%s\n", error.message);
     catalog_release(next);
     catalog_release(before);
     free_sources(&sources);
-    /* What the old stores held goes back to the system: a daemon of months may not keep the most it ever had.
+    /* Returns the memory of the old stores to the system, so that a daemon does not keep its peak for months.
      */
     (void)malloc_trim(0);
     fflush(all->out);

@@ -1,4 +1,4 @@
-/* Gradients of J = sum_i g_i q_i, q being radiosity, irradiance or indirect light, from w = (dq/dE)^T g,
+/* Gradients of J = sum_i g_i q_i, q being radiosity, irradiance or indirect radiosity, from w = (dq/dE)^T g,
  * which lam_operator_apply_adjoint gives. Plain arithmetic over [C][n]; cannot fail, allocates nothing.
  *
  * With R = diag(rho), M = (I - R F)^-1 and E' = E + rho H0: B = M E', H = H0 + F B, indirect B - E' = R F B.

@@ -13,14 +13,14 @@ struct map_range {
     atomic_bool taken;
     atomic_uintptr_t begin;
     atomic_size_t bytes; /* 0: not in use */
-    atomic_size_t lost;  /* 1 + offset of the page that was touched; 0: nothing is lost */
+    atomic_size_t lost;  /* 1 + offset of the first lost page that was read; 0: none */
 };
 
 static map_range ranges[MAP_GUARD_RANGES];
-static atomic_size_t n_used; /* ranges from here on were never taken */
+static atomic_size_t n_used; /* ranges from this one on were never used */
 static size_t page_bytes;
 
-/* Puts zeros from the page at fault to the end of its range: after a cut all of that is gone. */
+/* Maps zeros from the page at fault to the end of its range: a truncated file has lost all of that. */
 static bool mend(uintptr_t address) {
     const size_t count = atomic_load(&n_used);
     for (size_t i = 0; i < count; i++) {
@@ -30,8 +30,8 @@ static bool mend(uintptr_t address) {
         const size_t page = (address - begin) / page_bytes * page_bytes;
         size_t none = 0;
         atomic_compare_exchange_strong(&ranges[i].lost, &none, page + 1);
-        /* The bare system call: POSIX does not list mmap for signal handlers, and a sanitizer that watches
-         * the function would call this a write that races with those who read. */
+        /* The system call itself: POSIX does not list mmap as safe in signal handlers, and a thread sanitizer
+         * would report its wrapper as a race with readers. */
         return syscall(SYS_mmap, begin + page, bytes - page, PROT_READ,
                        MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED, -1, 0L) != -1;
     }
@@ -41,7 +41,7 @@ static bool mend(uintptr_t address) {
 static void on_fault(int number, siginfo_t *info, void *context) {
     (void)context;
     const int before = errno;
-    /* One that was sent, or that is none of ours: the access is tried again and ends the process. */
+    /* Sent by a process, or outside all ranges: the access is repeated and ends the process. */
     if (info->si_code <= 0 || !mend((uintptr_t)info->si_addr)) signal(number, SIG_DFL);
     errno = before;
 }

@@ -8,20 +8,20 @@
 
 struct refined {
     const lam_operator *op;
-    refined *base; /* of a variant, whose form factors it uses; NULL: its own */
+    refined *base; /* of a variant: the one with the form factors; NULL: this one */
     pthread_mutex_t *stores;
     pthread_mutex_t lock; /* of F and refiner */
     char *path;           /* NULL: no form factors are kept */
     char *checksum;       /* of the file that op was read from */
     memory_ledger *ledger;
-    size_t bytes, most_bytes; /* that F takes, and on the way */
+    size_t bytes, most_bytes; /* of F in memory, and while it is read */
     atomic_size_t held;       /* of the ledger */
     lam_form_factors *F;
-    lam_refiner *refiner; /* NULL until asked for */
-    size_t helper_bytes;  /* that it takes beside F, at most */
+    lam_refiner *refiner; /* NULL until needed */
+    size_t helper_bytes;  /* of the refiner beside F, at most */
 };
 
-/* The operator again, in bytes, and their scales. */
+/* The refiner keeps the operator in one byte a number, and scales. */
 static size_t helper_bytes_of(const lam_operator *op) {
     return lam_operator_bytes(op) / 3;
 }
@@ -76,7 +76,7 @@ void refined_destroy(refined *r) {
     free(r);
 }
 
-/* The file may be another one by now, although this scene is still served. */
+/* Checks that the file is still the one that the scene was read from. */
 static lam_status read_form_factors(refined *r, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
@@ -96,7 +96,7 @@ done:
     return status;
 }
 
-/* The same within what --max-memory leaves. */
+/* The same within the memory that the ledger has. */
 static lam_status take_form_factors(refined *r, lam_error *error) {
     lam_status status = LAM_OK;
     if (!memory_ledger_take(r->ledger, r->most_bytes))
@@ -109,7 +109,7 @@ static lam_status take_form_factors(refined *r, lam_error *error) {
     return status;
 }
 
-/* *F is NULL where none are kept. */
+/* *F is NULL if the store keeps none. */
 static lam_status get_form_factors(refined *r, const lam_form_factors **F, lam_error *error) {
     lam_status status = LAM_OK;
     pthread_mutex_lock(&r->lock);

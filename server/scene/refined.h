@@ -1,4 +1,4 @@
-/* Answers refined until they are certified: what that takes of a scene, and the whole of such an answer. */
+/* The refiner of a scene (lam_refiner) and the form factors that it needs. */
 #ifndef LAMBERT_SERVER_SCENE_REFINED_H
 #define LAMBERT_SERVER_SCENE_REFINED_H
 
@@ -7,26 +7,25 @@
 
 #include <pthread.h>
 
-/* The form factors of a store, which are read when they are first asked for and then kept: they may be many
- * times as large as the operator. Any thread. */
+/* Form factors may be many times as large as the operator: they are read when first needed, and then kept.
+ * Any thread. */
 typedef struct refined refined;
 
-/* Notes whether the open store s, op is of, keeps form factors, and how large they are. op, stores and ledger
- * (or NULL) outlive it; whoever opens a store holds stores. Errors: LAM_ERR_MEMORY, those of
- * form_factors_size. */
+/* Records if the open store s of op keeps form factors, and their size. op, stores and ledger (or NULL)
+ * outlive it; `stores` is held while a store is open. Errors: LAM_ERR_MEMORY, those of form_factors_size. */
 lam_status refined_create(store *s, const lam_operator *op, pthread_mutex_t *stores, memory_ledger *ledger,
                           refined **out, lam_error *error);
 
-/* Of a variant: op is another operator of base's elements. Both outlive it. Errors: LAM_ERR_MEMORY. */
+/* For a variant: op is another operator for the elements of base. Both outlive it. Errors: LAM_ERR_MEMORY. */
 lam_status refined_create_variant(refined *base, const lam_operator *op, refined **out, lam_error *error);
 
-/* What refines op's answers; *refiner is NULL where the store keeps no form factors, else it lives as long as
- * r. The first call reads them, takes their memory and finds the bound on the inverse; others wait for it.
- * Errors: LAM_ERR_IO (also where the file is another one by now), LAM_ERR_MEMORY (also of the ledger),
- * LAM_ERR_DAMAGED, LAM_ERR_FORMAT, LAM_ERR_NUMERIC (nothing can be certified). */
+/* The refiner of op, which lives as long as r; NULL if the store keeps no form factors. The first call reads
+ * them, takes their memory and computes the bound on the inverse, while others wait. Errors: LAM_ERR_IO (also
+ * if the file was replaced), LAM_ERR_MEMORY (also of the ledger), LAM_ERR_DAMAGED, LAM_ERR_FORMAT,
+ * LAM_ERR_NUMERIC (nothing can be certified). */
 lam_status refined_get(refined *r, const lam_refiner **refiner, lam_error *error);
 
-/* Bytes taken of the ledger. Any thread, waits for nobody. */
+/* Bytes taken of the ledger. Any thread; does not wait. */
 size_t refined_held(refined *r);
 
 /* NULL is allowed. */

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What a scene may keep of adjoint rows. */
+/* Limit of the adjoint rows of a scene. */
 #define ADJOINT_ROWS_BYTES ((size_t)256 << 20)
 
 enum { HEALTH_UNKNOWN, HEALTH_SOUND, HEALTH_DAMAGED };
@@ -90,7 +90,7 @@ done:
     return status;
 }
 
-/* The total error that an answer carries: the scene's own lights, else single elements, else none. */
+/* The total error for answers: of the scene's own lights, else of single elements, else none. */
 static void read_error(store *s, scene *made) {
     static const char *const groups[] = {"/error/lights", "/error/single"};
     for (size_t i = 0; i < 2 && !made->has_error; i++)
@@ -130,8 +130,8 @@ done:
     return status;
 }
 
-/* The work area that a thread keeps for the passes it makes; vectors and answers are their requests'. */
-static size_t work_of(const scene *s) {
+/* The work area of a thread for its passes; vectors and answers belong to requests. */
+static size_t pass_work_bytes(const scene *s) {
     return lam_operator_work_bytes(s->op, BATCH_PASS);
 }
 
@@ -139,8 +139,8 @@ uint64_t scene_work_memory(size_t n_threads, size_t work_bytes) {
     return (uint64_t)n_threads * work_bytes;
 }
 
-/* What a store counts for, found before anything large of it is read: the bytes of its operator, as it is
- * kept, and its sky, mapped or read. */
+/* *memory: bytes of the operator in memory and of the sky, mapped or read, found before anything large is
+ * read. */
 static lam_status memory_of(store *s, uint64_t *memory, uint64_t *operator_bytes, lam_error *error) {
     lam_status status = LAM_OK;
     char *kind = NULL;
@@ -154,8 +154,8 @@ done:
     return status;
 }
 
-/* A thread is woken for its part of a pass in about the time that it takes to go through so much; with less
- * to do it only holds up the others. */
+/* Waking a thread for a part of a pass takes about as long as reading this many bytes; a smaller part costs
+ * more than it saves. */
 #define LEAST_OF_THREAD ((size_t)8 << 20)
 
 static size_t threads_of(const lam_operator *op, size_t most) {
@@ -180,7 +180,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     lam_operator_set_threads(made->op, threads_of(made->op, options->threads));
     TRY(sky_load(s, made->n, &made->sky, error));
     made->n_emitters = lam_operator_emitters(made->op);
-    made->work_bytes = work_of(made);
+    made->work_bytes = pass_work_bytes(made);
     TRY(read_groups(s, made, error));
     TRY(read_area(s, made, error));
     made->ledger = options->ledger;
@@ -194,7 +194,7 @@ done:
     return status;
 }
 
-/* Whether the store is what the scene so far was made of, and nothing speaks against that one. */
+/* True if the file is the one that the present scene was read from, and that scene is not damaged. */
 static bool is_unchanged(const scene_options *options, const store *s) {
     return options->before != NULL && store_identity_same(&options->before->identity, store_identity_of(s)) &&
            !scene_damaged(options->before, NULL, NULL);

@@ -1,5 +1,5 @@
-/* One store, ready to answer, or a variant of one: immutable but for its health and the rows it keeps,
- * counted by who uses it. Its large arrays are mapped, all else is read. */
+/* A store that is served, or a variant of one. Immutable except for its health and its cache of adjoint rows;
+ * reference-counted. Large arrays are mapped, all others are read. */
 #ifndef LAMBERT_SERVER_SCENE_SCENE_H
 #define LAMBERT_SERVER_SCENE_SCENE_H
 
@@ -13,18 +13,18 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Whether what is mapped is known to be what was written. */
+/* The state of the comparison of mapped arrays with their checksums. */
 typedef struct scene_health scene_health;
 
 typedef struct scene scene;
 struct scene {
     atomic_size_t references;
     char *name;   /* as served */
-    bool renamed; /* the name was given, it is not the store's own */
+    bool renamed; /* the name was given on the command line, it is not the store's own */
     char *path;
     store_identity identity;
-    scene *base; /* of a variant: held; its path, groups, areas, sky, health and factors are lent. NULL: of a
-                    store */
+    scene *base; /* of a variant, held: path, groups, areas, sky, health and factors belong to it. NULL: this
+                    is a store */
     size_t n;
     size_t n_channels;
     lam_operator *op;
@@ -34,64 +34,62 @@ struct scene {
     lam_sky *sky;      /* NULL: none */
     size_t n_emitters; /* 0: the store answers any emission */
     uint64_t bytes;    /* of /operator as stored; of a variant, of the cores alone */
-    uint64_t memory;   /* what it counts for in --max-memory, without work areas */
-    size_t work_bytes; /* the work area of a thread that solves, at most */
+    uint64_t memory;   /* bytes counted against --max-memory, without work areas */
+    size_t work_bytes; /* largest work area of a thread that solves */
     char *description; /* the JSON of GET /v1/scenes/NAME */
-    bool has_error;    /* the store's total error, of its own lights or else of single elements */
+    bool has_error;    /* of the store: total error for its own lights, or else for single elements */
     double relative_mean, indirect_mean;
-    memory_ledger *ledger; /* of what is held beyond memory; or NULL */
-    row_cache *rows;       /* what reduces by a product; any thread */
-    refined *refined;      /* what refining its answers takes, found when it is first asked for */
+    memory_ledger *ledger; /* of memory taken later; or NULL */
+    row_cache *rows;       /* adjoint rows for linear reductions; any thread */
+    refined *refined;      /* the refiner of its answers, made when first needed */
     store_map *map;        /* held; NULL: nothing is mapped */
     scene_health *health;
-    scene *next_to_verify; /* verifier.c's */
+    scene *next_to_verify; /* private to verifier.c */
 };
 
-/* How a store is opened. */
 typedef struct scene_options {
     const char *path, *name; /* name NULL: the store's own */
-    bool verify;     /* compare everything in the file with its checksums first, also what is not read */
-    uint64_t memory; /* what it may count for; UINT64_MAX: anything */
+    bool verify;             /* first compare the whole file with its checksums */
+    uint64_t memory;         /* limit of its memory in bytes; UINT64_MAX: none */
     memory_ledger *ledger;   /* or NULL; outlives the scene */
-    scene *before;           /* the scene of this path and name so far, or NULL */
-    size_t threads;          /* that one answer may use */
-    pthread_mutex_t *stores; /* outlives the scene: whoever opens a store holds it, the caller of this too */
+    scene *before;           /* the present scene of this path and name, or NULL */
+    size_t threads;          /* for one answer, at most */
+    pthread_mutex_t *stores; /* outlives the scene; held by everyone who opens a store, also by the caller */
 } scene_options;
 
-/* Opens a store; its file is closed again before this returns, but for what is mapped. Verified here: headers
- * and checksums of checksums, /mesh, and whatever is not mapped. What is mapped is left to scene_verify,
- * unless options->verify. When the file is still that of options->before, and no damage of it is known, that
- * is given out again. Errors: as store_open and operator_load; LAM_ERR_MEMORY names the sizes where it does
- * not fit. Each names the path. One thread at a time. */
+/* Opens a store. The file is closed before this returns, except for its mapped arrays. Headers, checksums of
+ * checksums, /mesh and all arrays that are not mapped are verified here; mapped arrays are left to
+ * scene_verify, unless options->verify. If the file is still that of options->before, of which no damage is
+ * known, that scene is returned. Errors: as store_open and operator_load; LAM_ERR_MEMORY names the sizes if
+ * it does not fit. Each names the path. One thread at a time. */
 lam_status scene_open(const scene_options *options, scene **out, lam_error *error);
 
-/* What a scene has come to hold since it was opened, of its ledger. Any thread. */
+/* Bytes that the scene has taken of its ledger since it was opened. Any thread. */
 uint64_t scene_grown(const scene *s);
 
-/* What scenes of these work areas count for. */
+/* Bytes of the work areas of n_threads threads. */
 uint64_t scene_work_memory(size_t n_threads, size_t work_bytes);
 
-/* A scene beside base, which it holds: op (taken over, also on an error) is base's operator relit; groups is
- * the JSON object of its reflectances, for the description. It has no error figures: those of the base were
- * measured under other reflectances. Any thread. Errors: LAM_ERR_MEMORY. */
+/* Makes a variant of base, which it holds. op (taken over, also on an error) is base's operator for other
+ * reflectances; groups is the JSON object of these, for the description. A variant has no error figures:
+ * those of the base were measured under other reflectances. Any thread. Errors: LAM_ERR_MEMORY. */
 lam_status scene_open_variant(scene *base, const char *name, const char *groups, lam_operator *op,
                               scene **out, lam_error *error);
 
-/* Another user; every one gives it back with scene_release. Any thread. */
+/* Adds a reference, to be dropped by scene_release. Any thread. */
 scene *scene_acquire(scene *s);
 void scene_release(scene *s);
 
-/* Compares what is mapped with its checksums; from LAM_ERR_DAMAGED on the scene is damaged. One thread at a
- * time, while others solve. Errors: as store_map_verify. */
+/* Compares mapped arrays with their checksums. After LAM_ERR_DAMAGED the scene is out of service. One thread
+ * at a time, while others solve. Errors: as store_map_verify. */
 lam_status scene_verify(scene *s, const atomic_int *cancel, lam_error *error);
 
-/* Whether what is mapped has been compared (also: with a bad end), or there was no need to. Any thread. */
+/* True if mapped arrays were compared, with whatever result, or nothing is mapped. Any thread. */
 bool scene_verified(const scene *s);
 
-/* Whether the scene is out of service: a block differs from its checksum or cannot be read any more, or the
- * file was written to. An
- * answer that was made before this said so the last time is not to be trusted. why names file, array and MiB;
- * *news (or NULL) is true for the first who asks. Any thread. */
+/* True if the scene is out of service: a block differs from its checksum or cannot be read any more, or the
+ * file was written to. An answer is valid only if this is still false after it was computed. why names file,
+ * array and MiB; *news (or NULL) is true for the first caller. Any thread. */
 bool scene_damaged(const scene *s, lam_error *why, bool *news);
 
 #endif

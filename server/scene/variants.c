@@ -9,7 +9,7 @@
 #include <string.h>
 #include <sys/resource.h>
 
-/* A request, until its variant is served. */
+/* A request for a variant, until it is served. */
 typedef struct build {
     struct build *next;
     char *name;
@@ -20,13 +20,13 @@ typedef struct build {
     problem why; /* of one that failed */
 } build;
 
-/* A lock of the catalog's may be taken under this one, not the other way round. */
+/* Order of locks: this one, then the catalog's. */
 struct variants {
     const config *config;
     catalog *catalog;
     pthread_mutex_t lock;
     pthread_cond_t changed;
-    build *first;   /* those that wait, in their order, and those that have failed; one of a name */
+    build *first;   /* waiting and failed builds in order of arrival; one of a name */
     build *running; /* or NULL */
     bool closed, has_thread;
     pthread_t thread;
@@ -41,8 +41,6 @@ static void build_free(build *b) {
     free(b);
 }
 
-/* --- the list ------------------------------------------------------------------------------------------- */
-
 static void add(variants *v, build *b) {
     build **at = &v->first;
     while (*at != NULL) at = &(*at)->next;
@@ -50,7 +48,8 @@ static void add(variants *v, build *b) {
     *at = b;
 }
 
-/* Where the list has this name, or waits (name NULL); its end when it does not. */
+/* The place of the build of this name in the list, or (name NULL) of the first that waits; the end if there
+ * is none. */
 static build **find(variants *v, const char *name) {
     build **at = &v->first;
     while (*at != NULL && (name != NULL ? strcmp((*at)->name, name) != 0 : (*at)->base == NULL))
@@ -68,7 +67,7 @@ static bool is_running(const variants *v, const char *name) {
     return v->running != NULL && !atomic_load(&v->running->cancelled) && strcmp(v->running->name, name) == 0;
 }
 
-/* Whether one more name would be too many: of those served, waiting, built and failed. */
+/* True if another name would exceed --max-variants; served, waiting, running and failed ones count. */
 static bool is_full(variants *v, const char *name) {
     catalog_snapshot *served = catalog_acquire(v->catalog);
     const scene *known = catalog_find(served, name);
@@ -82,9 +81,7 @@ static bool is_full(variants *v, const char *name) {
            count >= v->config->max_variants;
 }
 
-/* --- the thread ----------------------------------------------------------------------------------------- */
-
-/* Of a base that is not served any more no variant is wanted. */
+/* True if base is in the present snapshot. */
 static bool is_served(const variants *v, const scene *base) {
     catalog_snapshot *present = catalog_acquire(v->catalog);
     const bool served = catalog_find(present, base->name) == base;
@@ -102,7 +99,7 @@ done:
     return status;
 }
 
-/* What is left of a failed one is what clients are told. */
+/* Keeps the reason of a failed build for clients. */
 static void keep_failed(variants *v, build *b, lam_status status, const lam_error *error) {
     problem_set(&b->why,
                 status == LAM_ERR_MEMORY     ? 503
@@ -120,7 +117,8 @@ static void *build_all(void *context) {
     variants *v = context;
     core_use_one_thread();
     map_guard_allow();
-    /* Solves come first (only this thread is meant). Not last of all: it holds locks that others wait for. */
+    /* Lowers the priority of this thread below those that solve, but not to the lowest: it holds locks that
+     * others need. */
     (void)setpriority(PRIO_PROCESS, 0, 10);
     pthread_mutex_lock(&v->lock);
     for (;;) {
@@ -151,8 +149,6 @@ static void *build_all(void *context) {
     pthread_mutex_unlock(&v->lock);
     return NULL;
 }
-
-/* --- from outside --------------------------------------------------------------------------------------- */
 
 lam_status variants_start(const config *c, catalog *all, variants **out, lam_error *error) {
     lam_status status = LAM_OK;

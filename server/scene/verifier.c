@@ -8,7 +8,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-/* Requests go first: a tenth of a core is left while they want all of it. */
+/* Requests have priority: about a tenth of a core is left for this thread while they use all of it. */
 #define NICENESS 10
 
 struct verifier {
@@ -20,7 +20,7 @@ struct verifier {
     atomic_int stopped;
 };
 
-void verifier_tell(FILE *problems, const scene *s, const lam_error *why) {
+void verifier_report_damage(FILE *problems, const scene *s, const lam_error *why) {
     fprintf(problems, "took %s out of service: %s\n", s->name, why->message);
     fflush(problems);
 }
@@ -28,11 +28,11 @@ void verifier_tell(FILE *problems, const scene *s, const lam_error *why) {
 static void verify(verifier *v, scene *s) {
     lam_error error;
     bool news;
-    /* Nobody else holds it: it was replaced while it waited. */
+    /* This thread has the only reference: the scene was replaced while it waited. */
     if (atomic_load(&s->references) == 1) return;
     const lam_status status = scene_verify(s, &v->stopped, &error);
     if (scene_damaged(s, &error, &news)) {
-        if (news) verifier_tell(v->problems, s, &error);
+        if (news) verifier_report_damage(v->problems, s, &error);
     } else if (status == LAM_OK) {
         fprintf(v->out, "verified %s: %zu bytes\n", s->name, store_map_bytes(s->map));
         fflush(v->out);

@@ -1,4 +1,4 @@
-/* The thread that compares with their checksums what scenes have mapped, while they are served already. */
+/* The thread that compares mapped arrays with their checksums while their scenes are served. */
 #ifndef LAMBERT_SERVER_SCENE_VERIFIER_H
 #define LAMBERT_SERVER_SCENE_VERIFIER_H
 
@@ -9,17 +9,16 @@
 
 typedef struct verifier verifier;
 
-/* Says a line on `out` for each scene that is as it was written, on `problems` for each that is not. */
+/* Writes a line to `out` for each scene that was verified, to `problems` for each that is damaged. */
 lam_status verifier_start(FILE *out, FILE *problems, verifier **made, lam_error *error);
 
-/* Another scene to compare, after those that wait; nothing where there is nothing to. Once for a scene. Any
- * thread. */
+/* Queues a scene, once; does nothing if it needs no comparison. Any thread. */
 void verifier_add(verifier *v, scene *s);
 
-/* Leaves what is not compared yet; NULL is allowed. */
+/* Stops the thread, also in the middle of a comparison. NULL is allowed. */
 void verifier_stop(verifier *v);
 
-/* The line for a scene that was found to be damaged. */
-void verifier_tell(FILE *problems, const scene *s, const lam_error *why);
+/* Writes the line for a damaged scene. */
+void verifier_report_damage(FILE *problems, const scene *s, const lam_error *why);
 
 #endif
