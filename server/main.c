@@ -1,4 +1,4 @@
-/* lambertd: reads stores, answers over HTTP what light they have, until a signal ends it. */
+/* lambertd: reads stores and answers requests over HTTP until a signal ends it. */
 #include "server/http/http.h"
 #include "server/route/routes.h"
 #include "server/scene/map_guard.h"
@@ -10,23 +10,27 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <time.h>
 #include <unistd.h>
 
-/* Between its loops OpenMP's threads spin unless told otherwise before the program starts: on a machine that
- * also has clients to talk to, they should sleep. So the program starts once more. */
+/* Between its loops OpenMP's threads spin, unless the environment forbids it before the program starts. On a
+ * machine that also serves clients they should sleep, so the program starts once more. ps and pgrep would
+ * then call it "exe", after the path of the second start. */
 static void let_threads_sleep(char **argv) {
+    (void)prctl(PR_SET_NAME, program_invocation_short_name);
     if (getenv("OMP_WAIT_POLICY") != NULL || setenv("OMP_WAIT_POLICY", "passive", 1) != 0) return;
     execv("/proc/self/exe", argv);
 }
 
-/* Threads that allocate little need no heaps of their own: what each keeps of its own busiest moment made the
- * daemon grow by a tenth in its first hundred thousand requests. */
+/* Threads that allocate little need no heaps of their own. With one heap for each thread, every heap kept its
+ * largest size and the daemon grew by a tenth in its first hundred thousand requests. */
 static void share_one_heap(void) {
     (void)mallopt(M_ARENA_MAX, 1);
 }
 
-/* The signals that are waited for; blocked before any thread is started, so that none gets them. */
+/* Blocks the signals that the main thread waits for, before any thread starts, so that no thread gets them.
+ */
 static sigset_t block_signals(void) {
     sigset_t set;
     sigemptyset(&set);
@@ -49,7 +53,7 @@ done:
 }
 
 /* Reads the stores again on every SIGHUP until another signal comes. */
-static void serve_until_told(service *s, const sigset_t *signals) {
+static void serve_until_signal(service *s, const sigset_t *signals) {
     int signal_number = 0;
     for (;;) {
         if (sigwait(signals, &signal_number) != 0 || signal_number != SIGHUP) return;
@@ -99,7 +103,7 @@ static lam_status run(const config *c, const sigset_t *signals, lam_error *error
     atomic_store(&s.state, SERVICE_READY);
     printf("listening on %s\n", where);
     fflush(stdout);
-    serve_until_told(&s, signals);
+    serve_until_signal(&s, signals);
     http_quiesce(h);
     atomic_store(&s.state, SERVICE_DRAINING);
     variants_close(s.variants);

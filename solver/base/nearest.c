@@ -1,5 +1,6 @@
 #include "solver/base/nearest.h"
 
+#include <stdio.h>
 #include <string.h>
 
 static size_t smaller(size_t a, size_t b) {
@@ -47,4 +48,15 @@ const char *nearest_word(const char *word, size_t n, const char *const *words) {
         if (best == 0) break;
     }
     return nearest;
+}
+
+void nearest_advice(const char *word, size_t n, const char *const *words, char *out, size_t size) {
+    const char *nearest = nearest_word(word, n, words);
+    if (nearest != NULL) {
+        snprintf(out, size, "did you mean %s?", nearest);
+        return;
+    }
+    size_t length = (size_t)snprintf(out, size, "must be one of:");
+    for (size_t k = 0; k < n && length < size; k++)
+        length += (size_t)snprintf(out + length, size - length, " %s", words[k]);
 }

@@ -13,4 +13,8 @@
  * others. */
 const char *nearest_word(const char *word, size_t n, const char *const *words);
 
+/* Advice after an unknown word: "did you mean NEAREST?", or "must be one of: " and all words where none is
+ * near, cut at the size of out. */
+void nearest_advice(const char *word, size_t n, const char *const *words, char *out, size_t size);
+
 #endif

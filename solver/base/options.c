@@ -1,30 +1,34 @@
 #include "solver/base/options.h"
 
+#include "solver/base/nearest.h"
+#include "solver/base/option_text.h"
+
 #include <assert.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
-/* The options of every program. */
+/* The options of every command; --print-... are for installers and stand in no help. */
 typedef struct common_fields {
-    bool help;
+    bool help, manual;
+    const char *shell;
 } common_fields;
 
 static const option_row common_rows[] = {
     {.name = "help", .kind = OPTION_FLAG, .offset = offsetof(common_fields, help)},
+    {.name = "print-manual", .kind = OPTION_FLAG, .offset = offsetof(common_fields, manual)},
+    {.name = "print-completion",
+     .kind = OPTION_CHOICE,
+     .offset = offsetof(common_fields, shell),
+     .choices = OPTION_SHELLS},
     {0},
 };
 
 typedef struct parser {
     const option_command *command;
-    const option_table *tables[2]; /* the common ones and the program's */
+    const option_table *tables[2]; /* the common ones and those of the command */
     option_result *result;
 } parser;
-
-/* All rows of a list of tables. */
-#define EACH_ROW(tables, t, row)                                                                             \
-    for (const option_table *t = (tables); t->rows != NULL; t++)                                             \
-        for (const option_row *row = t->rows; row->name != NULL; row++)
 
 int options_usage(const char *name, const char *format, ...) {
     lam_error error = {0};
@@ -45,7 +49,7 @@ bool options_given(const option_result *result, const char *name) {
 }
 
 static void take_presets(const option_table *tables) {
-    EACH_ROW(tables, t, row) {
+    OPTIONS_EACH_ROW(tables, t, row) {
         lam_error error = {0};
         if (row->preset == NULL) continue;
         const lam_status status = option_read(row, row->preset, (char *)t->fields + row->offset, &error);
@@ -58,28 +62,41 @@ static bool takes_value(const option_row *row) {
     return row->kind != OPTION_FLAG;
 }
 
-/* The row of a name, or of the only name that begins so. */
-static lam_status find_name(const parser *p, const char *name, size_t length, const option_row **found,
-                            lam_error *error) {
+/* Fails with "--NAME: no such option", and names the nearest one. */
+static lam_status no_such_option(const parser *p, const char *name, lam_error *error) {
+    enum { MOST = 256 };
+    const char *names[MOST];
+    size_t n = 0;
+    OPTIONS_EACH_ROW(p->tables[1], t, row)
+    if (n < MOST) names[n++] = row->name;
+    const char *nearest = nearest_word(name, n, names);
+    if (nearest != NULL)
+        return status_fail(error, LAM_ERR_ARGUMENT, "--%s: no such option; did you mean --%s?", name,
+                           nearest);
+    return status_fail(error, LAM_ERR_ARGUMENT, "--%s: no such option; see %s --help", name,
+                       p->command->name);
+}
+
+/* The row of a name, or of the only name that begins so and is in the help. */
+static lam_status find_name(const parser *p, const char *name, const option_row **found, lam_error *error) {
     lam_status status = LAM_OK;
+    const size_t length = strlen(name);
     const option_row *longer = NULL, *other = NULL;
-    for (size_t k = 0; k < 2; k++) EACH_ROW(p->tables[k], t, row) {
-            if (strncmp(row->name, name, length) != 0) continue;
-            if (row->name[length] == '\0') {
+    for (size_t k = 0; k < 2; k++) OPTIONS_EACH_ROW(p->tables[k], t, row) {
+            if (strcmp(row->name, name) == 0) {
                 *found = row;
                 return LAM_OK;
             }
+            if (strncmp(row->name, name, length) != 0 || strncmp(row->name, "print-", 6) == 0) continue;
             if (longer == NULL)
                 longer = row;
             else if (strcmp(longer->name, row->name) != 0)
                 other = row;
         }
     if (other != NULL)
-        FAIL(error, LAM_ERR_ARGUMENT, "--%.*s: ambiguous, may be --%s or --%s", (int)length, name,
-             longer->name, other->name);
-    if (longer == NULL)
-        FAIL(error, LAM_ERR_ARGUMENT, "--%.*s: no such option; see %s --help", (int)length, name,
-             p->command->name);
+        FAIL(error, LAM_ERR_ARGUMENT, "--%s: ambiguous, may be --%s or --%s", name, longer->name,
+             other->name);
+    if (longer == NULL) TRY(no_such_option(p, name, error));
     *found = longer;
 done:
     return status;
@@ -87,7 +104,7 @@ done:
 
 static lam_status find_letter(const parser *p, char letter, const option_row **found, lam_error *error) {
     lam_status status = LAM_OK;
-    EACH_ROW(p->tables[1], t, row) {
+    OPTIONS_EACH_ROW(p->tables[1], t, row) {
         if (row->letter != letter) continue;
         *found = row;
         return LAM_OK;
@@ -101,7 +118,7 @@ done:
 static lam_status set_value(const parser *p, const char *name, const char *value, lam_error *error) {
     lam_status status = LAM_OK;
     option_result *result = p->result;
-    for (size_t k = 0; k < 2; k++) EACH_ROW(p->tables[k], t, row)
+    for (size_t k = 0; k < 2; k++) OPTIONS_EACH_ROW(p->tables[k], t, row)
     if (strcmp(row->name, name) == 0) TRY(option_read(row, value, (char *)t->fields + row->offset, error));
     if (!options_given(result, name)) {
         assert(result->n_given < OPTIONS_GIVEN_MAX);
@@ -117,8 +134,10 @@ static lam_status parse_option(const parser *p, int argc, char **argv, int *i, l
     const char *word = argv[*i], *value = NULL;
     const option_row *row = NULL;
     if (word[1] == '-') {
+        char name[64];
         const size_t length = strcspn(word + 2, "=");
-        TRY(find_name(p, word + 2, length, &row, error));
+        snprintf(name, sizeof name, "%.*s", (int)length, word + 2);
+        TRY(find_name(p, name, &row, error));
         if (word[2 + length] == '=') value = word + 2 + length + 1;
     } else {
         TRY(find_letter(p, word[1], &row, error));
@@ -163,14 +182,74 @@ int options_parse(const option_command *command, const option_table *tables, int
     const parser p = {.command = command, .tables = {common_tables, tables}, .result = &parsed};
     take_presets(tables);
     const lam_status status = parse_all(&p, argc, argv, &error);
-    if (common.help) {
-        options_help(command, tables);
-        return 0;
-    }
+    if (common.help) option_text_help(command, tables);
+    if (common.manual) option_text_manual(command, tables);
+    if (common.shell != NULL) option_text_completion(common.shell, command, tables);
+    if (common.help || common.manual || common.shell != NULL) return 0;
     if (status != LAM_OK) return options_usage(command->name, "%s", error.message);
     if (parsed.n_arguments < command->least_arguments)
         return options_usage(command->name, "too few arguments; usage: %s %s", command->name,
                              command->arguments);
     *result = parsed;
     return OPTIONS_GO;
+}
+
+static const option_verb *find_verb(const option_verb *verbs, const char *name) {
+    while (verbs->name != NULL && strcmp(verbs->name, name) != 0) verbs++;
+    return verbs->name != NULL ? verbs : NULL;
+}
+
+static int no_such_verb(const option_command *program, const option_verb *verbs, const char *word) {
+    const char *names[64] = {"help"};
+    char advice[512];
+    size_t n = 1;
+    for (; verbs->name != NULL && n < sizeof names / sizeof *names; verbs++) names[n++] = verbs->name;
+    nearest_advice(word, n, names, advice, sizeof advice);
+    return options_usage(program->name, "%.40s: no such verb; %s", word, advice);
+}
+
+/* Has every verb print its part of a text. */
+static void print_verbs(const option_verb *verbs, char *option) {
+    for (; verbs->name != NULL; verbs++) {
+        char name[64];
+        char *argv[] = {name, option, NULL};
+        snprintf(name, sizeof name, "%s", verbs->name);
+        verbs->run(2, argv);
+    }
+}
+
+/* The answer to an option of the whole program. */
+static int program_option(const option_command *program, const option_verb *verbs, char *option) {
+    static const char completion[] = "--print-completion=";
+    const char *shell = option + sizeof completion - 1;
+    if (strcmp(option, "--help") == 0) {
+        option_text_help_verbs(program, verbs);
+    } else if (strcmp(option, "--version") == 0) {
+        printf("%s " LAMBERT_VERSION "\n", program->name);
+    } else if (strcmp(option, "--print-manual") == 0) {
+        option_text_manual_begin(program, verbs);
+        print_verbs(verbs, option);
+        option_text_manual_end(program);
+    } else if (strncmp(option, completion, sizeof completion - 1) == 0 &&
+               option_among(shell, OPTION_SHELLS)) {
+        option_text_completion_begin(shell, program);
+        print_verbs(verbs, option);
+        option_text_completion_end(shell, program, verbs);
+    } else {
+        return options_usage(program->name, "%s: no such option; see %s --help", option, program->name);
+    }
+    return 0;
+}
+
+int options_run_verb(const option_command *program, const option_verb *verbs, int argc, char **argv) {
+    static char help[] = "--help";
+    if (argc < 2) return options_usage(program->name, "no verb given; see %s --help", program->name);
+    if (argv[1][0] == '-') return program_option(program, verbs, argv[1]);
+    const bool asks_help = strcmp(argv[1], "help") == 0;
+    if (asks_help && argc == 2) return program_option(program, verbs, help);
+    char *name = asks_help ? argv[2] : argv[1];
+    const option_verb *verb = find_verb(verbs, name);
+    if (verb == NULL) return no_such_verb(program, verbs, name);
+    if (asks_help) return verb->run(2, (char *[]){name, help, NULL});
+    return verb->run(argc - 1, argv + 1);
 }

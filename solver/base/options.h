@@ -60,13 +60,20 @@ typedef struct option_table {
 } option_table;
 
 typedef struct option_command {
-    const char *name;      /* "lambert solve", with which messages begin */
+    const char *name;      /* "lambertd", or "lambert solve" of a verb; messages begin with it */
     const char *arguments; /* "STORE", for --help */
+    const char *choices;   /* "box|city": the words that may be the first argument; NULL: it is a file */
     const char *summary;
-    const char *notes;   /* after the options; may be NULL */
-    const char *version; /* the answer to --version; NULL: no such option */
+    const char *notes; /* paragraphs after the options; may be NULL */
     size_t least_arguments, most_arguments;
 } option_command;
+
+/* A verb of a program, with options of its own. */
+typedef struct option_verb {
+    const char *name;
+    int (*run)(int argc, char **argv); /* argv[0] is the verb; returns the exit status */
+    const char *summary;
+} option_verb;
 
 #define OPTIONS_GIVEN_MAX 128
 
@@ -79,18 +86,22 @@ typedef struct option_result {
 
 /* Fills the structs of the tables (the last has no rows) with presets and then from argv; a field without a
  * preset keeps its value. Texts stay in argv, whose order changes. Wrong usage is one line on standard error
- * and 2; --help goes to standard output and gives 0. */
+ * and 2; --help goes to standard output and gives 0. For installers, --print-manual prints the manual page,
+ * or the section of a verb, and --print-completion=SHELL the completion of the command line. */
 int options_parse(const option_command *command, const option_table *tables, int argc, char **argv,
                   option_result *result);
+
+/* Runs the verb argv[1] of a program. help VERB prints the verb's --help; --help, --version, --print-manual
+ * and
+ * --print-completion are those of the whole program. notes stand at the end of --help. The list of verbs ends
+ * with a row without name. */
+int options_run_verb(const option_command *program, const option_verb *verbs, int argc, char **argv);
 
 /* True if the option was on the command line. */
 bool options_given(const option_result *result, const char *name);
 
 /* Prints "NAME: ..." as one line on standard error; returns 2, the status of wrong usage. */
 int options_usage(const char *name, const char *format, ...) __attribute__((format(printf, 2, 3)));
-
-/* Prints --help on standard output, at most 80 columns wide. */
-void options_help(const option_command *command, const option_table *tables);
 
 /* Strict readers: the whole text must be a finite number. A message begins with the text `what`. */
 lam_status option_number(const char *what, const char *text, double *value, lam_error *error);

@@ -97,13 +97,15 @@ static const option_row city_rows[] = {
     {0},
 };
 
-static const option_command verb = {
-    .name = "lambert generate",
-    .arguments = "box|city|cornell|furnace|rooms|anechoic|patio|atrium|maze|canopy -o SCENE.obj",
-    .summary = "Write one of the known scenes as OBJ and MTL, z up, in metres.",
-    .least_arguments = 1,
-    .most_arguments = 1,
-};
+/* The names of all scenes as "box|city". */
+static void list_kinds(char choices[512]) {
+    const char *name;
+    choices[0] = '\0';
+    for (size_t k = 0; (name = generate_kind(k)) != NULL && strlen(choices) + strlen(name) + 2 < 512; k++) {
+        if (k > 0) strcat(choices, "|");
+        strcat(choices, name);
+    }
+}
 
 int cmd_generate(int argc, char **argv) {
     fields f = {0};
@@ -113,14 +115,20 @@ int cmd_generate(int argc, char **argv) {
     size_t faces = 0;
     const option_table tables[] = {
         {NULL, rows, &f}, {"box", box_rows, &f}, {"cornell", cornell_rows, &f}, {"city", city_rows, &f}, {0}};
+    char choices[512], arguments[600];
+    list_kinds(choices);
+    snprintf(arguments, sizeof arguments, "%s -o SCENE.obj", choices);
+    const option_command verb = {
+        .name = "lambert generate",
+        .arguments = arguments,
+        .choices = choices,
+        .summary = "Write one of the known scenes as OBJ and MTL, z up, in metres.",
+        .least_arguments = 1,
+        .most_arguments = 1,
+    };
     int code = options_parse(&verb, tables, argc, argv, &given);
     if (code != OPTIONS_GO) return code;
     const char *kind = given.arguments[0];
-    if (!option_among(kind, "box|city|cornell|furnace|rooms|anechoic|patio|atrium|maze|canopy"))
-        return options_usage(verb.name,
-                             "%s: no such scene; must be one of: box city cornell furnace rooms anechoic "
-                             "patio atrium maze canopy",
-                             kind);
     if (f.output == NULL) return options_usage(verb.name, "no -o SCENE.obj given");
     if (f.divisions != 0 && f.elements != 0)
         return options_usage(verb.name, "--divisions and --elements exclude each other");

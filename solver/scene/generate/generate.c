@@ -1,5 +1,6 @@
 /* The list of generated scenes, and the simple ones: boxes. */
 #include "solver/scene/generate/generate.h"
+#include "solver/base/nearest.h"
 #include "solver/scene/face_grid.h"
 #include "solver/scene/generate/scene_draft.h"
 
@@ -110,18 +111,27 @@ static const struct {
     {"patio", draft_patio_scene},   {"atrium", draft_atrium_scene},   {"maze", draft_maze_scene},
     {"canopy", draft_canopy_scene},
 };
+#define N_KINDS (sizeof kinds / sizeof *kinds)
+
+const char *generate_kind(size_t k) {
+    return k < N_KINDS ? kinds[k].name : NULL;
+}
+
+static lam_status no_such_scene(const char *word, lam_error *error) {
+    const char *names[N_KINDS];
+    char advice[256];
+    for (size_t k = 0; k < N_KINDS; k++) names[k] = kinds[k].name;
+    nearest_advice(word, N_KINDS, names, advice, sizeof advice);
+    return status_fail(error, LAM_ERR_ARGUMENT, "%.40s: no such scene; %s", word, advice);
+}
 
 lam_status scene_generate(const generate_options *options, const char *path, size_t *faces,
                           lam_error *error) {
     lam_status status = LAM_OK;
     draft d = {0};
     size_t kind = 0;
-    while (kind < sizeof kinds / sizeof *kinds && strcmp(kinds[kind].name, options->kind) != 0) kind++;
-    if (kind == sizeof kinds / sizeof *kinds)
-        FAIL(error, LAM_ERR_ARGUMENT,
-             "unknown kind of scene '%s'; known are box, city, cornell, furnace, rooms, anechoic, patio, "
-             "atrium, maze, canopy",
-             options->kind);
+    while (kind < N_KINDS && strcmp(kinds[kind].name, options->kind) != 0) kind++;
+    if (kind == N_KINDS) TRY(no_such_scene(options->kind, error));
     if (isnan(options->reflectance) || options->reflectance >= 1)
         FAIL(error, LAM_ERR_ARGUMENT, "reflectance = %g, must be in [0, 1)", options->reflectance);
     if (options->elements > most_faces)

@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 typedef struct generate_options {
-    const char *kind;    /* "box", "city", "rooms": the list is in generate.c */
+    const char *kind;    /* one of generate_kind */
     double size[3];      /* box, metres; 1,1,1 */
     unsigned divisions;  /* box: M, exactly 6 M^2 faces; 0: not set */
     bool closed;         /* cornell */
@@ -17,6 +17,9 @@ typedef struct generate_options {
     double reflectance;  /* for every face, grey (emission turns grey too); negative: the scene's own */
     uint64_t seed;
 } generate_options;
+
+/* The name of the k-th kind of scene; NULL after the last. */
+const char *generate_kind(size_t k);
 
 /* Writes path (an .obj) and its .mtl beside it, each written aside and renamed.
  * LAM_ERR_ARGUMENT for an unknown kind.
