@@ -1,21 +1,9 @@
 /* A solution as a table: one line an element, or one a figure. Texts are quoted as RFC 4180 says. */
+#include "solver/base/csv_text.h"
 #include "solver/output/output.h"
 
 #include <math.h>
 #include <string.h>
-
-static void quoted(const char *text, FILE *stream) {
-    if (text[strcspn(text, ",\"\n")] == '\0') {
-        fputs(text, stream);
-        return;
-    }
-    fputc('"', stream);
-    for (const char *c = text; *c != '\0'; c++) {
-        if (*c == '"') fputc('"', stream);
-        fputc(*c, stream);
-    }
-    fputc('"', stream);
-}
 
 static void header(const solution *s, const char *first, FILE *stream) {
     char name[OUTPUT_COLUMN];
@@ -33,7 +21,7 @@ static void elements(const solution *s, FILE *stream) {
     header(s, "element,group,area", stream);
     for (size_t i = 0; i < m->n; i++) {
         fprintf(stream, "%zu,", i);
-        quoted(m->group_names[m->group[i]], stream);
+        csv_text(m->group_names[m->group[i]], stream);
         fprintf(stream, ",%.9g", m->area[i]);
         for (size_t k = 0; k < s->n_vectors * m->n_channels; k++)
             fprintf(stream, ",%.*g", output_digits(s), output_value(s, k * m->n + i));
@@ -47,7 +35,7 @@ static void figures(const solution *s, FILE *stream) {
     for (size_t r = 0; r < s->n_reductions; r++)
         for (int k = 0; k < REDUCE_COUNT; k++) {
             if (!s->reductions[r].wanted[k]) continue;
-            quoted(s->reductions[r].group, stream);
+            csv_text(s->reductions[r].group, stream);
             fprintf(stream, ",%s", reduce_name((reduce_statistic)k));
             for (size_t column = 0; column < s->n_vectors * m->n_channels; column++) {
                 double out[REDUCE_COUNT];
