@@ -63,7 +63,6 @@ declare -A home=(
     ["embree3/"]="solver/formfactor/visibility/"
     ["lapacke.h"]="solver/method/ solver/linalg/core.c"
     ["cblas.h"]="solver/method/ solver/linalg/ tests/bench/bench_online.c"
-    ["cairo"]="solver/bench/plot.c"
     ["png.h"]="solver/render/image.c"
     ["jansson.h"]="solver/codec/ solver/light/ solver/output/ solver/verbs/ solver/bench/ tests/bench/"
     ["microhttpd.h"]="server/http/ tests/bench/ready_server.c"

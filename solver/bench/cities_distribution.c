@@ -109,38 +109,17 @@ static void add_row(unsigned variant, size_t n, float reflectance, const tally *
     table_number(out, 100 * share_above(t, 1e-7));
 }
 
-/* One line a reflectance, all cities. */
-typedef struct curves {
-    size_t n;
-    double x[BINS + 1], y[CITIES * REFLECTANCES][BINS + 1];
-    char labels[CITIES * REFLECTANCES][32];
-} curves;
-
-static void add_curve(unsigned variant, float reflectance, const tally *t, curves *drawn) {
+static void add_curve(unsigned variant, size_t n, float reflectance, const tally *t, table *curves) {
     for (size_t bin = 0; bin <= BINS; bin++) {
-        drawn->x[bin] = bin_value(bin);
-        drawn->y[drawn->n][bin] = 100 * t->above[bin] / t->all;
+        table_number(curves, variant);
+        table_number(curves, (double)n);
+        table_number(curves, round(1e3 * (double)reflectance) / 1e3);
+        table_number(curves, bin_value(bin));
+        table_number(curves, 100 * t->above[bin] / t->all);
     }
-    snprintf(drawn->labels[drawn->n++], sizeof drawn->labels[0], "city %u, R = %.1f", variant,
-             (double)reflectance);
 }
 
-static lam_status draw(const bench_run *run, const curves *c, lam_error *error) {
-    plot_series series[CITIES * REFLECTANCES];
-    for (size_t k = 0; k < c->n; k++)
-        series[k] = (plot_series){
-            .label = c->labels[k], .n = BINS + 1, .x = c->x, .y = c->y[k], .joined = true, .plain = true};
-    const plot p = {.name = "distribution",
-                    .title = "Elements of M = (I - RF)^-1 (thesis: figure 4.4)",
-                    .x_label = "x",
-                    .y_label = "elements of M greater than x, %",
-                    .x_log = true,
-                    .series = series,
-                    .n_series = c->n};
-    return run->sink->plot(run->sink->context, &p, error);
-}
-
-static lam_status add_city(const bench_run *run, const lowrank_scene *s, size_t k, curves *drawn, table *out,
+static lam_status add_city(const bench_run *run, const lowrank_scene *s, size_t k, table *out, table *curves,
                            lam_error *error) {
     lam_status status = LAM_OK;
     const bool quick = run->scale == BENCH_QUICK;
@@ -151,7 +130,7 @@ static lam_status add_city(const bench_run *run, const lowrank_scene *s, size_t 
         TRY(look_at(run, s, reflectances[r], count, &t, error));
         const bool told = !quick && reflectances[r] > .6f && reflectances[r] < .8f;
         add_row(variants[k], n, reflectances[r], &t, told ? their_share[k] : NAN, out);
-        add_curve(variants[k], reflectances[r], &t, drawn);
+        add_curve(variants[k], n, reflectances[r], &t, curves);
     }
 done:
     return status;
@@ -170,19 +149,26 @@ lam_status cities_distribution(const bench_run *run, const lowrank_scene *const 
         {"theirs", "%", "section 4.3.2: greater than 1e-5 for R <= .7, the most of which is at .7"},
         {"above_1e-6", "%", "greater than 1e-6"},
         {"above_1e-7", "%", "greater than 1e-7"}};
+    static const table_column curve_columns[] = {{"city", "", "1: flat houses, 3: with skyscrapers"},
+                                                 {"elements", "", "n"},
+                                                 {"reflectance", "", "R, of all elements"},
+                                                 {"x", "", "size of an element of M"},
+                                                 {"above", "%", "elements of M greater than x"}};
     lam_status status = LAM_OK;
-    curves *drawn = memory_allocate(1, sizeof *drawn, "curves", error);
+    table curves = {.name = "distribution-curves",
+                    .title = "Elements of M by size (figure 4.4)",
+                    .columns = curve_columns,
+                    .n_columns = sizeof curve_columns / sizeof *curve_columns};
     table out = {.name = "distribution",
                  .title = "Elements of M by size (figure 4.4)",
                  .columns = columns,
                  .n_columns = sizeof columns / sizeof *columns,
                  .printed = true};
-    if (drawn == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t k = 0; k < CITIES; k++) TRY(add_city(run, scenes[k], k, drawn, &out, error));
+    for (size_t k = 0; k < CITIES; k++) TRY(add_city(run, scenes[k], k, &out, &curves, error));
     TRY(bench_table(run, &out, error));
-    TRY(draw(run, drawn, error));
+    TRY(bench_table(run, &curves, error));
 done:
-    free(drawn);
+    table_free(&curves);
     table_free(&out);
     return status;
 }

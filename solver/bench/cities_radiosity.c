@@ -7,10 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { RAYS = 4096, POINTS = 120, WAYS = 3, CURVES = 2 * (1 + CITY_THRESHOLDS) };
-
-static const char *const way_labels[WAYS] = {"none", "delta", "discarded"}; /* as sparse_correction */
-static const char *const threshold_labels[CITY_THRESHOLDS] = {"1e-3", "1e-4", "1e-5"};
+enum { RAYS = 4096, POINTS = 120, WAYS = 3 }; /* WAYS: of sparse_correction */
 
 /* --- figure 4.5 -------------------------------------------------------------------------------------------
  */
@@ -61,58 +58,34 @@ done:
     return status;
 }
 
-/* Curves from the lowest value to the highest. */
-typedef struct sorted_light {
-    double place[POINTS], value[CURVES][POINTS];
-} sorted_light;
-
 static int by_value(const void *a, const void *b) {
     const double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
 }
 
-/* Sorts values, which are lost in their order. */
-static void add_curve(size_t n, double *values, double *curve) {
-    qsort(values, n, sizeof *values, by_value);
-    for (size_t p = 0; p < POINTS; p++) curve[p] = values[p * (n - 1) / (POINTS - 1)];
-}
-
-/* The curves of B and of S = B - E - R F E; room is [n]. */
-static void add_curves(size_t n, const double *B, const double *first, size_t which, double *room,
-                       sorted_light *out) {
-    for (size_t i = 0; i < n; i++) room[i] = B[i];
-    add_curve(n, room, out->value[2 * which]);
-    for (size_t i = 0; i < n; i++) room[i] = B[i] - first[i];
-    add_curve(n, room, out->value[2 * which + 1]);
-}
-
-static lam_status draw_light(const bench_run *run, const city *c, const sorted_light *l, lam_error *error) {
-    plot_series series[CURVES];
-    char labels[CURVES][32], name[64], title[128];
-    /* What is converged last, in dashes, so that the others show beneath. */
-    for (size_t k = 0; k < CURVES; k++) {
-        const size_t which = (k / 2 + 1) % (1 + CITY_THRESHOLDS);
-        snprintf(labels[k], sizeof labels[k], "%s, %s", k % 2 == 0 ? "B" : "S",
-                 which == 0 ? "converged" : threshold_labels[which - 1]);
-        series[k] = (plot_series){.label = labels[k],
-                                  .n = POINTS,
-                                  .x = l->place,
-                                  .y = l->value[2 * which + k % 2],
-                                  .joined = true,
-                                  .plain = which > 0,
-                                  .unmarked = which == 0};
+/* Figure 4.5: B and S = B - E - R F E, each sorted by value, at POINTS places from the least to the greatest.
+ */
+static lam_status add_curves(const city *c, double threshold, const double *B, const double *first,
+                             table *out, lam_error *error) {
+    const size_t n = c->m.n;
+    double *sorted = memory_allocate(2 * n, sizeof *sorted, "light", error);
+    if (sorted == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < n; i++) {
+        sorted[i] = B[i];
+        sorted[n + i] = B[i] - first[i];
     }
-    snprintf(name, sizeof name, "bounces-%u", c->variant);
-    snprintf(title, sizeof title,
-             "City %u, %zu elements: mean of %zu skies, S without two bounces (figure 4.5)", c->variant,
-             c->m.n, c->f.sky.tiling.n_tiles);
-    const plot p = {.name = name,
-                    .title = title,
-                    .x_label = "elements, each curve sorted by value, %",
-                    .y_label = "radiosity under one tile of 1 W/(m² sr), W/m²",
-                    .series = series,
-                    .n_series = CURVES};
-    return run->sink->plot(run->sink->context, &p, error);
+    for (int s = 0; s < 2; s++) qsort(sorted + (s > 0 ? n : 0), n, sizeof *sorted, by_value);
+    for (size_t p = 0; p < POINTS; p++) {
+        const size_t at = p * (n - 1) / (POINTS - 1);
+        table_number(out, c->variant);
+        table_number(out, (double)n);
+        table_number(out, threshold);
+        table_number(out, 100 * (double)p / (POINTS - 1));
+        table_number(out, sorted[at]);
+        table_number(out, sorted[n + at]);
+    }
+    free(sorted);
+    return LAM_OK;
 }
 
 /* Area-weighted. */
@@ -151,68 +124,44 @@ static void add_light_row(const city *c, double threshold, const mean_light *l, 
 }
 
 static lam_status light_of_city(const bench_run *run, const city *c, const city_light *d, table *out,
-                                lam_error *error) {
+                                table *curves, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = c->m.n;
     mean_light l = {.B = NULL};
     double *B = memory_allocate(n, sizeof *B, "light", error);
     double *room = memory_allocate(n, sizeof *room, "light", error);
-    sorted_light *sorted = memory_allocate(1, sizeof *sorted, "light", error);
-    if (B == NULL || room == NULL || sorted == NULL) TRY(LAM_ERR_MEMORY);
+    if (B == NULL || room == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mean_light_make(c, d, &l, error));
-    for (size_t p = 0; p < POINTS; p++) sorted->place[p] = 100 * (double)p / (POINTS - 1);
     add_light_row(c, NAN, &l, l.B, room, out);
-    add_curves(n, l.B, l.first, 0, room, sorted);
+    TRY(add_curves(c, NAN, l.B, l.first, curves, error));
     for (size_t k = 0; k < CITY_THRESHOLDS; k++) {
         TRY(mean_answer(run, c, d, city_thresholds[k], B, error));
         add_light_row(c, city_thresholds[k], &l, B, room, out);
-        add_curves(n, B, l.first, 1 + k, room, sorted);
+        TRY(add_curves(c, city_thresholds[k], B, l.first, curves, error));
     }
-    TRY(draw_light(run, c, sorted, error));
 done:
     mean_light_free(&l);
     free(B);
     free(room);
-    free(sorted);
     return status;
 }
 
 /* --- figure 4.10 ------------------------------------------------------------------------------------------
  */
 
-static lam_status draw_tiles(const bench_run *run, const city *c, size_t threshold, size_t m,
-                             const double *numbers, double *const errors[WAYS], lam_error *error) {
-    plot_series series[WAYS];
-    char name[64], title[128];
-    for (size_t way = 0; way < WAYS; way++)
-        series[way] = (plot_series){
-            .label = way_labels[way], .n = m, .x = numbers, .y = errors[way], .joined = true, .plain = true};
-    snprintf(name, sizeof name, "tiles-%s", threshold_labels[threshold]);
-    snprintf(title, sizeof title, "City %u, %zu elements, threshold %s: error of each sky (figure 4.10)",
-             c->variant, c->m.n, threshold_labels[threshold]);
-    const plot p = {.name = name,
-                    .title = title,
-                    .x_label = "tile, from the horizon up",
-                    .y_label = "|B~ - B| / |B|",
-                    .series = series,
-                    .n_series = WAYS};
-    return run->sink->plot(run->sink->context, &p, error);
-}
-
 static lam_status tiles_of_city(const bench_run *run, const city *c, const city_light *d, table *out,
                                 lam_error *error) {
     lam_status status = LAM_OK;
     const size_t m = d->m;
     lam_operator *op = NULL;
-    double *room = memory_allocate(WAYS + 2, m * sizeof *room, "errors", error);
+    double *room = memory_allocate(WAYS + 1, m * sizeof *room, "errors", error);
     if (room == NULL) return LAM_ERR_MEMORY;
-    double *const errors[WAYS] = {room, room + m, room + 2 * m}, *numbers = room + 3 * m;
-    for (size_t t = 0; t < m; t++) numbers[t] = (double)(t + 1);
+    double *const errors[WAYS] = {room, room + m, room + 2 * m};
     for (size_t k = 0; k < CITY_THRESHOLDS; k++) {
         for (size_t way = 0; way < WAYS; way++) {
             build_report report;
             TRY(city_sparse(run, c, city_thresholds[k], (sparse_correction)way, &op, &report, error));
-            TRY(city_light_errors(c, d, op, errors[way], room + 4 * m, error));
+            TRY(city_light_errors(c, d, op, errors[way], room + 3 * m, error));
             lam_operator_close(op);
             op = NULL;
         }
@@ -220,10 +169,9 @@ static lam_status tiles_of_city(const bench_run *run, const city *c, const city_
             table_number(out, c->variant);
             table_number(out, (double)c->m.n);
             table_number(out, city_thresholds[k]);
-            table_number(out, numbers[t]);
+            table_number(out, (double)(t + 1));
             for (size_t way = 0; way < WAYS; way++) table_number(out, errors[way][t]);
         }
-        TRY(draw_tiles(run, c, k, m, numbers, errors, error));
     }
 done:
     lam_operator_close(op);
@@ -231,15 +179,15 @@ done:
     return status;
 }
 
-static lam_status look_at(const bench_run *run, unsigned variant, size_t size, table *light, table *tiles,
-                          lam_error *error) {
+static lam_status look_at(const bench_run *run, unsigned variant, size_t size, table *light, table *curves,
+                          table *tiles, lam_error *error) {
     lam_status status = LAM_OK;
     const recipe rays = formfactors_rays(RAYS, run->seed);
     city c = {0};
     city_light d = {.m = 0};
     TRY(city_open(run, variant, size, "flat", &rays, &c, error));
     TRY(city_light_make(run, &c, &d, error));
-    if (light != NULL) TRY(light_of_city(run, &c, &d, light, error));
+    if (light != NULL) TRY(light_of_city(run, &c, &d, light, curves, error));
     if (tiles != NULL) TRY(tiles_of_city(run, &c, &d, tiles, error));
 done:
     city_light_free(&d);
@@ -256,6 +204,13 @@ lam_status cities_radiosity(const bench_run *run, lam_error *error) {
         {"S", "W/m^2", "the same of the third and later bounces, B - E - R F E"},
         {"error_B", "", "|B~ - B|/|B| of the mean over the tiles"},
         {"error_S", "", "|S~ - S|/|S| likewise"}};
+    static const table_column curve_columns[] = {
+        {"city", "", "1: flat houses, 3: with skyscrapers"},
+        {"elements", "", "n"},
+        {"threshold", "", "of M~; none: converged"},
+        {"place", "%", "share of the elements with a value of at most B, and with one of at most S"},
+        {"B", "W/m^2", "mean over the tiles, as in the table bounces"},
+        {"S", "W/m^2", "likewise"}};
     static const table_column tile_columns[] = {{"city", "", "3: with skyscrapers"},
                                                 {"elements", "", "n"},
                                                 {"threshold", "", "of M~"},
@@ -269,19 +224,25 @@ lam_status cities_radiosity(const bench_run *run, lam_error *error) {
                    .columns = light_columns,
                    .n_columns = sizeof light_columns / sizeof *light_columns,
                    .printed = true};
+    table curves = {.name = "bounces-curves",
+                    .title = "Radiosity and its third and later bounces, sorted by value (figure 4.5)",
+                    .columns = curve_columns,
+                    .n_columns = sizeof curve_columns / sizeof *curve_columns};
     table tiles = {.name = "tiles",
                    .title = "Error of every sky (figure 4.10)",
                    .columns = tile_columns,
                    .n_columns = sizeof tile_columns / sizeof *tile_columns};
     /* Figure 4.10 is of 35,588 elements, which take minutes. */
     const bool full = run->scale == BENCH_FULL;
-    TRY(look_at(run, 1, 0, &light, NULL, error));
-    TRY(look_at(run, 3, 0, &light, full ? NULL : &tiles, error));
-    if (full) TRY(look_at(run, 3, 1, NULL, &tiles, error));
+    TRY(look_at(run, 1, 0, &light, &curves, NULL, error));
+    TRY(look_at(run, 3, 0, &light, &curves, full ? NULL : &tiles, error));
+    if (full) TRY(look_at(run, 3, 1, NULL, NULL, &tiles, error));
     TRY(bench_table(run, &light, error));
+    TRY(bench_table(run, &curves, error));
     TRY(bench_table(run, &tiles, error));
 done:
     table_free(&light);
+    table_free(&curves);
     table_free(&tiles);
     return status;
 }

@@ -1,3 +1,4 @@
+/* Error of the radiosity against the time of its form factors, in Cornell boxes. */
 #include "solver/bench/formfactors.h"
 #include "solver/bench/scenes.h"
 #include "solver/bench/stats.h"
@@ -21,7 +22,7 @@ static const table_column columns[] = {
     {"lamp", "", "indirect error of B for the scene's own lights"},
 };
 
-enum { PROBES = 32, VECTORS = PROBES + 1, REFERENCES_MOST = 2, METHODS = 3, SETTINGS_MOST = 5 };
+enum { PROBES = 32, VECTORS = PROBES + 1, REFERENCES_MOST = 2, SETTINGS_MOST = 5 };
 
 /* Residual at which a solution counts as converged: far below every error that is printed. */
 static const double tolerance = 1e-8;
@@ -106,14 +107,8 @@ static double indirect_error(const lit_scene *s, const double *approximate, cons
     return indirect > 0 ? sqrt(wrong / indirect) : NAN;
 }
 
-/* Places of a curve of the plot. */
-typedef struct curve {
-    size_t n;
-    double seconds[SETTINGS_MOST], mean[SETTINGS_MOST], low[SETTINGS_MOST], high[SETTINGS_MOST];
-} curve;
-
 /* Makes the form factors of one recipe and judges them by every reference. */
-static lam_status judge(const bench_run *run, const lit_scene *s, const recipe *how, table *out, curve *drawn,
+static lam_status judge(const bench_run *run, const lit_scene *s, const recipe *how, table *out,
                         lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = s->m.n, size = s->m.n_channels * VECTORS * n;
@@ -135,65 +130,23 @@ static lam_status judge(const bench_run *run, const lit_scene *s, const recipe *
             const double x = indirect_error(s, B, s->B[r], E, v);
             if (isfinite(x)) errors[lit++] = x;
         }
-        const double mean = stats_mean(errors, lit), low = stats_quantile(errors, lit, .05),
-                     high = stats_quantile(errors, lit, .95);
         table_text(out, "cornell");
         table_number(out, (double)n);
         table_text(out, method);
         table_text(out, s->described[r]);
         table_number(out, seconds);
         table_number(out, (double)f.F.indptr[n]);
-        table_number(out, mean);
-        table_number(out, low);
+        table_number(out, stats_mean(errors, lit));
+        table_number(out, stats_quantile(errors, lit, .05));
         table_number(out, stats_median(errors, lit));
-        table_number(out, high);
+        table_number(out, stats_quantile(errors, lit, .95));
         table_number(out, indirect_error(s, B, s->B[r], E, PROBES));
-        if (r > 0) continue;
-        drawn->seconds[drawn->n] = seconds;
-        drawn->mean[drawn->n] = mean;
-        drawn->low[drawn->n] = low;
-        drawn->high[drawn->n++] = high;
     }
 done:
     form_factors_free(&f);
     free(B);
     free(E);
     return status;
-}
-
-static lam_status draw(const bench_run *run, size_t n, const curve curves[METHODS], lam_error *error) {
-    static const char *const labels[METHODS] = {"rays", "hemicubes", "pair by pair"};
-    char name[64], title[128];
-    double ends[2] = {INFINITY, 0}, goal[2] = {.01, .01};
-    plot_series series[METHODS + 1];
-    for (int k = 0; k < METHODS; k++) {
-        const curve *c = &curves[k];
-        series[k] = (plot_series){.label = labels[k],
-                                  .n = c->n,
-                                  .x = c->seconds,
-                                  .y = c->mean,
-                                  .low = c->low,
-                                  .high = c->high,
-                                  .joined = true};
-        for (size_t i = 0; i < c->n; i++) {
-            ends[0] = fmin(ends[0], c->seconds[i]);
-            ends[1] = fmax(ends[1], c->seconds[i]);
-        }
-    }
-    series[METHODS] =
-        (plot_series){.label = "1 %", .n = 2, .x = ends, .y = goal, .joined = true, .unmarked = true};
-    snprintf(name, sizeof name, "error-%zu", n);
-    snprintf(title, sizeof title, "Cornell box of %zu elements: error of B against time of the form factors",
-             n);
-    const plot picture = {.name = name,
-                          .title = title,
-                          .x_label = "form factors, seconds",
-                          .y_label = "indirect error, one bright element (mean, 5-95 %)",
-                          .x_log = true,
-                          .y_log = true,
-                          .series = series,
-                          .n_series = METHODS + 1};
-    return run->sink->plot(run->sink->context, &picture, error);
 }
 
 /* What is tried in a scene of about so many elements. */
@@ -208,7 +161,6 @@ typedef struct trial {
 static lam_status measure(const bench_run *run, const trial *t, table *out, lam_error *error) {
     lam_status status = LAM_OK;
     lit_scene s = {.n_references = 0};
-    curve curves[METHODS] = {{.n = 0}};
     const recipe reference_pairs = formfactors_pairs(t->finest, run->seed + 1000),
                  reference_rays = formfactors_rays(t->reference_rays, run->seed + 1000);
     TRY(scene_cornell(t->elements, &s.m, error));
@@ -219,11 +171,10 @@ static lam_status measure(const bench_run *run, const trial *t, table *out, lam_
         const recipe rays = formfactors_rays(t->rays[k], run->seed),
                      cube = formfactors_hemicube(t->resolution[k]),
                      pairs = formfactors_pairs(t->accuracy[k], run->seed);
-        if (t->rays[k] > 0) TRY(judge(run, &s, &rays, out, &curves[0], error));
-        if (t->resolution[k] > 0) TRY(judge(run, &s, &cube, out, &curves[1], error));
-        if (t->accuracy[k] > 0) TRY(judge(run, &s, &pairs, out, &curves[2], error));
+        if (t->rays[k] > 0) TRY(judge(run, &s, &rays, out, error));
+        if (t->resolution[k] > 0) TRY(judge(run, &s, &cube, out, error));
+        if (t->accuracy[k] > 0) TRY(judge(run, &s, &pairs, out, error));
     }
-    TRY(draw(run, s.m.n, curves, error));
 done:
     lit_free(&s);
     return status;

@@ -1,6 +1,6 @@
 /* Closed grey Cornell boxes of growing size: what a hierarchical operator takes, beside one of low rank. */
 #include "solver/base/clock.h"
-#include "solver/bench/bench_hierarchical.h"
+#include "solver/bench/lowrank.h"
 #include "solver/bench/scenes.h"
 #include "solver/formfactor/rays/ray_rows.h"
 

@@ -9,13 +9,13 @@
 
 enum { PROBES = 100, PROBES_OF_LARGE = 48, LARGE = 5000, KINDS = 7, SETTINGS_MOST = 5 };
 
-/* A method and what is varied. */
+/* A method, which is tried at several ranks or bounds. */
 typedef struct kind {
     const char *label, *method, *factorizer;
     bool by_rank; /* at ranks, else at bounds */
 } kind;
 
-static const kind kinds[KINDS] = {
+static const kind lowrank_kinds[KINDS] = {
     {"HF", "low-rank", "hf", false},          {"SVD", "low-rank", "svd", true},
     {"RSI", "low-rank", "rsi", true},         {"SGRSVD", "low-rank", "sgrsvd", true},
     {"two meshes", "2msc", "auto", true},     {"two meshes, QR", "2msc", "qr", true},
@@ -43,14 +43,8 @@ static const table_column columns[] = {
     {"random_operator", "", "against the same form factors"},
 };
 
-/* A line of each plot for every kind. */
-typedef struct curve {
-    size_t n;
-    double build[SETTINGS_MOST], memory[SETTINGS_MOST], answer[SETTINGS_MOST], error[SETTINGS_MOST];
-} curve;
-
 static lam_status try(const bench_run *run, const lowrank_scene *s, const csr *independent, const kind *k,
-                      int setting, table *out, curve *drawn, lam_error *error) {
+                      int setting, table *out, lam_error *error) {
     lam_status status = LAM_OK;
     const lowrank_case of = {.method = k->method,
                              .factorizer = k->factorizer,
@@ -77,41 +71,13 @@ static lam_status try(const bench_run *run, const lowrank_scene *s, const csr *i
     table_number(out, v.judged.single.operator_indirect.mean);
     table_number(out, v.judged.lights.probes > 0 ? v.judged.lights.operator_indirect.mean : NAN);
     table_number(out, v.judged.random.operator_indirect.mean);
-    drawn->build[drawn->n] = seconds;
-    drawn->memory[drawn->n] = mb;
-    drawn->answer[drawn->n] = 1e3 * v.answer_seconds;
-    drawn->error[drawn->n++] = v.judged.single.total_indirect.mean;
 done:
     return status;
-}
-
-static lam_status draw(const bench_run *run, const lowrank_scene *s, const char *what, const char *x_label,
-                       const curve curves[KINDS], size_t offset, lam_error *error) {
-    plot_series series[KINDS];
-    char name[64], title[128];
-    for (int k = 0; k < KINDS; k++)
-        series[k] = (plot_series){.label = kinds[k].label,
-                                  .n = curves[k].n,
-                                  .x = (const double *)((const char *)&curves[k] + offset),
-                                  .y = curves[k].error,
-                                  .joined = true};
-    snprintf(name, sizeof name, "error-by-%s-%zu", what, s->m.n);
-    snprintf(title, sizeof title, "Cornell box of %zu elements: error by %s", s->m.n, what);
-    const plot p = {.name = name,
-                    .title = title,
-                    .x_label = x_label,
-                    .y_label = "total indirect error, one bright element",
-                    .x_log = true,
-                    .y_log = true,
-                    .series = series,
-                    .n_series = KINDS};
-    return run->sink->plot(run->sink->context, &p, error);
 }
 
 static lam_status measure(const bench_run *run, const lowrank_scene *s, table *out, lam_error *error) {
     lam_status status = LAM_OK;
     form_factors independent = {.row_sums = NULL}; /* finer, of another seed */
-    curve curves[KINDS] = {{.n = 0}};
     const recipe finer = formfactors_pairs(2e-5, run->seed + 1000);
     double seconds;
     TRY(formfactors_make_timed(run, &s->m, s->z_order, &finer, "independent form factors", &independent,
@@ -120,13 +86,9 @@ static lam_status measure(const bench_run *run, const lowrank_scene *s, table *o
     for (int k = 0; k < KINDS; k++)
         for (int setting = 0; setting < SETTINGS_MOST; setting++) {
             if (run->scale == BENCH_QUICK && setting % 2 == 1) continue;
-            if (strcmp(kinds[k].method, "exact") == 0 && setting > 0) continue;
-            TRY(try(run, s, &independent.F, &kinds[k], setting, out, &curves[k], error));
+            if (strcmp(lowrank_kinds[k].method, "exact") == 0 && setting > 0) continue;
+            TRY(try(run, s, &independent.F, &lowrank_kinds[k], setting, out, error));
         }
-    TRY(draw(run, s, "build-time", "factorization and inverse, seconds", curves, offsetof(curve, build),
-             error));
-    TRY(draw(run, s, "memory", "operator, MB", curves, offsetof(curve, memory), error));
-    TRY(draw(run, s, "answer-time", "one answer, ms", curves, offsetof(curve, answer), error));
 done:
     form_factors_free(&independent);
     return status;

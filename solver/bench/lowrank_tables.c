@@ -1,4 +1,4 @@
-/* Tables 3.1 to 3.5 of the thesis row by row, theirs beside ours. */
+/* Tables 3.1 to 3.7 and figures 3.3 to 3.5 of the thesis row by row, its figures beside ours. */
 #include "solver/bench/lowrank.h"
 
 #include <math.h>
@@ -275,6 +275,189 @@ lam_status lowrank_of_factorizers(const bench_run *run, const lowrank_scene *con
     }
     TRY(bench_table(run, &out, error));
 done:
+    table_free(&out);
+    return status;
+}
+
+/* --- figures 3.3 to 3.5 ------------------------------------------------------------------------------- */
+
+enum { LEVELS_MOST = 9, RANK_EPSILONS = 4, MANY = 5000 };
+
+static const double rank_epsilons[RANK_EPSILONS] = {.1, .05, .02, .01};
+/* Levels whose leaves have between 32 and 2,560 columns. */
+static bool is_tried(size_t n, int levels) {
+    return n >> levels >= 32 && n >> levels <= 2560;
+}
+
+static lam_status levels_of_scene(const bench_run *run, const lowrank_scene *s, table *out,
+                                  lam_error *error) {
+    lam_status status = LAM_OK;
+    for (int e = 0; e <= RANK_EPSILONS; e++) {
+        const bool z = e < RANK_EPSILONS;
+        for (int levels = 0; levels <= LEVELS_MOST; levels++) {
+            factorizer_options how = lowrank_options(run, z ? rank_epsilons[e] : .1, 0);
+            lowrank_result r;
+            if (!is_tried(s->m.n, levels)) continue;
+            how.levels = levels;
+            TRY(lowrank_factorize(run, s, "hf", &how, z, 1, &r, error));
+            table_number(out, (double)s->m.n);
+            table_number(out, how.epsilon);
+            table_text(out, z ? "z" : "mesh");
+            table_number(out, levels);
+            table_number(out, r.seconds);
+            table_number(out, (double)r.rank);
+            table_number(out, r.real);
+        }
+    }
+done:
+    return status;
+}
+
+lam_status lowrank_of_levels(const bench_run *run, const lowrank_scene *const *scenes, size_t n,
+                             lam_error *error) {
+    static const table_column columns[] = {
+        {"elements", "", "n"},
+        {"epsilon", "", "bound"},
+        {"order", NULL, "of the columns"},
+        {"levels", "", "of the tree"},
+        {"seconds", "s", "of the factorization"},
+        {"rank", "", "k"},
+        {"real", "", "|S - Q V^T|_2"},
+    };
+    lam_status status = LAM_OK;
+    table out = {.name = "levels",
+                 .title = "Time by levels (thesis: figures 3.3 and 3.4)",
+                 .columns = columns,
+                 .n_columns = sizeof columns / sizeof *columns};
+    for (size_t i = 0; i < n; i++) /* many elements take minutes with too few levels */
+        if (run->scale == BENCH_FULL || scenes[i]->m.n <= MANY)
+            TRY(levels_of_scene(run, scenes[i], &out, error));
+    TRY(bench_table(run, &out, error));
+done:
+    table_free(&out);
+    return status;
+}
+
+lam_status lowrank_of_rank(const bench_run *run, const lowrank_scene *const *scenes, size_t n,
+                           lam_error *error) {
+    static const table_column columns[] = {
+        {"elements", "", "n"},
+        {"epsilon", "", "bound"},
+        {"rank", "", "k of hf"},
+        {"real", "", "|S - Q V^T|_2"},
+        {"thesis_rank", "", "as published, where it gives one (real error .05 at epsilon .1)"},
+    };
+    static const double theirs[][2] = {{2560, 416}, {10240, 877}, {40960, 1791}, {163840, 3990}};
+    lam_status status = LAM_OK;
+    table out = {.name = "rank",
+                 .title = "Rank by elements (thesis: figure 3.5)",
+                 .columns = columns,
+                 .n_columns = sizeof columns / sizeof *columns,
+                 .printed = true};
+    for (size_t i = 0; i < n; i++)
+        for (int e = 0; e < RANK_EPSILONS; e++) {
+            const factorizer_options how = lowrank_options(run, rank_epsilons[e], 0);
+            lowrank_result r;
+            double published = NAN;
+            /* What is below the noise of the rays is noise. */
+            if (rank_epsilons[e] < 2 * recipe_noise(&scenes[i]->f.recipe)) continue;
+            TRY(lowrank_factorize(run, scenes[i], "hf", &how, true, 1, &r, error));
+            for (size_t t = 0; e == 0 && t < sizeof theirs / sizeof *theirs; t++)
+                if (theirs[t][0] == (double)scenes[i]->m.n) published = theirs[t][1];
+            table_number(&out, (double)scenes[i]->m.n);
+            table_number(&out, rank_epsilons[e]);
+            table_number(&out, (double)r.rank);
+            table_number(&out, r.real);
+            table_number(&out, published);
+        }
+    TRY(bench_table(run, &out, error));
+done:
+    table_free(&out);
+    return status;
+}
+
+/* --- tables 3.6 and 3.7: radiosity -------------------------------------------------------------------- */
+
+enum { RADIOSITY_EPSILONS = 5, PROBES = 500, PROBES_OF_LARGE = 64, LARGE = 5000 };
+
+static const double radiosity_epsilons[RADIOSITY_EPSILONS] = {.05, .1, .2, .3, .5};
+
+/* k, mean, standard deviation and largest relative error of the thesis. */
+static const double patio[RADIOSITY_EPSILONS][4] = {{3920, .0025, .0013, .0073},
+                                                    {3114, .0048, .0030, .0170},
+                                                    {2227, .0096, .0073, .0395},
+                                                    {1617, .0142, .0124, .0635},
+                                                    {932, .0232, .0224, .1205}};
+static const double cornell[RADIOSITY_EPSILONS][4] = {{560, .0021, .0017, .0094},
+                                                      {416, .0045, .0042, .0213},
+                                                      {328, .0088, .0075, .0448},
+                                                      {274, .0133, .0122, .0839},
+                                                      {139, .0255, .0299, .1713}};
+
+static lam_status add_epsilon(const bench_run *run, const lowrank_scene *s, double epsilon,
+                              const double theirs[4], table *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    /* The real error of the thesis is half of its epsilon. */
+    const lowrank_case of = {.method = "low-rank",
+                             .factorizer = "hf",
+                             .epsilon = epsilon / 2,
+                             .probes = s->m.n > LARGE ? PROBES_OF_LARGE : PROBES};
+    lowrank_verdict v;
+    TRY(lowrank_judge(run, s, &of, &v, error));
+    table_text(out, s->name);
+    table_number(out, (double)s->m.n);
+    table_number(out, epsilon);
+    table_number(out, (double)v.built.rank);
+    table_number(out, v.built.measured_norm_error);
+    table_number(out, v.built.factorize_seconds);
+    table_number(out, v.built.invert_seconds);
+    table_number(out, 1e3 * v.answer_seconds);
+    table_number(out, v.judged.single.operator_relative.mean);
+    table_number(out, v.judged.single.operator_relative.std);
+    table_number(out, v.judged.single.operator_relative.max);
+    table_number(out, v.judged.single.operator_indirect.mean);
+    for (int k = 0; k < 4; k++) table_number(out, theirs[k]);
+done:
+    return status;
+}
+
+lam_status lowrank_of_radiosity(const bench_run *run, lam_error *error) {
+    static const table_column columns[] = {
+        {"scene", NULL, "which"},
+        {"elements", "", "n"},
+        {"epsilon", "", "of the thesis, whose real error is half of it; ours is bound to that half"},
+        {"rank", "", "k"},
+        {"real", "", "|S - Q V^T|_2"},
+        {"factorize_s", "s", "of the factorization"},
+        {"invert_s", "s", "of Y_k"},
+        {"answer_ms", "ms", "of one B, median"},
+        {"relative_mean", "", "|B~ - B|/|B| for single emitters"},
+        {"relative_std", "", "its standard deviation"},
+        {"relative_max", "", "its largest"},
+        {"indirect_mean", "", "|B~ - B|/|B - E|"},
+        {"thesis_rank", "", "as published (patio of 21,888, Cornell box of 2,560 elements)"},
+        {"thesis_mean", "", "as published, relative"},
+        {"thesis_std", "", "as published"},
+        {"thesis_max", "", "as published"},
+    };
+    static const size_t sizes[3][2] = {{640, 640}, {2560, 2700}, {2560, 21888}};
+    lam_status status = LAM_OK;
+    lowrank_scene s = {.name = NULL};
+    table out = {.name = "radiosity",
+                 .title = "Error of the radiosity at the real error of the thesis (tables 3.6 and 3.7)",
+                 .columns = columns,
+                 .n_columns = sizeof columns / sizeof *columns,
+                 .printed = true};
+    for (int k = 0; k < 2; k++) {
+        TRY(k == 0 ? lowrank_cornell(run, sizes[run->scale][0], &s, error)
+                   : lowrank_patio(run, sizes[run->scale][1], &s, error));
+        for (int e = 0; e < RADIOSITY_EPSILONS; e++)
+            TRY(add_epsilon(run, &s, radiosity_epsilons[e], k == 0 ? cornell[e] : patio[e], &out, error));
+        lowrank_scene_free(&s);
+    }
+    TRY(bench_table(run, &out, error));
+done:
+    lowrank_scene_free(&s);
     table_free(&out);
     return status;
 }

@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import os
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -136,12 +137,19 @@ class Hierarchical(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(folder.cleanup)
         cls.out = os.path.join(folder.name, "results")
-        done = lambert("bench", "hierarchical", "--quick", "-o", cls.out)
+        done = lambert("bench", "hierarchical", "--quick", "--json", "-o", cls.out)
         assert done.returncode == 0, done.stderr
+        cls.printed = json.loads(done.stdout)
         cls.tables = {}
         for name in "hierarchical", "equal-error", "growth":
             with open(os.path.join(cls.out, f"hierarchical-{name}.csv"), encoding="utf-8", newline="") as stream:
                 cls.tables[name] = list(csv.DictReader(stream))
+
+    def test_json_on_standard_output(self):
+        self.assertEqual(list(self.printed), [f"hierarchical-{name}" for name in self.tables])
+        for name, table in self.printed.items():
+            with open(os.path.join(self.out, f"{name}.json"), encoding="utf-8") as file:
+                self.assertEqual(table, json.load(file))
 
     def test_every_kind(self):
         rows = self.tables["hierarchical"]
@@ -269,6 +277,14 @@ class Refusals(unittest.TestCase):
             stream.write("mine")
         self.refused(1, "not a directory", "formfactors", "-o", file)
         self.assertEqual(os.listdir(self.folder), ["file"])
+
+    def test_without_the_program(self):
+        """lambert alone, neither beside lambert-bench nor with it in PATH."""
+        alone = shutil.copy(LAMBERT, self.folder)
+        done = subprocess.run([alone, "bench", "formfactors"], capture_output=True, text=True, check=False,
+                              env=dict(ENVIRONMENT, PATH=self.folder))
+        self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (1, "", 1), done.stderr)
+        self.assertIn("the program lambert-bench cannot be run: No such file or directory", done.stderr)
 
     def test_scene_is_missed_at_once(self):
         self.refused(1, "none.obj", "formfactors", "--scene", os.path.join(self.folder, "none.obj"), "-o",

@@ -242,7 +242,7 @@ class MadeUp(Case):
         self.assertFalse(os.path.exists(self.out))
 
     def test_killed(self):
-        """Nobody is left to stop the servers: the kernel does."""
+        """The script is told by the kernel, and stops the servers."""
         self.started().kill()
         until = time.monotonic() + PATIENCE
         while working_in(self.scratch):
@@ -251,15 +251,17 @@ class MadeUp(Case):
 
 
 class Missing(Case):
-    """A lambert that stands elsewhere than its build."""
+    """A lambert that stands elsewhere than its build, with its scripts where they are installed."""
 
     def copy(self, *programs):
-        for program in programs:
-            shutil.copy(os.path.join(os.path.dirname(LAMBERT), program), self.programs)
+        build = os.path.dirname(LAMBERT)
+        for program in "lambert", "lambert-bench", *programs:
+            shutil.copy(os.path.join(build, program), self.programs)
+        shutil.copytree(os.path.join(build, "bench"), os.path.join(self.folder, "share", "lambert", "bench"))
         return os.path.join(self.programs, "lambert")
 
     def test_without_wrk_and_ready_server(self):
-        lambert = self.copy("lambert", "lambertd")
+        lambert = self.copy("lambertd")
         self.environment["PATH"] = self.programs
         tables = self.tables(lambert)
         for row in tables["load"]:
@@ -273,10 +275,10 @@ class Missing(Case):
     def test_without_ready_server(self):
         self.program("wrk", WRK)
         self.program("nginx", NGINX_THAT_FAILS)
-        tables = self.tables(self.copy("lambert", "lambertd"))
+        tables = self.tables(self.copy("lambertd"))
         for row in tables["load"]:
             if row["server"] in ("ready", "sleeping", "as many", "abreast"):
-                self.assertEqual(row["note"], "not run: no tests/ready_server beside lambert")
+                self.assertEqual(row["note"], "not run: no tests/ready_server beside lambert-bench")
             elif row["server"] == "lambertd":
                 self.assertEqual(float(row["per_second"]), 500)
 
@@ -285,7 +287,7 @@ class Missing(Case):
         self.program("wrk", WRK)
         self.program("nginx", NGINX_THAT_FAILS)
         self.program("lambertd", LAMBERTD)
-        tables = self.tables(self.copy("lambert"))
+        tables = self.tables(self.copy())
         self.assertEqual([(row["loop"], row["format"], row["note"]) for row in tables["loop"]],
                          [("forward", "npy", ""), ("forward", "json", ""), ("forward, adjoint", "json", ""),
                           ("reduce", "json", "")])
@@ -301,7 +303,7 @@ class Missing(Case):
         self.assertGreater(float(ratios["evaluations a second of the reduce loop"]["measured"]), 0)
 
     def test_without_lambertd(self):
-        done = self.run_it(self.copy("lambert"))
+        done = self.run_it(self.copy())
         self.assertEqual(done.returncode, 1)
         self.assertIn("lambertd: cannot be run", done.stderr.splitlines()[-1])
 

@@ -1,9 +1,9 @@
-/* What suites of measurements write: quantiles, tables, plots; and the scenes they build. */
+/* Quantiles and tables of the suites of measurements, the scenes that they build, and the figures of cities.
+ */
+#include "solver/bench/bench.h"
 #include "solver/bench/cities.h"
-#include "solver/bench/plot.h"
 #include "solver/bench/scenes.h"
 #include "solver/bench/stats.h"
-#include "solver/bench/table.h"
 #include "support/suite.h"
 
 #include <jansson.h>
@@ -101,56 +101,6 @@ START_TEST(terminal_columns_align) {
 }
 END_TEST
 
-static const double x[] = {1, 10, 100, -5}, y[] = {.1, .01, 0, .1}, low[] = {.05, .005, 0, 0},
-                    high[] = {.2, .02, 0, 0};
-
-START_TEST(plots_are_written_whole) {
-    const plot_series series[] = {
-        {.label = "a < b & c", .n = 4, .x = x, .y = y, .low = low, .high = high, .joined = true},
-        {.label = "limit", .n = 2, .x = x, .y = y, .joined = true, .unmarked = true}};
-    const plot p = {.name = "p",
-                    .title = "<title>",
-                    .x_label = "x",
-                    .y_label = "y",
-                    .x_log = true,
-                    .y_log = true,
-                    .series = series,
-                    .n_series = 2};
-    for (int png = 0; png < 2; png++) {
-        lam_error error = {0};
-        written w = {0};
-        FILE *stream = open_memstream(&w.text, &w.size);
-        ck_assert_int_eq(png ? plot_png(&p, stream, &error) : plot_svg(&p, stream, &error), LAM_OK);
-        fclose(stream);
-        if (png) {
-            ck_assert_mem_eq(w.text, "\x89PNG\r\n\x1a\n", 8);
-            ck_assert_mem_eq(w.text + w.size - 8, "IEND", 4);
-        } else {
-            ck_assert_mem_eq(w.text, "<?xml", 5);
-            ck_assert_str_eq(w.text + w.size - 7, "</svg>\n");
-        }
-        free(w.text);
-    }
-}
-END_TEST
-
-START_TEST(plots_without_points_are_refused) {
-    const plot_series nothing = {.label = "all below 0", .n = 1, .x = x + 3, .y = y};
-    plot p = {.name = "empty", .x_log = true, .y_log = true, .series = &nothing, .n_series = 1};
-    lam_error error = {0};
-    written w = {0};
-    FILE *stream = open_memstream(&w.text, &w.size);
-    ck_assert_int_eq(plot_svg(&p, stream, &error), LAM_ERR_ARGUMENT);
-    ck_assert_ptr_nonnull(strstr(error.message, "no point"));
-    p.x_log = false; /* then it has a place */
-    ck_assert_int_eq(plot_svg(&p, stream, &error), LAM_OK);
-    p.n_series = PLOT_SERIES_MOST + 1;
-    ck_assert_int_eq(plot_svg(&p, stream, &error), LAM_ERR_ARGUMENT);
-    fclose(stream);
-    free(w.text);
-}
-END_TEST
-
 /* Twelve cells of ground and four of roof a lot, and of the walls only fronts that look outwards: seen from
  * outside, all the walls of a storey enclose a 2 x 2 house. */
 START_TEST(houses_stand_on_their_lots) {
@@ -198,9 +148,9 @@ START_TEST(pieces_become_elements) {
 }
 END_TEST
 
-/* What a suite hands on: tables with their names, whole rows, and plots that can be drawn. */
+/* Checks that the tables of a suite have whole rows, and keeps their names. */
 typedef struct harvest {
-    char tables[512], plots[512]; /* names, each after a space */
+    char tables[512]; /* names, each after a space */
     size_t kind_rows, map_rows;
 } harvest;
 
@@ -218,23 +168,6 @@ static lam_status reap_table(void *context, const table *t, lam_error *error) {
     return LAM_OK;
 }
 
-static lam_status reap_plot(void *context, const plot *p, lam_error *error) {
-    harvest *h = context;
-    written w = {0};
-    FILE *stream = open_memstream(&w.text, &w.size);
-    const lam_status status = plot_svg(p, stream, error);
-    fclose(stream);
-    free(w.text);
-    for (size_t k = 0; k < p->n_series; k++) {
-        size_t shown = 0;
-        for (size_t i = 0; i < p->series[k].n; i++)
-            shown += isfinite(p->series[k].x[i]) && isfinite(p->series[k].y[i]);
-        ck_assert_msg(shown > 0, "plot %s: nothing of %s", p->name, p->series[k].label);
-    }
-    strcat(strcat(h->plots, " "), p->name);
-    return status;
-}
-
 static void reap_line(void *context, const char *line) {
     (void)context;
     (void)line;
@@ -243,36 +176,15 @@ static void reap_line(void *context, const char *line) {
 START_TEST(figures_of_cities_are_whole) {
     harvest h = {.kind_rows = 0};
     lam_error error = {0};
-    const bench_sink sink = {.table = reap_table, .plot = reap_plot, .say = reap_line, .context = &h};
+    const bench_sink sink = {.table = reap_table, .say = reap_line, .context = &h};
     const bench_run run = {.scale = BENCH_QUICK, .seed = 1, .sink = &sink};
     ck_assert_msg(cities_radiosity(&run, &error) == LAM_OK, "%s", error.message);
     ck_assert_msg(cities_figures(&run, &error) == LAM_OK, "%s", error.message);
-    ck_assert_str_eq(h.tables, " bounces tiles map kinds singular-values distribution");
-    ck_assert_str_eq(h.plots, " bounces-1 bounces-3 tiles-1e-3 tiles-1e-4 tiles-1e-5 map singular-values"
-                              " distribution");
+    ck_assert_str_eq(h.tables,
+                     " bounces bounces-curves tiles map kinds singular-values singular-values-curves"
+                     " distribution distribution-curves");
     ck_assert_uint_eq(h.map_rows, MAP_SCENES);
     ck_assert_uint_eq(h.kind_rows, 6 * MAP_MAIN);
-}
-END_TEST
-
-/* Twelve names at one place, where four have room. */
-START_TEST(names_stand_beside_points) {
-    plot_series series[PLOT_SERIES_MOST];
-    for (size_t k = 0; k < PLOT_SERIES_MOST; k++)
-        series[k] = (plot_series){.label = "somewhere", .n = 1, .x = x, .y = y, .named = true};
-    const plot p = {.name = "p",
-                    .title = "names",
-                    .x_label = "x",
-                    .y_label = "y",
-                    .series = series,
-                    .n_series = PLOT_SERIES_MOST};
-    lam_error error = {0};
-    written w = {0};
-    FILE *stream = open_memstream(&w.text, &w.size);
-    ck_assert_int_eq(plot_svg(&p, stream, &error), LAM_OK);
-    fclose(stream);
-    ck_assert_str_eq(w.text + w.size - 7, "</svg>\n");
-    free(w.text);
 }
 END_TEST
 
@@ -283,11 +195,8 @@ int main(void) {
     tcase_add_test(cases, csv_quotes);
     tcase_add_test(cases, json_parses);
     tcase_add_test(cases, terminal_columns_align);
-    tcase_add_test(cases, plots_are_written_whole);
-    tcase_add_test(cases, plots_without_points_are_refused);
     tcase_add_test(cases, houses_stand_on_their_lots);
     tcase_add_test(cases, pieces_become_elements);
-    tcase_add_test(cases, names_stand_beside_points);
     tcase_add_test(cases, figures_of_cities_are_whole);
     tcase_set_timeout(cases, 300); /* of the figures, on a busy machine */
     suite_add_tcase(suite, cases);

@@ -1,8 +1,12 @@
-#include "solver/bench/table.h"
+/* Tables of measurements as CSV, as JSON and for a terminal; the list of suites. */
+#include "solver/bench/bench.h"
+
+#include "solver/base/csv_text.h"
 
 #include <assert.h>
 #include <jansson.h>
 #include <math.h>
+#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -49,19 +53,6 @@ lam_status table_check(const table *t, lam_error *error) {
 
 size_t table_rows(const table *t) {
     return t->used / t->n_columns;
-}
-
-static void csv_text(const char *text, FILE *stream) {
-    if (strpbrk(text, ",\"\r\n") == NULL) {
-        fputs(text, stream);
-        return;
-    }
-    fputc('"', stream);
-    for (const char *c = text; *c != '\0'; c++) {
-        if (*c == '"') fputc('"', stream);
-        fputc(*c, stream);
-    }
-    fputc('"', stream);
 }
 
 void table_csv(const table *t, FILE *stream) {
@@ -157,4 +148,43 @@ void table_print(const table *t, FILE *stream) {
         fputc('\n', stream);
     }
     fputc('\n', stream);
+}
+
+/* --- suites --------------------------------------------------------------------------------------------- */
+
+const bench_suite bench_suites[] = {
+    {.name = "formfactors", .run = bench_formfactors},
+    {.name = "lowrank", .run = bench_lowrank},
+    {.name = "stability", .run = bench_stability},
+    {.name = "cities", .run = bench_cities},
+    {.name = "service", .script = "service.py"},
+    {.name = "hierarchical", .run = bench_hierarchical},
+    {.name = NULL},
+};
+
+const char *bench_scale_name(bench_scale scale) {
+    static const char *const names[] = {"quick", "default", "full"};
+    return names[scale];
+}
+
+void bench_say(const bench_run *run, const char *format, ...) {
+    char line[256];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(line, sizeof line, format, arguments);
+    va_end(arguments);
+    run->sink->say(run->sink->context, line);
+}
+
+lam_status bench_table(const bench_run *run, const table *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(table_check(t, error));
+    TRY(run->sink->table(run->sink->context, t, error));
+done:
+    return status;
+}
+
+lam_status bench_check(const bench_run *run, lam_error *error) {
+    if (progress_cancelled(run->progress)) return status_fail(error, LAM_ERR_CANCELLED, "cancelled");
+    return LAM_OK;
 }
