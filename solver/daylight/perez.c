@@ -73,8 +73,8 @@ perez_sky perez_sky_of(const sun_position *sun, double direct, double diffuse) {
     if (diffuse > 0) p.clearness = ((diffuse + direct) / diffuse + cube) / (1 + cube);
     p.brightness = fmin(fmax(diffuse * air_mass(z) / extraterrestrial, .01), .6);
     while (p.bin < BINS - 1 && p.clearness >= bin_from[p.bin]) p.bin++;
-    /* Between overcast and clear, below a brightness of .2, horizons would come out without a bound:
-     * Radiance's gendaylit and gendaymtx take .2 there, and so does this. */
+    /* In bins 2 to 5 the luminance of the horizon is unbounded below a brightness of .2. We take .2 there, as
+     * Radiance's gendaylit and gendaymtx do. */
     const double Delta = p.bin >= 1 && p.bin <= 4 ? fmax(p.brightness, .2) : p.brightness;
     double x[5];
     const double(*const k)[4] = shape[p.bin];
@@ -84,7 +84,7 @@ perez_sky perez_sky_of(const sun_position *sun, double direct, double diffuse) {
         x[3] = -exp(Delta * (k[3][0] + k[3][1] * z)) + k[3][2] + Delta * k[3][3];
     }
     p.a = x[0];
-    p.b = fmin(x[1], 0); /* bright clear skies: above 0 the horizon would have no bound either */
+    p.b = fmin(x[1], 0); /* b > 0, of bright clear skies, would make the horizon unbounded too */
     p.c = x[2];
     p.d = x[3];
     p.e = x[4];

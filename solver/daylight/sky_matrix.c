@@ -15,13 +15,13 @@
 
 enum { ASCII, FLOAT, DOUBLE };
 
-/* A file that is being read: its header, then its numbers. */
+/* An open file and its header. */
 typedef struct reader {
     const char *path;
     FILE *stream;
     uint64_t size;
-    size_t rows, columns, components; /* 0: not told yet */
-    int format;                       /* -1: not told yet */
+    size_t rows, columns, components; /* 0: not read yet */
+    int format;                       /* -1: not read yet */
     bool big_endian;
 } reader;
 
@@ -54,7 +54,7 @@ done:
     return status;
 }
 
-/* A line of the header that tells a size. */
+/* Reads the size in a line KEY=SIZE of the header. */
 static lam_status read_size(const reader *r, const char *line, size_t *out, lam_error *error) {
     const char *digits = strchr(line, '=') + 1;
     char *end = NULL;
@@ -95,7 +95,7 @@ done:
 static lam_status read_header(reader *r, lam_error *error) {
     lam_status status = LAM_OK;
     char line[4096];
-    bool ended = false, begins = true; /* of a line: a longer one comes in parts */
+    bool ended = false, begins = true; /* begins: this is the start of a line, not the rest of a long one */
     for (size_t n = 0; !ended && n < HEADER_LINES && fgets(line, sizeof line, r->stream) != NULL; n++) {
         ended = begins && line[strspn(line, "\r")] == '\n';
         if (begins) TRY(read_line(r, line, error));
@@ -114,7 +114,7 @@ done:
     return status;
 }
 
-/* The tiling that has so many rows, which is the one asked for. */
+/* Chooses the tiling by the number of rows and checks that it is the one asked for. */
 static lam_status choose_tiling(const reader *r, const char *tiles, sky_tiling *out, lam_error *error) {
     lam_status status = LAM_OK;
     char name[SKY_NAME] = "tregenza";
@@ -135,8 +135,8 @@ done:
     return status;
 }
 
-/* tile [rows]: where each patch is, n_tiles for the ground. Bands are of one height, the zenith has half of
- * one; the first patch of a band is centred on north, the others follow by east. */
+/* tile [rows]: the tile of each patch, n_tiles for the ground. All bands have one height, the zenith cap half
+ * of it; the first patch of a band is centred on north, the others follow by east. */
 static void place_patches(size_t rows, const sky_tiling *s, uint32_t *tile) {
     static const size_t counts[7] = {30, 30, 24, 24, 18, 12, 6};
     const size_t split = (size_t)lround(sqrt((double)(rows - 2) / PER_SPLIT));
@@ -165,14 +165,14 @@ static bool is_blank(int c) {
     return c == ' ' || c == '\t' || c == '\n' || c == '\r';
 }
 
-/* The first character that is no blank, or EOF. */
+/* The first character that is not a blank, or EOF. */
 static int skip_blanks(reader *r) {
     int c = getc_unlocked(r->stream);
     while (is_blank(c)) c = getc_unlocked(r->stream);
     return c;
 }
 
-/* The next number of a text: what stands between blanks must be one. */
+/* Reads the next word of a text, which must be a number. */
 static bool next_text(reader *r, double *out) {
     char word[64], *end;
     size_t length = 0;
@@ -200,7 +200,7 @@ static bool next_bytes(reader *r, double *out) {
     return true;
 }
 
-/* Whether the file can hold that many numbers, before room is taken for them. */
+/* Checks that the file is long enough for its rows and columns, before memory is allocated for them. */
 static lam_status check_size(const reader *r, size_t *count, lam_error *error) {
     lam_status status = LAM_OK;
     static const size_t widths[] = {[ASCII] = 2, [FLOAT] = 4, [DOUBLE] = 8};
@@ -210,7 +210,7 @@ static lam_status check_size(const reader *r, size_t *count, lam_error *error) {
     const bool fits = size_multiply(r->rows, r->columns, &numbers) &&
                       size_multiply(numbers, r->components, &numbers) &&
                       size_multiply(numbers, widths[r->format], &bytes);
-    /* The last number of a text needs no blank after it. */
+    /* A number of a text takes at least two bytes, the last one at least one. */
     const uint64_t needed = r->format == ASCII ? bytes - 1 : bytes;
     if (!fits || left < needed || (r->format != ASCII && left != needed))
         FAIL(
@@ -226,7 +226,7 @@ done:
     return status;
 }
 
-/* L [columns][components][n_tiles] from row after row. */
+/* Reads L [columns][components][n_tiles], row by row. */
 static lam_status read_numbers(reader *r, const uint32_t *tile, size_t n_tiles, const progress *steps,
                                float *L, lam_error *error) {
     lam_status status = LAM_OK;
@@ -250,7 +250,7 @@ done:
     return status;
 }
 
-/* Three equal components become one. */
+/* Reduces three components to one channel where they are equal everywhere. */
 static void join_components(sky_matrix *m) {
     const size_t width = m->tiling.n_tiles;
     for (size_t h = 0; h < m->n; h++)

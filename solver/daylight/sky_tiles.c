@@ -8,13 +8,13 @@
 enum { TREGENZA_BANDS = 7 };
 static const uint32_t tregenza_counts[TREGENZA_BANDS] = {30, 30, 24, 24, 18, 12, 6};
 
-/* What a name says. */
+/* A parsed name. */
 typedef struct tiling_plan {
     size_t split;          /* of tregenza bands; 0: a grid */
     size_t sectors, bands; /* of a grid */
 } tiling_plan;
 
-/* Digits only, from 1 to most; what follows them, or NULL. */
+/* Reads digits, a number from 1 to most; returns the text behind them, or NULL. */
 static const char *read_count(const char *text, size_t most, size_t *out) {
     size_t value = 0;
     const char *at = text;
@@ -50,7 +50,7 @@ done:
     return status;
 }
 
-/* Which axis of the scene, and which way along it, is east, north and up. */
+/* Sets the axis of the scene, and the sign along it, of east, north and up. */
 static void turn(sky_tiling *s, char up) {
     static const struct {
         char up;
@@ -63,8 +63,8 @@ static void turn(sky_tiling *s, char up) {
     memcpy(s->sign, ways[way].sign, sizeof s->sign);
 }
 
-/* Between two altitudes and two azimuths a sector subtends da (sin a1 - sin a0), and the cosine to the
- * zenith, sin a, integrates to da (sin^2 a1 - sin^2 a0) / 2. */
+/* A tile between the altitudes a0, a1 and of the azimuthal width da has the solid angle da (sin a1 - sin a0);
+ * the cosine to the zenith, sin a, integrates to da (sin^2 a1 - sin^2 a0) / 2 over it. */
 static void place_tile(const sky_tiling *s, const double altitude[2], const double azimuth[2], bool cap,
                        sky_tile *t) {
     const double low = sin(altitude[0]), high = sin(altitude[1]), width = azimuth[1] - azimuth[0];
@@ -92,7 +92,7 @@ lam_status sky_tiling_create(const char *name, char up, sky_tiling *out, lam_err
     turn(&s, up);
     const bool cap = plan.split > 0;
     s.n_bands = cap ? TREGENZA_BANDS * plan.split + 1 : plan.bands;
-    /* The cap has the half of a band. */
+    /* The radius of the cap is half of a band's height. */
     const double height = M_PI / 2 / ((double)s.n_bands - (cap ? .5 : 0));
     s.bands_per_radian = (float)(1 / height);
     s.bands = memory_allocate(s.n_bands, sizeof *s.bands, "the tiles of the sky", error);
@@ -128,7 +128,7 @@ void sky_tiling_free(sky_tiling *s) {
     *s = (sky_tiling){0};
 }
 
-/* Four numbers at once, in the compilers' own vectors: what the baseline of every x86-64 has. */
+/* Vectors of four floats, as every x86-64 has (SSE2). */
 enum { LANES = 4 };
 typedef float lanes __attribute__((vector_size(LANES * sizeof(float))));
 typedef int32_t lane_mask __attribute__((vector_size(LANES * sizeof(float))));
@@ -141,8 +141,8 @@ static inline lanes magnitude(lanes x) {
     return choose(x < 0, -x, x);
 }
 
-/* The angle of (x, y), -pi to pi, to 2e-7: the minimax polynomial of atan(t)/t in t^2 on [0, 1]. atan2f, one
- * at a time, would cost a tenth of the ray. */
+/* atan2(y, x) to 2e-7, by the minimax polynomial of atan(t)/t in t^2 on [0, 1]. Scalar atan2f takes a tenth
+ * of the time of a ray. */
 static inline lanes angle_of(lanes y, lanes x) {
     const lanes ax = magnitude(x), ay = magnitude(y), least = {1e-30f, 1e-30f, 1e-30f, 1e-30f};
     const lane_mask steep = ay > ax;

@@ -1,4 +1,5 @@
-/* The sky in tiles: where each of them is, and which one a direction meets. Knows neither elements nor rays.
+/* Tilings of the sky: the position of each tile, and the tile in a direction. Knows neither elements nor
+ * rays.
  *
  * North is +y where z is up, -z where y is up, and +z where x is up; east is +x, +x and +y, so that east,
  * north and up are right-handed. Azimuth runs from north by east. */
@@ -9,7 +10,7 @@
 
 #include <stdint.h>
 
-/* One tile, angles in radians: nine numbers, as they stand in a store. */
+/* One tile, angles in radians: nine numbers, as in a store. */
 typedef struct sky_tile {
     double centre[3];   /* unit vector towards its middle altitude and azimuth, in the scene's axes */
     double altitude[2]; /* above the horizon: from, to */
@@ -30,7 +31,7 @@ typedef struct sky_tiling {
     char up; /* 'x', 'y' or 'z' */
     size_t n_tiles, n_bands;
     sky_tile *tiles; /* [n_tiles], band by band from the horizon */
-    sky_band *bands; /* [n_bands], all of one height; of a zenith cap only the lower half is there */
+    sky_band *bands; /* [n_bands], all of one height; a zenith cap is the lower half of a band */
     float bands_per_radian;
     int axis[3];   /* of the scene: east, north, up */
     float sign[3]; /* likewise */
@@ -47,8 +48,8 @@ typedef struct sky_tiling {
 lam_status sky_tiling_create(const char *name, char up, sky_tiling *out, lam_error *error);
 void sky_tiling_free(sky_tiling *s);
 
-/* The tile that each of a packet of directions (of any length, by component) meets, or n_tiles: the ground,
- * below the horizon. O(1). */
+/* The tile in each of a packet of directions (of any length, one array for each component); n_tiles, the
+ * ground, for directions below the horizon. O(1). */
 void sky_tiling_find(const sky_tiling *s, const float direction[3][SKY_PACKET], uint32_t tile[SKY_PACKET]);
 
 #endif

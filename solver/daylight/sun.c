@@ -4,8 +4,8 @@
 
 #define DEGREE (M_PI / 180)
 
-/* Days from noon of 1 January 2000 to the midnight at which a day begins. A year here begins with March,
- * so that a leap day is its last: 153 days make five months of 31, 30, 31, 30 and 31. */
+/* Days from noon of 1 January 2000 to the midnight at which a day begins. Years are counted from March, so
+ * that a leap day is the last day; five months of 31, 30, 31, 30 and 31 days have 153. */
 static double days_since_2000(int year, int month, int day) {
     const long back = month <= 2, y = year - back, m = month - 3 + 12 * back;
     const long days = 365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + day;

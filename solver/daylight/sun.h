@@ -1,4 +1,4 @@
-/* Where the sun stands. Knows nothing of weather. */
+/* The position of the sun. Knows nothing of weather. */
 #ifndef LAMBERT_DAYLIGHT_SUN_H
 #define LAMBERT_DAYLIGHT_SUN_H
 
@@ -6,14 +6,14 @@ typedef struct sun_position {
     double altitude;     /* radians; below 0: night */
     double azimuth;      /* radians from north by east, -pi to pi */
     double direction[3]; /* unit vector: east, north, up */
-    double distance;     /* of the earth from it, astronomical units */
+    double distance;     /* from the earth, astronomical units */
 } sun_position;
 
-/* At an hour of standard time (0 to 24, decimal) of a day of the Gregorian calendar, at a latitude and
- * longitude in degrees (north and east positive) whose clocks are time_zone hours before UTC. The true
- * position, without refraction, which lifts the sun by .57 degrees at the horizon, by less than .1 above an
- * altitude of 10. To .01 degrees from 1950 to 2050, less exact the further from it. Source: the low-precision
- * formulas of the Astronomical Almanac, as in Michalsky 1988, Solar Energy 40(3):227-235. */
+/* The position at an hour of standard time (0 to 24, decimal), time_zone hours ahead of UTC, of a day of the
+ * Gregorian calendar, at a latitude and longitude in degrees (north and east positive). It is accurate to .01
+ * degrees from 1950 to 2050. It omits refraction, which lifts the sun by .57 degrees at the horizon and by
+ * less than .1 above an altitude of 10 degrees. Source: the low-precision formulas of the Astronomical
+ * Almanac, as in Michalsky 1988, Solar Energy 40(3):227-235. */
 sun_position sun_at(double latitude, double longitude, double time_zone, int year, int month, int day,
                     double hour);
 

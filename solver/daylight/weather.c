@@ -11,7 +11,7 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-/* More than the sun gives above the air: what a sensor can show for a moment under broken clouds. */
+/* RADIATION_MOST exceeds the solar constant: a sensor under broken clouds can briefly show more than that. */
 #define RADIATION_MOST 3000
 #define MISSING_RADIATION 9999
 #define MISSING_DEW_POINT 99.9
@@ -54,7 +54,7 @@ done:
     return status;
 }
 
-/* The next line without its end and what blanks stand before that; *more is false where the file ends. */
+/* Reads the next line, without trailing blanks; *more is false at the end of the file. */
 static lam_status reader_next(reader *r, bool *more, lam_error *error) {
     lam_status status = LAM_OK;
     errno = 0;
@@ -74,7 +74,7 @@ done:
     return status;
 }
 
-/* The next line, which must be there: what is its name. */
+/* Reads the next line, an error where the file ends; what is its name. */
 static lam_status reader_need(reader *r, const char *what, lam_error *error) {
     bool more = false;
     const lam_status status = reader_next(r, &more, error);
@@ -83,7 +83,7 @@ static lam_status reader_need(reader *r, const char *what, lam_error *error) {
                        what);
 }
 
-/* Takes the rows that are left at most, at least 1. */
+/* Allocates as many hours as there are lines left. */
 static lam_status allocate_hours(reader *r, weather *w, lam_error *error) {
     size_t lines = 1;
     const long here = ftell(r->stream);
@@ -94,7 +94,7 @@ static lam_status allocate_hours(reader *r, weather *w, lam_error *error) {
     return w->hours == NULL ? LAM_ERR_MEMORY : LAM_OK;
 }
 
-/* A field as a finite number from low to high; blanks around it are nothing. */
+/* Reads a field as a finite number from low to high; blanks around it are ignored. */
 static lam_status read_number(const reader *r, const char *what, const char *text, double low, double high,
                               double *out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -128,7 +128,7 @@ done:
     return status;
 }
 
-/* Radiation is not taken for missing where it only is too much. */
+/* Reads a radiation, and tells a missing value (9999) from one that is too large. */
 static lam_status read_radiation(const reader *r, const char *what, const char *text, double *out,
                                  lam_error *error) {
     lam_status status = LAM_OK;
@@ -157,7 +157,7 @@ done:
     return status;
 }
 
-/* Cuts text at a mark; fields beyond most are left out. How many there are. */
+/* Splits text at a mark into at most `most` fields; returns how many. */
 static size_t cut(char *text, char mark, const char **fields, size_t most) {
     size_t n = 0;
     for (char *at = text; at != NULL && n < most; n++) {
@@ -205,7 +205,7 @@ static lam_status read_epw_header(reader *r, weather *w, lam_error *error) {
     int per_hour = 0;
     for (int k = 0; k < 8; k++) {
         TRY(reader_need(r, names[k], error));
-        /* A mark of UTF-8 may stand before the first. */
+        /* The file may begin with a byte order mark. */
         char *line = r->line + (k == 0 && strncmp(r->line, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0);
         const size_t n = cut(line, ',', fields, 10);
         if (n == 0 || strcasecmp(fields[0], names[k]) != 0)
@@ -255,7 +255,7 @@ done:
     return status;
 }
 
-/* In a WEA west is positive, and its time zone is a meridian. */
+/* In a WEA western longitudes are positive, and the time zone is given as a meridian. */
 static lam_status read_wea_header(reader *r, weather *w, lam_error *error) {
     lam_status status = LAM_OK;
     static const struct {

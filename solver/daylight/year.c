@@ -3,8 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Directions in a tile are about this far apart: the light around the sun falls to 1/e in 8 degrees at its
- * steepest. */
+/* The distance of sample directions in a tile. The scattering around the sun falls to 1/e in 8 degrees at its
+ * steepest.
+ */
 #define SPACING (3 * M_PI / 180)
 
 static size_t steps_across(double angle) {
@@ -23,7 +24,7 @@ void year_add_sky(const sky_tiling *s, const perez_sky *p, const sun_position *s
         const double all = (sin(first->altitude[1]) - sin(low)) * (double)sectors;
         for (size_t t = s->bands[b].first; t < s->bands[b].first + s->bands[b].count; t++) L[t] = 0;
         for (size_t r = 0; r < rings; r++) {
-            /* The solid angle of a ring goes with the difference of the sines. */
+            /* The solid angle of a ring is proportional to the difference of the sines. */
             const double under = sin(low + height * (double)r / (double)rings);
             const double over = sin(low + height * (double)(r + 1) / (double)rings);
             const double up = .5 * (under + over);

@@ -9,7 +9,7 @@
 #include "solver/linalg/csr.h"
 #include "solver/scene/mesh.h"
 
-/* How many pairs of elements each step of pairs.h decided. */
+/* The number of pairs of elements that each step of pairs.h decided. */
 typedef struct pairs_report {
     double facing;   /* face each other and are above the threshold */
     double certain;  /* of those: no element reaches into the shaft between their clusters */

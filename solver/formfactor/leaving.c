@@ -36,7 +36,7 @@ double leaving_outside(const form_factors *f, size_t element) {
 }
 
 lam_status leaving_to_sky(form_factors *f, size_t n, lam_error *error) {
-    double *scale = memory_allocate(n, sizeof *scale, "the light of the sky", error);
+    double *scale = memory_allocate(n, sizeof *scale, "first bounce of the sky", error);
     if (scale == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < n; i++) {
         const double outside = f->leaving[i] + absorbed(f, i);

@@ -127,8 +127,8 @@ static double product(const double *a, const double *b, const double *weight, si
     return sum;
 }
 
-/* gamma = argmin |f - sum gamma_k df_k|, weighted by areas, from the normal equations with the df_k made of
- * length 1; false where those are too much alike. */
+/* gamma = argmin |f - sum gamma_k df_k|, weighted by areas, by the normal equations of the df_k scaled to
+ * length 1; false where these are singular. */
 static bool least_squares(const history *h, const double *f, const double *area, double gamma[STEPS]) {
     double A[STEPS * STEPS], b[STEPS], length[STEPS], rcond;
     const size_t held = h->held;
@@ -141,7 +141,7 @@ static bool least_squares(const history *h, const double *f, const double *area,
     }
     for (size_t k = 0; k < held; k++) {
         for (size_t l = 0; l < held; l++) A[k * held + l] /= length[k] * length[l];
-        A[k * held + k] += alike; /* after the division: on the diagonal is 1 */
+        A[k * held + k] += alike; /* the diagonal is 1 */
     }
     if (core_invert(held, A, &rcond, NULL) != LAM_OK) return false;
     for (size_t k = 0; k < held; k++) {
@@ -152,8 +152,9 @@ static bool least_squares(const history *h, const double *f, const double *area,
     return true;
 }
 
-/* The same from d = 1 by far fewer sweeps: each is extrapolated from the steps before (Anderson 1965). before
- * gets the row sums at the start. Where it does not settle perhaps no scaling meets every row. */
+/* Finds the scaling of sweep from d = 1 with far fewer sweeps: each is extrapolated from the steps before
+ * (Anderson 1965). before receives the row sums of d = 1. settled is false where it does not converge:
+ * perhaps no scaling closes every row. */
 static lam_status extrapolate(scaling *c, double *before, bool *settled, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = c->G->n;
@@ -193,8 +194,8 @@ done:
     return status;
 }
 
-/* d so that r_i = A_i. Where no scaling meets every row, rows may still pass A_i: they are scaled down, and
- * with them the other ends of their pairs. */
+/* Finds d with r_i = A_i. Where no scaling closes every row, rows with r_i > A_i are scaled down, and their
+ * pairs with them. */
 static lam_status settle(scaling *c, double *before, lam_error *error) {
     lam_status status = LAM_OK;
     bool settled;
@@ -209,7 +210,7 @@ done:
     return status;
 }
 
-/* g_ij <- g_ij d_i d_j; row sums of the F it gives; returns the largest error of reciprocity. */
+/* g_ij <- g_ij d_i d_j; sets the row sums of F; returns the largest error of reciprocity. */
 static double scale(csr *G, sums *s, const double *area, const double *d, double *row_sums) {
     double worst = 0;
 #pragma omp parallel for schedule(dynamic, 1) reduction(max : worst)

@@ -1,14 +1,16 @@
-/* From merged exchange areas to form factors that keep reciprocity and their row sums. */
+/* The repair of row sums: symmetric Sinkhorn scaling d_i g_ij d_j of merged exchange areas, which keeps
+ * reciprocity. */
 #ifndef LAMBERT_FORMFACTOR_REPAIR_H
 #define LAMBERT_FORMFACTOR_REPAIR_H
 
 #include "solver/formfactor/formfactor.h"
 
-/* Scales g_ij by d_i d_j so that every row closes, d_i (A_i outside_i + sum_j g_ij d_j) = A_i (symmetric
- * Sinkhorn sweeps), never above: G, the upper triangle of g (upper.h), becomes A_i F_ij. outside, [n], is the
- * sampled share that does not reach an element: the outside is one more partner, scaled like the rest of its
- * row, so that a row whose own rays missed what others saw of it is not silenced by them. Fills the repair
- * figures, closure and reciprocity errors, row_sums. The same for any number of threads. */
+/* Scales g_ij by d_i d_j so that every row closes and none exceeds its target,
+ *     d_i (A_i outside_i + sum_j g_ij d_j) = A_i
+ * G, the upper triangle of g (upper.h), becomes A_i F_ij. outside, [n], is the sampled share that reaches no
+ * element (leaving.h). It is scaled like the rest of its row, so that a row keeps what the rays of other
+ * elements found of it. Sets the repair figures, closure and reciprocity errors, and row_sums. The same for
+ * any number of threads. */
 lam_status repair_close(csr *G, const double *area, const double *outside, form_factors *out,
                         lam_error *error);
 

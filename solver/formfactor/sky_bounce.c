@@ -20,8 +20,8 @@ lam_status sky_bounce_create(const char *tiling, char up, double ground_albedo, 
     TRY(sky_tiling_create(tiling, up, &s.tiling, error));
     if (!size_multiply(s.tiling.n_tiles, n, &count))
         FAIL(error, LAM_ERR_MEMORY, "%zu tiles of sky over %zu elements are too many", s.tiling.n_tiles, n);
-    s.first_bounce = memory_allocate(count, sizeof *s.first_bounce, "the light of the sky", error);
-    s.ground = memory_allocate(n, sizeof *s.ground, "the light of the ground", error);
+    s.first_bounce = memory_allocate(count, sizeof *s.first_bounce, "first bounce of the sky", error);
+    s.ground = memory_allocate(n, sizeof *s.ground, "first bounce of the sky", error);
     if (s.first_bounce == NULL || s.ground == NULL) TRY(LAM_ERR_MEMORY);
     *out = s;
     s = (sky_bounce){0};

@@ -12,9 +12,9 @@ typedef struct sky_bounce {
     sky_tiling tiling;
     double ground_albedo;
     size_t n;
-    float
-        *first_bounce; /* [m][n], sr: pi F_i,tile; until sky_bounce_close, the shares of an element's rays */
-    double *ground;    /* [n], the share that leaves below the horizon; NULL after sky_bounce_close */
+    /* [m][n], sr: pi F_i,tile; until sky_bounce_close, the shares of an element's rays */
+    float *first_bounce;
+    double *ground; /* [n], the share that leaves below the horizon; NULL after sky_bounce_close */
 } sky_bounce;
 
 /* Empty bins for n elements under a tiling (see sky_tiling_create); a ground of albedo 0 to 1.

@@ -6,8 +6,8 @@
 
 /* The side of the square of rays by which a camera is judged. */
 #define PROBE_SIDE 64
-#define MARGIN 0.03     /* left free at each side, of half the picture */
-#define INSIDE_FOV 75.0 /* a room looked at from within needs a wide angle */
+#define MARGIN 0.03     /* free at each side, as a share of half the picture */
+#define INSIDE_FOV 75.0 /* a view from inside a room needs a wide angle */
 #define CENTRING_PASSES 12
 #define RAISED_ELEVATION 25.0
 
@@ -26,7 +26,7 @@ static void scale_to_unit(double a[3]) {
     for (int d = 0; d < 3; d++) a[d] /= length;
 }
 
-/* The scene's axes: what is up, where north is (contract: +y, or -z when y is up), and east. */
+/* The scene's axes: up, north (+y, or -z where y is up), and east. */
 static void scene_axes(char up, double axes_up[3], double north[3], double east[3]) {
     memset(axes_up, 0, 3 * sizeof *axes_up);
     memset(north, 0, 3 * sizeof *north);
@@ -43,7 +43,7 @@ static void orient(camera *c, const double forward[3], char up, double fov, doub
     double axes_up[3], north[3], east[3];
     scene_axes(up, axes_up, north, east);
     memcpy(c->forward, forward, sizeof c->forward);
-    /* Looking straight up or down, north is at the top. */
+    /* A camera that faces straight up or down has north at the top. */
     const double *upright = fabs(dot(forward, axes_up)) > 1 - 1e-9 ? north : axes_up;
     cross(forward, upright, c->right);
     scale_to_unit(c->right);
@@ -77,7 +77,7 @@ void camera_direction(const camera *c, double x, double y, double direction[3]) 
     for (int d = 0; d < 3; d++) direction[d] = c->forward[d] + right * c->right[d] + up * c->up[d];
 }
 
-/* Moves the eye, keeping the direction, to where the picture just holds every vertex.
+/* Moves the eye, keeping the direction, to the nearest place from which the picture holds every vertex.
  * With v = (x, y, z) in camera axes, z towards the viewer, and the eye at (s, ., d): x - s <= (d - z) tan_x
  * and s - x <= (d - z) tan_x; so the two outermost planes give s, and d as their half sum over tan_x. */
 static void fit(const mesh *m, camera *c) {
@@ -105,7 +105,8 @@ static void fit(const mesh *m, camera *c) {
     }
 }
 
-/* Moves the eye sideways until the scene is in the middle; fit has left room in one of the two directions. */
+/* Moves the eye sideways until the scene is in the middle: fit leaves a margin in one of the two directions.
+ */
 static void centre_view(const mesh *m, camera *c) {
     const double *axis[2] = {c->right, c->up};
     for (int pass = 0; pass < 2 * CENTRING_PASSES; pass++) {
@@ -157,7 +158,7 @@ static void probe(const camera *c, const visibility *v, const bool *lit, double 
     *unlit_share = (double)n_unlit / (PROBE_SIDE * PROBE_SIDE);
 }
 
-/* How far one can go from a point before anything stands in the way, from either side. */
+/* The distance from a point to the nearest face in a direction, front or back. */
 static double free_distance(const visibility *v, const double from[3], const double direction[3]) {
     ray_packet rays;
     hit_packet hits;
@@ -172,7 +173,7 @@ static double free_distance(const visibility *v, const double from[3], const dou
     return hits.element[0] == VISIBILITY_NOTHING ? INFINITY : (double)hits.distance[0];
 }
 
-/* The middle of what is lit, by area. */
+/* The area-weighted mean of the centroids of lit elements. */
 static void lit_centre(const mesh *m, const bool *lit, double centre[3]) {
     double total = 0, sum[3] = {0, 0, 0};
     for (size_t i = 0; i < m->n; i++) {
@@ -185,7 +186,8 @@ static void lit_centre(const mesh *m, const bool *lit, double centre[3]) {
     for (int d = 0; d < 3; d++) centre[d] = sum[d] / total;
 }
 
-/* Looks for the best view from within: from the middle of the light towards a wall or corner and back. */
+/* Tries views from inside: the eye moves from the centre of the lit elements towards a wall or corner and
+ * faces back. */
 static void enter(const mesh *m, const visibility *v, const bool *lit, const double directions[8][3],
                   double aspect, double *best_score, camera *best) {
     double centre[3], radius, middle[3];
@@ -216,7 +218,7 @@ lam_status camera_choose(const mesh *m, const visibility *v, const bool *lit, do
     bool hidden = false;
     if (m->n == 0 || m->n_vertices == 0) FAIL(error, LAM_ERR_ARGUMENT, "the scene is empty: nothing to see");
     scene_axes(m->up, up, north, east);
-    /* From the south, east, west and north, then from between; each as seen from the scene. */
+    /* The eye's direction from the scene: south, east, west and north, then the four between. */
     static const double compass[8][2] = {{-1, 0}, {0, 1},   {0, -1}, {1, 0},
                                          {-1, 1}, {-1, -1}, {1, 1},  {1, -1}};
     for (int i = 0; i < 8; i++) {
@@ -226,7 +228,7 @@ lam_status camera_choose(const mesh *m, const visibility *v, const bool *lit, do
     for (int raised = 0; raised < 2; raised++)
         for (int i = 0; i < 8; i++) {
             const double elevation = raised ? RAISED_ELEVATION * M_PI / 180 : 0;
-            /* A plain elevation drawing is what people expect unless another view shows clearly more. */
+            /* An elevation is preferred unless another view shows clearly more. */
             const double preference = i < 4 && !raised ? 1 : i < 4 ? .85 : .8;
             double forward[3], lit_share, unlit_share;
             camera candidate = {0};
@@ -236,7 +238,7 @@ lam_status camera_choose(const mesh *m, const visibility *v, const bool *lit, do
             fit(m, &candidate);
             probe(&candidate, v, lit, &lit_share, &unlit_share);
             double score = preference * (lit_share + .1 * unlit_share);
-            if (score > best_score * 1.005) { /* of equals the first, whatever the last bit says */
+            if (score > best_score * 1.005) { /* of nearly equal views the first, independent of rounding */
                 best_score = score;
                 best = candidate;
                 hidden = unlit_share > lit_share;

@@ -1,4 +1,4 @@
-/* A pinhole camera in scene coordinates (double), and the choice of one that shows a scene well. */
+/* A pinhole camera in scene coordinates, and the automatic choice of a view. */
 #ifndef LAMBERT_RENDER_CAMERA_H
 #define LAMBERT_RENDER_CAMERA_H
 
@@ -12,9 +12,8 @@ typedef struct camera {
     double tan_x, tan_y;                /* half the width and height of the picture at distance 1 */
 } camera;
 
-/* A camera at eye that looks at target; fov is its vertical angle in degrees, aspect width over height, up
- * the axis ('x', 'y', 'z') that stays upright. LAM_ERR_ARGUMENT: eye at the target, fov not within 1 to 170.
- */
+/* A camera at eye that faces target; fov is its vertical angle in degrees, aspect width over height, up the
+ * axis ('x', 'y', 'z') that stays upright. LAM_ERR_ARGUMENT: eye at the target, fov not within 1 to 170. */
 lam_status camera_look(const double eye[3], const double target[3], double fov, double aspect, char up,
                        camera *c, lam_error *error);
 
@@ -22,8 +21,9 @@ lam_status camera_look(const double eye[3], const double target[3], double fov, 
  * down. */
 void camera_direction(const camera *c, double x, double y, double direction[3]);
 
-/* Chooses a camera that fills the picture with the fronts of elements; lit[n] says which of them have light.
- * Looks from outside, through back faces; a scene whose light cannot be seen from outside is entered. */
+/* Chooses a camera that fills the picture with fronts of elements, preferably lit ones (lit[n]). The camera
+ * stands outside, with back faces culled; where lit fronts are not visible from outside, it stands inside the
+ * scene. */
 lam_status camera_choose(const mesh *m, const visibility *v, const bool *lit, double aspect, camera *c,
                          lam_error *error);
 

@@ -42,7 +42,7 @@ void image_free(image *picture) {
     *picture = (image){0};
 }
 
-/* What libpng's callbacks tell the code that started them. */
+/* The state that libpng's callbacks share with encode_to. */
 typedef struct png_writer {
     FILE *file;
     int cause; /* errno when writing failed, else 0 */
@@ -73,7 +73,7 @@ static void on_png_flush(png_structp png) {
     (void)png;
 }
 
-/* Alone with setjmp: no variable of it is changed after. */
+/* A function of its own for setjmp: it changes no variable afterwards. */
 static bool encode(png_structp png, png_infop info, const image *picture) {
     if (setjmp(png_jmpbuf(png)) != 0) return false;
     png_set_IHDR(png, info, (png_uint_32)picture->width, (png_uint_32)picture->height, 8,

@@ -1,4 +1,4 @@
-/* An 8-bit picture in memory and its way into a PNG file: the only room with libpng in it. */
+/* An 8-bit picture in memory, and its PNG file: the only file that knows libpng. */
 #ifndef LAMBERT_RENDER_IMAGE_H
 #define LAMBERT_RENDER_IMAGE_H
 
@@ -15,7 +15,7 @@ typedef struct image {
     uint8_t *pixels; /* [height][width][channels], top row first */
 } image;
 
-/* LAM_ERR_ARGUMENT when a picture of this size is not possible. */
+/* LAM_ERR_ARGUMENT for a side or a number of pixels beyond the limits. */
 lam_status image_check_size(size_t width, size_t height, lam_error *error);
 
 /* Makes a black picture; freed with image_free. Errors: LAM_ERR_ARGUMENT (a size), LAM_ERR_MEMORY. */
@@ -23,7 +23,7 @@ lam_status image_create(size_t width, size_t height, size_t channels, image *pic
 void image_free(image *picture);
 
 /* Writes a PNG beside path and renames it onto path, so that an older file stays whole until then.
- * Errors: LAM_ERR_IO (a full disk among them; names path), LAM_ERR_MEMORY. */
+ * Errors: LAM_ERR_IO naming path (also for a full disk), LAM_ERR_MEMORY. */
 lam_status image_write_png(const image *picture, const char *path, lam_error *error);
 
 #endif

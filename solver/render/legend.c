@@ -8,7 +8,7 @@
 /* The most characters of a number in three digits. */
 #define LONGEST 8
 
-/* Numbers in 3 x 5 pixels, one row a group of three bits, top row first; drawn larger on larger pictures. */
+/* A font of 3 x 5 pixels: three bits for each row, top row first; scaled up on larger pictures. */
 #define GLYPH_WIDTH 3
 #define GLYPH_HEIGHT 5
 
@@ -49,7 +49,7 @@ static void write_text(image *picture, size_t x, size_t y, size_t scale, const c
         }
 }
 
-/* Everything in the legend, in pixels. */
+/* The sizes of the legend, in pixels. */
 typedef struct layout {
     size_t scale, margin, text_width, bar_width, width;
 } layout;

@@ -3,11 +3,11 @@
 #include <math.h>
 #include <string.h>
 
-/* Pixels of a square that one thread draws at a time. */
+/* The side, in pixels, of the square that one thread draws at a time. */
 #define TILE 32
 
-/* Rays of a pixel: two packets, placed as a (0, 4, 2)-net in base 2: one in each of the 4 x 4 and 16 x 1
- * cells. */
+/* Rays of a pixel: two packets, placed as a (0, 4, 2)-net in base 2, with one point in each elementary cell.
+ */
 #define SAMPLES 16
 #define PACKETS (SAMPLES / VISIBILITY_PACKET)
 
@@ -87,7 +87,7 @@ void picture_measure(const picture_scene *scene, const camera *c, tone_histogram
     if (h->total * 100 < shown || !(tone_histogram_quantile(h, 1) > 0)) *h = all;
 }
 
-/* Adds what a ray shows, as the screen should show it, to a pixel's sum. */
+/* Adds the display-linear colour of one ray to a pixel's sum. */
 static void add_sample(const picture_scene *scene, const camera *c, const picture_options *how, double x,
                        double y, uint32_t element, size_t channels_out, float *sum) {
     float values[SHADE_MAX_CHANNELS], rgb[3];
@@ -106,7 +106,8 @@ static void add_sample(const picture_scene *scene, const camera *c, const pictur
         for (size_t k = 0; k < channels_out; k++) sum[k] += values[channels == 3 ? k : 0];
         return;
     }
-    /* Toned sample by sample: averaged first, a lamp's edge would be as white as the lamp, and ragged. */
+    /* Samples are toned before they are averaged, or the edge of a lamp would be as white as the lamp and
+     * aliased. */
     for (size_t k = 0; k < channels; k++) values[k] *= (float)how->exposure;
     if (channels == 3)
         tone_color(values);
@@ -135,7 +136,8 @@ static void draw_pixel(const picture_scene *scene, const camera *c, const pictur
         memcpy(element + p * VISIBILITY_PACKET, hits.element, sizeof hits.element);
     }
     for (size_t s = 0; s < SAMPLES; s++) missed += element[s] == VISIBILITY_NOTHING;
-    /* Elements that only touch leave gaps of a rounding error. Beside a hit, a miss gets a second chance. */
+    /* Elements that only touch leave gaps of rounding. In a pixel with hits, a miss is cast again a little
+     * aside. */
     for (size_t s = 0; s < SAMPLES && missed > 0 && missed < SAMPLES; s++) {
         ray_packet rays;
         hit_packet hits;

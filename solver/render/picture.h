@@ -1,4 +1,5 @@
-/* From a camera to pixels: casts rays, shades what they meet. Same bits for any number of threads. */
+/* Draws a picture: casts the rays of a camera, shades the elements they hit and maps values to colours. The
+ * bits are the same for any number of threads. */
 #ifndef LAMBERT_RENDER_PICTURE_H
 #define LAMBERT_RENDER_PICTURE_H
 
@@ -7,25 +8,25 @@
 #include "solver/render/shade.h"
 #include "solver/render/tone.h"
 
-/* What is looked at. All of it is only read. */
+/* The scene to draw; only read. */
 typedef struct picture_scene {
     const mesh *mesh;
     const visibility *visibility;
     const shade *shade;
-    const bool *glows; /* [n]: elements whose light is mostly their own; they do not set the exposure */
+    const bool *glows; /* [n]: elements that mostly emit; they do not affect the exposure */
 } picture_scene;
 
-/* How values become colours: exposed and toned, or, with range > 0, false colour from 0 to range, or, with
- * plain, as they are: display-linear from 0 to 1. */
+/* The mapping of values to colours: exposure and tone curve; with range > 0, false colour from 0 to range;
+ * with plain, the values themselves, display-linear from 0 to 1. */
 typedef struct picture_options {
     double exposure;
     double range;
     bool plain;
-    size_t width; /* columns drawn on, from the left; a legend takes the others */
+    size_t width; /* columns of the picture proper, from the left; a legend takes the others */
 } picture_options;
 
-/* Gathers what a coarse picture of this camera and aspect shows, without what glows by itself
- * (with it where there is nothing else). */
+/* Adds the luminances of a coarse picture of this camera to h, without elements that glow unless there are no
+ * others. */
 void picture_measure(const picture_scene *scene, const camera *c, tone_histogram *h);
 
 /* Draws; picture has been created, with 1 channel or 3 (needed for colour). Errors: LAM_ERR_CANCELLED. */

@@ -7,15 +7,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Elements of a group are one surface where their normals are closer than 20 degrees. */
+/* The cosine of 20 degrees. */
 #define SURFACE_COS 0.93969262
 
-/* Vertices that meet in one point are compared pair by pair up to this many; past it with the last ones. */
+/* Each corner at a point is compared with at most this many previous ones. */
 #define MANY_CORNERS 256
 
 #define NONE 0xFFFFFFFFu
 
-/* Points found by place: a hash of cubic cells, each a chain. */
+/* Points hashed by cubic cells; each cell is a chain. */
 typedef struct point_grid {
     double cell;
     size_t n_heads; /* a power of 2 */
@@ -60,7 +60,7 @@ static void grid_add(point_grid *g, uint32_t i) {
     g->heads[head] = i;
 }
 
-/* Visits the points in the 27 cells around one (and others by chance). */
+/* Visits the points in the 27 cells around a point, and others with the same hash. */
 static void grid_near(const point_grid *g, const double point[3], void (*visit)(void *context, uint32_t i),
                       void *context) {
     int64_t centre[3];
@@ -75,7 +75,7 @@ static void grid_near(const point_grid *g, const double point[3], void (*visit)(
 typedef struct edge {
     uint64_t key; /* its nodes, the smaller first */
     uint32_t element;
-    uint32_t corner; /* it runs from here to the next one */
+    uint32_t corner; /* its first; the second is the next corner */
 } edge;
 
 /* A node inside an edge: its value is (1 - t) a + t b. */
@@ -134,7 +134,7 @@ done:
     return status;
 }
 
-/* One corner of an element and the place it is at. */
+/* One corner of an element and its welded vertex. */
 typedef struct corner {
     uint32_t vertex, element, number;
 } corner;
@@ -146,7 +146,7 @@ static int compare_corners(const void *left, const void *right) {
     return (a->number > b->number) - (a->number < b->number);
 }
 
-/* Gives the corners at one place their nodes: joined where their elements are one surface. */
+/* Gives the corners at one place their nodes: one node for each surface. */
 static void join_corners(smoother *s, const corner *corners, uint32_t *parent, size_t count) {
     for (size_t i = 0; i < count; i++) parent[i] = (uint32_t)i;
     for (size_t i = 0; i < count; i++)
@@ -242,8 +242,8 @@ static void edge_nodes(const smoother *s, const edge *e, uint32_t *a, uint32_t *
     *b = s->nodes->corner[e->element][(e->corner + 1) % mesh_corners(s->m, e->element)];
 }
 
-/* The edges that no second element shares: of open ends, and of places where elements meet edge to part of an
- * edge. *edges is freed by the caller. */
+/* The edges of only one element: boundaries, and edges that meet only a part of another one. *edges is freed
+ * by the caller. */
 static lam_status lone_edges(const smoother *s, edge **edges, size_t *count, lam_error *error) {
     const mesh *m = s->m;
     size_t all = 0, kept = 0;
@@ -275,7 +275,7 @@ typedef struct hang_query {
     double length;
 } hang_query;
 
-/* Ties a node that lies inside the edge to its ends. Of several such edges the longest counts. */
+/* Constrains a node inside the edge to the values of its ends; the longest of several such edges wins. */
 static void hang_visit(void *context, uint32_t node) {
     hang_query *q = context;
     smoother *s = q->s;
@@ -294,7 +294,7 @@ static void hang_visit(void *context, uint32_t node) {
     s->constraints[node] = (constraint){q->a, q->b, t, q->length};
 }
 
-/* Finds the nodes that lie inside edges, walking along each edge through a grid. */
+/* Finds the nodes inside edges by walking along each edge through a grid. */
 static lam_status find_hanging(smoother *s, const edge *edges, size_t count, lam_error *error) {
     lam_status status = LAM_OK;
     point_grid grid = {0};
@@ -311,7 +311,7 @@ static lam_status find_hanging(smoother *s, const edge *edges, size_t count, lam
         total += distance(points[a], points[b]);
         longest = fmax(longest, distance(points[a], points[b]));
     }
-    /* About one node a cell, and no edge through more than some thousand cells. */
+    /* About one node per cell, and no edge through more than some thousand cells. */
     const double cell = fmax(fmax(total / (double)(count + 1), longest / 4096), 4 * s->tolerance);
     TRY(grid_create((const double(*)[3])points, n_nodes, cell, &grid, error));
     for (size_t i = 0; i < count; i++) {
@@ -344,8 +344,8 @@ done:
     return status;
 }
 
-/* Gives hanging nodes the values of their edges. Ends may hang themselves, even in a ring; every pass then
- * brings all of them nearer, as each is a mean of others. */
+/* Gives hanging nodes the values of their edges. The ends of an edge may hang themselves, even in a cycle;
+ * the passes then converge, because each value is a mean of others. */
 static void apply_constraints(smoother *s, size_t n_channels) {
     float *values = s->nodes->values;
     double change = 1, largest = 0;

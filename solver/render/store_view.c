@@ -50,13 +50,13 @@ done:
     return status;
 }
 
-/* Hues a golden section of the circle apart: numbers that are near, as neighbours' are, get hues that are
- * far. Two lightnesses keep apart what comes near again after some turns. */
+/* Consecutive patches, often neighbours, get hues a golden section of the circle apart. Two lightnesses
+ * distinguish patches whose hues come close again. */
 static void color_of(size_t patch, float rgb[3]) {
     const double golden = .6180339887498949, lightness = patch % 2 == 0 ? .92 : .68, saturation = .62;
     const double hue = fmod(golden * (double)patch, 1) * 6;
     for (int c = 0; c < 3; c++) {
-        const double from = fabs(fmod(hue + 6 - 2 * c, 6) - 3) - 1; /* how far from this channel's own hue */
+        const double from = fabs(fmod(hue + 6 - 2 * c, 6) - 3) - 1; /* distance from this channel's hue */
         const double share = fmin(fmax(from, 0), 1);
         rgb[c] = tone_decode((float)(lightness * (1 - saturation * (1 - share))));
     }
@@ -99,7 +99,7 @@ lam_status store_view_visible(store *s, size_t n, float **values, double *mean, 
     TRY(store_get_text(s, "/form_factors", "storage", &storage, error));
     if (strcmp(storage, "compressed") == 0)
         FAIL(error, LAM_ERR_ARGUMENT,
-             "%s: its form factors are compressed, which does not say who sees whom; precompute it with "
+             "%s: compressed form factors do not tell which elements see each other; precompute it with "
              "--keep-form-factors alone",
              store_path(s));
     TRY(store_read(s, "/form_factors/indptr", STORE_U64, 1, dims, &ends, error));
@@ -108,7 +108,7 @@ lam_status store_view_visible(store *s, size_t n, float **values, double *mean, 
     if (counts == NULL) TRY(LAM_ERR_MEMORY);
     const uint64_t *row = ends;
     const uint32_t *column = columns;
-    const bool upper = strcmp(storage, "upper") == 0; /* each pair once, and both see */
+    const bool upper = strcmp(storage, "upper") == 0; /* an entry is a pair: both see each other */
     for (size_t i = 0; i < n; i++)
         for (uint64_t e = row[i]; e < row[i + 1]; e++) {
             if (row[i + 1] > entries[0] || column[e] >= n)

@@ -1,5 +1,5 @@
-/* What a store holds beside radiosity, as values to draw: the patches of its operator (Fernández et al. 2011,
- * figures 1d and 2b) and how many elements each one sees (Aguerre 2016, figures 4.2 and 4.8). */
+/* Properties of a store as values to draw: the patches of its operator (Fernández et al. 2011, figures 1d and
+ * 2b) and the number of elements that each one sees (Aguerre 2016, figures 4.2 and 4.8). */
 #ifndef LAMBERT_RENDER_STORE_VIEW_H
 #define LAMBERT_RENDER_STORE_VIEW_H
 
@@ -8,13 +8,13 @@
 /* values [n_channels][n] in mesh order, freed by the caller. LAM_ERR_ARGUMENT where the store's operator has
  * no patches, or was stored without their coherence. */
 
-/* Of each element the coherence of its patch, in [0, 1]; one channel. *smallest is the smallest of them. */
+/* The coherence of each element's patch, in [0, 1]; one channel. *smallest is the smallest of them. */
 lam_status store_view_coherence(store *s, float **values, float *smallest, lam_error *error);
 
 /* A colour for each patch, unlike those of its neighbours; three channels, display-linear. */
 lam_status store_view_patches(store *s, float **values, size_t *n_patches, lam_error *error);
 
-/* values [n] in mesh order, freed by the caller: how many form factors of a row are not 0; *mean and *most of
+/* The number of nonzero form factors in each row, [n] in mesh order, freed by the caller; *mean and *most of
  * them. Errors: LAM_ERR_ARGUMENT where the store keeps no form factors, LAM_ERR_FORMAT, LAM_ERR_MEMORY. */
 lam_status store_view_visible(store *s, size_t n, float **values, double *mean, double *most,
                               lam_error *error);

@@ -2,14 +2,14 @@
 
 #include <math.h>
 
-/* Luminances from 2^LOWEST on, BINS_PER_OCTAVE bins each octave; bin 0 holds all that is darker. */
+/* Bins of luminances from 2^LOWEST on, BINS_PER_OCTAVE for each octave; bin 0 holds all darker ones. */
 #define LOWEST (-48)
 #define BINS_PER_OCTAVE 20
 
 /* Where the curve leaves the diagonal. */
 #define KNEE 0.7f
 
-/* How many times brighter than the screen a colour is when it has lost most of its hue. */
+/* A colour this many times brighter than the screen has lost most of its hue. */
 #define WHITENING 6.0f
 
 float tone_luminance(const float *values, size_t n_channels) {
@@ -37,8 +37,9 @@ double tone_histogram_quantile(const tone_histogram *h, double share) {
 }
 
 double tone_exposure(const tone_histogram *h) {
-    /* The bright parts just reach the shoulder; where the middle would then be lost in the dark, it is raised
-     * half the way and the bright parts go into the shoulder. */
+    /* The 95 % quantile just reaches the shoulder of the curve. Where the median is then darker than .18, the
+     * exposure is raised half of the way (geometrically), at most fourfold, and bright parts move into the
+     * shoulder. */
     const double bright = tone_histogram_quantile(h, .95), middle = tone_histogram_quantile(h, .5);
     if (!(bright > 0)) return 1;
     const double for_bright = .75 / bright;

@@ -1,13 +1,14 @@
-/* Linear values to what a screen shows: exposure, tone curve, sRGB, false colour. Knows no scene. */
+/* The mapping of linear values to display colours: exposure, tone curve, sRGB, false colour. Knows no scene.
+ */
 #ifndef LAMBERT_RENDER_TONE_H
 #define LAMBERT_RENDER_TONE_H
 
 #include "store/status.h"
 
-/* One brightness for a sample of 1 channel (itself), 3 (Rec. 709 luminance) or more (their mean). */
+/* The luminance of a sample: its only channel, the Rec. 709 luminance of 3, or the mean of more. */
 float tone_luminance(const float *values, size_t n_channels);
 
-/* The values that pictures are judged by, gathered pixel by pixel; zeroed to begin with. */
+/* A histogram of luminances on a logarithmic scale; starts as zero. */
 #define TONE_BINS 2048
 typedef struct tone_histogram {
     size_t counts[TONE_BINS];
@@ -16,17 +17,17 @@ typedef struct tone_histogram {
 
 void tone_histogram_add(tone_histogram *h, float luminance);
 
-/* The value that this share (0 to 1) of what was added stays below, to 3 %; 0 when nothing is above 0. */
+/* The quantile of the luminances at share (0 to 1), to 3 %; 0 where none is above 0. */
 double tone_histogram_quantile(const tone_histogram *h, double share);
 
-/* The factor that makes a scene of these values fit a screen whose white is 1. */
+/* The exposure: the factor by which these luminances fit a screen whose white is 1. */
 double tone_exposure(const tone_histogram *h);
 
 /* Display-linear brightness of an exposed value: x itself up to the knee, then a shoulder towards 1. */
 float tone_curve(float x);
 
-/* The same for a colour, in place: its largest channel follows the curve and its hue stays, but the more it
- * exceeds the screen the whiter it is. */
+/* The tone curve of a colour, in place: the largest channel follows tone_curve and the hue stays, but
+ * desaturates the more the colour exceeds the screen. */
 void tone_color(float rgb[3]);
 
 /* The sRGB code (0 to 255) of a display-linear value. */

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What one walk has found. */
+/* The links that one task has found. */
 typedef struct bag {
     cluster_link *links;
     size_t n, capacity;

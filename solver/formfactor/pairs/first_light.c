@@ -19,10 +19,10 @@ struct first_light {
 
 lam_status first_light_create(const mesh *m, uint64_t seed, first_light **out, lam_error *error) {
     lam_status status = LAM_OK;
-    first_light *l = memory_allocate(1, sizeof *l, "the light of few", error);
+    first_light *l = memory_allocate(1, sizeof *l, "direct illumination", error);
     if (l == NULL) TRY(LAM_ERR_MEMORY);
     l->m = m;
-    l->polygons = memory_allocate(m->n, sizeof *l->polygons, "the light of few", error);
+    l->polygons = memory_allocate(m->n, sizeof *l->polygons, "direct illumination", error);
     if (l->polygons == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < m->n; i++) polygon_of_element(m, i, &l->polygons[i]);
     pair_factor_rules_init(&l->rules);
@@ -117,7 +117,7 @@ lam_status first_light_of(const first_light *l, const float *E, double *H, bool 
     for (size_t i = 0; i < n; i++) count += E[i] != 0;
     *known = count <= FIRST_LIGHT_MOST;
     if (!*known) return LAM_OK;
-    of = memory_allocate(count, sizeof *of, "the light of few", error);
+    of = memory_allocate(count, sizeof *of, "direct illumination", error);
     if (of == NULL) TRY(LAM_ERR_MEMORY);
     count = 0;
     for (size_t i = 0; i < n; i++)
@@ -139,7 +139,7 @@ lam_status first_light_of(const first_light *l, const float *E, double *H, bool 
         }
         free(g);
     }
-    if (failed) FAIL(error, LAM_ERR_MEMORY, "the light of few: cannot allocate %zu numbers", count);
+    if (failed) FAIL(error, LAM_ERR_MEMORY, "direct illumination: cannot allocate %zu numbers", count);
 done:
     free(of);
     return status;

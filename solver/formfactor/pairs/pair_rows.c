@@ -190,7 +190,6 @@ static lam_status sort_rows(csr *rows, lam_error *error) {
                          : LAM_OK;
 }
 
-/* What is not zero, by element, above the diagonal, rows ascending. */
 lam_status pair_rows_gather(const pair_rows *found, const uint32_t *order, bool keep_hidden, csr *G,
                             lam_error *error) {
     lam_status status = LAM_OK;

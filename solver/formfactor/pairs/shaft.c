@@ -45,7 +45,7 @@ void shaft_init(shaft *s, const cluster *a, const cluster *b, double slack) {
     add_hull(s, a, b, 2, 0, slack);
 }
 
-bool shaft_misses_box(const shaft *s, const double low[3], const double high[3]) {
+static bool misses_box(const shaft *s, const double low[3], const double high[3]) {
     for (int d = 0; d < 3; d++)
         if (low[d] >= s->high[d] || high[d] <= s->low[d]) return true;
     for (int k = 0; k < s->n_planes; k++) {
@@ -105,7 +105,7 @@ size_t shaft_filter(const shaft *s, const mesh *m, const cluster_tree *t, const 
         while (depth > 0) {
             const uint32_t at = stack[--depth];
             const cluster *c = &t->clusters[at];
-            if (shaft_misses_box(s, c->low, c->high)) continue;
+            if (misses_box(s, c->low, c->high)) continue;
             if (cluster_is_leaf(c)) {
                 if (misses_leaf(s, m, t, c)) continue;
             } else if (extent2(c->low, c->high) > small && depth + 2 <= DEPTH &&

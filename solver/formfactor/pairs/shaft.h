@@ -18,7 +18,7 @@ typedef struct shaft {
  * only touches it is outside. */
 void shaft_init(shaft *s, const cluster *a, const cluster *b, double slack);
 
-bool shaft_misses_box(const shaft *s, const double low[3], const double high[3]);
+/* True where an element lies wholly outside a shaft. */
 bool shaft_misses_element(const shaft *s, const mesh *m, uint32_t element);
 
 /* Writes to out those of the candidates, the clusters in an enclosing shaft, that reach into this shaft,

@@ -91,7 +91,7 @@ START_TEST(efficacies) {
 }
 END_TEST
 
-/* Every kind of weather: what comes in is what was said, nothing is negative. */
+/* For every kind of weather the irradiance of the sky is the given one and no radiance is negative. */
 START_TEST(exact_and_positive) {
     static const double directs[] = {0, .1, 20, 200, 900, 3000}, diffuses[] = {.1, 5, 60, 300, 3000};
     static const double altitudes[] = {-30, -1, 0, .01, 2, 15, 45, 80, 90};

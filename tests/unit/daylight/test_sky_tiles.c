@@ -75,7 +75,7 @@ START_TEST(tiles_fill_the_sky) {
 }
 END_TEST
 
-/* What the names promise: sizes of single tiles, their order, north and east. */
+/* The tiles of each name: sizes, order, north and east. */
 START_TEST(conventions) {
     const double degree = M_PI / 180;
     for (size_t f = 0; f < 3; f++) {

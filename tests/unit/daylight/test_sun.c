@@ -1,4 +1,4 @@
-/* The position of the sun against published values and what almanacs know. */
+/* The position of the sun against published values and almanacs. */
 #include "solver/daylight/sun.h"
 #include "support/suite.h"
 

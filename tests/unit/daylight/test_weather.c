@@ -1,4 +1,4 @@
-/* Weather files: what they say is read; every wrong line is refused with its place and what is allowed. */
+/* Weather files: values are read; every wrong line is refused with its place and the allowed range. */
 #include "solver/daylight/weather.h"
 #include "support/suite.h"
 

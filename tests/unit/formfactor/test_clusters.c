@@ -42,7 +42,7 @@ static mesh room(void) {
     return m;
 }
 
-/* All that the walk over clusters needs. */
+/* The input of cluster_links_find. */
 typedef struct site {
     mesh m;
     visibility *v;
@@ -113,7 +113,7 @@ START_TEST(tree_holds_every_element) {
 }
 END_TEST
 
-/* A pair of elements sees each other somewhere: something of either lies in front of the other. */
+/* Two elements face each other: a part of either lies in front of the other. */
 static bool facing(const site *s, uint32_t i, uint32_t j) {
     polygon seen;
     polygon_in_front(&s->polygons[i], &s->polygons[j], &seen);
@@ -140,8 +140,8 @@ START_TEST(clusters_that_face_away_have_no_facing_pairs) {
 }
 END_TEST
 
-/* Links hold each pair at most once; each pair they do not hold faces away or is hidden; those they call open
- * are not blocked for any of many segments. */
+/* Links hold each pair at most once. Each pair without a link faces away or is hidden. Of a pair with an open
+ * link none of many segments is blocked. */
 START_TEST(links_are_right) {
     site *s = site_open();
     const size_t n = s->m.n;
@@ -171,7 +171,7 @@ START_TEST(links_are_right) {
             double seen;
             const double g = pair_factor_exchange(&s->rules, &s->polygons[i], &s->polygons[j], 1e-4);
             if (g <= 0) continue;
-            /* Other segments than those that decided, many times over. */
+            /* Many segments, independent of those that decided. */
             occlusion other = s->occlusion;
             for (other.seed = 100; held[p * n + q] != 1 && other.seed < 104; other.seed++) {
                 occlusion_test(&other, i, j, g, &seen);
@@ -184,7 +184,7 @@ START_TEST(links_are_right) {
     ck_assert_uint_gt(open, n);
     ck_assert_uint_gt(missing, 0);
     ck_assert_double_gt(l.hidden_pairs, 0);
-    /* What is lost of all the pairs that are called hidden is, for an element, far less than the accuracy. */
+    /* The factors lost in hidden links are, for each element, far below the accuracy. */
     ck_assert_double_le(lost / (double)n, .1 * s->occlusion.accuracy);
     cluster_links_free(&l);
     free(held);
@@ -223,7 +223,7 @@ START_TEST(threshold_keeps_what_is_above) {
                 ck_assert_int_eq(occlusion_test(&s->occlusion, i, j, g, &seen), OCCLUSION_TOTAL);
         }
     ck_assert_uint_gt(above, 0);
-    ck_assert_uint_lt(held_pairs, n * n / 4); /* and much of what is below is left out */
+    ck_assert_uint_lt(held_pairs, n * n / 4); /* and most pairs below it have no link */
     ck_assert_double_gt(l.distant_pairs, 0);
     cluster_links_free(&l);
     free(held);
@@ -231,7 +231,7 @@ START_TEST(threshold_keeps_what_is_above) {
 }
 END_TEST
 
-/* Rows by the vector units are pair_factor_exchange's numbers. */
+/* pair_far_row agrees with pair_factor_exchange. */
 START_TEST(far_rows_are_pair_exchange) {
     static const double tolerances[] = {1e-4, 1e-6};
     site *s = site_open();
@@ -264,7 +264,7 @@ START_TEST(far_rows_are_pair_exchange) {
 }
 END_TEST
 
-/* A shaft misses only what hides nothing: whatever it misses blocks no segment between its clusters. */
+/* An element that a shaft misses blocks no segment between its clusters. */
 START_TEST(shafts_miss_only_what_is_not_between) {
     site *s = site_open();
     const cluster_tree *t = &s->tree;

@@ -1,5 +1,5 @@
-/* The light of few elements: against exact form factors where nothing is between, and those of all pairs
- * where there is. */
+/* Direct illumination by few elements, against exact form factors without occlusion and those of pairs with
+ * it. */
 #include "solver/bench/scenes.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/pairs/first_light.h"
@@ -71,7 +71,7 @@ START_TEST(shadows) {
 }
 END_TEST
 
-/* Of too many nothing is said, and nothing written. */
+/* For too many bright elements nothing is known, and H stays unchanged. */
 START_TEST(too_many) {
     mesh m = box_mesh(unit_cube, 53, .5f); /* 16,854 elements */
     first_light *l = NULL;

@@ -26,7 +26,7 @@ static double entry(const csr *F, size_t i, size_t j) {
     return 0;
 }
 
-/* What always holds: F_ii = 0, 0 <= F <= 1, reciprocity to 1e-6, row sums at most 1. */
+/* The invariants: F_ii = 0, 0 <= F <= 1, reciprocity to 1e-6, row sums at most 1. */
 static void check_invariants(const mesh *m, const form_factors *f) {
     ck_assert_double_le(f->reciprocity_error, 1e-6);
     for (size_t i = 0; i < m->n; i++) {
@@ -76,7 +76,7 @@ START_TEST(box_against_analytic) {
         for (size_t j = 0; j < m.n; j++) {
             const double difference = entry(&f.F, i, j) - entry(&exact, i, j);
             square += difference * difference;
-            /* Six deviations: 22,500 pairs are looked at. */
+            /* Six deviations, because 22,500 pairs are compared. */
             ck_assert_double_le(fabs(difference), 1.5 * spread(entry(&exact, i, j), RAYS) + 1e-6);
         }
     }
@@ -151,7 +151,7 @@ START_TEST(same_for_any_thread_count) {
 }
 END_TEST
 
-/* Plain sweeps take 38 products here, what is extrapolated 15. */
+/* Plain sweeps take 38 products here, extrapolated ones 15. */
 START_TEST(repair_ends_soon) {
     const double size[3] = {4, 1, 1};
     mesh m = box_mesh(size, 8, .5f);
@@ -251,7 +251,7 @@ START_TEST(mean_halves_the_variance) {
     csr exact = box_form_factors(size, 4, m.area);
     lam_error error = {0};
     ck_assert_msg(form_factors_mean(&a, &b, &mean, &error) == LAM_OK, "%s", error.message);
-    mean.reciprocity_error = 0; /* a figure of repair; check_invariants looks at every pair itself */
+    mean.reciprocity_error = 0; /* a figure of repair; check_invariants compares every pair itself */
     check_invariants(&m, &mean);
     double square[3] = {0};
     const csr *F[3] = {&a.F, &b.F, &mean.F};

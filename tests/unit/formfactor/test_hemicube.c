@@ -1,4 +1,4 @@
-/* Hemicubes: delta form factors, what one centroid sees against closed forms, and the invariants. */
+/* Hemicubes: delta form factors, the row of one centroid against closed forms, and the invariants. */
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/rays/hemicube.h"
 #include "support/box.h"
@@ -61,8 +61,6 @@ START_TEST(weights_follow_the_densities) {
 }
 END_TEST
 
-/* --- one small element and a unit square --------------------------------------------------------------- */
-
 /* A square, or a triangle, about 1e-3 wide around the origin, its front towards +z, its first edge turned
  * from the x axis. */
 static void add_tiny(mesh *m, bool triangle, double turn) {
@@ -91,7 +89,7 @@ static const struct {
 };
 enum { N_VIEWS = sizeof views / sizeof *views };
 
-/* What the centroids see, before anything is merged. */
+/* The one-sided rows of the centroids. */
 static csr trace_rows(const mesh *m, size_t resolution, double *leaving, double *absorbed) {
     hemicube h = cube(resolution);
     visibility *v = NULL;
@@ -172,8 +170,6 @@ START_TEST(backs_have_hemicubes_of_their_own) {
     mesh_free(&m);
 }
 END_TEST
-
-/* --- form factors -------------------------------------------------------------------------------------- */
 
 static form_factors make(const mesh *m, size_t resolution, bool reversed) {
     uint32_t *order = malloc(m->n * sizeof *order);
@@ -276,7 +272,7 @@ START_TEST(bad_requests_are_refused) {
 }
 END_TEST
 
-/* Some rows in any order have the entries that they have among all of them, one way. */
+/* form_factors_count_seen of some rows in any order agrees with the one-sided rows of all elements. */
 START_TEST(some_rows_are_those_of_all) {
     mesh m = box_mesh((const double[3]){2, 1, 1}, 3, .5f);
     const recipe ways[] = {{.method = RECIPE_HEMICUBE, .resolution = 32},

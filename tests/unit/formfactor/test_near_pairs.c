@@ -1,4 +1,4 @@
-/* Near pairs by mathematics and the others by rays: joined without counting anything twice. */
+/* Near pairs by quadrature and the others by rays: merged without counting anything twice. */
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/pairs/pair_factor.h"
 #include "solver/formfactor/pairs/pairs.h"
@@ -76,9 +76,9 @@ START_TEST(near_pairs_are_exact_and_nothing_is_counted_twice) {
 }
 END_TEST
 
-/* Near are exactly those whose mean factor, of what nothing hides, is above the threshold: the plate, sixteen
- * times as large as a cell, is near to a few of those that see it. What is seen of the partly hidden ones is
- * found to half a ray's share. */
+/* Near are exactly the pairs whose mean unoccluded factor is above the threshold: the plate, sixteen times as
+ * large as a cell, is near to a few of the elements that see it. Partly occluded ones are accurate to half of
+ * 1/rays. */
 START_TEST(near_pairs_are_those_above_the_threshold) {
     mesh m = room();
     const double threshold = .004 * (1 + _i);
@@ -162,8 +162,7 @@ START_TEST(the_mean_is_right) {
 }
 END_TEST
 
-/* What rays see of generated scenes, quads of any shape among them: each row's sum, and the rows themselves.
- */
+/* Near pairs against rays in generated scenes with quads of any shape: row sums, and rows. */
 START_TEST(pairs_see_what_rays_see) {
     static const generate_options scenes[] = {
         {.kind = "cornell", .elements = 400, .reflectance = -1, .seed = 1},

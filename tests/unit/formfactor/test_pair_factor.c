@@ -1,4 +1,4 @@
-/* Unoccluded form factors by mathematics, against closed forms from outside. */
+/* Unoccluded form factors by quadrature, against published closed forms. */
 #include "solver/formfactor/pairs/pair_factor.h"
 #include "support/suite.h"
 

@@ -81,7 +81,7 @@ static double *both_sides(subject *s, bool backwards, int n_threads) {
     return G;
 }
 
-/* What merging makes of rows that are held, near pairs in their place, before it is closed. */
+/* The merged upper triangle of held rows with near pairs replaced, before the repair. */
 static double *merged(const subject *s) {
     const size_t n = s->m.n;
     const recipe *r = &s->how.recipe;
@@ -246,8 +246,6 @@ START_TEST(pairs_do_not_come_row_by_row) {
     subject_free(&s);
 }
 END_TEST
-
-/* --- operators of them --------------------------------------------------------------------------------- */
 
 /* |B~ - B| / |B - E| of some lights, against a solution by form factors of far more rays. */
 static double indirect_error(const build_problem *problem, reference *truth, const lam_operator *op,

@@ -12,8 +12,6 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
-/* --- packing -------------------------------------------------------------------------------------------- */
-
 START_TEST(packed_rows_come_back) {
     static const uint32_t gaps[] = {0, 1, 62, 63, 64, 8190, 8191, 8192, 1 << 20, 0x7FFFFFF0};
     static const float counts[] = {1, 2, 3, 128, 129, 130, 16385, 1 << 24};
@@ -53,8 +51,6 @@ START_TEST(packed_rows_come_back) {
     ck_assert(!row_check(kind, &cut, columns));
 }
 END_TEST
-
-/* --- files ---------------------------------------------------------------------------------------------- */
 
 enum { BLOCK_ROWS = 8, FILE_ROWS = 43 };
 
@@ -273,8 +269,6 @@ START_TEST(a_folder_belongs_to_one_run) {
     folder_remove(folder);
 }
 END_TEST
-
-/* --- whole runs ----------------------------------------------------------------------------------------- */
 
 /* Says stop after some questions. */
 static bool stop_later(void *context) {

@@ -1,4 +1,4 @@
-/* What elements receive directly from a sky, against closed forms, and what stays of every row. */
+/* The first bounce of a sky against closed forms, and the balance of every row. */
 #include "solver/formfactor/formfactor.h"
 #include "support/box.h"
 #include "support/plates.h"
@@ -127,7 +127,7 @@ START_TEST(plate_before_a_wall) {
     mesh_finish(&m, .5f);
     form_factors f = trace(&m, &by_rays, "tregenza", 0);
     const double F = .5 * (1 + cos(M_PI / 4));
-    /* What F leaves over is the sky: the wall's share was merged and repaired. */
+    /* The sky is 1 minus the row sum of F, in which the wall's share was merged and repaired. */
     ck_assert_double_eq_tol(uniform_sky(&f, 0), M_PI * F, noise(F));
     ck_assert_double_eq_tol(uniform_sky(&f, 0), M_PI * (1 - f.row_sums[0]), 1e-6);
     /* South, where the wall is, the lowest band is dark; north it is not. */
@@ -244,7 +244,7 @@ START_TEST(open_furnace) {
 }
 END_TEST
 
-/* The same bits for any number of threads, and form factors do not know that somebody looks at the sky. */
+/* The same bits for any number of threads, and the same form factors with and without a sky. */
 START_TEST(threads_and_bystanders) {
     mesh m = open_box();
     const int threads = omp_get_max_threads();
@@ -293,8 +293,6 @@ START_TEST(refusals) {
     mesh_free(&m);
 }
 END_TEST
-
-/* --- /sky --- */
 
 static void save_as(const sky_bounce *b, const char *path, const char *up, double albedo) {
     lam_error error = {0};

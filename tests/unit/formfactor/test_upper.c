@@ -1,4 +1,4 @@
-/* The upper triangle: merged from found rows, expanded to rows and gathered again, through a store. */
+/* The upper triangle: merged from packed rows, expanded to rows and gathered again, through a store. */
 #include "solver/formfactor/rows/upper.h"
 #include "support/box.h"
 #include "support/scene.h"
@@ -6,8 +6,6 @@
 #include "support/suite.h"
 
 #include <omp.h>
-
-/* --- merging -------------------------------------------------------------------------------------------- */
 
 /* Scaled so that no row of F passes 1. */
 enum { RAYS = 100000 };
@@ -67,7 +65,7 @@ START_TEST(expanded_and_gathered_again) {
         }
         ck_assert_double_eq(sum, row_sums[i]);
     }
-    /* What is gathered may differ from what there was, but not in what it expands to. */
+    /* The gathered triangle may differ from the first one, but expands to the same bits. */
     again = merge(&s, 2);
     ck_assert_int_eq(upper_expand(&again, s.area, row_sums, &error), LAM_OK);
     ck_assert_int_eq(upper_gather(&again, s.area, &error), LAM_OK);
@@ -82,8 +80,6 @@ START_TEST(expanded_and_gathered_again) {
     square_free(&s);
 }
 END_TEST
-
-/* --- stores --------------------------------------------------------------------------------------------- */
 
 static form_factors make_upper(const mesh *m, bool upper) {
     uint32_t order[96];
