@@ -6,10 +6,12 @@
 #include "support/operator_file.h"
 #include "support/suite.h"
 
+static lam_error error;
+
 enum { N = 61, C = 2, S = 7, M = 5, MANY = 35 };
 
 static void setup(void) {
-    file_setup();
+    operator_file_setup();
     allocations_left = -1;
 }
 
@@ -285,7 +287,7 @@ static lam_status save(const problem *p, const lam_operator *op, lam_error *caus
     lam_status status = LAM_OK;
     store *s = NULL;
     const size_t dims[2] = {C, N}, sky[2] = {M, N};
-    TRY(store_create(path, &s, cause));
+    TRY(store_create(operator_file_path, &s, cause));
     TRY(store_write(s, "/mesh/reflectance", STORE_F32, 2, dims, p->rho, cause));
     TRY(store_write(s, "/sky/first_bounce", STORE_F32, 2, sky, p->first_bounce, cause));
     TRY(operator_save(op, s, cause));
@@ -303,7 +305,7 @@ START_TEST(what_is_saved_comes_back_bit_for_bit) {
     float *before = test_allocate((size_t)MANY * C * N, sizeof *before),
           *after = test_allocate((size_t)MANY * C * N, sizeof *after);
     ck_ok(save(p, op, &error));
-    ck_ok(lam_operator_open(path, &loaded, &error));
+    ck_ok(lam_operator_open(operator_file_path, &loaded, &error));
     const area work = work_area(op, MANY);
     ck_assert_uint_eq(lam_operator_emitters(loaded), S);
     for (size_t k = 0; k < S; k++)
@@ -335,7 +337,7 @@ START_TEST(memory_that_fails_is_not_lost) {
             lam_operator *made = NULL;
             allocations_left = k;
             const lam_status status = what == 0   ? save(p, op, &error)
-                                      : what == 1 ? lam_operator_open(path, &made, &error)
+                                      : what == 1 ? lam_operator_open(operator_file_path, &made, &error)
                                                   : make_operator(p, S, &made, &error);
             allocations_left = -1;
             lam_operator_close(made);
@@ -381,7 +383,7 @@ END_TEST
 int main(void) {
     Suite *suite = suite_create("emitters");
     TCase *cases = tcase_create("emitters");
-    tcase_add_checked_fixture(cases, setup, file_teardown);
+    tcase_add_checked_fixture(cases, setup, operator_file_teardown);
     tcase_add_test(cases, answers_are_sums);
     tcase_add_test(cases, adjoint_is_the_transpose);
     tcase_add_test(cases, weights_are_told_from_light);

@@ -25,8 +25,6 @@ static void teardown(void) {
     sample_folder_remove(file_folder);
 }
 
-#define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
-
 static uint64_t random_state = 11;
 
 static float *random_floats(size_t count, float least, float most) {

@@ -89,8 +89,8 @@ static const file_recipe recipes[] = {
 
 START_TEST(files_are_judged) {
     const file_recipe *r = &recipes[_i];
-    file_write(r);
-    file_judge(r->what, r->status, r->word);
+    operator_file_write(r);
+    operator_file_judge(r->what, r->status, r->word);
 }
 END_TEST
 
@@ -98,7 +98,7 @@ int main(void) {
     Suite *suite = suite_create("operator precision");
     TCase *tests = tcase_create("files");
     tcase_set_timeout(tests, 300);
-    tcase_add_checked_fixture(tests, file_setup, file_teardown);
+    tcase_add_checked_fixture(tests, operator_file_setup, operator_file_teardown);
     tcase_add_loop_test(tests, files_are_judged, 0, (int)(sizeof recipes / sizeof *recipes));
     suite_add_tcase(suite, tests);
     return suite_run(suite);

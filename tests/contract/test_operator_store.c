@@ -4,8 +4,10 @@
 #include "support/operator_file.h"
 #include "support/suite.h"
 
+static lam_error error;
+
 static void setup(void) {
-    file_setup();
+    operator_file_setup();
     allocations_left = -1;
 }
 
@@ -16,7 +18,7 @@ static lam_status save(const lam_operator *op, lam_error *cause) {
     store *s = NULL;
     size_t dims[2] = {op->n_channels, op->n};
     double area[512];
-    TRY(store_create(path, &s, cause));
+    TRY(store_create(operator_file_path, &s, cause));
     for (size_t i = 0; i < sizeof area / sizeof *area; i++) area[i] = transport_area(i);
     ck_assert_uint_le(op->n, sizeof area / sizeof *area);
     TRY(store_write(s, "/mesh/reflectance", STORE_F32, 2, dims, op->reflectance, cause));
@@ -36,7 +38,7 @@ START_TEST(what_is_saved_comes_back_bit_for_bit) {
     float *in = random_vectors(count, 12);
     lam_operator *loaded = NULL;
     ck_ok(save(t->op, &error));
-    ck_ok(lam_operator_open(path, &loaded, &error));
+    ck_ok(lam_operator_open(operator_file_path, &loaded, &error));
     ck_assert_str_eq(lam_operator_kind(loaded), lam_operator_kind(t->op));
     ck_assert_uint_eq(lam_operator_bytes(loaded), lam_operator_bytes(t->op));
     ck_assert_uint_eq(lam_operator_work_bytes(loaded, 17), lam_operator_work_bytes(t->op, 17));
@@ -62,7 +64,7 @@ START_TEST(exact_is_stored_as_the_whole_matrix) {
     size_t n = t.n, dims[STORE_MAX_RANK] = {1, n, n};
     char *layout = NULL;
     ck_ok(save(t.op, &error));
-    ck_ok(store_open(path, &s, &error));
+    ck_ok(store_open(operator_file_path, &s, &error));
     ck_ok(store_read(s, "/operator/M", STORE_F32, 3, dims, &data, &error));
     ck_ok(store_get_text(s, "/operator", "layout", &layout, &error));
     ck_assert_str_eq(layout, "rows");
@@ -88,7 +90,8 @@ START_TEST(every_failed_allocation_is_an_error) {
             lam_operator *op = NULL;
             ck_assert_int_lt(k, 100000);
             allocations_left = k;
-            lam_status status = loads ? lam_operator_open(path, &op, &error) : save(t->op, &error);
+            lam_status status =
+                loads ? lam_operator_open(operator_file_path, &op, &error) : save(t->op, &error);
             allocations_left = -1;
             lam_operator_close(op);
             if (status == LAM_OK) break;
@@ -248,17 +251,17 @@ static const file_recipe recipes[] = {
 
 START_TEST(files_that_cannot_be_are_refused) {
     const file_recipe *r = &recipes[_i];
-    file_write(r);
-    file_judge(r->what, r->status, r->word);
+    operator_file_write(r);
+    operator_file_judge(r->what, r->status, r->word);
 }
 END_TEST
 
 START_TEST(missing_arguments_and_files_are_errors) {
     lam_operator *op = NULL;
     ck_assert(lam_operator_open(NULL, &op, &error) == LAM_ERR_ARGUMENT);
-    ck_assert(lam_operator_open(path, NULL, &error) == LAM_ERR_ARGUMENT);
-    ck_assert(lam_operator_open(path, &op, &error) == LAM_ERR_IO);
-    ck_assert(lam_operator_open(path, &op, NULL) == LAM_ERR_IO);
+    ck_assert(lam_operator_open(operator_file_path, NULL, &error) == LAM_ERR_ARGUMENT);
+    ck_assert(lam_operator_open(operator_file_path, &op, &error) == LAM_ERR_IO);
+    ck_assert(lam_operator_open(operator_file_path, &op, NULL) == LAM_ERR_IO);
     ck_assert_ptr_null(op);
     lam_operator_close(NULL);
 }
@@ -305,7 +308,7 @@ START_TEST(rank_zero_is_direct_light_only) {
         else
             ck_ok(operator_low_rank_create_folded(3, 0, rho, constant(0, 0), constant(0, 0), &op, &error));
         ck_ok(save(op, &error));
-        ck_ok(lam_operator_open(path, &loaded, &error));
+        ck_ok(lam_operator_open(operator_file_path, &loaded, &error));
         for (int adjoint = 0; adjoint < 2; adjoint++) {
             float *B = transport_apply(loaded, adjoint, 1, LAM_RADIOSITY, E);
             float *H = transport_apply(loaded, adjoint, 1, LAM_IRRADIANCE, E);
@@ -370,7 +373,7 @@ int main(void) {
     TCase *tests = tcase_create("files");
     tcase_set_timeout(tests, 300);
     tcase_add_unchecked_fixture(tests, transport_keep_all, transport_free_all);
-    tcase_add_checked_fixture(tests, setup, file_teardown);
+    tcase_add_checked_fixture(tests, setup, operator_file_teardown);
     tcase_add_loop_test(tests, what_is_saved_comes_back_bit_for_bit, 0, TRANSPORTS);
     tcase_add_test(tests, exact_is_stored_as_the_whole_matrix);
     tcase_add_loop_test(tests, every_failed_allocation_is_an_error, 0, TRANSPORTS);

@@ -3,6 +3,8 @@
 #include "support/operator_file.h"
 #include "support/suite.h"
 
+static lam_error error;
+
 /* How a file differs from a good one of n = 6, k = 2: what is 0 or NULL is as it should be. */
 typedef struct recipe {
     const char *what;
@@ -58,7 +60,7 @@ static void write_recipe(const recipe *r) {
     const size_t C = r->factored ? 2 : 1, I_size = r->I_size > 0 ? r->I_size : 3;
     const bool shaped = r->left[0] > 0;
     const size_t left[2] = {shaped ? r->left[0] : 6, shaped ? r->left[1] : 2};
-    ck_ok(store_create(path, &s, &error));
+    ck_ok(store_create(operator_file_path, &s, &error));
     write_floats(s, "/mesh/reflectance", 2, (size_t[]){C, 6}, .5f, .5f);
     ck_ok(store_set_text(s, "/operator", "kind", "two_mesh", &error));
     if (!r->no_form)
@@ -82,7 +84,7 @@ static void write_recipe(const recipe *r) {
 START_TEST(files_are_judged) {
     const recipe *r = &recipes[_i];
     write_recipe(r);
-    file_judge(r->what, r->word == NULL ? LAM_OK : LAM_ERR_FORMAT, r->word);
+    operator_file_judge(r->what, r->word == NULL ? LAM_OK : LAM_ERR_FORMAT, r->word);
 }
 END_TEST
 
@@ -90,7 +92,7 @@ START_TEST(patches_can_be_asked_for) {
     operator_patches patches = {.k = 77};
     lam_operator *op = NULL;
     write_recipe(&recipes[3]);
-    ck_ok(lam_operator_open(path, &op, &error));
+    ck_ok(lam_operator_open(operator_file_path, &op, &error));
     ck_assert(operator_patches_of(op, &patches));
     ck_assert_uint_eq(patches.k, 2);
     ck_assert_uint_eq(patches.begin[1], 2);
@@ -98,7 +100,7 @@ START_TEST(patches_can_be_asked_for) {
     ck_assert_float_eq(patches.coherence[0], .5f);
     lam_operator_close(op);
     write_recipe(&recipes[0]);
-    ck_ok(lam_operator_open(path, &op, &error));
+    ck_ok(lam_operator_open(operator_file_path, &op, &error));
     ck_assert(operator_patches_of(op, &patches) && patches.coherence == NULL);
     lam_operator_close(op);
     transport t = transport_make(TRANSPORT_FOLDED, false);
@@ -112,7 +114,7 @@ int main(void) {
     Suite *suite = suite_create("two meshes in a store");
     TCase *tests = tcase_create("files");
     tcase_set_timeout(tests, 120);
-    tcase_add_checked_fixture(tests, file_setup, file_teardown);
+    tcase_add_checked_fixture(tests, operator_file_setup, operator_file_teardown);
     tcase_add_loop_test(tests, files_are_judged, 0, (int)(sizeof recipes / sizeof *recipes));
     tcase_add_test(tests, patches_can_be_asked_for);
     suite_add_tcase(suite, tests);

@@ -23,8 +23,6 @@ static void teardown(void) {
     sample_folder_remove(folder);
 }
 
-#define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
-
 /* A message is one line that names the file. */
 static void check_message(const char *context) {
     ck_assert_msg(strstr(error.message, path) != NULL, "%s: no file named in \"%s\"", context, error.message);

@@ -13,102 +13,35 @@
 #include <unistd.h>
 
 /* A fresh folder for a test; removed by folder_remove. */
-static inline void folder_make(char path[64]) {
-    snprintf(path, 64, "/tmp/lambert-test-XXXXXX");
-    ck_assert_ptr_nonnull(mkdtemp(path));
-}
+void folder_make(char path[64]);
 
-static inline void folder_remove(const char *path) {
-    char command[128];
-    snprintf(command, sizeof command, "rm -rf '%s'", path);
-    ck_assert_int_eq(system(command), 0);
-}
+void folder_remove(const char *path);
 
-static inline void file_write(const char *folder, const char *name, const char *text, char path[256]) {
-    snprintf(path, 256, "%s/%s", folder, name);
-    FILE *file = fopen(path, "w");
-    ck_assert_ptr_nonnull(file);
-    ck_assert_int_ge(fputs(text, file), 0);
-    ck_assert_int_eq(fclose(file), 0);
-}
+void file_write(const char *folder, const char *name, const char *text, char path[256]);
 
-static inline import_options import_plain(void) {
-    return (import_options){.unit = 1, .reflectance = -1};
-}
+import_options import_plain(void);
 
 /* Imports with plain options; the test fails when that does. */
-static inline mesh import_good(const char *path, import_report *report) {
-    const import_options options = import_plain();
-    mesh m = {0};
-    lam_error error = {0};
-    const lam_status status = scene_import(path, &options, &m, report, &error);
-    ck_assert_msg(status == LAM_OK, "%s", error.message);
-    return m;
-}
+mesh import_good(const char *path, import_report *report);
 
-static inline double total_area(const mesh *m) {
-    double sum = 0;
-    for (size_t i = 0; i < m->n; i++) sum += m->area[i];
-    return sum;
-}
+double total_area(const mesh *m);
+
+/* A scene of `lambert generate`, imported with plain options. */
+mesh generate_good(const generate_options *how);
 
 /* The index of a group, or n_groups. */
-static inline size_t group_find(const mesh *m, const char *name) {
-    size_t g = 0;
-    while (g < m->n_groups && strcmp(m->group_names[g], name) != 0) g++;
-    return g;
-}
+size_t group_find(const mesh *m, const char *name);
 
-static inline double group_area(const mesh *m, const char *name, size_t *elements) {
-    const size_t g = group_find(m, name);
-    double sum = 0;
-    size_t n = 0;
-    ck_assert_msg(g < m->n_groups, "there is no group '%s'", name);
-    for (size_t i = 0; i < m->n; i++)
-        if (m->group[i] == g) sum += m->area[i], n++;
-    if (elements != NULL) *elements = n;
-    return sum;
-}
+double group_area(const mesh *m, const char *name, size_t *elements);
 
 /* Solid angle of a triangle seen from p, positive when its front is seen (Van Oosterom and Strackee 1983). */
-static inline double solid_angle(const double p[3], const double *a, const double *b, const double *c) {
-    const double *corner[3] = {a, b, c};
-    double r[3][3], length[3], dot[3];
-    for (int i = 0; i < 3; i++) {
-        for (int k = 0; k < 3; k++) r[i][k] = corner[i][k] - p[k];
-        length[i] = sqrt(r[i][0] * r[i][0] + r[i][1] * r[i][1] + r[i][2] * r[i][2]);
-    }
-    for (int i = 0; i < 3; i++) {
-        const double *u = r[i], *v = r[(i + 1) % 3];
-        dot[i] = u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
-    }
-    const double volume = r[0][0] * (r[1][1] * r[2][2] - r[1][2] * r[2][1]) -
-                          r[0][1] * (r[1][0] * r[2][2] - r[1][2] * r[2][0]) +
-                          r[0][2] * (r[1][0] * r[2][1] - r[1][1] * r[2][0]);
-    /* seen from its front, a triangle runs counter-clockwise, which makes the volume negative */
-    return -2 * atan2(volume, length[0] * length[1] * length[2] + dot[0] * length[2] + dot[1] * length[0] +
-                                  dot[2] * length[1]);
-}
+double solid_angle(const double p[3], const double *a, const double *b, const double *c);
 
 /* All that is seen from p: 4 pi inside a closed scene whose fronts look inwards, 0 outside or inside a block.
  */
-static inline double seen_from(const mesh *m, const double p[3]) {
-    double sum = 0;
-    for (size_t i = 0; i < m->n; i++) {
-        const uint32_t *e = m->elements[i];
-        sum += solid_angle(p, m->vertices[e[0]], m->vertices[e[1]], m->vertices[e[2]]);
-        if (mesh_corners(m, i) == 4)
-            sum += solid_angle(p, m->vertices[e[0]], m->vertices[e[2]], m->vertices[e[3]]);
-    }
-    return sum;
-}
+double seen_from(const mesh *m, const double p[3]);
 
 /* Imports a file of tests/fixtures. */
-static inline lam_status import_fixture(const char *name, mesh *m, import_report *report, lam_error *error) {
-    char path[512];
-    const import_options options = import_plain();
-    snprintf(path, sizeof path, FIXTURES "/%s", name);
-    return scene_import(path, &options, m, report, error);
-}
+lam_status import_fixture(const char *name, mesh *m, import_report *report, lam_error *error);
 
 #endif

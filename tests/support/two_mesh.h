@@ -7,30 +7,17 @@
 #include "support/transport.h"
 
 static const double hall[3] = {10, 6, 3}, cube[3] = {1, 1, 1};
-static lam_error error;
 
 static const build_options defaults = {
     .method = "2msc", .factorizer = "auto", .epsilon = .05, .budget = {.alpha = .5}, .levels = -1};
 
-static inline lam_operator *build_as(const build_problem *problem, const build_options *options,
-                                     build_report *report) {
-    lam_operator *op = NULL;
-    ck_assert_msg(build_operator(problem, options, &op, report, &error) == LAM_OK, "%s", error.message);
-    return op;
-}
+lam_operator *build_as(const build_problem *problem, const build_options *options, build_report *report);
 
-static inline lam_operator *build_rank(room *r, size_t rank, const char *by, build_report *report) {
-    build_options options = defaults;
-    options.rank = rank;
-    options.factorizer = by;
-    return build_as(room_problem(r), &options, report);
-}
+lam_operator *build_rank(room *r, size_t rank, const char *by, build_report *report);
 
 /* Everything is positive, so errors are relative. U, the weights and the core are rounded once, and what is
  * off by u in U is off by u / (1 - rho) in the core; sums over k columns (twice: the fold, or the core, and
  * the product), of which 16 lanes at most 128 terms are added in single precision; rho, B. */
-static inline double tolerance(size_t k, double rho) {
-    return (3 / (1 - rho) + 2 * sum_roundings(k) + 5) * TRANSPORT_U;
-}
+double tolerance(size_t k, double rho);
 
 #endif

@@ -2,7 +2,6 @@
 #ifndef LAMBERT_TESTS_WAVELET_SUBJECT_H
 #define LAMBERT_TESTS_WAVELET_SUBJECT_H
 
-#include "solver/bench/scenes.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/method/hierarchical/plane_tree.h"
 #include "solver/method/hierarchical/wavelet_basis.h"
@@ -12,13 +11,10 @@
 #include "support/box_problem.h"
 #include "support/dense.h"
 #include "support/scene.h"
+#include "support/suite.h"
 
 #include <float.h>
 #include <math.h>
-
-static lam_error error;
-
-#define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
 
 /* A mesh with form factors, its tree and basis. */
 typedef struct subject {
@@ -34,171 +30,38 @@ typedef struct subject {
 
 enum { BOX, ROOM, CITY, MAZE, SUBJECTS };
 
-static inline void scene(subject *s, const char *kind, size_t elements) {
-    const generate_options how = {
-        .kind = kind, .variant = 1, .terrain = "flat", .elements = elements, .reflectance = -1, .seed = 1};
-    const form_factor_options options = {.recipe = {.method = RECIPE_RAYS, .rays = 256, .seed = 3}};
-    form_factors f;
-    ck_ok(scene_generated(&how, &s->m, &error));
-    s->order = test_allocate(s->m.n, sizeof *s->order);
-    ck_ok(mesh_z_order(&s->m, s->order, &error));
-    ck_ok(form_factors_make(&s->m, s->order, &options, &f, &error));
-    s->F = f.F;
-    f.F = (csr){.n = 0};
-    form_factors_free(&f);
-}
+void scene(subject *s, const char *kind, size_t elements);
 
-static inline wavelet_plan plan_of_all(const wavelets *basis) {
-    wavelet_plan plan;
-    bool *used = test_allocate(basis->n, sizeof *used);
-    memset(used, true, basis->n * sizeof *used);
-    ck_ok(wavelet_plan_create(basis, used, &plan, &error));
-    ck_assert_uint_eq(plan.n_used, basis->n);
-    free(used);
-    return plan;
-}
+wavelet_plan plan_of_all(const wavelets *basis);
 
-static inline subject subject_make(int which) {
-    subject s = {.W = NULL};
-    if (which == BOX || which == ROOM) {
-        fixture f = fixture_box(which == BOX ? unit_cube : room, which == BOX ? 3 : 7, .5f);
-        s.m = f.m;
-        s.F = f.F;
-        s.order = f.order;
-    } else {
-        scene(&s, which == CITY ? "city" : "maze", 300);
-    }
-    const size_t n = s.m.n;
-    s.centre = test_allocate(n, sizeof *s.centre);
-    for (size_t i = 0; i < n; i++) mesh_centroid(&s.m, i, s.centre[i]);
-    ck_ok(
-        plane_tree_make(n, (const double(*)[3])s.centre, (const float(*)[3])s.m.normal, 6, &s.tree, &error));
-    ck_ok(wavelet_basis_make(&s.tree, s.m.area, (const double(*)[3])s.centre, &s.basis, &error));
-    s.plan = plan_of_all(&s.basis);
-    return s;
-}
+subject wavelet_subject_make(int which);
 
-static inline void subject_free(subject *s) {
-    mesh_free(&s->m);
-    csr_free(&s->F);
-    free(s->order);
-    free(s->centre);
-    free(s->W);
-    plane_tree_free(&s->tree);
-    wavelet_plan_free(&s->plan);
-    wavelets_free(&s->basis);
-}
+void wavelet_subject_free(subject *s);
 
-static inline void transform(const subject *s, bool back, const float *from, float *to) {
-    float *work = test_allocate(wavelet_plan_work(&s->plan), sizeof *work);
-    if (back)
-        wavelet_plan_inverse(&s->plan, 1, from, to, work, 1);
-    else
-        wavelet_plan_forward(&s->plan, 1, from, to, work, 1);
-    free(work);
-}
+void transform(const subject *s, bool back, const float *from, float *to);
 
 /* Column by column. */
-static inline const double *dense_W(subject *s) {
-    const size_t n = s->m.n;
-    if (s->W != NULL) return s->W;
-    float *x = test_allocate(n, sizeof *x), *c = test_allocate(n, sizeof *c);
-    s->W = test_allocate(n * n, sizeof *s->W);
-    for (size_t p = 0; p < n; p++) {
-        memset(x, 0, n * sizeof *x);
-        x[p] = 1;
-        transform(s, false, x, c);
-        for (size_t k = 0; k < n; k++) s->W[k * n + p] = (double)c[k];
-    }
-    free(x);
-    free(c);
-    return s->W;
-}
+const double *dense_W(subject *s);
 
 /* W A W^T of a dense A by positions. */
-static inline double *in_basis(subject *s, const double *A) {
-    const size_t n = s->m.n;
-    const double *W = dense_W(s);
-    double *half = test_allocate(n * n, sizeof *half), *out = test_allocate(n * n, sizeof *out);
-    for (size_t i = 0; i < n; i++)
-        for (size_t p = 0; p < n; p++) {
-            const double w = W[i * n + p];
-            for (size_t q = 0; w != 0 && q < n; q++) half[i * n + q] += w * A[p * n + q];
-        }
-    for (size_t i = 0; i < n; i++)
-        for (size_t j = 0; j < n; j++)
-            for (size_t q = 0; q < n; q++) out[i * n + j] += half[i * n + q] * W[j * n + q];
-    free(half);
-    return out;
-}
+double *in_basis(subject *s, const double *A);
 
 /* S by positions. */
-static inline double *dense_S(const subject *s) {
-    const size_t n = s->m.n;
-    double *S = test_allocate(n * n, sizeof *S);
-    uint32_t *position = test_allocate(n, sizeof *position);
-    for (size_t p = 0; p < n; p++) position[s->tree.order[p]] = (uint32_t)p;
-    for (size_t i = 0; i < n; i++)
-        for (uint64_t e = s->F.indptr[i]; e < s->F.indptr[i + 1]; e++) {
-            const uint32_t j = s->F.indices[e];
-            S[position[i] * n + position[j]] = sqrt(s->m.area[i] / s->m.area[j]) * (double)s->F.data[e];
-        }
-    free(position);
-    return S;
-}
+double *dense_S(const subject *s);
 
-static inline float *ones(const wavelets *w) {
-    float *made = test_allocate(w->n_nodes, sizeof *made);
-    for (size_t t = 0; t < w->n_nodes; t++) made[t] = 1;
-    return made;
-}
+float *ones(const wavelets *w);
 
-static inline csr pass_of(const subject *s, const csr *F, bool one_sided, double reach, float threshold,
-                          const float *weight, size_t n_threads) {
-    row_source rows;
-    csr S = {.n = 0};
-    row_source_of_csr(&rows, F);
-    const wavelet_pass_input input = {.basis = &s->basis,
-                                      .rows = &rows,
-                                      .one_sided = one_sided,
-                                      .area = s->m.area,
-                                      .tree = &s->tree,
-                                      .threshold = threshold,
-                                      .weight = weight,
-                                      .centre = (const double(*)[3])s->centre,
-                                      .reach = reach,
-                                      .n_threads = n_threads};
-    ck_ok(wavelet_pass(&input, &S, &error));
-    return S;
-}
+csr pass_of(const subject *s, const csr *F, bool one_sided, double reach, float threshold,
+            const float *weight, size_t n_threads);
 
-static inline csr pass_within(const subject *s, double reach, float threshold, const float *weight,
-                              size_t n_threads) {
-    return pass_of(s, &s->F, false, reach, threshold, weight, n_threads);
-}
+csr pass_within(const subject *s, double reach, float threshold, const float *weight, size_t n_threads);
 
-static inline csr pass(const subject *s, float threshold, const float *weight, size_t n_threads) {
-    return pass_within(s, INFINITY, threshold, weight, n_threads);
-}
+csr pass(const subject *s, float threshold, const float *weight, size_t n_threads);
 
 /* An upper triangle, its rows ascending, as a whole matrix. */
-static inline double *whole(const csr *upper) {
-    const size_t n = upper->n;
-    double *A = test_allocate(n * n, sizeof *A);
-    for (size_t i = 0; i < n; i++)
-        for (uint64_t e = upper->indptr[i]; e < upper->indptr[i + 1]; e++) {
-            const uint32_t j = upper->indices[e];
-            ck_each(j >= i && (e == upper->indptr[i] || j > upper->indices[e - 1]));
-            A[i * n + j] = A[j * n + i] = (double)upper->data[e];
-        }
-    return A;
-}
+double *whole(const csr *upper);
 
-static inline double largest_difference(size_t count, const double *A, const double *B) {
-    double most = 0;
-    for (size_t k = 0; k < count; k++) most = fmax(most, fabs(A[k] - B[k]));
-    return most;
-}
+double largest_difference(size_t count, const double *A, const double *B);
 
 /* A transform rounds each number at most nine times a level, of at most 20: norms are 1. */
 #define TRANSFORM_U (200 * FLT_EPSILON / 2)

@@ -6,12 +6,11 @@
 #include "support/box_problem.h"
 #include "support/dense.h"
 #include "support/scene.h"
+#include "support/suite.h"
 
 #include <math.h>
 
 static lam_error error;
-
-#define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
 
 /* |H - F E| over |F E|, by area. */
 static double off(const mesh *m, const csr *F, const float *E) {

@@ -17,8 +17,6 @@
 
 static lam_error error;
 
-#define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
-
 enum { CLOSED, CLOSED_NEAR, OPEN, OPEN_NEAR, CASES };
 
 /* A scene and how its form factors are found. */

@@ -10,8 +10,6 @@ enum { N = 700, VECTORS = 16 };
 
 static lam_error error;
 
-#define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
-
 /* Rows of 0 to 20 numbers, some of up to 300, each length about as often as not a multiple of 16. */
 static csr random_rows(uint64_t *state) {
     csr a = {.n = N,

@@ -8,11 +8,10 @@
 #include "store/store.h"
 #include "support/certified.h"
 #include "support/scene.h"
+#include "support/suite.h"
 #include "support/view.h"
 
 static lam_error error;
-
-#define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
 
 static compressed_factors compress(const view *v, double threshold, size_t n_threads) {
     compressed_factors c = {.n = 0};

@@ -4,12 +4,11 @@
 #include "solver/precompute/forecast.h"
 #include "support/box_problem.h"
 #include "support/dense.h"
+#include "support/suite.h"
 
 #include <math.h>
 
 static lam_error error;
-
-#define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
 
 /* A box and where its elements are. */
 typedef struct closed {

@@ -5,6 +5,8 @@
 
 #include <omp.h>
 
+static lam_error error;
+
 /* --- edges --------------------------------------------------------------------------------------------- */
 
 START_TEST(nothing_seen_is_direct_light) {

@@ -2,10 +2,12 @@
 #include "solver/method/hierarchical/wavelet_entries.h"
 #include "support/wavelet_subject.h"
 
+static lam_error error;
+
 /* --- the pass ------------------------------------------------------------------------------------------ */
 
 START_TEST(a_pass_finds_every_coefficient) {
-    subject s = subject_make(_i);
+    subject s = wavelet_subject_make(_i);
     const size_t n = s.m.n;
     float *weight = ones(&s.basis);
     double *S = dense_S(&s), *truth = in_basis(&s, S);
@@ -42,13 +44,13 @@ START_TEST(a_pass_finds_every_coefficient) {
     free(truth);
     free(all);
     free(some);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 
 /* A finite reach leaves out coefficients, and of coarse ones parts, that are small together. */
 START_TEST(a_pass_within_reach) {
-    subject s = subject_make(ROOM);
+    subject s = wavelet_subject_make(ROOM);
     const size_t n = s.m.n;
     float *weight = ones(&s.basis);
     csr far = pass(&s, 0, weight, 1), near = pass_within(&s, 2, 0, weight, 2);
@@ -65,7 +67,7 @@ START_TEST(a_pass_within_reach) {
     free(weight);
     free(all);
     free(some);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 
@@ -92,7 +94,7 @@ static csr one_side(const subject *s, bool halves) {
 
 /* Rows that know one side of each pair give the coefficients that rows of both sides do. */
 START_TEST(a_pass_of_one_side) {
-    subject s = subject_make(_i % SUBJECTS);
+    subject s = wavelet_subject_make(_i % SUBJECTS);
     const size_t n = s.m.n;
     float *weight = ones(&s.basis);
     double *S = dense_S(&s), *truth = in_basis(&s, S);
@@ -130,13 +132,13 @@ START_TEST(a_pass_of_one_side) {
     free(all);
     free(some);
     free(wanted);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 
 /* So they do within a reach: what is left out is as small. */
 START_TEST(one_side_within_reach) {
-    subject s = subject_make(ROOM);
+    subject s = wavelet_subject_make(ROOM);
     const size_t n = s.m.n;
     float *weight = ones(&s.basis);
     csr F1 = one_side(&s, true);
@@ -154,14 +156,14 @@ START_TEST(one_side_within_reach) {
     free(weight);
     free(all);
     free(some);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 
 /* S A^1/2 becomes A^1/2 s for whatever s is asked for, and nothing else of S changes; a threshold leaves out
  * what is below it; where nothing leaves the last row is 1 on the diagonal. */
 START_TEST(one_even_light_is_put_in) {
-    subject s = subject_make(_i);
+    subject s = wavelet_subject_make(_i);
     const size_t n = s.m.n;
     float *weight = ones(&s.basis);
     double *area = test_allocate(n, sizeof *area), *sums = test_allocate(n, sizeof *sums);
@@ -205,7 +207,7 @@ START_TEST(one_even_light_is_put_in) {
     free(after);
     free(some);
     free(y);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 
@@ -227,7 +229,7 @@ static float *reflectance(const subject *s, int which) {
 }
 
 START_TEST(reflectances_in_the_basis) {
-    subject s = subject_make(_i % SUBJECTS);
+    subject s = wavelet_subject_make(_i % SUBJECTS);
     const size_t n = s.m.n;
     float *rho = reflectance(&s, _i / SUBJECTS);
     csr found;
@@ -243,14 +245,14 @@ START_TEST(reflectances_in_the_basis) {
     free(R);
     free(truth);
     free(all);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 
 /* Terms that products leave out, and what of R B they make no use of, add up to little: entries that are
  * there either way differ by less than a threshold. */
 START_TEST(what_is_skipped_is_small) {
-    subject s = subject_make(_i);
+    subject s = wavelet_subject_make(_i);
     const size_t n = s.m.n;
     float *rho = reflectance(&s, EACH_ITS_OWN), *weight = ones(&s.basis);
     csr in = pass(&s, 0, weight, 2), some, all;
@@ -278,12 +280,12 @@ START_TEST(what_is_skipped_is_small) {
     free(weight);
     free(a);
     free(b);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 
 START_TEST(doubling_inverts) {
-    subject s = subject_make(_i % SUBJECTS);
+    subject s = wavelet_subject_make(_i % SUBJECTS);
     const size_t n = s.m.n;
     float *rho = reflectance(&s, _i / SUBJECTS), *weight = ones(&s.basis);
     double *S = dense_S(&s), *A = test_allocate(n * n, sizeof *A), *K = test_allocate(n * n, sizeof *K);
@@ -323,7 +325,7 @@ START_TEST(doubling_inverts) {
     free(K);
     free(truth);
     free(all);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 

@@ -1,6 +1,8 @@
 /* Where the rows of a leaf begin, and what far clusters make of them at once. */
 #include "support/wavelet_subject.h"
 
+static lam_error error;
+
 static wavelet_reach reach_make(const subject *s, double radii) {
     wavelet_reach r;
     ck_ok(
@@ -30,7 +32,7 @@ static void hand_up(const wavelets *w, size_t t, size_t p, double up[3]) {
 
 /* Shared matrices differ by 1e-5 from a node's own; a level adds that, and there are at most twelve. */
 START_TEST(far_clusters_at_once) {
-    subject s = subject_make(_i);
+    subject s = wavelet_subject_make(_i);
     wavelet_reach r = reach_make(&s, 2);
     double most = 0;
     for (size_t t = 0; t < s.basis.n_nodes; t++) {
@@ -49,14 +51,14 @@ START_TEST(far_clusters_at_once) {
     }
     ck_assert_double_le(most, 12e-5);
     wavelet_reach_free(&r);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 
 /* Cells share out all positions. None is near to a node above the leaf that is as high at most, and of none
  * that was divided is that so; brothers divide alike what is as high as their parent. */
 START_TEST(cells_of_a_leaf) {
-    subject s = subject_make(_i);
+    subject s = wavelet_subject_make(_i);
     wavelet_reach r = reach_make(&s, 2);
     const wavelets *w = &s.basis;
     const size_t N = w->n_nodes;
@@ -83,7 +85,7 @@ START_TEST(cells_of_a_leaf) {
     free(cells);
     free(work);
     wavelet_reach_free(&r);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 
@@ -96,7 +98,7 @@ static bool sees_all(const wavelet_reach *r, size_t a, size_t b) {
 
 /* Coefficients of two nodes of one height that see each other are those of a pass that looks everywhere. */
 START_TEST(what_is_near_is_whole) {
-    subject s = subject_make(_i);
+    subject s = wavelet_subject_make(_i);
     const size_t n = s.m.n;
     float *weight = ones(&s.basis);
     wavelet_reach r = reach_make(&s, 1);
@@ -124,7 +126,7 @@ START_TEST(what_is_near_is_whole) {
     free(all);
     free(some);
     wavelet_reach_free(&r);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 

@@ -6,13 +6,12 @@
 #include "support/certified.h"
 #include "support/dense.h"
 #include "support/scene.h"
+#include "support/suite.h"
 #include "support/view.h"
 
 #include <omp.h>
 
 static lam_error error;
-
-#define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
 
 /* --- subjects ------------------------------------------------------------------------------------------ */
 

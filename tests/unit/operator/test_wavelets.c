@@ -1,10 +1,12 @@
 /* Multiwavelets of a mesh: the tree, the basis, and plans of what is used of it. */
 #include "support/wavelet_subject.h"
 
+static lam_error error;
+
 /* --- the tree ------------------------------------------------------------------------------------------ */
 
 START_TEST(every_element_is_in_one_leaf_of_one_plane) {
-    subject s = subject_make(_i);
+    subject s = wavelet_subject_make(_i);
     const plane_tree *t = &s.tree;
     bool *seen = test_allocate(s.m.n, sizeof *seen);
     uint32_t at = 0;
@@ -37,14 +39,14 @@ START_TEST(every_element_is_in_one_leaf_of_one_plane) {
     ck_assert_uint_eq(at, s.m.n);
     if (_i == BOX || _i == ROOM) ck_assert_uint_eq(t->n_frames, 6);
     free(seen);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 
 /* --- the basis ----------------------------------------------------------------------------------------- */
 
 START_TEST(the_basis_is_orthonormal) {
-    subject s = subject_make(_i);
+    subject s = wavelet_subject_make(_i);
     const size_t n = s.m.n;
     const double *W = dense_W(&s);
     float *x = test_allocate(n, sizeof *x), *c = test_allocate(n, sizeof *c);
@@ -64,13 +66,13 @@ START_TEST(the_basis_is_orthonormal) {
     free(x);
     free(c);
     free(back);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 
 /* What is the same everywhere is one number; what is linear on a plane is none within it. */
 START_TEST(smooth_functions_are_few_numbers) {
-    subject s = subject_make(_i);
+    subject s = wavelet_subject_make(_i);
     const size_t n = s.m.n;
     const wavelets *w = &s.basis;
     float *x = test_allocate(n, sizeof *x), *c = test_allocate(n, sizeof *c);
@@ -96,15 +98,15 @@ START_TEST(smooth_functions_are_few_numbers) {
             ck_each(fabs((double)c[w->nodes[t].first + k]) <= 4 * TRANSFORM_U * sqrt(norm));
     free(x);
     free(c);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 
 /* Congruent nodes share a matrix. */
 START_TEST(grids_have_few_shapes) {
-    subject s = subject_make(ROOM);
+    subject s = wavelet_subject_make(ROOM);
     ck_assert_uint_lt(s.basis.n_shapes, s.basis.n_nodes / 2);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 
@@ -157,7 +159,7 @@ END_TEST
 
 /* Without what is not in use: the other coefficients are the same, and come back as if those were 0. */
 START_TEST(a_plan_leaves_out_what_is_not_used) {
-    subject s = subject_make(_i % SUBJECTS);
+    subject s = wavelet_subject_make(_i % SUBJECTS);
     const size_t n = s.m.n, every = _i / SUBJECTS == 0 ? 40 : n;
     wavelet_plan plan;
     bool *used = test_allocate(n, sizeof *used);
@@ -196,7 +198,7 @@ START_TEST(a_plan_leaves_out_what_is_not_used) {
     free(some);
     free(back);
     free(truth);
-    subject_free(&s);
+    wavelet_subject_free(&s);
 }
 END_TEST
 

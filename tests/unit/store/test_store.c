@@ -20,8 +20,6 @@ static void teardown(void) {
     sample_folder_remove(folder);
 }
 
-#define ck_ok(call) ck_assert_msg((call) == LAM_OK, "%s", error.message)
-
 /* Fails with this status, and a message of one line that has these words in it. */
 static void check_failure(lam_status status, lam_status expected, const char *words) {
     ck_assert_msg(status == expected, "%s instead of %s: %s", lam_status_text(status),
