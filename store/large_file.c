@@ -7,7 +7,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-/* What it is called for the moment between its making and the loss of its name. */
+/* The name of the file between its creation and the unlink that follows. */
 #define NAME "large-array"
 
 struct large_file {
@@ -32,7 +32,7 @@ lam_status large_file_create(const large_place *place, large_file **out, lam_err
     return LAM_OK;
 }
 
-/* Room on the disk; an error number. */
+/* Reserves disk space; returns an error number. */
 static int set_length(const large_file *f, size_t n_bytes) {
     if (n_bytes > f->n_bytes) {
         const int why = posix_fallocate(f->fd, 0, (off_t)n_bytes);
@@ -54,7 +54,7 @@ lam_status large_file_resize(large_file *f, size_t n_bytes, void **bytes, lam_er
         return status_fail(error, LAM_ERR_MEMORY, "%s: an array of %zu bytes cannot be mapped: %s",
                            f->place->name, n_bytes, strerror(errno));
     f->bytes = map;
-    /* What is cut off could only have been room. */
+    /* Failing to shrink the file only wastes space. */
     if (n_bytes < f->n_bytes) set_length(f, n_bytes);
     f->n_bytes = n_bytes;
     *bytes = map;

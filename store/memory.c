@@ -1,5 +1,4 @@
-/* The one place that allocates, in a file of its own: a test may link its own memory_allocate instead, one
- * that fails when told to. */
+/* memory_allocate in a file of its own: a test may link one that fails on demand in its place. */
 #include "store/status.h"
 
 #include <stdint.h>

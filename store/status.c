@@ -13,7 +13,7 @@ const char *lam_status_text(lam_status status) {
     return "unknown status";
 }
 
-/* Takes the last UTF-8 character away, which cutting the text may have left incomplete. */
+/* Removes the last UTF-8 character, which may be incomplete. */
 static void cut_character(char *text) {
     size_t length = strlen(text);
     while (length > 0 && ((unsigned char)text[length - 1] & 0xC0) == 0x80) length--;

@@ -1,4 +1,5 @@
-/* The error idiom of the whole project (TRY, FAIL) and checked sizes. The lowest layer: knows nobody. */
+/* The error idiom of the whole project (TRY, FAIL) and checked sizes. The lowest layer: includes the public
+ * header alone. */
 #ifndef LAMBERT_STORE_STATUS_H
 #define LAMBERT_STORE_STATUS_H
 
@@ -26,12 +27,12 @@
 lam_status status_fail(lam_error *error, lam_status code, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-/* *product = a * b (or a * b * c * d); false when that passes SIZE_MAX, *product is then untouched. */
+/* *product = a * b; false, with *product untouched, if that exceeds SIZE_MAX. */
 bool size_multiply(size_t a, size_t b, size_t *product);
 
-/* As calloc for count * size bytes with the product checked; fills error with what and how much was wanted.
- * A count of 0 gives one byte, so that NULL always means failure. The caller frees with free().
- * In a file of its own (memory.c): a test that links its own memory_allocate can make it fail. */
+/* As calloc for count * size bytes with the product checked; the error names `what` and the size. A count of
+ * 0 gives one byte, so that NULL always means failure. The caller frees with free(). It stands in a file of
+ * its own (memory.c), so that a test can link a memory_allocate that fails. */
 void *memory_allocate(size_t count, size_t size, const char *what, lam_error *error);
 
 #endif

@@ -1,5 +1,5 @@
-/* A store as a whole: its file is made beside the target and renamed onto it; a sealed one is opened and all
- * of its metadata looked at. */
+/* Creates, seals and opens stores: a new file is written beside the target and renamed onto it; opening reads
+ * all metadata of a sealed one. */
 #include "store/store_private.h"
 
 #include <errno.h>
@@ -16,8 +16,8 @@
 
 store_mute store_mute_begin(void) {
     store_mute mute = {NULL, NULL};
-    /* At exit HDF5 would flush what was abandoned, and print about objects it lost itself over a damaged
-     * header. Every file is closed here, so it need not. Only the first call, before any other, counts. */
+    /* Without this HDF5 flushes abandoned files at exit, and prints about objects that it leaked over a
+     * damaged header. All files are closed here. It takes effect before any other HDF5 call only. */
     H5dont_atexit();
     H5Eget_auto2(H5E_DEFAULT, &mute.print, &mute.context);
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
@@ -49,13 +49,7 @@ const char *store_path(const store *s) {
     return s->path;
 }
 
-const char *store_partial_path(const store *s) {
-    return s->partial;
-}
-
-/* --- what went wrong ------------------------------------------------------------------------------------ */
-
-/* What HDF5 says at the place where it found the error. */
+/* The message of HDF5 at the place where it found the error. */
 typedef struct hdf5_cause {
     bool memory;
     char text[160];
@@ -83,8 +77,6 @@ lam_status store_hdf5_failure(store *s, const char *name, const char *what, lam_
                        cause.text);
 }
 
-/* --- paths inside the file ------------------------------------------------------------------------------ */
-
 lam_status store_name_check(const store *s, const char *name, lam_error *error) {
     size_t length = strlen(name), depth = 0;
     bool good = name[0] == '/' && length < STORE_NAME_SIZE - sizeof "/checksum";
@@ -101,7 +93,7 @@ lam_status store_name_check(const store *s, const char *name, lam_error *error) 
 
 static bool is_group(const store *s, const char *name) {
     hid_t object = H5Oopen(s->h5, name, H5P_DEFAULT);
-    /* One that cannot be opened counts as one: the next look into it fails and says so. */
+    /* An object that cannot be opened counts as one: reading it will fail with a message. */
     bool group = object < 0 || H5Iget_type(object) == H5I_GROUP;
     if (object >= 0) H5Oclose(object);
     return group;
@@ -119,7 +111,7 @@ int store_exists(const store *s, const char *name) {
         prefix[i] = '\0';
         htri_t found = H5Lexists(s->h5, prefix, H5P_DEFAULT);
         if (found <= 0) return found < 0 ? -1 : 0;
-        if (name[i] == '/' && !is_group(s, prefix)) return 0; /* nothing lies within an array */
+        if (name[i] == '/' && !is_group(s, prefix)) return 0; /* an array has no objects within */
     }
     return 1;
 }
@@ -131,8 +123,6 @@ bool store_has(store *s, const char *name) {
     return found;
 }
 
-/* --- making one ----------------------------------------------------------------------------------------- */
-
 static lam_status text_copy(const char *text, char **copy, lam_error *error) {
     size_t size = strlen(text) + 1;
     *copy = memory_allocate(size, 1, "a path", error);
@@ -141,7 +131,7 @@ static lam_status text_copy(const char *text, char **copy, lam_error *error) {
     return LAM_OK;
 }
 
-/* Where the bytes shall be in the end: what a symbolic link leads to, so that the link stays one. */
+/* The final path: the target of a symbolic link, so that the link stays. */
 static lam_status find_target(store *s, lam_error *error) {
     struct stat info;
     if (stat(s->path, &info) == 0 && !S_ISREG(info.st_mode))
@@ -161,7 +151,7 @@ static lam_status create_partial(store *s, lam_error *error) {
     if (name[0] == '\0') FAIL(error, LAM_ERR_IO, "\"%s\" names no file", s->path);
     partial = memory_allocate(size, 1, "a path", error);
     if (partial == NULL) TRY(LAM_ERR_MEMORY);
-    /* A killed process of the same number may have left its file, which is not ours to touch. */
+    /* A killed process of the same number may have left its file, which is not touched. */
     for (unsigned attempt = 0; s->file.fd < 0 && attempt < 10000; attempt++) {
         snprintf(partial, size, "%.*s.%.190s.partial-%ld-%06u", (int)folder, s->target, name, (long)getpid(),
                  attempt);
@@ -222,8 +212,8 @@ done:
     return status;
 }
 
-/* Makes a rename in the folder of path last through a power cut. The new file is whole and in its place by
- * then, and not every file system can do this, so a failure is none of the store. */
+/* Makes a rename in the folder of path survive a power cut. The new file is complete and in place by then,
+ * and not every file system supports this, so that failure is ignored. */
 static void sync_folder(const char *path) {
     const char *slash = strrchr(path, '/');
     char *folder = slash == NULL ? strdup(".") : strndup(path, slash == path ? 1 : (size_t)(slash - path));
@@ -278,7 +268,7 @@ void store_close(store *s) {
     store_mute mute = store_mute_begin();
     if (s->partial != NULL) {
         unlink(s->partial);
-        if (s->file.error == 0) s->file.error = ECANCELED; /* what HDF5 still holds need not be written */
+        if (s->file.error == 0) s->file.error = ECANCELED; /* data still in HDF5 need not be written */
     }
     if (s->h5 >= 0) H5Fclose(s->h5);
     if (s->file.fd >= 0) close(s->file.fd);
@@ -290,8 +280,6 @@ void store_close(store *s) {
     free(s);
     store_mute_end(&mute);
 }
-
-/* --- opening one ---------------------------------------------------------------------------------------- */
 
 static lam_status open_file(store *s, lam_error *error) {
     struct stat info;
@@ -332,7 +320,7 @@ static lam_status open_hdf5(store *s, lam_error *error) {
              (unsigned long long)s->file.size);
     if (!store_file_read(&s->file, 0, head, sizeof head))
         TRY(store_hdf5_failure(s, "the file", "read", error));
-    /* Version 0, of other HDF5 files, has no checksum: HDF5 is not asked to make sense of it. */
+    /* Version 0, of other HDF5 files, has no checksum: it is refused without asking HDF5. */
     if (memcmp(head, signature, sizeof signature) != 0 || head[8] < 2 || head[8] > 3 || head[9] != 8 ||
         head[10] != 8)
         FAIL(error, LAM_ERR_FORMAT, "%s: not a Lambert store", s->path);
@@ -384,7 +372,7 @@ static void attribute_ignore(void *context, const char *name, const char *text, 
     (void)number;
 }
 
-/* One link: it must be a hard one, to a group or to an array that has checksums, and all of it readable. */
+/* Checks one link: a hard link to a readable group, or to a readable array with checksums. */
 static herr_t metadata_visit(hid_t root, const char *relative, const H5L_info_t *info, void *context) {
     metadata_walk *walk = context;
     store *s = walk->s;
@@ -414,7 +402,7 @@ done:
     return status == LAM_OK ? 0 : -1;
 }
 
-/* Looks at every header once, so that a damaged one is found here and not taken for an absent one. */
+/* Reads every header once, so that a damaged one is reported here and not taken for a missing one. */
 static lam_status check_metadata(store *s, lam_error *error) {
     lam_status status = LAM_OK;
     metadata_walk walk = {s, LAM_OK, error};

@@ -32,10 +32,8 @@ size_t store_type_size(store_type type);
 /* XXH3 with 64 bits and seed 0: the checksum of every array, and of files beside a store. */
 uint64_t store_checksum(const void *data, size_t bytes);
 
-/* --- writing ---------------------------------------------------------------------------------------- */
-
-/* Starts a store that will become path: a hidden partial file beside it, created exclusively.
- * Groups are made as arrays and attributes name them. Errors: LAM_ERR_IO (names path), LAM_ERR_MEMORY. */
+/* Starts a store that will become path, as a hidden partial file beside it, created exclusively. Groups are
+ * created as arrays and attributes name them. Errors: LAM_ERR_IO (names path), LAM_ERR_MEMORY. */
 lam_status store_create(const char *path, store **out, lam_error *error);
 
 /* Writes one whole array, row-major, contiguous and aligned; rank 1 to STORE_MAX_RANK. A dimension may be 0.
@@ -47,24 +45,18 @@ lam_status store_write(store *s, const char *name, store_type type, int rank, co
 lam_status store_write_texts(store *s, const char *name, size_t count, const char *const *texts,
                              lam_error *error);
 
-/* Sets an attribute of the group or dataset object ("/" for the root); makes the group when it is missing. */
+/* Sets an attribute of the group or dataset `object` ("/" for the root); creates a missing group. */
 lam_status store_set_text(store *s, const char *object, const char *name, const char *text, lam_error *error);
 lam_status store_set_number(store *s, const char *object, const char *name, double value, lam_error *error);
 lam_status store_set_integer(store *s, const char *object, const char *name, int64_t value, lam_error *error);
 
-/* The path of the partial file, for a signal handler that must unlink it; owned by s. NULL for a store that
- * was opened. */
-const char *store_partial_path(const store *s);
-
-/* Adds format, version, created and /checksum, flushes to the disk, renames onto path (an older file is
- * replaced as a whole) and frees s, whatever the outcome; on an error nothing is left behind.
- * Errors: LAM_ERR_IO (a full disk among them; names path). */
+/* Adds format, version, created and /checksum, flushes to the disk, renames onto path (replacing an older
+ * file as a whole) and frees s in any case; after an error no file is left behind. Errors: LAM_ERR_IO (also a
+ * full disk; names path). */
 lam_status store_seal(store *s, lam_error *error);
 
 /* Abandons a store being written, or closes one that was opened; NULL is allowed. */
 void store_close(store *s);
-
-/* --- reading ---------------------------------------------------------------------------------------- */
 
 /* Opens read only and checks that it is a sealed store of this version.
  * Errors: LAM_ERR_IO, LAM_ERR_FORMAT (foreign or truncated), LAM_ERR_VERSION, LAM_ERR_DAMAGED. */
@@ -76,7 +68,7 @@ lam_status store_verify(store *s, lam_error *error);
 /* The same for the datasets below a group. */
 lam_status store_verify_group(store *s, const char *group, lam_error *error);
 
-/* What tells a store from another that may have taken its place: the file, and what its checksums come to. */
+/* Identifies a store: its file, and the checksum of its checksums. */
 typedef struct store_identity {
     uint64_t device, inode, size;
     int64_t modified_s, modified_ns;
@@ -84,34 +76,34 @@ typedef struct store_identity {
 } store_identity;
 bool store_identity_same(const store_identity *a, const store_identity *b);
 
-/* That of an opened store. */
+/* The identity of an opened store. */
 const store_identity *store_identity_of(const store *s);
 
 /* The path it was opened or created with; owned by s. */
 const char *store_path(const store *s);
 
-/* Whether there is a group or dataset of this name. */
+/* True if there is a group or dataset of this name. */
 bool store_has(store *s, const char *name);
 
-/* Type and shape of an array. LAM_ERR_FORMAT when it is missing or of a type that is not ours. */
+/* Type and shape of an array. LAM_ERR_FORMAT if it is missing or of another type than store_type has. */
 lam_status store_array_info(store *s, const char *name, store_type *type, int *rank, size_t *dims,
                             lam_error *error);
 
-/* Reads one array whole into fresh memory (*data, freed by the caller with free) and checks it against its
- * checksum. It must have this type, this rank, and these dims where they are not SIZE_MAX; a SIZE_MAX is
- * replaced by what was found. Sizes are compared with the file's real size before anything is allocated.
- * Errors: LAM_ERR_FORMAT, LAM_ERR_DAMAGED, LAM_ERR_MEMORY; each names the path and the dataset. */
+/* Reads a whole array into new memory (*data, freed by the caller with free) and compares it with its
+ * checksums. It must have this type, rank and dims; a dim of SIZE_MAX is replaced by the one found. Sizes are
+ * compared with the size of the file before anything is allocated. Errors: LAM_ERR_FORMAT, LAM_ERR_DAMAGED,
+ * LAM_ERR_MEMORY; each names the path and the dataset. */
 lam_status store_read(store *s, const char *name, store_type type, int rank, size_t *dims, void **data,
                       lam_error *error);
 
-/* The same into memory that the caller has for an array of this type and dims, none of them SIZE_MAX. */
+/* The same into memory of the caller, for an array of this type and dims, none of them SIZE_MAX. */
 lam_status store_read_into(store *s, const char *name, store_type type, int rank, const size_t *dims,
                            void *data, lam_error *error);
 
 /* Reads texts into one block: *texts is an array of *count pointers, freed by the caller with one free(). */
 lam_status store_read_texts(store *s, const char *name, size_t *count, char ***texts, lam_error *error);
 
-/* Attributes; LAM_ERR_FORMAT when missing or of another type. A text is freed by the caller. */
+/* Attributes; LAM_ERR_FORMAT if missing or of another type. A text is freed by the caller. */
 lam_status store_get_text(store *s, const char *object, const char *name, char **text, lam_error *error);
 lam_status store_get_number(store *s, const char *object, const char *name, double *value, lam_error *error);
 lam_status store_get_integer(store *s, const char *object, const char *name, int64_t *value,

@@ -18,9 +18,6 @@ done:
     return status;
 }
 
-/* --- writing ---------------------------------------------------------------------------------------------
- */
-
 static lam_status attribute_write(store *s, const char *object, const char *name, hid_t type,
                                   const void *value, lam_error *error) {
     assert(s->target != NULL);
@@ -72,9 +69,6 @@ lam_status store_set_integer(store *s, const char *object, const char *name, int
     return status;
 }
 
-/* --- reading ---------------------------------------------------------------------------------------------
- */
-
 typedef enum attribute_kind {
     ATTRIBUTE_TEXT,
     ATTRIBUTE_NUMBER,
@@ -97,7 +91,7 @@ static attribute_kind kind_of(hid_t type, hid_t space) {
     return ATTRIBUTE_OTHER;
 }
 
-/* Reads what is in an open attribute; value->text is the caller's to free. */
+/* Reads an open attribute; the caller frees value->text. */
 static lam_status attribute_read(store *s, const char *object, hid_t id, attribute *value, lam_error *error) {
     lam_status status = LAM_OK;
     hid_t type = H5Aget_type(id), space = H5Aget_space(id);

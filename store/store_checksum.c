@@ -1,4 +1,4 @@
-/* Checksums: XXH3 of every MiB of every array, and one over all of these. */
+/* Checksums: XXH3 of every MiB of every array, and one XXH3 over all of these. */
 #include "store/store_private.h"
 
 #include <inttypes.h>
@@ -21,9 +21,6 @@ static size_t piece_size(size_t bytes, size_t piece) {
     return rest < STORE_PIECE ? rest : STORE_PIECE;
 }
 
-/* --- the table -------------------------------------------------------------------------------------------
- */
-
 void store_sums_free(store_sums *sums) {
     for (size_t i = 0; i < sums->count; i++) {
         free(sums->entries[i].name);
@@ -33,7 +30,7 @@ void store_sums_free(store_sums *sums) {
     *sums = (store_sums){0};
 }
 
-/* Where name is, or belongs. */
+/* The index of name in the table, or where it would be inserted. */
 static size_t sums_place(const store_sums *sums, const char *name) {
     size_t low = 0, high = sums->count;
     while (low < high) {
@@ -51,7 +48,7 @@ const store_sum *store_sums_find(const store_sums *sums, const char *name) {
     return at < sums->count && strcmp(sums->entries[at].name, name) == 0 ? &sums->entries[at] : NULL;
 }
 
-/* Takes pieces over when it succeeds. */
+/* Takes pieces over on success. */
 static lam_status sums_insert(store_sums *sums, const char *name, size_t n_pieces, uint64_t *pieces,
                               lam_error *error) {
     size_t at = sums_place(sums, name), size = strlen(name) + 1;
@@ -103,9 +100,6 @@ static lam_status sums_digest(const store_sums *sums, char digest[17], lam_error
     free(all);
     return LAM_OK;
 }
-
-/* --- /checksum -------------------------------------------------------------------------------------------
- */
 
 lam_status store_sums_write(store *s, lam_error *error) {
     lam_status status = LAM_OK;
@@ -185,9 +179,6 @@ done:
     return status;
 }
 
-/* --- comparing -------------------------------------------------------------------------------------------
- */
-
 const store_sum *store_sums_find_for(const store *s, const char *name, const store_array *array,
                                      lam_error *error) {
     const store_sum *sum = store_sums_find(&s->sums, name);
@@ -221,7 +212,7 @@ done:
     return status;
 }
 
-/* Whether a dataset lies below a group of so many letters; "/" has none: every name goes on with a slash. */
+/* True if a dataset lies below a group, whose path has `length` letters; "/" counts as 0. */
 static bool is_below(const char *name, const char *group, size_t length) {
     return strncmp(name, group, length) == 0 && name[length] == '/';
 }
@@ -235,7 +226,7 @@ lam_status store_verify_group(store *s, const char *group, lam_error *error) {
     store_mute mute = store_mute_begin();
     store_array array = {.id = -1};
     const size_t length = strcmp(group, "/") == 0 ? 0 : strlen(group);
-    /* Every array is in the table: store_open has seen to it. */
+    /* Every array is in the table: store_open has checked that. */
     for (size_t i = 0; i < s->sums.count; i++) {
         const char *name = s->sums.entries[i].name;
         if (!is_below(name, group, length)) continue;

@@ -14,7 +14,7 @@ typedef struct driver_file {
     haddr_t eoa; /* end of what HDF5 has allocated */
 } driver_file;
 
-/* What the file access properties carry. */
+/* The content of the file access properties. */
 typedef struct driver_info {
     store_file *file;
 } driver_info;
@@ -67,7 +67,7 @@ static haddr_t driver_get_eof(const H5FD_t *base, H5FD_mem_t type) {
     return driver_of(base)->size;
 }
 
-/* Up to size bytes: fewer only at the end of the file. */
+/* Reads up to size bytes; fewer at the end of the file alone. */
 static ssize_t read_available(store_file *file, uint64_t offset, char *buffer, size_t size) {
     size_t done = 0;
     while (done < size) {
@@ -95,7 +95,7 @@ static herr_t driver_read(H5FD_t *base, H5FD_mem_t type, hid_t transfer, haddr_t
     (void)transfer;
     store_file *file = driver_of(base);
     if (!file->writable) return store_file_read(file, address, buffer, size) ? 0 : -1;
-    /* What was allocated but never written, or dropped, reads as zero. */
+    /* Bytes that were allocated and never written, or dropped, read as zero. */
     ssize_t n = read_available(file, address, buffer, size);
     if (n < 0) n = 0;
     memset((char *)buffer + n, 0, size - (size_t)n);
@@ -167,13 +167,12 @@ hid_t store_driver_properties(store_file *file) {
 #ifdef LAMBERT_SANITIZED
 #include <sanitizer/lsan_interface.h>
 
-/* HDF5 1.10 loses 424 bytes over every damaged object header; that is no leak of ours. Weak: a program may
- * bring its own list. */
+/* HDF5 1.10 leaks 424 bytes for every damaged object header. Weak: a program may have its own list. */
 __attribute__((weak)) const char *__lsan_default_suppressions(void) {
     return "leak:libhdf5\n";
 }
 
-/* Nor need it be told on standard error, where a program's own message is one line. */
+/* Suppresses the report on standard error, where a program writes one line of its own. */
 __attribute__((weak)) const char *__lsan_default_options(void) {
     return "print_suppressions=0";
 }

@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* An array that was given out, with its own copy of the checksums: the store's table goes with the store. */
+/* An array that was given out, with a copy of its checksums, as the table is freed with the store. */
 typedef struct map_array {
     char *name;
     uint64_t *pieces; /* [n_pieces] */
@@ -21,19 +21,19 @@ typedef struct map_array {
 struct store_map {
     atomic_size_t references;
     char *path;
-    int fd;                  /* of the file, to ask whether it changed */
+    int fd;                  /* of the file, for store_map_changed */
     store_identity identity; /* when the store was opened */
-    char *room;              /* what base lies in */
+    char *room;              /* reserved range that contains base */
     char *base;
     size_t file_bytes;
-    size_t mapped_bytes; /* the file's pages and one more */
+    size_t mapped_bytes; /* pages of the file, and one more */
     size_t room_bytes;
     map_array *arrays;
     size_t n_arrays, capacity;
 };
 
-/* A file's pages are joined to such pieces where memory and file agree on where one begins. With them a solve
- * of 5 GB runs at memory's speed, else at .75 of it. */
+/* Size of huge pages: the system uses them where address and offset are both aligned to it. With them a solve
+ * of 5 GB runs at memory speed, otherwise at .75 of it. */
 #define HUGE_PAGE ((size_t)2 << 20)
 
 static size_t page_size(void) {
@@ -57,7 +57,8 @@ lam_status store_map_file(store *s, lam_error *error) {
              (unsigned long long)s->file.size);
     map->file_bytes = (size_t)s->file.size;
     map->mapped_bytes = (map->file_bytes + page - 1) / page * page + page;
-    /* First room for all, with a page of zeros at its end: what is read behind the last array is there. */
+    /* Reserves the whole range first, with a page of zeros at its end, which may be read behind the last
+     * array. */
     map->room_bytes = map->mapped_bytes + HUGE_PAGE;
     map->room = mmap(NULL, map->room_bytes, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (map->room == MAP_FAILED)
@@ -66,7 +67,7 @@ lam_status store_map_file(store *s, lam_error *error) {
     if (map->file_bytes > 0 &&
         mmap(map->base, map->file_bytes, PROT_READ, MAP_SHARED | MAP_FIXED, s->file.fd, 0) == MAP_FAILED)
         FAIL(error, LAM_ERR_IO, "%s: cannot be mapped: %s", s->path, strerror(errno));
-    (void)madvise(map->base, map->file_bytes, MADV_HUGEPAGE); /* not every file system can */
+    (void)madvise(map->base, map->file_bytes, MADV_HUGEPAGE); /* not every file system supports it */
     store_map_release(s->map);
     s->map = map;
     map = NULL;
@@ -109,16 +110,13 @@ bool store_map_changed(const store_map *map) {
            (int64_t)info.st_mtim.tv_nsec != map->identity.modified_ns;
 }
 
-/* --- arrays ----------------------------------------------------------------------------------------------
- */
-
 static map_array *find_array(const store_map *map, const char *name) {
     for (size_t i = 0; i < map->n_arrays; i++)
         if (strcmp(map->arrays[i].name, name) == 0) return &map->arrays[i];
     return NULL;
 }
 
-/* Puts an array on the list, once. */
+/* Adds an array to the list, once. */
 static lam_status add_array(store_map *map, const char *name, const store_array *array, const store_sum *sum,
                             lam_error *error) {
     lam_status status = LAM_OK;
@@ -180,9 +178,6 @@ size_t store_map_bytes(const store_map *map) {
     for (size_t i = 0; i < map->n_arrays; i++) total += map->arrays[i].bytes;
     return total;
 }
-
-/* --- comparing -------------------------------------------------------------------------------------------
- */
 
 static lam_status damaged(const store_map *map, const map_array *array, size_t piece, const char *what,
                           lam_error *error) {

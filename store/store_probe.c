@@ -1,5 +1,5 @@
-/* HDF5's own reader may crash on a damaged header (1.10 frees what it never allocated, or never ends). So a
- * file is opened in a child process first, and only what the child survived is opened in this one. */
+/* The reader of HDF5 may crash on a damaged header (1.10 frees unallocated memory, or does not end). So a
+ * file is opened in a child process first, and in this process only if the child survives. */
 #include "store/store_private.h"
 
 #include <dirent.h>
@@ -12,7 +12,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/* Far more than any store's headers need. */
+/* Far more than the headers of any store need. */
 enum { CPU_SECONDS = 20, ALL_SECONDS = 30, TRIALS = 3 };
 
 #ifdef LAMBERT_SANITIZED
@@ -41,15 +41,15 @@ static _Noreturn void probe_in_child(store_opener *opener, const char *path) {
     setrlimit(RLIMIT_CORE, &no_core);
     setrlimit(RLIMIT_CPU, &cpu);
     alarm(ALL_SECONDS);
-    const int null = open("/dev/null", O_WRONLY); /* for what the C library says of a damaged heap */
+    const int null = open("/dev/null", O_WRONLY); /* hides the report of the C library on a damaged heap */
     if (null >= 0) dup2(null, STDERR_FILENO);
-    /* Whether it is refused is for the parent to find and say again. */
+    /* A refusal is found again, and reported, by the parent. */
     (void)opener(path, &s, &error);
     store_close(s);
     _exit(0);
 }
 
-/* How one child ended; false when there was none to be had. */
+/* *how: the wait status of the child; false if none could be started. */
 static bool probe_once(store_opener *opener, const char *path, int *how) {
     const pid_t child = fork();
     if (child == 0) probe_in_child(opener, path);
@@ -63,11 +63,9 @@ lam_status store_probe(store_opener *opener, const char *path, lam_error *error)
     lam_status status = LAM_OK;
     int how = 0;
     if (!may_fork()) return LAM_OK;
-    /* A damaged file ends every child; what else may end one (somebody kills it, memory is short) does not
-     * end three. */
+    /* A damaged file ends every child; other causes (it is killed, memory is short) hardly end three. */
     for (int trial = 0; trial < TRIALS; trial++) {
-        if (!probe_once(opener, path, &how))
-            return LAM_OK; /* no process: as it was before there were probes */
+        if (!probe_once(opener, path, &how)) return LAM_OK; /* without a child the file is opened unprobed */
         if (WIFEXITED(how) && WEXITSTATUS(how) == 0) return LAM_OK;
         if (WIFSIGNALED(how) && (WTERMSIG(how) == SIGALRM || WTERMSIG(how) == SIGXCPU)) break;
     }

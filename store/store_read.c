@@ -1,11 +1,11 @@
-/* Reading arrays: nothing in a header is believed before it is compared with the file. */
+/* Reads arrays: every size in a header is compared with the file before it is used. */
 #include "store/store_private.h"
 
 #include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* What the values are; false for a type that no store holds. */
+/* Type of the values; false for a type that no store holds. */
 static bool describe_type(hid_t type, store_array *array) {
     static const store_type types[] = {STORE_F32, STORE_F64, STORE_U32, STORE_U64,
                                        STORE_F16, STORE_U16, STORE_I8};
@@ -23,7 +23,7 @@ static bool describe_type(hid_t type, store_array *array) {
     return array->is_text && array->value_size > 0;
 }
 
-/* The shape and the bytes it takes; false for no shape of ours. */
+/* Shape and bytes; false for a shape that no store holds. */
 static bool describe_shape(hid_t space, store_array *array) {
     hsize_t extent[STORE_MAX_RANK];
     array->rank = H5Sget_simple_extent_ndims(space);
@@ -38,7 +38,7 @@ static bool describe_shape(hid_t space, store_array *array) {
     return true;
 }
 
-/* Whether it lies within this file, in its place. */
+/* True if the array is contiguous and lies within this file. */
 static bool locate(store *s, store_array *array) {
     if (array->bytes == 0) return true;
     haddr_t offset = H5Dget_offset(array->id);
@@ -58,7 +58,7 @@ lam_status store_array_open(store *s, const char *name, store_array *array, lam_
         FAIL(error, LAM_ERR_FORMAT, "%s: %s is not an array", s->path, name);
     if (array->id >= 0) properties = H5Dget_create_plist(array->id);
     if (properties < 0) TRY(store_hdf5_failure(s, name, "read", error));
-    /* Asked first: the shape of a virtual array would be looked up in other files. */
+    /* First of all: the shape of a virtual array would be read from other files. */
     if (H5Pget_layout(properties) != H5D_CONTIGUOUS || H5Pget_external_count(properties) != 0)
         FAIL(error, LAM_ERR_FORMAT, "%s: %s is chunked, compressed or in another file, as in no store",
              s->path, name);

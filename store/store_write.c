@@ -43,7 +43,7 @@ done:
     return status;
 }
 
-/* Contiguous, its place taken at once, nothing filled in. */
+/* Contiguous, allocated at once, without fill values. */
 static hid_t array_properties(void) {
     hid_t properties = store_untimed(H5P_DATASET_CREATE);
     if (properties >= 0 && (H5Pset_layout(properties, H5D_CONTIGUOUS) < 0 ||
@@ -112,7 +112,7 @@ hid_t store_file_type(store_type type) {
     return -1;
 }
 
-/* One array with its checksums. */
+/* Writes an array and adds its checksums. */
 static lam_status write_summed(store *s, const char *name, hid_t type, size_t value_size, int rank,
                                const size_t *dims, const void *data, lam_error *error) {
     lam_status status = LAM_OK;

@@ -1,4 +1,4 @@
-/* What a handler gets and gives back: the call and the answer. Knows no HTTP library and no route. */
+/* The input and output of a handler: the call and the answer. Knows no HTTP library and no route. */
 #ifndef LAMBERT_SERVER_ROUTE_CALL_H
 #define LAMBERT_SERVER_ROUTE_CALL_H
 

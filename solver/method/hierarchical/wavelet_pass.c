@@ -76,8 +76,7 @@ typedef struct pass_work {
     coefficient_list found;
 } pass_work;
 
-/* What happens to the rows at a column's wavelets: KEEP stores coefficients above the threshold, CARRY adds
- * finer columns. */
+/* The rows at a column's wavelets: KEEP stores coefficients above the threshold, CARRY adds finer columns. */
 enum { KEEP = 1, CARRY = 2 };
 
 /* The node whose rows are transformed. */

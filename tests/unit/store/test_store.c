@@ -1,4 +1,5 @@
 /* What is written to a store comes back; what is not a store is refused. */
+#include "store/store_private.h"
 #include "support/store_sample.h"
 #include "support/suite.h"
 
@@ -33,7 +34,7 @@ START_TEST(arrays_come_back) {
     ck_ok(sample_write(path, 1, &error));
     ck_ok(store_open(path, &s, &error));
     ck_assert_str_eq(store_path(s), path);
-    ck_assert_ptr_null(store_partial_path(s));
+    ck_assert_ptr_null(s->partial);
     ck_ok(store_verify(s, &error));
     for (int i = 0; i < SAMPLE_ARRAYS; i++) {
         const sample_array *array = &sample_arrays[i];
@@ -342,7 +343,7 @@ START_TEST(nothing_is_left_without_a_seal) {
     ck_ok(store_create(path, &s, &error));
     ck_ok(sample_fill(s, 1, &error));
     ck_assert_str_eq(store_path(s), path);
-    ck_assert_int_eq(access(store_partial_path(s), F_OK), 0);
+    ck_assert_int_eq(access(s->partial, F_OK), 0);
     ck_assert_int_ne(access(path, F_OK), 0);
     store_close(s);
     ck_assert_int_eq(sample_folder_extras(folder, NULL), 0);
@@ -449,7 +450,7 @@ START_TEST(an_unsealed_file_is_refused) {
     snprintf(rescued, sizeof rescued, "%s/rescued.h5", folder);
     ck_ok(store_create(path, &s, &error));
     ck_ok(sample_fill(s, 1, &error));
-    ck_assert_int_eq(link(store_partial_path(s), rescued), 0);
+    ck_assert_int_eq(link(s->partial, rescued), 0);
     store_close(s);
     s = NULL;
     lam_status status = store_open(rescued, &s, &error);
