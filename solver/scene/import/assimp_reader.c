@@ -1,4 +1,5 @@
 /* glTF, PLY, STL and whatever else libassimp reads, to a soup: the only user of it. Runs in the child. */
+#include "solver/base/file_text.h"
 #include "solver/scene/import/imported_faces.h"
 
 #include <assimp/cimport.h>

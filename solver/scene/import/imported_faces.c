@@ -144,27 +144,3 @@ done:
     polygon_scratch_free(&scratch);
     return status;
 }
-
-lam_status file_text(const char *path, char **out, size_t *out_length, lam_error *error) {
-    lam_status status = LAM_OK;
-    char *text = NULL;
-    size_t capacity = 0, length = 0, got = 1;
-    FILE *file = fopen(path, "rb");
-    if (file == NULL) FAIL(error, LAM_ERR_IO, "%s: cannot read: %s", path, strerror(errno));
-    while (got > 0) {
-        char *grown = array_grow(text, &capacity, length + 65536, 1, path, error);
-        if (grown == NULL) TRY(LAM_ERR_MEMORY);
-        text = grown;
-        got = fread(text + length, 1, capacity - length - 1, file);
-        length += got;
-    }
-    if (ferror(file)) FAIL(error, LAM_ERR_IO, "%s: cannot read: %s", path, strerror(errno));
-    text[length] = '\0';
-    *out = text;
-    *out_length = length;
-    text = NULL;
-done:
-    if (file != NULL) fclose(file);
-    free(text);
-    return status;
-}

@@ -62,9 +62,6 @@ lam_status soup_add_material(soup *s, const char *name, size_t length, uint32_t 
  */
 lam_status soup_split(soup *s, const char *path, lam_error *error);
 
-/* The whole of a file, with a NUL after its length bytes; freed by the caller. */
-lam_status file_text(const char *path, char **out, size_t *out_length, lam_error *error);
-
 /* A reader of one family of formats; runs in the child. */
 typedef lam_status soup_reader(const char *path, soup *s, lam_error *error);
 soup_reader obj_read;

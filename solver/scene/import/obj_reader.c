@@ -1,6 +1,7 @@
 /* OBJ + MTL to a soup, read here and not by the importing library, which keeps coordinates in single
  * precision, merges the names of `o` and `g`, invents a diffuse colour and only logs a missing MTL. Runs in
  * the child. */
+#include "solver/base/file_text.h"
 #include "solver/scene/import/imported_faces.h"
 
 #include <errno.h>
