@@ -66,13 +66,13 @@ done:
 lam_status option_numbers(const char *what, const char *text, size_t count, bool exactly, double *values,
                           size_t *found, lam_error *error) {
     lam_status status = LAM_OK;
-    double read[16];
     size_t n = 0;
+    double *read = memory_allocate(count, sizeof *read, what, error);
+    if (read == NULL) TRY(LAM_ERR_MEMORY);
     for (const char *rest = text;; n++) {
         size_t length = strcspn(rest, ",");
         char piece[64];
-        if (n == count || n == sizeof read / sizeof read[0])
-            FAIL(error, LAM_ERR_ARGUMENT, "%s %s: more than %zu numbers", what, text, count);
+        if (n == count) FAIL(error, LAM_ERR_ARGUMENT, "%s %s: more than %zu numbers", what, text, count);
         if (length >= sizeof piece) FAIL(error, LAM_ERR_ARGUMENT, "%s %s: not a number", what, text);
         memcpy(piece, rest, length);
         piece[length] = '\0';
@@ -90,6 +90,7 @@ lam_status option_numbers(const char *what, const char *text, size_t count, bool
     memcpy(values, read, n * sizeof *values);
     if (found != NULL) *found = n;
 done:
+    free(read);
     return status;
 }
 

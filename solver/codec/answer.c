@@ -24,8 +24,10 @@ bool answer_tail(buffer *b, const answer_notes *notes) {
             (buffer_append_text(b, ",\"error\":{\"relative_mean\":") &&
              json_write_double(b, notes->relative_mean) && buffer_append_text(b, ",\"indirect_mean\":") &&
              json_write_double(b, notes->indirect_mean) && buffer_append(b, "}", 1))) &&
-           buffer_printf(b, ",\"time_ms\":{\"parse\":%.3f,\"solve\":%.3f,\"encode\":%.3f}}\n",
-                         notes->parse_ms, notes->solve_ms, notes->encode_ms);
+           (!notes->has_time ||
+            buffer_printf(b, ",\"time_ms\":{\"parse\":%.3f,\"solve\":%.3f,\"encode\":%.3f}", notes->parse_ms,
+                          notes->solve_ms, notes->encode_ms)) &&
+           buffer_append(b, "}\n", 2);
 }
 
 bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,

@@ -14,15 +14,16 @@ typedef struct answer_shape {
     size_t n_values; /* elements that the answer is about: n, or those selected */
 } answer_shape;
 
-/* What the JSON object says beside the vectors. */
+/* The members of a JSON answer beside its vectors. */
 typedef struct answer_notes {
     const char *scene;
     lam_quantity quantity;
     bool has_error;
     double relative_mean, indirect_mean;
+    bool has_time;
     double parse_ms, solve_ms, encode_ms;
-    /* Of refined answers, in place of the store's error; else NULL: [n_rhs], what no number of a vector is
-     * further off by, and how often the form factors were multiplied for it. */
+    /* [n_rhs] of a refined answer, in place of the store's error, else NULL: the bound on the error of every
+     * number of a vector, and the multiplications by the form factors that it took. */
     const double *certificates;
     const size_t *iterations;
 } answer_notes;
@@ -31,8 +32,8 @@ typedef struct answer_notes {
  * nothing for others. False when memory is short. */
 bool answer_certificates(buffer *b, size_t n_rhs, bool batch, const answer_notes *notes);
 
-/* The beginning of any JSON answer, up to and with its quantity, and its end: what notes says, and the
- * closing bracket. False when memory is short. */
+/* The beginning of any JSON answer, up to and with its quantity, and its end: error, time and the closing
+ * brace. False when memory is short. */
 bool answer_head(buffer *b, size_t n, size_t n_channels, const answer_notes *notes);
 bool answer_tail(buffer *b, const answer_notes *notes);
 
@@ -40,21 +41,18 @@ bool answer_tail(buffer *b, const answer_notes *notes);
 bool answer_rows(buffer *b, const media_accept *as, size_t n_channels, size_t n, const float *x,
                  problem *why);
 
-/* Appends what stands before the vectors, then vectors first ... first + count of x [count][C][n_values],
- * then what stands behind the last. False with *why: 422 when a value is beyond what the encoding holds, 503
- * when memory is short. */
+/* Appends the beginning of an answer, then vectors first ... first + count of x [count][C][n_values], then
+ * its end. False with *why: 422 when a value is beyond what the encoding holds, 503 when memory is short. */
 bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,
                   problem *why);
-/* Where the values of a whole answer of so many vectors may be written at once, behind what answer_begin
- * wrote, [n_rhs][C][n_values]; answer_placed, in place of answer_add, then takes them. NULL where the
- * encoding is another, or memory is short. */
+/* Room behind answer_begin's bytes for the values of a whole answer, [n_rhs][C][n_values]; answer_placed, in
+ * place of answer_add, then takes them. NULL where the encoding is not <f4, or memory is short. */
 float *answer_place(buffer *b, const answer_shape *shape, const media_accept *as);
 bool answer_placed(buffer *b, const answer_shape *shape, problem *why);
 
 bool answer_add(buffer *b, const answer_shape *shape, const media_accept *as, size_t first, size_t count,
                 const float *x, problem *why);
-/* The same of refined answers. *rounding becomes the largest that a number was rounded by, if that is more
- * than it was. */
+/* The same of refined answers. *rounding rises to the largest rounding error of a number. */
 bool answer_add_doubles(buffer *b, const answer_shape *shape, const media_accept *as, size_t first,
                         size_t count, const double *x, double *rounding, problem *why);
 bool answer_end(buffer *b, const answer_shape *shape, const media_accept *as, const answer_notes *notes,

@@ -17,22 +17,39 @@ const char *reduce_statistic_name(reduce_statistic statistic) {
     return names[statistic];
 }
 
-static const char *text_of(const reduce_request *r, size_t k) {
+bool reduce_request_with(reduce_request *r, const char *word, size_t length, problem *why) {
+    const int shown = length > 80 ? 80 : (int)length;
+    for (int s = 0; s < REDUCE_COUNT; s++) {
+        const char *name = reduce_statistic_name((reduce_statistic)s);
+        if (strlen(name) != length || memcmp(name, word, length) != 0) continue;
+        for (size_t k = 0; k < r->n_with; k++)
+            if (r->with[k] == (reduce_statistic)s)
+                return problem_set(why, 422, "\"%s\" was listed before", name);
+        r->with[r->n_with++] = (reduce_statistic)s;
+        r->linear = (r->n_with == 1 || r->linear) && (s == REDUCE_MEAN || s == REDUCE_SUM);
+        return true;
+    }
+    return problem_set(why, 422, "\"%.*s\" must be one of: mean, sum, min, max, uniformity, variance", shown,
+                       word);
+}
+
+const char *reduce_text(const reduce_request *r, size_t k) {
     return r->texts.bytes + r->names[k].text;
 }
 
 bool reduce_request_add(reduce_request *r, const char *name, size_t length, const uint32_t *groups,
                         size_t n_groups, problem *why) {
     for (size_t k = 0; k < r->n_names; k++)
-        if (strlen(text_of(r, k)) == length && memcmp(text_of(r, k), name, length) == 0)
-            return problem_set(why, 422, "the group %.80s is given twice", text_of(r, k));
+        if (strlen(reduce_text(r, k)) == length && memcmp(reduce_text(r, k), name, length) == 0)
+            return problem_set(why, 422, "the group %.80s is given twice", reduce_text(r, k));
     if (r->n_names == REDUCE_NAMES_MAX)
         return problem_set(why, 422, "more than %d groups; send several requests", REDUCE_NAMES_MAX);
-    if ((r->n_names & (r->n_names - 1)) == 0) { /* a power of two is full */
-        size_t capacity = r->n_names == 0 ? 1 : 2 * r->n_names;
+    if (r->n_names == r->names_capacity) {
+        const size_t capacity = r->n_names == 0 ? 1 : 2 * r->n_names;
         reduce_name *names = realloc(r->names, capacity * sizeof *names);
         if (names == NULL) return problem_set(why, 503, "not enough memory for the groups of reduce");
         r->names = names;
+        r->names_capacity = capacity;
     }
     const size_t text = r->texts.length;
     if (!buffer_append(&r->texts, name, length) || !buffer_append(&r->texts, "", 1))
@@ -40,8 +57,6 @@ bool reduce_request_add(reduce_request *r, const char *name, size_t length, cons
     r->names[r->n_names++] = (reduce_name){.text = text, .groups = groups, .n_groups = n_groups};
     return true;
 }
-
-/* --- elements ------------------------------------------------------------------------------------------ */
 
 /* begin[g]: where the elements of group g stand among those of all names; UINT32_MAX: they do not. */
 static uint32_t *places_of_groups(const reduce_request *r, const group_index *groups, size_t *count) {
@@ -72,8 +87,6 @@ bool reduce_elements(const reduce_request *r, const group_index *groups, uint32_
     return all != NULL;
 }
 
-/* --- figures ------------------------------------------------------------------------------------------- */
-
 double *reduce_figures(const reduce_request *r, size_t n_rhs, size_t n_channels) {
     size_t count;
     if (!size_multiply(r->n_names * r->n_with, n_channels, &count) || !size_multiply(count, n_rhs, &count))
@@ -81,9 +94,8 @@ double *reduce_figures(const reduce_request *r, size_t n_rhs, size_t n_channels)
     return memory_allocate(count, sizeof(double), "reduce", NULL);
 }
 
-/* The figure of name k, statistic s, vector v and channel c. */
-static double *figure_at(const reduce_request *r, size_t k, size_t s, size_t n_rhs, size_t v,
-                         size_t n_channels, size_t c, double *figures) {
+double *reduce_figure(const reduce_request *r, size_t k, size_t s, size_t n_rhs, size_t v, size_t n_channels,
+                      size_t c, double *figures) {
     return figures + (((k * r->n_with + s) * n_rhs + v) * n_channels + c);
 }
 
@@ -91,14 +103,16 @@ static double value_at(reduce_values x, size_t i) {
     return x.doubles != NULL ? x.doubles[i] : (double)x.floats[i];
 }
 
-/* Every statistic of the elements of one name; x is in the order of reduce_elements, from x_begin on. */
-static void figures_of_name(const reduce_name *name, const group_index *groups, const uint32_t *begin,
-                            const double *area, reduce_values x, size_t x_begin, double out[REDUCE_COUNT]) {
+/* Every statistic of the elements of some groups. The values of group g stand from begin[g] on; where begin
+ * is NULL, x is in mesh order. */
+static void figures_of(size_t n_named, const uint32_t *named, const group_index *groups,
+                       const uint32_t *begin, const double *area, reduce_values x, size_t x_begin,
+                       double out[REDUCE_COUNT]) {
     double total = 0, sum = 0, squares = 0, low = INFINITY, high = -INFINITY;
-    for (size_t m = 0; m < name->n_groups; m++) {
-        const uint32_t g = name->groups[m], *elements = groups->elements + groups->start[g];
+    for (size_t m = 0; m < n_named; m++) {
+        const uint32_t g = named[m], *elements = groups->elements + groups->start[g];
         for (size_t e = 0; e < groups->start[g + 1] - groups->start[g]; e++) {
-            const double value = value_at(x, x_begin + begin[g] + e);
+            const double value = value_at(x, x_begin + (begin != NULL ? begin[g] + e : elements[e]));
             total += area[elements[e]];
             sum += area[elements[e]] * value;
             low = fmin(low, value);
@@ -106,10 +120,10 @@ static void figures_of_name(const reduce_name *name, const group_index *groups, 
         }
     }
     const double mean = sum / total;
-    for (size_t m = 0; m < name->n_groups; m++) {
-        const uint32_t g = name->groups[m], *elements = groups->elements + groups->start[g];
+    for (size_t m = 0; m < n_named; m++) {
+        const uint32_t g = named[m], *elements = groups->elements + groups->start[g];
         for (size_t e = 0; e < groups->start[g + 1] - groups->start[g]; e++) {
-            const double off = value_at(x, x_begin + begin[g] + e) - mean;
+            const double off = value_at(x, x_begin + (begin != NULL ? begin[g] + e : elements[e])) - mean;
             squares += area[elements[e]] * off * off;
         }
     }
@@ -122,19 +136,24 @@ static void figures_of_name(const reduce_name *name, const group_index *groups, 
     out[REDUCE_VARIANCE] = any ? squares / total : NAN;
 }
 
+void reduce_groups(size_t n_named, const uint32_t *named, const group_index *groups, const double *area,
+                   reduce_values x, double out[REDUCE_COUNT]) {
+    figures_of(n_named, named, groups, NULL, area, x, 0, out);
+}
+
 bool reduce_vectors(const reduce_request *r, const group_index *groups, const double *area, size_t n_channels,
                     size_t n_rhs, size_t first, size_t count, reduce_values x, double *figures) {
-    size_t n_values;
-    uint32_t *begin = places_of_groups(r, groups, &n_values);
-    if (begin == NULL) return false;
+    size_t n_values = groups->start[groups->n_groups];
+    uint32_t *begin = x.whole ? NULL : places_of_groups(r, groups, &n_values);
+    if (begin == NULL && !x.whole) return false;
     for (size_t v = 0; v < count; v++)
         for (size_t c = 0; c < n_channels; c++)
             for (size_t k = 0; k < r->n_names; k++) {
                 double of_name[REDUCE_COUNT];
-                figures_of_name(&r->names[k], groups, begin, area, x, (v * n_channels + c) * n_values,
-                                of_name);
+                figures_of(r->names[k].n_groups, r->names[k].groups, groups, begin, area, x,
+                           (v * n_channels + c) * n_values, of_name);
                 for (size_t s = 0; s < r->n_with; s++)
-                    *figure_at(r, k, s, n_rhs, first + v, n_channels, c, figures) = of_name[r->with[s]];
+                    *reduce_figure(r, k, s, n_rhs, first + v, n_channels, c, figures) = of_name[r->with[s]];
             }
     free(begin);
     return true;
@@ -146,18 +165,16 @@ void reduce_means(const reduce_request *r, size_t k, size_t n_channels, size_t n
         for (size_t v = 0; v < n_rhs; v++)
             for (size_t c = 0; c < n_channels; c++) {
                 const double mean = means[v * n_channels + c];
-                *figure_at(r, k, s, n_rhs, v, n_channels, c, figures) =
+                *reduce_figure(r, k, s, n_rhs, v, n_channels, c, figures) =
                     area > 0 ? r->with[s] == REDUCE_SUM ? area * mean : mean : NAN;
             }
 }
-
-/* --- the answer ---------------------------------------------------------------------------------------- */
 
 static bool write_one(buffer *b, double value) {
     return isnan(value) ? buffer_append(b, "null", 4) : json_write_double(b, value);
 }
 
-static bool write_channels(buffer *b, const double *values, size_t n_channels) {
+bool reduce_write_channels(buffer *b, const double *values, size_t n_channels) {
     if (n_channels == 1) return write_one(b, values[0]);
     bool written = buffer_append(b, "[", 1);
     for (size_t c = 0; written && c < n_channels; c++)
@@ -165,20 +182,27 @@ static bool write_channels(buffer *b, const double *values, size_t n_channels) {
     return written && buffer_append(b, "]", 1);
 }
 
-bool reduce_write(const reduce_request *r, size_t n_channels, size_t n_rhs, bool batch, const double *figures,
-                  buffer *b) {
-    bool written = buffer_append(b, "{", 1);
+bool reduce_write_names(const reduce_request *r, size_t n_channels, size_t n_rhs, bool batch,
+                        const double *figures, buffer *b) {
+    bool written = true;
     for (size_t k = 0; written && k < r->n_names; k++) {
-        written = (k == 0 || buffer_append(b, ",", 1)) && json_write_text(b, text_of(r, k)) &&
+        written = (k == 0 || buffer_append(b, ",", 1)) && json_write_text(b, reduce_text(r, k)) &&
                   buffer_append(b, ":{", 2);
         for (size_t s = 0; written && s < r->n_with; s++) {
             written = buffer_printf(b, "%s\"%s\":%s", s == 0 ? "" : ",", reduce_statistic_name(r->with[s]),
                                     batch ? "[" : "");
             for (size_t v = 0; written && v < n_rhs; v++, figures += n_channels)
-                written = (v == 0 || buffer_append(b, ",", 1)) && write_channels(b, figures, n_channels);
+                written =
+                    (v == 0 || buffer_append(b, ",", 1)) && reduce_write_channels(b, figures, n_channels);
             written = written && (!batch || buffer_append(b, "]", 1));
         }
         written = written && buffer_append(b, "}", 1);
     }
-    return written && buffer_append(b, "}", 1);
+    return written;
+}
+
+bool reduce_write(const reduce_request *r, size_t n_channels, size_t n_rhs, bool batch, const double *figures,
+                  buffer *b) {
+    return buffer_append(b, "{", 1) && reduce_write_names(r, n_channels, n_rhs, batch, figures, b) &&
+           buffer_append(b, "}", 1);
 }

@@ -19,9 +19,9 @@ typedef enum reduce_statistic {
     REDUCE_COUNT
 } reduce_statistic;
 
-/* A name that was asked for, and the groups of the scene that it means (group_index_find). */
+/* A name in a request, and the groups of the scene that it means (group_index_find). */
 typedef struct reduce_name {
-    size_t text; /* where it begins in texts; ends with a NUL */
+    size_t text; /* its offset in texts; it ends with a NUL */
     const uint32_t *groups;
     size_t n_groups;
 } reduce_name;
@@ -32,8 +32,8 @@ typedef struct reduce_request {
     bool linear; /* means and sums alone: adjoint rows answer it */
     buffer texts;
     reduce_name *names;
-    size_t n_names;
-    reduce_statistic with[REDUCE_COUNT];
+    size_t n_names, names_capacity;
+    reduce_statistic with[REDUCE_COUNT]; /* in the order asked */
     size_t n_with;
 } reduce_request;
 
@@ -42,7 +42,10 @@ void reduce_request_free(reduce_request *r);
 /* The contract's word for a statistic. */
 const char *reduce_statistic_name(reduce_statistic statistic);
 
-/* Takes one more name, and what it means. 422: a name given twice, or too many; 503. */
+/* Adds the statistic of a word. 422: an unknown word, or one given twice. */
+bool reduce_request_with(reduce_request *r, const char *word, size_t length, problem *why);
+
+/* Adds a name and the groups that it means. 422: a name given twice, or too many; 503. */
 bool reduce_request_add(reduce_request *r, const char *name, size_t length, const uint32_t *groups,
                         size_t n_groups, problem *why);
 
@@ -54,25 +57,41 @@ bool reduce_elements(const reduce_request *r, const group_index *groups, uint32_
  * short; the caller frees. */
 double *reduce_figures(const reduce_request *r, size_t n_rhs, size_t n_channels);
 
-/* Values that are reduced: either of the two. */
+/* The text of name k. */
+const char *reduce_text(const reduce_request *r, size_t k);
+
+/* The figure of name k, statistic s of `with`, vector v and channel c. */
+double *reduce_figure(const reduce_request *r, size_t k, size_t s, size_t n_rhs, size_t v, size_t n_channels,
+                      size_t c, double *figures);
+
+/* Values to reduce, in single or in double precision. */
 typedef struct reduce_values {
     const float *floats;
     const double *doubles;
+    bool whole; /* of every element in mesh order; else in the order of reduce_elements */
 } reduce_values;
 
-/* Fills the figures of vectors first ... first + count of n_rhs. x is [count][C][n_values], the elements in
- * the order of reduce_elements; area [n] in mesh order. NaN where a figure has no value: no area, or a mean
- * of 0. False when memory is short. */
+/* Fills the figures of vectors first ... first + count of n_rhs. x is [count][C][n_values]; area [n] in mesh
+ * order. NaN where a figure has no value: no area, or a mean of 0. False when memory is short. */
 bool reduce_vectors(const reduce_request *r, const group_index *groups, const double *area, size_t n_channels,
                     size_t n_rhs, size_t first, size_t count, reduce_values x, double *figures);
+
+/* Every statistic of the elements of some groups; x is [n] in mesh order. */
+void reduce_groups(size_t n_named, const uint32_t *named, const group_index *groups, const double *area,
+                   reduce_values x, double out[REDUCE_COUNT]);
 
 /* Fills those of name k from its means [n_rhs][C] alone; area is that of its elements. */
 void reduce_means(const reduce_request *r, size_t k, size_t n_channels, size_t n_rhs, double area,
                   const double *means, double *figures);
 
-/* Appends {"desk":{"mean":...},...}: a number for one channel, C of them for more, one level deeper for a
- * batch; null for NaN. False when memory is short. */
+/* Appends {"desk":{"mean":...},...}, or only what stands between the outer braces: a number for one channel,
+ * C of them for more, one level deeper for a batch; null for NaN. False when memory is short. */
 bool reduce_write(const reduce_request *r, size_t n_channels, size_t n_rhs, bool batch, const double *figures,
                   buffer *b);
+bool reduce_write_names(const reduce_request *r, size_t n_channels, size_t n_rhs, bool batch,
+                        const double *figures, buffer *b);
+
+/* Appends the figure of one vector: a number, or [C] of them; null for NaN. False when memory is short. */
+bool reduce_write_channels(buffer *b, const double *values, size_t n_channels);
 
 #endif

@@ -1,5 +1,8 @@
 #include "solver/codec/groups.h"
 
+#include "solver/base/nearest.h"
+
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -46,8 +49,8 @@ void group_index_free(group_index *index) {
     *index = (group_index){0};
 }
 
-/* Compares a group's name with name[0..length) and, with dot, a '.' behind it; of the group's name only as
- * much is looked at as the other is long when dot is set. */
+/* Compares a group's name with name[0..length), or, with dot, the beginning of a group's name with
+ * name[0..length) and a '.' behind it. */
 static int compare(const char *group, const char *name, size_t length, bool dot) {
     int order = strncmp(group, name, length);
     if (order != 0) return order;
@@ -79,4 +82,42 @@ size_t group_index_find(const group_index *index, const char *name, size_t lengt
         return last - first;
     }
     return 0;
+}
+
+/* The name of a group, or of an object of several materials, that is nearest to word; "" where none is near.
+ */
+static void find_nearest(const group_index *index, const char *word, char found[NEAREST_LENGTH_MAX + 1]) {
+    const char *nearest = NULL;
+    found[0] = '\0';
+    for (size_t g = 0; g < index->n_groups; g++) {
+        char object[NEAREST_LENGTH_MAX + 1] = "";
+        const size_t length = strcspn(index->names[g], ".");
+        if (length <= NEAREST_LENGTH_MAX) memcpy(object, index->names[g], length);
+        nearest = nearest_word(word, 3, (const char *const[]){found, index->names[g], object});
+        if (nearest != NULL && nearest != found) strcpy(found, nearest);
+    }
+}
+
+void group_index_miss(const group_index *index, const char *name, size_t length, char text[GROUP_MISS]) {
+    enum { SHOWN = 80 };
+    const char *cut = length > SHOWN ? "..." : "";
+    char word[NEAREST_LENGTH_MAX + 1] = "", nearest[NEAREST_LENGTH_MAX + 1] = "";
+    size_t at = (size_t)snprintf(text, GROUP_MISS, "no group \"%.*s%s\"",
+                                 length > SHOWN ? SHOWN : (int)length, name, cut);
+    if (length <= NEAREST_LENGTH_MAX) {
+        memcpy(word, name, length);
+        find_nearest(index, word, nearest);
+    }
+    if (nearest[0] != '\0') {
+        snprintf(text + at, GROUP_MISS - at, "; did you mean \"%s\"?", nearest);
+        return;
+    }
+    at += (size_t)snprintf(text + at, GROUP_MISS - at, "; there %s:", index->n_groups == 1 ? "is" : "are");
+    for (size_t g = 0; g < index->n_groups; g++) {
+        if (at + strlen(index->names[g]) + sizeof "  ..." > GROUP_MISS) {
+            strcpy(text + at, " ...");
+            return;
+        }
+        at += (size_t)sprintf(text + at, " %s", index->names[g]);
+    }
 }

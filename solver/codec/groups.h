@@ -1,4 +1,4 @@
-/* The groups of a scene by name, and the elements of each. */
+/* The groups of a scene by name, and the elements of each: group names mean the same in both programs. */
 #ifndef LAMBERT_CODEC_GROUPS_H
 #define LAMBERT_CODEC_GROUPS_H
 
@@ -20,8 +20,13 @@ lam_status group_index_make(size_t n, const uint32_t *group, size_t n_groups, ch
 
 void group_index_free(group_index *index);
 
-/* The groups that a request means by a name: the one so called, or else all called `name.something` (an
- * object of several materials). Returns how many; *groups points at their numbers, owned by index. */
+/* The groups that a name means: those of exactly this name, or else all called `name.something` (an object of
+ * several materials). Returns how many; *groups points at their numbers, owned by index. O(log g). */
 size_t group_index_find(const group_index *index, const char *name, size_t length, const uint32_t **groups);
+
+/* For a name that group_index_find does not know, writes `no group "lmap"; did you mean "lamp"?`, or the
+ * first names there are where none is near. O(g). */
+#define GROUP_MISS 256
+void group_index_miss(const group_index *index, const char *name, size_t length, char text[GROUP_MISS]);
 
 #endif

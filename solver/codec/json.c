@@ -1,5 +1,7 @@
-/* codec_read_json: one pass over the request, straight into its vectors. */
+/* codec_read_json and codec_read_emissions: one pass over the text, straight into vectors. */
 #include "solver/codec/json_parser.h"
+
+#include <string.h>
 
 /* ["floor", ...]: the elements of the first in mesh order, then of the next. */
 static bool read_selected_groups(parser *p, index_list *selected) {
@@ -55,6 +57,68 @@ static bool read_select(parser *p) {
     return good;
 }
 
+/* ["desk", ...] */
+static bool read_reduced_groups(parser *p) {
+    const size_t mark = p->pointer_length;
+    reduce_request *reduce = &p->request->reduce;
+    if (!parser_expect(p, JSON_ARRAY, "an array of group names")) return false;
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    for (size_t index = 0; json_next_element(&p->r); index++) {
+        json_slice name;
+        const uint32_t *found = NULL;
+        size_t n_found;
+        problem why = {0};
+        parser_point_index(p, index);
+        if (!parser_read_group(p, &name, &found, &n_found)) return false;
+        if (!reduce_request_add(reduce, name.bytes, name.length, found, n_found, &why))
+            return parser_refuse(p, why.status, "%s: %.200s", parser_here(p), why.detail);
+        p->pointer_length = mark;
+    }
+    if (!parser_closed(p)) return false;
+    return reduce->n_names > 0 ||
+           parser_refuse(p, 422, "%s is empty, must hold the name of a group", parser_here(p));
+}
+
+/* ["mean", ...] */
+static bool read_with(parser *p) {
+    const size_t mark = p->pointer_length;
+    reduce_request *reduce = &p->request->reduce;
+    if (!parser_expect(p, JSON_ARRAY, "an array of names of figures")) return false;
+    if (!json_enter_array(&p->r)) return parser_fault(p);
+    for (size_t index = 0; json_next_element(&p->r); index++) {
+        json_slice word;
+        problem why = {0};
+        parser_point_index(p, index);
+        if (!parser_expect(p, JSON_TEXT, "the name of a figure")) return false;
+        if (!json_read_text(&p->r, &word)) return parser_fault(p);
+        if (!reduce_request_with(reduce, word.bytes, word.length, &why))
+            return parser_refuse(p, why.status, "%s: %.200s", parser_here(p), why.detail);
+        p->pointer_length = mark;
+    }
+    if (!parser_closed(p)) return false;
+    return reduce->n_with > 0 ||
+           parser_refuse(p, 422, "%s is empty, must hold mean, sum, min, max, uniformity or variance",
+                         parser_here(p));
+}
+
+static bool read_reduce(parser *p) {
+    static const char *const names[] = {"groups", "with"};
+    const size_t mark = p->pointer_length;
+    size_t which;
+    unsigned seen = 0;
+    json_slice key;
+    if (!parser_expect(p, JSON_OBJECT, "an object with groups and with")) return false;
+    if (!json_enter_object(&p->r)) return parser_fault(p);
+    while (parser_next_member(p, &key)) {
+        if (!parser_known_member(p, &key, names, 2, &seen, &which)) return false;
+        if (!(which == 0 ? read_reduced_groups(p) : read_with(p))) return false;
+        p->pointer_length = mark;
+    }
+    if (p->why->status != 0) return false;
+    p->request->reduce.on = true;
+    return seen == 3 || parser_refuse(p, 422, "%s must hold both groups and with", parser_here(p));
+}
+
 static bool read_tolerance(parser *p) {
     double *value = &p->request->tolerance;
     if (!parser_expect(p, JSON_NUMBER, "a number above 0 and below 1")) return false;
@@ -63,10 +127,24 @@ static bool read_tolerance(parser *p) {
            parser_refuse(p, 422, "%s = %.9g, must be above 0 and below 1", parser_here(p), *value);
 }
 
+/* The members that hold emissions, in a request and in a file. */
+enum { EMISSION, EMISSIONS, EITHER = 1u << EMISSION | 1u << EMISSIONS };
+
+static bool read_lights(parser *p, size_t which, unsigned seen) {
+    if ((seen & EITHER) == EITHER) {
+        p->pointer_length = 0;
+        return parser_refuse(p, 422, "%s holds both emission and emissions, must hold one of them",
+                             codec_source(p->scene));
+    }
+    if (which == EMISSION) return parser_read_emission(p);
+    p->request->batch = true;
+    return parser_read_emissions(p);
+}
+
 static bool read_body(parser *p) {
     static const char *const names[] = {"emission", "emissions", "select", "quantity", "tolerance", "reduce"};
-    enum { EMISSION, EMISSIONS, SELECT, QUANTITY, TOLERANCE, REDUCE, N_NAMES };
-    unsigned seen = 0, both = 1u << EMISSION | 1u << EMISSIONS;
+    enum { SELECT = EMISSIONS + 1, QUANTITY, TOLERANCE, REDUCE, N_NAMES };
+    unsigned seen = 0;
     size_t which;
     json_slice key;
     if (!parser_expect(p, JSON_OBJECT, "an object")) return false;
@@ -74,19 +152,8 @@ static bool read_body(parser *p) {
     while (parser_next_member(p, &key)) {
         bool good = parser_known_member(p, &key, names, N_NAMES, &seen, &which);
         if (!good) return false;
-        if ((seen & both) == both) {
-            p->pointer_length = 0;
-            return parser_refuse(p, 422, "the body holds both emission and emissions, must hold one of them");
-        }
         if (p->scene->only_linear && (which == SELECT || which == TOLERANCE)) return parser_not_linear(p);
         switch (which) {
-        case EMISSION:
-            good = parser_read_emission(p);
-            break;
-        case EMISSIONS:
-            p->request->batch = true;
-            good = parser_read_emissions(p);
-            break;
         case SELECT:
             good = read_select(p);
             break;
@@ -94,13 +161,13 @@ static bool read_body(parser *p) {
             good = parser_read_quantity(p, &p->request->quantity);
             break;
         case REDUCE:
-            good = parser_read_reduce(p);
+            good = read_reduce(p);
             break;
         case TOLERANCE:
             good = read_tolerance(p);
             break;
         default:
-            good = parser_refuse(p, 501, "%s is not supported yet", parser_here(p));
+            good = read_lights(p, which, seen);
         }
         if (!good) return false;
         p->pointer_length = 0;
@@ -109,7 +176,7 @@ static bool read_body(parser *p) {
     }
     if (p->why->status != 0) return false;
     if (!json_finish(&p->r)) return parser_fault(p);
-    return (seen & both) != 0 || parser_refuse(p, 422, "the body holds neither emission nor emissions");
+    return (seen & EITHER) != 0 || parser_refuse(p, 422, "the body holds neither emission nor emissions");
 }
 
 /* The elements of a reduction that adjoint rows do not answer. */
@@ -129,4 +196,44 @@ bool codec_read_json(const codec_scene *scene, const char *text, size_t length, 
     if (scene->only_linear && !reduce->linear) return parser_not_linear(&p);
     if (reduce->on && !reduce->linear && !select_reduced(scene, request, why)) return false;
     return (reduce->linear && request->n_dense == 0) || radiosity_request_expand(request, scene, why);
+}
+
+/* {"emission": ...} or {"emissions": [...]}. */
+static bool read_file_object(parser *p) {
+    static const char *const names[] = {"emission", "emissions"};
+    unsigned seen = 0;
+    size_t which;
+    json_slice key;
+    if (!json_enter_object(&p->r)) return parser_fault(p);
+    while (parser_next_member(p, &key)) {
+        if (!parser_known_member(p, &key, names, 2, &seen, &which)) return false;
+        if (!read_lights(p, which, seen)) return false;
+        p->pointer_length = 0;
+    }
+    return p->why->status == 0;
+}
+
+/* True when the text is an object that begins with one of the two members. */
+static bool holds_lights(const char *text, size_t length) {
+    json_reader r;
+    json_slice key;
+    json_begin(&r, text, length);
+    const bool found = json_look(&r) == JSON_OBJECT && json_enter_object(&r) && json_next_member(&r, &key) &&
+                       ((key.length == 8 && memcmp(key.bytes, "emission", 8) == 0) ||
+                        (key.length == 9 && memcmp(key.bytes, "emissions", 9) == 0));
+    json_end(&r);
+    return found;
+}
+
+static bool read_file(parser *p, bool object) {
+    if (!(object ? read_file_object(p) : parser_read_emission(p))) return false;
+    return json_finish(&p->r) ? parser_fill_sides(p) : parser_fault(p);
+}
+
+bool codec_read_emissions(const codec_scene *scene, const char *text, size_t length,
+                          radiosity_request *request, problem *why) {
+    parser p;
+    const bool good =
+        parser_begin(&p, scene, text, length, request, why) && read_file(&p, holds_lights(text, length));
+    return parser_end(&p, good) && radiosity_request_expand(request, scene, why);
 }

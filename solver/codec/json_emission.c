@@ -6,8 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* --- numbers ------------------------------------------------------------------------------------------ */
-
 static inline float least_value(const parser *p) {
     return p->request->any_sign ? -FLT_MAX : 0.0f;
 }
@@ -18,7 +16,7 @@ static bool bad_value(parser *p, float value) {
     if (!isfinite(value))
         return parser_refuse(p, 422, "%s = %.*s%s, must be within the range of single precision (3.4e38)",
                              parser_here(p), length, p->r.number.bytes, more);
-    return parser_refuse(p, 422, "%s = %.*s%s, an emission must not be negative", parser_here(p), length,
+    return parser_refuse(p, 422, "%s = %.*s%s, must not be negative", parser_here(p), length,
                          p->r.number.bytes, more);
 }
 
@@ -106,8 +104,6 @@ bool parser_read_elements(parser *p, index_list *elements, bool once) {
     return parser_closed(p);
 }
 
-/* --- emissions ---------------------------------------------------------------------------------------- */
-
 /* [e0, e1, ...] or C rows of it. */
 static bool read_dense(parser *p, float *E) {
     size_t n = p->scene->n, C = p->scene->n_channels, mark = p->pointer_length, rows = 0;
@@ -175,9 +171,8 @@ static bool read_groups(parser *p) {
     while (parser_next_member(p, &key)) {
         const uint32_t *found = NULL;
         parser_point_key(p, key.bytes, key.length);
-        size_t n_found = group_index_find(groups, key.bytes, key.length, &found);
-        if (n_found == 0)
-            return parser_refuse(p, 422, "%s: the scene has no group of this name", parser_here(p));
+        size_t n_found;
+        if (!parser_find_group(p, &key, &found, &n_found)) return false;
         if (!read_colour(p, p->colour)) return false;
         for (size_t k = 0; k < n_found; k++) {
             const index_set_result added = index_set_add(&p->seen, found[k]);

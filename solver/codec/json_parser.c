@@ -39,13 +39,19 @@ bool parser_refuse(parser *p, unsigned status, const char *format, ...) {
 
 const char *parser_here(parser *p) {
     p->pointer[p->pointer_length] = '\0';
-    return p->pointer_length == 0 ? "the body" : p->pointer + 1;
+    return p->pointer_length == 0 ? codec_source(p->scene) : p->pointer + 1;
 }
 
 bool parser_fault(parser *p) {
-    if (p->r.no_memory) return problem_set(p->why, 503, "not enough memory to read the body");
-    return problem_set(p->why, 400, "the body is not JSON: %s, at byte %zu", p->r.fault,
-                       (size_t)(p->r.at - p->r.start));
+    size_t line = 1, column = 1;
+    if (p->r.no_memory)
+        return problem_set(p->why, 503, "not enough memory to read %s", codec_source(p->scene));
+    for (const char *at = p->r.start; at < p->r.at; at++) {
+        column = *at == '\n' ? 1 : column + 1;
+        line += *at == '\n';
+    }
+    return problem_set(p->why, 400, "%s is not JSON: %s, at byte %zu (line %zu, column %zu)",
+                       codec_source(p->scene), p->r.fault, (size_t)(p->r.at - p->r.start), line, column);
 }
 
 bool parser_not_linear(parser *p) {
@@ -110,24 +116,23 @@ bool parser_append(parser *p, index_list *list, const uint32_t *indices, size_t 
 bool parser_read_group(parser *p, json_slice *name, const uint32_t **groups, size_t *n_groups) {
     if (!parser_expect(p, JSON_TEXT, "a group name")) return false;
     if (!json_read_text(&p->r, name)) return parser_fault(p);
+    return parser_find_group(p, name, groups, n_groups);
+}
+
+bool parser_find_group(parser *p, const json_slice *name, const uint32_t **groups, size_t *n_groups) {
+    char miss[GROUP_MISS];
     *n_groups = group_index_find(p->scene->groups, name->bytes, name->length, groups);
-    return *n_groups > 0 ||
-           parser_refuse(p, 422, "%s = \"%.*s\", the scene has no group of this name", parser_here(p),
-                         name->length > 80 ? 80 : (int)name->length, name->bytes);
+    if (*n_groups > 0) return true;
+    group_index_miss(p->scene->groups, name->bytes, name->length, miss);
+    return parser_refuse(p, 422, "%s: the scene has %s", parser_here(p), miss);
 }
 
 bool parser_read_quantity(parser *p, lam_quantity *quantity) {
     json_slice text;
     if (!parser_expect(p, JSON_TEXT, "\"radiosity\", \"irradiance\" or \"indirect\"")) return false;
     if (!json_read_text(&p->r, &text)) return parser_fault(p);
-    for (int q = LAM_RADIOSITY; q <= LAM_INDIRECT; q++) {
-        const char *name = codec_quantity_name((lam_quantity)q);
-        if (strlen(name) == text.length && memcmp(name, text.bytes, text.length) == 0) {
-            *quantity = (lam_quantity)q;
-            return true;
-        }
-    }
-    return parser_refuse(p, 422, "%s = \"%.*s\", must be radiosity, irradiance or indirect", parser_here(p),
+    return codec_quantity_find(text.bytes, text.length, quantity) ||
+           parser_refuse(p, 422, "%s = \"%.*s\", must be radiosity, irradiance or indirect", parser_here(p),
                          text.length > 80 ? 80 : (int)text.length, text.bytes);
 }
 
@@ -137,7 +142,7 @@ bool parser_begin(parser *p, const codec_scene *scene, const char *text, size_t 
     *why = (problem){0};
     json_begin(&p->r, text, length);
     p->colour = memory_allocate(scene->n_channels, sizeof *p->colour, "colour", NULL);
-    return p->colour != NULL || problem_set(why, 503, "not enough memory to read the body");
+    return p->colour != NULL || problem_set(why, 503, "not enough memory to read %s", codec_source(scene));
 }
 
 bool parser_fill_sides(parser *p) {

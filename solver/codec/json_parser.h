@@ -68,7 +68,9 @@ bool parser_known_member(parser *p, const json_slice *key, const char *const *na
 /* Appends; values is not NULL then, also for none. 503 when memory is short. */
 bool parser_append(parser *p, index_list *list, const uint32_t *indices, size_t count);
 
-/* What of a scene's groups the text that comes next means; name is valid until the next text is read. */
+/* The groups that a name means, and those of the text that comes next; name is valid until the next text is
+ * read. */
+bool parser_find_group(parser *p, const json_slice *name, const uint32_t **groups, size_t *n_groups);
 bool parser_read_group(parser *p, json_slice *name, const uint32_t **groups, size_t *n_groups);
 
 /* [...] of element indices, each below n, at most n of them; those of an emission only once each. */
@@ -80,8 +82,5 @@ bool parser_read_quantity(parser *p, lam_quantity *quantity);
 /* The value of `emission`, and of `emissions`; of `cotangent`, which has neither sky nor emitters. */
 bool parser_read_emission(parser *p);
 bool parser_read_emissions(parser *p);
-
-/* The value of `reduce`. */
-bool parser_read_reduce(parser *p);
 
 #endif

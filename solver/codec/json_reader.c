@@ -111,8 +111,6 @@ bool json_next_member(json_reader *r, json_slice *key) {
     return true;
 }
 
-/* --- texts ------------------------------------------------------------------------------------------ */
-
 size_t utf8_sequence(const char *at, const char *end) {
     const unsigned char *b = (const unsigned char *)at;
     size_t left = (size_t)(end - at);
@@ -242,8 +240,6 @@ bool json_read_text(json_reader *r, json_slice *text) {
     r->at = close + 1;
     return true;
 }
-
-/* --- the rest --------------------------------------------------------------------------------------- */
 
 static bool read_word(json_reader *r, const char *word) {
     size_t length = strlen(word);

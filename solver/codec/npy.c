@@ -1,4 +1,4 @@
-/* codec_read_npy: a NumPy array (NPY format 1.0 to 3.0) as emission. */
+/* NPY arrays (format 1.0 to 3.0): codec_read_npy reads one as emission, npy_write_* write one. */
 #include "solver/codec/npy.h"
 
 #include "solver/base/half.h"
@@ -10,6 +10,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "values are copied as they are in memory");
 
 #define MAX_RANK 3
 
@@ -107,30 +109,31 @@ static bool take_dictionary(literal *l, npy_header *h) {
     return seen == 7 && l->at == l->end;
 }
 
-static bool read_header(const char *bytes, size_t length, npy_header *h, problem *why) {
+static bool read_header(const char *source, const char *bytes, size_t length, npy_header *h, problem *why) {
     const unsigned char *b = (const unsigned char *)bytes;
     *h = (npy_header){0};
     if (length < 10 || memcmp(bytes, "\x93NUMPY", 6) != 0)
-        return problem_set(why, 400, "the body is not NPY: it does not begin with its magic number");
+        return problem_set(why, 400, "%s is not NPY: it does not begin with its magic number", source);
     if (b[6] < 1 || b[6] > 3 || b[7] != 0)
-        return problem_set(why, 400, "the body is NPY version %u.%u, must be 1.0, 2.0 or 3.0", b[6], b[7]);
+        return problem_set(why, 400, "%s is NPY version %u.%u, must be 1.0, 2.0 or 3.0", source, b[6], b[7]);
     size_t size = (size_t)b[8] | (size_t)b[9] << 8, start = 10;
     if (b[6] > 1) {
-        if (length < 12) return problem_set(why, 400, "the body is not NPY: it ends in its header");
+        if (length < 12) return problem_set(why, 400, "%s is not NPY: it ends in its header", source);
         size |= (size_t)b[10] << 16 | (size_t)b[11] << 24;
         start = 12;
     }
-    if (size > length - start) return problem_set(why, 400, "the body is not NPY: it ends in its header");
+    if (size > length - start) return problem_set(why, 400, "%s is not NPY: it ends in its header", source);
     literal l = {bytes + start, bytes + start + size};
     if (!take_dictionary(&l, h))
         return problem_set(why, 400,
-                           "the body is not NPY: its header is not {'descr': '<f4', 'fortran_order': False, "
-                           "'shape': (...)}");
+                           "%s is not NPY: its header is not {'descr': '<f4', 'fortran_order': False, "
+                           "'shape': (...)}",
+                           source);
     h->data = start + size;
     return true;
 }
 
-/* How the array's axes are understood. */
+/* The meaning of the array's axes. */
 typedef struct layout {
     size_t n_rhs;
     size_t rows; /* in one vector: C, or 1 for all channels alike */
@@ -150,16 +153,19 @@ static bool read_layout(const npy_header *h, const codec_scene *scene, layout *f
         *found = (layout){shape[0], C, true};
     } else {
         char given[96] = "";
+        const char *item = scene->item != NULL ? scene->item : "element";
         for (size_t i = 0, at = 0; i < h->rank && i < MAX_RANK; i++)
             at += (size_t)snprintf(given + at, sizeof given - at, "%s%zu", i > 0 ? ", " : "", shape[i]);
         if (h->rank > MAX_RANK)
             return problem_set(why, 422, "the array's shape has more than %d axes", MAX_RANK);
         if (C == 1)
-            return problem_set(why, 422, "the array's shape is (%s), must be (%zu) or (vectors, %zu)", given,
-                               n, n);
+            return problem_set(
+                why, 422, "the array's shape is (%s), must be (%zu) or (vectors, %zu), one value for each %s",
+                given, n, n, item);
         return problem_set(why, 422,
-                           "the array's shape is (%s), must be (%zu), (%zu, %zu) or (vectors, %zu, %zu)",
-                           given, n, C, n, C, n);
+                           "the array's shape is (%s), must be (%zu), (%zu, %zu) or (vectors, %zu, %zu), one "
+                           "value for each channel and %s",
+                           given, n, C, n, C, n, item);
     }
     if (found->n_rhs == 0) return problem_set(why, 422, "the batch is empty, must hold a vector");
     if (found->n_rhs > scene->max_batch)
@@ -172,8 +178,7 @@ static bool read_layout(const npy_header *h, const codec_scene *scene, layout *f
 static bool bad_value(size_t index, double value, bool any_sign, problem *why) {
     if (isnan(value)) return problem_set(why, 422, "the array's value %zu is NaN, must be a number", index);
     if (value < 0.0 && !any_sign)
-        return problem_set(why, 422, "the array's value %zu is %.9g, an emission must not be negative", index,
-                           value);
+        return problem_set(why, 422, "the array's value %zu is %.9g, must not be negative", index, value);
     return problem_set(why, 422, "the array's value %zu is %.9g, must be within single precision (3.4e38)",
                        index, value);
 }
@@ -206,7 +211,7 @@ bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, 
     npy_header h;
     layout found = {0};
     *why = (problem){0};
-    if (!read_header(bytes, length, &h, why)) return false;
+    if (!read_header(codec_source(scene), bytes, length, &h, why)) return false;
     bool wide = strcmp(h.descr, "<f8") == 0;
     if (!wide && strcmp(h.descr, "<f4") != 0)
         return problem_set(why, 422, "the array's type is %s, must be <f4 or <f8", h.descr);
@@ -221,19 +226,17 @@ bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, 
         return problem_set(why, 422, "the array holds %zu bytes of values, its shape and type need %zu",
                            length - h.data, size);
     request->batch = found.batch;
+    request->n_rhs = found.n_rhs;
+    float *last;
+    if (!radiosity_request_dense(request, scene, &last, why)) return false;
+    const size_t count = found.rows * row;
     for (size_t r = 0; r < found.n_rhs; r++) {
-        float *E;
-        size_t count = found.rows * row;
-        if (!radiosity_request_add(request, scene, why) ||
-            !radiosity_request_dense(request, scene, &E, why) ||
-            !read_values(bytes + h.data, wide, r * count, count, request->any_sign, E, why))
-            return false;
+        float *E = request->E + r * scene->n_channels * row;
+        if (!read_values(bytes + h.data, wide, r * count, count, request->any_sign, E, why)) return false;
         for (size_t c = found.rows; c < scene->n_channels; c++) memcpy(E + c * row, E, row * sizeof *E);
     }
     return true;
 }
-
-/* --- answers ------------------------------------------------------------------------------------------ */
 
 bool npy_write_header(buffer *b, npy_type type, size_t rank, const size_t *shape) {
     static const char *const names[] = {[NPY_F2] = "<f2", [NPY_F4] = "<f4", [NPY_F8] = "<f8"};

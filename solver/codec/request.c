@@ -3,6 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+const char *codec_source(const codec_scene *scene) {
+    return scene->source != NULL ? scene->source : "the body";
+}
+
 void radiosity_request_free(radiosity_request *request) {
     free(request->E);
     free(request->spots);
@@ -23,21 +27,17 @@ bool radiosity_request_add(radiosity_request *request, const codec_scene *scene,
     return true;
 }
 
-/* Room for `wanted` rows of `bytes` each within max_bytes, those beyond *n zeroed; doubles, so that a batch
- * is copied a few times only. */
-static bool grow(float **values, size_t *n, size_t *capacity, size_t wanted, size_t bytes, size_t max_bytes,
-                 const char *what, problem *why) {
-    size_t size;
+/* Makes room for `wanted` rows of `bytes` each within max_bytes, and zeroes those beyond *n. */
+static bool grow_rows(float **values, size_t *n, size_t *capacity, size_t wanted, size_t bytes,
+                      size_t max_bytes, const char *what, problem *why) {
     if (wanted > *capacity) {
-        size_t more = 2 * *capacity > wanted ? 2 * *capacity : wanted;
-        if (!size_multiply(bytes, more, &size) || size > max_bytes) {
-            more = max_bytes / bytes;
-            size = more * bytes;
-        }
-        float *grown = realloc(*values, size);
-        if (grown == NULL) return problem_set(why, 503, "not enough memory for %zu bytes of %s", size, what);
+        const size_t most = max_bytes / bytes, more = 2 * *capacity > wanted ? 2 * *capacity : wanted;
+        const size_t rows = more < most ? more : most;
+        float *grown = realloc(*values, rows * bytes);
+        if (grown == NULL)
+            return problem_set(why, 503, "not enough memory for %zu vectors of %s", rows, what);
         *values = grown;
-        *capacity = more;
+        *capacity = rows;
     }
     memset((char *)*values + *n * bytes, 0, (wanted - *n) * bytes);
     *n = wanted;
@@ -56,8 +56,8 @@ static bool grow_dense(radiosity_request *request, const codec_scene *scene, pro
             "hold; send several requests",
             request->n_rhs, scene->n_channels, scene->n, scene->max_bytes);
     if (request->n_dense == request->n_rhs) return true;
-    return grow(&request->E, &request->n_dense, &request->dense_capacity, request->n_rhs, bytes,
-                scene->max_bytes, "emission", why);
+    return grow_rows(&request->E, &request->n_dense, &request->dense_capacity, request->n_rhs, bytes,
+                     scene->max_bytes, "emission", why);
 }
 
 bool radiosity_request_dense(radiosity_request *request, const codec_scene *scene, float **E, problem *why) {
@@ -70,7 +70,8 @@ bool radiosity_request_spot(radiosity_request *request, const codec_scene *scene
                             bool whole_group, const float *colour, problem *why) {
     const size_t C = scene->n_channels, each = sizeof *request->spots + C * sizeof *colour;
     if (request->n_spots == request->spots_capacity) {
-        size_t most = scene->max_bytes / each, more = request->n_spots == 0 ? 16 : 2 * request->n_spots;
+        const size_t most = scene->max_bytes / each;
+        size_t more = request->n_spots == 0 ? 16 : 2 * request->n_spots;
         if (more > most) more = most;
         if (more <= request->n_spots)
             return problem_set(why, 422,
@@ -123,7 +124,8 @@ static bool add_side(const radiosity_request *request, const codec_scene *scene,
             "%zu times %zu channels of %zu %s pass the %zu bytes that a request may hold; send "
             "several requests",
             request->n_rhs, scene->n_channels, width, what, scene->max_bytes);
-    if (!grow(&side->values, &side->n, &side->capacity, request->n_rhs, bytes, scene->max_bytes, what, why))
+    if (!grow_rows(&side->values, &side->n, &side->capacity, request->n_rhs, bytes, scene->max_bytes, what,
+                   why))
         return false;
     *row = side->values + (request->n_rhs - 1) * values;
     return true;
@@ -138,14 +140,18 @@ bool radiosity_request_emitters(radiosity_request *request, const codec_scene *s
     return add_side(request, scene, &request->emitters, scene->n_emitters, "emitters", row, why);
 }
 
+static const char *const quantities[] = {
+    [LAM_RADIOSITY] = "radiosity", [LAM_IRRADIANCE] = "irradiance", [LAM_INDIRECT] = "indirect"};
+
 const char *codec_quantity_name(lam_quantity quantity) {
-    switch (quantity) {
-    case LAM_RADIOSITY:
-        return "radiosity";
-    case LAM_IRRADIANCE:
-        return "irradiance";
-    case LAM_INDIRECT:
-        return "indirect";
-    }
-    return "";
+    return quantities[quantity];
+}
+
+bool codec_quantity_find(const char *word, size_t length, lam_quantity *quantity) {
+    for (size_t q = 0; q < sizeof quantities / sizeof *quantities; q++)
+        if (strlen(quantities[q]) == length && memcmp(quantities[q], word, length) == 0) {
+            *quantity = (lam_quantity)q;
+            return true;
+        }
+    return false;
 }

@@ -1,5 +1,5 @@
-/* Request bytes to emission vectors: what is asked of a scene. No I/O, so that it can be fuzzed.
- * Knows nothing of HTTP but the status that a refusal has. */
+/* The bytes of a request, or of a file of emissions, to emission vectors and options. No I/O, so that it can
+ * be fuzzed. Knows nothing of HTTP but the status of a refusal. */
 #ifndef LAMBERT_CODEC_REQUEST_H
 #define LAMBERT_CODEC_REQUEST_H
 
@@ -8,28 +8,35 @@
 #include "solver/codec/groups.h"
 #include "solver/codec/problem.h"
 
-/* What a request is read against. */
+/* The scene that a request is about, and the limits of one request. */
 typedef struct codec_scene {
     size_t n;
     size_t n_channels;
     const group_index *groups;
-    size_t n_tiles;    /* of the sky; 0: none */
-    size_t n_emitters; /* 0: none */
-    size_t max_batch;  /* vectors in a request */
-    size_t max_bytes;  /* of emission vectors in a request */
-    bool only_linear;  /* whatever is no linear reduction of sparse vectors is refused (503) before it costs
-                          more than its text */
-    size_t max_rows;   /* adjoint rows that the scene keeps: so many groups can be reduced by them */
+    size_t n_tiles;     /* of the sky; 0: none */
+    size_t n_emitters;  /* 0: none */
+    size_t max_batch;   /* vectors in a request, at most CODEC_BATCH_MOST */
+    size_t max_bytes;   /* of emission vectors in a request */
+    bool only_linear;   /* anything but a linear reduction of sparse vectors is refused (503) before it costs
+                           more than its text */
+    size_t max_rows;    /* adjoint rows that the scene keeps: at most so many groups are reduced by them */
+    const char *source; /* the word for the bytes in messages; NULL: "the body" */
+    const char *item;   /* the word for one of the n values of an NPY row; NULL: "element" */
 } codec_scene;
 
-/* Something that emits in a sparse vector: an element, or every element of a group. */
+#define CODEC_BATCH_MOST ((size_t)UINT32_MAX)
+
+/* The word for the bytes in messages. */
+const char *codec_source(const codec_scene *scene);
+
+/* An entry of a sparse vector: an element, or every element of a group. */
 typedef struct emission_spot {
     uint32_t vector;
     uint32_t where; /* an element, or a group of the scene */
     bool whole_group;
 } emission_spot;
 
-/* What stands beside the emissions of some vectors: [n][C][width], for the first n of them. */
+/* Radiances or weights beside the emissions: [n][C][width], for the first n vectors. */
 typedef struct side_rows {
     float *values; /* NULL: no vector has any */
     size_t n, capacity;
@@ -60,7 +67,7 @@ typedef struct radiosity_request {
 
 void radiosity_request_free(radiosity_request *request);
 
-/* Both return false with *why filled; request must be freed either way.
+/* All three return false with *why filled; request must be freed either way.
  * text[length] must be NUL. 400: not JSON, or not NPY; 422: what the contract lists; 501: not supported yet.
  * E then holds every vector, but for a linear reduction of sparse vectors, which stay spots, so that reading
  * it costs no more than the text is long. With any other reduction, select names the elements of its groups.
@@ -68,12 +75,17 @@ void radiosity_request_free(radiosity_request *request);
 bool codec_read_json(const codec_scene *scene, const char *text, size_t length, radiosity_request *request,
                      problem *why);
 
+/* A JSON file of emissions: an EMISSION of the contract, or an object with one as `emission`, or with a batch
+ * of them as `emissions`. E then holds every vector. */
+bool codec_read_emissions(const codec_scene *scene, const char *text, size_t length,
+                          radiosity_request *request, problem *why);
+
 /* NPY format 1.0 to 3.0, little-endian <f4 or <f8, C order. For one channel [n], or a batch [m][n] or
  * [m][1][n]; for more channels [n] (all alike), [C][n], or a batch [m][C][n]. */
 bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, radiosity_request *request,
                     problem *why);
 
-/* One more vector, dark. */
+/* Adds a vector without any emission. */
 bool radiosity_request_add(radiosity_request *request, const codec_scene *scene, problem *why);
 
 /* Room in E for the last vector, zeroed: *E is its [C][n]; so is that of those before it that have none. */
@@ -92,7 +104,8 @@ bool radiosity_request_sky(radiosity_request *request, const codec_scene *scene,
 bool radiosity_request_emitters(radiosity_request *request, const codec_scene *scene, float **row,
                                 problem *why);
 
-/* The contract's word for a quantity. */
+/* The contract's word for a quantity, and the quantity of a word: false for any other word. */
 const char *codec_quantity_name(lam_quantity quantity);
+bool codec_quantity_find(const char *word, size_t length, lam_quantity *quantity);
 
 #endif

@@ -5,9 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The command line has three; a store may hold more bands. */
-enum { EMISSION_MAX_CHANNELS = 16 };
-
 void emission_free(emission *e) {
     free(e->E);
     free(e->L);
@@ -15,130 +12,148 @@ void emission_free(emission *e) {
     *e = (emission){0};
 }
 
-static bool is_material_of(const char *group, const char *object) {
-    size_t length = strlen(object);
-    return strncmp(group, object, length) == 0 && group[length] == '.';
+lam_status emission_allocate(const char *path, size_t n_channels, size_t width, size_t n_vectors,
+                             float **values, lam_error *error) {
+    size_t count = 0;
+    if (!size_multiply(width, n_channels, &count) || !size_multiply(count, n_vectors, &count))
+        return status_fail(error, LAM_ERR_MEMORY, "%s: too many emissions for memory", path);
+    *values = memory_allocate(count, sizeof **values, path, error);
+    return *values == NULL ? LAM_ERR_MEMORY : LAM_OK;
 }
 
-size_t emission_match_groups(const mesh *m, const char *name, void (*visit)(void *context, size_t group),
-                             void *context) {
-    size_t found = 0;
-    for (size_t g = 0; g < m->n_groups; g++)
-        if (strcmp(m->group_names[g], name) == 0) {
-            visit(context, g);
-            found++;
-        }
-    if (found > 0) return found;
-    for (size_t g = 0; g < m->n_groups; g++)
-        if (is_material_of(m->group_names[g], name)) {
-            visit(context, g);
-            found++;
-        }
-    return found;
+/* A copy of the mesh's names in one block, as a group_index owns them. */
+static char **copy_names(const mesh *m, lam_error *error) {
+    size_t bytes = m->n_groups * sizeof(char *);
+    for (size_t g = 0; g < m->n_groups; g++) bytes += strlen(m->group_names[g]) + 1;
+    char **names = memory_allocate(bytes, 1, "group names", error);
+    if (names == NULL) return NULL;
+    char *to = (char *)(names + m->n_groups);
+    for (size_t g = 0; g < m->n_groups; g++) {
+        names[g] = to;
+        to = stpcpy(to, m->group_names[g]) + 1;
+    }
+    return names;
 }
 
-typedef struct filling {
-    const mesh *m;
-    const double *values; /* [C] */
-    float *E;             /* [C][n] */
-} filling;
-
-static void fill_group(void *context, size_t group) {
-    const filling *f = context;
-    for (size_t c = 0; c < f->m->n_channels; c++)
-        for (size_t i = 0; i < f->m->n; i++)
-            if (f->m->group[i] == group) f->E[c * f->m->n + i] = (float)f->values[c];
+lam_status emission_scene_create(const mesh *m, emission_scene *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    emission_scene made = {.m = m};
+    char **names = copy_names(m, error);
+    if (names == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(group_index_make(m->n, m->group, m->n_groups, names, &made.groups, error));
+    *out = made;
+done:
+    return status;
 }
 
-/* What an item says: the group's name (the caller frees it) and its values. */
-static lam_status item_parse(const char *item, char **name, double values[EMISSION_MAX_CHANNELS],
-                             size_t *found, lam_error *error) {
+void emission_scene_free(emission_scene *scene) {
+    group_index_free(&scene->groups);
+    *scene = (emission_scene){0};
+}
+
+void emission_scene_sources(emission_scene *scene, const lam_operator *op, const lam_sky *sky) {
+    scene->n_tiles = sky != NULL ? lam_sky_tiles(sky) : 0;
+    scene->n_emitters = lam_operator_emitters(op);
+}
+
+lam_status emission_fill_group(const emission_scene *scene, const char *what, const char *name,
+                               const double *values, float *E, lam_error *error) {
+    const group_index *groups = &scene->groups;
+    const size_t n = scene->m->n, length = strlen(name);
+    const uint32_t *found = NULL;
+    const size_t n_found = group_index_find(groups, name, length, &found);
+    char miss[GROUP_MISS];
+    if (n_found == 0) {
+        group_index_miss(groups, name, length, miss);
+        return status_fail(error, LAM_ERR_ARGUMENT, "%.200s: the scene has %s", what, miss);
+    }
+    for (size_t k = 0; k < n_found; k++)
+        for (uint32_t i = groups->start[found[k]]; i < groups->start[found[k] + 1]; i++)
+            for (size_t c = 0; c < scene->m->n_channels; c++)
+                E[c * n + groups->elements[i]] = values != NULL ? (float)values[c] : 1;
+    return LAM_OK;
+}
+
+/* The group's name and the values of an item; both are freed with free(). */
+static lam_status item_parse(const char *item, char **name, double **values, size_t *found,
+                             lam_error *error) {
     lam_status status = LAM_OK;
     char what[128];
     char *before = NULL;
+    double *numbers = NULL;
+    size_t most = 2;
     const char *equals = strrchr(item, '=');
     if (equals == NULL || equals == item)
         FAIL(error, LAM_ERR_ARGUMENT, "--emit %s: must be GROUP=V or GROUP=V,V,V", item);
+    for (const char *at = equals; *at != '\0'; at++) most += *at == ',';
     before = strndup(item, (size_t)(equals - item));
     if (before == NULL) FAIL(error, LAM_ERR_MEMORY, "--emit %s: not enough memory", item);
+    numbers = memory_allocate(most, sizeof *numbers, "--emit", error);
+    if (numbers == NULL) TRY(LAM_ERR_MEMORY);
     snprintf(what, sizeof what, "--emit %s:", before);
-    TRY(option_numbers(what, equals + 1, EMISSION_MAX_CHANNELS, false, values, found, error));
+    TRY(option_numbers(what, equals + 1, most, false, numbers, found, error));
     for (size_t c = 0; c < *found; c++)
-        if (values[c] < 0 || values[c] > (double)FLT_MAX)
+        if (numbers[c] < 0 || numbers[c] > (double)FLT_MAX)
             FAIL(error, LAM_ERR_ARGUMENT, "--emit %s: must be from 0 to %g", item, (double)FLT_MAX);
     *name = before;
+    *values = numbers;
     before = NULL;
+    numbers = NULL;
 done:
     free(before);
+    free(numbers);
     return status;
 }
 
 lam_status emission_check_items(const option_list *items, lam_error *error) {
     lam_status status = LAM_OK;
-    double values[EMISSION_MAX_CHANNELS];
-    size_t found = 0;
     for (size_t i = 0; i < items->count; i++) {
         char *name = NULL;
-        TRY(item_parse(items->items[i], &name, values, &found, error));
+        double *values = NULL;
+        size_t found = 0;
+        TRY(item_parse(items->items[i], &name, &values, &found, error));
         free(name);
+        free(values);
     }
 done:
     return status;
 }
 
-/* The first group names, for a message. */
-static void list_groups(const mesh *m, char *known, size_t size) {
-    size_t length = 0;
-    known[0] = '\0';
-    for (size_t g = 0; g < m->n_groups; g++) {
-        const size_t more = strlen(m->group_names[g]) + 1;
-        if (length + more + sizeof " ..." > size) {
-            strcpy(known + length, " ...");
-            return;
-        }
-        known[length] = ' ';
-        strcpy(known + length + 1, m->group_names[g]);
-        length += more;
-    }
-}
-
-static lam_status fill_item(const mesh *m, const char *item, float *E, lam_error *error) {
+static lam_status fill_item(const emission_scene *scene, const char *item, float *E, lam_error *error) {
     lam_status status = LAM_OK;
-    double values[EMISSION_MAX_CHANNELS];
+    const size_t C = scene->m->n_channels;
+    double *values = NULL;
     size_t found = 0;
-    char known[200];
-    char *name = NULL;
-    TRY(item_parse(item, &name, values, &found, error));
-    if (found != 1 && found != m->n_channels)
+    char what[240], *name = NULL;
+    TRY(item_parse(item, &name, &values, &found, error));
+    if (found != 1 && found != C)
         FAIL(error, LAM_ERR_ARGUMENT, "--emit %s: %zu values, must be 1 or one for each of %zu channels",
-             item, found, m->n_channels);
-    for (size_t c = found; c < m->n_channels; c++) values[c] = values[0];
-    filling f = {m, values, E};
-    if (emission_match_groups(m, name, fill_group, &f) == 0) {
-        list_groups(m, known, sizeof known);
-        FAIL(error, LAM_ERR_ARGUMENT, "--emit %s: no group of this name; there are:%s", item, known);
+             item, found, C);
+    if (found < C) {
+        const double all = values[0];
+        free(values);
+        values = memory_allocate(C, sizeof *values, "--emit", error);
+        if (values == NULL) TRY(LAM_ERR_MEMORY);
+        for (size_t c = 0; c < C; c++) values[c] = all;
     }
+    snprintf(what, sizeof what, "--emit %s", item);
+    TRY(emission_fill_group(scene, what, name, values, E, error));
 done:
     free(name);
+    free(values);
     return status;
 }
 
 static lam_status one_vector(const mesh *m, float **E, lam_error *error) {
-    size_t count = 0;
-    if (!size_multiply(m->n, m->n_channels, &count))
-        return status_fail(error, LAM_ERR_MEMORY, "emission: too large");
-    *E = memory_allocate(count, sizeof **E, "emission", error);
-    return *E == NULL ? LAM_ERR_MEMORY : LAM_OK;
+    return emission_allocate("emission", m->n_channels, m->n, 1, E, error);
 }
 
-lam_status emission_from_groups(const mesh *m, const option_list *items, emission *out, lam_error *error) {
+lam_status emission_from_groups(const emission_scene *scene, const option_list *items, emission *out,
+                                lam_error *error) {
     lam_status status = LAM_OK;
     float *E = NULL;
-    if (m->n_channels > EMISSION_MAX_CHANNELS)
-        FAIL(error, LAM_ERR_UNSUPPORTED, "--emit: %zu channels, at most %d are supported", m->n_channels,
-             EMISSION_MAX_CHANNELS);
-    TRY(one_vector(m, &E, error));
-    for (size_t i = 0; i < items->count; i++) TRY(fill_item(m, items->items[i], E, error));
+    TRY(one_vector(scene->m, &E, error));
+    for (size_t i = 0; i < items->count; i++) TRY(fill_item(scene, items->items[i], E, error));
     *out = (emission){.n_vectors = 1, .E = E};
     E = NULL;
 done:
@@ -156,25 +171,20 @@ done:
     return status;
 }
 
-emission_sources emission_sources_of(const lam_operator *op, const lam_sky *sky) {
-    return (emission_sources){.n_tiles = sky != NULL ? lam_sky_tiles(sky) : 0,
-                              .n_emitters = lam_operator_emitters(op)};
-}
-
-lam_status emission_choose(const mesh *m, emission_sources there, const emission_wish *wish, emission *out,
+lam_status emission_choose(const emission_scene *scene, const emission_options *options, emission *out,
                            bool *own, lam_error *error) {
     lam_status status = LAM_OK;
     emission e = {.n_vectors = 1};
-    *own = wish->items->count == 0 && wish->path == NULL && wish->sky == NULL && !wish->other;
+    *own = options->items->count == 0 && options->path == NULL && options->sky == NULL && !options->other;
     if (*own)
-        TRY(emission_of_scene(m, &e, error));
-    else if (wish->items->count > 0)
-        TRY(emission_from_groups(m, wish->items, &e, error));
-    else if (wish->path != NULL)
-        TRY(emission_read(wish->path, m, there, &e, error));
+        TRY(emission_of_scene(scene->m, &e, error));
+    else if (options->items->count > 0)
+        TRY(emission_from_groups(scene, options->items, &e, error));
+    else if (options->path != NULL)
+        TRY(emission_read(options->path, scene, &e, error));
     else
-        TRY(one_vector(m, &e.E, error));
-    if (wish->sky != NULL) TRY(emission_add_sky(&e, wish->sky, m, there.n_tiles, error));
+        TRY(one_vector(scene->m, &e.E, error));
+    if (options->sky != NULL) TRY(emission_add_sky(&e, options->sky, scene, error));
     *out = e;
     e = (emission){0};
 done:

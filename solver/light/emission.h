@@ -1,9 +1,11 @@
-/* Emissions from a command line or a file: --emit GROUP=V[,V,V] and --emission FILE.npy|.json. */
+/* Emissions of a command line or of files: --emit GROUP=V[,V,V], --emission FILE.npy|.json and --sky
+ * FILE.npy. The room codec knows the formats; this one knows files, options and batches. */
 #ifndef LAMBERT_LIGHT_EMISSION_H
 #define LAMBERT_LIGHT_EMISSION_H
 
 #include "lambert/lambert.h"
 #include "solver/base/options.h"
+#include "solver/codec/groups.h"
 #include "solver/scene/mesh.h"
 
 /* A batch of emissions: E is [n_vectors][C][n] in mesh order, W/m^2, never negative. */
@@ -19,64 +21,66 @@ typedef struct emission {
 
 void emission_free(emission *e);
 
-/* One vector by group names: each item is GROUP=V or GROUP=V,V,V, V one per channel; the others are 0. A name
- * matches its group, else (an object of several materials) every group `name.material`; a later item replaces
- * an earlier one. Errors: LAM_ERR_ARGUMENT names the item. */
-lam_status emission_from_groups(const mesh *m, const option_list *items, emission *out, lam_error *error);
+/* The scene that emissions are for. Freed by emission_scene_free. */
+typedef struct emission_scene {
+    const mesh *m; /* borrowed */
+    group_index groups;
+    size_t n_tiles, n_emitters; /* of the store's sky and operator; 0: none */
+} emission_scene;
 
-/* Whether every item is well formed, whatever the store: otherwise it is wrong usage. */
-lam_status emission_check_items(const option_list *items, lam_error *error);
+/* Without sky and emitters; the caller sets them, or emission_scene_sources does. O(n + g log g). Errors:
+ * LAM_ERR_MEMORY, LAM_ERR_FORMAT. */
+lam_status emission_scene_create(const mesh *m, emission_scene *out, lam_error *error);
+void emission_scene_free(emission_scene *scene);
 
-/* What a store offers beside its elements: tiles of a sky, emitters; 0: none. */
-typedef struct emission_sources {
-    size_t n_tiles, n_emitters;
-} emission_sources;
+/* Takes the tiles and emitters of a store's operator and sky, which may be NULL. */
+void emission_scene_sources(emission_scene *scene, const lam_operator *op, const lam_sky *sky);
 
-/* A file. NPY: <f4 or <f8 of shape [n], [C][n] or a batch of them ([b][C][n]; also [b][n] with one channel).
- * JSON: such an array, the contract's EMISSION, or an object with `emission` or `emissions`.
- * Errors name the file, the place, the value and the limit. */
-lam_status emission_read(const char *path, const mesh *m, emission_sources there, emission *out,
-                         lam_error *error);
-lam_status emission_read_npy(const char *path, const mesh *m, emission *out, lam_error *error);
+/* Every element of the groups that name means emits values [C], or 1 in every channel where values is NULL;
+ * E is [C][n]. LAM_ERR_ARGUMENT for an unknown name: the message begins with what and suggests a name. */
+lam_status emission_fill_group(const emission_scene *scene, const char *what, const char *name,
+                               const double *values, float *E, lam_error *error);
 
-/* Puts e under the sky of an NPY file: [m], [C][m] or a batch of them; one sky goes with every emission, one
- * emission with every sky (steady), else there must be as many. */
-lam_status emission_add_sky(emission *e, const char *path, const mesh *m, size_t n_tiles, lam_error *error);
-
-/* The same for a batch of skies L [n_skies][n_tiles], which is copied, the same in every channel; what is the
- * word for it in messages. */
-lam_status emission_add_skies(emission *e, const char *what, const mesh *m, size_t n_tiles, size_t n_skies,
-                              const float *L, lam_error *error);
-
-/* A value of a file that must be light: finite, not negative. */
-lam_status emission_check_value(const char *path, size_t vector, size_t index, double value, float *out,
+/* One vector by group names: each item is GROUP=V or GROUP=V,V,V, one V per channel; the other groups are
+ * dark. A later item replaces an earlier one. Errors: LAM_ERR_ARGUMENT names the item. */
+lam_status emission_from_groups(const emission_scene *scene, const option_list *items, emission *out,
                                 lam_error *error);
 
-/* *values is [n_vectors][C][width], zero; freed with free(). */
+/* Checks the form of every item, which needs no store: an error is wrong usage. */
+lam_status emission_check_items(const option_list *items, lam_error *error);
+
+/* Reads a file. NPY: <f4 or <f8 of shape (n), (C, n) or a batch (b, C, n), and (b, n) for one channel. JSON:
+ * the contract's EMISSION, or an object with one as `emission` or with a batch of them as `emissions`.
+ * Errors name the file, the place, the value and the limit. */
+lam_status emission_read(const char *path, const emission_scene *scene, emission *out, lam_error *error);
+
+/* Puts e under the sky of an NPY file, shaped as an emission of m tiles. One sky goes with every emission,
+ * one emission with every sky (steady); else there must be as many of both. */
+lam_status emission_add_sky(emission *e, const char *path, const emission_scene *scene, lam_error *error);
+
+/* The same for a batch of skies L [n_skies][m], which is copied to every channel; path names it in messages.
+ */
+lam_status emission_add_skies(emission *e, const char *path, const mesh *m, size_t n_tiles, size_t n_skies,
+                              const float *L, lam_error *error);
+
+/* *values is [n_vectors][C][width], zero; freed with free(). path names it in messages. */
 lam_status emission_allocate(const char *path, size_t n_channels, size_t width, size_t n_vectors,
                              float **values, lam_error *error);
 
 /* The scene's own emission as one vector. */
 lam_status emission_of_scene(const mesh *m, emission *out, lam_error *error);
 
-/* What a command line asks for. */
-typedef struct emission_wish {
+/* The options of a command line that are about light. */
+typedef struct emission_options {
     const option_list *items; /* --emit */
     const char *path;         /* --emission, or NULL */
     const char *sky;          /* --sky, or NULL */
-    bool other;               /* a light that is added later: without any of these none is of the scene */
-} emission_wish;
+    bool other;               /* light is added later: the scene's own is not the preset */
+} emission_options;
 
-/* Groups when there are items, else the file, else none beside a sky, else the scene's own, which is *own.
+/* Groups when there are items, else the file, else none beside a sky, else the scene's own, which sets *own.
  */
-lam_status emission_choose(const mesh *m, emission_sources there, const emission_wish *wish, emission *out,
+lam_status emission_choose(const emission_scene *scene, const emission_options *options, emission *out,
                            bool *own, lam_error *error);
-
-/* Those of a store's operator and sky, which may be NULL. */
-emission_sources emission_sources_of(const lam_operator *op, const lam_sky *sky);
-
-/* Calls visit(context, g) for each group that name means; returns how many. */
-size_t emission_match_groups(const mesh *m, const char *name, void (*visit)(void *context, size_t group),
-                             void *context);
 
 #endif

@@ -2,9 +2,82 @@
 
 #include "solver/base/atomic_file.h"
 #include "solver/base/options.h"
-#include "solver/light/npy_file.h"
+#include "solver/codec/npy.h"
+#include "solver/codec/request.h"
 
+#include <stdlib.h>
 #include <string.h>
+
+void reductions_free(reduction *reductions, size_t n) {
+    for (size_t r = 0; r < n; r++) {
+        free(reductions[r].group);
+        free(reductions[r].figures);
+        reduce_request_free(&reductions[r].request);
+    }
+}
+
+/* The reduction of a group, a new one where there is none. */
+static reduction *find_reduction(reduction *reductions, size_t *n, const char *group, size_t length) {
+    for (size_t r = 0; r < *n; r++)
+        if (strlen(reductions[r].group) == length && memcmp(reductions[r].group, group, length) == 0)
+            return &reductions[r];
+    reductions[*n] = (reduction){.group = strndup(group, length)};
+    return reductions[*n].group != NULL ? &reductions[(*n)++] : NULL;
+}
+
+lam_status reductions_add(reduction *reductions, size_t *n, const char *item, lam_error *error) {
+    lam_status status = LAM_OK;
+    problem why;
+    const char *equals = strrchr(item, '=');
+    if (equals == NULL || equals == item)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--reduce %s: must be GROUP=mean, sum, min, max, uniformity or variance", item);
+    reduction *r = find_reduction(reductions, n, item, (size_t)(equals - item));
+    if (r == NULL) FAIL(error, LAM_ERR_MEMORY, "--reduce %s: not enough memory", item);
+    for (const char *rest = equals + 1;; rest++) {
+        const size_t length = strcspn(rest, ",");
+        if (!reduce_request_with(&r->request, rest, length, &why))
+            FAIL(error, LAM_ERR_ARGUMENT, "--reduce %.200s: %s", item, why.detail);
+        rest += length;
+        if (*rest == '\0') break;
+    }
+done:
+    return status;
+}
+
+lam_status reductions_bind(reduction *reductions, size_t n, const group_index *groups, lam_error *error) {
+    lam_status status = LAM_OK;
+    problem why;
+    for (size_t r = 0; r < n; r++) {
+        const char *group = reductions[r].group;
+        const uint32_t *found = NULL;
+        const size_t length = strlen(group), n_found = group_index_find(groups, group, length, &found);
+        char miss[GROUP_MISS];
+        if (n_found == 0) {
+            group_index_miss(groups, group, length, miss);
+            FAIL(error, LAM_ERR_ARGUMENT, "--reduce %.200s: the scene has %s", group, miss);
+        }
+        if (!reduce_request_add(&reductions[r].request, group, length, found, n_found, &why))
+            FAIL(error, LAM_ERR_MEMORY, "--reduce %.200s: %s", group, why.detail);
+    }
+done:
+    return status;
+}
+
+lam_status reductions_fill(solution *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t C = s->m->n_channels;
+    const reduce_values x = {.floats = s->values, .doubles = s->refined, .whole = true};
+    for (size_t r = 0; r < s->n_reductions; r++) {
+        reduction *to = &s->reductions[r];
+        to->figures = reduce_figures(&to->request, s->n_vectors, C);
+        if (to->figures == NULL || !reduce_vectors(&to->request, s->groups, s->m->area, C, s->n_vectors, 0,
+                                                   s->n_vectors, x, to->figures))
+            FAIL(error, LAM_ERR_MEMORY, "--reduce %.200s: not enough memory", to->group);
+    }
+done:
+    return status;
+}
 
 lam_status output_check(const char *path, bool reduced, lam_error *error) {
     lam_status status = LAM_OK;
@@ -20,7 +93,7 @@ done:
 
 void output_column(const solution *s, size_t vector, size_t channel, char name[OUTPUT_COLUMN]) {
     static const char letters[] = "rgb";
-    int length = snprintf(name, OUTPUT_COLUMN, "%s", s->quantity);
+    int length = snprintf(name, OUTPUT_COLUMN, "%s", codec_quantity_name(s->quantity));
     if (s->names != NULL)
         length += snprintf(name + length, OUTPUT_COLUMN - (size_t)length, "_%s", s->names[vector]);
     else if (s->batch)
@@ -31,23 +104,31 @@ void output_column(const solution *s, size_t vector, size_t channel, char name[O
         snprintf(name + length, OUTPUT_COLUMN - (size_t)length, "_c%zu", channel);
 }
 
-void output_figures(const solution *s, const bool *inside, size_t column, double figures[REDUCE_COUNT]) {
-    if (s->values != NULL)
-        reduce_compute(s->m, inside, s->values + column * s->m->n, figures);
-    else
-        reduce_compute_double(s->m, inside, s->refined + column * s->m->n, figures);
+lam_status output_array(FILE *stream, size_t rank, const size_t *shape, const float *floats,
+                        const double *doubles, lam_error *error) {
+    enum { BLOCK = 1 << 16 };
+    size_t count = 1;
+    double rounding = 0;
+    buffer b = {0};
+    bool good = npy_write_header(&b, floats != NULL ? NPY_F4 : NPY_F8, rank, shape);
+    for (size_t k = 0; k < rank; k++) count *= shape[k];
+    for (size_t first = 0; good && (first < count || first == 0); first += BLOCK) {
+        const size_t some = count - first < BLOCK ? count - first : BLOCK;
+        good = floats != NULL ? npy_write_values(&b, NPY_F4, floats + first, some)
+                              : npy_write_doubles(&b, NPY_F8, doubles + first, some, &rounding);
+        if (good) fwrite(b.bytes, 1, b.length, stream);
+        b.length = 0;
+    }
+    buffer_free(&b);
+    return good ? LAM_OK : status_fail(error, LAM_ERR_MEMORY, "not enough memory to write an array");
 }
 
-static void output_npy(const solution *s, FILE *stream) {
-    size_t dims[3];
-    int rank = 0;
-    if (s->batch) dims[rank++] = s->n_vectors;
-    if (s->m->n_channels > 1) dims[rank++] = s->m->n_channels;
-    dims[rank++] = s->m->n;
-    if (s->values != NULL)
-        npy_write(stream, rank, dims, s->values);
-    else
-        npy_write_double(stream, rank, dims, s->refined);
+static lam_status output_npy(const solution *s, FILE *stream, lam_error *error) {
+    size_t shape[3], rank = 0;
+    if (s->batch) shape[rank++] = s->n_vectors;
+    if (s->m->n_channels > 1) shape[rank++] = s->m->n_channels;
+    shape[rank++] = s->m->n;
+    return output_array(stream, rank, shape, s->values, s->refined, error);
 }
 
 lam_status output_write(const solution *s, const char *path, lam_error *error) {
@@ -57,7 +138,7 @@ lam_status output_write(const solution *s, const char *path, lam_error *error) {
     output_file_extension(path, extension);
     TRY(output_file_open(path, &file, error));
     if (strcmp(extension, "npy") == 0)
-        output_npy(s, file.stream);
+        TRY(output_npy(s, file.stream, error));
     else if (strcmp(extension, "json") == 0)
         TRY(output_json(s, file.stream, error));
     else if (strcmp(extension, "csv") == 0)

@@ -1,17 +1,35 @@
-/* Solutions as files: NPY, JSON, CSV, PLY, VTU. */
+/* Solutions as files: NPY, JSON, CSV, PLY, VTU; and the figures of groups that --reduce asks for. The room
+ * codec writes numbers, NPY and JSON. */
 #ifndef LAMBERT_OUTPUT_OUTPUT_H
 #define LAMBERT_OUTPUT_OUTPUT_H
 
-#include "solver/light/result_figures.h"
+#include "lambert/lambert.h"
+#include "solver/codec/group_figures.h"
 #include "solver/scene/mesh.h"
 
 #include <stdio.h>
 
-/* What a solve found, and what it was asked. */
+/* --reduce GROUP=FIGURE,...: each request has one name; items of the same group share one. */
+typedef struct reduction {
+    char *group;
+    reduce_request request;
+    double *figures; /* [n_with][n_vectors][C], or NULL before reductions_fill */
+} reduction;
+
+/* Adds an item to the n reductions, which have room for one more. LAM_ERR_ARGUMENT names the item. */
+lam_status reductions_add(reduction *reductions, size_t *n, const char *item, lam_error *error);
+
+/* Finds the groups of each. LAM_ERR_ARGUMENT for a name that the scene does not have. */
+lam_status reductions_bind(reduction *reductions, size_t n, const group_index *groups, lam_error *error);
+
+void reductions_free(reduction *reductions, size_t n);
+
+/* An answer of the solver and its question. */
 typedef struct solution {
     const mesh *m;
+    const group_index *groups;
     const char *scene;
-    const char *quantity;
+    lam_quantity quantity;
     size_t n_vectors;
     bool batch;
     const char *const *names; /* [n_vectors], of figures of a year in place of vectors; NULL: numbers */
@@ -19,26 +37,31 @@ typedef struct solution {
     const double *refined;    /* [n_vectors][C][n], and, of each vector, [n_vectors]: */
     const double *certificates;
     const size_t *iterations;
-    const reduction *reductions;
+    reduction *reductions;
     size_t n_reductions;       /* 0: the values themselves are written */
     double relative, indirect; /* mean error that the store states; negative: not measured */
 } solution;
 
-/* Whether a file of this name can be written; LAM_ERR_ARGUMENT names the extensions that can.
- * Reductions go into JSON and CSV only. */
+/* Computes the figures of every reduction. LAM_ERR_MEMORY. */
+lam_status reductions_fill(solution *s, lam_error *error);
+
+/* Checks that a file of this name can be written: LAM_ERR_ARGUMENT names the extensions that can. Reductions
+ * go into JSON and CSV only. */
 lam_status output_check(const char *path, bool reduced, lam_error *error);
 
 /* Writes path in the format of its extension, whole or not at all. */
 lam_status output_write(const solution *s, const char *path, lam_error *error);
 
+/* Writes an array, floats or doubles, as NPY of its own type; a failed write is seen by ferror(stream).
+ * Errors: LAM_ERR_MEMORY. */
+lam_status output_array(FILE *stream, size_t rank, const size_t *shape, const float *floats,
+                        const double *doubles, lam_error *error);
+
 /* "radiosity", "radiosity_g", "radiosity_3_g", "irradiance_sum": the column of a vector and channel. */
 #define OUTPUT_COLUMN 64
 void output_column(const solution *s, size_t vector, size_t channel, char name[OUTPUT_COLUMN]);
 
-/* The figures of a reduction of one channel of a vector: column v C + c. */
-void output_figures(const solution *s, const bool *inside, size_t column, double figures[REDUCE_COUNT]);
-
-/* A value in double, and the digits that tell it from all others of its precision. */
+/* A value in double, and the digits that distinguish it from all others of its precision. */
 static inline double output_value(const solution *s, size_t index) {
     return s->values != NULL ? (double)s->values[index] : s->refined[index];
 }
@@ -46,8 +69,14 @@ static inline int output_digits(const solution *s) {
     return s->values != NULL ? 9 : 17;
 }
 
-/* On standard output: the reductions, or the mean of every group. */
-lam_status output_print(const solution *s, lam_error *error);
+/* The figure of a reduction: number k of its request's statistics, of column v C + c. */
+static inline double output_figure(const solution *s, const reduction *r, size_t k, size_t column) {
+    const size_t C = s->m->n_channels;
+    return *reduce_figure(&r->request, 0, k, s->n_vectors, column / C, C, column % C, r->figures);
+}
+
+/* Writes on standard output: the reductions, or the mean of every group. */
+void output_print(const solution *s);
 
 /* The formats; a failed write is seen by ferror(stream). */
 lam_status output_json(const solution *s, FILE *stream, lam_error *error);

@@ -32,21 +32,21 @@ static void elements(const solution *s, FILE *stream) {
 static void figures(const solution *s, FILE *stream) {
     const mesh *m = s->m;
     header(s, "group,statistic", stream);
-    for (size_t r = 0; r < s->n_reductions; r++)
-        for (int k = 0; k < REDUCE_COUNT; k++) {
-            if (!s->reductions[r].wanted[k]) continue;
-            csv_text(s->reductions[r].group, stream);
-            fprintf(stream, ",%s", reduce_name((reduce_statistic)k));
+    for (size_t r = 0; r < s->n_reductions; r++) {
+        const reduction *of = &s->reductions[r];
+        for (size_t k = 0; k < of->request.n_with; k++) {
+            csv_text(of->group, stream);
+            fprintf(stream, ",%s", reduce_statistic_name(of->request.with[k]));
             for (size_t column = 0; column < s->n_vectors * m->n_channels; column++) {
-                double out[REDUCE_COUNT];
-                output_figures(s, s->reductions[r].inside, column, out);
-                if (isfinite(out[k]))
-                    fprintf(stream, ",%.*g", output_digits(s), out[k]);
+                const double value = output_figure(s, of, k, column);
+                if (isfinite(value))
+                    fprintf(stream, ",%.*g", output_digits(s), value);
                 else
                     fputc(',', stream);
             }
             fputs("\n", stream);
         }
+    }
 }
 
 void output_csv(const solution *s, FILE *stream) {

@@ -1,105 +1,114 @@
-/* A solution as the daemon answers it. */
+/* A solution as the daemon answers it, by the same writer, a vector at a time. */
+#include "solver/codec/answer.h"
+#include "solver/codec/json_writer.h"
 #include "solver/output/output.h"
 
-#include <jansson.h>
-#include <math.h>
-
-static json_t *row(const solution *s, size_t column) {
-    const size_t n = s->m->n;
-    json_t *out = json_array();
-    for (size_t i = 0; i < n; i++) json_array_append_new(out, json_real(output_value(s, column * n + i)));
-    return out;
+/* Sends what b holds to the stream. */
+static void flush(buffer *b, FILE *stream) {
+    if (b->length > 0) fwrite(b->bytes, 1, b->length, stream);
+    b->length = 0;
 }
 
-/* [n], or [C][n] for more than one channel. */
-static json_t *vector(const solution *s, size_t v) {
-    const size_t n_channels = s->m->n_channels;
-    if (n_channels == 1) return row(s, v);
-    json_t *out = json_array();
-    for (size_t c = 0; c < n_channels; c++) json_array_append_new(out, row(s, v * n_channels + c));
-    return out;
-}
-
-static json_t *number_or_null(double x) {
-    return isfinite(x) ? json_real(x) : json_null();
-}
-
-/* One group's figures of one vector: a number each, or one per channel. */
-static void reduce_into(const solution *s, const reduction *r, size_t v, json_t *groups) {
-    const size_t n_channels = s->m->n_channels;
-    json_t *out = json_object_get(groups, r->group);
-    if (out == NULL) {
-        out = json_object();
-        json_object_set_new(groups, r->group, out);
-    }
-    for (int k = 0; k < REDUCE_COUNT; k++)
-        if (r->wanted[k]) json_object_set_new(out, reduce_name((reduce_statistic)k), json_array());
-    for (size_t c = 0; c < n_channels; c++) {
-        double figures[REDUCE_COUNT];
-        output_figures(s, r->inside, v * n_channels + c, figures);
-        for (int k = 0; k < REDUCE_COUNT; k++) {
-            const char *name = reduce_name((reduce_statistic)k);
-            if (!r->wanted[k]) continue;
-            if (n_channels == 1)
-                json_object_set_new(out, name, number_or_null(figures[k]));
-            else
-                json_array_append_new(json_object_get(out, name), number_or_null(figures[k]));
-        }
-    }
-}
-
-static json_t *groups_of(const solution *s, size_t v) {
-    json_t *groups = json_object();
-    for (size_t i = 0; i < s->n_reductions; i++) reduce_into(s, &s->reductions[i], v, groups);
-    return groups;
-}
-
-/* What a refined answer carries: a number, or one for each vector of a batch. */
-static void set_figures(const solution *s, json_t *answer) {
-    json_t *certificates = json_array(), *iterations = json_array();
+/* "sum":ROWS of every figure of a year. */
+static bool write_year(const solution *s, buffer *b, FILE *stream, problem *why) {
+    const size_t C = s->m->n_channels, n = s->m->n;
+    const media_accept as = {.type = MEDIA_JSON};
     for (size_t v = 0; v < s->n_vectors; v++) {
-        json_array_append_new(certificates, json_real(s->certificates[v]));
-        json_array_append_new(iterations, json_integer((json_int_t)s->iterations[v]));
+        const bool written = (v == 0 || buffer_append(b, ",", 1)) && json_write_text(b, s->names[v]) &&
+                             buffer_append(b, ":", 1);
+        if (!written) return problem_set(why, 503, "not enough memory for the answer");
+        if (!answer_rows(b, &as, C, n, s->values + v * C * n, why)) return false;
+        flush(b, stream);
     }
-    json_object_set(answer, "certificate", s->batch ? certificates : json_array_get(certificates, 0));
-    json_object_set(answer, "iterations", s->batch ? iterations : json_array_get(iterations, 0));
-    json_decref(certificates);
-    json_decref(iterations);
+    return true;
+}
+
+/* "sum":{"desk":{"mean":...},...} of every figure of a year: each is reduced by itself. */
+static bool write_reduced_year(const solution *s, buffer *b) {
+    const size_t C = s->m->n_channels;
+    bool written = true;
+    for (size_t v = 0; written && v < s->n_vectors; v++) {
+        written = (v == 0 || buffer_append(b, ",", 1)) && json_write_text(b, s->names[v]) &&
+                  buffer_append(b, ":{", 2);
+        for (size_t r = 0; written && r < s->n_reductions; r++) {
+            const reduction *of = &s->reductions[r];
+            written = (r == 0 || buffer_append(b, ",", 1)) && json_write_text(b, of->group) &&
+                      buffer_append(b, ":{", 2);
+            for (size_t k = 0; written && k < of->request.n_with; k++)
+                written = (k == 0 || buffer_append(b, ",", 1)) &&
+                          buffer_printf(b, "\"%s\":", reduce_statistic_name(of->request.with[k])) &&
+                          reduce_write_channels(
+                              b, reduce_figure(&of->request, 0, k, s->n_vectors, v, C, 0, of->figures), C);
+            written = written && buffer_append(b, "}", 1);
+        }
+        written = written && buffer_append(b, "}", 1);
+    }
+    return written;
+}
+
+static bool write_reductions(const solution *s, buffer *b) {
+    bool written = true;
+    for (size_t r = 0; written && r < s->n_reductions; r++)
+        written = (r == 0 || buffer_append(b, ",", 1)) &&
+                  reduce_write_names(&s->reductions[r].request, s->m->n_channels, s->n_vectors, s->batch,
+                                     s->reductions[r].figures, b);
+    return written;
+}
+
+static bool write_vectors(const solution *s, const answer_shape *shape, const answer_notes *notes, buffer *b,
+                          FILE *stream, problem *why) {
+    const size_t row = s->m->n_channels * s->m->n;
+    const media_accept as = {.type = MEDIA_JSON};
+    double rounding = 0;
+    if (!answer_begin(b, shape, &as, notes, why)) return false;
+    for (size_t v = 0; v < s->n_vectors; v++) {
+        if (!(s->values != NULL
+                  ? answer_add(b, shape, &as, v, 1, s->values + v * row, why)
+                  : answer_add_doubles(b, shape, &as, v, 1, s->refined + v * row, &rounding, why)))
+            return false;
+        flush(b, stream);
+    }
+    return answer_end(b, shape, &as, notes, why);
+}
+
+/* An object of figures in place of vectors. */
+static bool write_object(const solution *s, const answer_notes *notes, buffer *b, FILE *stream,
+                         problem *why) {
+    const bool year = s->names != NULL, reduced = s->n_reductions > 0;
+    bool written = answer_head(b, s->m->n, s->m->n_channels, notes) &&
+                   buffer_printf(b, ",\"%s\":{", year ? "annual" : "groups");
+    if (year && !reduced) {
+        if (written && !write_year(s, b, stream, why)) return false;
+    } else {
+        written = written && (year ? write_reduced_year(s, b) : write_reductions(s, b));
+    }
+    written = written && buffer_append(b, "}", 1) && answer_certificates(b, s->n_vectors, s->batch, notes) &&
+              answer_tail(b, notes);
+    return written || problem_set(why, 503, "not enough memory for the answer");
 }
 
 lam_status output_json(const solution *s, FILE *stream, lam_error *error) {
     lam_status status = LAM_OK;
-    json_t *answer = json_object();
-    const bool reduced = s->n_reductions > 0;
-    json_object_set_new(answer, "scene", json_string(s->scene));
-    json_object_set_new(answer, "elements", json_integer((json_int_t)s->m->n));
-    json_object_set_new(answer, "channels", json_integer((json_int_t)s->m->n_channels));
-    json_object_set_new(answer, "quantity", json_string(s->quantity));
-    json_t *values;
-    if (s->names != NULL) {
-        values = json_object();
-        for (size_t v = 0; v < s->n_vectors; v++)
-            json_object_set_new(values, s->names[v], reduced ? groups_of(s, v) : vector(s, v));
-    } else if (s->batch) {
-        values = json_array();
-        for (size_t v = 0; v < s->n_vectors; v++)
-            json_array_append_new(values, reduced ? groups_of(s, v) : vector(s, v));
-    } else {
-        values = reduced ? groups_of(s, 0) : vector(s, 0);
-    }
-    const char *what = s->names != NULL ? "annual" : reduced ? "groups" : s->quantity;
-    json_object_set_new(answer, what, values);
-    if (s->certificates != NULL)
-        set_figures(s, answer);
-    else if (s->relative >= 0)
-        json_object_set_new(
-            answer, "error",
-            json_pack("{s:f, s:f}", "relative_mean", s->relative, "indirect_mean", s->indirect));
-    if (json_dumpf(answer, stream, JSON_COMPACT | JSON_REAL_PRECISION((size_t)output_digits(s))) != 0 &&
-        !ferror(stream))
-        FAIL(error, LAM_ERR_MEMORY, "not enough memory to write the answer as JSON; write .npy");
-    fputc('\n', stream);
+    buffer b = {0};
+    problem why = {0};
+    const answer_shape shape = {.n = s->m->n,
+                                .n_channels = s->m->n_channels,
+                                .n_rhs = s->n_vectors,
+                                .batch = s->batch,
+                                .n_values = s->m->n};
+    const answer_notes notes = {.scene = s->scene,
+                                .quantity = s->quantity,
+                                .has_error = s->relative >= 0,
+                                .relative_mean = s->relative,
+                                .indirect_mean = s->indirect,
+                                .certificates = s->certificates,
+                                .iterations = s->iterations};
+    const bool vectors = s->names == NULL && s->n_reductions == 0;
+    if (!(vectors ? write_vectors(s, &shape, &notes, &b, stream, &why)
+                  : write_object(s, &notes, &b, stream, &why)))
+        FAIL(error, why.status == 503 ? LAM_ERR_MEMORY : LAM_ERR_ARGUMENT, "%s", why.detail);
+    flush(&b, stream);
 done:
-    json_decref(answer);
+    buffer_free(&b);
     return status;
 }

@@ -1,4 +1,5 @@
 /* A solution on its mesh: PLY (binary, values at the faces) and VTU (cell data, as ParaView reads it). */
+#include "solver/codec/request.h"
 #include "solver/output/output.h"
 
 #include <endian.h>
@@ -21,7 +22,8 @@ static void put_double(double value, FILE *stream) {
 void output_ply(const solution *s, FILE *stream) {
     const mesh *m = s->m;
     char name[OUTPUT_COLUMN];
-    fprintf(stream, "ply\nformat binary_little_endian 1.0\ncomment %s of %s\n", s->quantity, s->scene);
+    fprintf(stream, "ply\nformat binary_little_endian 1.0\ncomment %s of %s\n",
+            codec_quantity_name(s->quantity), s->scene);
     fprintf(stream, "element vertex %zu\nproperty double x\nproperty double y\nproperty double z\n",
             m->n_vertices);
     fprintf(stream, "element face %zu\nproperty list uchar uint vertex_indices\nproperty uint group\n", m->n);

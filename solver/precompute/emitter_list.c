@@ -42,35 +42,23 @@ done:
     return status;
 }
 
-typedef struct filling {
-    const mesh *m;
-    float *E; /* [C][n] */
-} filling;
-
-static void fill_group(void *context, size_t group) {
-    const filling *f = context;
-    for (size_t c = 0; c < f->m->n_channels; c++)
-        for (size_t i = 0; i < f->m->n; i++)
-            if (f->m->group[i] == group) f->E[c * f->m->n + i] = 1;
-}
-
 /* names: NAME,NAME,... */
-static lam_status read_groups(const char *names, const mesh *m, emitter_wish *w, lam_error *error) {
+static lam_status read_groups(const char *names, const emission_scene *scene, emitter_wish *w,
+                              lam_error *error) {
     lam_status status = LAM_OK;
+    const mesh *m = scene->m;
     const size_t vector = m->n_channels * m->n;
+    char what[240];
     size_t s = 1, longest = strlen(names) + 1, k = 0;
     for (const char *at = names; *at != '\0'; at++) s += *at == ',';
+    snprintf(what, sizeof what, "--emitters group=%s", names);
     TRY(reserve_names(s, longest, w, error));
     TRY(emission_allocate("--emitters", m->n_channels, m->n, s, &w->light.E, error));
     w->light.n_vectors = s;
     for (const char *at = names; k < s; k++) {
         const size_t length = strcspn(at, ",");
-        filling f = {m, w->light.E + k * vector};
         memcpy(w->names[k], at, length);
-        if (emission_match_groups(m, w->names[k], fill_group, &f) == 0)
-            FAIL(error, LAM_ERR_ARGUMENT,
-                 "--emitters group=%.200s: the scene has no group \"%.60s\"; solve STORE names all there are",
-                 names, w->names[k]);
+        TRY(emission_fill_group(scene, what, w->names[k], NULL, w->light.E + k * vector, error));
         at += length + 1;
     }
 done:
@@ -89,12 +77,15 @@ lam_status emitter_wish_read(const char *text, const mesh *m, size_t n_tiles, em
                              lam_error *error) {
     lam_status status = LAM_OK;
     emitter_wish made = {.s = 0};
+    emission_scene scene = {0};
+    TRY(emission_scene_create(m, &scene, error));
+    scene.n_tiles = n_tiles;
     if (strcmp(text, "sky") == 0) {
         TRY(read_sky(m, n_tiles, &made, error));
     } else if (strncmp(text, "group=", 6) == 0) {
-        TRY(read_groups(text + 6, m, &made, error));
+        TRY(read_groups(text + 6, &scene, &made, error));
     } else {
-        TRY(emission_read(text, m, (emission_sources){.n_tiles = n_tiles}, &made.light, error));
+        TRY(emission_read(text, &scene, &made.light, error));
         TRY(number_names("emitter", made.light.n_vectors, &made, error));
     }
     for (size_t k = 0; k < made.s; k++)
@@ -103,6 +94,7 @@ lam_status emitter_wish_read(const char *text, const mesh *m, size_t n_tiles, em
     *out = made;
     made = (emitter_wish){.s = 0};
 done:
+    emission_scene_free(&scene);
     emitter_wish_free(&made);
     return status;
 }

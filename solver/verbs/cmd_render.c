@@ -1,6 +1,7 @@
 /* lambert render: a picture of a store under any lighting. */
 #include "solver/base/atomic_file.h"
 #include "solver/base/terminal.h"
+#include "solver/codec/request.h"
 #include "solver/light/emission_apply.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky_light.h"
@@ -270,22 +271,24 @@ static lam_status render(const char *path, const fields *f, terminal *t, lam_err
     view v = {.s = NULL};
     lam_operator *op = NULL;
     lam_sky *sky = NULL;
+    emission_scene scene = {0};
     emission light = {0};
+    lam_quantity quantity = LAM_RADIOSITY;
     bool own = false;
 
+    codec_quantity_find(f->quantity, strlen(f->quantity), &quantity);
     TRY(view_open(path, f, &v, error));
     TRY(sky_load(v.s, v.m.n, &sky, error));
-    const emission_wish wish = {.items = &f->emit, .path = f->emission, .sky = f->sky};
+    const emission_options given = {.items = &f->emit, .path = f->emission, .sky = f->sky};
     TRY(operator_load(v.s, &op, error));
-    TRY(emission_choose(&v.m, emission_sources_of(op, sky), &wish, &light, &own, error));
+    TRY(emission_scene_create(&v.m, &scene, error));
+    emission_scene_sources(&scene, op, sky);
+    TRY(emission_choose(&scene, &given, &light, &own, error));
     if (light.n_vectors != 1)
         FAIL(error, LAM_ERR_ARGUMENT, "%s: holds %zu emissions, a picture shows exactly 1",
              f->emission != NULL ? f->emission : f->sky, light.n_vectors);
     lam_operator_set_threads(op, (size_t)omp_get_max_threads());
     TRY(terminal_check(error));
-    const lam_quantity quantity = strcmp(f->quantity, "irradiance") == 0 ? LAM_IRRADIANCE
-                                  : strcmp(f->quantity, "indirect") == 0 ? LAM_INDIRECT
-                                                                         : LAM_RADIOSITY;
     TRY(emission_apply(&light, op, sky, quantity, 0, NULL, NULL, &v.values, error));
     mark(&v.m, v.values, light.E, quantity == LAM_RADIOSITY, v.lit, v.glows);
     if (own && memchr(v.glows, true, v.m.n) == NULL && memchr(v.lit, true, v.m.n) == NULL)
@@ -300,6 +303,7 @@ static lam_status render(const char *path, const fields *f, terminal *t, lam_err
         terminal_log(t, "white is about %.3g W/m2", 1 / look.exposure);
 done:
     view_close(&v);
+    emission_scene_free(&scene);
     emission_free(&light);
     lam_operator_close(op);
     lam_sky_close(sky);

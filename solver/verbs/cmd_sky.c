@@ -4,8 +4,8 @@
 #include "solver/base/options.h"
 #include "solver/base/terminal.h"
 #include "solver/daylight/sky_matrix.h"
-#include "solver/light/npy_file.h"
 #include "solver/light/weather_light.h"
+#include "solver/output/output.h"
 #include "solver/verbs/verbs.h"
 
 #include <math.h>
@@ -94,7 +94,7 @@ static lam_status make_skies(const char *path, const fields *f, terminal *t, lam
     const year_options wish = {.photometric = f->photometric, .sun_in_tiles = true};
     TRY(weather_skies_read(path, &tiling, &wish, t, &made, error));
     TRY(output_file_open(f->output, &file, error));
-    npy_write(file.stream, 2, (const size_t[2]){made.n, tiling.n_tiles}, made.L);
+    TRY(output_array(file.stream, 2, (const size_t[2]){made.n, tiling.n_tiles}, made.L, NULL, error));
     TRY(output_file_commit(&file, error));
     printf("%s: %zu skies of %zu tiles (%s), %s\n", f->output, made.n, tiling.n_tiles, tiling.name,
            f->photometric ? "cd/m2" : "W/(m2 sr)");
@@ -137,9 +137,10 @@ static lam_status convert_matrix(const char *path, const fields *f, terminal *t,
                      received[c] * 1e-3, f->photometric ? "klx h" : "kWh/m2");
     TRY(output_file_open(f->output, &file, error));
     if (m.n_channels == 1)
-        npy_write(file.stream, 2, (const size_t[2]){m.n, m.tiling.n_tiles}, m.L);
+        TRY(output_array(file.stream, 2, (const size_t[2]){m.n, m.tiling.n_tiles}, m.L, NULL, error));
     else
-        npy_write(file.stream, 3, (const size_t[3]){m.n, m.n_channels, m.tiling.n_tiles}, m.L);
+        TRY(output_array(file.stream, 3, (const size_t[3]){m.n, m.n_channels, m.tiling.n_tiles}, m.L, NULL,
+                         error));
     TRY(output_file_commit(&file, error));
     printf("%s: %zu skies of %zu tiles (%s), %s%s\n", f->output, m.n, m.tiling.n_tiles, m.tiling.name,
            m.n_channels == 1 ? "" : "three components, ", f->photometric ? "cd/m2" : "W/(m2 sr)");

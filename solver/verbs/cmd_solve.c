@@ -1,6 +1,7 @@
 /* lambert solve: lights a store and writes what it answers. */
 #include "solver/base/atomic_file.h"
 #include "solver/base/terminal.h"
+#include "solver/codec/request.h"
 #include "solver/light/annual.h"
 #include "solver/light/emission_refine.h"
 #include "solver/light/weather_light.h"
@@ -139,12 +140,6 @@ static const option_command verb = {
     .most_arguments = 1,
 };
 
-static lam_quantity quantity_of(const char *name) {
-    if (strcmp(name, "irradiance") == 0) return LAM_IRRADIANCE;
-    if (strcmp(name, "indirect") == 0) return LAM_INDIRECT;
-    return LAM_RADIOSITY;
-}
-
 static bool is_dark(const emission *light, size_t count) {
     for (size_t i = 0; i < count; i++)
         if (light->E[i] > 0) return false;
@@ -164,20 +159,30 @@ static void stated_error(store *s, double *relative, double *indirect) {
     }
 }
 
-/* The elements that some reduction is about, *selected freed with free(); NULL where all are wanted. */
+/* The elements of the groups that are reduced, *selected freed with free(); NULL where all are wanted. */
 static lam_status wanted_elements(const mesh *m, const reduction *reductions, size_t n_reductions,
                                   size_t *n_selected, uint32_t **selected, lam_error *error) {
+    lam_status status = LAM_OK;
+    bool *inside = NULL;
+    uint32_t *made = NULL;
     *selected = NULL;
     *n_selected = 0;
     if (n_reductions == 0) return LAM_OK;
-    *selected = memory_allocate(m->n, sizeof **selected, "the elements wanted", error);
-    if (*selected == NULL) return LAM_ERR_MEMORY;
-    for (size_t i = 0; i < m->n; i++) {
-        bool inside = false;
-        for (size_t r = 0; r < n_reductions; r++) inside = inside || reductions[r].inside[m->group[i]];
-        if (inside) (*selected)[(*n_selected)++] = (uint32_t)i;
+    inside = memory_allocate(m->n_groups, sizeof *inside, "the elements wanted", error);
+    made = memory_allocate(m->n, sizeof *made, "the elements wanted", error);
+    if (inside == NULL || made == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t r = 0; r < n_reductions; r++) {
+        const reduce_name *name = &reductions[r].request.names[0];
+        for (size_t g = 0; g < name->n_groups; g++) inside[name->groups[g]] = true;
     }
-    return LAM_OK;
+    for (size_t i = 0; i < m->n; i++)
+        if (inside[m->group[i]]) made[(*n_selected)++] = (uint32_t)i;
+    *selected = made;
+    made = NULL;
+done:
+    free(inside);
+    free(made);
+    return status;
 }
 
 /* Figures of the year in place of the batch; *values is freed with free(). */
@@ -187,10 +192,9 @@ static lam_status solve_year(const annual_wish *wish, const emission *light, con
     lam_status status = LAM_OK;
     const progress steps = terminal_progress(t);
     annual_summary sum = {0};
-    TRY(annual_apply(wish, light, op, sky, quantity_of(out->quantity), n_selected, selected, &steps, values,
-                     &sum, error));
-    terminal_log(t, "a year of %s: %zu vectors of %g h, %zu with light", out->quantity, sum.n, wish->hours,
-                 sum.lit);
+    TRY(annual_apply(wish, light, op, sky, out->quantity, n_selected, selected, &steps, values, &sum, error));
+    terminal_log(t, "a year of %s: %zu vectors of %g h, %zu with light", codec_quantity_name(out->quantity),
+                 sum.n, wish->hours, sum.lit);
     if (annual_has_shares(wish)) terminal_log(t, "shares are of %zu vectors", sum.counted);
     if (sum.lit == 0) terminal_warn(t, "no vector has any light");
     out->n_vectors = wish->n_figures;
@@ -213,18 +217,20 @@ static void tell_refined(const refined_light *refined, solution *out, double tol
     terminal_log(t,
                  "refined to %g: no %s is further than %.3g from that of the store's form factors; %zu "
                  "iteration%s%s",
-                 tolerance, out->quantity, certificate, iterations, iterations == 1 ? "" : "s",
-                 out->n_vectors > 1 ? " at most" : "");
+                 tolerance, codec_quantity_name(out->quantity), certificate, iterations,
+                 iterations == 1 ? "" : "s", out->n_vectors > 1 ? " at most" : "");
 }
 
 static lam_status solve(const char *path, const fields *f, const annual_wish *year, reduction *reductions,
-                        terminal *t, lam_error *error) {
+                        size_t n_reductions, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
     mesh m = {0};
     lam_operator *op = NULL;
     lam_sky *sky = NULL;
+    emission_scene there = {0};
     emission light = {0};
+    lam_quantity quantity = LAM_RADIOSITY;
     double *row_sums = NULL;
     float *values = NULL;
     refined_light refined = {0};
@@ -239,19 +245,21 @@ static lam_status solve(const char *path, const fields *f, const annual_wish *ye
     TRY(store_open(path, &s, error));
     TRY(store_get_text(s, "/", "name", &scene, error));
     TRY(mesh_load(s, &m, &row_sums, error));
-    for (size_t i = 0; i < f->reduce.count; i++) TRY(reduce_bind(&reductions[i], &m, error));
+    TRY(emission_scene_create(&m, &there, error));
+    TRY(reductions_bind(reductions, n_reductions, &there.groups, error));
     TRY(sky_load(s, m.n, &sky, error));
-    const emission_wish wish = {
+    const emission_options given = {
         .items = &f->emit, .path = f->emission, .sky = f->sky, .other = f->weather != NULL};
     TRY(operator_load(s, &op, error));
-    TRY(emission_choose(&m, emission_sources_of(op, sky), &wish, &light, &own, error));
+    emission_scene_sources(&there, op, sky);
+    TRY(emission_choose(&there, &given, &light, &own, error));
     if (own && is_dark(&light, m.n * m.n_channels))
         FAIL(error, LAM_ERR_ARGUMENT,
              "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s", path,
              sky != NULL ? ", --sky FILE or --weather FILE" : "");
     if (own) terminal_log(t, "no --emit, --emission, --sky or --weather: the scene's own light");
     /* With --reduce only figures are written, with -o too. */
-    TRY(wanted_elements(&m, reductions, f->reduce.count, &n_selected, &selected, error));
+    TRY(wanted_elements(&m, reductions, n_reductions, &n_selected, &selected, error));
     if (f->weather != NULL) {
         const weather_wish hours = {.path = f->weather,
                                     .photometric = f->photometric,
@@ -265,37 +273,39 @@ static lam_status solve(const char *path, const fields *f, const annual_wish *ye
              "or --weather");
     lam_operator_set_threads(op, (size_t)omp_get_max_threads());
     TRY(terminal_check(error));
+    codec_quantity_find(f->quantity, strlen(f->quantity), &quantity);
     solution out = {.m = &m,
+                    .groups = &there.groups,
                     .scene = scene,
-                    .quantity = f->quantity,
+                    .quantity = quantity,
                     .n_vectors = light.n_vectors,
                     .batch = light.batch,
                     .reductions = reductions,
-                    .n_reductions = f->reduce.count};
+                    .n_reductions = n_reductions};
     if (year->n_figures > 0) {
         out.names = names;
         TRY(solve_year(year, &light, op, sky, n_selected, selected, t, &out, &values, error));
     } else if (f->tolerance > 0) {
-        TRY(emission_refine(&light, path, op, sky, quantity_of(f->quantity), f->tolerance, terminal_check,
-                            &refined, error));
+        TRY(emission_refine(&light, path, op, sky, quantity, f->tolerance, terminal_check, &refined, error));
         tell_refined(&refined, &out, f->tolerance, t);
     } else {
-        TRY(emission_apply(&light, op, sky, quantity_of(f->quantity), n_selected, selected, terminal_check,
-                           &values, error));
+        TRY(emission_apply(&light, op, sky, quantity, n_selected, selected, terminal_check, &values, error));
     }
     out.values = values;
+    TRY(reductions_fill(&out, error));
     out.relative = out.indirect = -1;
     if (f->tolerance == 0) stated_error(s, &out.relative, &out.indirect);
     if (f->output != NULL)
         TRY(output_write(&out, f->output, error));
     else
-        TRY(output_print(&out, error));
+        output_print(&out);
 done:
     free(scene);
     free(selected);
     free(values);
     refined_light_free(&refined);
     free(row_sums);
+    emission_scene_free(&there);
     emission_free(&light);
     sunlight_free(&sun);
     lam_operator_close(op);
@@ -353,11 +363,12 @@ int cmd_solve(int argc, char **argv) {
     /* What a place receives is what a study of daylight asks for. */
     if (f.quantity == NULL) f.quantity = year.n_figures > 0 ? "irradiance" : "radiosity";
     reduction reductions[OPTION_LIST_MAX] = {0};
+    size_t n_reductions = 0;
     for (size_t i = 0; i < f.reduce.count; i++)
-        if (reduce_parse(f.reduce.items[i], &reductions[i], &error) != LAM_OK)
+        if (reductions_add(reductions, &n_reductions, f.reduce.items[i], &error) != LAM_OK)
             return options_usage(verb.name, "%s", error.message);
     terminal_open(&term, verb.name, false, false);
-    const lam_status status = solve(given.arguments[0], &f, &year, reductions, &term, &error);
-    for (size_t i = 0; i < f.reduce.count; i++) reduce_free(&reductions[i]);
+    const lam_status status = solve(given.arguments[0], &f, &year, reductions, n_reductions, &term, &error);
+    reductions_free(reductions, n_reductions);
     return status == LAM_OK ? 0 : terminal_fail(&term, &error);
 }

@@ -152,11 +152,12 @@ class Emitters(unittest.TestCase):
         self.refused(1, "--emitters sky", "solve", self.stores["groups"], "--sky", self.folder / "dusk.npy")
         np.save(self.folder / "wrong.npy", self.rng.random((3, self.truth["groups"].n)))
         self.refused(1, "emits", "solve", self.stores["groups"], "--emission", self.folder / "wrong.npy")
-        for weights, wanted in (([1], "2 values"), ([1, -2], "-2"), ([1, [1, 2]], "needs 1 or 3"), ("x", "2 values")):
+        for weights, wanted in (([1], "must be 2"), ([1, -2], "-2"), ([1, [1, 2]], "must be 3"),
+                                ("x", "an array of weights")):
             at.write_text(json.dumps({"emitters": weights}))
             self.refused(1, wanted, "solve", self.stores["groups"], "--emission", at)
         at.write_text(json.dumps({"emitters": [1, 2], "groups": {"lamp": 1}}))
-        self.refused(1, "must be", "solve", self.stores["groups"], "--emission", at)
+        self.refused(1, "must hold either", "solve", self.stores["groups"], "--emission", at)
 
     def test_options(self):
         precompute = "precompute", self.scene, "-o", self.folder / "no.h5", "--rays", 64, "--probes", 0

@@ -205,14 +205,14 @@ class Sky(unittest.TestCase):
         both = self.folder / "both.json"
         both.write_text(json.dumps({"sky": good.tolist()}))
         for wanted, store, *arguments in (
-            ("rows of 144 values, the store has 145 tiles", "exact", "--sky", self.npy("a.npy", good[:-1])),
-            ("value 3 = -1", "exact", "--sky", self.npy("b.npy", negative)),
-            ("value 7 is not finite", "exact", "--sky", self.npy("c.npy", nan)),
+            ("is (144), must be (145)", "exact", "--sky", self.npy("a.npy", good[:-1])),
+            ("value 3 is -1", "exact", "--sky", self.npy("b.npy", negative)),
+            ("value 7 is NaN", "exact", "--sky", self.npy("c.npy", nan)),
             ("shape", "colour", "--sky", self.npy("d.npy", np.ones((2, 132)))),
             ("No such file", "exact", "--sky", self.folder / "missing.npy"),
             ("a sky of its own", "exact", "--sky", self.npy("e.npy", good), "--emission", both),
             ("has no sky", None, "--sky", self.npy("e.npy", good)),
-            ("has none; precompute with --sky", None, "--emission", both),
+            ("has no sky; precompute it with --sky", None, "--emission", both),
         ):
             done = run("solve", self.stores[store] if store else self.plain, *arguments, "-o", self.folder / "no.npy")
             self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1), done.stderr)

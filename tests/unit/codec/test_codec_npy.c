@@ -97,6 +97,54 @@ START_TEST(cut_arrays_are_refused) {
 }
 END_TEST
 
+/* Headers of other types, orders, shapes and lengths, around one value of a single element. */
+START_TEST(foreign_headers_are_refused) {
+    static const struct {
+        unsigned status;
+        const char *header;
+    } cases[] = {
+        {0, "{'descr': '<f4', 'fortran_order': False, 'shape': (1,), }\n"},
+        {0, "{'shape': (1,), 'fortran_order': False, 'descr': '<f4'}\n"},
+        {422, "{'descr': '>f4', 'fortran_order': False, 'shape': (1,), }\n"},
+        {422, "{'descr': '<i4', 'fortran_order': False, 'shape': (1,), }\n"},
+        {422, "{'descr': '<f4', 'fortran_order': True, 'shape': (1,), }\n"},
+        {422, "{'descr': '<f4', 'fortran_order': False, 'shape': (2,), }\n"},
+        {422, "{'descr': '<f4', 'fortran_order': False, 'shape': (), }\n"},
+        {422, "{'descr': '<f4', 'fortran_order': False, 'shape': (1,1,1,1), }\n"},
+        {400, "{'descr': '<f4', 'fortran_order': False, 'shape': (1), }\n"},
+        {400, "{'descr': '<f4', 'fortran_order': False, 'shape': (-1,), }\n"},
+        {400, "{'descr': '<f4', 'fortran_order': False, 'shape': (18446744073709551616,), }\n"},
+        {422, "{'descr': '<f4', 'fortran_order': False, 'shape': (4294967296,4294967296,4), }\n"},
+        {400, "{'descr': '<f4', 'fortran_order': False, 'shape': (1,\n"},
+        {400, "{'descr': '<f4', 'fortran_order': False}\n"},
+        {400, "{'fortran_order': False, 'shape': (1,), }\n"},
+        {400, "{'descr': '<f4', 'shape': (1,), }\n"},
+        {400, "{'descr"},
+        {400, ""},
+    };
+    const codec_scene one = {
+        .n = 1, .n_channels = 1, .max_batch = 4, .max_bytes = 4096, .source = "the file"};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const size_t length = strlen(cases[i].header);
+        const unsigned char head[10] = {0x93, 'N', 'U', 'M', 'P', 'Y', 1, 0, (unsigned char)length, 0};
+        const float value = 1;
+        buffer b = {0};
+        problem why;
+        radiosity_request request = {0};
+        ck_assert(buffer_append(&b, head, sizeof head) && buffer_append(&b, cases[i].header, length) &&
+                  buffer_append(&b, &value, sizeof value));
+        codec_read_npy(&one, b.bytes, b.length, &request, &why);
+        ck_assert_msg(why.status == cases[i].status, "%u: %s", why.status, cases[i].header);
+        if (why.status == 400)
+            ck_assert_msg(strstr(why.detail, "the file is not NPY") != NULL, "%s", why.detail);
+        radiosity_request_free(&request);
+        buffer_free(&b);
+    }
+    ck_assert_uint_eq(status_of("PK", 2, NULL), 400);
+    ck_assert_uint_eq(status_of("\x93NUMPY\x09\x00\x00\x00", 10, NULL), 400);
+}
+END_TEST
+
 START_TEST(changed_arrays_never_do_harm) {
     size_t counts[3] = {0};
     for (int version = 1; version <= 2; version++) {
@@ -197,6 +245,7 @@ int main(void) {
     tcase_add_test(tcase, doubles_tell_their_rounding);
     tcase_add_test(tcase, written_arrays_are_read);
     tcase_add_test(tcase, cut_arrays_are_refused);
+    tcase_add_test(tcase, foreign_headers_are_refused);
     tcase_add_test(tcase, changed_arrays_never_do_harm);
     tcase_add_test(tcase, halves_are_rounded_to_nearest_even);
     tcase_add_test(tcase, headers_are_aligned);

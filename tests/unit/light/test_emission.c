@@ -1,10 +1,8 @@
-/* Emissions by group, by file, and the figures over groups, on a mesh made by hand. */
+/* Emissions by group and by file, on a mesh made by hand. */
+#include "solver/codec/npy.h"
 #include "solver/light/emission.h"
-#include "solver/light/npy_file.h"
-#include "solver/light/result_figures.h"
 #include "support/suite.h"
 
-#include <math.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -25,9 +23,19 @@ static mesh hand_made(size_t n_channels) {
                   .emission = dark};
 }
 
+static emission_scene scene_of(const mesh *m) {
+    emission_scene scene = {0};
+    ck_assert_int_eq(emission_scene_create(m, &scene, NULL), LAM_OK);
+    scene.n_tiles = N_TILES;
+    return scene;
+}
+
 static lam_status by_groups(const mesh *m, const char *one, const char *two, emission *e, lam_error *error) {
     option_list items = {.items = {one, two}, .count = two == NULL ? 1 : 2};
-    return emission_from_groups(m, &items, e, error);
+    emission_scene scene = scene_of(m);
+    const lam_status status = emission_from_groups(&scene, &items, e, error);
+    emission_scene_free(&scene);
+    return status;
 }
 
 START_TEST(test_groups) {
@@ -51,6 +59,29 @@ START_TEST(test_groups) {
                       bad[i]);
         ck_assert_ptr_null(e.E);
     }
+    ck_assert_int_eq(by_groups(&m, "lmap=1", NULL, &e, &error), LAM_ERR_ARGUMENT);
+    ck_assert_msg(strstr(error.message, "no group \"lmap\"; did you mean \"lamp\"?") != NULL, "%s",
+                  error.message);
+    ck_assert_int_eq(by_groups(&m, "tabel=1", NULL, &e, &error), LAM_ERR_ARGUMENT);
+    ck_assert_msg(strstr(error.message, "did you mean \"table\"?") != NULL, "%s", error.message);
+    ck_assert_int_eq(by_groups(&m, "xyz=1", NULL, &e, &error), LAM_ERR_ARGUMENT);
+    ck_assert_msg(strstr(error.message, "there are: lamp table.top table.leg") != NULL, "%s", error.message);
+}
+END_TEST
+
+/* More channels than a command line has colours. */
+START_TEST(test_many_channels) {
+    enum { C = 20 };
+    mesh m = hand_made(C);
+    emission e = {0};
+    lam_error error;
+    ck_assert_int_eq(by_groups(&m, "lamp=2", NULL, &e, &error), LAM_OK);
+    for (size_t c = 0; c < C; c++) ck_assert(e.E[c * N] == 2 && e.E[c * N + 1] == 0);
+    emission_free(&e);
+    ck_assert_int_eq(
+        by_groups(&m, "lamp=1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20", NULL, &e, &error), LAM_OK);
+    for (size_t c = 0; c < C; c++) ck_assert(e.E[c * N] == (float)c + 1);
+    emission_free(&e);
 }
 END_TEST
 
@@ -60,7 +91,9 @@ static lam_status by_json(const mesh *m, const char *text, emission *e, lam_erro
     ck_assert_int_ge(descriptor, 0);
     ck_assert_int_eq(write(descriptor, text, strlen(text)), (ssize_t)strlen(text));
     close(descriptor);
-    lam_status status = emission_read(path, m, (emission_sources){.n_tiles = N_TILES}, e, error);
+    emission_scene scene = scene_of(m);
+    lam_status status = emission_read(path, &scene, e, error);
+    emission_scene_free(&scene);
     unlink(path);
     return status;
 }
@@ -74,7 +107,7 @@ START_TEST(test_json) {
     } good[] = {
         {1, 1, false, "[1,2,3,4]", {1, 2, 3, 4}},
         {1, 1, false, "[[1,2,3,4]]", {1, 2, 3, 4}},
-        {1, 2, true, "[[1,2,3,4],[5,6,7,8]]", {1, 2, 3, 4, 5, 6, 7, 8}},
+        {1, 2, true, "{\"emissions\":[[1,2,3,4],[[5,6,7,8]]]}", {1, 2, 3, 4, 5, 6, 7, 8}},
         {3, 1, false, "[1,2,3,4]", {1, 2, 3, 4, 1, 2, 3, 4, 1, 2, 3, 4}},
         {3, 1, false, "[[1,2,3,4],[5,6,7,8],[9,1,2,3]]", {1, 2, 3, 4, 5, 6, 7, 8, 9, 1, 2, 3}},
         {1, 1, false, "{\"elements\":[3,0],\"values\":[5,[6]]}", {6, 0, 0, 5}},
@@ -84,43 +117,24 @@ START_TEST(test_json) {
         {1, 2, true, "{\"emissions\":[[1,0,0,0],{\"groups\":{\"lamp\":7}}]}", {1, 0, 0, 0, 7}},
         {1, 1, true, "{\"emissions\":[[1,0,0,0]]}", {1}},
     };
-    static const char *const bad[] = {"",
-                                      "7",
-                                      "null",
-                                      "{}",
-                                      "[]",
-                                      "[1,2,3]",
-                                      "[1,2,3,-4]",
-                                      "[1,2,3,1e39]",
-                                      "[1,2,3,\"4\"]",
-                                      "[[1,2],[3,4]]",
-                                      "[1,2,3,NaN]",
-                                      "{\"elements\":[4],\"values\":[1]}",
-                                      "{\"elements\":[-1],\"values\":[1]}",
-                                      "{\"elements\":[1.5],\"values\":[1]}",
-                                      "{\"elements\":[1]}",
-                                      "{\"values\":[1]}",
-                                      "{\"elements\":[1],\"values\":[1,2]}",
-                                      "{\"elements\":[1],\"values\":[[1,2]]}",
-                                      "{\"groups\":[1]}",
-                                      "{\"groups\":{\"none\":1}}",
-                                      "{\"groups\":{\"lamp\":null}}",
-                                      "{\"groups\":{},\"elements\":[],\"values\":[]}",
-                                      "{\"sky\":[1]}",
-                                      "{\"sky\":[1,2,3]}",
-                                      "{\"sky\":[1,-2]}",
-                                      "{\"sky\":[1,null]}",
-                                      "{\"sky\":[1,[1,2]]}",
-                                      "{\"sky\":7}",
-                                      "{\"sky\":[1,2],\"emitters\":[1]}",
-                                      "{\"sky\":[1,2],\"values\":[1]}",
-                                      "{\"sky\":[1,2],\"other\":1}",
-                                      "{\"emitters\":[1]}",
-                                      "{\"emissions\":[]}",
-                                      "{\"emissions\":{}}",
-                                      "{\"emission\":[1,2,3,4],\"emissions\":[[1,2,3,4]]}",
-                                      "{\"groups\":{\"lamp\":1},\"other\":1}",
-                                      "[1,2,3,4]x"};
+    static const char *const bad[] = {
+        "", "7", "null", "{}", "[]", "[1,2,3]", "[1,2,3,-4]", "[1,2,3,1e39]", "[1,2,3,\"4\"]",
+        "[[1,2],[3,4]]",
+        /* Rows are channels: a batch is an object with emissions. */
+        "[[1,2,3,4],[5,6,7,8]]", "[{\"groups\":{\"lamp\":1}},{\"groups\":{\"lamp\":2}}]",
+        "{\"elements\":[1,1],\"values\":[1,1]}", "{\"groups\":{\"table\":1,\"table.leg\":2}}",
+        "{\"emission\":[1,2,3,4],\"quantity\":\"indirect\"}",
+        "{\"quantity\":\"indirect\",\"emission\":[1,2,3,4]}", "[1,2,3,NaN]",
+        "{\"elements\":[4],\"values\":[1]}", "{\"elements\":[-1],\"values\":[1]}",
+        "{\"elements\":[1.5],\"values\":[1]}", "{\"elements\":[1]}", "{\"values\":[1]}",
+        "{\"elements\":[1],\"values\":[1,2]}", "{\"elements\":[1],\"values\":[[1,2]]}", "{\"groups\":[1]}",
+        "{\"groups\":{\"none\":1}}", "{\"groups\":{\"lamp\":null}}",
+        "{\"groups\":{},\"elements\":[],\"values\":[]}", "{\"sky\":[1]}", "{\"sky\":[1,2,3]}",
+        "{\"sky\":[1,-2]}", "{\"sky\":[1,null]}", "{\"sky\":[1,[1,2]]}", "{\"sky\":7}",
+        "{\"sky\":[1,2],\"emitters\":[1]}", "{\"sky\":[1,2],\"values\":[1]}", "{\"sky\":[1,2],\"other\":1}",
+        "{\"emitters\":[1]}", "{\"emissions\":[]}", "{\"emissions\":{}}",
+        "{\"emission\":[1,2,3,4],\"emissions\":[[1,2,3,4]]}", "{\"groups\":{\"lamp\":1},\"other\":1}",
+        "[1,2,3,4]x"};
     lam_error error;
     for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
         const mesh m = hand_made(good[i].n_channels);
@@ -168,20 +182,66 @@ START_TEST(test_json_skies) {
 }
 END_TEST
 
+/* Writes an NPY file of this shape whose values count from 1. */
+static void write_counting(int descriptor, size_t rank, const size_t *shape) {
+    float values[64];
+    size_t count = 1;
+    buffer b = {0};
+    for (size_t k = 0; k < rank; k++) count *= shape[k];
+    for (size_t i = 0; i < count; i++) values[i] = (float)(i + 1);
+    ck_assert(npy_write_header(&b, NPY_F4, rank, shape) && npy_write_values(&b, NPY_F4, values, count));
+    ck_assert_int_eq(write(descriptor, b.bytes, b.length), (ssize_t)b.length);
+    close(descriptor);
+    buffer_free(&b);
+}
+
+START_TEST(test_npy) {
+    const mesh m = hand_made(1), colour = hand_made(3);
+    const struct {
+        const mesh *m;
+        size_t rank, shape[3], n_vectors;
+        bool batch;
+    } cases[] = {
+        {&m, 1, {4}, 1, false},           {&m, 2, {1, 4}, 1, true},       {&m, 2, {3, 4}, 3, true},
+        {&m, 3, {3, 1, 4}, 3, true},      {&colour, 1, {4}, 1, false},    {&colour, 2, {3, 4}, 1, false},
+        {&colour, 3, {2, 3, 4}, 2, true}, {&colour, 2, {2, 4}, 0, false}, {&m, 1, {5}, 0, false}};
+    lam_error error;
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        char path[] = "/tmp/test-emission-XXXXXX.npy";
+        const mesh *of = cases[k].m;
+        emission_scene scene = scene_of(of);
+        emission e = {0};
+        write_counting(mkstemps(path, 4), cases[k].rank, cases[k].shape);
+        const lam_status status = emission_read(path, &scene, &e, &error);
+        ck_assert_int_eq(status, cases[k].n_vectors > 0 ? LAM_OK : LAM_ERR_ARGUMENT);
+        ck_assert(e.n_vectors == cases[k].n_vectors && e.batch == cases[k].batch);
+        for (size_t i = 0; i < e.n_vectors * of->n_channels * N; i++)
+            ck_assert(e.E[i] == (float)(cases[k].rank == 1 ? i % N : i) + 1);
+        if (status != LAM_OK) ck_assert_ptr_nonnull(strstr(error.message, path));
+        emission_free(&e);
+        emission_scene_free(&scene);
+        unlink(path);
+    }
+    emission_scene scene = scene_of(&m);
+    emission e = {0};
+    ck_assert_int_eq(emission_read("/nonexistent/a.npy", &scene, &e, &error), LAM_ERR_IO);
+    ck_assert_int_eq(emission_read("/nonexistent/a.json", &scene, &e, &error), LAM_ERR_IO);
+    ck_assert_int_eq(emission_read("/tmp", &scene, &e, &error), LAM_ERR_ARGUMENT);
+    emission_scene_free(&scene);
+}
+END_TEST
+
 /* Puts three dark emissions, or one, under a sky of this shape whose values count from 1. */
-static lam_status under_sky(const mesh *m, size_t n_vectors, int rank, const size_t *dims, emission *e,
+static lam_status under_sky(const mesh *m, size_t n_vectors, size_t rank, const size_t *dims, emission *e,
                             lam_error *error) {
     char path[] = "/tmp/test-emission-XXXXXX.npy";
-    float values[64];
-    int descriptor = mkstemps(path, 4);
-    FILE *stream = fdopen(descriptor, "wb");
-    for (size_t i = 0; i < 64; i++) values[i] = (float)(i + 1);
-    npy_write(stream, rank, dims, values);
-    ck_assert_int_eq(fclose(stream), 0);
+    emission_scene scene = scene_of(m);
+    write_counting(mkstemps(path, 4), rank, dims);
     *e = (emission){.n_vectors = n_vectors};
     ck_assert_int_eq(emission_allocate(path, m->n_channels, N, n_vectors, &e->E, error), LAM_OK);
     e->E[1] = 3;
-    const lam_status status = emission_add_sky(e, path, m, N_TILES, error);
+    const lam_status status = emission_add_sky(e, path, &scene, error);
+    emission_scene_free(&scene);
     unlink(path);
     return status;
 }
@@ -217,11 +277,9 @@ START_TEST(test_skies_from_files) {
     ck_assert_float_eq(e.L[17], 18);
     emission_free(&e);
     static const struct {
-        size_t n_channels, n_vectors;
-        int rank;
-        size_t dims[3];
+        size_t n_channels, n_vectors, rank, dims[3];
         const char *says;
-    } bad[] = {{1, 1, 1, {3}, "rows of 3 values, the store has 2 tiles"},
+    } bad[] = {{1, 1, 1, {3}, "is (3), must be (2) or (vectors, 2), one value for each tile of the sky"},
                {3, 1, 2, {2, 2}, "shape"},
                {1, 3, 2, {2, 2}, "2 skies beside 3 emissions"},
                {1, 1, 2, {0, 2}, "empty"}};
@@ -236,47 +294,16 @@ START_TEST(test_skies_from_files) {
 }
 END_TEST
 
-START_TEST(test_reduce) {
-    const mesh m = hand_made(1);
-    const float x[N] = {9, 1, 3, 2};
-    reduction r = {0};
-    lam_error error;
-    double out[REDUCE_COUNT];
-    ck_assert_int_eq(reduce_parse("table=mean,variance", &r, &error), LAM_OK);
-    ck_assert(r.wanted[REDUCE_MEAN] && r.wanted[REDUCE_VARIANCE] && !r.wanted[REDUCE_SUM]);
-    ck_assert_int_eq(reduce_bind(&r, &m, &error), LAM_OK);
-    reduce_compute(&m, r.inside, x, out);
-    /* areas 2, 3, 4 and values 1, 3, 2: sum 19, mean 19/9 */
-    ck_assert_double_eq_tol(out[REDUCE_SUM], 19, 1e-12);
-    ck_assert_double_eq_tol(out[REDUCE_MEAN], 19. / 9, 1e-12);
-    ck_assert_double_eq(out[REDUCE_MIN], 1);
-    ck_assert_double_eq(out[REDUCE_MAX], 3);
-    ck_assert_double_eq_tol(out[REDUCE_UNIFORMITY], 9. / 19, 1e-12);
-    /* (2 + 27 + 16)/9 - (19/9)^2 */
-    ck_assert_double_eq_tol(out[REDUCE_VARIANCE], 5 - 361. / 81, 1e-12);
-    const bool none[3] = {false, false, false};
-    reduce_compute(&m, none, x, out);
-    ck_assert(isnan(out[REDUCE_MEAN]) && isnan(out[REDUCE_MIN]));
-    reduce_free(&r);
-    static const char *const bad[] = {
-        "table", "=mean", "table=", "table=mean,", "table=median", "table=mean;max"};
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
-        ck_assert_msg(reduce_parse(bad[i], &r, &error) == LAM_ERR_ARGUMENT, "'%s' was read", bad[i]);
-    ck_assert_int_eq(reduce_parse("chair=mean", &r, &error), LAM_OK);
-    ck_assert_int_eq(reduce_bind(&r, &m, &error), LAM_ERR_ARGUMENT);
-    reduce_free(&r);
-}
-END_TEST
-
 int main(void) {
     Suite *s = suite_create("emission");
     TCase *c = tcase_create("all");
     tcase_set_timeout(c, 60);
     tcase_add_test(c, test_groups);
+    tcase_add_test(c, test_many_channels);
+    tcase_add_test(c, test_npy);
     tcase_add_test(c, test_json);
     tcase_add_test(c, test_json_skies);
     tcase_add_test(c, test_skies_from_files);
-    tcase_add_test(c, test_reduce);
     suite_add_tcase(s, c);
     return suite_run(s);
 }
