@@ -37,6 +37,9 @@ bool answer_certificates(buffer *b, size_t n_rhs, bool batch, const answer_notes
 bool answer_head(buffer *b, size_t n, size_t n_channels, const answer_notes *notes);
 bool answer_tail(buffer *b, const answer_notes *notes);
 
+/* Checks that an answer is within single precision; 422. */
+bool answer_check(const float *x, size_t count, problem *why);
+
 /* Appends x [C][n], or [n] for one channel. False with *why as the next. */
 bool answer_rows(buffer *b, const media_accept *as, size_t n_channels, size_t n, const float *x,
                  problem *why);

@@ -2,6 +2,7 @@
 
 #include "solver/base/atomic_file.h"
 #include "solver/base/options.h"
+#include "solver/codec/answer.h"
 #include "solver/codec/npy.h"
 #include "solver/codec/request.h"
 
@@ -135,7 +136,10 @@ lam_status output_write(const solution *s, const char *path, lam_error *error) {
     lam_status status = LAM_OK;
     output_file file = {0};
     char extension[16];
+    problem why;
     output_file_extension(path, extension);
+    if (s->values != NULL && !answer_check(s->values, s->n_vectors * s->m->n_channels * s->m->n, &why))
+        FAIL(error, LAM_ERR_ARGUMENT, "%.200s: %s", path, why.detail);
     TRY(output_file_open(path, &file, error));
     if (strcmp(extension, "npy") == 0)
         TRY(output_npy(s, file.stream, error));
