@@ -3,7 +3,7 @@
 #include "server/route/routes.h"
 #include "server/scene/map_guard.h"
 #include "solver/base/options.h"
-#include "solver/codec/json_memory.h"
+#include "solver/codec/reflectance.h"
 
 #include <errno.h>
 #include <malloc.h>
@@ -128,7 +128,7 @@ int main(int argc, char **argv) {
     lam_error error = {0};
     sigset_t signals = block_signals();
     map_guard_install();
-    json_memory_install();
+    reflectance_watch_memory();
     const int code = config_read(&c, argc, argv);
     if (code != OPTIONS_GO) return fflush(stdout) == 0 ? code : EXIT_FAILURE;
     if (run(&c, &signals, &error) == LAM_OK) return EXIT_SUCCESS;

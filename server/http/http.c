@@ -26,7 +26,7 @@ struct http {
 #define DROP_MAX ((uint64_t)1 << 20)
 
 static void refuse_token(request *r) {
-    answer_refuse(&r->answer, 401, "a bearer token is needed: Authorization: Bearer TOKEN");
+    answer_refuse(&r->answer, PROBLEM_NO_TOKEN, "a bearer token is needed: Authorization: Bearer TOKEN");
 }
 
 /* False, with 503 in place of any answer, if the scene is out of service. */
@@ -35,7 +35,8 @@ static bool check_health(request *r) {
     bool news;
     if (r->call.scene == NULL || !scene_damaged(r->call.scene, &why, &news)) return true;
     if (news) verifier_report_damage(stderr, r->call.scene, &why);
-    answer_refuse(&r->answer, 503, "%.200s is out of service: %s", r->call.scene->name, why.message);
+    answer_refuse(&r->answer, PROBLEM_UNAVAILABLE, "%.200s is out of service: %s", r->call.scene->name,
+                  why.message);
     return false;
 }
 
@@ -47,13 +48,14 @@ static bool check_scene(request *r) {
     if (r->call.scene != NULL) return check_health(r);
     if (variant != VARIANT_SETTLED && r->match.route->also_built) return true;
     if (variant == VARIANT_BUILDING)
-        answer_refuse(&r->answer, 503, "%.200s is being built", r->match.name);
+        answer_refuse(&r->answer, PROBLEM_UNAVAILABLE, "%.200s is being built", r->match.name);
     else if (variant == VARIANT_FAILED)
         answer_problem(&r->answer, &r->variant_why);
     else if (atomic_load(&r->service->state) == SERVICE_LOADING)
-        answer_refuse(&r->answer, 503, "stores are being loaded");
+        answer_refuse(&r->answer, PROBLEM_UNAVAILABLE, "stores are being loaded");
     else
-        answer_refuse(&r->answer, 404, "there is no scene %.200s; GET /v1/scenes lists them", r->match.name);
+        answer_refuse(&r->answer, PROBLEM_NOT_FOUND, "there is no scene %.200s; GET /v1/scenes lists them",
+                      r->match.name);
     return false;
 }
 
@@ -63,22 +65,24 @@ static bool check_type(request *r) {
     r->call.body_type = media_content_type(type);
     r->call.accept = media_choose(http_header(r, MHD_HTTP_HEADER_ACCEPT));
     if (r->call.body_type == MEDIA_OTHER)
-        answer_refuse(&r->answer, 415,
+        answer_refuse(&r->answer, PROBLEM_MEDIA_TYPE,
                       "Content-Type is %.100s, must be application/json or application/x-npy", type);
     else if (encoding != NULL && strcasecmp(encoding, "identity") != 0)
-        answer_refuse(&r->answer, 415, "Content-Encoding is %.100s, must be left out", encoding);
+        answer_refuse(&r->answer, PROBLEM_MEDIA_TYPE, "Content-Encoding is %.100s, must be left out",
+                      encoding);
     else
         return true;
     return false;
 }
 
 static void refuse_length(request *r) {
-    answer_refuse(&r->answer, 413, "the body is longer than %zu bytes (--max-body); send several requests",
+    answer_refuse(&r->answer, PROBLEM_TOO_LONG,
+                  "the body is longer than %zu bytes (--max-body); send several requests",
                   r->service->config->max_body);
 }
 
 static void refuse_to_hold(request *r, const char *what) {
-    answer_refuse(&r->answer, 503,
+    answer_refuse(&r->answer, PROBLEM_UNAVAILABLE,
                   "there is no room for %s: %zu bytes of bodies are held at once (--max-buffered)", what,
                   r->service->config->max_buffered);
 }
@@ -122,7 +126,7 @@ static bool hold_body(request *r, const char *bytes, size_t count) {
     if (room && buffer_append(&r->body, bytes, count)) return true;
     atomic_fetch_sub(&s->body_bytes, count);
     if (room)
-        answer_refuse(&r->answer, 503, "not enough memory for the body");
+        answer_refuse(&r->answer, PROBLEM_NO_MEMORY, "not enough memory for the body");
     else
         refuse_to_hold(r, "the rest of the body");
     return false;
@@ -149,7 +153,7 @@ static bool begin_solve(batch_job *job, batch_workspace *workspace) {
     r->call.workspace = workspace;
     map_guard_allow();
     if (client_is_lost(r->client)) {
-        answer_refuse(&r->answer, 503, "the client left before the solve began");
+        answer_refuse(&r->answer, PROBLEM_UNAVAILABLE, "the client left before the solve began");
     } else if (to->steps != NULL) {
         if (to->steps->begin(&r->call, &r->answer)) return true;
     } else {
@@ -207,7 +211,8 @@ static enum MHD_Result handle(request *r) {
             client_enter(r->service->connections, r->client, STAGE_SOLVE, 0);
             MHD_suspend_connection(r->connection);
             if (batch_submit(r->service->queue, &r->call.job)) return MHD_YES;
-            answer_refuse(&r->answer, 503, "%zu solves wait or run (--max-inflight); try again",
+            answer_refuse(&r->answer, PROBLEM_UNAVAILABLE,
+                          "%zu solves wait or run (--max-inflight); try again",
                           r->service->config->max_inflight);
             r->answered = true;
             MHD_resume_connection(r->connection);

@@ -21,8 +21,8 @@ void answer_problem(answer *out, const problem *what) {
     out->retry_after = 1;
 }
 
-void answer_refuse(answer *out, unsigned status, const char *format, ...) {
-    problem what = {.status = status};
+void answer_refuse(answer *out, problem_kind kind, const char *format, ...) {
+    problem what = {.kind = kind, .status = problem_status(kind)};
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(what.detail, sizeof what.detail, format, arguments);
@@ -33,7 +33,7 @@ void answer_refuse(answer *out, unsigned status, const char *format, ...) {
 void answer_json(answer *out, buffer *b, bool written) {
     if (!written) {
         buffer_free(b);
-        answer_refuse(out, 503, "not enough memory for the answer");
+        answer_refuse(out, PROBLEM_NO_MEMORY, "not enough memory for the answer");
         return;
     }
     *out = (answer){.status = 200, .type = "application/json", .body = *b};

@@ -50,7 +50,7 @@ static inline call *call_of(batch_job *job) {
 
 /* Makes the answer a problem document. */
 void answer_problem(answer *out, const problem *what);
-void answer_refuse(answer *out, unsigned status, const char *format, ...)
+void answer_refuse(answer *out, problem_kind kind, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
 /* Makes the answer the JSON in b (taken over), or 503 if it could not be written. */

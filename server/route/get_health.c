@@ -18,10 +18,10 @@ void get_readyz(call *in, answer *out) {
         answer_state(out, "ready");
         break;
     case SERVICE_LOADING:
-        answer_refuse(out, 503, "loading stores");
+        answer_refuse(out, PROBLEM_UNAVAILABLE, "loading stores");
         break;
     case SERVICE_DRAINING:
-        answer_refuse(out, 503, "shutting down");
+        answer_refuse(out, PROBLEM_UNAVAILABLE, "shutting down");
         break;
     }
 }

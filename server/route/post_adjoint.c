@@ -40,7 +40,8 @@ static bool get_memory(call *in, const adjoint_request *request, adjoint_memory 
     char *bytes = NULL;
     if (fits && memory->work_bytes > 0 && !__builtin_add_overflow(total, memory->work_bytes, &all))
         bytes = batch_workspace_get(in->workspace, all);
-    if (bytes == NULL) return problem_set(why, 503, "not enough memory to solve for a gradient");
+    if (bytes == NULL)
+        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve for a gradient");
     float **const places[] = {&memory->w, &memory->H, &memory->H0, &memory->v, &memory->narrow};
     for (size_t k = 0; k < 5; k++) *places[k] = (float *)(void *)(bytes + at[k]);
     memory->work = bytes + total;
@@ -58,7 +59,7 @@ static bool solve_irradiance(const scene *s, const radiosity_request *light, adj
     }
     return lam_operator_apply_lit(s->op, 1, LAM_IRRADIANCE, light->E, *H0, memory->H, memory->work,
                                   memory->work_bytes, &error) == LAM_OK ||
-           problem_set(why, 500, "%s", error.message);
+           problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
 }
 
 /* Computes the gradients asked for: by emission in w, by reflectance in H, by tile or emitter in narrow. */
@@ -71,10 +72,10 @@ static bool solve(const scene *s, const adjoint_request *request, adjoint_memory
     if (s->n_emitters > 0)
         return lam_operator_adjoint_emitters(s->op, 1, request->quantity, g, memory->narrow, memory->work,
                                              memory->work_bytes, &error) == LAM_OK ||
-               problem_set(why, 500, "%s", error.message);
+               problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
     if (lam_operator_apply_adjoint(s->op, 1, request->quantity, g, memory->w, memory->work,
                                    memory->work_bytes, &error) != LAM_OK)
-        return problem_set(why, 500, "%s", error.message);
+        return problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
     if (adjoint_wants(request, GRADIENT_SKY)) {
         gradient_of_sky_irradiance(request->quantity, vector, s->reflectance, g, memory->w, memory->v);
         lam_sky_adjoint(s->sky, s->n_channels, memory->v, memory->narrow);
@@ -101,7 +102,7 @@ static bool write_npy(const call *in, const adjoint_request *request, const adjo
     const float *values = gradient_values(in->scene, memory, request->named[0], &width);
     const size_t dims[2] = {C, width};
     if (!npy_write_header(b, in->accept.npy, C > 1 ? 2 : 1, C > 1 ? dims : &dims[1]))
-        return problem_set(why, 503, "not enough memory for the answer");
+        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
     return answer_rows(b, &in->accept, C, width, values, why);
 }
 
@@ -119,7 +120,8 @@ static bool write_json(const call *in, const adjoint_request *request, const adj
     }
     written = written && buffer_append(b, "}", 1);
     notes->encode_ms = call_now_ms() - start;
-    return (written && answer_tail(b, notes)) || problem_set(why, 503, "not enough memory for the answer");
+    return (written && answer_tail(b, notes)) ||
+           problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
 }
 
 static bool read_body(const call *in, adjoint_request *request, problem *why) {
@@ -129,7 +131,8 @@ static bool read_body(const call *in, adjoint_request *request, problem *why) {
         return false;
     if (in->accept.type == MEDIA_JSON) return true;
     if (request->n_named > 1)
-        return problem_set(why, 422, "an NPY answer holds one array; ask for one gradient, or for JSON");
+        return problem_set(why, PROBLEM_NOT_IN_ENCODING,
+                           "an NPY answer holds one array; ask for one gradient, or for JSON");
     request->wanted = 1u << request->named[0]; /* an NPY answer has no gradient by sky */
     return true;
 }

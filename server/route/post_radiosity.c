@@ -53,16 +53,19 @@ static bool find_light(const scene *s, radiosity_solve *solve, problem *why) {
         if (request->sky.values == NULL) return true;
         solve->H0 = allocate_rows(solve, s->n);
         if (solve->H0 == NULL)
-            return problem_set(why, 503, "not enough memory for %zu skies", request->n_rhs);
+            return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for %zu skies", request->n_rhs);
         lam_sky_irradiance(s->sky, request->n_rhs * C, request->sky.values, solve->H0);
         return true;
     }
     solve->W = allocate_rows(solve, s->n_emitters);
     if (solve->W == NULL)
-        return problem_set(why, 503, "not enough memory for the weights of %zu vectors", request->n_rhs);
+        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the weights of %zu vectors",
+                           request->n_rhs);
     const lam_status status = lam_operator_weights(s->op, request->n_rhs, request->E, n_tiles,
                                                    request->sky.values, solve->W, &error);
-    if (status != LAM_OK) return problem_set(why, status == LAM_ERR_MEMORY ? 503 : 422, "%s", error.message);
+    if (status != LAM_OK)
+        return problem_set(why, status == LAM_ERR_MEMORY ? PROBLEM_NO_MEMORY : PROBLEM_NOT_IN_STORE, "%s",
+                           error.message);
     for (size_t k = 0; request->emitters.values != NULL && k < request->n_rhs * C * s->n_emitters; k++)
         solve->W[k] += request->emitters.values[k];
     return true;
@@ -76,12 +79,13 @@ static bool find_room(call *in, radiosity_solve *s, problem *why) {
         s->figures = reduce_figures(reduce, s->shape.n_rhs, s->shape.n_channels);
         s->out = s->own = allocate_rows(s, s->shape.n_values);
         return (s->figures != NULL && s->own != NULL) ||
-               problem_set(why, 503, "not enough memory to reduce %zu vectors", s->shape.n_rhs);
+               problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to reduce %zu vectors", s->shape.n_rhs);
     }
     if (!answer_begin(&s->answer, &s->shape, &in->accept, &s->notes, why)) return false;
     s->out = answer_place(&s->answer, &s->shape, &in->accept);
     if (s->out == NULL) s->out = s->own = allocate_rows(s, s->shape.n_values);
-    return s->out != NULL || problem_set(why, 503, "not enough memory to solve %zu vectors", s->shape.n_rhs);
+    return s->out != NULL ||
+           problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve %zu vectors", s->shape.n_rhs);
 }
 
 static bool begin(call *in, answer *out) {
@@ -90,7 +94,7 @@ static bool begin(call *in, answer *out) {
     problem why = {0};
     radiosity_solve *s = calloc(1, sizeof *s);
     if (s == NULL) {
-        answer_refuse(out, 503, "not enough memory for the request");
+        answer_refuse(out, PROBLEM_NO_MEMORY, "not enough memory for the request");
         return false;
     }
     const double start = call_now_ms();
@@ -135,7 +139,7 @@ static bool begin(call *in, answer *out) {
 static void *get_work(const scene *s, size_t n_rhs, batch_workspace *workspace, size_t *bytes, problem *why) {
     *bytes = lam_operator_work_bytes(s->op, n_rhs);
     void *work = *bytes > 0 ? batch_workspace_get(workspace, *bytes) : NULL;
-    if (work == NULL) problem_set(why, 503, "not enough memory to solve %zu vectors", n_rhs);
+    if (work == NULL) problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to solve %zu vectors", n_rhs);
     return work;
 }
 
@@ -195,7 +199,7 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
             s->n_emitters > 0     ? pass_of_emitters(s, one, parts, shared[0].out, work, bytes, &error)
             : one->request.select ? pass_of_selected(s, one, parts, shared[0].out, work, bytes, &error)
                                   : lam_operator_apply_parts(s->op, n_parts, shared, work, bytes, &error);
-        if (status != LAM_OK) problem_set(&why, 500, "%s", error.message);
+        if (status != LAM_OK) problem_set(&why, PROBLEM_INTERNAL, "%s", error.message);
     }
     metrics_pass(first->service->metrics, count);
     const double took = call_now_ms() - start;

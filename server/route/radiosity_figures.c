@@ -18,7 +18,8 @@
 
 bool figures_acceptable(const call *in, const radiosity_request *request, problem *why) {
     return !request->reduce.on || in->accept.type == MEDIA_JSON ||
-           problem_set(why, 422, "reduce is answered in JSON; leave application/x-npy out of Accept");
+           problem_set(why, PROBLEM_NOT_IN_ENCODING,
+                       "reduce is answered in JSON; leave application/x-npy out of Accept");
 }
 
 bool figures_add(const scene *s, const radiosity_request *request, size_t first, size_t count, const float *x,
@@ -27,11 +28,11 @@ bool figures_add(const scene *s, const radiosity_request *request, size_t first,
     int bad = 0;
     for (size_t i = 0; i < n_values; i++) bad |= !(fabsf(x[i]) <= FLT_MAX);
     if (bad)
-        return problem_set(why, 422,
+        return problem_set(why, PROBLEM_NOT_IN_ENCODING,
                            "the answer passes the range of single precision (3.4e38); scale the emission");
     return reduce_vectors(&request->reduce, &s->groups, s->area, s->n_channels, request->n_rhs, first, count,
                           (reduce_values){.floats = x}, figures) ||
-           problem_set(why, 503, "not enough memory to reduce %zu vectors", count);
+           problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to reduce %zu vectors", count);
 }
 
 bool figures_write(const scene *s, const radiosity_request *request, const double *figures,
@@ -39,7 +40,8 @@ bool figures_write(const scene *s, const radiosity_request *request, const doubl
     return (answer_head(b, s->n, s->n_channels, notes) && buffer_append_text(b, ",\"groups\":") &&
             reduce_write(&request->reduce, s->n_channels, request->n_rhs, request->batch, figures, b) &&
             answer_certificates(b, request->n_rhs, request->batch, notes) && answer_tail(b, notes)) ||
-           problem_set(why, 503, "not enough memory for the answer; ask for fewer vectors or groups");
+           problem_set(why, PROBLEM_NO_MEMORY,
+                       "not enough memory for the answer; ask for fewer vectors or groups");
 }
 
 /* *weights [n_rhs][C][s]: the whole emission of each vector as weights of emitters; NULL if not needed. */
@@ -55,10 +57,13 @@ static bool weights_of(const call *in, radiosity_request *request, float **weigh
     if (!radiosity_request_expand(request, &about, why)) return false;
     if (size_multiply(request->n_rhs, row, &count))
         *weights = memory_allocate(count, sizeof **weights, "weights", NULL);
-    if (*weights == NULL) return problem_set(why, 503, "not enough memory for %zu vectors", request->n_rhs);
+    if (*weights == NULL)
+        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for %zu vectors", request->n_rhs);
     const lam_status status = lam_operator_weights(s->op, request->n_rhs, request->E, about.n_tiles,
                                                    request->sky.values, *weights, &error);
-    if (status != LAM_OK) return problem_set(why, status == LAM_ERR_MEMORY ? 503 : 422, "%s", error.message);
+    if (status != LAM_OK)
+        return problem_set(why, status == LAM_ERR_MEMORY ? PROBLEM_NO_MEMORY : PROBLEM_NOT_IN_STORE, "%s",
+                           error.message);
     for (size_t k = 0; k < request->emitters.n * row; k++) (*weights)[k] += request->emitters.values[k];
     return true;
 }
@@ -72,7 +77,9 @@ static bool evaluate(const call *in, radiosity_request *request, adjoint_row *co
     double *means = memory_allocate(request->n_rhs, s->n_channels * sizeof *means, "means", NULL);
     float *weights = NULL;
     bool good = figures != NULL && means != NULL;
-    if (!good) problem_set(why, 503, "not enough memory for the answer; ask for fewer vectors or groups");
+    if (!good)
+        problem_set(why, PROBLEM_NO_MEMORY,
+                    "not enough memory for the answer; ask for fewer vectors or groups");
     if (good && !adjoint_row_suffices(s, rows[0], request)) good = weights_of(in, request, &weights, why);
     for (size_t k = 0; good && k < r->n_names; k++) {
         adjoint_row_evaluate(s, rows[k], request, weights, means);

@@ -69,13 +69,13 @@ static bool pass_memory_allocate(const scene *s, const radiosity_request *reques
         p->work = memory_allocate(p->work_bytes, 1, "work", NULL);
         good = good && p->start != NULL && p->W != NULL && p->work != NULL;
     }
-    return good || problem_set(why, 503, "not enough memory to refine %zu vectors", vectors);
+    return good || problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to refine %zu vectors", vectors);
 }
 
 static bool refuse(lam_status status, const lam_error *error, problem *why) {
-    const unsigned as = status == LAM_ERR_MEMORY || status == LAM_ERR_IO          ? 503
-                        : status == LAM_ERR_NUMERIC || status == LAM_ERR_ARGUMENT ? 422
-                                                                                  : 500;
+    const problem_kind as = status == LAM_ERR_MEMORY || status == LAM_ERR_IO          ? PROBLEM_NO_MEMORY
+                            : status == LAM_ERR_NUMERIC || status == LAM_ERR_ARGUMENT ? PROBLEM_NOT_REFINED
+                                                                                      : PROBLEM_INTERNAL;
     return problem_set(why, as, "%s", error->message);
 }
 
@@ -134,7 +134,7 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
                    problem *why) {
     const scene *s = in->scene;
     refined_solve *r = calloc(1, sizeof *r);
-    if (r == NULL) return problem_set(why, 503, "not enough memory for the request");
+    if (r == NULL) return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the request");
     r->as = in->accept;
     if (!r->as.npy_given) r->as.npy = NPY_F8;
     r->shape = (answer_shape){.n = s->n,
@@ -150,7 +150,7 @@ bool refined_begin(call *in, const radiosity_request *request, answer_notes *not
     if (request->reduce.on) r->figures = reduce_figures(&request->reduce, request->n_rhs, s->n_channels);
     return (r->certificates != NULL && r->iterations != NULL &&
             (r->figures != NULL || !request->reduce.on)) ||
-           problem_set(why, 503, "not enough memory for %zu certificates", request->n_rhs);
+           problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for %zu certificates", request->n_rhs);
 }
 
 /* The refiner of a scene; its first use reads the form factors. */
@@ -159,7 +159,7 @@ static bool find_refiner(const scene *s, const lam_refiner **refiner, problem *w
     const lam_status status = refined_get(s->refined, refiner, &error);
     if (status != LAM_OK) return refuse(status, &error, why);
     if (*refiner != NULL) return true;
-    problem_set(why, 422,
+    problem_set(why, PROBLEM_NOT_IN_STORE,
                 "scene %.80s keeps no form factors, which a tolerance needs; precompute it with "
                 "--keep-form-factors",
                 s->name);
@@ -187,7 +187,7 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
     if (good && r->figures != NULL)
         good = reduce_vectors(&request->reduce, &s->groups, s->area, s->n_channels, request->n_rhs, first,
                               count, (reduce_values){.doubles = x}, r->figures) ||
-               problem_set(why, 503, "not enough memory to reduce %zu vectors", count);
+               problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to reduce %zu vectors", count);
     for (size_t v = 0; good && r->figures == NULL && v < count; v++) {
         /* One by one: each vector has its own rounding error, which counts in its certificate. */
         double rounding = 0;

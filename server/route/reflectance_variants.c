@@ -17,19 +17,24 @@
 static bool check_scene(const call *in, problem *why) {
     const scene *s = in->scene;
     if (in->service->config->max_variants == 0)
-        return problem_set(why, 403, "this daemon makes no variants; start it with --max-variants N");
+        return problem_set(why, PROBLEM_NOT_ALLOWED,
+                           "this daemon makes no variants; start it with --max-variants N");
     if (in->service->token.length == 0)
-        return problem_set(why, 403, "variants need a token; start the daemon with --token-file FILE");
+        return problem_set(why, PROBLEM_NOT_ALLOWED,
+                           "variants need a token; start the daemon with --token-file FILE");
     if (s->base != NULL)
-        return problem_set(why, 409, "%.200s is a variant itself; PUT to /v1/scenes/%.200s/reflectance",
-                           s->name, s->base->name);
+        return problem_set(why, PROBLEM_CONFLICT,
+                           "%.200s is a variant itself; PUT to /v1/scenes/%.200s/reflectance", s->name,
+                           s->base->name);
     if (!operator_keeps_factors(s->op))
-        return problem_set(why, 409,
+        return problem_set(why, PROBLEM_CONFLICT,
                            "%.200s keeps no factors (%s); precompute it with --method low-rank or 2msc and "
                            "--keep-factors",
                            s->name, lam_operator_kind(s->op));
-    if (in->body_type != MEDIA_JSON) return problem_set(why, 415, "Content-Type must be application/json");
-    if (in->length > BODY_MOST) return problem_set(why, 413, "the body is longer than %zu bytes", BODY_MOST);
+    if (in->body_type != MEDIA_JSON)
+        return problem_set(why, PROBLEM_MEDIA_TYPE, "Content-Type must be application/json");
+    if (in->length > BODY_MOST)
+        return problem_set(why, PROBLEM_TOO_LONG, "the body is longer than %zu bytes", BODY_MOST);
     return true;
 }
 
@@ -63,10 +68,11 @@ static bool put(const call *in, reflectance_request *request, char **location, p
     char name[ROUTE_NAME_MAX];
     float *reflectance = request->reflectance;
     if (snprintf(name, sizeof name, "%s@%s", in->scene->name, request->variant) >= ROUTE_NAME_MAX)
-        return problem_set(why, 422, "%.100s: with the scene's name it is longer than the %d bytes of a name",
+        return problem_set(why, PROBLEM_TOO_MUCH,
+                           "%.100s: with the scene's name it is longer than the %d bytes of a name",
                            request->variant, ROUTE_NAME_MAX - 1);
     *location = path_of(name);
-    if (*location == NULL) return problem_set(why, 503, "not enough memory for a variant");
+    if (*location == NULL) return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for a variant");
     request->reflectance = NULL;
     return variants_put(in->service->variants, scene_of(in), name, reflectance, request->groups, why);
 }
@@ -84,7 +90,7 @@ void put_reflectance(call *in, answer *out) {
         good = codec_read_reflectance(&about, in->body, in->length, &request, &why);
     }
     if (good && !buffer_append_text(&b, "{\"status\":\"building\"}\n"))
-        good = problem_set(&why, 503, "not enough memory for the answer");
+        good = problem_set(&why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
     good = good && put(in, &request, &location, &why);
     if (good) {
         answer_json(out, &b, true);
@@ -114,7 +120,7 @@ static bool is_of_store(const call *in) {
 
 void delete_scene(call *in, answer *out) {
     if (is_of_store(in)) {
-        answer_refuse(out, 405,
+        answer_refuse(out, PROBLEM_WRONG_METHOD,
                       "/v1/scenes/%.200s: the method is DELETE, must be GET, HEAD: it is a store, and only "
                       "variants can be deleted",
                       in->scene->name);
@@ -132,15 +138,15 @@ void delete_reflectance(call *in, answer *out) {
         return;
     }
     if (in->body_type != MEDIA_JSON)
-        answer_refuse(out, 415, "Content-Type must be application/json");
+        answer_refuse(out, PROBLEM_MEDIA_TYPE, "Content-Type must be application/json");
     else if (in->length == 0)
-        answer_refuse(out, 422,
+        answer_refuse(out, PROBLEM_WRONG_MEMBERS,
                       "which variant? DELETE /v1/scenes/%.200s@VARIANT/reflectance, or {\"variant\":...}",
                       in->scene->name);
     else if (!codec_read_variant(in->body, in->length, &variant, &why))
         answer_problem(out, &why);
     else if (snprintf(name, sizeof name, "%s@%s", in->scene->name, variant) >= ROUTE_NAME_MAX)
-        answer_refuse(out, 404, "there is no variant %.200s", variant);
+        answer_refuse(out, PROBLEM_NOT_FOUND, "there is no variant %.200s", variant);
     else
         remove_variant(in, name, out);
     free(variant);

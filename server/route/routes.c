@@ -102,9 +102,10 @@ void route_find(const char *method, const char *path, route_match *match, answer
         if (i + 1 == N_ROUTES || strcmp(routes[i].pattern, routes[i + 1].pattern) != 0) break;
     }
     if (match->label == N_ROUTES) {
-        answer_refuse(out, 404, "%.120s: there is no such route", path);
+        answer_refuse(out, PROBLEM_NOT_FOUND, "%.120s: there is no such route", path);
     } else {
-        answer_refuse(out, 405, "%.120s: the method is %.20s, must be %s", path, method, allow);
+        answer_refuse(out, PROBLEM_WRONG_METHOD, "%.120s: the method is %.20s, must be %s", path, method,
+                      allow);
         memcpy(out->allow, allow, sizeof allow);
     }
 }

@@ -215,7 +215,7 @@ static bool make_rows(const scene *s, const radiosity_request *request, size_t c
     for (size_t k = 0; allocated && k < count; k++)
         allocated = (made[k] = row_allocate(s, &request->reduce.names[which[k]], request->quantity)) != NULL;
     if (!allocated) {
-        problem_set(why, 503, "not enough memory for the adjoint rows of %zu groups", count);
+        problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the adjoint rows of %zu groups", count);
         goto done;
     }
     float *g = (float *)(void *)bytes, *w = (float *)(void *)(bytes + g_bytes);
@@ -227,7 +227,7 @@ static bool make_rows(const scene *s, const radiosity_request *request, size_t c
             ? lam_operator_adjoint_emitters(s->op, count, request->quantity, g, w, work, work_bytes, &error)
             : lam_operator_apply_adjoint(s->op, count, request->quantity, g, w, work, work_bytes, &error);
     if (status != LAM_OK) {
-        problem_set(why, 500, "%s", error.message);
+        problem_set(why, PROBLEM_INTERNAL, "%s", error.message);
         goto done;
     }
     for (size_t k = 0; k < count; k++) {

@@ -102,10 +102,10 @@ done:
 /* Keeps the reason of a failed build for clients. */
 static void keep_failed(variants *v, build *b, lam_status status, const lam_error *error) {
     problem_set(&b->why,
-                status == LAM_ERR_MEMORY     ? 503
-                : status == LAM_ERR_ARGUMENT ? 409
-                : status == LAM_ERR_NUMERIC  ? 422
-                                             : 500,
+                status == LAM_ERR_MEMORY     ? PROBLEM_NO_MEMORY
+                : status == LAM_ERR_ARGUMENT ? PROBLEM_CONFLICT
+                : status == LAM_ERR_NUMERIC  ? PROBLEM_BAD_VALUE
+                                             : PROBLEM_INTERNAL,
                 "%.200s could not be built: %.240s", b->name, error->message);
     free(b->reflectance);
     b->reflectance = NULL;
@@ -205,7 +205,7 @@ static build *build_create(scene *base, const char *name, float *reflectance, co
 bool variants_put(variants *v, scene *base, const char *name, float *reflectance, const char *groups,
                   problem *why) {
     build *b = build_create(base, name, reflectance, groups), *dropped = NULL;
-    if (b == NULL) return problem_set(why, 503, "not enough memory for a variant");
+    if (b == NULL) return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for a variant");
     catalog_snapshot *served = catalog_acquire(v->catalog);
     const scene *known = catalog_find(served, name);
     const bool taken = known != NULL && known->base == NULL;
@@ -213,12 +213,12 @@ bool variants_put(variants *v, scene *base, const char *name, float *reflectance
     bool good = false;
     pthread_mutex_lock(&v->lock);
     if (taken) {
-        problem_set(why, 409, "the name %.200s is taken by a store; choose another", name);
+        problem_set(why, PROBLEM_CONFLICT, "the name %.200s is taken by a store; choose another", name);
     } else if (v->closed) {
-        problem_set(why, 503, "shutting down");
+        problem_set(why, PROBLEM_UNAVAILABLE, "shutting down");
     } else if (is_full(v, name)) {
-        problem_set(why, 429, "there are %zu variants already (--max-variants); DELETE one",
-                    v->config->max_variants);
+        problem_set(why, PROBLEM_TOO_MANY_VARIANTS,
+                    "there are %zu variants already (--max-variants); DELETE one", v->config->max_variants);
     } else {
         dropped = take(find(v, name));
         if (is_running(v, name)) atomic_store(&v->running->cancelled, true);
@@ -243,8 +243,9 @@ bool variants_remove(variants *v, const char *name, problem *why) {
     pthread_mutex_unlock(&v->lock);
     const bool found = dropped != NULL || running || status == LAM_OK;
     build_free(dropped);
-    if (status == LAM_ERR_MEMORY) return problem_set(why, 503, "not enough memory to take %.200s out", name);
-    return found || problem_set(why, 404, "there is no variant %.200s", name);
+    if (status == LAM_ERR_MEMORY)
+        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to take %.200s out", name);
+    return found || problem_set(why, PROBLEM_NOT_FOUND, "there is no variant %.200s", name);
 }
 
 variant_state variants_state(variants *v, const char *name, problem *why) {

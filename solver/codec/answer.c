@@ -9,7 +9,7 @@
 #include <math.h>
 
 static bool no_memory(problem *why) {
-    return problem_set(why, 503,
+    return problem_set(why, PROBLEM_NO_MEMORY,
                        "not enough memory for the answer; ask for fewer vectors or select elements");
 }
 
@@ -47,9 +47,9 @@ bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, 
 /* Refuses what would be written as something else than it is. */
 static bool refuse_range(double limit, problem *why) {
     if (limit < (double)FLT_MAX)
-        return problem_set(why, 422, "the answer passes the range of half precision (%g); ask for dtype=f4",
-                           limit);
-    return problem_set(why, 422,
+        return problem_set(why, PROBLEM_NOT_IN_ENCODING,
+                           "the answer passes the range of half precision (%g); ask for dtype=f4", limit);
+    return problem_set(why, PROBLEM_NOT_IN_ENCODING,
                        "the answer passes the range of single precision (3.4e38); scale the emission");
 }
 

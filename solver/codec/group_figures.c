@@ -24,13 +24,13 @@ bool reduce_request_with(reduce_request *r, const char *word, size_t length, pro
         if (strlen(name) != length || memcmp(name, word, length) != 0) continue;
         for (size_t k = 0; k < r->n_with; k++)
             if (r->with[k] == (reduce_statistic)s)
-                return problem_set(why, 422, "\"%s\" was listed before", name);
+                return problem_set(why, PROBLEM_GIVEN_TWICE, "\"%s\" was listed before", name);
         r->with[r->n_with++] = (reduce_statistic)s;
         r->linear = (r->n_with == 1 || r->linear) && (s == REDUCE_MEAN || s == REDUCE_SUM);
         return true;
     }
-    return problem_set(why, 422, "\"%.*s\" must be one of: mean, sum, min, max, uniformity, variance", shown,
-                       word);
+    return problem_set(why, PROBLEM_UNKNOWN_WORD,
+                       "\"%.*s\" must be one of: mean, sum, min, max, uniformity, variance", shown, word);
 }
 
 const char *reduce_text(const reduce_request *r, size_t k) {
@@ -41,19 +41,21 @@ bool reduce_request_add(reduce_request *r, const char *name, size_t length, cons
                         size_t n_groups, problem *why) {
     for (size_t k = 0; k < r->n_names; k++)
         if (strlen(reduce_text(r, k)) == length && memcmp(reduce_text(r, k), name, length) == 0)
-            return problem_set(why, 422, "the group %.80s is given twice", reduce_text(r, k));
+            return problem_set(why, PROBLEM_GIVEN_TWICE, "the group %.80s is given twice", reduce_text(r, k));
     if (r->n_names == REDUCE_NAMES_MAX)
-        return problem_set(why, 422, "more than %d groups; send several requests", REDUCE_NAMES_MAX);
+        return problem_set(why, PROBLEM_TOO_MUCH, "more than %d groups; send several requests",
+                           REDUCE_NAMES_MAX);
     if (r->n_names == r->names_capacity) {
         const size_t capacity = r->n_names == 0 ? 1 : 2 * r->n_names;
         reduce_name *names = realloc(r->names, capacity * sizeof *names);
-        if (names == NULL) return problem_set(why, 503, "not enough memory for the groups of reduce");
+        if (names == NULL)
+            return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the groups of reduce");
         r->names = names;
         r->names_capacity = capacity;
     }
     const size_t text = r->texts.length;
     if (!buffer_append(&r->texts, name, length) || !buffer_append(&r->texts, "", 1))
-        return problem_set(why, 503, "not enough memory for the groups of reduce");
+        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the groups of reduce");
     r->names[r->n_names++] = (reduce_name){.text = text, .groups = groups, .n_groups = n_groups};
     return true;
 }

@@ -18,8 +18,8 @@ static bool read_selected_groups(parser *p, index_list *selected) {
         for (size_t k = 0; k < n_found; k++) {
             uint32_t first = groups->start[found[k]], count = groups->start[found[k] + 1] - first;
             if (count > p->scene->n - selected->count)
-                return parser_refuse(p, 422, "%s: more than the %zu elements of the scene", parser_here(p),
-                                     p->scene->n);
+                return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s: more than the %zu elements of the scene",
+                                     parser_here(p), p->scene->n);
             if (!parser_append(p, selected, groups->elements + first, count)) return false;
         }
         p->pointer_length = mark;
@@ -44,7 +44,7 @@ static bool read_select_members(parser *p, index_list *selected) {
     if (p->why->status != 0) return false;
     p->pointer_length = mark;
     return seen == 1 || seen == 2 ||
-           parser_refuse(p, 422, "%s must hold either elements or groups", parser_here(p));
+           parser_refuse(p, PROBLEM_WRONG_MEMBERS, "%s must hold either elements or groups", parser_here(p));
 }
 
 static bool read_select(parser *p) {
@@ -71,12 +71,12 @@ static bool read_reduced_groups(parser *p) {
         parser_point_index(p, index);
         if (!parser_read_group(p, &name, &found, &n_found)) return false;
         if (!reduce_request_add(reduce, name.bytes, name.length, found, n_found, &why))
-            return parser_refuse(p, why.status, "%s: %.200s", parser_here(p), why.detail);
+            return parser_refuse(p, why.kind, "%s: %.200s", parser_here(p), why.detail);
         p->pointer_length = mark;
     }
     if (!parser_closed(p)) return false;
-    return reduce->n_names > 0 ||
-           parser_refuse(p, 422, "%s is empty, must hold the name of a group", parser_here(p));
+    return reduce->n_names > 0 || parser_refuse(p, PROBLEM_WRONG_LENGTH,
+                                                "%s is empty, must hold the name of a group", parser_here(p));
 }
 
 /* ["mean", ...] */
@@ -92,12 +92,13 @@ static bool read_with(parser *p) {
         if (!parser_expect(p, JSON_TEXT, "the name of a figure")) return false;
         if (!json_read_text(&p->r, &word)) return parser_fault(p);
         if (!reduce_request_with(reduce, word.bytes, word.length, &why))
-            return parser_refuse(p, why.status, "%s: %.200s", parser_here(p), why.detail);
+            return parser_refuse(p, why.kind, "%s: %.200s", parser_here(p), why.detail);
         p->pointer_length = mark;
     }
     if (!parser_closed(p)) return false;
     return reduce->n_with > 0 ||
-           parser_refuse(p, 422, "%s is empty, must hold mean, sum, min, max, uniformity or variance",
+           parser_refuse(p, PROBLEM_WRONG_LENGTH,
+                         "%s is empty, must hold mean, sum, min, max, uniformity or variance",
                          parser_here(p));
 }
 
@@ -116,7 +117,8 @@ static bool read_reduce(parser *p) {
     }
     if (p->why->status != 0) return false;
     p->request->reduce.on = true;
-    return seen == 3 || parser_refuse(p, 422, "%s must hold both groups and with", parser_here(p));
+    return seen == 3 ||
+           parser_refuse(p, PROBLEM_WRONG_MEMBERS, "%s must hold both groups and with", parser_here(p));
 }
 
 static bool read_tolerance(parser *p) {
@@ -124,7 +126,8 @@ static bool read_tolerance(parser *p) {
     if (!parser_expect(p, JSON_NUMBER, "a number above 0 and below 1")) return false;
     if (!json_read_double(&p->r, value)) return parser_fault(p);
     return (*value > 0 && *value < 1) ||
-           parser_refuse(p, 422, "%s = %.9g, must be above 0 and below 1", parser_here(p), *value);
+           parser_refuse(p, PROBLEM_BAD_VALUE, "%s = %.9g, must be above 0 and below 1", parser_here(p),
+                         *value);
 }
 
 /* The members that hold emissions, in a request and in a file. */
@@ -133,7 +136,8 @@ enum { EMISSION, EMISSIONS, EITHER = 1u << EMISSION | 1u << EMISSIONS };
 static bool read_lights(parser *p, size_t which, unsigned seen) {
     if ((seen & EITHER) == EITHER) {
         p->pointer_length = 0;
-        return parser_refuse(p, 422, "%s holds both emission and emissions, must hold one of them",
+        return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
+                             "%s holds both emission and emissions, must hold one of them",
                              codec_source(p->scene));
     }
     if (which == EMISSION) return parser_read_emission(p);
@@ -172,18 +176,20 @@ static bool read_body(parser *p) {
         if (!good) return false;
         p->pointer_length = 0;
         if (p->request->reduce.on && p->request->select)
-            return parser_refuse(p, 422, "the body holds both select and reduce, must hold one of them");
+            return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
+                                 "the body holds both select and reduce, must hold one of them");
     }
     if (p->why->status != 0) return false;
     if (!json_finish(&p->r)) return parser_fault(p);
-    return (seen & EITHER) != 0 || parser_refuse(p, 422, "the body holds neither emission nor emissions");
+    return (seen & EITHER) != 0 ||
+           parser_refuse(p, PROBLEM_WRONG_MEMBERS, "the body holds neither emission nor emissions");
 }
 
 /* The elements of a reduction that adjoint rows do not answer. */
 static bool select_reduced(const codec_scene *scene, radiosity_request *request, problem *why) {
     request->select = true;
     return reduce_elements(&request->reduce, scene->groups, &request->selected, &request->n_selected) ||
-           problem_set(why, 503, "not enough memory for the groups of reduce");
+           problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the groups of reduce");
 }
 
 bool codec_read_json(const codec_scene *scene, const char *text, size_t length, radiosity_request *request,

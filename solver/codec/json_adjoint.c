@@ -23,17 +23,20 @@ static bool check_gradient(parser *p, gradient_kind kind) {
         return true;
     case GRADIENT_REFLECTANCE:
         return scene->n_emitters == 0 ||
-               parser_refuse(p, 422, "%s: a store of few emitters tells no gradient by reflectance",
-                             parser_here(p));
+               parser_refuse(p, PROBLEM_NOT_IN_STORE,
+                             "%s: a store of few emitters tells no gradient by reflectance", parser_here(p));
     case GRADIENT_SKY:
         if (scene->n_emitters > 0)
-            return parser_refuse(p, 422, "%s: a store of few emitters tells those of its emitters only",
+            return parser_refuse(p, PROBLEM_NOT_IN_STORE,
+                                 "%s: a store of few emitters tells those of its emitters only",
                                  parser_here(p));
         return scene->n_tiles > 0 ||
-               parser_refuse(p, 422, "%s: the store has no sky; precompute it with --sky", parser_here(p));
+               parser_refuse(p, PROBLEM_NOT_IN_STORE, "%s: the store has no sky; precompute it with --sky",
+                             parser_here(p));
     default:
         return scene->n_emitters > 0 ||
-               parser_refuse(p, 422, "%s: the store has no precomputed emitters", parser_here(p));
+               parser_refuse(p, PROBLEM_NOT_IN_STORE, "%s: the store has no precomputed emitters",
+                             parser_here(p));
     }
 }
 
@@ -46,12 +49,14 @@ static bool read_gradient_name(parser *p, adjoint_request *request) {
         if (strlen(name) != text.length || memcmp(name, text.bytes, text.length) != 0) continue;
         for (size_t k = 0; k < request->n_named; k++)
             if (request->named[k] == (gradient_kind)kind)
-                return parser_refuse(p, 422, "%s = \"%s\", which was listed before", parser_here(p), name);
+                return parser_refuse(p, PROBLEM_GIVEN_TWICE, "%s = \"%s\", which was listed before",
+                                     parser_here(p), name);
         request->named[request->n_named++] = (gradient_kind)kind;
         return check_gradient(p, (gradient_kind)kind);
     }
-    return parser_refuse(p, 422, "%s = \"%.*s\", must be emission, reflectance, sky or emitters",
-                         parser_here(p), text.length > 80 ? 80 : (int)text.length, text.bytes);
+    return parser_refuse(p, PROBLEM_UNKNOWN_WORD,
+                         "%s = \"%.*s\", must be emission, reflectance, sky or emitters", parser_here(p),
+                         text.length > 80 ? 80 : (int)text.length, text.bytes);
 }
 
 /* ["emission", ...] */
@@ -65,7 +70,8 @@ static bool read_gradient(parser *p, adjoint_request *request) {
         p->pointer_length = mark;
     }
     if (!parser_closed(p)) return false;
-    return request->n_named > 0 || parser_refuse(p, 422, "%s is empty, must name a gradient", parser_here(p));
+    return request->n_named > 0 ||
+           parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s is empty, must name a gradient", parser_here(p));
 }
 
 static bool read_body(parser *p, adjoint_request *request) {
@@ -96,10 +102,11 @@ static bool read_body(parser *p, adjoint_request *request) {
     }
     if (p->why->status != 0) return false;
     if (!json_finish(&p->r)) return parser_fault(p);
-    if ((seen & 1u << COTANGENT) == 0) return parser_refuse(p, 422, "the body holds no cotangent");
+    if ((seen & 1u << COTANGENT) == 0)
+        return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "the body holds no cotangent");
     for (size_t k = 0; k < request->n_named; k++)
         if (request->named[k] == GRADIENT_REFLECTANCE && (seen & 1u << EMISSION) == 0)
-            return parser_refuse(p, 422,
+            return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
                                  "the gradient by reflectance needs an emission, the body holds none");
     return true;
 }
@@ -133,7 +140,7 @@ bool codec_read_adjoint_npy(const codec_scene *scene, const char *bytes, size_t 
     request->cotangent.any_sign = true;
     if (!codec_read_npy(scene, bytes, length, &request->cotangent, why)) return false;
     if (request->cotangent.batch)
-        return problem_set(why, 422, "the array holds a batch, must hold one cotangent");
+        return problem_set(why, PROBLEM_WRONG_LENGTH, "the array holds a batch, must hold one cotangent");
     settle(scene, request);
     return true;
 }

@@ -14,9 +14,10 @@ static bool bad_value(parser *p, float value) {
     int length = p->r.number.length > 40 ? 40 : (int)p->r.number.length;
     const char *more = p->r.number.length > 40 ? "..." : "";
     if (!isfinite(value))
-        return parser_refuse(p, 422, "%s = %.*s%s, must be within the range of single precision (3.4e38)",
+        return parser_refuse(p, PROBLEM_BAD_VALUE,
+                             "%s = %.*s%s, must be within the range of single precision (3.4e38)",
                              parser_here(p), length, p->r.number.bytes, more);
-    return parser_refuse(p, 422, "%s = %.*s%s, must not be negative", parser_here(p), length,
+    return parser_refuse(p, PROBLEM_BAD_VALUE, "%s = %.*s%s, must not be negative", parser_here(p), length,
                          p->r.number.bytes, more);
 }
 
@@ -33,8 +34,8 @@ static bool read_rest_of_row(parser *p, float *row, size_t count, const char *of
     size_t i = json_read_plain_floats(&p->r, row, count);
     for (; json_next_element(&p->r); i++, i += json_read_plain_floats(&p->r, row + i, count - i)) {
         if (i == count)
-            return parser_refuse(p, 422, "%s holds more than %zu values, one for each %s", parser_here(p),
-                                 count, of_what);
+            return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds more than %zu values, one for each %s",
+                                 parser_here(p), count, of_what);
         if (json_peek(&p->r) != JSON_NUMBER) {
             parser_point_index(p, i);
             return parser_expect(p, JSON_NUMBER, "a number");
@@ -46,8 +47,9 @@ static bool read_rest_of_row(parser *p, float *row, size_t count, const char *of
         }
     }
     if (!parser_closed(p)) return false;
-    return i == count || parser_refuse(p, 422, "%s holds %zu values, must be %zu, one for each %s",
-                                       parser_here(p), i, count, of_what);
+    return i == count ||
+           parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds %zu values, must be %zu, one for each %s",
+                         parser_here(p), i, count, of_what);
 }
 
 /* A number for all channels, or one each. */
@@ -69,21 +71,23 @@ static bool check_element(parser *p, double index, size_t count, bool once) {
     const size_t n = p->scene->n;
     if (!(index >= 0.0 && index < (double)n && index == floor(index))) {
         int length = p->r.number.length > 40 ? 40 : (int)p->r.number.length;
-        return parser_refuse(p, 422, "%s = %.*s, must be an integer from 0 to %zu", parser_here(p), length,
-                             p->r.number.bytes, n - 1);
+        return parser_refuse(p, PROBLEM_BAD_INDEX, "%s = %.*s, must be an integer from 0 to %zu",
+                             parser_here(p), length, p->r.number.bytes, n - 1);
     }
     if (count == n)
-        return parser_refuse(p, 422, "%s: more than the %zu elements of the scene", parser_here(p), n);
+        return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s: more than the %zu elements of the scene",
+                             parser_here(p), n);
     if (!once) return true;
     switch (index_set_add(&p->seen, (uint32_t)index)) {
     case INDEX_SET_ADDED:
         return true;
     case INDEX_SET_KNOWN:
-        return parser_refuse(p, 422, "%s = %.0f, an element that was listed before", parser_here(p), index);
+        return parser_refuse(p, PROBLEM_GIVEN_TWICE, "%s = %.0f, an element that was listed before",
+                             parser_here(p), index);
     case INDEX_SET_NO_MEMORY:
         break;
     }
-    return problem_set(p->why, 503, "not enough memory for a list of indices");
+    return problem_set(p->why, PROBLEM_NO_MEMORY, "not enough memory for a list of indices");
 }
 
 bool parser_read_elements(parser *p, index_list *elements, bool once) {
@@ -115,8 +119,8 @@ static bool read_dense(parser *p, float *E) {
     }
     while (json_next_element(&p->r)) {
         if (rows == C)
-            return parser_refuse(p, 422, "%s holds more than %zu rows, one for each channel", parser_here(p),
-                                 C);
+            return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds more than %zu rows, one for each channel",
+                                 parser_here(p), C);
         parser_point_index(p, rows);
         if (!parser_expect(p, JSON_ARRAY, "an array of numbers")) return false;
         if (!json_enter_array(&p->r)) return parser_fault(p);
@@ -125,8 +129,9 @@ static bool read_dense(parser *p, float *E) {
         rows++;
     }
     if (!parser_closed(p)) return false;
-    return rows == C || parser_refuse(p, 422, "%s holds %zu rows, must be %zu, one for each channel",
-                                      parser_here(p), rows, C);
+    return rows == C ||
+           parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds %zu rows, must be %zu, one for each channel",
+                         parser_here(p), rows, C);
 }
 
 /* [v...] of the sparse form: each a number or C of them. */
@@ -137,11 +142,13 @@ static bool read_values(parser *p, size_t *count) {
     if (!json_enter_array(&p->r)) return parser_fault(p);
     while (json_next_element(&p->r)) {
         if (*count == n)
-            return parser_refuse(p, 422, "%s holds more values than there are elements", parser_here(p));
+            return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds more values than there are elements",
+                                 parser_here(p));
         if (*count == p->values_capacity) {
             const size_t capacity = *count == 0 ? 64 : 2 * *count;
             float *grown = realloc(p->values, capacity * C * sizeof *grown);
-            if (grown == NULL) return problem_set(p->why, 503, "not enough memory for a sparse emission");
+            if (grown == NULL)
+                return problem_set(p->why, PROBLEM_NO_MEMORY, "not enough memory for a sparse emission");
             p->values = grown;
             p->values_capacity = capacity;
         }
@@ -177,10 +184,10 @@ static bool read_groups(parser *p) {
         for (size_t k = 0; k < n_found; k++) {
             const index_set_result added = index_set_add(&p->seen, found[k]);
             if (added == INDEX_SET_KNOWN)
-                return parser_refuse(p, 422, "%s: the group %s is given twice", parser_here(p),
-                                     groups->names[found[k]]);
+                return parser_refuse(p, PROBLEM_GIVEN_TWICE, "%s: the group %s is given twice",
+                                     parser_here(p), groups->names[found[k]]);
             if (added == INDEX_SET_NO_MEMORY)
-                return problem_set(p->why, 503, "not enough memory for a sparse emission");
+                return problem_set(p->why, PROBLEM_NO_MEMORY, "not enough memory for a sparse emission");
             if (!radiosity_request_spot(p->request, p->scene, found[k], true, p->colour, p->why))
                 return refused_here(p);
         }
@@ -196,23 +203,25 @@ static bool read_side(parser *p, size_t width, const char *each, float *row) {
     if (!json_enter_array(&p->r)) return parser_fault(p);
     for (; json_next_element(&p->r); t++) {
         if (t == width)
-            return parser_refuse(p, 422, "%s holds more than %zu values, one for each %s", parser_here(p),
-                                 width, each);
+            return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds more than %zu values, one for each %s",
+                                 parser_here(p), width, each);
         parser_point_index(p, t);
         if (!read_colour(p, p->colour)) return false;
         for (size_t c = 0; c < C; c++) row[c * width + t] = p->colour[c];
         p->pointer_length = mark;
     }
     if (!parser_closed(p)) return false;
-    return t == width || parser_refuse(p, 422, "%s holds %zu values, must be %zu, one for each %s",
-                                       parser_here(p), t, width, each);
+    return t == width ||
+           parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds %zu values, must be %zu, one for each %s",
+                         parser_here(p), t, width, each);
 }
 
 /* One radiance a tile. */
 static bool read_sky(parser *p) {
     float *L;
     if (p->scene->n_tiles == 0)
-        return parser_refuse(p, 422, "%s: the store has no sky; precompute it with --sky", parser_here(p));
+        return parser_refuse(p, PROBLEM_NOT_IN_STORE, "%s: the store has no sky; precompute it with --sky",
+                             parser_here(p));
     if (!parser_expect(p, JSON_ARRAY, "an array of radiances")) return false;
     if (!radiosity_request_sky(p->request, p->scene, &L, p->why)) return refused_here(p);
     return read_side(p, p->scene->n_tiles, "tile", L);
@@ -222,7 +231,8 @@ static bool read_sky(parser *p) {
 static bool read_emitters(parser *p) {
     float *W;
     if (p->scene->n_emitters == 0)
-        return parser_refuse(p, 422, "%s: the store has no precomputed emitters", parser_here(p));
+        return parser_refuse(p, PROBLEM_NOT_IN_STORE, "%s: the store has no precomputed emitters",
+                             parser_here(p));
     if (!parser_expect(p, JSON_ARRAY, "an array of weights")) return false;
     if (!radiosity_request_emitters(p->request, p->scene, &W, p->why)) return refused_here(p);
     return read_side(p, p->scene->n_emitters, "emitter", W);
@@ -240,7 +250,8 @@ static bool read_emission_object(parser *p) {
         bool good = parser_known_member(p, &key, names, N_NAMES, &seen, &which);
         if (!good) return false;
         if (p->request->any_sign && (which == SKY || which == EMITTERS))
-            return parser_refuse(p, 422, "%s: a cotangent is of elements or groups", parser_here(p));
+            return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "%s: a cotangent is of elements or groups",
+                                 parser_here(p));
         switch (which) {
         case ELEMENTS:
             good = parser_read_elements(p, &p->elements, true);
@@ -266,15 +277,16 @@ static bool read_emission_object(parser *p) {
     const bool emitters = (seen & 1u << EMITTERS) != 0;
     const int ways = sparse + groups + emitters;
     if (ways > 1 || (ways == 0 && !sky))
-        return parser_refuse(p, 422,
+        return parser_refuse(p, PROBLEM_WRONG_MEMBERS,
                              "%s must hold either elements and values or groups or emitters, or a sky",
                              parser_here(p));
     if (sparse && ((seen & 1u << ELEMENTS) == 0 || (seen & 1u << VALUES) == 0))
-        return parser_refuse(p, 422, "%s must hold both elements and values", parser_here(p));
+        return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "%s must hold both elements and values",
+                             parser_here(p));
     if (!sparse) return true;
     if (p->elements.count != n_values)
-        return parser_refuse(p, 422, "%s holds %zu elements and %zu values, must be as many", parser_here(p),
-                             p->elements.count, n_values);
+        return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds %zu elements and %zu values, must be as many",
+                             parser_here(p), p->elements.count, n_values);
     for (size_t i = 0; i < n_values; i++)
         if (!radiosity_request_spot(p->request, p->scene, p->elements.values[i], false, p->values + i * C,
                                     p->why))
@@ -287,7 +299,8 @@ bool parser_read_emission(parser *p) {
     json_kind kind = json_peek(&p->r);
     if (kind == JSON_NOTHING) return parser_fault(p);
     if (kind != JSON_ARRAY && kind != JSON_OBJECT)
-        return parser_refuse(p, 422, "%s must be an array of numbers or an object", parser_here(p));
+        return parser_refuse(p, PROBLEM_WRONG_KIND, "%s must be an array of numbers or an object",
+                             parser_here(p));
     if (!radiosity_request_add(p->request, p->scene, p->why)) return refused_here(p);
     if (kind == JSON_OBJECT) return read_emission_object(p);
     if (p->scene->only_linear) return parser_not_linear(p);
@@ -306,5 +319,5 @@ bool parser_read_emissions(parser *p) {
     }
     if (!parser_closed(p)) return false;
     return p->request->n_rhs > 0 ||
-           parser_refuse(p, 422, "%s is empty, must hold an emission", parser_here(p));
+           parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s is empty, must hold an emission", parser_here(p));
 }

@@ -5,6 +5,52 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define LEAST_SIZE ((size_t)64)
+
+/* The slot of an index, or the free one where it belongs: the high bits of a multiplicative hash, then one
+ * after the other. At most half of the slots are taken, so that there is one. */
+static size_t slot_of(const index_set *set, uint32_t index) {
+    size_t at = (size_t)((uint64_t)index * 0x9E3779B97F4A7C15u >> 20) & (set->size - 1);
+    while (set->slots[at] != UINT32_MAX && set->slots[at] != index) at = (at + 1) & (set->size - 1);
+    return at;
+}
+
+static bool grow(index_set *set) {
+    index_set larger = {.size = set->size == 0 ? LEAST_SIZE : 2 * set->size};
+    larger.slots = malloc(larger.size * sizeof *larger.slots);
+    if (larger.slots == NULL) return false;
+    memset(larger.slots, 0xff, larger.size * sizeof *larger.slots);
+    for (size_t k = 0; k < set->size; k++)
+        if (set->slots[k] != UINT32_MAX) larger.slots[slot_of(&larger, set->slots[k])] = set->slots[k];
+    larger.count = set->count;
+    free(set->slots);
+    *set = larger;
+    return true;
+}
+
+index_set_result index_set_add(index_set *set, uint32_t index) {
+    if (2 * set->count >= set->size && !grow(set)) return INDEX_SET_NO_MEMORY;
+    const size_t at = slot_of(set, index);
+    if (set->slots[at] == index) return INDEX_SET_KNOWN;
+    set->slots[at] = index;
+    set->count++;
+    return INDEX_SET_ADDED;
+}
+
+void index_set_clear(index_set *set) {
+    /* A batch of short lists behind a long one must not pay for that again with each. */
+    if (set->size > 16 * LEAST_SIZE)
+        index_set_free(set);
+    else if (set->count > 0)
+        memset(set->slots, 0xff, set->size * sizeof *set->slots);
+    set->count = 0;
+}
+
+void index_set_free(index_set *set) {
+    free(set->slots);
+    *set = (index_set){0};
+}
+
 void parser_point_key(parser *p, const char *key, size_t length) {
     size_t at = p->pointer_length;
     if (at + 2 * length + 2 > sizeof p->pointer) return;
@@ -26,12 +72,13 @@ void parser_point_index(parser *p, size_t index) {
     parser_point_key(p, text, (size_t)length);
 }
 
-bool parser_refuse(parser *p, unsigned status, const char *format, ...) {
+bool parser_refuse(parser *p, problem_kind kind, const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(p->why->detail, sizeof p->why->detail, format, arguments);
     va_end(arguments);
-    p->why->status = status;
+    p->why->kind = kind;
+    p->why->status = problem_status(kind);
     p->pointer[p->pointer_length] = '\0';
     memcpy(p->why->pointer, p->pointer, p->pointer_length + 1);
     return false;
@@ -45,17 +92,17 @@ const char *parser_here(parser *p) {
 bool parser_fault(parser *p) {
     size_t line = 1, column = 1;
     if (p->r.no_memory)
-        return problem_set(p->why, 503, "not enough memory to read %s", codec_source(p->scene));
+        return problem_set(p->why, PROBLEM_NO_MEMORY, "not enough memory to read %s", codec_source(p->scene));
     for (const char *at = p->r.start; at < p->r.at; at++) {
         column = *at == '\n' ? 1 : column + 1;
         line += *at == '\n';
     }
-    return problem_set(p->why, 400, "%s is not JSON: %s, at byte %zu (line %zu, column %zu)",
+    return problem_set(p->why, PROBLEM_NOT_JSON, "%s is not JSON: %s, at byte %zu (line %zu, column %zu)",
                        codec_source(p->scene), p->r.fault, (size_t)(p->r.at - p->r.start), line, column);
 }
 
 bool parser_not_linear(parser *p) {
-    return problem_set(p->why, 503, "no linear reduction of sparse vectors");
+    return problem_set(p->why, PROBLEM_UNAVAILABLE, "no linear reduction of sparse vectors");
 }
 
 bool parser_closed(parser *p) {
@@ -65,7 +112,7 @@ bool parser_closed(parser *p) {
 bool parser_expect(parser *p, json_kind kind, const char *what) {
     json_kind found = json_peek(&p->r);
     if (found == JSON_NOTHING) return parser_fault(p);
-    return found == kind || parser_refuse(p, 422, "%s must be %s", parser_here(p), what);
+    return found == kind || parser_refuse(p, PROBLEM_WRONG_KIND, "%s must be %s", parser_here(p), what);
 }
 
 bool parser_next_member(parser *p, json_slice *key) {
@@ -75,7 +122,7 @@ bool parser_next_member(parser *p, json_slice *key) {
     }
     if (memchr(key->bytes, '\0', key->length) != NULL) {
         parser_point_key(p, key->bytes, strnlen(key->bytes, key->length));
-        return parser_refuse(p, 422, "a NUL in a key of %s", parser_here(p));
+        return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "a NUL in a key of %s", parser_here(p));
     }
     return true;
 }
@@ -93,8 +140,10 @@ bool parser_known_member(parser *p, const json_slice *key, const char *const *na
     *which = find_name(key, names, count);
     parser_point_key(p, key->bytes, key->length);
     if (*which == count)
-        return parser_refuse(p, 422, "%s is not a member that can stand here", parser_here(p));
-    if (*seen & 1u << *which) return parser_refuse(p, 422, "%s is given twice", parser_here(p));
+        return parser_refuse(p, PROBLEM_WRONG_MEMBERS, "%s is not a member that can stand here",
+                             parser_here(p));
+    if (*seen & 1u << *which)
+        return parser_refuse(p, PROBLEM_GIVEN_TWICE, "%s is given twice", parser_here(p));
     *seen |= 1u << *which;
     return true;
 }
@@ -104,7 +153,8 @@ bool parser_append(parser *p, index_list *list, const uint32_t *indices, size_t 
         size_t capacity = list->capacity == 0 ? 64 : 2 * list->capacity;
         if (capacity < list->count + count) capacity = list->count + count;
         uint32_t *grown = realloc(list->values, capacity * sizeof *grown);
-        if (grown == NULL) return problem_set(p->why, 503, "not enough memory for a list of indices");
+        if (grown == NULL)
+            return problem_set(p->why, PROBLEM_NO_MEMORY, "not enough memory for a list of indices");
         list->values = grown;
         list->capacity = capacity;
     }
@@ -124,7 +174,7 @@ bool parser_find_group(parser *p, const json_slice *name, const uint32_t **group
     *n_groups = group_index_find(p->scene->groups, name->bytes, name->length, groups);
     if (*n_groups > 0) return true;
     group_index_miss(p->scene->groups, name->bytes, name->length, miss);
-    return parser_refuse(p, 422, "%s: the scene has %s", parser_here(p), miss);
+    return parser_refuse(p, PROBLEM_UNKNOWN_GROUP, "%s: the scene has %s", parser_here(p), miss);
 }
 
 bool parser_read_quantity(parser *p, lam_quantity *quantity) {
@@ -132,8 +182,8 @@ bool parser_read_quantity(parser *p, lam_quantity *quantity) {
     if (!parser_expect(p, JSON_TEXT, "\"radiosity\", \"irradiance\" or \"indirect\"")) return false;
     if (!json_read_text(&p->r, &text)) return parser_fault(p);
     return codec_quantity_find(text.bytes, text.length, quantity) ||
-           parser_refuse(p, 422, "%s = \"%.*s\", must be radiosity, irradiance or indirect", parser_here(p),
-                         text.length > 80 ? 80 : (int)text.length, text.bytes);
+           parser_refuse(p, PROBLEM_UNKNOWN_WORD, "%s = \"%.*s\", must be radiosity, irradiance or indirect",
+                         parser_here(p), text.length > 80 ? 80 : (int)text.length, text.bytes);
 }
 
 bool parser_begin(parser *p, const codec_scene *scene, const char *text, size_t length,
@@ -142,7 +192,8 @@ bool parser_begin(parser *p, const codec_scene *scene, const char *text, size_t 
     *why = (problem){0};
     json_begin(&p->r, text, length);
     p->colour = memory_allocate(scene->n_channels, sizeof *p->colour, "colour", NULL);
-    return p->colour != NULL || problem_set(why, 503, "not enough memory to read %s", codec_source(scene));
+    return p->colour != NULL ||
+           problem_set(why, PROBLEM_NO_MEMORY, "not enough memory to read %s", codec_source(scene));
 }
 
 bool parser_fill_sides(parser *p) {

@@ -3,9 +3,25 @@
 #ifndef LAMBERT_CODEC_JSON_PARSER_H
 #define LAMBERT_CODEC_JSON_PARSER_H
 
-#include "solver/codec/index_set.h"
 #include "solver/codec/json_reader.h"
 #include "solver/codec/request.h"
+
+/* A set of numbers that costs memory for its members, not for its range. Starts zeroed; freed by
+ * index_set_free. Holds anything but UINT32_MAX. */
+typedef struct index_set {
+    uint32_t *slots; /* [size], a power of two; UINT32_MAX: free */
+    size_t size, count;
+} index_set;
+
+typedef enum index_set_result { INDEX_SET_ADDED, INDEX_SET_KNOWN, INDEX_SET_NO_MEMORY } index_set_result;
+
+/* O(1) on average. */
+index_set_result index_set_add(index_set *set, uint32_t index);
+
+/* Empties it; what it has room for stays, where that is little. */
+void index_set_clear(index_set *set);
+
+void index_set_free(index_set *set);
 
 /* Indices as they are read. */
 typedef struct index_list {
@@ -46,7 +62,8 @@ void parser_point_index(parser *p, size_t index);
 const char *parser_here(parser *p);
 
 /* Refuses what is being read; the text itself, when it is not JSON. */
-bool parser_refuse(parser *p, unsigned status, const char *format, ...) __attribute__((format(printf, 3, 4)));
+bool parser_refuse(parser *p, problem_kind kind, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
 bool parser_fault(parser *p);
 
 /* Refuses what is not wrong, but no linear reduction of sparse vectors. */

@@ -113,19 +113,23 @@ static bool read_header(const char *source, const char *bytes, size_t length, np
     const unsigned char *b = (const unsigned char *)bytes;
     *h = (npy_header){0};
     if (length < 10 || memcmp(bytes, "\x93NUMPY", 6) != 0)
-        return problem_set(why, 400, "%s is not NPY: it does not begin with its magic number", source);
+        return problem_set(why, PROBLEM_NOT_NPY, "%s is not NPY: it does not begin with its magic number",
+                           source);
     if (b[6] < 1 || b[6] > 3 || b[7] != 0)
-        return problem_set(why, 400, "%s is NPY version %u.%u, must be 1.0, 2.0 or 3.0", source, b[6], b[7]);
+        return problem_set(why, PROBLEM_NOT_NPY, "%s is NPY version %u.%u, must be 1.0, 2.0 or 3.0", source,
+                           b[6], b[7]);
     size_t size = (size_t)b[8] | (size_t)b[9] << 8, start = 10;
     if (b[6] > 1) {
-        if (length < 12) return problem_set(why, 400, "%s is not NPY: it ends in its header", source);
+        if (length < 12)
+            return problem_set(why, PROBLEM_NOT_NPY, "%s is not NPY: it ends in its header", source);
         size |= (size_t)b[10] << 16 | (size_t)b[11] << 24;
         start = 12;
     }
-    if (size > length - start) return problem_set(why, 400, "%s is not NPY: it ends in its header", source);
+    if (size > length - start)
+        return problem_set(why, PROBLEM_NOT_NPY, "%s is not NPY: it ends in its header", source);
     literal l = {bytes + start, bytes + start + size};
     if (!take_dictionary(&l, h))
-        return problem_set(why, 400,
+        return problem_set(why, PROBLEM_NOT_NPY,
                            "%s is not NPY: its header is not {'descr': '<f4', 'fortran_order': False, "
                            "'shape': (...)}",
                            source);
@@ -157,30 +161,36 @@ static bool read_layout(const npy_header *h, const codec_scene *scene, layout *f
         for (size_t i = 0, at = 0; i < h->rank && i < MAX_RANK; i++)
             at += (size_t)snprintf(given + at, sizeof given - at, "%s%zu", i > 0 ? ", " : "", shape[i]);
         if (h->rank > MAX_RANK)
-            return problem_set(why, 422, "the array's shape has more than %d axes", MAX_RANK);
+            return problem_set(why, PROBLEM_WRONG_LENGTH, "the array's shape has more than %d axes",
+                               MAX_RANK);
         if (C == 1)
             return problem_set(
-                why, 422, "the array's shape is (%s), must be (%zu) or (vectors, %zu), one value for each %s",
-                given, n, n, item);
-        return problem_set(why, 422,
+                why, PROBLEM_WRONG_LENGTH,
+                "the array's shape is (%s), must be (%zu) or (vectors, %zu), one value for each %s", given, n,
+                n, item);
+        return problem_set(why, PROBLEM_WRONG_LENGTH,
                            "the array's shape is (%s), must be (%zu), (%zu, %zu) or (vectors, %zu, %zu), one "
                            "value for each channel and %s",
                            given, n, C, n, C, n, item);
     }
-    if (found->n_rhs == 0) return problem_set(why, 422, "the batch is empty, must hold a vector");
+    if (found->n_rhs == 0)
+        return problem_set(why, PROBLEM_WRONG_LENGTH, "the batch is empty, must hold a vector");
     if (found->n_rhs > scene->max_batch)
-        return problem_set(why, 422,
+        return problem_set(why, PROBLEM_TOO_MUCH,
                            "the batch holds %zu vectors, at most %zu (--max-batch); send several requests",
                            found->n_rhs, scene->max_batch);
     return true;
 }
 
 static bool bad_value(size_t index, double value, bool any_sign, problem *why) {
-    if (isnan(value)) return problem_set(why, 422, "the array's value %zu is NaN, must be a number", index);
+    if (isnan(value))
+        return problem_set(why, PROBLEM_BAD_VALUE, "the array's value %zu is NaN, must be a number", index);
     if (value < 0.0 && !any_sign)
-        return problem_set(why, 422, "the array's value %zu is %.9g, must not be negative", index, value);
-    return problem_set(why, 422, "the array's value %zu is %.9g, must be within single precision (3.4e38)",
-                       index, value);
+        return problem_set(why, PROBLEM_BAD_VALUE, "the array's value %zu is %.9g, must not be negative",
+                           index, value);
+    return problem_set(why, PROBLEM_BAD_VALUE,
+                       "the array's value %zu is %.9g, must be within single precision (3.4e38)", index,
+                       value);
 }
 
 /* Values first ... first + count of the array to E. */
@@ -214,8 +224,9 @@ bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, 
     if (!read_header(codec_source(scene), bytes, length, &h, why)) return false;
     bool wide = strcmp(h.descr, "<f8") == 0;
     if (!wide && strcmp(h.descr, "<f4") != 0)
-        return problem_set(why, 422, "the array's type is %s, must be <f4 or <f8", h.descr);
-    if (h.fortran_order) return problem_set(why, 422, "the array is in Fortran order, must be in C order");
+        return problem_set(why, PROBLEM_WRONG_KIND, "the array's type is %s, must be <f4 or <f8", h.descr);
+    if (h.fortran_order)
+        return problem_set(why, PROBLEM_WRONG_KIND, "the array is in Fortran order, must be in C order");
     if (!read_layout(&h, scene, &found, why)) return false;
 
     size_t row = scene->n, values, size;
@@ -223,7 +234,8 @@ bool codec_read_npy(const codec_scene *scene, const char *bytes, size_t length, 
         !size_multiply(values, wide ? 8 : 4, &size))
         size = SIZE_MAX;
     if (size != length - h.data)
-        return problem_set(why, 422, "the array holds %zu bytes of values, its shape and type need %zu",
+        return problem_set(why, PROBLEM_WRONG_LENGTH,
+                           "the array holds %zu bytes of values, its shape and type need %zu",
                            length - h.data, size);
     request->batch = found.batch;
     request->n_rhs = found.n_rhs;

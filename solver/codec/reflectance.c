@@ -1,13 +1,25 @@
 #include "solver/codec/reflectance.h"
 
-#include "solver/codec/json_memory.h"
-
 #include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* A variant's own name: what is before it is the scene's. */
+/* True when jansson was refused memory in this thread since the last parse began: its parser then says that
+ * the text is wrong, or leaves out a byte of it. Its functions of allocation take no argument of ours. */
+static _Thread_local bool memory_failed;
+
+static void *allocate(size_t size) {
+    void *memory = malloc(size);
+    memory_failed = memory_failed || memory == NULL;
+    return memory;
+}
+
+void reflectance_watch_memory(void) {
+    json_set_alloc_funcs(allocate, free);
+}
+
+/* The most bytes of a variant's own name, behind the scene's. */
 #define VARIANT_NAME_MOST 100
 
 /* JSON pointer /groups/KEY or /groups/KEY/index; too long a key is left out. */
@@ -29,14 +41,16 @@ static void point(problem *why, const char *key, size_t index) {
 
 static bool read_one(const json_t *value, const char *group, size_t index, float *rho, problem *why) {
     if (!json_is_number(value)) {
-        problem_set(why, 422, "the reflectance of %.200s must be a number, or one for each channel", group);
+        problem_set(why, PROBLEM_WRONG_KIND,
+                    "the reflectance of %.200s must be a number, or one for each channel", group);
         point(why, group, index);
         return false;
     }
     const double given = json_number_value(value);
     *rho = (float)given;
     if (given >= 0 && *rho < 1) return true;
-    problem_set(why, 422, "the reflectance of %.200s = %.9g, must be at least 0 and below 1", group, given);
+    problem_set(why, PROBLEM_BAD_VALUE, "the reflectance of %.200s = %.9g, must be at least 0 and below 1",
+                group, given);
     point(why, group, index);
     return false;
 }
@@ -49,12 +63,14 @@ static bool set_group(const reflectance_scene *s, const char *group, const json_
     const uint32_t *found = NULL;
     const size_t n_found = group_index_find(groups, group, strlen(group), &found);
     if (n_found == 0) {
-        problem_set(why, 422, "the scene has no group %.200s", group);
+        char miss[GROUP_MISS];
+        group_index_miss(groups, group, strlen(group), miss);
+        problem_set(why, PROBLEM_UNKNOWN_GROUP, "the scene has %s", miss);
         point(why, group, SIZE_MAX);
         return false;
     }
     if (json_is_array(value) && json_array_size(value) != s->n_channels) {
-        problem_set(why, 422,
+        problem_set(why, PROBLEM_WRONG_LENGTH,
                     "the reflectance of %.200s has %zu values, must be a number or %zu, one for each channel",
                     group, json_array_size(value), s->n_channels);
         point(why, group, SIZE_MAX);
@@ -62,7 +78,7 @@ static bool set_group(const reflectance_scene *s, const char *group, const json_
     }
     for (size_t k = 0; k < n_found; k++) {
         if (done[found[k]]) {
-            problem_set(why, 422, "the group %.200s is given twice", groups->names[found[k]]);
+            problem_set(why, PROBLEM_GIVEN_TWICE, "the group %.200s is given twice", groups->names[found[k]]);
             point(why, group, SIZE_MAX);
             return false;
         }
@@ -86,7 +102,7 @@ static bool read_reflectance(const reflectance_scene *s, json_t *groups, float *
     float *rho = malloc(count * sizeof *rho);
     bool *done = calloc(s->groups->n_groups > 0 ? s->groups->n_groups : 1, sizeof *done);
     bool good = rho != NULL && done != NULL;
-    if (!good) problem_set(why, 503, "not enough memory for the reflectances");
+    if (!good) problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the reflectances");
     if (good) memcpy(rho, s->reflectance, count * sizeof *rho);
     const char *group;
     json_t *value;
@@ -103,7 +119,11 @@ static bool refuse_text(const json_error_t *error, problem *why) {
     const enum json_error_code code = json_error_code(error);
     const bool number = code == json_error_numeric_overflow, again = code == json_error_duplicate_key;
     const bool nul = code == json_error_null_byte_in_key || code == json_error_null_character;
-    return problem_set(why, number || again || nul ? 422 : 400, "%s: %.160s at byte %d",
+    const problem_kind kind = number  ? PROBLEM_BAD_VALUE
+                              : again ? PROBLEM_GIVEN_TWICE
+                              : nul   ? PROBLEM_WRONG_MEMBERS
+                                      : PROBLEM_NOT_JSON;
+    return problem_set(why, kind, "%s: %.160s at byte %d",
                        number  ? "a number beyond double"
                        : again ? "a name is given twice"
                        : nul   ? "a name with a NUL"
@@ -113,12 +133,12 @@ static bool refuse_text(const json_error_t *error, problem *why) {
 
 static bool read_text(const char *text, size_t length, json_t **body, problem *why) {
     json_error_t error;
-    json_memory_watch();
+    memory_failed = false;
     *body =
         json_loadb(text, length, JSON_REJECT_DUPLICATES | JSON_DECODE_ANY | JSON_DECODE_INT_AS_REAL, &error);
-    if (json_memory_failed()) return problem_set(why, 503, "not enough memory for the request");
+    if (memory_failed) return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the request");
     if (*body == NULL) return refuse_text(&error, why);
-    if (!json_is_object(*body)) return problem_set(why, 422, "the body must be an object");
+    if (!json_is_object(*body)) return problem_set(why, PROBLEM_WRONG_KIND, "the body must be an object");
     return true;
 }
 
@@ -128,13 +148,14 @@ static bool read_name(const json_t *body, char **variant, problem *why) {
     for (const char *c = name; good && *c != '\0'; c++)
         good = (unsigned char)*c > ' ' && *c != 0x7f && *c != '/' && *c != '@';
     if (!good) {
-        problem_set(why, 422, "variant must be a text of 1 to %d bytes, without white space, / and @",
+        problem_set(why, PROBLEM_WRONG_KIND,
+                    "variant must be a text of 1 to %d bytes, without white space, / and @",
                     VARIANT_NAME_MOST);
         snprintf(why->pointer, sizeof why->pointer, "/variant");
         return false;
     }
     *variant = strdup(name);
-    return *variant != NULL || problem_set(why, 503, "not enough memory for the request");
+    return *variant != NULL || problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the request");
 }
 
 /* Members other than these are mistakes. */
@@ -143,11 +164,11 @@ static bool check_members(json_t *body, bool with_groups, problem *why) {
     json_t *value;
     json_object_foreach(body, key, value) {
         if (strcmp(key, "variant") == 0 || (with_groups && strcmp(key, "groups") == 0)) continue;
-        return problem_set(why, 422, "%.100s is not known here; a variant has %s", key,
+        return problem_set(why, PROBLEM_WRONG_MEMBERS, "%.100s is not known here; a variant has %s", key,
                            with_groups ? "variant and groups" : "the member variant");
     }
     if (!with_groups || json_is_object(json_object_get(body, "groups"))) return true;
-    problem_set(why, 422, "groups must be an object of group names and reflectances");
+    problem_set(why, PROBLEM_WRONG_KIND, "groups must be an object of group names and reflectances");
     snprintf(why->pointer, sizeof why->pointer, "/groups");
     return false;
 }
@@ -167,7 +188,8 @@ bool codec_read_reflectance(const reflectance_scene *scene, const char *text, si
                 read_reflectance(scene, json_object_get(body, "groups"), &request->reflectance, why);
     if (good) {
         request->groups = json_dumps(json_object_get(body, "groups"), JSON_COMPACT);
-        good = request->groups != NULL || problem_set(why, 503, "not enough memory for the request");
+        good = request->groups != NULL ||
+               problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the request");
     }
     json_decref(body);
     return good;

@@ -5,12 +5,15 @@
 #include "solver/codec/groups.h"
 #include "solver/codec/problem.h"
 
-/* What a request is read against. */
+/* Once, before any thread uses jansson: lets the readers below tell short memory from a wrong text. */
+void reflectance_watch_memory(void);
+
+/* The scene that a request is about. */
 typedef struct reflectance_scene {
     size_t n;
     size_t n_channels;
     const group_index *groups;
-    const float *reflectance; /* [C][n], of what the request leaves as it is */
+    const float *reflectance; /* [C][n], for groups that the request does not name */
 } reflectance_scene;
 
 /* Starts zeroed. */

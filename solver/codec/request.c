@@ -20,7 +20,7 @@ void radiosity_request_free(radiosity_request *request) {
 
 bool radiosity_request_add(radiosity_request *request, const codec_scene *scene, problem *why) {
     if (request->n_rhs == scene->max_batch)
-        return problem_set(why, 422,
+        return problem_set(why, PROBLEM_TOO_MUCH,
                            "the batch holds more than %zu vectors (--max-batch); send several requests",
                            scene->max_batch);
     request->n_rhs++;
@@ -35,7 +35,7 @@ static bool grow_rows(float **values, size_t *n, size_t *capacity, size_t wanted
         const size_t rows = more < most ? more : most;
         float *grown = realloc(*values, rows * bytes);
         if (grown == NULL)
-            return problem_set(why, 503, "not enough memory for %zu vectors of %s", rows, what);
+            return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for %zu vectors of %s", rows, what);
         *values = grown;
         *capacity = rows;
     }
@@ -51,7 +51,7 @@ static bool grow_dense(radiosity_request *request, const codec_scene *scene, pro
         !size_multiply(values, sizeof(float), &bytes) || !size_multiply(bytes, request->n_rhs, &size) ||
         size > scene->max_bytes)
         return problem_set(
-            why, 422,
+            why, PROBLEM_TOO_MUCH,
             "%zu vectors of %zu channels and %zu elements pass the %zu bytes that a request may "
             "hold; send several requests",
             request->n_rhs, scene->n_channels, scene->n, scene->max_bytes);
@@ -74,7 +74,7 @@ bool radiosity_request_spot(radiosity_request *request, const codec_scene *scene
         size_t more = request->n_spots == 0 ? 16 : 2 * request->n_spots;
         if (more > most) more = most;
         if (more <= request->n_spots)
-            return problem_set(why, 422,
+            return problem_set(why, PROBLEM_TOO_MUCH,
                                "the sparse vectors pass the %zu bytes that a request may hold; send several "
                                "requests",
                                scene->max_bytes);
@@ -83,7 +83,7 @@ bool radiosity_request_spot(radiosity_request *request, const codec_scene *scene
         float *colours = realloc(request->colours, more * C * sizeof *colours);
         if (colours != NULL) request->colours = colours;
         if (spots == NULL || colours == NULL)
-            return problem_set(why, 503, "not enough memory for a sparse emission");
+            return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for a sparse emission");
         request->spots_capacity = more;
     }
     request->spots[request->n_spots] =
@@ -120,7 +120,7 @@ static bool add_side(const radiosity_request *request, const codec_scene *scene,
     if (!size_multiply(width, scene->n_channels, &values) || !size_multiply(values, sizeof(float), &bytes) ||
         !size_multiply(bytes, request->n_rhs, &size) || size > scene->max_bytes)
         return problem_set(
-            why, 422,
+            why, PROBLEM_TOO_MUCH,
             "%zu times %zu channels of %zu %s pass the %zu bytes that a request may hold; send "
             "several requests",
             request->n_rhs, scene->n_channels, width, what, scene->max_bytes);

@@ -16,7 +16,7 @@ static bool write_year(const solution *s, buffer *b, FILE *stream, problem *why)
     for (size_t v = 0; v < s->n_vectors; v++) {
         const bool written = (v == 0 || buffer_append(b, ",", 1)) && json_write_text(b, s->names[v]) &&
                              buffer_append(b, ":", 1);
-        if (!written) return problem_set(why, 503, "not enough memory for the answer");
+        if (!written) return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
         if (!answer_rows(b, &as, C, n, s->values + v * C * n, why)) return false;
         flush(b, stream);
     }
@@ -84,7 +84,7 @@ static bool write_object(const solution *s, const answer_notes *notes, buffer *b
     }
     written = written && buffer_append(b, "}", 1) && answer_certificates(b, s->n_vectors, s->batch, notes) &&
               answer_tail(b, notes);
-    return written || problem_set(why, 503, "not enough memory for the answer");
+    return written || problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
 }
 
 lam_status output_json(const solution *s, FILE *stream, lam_error *error) {

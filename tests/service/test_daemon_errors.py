@@ -58,13 +58,30 @@ class Errors(unittest.TestCase):
         what = answer.json()
         self.assertEqual(what["status"], status)
         self.assertTrue(what["title"])
-        self.assertEqual(what["type"], "about:blank")
+        self.assertRegex(what["type"], r"^deploy/docs/api\.md#[a-z-]+$")
         self.assertNotIn("\n", what["detail"])
         for word in words:
             self.assertIn(str(word), what["detail"])
         if pointer is not None:
             self.assertEqual(what.get("pointer"), pointer)
         return what
+
+    def test_classes(self):
+        """A problem's type is that of its class, whatever else it says."""
+        dense = [1] * N
+        for body, name in (
+                ("{", "not-json"), ({"emission": dense, "x": 1}, "wrong-members"), ({}, "wrong-members"), ([], "wrong-kind"),
+                ({"emission": 7}, "wrong-kind"), ({"emission": dense[1:]}, "wrong-length"),
+                ({"emissions": []}, "wrong-length"), ({"emission": [-1] * N}, "bad-value"),
+                ({"emission": {"elements": [N], "values": [1]}}, "bad-index"),
+                ({"emission": {"elements": [1, 1], "values": [1, 1]}}, "given-twice"),
+                ({"emission": {"groups": {"lava": 1}}}, "unknown-group"),
+                ({"emission": dense, "select": {"groups": ["lava"]}}, "unknown-group"),
+                ({"emission": dense, "quantity": "heat"}, "unknown-word"),
+                ({"emission": {"emitters": [1]}}, "not-in-store"), ({"emission": [3e38] * N}, "not-in-encoding")):
+            answer = self.daemon.radiosity("grey", body, connection=self.connection)
+            self.assertEqual(answer.json()["type"], f"deploy/docs/api.md#{name}", (body, answer))
+        self.assertEqual(self.daemon.get("/v1/scenes/lava").json()["type"], "deploy/docs/api.md#not-found")
 
     def refuse(self, body, status, *words, pointer=None, name="grey", **more):
         with self.subTest(body=body if len(str(body)) < 200 else str(body)[:200], name=name):

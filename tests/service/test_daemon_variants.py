@@ -263,7 +263,7 @@ class Variants(unittest.TestCase):
                     ('{%s,"groups":{"wall":.1}}' % good, 400, "not JSON", None),
                     ('{%s,"groups":{"wall":0.1,"wall":0.2}}' % good, 422, "twice", None),
                     ('{%s,"groups":{"box.red":0.1,"box":0.2}}' % good, 422, "box.red is given twice", "/groups/box"),
-                    ('{%s,"groups":{"a/~b":0.1}}' % good, 422, "no group a/~b", "/groups/a~1~0b"),
+                    ('{%s,"groups":{"a/~b":0.1}}' % good, 422, "no group \"a/~b\"", "/groups/a~1~0b"),
                     ('{%s,"groups":{"%s":0.1}}' % (good, "y" * 1000), 422, "no group", None),
                     ('{%s,"groups":{"wall":1}}' % good, 422, "wall = 1, must be at least 0 and below 1", "/groups/wall"),
                     ('{%s,"groups":{"wall":0.99999999}}' % good, 422, "below 1", "/groups/wall"),

@@ -14,7 +14,8 @@ from make_store import Scene
 
 N = 60
 METHODS = "get put post delete options head patch trace".split()
-ROUTES = pathlib.Path(__file__).resolve().parents[2] / "server" / "route" / "routes.c"
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+ROUTES = SOURCE / "server" / "route" / "routes.c"
 
 
 def obj(required=(), patterns=None, /, **properties):
@@ -259,6 +260,18 @@ class OpenApi(unittest.TestCase):
                        self.daemon.radiosity("grey", "{"), self.daemon.radiosity("grey", " " * 200_000)):
             self.assertEqual(answer.headers["Content-Type"], "application/problem+json")
             self.fits(answer.json(), self.named("Problem"))
+
+    def test_problem_types(self):
+        """The document lists the classes of problems that the daemon has; each has a section in the manual."""
+        classes = re.findall(r'MANUAL "([a-z-]+)"', (SOURCE / "solver" / "codec" / "problem.c").read_text())
+        self.assertGreater(len(classes), 20)
+        types = self.at(self.named("Problem"))["properties"]["type"]["enum"]
+        self.assertEqual(types, [f"deploy/docs/api.md#{name}" for name in classes])
+        manual = SOURCE / "deploy" / "docs" / "api.md"
+        if manual.exists():
+            headings = re.findall(r"^#+ (.*)$", manual.read_text(), re.M)
+            anchors = [re.sub(r"[^a-z0-9 -]", "", heading.lower()).replace(" ", "-") for heading in headings]
+            self.assertEqual([name for name in classes if name not in anchors], [])
 
 
 if __name__ == "__main__":

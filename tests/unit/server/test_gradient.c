@@ -2,7 +2,6 @@
  * H = H0 + F B, converged in double; and figures over groups, against sums written out. */
 #include "server/scene/gradient.h"
 #include "solver/codec/group_figures.h"
-#include "solver/codec/index_set.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -201,39 +200,12 @@ START_TEST(figures_have_the_shape_asked) {
 }
 END_TEST
 
-/* --- sets ---------------------------------------------------------------------------------------------- */
-
-START_TEST(a_set_knows_what_it_holds) {
-    enum { SPAN = 5000 };
-    static bool known[SPAN];
-    index_set set = {0};
-    uint64_t state = 99;
-    for (int round = 0; round < 5; round++) {
-        size_t count = 0;
-        memset(known, 0, sizeof known);
-        for (int k = 0; k < (round % 2 == 0 ? 8000 : 40); k++) {
-            /* Multiples of a large power of two fall together in a poor hash. */
-            const uint32_t index = (uint32_t)(next_random(&state) * SPAN),
-                           at = index * (round == 2 ? 1u << 19 : 1);
-            ck_assert_int_eq(index_set_add(&set, at), known[index] ? INDEX_SET_KNOWN : INDEX_SET_ADDED);
-            count += !known[index];
-            known[index] = true;
-        }
-        ck_assert_uint_eq(set.count, count);
-        index_set_clear(&set);
-        ck_assert_uint_eq(set.count, 0);
-    }
-    index_set_free(&set);
-}
-END_TEST
-
 int main(void) {
     Suite *suite = suite_create("gradient");
     TCase *tcase = tcase_create("gradient");
     tcase_add_test(tcase, gradients_are_differences);
     tcase_add_test(tcase, figures_are_sums_written_out);
     tcase_add_test(tcase, figures_have_the_shape_asked);
-    tcase_add_test(tcase, a_set_knows_what_it_holds);
     suite_add_tcase(suite, tcase);
     return suite_run(suite);
 }
