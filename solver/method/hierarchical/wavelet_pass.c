@@ -249,6 +249,8 @@ done:
     return status;
 }
 
+/* The rows of one node (wavelet_pass.h): formed from those of its children or of a leaf's elements, its
+ * scaling rows coarsened to the height below the parent and stored, its wavelets coarsened up to the root. */
 static lam_status run_node(pass_job *job, size_t node, pass_work *d, lam_error *error) {
     lam_status status = LAM_OK;
     const pass_kernels kernels = kernels_of_cpu();
@@ -285,6 +287,7 @@ static lam_status run_node(pass_job *job, size_t node, pass_work *d, lam_error *
     }
     live_rows *near = &d->near[0], *next = &d->near[1];
     take_near(job, node, from, near);
+    /* Phi_a S up to the height below the parent */
     for (uint32_t h = height; node != root && h <= keep_at; h++) {
         d->runs[h - height] = d->fresh.count;
         TRY(kernels.promote(&row, h, row.wanted, from, to, d, error));
@@ -292,6 +295,7 @@ static lam_status run_node(pass_job *job, size_t node, pass_work *d, lam_error *
     }
     if (node != root) TRY(keep_rows(from, a->scaling, w, &job->kept[node], error));
     if (node != root && !two_sided) TRY(carry_fine_columns(job, &row, d, keep_at + 1 - height, error));
+    /* Psi_a S Psi_b^T for b of every height up to the root */
     for (; height <= top; height++) {
         TRY(kernels.promote(&row, height, KEEP, near, next, d, error));
         swap(&near, &next);

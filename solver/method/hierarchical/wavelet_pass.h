@@ -1,6 +1,7 @@
-/* W S W^T, the transport matrix S = A^1/2 F A^-1/2 in a multiwavelet basis W: the standard form of Beylkin,
- * Coifman and Rokhlin 1991, for radiosity Gortler et al. 1993. One pass over the rows of F finds it; no row
- * is held. */
+/* The transport matrix S = A^1/2 F A^-1/2 in a multiwavelet basis W, in its standard form
+ *     W S W^T
+ * (Beylkin, Coifman and Rokhlin 1991; for radiosity Gortler et al. 1993), by one pass over the rows of F, of
+ * which none is held. */
 #ifndef LAMBERT_METHOD_HIERARCHICAL_WAVELET_PASS_H
 #define LAMBERT_METHOD_HIERARCHICAL_WAVELET_PASS_H
 
@@ -18,24 +19,28 @@ typedef struct wavelet_pass_input {
     float threshold;           /* coefficient (i, j) is kept above threshold weight_i weight_j */
     const float *weight;       /* [n_nodes], of all coefficients of a node */
     const double (*centre)[3]; /* [n], by element */
-    double reach; /* coefficients of a node with clusters beyond this many of its radii are taken as 0;
-                     INFINITY: none */
+    double reach; /* coefficients with clusters beyond this many radii of a node are 0; INFINITY: no cut */
     size_t n_threads;
     const progress *progress;
 } wavelet_pass_input;
 
 /* out: the upper triangle of W S W^T with its diagonal, freed by the caller with csr_free.
  *
- * Let Phi_a and Psi_a be the scaling functions and wavelets of node a: [Phi_a; Psi_a] = Q_a [Phi_left;
- * Phi_right]. Nodes run in postorder. Node a forms the rows Q_a [Phi_left S; Phi_right S] on the scaling
- * functions of column clusters, and coarsens these columns level by level by the same Q_b. The rows Psi_a S
- * give on their way the coefficients Psi_a S Psi_b^T of all b that are no finer than a, which are final; the
- * rows Phi_a S stop below the height of a's parent and wait for the sibling. Finer b follow from the symmetry
- * of S. Of a one-sided F1, Psi_a S1 Psi_b^T for b finer than a is not the transpose of anything that was
- * found. So Phi_a S1 Psi_b^T is carried up with the scaling rows (fine_column in wavelet_entries.h), and W S
- * W^T is the result plus its transpose. A leaf's rows begin on clusters that are the coarser the farther away
- * they are (wavelet_reach.h). The bits do not depend on n_threads. Cost: about nnz(F), and a few hundred
- * clusters for each leaf and level. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED, those of rows. */
+ * Let Phi_a and Psi_a be the scaling functions and wavelets of node a, and Q_a its matrix:
+ *     (Phi_a; Psi_a) = Q_a (Phi_left; Phi_right).
+ * Nodes run in postorder. Node a forms its rows from those that its children left,
+ *     (Phi_a S; Psi_a S) = Q_a (Phi_left S; Phi_right S),
+ * on the scaling functions of column clusters, and coarsens the columns level by level by the same Q_b.
+ * Psi_a S yields the coefficients Psi_a S Psi_b^T of all b that are no finer than a; they are final. Those of
+ * finer b follow from symmetry. Phi_a S stops below the height of the parent and waits for the sibling.
+ *
+ * Of a one-sided F1, S = S1 + S1^T, and Psi_a S1 Psi_b^T for a finer b is no transpose of what b found. So
+ * Phi_a S1 Psi_b^T is carried up beside Phi_a S1 (fine_column in wavelet_entries.h), and the transpose is
+ * added at the end.
+ *
+ * The rows of a leaf begin on clusters that are the coarser the farther away they are (wavelet_reach.h). The
+ * bits do not depend on n_threads. Cost: about nnz(F), and a few hundred clusters for each leaf and level.
+ * Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED, those of rows. */
 lam_status wavelet_pass(const wavelet_pass_input *input, csr *out, lam_error *error);
 
 #endif
