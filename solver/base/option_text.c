@@ -9,9 +9,10 @@ enum { WIDTH = 80, COLUMN = 29, TEXT_MOST = 1024 };
 const option_row option_help_row = {.name = "help", .kind = OPTION_FLAG, .help = "Print this and stop"};
 
 bool option_is_first(const option_table *tables, const option_row *row) {
+    if (row->help == NULL) return false;
     OPTIONS_EACH_ROW(tables, t, other) {
         if (other == row) return true;
-        if (strcmp(other->name, row->name) == 0) return false;
+        if (other->help != NULL && strcmp(other->name, row->name) == 0) return false;
     }
     return true;
 }
@@ -45,7 +46,7 @@ static void print_wrapped(const char *text, size_t at, size_t from) {
     putchar('\n');
 }
 
-/* "[=" and "]" around a value that may be left out. */
+/* "-o, --output=FILE"; a value that may be left out is in brackets. */
 static void option_signature(const option_row *row, char out[TEXT_MOST]) {
     const char *argument = option_argument(row);
     char letter[8] = "";
@@ -68,7 +69,8 @@ static void option_limits(const option_row *row, char out[TEXT_MOST]) {
     snprintf(out, TEXT_MOST, "%s %.12g%s", row->above ? "above" : "at least", row->least, most);
 }
 
-/* The help of a row and, in brackets, its preset with its unit and, where wanted, its limits. */
+/* Puts into out the help of a row and, in brackets, its preset with its unit and, where wanted, its limits.
+ */
 static void option_explanation(const option_row *row, bool with_limits, char out[TEXT_MOST]) {
     char preset[TEXT_MOST] = "", limits[TEXT_MOST] = "";
     if (row->preset != NULL)
@@ -120,12 +122,14 @@ static void help_end(const option_command *command) {
 void option_text_help(const option_command *command, const option_table *tables) {
     help_begin(command, true);
     for (const option_table *t = tables; t->rows != NULL; t++) {
-        putchar('\n');
-        if (t->heading != NULL) {
+        const bool goes_on = t->heading != NULL && *t->heading == '\0';
+        if (!goes_on) putchar('\n');
+        if (t->heading != NULL && !goes_on) {
             putchar(' ');
             print_wrapped(t->heading, 1, 1);
         }
-        for (const option_row *row = t->rows; row->name != NULL; row++) help_row(row);
+        for (const option_row *row = t->rows; row->name != NULL; row++)
+            if (row->help != NULL) help_row(row);
     }
     putchar('\n');
     help_end(command);
@@ -188,8 +192,9 @@ static void manual_usage(const option_command *command, bool has_options) {
 static void manual_tables(const option_table *tables) {
     char label[TEXT_MOST], text[TEXT_MOST];
     for (const option_table *t = tables; t->rows != NULL; t++) {
-        if (t->heading != NULL) roff_request("SS", t->heading);
+        if (t->heading != NULL && *t->heading != '\0') roff_request("SS", t->heading);
         for (const option_row *row = t->rows; row->name != NULL; row++) {
+            if (row->help == NULL) continue;
             option_signature(row, label);
             option_explanation(row, true, text);
             roff_item(label, text);

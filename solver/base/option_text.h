@@ -13,7 +13,7 @@ extern const option_row option_help_row;
     for (const option_table *t = (tables); t->rows != NULL; t++)                                             \
         for (const option_row *row = t->rows; row->name != NULL; row++)
 
-/* True if no row before this one has its name. */
+/* True if the row explains its option and no row before it does so for the same name. */
 bool option_is_first(const option_table *tables, const option_row *row);
 
 /* The name of the value, "N" or the words of a choice; NULL of a flag. */

@@ -48,13 +48,13 @@ typedef struct option_row {
     bool above, below;   /* the value must lie above least, below most */
     const char *choices; /* "rays|hemicube" */
     lam_status (*parse)(const char *text, void *field, lam_error *error);
-    const char *help;
+    const char *help; /* NULL: stands in another table with this name */
 } option_row;
 
 /* Rows under one heading, and the struct that they fill. Several tables may fill one struct; one name may
  * stand in several tables, and each of them gets the value. */
 typedef struct option_table {
-    const char *heading;    /* of --help; NULL for the first */
+    const char *heading;    /* of --help; NULL for the first, "" to go on under the one before */
     const option_row *rows; /* the last row has no name */
     void *fields;
 } option_table;

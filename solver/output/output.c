@@ -1,7 +1,6 @@
 #include "solver/output/output.h"
 
 #include "solver/base/atomic_file.h"
-#include "solver/base/options.h"
 #include "solver/codec/answer.h"
 #include "solver/codec/npy.h"
 #include "solver/codec/request.h"
@@ -80,18 +79,6 @@ done:
     return status;
 }
 
-lam_status output_check(const char *path, bool reduced, lam_error *error) {
-    lam_status status = LAM_OK;
-    char extension[16];
-    output_file_extension(path, extension);
-    if (!option_among(extension, "npy|json|csv|ply|vtu"))
-        FAIL(error, LAM_ERR_ARGUMENT, "-o %s: must end in .npy, .json, .csv, .ply or .vtu", path);
-    if (reduced && !option_among(extension, "json|csv"))
-        FAIL(error, LAM_ERR_ARGUMENT, "-o %s: --reduce goes into .json or .csv only", path);
-done:
-    return status;
-}
-
 void output_column(const solution *s, size_t vector, size_t channel, char name[OUTPUT_COLUMN]) {
     static const char letters[] = "rgb";
     int length = snprintf(name, OUTPUT_COLUMN, "%s", codec_quantity_name(s->quantity));
@@ -132,25 +119,59 @@ static lam_status output_npy(const solution *s, FILE *stream, lam_error *error) 
     return output_array(stream, rank, shape, s->values, s->refined, error);
 }
 
+/* A format of files: the writer of an extension. */
+static const struct {
+    const char *extension;
+    lam_status (*write)(const solution *s, FILE *stream, lam_error *error);
+    bool takes_figures; /* also figures of groups in place of vectors */
+} formats[] = {
+    {"npy", output_npy, false}, {"json", output_json, true}, {"csv", output_csv, true},
+    {"ply", output_ply, false}, {"vtu", output_vtu, false},
+};
+#define N_FORMATS (sizeof formats / sizeof *formats)
+
+void output_formats(bool figures, char text[OUTPUT_FORMATS]) {
+    size_t length = 0, left = 0;
+    for (size_t k = 0; k < N_FORMATS; k++) left += !figures || formats[k].takes_figures;
+    for (size_t k = 0; k < N_FORMATS && length < OUTPUT_FORMATS; k++) {
+        if (figures && !formats[k].takes_figures) continue;
+        left--;
+        length += (size_t)snprintf(text + length, OUTPUT_FORMATS - length, ".%s%s", formats[k].extension,
+                                   left > 1    ? ", "
+                                   : left == 1 ? " or "
+                                               : "");
+    }
+}
+
+/* The format of a path; N_FORMATS: none. */
+static size_t find_format(const char *path) {
+    size_t k = 0;
+    char extension[16];
+    output_file_extension(path, extension);
+    while (k < N_FORMATS && strcmp(formats[k].extension, extension) != 0) k++;
+    return k;
+}
+
+lam_status output_check(const char *path, bool reduced, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t format = find_format(path);
+    char text[OUTPUT_FORMATS];
+    output_formats(reduced && format < N_FORMATS, text);
+    if (format == N_FORMATS) FAIL(error, LAM_ERR_ARGUMENT, "-o %s: must end in %s", path, text);
+    if (reduced && !formats[format].takes_figures)
+        FAIL(error, LAM_ERR_ARGUMENT, "-o %s: --reduce goes into %s only", path, text);
+done:
+    return status;
+}
+
 lam_status output_write(const solution *s, const char *path, lam_error *error) {
     lam_status status = LAM_OK;
     output_file file = {0};
-    char extension[16];
     problem why;
-    output_file_extension(path, extension);
     if (s->values != NULL && !answer_check(s->values, s->n_vectors * s->m->n_channels * s->m->n, &why))
         FAIL(error, LAM_ERR_ARGUMENT, "%.200s: %s", path, why.detail);
     TRY(output_file_open(path, &file, error));
-    if (strcmp(extension, "npy") == 0)
-        TRY(output_npy(s, file.stream, error));
-    else if (strcmp(extension, "json") == 0)
-        TRY(output_json(s, file.stream, error));
-    else if (strcmp(extension, "csv") == 0)
-        output_csv(s, file.stream);
-    else if (strcmp(extension, "ply") == 0)
-        output_ply(s, file.stream);
-    else
-        output_vtu(s, file.stream);
+    TRY(formats[find_format(path)].write(s, file.stream, error));
     TRY(output_file_commit(&file, error));
 done:
     output_file_abort(&file);

@@ -45,8 +45,12 @@ typedef struct solution {
 /* Computes the figures of every reduction. LAM_ERR_MEMORY. */
 lam_status reductions_fill(solution *s, lam_error *error);
 
-/* Checks that a file of this name can be written: LAM_ERR_ARGUMENT names the extensions that can. Reductions
- * go into JSON and CSV only. */
+/* Puts ".npy, .json or .csv", all formats, or those that figures of groups can be written in, into text. */
+#define OUTPUT_FORMATS 128
+void output_formats(bool figures, char text[OUTPUT_FORMATS]);
+
+/* Checks that a file of this name can be written: LAM_ERR_ARGUMENT names the extensions that can, or
+ * those for reductions. */
 lam_status output_check(const char *path, bool reduced, lam_error *error);
 
 /* Writes path in the format of its extension, whole or not at all. */
@@ -78,10 +82,14 @@ static inline double output_figure(const solution *s, const reduction *r, size_t
 /* Writes on standard output: the reductions, or the mean of every group. */
 void output_print(const solution *s);
 
+/* Writes the same as JSON on standard output. Errors: LAM_ERR_MEMORY; LAM_ERR_ARGUMENT for a value that is
+ * too large for a float. */
+lam_status output_print_json(const solution *s, lam_error *error);
+
 /* The formats; a failed write is seen by ferror(stream). */
 lam_status output_json(const solution *s, FILE *stream, lam_error *error);
-void output_csv(const solution *s, FILE *stream);
-void output_ply(const solution *s, FILE *stream);
-void output_vtu(const solution *s, FILE *stream);
+lam_status output_csv(const solution *s, FILE *stream, lam_error *error);
+lam_status output_ply(const solution *s, FILE *stream, lam_error *error);
+lam_status output_vtu(const solution *s, FILE *stream, lam_error *error);
 
 #endif

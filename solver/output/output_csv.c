@@ -49,9 +49,11 @@ static void figures(const solution *s, FILE *stream) {
     }
 }
 
-void output_csv(const solution *s, FILE *stream) {
+lam_status output_csv(const solution *s, FILE *stream, lam_error *error) {
+    (void)error;
     if (s->n_reductions > 0)
         figures(s, stream);
     else
         elements(s, stream);
+    return LAM_OK;
 }

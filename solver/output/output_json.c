@@ -55,6 +55,47 @@ static bool write_reductions(const solution *s, buffer *b) {
     return written;
 }
 
+/* The mean of a group in every channel of a vector. */
+static bool write_mean(const solution *s, uint32_t g, size_t v, buffer *b) {
+    const size_t C = s->m->n_channels, n = s->m->n;
+    bool written = C == 1 || buffer_append(b, "[", 1);
+    for (size_t c = 0; written && c < C; c++) {
+        const size_t at = (v * C + c) * n;
+        const reduce_values x = {.floats = s->values != NULL ? s->values + at : NULL,
+                                 .doubles = s->refined != NULL ? s->refined + at : NULL};
+        double figures[REDUCE_COUNT];
+        reduce_groups(1, &g, s->groups, s->m->area, x, figures);
+        written = (c == 0 || buffer_append(b, ",", 1)) && reduce_write_channels(b, &figures[REDUCE_MEAN], 1);
+    }
+    return written && (C == 1 || buffer_append(b, "]", 1));
+}
+
+/* "floor":{"elements":N,"area":A,"mean":...},... of vectors v0 to end; a list of means for a batch. */
+static bool write_means(const solution *s, size_t v0, size_t end, bool list, buffer *b) {
+    bool written = true;
+    for (uint32_t g = 0; written && g < s->m->n_groups; g++) {
+        const uint32_t first = s->groups->start[g], last = s->groups->start[g + 1];
+        double area = 0;
+        for (uint32_t e = first; e < last; e++) area += s->m->area[s->groups->elements[e]];
+        written = (g == 0 || buffer_append(b, ",", 1)) && json_write_text(b, s->m->group_names[g]) &&
+                  buffer_printf(b, ":{\"elements\":%u,\"area\":", last - first) &&
+                  json_write_double(b, area) && buffer_printf(b, ",\"mean\":%s", list ? "[" : "");
+        for (size_t v = v0; written && v < end; v++)
+            written = (v == v0 || buffer_append(b, ",", 1)) && write_mean(s, g, v, b);
+        written = written && buffer_printf(b, "%s", list ? "]}" : "}");
+    }
+    return written;
+}
+
+/* "sum":{"floor":{...},...},... of every figure of a year. */
+static bool write_year_means(const solution *s, buffer *b) {
+    bool written = true;
+    for (size_t v = 0; written && v < s->n_vectors; v++)
+        written = (v == 0 || buffer_append(b, ",", 1)) && json_write_text(b, s->names[v]) &&
+                  buffer_append(b, ":{", 2) && write_means(s, v, v + 1, false, b) && buffer_append(b, "}", 1);
+    return written;
+}
+
 static bool write_vectors(const solution *s, const answer_shape *shape, const answer_notes *notes, buffer *b,
                           FILE *stream, problem *why) {
     const size_t row = s->m->n_channels * s->m->n;
@@ -71,13 +112,15 @@ static bool write_vectors(const solution *s, const answer_shape *shape, const an
     return answer_end(b, shape, &as, notes, why);
 }
 
-/* An object of figures in place of vectors. */
-static bool write_object(const solution *s, const answer_notes *notes, buffer *b, FILE *stream,
+/* An object of figures in place of vectors: means of all groups, figures of a year or reductions. */
+static bool write_object(const solution *s, bool means, const answer_notes *notes, buffer *b, FILE *stream,
                          problem *why) {
     const bool year = s->names != NULL, reduced = s->n_reductions > 0;
     bool written = answer_head(b, s->m->n, s->m->n_channels, notes) &&
                    buffer_printf(b, ",\"%s\":{", year ? "annual" : "groups");
-    if (year && !reduced) {
+    if (means) {
+        written = written && (year ? write_year_means(s, b) : write_means(s, 0, s->n_vectors, s->batch, b));
+    } else if (year && !reduced) {
         if (written && !write_year(s, b, stream, why)) return false;
     } else {
         written = written && (year ? write_reduced_year(s, b) : write_reductions(s, b));
@@ -87,7 +130,7 @@ static bool write_object(const solution *s, const answer_notes *notes, buffer *b
     return written || problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
 }
 
-lam_status output_json(const solution *s, FILE *stream, lam_error *error) {
+static lam_status write_all(const solution *s, bool means, FILE *stream, lam_error *error) {
     lam_status status = LAM_OK;
     buffer b = {0};
     problem why = {0};
@@ -103,12 +146,20 @@ lam_status output_json(const solution *s, FILE *stream, lam_error *error) {
                                 .indirect_mean = s->indirect,
                                 .certificates = s->certificates,
                                 .iterations = s->iterations};
-    const bool vectors = s->names == NULL && s->n_reductions == 0;
+    const bool vectors = !means && s->names == NULL && s->n_reductions == 0;
     if (!(vectors ? write_vectors(s, &shape, &notes, &b, stream, &why)
-                  : write_object(s, &notes, &b, stream, &why)))
+                  : write_object(s, means, &notes, &b, stream, &why)))
         FAIL(error, why.status == 503 ? LAM_ERR_MEMORY : LAM_ERR_ARGUMENT, "%s", why.detail);
     flush(&b, stream);
 done:
     buffer_free(&b);
     return status;
+}
+
+lam_status output_json(const solution *s, FILE *stream, lam_error *error) {
+    return write_all(s, false, stream, error);
+}
+
+lam_status output_print_json(const solution *s, lam_error *error) {
+    return write_all(s, s->n_reductions == 0, stdout, error);
 }

@@ -19,7 +19,8 @@ static void put_double(double value, FILE *stream) {
     fwrite(&bits, sizeof bits, 1, stream);
 }
 
-void output_ply(const solution *s, FILE *stream) {
+lam_status output_ply(const solution *s, FILE *stream, lam_error *error) {
+    (void)error;
     const mesh *m = s->m;
     char name[OUTPUT_COLUMN];
     fprintf(stream, "ply\nformat binary_little_endian 1.0\ncomment %s of %s\n",
@@ -44,6 +45,7 @@ void output_ply(const solution *s, FILE *stream) {
         for (size_t k = 0; k < s->n_vectors * m->n_channels; k++)
             put_float((float)output_value(s, k * m->n + i), stream);
     }
+    return LAM_OK;
 }
 
 /* One text array: format is for one value. */
@@ -52,7 +54,8 @@ void output_ply(const solution *s, FILE *stream) {
             type, name, components)
 #define CLOSE_ARRAY() fputs("</DataArray>\n", stream)
 
-void output_vtu(const solution *s, FILE *stream) {
+lam_status output_vtu(const solution *s, FILE *stream, lam_error *error) {
+    (void)error;
     enum { VTK_TRIANGLE = 5, VTK_QUAD = 9 };
     const mesh *m = s->m;
     char name[OUTPUT_COLUMN];
@@ -93,4 +96,5 @@ void output_vtu(const solution *s, FILE *stream) {
             CLOSE_ARRAY();
         }
     fputs("</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n", stream);
+    return LAM_OK;
 }

@@ -1,16 +1,14 @@
-/* lambert render: a picture of a store under any lighting. */
+/* lambert render: draws a picture of a store under any light. */
 #include "solver/base/atomic_file.h"
 #include "solver/base/terminal.h"
 #include "solver/codec/request.h"
 #include "solver/light/emission_apply.h"
-#include "solver/operator/operator.h"
-#include "solver/operator/sky_light.h"
 #include "solver/render/picture.h"
 #include "solver/render/store_view.h"
+#include "solver/verbs/light_options.h"
 #include "solver/verbs/verbs.h"
 
 #include <math.h>
-#include <omp.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,8 +23,7 @@ typedef struct size_option {
 } size_option;
 
 typedef struct fields {
-    option_list emit;
-    const char *emission, *sky;
+    light_options light;
     const char *quantity;
     camera_option camera;
     size_option size;
@@ -78,26 +75,6 @@ static const option_row rows[] = {
      .offset = FIELD(output),
      .argument = "IMAGE.png",
      .help = "Where the picture goes"},
-    {0},
-};
-static const option_row light_rows[] = {
-    {.name = "emit",
-     .kind = OPTION_LIST,
-     .offset = FIELD(emit),
-     .argument = "GROUP=V[,V,V]",
-     .unit = "W/m2",
-     .help = "A group emits V W/m2, one number or one per channel; may be repeated"},
-    {.name = "emission",
-     .kind = OPTION_TEXT,
-     .offset = FIELD(emission),
-     .argument = "FILE.npy|.json",
-     .help = "One emission from a file"},
-    {.name = "sky",
-     .kind = OPTION_TEXT,
-     .offset = FIELD(sky),
-     .argument = "FILE.npy",
-     .help =
-         "Radiances of the tiles of the sky, W/(m2 sr): [m] or [C][m]; alone or added to the other light"},
     {0},
 };
 static const option_row view_rows[] = {
@@ -156,7 +133,7 @@ static float luminance_of(const mesh *m, const float *values, size_t i) {
     return tone_luminance(channels, m->n_channels);
 }
 
-/* Which elements have light at all, and which show mostly their own. */
+/* Marks the elements that have any light, and those whose own emission is most of what they show. */
 static void mark(const mesh *m, const float *values, const float *E, bool emission_shows, bool *lit,
                  bool *glows) {
     float largest = 0;
@@ -168,7 +145,7 @@ static void mark(const mesh *m, const float *values, const float *E, bool emissi
     }
 }
 
-/* The next number whose quarters are short. */
+/* The next larger number whose quarters have few digits, for the legend. */
 static double round_up(double x) {
     static const double steps[] = {1, 1.2, 1.6, 2, 2.4, 2.8, 3.2, 4, 4.8, 6, 8, 10};
     if (!(x > 0)) return 1;
@@ -183,7 +160,7 @@ static size_t view_width(const fields *f) {
     return f->size.width - (f->false_color ? picture_legend_width(f->size.width, f->size.height) : 0);
 }
 
-/* A store, what its elements show, and from where they are seen. */
+/* A store, the values that its elements show, and the camera. */
 typedef struct view {
     store *s;
     mesh m;
@@ -206,7 +183,7 @@ static void view_close(view *v) {
     store_close(v->s);
 }
 
-/* All but what the elements show, and so nothing that costs much. */
+/* Loads all but the values of the elements, which is cheap. */
 static lam_status view_open(const char *path, const fields *f, view *v, lam_error *error) {
     lam_status status = LAM_OK;
     TRY(output_file_check(f->output, error));
@@ -219,7 +196,7 @@ done:
     return status;
 }
 
-/* The scene and the camera of a view whose values are there. */
+/* Makes the scene and the camera of a view that has values. */
 static lam_status view_aim(const fields *f, size_t n_channels, bool smooth, view *v, lam_error *error) {
     lam_status status = LAM_OK;
     const double aspect = (double)view_width(f) / (double)f->size.height;
@@ -235,7 +212,7 @@ done:
     return status;
 }
 
-/* What fits the light that is seen. */
+/* The exposure, or the range of colours, that fits the light in view. */
 static picture_options look_of_light(const fields *f, const view *v) {
     tone_histogram histogram = {0};
     picture_options look = {.width = view_width(f)};
@@ -269,29 +246,19 @@ done:
 static lam_status render(const char *path, const fields *f, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
     view v = {.s = NULL};
-    lam_operator *op = NULL;
-    lam_sky *sky = NULL;
-    emission_scene scene = {0};
-    emission light = {0};
+    lit_store lit = {0};
     lam_quantity quantity = LAM_RADIOSITY;
-    bool own = false;
 
     codec_quantity_find(f->quantity, strlen(f->quantity), &quantity);
     TRY(view_open(path, f, &v, error));
-    TRY(sky_load(v.s, v.m.n, &sky, error));
-    const emission_options given = {.items = &f->emit, .path = f->emission, .sky = f->sky};
-    TRY(operator_load(v.s, &op, error));
-    TRY(emission_scene_create(&v.m, &scene, error));
-    emission_scene_sources(&scene, op, sky);
-    TRY(emission_choose(&scene, &given, &light, &own, error));
-    if (light.n_vectors != 1)
+    TRY(light_open(v.s, &v.m, &f->light, false, &lit, error));
+    if (lit.light.n_vectors != 1)
         FAIL(error, LAM_ERR_ARGUMENT, "%s: holds %zu emissions, a picture shows exactly 1",
-             f->emission != NULL ? f->emission : f->sky, light.n_vectors);
-    lam_operator_set_threads(op, (size_t)omp_get_max_threads());
+             f->light.emission != NULL ? f->light.emission : f->light.sky, lit.light.n_vectors);
     TRY(terminal_check(error));
-    TRY(emission_apply(&light, op, sky, quantity, 0, NULL, NULL, &v.values, error));
-    mark(&v.m, v.values, light.E, quantity == LAM_RADIOSITY, v.lit, v.glows);
-    if (own && memchr(v.glows, true, v.m.n) == NULL && memchr(v.lit, true, v.m.n) == NULL)
+    TRY(emission_apply(&lit.light, lit.op, lit.sky, quantity, 0, NULL, NULL, &v.values, error));
+    mark(&v.m, v.values, lit.light.E, quantity == LAM_RADIOSITY, v.lit, v.glows);
+    if (lit.own && memchr(v.glows, true, v.m.n) == NULL && memchr(v.lit, true, v.m.n) == NULL)
         FAIL(error, LAM_ERR_ARGUMENT,
              "%s: the scene has no light of its own; give --emit GROUP=V, --emission or --sky", path);
     TRY(view_aim(f, v.m.n_channels, f->smooth, &v, error));
@@ -303,10 +270,7 @@ static lam_status render(const char *path, const fields *f, terminal *t, lam_err
         terminal_log(t, "white is about %.3g W/m2", 1 / look.exposure);
 done:
     view_close(&v);
-    emission_scene_free(&scene);
-    emission_free(&light);
-    lam_operator_close(op);
-    lam_sky_close(sky);
+    light_close(&lit);
     return status;
 }
 
@@ -376,7 +340,7 @@ done:
     return status;
 }
 
-/* Names the options that a picture without light has no use for. */
+/* Logs the given options that a picture without light does not use. */
 static void log_unused(const fields *f, const option_result *given, terminal *t) {
     static const char *const of_light[] = {"emit", "emission", "sky", "exposure", "smooth", "false-color"};
     const size_t count = strcmp(f->quantity, "coherence") == 0 ? 5 : 6;
@@ -391,17 +355,14 @@ int cmd_render(int argc, char **argv) {
     lam_error error = {0};
     terminal t;
     char extension[16];
-    const option_table tables[] = {{NULL, rows, &f},
-                                   {"light (preset: the emission in the scene)", light_rows, &f},
-                                   {"view", view_rows, &f},
-                                   {0}};
+    const option_table tables[] = {
+        {NULL, rows, &f}, {LIGHT_HEADING, light_rows, &f.light}, {"view", view_rows, &f}, {0}};
     int go = options_parse(&verb, tables, argc, argv, &result);
     if (go != OPTIONS_GO) return go;
     if (f.output == NULL) return options_usage(verb.name, "give -o IMAGE.png");
     output_file_extension(f.output, extension);
     if (strcmp(extension, "png") != 0) return options_usage(verb.name, "-o %s: must end in .png", f.output);
-    if (f.emit.count > 0 && f.emission != NULL)
-        return options_usage(verb.name, "give --emit or --emission, not both");
+    if (light_check(&f.light, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
     terminal_open(&t, verb.name, false, false);
     if (needs_no_light(&f)) {
         if (strcmp(f.quantity, "patch") == 0) f.false_color = false; /* and no room for a legend */

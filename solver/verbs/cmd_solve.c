@@ -1,56 +1,29 @@
-/* lambert solve: lights a store and writes what it answers. */
+/* lambert solve: lights a store and writes the answer. */
 #include "solver/base/atomic_file.h"
 #include "solver/base/terminal.h"
 #include "solver/codec/request.h"
 #include "solver/light/annual.h"
 #include "solver/light/emission_refine.h"
 #include "solver/light/weather_light.h"
-#include "solver/operator/operator.h"
-#include "solver/operator/sky_light.h"
 #include "solver/output/output.h"
+#include "solver/verbs/light_options.h"
 #include "solver/verbs/verbs.h"
 
 #include <math.h>
-#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
 typedef struct fields {
-    option_list emit, reduce, annual;
-    const char *emission, *sky, *weather, *sun, *quantity, *output, *occupied;
+    light_options light;
+    option_list reduce, annual;
+    const char *weather, *sun, *quantity, *output, *occupied;
     double hours, tolerance;
     uint64_t sun_points;
-    bool photometric;
+    bool photometric, json;
 } fields;
 
 #define FIELD(member) offsetof(fields, member)
-static const option_row rows[] = {
-    {.name = "output",
-     .letter = 'o',
-     .kind = OPTION_TEXT,
-     .offset = FIELD(output),
-     .argument = "FILE",
-     .help = ".npy, .json, .csv, .ply or .vtu; without it the mean of every group is printed"},
-    {0},
-};
-static const option_row light_rows[] = {
-    {.name = "emit",
-     .kind = OPTION_LIST,
-     .offset = FIELD(emit),
-     .argument = "GROUP=V[,V,V]",
-     .unit = "W/m2",
-     .help = "A group emits V W/m2, one number or one per channel; may be repeated"},
-    {.name = "emission",
-     .kind = OPTION_TEXT,
-     .offset = FIELD(emission),
-     .argument = "FILE.npy|.json",
-     .help = "One emission or a batch from a file"},
-    {.name = "sky",
-     .kind = OPTION_TEXT,
-     .offset = FIELD(sky),
-     .argument = "FILE.npy",
-     .help = "Radiances of the tiles of the sky, W/(m2 sr): [m], [C][m] or a batch; alone or added to the "
-             "other light"},
+static const option_row weather_rows[] = {
     {.name = "weather",
      .kind = OPTION_TEXT,
      .offset = FIELD(weather),
@@ -92,6 +65,10 @@ static const option_row answer_rows[] = {
      .offset = FIELD(reduce),
      .argument = "GROUP=FIGURE",
      .help = "mean, sum, min, max, uniformity or variance of a group; may be repeated"},
+    {.name = "json",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(json),
+     .help = "Print JSON in place of a table, without -o"},
     {.name = "tolerance",
      .kind = OPTION_NUMBER,
      .offset = FIELD(tolerance),
@@ -203,8 +180,8 @@ done:
     return status;
 }
 
-/* What came of refining, for the log and the file. */
-static void tell_refined(const refined_light *refined, solution *out, double tolerance, terminal *t) {
+/* Puts refined values and their certificates into the solution, and the largest into the log. */
+static void take_refined(const refined_light *refined, solution *out, double tolerance, terminal *t) {
     double certificate = 0;
     size_t iterations = 0;
     out->refined = refined->values;
@@ -226,10 +203,7 @@ static lam_status solve(const char *path, const fields *f, const annual_wish *ye
     lam_status status = LAM_OK;
     store *s = NULL;
     mesh m = {0};
-    lam_operator *op = NULL;
-    lam_sky *sky = NULL;
-    emission_scene there = {0};
-    emission light = {0};
+    lit_store lit = {0};
     lam_quantity quantity = LAM_RADIOSITY;
     double *row_sums = NULL;
     float *values = NULL;
@@ -238,26 +212,19 @@ static lam_status solve(const char *path, const fields *f, const annual_wish *ye
     uint32_t *selected = NULL;
     size_t n_selected = 0;
     sunlight sun = {0};
-    bool own = false;
     const char *names[ANNUAL_MOST];
     for (size_t k = 0; k < year->n_figures; k++) names[k] = year->figures[k].name;
     if (f->output != NULL) TRY(output_file_check(f->output, error));
     TRY(store_open(path, &s, error));
     TRY(store_get_text(s, "/", "name", &scene, error));
     TRY(mesh_load(s, &m, &row_sums, error));
-    TRY(emission_scene_create(&m, &there, error));
-    TRY(reductions_bind(reductions, n_reductions, &there.groups, error));
-    TRY(sky_load(s, m.n, &sky, error));
-    const emission_options given = {
-        .items = &f->emit, .path = f->emission, .sky = f->sky, .other = f->weather != NULL};
-    TRY(operator_load(s, &op, error));
-    emission_scene_sources(&there, op, sky);
-    TRY(emission_choose(&there, &given, &light, &own, error));
-    if (own && is_dark(&light, m.n * m.n_channels))
+    TRY(light_open(s, &m, &f->light, f->weather != NULL, &lit, error));
+    TRY(reductions_bind(reductions, n_reductions, &lit.scene.groups, error));
+    if (lit.own && is_dark(&lit.light, m.n * m.n_channels))
         FAIL(error, LAM_ERR_ARGUMENT,
              "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s", path,
-             sky != NULL ? ", --sky FILE or --weather FILE" : "");
-    if (own) terminal_log(t, "no --emit, --emission, --sky or --weather: the scene's own light");
+             lit.sky != NULL ? ", --sky FILE or --weather FILE" : "");
+    if (lit.own) terminal_log(t, "no --emit, --emission, --sky or --weather: the scene's own light");
     /* With --reduce only figures are written, with -o too. */
     TRY(wanted_elements(&m, reductions, n_reductions, &n_selected, &selected, error));
     if (f->weather != NULL) {
@@ -265,31 +232,33 @@ static lam_status solve(const char *path, const fields *f, const annual_wish *ye
                                     .photometric = f->photometric,
                                     .exact = strcmp(f->sun, "exact") == 0,
                                     .sun_points = (size_t)f->sun_points};
-        TRY(weather_light_add(&hours, s, &m, op, sky, n_selected, selected, t, &light, &sun, error));
+        TRY(weather_light_add(&hours, s, &m, lit.op, lit.sky, n_selected, selected, t, &lit.light, &sun,
+                              error));
     }
-    if (year->n_figures > 0 && !light.batch)
+    if (year->n_figures > 0 && !lit.light.batch)
         FAIL(error, LAM_ERR_ARGUMENT,
              "--annual is of a batch, one vector an hour, and this is one light; give --sky [hours][tiles] "
              "or --weather");
-    lam_operator_set_threads(op, (size_t)omp_get_max_threads());
     TRY(terminal_check(error));
     codec_quantity_find(f->quantity, strlen(f->quantity), &quantity);
     solution out = {.m = &m,
-                    .groups = &there.groups,
+                    .groups = &lit.scene.groups,
                     .scene = scene,
                     .quantity = quantity,
-                    .n_vectors = light.n_vectors,
-                    .batch = light.batch,
+                    .n_vectors = lit.light.n_vectors,
+                    .batch = lit.light.batch,
                     .reductions = reductions,
                     .n_reductions = n_reductions};
     if (year->n_figures > 0) {
         out.names = names;
-        TRY(solve_year(year, &light, op, sky, n_selected, selected, t, &out, &values, error));
+        TRY(solve_year(year, &lit.light, lit.op, lit.sky, n_selected, selected, t, &out, &values, error));
     } else if (f->tolerance > 0) {
-        TRY(emission_refine(&light, path, op, sky, quantity, f->tolerance, terminal_check, &refined, error));
-        tell_refined(&refined, &out, f->tolerance, t);
+        TRY(emission_refine(&lit.light, path, lit.op, lit.sky, quantity, f->tolerance, terminal_check,
+                            &refined, error));
+        take_refined(&refined, &out, f->tolerance, t);
     } else {
-        TRY(emission_apply(&light, op, sky, quantity, n_selected, selected, terminal_check, &values, error));
+        TRY(emission_apply(&lit.light, lit.op, lit.sky, quantity, n_selected, selected, terminal_check,
+                           &values, error));
     }
     out.values = values;
     TRY(reductions_fill(&out, error));
@@ -297,6 +266,8 @@ static lam_status solve(const char *path, const fields *f, const annual_wish *ye
     if (f->tolerance == 0) stated_error(s, &out.relative, &out.indirect);
     if (f->output != NULL)
         TRY(output_write(&out, f->output, error));
+    else if (f->json)
+        TRY(output_print_json(&out, error));
     else
         output_print(&out);
 done:
@@ -305,11 +276,8 @@ done:
     free(values);
     refined_light_free(&refined);
     free(row_sums);
-    emission_scene_free(&there);
-    emission_free(&light);
     sunlight_free(&sun);
-    lam_operator_close(op);
-    lam_sky_close(sky);
+    light_close(&lit);
     mesh_free(&m);
     store_close(s);
     return status;
@@ -335,18 +303,28 @@ int cmd_solve(int argc, char **argv) {
     lam_error error = {0};
     terminal term;
     annual_wish year = {.hours = 1, .from = 0, .to = 24};
+    char formats[OUTPUT_FORMATS], output_help[2 * OUTPUT_FORMATS];
+    output_formats(false, formats);
+    snprintf(output_help, sizeof output_help, "%s; without it the mean of every group is printed", formats);
+    const option_row output_rows[] = {{.name = "output",
+                                       .letter = 'o',
+                                       .kind = OPTION_TEXT,
+                                       .offset = FIELD(output),
+                                       .argument = "FILE",
+                                       .help = output_help},
+                                      {0}};
     const option_table tables[] = {
-        {NULL, rows, &f},
-        {"light (preset: the emission in the scene)", light_rows, &f},
+        {NULL, output_rows, &f},
+        {LIGHT_HEADING, light_rows, &f.light},
+        {"", weather_rows, &f},
         {"answer", answer_rows, &f},
         {"a year: figures of each element over a batch of skies or emissions, in place of the batch",
          year_rows, &f},
         {0}};
     int code = options_parse(&verb, tables, argc, argv, &given);
     if (code != OPTIONS_GO) return code;
-    if (f.emit.count > 0 && f.emission != NULL)
-        return options_usage(verb.name, "give --emit or --emission, not both");
-    if (f.sky != NULL && f.weather != NULL)
+    if (light_check(&f.light, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
+    if (f.light.sky != NULL && f.weather != NULL)
         return options_usage(verb.name, "give --sky or --weather, not both");
     if (f.weather != NULL && !weather_is_named(f.weather))
         return options_usage(verb.name, "--weather %s: must end in .epw or .wea", f.weather);
@@ -356,11 +334,11 @@ int cmd_solve(int argc, char **argv) {
         return options_usage(verb.name, "--sun-points is for --sun exact");
     if (f.tolerance > 0 && f.annual.count > 0)
         return options_usage(verb.name, "--tolerance is not for --annual");
-    if (emission_check_items(&f.emit, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
+    if (f.json && f.output != NULL) return options_usage(verb.name, "give --json or -o, not both");
     if (f.output != NULL && output_check(f.output, f.reduce.count > 0, &error) != LAM_OK)
         return options_usage(verb.name, "%s", error.message);
     if (read_year(&f, &year, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
-    /* What a place receives is what a study of daylight asks for. */
+    /* Studies of daylight ask for the light that a place receives. */
     if (f.quantity == NULL) f.quantity = year.n_figures > 0 ? "irradiance" : "radiosity";
     reduction reductions[OPTION_LIST_MAX] = {0};
     size_t n_reductions = 0;

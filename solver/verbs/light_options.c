@@ -1,0 +1,59 @@
+#include "solver/verbs/light_options.h"
+
+#include "solver/operator/operator.h"
+#include "solver/operator/sky_light.h"
+
+#include <omp.h>
+
+#define FIELD(member) offsetof(light_options, member)
+const option_row light_rows[] = {
+    {.name = "emit",
+     .kind = OPTION_LIST,
+     .offset = FIELD(emit),
+     .argument = "GROUP=V[,V,V]",
+     .unit = "W/m2",
+     .help = "A group emits V W/m2, one number or one per channel; may be repeated"},
+    {.name = "emission",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(emission),
+     .argument = "FILE.npy|.json",
+     .help = "One emission from a file, or a batch of them for solve"},
+    {.name = "sky",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(sky),
+     .argument = "FILE.npy",
+     .help = "Radiances of the tiles of the sky, W/(m2 sr): [m], [C][m], or a batch of them for solve; alone "
+             "or added to the other light"},
+    {0},
+};
+
+lam_status light_check(const light_options *options, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (options->emit.count > 0 && options->emission != NULL)
+        FAIL(error, LAM_ERR_ARGUMENT, "give --emit or --emission, not both");
+    TRY(emission_check_items(&options->emit, error));
+done:
+    return status;
+}
+
+lam_status light_open(store *s, const mesh *m, const light_options *options, bool other, lit_store *out,
+                      lam_error *error) {
+    lam_status status = LAM_OK;
+    const emission_options given = {
+        .items = &options->emit, .path = options->emission, .sky = options->sky, .other = other};
+    TRY(emission_scene_create(m, &out->scene, error));
+    TRY(sky_load(s, m->n, &out->sky, error));
+    TRY(operator_load(s, &out->op, error));
+    emission_scene_sources(&out->scene, out->op, out->sky);
+    TRY(emission_choose(&out->scene, &given, &out->light, &out->own, error));
+    lam_operator_set_threads(out->op, (size_t)omp_get_max_threads());
+done:
+    return status;
+}
+
+void light_close(lit_store *lit) {
+    emission_scene_free(&lit->scene);
+    emission_free(&lit->light);
+    lam_operator_close(lit->op);
+    lam_sky_close(lit->sky);
+}

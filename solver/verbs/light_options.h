@@ -1,0 +1,36 @@
+/* The light of a command line, for solve and render: --emit, --emission and --sky. */
+#ifndef LAMBERT_VERBS_LIGHT_OPTIONS_H
+#define LAMBERT_VERBS_LIGHT_OPTIONS_H
+
+#include "solver/light/emission.h"
+#include "store/store.h"
+
+#define LIGHT_HEADING "light (preset: the emission in the scene)"
+
+typedef struct light_options {
+    option_list emit;
+    const char *emission, *sky;
+} light_options;
+
+/* The rows of a table that fills light_options. */
+extern const option_row light_rows[];
+
+/* Checks what needs no store; an error is wrong usage. */
+lam_status light_check(const light_options *options, lam_error *error);
+
+/* A store's operator and sky, and the light that options ask for. */
+typedef struct lit_store {
+    lam_operator *op;
+    lam_sky *sky; /* NULL: the store has none */
+    emission_scene scene;
+    emission light;
+    bool own; /* the light is the scene's own */
+} lit_store;
+
+/* Loads from an open store with all threads for the operator. `other` is light that the caller adds later, so
+ * that the scene's own is not the preset. light_close frees also after an error; *out begins zeroed. */
+lam_status light_open(store *s, const mesh *m, const light_options *options, bool other, lit_store *out,
+                      lam_error *error);
+void light_close(lit_store *lit);
+
+#endif
