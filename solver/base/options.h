@@ -91,10 +91,8 @@ typedef struct option_result {
 int options_parse(const option_command *command, const option_table *tables, int argc, char **argv,
                   option_result *result);
 
-/* Runs the verb argv[1] of a program. help VERB prints the verb's --help; --help, --version, --print-manual
- * and
- * --print-completion are those of the whole program. notes stand at the end of --help. The list of verbs ends
- * with a row without name. */
+/* Runs the verb argv[1] of a program, from a list that ends with a row without name. `help VERB` prints the
+ * verb's --help; --help, --version, --print-manual and --print-completion are those of the whole program. */
 int options_run_verb(const option_command *program, const option_verb *verbs, int argc, char **argv);
 
 /* True if the option was on the command line. */

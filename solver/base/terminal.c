@@ -10,7 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* The one thing a signal handler may touch; nothing else in the project is static and mutable. */
+/* Set by the signal handler, which may touch nothing else. */
 static volatile sig_atomic_t signal_came;
 
 static void signal_note(int number) {
@@ -90,6 +90,14 @@ void terminal_log(terminal *t, const char *format, ...) {
     vfprintf(stderr, format, arguments);
     va_end(arguments);
     fputc('\n', stderr);
+}
+
+void terminal_log_stage(terminal *t, const char *name, double seconds) {
+    terminal_log(t, "%-14s%8.2f s", name, seconds);
+    if (t->n_done == TERMINAL_STAGES) return;
+    terminal_stage *stage = &t->done[t->n_done++];
+    snprintf(stage->name, sizeof stage->name, "%s", name);
+    stage->seconds = seconds;
 }
 
 void terminal_warn(terminal *t, const char *format, ...) {

@@ -1,4 +1,4 @@
-/* lambert bench: becomes the program lambert-bench, which a user who does not measure need not install. */
+/* lambert bench: executes the program lambert-bench, which is installed only by users who measure. */
 #include "solver/verbs/verbs.h"
 
 #include <errno.h>

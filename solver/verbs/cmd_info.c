@@ -1,4 +1,4 @@
-/* lambert info: what a store holds, how large and how exact it is. */
+/* lambert info: prints the contents of a store, its size and its errors. */
 #include "solver/base/options.h"
 #include "solver/base/terminal.h"
 #include "solver/codec/describe.h"
@@ -23,7 +23,7 @@ static const option_row rows[] = {
 static const option_command verb = {
     .name = "lambert info",
     .arguments = "STORE",
-    .summary = "Say what a store holds, its size, its measured errors, and why its method was chosen.",
+    .summary = "Print the contents of a store, its size, its measured errors, and the reason for its method.",
     .least_arguments = 1,
     .most_arguments = 1,
 };
@@ -46,7 +46,7 @@ static void print_bytes(double bytes) {
     printf("%-18s%.4g %s\n", "operator", bytes, units[unit]);
 }
 
-/* One line of figures, mean and largest, for the light of a group of probes. */
+/* Prints the mean and the largest error of a group of probes on one line. */
 static void print_figures(const char *name, const json_t *group, const char *against) {
     char key[64];
     double value[4];
@@ -72,12 +72,11 @@ static void print_error(const json_t *figures) {
         print_figures(names[i], group, "total");
         print_figures(names[i], group, "operator");
     }
-    puts("  total: against an independent sample of the form factors; operator: against the very sample it "
-         "was "
-         "built from");
+    puts("  total: against an independent sample of the form factors\n"
+         "  operator: against the sample that it was built from");
 }
 
-/* A screen's worth: a city has hundreds of groups. */
+/* Prints as many groups as fit on a screen: a city has hundreds of them. */
 static void print_groups(const json_t *groups) {
     enum { MOST = 20 };
     const size_t count = json_array_size(groups), shown = count <= MOST ? count : MOST - 1;

@@ -105,7 +105,8 @@ done:
     return status;
 }
 
-/* Times a factor; what a horizontal plane receives of each channel in all hours. */
+/* Multiplies every radiance by a factor. received[c] += sum L cos over all hours: the light of channel c on a
+ * horizontal plane. */
 static void weigh(sky_matrix *m, double factor, double received[3], bool *lit) {
     const size_t n_tiles = m->tiling.n_tiles;
     for (size_t k = 0; k < m->n * m->n_channels * n_tiles; k++) {

@@ -1,4 +1,4 @@
-/* lambert verify: tests what a store promises, one line a check. */
+/* lambert verify: checks a store and prints one line for each check. */
 #include "solver/base/options.h"
 #include "solver/verbs/verbs.h"
 #include "solver/verify/verify.h"
@@ -30,9 +30,9 @@ static const option_row rows[] = {
 static const option_command verb = {
     .name = "lambert verify",
     .arguments = "STORE [SCENE]",
-    .summary =
-        "Check a store: checksums, invariants, its stated error, and whether SCENE is still what it was "
-        "made from. Exit status 1 when something is broken.",
+    .summary = "Check a store: checksums, invariants, its stated error, and whether SCENE has changed since "
+               "the store was "
+               "made. The exit status is 1 if anything is broken.",
     .least_arguments = 1,
     .most_arguments = 2,
 };
