@@ -152,11 +152,11 @@ static void join_corners(smoother *s, const corner *corners, uint32_t *parent, s
     for (size_t i = 0; i < count; i++)
         for (size_t j = i > MANY_CORNERS ? i - MANY_CORNERS : 0; j < i; j++) {
             if (!same_surface(s->m, corners[i].element, corners[j].element)) continue;
-            const uint32_t x = joined_root(parent, (uint32_t)i), y = joined_root(parent, (uint32_t)j);
-            joined_link(parent, x > y ? x : y, x > y ? y : x);
+            const uint32_t x = union_find_root(parent, (uint32_t)i), y = union_find_root(parent, (uint32_t)j);
+            union_find_join(parent, x > y ? x : y, x > y ? y : x);
         }
     for (size_t i = 0; i < count; i++) {
-        const uint32_t root = joined_root(parent, (uint32_t)i);
+        const uint32_t root = union_find_root(parent, (uint32_t)i);
         uint32_t *node = &s->nodes->corner[corners[i].element][corners[i].number];
         if (root == i) { /* the smallest of its set, so met first */
             s->node_vertex[s->nodes->n_nodes] = corners[i].vertex;

@@ -13,15 +13,15 @@ static const double straightness = 1e-6;
 /* How far, in diameters, a corner may lie off the plane of a planar quad. */
 static const double flatness = 1e-5;
 
-void polygon_scratch_free(polygon_scratch *scratch) {
+void polygon_split_scratch_free(polygon_split_scratch *scratch) {
     free(scratch->corners);
     free(scratch->flat);
     free(scratch->quality);
     free(scratch->pieces);
-    *scratch = (polygon_scratch){0};
+    *scratch = (polygon_split_scratch){0};
 }
 
-static lam_status scratch_reserve(polygon_scratch *s, size_t n, lam_error *error) {
+static lam_status scratch_reserve(polygon_split_scratch *s, size_t n, lam_error *error) {
     void *grown = array_grow(s->corners, &s->corner_capacity, n, sizeof *s->corners, "face corners", error);
     if (grown == NULL) return LAM_ERR_MEMORY;
     s->corners = grown;
@@ -70,7 +70,7 @@ static double flatten(const double (*v)[3], const uint32_t *corners, size_t n, c
     return off;
 }
 
-static void remove_corner(polygon_scratch *s, size_t *n, size_t i) {
+static void remove_corner(polygon_split_scratch *s, size_t *n, size_t i) {
     (*n)--;
     memmove(s->corners + i, s->corners + i + 1, (*n - i) * sizeof *s->corners);
     memmove(s->flat + i, s->flat + i + 1, (*n - i) * sizeof *s->flat);
@@ -78,7 +78,7 @@ static void remove_corner(polygon_scratch *s, size_t *n, size_t i) {
 }
 
 /* Drops corners that repeat their neighbour, lie straight between both, or are the tip of a spike. */
-static void remove_straight(polygon_scratch *s, size_t *n, double diameter) {
+static void remove_straight(polygon_split_scratch *s, size_t *n, double diameter) {
     for (size_t i = 0, unchanged = 0; *n >= 3 && unchanged < *n;) {
         const size_t before = (i + *n - 1) % *n, after = (i + 1) % *n;
         const double *a = s->flat[before], *b = s->flat[i], *c = s->flat[after];
@@ -97,7 +97,7 @@ static void remove_straight(polygon_scratch *s, size_t *n, double diameter) {
 }
 
 /* How good the triangle cut off at corner i is: 4 sqrt(3) area / sum of squared edges; -1 if it is no ear. */
-static double ear_quality(const polygon_scratch *s, size_t n, size_t i) {
+static double ear_quality(const polygon_split_scratch *s, size_t n, size_t i) {
     const size_t before = (i + n - 1) % n, after = (i + 1) % n;
     const double *a = s->flat[before], *b = s->flat[i], *c = s->flat[after];
     const double area = plane_turn(a, b, c);
@@ -115,14 +115,14 @@ static double ear_quality(const polygon_scratch *s, size_t n, size_t i) {
     return 2 * sqrt(3.0) * area / (ab * ab + bc * bc + ca * ca);
 }
 
-static void add_piece(polygon_scratch *s, uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
+static void add_piece(polygon_split_scratch *s, uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
     const uint32_t piece[4] = {a, b, c, d};
     memcpy(s->pieces[s->n_pieces++], piece, sizeof piece);
 }
 
 /* Cuts off the best ear until a triangle is left. A polygon that crosses itself may run out of ears: then the
  * corner with the largest area goes, so that it always ends. O(n^2). */
-static void clip_ears(polygon_scratch *s, size_t n, double least_turn) {
+static void clip_ears(polygon_split_scratch *s, size_t n, double least_turn) {
     for (size_t i = 0; i < n; i++) s->quality[i] = ear_quality(s, n, i);
     while (n > 3) {
         size_t best = 0;
@@ -148,7 +148,7 @@ static void clip_ears(polygon_scratch *s, size_t n, double least_turn) {
 }
 
 lam_status polygon_split(const double (*vertices)[3], const uint32_t *corners, size_t n, double least_area,
-                         bool keep_straight, polygon_scratch *s, lam_error *error) {
+                         bool keep_straight, polygon_split_scratch *s, lam_error *error) {
     lam_status status = LAM_OK;
     double normal[3], diameter = 0;
     s->n_pieces = 0;

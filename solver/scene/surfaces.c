@@ -83,11 +83,11 @@ lam_status mesh_surfaces(const mesh *m, uint32_t *surface, size_t *n_surfaces, l
         if (corners[k].place != corners[first].place) first = k;
         const uint32_t i = corners[k].element;
         for (size_t l = k - first > MANY_CORNERS ? k - MANY_CORNERS : first; l < k; l++)
-            if (face_alike(m, i, corners[l].element)) joined_link(parent, i, corners[l].element);
+            if (face_alike(m, i, corners[l].element)) union_find_join(parent, i, corners[l].element);
     }
     for (size_t i = 0; i < m->n; i++) surface[i] = NONE;
     for (uint32_t i = 0; i < m->n; i++) { /* the root's entry holds the number until its own turn */
-        const uint32_t root = joined_root(parent, i);
+        const uint32_t root = union_find_root(parent, i);
         if (surface[root] == NONE) surface[root] = (uint32_t)count++;
         surface[i] = surface[root];
     }

@@ -85,11 +85,6 @@ const char *name_table_get(const name_table *t, size_t index) {
     return t->text + t->start[index];
 }
 
-uint32_t name_table_find(const name_table *t, const char *name) {
-    if (t->n == 0) return TABLE_NONE;
-    return t->slots.slots[name_slot(t, name, strlen(name))] - 1; /* a free slot holds 0 */
-}
-
 void name_table_free(name_table *t) {
     free(t->start);
     free(t->text);

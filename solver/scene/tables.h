@@ -33,8 +33,6 @@ typedef struct name_table {
 /* *index = the entry that equals the first length bytes of name, added when it is new. */
 lam_status name_table_add(name_table *t, const char *name, size_t length, uint32_t *index, lam_error *error);
 const char *name_table_get(const name_table *t, size_t index);
-/* The index of name, or TABLE_NONE. */
-uint32_t name_table_find(const name_table *t, const char *name);
 void name_table_free(name_table *t);
 
 /* Points; two are the same when all coordinates are equal (-0 equals 0). */

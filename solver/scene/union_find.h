@@ -6,14 +6,14 @@
 #include <stdint.h>
 
 /* Halves the way on its way, which keeps all later ones short. */
-static inline uint32_t joined_root(uint32_t *parent, uint32_t i) {
+static inline uint32_t union_find_root(uint32_t *parent, uint32_t i) {
     while (parent[i] != i) i = parent[i] = parent[parent[i]];
     return i;
 }
 
 /* Joins i to j: j's root stands for both. */
-static inline void joined_link(uint32_t *parent, uint32_t i, uint32_t j) {
-    parent[joined_root(parent, i)] = joined_root(parent, j);
+static inline void union_find_join(uint32_t *parent, uint32_t i, uint32_t j) {
+    parent[union_find_root(parent, i)] = union_find_root(parent, j);
 }
 
 #endif

@@ -13,7 +13,7 @@ typedef struct sent {
 static sent to_send;
 
 /* In the child, whose only descriptor besides the standard ones is the pipe, at 3. */
-static lam_status send_it(const char *path, soup *s, lam_error *error) {
+static lam_status send_it(const char *path, imported_faces *s, lam_error *error) {
     (void)path;
     (void)s;
     (void)error;
@@ -27,7 +27,7 @@ static lam_status send_it(const char *path, soup *s, lam_error *error) {
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const child_limits limits = {.cpu_seconds = 5, .memory_bytes = (size_t)1 << 28};
-    soup s = {0};
+    imported_faces s = {0};
     lam_error error = {.message = ""};
     to_send = (sent){data, size};
     if (import_in_child(send_it, "scene.obj", &limits, &s, &error) == LAM_OK) {
@@ -37,6 +37,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     } else {
         FUZZ_CHECK(error.message[0] != '\0' && strchr(error.message, '\n') == NULL);
     }
-    soup_free(&s);
+    imported_faces_free(&s);
     return 0;
 }

@@ -2,7 +2,17 @@
 #ifndef LAMBERT_SCENE_FACET_FACET_OUTLINE_H
 #define LAMBERT_SCENE_FACET_FACET_OUTLINE_H
 
-#include "solver/scene/facet/facet_sides.h"
+#include "solver/scene/mesh.h"
+
+/* A side of an element that no other element of its part shares: from place to place, as the outline runs. */
+typedef struct side {
+    uint32_t from, to, part;
+} side;
+
+typedef struct side_list {
+    side *sides; /* sorted by part */
+    size_t n, capacity;
+} side_list;
 
 typedef struct outlines {
     const mesh *m;
@@ -24,5 +34,11 @@ typedef struct outlines {
 
 /* Cost: O(sides), and for each part the square of its outline's corners. Errors: LAM_ERR_MEMORY. */
 lam_status outlines_cut(outlines *o, lam_error *error);
+
+/* Takes away sides of a part that run along each other in opposite directions, also where one of them is as
+ * long as several together: a corner of one element on the side of another parts nothing in a plane. Cost:
+ * for each part the square of its sides; those with more than some thousands stay as they are.
+ * Errors: LAM_ERR_MEMORY. */
+lam_status sides_cancel(const mesh *m, double flat, side_list *list, lam_error *error);
 
 #endif

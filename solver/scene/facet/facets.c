@@ -114,7 +114,7 @@ static void join_meeting(joining *j, edge *e, size_t count) {
             back += e[l].forward == e[k].forward && of_one_plane(j, e[mate].element, e[l].element);
         if (back != 1) continue;
         e[k].inner = e[mate].inner = true;
-        joined_link(j->parent, e[k].element, e[mate].element);
+        union_find_join(j->parent, e[k].element, e[mate].element);
     }
 }
 
@@ -146,7 +146,7 @@ static lam_status measure_parts(joining *j, lam_error *error) {
     const mesh *m = j->m;
     for (size_t i = 0; i < j->n; i++) j->part[i] = MESH_NO_VERTEX;
     for (uint32_t i = 0; i < j->n; i++) {
-        const uint32_t root = joined_root(j->parent, i);
+        const uint32_t root = union_find_root(j->parent, i);
         if (j->part[root] == MESH_NO_VERTEX) j->part[root] = (uint32_t)j->n_parts++;
         j->part[i] = j->part[root];
     }

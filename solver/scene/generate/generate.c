@@ -15,7 +15,7 @@ static const int box_faces[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 4, 6, 2},
                                     {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}};
 enum { BOX_FLOOR, BOX_CEILING, BOX_X0, BOX_X1, BOX_Y0, BOX_Y1 };
 
-static const draft_material half_grey = {"grey", {.5, .5, .5}, {0, 0, 0}};
+static const scene_draft_material half_grey = {"grey", {.5, .5, .5}, {0, 0, 0}};
 
 /* Face number of a box from 0 to size; seen from inside. */
 static void room_face(const double size[3], int number, double quad[4][3]) {
@@ -29,7 +29,7 @@ static const char *const room_groups[6] = {
     [BOX_FLOOR] = "floor", [BOX_CEILING] = "ceiling", [BOX_X0] = "wall-x0",
     [BOX_X1] = "wall-x1",  [BOX_Y0] = "wall-y0",      [BOX_Y1] = "wall-y1"};
 
-lam_status draft_box_scene(draft *d, const generate_options *options, lam_error *error) {
+lam_status generate_box(scene_draft *d, const generate_options *options, lam_error *error) {
     lam_status status = LAM_OK;
     for (int axis = 0; axis < 3; axis++)
         if (!(options->size[axis] > 0) || !(options->size[axis] < 1e6))
@@ -47,8 +47,8 @@ lam_status draft_box_scene(draft *d, const generate_options *options, lam_error 
     for (int number = 0; number < 6; number++) {
         double quad[4][3];
         room_face(options->size, number, quad);
-        TRY(draft_group(d, room_groups[number], &half_grey, error));
-        TRY(draft_grid(d, (const double(*)[3])quad, m, m, error));
+        TRY(scene_draft_group(d, room_groups[number], &half_grey, error));
+        TRY(scene_draft_grid(d, (const double(*)[3])quad, m, m, error));
     }
 done:
     return status;
@@ -67,19 +67,20 @@ static const floating_block furnace_blocks[] = {
     {"block-3", {.6, 1.9, 1.3}, {1.2, 2.5, 1.6}, 1.1},
 };
 
-static lam_status furnace_cells(draft *d, const generate_options *options, double cell, lam_error *error) {
+static lam_status furnace_cells(scene_draft *d, const generate_options *options, double cell,
+                                lam_error *error) {
     lam_status status = LAM_OK;
     (void)options;
     for (int number = 0; number < 6; number++) {
         double quad[4][3];
         room_face(furnace_size, number, quad);
-        TRY(draft_group(d, room_groups[number], &half_grey, error));
-        TRY(draft_cells(d, (const double(*)[3])quad, cell, error));
+        TRY(scene_draft_group(d, room_groups[number], &half_grey, error));
+        TRY(scene_draft_cells(d, (const double(*)[3])quad, cell, error));
     }
     for (size_t b = 0; b < sizeof furnace_blocks / sizeof *furnace_blocks; b++) {
         const floating_block *block = &furnace_blocks[b];
         const double middle[2] = {(block->low[0] + block->high[0]) / 2, (block->low[1] + block->high[1]) / 2};
-        TRY(draft_group(d, block->name, &half_grey, error));
+        TRY(scene_draft_group(d, block->name, &half_grey, error));
         for (int number = 0; number < 6; number++) {
             double quad[4][3];
             for (int k = 0; k < 4; k++) {
@@ -90,26 +91,26 @@ static lam_status furnace_cells(draft *d, const generate_options *options, doubl
                 quad[k][1] = middle[1] + sin(block->angle) * x + cos(block->angle) * y;
                 quad[k][2] = (corner & 4 ? block->high : block->low)[2];
             }
-            TRY(draft_cells(d, (const double(*)[3])quad, cell, error));
+            TRY(scene_draft_cells(d, (const double(*)[3])quad, cell, error));
         }
     }
 done:
     return status;
 }
 
-lam_status draft_furnace_scene(draft *d, const generate_options *options, lam_error *error) {
-    return draft_build_near(d, furnace_cells, options, options->elements > 0 ? options->elements : 1000,
-                            error);
+lam_status generate_furnace(scene_draft *d, const generate_options *options, lam_error *error) {
+    return scene_draft_build_near(d, furnace_cells, options, options->elements > 0 ? options->elements : 1000,
+                                  error);
 }
 
 static const struct {
     const char *name;
-    lam_status (*build)(draft *d, const generate_options *options, lam_error *error);
+    lam_status (*build)(scene_draft *d, const generate_options *options, lam_error *error);
 } kinds[] = {
-    {"box", draft_box_scene},       {"cornell", draft_cornell_scene}, {"furnace", draft_furnace_scene},
-    {"city", draft_city_scene},     {"rooms", draft_rooms_scene},     {"anechoic", draft_anechoic_scene},
-    {"patio", draft_patio_scene},   {"atrium", draft_atrium_scene},   {"maze", draft_maze_scene},
-    {"canopy", draft_canopy_scene},
+    {"box", generate_box},       {"cornell", generate_cornell}, {"furnace", generate_furnace},
+    {"city", generate_city},     {"rooms", generate_rooms},     {"anechoic", generate_anechoic},
+    {"patio", generate_patio},   {"atrium", generate_atrium},   {"maze", generate_maze},
+    {"canopy", generate_canopy},
 };
 #define N_KINDS (sizeof kinds / sizeof *kinds)
 
@@ -128,7 +129,7 @@ static lam_status no_such_scene(const char *word, lam_error *error) {
 lam_status scene_generate(const generate_options *options, const char *path, size_t *faces,
                           lam_error *error) {
     lam_status status = LAM_OK;
-    draft d = {0};
+    scene_draft d = {0};
     size_t kind = 0;
     while (kind < N_KINDS && strcmp(kinds[kind].name, options->kind) != 0) kind++;
     if (kind == N_KINDS) TRY(no_such_scene(options->kind, error));
@@ -138,9 +139,9 @@ lam_status scene_generate(const generate_options *options, const char *path, siz
         FAIL(error, LAM_ERR_ARGUMENT, "elements = %zu, at most %zu can be generated", options->elements,
              most_faces);
     TRY(kinds[kind].build(&d, options, error));
-    TRY(draft_write(&d, path, options->reflectance, error));
+    TRY(scene_draft_write(&d, path, options->reflectance, error));
     if (faces != NULL) *faces = d.n_faces;
 done:
-    draft_free(&d);
+    scene_draft_free(&d);
     return status;
 }

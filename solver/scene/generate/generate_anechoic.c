@@ -11,8 +11,8 @@ static const double longest = 6; /* metres, between the tips at both ends */
 enum { PER_PYRAMID = 16, PER_EDGE = 40, LEAST_PYRAMIDS = 2, CHAMBER_ELEMENTS = 6000 };
 enum { FLOOR, CEILING, WALL, SLOPE, LAMP, GROUPS };
 
-static const draft_material foam = {"foam", {.3, .3, .3}, {0, 0, 0}};
-static const draft_material light = {"light", {.3, .3, .3}, {60, 60, 60}};
+static const scene_draft_material foam = {"foam", {.3, .3, .3}, {0, 0, 0}};
+static const scene_draft_material light = {"light", {.3, .3, .3}, {60, 60, 60}};
 static const patch_group groups[GROUPS] = {
     {"floor", &foam}, {"ceiling", &foam}, {"wall", &foam}, {"slope", &foam}, {"lamp", &light}};
 
@@ -150,7 +150,7 @@ done:
     return status;
 }
 
-lam_status draft_anechoic_scene(draft *d, const generate_options *options, lam_error *error) {
+lam_status generate_anechoic(scene_draft *d, const generate_options *options, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t wanted = options->elements > 0 ? options->elements : CHAMBER_ELEMENTS;
     chamber c = choose_chamber(wanted);

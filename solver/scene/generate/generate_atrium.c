@@ -21,11 +21,11 @@ enum { BAYS_ACROSS = 2, BAYS_LEAST = 3, BAYS_MOST = 8, PER_BAY = 1500 };
 enum { ARCH_PARTS = 8, ROUND_FROM = 40000, ATRIUM_ELEMENTS = 79232 };
 enum { FLOOR, CEILING, WALL, COLUMN, ARCH, PARAPET, ROOF, LAMP, GROUPS };
 
-static const draft_material paving = {"paving", {.48, .42, .36}, {0, 0, 0}};
-static const draft_material plaster = {"plaster", {.7, .64, .54}, {0, 0, 0}};
-static const draft_material marble = {"marble", {.65, .63, .6}, {0, 0, 0}};
-static const draft_material brick = {"brick", {.55, .33, .24}, {0, 0, 0}};
-static const draft_material light = {"light", {.7, .7, .7}, {40, 34, 26}};
+static const scene_draft_material paving = {"paving", {.48, .42, .36}, {0, 0, 0}};
+static const scene_draft_material plaster = {"plaster", {.7, .64, .54}, {0, 0, 0}};
+static const scene_draft_material marble = {"marble", {.65, .63, .6}, {0, 0, 0}};
+static const scene_draft_material brick = {"brick", {.55, .33, .24}, {0, 0, 0}};
+static const scene_draft_material light = {"light", {.7, .7, .7}, {40, 34, 26}};
 
 static const patch_group groups[GROUPS] = {{"floor", &paving},  {"ceiling", &plaster}, {"wall", &plaster},
                                            {"column", &marble}, {"arch", &brick},      {"parapet", &marble},
@@ -154,7 +154,7 @@ done:
     return status;
 }
 
-lam_status draft_atrium_scene(draft *d, const generate_options *options, lam_error *error) {
+lam_status generate_atrium(scene_draft *d, const generate_options *options, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t wanted = options->elements > 0 ? options->elements : ATRIUM_ELEMENTS;
     const size_t fitting = wanted / PER_BAY;

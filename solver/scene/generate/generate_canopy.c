@@ -16,9 +16,9 @@ static const double bare_share = .15;                             /* of all elem
 
 enum { CANOPY_ELEMENTS = 12000, PER_TREE = 820, TRUNK_SIDES = 8, GROUND = 0, TRUNK, GROUPS };
 
-static const draft_material soil = {"soil", {.3, .25, .18}, {0, 0, 0}};
-static const draft_material bark = {"bark", {.25, .19, .14}, {0, 0, 0}};
-static const draft_material green = {"green", {.14, .34, .08}, {0, 0, 0}};
+static const scene_draft_material soil = {"soil", {.3, .25, .18}, {0, 0, 0}};
+static const scene_draft_material bark = {"bark", {.25, .19, .14}, {0, 0, 0}};
+static const scene_draft_material green = {"green", {.14, .34, .08}, {0, 0, 0}};
 static const patch_group groups[GROUPS] = {{"ground", &soil}, {"trunk", &bark}};
 
 typedef struct tree {
@@ -81,7 +81,7 @@ static void leaf_place(dice *r, const tree *t, double length, double out[3]) {
 }
 
 /* A rhombus that lies anyhow, and the same from behind. */
-static lam_status draw_leaf(draft *d, dice *r, const tree *t, lam_error *error) {
+static lam_status draw_leaf(scene_draft *d, dice *r, const tree *t, lam_error *error) {
     lam_status status = LAM_OK;
     const double length = dice_between(r, leaf_length[0], leaf_length[1]);
     double middle[3], along[3], across[3], corners[4][3], behind[4][3], dot = 0, norm = 0;
@@ -102,8 +102,8 @@ static lam_status draw_leaf(draft *d, dice *r, const tree *t, lam_error *error) 
         corners[3][k] = micrometres(p - b);
     }
     for (int k = 0; k < 4; k++) memcpy(behind[k], corners[3 - k], sizeof *behind);
-    TRY(draft_face(d, (const double(*)[3])corners, 4, error));
-    TRY(draft_face(d, (const double(*)[3])behind, 4, error));
+    TRY(scene_draft_face(d, (const double(*)[3])corners, 4, error));
+    TRY(scene_draft_face(d, (const double(*)[3])behind, 4, error));
 done:
     return status;
 }
@@ -132,7 +132,7 @@ done:
     return status;
 }
 
-lam_status draft_canopy_scene(draft *d, const generate_options *options, lam_error *error) {
+lam_status generate_canopy(scene_draft *d, const generate_options *options, lam_error *error) {
     lam_status status = LAM_OK;
     patch_list list = {.groups = groups, .n_groups = GROUPS};
     const size_t wanted = options->elements > 0 ? options->elements : CANOPY_ELEMENTS;
@@ -143,7 +143,7 @@ lam_status draft_canopy_scene(draft *d, const generate_options *options, lam_err
     TRY(patches_draw(&list, d, options, (size_t)fmax(1, bare_share * (double)wanted), error));
     const size_t leaves =
         wanted > d->n_faces + 2 * n ? (wanted - d->n_faces) / 2 : n; /* what is left to draw */
-    TRY(draft_group(d, "leaf", &green, error));
+    TRY(scene_draft_group(d, "leaf", &green, error));
     for (size_t i = 0; i < n; i++) {
         dice r = dice_for(options->seed, 3 + i);
         for (size_t k = leaves * i / n; k < leaves * (i + 1) / n; k++)

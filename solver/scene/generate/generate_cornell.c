@@ -19,10 +19,10 @@ static const struct {
     {"tall-block", {{423, 247}, {265, 296}, {314, 456}, {472, 406}}, .330},
 };
 
-static const draft_material white = {"white", {.725, .71, .68}, {0, 0, 0}};
-static const draft_material red = {"red", {.63, .065, .05}, {0, 0, 0}};
-static const draft_material green = {"green", {.14, .45, .091}, {0, 0, 0}};
-static const draft_material light = {"light", {.78, .78, .78}, {17, 12, 4}};
+static const scene_draft_material white = {"white", {.725, .71, .68}, {0, 0, 0}};
+static const scene_draft_material red = {"red", {.63, .065, .05}, {0, 0, 0}};
+static const scene_draft_material green = {"green", {.14, .45, .091}, {0, 0, 0}};
+static const scene_draft_material light = {"light", {.78, .78, .78}, {17, 12, 4}};
 
 /* The footprint of a block, counter-clockwise seen from above. */
 static convex footprint(size_t b) {
@@ -106,9 +106,10 @@ static void merge_piece(cut_floor *left, size_t x, size_t y, size_t i) {
     }
 }
 
-static lam_status add_floor(draft *d, double size, lam_error *error) {
+static lam_status add_floor(scene_draft *d, double size, lam_error *error) {
     lam_status status = LAM_OK;
-    cut_floor left = {.nx = draft_steps_along(d, width, size), .ny = draft_steps_across(d, depth, size)};
+    cut_floor left = {.nx = scene_draft_steps_along(d, width, size),
+                      .ny = scene_draft_steps_across(d, depth, size)};
     const double dx = width / (double)left.nx, dy = depth / (double)left.ny;
     const convex feet[2] = {footprint(0), footprint(1)};
     left.first = memory_allocate(left.nx * left.ny + 1, sizeof *left.first, "floor", error);
@@ -133,7 +134,7 @@ static lam_status add_floor(draft *d, double size, lam_error *error) {
         for (size_t f = 0; f < n; f++) {
             double corners[4][3] = {{0}};
             for (size_t k = 0; k < faces[f].n; k++) memcpy(corners[k], faces[f].p[k], sizeof faces[f].p[k]);
-            TRY(draft_face(d, (const double(*)[3])corners, faces[f].n, error));
+            TRY(scene_draft_face(d, (const double(*)[3])corners, faces[f].n, error));
         }
     }
 done:
@@ -143,14 +144,14 @@ done:
 }
 
 /* An upright wall from (x0, y0) to (x1, y1); its front is on the right of that way. */
-static lam_status add_wall(draft *d, double x0, double y0, double x1, double y1, double high, double size,
-                           lam_error *error) {
+static lam_status add_wall(scene_draft *d, double x0, double y0, double x1, double y1, double high,
+                           double size, lam_error *error) {
     const double quad[4][3] = {{x0, y0, 0}, {x1, y1, 0}, {x1, y1, high}, {x0, y0, high}};
-    return draft_cells(d, quad, size, error);
+    return scene_draft_cells(d, quad, size, error);
 }
 
 /* The ceiling's grid lines follow the lamp, which fills its hole exactly. */
-static lam_status add_ceiling(draft *d, double size, bool lamp, lam_error *error) {
+static lam_status add_ceiling(scene_draft *d, double size, bool lamp, lam_error *error) {
     lam_status status = LAM_OK;
     const double x[4] = {0, lamp_x[0], lamp_x[1], width}, y[4] = {0, lamp_y[0], lamp_y[1], depth};
     for (int j = 0; j < 3; j++)
@@ -160,29 +161,30 @@ static lam_status add_ceiling(draft *d, double size, bool lamp, lam_error *error
                                        {x[i], y[j + 1], height},
                                        {x[i + 1], y[j + 1], height},
                                        {x[i + 1], y[j], height}};
-            TRY(draft_cells(d, quad, size, error));
+            TRY(scene_draft_cells(d, quad, size, error));
         }
 done:
     return status;
 }
 
-static lam_status cornell_cells(draft *d, const generate_options *options, double size, lam_error *error) {
+static lam_status cornell_cells(scene_draft *d, const generate_options *options, double size,
+                                lam_error *error) {
     lam_status status = LAM_OK;
-    TRY(draft_group(d, "floor", &white, error));
+    TRY(scene_draft_group(d, "floor", &white, error));
     TRY(add_floor(d, size, error));
-    TRY(draft_group(d, "ceiling", &white, error));
+    TRY(scene_draft_group(d, "ceiling", &white, error));
     TRY(add_ceiling(d, size, false, error));
-    TRY(draft_group(d, "back-wall", &white, error));
+    TRY(scene_draft_group(d, "back-wall", &white, error));
     TRY(add_wall(d, 0, depth, width, depth, height, size, error));
-    TRY(draft_group(d, "left-wall", &red, error));
+    TRY(scene_draft_group(d, "left-wall", &red, error));
     TRY(add_wall(d, 0, 0, 0, depth, height, size, error));
-    TRY(draft_group(d, "right-wall", &green, error));
+    TRY(scene_draft_group(d, "right-wall", &green, error));
     TRY(add_wall(d, width, depth, width, 0, height, size, error));
     if (options->closed) {
-        TRY(draft_group(d, "front-wall", &white, error));
+        TRY(scene_draft_group(d, "front-wall", &white, error));
         TRY(add_wall(d, width, 0, 0, 0, height, size, error));
     }
-    TRY(draft_group(d, "lamp", &light, error));
+    TRY(scene_draft_group(d, "lamp", &light, error));
     TRY(add_ceiling(d, size, true, error));
     for (size_t b = 0; b < 2; b++) {
         const convex foot = footprint(b);
@@ -192,8 +194,8 @@ static lam_status cornell_cells(draft *d, const generate_options *options, doubl
             top[k][1] = foot.p[k][1];
             top[k][2] = blocks[b].height;
         }
-        TRY(draft_group(d, blocks[b].name, &white, error));
-        TRY(draft_cells(d, (const double(*)[3])top, size, error));
+        TRY(scene_draft_group(d, blocks[b].name, &white, error));
+        TRY(scene_draft_cells(d, (const double(*)[3])top, size, error));
         for (size_t k = 0; k < 4; k++) {
             const double *from = foot.p[k], *to = foot.p[(k + 1) % 4];
             TRY(add_wall(d, from[0], from[1], to[0], to[1], blocks[b].height, size, error));
@@ -203,7 +205,7 @@ done:
     return status;
 }
 
-lam_status draft_cornell_scene(draft *d, const generate_options *options, lam_error *error) {
-    return draft_build_near(d, cornell_cells, options, options->elements > 0 ? options->elements : 2560,
-                            error);
+lam_status generate_cornell(scene_draft *d, const generate_options *options, lam_error *error) {
+    return scene_draft_build_near(d, cornell_cells, options, options->elements > 0 ? options->elements : 2560,
+                                  error);
 }

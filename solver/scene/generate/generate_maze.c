@@ -12,7 +12,7 @@ static const double passage = 1.8, wall = .3, wall_height = 2.2, sky = 3, ground
 /* A cell has about so many elements, so a maze of more elements has more cells, not finer ones. */
 enum { PER_CELL = 60, LEAST_CELLS = 3, MAZE_ELEMENTS = 6000, FLOOR = 0, WALL, WALL_TOP, GROUPS };
 
-static const draft_material stone = {"stone", {.5, .5, .5}, {0, 0, 0}};
+static const scene_draft_material stone = {"stone", {.5, .5, .5}, {0, 0, 0}};
 static const patch_group groups[GROUPS] = {{"floor", &stone}, {"wall", &stone}, {"wall-top", &stone}};
 
 /* What is carved of the maze: from cell (x, y) on so many cells, and the walls between them. */
@@ -59,7 +59,7 @@ done:
     return status;
 }
 
-lam_status draft_maze_scene(draft *d, const generate_options *options, lam_error *error) {
+lam_status generate_maze(scene_draft *d, const generate_options *options, lam_error *error) {
     static const block_stuff stuffs[2] = {{FLOOR, FLOOR, FLOOR}, {WALL_TOP, WALL, WALL}};
     lam_status status = LAM_OK;
     blocks all = {0};

@@ -11,11 +11,11 @@ static const double sill = .9, lintel = 2.1, half_lamp = .4, lamp_depth = .1;
 
 enum { PATIO_ELEMENTS = 21888, COURT = 0, FLOOR, CEILING, WALL, PILLAR, RAILING, ROOF, LAMP, GROUPS };
 
-static const draft_material stone = {"stone", {.45, .44, .4}, {0, 0, 0}};
-static const draft_material tiles = {"tiles", {.5, .32, .24}, {0, 0, 0}};
-static const draft_material plaster = {"plaster", {.75, .7, .6}, {0, 0, 0}};
-static const draft_material wood = {"wood", {.35, .22, .14}, {0, 0, 0}};
-static const draft_material light = {"light", {.75, .75, .75}, {30, 26, 20}};
+static const scene_draft_material stone = {"stone", {.45, .44, .4}, {0, 0, 0}};
+static const scene_draft_material tiles = {"tiles", {.5, .32, .24}, {0, 0, 0}};
+static const scene_draft_material plaster = {"plaster", {.75, .7, .6}, {0, 0, 0}};
+static const scene_draft_material wood = {"wood", {.35, .22, .14}, {0, 0, 0}};
+static const scene_draft_material light = {"light", {.75, .75, .75}, {30, 26, 20}};
 
 static const patch_group groups[GROUPS] = {{"court", &stone},  {"floor", &tiles},  {"ceiling", &plaster},
                                            {"wall", &plaster}, {"pillar", &stone}, {"railing", &wood},
@@ -103,7 +103,7 @@ done:
     return status;
 }
 
-lam_status draft_patio_scene(draft *d, const generate_options *options, lam_error *error) {
+lam_status generate_patio(scene_draft *d, const generate_options *options, lam_error *error) {
     lam_status status = LAM_OK;
     blocks all = {0};
     patch_list list = {.groups = groups, .n_groups = GROUPS};

@@ -16,8 +16,8 @@ enum { ROOM_ELEMENTS = 1000 };
 
 enum { ROOMS_MOST = 12, ROOMS_ELEMENTS = 6000, FLOOR = 0, CEILING, WALL, LAMP };
 
-static const draft_material grey = {"grey", {.6, .6, .6}, {0, 0, 0}};
-static const draft_material light = {"light", {.6, .6, .6}, {40, 40, 40}};
+static const scene_draft_material grey = {"grey", {.6, .6, .6}, {0, 0, 0}};
+static const scene_draft_material light = {"light", {.6, .6, .6}, {40, 40, 40}};
 
 static const patch_group groups[LAMP + ROOMS_MOST] = {
     {"floor", &grey},   {"ceiling", &grey}, {"wall", &grey},     {"lamp-1", &light},  {"lamp-2", &light},
@@ -78,10 +78,10 @@ static lam_status add_corridors(blocks *all, const room *rooms, size_t nx, size_
     for (size_t left = n; left > 0; left--) {
         const size_t drawn = (size_t)(dice_throw(&order) % left), pair = pairs[drawn];
         const size_t i = pair / 2, axis = pair % 2, j = axis == 0 ? i + 1 : i + nx;
-        const uint32_t a = joined_root(joined, (uint32_t)i), b = joined_root(joined, (uint32_t)j);
+        const uint32_t a = union_find_root(joined, (uint32_t)i), b = union_find_root(joined, (uint32_t)j);
         pairs[drawn] = pairs[left - 1];
         if (a == b && dice_between(&order, 0, 1) >= extra_share) continue;
-        joined_link(joined, a, b);
+        union_find_join(joined, a, b);
         const double lots[2] = {(double)(i % nx), (double)(i / nx)};
         TRY(add_corridor(all, &shape, &rooms[i], &rooms[j], (int)axis, lot * (lots[axis] + 1),
                          lot * (lots[1 - axis] + .5), error));
@@ -107,7 +107,7 @@ done:
     return status;
 }
 
-lam_status draft_rooms_scene(draft *d, const generate_options *options, lam_error *error) {
+lam_status generate_rooms(scene_draft *d, const generate_options *options, lam_error *error) {
     static const size_t plans[][2] = {{2, 1}, {3, 1}, {2, 2}, {3, 2}, {4, 2}, {3, 3}, {4, 3}};
     const size_t wanted = options->elements > 0 ? options->elements : ROOMS_ELEMENTS;
     size_t n_plans = 1;

@@ -7,7 +7,7 @@
 /* What a patch belongs to: a place in the scene's list of these. */
 typedef struct patch_group {
     const char *name; /* static, as materials are */
-    const draft_material *material;
+    const scene_draft_material *material;
 } patch_group;
 
 typedef struct patch {
@@ -26,7 +26,7 @@ lam_status patch_add(patch_list *list, const double (*corners)[3], size_t n, siz
 void patches_free(patch_list *list);
 
 /* Every patch in cells, about wanted of them together but at least one each, one group after the other. */
-lam_status patches_draw(const patch_list *list, draft *d, const generate_options *options, size_t wanted,
-                        lam_error *error);
+lam_status patches_draw(const patch_list *list, scene_draft *d, const generate_options *options,
+                        size_t wanted, lam_error *error);
 
 #endif

@@ -14,7 +14,7 @@
 
 typedef struct assimp_state {
     const struct aiScene *scene;
-    soup *s;
+    imported_faces *s;
     const char *path;
     bool gltf;
     uint32_t *materials; /* library's index -> ours, or TABLE_NONE */
@@ -78,9 +78,9 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
     a->materials[index] = TABLE_NONE;
     if (is_made_up(a, index, name)) return LAM_OK;
     if (name[0] == '\0') snprintf(name, sizeof name, "material-%u", index);
-    TRY(soup_add_material(a->s, name, strlen(name), &a->materials[index], error));
-    soup_material *v = &a->s->values[a->materials[index]];
-    soup_material fresh = {.defined = 1};
+    TRY(imported_faces_add_material(a->s, name, strlen(name), &a->materials[index], error));
+    imported_material *v = &a->s->values[a->materials[index]];
+    imported_material fresh = {.defined = 1};
     fresh.has_diffuse =
         colour_of(m, colour_base, fresh.diffuse) || colour_of(m, colour_diffuse, fresh.diffuse);
     colour_of(m, colour_emissive, fresh.emission);
@@ -89,14 +89,14 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
     if (v->defined && memcmp(v, &fresh, sizeof fresh) != 0) { /* two materials of one name */
         const size_t length = strlen(name);
         snprintf(name + length, sizeof name - length, "-%u", index);
-        TRY(soup_add_material(a->s, name, strlen(name), &a->materials[index], error));
+        TRY(imported_faces_add_material(a->s, name, strlen(name), &a->materials[index], error));
         v = &a->s->values[a->materials[index]];
     }
     *v = fresh;
     if (aiGetMaterialTextureCount(m, aiTextureType_DIFFUSE) > 0 ||
         aiGetMaterialTextureCount(m, aiTextureType_BASE_COLOR) > 0 ||
         aiGetMaterialTextureCount(m, aiTextureType_EMISSIVE) > 0)
-        soup_warn(&a->s->warnings, "%s: the texture of material '%s' is ignored", a->path, name);
+        import_warn(&a->s->warnings, "%s: the texture of material '%s' is ignored", a->path, name);
 done:
     return status;
 }
@@ -128,7 +128,7 @@ static lam_status read_mesh(assimp_state *a, const struct aiMesh *m, const affin
         double world[3];
         for (int k = 0; k < 3; k++)
             world[k] = t->a[k][0] * p[0] + t->a[k][1] * p[1] + t->a[k][2] * p[2] + t->a[k][3];
-        TRY(soup_add_vertex(a->s, world, error));
+        TRY(imported_faces_add_vertex(a->s, world, error));
     }
     for (unsigned f = 0; f < m->mNumFaces; f++) {
         const unsigned n = m->mFaces[f].mNumIndices;
@@ -146,7 +146,7 @@ static lam_status read_mesh(assimp_state *a, const struct aiMesh *m, const affin
         }
         const uint32_t material =
             m->mMaterialIndex < a->scene->mNumMaterials ? a->materials[m->mMaterialIndex] : TABLE_NONE;
-        TRY(soup_add_polygon(a->s, a->corners, n, object, material, 0, error));
+        TRY(imported_faces_add_polygon(a->s, a->corners, n, object, material, 0, error));
     }
 done:
     return status;
@@ -221,7 +221,7 @@ static const struct aiScene *import_scene(const char *path, const char *padded, 
     return scene;
 }
 
-lam_status assimp_read(const char *path, soup *s, lam_error *error) {
+lam_status assimp_read(const char *path, imported_faces *s, lam_error *error) {
     lam_status status = LAM_OK;
     const char *dot = strrchr(path, '.');
     assimp_state a = {.s = s, .path = path};
@@ -232,8 +232,8 @@ lam_status assimp_read(const char *path, soup *s, lam_error *error) {
     TRY(file_text(path, &bytes, &length, error));
     if (a.gltf) TRY(glb_padded(bytes, length, &padded, &padded_length, error));
     if (a.gltf && memmem(bytes, length, strength, sizeof strength - 1) != NULL)
-        soup_warn(&s->warnings, "%s: %s is not read; emissions are the plain emissive factors", path,
-                  strength);
+        import_warn(&s->warnings, "%s: %s is not read; emissions are the plain emissive factors", path,
+                    strength);
     a.scene = import_scene(path, padded, padded_length);
     if (a.scene == NULL)
         FAIL(error, LAM_ERR_FORMAT, "%s: not a scene that can be read: %.300s", path, aiGetErrorString());

@@ -28,17 +28,17 @@ static void stem_of(const char *path, char *out, size_t size) {
 /* --- materials ----------------------------------------------------------------------------------------- */
 
 /* Checks and clamps the values of the materials that faces use; soup values become final. */
-static lam_status settle_materials(soup *s, const char *path, const bool *used, import_report *report,
-                                   lam_error *error) {
+static lam_status settle_materials(imported_faces *s, const char *path, const bool *used,
+                                   import_report *report, lam_error *error) {
     lam_status status = LAM_OK;
     for (size_t i = 0; i < s->materials.n; i++) {
-        soup_material *v = &s->values[i];
+        imported_material *v = &s->values[i];
         const char *name = name_table_get(&s->materials, i);
         bool clamped = false;
         if (!used[i]) continue;
         if (!v->has_diffuse) {
-            soup_warn(&s->warnings, "%s: material '%s' %s; its reflectance is set to %g", path, name,
-                      v->defined ? "has no diffuse colour" : "is not defined", default_reflectance);
+            import_warn(&s->warnings, "%s: material '%s' %s; its reflectance is set to %g", path, name,
+                        v->defined ? "has no diffuse colour" : "is not defined", default_reflectance);
             for (int c = 0; c < 3; c++) v->diffuse[c] = default_reflectance;
         }
         for (int c = 0; c < 3; c++) {
@@ -54,8 +54,8 @@ static lam_status settle_materials(soup *s, const char *path, const bool *used, 
         }
         if (!clamped) continue;
         report->clamped++;
-        soup_warn(&s->warnings, "%s: material '%s': a diffuse value of 1 or more is clamped to %g", path,
-                  name, largest_reflectance);
+        import_warn(&s->warnings, "%s: material '%s': a diffuse value of 1 or more is clamped to %g", path,
+                    name, largest_reflectance);
     }
 done:
     return status;
@@ -66,7 +66,7 @@ static bool is_grey(const double v[3]) {
 }
 
 /* Fills reflectance, emission and the number of channels of m. */
-static lam_status apply_materials(soup *s, const char *path, const import_options *options, mesh *m,
+static lam_status apply_materials(imported_faces *s, const char *path, const import_options *options, mesh *m,
                                   import_report *report, lam_error *error) {
     lam_status status = LAM_OK;
     size_t unnamed = 0;
@@ -83,8 +83,8 @@ static lam_status apply_materials(soup *s, const char *path, const import_option
         for (int c = 0; c < 3; c++) s->values[i].diffuse[c] = options->reflectance;
     }
     if (unnamed > 0 && !overridden)
-        soup_warn(&s->warnings, "%s: %zu faces have no material; their reflectance is set to %g", path,
-                  unnamed, default_reflectance);
+        import_warn(&s->warnings, "%s: %zu faces have no material; their reflectance is set to %g", path,
+                    unnamed, default_reflectance);
     TRY(settle_materials(s, path, used, report, error));
     m->n_channels = 1;
     for (size_t i = 0; i < s->materials.n; i++)
@@ -95,7 +95,7 @@ static lam_status apply_materials(soup *s, const char *path, const import_option
     for (size_t c = 0; c < m->n_channels; c++)
         for (size_t i = 0; i < m->n; i++) {
             const uint32_t material = s->elements[i].material;
-            const soup_material *v = material == TABLE_NONE ? NULL : &s->values[material];
+            const imported_material *v = material == TABLE_NONE ? NULL : &s->values[material];
             m->emission[c * m->n + i] = v == NULL ? 0.f : (float)v->emission[c];
             m->reflectance[c * m->n + i] = v != NULL    ? (float)v->diffuse[c]
                                            : overridden ? (float)options->reflectance
@@ -121,7 +121,7 @@ static char **name_block(const name_table *names, lam_error *error) {
 /* Names every element's group by the contract: the object's name, `object.material` where an object has
  * several materials, the material's without an object, the scene's without either. Equal names are one group.
  */
-static lam_status name_groups(const soup *s, mesh *m, lam_error *error) {
+static lam_status name_groups(const imported_faces *s, mesh *m, lam_error *error) {
     lam_status status = LAM_OK;
     name_table names = {0};
     char *joined = NULL;
@@ -132,7 +132,7 @@ static lam_status name_groups(const soup *s, mesh *m, lam_error *error) {
     if (only == NULL || m->group == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t o = 0; o < s->objects.n; o++) only[o] = unseen;
     for (size_t i = 0; i < m->n; i++) {
-        const struct soup_element *e = &s->elements[i];
+        const struct imported_element *e = &s->elements[i];
         if (e->object == TABLE_NONE) continue;
         if (only[e->object] == unseen)
             only[e->object] = e->material;
@@ -140,7 +140,7 @@ static lam_status name_groups(const soup *s, mesh *m, lam_error *error) {
             only[e->object] = several;
     }
     for (size_t i = 0; i < m->n; i++) {
-        const struct soup_element *e = &s->elements[i];
+        const struct imported_element *e = &s->elements[i];
         const char *material =
             e->material == TABLE_NONE ? "default" : name_table_get(&s->materials, e->material);
         const char *name = e->object != TABLE_NONE     ? name_table_get(&s->objects, e->object)
@@ -168,7 +168,7 @@ done:
 
 /* --- geometry ------------------------------------------------------------------------------------------ */
 
-static lam_status copy_geometry(soup *s, const char *path, double unit, mesh *m, lam_error *error) {
+static lam_status copy_geometry(imported_faces *s, const char *path, double unit, mesh *m, lam_error *error) {
     lam_status status = LAM_OK;
     m->n = s->n_elements;
     m->elements = memory_allocate(m->n, sizeof *m->elements, "elements", error);
@@ -191,12 +191,12 @@ done:
 
 /* Formats in single precision lose the shape of a small scene far from the origin; the text of an OBJ does
  * not. */
-static void warn_of_lost_precision(soup *s, const char *path, const mesh *m) {
+static void warn_of_lost_precision(imported_faces *s, const char *path, const mesh *m) {
     double centre[3], radius, farthest = 0;
     mesh_bounds(m, centre, &radius);
     for (int k = 0; k < 3; k++) farthest = fmax(farthest, fabs(centre[k]));
     if (farthest * 0x1p-23 > 1e-4 * 2 * radius)
-        soup_warn(
+        import_warn(
             &s->warnings,
             "%s: coordinates near %g m are kept to %.2g m in single precision; move the scene to the origin",
             path, farthest, farthest * 0x1p-23);
@@ -217,7 +217,7 @@ done:
 lam_status scene_import(const char *path, const import_options *options, mesh *m, import_report *report,
                         lam_error *error) {
     lam_status status = LAM_OK;
-    soup s = {0};
+    imported_faces s = {0};
     mesh made = {0};
     import_report told = {0};
     const char *extension = extension_of(path);
@@ -248,6 +248,6 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     if (report != NULL) *report = told;
 done:
     mesh_free(&made);
-    soup_free(&s);
+    imported_faces_free(&s);
     return status;
 }

@@ -21,7 +21,7 @@ typedef struct reply_header {
     char magic[8];
     uint64_t status;
     char message[sizeof((lam_error *)0)->message];
-    soup_warnings warnings;
+    import_warnings warnings;
     uint64_t n_points, n_elements, n_objects, object_bytes, n_materials, material_bytes, dropped;
 } reply_header;
 
@@ -40,7 +40,7 @@ static bool send_bytes(int fd, const void *data, size_t bytes) {
     return true;
 }
 
-static bool send_reply(int fd, lam_status result, const lam_error *error, const soup *s) {
+static bool send_reply(int fd, lam_status result, const lam_error *error, const imported_faces *s) {
     reply_header header;
     memset(&header, 0, sizeof header);
     memcpy(header.magic, reply_magic, sizeof reply_magic);
@@ -97,12 +97,12 @@ static int confine(int fd, const child_limits *limits) {
     return 3;
 }
 
-static _Noreturn void child_main(soup_reader *reader, const char *path, const child_limits *limits, int fd) {
-    soup s = {0};
+static _Noreturn void child_main(scene_reader *reader, const char *path, const child_limits *limits, int fd) {
+    imported_faces s = {0};
     lam_error error = {0};
     fd = confine(fd, limits);
     lam_status result = reader(path, &s, &error);
-    if (result == LAM_OK) result = soup_split(&s, path, &error);
+    if (result == LAM_OK) result = imported_faces_split(&s, path, &error);
     if (result == LAM_ERR_MEMORY)
         status_fail(&error, LAM_ERR_MEMORY, "%s: the importer needs more than its %zu MiB of memory", path,
                     limits->memory_bytes >> 20);
@@ -161,12 +161,12 @@ done:
     return status;
 }
 
-static bool elements_are_sound(const soup *s) {
+static bool elements_are_sound(const imported_faces *s) {
     for (size_t v = 0; v < s->points.n; v++)
         for (int k = 0; k < 3; k++)
             if (!isfinite(s->points.points[v][k])) return false;
     for (size_t i = 0; i < s->n_elements; i++) {
-        const struct soup_element *e = &s->elements[i];
+        const struct imported_element *e = &s->elements[i];
         for (int k = 0; k < 4; k++)
             if (e->corners[k] >= s->points.n && !(k == 3 && e->corners[k] == TABLE_NONE)) return false;
         if (e->object >= s->objects.n && e->object != TABLE_NONE) return false;
@@ -176,8 +176,8 @@ static bool elements_are_sound(const soup *s) {
 }
 
 /* Receives a reply into s; *whole tells whether all of it came. */
-static lam_status receive_reply(reply_pipe *pipe, const char *path, size_t most_bytes, soup *s, bool *whole,
-                                lam_error *error) {
+static lam_status receive_reply(reply_pipe *pipe, const char *path, size_t most_bytes, imported_faces *s,
+                                bool *whole, lam_error *error) {
     lam_status status = LAM_OK;
     reply_header header;
     char *objects = NULL, *materials = NULL;
@@ -244,14 +244,14 @@ static lam_status child_verdict(const char *path, const child_limits *limits, bo
                        path, WIFEXITED(wait_status) ? WEXITSTATUS(wait_status) : -1);
 }
 
-lam_status import_in_child(soup_reader *reader, const char *path, const child_limits *limits, soup *s,
-                           lam_error *error) {
+lam_status import_in_child(scene_reader *reader, const char *path, const child_limits *limits,
+                           imported_faces *s, lam_error *error) {
     lam_status status = LAM_OK;
     reply_pipe from_child = {.fd = -1};
     int ends[2], wait_status = 0;
     pid_t child = -1;
     bool whole = false;
-    soup received = {0};
+    imported_faces received = {0};
     if (pipe2(ends, O_CLOEXEC) != 0)
         FAIL(error, LAM_ERR_IO, "%s: cannot start the importer: pipe: %s", path, strerror(errno));
     from_child.fd = ends[0];
@@ -270,11 +270,11 @@ lam_status import_in_child(soup_reader *reader, const char *path, const child_li
     while (waitpid(child, &wait_status, 0) < 0 && errno == EINTR) continue;
     if (status == LAM_OK && !whole) status = child_verdict(path, limits, from_child.late, wait_status, error);
     if (status != LAM_OK) goto done;
-    soup_free(s);
+    imported_faces_free(s);
     *s = received;
-    received = (soup){0};
+    received = (imported_faces){0};
 done:
     if (from_child.fd >= 0) close(from_child.fd);
-    soup_free(&received);
+    imported_faces_free(&received);
     return status;
 }

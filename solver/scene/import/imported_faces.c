@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-void soup_warn(soup_warnings *w, const char *format, ...) {
+void import_warn(import_warnings *w, const char *format, ...) {
     const size_t used = strlen(w->text), room = sizeof w->text - used;
     va_list arguments;
     if (w->omitted > 0 || room < 3) { /* once one is left out, so are the later ones */
@@ -29,7 +29,7 @@ void soup_warn(soup_warnings *w, const char *format, ...) {
         if ((unsigned char)*line < 0x20 || *line == 0x7f) *line = '?';
 }
 
-void soup_free(soup *s) {
+void imported_faces_free(imported_faces *s) {
     free(s->vertices);
     free(s->corners);
     free(s->polygons);
@@ -38,10 +38,10 @@ void soup_free(soup *s) {
     point_table_free(&s->points);
     name_table_free(&s->objects);
     name_table_free(&s->materials);
-    *s = (soup){0};
+    *s = (imported_faces){0};
 }
 
-lam_status soup_add_vertex(soup *s, const double vertex[3], lam_error *error) {
+lam_status imported_faces_add_vertex(imported_faces *s, const double vertex[3], lam_error *error) {
     void *grown = array_grow(s->vertices, &s->vertex_capacity, s->n_vertices + 1, sizeof *s->vertices,
                              "vertices", error);
     if (grown == NULL) return LAM_ERR_MEMORY;
@@ -50,8 +50,8 @@ lam_status soup_add_vertex(soup *s, const double vertex[3], lam_error *error) {
     return LAM_OK;
 }
 
-lam_status soup_add_polygon(soup *s, const uint32_t *corners, size_t n, uint32_t object, uint32_t material,
-                            uint32_t line, lam_error *error) {
+lam_status imported_faces_add_polygon(imported_faces *s, const uint32_t *corners, size_t n, uint32_t object,
+                                      uint32_t material, uint32_t line, lam_error *error) {
     void *grown = array_grow(s->corners, &s->corner_capacity, s->n_corners + n, sizeof *s->corners,
                              "face corners", error);
     if (grown == NULL) return LAM_ERR_MEMORY;
@@ -61,12 +61,14 @@ lam_status soup_add_polygon(soup *s, const uint32_t *corners, size_t n, uint32_t
     if (grown == NULL) return LAM_ERR_MEMORY;
     s->polygons = grown;
     memcpy(s->corners + s->n_corners, corners, n * sizeof *corners);
-    s->polygons[s->n_polygons++] = (struct soup_polygon){s->n_corners, (uint32_t)n, object, material, line};
+    s->polygons[s->n_polygons++] =
+        (struct imported_polygon){s->n_corners, (uint32_t)n, object, material, line};
     s->n_corners += n;
     return LAM_OK;
 }
 
-lam_status soup_add_material(soup *s, const char *name, size_t length, uint32_t *index, lam_error *error) {
+lam_status imported_faces_add_material(imported_faces *s, const char *name, size_t length, uint32_t *index,
+                                       lam_error *error) {
     const size_t before = s->materials.n;
     lam_status status = name_table_add(&s->materials, name, length, index, error);
     if (status != LAM_OK || s->materials.n == before) return status;
@@ -74,14 +76,14 @@ lam_status soup_add_material(soup *s, const char *name, size_t length, uint32_t 
         array_grow(s->values, &s->value_capacity, s->materials.n, sizeof *s->values, "materials", error);
     if (grown == NULL) return LAM_ERR_MEMORY;
     s->values = grown;
-    s->values[*index] = (soup_material){0};
+    s->values[*index] = (imported_material){0};
     return LAM_OK;
 }
 
-static lam_status add_element(soup *s, const uint32_t piece[4], const struct soup_polygon *polygon,
-                              lam_error *error) {
+static lam_status add_element(imported_faces *s, const uint32_t piece[4],
+                              const struct imported_polygon *polygon, lam_error *error) {
     lam_status status = LAM_OK;
-    struct soup_element element = {{0, 0, 0, TABLE_NONE}, polygon->object, polygon->material};
+    struct imported_element element = {{0, 0, 0, TABLE_NONE}, polygon->object, polygon->material};
     for (int k = 0; k < 4 && piece[k] != TABLE_NONE; k++)
         TRY(point_table_add(&s->points, s->vertices[piece[k]], &element.corners[k], error));
     void *grown = array_grow(s->elements, &s->element_capacity, s->n_elements + 1, sizeof *s->elements,
@@ -94,7 +96,8 @@ done:
 }
 
 /* Checks what every format can get wrong; extent is the diagonal of the box around what faces use. */
-static lam_status check_polygons(const soup *s, const char *path, double *extent, lam_error *error) {
+static lam_status check_polygons(const imported_faces *s, const char *path, double *extent,
+                                 lam_error *error) {
     lam_status status = LAM_OK;
     double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
     for (size_t v = 0; v < s->n_vertices; v++)
@@ -103,7 +106,7 @@ static lam_status check_polygons(const soup *s, const char *path, double *extent
                 FAIL(error, LAM_ERR_FORMAT, "%s: vertex %zu: coordinate %g is not a usable number", path, v,
                      s->vertices[v][k]);
     for (size_t i = 0; i < s->n_polygons; i++) {
-        const struct soup_polygon *polygon = &s->polygons[i];
+        const struct imported_polygon *polygon = &s->polygons[i];
         for (size_t c = 0; c < polygon->n_corners; c++) {
             const uint32_t v = s->corners[polygon->first + c];
             if (v >= s->n_vertices && polygon->line > 0)
@@ -125,13 +128,13 @@ done:
     return status;
 }
 
-lam_status soup_split(soup *s, const char *path, lam_error *error) {
+lam_status imported_faces_split(imported_faces *s, const char *path, lam_error *error) {
     lam_status status = LAM_OK;
-    polygon_scratch scratch = {0};
+    polygon_split_scratch scratch = {0};
     double extent = 0;
     TRY(check_polygons(s, path, &extent, error));
     for (size_t i = 0; i < s->n_polygons; i++) {
-        const struct soup_polygon *polygon = &s->polygons[i];
+        const struct imported_polygon *polygon = &s->polygons[i];
         TRY(polygon_split((const double(*)[3])s->vertices, s->corners + polygon->first, polygon->n_corners,
                           1e-14 * extent * extent, false, &scratch, error));
         if (scratch.n_pieces == 0) s->dropped++;
@@ -141,6 +144,6 @@ lam_status soup_split(soup *s, const char *path, lam_error *error) {
         FAIL(error, LAM_ERR_FORMAT, "%s: the scene is empty: none of its %zu faces has an area", path,
              s->n_polygons);
 done:
-    polygon_scratch_free(&scratch);
+    polygon_split_scratch_free(&scratch);
     return status;
 }

@@ -9,63 +9,64 @@
 #include <stdbool.h>
 
 /* Lines for the user, cut with a count when they are too many. */
-typedef struct soup_warnings {
+typedef struct import_warnings {
     char text[2048]; /* '\n' between the lines */
     uint64_t omitted;
-} soup_warnings;
+} import_warnings;
 
-void soup_warn(soup_warnings *w, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void import_warn(import_warnings *w, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-typedef struct soup_material {
+typedef struct imported_material {
     double diffuse[3], emission[3];
     uint64_t defined;     /* 0: only its name was met */
     uint64_t has_diffuse; /* 0: the file gives none */
-} soup_material;
+} imported_material;
 
-typedef struct soup {
+typedef struct imported_faces {
     /* Polygons: polygon i has the corners first[i] .. first[i+1]-1 of corners, indices into vertices. */
     double (*vertices)[3];
     size_t n_vertices, vertex_capacity;
     uint32_t *corners;
     size_t n_corners, corner_capacity;
-    struct soup_polygon {
+    struct imported_polygon {
         size_t first;
         uint32_t n_corners, object, material, line; /* line 0: the format has none */
     } * polygons;
     size_t n_polygons, polygon_capacity;
 
-    /* Elements, after soup_split. */
+    /* Elements, after imported_faces_split. */
     point_table points;
-    struct soup_element {
+    struct imported_element {
         uint32_t corners[4], object, material;
     } * elements;
     size_t n_elements, element_capacity;
     uint64_t dropped; /* faces without an area */
 
     name_table objects, materials;
-    soup_material *values; /* [materials.n] */
+    imported_material *values; /* [materials.n] */
     size_t value_capacity;
-    soup_warnings warnings;
-} soup;
+    import_warnings warnings;
+} imported_faces;
 
-void soup_free(soup *s);
+void imported_faces_free(imported_faces *s);
 
-lam_status soup_add_vertex(soup *s, const double vertex[3], lam_error *error);
-lam_status soup_add_polygon(soup *s, const uint32_t *corners, size_t n, uint32_t object, uint32_t material,
-                            uint32_t line, lam_error *error);
+lam_status imported_faces_add_vertex(imported_faces *s, const double vertex[3], lam_error *error);
+lam_status imported_faces_add_polygon(imported_faces *s, const uint32_t *corners, size_t n, uint32_t object,
+                                      uint32_t material, uint32_t line, lam_error *error);
 
 /* The index of the material of this name, made with no values when it is new. */
-lam_status soup_add_material(soup *s, const char *name, size_t length, uint32_t *index, lam_error *error);
+lam_status imported_faces_add_material(imported_faces *s, const char *name, size_t length, uint32_t *index,
+                                       lam_error *error);
 
 /* Polygons to elements: planar convex quads stay, others become triangles, faces without an area are counted.
  * Equal vertices are shared, unused ones dropped. Errors: LAM_ERR_FORMAT for an empty scene or a bad index.
  */
-lam_status soup_split(soup *s, const char *path, lam_error *error);
+lam_status imported_faces_split(imported_faces *s, const char *path, lam_error *error);
 
 /* A reader of one family of formats; runs in the child. */
-typedef lam_status soup_reader(const char *path, soup *s, lam_error *error);
-soup_reader obj_read;
-soup_reader assimp_read;
+typedef lam_status scene_reader(const char *path, imported_faces *s, lam_error *error);
+scene_reader obj_read;
+scene_reader assimp_read;
 
 /* Runs reader on path in a child process under limits and receives the elements, names and materials (not the
  * polygons), every index and size checked. */
@@ -74,7 +75,7 @@ typedef struct child_limits {
     size_t memory_bytes;
 } child_limits;
 
-lam_status import_in_child(soup_reader *reader, const char *path, const child_limits *limits, soup *s,
-                           lam_error *error);
+lam_status import_in_child(scene_reader *reader, const char *path, const child_limits *limits,
+                           imported_faces *s, lam_error *error);
 
 #endif

@@ -79,7 +79,7 @@ done:
     return status;
 }
 
-static lam_status read_mtl(const char *path, soup *s, lam_error *error) {
+static lam_status read_mtl(const char *path, imported_faces *s, lam_error *error) {
     lam_status status = LAM_OK;
     size_t length = 0;
     uint32_t current = TABLE_NONE;
@@ -88,10 +88,10 @@ static lam_status read_mtl(const char *path, soup *s, lam_error *error) {
     line_cursor cursor = {.next = text, .end = text + length};
     for (char *line; (line = next_line(&cursor)) != NULL;) {
         if ((rest = after_keyword(line, "newmtl")) != NULL) {
-            TRY(soup_add_material(s, rest, strlen(rest), &current, error));
+            TRY(imported_faces_add_material(s, rest, strlen(rest), &current, error));
             if (s->values[current].defined) {
-                soup_warn(&s->warnings, "%s:%u: material '%s' is defined again; the first one counts", path,
-                          cursor.number, rest);
+                import_warn(&s->warnings, "%s:%u: material '%s' is defined again; the first one counts", path,
+                            cursor.number, rest);
                 current = TABLE_NONE;
             } else
                 s->values[current].defined = 1;
@@ -103,8 +103,8 @@ static lam_status read_mtl(const char *path, soup *s, lam_error *error) {
         } else if ((rest = after_keyword(line, "Ke")) != NULL) {
             TRY(read_colour(path, cursor.number, rest, s->values[current].emission, error));
         } else if (after_keyword(line, "map_Kd") != NULL || after_keyword(line, "map_Ke") != NULL) {
-            soup_warn(&s->warnings, "%s:%u: the texture of material '%s' is ignored", path, cursor.number,
-                      name_table_get(&s->materials, current));
+            import_warn(&s->warnings, "%s:%u: the texture of material '%s' is ignored", path, cursor.number,
+                        name_table_get(&s->materials, current));
         }
     }
 done:
@@ -114,7 +114,8 @@ done:
 
 /* Reads file, which stands beside the OBJ unless it is an absolute path; *found is false when there is none.
  */
-static lam_status read_library(const char *path, const char *file, soup *s, bool *found, lam_error *error) {
+static lam_status read_library(const char *path, const char *file, imported_faces *s, bool *found,
+                               lam_error *error) {
     lam_status status = LAM_OK;
     const char *slash = strrchr(path, '/');
     const size_t folder = file[0] == '/' || slash == NULL ? 0 : (size_t)(slash - path) + 1;
@@ -130,7 +131,8 @@ done:
 }
 
 /* One name with blanks in it, or several names; "\ " is a blank inside a name. */
-static lam_status read_libraries(const char *path, uint32_t line, char *names, soup *s, lam_error *error) {
+static lam_status read_libraries(const char *path, uint32_t line, char *names, imported_faces *s,
+                                 lam_error *error) {
     lam_status status = LAM_OK;
     bool found;
     TRY(read_library(path, names, s, &found, error));
@@ -158,7 +160,7 @@ done:
 
 typedef struct obj_state {
     const char *path;
-    soup *s;
+    imported_faces *s;
     uint32_t object, group, material;
     uint32_t *corners; /* of the face being read */
     size_t corner_capacity;
@@ -174,7 +176,7 @@ static lam_status read_vertex(obj_state *o, uint32_t line, const char *text, lam
         if (!(fabs(vertex[k]) < 1e30))
             FAIL(error, LAM_ERR_FORMAT, "%s:%u: vertex coordinate %g is not a usable number", o->path, line,
                  vertex[k]);
-    TRY(soup_add_vertex(o->s, vertex, error));
+    TRY(imported_faces_add_vertex(o->s, vertex, error));
 done:
     return status;
 }
@@ -203,19 +205,19 @@ static lam_status read_face(obj_state *o, uint32_t line, const char *text, lam_e
         while (is_blank(*text)) text++;
     }
     if (n > 0)
-        TRY(soup_add_polygon(o->s, o->corners, n, o->object != TABLE_NONE ? o->object : o->group, o->material,
-                             line, error));
+        TRY(imported_faces_add_polygon(o->s, o->corners, n, o->object != TABLE_NONE ? o->object : o->group,
+                                       o->material, line, error));
 done:
     return status;
 }
 
 /* The index of a name in the table of objects; TABLE_NONE for an empty one. */
-static lam_status read_name(soup *s, const char *name, uint32_t *index, lam_error *error) {
+static lam_status read_name(imported_faces *s, const char *name, uint32_t *index, lam_error *error) {
     *index = TABLE_NONE;
     return *name == '\0' ? LAM_OK : name_table_add(&s->objects, name, strlen(name), index, error);
 }
 
-lam_status obj_read(const char *path, soup *s, lam_error *error) {
+lam_status obj_read(const char *path, imported_faces *s, lam_error *error) {
     lam_status status = LAM_OK;
     obj_state o = {.path = path, .s = s, .object = TABLE_NONE, .group = TABLE_NONE, .material = TABLE_NONE};
     size_t length = 0;
@@ -233,7 +235,7 @@ lam_status obj_read(const char *path, soup *s, lam_error *error) {
             TRY(read_name(s, rest, &o.group, error));
         else if ((rest = after_keyword(line, "usemtl")) != NULL) {
             o.material = TABLE_NONE;
-            if (*rest != '\0') TRY(soup_add_material(s, rest, strlen(rest), &o.material, error));
+            if (*rest != '\0') TRY(imported_faces_add_material(s, rest, strlen(rest), &o.material, error));
         } else if ((rest = after_keyword(line, "mtllib")) != NULL)
             TRY(read_libraries(path, cursor.number, rest, s, error));
     }

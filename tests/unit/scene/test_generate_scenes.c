@@ -218,7 +218,7 @@ static tally cast_from_all(const mesh *m, size_t rays, uint64_t seed) {
                 t.backs += hits.back[k];
                 if (gone || hits.back[k]) continue;
                 sees[i] = sees[hits.element[k]] = true;
-                joined_link(joined, i, hits.element[k]);
+                union_find_join(joined, i, hits.element[k]);
                 mesh_centroid(m, hits.element[k], to);
                 t.far += hypot(from[0] - to[0], from[1] - to[1]) > 8;
             }

@@ -18,52 +18,52 @@ static void teardown(void) {
     folder_remove(folder);
 }
 
-static lam_status reads_well(const char *path, soup *s, lam_error *error) {
+static lam_status reads_well(const char *path, imported_faces *s, lam_error *error) {
     const uint32_t corners[3] = {0, 1, 2};
     (void)path;
     for (int i = 0; i < 3; i++) {
-        lam_status status = soup_add_vertex(s, (const double[3]){i == 1, i == 2, 0}, error);
+        lam_status status = imported_faces_add_vertex(s, (const double[3]){i == 1, i == 2, 0}, error);
         if (status != LAM_OK) return status;
     }
-    return soup_add_polygon(s, corners, 3, TABLE_NONE, TABLE_NONE, 0, error);
+    return imported_faces_add_polygon(s, corners, 3, TABLE_NONE, TABLE_NONE, 0, error);
 }
 
-static lam_status crashes(const char *path, soup *s, lam_error *error) {
+static lam_status crashes(const char *path, imported_faces *s, lam_error *error) {
     (void)path, (void)s, (void)error;
     raise(SIGSEGV);
     return LAM_OK;
 }
 
-static lam_status aborts(const char *path, soup *s, lam_error *error) {
+static lam_status aborts(const char *path, imported_faces *s, lam_error *error) {
     (void)path, (void)s, (void)error;
     abort();
 }
 
-static lam_status leaves(const char *path, soup *s, lam_error *error) {
+static lam_status leaves(const char *path, imported_faces *s, lam_error *error) {
     (void)path, (void)s, (void)error;
     _exit(0);
 }
 
-static lam_status spins(const char *path, soup *s, lam_error *error) {
+static lam_status spins(const char *path, imported_faces *s, lam_error *error) {
     (void)path, (void)s, (void)error;
     for (volatile unsigned i = 0; i < 1000; i = 0) continue;
     return LAM_OK;
 }
 
-static lam_status sleeps(const char *path, soup *s, lam_error *error) {
+static lam_status sleeps(const char *path, imported_faces *s, lam_error *error) {
     (void)path, (void)s, (void)error;
     while (pause() < 0) continue;
     return LAM_OK;
 }
 
-static lam_status hoards(const char *path, soup *s, lam_error *error) {
+static lam_status hoards(const char *path, imported_faces *s, lam_error *error) {
     void *all = memory_allocate(3, (size_t)1 << 30, "hoard", error);
     if (all == NULL) return LAM_ERR_MEMORY;
     free(all);
     return reads_well(path, s, error);
 }
 
-static lam_status writes_a_file(const char *path, soup *s, lam_error *error) {
+static lam_status writes_a_file(const char *path, imported_faces *s, lam_error *error) {
     FILE *file = fopen(path, "w");
     if (file == NULL) return status_fail(error, LAM_ERR_IO, "%s: could not even open it", path);
     fputs("written by the child", file);
@@ -72,7 +72,7 @@ static lam_status writes_a_file(const char *path, soup *s, lam_error *error) {
 }
 
 /* Something on every descriptor but standard input, output and error, where the reply's pipe must be. */
-static lam_status babbles(const char *path, soup *s, lam_error *error) {
+static lam_status babbles(const char *path, imported_faces *s, lam_error *error) {
     (void)path, (void)s, (void)error;
     static const char nonsense[65536] = "lamsoup";
     for (int fd = 3; fd < 32; fd++)
@@ -80,11 +80,11 @@ static lam_status babbles(const char *path, soup *s, lam_error *error) {
     _exit(0);
 }
 
-static lam_status lies_about_corners(const char *path, soup *s, lam_error *error) {
+static lam_status lies_about_corners(const char *path, imported_faces *s, lam_error *error) {
     (void)path;
-    /* after soup_split there is nobody who checks this but the parent: an element added by hand */
+    /* after imported_faces_split there is nobody who checks this but the parent: an element added by hand */
     lam_status status = reads_well(path, s, error);
-    struct soup_element *element = calloc(64, sizeof *element);
+    struct imported_element *element = calloc(64, sizeof *element);
     for (int i = 0; i < 4; i++) element->corners[i] = 1000000;
     s->elements = element;
     s->n_elements = 1;
@@ -92,7 +92,7 @@ static lam_status lies_about_corners(const char *path, soup *s, lam_error *error
     return status;
 }
 
-static lam_status run_child(soup_reader *reader, soup *s, lam_error *error) {
+static lam_status run_child(scene_reader *reader, imported_faces *s, lam_error *error) {
     const child_limits limits = {.cpu_seconds = 1, .memory_bytes = (size_t)1 << 30};
     char path[256];
     file_write(folder, "scene.xyz", "untouched", path);
@@ -101,7 +101,7 @@ static lam_status run_child(soup_reader *reader, soup *s, lam_error *error) {
 
 START_TEST(child_is_survived) {
     const struct {
-        soup_reader *reader;
+        scene_reader *reader;
         lam_status status;
         const char *says;
     } cases[] = {
@@ -118,7 +118,7 @@ START_TEST(child_is_survived) {
         {writes_a_file, LAM_ERR_FORMAT, "crashed (signal 25)"}, /* SIGXFSZ */
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        soup s = {0};
+        imported_faces s = {0};
         lam_error error = {0};
         const lam_status status = run_child(cases[i].reader, &s, &error);
         ck_assert_msg(status == cases[i].status && strstr(error.message, cases[i].says) != NULL,
@@ -126,11 +126,11 @@ START_TEST(child_is_survived) {
         ck_assert_ptr_null(s.elements);
     }
     (void)hoards;
-    soup s = {0};
+    imported_faces s = {0};
     lam_error error = {0};
     ck_assert_int_eq(run_child(reads_well, &s, &error), LAM_OK);
     ck_assert_uint_eq(s.n_elements, 1);
-    soup_free(&s);
+    imported_faces_free(&s);
 }
 END_TEST
 
