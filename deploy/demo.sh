@@ -47,9 +47,6 @@ lambert=$PWD/build/release/lambert
 lambertd=$PWD/build/release/lambertd
 
 if [ -z "$scene" ]; then
-    # Its lamp is a hundred times brighter than the floor in the shadow: an error small beside the lamp would
-    # still show there, so this picture asks for more than the defaults do.
-    how=(--rank 1024)
     echo "== scene"
     scene=$out/cornell.obj
     "$lambert" generate cornell --elements 2560 -o "$scene"
@@ -85,7 +82,7 @@ for lighting in 1 2; do
         -o "$out/answer-$lighting.json" -w 'answered in %{time_total} s\n' "$url"
     /usr/bin/python3 deploy/demo_lightings.py table "$store" "$out" "$lighting"
     picture=$out/$(basename "${store%.h5}")-$lighting.png
-    "$lambert" render "$store" --emission "$out/emission-$lighting.json" -o "$picture"
+    "$lambert" render "$store" --emission "$out/emission-$lighting.json" --smooth -o "$picture"
     echo "picture: $picture"
     echo
 done
