@@ -9,11 +9,10 @@ import unittest
 import h5py
 import numpy as np
 
-from command import lambert, must
+from command import example, lambert, must
 from daemon import Daemon
 from make_store import add_checksums
 
-FORMAT = pathlib.Path(__file__).resolve().parents[2] / "store" / "FORMAT.md"
 TOLERANCES = (.3, .05, .01)
 
 
@@ -76,13 +75,8 @@ class Compressed(unittest.TestCase):
         self.assertIn("kept as           compressed", must("info", self.stores["tree"]).stdout)
 
     def test_python_of_the_format(self):
-        """The examples in FORMAT.md, run as they stand there, light the scene as all of F does."""
-        examples = re.findall(r"```python\n(.*?)```", FORMAT.read_text(), re.S)
-        basis = next(e for e in examples if "basis/node" in e)
-        example = next(e for e in examples if "lit_group" in e)
-        names = {}
-        for text in (basis, example):
-            exec(text.replace("STORE.h5", str(self.stores["tree"])), names)
+        """The reader in deploy/examples lights the scene as all of F does."""
+        names = example("read_compressed.py", self.stores["tree"])
         with h5py.File(self.stores["tree"], "r") as f:
             x = f["mesh/emission"][0].astype(float)
         self.assertGreater(x.max(), 0)

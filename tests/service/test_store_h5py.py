@@ -13,7 +13,7 @@ import unittest
 import h5py
 import numpy as np
 
-from command import lambert as run
+from command import example, lambert as run
 from cube import CORNERS
 
 FORMAT = pathlib.Path(__file__).resolve().parents[2] / "store" / "FORMAT.md"
@@ -412,23 +412,16 @@ class StoreTest(unittest.TestCase):
             self.assertEqual(f"{xxh3(everything):016x}", self.text(f["checksum"].attrs, "xxh3"))
 
     def test_python_of_the_documentation(self):
-        """The example in FORMAT.md, run as it stands there."""
-        examples = re.findall(r"```python\n(.*?)```", FORMAT.read_text(), re.S)
-        example = next(e for e in examples if "operator/Y" in e)
-        self.assertLessEqual(len(example.splitlines()), 10)
+        """The reader in deploy/examples computes what this file does."""
         path = self.stores["folded"]
-        names = {}
-        exec(example.replace("STORE.h5", str(path)), names)
+        names = example("read_low_rank.py", path)
         store = Store(path)
         with h5py.File(path, "r") as f:
             E = f["mesh/emission"][()].astype(float)
         np.testing.assert_allclose(names["B"], store.answer(E)[0][0], rtol=1e-12)
 
     def test_python_of_a_hierarchical_store(self):
-        """The example in FORMAT.md, run as it stands there, says what `lambert solve` does."""
-        examples = re.findall(r"```python\n(.*?)```", FORMAT.read_text(), re.S)
-        example = next(e for e in examples if "basis/node" in e)
-        self.assertLessEqual(len(example.splitlines()), 35)
+        """The reader in deploy/examples says what `lambert solve` does."""
         scene, path, answer = (self.root / name for name in ("tree.obj", "tree.h5", "tree.npy"))
         for kind, group, rays, made_up in (("cornell", "lamp", "auto", False), ("city", "street", 64, True)):
             for line in (("generate", kind, "--elements", 1000, "-o", scene),
@@ -441,25 +434,21 @@ class StoreTest(unittest.TestCase):
                 bright = [name.decode() for name in f["mesh/group_names"][()]].index(group)
                 f["mesh/emission"][0] = np.where(f["mesh/group"][()] == bright, 2, 0)
                 self.assertEqual("missing" in f["operator"], made_up)
-            names = {}
-            exec(example.replace("STORE.h5", str(path)), names)
+            names = example("read_hierarchical.py", path)
             B = np.load(answer)
             B = B[0] if B.ndim == 2 else B
             # Two transforms and a product in single precision, of numbers that half precision has exactly.
             np.testing.assert_allclose(names["B"], B, atol=1e-5 * B.max())
 
     def test_upper_triangle(self):
-        """Above 10,240 elements: read as the example in FORMAT.md says, and as `precompute` and `verify` do."""
-        examples = re.findall(r"```python\n(.*?)```", FORMAT.read_text(), re.S)
-        example = next(e for e in examples if "upper" in e)
+        """Above 10,240 elements: read by the reader in deploy/examples, and as `precompute` and `verify` do."""
         scene, path, again = (self.root / name for name in ("many.obj", "many.h5", "again.h5"))
         how = ("--method", "low-rank", "--rank", 8, "--probes", 0, "--keep-form-factors")
         for line in (("generate", "box", "--divisions", 42, "-o", scene), ("precompute", scene, "-o", path, "--rays", 64, *how),
                      ("precompute", path, "-o", again, *how), ("verify", path, "--probes", 0)):
             done = run(*line)
             self.assertEqual(done.returncode, 0, done.stderr + done.stdout)
-        names = {}
-        exec(example.replace("STORE.h5", str(path)), names)
+        names = example("read_form_factors.py", path)
         n, pairs = 10584, len(names["F"])
         with h5py.File(path, "r") as one, h5py.File(again, "r") as two:
             self.assertEqual(one["form_factors"].attrs["storage"], b"upper")
