@@ -148,9 +148,9 @@ static lam_status check_head(row_file *f, uint64_t size, lam_error *error) {
         FAIL(error, LAM_ERR_ARGUMENT,
              "%s: %s; finish that run, remove the file, or use another --scratch folder", f->path,
              !whole ? "its head is damaged"
-             : memcmp(theirs.geometry, ours.geometry, sizeof ours.geometry)
+             : memcmp(theirs.geometry, ours.geometry, sizeof ours.geometry) != 0
                  ? "holds the rows of another scene"
-             : theirs.version != ours.version || memcmp(theirs.tool, ours.tool, sizeof ours.tool)
+             : theirs.version != ours.version || memcmp(theirs.tool, ours.tool, sizeof ours.tool) != 0
                  ? "was made by another version of lambert"
                  : "holds the rows of a run with other options");
     }
