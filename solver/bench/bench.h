@@ -33,7 +33,7 @@ typedef struct table {
     bool out_of_memory; /* a cell was lost; table_check says so */
 } table;
 
-/* Cells are added one after the other, row by row, in the order and of the kind of the columns. */
+/* Cells are added row by row, in the order of the columns and of their kind. */
 void table_text(table *t, const char *text);
 void table_number(table *t, double number); /* not finite: not measured */
 void table_free(table *t);
@@ -42,7 +42,7 @@ void table_free(table *t);
 lam_status table_check(const table *t, lam_error *error);
 size_t table_rows(const table *t);
 
-/* Where and how a table was measured. */
+/* The run that a table belongs to. */
 typedef struct table_run {
     const char *tool, *scale, *time; /* time: ISO 8601 */
     uint64_t seed;
@@ -62,7 +62,7 @@ void table_print(const table *t, FILE *stream);
 
 /* --- suites --------------------------------------------------------------------------------------------- */
 
-/* Where results go as soon as they are there. */
+/* The receiver of results, table by table. */
 typedef struct bench_sink {
     lam_status (*table)(void *context, const table *t, lam_error *error);
     void (*say)(void *context, const char *line); /* for the log */

@@ -149,7 +149,8 @@ static const double theirs[CITY_VARIANTS][CITY_SIZES][CITY_TERRAINS] = {
     {{.84, 6.48, .96}, {.60, 4.19, .66}, {.44, 2.48, .47}},
     {{1.23, 2.99, 1.14}, {.87, 1.97, .79}, {.64, 1.31, .58}}};
 
-/* A row of 512 pixels is 786 thousand rays, an hour for all of 35,588: some rows tell of all. */
+/* A row by 512 pixels takes 786 thousand rays, and all 35,588 rows would take an hour: a sample of the rows
+ * is measured. */
 enum {
     DENSITY_RAYS = 4096,
     RESOLUTION = 512,
@@ -159,8 +160,8 @@ enum {
     ROWS_FULL = 1024
 };
 
-/* Rows spread over the mesh, whose elements lie group by group and building by building: one at random out of
- * each of count parts. */
+/* A stratified sample of rows: one at random out of each of count parts of the mesh, whose elements are
+ * ordered by group and by building. */
 static void spread_rows(size_t n, size_t count, uint64_t seed, uint32_t *rows) {
     for (size_t k = 0; k < count; k++) {
         seed = seed * 6364136223846793005u + 1442695040888963407u;
@@ -169,7 +170,7 @@ static void spread_rows(size_t n, size_t count, uint64_t seed, uint32_t *rows) {
     }
 }
 
-/* The share of all that these rows see, in percent, and its standard error. */
+/* The mean share of all elements that these rows see, in percent, and its standard error. */
 static lam_status density_of(const bench_run *run, const mesh *m, const recipe *how, const uint32_t *rows,
                              size_t count, size_t *seen, double *density, double *deviation,
                              lam_error *error) {
@@ -228,13 +229,13 @@ done:
 lam_status cities_density(const bench_run *run, lam_error *error) {
     static const table_column columns[] = {
         {"city", "", "1: flat houses, 2: up to middle-high, 3: with skyscrapers"},
-        {"terrain", NULL, "what it stands on"},
+        {"terrain", NULL, "ground under the city"},
         {"elements", "", "n"},
-        {"rows", "", "of F that were looked at"},
-        {"density", "%", "of F by hemicubes of 512 pixels, one way, as in the thesis"},
-        {"deviation", "%", "standard error of that, as not all rows were looked at"},
+        {"rows", "", "rows of F in the sample"},
+        {"density", "%", "density of F by hemicubes of 512 pixels, one way, as in the thesis"},
+        {"deviation", "%", "standard error of the density, as only a sample of the rows was measured"},
         {"theirs", "%", "table 4.5 of the thesis"},
-        {"ratio", "", "ours over theirs"},
+        {"ratio", "", "density over that of the thesis"},
         {"rays", "%", "density of the same rows by 4,096 rays an element, one way"}};
     lam_status status = LAM_OK;
     table out = {.name = "density",

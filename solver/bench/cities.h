@@ -10,7 +10,7 @@
 
 enum { CITY_VARIANTS = 3, CITY_SIZES = 3, CITY_TERRAINS = 3, CITY_THRESHOLDS = 3, CITY_SKIES = 3650 };
 
-/* A city of the thesis: its elements and what it says of them. */
+/* A city of the thesis with its form factors. */
 extern const size_t city_sizes[CITY_SIZES];            /* 8897, 35588, 142352 */
 extern const char *const city_terrains[CITY_TERRAINS]; /* flat, valley, hill */
 extern const double city_thresholds[CITY_THRESHOLDS];  /* 1e-3, 1e-4, 1e-5 */
@@ -26,11 +26,11 @@ typedef struct city {
     build_problem problem;
 } city;
 
-/* Its elements alone; freed by mesh_free. */
+/* The mesh of a city; freed by mesh_free. */
 lam_status city_mesh(const bench_run *run, unsigned variant, size_t size, const char *terrain, mesh *out,
                      lam_error *error);
 
-/* Makes one and finds its form factors by a recipe. Freed by city_free. */
+/* Makes a city and computes its form factors by a recipe. Freed by city_free. */
 lam_status city_open(const bench_run *run, unsigned variant, size_t size, const char *terrain,
                      const recipe *how, city *out, lam_error *error);
 void city_free(city *c);
@@ -48,7 +48,7 @@ typedef struct city_light {
 lam_status city_light_make(const bench_run *run, const city *c, city_light *d, lam_error *error);
 void city_light_free(city_light *d);
 
-/* M~ at a threshold, else as precompute has it. */
+/* M~ at a threshold, with the other defaults of precompute. */
 lam_status city_sparse(const bench_run *run, const city *c, double threshold, sparse_correction correction,
                        lam_operator **op, build_report *report, lam_error *error);
 
@@ -57,17 +57,17 @@ lam_status city_light_answer(const city_light *d, const lam_operator *op, float 
 lam_status city_light_errors(const city *c, const city_light *d, const lam_operator *op, double *relative,
                              double *indirect, lam_error *error);
 
-/* The scenes of figure 5.1, the first MAP_MAIN of them the thesis', and others beside them: as `lambert
- * generate` makes them, cities of reflectance .7 as in the thesis, the others of their own. */
+/* The scenes of figure 5.1, of which the first MAP_MAIN are those of the thesis, as `lambert generate` makes
+ * them. Cities have the reflectance .7 of the thesis, the others their own. */
 enum { MAP_SCENES = 10, MAP_MAIN = 4, FALL_SCENES = 4 };
 extern const char *const map_scenes[MAP_SCENES];
 
-/* One of them with its form factors: pair by pair as far as lowrank_recipe goes, of a quick run by rays. */
+/* One of them with its form factors: by lowrank_recipe, in a quick run by rays. */
 lam_status map_scene_open(const bench_run *run, const char *name, size_t elements, lowrank_scene *out,
                           lam_error *error);
 
-/* Where the singular values of S = A^1/2 F A^-1/2 lie, which are those of F where areas are equal. Freed by
- * spectrum_free. */
+/* The distribution of the singular values of S = A^1/2 F A^-1/2, which are those of F where areas are equal.
+ * Freed by spectrum_free. */
 lam_status map_spectrum(const bench_run *run, const lowrank_scene *s, spectrum *out, lam_error *error);
 
 /* Tables 4.1 and 4.5: densities of F. */
@@ -87,10 +87,10 @@ lam_status cities_spectra(const bench_run *run, const lowrank_scene *const *scen
 /* Figure 4.4: how the elements of M are distributed in cities 1 and 3. */
 lam_status cities_distribution(const bench_run *run, const lowrank_scene *const scenes[2], lam_error *error);
 
-/* Figure 5.1: density against rank of MAP_SCENES scenes, and what classify_scene makes of them. */
+/* Figure 5.1: density against rank of MAP_SCENES scenes, and the kind that suits each. */
 lam_status cities_map(const bench_run *run, const lowrank_scene *scenes, lam_error *error);
 
-/* Every kind of operator on MAP_MAIN scenes, and whether auto picks well. */
+/* Every kind of operator on MAP_MAIN scenes, and the kind that auto picks. */
 lam_status cities_kinds(const bench_run *run, const lowrank_scene *scenes, lam_error *error);
 
 /* Figures 4.5 and 4.10: radiosity with and without its first bounces, error of every tile's light. */

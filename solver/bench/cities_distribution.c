@@ -1,4 +1,5 @@
-/* Figure 4.4 of the thesis: most elements of M = (I - R F)^-1 are small, the smaller the darker the city. */
+/* Figure 4.4 of the thesis: most elements of M = (I - R F)^-1 are small, and they are smaller in darker
+ * cities. */
 #include "solver/bench/cities.h"
 #include "solver/method/many_lights.h"
 
@@ -25,7 +26,7 @@ static const double their_share[CITIES] = {3, 10};
 
 static const double lowest = 1e-12; /* of the bins: 12 decades up to 1 */
 
-/* How many of the elements looked at are above lowest 10^(bin / BINS_A_DECADE). */
+/* A cumulative histogram: all elements counted, and those above lowest 10^(bin / BINS_A_DECADE). */
 typedef struct tally {
     double all, above[BINS + 1];
     double shares, squares, columns; /* of each column above 1e-5, for the standard error */
@@ -55,8 +56,8 @@ static void tally_column(size_t n, const float *column, tally *t) {
     t->columns++;
 }
 
-/* Columns of M, spread over the city. By Jacobi sweeps from the identity: sums of what is not negative, so
- * that small elements are as exact as large ones. E holds the unit vectors. */
+/* Tallies columns of M that are spread over the city. Jacobi sweeps from the identity add nonnegative numbers
+ * only, so that small elements are as exact as large ones. E holds the unit vectors. */
 static lam_status look_at(const bench_run *run, const lowrank_scene *s, float reflectance, size_t count,
                           tally *t, lam_error *error) {
     lam_status status = LAM_OK;
@@ -141,12 +142,12 @@ lam_status cities_distribution(const bench_run *run, const lowrank_scene *const 
         {"city", "", "1: flat houses, 3: with skyscrapers"},
         {"elements", "", "n"},
         {"reflectance", "", "R, of all elements"},
-        {"columns", "", "of M that were looked at"},
+        {"columns", "", "columns of M in the sample"},
         {"above_1e-3", "%", "elements of M greater than 1e-3"},
         {"above_1e-4", "%", "greater than 1e-4"},
         {"above_1e-5", "%", "greater than 1e-5"},
-        {"deviation", "%", "standard error of that, as not all columns were looked at"},
-        {"theirs", "%", "section 4.3.2: greater than 1e-5 for R <= .7, the most of which is at .7"},
+        {"deviation", "%", "standard error of above_1e-5, as only a sample of the columns was computed"},
+        {"theirs", "%", "section 4.3.2: share greater than 1e-5 for R <= .7, which is largest at .7"},
         {"above_1e-6", "%", "greater than 1e-6"},
         {"above_1e-7", "%", "greater than 1e-7"}};
     static const table_column curve_columns[] = {{"city", "", "1: flat houses, 3: with skyscrapers"},

@@ -53,20 +53,20 @@ done:
 
 lam_status cities_map(const bench_run *run, const lowrank_scene *scenes, lam_error *error) {
     static const table_column columns[] = {
-        {"scene", NULL, "as lambert generate makes it; cities of reflectance .7"},
+        {"scene", NULL, "kind of lambert generate; cities have reflectance .7"},
         {"elements", "", "n"},
-        {"density", "%", "of F, pair by pair"},
+        {"density", "%", "density of F, pair by pair"},
         {"density_theirs", "%",
          "section 5.2.1: the Cornell box around 20 %, city 1 of 8,897 elements less than 1 %"},
         {"above_.5", "", "singular values of F above .5, estimate"},
         {"above_.1", "", "above .1"},
         {"rank_.1", "", "estimate of the rank that a factorization of epsilon .1 has"},
-        {"rank_.05", "", "the same at .05"},
+        {"rank_.05", "", "estimate of the rank at epsilon .05"},
         {"share_.05", "%", "rank_.05 / n"},
-        {"tail", "", "what epsilon .05 leaves out, |S - S_k|_F / |S|_F"},
-        {"kind", NULL, "of operator that suits it at epsilon .05, as classify_scene finds"},
-        {"threshold", "", "of a sparse inverse where that suits"},
-        {"reason", NULL, "why"}};
+        {"tail", "", "|S - S_k|_F / |S|_F at epsilon .05"},
+        {"kind", NULL, "kind of operator that suits the scene at epsilon .05"},
+        {"threshold", "", "threshold of a sparse inverse where that suits"},
+        {"reason", NULL, "reason for that kind"}};
     lam_status status = LAM_OK;
     table out = {.name = "map",
                  .title = "Density and rank of scenes (figure 5.1)",
@@ -87,7 +87,8 @@ enum { POINTS = 80, EXACT_MOST = 2600, EXACT_MOST_FULL = 9000 };
 /* Section 4.2.1: "to get an error of 0.1, the city needs three times more singular values". */
 static const double their_ratio = 3;
 
-/* Below it eigenvalues of a Gram matrix in single precision are rounding. */
+/* Smaller singular values, as roots of the eigenvalues of a Gram matrix in single precision, are rounding
+ * errors. */
 static const double smallest_value = 2e-3;
 
 /* A point of a falling curve: a share of all singular values is at least that large. */
@@ -98,7 +99,7 @@ static void add_point(const lowrank_scene *s, double share, double value, table 
     table_number(curves, value);
 }
 
-/* All singular values, falling. */
+/* All singular values in descending order. */
 static lam_status find_all(const lowrank_scene *s, double *values, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = s->m.n;
@@ -121,7 +122,7 @@ done:
     return status;
 }
 
-/* Points at indices that grow by a factor, 1, 2, 3 ... at first. */
+/* Points at indices that grow geometrically, from 1. */
 static void fall_of_all(const lowrank_scene *s, const double *values, table *curves) {
     const size_t n = s->m.n;
     const double factor = pow((double)n, 1. / (POINTS - 1));
@@ -135,7 +136,8 @@ static void fall_of_all(const lowrank_scene *s, const double *values, table *cur
     }
 }
 
-/* From where a count is one of several: the largest few are not told one by one. */
+/* Points at singular values that fall geometrically. The estimated counts begin at 5, as they do not resolve
+ * the largest few. */
 static void fall_of_counts(const lowrank_scene *s, const spectrum *found, table *curves) {
     for (size_t p = 0; p < POINTS; p++) {
         const double value = pow(smallest_value, (double)p / (POINTS - 1));
@@ -150,7 +152,8 @@ static size_t count_above(size_t n, const double *values, double x) {
     return count;
 }
 
-/* Its row; of_box are the counts of the Cornell box of as many elements, by all values and by quadrature. */
+/* The row of a scene; of_box are the counts of the Cornell box of about as many elements, from all singular
+ * values and by quadrature. */
 static void add_count(const char *name, size_t n, double all, double counted, const double of_box[2],
                       double theirs, table *out) {
     table_text(out, name);
@@ -207,14 +210,15 @@ done:
 
 lam_status cities_spectra(const bench_run *run, const lowrank_scene *const *scenes, size_t n_sizes,
                           lam_error *error) {
-    static const table_column columns[] = {{"scene", NULL, "cities of reflectance .7"},
-                                           {"elements", "", "n"},
-                                           {"above", "", "singular values of F above .1, from all of them"},
-                                           {"estimate", "", "the same by stochastic Lanczos quadrature"},
-                                           {"share", "%", "estimate / n"},
-                                           {"ratio", "", "above over that of the Cornell box"},
-                                           {"ratio_estimate", "", "estimate over that of the Cornell box"},
-                                           {"ratio_theirs", "", "of city 1 (section 4.2.1)"}};
+    static const table_column columns[] = {
+        {"scene", NULL, "cities of reflectance .7"},
+        {"elements", "", "n"},
+        {"above", "", "singular values of F above .1, from all of them"},
+        {"estimate", "", "estimate of above by stochastic Lanczos quadrature"},
+        {"share", "%", "estimate / n"},
+        {"ratio", "", "above over above of the Cornell box"},
+        {"ratio_estimate", "", "estimate over estimate of the Cornell box"},
+        {"ratio_theirs", "", "the thesis on city 1 (section 4.2.1)"}};
     static const table_column curve_columns[] = {{"scene", NULL, "cities of reflectance .7"},
                                                  {"elements", "", "n"},
                                                  {"share", "", "index of the singular value over n"},
@@ -247,14 +251,14 @@ done:
 
 /* --- the scenes --------------------------------------------------------------------------------------- */
 
-/* City 1, two with properties of the thesis' other two, the Cornell box; and others. */
+/* City 1 and the Cornell box, two scenes with the properties of the other two of the thesis, and more. */
 const char *const map_scenes[MAP_SCENES] = {"city 1", "rooms", "anechoic", "cornell", "city 2",
                                             "city 3", "patio", "atrium",   "maze",    "canopy"};
 
-/* Of figure 4.1: where they are among map_scenes. */
+/* The scenes of figure 4.1, as indices into map_scenes. */
 static const size_t fall_scenes[FALL_SCENES] = {3, 0, 4, 5};
 
-/* Pairs would take most of the seconds that quick has. */
+/* In a quick run form factors pair by pair would take most of the time. */
 enum { RAYS_QUICK = 1024 };
 
 typedef struct figure_scenes {
@@ -291,7 +295,7 @@ done:
 }
 
 lam_status cities_figures(const bench_run *run, lam_error *error) {
-    /* of the map, and of figure 4.1 beside them */
+    /* elements of the scenes of figure 5.1, and of the second size of figure 4.1 */
     static const size_t elements[][2] = {
         [BENCH_QUICK] = {600, 0}, [BENCH_DEFAULT] = {2500, 8897}, [BENCH_FULL] = {8897, 2500}};
     lam_status status = LAM_OK;

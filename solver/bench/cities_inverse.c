@@ -1,4 +1,4 @@
-/* Tables 4.1 to 4.4 and 4.7 of the thesis: the sparse inverse, its time beside Jacobi's, its error; and the
+/* Tables 4.1 to 4.4 and 4.7 of the thesis: time and error of the sparse inverse beside Jacobi sweeps, and the
  * light of few emitters (section 4.4.3). */
 #include "solver/base/clock.h"
 #include "solver/bench/cities.h"
@@ -67,7 +67,7 @@ done:
     return status;
 }
 
-/* Seconds of CITY_SKIES answers, the tiles over and over again. */
+/* Seconds of CITY_SKIES answers; the tiles are used in turns. */
 static lam_status time_product(const bench_run *run, const city *c, const city_light *d,
                                const lam_operator *op, double *seconds, lam_error *error) {
     lam_status status = LAM_OK;
@@ -89,7 +89,7 @@ done:
     return status;
 }
 
-/* Seconds of so many sweeps for CITY_SKIES skies, from those of JACOBI_VECTORS. */
+/* Seconds of Jacobi sweeps for CITY_SKIES skies, extrapolated from JACOBI_VECTORS of them. */
 static lam_status time_jacobi(const bench_run *run, const city *c, const city_light *d, size_t sweeps,
                               double *seconds, lam_error *error) {
     lam_status status = LAM_OK;
@@ -115,7 +115,7 @@ done:
     return status;
 }
 
-/* The fewest sweeps whose error, of the first tiles, is at most that of M~. */
+/* The least number of sweeps whose error for the first tiles is at most that of M~. */
 static lam_status sweeps_for(const bench_run *run, const city *c, const city_light *d, double wanted,
                              size_t *sweeps, lam_error *error) {
     enum { TILES = 32 };
@@ -236,7 +236,7 @@ done:
     return status;
 }
 
-/* The light of the tiles, each alone, converged and after the thesis' 5 sweeps. */
+/* The radiosity under each tile alone, converged and after the 5 sweeps of the thesis. */
 static lam_status add_emitters(const bench_run *run, const city *c, table *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = c->m.n, m = c->f.sky.tiling.n_tiles;
@@ -278,7 +278,7 @@ done:
     return status;
 }
 
-/* The form factors that a size is measured with. */
+/* The recipe of the form factors at a size. */
 enum { WAYS = 3 };
 
 typedef struct way_of_F {
@@ -305,45 +305,45 @@ lam_status cities_inverse(const bench_run *run, lam_error *error) {
         {"elements", "", "n"},
         {"form_factors", NULL, "how they were found; the thesis: by hemicubes of 512 pixels"},
         {"threshold", "", "entries below it are left out"},
-        {"density", "%", "of M~"},
+        {"density", "%", "density of M~"},
         {"density_theirs", "%", "table 4.1"},
-        {"inverse_s", "s", "of M~ with what was discarded, algorithm 6"},
+        {"inverse_s", "s", "time of M~ with the discarded part (algorithm 6)"},
         {"inverse_theirs", "s", "table 4.2"},
-        {"product_s", "s", "of M~ E for 3,650 skies"},
+        {"product_s", "s", "time of M~ E for 3,650 skies"},
         {"product_theirs", "s", "table 4.2"},
-        {"jacobi_s", "s", "of 40 sweeps for 3,650 skies, from 320 of them"},
+        {"jacobi_s", "s", "time of 40 Jacobi sweeps for 3,650 skies, extrapolated from 320"},
         {"jacobi_theirs", "s", "table 4.2"},
         {"speedup", "", "jacobi_s / (inverse_s + product_s)"},
         {"speedup_theirs", "", "table 4.3"},
-        {"sweeps", "", "of Jacobi until its mean error is that of M~ with what was discarded"},
+        {"sweeps", "", "Jacobi sweeps to the mean error of M~ with the discarded part"},
         {"speedup_at_error", "", "the speed-up over as many sweeps"}};
     static const table_column error_columns[] = {
-        {"city", "", "as above"},
+        {"city", "", "as in the table times"},
         {"elements", "", "n"},
-        {"form_factors", NULL, "as above"},
+        {"form_factors", NULL, "as in the table times"},
         {"threshold", "", "entries below it are left out"},
         {"none_mean", "1e-3", "|B~ - B|/|B| over 132 tiles alone, nothing made up for"},
-        {"none_std", "1e-3", "its standard deviation"},
-        {"none_max", "1e-3", "its largest"},
+        {"none_std", "1e-3", "standard deviation of the same"},
+        {"none_max", "1e-3", "maximum of the same"},
         {"none_indirect", "1e-3", "|B~ - B|/|B - E|, mean"},
         {"none_theirs", "1e-3", "table 4.4, mean"},
-        {"discarded_mean", "1e-3", "with what was discarded (eq. 4.7)"},
-        {"discarded_std", "1e-3", "its standard deviation"},
-        {"discarded_max", "1e-3", "its largest"},
+        {"discarded_mean", "1e-3", "likewise with the discarded part (eq. 4.7)"},
+        {"discarded_std", "1e-3", "standard deviation of the same"},
+        {"discarded_max", "1e-3", "maximum of the same"},
         {"discarded_indirect", "1e-3", "|B~ - B|/|B - E|, mean"},
         {"discarded_theirs", "1e-3", "table 4.7, mean"},
         {"delta_mean", "1e-3", "with what one converged solution says is missing"},
-        {"delta_std", "1e-3", "its standard deviation"},
-        {"delta_max", "1e-3", "its largest"},
+        {"delta_std", "1e-3", "standard deviation of the same"},
+        {"delta_max", "1e-3", "maximum of the same"},
         {"delta_indirect", "1e-3", "|B~ - B|/|B - E|, mean"}};
     static const table_column emitter_columns[] = {
-        {"city", "", "as above"},
+        {"city", "", "as in the table times"},
         {"elements", "", "n"},
         {"emitters", "", "tiles of the sky, each alone"},
         {"converged_s", "s", "by conjugate gradients (thesis, 145 tiles, city 3, 142,352 elements: 1000 s)"},
         {"sweeps", "", "products with F"},
         {"residual", "", "reached"},
-        {"five_sweeps_s", "s", "of 5 Jacobi sweeps (thesis: 140 s)"},
+        {"five_sweeps_s", "s", "time of 5 Jacobi sweeps (thesis: 140 s)"},
         {"five_sweeps_error", "", "relative, of what is reflected"}};
     lam_status status = LAM_OK;
     city c = {0};

@@ -1,4 +1,4 @@
-/* Every kind of operator on the four scenes of figure 5.1: what each takes, and whether auto picks well. */
+/* Every kind of operator on the four scenes of figure 5.1: cost, error, and the kind that auto picks. */
 #include "solver/bench/cities.h"
 #include "solver/method/classify.h"
 
@@ -13,8 +13,8 @@ static const char *const kinds[KINDS] = {"exact", "low-rank", "2msc", "sparse", 
 
 static const double epsilon = .05, usual_threshold = 1e-4;
 
-/* How much less exact than the pick another kind may be and still be compared with it; one that is as exact
- * as was asked, to epsilon, always is: more than that is no merit of the pick. */
+/* Another kind is compared with the pick if its error is at most this many times that of the pick, or at most
+ * epsilon, which is all that was asked for. */
 static const double as_exact = 1.5;
 
 typedef struct light_source {
@@ -30,8 +30,8 @@ static bool shines(const mesh *m, size_t i) {
     return any;
 }
 
-/* The scene's lights, element by element, or, where they are many, put together in their order; of a scene
- * without lights some elements that might be. */
+/* The scene's luminous elements as emitters, several in one where they are more than EMITTERS_MOST; in a
+ * scene without lights a sample of its elements. */
 static lam_status lights_of(const lowrank_scene *s, light_source *out, lam_error *error) {
     const size_t n = s->m.n, C = s->m.n_channels;
     size_t lit = 0, seen = 0;
@@ -53,7 +53,7 @@ static lam_status lights_of(const lowrank_scene *s, light_source *out, lam_error
     return LAM_OK;
 }
 
-/* The kind that auto builds, and the threshold it would have a sparse inverse at. */
+/* The kind that auto builds, and the threshold that it would choose for a sparse inverse. */
 static lam_status find_pick(const bench_run *run, const lowrank_scene *s, size_t *pick, double *threshold,
                             lam_error *error) {
     lam_status status = LAM_OK;
@@ -100,8 +100,8 @@ static bool is_as_exact(const error_report *a, const error_report *pick) {
            a->random.operator_indirect.mean <= fmax(epsilon, as_exact * pick->random.operator_indirect.mean);
 }
 
-/* Time of the pick over that of the fastest that is about as exact; emitters, which answer for their own
- * lights alone, are no rival. */
+/* Time of the pick over that of the fastest kind that is about as exact. The kind emitters is left out, as it
+ * answers for its own lights alone. */
 static double over_fastest(const lowrank_verdict verdicts[KINDS], size_t pick) {
     double fastest = verdicts[pick].answer_seconds;
     for (size_t k = 0; k + 1 < KINDS; k++)
@@ -149,22 +149,22 @@ done:
 
 lam_status cities_kinds(const bench_run *run, const lowrank_scene *scenes, lam_error *error) {
     static const table_column columns[] = {
-        {"scene", NULL, "of figure 5.1"},
+        {"scene", NULL, "scene of figure 5.1"},
         {"elements", "", "n"},
         {"channels", "", "C"},
-        {"kind", NULL, "of operator, as precompute makes it at epsilon .05"},
+        {"kind", NULL, "kind of operator, at the defaults of precompute and epsilon .05"},
         {"rank", "", "k"},
-        {"threshold", "", "of the sparse inverse: what classify_scene names, else 1e-4"},
-        {"build_s", "s", "without form factors"},
-        {"query_ms", "ms", "of one radiosity, median, one thread"},
-        {"mb", "MB", "that a query reads"},
+        {"threshold", "", "threshold of the sparse inverse: that of auto, else 1e-4"},
+        {"build_s", "s", "time of the build, without form factors"},
+        {"query_ms", "ms", "time of one radiosity, median, one thread"},
+        {"mb", "MB", "memory that one radiosity reads"},
         {"single_relative", "", "|B~ - B|/|B|, one bright element (of emitters: one of them), mean"},
         {"single_indirect", "", "|B~ - B|/|B - E| of the same"},
         {"lights_relative", "", "the scene's lights"},
         {"lights_indirect", "", "the same"},
-        {"random_relative", "", "light from everywhere (of emitters: all of them), mean"},
+        {"random_relative", "", "random emission of all elements (of emitters: all of them), mean"},
         {"random_indirect", "", "the same"},
-        {"picked", NULL, "what --method auto builds"},
+        {"picked", NULL, "auto: the kind that --method auto builds"},
         {"over_fastest", "",
          "query of the pick over that of the fastest kind of at most 1.5 times its indirect errors, or .05, "
          "emitters apart"}};

@@ -1,5 +1,5 @@
-/* Figures 4.5 and 4.10 of the thesis: what a sparse inverse makes of the sky's light, element by element and
- * tile by tile. */
+/* Figures 4.5 and 4.10 of the thesis: the light of the sky by a sparse inverse, element by element and tile
+ * by tile. */
 #include "solver/bench/cities.h"
 #include "solver/bench/formfactors.h"
 
@@ -12,7 +12,7 @@ enum { RAYS = 4096, POINTS = 120, WAYS = 3 }; /* WAYS: of sparse_correction */
 /* --- figure 4.5 -------------------------------------------------------------------------------------------
  */
 
-/* Of every element, mean over the tiles: all light, and that of the first two bounces, E + R F E. */
+/* Means over the tiles for every element: the converged radiosity, and E + R F E of the first two bounces. */
 typedef struct mean_light {
     double *B, *first; /* [n] */
 } mean_light;
@@ -39,7 +39,7 @@ static lam_status mean_light_make(const city *c, const city_light *d, mean_light
     return ready ? LAM_OK : LAM_ERR_MEMORY;
 }
 
-/* The mean over the tiles of what M~ answers, nothing made up for. */
+/* The mean over the tiles of the radiosity by M~ without a correction. */
 static lam_status mean_answer(const bench_run *run, const city *c, const city_light *d, double threshold,
                               double *B, lam_error *error) {
     lam_status status = LAM_OK;
@@ -88,7 +88,7 @@ static lam_status add_curves(const city *c, double threshold, const double *B, c
     return LAM_OK;
 }
 
-/* Area-weighted. */
+/* The area-weighted mean. */
 static double mean_of(const city *c, const double *x) {
     double sum = 0, all = 0;
     for (size_t i = 0; i < c->m.n; i++) {
@@ -108,7 +108,7 @@ static double root_square(const city *c, const double *x, const double *less) {
     return sqrt(sum / all);
 }
 
-/* S is scratch. */
+/* S is a work area. */
 static void add_light_row(const city *c, double threshold, const mean_light *l, const double *B, double *S,
                           table *out) {
     for (size_t i = 0; i < c->m.n; i++) S[i] = B[i] - l->first[i];
@@ -199,25 +199,26 @@ lam_status cities_radiosity(const bench_run *run, lam_error *error) {
     static const table_column light_columns[] = {
         {"city", "", "1: flat houses, 3: with skyscrapers"},
         {"elements", "", "n"},
-        {"threshold", "", "of M~, nothing made up for; none: converged"},
+        {"threshold", "", "threshold of M~ without a correction; empty: converged"},
         {"B", "W/m^2", "radiosity, mean over elements and over tiles of 1 W/(m^2 sr), each alone"},
-        {"S", "W/m^2", "the same of the third and later bounces, B - E - R F E"},
+        {"S", "W/m^2", "likewise of the third and later bounces, B - E - R F E"},
         {"error_B", "", "|B~ - B|/|B| of the mean over the tiles"},
         {"error_S", "", "|S~ - S|/|S| likewise"}};
     static const table_column curve_columns[] = {
         {"city", "", "1: flat houses, 3: with skyscrapers"},
         {"elements", "", "n"},
-        {"threshold", "", "of M~; none: converged"},
+        {"threshold", "", "threshold of M~; empty: converged"},
         {"place", "%", "share of the elements with a value of at most B, and with one of at most S"},
         {"B", "W/m^2", "mean over the tiles, as in the table bounces"},
         {"S", "W/m^2", "likewise"}};
-    static const table_column tile_columns[] = {{"city", "", "3: with skyscrapers"},
-                                                {"elements", "", "n"},
-                                                {"threshold", "", "of M~"},
-                                                {"tile", "", "of the sky, alone"},
-                                                {"none", "", "|B~ - B|/|B|, nothing made up for"},
-                                                {"delta", "", "with what one converged solution misses"},
-                                                {"discarded", "", "with what was discarded (eq. 4.7)"}};
+    static const table_column tile_columns[] = {
+        {"city", "", "3: with skyscrapers"},
+        {"elements", "", "n"},
+        {"threshold", "", "threshold of M~"},
+        {"tile", "", "the only bright tile of the sky"},
+        {"none", "", "|B~ - B|/|B| without a correction"},
+        {"delta", "", "likewise with the correction by one converged solution"},
+        {"discarded", "", "likewise with the discarded part (eq. 4.7)"}};
     lam_status status = LAM_OK;
     table light = {.name = "bounces",
                    .title = "Third and later bounces (figure 4.5)",

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Rays that only tell pairs whether a scene is closed; as precompute takes them. */
+/* Rays per element by which pairs find out whether a scene is closed; precompute takes as many. */
 enum { FEW_RAYS = 256 };
 
 recipe formfactors_rays(size_t rays, uint64_t seed) {
@@ -89,12 +89,12 @@ static const struct {
                   {32, {.0006, .0009, .0015}, {3.2, 3.2, 3.2}, {.1444, .1281, .1279}}};
 
 static const table_column resolution_columns[] = {
-    {"scene", NULL, "which"},
+    {"scene", NULL, "name of the scene"},
     {"elements", "", "n"},
     {"resolution", "", "pixels along the top of a hemicube"},
-    {"seconds", "s", "of the form factors"},
+    {"seconds", "s", "time of the form factors"},
     {"density", "", "share of F that is not 0"},
-    {"speedup", "", "against the finest"},
+    {"speedup", "", "speed over that of the finest hemicube"},
     {"error", "", "|F_finest - F| / |F_finest|, Frobenius"},
     {"density_1", "", "thesis, city 1"},
     {"density_2", "", "thesis, city 2"},
@@ -174,10 +174,10 @@ done:
 /* --- throughput of rays ------------------------------------------------------------------------------- */
 
 static const table_column throughput_columns[] = {
-    {"scene", NULL, "which"},
+    {"scene", NULL, "name of the scene"},
     {"elements", "", "n"},
     {"rays", "", "from every element"},
-    {"threads", "", "that cast"},
+    {"threads", "", "threads that cast rays"},
     {"bare", "Mray/s", "Embree alone on the elements, rays in memory; median of the passes"},
     {"facets", "Mray/s", "Embree alone on the facets that the elements lie in, likewise"},
     {"counted", "Mray/s", "rays made, cast and counted into rows; median of the passes"},
@@ -211,7 +211,7 @@ static void ray_scene_free(ray_scene *s) {
     free(s->self);
 }
 
-/* Every ray that rays_count casts, in memory. */
+/* Keeps every ray that rays_count casts in memory. */
 static lam_status prepare_rays(ray_scene *s, uint64_t seed, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t per_element = s->rays / VISIBILITY_PACKET;
@@ -266,7 +266,7 @@ done:
     return status;
 }
 
-/* Medians of the passes for one number of threads, one row of the table. */
+/* Adds one row: medians of the passes for one number of threads. */
 static lam_status measure(const bench_run *run, const ray_scene *s, int threads, size_t passes,
                           double alone[2], table *out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -302,7 +302,7 @@ done:
     return status;
 }
 
-/* Measures one scene, which it takes, with one thread and with all. */
+/* Measures one scene, which it frees, with one thread and with all. */
 static lam_status measure_scene(const bench_run *run, ray_scene *s, size_t passes, table *out,
                                 lam_error *error) {
     lam_status status = LAM_OK;
@@ -348,7 +348,7 @@ done:
 lam_status bench_formfactors(const bench_run *run, lam_error *error) {
     lam_status status = LAM_OK;
     mesh given = {0};
-    /* A scene that cannot be read is told before the measuring begins. */
+    /* A scene that cannot be read fails before the first measurement. */
     if (run->scene != NULL) TRY(scene_file(run->scene, &given, error));
     mesh_free(&given);
     TRY(formfactors_closed_forms(run, error));

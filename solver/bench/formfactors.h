@@ -20,11 +20,11 @@ double formfactors_entry(const csr *F, size_t i, size_t j);
 /* The Z-order of a mesh as a fresh array. */
 lam_status formfactors_order(const mesh *m, uint32_t **order, lam_error *error);
 
-/* The scene of run, or houses where it has none; name is what to call it. */
+/* The scene of --scene, or houses without it; name is for the tables. */
 lam_status formfactors_open_scene(const bench_run *run, size_t lots, mesh *out, char name[64],
                                   lam_error *error);
 
-/* Closed forms: estimate, truth, stated bar and how often it covers the truth. */
+/* Closed forms: estimate, truth, error bar, and how often that covers the truth. */
 lam_status formfactors_closed_forms(const bench_run *run, lam_error *error);
 
 /* Enclosures whose factors are known between whole surfaces, and the radiosity of one. */

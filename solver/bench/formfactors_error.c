@@ -9,25 +9,25 @@
 #include <string.h>
 
 static const table_column columns[] = {
-    {"scene", NULL, "which"},
+    {"scene", NULL, "name of the scene"},
     {"elements", "", "n"},
-    {"method", NULL, "how the form factors were found"},
-    {"reference", NULL, "the form factors that they are judged by, of another seed"},
-    {"seconds", "s", "of the form factors"},
-    {"entries", "", "of F that are not 0"},
+    {"method", NULL, "how the form factors were computed"},
+    {"reference", NULL, "form factors of the reference, of another seed"},
+    {"seconds", "s", "time of the form factors"},
+    {"entries", "", "entries of F that are not 0"},
     {"single_mean", "", "indirect error of B for one bright element, mean over the probes"},
-    {"single_q05", "", "its 5 % quantile"},
-    {"single_median", "", "its median"},
-    {"single_q95", "", "its 95 % quantile"},
+    {"single_q05", "", "5 % quantile of the same"},
+    {"single_median", "", "median of the same"},
+    {"single_q95", "", "95 % quantile of the same"},
     {"lamp", "", "indirect error of B for the scene's own lights"},
 };
 
 enum { PROBES = 32, VECTORS = PROBES + 1, REFERENCES_MOST = 2, SETTINGS_MOST = 5 };
 
-/* Residual at which a solution counts as converged: far below every error that is printed. */
+/* Residual at which a solution counts as converged, far below every error in the table. */
 static const double tolerance = 1e-8;
 
-/* A scene, what lights it, and what its radiosity should be. */
+/* A scene and its converged radiosity by each reference. */
 typedef struct lit_scene {
     mesh m;
     uint32_t *order;
@@ -42,8 +42,8 @@ static void lit_free(lit_scene *s) {
     mesh_free(&s->m);
 }
 
-/* One bright element a vector, spread over the scene by the Z-order; the last vector is the scene's lights.
- */
+/* Emissions: one bright element per vector, spread over the scene by the Z-order; the last vector is the
+ * scene's lights. */
 static void light(const lit_scene *s, size_t channel, double *E) {
     const size_t n = s->m.n;
     memset(E, 0, VECTORS * n * sizeof *E);
@@ -149,7 +149,7 @@ done:
     return status;
 }
 
-/* What is tried in a scene of about so many elements. */
+/* The settings of one scene and its approximate number of elements. */
 typedef struct trial {
     size_t elements;
     size_t rays[SETTINGS_MOST], resolution[SETTINGS_MOST]; /* up to the first 0 */

@@ -12,15 +12,14 @@
 
 static const table_column case_columns[] = {
     {"case", NULL, "the configuration"},
-    {"source", NULL, "of the truth"},
-    {"method", NULL, "how the form factor was found"},
+    {"source", NULL, "source of the truth"},
+    {"method", NULL, "how the form factor was computed"},
     {"occluded", "", "1: wholly or partly hidden"},
     {"truth", "", "F"},
     {"estimate", "", "F with the first seed"},
-    {"absolute_error", "", "of the first seed"},
-    {"relative_error", "", "of the first seed"},
-    {"stated_bar", "",
-     "what the error may be: two standard errors, or the tolerance where nothing is sampled"},
+    {"absolute_error", "", "error with the first seed"},
+    {"relative_error", "", "error with the first seed"},
+    {"stated_bar", "", "error bar: two standard errors, or the tolerance where nothing is sampled"},
     {"repeats", "", "seeds"},
     {"covered", "", "share of the seeds whose error was within the bar stated with it"},
     {"worst_error", "", "largest absolute error of all seeds"},
@@ -28,7 +27,7 @@ static const table_column case_columns[] = {
 };
 
 static const table_column method_columns[] = {
-    {"method", NULL, "how the form factor was found"},
+    {"method", NULL, "how the form factor was computed"},
     {"open_worst", "", "largest relative error of the first seed, nothing between"},
     {"open_median", "", "median of the same"},
     {"hidden_worst", "", "largest relative error of the first seed, something between"},
@@ -39,7 +38,7 @@ static const table_column method_columns[] = {
 
 enum { METHODS_MOST = 6, SEEDS_MOST = 21, CASES_MOST = 64 };
 
-/* What all cases of one method come to. */
+/* Figures of one method over all cases. */
 typedef struct method_summary {
     double open[CASES_MOST], seconds[CASES_MOST];
     size_t n_open, n_cases, n_runs, n_covered;
@@ -168,26 +167,26 @@ done:
 /* --- enclosures --------------------------------------------------------------------------------------- */
 
 static const table_column pair_columns[] = {
-    {"enclosure", NULL, "which"},
-    {"source", NULL, "of the truth"},
-    {"method", NULL, "how the form factors were found"},
+    {"enclosure", NULL, "name of the enclosure"},
+    {"source", NULL, "source of the truth"},
+    {"method", NULL, "how the form factors were computed"},
     {"quantity", NULL, "F, or B in W/m2"},
     {"from", "", "surface, from 1"},
     {"to", "", "surface, from 1"},
     {"truth", "", "F: exact, or as published; B: as published"},
-    {"estimate", "", "as found"},
+    {"estimate", "", "as computed"},
     {"error", "", "absolute"},
-    {"own_accuracy", "", "how far the published value may be off"},
+    {"own_accuracy", "", "largest error of the published value"},
 };
 
 static const table_column enclosure_columns[] = {
-    {"enclosure", NULL, "which"},
-    {"method", NULL, "how the form factors were found"},
+    {"enclosure", NULL, "name of the enclosure"},
+    {"method", NULL, "how the form factors were computed"},
     {"F_worst", "", "largest absolute error of a form factor"},
-    {"F_own", "", "how far the published form factors may be off"},
+    {"F_own", "", "largest error of the published form factors"},
     {"B_worst", "W/m2", "largest absolute error of a radiosity"},
-    {"B_own", "W/m2", "how far the published radiosity may be off"},
-    {"seconds", "s", "of the form factors"},
+    {"B_own", "W/m2", "largest error of the published radiosity"},
+    {"seconds", "s", "time of the form factors"},
 };
 
 enum { SURFACES_MOST = 8 };

@@ -1,4 +1,4 @@
-/* What is known exactly about form factors, and the geometry that poses it. Constants only. */
+/* Form factors that are known exactly, and the geometry of each. Constants only. */
 #ifndef LAMBERT_BENCH_FORMFACTORS_TRUTHS_H
 #define LAMBERT_BENCH_FORMFACTORS_TRUTHS_H
 

@@ -1,4 +1,5 @@
-/* Closed grey Cornell boxes of growing size: what a hierarchical operator takes, beside one of low rank. */
+/* Closed grey Cornell boxes of growing size: time and memory of a hierarchical operator beside one of low
+ * rank. */
 #include "solver/base/clock.h"
 #include "solver/bench/lowrank.h"
 #include "solver/bench/scenes.h"
@@ -10,41 +11,43 @@
 
 enum { SIZES = 4, SOLVES = 31, SOLVES_OF_LARGE = 7, LARGE_SOLVE = 1 << 28 };
 
-/* The recipe of large scenes at defaults, for all of them: how time grows is seen at equal rays. */
+/* The recipe of large scenes at defaults serves all sizes, so that time grows at an equal number of rays. */
 enum { RAYS = 512 };
 static const double accuracy = 7e-5, epsilon = .05, reflectance = .6;
 
-/* Elements up to which the reference is waited for, and its probes. */
+/* Largest number of elements at which errors are measured, and the probes of that. */
 enum { JUDGED_MOST = 200000, PROBES = 16, PROBES_QUICK = 4 };
 
 /* The rank of HF at 163,840 elements and epsilon .05, which grows like the square root of n: the thesis needs
  * 3,981 for that box (table 3.5). */
 static const double rank_known = 3981, rank_known_at = 163840;
 
-/* Of an operator kept in memory beside the form factors, at most. */
+/* Largest share of the free memory for the low-rank operator. */
 static const double memory_share = .5;
 
 static const table_column columns[] = {
     {"elements", "", "n"},
-    {"near_pairs_s", "s", "pair by pair"},
-    {"wavelets_s", "s", "512 rays an element and the pass over what they find"},
-    {"inverse_s", "s", "inverse and self-checks"},
-    {"build_s", "s", "all of these"},
-    {"peak_mb", "MB", "of memory while it was built"},
+    {"near_pairs_s", "s", "time of near pairs"},
+    {"wavelets_s", "s", "time of 512 rays per element and of their wavelet transform"},
+    {"inverse_s", "s", "time of the inverse and its checks"},
+    {"build_s", "s", "sum of these times"},
+    {"peak_mb", "MB", "peak of memory during the build"},
     {"exponent", "", "p of build time ~ n^p since the size before"},
-    {"numbers", "", "of K, upper triangle, an element"},
-    {"stored_mb", "MB", "of the operator in a store"},
-    {"query_ms", "ms", "of one radiosity, median, all threads"},
-    {"rank", "", "of an operator of random numbers: as HF needs, 3,981 at 163,840, with the root of n"},
-    {"low_rank_ms", "ms", "that one's radiosity, median, all threads"},
-    {"ratio", "", "of the two"},
+    {"numbers", "", "stored coefficients of K per element"},
+    {"stored_mb", "MB", "size of the operator in a store"},
+    {"query_ms", "ms", "time of one radiosity, median, all threads"},
+    {"rank", "",
+     "rank of a low-rank operator: that of HF, 3,981 at n = 163,840, growing with the square root of n"},
+    {"low_rank_ms", "ms", "time of one radiosity by that operator, median, all threads"},
+    {"ratio", "", "low_rank_ms over query_ms"},
     {"single", "", "total indirect error, one bright element, mean of 16"},
     {"lights", "", "the scene's light"},
-    {"all_over", "", "light all over"},
+    {"all_over", "", "random emission of all elements"},
     {"uniform", "", "|B~ - 1| / |1| where E = 1 - rho s"},
 };
 
-/* A folded operator of random numbers, whose speed does not depend on them; NaN where memory is too small. */
+/* Times a folded operator of arbitrary numbers, on which its speed does not depend; NaN where memory is too
+ * small. */
 static lam_status time_low_rank(const bench_run *run, const mesh *m, size_t k, double *median,
                                 lam_error *error) {
     lam_status status = LAM_OK;
@@ -73,7 +76,8 @@ done:
     return status;
 }
 
-/* The operator by form factors of another seed; those it was made of are found once more. */
+/* Errors of the operator against form factors of another seed; its own form factors are computed once more.
+ */
 static lam_status judge(const bench_run *run, lowrank_scene *s, const recipe *own, lam_operator *op,
                         error_report *out, lam_error *error) {
     lam_status status = LAM_OK;

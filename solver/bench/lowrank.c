@@ -74,7 +74,7 @@ static lam_status open_usual(const bench_run *run, const char *name, mesh *m, lo
     return lowrank_open(run, name, m, &how, out, error);
 }
 
-/* divisions x divisions squares of a wall, each of one piece or two triangles. */
+/* Cuts a wall into u x v parallelograms, each one piece or two triangles. */
 static size_t add_wall(scene_piece *pieces, const double corner[3], const double along[3],
                        const double across[3], size_t u, size_t v, bool triangles) {
     size_t n = 0;
@@ -134,7 +134,7 @@ done:
 /* --- a courtyard of two storeys ---------------------------------------------------------------------------
  */
 
-/* Rectangles that are cut into cells of about one size. */
+/* Cuts rectangles into cells of about one size. */
 typedef struct builder {
     double cell;
     scene_piece *pieces; /* NULL: only counted */
@@ -305,7 +305,7 @@ build_problem lowrank_problem(const lowrank_scene *s) {
                            .surface = s->surface};
 }
 
-/* The kind that answers for its own emitters alone takes their weights W in place of E. */
+/* The kind emitters takes weights of its emitters in place of an emission. */
 static lam_status answer(const lam_operator *op, const float *E, float *B, void *work, size_t bytes,
                          lam_error *error) {
     if (lam_operator_emitters(op) > 0)
@@ -402,7 +402,7 @@ done:
 enum { ROOMS_MOST = 4 };
 
 lam_status bench_lowrank(const bench_run *run, lam_error *error) {
-    /* 640 and 2,560 elements; 2,560 and 10,240; all of the thesis'. */
+    /* 640 and 2,560 elements; 2,560 and 10,240; all sizes of the thesis */
     static const size_t divisions[3][ROOMS_MOST] = {{8, 16, 0, 0}, {16, 32, 0, 0}, {16, 32, 64, 128}};
     lam_status status = LAM_OK;
     lowrank_scene rooms[ROOMS_MOST] = {{.name = NULL}};

@@ -26,10 +26,10 @@ lam_status lowrank_open(const bench_run *run, const char *name, mesh *m, const r
                         lowrank_scene *out, lam_error *error);
 lam_status lowrank_trace(const bench_run *run, lowrank_scene *s, const recipe *how, lam_error *error);
 
-/* All pairs up to 24,000 elements, rays beyond. */
+/* Pair by pair up to 24,000 elements, rays beyond. */
 recipe lowrank_recipe(const bench_run *run, size_t elements);
 
-/* What builders are given of it, which it must outlive. */
+/* The scene as builders see it; the scene must outlive it. */
 build_problem lowrank_problem(const lowrank_scene *s);
 
 /* Five walls of a cube, each of divisions x divisions squares of two triangles: 10 divisions^2 elements,
@@ -40,12 +40,12 @@ lam_status lowrank_room(const bench_run *run, size_t divisions, lowrank_scene *o
 lam_status lowrank_cornell(const bench_run *run, size_t elements, lowrank_scene *out, lam_error *error);
 lam_status lowrank_patio(const bench_run *run, size_t elements, lowrank_scene *out, lam_error *error);
 
-/* Bytes of memory now, from which on the most is watched anew (where the kernel does not do that, it is that
- * of the whole run); and by how much that has passed them since. */
+/* lowrank_begin_peak returns the bytes of memory now and resets the peak of the process (where the kernel
+ * allows it); lowrank_peak returns how far the peak has passed them since. */
 double lowrank_begin_peak(void);
 double lowrank_peak(double before);
 
-/* One factorization, measured. */
+/* Cost and error of one factorization. */
 typedef struct lowrank_result {
     double seconds; /* median of the repeats */
     size_t rank;
@@ -58,10 +58,10 @@ lam_status lowrank_factorize(const bench_run *run, const lowrank_scene *s, const
                              const factorizer_options *options, bool in_z_order, size_t repeats,
                              lowrank_result *out, lam_error *error);
 
-/* Options as precompute has them. */
+/* The default options of precompute. */
 factorizer_options lowrank_options(const bench_run *run, double epsilon, size_t rank);
 
-/* How an operator is built, and by what it is judged; else as precompute has it. */
+/* Settings of an operator and of its errors; the other settings are the defaults of precompute. */
 typedef struct lowrank_case {
     const char *method, *factorizer;
     double epsilon;
@@ -83,12 +83,12 @@ typedef struct lowrank_verdict {
     double stored;         /* bytes of the operator in a store, where it was weighed */
 } lowrank_verdict;
 
-/* Median seconds of one radiosity, or of all emitters' light, in so many solves, LOWRANK_SOLVES_MOST at most.
- */
+/* Median seconds of one radiosity over a number of solves, at most LOWRANK_SOLVES_MOST; of the kind emitters
+ * the radiosity of all its emitters. */
 enum { LOWRANK_SOLVES_MOST = 31 };
 lam_status lowrank_time_answer(const lam_operator *op, size_t solves, double *median, lam_error *error);
 
-/* What an operator takes in a store: the size of one with nothing else in it, written and removed. */
+/* Bytes of a store that holds nothing but the operator; it is written to a temporary file. */
 lam_status lowrank_stored_bytes(const lam_operator *op, double *bytes, lam_error *error);
 
 lam_status lowrank_judge(const bench_run *run, const lowrank_scene *s, const lowrank_case *of,
@@ -112,11 +112,11 @@ lam_status lowrank_of_radiosity(const bench_run *run, lam_error *error);
 /* Every method: run time and memory against error, and two meshes against the SVD at equal k. */
 lam_status lowrank_of_methods(const bench_run *run, lam_error *error);
 
-/* Tables 1 to 5 of seed 000: the index vector, and frames a second. */
+/* Tables 1 to 5 of Fernández et al. 2011: the index vector, and frames a second. */
 lam_status lowrank_of_index_vector(const bench_run *run, lam_error *error);
 
-/* Of the suite hierarchical: closed Cornell boxes of growing size; time, memory and stored coefficients per
- * element, beside an operator of low rank. */
+/* A part of the suite hierarchical: closed Cornell boxes of growing size; time, memory and stored
+ * coefficients per element, beside an operator of low rank. */
 lam_status hierarchical_growth(const bench_run *run, lam_error *error);
 
 #endif

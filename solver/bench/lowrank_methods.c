@@ -22,22 +22,22 @@ static const kind lowrank_kinds[KINDS] = {
     {"whole inverse", "exact", "auto", false}};
 
 static const double bounds[SETTINGS_MOST] = {.3, .2, .1, .05, .02};
-/* k as parts of n. */
+/* Ranks as shares of n. */
 static const double parts[SETTINGS_MOST] = {1. / 32, 1. / 16, 1. / 8, 1. / 5, 1. / 4};
 
 static const table_column columns[] = {
-    {"scene", NULL, "which"},
+    {"scene", NULL, "name of the scene"},
     {"elements", "", "n"},
     {"method", NULL, "how it was built"},
     {"epsilon", "", "bound asked for"},
     {"rank", "", "k"},
     {"norm", "", "|S - S~|_2"},
     {"build_s", "s", "factorization and inverse, without form factors"},
-    {"mb", "MB", "that an answer reads"},
-    {"answer_ms", "ms", "of one B, median, one thread"},
+    {"mb", "MB", "memory that an answer reads"},
+    {"answer_ms", "ms", "time of one B, median, one thread"},
     {"single", "", "total indirect error for one bright element, mean"},
-    {"lights", "", "for the scene's lights"},
-    {"random", "", "for light all over, mean"},
+    {"lights", "", "likewise for the scene's lights"},
+    {"random", "", "likewise for random emission of all elements, mean"},
     {"single_operator", "", "indirect error against the very same form factors"},
     {"lights_operator", "", "against the same form factors"},
     {"random_operator", "", "against the same form factors"},

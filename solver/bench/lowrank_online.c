@@ -1,6 +1,6 @@
-/* Tables 1 to 5 of Fernandez et al. 2011 at their sizes: V^T E by the index vector against a full V, and B~
- * in frames a second. V has one 1 a row in runs of n/k, Y is made up: neither time depends on the numbers.
- * Figures of GPUs are quoted; nothing ran on one. */
+/* Tables 1 to 5 of Fernández et al. 2011 at their sizes: V^T E by the index vector against a full V, and B~
+ * in frames a second. V has a single 1 in each row, in runs of n/k, and the numbers of Y are arbitrary: no
+ * time depends on them. Figures of GPUs are quoted from the paper; nothing ran on one. */
 #include "solver/base/clock.h"
 #include "solver/bench/lowrank.h"
 #include "solver/bench/stats.h"
@@ -15,10 +15,10 @@
 
 enum { RUNS = 15 };
 
-/* What one thing is timed for, in all. */
+/* Total time of one measurement. */
 static const double seconds_of_a_case = .6;
 
-/* Median seconds of one call: RUNS measurements of so many calls that each can be timed. */
+/* Median seconds of one call, of RUNS measurements with enough calls in each to be timed. */
 static double time_of(void (*call)(void *), void *context) {
     double runs[RUNS], start = clock_seconds();
     call(context); /* the first fetches pages and caches */
@@ -32,7 +32,7 @@ static double time_of(void (*call)(void *), void *context) {
     return stats_median(runs, RUNS);
 }
 
-/* Where runs of n/k begin. */
+/* The first elements of k runs of n/k elements. */
 static uint64_t *runs_of(size_t n, size_t k, lam_error *error) {
     uint64_t *begin = memory_allocate(k + 1, sizeof *begin, "runs", error);
     for (size_t p = 0; begin != NULL && p <= k; p++) begin[p] = p * n / k;
@@ -111,7 +111,7 @@ static lam_status products(const bench_run *run, lam_error *error) {
         {"elements", "", "n"},
         {"patches", "", "k"},
         {"full_one_thread_us", "us", "V^T E with a full V by OpenBLAS, the faster of both storage orders"},
-        {"full_us", "us", "the same with all threads"},
+        {"full_us", "us", "full V with all threads"},
         {"sparse_us", "us", "by the index vector, one thread"},
         {"ratio_one_thread", "", "full over sparse"},
         {"ratio", "", "full with all threads over sparse"},
@@ -125,7 +125,7 @@ static lam_status products(const bench_run *run, lam_error *error) {
                  {13824, 3456, 335.50}, {55296, 864, 94.03}, {221184, 216, 24.01}};
     lam_status status = LAM_OK;
     table out = {.name = "index-vector",
-                 .title = "V^T E by the index vector (seed 000: table 1)",
+                 .title = "V^T E by the index vector (Fernández et al. 2011: table 1)",
                  .columns = columns,
                  .n_columns = sizeof columns / sizeof *columns,
                  .printed = true};
@@ -153,7 +153,7 @@ typedef struct solve {
 
 static void apply(void *context) {
     const solve *s = context;
-    /* Cannot fail with shapes that were right once. */
+    /* Shapes that were right once stay right, so that this cannot fail. */
     (void)lam_operator_apply(s->op, 1, LAM_RADIOSITY, s->E, s->B, s->work, s->work_bytes, NULL);
 }
 
@@ -173,7 +173,7 @@ done:
     return status;
 }
 
-/* Y [n][k] of made up numbers. */
+/* Y [n][k] of arbitrary numbers. */
 static float *made_up(size_t n, size_t k, lam_error *error) {
     float *Y = memory_allocate(n, k * sizeof *Y, "Y", error);
     for (size_t i = 0; Y != NULL && i < n * k; i++) Y[i] = -1e-4f * (float)(1 + i % 13);
@@ -233,14 +233,14 @@ done:
 
 static lam_status answers(const bench_run *run, lam_error *error) {
     static const table_column columns[] = {
-        {"table", NULL, "of the paper"},
+        {"table", NULL, "table of the paper"},
         {"elements", "", "n"},
         {"patches", "", "k"},
-        {"ms", "ms", "of one B~ with the index vector"},
+        {"ms", "ms", "time of one B~ with the index vector"},
         {"fps", "1/s", "B~ with the index vector"},
         {"fps_full", "1/s", "B~ with a full V"},
         {"speedup", "", "index vector over full V (table 2)"},
-        {"gb_s", "GB/s", "of Y read"},
+        {"gb_s", "GB/s", "rate at which Y is read"},
         {"paper_cpu_full", "1/s", "as published"},
         {"paper_cpu_sparse", "1/s", "as published"},
         {"paper_gpu_full_not_run", "1/s", "as published; nothing ran on a GPU"},
@@ -262,7 +262,7 @@ static lam_status answers(const bench_run *run, lam_error *error) {
                  {"5", 3538944, 216, {0, 4.00, 0, 11.48}}};
     lam_status status = LAM_OK;
     table out = {.name = "answers",
-                 .title = "Radiosity in frames a second (seed 000: tables 2 to 5)",
+                 .title = "Radiosity in frames a second (Fernández et al. 2011: tables 2 to 5)",
                  .columns = columns,
                  .n_columns = sizeof columns / sizeof *columns,
                  .printed = true};

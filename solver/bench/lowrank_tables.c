@@ -7,7 +7,7 @@
 
 enum { REPEATS = 3 };
 
-/* What a size or a setting has in the thesis; NaN: nothing. */
+/* A figure that the thesis does not give. */
 static const double none = NAN;
 
 /* --- table 3.1 -------------------------------------------------------------------------------------------
@@ -80,14 +80,14 @@ lam_status lowrank_of_order(const bench_run *run, const lowrank_scene *const *sc
     static const table_column columns[] = {
         {"elements", "", "n"},
         {"budget", NULL, "how errors add"},
-        {"order", NULL, "of the columns"},
-        {"seconds", "s", "of the factorization"},
+        {"order", NULL, "order of the columns"},
+        {"seconds", "s", "time of the factorization"},
         {"rank", "", "k"},
         {"real", "", "|S - Q V^T|_2"},
-        {"levels", "", "of the tree"},
+        {"levels", "", "levels of the tree"},
         {"full_mb", "MB", "n^2 numbers of 4 bytes"},
         {"factors_mb", "MB", "Q and V"},
-        {"peak_mb", "MB", "while it ran, beside the form factors"},
+        {"peak_mb", "MB", "peak of memory during the factorization, beside the form factors"},
         {"thesis_seconds", "s", "as published"},
         {"thesis_rank", "", "as published"},
         {"thesis_real", "", "as published"},
@@ -108,7 +108,8 @@ lam_status lowrank_of_order(const bench_run *run, const lowrank_scene *const *sc
                 factorizer_options how = lowrank_options(run, .1, 0);
                 lowrank_result r;
                 how.budget.rule = (budget_rule)rule;
-                /* Above the noise of its rays no columns are dropped by eq. 3.10, and nothing is gained. */
+                /* By eq. 3.10 no columns are dropped above the sampling noise of the rays, and nothing is
+                 * gained. */
                 if (rule == BUDGET_SUMS && recipe_noise(&scenes[i]->f.recipe) > 0) continue;
                 if (z == 0 && elements > 50000) continue;
                 TRY(lowrank_factorize(run, scenes[i], "hf", &how, z == 1, elements > 20000 ? 1 : REPEATS, &r,
@@ -158,12 +159,12 @@ static double cost_of_mean(double n, int levels, double rho) {
 
 lam_status lowrank_of_compression(const bench_run *run, const lowrank_scene *s, lam_error *error) {
     static const table_column columns[] = {
-        {"levels", "", "of the tree"},
+        {"levels", "", "levels of the tree"},
         {"epsilon", "", "bound"},
         {"rho_1", "", "columns kept over columns given, below the root"},
         {"rho_2", "", ""},
         {"rho_3", "", ""},
-        {"rho_4", "", "of the leaves"},
+        {"rho_4", "", "likewise of the leaves"},
         {"rho_mean", "", "geometric mean"},
         {"T_HF", "", "operations by eq. 3.16"},
         {"T_mean", "", "by eq. 3.19"},
@@ -229,13 +230,13 @@ lam_status lowrank_of_factorizers(const bench_run *run, const lowrank_scene *con
     static const table_column columns[] = {
         {"elements", "", "n"},
         {"at", NULL, "the same rank (that of hf at epsilon .1), or the same bound"},
-        {"factorizer", NULL, "which"},
+        {"factorizer", NULL, "name of the factorizer"},
         {"rank", "", "k"},
-        {"seconds", "s", "of the factorization"},
+        {"seconds", "s", "time of the factorization"},
         {"over_hf", "", "its time over that of hf"},
         {"real", "", "|S - Q V^T|_2"},
         {"passes", "", "over the columns of S"},
-        {"peak_mb", "MB", "while it ran, beside the form factors"},
+        {"peak_mb", "MB", "peak of memory during the factorization, beside the form factors"},
         {"thesis_over_hf", "", "as published"},
         {"thesis_real", "", "as published"},
     };
@@ -318,9 +319,9 @@ lam_status lowrank_of_levels(const bench_run *run, const lowrank_scene *const *s
     static const table_column columns[] = {
         {"elements", "", "n"},
         {"epsilon", "", "bound"},
-        {"order", NULL, "of the columns"},
-        {"levels", "", "of the tree"},
-        {"seconds", "s", "of the factorization"},
+        {"order", NULL, "order of the columns"},
+        {"levels", "", "levels of the tree"},
+        {"seconds", "s", "time of the factorization"},
         {"rank", "", "k"},
         {"real", "", "|S - Q V^T|_2"},
     };
@@ -359,7 +360,7 @@ lam_status lowrank_of_rank(const bench_run *run, const lowrank_scene *const *sce
             const factorizer_options how = lowrank_options(run, rank_epsilons[e], 0);
             lowrank_result r;
             double published = NAN;
-            /* What is below the noise of the rays is noise. */
+            /* Columns below the sampling noise of the rays are noise. */
             if (rank_epsilons[e] < 2 * recipe_noise(&scenes[i]->f.recipe)) continue;
             TRY(lowrank_factorize(run, scenes[i], "hf", &how, true, 1, &r, error));
             for (size_t t = 0; e == 0 && t < sizeof theirs / sizeof *theirs; t++)
@@ -397,7 +398,7 @@ static const double cornell[RADIOSITY_EPSILONS][4] = {{560, .0021, .0017, .0094}
 static lam_status add_epsilon(const bench_run *run, const lowrank_scene *s, double epsilon,
                               const double theirs[4], table *out, lam_error *error) {
     lam_status status = LAM_OK;
-    /* The real error of the thesis is half of its epsilon. */
+    /* The measured error of the thesis is half of its epsilon. */
     const lowrank_case of = {.method = "low-rank",
                              .factorizer = "hf",
                              .epsilon = epsilon / 2,
@@ -423,17 +424,18 @@ done:
 
 lam_status lowrank_of_radiosity(const bench_run *run, lam_error *error) {
     static const table_column columns[] = {
-        {"scene", NULL, "which"},
+        {"scene", NULL, "name of the scene"},
         {"elements", "", "n"},
-        {"epsilon", "", "of the thesis, whose real error is half of it; ours is bound to that half"},
+        {"epsilon", "",
+         "epsilon of the thesis, whose measured error is half of it; ours is bound to that half"},
         {"rank", "", "k"},
         {"real", "", "|S - Q V^T|_2"},
-        {"factorize_s", "s", "of the factorization"},
-        {"invert_s", "s", "of Y_k"},
-        {"answer_ms", "ms", "of one B, median"},
+        {"factorize_s", "s", "time of the factorization"},
+        {"invert_s", "s", "time of Y_k"},
+        {"answer_ms", "ms", "time of one B, median"},
         {"relative_mean", "", "|B~ - B|/|B| for single emitters"},
-        {"relative_std", "", "its standard deviation"},
-        {"relative_max", "", "its largest"},
+        {"relative_std", "", "standard deviation of the same"},
+        {"relative_max", "", "maximum of the same"},
         {"indirect_mean", "", "|B~ - B|/|B - E|"},
         {"thesis_rank", "", "as published (patio of 21,888, Cornell box of 2,560 elements)"},
         {"thesis_mean", "", "as published, relative"},

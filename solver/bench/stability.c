@@ -1,4 +1,4 @@
-/* Suite stability: transport problems that are hard on numbers, and the operators of them. */
+/* Suite stability: transport problems that are numerically hard, and the errors of operators on them. */
 #include "solver/bench/stability.h"
 #include "solver/bench/bench.h"
 #include "solver/bench/scenes.h"
@@ -39,7 +39,7 @@ static lam_status allocate(stability_problem *p, size_t n, size_t entries, lam_e
     return LAM_OK;
 }
 
-/* A cube from inside, each face DIVISIONS x DIVISIONS. */
+/* A cube seen from inside, each face of DIVISIONS x DIVISIONS elements. */
 static lam_status cube_mesh(mesh *m, lam_error *error) {
     static const double faces[6][3][3] = {
         {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}},
@@ -130,7 +130,7 @@ static lam_status make_areas(double rho, stability_problem *p, lam_error *error)
     return LAM_OK;
 }
 
-/* Nothing sees anything. */
+/* A scene in which no element sees another. */
 static lam_status make_blind(size_t n, double rho, stability_problem *p, lam_error *error) {
     const lam_status status = allocate(p, n, 1, error);
     for (size_t i = 0; status == LAM_OK && i < n; i++) {
@@ -178,8 +178,8 @@ done:
 /* --- an operator on probation ------------------------------------------------------------------------------
  */
 
-/* What it is given and what it answers, [PROBES][n]: one bright element, every third, all, 2 of the first and
- * the second. */
+/* Emissions and answers, [PROBES][n]: one bright element, every third element, all elements, and twice the
+ * first plus the second. */
 typedef struct probation {
     const stability_problem *p;
     lam_operator *op;
@@ -321,22 +321,22 @@ done:
 /* --- the suite ---------------------------------------------------------------------------------------- */
 
 static const table_column stability_columns[] = {
-    {"problem", NULL, "which"},
+    {"problem", NULL, "name of the problem"},
     {"rho", "", "largest reflectance"},
-    {"method", NULL, "and factorizer"},
-    {"epsilon", "", "asked for"},
+    {"method", NULL, "method and factorizer"},
+    {"epsilon", "", "epsilon asked for"},
     {"rank_asked", "", "0: by epsilon"},
     {"rank", "", "k"},
     {"norm", "", "|S - Q V^T|_2"},
-    {"rcond", "", "of the matrix inverted"},
+    {"rcond", "", "reciprocal condition number of the matrix inverted"},
     {"relative", "", "largest |B~ - B|/|B| over the probes"},
     {"bound", "", "norm / (1 - max rho)"},
     {"indirect", "", "largest |B~ - B|/|B - E|"},
     {"negative", "", "most negative radiosity over the largest"},
-    {"energy", "", "what is not kept of the power, closed scenes"},
+    {"energy", "", "relative error of the power balance in closed scenes"},
     {"linearity", "", "relative"},
     {"reciprocity", "", "relative"},
-    {"outcome", NULL, "done, or why it was refused"},
+    {"outcome", NULL, "done, or the reason of the refusal"},
 };
 
 static lam_status add_result(const bench_run *run, const stability_problem *p, double rho,
@@ -378,7 +378,7 @@ lam_status bench_stability(const bench_run *run, lam_error *error) {
     lam_status status = LAM_OK;
     stability_problem p = {0};
     table out = {.name = "operators",
-                 .title = "Operators of problems that are hard on numbers",
+                 .title = "Operators of numerically hard problems",
                  .columns = stability_columns,
                  .n_columns = sizeof stability_columns / sizeof *stability_columns,
                  .printed = true};

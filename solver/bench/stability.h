@@ -1,4 +1,4 @@
-/* Transport problems that are hard on numbers, and what an operator makes of them. */
+/* Transport problems that are numerically hard, and the errors of operators on them. */
 #ifndef LAMBERT_BENCH_STABILITY_H
 #define LAMBERT_BENCH_STABILITY_H
 
@@ -30,14 +30,14 @@ enum {
 };
 lam_status stability_make(int which, double rho, stability_problem *out, lam_error *error);
 
-/* How a problem is built. */
+/* How an operator of a problem is built. */
 typedef struct stability_way {
     const char *method, *factorizer;
     double epsilon;
     size_t rank; /* 0: by epsilon */
 } stability_way;
 
-/* What came of it. */
+/* The operator that was built, and its errors. */
 typedef struct stability_result {
     lam_status status; /* LAM_OK, or how it was refused: */
     char message[480];

@@ -1,4 +1,4 @@
-/* What repeated measurements come to. */
+/* Quantiles and means of repeated measurements. */
 #ifndef LAMBERT_BENCH_STATS_H
 #define LAMBERT_BENCH_STATS_H
 

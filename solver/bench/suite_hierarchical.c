@@ -22,12 +22,12 @@ enum {
     HUGE_SCENE = 60000
 };
 
-/* Kinds of operator, the first of them hierarchical, and settings of each, from rough to fine. */
+/* Kinds of operator, the first of them hierarchical, and settings of each, from coarse to fine. */
 enum { KINDS = 6, SETTINGS_MOST = 5 };
-/* What errors are of: one bright element, the scene's lights, light all over. */
+/* Emissions of the errors: one bright element, the scene's lights, random emission of all elements. */
 enum { LIGHT_SINGLE, LIGHT_LAMPS, LIGHT_ALL_OVER, LIGHTS };
 
-/* An operator, measured. */
+/* Cost and errors of one operator. */
 typedef struct kind_point {
     double setting, build_s, query_ms, mb, stored_mb;
     double error[LIGHTS]; /* total indirect, mean; NaN: not measured */
@@ -40,7 +40,7 @@ typedef struct kind_curve {
 static const char *const kinds[KINDS] = {"hierarchical", "low-rank", "2msc", "sparse", "exact", "emitters"};
 static const char *const light_names[LIGHTS] = {"single", "lights", "all over"};
 
-/* epsilon; for 2msc k over n, of a sparse inverse the threshold */
+/* epsilon; k/n of 2msc; the threshold of a sparse inverse */
 static const double settings[KINDS][SETTINGS_MOST] = {{.2, .1, .05, .02, .01},
                                                       {.3, .2, .1, .05, .02},
                                                       {1. / 32, 1. / 16, 1. / 8, 1. / 4},
@@ -48,29 +48,29 @@ static const double settings[KINDS][SETTINGS_MOST] = {{.2, .1, .05, .02, .01},
                                                       {1},
                                                       {1}};
 
-/* Accuracy of the form factors that judge, far finer than those judged. */
+/* Accuracy of the reference form factors, far finer than that of the form factors in use. */
 static const double judge_accuracy = 2e-5;
 
 static const table_column points_columns[] = {
-    {"scene", NULL, "which"},
+    {"scene", NULL, "name of the scene"},
     {"elements", "", "n"},
     {"channels", "", "C"},
-    {"kind", NULL, "of operator"},
+    {"kind", NULL, "kind of operator"},
     {"setting", "", "epsilon of hierarchical and low-rank, k / n of 2msc, threshold of sparse"},
     {"rank", "", "k"},
-    {"build_s", "s", "without form factors"},
-    {"query_ms", "ms", "of one radiosity, median, one thread"},
-    {"mb", "MB", "that a query reads"},
-    {"stored_mb", "MB", "of the operator in a store"},
+    {"build_s", "s", "time of the build, without form factors"},
+    {"query_ms", "ms", "time of one radiosity, median, one thread"},
+    {"mb", "MB", "memory that one radiosity reads"},
+    {"stored_mb", "MB", "size of the operator in a store"},
     {"single", "", "total indirect error, one bright element, mean"},
     {"lights", "", "the scene's lights (of emitters: all of them)"},
-    {"all_over", "", "light all over, mean"},
+    {"all_over", "", "likewise for random emission of all elements"},
     {"single_relative", "", "total relative error of the same"},
     {"lights_relative", "", "the same"},
     {"all_over_relative", "", "the same"},
 };
 
-/* Form factors that judge: pairs, or, of more elements, near pairs and rays of another seed. */
+/* Reference form factors: pair by pair, or, in large scenes, by the same recipe with another seed. */
 static recipe recipe_of_reference(const bench_run *run, const lowrank_scene *s) {
     if (s->m.n <= PAIRS_MOST && run->scale != BENCH_QUICK)
         return formfactors_pairs(judge_accuracy, run->seed + 1000);
@@ -110,7 +110,7 @@ static kind_point point_of(double setting, const lowrank_verdict *v) {
     return p;
 }
 
-/* The scene's lights as one emitter, or an element that is bright. */
+/* The scene's lights as one emitter, or one bright element where it has none. */
 static lam_status emitter_of(const lowrank_scene *s, float **E, lam_error *error) {
     const size_t all = s->m.n * s->m.n_channels;
     bool any = false;
@@ -122,8 +122,8 @@ static lam_status emitter_of(const lowrank_scene *s, float **E, lam_error *error
     return LAM_OK;
 }
 
-/* Whether a setting is worth its time here: rank and whole inverse grow too fast, quick leaves out every
- * second one. */
+/* Leaves out settings that take too long: fine ones of other kinds in large scenes, and every second one in a
+ * quick run. */
 static bool is_tried(const bench_run *run, const lowrank_scene *s, size_t kind, int setting) {
     const char *name = kinds[kind];
     if (settings[kind][setting] == 0) return false;
@@ -183,29 +183,29 @@ done:
 /* --- at equal error ----------------------------------------------------------------------------------- */
 
 static const table_column equal_columns[] = {
-    {"scene", NULL, "which"},
+    {"scene", NULL, "name of the scene"},
     {"elements", "", "n"},
-    {"light", NULL, "what shines"},
-    {"epsilon", "", "of the hierarchical operator"},
-    {"error", "", "its total indirect error, mean"},
-    {"stored_mb", "MB", "it takes in a store"},
-    {"least_kind", NULL, "the other kind that takes least for as small an error; -: none has it"},
-    {"least_mb", "MB", "what that takes, between two of its settings by powers"},
-    {"stored_share", "", "hierarchical over that"},
-    {"mb", "MB", "that a query reads"},
-    {"mb_share", "", "over that of the other kind that reads least"},
+    {"light", NULL, "emission"},
+    {"epsilon", "", "epsilon of the hierarchical operator"},
+    {"error", "", "total indirect error of the hierarchical operator, mean"},
+    {"stored_mb", "MB", "its size in a store"},
+    {"least_kind", NULL, "the smallest other kind with an error as small; -: none"},
+    {"least_mb", "MB", "size of that kind, interpolated by powers between two of its settings"},
+    {"stored_share", "", "stored_mb over least_mb"},
+    {"mb", "MB", "memory that one radiosity reads"},
+    {"mb_share", "", "mb over that of the other kind that reads least"},
     {"query_ms", "ms", "of one radiosity, one thread"},
-    {"query_share", "", "over that of the fastest other kind"},
-    {"build_s", "s", "without form factors"},
-    {"build_share", "", "over that of the other kind that is built fastest"},
+    {"query_share", "", "query_ms over that of the fastest other kind"},
+    {"build_s", "s", "time of the build, without form factors"},
+    {"build_share", "", "build_s over that of the other kind that is built fastest"},
 };
 
 static double cost_of(const kind_point *p, size_t offset) {
     return *(const double *)((const char *)p + offset);
 }
 
-/* The least cost of a kind for an error of at most `error`: that of a setting, or between one that is rougher
- * and the next; infinite where no setting is fine enough. */
+/* The least cost of a kind for an error of at most `error`: that of a setting, or interpolated by powers
+ * between a coarser setting and the next; infinite where no setting is fine enough. */
 static double least_cost(const kind_curve *c, size_t light, double error, size_t offset) {
     double least = INFINITY;
     for (size_t k = 0; k < c->n; k++) {
@@ -221,7 +221,7 @@ static double least_cost(const kind_curve *c, size_t light, double error, size_t
     return least;
 }
 
-/* Of all kinds that answer for any light but hierarchical. */
+/* The least cost of all kinds but hierarchical that answer for any emission. */
 static double least_of_others(const kind_curve curves[KINDS], size_t light, double error, size_t offset,
                               const char **kind) {
     double least = INFINITY;
@@ -267,16 +267,17 @@ static void add_equal(const lowrank_scene *s, const kind_curve curves[KINDS], ta
 
 /* --- the suite ---------------------------------------------------------------------------------------- */
 
-/* Rays of all a file's elements together where there are too many for pairs, about, and of one at least. */
+/* Rays in a scene file with too many elements for pairs: about so many of all elements together, and so many
+ * of each at least. */
 enum { RAYS_OF_FILE = 1 << 27, RAYS_LEAST = 1024 };
 
-/* Quick takes every third of the first: a city and a Cornell box. */
+/* A quick run takes every third of the first scenes: a city and a Cornell box. */
 enum { QUICK_STEP = 3 };
 
-/* Elements of each scene; a file is refined to as many. */
+/* Elements of each scene; a scene file is refined to as many. */
 static const size_t elements_of[3] = {600, 2500, 8897};
 
-/* The file that was named, its name without what is around it. */
+/* Opens the file of --scene; name is its stem. */
 static lam_status open_file(const bench_run *run, char name[64], lowrank_scene *out, lam_error *error) {
     lam_status status = LAM_OK;
     mesh m = {0};

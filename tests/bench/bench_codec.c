@@ -1,4 +1,4 @@
-/* How fast the daemon's codecs are: a dense emission of n numbers read from JSON, and as many floats written,
+/* Measures the speed of the codecs: a dense emission of n numbers read from JSON, and as many floats written,
  * beside jansson doing the same, taking turns in one run.
  *
  *     bench_codec [-r ROUNDS] [N ...]
@@ -53,7 +53,7 @@ static size_t write_once(size_t n, const float *values) {
     return length;
 }
 
-/* What the daemon would do with jansson alone: a tree, and a walk over it. */
+/* The same by jansson alone: a tree, and a walk over it. */
 static void jansson_read_once(const buffer *body, float *E) {
     json_error_t error;
     json_t *all = json_loadb(body->bytes, body->length, 0, &error), *value;

@@ -22,7 +22,7 @@
 #include <string.h>
 
 enum { MOST_PROBES = 96, ROUNDS = 31 };
-/* Of a lamp, over the scene's largest extent. */
+/* Edge of a lamp over the scene's largest extent. */
 static const double lamp_width = .24;
 
 /* An answer of light all over, of one element's light, of light all over for some elements. */

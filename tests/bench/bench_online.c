@@ -1,4 +1,4 @@
-/* How fast one answer of a low-rank operator is: y = Y x for a Gaussian Y [n][k] in every precision, one to
+/* Measures one answer of a low-rank operator: y = Y x for a Gaussian Y [n][k] in every precision, one to
  * 16 vectors at once, beside a plain read of Y and OpenBLAS's sgemv, taking turns in one run. Y is kept in
  * tiles in huge pages, and again as a daemon has it: in rows, in a file that is mapped.
  *

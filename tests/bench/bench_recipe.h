@@ -1,4 +1,4 @@
-/* How the drivers of form factors are told what to make. */
+/* The recipe argument of the drivers of form factors. */
 #ifndef LAMBERT_TESTS_BENCH_RECIPE_H
 #define LAMBERT_TESTS_BENCH_RECIPE_H
 

@@ -1,5 +1,5 @@
-/* How fast answers are refined to a certificate: one vector, the scene's own light (or one bright element
- * where it has none), of a store of one channel that keeps its form factors.
+/* Measures the refinement of answers to a certificate: one vector, the scene's own light (or one bright
+ * element where it has none), of a store of one channel that keeps its form factors.
  *
  *     bench_refine [-r ROUNDS] [-t TOLERANCE] STORE.h5 ...
  *

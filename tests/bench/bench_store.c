@@ -1,5 +1,5 @@
-/* Writes a store of low rank as large as wanted, of numbers that mean nothing: how a daemon starts with it
- * depends on its size alone. tests/bench/start.py serves it.
+/* Writes a low-rank store of any size, of arbitrary numbers: the start of a daemon depends on its size alone.
+ * tests/bench/start.py serves it.
  *
  *     bench_store STORE.h5 NxK [f32|f16|i8]        2 n k values: 320000x2000 in f32 are 5.1 GB
  */

@@ -16,6 +16,7 @@ try:
     import matplotlib
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import LogFormatter
 except ImportError:
     print(json.dumps({"log": f"no plots: python3-matplotlib is missing; later: {' '.join(sys.argv)}"}))
     sys.exit(0)
@@ -29,6 +30,13 @@ plt.rcParams.update({
     "axes.prop_cycle": matplotlib.cycler(color=COLOURS, marker=MARKERS), "grid.alpha": .3,
     "legend.frameon": False, "lines.linewidth": 1.5, "lines.markersize": 6, "svg.hashsalt": "lambert", "axes.spines.top":
     False, "axes.spines.right": False})
+
+
+class PlainNumbers(LogFormatter):
+    """0.2 in place of 2e-01 beside a logarithmic axis."""
+
+    def _num_to_string(self, x, vmin, vmax):
+        return f"{x:g}"
 
 
 def number(text):
@@ -45,7 +53,7 @@ class Results:
         self.folder, self.suite = pathlib.Path(folder), suite
 
     def rows(self, table):
-        """Dictionaries; what was not measured is an empty text. None where the table is not there."""
+        """One dictionary per row, with an empty text for a figure that was not measured; no rows without the table."""
         path = self.folder / f"{self.suite}-{table}.csv"
         if not path.exists():
             return []
@@ -54,8 +62,7 @@ class Results:
 
     def draw(self, name, title, x, y, series, log="", notes=None):
         """series: label -> list of (x, y), of (x, y, low, high) with the ends of error bars, or a dictionary of such
-        points and of arguments of plot(). log: the axes that are logarithmic, "x", "y" or "xy". notes(axes) adds what
-        else there is. Points without a number, or not above 0 on such an axis, are left out; without any point there
+        points and of arguments of plot(). log names the logarithmic axes: "x", "y" or "xy". notes(axes) adds the rest. Points without a number, or not above 0 on such an axis, are left out; without any point there
         is no plot."""
         figure, axes = plt.subplots(layout="constrained")
         drawn = 0
@@ -76,10 +83,11 @@ class Results:
             else:
                 axes.plot(*columns, label=label, **style)
         if drawn > 0:
-            if "x" in log:
-                axes.set_xscale("log")
-            if "y" in log:
-                axes.set_yscale("log")
+            for name_of_axis in log:
+                getattr(axes, f"set_{name_of_axis}scale")("log")
+                axis = getattr(axes, f"{name_of_axis}axis")
+                axis.set_major_formatter(PlainNumbers())
+                axis.set_minor_formatter(PlainNumbers(labelOnlyBase=False))
             axes.set(title=title, xlabel=x, ylabel=y)
             if notes is not None:
                 notes(axes)
@@ -156,7 +164,7 @@ def lowrank(results):
 def cities(results):
     for (city, n), rows in groups(results.rows("bounces-curves"), "city", "elements"):
         curves = {}
-        # What is converged last, in dashes, so that the others show beneath.
+        # The converged curves come last and dashed, so that the others show beneath them.
         for (threshold,), of in sorted(groups(rows, "threshold"), key=lambda item: item[0][0] == ""):
             converged = threshold == ""
             name = "converged" if converged else f"threshold {threshold:g}"
@@ -206,7 +214,7 @@ def hierarchical(results):
                                     ("build-time", "build_s", "build, without form factors (s)"),
                                     ("query-time", "query_ms", "one answer, one thread (ms)")):
             results.draw(f"{scene}-by-{name}".replace(" ", "-"),
-                         f"{scene} of {n:.0f} elements: error by {name.replace('-', ' ')}", label,
+                         f"{scene.capitalize()} of {n:.0f} elements: error by {name.replace('-', ' ')}", label,
                          "total indirect error, one bright element",
                          {kind: points(of, column, "single") for (kind,), of in groups(rows, "kind")}, "xy")
 

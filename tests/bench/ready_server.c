@@ -1,4 +1,4 @@
-/* What an HTTP server costs that computes nothing: answers every request, once its body has come, with one of
+/* An HTTP server that computes nothing: it answers every request, once its body has come, with one of
  * the files it has read; at once, or after a sleep as long as a solve. `lambert bench service` measures
  * lambertd beside it, so it is built like lambertd: one thread talks, the sleep is on others.
  *
@@ -56,7 +56,7 @@ static void enqueue(server *s, request *r) {
     pthread_mutex_unlock(&s->lock);
 }
 
-/* NULL when the server ends; *hurry: it is about to. */
+/* NULL when the server ends; *hurry is set when it is about to. */
 static request *dequeue(server *s, bool *hurry) {
     pthread_mutex_lock(&s->lock);
     while (s->first == NULL && !s->closed) pthread_cond_wait(&s->work, &s->lock);
@@ -71,7 +71,7 @@ static void *sleep_for_others(void *context) {
     server *s = context;
     request *r;
     bool hurry;
-    /* The kernel may else add 50 us to every sleep: half of a small solve. */
+    /* By default the kernel may add 50 us to every sleep, which is half of a small solve. */
     prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
     while ((r = dequeue(s, &hurry)) != NULL) {
         struct timespec left = {.tv_sec = s->nanoseconds / 1000000000,
@@ -198,7 +198,7 @@ int main(int argc, char **argv) {
     printf("listening on http://127.0.0.1:%u\n", port);
     fflush(stdout);
     sigwait(&signals, &signal_number);
-    /* Those who sleep wake first: libmicrohttpd cannot stop with a connection suspended. */
+    /* Sleeping requests wake first: libmicrohttpd cannot stop with a connection suspended. */
     pthread_mutex_lock(&s.lock);
     s.closed = true;
     pthread_cond_broadcast(&s.work);

@@ -158,7 +158,7 @@ class Program:
         return line
 
     def port(self):
-        """Of a server that prints where it listens."""
+        """The port of a server, from the line in which it says where it listens."""
         while True:
             line = self.line()
             if "listening on http://127.0.0.1:" in line:
@@ -439,7 +439,7 @@ class Size:
         said = wrk.finish(seconds + ANSWER_S)
         self.running.remove(wrk)
         wrk.stop()
-        # What wrk asked for last and did not wait for is solved all the same; it must not disturb what comes next.
+        # lambertd still solves the last requests of wrk, which nobody waits for; they must not disturb the next run.
         client.repeat(warm, 0, server)
         client.close()
         found = [line.split()[1:] for line in said.splitlines() if line.startswith("measured ")]
@@ -461,7 +461,7 @@ class Size:
             self.runs[form, clients, server].append(self.load(form, clients, server, self.seconds_of(clients, server)))
 
     def measure_rounds(self):
-        """What the ratios need, in turns."""
+        """Measures both sides of every ratio, in turns."""
         rounds = 1 if self.bench.quick else 5
         for number in range(rounds):
             tell(progress=["rounds of HTTP and solves", number / rounds])
@@ -472,7 +472,7 @@ class Size:
                 self.run("npy", MANY, server)
 
     def measure_rest(self):
-        """Everything that had no turn yet, once."""
+        """Runs everything that had no turn yet, once."""
         for number, key in enumerate(self.runs):
             tell(progress=["load on every server", number / len(self.runs)])
             if not self.runs[key]:
@@ -484,7 +484,7 @@ class Size:
         return statistics.median([run[figure] for run in self.runs[key]] or [math.nan])
 
     def enough(self, key):
-        """Whether the requests that are under way when wrk stops, which it does not count, are few beside the rest."""
+        """True where the requests that are under way when wrk stops, which it does not count, are few beside the rest."""
         return all(run["requests"] >= 3 * key[1] for run in self.runs[key])
 
     def add_load(self, form, clients, server):
@@ -562,7 +562,7 @@ class Size:
         return math.nan
 
     def measure_codec(self, client):
-        """What dense JSON answers say of their time, at their end."""
+        """The times that dense JSON answers state at their end."""
         times = []
         for _ in range(9):
             body, _ = client.must(self.requests["json"], "lambertd")

@@ -1,4 +1,4 @@
-"""How soon lambertd answers from a large store, and what two of them take of memory.
+"""Measures how soon lambertd answers from a large store, and the memory of two daemons on one store.
 
     LAMBERTD=… /usr/bin/python3 tests/bench/start.py STORE.h5 [ROUNDS]
 
