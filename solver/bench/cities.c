@@ -1,6 +1,7 @@
 /* Suite cities: chapter 4 of the thesis, on cities of the same kind and size. */
 #include "solver/bench/cities.h"
 #include "solver/base/clock.h"
+#include "solver/base/random.h"
 #include "solver/bench/formfactors.h"
 #include "solver/bench/scenes.h"
 #include "solver/formfactor/formfactor.h"
@@ -164,8 +165,7 @@ enum {
  * ordered by group and by building. */
 static void spread_rows(size_t n, size_t count, uint64_t seed, uint32_t *rows) {
     for (size_t k = 0; k < count; k++) {
-        seed = seed * 6364136223846793005u + 1442695040888963407u;
-        const double place = (double)k + (double)(seed >> 11) * 0x1p-53;
+        const double place = (double)k + random_lcg_unit(&seed);
         rows[k] = (uint32_t)(place * (double)n / (double)count);
     }
 }

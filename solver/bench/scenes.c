@@ -1,5 +1,6 @@
 #include "solver/bench/scenes.h"
 
+#include "solver/base/random.h"
 #include "solver/scene/import/import.h"
 
 #include <errno.h>
@@ -89,8 +90,7 @@ lam_status scene_houses(size_t lots, uint64_t seed, mesh *out, lam_error *error)
     uint64_t state = seed;
     for (size_t i = 0; i < lots; i++)
         for (size_t k = 0; k < lots; k++) {
-            state = state * 6364136223846793005u + 1442695040888963407u;
-            const int storeys = 1 + (int)((state >> 33) % STOREYS_MOST);
+            const int storeys = 1 + (int)((random_lcg(&state) >> 33) % STOREYS_MOST);
             n += add_lot(pieces + n, (double)(LOT * i), (double)(LOT * k), storeys);
         }
     TRY(scene_of_pieces(pieces, n, out, error));

@@ -1,6 +1,7 @@
 #include "solver/method/judge.h"
 
 #include "solver/base/clock.h"
+#include "solver/base/random.h"
 #include "solver/method/reference.h"
 #include "solver/operator/emitters.h"
 
@@ -69,14 +70,6 @@ done:
     return status;
 }
 
-/* The next value of a 64-bit generator (SplitMix64), in [0, 1). */
-static double next_random(uint64_t *state) {
-    uint64_t x = *state += 0x9E3779B97F4A7C15u;
-    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
-    return (double)((x ^ (x >> 31)) >> 11) * 0x1p-53;
-}
-
 /* One bright element a probe, drawn without repetition. */
 static lam_status single_emissions(const build_problem *problem, uint64_t seed, probes *p, lam_error *error) {
     const size_t n = problem->n;
@@ -84,7 +77,7 @@ static lam_status single_emissions(const build_problem *problem, uint64_t seed, 
     if (deck == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < n; i++) deck[i] = (uint32_t)i;
     for (size_t v = 0; v < p->begin[LIGHTS]; v++) {
-        const size_t other = v + (size_t)(next_random(&seed) * (double)(n - v));
+        const size_t other = v + (size_t)(random_unit(&seed) * (double)(n - v));
         const uint32_t element = deck[other];
         deck[other] = deck[v];
         for (size_t c = 0; c < problem->n_channels; c++)
@@ -96,7 +89,7 @@ static lam_status single_emissions(const build_problem *problem, uint64_t seed, 
 
 static void random_emissions(const build_problem *problem, uint64_t seed, probes *p) {
     const size_t vector = problem->n_channels * problem->n;
-    for (size_t i = p->begin[RANDOM] * vector; i < p->m * vector; i++) p->E[i] = (float)next_random(&seed);
+    for (size_t i = p->begin[RANDOM] * vector; i < p->m * vector; i++) p->E[i] = (float)random_unit(&seed);
 }
 
 /* out = quantity of the operator for every probe, a few at a time. */
@@ -390,7 +383,7 @@ static lam_status emitter_emissions(const lam_operator *op, const judge_input *i
     for (size_t v = 0; v < p->m; v++)
         for (size_t c = 0; c < C; c++)
             for (size_t k = 0; k < s; k++)
-                p->W[(v * C + c) * s + k] = v >= p->begin[RANDOM]           ? (float)next_random(&seed)
+                p->W[(v * C + c) * s + k] = v >= p->begin[RANDOM]           ? (float)random_unit(&seed)
                                             : k == v * s / p->begin[LIGHTS] ? 1
                                                                             : 0;
     if (p->begin[RANDOM] > p->begin[LIGHTS])

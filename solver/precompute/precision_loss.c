@@ -1,18 +1,12 @@
 #include "solver/precompute/precision_loss.h"
 
+#include "solver/base/random.h"
+
 #include <math.h>
 #include <stdlib.h>
 
 /* Probes of each sort. */
 enum { PROBES = 8 };
-
-/* The next value of a 64-bit generator (SplitMix64), in [0, 1). */
-static double next_random(uint64_t *state) {
-    uint64_t x = *state += 0x9E3779B97F4A7C15u;
-    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
-    return (double)((x ^ (x >> 31)) >> 11) * 0x1p-53;
-}
 
 static lam_status apply(const lam_operator *op, const float *E, float *out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -47,9 +41,9 @@ lam_status narrow_measure(const lam_operator *op, const lam_operator *narrow, co
     float *after = memory_allocate(2 * PROBES, vector * sizeof *after, "probes", error);
     if (E == NULL || before == NULL || after == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t v = 0; v < PROBES; v++) {
-        const size_t bright = (size_t)(next_random(&seed) * (double)n);
+        const size_t bright = (size_t)(random_unit(&seed) * (double)n);
         for (size_t c = 0; c < n_channels; c++) E[v * vector + c * n + bright] = 1;
-        for (size_t i = 0; i < vector; i++) E[(PROBES + v) * vector + i] = (float)next_random(&seed);
+        for (size_t i = 0; i < vector; i++) E[(PROBES + v) * vector + i] = (float)random_unit(&seed);
     }
     TRY(apply(op, E, before, error));
     TRY(apply(narrow, E, after, error));

@@ -1,6 +1,7 @@
 #include "solver/precompute/precompute.h"
 
 #include "solver/base/clock.h"
+#include "solver/base/random.h"
 #include "solver/precompute/precompute_state.h"
 
 #include <omp.h>
@@ -25,10 +26,7 @@ double work_memory(const precompute_options *o) {
 }
 
 uint64_t precompute_seed(uint64_t seed, uint64_t purpose) {
-    uint64_t x = seed + purpose * 0x9E3779B97F4A7C15u;
-    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
-    return x ^ (x >> 31);
+    return random_mix(seed + purpose * RANDOM_STEP);
 }
 
 static void log_stage(work *w, const char *stage, double started) {

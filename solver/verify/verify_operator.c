@@ -1,4 +1,5 @@
 /* Checks of the operator: finite, linear, energy, and its error measured again. */
+#include "solver/base/random.h"
 #include "solver/formfactor/pairs/first_light.h"
 #include "solver/method/judge.h"
 #include "solver/operator/emitters.h"
@@ -90,8 +91,8 @@ lam_status verify_linearity(examination *e, check *c, lam_error *error) {
     E = memory_allocate(inputs, 3 * sizeof *E, "emissions", error);
     if (E == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < inputs; i++) {
-        E[i] = (float)(precompute_seed(state, 1) >> 40) * 0x1p-24f;
-        E[inputs + i] = (float)(precompute_seed(state, 2) >> 40) * 0x1p-24f;
+        E[i] = random_to_float(precompute_seed(state, 1));
+        E[inputs + i] = random_to_float(precompute_seed(state, 2));
         E[2 * inputs + i] = E[i] + 2 * E[inputs + i];
         state++;
     }

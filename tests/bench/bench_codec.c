@@ -6,6 +6,7 @@
  * CSV, times are medians in milliseconds; round_trips counts the floats that come back as they were.
  */
 #include "solver/base/clock.h"
+#include "solver/base/random.h"
 #include "solver/bench/stats.h"
 #include "solver/codec/answer.h"
 #include "solver/codec/json_writer.h"
@@ -80,10 +81,7 @@ static void measure(size_t n, size_t rounds) {
     double times[MEASURED][MOST_ROUNDS];
     if (values == NULL || E == NULL) die("not enough memory");
     uint64_t state = 1;
-    for (size_t i = 0; i < n; i++) {
-        state = state * 6364136223846793005u + 1442695040888963407u;
-        values[i] = (float)(state >> 40) * 0x1p-24f;
-    }
+    for (size_t i = 0; i < n; i++) values[i] = random_to_float(random_lcg(&state));
     if (!buffer_append_text(&body, "{\"emission\":") || !json_write_floats(&body, values, n) ||
         !buffer_append_text(&body, "}"))
         die("not enough memory");

@@ -7,6 +7,7 @@
  * by pair, of lamps (squares of a plane) by some of their elements for each element, of light all over by F',
  * as all that bounces on is. F' is of the recipe JUDGE. As CSV. */
 #include "solver/base/clock.h"
+#include "solver/base/random.h"
 #include "solver/bench/stats.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/pairs/first_light.h"
@@ -43,8 +44,7 @@ typedef struct bench {
 } bench;
 
 static double unit(uint64_t *state) {
-    *state = *state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(*state >> 11) * 0x1p-53;
+    return random_lcg_unit(state);
 }
 
 static void die(const char *what) {

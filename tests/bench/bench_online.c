@@ -9,6 +9,7 @@
  * OpenBLAS is with all threads, is far below their number, the machine was not free.
  */
 #include "solver/base/clock.h"
+#include "solver/base/random.h"
 #include "solver/bench/stats.h"
 #include "solver/linalg/panel.h"
 
@@ -38,8 +39,7 @@ typedef struct subject {
 } subject;
 
 static uint64_t next_random(uint64_t *state) {
-    *state = *state * 6364136223846793005u + 1442695040888963407u;
-    return *state >> 33;
+    return random_lcg(state) >> 33;
 }
 
 /* The sum of 4 uniform numbers, of variance 1: close enough to a Gaussian one. */
@@ -97,7 +97,7 @@ static void make_subject(subject *s, const char *folder) {
     s->rows = rows;
 #pragma omp parallel for
     for (size_t i = 0; i < s->n; i++) {
-        uint64_t state = i * 0x9E3779B97F4A7C15u + 1;
+        uint64_t state = i * RANDOM_STEP + 1;
         for (size_t j = 0; j < s->k; j++) rows[i * s->k + j] = gaussian(&state);
     }
     panel *tiles = s->Y[PANEL_TILES];

@@ -4,6 +4,7 @@
  *     bench_store STORE.h5 NxK [f32|f16|i8]        2 n k values: 320000x2000 in f32 are 5.1 GB
  */
 #include "solver/base/half.h"
+#include "solver/base/random.h"
 #include "solver/linalg/panel.h"
 #include "store/store.h"
 
@@ -30,10 +31,9 @@ static void *room(size_t count, size_t size) {
 static void fill(size_t n, size_t k, int precision, unsigned seed, void *values) {
 #pragma omp parallel for
     for (size_t i = 0; i < n; i++) {
-        uint64_t state = (i + 1) * 0x9E3779B97F4A7C15u + seed;
+        uint64_t state = (i + 1) * RANDOM_STEP + seed;
         for (size_t j = 0; j < k; j++) {
-            state = state * 6364136223846793005u + 1442695040888963407u;
-            const int digit = (int)(state >> 57) - 64; /* -64 to 63 */
+            const int digit = (int)(random_lcg(&state) >> 57) - 64; /* -64 to 63 */
             if (precision == PANEL_F32) ((float *)values)[i * k + j] = (float)digit * 1e-5f;
             if (precision == PANEL_F16) ((uint16_t *)values)[i * k + j] = half_of_float((float)digit * 1e-3f);
             if (precision == PANEL_I8) ((int8_t *)values)[i * k + j] = (int8_t)digit;

@@ -1,5 +1,6 @@
 /* Operators of few emitters: their answers against sums in double, their transpose, what they can tell from
  * an emission, and what a store may not be. */
+#include "solver/base/random.h"
 #include "solver/operator/emitters.h"
 #include "solver/operator/sky_light.h"
 #include "support/failing_memory.h"
@@ -31,7 +32,7 @@ static problem *make_problem(void) {
     float *rho = random_reflectance(N, C, &state);
     memcpy(p->rho, rho, sizeof p->rho);
     free(rho);
-    for (size_t k = 0; k < M * N; k++) p->first_bounce[k] = (float)(.1 * random_unit(&state));
+    for (size_t k = 0; k < M * N; k++) p->first_bounce[k] = (float)(.1 * random_lcg_unit(&state));
     for (size_t c = 0; c < C; c++) {
         for (size_t k = 0; k < 4; k++) {
             p->E[(c * S + k) * N + 3 * k] = (float)(k + 1);
@@ -43,7 +44,7 @@ static problem *make_problem(void) {
         p->L[(c * S + 5) * M + 3] = (float)(c + 1);
         p->E[(c * S + 5) * N + 59] = .25f;
     }
-    for (size_t k = 0; k < (size_t)C * S * N; k++) p->T[k] = .3 * random_unit(&state);
+    for (size_t k = 0; k < (size_t)C * S * N; k++) p->T[k] = .3 * random_lcg_unit(&state);
     return p;
 }
 

@@ -1,4 +1,5 @@
 /* Operators of a mapped store answer with the bits of copies, and live as long as they are open. */
+#include "solver/base/random.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky_light.h"
 #include "store/store_map.h"
@@ -30,8 +31,7 @@ static uint64_t random_state = 11;
 static float *random_floats(size_t count, float least, float most) {
     float *x = malloc(count * sizeof *x);
     for (size_t i = 0; i < count; i++) {
-        random_state = random_state * 6364136223846793005u + 1442695040888963407u;
-        x[i] = least + (most - least) * (float)(random_state >> 40) * 0x1p-24f;
+        x[i] = least + (most - least) * random_to_float(random_lcg(&random_state));
     }
     return x;
 }

@@ -1,5 +1,6 @@
 /* Operators in a store: what is saved comes back bit for bit, what cannot be is refused in one clear line,
  * and no failed allocation is lost. */
+#include "solver/base/random.h"
 #include "support/failing_memory.h"
 #include "support/operator_file.h"
 #include "support/suite.h"
@@ -330,9 +331,9 @@ START_TEST(sphere_is_exact_with_one_column) {
     double area[N], total = 0, mean_rho = 0, mean_E = 0;
     float rho[N], E[N];
     for (size_t i = 0; i < N; i++) {
-        area[i] = 0.5 + random_unit(&state);
-        rho[i] = i % 10 == 0 ? 0.0f : (float)(0.9 * random_unit(&state));
-        E[i] = (float)random_unit(&state);
+        area[i] = 0.5 + random_lcg_unit(&state);
+        rho[i] = i % 10 == 0 ? 0.0f : (float)(0.9 * random_lcg_unit(&state));
+        E[i] = (float)random_lcg_unit(&state);
         total += area[i];
         mean_rho += area[i] * (double)rho[i];
         mean_E += area[i] * (double)E[i];

@@ -1,5 +1,6 @@
 /* Answers of every kind of operator refined until they are certified. The form factors here are no scene's:
  * without reciprocity, and in part far from what the operator was made from. */
+#include "solver/base/random.h"
 #include "support/certified.h"
 #include "support/transport.h"
 
@@ -44,7 +45,7 @@ static double *light(const lam_operator *op, size_t n_rhs, uint64_t seed) {
     double *E = test_allocate(rows * n, sizeof *E);
     for (size_t row = 0; row < rows; row++)
         for (size_t i = 0; i < n; i++) {
-            const double x = random_unit(&seed);
+            const double x = random_lcg_unit(&seed);
             E[row * n + i] = row % 3 == 1                         ? (i == (row * 7) % n ? 3.0 : 0.0)
                              : row % 3 == 2 && i == (row * 5) % n ? 1e6 * x
                                                                   : x;

@@ -1,5 +1,6 @@
 /* Operators under other reflectances: the same bits as if their cores had been built so; what cannot be relit
  * is refused. What a relit operator computes is judged with every other kind, by the contract test. */
+#include "solver/base/random.h"
 #include "solver/linalg/core.h"
 #include "support/failing_memory.h"
 #include "support/suite.h"
@@ -30,7 +31,7 @@ static factors_of_test make_factors(size_t C) {
     for (size_t p = 1; p <= PATCHES; p++) f.begin[p] = p * N / PATCHES;
     /* U is small (its rows times the sums of the columns of V are below 1): so are U V^T and these weights.
      */
-    for (size_t j = 0; j < N; j++) f.weight[j] = (float)((1 + random_unit(&state)) / 160);
+    for (size_t j = 0; j < N; j++) f.weight[j] = (float)((1 + random_lcg_unit(&state)) / 160);
     return f;
 }
 

@@ -1,5 +1,6 @@
 /* Operators where numbers are hard: nothing ends in NaN, infinity, a radiosity more negative than the error
  * allows, or a crash; what cannot be done is refused with a remedy. */
+#include "solver/base/random.h"
 #include "solver/bench/stability.h"
 #include "solver/linalg/panel.h"
 #include "support/suite.h"
@@ -81,9 +82,8 @@ START_TEST(long_sums_are_right) {
     for (size_t i = 0; i < N; i++) {
         x[i] = 1 + (float)(i % 1000) * 1e-3f;
         for (size_t k = 0; k < K; k++) {
-            state = state * 6364136223846793005u + 1442695040888963407u;
             /* All of one sign, the worst for a running sum; and of both. */
-            const double u = (double)(state >> 11) * 0x1p-53;
+            const double u = random_lcg_unit(&state);
             rows[i * K + k] = (float)(k == 0 ? u : u - .5);
             exact[k] += (double)rows[i * K + k] * (double)x[i];
             size[k] += fabs((double)rows[i * K + k] * (double)x[i]);

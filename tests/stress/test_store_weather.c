@@ -3,6 +3,8 @@
 #include "support/store_sample.h"
 #include "support/suite.h"
 
+#include "solver/base/random.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -104,7 +106,7 @@ START_TEST(flipped_bytes_are_found) {
     ck_ok(sample_read(path, &expected, &error));
     unsigned char *bytes = sample_load(path, &size);
     for (size_t i = 0; i < 700; i++) {
-        random = random * 6364136223846793005u + 1442695040888963407u;
+        random_lcg(&random);
         size_t place = i < 200 ? i : (size_t)(random >> 33) % size;
         unsigned char mask = i % 3 == 0 ? (unsigned char)(random >> 25) | 1 : (unsigned char)(1 << (i % 8));
         unsigned char flipped = bytes[place] ^ mask;
@@ -124,7 +126,7 @@ START_TEST(overwritten_stretches_are_found) {
     ck_ok(sample_read(path, &expected, &error));
     unsigned char *bytes = sample_load(path, &size);
     for (size_t i = 0; i < 300; i++) {
-        random = random * 6364136223846793005u + 1442695040888963407u;
+        random_lcg(&random);
         size_t length = (size_t)1 << (i % 10), place = (size_t)(random >> 33) % (size - length);
         size_t source = (size_t)(random >> 13) % (size - length);
         unsigned char *patch = i % 3 == 0 ? calloc(length, 1) : sample_values(length, random);

@@ -1,9 +1,6 @@
 #include "support/dense.h"
 
-double random_unit(uint64_t *state) {
-    *state = *state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(*state >> 11) / 9007199254740992.0;
-}
+#include "solver/base/random.h"
 
 void *test_allocate(size_t count, size_t size) {
     void *memory = calloc(count + 1, size);
@@ -65,9 +62,9 @@ void random_factors(size_t n, size_t k, float *U, float *V, uint64_t *state) {
     double *A = test_allocate(n, sizeof *A), largest = 0;
     double *column = test_allocate(k, sizeof *column);
     for (size_t i = 0; i < n; i++) {
-        A[i] = 0.1 + 3 * random_unit(state);
+        A[i] = 0.1 + 3 * random_lcg_unit(state);
         for (size_t j = 0; j < k; j++) {
-            V[i * k + j] = random_unit(state) < 0.4 ? (float)random_unit(state) : 0.0f;
+            V[i * k + j] = random_lcg_unit(state) < 0.4 ? (float)random_lcg_unit(state) : 0.0f;
             column[j] += (double)V[i * k + j];
         }
     }
@@ -91,7 +88,7 @@ void random_factors(size_t n, size_t k, float *U, float *V, uint64_t *state) {
 float *random_reflectance(size_t n, size_t n_channels, uint64_t *state) {
     float *rho = test_allocate(n * n_channels, sizeof *rho);
     for (size_t i = 0; i < n * n_channels; i++)
-        rho[i] = random_unit(state) < 1 / 6.0 ? 0.0f : (float)(0.05 + 0.8 * random_unit(state));
+        rho[i] = random_lcg_unit(state) < 1 / 6.0 ? 0.0f : (float)(0.05 + 0.8 * random_lcg_unit(state));
     return rho;
 }
 
@@ -107,7 +104,7 @@ uint32_t *random_order(size_t n, uint64_t *state) {
     uint32_t *order = test_allocate(n, sizeof *order);
     for (size_t p = 0; p < n; p++) order[p] = (uint32_t)p;
     for (size_t p = n; p > 1; p--) {
-        size_t other = (size_t)(random_unit(state) * (double)p);
+        size_t other = (size_t)(random_lcg_unit(state) * (double)p);
         uint32_t x = order[p - 1];
         order[p - 1] = order[other];
         order[other] = x;

@@ -9,8 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-double random_unit(uint64_t *state);
-
 void *test_allocate(size_t count, size_t size);
 
 /* X := X^-1, [n][n], by Gauss-Jordan with row pivots. */

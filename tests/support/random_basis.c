@@ -1,5 +1,7 @@
 #include "support/random_basis.h"
 
+#include "solver/base/random.h"
+
 double random_basis(size_t n, uint64_t *state, wavelets *basis, double *W, double *size) {
     enum { NODES = 512 };
     lam_error error = {.message = ""};
@@ -8,7 +10,7 @@ double random_basis(size_t n, uint64_t *state, wavelets *basis, double *W, doubl
     wavelet_shape *shapes = test_allocate(NODES, sizeof *shapes);
     float *matrices = test_allocate(NODES, WAVELET_INPUTS * WAVELET_INPUTS * sizeof *matrices);
     while (begin < n || n_waiting > 1) {
-        const bool join = n_waiting >= 2 && (begin == n || (n_waiting > 4 && random_unit(state) < .7));
+        const bool join = n_waiting >= 2 && (begin == n || (n_waiting > 4 && random_lcg_unit(state) < .7));
         wavelet_shape *shape = &shapes[n_nodes];
         depth[n_nodes] = 1;
         if (join) {
@@ -18,16 +20,16 @@ double random_basis(size_t n, uint64_t *state, wavelets *basis, double *W, doubl
             n_waiting -= 2;
         } else {
             shape->leaf = 1;
-            shape->inputs = 1 + (uint32_t)(7 * random_unit(state));
+            shape->inputs = 1 + (uint32_t)(7 * random_lcg_unit(state));
             if (shape->inputs > n - begin) shape->inputs = (uint32_t)(n - begin);
             begin += shape->inputs;
         }
         if (depth[n_nodes] > deepest) deepest = depth[n_nodes];
-        shape->scaling = shape->inputs < 4 ? shape->inputs : 1 + (uint32_t)(4 * random_unit(state));
+        shape->scaling = shape->inputs < 4 ? shape->inputs : 1 + (uint32_t)(4 * random_lcg_unit(state));
         for (size_t i = 0; i < shape->inputs; i++)
             for (size_t j = 0; j < shape->inputs; j++)
                 matrices[used++] = (float)((i + j + 1 == shape->inputs ? (j % 2 == 0 ? 1 : -1) : 0) +
-                                           .2 * (random_unit(state) - .5));
+                                           .2 * (random_lcg_unit(state) - .5));
         shapes_of[n_nodes] = (uint32_t)n_nodes;
         waiting[n_waiting++] = (uint32_t)n_nodes++;
         ck_assert_uint_lt(n_nodes, NODES);

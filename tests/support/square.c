@@ -1,9 +1,6 @@
 #include "support/square.h"
 
-static uint64_t square_random(uint64_t *state) {
-    *state = *state * 6364136223846793005u + 1442695040888963407u;
-    return *state >> 33;
-}
+#include "solver/base/random.h"
 
 square square_make(size_t n, row_kind kind, uint64_t seed) {
     square s = {.n = n,
@@ -17,11 +14,11 @@ square square_make(size_t n, row_kind kind, uint64_t seed) {
     for (size_t i = 0; i < n; i++) {
         uint8_t *const from = to;
         uint32_t next = 0;
-        s.area[i] = .1 + (double)(square_random(&seed) % 1000);
+        s.area[i] = .1 + (double)((random_lcg(&seed) >> 33) % 1000);
         for (size_t j = 0; j < n; j++) {
             /* Some rows are empty, some columns are full. */
-            if (i == j || i % 7 == 3 || (square_random(&seed) % 4 != 0 && j % 11 != 0)) continue;
-            const uint64_t count = 1 + square_random(&seed) % 5;
+            if (i == j || i % 7 == 3 || ((random_lcg(&seed) >> 33) % 4 != 0 && j % 11 != 0)) continue;
+            const uint64_t count = 1 + (random_lcg(&seed) >> 33) % 5;
             s.values[i * n + j] = kind == ROW_COUNTS ? (float)count : (float)count / 1e3f;
             to = row_put(kind, to, (uint32_t)j - next, s.values[i * n + j]);
             next = (uint32_t)j + 1;

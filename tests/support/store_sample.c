@@ -1,5 +1,7 @@
 #include "support/store_sample.h"
 
+#include "solver/base/random.h"
+
 size_t sample_bytes(const sample_array *array) {
     size_t bytes = store_type_size(array->type);
     for (int i = 0; i < array->rank; i++) bytes *= array->dims[i];
@@ -8,10 +10,7 @@ size_t sample_bytes(const sample_array *array) {
 
 unsigned char *sample_values(size_t bytes, uint64_t seed) {
     unsigned char *values = malloc(bytes + 1);
-    for (size_t i = 0; i < bytes; i++) {
-        seed = seed * 6364136223846793005u + 1442695040888963407u;
-        values[i] = (unsigned char)(seed >> 56);
-    }
+    for (size_t i = 0; i < bytes; i++) values[i] = (unsigned char)(random_lcg(&seed) >> 56);
     return values;
 }
 

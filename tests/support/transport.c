@@ -1,5 +1,7 @@
 #include "support/transport.h"
 
+#include "solver/base/random.h"
+
 double sum_roundings(size_t count) {
     return (count < 128 ? (double)count : 128.0) + 6.0;
 }
@@ -89,8 +91,8 @@ static void make_up_for_even_light(transport *t, const double *area, uint64_t *s
     const size_t n = t->n, C = t->n_channels;
     double *missing = test_allocate(C * n, sizeof *missing), *light = test_allocate(C, sizeof *light);
     for (size_t c = 0; c < C; c++) {
-        light[c] = 50 + 100 * random_unit(state);
-        for (size_t p = 0; p < n; p++) missing[c * n + p] = floor(64 * random_unit(state) - 24) / 64;
+        light[c] = 50 + 100 * random_lcg_unit(state);
+        for (size_t p = 0; p < n; p++) missing[c * n + p] = floor(64 * random_lcg_unit(state) - 24) / 64;
         for (size_t p = 0; p < n; p++)
             for (size_t q = 0; q < n; q++) {
                 const size_t i = t->order != NULL ? t->order[p] : p, j = t->order != NULL ? t->order[q] : q;
@@ -126,8 +128,8 @@ static void make_hierarchical(transport *t, const transport_parts *parts) {
         for (size_t i = 0; i < n; i++) {
             uint64_t last = upper->indptr[i];
             for (size_t j = i; j < n; j++) {
-                if (i != j && random_unit(state) > .05) continue;
-                const double value = floor(200 * random_unit(state) - 50) / 64;
+                if (i != j && random_lcg_unit(state) > .05) continue;
+                const double value = floor(200 * random_lcg_unit(state) - 50) / 64;
                 K[i * n + j] = K[j * n + i] = value;
                 upper->indices[last] = (uint32_t)j;
                 upper->data[last++] = (float)value;
@@ -205,14 +207,14 @@ static void random_two_mesh(size_t n, size_t k, const uint32_t *order, bool weig
         double area = 0, share[512];
         ck_assert(begin[p + 1] > begin[p] && begin[p + 1] - begin[p] < 512);
         for (uint64_t j = begin[p]; j < begin[p + 1]; j++)
-            area += share[j - begin[p]] = 0.1 + random_unit(state);
+            area += share[j - begin[p]] = 0.1 + random_lcg_unit(state);
         for (uint64_t j = begin[p]; j < begin[p + 1]; j++)
             V[(order ? order[j] : j) * k + p] = weighted ? (float)(share[j - begin[p]] / area) : 1.0f;
     }
     for (size_t i = 0; i < n; i++) {
         double sum = 0;
         for (size_t p = 0; p < k; p++) {
-            U[i * k + p] = random_unit(state) < 0.4 ? (float)random_unit(state) : 0.0f;
+            U[i * k + p] = random_lcg_unit(state) < 0.4 ? (float)random_lcg_unit(state) : 0.0f;
             sum += (double)U[i * k + p] * (weighted ? 1.0 : (double)(begin[p + 1] - begin[p]));
         }
         for (size_t p = 0; p < k && sum > 0; p++) U[i * k + p] = (float)(0.95 * (double)U[i * k + p] / sum);
@@ -417,7 +419,7 @@ void quantity_row(lam_quantity quantity, float rho, double *direct, double *scal
 
 float *random_vectors(size_t count, uint64_t seed) {
     float *x = test_allocate(count, sizeof *x);
-    for (size_t i = 0; i < count; i++) x[i] = (float)(random_unit(&seed) * 2 - 0.999);
+    for (size_t i = 0; i < count; i++) x[i] = (float)(random_lcg_unit(&seed) * 2 - 0.999);
     return x;
 }
 

@@ -1,5 +1,6 @@
 #include "solver/formfactor/pairs/first_light.h"
 
+#include "solver/base/random.h"
 #include "solver/formfactor/pairs/occlusion.h"
 
 #include <math.h>
@@ -76,13 +77,6 @@ static double kernel(const first_light *l, uint32_t e, uint32_t i) {
     return l->m->area[e] * l->m->area[i] * leaving * arriving / (M_PI * r2 * r2);
 }
 
-/* In [0, 1), of an element. */
-static double place(uint64_t x) {
-    x = (x + 1) * 0x9E3779B97F4A7C15u;
-    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-    return (double)((x ^ (x >> 27)) >> 11) * 0x1p-53;
-}
-
 /* sum_e E_e g_ei over many bright elements. Those above 1/STAND_FOR_ALL of all sum_e E_e K_ei one by one; the
  * others by systematic sampling in proportion to E_e K_ei: rest times the mean of g / K over the sample. */
 static double of_many(const first_light *l, size_t count, const uint32_t *of, const float *E, uint32_t i,
@@ -97,7 +91,7 @@ static double of_many(const first_light *l, size_t count, const uint32_t *of, co
             rest += g[k];
     }
     const double step = rest / STAND_FOR_ALL;
-    double at = step * place(i);
+    double at = step * random_to_double(random_scatter(((uint64_t)i + 1) * RANDOM_STEP));
     for (size_t k = 0; k < count && rest > 0; k++) {
         if (g[k] > large) continue;
         passed += g[k];

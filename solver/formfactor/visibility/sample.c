@@ -1,5 +1,6 @@
 #include "solver/formfactor/visibility/sample.h"
 
+#include "solver/base/random.h"
 #include "solver/scene/plane.h"
 
 #include <math.h>
@@ -7,14 +8,6 @@
 /* Steps of the 4-d Kronecker sequence: frac(phi^-d), d = 1 ... 4, in units of 2^-32, where phi^5 = phi + 1
  * (the generalised golden ratio; Roberts 2018). */
 static const uint32_t kronecker_step[4] = {3679390609u, 3152041523u, 2700274807u, 2313257605u};
-
-/* A well-mixed 64-bit value of x (the finalizer of SplitMix64; Steele et al. 2014). */
-static uint64_t mix(uint64_t x) {
-    x += 0x9E3779B97F4A7C15u;
-    x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-    x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
-    return x ^ (x >> 31);
-}
 
 static void set_piece(element_sampler *s, int piece, const double *a, const double *b, const double *c,
                       const visibility *v) {
@@ -64,9 +57,9 @@ void element_sampler_init(element_sampler *s, const mesh *m, const visibility *v
         }
     }
     element_frame_init(&s->frame, m, element);
-    uint64_t state = mix(seed) ^ mix((uint64_t)element + 1);
+    uint64_t state = random_hash(seed) ^ random_hash((uint64_t)element + 1);
     for (int d = 0; d < 4; d += 2) {
-        state = mix(state);
+        state = random_hash(state);
         s->shift[d] = (uint32_t)state;
         s->shift[d + 1] = (uint32_t)(state >> 32);
     }
@@ -124,9 +117,10 @@ void element_sampler_point(const element_sampler *s, float u, float w, float poi
 
 /* The start of the Kronecker sequence for a pair. */
 void pair_sampler_init(pair_sampler *s, uint64_t seed, size_t i, size_t j) {
-    uint64_t state = mix(mix(seed) ^ mix((uint64_t)i + 1)) ^ mix((uint64_t)j + 0x100000001u);
+    uint64_t state = random_hash(random_hash(seed) ^ random_hash((uint64_t)i + 1)) ^
+                     random_hash((uint64_t)j + 0x100000001u);
     for (int d = 0; d < 4; d += 2) {
-        state = mix(state);
+        state = random_hash(state);
         s->shift[d] = (uint32_t)state;
         s->shift[d + 1] = (uint32_t)(state >> 32);
     }

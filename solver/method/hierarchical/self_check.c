@@ -1,5 +1,6 @@
 #include "solver/method/hierarchical/self_check.h"
 
+#include "solver/base/random.h"
 #include "store/status.h"
 
 #include <math.h>
@@ -129,9 +130,9 @@ lam_status self_check(const build_problem *problem, const double *row_sums, cons
     for (size_t e = 0; e < EMISSIONS; e++)
         for (size_t i = 0; i < n; i++)
             for (size_t c = 0; c < C; c++) {
-                seed = seed * 6364136223846793005u + 1442695040888963407u;
+                const uint64_t bits = random_lcg(&seed);
                 s.E[(e * C + c) * n + i] =
-                    e < PROBES ? (float)(seed >> 40) * 0x1p-24f
+                    e < PROBES ? random_to_float(bits)
                                : (float)fmax(1 - (double)problem->reflectance[c * n + i] * row_sums[i], 0);
             }
     TRY(lam_operator_apply(op, EMISSIONS, LAM_RADIOSITY, s.E, s.B, s.work, s.work_bytes, error));

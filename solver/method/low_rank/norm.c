@@ -1,5 +1,7 @@
 #include "solver/method/low_rank/norm.h"
 
+#include "solver/base/random.h"
+
 #include <cblas.h>
 #include <lapacke.h>
 
@@ -56,8 +58,7 @@ lam_status norm_of_product(size_t n, norm_product *product, void *context, const
     /* A start that no symmetry of a scene is likely to be orthogonal to. */
     uint64_t state = 1;
     for (size_t i = 0; i < n; i++) {
-        state = state * 6364136223846793005u + 1442695040888963407u;
-        basis[i] = (double)(state >> 11) * 0x1p-53 - .5;
+        basis[i] = random_lcg_unit(&state) - .5;
     }
     cblas_dscal((int)n, 1 / cblas_dnrm2((int)n, basis, 1), basis, 1);
 

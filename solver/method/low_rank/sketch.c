@@ -1,5 +1,6 @@
 #include "solver/method/low_rank/sketch.h"
 
+#include "solver/base/random.h"
 #include "solver/linalg/dense.h"
 #include "store/status.h"
 
@@ -9,23 +10,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* splitmix64 of Steele, Lea and Flood 2014: a counter makes each entry by itself. */
-static uint64_t mix(uint64_t x) {
-    x += 0x9e3779b97f4a7c15u;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    return x ^ (x >> 31);
-}
-
 /* Two numbers uniform over [0, 1), the first never 0. */
 static void uniform_pair(uint64_t key, double *one, double *two) {
-    const uint64_t bits = mix(key), more = mix(bits);
+    const uint64_t bits = random_hash(key), more = random_hash(bits);
     *one = ((double)(bits >> 11) + .5) * 0x1p-53;
-    *two = (double)(more >> 11) * 0x1p-53;
+    *two = random_to_double(more);
 }
 
 void sketch_gaussian(uint64_t seed, size_t n, size_t m, float *X) {
-    const uint64_t key = mix(seed);
+    const uint64_t key = random_hash(seed);
     const size_t pairs = (n * m + 1) / 2;
 #pragma omp parallel for schedule(static)
     for (size_t k = 0; k < pairs; k++) { /* Box and Muller 1958 */
@@ -38,7 +31,7 @@ void sketch_gaussian(uint64_t seed, size_t n, size_t m, float *X) {
 }
 
 void sketch_sparse_column(uint64_t seed, size_t k, size_t i, sketch_entry column[SKETCH_ENTRIES]) {
-    const uint64_t key = mix(seed);
+    const uint64_t key = random_hash(seed);
     for (size_t e = 0; e < SKETCH_ENTRIES; e++) {
         double u, turn, place, unused;
         uniform_pair(key + 2 * (i * SKETCH_ENTRIES + e), &u, &turn);

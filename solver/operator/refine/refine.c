@@ -1,6 +1,7 @@
 /* lam_refiner and lam_refine: bounds on (I - R F)^-1, batches, quantities. */
 #include "solver/operator/refine/refine.h"
 
+#include "solver/base/random.h"
 #include "solver/linalg/csr_doubles.h"
 
 #include <float.h>
@@ -119,10 +120,7 @@ static double left_by_start(refinement *s) {
 /* Light of 0 to 1, as different from element to element as can be. */
 static void write_probe(size_t count, double *x) {
     uint64_t state = 1;
-    for (size_t k = 0; k < count; k++) {
-        state = state * 6364136223846793005u + 1442695040888963407u;
-        x[k] = (double)(state >> 40) * 0x1p-24;
-    }
+    for (size_t k = 0; k < count; k++) x[k] = (double)random_to_float(random_lcg(&state));
 }
 
 /* Sets refiner->helper, or leaves it NULL. Two products with F. */

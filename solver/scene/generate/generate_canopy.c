@@ -1,7 +1,7 @@
 /* Trees on open ground: each a trunk and some hundred leaves. A leaf has no thickness: it is two faces back
  * to back, so that light falls on both. */
+#include "solver/base/random.h"
 #include "solver/scene/generate/column.h"
-#include "solver/scene/generate/dice.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -60,17 +60,18 @@ done:
 }
 
 /* Uniform over all directions. */
-static void any_direction(dice *r, double out[3]) {
-    const double z = dice_between(r, -1, 1), angle = dice_between(r, 0, 2 * M_PI), across = sqrt(1 - z * z);
+static void any_direction(uint64_t *r, double out[3]) {
+    const double z = random_between(r, -1, 1), angle = random_between(r, 0, 2 * M_PI),
+                 across = sqrt(1 - z * z);
     out[0] = across * cos(angle);
     out[1] = across * sin(angle);
     out[2] = z;
 }
 
 /* A place in the crown, anew until a leaf of this length there is clear of the trunk. */
-static void leaf_place(dice *r, const tree *t, double length, double out[3]) {
+static void leaf_place(uint64_t *r, const tree *t, double length, double out[3]) {
     for (;;) {
-        const double reach = cbrt(dice_between(r, 0, 1));
+        const double reach = cbrt(random_unit(r));
         any_direction(r, out);
         for (int d = 0; d < 3; d++) out[d] *= reach * (d < 2 ? t->radius : t->rise);
         const double beside = hypot(out[0], out[1]) - t->trunk;
@@ -81,9 +82,9 @@ static void leaf_place(dice *r, const tree *t, double length, double out[3]) {
 }
 
 /* A rhombus that lies anyhow, and the same from behind. */
-static lam_status draw_leaf(scene_draft *d, dice *r, const tree *t, lam_error *error) {
+static lam_status draw_leaf(scene_draft *d, uint64_t *r, const tree *t, lam_error *error) {
     lam_status status = LAM_OK;
-    const double length = dice_between(r, leaf_length[0], leaf_length[1]);
+    const double length = random_between(r, leaf_length[0], leaf_length[1]);
     double middle[3], along[3], across[3], corners[4][3], behind[4][3], dot = 0, norm = 0;
     leaf_place(r, t, length, middle);
     any_direction(r, along);
@@ -112,20 +113,20 @@ done:
 static lam_status plant(patch_list *list, tree *trees, size_t n, uint64_t seed, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t columns = (size_t)ceil(sqrt((double)n)), lots = columns * ((n + columns - 1) / columns);
-    dice chance = dice_for(seed, 1), shape = dice_for(seed, 2);
+    uint64_t chance = random_stream(seed, 1), shape = random_stream(seed, 2);
     for (size_t i = 0, planted = 0; i < lots; i++) {
         const double x = lot * (double)(i % columns), y = lot * (double)(i / columns);
-        if (dice_between(&chance, 0, (double)(lots - i)) >= (double)(n - planted)) {
+        if (random_between(&chance, 0, (double)(lots - i)) >= (double)(n - planted)) {
             TRY(add_ground(list, x, y, x + lot, y + lot, error));
             continue;
         }
         tree *t = &trees[planted++];
-        t->foot[0] = micrometres(x + lot / 2 + dice_between(&shape, -astray, astray));
-        t->foot[1] = micrometres(y + lot / 2 + dice_between(&shape, -astray, astray));
-        t->trunk = dice_between(&shape, trunk_radius[0], trunk_radius[1]);
-        t->middle = dice_between(&shape, crown_middle[0], crown_middle[1]);
-        t->radius = dice_between(&shape, crown_radius[0], crown_radius[1]);
-        t->rise = dice_between(&shape, crown_rise[0], crown_rise[1]);
+        t->foot[0] = micrometres(x + lot / 2 + random_between(&shape, -astray, astray));
+        t->foot[1] = micrometres(y + lot / 2 + random_between(&shape, -astray, astray));
+        t->trunk = random_between(&shape, trunk_radius[0], trunk_radius[1]);
+        t->middle = random_between(&shape, crown_middle[0], crown_middle[1]);
+        t->radius = random_between(&shape, crown_radius[0], crown_radius[1]);
+        t->rise = random_between(&shape, crown_rise[0], crown_rise[1]);
         TRY(add_tree(list, t, x, y, error));
     }
 done:
@@ -145,7 +146,7 @@ lam_status generate_canopy(scene_draft *d, const generate_options *options, lam_
         wanted > d->n_faces + 2 * n ? (wanted - d->n_faces) / 2 : n; /* what is left to draw */
     TRY(scene_draft_group(d, "leaf", &green, error));
     for (size_t i = 0; i < n; i++) {
-        dice r = dice_for(options->seed, 3 + i);
+        uint64_t r = random_stream(options->seed, 3 + i);
         for (size_t k = leaves * i / n; k < leaves * (i + 1) / n; k++)
             TRY(draw_leaf(d, &r, &trees[i], error));
     }

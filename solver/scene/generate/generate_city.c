@@ -1,7 +1,7 @@
 /* Cities in the manner of "Aguerre 2016, section 4.3.1", one plan and three distributions of heights, on the
  * three terrains of its section 4.3.5. Buildings are open below: nothing sees the ground under them. */
+#include "solver/base/random.h"
 #include "solver/scene/face_grid.h"
-#include "solver/scene/generate/dice.h"
 #include "solver/scene/generate/scene_draft.h"
 
 #include <math.h>
@@ -58,14 +58,14 @@ static lam_status rectangle_add(city_rectangles *all, city_rectangle one, lam_er
 
 /* Cuts a part of a block by alleys until it is a lot. A lot that touches no street is a courtyard, and a few
  * others stay empty. */
-static lam_status divide_block(city_plan *plan, dice *r, const city_rectangle *block, city_rectangle part,
+static lam_status divide_block(city_plan *plan, uint64_t *r, const city_rectangle *block, city_rectangle part,
                                lam_error *error) {
     lam_status status = LAM_OK;
     const double side[2] = {part.high[0] - part.low[0], part.high[1] - part.low[1]};
     const int axis = side[1] > side[0];
     if (side[axis] > largest_lot) {
-        const double alley = dice_between(r, alley_width[0], alley_width[1]);
-        const double cut = part.low[axis] + (side[axis] - alley) * dice_between(r, .38, .62);
+        const double alley = random_between(r, alley_width[0], alley_width[1]);
+        const double cut = part.low[axis] + (side[axis] - alley) * random_between(r, .38, .62);
         city_rectangle low = part, between = part, high = part;
         low.high[axis] = between.low[axis] = cut;
         between.high[axis] = high.low[axis] = cut + alley;
@@ -75,22 +75,23 @@ static lam_status divide_block(city_plan *plan, dice *r, const city_rectangle *b
     } else {
         const bool court = part.low[0] > block->low[0] && part.high[0] < block->high[0] &&
                            part.low[1] > block->low[1] && part.high[1] < block->high[1];
-        const bool empty = dice_between(r, 0, 1) < empty_share;
+        const bool empty = random_unit(r) < empty_share;
         TRY(rectangle_add(court || empty ? &plan->yards : &plan->buildings, part, error));
     }
 done:
     return status;
 }
 
-static lam_status make_axis(city_axis *axis, size_t blocks, dice r, const char *terrain, lam_error *error) {
+static lam_status make_axis(city_axis *axis, size_t blocks, uint64_t r, const char *terrain,
+                            lam_error *error) {
     lam_status status = LAM_OK;
     axis->n = 2 * blocks + 2;
     axis->at = memory_allocate(axis->n, sizeof *axis->at, "the plan of a city", error);
     axis->rise = memory_allocate(axis->n, sizeof *axis->rise, "the plan of a city", error);
     if (axis->at == NULL || axis->rise == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t k = 1; k < axis->n; k++) {
-        double width = k % 2 == 0 ? dice_between(&r, block_side[0], block_side[1])
-                                  : dice_between(&r, street[0], street[1]);
+        double width = k % 2 == 0 ? random_between(&r, block_side[0], block_side[1])
+                                  : random_between(&r, street[0], street[1]);
         if (k % 6 == 1) width = avenue;
         axis->at[k] = axis->at[k - 1] + width;
     }
@@ -105,10 +106,10 @@ done:
 }
 
 /* Every height of the variant once, in random order: the sum does not hang on luck. */
-static void deal_heights(city_plan *plan, unsigned variant, dice r) {
+static void deal_heights(city_plan *plan, unsigned variant, uint64_t r) {
     for (size_t b = 0; b < plan->buildings.n; b++) {
         const double u = ((double)b + .5) / (double)plan->buildings.n;
-        const size_t other = (size_t)(dice_throw(&r) % (b + 1));
+        const size_t other = (size_t)(random_next(&r) % (b + 1));
         plan->heights[b] = plan->heights[other];
         plan->heights[other] = variants[variant - 1].low + variants[variant - 1].middle * u +
                                variants[variant - 1].top * pow(u, variants[variant - 1].power);
@@ -123,9 +124,9 @@ static lam_status city_plan_make(const generate_options *options, size_t blocks_
     *plan = (city_plan){0};
     const city_axis *x = &plan->axes[0], *y = &plan->axes[1];
     for (int a = 0; a < 2; a++)
-        TRY(make_axis(&plan->axes[a], blocks_per_side, dice_for(options->seed, 1 + (uint64_t)a),
+        TRY(make_axis(&plan->axes[a], blocks_per_side, random_stream(options->seed, 1 + (uint64_t)a),
                       options->terrain, error));
-    dice r = dice_for(options->seed, 3);
+    uint64_t r = random_stream(options->seed, 3);
     for (size_t j = 0; j + 1 < y->n; j++)
         for (size_t i = 0; i + 1 < x->n; i++) {
             const city_rectangle cell = {{x->at[i], y->at[j]}, {x->at[i + 1], y->at[j + 1]}};
@@ -136,7 +137,7 @@ static lam_status city_plan_make(const generate_options *options, size_t blocks_
         }
     plan->heights = memory_allocate(plan->buildings.n, sizeof *plan->heights, "the plan of a city", error);
     if (plan->heights == NULL) TRY(LAM_ERR_MEMORY);
-    deal_heights(plan, options->variant, dice_for(options->seed, 4));
+    deal_heights(plan, options->variant, random_stream(options->seed, 4));
 done:
     return status;
 }

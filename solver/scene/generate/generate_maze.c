@@ -1,7 +1,7 @@
 /* A maze under the open sky: a tree of passages, drawn by walking at random until there is no way on and
  * going back to where there was one. */
+#include "solver/base/random.h"
 #include "solver/scene/generate/blocks.h"
-#include "solver/scene/generate/dice.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -23,24 +23,24 @@ static lam_status carve(blocks *all, size_t x, size_t y, size_t nx, size_t ny, l
 }
 
 /* One of the neighbours of a cell that were not visited yet, or the cell itself. */
-static size_t way_on(const bool *visited, size_t k, size_t cell, dice *r) {
+static size_t way_on(const bool *visited, size_t k, size_t cell, uint64_t *r) {
     const size_t x = cell % k, y = cell / k;
     size_t ways[4], n = 0;
     if (x > 0 && !visited[cell - 1]) ways[n++] = cell - 1;
     if (x + 1 < k && !visited[cell + 1]) ways[n++] = cell + 1;
     if (y > 0 && !visited[cell - k]) ways[n++] = cell - k;
     if (y + 1 < k && !visited[cell + k]) ways[n++] = cell + k;
-    return n == 0 ? cell : ways[dice_throw(r) % n];
+    return n == 0 ? cell : ways[random_next(r) % n];
 }
 
 /* k x k cells; each is entered once, from another. */
 static lam_status carve_passages(blocks *all, size_t k, uint64_t seed, lam_error *error) {
     lam_status status = LAM_OK;
-    dice r = dice_for(seed, 1);
+    uint64_t r = random_stream(seed, 1);
     bool *visited = memory_allocate(k * k, sizeof *visited, "maze", error);
     size_t *way = memory_allocate(k * k, sizeof *way, "maze", error), length = 1;
     if (visited == NULL || way == NULL) TRY(LAM_ERR_MEMORY);
-    way[0] = (size_t)(dice_throw(&r) % (k * k));
+    way[0] = (size_t)(random_next(&r) % (k * k));
     visited[way[0]] = true;
     while (length > 0) {
         const size_t here = way[length - 1], next = way_on(visited, k, here, &r);

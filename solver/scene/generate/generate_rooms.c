@@ -1,7 +1,7 @@
 /* Rooms joined by corridors with a bend: "Aguerre 2016, figure 5.1", above on the right. Each is a plain box,
  * which sees next to nothing of the others. */
+#include "solver/base/random.h"
 #include "solver/scene/generate/blocks.h"
-#include "solver/scene/generate/dice.h"
 #include "solver/scene/union_find.h"
 
 #include <math.h>
@@ -30,8 +30,8 @@ typedef struct room {
 } room;
 
 /* Between two tenths of a metre, so that no two walls are closer than that. */
-static double tenths_between(dice *r, double low, double high) {
-    return round(dice_between(r, low, high) * 10) / 10;
+static double tenths_between(uint64_t *r, double low, double high) {
+    return round(random_between(r, low, high) * 10) / 10;
 }
 
 static lam_status carve(blocks *all, const room *r, double height, lam_error *error) {
@@ -40,12 +40,12 @@ static lam_status carve(blocks *all, const room *r, double height, lam_error *er
 
 /* From room a to its neighbour b on the far side along an axis: two straight pieces that meet half way, and
  * what joins them across. */
-static lam_status add_corridor(blocks *all, dice *r, const room *a, const room *b, int axis, double border,
-                               double middle, lam_error *error) {
+static lam_status add_corridor(blocks *all, uint64_t *r, const room *a, const room *b, int axis,
+                               double border, double middle, lam_error *error) {
     lam_status status = LAM_OK;
     const int across = 1 - axis;
     const double at[2] = {middle + tenths_between(r, -1, -.4), middle + tenths_between(r, .4, 1)};
-    const bool turned = dice_throw(r) % 2 == 1;
+    const bool turned = random_next(r) % 2 == 1;
     room piece[3] = {*a, *b, *a};
     for (int k = 0; k < 2; k++) {
         const double y = at[turned ? 1 - k : k];
@@ -67,7 +67,7 @@ done:
 static lam_status add_corridors(blocks *all, const room *rooms, size_t nx, size_t ny, uint64_t seed,
                                 lam_error *error) {
     lam_status status = LAM_OK;
-    dice order = dice_for(seed, 3), shape = dice_for(seed, 4);
+    uint64_t order = random_stream(seed, 3), shape = random_stream(seed, 4);
     uint32_t joined[ROOMS_MOST];
     size_t pairs[2 * ROOMS_MOST], n = 0; /* a pair: 2 i + axis */
     for (uint32_t i = 0; i < nx * ny; i++) {
@@ -76,11 +76,11 @@ static lam_status add_corridors(blocks *all, const room *rooms, size_t nx, size_
         if (i / nx + 1 < ny) pairs[n++] = 2 * i + 1;
     }
     for (size_t left = n; left > 0; left--) {
-        const size_t drawn = (size_t)(dice_throw(&order) % left), pair = pairs[drawn];
+        const size_t drawn = (size_t)(random_next(&order) % left), pair = pairs[drawn];
         const size_t i = pair / 2, axis = pair % 2, j = axis == 0 ? i + 1 : i + nx;
         const uint32_t a = union_find_root(joined, (uint32_t)i), b = union_find_root(joined, (uint32_t)j);
         pairs[drawn] = pairs[left - 1];
-        if (a == b && dice_between(&order, 0, 1) >= extra_share) continue;
+        if (a == b && random_unit(&order) >= extra_share) continue;
         union_find_join(joined, a, b);
         const double lots[2] = {(double)(i % nx), (double)(i / nx)};
         TRY(add_corridor(all, &shape, &rooms[i], &rooms[j], (int)axis, lot * (lots[axis] + 1),
@@ -90,7 +90,7 @@ done:
     return status;
 }
 
-static lam_status add_room(blocks *all, dice *r, size_t number, double x, double y, room *out,
+static lam_status add_room(blocks *all, uint64_t *r, size_t number, double x, double y, room *out,
                            lam_error *error) {
     lam_status status = LAM_OK;
     const double middle[2] = {x, y}, height = tenths_between(r, room_height[0], room_height[1]);
@@ -119,9 +119,9 @@ lam_status generate_rooms(scene_draft *d, const generate_options *options, lam_e
     patch_list list = {.groups = groups};
     block_stuff stuffs[1 + ROOMS_MOST] = {{FLOOR, WALL, CEILING}};
     room rooms[ROOMS_MOST];
-    dice size = dice_for(options->seed, 1), shape = dice_for(options->seed, 2);
+    uint64_t size = random_stream(options->seed, 1), shape = random_stream(options->seed, 2);
     /* one of the two largest, by the seed */
-    const size_t *plan = plans[n_plans - 1 - (n_plans > 1 ? dice_throw(&size) % 2 : 0)],
+    const size_t *plan = plans[n_plans - 1 - (n_plans > 1 ? random_next(&size) % 2 : 0)],
                  n = plan[0] * plan[1];
     TRY(block_add(&all, BLOCK_SOLID, 0, 0, -outside, lot * (double)plan[0], lot * (double)plan[1],
                   room_height[1] + outside, error));

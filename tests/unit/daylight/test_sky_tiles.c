@@ -1,4 +1,5 @@
 /* Tilings of the sky: closed forms, conventions, and which tile a direction meets. */
+#include "solver/base/random.h"
 #include "solver/daylight/sky_tiles.h"
 #include "support/suite.h"
 
@@ -49,8 +50,7 @@ static size_t find(const sky_tiling *s, float x, float y, float z) {
 }
 
 static double uniform(uint64_t *state) {
-    *state = *state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(*state >> 11) * 0x1p-53;
+    return random_lcg_unit(state);
 }
 
 START_TEST(tiles_fill_the_sky) {

@@ -1,5 +1,6 @@
 /* Clusters, the shafts between them, their links, and rows of far exchange areas: each against brute force.
  */
+#include "solver/base/random.h"
 #include "solver/formfactor/pairs/cluster_links.h"
 #include "solver/formfactor/pairs/pair_far.h"
 #include "solver/formfactor/pairs/shaft.h"
@@ -274,14 +275,9 @@ START_TEST(shafts_miss_only_what_is_not_between) {
     for (int trial = 0; trial < 4000; trial++) {
         uint32_t pick[3];
         double u[4];
-        for (int k = 0; k < 3; k++) {
-            state = state * 6364136223846793005u + 1442695040888963407u;
-            pick[k] = (uint32_t)((state >> 33) % (k < 2 ? t->n_clusters : s->m.n));
-        }
-        for (int k = 0; k < 4; k++) {
-            state = state * 6364136223846793005u + 1442695040888963407u;
-            u[k] = (double)(state >> 11) * 0x1p-53;
-        }
+        for (int k = 0; k < 3; k++)
+            pick[k] = (uint32_t)((random_lcg(&state) >> 33) % (k < 2 ? t->n_clusters : s->m.n));
+        for (int k = 0; k < 4; k++) u[k] = random_lcg_unit(&state);
         const cluster *a = &t->clusters[pick[0]], *b = &t->clusters[pick[1]];
         shaft box;
         shaft_init(&box, a, b, slack);

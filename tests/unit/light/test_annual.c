@@ -1,5 +1,6 @@
 /* Figures of a year against the plainest way to find them: every vector solved by itself, every hour counted.
  */
+#include "solver/base/random.h"
 #include "solver/light/annual.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/sky_light.h"
@@ -24,9 +25,10 @@ static place make_place(bool steady, bool lamp) {
     lam_error error = {0};
     uint64_t seed = 7;
     float *P = malloc(sizeof(float) * C * N * N), first_bounce[TILES * N], reflectance[C * N];
-    for (size_t i = 0; i < C * N; i++) reflectance[i] = i == 4 ? 0 : (float)(.1 + .8 * random_unit(&seed));
-    for (size_t i = 0; i < (size_t)C * N * N; i++) P[i] = (float)(.05 * random_unit(&seed));
-    for (size_t i = 0; i < TILES * N; i++) first_bounce[i] = (float)random_unit(&seed);
+    for (size_t i = 0; i < C * N; i++)
+        reflectance[i] = i == 4 ? 0 : (float)(.1 + .8 * random_lcg_unit(&seed));
+    for (size_t i = 0; i < (size_t)C * N * N; i++) P[i] = (float)(.05 * random_lcg_unit(&seed));
+    for (size_t i = 0; i < TILES * N; i++) first_bounce[i] = (float)random_lcg_unit(&seed);
     ck_assert_int_eq(operator_exact_create(N, C, reflectance, P, &p.op, &error), LAM_OK);
     ck_assert_int_eq(sky_create(TILES, N, first_bounce, &p.sky, &error), LAM_OK);
     const size_t n_E = steady ? 1 : HOURS;
@@ -35,9 +37,9 @@ static place make_place(bool steady, bool lamp) {
     for (size_t h = 0; h < HOURS; h++) {
         const bool day = h % 24 >= 6 && h % 24 < 19;
         for (size_t t = 0; t < C * TILES; t++)
-            p.light.L[h * C * TILES + t] = day ? (float)(100 * random_unit(&seed)) : 0;
+            p.light.L[h * C * TILES + t] = day ? (float)(100 * random_lcg_unit(&seed)) : 0;
         for (size_t i = 0; i < C * N; i++)
-            if (h < n_E) p.light.E[h * C * N + i] = lamp && h % 3 == 0 ? (float)random_unit(&seed) : 0;
+            if (h < n_E) p.light.E[h * C * N + i] = lamp && h % 3 == 0 ? (float)random_lcg_unit(&seed) : 0;
     }
     return p;
 }

@@ -1,4 +1,5 @@
 /* The k x k core: inverse, condition, and what it refuses. */
+#include "solver/base/random.h"
 #include "solver/linalg/core.h"
 #include "support/suite.h"
 
@@ -10,8 +11,7 @@
 static uint64_t random_state = 5;
 
 static double random_double(void) {
-    random_state = random_state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(random_state >> 11) / 9007199254740992.0 - 0.5;
+    return random_lcg_unit(&random_state) - 0.5;
 }
 
 static lam_error error;

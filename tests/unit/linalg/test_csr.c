@@ -1,4 +1,5 @@
 /* Sparse rows: their product and what the check refuses. */
+#include "solver/base/random.h"
 #include "solver/linalg/csr.h"
 #include "solver/linalg/csr_doubles.h"
 #include "solver/linalg/csr_floats.h"
@@ -12,8 +13,7 @@
 static uint64_t random_state = 9;
 
 static double random_double(void) {
-    random_state = random_state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(random_state >> 11) / 9007199254740992.0 - 0.5;
+    return random_lcg_unit(&random_state) - 0.5;
 }
 
 /* About a third of the entries; every fifth row is empty. */

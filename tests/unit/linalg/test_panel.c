@@ -1,5 +1,6 @@
 /* The two products of a dense matrix, on every instruction set this CPU has. */
 #include "solver/base/half.h"
+#include "solver/base/random.h"
 #include "solver/linalg/panel.h"
 #include "support/suite.h"
 
@@ -12,8 +13,7 @@ static uint64_t random_state;
 
 /* In (-1, 1), never 0. */
 static float random_float(void) {
-    random_state = random_state * 6364136223846793005u + 1442695040888963407u;
-    return (float)((double)(random_state >> 40) + 0.5) / 8388608.0f - 1.0f;
+    return (float)((double)(random_lcg(&random_state) >> 40) + 0.5) / 8388608.0f - 1.0f;
 }
 
 static float *random_floats(size_t count) {

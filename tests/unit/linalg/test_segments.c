@@ -1,4 +1,5 @@
 /* Runs of consecutive numbers: their sums against double, the same bits on every instruction set. */
+#include "solver/base/random.h"
 #include "solver/linalg/segments.h"
 #include "support/suite.h"
 
@@ -9,8 +10,7 @@ static lam_error error;
 static uint64_t random_state = 3;
 
 static double random_double(void) {
-    random_state = random_state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(random_state >> 11) / 9007199254740992.0 - 0.5;
+    return random_lcg_unit(&random_state) - 0.5;
 }
 
 /* Runs of every length from 0 to 40, and one of 5000. */

@@ -1,5 +1,6 @@
 /* Sparse rows in slices: empty, short and long ones, against double, and the same bits in any batch. */
 #include "solver/base/half.h"
+#include "solver/base/random.h"
 #include "solver/linalg/sliced.h"
 #include "support/dense.h"
 #include "support/suite.h"
@@ -18,12 +19,12 @@ static csr random_rows(uint64_t *state) {
              .data = test_allocate(N * N, sizeof *a.data)};
     for (size_t i = 0; i < N; i++) {
         const size_t most = i % 50 == 7 ? 300 : i % 3 == 0 ? 0 : 20;
-        const double share = random_unit(state) * (double)most / N;
+        const double share = random_lcg_unit(state) * (double)most / N;
         uint64_t last = a.indptr[i];
         for (size_t j = 0; j < N && most > 0; j++) {
-            if (random_unit(state) > share) continue;
+            if (random_lcg_unit(state) > share) continue;
             a.indices[last] = (uint32_t)j;
-            a.data[last++] = (float)(random_unit(state) - .3);
+            a.data[last++] = (float)(random_lcg_unit(state) - .3);
         }
         a.indptr[i + 1] = last;
     }
@@ -48,7 +49,7 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
     ck_assert_uint_gt(s.n_long, 3);
     ck_assert_uint_gt(s.n_slices, 20);
     ck_assert_uint_gt(s.n_empty, N / 4);
-    for (size_t k = 0; k < VECTORS * N; k++) X[k] = (float)(random_unit(&state) - .4);
+    for (size_t k = 0; k < VECTORS * N; k++) X[k] = (float)(random_lcg_unit(&state) - .4);
     for (size_t m = 1; m <= VECTORS; m += 5)
         for (size_t n_threads = 1; n_threads < 4; n_threads += 2) {
             for (size_t k = 0; k < VECTORS * N; k++) Y[k] = NAN;

@@ -1,4 +1,5 @@
 /* What decides the kind of an operator: rows of inverses, how much of them may go, and the choice. */
+#include "solver/base/random.h"
 #include "solver/method/classify.h"
 #include "solver/method/reference.h"
 #include "solver/method/sparse/sparse_inverse.h"
@@ -105,8 +106,7 @@ static fixture random_pairs(size_t each, float near) {
     for (size_t round = 0; round < each; round++) {
         for (uint32_t i = 0; i < N; i++) partner[i] = i;
         for (size_t i = N - 1; i > 0; i--) {
-            state = state * 6364136223846793005u + 1442695040888963407u;
-            const size_t j = (size_t)(state >> 33) % (i + 1);
+            const size_t j = (size_t)(random_lcg(&state) >> 33) % (i + 1);
             const uint32_t swap = partner[i];
             partner[i] = partner[j];
             partner[j] = swap;
@@ -230,10 +230,7 @@ START_TEST(low_rank_is_no_rival) {
         f.m.area[i] = 1;
         f.m.reflectance[i] = .5f;
         normal[i][2] = 1;
-        for (int d = 0; d < 2; d++) {
-            state = state * 6364136223846793005u + 1442695040888963407u;
-            centre[i][d] = (double)(state >> 40);
-        }
+        for (int d = 0; d < 2; d++) centre[i][d] = (double)(random_lcg(&state) >> 40);
     }
     build_problem p = *problem_of(&f);
     p.centre = (const double(*)[3])centre;

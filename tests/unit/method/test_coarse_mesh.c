@@ -1,4 +1,5 @@
 /* The coarse mesh of 2MSC: coherence, splitting, assignment. */
+#include "solver/base/random.h"
 #include "solver/method/two_mesh/coarse_mesh.h"
 #include "support/room.h"
 #include "support/suite.h"
@@ -241,8 +242,8 @@ START_TEST(proximity_takes_the_nearest) {
     uint64_t state = 1;
     for (size_t i = 0; i < n; i++)
         for (int d = 0; d < 3; d++) {
-            state = state * 6364136223846793005u + 1442695040888963407u;
-            if (r.m.normal[i][d] == 0) r.geometry.centre[i][d] += .6 * ((double)(state >> 11) * 0x1p-53 - .5);
+            const double place = random_lcg_unit(&state);
+            if (r.m.normal[i][d] == 0) r.geometry.centre[i][d] += .6 * (place - .5);
         }
     coarse_mesh a = create(room_problem(&r), (coarse_options){.patches = k});
     coarse_mesh b = create(room_problem(&r), (coarse_options){.patches = k, .proximity = true});

@@ -1,5 +1,6 @@
 /* Form factors compressed: products and their bounds beside all of F, refined answers beside a dense LU,
  * stores. */
+#include "solver/base/random.h"
 #include "solver/method/hierarchical/compress.h"
 #include "solver/method/method.h"
 #include "solver/operator/refine/form_factor_rows.h"
@@ -48,7 +49,7 @@ enum { LIGHTS = 6 };
 static void light(const view *v, int which, double *x) {
     uint64_t seed = 5;
     for (size_t i = 0; i < v->m.n; i++) {
-        const double any = random_unit(&seed);
+        const double any = random_lcg_unit(&seed);
         double middle[3];
         mesh_centroid(&v->m, i, middle);
         x[i] = which == 0   ? (i == v->m.n / 3)

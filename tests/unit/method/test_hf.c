@@ -1,4 +1,5 @@
 /* HF against a dense SVD in double: its bound, how its levels share it, and what it foresees. */
+#include "solver/base/random.h"
 #include "solver/method/low_rank/gram.h"
 #include "solver/method/low_rank/hf.h"
 #include "solver/method/low_rank/norm.h"
@@ -165,7 +166,8 @@ END_TEST
 /* How often rays hit what they meet so often on average (Knuth 1969). */
 static int poisson(double mean, uint64_t *state) {
     int count = 0;
-    for (double left = exp(-mean), at = random_unit(state); at > left; at *= random_unit(state)) count++;
+    for (double left = exp(-mean), at = random_lcg_unit(state); at > left; at *= random_lcg_unit(state))
+        count++;
     return count;
 }
 

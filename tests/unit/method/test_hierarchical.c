@@ -1,5 +1,6 @@
 /* The hierarchical operator of boxes with exact form factors: how near it comes, and what it says of itself.
  */
+#include "solver/base/random.h"
 #include "solver/method/reference.h"
 #include "solver/precompute/forecast.h"
 #include "support/box_problem.h"
@@ -84,7 +85,7 @@ START_TEST(epsilon_is_what_it_costs) {
     E[n / 5] = 1;
     for (size_t i = 0; i < n; i++) {
         E[n + i] = i > n / 2 && i < n / 2 + 40 ? 1 : 0;
-        E[2 * n + i] = (float)random_unit(&seed);
+        E[2 * n + i] = (float)random_lcg_unit(&seed);
     }
     for (int k = 0; k < 3; k++) {
         build_report report;
@@ -197,7 +198,7 @@ START_TEST(even_light_is_made_up_for) {
     /* Half precision, of what was missing. */
     ck_assert_double_lt(report.uniform_error, 1e-3);
     for (size_t i = 0; i < n; i++) {
-        lit[i] = (float)random_unit(&seed);
+        lit[i] = (float)random_lcg_unit(&seed);
         E[i] = i % 2 == 0 ? 1.0f : .5f;
     }
     ck_assert_double_lt(indirect_error(problem, coarse, E), .1);
@@ -231,11 +232,11 @@ START_TEST(some_elements) {
     E[n / 7] = 2; /* one element, a wall, all over */
     for (size_t i = 0; i < n; i++) {
         E[n + i] = problem->normal[i][2] > .5f ? 1 : 0;
-        E[2 * n + i] = (float)random_unit(&seed);
+        E[2 * n + i] = (float)random_lcg_unit(&seed);
     }
     ck_ok(lam_operator_apply(op, 3, LAM_INDIRECT, E, all, work, bytes, &error));
     for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) {
-        for (size_t r = 0; r < counts[k]; r++) which[r] = (uint32_t)(random_unit(&seed) * (double)n);
+        for (size_t r = 0; r < counts[k]; r++) which[r] = (uint32_t)(random_lcg_unit(&seed) * (double)n);
         if (counts[k] == 3) which[2] = which[0];
         memset(work, 0xA5, bytes);
         ck_ok(lam_operator_apply_selected(op, 3, LAM_INDIRECT, E, NULL, counts[k], which, some, work, bytes,

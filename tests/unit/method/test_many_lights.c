@@ -1,4 +1,5 @@
 /* The light of many emissions at once against the dense solution in double. */
+#include "solver/base/random.h"
 #include "solver/method/many_lights.h"
 #include "solver/method/reference.h"
 #include "support/suite.h"
@@ -18,11 +19,11 @@ typedef struct room {
 static void make_room(double closed, uint64_t seed, room *r) {
     double *G = test_allocate((size_t)N * N, sizeof *G), largest = 0;
     uint64_t entries = 0;
-    for (size_t i = 0; i < N; i++) r->area[i] = pow(10, 4 * random_unit(&seed) - 2);
+    for (size_t i = 0; i < N; i++) r->area[i] = pow(10, 4 * random_lcg_unit(&seed) - 2);
     for (size_t i = 0; i < N; i++)
         for (size_t j = 0; j < i; j++)
-            if (random_unit(&seed) > .33)
-                G[i * N + j] = G[j * N + i] = random_unit(&seed) * r->area[i] * r->area[j];
+            if (random_lcg_unit(&seed) > .33)
+                G[i * N + j] = G[j * N + i] = random_lcg_unit(&seed) * r->area[i] * r->area[j];
     for (size_t i = 0; i < N; i++) {
         double sum = 0;
         for (size_t j = 0; j < N; j++) sum += G[i * N + j] / r->area[i];
@@ -39,7 +40,7 @@ static void make_room(double closed, uint64_t seed, room *r) {
             r->F.data[entries++] = (float)(closed * G[i * N + j] / r->area[i] / largest);
         }
         r->F.indptr[i + 1] = entries;
-        r->rho[i] = i % 6 == 3 ? 0 : (float)(.2 + .75 * random_unit(&seed));
+        r->rho[i] = i % 6 == 3 ? 0 : (float)(.2 + .75 * random_lcg_unit(&seed));
     }
     free(G);
 }
@@ -50,7 +51,7 @@ static light_columns problem_of(const room *r, size_t m, const float *E, const f
 
 static float *random_light(size_t m, uint64_t seed) {
     float *E = test_allocate(m * N, sizeof *E);
-    for (size_t k = 0; k < m * N; k++) E[k] = random_unit(&seed) < .1 ? (float)random_unit(&seed) : 0;
+    for (size_t k = 0; k < m * N; k++) E[k] = random_lcg_unit(&seed) < .1 ? (float)random_lcg_unit(&seed) : 0;
     return E;
 }
 

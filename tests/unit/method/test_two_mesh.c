@@ -1,4 +1,5 @@
 /* 2MSC against a reference that builds U and V densely, and what must hold whatever the patches. */
+#include "solver/base/random.h"
 #include "solver/method/method.h"
 #include "solver/operator/two_mesh.h"
 #include "support/room.h"
@@ -76,7 +77,7 @@ START_TEST(agrees_with_dense_factors) {
                       n * stride * 4 + (patches.k + 1) * 8 + (cases[_i].weighted ? 4 * n : 0) + cores);
     float *E = test_allocate(C * n, sizeof *E);
     uint64_t state = 5;
-    for (size_t i = 0; i < C * n; i++) E[i] = (float)random_unit(&state);
+    for (size_t i = 0; i < C * n; i++) E[i] = (float)random_lcg_unit(&state);
     float *B = transport_apply(op, false, 1, LAM_RADIOSITY, E);
     float *H = transport_apply(op, false, 1, LAM_IRRADIANCE, E);
     for (size_t c = 0; c < C; c++) {

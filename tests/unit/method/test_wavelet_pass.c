@@ -1,4 +1,5 @@
 /* F in a basis of wavelets and its inverse there, against dense matrices in double. */
+#include "solver/base/random.h"
 #include "solver/method/hierarchical/wavelet_entries.h"
 #include "support/wavelet_subject.h"
 
@@ -173,7 +174,7 @@ START_TEST(one_even_light_is_put_in) {
     double *before = whole(&S), length = 0;
     for (size_t p = 0; p < n; p++) area[p] = s.m.area[s.tree.order[p]];
     for (size_t p = 0; p < n; p++) length += area[p];
-    for (size_t i = 0; i < n; i++) sums[i] = random_unit(&seed);
+    for (size_t i = 0; i < n; i++) sums[i] = random_lcg_unit(&seed);
     ck_ok(wavelet_impose_row_sums(&s.basis, s.tree.order, area, sums, 0, weight, &S, &error));
     double *after = whole(&S), *y = test_allocate(n, sizeof *y);
     for (size_t k = 0; k < n * n; k++)
@@ -221,7 +222,7 @@ static float *reflectance(const subject *s, int which) {
     for (size_t p = 0; p < s->m.n; p++) {
         const uint32_t i = s->tree.order[p];
         rho[p] = which == ONE_FOR_ALL                     ? .8f
-                 : which == EACH_ITS_OWN                  ? (float)(.95 * random_unit(&seed))
+                 : which == EACH_ITS_OWN                  ? (float)(.95 * random_lcg_unit(&seed))
                  : s->m.normal[i][2] > .5f || i % 50 == 0 ? 0
                                                           : .6f;
     }

@@ -1,4 +1,5 @@
 /* The runtime half of a sky: H0 = first_bounce^T L from a store. */
+#include "solver/base/random.h"
 #include "solver/operator/sky_light.h"
 #include "store/store.h"
 #include "support/suite.h"
@@ -28,7 +29,7 @@ static void name_store(char path[64]) {
 
 static float *random_positive(size_t count, uint64_t seed) {
     float *x = test_allocate(count, sizeof *x);
-    for (size_t i = 0; i < count; i++) x[i] = (float)random_unit(&seed);
+    for (size_t i = 0; i < count; i++) x[i] = (float)random_lcg_unit(&seed);
     return x;
 }
 

@@ -1,4 +1,5 @@
 /* Multiwavelets of a mesh: the tree, the basis, and plans of what is used of it. */
+#include "solver/base/random.h"
 #include "support/wavelet_subject.h"
 
 static lam_error error;
@@ -57,7 +58,7 @@ START_TEST(the_basis_is_orthonormal) {
             for (size_t p = 0; p < n; p++) sum += W[i * n + p] * W[j * n + p];
             ck_each(fabs(sum - (i == j ? 1 : 0)) <= 2 * TRANSFORM_U);
         }
-    for (size_t p = 0; p < n; p++) x[p] = (float)random_unit(&seed);
+    for (size_t p = 0; p < n; p++) x[p] = (float)random_lcg_unit(&seed);
     transform(&s, false, x, c);
     float *back = test_allocate(n, sizeof *back);
     transform(&s, true, c, back);
@@ -132,7 +133,7 @@ START_TEST(bits_do_not_depend_on_threads) {
     ck_assert_uint_gt(plan.n_pieces, 2);
     ck_assert_uint_gt(plan.n_above, 2);
     float *work = test_allocate(VECTORS * wavelet_plan_work(&plan), sizeof *work);
-    for (size_t k = 0; k < VECTORS * N; k++) X[k] = (float)random_unit(&seed);
+    for (size_t k = 0; k < VECTORS * N; k++) X[k] = (float)random_lcg_unit(&seed);
     /* Most of the second vector is dark, and all of the third but one element. */
     for (size_t p = 0; p < N; p++) {
         if (p > N / 3) X[N + p] = 0;
@@ -169,7 +170,7 @@ START_TEST(a_plan_leaves_out_what_is_not_used) {
     uint64_t seed = 3;
     for (size_t k = 0; k < n; k++) {
         used[k] = k % every == every - 1;
-        x[k] = (float)random_unit(&seed);
+        x[k] = (float)random_lcg_unit(&seed);
     }
     ck_ok(wavelet_plan_create(&s.basis, used, &plan, &error));
     ck_assert_uint_lt(plan.n_used, every == n ? 4 : n / 2);

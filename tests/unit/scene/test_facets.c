@@ -1,4 +1,5 @@
 /* Facets: elements of one plane cast against as one, and found again by where they were met. */
+#include "solver/base/random.h"
 #include "solver/bench/scenes.h"
 #include "solver/formfactor/visibility/sample.h"
 #include "solver/formfactor/visibility/visibility.h"
@@ -44,7 +45,7 @@ static bool in_piece(const mesh *m, const uint32_t piece[4], const double p[3], 
 static void point_in(const mesh *m, size_t element, uint64_t *state, double p[3]) {
     const size_t corners = mesh_corners(m, element);
     double weight[4], sum = 0;
-    for (size_t k = 0; k < corners; k++) sum += weight[k] = .01 + random_unit(state);
+    for (size_t k = 0; k < corners; k++) sum += weight[k] = .01 + random_lcg_unit(state);
     for (int d = 0; d < 3; d++) {
         p[d] = 0;
         for (size_t k = 0; k < corners; k++)
