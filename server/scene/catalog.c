@@ -1,6 +1,7 @@
 #include "server/scene/catalog.h"
 
 #include "server/scene/verifier.h"
+#include "solver/base/array_grow.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -40,13 +41,7 @@ static lam_status add_source(source_list *list, const char *folder, const char *
                              lam_error *error) {
     lam_status status = LAM_OK;
     char *path = NULL;
-    if (list->count == list->capacity) {
-        size_t capacity = 2 * list->capacity + 8;
-        source *items = realloc(list->items, capacity * sizeof *items);
-        if (items == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", argument);
-        list->items = items;
-        list->capacity = capacity;
-    }
+    TRY(array_grow(&list->items, &list->capacity, list->count + 1, sizeof *list->items, argument, error));
     if (asprintf(&path, "%s%s%s", folder == NULL ? "" : folder, folder == NULL ? "" : "/", argument) < 0) {
         path = NULL;
         FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory", argument);

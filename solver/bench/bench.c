@@ -3,6 +3,8 @@
 
 #include "solver/base/csv_text.h"
 
+#include "solver/base/array_grow.h"
+
 #include <assert.h>
 #include <jansson.h>
 #include <math.h>
@@ -11,16 +13,10 @@
 #include <string.h>
 
 static void add(table *t, table_cell cell) {
-    if (t->used == t->capacity) {
-        const size_t capacity = 2 * t->capacity + 4 * t->n_columns;
-        table_cell *cells = realloc(t->cells, capacity * sizeof *cells);
-        if (cells == NULL) {
-            free(cell.text);
-            t->out_of_memory = true;
-            return;
-        }
-        t->cells = cells;
-        t->capacity = capacity;
+    if (array_grow(&t->cells, &t->capacity, t->used + 1, sizeof *t->cells, "table", NULL) != LAM_OK) {
+        free(cell.text);
+        t->out_of_memory = true;
+        return;
     }
     t->cells[t->used++] = cell;
 }

@@ -18,6 +18,8 @@
 #include <omp.h>
 #include <poll.h>
 #include <signal.h>
+#include <stdlib.h>
+#include <string.h>
 #include <sys/prctl.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -286,11 +288,12 @@ static lam_status take_records(const bench_run *run, int out, lam_error *error) 
     enum { PIECE = 1 << 16, POLL_MS = 50 };
     lam_status status = LAM_OK;
     char *bytes = NULL;
+    size_t capacity = 0;
     struct pollfd wait = {.fd = out, .events = POLLIN};
     for (size_t used = 0;;) {
         TRY(bench_check(run, error));
         if (poll(&wait, 1, POLL_MS) <= 0) continue;
-        TRY(grow(&bytes, used + PIECE, 1, error));
+        TRY(array_grow(&bytes, &capacity, used + PIECE, 1, "a record of a script", error));
         const ssize_t got = read(out, bytes + used, PIECE);
         if (got < 0 && errno == EINTR) continue;
         if (got <= 0) break;

@@ -1,6 +1,7 @@
 /* One polygon to a planar convex quad or to triangles, by cutting ears off its plane projection. */
 #include "solver/scene/polygon_split.h"
 
+#include "solver/base/array_grow.h"
 #include "solver/scene/plane.h"
 #include "solver/scene/tables.h"
 
@@ -22,18 +23,14 @@ void polygon_split_scratch_free(polygon_split_scratch *scratch) {
 }
 
 static lam_status scratch_reserve(polygon_split_scratch *s, size_t n, lam_error *error) {
-    void *grown = array_grow(s->corners, &s->corner_capacity, n, sizeof *s->corners, "face corners", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    s->corners = grown;
-    grown = array_grow(s->flat, &s->flat_capacity, n, sizeof *s->flat, "face corners", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    s->flat = grown;
-    grown = array_grow(s->quality, &s->quality_capacity, n, sizeof *s->quality, "face corners", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    s->quality = grown;
-    grown = array_grow(s->pieces, &s->piece_capacity, n, sizeof *s->pieces, "face corners", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    s->pieces = grown;
+    if (array_grow(&s->corners, &s->corner_capacity, n, sizeof *s->corners, "face corners", error) != LAM_OK)
+        return LAM_ERR_MEMORY;
+    if (array_grow(&s->flat, &s->flat_capacity, n, sizeof *s->flat, "face corners", error) != LAM_OK)
+        return LAM_ERR_MEMORY;
+    if (array_grow(&s->quality, &s->quality_capacity, n, sizeof *s->quality, "face corners", error) != LAM_OK)
+        return LAM_ERR_MEMORY;
+    if (array_grow(&s->pieces, &s->piece_capacity, n, sizeof *s->pieces, "face corners", error) != LAM_OK)
+        return LAM_ERR_MEMORY;
     return LAM_OK;
 }
 

@@ -1,25 +1,10 @@
 #include "solver/scene/tables.h"
 
+#include "solver/base/array_grow.h"
+
 #include <stdlib.h>
 #include <string.h>
 #include <xxhash.h>
-
-void *array_grow(void *data, size_t *capacity, size_t count, size_t size, const char *what,
-                 lam_error *error) {
-    if (count <= *capacity && data != NULL) return data;
-    size_t wanted = *capacity < 64 ? 64 : *capacity, bytes;
-    while (wanted < count && size_multiply(wanted, 2, &wanted)) continue;
-    if (wanted < count || !size_multiply(wanted, size, &bytes)) {
-        status_fail(error, LAM_ERR_MEMORY, "%s: %zu entries are too many", what, count);
-        return NULL;
-    }
-    void *grown = realloc(data, bytes);
-    if (grown == NULL)
-        status_fail(error, LAM_ERR_MEMORY, "%s: cannot allocate %zu bytes; use a smaller scene", what, bytes);
-    else
-        *capacity = wanted;
-    return grown;
-}
 
 /* Doubles the slots; hash_of(table, i) gives the hash of entry i < n. */
 static lam_status slots_grow(table_slots *slots, size_t n, uint64_t (*hash_of)(const void *table, size_t i),
@@ -64,12 +49,8 @@ lam_status name_table_add(name_table *t, const char *name, size_t length, uint32
     size_t slot = name_slot(t, name, length);
     if (t->slots.slots[slot] == 0) {
         if (t->n >= most_entries) FAIL(error, LAM_ERR_MEMORY, "scene: more than %zu names", most_entries);
-        size_t *start = array_grow(t->start, &t->start_capacity, t->n + 1, sizeof *start, "names", error);
-        if (start == NULL) TRY(LAM_ERR_MEMORY);
-        t->start = start;
-        char *text = array_grow(t->text, &t->text_capacity, t->text_bytes + length + 1, 1, "names", error);
-        if (text == NULL) TRY(LAM_ERR_MEMORY);
-        t->text = text;
+        TRY(array_grow(&t->start, &t->start_capacity, t->n + 1, sizeof *t->start, "names", error));
+        TRY(array_grow(&t->text, &t->text_capacity, t->text_bytes + length + 1, 1, "names", error));
         t->start[t->n] = t->text_bytes;
         memcpy(t->text + t->text_bytes, name, length);
         t->text[t->text_bytes + length] = '\0';
@@ -106,9 +87,7 @@ lam_status point_table_add(point_table *t, const double point[3], uint32_t *inde
         slot = (slot + 1) & (t->slots.n_slots - 1);
     if (t->slots.slots[slot] == 0) {
         if (t->n >= most_entries) FAIL(error, LAM_ERR_MEMORY, "mesh: more than %zu vertices", most_entries);
-        void *points = array_grow(t->points, &t->capacity, t->n + 1, sizeof *t->points, "vertices", error);
-        if (points == NULL) TRY(LAM_ERR_MEMORY);
-        t->points = points;
+        TRY(array_grow(&t->points, &t->capacity, t->n + 1, sizeof *t->points, "vertices", error));
         memcpy(t->points[t->n], p, sizeof p);
         t->slots.slots[slot] = (uint32_t)++t->n;
     }

@@ -1,5 +1,5 @@
-/* Growing arrays and the two tables that scenes are made with: names and points, each entry kept once.
- * Private to solver/scene. */
+/* The two hash tables that scenes are made with: names and points, each entry kept once. Private to
+ * solver/scene. */
 #ifndef LAMBERT_SCENE_TABLES_H
 #define LAMBERT_SCENE_TABLES_H
 
@@ -9,10 +9,6 @@
 
 /* No entry: a face without an object name or a material. */
 #define TABLE_NONE 0xFFFFFFFFu
-
-/* data, or its larger copy, with room for count items of size bytes; *capacity is in items, never 0 after
- * success. NULL when that fails: data is then as it was. */
-void *array_grow(void *data, size_t *capacity, size_t count, size_t size, const char *what, lam_error *error);
 
 /* Open addressing: slot -> index + 1 of an entry, 0 when free. */
 typedef struct table_slots {

@@ -1,5 +1,6 @@
 #include "solver/formfactor/pairs/cluster_links.h"
 
+#include "solver/base/array_grow.h"
 #include "solver/formfactor/pairs/shaft.h"
 
 #include <math.h>
@@ -29,15 +30,9 @@ void cluster_links_free(cluster_links *l) {
 }
 
 static void bag_add(bag *b, uint32_t a, uint32_t c, bool open) {
-    if (b->n == b->capacity) {
-        const size_t capacity = b->capacity + b->capacity / 2 + 256;
-        cluster_link *links = realloc(b->links, capacity * sizeof *links);
-        if (links == NULL) {
-            b->out_of_memory = true;
-            return;
-        }
-        b->links = links;
-        b->capacity = capacity;
+    if (array_grow(&b->links, &b->capacity, b->n + 1, sizeof *b->links, "cluster links", NULL) != LAM_OK) {
+        b->out_of_memory = true;
+        return;
     }
     b->links[b->n++] = (cluster_link){a, c, open};
 }

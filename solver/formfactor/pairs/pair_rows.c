@@ -1,5 +1,6 @@
 #include "solver/formfactor/pairs/pair_rows.h"
 
+#include "solver/base/array_grow.h"
 #include "solver/base/bitset.h"
 
 #include <stdlib.h>
@@ -28,20 +29,17 @@ void pair_rows_free(pair_rows *rows) {
 
 /* Sets the capacity. */
 static bool block_resize(pair_block *b, size_t capacity) {
-    uint32_t *other = realloc(b->other, (capacity + 1) * sizeof *other);
-    if (other != NULL) b->other = other;
-    float *exchange = realloc(b->exchange, (capacity + 1) * sizeof *exchange);
-    if (exchange != NULL) b->exchange = exchange;
-    uint8_t *state = realloc(b->state, (capacity + 1) * sizeof *state);
-    if (state != NULL) b->state = state;
-    if (other == NULL || exchange == NULL || state == NULL) return false;
+    if (array_resize(&b->other, capacity, sizeof *b->other, "pairs", NULL) != LAM_OK ||
+        array_resize(&b->exchange, capacity, sizeof *b->exchange, "pairs", NULL) != LAM_OK ||
+        array_resize(&b->state, capacity, sizeof *b->state, "pairs", NULL) != LAM_OK)
+        return false;
     b->capacity = capacity;
     return true;
 }
 
 bool pair_block_reserve(pair_block *b, size_t more) {
     if (b->capacity - b->used >= more) return true;
-    return block_resize(b, b->capacity + b->capacity / 2 + more + 4096);
+    return block_resize(b, array_capacity(b->capacity, b->used + more));
 }
 
 void pair_block_shrink(pair_block *b) {

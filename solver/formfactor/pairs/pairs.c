@@ -1,5 +1,6 @@
 #include "solver/formfactor/pairs/pairs.h"
 
+#include "solver/base/array_grow.h"
 #include "solver/formfactor/pairs/cluster_links.h"
 #include "solver/formfactor/pairs/pair_far.h"
 #include "solver/formfactor/pairs/pair_rows.h"
@@ -49,13 +50,9 @@ static bool find_reaches(const pairs_run *run, uint32_t leaf, leaf_reaches *out)
     out->n = 0;
     for (uint32_t c = leaf;; c = run->parent[c]) {
         const size_t first = run->links.of_cluster[c], last = run->links.of_cluster[c + 1];
-        if (out->n + (last - first) > out->capacity) {
-            const size_t capacity = 2 * (out->n + (last - first)) + 64;
-            reach *more = realloc(out->reaches, capacity * sizeof *more);
-            if (more == NULL) return false;
-            out->reaches = more;
-            out->capacity = capacity;
-        }
+        if (array_grow(&out->reaches, &out->capacity, out->n + (last - first), sizeof *out->reaches, "pairs",
+                       NULL) != LAM_OK)
+            return false;
         for (size_t k = first; k < last; k++) {
             const cluster *b = &run->tree.clusters[run->links.links[k].b];
             out->reaches[out->n++] = (reach){b->first, b->last, run->links.links[k].open};

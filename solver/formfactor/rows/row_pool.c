@@ -1,5 +1,6 @@
 #include "solver/formfactor/rows/row_pool.h"
 
+#include "solver/base/array_grow.h"
 #include "solver/formfactor/rows/row_file.h"
 
 #include <omp.h>
@@ -11,13 +12,7 @@
 enum { CHUNK_MOST = 16, CHUNK_RAYS = 1 << 18, BLOCK_RAYS = 1 << 20 };
 
 static bool pool_reserve(row_pool *p, size_t more) {
-    if (p->capacity - p->used >= more) return true;
-    const size_t capacity = p->capacity + p->capacity / 2 + more + 4096;
-    uint8_t *bytes = realloc(p->bytes, capacity);
-    if (bytes == NULL) return false;
-    p->bytes = bytes;
-    p->capacity = capacity;
-    return true;
+    return array_grow(&p->bytes, &p->capacity, p->used + more, 1, "form factor rows", NULL) == LAM_OK;
 }
 
 static lam_status pools_create(const row_maker *maker, size_t n_pools, row_pool **out, lam_error *error) {

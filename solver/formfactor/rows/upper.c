@@ -1,5 +1,7 @@
 #include "solver/formfactor/rows/upper.h"
 
+#include "solver/base/array_grow.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -24,15 +26,11 @@ typedef struct transpose_slice {
 } transpose_slice;
 
 static void transpose_push_grown(transpose_slice *slice, transpose_entry entry) {
-    const size_t capacity = slice->capacity + slice->capacity / 2 + 1024;
-    transpose_entry *entries =
-        slice->failed ? NULL : realloc(slice->entries, capacity * sizeof *slice->entries);
-    if (entries == NULL) {
+    if (slice->failed || array_grow(&slice->entries, &slice->capacity, slice->count + 1,
+                                    sizeof *slice->entries, "form factor rows", NULL) != LAM_OK) {
         slice->failed = true;
         return;
     }
-    slice->entries = entries;
-    slice->capacity = capacity;
     slice->entries[slice->count++] = entry;
 }
 

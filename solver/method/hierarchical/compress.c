@@ -1,3 +1,4 @@
+#include "solver/base/array_grow.h"
 #include "solver/method/hierarchical/compress_bound.h"
 
 #include "solver/method/hierarchical/plane_tree.h"
@@ -131,16 +132,9 @@ static void take_children(const compress_job *job, size_t t, compress_work *d) {
 }
 
 static lam_status keep(compress_work *d, size_t i, size_t j, double value, lam_error *error) {
-    if (d->n_kept == d->capacity) {
-        const size_t capacity = d->capacity + d->capacity / 2 + 4096;
-        kept_number *const more = realloc(d->kept, capacity * sizeof *more);
-        if (more == NULL)
-            return status_fail(error, LAM_ERR_MEMORY,
-                               "compressed form factors: cannot allocate %zu x %zu bytes", capacity,
-                               sizeof *more);
-        d->kept = more;
-        d->capacity = capacity;
-    }
+    if (array_grow(&d->kept, &d->capacity, d->n_kept + 1, sizeof *d->kept, "compressed form factors",
+                   error) != LAM_OK)
+        return LAM_ERR_MEMORY;
     d->kept[d->n_kept++] = (kept_number){(uint32_t)i, (uint32_t)j, (float)value};
     return LAM_OK;
 }

@@ -161,14 +161,12 @@ static lam_status find_shape(shape_table *t, const wavelet_shape *s, const squar
     }
     const size_t size = (size_t)s->inputs * s->inputs;
     if (t->count == t->capacity) {
-        t->capacity = 2 * t->capacity + 64;
-        TRY(grow(&t->shapes, t->capacity, sizeof *t->shapes, error));
-        TRY(grow(&t->begin, t->capacity, sizeof *t->begin, error));
+        const size_t capacity = array_capacity(t->capacity, t->count + 1);
+        TRY(array_resize(&t->shapes, capacity, sizeof *t->shapes, "wavelets", error));
+        TRY(array_resize(&t->begin, capacity, sizeof *t->begin, "wavelets", error));
+        t->capacity = capacity;
     }
-    if (t->used + size > t->room) {
-        t->room = 2 * t->room + 64 * WAVELET_INPUTS;
-        TRY(grow(&t->basis, t->room, sizeof *t->basis, error));
-    }
+    TRY(array_grow(&t->basis, &t->room, t->used + size, sizeof *t->basis, "wavelets", error));
     t->shapes[t->count] = *s;
     t->begin[t->count] = t->used;
     for (size_t i = 0; i < s->inputs; i++)

@@ -22,10 +22,11 @@ typedef struct entries {
 static lam_status put(entries *to, size_t i, size_t j, float value, lam_error *error) {
     lam_status status = LAM_OK;
     if (to->used == to->capacity) {
-        to->capacity = 2 * to->capacity + 1024;
-        TRY(grow(&to->row, to->capacity, sizeof *to->row, error));
-        TRY(grow(&to->column, to->capacity, sizeof *to->column, error));
-        TRY(grow(&to->value, to->capacity, sizeof *to->value, error));
+        const size_t capacity = array_capacity(to->capacity, to->used + 1);
+        TRY(array_resize(&to->row, capacity, sizeof *to->row, "wavelets", error));
+        TRY(array_resize(&to->column, capacity, sizeof *to->column, "wavelets", error));
+        TRY(array_resize(&to->value, capacity, sizeof *to->value, "wavelets", error));
+        to->capacity = capacity;
     }
     to->row[to->used] = (uint32_t)i;
     to->column[to->used] = (uint32_t)j;

@@ -1,5 +1,6 @@
 #include "solver/method/hierarchical/wavelet_entries.h"
 
+#include "solver/base/array_grow.h"
 #include "solver/operator/wavelet/wavelet_plan.h"
 
 #include "store/status.h"
@@ -14,15 +15,8 @@ void coefficient_list_free(coefficient_list *k) {
 }
 
 lam_status coefficient_list_add(coefficient_list *k, uint32_t i, uint32_t j, float value, lam_error *error) {
-    if (k->count == k->capacity) {
-        const size_t capacity = k->capacity + k->capacity / 2 + 4096;
-        coefficient *const more = realloc(k->list, capacity * sizeof *more);
-        if (more == NULL)
-            return status_fail(error, LAM_ERR_MEMORY, "wavelets: cannot allocate %zu x %zu bytes", capacity,
-                               sizeof *more);
-        k->list = more;
-        k->capacity = capacity;
-    }
+    if (array_grow(&k->list, &k->capacity, k->count + 1, sizeof *k->list, "wavelets", error) != LAM_OK)
+        return LAM_ERR_MEMORY;
     k->list[k->count++] = i < j ? (coefficient){i, j, value} : (coefficient){j, i, value};
     return LAM_OK;
 }
@@ -164,15 +158,7 @@ void fine_columns_free(fine_columns *d) {
 }
 
 lam_status fine_columns_reserve(fine_columns *d, size_t more, lam_error *error) {
-    if (d->capacity - d->count >= more) return LAM_OK;
-    const size_t capacity = d->count + more + d->capacity / 2 + 64;
-    fine_column *const list = realloc(d->list, capacity * sizeof *list);
-    if (list == NULL)
-        return status_fail(error, LAM_ERR_MEMORY, "wavelets: cannot allocate %zu x %zu bytes", capacity,
-                           sizeof *list);
-    d->list = list;
-    d->capacity = capacity;
-    return LAM_OK;
+    return array_grow(&d->list, &d->capacity, d->count + more, sizeof *d->list, "wavelets", error);
 }
 
 lam_status fine_columns_union(const fine_columns *a, const fine_column *b, size_t b_count, fine_columns *into,

@@ -101,9 +101,10 @@ static lam_status store_row(const product_job *job, const row_rule *rule, size_t
     }
     qsort(row, used, sizeof *row, rule->by_size ? by_size : by_index);
     if (d->done.used + used > d->done.capacity) {
-        d->done.capacity = 2 * d->done.capacity + used + 4096;
-        TRY(grow(&d->done.indices, d->done.capacity, sizeof *d->done.indices, error));
-        TRY(grow(&d->done.data, d->done.capacity, sizeof *d->done.data, error));
+        const size_t capacity = array_capacity(d->done.capacity, d->done.used + used);
+        TRY(array_resize(&d->done.indices, capacity, sizeof *d->done.indices, "wavelets", error));
+        TRY(array_resize(&d->done.data, capacity, sizeof *d->done.data, "wavelets", error));
+        d->done.capacity = capacity;
     }
     for (size_t k = 0; k < used; k++) {
         d->done.indices[d->done.used] = row[k].index;

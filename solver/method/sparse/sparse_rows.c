@@ -1,5 +1,7 @@
 #include "solver/method/sparse/sparse_rows.h"
 
+#include "solver/base/array_grow.h"
+
 #include <stdlib.h>
 
 static void reflected_free(reflected *r) {
@@ -106,12 +108,10 @@ static double bounce(row_work *d, const reflected *RF) {
 
 static bool row_work_reserve(row_work *d, size_t more) {
     if (d->capacity - d->used >= more) return true;
-    const size_t capacity = d->used + more + d->capacity / 2 + 4096;
-    uint32_t *indices = realloc(d->indices, capacity * sizeof *indices);
-    if (indices != NULL) d->indices = indices;
-    float *data = realloc(d->data, capacity * sizeof *data);
-    if (data != NULL) d->data = data;
-    if (indices == NULL || data == NULL) return false;
+    const size_t capacity = array_capacity(d->capacity, d->used + more);
+    if (array_resize(&d->indices, capacity, sizeof *d->indices, "sparse rows", NULL) != LAM_OK ||
+        array_resize(&d->data, capacity, sizeof *d->data, "sparse rows", NULL) != LAM_OK)
+        return false;
     d->capacity = capacity;
     return true;
 }

@@ -1,5 +1,6 @@
 #include "solver/operator/wavelet/wavelet_plan.h"
 
+#include "solver/base/array_grow.h"
 #include "store/status.h"
 
 #include <stdlib.h>
@@ -90,15 +91,9 @@ static lam_status find_matrix(whole_table *table, size_t t, size_t *out, lam_err
     }
     const wavelet_node *a = &table->basis->nodes[t];
     const size_t size = a->scaling * padded(a->n_elements);
-    if (table->used + size > table->room) {
-        const size_t room = 2 * table->room + 4096 + size;
-        float *const more = realloc(table->matrices, room * sizeof *more);
-        if (more == NULL)
-            return status_fail(error, LAM_ERR_MEMORY, "wavelets: cannot allocate %zu x %zu bytes", room,
-                               sizeof *more);
-        table->matrices = more;
-        table->room = room;
-    }
+    if (array_grow(&table->matrices, &table->room, table->used + size, sizeof *table->matrices, "wavelets",
+                   error) != LAM_OK)
+        return LAM_ERR_MEMORY;
     write_rows(table->basis, t, table->matrices + table->used);
     *out = table->matrix[t] = table->used;
     table->slots[slot] = (uint32_t)t + 1;

@@ -1,6 +1,6 @@
 #include "solver/scene/facet/facet_grid.h"
 
-#include "solver/scene/tables.h"
+#include "solver/base/array_grow.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -200,10 +200,9 @@ typedef struct gathering {
 
 static lam_status gather(const mesh *m, const uint32_t *elements, size_t n, const frame *f,
                          const facet_grid *grid, gathering *g, lam_error *error) {
-    void *grown =
-        array_grow(g->footprints, &g->footprint_capacity, n, sizeof *g->footprints, "facets", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    g->footprints = grown;
+    if (array_grow(&g->footprints, &g->footprint_capacity, n, sizeof *g->footprints, "facets", error) !=
+        LAM_OK)
+        return LAM_ERR_MEMORY;
     g->n = 0;
     for (size_t k = 0; k < n; k++) {
         footprint *p = &g->footprints[k];
@@ -216,9 +215,9 @@ static lam_status gather(const mesh *m, const uint32_t *elements, size_t n, cons
                 double best, worst;
                 reach(p, x, y, &best, &worst);
                 if (best <= margin) continue;
-                grown = array_grow(g->overlaps, &g->capacity, g->n + 1, sizeof *g->overlaps, "facets", error);
-                if (grown == NULL) return LAM_ERR_MEMORY;
-                g->overlaps = grown;
+                if (array_grow(&g->overlaps, &g->capacity, g->n + 1, sizeof *g->overlaps, "facets", error) !=
+                    LAM_OK)
+                    return LAM_ERR_MEMORY;
                 g->overlaps[g->n++] = (overlap){y * grid->nx + x, (uint32_t)k, worst >= -margin};
             }
     }
@@ -228,17 +227,15 @@ static lam_status gather(const mesh *m, const uint32_t *elements, size_t n, cons
 
 static lam_status fill_cells(const facet_grid *grid, const gathering *g, facet_grids *out, lam_error *error) {
     const size_t n_cells = (size_t)grid->nx * grid->ny;
-    void *grown = array_grow(out->cells, &out->cell_capacity, out->n_cells + n_cells, sizeof *out->cells,
-                             "facets", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    out->cells = grown;
+    if (array_grow(&out->cells, &out->cell_capacity, out->n_cells + n_cells, sizeof *out->cells, "facets",
+                   error) != LAM_OK)
+        return LAM_ERR_MEMORY;
     uint32_t *cells = out->cells + out->n_cells;
     out->n_cells += n_cells;
     for (size_t k = 0; k < n_cells; k++) cells[k] = CELL_EMPTY;
-    grown = array_grow(out->candidates, &out->candidate_capacity, out->n_candidates + g->n,
-                       sizeof *out->candidates, "facets", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    out->candidates = grown;
+    if (array_grow(&out->candidates, &out->candidate_capacity, out->n_candidates + g->n,
+                   sizeof *out->candidates, "facets", error) != LAM_OK)
+        return LAM_ERR_MEMORY;
     for (size_t first = 0, last; first < g->n; first = last) {
         const uint32_t cell = g->overlaps[first].cell;
         bool filled = false;

@@ -1,5 +1,6 @@
 #include "solver/scene/facet/facet_outline.h"
 
+#include "solver/base/array_grow.h"
 #include "solver/scene/plane.h"
 #include "solver/scene/polygon_split.h"
 #include "solver/scene/tables.h"
@@ -52,9 +53,9 @@ static int between_order(const void *a, const void *b) {
 }
 
 static lam_status append(side_list *list, side s, lam_error *error) {
-    void *grown = array_grow(list->sides, &list->capacity, list->n + 1, sizeof *list->sides, "facets", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    list->sides = grown;
+    if (array_grow(&list->sides, &list->capacity, list->n + 1, sizeof *list->sides, "facets", error) !=
+        LAM_OK)
+        return LAM_ERR_MEMORY;
     list->sides[list->n++] = s;
     return LAM_OK;
 }
@@ -67,9 +68,8 @@ static lam_status cut_side(const mesh *m, double flat, const side *all, size_t n
     for (size_t k = 0; k < n; k++) {
         const uint32_t v = all[k].from;
         if (v == s.from || v == s.to || vertex_off_way(m, s.from, v, s.to) > flat) continue;
-        void *grown = array_grow(c->at, &c->capacity, c->n + 1, sizeof *c->at, "facets", error);
-        if (grown == NULL) return LAM_ERR_MEMORY;
-        c->at = grown;
+        if (array_grow(&c->at, &c->capacity, c->n + 1, sizeof *c->at, "facets", error) != LAM_OK)
+            return LAM_ERR_MEMORY;
         const double *p = m->vertices[s.from], *x = m->vertices[v];
         c->at[c->n++] = (on_side){hypot(hypot(x[0] - p[0], x[1] - p[1]), x[2] - p[2]), v};
     }
@@ -371,14 +371,12 @@ static bool is_parallelogram(const outlines *o, const uint32_t piece[4]) {
 }
 
 static lam_status add_piece(outlines *o, const uint32_t corners[4], uint32_t part, lam_error *error) {
-    void *grown =
-        array_grow(o->pieces, &o->piece_capacity, o->n_pieces + 1, sizeof *o->pieces, "facets", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    o->pieces = grown;
-    grown = array_grow(o->piece_part, &o->owner_capacity, o->n_pieces + 1, sizeof *o->piece_part, "facets",
-                       error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    o->piece_part = grown;
+    if (array_grow(&o->pieces, &o->piece_capacity, o->n_pieces + 1, sizeof *o->pieces, "facets", error) !=
+        LAM_OK)
+        return LAM_ERR_MEMORY;
+    if (array_grow(&o->piece_part, &o->owner_capacity, o->n_pieces + 1, sizeof *o->piece_part, "facets",
+                   error) != LAM_OK)
+        return LAM_ERR_MEMORY;
     memcpy(o->pieces[o->n_pieces], corners, sizeof *o->pieces);
     o->piece_part[o->n_pieces++] = part;
     return LAM_OK;

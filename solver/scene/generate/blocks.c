@@ -1,5 +1,7 @@
 #include "solver/scene/generate/blocks.h"
 
+#include "solver/base/array_grow.h"
+
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
@@ -16,9 +18,8 @@ lam_status block_add(blocks *all, int fill, double x0, double y0, double z0, dou
                        fill};
     for (int axis = 0; axis < 3; axis++)
         if (!(one.low[axis] < one.high[axis])) return LAM_OK;
-    block *grown = array_grow(all->items, &all->capacity, all->n + 1, sizeof *grown, "blocks", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    all->items = grown;
+    if (array_grow(&all->items, &all->capacity, all->n + 1, sizeof *all->items, "blocks", error) != LAM_OK)
+        return LAM_ERR_MEMORY;
     all->items[all->n++] = one;
     return LAM_OK;
 }

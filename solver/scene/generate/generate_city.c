@@ -1,5 +1,6 @@
 /* Cities in the manner of "Aguerre 2016, section 4.3.1", one plan and three distributions of heights, on the
  * three terrains of its section 4.3.5. Buildings are open below: nothing sees the ground under them. */
+#include "solver/base/array_grow.h"
 #include "solver/base/random.h"
 #include "solver/scene/face_grid.h"
 #include "solver/scene/generate/scene_draft.h"
@@ -48,10 +49,9 @@ static const struct {
 } variants[3] = {{5, 1.2, 0, 1}, {7, 6, 0, 1}, {21, 5, 36, 70}};
 
 static lam_status rectangle_add(city_rectangles *all, city_rectangle one, lam_error *error) {
-    city_rectangle *grown =
-        array_grow(all->items, &all->capacity, all->n + 1, sizeof *grown, "the plan of a city", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    all->items = grown;
+    if (array_grow(&all->items, &all->capacity, all->n + 1, sizeof *all->items, "the plan of a city",
+                   error) != LAM_OK)
+        return LAM_ERR_MEMORY;
     all->items[all->n++] = one;
     return LAM_OK;
 }

@@ -1,6 +1,7 @@
 /* The measured Cornell box: published corners in millimetres, turned so that z is up and the open front looks
  * along -y; the room is squared (the published walls lean by up to 6.4 mm, which four corners cannot do in a
  * plane). */
+#include "solver/base/array_grow.h"
 #include "solver/scene/generate/convex.h"
 #include "solver/scene/generate/scene_draft.h"
 
@@ -81,9 +82,9 @@ static lam_status cut_cell(cut_floor *left, const convex *cell, const convex fee
         memcpy(now, next, n_next * sizeof *next);
         n = n_next;
     }
-    convex *grown = array_grow(left->pieces, &left->capacity, left->n + n, sizeof *grown, "floor", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    left->pieces = grown;
+    if (array_grow(&left->pieces, &left->capacity, left->n + n, sizeof *left->pieces, "floor", error) !=
+        LAM_OK)
+        return LAM_ERR_MEMORY;
     memcpy(left->pieces + left->n, now, n * sizeof *now);
     left->n += n;
     return LAM_OK;

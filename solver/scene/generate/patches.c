@@ -1,4 +1,5 @@
 #include "solver/scene/generate/patches.h"
+#include "solver/base/array_grow.h"
 #include "solver/scene/face_grid.h"
 #include "solver/scene/plane.h"
 
@@ -7,9 +8,9 @@
 #include <string.h>
 
 lam_status patch_add(patch_list *list, const double (*corners)[3], size_t n, size_t group, lam_error *error) {
-    patch *grown = array_grow(list->items, &list->capacity, list->n + 1, sizeof *grown, "patches", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    list->items = grown;
+    if (array_grow(&list->items, &list->capacity, list->n + 1, sizeof *list->items, "patches", error) !=
+        LAM_OK)
+        return LAM_ERR_MEMORY;
     patch *p = &list->items[list->n++];
     *p = (patch){.n = (uint32_t)n, .group = (uint32_t)group};
     memcpy(p->corners, corners, n * sizeof *corners);

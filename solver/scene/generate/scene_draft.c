@@ -1,5 +1,6 @@
 #include "solver/scene/generate/scene_draft.h"
 
+#include "solver/base/array_grow.h"
 #include "solver/base/atomic_file.h"
 #include "solver/scene/face_grid.h"
 
@@ -20,10 +21,9 @@ void scene_draft_free(scene_draft *d) {
 
 lam_status scene_draft_group(scene_draft *d, const char *name, const scene_draft_material *material,
                              lam_error *error) {
-    struct scene_draft_group *grown =
-        array_grow(d->groups, &d->group_capacity, d->n_groups + 1, sizeof *grown, "groups", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    d->groups = grown;
+    if (array_grow(&d->groups, &d->group_capacity, d->n_groups + 1, sizeof *d->groups, "groups", error) !=
+        LAM_OK)
+        return LAM_ERR_MEMORY;
     d->groups[d->n_groups++] = (struct scene_draft_group){name, material};
     return LAM_OK;
 }
@@ -33,10 +33,7 @@ lam_status scene_draft_face(scene_draft *d, const double (*corners)[3], size_t n
     struct scene_draft_face face = {{0, 0, 0, TABLE_NONE}, (uint32_t)(d->n_groups - 1)};
     if (!d->counting) {
         for (size_t k = 0; k < n; k++) TRY(point_table_add(&d->points, corners[k], &face.corners[k], error));
-        struct scene_draft_face *grown =
-            array_grow(d->faces, &d->face_capacity, d->n_faces + 1, sizeof *grown, "faces", error);
-        if (grown == NULL) TRY(LAM_ERR_MEMORY);
-        d->faces = grown;
+        TRY(array_grow(&d->faces, &d->face_capacity, d->n_faces + 1, sizeof *d->faces, "faces", error));
         d->faces[d->n_faces] = face;
     }
     d->n_faces++;

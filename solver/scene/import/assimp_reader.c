@@ -1,4 +1,5 @@
 /* glTF, PLY, STL and whatever else libassimp reads, to a soup: the only user of it. Runs in the child. */
+#include "solver/base/array_grow.h"
 #include "solver/base/file_text.h"
 #include "solver/scene/import/imported_faces.h"
 
@@ -133,10 +134,7 @@ static lam_status read_mesh(assimp_state *a, const struct aiMesh *m, const affin
     for (unsigned f = 0; f < m->mNumFaces; f++) {
         const unsigned n = m->mFaces[f].mNumIndices;
         if (n < 3) continue; /* a point or a line */
-        uint32_t *grown =
-            array_grow(a->corners, &a->corner_capacity, n, sizeof *a->corners, "face corners", error);
-        if (grown == NULL) TRY(LAM_ERR_MEMORY);
-        a->corners = grown;
+        TRY(array_grow(&a->corners, &a->corner_capacity, n, sizeof *a->corners, "face corners", error));
         for (unsigned k = 0; k < n; k++) {
             const unsigned corner = m->mFaces[f].mIndices[mirrored ? n - 1 - k : k];
             if (corner >= m->mNumVertices)

@@ -1,5 +1,6 @@
 /* What the importer's child read, turned into a mesh: groups, materials, units. */
 #include "solver/scene/import/import.h"
+#include "solver/base/array_grow.h"
 #include "solver/scene/import/imported_faces.h"
 
 #include <float.h>
@@ -148,9 +149,7 @@ static lam_status name_groups(const imported_faces *s, mesh *m, lam_error *error
                                                        : m->name;
         if (e->object != TABLE_NONE && only[e->object] == several) {
             const size_t length = strlen(name) + 1 + strlen(material) + 1;
-            char *grown = array_grow(joined, &joined_capacity, length, 1, "groups", error);
-            if (grown == NULL) TRY(LAM_ERR_MEMORY);
-            joined = grown;
+            TRY(array_grow(&joined, &joined_capacity, length, 1, "groups", error));
             snprintf(joined, length, "%s.%s", name, material);
             name = joined;
         }

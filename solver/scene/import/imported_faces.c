@@ -1,5 +1,7 @@
 #include "solver/scene/import/imported_faces.h"
 
+#include "solver/base/array_grow.h"
+
 #include <errno.h>
 #include <math.h>
 #include <stdarg.h>
@@ -42,24 +44,21 @@ void imported_faces_free(imported_faces *s) {
 }
 
 lam_status imported_faces_add_vertex(imported_faces *s, const double vertex[3], lam_error *error) {
-    void *grown = array_grow(s->vertices, &s->vertex_capacity, s->n_vertices + 1, sizeof *s->vertices,
-                             "vertices", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    s->vertices = grown;
+    if (array_grow(&s->vertices, &s->vertex_capacity, s->n_vertices + 1, sizeof *s->vertices, "vertices",
+                   error) != LAM_OK)
+        return LAM_ERR_MEMORY;
     memcpy(s->vertices[s->n_vertices++], vertex, sizeof *s->vertices);
     return LAM_OK;
 }
 
 lam_status imported_faces_add_polygon(imported_faces *s, const uint32_t *corners, size_t n, uint32_t object,
                                       uint32_t material, uint32_t line, lam_error *error) {
-    void *grown = array_grow(s->corners, &s->corner_capacity, s->n_corners + n, sizeof *s->corners,
-                             "face corners", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    s->corners = grown;
-    grown =
-        array_grow(s->polygons, &s->polygon_capacity, s->n_polygons + 1, sizeof *s->polygons, "faces", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    s->polygons = grown;
+    if (array_grow(&s->corners, &s->corner_capacity, s->n_corners + n, sizeof *s->corners, "face corners",
+                   error) != LAM_OK)
+        return LAM_ERR_MEMORY;
+    if (array_grow(&s->polygons, &s->polygon_capacity, s->n_polygons + 1, sizeof *s->polygons, "faces",
+                   error) != LAM_OK)
+        return LAM_ERR_MEMORY;
     memcpy(s->corners + s->n_corners, corners, n * sizeof *corners);
     s->polygons[s->n_polygons++] =
         (struct imported_polygon){s->n_corners, (uint32_t)n, object, material, line};
@@ -72,10 +71,9 @@ lam_status imported_faces_add_material(imported_faces *s, const char *name, size
     const size_t before = s->materials.n;
     lam_status status = name_table_add(&s->materials, name, length, index, error);
     if (status != LAM_OK || s->materials.n == before) return status;
-    void *grown =
-        array_grow(s->values, &s->value_capacity, s->materials.n, sizeof *s->values, "materials", error);
-    if (grown == NULL) return LAM_ERR_MEMORY;
-    s->values = grown;
+    if (array_grow(&s->values, &s->value_capacity, s->materials.n, sizeof *s->values, "materials", error) !=
+        LAM_OK)
+        return LAM_ERR_MEMORY;
     s->values[*index] = (imported_material){0};
     return LAM_OK;
 }
@@ -86,10 +84,8 @@ static lam_status add_element(imported_faces *s, const uint32_t piece[4],
     struct imported_element element = {{0, 0, 0, TABLE_NONE}, polygon->object, polygon->material};
     for (int k = 0; k < 4 && piece[k] != TABLE_NONE; k++)
         TRY(point_table_add(&s->points, s->vertices[piece[k]], &element.corners[k], error));
-    void *grown = array_grow(s->elements, &s->element_capacity, s->n_elements + 1, sizeof *s->elements,
-                             "elements", error);
-    if (grown == NULL) TRY(LAM_ERR_MEMORY);
-    s->elements = grown;
+    TRY(array_grow(&s->elements, &s->element_capacity, s->n_elements + 1, sizeof *s->elements, "elements",
+                   error));
     s->elements[s->n_elements++] = element;
 done:
     return status;

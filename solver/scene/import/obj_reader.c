@@ -1,6 +1,7 @@
 /* OBJ + MTL to a soup, read here and not by the importing library, which keeps coordinates in single
  * precision, merges the names of `o` and `g`, invents a diffuse colour and only logs a missing MTL. Runs in
  * the child. */
+#include "solver/base/array_grow.h"
 #include "solver/base/file_text.h"
 #include "solver/scene/import/imported_faces.h"
 
@@ -196,10 +197,7 @@ static lam_status read_face(obj_state *o, uint32_t line, const char *text, lam_e
             FAIL(error, LAM_ERR_FORMAT,
                  "%s:%u: vertex index %.*s of a face, must be 1 to %zu or count back from there", o->path,
                  line, (int)(stop - text), text, o->s->n_vertices);
-        uint32_t *grown =
-            array_grow(o->corners, &o->corner_capacity, n + 1, sizeof *o->corners, "face corners", error);
-        if (grown == NULL) TRY(LAM_ERR_MEMORY);
-        o->corners = grown;
+        TRY(array_grow(&o->corners, &o->corner_capacity, n + 1, sizeof *o->corners, "face corners", error));
         o->corners[n++] = (uint32_t)index;
         for (text = stop; *text != '\0' && !is_blank(*text);) text++;
         while (is_blank(*text)) text++;
