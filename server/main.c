@@ -2,6 +2,7 @@
 #include "server/http/http.h"
 #include "server/route/routes.h"
 #include "server/scene/map_guard.h"
+#include "solver/base/clock.h"
 #include "solver/base/options.h"
 #include "solver/codec/reflectance.h"
 
@@ -67,13 +68,10 @@ static void serve_until_signal(service *s, const sigset_t *signals) {
  * SIGHUP) ends the wait. */
 static void drain(service *s, const sigset_t *signals) {
     const struct timespec pause = {.tv_nsec = 5000000};
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    time_t end = now.tv_sec + (time_t)s->config->timeout_s + 1;
-    while (metrics_in_flight(s->metrics) > 0 && now.tv_sec < end) {
+    const double end = clock_seconds() + (double)s->config->timeout_s + 1;
+    while (metrics_in_flight(s->metrics) > 0 && clock_seconds() < end) {
         int signal_number = sigtimedwait(signals, NULL, &pause);
         if (signal_number == SIGINT || signal_number == SIGTERM) break;
-        clock_gettime(CLOCK_MONOTONIC, &now);
     }
 }
 

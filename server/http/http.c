@@ -3,6 +3,7 @@
 #include "server/http/http_request.h"
 #include "server/scene/map_guard.h"
 #include "server/scene/verifier.h"
+#include "solver/base/clock.h"
 #include "solver/codec/json_writer.h"
 
 #include <stdio.h>
@@ -242,7 +243,7 @@ static request *begin_request(http *h, struct MHD_Connection *connection, const 
     r->accepted = coding_choose(http_header(r, MHD_HTTP_HEADER_ACCEPT_ENCODING));
     client_enter(h->service->connections, r->client, STAGE_BODY, 0);
     snprintf(r->method, sizeof r->method, "%s", method);
-    clock_gettime(CLOCK_MONOTONIC, &r->start);
+    r->start = clock_seconds();
     r->match.label = route_label_count() - 1;
     metrics_begin(h->service->metrics);
     return r;
@@ -335,10 +336,8 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     request *r = *request_context;
     if (r == NULL) return;
     *request_context = NULL;
-    struct timespec end;
-    clock_gettime(CLOCK_MONOTONIC, &end);
+    const double seconds = clock_seconds() - r->start;
     client_enter(h->service->connections, r->client, STAGE_HEAD, 0);
-    double seconds = (double)(end.tv_sec - r->start.tv_sec) + 1e-9 * (double)(end.tv_nsec - r->start.tv_nsec);
     unsigned status = r->queued && code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? r->answer.status : 0;
     if (h->service->access_log != NULL) log_request(r, status, seconds * 1e3);
     catalog_release(r->snapshot);

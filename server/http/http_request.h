@@ -8,7 +8,6 @@
 #include "server/route/routes.h"
 
 #include <microhttpd.h>
-#include <time.h>
 
 /* Lives from its head to the last byte of its answer. It belongs to the I/O thread, or, while its connection
  * is suspended, to the thread that solves. */
@@ -19,8 +18,8 @@ typedef struct request {
     client *client; /* NULL when memory was short */
     char id[REQUEST_ID_MAX + 1];
     char method[16];
-    char *path; /* as sent */
-    struct timespec start;
+    char *path;   /* as sent */
+    double start; /* clock_seconds */
     route_match match;
     catalog_snapshot *snapshot;
     problem variant_why;

@@ -1,5 +1,7 @@
 #include "server/net/connections.h"
 
+#include "solver/base/clock.h"
+
 #include <errno.h>
 #include <linux/sockios.h>
 #include <linux/tcp.h>
@@ -16,7 +18,6 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
-#include <time.h>
 #include <unistd.h>
 
 #define SOCKET_FLAGS (SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC)
@@ -140,12 +141,6 @@ struct connections {
     bool ended;
 };
 
-static double now_s(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 lam_status connections_affordable(size_t wanted, size_t *most, lam_error *error) {
     lam_status status = LAM_OK;
     struct rlimit limit;
@@ -251,7 +246,7 @@ static client *find_idle(const connections *all, double now) {
 /* With the lock. Closes what is past its deadline and, if all connections are in use, at most a quarter of
  * them that are idle. O(open) for each one closed. */
 static void sweep(connections *all) {
-    const double now = now_s();
+    const double now = clock_seconds();
     cut_reason why = CUT_HEAD;
     for (client *c = all->first; c != NULL; c = c->after)
         if (!c->cut && is_over_time(&all->limits, c, now, &why)) cut(all, c, why);
@@ -265,8 +260,7 @@ static void sweep(connections *all) {
 
 static void *watch(void *argument) {
     connections *all = argument;
-    struct timespec next;
-    clock_gettime(CLOCK_MONOTONIC, &next);
+    struct timespec next = clock_now();
     pthread_mutex_lock(&all->lock);
     while (!all->ended) {
         next.tv_sec++;
@@ -331,7 +325,7 @@ client *connections_add(connections *all, int fd) {
     client *c = calloc(1, sizeof *c);
     if (c == NULL) return NULL;
     c->fd = fd;
-    begin_stage(all, c, STAGE_HEAD, 0, now_s());
+    begin_stage(all, c, STAGE_HEAD, 0, clock_seconds());
     pthread_mutex_lock(&all->lock);
     c->after = all->first;
     if (all->first != NULL) all->first->before = c;
@@ -356,7 +350,7 @@ void connections_remove(connections *all, client *c) {
 
 void client_enter(connections *all, client *c, connection_stage stage, size_t bytes) {
     if (c == NULL) return;
-    const double now = now_s();
+    const double now = clock_seconds();
     pthread_mutex_lock(&all->lock);
     begin_stage(all, c, stage, bytes, now);
     pthread_mutex_unlock(&all->lock);

@@ -61,9 +61,4 @@ void answer_json(answer *out, buffer *b, bool written);
 codec_scene call_codec_scene(const call *in);
 answer_notes call_notes(const call *in);
 
-/* Milliseconds of a monotonic clock. */
-static inline double call_now_ms(void) {
-    return 1e3 * clock_seconds();
-}
-
 #endif

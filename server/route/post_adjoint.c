@@ -2,6 +2,7 @@
  * has the formulas. */
 #include "server/route/routes.h"
 #include "server/scene/gradient.h"
+#include "solver/base/clock.h"
 #include "solver/codec/adjoint.h"
 #include "solver/codec/answer.h"
 
@@ -109,7 +110,7 @@ static bool write_npy(const call *in, const adjoint_request *request, const adjo
 static bool write_json(const call *in, const adjoint_request *request, const adjoint_memory *memory,
                        answer_notes *notes, buffer *b, problem *why) {
     const scene *s = in->scene;
-    const double start = call_now_ms();
+    const double start = clock_ms();
     bool written = answer_head(b, s->n, s->n_channels, notes) && buffer_append_text(b, ",\"gradient\":{");
     for (int kind = 0, count = 0; written && kind < GRADIENT_COUNT; kind++) {
         size_t width;
@@ -119,7 +120,7 @@ static bool write_json(const call *in, const adjoint_request *request, const adj
         if (written && !answer_rows(b, &in->accept, s->n_channels, width, values, why)) return false;
     }
     written = written && buffer_append(b, "}", 1);
-    notes->encode_ms = call_now_ms() - start;
+    notes->encode_ms = clock_ms() - start;
     return (written && answer_tail(b, notes)) ||
            problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the answer");
 }
@@ -143,15 +144,15 @@ void post_adjoint(call *in, answer *out) {
     adjoint_memory memory = {0};
     problem why = {0};
     buffer b = {0};
-    const double start = call_now_ms();
+    const double start = clock_ms();
     bool good = read_body(in, &request, &why) && get_memory(in, &request, &memory, &why);
-    const double parsed = call_now_ms();
+    const double parsed = clock_ms();
     notes.parse_ms = parsed - start;
     notes.quantity = request.quantity;
     notes.has_error = false; /* error figures are of answers, not of gradients */
     in->n_rhs = 1;
     good = good && solve(in->scene, &request, &memory, in->service->metrics, &why);
-    notes.solve_ms = call_now_ms() - parsed;
+    notes.solve_ms = clock_ms() - parsed;
     if (good && (in->accept.type == MEDIA_NPY ? write_npy(in, &request, &memory, &b, &why)
                                               : write_json(in, &request, &memory, &notes, &b, &why))) {
         answer_json(out, &b, true);

@@ -3,6 +3,7 @@
 #include "server/route/radiosity_figures.h"
 #include "server/route/refined_answer.h"
 #include "server/route/routes.h"
+#include "solver/base/clock.h"
 #include "solver/codec/answer.h"
 #include "solver/codec/request.h"
 
@@ -97,13 +98,13 @@ static bool begin(call *in, answer *out) {
         answer_refuse(out, PROBLEM_NO_MEMORY, "not enough memory for the request");
         return false;
     }
-    const double start = call_now_ms();
+    const double start = clock_ms();
     bool good = in->body_type == MEDIA_NPY ? codec_read_npy(&about, in->body, in->length, &s->request, &why)
                                            : codec_read_json(&about, in->body, in->length, &s->request, &why);
     const radiosity_request *request = &s->request;
     s->notes = call_notes(in);
     s->notes.quantity = request->quantity;
-    s->notes.parse_ms = call_now_ms() - start;
+    s->notes.parse_ms = clock_ms() - start;
     s->shape = (answer_shape){.n = of->n,
                               .n_channels = of->n_channels,
                               .n_rhs = request->n_rhs,
@@ -177,7 +178,7 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
     lam_error error = {.message = ""};
     problem why = {0};
     size_t count = 0, bytes = 0;
-    const double start = call_now_ms();
+    const double start = clock_ms();
     const radiosity_solve *one = first->state;
     if (one->refined != NULL) {
         pass_refined(parts, n_parts);
@@ -202,7 +203,7 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
         if (status != LAM_OK) problem_set(&why, PROBLEM_INTERNAL, "%s", error.message);
     }
     metrics_pass(first->service->metrics, count);
-    const double took = call_now_ms() - start;
+    const double took = clock_ms() - start;
     for (size_t p = 0; p < n_parts; p++) {
         radiosity_solve *solve = call_of(parts[p].job)->state;
         solve->notes.solve_ms += took;
@@ -214,7 +215,7 @@ static void pass(const batch_part *parts, size_t n_parts, batch_workspace *works
 
 /* Writes figures or values into the answer; false with s->why. */
 static bool write_answer(call *in, radiosity_solve *s) {
-    const double start = call_now_ms();
+    const double start = clock_ms();
     bool good = !s->failed;
     if (s->refined != NULL)
         return good && refined_end(in, &s->request, s->refined, &s->notes, &s->answer, &s->why);
@@ -224,7 +225,7 @@ static bool write_answer(call *in, radiosity_solve *s) {
     good = good && (s->own == NULL
                         ? answer_placed(&s->answer, &s->shape, &s->why)
                         : answer_add(&s->answer, &s->shape, &in->accept, 0, s->shape.n_rhs, s->own, &s->why));
-    s->notes.encode_ms = call_now_ms() - start;
+    s->notes.encode_ms = clock_ms() - start;
     return good && answer_end(&s->answer, &s->shape, &in->accept, &s->notes, &s->why);
 }
 

@@ -3,6 +3,7 @@
 #include "server/route/routes.h"
 #include "server/scene/adjoint_rows.h"
 
+#include "solver/base/clock.h"
 #include "solver/codec/group_figures.h"
 
 #include <float.h>
@@ -85,7 +86,7 @@ static bool evaluate(const call *in, radiosity_request *request, adjoint_row *co
         adjoint_row_evaluate(s, rows[k], request, weights, means);
         reduce_means(r, k, s->n_channels, request->n_rhs, rows[k]->area, means, figures);
     }
-    const double solved = call_now_ms();
+    const double solved = clock_ms();
     notes->solve_ms += solved;
     good = good && figures_write(s, request, figures, notes, b, why);
     free(figures);
@@ -96,7 +97,7 @@ static bool evaluate(const call *in, radiosity_request *request, adjoint_row *co
 
 bool figures_linear(call *in, radiosity_request *request, answer_notes *notes, buffer *b, problem *why) {
     adjoint_row *rows[ADJOINT_ROWS_OF_REQUEST];
-    notes->solve_ms = -call_now_ms();
+    notes->solve_ms = -clock_ms();
     if (!adjoint_rows_get(in->scene, request, in->workspace, rows, why)) return false;
     const bool good = evaluate(in, request, rows, notes, b, why);
     adjoint_rows_release(in->scene, request->reduce.n_names, rows);
@@ -117,7 +118,7 @@ bool quick_radiosity(call *in, answer *out) {
     problem why = {0};
     buffer b = {0};
     adjoint_row *rows[ADJOINT_ROWS_OF_REQUEST];
-    const double start = call_now_ms();
+    const double start = clock_ms();
     bool good = codec_read_json(&about, in->body, in->length, &request, &why) &&
                 adjoint_row_work(s, &request) <= QUICK_WORK / request.reduce.n_names &&
                 adjoint_rows_find(s, &request, rows);
@@ -126,7 +127,7 @@ bool quick_radiosity(call *in, answer *out) {
         good = false;
     }
     if (good) {
-        const double parsed = call_now_ms();
+        const double parsed = clock_ms();
         notes.parse_ms = parsed - start;
         notes.solve_ms = -parsed;
         notes.quantity = request.quantity;

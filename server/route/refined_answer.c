@@ -1,6 +1,7 @@
 #include "server/route/refined_answer.h"
 
 #include "server/route/radiosity_figures.h"
+#include "solver/base/clock.h"
 #include "solver/codec/group_figures.h"
 #include "solver/operator/emitters.h"
 #include "solver/operator/sky_light.h"
@@ -171,7 +172,7 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
                   answer_notes *notes, buffer *b, problem *why) {
     const scene *s = in->scene;
     const lam_refiner *refiner = NULL;
-    const double begin = call_now_ms();
+    const double begin = clock_ms();
     bool good = find_refiner(s, &refiner, why);
     if (good && !r->made) {
         r->made = true;
@@ -181,7 +182,7 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
     const double *x = good ? refine(s, refiner, request, first, count, &r->p, r->certificates + first,
                                     r->iterations + first, why)
                            : NULL;
-    const double solved = call_now_ms();
+    const double solved = clock_ms();
     notes->solve_ms += solved - begin;
     good = x != NULL;
     if (good && r->figures != NULL)
@@ -195,7 +196,7 @@ bool refined_pass(call *in, const radiosity_request *request, size_t first, size
                                   x + v * s->n_channels * r->shape.n_values, &rounding, why);
         r->certificates[first + v] += rounding;
     }
-    notes->encode_ms += call_now_ms() - solved;
+    notes->encode_ms += clock_ms() - solved;
     if (good) metrics_pass(in->service->metrics, count);
     return good;
 }

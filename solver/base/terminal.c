@@ -41,16 +41,6 @@ void terminal_clear(terminal *t) {
     t->line_shown = false;
 }
 
-static void format_seconds(double seconds, char *text, size_t size) {
-    long whole = lround(fmin(seconds, 1e8));
-    if (whole < 60)
-        snprintf(text, size, "%ld s", whole);
-    else if (whole < 3600)
-        snprintf(text, size, "%ld min %ld s", whole / 60, whole % 60);
-    else
-        snprintf(text, size, "%ld h %ld min", whole / 3600, whole % 3600 / 60);
-}
-
 static void show(void *context, const char *stage, double share) {
     terminal *t = context;
     double now = clock_seconds();
@@ -67,7 +57,7 @@ static void show(void *context, const char *stage, double share) {
     t->last_shown = now;
     char left[32] = "";
     double elapsed = now - t->stage_started;
-    if (share > 0.01 && elapsed > 0.5) format_seconds(elapsed / share * (1 - share), left, sizeof left);
+    if (share > 0.01 && elapsed > 0.5) clock_format_seconds(elapsed / share * (1 - share), left);
     fprintf(stderr, "\r\033[K%s: %.0f %%%s%s", stage, 100 * fmax(share, 0), left[0] != '\0' ? ", left: " : "",
             left);
     t->line_shown = true;

@@ -255,15 +255,6 @@ void forecast_format_bytes(double bytes, char text[32]) {
         snprintf(text, 32, "%.1fG", ceil(bytes * 0x1p-30 * 10) / 10);
 }
 
-void forecast_format_seconds(double seconds, char text[32]) {
-    if (seconds < 60)
-        snprintf(text, 32, "%.*f s", seconds < 10 ? 1 : 0, seconds);
-    else if (seconds < 3600)
-        snprintf(text, 32, "%.0f min", ceil(seconds / 60));
-    else
-        snprintf(text, 32, "%.1f h", seconds / 3600);
-}
-
 /* Halves what the rows are found with; false when that is little already. */
 static bool sample_less(recipe *r) {
     switch (r->method) {

@@ -51,9 +51,8 @@ double forecast_scratch_bytes(const forecast *f);
 lam_status forecast_check_disk(const forecast *f, const char *output, const scratch *rows,
                                const char *scratch_folder, lam_error *error);
 
-/* "812M", "2.4G", "3 min 20 s" */
+/* "812M", "2.4G" */
 void forecast_format_bytes(double bytes, char text[32]);
-void forecast_format_seconds(double seconds, char text[32]);
 
 /* Bytes that are free: MemAvailable of /proc/meminfo, less where a control group allows less; 0 when unknown.
  */

@@ -83,8 +83,8 @@ static lam_status announce(work *w, lam_error *error) {
     forecast_format_bytes(forecast_bytes(&f), memory);
     forecast_format_bytes(forecast_store_bytes(&f), stored);
     forecast_format_bytes(forecast_scratch_bytes(&f), scratch_room);
-    forecast_format_seconds(times.form_factors, seconds);
-    forecast_format_seconds(times.judge, judging);
+    clock_format_seconds(times.form_factors, seconds);
+    clock_format_seconds(times.judge, judging);
     /* How much is partly hidden is not known before. */
     const bool pairs = w->recipe.method == RECIPE_PAIRS || w->recipe.method == RECIPE_NEAR_PAIRS;
     if (!o->from_store) snprintf(made, sizeof made, " form factors %s%s,", seconds, pairs ? " or more" : "");

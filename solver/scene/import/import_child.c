@@ -1,5 +1,6 @@
 /* The process that scene files are read in, with limits, and the pipe that brings plain arrays back.
  * The parent trusts nothing that comes through it. */
+#include "solver/base/clock.h"
 #include "solver/scene/import/imported_faces.h"
 
 #include <errno.h>
@@ -13,7 +14,6 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 /* What the child sends first; then points, elements, both name texts and the material values. */
@@ -114,17 +114,14 @@ static _Noreturn void child_main(scene_reader *reader, const char *path, const c
 
 typedef struct reply_pipe {
     int fd;
-    struct timespec deadline;
+    double deadline_ms; /* of clock_ms */
     bool late;
 } reply_pipe;
 
 /* Reads exactly that many bytes; false at the end of the pipe or the time. */
 static bool receive_bytes(reply_pipe *pipe, void *out, size_t bytes) {
     for (char *at = out; bytes > 0;) {
-        struct timespec now;
-        clock_gettime(CLOCK_MONOTONIC, &now);
-        const double left_ms = 1e3 * (double)(pipe->deadline.tv_sec - now.tv_sec) +
-                               1e-6 * (double)(pipe->deadline.tv_nsec - now.tv_nsec);
+        const double left_ms = pipe->deadline_ms - clock_ms();
         struct pollfd ready = {.fd = pipe->fd, .events = POLLIN};
         const int n = left_ms <= 0 ? 0 : poll(&ready, 1, left_ms < 1e6 ? (int)left_ms + 1 : 1000000);
         if (n < 0 && errno == EINTR) continue;
@@ -263,8 +260,7 @@ lam_status import_in_child(scene_reader *reader, const char *path, const child_l
         FAIL(error, LAM_ERR_IO, "%s: cannot start the importer: fork: %s", path, strerror(fork_error));
     /* The kernel counts the processor time; the clock only ends a child that sleeps, even on a busy machine.
      */
-    clock_gettime(CLOCK_MONOTONIC, &from_child.deadline);
-    from_child.deadline.tv_sec += 4 * (time_t)limits->cpu_seconds + 2;
+    from_child.deadline_ms = clock_ms() + 1e3 * (4 * (double)limits->cpu_seconds + 2);
     status = receive_reply(&from_child, path, limits->memory_bytes, &received, &whole, error);
     if (status != LAM_OK || !whole) kill(child, SIGKILL); /* changes nothing for one that is dying already */
     while (waitpid(child, &wait_status, 0) < 0 && errno == EINTR) continue;
