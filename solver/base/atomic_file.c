@@ -15,7 +15,7 @@ static char *directory_of(const char *path) {
     return strndup(path, slash == path ? 1 : (size_t)(slash - path));
 }
 
-lam_status output_file_check(const char *path, lam_error *error) {
+lam_status atomic_file_check(const char *path, lam_error *error) {
     lam_status status = LAM_OK;
     struct stat about;
     char *directory = directory_of(path);
@@ -37,13 +37,13 @@ done:
     return status;
 }
 
-lam_status output_file_open(const char *path, output_file *out, lam_error *error) {
+lam_status atomic_file_open(const char *path, atomic_file *out, lam_error *error) {
     lam_status status = LAM_OK;
-    output_file file = {0};
+    atomic_file file = {0};
     int descriptor = -1;
     const char *slash = strrchr(path, '/');
     size_t folder = slash == NULL ? 0 : (size_t)(slash - path) + 1;
-    TRY(output_file_check(path, error));
+    TRY(atomic_file_check(path, error));
     file.path = strdup(path);
     if (file.path == NULL || asprintf(&file.partial, "%.*s.%s.partial-%ld", (int)folder, path, path + folder,
                                       (long)getpid()) < 0) {
@@ -61,14 +61,14 @@ lam_status output_file_open(const char *path, output_file *out, lam_error *error
         goto done;
     }
     *out = file;
-    file = (output_file){0};
+    file = (atomic_file){0};
 done:
     free(file.path);
     free(file.partial);
     return status;
 }
 
-lam_status output_file_commit(output_file *out, lam_error *error) {
+lam_status atomic_file_commit(atomic_file *out, lam_error *error) {
     lam_status status = LAM_OK;
     errno = 0;
     bool failed = ferror(out->stream) != 0;
@@ -85,19 +85,19 @@ lam_status output_file_commit(output_file *out, lam_error *error) {
     free(out->partial);
     out->partial = NULL;
 done:
-    output_file_abort(out);
+    atomic_file_abort(out);
     return status;
 }
 
-void output_file_abort(output_file *out) {
+void atomic_file_abort(atomic_file *out) {
     if (out->stream != NULL) fclose(out->stream);
     if (out->partial != NULL) unlink(out->partial);
     free(out->partial);
     free(out->path);
-    *out = (output_file){0};
+    *out = (atomic_file){0};
 }
 
-void output_file_extension(const char *path, char extension[16]) {
+void atomic_file_extension(const char *path, char extension[16]) {
     const char *slash = strrchr(path, '/');
     const char *dot = strrchr(slash != NULL ? slash : path, '.');
     extension[0] = '\0';

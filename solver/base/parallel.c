@@ -2,25 +2,24 @@
 
 #include <omp.h>
 
-/* One thing for the tasks to share: clang 14 does not survive a taskloop over a parameter that is a function.
- */
-typedef struct pieces {
-    pieces_function *run;
+/* The arguments as one object, because clang 14 crashes on a taskloop over a parameter that is a function. */
+typedef struct parallel_loop {
+    parallel_body *run;
     const void *job;
     size_t count;
-} pieces;
+} parallel_loop;
 
-static void share(const pieces *p) {
+static void share(const parallel_loop *l) {
     if (omp_in_parallel()) {
 #pragma omp taskloop grainsize(1)
-        for (size_t k = 0; k < p->count; k++) p->run(p->job, k);
+        for (size_t k = 0; k < l->count; k++) l->run(l->job, k);
     } else {
 #pragma omp parallel for schedule(dynamic, 1)
-        for (size_t k = 0; k < p->count; k++) p->run(p->job, k);
+        for (size_t k = 0; k < l->count; k++) l->run(l->job, k);
     }
 }
 
-void pieces_run(pieces_function *run, const void *job, size_t count) {
-    const pieces p = {run, job, count};
-    share(&p);
+void parallel_for(parallel_body *run, const void *job, size_t count) {
+    const parallel_loop l = {run, job, count};
+    share(&l);
 }

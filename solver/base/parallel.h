@@ -1,13 +1,12 @@
-/* Work cut into pieces that are independent of each other: tasks where there is a team of threads already,
- * else a team. */
+/* Loops over independent pieces of work: OpenMP tasks inside a team of threads, a new team elsewhere. */
 #ifndef LAMBERT_BASE_PARALLEL_H
 #define LAMBERT_BASE_PARALLEL_H
 
 #include <stddef.h>
 
-typedef void pieces_function(const void *job, size_t piece);
+typedef void parallel_body(const void *job, size_t piece);
 
-/* run(job, piece) for pieces 0 ... count-1, in any order and by any threads. */
-void pieces_run(pieces_function *run, const void *job, size_t count);
+/* Calls run(job, piece) for pieces 0 ... count-1, in any order and by any threads. */
+void parallel_for(parallel_body *run, const void *job, size_t count);
 
 #endif

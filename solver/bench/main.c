@@ -114,7 +114,7 @@ static lam_status results_open(results *r, lam_error *error) {
         probe = NULL;
         FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory for its name", r->folder);
     }
-    TRY(output_file_check(probe, error));
+    TRY(atomic_file_check(probe, error));
     const time_t now = time(NULL);
     struct tm utc;
     gmtime_r(&now, &utc);
@@ -142,19 +142,19 @@ static size_t results_count(const results *r) {
 static lam_status write_file(const results *r, const table *t, const char *extension, lam_error *error) {
     lam_status status = LAM_OK;
     char *path = NULL;
-    output_file out = {0};
+    atomic_file out = {0};
     if (asprintf(&path, "%s/%s-%s.%s", r->folder, r->suite, t->name, extension) < 0) {
         path = NULL;
         FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory for its name", r->folder);
     }
-    TRY(output_file_open(path, &out, error));
+    TRY(atomic_file_open(path, &out, error));
     if (strcmp(extension, "csv") == 0)
         table_csv(t, out.stream);
     else
         TRY(table_json(t, &r->run, out.stream, error));
-    TRY(output_file_commit(&out, error));
+    TRY(atomic_file_commit(&out, error));
 done:
-    output_file_abort(&out);
+    atomic_file_abort(&out);
     free(path);
     return status;
 }

@@ -50,7 +50,7 @@ lam_status emission_read(const char *path, const emission_scene *scene, emission
                                .groups = &scene->groups,
                                .n_tiles = scene->n_tiles,
                                .n_emitters = scene->n_emitters};
-    output_file_extension(path, extension);
+    atomic_file_extension(path, extension);
     const bool npy = strcmp(extension, "npy") == 0;
     if (!npy && strcmp(extension, "json") != 0)
         FAIL(error, LAM_ERR_ARGUMENT, "--emission %s: must end in .npy or .json", path);

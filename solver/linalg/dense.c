@@ -32,7 +32,7 @@ void dense_multiply(size_t n, size_t k, size_t m, const float *A, const float *B
         return;
     }
     const multiply_job job = {n, k, m, A, B, transposed, C};
-    pieces_run(multiply_piece, &job, (n + ROWS - 1) / ROWS);
+    parallel_for(multiply_piece, &job, (n + ROWS - 1) / ROWS);
 }
 
 /* The tile of a piece, counted along the rows of the upper triangle of tiles. */
@@ -74,7 +74,7 @@ void dense_gram(size_t n, size_t m, const float *A, float *G) {
     if (n == 0 || m == 0) return;
     const size_t tiles = (m + TILE - 1) / TILE;
     const gram_job job = {.n = n, .m = m, .tiles = tiles, .A = A, .G = G};
-    pieces_run(gram_piece, &job, tiles * (tiles + 1) / 2);
+    parallel_for(gram_piece, &job, tiles * (tiles + 1) / 2);
 }
 
 lam_status dense_gram_double(size_t n, size_t m, const float *A, double *G, lam_error *error) {
@@ -86,7 +86,7 @@ lam_status dense_gram_double(size_t n, size_t m, const float *A, double *G, lam_
         const size_t rows = n - first < PANEL ? n - first : PANEL;
         for (size_t k = 0; k < rows * m; k++) panel[k] = (double)A[first * m + k];
         const gram_job job = {.n = rows, .m = m, .tiles = tiles, .A_double = panel, .G_double = G};
-        pieces_run(gram_piece, &job, tiles * (tiles + 1) / 2);
+        parallel_for(gram_piece, &job, tiles * (tiles + 1) / 2);
     }
     free(panel);
     return LAM_OK;
@@ -122,7 +122,7 @@ lam_status dense_project(size_t n, size_t m, size_t w, const float *A, const flo
             for (size_t k = 0; k < rows * m; k++) a[k] = (double)A[first * m + k];
             for (size_t k = 0; k < rows * w; k++) b[k] = (double)B[first * w + k];
             const project_job job = {rows, m, w, a, b, C};
-            pieces_run(project_piece, &job, (m + TILE - 1) / TILE);
+            parallel_for(project_piece, &job, (m + TILE - 1) / TILE);
         }
     const bool enough = a != NULL && b != NULL;
     free(a);

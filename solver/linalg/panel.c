@@ -2,6 +2,7 @@
 #include "solver/linalg/panel.h"
 
 #include "solver/base/half.h"
+#include "solver/base/work_area.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -42,7 +43,7 @@ size_t panel_value_size(panel_precision precision) {
 /* Zeroed memory of so many bytes, *data at a cache line in it, or in huge pages: with 4 KiB pages a solve
  * takes twice as long. NULL on failure. */
 static void *allocate_data(size_t bytes, const char *name, void **data, lam_error *error) {
-    const size_t align = bytes < 2 * HUGE_PAGE ? PANEL_ALIGN : HUGE_PAGE;
+    const size_t align = bytes < 2 * HUGE_PAGE ? WORK_AREA_ALIGN : HUGE_PAGE;
     char *memory = memory_allocate(bytes + align, 1, name, error);
     if (memory == NULL) return NULL;
     char *aligned = memory + (align - (uintptr_t)memory % align) % align;

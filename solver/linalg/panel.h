@@ -20,8 +20,6 @@
 /* So many vectors share one pass over a matrix; more are cut into passes. At 16, one core computes about as
  * long as it reads. */
 #define PANEL_VECTORS 16
-/* Work areas are handed out in pieces of this alignment, in bytes. */
-#define PANEL_ALIGN 64
 
 /* How values are kept: float, IEEE half precision, signed bytes. */
 typedef enum panel_precision { PANEL_F32, PANEL_F16, PANEL_I8 } panel_precision;
@@ -42,7 +40,7 @@ typedef struct panel {
     size_t stride; /* k rounded up to PANEL_CHUNK */
     panel_precision precision;
     panel_layout layout;
-    void *data;                   /* PANEL_TILES: tiles, aligned to PANEL_ALIGN */
+    void *data;                   /* PANEL_TILES: tiles, aligned to WORK_AREA_ALIGN */
     const void *rows;             /* PANEL_ROWS: [n][k] */
     store_map *mapping;           /* held, where rows lie in one; else NULL */
     float *scale;                 /* [k], what the values of a column are multiplied by; NULL: 1; owned */
@@ -99,7 +97,7 @@ size_t panel_work_bytes(const panel *a, size_t m);
 /* T_v = a^T X_v for m vectors: X_v = X + v x_stride holds n numbers, T_v = T + v t_stride gets k.
  * Rows where every X_v is 0 are not read. Sums over rows end in double; the bits of T_v depend on X_v alone,
  * not on the batch nor on the number of threads.
- * work is aligned to PANEL_ALIGN. Cost: O(nk) a vector, one pass over a for PANEL_VECTORS of them. */
+ * work is aligned to WORK_AREA_ALIGN. Cost: O(nk) a vector, one pass over a for PANEL_VECTORS of them. */
 void panel_project(const panel *a, size_t m, const float *X, size_t x_stride, float *T, size_t t_stride,
                    void *work);
 
@@ -116,19 +114,5 @@ void panel_expand_rows(const panel *a, size_t m, const float *T, size_t t_stride
  * first. */
 const panel_kernels *panel_kernels_available(size_t index);
 const char *panel_kernels_name(const panel_kernels *kernels);
-
-/* *total += bytes rounded up to PANEL_ALIGN; false on an overflow. */
-static inline bool work_add(size_t *total, size_t bytes) {
-    size_t rounded;
-    return !__builtin_add_overflow(bytes, PANEL_ALIGN - 1, &rounded) &&
-           !__builtin_add_overflow(*total, rounded / PANEL_ALIGN * PANEL_ALIGN, total);
-}
-
-/* The next piece of a work area that was measured with work_add. */
-static inline void *work_take(void **work, size_t bytes) {
-    char *piece = *work;
-    *work = piece + (bytes + PANEL_ALIGN - 1) / PANEL_ALIGN * PANEL_ALIGN;
-    return piece;
-}
 
 #endif

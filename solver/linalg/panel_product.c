@@ -1,5 +1,6 @@
 /* The two products of a panel: cut into blocks of rows whose order is fixed, so that neither batch nor
  * threads change a bit. */
+#include "solver/base/work_area.h"
 #include "solver/linalg/panel_kernels.h"
 
 #include <omp.h>
@@ -42,10 +43,10 @@ size_t panel_work_bytes(const panel *a, size_t m) {
     if (!size_multiply(a->stride, m, &count) || count > SIZE_MAX / sizeof(double)) return 0;
     const size_t n_threads = count_threads(a, count_slabs(a)), n_sums = n_threads > 1 ? count_slabs(a) : 1;
     for (size_t i = 0; i < n_threads; i++)
-        if (!work_add(&total, count * sizeof(float))) return 0;
+        if (!work_area_add(&total, count * sizeof(float))) return 0;
     for (size_t i = 0; i < n_sums + 1; i++)
-        if (!work_add(&total, count * sizeof(double))) return 0;
-    return total > 0 ? total : PANEL_ALIGN;
+        if (!work_area_add(&total, count * sizeof(double))) return 0;
+    return total > 0 ? total : WORK_AREA_ALIGN;
 }
 
 /* The tile that row i is in, and what follows it. */
@@ -124,9 +125,10 @@ static bool project_slab(const panel *a, size_t slab, size_t m, const float *X, 
 static void project_pass(const panel *a, size_t m, const float *X, size_t x_stride, float *T, size_t t_stride,
                          void *work) {
     const size_t count = a->stride * m, n_slabs = count_slabs(a), n_threads = count_threads(a, n_slabs);
-    const size_t part_size = (count * sizeof(float) + PANEL_ALIGN - 1) / PANEL_ALIGN * PANEL_ALIGN;
-    double *total = work_take(&work, count * sizeof *total);
-    char *parts = work_take(&work, n_threads * part_size);
+    const size_t part_size =
+        (count * sizeof(float) + WORK_AREA_ALIGN - 1) / WORK_AREA_ALIGN * WORK_AREA_ALIGN;
+    double *total = work_area_take(&work, count * sizeof *total);
+    char *parts = work_area_take(&work, n_threads * part_size);
     double *sums = work; /* of every slab, or of one at a time */
     bool any[MOST_SLABS] = {false};
     memset(total, 0, count * sizeof *total);
@@ -176,7 +178,7 @@ static void expand_pass(const panel *a, size_t m, const float *T, size_t t_strid
     const size_t n_rows = choice->n_rows;
     const size_t n_blocks = n_rows / EXPAND_BLOCK + (n_rows % EXPAND_BLOCK > 0);
     const size_t n_threads = count_threads(a, n_blocks);
-    float *t = work_take(&work, a->stride * m * sizeof *t);
+    float *t = work_area_take(&work, a->stride * m * sizeof *t);
     for (size_t v = 0; v < m; v++)
         for (size_t j = 0; j < a->stride; j++) {
             float *t_vj = t + (j / PANEL_CHUNK * m + v) * PANEL_CHUNK + j % PANEL_CHUNK;

@@ -1,5 +1,6 @@
 #include "solver/linalg/sparse_product.h"
 
+#include "solver/base/work_area.h"
 #include "solver/linalg/csr_floats.h"
 #include "solver/linalg/panel.h"
 
@@ -40,7 +41,8 @@ done:
 size_t sparse_product_work(size_t n, size_t m) {
     size_t side, whole, total = 0;
     if (!size_multiply(n, csr_floats_width(m) * sizeof(float), &side) ||
-        !size_multiply(n, sizeof(float), &whole) || !work_add(&total, side) || !work_add(&total, whole))
+        !size_multiply(n, sizeof(float), &whole) || !work_area_add(&total, side) ||
+        !work_area_add(&total, whole))
         return 0;
     return total;
 }
@@ -104,8 +106,8 @@ static bool rows_are_few(const csr *a, size_t n_rows) {
 void sparse_product(const sparse_pair *A, size_t m, const float *X, size_t x_stride, size_t n_chosen,
                     const uint32_t *chosen, const uint32_t *map, float *Y, size_t y_stride, void *work) {
     const size_t n = A->rows->n, n_rows = chosen != NULL ? n_chosen : n;
-    float *side = work_take(&work, n * csr_floats_width(m) * sizeof *side);
-    float *whole = work_take(&work, n * sizeof *whole);
+    float *side = work_area_take(&work, n * csr_floats_width(m) * sizeof *side);
+    float *whole = work_area_take(&work, n * sizeof *whole);
     size_t dense[BATCH], n_dense = 0;
     for (size_t v = 0; v < m; v++) {
         const float *x = X + v * x_stride;

@@ -1,5 +1,6 @@
 /* What the public functions do around a kind's product: check what is asked, cut it into passes, and lead
  * from emission in mesh order to the quantity asked for and back. */
+#include "solver/base/work_area.h"
 #include "solver/operator/operator.h"
 
 #include <stdint.h>
@@ -7,10 +8,11 @@
 /* A pass needs the caller's vectors in position order and side by side (the adjoint: g pulled back through
  * the quantity), the answer before it is put into mesh order or handed out, and what the kind needs. */
 static size_t pass_bytes(const lam_operator *op, size_t n_rhs, size_t *vectors_bytes) {
-    size_t count, vectors, kind_bytes = op->kind->work_bytes(op, n_rhs), total = PANEL_ALIGN;
+    size_t count, vectors, kind_bytes = op->kind->work_bytes(op, n_rhs), total = WORK_AREA_ALIGN;
     if (kind_bytes == 0 || !size_multiply(n_rhs, op->n_channels, &count) ||
         !size_multiply(count, op->n, &count) || !size_multiply(count, sizeof(float), &vectors) ||
-        !work_add(&total, vectors) || !work_add(&total, vectors) || !work_add(&total, kind_bytes))
+        !work_area_add(&total, vectors) || !work_area_add(&total, vectors) ||
+        !work_area_add(&total, kind_bytes))
         return 0;
     if (vectors_bytes != NULL) *vectors_bytes = vectors;
     return total;
@@ -59,10 +61,6 @@ static lam_status check_apply(const lam_operator *op, size_t n_rhs, lam_quantity
         FAIL(error, LAM_ERR_ARGUMENT, "input, output and work area overlap");
 done:
     return status;
-}
-
-static void *align_work(void *work) {
-    return (char *)work + (PANEL_ALIGN - (uintptr_t)work % PANEL_ALIGN) % PANEL_ALIGN;
 }
 
 /* Rows shorter than this are finished by one thread. */
@@ -130,15 +128,15 @@ static void apply_pass(const lam_operator *op, const pass *in, float *out, void 
     const bool apart = in->selected != NULL ? !choose : op->order != NULL;
     const float *lit = in->E;
     float *P = out;
-    void *rest = align_work(work);
+    void *rest = work_area_begin(work);
     if (op->order != NULL || in->H0 != NULL) {
-        float *positions = work_take(&rest, rows * row_bytes);
+        float *positions = work_area_take(&rest, rows * row_bytes);
         for (size_t row = 0; row < rows; row++)
             light_row(op, row % op->n_channels, in->E + row * n, in->H0 != NULL ? in->H0 + row * n : NULL,
                       positions + row * n);
         lit = positions;
     }
-    if (apart) P = work_take(&rest, rows * row_bytes);
+    if (apart) P = work_area_take(&rest, rows * row_bytes);
     if (choose)
         op->kind->apply_selected(op, in->count, lit, in->n_selected, in->selected, P, rest);
     else
@@ -187,8 +185,9 @@ done:
 static void share_pass(const lam_operator *op, size_t n_parts, const lam_part *parts, size_t first,
                        size_t count, void *work) {
     const size_t n = op->n, C = op->n_channels, rows = count * C;
-    void *rest = align_work(work);
-    float *lit = work_take(&rest, rows * n * sizeof *lit), *P = work_take(&rest, rows * n * sizeof *P);
+    void *rest = work_area_begin(work);
+    float *lit = work_area_take(&rest, rows * n * sizeof *lit),
+          *P = work_area_take(&rest, rows * n * sizeof *P);
     for (int handing_out = 0; handing_out < 2; handing_out++) {
         size_t before = 0, done_rows = 0; /* vectors of the parts before; rows of this pass */
         for (size_t k = 0; k < n_parts; before += parts[k++].n_rhs) {
@@ -282,9 +281,9 @@ lam_status lam_operator_apply_adjoint(const lam_operator *op, size_t n_rhs, lam_
         size_t count = n_rhs - r < OPERATOR_PASS ? n_rhs - r : OPERATOR_PASS, rows = count * op->n_channels;
         const float *g_pass = g + r * op->n_channels * n;
         float *w_pass = w + r * op->n_channels * n, *transposed = w_pass;
-        void *rest = align_work(work);
-        float *pulled = work_take(&rest, rows * row_bytes);
-        if (op->order != NULL) transposed = work_take(&rest, rows * row_bytes);
+        void *rest = work_area_begin(work);
+        float *pulled = work_area_take(&rest, rows * row_bytes);
+        if (op->order != NULL) transposed = work_area_take(&rest, rows * row_bytes);
         for (size_t row = 0; row < rows; row++)
             pull_back_row(op, row % op->n_channels, quantity, g_pass + row * n, pulled + row * n);
         op->kind->apply_adjoint(op, count, pulled, transposed, rest);

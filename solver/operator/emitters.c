@@ -2,6 +2,7 @@
  * is stored: O(ns). Making, loading and saving; what it answers is in emitters_apply.c. */
 #include "solver/operator/emitters.h"
 
+#include "solver/base/work_area.h"
 #include "solver/linalg/csr.h"
 #include "solver/operator/sky_light.h"
 
@@ -225,7 +226,8 @@ static size_t emitters_work_bytes(const lam_operator *op, size_t n_rhs) {
     size_t vectors, tiles, total = panels;
     if (panels == 0 || !size_multiply(n_rhs * op->n_channels, op->n * sizeof(float), &vectors) ||
         !size_multiply(n_rhs * op->n_channels, self->a.n_tiles * sizeof(float), &tiles) ||
-        !work_add(&total, vectors) || !work_add(&total, tiles) || !work_add(&total, op->n * sizeof(float)))
+        !work_area_add(&total, vectors) || !work_area_add(&total, tiles) ||
+        !work_area_add(&total, op->n * sizeof(float)))
         return 0;
     return total;
 }

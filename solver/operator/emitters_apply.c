@@ -1,4 +1,5 @@
 /* What an operator of few emitters answers: B = sum_k w_k B_k, its weights from an emission, its adjoint. */
+#include "solver/base/work_area.h"
 #include "solver/operator/emitters.h"
 
 #include "solver/operator/sky_light.h"
@@ -175,10 +176,6 @@ done:
     return status;
 }
 
-static void *aligned(const void *work) {
-    return (char *)(uintptr_t)work + (PANEL_ALIGN - (uintptr_t)work % PANEL_ALIGN) % PANEL_ALIGN;
-}
-
 /* What is T in out becomes the quantity: radiosity E + T, irradiance T / rho', indirect T - rho H0; where rho
  * is 0 radiosity is E alone and indirect 0. other [n]: E, or H0; NULL: 0. */
 static void finish(const lam_operator *op, size_t c, lam_quantity quantity, const float *other,
@@ -211,9 +208,9 @@ lam_status lam_operator_apply_emitters(const lam_operator *op, size_t n_rhs, lam
         const size_t m = n_rhs - first < OPERATOR_PASS ? n_rhs - first : OPERATOR_PASS;
         const float *w = W + first * C * s;
         float *to = out + first * C * count;
-        void *rest = aligned(work);
-        float *other = work_take(&rest, n * sizeof *other),
-              *L = work_take(&rest, self->a.n_tiles * sizeof *L);
+        void *rest = work_area_begin(work);
+        float *other = work_area_take(&rest, n * sizeof *other),
+              *L = work_area_take(&rest, self->a.n_tiles * sizeof *L);
         for (size_t c = 0; c < C; c++)
             if (selected != NULL)
                 panel_expand_rows(&self->T[c], m, w + c * s, C * s, count, selected, NULL, to + c * count,
@@ -282,10 +279,10 @@ lam_status lam_operator_adjoint_emitters(const lam_operator *op, size_t n_rhs, l
         const size_t m = n_rhs - first < OPERATOR_PASS ? n_rhs - first : OPERATOR_PASS;
         const float *from = g + first * C * n;
         float *to = W + first * C * s;
-        void *rest = aligned(work);
-        float *other = work_take(&rest, n * sizeof *other),
-              *L = work_take(&rest, self->a.n_tiles * sizeof *L);
-        float *pulled = work_take(&rest, m * C * n * sizeof *pulled);
+        void *rest = work_area_begin(work);
+        float *other = work_area_take(&rest, n * sizeof *other),
+              *L = work_area_take(&rest, self->a.n_tiles * sizeof *L);
+        float *pulled = work_area_take(&rest, m * C * n * sizeof *pulled);
         for (size_t row = 0; row < m * C; row++)
             pull_back(op, row % C, quantity, from + row * n, pulled + row * n);
         for (size_t c = 0; c < C; c++)

@@ -1,5 +1,6 @@
 #include "solver/operator/factors.h"
 
+#include "solver/base/work_area.h"
 #include "solver/linalg/panel_store.h"
 
 #include <stdio.h>
@@ -177,14 +178,14 @@ size_t factors_work_bytes(const factors *f, size_t n_rhs, size_t V_bytes) {
     const size_t of_core = f->core != NULL ? panel_work_bytes(f->core, n_rhs) : of_left;
     size_t product = of_left > of_core ? of_left : of_core;
     product = product > V_bytes ? product : V_bytes;
-    if (of_left == 0 || of_core == 0 || !work_add(&total, t_bytes) || !work_add(&total, t_bytes) ||
-        !work_add(&total, product))
+    if (of_left == 0 || of_core == 0 || !work_area_add(&total, t_bytes) || !work_area_add(&total, t_bytes) ||
+        !work_area_add(&total, product))
         return 0;
     return total;
 }
 
 float *factors_take_columns(const factors *f, size_t n_rhs, void **work) {
-    return work_take(work, n_rhs * f->n_channels * f->left.stride * sizeof(float));
+    return work_area_take(work, n_rhs * f->n_channels * f->left.stride * sizeof(float));
 }
 
 /* Numbers of a vector that lie a stride apart. */

@@ -3,6 +3,7 @@
  * is left. */
 #include "solver/operator/hierarchical.h"
 
+#include "solver/base/work_area.h"
 #include "solver/linalg/sliced.h"
 #include "solver/linalg/sparse_product.h"
 #include "solver/operator/mean_correction.h"
@@ -209,21 +210,22 @@ done:
 
 /* Steps, coefficients and flags of some positions. */
 static size_t some_bytes(const wavelet_plan *plan) {
-    return 4 * PANEL_ALIGN + plan->n_steps * (sizeof(uint32_t) + 1) +
+    return 4 * WORK_AREA_ALIGN + plan->n_steps * (sizeof(uint32_t) + 1) +
            (plan->n_used + plan->n) * sizeof(uint32_t);
 }
 
 static size_t hierarchical_work_bytes(const lam_operator *op, size_t n_rhs) {
     const hierarchical *self = (const hierarchical *)op;
     const size_t used = self->plan.n_used, product = sparse_product_work(used, 1);
-    size_t side, vectors, coefficients, slots, total = PANEL_ALIGN;
+    size_t side, vectors, coefficients, slots, total = WORK_AREA_ALIGN;
     if (product == 0 || !size_multiply(sliced_work(used, n_rhs), sizeof(float), &side) ||
         !size_multiply(op->n, n_rhs * sizeof(float), &vectors) ||
         !size_multiply(used, n_rhs * sizeof(float), &coefficients) ||
         !size_multiply(wavelet_plan_work(&self->plan), n_rhs * sizeof(float), &slots) ||
-        !work_add(&total, vectors) || !work_add(&total, coefficients) || !work_add(&total, coefficients) ||
-        !work_add(&total, slots) || !work_add(&total, some_bytes(&self->plan)) || !work_add(&total, side) ||
-        !work_add(&total, product))
+        !work_area_add(&total, vectors) || !work_area_add(&total, coefficients) ||
+        !work_area_add(&total, coefficients) || !work_area_add(&total, slots) ||
+        !work_area_add(&total, some_bytes(&self->plan)) || !work_area_add(&total, side) ||
+        !work_area_add(&total, product))
         return 0;
     return total;
 }
@@ -265,11 +267,11 @@ static void apply(const lam_operator *op, bool adjoint, size_t n_rhs, const floa
     const hierarchical *self = (const hierarchical *)op;
     const wavelet_plan *plan = &self->plan;
     const size_t n = op->n, C = op->n_channels, n_threads = op->n_threads;
-    float *X = work_take(&work, n_rhs * n * sizeof *X);
-    float *from = work_take(&work, n_rhs * plan->n_used * sizeof *from);
-    float *to = work_take(&work, n_rhs * plan->n_used * sizeof *to);
-    float *slots = work_take(&work, n_rhs * wavelet_plan_work(plan) * sizeof *slots);
-    float *side = work_take(&work, sliced_work(plan->n_used, n_rhs) * sizeof *side);
+    float *X = work_area_take(&work, n_rhs * n * sizeof *X);
+    float *from = work_area_take(&work, n_rhs * plan->n_used * sizeof *from);
+    float *to = work_area_take(&work, n_rhs * plan->n_used * sizeof *to);
+    float *slots = work_area_take(&work, n_rhs * wavelet_plan_work(plan) * sizeof *slots);
+    float *side = work_area_take(&work, sliced_work(plan->n_used, n_rhs) * sizeof *side);
     for (size_t c = 0; c < C; c++) {
         const float *left = self->left + c * n, *root = self->root_area;
         scale(n_rhs, n, adjoint ? left : root, in + c * n, C * n, X, n, n_threads);
@@ -298,15 +300,15 @@ static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, co
     const hierarchical *self = (const hierarchical *)op;
     const wavelet_plan *plan = &self->plan;
     const size_t n = op->n, C = op->n_channels, used = plan->n_used, n_threads = op->n_threads;
-    float *X = work_take(&work, n_rhs * n * sizeof *X);
-    float *from = work_take(&work, n_rhs * used * sizeof *from);
-    float *to = work_take(&work, n_rhs * used * sizeof *to);
-    float *slots = work_take(&work, n_rhs * wavelet_plan_work(plan) * sizeof *slots);
-    float *side = work_take(&work, sliced_work(used, n_rhs) * sizeof *side);
-    uint32_t *steps = work_take(&work, plan->n_steps * sizeof *steps);
-    uint32_t *rows = work_take(&work, used * sizeof *rows);
-    uint32_t *positions = work_take(&work, n * sizeof *positions);
-    uint8_t *flags = work_take(&work, plan->n_steps);
+    float *X = work_area_take(&work, n_rhs * n * sizeof *X);
+    float *from = work_area_take(&work, n_rhs * used * sizeof *from);
+    float *to = work_area_take(&work, n_rhs * used * sizeof *to);
+    float *slots = work_area_take(&work, n_rhs * wavelet_plan_work(plan) * sizeof *slots);
+    float *side = work_area_take(&work, sliced_work(used, n_rhs) * sizeof *side);
+    uint32_t *steps = work_area_take(&work, plan->n_steps * sizeof *steps);
+    uint32_t *rows = work_area_take(&work, used * sizeof *rows);
+    uint32_t *positions = work_area_take(&work, n * sizeof *positions);
+    uint8_t *flags = work_area_take(&work, plan->n_steps);
     size_t n_steps = plan->n_steps, n_rows = used;
     memset(flags, 0, plan->n_steps);
     const bool few = n_selected <= n;

@@ -3,6 +3,7 @@
  * what is stored of their columns. */
 #include "solver/operator/sparse.h"
 
+#include "solver/base/work_area.h"
 #include "solver/linalg/sparse_product.h"
 
 #include <math.h>
@@ -119,8 +120,8 @@ done:
  */
 
 static size_t sparse_work_bytes(const lam_operator *op, size_t n_rhs) {
-    size_t bytes = sparse_product_work(op->n, n_rhs), total = PANEL_ALIGN;
-    return bytes > 0 && work_add(&total, bytes) ? total : 0;
+    size_t bytes = sparse_product_work(op->n, n_rhs), total = WORK_AREA_ALIGN;
+    return bytes > 0 && work_area_add(&total, bytes) ? total : 0;
 }
 
 /* a . b, in double and in one order. */

@@ -147,7 +147,7 @@ void output_formats(bool figures, char text[OUTPUT_FORMATS]) {
 static size_t find_format(const char *path) {
     size_t k = 0;
     char extension[16];
-    output_file_extension(path, extension);
+    atomic_file_extension(path, extension);
     while (k < N_FORMATS && strcmp(formats[k].extension, extension) != 0) k++;
     return k;
 }
@@ -166,14 +166,14 @@ done:
 
 lam_status output_write(const solution *s, const char *path, lam_error *error) {
     lam_status status = LAM_OK;
-    output_file file = {0};
+    atomic_file file = {0};
     problem why;
     if (s->values != NULL && !answer_check(s->values, s->n_vectors * s->m->n_channels * s->m->n, &why))
         FAIL(error, LAM_ERR_ARGUMENT, "%.200s: %s", path, why.detail);
-    TRY(output_file_open(path, &file, error));
+    TRY(atomic_file_open(path, &file, error));
     TRY(formats[find_format(path)].write(s, file.stream, error));
-    TRY(output_file_commit(&file, error));
+    TRY(atomic_file_commit(&file, error));
 done:
-    output_file_abort(&file);
+    atomic_file_abort(&file);
     return status;
 }

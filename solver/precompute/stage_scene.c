@@ -18,7 +18,7 @@ bool precompute_takes_as_store(const char *path) {
     unsigned char start[8] = {0};
     char extension[16];
     struct stat about;
-    output_file_extension(path, extension);
+    atomic_file_extension(path, extension);
     if (strcmp(extension, "h5") == 0) return true;
     if (stat(path, &about) != 0 || !S_ISREG(about.st_mode)) return false;
     FILE *stream = fopen(path, "rb");

@@ -107,11 +107,11 @@ done:
 
 lam_status image_write_png(const image *picture, const char *path, lam_error *error) {
     lam_status status = LAM_OK;
-    output_file out = {0};
-    TRY(output_file_open(path, &out, error));
+    atomic_file out = {0};
+    TRY(atomic_file_open(path, &out, error));
     TRY(encode_to(out.stream, picture, path, error));
-    TRY(output_file_commit(&out, error));
+    TRY(atomic_file_commit(&out, error));
 done:
-    output_file_abort(&out);
+    atomic_file_abort(&out);
     return status;
 }

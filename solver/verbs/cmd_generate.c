@@ -139,7 +139,7 @@ int cmd_generate(int argc, char **argv) {
     if (strcmp(kind, "city") != 0 && (options_given(&given, "variant") || options_given(&given, "terrain")))
         return options_usage(verb.name, "--variant and --terrain: only for city");
     char extension[16];
-    output_file_extension(f.output, extension);
+    atomic_file_extension(f.output, extension);
     if (strcmp(extension, "obj") != 0) return options_usage(verb.name, "-o %s: must end in .obj", f.output);
 
     terminal_open(&term, verb.name, false, false);
@@ -152,7 +152,7 @@ int cmd_generate(int argc, char **argv) {
                                 .elements = f.elements,
                                 .reflectance = options_given(&given, "reflectance") ? f.reflectance : -1,
                                 .seed = f.seed};
-    if (output_file_check(f.output, &error) != LAM_OK) return terminal_fail(&term, &error);
+    if (atomic_file_check(f.output, &error) != LAM_OK) return terminal_fail(&term, &error);
     lam_status status = scene_generate(&options, f.output, &faces, &error);
     if (status == LAM_ERR_ARGUMENT) return options_usage(verb.name, "%s", error.message);
     if (status != LAM_OK) return terminal_fail(&term, &error);

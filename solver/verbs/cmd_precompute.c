@@ -216,7 +216,7 @@ int cmd_precompute(int argc, char **argv) {
         .scratch = f.scratch,
         .continues = continues != NULL ? continues : "what was finished stays in the scratch folder",
     };
-    lam_status status = output_file_check(f.output, &error);
+    lam_status status = atomic_file_check(f.output, &error);
     if (status == LAM_OK) status = precompute_run(&options, &term, &built, &error);
     code = status == LAM_OK ? 0 : terminal_fail(&term, &error);
     free(command);

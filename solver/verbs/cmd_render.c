@@ -186,7 +186,7 @@ static void view_close(view *v) {
 /* Loads all but the values of the elements, which is cheap. */
 static lam_status view_open(const char *path, const fields *f, view *v, lam_error *error) {
     lam_status status = LAM_OK;
-    TRY(output_file_check(f->output, error));
+    TRY(atomic_file_check(f->output, error));
     TRY(store_open(path, &v->s, error));
     TRY(mesh_load(v->s, &v->m, NULL, error));
     v->lit = memory_allocate(v->m.n, sizeof *v->lit, "lit elements", error);
@@ -360,7 +360,7 @@ int cmd_render(int argc, char **argv) {
     int go = options_parse(&verb, tables, argc, argv, &result);
     if (go != OPTIONS_GO) return go;
     if (f.output == NULL) return options_usage(verb.name, "give -o IMAGE.png");
-    output_file_extension(f.output, extension);
+    atomic_file_extension(f.output, extension);
     if (strcmp(extension, "png") != 0) return options_usage(verb.name, "-o %s: must end in .png", f.output);
     if (light_check(&f.light, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
     terminal_open(&t, verb.name, false, false);

@@ -88,18 +88,18 @@ static lam_status make_skies(const char *path, const fields *f, terminal *t, lam
     lam_status status = LAM_OK;
     sky_tiling tiling = {0};
     weather_skies made = {0};
-    output_file file = {0};
-    TRY(output_file_check(f->output, error));
+    atomic_file file = {0};
+    TRY(atomic_file_check(f->output, error));
     TRY(sky_tiling_create(f->tiles != NULL ? f->tiles : "tregenza", 'z', &tiling, error));
     const year_options wish = {.photometric = f->photometric, .sun_in_tiles = true};
     TRY(weather_skies_read(path, &tiling, &wish, t, &made, error));
-    TRY(output_file_open(f->output, &file, error));
+    TRY(atomic_file_open(f->output, &file, error));
     TRY(output_array(file.stream, 2, (const size_t[2]){made.n, tiling.n_tiles}, made.L, NULL, error));
-    TRY(output_file_commit(&file, error));
+    TRY(atomic_file_commit(&file, error));
     printf("%s: %zu skies of %zu tiles (%s), %s\n", f->output, made.n, tiling.n_tiles, tiling.name,
            f->photometric ? "cd/m2" : "W/(m2 sr)");
 done:
-    output_file_abort(&file);
+    atomic_file_abort(&file);
     weather_skies_free(&made);
     sky_tiling_free(&tiling);
     return status;
@@ -120,11 +120,11 @@ static void weigh(sky_matrix *m, double factor, double received[3], bool *lit) {
 static lam_status convert_matrix(const char *path, const fields *f, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
     sky_matrix m = {0};
-    output_file file = {0};
+    atomic_file file = {0};
     const progress steps = terminal_progress(t);
     double received[3] = {0};
     bool lit = false;
-    TRY(output_file_check(f->output, error));
+    TRY(atomic_file_check(f->output, error));
     TRY(sky_matrix_read(path, f->tiles, &steps, &m, error));
     weigh(&m, f->photometric ? WHITE_EFFICACY : 1, received, &lit);
     terminal_clear(t);
@@ -136,17 +136,17 @@ static lam_status convert_matrix(const char *path, const fields *f, terminal *t,
                      : c == 1          ? ", second"
                                        : ", third",
                      received[c] * 1e-3, f->photometric ? "klx h" : "kWh/m2");
-    TRY(output_file_open(f->output, &file, error));
+    TRY(atomic_file_open(f->output, &file, error));
     if (m.n_channels == 1)
         TRY(output_array(file.stream, 2, (const size_t[2]){m.n, m.tiling.n_tiles}, m.L, NULL, error));
     else
         TRY(output_array(file.stream, 3, (const size_t[3]){m.n, m.n_channels, m.tiling.n_tiles}, m.L, NULL,
                          error));
-    TRY(output_file_commit(&file, error));
+    TRY(atomic_file_commit(&file, error));
     printf("%s: %zu skies of %zu tiles (%s), %s%s\n", f->output, m.n, m.tiling.n_tiles, m.tiling.name,
            m.n_channels == 1 ? "" : "three components, ", f->photometric ? "cd/m2" : "W/(m2 sr)");
 done:
-    output_file_abort(&file);
+    atomic_file_abort(&file);
     sky_matrix_free(&m);
     return status;
 }
@@ -162,7 +162,7 @@ int cmd_sky(int argc, char **argv) {
     if (code != OPTIONS_GO) return code;
     const char *path = given.arguments[0];
     if (f.output == NULL) return options_usage(verb.name, "no -o SKY.npy given");
-    output_file_extension(f.output, extension);
+    atomic_file_extension(f.output, extension);
     if (strcmp(extension, "npy") != 0) return options_usage(verb.name, "-o %s: must end in .npy", f.output);
     const bool matrix = sky_matrix_is_named(path);
     if (!matrix && !weather_is_named(path))

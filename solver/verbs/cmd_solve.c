@@ -214,7 +214,7 @@ static lam_status solve(const char *path, const fields *f, const annual_wish *ye
     sunlight sun = {0};
     const char *names[ANNUAL_MOST];
     for (size_t k = 0; k < year->n_figures; k++) names[k] = year->figures[k].name;
-    if (f->output != NULL) TRY(output_file_check(f->output, error));
+    if (f->output != NULL) TRY(atomic_file_check(f->output, error));
     TRY(store_open(path, &s, error));
     TRY(store_get_text(s, "/", "name", &scene, error));
     TRY(mesh_load(s, &m, &row_sums, error));

@@ -10,6 +10,7 @@
  */
 #include "solver/base/clock.h"
 #include "solver/base/random.h"
+#include "solver/base/work_area.h"
 #include "solver/bench/stats.h"
 #include "solver/linalg/panel.h"
 
@@ -112,9 +113,9 @@ static void make_subject(subject *s, const char *folder) {
         const size_t bytes = panel_work_bytes(&tiles[p], PANEL_VECTORS);
         if (bytes > work_bytes) work_bytes = bytes;
     }
-    s->x = aligned_alloc(PANEL_ALIGN, longest * PANEL_VECTORS * sizeof *s->x);
-    s->y = aligned_alloc(PANEL_ALIGN, longest * PANEL_VECTORS * sizeof *s->y);
-    s->work = aligned_alloc(PANEL_ALIGN, work_bytes);
+    s->x = aligned_alloc(WORK_AREA_ALIGN, longest * PANEL_VECTORS * sizeof *s->x);
+    s->y = aligned_alloc(WORK_AREA_ALIGN, longest * PANEL_VECTORS * sizeof *s->y);
+    s->work = aligned_alloc(WORK_AREA_ALIGN, work_bytes);
     if (s->x == NULL || s->y == NULL || s->work == NULL) die("not enough memory");
     uint64_t state = 1;
     for (size_t i = 0; i < longest * PANEL_VECTORS; i++) s->x[i] = gaussian(&state);

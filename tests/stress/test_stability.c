@@ -1,6 +1,7 @@
 /* Operators where numbers are hard: nothing ends in NaN, infinity, a radiosity more negative than the error
  * allows, or a crash; what cannot be done is refused with a remedy. */
 #include "solver/base/random.h"
+#include "solver/base/work_area.h"
 #include "solver/bench/stability.h"
 #include "solver/linalg/panel.h"
 #include "support/suite.h"
@@ -90,8 +91,9 @@ START_TEST(long_sums_are_right) {
         }
     }
     ck_assert_msg(panel_create(N, K, rows, "A", &a, &error) == LAM_OK, "%s", error.message);
-    char *work = malloc(panel_work_bytes(&a, 1) + PANEL_ALIGN);
-    panel_project(&a, 1, x, N, t, K, work + (PANEL_ALIGN - (uintptr_t)work % PANEL_ALIGN) % PANEL_ALIGN);
+    char *work = malloc(panel_work_bytes(&a, 1) + WORK_AREA_ALIGN);
+    panel_project(&a, 1, x, N, t, K,
+                  work + (WORK_AREA_ALIGN - (uintptr_t)work % WORK_AREA_ALIGN) % WORK_AREA_ALIGN);
     /* Blocks of 128 rows in single precision, their sums in double: 128 roundings of a block. */
     for (size_t k = 0; k < K; k++)
         ck_assert_double_le(fabs((double)t[k] - exact[k]), 128 * (double)FLT_EPSILON / 2 * size[k]);

@@ -152,13 +152,13 @@ lam_status pair_rows_fetch_exchange(pair_rows *rows, size_t block, const uint32_
 }
 
 /* Sorts the entries of a row by index, through a dense row and a bitset: O(entries + n/64). */
-static void sort_row(csr *rows, size_t i, float *dense, marks *there) {
+static void sort_row(csr *rows, size_t i, float *dense, bitset *there) {
     for (uint64_t p = rows->indptr[i]; p < rows->indptr[i + 1]; p++) {
         const uint32_t j = rows->indices[p];
         dense[j] = rows->data[p];
-        marks_add(there, j);
+        bitset_add(there, j);
     }
-    const size_t count = marks_take(there);
+    const size_t count = bitset_take(there);
     for (size_t k = 0; k < count; k++) {
         rows->indices[rows->indptr[i] + k] = there->taken[k];
         rows->data[rows->indptr[i] + k] = dense[there->taken[k]];
@@ -171,9 +171,10 @@ static lam_status sort_rows(csr *rows, lam_error *error) {
 #pragma omp parallel
     {
         lam_error ignored;
-        marks there;
+        bitset there;
         float *dense = memory_allocate(n, sizeof *dense, "form factor rows", &ignored);
-        const bool enough = marks_make(n, 0, "form factor rows", &there, &ignored) == LAM_OK && dense != NULL;
+        const bool enough =
+            bitset_make(n, 0, "form factor rows", &there, &ignored) == LAM_OK && dense != NULL;
         if (!enough) {
 #pragma omp atomic write
             out_of_memory = true;
@@ -182,7 +183,7 @@ static lam_status sort_rows(csr *rows, lam_error *error) {
         for (size_t i = 0; i < n; i++)
             if (enough) sort_row(rows, i, dense, &there);
         free(dense);
-        marks_free(&there);
+        bitset_free(&there);
     }
     return out_of_memory ? status_fail(error, LAM_ERR_MEMORY, "rows of %zu elements: out of memory", n)
                          : LAM_OK;

@@ -23,7 +23,7 @@ static lam_status pools_create(const row_maker *maker, size_t n_pools, row_pool 
     for (size_t t = 0; t < n_pools; t++) {
         pools[t].sums = memory_allocate(n, sizeof *pools[t].sums, "form factor rows", error);
         if (pools[t].sums == NULL) return LAM_ERR_MEMORY;
-        if (marks_make(n, 0, "form factor rows", &pools[t].summed, error) != LAM_OK) return LAM_ERR_MEMORY;
+        if (bitset_make(n, 0, "form factor rows", &pools[t].summed, error) != LAM_OK) return LAM_ERR_MEMORY;
         if (maker->sky == NULL) continue;
         pools[t].sky = memory_allocate(maker->sky->tiling.n_tiles + 1, sizeof *pools[t].sky,
                                        "the tiles of the sky", error);
@@ -35,7 +35,7 @@ static lam_status pools_create(const row_maker *maker, size_t n_pools, row_pool 
 static void pools_free(row_pool *pools, size_t n_pools) {
     for (size_t t = 0; pools != NULL && t < n_pools; t++) {
         free(pools[t].sums);
-        marks_free(&pools[t].summed);
+        bitset_free(&pools[t].summed);
         free(pools[t].sky);
         free(pools[t].bytes);
     }
@@ -44,7 +44,7 @@ static void pools_free(row_pool *pools, size_t n_pools) {
 
 /* Packs the sums with ascending columns and clears them. */
 static bool take_row(row_pool *pool, row_kind kind, packed_row *row) {
-    const size_t length = marks_take(&pool->summed);
+    const size_t length = bitset_take(&pool->summed);
     const uint32_t *columns = pool->summed.taken;
     if (!pool_reserve(pool, length * ROW_ENTRY_MOST)) return false;
     uint8_t *const begin = pool->bytes + pool->used, *to = begin;

@@ -14,9 +14,9 @@
 
 /* The work area of one thread: the sums of the present element, and the packed rows of its chunk. */
 typedef struct row_pool {
-    double *sums; /* [n], all zero between elements */
-    marks summed; /* where sums were added to */
-    double *sky;  /* [m + 1], zero between elements: sums of the tiles and of the ground; NULL: no sky */
+    double *sums;  /* [n], all zero between elements */
+    bitset summed; /* where sums were added to */
+    double *sky;   /* [m + 1], zero between elements: sums of the tiles and of the ground; NULL: no sky */
     uint8_t *bytes;
     size_t used, capacity;
 } row_pool;
@@ -24,7 +24,7 @@ typedef struct row_pool {
 /* Adds the weight of rays of the present element that hit another one. */
 static inline void row_pool_add(row_pool *pool, uint32_t seen, double weight) {
     pool->sums[seen] += weight;
-    marks_add(&pool->summed, seen);
+    bitset_add(&pool->summed, seen);
 }
 
 /* Adds to the sky the weights of those rays of a packet that leave the scene. */

@@ -67,7 +67,7 @@ typedef struct pass_job {
 /* The working area of one thread. */
 typedef struct pass_work {
     lanes *dense;           /* [n], rows of a leaf by position: all 0 between leaves */
-    marks lit;              /* positions where they are not 0; AHEAD numbers behind these may be read */
+    bitset lit;             /* positions where they are not 0; AHEAD numbers behind these may be read */
     uint32_t *cells, *work; /* of wavelet_cells */
     live_rows rows[2];      /* of the scaling functions, before and after a level */
     live_rows near[2];      /* of the wavelets, on near clusters alone */
@@ -168,7 +168,7 @@ static lam_status scatter_rows(const pass_job *job, size_t node, pass_work *d, l
                 __builtin_prefetch(&d->dense[job->columns[rows.indices[lane][e + AHEAD]].position], 1);
             const size_t p = at->position;
             d->dense[p][lane] += root * at->over_root * rows.data[lane][e];
-            marks_add(&d->lit, p);
+            bitset_add(&d->lit, p);
         }
     }
 done:
@@ -337,7 +337,7 @@ done:
 
 static void pass_work_free(pass_work *d) {
     free(d->dense);
-    marks_free(&d->lit);
+    bitset_free(&d->lit);
     free(d->cells);
     free(d->work);
     for (int k = 0; k < 2; k++) {
@@ -368,7 +368,7 @@ static lam_status pass_work_make(const pass_job *job, pass_work *d, lam_error *e
     lam_status status = LAM_OK;
     const size_t n = job->input->basis->n;
     d->dense = aligned_lanes(n, sizeof *d->dense, error);
-    TRY(marks_make(n, AHEAD, "wavelets", &d->lit, error));
+    TRY(bitset_make(n, AHEAD, "wavelets", &d->lit, error));
     d->cells = memory_allocate(job->reach.n_leaves, sizeof *d->cells, "wavelets", error);
     d->work = memory_allocate(2 * (size_t)job->reach.height[job->input->basis->n_nodes - 1] + 4,
                               sizeof *d->work, "wavelets", error);

@@ -150,7 +150,7 @@ lam_status gram_add_sparse(gram *g, const sparse_block *A, lam_error *error) {
     }
     TRY(gram_add(g, spread, panel, error));
     const thin_job job = {.g = g, .A = A, .rows = thin};
-    pieces_run(add_tile, &job, tiles * (tiles + 1) / 2);
+    parallel_for(add_tile, &job, tiles * (tiles + 1) / 2);
 done:
     free(panel);
     free(thin.begin);

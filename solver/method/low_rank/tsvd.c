@@ -119,7 +119,7 @@ static lam_status each_panel(const tall_block *A,
     for (size_t first = 0; first < A->n; first += most) {
         const size_t rows = A->n - first < most ? A->n - first : most;
         const join_job job = {A, first, rows, panel};
-        pieces_run(join_piece, &job, (rows + JOINED_PIECE - 1) / JOINED_PIECE);
+        parallel_for(join_piece, &job, (rows + JOINED_PIECE - 1) / JOINED_PIECE);
         TRY(take(context, first, rows, panel, error));
     }
 done:
@@ -191,7 +191,7 @@ static lam_status project(const tall_block *A, size_t k, const float *V, float *
         return each_panel(A, project_panel, &p, error);
     }
     const sparse_projection thin = {A->sparse, k, V, Q};
-    pieces_run(project_thin_rows, &thin, (A->n + PANEL - 1) / PANEL);
+    parallel_for(project_thin_rows, &thin, (A->n + PANEL - 1) / PANEL);
     float *panel = memory_allocate(PANEL, m * sizeof *panel, "factorization", error);
     if (panel == NULL) return LAM_ERR_MEMORY;
     for (size_t first = 0; first < A->n;) {

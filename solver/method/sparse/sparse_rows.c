@@ -47,14 +47,14 @@ static lam_status reflected_make(const build_problem *p, const float *rho, const
 
 static inline void add_to(sparse_row *r, uint32_t j, double x) {
     r->value[j] += x;
-    marks_add(&r->there, j);
+    bitset_add(&r->there, j);
 }
 
 void row_work_free(row_work *d) {
     free(d->sum.value);
-    marks_free(&d->sum.there);
+    bitset_free(&d->sum.there);
     free(d->next.value);
-    marks_free(&d->next.there);
+    bitset_free(&d->next.there);
     free(d->at);
     free(d->T);
     free(d->indices);
@@ -65,8 +65,8 @@ lam_status row_work_make(size_t n, row_work *d, lam_error *error) {
     *d = (row_work){.n = n};
     d->sum.value = memory_allocate(n, sizeof *d->sum.value, "sparse inverse", error);
     d->next.value = memory_allocate(n, sizeof *d->next.value, "sparse inverse", error);
-    const bool marked = marks_make(n, 0, "sparse inverse", &d->sum.there, error) == LAM_OK &&
-                        marks_make(n, 0, "sparse inverse", &d->next.there, error) == LAM_OK;
+    const bool marked = bitset_make(n, 0, "sparse inverse", &d->sum.there, error) == LAM_OK &&
+                        bitset_make(n, 0, "sparse inverse", &d->next.there, error) == LAM_OK;
     d->at = memory_allocate(n, sizeof *d->at, "sparse inverse", error);
     d->T = memory_allocate(n, sizeof *d->T, "sparse inverse", error);
     const bool all = marked && d->sum.value != NULL && d->next.value != NULL && d->at != NULL && d->T != NULL;
@@ -77,7 +77,7 @@ lam_status row_work_make(size_t n, row_work *d, lam_error *error) {
 static double drop_small(row_work *d, double threshold) {
     double removed = 0;
     d->n_T = 0;
-    const size_t count = marks_take(&d->next.there);
+    const size_t count = bitset_take(&d->next.there);
     for (size_t k = 0; k < count; k++) {
         const uint32_t j = d->next.there.taken[k];
         const double t = d->next.value[j];
@@ -117,7 +117,7 @@ static bool row_work_reserve(row_work *d, size_t more) {
 }
 
 bool row_work_store(row_work *d, uint64_t *entries) {
-    const size_t count = marks_take(&d->sum.there);
+    const size_t count = bitset_take(&d->sum.there);
     if (!row_work_reserve(d, count)) return false;
     for (size_t k = 0; k < count; k++) {
         const uint32_t j = d->sum.there.taken[k];

@@ -32,7 +32,7 @@ void rows_job_end(rows_job *job);
 /* A dense row, most entries of which are 0, with the set of the others. */
 typedef struct sparse_row {
     double *value; /* [n] */
-    marks there;
+    bitset there;
 } sparse_row;
 
 /* The working area of one thread. */

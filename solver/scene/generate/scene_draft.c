@@ -174,26 +174,26 @@ static bool is_on_disk(FILE *file) {
 
 lam_status scene_draft_write(const scene_draft *d, const char *path, double reflectance, lam_error *error) {
     lam_status status = LAM_OK;
-    output_file obj = {0}, mtl = {0};
+    atomic_file obj = {0}, mtl = {0};
     const size_t length = strlen(path);
     char *mtl_path = memory_allocate(length + 1, 1, path, error);
     if (mtl_path == NULL) return LAM_ERR_MEMORY;
     if (length < 5 || strcasecmp(path + length - 4, ".obj") != 0 || path[length - 5] == '/')
         FAIL(error, LAM_ERR_ARGUMENT, "%s: the name of a generated scene must end in .obj", path);
     snprintf(mtl_path, length + 1, "%.*s.mtl", (int)length - 4, path);
-    TRY(output_file_open(mtl_path, &mtl, error));
-    TRY(output_file_open(path, &obj, error));
+    TRY(atomic_file_open(mtl_path, &mtl, error));
+    TRY(atomic_file_open(path, &obj, error));
     const char *slash = strrchr(mtl_path, '/');
     write_mtl(d, mtl.stream, reflectance);
     write_obj(d, obj.stream, slash == NULL ? mtl_path : slash + 1);
     /* Neither file may appear without the other. */
     if (!is_on_disk(mtl.stream) || !is_on_disk(obj.stream))
         FAIL(error, LAM_ERR_IO, "%s: cannot be written: %s", path, strerror(errno));
-    TRY(output_file_commit(&mtl, error));
-    TRY(output_file_commit(&obj, error));
+    TRY(atomic_file_commit(&mtl, error));
+    TRY(atomic_file_commit(&obj, error));
 done:
-    output_file_abort(&mtl);
-    output_file_abort(&obj);
+    atomic_file_abort(&mtl);
+    atomic_file_abort(&obj);
     free(mtl_path);
     return status;
 }

@@ -1,6 +1,7 @@
 /* The two products of a dense matrix, on every instruction set this CPU has. */
 #include "solver/base/half.h"
 #include "solver/base/random.h"
+#include "solver/base/work_area.h"
 #include "solver/linalg/panel.h"
 #include "support/suite.h"
 
@@ -79,8 +80,9 @@ static void subject_make(subject *s, shape size, panel_precision precision, cons
     make_panel(size.n, size.k, precision, &s->rows, &s->a);
     s->kept = kept_values(&s->a);
     s->a.kernels = kernels;
-    s->memory = malloc(panel_work_bytes(&s->a, VECTORS) + PANEL_ALIGN);
-    s->work = (char *)s->memory + (PANEL_ALIGN - (uintptr_t)s->memory % PANEL_ALIGN) % PANEL_ALIGN;
+    s->memory = malloc(panel_work_bytes(&s->a, VECTORS) + WORK_AREA_ALIGN);
+    s->work =
+        (char *)s->memory + (WORK_AREA_ALIGN - (uintptr_t)s->memory % WORK_AREA_ALIGN) % WORK_AREA_ALIGN;
 }
 
 static void subject_free(subject *s) {
@@ -215,7 +217,7 @@ START_TEST(long_sums_end_in_double) {
     double exact = (double)N * 0.1f * 0.1f;
     ck_assert(panel_create(N, 1, ones, "A", &tall, &error) == LAM_OK);
     ck_assert(panel_create(1, N, ones, "A", &wide, &error) == LAM_OK);
-    void *work = aligned_alloc(PANEL_ALIGN, panel_work_bytes(&wide, 1));
+    void *work = aligned_alloc(WORK_AREA_ALIGN, panel_work_bytes(&wide, 1));
     for (size_t set = 0; panel_kernels_available(set) != NULL; set++) {
         tall.kernels = wide.kernels = panel_kernels_available(set);
         panel_project(&tall, 1, ones, N, &sum, 1, work);
@@ -238,7 +240,7 @@ START_TEST(large_matrices_come_back_as_they_went_in) {
     panel_copy_rows(&s.a, copy);
     ck_assert_mem_eq(copy, s.rows, n * k * sizeof *copy);
     ck_assert_uint_eq(panel_bytes(&s.a), n * 1008 * sizeof *copy);
-    ck_assert_uint_eq((uintptr_t)s.a.data % PANEL_ALIGN, 0);
+    ck_assert_uint_eq((uintptr_t)s.a.data % WORK_AREA_ALIGN, 0);
     free(copy);
     subject_free(&s);
 }
@@ -379,7 +381,7 @@ START_TEST(bits_do_not_depend_on_threads) {
     for (size_t i = 0; i < N; i++) s.X[N + GAP + i] = i < 3000 || i > 6100 ? 0.0f : s.X[i]; /* empty slabs */
     for (size_t i = 0; i < 4; i++) {
         s.a.n_threads = threads[i];
-        void *work = aligned_alloc(PANEL_ALIGN, panel_work_bytes(&s.a, M));
+        void *work = aligned_alloc(WORK_AREA_ALIGN, panel_work_bytes(&s.a, M));
         T[i] = nan_floats(M * K);
         Y[i] = nan_floats(M * N);
         panel_project(&s.a, M, s.X, N + GAP, T[i], K, work);
@@ -415,7 +417,7 @@ START_TEST(subnormal_numbers_count) {
             ck_assert(panel_create_kept(N, K, half ? PANEL_F16 : PANEL_F32, half ? (void *)halves : tiny,
                                         NULL, "A", &a, &error) == LAM_OK);
             a.kernels = panel_kernels_available(set);
-            void *work = aligned_alloc(PANEL_ALIGN, panel_work_bytes(&a, 1));
+            void *work = aligned_alloc(WORK_AREA_ALIGN, panel_work_bytes(&a, 1));
             panel_expand(&a, 1, ones, K, Y, N, work);
             for (size_t i = 0; i < N; i++) {
                 double sum = 0, magnitude = 0;
