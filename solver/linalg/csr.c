@@ -1,13 +1,14 @@
 /* Sparse rows: their check and their product with a block of vectors in double. */
 #include "solver/linalg/csr.h"
 
+#include "solver/base/cpu.h"
 #include "store/status.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#if defined(__x86_64__)
+#ifdef CPU_AVX2_TARGET
 #include <immintrin.h>
 #endif
 
@@ -162,10 +163,9 @@ static void multiply_wide_portable(const uint32_t *indices, const float *data, u
         multiply_tile(NARROW, indices, data, n_entries, m, X + v, Y + v);
 }
 
-#if defined(__x86_64__)
-__attribute__((target("avx512f"))) static void multiply_wide_avx512(const uint32_t *indices,
-                                                                    const float *data, uint64_t n_entries,
-                                                                    size_t m, const double *X, double *Y) {
+#ifdef CPU_AVX2_TARGET
+CPU_AVX512_TARGET static void multiply_wide_avx512(const uint32_t *indices, const float *data,
+                                                   uint64_t n_entries, size_t m, const double *X, double *Y) {
     __m512d sum[WIDE / 8];
     for (int t = 0; t < WIDE / 8; t++) sum[t] = _mm512_setzero_pd();
     for (uint64_t e = 0; e < n_entries; e++) {
@@ -176,9 +176,8 @@ __attribute__((target("avx512f"))) static void multiply_wide_avx512(const uint32
     for (int t = 0; t < WIDE / 8; t++) _mm512_storeu_pd(Y + 8 * t, sum[t]);
 }
 
-__attribute__((target("avx2,fma"))) static void multiply_wide_avx2(const uint32_t *indices, const float *data,
-                                                                   uint64_t n_entries, size_t m,
-                                                                   const double *X, double *Y) {
+CPU_AVX2_TARGET static void multiply_wide_avx2(const uint32_t *indices, const float *data, uint64_t n_entries,
+                                               size_t m, const double *X, double *Y) {
     __m256d sum[WIDE / 4];
     for (int t = 0; t < WIDE / 4; t++) sum[t] = _mm256_setzero_pd();
     for (uint64_t e = 0; e < n_entries; e++) {
@@ -190,16 +189,10 @@ __attribute__((target("avx2,fma"))) static void multiply_wide_avx2(const uint32_
 }
 #endif
 
-static multiply_wide *wide_for_this_cpu(void) {
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx512f")) return multiply_wide_avx512;
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return multiply_wide_avx2;
-#endif
-    return multiply_wide_portable;
-}
-
 void csr_multiply_rows(const csr *a, size_t first, size_t last, size_t m, const double *X, double *Y) {
-    multiply_wide *wide = wide_for_this_cpu();
+    static multiply_wide *const table[] =
+        CPU_TABLE(multiply_wide_portable, multiply_wide_avx2, multiply_wide_avx512);
+    multiply_wide *const wide = table[cpu_best()];
     for (size_t i = first; i < last; i++) {
         const uint64_t begin = a->indptr[i], n_entries = a->indptr[i + 1] - begin;
         const uint32_t *indices = a->indices + begin;

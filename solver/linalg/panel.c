@@ -1,6 +1,7 @@
 /* Owns the dense matrix of an operator: its memory, its precision. The products are in panel_product.c. */
 #include "solver/linalg/panel.h"
 
+#include "solver/base/cpu.h"
 #include "solver/base/half.h"
 #include "solver/base/work_area.h"
 
@@ -135,7 +136,7 @@ static lam_status panel_shape(size_t n, size_t k, panel_precision precision, con
                  (double)scale[j]);
         made.scale[j] = scale[j];
     }
-    made.kernels = panel_kernels_available(0);
+    made.kernels = panel_kernels_of(cpu_best());
     *a = made;
     made = (panel){0};
 done:

@@ -4,6 +4,7 @@
 #ifndef LAMBERT_LINALG_PANEL_H
 #define LAMBERT_LINALG_PANEL_H
 
+#include "solver/base/cpu.h"
 #include "store/status.h"
 #include "store/store_map.h"
 
@@ -110,9 +111,7 @@ void panel_expand(const panel *a, size_t m, const float *T, size_t t_stride, flo
 void panel_expand_rows(const panel *a, size_t m, const float *T, size_t t_stride, size_t n_rows,
                        const uint32_t *rows, const uint32_t *map, float *Y, size_t y_stride, void *work);
 
-/* The instruction sets this CPU can run, best first; NULL past the last. For tests: panel_create takes the
- * first. */
-const panel_kernels *panel_kernels_available(size_t index);
-const char *panel_kernels_name(const panel_kernels *kernels);
+/* The kernels of one level, at most cpu_best(), which panel_create takes. For tests. */
+const panel_kernels *panel_kernels_of(cpu_level level);
 
 #endif

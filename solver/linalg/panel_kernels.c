@@ -5,7 +5,7 @@
 #include "solver/base/half.h"
 
 #include <string.h>
-#if defined(__x86_64__)
+#ifdef CPU_AVX2_TARGET
 #include <immintrin.h>
 #endif
 
@@ -23,7 +23,6 @@ static inline float lane_sum_portable(lane4 x) {
     return (x[0] + x[2]) + (x[1] + x[3]);
 }
 #define NAME(name) name##_portable
-#define LABEL "portable"
 #define TARGET
 #define lane lane4
 #define LANE_SET(x) ((lane4){(x), (x), (x), (x)})
@@ -38,18 +37,17 @@ static inline float lane_sum_portable(lane4 x) {
 #define PROJECT_TILE 1
 #include "solver/linalg/panel_kernels_each.inc"
 
-#if defined(__x86_64__)
+#ifdef CPU_AVX2_TARGET
 #define LOAD_128(p) _mm_loadu_si128((const __m128i *)(const void *)(p))
 #define LOAD_256(p) _mm256_loadu_si256((const __m256i *)(const void *)(p))
 
-__attribute__((target("avx2,fma"))) static inline float lane_sum_avx2(__m256 x) {
+CPU_AVX2_TARGET static inline float lane_sum_avx2(__m256 x) {
     __m128 four = _mm256_castps256_ps128(x) + _mm256_extractf128_ps(x, 1);
     __m128 two = four + _mm_movehl_ps(four, four);
     return _mm_cvtss_f32(two + _mm_movehdup_ps(two));
 }
 #define NAME(name) name##_avx2
-#define LABEL "avx2"
-#define TARGET __attribute__((target("avx2,fma,f16c")))
+#define TARGET CPU_AVX2_TARGET
 #define lane __m256
 #define LANE_SET(x) _mm256_set1_ps(x)
 #define LANE_FMA(a, b, c) _mm256_fmadd_ps(a, b, c)
@@ -63,7 +61,7 @@ __attribute__((target("avx2,fma"))) static inline float lane_sum_avx2(__m256 x) 
 #define PROJECT_TILE 2
 #include "solver/linalg/panel_kernels_each.inc"
 
-__attribute__((target("avx512f"))) static inline float lane_sum_avx512(__m512 x) {
+CPU_AVX512_TARGET static inline float lane_sum_avx512(__m512 x) {
     __m256 eight =
         _mm512_castps512_ps256(x) + _mm256_castpd_ps(_mm512_extractf64x4_pd(_mm512_castps_pd(x), 1));
     __m128 four = _mm256_castps256_ps128(eight) + _mm256_extractf128_ps(eight, 1);
@@ -71,8 +69,7 @@ __attribute__((target("avx512f"))) static inline float lane_sum_avx512(__m512 x)
     return _mm_cvtss_f32(two + _mm_movehdup_ps(two));
 }
 #define NAME(name) name##_avx512
-#define LABEL "avx512"
-#define TARGET __attribute__((target("avx512f")))
+#define TARGET CPU_AVX512_TARGET
 #define lane __m512
 #define LANE_SET(x) _mm512_set1_ps(x)
 #define LANE_FMA(a, b, c) _mm512_fmadd_ps(a, b, c)
@@ -86,17 +83,7 @@ __attribute__((target("avx512f"))) static inline float lane_sum_avx512(__m512 x)
 #include "solver/linalg/panel_kernels_each.inc"
 #endif
 
-const panel_kernels *panel_kernels_available(size_t index) {
-    const panel_kernels *available[3];
-    size_t count = 0;
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx512f")) available[count++] = &kernels_avx512;
-    if (cpu_has_avx2_set()) available[count++] = &kernels_avx2;
-#endif
-    available[count++] = &kernels_portable;
-    return index < count ? available[index] : NULL;
-}
-
-const char *panel_kernels_name(const panel_kernels *kernels) {
-    return kernels->name;
+const panel_kernels *panel_kernels_of(cpu_level level) {
+    static const panel_kernels *const table[] = CPU_TABLE(&kernels_portable, &kernels_avx2, &kernels_avx512);
+    return table[level];
 }

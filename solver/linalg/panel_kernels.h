@@ -38,7 +38,6 @@ typedef void expand_row_kernel(const panel_values *from, size_t row, size_t m, c
                                size_t y_stride);
 
 struct panel_kernels {
-    const char *name;
     project_kernel *project[PANEL_LAYOUTS][PANEL_PRECISIONS];
     expand_kernel *expand[PANEL_LAYOUTS][PANEL_PRECISIONS];
     expand_row_kernel *expand_row[PANEL_LAYOUTS][PANEL_PRECISIONS];

@@ -5,12 +5,11 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#if defined(__x86_64__)
+#ifdef CPU_AVX2_TARGET
 #include <immintrin.h>
 #endif
 
 struct segment_kernels {
-    const char *name;
     void (*sum)(const segments *s, const float *x, float *t);
 };
 
@@ -32,11 +31,11 @@ static inline void load_four_portable(const float *x, size_t count, half *lanes)
     for (size_t j = 0; j < count; j++) (*lanes)[j] = (double)x[j];
 }
 #include "solver/linalg/segment_kernels.inc"
-static const segment_kernels kernels_portable = {"portable", sum_portable};
+static const segment_kernels kernels_portable = {sum_portable};
 
-#if defined(__x86_64__)
+#ifdef CPU_AVX2_TARGET
 #define KERNEL(name) name##_avx2
-#define TARGET __attribute__((target("avx2,fma")))
+#define TARGET CPU_AVX2_TARGET
 TARGET static inline __attribute__((always_inline)) void load_eight_avx2(const float *x, size_t count,
                                                                          wide *lanes) {
     static const int32_t masks[16] = {-1, -1, -1, -1, -1, -1, -1, -1};
@@ -54,10 +53,10 @@ TARGET static inline __attribute__((always_inline)) void load_four_avx2(const fl
         _mm_maskload_ps(x, _mm_loadu_si128((const __m128i_u *)(const void *)(masks + 4 - count))));
 }
 #include "solver/linalg/segment_kernels.inc"
-static const segment_kernels kernels_avx2 = {"avx2", sum_avx2};
+static const segment_kernels kernels_avx2 = {sum_avx2};
 
 #define KERNEL(name) name##_avx512
-#define TARGET __attribute__((target("avx512f,avx512vl")))
+#define TARGET CPU_AVX512_TARGET
 TARGET static inline __attribute__((always_inline)) void load_eight_avx512(const float *x, size_t count,
                                                                            wide *lanes) {
     *lanes = (wide)_mm512_cvtps_pd(_mm256_maskz_loadu_ps((__mmask8)((1u << count) - 1), x));
@@ -67,23 +66,13 @@ TARGET static inline __attribute__((always_inline)) void load_four_avx512(const 
     *lanes = (half)_mm256_cvtps_pd(_mm_maskz_loadu_ps((__mmask8)((1u << count) - 1), x));
 }
 #include "solver/linalg/segment_kernels.inc"
-static const segment_kernels kernels_avx512 = {"avx512", sum_avx512};
+static const segment_kernels kernels_avx512 = {sum_avx512};
 #endif
 
-const segment_kernels *segment_kernels_available(size_t index) {
-    const segment_kernels *available[3];
-    size_t count = 0;
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl"))
-        available[count++] = &kernels_avx512;
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) available[count++] = &kernels_avx2;
-#endif
-    available[count++] = &kernels_portable;
-    return index < count ? available[index] : NULL;
-}
-
-const char *segment_kernels_name(const segment_kernels *kernels) {
-    return kernels->name;
+const segment_kernels *segment_kernels_of(cpu_level level) {
+    static const segment_kernels *const table[] =
+        CPU_TABLE(&kernels_portable, &kernels_avx2, &kernels_avx512);
+    return table[level];
 }
 
 lam_status segments_create(size_t n, size_t k, uint64_t *begin, float *weight, segments *s,
@@ -100,8 +89,8 @@ lam_status segments_create(size_t n, size_t k, uint64_t *begin, float *weight, s
     for (size_t j = 0; weight != NULL && j < n; j++)
         if (!isfinite(weight[j]))
             FAIL(error, LAM_ERR_NUMERIC, "/operator/weight[%zu] = %g, must be finite", j, (double)weight[j]);
-    *s =
-        (segments){.n = n, .k = k, .begin = begin, .weight = weight, .kernels = segment_kernels_available(0)};
+    *s = (segments){
+        .n = n, .k = k, .begin = begin, .weight = weight, .kernels = segment_kernels_of(cpu_best())};
 done:
     return status;
 }

@@ -3,6 +3,7 @@
 #ifndef LAMBERT_LINALG_SEGMENTS_H
 #define LAMBERT_LINALG_SEGMENTS_H
 
+#include "solver/base/cpu.h"
 #include "store/status.h"
 
 #include <stdint.h>
@@ -33,9 +34,7 @@ void segments_sum(const segments *s, const float *x, float *t);
 /* x = V t: x_j = weight_j t_p. Cost: O(n). */
 void segments_spread(const segments *s, const float *t, float *x);
 
-/* The instruction sets this CPU can run, best first; NULL past the last. For tests: segments_create takes the
- * first. */
-const segment_kernels *segment_kernels_available(size_t index);
-const char *segment_kernels_name(const segment_kernels *kernels);
+/* The kernels of one level, at most cpu_best(), which segments_create takes. For tests. */
+const segment_kernels *segment_kernels_of(cpu_level level);
 
 #endif

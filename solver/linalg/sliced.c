@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#if defined(__x86_64__)
+#ifdef CPU_AVX2_TARGET
 #include <immintrin.h>
 #endif
 
@@ -163,9 +163,6 @@ typedef struct kernels {
     void (*wide_long)(const sliced_rows *s, size_t k, const float *side, float *sums);
 } kernels;
 
-#define TARGET_AVX2 __attribute__((target("avx2,fma,f16c")))
-#define TARGET_AVX512 __attribute__((target("avx512f,fma,f16c")))
-
 #define FORM(name) name##_floats
 #define INDEX uint32_t
 #define VALUE float
@@ -196,7 +193,7 @@ typedef struct kernels {
 
 /* The fastest for this CPU and these numbers. */
 static kernels kernels_for(const sliced_rows *s) {
-    return s->halves != NULL ? kernels_of_cpu_halves() : kernels_of_cpu_floats();
+    return s->halves != NULL ? kernels_halves[cpu_best()] : kernels_floats[cpu_best()];
 }
 
 /* --- all of it -------------------------------------------------------------------------------------------

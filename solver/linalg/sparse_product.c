@@ -1,7 +1,7 @@
 #include "solver/linalg/sparse_product.h"
 
 #include "solver/base/work_area.h"
-#include "solver/linalg/csr_floats.h"
+#include "solver/linalg/csr_rows.h"
 #include "solver/linalg/panel.h"
 
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 #include "solver/method/many_lights.h"
 
-#include "solver/linalg/csr_floats.h"
+#include "solver/linalg/csr_rows.h"
 
 #include <math.h>
 #include <stdlib.h>

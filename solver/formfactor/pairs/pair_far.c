@@ -1,5 +1,7 @@
 #include "solver/formfactor/pairs/pair_far.h"
 
+#include "solver/base/cpu.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -83,11 +85,11 @@ void pair_far_table_free(pair_far_table *t) {
     *t = (pair_far_table){0};
 }
 
-#if defined(__x86_64__)
+#ifdef CPU_AVX2_TARGET
 typedef double lane_avx512 __attribute__((vector_size(64)));
 typedef long long mask_avx512 __attribute__((vector_size(64)));
 #define KERNEL(name) name##_avx512
-#define TARGET __attribute__((target("avx512f,avx512dq")))
+#define TARGET CPU_AVX512_TARGET
 #define lane lane_avx512
 #define mask mask_avx512
 #include "solver/formfactor/pairs/pair_far_kernels.inc"
@@ -99,7 +101,7 @@ typedef long long mask_avx512 __attribute__((vector_size(64)));
 typedef double lane_avx2 __attribute__((vector_size(32)));
 typedef long long mask_avx2 __attribute__((vector_size(32)));
 #define KERNEL(name) name##_avx2
-#define TARGET __attribute__((target("avx2,fma")))
+#define TARGET CPU_AVX2_TARGET
 #define lane lane_avx2
 #define mask mask_avx2
 #include "solver/formfactor/pairs/pair_far_kernels.inc"
@@ -122,15 +124,7 @@ typedef long long mask_plain __attribute__((vector_size(16)));
 #undef mask
 
 void pair_far_row(const pair_far_table *t, size_t i, size_t first, size_t count, double *g) {
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx512dq")) {
-        pair_far_row_avx512(t, i, first, count, g);
-        return;
-    }
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-        pair_far_row_avx2(t, i, first, count, g);
-        return;
-    }
-#endif
-    pair_far_row_plain(t, i, first, count, g);
+    typedef void row_kernel(const pair_far_table *, size_t, size_t, size_t, double *);
+    static row_kernel *const table[] = CPU_TABLE(pair_far_row_plain, pair_far_row_avx2, pair_far_row_avx512);
+    table[cpu_best()](t, i, first, count, g);
 }

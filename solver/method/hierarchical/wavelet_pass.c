@@ -1,6 +1,7 @@
 #include "solver/method/hierarchical/wavelet_pass.h"
 
 #include "solver/base/bitset.h"
+#include "solver/base/cpu.h"
 #include "solver/method/hierarchical/subtrees.h"
 #include "solver/method/hierarchical/wavelet_entries.h"
 
@@ -10,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#if defined(__x86_64__)
+#ifdef CPU_AVX2_TARGET
 #include <immintrin.h>
 #endif
 
@@ -123,9 +124,9 @@ static inline unsigned beyond_portable(const lanes *v, float least) {
 #define BEYOND(v, x) beyond_portable(v, x)
 #include "solver/method/hierarchical/wavelet_pass_kernels.inc"
 
-#if defined(__x86_64__)
+#ifdef CPU_AVX2_TARGET
 #define KERNEL(name) name##_avx2
-#define TARGET __attribute__((target("avx2,fma")))
+#define TARGET CPU_AVX2_TARGET
 #define BEYOND(v, x)                                                                                         \
     (unsigned)_mm256_movemask_ps(_mm256_cmp_ps(                                                              \
         _mm256_andnot_ps(_mm256_set1_ps(-0.0f), *(const __m256 *)(v)), _mm256_set1_ps(x), _CMP_GT_OQ))
@@ -142,13 +143,10 @@ typedef struct pass_kernels {
     lam_status (*begin_leaf)(const pass_row *, size_t, live_rows *, pass_work *, lam_error *);
 } pass_kernels;
 
-static pass_kernels kernels_of_cpu(void) {
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
-        return (pass_kernels){merge_avx2, promote_avx2, merge_fine_columns_avx2, begin_leaf_avx2};
-#endif
-    return (pass_kernels){merge_portable, promote_portable, merge_fine_columns_portable, begin_leaf_portable};
-}
+#define KERNELS(name)                                                                                        \
+    { merge_##name, promote_##name, merge_fine_columns_##name, begin_leaf_##name }
+static const pass_kernels kernels_of[] = CPU_TABLE(KERNELS(portable), KERNELS(avx2), KERNELS(avx2));
+#undef KERNELS
 
 /* Rows S_ij = A_i^1/2 F_ij A_j^-1/2 of a leaf's elements, one a lane, into `dense`. */
 static lam_status scatter_rows(const pass_job *job, size_t node, pass_work *d, lam_error *error) {
@@ -253,7 +251,7 @@ done:
  * scaling rows coarsened to the height below the parent and stored, its wavelets coarsened up to the root. */
 static lam_status run_node(pass_job *job, size_t node, pass_work *d, lam_error *error) {
     lam_status status = LAM_OK;
-    const pass_kernels kernels = kernels_of_cpu();
+    const pass_kernels kernels = kernels_of[cpu_best()];
     const wavelets *w = job->input->basis;
     const wavelet_node *a = &w->nodes[node];
     const uint32_t root = (uint32_t)w->n_nodes - 1, top = job->reach.height[root];

@@ -1,6 +1,6 @@
 #include "solver/operator/refine/compressed_factors.h"
 
-#include "solver/linalg/csr_doubles.h"
+#include "solver/linalg/csr_rows.h"
 #include "solver/operator/hierarchical.h"
 #include "solver/operator/wavelet/wavelet_doubles.h"
 

@@ -2,7 +2,7 @@
 #include "solver/operator/refine/refine.h"
 
 #include "solver/base/random.h"
-#include "solver/linalg/csr_doubles.h"
+#include "solver/linalg/csr_rows.h"
 
 #include <float.h>
 #include <math.h>

@@ -1,8 +1,7 @@
 /* How far a refined answer may be from the true one, and whether that is enough: the certificate of refine.h.
  */
+#include "solver/linalg/csr_rows.h"
 #include "solver/operator/refine/refine.h"
-
-#include "solver/linalg/csr_doubles.h"
 
 #include <math.h>
 #include <string.h>

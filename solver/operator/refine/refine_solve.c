@@ -2,9 +2,8 @@
  * q = A z in double, each q made orthogonal to some before it, steps that leave the least |r|. r follows the
  * steps, so that one product with the stored F an iteration is all there is; how far rounding has moved it
  * from r of the P it stands for is added up beside it. */
+#include "solver/linalg/csr_rows.h"
 #include "solver/operator/refine/refine.h"
-
-#include "solver/linalg/csr_doubles.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,7 @@
 #include "solver/operator/wavelet/wavelet_plan.h"
 
 #include "solver/base/array_grow.h"
+#include "solver/base/cpu.h"
 #include "store/status.h"
 
 #include <stdlib.h>
@@ -250,36 +251,17 @@ size_t wavelet_plan_bytes(const wavelet_plan *plan) {
 #define TARGET
 #include "solver/operator/wavelet/wavelet_kernels.inc"
 
-#if defined(__x86_64__)
+#ifdef CPU_AVX2_TARGET
 #define KERNEL(name) name##_avx2
-#define TARGET __attribute__((target("avx2,fma")))
+#define TARGET CPU_AVX2_TARGET
 #include "solver/operator/wavelet/wavelet_kernels.inc"
 #endif
 
 typedef void transform(const wavelet_plan *plan, size_t first, size_t last, const uint32_t *which,
                        const float *from, float *to, float *s);
 
-static bool has_avx2(void) {
-#if defined(__x86_64__)
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-#else
-    return false;
-#endif
-}
-
-static transform *forward_kernel(void) {
-#if defined(__x86_64__)
-    if (has_avx2()) return forward_avx2;
-#endif
-    return forward_portable;
-}
-
-static transform *inverse_kernel(void) {
-#if defined(__x86_64__)
-    if (has_avx2()) return inverse_avx2;
-#endif
-    return inverse_portable;
-}
+static transform *const forward[] = CPU_TABLE(forward_portable, forward_avx2, forward_avx2),
+                        *const inverse[] = CPU_TABLE(inverse_portable, inverse_avx2, inverse_avx2);
 
 /* Whether all of a piece is 0. */
 static bool is_dark(const wavelet_plan *plan, const wavelet_piece *piece, const float *x) {
@@ -298,7 +280,7 @@ static void leave_dark(const wavelet_plan *plan, const wavelet_piece *piece, flo
 
 void wavelet_plan_forward(const wavelet_plan *plan, size_t m, const float *X, float *C, float *work,
                           size_t n_threads) {
-    transform *const run = forward_kernel();
+    transform *const run = forward[cpu_best()];
     const size_t room = wavelet_plan_work(plan), n_pieces = plan->n_pieces;
     const plan_step *root = &plan->steps[plan->n_steps - 1];
 #pragma omp parallel for schedule(dynamic, 1)                                                                \
@@ -322,7 +304,7 @@ void wavelet_plan_forward(const wavelet_plan *plan, size_t m, const float *X, fl
 
 void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, float *X, float *work,
                           size_t n_threads) {
-    transform *const run = inverse_kernel();
+    transform *const run = inverse[cpu_best()];
     const size_t room = wavelet_plan_work(plan), n_pieces = plan->n_pieces;
     const plan_step *root = &plan->steps[plan->n_steps - 1];
     for (size_t v = 0; v < m; v++) {
@@ -385,5 +367,5 @@ void wavelet_plan_inverse_some(const wavelet_plan *plan, size_t n_steps, const u
     const plan_step *root = &plan->steps[plan->n_steps - 1];
     float *s = work + (plan->n_steps - 1) * WAVELET_SCALING;
     for (size_t k = 0; k < root->scaling; k++) s[k] = C[plan->n_used - root->scaling + k];
-    inverse_kernel()(plan, 0, n_steps, steps, C, X, work);
+    inverse[cpu_best()](plan, 0, n_steps, steps, C, X, work);
 }

@@ -1,8 +1,7 @@
 /* Sparse rows: their product and what the check refuses. */
 #include "solver/base/random.h"
 #include "solver/linalg/csr.h"
-#include "solver/linalg/csr_doubles.h"
-#include "solver/linalg/csr_floats.h"
+#include "solver/linalg/csr_rows.h"
 #include "solver/linalg/sparse_product.h"
 #include "support/suite.h"
 
@@ -41,7 +40,7 @@ START_TEST(products_of_floats_side_by_side) {
     static const size_t widths[] = {1, 8, 16, 32};
     csr a = random_rows(N);
     float *X = aligned_alloc(64, N * CSR_FLOATS_WIDTH * sizeof *X), one[N], sums[CSR_FLOATS_WIDTH], alone;
-    for (size_t set = 0; csr_floats_row_of(set, 1) != NULL; set++)
+    for (cpu_level set = CPU_PORTABLE; set <= cpu_best(); set++)
         for (size_t w = 0; w < 4; w++) {
             const size_t width = widths[w];
             ck_assert_uint_eq(csr_floats_width(width), width);
@@ -74,7 +73,7 @@ START_TEST(products_of_doubles_side_by_side) {
     static const size_t widths[] = {1, 4, 8, 16};
     csr a = random_rows(N);
     double *X = aligned_alloc(64, N * CSR_DOUBLES_WIDTH * sizeof *X), one[N], sums[CSR_DOUBLES_WIDTH], alone;
-    for (size_t set = 0; csr_doubles_row_of(set, 1) != NULL; set++)
+    for (cpu_level set = CPU_PORTABLE; set <= cpu_best(); set++)
         for (size_t w = 0; w < 4; w++) {
             const size_t width = widths[w];
             ck_assert_uint_eq(csr_doubles_width(width), width);

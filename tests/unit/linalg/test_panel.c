@@ -106,11 +106,11 @@ static float *nan_floats(size_t count) {
 #define TOLERANCE(terms) (((terms) < 128 ? (double)(terms) : 128.0) + 7.0) * (FLT_EPSILON / 2.0)
 
 START_TEST(products_agree_with_sums_in_double) {
-    for (size_t set = 0; panel_kernels_available(set) != NULL; set++)
+    for (cpu_level set = CPU_PORTABLE; set <= cpu_best(); set++)
         for (size_t shape_index = 0; shape_index < SHAPES; shape_index++) {
             size_t n = shapes[shape_index].n, k = shapes[shape_index].k;
             subject s;
-            subject_make(&s, shapes[shape_index], (panel_precision)_i, panel_kernels_available(set));
+            subject_make(&s, shapes[shape_index], (panel_precision)_i, panel_kernels_of(set));
             float *T = nan_floats(VECTORS * (k + GAP)), *Y = nan_floats(VECTORS * (n + GAP));
             panel_project(&s.a, VECTORS, s.X, n + GAP, T, k + GAP, s.work);
             panel_expand(&s.a, VECTORS, s.T, k + GAP, Y, n + GAP, s.work);
@@ -152,11 +152,11 @@ END_TEST
 START_TEST(bits_do_not_depend_on_the_batch) {
     /* Around the vectors that kernels take at once: 1, 2, 4 and 16. */
     static const size_t batches[] = {1, 2, 3, 4, 5, 8, 15, 16, 17, VECTORS};
-    for (size_t set = 0; panel_kernels_available(set) != NULL; set++)
+    for (cpu_level set = CPU_PORTABLE; set <= cpu_best(); set++)
         for (size_t shape_index = 0; shape_index < SHAPES; shape_index++) {
             size_t n = shapes[shape_index].n, k = shapes[shape_index].k;
             subject s;
-            subject_make(&s, shapes[shape_index], (panel_precision)_i, panel_kernels_available(set));
+            subject_make(&s, shapes[shape_index], (panel_precision)_i, panel_kernels_of(set));
             /* Vector 1 is almost empty: alone it skips rows that its neighbours need. */
             for (size_t i = 0; i < n; i++)
                 if (i != n / 2) s.X[n + GAP + i] = 0.0f;
@@ -184,8 +184,8 @@ END_TEST
 
 /* Both fuse a b + c and add the same 16 lanes in the same order. */
 START_TEST(wide_instruction_sets_give_the_same_bits) {
-    const panel_kernels *first = panel_kernels_available(0), *second = panel_kernels_available(1);
-    if (second == NULL || panel_kernels_available(2) == NULL) return; /* this CPU has not both */
+    if (cpu_best() < CPU_AVX512) return;
+    const panel_kernels *first = panel_kernels_of(CPU_AVX512), *second = panel_kernels_of(CPU_AVX2);
     size_t n = 300, k = 100;
     subject s;
     subject_make(&s, (shape){n, k}, (panel_precision)_i, first);
@@ -218,8 +218,8 @@ START_TEST(long_sums_end_in_double) {
     ck_assert(panel_create(N, 1, ones, "A", &tall, &error) == LAM_OK);
     ck_assert(panel_create(1, N, ones, "A", &wide, &error) == LAM_OK);
     void *work = aligned_alloc(WORK_AREA_ALIGN, panel_work_bytes(&wide, 1));
-    for (size_t set = 0; panel_kernels_available(set) != NULL; set++) {
-        tall.kernels = wide.kernels = panel_kernels_available(set);
+    for (cpu_level set = CPU_PORTABLE; set <= cpu_best(); set++) {
+        tall.kernels = wide.kernels = panel_kernels_of(set);
         panel_project(&tall, 1, ones, N, &sum, 1, work);
         ck_assert_double_le(fabs((double)sum - exact), TOLERANCE(128) * exact);
         panel_expand(&wide, 1, ones, N, &sum, 1, work);
@@ -235,7 +235,7 @@ END_TEST
 START_TEST(large_matrices_come_back_as_they_went_in) {
     size_t n = 1501, k = 1003; /* 6 MB: huge pages */
     subject s;
-    subject_make(&s, (shape){n, k}, PANEL_F32, panel_kernels_available(0));
+    subject_make(&s, (shape){n, k}, PANEL_F32, panel_kernels_of(cpu_best()));
     float *copy = nan_floats(n * k);
     panel_copy_rows(&s.a, copy);
     ck_assert_mem_eq(copy, s.rows, n * k * sizeof *copy);
@@ -248,11 +248,11 @@ END_TEST
 
 /* Any rows in any order, through a map or not: those of the whole product. */
 START_TEST(chosen_rows_have_the_same_bits) {
-    for (size_t set = 0; panel_kernels_available(set) != NULL; set++) {
+    for (cpu_level set = CPU_PORTABLE; set <= cpu_best(); set++) {
         enum { N = 301, K = 2085, CHOSEN = 70 };
         subject s;
         uint32_t rows[CHOSEN], map[N];
-        subject_make(&s, (shape){N, K}, (panel_precision)_i, panel_kernels_available(set));
+        subject_make(&s, (shape){N, K}, (panel_precision)_i, panel_kernels_of(set));
         for (size_t r = 0; r < CHOSEN; r++) rows[r] = (uint32_t)(r * r * 3 % N);
         for (size_t i = 0; i < N; i++) map[i] = (uint32_t)(N - 1 - i);
         float *Y = nan_floats(VECTORS * N), *some = nan_floats(VECTORS * CHOSEN);
@@ -292,12 +292,12 @@ static panel view_of(const panel *a, void **memory) {
 /* Rows as they lie in a store take part in the same sums as tiles, whatever stands behind them. */
 START_TEST(rows_give_the_bits_of_tiles) {
     static const size_t batches[] = {1, 2, 4, 5, 16, VECTORS};
-    for (size_t set = 0; panel_kernels_available(set) != NULL; set++)
+    for (cpu_level set = CPU_PORTABLE; set <= cpu_best(); set++)
         for (size_t shape_index = 0; shape_index < SHAPES; shape_index++) {
             const size_t n = shapes[shape_index].n, k = shapes[shape_index].k;
             subject s;
             void *memory;
-            subject_make(&s, shapes[shape_index], (panel_precision)_i, panel_kernels_available(set));
+            subject_make(&s, shapes[shape_index], (panel_precision)_i, panel_kernels_of(set));
             panel rows = view_of(&s.a, &memory);
             ck_assert_uint_eq(panel_work_bytes(&rows, VECTORS), panel_work_bytes(&s.a, VECTORS));
             /* Vector 0 has dark elements, so that tiles are read in part. */
@@ -343,7 +343,7 @@ START_TEST(views_can_be_copied) {
     void *memory;
     panel narrow[2];
     float copies[2][N * K];
-    subject_make(&s, (shape){N, K}, (panel_precision)_i, panel_kernels_available(0));
+    subject_make(&s, (shape){N, K}, (panel_precision)_i, panel_kernels_of(cpu_best()));
     panel rows = view_of(&s.a, &memory);
     panel_copy_rows(&s.a, copies[0]);
     panel_copy_rows(&rows, copies[1]);
@@ -377,7 +377,7 @@ START_TEST(bits_do_not_depend_on_threads) {
     static const size_t threads[] = {1, 2, 3, 8};
     subject s;
     float *T[4], *Y[4];
-    subject_make(&s, (shape){N, K}, (panel_precision)_i, panel_kernels_available(0));
+    subject_make(&s, (shape){N, K}, (panel_precision)_i, panel_kernels_of(cpu_best()));
     for (size_t i = 0; i < N; i++) s.X[N + GAP + i] = i < 3000 || i > 6100 ? 0.0f : s.X[i]; /* empty slabs */
     for (size_t i = 0; i < 4; i++) {
         s.a.n_threads = threads[i];
@@ -402,7 +402,7 @@ END_TEST
 /* Numbers below the least normal one are numbers: each product and sum is off by at most 2^-150 more. */
 START_TEST(subnormal_numbers_count) {
     enum { N = 40, K = 35 };
-    for (size_t set = 0; panel_kernels_available(set) != NULL; set++) {
+    for (cpu_level set = CPU_PORTABLE; set <= cpu_best(); set++) {
         lam_error error = {.message = ""};
         uint16_t halves[N * K];
         float tiny[N * K], ones[K], Y[N];
@@ -416,7 +416,7 @@ START_TEST(subnormal_numbers_count) {
         for (int half = 0; half < 2; half++) {
             ck_assert(panel_create_kept(N, K, half ? PANEL_F16 : PANEL_F32, half ? (void *)halves : tiny,
                                         NULL, "A", &a, &error) == LAM_OK);
-            a.kernels = panel_kernels_available(set);
+            a.kernels = panel_kernels_of(set);
             void *work = aligned_alloc(WORK_AREA_ALIGN, panel_work_bytes(&a, 1));
             panel_expand(&a, 1, ones, K, Y, N, work);
             for (size_t i = 0; i < N; i++) {

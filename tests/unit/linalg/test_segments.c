@@ -33,8 +33,8 @@ START_TEST(sums_are_right) {
     float x[N], t[RUNS], first[RUNS];
     for (size_t j = 0; j < N; j++) x[j] = (float)random_double();
     segments_sum(&s, x, first);
-    for (size_t i = 0; segment_kernels_available(i) != NULL; i++) {
-        s.kernels = segment_kernels_available(i);
+    for (cpu_level level = CPU_PORTABLE; level <= cpu_best(); level++) {
+        s.kernels = segment_kernels_of(level);
         for (size_t p = 0; p < RUNS; p++) t[p] = NAN;
         segments_sum(&s, x, t);
         for (size_t p = 0; p < RUNS; p++) {
@@ -45,8 +45,7 @@ START_TEST(sums_are_right) {
                 magnitude += fabs(term);
             }
             ck_assert_msg(fabs((double)t[p] - truth) <= 0x1p-24 * fabs(truth) + 5000 * 0x1p-52 * magnitude,
-                          "%s, run %zu: %.9g, not %.9g", segment_kernels_name(s.kernels), p, (double)t[p],
-                          truth);
+                          "level %d, run %zu: %.9g, not %.9g", (int)level, p, (double)t[p], truth);
         }
         ck_assert_mem_eq(t, first, sizeof t);
     }
