@@ -35,7 +35,7 @@ static inline uint16_t half_of_float(float x) {
 static inline float float_of_half(uint16_t half) {
     const uint32_t sign = (uint32_t)(half & 0x8000u) << 16, magnitude = half & 0x7fffu;
     if (magnitude >= 0x7c00u) return float_of_bits(sign | 0x7f800000u | magnitude << 13);
-    /* Its exponent is 112 too small for a float; a multiplication makes subnormal ones right, too. */
+    /* The exponent is 112 too small for a float; the multiplication also normalizes subnormal numbers. */
     return float_of_bits(sign | float_bits(float_of_bits(magnitude << 13) * 0x1p112f));
 }
 

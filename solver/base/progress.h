@@ -1,4 +1,4 @@
-/* How long work tells how far it is and learns that it should stop. Plain callbacks: no printing here. */
+/* Callbacks through which long work reports progress and is cancelled. Nothing here prints. */
 #ifndef LAMBERT_BASE_PROGRESS_H
 #define LAMBERT_BASE_PROGRESS_H
 

@@ -16,7 +16,7 @@ static bool is_cancelled(atomic_bool *cancelled) {
     return cancelled != NULL && atomic_load(cancelled);
 }
 
-/* LAPACK is not interrupted, but what follows it is left out. */
+/* LAPACK is not interrupted; the flag is tested between its calls. */
 static lam_status invert(size_t k, double *K, double *rcond, atomic_bool *cancelled, lam_error *error) {
     lam_status status = LAM_OK;
     lapack_int *pivots = NULL;
@@ -77,7 +77,7 @@ static void take_rows(const float *array, const panel *a, size_t k, size_t first
     for (size_t j = 0; j < count * k; j++) rows[j] = (double)from[j];
 }
 
-/* Rows at a time, and room for them. */
+/* Room for CORE_PANEL rows. */
 typedef struct core_rows {
     double *U, *V; /* V: NULL where it has one entry a row */
     float *floats;
@@ -88,7 +88,7 @@ static void take_off(const core_factors *in, size_t first, size_t count, const c
                      double *K) {
     const size_t k = in->k;
     take_rows(in->U, in->U_panel, k, first, count, rows->floats, rows->U);
-    for (size_t r = 0; r < count; r++) { /* R U, for one entry a row at once V R U */
+    for (size_t r = 0; r < count; r++) { /* R U; with one entry of V a row, times that entry */
         const size_t j = first + r;
         double factor = (double)in->rho[in->order != NULL ? in->order[j] : j];
         if (in->begin != NULL && in->weight != NULL) factor *= (double)in->weight[j];
@@ -100,7 +100,7 @@ static void take_off(const core_factors *in, size_t first, size_t count, const c
                     (int)k, rows->U, (int)k, 1.0, K, (int)k);
         return;
     }
-    for (size_t r = 0; r < count; r++) { /* row p of V^T has the elements of run p alone */
+    for (size_t r = 0; r < count; r++) { /* row p of V^T is nonzero in run p alone */
         while (*p + 1 < k && in->begin[*p + 1] <= first + r) ++*p;
         for (size_t q = 0; q < k; q++) K[*p * k + q] -= rows->U[r * k + q];
     }

@@ -27,7 +27,7 @@ void csr_free(csr *a) {
     *a = (csr){0};
 }
 
-/* One of the two arrays with another room, in a file or in memory. */
+/* Resizes one of the two arrays, in a file or in memory. */
 static lam_status reserve(const large_place *place, large_file **file, size_t entries, size_t size,
                           void **array, lam_error *error) {
     lam_status status = LAM_OK;
@@ -140,7 +140,7 @@ done:
     return status;
 }
 
-/* One row of the product, WIDE columns from where X and Y point: Y_i = sum_e a_e X_j(e). */
+/* One row of the product, WIDE columns from X and Y on: Y_i = sum_e a_e X_j(e). */
 typedef void multiply_wide(const uint32_t *indices, const float *data, uint64_t n_entries, size_t m,
                            const double *X, double *Y);
 

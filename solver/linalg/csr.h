@@ -12,21 +12,21 @@ typedef struct csr {
     uint64_t *indptr;  /* [n+1] */
     uint32_t *indices; /* [nnz], ascending in a row */
     float *data;       /* [nnz] */
-    /* Where indices and data lie: in memory where this is NULL, else in files there. */
+    /* NULL: indices and data lie in memory; else in files of this place. */
     const large_place *place;
     large_file *files[2];
 } csr;
 
 void csr_free(csr *a);
 
-/* Gives indices and data room for so many entries, more or fewer than now, and keeps what is there; in
- * memory, pages that are not written take none. Errors: LAM_ERR_MEMORY, LAM_ERR_IO; a is then as it was, but
- * for room that one of the two may have more. */
+/* Resizes indices and data to `entries`, more or fewer than now, and keeps their content; pages that are
+ * never written take no memory. Errors: LAM_ERR_MEMORY, LAM_ERR_IO; a then keeps its content, and one of the
+ * two arrays may be larger. */
 lam_status csr_reserve(csr *a, size_t entries, lam_error *error);
 
-/* Filling rows in any sequence. First indptr [n+1] holds in i + 1 how many entries row i gets: from it
- * csr_begin_rows gives indices and data their room (LAM_ERR_MEMORY, naming what). Then an entry of row i goes
- * to indptr[i]++, which so runs ahead to where row i + 1 begins, and csr_end_rows puts that right. */
+/* Fill rows in any order. The caller puts the number of entries of row i into indptr[i + 1]; csr_begin_rows
+ * turns these into begins and allocates indices and data (LAM_ERR_MEMORY, naming what). The caller then puts
+ * each entry of row i at indptr[i]++, and csr_end_rows restores the begins. */
 lam_status csr_begin_rows(csr *a, const char *what, lam_error *error);
 void csr_end_rows(csr *a);
 
@@ -42,12 +42,11 @@ lam_status csr_load(store *s, const char *name, size_t n, csr *out, lam_error *e
 /* Y[first..last) = A X for rows first <= i < last: X and Y are [n][m] row-major, double. */
 void csr_multiply_rows(const csr *a, size_t first, size_t last, size_t m, const double *X, double *Y);
 
-/* out = u A + w B, without entries that come to 0; the caller frees it with csr_free. Both have n rows.
- * It lies where A does. Cost: O(nnz). Errors: LAM_ERR_MEMORY, LAM_ERR_IO. */
+/* out = u A + w B without entries that are 0; the caller frees it with csr_free. Both have n rows.
+ * It lies in the place of A. Cost: O(nnz). Errors: LAM_ERR_MEMORY, LAM_ERR_IO. */
 lam_status csr_combine(const csr *A, float u, const csr *B, float w, csr *out, lam_error *error);
 
-/* A with the entries of B in place of its own, and in place of nothing; those that are 0 in B are left out.
- */
+/* out = A with the entries of B added or put in place of its own; entries that are 0 in B are dropped. */
 lam_status csr_replace(const csr *A, const csr *B, csr *out, lam_error *error);
 
 #endif

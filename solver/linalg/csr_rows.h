@@ -32,7 +32,7 @@ size_t csr_doubles_width(size_t n_vectors);
 csr_float_row *csr_floats_row(size_t width);
 csr_double_row *csr_doubles_row(size_t width);
 
-/* The same of one level, at most cpu_best(). For tests. */
+/* The products of one level, at most cpu_best(). For tests. */
 csr_float_row *csr_floats_row_of(cpu_level level, size_t width);
 csr_double_row *csr_doubles_row_of(cpu_level level, size_t width);
 

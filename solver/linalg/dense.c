@@ -7,7 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Rows of a tall product, and columns of a tile of a Gram matrix, that one call of BLAS gets. */
+/* Rows of a tall product, columns of a tile of a Gram matrix and rows in double that one call of BLAS takes.
+ */
 enum { ROWS = 512, TILE = 256, PANEL = 2048 };
 
 typedef struct multiply_job {

@@ -1,4 +1,4 @@
-/* Owns the dense matrix of an operator: its memory, its precision. The products are in panel_product.c. */
+/* The memory and the precision of a panel; its products are in panel_product.c. */
 #include "solver/linalg/panel.h"
 
 #include "solver/base/cpu.h"
@@ -12,8 +12,8 @@
 
 #define HUGE_PAGE ((size_t)2 << 20)
 
-/* f16: a column whose largest magnitude lies between these needs no scale. Below, what its small values lose
- * to f16's smallest step of 2^-24 would show beside the rounding of its large ones. */
+/* f16: a column whose largest magnitude lies between these needs no scale. Below HALF_LEAST, the error of its
+ * small values by f16's smallest step of 2^-24 would exceed the rounding of its large ones. */
 #define HALF_LEAST 0x1p-7f
 #define HALF_MOST 6e4f
 /* i8: steps from 0 to the largest magnitude of a column. */
@@ -41,14 +41,14 @@ size_t panel_value_size(panel_precision precision) {
     return precisions[precision].size;
 }
 
-/* Zeroed memory of so many bytes, *data at a cache line in it, or in huge pages: with 4 KiB pages a solve
+/* Zeroed memory, *data at its first cache line or, when it is large, huge page: with 4 KiB pages an answer
  * takes twice as long. NULL on failure. */
 static void *allocate_data(size_t bytes, const char *name, void **data, lam_error *error) {
     const size_t align = bytes < 2 * HUGE_PAGE ? WORK_AREA_ALIGN : HUGE_PAGE;
     char *memory = memory_allocate(bytes + align, 1, name, error);
     if (memory == NULL) return NULL;
     char *aligned = memory + (align - (uintptr_t)memory % align) % align;
-    /* Only advice: without it the result is the same, later. */
+    /* A refused advice costs time alone. */
     if (align == HUGE_PAGE) (void)madvise(aligned, bytes, MADV_HUGEPAGE);
     *data = aligned;
     return memory;
@@ -66,7 +66,7 @@ static float value_as_float(panel_precision precision, const void *values, size_
     return NAN;
 }
 
-/* Whether all are finite: no exponent has all its bits. */
+/* True when no exponent has all its bits. */
 static bool all_finite(panel_precision precision, size_t count, const void *values) {
     bool good = true;
     switch (precision) {
@@ -90,7 +90,7 @@ static void *tile_chunk(const panel *a, size_t i, size_t q) {
            (tile + (q * PANEL_TILE + i % PANEL_TILE) * PANEL_CHUNK) * panel_value_size(a->precision);
 }
 
-/* The same in either layout. */
+/* tile_chunk in either layout. */
 static const void *chunk_of(const panel *a, size_t i, size_t q) {
     if (a->layout == PANEL_TILES) return tile_chunk(a, i, q);
     return (const char *)a->rows + (i * a->k + q * PANEL_CHUNK) * panel_value_size(a->precision);
@@ -114,7 +114,7 @@ static void get_row(const panel *a, size_t i, void *values) {
         memcpy((char *)values + q * PANEL_CHUNK * size, chunk_of(a, i, q), chunk_columns(a, q) * size);
 }
 
-/* A panel without values: shape, and a copy of scale or (scaled, scale NULL) room for one. */
+/* A panel without values: its shape, and a copy of scale or, with scaled and no scale, room for one. */
 static lam_status panel_shape(size_t n, size_t k, panel_precision precision, const float *scale, bool scaled,
                               const char *name, panel *a, lam_error *error) {
     lam_status status = LAM_OK;
@@ -144,7 +144,7 @@ done:
     return status;
 }
 
-/* The same with room for tiles, zeroed. */
+/* panel_shape with room for tiles, zeroed. */
 static lam_status panel_init(size_t n, size_t k, panel_precision precision, const float *scale, bool scaled,
                              const char *name, panel *a, lam_error *error) {
     lam_status status = LAM_OK;
@@ -204,8 +204,6 @@ void panel_free(panel *a) {
     *a = (panel){0};
 }
 
-/* --- precisions --------------------------------------------------------------------------------------- */
-
 /* A power of two that brings the largest magnitude of a column to at least 2^14 and below 2^15. */
 static float half_scale(float largest) {
     int exponent;
@@ -215,7 +213,7 @@ static float half_scale(float largest) {
     return ldexpf(1.0f, exponent > -126 ? exponent : -126);
 }
 
-/* Scales of the columns for a precision; whether there is one that is not 1. row has room for one. */
+/* Scales of the columns for a precision; true when one is not 1. row has room for a row. */
 static bool find_scale(const panel *a, panel_precision precision, float *row, float *scale) {
     bool any = false;
     memset(scale, 0, a->k * sizeof *scale);
@@ -230,7 +228,7 @@ static bool find_scale(const panel *a, panel_precision precision, float *row, fl
         const float largest = scale[j];
         if (precision == PANEL_F16)
             scale[j] = half_scale(largest);
-        else /* the division would end in 0 far down among the subnormal numbers */
+        else /* the quotient of a subnormal number may be 0 */
             scale[j] = largest > 0x1p-119f ? largest / I8_STEPS : 0x1p-126f;
         any = any || scale[j] != 1.0f;
     }
@@ -280,8 +278,6 @@ done:
     panel_free(&made);
     return status;
 }
-
-/* --- out again ---------------------------------------------------------------------------------------- */
 
 void panel_copy_some(const panel *a, size_t first, size_t count, float *rows) {
     for (size_t i = 0; i < count; i++)

@@ -1,4 +1,4 @@
-/* The instruction sets that the products are compiled for, and which of them this CPU has. */
+/* Compiles the inner loops of panel products for each instruction set. */
 #include "solver/linalg/panel_kernels.h"
 
 #include "solver/base/cpu.h"
@@ -9,11 +9,11 @@
 #include <immintrin.h>
 #endif
 
-/* So far ahead of its use memory is asked for, in bytes. Not a multiple of 4096: there the line asked for and
- * the line in use share a set of the nearest cache, which made B~ in f32 a third slower (Xeon, 2 cores). */
+/* Prefetch distance in bytes. It is no multiple of 4096, because then the line prefetched and the line in use
+ * would share a set of the nearest cache, which made answers in f32 a third slower (Xeon, 2 cores). */
 #define AHEAD_BYTES 3072
-/* The same where the rows of a tile lie apart and each is asked for by itself: all four together go on four
- * times as fast. */
+/* The distance for PANEL_ROWS, where each row of a tile is a stream of its own and advances at a quarter of
+ * the speed. */
 #define ROWS_AHEAD_BYTES 512
 
 typedef float lane4 __attribute__((vector_size(16), may_alias));

@@ -1,23 +1,24 @@
-/* The inner loops of the two products, one set for each instruction set; between panel_kernels.c, where they
- * are compiled, and panel_product.c, which cuts matrices into what they take. */
+/* The inner loops of the two products of a panel, one set for each instruction set. panel_kernels.c compiles
+ * them, panel_product.c calls them for blocks of rows. */
 #ifndef LAMBERT_LINALG_PANEL_KERNELS_H
 #define LAMBERT_LINALG_PANEL_KERNELS_H
 
 #include "solver/linalg/panel.h"
 
-/* Chunks of columns that a lane of expand adds before they join the sum in double. */
+/* Chunks of columns that expand adds in single precision before they join the sum in double. */
 #define EXPAND_CHUNKS 128
 
-/* Chunks that both products go through at a time where many vectors share them: few enough that the values
- * and the vectors' numbers stay in the nearest cache. */
+/* Chunks of a step when many vectors share a pass: few enough that the values of the panel and of the vectors
+ * stay in the nearest cache. */
 #define STEP_CHUNKS 16
 
-/* Where a kernel reads: whole tiles from the first row on, or (PANEL_ROWS) rows as they lie in a store. */
+/* The values that a kernel reads: whole tiles from the first row on, or (PANEL_ROWS) rows as in a store. */
 typedef struct panel_values {
     const void *values;
     size_t row_step; /* PANEL_ROWS: values from a row to the next */
     size_t n_chunks;
-    size_t tail; /* PANEL_ROWS: columns of the last chunk; 0: all of them. What follows is read and ignored */
+    size_t tail; /* PANEL_ROWS: columns of the last chunk; 0: all of them. The values behind are read and
+                    masked */
 } panel_values;
 
 /* t is [n_chunks][m][PANEL_CHUNK] for m vectors, at most PANEL_VECTORS, in all of these; from is one tile for

@@ -1,5 +1,5 @@
-/* The two products of a panel: cut into blocks of rows whose order is fixed, so that neither batch nor
- * threads change a bit. */
+/* The two products of a panel, cut into blocks of rows in a fixed order, so that the bits depend on neither
+ * the batch nor the threads. */
 #include "solver/base/work_area.h"
 #include "solver/linalg/panel_kernels.h"
 
@@ -9,10 +9,10 @@
 /* Rows whose products are added in single precision before they join a sum in double. */
 #define PROJECT_BLOCK 128
 #define BLOCK_TILES (PROJECT_BLOCK / PANEL_TILE)
-/* So few vectors' sums stay in a near cache as they are. */
+/* Up to this many vectors, the sums of all columns fit into a near cache. */
 #define MANY_VECTORS 4
-/* Slabs of rows whose sums in double are made apart, then added up in their order: at most so many, of at
- * least so many rows. However many threads there are, these are the same. */
+/* The rows are cut into at most MOST_SLABS slabs of at least SLAB_ROWS rows, independent of the number of
+ * threads; each slab has its own sums in double, which are then added in the order of the slabs. */
 #define MOST_SLABS 64
 #define SLAB_ROWS 512
 /* Rows of expand that a thread takes at a time. */
@@ -25,7 +25,7 @@ static size_t count_threads(const panel *a, size_t n_blocks) {
     return panel_bytes(a) < THREADS_WORTH || n_threads == 0 ? 1 : n_threads;
 }
 
-/* Whole blocks. */
+/* Rows of a slab: a multiple of PROJECT_BLOCK. */
 static size_t slab_rows(const panel *a) {
     const size_t rows = a->n / MOST_SLABS + 1;
     return rows < SLAB_ROWS ? SLAB_ROWS : (rows + PROJECT_BLOCK - 1) / PROJECT_BLOCK * PROJECT_BLOCK;
@@ -35,8 +35,8 @@ static size_t count_slabs(const panel *a) {
     return a->n / slab_rows(a) + (a->n % slab_rows(a) > 0);
 }
 
-/* The sum; then of each thread a part in single precision, of each slab (of one when there is one thread) its
- * sum. */
+/* The total; a part in single precision for each thread; a sum in double for each slab, or one in all with
+ * one thread. */
 size_t panel_work_bytes(const panel *a, size_t m) {
     size_t count, total = 0;
     if (m > PANEL_VECTORS) m = PANEL_VECTORS;
@@ -49,7 +49,7 @@ size_t panel_work_bytes(const panel *a, size_t m) {
     return total > 0 ? total : WORK_AREA_ALIGN;
 }
 
-/* The tile that row i is in, and what follows it. */
+/* The values from the tile of row i on. */
 static panel_values tile_of(const panel *a, size_t i) {
     const bool by_rows = a->layout == PANEL_ROWS;
     const size_t row_step = by_rows ? a->k : a->stride;
@@ -60,9 +60,7 @@ static panel_values tile_of(const panel *a, size_t i) {
                           .tail = by_rows ? a->k % PANEL_CHUNK : 0};
 }
 
-/* --- project ------------------------------------------------------------------------------------------ */
-
-/* Rows of a block that are needed: of each tile how many, which, and their numbers. */
+/* The rows of a block in which a vector is not 0: for each tile their number, places and coefficients. */
 typedef struct block_rows {
     size_t n_tiles, found;
     size_t n_rows[BLOCK_TILES];
@@ -70,7 +68,7 @@ typedef struct block_rows {
     float c[BLOCK_TILES][PANEL_TILE * PANEL_VECTORS]; /* [rows found][m] */
 } block_rows;
 
-/* Those where some vector is not 0, of rows first <= i < last. */
+/* Fills out with the rows first <= i < last. */
 static void find_rows(size_t first, size_t last, size_t m, const float *X, size_t x_stride, block_rows *out) {
     out->n_tiles = (last - first + PANEL_TILE - 1) / PANEL_TILE;
     out->found = 0;
@@ -92,8 +90,8 @@ static void find_rows(size_t first, size_t last, size_t m, const float *X, size_
     }
 }
 
-/* part += the rows of a block. Many vectors: a step of columns of all its tiles after another, so that theirs
- * stay in the nearest cache; few: straight on through memory. */
+/* part += the rows of a block. With many vectors it goes step by step of columns through all tiles, so that
+ * the sums of a step stay in the nearest cache; with few it reads memory in sequence. */
 static void project_block(const panel *a, size_t first, size_t m, const block_rows *rows, float *part) {
     const size_t n_chunks = a->stride / PANEL_CHUNK, step = m > MANY_VECTORS ? STEP_CHUNKS : n_chunks;
     for (size_t q = 0; q < n_chunks; q += step)
@@ -106,7 +104,7 @@ static void project_block(const panel *a, size_t first, size_t m, const block_ro
         }
 }
 
-/* total += the rows of a slab; part is 0 before and after. Whether there were any. */
+/* total += the rows of a slab; part is 0 before and after. True when a row was not 0. */
 static bool project_slab(const panel *a, size_t slab, size_t m, const float *X, size_t x_stride, float *part,
                          double *total) {
     const size_t end = a->n - slab < slab_rows(a) ? a->n : slab + slab_rows(a);
@@ -161,9 +159,7 @@ void panel_project(const panel *a, size_t m, const float *X, size_t x_stride, fl
                      T + v * t_stride, t_stride, work);
 }
 
-/* --- expand ------------------------------------------------------------------------------------------- */
-
-/* Which rows: n_rows of them, the first ones when rows is NULL. */
+/* The rows of a product: n_rows of them, the first ones when rows is NULL. */
 typedef struct row_choice {
     size_t n_rows;
     const uint32_t *rows, *map;

@@ -9,12 +9,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Rows that a product takes from the source at a time, per thread; what BLAS gets of them is spread out, and
- * should be enough to pay for its packing. */
+/* Rows that a thread reads from the source at a time; the same for BLAS, enough to pay for its packing;
+ * floats of the dense copy that BLAS gets. */
 enum { ROWS = 64, ROWS_OF_BLAS = 512, SPREAD_MOST = 1 << 24 };
-/* Above this density a product spreads rows out and leaves them to BLAS. */
+/* Above this density a product copies rows into dense ones and calls BLAS. */
 static const double dense_above = .08;
-/* Products of single precision that are added before they join the sum of their row. */
+/* Terms that are added in single precision before they join the sum of their row. */
 enum { TERMS = 256 };
 
 lam_status scaled_init(scaled_matrix *S, row_source *rows, const double *area, const uint32_t *order,
@@ -86,9 +86,6 @@ done:
     return status;
 }
 
-/* --- products --------------------------------------------------------------------------------------------
- */
-
 /* y = sum_j F_ej x_j over one row, x_j [w] at X + position(j) w. */
 static void multiply_row(const scaled_matrix *S, size_t length, const uint32_t *indices, const float *data,
                          size_t w, const float *X, float *y, float *part) {
@@ -106,7 +103,7 @@ static void multiply_row(const scaled_matrix *S, size_t length, const uint32_t *
     }
 }
 
-/* The rows of a block by BLAS: spread out into dense, [m][n]. */
+/* The rows of a block by BLAS, copied into dense [m][n]. */
 static void multiply_dense(const scaled_matrix *S, const row_block *rows, size_t w, const float *X, float *Y,
                            float *dense) {
     const size_t n = S->n;
@@ -119,7 +116,7 @@ static void multiply_dense(const scaled_matrix *S, const row_block *rows, size_t
                 (int)w, 0, Y, (int)w);
 }
 
-/* Rows first ... of a product, already divided by the root of the area of what they meet. */
+/* Rows first ... first + m of a product, of X already divided by A^1/2. */
 static lam_status multiply_rows(const scaled_matrix *S, size_t first, size_t m, size_t w, const float *X,
                                 float *Y, bool by_blas, lam_error *error) {
     lam_status status = LAM_OK;

@@ -1,6 +1,6 @@
 /* S = P A^1/2 F A^-1/2 P^T, the symmetric form of F with rows and columns in the order of a curve, as blocks
- * of sparse columns and as products. Its 2-norm is at most 1 whatever the areas. Everything here speaks of
- * positions on the curve; knows no method that uses it. */
+ * of sparse columns and as products. Its 2-norm is at most 1 whatever the areas. Rows and columns
+ * are positions on the curve. It knows no method. */
 #ifndef LAMBERT_LINALG_SCALED_H
 #define LAMBERT_LINALG_SCALED_H
 
@@ -20,7 +20,7 @@ lam_status scaled_init(scaled_matrix *S, row_source *rows, const double *area, c
                        lam_error *error);
 void scaled_free(scaled_matrix *S);
 
-/* Some columns of S by their rows: columns[p] counts from the first of the block. */
+/* Consecutive columns of S, stored by rows: columns[p] counts from the first column of the block. */
 typedef struct sparse_block {
     size_t n, m;
     uint64_t *indptr;  /* [n + 1] */
@@ -35,14 +35,14 @@ void sparse_block_free(sparse_block *block);
 lam_status scaled_block(const scaled_matrix *S, size_t first, size_t last, sparse_block *out,
                         lam_error *error);
 
-/* Y = S X for w vectors, X and Y [n][w], in single precision (sums over n in groups of 256 terms); one pass.
- * Errors: LAM_ERR_MEMORY, those of the source. Cost: O(nnz w). */
+/* Y = S X for w vectors, X and Y [n][w], in single precision (sums over n in groups of 256 terms); one pass
+ * over F. Errors: LAM_ERR_MEMORY, those of the source. Cost: O(nnz w). */
 lam_status scaled_multiply(const scaled_matrix *S, size_t w, const float *X, float *Y, lam_error *error);
 
-/* y = S x in double; one pass. */
+/* y = S x in double; one pass over F. */
 lam_status scaled_multiply_double(const scaled_matrix *S, const double *x, double *y, lam_error *error);
 
-/* The whole of S, [n][n], column by column; one pass. */
+/* dense = S, [n][n], column by column; one pass over F. */
 lam_status scaled_dense(const scaled_matrix *S, float *dense, lam_error *error);
 
 #endif

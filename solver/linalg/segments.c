@@ -1,4 +1,4 @@
-/* Owns the runs of a sparse V and their sums for the CPU at hand. */
+/* The sums over runs for each instruction set. */
 #include "solver/linalg/segments.h"
 
 #include <inttypes.h>
@@ -13,7 +13,7 @@ struct segment_kernels {
     void (*sum)(const segments *s, const float *x, float *t);
 };
 
-/* 8 sums side by side, and half of them. */
+/* Eight and four sums side by side. */
 typedef double wide __attribute__((vector_size(64)));
 typedef double half __attribute__((vector_size(32)));
 typedef float wide_floats __attribute__((vector_size(32), aligned(4), may_alias));

@@ -1,5 +1,5 @@
 /* Sums over runs of consecutive numbers: a V with one entry a row, kept as the index vector I (Fernández et
- * al. 2011, eq. 7). Knows nothing of light: runs, weights, vectors. */
+ * al. 2011, eq. 7). It knows runs, weights and vectors, no light. */
 #ifndef LAMBERT_LINALG_SEGMENTS_H
 #define LAMBERT_LINALG_SEGMENTS_H
 
@@ -18,8 +18,8 @@ typedef struct segments {
     const segment_kernels *kernels; /* for this CPU */
 } segments;
 
-/* Takes begin and weight over when they are sound: ascending from 0 to n, finite; else leaves them to the
- * caller. LAM_ERR_NUMERIC names the entry. */
+/* Takes begin and weight over when begin ascends from 0 to n and weights are finite; else the caller keeps
+ * them and LAM_ERR_NUMERIC names the entry. */
 lam_status segments_create(size_t n, size_t k, uint64_t *begin, float *weight, segments *s, lam_error *error);
 
 /* A zeroed one is allowed. */
@@ -28,7 +28,7 @@ void segments_free(segments *s);
 size_t segments_bytes(const segments *s);
 
 /* t = V^T x: t_p = sum over run p of weight_j x_j, in double and rounded once. Products of two floats are
- * exact in double, and a run is always added in the same order: the bits depend on x alone. Cost: O(n). */
+ * exact in double, and every run has one order of additions: the bits depend on x alone. Cost: O(n). */
 void segments_sum(const segments *s, const float *x, float *t);
 
 /* x = V t: x_j = weight_j t_p. Cost: O(n). */

@@ -11,7 +11,8 @@
 #include <immintrin.h>
 #endif
 
-/* Longer rows are multiplied one by one; slices at a time for a thread; work below which there is but one. */
+/* The longest row of a slice; slices that a thread takes at a time; multiplications below which one thread
+ * works. */
 enum { SHORT = 96, SLICES_AT_ONCE = 64, THREADS_WORTH = 100000 };
 
 void sliced_free(sliced_rows *s) {
@@ -31,7 +32,7 @@ static size_t length_of(const csr *a, size_t i) {
     return (size_t)(a->indptr[i + 1] - a->indptr[i]);
 }
 
-/* Rows by length, in their order where that is the same: begin[l] is where those of length l begin. */
+/* Sorts rows by length, stably: those of length l begin at begin[l]. */
 static void sort_rows(const csr *a, uint32_t *sorted, size_t begin[SHORT + 2]) {
     memset(begin, 0, (SHORT + 2) * sizeof *begin);
     for (size_t i = 0; i < a->n; i++)
@@ -43,7 +44,7 @@ static void sort_rows(const csr *a, uint32_t *sorted, size_t begin[SHORT + 2]) {
         if (length_of(a, i) <= SHORT) sorted[next[length_of(a, i)]++] = (uint32_t)i;
 }
 
-/* Whether all numbers are scale, a power of two, times halves, and indices are of 16 bits. */
+/* True when every value is scale, a power of two, times an f16, and indices fit into 16 bits. */
 static bool fits_halves(const csr *a, float scale) {
     int exponent;
     if (a->n > UINT16_MAX + (size_t)1 || !(scale > 0) || frexpf(scale, &exponent) != .5f) return false;
@@ -52,7 +53,7 @@ static bool fits_halves(const csr *a, float scale) {
     return true;
 }
 
-/* Entry `from` of all becomes entry `to`. */
+/* Copies entry `from` of all to entry `to`. */
 static void put(sliced_rows *s, uint64_t to, uint64_t from) {
     if (s->halves != NULL) {
         s->half_indices[to] = (uint16_t)s->all->indices[from];
@@ -71,7 +72,7 @@ static void fill_slice(const csr *a, const uint32_t *rows, size_t count, sliced_
     }
 }
 
-/* Room for the slices' entries and, of halves, those of long rows behind them. */
+/* Allocates the entries of slices and, for 16 bits, those of long rows behind them. */
 static lam_status reserve(sliced_rows *s, size_t entries, size_t long_entries, bool halves,
                           lam_error *error) {
     if (halves) {
@@ -84,7 +85,7 @@ static lam_status reserve(sliced_rows *s, size_t entries, size_t long_entries, b
     return s->indices != NULL && s->data != NULL ? LAM_OK : LAM_ERR_MEMORY;
 }
 
-/* Where long rows begin; entries: of slices. */
+/* Places the long rows; `entries` is the number of entries in slices. */
 static void place_long(sliced_rows *s, uint64_t entries) {
     const csr *a = s->all;
     for (size_t i = 0; i < a->n; i++) {
@@ -144,18 +145,17 @@ done:
     return status;
 }
 
-/* Sums that take turns, in pairs that are the same wherever they were made. */
+/* Adds the partial sums in a fixed order of pairs, so that all kernels give the same bits. */
 static float sum_of_turns(float turns[SLICE_ROWS]) {
     for (size_t half = SLICE_ROWS / 2; half > 0; half /= 2)
         for (size_t l = 0; l < half; l++) turns[l] += turns[l + half];
     return turns[0];
 }
 
-/* --- kernels ------------------------------------------------------------------------------------------- */
-
 enum { WIDTH = 16 };
 
-/* One vector: some slices, a long row; several: the same, side being [n][WIDTH]. */
+/* one, one_long: a range of slices and a long row for one vector; wide, wide_long: for WIDTH, side is
+ * [n][WIDTH]. */
 typedef struct kernels {
     void (*one)(const sliced_rows *s, size_t first, size_t last, const float *x, float *y);
     float (*one_long)(const sliced_rows *s, size_t k, const float *x);
@@ -191,13 +191,10 @@ typedef struct kernels {
 #define VALUE_16(p) _mm512_cvtph_ps(_mm256_loadu_si256((const __m256i *)(const void *)(p)))
 #include "solver/linalg/sliced_kernels.inc"
 
-/* The fastest for this CPU and these numbers. */
+/* The kernels for this CPU and the form of the values. */
 static kernels kernels_for(const sliced_rows *s) {
     return s->halves != NULL ? kernels_halves[cpu_best()] : kernels_floats[cpu_best()];
 }
-
-/* --- all of it -------------------------------------------------------------------------------------------
- */
 
 size_t sliced_work(size_t n, size_t m) {
     return m > 1 ? n * WIDTH : 0;

@@ -9,11 +9,11 @@
 
 enum { BATCH = 16 };
 
-/* Fewer multiplications than this in all are done by one thread. */
+/* Below this number of multiplications one thread does all. */
 enum { THREADS_WORTH = 200000 };
 
-/* By columns every product goes through memory, one after the other: that pays for vectors which touch less
- * than one part of so many of all entries. */
+/* By columns, each product is added in memory, which is slower than a sum in a register: columns are taken
+ * when they hold less than 1/SPARSE_SHARE of all entries. */
 enum { SPARSE_SHARE = 8 };
 
 lam_status csr_transpose(const csr *a, csr *out, lam_error *error) {
@@ -63,7 +63,7 @@ static size_t row_of(const uint32_t *chosen, const uint32_t *map, size_t r) {
     return map != NULL ? map[chosen[r]] : chosen[r];
 }
 
-/* y = A x by the columns of what is not 0. */
+/* y = A x by the columns j with x_j != 0. */
 static void by_columns(const csr *columns, const float *x, float *y) {
     memset(y, 0, columns->n * sizeof *y);
     for (size_t j = 0; j < columns->n; j++) {
@@ -74,7 +74,7 @@ static void by_columns(const csr *columns, const float *x, float *y) {
     }
 }
 
-/* Vectors which[0] ... which[m - 1] by rows, side by side where there are several. */
+/* Vectors which[0] ... which[m - 1] by rows; several of them are first copied side by side. */
 static void by_rows(const sparse_pair *A, size_t m, const size_t *which, const float *X, size_t x_stride,
                     size_t n_rows, const uint32_t *chosen, const uint32_t *map, float *Y, size_t y_stride,
                     float *side) {
@@ -98,7 +98,8 @@ static void by_rows(const sparse_pair *A, size_t m, const size_t *which, const f
     }
 }
 
-/* Few rows that touch less than n entries: putting vectors side by side would cost more than they do. */
+/* True when the rows hold fewer than n entries, so that copying vectors side by side would cost more than the
+ * product. */
 static bool rows_are_few(const csr *a, size_t n_rows) {
     return (double)n_rows * (double)a->indptr[a->n] < (double)a->n * (double)a->n;
 }

@@ -93,7 +93,7 @@ class Compressed(unittest.TestCase):
                     done = lambert("solve", self.stores[name], "--emission", self.path("one.npy"), "--tolerance", tolerance,
                                "--quantity", "indirect", "-o", self.path("answer.npy"))
                     if done.returncode != 0:
-                        self.assertIn("which are compressed; ask for less", done.stderr)
+                        self.assertIn("which are compressed; use a larger tolerance", done.stderr)
                         self.assertEqual(len(done.stderr.strip().splitlines()), 1)
                         continue
                     reached += 1
@@ -154,13 +154,13 @@ class Compressed(unittest.TestCase):
             replace(f, name, values)
 
         for wanted, break_it in (
-                ("must be every number below", lambda f: set_one(f, "order", 3, 4)),
+                ("must hold every number below", lambda f: set_one(f, "order", 3, 4)),
                 ("must be at least 0", lambda f: set_one(f, "bound", (0, 0), -1)),
                 ("must be at least 0", lambda f: set_one(f, "lit", (0, 0), np.nan)),
                 ("rows, the basis has", lambda f: replace(f, "bound", f["form_factors/bound"][:-1])),
                 ("columns, must be", lambda f: replace(f, "bound", f["form_factors/bound"][:, :-1])),
                 ("lit", lambda f: replace(f, "lit", f["form_factors/lit"][:, :-1])),
-                ("must not be below it", lambda f: set_one(f, "indices", f["form_factors/indptr"][5], 2)),
+                ("must not be below the diagonal", lambda f: set_one(f, "indices", f["form_factors/indptr"][5], 2)),
                 ("node", lambda f: replace(f, "basis/node", f["form_factors/basis/node"][:-1])),
                 ("order", lambda f: f.pop("form_factors/order"))):
             shutil.copy(self.stores["tree"], self.path("broken.h5"))

@@ -1,7 +1,5 @@
 #include "solver/method/hierarchical/compress_bound.h"
 
-#include "solver/operator/wavelet/wavelet_doubles.h"
-
 #include "store/status.h"
 
 #include <math.h>

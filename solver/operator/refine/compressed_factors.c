@@ -2,7 +2,6 @@
 
 #include "solver/linalg/csr_rows.h"
 #include "solver/operator/hierarchical.h"
-#include "solver/operator/wavelet/wavelet_doubles.h"
 
 #include "store/status.h"
 
@@ -13,7 +12,7 @@
 
 enum { ROWS_AT_ONCE = 64 };
 
-/* Sums of bounds are taken this much wider, for their own rounding. */
+/* Factor for the rounding of sums of bounds. */
 static const double margin = 1 + 1e-9;
 
 /* Half a unit in the last place of single precision, in which lit is kept. */
@@ -54,7 +53,7 @@ static lam_status find_classes(compressed_factors *c, lam_error *error) {
     return LAM_OK;
 }
 
-/* Where the groups are whose first light is kept. */
+/* Maps elements to the groups whose F 1_g is stored. */
 static lam_status find_lit(compressed_factors *c, const double *area, const uint32_t *group,
                            lam_error *error) {
     c->lit_of = memory_allocate(c->n, sizeof *c->lit_of, "form factors", error);
@@ -69,8 +68,9 @@ static lam_status find_lit(compressed_factors *c, const double *area, const uint
     return LAM_OK;
 }
 
-/* Of a product, every step in norms: two transforms of at most eight terms a level, whose absolute values
- * have a norm of eight at most, and the sums of S, whose absolute values have its Frobenius norm at most. */
+/* The rounding of a product, bounded step by step in norms: two transforms with sums of at most eight terms a
+ * level, whose matrices of absolute values have norms of at most eight, and the sums of S, whose absolute
+ * values have at most its Frobenius norm. */
 static double rounding_of(const compressed_factors *c) {
     double squares = 0, least = INFINITY;
     uint64_t longest = 0;
@@ -112,14 +112,12 @@ lam_status compressed_finish(compressed_factors *c, lam_error *error) {
     return LAM_OK;
 }
 
-/* --- products ------------------------------------------------------------------------------------------ */
-
-/* Of work: coefficients of the light, of its answer, sums of groups, what a transform takes. */
+/* Work: coefficients of x and of F~ x, means of groups, work of a transform. */
 size_t compressed_work(const compressed_factors *c) {
-    return 2 * c->n + c->n_lit + wavelet_doubles_work(&c->basis);
+    return 2 * c->n + c->n_lit + wavelets_work(&c->basis);
 }
 
-/* mean [n_lit] of x, and c = W A^1/2 y; scratch [n]. */
+/* Splits x into mean [n_lit] and c = W A^1/2 y; scratch [n]. */
 static void take_apart(const compressed_factors *c, const double *x, double *mean, double *coefficients,
                        double *scratch, double *work) {
     for (size_t g = 0; g < c->n_lit; g++) mean[g] = 0;
@@ -132,7 +130,7 @@ static void take_apart(const compressed_factors *c, const double *x, double *mea
         const size_t i = c->order[p], g = c->lit_of[i];
         scratch[p] = c->root[p] * (g < c->n_lit ? x[i] - mean[g] : x[i]);
     }
-    wavelet_doubles_forward(&c->basis, scratch, coefficients, work);
+    wavelets_forward(&c->basis, scratch, coefficients, work);
 }
 
 void compressed_multiply(const compressed_factors *c, const double *x, double *y, double *work,
@@ -147,7 +145,7 @@ void compressed_multiply(const compressed_factors *c, const double *x, double *y
             const uint64_t begin = c->S.indptr[k];
             row(c->S.indices + begin, c->S.data + begin, c->S.indptr[k + 1] - begin, from, to + k);
         }
-    wavelet_doubles_inverse(&c->basis, to, from, slots);
+    wavelets_inverse(&c->basis, to, from, slots);
     for (size_t p = 0; p < n; p++) y[c->order[p]] = from[p] / c->root[p];
     for (size_t g = 0; g < c->n_lit; g++)
         for (size_t i = 0; i < n; i++) y[i] += mean[g] * (double)c->lit[g * n + i];
@@ -160,16 +158,16 @@ void compressed_norms(const compressed_factors *c, const double *x, double *norm
     for (size_t k = 0; k < c->n_classes; k++) norms[k] = 0;
     for (size_t q = 0; q < n; q++) norms[c->class_of[q]] += from[q] * from[q];
     for (size_t k = 0; k < c->n_classes; k++) all += norms[k];
-    /* The transform has rounded each by some of the whole. */
+    /* The transform rounds each part relative to the whole. */
     for (size_t k = 0; k < c->n_classes; k++) norms[k] = margin * (sqrt(norms[k]) + 1e-12 * sqrt(all));
 }
 
 double compressed_error(const compressed_factors *c, const double *x, double *out, double *work) {
     const wavelets *w = &c->basis;
     const size_t n = c->n;
-    /* As compressed_norms leaves it. */
+    /* compressed_norms leaves the means here. */
     const double *mean = work + 2 * n;
-    double *sum = work + 2 * n + c->n_lit; /* [n_nodes], of a node and those above it */
+    double *sum = work + 2 * n + c->n_lit; /* [n_nodes], over a node and its ancestors */
     double norms[COMPRESSED_CLASSES_MOST] = {0}, largest = 0;
     compressed_norms(c, x, norms, work);
     for (size_t t = w->n_nodes; t-- > 0;) {
@@ -194,8 +192,6 @@ size_t compressed_bytes(const compressed_factors *c) {
            (c->n + 1) * sizeof *c->S.indptr + c->basis.n_nodes * c->n_classes * sizeof *c->bound +
            c->n_lit * c->n * sizeof *c->lit;
 }
-
-/* --- the store ----------------------------------------------------------------------------------------- */
 
 #define GROUP "/form_factors"
 
@@ -228,8 +224,9 @@ static lam_status check_order(store *s, const compressed_factors *c, lam_error *
     for (size_t p = 0; p < c->n; p++) {
         const size_t i = c->order[p];
         if (i >= c->n || seen[i])
-            FAIL(error, LAM_ERR_FORMAT, "%s: " GROUP "/order[%zu] = %zu, must be every number below %zu once",
-                 store_path(s), p, i, c->n);
+            FAIL(error, LAM_ERR_FORMAT,
+                 "%s: " GROUP "/order[%zu] = %zu, must hold every number below %zu once", store_path(s), p, i,
+                 c->n);
         seen[i] = true;
     }
 done:
@@ -246,7 +243,8 @@ static lam_status read_parts(store *s, size_t n, compressed_factors *c, lam_erro
     TRY(csr_check(&c->S, (size_t)c->S.indptr[n], GROUP, error));
     for (size_t i = 0; i < n; i++)
         if (c->S.indptr[i] < c->S.indptr[i + 1] && c->S.indices[c->S.indptr[i]] < i)
-            FAIL(error, LAM_ERR_FORMAT, "%s: /form_factors: row %zu has the column %u, must not be below it",
+            FAIL(error, LAM_ERR_FORMAT,
+                 "%s: /form_factors: row %zu has the column %u, must not be below the diagonal",
                  store_path(s), i, c->S.indices[c->S.indptr[i]]);
     TRY(wavelets_load(s, GROUP "/basis", n, &c->basis, error));
     TRY(store_read(s, GROUP "/order", STORE_U32, 1, (size_t[]){n}, &data, error));
@@ -294,7 +292,7 @@ lam_status compressed_size(store *s, size_t *bytes, lam_error *error) {
     lam_status status = LAM_OK;
     static const struct {
         const char *name;
-        size_t bytes; /* a number, in memory */
+        size_t bytes; /* in memory, for each number of the array */
     } parts[] = {{GROUP "/data", 2 * (sizeof(uint32_t) + sizeof(float))},
                  {GROUP "/indptr", 2 * sizeof(uint64_t) + 6 * sizeof(double)},
                  {GROUP "/basis/node", sizeof(wavelet_node) + WAVELET_SCALING * sizeof(double)},
@@ -310,7 +308,7 @@ lam_status compressed_size(store *s, size_t *bytes, lam_error *error) {
         for (int d = 0; d < rank; d++)
             if (!size_multiply(count, dims[d], &count)) count = SIZE_MAX / 64;
         if (!size_multiply(count, parts[k].bytes, &part) || *bytes > SIZE_MAX - part)
-            FAIL(error, LAM_ERR_MEMORY, "%s: %s is more than memory can have", store_path(s), parts[k].name);
+            FAIL(error, LAM_ERR_MEMORY, "%s: %s is larger than memory can be", store_path(s), parts[k].name);
         *bytes += part;
     }
 done:

@@ -7,8 +7,6 @@
 
 #define GROUP FORM_FACTORS_GROUP
 
-/* --- what lies in the store ---------------------------------------------------------------------------- */
-
 typedef enum storage { STORAGE_ROWS, STORAGE_UPPER, STORAGE_COMPRESSED, STORAGES } storage;
 
 static lam_status read_storage(store *s, storage *out, lam_error *error) {
@@ -19,8 +17,9 @@ static lam_status read_storage(store *s, storage *out, lam_error *error) {
     TRY(store_get_text(s, GROUP, "storage", &text, error));
     while (k < STORAGES && strcmp(text, names[k]) != 0) k++;
     if (k == STORAGES)
-        FAIL(error, LAM_ERR_UNSUPPORTED, "%s: /form_factors with storage '%.20s' is not supported yet",
-             store_path(s), text);
+        FAIL(error, LAM_ERR_UNSUPPORTED,
+             "%s: /form_factors has the storage '%.20s', which this version does not know", store_path(s),
+             text);
     *out = (storage)k;
 done:
     free(text);
@@ -36,7 +35,7 @@ lam_status form_factors_in_rows(store *s, bool *in_rows, lam_error *error) {
     return status;
 }
 
-/* Rows or the triangle, checked as sparse rows. */
+/* Reads rows or the triangle and checks them as sparse rows. */
 static lam_status read_csr(store *s, csr *held, lam_error *error) {
     lam_status status = LAM_OK;
     store_type type;
@@ -77,7 +76,7 @@ done:
     return status;
 }
 
-/* The same of the upper triangle: each entry stands for two. */
+/* check_rows for the upper triangle, each entry of which gives two form factors. */
 static lam_status check_upper(store *s, const csr *g, const double *area, double *row_sums,
                               lam_error *error) {
     lam_status status = LAM_OK;
@@ -89,7 +88,7 @@ static lam_status check_upper(store *s, const csr *g, const double *area, double
             if (j <= i)
                 FAIL(error, LAM_ERR_FORMAT, "%s: /form_factors: row %zu has the column %u, must be above it",
                      store_path(s), i, j);
-            /* Rounded to single precision twice. */
+            /* The exchange was rounded to single precision twice. */
             if (exchange < 0 || exchange > least * (1 + 1e-6))
                 FAIL(error, LAM_ERR_FORMAT,
                      "%s: /form_factors: A_i F_ij of elements %zu and %u is %g m2, must be from 0 to %g",
@@ -125,10 +124,8 @@ done:
     return status;
 }
 
-/* --- at run time --------------------------------------------------------------------------------------- */
-
-/* Rows of F from the triangle. Row j is complete when row j of the triangle is come to: its entries below the
- * diagonal are met in the rows above, in their order, and those beyond it follow. */
+/* Rows of F from the triangle. Rows above j give the entries of row j below the diagonal, in ascending order,
+ * and row j of the triangle gives the others. */
 static lam_status expand(const csr *g, const double *area, csr *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = g->n;
@@ -162,7 +159,7 @@ done:
     return status;
 }
 
-/* What is known of rows once they are there. */
+/* Norms and the longest row. */
 static lam_status describe_rows(lam_form_factors *f, lam_error *error) {
     const csr *F = &f->F;
     f->row_norms = memory_allocate(F->n, sizeof *f->row_norms, "form factors", error);
@@ -219,7 +216,7 @@ done:
     return status;
 }
 
-/* Row sums of what was compressed are those of the mesh. */
+/* The row sums of compressed form factors are stored with the mesh. */
 static lam_status open_compressed(store *s, lam_form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
     void *row_sums = NULL;

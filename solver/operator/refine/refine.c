@@ -9,13 +9,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Vectors refined together take at most so many bytes, where they are more than one. */
+/* Most bytes of vectors that are refined together, unless it is one. */
 #define PASS_BYTES ((size_t)1 << 29)
 
-/* Of what is given: answers stay far from the end of double's range. */
+/* Largest emission, so that answers stay far from the end of double's range. */
 #define LARGEST 1e100
-
-/* --- the bound on A^-1 --------------------------------------------------------------------------------- */
 
 /* w = 1, v = 1 - rho s. */
 static lam_status bound_by_rows(const lam_refiner *refiner, size_t c, refine_channel *channel,
@@ -28,8 +26,9 @@ static lam_status bound_by_rows(const lam_refiner *refiner, size_t c, refine_cha
         channel->v[i] = 1 - taken * (1 + refiner->roundings) - 2 * REFINE_U;
         if (!(channel->v[i] > 0))
             FAIL(error, LAM_ERR_NUMERIC,
-                 "element %zu of channel %zu reflects %.17g of what its %.9g of form factors bring: no "
-                 "error can be certified",
+                 "element %zu of channel %zu: reflectance times the sum of its form factors is %.17g, of a "
+                 "sum of %.9g, "
+                 "must be below 1; no error can be certified",
                  i, c, taken, refiner->F->row_sums[i]);
         channel->v_least = fmin(channel->v_least, channel->v[i]);
     }
@@ -37,14 +36,14 @@ done:
     return status;
 }
 
-/* 1 - r_i less what rounding and compression may have made of it. */
+/* 1 - r_i less the bounds of its rounding and compression. */
 static double bounded_v(const refinement *s, size_t c, size_t i, const double *compression) {
     const refine_column *col = &s->columns[c];
     const double lost = compression != NULL ? (double)col->channel->rho[i] * compression[i] : 0;
     return (1 - s->r[c * s->refiner->op->n + i] - col->error - lost) * (1 - 4 * REFINE_U);
 }
 
-/* w = E' + P for E' = 1, v = A w = 1 - r; kept where it is better than the bound that is there. */
+/* w = E' + P for E' = 1 and v = A w = 1 - r; taken when its bound is sharper than the present one. */
 static void bound_by_light(refinement *s, size_t c, refine_channel *channel) {
     const size_t n = s->refiner->op->n;
     const double *P = s->P + c * n, *compression = NULL;
@@ -85,17 +84,15 @@ static void prepare_judging(const lam_refiner *refiner, refine_channel *channel)
     qsort(channel->rows, refiner->op->n, sizeof *channel->rows, by_falling_mean);
 }
 
-/* --- what helps ---------------------------------------------------------------------------------------- */
-
-/* An operator in bytes is read in a quarter of the time, and leaves more. What a digit costs: bytes of a
- * step, F and operator, over the digits that it gains; of one that gains none, more than anything. */
+/* An operator in i8 is read in a quarter of the time and reduces r less. The cost of a digit is the bytes of
+ * a step, of F and of the operator, over the digits that the step gains; infinite when it gains none. */
 static double cost_of_digit(const refinement *s, double left) {
     const lam_refiner *refiner = s->refiner;
     const size_t bytes = lam_form_factors_bytes(refiner->F) + lam_operator_bytes(refiner_help(refiner));
     return left < 1 ? (double)bytes / -log10(fmax(left, DBL_EPSILON)) : INFINITY;
 }
 
-/* |r| / |P| of the start that the refiner's operator gives, of the worst channel. */
+/* |r| / |P| after the start by the operator, in the worst channel. */
 static double left_by_start(refinement *s) {
     const lam_refiner *refiner = s->refiner;
     const size_t n = refiner->op->n;
@@ -117,13 +114,13 @@ static double left_by_start(refinement *s) {
     return worst;
 }
 
-/* Light of 0 to 1, as different from element to element as can be. */
+/* x_k independent and uniform in [0, 1). */
 static void write_probe(size_t count, double *x) {
     uint64_t state = 1;
     for (size_t k = 0; k < count; k++) x[k] = (double)random_to_float(random_lcg(&state));
 }
 
-/* Sets refiner->helper, or leaves it NULL. Two products with F. */
+/* Sets refiner->helper, or leaves it NULL. Cost: two products with F. */
 static lam_status find_helper(lam_refiner *refiner, lam_error *error) {
     lam_status status = LAM_OK;
     const lam_operator *op = refiner->op;
@@ -133,7 +130,7 @@ static lam_status find_helper(lam_refiner *refiner, lam_error *error) {
     operator_describe(op, &about);
     if (op->kind->narrow == NULL || (about.precision != NULL && strcmp(about.precision, "f32") != 0))
         return LAM_OK;
-    if (operator_narrow(op, PANEL_I8, &helper, NULL) != LAM_OK) return LAM_OK; /* op will do */
+    if (operator_narrow(op, PANEL_I8, &helper, NULL) != LAM_OK) return LAM_OK; /* op is used */
     refiner->helper = helper;
     TRY(refinement_create(refiner, 1, &s, error));
     write_probe(s.n_columns * op->n, s.lit);
@@ -149,8 +146,6 @@ done:
     refinement_free(&s);
     return status;
 }
-
-/* --- the bound on A^-1, found -------------------------------------------------------------------------- */
 
 static lam_status bound_inverse(lam_refiner *refiner, lam_error *error) {
     lam_status status = LAM_OK;
@@ -195,7 +190,7 @@ lam_status lam_refiner_create(const lam_operator *op, const lam_form_factors *F,
     if (made == NULL) TRY(LAM_ERR_MEMORY);
     made->op = op;
     made->F = F;
-    /* Of the sum; of E' (2), E' + P and the product with rho. */
+    /* Roundings of the sum, of E' (2), of E' + P and of the product with rho. */
     const double count = (csr_doubles_roundings(F->longest) + 4) * REFINE_U;
     made->roundings = count / (1 - count);
     for (size_t i = 0; i < op->n; i++)
@@ -222,9 +217,7 @@ void lam_refiner_free(lam_refiner *refiner) {
     free(refiner);
 }
 
-/* --- a batch ------------------------------------------------------------------------------------------- */
-
-/* What is asked of some vectors. */
+/* The arguments of lam_refine. */
 typedef struct request {
     lam_quantity quantity;
     const double *E, *H0;
@@ -281,7 +274,7 @@ static int light_column(refinement *s, size_t c, const double *E, const double *
     return exponent;
 }
 
-/* H = H0 + F (E' + P): also where nothing reflects. |H - H~| <= s |P - P~| and what rounding adds. */
+/* H = H0 + F (E' + P), also where rho = 0. |H - H~| <= s |P - P~| plus rounding. */
 static void find_irradiance(refinement *s, const int *exponents, const double *H0, double *out,
                             double *certificates) {
     const lam_refiner *refiner = s->refiner;
@@ -355,7 +348,7 @@ static lam_status refine_pass(refinement *s, size_t first, const request *asked,
         if (col->done) continue;
         FAIL(error, LAM_ERR_NUMERIC,
              "tolerance %g is not reached: vector %zu is certified to %.2g of its indirect light after %zu "
-             "products with the form factors%s; ask for less",
+             "products with the form factors%s; use a larger tolerance",
              asked->tolerance, first + c / C, col->bound / col->P, col->passes,
              s->scratch != NULL ? ", which are compressed" : "");
     }
@@ -374,7 +367,7 @@ done:
     return status;
 }
 
-/* Vectors that go together: as many as share a product, if memory holds them. */
+/* Vectors of a pass: as many as share a product, within PASS_BYTES. */
 static size_t vectors_at_once(const lam_refiner *refiner, size_t n_rhs) {
     const size_t C = refiner->op->n_channels, room = PASS_BYTES / refinement_bytes(refiner);
     size_t count = CSR_DOUBLES_WIDTH / C;
@@ -383,7 +376,7 @@ static size_t vectors_at_once(const lam_refiner *refiner, size_t n_rhs) {
     return count > 0 ? count : 1;
 }
 
-/* Answers are made aside: an error leaves what the caller has. */
+/* Answers go to memory of their own, so that an error leaves the outputs of the caller untouched. */
 static lam_status reserve_answers(size_t n_rhs, size_t size, request *made, lam_error *error) {
     made->out = memory_allocate(n_rhs, size * sizeof *made->out, "refined answers", error);
     made->certificates = memory_allocate(n_rhs, sizeof *made->certificates, "refined answers", error);

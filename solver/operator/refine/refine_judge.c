@@ -1,23 +1,22 @@
-/* How far a refined answer may be from the true one, and whether that is enough: the certificate of refine.h.
- */
+/* The certificate of refine.h: a bound on the error of a column, and the decision whether it is done. */
 #include "solver/linalg/csr_rows.h"
 #include "solver/operator/refine/refine.h"
 
 #include <math.h>
 #include <string.h>
 
-/* w = E' + P with |r| below this is as good as A^-1 1: the certificate is at most 1.05 times as wide. */
+/* With |r| below this, w = E' + P makes the certificate at most 1.05 times as wide as A^-1 1. */
 static const double weights_good = .02;
 enum { WEIGHTS_PASSES_MOST = 300 };
 
-/* Where compression alone keeps a bound up to this above what it leaves, no more steps are made. */
+/* Steps end when the bound is at most this factor above the share that compression alone causes. */
 static const double compressed_rest = 1.1;
 
-/* Bounds are taken this much wider, for their own rounding: it grows with n at most, 2^32 2^-53. */
+/* Factor for the rounding of the bounds themselves, at most n u = 2^32 2^-53. */
 #define BOUND_MARGIN 1.000001
 
-/* Rows of F are multiplied for a certificate alone where they are less than this share of F: a whole product
- * would bring the answer nearer instead. */
+/* A certificate multiplies at most 1/SHARE_OF_ROWS of the entries of F; for more, a whole product would
+ * improve the answer instead. */
 enum { SHARE_OF_ROWS = 8 };
 
 double refinement_sum_rounding(const refinement *s, size_t column) {
@@ -28,7 +27,7 @@ double refinement_sum_rounding(const refinement *s, size_t column) {
            (P + (s->count_sum ? (s->columns[column].lit_rounded ? 2 : 0) + (P > 0 ? 1 + P : 0) : 0));
 }
 
-/* (sum A x^2)^1/2 of an x of this maximum norm; squares of what is tiny would vanish. */
+/* (sum A x^2)^1/2 of an x of this maximum norm, scaled against underflow. */
 static double area_norm(size_t n, const double *area, const double *x, double largest) {
     if (!(largest > 0)) return 0;
     const double scale = 1 / largest;
@@ -39,8 +38,8 @@ static double area_norm(size_t n, const double *area, const double *x, double la
     return largest * sqrt(sum);
 }
 
-/* The first rows in falling order of rho k / v, as many as have more than `allowed`; 0 where they are too
- * large a share of F. */
+/* The number of rows with rho k / v |r|_A above `allowed`, which stand first; 0 when they are too large a
+ * share of F. */
 static size_t rows_in_question(const lam_refiner *refiner, const refine_channel *channel, double norm,
                                double allowed) {
     const csr *F = &refiner->F->F;
@@ -55,7 +54,7 @@ static size_t rows_in_question(const lam_refiner *refiner, const refine_channel 
     return count;
 }
 
-/* max_i rho_i |(F r)_i| / v_i of the first rows, and what rounding adds. */
+/* max_i rho_i |(F r)_i| / v_i over the first rows, plus rounding. */
 static double largest_of_rows(const lam_refiner *refiner, const refine_channel *channel, size_t count,
                               const double *r, double r_most) {
     const csr *F = &refiner->F->F;
@@ -98,7 +97,7 @@ double *refinement_compression(refinement *s, size_t column, bool second, const 
     return out;
 }
 
-/* The same bound of compressed form factors, with its share that stays. */
+/* refine_left for compressed form factors; *stays is its last term, which does not decrease with r. */
 static double left_compressed(refinement *s, size_t c, double r_most, double *stays) {
     const refine_channel *channel = s->columns[c].channel;
     const size_t n = s->refiner->op->n;
@@ -134,7 +133,7 @@ bool refinement_judge(refinement *s, size_t c) {
         answer = sum > answer ? sum : answer;
     }
     col->P = answer;
-    /* The client's B~ - E' may be less than P by what rounding made of B~. */
+    /* The caller's B~ - E' may be below P by the rounding of B~. */
     const double sum = refinement_sum_rounding(s, c), wanted = s->tolerance * (answer - sum);
     const double rounded = BOUND_MARGIN * channel->w_most * col->error / channel->v_least;
     double stays = 0;
@@ -147,8 +146,9 @@ bool refinement_judge(refinement *s, size_t c) {
     if (col->passes >= REFINE_PASSES_MOST || (stays > 0 && left <= compressed_rest * stays))
         col->stuck = true;
     if (left > rounded) return false;
-    /* Only rounding is left: less of it where r is found anew, unless that was so the last time. Where there
-     * is far less light than P began with, none if E' is not seen, that is what the rounding is of. */
+    /* Rounding dominates. Computing r anew from P reduces it, unless it did not the last time. When the
+     * answer is far below the P that it began with (0 when E' meets no surface), the rounding is that of the
+     * first P, and P begins again with 0. */
     if (!col->from_dark && answer < 1e-6 * col->P_first) {
         col->from_dark = true;
         memset(s->P + c * n, 0, n * sizeof *P);

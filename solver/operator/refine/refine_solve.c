@@ -1,7 +1,7 @@
-/* Flexible conjugate residuals (GCR, a truncated flexible GMRES): directions z = M~ r in single precision,
- * q = A z in double, each q made orthogonal to some before it, steps that leave the least |r|. r follows the
- * steps, so that one product with the stored F an iteration is all there is; how far rounding has moved it
- * from r of the P it stands for is added up beside it. */
+/* Flexible conjugate residuals (GCR, a truncated flexible GMRES): directions z = M~ r in single precision, q
+ * = A z in double, each q made orthogonal to the last REFINE_WINDOW ones, steps that minimize |r|. r is
+ * updated with P, so that an iteration takes one product with F; a bound on the difference from the true
+ * residual is updated too. */
 #include "solver/linalg/csr_rows.h"
 #include "solver/operator/refine/refine.h"
 
@@ -11,10 +11,9 @@
 
 enum { ROWS_AT_ONCE = 64 };
 
-/* A direction that leaves more than this of |r|^2 is followed by r itself, along which |r| always falls. */
+/* After a direction that leaves more than this share of |r|^2 the next direction is r itself, along which |r|
+ * always falls. */
 static const double poor = .81;
-
-/* --- memory -------------------------------------------------------------------------------------------- */
 
 void refinement_free(refinement *s) {
     free(s->lit);
@@ -37,9 +36,8 @@ void refinement_free(refinement *s) {
     *s = (refinement){.n_columns = 0};
 }
 
-/* Doubles that a column of compressed form factors takes: what two lights lack, a light, what a product
- * takes.
- */
+/* Doubles of scratch of a column with compressed form factors: two error bounds, one vector, and the work of
+ * a product. */
 static size_t scratch_of(const lam_refiner *refiner) {
     const compressed_factors *c = refiner->F->compressed;
     return c == NULL ? 0 : 3 * c->n + compressed_work(c);
@@ -76,7 +74,7 @@ lam_status refinement_create(const lam_refiner *refiner, size_t n_vectors, refin
     TRY(reserve(REFINE_WINDOW * m, n * sizeof(double), &s.kept_Z, error));
     TRY(reserve(REFINE_WINDOW * m, n * sizeof(double), &s.kept_Q, error));
     if (s.scratch_stride > 0) TRY(reserve(m, s.scratch_stride * sizeof(double), &s.scratch, error));
-    if (m > 1 && s.scratch == NULL) { /* one vector is multiplied where it lies */
+    if (m > 1 && s.scratch == NULL) { /* one vector is not copied */
         TRY(reserve(n, CSR_DOUBLES_WIDTH * sizeof(double), &s.X, error));
         TRY(reserve(n, CSR_DOUBLES_WIDTH * sizeof(double), &s.Y, error));
     }
@@ -98,8 +96,6 @@ done:
     return status;
 }
 
-/* --- vectors ------------------------------------------------------------------------------------------- */
-
 /* sum_i scale_i x_i y_i */
 static double dot(size_t n, const double *scale, const double *x, const double *y) {
     double sum = 0;
@@ -113,9 +109,7 @@ static void add(size_t n, double a, const double *y, double *x) {
     for (size_t i = 0; i < n; i++) x[i] += a * y[i];
 }
 
-/* --- products ------------------------------------------------------------------------------------------ */
-
-/* Some columns side by side. */
+/* Multiplies m columns, side by side when m > 1. */
 static void multiply_some(refinement *s, size_t m, const size_t *columns, const double *from, double *to) {
     const lam_operator *op = s->refiner->op;
     const csr *F = &s->refiner->F->F;
@@ -172,7 +166,7 @@ static double to_range(size_t n, const double *x) {
     return ldexp(1, exponent < -1000 ? 1000 : -exponent);
 }
 
-/* to = the operator's indirect light of `from` for the chosen columns. */
+/* to = the operator's indirect radiosity for `from`, for the chosen columns. */
 static void ask_operator(refinement *s, const bool *chosen, const double *from, double *to) {
     const lam_operator *op = refiner_help(s->refiner);
     const size_t n = op->n, C = op->n_channels;
@@ -186,7 +180,7 @@ static void ask_operator(refinement *s, const bool *chosen, const double *from, 
         }
     }
     if (n_asked == 0) return;
-    /* All that it checks is right here. */
+    /* It fails for wrong arguments alone. */
     (void)lam_operator_apply(op, n_asked, LAM_INDIRECT, s->narrow_in, s->narrow_out, s->work, s->work_bytes,
                              NULL);
     n_asked = 0;
@@ -210,9 +204,7 @@ void refinement_start(refinement *s) {
     for (size_t k = 0; k < s->n_columns * n; k++) s->P[k] = s->P[k] > 0 ? s->P[k] : 0; /* also of NaN */
 }
 
-/* --- one column ---------------------------------------------------------------------------------------- */
-
-/* r = R F (E' + P) - P from x = E' + P and h = F x, and what rounding made of it. */
+/* r = R F (E' + P) - P from x = E' + P and h = F x, and a bound on its rounding. */
 static void restart(refinement *s, size_t c, const double *x, const double *h) {
     refine_column *col = &s->columns[c];
     const lam_refiner *refiner = s->refiner;
@@ -223,7 +215,7 @@ static void restart(refinement *s, size_t c, const double *x, const double *h) {
     for (size_t i = 0; i < n; i++) {
         const double bounced = (double)rho[i] * h[i];
         r[i] = bounced - P[i];
-        /* Where E' + P is below 0, F |E' + P| is more than h. */
+        /* When E' + P has negative values, F |E' + P| exceeds h. */
         const double all = (double)rho[i] * (fabs(h[i]) - 2 * col->least * refiner->row_most);
         largest = all > largest ? all : largest;
         rho_most = fmax(rho_most, (double)rho[i]);
@@ -235,7 +227,7 @@ static void restart(refinement *s, size_t c, const double *x, const double *h) {
     col->n_kept = 0;
 }
 
-/* r of the chosen columns from their P. z and q are lost. */
+/* Computes r of the chosen columns from their P; overwrites z and q. */
 static void find_residuals(refinement *s, bool *chosen) {
     const size_t n = s->refiner->op->n;
     for (size_t c = 0; c < s->n_columns; c++) {
@@ -254,7 +246,7 @@ static void find_residuals(refinement *s, bool *chosen) {
         s->columns[c].at_restart = INFINITY;
         (void)refinement_judge(s, c);
         s->columns[c].at_restart = s->columns[c].bound;
-        /* Nothing but rounding was left of a fresh r. */
+        /* r is fresh, so that it need not be computed again. */
         chosen[c] = false;
     }
 }
@@ -277,12 +269,12 @@ static void step(refinement *s, size_t c) {
         add(n, -beta, Z, z);
         z_most += size * col->kept_z[k];
         q_most += size * col->kept_q[k];
-        /* |A| <= 2: what rounding makes of z counts twice, two roundings each. */
+        /* |A| <= 2, so that the two roundings of z count twice. */
         error += size * col->kept_error[k] + 2 * REFINE_U * (2 * z_most + q_most);
     }
     const double norm = dot(n, channel->scale, q, q), before = dot(n, channel->scale, r, r);
     const double along = dot(n, channel->scale, r, q);
-    if (!(norm > 0 && isfinite(along / norm))) { /* z says nothing, or nonsense */
+    if (!(norm > 0 && isfinite(along / norm))) { /* z is 0 or not finite */
         col->stuck = col->plain;
         col->plain = true;
         return;
@@ -305,8 +297,6 @@ static void step(refinement *s, size_t c) {
     col->kept_z[slot] = z_most;
     col->kept_q[slot] = q_most;
 }
-
-/* --- all of them --------------------------------------------------------------------------------------- */
 
 /* z = M~ r, or r. */
 static void find_directions(refinement *s, const bool *active) {

@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Elements of a piece at most: several for each thread, each worth a thread's while; of a subtree in one
- * matrix. */
+/* Most elements of a piece, so that each thread gets several and each is worth its dispatch; most elements of
+ * a subtree that becomes one matrix. */
 enum { PIECE_ELEMENTS = 4096, WHOLE_ELEMENTS = 96 };
 
 void wavelet_plan_free(wavelet_plan *plan) {
@@ -25,15 +25,12 @@ static size_t padded(size_t count) {
     return (count + WAVELET_INPUTS - 1) / WAVELET_INPUTS * WAVELET_INPUTS;
 }
 
-/* --- subtrees in one matrix ------------------------------------------------------------------------------
- */
-
 /* Subtrees of the same shapes in the same order have the same matrix. */
 typedef struct whole_table {
     const wavelets *basis;
     const uint32_t *begin; /* [n_nodes], the first node of a subtree */
     uint32_t *slots;       /* [n_slots] node + 1, 0: empty */
-    size_t *matrix;        /* [n_nodes], where that of the first such subtree is */
+    size_t *matrix;        /* [n_nodes], the offset of the matrix of a subtree's first occurrence */
     size_t n_slots, used, room;
     float *matrices;
 } whole_table;
@@ -55,7 +52,7 @@ static uint64_t hash_subtree(const whole_table *t, size_t a) {
     return h;
 }
 
-/* rows [scaling][padded(count)] of node t from those of its children. */
+/* out [scaling][padded(count)]: the scaling functions of node t, from those of its children. */
 static void write_rows(const wavelets *w, size_t t, float *out) {
     const wavelet_node *a = &w->nodes[t];
     const float *columns = wavelet_columns(w, a);
@@ -102,14 +99,11 @@ static lam_status find_matrix(whole_table *table, size_t t, size_t *out, lam_err
     return LAM_OK;
 }
 
-/* --- the plan ----------------------------------------------------------------------------------------------
- */
-
 static size_t own_of(const wavelet_node *a) {
     return a->inputs - a->scaling;
 }
 
-/* Coefficients in use below and in every node, and the first node of its subtree. */
+/* For each node: the used coefficients of its subtree and its own, and the first node of the subtree. */
 static void count_used(const wavelets *w, const bool *used, uint32_t *below, uint32_t *own, uint32_t *begin) {
     for (size_t t = 0; t < w->n_nodes; t++) {
         const wavelet_node *a = &w->nodes[t];
@@ -123,7 +117,7 @@ static void count_used(const wavelets *w, const bool *used, uint32_t *below, uin
     }
 }
 
-/* The root, whose last coefficients are what it hands up, is never part of a matrix. */
+/* The root is never part of a matrix, because its scaling coefficients are used. */
 static bool is_whole(const wavelets *w, const uint32_t *below, size_t t) {
     return below[t] == 0 && w->nodes[t].n_elements <= WHOLE_ELEMENTS && t + 1 < w->n_nodes;
 }
@@ -143,7 +137,7 @@ static lam_status add_steps(wavelet_plan *plan, whole_table *table, const uint32
         if (whole) {
             size_t matrix = 0;
             TRY(find_matrix(table, t, &matrix, error));
-            step->left = (uint32_t)matrix; /* until matrices stay where they are */
+            step->left = (uint32_t)matrix; /* an offset until all matrices are made */
             continue;
         }
         step->columns = wavelet_columns(w, a);
@@ -161,7 +155,7 @@ done:
     return status;
 }
 
-/* Parents, and the steps that are leaves here. */
+/* Sets the parents and lists the leaves. */
 static lam_status link_steps(wavelet_plan *plan, lam_error *error) {
     plan->leaves = memory_allocate(plan->n_steps, sizeof *plan->leaves, "wavelets", error);
     if (plan->leaves == NULL) return LAM_ERR_MEMORY;
@@ -176,7 +170,7 @@ static lam_status link_steps(wavelet_plan *plan, lam_error *error) {
     return LAM_OK;
 }
 
-/* The largest subtrees of at most PIECE_ELEMENTS elements, and what is above them. */
+/* Finds the largest subtrees of at most PIECE_ELEMENTS elements and the steps above them. */
 static lam_status cut_pieces(wavelet_plan *plan, lam_error *error) {
     lam_status status = LAM_OK;
     uint32_t *begin = memory_allocate(plan->n_steps, sizeof *begin, "wavelets", error);
@@ -244,9 +238,6 @@ size_t wavelet_plan_bytes(const wavelet_plan *plan) {
     return plan->n_steps * sizeof *plan->steps + plan->n_numbers * sizeof *plan->matrices;
 }
 
-/* --- the transforms ----------------------------------------------------------------------------------------
- */
-
 #define KERNEL(name) name##_portable
 #define TARGET
 #include "solver/operator/wavelet/wavelet_kernels.inc"
@@ -263,7 +254,7 @@ typedef void transform(const wavelet_plan *plan, size_t first, size_t last, cons
 static transform *const forward[] = CPU_TABLE(forward_portable, forward_avx2, forward_avx2),
                         *const inverse[] = CPU_TABLE(inverse_portable, inverse_avx2, inverse_avx2);
 
-/* Whether all of a piece is 0. */
+/* True when all of a piece is 0. */
 static bool is_dark(const wavelet_plan *plan, const wavelet_piece *piece, const float *x) {
     const plan_step *top = &plan->steps[piece->last - 1];
     for (size_t p = top->begin; p < (size_t)top->begin + top->count; p++)
@@ -271,7 +262,7 @@ static bool is_dark(const wavelet_plan *plan, const wavelet_piece *piece, const 
     return true;
 }
 
-/* What a transform of a piece that is 0 leaves. */
+/* Writes the transform of a piece that is 0. */
 static void leave_dark(const wavelet_plan *plan, const wavelet_piece *piece, float *c, float *s) {
     for (size_t t = piece->first; t < piece->last; t++)
         memset(c + plan->steps[t].first, 0, plan->steps[t].own * sizeof *c);
@@ -321,8 +312,6 @@ void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, fl
         run(plan, piece->first, piece->last, NULL, C + v * plan->n_used, X + v * plan->n, work + v * room);
     }
 }
-
-/* --- some positions ------------------------------------------------------------------------------------- */
 
 /* The leaf that takes a position. */
 static uint32_t leaf_of(const wavelet_plan *plan, uint32_t position) {

@@ -1,19 +1,20 @@
-/* The transforms of a basis of which only some coefficients are ever used: subtrees without any are one
- * matrix from their elements to what they hand up, and coefficients are numbered without those of nodes that
- * have none in use. */
+/* The transforms of a basis when only some coefficients are used. A subtree with none in use becomes one
+ * matrix from its elements to its scaling coefficients, and coefficients are renumbered without those of
+ * unused nodes. */
 #ifndef LAMBERT_OPERATOR_WAVELET_WAVELET_PLAN_H
 #define LAMBERT_OPERATOR_WAVELET_WAVELET_PLAN_H
 
 #include "solver/operator/wavelet/wavelets.h"
 
-/* A node of the basis, or a whole subtree. */
+/* A node of the basis, or a subtree that is one matrix. */
 typedef struct plan_step {
-    const float *columns, *rows; /* of its shape, padded; of a subtree rows [scaling][count] alone */
-    uint32_t begin, count;       /* its positions, where it takes them itself */
-    uint32_t left;               /* the step of its left child; the right one is the step before it */
-    uint32_t parent;             /* WAVELET_NONE: it is the root */
-    uint32_t first;              /* its first coefficient */
-    uint8_t inputs, scaling, from_left, own; /* own: coefficients, 0: none in use */
+    const float *columns,
+        *rows;             /* the padded matrix of its shape; a subtree has rows [scaling][count] alone */
+    uint32_t begin, count; /* its positions, when it is a leaf or a subtree */
+    uint32_t left;         /* the step of its left child; the right one is the step before it */
+    uint32_t parent;       /* WAVELET_NONE: it is the root */
+    uint32_t first;        /* its first coefficient */
+    uint8_t inputs, scaling, from_left, own; /* own: wavelet coefficients; 0: none in use */
     bool whole;                              /* a subtree */
 } plan_step;
 
@@ -21,13 +22,13 @@ typedef struct wavelet_plan {
     size_t n, n_used; /* elements, coefficients */
     size_t n_steps, n_pieces, n_above;
     plan_step *steps; /* postorder */
-    float *matrices;  /* of subtrees, n_numbers in all */
+    float *matrices;  /* of subtrees, n_numbers floats */
     size_t n_numbers;
     uint32_t *coefficient; /* [n_used], its number in the basis, ascending */
-    uint32_t *leaves;      /* [n_leaves], steps that take positions themselves, in their order */
+    uint32_t *leaves;      /* [n_leaves], leaves and subtrees in the order of positions */
     size_t n_leaves;
-    wavelet_piece *pieces; /* [n_pieces], steps that a thread takes at once */
-    uint32_t *above;       /* [n_above], steps in none */
+    wavelet_piece *pieces; /* [n_pieces], steps that one thread takes at a time */
+    uint32_t *above;       /* [n_above], steps outside all pieces */
 } wavelet_plan;
 
 void wavelet_plan_free(wavelet_plan *plan);
@@ -40,25 +41,24 @@ static inline size_t wavelet_plan_work(const wavelet_plan *plan) {
     return plan->n_steps * WAVELET_SCALING;
 }
 
-/* What is 0 in X is passed over.
- *
- * C_v = W X_v without what is not in use: X_v = X + v n, C_v = C + v n_used; and X_v = W^T C_v. The bits
- * depend on neither m nor n_threads. */
+/* C_v = W X_v, the used coefficients alone, and X_v = W^T C_v: X_v = X + v n, C_v = C + v n_used. The forward
+ * transform skips pieces in which X_v is 0. The bits depend on neither m nor n_threads. */
 void wavelet_plan_forward(const wavelet_plan *plan, size_t m, const float *X, float *C, float *work,
                           size_t n_threads);
 void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, float *X, float *work,
                           size_t n_threads);
 
-/* The steps that some positions are made by, ascending: out has room for n_steps, flags [n_steps] are 0 and
- * are 0 again. Returns their number. */
+/* The steps on the paths from the root to some positions, ascending: out has room for n_steps, flags
+ * [n_steps] are 0 before and after. Returns their number. */
 size_t wavelet_plan_paths(const wavelet_plan *plan, size_t count, const uint32_t *positions, uint8_t *flags,
                           uint32_t *out);
 
-/* The coefficients that these steps take, ascending: out has room for n_used. Returns their number. */
+/* The coefficients that these steps read, ascending: out has room for n_used. Returns their number. */
 size_t wavelet_plan_coefficients(const wavelet_plan *plan, size_t n_steps, const uint32_t *steps,
                                  uint32_t *out);
 
-/* The inverse of one vector where these steps end; the rest of X is not written. The same bits there. */
+/* The inverse transform of one vector at the positions of these steps, with the bits of wavelet_plan_inverse;
+ * the rest of X is not written. */
 void wavelet_plan_inverse_some(const wavelet_plan *plan, size_t n_steps, const uint32_t *steps,
                                const float *C, float *X, float *work);
 

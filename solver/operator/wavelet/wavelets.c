@@ -23,8 +23,6 @@ void wavelets_heights(const wavelets *w, uint32_t *out) {
     }
 }
 
-/* --- making one ---------------------------------------------------------------------------------------- */
-
 static lam_status check_shapes(const wavelets *w, lam_error *error) {
     lam_status status = LAM_OK;
     size_t count = 0;
@@ -33,12 +31,12 @@ static lam_status check_shapes(const wavelets *w, lam_error *error) {
         if (s->leaf > 1 || s->inputs == 0 || s->inputs > WAVELET_INPUTS || s->scaling == 0 ||
             s->scaling > WAVELET_SCALING || s->scaling > s->inputs)
             FAIL(error, LAM_ERR_NUMERIC,
-                 "shape[%zu] takes %u numbers and hands up %u, must be 1 to 8 and 1 to 4 of them", k,
-                 (unsigned)s->inputs, (unsigned)s->scaling);
+                 "shape[%zu] has %u inputs and %u scaling coefficients, must have 1 to 8 and 1 to 4 of them",
+                 k, (unsigned)s->inputs, (unsigned)s->scaling);
         count += (size_t)s->inputs * s->inputs;
     }
     if (count != w->basis_count)
-        FAIL(error, LAM_ERR_NUMERIC, "the basis has %zu numbers, its shapes want %zu", w->basis_count, count);
+        FAIL(error, LAM_ERR_NUMERIC, "the basis has %zu numbers, its shapes need %zu", w->basis_count, count);
     for (size_t k = 0; k < count; k++)
         if (!isfinite(w->basis[k]))
             FAIL(error, LAM_ERR_NUMERIC, "basis[%zu] = %g, must be finite", k, (double)w->basis[k]);
@@ -46,7 +44,7 @@ done:
     return status;
 }
 
-/* Nodes from their shapes in postorder: those that still wait for a parent are on a stack. */
+/* Links nodes from their shapes in postorder; a stack holds the nodes that have no parent yet. */
 static lam_status link_nodes(wavelets *w, const uint32_t *node_shapes, lam_error *error) {
     lam_status status = LAM_OK;
     size_t n_waiting = 0, begin = 0, first = 0;
@@ -74,7 +72,8 @@ static lam_status link_nodes(wavelets *w, const uint32_t *node_shapes, lam_error
             a->left = waiting[n_waiting - 2];
             const wavelet_node *left = &w->nodes[a->left], *right = &w->nodes[t - 1];
             if (left->scaling + right->scaling != shape->inputs)
-                FAIL(error, LAM_ERR_NUMERIC, "node[%zu] takes %u numbers, its children hand up %u", t,
+                FAIL(error, LAM_ERR_NUMERIC,
+                     "node[%zu] has %u inputs, its children have %u scaling coefficients", t,
                      (unsigned)shape->inputs, (unsigned)(left->scaling + right->scaling));
             w->nodes[a->left].parent = w->nodes[t - 1].parent = (uint32_t)t;
             a->from_left = left->scaling;
@@ -134,7 +133,50 @@ done:
     return status;
 }
 
-/* --- the store ----------------------------------------------------------------------------------------- */
+/* out = Q in; the columns of Q lie eight apart. The rows of Q in their place give Q^T in. */
+static void turn(const float *columns, size_t inputs, const double *in, double *out) {
+    memset(out, 0, WAVELET_INPUTS * sizeof *out);
+    for (size_t m = 0; m < inputs; m++)
+        for (size_t k = 0; k < WAVELET_INPUTS; k++) out[k] += (double)columns[m * WAVELET_INPUTS + k] * in[m];
+}
+
+void wavelets_forward(const wavelets *w, const double *x, double *c, double *work) {
+    for (size_t t = 0; t < w->n_nodes; t++) {
+        const wavelet_node *a = &w->nodes[t];
+        double in[WAVELET_INPUTS], out[WAVELET_INPUTS];
+        if (a->from_left == 0) {
+            memcpy(in, x + a->begin, a->inputs * sizeof *in);
+        } else {
+            memcpy(in, work + (size_t)a->left * WAVELET_SCALING, a->from_left * sizeof *in);
+            memcpy(in + a->from_left, work + (t - 1) * WAVELET_SCALING,
+                   (a->inputs - a->from_left) * sizeof *in);
+        }
+        turn(wavelet_columns(w, a), a->inputs, in, out);
+        memcpy(work + t * WAVELET_SCALING, out, a->scaling * sizeof *out);
+        memcpy(c + a->first, out + a->scaling, (a->inputs - a->scaling) * sizeof *out);
+    }
+    const size_t scaling = w->nodes[w->n_nodes - 1].scaling;
+    memcpy(c + w->n - scaling, work + (w->n_nodes - 1) * WAVELET_SCALING, scaling * sizeof *c);
+}
+
+void wavelets_inverse(const wavelets *w, const double *c, double *x, double *work) {
+    const size_t scaling = w->nodes[w->n_nodes - 1].scaling;
+    memcpy(work + (w->n_nodes - 1) * WAVELET_SCALING, c + w->n - scaling, scaling * sizeof *c);
+    for (size_t t = w->n_nodes; t-- > 0;) {
+        const wavelet_node *a = &w->nodes[t];
+        double in[WAVELET_INPUTS], out[WAVELET_INPUTS];
+        memcpy(in, work + t * WAVELET_SCALING, a->scaling * sizeof *in);
+        memcpy(in + a->scaling, c + a->first, (a->inputs - a->scaling) * sizeof *in);
+        turn(wavelet_columns(w, a) + WAVELET_INPUTS * WAVELET_INPUTS, a->inputs, in, out);
+        if (a->from_left == 0) {
+            memcpy(x + a->begin, out, a->inputs * sizeof *out);
+        } else {
+            memcpy(work + (size_t)a->left * WAVELET_SCALING, out, a->from_left * sizeof *out);
+            memcpy(work + (t - 1) * WAVELET_SCALING, out + a->from_left,
+                   (a->inputs - a->from_left) * sizeof *out);
+        }
+    }
+}
 
 lam_status wavelets_save(const wavelets *w, const char *group, store *s, lam_error *error) {
     lam_status status = LAM_OK;

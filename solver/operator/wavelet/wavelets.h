@@ -1,11 +1,11 @@
-/* An orthonormal basis on a binary tree of clusters of elements: area-weighted multiwavelets, applied in
- * O(n). Knows nothing of how it was made, nor of what is written in it.
+/* An orthonormal multiwavelet basis W on a binary tree of clusters of elements (Gortler et al. 1993), c = W x
+ * and x = W^T c in O(n). It knows neither how the basis was chosen nor which matrix is written in it.
  *
- * Positions are elements in tree order, so that a cluster is a range of them. A node takes up to eight
- * numbers (of a leaf its elements, above what its two children hand up) and turns them by an orthonormal
- * matrix, its shape, into up to four that it hands up and the rest, which are coefficients: c = W x, x = W^T
- * c. Coefficients are numbered by the nodes in postorder; those of what the root would hand up come last.
- */
+ * Positions are elements in tree order, so that a cluster is a range of them. A node has up to eight inputs:
+ * the values of its elements (a leaf) or the scaling coefficients of its two children. Its orthonormal
+ * matrix, the shape, turns them into up to four scaling coefficients, which go to its parent, and wavelet
+ * coefficients. Coefficients are numbered by nodes in postorder; the scaling coefficients of the root come
+ * last. */
 #ifndef LAMBERT_OPERATOR_WAVELET_WAVELETS_H
 #define LAMBERT_OPERATOR_WAVELET_WAVELETS_H
 
@@ -13,12 +13,12 @@
 
 #include <stdint.h>
 
-/* Numbers that a node takes, and hands up, at most. */
+/* Most inputs and most scaling coefficients of a node. */
 enum { WAVELET_INPUTS = 8, WAVELET_SCALING = 4 };
 
 #define WAVELET_NONE UINT32_MAX
 
-/* What congruent nodes share. The first `scaling` rows of its matrix are what is handed up. */
+/* The matrix that congruent nodes share; its first `scaling` rows give the scaling coefficients. */
 typedef struct wavelet_shape {
     uint32_t leaf; /* 1: of elements, 0: of two children */
     uint32_t inputs, scaling;
@@ -34,7 +34,7 @@ typedef struct wavelet_node {
     uint32_t inputs, scaling, from_left; /* of the inputs, those of the left child; 0: a leaf */
 } wavelet_node;
 
-/* Nodes [first, last) that are whole subtrees, small enough that several threads share the work. */
+/* Nodes [first, last), a subtree that one thread takes at a time. */
 typedef struct wavelet_piece {
     uint32_t first, last;
 } wavelet_piece;
@@ -42,7 +42,7 @@ typedef struct wavelet_piece {
 typedef struct wavelets {
     size_t n, n_nodes, n_shapes;
     wavelet_shape *shapes; /* [n_shapes] */
-    float *basis;          /* of shape after shape, [inputs][inputs] */
+    float *basis;          /* the matrices, shape after shape, [inputs][inputs] */
     size_t basis_count;
     wavelet_node *nodes; /* [n_nodes], postorder: children before their parent, the left one first */
     float *padded;       /* [n_shapes][2][8][8]: columns of the matrix, then its rows */
@@ -55,15 +55,25 @@ static inline const float *wavelet_columns(const wavelets *w, const wavelet_node
 
 void wavelets_free(wavelets *w);
 
-/* How many nodes are below each on the longest way to a leaf: out [n_nodes]; leaves: 0. */
+/* out [n_nodes] = the height of each node: the longest path to a leaf below it; leaves have 0. */
 void wavelets_heights(const wavelets *w, uint32_t *out);
 
-/* From shapes, basis and the shape of every node in postorder ([n_nodes]; copied); shapes and basis are taken
- * over, also on an error. Errors: LAM_ERR_NUMERIC where the nodes are no tree of n elements, or a shape is
- * out of bounds or has a number that is not finite; LAM_ERR_MEMORY. */
+/* Builds the basis from the shape of every node in postorder (node_shapes [n_nodes], copied). It takes over
+ * shapes and basis, also on an error. Errors: LAM_ERR_NUMERIC when the nodes are no tree of n elements, a
+ * shape is out of bounds or a number is not finite; LAM_ERR_MEMORY. */
 lam_status wavelets_create(size_t n, size_t n_nodes, const uint32_t *node_shapes, size_t n_shapes,
                            wavelet_shape *shapes, float *basis, size_t basis_count, wavelets *out,
                            lam_error *error);
+
+/* Doubles of work for a transform in double. */
+static inline size_t wavelets_work(const wavelets *w) {
+    return w->n_nodes * WAVELET_SCALING;
+}
+
+/* c = W x and x = W^T c for one vector in double: x [n] by position, c [n] by coefficient. A number is
+ * rounded in a sum of at most eight products for each node above its element. */
+void wavelets_forward(const wavelets *w, const double *x, double *c, double *work);
+void wavelets_inverse(const wavelets *w, const double *c, double *x, double *work);
 
 /* GROUP/shape [n_shapes][3] u32, basis [basis_count] f32, node [n_nodes] u32. Errors: as store_read;
  * LAM_ERR_NUMERIC as wavelets_create. */
