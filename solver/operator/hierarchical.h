@@ -54,7 +54,4 @@ lam_status csr_mirror(const csr *upper, csr *out, lam_error *error);
 lam_status half_matrix_save(const half_matrix *m, const char *group, store *s, lam_error *error);
 lam_status half_matrix_load(store *s, const char *group, size_t n, half_matrix *out, lam_error *error);
 
-/* Bytes of it as stored. */
-size_t half_matrix_bytes(const half_matrix *m);
-
 #endif

@@ -260,9 +260,3 @@ done:
     csr_free(&made.rows);
     return status;
 }
-
-size_t half_matrix_bytes(const half_matrix *m) {
-    size_t stored = 0;
-    for (size_t row = 0; row < m->rows.n; row++) stored += each_stored(m, row, NULL, NULL);
-    return stored * 2 * sizeof(uint16_t) + m->n * sizeof(uint16_t);
-}
