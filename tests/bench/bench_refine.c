@@ -9,7 +9,7 @@
  */
 #include "solver/base/clock.h"
 #include "solver/bench/stats.h"
-#include "solver/operator/refine/refine.h"
+#include "solver/operator/refine/refinement.h"
 
 #include <math.h>
 #include <omp.h>

@@ -1,5 +1,5 @@
 /* lam_refiner and lam_refine: bounds on (I - R F)^-1, batches, quantities. */
-#include "solver/operator/refine/refine.h"
+#include "solver/operator/refine/refinement.h"
 
 #include "solver/base/random.h"
 #include "solver/linalg/csr_rows.h"

@@ -1,6 +1,6 @@
-/* The certificate of refine.h: a bound on the error of a column, and the decision whether it is done. */
+/* The certificate of refinement.h: a bound on the error of a column, and the decision whether it is done. */
 #include "solver/linalg/csr_rows.h"
-#include "solver/operator/refine/refine.h"
+#include "solver/operator/refine/refinement.h"
 
 #include <math.h>
 #include <string.h>

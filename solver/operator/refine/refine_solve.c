@@ -3,7 +3,7 @@
  * updated with P, so that an iteration takes one product with F; a bound on the difference from the true
  * residual is updated too. */
 #include "solver/linalg/csr_rows.h"
-#include "solver/operator/refine/refine.h"
+#include "solver/operator/refine/refinement.h"
 
 #include <math.h>
 #include <stdlib.h>

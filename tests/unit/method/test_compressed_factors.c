@@ -4,7 +4,7 @@
 #include "solver/method/hierarchical/compress.h"
 #include "solver/method/method.h"
 #include "solver/operator/refine/form_factor_rows.h"
-#include "solver/operator/refine/refine.h"
+#include "solver/operator/refine/refinement.h"
 #include "store/store.h"
 #include "support/certified.h"
 #include "support/scene.h"

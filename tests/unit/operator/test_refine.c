@@ -3,7 +3,7 @@
 #include "solver/base/random.h"
 #include "solver/bench/scenes.h"
 #include "solver/bench/stability.h"
-#include "solver/operator/refine/refine.h"
+#include "solver/operator/refine/refinement.h"
 #include "support/certified.h"
 #include "support/dense.h"
 #include "support/scene.h"

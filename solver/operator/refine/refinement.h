@@ -18,8 +18,8 @@
  *     R F (E' + Q) - Q = R F~ r + R (F - F~)(E' + Q),
  *     so   b_i = rho_i (s_i |r|_max + delta_i(r) + delta_i(E' + Q)).
  * The last term does not decrease with r. */
-#ifndef LAMBERT_OPERATOR_REFINE_REFINE_H
-#define LAMBERT_OPERATOR_REFINE_REFINE_H
+#ifndef LAMBERT_OPERATOR_REFINE_REFINEMENT_H
+#define LAMBERT_OPERATOR_REFINE_REFINEMENT_H
 
 #include "solver/operator/operator.h"
 #include "solver/operator/refine/form_factor_rows.h"
