@@ -1,5 +1,7 @@
 #include "solver/base/file_text.h"
 
+#include "solver/base/array_grow.h"
+
 #include <errno.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -26,12 +28,9 @@ lam_status file_text(const char *path, char **out, size_t *out_length, lam_error
     FILE *file = fopen(path, "rb");
     if (file == NULL) FAIL(error, LAM_ERR_IO, "%s: cannot read: %s", path, strerror(errno));
     while (!feof(file) && !ferror(file)) {
-        if (capacity - length < 2) {
-            capacity = capacity == 0 ? first_capacity(file) : 2 * capacity;
-            char *grown = realloc(text, capacity);
-            if (grown == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory to read it", path);
-            text = grown;
-        }
+        if (capacity - length < 2)
+            TRY(array_grow(&text, &capacity, capacity == 0 ? first_capacity(file) : capacity + 1, 1, path,
+                           error));
         length += fread(text + length, 1, capacity - length - 1, file);
     }
     if (ferror(file)) FAIL(error, LAM_ERR_IO, "%s: cannot read: %s", path, strerror(errno));
