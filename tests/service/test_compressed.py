@@ -123,7 +123,7 @@ class Compressed(unittest.TestCase):
     def test_what_needs_rows_is_refused(self):
         for wanted, line in (
                 ("makes no operator; precompute the scene again", ("precompute", self.stores["tree"], "-o", self.path("x.h5"))),
-                ("does not say who sees whom",
+                ("do not tell which elements see each other",
                  ("render", self.stores["tree"], "--quantity", "visible", "-o", self.path("x.png")))):
             done = lambert(*line)
             self.assertEqual(done.returncode, 1)
