@@ -1,4 +1,5 @@
-/* What a client may send as JSON: whatever it is, it ends in a request that is in range or in one problem. */
+/* JSON of clients and of files of emissions: any text ends in a request that is in range, or in one problem.
+ */
 #include "fuzz/fuzz.h"
 #include "solver/codec/answer.h"
 
@@ -19,6 +20,24 @@ static void write_back(const codec_scene *scene, const radiosity_request *reques
                answer_add(&b, &about, &as, 0, request->n_rhs, request->E, &why) &&
                answer_end(&b, &about, &as, &notes, &why));
     buffer_free(&b);
+}
+
+/* The text as a file of emissions: every vector is then dense. */
+static void read_file(const codec_scene *scene, const char *text, size_t size) {
+    codec_scene about = *scene;
+    radiosity_request request = {0};
+    problem why = {0};
+    about.only_linear = false;
+    about.source = "the file";
+    if (codec_read_emissions(&about, text, size, &request, &why)) {
+        FUZZ_CHECK(request.n_rhs > 0 && request.n_rhs <= about.max_batch && request.n_dense == request.n_rhs);
+        FUZZ_CHECK(!request.select && !request.reduce.on && request.tolerance == 0);
+        for (size_t i = 0; i < request.n_rhs * about.n_channels * about.n; i++)
+            FUZZ_CHECK(request.E[i] >= 0 && request.E[i] <= FLT_MAX);
+    } else {
+        fuzz_check_problem(&why);
+    }
+    radiosity_request_free(&request);
 }
 
 /* The last byte, a blank as a rule, says what scene it is. */
@@ -44,6 +63,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         fuzz_check_problem(&why);
     }
     radiosity_request_free(&request);
+    read_file(&scene, text, size);
     group_index_free(&groups);
     free(text);
     return 0;

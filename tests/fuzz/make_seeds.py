@@ -31,6 +31,10 @@ for e in emissions:
                 (folder / name / f"{count:03}").write_text(json.dumps(body) + blank)
             count += 1
 
+# Files of emissions: an EMISSION by itself.
+for k, e in enumerate(emissions):
+    (folder / "json" / f"file{k}").write_text(json.dumps(e) + "\t")
+
 for k, (shape, kind) in enumerate([((5,), "<f4"), ((5,), "<f8"), ((3, 5), "<f4"), ((2, 1, 5), "<f8"), ((2, 3, 5), "<f4"),
                                    ((5,), ">f4"), ((4,), "<f4"), ((5,), "<i4"), ((0, 5), "<f4")]):
     with open(folder / "npy" / f"{k}", "wb") as f:

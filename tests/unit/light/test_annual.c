@@ -86,7 +86,7 @@ static void check(const wanted *w) {
     static const uint32_t chosen[] = {3, 4, 17};
     place p = make_place(w->steady, w->lamp);
     lam_error error = {0};
-    annual_wish wish = {.hours = w->hours, .from = 0, .to = 24};
+    annual_options wish = {.hours = w->hours, .from = 0, .to = 24};
     annual_summary sum = {0};
     float *values = NULL;
     size_t between = 0;
@@ -136,7 +136,7 @@ END_TEST
 START_TEST(bounds) {
     lam_error error = {0};
     lam_operator *op = NULL;
-    annual_wish wish = {.hours = 1, .from = 0, .to = 24};
+    annual_options wish = {.hours = 1, .from = 0, .to = 24};
     annual_summary sum = {0};
     const float reflectance[1] = {.5f};
     float light[] = {0, 100, 2000, 2001, 99, 300}, *values = NULL;
@@ -168,7 +168,7 @@ START_TEST(ctrl_c) {
     size_t asked = 0;
     const progress steps = {.cancelled = stopped, .context = &asked};
     lam_error error = {0};
-    annual_wish wish = {.hours = 1, .from = 0, .to = 24};
+    annual_options wish = {.hours = 1, .from = 0, .to = 24};
     annual_summary sum;
     float *values = NULL;
     ck_assert_int_eq(annual_add(&wish, "autonomy=1", &error), LAM_OK);
@@ -185,7 +185,7 @@ START_TEST(no_memory) {
     static const uint32_t chosen[] = {3};
     place p = make_place(false, true);
     lam_error error = {0};
-    annual_wish wish = {.hours = 1, .from = 0, .to = 24};
+    annual_options wish = {.hours = 1, .from = 0, .to = 24};
     annual_summary sum;
     float *values = NULL;
     ck_assert_int_eq(annual_add(&wish, "sum", &error), LAM_OK);
@@ -209,7 +209,7 @@ END_TEST
 
 START_TEST(wrong) {
     lam_error error = {0};
-    annual_wish wish = {.hours = 1, .from = 0, .to = 24};
+    annual_options wish = {.hours = 1, .from = 0, .to = 24};
     annual_summary sum;
     float *values = NULL;
     static const char *const items[] = {
