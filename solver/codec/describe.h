@@ -1,4 +1,4 @@
-/* What a store says about itself: the JSON of `lambert info --json` and of GET /v1/scenes/NAME. */
+/* The description of a store: the JSON of `lambert info --json` and of GET /v1/scenes/NAME. */
 #ifndef LAMBERT_CODEC_DESCRIBE_H
 #define LAMBERT_CODEC_DESCRIBE_H
 

@@ -80,7 +80,7 @@ bool reduce_vectors(const reduce_request *r, const group_index *groups, const do
 void reduce_groups(size_t n_named, const uint32_t *named, const group_index *groups, const double *area,
                    reduce_values x, double out[REDUCE_COUNT]);
 
-/* Fills those of name k from its means [n_rhs][C] alone; area is that of its elements. */
+/* Fills the means and sums of name k from its means [n_rhs][C]; area is that of its elements. */
 void reduce_means(const reduce_request *r, size_t k, size_t n_channels, size_t n_rhs, double area,
                   const double *means, double *figures);
 

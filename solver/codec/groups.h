@@ -14,7 +14,7 @@ typedef struct group_index {
     uint32_t *sorted;   /* [n_groups]: groups in the order of their names */
 } group_index;
 
-/* Takes names over, also on an error. group is [n]. Errors: LAM_ERR_FORMAT (a group that has no name). */
+/* Takes over names, also on an error. group is [n]. Errors: LAM_ERR_FORMAT (a group that has no name). */
 lam_status group_index_make(size_t n, const uint32_t *group, size_t n_groups, char **names, group_index *out,
                             lam_error *error);
 

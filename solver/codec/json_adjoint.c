@@ -15,7 +15,7 @@ const char *gradient_name(gradient_kind kind) {
     return names[kind];
 }
 
-/* Whether the store has that gradient. */
+/* Checks that the store has the gradient. */
 static bool check_gradient(parser *p, gradient_kind kind) {
     const codec_scene *scene = p->scene;
     switch (kind) {
@@ -24,11 +24,11 @@ static bool check_gradient(parser *p, gradient_kind kind) {
     case GRADIENT_REFLECTANCE:
         return scene->n_emitters == 0 ||
                parser_refuse(p, PROBLEM_NOT_IN_STORE,
-                             "%s: a store of few emitters tells no gradient by reflectance", parser_here(p));
+                             "%s: a store of few emitters has no gradient by reflectance", parser_here(p));
     case GRADIENT_SKY:
         if (scene->n_emitters > 0)
             return parser_refuse(p, PROBLEM_NOT_IN_STORE,
-                                 "%s: a store of few emitters tells those of its emitters only",
+                                 "%s: a store of few emitters has the gradient by emitters only",
                                  parser_here(p));
         return scene->n_tiles > 0 ||
                parser_refuse(p, PROBLEM_NOT_IN_STORE, "%s: the store has no sky; precompute it with --sky",
@@ -111,7 +111,7 @@ static bool read_body(parser *p, adjoint_request *request) {
     return true;
 }
 
-/* What is answered where these gradients are named. */
+/* Decides which gradients the answer holds, from those that are named. */
 static void settle(const codec_scene *scene, adjoint_request *request) {
     if (request->n_named == 0) request->named[request->n_named++] = GRADIENT_EMISSION;
     for (size_t k = 0; k < request->n_named; k++) {

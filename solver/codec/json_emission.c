@@ -66,7 +66,7 @@ static bool read_colour(parser *p, float *colour) {
     return true;
 }
 
-/* Whether an index that was just read may stand in the list. */
+/* Checks an index that was just read: an element of the scene, and with once none that was listed before. */
 static bool check_element(parser *p, double index, size_t count, bool once) {
     const size_t n = p->scene->n;
     if (!(index >= 0.0 && index < (double)n && index == floor(index))) {
@@ -160,7 +160,7 @@ static bool read_values(parser *p, size_t *count) {
     return parser_closed(p);
 }
 
-/* A refusal that says what is too large, at the value being read. */
+/* Adds the place of the value being read to a refusal. */
 static bool refused_here(parser *p) {
     memcpy(p->why->pointer, p->pointer, p->pointer_length);
     p->why->pointer[p->pointer_length] = '\0';

@@ -138,8 +138,8 @@ static const double rounded_power[] = {
     1e8,   1e9,   1e10,  1e11,  1e12,  1e13,  1e14,  1e15,  1e16,  1e17,  1e18,  1e19,  1e20,  1e21, 1e22};
 _Static_assert(sizeof rounded_power / sizeof *rounded_power == 2 * EXACT_POWERS + 1, "one each");
 
-/* Whether these are eight digits, and their value: pairs of digits, then of pairs, then of those are put
- * together, all at once in one word. */
+/* True for eight digits, whose value is then combined in one word: digits to pairs, pairs to fours, fours to
+ * eight. */
 static inline bool eight_digits(const char *at, uint64_t *value) {
     uint64_t v;
     memcpy(&v, at, sizeof v);

@@ -127,7 +127,7 @@ bool parser_next_member(parser *p, json_slice *key) {
     return true;
 }
 
-/* Which of the names a key is; their number when none. */
+/* The number of the name that equals a key; count when there is none. */
 static size_t find_name(const json_slice *key, const char *const *names, size_t count) {
     size_t i = 0;
     while (i < count && (strlen(names[i]) != key->length || memcmp(names[i], key->bytes, key->length) != 0))

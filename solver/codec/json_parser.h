@@ -1,5 +1,5 @@
-/* What the parts of codec_read_json share: where they are in a request, and how they refuse it. Private to
- * the codec. Every function that returns false has filled why. */
+/* The state of reading a request, and its refusals. Private to the codec. Every function that returns false
+ * has filled why. */
 #ifndef LAMBERT_CODEC_JSON_PARSER_H
 #define LAMBERT_CODEC_JSON_PARSER_H
 
@@ -36,7 +36,7 @@ typedef struct parser {
     problem *why;
     char pointer[sizeof((problem *)0)->pointer]; /* of the value being read */
     size_t pointer_length;
-    /* Of sparse vectors, kept from one to the next; nothing is larger than what was read. */
+    /* Scratch of sparse vectors, kept from one to the next; never larger than the text read so far. */
     index_list elements;
     float *values; /* [values_capacity][C] */
     size_t values_capacity;
@@ -44,35 +44,35 @@ typedef struct parser {
     index_set seen; /* elements, or groups */
 } parser;
 
-/* Begins to read a text into request; parser_end frees what the parser holds and gives good back, with what
- * is no JSON at all told before all else, wherever its fault lies. */
+/* Begins to read a text into request. parser_end frees the parser and returns good; when a text is refused,
+ * it reads on to its end, because not being JSON goes before any other fault, wherever it lies. */
 bool parser_begin(parser *p, const codec_scene *scene, const char *text, size_t length,
                   radiosity_request *request, problem *why);
 bool parser_end(parser *p, bool good);
 
-/* Skies and emitters of the vectors behind the last that has any, dark. */
+/* Adds dark skies and emitters for the vectors behind the last that has any. */
 bool parser_fill_sides(parser *p);
 
-/* Goes into a member, or an array's element; the caller restores pointer_length. What does not fit is left
- * out. */
+/* Goes into a member, or an array's element; the caller restores pointer_length. A key that does not
+ * fit is left out. */
 void parser_point_key(parser *p, const char *key, size_t length);
 void parser_point_index(parser *p, size_t index);
 
-/* The pointer as a reader of the message would say it: "emission/groups/lamp". */
+/* The pointer as it stands in messages: "emission/groups/lamp". */
 const char *parser_here(parser *p);
 
-/* Refuses what is being read; the text itself, when it is not JSON. */
+/* Refuses the value being read; parser_fault refuses the text, which is not JSON. */
 bool parser_refuse(parser *p, problem_kind kind, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 bool parser_fault(parser *p);
 
-/* Refuses what is not wrong, but no linear reduction of sparse vectors. */
+/* Refuses a sound request that is not a linear reduction of sparse vectors. */
 bool parser_not_linear(parser *p);
 
-/* Over the end of an array or object whose loop has ended. */
+/* True behind the end of an array or object; false after a fault in it. */
 bool parser_closed(parser *p);
 
-/* Whether a value of this kind comes next. */
+/* Checks that a value of this kind comes next; what names it in the refusal. */
 bool parser_expect(parser *p, json_kind kind, const char *what);
 
 /* The next member of an object; false at its end or on a refusal. */

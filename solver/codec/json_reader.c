@@ -216,7 +216,7 @@ bool json_read_text(json_reader *r, json_slice *text) {
         r->at = close + 1;
         return true;
     }
-    /* What an escape stands for is never longer than the escape. */
+    /* An escape is never shorter than the bytes that it stands for. */
     size_t room = (size_t)(close - begin);
     if (room > r->scratch_capacity) {
         char *scratch = realloc(r->scratch, room);

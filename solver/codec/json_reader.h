@@ -27,7 +27,7 @@ typedef struct json_slice {
 /* Every function returns false on a fault; the reader then stays where it is and every further call fails. */
 typedef struct json_reader {
     const char *start, *at, *end;
-    const char *fault; /* what is wrong at `at`, static; NULL while all is well */
+    const char *fault; /* the fault at `at`, static; NULL while there is none */
     bool no_memory;    /* the fault is ours, not the text's */
     bool first;        /* just behind a [ or { */
     unsigned depth;
@@ -40,10 +40,10 @@ typedef struct json_reader {
 void json_begin(json_reader *r, const char *text, size_t length);
 void json_end(json_reader *r);
 
-/* What comes next; nothing is consumed but white space. */
+/* The kind of the next value; consumes only white space. */
 json_kind json_peek(json_reader *r);
 
-/* The same, but that no value starts here is no fault yet. */
+/* The same, but a missing value is not a fault. */
 json_kind json_look(json_reader *r);
 
 /* Into an array, then to each element: false behind the last one (or on a fault: look at r->fault). */

@@ -39,7 +39,7 @@ media_type media_content_type(const char *header) {
     return MEDIA_OTHER;
 }
 
-/* How much an element of Accept is liked, 0 to 1. */
+/* The quality of an element of Accept, 0 to 1. */
 static double read_quality(const char *text) {
     char *end;
     double q = strtod(text, &end);

@@ -8,7 +8,7 @@
 
 typedef enum media_type { MEDIA_JSON, MEDIA_NPY, MEDIA_OTHER } media_type;
 
-/* What a Content-Type header says; NULL (no header) is JSON. */
+/* The type that a Content-Type header names; JSON without a header (NULL). */
 media_type media_content_type(const char *header);
 
 typedef struct media_accept {
@@ -17,7 +17,8 @@ typedef struct media_accept {
     bool npy_given; /* with a dtype; else npy is <f4 */
 } media_accept;
 
-/* What to answer to an Accept header: NPY when it is named and not liked less than JSON, else JSON. */
+/* The encoding of the answer to an Accept header: NPY when it is named with a quality not below that of JSON,
+ * else JSON. */
 media_accept media_choose(const char *header);
 
 #endif

@@ -9,7 +9,7 @@
 
 enum { AT_ONCE = 64 }; /* vectors in one go */
 
-lam_status annual_add(annual_wish *w, const char *item, lam_error *error) {
+lam_status annual_add(annual_options *w, const char *item, lam_error *error) {
     lam_status status = LAM_OK;
     annual_figure f = {.high = INFINITY};
     if (strcmp(item, "sum") == 0) {
@@ -17,7 +17,7 @@ lam_status annual_add(annual_wish *w, const char *item, lam_error *error) {
         snprintf(f.name, sizeof f.name, "sum");
     } else if (strncmp(item, "autonomy=", 9) == 0) {
         TRY(option_number("--annual autonomy:", item + 9, &f.low, error));
-        /* The dark would be autonomous at 0. */
+        /* At 0 every dark hour would count as autonomous. */
         if (f.low <= 0)
             FAIL(error, LAM_ERR_ARGUMENT, "--annual %s: must be above 0, in the unit of the answer", item);
         snprintf(f.name, sizeof f.name, "autonomy_%g", f.low);
@@ -42,7 +42,7 @@ done:
     return status;
 }
 
-lam_status annual_parse_occupied(const char *text, annual_wish *w, lam_error *error) {
+lam_status annual_parse_occupied(const char *text, annual_options *w, lam_error *error) {
     lam_status status = LAM_OK;
     unsigned from = 0, to = 0;
     int length = 0;
@@ -56,24 +56,24 @@ done:
     return status;
 }
 
-bool annual_has_shares(const annual_wish *w) {
+bool annual_has_shares(const annual_options *w) {
     for (size_t k = 0; k < w->n_figures; k++)
         if (!w->figures[k].is_sum) return true;
     return false;
 }
 
-static bool all_count(const annual_wish *w) {
+static bool all_count(const annual_options *w) {
     return w->from == 0 && w->to == 24;
 }
 
-static bool counts(const annual_wish *w, size_t vector) {
+static bool counts(const annual_options *w, size_t vector) {
     if (all_count(w)) return true;
     const double middle = fmod(((double)vector + .5) * w->hours, 24);
     return middle > w->from && middle < w->to;
 }
 
-/* Hours of the day want a batch that begins at midnight and holds whole days. */
-static lam_status check_days(const annual_wish *w, size_t n, lam_error *error) {
+/* Hours of the day need a batch that begins at midnight and holds whole days. */
+static lam_status check_days(const annual_options *w, size_t n, lam_error *error) {
     lam_status status = LAM_OK;
     const double a_day = 24 / w->hours;
     if (all_count(w)) goto done;
@@ -93,7 +93,7 @@ static bool any(const float *x, size_t count) {
     return false;
 }
 
-/* How many numbers a vector has in E, L and W. */
+/* The numbers of one vector in E, L and W. */
 typedef struct widths {
     size_t E, L, W;
 } widths;
@@ -147,7 +147,7 @@ done:
 
 /* An answer under way. */
 typedef struct work {
-    const annual_wish *wish;
+    const annual_options *options;
     const lam_operator *op;
     const lam_sky *sky;
     lam_quantity quantity;
@@ -161,12 +161,12 @@ typedef struct work {
 static lam_status make_sums(const work *w, const emission *light, lam_error *error) {
     lam_status status = LAM_OK;
     const widths width = widths_of(w->op, w->sky);
-    const double scale = (double)light->n_vectors * w->wish->hours / 1000;
+    const double scale = (double)light->n_vectors * w->options->hours / 1000;
     emission mean = {0};
     sunlight sun = {0};
     emission_pass p = {0};
-    for (size_t k = 0; k < w->wish->n_figures; k++) {
-        if (!w->wish->figures[k].is_sum) continue;
+    for (size_t k = 0; k < w->options->n_figures; k++) {
+        if (!w->options->figures[k].is_sum) continue;
         float *to = w->made + k * w->row;
         TRY(mean_of(light, &width, &mean, error));
         if (light->sun != NULL) {
@@ -197,7 +197,7 @@ static void count_hours(const annual_figure *f, size_t n, size_t row, const floa
 static lam_status make_shares(const work *w, const emission *light, const size_t *vectors, size_t n_vectors,
                               annual_summary *sum, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n_figures = w->wish->n_figures, most = n_vectors < AT_ONCE ? n_vectors : AT_ONCE;
+    const size_t n_figures = w->options->n_figures, most = n_vectors < AT_ONCE ? n_vectors : AT_ONCE;
     const size_t dark = sum->counted - n_vectors;
     emission_pass p = {0};
     uint32_t *count = memory_allocate(n_figures, w->row * sizeof *count, "hours", error);
@@ -212,11 +212,11 @@ static lam_status make_shares(const work *w, const emission *light, const size_t
         progress_report(w->steps, "hours", (double)first / (double)n_vectors);
         TRY(emission_pass_solve(&p, now, vectors + first, x, error));
         for (size_t k = 0; k < n_figures; k++)
-            if (!w->wish->figures[k].is_sum)
-                count_hours(&w->wish->figures[k], now, w->row, x, count + k * w->row);
+            if (!w->options->figures[k].is_sum)
+                count_hours(&w->options->figures[k], now, w->row, x, count + k * w->row);
     }
     for (size_t k = 0; k < n_figures; k++) {
-        const annual_figure *f = &w->wish->figures[k];
+        const annual_figure *f = &w->options->figures[k];
         const size_t always = f->low <= 0 ? dark : 0; /* hours of exactly 0 */
         for (size_t i = 0; i < w->row && !f->is_sum; i++)
             w->made[k * w->row + i] =
@@ -229,7 +229,7 @@ done:
     return status;
 }
 
-lam_status annual_apply(const annual_wish *wish, const emission *light, const lam_operator *op,
+lam_status annual_apply(const annual_options *options, const emission *light, const lam_operator *op,
                         const lam_sky *sky, lam_quantity quantity, size_t n_selected,
                         const uint32_t *selected, const progress *steps, float **values,
                         annual_summary *summary, lam_error *error) {
@@ -237,7 +237,7 @@ lam_status annual_apply(const annual_wish *wish, const emission *light, const la
     const size_t C = lam_operator_channels(op), n = lam_operator_elements(op);
     const widths width = widths_of(op, sky);
     annual_summary sum = {.n = light->n_vectors};
-    work w = {.wish = wish,
+    work w = {.options = options,
               .op = op,
               .sky = sky,
               .quantity = quantity,
@@ -247,25 +247,25 @@ lam_status annual_apply(const annual_wish *wish, const emission *light, const la
               .row = C * (selected != NULL ? n_selected : n)};
     size_t *lit = NULL, n_lit = 0; /* vectors that are lit and count */
     float *whole = NULL;
-    TRY(check_days(wish, light->n_vectors, error));
+    TRY(check_days(options, light->n_vectors, error));
     lit = memory_allocate(light->n_vectors, sizeof *lit, "hours", error);
-    w.made = memory_allocate(wish->n_figures, w.row * sizeof *w.made, "figures of the year", error);
+    w.made = memory_allocate(options->n_figures, w.row * sizeof *w.made, "figures of the year", error);
     if (lit == NULL || w.made == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t v = 0; v < light->n_vectors; v++) {
-        const bool shines = is_lit(light, &width, v), counted = counts(wish, v);
+        const bool shines = is_lit(light, &width, v), counted = counts(options, v);
         sum.counted += counted;
         sum.lit += shines;
         if (shines && counted) lit[n_lit++] = v;
     }
     if (sum.counted == 0)
         FAIL(error, LAM_ERR_ARGUMENT, "--occupied %g-%g: no vector of %g hours has its middle in these hours",
-             wish->from, wish->to, wish->hours);
+             options->from, options->to, options->hours);
     TRY(make_sums(&w, light, error));
-    if (annual_has_shares(wish)) TRY(make_shares(&w, light, lit, n_lit, &sum, error));
+    if (annual_has_shares(options)) TRY(make_shares(&w, light, lit, n_lit, &sum, error));
     if (selected != NULL) {
-        whole = memory_allocate(wish->n_figures * C, n * sizeof *whole, "figures of the year", error);
+        whole = memory_allocate(options->n_figures * C, n * sizeof *whole, "figures of the year", error);
         if (whole == NULL) TRY(LAM_ERR_MEMORY);
-        emission_scatter(wish->n_figures * C, n, n_selected, selected, w.made, whole);
+        emission_scatter(options->n_figures * C, n, n_selected, selected, w.made, whole);
     }
     *values = selected != NULL ? whole : w.made;
     *summary = sum;

@@ -1,5 +1,5 @@
-/* A year of light in few numbers an element: sums over the hours, and the share of them that is bright
- * enough. Knows no files. */
+/* Figures of a year for each element: sums over the hours, and the share of hours that are bright enough.
+ * Knows no files. */
 #ifndef LAMBERT_LIGHT_ANNUAL_H
 #define LAMBERT_LIGHT_ANNUAL_H
 
@@ -20,36 +20,35 @@ typedef struct annual_figure {
     char name[ANNUAL_NAME];
 } annual_figure;
 
-typedef struct annual_wish {
+typedef struct annual_options {
     size_t n_figures;
     annual_figure figures[ANNUAL_MOST];
     double hours;    /* that a vector stands for */
     double from, to; /* hours of the day: vectors count whose middle is between them; 0 and 24: all */
-} annual_wish;
+} annual_options;
 
-/* Adds what an item says: sum, autonomy=X or useful=LOW,HIGH. LAM_ERR_ARGUMENT names the item. */
-lam_status annual_add(annual_wish *w, const char *item, lam_error *error);
+/* Adds the figure of an item: sum, autonomy=X or useful=LOW,HIGH. LAM_ERR_ARGUMENT names the item. */
+lam_status annual_add(annual_options *w, const char *item, lam_error *error);
 
 /* Reads FROM-TO, whole hours from 0 to 24. */
-lam_status annual_parse_occupied(const char *text, annual_wish *w, lam_error *error);
+lam_status annual_parse_occupied(const char *text, annual_options *w, lam_error *error);
 
-/* Whether a figure is something else than a sum. */
-bool annual_has_shares(const annual_wish *w);
+/* True when a figure is a share of the hours, not a sum. */
+bool annual_has_shares(const annual_options *w);
 
-/* What the figures were made of. */
+/* The vectors behind the figures. */
 typedef struct annual_summary {
     size_t n;       /* vectors */
     size_t counted; /* of them in the hours that count */
     size_t lit;     /* with any light at all */
 } annual_summary;
 
-/* *values is [n_figures][C][n], freed with free(): the figures of what the operator makes of each vector;
- * where selected is not NULL of these elements only, and 0 elsewhere. The mean vector is solved for the sum,
- * which is linear; for shares all lit vectors that count, a few at a time.
- * Cost: one answer for sums, one a lit and counted vector for shares; memory O(n) whatever their number.
- * Errors: LAM_ERR_ARGUMENT (not whole days, where hours of the day are asked for), LAM_ERR_CANCELLED,
- * LAM_ERR_MEMORY. */
-lam_status annual_apply(const annual_wish *w, const emission *light, const lam_operator *op,
+/* *values is [n_figures][C][n], freed with free(): the figures of the answers to all vectors; with selected
+ * (not NULL) of these elements only, and 0 elsewhere. The mean vector is solved for the sum, which is linear;
+ * for shares all lit vectors that count, a few at a time. Cost: one answer for sums, one a lit and counted
+ * vector for shares; memory O(n) whatever their number. Errors: LAM_ERR_ARGUMENT (not whole days, where hours
+ * of the day are asked for), LAM_ERR_CANCELLED, LAM_ERR_MEMORY. */
+lam_status annual_apply(const annual_options *w, const emission *light, const lam_operator *op,
                         const lam_sky *sky, lam_quantity quantity, size_t n_selected,
                         const uint32_t *selected, const progress *steps, float **values,
                         annual_summary *summary, lam_error *error);

@@ -64,7 +64,7 @@ static void gather(size_t n, const size_t *vectors, size_t width, const float *f
     for (size_t k = 0; k < n; k++) memcpy(to + k * width, from + vectors[k] * width, width * sizeof *to);
 }
 
-/* The weights: those given and those told from E and L. */
+/* The weights of the emitters: those given, and those found from E and L. */
 static lam_status find_weights(emission_pass *p, size_t n, const size_t *vectors, lam_error *error) {
     lam_status status = LAM_OK;
     const emission *e = p->light;
@@ -90,8 +90,8 @@ static void light_directly(emission_pass *p, size_t n, const size_t *vectors) {
             p->H0[row * n_elements + i] += p->sun[row / C * n_elements + i];
 }
 
-/* The sun on answers that cannot take it on its way: their direct light becomes exact, what bounces is not
- * changed, nor is what is indirect. Rounding does not make light negative. */
+/* Adds the sun to the answers of an operator of few emitters. Their direct light becomes exact; the bounced
+ * light stays that of the tile. Rounding must not make a value negative. */
 static void light_answers(emission_pass *p, size_t n, const size_t *vectors, float *out) {
     const size_t C = lam_operator_channels(p->op), n_elements = lam_operator_elements(p->op);
     const size_t width = p->selected != NULL ? p->n_selected : n_elements;

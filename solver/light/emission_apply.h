@@ -1,11 +1,11 @@
-/* What an operator makes of emissions, a few vectors at a time: a year of them need not be in memory at once.
+/* Answers of an operator to emissions, a few vectors at a time, so that a year need not be in memory at once.
  */
 #ifndef LAMBERT_LIGHT_EMISSION_APPLY_H
 #define LAMBERT_LIGHT_EMISSION_APPLY_H
 
 #include "solver/light/emission.h"
 
-/* An operator and its sky (NULL: none) about to answer vectors of an emission. All are borrowed. */
+/* An operator and its sky (NULL: none) with room to answer some vectors of an emission. All are borrowed. */
 typedef struct emission_pass {
     const emission *light;
     const lam_operator *op;
@@ -20,32 +20,32 @@ typedef struct emission_pass {
     float *sun, *sun_work; /* [most][elements]; NULL without one */
 } emission_pass;
 
-/* Makes ready for at most this many vectors in one go; with selected for these elements only,
- * which is less work. Freed by emission_pass_free. Errors: LAM_ERR_MEMORY. */
+/* Allocates for passes of at most `most` vectors. With selected only these elements are answered, which is
+ * less work. Freed by emission_pass_free. Errors: LAM_ERR_MEMORY. */
 lam_status emission_pass_create(const emission *light, const lam_operator *op, const lam_sky *sky,
                                 lam_quantity quantity, size_t n_selected, const uint32_t *selected,
                                 size_t most, emission_pass *out, lam_error *error);
 void emission_pass_free(emission_pass *p);
 
 /* Answers the n vectors of these numbers, at most `most`: out is [n][C][elements], or [n][C][n_selected].
- * Errors: LAM_ERR_ARGUMENT (what the store's emitters cannot give), LAM_ERR_MEMORY. */
+ * Errors: LAM_ERR_ARGUMENT (an emission that is not a sum of the store's emitters), LAM_ERR_MEMORY. */
 lam_status emission_pass_solve(emission_pass *p, size_t n, const size_t *vectors, float *out,
                                lam_error *error);
 
-/* *values is [n_vectors][C][n], freed with free(): what the operator makes of each vector under its sky;
- * where selected is not NULL only of these elements, and 0 elsewhere. stop, which may be NULL, is asked
- * between passes and ends the work with its status. */
+/* *values is [n_vectors][C][n], freed with free(): the answer to each vector under its sky; with selected
+ * (not NULL) of these elements only, and 0 elsewhere. stop, which may be NULL, is asked between passes and
+ * ends the work with its status. */
 lam_status emission_apply(const emission *e, const lam_operator *op, const lam_sky *sky,
                           lam_quantity quantity, size_t n_selected, const uint32_t *selected,
                           lam_status (*stop)(lam_error *error), float **values, lam_error *error);
 
-/* What refines the n vectors of these numbers: E and H0 [n][C][elements] in double; *H0_there whether there
- * is any; of an operator of few emitters also the indirect light that it answers, start [n][C][elements].
- * Errors as emission_pass_solve; LAM_ERR_UNSUPPORTED for the sun on such an operator. */
+/* The input of refining the n vectors of these numbers: E and H0 [n][C][elements] in double. *H0_there is
+ * false where there is no H0. An operator of few emitters also gives its indirect light, start
+ * [n][C][elements]. Errors as emission_pass_solve; LAM_ERR_UNSUPPORTED for the sun on such an operator. */
 lam_status emission_pass_light(emission_pass *p, size_t n, const size_t *vectors, double *E, double *H0,
                                bool *H0_there, float *start, lam_error *error);
 
-/* Answers of chosen elements to their places: to [n_rows][n] of from [n_rows][n_selected]. */
+/* Puts answers of selected elements in their places: from [n_rows][n_selected] to [n_rows][n]. */
 void emission_scatter(size_t n_rows, size_t n, size_t n_selected, const uint32_t *selected, const float *from,
                       float *to);
 

@@ -11,7 +11,7 @@ void refined_light_free(refined_light *r) {
     *r = (refined_light){0};
 }
 
-/* What a go works with. */
+/* The vectors of one pass. */
 typedef struct room {
     double *E, *H0;
     float *start;

@@ -13,9 +13,9 @@ typedef struct refined_light {
 void refined_light_free(refined_light *r);
 
 /* Refines every vector of e to a tolerance (lam_refine) by the form factors of the store at path, which must
- * keep some. op's answers are what it starts from. stop as of emission_apply. Errors: LAM_ERR_ARGUMENT (none
- * are kept; what the store's emitters cannot give), LAM_ERR_NUMERIC (not reached), those of opening a store,
- * LAM_ERR_MEMORY. */
+ * keep some. It starts from the answers of op. stop as of emission_apply. Errors: LAM_ERR_ARGUMENT (none
+ * are kept; an emission that is not a sum of the store's emitters), LAM_ERR_NUMERIC (not reached), those of
+ * opening a store, LAM_ERR_MEMORY. */
 lam_status emission_refine(const emission *e, const char *path, const lam_operator *op, const lam_sky *sky,
                            lam_quantity quantity, double tolerance, lam_status (*stop)(lam_error *error),
                            refined_light *out, lam_error *error);

@@ -68,7 +68,7 @@ size_t sunlight_work(const sunlight *s) {
     return s->n + s->tiling.n_tiles;
 }
 
-/* What the rays found becomes what is added. */
+/* Turns the shares V n . s that the rays found into irradiances. */
 static void finish(const sunlight *s, const year_sun *sun, float *H, float *work) {
     for (size_t i = 0; i < s->n; i++)
         H[i] = (float)((double)H[i] * sun->normal + (double)s->ground[i] * sun->horizontal);

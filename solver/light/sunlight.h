@@ -7,9 +7,10 @@
 #include "solver/formfactor/visibility/sun_rays.h"
 #include "store/store.h"
 
-/* What the sun of vector h adds to an element's irradiance before any bounce: its normal irradiance times
- * max(0, n . s) V, V the share of the element that sees it, and what an unshaded ground of the store's albedo
- * sends up of it; and, where the answer holds the sun of the tiles already, less what that gives directly. */
+/* The direct irradiance of an element by the sun of vector h: E_n max(0, n . s) V with the normal irradiance
+ * E_n and the share V of the element that sees the sun, plus the light that an unshaded ground of the store's
+ * albedo reflects. Where the answer already holds the sun of a tile, that tile's direct light is subtracted.
+ */
 typedef struct sunlight {
     size_t n_vectors, n; /* hours, elements */
     year_sun *suns;      /* [n_vectors] */
@@ -17,20 +18,20 @@ typedef struct sunlight {
     const lam_sky *sky; /* borrowed; NULL: no sun is in the tiles */
     sky_tiling tiling;
     float *ground; /* [n], of the irradiance of the ground */
-    float *given;  /* [n]: one vector that is known; then there is nothing of the above */
+    float *given;  /* [n]: one vector that is known; the members above are then unused */
 } sunlight;
 
 /* Takes over suns [n_vectors], also on an error. Rays are n_points an element, of those wanted or, where that
- * is NULL, of all. in_tiles: the sky whose answers have the sun in a tile, or NULL. What the ground sends to
- * an element is told from the tiles that it does not see, first_bounce = a F_ground c there: the least of
- * first_bounce / c, but no more than an element so inclined sees of an open ground, a (1 - n_up) / 2.
+ * is NULL, of all. in_tiles: the sky whose answers have the sun in a tile, or NULL. The light of the
+ * ground on an element is found from the tiles that it does not see, where first_bounce = a F_ground c: the
+ * least of first_bounce / c, at most the share of an open ground at this inclination, a (1 - n_up) / 2.
  * Errors: those of the store's /sky, LAM_ERR_MEMORY, LAM_ERR_INTERNAL. */
 lam_status sunlight_create(store *s, const mesh *m, year_sun *suns, size_t n_vectors, size_t n_points,
                            size_t n_wanted, const uint32_t *wanted, const lam_sky *in_tiles, sunlight *out,
                            lam_error *error);
 void sunlight_free(sunlight *s);
 
-/* Whether there is any sun in a vector. */
+/* True where the sun shines in a vector. */
 bool sunlight_shines(const sunlight *s, size_t vector);
 
 enum { SUNLIGHT_MOST = 64 };

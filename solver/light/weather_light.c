@@ -41,7 +41,7 @@ static void log_year(terminal *t, const year_summary *sum, bool photometric) {
                       sum->sunless, sum->left_out);
 }
 
-lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const year_options *wish,
+lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const year_options *options,
                               terminal *t, weather_skies *out, lam_error *error) {
     lam_status status = LAM_OK;
     weather w = {0};
@@ -56,7 +56,7 @@ lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const 
     made.L = memory_allocate(count, sizeof *made.L, "the skies", error);
     made.suns = memory_allocate(w.n, sizeof *made.suns, "the suns", error);
     if (made.L == NULL || made.suns == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(year_skies(&w, tiling, wish, &steps, made.L, made.suns, &sum, error));
+    TRY(year_skies(&w, tiling, options, &steps, made.L, made.suns, &sum, error));
     if (sum.lit == 0)
         FAIL(error, LAM_ERR_ARGUMENT,
              "%s: the sky is dark all year: of %zu hours none has diffuse light, nor direct light of a sun "
@@ -64,7 +64,7 @@ lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const 
              path, w.n);
     terminal_clear(t);
     log_weather(t, &w);
-    log_year(t, &sum, wish->photometric);
+    log_year(t, &sum, options->photometric);
     *out = made;
     made = (weather_skies){0};
 done:
@@ -86,7 +86,7 @@ done:
     return status;
 }
 
-lam_status weather_light_add(const weather_wish *wish, store *s, const mesh *m, const lam_operator *op,
+lam_status weather_light_add(const weather_options *options, store *s, const mesh *m, const lam_operator *op,
                              const lam_sky *sky, size_t n_selected, const uint32_t *selected, terminal *t,
                              emission *e, sunlight *sun, lam_error *error) {
     lam_status status = LAM_OK;
@@ -96,27 +96,27 @@ lam_status weather_light_add(const weather_wish *wish, store *s, const mesh *m, 
     const bool few = lam_operator_emitters(op) > 0;
     if (sky == NULL)
         FAIL(error, LAM_ERR_ARGUMENT, "--weather %s: the store has no sky; precompute it with --sky",
-             wish->path);
+             options->path);
     TRY(load_tiling(s, &tiling, error));
     if (tiling.n_tiles != lam_sky_tiles(sky))
         FAIL(error, LAM_ERR_FORMAT, "%s: /sky has %zu tiles, %s has %zu", store_path(s), lam_sky_tiles(sky),
              tiling.name, tiling.n_tiles);
-    const year_options year = {.photometric = wish->photometric, .sun_in_tiles = few || !wish->exact};
-    TRY(weather_skies_read(wish->path, &tiling, &year, t, &made, error));
-    TRY(emission_add_skies(e, wish->path, m, tiling.n_tiles, made.n, made.L, error));
+    const year_options year = {.photometric = options->photometric, .sun_in_tiles = few || !options->exact};
+    TRY(weather_skies_read(options->path, &tiling, &year, t, &made, error));
+    TRY(emission_add_skies(e, options->path, m, tiling.n_tiles, made.n, made.L, error));
     if (e->n_vectors != made.n)
-        FAIL(error, LAM_ERR_ARGUMENT, "%s: 1 hour beside %zu emissions", wish->path, e->n_vectors);
-    if (!wish->exact) goto done;
+        FAIL(error, LAM_ERR_ARGUMENT, "%s: 1 hour beside %zu emissions", options->path, e->n_vectors);
+    if (!options->exact) goto done;
     year_sun *suns = made.suns;
     made.suns = NULL;
-    TRY(sunlight_create(s, m, suns, made.n, wish->sun_points, few ? n_selected : 0, few ? selected : NULL,
+    TRY(sunlight_create(s, m, suns, made.n, options->sun_points, few ? n_selected : 0, few ? selected : NULL,
                         few ? sky : NULL, sun, error));
     e->sun = sun;
     terminal_log(t,
                  few ? "the sun: %zu rays an element and hour; what bounces of it comes from its tile, as a "
                        "store of few emitters has it"
                      : "the sun: %zu rays an element and hour, through all bounces",
-                 wish->sun_points);
+                 options->sun_points);
 done:
     weather_skies_free(&made);
     sky_tiling_free(&tiling);

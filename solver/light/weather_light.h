@@ -1,4 +1,4 @@
-/* Light from a weather file: the skies of its hours on the tiles that a store has, and its sun itself. */
+/* Light of a weather file: the skies of its hours on the tiles of a store, and the sun. */
 #ifndef LAMBERT_LIGHT_WEATHER_LIGHT_H
 #define LAMBERT_LIGHT_WEATHER_LIGHT_H
 
@@ -15,23 +15,23 @@ typedef struct weather_skies {
 
 void weather_skies_free(weather_skies *w);
 
-/* Reads a file, makes its hours and says on the terminal what they are. Errors: those of the file,
+/* Reads a file, makes the skies of its hours and logs a summary. Errors: those of the file,
  * LAM_ERR_ARGUMENT where no hour has any light, LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
-lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const year_options *wish,
+lam_status weather_skies_read(const char *path, const sky_tiling *tiling, const year_options *options,
                               terminal *t, weather_skies *out, lam_error *error);
 
-/* What a command line asks for. */
-typedef struct weather_wish {
+/* The options of a command line about weather. */
+typedef struct weather_options {
     const char *path;  /* --weather */
     bool photometric;  /* --photometric */
     bool exact;        /* --sun exact */
     size_t sun_points; /* --sun-points */
-} weather_wish;
+} weather_options;
 
-/* Puts e under the hours of a file, on the tiles of an open store; where the sun is to be exact, sun gets it,
- * for the elements selected (NULL: all), and e points there: to be freed by sunlight_free after e's last use.
+/* Puts e under the hours of a file, on the tiles of an open store. With an exact sun, *sun holds it for the
+ * elements selected (NULL: all), and e points there: sunlight_free it after the last use of e.
  * Errors: also LAM_ERR_ARGUMENT for a store without a sky. */
-lam_status weather_light_add(const weather_wish *wish, store *s, const mesh *m, const lam_operator *op,
+lam_status weather_light_add(const weather_options *options, store *s, const mesh *m, const lam_operator *op,
                              const lam_sky *sky, size_t n_selected, const uint32_t *selected, terminal *t,
                              emission *e, sunlight *sun, lam_error *error);
 

@@ -163,7 +163,7 @@ done:
 }
 
 /* Figures of the year in place of the batch; *values is freed with free(). */
-static lam_status solve_year(const annual_wish *wish, const emission *light, const lam_operator *op,
+static lam_status solve_year(const annual_options *wish, const emission *light, const lam_operator *op,
                              const lam_sky *sky, size_t n_selected, const uint32_t *selected, terminal *t,
                              solution *out, float **values, lam_error *error) {
     lam_status status = LAM_OK;
@@ -198,7 +198,7 @@ static void take_refined(const refined_light *refined, solution *out, double tol
                  iterations == 1 ? "" : "s", out->n_vectors > 1 ? " at most" : "");
 }
 
-static lam_status solve(const char *path, const fields *f, const annual_wish *year, reduction *reductions,
+static lam_status solve(const char *path, const fields *f, const annual_options *year, reduction *reductions,
                         size_t n_reductions, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
@@ -228,10 +228,10 @@ static lam_status solve(const char *path, const fields *f, const annual_wish *ye
     /* With --reduce only figures are written, with -o too. */
     TRY(wanted_elements(&m, reductions, n_reductions, &n_selected, &selected, error));
     if (f->weather != NULL) {
-        const weather_wish hours = {.path = f->weather,
-                                    .photometric = f->photometric,
-                                    .exact = strcmp(f->sun, "exact") == 0,
-                                    .sun_points = (size_t)f->sun_points};
+        const weather_options hours = {.path = f->weather,
+                                       .photometric = f->photometric,
+                                       .exact = strcmp(f->sun, "exact") == 0,
+                                       .sun_points = (size_t)f->sun_points};
         TRY(weather_light_add(&hours, s, &m, lit.op, lit.sky, n_selected, selected, t, &lit.light, &sun,
                               error));
     }
@@ -284,7 +284,7 @@ done:
 }
 
 /* The figures of --annual and the options that are about them. */
-static lam_status read_year(const fields *f, annual_wish *year, lam_error *error) {
+static lam_status read_year(const fields *f, annual_options *year, lam_error *error) {
     lam_status status = LAM_OK;
     for (size_t i = 0; i < f->annual.count; i++) TRY(annual_add(year, f->annual.items[i], error));
     if (f->annual.count == 0 && f->hours > 0)
@@ -302,7 +302,7 @@ int cmd_solve(int argc, char **argv) {
     option_result given = {0};
     lam_error error = {0};
     terminal term;
-    annual_wish year = {.hours = 1, .from = 0, .to = 24};
+    annual_options year = {.hours = 1, .from = 0, .to = 24};
     char formats[OUTPUT_FORMATS], output_help[2 * OUTPUT_FORMATS];
     output_formats(false, formats);
     snprintf(output_help, sizeof output_help, "%s; without it the mean of every group is printed", formats);
