@@ -1,5 +1,6 @@
 """A lambertd for a test: on a free port of the loopback, stopped whatever happens."""
 
+import io
 import http.client
 import json
 import os
@@ -9,6 +10,8 @@ import socket
 import subprocess
 import tempfile
 import time
+
+import numpy as np
 
 LAMBERTD = os.environ["LAMBERTD"]
 
@@ -137,3 +140,10 @@ class Daemon:
 
     def radiosity(self, name, body, **more):
         return self.post(f"/v1/scenes/{name}/radiosity", body, **more)
+
+
+def npy(array, version=None):
+    """The bytes of a NumPy array as a file holds them."""
+    out = io.BytesIO()
+    np.lib.format.write_array(out, np.asarray(array), version)
+    return out.getvalue()

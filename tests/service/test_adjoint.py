@@ -13,7 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from command import must
-from daemon import Daemon
+from daemon import Daemon, npy
 from make_store import Scene
 from yard import MATERIALS, YARD, Truth
 
@@ -21,12 +21,6 @@ QUANTITIES = "radiosity", "irradiance", "indirect"
 # Some hundred terms in single precision, of either sign: of the sum of their magnitudes.
 TOLERANCE = 1e-5
 NPY = "application/x-npy"
-
-
-def npy(array):
-    out = io.BytesIO()
-    np.save(out, array)
-    return out.getvalue()
 
 
 class Both(unittest.TestCase):

@@ -7,18 +7,12 @@ import unittest
 
 import numpy as np
 
-from daemon import Daemon
+from daemon import Daemon, npy
 from make_store import Scene
 
 # Factors are stored in single precision (6e-8 each) and at most 60 terms of one sign are summed in it: 4e-6 of
 # the largest value.
 TOLERANCE = 1e-5
-
-
-def npy(array):
-    out = io.BytesIO()
-    np.save(out, array)
-    return out.getvalue()
 
 
 class Answers(unittest.TestCase):

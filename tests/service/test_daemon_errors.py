@@ -1,7 +1,6 @@
 """Every line of the contract's list of errors, over a real socket; the next request on the same connection works."""
 
 import functools
-import io
 import json
 import pathlib
 import tempfile
@@ -9,17 +8,11 @@ import unittest
 
 import numpy as np
 
-from daemon import Daemon
+from daemon import Daemon, npy
 from make_store import Scene
 
 N = 60
 MAX_BODY = 100_000
-
-
-def npy(array, version=None):
-    out = io.BytesIO()
-    np.lib.format.write_array(out, array, version)
-    return out.getvalue()
 
 
 def header(text, data=b"", version=1, length=None):

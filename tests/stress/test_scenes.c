@@ -29,12 +29,6 @@ static form_factors make(const mesh *m, const recipe *r) {
     return f;
 }
 
-static double entry(const csr *F, size_t i, size_t j) {
-    for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++)
-        if (F->indices[p] == j) return (double)F->data[p];
-    return 0;
-}
-
 /* F_ii = 0, 0 <= F <= 1, reciprocity to 1e-6, rows sum to at most 1. A row of single precision numbers sums
  * to within 6e-8 of itself. */
 static void check_invariants(const mesh *m, const form_factors *f) {
@@ -44,7 +38,7 @@ static void check_invariants(const mesh *m, const form_factors *f) {
         for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++) {
             const double here = (double)F->data[p];
             const size_t j = F->indices[p];
-            const double there = m->area[j] * entry(F, j, i) / m->area[i];
+            const double there = m->area[j] * csr_entry(F, j, i) / m->area[i];
             ck_assert_uint_ne(i, j);
             ck_assert(here > 0 && here <= 1);
             ck_assert_double_eq_tol(here, there, 1e-6 * here);
@@ -117,7 +111,7 @@ START_TEST(slivers_hold) {
     const box_cell ceiling = {.axis = 2, .level = 1, .from = {0, 0, 1}, .to = {1, 1, 1}},
                    strip = {.axis = 2, .level = 0, .from = {.01, 0, 0}, .to = {.3, 1, 0}};
     const double exact = box_exchange(&strip, &ceiling) / .29;
-    ck_assert_double_eq_tol(entry(&f.F, 8, 4), exact, 1e-4 * exact);
+    ck_assert_double_eq_tol(csr_entry(&f.F, 8, 4), exact, 1e-4 * exact);
     form_factors_free(&f);
     mesh_free(&m);
 }
@@ -201,7 +195,7 @@ START_TEST(enclosed_element_sees_only_its_box) {
     for (size_t r = 0; r < N_RECIPES; r++) {
         form_factors f = make(&m, &recipes[r]);
         for (size_t i = 12; i < m.n; i++)
-            for (size_t j = 0; j < 12; j++) ck_assert_double_eq(entry(&f.F, i, j), 0);
+            for (size_t j = 0; j < 12; j++) ck_assert_double_eq(csr_entry(&f.F, i, j), 0);
         form_factors_free(&f);
     }
     mesh_free(&m);
@@ -224,8 +218,8 @@ START_TEST(occluder_raises_nothing_beyond_the_repair) {
             for (size_t j = 0; j < without.n; j++)
                 /* A row is scaled by about what its sum was repaired by, at either end. */
                 ck_assert_double_le(
-                    entry(&after.F, i, j),
-                    entry(&before.F, i, j) * (1 + 4 * (after.repair_max + before.repair_max)) + 1e-6);
+                    csr_entry(&after.F, i, j),
+                    csr_entry(&before.F, i, j) * (1 + 4 * (after.repair_max + before.repair_max)) + 1e-6);
         form_factors_free(&before);
         form_factors_free(&after);
     }
@@ -245,8 +239,8 @@ START_TEST(factors_have_no_scale) {
         for (size_t i = 0; i < m.n; i++)
             for (size_t j = 0; j < m.n; j++)
                 /* The same segments: but for rounding at edges, within several times the standard error. */
-                ck_assert_double_eq_tol(entry(&f.F, i, j), entry(&same.F, i, j),
-                                        5 * recipes[2].accuracy * fmax(1, 10 * entry(&same.F, i, j)));
+                ck_assert_double_eq_tol(csr_entry(&f.F, i, j), csr_entry(&same.F, i, j),
+                                        5 * recipes[2].accuracy * fmax(1, 10 * csr_entry(&same.F, i, j)));
         form_factors_free(&f);
         mesh_free(&m);
     }

@@ -122,3 +122,9 @@ csr box_form_factors(const double size[3], unsigned divisions, const double *are
     }
     return F;
 }
+
+double csr_entry(const csr *F, size_t i, size_t j) {
+    for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++)
+        if (F->indices[p] == j) return (double)F->data[p];
+    return 0;
+}

@@ -34,6 +34,9 @@ mesh box_mesh(const double size[3], unsigned divisions, float reflectance);
 /* The exchange area A1 F12 of two cells of the inside of a box. */
 double box_exchange(const box_cell *one, const box_cell *two);
 
+/* F_ij, 0 where none is stored. */
+double csr_entry(const csr *F, size_t i, size_t j);
+
 /* F of a box without anything in it, as rows; only single precision is between it and the closed forms. */
 csr box_form_factors(const double size[3], unsigned divisions, const double *area);
 

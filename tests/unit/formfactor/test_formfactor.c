@@ -20,12 +20,6 @@ static form_factors trace(const mesh *m, size_t rays, uint64_t seed) {
     return f;
 }
 
-static double entry(const csr *F, size_t i, size_t j) {
-    for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++)
-        if (F->indices[p] == j) return (double)F->data[p];
-    return 0;
-}
-
 /* The invariants: F_ii = 0, 0 <= F <= 1, reciprocity to 1e-6, row sums at most 1. */
 static void check_invariants(const mesh *m, const form_factors *f) {
     ck_assert_double_le(f->reciprocity_error, 1e-6);
@@ -33,7 +27,7 @@ static void check_invariants(const mesh *m, const form_factors *f) {
         double sum = 0;
         for (uint64_t p = f->F.indptr[i]; p < f->F.indptr[i + 1]; p++) {
             const size_t j = f->F.indices[p];
-            const double one = (double)f->F.data[p], other = entry(&f->F, j, i);
+            const double one = (double)f->F.data[p], other = csr_entry(&f->F, j, i);
             ck_assert_uint_ne(i, j);
             ck_assert(one >= 0 && one <= 1);
             ck_assert_double_le(fabs(m->area[i] * one - m->area[j] * other), 1e-6 * m->area[i] * one);
@@ -56,9 +50,9 @@ START_TEST(room_closed_forms) {
     check_invariants(&m, &f);
     ck_assert(f.closed);
     for (size_t i = 0; i < 6; i++) ck_assert_double_eq_tol(f.row_sums[i], 1, 1e-6);
-    ck_assert_double_eq_tol(entry(&f.F, 4, 5), .488700936440, spread(.4887, RAYS));
-    ck_assert_double_eq_tol(entry(&f.F, 4, 2), .162387354927, spread(.1624, RAYS));
-    ck_assert_double_eq_tol(entry(&f.F, 4, 0), .093262176853, spread(.0933, RAYS));
+    ck_assert_double_eq_tol(csr_entry(&f.F, 4, 5), .488700936440, spread(.4887, RAYS));
+    ck_assert_double_eq_tol(csr_entry(&f.F, 4, 2), .162387354927, spread(.1624, RAYS));
+    ck_assert_double_eq_tol(csr_entry(&f.F, 4, 0), .093262176853, spread(.0933, RAYS));
     form_factors_free(&f);
     mesh_free(&m);
 }
@@ -74,10 +68,10 @@ START_TEST(box_against_analytic) {
     for (size_t i = 0; i < m.n; i++) {
         ck_assert_double_eq_tol(f.row_sums[i], 1, 1e-6);
         for (size_t j = 0; j < m.n; j++) {
-            const double difference = entry(&f.F, i, j) - entry(&exact, i, j);
+            const double difference = csr_entry(&f.F, i, j) - csr_entry(&exact, i, j);
             square += difference * difference;
             /* Six deviations, because 22,500 pairs are compared. */
-            ck_assert_double_le(fabs(difference), 1.5 * spread(entry(&exact, i, j), RAYS) + 1e-6);
+            ck_assert_double_le(fabs(difference), 1.5 * spread(csr_entry(&exact, i, j), RAYS) + 1e-6);
         }
     }
     /* House: the 2-norm of merged noise is sqrt(2 / rays); the Frobenius norm is sqrt(n / (2 rays)) for
@@ -96,14 +90,14 @@ START_TEST(occluded_plates) {
         form_factors f = trace(&m, RAYS, 1);
         check_invariants(&m, &f);
         ck_assert(!f.closed);
-        ck_assert_double_eq_tol(entry(&f.F, 0, 1), plates_cases[c].F, spread(plates_cases[c].F, RAYS));
+        ck_assert_double_eq_tol(csr_entry(&f.F, 0, 1), plates_cases[c].F, spread(plates_cases[c].F, RAYS));
         form_factors_free(&f);
         mesh_free(&m);
     }
     mesh m = plates(plates_hidden);
     plates_move(&m, plates_places[_i][0], plates_places[_i][1]);
     form_factors f = trace(&m, 4 * RAYS, 1);
-    ck_assert_double_eq(entry(&f.F, 0, 1), 0); /* exactly: edges must not leak */
+    ck_assert_double_eq(csr_entry(&f.F, 0, 1), 0); /* exactly: edges must not leak */
     form_factors_free(&f);
     mesh_free(&m);
 }
@@ -122,8 +116,8 @@ START_TEST(l_room_corner_hides) {
     mesh_finish(&m, .5f);
     ck_assert(m.normal[0][0] < 0); /* wall x = 3 looks into the room */
     form_factors f = trace(&m, 4 * RAYS, 1);
-    ck_assert_double_eq(entry(&f.F, 0, 3), 0);
-    ck_assert_double_eq(entry(&f.F, 3, 0), 0);
+    ck_assert_double_eq(csr_entry(&f.F, 0, 3), 0);
+    ck_assert_double_eq(csr_entry(&f.F, 3, 0), 0);
     form_factors_free(&f);
     mesh_free(&m);
 }
@@ -175,7 +169,7 @@ START_TEST(back_faces_absorb) {
     check_invariants(&m, &f);
     ck_assert_double_eq_tol(f.absorbed[4], .199824895698, spread(.2, RAYS));
     ck_assert_double_eq_tol(f.leaving[5], 1, 1e-12);
-    ck_assert_double_eq(entry(&f.F, 4, 5), 0);
+    ck_assert_double_eq(csr_entry(&f.F, 4, 5), 0);
     ck_assert_double_eq_tol(f.row_sums[4] + f.absorbed[4] + f.leaving[4], 1, 1e-6);
     double most = 0;
     for (size_t i = 0; i < m.n; i++) most = fmax(most, fabs(f.repair[i]));
@@ -201,8 +195,8 @@ START_TEST(two_sided_sheet) {
     ck_assert_double_eq_tol(f.absorbed_share, 0, 1e-12);
     ck_assert_double_eq_tol(f.leaving[0], 1, 1e-12);
     /* Unit squares at distance 1/2: C-11 (2, 2). */
-    ck_assert_double_eq_tol(entry(&f.F, 1, 2), .415253283577, spread(.415, RAYS));
-    ck_assert_double_eq(entry(&f.F, 1, 0), 0);
+    ck_assert_double_eq_tol(csr_entry(&f.F, 1, 2), .415253283577, spread(.415, RAYS));
+    ck_assert_double_eq(csr_entry(&f.F, 1, 0), 0);
     form_factors_free(&f);
     mesh_free(&m);
 }
@@ -220,7 +214,7 @@ START_TEST(bent_quad_does_not_see_itself) {
         form_factors f = trace(&m, RAYS, 1);
         check_invariants(&m, &f);
         for (size_t i = 0; i < 2; i++) ck_assert_double_eq(f.absorbed[i], 0);
-        ck_assert_double_eq_tol(entry(&f.F, 0, 1), .199824895698, spread(.2, RAYS));
+        ck_assert_double_eq_tol(csr_entry(&f.F, 0, 1), .199824895698, spread(.2, RAYS));
         form_factors_free(&f);
         mesh_free(&m);
     }
@@ -237,8 +231,8 @@ START_TEST(uneven_areas) {
     form_factors f = trace(&m, RAYS, 1);
     check_invariants(&m, &f);
     /* Seen from the small one: the point form factor under the centre. */
-    ck_assert_double_eq_tol(entry(&f.F, 1, 0), .239456470461, spread(.24, RAYS));
-    ck_assert_double_eq_tol(entry(&f.F, 0, 1), .239456470461 * 1e-8, 1e-8 * spread(.24, RAYS));
+    ck_assert_double_eq_tol(csr_entry(&f.F, 1, 0), .239456470461, spread(.24, RAYS));
+    ck_assert_double_eq_tol(csr_entry(&f.F, 0, 1), .239456470461 * 1e-8, 1e-8 * spread(.24, RAYS));
     form_factors_free(&f);
     mesh_free(&m);
 }
@@ -257,7 +251,8 @@ START_TEST(mean_halves_the_variance) {
     const csr *F[3] = {&a.F, &b.F, &mean.F};
     for (int k = 0; k < 3; k++)
         for (size_t i = 0; i < m.n; i++)
-            for (size_t j = 0; j < m.n; j++) square[k] += pow(entry(F[k], i, j) - entry(&exact, i, j), 2);
+            for (size_t j = 0; j < m.n; j++)
+                square[k] += pow(csr_entry(F[k], i, j) - csr_entry(&exact, i, j), 2);
     /* 9,216 independent errors: the ratio of 1/2 is known to a few per cent. */
     ck_assert_double_le(square[2], .6 * .5 * (square[0] + square[1]));
     csr_free(&exact);

@@ -11,12 +11,6 @@
 static const size_t resolutions[] = {32, 128, 512};
 enum { N_RESOLUTIONS = sizeof resolutions / sizeof *resolutions };
 
-static double entry(const csr *F, size_t i, size_t j) {
-    for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++)
-        if (F->indices[p] == j) return (double)F->data[p];
-    return 0;
-}
-
 static hemicube cube(size_t resolution) {
     hemicube h = {0};
     lam_error error = {0};
@@ -115,7 +109,7 @@ static double seen_by_tiny(size_t view, bool triangle, double turn, size_t resol
     mesh_add_cell(&m, &views[view].plate, views[view].positive);
     mesh_finish(&m, .5f);
     csr rows = trace_rows(&m, resolution, leaving, absorbed);
-    const double F = entry(&rows, 0, 1);
+    const double F = csr_entry(&rows, 0, 1);
     ck_assert_double_eq(absorbed[0], 0);
     ck_assert_double_eq_tol(leaving[0] + F, 1, 1e-7); /* F is rounded to single precision */
     csr_free(&rows);
@@ -164,8 +158,8 @@ START_TEST(backs_have_hemicubes_of_their_own) {
     ck_assert_msg(mesh_make_two_sided(&m, &error) == LAM_OK, "%s", error.message);
     csr rows = trace_rows(&m, 64, leaving, absorbed);
     ck_assert_double_eq_tol(leaving[0], 1, 1e-12);
-    ck_assert_double_eq_tol(entry(&rows, 2, 1), views[0].F, 1e-7);
-    ck_assert_double_eq(entry(&rows, 2, 3), 0);
+    ck_assert_double_eq_tol(csr_entry(&rows, 2, 1), views[0].F, 1e-7);
+    ck_assert_double_eq(csr_entry(&rows, 2, 3), 0);
     csr_free(&rows);
     mesh_free(&m);
 }
@@ -190,11 +184,11 @@ START_TEST(hidden_plate_is_exactly_hidden) {
     plates_move(&hidden, plates_places[_i][0], plates_places[_i][1]);
     form_factors one = make(&open, 128, false), other = make(&hidden, 128, false);
     /* Both centroids see the same; single precision and the repair to 1e-7 are between. */
-    ck_assert_double_eq_tol(entry(&one.F, 0, 1), views[0].F, 1e-6);
+    ck_assert_double_eq_tol(csr_entry(&one.F, 0, 1), views[0].F, 1e-6);
     ck_assert(!one.closed);
-    ck_assert_double_eq(entry(&other.F, 0, 1), 0);
-    ck_assert_double_eq(entry(&other.F, 1, 0), 0);
-    ck_assert_double_gt(entry(&other.F, 0, 3), 0);
+    ck_assert_double_eq(csr_entry(&other.F, 0, 1), 0);
+    ck_assert_double_eq(csr_entry(&other.F, 1, 0), 0);
+    ck_assert_double_gt(csr_entry(&other.F, 0, 3), 0);
     form_factors_free(&one);
     form_factors_free(&other);
     mesh_free(&open);
@@ -216,7 +210,7 @@ START_TEST(closed_box_keeps_the_invariants) {
         ck_assert_double_eq(f.leaving[i] + f.absorbed[i], 0);
         for (uint64_t p = f.F.indptr[i]; p < f.F.indptr[i + 1]; p++) {
             const size_t j = f.F.indices[p];
-            const double F = (double)f.F.data[p], back = entry(&f.F, j, i);
+            const double F = (double)f.F.data[p], back = csr_entry(&f.F, j, i);
             ck_assert_uint_ne(i, j);
             ck_assert(F > 0 && F <= 1);
             ck_assert_double_le(fabs(m.area[i] * F - m.area[j] * back), 1e-6 * m.area[i] * F);

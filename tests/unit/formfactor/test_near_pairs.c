@@ -36,12 +36,6 @@ static form_factors make(const mesh *m, const recipe *r) {
     return f;
 }
 
-static double entry(const csr *F, size_t i, size_t j) {
-    for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++)
-        if (F->indices[p] == j) return (double)F->data[p];
-    return 0;
-}
-
 START_TEST(near_pairs_are_exact_and_nothing_is_counted_twice) {
     mesh m = room();
     const recipe all = {.method = RECIPE_PAIRS, .rays = 256, .accuracy = 1e-5, .seed = 9},
@@ -52,9 +46,9 @@ START_TEST(near_pairs_are_exact_and_nothing_is_counted_twice) {
     size_t n_near = 0;
     for (size_t i = 0; i < m.n; i++)
         for (size_t j = 0; j < m.n; j++) {
-            const double F = entry(&exact.F, i, j), one = entry(&joined.F, i, j);
+            const double F = csr_entry(&exact.F, i, j), one = csr_entry(&joined.F, i, j);
             of_joined += (one - F) * (one - F);
-            of_counted += pow(entry(&counted.F, i, j) - F, 2);
+            of_counted += pow(csr_entry(&counted.F, i, j) - F, 2);
             /* Well above the threshold, whatever is hidden. */
             if (2 * F * m.area[i] / (m.area[i] + m.area[j]) < 2 * recipe_near(&near)) continue;
             n_near++;
@@ -105,7 +99,7 @@ START_TEST(near_pairs_are_those_above_the_threshold) {
             const double g = pair_factor_exchange(&rules, &polygons[i], &polygons[j], 1e-6);
             const double mean = 2 * g / (m.area[i] + m.area[j]);
             const bool there = p < G.indptr[i + 1] && G.indices[p] == j;
-            const double seen = m.area[i] * entry(&exact.F, i, j), smaller = fmin(m.area[i], m.area[j]);
+            const double seen = m.area[i] * csr_entry(&exact.F, i, j), smaller = fmin(m.area[i], m.area[j]);
             if (there && seen > .01 * g && seen < .99 * g) {
                 off += pow(((double)G.data[p] - seen) / smaller, 2);
                 n_partly++;
@@ -150,7 +144,7 @@ START_TEST(the_mean_is_right) {
     double off = 0, expected = 0;
     for (size_t i = 0; i < m.n; i++)
         for (size_t j = 0; j < m.n; j++) {
-            const double F = entry(&exact.F, i, j);
+            const double F = csr_entry(&exact.F, i, j);
             off += pow(mean[i * m.n + j] - F, 2);
             expected += F / (2 * RAYS * SEEDS);
         }
@@ -186,8 +180,8 @@ START_TEST(pairs_see_what_rays_see) {
         /* Half a ray in sqrt(rays), five times; low-discrepancy rays do better. */
         ck_assert_double_eq_tol(one.row_sums[i], other.row_sums[i], 5 * .5 / sqrt(MANY));
         for (size_t j = 0; j < m.n; j++) {
-            const double F = entry(&one.F, i, j);
-            off += pow(entry(&other.F, i, j) - F, 2);
+            const double F = csr_entry(&one.F, i, j);
+            off += pow(csr_entry(&other.F, i, j) - F, 2);
             all += F / (2 * MANY);
         }
     }

@@ -459,30 +459,6 @@ START_TEST(an_unsealed_file_is_refused) {
 }
 END_TEST
 
-START_TEST(descriptors_are_closed_on_exec) {
-    store *s = NULL, *reader = NULL;
-    char other[160];
-    snprintf(other, sizeof other, "%s/other.h5", folder);
-    ck_ok(sample_write(path, 1, &error));
-    ck_ok(store_open(path, &reader, &error));
-    ck_ok(store_create(other, &s, &error));
-    int files = 0;
-    for (int fd = 3; fd < 1024; fd++) {
-        char link[64], name[256];
-        snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
-        ssize_t length = readlink(link, name, sizeof name - 1);
-        if (length < 0) continue;
-        name[length] = '\0';
-        if (strncmp(name, folder, strlen(folder)) != 0) continue;
-        ck_assert_int_ne(fcntl(fd, F_GETFD) & FD_CLOEXEC, 0);
-        files++;
-    }
-    ck_assert_int_eq(files, 2);
-    store_close(reader);
-    store_close(s);
-}
-END_TEST
-
 int main(void) {
     Suite *suite = suite_create("store");
     TCase *tests = tcase_create("store");
@@ -506,7 +482,6 @@ int main(void) {
     tcase_add_test(tests, targets_that_cannot_be);
     tcase_add_test(tests, what_is_no_store_is_refused);
     tcase_add_test(tests, an_unsealed_file_is_refused);
-    tcase_add_test(tests, descriptors_are_closed_on_exec);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }

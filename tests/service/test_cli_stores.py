@@ -1,0 +1,192 @@
+"""Black box: stores that `lambert precompute` makes, and what `info` and `verify` say of them."""
+
+import json
+import shutil
+import unittest
+
+import h5py
+import numpy
+
+from case import Case
+from command import lambert, must
+
+
+class Stores(Case):
+    def test_info_as_json(self):
+        about = json.loads(must("info", self.store, "--json").stdout)
+        self.assertEqual((about["name"], about["elements"], about["channels"], about["kind"], about["method"]),
+                         ("box", 96, 1, "exact", "exact"))
+        self.assertIsInstance(about["reason"], str)
+        self.assertEqual(about["density"], 1)
+        self.assertIn("epsilon", about)
+        with h5py.File(self.store) as file:
+            self.assertEqual(about["bytes"], sum(d.nbytes for d in file["operator"].values()))
+            self.assertEqual(about["provenance"]["geometry_hash"], file["mesh"].attrs["geometry_hash"].decode()
+                             if isinstance(file["mesh"].attrs["geometry_hash"], bytes)
+                             else file["mesh"].attrs["geometry_hash"])
+            self.assertEqual(about["error"]["single"]["total_indirect_mean"],
+                             file["error/single"].attrs["total_indirect_mean"])
+        self.assertEqual(sum(group["elements"] for group in about["groups"]), 96)
+        self.assertEqual((about["emitters"], about["sky"]), (None, None))
+        self.assertEqual(about["error"]["single"]["probes"], 8)
+        provenance = about["provenance"]
+        self.assertRegex(provenance["tool"], r"^lambert \d")
+        self.assertEqual((provenance["seed"], provenance["unit"]), (1, 1))
+        self.assertTrue(provenance["command"].startswith("lambert precompute "))
+        self.assertEqual(provenance["form_factors"]["rays"], 256)
+        text = must("info", self.store).stdout
+        for word in ("box", "exact", "floor, 16 elements", "single", "lambert precompute"):
+            self.assertIn(word, text)
+
+    def test_log_and_quiet(self):
+        done = must("precompute", self.box, "-o", self.path("a.h5"), "--method", "exact", "--alpha", ".3",
+                    "--coherence", ".5", "--rays", 64, "--probes", 0)
+        self.assertIn("exact does not use --alpha, --coherence", done.stderr)
+        for stage in ("import", "mesh", "form factors", "invert", "store"):
+            self.assertRegex(done.stderr, r"(?m)^" + stage + r" +[\d.]+ s$")
+        self.assertEqual(done.stdout, "")
+        done = must("precompute", self.box, "-o", self.path("a.h5"), "--rays", 64, "--probes", 0, "--quiet")
+        self.assertEqual(done.stderr, "")
+        about = json.loads(must("info", self.path("a.h5"), "--json").stdout)
+        self.assertEqual(about["error"], {})
+        done = must("precompute", self.box, "-o", self.path("a.h5"), "--rays", 64, "--probes", 0, "--method",
+                    "low-rank", "--epsilon", ".1")
+        self.assertIn("below the sampling noise", done.stderr)
+
+    def test_from_a_store_with_form_factors(self):
+        for method in ("exact", "low-rank"):
+            direct, again = self.path(method + ".h5"), self.path(method + "-again.h5")
+            common = ("--method", method, "--rays", 256, "--epsilon", ".2", "--probes", 6)
+            must("precompute", self.box, "-o", direct, *common)
+            must("precompute", self.store, "-o", again, *common)
+            with h5py.File(direct) as one, h5py.File(again) as two:
+                self.assertEqual(sorted(one["operator"]), sorted(two["operator"]))
+                for name in one["operator"]:
+                    numpy.testing.assert_array_equal(one["operator"][name][:], two["operator"][name][:])
+                self.assertEqual(one.attrs["name"], two.attrs["name"])
+        self.refused(2, "--subdivide", "precompute", self.store, "--subdivide", 1, "-o", self.path("b.h5"))
+        self.failed("holds no /form_factors", "precompute", self.path("exact.h5"), "-o", self.path("b.h5"))
+
+    def test_pairs(self):
+        kept, bare, again = self.path("kept.h5"), self.path("bare.h5"), self.path("again.h5")
+        common = ("--quality", "high", "--method", "exact", "--probes", 8)
+        done = must("precompute", self.box, "-o", kept, *common, "--keep-form-factors")
+        self.assertIn("pair by pair to 7e-06: 0.00 % leave the scene (closed)", done.stderr)
+        must("precompute", self.box, "-o", bare, *common)
+        must("precompute", kept, "-o", again, *common)
+        with h5py.File(kept) as file:
+            attributes = dict(file["form_factors"].attrs)
+            self.assertEqual((attributes["method"], attributes["rays"]), (b"pairs", 256))
+            self.assertEqual(file["operator"].attrs["accuracy"], attributes["accuracy"])
+            numpy.testing.assert_allclose(file["mesh/row_sums"][:], 1, atol=1e-6)
+            # An empty box: nothing is hidden, so nothing is sampled.
+            self.assertLess(attributes["repair_max"], 1e-5)
+            self.assertLess(file["error/single"].attrs["total_indirect_max"], 1e-4)
+        for store in (kept, bare, again):
+            must("verify", store, "--probes", 4)
+        self.assertRegex(must("info", kept).stdout, r"(?m)^form factors +pairs$")
+        # Rays asked for by number are rays.
+        done = must("precompute", self.box, "-o", bare, *common, "--rays", 64)
+        self.assertIn("64 rays per element", done.stderr)
+        done = lambert("precompute", self.box, "-o", bare, *common, "--memory", "100K")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("with near-pairs need about", done.stderr)
+
+    def test_hemicube(self):
+        kept, bare, again = self.path("kept.h5"), self.path("bare.h5"), self.path("again.h5")
+        common = ("--form-factors", "hemicube", "--resolution", 48, "--method", "low-rank", "--epsilon", ".02",
+                  "--probes", 8)
+        done = must("precompute", self.box, "-o", kept, *common, "--rays", 64, "--quality", "high",
+                    "--keep-form-factors")
+        self.assertIn("hemicubes of 48 pixels: 0.00 % leave the scene (closed)", done.stderr)
+        self.assertIn("hemicube does not use --rays, --quality", done.stderr)
+        self.assertNotIn("noise of 0 rays", done.stderr)
+        self.assertNotIn("below the sampling noise", done.stderr)
+        with h5py.File(kept) as file:
+            attributes = dict(file["form_factors"].attrs)
+            self.assertEqual((attributes["method"], attributes["resolution"], attributes["rays"]),
+                             (b"hemicube", 48, 0))
+            self.assertLess(attributes["reciprocity_error"], 1e-6)
+            numpy.testing.assert_allclose(file["mesh/row_sums"][:], 1, atol=1e-6)
+            self.assertEqual(file["operator"].attrs["resolution"], 48)
+            # Judged by rays: a hemicube that judged itself would find no difference and no noise.
+            single = file["error/single"].attrs
+            self.assertGreater(single["total_indirect_mean"], 1.5 * single["operator_indirect_mean"])
+            self.assertGreater(single["reference_noise"], 1e-3)
+        self.assertRegex(must("info", kept).stdout, r"(?m)^form factors +hemicube\nresolution +48$")
+        about = json.loads(must("info", kept, "--json").stdout)["provenance"]["form_factors"]
+        self.assertEqual((about["method"], about["resolution"]), ("hemicube", 48))
+
+        # Kept or not, a later run and verify know what the operator was built from.
+        must("precompute", self.box, "-o", bare, *common)
+        done = must("precompute", kept, "-o", again, *common, "--keep-form-factors")
+        self.assertIn("does not use --form-factors, --resolution", done.stderr)
+        for store in (bare, again):
+            with h5py.File(kept) as one, h5py.File(store) as two:
+                for name in one["operator"]:
+                    numpy.testing.assert_array_equal(one["operator"][name][:], two["operator"][name][:])
+                self.assertEqual(two["operator"].attrs["resolution"], 48)
+            must("verify", store, self.box, "--probes", 6)
+        with h5py.File(again) as file:
+            self.assertEqual((file["form_factors"].attrs["method"], file["form_factors"].attrs["resolution"]),
+                             (b"hemicube", 48))
+
+        done = must("precompute", self.box, "-o", again, "--resolution", 32, "--rays", 64, "--probes", 0)
+        self.assertIn("rays does not use --resolution", done.stderr)
+
+    def test_judged_by_another_sample_whatever_the_seeds(self):
+        # With the F of seed s kept, another seed must not make the judge draw s again: then total = operator.
+        about = {}
+        for seed in (1, 2, 3):
+            must("precompute", self.store, "-o", self.path("a.h5"), "--method", "exact", "--seed", seed,
+                 "--probes", 4, "--quiet")
+            about[seed] = json.loads(must("info", self.path("a.h5"), "--json").stdout)["error"]["single"]
+            self.assertLess(about[seed]["operator_indirect_mean"], 1e-5)
+            self.assertGreater(about[seed]["total_indirect_mean"], 1e-3)
+
+    def test_threads_do_not_change_the_store(self):
+        for threads in (1, 2):
+            must("precompute", self.box, "-o", self.path(f"{threads}.h5"), "--method", "exact", "--rays", 256,
+                 "--probes", 0, "--threads", threads, "--keep-form-factors")
+        with h5py.File(self.path("1.h5")) as one, h5py.File(self.path("2.h5")) as two:
+            for name in ("indptr", "indices", "data"):
+                numpy.testing.assert_array_equal(one["form_factors"][name][:], two["form_factors"][name][:])
+
+    def test_verify(self):
+        done = must("verify", self.store, self.box, "--probes", 6)
+        self.assertEqual([line.split()[0] for line in done.stdout.splitlines()], ["ok"] * 3 + ["skipped"] + ["ok"] * 5)  # no sky
+        answer = json.loads(must("verify", self.store, "--probes", 0, "--json").stdout)
+        self.assertTrue(answer["ok"])
+        self.assertEqual({check["name"]: check["result"] for check in answer["checks"]}["scene"], "skipped")
+
+    def test_verify_finds_a_flipped_byte(self):
+        with h5py.File(self.store) as file:
+            places = {name: file[name].id.get_offset() for name in ("operator/M", "mesh/area", "form_factors/data")}
+        for name, place in places.items():
+            with self.subTest(name):
+                broken = self.path("broken.h5")
+                shutil.copy(self.store, broken)
+                with open(broken, "r+b") as file:
+                    file.seek(place + 17)
+                    byte = file.read(1)[0]
+                    file.seek(place + 17)
+                    file.write(bytes([byte ^ 4]))
+                done = lambert("verify", broken, "--probes", 0)
+                self.assertEqual(done.returncode, 1)
+                self.assertRegex(done.stdout, r"(?m)^BROKEN +checksums.*" + name)
+                self.assertIn("broken", done.stderr)
+
+    def test_verify_finds_another_scene(self):
+        other = self.path("box.obj")
+        must("generate", "box", "--divisions", 4, "--reflectance", .5, "--size", "1,1,2", "-o", other)
+        done = lambert("verify", self.store, other, "--probes", 0)
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stdout, r"(?m)^BROKEN +scene +stale: .*geometry")
+        must("generate", "box", "--divisions", 4, "--reflectance", .6, "-o", other)
+        done = lambert("verify", self.store, other, "--probes", 0)
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stdout, r"(?m)^BROKEN +scene +stale: group .*material")
+
+
+if __name__ == "__main__":
+    unittest.main()
