@@ -8,7 +8,7 @@ double point_distance(const double a[3], const double b[3]) {
     return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
 }
 
-/* Whether a comes before b; any order does, as long as it is one. */
+/* A total order of points. */
 static int comes_first(const double a[3], const double b[3]) {
     for (int c = 0; c < 3; c++)
         if (a[c] != b[c]) return a[c] < b[c];
@@ -28,7 +28,7 @@ void edge_point(const double a[3], const double b[3], size_t k, size_t m, double
 
 void grid_point(const double quad[4][3], size_t i, size_t na, size_t j, size_t nb, double out[3]) {
     double low[3], high[3];
-    /* On the quad's border this is an edge_point of its corners, which the neighbour finds too. */
+    /* On the quad's border this is the edge_point that the neighbour computes. */
     if (i == 0 || i == na) {
         edge_point(quad[i == 0 ? 0 : 1], quad[i == 0 ? 3 : 2], j, nb, out);
         return;

@@ -1,4 +1,5 @@
-/* Points of regular divisions, with the same bits whichever face an edge is seen from. Private. */
+/* Points of regular divisions of faces. The points of an edge have the same bits in both faces that share it.
+ * Private to solver/scene. */
 #ifndef LAMBERT_SCENE_FACE_GRID_H
 #define LAMBERT_SCENE_FACE_GRID_H
 

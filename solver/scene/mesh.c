@@ -44,7 +44,7 @@ lam_status mesh_measure(mesh *m, lam_error *error) {
                 FAIL(error, LAM_ERR_ARGUMENT, "element %zu: vertex index %u, there are %zu vertices", i, e[k],
                      m->n_vertices);
         const double(*v)[3] = (const double(*)[3])m->vertices;
-        double twice[3]; /* a planar polygon's doubled area vector: the cross product of its diagonals */
+        double twice[3]; /* twice the area vector of a planar quad: the cross product of its diagonals */
         if (corners == 3)
             cross_of_differences(v[e[0]], v[e[1]], v[e[0]], v[e[2]], twice);
         else

@@ -32,7 +32,7 @@ typedef struct mesh {
     char source_hash[33]; /* of the faces as imported, before any subdivision: hex */
 } mesh;
 
-/* 3 or 4, of an element or of anything else that names its vertices in this way. */
+/* The number of corners, 3 or 4, of an element or of any other list of vertices with this layout. */
 static inline size_t corner_count(const uint32_t vertices[4]) {
     return vertices[3] == MESH_NO_VERTEX ? 3 : 4;
 }
@@ -48,17 +48,17 @@ void mesh_free(mesh *m);
  * Errors: LAM_ERR_ARGUMENT for a zero area or an index out of range, naming the element. */
 lam_status mesh_measure(mesh *m, lam_error *error);
 
-/* How a mesh is refined; at most one of the three is set, 0 means not set. */
+/* The refinement of a mesh; at most one of the three is set, 0 means not set. */
 typedef struct mesh_refinement {
-    unsigned subdivide_levels; /* each element into 4, this often */
+    unsigned subdivide_levels; /* the number of times that each element is split into 4 */
     double max_edge;           /* metres */
-    size_t elements;           /* as close to this as equal-area splitting gives */
+    size_t elements;           /* the number of elements, as closely as near-equal areas allow */
 } mesh_refinement;
 
 /* Refines in place; children of an element are consecutive and inherit its group and materials. */
 lam_status mesh_refine(mesh *m, const mesh_refinement *how, lam_error *error);
 
-/* Makes every element two: all fronts, then all backs (contract, `--two-sided`). */
+/* Doubles every element: all fronts in mesh order, then all backs (`--two-sided`). */
 lam_status mesh_make_two_sided(mesh *m, lam_error *error);
 
 /* 3-D Morton order of the element centroids (thesis 2.3): order[position] = element. order is [n]. */
@@ -67,13 +67,13 @@ lam_status mesh_z_order(const mesh *m, uint32_t *order, lam_error *error);
 /* Hash of vertices, elements and sidedness: 32 hex digits and a NUL. */
 void mesh_geometry_hash(const mesh *m, char hash[33]);
 
-/* Centre of the bounding box and half its diagonal: what single precision is recentred by. */
+/* The centre of the bounding box and half its diagonal. */
 void mesh_bounds(const mesh *m, double centre[3], double *radius);
 
 /* The centroid of an element. */
 void mesh_centroid(const mesh *m, size_t element, double centroid[3]);
 
-/* /mesh of a store, as the contract says; loading checks every index and value before use. */
+/* /mesh of a store (store/FORMAT.md); loading checks every index and value. */
 lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error *error);
 lam_status mesh_load(store *s, mesh *m, double **row_sums, lam_error *error);
 

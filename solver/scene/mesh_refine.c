@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* How one face is cut: a quad into a x b cells (a along its first edge), a triangle into a^2. */
+/* The division of one face: a quad into a x b cells (a along its first edge), a triangle into a^2. */
 typedef struct face_cut {
     uint32_t a, b;
 } face_cut;
@@ -27,9 +27,7 @@ static size_t cut_pieces(const mesh *m, size_t i, face_cut cut) {
     return mesh_corners(m, i) == 3 ? (size_t)cut.a * cut.a : (size_t)cut.a * cut.b;
 }
 
-/* --- how to cut ---------------------------------------------------------------------------------------- */
-
-/* More than this along an edge is a mistake in a unit, not a wish. */
+/* More steps than this along an edge are taken for a wrong unit. */
 static const double most_steps = 32768;
 
 static lam_status cuts_by_edge(const mesh *m, double max_edge, face_cut *cuts, lam_error *error) {
@@ -45,7 +43,7 @@ static lam_status cuts_by_edge(const mesh *m, double max_edge, face_cut *cuts, l
             if (f.n == 3 || k % 2 == 0) along = fmax(along, length);
             if (f.n == 3 || k % 2 == 1) across = fmax(across, length);
         }
-        /* a hair's width of tolerance: 3 m by .1 m is 30 steps, not 31 */
+        /* with a tolerance for rounding: 3 m by .1 m is 30 steps, not 31 */
         const double a = fmax(ceil(along / max_edge - 1e-9), 1), b = fmax(ceil(across / max_edge - 1e-9), 1);
         if (a > most_steps || b > most_steps)
             FAIL(error, LAM_ERR_ARGUMENT,
@@ -57,14 +55,14 @@ done:
     return status;
 }
 
-/* Near-square cells of about target m^2: of the two whole numbers around the ideal, those whose area is
- * nearest; a triangle's count is a square. */
+/* Near-square cells of about target m^2: of the two integers around the ideal number in each direction, those
+ * whose cell area is nearest; the number of a triangle's cells is a square. */
 static face_cut cut_by_area(const mesh *m, size_t i, double target) {
     const face f = face_of(m, i);
     const double pieces = fmin(fmax(m->area[i] / target, 1), most_steps * most_steps);
     if (f.n == 3) {
         double a = floor(sqrt(pieces));
-        /* ratios, not differences: half as large is as far off as twice as large */
+        /* by ratios: half as large is as far off as twice as large */
         if (pieces / (a * a) > (a + 1) * (a + 1) / pieces) a++;
         return (face_cut){(uint32_t)a, 1};
     }
@@ -132,8 +130,6 @@ static lam_status plan_cuts(const mesh *m, const mesh_refinement *how, face_cut 
 done:
     return status;
 }
-
-/* --- cutting ------------------------------------------------------------------------------------------- */
 
 static lam_status add_quad(point_table *points, const double p[4][3], uint32_t *element, lam_error *error) {
     lam_status status = LAM_OK;

@@ -1,4 +1,4 @@
-/* Triangles, and axes of planes. */
+/* Elementary geometry of planes: turns, distances, axes and triangle areas. */
 #ifndef LAMBERT_SCENE_PLANE_H
 #define LAMBERT_SCENE_PLANE_H
 

@@ -9,9 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Lengths below this share of a polygon's diameter count as none: about what single precision keeps. */
+/* Lengths below this share of a polygon's diameter count as 0: about the rounding of single precision. */
 static const double straightness = 1e-6;
-/* How far, in diameters, a corner may lie off the plane of a planar quad. */
+/* The largest distance, in diameters, of a corner from the plane of a planar quad. */
 static const double flatness = 1e-5;
 
 void polygon_split_scratch_free(polygon_split_scratch *scratch) {
@@ -74,7 +74,7 @@ static void remove_corner(polygon_split_scratch *s, size_t *n, size_t i) {
     memmove(s->quality + i, s->quality + i + 1, (*n - i) * sizeof *s->quality);
 }
 
-/* Drops corners that repeat their neighbour, lie straight between both, or are the tip of a spike. */
+/* Drops corners that repeat a neighbour, lie straight between both, or are the tip of a spike. */
 static void remove_straight(polygon_split_scratch *s, size_t *n, double diameter) {
     for (size_t i = 0, unchanged = 0; *n >= 3 && unchanged < *n;) {
         const size_t before = (i + *n - 1) % *n, after = (i + 1) % *n;
@@ -93,7 +93,8 @@ static void remove_straight(polygon_split_scratch *s, size_t *n, double diameter
     }
 }
 
-/* How good the triangle cut off at corner i is: 4 sqrt(3) area / sum of squared edges; -1 if it is no ear. */
+/* The quality of the triangle at corner i: 4 sqrt(3) area / sum of squared edges; -1 where it is not an ear.
+ */
 static double ear_quality(const polygon_split_scratch *s, size_t n, size_t i) {
     const size_t before = (i + n - 1) % n, after = (i + 1) % n;
     const double *a = s->flat[before], *b = s->flat[i], *c = s->flat[after];
@@ -102,7 +103,7 @@ static double ear_quality(const polygon_split_scratch *s, size_t n, size_t i) {
     for (size_t j = 0; j < n; j++) {
         if (j == before || j == i || j == after) continue;
         const double *p = s->flat[j];
-        /* A corner met twice, where a bridge leads to a hole: each time it has its own part of the angle. */
+        /* A bridge to a hole visits a corner twice, each time with its own part of the angle. */
         if (memcmp(p, a, sizeof *s->flat) == 0 || memcmp(p, b, sizeof *s->flat) == 0 ||
             memcmp(p, c, sizeof *s->flat) == 0)
             continue;
@@ -117,8 +118,8 @@ static void add_piece(polygon_split_scratch *s, uint32_t a, uint32_t b, uint32_t
     memcpy(s->pieces[s->n_pieces++], piece, sizeof piece);
 }
 
-/* Cuts off the best ear until a triangle is left. A polygon that crosses itself may run out of ears: then the
- * corner with the largest area goes, so that it always ends. O(n^2). */
+/* Cuts off the best ear until a triangle is left. Where a polygon that crosses itself has no ear, the corner
+ * with the largest area is cut, so that the loop always ends. O(n^2). */
 static void clip_ears(polygon_split_scratch *s, size_t n, double least_turn) {
     for (size_t i = 0; i < n; i++) s->quality[i] = ear_quality(s, n, i);
     while (n > 3) {

@@ -8,12 +8,12 @@
 /* cos 30 degrees */
 #define SURFACE_COS 0.8660254
 
-/* Elements that meet in one place are compared pair by pair up to this many; past it with the last ones. */
+/* Each element at a place is compared with at most this many previous ones. */
 #define MANY_CORNERS 64
 
 #define NONE 0xFFFFFFFFu
 
-/* A vertex as a cell of a grid so fine that what falls into one is one place. */
+/* A vertex as a cell of a grid so fine that the vertices of a cell are one place. */
 typedef struct place {
     int64_t cell[3];
     uint32_t vertex;

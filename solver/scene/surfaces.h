@@ -1,13 +1,13 @@
-/* Which elements are of one surface. Knows no light. */
+/* Surfaces: connected elements with similar normals. Knows no light. */
 #ifndef LAMBERT_SCENE_SURFACES_H
 #define LAMBERT_SCENE_SURFACES_H
 
 #include "solver/scene/mesh.h"
 
-/* surface[i], i < n, is the surface of element i: elements belong together that share a corner and whose
- * normals differ by less than 30 degrees, and whatever such neighbours link. Vertices closer than a millionth
- * of the scene are one, however often the mesh holds them. Numbered from 0 by their first elements; the two
- * sides of a face are never one surface. Cost: O(n log n). Errors: LAM_ERR_MEMORY. */
+/* surface[i], i < n, is the surface of element i: a connected component of the elements that share a corner
+ * and whose normals differ by less than 30 degrees. Vertices closer than a millionth of the scene are one.
+ * Surfaces are numbered from 0 by their first elements; the two sides of a face are never one surface. Cost:
+ * O(n log n). Errors: LAM_ERR_MEMORY. */
 lam_status mesh_surfaces(const mesh *m, uint32_t *surface, size_t *n_surfaces, lam_error *error);
 
 #endif

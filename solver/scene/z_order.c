@@ -39,8 +39,7 @@ lam_status mesh_z_order(const mesh *m, uint32_t *order, lam_error *error) {
             if (i == 0 || c[k] > high[k]) high[k] = c[k];
         }
     }
-    /* One scale for the three axes: the cells are cubes, so that neighbours in the order are near in space.
-     */
+    /* One scale for the three axes: cells are cubes, so that neighbours in the order are near in space. */
     for (int k = 0; k < 3; k++) extent = fmax(extent, high[k] - low[k]);
     const double cells = (double)((1u << Z_ORDER_BITS) - 1), scale = extent > 0 ? cells / extent : 0;
     for (size_t i = 0; i < m->n; i++) {

@@ -10,10 +10,11 @@
 #define CELL_FILLED 0x80000000u
 #define CELL_EMPTY 0xFFFFFFFFu
 
-/* In cells: what overlaps less is no overlap; what fills but for this fills. Above the rounding of places. */
+/* In cells: a smaller overlap counts as none, a smaller gap as filled. Larger than the rounding of
+ * coordinates. */
 static const double margin = 1e-5;
 
-/* Cells for an element at most, and for a facet besides. */
+/* The most cells per element, and the most cells of a facet beside these. */
 enum { CELLS_EACH = 4, CELLS_MORE = 16 };
 
 struct facet_grid {
@@ -21,8 +22,8 @@ struct facet_grid {
     uint32_t element;       /* the facet's first */
 };
 
-/* An element that overlaps a cell: a point is inside by the least of a x + b y + c, cells from the cell's
- * corner, of its sides. A triangle's fourth is always larger. */
+/* An element that overlaps a cell. The least a x + b y + c over its sides, with x and y in cells from the
+ * cell's corner, is a point's distance inside it. The fourth side of a triangle never is the least. */
 typedef struct facet_candidate {
     float a[4], b[4], c[4];
     uint32_t element, last;
@@ -41,8 +42,8 @@ static void to_cells(const frame *f, const double p[3], double at[2]) {
     }
 }
 
-/* Axes along two sides of an element, those of the corner that is nearest to a right angle, one side long
- * each: what was divided evenly then fills cells evenly. */
+/* Takes the two sides of an element at the corner nearest to a right angle as axes, so that regularly divided
+ * faces fill cells evenly. */
 static void set_axes(const mesh *m, size_t element, frame *f) {
     const size_t corners = mesh_corners(m, element);
     double best = INFINITY, u[3] = {0}, w[3] = {0};
@@ -89,7 +90,7 @@ static uint32_t typical(const mesh *m, const uint32_t *elements, size_t n) {
     return found;
 }
 
-/* Lays the grid: its frame, and how many cells. */
+/* Sets the frame of the grid and its number of cells. */
 static void lay(const mesh *m, const uint32_t *elements, size_t n, frame *f, facet_grid *g) {
     double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
     memcpy(f->origin, m->vertices[m->elements[elements[0]][0]], sizeof f->origin);
@@ -164,8 +165,8 @@ static void set_footprint(const mesh *m, const frame *f, uint32_t element, footp
     if (corners == 3) p->c[3] = HUGE_VALF;
 }
 
-/* How far the cell at (x, y) reaches to the inner side of the element's sides, at best and at worst corner:
- * the least over sides. */
+/* The distance of the cell at (x, y) inside the element, the least over sides, at its best and at its worst
+ * corner. */
 static void reach(const footprint *p, double x, double y, double *best, double *worst) {
     *best = *worst = INFINITY;
     for (int k = 0; k < 4; k++) {
@@ -261,7 +262,7 @@ static lam_status fill_cells(const facet_grid *grid, const gathering *g, facet_g
     return LAM_OK;
 }
 
-/* Where a piece lies: its corner, and the two sides from there. */
+/* Sets the map of a piece from its corner and the two sides from there. */
 static void place_piece(const mesh *m, const frame *f, const uint32_t piece[4], piece_place *out) {
     double o[2], u[2], w[2];
     to_cells(f, m->vertices[piece[0]], o);
@@ -332,7 +333,7 @@ static float inside(const facet_candidate *c, float x, float y) {
     return least;
 }
 
-/* A point on its way to its element. */
+/* The search for the element of a point. */
 typedef struct search {
     float x, y; /* in its cell */
     const uint32_t *cell;
@@ -361,7 +362,7 @@ static uint32_t choose(const facet_candidate *c, float x, float y) {
 void facet_grids_find(const facet_grids *g, size_t n, const uint32_t *piece, const float *u, const float *v,
                       uint32_t *element) {
     search s[FACET_SEARCHES];
-    /* All are looked up step by step: while one waits for memory the others do too. */
+    /* All searches advance step by step together, so that their cache misses overlap. */
     for (size_t i = 0; i < n; i++) {
         s[i] = begin(g, &g->pieces[piece[i]], u[i], v[i]);
         __builtin_prefetch(s[i].cell);

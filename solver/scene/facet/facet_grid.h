@@ -1,11 +1,11 @@
-/* Which element of a facet holds a point: a grid laid along the facet's elements. Knows no light. */
+/* Finds the element of a facet at a point, by a grid aligned with the facet's elements. Knows no light. */
 #ifndef LAMBERT_SCENE_FACET_FACET_GRID_H
 #define LAMBERT_SCENE_FACET_FACET_GRID_H
 
 #include "solver/scene/facet/facets.h"
 
-/* Where a piece lies in its facet's grid: x = x[0] + u x[1] + v x[2], y likewise, for the piece's barycentric
- * u and v, the shares of its second and last corner. */
+/* The map from a piece to its facet's grid: x = x[0] + u x[1] + v x[2], y likewise, with the barycentric
+ * coordinates u and v of its second and last corner. */
 typedef struct piece_place {
     float x[3], y[3];
     uint32_t grid;
@@ -14,7 +14,7 @@ typedef struct piece_place {
 typedef struct facet_grid facet_grid;
 
 typedef struct facet_grids {
-    piece_place *pieces; /* [n_pieces]; nothing where a facet is one element */
+    piece_place *pieces; /* [n_pieces]; unused where a facet is one element */
     facet_grid *grids;
     size_t n_grids;
     uint32_t *cells;
@@ -26,13 +26,12 @@ typedef struct facet_grids {
 lam_status facet_grids_create(const mesh *m, const facets *f, facet_grids *out, lam_error *error);
 void facet_grids_free(facet_grids *g);
 
-/* Points looked up at once, at most. */
+/* The most points of one facet_grids_find. */
 #define FACET_SEARCHES 16
 
-/* element[i], i < n: the one at (u, v) of a piece, of its facet whatever u and v are. The facets have more
- * than one element. A point within about
- * 1e-5 of an element's width from its border may go to the neighbour. Cost: O(1) each, two or three lines of
- * memory. */
+/* element[i], i < n: the element at (u, v) of a piece, always one of its facet, which must have more than
+ * one. A point within about 1e-5 of an element's width from its border may be assigned to the neighbour.
+ * Cost: O(1) each, two or three cache lines. */
 void facet_grids_find(const facet_grids *g, size_t n, const uint32_t *piece, const float *u, const float *v,
                       uint32_t *element);
 

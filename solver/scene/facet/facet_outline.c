@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Sides of a part at most: what they are cut at is looked for among all its corners. */
+/* The most sides of a part: each is compared with all its corners. */
 enum { SIDES_MOST = 8192 };
 
 typedef struct on_side {
@@ -22,7 +22,7 @@ typedef struct cuts {
     size_t n, capacity;
 } cuts;
 
-/* How far vertex v lies off the straight way from a to b, metres; infinity where it is not between them. */
+/* The distance of vertex v from the segment from a to b, metres; infinity where it is not between them. */
 static double vertex_off_way(const mesh *m, uint32_t a, uint32_t v, uint32_t b) {
     const double *p = m->vertices[a], *q = m->vertices[b], *x = m->vertices[v];
     double along = 0, length = 0, off = 0;
@@ -85,7 +85,7 @@ done:
     return status;
 }
 
-/* Takes opposite sides out of sides[0] ... sides[n-1]; returns how many are left. */
+/* Removes pairs of opposite sides from sides[0] ... sides[n-1]; returns how many are left. */
 static size_t cancel(side *sides, size_t n) {
     size_t left = 0;
     qsort(sides, n, sizeof *sides, between_order);
@@ -130,12 +130,12 @@ done:
     return status;
 }
 
-/* Corners of an outline at most: cutting takes their square. How often parts that are not worth it are taken
- * out before all are. */
+/* The most corners of an outline, because cutting takes their square, and the most rounds in which parts are
+ * found to stay alone, before all do. */
 enum { OUTLINE_MOST = 4096, ROUNDS_MOST = 64 };
 
-/* Elements for each piece at least. Pieces are longer than elements, and an element must be looked for: for
- * fewer that is slower. */
+/* The least number of elements per piece. Below it casting is slower than against elements: pieces are
+ * longer, and the element must be found in the grid. */
 enum { ELEMENTS_EACH = 16 };
 
 typedef struct loop {
@@ -143,7 +143,7 @@ typedef struct loop {
     uint32_t part;
 } loop;
 
-/* The outline of one part while it is cut: one walk around, loops inside it joined by bridges. */
+/* The outline of one part: one closed walk, to which the loops of holes are joined by bridges. */
 typedef struct walk {
     size_t n;
     uint32_t vertex[OUTLINE_MOST];
@@ -206,8 +206,8 @@ static void follow_all(cutter *c) {
     }
 }
 
-/* Vertices between two corners may go only if all of them lie on the straight way: of those that do not the
- * farthest becomes a corner. Returns whether one did. */
+/* Vertices between two corners are dropped only if all of them lie on the segment: otherwise the farthest
+ * becomes a corner (Douglas and Peucker 1973). Returns true where one did. */
 static bool keep_bent(cutter *c, const loop *l) {
     const outlines *o = c->o;
     const uint32_t *v = c->vertices + l->first;
@@ -230,7 +230,7 @@ static bool keep_bent(cutter *c, const loop *l) {
     return changed;
 }
 
-/* Which places are corners: of elements that are alone, and where some outline turns. */
+/* Marks the places that are corners: of elements that are alone, and where an outline turns. */
 static void find_corners(cutter *c) {
     const outlines *o = c->o;
     memset(c->corner, 0, o->m->n_vertices * sizeof *c->corner);
@@ -275,7 +275,7 @@ static double doubled_area(const walk *w) {
     return sum;
 }
 
-/* Whether the segment from corner a of one walk to corner b of another meets a side of w. */
+/* True where the segment from corner a of one walk to corner b of another intersects a side of w. */
 static bool crosses(const walk *w, uint32_t from, const double a[2], uint32_t to, const double b[2]) {
     for (size_t i = 0; i < w->n; i++) {
         const size_t j = (i + 1) % w->n;
@@ -290,15 +290,15 @@ static bool crosses(const walk *w, uint32_t from, const double a[2], uint32_t to
     return false;
 }
 
-/* Whether a segment from corner i of a walk to b begins on the walk's inner side. */
+/* True where a segment from corner i of a walk to b starts on the walk's inner side. */
 static bool leaves_inwards(const walk *w, size_t i, const double b[2]) {
     const double *a = w->at[i], *before = w->at[(i + w->n - 1) % w->n], *after = w->at[(i + 1) % w->n];
     if (plane_turn(before, a, after) >= 0) return plane_turn(a, b, before) > 0 && plane_turn(b, a, after) > 0;
     return !(plane_turn(a, b, after) >= 0 && plane_turn(b, a, before) >= 0);
 }
 
-/* Joins the hole to the outer walk by a bridge from its rightmost corner to the nearest that is seen from
- * there and is not behind the other holes. */
+/* Joins a hole to the outer walk by a bridge from its rightmost corner to the nearest corner that is visible
+ * from there and not behind the other holes. */
 static bool bridge(cutter *c, const loop *holes, size_t n_holes, size_t now) {
     walk *outer = c->outer, *hole = c->hole;
     size_t right = 0, best = 0;
@@ -382,8 +382,8 @@ static lam_status add_piece(outlines *o, const uint32_t corners[4], uint32_t par
     return LAM_OK;
 }
 
-/* Cuts the part of the loops first ... last-1. What was cut is right if every corner has its share in it and
- * its area is that of the elements; otherwise, or where it is little gain, they stay alone. */
+/* Cuts the part of the loops first ... last-1. The pieces are valid if they use every corner and have the
+ * area of the elements; otherwise, or where they gain little, the elements stay alone. */
 static lam_status cut_part(cutter *c, size_t first, size_t last, lam_error *error) {
     lam_status status = LAM_OK;
     outlines *o = c->o;
@@ -418,7 +418,7 @@ done:
     return status;
 }
 
-/* Cuts all parts; *failed: how many of them stay alone from now on. */
+/* Cuts all parts; *failed is the number of parts that stay alone from now on. */
 static lam_status cut_all(cutter *c, size_t *failed, lam_error *error) {
     lam_status status = LAM_OK;
     c->o->n_pieces = *failed = 0;

@@ -18,13 +18,13 @@ typedef struct outlines {
     const mesh *m;
     size_t n_elements;
     const uint32_t *place; /* [n_vertices], one vertex for all that are at the same point */
-    double flat;           /* metres: how far off a line a vertex may be left out */
+    double flat;           /* metres: the distance from a line within which a vertex may be dropped */
     size_t n_parts;
     const uint32_t *part;      /* [n_elements] */
     const uint32_t *size;      /* [n_parts], elements */
     const double (*normal)[3]; /* [n_parts], unit */
     const double *area;        /* [n_parts] */
-    bool *alone;               /* [n_parts], not to be joined; set where there is no outline to join to */
+    bool *alone;               /* [n_parts], not joined; set where a part has no usable outline */
     const side *sides;         /* sorted by part */
     size_t n_sides;
     uint32_t (*pieces)[4]; /* result, freed by the caller: those of joined parts, as in facets */
@@ -35,10 +35,9 @@ typedef struct outlines {
 /* Cost: O(sides), and for each part the square of its outline's corners. Errors: LAM_ERR_MEMORY. */
 lam_status outlines_cut(outlines *o, lam_error *error);
 
-/* Takes away sides of a part that run along each other in opposite directions, also where one of them is as
- * long as several together: a corner of one element on the side of another parts nothing in a plane. Cost:
- * for each part the square of its sides; those with more than some thousands stay as they are.
- * Errors: LAM_ERR_MEMORY. */
+/* Removes sides of a part that run along each other in opposite directions, also where one is as long as
+ * several others together, because a corner of one element lies on the side of another. Cost: for each part
+ * the square of its sides; parts with more than some thousands stay unchanged. Errors: LAM_ERR_MEMORY. */
 lam_status sides_cancel(const mesh *m, double flat, side_list *list, lam_error *error);
 
 #endif

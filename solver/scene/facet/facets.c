@@ -10,7 +10,7 @@
 /* Normals of one plane differ by no more than this, 1 - cosine. */
 static const double same_direction = 1e-6;
 
-/* Sides between the same two places that are compared pair by pair; where more meet nothing is joined. */
+/* At most this many sides between the same two places are compared pair by pair; more are not joined. */
 enum { MEETING_MOST = 16 };
 
 /* The side from corner `from` to corner `to` of an element, by its two places in ascending order. */
@@ -59,7 +59,7 @@ static int side_order(const void *a, const void *b) {
     return (p->from > q->from) - (p->from < q->from);
 }
 
-/* place[v]: the first of all vertices at the same point. */
+/* place[v]: the first vertex at the same point. */
 static lam_status weld(joining *j, lam_error *error) {
     const size_t n = j->m->n_vertices;
     point *points = memory_allocate(n, sizeof *points, "facets", error);
@@ -99,8 +99,8 @@ static bool of_one_plane(const joining *j, uint32_t a, uint32_t b) {
            off_plane(m, a, m->vertices[m->elements[b][0]], q) <= j->flat;
 }
 
-/* Joins elements of one plane across the sides e[0] ... e[count-1] between the same two places, where just
- * two of them go together. */
+/* Joins elements of one plane across the sides e[0] ... e[count-1] between the same two places, where exactly
+ * two of them match. */
 static void join_meeting(joining *j, edge *e, size_t count) {
     if (count > MEETING_MOST) return;
     for (size_t k = 0; k < count; k++) {
@@ -140,8 +140,8 @@ static void join_neighbours(joining *j) {
     }
 }
 
-/* Numbers the parts by their first elements and measures them. A part is alone if it is one element or, taken
- * together, not of one plane. */
+/* Numbers the parts by their first elements and measures them. A part is alone where it is one element or, as
+ * a whole, not plane. */
 static lam_status measure_parts(joining *j, lam_error *error) {
     const mesh *m = j->m;
     for (size_t i = 0; i < j->n; i++) j->part[i] = MESH_NO_VERTEX;
@@ -215,7 +215,7 @@ static lam_status reserve(size_t n_elements, size_t n, size_t n_pieces, facets *
                : LAM_OK;
 }
 
-/* What the parts become: one facet each, or one for every element where they are alone. */
+/* Turns parts into facets: one for each part, or one for each element of a part that is alone. */
 static lam_status fill(const joining *j, const outlines *o, facets *f, lam_error *error) {
     lam_status status = LAM_OK;
     const mesh *m = j->m;

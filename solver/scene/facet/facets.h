@@ -1,5 +1,5 @@
-/* Facets: elements of one plane joined into the few pieces that together cover the same. What is cast against
- * facets meets tens of pieces where a mesh has thousands of elements. Knows no light. */
+/* Facets: plane regions of many elements, each covered by a few triangles and parallelograms (pieces). Rays
+ * are cast against tens of pieces where the mesh has thousands of elements. Knows no light. */
 #ifndef LAMBERT_SCENE_FACET_FACETS_H
 #define LAMBERT_SCENE_FACET_FACETS_H
 
@@ -18,14 +18,14 @@ typedef struct facets {
     uint32_t *piece_facet; /* [n_pieces] */
 } facets;
 
-/* Joins elements 0 ... n_elements-1 that share an edge and lie within flat metres of one plane. Two facets
- * that meet share the corners of their pieces: a vertex goes only where it lies straight, within flat metres,
- * on the outline of every facet around it, so no ray passes between them that did not before. Elements stay
- * alone where their outline crosses itself, has thousands of corners, or takes a piece for few of them. Freed
- * by facets_free. Cost: O(n log n). Errors: LAM_ERR_MEMORY. */
+/* Joins elements 0 ... n_elements-1 that share an edge and lie within flat metres of one plane. Facets that
+ * meet share the corners of their pieces: a vertex is dropped only where it lies straight, within flat
+ * metres, on the outline of every facet around it, so that no new crack opens between them. Elements stay
+ * alone where their outline crosses itself, has thousands of corners, or takes a piece for only few elements.
+ * Freed by facets_free. Cost: O(n log n). Errors: LAM_ERR_MEMORY. */
 lam_status facets_join(const mesh *m, size_t n_elements, double flat, facets *out, lam_error *error);
 
-/* Every element a facet. */
+/* Makes every element a facet. */
 lam_status facets_alone(const mesh *m, size_t n_elements, facets *out, lam_error *error);
 void facets_free(facets *f);
 

@@ -29,7 +29,7 @@ void blocks_free(blocks *all) {
     *all = (blocks){0};
 }
 
-/* Space cut along every side of every box: what fills each cell, and the places of the cuts. */
+/* Space cut along every side of every box: the filling of each cell, and the places of the cuts. */
 typedef struct raster {
     size_t n[3]; /* cells along each axis */
     double *at[3];
@@ -101,7 +101,7 @@ static void raster_free(raster *r) {
     free(r->mask);
 }
 
-/* The faces that solids show along an axis at one cut, before or behind which they are. */
+/* The faces of solids at one cut across an axis, for the solids on one side of it. */
 static void mark_plane(raster *r, const block_stuff *stuffs, int axis, size_t cut, bool behind) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     size_t at[3];
@@ -131,7 +131,8 @@ static bool is_marked(const raster *r, size_t n_u, const region *g, uint8_t mark
     return true;
 }
 
-/* The largest region from a cell on along one axis of the plane, then as far as it goes along the other. */
+/* Grows a region of one group from a cell: as far as possible along one axis of the plane, then along the
+ * other. */
 static region grow_region(const raster *r, const size_t n[2], const size_t at[2], int first, uint8_t mark) {
     region g = {{at[0], at[1]}, {1, 1}};
     for (int turn = 0; turn < 2; turn++) {

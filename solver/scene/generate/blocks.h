@@ -1,13 +1,13 @@
-/* Solids that are boxes, laid one over another as they are added; where solid meets air they become patches.
- * So whatever is built of them, no two faces lie on one another, none is hidden in or under a solid, and all
- * look into the air. Private. */
+/* Scenes of boxes of solid and air, each laid over the ones before. The borders between solid and air become
+ * patches, so that no two faces overlap, none is hidden inside a solid, and all face the air. Private to
+ * solver/scene/generate. */
 #ifndef LAMBERT_SCENE_GENERATE_BLOCKS_H
 #define LAMBERT_SCENE_GENERATE_BLOCKS_H
 
 #include "solver/scene/generate/patches.h"
 
-/* What a box is filled with. Made is what the scene makes by itself, of other shapes: it has no faces here,
- * and neither has what it touches. Solid: BLOCK_SOLID + a place in the list of stuffs. */
+/* The filling of a box. BLOCK_MADE: the scene draws other shapes there itself; neither they nor the solids
+ * they touch get faces here. A solid is BLOCK_SOLID + its index in the list of stuffs. */
 enum { BLOCK_AIR, BLOCK_MADE, BLOCK_SOLID };
 
 /* The groups of a solid's faces: on top of it, at its sides, below. */
@@ -25,12 +25,12 @@ typedef struct blocks {
     size_t n, capacity;
 } blocks;
 
-/* To the millimetre, with the same bits however it was reckoned. Boxes are taken at such places, and what
- * touches them must be. */
+/* x rounded to the millimetre, with the same bits however x was computed. Boxes are placed so, and shapes
+ * that touch them must be. */
 double block_place(double x);
 
-/* Over all that was there; the first is the whole scene, on whose border there are no faces and in which all
- * others must be. One without a width is left out. */
+/* Lays a box over all previous ones. The first one is the whole scene: it contains all others, and its border
+ * has no faces. A box of no width is ignored. */
 lam_status block_add(blocks *all, int fill, double x0, double y0, double z0, double x1, double y1, double z1,
                      lam_error *error);
 void blocks_free(blocks *all);

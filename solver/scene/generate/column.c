@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Corners of the column at a height, and one more that is the first again. */
+/* The corners of the column at a height; the last repeats the first. */
 static void ring(const column *c, double z, double radius, double out[COLUMN_SIDES_MOST + 1][3]) {
     assert(c->sides % 8 == 0 && c->sides <= COLUMN_SIDES_MOST);
     for (size_t k = 0; k < c->sides; k++) {

@@ -1,5 +1,4 @@
-/* Upright round shapes with flat sides: pieces that together are a column on a square foot, or a trunk.
- * Private. */
+/* Upright prisms and cones for columns on a square foot and for trunks. Private to solver/scene/generate. */
 #ifndef LAMBERT_SCENE_GENERATE_COLUMN_H
 #define LAMBERT_SCENE_GENERATE_COLUMN_H
 
@@ -13,8 +12,8 @@ typedef struct column {
 
 enum { COLUMN_SIDES_MOST = 16 };
 
-/* What is left of a level square, seen from above from low to high about the middle, beside a column of this
- * radius that stands on it (or, facing down, carries it). */
+/* The level square from low to high around the middle, minus the section of a column of this radius that
+ * stands on it (or, facing down, carries it). */
 lam_status column_square(const column *c, const double low[2], const double high[2], double z, double radius,
                          bool down, patch_list *out, lam_error *error);
 

@@ -11,7 +11,7 @@ double convex_area(const convex *a) {
     return twice / 2;
 }
 
-/* 1 for a square, less the longer and thinner. */
+/* The shape of a polygon: 1 for a square, less for thinner ones. */
 static double shape(const convex *a) {
     double around = 0;
     for (size_t i = 0; i < a->n; i++) around += plane_distance(a->p[i], a->p[(i + 1) % a->n]);
@@ -22,7 +22,7 @@ static void append(convex *a, const double p[2]) {
     if (a->n < CONVEX_MOST) memcpy(a->p[a->n++], p, sizeof *a->p);
 }
 
-/* Where the segment ab crosses the line, given the signed distances of both ends. */
+/* The intersection of the segment ab with a line, given the signed distances of both ends. */
 static void crossing(const double a[2], double da, const double b[2], double db, double out[2]) {
     if (a[0] > b[0] || (a[0] == b[0] && a[1] > b[1])) { /* the same bits from both sides */
         const double *p = a, d = da;
@@ -57,8 +57,8 @@ static void cut(const convex *a, const double s[2], const double e[2], convex *l
 size_t convex_subtract(const convex *a, const convex *b, double tiny, convex *pieces) {
     size_t best = 0;
     double best_shape = -1;
-    /* Which edge of b cuts first decides the pieces: the order with fewest, then with the best worst shape.
-     */
+    /* The pieces depend on the edge of b that cuts first: chooses the one with the fewest pieces, then with
+     * the best worst shape. */
     for (size_t first = 0; first < b->n; first++) {
         convex rest = *a, found[CONVEX_MOST], outside;
         size_t n = 0;

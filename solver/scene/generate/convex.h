@@ -1,4 +1,4 @@
-/* Convex polygons in the plane: what a floor is cut out with. Private. */
+/* Convex polygons in the plane: subtraction, union and splitting. Private to solver/scene/generate. */
 #ifndef LAMBERT_SCENE_GENERATE_CONVEX_H
 #define LAMBERT_SCENE_GENERATE_CONVEX_H
 
@@ -15,8 +15,8 @@ typedef struct convex {
 
 double convex_area(const convex *a);
 
-/* a minus b as convex pieces; pieces has room for b->n of them; returns how many. Pieces of less than
- * tiny area are left out. */
+/* a minus b as convex pieces; pieces has room for b->n of them; returns how many. Pieces of an area below
+ * tiny are dropped. */
 size_t convex_subtract(const convex *a, const convex *b, double tiny, convex *pieces);
 
 /* The union of two that share an edge, when it is convex and has at most 4 corners. */

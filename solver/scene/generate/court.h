@@ -1,5 +1,5 @@
-/* Places around a rectangular court whose middle is at (0, 0): what is built at one of its four sides is
- * built at all. Private. */
+/* Coordinates around a rectangular court with its middle at (0, 0), so that one description builds all four
+ * sides. Private to solver/scene/generate. */
 #ifndef LAMBERT_SCENE_GENERATE_COURT_H
 #define LAMBERT_SCENE_GENERATE_COURT_H
 
@@ -11,21 +11,21 @@ typedef struct court {
 
 enum { COURT_SIDES = 4 }; /* +x, +y, -x, -y */
 
-/* How far the side goes to both sides of its middle. */
+/* Half the length of a side. */
 double court_half(const court *c, int side);
 
-/* A point so far out from a side of the court, and so far along it from its middle. Out, along and up are
- * right-handed. How far out is taken to the millimetre, as blocks are. */
+/* The point at the distance out from a side of the court and the distance along it from its middle. Out,
+ * along and up are right-handed. out is rounded by block_place. */
 void court_point(const court *c, int side, double out, double along, double z, double point[3]);
 
-/* A box between two such places. */
+/* A box between two points of court_point. */
 typedef struct court_box {
     double out[2], along[2], z[2];
 } court_box;
 
 lam_status court_add(const court *c, int side, int fill, const court_box *box, blocks *all, lam_error *error);
 
-/* The court and what is around it so far out. */
+/* Adds the box over the court and its surroundings up to the distance out. */
 lam_status court_add_square(const court *c, int fill, double out, double z0, double z1, blocks *all,
                             lam_error *error);
 

@@ -27,7 +27,7 @@ static double expected_elements(const size_t n[3]) {
                     PER_EDGE * (n[0] + n[1] + n[2]));
 }
 
-/* How many pyramids: about 5 : 4 : 3, and as many as make up the elements. */
+/* The numbers of pyramids along x, y and z, about 5 : 4 : 3, for the number of elements. */
 static chamber choose_chamber(size_t wanted) {
     chamber best = {.n = {0}};
     double off = HUGE_VAL;
@@ -46,12 +46,12 @@ static chamber choose_chamber(size_t wanted) {
     return best;
 }
 
-/* Where the feet of the pyramids at one end of an axis are. */
+/* The coordinate of the feet of the pyramids at one end of an axis. */
 static double feet_at(const chamber *c, int axis, bool far) {
     return far ? c->pitch * (double)(c->n[axis] + 1) : -c->pitch;
 }
 
-/* Where the tips are, which is also where the feet of the sides across begin. */
+/* The coordinate of the tips, where the feet of the adjacent sides begin. */
 static double tips_at(const chamber *c, int axis, bool far) {
     return far ? c->pitch * (double)c->n[axis] : 0;
 }
@@ -109,7 +109,7 @@ done:
     return status;
 }
 
-/* Adds it in the order that lets it look at the middle of the room. */
+/* Adds a face in the orientation that faces the middle of the room. */
 static lam_status add_slope(chamber *c, double corners[4][3], size_t n, lam_error *error) {
     double towards = 0;
     for (int d = 0; d < 3; d++) {

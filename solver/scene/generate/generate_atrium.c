@@ -1,5 +1,5 @@
-/* A long hall under an open roof, between two storeys of galleries behind round columns and arches: what the
- * Sponza atrium of "Aguerre 2016, figure 3.6" is like, with as many elements. */
+/* A long hall under an open roof, between two storeys of galleries behind round columns and arches, in the
+ * manner of the Sponza atrium of Aguerre 2016, figure 3.6, with as many elements. */
 #include "solver/scene/generate/column.h"
 #include "solver/scene/generate/court.h"
 

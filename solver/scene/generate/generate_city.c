@@ -19,7 +19,8 @@ typedef struct city_rectangles {
     size_t n, capacity;
 } city_rectangles;
 
-/* What lies along x or y: a street from at[0] to at[1], blocks to at[2], and so on to a last street. */
+/* The streets and blocks along x or y: a street from at[0] to at[1], blocks to at[2], and so on to a last
+ * street. */
 typedef struct city_axis {
     double *at, *rise; /* [n]; metres; the ground is straight between two of them */
     size_t n;
@@ -31,19 +32,18 @@ typedef struct city_plan {
     double *heights;                           /* [buildings.n], metres above the ground */
 } city_plan;
 
-/* Metres. What is seen from an element, in elements, hangs on how few blocks there are, how deep the streets
- * between them and how unlike the roofs beside each other. All of it, slopes included, is chosen so that F is
- * within 15 % as dense as in "Aguerre 2016, tables 4.1 and 4.5", counted as there; `lambert bench cities`
- * prints both. */
+/* Metres. The number of elements that an element sees depends on the number of blocks, the depth of the
+ * streets and the differences of roof heights. These and the slopes are chosen so that the density of F is
+ * within 15 % of Aguerre 2016, tables 4.1 and 4.5, counted as there; `lambert bench cities` prints both. */
 static const double avenue = 14, street[2] = {9, 13}, block_side[2] = {45, 65}, alley_width[2] = {3, 5};
 static const double largest_lot = 22, empty_share = .05;
 
-/* Rise of the ground over half a side of the site, and how it goes with x and with y, t from -1 to 1: a bowl;
- * a hill with a foot. */
+/* The rise of the ground over half a side of the site, and its profile along x and along y, t from -1 to 1: a
+ * bowl; a hill with a foot. */
 static const double valley_slope = .12, hill_slope = .1;
 
-/* Heights go like low + middle u + top u^power for u from 0 to 1: flat houses; low and middle-high ones; all
- * sizes, with a few skyscrapers. */
+/* The distribution of heights, low + middle u + top u^power for u from 0 to 1, by variant: flat houses; low
+ * and medium-high ones; all sizes, with a few skyscrapers. */
 static const struct {
     double low, middle, top, power;
 } variants[3] = {{5, 1.2, 0, 1}, {7, 6, 0, 1}, {21, 5, 36, 70}};
@@ -105,7 +105,7 @@ done:
     return status;
 }
 
-/* Every height of the variant once, in random order: the sum does not hang on luck. */
+/* Quantiles of the variant's heights in random order, so that their sum does not depend on the seed. */
 static void deal_heights(city_plan *plan, unsigned variant, uint64_t r) {
     for (size_t b = 0; b < plan->buildings.n; b++) {
         const double u = ((double)b + .5) / (double)plan->buildings.n;
@@ -168,12 +168,12 @@ static double city_ground(const city_plan *plan, double x, double y) {
     return rise_at(&plan->axes[0], x) + rise_at(&plan->axes[1], y);
 }
 
-/* The whole city, and what a block takes at least before cells grow longer than houses: a city of fewer
- * elements has fewer blocks. As in the thesis, finer cities divide each cell of the coarsest into four, once
- * or more often. */
+/* The size of the whole city, and the least number of elements of a block, below which cells would be longer
+ * than houses: a city of fewer elements has fewer blocks. As in Aguerre 2016, finer cities divide each cell
+ * of the coarsest into four, once or more often. */
 enum { BLOCKS_PER_SIDE = 7, LEAST_PER_BLOCK = 160, THESIS_ELEMENTS = 35588 };
 
-/* How cells are made: of about size^2 (metres), each cut into parts x parts. */
+/* The division into cells of about size^2 (metres), each cut into parts x parts. */
 typedef struct cell_rule {
     double size;
     size_t parts;
@@ -251,7 +251,7 @@ static size_t wanted_elements(const generate_options *options) {
     return options->elements > 0 ? options->elements : THESIS_ELEMENTS;
 }
 
-/* Whether a whole city of cells cut into parts x parts has enough of them. */
+/* True where a whole city of cells cut into parts x parts has enough elements. */
 static bool coarsest_fits(size_t wanted, size_t parts) {
     return wanted / (parts * parts) >= (size_t)BLOCKS_PER_SIDE * BLOCKS_PER_SIDE * LEAST_PER_BLOCK;
 }

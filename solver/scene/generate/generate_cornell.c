@@ -57,8 +57,8 @@ static bool boxes_overlap(const convex *a, const convex *b) {
     return true;
 }
 
-/* What is left of the floor's cells: the pieces of cell c are first[c] .. first[c + 1] - 1; one that went
- * into another has no corners. */
+/* The floor's cells minus the footprints: the pieces of cell c are first[c] .. first[c + 1] - 1; a piece that
+ * was merged into another one has no corners. */
 typedef struct cut_floor {
     size_t nx, ny, *first;
     convex *pieces;

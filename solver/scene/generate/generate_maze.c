@@ -9,13 +9,13 @@
 /* Metres. */
 static const double passage = 1.8, wall = .3, wall_height = 2.2, sky = 3, ground_depth = .3;
 
-/* A cell has about so many elements, so a maze of more elements has more cells, not finer ones. */
+/* Elements per cell of the maze, about: a maze of more elements has more cells, not finer ones. */
 enum { PER_CELL = 60, LEAST_CELLS = 3, MAZE_ELEMENTS = 6000, FLOOR = 0, WALL, WALL_TOP, GROUPS };
 
 static const scene_draft_material stone = {"stone", {.5, .5, .5}, {0, 0, 0}};
 static const patch_group groups[GROUPS] = {{"floor", &stone}, {"wall", &stone}, {"wall-top", &stone}};
 
-/* What is carved of the maze: from cell (x, y) on so many cells, and the walls between them. */
+/* Carves cells from (x, y) on, and the walls between them. */
 static lam_status carve(blocks *all, size_t x, size_t y, size_t nx, size_t ny, lam_error *error) {
     const double pitch = passage + wall, low[2] = {wall + pitch * (double)x, wall + pitch * (double)y};
     return block_add(all, BLOCK_AIR, low[0], low[1], 0, low[0] + pitch * (double)nx - wall,

@@ -6,12 +6,14 @@
 
 #include <math.h>
 
-/* Metres. Rooms keep so far from the borders of their lots that a corridor can turn between two of them. */
+/* Metres. Rooms keep a distance from the borders of their lots, so that a corridor can turn between two of
+ * them. */
 static const double lot = 8, half_room[2] = {1.8, 2.8}, room_height[2] = {2.6, 3.6}, outside = .3;
 static const double half_corridor = .7, corridor_height = 2.2, half_lamp[2] = {.6, .3}, lamp_depth = .1;
 static const double extra_share = .3; /* of the neighbours that need no corridor: these have one too */
 
-/* A room of fewer elements than these is no longer of low rank, which is what this scene is about. */
+/* The least number of elements of a room: with fewer, F is no longer of low rank, which this scene
+ * demonstrates. */
 enum { ROOM_ELEMENTS = 1000 };
 
 enum { ROOMS_MOST = 12, ROOMS_ELEMENTS = 6000, FLOOR = 0, CEILING, WALL, LAMP };
@@ -38,8 +40,8 @@ static lam_status carve(blocks *all, const room *r, double height, lam_error *er
     return block_add(all, BLOCK_AIR, r->low[0], r->low[1], 0, r->high[0], r->high[1], height, error);
 }
 
-/* From room a to its neighbour b on the far side along an axis: two straight pieces that meet half way, and
- * what joins them across. */
+/* A corridor from room a to its neighbour b along an axis: two straight pieces that end half way, and a piece
+ * across that joins them. */
 static lam_status add_corridor(blocks *all, uint64_t *r, const room *a, const room *b, int axis,
                                double border, double middle, lam_error *error) {
     lam_status status = LAM_OK;

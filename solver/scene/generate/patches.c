@@ -22,7 +22,7 @@ void patches_free(patch_list *list) {
     *list = (patch_list){0};
 }
 
-/* A triangle as m^2 of its shape, each as large as a square of that size. */
+/* Draws a triangle as m^2 similar ones of the area size^2. */
 static lam_status draw_triangle(scene_draft *d, const patch *p, double size, lam_error *error) {
     lam_status status = LAM_OK;
     const double(*corners)[3] = (const double(*)[3])p->corners;

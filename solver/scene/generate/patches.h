@@ -1,10 +1,11 @@
-/* A generated scene as the flat patches it is cut from: cells only once their size is known. Private. */
+/* A generated scene as plane patches, cut into cells once their size is known. Private to
+ * solver/scene/generate. */
 #ifndef LAMBERT_SCENE_GENERATE_PATCHES_H
 #define LAMBERT_SCENE_GENERATE_PATCHES_H
 
 #include "solver/scene/generate/scene_draft.h"
 
-/* What a patch belongs to: a place in the scene's list of these. */
+/* The group of a patch, an index into the scene's list of groups. */
 typedef struct patch_group {
     const char *name; /* static, as materials are */
     const scene_draft_material *material;
@@ -25,7 +26,7 @@ typedef struct patch_list {
 lam_status patch_add(patch_list *list, const double (*corners)[3], size_t n, size_t group, lam_error *error);
 void patches_free(patch_list *list);
 
-/* Every patch in cells, about wanted of them together but at least one each, one group after the other. */
+/* Draws every patch in cells, about wanted of them together but at least one each, group by group. */
 lam_status patches_draw(const patch_list *list, scene_draft *d, const generate_options *options,
                         size_t wanted, lam_error *error);
 

@@ -104,8 +104,8 @@ lam_status scene_draft_build_near(scene_draft *d, scene_draft_builder *build, co
     near_search search = {d->plan, build, options, wanted, HUGE_VAL, 1, 1};
     size_t n = 0;
     double size = 1;
-    /* The number of faces goes like 1 / size^2: a few corrections come near, then what lies around is tried
-     * until it is right to a thousandth. */
+    /* The number of faces is about proportional to 1 / size^2: a few corrections come near, then sizes around
+     * are tried until the number is right to a thousandth. */
     for (int round = 0; round < 12 && search.off > 0; round++) {
         TRY(try_cells(&search, size, 1, &n, error));
         size *= fmin(fmax(sqrt((double)n / (double)wanted), 1.0 / 16), 16);

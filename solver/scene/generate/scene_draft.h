@@ -1,4 +1,5 @@
-/* A scene being generated: faces in named groups with materials, and its OBJ + MTL files. Private. */
+/* A scene in progress: faces in named groups with materials, and its OBJ + MTL files. Private to
+ * solver/scene/generate. */
 #ifndef LAMBERT_SCENE_GENERATE_SCENE_DRAFT_H
 #define LAMBERT_SCENE_GENERATE_SCENE_DRAFT_H
 
@@ -39,9 +40,9 @@ lam_status scene_draft_face(scene_draft *d, const double (*corners)[3], size_t n
 /* A quad as na x nb cells: na along its first edge. */
 lam_status scene_draft_grid(scene_draft *d, const double quad[4][3], size_t na, size_t nb, lam_error *error);
 
-/* The same with cells whose sides are as near to size as whole numbers allow. */
+/* A quad as cells whose sides are as close to size as whole numbers allow. */
 lam_status scene_draft_cells(scene_draft *d, const double quad[4][3], double size, lam_error *error);
-/* How many cells of this size a length takes, along a first edge or across. */
+/* The number of cells of this size for a length, along a first edge or across it. */
 size_t scene_draft_steps_along(const scene_draft *d, double length, double size);
 size_t scene_draft_steps_across(const scene_draft *d, double length, double size);
 
@@ -49,7 +50,7 @@ size_t scene_draft_steps_across(const scene_draft *d, double length, double size
  * negative replaces every diffuse colour and turns emissions grey. */
 lam_status scene_draft_write(const scene_draft *d, const char *path, double reflectance, lam_error *error);
 
-/* One kind of scene, made with cells of about this size. */
+/* Draws one kind of scene with cells of about this size. */
 typedef lam_status scene_draft_builder(scene_draft *d, const generate_options *options, double size,
                                        lam_error *error);
 

@@ -1,4 +1,5 @@
-/* glTF, PLY, STL and whatever else libassimp reads, to a soup: the only user of it. Runs in the child. */
+/* Reads glTF, PLY, STL and the other formats of libassimp: the only file that knows libassimp. Runs in the
+ * child. */
 #include "solver/base/array_grow.h"
 #include "solver/base/file_text.h"
 #include "solver/scene/import/imported_faces.h"
@@ -61,8 +62,8 @@ static bool colour_of(const struct aiMaterial *m, const char *key, double out[3]
 static const char colour_base[] = "$clr.base", colour_diffuse[] = "$clr.diffuse",
                   colour_emissive[] = "$clr.emissive", emissive_intensity[] = "$mat.emissiveIntensity";
 
-/* Whether the library made this material up for faces that have none: it bears its default name, or none; in
- * a glTF, whose materials may be nameless, it is the last one. */
+/* True for the material that the library adds for faces without one: it has the library's default name, or
+ * none; in a glTF, whose materials may be nameless, it is the last one. */
 static bool is_made_up(const assimp_state *a, unsigned index, const char *name) {
     if (strcmp(name, AI_DEFAULT_MATERIAL_NAME) == 0) return true;
     return name[0] == '\0' && (!a->gltf || index + 1 == a->scene->mNumMaterials);
@@ -104,7 +105,7 @@ done:
 
 /* --- nodes --------------------------------------------------------------------------------------------- */
 
-/* A node's own name: the library makes some up, such as <STL_BINARY>, or nodes[3] in a glTF. */
+/* A node's name in the file, or "": the library invents some, such as <STL_BINARY>, or nodes[3] in a glTF. */
 static lam_status name_of_node(assimp_state *a, const struct aiNode *node, uint32_t *object,
                                lam_error *error) {
     const char *name = node->mName.data;
@@ -175,8 +176,8 @@ static void put_little_endian(char *bytes, uint32_t x) {
     for (int k = 0; k < 4; k++) bytes[k] = (char)(x >> 8 * k & 255);
 }
 
-/* Some writers of GLB forget to pad chunks to 4 bytes, which the library refuses: *out is a padded copy,
- * freed by the caller, or NULL when the file is no GLB or needs none. */
+/* Some writers of GLB do not pad chunks to 4 bytes, which the library refuses. *out is a padded copy, freed
+ * by the caller, or NULL where the file is not a GLB or is padded. */
 static lam_status glb_padded(const char *glb, size_t length, char **out, size_t *out_length,
                              lam_error *error) {
     size_t chunks = 0, uneven = 0, to = 12;

@@ -1,4 +1,4 @@
-/* What the importer's child read, turned into a mesh: groups, materials, units. */
+/* Turns the faces that the child read into a mesh: groups, materials, units. */
 #include "solver/scene/import/import.h"
 #include "solver/base/array_grow.h"
 #include "solver/scene/import/imported_faces.h"
@@ -10,7 +10,8 @@
 #include <string.h>
 #include <strings.h>
 
-/* What faces get whose file names no diffuse colour, and what a diffuse value of 1 or more becomes. */
+/* The reflectance of faces without a diffuse colour, and the one that replaces a diffuse value of 1 or more.
+ */
 static const double default_reflectance = .5;
 static const double largest_reflectance = .999;
 
@@ -26,9 +27,7 @@ static void stem_of(const char *path, char *out, size_t size) {
     snprintf(out, size, "%.*s", (int)(length < size ? length : size - 1), name);
 }
 
-/* --- materials ----------------------------------------------------------------------------------------- */
-
-/* Checks and clamps the values of the materials that faces use; soup values become final. */
+/* Checks and clamps the values of the materials that faces use, in place. */
 static lam_status settle_materials(imported_faces *s, const char *path, const bool *used,
                                    import_report *report, lam_error *error) {
     lam_status status = LAM_OK;
@@ -107,9 +106,7 @@ done:
     return status;
 }
 
-/* --- groups -------------------------------------------------------------------------------------------- */
-
-/* The texts of a table as one block: pointers, then what they point to. */
+/* The texts of a table as one block: pointers, then the texts. */
 static char **name_block(const name_table *names, lam_error *error) {
     char **block = memory_allocate(1, names->n * sizeof *block + names->text_bytes, "group names", error);
     if (block == NULL) return NULL;
@@ -164,8 +161,6 @@ done:
     name_table_free(&names);
     return status;
 }
-
-/* --- geometry ------------------------------------------------------------------------------------------ */
 
 static lam_status copy_geometry(imported_faces *s, const char *path, double unit, mesh *m, lam_error *error) {
     lam_status status = LAM_OK;

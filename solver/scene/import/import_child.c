@@ -1,5 +1,5 @@
-/* The process that scene files are read in, with limits, and the pipe that brings plain arrays back.
- * The parent trusts nothing that comes through it. */
+/* Reads scene files in a child process with limits, which sends plain arrays through a pipe. The parent
+ * checks all that it receives. */
 #include "solver/base/clock.h"
 #include "solver/scene/import/imported_faces.h"
 
@@ -16,7 +16,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/* What the child sends first; then points, elements, both name texts and the material values. */
+/* The first bytes that the child sends; points, elements, both name texts and the material values follow. */
 typedef struct reply_header {
     char magic[8];
     uint64_t status;
@@ -71,7 +71,8 @@ static void limit(int resource, rlim_t soft, rlim_t hard) {
     setrlimit(resource, &wanted);
 }
 
-/* Gives up what the reader does not need; fd becomes the only descriptor besides a null input and output. */
+/* Confines the child: default signals, resource limits, and fd as the only descriptor besides a null input
+ * and output. Returns the new descriptor. */
 static int confine(int fd, const child_limits *limits) {
     const int handled[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXCPU, SIGALRM, SIGSEGV, SIGABRT};
     for (size_t i = 0; i < sizeof handled / sizeof *handled; i++) signal(handled[i], SIG_DFL);
@@ -137,14 +138,16 @@ static bool receive_bytes(reply_pipe *pipe, void *out, size_t bytes) {
     return true;
 }
 
-/* An array of count values of size bytes from the pipe, or NULL; *whole turns false when the pipe ended. */
+/* Reads an array of count values of size bytes from the pipe, or returns NULL; *whole becomes false where the
+ * pipe ends.
+ */
 static void *receive_array(reply_pipe *pipe, uint64_t count, size_t size, bool *whole, lam_error *error) {
     void *data = memory_allocate(count, size, "imported scene", error);
     if (data != NULL && !receive_bytes(pipe, data, count * size)) *whole = false;
     return data;
 }
 
-/* The names in a block of bytes; false when there are not exactly n different ones. */
+/* Reads the names in a block of bytes; false where they are not exactly n different ones. */
 static lam_status names_of_block(const char *block, uint64_t bytes, uint64_t n, name_table *names,
                                  bool *sound, lam_error *error) {
     lam_status status = LAM_OK;
@@ -172,7 +175,7 @@ static bool elements_are_sound(const imported_faces *s) {
     return true;
 }
 
-/* Receives a reply into s; *whole tells whether all of it came. */
+/* Receives a reply into s; *whole is false where the pipe ended before. */
 static lam_status receive_reply(reply_pipe *pipe, const char *path, size_t most_bytes, imported_faces *s,
                                 bool *whole, lam_error *error) {
     lam_status status = LAM_OK;
@@ -258,8 +261,7 @@ lam_status import_in_child(scene_reader *reader, const char *path, const child_l
     close(ends[1]);
     if (child < 0)
         FAIL(error, LAM_ERR_IO, "%s: cannot start the importer: fork: %s", path, strerror(fork_error));
-    /* The kernel counts the processor time; the clock only ends a child that sleeps, even on a busy machine.
-     */
+    /* The kernel limits the processor time; the clock only ends a child that sleeps. */
     from_child.deadline_ms = clock_ms() + 1e3 * (4 * (double)limits->cpu_seconds + 2);
     status = receive_reply(&from_child, path, limits->memory_bytes, &received, &whole, error);
     if (status != LAM_OK || !whole) kill(child, SIGKILL); /* changes nothing for one that is dying already */

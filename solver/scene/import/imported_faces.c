@@ -91,7 +91,8 @@ done:
     return status;
 }
 
-/* Checks what every format can get wrong; extent is the diagonal of the box around what faces use. */
+/* Checks indices, coordinates and emptiness for every format; extent is the diagonal of the box around used
+ * vertices. */
 static lam_status check_polygons(const imported_faces *s, const char *path, double *extent,
                                  lam_error *error) {
     lam_status status = LAM_OK;

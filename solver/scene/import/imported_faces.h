@@ -1,5 +1,5 @@
-/* What a scene reader hands over: polygons as the file has them, then quads and triangles with names and
- * materials. Filled in the child process, sent through a pipe, checked by the parent. Private. */
+/* The result of a scene reader: the polygons of the file, then quads and triangles with names and materials.
+ * Filled in the child process, sent through a pipe, checked by the parent. Private to solver/scene/import. */
 #ifndef LAMBERT_SCENE_IMPORT_IMPORTED_FACES_H
 #define LAMBERT_SCENE_IMPORT_IMPORTED_FACES_H
 
@@ -18,7 +18,7 @@ void import_warn(import_warnings *w, const char *format, ...) __attribute__((for
 
 typedef struct imported_material {
     double diffuse[3], emission[3];
-    uint64_t defined;     /* 0: only its name was met */
+    uint64_t defined;     /* 0: the file only names it */
     uint64_t has_diffuse; /* 0: the file gives none */
 } imported_material;
 
@@ -58,9 +58,9 @@ lam_status imported_faces_add_polygon(imported_faces *s, const uint32_t *corners
 lam_status imported_faces_add_material(imported_faces *s, const char *name, size_t length, uint32_t *index,
                                        lam_error *error);
 
-/* Polygons to elements: planar convex quads stay, others become triangles, faces without an area are counted.
- * Equal vertices are shared, unused ones dropped. Errors: LAM_ERR_FORMAT for an empty scene or a bad index.
- */
+/* Turns polygons into elements: planar convex quads stay, others become triangles, faces without an area are
+ * counted in dropped. Equal vertices are shared, unused ones dropped. Errors: LAM_ERR_FORMAT for an empty
+ * scene or a bad index. */
 lam_status imported_faces_split(imported_faces *s, const char *path, lam_error *error);
 
 /* A reader of one family of formats; runs in the child. */
@@ -69,7 +69,7 @@ scene_reader obj_read;
 scene_reader assimp_read;
 
 /* Runs reader on path in a child process under limits and receives the elements, names and materials (not the
- * polygons), every index and size checked. */
+ * polygons). Every index and size is checked. */
 typedef struct child_limits {
     unsigned cpu_seconds;
     size_t memory_bytes;

@@ -1,6 +1,5 @@
-/* OBJ + MTL to a soup, read here and not by the importing library, which keeps coordinates in single
- * precision, merges the names of `o` and `g`, invents a diffuse colour and only logs a missing MTL. Runs in
- * the child. */
+/* Reads OBJ + MTL in double precision. libassimp would keep coordinates in single precision, merge the names
+ * of `o` and `g`, invent a diffuse colour and only log a missing MTL. Runs in the child. */
 #include "solver/base/array_grow.h"
 #include "solver/base/file_text.h"
 #include "solver/scene/import/imported_faces.h"
@@ -47,7 +46,7 @@ static char *next_line(line_cursor *cursor) {
     return line;
 }
 
-/* What follows keyword in line, or NULL when the line does not begin with it. */
+/* The text behind keyword in line, or NULL where the line does not begin with it. */
 static char *after_keyword(char *line, const char *keyword) {
     const size_t length = strlen(keyword);
     if (strncmp(line, keyword, length) != 0) return NULL;
@@ -57,7 +56,7 @@ static char *after_keyword(char *line, const char *keyword) {
     return line;
 }
 
-/* Reads count numbers; how many there were. */
+/* Reads up to count numbers; returns how many. */
 static size_t read_numbers(const char *text, size_t count, double *out) {
     size_t n = 0;
     for (char *stop; n < count; n++, text = stop) {
@@ -113,8 +112,8 @@ done:
     return status;
 }
 
-/* Reads file, which stands beside the OBJ unless it is an absolute path; *found is false when there is none.
- */
+/* Reads file, relative to the OBJ's folder unless it is an absolute path; *found is false where it does not
+ * exist. */
 static lam_status read_library(const char *path, const char *file, imported_faces *s, bool *found,
                                lam_error *error) {
     lam_status status = LAM_OK;
