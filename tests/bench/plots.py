@@ -87,7 +87,7 @@ class Results:
                 getattr(axes, f"set_{name_of_axis}scale")("log")
                 axis = getattr(axes, f"{name_of_axis}axis")
                 axis.set_major_formatter(PlainNumbers())
-                axis.set_minor_formatter(PlainNumbers(labelOnlyBase=False))
+                axis.set_minor_formatter(PlainNumbers(labelOnlyBase=False, minor_thresholds=(2, .7)))
             axes.set(title=title, xlabel=x, ylabel=y)
             if notes is not None:
                 notes(axes)
@@ -125,12 +125,13 @@ def formfactors(results):
     results.draw("closed-forms", "Form factors of pairs with nothing between, against their closed forms", "form factor",
                  "relative error", {method: {"points": points(rows, "truth", "relative_error"), "linestyle": ""}
                                     for (method,), rows in groups(open_cases, "method")}, "xy")
-    rows = results.rows("resolution")
+    rows = sizes = results.rows("resolution")
     ours = {f"{scene}, {n:.0f} elements": points(of, "resolution", "error")
             for (scene, n), of in groups(rows, "scene", "elements")}
     theirs = {f"thesis, city {city}": points(rows, "resolution", f"error_{city}") for city in (1, 2, 3)}
     results.draw("resolution", "Hemicubes against the finest one (thesis: table 4.6)", "pixels along a hemicube",
-                 "relative error of F (ours: Frobenius norm)", ours | theirs, "xy")
+                 "relative error of F (ours: Frobenius norm)", ours | theirs, "xy",
+                 lambda axes: axes.set_xticks(sorted({row["resolution"] for row in sizes}), minor=False))
     kinds = {"rays": "rays", "hemicube": "hemicubes", "pair": "pair by pair"}
     for (n,), rows in groups(results.rows("error"), "elements"):
         reference = rows[0]["reference"]
