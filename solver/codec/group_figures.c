@@ -1,5 +1,6 @@
 #include "solver/codec/group_figures.h"
 
+#include "solver/base/array_grow.h"
 #include "solver/codec/json_writer.h"
 
 #include <math.h>
@@ -45,14 +46,8 @@ bool reduce_request_add(reduce_request *r, const char *name, size_t length, cons
     if (r->n_names == REDUCE_NAMES_MAX)
         return problem_set(why, PROBLEM_TOO_MUCH, "more than %d groups; send several requests",
                            REDUCE_NAMES_MAX);
-    if (r->n_names == r->names_capacity) {
-        const size_t capacity = r->n_names == 0 ? 1 : 2 * r->n_names;
-        reduce_name *names = realloc(r->names, capacity * sizeof *names);
-        if (names == NULL)
-            return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the groups of reduce");
-        r->names = names;
-        r->names_capacity = capacity;
-    }
+    if (array_grow(&r->names, &r->names_capacity, r->n_names + 1, sizeof *r->names, "names", NULL) != LAM_OK)
+        return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the groups of reduce");
     const size_t text = r->texts.length;
     if (!buffer_append(&r->texts, name, length) || !buffer_append(&r->texts, "", 1))
         return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for the groups of reduce");

@@ -1,4 +1,5 @@
 /* The emissions of a request: dense, sparse, by group, by sky. */
+#include "solver/base/array_grow.h"
 #include "solver/codec/json_parser.h"
 
 #include <float.h>
@@ -144,14 +145,9 @@ static bool read_values(parser *p, size_t *count) {
         if (*count == n)
             return parser_refuse(p, PROBLEM_WRONG_LENGTH, "%s holds more values than there are elements",
                                  parser_here(p));
-        if (*count == p->values_capacity) {
-            const size_t capacity = *count == 0 ? 64 : 2 * *count;
-            float *grown = realloc(p->values, capacity * C * sizeof *grown);
-            if (grown == NULL)
-                return problem_set(p->why, PROBLEM_NO_MEMORY, "not enough memory for a sparse emission");
-            p->values = grown;
-            p->values_capacity = capacity;
-        }
+        if (*count == p->values_capacity && array_grow(&p->values, &p->values_capacity, *count + 1,
+                                                       C * sizeof *p->values, "values", NULL) != LAM_OK)
+            return problem_set(p->why, PROBLEM_NO_MEMORY, "not enough memory for a sparse emission");
         parser_point_index(p, *count);
         if (!read_colour(p, p->values + *count * C)) return false;
         p->pointer_length = mark;

@@ -1,5 +1,7 @@
 #include "solver/codec/json_parser.h"
 
+#include "solver/base/array_grow.h"
+
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -149,15 +151,9 @@ bool parser_known_member(parser *p, const json_slice *key, const char *const *na
 }
 
 bool parser_append(parser *p, index_list *list, const uint32_t *indices, size_t count) {
-    if (list->values == NULL || count > list->capacity - list->count) {
-        size_t capacity = list->capacity == 0 ? 64 : 2 * list->capacity;
-        if (capacity < list->count + count) capacity = list->count + count;
-        uint32_t *grown = realloc(list->values, capacity * sizeof *grown);
-        if (grown == NULL)
-            return problem_set(p->why, PROBLEM_NO_MEMORY, "not enough memory for a list of indices");
-        list->values = grown;
-        list->capacity = capacity;
-    }
+    if (array_grow(&list->values, &list->capacity, list->count + count, sizeof *list->values, "indices",
+                   NULL) != LAM_OK)
+        return problem_set(p->why, PROBLEM_NO_MEMORY, "not enough memory for a list of indices");
     if (count > 0) memcpy(list->values + list->count, indices, count * sizeof *indices);
     list->count += count;
     return true;

@@ -1,5 +1,7 @@
 #include "solver/codec/request.h"
 
+#include "solver/base/array_grow.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -33,10 +35,8 @@ static bool grow_rows(float **values, size_t *n, size_t *capacity, size_t wanted
     if (wanted > *capacity) {
         const size_t most = max_bytes / bytes, more = 2 * *capacity > wanted ? 2 * *capacity : wanted;
         const size_t rows = more < most ? more : most;
-        float *grown = realloc(*values, rows * bytes);
-        if (grown == NULL)
+        if (array_resize(values, rows, bytes, what, NULL) != LAM_OK)
             return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for %zu vectors of %s", rows, what);
-        *values = grown;
         *capacity = rows;
     }
     memset((char *)*values + *n * bytes, 0, (wanted - *n) * bytes);
@@ -71,18 +71,15 @@ bool radiosity_request_spot(radiosity_request *request, const codec_scene *scene
     const size_t C = scene->n_channels, each = sizeof *request->spots + C * sizeof *colour;
     if (request->n_spots == request->spots_capacity) {
         const size_t most = scene->max_bytes / each;
-        size_t more = request->n_spots == 0 ? 16 : 2 * request->n_spots;
+        size_t more = array_capacity(request->spots_capacity, request->n_spots + 1);
         if (more > most) more = most;
         if (more <= request->n_spots)
             return problem_set(why, PROBLEM_TOO_MUCH,
                                "the sparse vectors pass the %zu bytes that a request may hold; send several "
                                "requests",
                                scene->max_bytes);
-        emission_spot *spots = realloc(request->spots, more * sizeof *spots);
-        if (spots != NULL) request->spots = spots;
-        float *colours = realloc(request->colours, more * C * sizeof *colours);
-        if (colours != NULL) request->colours = colours;
-        if (spots == NULL || colours == NULL)
+        if (array_resize(&request->spots, more, sizeof *request->spots, "spots", NULL) != LAM_OK ||
+            array_resize(&request->colours, more, C * sizeof *colour, "spots", NULL) != LAM_OK)
             return problem_set(why, PROBLEM_NO_MEMORY, "not enough memory for a sparse emission");
         request->spots_capacity = more;
     }
