@@ -30,7 +30,7 @@ enum {
 };
 lam_status stability_make(int which, double rho, stability_problem *out, lam_error *error);
 
-/* How an operator of a problem is built. */
+/* The settings of one operator of a problem. */
 typedef struct stability_way {
     const char *method, *factorizer;
     double epsilon;
