@@ -1,4 +1,4 @@
-"""What the demonstration asks and how it shows the answer: two lightings of any store, a table of group means.
+"""The requests of the demonstration and a table of their answers: two lightings of any store, a table of group means.
 
 requests STORE FOLDER: writes emission-N.json (what `lambert render` reads) and request-N.json (what the daemon
 reads), N = 1, 2. table STORE FOLDER N: prints the mean radiosity of each group in answer-N.json.

@@ -111,7 +111,8 @@ def fragments(text, is_comment):
     """Offsets of the sentences of a text that begin so; a comment may begin with a small letter, a text may not."""
     body = len(text) - len(text.lstrip())
     found = BEGIN.match(text, body)
-    offsets = [body] if found and (is_comment or text[body].isupper()) else []
+    joined = re.compile("which|whose").match(text, body)  # a clause of the line of code before it
+    offsets = [body] if found and not joined and (is_comment or text[body].isupper()) else []
     offsets += [at.start(1) for at in LATER.finditer(text) if at.group(1)[0].isupper()]
     return [at for at in offsets if not QUESTION.match(text, at)]
 

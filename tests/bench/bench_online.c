@@ -33,7 +33,7 @@ typedef struct subject {
     size_t n, k;
     float *rows; /* [n][k], in huge pages: what is read, and what OpenBLAS takes */
     panel Y[PANEL_LAYOUTS][PANEL_PRECISIONS];
-    void *file[PANEL_PRECISIONS]; /* what the rows of the second layout lie in */
+    void *file[PANEL_PRECISIONS]; /* memory of the rows of the second layout */
     size_t file_bytes[PANEL_PRECISIONS];
     float *x, *y; /* 16 vectors of max(n, k) each */
     void *work;

@@ -5,7 +5,7 @@
  * B - E = rho F_e + D,  (I - R F') D = R F' (rho F_e)
  * with F_e, the light of the bright element itself, pair by pair and far more finely than the recipes do, and
  * F' of the recipe JUDGE (the one that is judged) and another seed for what bounces on: by then it comes from
- * everywhere, and its noise has averaged out. How much of it has not is printed beside. As CSV. */
+ * everywhere, and its noise has averaged out. The share of it that has not is printed beside. As CSV. */
 #include "solver/base/clock.h"
 #include "solver/bench/stats.h"
 #include "solver/formfactor/formfactor.h"

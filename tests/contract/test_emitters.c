@@ -352,7 +352,7 @@ START_TEST(memory_that_fails_is_not_lost) {
 }
 END_TEST
 
-/* What a file may hold that is no operator. */
+/* Files that hold no operator of this kind. */
 START_TEST(what_does_not_fit_is_refused) {
     problem *p = make_problem();
     for (int what = 0; what < 6; what++) {

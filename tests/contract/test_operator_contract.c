@@ -1,4 +1,4 @@
-/* What every operator kind owes: the same checks, run on each. */
+/* The contract of every operator kind: the same checks, run on each. */
 #include "support/suite.h"
 #include "support/transport.h"
 

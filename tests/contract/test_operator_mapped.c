@@ -152,7 +152,7 @@ START_TEST(mapped_operators_have_the_bits_of_copies) {
         ck_assert_msg(memcmp(found, wanted, count * sizeof *found) == 0, "%s", s->name);
         free(found);
     }
-    /* What is mapped can be saved again, and is then the same. */
+    /* A mapped operator can be saved again, with the same bits. */
     lam_operator *again = NULL;
     save(mapped, NULL);
     lam_operator_close(mapped);

@@ -102,7 +102,8 @@ START_TEST(bits_do_not_depend_on_the_batch) {
 }
 END_TEST
 
-/* What no double can certify ends, says what was reached, and leaves the outputs as they were. */
+/* A tolerance below what double certifies ends, says the bound that was reached, and leaves the outputs as
+ * they were. */
 START_TEST(a_tolerance_too_small_is_refused) {
     certified s = subject(_i);
     const size_t size = s.op->n_channels * s.op->n;

@@ -1,5 +1,5 @@
 /* Operators under other reflectances: the same bits as if their cores had been built so; what cannot be relit
- * is refused. What a relit operator computes is judged with every other kind, by the contract test. */
+ * is refused. The answers of a relit operator are judged with every other kind, by the contract test. */
 #include "solver/base/random.h"
 #include "solver/linalg/core.h"
 #include "support/failing_memory.h"
@@ -96,7 +96,7 @@ static void check_same_bits(const lam_operator *one, const lam_operator *other) 
     free(E);
 }
 
-/* Which reflectances change is all that differs, so a relit operator is, bit for bit, the one built: 0 or not
+/* Only the reflectances differ, so a relit operator is, bit for bit, the one built: 0 or not
  * before and after stand beside each other in random_reflectance. */
 START_TEST(the_bits_are_those_of_an_operator_built_so) {
     static const panel_precision precisions[] = {PANEL_F32, PANEL_F16, PANEL_I8};
@@ -105,7 +105,7 @@ START_TEST(the_bits_are_those_of_an_operator_built_so) {
     factors_of_test f = make_factors(_i / 2 % 2 == 1 ? 3 : 1);
     lam_operator *wide = build(&f, two_mesh, f.U, f.V, f.before), *before = wide, *relit = NULL, *back = NULL;
     if (precision != PANEL_F32) {
-        /* What a store in fewer bits has: the factors as they are kept, and the core of them. */
+        /* A store in fewer bits has the factors as they are kept, and the core of them. */
         ck_assert(operator_narrow(wide, precision, &before, &error) == LAM_OK);
         lam_operator_close(wide);
     }

@@ -5,7 +5,7 @@
 
 static lam_error error;
 
-/* How a file differs from a good one of n = 6, k = 2: what is 0 or NULL is as it should be. */
+/* A file's differences from a good one of n = 6, k = 2: a member that is 0 or NULL is as it should be. */
 typedef struct recipe {
     const char *what;
     bool factored, no_I, no_form;

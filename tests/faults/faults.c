@@ -1,4 +1,4 @@
-/* What goes wrong under a program: loaded before it (LD_PRELOAD), it lets one allocation fail, counts what is
+/* Faults under a program: loaded before it (LD_PRELOAD), it lets one allocation fail, counts what is
  * held, and sets the clock on the wall. A test steers it through the file that the variable FAULTS names,
  * which holds one struct controls and is shared by every process that has it.
  *

@@ -1,5 +1,5 @@
-/* What the harnesses share. Each is a LLVMFuzzerTestOneInput: libFuzzer and AFL++ call it with what they make
- * up, replay.c with files. */
+/* Checks and a scene that the harnesses share. Each is a LLVMFuzzerTestOneInput: libFuzzer and AFL++ call it
+ * with what they make up, replay.c with files. */
 #ifndef LAMBERT_TESTS_FUZZ_H
 #define LAMBERT_TESTS_FUZZ_H
 

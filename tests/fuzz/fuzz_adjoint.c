@@ -1,4 +1,4 @@
-/* What a client may send to be pulled back. */
+/* Adjoint requests as a client may send them. */
 #include "fuzz/fuzz.h"
 #include "solver/codec/adjoint.h"
 

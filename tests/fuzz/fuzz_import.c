@@ -1,10 +1,11 @@
-/* What may come back from the process that reads scene files: the parent takes it only when it is sound. */
+/* Replies of the process that reads scene files: the parent takes it only when it is sound. */
 #include "fuzz/fuzz.h"
 #include "solver/scene/import/imported_faces.h"
 
 #include <unistd.h>
 
-/* What the child's reader sends in place of a reply: inherited by the fork, so that it need not be handed in.
+/* The bytes that the child's reader sends in place of a reply: inherited by the fork, so that it need not be
+ * handed in.
  */
 typedef struct sent {
     const uint8_t *data;

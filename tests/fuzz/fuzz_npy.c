@@ -1,4 +1,4 @@
-/* What a client may send as NPY. */
+/* NPY arrays as a client may send them. */
 #include "fuzz/fuzz.h"
 #include "solver/codec/request.h"
 

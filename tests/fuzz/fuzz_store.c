@@ -1,4 +1,4 @@
-/* What a store may hold: it opens and answers with finite light, or is refused in one line. */
+/* Stores with any content: each opens and answers with finite light, or is refused in one line. */
 #include "fuzz/fuzz.h"
 #include "server/scene/scene.h"
 

@@ -56,7 +56,7 @@ with tempfile.TemporaryDirectory() as scratch:
     run("precompute", "box.obj", "--probes", 0, "--quiet", "-o", folder / "store" / "compressed.h5", "--method",
         "hierarchical", "--epsilon", .99, "--keep-form-factors=compressed")
 
-# What the importing process sends: a header, then points, elements, names, materials.
+# The reply of the importing process: a header, then points, elements, names, materials.
 header = struct.pack("<8sQ480s2048sQ7Q", b"lamsoup", 0, b"", b"", 0, 3, 1, 1, 2, 1, 2, 0)
 body = struct.pack("<9d", 0, 0, 0, 1, 0, 0, 0, 1, 0) + struct.pack("<6I", 0, 1, 2, 0xFFFFFFFF, 0, 0) + b"a\0" + b"m\0"
 (folder / "import" / "one").write_bytes(header + body + struct.pack("<6d2Q", .5, .5, .5, 0, 0, 0, 1, 1))

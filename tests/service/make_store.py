@@ -28,7 +28,7 @@ def text(value):
 
 
 class Scene:
-    """What a store holds: answers in double, for comparison."""
+    """The content of a store: answers in double, for comparison."""
 
     def __init__(self, n, channels=1, rank=5, seed=1, groups=("floor", "lamp", "box.red", "box.blue", "wall")):
         rng = np.random.default_rng(seed)
@@ -66,7 +66,7 @@ class Scene:
         return np.concatenate([np.flatnonzero(self.group == g) for g in ids])
 
     def first_bounce(self, tiles):
-        """What `tiles` sectors of the horizon give, as it is stored."""
+        """The first bounce of `tiles` sectors of the horizon, as it is stored."""
         return np.random.default_rng(tiles).random((tiles, self.n)).astype(np.float32)
 
     def solve(self, E, quantity="radiosity", L=None):

@@ -24,7 +24,7 @@ NPY = "application/x-npy"
 
 
 class Both(unittest.TestCase):
-    """What the classes below share."""
+    """Stores and checks that the classes below share."""
 
     def ask(self, name, body, **more):
         answer = self.daemon.post(f"/v1/scenes/{name}/adjoint", body, **more)

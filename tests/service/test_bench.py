@@ -108,7 +108,7 @@ class FormFactors(unittest.TestCase):
         for row in self.tables["throughput"]:
             for key in ("bare", "counted", "whole", "counted_ratio", "counted_speedup"):
                 self.assertGreater(float(row[key]), 0, row)
-            # what the bare loop casts must not end where it begins
+            # rays of the bare loop must not end where it begins
             self.assertLess(float(row["own_share"]), 1e-3, row)
 
     def test_resolution(self):

@@ -1,4 +1,4 @@
-"""Black box: `lambert bench service`. Whatever of wrk and nginx is installed takes part; figures are only looked at
+"""Black box: `lambert bench service`. wrk and nginx take part where they are installed; figures are only looked at
 where they come from a wrk that is made up, as they must not depend on the machine."""
 
 import csv

@@ -105,7 +105,7 @@ class Suggestions(unittest.TestCase):
 
 
 class Installed(unittest.TestCase):
-    """What the install target writes from the programs themselves."""
+    """Manual pages and completion, which the install target writes from the programs themselves."""
 
     PROGRAMS = (("lambert", LAMBERT), ("lambertd", LAMBERTD))
 

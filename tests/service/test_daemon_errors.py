@@ -242,7 +242,7 @@ class Errors(unittest.TestCase):
             self.refuse(body, 422, pointer=pointer)
         self.refuse('{"emission":{"groups":{"lamp":[1,2,-3]}}}', 422, "-3", name="colour",
                     pointer="/emission/groups/lamp/2")
-        # What is no error: zero below zero, and numbers too small for single precision.
+        # These are no errors: zero below zero, and numbers too small for single precision.
         for text in "-0", "-0.0", "-0e5", "1e-999", "1e-60":
             answer = self.daemon.radiosity("grey", dense(text), connection=self.connection)
             self.assertEqual(answer.status, 200, answer)

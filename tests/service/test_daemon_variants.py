@@ -141,7 +141,7 @@ class Variants(unittest.TestCase):
         with self.daemon(most=1) as daemon:
             self.made(daemon, RED)
             self.made(daemon, {"floor": .25})
-            # What the first one said of walls is forgotten: what is not named is the scene's.
+            # The walls of the first one are forgotten: a group that is not named has the scene's reflectance.
             self.check(daemon, "colour@red", scene.relit({"floor": .25}))
 
     def test_names(self):
@@ -316,7 +316,7 @@ class Variants(unittest.TestCase):
             self.assertEqual(self.put(daemon, half, "x", "two").status, 202)
             what = self.until(daemon, "/v1/scenes/two@x", 422)
             self.problem(what, 422, "two@x could not be built", "nearly singular")
-            # What was served is served on; it can be tried again, or deleted.
+            # The variant that was served is served on; the other can be tried again, or deleted.
             self.assertEqual(self.solve(daemon, "two@x", [1.0] * N).json()["radiosity"], before)
             self.made(daemon, {"wall": .3}, "x", "two")
             self.assertEqual(self.ask(daemon, "DELETE", "/v1/scenes/two@x").status, 204)

@@ -88,7 +88,7 @@ class Factors(unittest.TestCase):
         kept, _ = self.precompute("kept", "--method", "low-rank", "--rank", 96, "--keep-factors")
         exact, _ = self.precompute("exact", "--method", "exact", "--reflectance", .7)
         H, magnitude = self.relit(kept, np.float32(.7))
-        # What S - Q V^T leaves, in single precision: 96 roundings and 1/(1 - .7) of each.
+        # The rounding of S - Q V^T in single precision: 96 roundings and 1/(1 - .7) of each.
         self.assertLess(np.abs(self.solve(exact) - H).max(), 96 * 6e-8 * magnitude.max() / .3)
         self.assertGreater(np.abs(self.relit(kept, .5)[0] - H).max(), .1 * H.max())
 

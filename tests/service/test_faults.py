@@ -1,4 +1,4 @@
-"""What goes wrong around a daemon and not in a request: memory that ends, clocks that jump, kill -9, reloads without
+"""Faults around a daemon and not in a request: memory that ends, clocks that jump, kill -9, reloads without
 end. tests/faults/faults.c makes it go wrong; sanitizers bring allocators of their own, so this is for other builds."""
 
 import gzip
@@ -98,7 +98,7 @@ def each_request(n):
 
 
 def settled(answer):
-    """What must be the same each time: not the times, nor what a metric counts, nor whether it was compressed, nor what
+    """The part that must be the same each time: not the times, nor what a metric counts, nor whether it was compressed, nor what
     is still being built."""
     body = answer.body
     if answer.headers.get("Content-Encoding") == "gzip":
@@ -146,7 +146,7 @@ class Faults(unittest.TestCase):
             time.sleep(0.001)
 
     def fail_everywhere(self, daemon, controls, request, right):
-        """One allocation after the other fails, until the request is answered without so many. How often it was refused."""
+        """One allocation after the other fails, until the request is answered without so many. Returns the number of refusals."""
         refused = 0
         for k in range(10000):
             controls.fail_after(k)
@@ -182,7 +182,7 @@ class Faults(unittest.TestCase):
                 refused = sum(self.fail_everywhere(daemon, controls, *pair) for pair in zip(asked, right))
                 self.gone(daemon)
                 held.append(controls.held())
-            # What is made once and kept is there after the first time round; a thread may have its own a time later.
+            # Memory that is allocated once and kept is there after the first time round; a thread may have its own a time later.
             self.assertLessEqual(min(held[1:]) - held[0], 8, held)
             self.assertGreater(refused, 10 * len(asked))
             for request, wanted in zip(asked, right):
@@ -222,7 +222,7 @@ class Faults(unittest.TestCase):
 
     @staticmethod
     def solves():
-        """Those of the requests that have one answer, as what a dict can hold."""
+        """Answers of the requests that have one answer, as what a dict can hold."""
         return [(method, path, tuple(headers.items()), body) for method, path, headers, body in requests(N)
                 if path.startswith("/v1/scenes/grey/") and method == "POST" and "moon" not in str(body)
                 and body != '{"emission":[1,' and len(str(body)) > 60][:5]

@@ -1,4 +1,4 @@
-"""What lambertd holds against bad clients: limits of memory, connections and time; and that others do not feel it."""
+"""lambertd's defence against bad clients: limits of memory, connections and time; and that others do not feel it."""
 
 import json
 import os
@@ -93,7 +93,7 @@ class Guard(unittest.TestCase):
             answer = daemon.ask("POST", "/v1/scenes/box/radiosity", iter([b" " * 65536] * 20), connection=connection)
             self.assertEqual((answer.status, answer.headers["Retry-After"]), (503, "1"), answer)
             self.assertEqual(metrics(daemon)[("lambertd_body_bytes",)], 3 * MIB)
-            # What fits is served meanwhile, on that connection too.
+            # A request that fits is served meanwhile, on that connection too.
             self.assertEqual(daemon.radiosity("box", SOLVE, connection=connection).status, 200)
             connection.close()
             first.sendall(whole[3 * MIB :])
@@ -118,7 +118,7 @@ class Guard(unittest.TestCase):
             self.serves(daemon)
             self.assertEqual(idle[0].recv(1), b"")
             self.assertGreaterEqual(cuts(daemon, "place"), 1)
-            # Who is in the middle of a request is not idle.
+            # A client in the middle of a request is not idle.
             working.sendall(SOLVE[5:])
             self.assertTrue(working.recv(65536).startswith(b"HTTP/1.1 200 "))
             for s in working, *idle:
@@ -150,7 +150,7 @@ class Guard(unittest.TestCase):
             before = cpu_seconds(daemon)
             for s in clients[:3]:
                 self.assertEqual(read_all(s), b"")
-            # So much only a daemon spends that turns round and round for the second until they are cut.
+            # Only a daemon that spins until the clients are cut spends more.
             self.assertLess(cpu_seconds(daemon) - before, 0.5)
             for s in clients:
                 s.close()

@@ -1,4 +1,4 @@
-"""What answers carry beside their bodies: codings, entity tags, request ids; and /metrics as Prometheus reads it."""
+"""Headers of answers: codings, entity tags, request ids; and /metrics as Prometheus reads it."""
 
 import ctypes
 import ctypes.util
@@ -90,7 +90,7 @@ class Headers(unittest.TestCase):
         answer = self.ask("zstd", body=dark, accept="application/x-npy")
         self.assertEqual(answer.headers["Content-Encoding"], "zstd")
         self.assertEqual(np.abs(np.load(io.BytesIO(unzstd(answer.body)))).max(), 0)
-        # Who takes nothing else gets it coded whatever that saves.
+        # A client that takes nothing else gets it coded, whatever that saves.
         answer = self.ask("gzip, identity;q=0", body=short)
         self.assertEqual(len(json.loads(gzip.decompress(answer.body))["radiosity"]), 1)
 

@@ -213,7 +213,7 @@ class OpenApi(unittest.TestCase):
         for name, header in response["headers"].items():
             header = self.at(header)
             given = answer.headers[name]
-            # What is short is never coded, whatever is asked for.
+            # A short answer is never coded, whatever is asked for.
             if given is None:
                 self.assertIn(name, ("Content-Encoding", "Vary"))
                 continue

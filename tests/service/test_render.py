@@ -102,7 +102,7 @@ class Render(unittest.TestCase):
         darker = self.draw(self.cornell, "--size", "90x90", "--exposure", -1).mean()
         self.assertGreater(brighter, plain + 10)
         self.assertLess(darker, plain - 10)
-        # What the lamp sends is no part of what it receives by reflection.
+        # The lamp's own emission is no part of the light that it receives by reflection.
         indirect = self.draw(self.cornell, "--size", "240x240", "--quantity", "indirect")
         self.assertFalse((indirect.min(2) >= 250).any())
         self.draw(self.cornell, "--size", "90x90", "--quantity", "irradiance")
@@ -214,7 +214,7 @@ class Render(unittest.TestCase):
 
 
 class Visible(unittest.TestCase):
-    """How many elements each one sees, of both ways in which form factors are kept."""
+    """The number of elements that each one sees, by both ways in which form factors are kept."""
 
     def test_counts_and_colours(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -68,7 +68,7 @@ class Sky(unittest.TestCase):
             middle[np.isclose(np.diff(azimuth)[:, 0], 2 * np.pi)] = np.pi / 2
             np.testing.assert_allclose(t.tiles[:, 0], np.sin(towards) * np.cos(middle), atol=1e-14)
             np.testing.assert_allclose(t.tiles[:, 1], np.cos(towards) * np.cos(middle), atol=1e-14)
-            # What comes in is what rows leave outside; the yard shows nobody a back face but its lamp and walls.
+            # The incoming light is the part that rows leave outside; the yard shows nobody a back face but its lamp and walls.
             outside = 1 - t.F.sum(axis=1)
             self.assertTrue((t.first_bounce.sum(axis=0) / np.pi <= outside + 1e-6).all())
             self.assertGreater(t.first_bounce.sum(), 0)
@@ -153,7 +153,7 @@ class Sky(unittest.TestCase):
             t = Truth(path)
             outside = 1 - t.F.sum(axis=1)
             self.assertTrue((t.first_bounce.sum(axis=0) / np.pi <= outside + 1e-6).all(), options)
-            # What of the outside is no back face is sky or ground; of floor and walls at least this much.
+            # The part of the outside that is no back face is sky or ground; of floor and walls at least this much.
             self.assertGreater((t.area * t.first_bounce.sum(axis=0)).sum(), 0.5 * np.pi * (t.area * outside).sum())
             with h5py.File(path) as f:
                 if options[0] == "--quality":  # the sky needs more rays than the pairs do

@@ -70,7 +70,7 @@ def load_xxhash():
 
 
 class Store:
-    """What FORMAT.md says of an operator, in numpy, in double."""
+    """An operator as FORMAT.md describes it, in numpy, in double."""
 
     def __init__(self, path):
         with h5py.File(path, "r") as f:
@@ -123,7 +123,7 @@ class Store:
         return np.where(black, E, E + row), row / np.where(black, 1, rho)
 
     def rounding(self, E):
-        """How far single precision may be from it: an operation rounds by ROUND of what it adds, and no sum
+        """A bound on the rounding of single precision: an operation rounds by ROUND of what it adds, and no sum
         here has more terms than n for each of at most three products."""
         return 3 * (self.n + 2) * ROUND * (np.abs(E) + self.bounced(E, magnitude=True))
 

@@ -110,7 +110,7 @@ class Streamed(unittest.TestCase):
             sky, other = one["sky/first_bounce"][()].astype(float), two["sky/first_bounce"][()].astype(float)
             self.assertEqual(sky.shape, other.shape)
             self.assertLess(np.abs(sky - other).sum(), .01 * other.sum())
-            # What elements send to others, the sky and the ground (which gives a fifth back) is all there is.
+            # The light that elements send to others, the sky and the ground (which gives a fifth back) is all there is.
             self.assertLess((one["mesh/row_sums"][()] + sky.sum(axis=0) / np.pi).max(), 1 + 1e-5)
 
     def test_it_ends_when_asked_to(self):

@@ -33,8 +33,8 @@ static void check(const stability_problem *p, double rho, const stability_way *w
                       way->factorizer, r.message);
         return;
     }
-    /* What single precision leaves: an n-th part of n rounded entries weighs as one, and a bounce that loses
-     * 1 - rho of its light makes 1 / (1 - rho) of it; twenty for the steps between. */
+    /* The rounding of single precision: an n-th part of n rounded entries weighs as one, and a bounce that
+     * loses 1 - rho of its light makes 1 / (1 - rho) of it; twenty for the steps between. */
     double most = 0;
     for (size_t i = 0; i < p->n; i++) most = fmax(most, (double)p->reflectance[i]);
     const double rounding = 20 * (double)FLT_EPSILON / (1 - most);

@@ -182,7 +182,8 @@ END_TEST
 /* --- foreign files -----------------------------------------------------------------------------------------
  */
 
-/* What tests/support/foreign_stores.py makes of a sample, and what reading all of it must answer. */
+/* A sample as tests/support/foreign_stores.py changes it, and the status that reading all of it must answer.
+ */
 static const struct foreign {
     const char *name;
     lam_status expected;

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_TESTS_FAILING_MEMORY_H
 #define LAMBERT_TESTS_FAILING_MEMORY_H
 
-/* How many allocations succeed from now on; negative: all. */
+/* Number of allocations that succeed from now on; negative: all. */
 extern long allocations_left;
 
 #endif

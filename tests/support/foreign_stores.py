@@ -1,6 +1,6 @@
 """Makes files that are not quite stores out of a sound sample: foreign_stores.py SAMPLE.h5
 
-Writes NAME.h5 beside the sample and prints each NAME. What a reader must answer stands in
+Writes NAME.h5 beside the sample and prints each NAME. The answers that a reader must give stand in
 tests/stress/test_store_weather.c.
 """
 

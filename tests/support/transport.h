@@ -28,7 +28,7 @@ typedef struct transport {
     double *F;          /* [n][n] form factors of the truth, that all channels share */
     double *P;          /* [C][n][n] bounced light, mesh order: what the kind must compute */
     double *magnitude;  /* [C][n][n] the sum of the magnitudes of the products behind P */
-    double roundings;   /* how often each of those products is rounded at most, in units of u */
+    double roundings;   /* the most roundings of each of those products, in units of u */
     uint32_t *order;    /* [n] or NULL */
     panel_precision precision;
     lam_operator *op;

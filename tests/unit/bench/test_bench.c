@@ -162,7 +162,7 @@ static lam_status reap_table(void *context, const table *t, lam_error *error) {
     strcat(strcat(h->tables, " "), t->name);
     if (strcmp(t->name, "kinds") == 0) h->kind_rows = table_rows(t);
     if (strcmp(t->name, "map") == 0) h->map_rows = table_rows(t);
-    /* Whatever is counted or measured in the first rows is there and not below 0. */
+    /* Each count and measure in the first rows is there and not below 0. */
     for (size_t c = 0; c < t->n_columns && c < 2; c++)
         if (t->columns[c].unit != NULL) ck_assert_double_ge(t->cells[c].number, 0);
     return LAM_OK;

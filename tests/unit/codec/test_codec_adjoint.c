@@ -112,7 +112,7 @@ START_TEST(others_are_selected) {
         0);
     ck_assert(!request.reduce.linear && request.select);
     ck_assert_mem_eq(request.E, ((float[N]){0, 0, 2}), N * sizeof(float));
-    /* Those of box.red once. */
+    /* Elements of box.red appear once. */
     ck_assert_uint_eq(request.n_selected, 4);
     ck_assert_mem_eq(request.selected, ((uint32_t[]){1, 4, 0, 3}), 4 * sizeof(uint32_t));
     radiosity_request_free(&request);
@@ -155,7 +155,8 @@ START_TEST(linear_reductions_cost_what_they_name) {
     ck_assert_uint_eq(
         read_radiosity(&f, "{\"emission\":{\"elements\":[1000000000],\"values\":[1]}}", &request), 422);
     radiosity_request_free(&request);
-    /* What is no linear reduction of sparse vectors is not even tried where nothing else is wanted. */
+    /* A request that is no linear reduction of sparse vectors is not even tried where nothing else is wanted.
+     */
     static const char *const others[] = {
         "{\"emission\":[1", "{\"select\":{\"groups\":[\"wall\"]},\"emission\":{\"groups\":{}}}",
         "{\"emission\":{\"groups\":{}},\"reduce\":{\"groups\":[\"wall\"],\"with\":[\"max\"]}}",

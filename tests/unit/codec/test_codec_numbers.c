@@ -286,7 +286,8 @@ START_TEST(plain_numbers_are_the_same_numbers) {
 }
 END_TEST
 
-/* What the quick way must leave to the slow one: not numbers, what is written otherwise, what is too large.
+/* Texts that the quick way must leave to the slow one: not numbers, what is written otherwise, what is too
+ * large.
  */
 START_TEST(what_is_not_plain_is_left) {
     static const char *const left[] = {"[-1]",     "[01]",

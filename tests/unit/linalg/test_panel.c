@@ -272,7 +272,8 @@ START_TEST(chosen_rows_have_the_same_bits) {
 }
 END_TEST
 
-/* What a is kept as, [n][k] values in a place that begins odd where it may, with what is no number behind. */
+/* The values of a as they are kept, [n][k] values in a place that begins odd where it may, with what is no
+ * number behind. */
 static panel view_of(const panel *a, void **memory) {
     const size_t size = panel_value_size(a->precision), bytes = a->n * a->k * size;
     lam_error error = {.message = ""};

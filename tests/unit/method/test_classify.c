@@ -1,4 +1,5 @@
-/* What decides the kind of an operator: rows of inverses, how much of them may go, and the choice. */
+/* The measures that decide the kind of an operator: rows of inverses, how much of them may go, and the
+ * choice. */
 #include "solver/base/random.h"
 #include "solver/method/classify.h"
 #include "solver/method/reference.h"

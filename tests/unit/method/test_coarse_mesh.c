@@ -165,8 +165,8 @@ START_TEST(splitting_stops_at_the_smallest_area) {
             const size_t count = c.begin[p + 1] - c.begin[p];
             ck_assert(count == 1 || c.area[p] <= options.min_area ||
                       (double)c.coherence[p] >= options.coherence - 1e-6);
-            /* What it was split from was above: a half is at least 3 / 8 of it (3 of 8 rows, at worst 1 of
-             * 3). */
+            /* The patch that it was split from was above: a half is at least 3 / 8 of it (3 of 8 rows, at
+             * worst 1 of 3). */
             ck_assert(c.area[p] > options.min_area / 3 || c.area[p] >= 17.9 || count == 1);
         }
         if (smallest[_i] > 60) ck_assert_uint_eq(c.k, 6);

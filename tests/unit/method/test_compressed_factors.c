@@ -132,7 +132,7 @@ START_TEST(bounds_hold) {
 }
 END_TEST
 
-/* What a group sends is known as well as F itself: it is kept. */
+/* Direct illumination of a whole group is kept, so it is as exact as by F itself. */
 START_TEST(groups_are_exact) {
     view v = make_view(CORNELL);
     compressed_factors c = finished(&v, .02);

@@ -1,4 +1,4 @@
-/* What factorizers are made of: products with S, Gram matrices and their eigenvectors, bases. */
+/* The parts of factorizers: products with S, Gram matrices and their eigenvectors, bases. */
 #include "solver/method/low_rank/gram.h"
 #include "solver/method/low_rank/sketch.h"
 #include "support/subject.h"

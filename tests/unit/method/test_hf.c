@@ -79,7 +79,7 @@ START_TEST(hf_keeps_its_bound) {
 }
 END_TEST
 
-/* What a node leaves out is orthogonal to what its parent drops: with all of a level's error in one place the
+/* The error of a node is orthogonal to that of its parent: with all of a level's error in one place the
  * bound of squares is nearly reached, and that of sums is far. */
 START_TEST(errors_add_in_squares) {
     subject s;
@@ -163,7 +163,7 @@ START_TEST(forecast_knows_the_samples) {
 }
 END_TEST
 
-/* How often rays hit what they meet so often on average (Knuth 1969). */
+/* A Poisson variate of this mean: hits of rays (Knuth 1969). */
 static int poisson(double mean, uint64_t *state) {
     int count = 0;
     for (double left = exp(-mean), at = random_lcg_unit(state); at > left; at *= random_lcg_unit(state))

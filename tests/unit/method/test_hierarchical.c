@@ -151,7 +151,7 @@ START_TEST(black_and_white) {
 }
 END_TEST
 
-/* What is below the noise of rays is not kept, whatever epsilon asks for. */
+/* A coefficient below the noise of rays is not kept, whatever epsilon asks for. */
 START_TEST(noise_sets_the_threshold) {
     closed s = closed_make(unit_cube, 6, .5f);
     build_report report;

@@ -167,7 +167,7 @@ START_TEST(furnace) {
 }
 END_TEST
 
-/* What is emitted is absorbed, sum A E = sum A (1 - rho) H, for any light: as columns A_i F~_ij sum to
+/* Emitted power is absorbed, sum A E = sum A (1 - rho) H, for any light: as columns A_i F~_ij sum to
  * A_j times the mean row sum of the patch, which in a closed room is 1, like those of F. */
 START_TEST(power_is_balanced) {
     static const size_t ranks[] = {1, 4, 13, 30};

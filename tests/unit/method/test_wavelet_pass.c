@@ -20,7 +20,7 @@ START_TEST(a_pass_finds_every_coefficient) {
     ck_assert_mem_eq(found.indices, again.indices, found.indptr[n] * sizeof *found.indices);
     ck_assert_mem_eq(found.data, again.data, found.indptr[n] * sizeof *found.data);
     csr_free(&again);
-    /* What is above a threshold, and nothing else. */
+    /* The entries above a threshold, and no others. */
     for (size_t t = 0; t < s.basis.n_nodes; t++) weight[t] = t % 2 == 0 ? 1 : .5f;
     again = pass(&s, .02f, weight, 2);
     double *some = whole(&again);
@@ -309,7 +309,8 @@ START_TEST(doubling_inverts) {
         for (size_t k = 0; k < n; k++)
             for (size_t q = 0; q < n; q++) K[p * n + q] += S[p * n + k] * A[k * n + q];
     double *truth = in_basis(&s, K), *all = whole(&found);
-    /* What is left out is below 1e-6 an entry; of single precision |A|^-1 and its square is at most 25 times.
+    /* An entry that is left out is below 1e-6 an entry; of single precision |A|^-1 and its square is at most
+     * 25 times.
      */
     ck_assert_double_le(largest_difference(n * n, all, truth), 1e-4);
     input.n_threads = 3;

@@ -10,7 +10,7 @@ static wavelet_reach reach_make(const subject *s, double radii) {
     return r;
 }
 
-/* What node t hands up of position p, level by level. */
+/* The scaling coefficients of node t for a 1 at position p, level by level. */
 static void hand_up(const wavelets *w, size_t t, size_t p, double up[3]) {
     const wavelet_node *a = &w->nodes[t];
     const float *columns = w->padded + (size_t)a->shape * 2 * WAVELET_INPUTS * WAVELET_INPUTS;
@@ -89,7 +89,7 @@ START_TEST(cells_of_a_leaf) {
 }
 END_TEST
 
-/* Whether a node looks at all of another of its height: at each half of it. */
+/* True where a node knows another of its height whole: both halves of it. */
 static bool sees_all(const wavelet_reach *r, size_t a, size_t b) {
     const wavelet_node *node = &r->basis->nodes[b];
     if (node->from_left == 0) return wavelet_is_near(r, a, b);

@@ -71,7 +71,7 @@ START_TEST(the_basis_is_orthonormal) {
 }
 END_TEST
 
-/* What is the same everywhere is one number; what is linear on a plane is none within it. */
+/* A constant is one coefficient; a function that is linear on a plane has none within it. */
 START_TEST(smooth_functions_are_few_numbers) {
     subject s = wavelet_subject_make(_i);
     const size_t n = s.m.n;

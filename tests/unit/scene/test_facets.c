@@ -146,7 +146,7 @@ START_TEST(a_box_is_six) {
 }
 END_TEST
 
-/* What was divided evenly lies in cells that one element fills: nothing is looked for. */
+/* An evenly divided mesh lies in cells that one element fills: nothing is looked for. */
 START_TEST(even_divisions_need_no_search) {
     const double size[3] = {10, 6, 3};
     mesh m = box_mesh(size, 7, .5f);

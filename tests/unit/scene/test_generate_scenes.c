@@ -1,4 +1,4 @@
-/* What the generated scenes of many surfaces have in common, whatever they show. */
+/* Properties that all generated scenes of many surfaces have. */
 #include "support/suite.h"
 
 #include "solver/formfactor/visibility/sample.h"
@@ -123,7 +123,7 @@ static double turn(const double *a, const double *b, const double *p, const floa
     return sum;
 }
 
-/* Whether a point lies in an element, to within a hundredth of a millimetre off its plane and not on its
+/* True where a point lies in an element, to within a hundredth of a millimetre off its plane and not on its
  * border. */
 static bool is_in(const mesh *m, size_t i, const double p[3]) {
     const double *first = m->vertices[m->elements[i][0]];
@@ -184,7 +184,7 @@ START_TEST(the_surface_has_no_gaps) {
 }
 END_TEST
 
-/* What became of rays from every element. */
+/* The fate of rays from every element. */
 typedef struct tally {
     size_t all, gone, backs;
     size_t far;   /* met what is 8 m away or more, seen from above */

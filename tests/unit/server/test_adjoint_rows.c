@@ -103,7 +103,7 @@ static double mean_of(const fixture *f, size_t g, lam_quantity quantity, size_t 
     return sum / total;
 }
 
-/* Whether the row answers as it should. */
+/* True where the row answers as it should. */
 static void judge(const fixture *f, const adjoint_row *row, const radiosity_request *request, size_t g) {
     double means[2 * C];
     ck_assert(adjoint_row_suffices(&f->s, row, request));
@@ -174,7 +174,7 @@ START_TEST(the_oldest_row_goes) {
 }
 END_TEST
 
-/* What others take of the memory rows cannot have: fewer are kept, then none, and all answer. */
+/* Rows get the memory that others leave: fewer are kept, then none, and all answer. */
 START_TEST(a_ledger_without_room) {
     fixture f;
     setup(&f, 15);

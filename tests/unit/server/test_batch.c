@@ -10,7 +10,7 @@
 
 enum { MOST_PASSES = 64, MOST_JOBS = 64 };
 
-/* What the test and the queue's threads share. */
+/* State that the test and the queue's threads share. */
 typedef struct stage {
     pthread_mutex_t lock;
     sem_t entered; /* posted by every pass that begins */
@@ -208,7 +208,7 @@ START_TEST(brief_ones_come_evenly) {
 }
 END_TEST
 
-/* What does not belong together does not go together; two threads let them go side by side. */
+/* Jobs of different keys share no pass; two threads let them go side by side. */
 START_TEST(keys_have_passes_of_their_own) {
     stage s;
     job jobs[5];
@@ -309,8 +309,8 @@ static bool begin_that_lets_go(batch_job *b, batch_workspace *workspace) {
     return false;
 }
 
-/* While somebody is at what is brief nobody is woken for what comes. Who turns from that to something long
- * has another thread woken first: here the long one ends only once the last has begun. */
+/* While somebody is at what is brief nobody is woken for what comes. A thread that turns from that to
+ * something long has another thread woken first: here the long one ends only once the last has begun. */
 START_TEST(what_waits_behind_a_long_one_is_handed_over) {
     stage s;
     job jobs[3];

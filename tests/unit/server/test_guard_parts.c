@@ -1,5 +1,5 @@
-/* What the daemon tells connections, answers and requests apart by: who is cut and who is not, entity tags,
- * request ids. */
+/* The rules by which the daemon tells connections, answers and requests apart: who is cut and who is not,
+ * entity tags, request ids. */
 #include "server/http/http_fields.h"
 #include "server/net/connections.h"
 #include "support/suite.h"
@@ -22,7 +22,7 @@ static pair open_pair(connections *all) {
     return p;
 }
 
-/* Whether the client sees an end, now. */
+/* True where the client sees an end, now. */
 static bool is_cut(const pair *p) {
     char byte;
     return recv(p->theirs, &byte, 1, MSG_DONTWAIT) == 0;
@@ -170,7 +170,7 @@ START_TEST(tags) {
     snprintf(header, sizeof header, "%s , W/%s", other, plain);
     ck_assert(etag_is_listed(header, plain) && etag_is_listed(header, other) &&
               !etag_is_listed(header, coded));
-    /* What stands inside a quoted tag is no tag. */
+    /* Text inside a quoted tag is no tag. */
     snprintf(header, sizeof header, "\"x, %.17s", plain + 1);
     ck_assert(!etag_is_listed(header, plain));
     static const char *const none[] = {"", ",", "\"", "W/", "W/\"", "\"\"", "a", "x*", " ", NULL};

@@ -39,7 +39,7 @@ START_TEST(message_is_one_line) {
 }
 END_TEST
 
-/* Whatever the length: it fits, and a character of two or three bytes is whole or gone. */
+/* A message of any length fits, and a character of two or three bytes is whole or gone. */
 START_TEST(message_is_cut_between_characters) {
     char text[700];
     lam_error error;
@@ -52,7 +52,7 @@ START_TEST(message_is_cut_between_characters) {
         ck_assert_uint_lt(length, sizeof error.message);
         ck_assert_uint_gt(length, sizeof error.message - 8);
         ck_assert_mem_eq(error.message, text, length);
-        ck_assert_int_ne(text[length] & 0xC0, 0x80); /* what follows the cut begins a character */
+        ck_assert_int_ne(text[length] & 0xC0, 0x80); /* the text after the cut begins a character */
     }
 }
 END_TEST

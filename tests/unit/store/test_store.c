@@ -1,4 +1,4 @@
-/* What is written to a store comes back; what is not a store is refused. */
+/* Data written to a store comes back; a file that is not a store is refused. */
 #include "store/store_private.h"
 #include "support/store_sample.h"
 #include "support/suite.h"
@@ -281,7 +281,7 @@ START_TEST(bad_names_are_not_written) {
         ck_ok(store_create(path, &s, &error));
         check_failure(store_write(s, names[i], STORE_F64, 1, &one, &(double){1}, &error), LAM_ERR_ARGUMENT,
                       path);
-        ck_assert_int_ne(store_seal(s, &error), LAM_OK); /* what is not complete is not sealed */
+        ck_assert_int_ne(store_seal(s, &error), LAM_OK); /* an incomplete store is not sealed */
         ck_assert_int_eq(sample_folder_extras(folder, NULL), 0);
     }
     store *s = NULL;

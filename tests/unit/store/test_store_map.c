@@ -99,7 +99,7 @@ START_TEST(large_arrays_lie_in_the_file) {
     for (size_t i = 0; i < LARGE; i++) ck_each(((const float *)large.data)[i] == value_at(i));
     lam_error error = {.message = ""};
     ck_assert_msg(store_map_verify(large.map, NULL, &error) == LAM_OK, "%s", error.message);
-    /* What is behind the last array can be read as far as was promised. */
+    /* Memory behind the last array can be read as far as was promised. */
     volatile unsigned char sum = 0;
     for (size_t i = 0; i < STORE_MAP_SLACK; i++)
         sum = (unsigned char)(sum + ((const unsigned char *)begin)[bytes - 1 - i]);
