@@ -119,17 +119,24 @@ static void help_end(const option_command *command) {
     print_wrapped(command->notes, 0, 0);
 }
 
+/* True if some row of a table is explained here and not in another table. */
+static bool has_help(const option_table *tables, const option_table *t) {
+    for (const option_row *row = t->rows; row->name != NULL; row++)
+        if (option_is_first(tables, row)) return true;
+    return false;
+}
+
 void option_text_help(const option_command *command, const option_table *tables) {
     help_begin(command, true);
     for (const option_table *t = tables; t->rows != NULL; t++) {
-        const bool goes_on = t->heading != NULL && *t->heading == '\0';
-        if (!goes_on) putchar('\n');
-        if (t->heading != NULL && !goes_on) {
+        if (!has_help(tables, t)) continue;
+        if (t->heading == NULL || *t->heading != '\0') putchar('\n');
+        if (t->heading != NULL && *t->heading != '\0') {
             putchar(' ');
             print_wrapped(t->heading, 1, 1);
         }
         for (const option_row *row = t->rows; row->name != NULL; row++)
-            if (row->help != NULL) help_row(row);
+            if (option_is_first(tables, row)) help_row(row);
     }
     putchar('\n');
     help_end(command);
@@ -192,9 +199,10 @@ static void manual_usage(const option_command *command, bool has_options) {
 static void manual_tables(const option_table *tables) {
     char label[TEXT_MOST], text[TEXT_MOST];
     for (const option_table *t = tables; t->rows != NULL; t++) {
+        if (!has_help(tables, t)) continue;
         if (t->heading != NULL && *t->heading != '\0') roff_request("SS", t->heading);
         for (const option_row *row = t->rows; row->name != NULL; row++) {
-            if (row->help == NULL) continue;
+            if (!option_is_first(tables, row)) continue;
             option_signature(row, label);
             option_explanation(row, true, text);
             roff_item(label, text);

@@ -94,17 +94,17 @@ done:
     return status;
 }
 
-lam_status city_sparse(const bench_run *run, const city *c, double threshold, sparse_correction correction,
+lam_status city_sparse(const bench_run *run, const city *c, double threshold, const char *correction,
                        lam_operator **op, build_report *report, lam_error *error) {
-    const build_options options = {.method = "sparse",
-                                   .factorizer = "auto",
-                                   .epsilon = .05,
-                                   .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
-                                   .threshold = threshold,
-                                   .correction = correction,
-                                   .seed = run->seed,
-                                   .progress = run->progress};
-    return build_operator(&c->problem, &options, op, report, error);
+    lam_status status = LAM_OK;
+    build_options options = build_presets("sparse");
+    options.seed = run->seed;
+    options.progress = run->progress;
+    TRY(build_set_number(&options, "threshold", threshold, error));
+    TRY(build_set(&options, "correction", correction, error));
+    TRY(build_operator(&c->problem, &options, op, report, error));
+done:
+    return status;
 }
 
 lam_status city_light_answer(const city_light *d, const lam_operator *op, float *B, lam_error *error) {

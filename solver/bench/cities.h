@@ -5,8 +5,8 @@
 #include "solver/bench/bench.h"
 #include "solver/bench/lowrank.h"
 #include "solver/formfactor/formfactor.h"
+#include "solver/method/low_rank/spectrum.h"
 #include "solver/method/method.h"
-#include "solver/method/spectrum.h"
 
 enum { CITY_VARIANTS = 3, CITY_SIZES = 3, CITY_TERRAINS = 3, CITY_THRESHOLDS = 3, CITY_SKIES = 3650 };
 
@@ -48,8 +48,9 @@ typedef struct city_light {
 lam_status city_light_make(const bench_run *run, const city *c, city_light *d, lam_error *error);
 void city_light_free(city_light *d);
 
-/* M~ at a threshold, with the other defaults of precompute. */
-lam_status city_sparse(const bench_run *run, const city *c, double threshold, sparse_correction correction,
+/* M~ at a threshold and with a correction ("none", "delta", "discarded"), with the other defaults of
+ * precompute. */
+lam_status city_sparse(const bench_run *run, const city *c, double threshold, const char *correction,
                        lam_operator **op, build_report *report, lam_error *error);
 
 /* B~ [m][n] of an operator, and |B~ - B| over |B| and |B - E| of each tile, area-weighted. */

@@ -69,16 +69,16 @@ static lam_status look_at(const bench_run *run, const lowrank_scene *s, float re
     for (size_t i = 0; i < n; i++) rho[i] = reflectance;
     for (size_t first = 0; first < count; first += AT_ONCE) {
         const size_t m = count - first < AT_ONCE ? count - first : AT_ONCE;
-        const light_columns unit = {.n = n,
-                                    .F = &s->f.F,
-                                    .area = s->m.area,
-                                    .rho = rho,
-                                    .m = m,
-                                    .E = E,
-                                    .progress = run->progress,
-                                    .stage = "columns of M"};
+        const many_lights_input unit = {.n = n,
+                                        .F = &s->f.F,
+                                        .area = s->m.area,
+                                        .rho = rho,
+                                        .m = m,
+                                        .E = E,
+                                        .progress = run->progress,
+                                        .stage = "columns of M"};
         for (size_t v = 0; v < m; v++) E[v * n + s->z_order[(first + v) * n / count]] = 1;
-        TRY(columns_jacobi(&unit, SWEEPS, T, error));
+        TRY(many_lights_jacobi(&unit, SWEEPS, T, error));
         for (size_t v = 0; v < m; v++) {
             const size_t one = v * n + s->z_order[(first + v) * n / count];
             T[one] += E[one]; /* M = I + (M - I) */

@@ -3,7 +3,7 @@
 #include "solver/bench/cities.h"
 #include "solver/bench/formfactors.h"
 #include "solver/bench/scenes.h"
-#include "solver/method/classify.h"
+#include "solver/method/choice.h"
 #include "solver/method/low_rank/tsvd.h"
 
 #include <math.h>
@@ -24,14 +24,17 @@ static lam_status add_place(const bench_run *run, const lowrank_scene *s, table 
     lam_status status = LAM_OK;
     const build_problem problem = lowrank_problem(s);
     const double n = (double)s->m.n;
-    const classify_options how = {
-        .epsilon = .05, .seed = run->seed, .thorough = true, .progress = run->progress};
-    scene_class fine;
+    build_options how = build_presets("auto");
+    decision fine = {.n_candidates = 0};
     spectrum values = {.nodes = 0};
     TRY(bench_check(run, error));
-    TRY(classify_scene(&problem, &how, &fine, error));
+    how.seed = run->seed;
+    how.progress = run->progress;
+    TRY(choose_method(&problem, &how, true, &fine, error));
+    const double rank = decision_figure(&fine, "rank", "estimate", NAN);
+    const candidate *low_rank = decision_find(&fine, "low-rank");
     TRY(map_spectrum(run, s, &values, error));
-    const double rough = classify_rank(&values, .1);
+    const double rough = spectrum_rank(&values, .1);
     table_text(out, s->name);
     table_number(out, n);
     table_number(out, 100 * fine.density);
@@ -39,14 +42,17 @@ static lam_status add_place(const bench_run *run, const lowrank_scene *s, table 
     table_number(out, spectrum_above(&values, .5));
     table_number(out, spectrum_above(&values, .1));
     table_number(out, rough);
-    table_number(out, fine.rank);
-    table_number(out, 100 * fine.rank / n);
-    table_number(out, fine.tail);
-    table_text(out, fine.method);
-    table_number(out, strcmp(fine.method, "sparse") == 0 ? fine.threshold : NAN);
+    table_number(out, rank);
+    table_number(out, 100 * rank / n);
+    table_number(out, low_rank != NULL ? low_rank->left : NAN);
+    table_text(out, fine.taken->method->name);
+    table_number(out, strcmp(fine.taken->method->name, "sparse") == 0
+                          ? decision_figure(&fine, "sparse", "threshold", NAN)
+                          : NAN);
     table_text(out, fine.reason);
     bench_say(run, "%s, %zu elements: %s", s->name, s->m.n, fine.reason);
 done:
+    decision_free(&fine);
     spectrum_free(&values);
     return status;
 }
@@ -172,7 +178,7 @@ lam_status map_spectrum(const bench_run *run, const lowrank_scene *s, spectrum *
     scaled_matrix S = {0};
     row_source_of_csr(&rows, &s->f.F);
     TRY(scaled_init(&S, &rows, s->m.area, s->z_order, error));
-    TRY(spectrum_find(&S, CLASSIFY_STEPS, run->seed, run->progress, out, error));
+    TRY(spectrum_find(&S, SPECTRUM_STEPS, run->seed, run->progress, out, error));
 done:
     scaled_free(&S);
     return status;

@@ -98,16 +98,16 @@ static lam_status time_jacobi(const bench_run *run, const city *c, const city_li
     float *T = memory_allocate(JACOBI_VECTORS, n * sizeof *T, "answers", error);
     if (E == NULL || T == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t v = 0; v < JACOBI_VECTORS; v++) memcpy(E + v * n, d->E + v % d->m * n, n * sizeof *E);
-    const light_columns all = {.n = n,
-                               .F = &c->f.F,
-                               .area = c->m.area,
-                               .rho = c->m.reflectance,
-                               .m = JACOBI_VECTORS,
-                               .E = E,
-                               .progress = run->progress,
-                               .stage = "jacobi"};
+    const many_lights_input all = {.n = n,
+                                   .F = &c->f.F,
+                                   .area = c->m.area,
+                                   .rho = c->m.reflectance,
+                                   .m = JACOBI_VECTORS,
+                                   .E = E,
+                                   .progress = run->progress,
+                                   .stage = "jacobi"};
     const double started = clock_seconds();
-    TRY(columns_jacobi(&all, sweeps, T, error));
+    TRY(many_lights_jacobi(&all, sweeps, T, error));
     *seconds = (clock_seconds() - started) * CITY_SKIES / JACOBI_VECTORS;
 done:
     free(E);
@@ -123,17 +123,17 @@ static lam_status sweeps_for(const bench_run *run, const city *c, const city_lig
     const size_t n = c->m.n, m = d->m < TILES ? d->m : TILES;
     float *T = memory_allocate(m, n * sizeof *T, "answers", error);
     if (T == NULL) TRY(LAM_ERR_MEMORY);
-    const light_columns some = {.n = n,
-                                .F = &c->f.F,
-                                .area = c->m.area,
-                                .rho = c->m.reflectance,
-                                .m = m,
-                                .E = d->E,
-                                .progress = run->progress,
-                                .stage = "jacobi"};
+    const many_lights_input some = {.n = n,
+                                    .F = &c->f.F,
+                                    .area = c->m.area,
+                                    .rho = c->m.reflectance,
+                                    .m = m,
+                                    .E = d->E,
+                                    .progress = run->progress,
+                                    .stage = "jacobi"};
     for (*sweeps = 1; *sweeps < SWEEPS; ++*sweeps) {
         double sum = 0;
-        TRY(columns_jacobi(&some, *sweeps, T, error));
+        TRY(many_lights_jacobi(&some, *sweeps, T, error));
         for (size_t t = 0; t < m; t++) {
             double off = 0, all = 0;
             for (size_t i = 0; i < n; i++) {
@@ -160,17 +160,17 @@ static lam_status measure(const bench_run *run, const city *c, const city_light 
                           threshold_row *row, lam_error *error) {
     lam_status status = LAM_OK;
     lam_operator *op = NULL;
-    for (sparse_correction how = SPARSE_NONE; how <= SPARSE_DISCARDED; how++) {
+    static const char *const corrections[] = {"none", "discarded", "delta"};
+    for (size_t place = 0; place < 3; place++) {
         build_report report;
         operator_description about;
-        TRY(city_sparse(run, c, threshold, how, &op, &report, error));
+        TRY(city_sparse(run, c, threshold, corrections[place], &op, &report, error));
         lam_operator_set_threads(op, (size_t)omp_get_max_threads());
         operator_describe(op, &about);
-        const int place = how == SPARSE_NONE ? 0 : how == SPARSE_DISCARDED ? 1 : 2;
         TRY(judge(c, d, op, &row->of[place], error));
-        if (how == SPARSE_DISCARDED) {
+        if (place == 1) {
             row->density = about.density;
-            row->build_seconds = report.invert_seconds;
+            row->build_seconds = report_seconds(&report);
             TRY(time_product(run, c, d, op, &row->product_seconds, error));
         }
         lam_operator_close(op);
@@ -194,7 +194,7 @@ static lam_status add_city(const bench_run *run, const city *c, const char *foun
     TRY(city_light_make(run, c, &d, error));
     TRY(time_jacobi(run, c, &d, SWEEPS, &jacobi, error));
     for (size_t k = 0; k < CITY_THRESHOLDS; k++) {
-        threshold_row row;
+        threshold_row row = {0};
         size_t sweeps;
         TRY(measure(run, c, &d, city_thresholds[k], &row, error));
         TRY(sweeps_for(run, c, &d, row.of[1].mean, &sweeps, error));
@@ -240,24 +240,24 @@ done:
 static lam_status add_emitters(const bench_run *run, const city *c, table *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = c->m.n, m = c->f.sky.tiling.n_tiles;
-    columns_report report;
+    many_lights_report report;
     float *T = memory_allocate(m, n * sizeof *T, "light of emitters", error), *five = NULL;
     double started, converged, swept, off = 0, all = 0;
     five = memory_allocate(m, n * sizeof *five, "light of emitters", error);
     if (T == NULL || five == NULL) TRY(LAM_ERR_MEMORY);
-    const light_columns columns = {.n = n,
-                                   .F = &c->f.F,
-                                   .area = c->m.area,
-                                   .rho = c->m.reflectance,
-                                   .m = m,
-                                   .H0 = c->f.sky.first_bounce,
-                                   .progress = run->progress,
-                                   .stage = "emitters"};
+    const many_lights_input columns = {.n = n,
+                                       .F = &c->f.F,
+                                       .area = c->m.area,
+                                       .rho = c->m.reflectance,
+                                       .m = m,
+                                       .H0 = c->f.sky.first_bounce,
+                                       .progress = run->progress,
+                                       .stage = "emitters"};
     started = clock_seconds();
-    TRY(columns_solve(&columns, 1e-6, T, &report, error));
+    TRY(many_lights_solve(&columns, 1e-6, T, &report, error));
     converged = clock_seconds() - started;
     started = clock_seconds();
-    TRY(columns_jacobi(&columns, 5, five, error));
+    TRY(many_lights_jacobi(&columns, 5, five, error));
     swept = clock_seconds() - started;
     for (size_t k = 0; k < m * n; k++) {
         const double e = (double)five[k] - (double)T[k];

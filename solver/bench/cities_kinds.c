@@ -1,6 +1,6 @@
 /* Every kind of operator on the four scenes of figure 5.1: cost, error, and the kind that auto picks. */
 #include "solver/bench/cities.h"
-#include "solver/method/classify.h"
+#include "solver/method/choice.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -58,26 +58,20 @@ static lam_status find_pick(const bench_run *run, const lowrank_scene *s, size_t
                             lam_error *error) {
     lam_status status = LAM_OK;
     const build_problem problem = lowrank_problem(s);
-    const classify_options look = {
-        .epsilon = epsilon, .seed = run->seed, .thorough = true, .progress = run->progress};
-    const build_options how = {.method = "auto",
-                               .factorizer = "auto",
-                               .epsilon = epsilon,
-                               .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
-                               .levels = -1,
-                               .correction = SPARSE_DELTA,
-                               .seed = run->seed,
-                               .progress = run->progress};
-    scene_class looked;
+    build_options how = build_presets("auto");
+    decision looked = {.n_candidates = 0};
     build_report built;
     lam_operator *op = NULL;
-    TRY(classify_scene(&problem, &look, &looked, error));
+    how.seed = run->seed;
+    how.progress = run->progress;
+    TRY(choose_method(&problem, &how, true, &looked, error));
     TRY(build_operator(&problem, &how, &op, &built, error));
-    *threshold = looked.threshold > 0 ? looked.threshold : usual_threshold;
+    *threshold = decision_figure(&looked, "sparse", "threshold", usual_threshold);
     for (*pick = 0; *pick + 1 < KINDS && strcmp(kinds[*pick], built.method) != 0;) ++*pick;
     bench_say(run, "%s, %zu elements: auto: %s", s->name, s->m.n, built.reason);
 done:
     lam_operator_close(op);
+    decision_free(&looked);
     return status;
 }
 
@@ -89,7 +83,6 @@ static lam_status judge_kind(const bench_run *run, const lowrank_scene *s, const
                              .epsilon = epsilon,
                              .probes = s->m.n > LARGE ? PROBES_OF_LARGE : PROBES,
                              .threshold = sparse ? threshold : 0,
-                             .correction = SPARSE_DELTA,
                              .emitters = few ? &lights->of : NULL};
     return lowrank_judge(run, s, &of, out, error);
 }
@@ -118,9 +111,9 @@ static void add_row(const lowrank_scene *s, size_t k, double threshold, const lo
     table_number(out, (double)s->m.n);
     table_number(out, (double)s->m.n_channels);
     table_text(out, kinds[k]);
-    table_number(out, v->built.rank > 0 ? (double)v->built.rank : NAN);
-    table_number(out, v->built.threshold > 0 ? threshold : NAN);
-    table_number(out, v->built.factorize_seconds + v->built.invert_seconds);
+    table_number(out, report_get(&v->built, "rank", NAN));
+    table_number(out, report_get(&v->built, "threshold", NAN) > 0 ? threshold : NAN);
+    table_number(out, report_seconds(&v->built));
     table_number(out, 1e3 * v->answer_seconds);
     table_number(out, 1e-6 * v->bytes);
     for (size_t g = 0; g < sizeof groups / sizeof *groups; g++) {

@@ -7,7 +7,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { RAYS = 4096, POINTS = 120, WAYS = 3 }; /* WAYS: of sparse_correction */
+enum { RAYS = 4096, POINTS = 120, WAYS = 3 };
+
+/* Corrections of a sparse inverse. */
+static const char *const ways[WAYS] = {"none", "delta", "discarded"};
 
 /* --- figure 4.5 -------------------------------------------------------------------------------------------
  */
@@ -48,7 +51,7 @@ static lam_status mean_answer(const bench_run *run, const city *c, const city_li
     lam_operator *op = NULL;
     float *answers = memory_allocate(d->m, n * sizeof *answers, "answers", error);
     if (answers == NULL) return LAM_ERR_MEMORY;
-    TRY(city_sparse(run, c, threshold, SPARSE_NONE, &op, &report, error));
+    TRY(city_sparse(run, c, threshold, ways[0], &op, &report, error));
     TRY(city_light_answer(d, op, answers, error));
     for (size_t i = 0; i < n; i++) B[i] = 0;
     for (size_t k = 0; k < d->m * n; k++) B[k % n] += (double)answers[k] / (double)d->m;
@@ -160,7 +163,7 @@ static lam_status tiles_of_city(const bench_run *run, const city *c, const city_
     for (size_t k = 0; k < CITY_THRESHOLDS; k++) {
         for (size_t way = 0; way < WAYS; way++) {
             build_report report;
-            TRY(city_sparse(run, c, city_thresholds[k], (sparse_correction)way, &op, &report, error));
+            TRY(city_sparse(run, c, city_thresholds[k], ways[way], &op, &report, error));
             TRY(city_light_errors(c, d, op, errors[way], room + 3 * m, error));
             lam_operator_close(op);
             op = NULL;
@@ -196,7 +199,7 @@ done:
 }
 
 lam_status cities_radiosity(const bench_run *run, lam_error *error) {
-    static const table_column light_columns[] = {
+    static const table_column many_lights_input[] = {
         {"city", "", "1: flat houses, 3: with skyscrapers"},
         {"elements", "", "n"},
         {"threshold", "", "threshold of M~ without a correction; empty: converged"},
@@ -222,8 +225,8 @@ lam_status cities_radiosity(const bench_run *run, lam_error *error) {
     lam_status status = LAM_OK;
     table light = {.name = "bounces",
                    .title = "Third and later bounces (figure 4.5)",
-                   .columns = light_columns,
-                   .n_columns = sizeof light_columns / sizeof *light_columns,
+                   .columns = many_lights_input,
+                   .n_columns = sizeof many_lights_input / sizeof *many_lights_input,
                    .printed = true};
     table curves = {.name = "bounces-curves",
                     .title = "Radiosity and its third and later bounces, sorted by value (figure 4.5)",

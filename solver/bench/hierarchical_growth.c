@@ -120,12 +120,7 @@ static lam_status add_size(const bench_run *run, size_t elements, grown *before,
     const generate_options box = {
         .kind = "cornell", .closed = true, .elements = elements, .reflectance = reflectance, .seed = 1};
     const recipe how = {.method = RECIPE_NEAR_PAIRS, .rays = RAYS, .accuracy = accuracy, .seed = run->seed};
-    const build_options options = {.method = "hierarchical",
-                                   .factorizer = "auto",
-                                   .epsilon = epsilon,
-                                   .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
-                                   .seed = run->seed,
-                                   .progress = run->progress};
+    build_options options = build_presets("hierarchical");
     mesh m = {0};
     lowrank_scene s = {.name = NULL};
     lam_operator *op = NULL;
@@ -148,6 +143,9 @@ static lam_status add_size(const bench_run *run, size_t elements, grown *before,
     problem.stream = &stream;
     problem.noise = recipe_noise(&how);
     const double n = (double)s.m.n;
+    options.seed = run->seed;
+    options.progress = run->progress;
+    TRY(build_set_number(&options, "epsilon", epsilon, error));
     TRY(build_operator(&problem, &options, &op, &built, error));
     const double peak = lowrank_peak(before_it);
     ray_rows_destroy(rays);
@@ -164,11 +162,11 @@ static lam_status add_size(const bench_run *run, size_t elements, grown *before,
     form_factors_free(&s.f);
     s.f = (form_factors){.row_sums = NULL};
     TRY(time_low_rank(run, &s.m, rank, &low_rank, error));
-    const double build = near + built.factorize_seconds + built.invert_seconds;
+    const double build = near + report_seconds(&built);
     table_number(out, n);
     table_number(out, near);
-    table_number(out, built.factorize_seconds);
-    table_number(out, built.invert_seconds);
+    table_number(out, built.steps[0].seconds);
+    table_number(out, built.steps[1].seconds);
     table_number(out, build);
     table_number(out, 1e-6 * peak);
     table_number(out, before->n > 0 ? log(build / before->build_s) / log(n / before->n) : NAN);
@@ -181,7 +179,7 @@ static lam_status add_size(const bench_run *run, size_t elements, grown *before,
     table_number(out, judged ? e->single.total_indirect.mean : NAN);
     table_number(out, judged ? e->lights.total_indirect.mean : NAN);
     table_number(out, judged ? e->random.total_indirect.mean : NAN);
-    table_number(out, built.uniform_error);
+    table_number(out, report_get(&built, "uniform_error", NAN));
     *before = (grown){.n = n, .build_s = build};
 done:
     lam_operator_close(op);

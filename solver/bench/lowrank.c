@@ -5,7 +5,7 @@
 #include "solver/bench/formfactors.h"
 #include "solver/bench/scenes.h"
 #include "solver/bench/stats.h"
-#include "solver/method/low_rank/norm.h"
+#include "solver/method/norm.h"
 #include "solver/scene/surfaces.h"
 
 #include <errno.h>
@@ -228,7 +228,7 @@ done:
 factorizer_options lowrank_options(const bench_run *run, double epsilon, size_t rank) {
     return (factorizer_options){.epsilon = epsilon,
                                 .rank = rank,
-                                .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
+                                .budget = {.alpha = .5},
                                 .levels = -1,
                                 .iterations = -1,
                                 .seed = run->seed,
@@ -363,16 +363,7 @@ lam_status lowrank_judge(const bench_run *run, const lowrank_scene *s, const low
                          lowrank_verdict *out, lam_error *error) {
     lam_status status = LAM_OK;
     build_problem problem = lowrank_problem(s);
-    const build_options how = {.method = of->method,
-                               .factorizer = of->factorizer,
-                               .epsilon = of->epsilon,
-                               .rank = of->rank,
-                               .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
-                               .levels = -1,
-                               .threshold = of->threshold,
-                               .correction = of->correction,
-                               .seed = run->seed,
-                               .progress = run->progress};
+    build_options how = build_presets(of->method);
     const judge_input input = {.problem = &problem,
                                .row_sums = s->f.row_sums,
                                .emission = s->m.emission,
@@ -386,6 +377,12 @@ lam_status lowrank_judge(const bench_run *run, const lowrank_scene *s, const low
     lam_operator *op = NULL;
     problem.emitters = of->emitters;
     TRY(bench_check(run, error));
+    how.seed = run->seed;
+    how.progress = run->progress;
+    TRY(build_set(&how, "factorizer", of->factorizer, error));
+    TRY(build_set_number(&how, "epsilon", of->epsilon, error));
+    if (of->rank > 0) TRY(build_set_number(&how, "rank", (double)of->rank, error));
+    if (of->threshold > 0) TRY(build_set_number(&how, "threshold", of->threshold, error));
     TRY(build_operator(&problem, &how, &op, &verdict.built, error));
     TRY(lowrank_time_answer(op, LOWRANK_SOLVES_MOST, &verdict.answer_seconds, error));
     TRY(judge_operator(op, &input, &verdict.judged, error));

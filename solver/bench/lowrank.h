@@ -6,6 +6,7 @@
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/pairs/first_light.h"
 #include "solver/method/judge.h"
+#include "solver/method/low_rank/factorizer.h"
 
 /* A scene with its form factors as a matrix. */
 typedef struct lowrank_scene {
@@ -65,10 +66,9 @@ factorizer_options lowrank_options(const bench_run *run, double epsilon, size_t 
 typedef struct lowrank_case {
     const char *method, *factorizer;
     double epsilon;
-    size_t rank;      /* 0: by epsilon */
-    size_t probes;    /* single elements, at most */
-    double threshold; /* sparse */
-    sparse_correction correction;
+    size_t rank;                    /* 0: by epsilon */
+    size_t probes;                  /* single elements, at most */
+    double threshold;               /* sparse; 0: its preset */
     const emitter_source *emitters; /* of the method emitters; else NULL */
     const csr *independent;         /* another sample of F, or NULL: no total error */
     first_light *first;             /* what single elements give, better than that sample; or NULL */

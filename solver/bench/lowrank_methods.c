@@ -55,13 +55,13 @@ static lam_status try(const bench_run *run, const lowrank_scene *s, const csr *i
     lowrank_verdict v;
     TRY(lowrank_judge(run, s, &of, &v, error));
     const double mb = 1e-6 * v.bytes;
-    const double seconds = v.built.factorize_seconds + v.built.invert_seconds;
+    const double seconds = report_seconds(&v.built);
     table_text(out, s->name);
     table_number(out, (double)s->m.n);
     table_text(out, k->label);
     table_number(out, k->by_rank || strcmp(k->method, "exact") == 0 ? NAN : of.epsilon);
-    table_number(out, v.built.rank > 0 ? (double)v.built.rank : NAN);
-    table_number(out, v.built.measured_norm_error >= 0 ? v.built.measured_norm_error : NAN);
+    table_number(out, report_get(&v.built, "rank", NAN));
+    table_number(out, report_get(&v.built, "measured_norm_error", NAN));
     table_number(out, seconds);
     table_number(out, mb);
     table_number(out, 1e3 * v.answer_seconds);

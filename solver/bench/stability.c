@@ -280,15 +280,12 @@ lam_status stability_try(const stability_problem *p, const stability_way *way, s
                                    .reflectance = p->reflectance,
                                    .F = &p->F,
                                    .order = p->order};
-    const build_options how = {.method = way->method,
-                               .factorizer = way->factorizer,
-                               .epsilon = way->epsilon,
-                               .rank = way->rank,
-                               .budget = {.rule = BUDGET_SQUARES, .alpha = .5},
-                               .levels = -1,
-                               .seed = 1};
+    build_options how = build_presets(way->method);
     probation q = {.p = p};
     *out = (stability_result){.finite = true};
+    TRY(build_set(&how, "factorizer", way->factorizer, error));
+    TRY(build_set_number(&how, "epsilon", way->epsilon, error));
+    if (way->rank > 0) TRY(build_set_number(&how, "rank", (double)way->rank, error));
     out->status = build_operator(&problem, &how, &q.op, &built, &why);
     if (out->status == LAM_ERR_MEMORY) FAIL(error, LAM_ERR_MEMORY, "%s", why.message);
     snprintf(out->message, sizeof out->message, "%s", why.message);
@@ -305,9 +302,9 @@ lam_status stability_try(const stability_problem *p, const stability_way *way, s
     judge_linearity(&q, out);
     judge_reciprocity(&q, out);
     for (size_t i = 0; i < p->n; i++) most_rho = fmax(most_rho, (double)p->reflectance[i]);
-    out->rank = built.rank;
-    out->rcond = built.rcond;
-    out->norm = fmax(built.measured_norm_error, 0);
+    out->rank = (size_t)report_get(&built, "rank", 0);
+    out->rcond = report_get(&built, "rcond", 1);
+    out->norm = report_get(&built, "measured_norm_error", 0);
     out->bound = out->norm / (1 - most_rho);
 done:
     lam_operator_close(q.op);

@@ -3,7 +3,7 @@
 #include "solver/bench/formfactors.h"
 #include "solver/bench/lowrank.h"
 #include "solver/bench/scenes.h"
-#include "solver/method/classify.h"
+#include "solver/method/choice.h"
 
 #include <libgen.h>
 #include <math.h>
@@ -12,6 +12,9 @@
 #include <string.h>
 
 /* --- every kind at several settings ------------------------------------------------------------------- */
+
+/* Elements up to which the whole inverse is built in a bearable time. */
+enum { EXACT_MOST = 12288 };
 
 enum {
     PROBES_QUICK = 8,
@@ -87,8 +90,8 @@ static void add_row(const lowrank_scene *s, const char *kind, double setting, co
     table_number(out, (double)s->m.n_channels);
     table_text(out, kind);
     table_number(out, setting < 1 ? setting : NAN);
-    table_number(out, v->built.rank > 0 ? (double)v->built.rank : NAN);
-    table_number(out, v->built.factorize_seconds + v->built.invert_seconds);
+    table_number(out, report_get(&v->built, "rank", NAN));
+    table_number(out, report_seconds(&v->built));
     table_number(out, 1e3 * v->answer_seconds);
     table_number(out, 1e-6 * v->bytes);
     table_number(out, 1e-6 * v->stored);
@@ -101,7 +104,7 @@ static void add_row(const lowrank_scene *s, const char *kind, double setting, co
 static kind_point point_of(double setting, const lowrank_verdict *v) {
     const error_group *const groups[LIGHTS] = {&v->judged.single, &v->judged.lights, &v->judged.random};
     kind_point p = {.setting = setting,
-                    .build_s = v->built.factorize_seconds + v->built.invert_seconds,
+                    .build_s = report_seconds(&v->built),
                     .query_ms = 1e3 * v->answer_seconds,
                     .mb = 1e-6 * v->bytes,
                     .stored_mb = 1e-6 * v->stored};
@@ -127,7 +130,7 @@ static lam_status emitter_of(const lowrank_scene *s, float **E, lam_error *error
 static bool is_tried(const bench_run *run, const lowrank_scene *s, size_t kind, int setting) {
     const char *name = kinds[kind];
     if (settings[kind][setting] == 0) return false;
-    if (strcmp(name, "exact") == 0) return s->m.n <= CLASSIFY_EXACT_MOST;
+    if (strcmp(name, "exact") == 0) return s->m.n <= EXACT_MOST;
     if (run->scale == BENCH_QUICK && setting % 2 == 1) return false;
     if (kind > 0 && s->m.n > PAIRS_MOST && setting > 2) return false;
     if (kind > 0 && s->m.n > HUGE_SCENE && setting > 1) return false;
@@ -163,7 +166,6 @@ static lam_status measure_scene(const bench_run *run, const lowrank_scene *s, ki
                                                : s->m.n > LARGE          ? PROBES_OF_LARGE
                                                                          : PROBES,
                                      .threshold = strcmp(kinds[k], "sparse") == 0 ? value : 0,
-                                     .correction = SPARSE_DELTA,
                                      .emitters = strcmp(kinds[k], "emitters") == 0 ? &lights : NULL,
                                      .independent = &independent.F,
                                      .first = first,

@@ -396,7 +396,7 @@ done:
     return status;
 }
 
-/* Whether the scene has light of its own that the operator can answer. */
+/* True if the scene has light of its own that the operator can answer. */
 static bool any_light(const lam_operator *op, const judge_input *input) {
     if (lam_operator_emitters(op) > 0) {
         const size_t s = lam_operator_emitters(op), C = input->problem->n_channels;

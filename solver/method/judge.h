@@ -30,9 +30,9 @@ typedef struct judge_input {
     const float *emission;  /* [C][n], the scene's own */
     const csr *independent; /* the mean of two more samples of F, or NULL: no total error */
     const csr *halves[2];   /* those two samples, for the reference's own noise */
-    /* H = F E, [n], better than the independent sample has it, where few elements shine; *known is false
-     * where many do. NULL: there is none. What the reference then takes from the sample is how that light
-     * bounces on. */
+    /* H = F E, [n], closer than by the independent sample, where few elements shine; *known is false where
+     * many do. NULL: there is none. The reference then takes only the further bounces of that light from the
+     * sample. */
     lam_status (*first_light)(void *context, const float *E, double *H, bool *known, lam_error *error);
     void *first_light_context;
     size_t probes; /* single elements */

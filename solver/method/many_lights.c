@@ -12,14 +12,14 @@ enum { ROWS = 64 };
 /* Multiplications in a product with F below which threads cost more than they bring. */
 enum { THREADS_WORTH = 200000 };
 
-/* Starts from the true residual at most, and sweeps of each. What single precision cannot bring below this
- * has not settled. */
+/* Starts from the true residual at most, and sweeps of each. A residual that single precision cannot bring
+ * below this has not settled. */
 enum { MOST_STARTS = 6, MOST_SWEEPS = 2000 };
 static const double unsettled = 1e-3;
 
 /* The space of one block: vectors side by side, [n][width]. e, h0: A^1/2 E, A^1/2 H0. */
 typedef struct block {
-    const light_columns *c;
+    const many_lights_input *c;
     size_t n, width, first, count; /* columns first ... first + count - 1, then zeros */
     csr_float_row *multiply;
     float *e, *h0, *u, *r, *p, *q, *t;
@@ -57,7 +57,7 @@ static void block_free(block *b) {
     free(b->sums);
 }
 
-static lam_status block_make(const light_columns *c, size_t width, block *b, lam_error *error) {
+static lam_status block_make(const many_lights_input *c, size_t width, block *b, lam_error *error) {
     *b = (block){.c = c, .n = c->n, .width = width, .multiply = csr_floats_row(width)};
     b->many = c->F->indptr[c->n] * width > THREADS_WORTH;
     float **const all[] = {&b->e, &b->h0, &b->u, &b->r, &b->p, &b->q, &b->t};
@@ -253,7 +253,7 @@ static void scatter(const block *b, const float *x, float *T) {
 /* Blocks of columns: `each` makes of one what then lies in q. */
 typedef lam_status each_block(block *b, void *context, lam_error *error);
 
-static lam_status in_blocks(const light_columns *c, each_block *each, void *context, float *T,
+static lam_status in_blocks(const many_lights_input *c, each_block *each, void *context, float *T,
                             lam_error *error) {
     lam_status status = LAM_OK;
     block b = {.c = NULL};
@@ -279,7 +279,7 @@ done:
 
 typedef struct solving {
     double tolerance;
-    columns_report *report;
+    many_lights_report *report;
 } solving;
 
 static lam_status solve_one(block *b, void *context, lam_error *error) {
@@ -291,10 +291,10 @@ static lam_status solve_one(block *b, void *context, lam_error *error) {
     return status;
 }
 
-lam_status columns_solve(const light_columns *c, double tolerance, float *T, columns_report *report,
-                         lam_error *error) {
+lam_status many_lights_solve(const many_lights_input *c, double tolerance, float *T,
+                             many_lights_report *report, lam_error *error) {
     solving s = {tolerance, report};
-    *report = (columns_report){0};
+    *report = (many_lights_report){0};
     return in_blocks(c, solve_one, &s, T, error);
 }
 
@@ -326,6 +326,6 @@ static lam_status jacobi_one(block *b, void *context, lam_error *error) {
     return LAM_OK;
 }
 
-lam_status columns_jacobi(const light_columns *c, size_t sweeps, float *T, lam_error *error) {
+lam_status many_lights_jacobi(const many_lights_input *c, size_t sweeps, float *T, lam_error *error) {
     return in_blocks(c, jacobi_one, &sweeps, T, error);
 }

@@ -1,14 +1,17 @@
-/* From form factors to an operator: the offline half. One file per method; methods.c lists them. */
+/* From form factors to an operator. A method is a const table at the end of its own file; methods.c lists
+ * them. The table holds the method's options, needs, forecast, cost and build: nothing else knows a method by
+ * name. */
 #ifndef LAMBERT_METHOD_METHOD_H
 #define LAMBERT_METHOD_METHOD_H
 
+#include "solver/base/options.h"
 #include "solver/base/progress.h"
 #include "solver/linalg/csr.h"
 #include "solver/linalg/row_source.h"
-#include "solver/method/low_rank/factorizer.h"
+#include "solver/method/report.h"
 #include "solver/operator/operator.h"
 
-/* What is to shine, for the method emitters: numbers of emitter k come k C at a time. */
+/* The emitters that alone are going to shine: numbers of emitter k come k C at a time. */
 typedef struct emitter_source {
     size_t s;
     const char *const *names;  /* [s] */
@@ -18,88 +21,126 @@ typedef struct emitter_source {
     const float *first_bounce; /* [m][n], sr */
 } emitter_source;
 
-/* What every method is given. All in mesh order; order[position] = element is the Z-order. */
+/* The input of every method. All in mesh order; order[position] = element is the Z-order. */
 typedef struct build_problem {
     size_t n;
     size_t n_channels;
     const double *area;       /* [n] */
     const float *reflectance; /* [C][n], in [0, 1) */
-    const csr *F;             /* NULL where there is a stream, which hierarchical alone can use */
-    row_stream *stream;       /* NULL where there is F */
+    const csr *F;             /* NULL where there is a stream, and before the form factors are found */
+    row_stream *stream;       /* NULL where there is F; METHOD_STREAMS */
     const uint32_t *order;    /* [n] */
     double noise;             /* sampling error of S in the 2-norm, about; 0: not known */
-    /* Only 2msc and hierarchical need these (hierarchical no surface); NULL elsewhere. */
+    /* NULL where no method needs them: METHOD_GEOMETRY. */
     const double (*centre)[3];      /* [n] centroids, m */
     const float (*normal)[3];       /* [n] unit */
-    const uint32_t *surface;        /* [n] below n: equal where elements are of one surface */
+    const uint32_t *surface;        /* [n] below n: equal where elements lie on one surface */
     const emitter_source *emitters; /* NULL: none asked for */
 } build_problem;
 
-/* How a sparse inverse makes up for what is left out of it: not; by what one solution with light everywhere
- * misses; by the sum of what was left out, whose own further bounces are forgotten (Aguerre 2016, eq. 4.7).
- */
-typedef enum sparse_correction { SPARSE_NONE, SPARSE_DELTA, SPARSE_DISCARDED } sparse_correction;
+/* Methods at most, and bytes of the options of one. */
+enum { METHODS_MOST = 16, METHOD_OPTIONS_BYTES = 96 };
 
-/* "none", "delta", "discarded"; find: false where the name is none of them. */
-const char *sparse_correction_name(sparse_correction correction);
-bool sparse_correction_find(const char *name, sparse_correction *correction);
+typedef union method_values {
+    unsigned char bytes[METHOD_OPTIONS_BYTES];
+    double align;
+} method_values;
 
+/* The options of a build. build_rows and the rows of every method fill it; build_presets does without a
+ * command line. */
 typedef struct build_options {
-    const char *method;     /* "auto", "exact", "low-rank", ... */
-    const char *factorizer; /* "auto", "hf", ... */
-    double epsilon;
-    budget budget;              /* of hf */
-    int levels;                 /* negative: auto */
-    size_t rank;                /* 0: by epsilon; else exactly min(rank, n) columns */
-    double coherence, min_area; /* 2msc: smallest coherence, smallest area of a patch, m^2; 0: not given */
-    bool proximity;             /* 2msc: elements belong to the nearest patch */
-    double threshold;           /* sparse: entries below it are left out; auto: 0 for what suits epsilon */
-    sparse_correction correction;
-    size_t memory;     /* bytes it may use; 0: no limit */
-    bool keep_factors; /* low-rank, 2msc: factored also for one channel */
-    bool low_rank;     /* auto: as something was asked for that low rank alone has, nothing hierarchical */
-    uint64_t seed;     /* of random sketches */
+    const char *method;    /* "auto" or the name of a method */
+    double epsilon;        /* the error at which auto compares methods */
+    const char *precision; /* of the large arrays of the operator: "f32", "f16", "i8" */
+    size_t memory;         /* bytes it may use; 0: no limit */
+    uint64_t seed;         /* of random sketches */
     const progress *progress;
+    method_values of[METHODS_MOST]; /* each method's own, in the order of the list */
 } build_options;
 
-typedef struct build_report {
-    const char *method;     /* as built; static text */
-    const char *factorizer; /* or NULL */
-    char reason[256];       /* why this method */
-    size_t rank;
-    int levels;
-    factorizer_report factorized;
-    truncation_norm norm;         /* of epsilon and of measured_norm_error */
-    double epsilon;               /* the bound reached; negative when it has none */
-    double measured_norm_error;   /* |S - Q V^T|; negative when not measured */
-    double rcond;                 /* of the matrix inverted; 1 when none was */
-    double coherence, patch_area; /* 2msc: the smallest of a patch, m^2; negative when there are no patches */
-    double threshold;             /* sparse, hierarchical: as reached; 0: neither */
-    /* hierarchical, negative elsewhere: |E - (I - R F) B~| / |E| of light all over, the mean of some; |B~ -
-     * 1| / |1| of E = 1 - rho s, whose B is 1. By area, of the worst channel. */
-    double probe_residual, uniform_error;
-    sparse_correction correction;
-    double residual; /* emitters: of the worst; negative: no emitters */
-    size_t sweeps;   /* emitters: products with F for a block of them, at most */
-    double factorize_seconds, invert_seconds;
-} build_report;
+/* Bytes that a build is going to take beside the form factors. */
+typedef struct method_forecast {
+    double building; /* at the peak, while the operator is made */
+    double loaded;   /* by the operator in memory, in single precision where its kind can be narrowed */
+    double stored;   /* by its arrays in the store, likewise */
+} method_forecast;
 
-/* A method: fills op (closed by the caller) and report. Errors: LAM_ERR_NUMERIC, _MEMORY, _CANCELLED. */
+/* The size of a build, as far as it is known before. */
+typedef struct method_scale {
+    double n, n_channels;
+    double noise;      /* of S, 2-norm; 0: none */
+    double n_emitters; /* 0: none, or not read yet */
+} method_scale;
+
+struct decision;
+struct candidate;
+
+/* A method needs, or can do without, these of a problem. */
+enum {
+    METHOD_GEOMETRY = 1,      /* it needs centres, normals and surfaces */
+    METHOD_STREAMS = 2,       /* it can build from a stream of rows instead of F */
+    METHOD_FILTERS_NOISE = 4, /* it leaves out most of the noise of rays, so fewer rays are enough */
+};
+
+/* One method. own points to a struct of the method that its rows fill; a NULL function has no effect.
+ * Units of cost: coefficients of a dense matrix that one answer reads, per channel (choice.h). */
 typedef struct build_method {
-    const char *name;
-    lam_status (*build)(const build_problem *problem, const build_options *options, lam_operator **op,
-                        build_report *report, lam_error *error);
+    const char *name;          /* the word of --method */
+    const char *summary;       /* one line of --help */
+    const operator_kind *kind; /* of the operator that it usually makes */
+    const option_row *rows;    /* its options, with presets and limits; NULL: none */
+    unsigned flags;            /* METHOD_... */
+    const char *smaller;       /* an option that asks for a smaller operator; NULL: none is known */
+    /* Of a command line: LAM_ERR_ARGUMENT where options that are each in their limits do not go together. */
+    lam_status (*check)(const void *own, lam_error *error);
+    /* True if an option that was given, a row of this table, had no effect beside the others. */
+    bool (*ignores)(const void *own, const build_report *report, const char *option);
+    void (*forecast)(const method_scale *scale, const void *own, method_forecast *out);
+    /* True if options are set that only this method has a use for, so that auto leaves out its rivals. */
+    bool (*is_asked)(const struct build_options *options, const void *own);
+    /* The method's part in the choice of --method auto (choice.h); NULL: auto never takes it. */
+    lam_status (*weigh)(const struct decision *so_far, void *own, struct candidate *out, lam_error *error);
+    /* Fills op (closed by the caller) and report. Errors: LAM_ERR_NUMERIC, _MEMORY, _CANCELLED, _ARGUMENT. */
+    lam_status (*build)(const build_problem *problem, const build_options *options, const void *own,
+                        lam_operator **op, build_report *report, lam_error *error);
 } build_method;
 
-extern const build_method build_exact;
-extern const build_method build_low_rank;
-extern const build_method build_two_mesh;
-extern const build_method build_sparse;
-extern const build_method build_emitters;
-extern const build_method build_hierarchical;
+/* The list: the k-th method, NULL beyond the last; the method of a name, or NULL; "auto|exact|...". */
+const build_method *method_at(size_t k);
+const build_method *method_find(const char *name);
+const char *method_choices(void);
 
-/* Builds by options->method ("auto" chooses and says why). LAM_ERR_UNSUPPORTED for a method of the contract
- * that is still to come. */
+/* The method that auto takes where no other can be had; it takes little memory at any size. */
+const build_method *method_fallback(void);
+
+/* True if an option has a row in the table of the method; NULL: of any method. */
+bool method_has_option(const build_method *method, const char *option);
+
+/* The factorizers of low-rank and 2msc, which share the option. */
+#define METHOD_FACTORIZERS "auto|hf|svd|rsi|sgrsvd|qr"
+
+/* The own options of a method among those of a build. */
+void *method_own(build_options *options, const build_method *method);
+const void *method_own_const(const build_options *options, const build_method *method);
+
+/* Rows of epsilon and store-precision, for a table with a build_options. */
+extern const option_row build_rows[];
+
+/* All options of all methods at their presets. */
+build_options build_presets(const char *method);
+
+/* Gives an option a value as a command line would: every method that has it gets it. Errors: LAM_ERR_ARGUMENT
+ * names the option where no method has it or the value is outside its limits. */
+lam_status build_set(build_options *options, const char *name, const char *value, lam_error *error);
+lam_status build_set_number(build_options *options, const char *name, double value, lam_error *error);
+
+/* Builds by one method. Errors: also LAM_ERR_ARGUMENT for options outside their limits and for a problem that
+ * lacks what the method needs. */
+lam_status method_build(const build_method *method, const build_problem *problem,
+                        const build_options *options, const void *own, lam_operator **op,
+                        build_report *report, lam_error *error);
+
+/* Builds by options->method; "auto" chooses by choose_method. */
 lam_status build_operator(const build_problem *problem, const build_options *options, lam_operator **op,
                           build_report *report, lam_error *error);
 

@@ -3,13 +3,29 @@
 #include "solver/operator/emitters.h"
 
 #include "solver/base/clock.h"
+#include "solver/method/choice.h"
 #include "solver/method/many_lights.h"
-#include "solver/method/method.h"
 #include "solver/operator/sky_light.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+typedef struct emitters_options {
+    const char *emitters; /* read by whoever makes the problem */
+} emitters_options;
+
+static const option_row rows[] = {
+    {.name = "emitters",
+     .kind = OPTION_TEXT,
+     .offset = offsetof(emitters_options, emitters),
+     .argument = "FILE|group=NAME|sky",
+     .help = "The emissions that the store answers: each of a .json or .npy file, each of the groups "
+             "NAME,NAME, or every tile of --sky; --method auto then takes emitters"},
+    {0},
+};
+
+static const char missing[] = "--method emitters: give --emitters FILE, group=NAME or sky";
 
 /* Residual at which the light of an emitter counts as converged: a few units of single precision. */
 static const double tolerance = 1e-6;
@@ -27,7 +43,7 @@ static lam_status copy_names(const emitter_source *from, char ***names, lam_erro
     return LAM_OK;
 }
 
-/* What the elements themselves send out, without the zeros. */
+/* The emission of the elements themselves, without the zeros. */
 static lam_status gather_emission(const build_problem *problem, emitter_arrays *a, lam_error *error) {
     const size_t n = problem->n, C = problem->n_channels, s = a->s;
     const float *E = problem->emitters->E;
@@ -71,8 +87,8 @@ static void light_of_channel(const build_problem *problem, const emitter_arrays 
     if (H0 != NULL) lam_sky_irradiance(a->sky, s, a->L + c * s * a->n_tiles, H0);
 }
 
-static lam_status build(const build_problem *problem, const build_options *options, lam_operator **op,
-                        build_report *report, lam_error *error) {
+static lam_status build(const build_problem *problem, const build_options *options, const void *own,
+                        lam_operator **op, build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n, C = problem->n_channels;
     const double started = clock_seconds();
@@ -80,8 +96,8 @@ static lam_status build(const build_problem *problem, const build_options *optio
     float *E = NULL, *H0 = NULL;
     double residual = 0;
     size_t sweeps = 0;
-    if (problem->emitters == NULL)
-        FAIL(error, LAM_ERR_ARGUMENT, "--method emitters: give --emitters FILE, group=NAME or sky");
+    (void)own;
+    if (problem->emitters == NULL) FAIL(error, LAM_ERR_ARGUMENT, "%s", missing);
     const size_t s = a.s = problem->emitters->s;
     TRY(copy_names(problem->emitters, &a.names, error));
     TRY(gather_emission(problem, &a, error));
@@ -94,30 +110,27 @@ static lam_status build(const build_problem *problem, const build_options *optio
         if (H0 == NULL) TRY(LAM_ERR_MEMORY);
     }
     for (size_t c = 0; c < C; c++) {
-        columns_report made;
+        many_lights_report made;
         light_of_channel(problem, &a, c, E, H0);
-        const light_columns columns = {.n = n,
-                                       .F = problem->F,
-                                       .area = problem->area,
-                                       .rho = problem->reflectance + c * n,
-                                       .m = s,
-                                       .E = E,
-                                       .H0 = H0,
-                                       .progress = options->progress,
-                                       .stage = "emitters"};
-        TRY(columns_solve(&columns, tolerance, a.T + c * s * n, &made, error));
+        const many_lights_input columns = {.n = n,
+                                           .F = problem->F,
+                                           .area = problem->area,
+                                           .rho = problem->reflectance + c * n,
+                                           .m = s,
+                                           .E = E,
+                                           .H0 = H0,
+                                           .progress = options->progress,
+                                           .stage = "emitters"};
+        TRY(many_lights_solve(&columns, tolerance, a.T + c * s * n, &made, error));
         residual = made.residual > residual ? made.residual : residual;
         sweeps = made.sweeps > sweeps ? made.sweeps : sweeps;
     }
     TRY(operator_emitters_create(n, C, problem->reflectance, &a, op, error));
-    report->method = "emitters";
-    report->epsilon = -1;
-    report->residual = residual;
-    report->sweeps = sweeps;
-    report->invert_seconds = clock_seconds() - started;
-    snprintf(report->reason, sizeof report->reason,
-             "emitters: %zu asked for by --emitters, each converged to %.2g in %zu sweeps", s, residual,
-             sweeps);
+    report_number(report, "residual", residual);
+    report_count(report, "sweeps", (double)sweeps);
+    report_step_add(report, "invert", clock_seconds() - started);
+    snprintf(report->detail, sizeof report->detail,
+             "%zu asked for by --emitters, each converged to %.2g in %zu sweeps", s, residual, sweeps);
 done:
     emitter_arrays_free(&a);
     free(E);
@@ -125,4 +138,39 @@ done:
     return status;
 }
 
-const build_method build_emitters = {"emitters", build};
+static lam_status check(const void *own, lam_error *error) {
+    if (((const emitters_options *)own)->emitters == NULL)
+        return status_fail(error, LAM_ERR_ARGUMENT, "%s", missing);
+    return LAM_OK;
+}
+
+/* Light, emissions and what the sky gives of every emitter, and the vectors of a block that iterates. */
+static void forecast(const method_scale *scale, const void *own, method_forecast *out) {
+    const double n = scale->n, s = scale->n_emitters, C = scale->n_channels;
+    (void)own;
+    *out = (method_forecast){
+        .building = 4 * n * (s * (3 * C + 2) + 7 * 32), .loaded = 4 * n * s * C, .stored = 4 * n * s * C};
+}
+
+static lam_status weigh(const decision *so_far, void *own, candidate *out, lam_error *error) {
+    const build_problem *p = so_far->problem;
+    (void)error;
+    if (p->emitters == NULL && ((const emitters_options *)own)->emitters == NULL) return LAM_OK;
+    out->claim = CLAIM_INPUT;
+    if (p->emitters == NULL) return LAM_OK;
+    out->cost = (double)p->n * (double)p->emitters->s;
+    snprintf(out->found, sizeof out->found, "--emitters names %zu", p->emitters->s);
+    return LAM_OK;
+}
+
+const build_method method_emitters = {
+    .name = "emitters",
+    .summary = "answers for the emitters of --emitters only",
+    .kind = &operator_emitters,
+    .rows = rows,
+    .check = check,
+    .forecast = forecast,
+    .weigh = weigh,
+    .build = build,
+};
+_Static_assert(sizeof(emitters_options) <= METHOD_OPTIONS_BYTES, "they fit");

@@ -1,12 +1,17 @@
 /* exact: the whole inverse, in double. For scenes small enough that nothing else pays. */
 #include "solver/base/clock.h"
-#include "solver/method/method.h"
+#include "solver/method/choice.h"
 
 #include <lapacke.h>
 
 #include <limits.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
+
+/* Up to SMALL elements the whole inverse is small, without error, and built in well under a second; above
+ * MOST it takes too long. */
+enum { SMALL = 1024, MOST = 12288 };
 
 /* M = (I - R F)^-1 in place and the reciprocal condition number; M is [n][n] row-major. LAPACK reads it as
  * its transpose, whose inverse is the transpose of the inverse: nothing need be moved. */
@@ -55,14 +60,16 @@ static void bounced(size_t n, const csr *F, const float *rho, const double *M, f
     }
 }
 
-static lam_status build(const build_problem *problem, const build_options *options, lam_operator **op,
-                        build_report *report, lam_error *error) {
+static lam_status build(const build_problem *problem, const build_options *options, const void *own,
+                        lam_operator **op, build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n, n_channels = problem->n_channels;
     const double start = clock_seconds();
     double *M = NULL;
     float *P = NULL;
+    double worst = 1;
     lapack_int *pivots = NULL;
+    (void)own;
     size_t square, bytes;
     if (n > INT_MAX || !size_multiply(n, n, &square) || !size_multiply(square, 8 + 4 * n_channels, &bytes) ||
         (options->memory > 0 && bytes > options->memory))
@@ -76,7 +83,6 @@ static lam_status build(const build_problem *problem, const build_options *optio
     pivots = memory_allocate(n, sizeof *pivots, "exact inverse", error);
     if (M == NULL || P == NULL || pivots == NULL) TRY(LAM_ERR_MEMORY);
 
-    report->rcond = 1;
     for (size_t c = 0; c < n_channels; c++) {
         const float *rho = problem->reflectance + c * n;
         double rcond = 0;
@@ -84,20 +90,15 @@ static lam_status build(const build_problem *problem, const build_options *optio
         if (progress_cancelled(options->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         TRY(invert(n, problem->F, rho, M, pivots, &rcond, error));
         bounced(n, problem->F, rho, M, P + c * square);
-        report->rcond = fmin(report->rcond, rcond);
+        worst = fmin(worst, rcond);
     }
     free(M);
     M = NULL;
     TRY(operator_exact_create(n, n_channels, problem->reflectance, P, op, error));
     P = NULL;
-    report->method = "exact";
-    report->factorizer = NULL;
-    report->rank = 0;
-    report->levels = 0;
-    report->epsilon = 0;
-    report->measured_norm_error = -1;
-    report->factorize_seconds = 0;
-    report->invert_seconds = clock_seconds() - start;
+    report_number(report, "epsilon", 0);
+    report_number(report, "rcond", worst);
+    report_step_add(report, "invert", clock_seconds() - start);
 done:
     free(M);
     free(P);
@@ -105,4 +106,33 @@ done:
     return status;
 }
 
-const build_method build_exact = {"exact", build};
+static void forecast(const method_scale *scale, const void *own, method_forecast *out) {
+    const double square = scale->n * scale->n, C = scale->n_channels;
+    (void)own;
+    *out = (method_forecast){
+        .building = square * (8 + 4 * C), .loaded = 4 * square * C, .stored = 4 * square * C};
+}
+
+static lam_status weigh(const decision *so_far, void *own, candidate *out, lam_error *error) {
+    const double n = (double)so_far->problem->n, C = (double)so_far->problem->n_channels;
+    (void)own;
+    (void)error;
+    if (n > MOST || C * n * n > so_far->most) return LAM_OK;
+    out->cost = n * n;
+    out->certain = true;
+    if (n > SMALL) return LAM_OK;
+    out->claim = CLAIM_SMALL;
+    snprintf(out->found, sizeof out->found,
+             "%.0f elements are few enough (up to %d) to keep the whole inverse", n, SMALL);
+    return LAM_OK;
+}
+
+const build_method method_exact = {
+    .name = "exact",
+    .summary = "the whole inverse; up to some thousand elements",
+    .kind = &operator_exact,
+    .smaller = "--method low-rank",
+    .forecast = forecast,
+    .weigh = weigh,
+    .build = build,
+};

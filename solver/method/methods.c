@@ -1,160 +1,215 @@
-/* The list of methods and the choice among them. */
-#include "solver/method/classify.h"
+/* The list of methods, their options together, and the build by one of them. */
+#include "solver/method/choice.h"
 #include "solver/method/method.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-static const build_method *const methods[] = {&build_exact,  &build_low_rank, &build_two_mesh,
-                                              &build_sparse, &build_emitters, &build_hierarchical};
+extern const build_method method_emitters, method_exact, method_hierarchical, method_low_rank,
+    method_two_mesh, method_sparse;
 
-static lam_status check_options(const build_options *options, lam_error *error) {
+/* Adding a method is one word above and one here. auto weighs them in this order: one that asks what others
+ * cost stands behind them. */
+static const build_method *const methods[] = {&method_emitters, &method_exact,    &method_hierarchical,
+                                              &method_low_rank, &method_two_mesh, &method_sparse};
+enum { METHODS = sizeof methods / sizeof *methods };
+_Static_assert((int)METHODS <= (int)METHODS_MOST, "build_options has room for the options of each method");
+
+const build_method *method_at(size_t k) {
+    return k < METHODS ? methods[k] : NULL;
+}
+
+const build_method *method_find(const char *name) {
+    for (size_t k = 0; k < METHODS; k++)
+        if (strcmp(methods[k]->name, name) == 0) return methods[k];
+    return NULL;
+}
+
+const build_method *method_fallback(void) {
+    return &method_low_rank;
+}
+
+const char *method_choices(void) {
+    static char words[16 * METHODS_MOST];
+    if (words[0] == '\0') {
+        char *end = stpcpy(words, "auto");
+        for (size_t k = 0; k < METHODS; k++) end += sprintf(end, "|%s", methods[k]->name);
+    }
+    return words;
+}
+
+bool method_has_option(const build_method *method, const char *option) {
+    for (size_t k = 0; method == NULL && k < METHODS; k++)
+        if (method_has_option(methods[k], option)) return true;
+    for (const option_row *row = method != NULL ? method->rows : NULL; row != NULL && row->name != NULL;
+         row++)
+        if (strcmp(row->name, option) == 0) return true;
+    return false;
+}
+
+static size_t index_of(const build_method *method) {
+    size_t k = 0;
+    while (methods[k] != method) k++;
+    return k;
+}
+
+void *method_own(build_options *options, const build_method *method) {
+    return &options->of[index_of(method)];
+}
+
+const void *method_own_const(const build_options *options, const build_method *method) {
+    return &options->of[index_of(method)];
+}
+
+/* --- options ----------------------------------------------------------------------------------------------
+ */
+
+const option_row build_rows[] = {
+    {.name = "epsilon",
+     .kind = OPTION_NUMBER,
+     .offset = offsetof(build_options, epsilon),
+     .argument = "X",
+     .preset = ".05",
+     .least = 0,
+     .most = 1,
+     .above = true,
+     .help = "low-rank: bound on the error of the factorization in the 2-norm; hierarchical: fifty times the "
+             "smallest coefficient that is stored; auto: the error at which methods are compared"},
+    {.name = "store-precision",
+     .kind = OPTION_CHOICE,
+     .offset = offsetof(build_options, precision),
+     .preset = "f32",
+     .choices = "f32|f16|i8",
+     .help = "Format of the large arrays of an operator of low rank; f16 takes half of the memory and time, "
+             "i8 a quarter"},
+    {0},
+};
+
+static lam_status take_presets(const option_row *rows, void *fields, lam_error *error) {
     lam_status status = LAM_OK;
-    /* 2msc does not factorize, it can make its own columns orthogonal; exact does neither. What a method has
-     * no use for is not refused. */
-    const bool qr = strcmp(options->factorizer, "qr") == 0;
-    const bool factorizes = strcmp(options->method, "auto") == 0 || strcmp(options->method, "low-rank") == 0;
-    if (!qr && !factorizer_exists(options->factorizer))
-        FAIL(error, LAM_ERR_ARGUMENT, "--factorizer %.40s: unknown; use auto, hf, svd, rsi, sgrsvd or qr",
-             options->factorizer);
-    if (qr && factorizes)
-        FAIL(error, LAM_ERR_ARGUMENT,
-             "--factorizer qr: is of --method 2msc alone; --method %.40s cannot use it", options->method);
-    if (!(options->coherence >= 0 && options->coherence <= 1))
-        FAIL(error, LAM_ERR_ARGUMENT, "--coherence %g: must be above 0 and at most 1", options->coherence);
-    if (!(options->min_area >= 0 && options->min_area < INFINITY))
-        FAIL(error, LAM_ERR_ARGUMENT, "--min-area %g: must be above 0", options->min_area);
-    if (strcmp(options->method, "sparse") == 0 && !(options->threshold > 0 && options->threshold < 1))
-        FAIL(error, LAM_ERR_ARGUMENT, "--threshold %g: must be above 0 and below 1", options->threshold);
-    if (!(options->epsilon > 0 && options->epsilon <= 1))
-        FAIL(error, LAM_ERR_ARGUMENT, "--epsilon %g: must be above 0 and at most 1", options->epsilon);
-    if (!(options->budget.alpha > 0 && options->budget.alpha < 1))
-        FAIL(error, LAM_ERR_ARGUMENT, "--alpha %g: must be above 0 and below 1", options->budget.alpha);
+    for (const option_row *row = rows; row != NULL && row->name != NULL; row++)
+        if (row->preset != NULL) TRY(option_read(row, row->preset, (char *)fields + row->offset, error));
 done:
     return status;
 }
 
-/* The numbers of a low-rank operator over those of the exact one: folded Y and V, or U, V and C cores. */
-static double low_rank_share(size_t n, size_t rank, size_t n_channels, bool keep_factors) {
-    const double k = (double)rank, whole = (double)n * (double)n * (double)n_channels;
-    const bool factored = n_channels > 1 || keep_factors;
-    return (2 * (double)n * k + (factored ? (double)n_channels * k * k : 0)) / whole;
+build_options build_presets(const char *method) {
+    build_options made = {.method = method, .seed = 1};
+    lam_error error = {.message = ""};
+    (void)take_presets(build_rows, &made, &error);
+    for (size_t k = 0; k < METHODS; k++) (void)take_presets(methods[k]->rows, &made.of[k], &error);
+    return made;
 }
 
-/* Low-rank, or exact where the rank turns out to save nothing. */
-static lam_status build_by_rank(const build_problem *problem, const build_options *options,
-                                const scene_class *looked, lam_operator **op, build_report *report,
-                                lam_error *error) {
+/* Gives the rows of this name the value; counts them. */
+static lam_status set_rows(const option_row *rows, void *fields, const char *name, const char *value,
+                           size_t *found, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = problem->n;
-    lam_operator *low_rank = NULL;
-    TRY(build_low_rank.build(problem, options, &low_rank, report, error));
-    const size_t rank = report->rank;
-    const double share = low_rank_share(n, rank, problem->n_channels, options->keep_factors);
-    if (share >= 1 && isfinite(looked->exact_cost)) {
-        const double spent = report->factorize_seconds, bound = report->epsilon;
-        TRY(build_exact.build(problem, options, op, report, error));
-        report->factorize_seconds = spent;
-        snprintf(report->reason, sizeof report->reason,
-                 "exact: rank %zu of %zu for epsilon %.3g would take more memory than the whole inverse",
-                 rank, n, bound);
-    } else {
-        *op = low_rank;
-        low_rank = NULL;
-        snprintf(
-            report->reason, sizeof report->reason,
-            "low-rank: F is %.3g %% dense; rank %zu of %zu, epsilon %.3g, takes %.3g %% of the memory of "
-            "the whole inverse",
-            100 * looked->density, rank, n, report->epsilon, 100 * share);
+    for (const option_row *row = rows; row != NULL && row->name != NULL; row++) {
+        if (strcmp(row->name, name) != 0) continue;
+        TRY(option_read(row, value, (char *)fields + row->offset, error));
+        ++*found;
     }
 done:
-    lam_operator_close(low_rank);
     return status;
 }
 
-/* auto: what classify.h finds. */
-static lam_status build_auto(const build_problem *problem, const build_options *options, lam_operator **op,
-                             build_report *report, lam_error *error) {
+lam_status build_set(build_options *options, const char *name, const char *value, lam_error *error) {
     lam_status status = LAM_OK;
-    scene_class looked;
-    lam_operator *hierarchical = NULL;
-    build_report made = *report;
-    const classify_options look = {.epsilon = options->epsilon,
-                                   .threshold = options->threshold,
-                                   .memory = options->memory,
-                                   .seed = options->seed,
-                                   .progress = options->progress,
-                                   .hierarchical = &hierarchical,
-                                   .hierarchical_report = &made};
-    build_problem seen = *problem;
-    if (options->low_rank) seen.centre = NULL; /* not to build what is not wanted */
-    TRY(classify_scene(&seen, &look, &looked, error));
-    if (strcmp(looked.method, "hierarchical") == 0) {
-        *op = hierarchical;
-        *report = made;
-        hierarchical = NULL;
-        memcpy(report->reason, looked.reason, sizeof report->reason);
-    } else if (strcmp(looked.method, "low-rank") == 0 || options->rank > 0) {
-        TRY(build_by_rank(problem, options, &looked, op, report, error));
-    } else if (strcmp(looked.method, "sparse") == 0) {
-        build_options how = *options;
-        how.threshold = looked.threshold;
-        TRY(build_sparse.build(problem, &how, op, report, error));
-        memcpy(report->reason, looked.reason, sizeof report->reason);
-    } else {
-        TRY(build_exact.build(problem, options, op, report, error));
-        memcpy(report->reason, looked.reason, sizeof report->reason);
+    size_t found = 0;
+    TRY(set_rows(build_rows, options, name, value, &found, error));
+    for (size_t k = 0; k < METHODS; k++)
+        TRY(set_rows(methods[k]->rows, &options->of[k], name, value, &found, error));
+    if (found == 0) FAIL(error, LAM_ERR_ARGUMENT, "--%s: no method has this option", name);
+done:
+    return status;
+}
+
+lam_status build_set_number(build_options *options, const char *name, double value, lam_error *error) {
+    char text[32];
+    snprintf(text, sizeof text, "%.17g", value);
+    return build_set(options, name, text, error);
+}
+
+/* Numbers that did not come through option_read lie in their limits too; 0 without a preset is not given. */
+static lam_status check_numbers(const option_row *rows, const void *fields, lam_error *error) {
+    lam_status status = LAM_OK;
+    for (const option_row *row = rows; row != NULL && row->name != NULL; row++) {
+        double value, read;
+        char text[32];
+        if (row->kind != OPTION_NUMBER) continue;
+        memcpy(&value, (const char *)fields + row->offset, sizeof value);
+        if (value == 0 && row->preset == NULL) continue;
+        snprintf(text, sizeof text, "%.17g", value);
+        TRY(option_read(row, text, &read, error));
     }
 done:
-    lam_operator_close(hierarchical);
     return status;
 }
 
-/* Rows that nobody holds: only a hierarchical operator can be made of them. */
-static lam_status build_streamed(const build_problem *problem, const build_options *options,
-                                 lam_operator **op, build_report *report, lam_error *error) {
-    const char *method = options->method;
-    if (strcmp(method, "auto") != 0 && strcmp(method, "hierarchical") != 0)
-        return status_fail(error, LAM_ERR_ARGUMENT,
-                           "--method %.40s: needs rows of form factors that are held", method);
-    return build_hierarchical.build(problem, options, op, report, error);
+/* --- building ---------------------------------------------------------------------------------------------
+ */
+
+lam_status method_build(const build_method *m, const build_problem *problem, const build_options *options,
+                        const void *own, lam_operator **op, build_report *report, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(check_numbers(m->rows, own, error));
+    if ((m->flags & METHOD_GEOMETRY) && (problem->centre == NULL || problem->normal == NULL))
+        FAIL(error, LAM_ERR_ARGUMENT, "--method %s: needs centres and normals of the elements", m->name);
+    report->method = m->name;
+    report_text(report, "factorizer", "none");
+    report_number(report, "rcond", 1);
+    TRY(m->build(problem, options, own, op, report, error));
+done:
+    return status;
+}
+
+/* The candidate without error that an operator of this cost is no cheaper than; NULL: there is none. */
+static const candidate *whole_instead(const decision *d, const build_problem *problem, double cost) {
+    for (size_t k = 0; k < d->n_candidates; k++) {
+        const candidate *c = &d->candidates[k];
+        if (c != d->taken && c->certain && isfinite(c->cost) && cost >= c->cost * (double)problem->n_channels)
+            return c;
+    }
+    return NULL;
 }
 
 lam_status build_operator(const build_problem *problem, const build_options *options, lam_operator **op,
                           build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
-    *report = (build_report){.measured_norm_error = -1,
-                             .rcond = 1,
-                             .coherence = -1,
-                             .patch_area = -1,
-                             .residual = -1,
-                             .probe_residual = -1,
-                             .uniform_error = -1};
-    TRY(check_options(options, error));
-    if (problem->stream != NULL) {
-        TRY(build_streamed(problem, options, op, report, error));
-        goto done;
+    lam_operator *made = NULL;
+    decision d = {.n_candidates = 0};
+    char why[sizeof d.reason + 128];
+    *report = (build_report){.method = NULL};
+    TRY(check_numbers(build_rows, options, error));
+    TRY(choose_method(problem, options, false, &d, error));
+    snprintf(why, sizeof why, "%s", d.reason);
+    if (d.taken->op != NULL) {
+        candidate *built = &d.candidates[d.taken - d.candidates];
+        *report = built->built;
+        made = built->op;
+        built->op = NULL;
+    } else {
+        TRY(method_build(d.taken->method, problem, options, &d.taken->own, &made, report, error));
     }
-    const bool chosen = strcmp(options->method, "auto") == 0;
-    if (chosen && problem->emitters != NULL) {
-        TRY(build_emitters.build(problem, options, op, report, error));
-        goto done;
+    const candidate *whole = report->cost > 0 ? whole_instead(&d, problem, report->cost) : NULL;
+    if (whole != NULL) {
+        const build_report before = *report;
+        lam_operator_close(made);
+        made = NULL;
+        *report = (build_report){.below_noise = before.below_noise};
+        for (size_t k = 0; k < before.n_steps; k++)
+            report_step_add(report, before.steps[k].name, before.steps[k].seconds);
+        TRY(method_build(whole->method, problem, options, &whole->own, &made, report, error));
+        snprintf(why, sizeof why, "%s with %s would take more memory", before.method, before.detail);
     }
-    if (chosen) {
-        TRY(build_auto(problem, options, op, report, error));
-        goto done;
-    }
-    for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
-        if (strcmp(options->method, methods[i]->name) != 0) continue;
-        TRY(methods[i]->build(problem, options, op, report, error));
-        if (report->reason[0] == '\0')
-            snprintf(report->reason, sizeof report->reason, "%s: asked for by --method", methods[i]->name);
-        goto done;
-    }
-    FAIL(error, LAM_ERR_ARGUMENT,
-         "--method %.40s: unknown; use auto, exact, low-rank, 2msc, sparse, emitters or hierarchical",
-         options->method);
+    snprintf(report->reason, sizeof report->reason, "%s: %s%s%s", report->method, why,
+             report->detail[0] != '\0' ? "; " : "", report->detail);
+    *op = made;
+    made = NULL;
 done:
+    lam_operator_close(made);
+    decision_free(&d);
     return status;
 }

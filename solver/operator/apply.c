@@ -1,5 +1,5 @@
-/* What the public functions do around a kind's product: check what is asked, cut it into passes, and lead
- * from emission in mesh order to the quantity asked for and back. */
+/* The public functions around a kind's product: they check arguments, cut a batch into passes, and lead from
+ * emission in mesh order to the quantity asked for and back. */
 #include "solver/base/work_area.h"
 #include "solver/operator/operator.h"
 
@@ -114,7 +114,7 @@ static void light_row(const lam_operator *op, size_t c, const float *E, const fl
     }
 }
 
-/* What one pass takes in, for all of out or (selected not NULL) some elements. */
+/* The input of one pass, for all of out or (selected not NULL) some elements. */
 typedef struct pass {
     const float *E, *H0;
     size_t count, n_selected;

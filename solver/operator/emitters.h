@@ -1,4 +1,4 @@
-/* What only an operator of few emitters is made of. */
+/* The arrays of an operator of few emitters. */
 #ifndef LAMBERT_OPERATOR_EMITTERS_H
 #define LAMBERT_OPERATOR_EMITTERS_H
 
@@ -41,9 +41,8 @@ typedef struct emitters {
 /* The same operator seen from inside; NULL of another kind. */
 const emitters *operator_emitters_of(const lam_operator *op);
 
-/* What so many weights [n_rhs][C][s] send out: E [n_rhs][C][n], and H0, the same of what their sky gives
- * directly. Errors:
- * LAM_ERR_MEMORY. */
+/* The emission E [n_rhs][C][n] that weights [n_rhs][C][s] stand for, and H0, the direct irradiance of their
+ * sky, in the same shape. Errors: LAM_ERR_MEMORY. */
 lam_status operator_emitters_light(const lam_operator *op, size_t n_rhs, const float *W, float *E, float *H0,
                                    lam_error *error);
 

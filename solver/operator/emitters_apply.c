@@ -1,4 +1,4 @@
-/* What an operator of few emitters answers: B = sum_k w_k B_k, its weights from an emission, its adjoint. */
+/* Answers of an operator of few emitters: B = sum_k w_k B_k, its weights from an emission, its adjoint. */
 #include "solver/base/work_area.h"
 #include "solver/operator/emitters.h"
 
@@ -8,7 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What an emission may miss of what its weights send out, of the larger of both. */
+/* Largest difference between an emission and the emission of the weights found for it, over the larger of
+ * both.
+ */
 static const float close_enough = 1e-5f;
 
 size_t lam_operator_emitters(const lam_operator *op) {
@@ -176,7 +178,7 @@ done:
     return status;
 }
 
-/* What is T in out becomes the quantity: radiosity E + T, irradiance T / rho', indirect T - rho H0; where rho
+/* T in out becomes the quantity: radiosity E + T, irradiance T / rho', indirect T - rho H0; where rho
  * is 0 radiosity is E alone and indirect 0. other [n]: E, or H0; NULL: 0. */
 static void finish(const lam_operator *op, size_t c, lam_quantity quantity, const float *other,
                    size_t n_selected, const uint32_t *selected, float *out) {

@@ -1,5 +1,5 @@
-/* What operators of k columns have in common: the array Y or U that spreads light out over the elements, the
- * cores between it and V, and the products of both. What V is, and what V^T E is, is the kind's own affair.
+/* The common part of operators of k columns: the array Y or U that spreads light out over the elements, the
+ * cores between it and V, and the products of both. V and V^T E belong to the kind.
  * folded (grey):  P = -Y T                      T = V^T E
  * factored:       P_c = rho'_c U core_c T_c     U free of reflectance, shared by all channels */
 #ifndef LAMBERT_OPERATOR_FACTORS_H

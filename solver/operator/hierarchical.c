@@ -1,6 +1,6 @@
-/* kind "hierarchical": the symmetric core of the transport in a basis of multiwavelets on a tree of clusters,
- * where nearly all of it is below what matters. An answer is two transforms of O(n) and a product with what
- * is left. */
+/* kind "hierarchical": H = A^-1/2 W^T K W A^1/2 E, with W a basis of multiwavelets on a tree of clusters
+ * (Gortler et al. 1993; Beylkin et al. 1991) and K sparse, as most of its coefficients lie below the
+ * threshold. An answer is two transforms of O(n) and a product with K. */
 #include "solver/operator/hierarchical.h"
 
 #include "solver/base/work_area.h"
@@ -25,7 +25,7 @@ typedef struct hierarchical {
     sliced_rows *fast; /* [C], the rows of K */
     float *root_area;  /* [n] A^1/2, by position */
     float *left;       /* [C][n] rho' A^-1/2, by position */
-    even_light even;
+    mean_correction even;
 } hierarchical;
 
 void hierarchical_arrays_free(hierarchical_arrays *arrays, size_t n_channels) {
@@ -43,7 +43,7 @@ static void hierarchical_destroy(lam_operator *op) {
     free(self->K);
     free(self->root_area);
     free(self->left);
-    even_light_free(&self->even);
+    mean_correction_free(&self->even);
     wavelet_plan_free(&self->plan);
     wavelets_free(&self->basis);
 }
@@ -86,22 +86,22 @@ static lam_status lift_even_light(hierarchical *self, lam_error *error) {
     if (by == NULL) return LAM_ERR_MEMORY;
     for (size_t c = 0; c < C; c++)
         for (size_t p = 0; p < n; p++) by[c * n + p] = operator_reflectance_or_one(&self->base, c, p);
-    const lam_status status = even_light_lift(&self->even, by, error);
+    const lam_status status = mean_correction_lift(&self->even, by, error);
     free(by);
     return status;
 }
 
-lam_status operator_hierarchical_make_up(lam_operator *op, const double *missing, const double *light,
+lam_status operator_hierarchical_correct(lam_operator *op, const double *missing, const double *light,
                                          lam_error *error) {
     lam_status status = LAM_OK;
     hierarchical *self = (hierarchical *)op;
-    TRY(even_light_create(op->n, op->n_channels, missing, light, &self->even, error));
+    TRY(mean_correction_create(op->n, op->n_channels, missing, light, &self->even, error));
     TRY(lift_even_light(self, error));
 done:
     return status;
 }
 
-/* What answers need of basis and K. */
+/* Makes of basis and K the arrays that answers read. */
 static lam_status finish(hierarchical *self, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = self->base.n, C = self->base.n_channels;
@@ -180,7 +180,7 @@ static lam_status hierarchical_load(store *s, size_t n, size_t n_channels, const
         snprintf(group, sizeof group, "/operator/K/%zu", c);
         TRY(half_matrix_load(s, group, n, &self->K[c], error));
     }
-    TRY(even_light_load(s, n, n_channels, &self->even, error));
+    TRY(mean_correction_load(s, n, n_channels, &self->even, error));
     TRY(lift_even_light(self, error));
     TRY(finish(self, error));
     *op = &self->base;
@@ -201,7 +201,7 @@ static lam_status hierarchical_save(const lam_operator *op, store *s, lam_error 
         snprintf(group, sizeof group, "/operator/K/%zu", c);
         TRY(half_matrix_save(&self->K[c], group, s, error));
     }
-    TRY(even_light_save(&self->even, s, error));
+    TRY(mean_correction_save(&self->even, s, error));
 done:
     return status;
 }
@@ -281,8 +281,8 @@ static void apply(const lam_operator *op, bool adjoint, size_t n_rhs, const floa
         scale(n_rhs, n, adjoint ? root : left, X, n, out + c * n, C * n, n_threads);
         for (size_t v = 0; v < n_rhs; v++) {
             const size_t row = (v * C + c) * n;
-            const double sum = even_light_sum(&self->even, c, adjoint, root, in + row);
-            even_light_add(&self->even, c, adjoint, root, sum, out + row);
+            const double sum = mean_correction_sum(&self->even, c, adjoint, root, in + row);
+            mean_correction_add(&self->even, c, adjoint, root, sum, out + row);
         }
     }
 }
@@ -332,9 +332,10 @@ static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, co
             else if (some)
                 sliced_multiply_rows(&self->fast[c], n_rows, rows, from + v * used, to);
             if (some) wavelet_plan_inverse_some(plan, n_steps, steps, to, X + v * n, slots);
-            const even_light *even = &self->even;
+            const mean_correction *even = &self->even;
             const float *lift = even->missing != NULL ? even->lift + c * n : NULL;
-            const float sum = (float)even_light_sum(even, c, false, self->root_area, E + (v * C + c) * n);
+            const float sum =
+                (float)mean_correction_sum(even, c, false, self->root_area, E + (v * C + c) * n);
             for (size_t r = 0; r < n_selected; r++) {
                 const size_t p = operator_position(op, selected[r]);
                 const float found = left[p] * X[v * n + p];
@@ -357,7 +358,7 @@ static void hierarchical_describe(const lam_operator *op, operator_description *
         entries += (double)stored;
         description->bytes += sliced_bytes(&self->fast[c]);
     }
-    description->bytes += even_light_bytes(&self->even);
+    description->bytes += mean_correction_bytes(&self->even);
     description->bytes += wavelet_plan_bytes(&self->plan) + (1 + op->n_channels) * op->n * sizeof(float);
     description->precision = "f16"; /* of K in the store */
     description->density = entries / whole;

@@ -1,4 +1,4 @@
-/* What only a hierarchical operator is made of. */
+/* The arrays of a hierarchical operator. */
 #ifndef LAMBERT_OPERATOR_HIERARCHICAL_H
 #define LAMBERT_OPERATOR_HIERARCHICAL_H
 
@@ -7,7 +7,7 @@
 #include "solver/operator/wavelet/wavelets.h"
 
 /* H_c = A^-1/2 W^T K_c W A^1/2 E_c, with K_c = W A^1/2 F (I - R_c F)^-1 A^-1/2 W^T, symmetric whatever R is,
- * and all of it sparse but for what was left out of K. */
+ * of which entries below the threshold are left out. */
 typedef struct hierarchical_arrays {
     wavelets basis;
     csr *K; /* [C], of n rows each: the upper triangle, the diagonal included */
@@ -24,8 +24,8 @@ lam_status operator_hierarchical_create(size_t n, size_t n_channels, const float
 
 /* H += missing (sum_j A_j E_j) / light from now on (mean_correction.h): missing [C][n], by position, is what
  * op lacks of the irradiance that a light E0 brings, light [C] the area-weighted sum of E0. Once at most.
- * Errors: as even_light_create. */
-lam_status operator_hierarchical_make_up(lam_operator *op, const double *missing, const double *light,
+ * Errors: as mean_correction_create. */
+lam_status operator_hierarchical_correct(lam_operator *op, const double *missing, const double *light,
                                          lam_error *error);
 
 /* --- half a symmetric matrix in a store: hierarchical_store.c ------------------------------------------ */
@@ -34,7 +34,7 @@ lam_status operator_hierarchical_make_up(lam_operator *op, const double *missing
 typedef struct half_matrix {
     size_t n;               /* rows and columns, empty ones included */
     csr rows;               /* all of it, both triangles */
-    const uint32_t *number; /* what its rows and columns are, ascending; NULL: all n. Not owned */
+    const uint32_t *number; /* of its rows and columns, ascending; NULL: all n. Not owned */
     float scale;
 } half_matrix;
 

@@ -8,14 +8,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-void even_light_free(even_light *e) {
+void mean_correction_free(mean_correction *e) {
     free(e->missing);
     free(e->light);
     free(e->lift);
-    *e = (even_light){.n = 0};
+    *e = (mean_correction){.n = 0};
 }
 
-static lam_status check(const even_light *e, lam_error *error) {
+static lam_status check(const mean_correction *e, lam_error *error) {
     lam_status status = LAM_OK;
     for (size_t k = 0; k < e->n * e->n_channels; k++)
         if (!isfinite(e->missing[k]))
@@ -27,31 +27,31 @@ done:
     return status;
 }
 
-static lam_status reserve(size_t n, size_t n_channels, even_light *e, lam_error *error) {
-    *e = (even_light){.n = n,
-                      .n_channels = n_channels,
-                      .missing = memory_allocate(n_channels, n * sizeof *e->missing, "operator", error),
-                      .light = memory_allocate(n_channels, sizeof *e->light, "operator", error)};
+static lam_status reserve(size_t n, size_t n_channels, mean_correction *e, lam_error *error) {
+    *e = (mean_correction){.n = n,
+                           .n_channels = n_channels,
+                           .missing = memory_allocate(n_channels, n * sizeof *e->missing, "operator", error),
+                           .light = memory_allocate(n_channels, sizeof *e->light, "operator", error)};
     return e->missing != NULL && e->light != NULL ? LAM_OK : LAM_ERR_MEMORY;
 }
 
-lam_status even_light_create(size_t n, size_t n_channels, const double *missing, const double *light,
-                             even_light *out, lam_error *error) {
+lam_status mean_correction_create(size_t n, size_t n_channels, const double *missing, const double *light,
+                                  mean_correction *out, lam_error *error) {
     lam_status status = LAM_OK;
-    even_light e = {.n = 0};
+    mean_correction e = {.n = 0};
     TRY(reserve(n, n_channels, &e, error));
     for (size_t k = 0; k < n * n_channels; k++)
         e.missing[k] = float_of_half(half_of_float((float)missing[k]));
     memcpy(e.light, light, n_channels * sizeof *light);
     TRY(check(&e, error));
     *out = e;
-    e = (even_light){.n = 0};
+    e = (mean_correction){.n = 0};
 done:
-    even_light_free(&e);
+    mean_correction_free(&e);
     return status;
 }
 
-lam_status even_light_save(const even_light *e, store *s, lam_error *error) {
+lam_status mean_correction_save(const mean_correction *e, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     uint16_t *halves = NULL;
     const size_t count = e->n * e->n_channels;
@@ -66,9 +66,10 @@ done:
     return status;
 }
 
-lam_status even_light_load(store *s, size_t n, size_t n_channels, even_light *out, lam_error *error) {
+lam_status mean_correction_load(store *s, size_t n, size_t n_channels, mean_correction *out,
+                                lam_error *error) {
     lam_status status = LAM_OK;
-    even_light e = {.n = 0};
+    mean_correction e = {.n = 0};
     void *halves = NULL, *light = NULL;
     if (!store_has(s, "/operator/missing")) {
         *out = e;
@@ -81,15 +82,16 @@ lam_status even_light_load(store *s, size_t n, size_t n_channels, even_light *ou
     memcpy(e.light, light, n_channels * sizeof *e.light);
     TRY(check(&e, error));
     *out = e;
-    e = (even_light){.n = 0};
+    e = (mean_correction){.n = 0};
 done:
     free(halves);
     free(light);
-    even_light_free(&e);
+    mean_correction_free(&e);
     return status;
 }
 
-double even_light_sum(const even_light *e, size_t c, bool adjoint, const float *root, const float *x) {
+double mean_correction_sum(const mean_correction *e, size_t c, bool adjoint, const float *root,
+                           const float *x) {
     double sum = 0;
     if (e->missing == NULL) return 0;
     const float *lift = e->lift + c * e->n;
@@ -101,7 +103,8 @@ double even_light_sum(const even_light *e, size_t c, bool adjoint, const float *
     return sum / e->light[c];
 }
 
-void even_light_add(const even_light *e, size_t c, bool adjoint, const float *root, double sum, float *y) {
+void mean_correction_add(const mean_correction *e, size_t c, bool adjoint, const float *root, double sum,
+                         float *y) {
     const float factor = (float)sum;
     if (e->missing == NULL || factor == 0) return;
     const float *lift = e->lift + c * e->n;
@@ -112,7 +115,7 @@ void even_light_add(const even_light *e, size_t c, bool adjoint, const float *ro
     }
 }
 
-lam_status even_light_lift(even_light *e, const float *by, lam_error *error) {
+lam_status mean_correction_lift(mean_correction *e, const float *by, lam_error *error) {
     if (e->missing == NULL) return LAM_OK;
     e->lift = memory_allocate(e->n_channels, e->n * sizeof *e->lift, "operator", error);
     if (e->lift == NULL) return LAM_ERR_MEMORY;
@@ -120,6 +123,6 @@ lam_status even_light_lift(even_light *e, const float *by, lam_error *error) {
     return LAM_OK;
 }
 
-size_t even_light_bytes(const even_light *e) {
+size_t mean_correction_bytes(const mean_correction *e) {
     return e->missing != NULL ? e->n * e->n_channels * sizeof *e->lift : 0;
 }

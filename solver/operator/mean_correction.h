@@ -1,6 +1,6 @@
-/* What an operator lacks of one light that shines everywhere and whose answer is known, given to any light by
- * how much of it there is: small numbers that were left out of many pairs are nothing to one emitter, and
- * together much of the light of a sky. */
+/* Correction of an operator by its error for one emission E0 that is everywhere and whose answer is known, in
+ * proportion to the mean of any other emission: coefficients too small to be stored are nothing to one
+ * emitter, and together much of the light of a sky. */
 #ifndef LAMBERT_OPERATOR_MEAN_CORRECTION_H
 #define LAMBERT_OPERATOR_MEAN_CORRECTION_H
 
@@ -11,34 +11,37 @@
 
 /* H += missing sum_j A_j E_j / light, light = sum_j A_j E0_j of the light E0 whose irradiance was too small
  * by missing. */
-typedef struct even_light {
+typedef struct mean_correction {
     size_t n, n_channels;
     float *missing; /* [C][n], by position, what half precision holds; NULL: nothing is missing */
     double *light;  /* [C], m^2 */
-    float *lift;    /* [C][n], made by even_light_lift */
-} even_light;
+    float *lift;    /* [C][n], made by mean_correction_lift */
+} mean_correction;
 
-void even_light_free(even_light *e);
+void mean_correction_free(mean_correction *e);
 
 /* From missing [C][n], by position, which is rounded, and light [C]; both are copied. Errors: LAM_ERR_MEMORY,
  * LAM_ERR_NUMERIC where a number is not finite, or a light not above 0. */
-lam_status even_light_create(size_t n, size_t n_channels, const double *missing, const double *light,
-                             even_light *out, lam_error *error);
+lam_status mean_correction_create(size_t n, size_t n_channels, const double *missing, const double *light,
+                                  mean_correction *out, lam_error *error);
 
 /* /operator/missing [C][n] f16 and /operator/even_light [C] f64, both or none. Errors: as store_read,
  * LAM_ERR_NUMERIC as above. */
-lam_status even_light_save(const even_light *e, store *s, lam_error *error);
-lam_status even_light_load(store *s, size_t n, size_t n_channels, even_light *out, lam_error *error);
+lam_status mean_correction_save(const mean_correction *e, store *s, lam_error *error);
+lam_status mean_correction_load(store *s, size_t n, size_t n_channels, mean_correction *out,
+                                lam_error *error);
 
 /* lift = by missing, by [C][n] by position: before the first product. Errors: LAM_ERR_MEMORY. */
-lam_status even_light_lift(even_light *e, const float *by, lam_error *error);
+lam_status mean_correction_lift(mean_correction *e, const float *by, lam_error *error);
 
 /* y += lift (sum_j A_j x_j) / light of channel c, or, adjoint, y += A (sum_i lift_i x_i) / light: [n] by
- * position, root = A^1/2. Where nothing is missing y stays. sum: what even_light_sum says. */
-double even_light_sum(const even_light *e, size_t c, bool adjoint, const float *root, const float *x);
-void even_light_add(const even_light *e, size_t c, bool adjoint, const float *root, double sum, float *y);
+ * position, root = A^1/2. Where nothing is missing y stays. sum: what mean_correction_sum says. */
+double mean_correction_sum(const mean_correction *e, size_t c, bool adjoint, const float *root,
+                           const float *x);
+void mean_correction_add(const mean_correction *e, size_t c, bool adjoint, const float *root, double sum,
+                         float *y);
 
 /* Bytes that a product reads. */
-size_t even_light_bytes(const even_light *e);
+size_t mean_correction_bytes(const mean_correction *e);
 
 #endif

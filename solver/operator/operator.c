@@ -93,8 +93,6 @@ static lam_status load_kind(store *s, const operator_kind **kind, lam_error *err
              store_path(s), name);
     if (store_has_attribute(s, "/operator", "layout")) {
         TRY(store_get_text(s, "/operator", "layout", &layout, error));
-        if (strcmp(layout, "panel64") == 0)
-            FAIL(error, LAM_ERR_UNSUPPORTED, "%s: layout 'panel64' is not supported yet", store_path(s));
         if (strcmp(layout, "rows") != 0)
             FAIL(error, LAM_ERR_FORMAT, "%s: /operator has the unknown layout '%s'", store_path(s), layout);
     }

@@ -8,7 +8,7 @@
 #include <stdatomic.h>
 #include <stdint.h>
 
-/* What an operator says about itself. */
+/* The description of an operator. */
 typedef struct operator_description {
     const char *form;      /* "folded", "factored" or NULL */
     const char *precision; /* of its large arrays; NULL: f32, which the kind has no choice about */
@@ -106,7 +106,7 @@ static inline float operator_reflectance_or_one(const lam_operator *op, size_t c
 lam_status operator_narrow(const lam_operator *op, panel_precision precision, lam_operator **out,
                            lam_error *error);
 
-/* Whether op keeps factors without reflectance, so that it can be relit. */
+/* True if op keeps factors without reflectance, so that it can be relit. */
 bool operator_keeps_factors(const lam_operator *op);
 
 /* Makes op again under other reflectances [C][n] (mesh order): the cores anew, as a builder makes them of the
@@ -141,7 +141,7 @@ lam_status operator_low_rank_create_factored(size_t n, size_t k, size_t n_channe
                                              float *U, float *V, float *core, lam_operator **op,
                                              lam_error *error);
 
-/* What a two_mesh operator is made of. */
+/* The arrays of a two_mesh operator. */
 typedef struct two_mesh_arrays {
     float *left;      /* [n][k]: Y (folded, grey: P = -Y T) or U (factored: H_c = U core_c T_c) */
     uint64_t *begin;  /* [k+1]: T_p is the sum of weight E over rows begin[p] ... begin[p+1]-1 */

@@ -26,7 +26,7 @@ lam_status sky_load(store *s, size_t n, lam_sky **out, lam_error *error) {
     TRY(store_read_view(s, "/sky/first_bounce", STORE_F32, 2, dims, &view, error));
     const float *values = view.data;
     if (dims[0] == 0) FAIL(error, LAM_ERR_FORMAT, "%s: /sky/first_bounce has no tiles", store_path(s));
-    /* What is mapped is compared with its checksums later, and is then what a writer has checked. */
+    /* A mapped array is compared with its checksums later; its writer has checked the values. */
     for (size_t k = 0; k < dims[0] * n && view.map == NULL; k++)
         if (!(values[k] >= 0 && isfinite(values[k])))
             FAIL(error, LAM_ERR_FORMAT, "%s: /sky/first_bounce[%zu][%zu] = %g, must be at least 0",

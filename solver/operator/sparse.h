@@ -1,4 +1,4 @@
-/* What only a sparse operator is made of. */
+/* The arrays of a sparse operator. */
 #ifndef LAMBERT_OPERATOR_SPARSE_H
 #define LAMBERT_OPERATOR_SPARSE_H
 

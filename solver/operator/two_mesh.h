@@ -1,4 +1,4 @@
-/* What only an operator of two meshes can tell: its patches. */
+/* The patches of an operator of two meshes. */
 #ifndef LAMBERT_OPERATOR_TWO_MESH_H
 #define LAMBERT_OPERATOR_TWO_MESH_H
 

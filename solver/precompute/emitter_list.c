@@ -4,46 +4,46 @@
 #include <stdlib.h>
 #include <string.h>
 
-void emitter_wish_free(emitter_wish *w) {
-    free(w->names);
-    emission_free(&w->light);
-    *w = (emitter_wish){.s = 0};
+void emitter_list_free(emitter_list *list) {
+    free(list->names);
+    emission_free(&list->light);
+    *list = (emitter_list){.s = 0};
 }
 
 /* Room for s names of at most so many bytes. */
-static lam_status reserve_names(size_t s, size_t each, emitter_wish *w, lam_error *error) {
-    w->names = memory_allocate(s, sizeof *w->names + each, "names of emitters", error);
-    if (w->names == NULL) return LAM_ERR_MEMORY;
-    for (size_t k = 0; k < s; k++) w->names[k] = (char *)(w->names + s) + k * each;
-    w->s = s;
+static lam_status reserve_names(size_t s, size_t each, emitter_list *list, lam_error *error) {
+    list->names = memory_allocate(s, sizeof *list->names + each, "names of emitters", error);
+    if (list->names == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < s; k++) list->names[k] = (char *)(list->names + s) + k * each;
+    list->s = s;
     return LAM_OK;
 }
 
-static lam_status number_names(const char *what, size_t s, emitter_wish *w, lam_error *error) {
+static lam_status number_names(const char *what, size_t s, emitter_list *list, lam_error *error) {
     enum { EACH = 40 };
-    const lam_status status = reserve_names(s, EACH, w, error);
-    for (size_t k = 0; status == LAM_OK && k < s; k++) snprintf(w->names[k], EACH, "%s %zu", what, k);
+    const lam_status status = reserve_names(s, EACH, list, error);
+    for (size_t k = 0; status == LAM_OK && k < s; k++) snprintf(list->names[k], EACH, "%s %zu", what, k);
     return status;
 }
 
-static lam_status read_sky(const mesh *m, size_t n_tiles, emitter_wish *w, lam_error *error) {
+static lam_status read_sky(const mesh *m, size_t n_tiles, emitter_list *list, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t C = m->n_channels;
     if (n_tiles == 0)
         FAIL(error, LAM_ERR_ARGUMENT,
              "--emitters sky: there is no sky; give --sky tregenza, reinhart:MF or grid:AxB too");
-    TRY(number_names("tile", n_tiles, w, error));
-    TRY(emission_allocate("--emitters sky", C, m->n, n_tiles, &w->light.E, error));
-    TRY(emission_allocate("--emitters sky", C, n_tiles, n_tiles, &w->light.L, error));
-    w->light.n_vectors = n_tiles;
+    TRY(number_names("tile", n_tiles, list, error));
+    TRY(emission_allocate("--emitters sky", C, m->n, n_tiles, &list->light.E, error));
+    TRY(emission_allocate("--emitters sky", C, n_tiles, n_tiles, &list->light.L, error));
+    list->light.n_vectors = n_tiles;
     for (size_t t = 0; t < n_tiles; t++)
-        for (size_t c = 0; c < C; c++) w->light.L[(t * C + c) * n_tiles + t] = 1;
+        for (size_t c = 0; c < C; c++) list->light.L[(t * C + c) * n_tiles + t] = 1;
 done:
     return status;
 }
 
 /* names: NAME,NAME,... */
-static lam_status read_groups(const char *names, const emission_scene *scene, emitter_wish *w,
+static lam_status read_groups(const char *names, const emission_scene *scene, emitter_list *list,
                               lam_error *error) {
     lam_status status = LAM_OK;
     const mesh *m = scene->m;
@@ -52,13 +52,13 @@ static lam_status read_groups(const char *names, const emission_scene *scene, em
     size_t s = 1, longest = strlen(names) + 1, k = 0;
     for (const char *at = names; *at != '\0'; at++) s += *at == ',';
     snprintf(what, sizeof what, "--emitters group=%s", names);
-    TRY(reserve_names(s, longest, w, error));
-    TRY(emission_allocate("--emitters", m->n_channels, m->n, s, &w->light.E, error));
-    w->light.n_vectors = s;
+    TRY(reserve_names(s, longest, list, error));
+    TRY(emission_allocate("--emitters", m->n_channels, m->n, s, &list->light.E, error));
+    list->light.n_vectors = s;
     for (const char *at = names; k < s; k++) {
         const size_t length = strcspn(at, ",");
-        memcpy(w->names[k], at, length);
-        TRY(emission_fill_group(scene, what, w->names[k], NULL, w->light.E + k * vector, error));
+        memcpy(list->names[k], at, length);
+        TRY(emission_fill_group(scene, what, list->names[k], NULL, list->light.E + k * vector, error));
         at += length + 1;
     }
 done:
@@ -73,10 +73,10 @@ static bool is_lit(const emission *e, size_t k, size_t vector, size_t tiles) {
     return false;
 }
 
-lam_status emitter_wish_read(const char *text, const mesh *m, size_t n_tiles, emitter_wish *out,
+lam_status emitter_list_read(const char *text, const mesh *m, size_t n_tiles, emitter_list *out,
                              lam_error *error) {
     lam_status status = LAM_OK;
-    emitter_wish made = {.s = 0};
+    emitter_list made = {.s = 0};
     emission_scene scene = {0};
     TRY(emission_scene_create(m, &scene, error));
     scene.n_tiles = n_tiles;
@@ -92,9 +92,9 @@ lam_status emitter_wish_read(const char *text, const mesh *m, size_t n_tiles, em
         if (!is_lit(&made.light, k, m->n * m->n_channels, n_tiles * m->n_channels))
             FAIL(error, LAM_ERR_ARGUMENT, "--emitters %.200s: emitter %zu sends nothing out", text, k);
     *out = made;
-    made = (emitter_wish){.s = 0};
+    made = (emitter_list){.s = 0};
 done:
     emission_scene_free(&scene);
-    emitter_wish_free(&made);
+    emitter_list_free(&made);
     return status;
 }

@@ -1,10 +1,11 @@
-/* What a precomputation will take, told before it begins: memory, time, room on the disk. */
+/* The forecast of a precomputation: memory, time, room on the disk. */
 #ifndef LAMBERT_PRECOMPUTE_FORECAST_H
 #define LAMBERT_PRECOMPUTE_FORECAST_H
 
 #include "solver/formfactor/recipe.h"
 #include "solver/formfactor/scratch.h"
 #include "solver/linalg/panel.h"
+#include "solver/method/method.h"
 
 #include <stdint.h>
 
@@ -18,14 +19,11 @@ typedef struct forecast {
     bool large;                  /* and whole samples lie there, as memory is too small for them */
     bool keep;                   /* the store keeps the form factors */
     bool compress;               /* compressed, where that takes less */
-    bool exact;                  /* the whole inverse is built */
-    size_t rank;                 /* 0: not known yet */
-    size_t emitters;             /* 0: another kind of operator */
-    bool sparse;                 /* a sparse inverse, whose threshold rises until it fits */
-    bool hierarchical;           /* or one in wavelets, of this epsilon */
-    bool streamed;               /* which asks for rows one after the other; none are held */
-    double epsilon;
-    panel_precision precision; /* of an operator of low rank */
+    bool streamed;               /* the method asks for rows one after the other; none are held */
+    size_t emitters;             /* 0: none, or not read yet */
+    const build_method *method;  /* NULL: no operator is built */
+    const build_options *build;  /* its options */
+    panel_precision precision;   /* of the stored operator */
 } forecast;
 
 /* Bytes at the peak; an upper bound for the form factors, an estimate for the rest. */
@@ -41,13 +39,23 @@ typedef struct forecast_times {
 } forecast_times;
 forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n_threads);
 
+/* Rays that look for other elements from one; a hemicube is a ray for each of its pixels. Bytes: of the rows
+ * of a merged sample, of packed rows, of one tile of a sky, of the judge's two samples and their mean, of the
+ * operator in the store. */
+double forecast_rays(double n, const recipe *r);
+double forecast_rows_bytes(double n, const recipe *r);
+double forecast_packed_bytes(double n, const recipe *r);
+double forecast_tile_bytes(double n);
+double forecast_reference_bytes(const forecast *f);
+double forecast_operator_bytes(const forecast *f);
+
 /* Bytes of the store and of the scratch folder: upper bounds for form factors, an estimate for the operator.
  */
 double forecast_store_bytes(const forecast *f);
 double forecast_scratch_bytes(const forecast *f);
 
 /* LAM_ERR_IO when the disks cannot hold that; the message names the option that would make it fit. scratch
- * may be NULL. What an earlier run has left there counts as free. */
+ * may be NULL. Rows that an earlier run has left there count as free. */
 lam_status forecast_check_disk(const forecast *f, const char *output, const scratch *rows,
                                const char *scratch_folder, lam_error *error);
 

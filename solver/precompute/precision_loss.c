@@ -5,6 +5,11 @@
 #include <math.h>
 #include <stdlib.h>
 
+/* The loss for one bright element, and for emissions that are random everywhere. */
+typedef struct precision_loss {
+    double single, random;
+} precision_loss;
+
 /* Probes of each sort. */
 enum { PROBES = 8 };
 
@@ -31,8 +36,8 @@ static double difference(const lam_operator *op, const double *area, const float
     return whole > 0 ? sqrt(off / whole) : 0;
 }
 
-lam_status narrow_measure(const lam_operator *op, const lam_operator *narrow, const double *area,
-                          uint64_t seed, narrow_loss *out, lam_error *error) {
+static lam_status measure_loss(const lam_operator *op, const lam_operator *narrow, const double *area,
+                               uint64_t seed, precision_loss *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = lam_operator_elements(op), n_channels = lam_operator_channels(op),
                  vector = n * n_channels;
@@ -47,7 +52,7 @@ lam_status narrow_measure(const lam_operator *op, const lam_operator *narrow, co
     }
     TRY(apply(op, E, before, error));
     TRY(apply(narrow, E, after, error));
-    *out = (narrow_loss){0};
+    *out = (precision_loss){0};
     for (size_t v = 0; v < PROBES; v++) {
         out->single += difference(op, area, before + v * vector, after + v * vector) / PROBES;
         out->random +=
@@ -60,63 +65,24 @@ done:
     return status;
 }
 
-lam_status narrow_replace(lam_operator **op, panel_precision precision, const double *area, uint64_t seed,
-                          terminal *t, lam_error *error) {
+lam_status precision_replace(lam_operator **op, panel_precision precision, const double *area, uint64_t seed,
+                             terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
     lam_operator *made = NULL;
-    narrow_loss loss;
+    precision_loss loss;
     if ((*op)->kind->narrow == NULL || precision == PANEL_F32) return LAM_OK;
     const size_t before = lam_operator_bytes(*op);
     TRY(operator_narrow(*op, precision, &made, error));
-    TRY(narrow_measure(*op, made, area, seed, &loss, error));
+    TRY(measure_loss(*op, made, area, seed, &loss, error));
     lam_operator_close(*op);
     *op = made;
     made = NULL;
     terminal_log(
         t,
         "%s takes %.0f %% of the memory of f32 and adds %.2g to the indirect error of single elements, "
-        "%.2g of light all over",
+        "%.2g of random emissions",
         panel_precision_name(precision),
         100 * (double)lam_operator_bytes(*op) / (double)(before > 0 ? before : 1), loss.single, loss.random);
-done:
-    lam_operator_close(made);
-    return status;
-}
-
-/* Errors that have nothing to do with each other add in squares: a tenth makes the whole half a percent
- * larger. */
-static bool fits(const narrow_loss *loss, const error_report *errors) {
-    return loss->single <= .1 * errors->single.operator_indirect.mean &&
-           loss->random <= .1 * errors->random.operator_indirect.mean;
-}
-
-lam_status narrow_advise(const lam_operator *op, const error_report *errors, const double *area,
-                         uint64_t seed, terminal *t, lam_error *error) {
-    static const panel_precision narrowest_first[] = {PANEL_I8, PANEL_F16};
-    lam_status status = LAM_OK;
-    lam_operator *made = NULL;
-    operator_description about;
-    operator_describe(op, &about);
-    if (op->kind->narrow == NULL || about.rank == 0 || errors->single.probes == 0 ||
-        errors->random.probes == 0 || t->quiet)
-        return LAM_OK;
-    for (size_t i = 0; i < sizeof narrowest_first / sizeof *narrowest_first; i++) {
-        narrow_loss loss;
-        const panel_precision precision = narrowest_first[i];
-        TRY(operator_narrow(op, precision, &made, error));
-        TRY(narrow_measure(op, made, area, seed, &loss, error));
-        if (fits(&loss, errors)) {
-            terminal_log(
-                t,
-                "--store-precision %s would add %.2g to an indirect error of %.2g and take %.0f %% of "
-                "the memory",
-                panel_precision_name(precision), loss.single, errors->single.operator_indirect.mean,
-                100 * (double)lam_operator_bytes(made) / (double)about.bytes);
-            break;
-        }
-        lam_operator_close(made);
-        made = NULL;
-    }
 done:
     lam_operator_close(made);
     return status;

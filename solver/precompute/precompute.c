@@ -7,49 +7,57 @@
 #include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
-void work_free(work *w) {
-    mesh_free(&w->m);
-    free(w->order);
-    form_factors_free(&w->f);
-    ray_rows_destroy(w->rays);
-    compressed_free(&w->compressed);
-    emitter_wish_free(&w->emitters);
-    scratch_close(w->scratch, false);
-    lam_operator_close(w->op);
-}
-
-double work_memory(const precompute_options *o) {
+static double memory_of(const precompute_options *o) {
     const uint64_t available = memory_available();
     if (o->memory > 0) return (double)o->memory;
     return available > 0 ? .7 * (double)available : 0x1p60;
 }
 
-uint64_t precompute_seed(uint64_t seed, uint64_t purpose) {
-    return random_mix(seed + purpose * RANDOM_STEP);
+precompute_state state_begin(const precompute_options *options, terminal *t) {
+    return (precompute_state){
+        .options = options, .t = t, .progress = terminal_progress(t), .memory = memory_of(options)};
 }
 
-static void log_stage(work *w, const char *stage, double started) {
-    terminal_log(w->t, "%-14s%8.2f s", stage, clock_seconds() - started);
+void state_free(precompute_state *state) {
+    mesh_free(&state->m);
+    free(state->order);
+    free(state->centre);
+    free(state->surface);
+    form_factors_free(&state->f);
+    ray_rows_destroy(state->rays);
+    compressed_free(&state->compressed);
+    emitter_list_free(&state->emitters);
+    scratch_close(state->scratch, false);
+    lam_operator_close(state->op);
 }
 
-static void log_form_factors(work *w) {
-    const form_factors *f = &w->f;
+uint64_t precompute_seed(uint64_t seed, seed_purpose purpose) {
+    return random_mix(seed + (uint64_t)purpose * RANDOM_STEP);
+}
+
+static void log_stage(precompute_state *state, const char *stage, double started) {
+    terminal_log(state->t, "%-14s%8.2f s", stage, clock_seconds() - started);
+}
+
+static void log_form_factors(precompute_state *state) {
+    const form_factors *f = &state->f;
     char how[64];
     recipe_describe(&f->recipe, how);
-    terminal_log(w->t,
+    terminal_log(state->t,
                  "%s: %.2f %% leave the scene%s, %.2f %% meet back faces; row sums repaired by "
                  "%.2g on average, at most %.2g",
                  how, 100 * f->leaving_share, f->closed ? " (closed)" : "", 100 * f->absorbed_share,
                  f->repair_mean, f->repair_max);
     if (f->pairs.accuracy > recipe_accuracy(&f->recipe))
-        terminal_log(w->t,
-                     "so much is partly hidden that it was found to a standard error of %.2g, not %.2g; "
-                     "--quality high looks closer",
+        terminal_log(state->t,
+                     "many pairs are partly hidden: their factors have a standard error of %.2g, not %.2g; "
+                     "--quality high casts more rays for them",
                      f->pairs.accuracy, recipe_accuracy(&f->recipe));
     if (f->pairs.facing > 0) {
-        const double all = .5 * (double)w->m.n * (double)(w->m.n - 1), facing = f->pairs.facing;
-        terminal_log(w->t,
+        const double all = .5 * (double)state->m.n * (double)(state->m.n - 1), facing = f->pairs.facing;
+        terminal_log(state->t,
                      "%.1f %% of all pairs taken one by one; of those %.1f %% have nothing between them, "
                      "%.1f %% are plainly open, %.1f %% plainly hidden",
                      100 * facing / all, 100 * f->pairs.certain / facing, 100 * f->pairs.open / facing,
@@ -57,130 +65,150 @@ static void log_form_factors(work *w) {
     }
     const sky_bounce *sky = &f->sky;
     if (sky->first_bounce != NULL)
-        terminal_log(w->t, "sky: %s, %zu tiles, ground albedo %g", sky->tiling.name, sky->tiling.n_tiles,
+        terminal_log(state->t, "sky: %s, %zu tiles, ground albedo %g", sky->tiling.name, sky->tiling.n_tiles,
                      sky->ground_albedo);
     if (sky->first_bounce != NULL && f->closed)
-        terminal_warn(w->t, "the scene is closed: no element sees the sky");
-    if (f->absorbed_share > .01 && !w->m.two_sided)
-        terminal_warn(w->t,
+        terminal_warn(state->t, "the scene is closed: no element sees the sky");
+    if (f->absorbed_share > .01 && !state->m.two_sided)
+        terminal_warn(state->t,
                       "%.1f %% of the light meets back faces and is lost there: turn the faces, or give "
                       "--two-sided",
                       100 * f->absorbed_share);
 }
 
 /* One line of what is to come, and whether the disks can hold it. */
-static lam_status announce(work *w, lam_error *error) {
+static lam_status announce(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
-    const precompute_options *o = w->options;
-    const forecast f = work_forecast(w, (double)w->m.n);
+    const precompute_options *o = state->options;
+    const forecast f = state_forecast(state, (double)state->m.n);
     char memory[32], stored[32], seconds[32], judging[32], scratch_room[32];
     char made[64] = "", judged[64] = "", kept[64] = "";
     double rate;
-    TRY(forecast_check_disk(&f, o->output, w->scratch, o->scratch, error));
-    if (w->t->quiet || (o->from_store && w->probes == 0)) goto done;
-    TRY(form_factors_ray_rate(&w->m, w->order, &rate, error));
+    TRY(forecast_check_disk(&f, o->output, state->scratch, o->scratch, error));
+    if (state->t->quiet || (o->from_store && state->probes == 0)) goto done;
+    TRY(form_factors_ray_rate(&state->m, state->order, &rate, error));
     const forecast_times times = forecast_seconds(&f, rate, omp_get_max_threads());
     forecast_format_bytes(forecast_bytes(&f), memory);
     forecast_format_bytes(forecast_store_bytes(&f), stored);
     forecast_format_bytes(forecast_scratch_bytes(&f), scratch_room);
     clock_format_seconds(times.form_factors, seconds);
     clock_format_seconds(times.judge, judging);
-    /* How much is partly hidden is not known before. */
-    const bool pairs = w->recipe.method == RECIPE_PAIRS || w->recipe.method == RECIPE_NEAR_PAIRS;
+    /* The share of partly hidden pairs is not known before. */
+    const bool pairs = state->recipe.method == RECIPE_PAIRS || state->recipe.method == RECIPE_NEAR_PAIRS;
     if (!o->from_store) snprintf(made, sizeof made, " form factors %s%s,", seconds, pairs ? " or more" : "");
-    if (w->probes > 0) snprintf(judged, sizeof judged, " the judge's %s,", judging);
-    if (w->scratch != NULL) snprintf(kept, sizeof kept, ", scratch up to %s", scratch_room);
-    terminal_log(w->t, "forecast:%s%s at %.3g Mray/s of a trial; memory up to %s, store up to %s%s", made,
+    if (state->probes > 0) snprintf(judged, sizeof judged, " the judge's %s,", judging);
+    if (state->scratch != NULL) snprintf(kept, sizeof kept, ", scratch up to %s", scratch_room);
+    terminal_log(state->t, "forecast:%s%s at %.3g Mray/s of a trial; memory up to %s, store up to %s%s", made,
                  judged, rate * 1e-6, memory, stored, kept);
-    if (w->large) terminal_log(w->t, "rows are kept in %s, as memory is too small for them", o->scratch);
+    if (state->large)
+        terminal_log(state->t, "rows are kept in %s, as memory is too small for them", o->scratch);
 done:
     return status;
 }
 
-void work_log_kept(work *w, const form_factors *f) {
+void state_log_kept(precompute_state *state, const form_factors *f) {
     if (f->rows_kept > 0)
-        terminal_log(w->t, "%zu of %zu rows were in %s already", f->rows_kept, w->m.n, w->options->scratch);
+        terminal_log(state->t, "%zu of %zu rows were in %s already", f->rows_kept, state->m.n,
+                     state->options->scratch);
 }
 
-lam_status work_trace(work *w, lam_error *error) {
+lam_status stage_form_factors(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
-    const form_factor_options how = {.recipe = w->recipe,
-                                     .progress = &w->progress,
+    const form_factor_options how = {.recipe = state->recipe,
+                                     .progress = &state->progress,
                                      .stage = "form factors",
-                                     .scratch = w->scratch,
+                                     .scratch = state->scratch,
                                      .scratch_name = "form-factors.rows",
-                                     .large = work_large_place(w),
-                                     .sky = w->options->sky,
-                                     .ground_albedo = w->options->ground_albedo};
-    TRY(form_factors_make(&w->m, w->order, &how, &w->f, error));
-    work_log_kept(w, &w->f);
+                                     .large = state_large_place(state),
+                                     .sky = state->options->sky,
+                                     .ground_albedo = state->options->ground_albedo};
+    TRY(form_factors_make(&state->m, state->order, &how, &state->f, error));
+    state_log_kept(state, &state->f);
 done:
     return status;
 }
 
-lam_status work_begin_stream(work *w, lam_error *error) {
-    const form_factor_options how = {.recipe = w->recipe,
-                                     .progress = &w->progress,
+lam_status stage_near_pairs(precompute_state *state, lam_error *error) {
+    const form_factor_options how = {.recipe = state->recipe,
+                                     .progress = &state->progress,
                                      .stage = "near pairs",
-                                     .sky = w->options->sky,
-                                     .ground_albedo = w->options->ground_albedo};
-    const lam_status status = ray_rows_create(&w->m, &how, &w->rays, error);
+                                     .sky = state->options->sky,
+                                     .ground_albedo = state->options->ground_albedo};
+    const lam_status status = ray_rows_create(&state->m, &how, &state->rays, error);
     if (status == LAM_OK)
-        ray_rows_stream(w->rays, precompute_seed(w->options->form_factors.seed, 6), &w->stream);
-    w->f.recipe = w->recipe;
+        ray_rows_stream(state->rays, precompute_seed(state->options->seed, SEED_OTHER_ROWS), &state->stream);
+    state->f.recipe = state->recipe;
     return status;
 }
 
-lam_status precompute_run(const precompute_options *options, terminal *t, build_report *report,
-                          lam_error *error) {
+/* The options among those given that the method had no use for: a row of another method's table, or one whose
+ * own method says that the others leave it no effect. */
+static void list_unused(const precompute_state *state, const option_result *given, char list[256]) {
+    const build_method *built = method_find(state->built.method);
+    const build_options *o = &state->options->build;
+    size_t length = 0;
+    list[0] = '\0';
+    for (size_t i = 0; i < given->n_given; i++) {
+        const char *name = given->given[i];
+        bool unused = method_has_option(NULL, name) && !method_has_option(built, name);
+        if (!unused && built->ignores != NULL && method_has_option(built, name))
+            unused = built->ignores(method_own_const(o, built), &state->built, name);
+        if (strcmp(name, "store-precision") == 0) unused = state->op->kind->narrow == NULL;
+        if (unused && length + strlen(name) + 5 < 256)
+            length += (size_t)sprintf(list + length, "%s--%s", length > 0 ? ", " : "", name);
+    }
+}
+
+lam_status precompute_run(const precompute_options *options, const option_result *given, terminal *t,
+                          precompute_result *result, lam_error *error) {
     lam_status status = LAM_OK;
-    work w = {.options = options, .t = t, .progress = terminal_progress(t)};
-    w.memory = work_memory(options);
+    precompute_state state = state_begin(options, t);
 
     double started = clock_seconds();
-    TRY(options->from_store ? work_load_store(&w, error) : work_load_scene(&w, error));
-    log_stage(&w, "import", started);
+    TRY(options->from_store ? stage_load_store(&state, error) : stage_load_scene(&state, error));
+    log_stage(&state, "import", started);
     TRY(terminal_check(error));
 
     started = clock_seconds();
-    TRY(work_prepare_mesh(&w, error));
-    log_stage(&w, "mesh", started);
+    TRY(stage_prepare_mesh(&state, error));
+    log_stage(&state, "mesh", started);
     TRY(terminal_check(error));
 
-    TRY(work_take_scratch(&w, error));
-    TRY(announce(&w, error));
+    TRY(stage_open_scratch(&state, error));
+    TRY(announce(&state, error));
     if (!options->from_store) {
         started = clock_seconds();
-        TRY(w.streamed ? work_begin_stream(&w, error) : work_trace(&w, error));
-        log_stage(&w, w.streamed ? "near pairs" : "form factors", started);
+        TRY(state.streamed ? stage_near_pairs(&state, error) : stage_form_factors(&state, error));
+        log_stage(&state, state.streamed ? "near pairs" : "form factors", started);
     }
-    if (!w.streamed) log_form_factors(&w);
+    if (!state.streamed) log_form_factors(&state);
 
-    TRY(work_build(&w, error));
-    if (w.streamed) log_form_factors(&w);
+    TRY(stage_operator(&state, error));
+    if (state.streamed) log_form_factors(&state);
     TRY(terminal_check(error));
 
-    if (options->compress_form_factors) {
+    if (state_compresses(options)) {
         started = clock_seconds();
-        TRY(work_compress(&w, error));
-        log_stage(&w, "compress", started);
+        TRY(stage_compress(&state, error));
+        log_stage(&state, "compress", started);
         TRY(terminal_check(error));
     }
 
-    if (w.probes > 0) {
+    if (state.probes > 0) {
         started = clock_seconds();
-        TRY(work_judge(&w, error));
-        log_stage(&w, "judge", started);
+        TRY(stage_judge(&state, error));
+        log_stage(&state, "judge", started);
     }
     TRY(terminal_check(error));
 
     started = clock_seconds();
-    TRY(work_save(&w, error));
-    log_stage(&w, "store", started);
-    scratch_close(w.scratch, true);
-    w.scratch = NULL;
-    *report = w.built;
+    TRY(stage_store(&state, error));
+    log_stage(&state, "store", started);
+    scratch_close(state.scratch, true);
+    state.scratch = NULL;
+    result->report = state.built;
+    list_unused(&state, given, result->unused);
 done:
-    work_free(&w);
+    state_free(&state);
     return status;
 }

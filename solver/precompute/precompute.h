@@ -3,61 +3,79 @@
 #define LAMBERT_PRECOMPUTE_PRECOMPUTE_H
 
 #include "solver/base/terminal.h"
-#include "solver/method/classify.h"
+#include "solver/method/choice.h"
 #include "solver/precompute/recipe_choice.h"
 #include "solver/scene/mesh.h"
 
-/* Where --levels auto and --probes auto are still open. */
-#define PRECOMPUTE_AUTO UINT64_MAX
-
+/* The options, as the rows of precompute_tables fill them; texts point into argv. The members below the line
+ * belong to the verb. */
 typedef struct precompute_options {
-    const char *input, *output;
-    bool from_store;
-    const char *command; /* for the record */
-    mesh_refinement refinement;
-    double unit;
-    char up; /* 0: by the file */
+    const char *output;
+    uint64_t subdivide, elements;
+    double max_edge, unit, reflectance; /* reflectance: negative, the file's own */
+    const char *up;                     /* NULL: by the file */
     bool two_sided;
-    double reflectance;          /* negative: the file's own */
-    choice_request form_factors; /* from a store: of the judge only */
-    const char *sky;             /* a tiling, or NULL; from a store: that of the store */
+    const char *form_factors, *quality; /* "rays" or "hemicube"; "draft", ... */
+    uint64_t rays, resolution;          /* rays: OPTION_AUTO */
+    const char *sky;                    /* a tiling, or NULL; from a store: that of the store */
     double ground_albedo;
-    uint64_t probes;
-    bool keep_form_factors;
-    bool compress_form_factors; /* those that are kept */
-    const char *method, *factorizer;
-    double epsilon, alpha;
-    const char *budget;         /* "squares", ... */
-    uint64_t seed;              /* of random sketches */
-    uint64_t levels;            /* PRECOMPUTE_AUTO */
-    uint64_t rank;              /* 0: by epsilon */
-    double coherence, min_area; /* of 2msc; 0: not given */
-    bool proximity;             /* of 2msc */
-    double threshold;           /* of sparse; 0 with auto: what suits epsilon */
-    const char *correction;     /* of sparse: "none", "delta", "discarded" */
-    const char *emitters;       /* FILE, group=NAME, sky; or NULL */
-    bool keep_factors;          /* also of one channel */
-    panel_precision precision;  /* of the stored operator */
-    uint64_t memory;            /* bytes; 0: 70 % of what is free */
-    const char *scratch;        /* a folder, or NULL */
-    const char *continues;      /* what a cancelled run says where the folder holds what it has finished */
+    const char *keep_form_factors; /* NULL: they are not kept; "": as they are; "compressed" */
+    const char *emitters;          /* FILE, group=NAME, sky; or NULL */
+    build_options build;           /* memory, seed and progress are set when the build begins */
+    uint64_t threads, memory;      /* memory: bytes; 0: 70 % of what is free */
+    const char *scratch;           /* a folder, or NULL */
+    uint64_t seed, probes;         /* probes: OPTION_AUTO */
+    bool quiet, progress;
+    /* --- */
+    const char *input;
+    bool from_store;
+    const char *command;   /* for the record */
+    const char *continues; /* the message of a cancelled run whose finished rows the folder holds */
 } precompute_options;
 
-/* Whether an input is a store: an HDF5 file, or one that is called so. */
+/* Tables of options at most: those of precompute, of every method, and the last, which has no rows. */
+enum { PRECOMPUTE_TABLES = 8 + METHODS_MOST };
+
+/* The tables that fill o, whose fields without presets they set first. to_classify: only those that say what
+ * the scene is and what suits it. Returns how many there are. */
+size_t precompute_tables(precompute_options *o, bool to_classify, option_table tables[PRECOMPUTE_TABLES]);
+
+/* True for an HDF5 file, or one that is named so: it is taken for a store. */
 bool precompute_takes_as_store(const char *path);
 
-/* What kind of scene it is, looked at thoroughly: its form factors by so many rays as 2^28 allow, from 256 to
- * 4,096 an element, unless their number is given or a store has them; rays_used says how many (0: of a
- * store). Of the options those about the scene, its sky and emitters, epsilon, threshold, memory, seed count.
- */
-lam_status precompute_classify(const precompute_options *options, terminal *t, scene_class *out,
+/* Weighs all methods for a scene, thoroughly: by form factors of as many rays as 2^28 allow, from 256 to
+ * 4,096 per element, unless their number is given or a store has them; *rays_used is that number (0: of a
+ * store), *n the number of elements. The caller frees out with decision_free; its problem and options are
+ * gone. */
+lam_status precompute_classify(const precompute_options *options, terminal *t, decision *out, size_t *n,
                                size_t *rays_used, lam_error *error);
 
-/* Does it all; on an error nothing is written. report says what was built. */
-lam_status precompute_run(const precompute_options *options, terminal *t, build_report *report,
-                          lam_error *error);
+/* Does it all; on an error nothing is written. report says what was built; unused lists the options among
+ * those given that the method built had no use for: "--alpha, --levels". */
+typedef struct precompute_result {
+    build_report report;
+    char unused[256];
+} precompute_result;
+lam_status precompute_run(const precompute_options *options, const option_result *given, terminal *t,
+                          precompute_result *result, lam_error *error);
 
-/* A seed that belongs to seed but shares no stream with it; another one for every purpose from 1. */
-uint64_t precompute_seed(uint64_t seed, uint64_t purpose);
+/* The streams of random numbers of a precompute and of verify: a seed is one for each purpose, and shares no
+ * stream with the seed that it is made of. The numbers are part of every store: do not change them. A store's
+ * own form factors may have been made with the seed of a judge's sample; then the next number is taken. */
+typedef enum seed_purpose {
+    SEED_JUDGE_FIRST = 1,   /* the judge's first sample of the form factors */
+    SEED_JUDGE_SECOND = 2,  /* its second */
+    SEED_PROBES = 3,        /* emissions that the error is measured with */
+    SEED_PRECISION = 4,     /* emissions that the loss of --store-precision is measured with */
+    SEED_FIRST_LIGHT = 5,   /* the judge's direct illumination of single elements */
+    SEED_OTHER_ROWS = 6,    /* rows of a stream that a self-check compares with */
+    SEED_VERIFY_FIRST = 11, /* of verify: its samples, probes and direct illumination */
+    SEED_VERIFY_SECOND = 12,
+    SEED_VERIFY_PROBES = 13,
+    SEED_VERIFY_FIRST_LIGHT = 14,
+    SEED_LINEAR_FIRST = 1, /* emissions that verify adds up: their seeds are counted, not given by a user */
+    SEED_LINEAR_SECOND = 2
+} seed_purpose;
+uint64_t precompute_seed(uint64_t seed, seed_purpose purpose);
 
 #endif

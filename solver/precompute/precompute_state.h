@@ -1,4 +1,4 @@
-/* What the stages of a precompute hand on. Private to solver/precompute/. */
+/* The state that the stages of a precompute hand on. Private to solver/precompute/. */
 #ifndef LAMBERT_PRECOMPUTE_PRECOMPUTE_STATE_H
 #define LAMBERT_PRECOMPUTE_PRECOMPUTE_STATE_H
 
@@ -10,7 +10,7 @@
 #include "solver/precompute/forecast.h"
 #include "solver/precompute/precompute.h"
 
-typedef struct work {
+typedef struct precompute_state {
     const precompute_options *options;
     terminal *t;
     progress progress;
@@ -18,9 +18,12 @@ typedef struct work {
     scratch *scratch; /* NULL: none */
     mesh m;
     uint32_t *order;
+    double (*centre)[3]; /* [n], with surface where a method needs them */
+    uint32_t *surface;
     form_factors f;
-    bool holds;                    /* somebody else asks for rows of F whatever the operator is */
-    bool streamed;                 /* rows of F are found as the operator asks for them; f has none */
+    const build_method *expected;  /* by what is known before the form factors are */
+    bool holds;                    /* rows of F are needed whatever the method is */
+    bool streamed;                 /* rows of F are found as the method asks for them; f has none */
     ray_rows *rays;                /* of these, until the operator is built */
     row_stream stream;             /* of rays */
     compressed_factors compressed; /* of f; n is 0 where they are kept as they are, or not */
@@ -28,64 +31,61 @@ typedef struct work {
     bool large;                    /* its rows and the judge's lie in the scratch folder */
     size_t sky_tiles;
     size_t probes;
-    emitter_wish emitters;
+    emitter_list emitters;
+    emitter_source emitting; /* a view of emitters, for methods */
     lam_operator *op;
     build_report built;
     error_report errors;
-} work;
+} precompute_state;
 
-/* The scene, or a store with its form factors: stage_scene.c. */
-lam_status work_load_scene(work *w, lam_error *error);
-lam_status work_load_store(work *w, lam_error *error);
+/* The state at the beginning of a precompute; frees it: precompute.c. */
+precompute_state state_begin(const precompute_options *options, terminal *t);
+void state_free(precompute_state *state);
 
-/* Refines the mesh, orders it, chooses the recipe and sees that memory holds what it takes. */
-lam_status work_prepare_mesh(work *w, lam_error *error);
+/* Says how many rows were in the scratch folder already. */
+void state_log_kept(precompute_state *state, const form_factors *f);
 
-/* Opens the folder for rows where one was given and is needed. */
-lam_status work_take_scratch(work *w, lam_error *error);
+/* True if the store keeps form factors; compressed ones. */
+bool state_keeps(const precompute_options *o);
+bool state_compresses(const precompute_options *o);
 
 /* The recipe of the judge's samples: with --rays given, of as many also where a store's form factors had
- * others. */
-recipe work_judge_recipe(const work *w, uint64_t seed);
+ * others: stage_scene.c. */
+recipe state_judge_recipe(const precompute_state *state, uint64_t seed);
 
-/* Whether something was asked for that operators of low rank alone have. */
-bool work_is_low_rank(const precompute_options *o);
+/* The forecast for n elements. */
+forecast state_forecast(const precompute_state *state, double n);
 
-/* What n elements are going to take. */
-forecast work_forecast(const work *w, double n);
+/* The place of large arrays; NULL: in memory. */
+const large_place *state_large_place(const precompute_state *state);
 
-/* Where large arrays lie; NULL: in memory. */
-const large_place *work_large_place(const work *w);
+/* The scene, or a store with its form factors. */
+lam_status stage_load_scene(precompute_state *state, lam_error *error);
+lam_status stage_load_store(precompute_state *state, lam_error *error);
 
-/* Says how many rows were there already: precompute.c. */
-void work_log_kept(work *w, const form_factors *f);
+/* Refines the mesh, orders it, and chooses a recipe that memory has room for. */
+lam_status stage_prepare_mesh(precompute_state *state, lam_error *error);
 
-/* Frees all of it, and how much memory it may use: precompute.c. */
-void work_free(work *w);
-double work_memory(const precompute_options *o);
+/* Opens the folder for rows where one was given and is needed. */
+lam_status stage_open_scratch(precompute_state *state, lam_error *error);
 
-/* Form factors of a scene: precompute.c. */
-lam_status work_trace(work *w, lam_error *error);
+/* Form factors of a scene, or of a stream the near pairs alone: precompute.c. */
+lam_status stage_form_factors(precompute_state *state, lam_error *error);
+lam_status stage_near_pairs(precompute_state *state, lam_error *error);
 
-/* The rows of near pairs, if the recipe has any; the others are found while the operator is built. */
-lam_status work_begin_stream(work *w, lam_error *error);
+/* The problem for methods: views of state, which must stay where it is. geometry: with centres, normals and
+ * surfaces (METHOD_GEOMETRY). The options of a build, with the memory that form factors and mesh leave:
+ * stage_operator.c. */
+lam_status state_problem(precompute_state *state, bool geometry, build_problem *problem, lam_error *error);
+build_options state_build_options(const precompute_state *state);
 
-/* What methods are given; emitters: of work_emitters, as long as the problem is used. */
-emitter_source work_emitters(const work *w);
-build_problem work_problem(const work *w, const emitter_source *emitters);
+lam_status stage_operator(precompute_state *state, lam_error *error);
+lam_status stage_judge(precompute_state *state, lam_error *error);
 
-/* Bytes of memory that form factors and mesh leave. */
-size_t work_left(const work *w);
-
-/* The operator and its errors: stage_operator.c. */
-lam_status work_build(work *w, lam_error *error);
-lam_status work_judge(work *w, lam_error *error);
-
-/* Compresses the form factors where that was asked for and takes less than they do: stage_compress.c.
- */
-lam_status work_compress(work *w, lam_error *error);
+/* Compresses the form factors where that was asked for and takes less than they do: stage_compress.c. */
+lam_status stage_compress(precompute_state *state, lam_error *error);
 
 /* The sealed store: stage_store.c. */
-lam_status work_save(work *w, lam_error *error);
+lam_status stage_store(precompute_state *state, lam_error *error);
 
 #endif

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-/* What a quality promises. */
+/* The accuracy that a quality stands for. */
 typedef struct quality_level {
     const char *name;
     double noise_share; /* of rays: part of epsilon that their noise may be */

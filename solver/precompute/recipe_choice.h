@@ -1,19 +1,20 @@
-/* Which recipe of form factors the options of a precomputation lead to. */
+/* The choice of a recipe of form factors by the options of a precomputation. */
 #ifndef LAMBERT_PRECOMPUTE_RECIPE_CHOICE_H
 #define LAMBERT_PRECOMPUTE_RECIPE_CHOICE_H
 
+#include "solver/base/options.h"
 #include "solver/formfactor/formfactor.h"
 
-#define CHOICE_AUTO UINT64_MAX
+#define CHOICE_AUTO OPTION_AUTO
 
-/* What was asked for. */
+/* The options that decide. */
 typedef struct choice_request {
     const char *quality; /* "draft", "normal", "high" */
     double epsilon;
     uint64_t rays;     /* CHOICE_AUTO */
     size_t resolution; /* of hemicubes in place of rays; 0: none */
     uint64_t seed;
-    bool sky;      /* what leaves the scene matters too */
+    bool sky;      /* light that leaves the scene matters too */
     bool filtered; /* the method takes out most of the noise of rays: few are enough */
 } choice_request;
 

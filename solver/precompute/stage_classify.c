@@ -1,5 +1,4 @@
 /* A scene's form factors, roughly, and what they say of the scene. */
-#include "solver/precompute/element_geometry.h"
 #include "solver/precompute/precompute_state.h"
 
 #include <math.h>
@@ -13,46 +12,37 @@ static size_t rays_for(size_t n) {
     return (size_t)exp2(floor(log2(each)));
 }
 
-lam_status precompute_classify(const precompute_options *options, terminal *t, scene_class *out,
+lam_status precompute_classify(const precompute_options *options, terminal *t, decision *out, size_t *n,
                                size_t *rays_used, lam_error *error) {
     lam_status status = LAM_OK;
     precompute_options o = *options;
-    work w = {.options = &o,
-              .t = t,
-              .progress = terminal_progress(t),
-              .memory = work_memory(options),
-              .holds = true};
-    element_geometry geometry = {0};
-    o.form_factors.quality = "draft";
-    TRY(o.from_store ? work_load_store(&w, error) : work_load_scene(&w, error));
+    precompute_state state = state_begin(&o, t);
+    build_problem problem;
+    state.holds = true;
+    o.form_factors = "rays";
+    o.quality = "draft";
+    TRY(o.from_store ? stage_load_store(&state, error) : stage_load_scene(&state, error));
     TRY(terminal_check(error));
-    TRY(work_prepare_mesh(&w, error));
+    TRY(stage_prepare_mesh(&state, error));
     TRY(terminal_check(error));
     *rays_used = 0;
     if (!o.from_store) {
-        if (o.form_factors.rays == CHOICE_AUTO) {
-            o.form_factors.rays = rays_for(w.m.n);
-            w.recipe = choice_recipe(&o.form_factors, false);
-        }
-        TRY(work_trace(&w, error));
-        *rays_used = w.recipe.rays;
+        if (o.rays == OPTION_AUTO)
+            state.recipe = (recipe){.method = RECIPE_RAYS, .rays = rays_for(state.m.n), .seed = o.seed};
+        TRY(stage_form_factors(&state, error));
+        *rays_used = state.recipe.rays;
     }
-    const emitter_source emitters = work_emitters(&w);
-    build_problem problem = work_problem(&w, &emitters);
-    TRY(element_geometry_add(&w.m, &geometry, &problem, error));
-    const classify_options look = {.epsilon = o.epsilon,
-                                   .threshold = o.threshold,
-                                   .memory = work_left(&w),
-                                   .seed = o.seed,
-                                   .thorough = true,
-                                   .progress = &w.progress};
-    TRY(classify_scene(&problem, &look, out, error));
-    const double noise = recipe_noise(&w.f.recipe);
-    if (noise > o.epsilon)
+    const build_options how = state_build_options(&state);
+    TRY(state_problem(&state, true, &problem, error));
+    TRY(choose_method(&problem, &how, true, out, error));
+    *n = state.m.n;
+    out->problem = NULL;
+    out->options = NULL;
+    const double noise = recipe_noise(&state.f.recipe);
+    if (noise > o.build.epsilon)
         terminal_warn(t, "the rank at --epsilon %g counts the noise %.2g of %zu rays: give more --rays",
-                      o.epsilon, noise, w.f.recipe.rays);
+                      o.build.epsilon, noise, state.f.recipe.rays);
 done:
-    element_geometry_free(&geometry);
-    work_free(&w);
+    state_free(&state);
     return status;
 }

@@ -1,6 +1,5 @@
 /* The first stages of a precompute: what comes in, its mesh, and whether memory holds what is to come. */
 #include "solver/base/atomic_file.h"
-#include "solver/method/classify.h"
 #include "solver/precompute/precompute_state.h"
 #include "solver/scene/import/import.h"
 
@@ -36,203 +35,233 @@ static void log_warnings(terminal *t, const char *warnings) {
     }
 }
 
-lam_status work_load_scene(work *w, lam_error *error) {
+lam_status stage_load_scene(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
-    const precompute_options *o = w->options;
-    const import_options how = {.unit = o->unit, .up = o->up, .reflectance = o->reflectance};
+    const precompute_options *o = state->options;
+    const import_options how = {
+        .unit = o->unit, .up = o->up != NULL ? o->up[0] : 0, .reflectance = o->reflectance};
     import_report report = {0};
-    TRY(scene_import(o->input, &how, &w->m, &report, error));
-    log_warnings(w->t, report.warnings);
+    TRY(scene_import(o->input, &how, &state->m, &report, error));
+    log_warnings(state->t, report.warnings);
     if (report.dropped_faces > 0)
-        terminal_log(w->t, "%zu faces of zero area were dropped", report.dropped_faces);
+        terminal_log(state->t, "%zu faces of zero area were dropped", report.dropped_faces);
     if (report.clamped > 0)
-        terminal_log(w->t, "%zu materials reflected all light or more: set below 1", report.clamped);
+        terminal_log(state->t, "%zu materials reflected all light or more: set below 1", report.clamped);
 done:
     return status;
 }
 
 /* About how many elements there will be; never fewer than now. */
 static double elements_after(const mesh *m, const precompute_options *o) {
-    const mesh_refinement *how = &o->refinement;
     double n = (double)m->n, area = 0;
-    if (how->subdivide_levels > 0) n *= pow(4, how->subdivide_levels);
-    if (how->max_edge > 0) {
+    if (o->subdivide > 0) n *= pow(4, (double)o->subdivide);
+    if (o->max_edge > 0) {
         for (size_t i = 0; i < m->n; i++) area += m->area[i];
-        n = fmax(n, area / (how->max_edge * how->max_edge));
+        n = fmax(n, area / (o->max_edge * o->max_edge));
     }
     if (o->two_sided) n *= 2;
-    return fmax(n, (double)how->elements);
+    return fmax(n, (double)o->elements);
 }
 
-bool work_is_low_rank(const precompute_options *o) {
-    return o->rank > 0 || o->keep_factors || o->precision != PANEL_F32 || strcmp(o->factorizer, "auto") != 0;
+bool state_keeps(const precompute_options *o) {
+    return o->keep_form_factors != NULL;
 }
 
-/* Whether the operator is going to be a hierarchical one: auto takes another one of large scenes where F is
- * sparse and well known alone. */
-static bool is_hierarchical(const precompute_options *o, double n) {
-    if (strcmp(o->method, "auto") != 0) return strcmp(o->method, "hierarchical") == 0;
-    return n > CLASSIFY_SMALL && o->emitters == NULL && !work_is_low_rank(o);
+bool state_compresses(const precompute_options *o) {
+    return state_keeps(o) && *o->keep_form_factors != '\0';
 }
 
 /* Bytes of rows from which on they are rather found twice, where a judge needs them, than held. */
 static const double held_most = 0x1p26;
 
-/* Whether nobody but a hierarchical operator asks for rows of n elements, and they would take much memory. */
-static bool streams(const work *w, double n) {
-    const precompute_options *o = w->options;
-    const double bytes = 8 * n * fmin(n, 2 * (double)w->recipe.rays);
-    const bool kept = o->keep_form_factors || o->compress_form_factors || o->from_store || o->scratch != NULL;
-    if (kept || w->holds || !ray_rows_can(&w->recipe) || !(bytes > held_most)) return false;
-    if (strcmp(o->method, "auto") != 0) return strcmp(o->method, "hierarchical") == 0;
-    /* What auto would take without a look at F: the whole inverse is too large, a sparse one would be noise.
-     */
-    return is_hierarchical(o, n) && n > CLASSIFY_EXACT_MOST && o->threshold == 0 &&
-           recipe_noise(&w->recipe) > o->epsilon;
+/* The method that n elements are going to get, as far as it is known before their form factors are; *final:
+ * nothing in them can change it. A sky and the emitters of a file are not read yet. */
+static lam_status expect_method(const precompute_state *state, double n, double noise,
+                                const build_method **method, bool *final, lam_error *error) {
+    lam_status status = LAM_OK;
+    const build_problem problem = {.n = (size_t)n, .n_channels = state->m.n_channels, .noise = noise};
+    decision d = {.n_candidates = 0};
+    TRY(choose_method(&problem, &state->options->build, false, &d, error));
+    *method = d.taken->method;
+    *final = d.final;
+done:
+    decision_free(&d);
+    return status;
 }
 
-/* What was asked for, and what the method makes of it. */
-static choice_request asked_of(const precompute_options *o, double n) {
-    choice_request asked = o->form_factors;
-    asked.filtered = is_hierarchical(o, n);
-    return asked;
+static bool is_hemicube(const precompute_options *o) {
+    return strcmp(o->form_factors, "hemicube") == 0;
 }
 
-recipe work_judge_recipe(const work *w, uint64_t seed) {
-    const choice_request asked = asked_of(w->options, (double)w->m.n);
-    const recipe *of = &w->recipe;
+/* The request for a recipe. Beside hemicubes only the judge casts rays, and --quality is not about the judge.
+ */
+static choice_request request_of(const precompute_state *state) {
+    const precompute_options *o = state->options;
+    const bool hemicube = is_hemicube(o);
+    return (choice_request){.quality = hemicube ? "normal" : o->quality,
+                            .epsilon = o->build.epsilon,
+                            .rays = hemicube && !o->from_store ? CHOICE_AUTO : o->rays,
+                            .resolution = hemicube && !o->from_store ? (size_t)o->resolution : 0,
+                            .seed = o->seed,
+                            .sky = o->sky != NULL,
+                            .filtered = (state->expected->flags & METHOD_FILTERS_NOISE) != 0};
+}
+
+/* Sets streamed where only a method that can use a stream asks for rows of n elements, and they would take
+ * much memory. */
+static lam_status choose_stream(precompute_state *state, double n, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = state->options;
+    const double bytes = 8 * n * fmin(n, 2 * (double)state->recipe.rays);
+    const bool kept = state_keeps(o) || o->from_store || o->scratch != NULL;
+    const build_method *method;
+    bool final;
+    state->streamed = false;
+    if (kept || state->holds || !ray_rows_can(&state->recipe) || !(bytes > held_most)) return LAM_OK;
+    TRY(expect_method(state, n, recipe_noise(&state->recipe), &method, &final, error));
+    state->streamed = final && (method->flags & METHOD_STREAMS);
+done:
+    return status;
+}
+
+recipe state_judge_recipe(const precompute_state *state, uint64_t seed) {
+    const choice_request asked = request_of(state);
+    const recipe *of = &state->recipe;
     recipe r = recipe_of_judge(of, choice_rays(&asked), seed);
-    if (w->options->from_store && r.method == RECIPE_RAYS && asked.rays != CHOICE_AUTO)
+    if (state->options->from_store && r.method == RECIPE_RAYS && asked.rays != CHOICE_AUTO)
         r.rays = (size_t)asked.rays;
     return r;
 }
 
-/* Columns of the operator where they are known before: the patches of 2msc without its options are. */
-static size_t likely_rank(const precompute_options *o, double n) {
-    const bool by_size = o->coherence <= 0 && o->min_area <= 0;
-    if (o->rank > 0 || strcmp(o->method, "2msc") != 0 || !by_size) return o->rank;
-    return (size_t)ceil(n / 16);
-}
-
-forecast work_forecast(const work *w, double n) {
-    const precompute_options *o = w->options;
+forecast state_forecast(const precompute_state *state, double n) {
+    const precompute_options *o = state->options;
+    panel_precision precision = PANEL_F32;
+    (void)panel_precision_find(o->build.precision, &precision); /* one of the choices of the row */
     return (forecast){.n = (size_t)n,
-                      .n_channels = w->m.n_channels,
-                      .sky_tiles = w->sky_tiles,
-                      .recipe = w->recipe,
-                      .judge_recipe = work_judge_recipe(w, 0),
-                      .probes = o->probes == PRECOMPUTE_AUTO ? PROBES_OF_LARGE : o->probes,
+                      .n_channels = state->m.n_channels,
+                      .sky_tiles = state->sky_tiles,
+                      .recipe = state->recipe,
+                      .judge_recipe = state_judge_recipe(state, 0),
+                      .probes = o->probes == OPTION_AUTO ? PROBES_OF_LARGE : o->probes,
                       .from_store = o->from_store,
                       .scratch = o->scratch != NULL,
-                      .large = w->large,
-                      .keep = o->keep_form_factors,
-                      .compress = o->compress_form_factors,
-                      .exact = strcmp(o->method, "exact") == 0,
-                      .rank = likely_rank(o, n),
-                      .emitters = w->emitters.s,
-                      .sparse = strcmp(o->method, "sparse") == 0,
-                      .hierarchical = is_hierarchical(o, n),
-                      .streamed = w->streamed,
-                      .epsilon = o->epsilon,
-                      .precision = o->precision};
+                      .large = state->large,
+                      .keep = state_keeps(o),
+                      .compress = state_compresses(o),
+                      .streamed = state->streamed,
+                      .emitters = state->emitters.s,
+                      .method = state->expected,
+                      .build = &o->build,
+                      .precision = precision};
 }
 
-/* Chooses the recipe for n elements and sees that it fits. */
-static lam_status check_memory(work *w, double n, lam_error *error) {
-    const precompute_options *o = w->options;
-    sky_tiling tiling = {.n_tiles = w->f.sky.tiling.n_tiles};
-    if (o->sky != NULL) {
-        const lam_status status = sky_tiling_create(o->sky, w->m.up, &tiling, error);
-        if (status != LAM_OK) return status;
-    }
-    w->sky_tiles = tiling.n_tiles;
-    sky_tiling_free(&tiling);
-    if (n > 4e9)
-        return status_fail(error, LAM_ERR_MEMORY, "%s: %.3g elements, must be below 4e9; refine less",
-                           o->input, n);
-    const choice_request asked = asked_of(o, n);
+/* Tiles of the sky of a scene, or of the store that was loaded. */
+static lam_status count_tiles(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    sky_tiling tiling = {.n_tiles = state->f.sky.tiling.n_tiles};
+    if (state->options->sky != NULL) TRY(sky_tiling_create(state->options->sky, state->m.up, &tiling, error));
+    state->sky_tiles = tiling.n_tiles;
+done:
+    if (state->options->sky != NULL) sky_tiling_free(&tiling);
+    return status;
+}
+
+/* Chooses the recipe for n elements: all pairs where they are affordable, or no more than the rays that would
+ * do, else rays; in memory, or, where there is a scratch folder and no other way, on disk. Fails where none
+ * fits. */
+static lam_status choose_recipe_that_fits(precompute_state *state, double n, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = state->options;
+    bool final;
     forecast f;
-    /* All pairs where they are affordable, or no more than the rays that would do, and the disk in place of
-     * memory only where there is no other way. */
+    TRY(count_tiles(state, error));
+    if (n > 4e9)
+        FAIL(error, LAM_ERR_MEMORY, "%s: %.3g elements, must be below 4e9; refine less", o->input, n);
+    TRY(expect_method(state, n, 0, &state->expected, &final, error));
+    const choice_request asked = request_of(state);
     const int disk_too = o->scratch != NULL,
               pairs_too = n <= CHOICE_PAIRS_MOST || n <= (double)choice_rays(&asked);
     for (int way = 0; way <= 2 * disk_too + 1; way++) {
         const bool all_pairs = way % 2 == 0;
         if (all_pairs && !pairs_too) continue;
-        w->large = way >= 2;
-        w->recipe = o->from_store ? w->f.recipe : choice_recipe(&asked, all_pairs);
-        w->streamed = streams(w, n);
-        f = work_forecast(w, n);
-        if (forecast_bytes(&f) <= w->memory) break;
+        state->large = way >= 2;
+        state->recipe = o->from_store ? state->f.recipe : choice_recipe(&asked, all_pairs);
+        TRY(choose_stream(state, n, error));
+        f = state_forecast(state, n);
+        if (forecast_bytes(&f) <= state->memory) break;
     }
-    return forecast_check(&f, w->memory, error);
+    TRY(forecast_check(&f, state->memory, error));
+done:
+    return status;
 }
 
 /* Rows go to the scratch folder as they are found, and whole samples where memory is too small for them. */
-static lam_status open_scratch(work *w, lam_error *error) {
-    if (w->scratch != NULL) return LAM_OK;
-    w->t->nothing = w->options->continues;
-    return scratch_open(w->options->scratch, &w->scratch, error);
+static lam_status open_scratch(precompute_state *state, lam_error *error) {
+    if (state->scratch != NULL) return LAM_OK;
+    state->t->nothing = state->options->continues;
+    return scratch_open(state->options->scratch, &state->scratch, error);
 }
 
 /* A store has its rows: it needs the folder for the judge's only, or where memory is too small. */
-lam_status work_take_scratch(work *w, lam_error *error) {
-    const precompute_options *o = w->options;
+lam_status stage_open_scratch(precompute_state *state, lam_error *error) {
+    const precompute_options *o = state->options;
     if (o->scratch == NULL) return LAM_OK;
-    if (w->probes > 0 || !o->from_store || w->large) return open_scratch(w, error);
-    terminal_log(w->t, "a store with form factors does not use --scratch");
+    if (state->probes > 0 || !o->from_store || state->large) return open_scratch(state, error);
+    terminal_log(state->t, "a store with form factors does not use --scratch");
     return LAM_OK;
 }
 
-const large_place *work_large_place(const work *w) {
-    return w->large ? scratch_place(w->scratch) : NULL;
+const large_place *state_large_place(const precompute_state *state) {
+    return state->large ? scratch_place(state->scratch) : NULL;
 }
 
-lam_status work_load_store(work *w, lam_error *error) {
+lam_status stage_load_store(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
     double *row_sums = NULL;
-    TRY(store_open(w->options->input, &s, error));
-    TRY(mesh_load(s, &w->m, &row_sums, error));
+    TRY(store_open(state->options->input, &s, error));
+    TRY(mesh_load(s, &state->m, &row_sums, error));
     if (store_has(s, "/form_factors")) {
-        TRY(recipe_load(s, &recipe_of_form_factors, &w->f.recipe, error));
-        TRY(check_memory(w, (double)w->m.n, error));
+        TRY(recipe_load(s, &recipe_of_form_factors, &state->f.recipe, error));
+        TRY(choose_recipe_that_fits(state, (double)state->m.n, error));
     }
-    if (w->large) TRY(open_scratch(w, error));
-    TRY(form_factors_load(s, &w->m, work_large_place(w), &w->f, error));
-    TRY(form_factors_expand(&w->f, w->m.area, error));
-    if (store_has(s, "/sky")) TRY(sky_bounce_load(s, w->m.n, &w->f.sky, error));
-    if (w->options->reflectance >= 0)
-        for (size_t i = 0; i < w->m.n * w->m.n_channels; i++)
-            w->m.reflectance[i] = (float)w->options->reflectance;
+    if (state->large) TRY(open_scratch(state, error));
+    TRY(form_factors_load(s, &state->m, state_large_place(state), &state->f, error));
+    TRY(form_factors_expand(&state->f, state->m.area, error));
+    if (store_has(s, "/sky")) TRY(sky_bounce_load(s, state->m.n, &state->f.sky, error));
+    if (state->options->reflectance >= 0)
+        for (size_t i = 0; i < state->m.n * state->m.n_channels; i++)
+            state->m.reflectance[i] = (float)state->options->reflectance;
 done:
     free(row_sums);
     store_close(s);
     return status;
 }
 
-lam_status work_prepare_mesh(work *w, lam_error *error) {
+lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
-    const precompute_options *o = w->options;
-    mesh_refinement refinement = o->refinement;
+    const precompute_options *o = state->options;
     /* --elements counts both sides. */
-    if (o->two_sided) refinement.elements = (refinement.elements + 1) / 2;
-    TRY(check_memory(w, elements_after(&w->m, o), error));
+    const mesh_refinement refinement = {.subdivide_levels = (unsigned)o->subdivide,
+                                        .max_edge = o->max_edge,
+                                        .elements = o->two_sided ? (o->elements + 1) / 2 : o->elements};
+    TRY(choose_recipe_that_fits(state, elements_after(&state->m, o), error));
     if (refinement.subdivide_levels > 0 || refinement.max_edge > 0 || refinement.elements > 0)
-        TRY(mesh_refine(&w->m, &refinement, error));
-    if (o->two_sided) TRY(mesh_make_two_sided(&w->m, error));
-    TRY(check_memory(w, (double)w->m.n, error));
-    w->order = memory_allocate(w->m.n, sizeof *w->order, "the order of the elements", error);
-    if (w->order == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(mesh_z_order(&w->m, w->order, error));
-    w->probes = o->probes != PRECOMPUTE_AUTO ? o->probes : w->m.n > LARGE ? PROBES_OF_LARGE : PROBES;
-    if (w->probes > w->m.n) w->probes = w->m.n;
+        TRY(mesh_refine(&state->m, &refinement, error));
+    if (o->two_sided) TRY(mesh_make_two_sided(&state->m, error));
+    TRY(choose_recipe_that_fits(state, (double)state->m.n, error));
+    state->order = memory_allocate(state->m.n, sizeof *state->order, "the order of the elements", error);
+    if (state->order == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(mesh_z_order(&state->m, state->order, error));
+    state->probes = o->probes != OPTION_AUTO ? o->probes : state->m.n > LARGE ? PROBES_OF_LARGE : PROBES;
+    if (state->probes > state->m.n) state->probes = state->m.n;
     if (o->emitters != NULL) {
-        TRY(emitter_wish_read(o->emitters, &w->m, w->sky_tiles, &w->emitters, error));
-        TRY(check_memory(w, (double)w->m.n, error));
+        TRY(emitter_list_read(o->emitters, &state->m, state->sky_tiles, &state->emitters, error));
+        TRY(choose_recipe_that_fits(state, (double)state->m.n, error));
     }
-    terminal_log(w->t, "%zu elements in %zu groups, %zu channel%s%s", w->m.n, w->m.n_groups, w->m.n_channels,
-                 w->m.n_channels == 1 ? "" : "s", w->m.two_sided ? ", two-sided" : "");
+    terminal_log(state->t, "%zu elements in %zu groups, %zu channel%s%s", state->m.n, state->m.n_groups,
+                 state->m.n_channels, state->m.n_channels == 1 ? "" : "s",
+                 state->m.two_sided ? ", two-sided" : "");
 done:
     return status;
 }

@@ -1,9 +1,8 @@
 /* Checks of the operator: finite, linear, energy, and its error measured again. */
 #include "solver/base/random.h"
-#include "solver/formfactor/pairs/first_light.h"
-#include "solver/method/judge.h"
 #include "solver/operator/emitters.h"
 #include "solver/precompute/forecast.h"
+#include "solver/precompute/judging.h"
 #include "solver/precompute/precompute.h"
 #include "solver/verify/verify.h"
 
@@ -12,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of what a single-precision product over n terms may round, relative to the largest value. */
+/* Rounding of a single-precision product over n terms, relative to the largest value. */
 static const double rounding = 1e-5;
 
 /* Numbers of one emission: a channel has one for each element, or, of an operator of emitters, a weight each.
@@ -63,7 +62,7 @@ lam_status verify_operator(examination *e, check *c, lam_error *error) {
               about.precision != NULL ? about.precision : "f32", about.bytes);
     if (e->op->kind->check != NULL && !e->op->kind->check(e->op, e->m.area, detail, sizeof detail))
         check_say(c, VERDICT_BROKEN, "%s", detail);
-    /* Light everywhere: a value that is not finite anywhere in the operator shows in the answer. */
+    /* Uniform emission: a value that is not finite anywhere in the operator shows in the answer. */
     const size_t count = e->m.n * e->m.n_channels, inputs = input_size(e);
     E = memory_allocate(inputs, sizeof *E, "an emission", error);
     if (E == NULL) TRY(LAM_ERR_MEMORY);
@@ -91,8 +90,8 @@ lam_status verify_linearity(examination *e, check *c, lam_error *error) {
     E = memory_allocate(inputs, 3 * sizeof *E, "emissions", error);
     if (E == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < inputs; i++) {
-        E[i] = random_to_float(precompute_seed(state, 1));
-        E[inputs + i] = random_to_float(precompute_seed(state, 2));
+        E[i] = random_to_float(precompute_seed(state, SEED_LINEAR_FIRST));
+        E[inputs + i] = random_to_float(precompute_seed(state, SEED_LINEAR_SECOND));
         E[2 * inputs + i] = E[i] + 2 * E[inputs + i];
         state++;
     }
@@ -117,9 +116,10 @@ static bool stated(store *s, const char *group, const char *name, double *value)
            store_get_number(s, group, name, value, NULL) == LAM_OK;
 }
 
-/* How far the power may be out of balance; negative when the store states nothing. For the scene's own light
- * the store says it; for light everywhere it follows from the error of all-over light: off by h in H is off
- * by sum A (1 - rho s) h <= |A|^1/2 |h|, twice because the stated error weighs H by the reflectance. */
+/* Largest imbalance of the power; negative when the store states none. For the scene's own light the store
+ * states it; for uniform emission it follows from the error of random emissions: an error h of H is an
+ * imbalance of sum A (1 - rho s) h <= |A|^1/2 |h|, twice because the stated error weighs H by the
+ * reflectance. */
 static double allowed_imbalance(store *s, bool own, double emitted, double area, double received) {
     double value;
     if (own && stated(s, "/error/lights", "energy_balance", &value))
@@ -129,8 +129,8 @@ static double allowed_imbalance(store *s, bool own, double emitted, double area,
     return -1;
 }
 
-/* What is tested for its energy: the scene's own light, or light everywhere, or all emitters at once, whose
- * sky counts as what the elements reflect of it (E + rho H0) and is taken out of what they receive. */
+/* The light whose energy is tested: the scene's own, or uniform emission, or all emitters at once. Their sky
+ * counts by the light that the elements reflect of it (E + rho H0), and is taken out of their irradiance. */
 typedef struct lit {
     bool own;
     const char *name;
@@ -155,7 +155,7 @@ static lam_status light_up(const examination *e, lit *l, lam_error *error) {
     }
     for (size_t i = 0; i < count; i++) l->own = l->own || m->emission[i] > 0;
     for (size_t i = 0; i < count; i++) l->input[i] = l->E[i] = l->own ? m->emission[i] : 1;
-    l->name = l->own ? "the scene's own light" : "light everywhere";
+    l->name = l->own ? "the scene's own light" : "uniform emission";
 done:
     return status;
 }
@@ -238,50 +238,38 @@ static lam_status read_recipe(examination *e, recipe *out, lam_error *error) {
     return LAM_OK;
 }
 
-/* Purposes 1 to 3 belong to precompute: the samples of these are new to the operator and to its figures. */
-static recipe recipe_again(const examination *e, const recipe *of, uint64_t half) {
-    return recipe_of_judge(of, judge_rays(e), precompute_seed(of->seed, 11 + half));
+/* The samples are new to the operator and to the figures that the store states. */
+static recipe recipe_again(const examination *e, const recipe *of, seed_purpose half) {
+    return recipe_of_judge(of, judge_rays(e), precompute_seed(of->seed, half));
 }
 
 static lam_status measure_again(examination *e, const recipe *from, error_report *out, lam_error *error) {
     lam_status status = LAM_OK;
-    form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}}, mean = {.row_sums = NULL};
-    form_factor_options how = {.recipe = *from, .progress = e->progress, .stage = "form factors"};
-    first_light *first = NULL;
+    const form_factor_options how = {.recipe = *from, .progress = e->progress, .stage = "form factors"};
     uint32_t *order = memory_allocate(e->m.n, sizeof *order, "the order of the elements", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&e->m, order, error));
     if (e->f.F.indptr == NULL) TRY(form_factors_make(&e->m, order, &how, &e->f, error));
-    for (uint64_t h = 0; h < 2; h++) {
-        how.recipe = recipe_again(e, from, h);
-        TRY(form_factors_make(&e->m, order, &how, &half[h], error));
-    }
-    TRY(form_factors_mean(&half[0], &half[1], &mean, error));
     const build_problem problem = {.n = e->m.n,
                                    .n_channels = e->m.n_channels,
                                    .area = e->m.area,
                                    .reflectance = e->m.reflectance,
                                    .F = &e->f.F,
                                    .order = order};
-    if (recipe_noise(from) > 0)
-        TRY(first_light_create(&e->m, precompute_seed(from->seed, 14), &first, error));
-    const judge_input input = {.problem = &problem,
-                               .row_sums = e->f.row_sums,
-                               .first_light = first != NULL ? first_light_for_judge : NULL,
-                               .first_light_context = first,
-                               .emission = e->m.emission,
-                               .independent = &mean.F,
-                               .halves = {&half[0].F, &half[1].F},
-                               .probes = e->probes,
-                               .seed = precompute_seed(from->seed, 13),
-                               .progress = e->progress};
-    TRY(judge_operator(e->op, &input, out, error));
+    const judging j = {
+        .m = &e->m,
+        .order = order,
+        .problem = &problem,
+        .f = &e->f,
+        .halves = {recipe_again(e, from, SEED_VERIFY_FIRST), recipe_again(e, from, SEED_VERIFY_SECOND)},
+        .stages = {"form factors", "form factors"},
+        .probes_seed = precompute_seed(from->seed, SEED_VERIFY_PROBES),
+        .first_light_seed = precompute_seed(from->seed, SEED_VERIFY_FIRST_LIGHT),
+        .probes = e->probes,
+        .progress = e->progress};
+    TRY(judging_run(&j, e->op, out, error));
 done:
-    first_light_destroy(first);
     free(order);
-    form_factors_free(&half[0]);
-    form_factors_free(&half[1]);
-    form_factors_free(&mean);
     return status;
 }
 
@@ -300,9 +288,8 @@ lam_status verify_error(examination *e, check *c, lam_error *error) {
     const forecast f = {.n = e->m.n,
                         .n_channels = e->m.n_channels,
                         .recipe = from,
-                        .judge_recipe = recipe_again(e, &from, 0),
-                        .probes = e->probes,
-                        .rank = 1};
+                        .judge_recipe = recipe_again(e, &from, SEED_VERIFY_FIRST),
+                        .probes = e->probes};
     if (available > 0) TRY(forecast_check(&f, .7 * (double)available, error));
     TRY(measure_again(e, &from, &again, error));
     check_say(c, VERDICT_OK, "single elements: total indirect %.3g, operator indirect %.3g, as stated",

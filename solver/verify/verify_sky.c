@@ -4,7 +4,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* What comes in is what a row leaves outside: sum_j F_ij + sum_t first_bounce_ti / pi <= 1, for any albedo.
+/* Light from the sky comes from where a row sees no element: sum_j F_ij + sum_t first_bounce_ti / pi <= 1,
+ * for any albedo.
  */
 lam_status verify_sky(examination *e, check *c, lam_error *error) {
     lam_status status = LAM_OK;

@@ -1,13 +1,14 @@
 /* Factorizers on the form factors of a store, as CSV:
  *
- *     bench_factorize STORE.h5 FACTORIZER epsilon=X|rank=K [alpha=X] [levels=N] [budget=RULE] [iterations=Q]
+ *     bench_factorize STORE.h5 FACTORIZER epsilon=X|rank=K [alpha=X] [levels=N] [iterations=Q]
  *                     [order=mesh] [runs=N] [norm=0]
  */
 #include "solver/base/clock.h"
 #include "solver/bench/stats.h"
 #include "solver/formfactor/formfactor.h"
-#include "solver/method/low_rank/norm.h"
+#include "solver/method/low_rank/factorizer.h"
 #include "solver/method/method.h"
+#include "solver/method/norm.h"
 
 #include <omp.h>
 #include <stdio.h>
@@ -50,7 +51,6 @@ int main(int argc, char **argv) {
         if (sscanf(argv[k], "runs=%lf", &x) == 1) runs = (size_t)x;
         if (sscanf(argv[k], "norm=%lf", &x) == 1) with_norm = x != 0;
         if (sscanf(argv[k], "memory=%lf", &x) == 1) how.memory = (size_t)x;
-        if (strncmp(argv[k], "budget=", 7) == 0 && !budget_rule_find(argv[k] + 7, &how.budget.rule)) return 2;
         if (strcmp(argv[k], "order=mesh") == 0) mesh_order = true;
     }
     if (ratio > 0 && how.levels > 0) budget_divide(&how.budget, how.levels, ratio, leaf);
@@ -75,12 +75,12 @@ int main(int argc, char **argv) {
     }
     if (with_norm) TRY(norm_of_error(&S, &factors, NULL, &norm, error));
     getrusage(RUSAGE_SELF, &used);
-    printf("elements,density,factorizer,epsilon,rank_asked,alpha,budget,order,threads,runs,seconds,rank,real,"
+    printf("elements,density,factorizer,epsilon,rank_asked,alpha,order,threads,runs,seconds,rank,real,"
            "levels,passes,peak_MiB,left,compression\n");
-    printf("%zu,%.4f,%s,%g,%zu,%g,%s,%s,%d,%zu,%.3f,%zu,%.4f,%d,%.2f,%.0f,", m.n, rows.density, report.name,
-           how.epsilon, how.rank, how.budget.alpha, budget_rule_name(how.budget.rule),
-           mesh_order ? "mesh" : "z", omp_get_max_threads(), runs, stats_median(seconds, runs), factors.rank,
-           norm, report.levels, report.passes, (double)used.ru_maxrss / 1024);
+    printf("%zu,%.4f,%s,%g,%zu,%g,%s,%d,%zu,%.3f,%zu,%.4f,%d,%.2f,%.0f,", m.n, rows.density, report.name,
+           how.epsilon, how.rank, how.budget.alpha, mesh_order ? "mesh" : "z", omp_get_max_threads(), runs,
+           stats_median(seconds, runs), factors.rank, norm, report.levels, report.passes,
+           (double)used.ru_maxrss / 1024);
     for (int l = 0; l <= report.levels; l++) printf("%.4f%s", report.left[l], l < report.levels ? " " : ",");
     for (int l = 0; l <= report.levels; l++) printf("%.3f ", report.compression[l]);
     printf("\n");

@@ -73,7 +73,7 @@ class Usage(Case):
                 ("--memory -5G: not a size", "precompute a.obj -o b.h5 --memory -5G"),
                 ("--memory K: not a size", "precompute a.obj -o b.h5 --memory K"),
                 ("--quality fine: must be one of: draft normal high", "precompute a.obj -o b.h5 --quality fine"),
-                ("--method magic: must be one of: auto exact low-rank", "precompute a.obj -o b.h5 --method magic"),
+                ("--method magic: must be one of: auto emitters exact hierarchical low-rank", "precompute a.obj -o b.h5 --method magic"),
                 ("--up w: must be one of: x y z", "precompute a.obj -o b.h5 --up w"),
                 ("exclude each other", "precompute a.obj -o b.h5 --subdivide 1 --elements 9"),
                 ("no such scene", "generate castle -o a.obj"),

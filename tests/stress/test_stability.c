@@ -4,6 +4,7 @@
 #include "solver/base/work_area.h"
 #include "solver/bench/stability.h"
 #include "solver/linalg/panel.h"
+#include "support/building.h"
 #include "support/suite.h"
 
 #include <float.h>
@@ -112,8 +113,8 @@ START_TEST(denormals_are_numbers) {
     ck_assert_int_eq(stability_make(STABILITY_ROOM, .5, &p, &error), LAM_OK);
     const build_problem problem = {
         .n = p.n, .n_channels = 1, .area = p.area, .reflectance = p.reflectance, .F = &p.F, .order = p.order};
-    const build_options how = {
-        .method = "low-rank", .factorizer = "hf", .epsilon = .05, .budget = {.alpha = .5}, .levels = -1};
+    build_options how = build_presets("low-rank");
+    set_text(&how, "factorizer", "hf");
     build_report report;
     lam_operator *op = NULL;
     ck_assert_int_eq(build_operator(&problem, &how, &op, &report, &error), LAM_OK);

@@ -1,5 +1,7 @@
 #include "support/room.h"
 
+#include "solver/scene/surfaces.h"
+
 room room_create(const double size[3], unsigned divisions, float rho, size_t n_channels) {
     room r = {.m = box_mesh(size, divisions, rho)};
     const size_t n = r.m.n;
@@ -14,7 +16,15 @@ room room_create(const double size[3], unsigned divisions, float rho, size_t n_c
     ck_assert_msg(mesh_z_order(&r.m, r.order, &error) == LAM_OK, "%s", error.message);
     r.problem = (build_problem){
         .n = n, .n_channels = n_channels, .area = r.m.area, .reflectance = r.m.reflectance, .order = r.order};
-    ck_assert_msg(element_geometry_add(&r.m, &r.geometry, &r.problem, &error) == LAM_OK, "%s", error.message);
+    size_t n_surfaces;
+    r.centre = malloc(n * sizeof *r.centre);
+    r.surface = malloc(n * sizeof *r.surface);
+    ck_assert(r.centre != NULL && r.surface != NULL);
+    for (size_t i = 0; i < n; i++) mesh_centroid(&r.m, i, r.centre[i]);
+    ck_assert_msg(mesh_surfaces(&r.m, r.surface, &n_surfaces, &error) == LAM_OK, "%s", error.message);
+    r.problem.centre = (const double(*)[3])r.centre;
+    r.problem.normal = (const float(*)[3])r.m.normal;
+    r.problem.surface = r.surface;
     return r;
 }
 
@@ -27,7 +37,8 @@ void room_free(room *r) {
     mesh_free(&r->m);
     csr_free(&r->F);
     free(r->order);
-    element_geometry_free(&r->geometry);
+    free(r->centre);
+    free(r->surface);
 }
 
 double *room_dense(const csr *F) {

@@ -3,14 +3,15 @@
 #define LAMBERT_TESTS_ROOM_H
 
 #include "solver/method/method.h"
-#include "solver/precompute/element_geometry.h"
+#include "solver/scene/surfaces.h"
 #include "support/box.h"
 
 typedef struct room {
     mesh m;
     csr F;
     uint32_t *order;
-    element_geometry geometry;
+    double (*centre)[3];
+    uint32_t *surface;
     build_problem problem;
 } room;
 

@@ -101,7 +101,7 @@ static void make_up_for_even_light(transport *t, const double *area, uint64_t *s
                 t->magnitude[(c * n + i) * n + j] += fabs(by) * area[q] / light[c];
             }
     }
-    ck_assert_msg(operator_hierarchical_make_up(t->op, missing, light, &error) == LAM_OK, "%s",
+    ck_assert_msg(operator_hierarchical_correct(t->op, missing, light, &error) == LAM_OK, "%s",
                   error.message);
     free(missing);
     free(light);

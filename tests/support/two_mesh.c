@@ -9,9 +9,9 @@ lam_operator *build_as(const build_problem *problem, const build_options *option
 }
 
 lam_operator *build_rank(room *r, size_t rank, const char *by, build_report *report) {
-    build_options options = defaults;
-    options.rank = rank;
-    options.factorizer = by;
+    build_options options = build_presets("2msc");
+    if (rank > 0) set_number(&options, "rank", (double)rank);
+    set_text(&options, "factorizer", by);
     return build_as(room_problem(r), &options, report);
 }
 

@@ -2,14 +2,12 @@
 #ifndef LAMBERT_TESTS_TWO_MESH_H
 #define LAMBERT_TESTS_TWO_MESH_H
 
-#include "solver/method/method.h"
+#include "solver/method/two_mesh/method_two_mesh.h"
+#include "support/building.h"
 #include "support/room.h"
 #include "support/transport.h"
 
 static const double hall[3] = {10, 6, 3}, cube[3] = {1, 1, 1};
-
-static const build_options defaults = {
-    .method = "2msc", .factorizer = "auto", .epsilon = .05, .budget = {.alpha = .5}, .levels = -1};
 
 lam_operator *build_as(const build_problem *problem, const build_options *options, build_report *report);
 

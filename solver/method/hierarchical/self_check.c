@@ -137,14 +137,15 @@ lam_status self_check(const build_problem *problem, const double *row_sums, cons
             }
     TRY(lam_operator_apply(op, EMISSIONS, LAM_RADIOSITY, s.E, s.B, s.work, s.work_bytes, error));
     TRY(problem->stream == NULL ? multiply(problem, &s, error) : multiply_others(problem, &s, error));
-    report->probe_residual = report->uniform_error = 0;
+    double mean_residual = 0, largest = 0;
     for (size_t e = 0; e < PROBES; e++) {
         double worst = 0;
         for (size_t c = 0; c < C; c++) worst = fmax(worst, residual(problem, &s, e, c));
-        report->probe_residual += worst / PROBES;
+        mean_residual += worst / PROBES;
     }
-    for (size_t c = 0; c < C; c++)
-        report->uniform_error = fmax(report->uniform_error, uniform_error(problem, &s, c));
+    for (size_t c = 0; c < C; c++) largest = fmax(largest, uniform_error(problem, &s, c));
+    report_number(report, "probe_residual", mean_residual);
+    report_number(report, "uniform_error", largest);
 done:
     check_free(&s);
     return status;

@@ -2,7 +2,7 @@
 #ifndef LAMBERT_METHOD_LOW_RANK_BUDGET_H
 #define LAMBERT_METHOD_LOW_RANK_BUDGET_H
 
-#include "solver/method/low_rank/tsvd.h"
+#include <stdbool.h>
 
 enum { BUDGET_LEVELS_MOST = 20 };
 
@@ -13,17 +13,11 @@ enum { BUDGET_LEVELS_MOST = 20 };
  * x = y + W z with W^T y = 0, |(A - Q V^T) x| <= e_ch |y| + e_p |z| with e_p what its own truncation leaves,
  * and |y|^2 + |z|^2 = |x|^2, so |A - Q V^T|_2^2 <= e_p^2 + |A (I - W W^T)|_2^2 <= e_p^2 + e_1^2 + e_2^2 by
  * theorem 3.1 of the thesis; in the Frobenius norm both are equalities. Hence over all 2^l nodes of level l
- * that leave p_l each, sum_l 2^l p_l^2 <= epsilon^2 keeps the bound. Eq. 3.10 asks for e_p + sqrt(2) e_ch. */
-typedef enum budget_rule {
-    BUDGET_SQUARES,   /* sum_l 2^l p_l^2 = epsilon^2 */
-    BUDGET_SUMS,      /* eqs. 3.10 and 3.11: e_p = alpha epsilon, e_ch = (1 - alpha) epsilon / sqrt(2) */
-    BUDGET_FROBENIUS, /* as squares, in the Frobenius norm: |S - Q V^T|_F <= epsilon */
-} budget_rule;
-
+ * that leave p_l each, sum_l 2^l p_l^2 <= epsilon^2 keeps the bound. (Aguerre 2016, eq. 3.10, adds e_p +
+ * sqrt(2) e_ch in place of squares.) */
 typedef struct budget {
-    budget_rule rule;
-    double alpha; /* the root's share (of epsilon^2, or of epsilon where errors are summed), in (0, 1) */
-    /* Of squares: the part of what the root leaves that level l = 1 ... levels takes; together 1. */
+    double alpha; /* the root's share of epsilon^2, in (0, 1) */
+    /* The part of what the root leaves that level l = 1 ... levels takes; together 1. */
     double part[BUDGET_LEVELS_MOST + 1];
 } budget;
 
@@ -35,11 +29,5 @@ bool budget_divided(const budget *b);
 
 /* What a node of each level may leave out, p[0] of the root to p[levels] of a leaf. */
 void budget_share(const budget *b, double epsilon, int levels, double p[BUDGET_LEVELS_MOST + 1]);
-
-/* "squares", "sums", "frobenius"; false for any other name. */
-bool budget_rule_find(const char *name, budget_rule *rule);
-const char *budget_rule_name(budget_rule rule);
-
-truncation_norm budget_norm(budget_rule rule);
 
 #endif

@@ -4,6 +4,16 @@
 
 #include "solver/base/progress.h"
 #include "solver/method/low_rank/budget.h"
+#include "solver/method/low_rank/tsvd.h"
+
+/* The options of --method low-rank. */
+typedef struct low_rank_options {
+    const char *factorizer; /* "auto" or the name of one */
+    double epsilon, alpha;
+    uint64_t levels; /* OPTION_AUTO */
+    uint64_t rank;   /* 0: by epsilon; else exactly min(rank, n) columns */
+    bool keep_factors;
+} low_rank_options;
 
 typedef struct factorizer_options {
     double epsilon; /* |S - Q V^T|_2 <= epsilon (in the Frobenius norm where the budget says so) */

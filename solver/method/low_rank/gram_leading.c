@@ -1,8 +1,8 @@
 /* The leading eigenvectors of a Gram matrix by subspace iteration, for when they are few. */
 #include "solver/linalg/dense.h"
 #include "solver/method/low_rank/gram.h"
-#include "solver/method/low_rank/norm.h"
 #include "solver/method/low_rank/sketch.h"
+#include "solver/method/norm.h"
 #include "store/status.h"
 
 #include <cblas.h>

@@ -27,10 +27,8 @@ typedef struct hf_run {
 } hf_run;
 
 static truncation truncation_of(const hf_run *run, int level) {
-    return (truncation){.norm = budget_norm(run->options->budget.rule),
-                        .epsilon = run->plan.left[level],
-                        .rank = run->options->rank,
-                        .round = level == 0 ? ROOT_ROUND : 1};
+    return (truncation){
+        .epsilon = run->plan.left[level], .rank = run->options->rank, .round = level == 0 ? ROOT_ROUND : 1};
 }
 
 static void count_columns(hf_run *run, int level, size_t given, size_t kept) {
@@ -225,7 +223,7 @@ static lam_status hf_factorize(const scaled_matrix *S, const factorizer_options 
     hf_run run = {.S = S, .options = options};
     hf_forecast *forecast = NULL;
     const budget *shares = &options->budget;
-    const bool shared = shares->rule == BUDGET_SUMS || budget_divided(shares) || options->levels == 0;
+    const bool shared = budget_divided(shares) || options->levels == 0;
     if (options->levels >= 0 && shared) {
         run.plan.levels = options->levels < BUDGET_LEVELS_MOST ? options->levels : BUDGET_LEVELS_MOST;
         budget_share(shares, options->epsilon, run.plan.levels, run.plan.left);

@@ -212,7 +212,7 @@ static double divide(const hf_forecast *f, const factorizer_options *options, bu
     double least = INFINITY;
     const int levels = plan->levels;
     for (size_t k = 0; k < RATIOS * LEAVES; k++) {
-        budget tried = {.rule = options->budget.rule, .alpha = options->budget.alpha};
+        budget tried = {.alpha = options->budget.alpha};
         hf_plan other = {.levels = levels};
         budget_divide(&tried, levels, ratios[k % RATIOS], leaves[k / RATIOS]);
         budget_share(&tried, options->epsilon, levels, other.left);
@@ -228,7 +228,7 @@ static double divide(const hf_forecast *f, const factorizer_options *options, bu
 hf_plan hf_forecast_plan(const hf_forecast *f, const factorizer_options *options) {
     /* A division this much slower than the best of another number of levels is not improved. */
     static const double hopeless = 3;
-    const bool shared = options->budget.rule == BUDGET_SUMS || budget_divided(&options->budget);
+    const bool shared = budget_divided(&options->budget);
     hf_plan best = {.levels = 0};
     double least = INFINITY;
     for (int levels = 0; levels <= BUDGET_LEVELS_MOST; levels++) {

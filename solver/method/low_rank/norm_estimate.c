@@ -1,5 +1,4 @@
 #include "solver/linalg/dense.h"
-#include "solver/method/low_rank/norm.h"
 #include "solver/method/low_rank/sketch.h"
 #include "store/status.h"
 

@@ -24,6 +24,11 @@ void sketch_sparse_column(uint64_t seed, size_t k, size_t i, sketch_entry column
  * Cost: O(n m^2). Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC. */
 lam_status sketch_orthonormalize(size_t n, size_t m, float *Y, size_t *rank, lam_error *error);
 
+/* |S - B X^T|_2, X and B [n][m], to about a tenth from below: power iteration on the square of the difference
+ * with eight vectors at once, six passes. Errors: those of norm_of_error. */
+lam_status norm_estimate(const scaled_matrix *S, size_t m, const float *X, const float *B, uint64_t seed,
+                         double *norm, lam_error *error);
+
 /* An orthonormal basis X [n][m] and B [n][m], which is S X or close to it: S ~ B X^T. */
 typedef struct sketch_basis {
     size_t n, m;

@@ -1,6 +1,5 @@
 /* Factors Q V^T from a sketched basis, at a given rank or error bound. */
 #include "solver/linalg/dense.h"
-#include "solver/method/low_rank/norm.h"
 #include "solver/method/low_rank/sketch.h"
 #include "store/status.h"
 
@@ -103,7 +102,7 @@ static lam_status fixed_precision(const scaled_matrix *S, const factorizer_optio
     const double alpha = o->budget.alpha, spare = 1.1;
     const double kept = o->epsilon * (exact ? sqrt(alpha) : alpha);
     const double left = o->epsilon * (exact ? sqrt(1 - alpha) : 1 - alpha) / spare;
-    const truncation keep = {.norm = TRUNCATION_SPECTRAL, .epsilon = kept};
+    const truncation keep = {.epsilon = kept};
     sketch_basis b = {0};
     size_t m = n / BASIS_SHARE > BASIS_LEAST ? n / BASIS_SHARE : BASIS_LEAST;
     for (m = m < n ? m : n;;) {
@@ -145,9 +144,6 @@ done:
 lam_status sketch_factorize(const scaled_matrix *S, const factorizer_options *options, sketch_find find,
                             bool exact, tall_factors *out, lam_error *error) {
     lam_status status = LAM_OK;
-    if (options->budget.rule == BUDGET_FROBENIUS && options->rank == 0)
-        FAIL(error, LAM_ERR_UNSUPPORTED,
-             "--budget frobenius with a random sketch: use --factorizer hf or svd");
     if (options->rank > 0)
         TRY(fixed_rank(S, options, find, exact, out, error));
     else

@@ -45,8 +45,7 @@ static lam_status svd_factorize(const scaled_matrix *S, const factorizer_options
     lam_status status = LAM_OK;
     const size_t n = S->n;
     tall_factors f = {.n = n, .m = n};
-    const truncation keep = {
-        .norm = budget_norm(options->budget.rule), .epsilon = options->epsilon, .rank = options->rank};
+    const truncation keep = {.epsilon = options->epsilon, .rank = options->rank};
     eigenvalue *sorted = NULL;
     double *squares = NULL;
     float *w = NULL, *vectors = memory_allocate(n, n * sizeof *vectors, "factorization", error);

@@ -24,24 +24,10 @@ enum { PANEL = 1024, LEADING_LEAST = 768 };
 /* Rows of parts joined at a time, and by one thread. */
 enum { JOINED = 4096, JOINED_PIECE = 256 };
 
-void tall_factors_free(tall_factors *f) {
-    free(f->Q);
-    free(f->V);
-    *f = (tall_factors){0};
-}
-
 size_t truncation_rank(const truncation *keep, size_t m, const double *values) {
     const double kept = keep->epsilon * keep->epsilon;
     size_t rank = 0;
     if (keep->rank > 0) return keep->rank < m ? keep->rank : m;
-    if (keep->norm == TRUNCATION_FROBENIUS) {
-        double dropped = 0;
-        for (rank = m; rank > 0; rank--) {
-            dropped += fmax(values[m - rank], 0);
-            if (dropped > kept) break;
-        }
-        return rank;
-    }
     const size_t round = keep->round > 0 ? keep->round : 1;
     while (rank < m && values[m - 1 - rank] >= kept) rank++;
     while (rank < m && rank % round != 0 && values[m - 1 - rank] >= kept / 4) rank++;
@@ -50,7 +36,7 @@ size_t truncation_rank(const truncation *keep, size_t m, const double *values) {
 
 /* True if a Gram matrix in single precision may be accurate enough. */
 static bool may_be_single(const truncation *keep) {
-    return keep->rank == 0 && keep->norm == TRUNCATION_SPECTRAL && keep->epsilon >= 1e-3;
+    return keep->rank == 0 && keep->epsilon >= 1e-3;
 }
 
 /* V [m][rank] from the eigenvectors, largest first. */

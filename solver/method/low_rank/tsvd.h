@@ -3,26 +3,12 @@
 #define LAMBERT_METHOD_LOW_RANK_TSVD_H
 
 #include "solver/linalg/scaled.h"
+#include "solver/method/tall_factors.h"
 
-/* A ~ Q V^T: Q is [n][rank], V is [m][rank] with orthonormal columns, by descending singular value. Both
- * freed by tall_factors_free. Since Q = A V, the rows of the remainder A (I - V V^T) are orthogonal to the
- * columns of V. */
-typedef struct tall_factors {
-    size_t n, m, rank;
-    float *Q;
-    float *V;
-} tall_factors;
-
-void tall_factors_free(tall_factors *f);
-
-typedef enum truncation_norm { TRUNCATION_SPECTRAL, TRUNCATION_FROBENIUS } truncation_norm;
-
-/* The truncation rule. Spectral: every singular value of at least epsilon is kept (Aguerre 2016, algorithm 4,
- * TSVD), so that |A - Q V^T|_2 < epsilon; then, up to the next multiple of round, those of at least epsilon
- * / 2. Frobenius: as few as leave |A - Q V^T|_F <= epsilon. With rank > 0 exactly min(rank, m) columns are
- * kept instead. */
+/* The truncation rule: every singular value of at least epsilon is kept (Aguerre 2016, algorithm 4, TSVD), so
+ * that |A - Q V^T|_2 < epsilon; then, up to the next multiple of round, those of at least epsilon / 2. With
+ * rank > 0 exactly min(rank, m) columns are kept instead. */
 typedef struct truncation {
-    truncation_norm norm;
     double epsilon;
     size_t rank;
     size_t round; /* 0 or 1: none */

@@ -1,6 +1,7 @@
 /* sparse: for scenes that hide most of themselves, where F has few entries and no low rank (Aguerre 2016,
  * chapter 4). */
 #include "solver/base/clock.h"
+#include "solver/method/choice.h"
 #include "solver/method/reference.h"
 #include "solver/method/sparse/sparse_inverse.h"
 #include "solver/operator/sparse.h"
@@ -10,36 +11,50 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* How close to 1 the solution with light everywhere comes that delta is measured by. */
+/* Residual of the solution with uniform emission that delta is measured by. */
 static const double delta_tolerance = 1e-7;
-/* By what a threshold rises at a time where memory is too small, and what its forecast may be wrong by. */
+/* Factor by which a threshold rises at a time where memory is too small; error of its forecast. */
 static const double rise = 1.25, doubt = 1.15;
 
 /* Of an entry: its column and its value, in rows and, transposed, in columns. */
 enum { ENTRY_BYTES = 2 * (sizeof(uint32_t) + sizeof(float)) };
 
-static const char *const corrections[] = {
-    [SPARSE_NONE] = "none", [SPARSE_DELTA] = "delta", [SPARSE_DISCARDED] = "discarded"};
+static const option_row rows[] = {
+    {.name = "threshold",
+     .kind = OPTION_NUMBER,
+     .offset = offsetof(sparse_options, threshold),
+     .argument = "X",
+     .otherwise = "1e-4; under --method auto as --epsilon needs it",
+     .most = 1,
+     .above = true,
+     .below = true,
+     .help = "Entries below X are discarded"},
+    {.name = "correction",
+     .kind = OPTION_CHOICE,
+     .offset = offsetof(sparse_options, correction),
+     .preset = "delta",
+     .choices = "none|delta|discarded",
+     .help = "Correction for discarded entries: none; the error of one solution with uniform emission; "
+             "their sum, without its further bounces (Aguerre 2016, eq. 4.7)"},
+    {0},
+};
 
-const char *sparse_correction_name(sparse_correction correction) {
-    return corrections[correction];
-}
+/* The threshold where none is given. */
+static const double usual_threshold = 1e-4;
 
-bool sparse_correction_find(const char *name, sparse_correction *correction) {
-    for (sparse_correction c = SPARSE_NONE; c <= SPARSE_DISCARDED; c++) {
-        if (strcmp(corrections[c], name) != 0) continue;
-        *correction = c;
-        return true;
-    }
-    return false;
+typedef enum sparse_correction { SPARSE_NONE, SPARSE_DELTA, SPARSE_DISCARDED } sparse_correction;
+
+static sparse_correction correction_of(const sparse_options *o) {
+    return strcmp(o->correction, "none") == 0    ? SPARSE_NONE
+           : strcmp(o->correction, "delta") == 0 ? SPARSE_DELTA
+                                                 : SPARSE_DISCARDED;
 }
 
 /* The smallest threshold from that asked for on whose entries memory is forecast to hold, of all channels. */
-static lam_status fitting_threshold(const build_problem *problem, const build_options *options,
-                                    double *threshold, lam_error *error) {
+static lam_status fitting_threshold(const build_problem *problem, size_t memory, double *threshold,
+                                    lam_error *error) {
     lam_status status = LAM_OK;
-    *threshold = options->threshold;
-    for (double needed = INFINITY; options->memory > 0 && needed > (double)options->memory;) {
+    for (double needed = INFINITY; memory > 0 && needed > (double)memory;) {
         needed = 0;
         for (size_t c = 0; c < problem->n_channels; c++) {
             double entries;
@@ -47,7 +62,7 @@ static lam_status fitting_threshold(const build_problem *problem, const build_op
                                         error));
             needed += doubt * entries * ENTRY_BYTES;
         }
-        if (needed > (double)options->memory) *threshold *= rise;
+        if (needed > (double)memory) *threshold *= rise;
         if (*threshold >= 1)
             FAIL(error, LAM_ERR_MEMORY, "--method sparse: no --threshold below 1 fits into --memory");
     }
@@ -83,7 +98,7 @@ done:
     return status;
 }
 
-/* What the mean of E is weighted by: areas, or, as in the thesis, elements alike. */
+/* Weights of the mean of E: areas, or, as in the thesis, the same for every element. */
 static void set_weights(const build_problem *problem, sparse_correction correction, float *weight) {
     double sum = 0;
     for (size_t i = 0; i < problem->n; i++) sum += problem->area[i];
@@ -92,24 +107,27 @@ static void set_weights(const build_problem *problem, sparse_correction correcti
                                                : 1 / (float)problem->n;
 }
 
-static lam_status build(const build_problem *problem, const build_options *options, lam_operator **op,
-                        build_report *report, lam_error *error) {
+static lam_status build(const build_problem *problem, const build_options *options, const void *own,
+                        lam_operator **op, build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n, C = problem->n_channels;
     const double started = clock_seconds();
     sparse_inverse inverse = {.bounces = 0};
     sparse_arrays arrays = {.M = memory_allocate(C, sizeof *arrays.M, "operator", error)};
     lam_operator *made = NULL;
-    double entries = 0, threshold;
+    const sparse_options *o = own;
+    const sparse_correction correction = correction_of(o);
+    const double asked = o->threshold > 0 ? o->threshold : usual_threshold;
+    double entries = 0, threshold = asked;
     size_t bounces = 0, left = options->memory;
     if (arrays.M == NULL) TRY(LAM_ERR_MEMORY);
-    if (options->correction != SPARSE_NONE) {
+    if (correction != SPARSE_NONE) {
         arrays.delta = memory_allocate(n, C * sizeof *arrays.delta, "operator", error);
         arrays.weight = memory_allocate(n, sizeof *arrays.weight, "operator", error);
         if (arrays.delta == NULL || arrays.weight == NULL) TRY(LAM_ERR_MEMORY);
-        set_weights(problem, options->correction, arrays.weight);
+        set_weights(problem, correction, arrays.weight);
     }
-    TRY(fitting_threshold(problem, options, &threshold, error));
+    TRY(fitting_threshold(problem, options->memory, &threshold, error));
     for (size_t c = 0; c < C; c++) {
         const float *rho = problem->reflectance + c * n;
         TRY(sparse_inverse_rows(problem, rho, threshold, left / 2, options->progress, &inverse, error));
@@ -119,23 +137,20 @@ static lam_status build(const build_problem *problem, const build_options *optio
         entries += (double)stored;
         if (left > 0) left -= stored * ENTRY_BYTES;
         if (inverse.bounces > bounces) bounces = inverse.bounces;
-        if (options->correction == SPARSE_DISCARDED)
+        if (correction == SPARSE_DISCARDED)
             for (size_t p = 0; p < n; p++) arrays.delta[c * n + p] = (float)inverse.discarded[p];
-        if (options->correction == SPARSE_DELTA)
+        if (correction == SPARSE_DELTA)
             TRY(find_delta(problem, rho, &arrays.M[c], arrays.delta + c * n, options->progress, error));
         sparse_inverse_free(&inverse);
     }
     TRY(operator_sparse_create(n, C, problem->reflectance, &arrays, &made, error));
     TRY(operator_set_order(made, problem->order, error));
-    report->method = "sparse";
-    report->threshold = threshold;
-    report->correction = options->correction;
-    report->epsilon = -1;
-    report->invert_seconds = clock_seconds() - started;
-    snprintf(report->reason, sizeof report->reason,
-             "sparse: asked for by --method; %.3g %% of all entries, %zu bounces%s",
-             100 * entries / ((double)n * (double)n * (double)C), bounces,
-             threshold > options->threshold ? ", the threshold raised to fit into --memory" : "");
+    report_number(report, "threshold", threshold);
+    report_text(report, "correction", o->correction);
+    report_step_add(report, "invert", clock_seconds() - started);
+    snprintf(report->detail, sizeof report->detail, "threshold %.3g, %.3g %% of all entries, %zu bounces%s",
+             threshold, 100 * entries / ((double)n * (double)n * (double)C), bounces,
+             threshold > asked ? ", the threshold raised to fit into --memory" : "");
     *op = made;
     made = NULL;
 done:
@@ -145,4 +160,112 @@ done:
     return status;
 }
 
-const build_method build_sparse = {"sparse", build};
+/* The threshold rises until its entries fit. */
+static void forecast(const method_scale *scale, const void *own, method_forecast *out) {
+    (void)scale;
+    (void)own;
+    *out = (method_forecast){.building = 0};
+}
+
+/* Thresholds that are tried, and from one to the next. */
+static const double threshold_first = 1e-2, threshold_last = 1e-6, threshold_step = .3162277660168379;
+
+/* The error of a sample over the error allowed: of uniform emission epsilon, which operators of low rank and
+ * hierarchical ones keep to; of single elements epsilon too, or as much as the rival leaves out, if that is
+ * more. */
+static double excess(const sparse_sample *sample, double epsilon, double single) {
+    return fmax(sample->single / single, sample->everywhere / epsilon);
+}
+
+/* The largest threshold at which truncation alone leaves out no more than is allowed; 0: none. */
+static double optimistic_threshold(const inverse_rows *truth, double epsilon, double single,
+                                   double entries_most) {
+    for (double threshold = threshold_first; threshold > threshold_last; threshold *= threshold_step) {
+        const sparse_sample sample = inverse_rows_truncated(truth, threshold);
+        if (sample.entries > entries_most) return 0;
+        if (excess(&sample, epsilon, single) <= 1) return threshold;
+    }
+    return 0;
+}
+
+/* From the threshold that truncation alone would allow, down until a sparse inverse leaves out no more than
+ * is allowed, or has too many entries; between two thresholds both are taken to be powers of it. *entries
+ * stays negative where there is none. A threshold that was given is only sampled. */
+static lam_status find_threshold(const decision *d, double single, double entries_most, double *threshold,
+                                 double *entries, lam_error *error) {
+    lam_status status = LAM_OK;
+    const build_problem *p = d->problem;
+    const bool given = *threshold > 0;
+    const double epsilon = d->options->epsilon;
+    inverse_rows truth = {.rows = NULL};
+    sparse_sample sample;
+    double tried = *threshold, last_entries = 0, last_excess = 0;
+    TRY(inverse_rows_find(p, p->reflectance, d->options->progress, &truth, error));
+    if (!given) tried = optimistic_threshold(&truth, epsilon, single, entries_most);
+    while (tried >= threshold_last) {
+        if (progress_cancelled(d->options->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+        TRY(sparse_inverse_sample(p, p->reflectance, tried, &truth, &sample, error));
+        const double now = excess(&sample, epsilon, single);
+        if (given || now <= 1) {
+            *threshold = tried;
+            *entries = sample.entries;
+            if (last_entries > 0 && now > 0) {
+                const double part = log(last_excess) / log(last_excess / now);
+                *threshold = tried / threshold_step * pow(threshold_step, part);
+                *entries = last_entries * pow(sample.entries / last_entries, part);
+            }
+            break;
+        }
+        if (sample.entries > entries_most) break;
+        last_excess = now;
+        last_entries = sample.entries;
+        tried *= threshold_step;
+    }
+done:
+    inverse_rows_free(&truth);
+    return status;
+}
+
+/* Some rows of sparse inverses say what threshold keeps to epsilon, and how many entries are left then. A
+ * dense F has no sparse inverse that is of use; where the noise of F is above epsilon, an inverse of it is
+ * noise, and a method that filters the noise is better. */
+static lam_status weigh(const decision *so_far, void *own, candidate *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    sparse_options *o = own;
+    const build_problem *p = so_far->problem;
+    const double n = (double)p->n, C = (double)p->n_channels, epsilon = so_far->options->epsilon;
+    double entries = -1, single = epsilon;
+    bool filtered = false;
+    out->object = "sparse";
+    for (size_t k = 0; k < so_far->n_candidates; k++) {
+        const candidate *c = &so_far->candidates[k];
+        filtered = filtered || ((c->method->flags & METHOD_FILTERS_NOISE) && (isfinite(c->cost) || c->open));
+        if (!c->outdone) single = fmax(single, c->left);
+    }
+    if (filtered && p->noise > epsilon && o->threshold == 0) return LAM_OK;
+    out->open = p->F == NULL;
+    if (out->open || so_far->density >= 1 / CHOICE_SCATTERED ||
+        (decision_claimed(so_far) && !so_far->thorough))
+        return LAM_OK;
+    const double most = fmin(decision_rival(so_far) / CHOICE_SCATTERED, so_far->most / 2 / C);
+    TRY(find_threshold(so_far, single, most, &o->threshold, &entries, error));
+    if (entries < 0) goto done;
+    if (2 * C * entries <= so_far->most) out->cost = CHOICE_SCATTERED * entries;
+    candidate_figure(out, "entries", entries);
+    candidate_figure(out, "threshold", o->threshold);
+    snprintf(out->found, sizeof out->found, "sparse inverse of %.3g entries, %.3g %%, at threshold %.3g",
+             entries, 100 * entries / (n * n), o->threshold);
+done:
+    return status;
+}
+
+const build_method method_sparse = {
+    .name = "sparse",
+    .summary = "entries above a threshold; cities and mazes, where most of the scene is hidden",
+    .kind = &operator_sparse,
+    .rows = rows,
+    .forecast = forecast,
+    .weigh = weigh,
+    .build = build,
+};
+_Static_assert(sizeof(sparse_options) <= METHOD_OPTIONS_BYTES, "they fit");

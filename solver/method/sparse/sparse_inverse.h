@@ -1,3 +1,9 @@
+/* The options of --method sparse. */
+typedef struct sparse_options {
+    double threshold;       /* entries below it are left out; 0: not given */
+    const char *correction; /* "none", "delta", "discarded" */
+} sparse_options;
+
 /* The inverse of I - R F as a sparse matrix: rows of a Neumann series, small terms dropped (Aguerre 2016,
  * chapter 4). */
 #ifndef LAMBERT_METHOD_SPARSE_SPARSE_INVERSE_H
@@ -37,7 +43,7 @@ typedef struct inverse_rows {
 void inverse_rows_free(inverse_rows *r);
 
 /* Solves for columns, which are rows by reciprocity: A_i/rho_i (M - I)_ij is symmetric. Cost: a few dozen
- * products of F with a block of vectors. Errors: those of columns_solve. */
+ * products of F with a block of vectors. Errors: those of many_lights_solve. */
 lam_status inverse_rows_find(const build_problem *problem, const float *rho, const progress *p,
                              inverse_rows *out, lam_error *error);
 

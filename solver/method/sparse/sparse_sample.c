@@ -50,22 +50,22 @@ lam_status inverse_rows_find(const build_problem *problem, const float *rho, con
                              inverse_rows *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n, count = n < COMPARED ? n : COMPARED;
-    columns_report report;
+    many_lights_report report;
     inverse_rows found = {.n = n, .count = count};
     float *E = memory_allocate(count, n * sizeof *E, "rows of an inverse", error);
     float *T = memory_allocate(count, n * sizeof *T, "rows of an inverse", error);
     found.rows = memory_allocate(count, n * sizeof *found.rows, "rows of an inverse", error);
     if (E == NULL || T == NULL || found.rows == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t k = 0; k < count; k++) E[k * n + problem->order[k * n / count]] = 1;
-    const light_columns unit = {.n = n,
-                                .F = problem->F,
-                                .area = problem->area,
-                                .rho = rho,
-                                .m = count,
-                                .E = E,
-                                .progress = p,
-                                .stage = "sample the inverse"};
-    TRY(columns_solve(&unit, 1e-5, T, &report, error));
+    const many_lights_input unit = {.n = n,
+                                    .F = problem->F,
+                                    .area = problem->area,
+                                    .rho = rho,
+                                    .m = count,
+                                    .E = E,
+                                    .progress = p,
+                                    .stage = "sample the inverse"};
+    TRY(many_lights_solve(&unit, 1e-5, T, &report, error));
     for (size_t k = 0; k < count; k++)
         column_to_row(problem, rho, problem->order[k * n / count], T + k * n, found.rows + k * n);
     for (size_t k = 0; k < count * n; k++) {

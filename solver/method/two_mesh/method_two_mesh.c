@@ -3,9 +3,9 @@
 #include "solver/method/two_mesh/method_two_mesh.h"
 
 #include "solver/base/clock.h"
-#include "solver/method/low_rank/fold_factors.h"
-#include "solver/method/low_rank/norm.h"
-#include "solver/method/low_rank/orthonormal.h"
+#include "solver/method/choice.h"
+#include "solver/method/norm.h"
+#include "solver/method/tall_factors.h"
 
 #include <limits.h>
 #include <math.h>
@@ -13,18 +13,63 @@
 #include <stdlib.h>
 #include <string.h>
 
+static const option_row rows[] = {
+    {.name = "factorizer",
+     .kind = OPTION_CHOICE,
+     .offset = offsetof(two_mesh_options, factorizer),
+     .preset = "auto",
+     .choices = METHOD_FACTORIZERS},
+    {.name = "rank",
+     .kind = OPTION_COUNT,
+     .offset = offsetof(two_mesh_options, rank),
+     .least = 1,
+     .most = 4e9},
+    {.name = "keep-factors", .kind = OPTION_FLAG, .offset = offsetof(two_mesh_options, keep_factors)},
+    {.name = "coherence",
+     .kind = OPTION_NUMBER,
+     .offset = offsetof(two_mesh_options, coherence),
+     .argument = "X",
+     .most = 1,
+     .above = true,
+     .help =
+         "Split patches whose coherence is below X. Coherence is 1 less the variance of the form factors "
+         "of the elements of a patch over their mean square, weighted by area; it is 1 where all elements "
+         "see the same. Without this and --min-area the patches that lose most are split, until patches "
+         "have 16 elements on average"},
+    {.name = "min-area",
+     .kind = OPTION_NUMBER,
+     .offset = offsetof(two_mesh_options, min_area),
+     .argument = "M2",
+     .above = true,
+     .help = "Split no patch of this area or less; without --coherence, split all others"},
+    {.name = "assign",
+     .kind = OPTION_CHOICE,
+     .offset = offsetof(two_mesh_options, assign),
+     .preset = "inclusion",
+     .choices = "inclusion|proximity",
+     .help = "An element belongs to the patch that it was split into, or to the nearest patch that faces the "
+             "same way"},
+    {0},
+};
+
 /* Elements a patch has on average where nothing is asked for. */
 enum { ELEMENTS_OF_PATCH = 16 };
 
-static coarse_options coarse_of(const build_problem *problem, const build_options *options) {
-    coarse_options coarse = {.coherence = options->coherence > 0 ? options->coherence : 1,
-                             .min_area = options->min_area,
-                             .proximity = options->proximity};
-    if (options->rank > 0)
-        coarse.patches = options->rank < problem->n ? options->rank : problem->n;
-    else if (options->coherence <= 0 && options->min_area <= 0)
-        coarse.patches = (problem->n + ELEMENTS_OF_PATCH - 1) / ELEMENTS_OF_PATCH;
-    return coarse;
+static bool by_proximity(const two_mesh_options *o) {
+    return strcmp(o->assign, "proximity") == 0;
+}
+
+/* Patches where their number is known before; 0: it is not. */
+static double patches_of(const two_mesh_options *o, double n) {
+    if (o->rank > 0) return fmin((double)o->rank, n);
+    return o->coherence <= 0 && o->min_area <= 0 ? ceil(n / ELEMENTS_OF_PATCH) : 0;
+}
+
+static coarse_options coarse_of(const build_problem *problem, const two_mesh_options *o) {
+    return (coarse_options){.coherence = o->coherence > 0 ? o->coherence : 1,
+                            .min_area = o->min_area,
+                            .proximity = by_proximity(o),
+                            .patches = (size_t)patches_of(o, (double)problem->n)};
 }
 
 /* U, one copy of it while it goes over into the operator, the core in double and single; QR has factors
@@ -43,7 +88,7 @@ static lam_status check_memory(const build_problem *problem, const build_options
 
 /* eqs. 5 and 6: the operator of two meshes, folded for one channel unless its factors are to be kept. */
 static lam_status build_summed(const build_problem *problem, coarse_mesh *mesh, bool keep_factors,
-                               lam_operator **op, build_report *report, lam_error *error) {
+                               lam_operator **op, double *worst, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n, C = problem->n_channels, k = mesh->k;
     lam_operator *made = NULL;
@@ -51,15 +96,15 @@ static lam_status build_summed(const build_problem *problem, coarse_mesh *mesh, 
     float *core = memory_allocate(C, k * k * sizeof *core, "core", error);
     if (core == NULL) TRY(LAM_ERR_MEMORY);
     TRY(two_mesh_factors(problem, mesh, &arrays.left, &arrays.weight, error));
-    report->rcond = 1;
+    *worst = 1;
     for (size_t c = 0; c < C; c++) {
         double rcond;
         TRY(two_mesh_core(mesh, arrays.left, arrays.weight, problem->reflectance + c * n, core + c * k * k,
                           &rcond, error));
-        report->rcond = fmin(report->rcond, rcond);
+        *worst = fmin(*worst, rcond);
     }
     if (C == 1 && !keep_factors) {
-        TRY(finish_fold(n, k, core, problem->reflectance, mesh->element, arrays.left, error));
+        TRY(factors_fold(n, k, core, problem->reflectance, mesh->element, arrays.left, error));
     } else {
         arrays.core = core;
         core = NULL;
@@ -112,56 +157,57 @@ done:
     return status;
 }
 
-static void explain(const build_options *options, size_t n, build_report *r) {
-    snprintf(r->reason, sizeof r->reason,
-             "2msc: asked for by --method; %zu patches of %zu elements by %s, coherence %.3g or more, the "
-             "smallest patch %.3g m2",
-             r->rank, n, options->proximity ? "proximity" : "inclusion", r->coherence, r->patch_area);
-}
-
-static lam_status build(const build_problem *problem, const build_options *options, lam_operator **op,
-                        build_report *report, lam_error *error) {
+static lam_status build(const build_problem *problem, const build_options *options, const void *own,
+                        lam_operator **op, build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
-    const bool qr = strcmp(options->factorizer, "qr") == 0;
-    const coarse_options coarse = coarse_of(problem, options);
-    row_source rows;
+    const two_mesh_options *o = own;
+    const bool qr = strcmp(o->factorizer, "qr") == 0;
+    const coarse_options coarse = coarse_of(problem, o);
+    row_source rows_of_F;
     scaled_matrix S = {0};
     coarse_mesh mesh = {0};
     tall_factors f = {0};
-    if (problem->centre == NULL || problem->normal == NULL || problem->surface == NULL)
-        FAIL(error, LAM_ERR_INTERNAL,
-             "--method 2msc needs the centres, normals and surfaces of the elements");
+    double norm, rcond;
+    if (problem->surface == NULL)
+        FAIL(error, LAM_ERR_INTERNAL, "--method 2msc: needs the surfaces of the elements");
 
     const double start = clock_seconds();
     progress_report(options->progress, "patches", 0);
     TRY(coarse_mesh_create(problem, &coarse, options->progress, &mesh, error));
     TRY(check_memory(problem, options, mesh.k, qr, error));
-    report->factorize_seconds = clock_seconds() - start;
-    row_source_of_csr(&rows, problem->F);
-    TRY(scaled_init(&S, &rows, problem->area, problem->order, error));
+    double factorized = clock_seconds() - start;
+    row_source_of_csr(&rows_of_F, problem->F);
+    TRY(scaled_init(&S, &rows_of_F, problem->area, problem->order, error));
     if (qr) {
         TRY(qr_factors(problem, &mesh, &S, &f, error));
-        report->factorize_seconds = clock_seconds() - start;
-        TRY(norm_of_error(&S, &f, options->progress, &report->measured_norm_error, error));
+        factorized = clock_seconds() - start;
+        TRY(norm_of_error(&S, &f, options->progress, &norm, error));
     } else {
-        TRY(two_mesh_norm(problem, &mesh, &S, options->progress, &report->measured_norm_error, error));
+        TRY(two_mesh_norm(problem, &mesh, &S, options->progress, &norm, error));
     }
+    report_step_add(report, "factorize", factorized);
 
     const double inverting = clock_seconds();
     progress_report(options->progress, "invert", 0);
-    report->rank = mesh.k;
-    report->coherence = mesh.smallest_coherence;
-    report->patch_area = mesh.smallest_area;
+    const size_t k = mesh.k;
+    report_text(report, "assign", by_proximity(o) ? "proximity" : "inclusion");
+    report_number(report, "coherence_min", mesh.smallest_coherence);
+    report_number(report, "patch_area_min", mesh.smallest_area);
+    snprintf(report->detail, sizeof report->detail,
+             "%zu patches of %zu elements by %s, coherence %.3g or more, the smallest patch %.3g m2", k,
+             problem->n, by_proximity(o) ? "proximity" : "inclusion", mesh.smallest_coherence,
+             mesh.smallest_area);
     if (qr)
-        TRY(finish_low_rank(problem, &S, &f, options->keep_factors, op, &report->rcond, error));
+        TRY(operator_of_factors(problem, &S, &f, o->keep_factors, op, &rcond, error));
     else
-        TRY(build_summed(problem, &mesh, options->keep_factors, op, report, error));
-    report->invert_seconds = clock_seconds() - inverting;
-    report->method = "2msc";
-    report->factorizer = qr ? "qr" : NULL;
-    report->levels = -1;
-    report->epsilon = report->measured_norm_error;
-    explain(options, problem->n, report);
+        TRY(build_summed(problem, &mesh, o->keep_factors, op, &rcond, error));
+    report_step_add(report, "invert", clock_seconds() - inverting);
+    if (qr) report_text(report, "factorizer", "qr");
+    report_number(report, "epsilon", norm);
+    report_number(report, "rcond", rcond);
+    report_count(report, "rank", (double)k);
+    report_number(report, "measured_norm_error", norm);
+    report_text(report, "norm", "2");
 done:
     scaled_free(&S);
     coarse_mesh_free(&mesh);
@@ -169,4 +215,29 @@ done:
     return status;
 }
 
-const build_method build_two_mesh = {"2msc", build};
+/* A number of patches takes the place of what would split them; of the factorizers it knows qr alone. */
+static bool ignores(const void *own, const build_report *report, const char *option) {
+    const two_mesh_options *o = own;
+    (void)report;
+    if (strcmp(option, "factorizer") == 0)
+        return strcmp(o->factorizer, "auto") != 0 && strcmp(o->factorizer, "qr") != 0;
+    return o->rank > 0 && (strcmp(option, "coherence") == 0 || strcmp(option, "min-area") == 0);
+}
+
+static void forecast(const method_scale *scale, const void *own, method_forecast *out) {
+    const double n = scale->n, known = patches_of(own, n), k = known > 0 ? known : fmin(1024, n);
+    *out = (method_forecast){
+        .building = 4 * n * (2 * fmin(1024, n) + 6 * k), .loaded = 8 * n * k, .stored = 8 * n * k};
+}
+
+const build_method method_two_mesh = {
+    .name = "2msc",
+    .summary = "patches of a coarse mesh send, elements receive (Fernández et al. 2011)",
+    .kind = &operator_two_mesh,
+    .rows = rows,
+    .flags = METHOD_GEOMETRY,
+    .ignores = ignores,
+    .forecast = forecast,
+    .build = build,
+};
+_Static_assert(sizeof(two_mesh_options) <= METHOD_OPTIONS_BYTES, "they fit");

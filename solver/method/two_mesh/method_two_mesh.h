@@ -5,6 +5,14 @@
 #include "solver/linalg/scaled.h"
 #include "solver/method/two_mesh/coarse_mesh.h"
 
+/* The options of --method 2msc. */
+typedef struct two_mesh_options {
+    const char *factorizer, *assign; /* "auto" or "qr"; "inclusion" or "proximity" */
+    uint64_t rank;                   /* 0: by coherence and min_area */
+    double coherence, min_area;      /* smallest coherence; smallest area of a patch, m^2; 0: not given */
+    bool keep_factors;
+} two_mesh_options;
+
 /* F ~ U V^T in its general form: U_ep = sum of F_ej over the elements j of patch p, V_jp = A_j / A_p. Each
  * patch is taken to send as one, so that rows keep their sums. With S = A^1/2 F A^-1/2 that is S W W^T for
  * W_jp = (A_j / A_p)^1/2, whose columns are orthonormal: S between projectors, so |U V^T| <= |S| <= 1 in the

@@ -1,5 +1,5 @@
 #include "solver/linalg/core.h"
-#include "solver/method/low_rank/norm.h"
+#include "solver/method/norm.h"
 #include "solver/method/two_mesh/method_two_mesh.h"
 
 #include <math.h>

@@ -1,12 +1,15 @@
 /* The builders and the reference against closed forms (exact form factors in, nine digits out). */
 #include "solver/method/judge.h"
+#include "solver/method/low_rank/factorizer.h"
 #include "solver/method/method.h"
 #include "solver/method/reference.h"
 #include "support/box_problem.h"
+#include "support/building.h"
 #include "support/suite.h"
 
-static const build_options defaults = {
-    .method = "low-rank", .factorizer = "auto", .epsilon = .1, .budget = {.alpha = .5}, .levels = -1};
+static build_options defaults(void) {
+    return options_with("low-rank", .1);
+}
 
 static lam_operator *build(const build_problem *problem, const build_options *options, build_report *report) {
     lam_operator *op = NULL;
@@ -69,7 +72,7 @@ END_TEST
 START_TEST(exact_cube) {
     fixture f = fixture_box(unit_cube, cubes[_i].divisions, .5f);
     const size_t n = f.m.n, cells = n / 6;
-    build_options options = defaults;
+    build_options options = defaults();
     options.method = "exact";
     build_report report;
     lam_operator *op = build(problem_of(&f), &options, &report);
@@ -101,9 +104,9 @@ START_TEST(room_one_element_per_face) {
     float E[6] = {0, 0, 0, 0, 0, 1}, B[6], H[6];
     const char *const methods[] = {"exact", "low-rank"};
     for (int method = 0; method < 2; method++) {
-        build_options options = defaults;
+        build_options options = defaults();
         options.method = methods[method];
-        options.epsilon = 1e-6; /* full rank */
+        set_number(&options, "epsilon", 1e-6); /* full rank */
         build_report report;
         lam_operator *op = build(problem_of(&f), &options, &report);
         apply(op, LAM_RADIOSITY, E, B);
@@ -149,12 +152,12 @@ START_TEST(sphere_has_rank_one) {
         .n = N, .n_channels = 1, .area = area, .reflectance = rho, .F = &F, .order = order};
     const char *const methods[] = {"exact", "low-rank"};
     for (int method = 0; method < 2; method++) {
-        build_options options = defaults;
+        build_options options = defaults();
         options.method = methods[method];
-        options.epsilon = 1e-3;
+        set_number(&options, "epsilon", 1e-3);
         build_report report;
         lam_operator *op = build(&problem, &options, &report);
-        if (method == 1) ck_assert_uint_eq(report.rank, 1);
+        if (method == 1) ck_assert_double_eq(report_get(&report, "rank", -1), 1);
         apply(op, LAM_RADIOSITY, E, B);
         for (int i = 0; i < N; i++) /* single precision in F and in the operator */
             ck_assert_double_eq_tol((double)B[i], (double)E[i] + (double)rho[i] * mean_E / (1 - mean_rho),
@@ -173,7 +176,7 @@ START_TEST(furnace) {
         float *E = malloc(n * sizeof *E), *B = malloc(n * sizeof *B);
         for (size_t i = 0; i < n; i++) E[i] = 1;
         const double expected = 1 / (1 - (double)rhos[r]);
-        build_options options = defaults;
+        build_options options = defaults();
         build_report report;
         options.method = "exact";
         lam_operator *op = build(problem_of(&f), &options, &report);
@@ -186,7 +189,8 @@ START_TEST(furnace) {
         double error = 0;
         for (size_t i = 0; i < n; i++) error += pow((double)B[i] / expected - 1, 2) / (double)n;
         /* eq. 2.9 with equal areas: relative error at most epsilon / (1 - max rho). */
-        ck_assert_double_le(sqrt(error), report.measured_norm_error / (1 - (double)rhos[r]) + 1e-5);
+        ck_assert_double_le(sqrt(error),
+                            report_get(&report, "measured_norm_error", 1) / (1 - (double)rhos[r]) + 1e-5);
         lam_operator_close(op);
         free(E);
         free(B);
@@ -205,7 +209,7 @@ START_TEST(judge_finds_the_exact_operator_exact) {
         for (uint64_t p = f.F.indptr[i]; p < f.F.indptr[i + 1]; p++) row_sums[i] += (double)f.F.data[p];
     const char *const methods[] = {"exact", "low-rank"};
     for (int method = 0; method < 2; method++) {
-        build_options options = defaults;
+        build_options options = defaults();
         options.method = methods[method];
         build_report built;
         lam_operator *op = build(problem_of(&f), &options, &built);
@@ -236,7 +240,8 @@ START_TEST(judge_finds_the_exact_operator_exact) {
                 ck_assert_double_le(groups[g]->energy_balance, 1e-5);
             } else {
                 ck_assert_double_ge(groups[g]->operator_indirect.mean, 1e-5);
-                ck_assert_double_le(groups[g]->operator_relative.max, built.measured_norm_error / .5);
+                ck_assert_double_le(groups[g]->operator_relative.max,
+                                    report_get(&built, "measured_norm_error", 1) / .5);
             }
         }
         lam_operator_close(op);
@@ -298,7 +303,7 @@ END_TEST
 
 START_TEST(auto_explains_itself) {
     fixture f = fixture_box(unit_cube, 3, .5f);
-    build_options options = defaults;
+    build_options options = defaults();
     options.method = "auto";
     build_report report;
     lam_operator *op = build(problem_of(&f), &options, &report);
@@ -314,16 +319,19 @@ START_TEST(bad_options_are_refused) {
     lam_operator *op = NULL;
     build_report report;
     lam_error error = {0};
-    build_options options = defaults;
+    build_options options = defaults();
     options.method = "emitters"; /* and none are asked for */
     ck_assert_int_eq(build_operator(problem_of(&f), &options, &op, &report, &error), LAM_ERR_ARGUMENT);
     ck_assert_ptr_nonnull(strstr(error.message, "--emitters"));
     options.method = "magic";
     ck_assert_int_eq(build_operator(&f.problem, &options, &op, &report, &error), LAM_ERR_ARGUMENT);
-    options = defaults;
+    options = defaults();
     options.epsilon = NAN;
     ck_assert_int_eq(build_operator(&f.problem, &options, &op, &report, &error), LAM_ERR_ARGUMENT);
-    options = defaults;
+    options = defaults();
+    ((low_rank_options *)own_options(&options, "low-rank"))->epsilon = NAN;
+    ck_assert_int_eq(build_operator(&f.problem, &options, &op, &report, &error), LAM_ERR_ARGUMENT);
+    options = defaults();
     options.method = "exact";
     options.memory = 100;
     ck_assert_int_eq(build_operator(&f.problem, &options, &op, &report, &error), LAM_ERR_MEMORY);

@@ -1,10 +1,11 @@
 /* The measures that decide the kind of an operator: rows of inverses, how much of them may go, and the
  * choice. */
 #include "solver/base/random.h"
-#include "solver/method/classify.h"
+#include "solver/method/choice.h"
 #include "solver/method/reference.h"
 #include "solver/method/sparse/sparse_inverse.h"
 #include "support/box_problem.h"
+#include "support/building.h"
 
 #include <math.h>
 #include <string.h>
@@ -140,25 +141,30 @@ static fixture random_pairs(size_t each, float near) {
     return f;
 }
 
-static scene_class classified(fixture *f, const classify_options *options) {
+static decision chosen(const build_problem *problem, const build_options *options, bool thorough) {
     lam_error error = {0};
-    scene_class c;
-    ck_assert_msg(classify_scene(problem_of(f), options, &c, &error) == LAM_OK, "%s", error.message);
-    printf("%s\n", c.reason);
-    ck_assert_int_eq(strncmp(c.reason, c.method, strlen(c.method)), 0);
-    return c;
+    decision d;
+    ck_assert_msg(choose_method(problem, options, thorough, &d, &error) == LAM_OK, "%s", error.message);
+    printf("%s: %s\n", d.taken->method->name, d.reason);
+    ck_assert(d.final && d.reason[0] != '\0');
+    return d;
 }
 
-static const classify_options usual = {.epsilon = .05, .seed = 1};
+static double cost(const decision *d, const char *method) {
+    return decision_find(d, method)->cost;
+}
 
 /* The four corners of the map. A box: dense, and smooth. */
 START_TEST(a_box_is_of_low_rank) {
     fixture f = fixture_box(unit_cube, 15, .5f);
-    const scene_class c = classified(&f, &usual);
-    ck_assert_str_eq(c.method, "low-rank");
-    ck_assert_double_gt(c.density, .5);
-    ck_assert_double_lt(c.rank, .5 * (double)c.n); /* else the whole inverse is smaller */
-    ck_assert_double_lt(c.entries, 0);             /* F is too dense: not looked at */
+    const build_options how = build_presets("auto");
+    decision d = chosen(problem_of(&f), &how, false);
+    ck_assert_str_eq(d.taken->method->name, "low-rank");
+    ck_assert_double_gt(d.density, .5);
+    ck_assert_double_lt(decision_figure(&d, "rank", "estimate", -1),
+                        .5 * (double)f.m.n); /* else the whole inverse is smaller */
+    ck_assert_double_lt(decision_figure(&d, "sparse", "entries", -1), 0); /* F is too dense: not looked at */
+    decision_free(&d);
     fixture_free(&f);
 }
 END_TEST
@@ -166,12 +172,15 @@ END_TEST
 /* Each sees one other: 2 n numbers, and every singular value is 1. */
 START_TEST(pairs_are_sparse) {
     fixture f = random_pairs(1, 0);
-    const scene_class c = classified(&f, &usual);
-    ck_assert_str_eq(c.method, "sparse");
-    ck_assert_double_eq_tol(c.rank, N, 1e-3 * N);
-    ck_assert_double_eq_tol(c.entries, 2 * N, 1e-6 * N); /* it and, by way of it, itself */
-    ck_assert_double_gt(c.threshold, 0);
-    ck_assert_double_eq(c.sparse_cost, 4 * c.entries);
+    const build_options how = build_presets("auto");
+    decision d = chosen(problem_of(&f), &how, false);
+    ck_assert_str_eq(d.taken->method->name, "sparse");
+    ck_assert_double_eq_tol(decision_figure(&d, "rank", "estimate", -1), N, 1e-3 * N);
+    ck_assert_double_eq_tol(decision_figure(&d, "sparse", "entries", -1), 2 * N,
+                            1e-6 * N); /* it and, by way of it, itself */
+    ck_assert_double_gt(decision_figure(&d, "sparse", "threshold", -1), 0);
+    ck_assert_double_eq(cost(&d, "sparse"), 4 * decision_figure(&d, "sparse", "entries", -1));
+    decision_free(&d);
     fixture_free(&f);
 }
 END_TEST
@@ -180,10 +189,11 @@ END_TEST
  * of the other half, but light from everywhere lacks a half: they must stay, and nothing is sparse. */
 START_TEST(crumbs_that_add_up_are_kept) {
     fixture f = random_pairs(100, .5f);
-    classify_options how = usual;
-    how.epsilon = .15;
-    const scene_class c = classified(&f, &how);
-    ck_assert(c.entries < 0 || c.entries > 100. * N);
+    const build_options how = options_with("auto", .15);
+    decision d = chosen(problem_of(&f), &how, false);
+    ck_assert(decision_figure(&d, "sparse", "entries", -1) < 0 ||
+              decision_figure(&d, "sparse", "entries", -1) > 100. * N);
+    decision_free(&d);
     fixture_free(&f);
 }
 END_TEST
@@ -192,16 +202,18 @@ END_TEST
  * semicircle law), and most of them above .035. */
 START_TEST(noise_is_neither) {
     fixture f = random_pairs(EACH, 0);
-    classify_options how = usual;
-    scene_class c = classified(&f, &how);
-    ck_assert_str_eq(c.method, "exact");
+    build_options how = build_presets("auto");
+    decision d = chosen(problem_of(&f), &how, false);
+    ck_assert_str_eq(d.taken->method->name, "exact");
     const double x = .035 / (2 / sqrt(EACH)),
                  above = 1 - 2 / M_PI * (x * sqrt(1 - x * x) + asin(x)); /* of the semicircle */
-    ck_assert_double_eq_tol(c.rank, above * N, .06 * N);
+    ck_assert_double_eq_tol(decision_figure(&d, "rank", "estimate", -1), above * N, .06 * N);
     how.memory = N * N; /* bytes: a quarter of the whole inverse */
-    c = classified(&f, &how);
-    ck_assert(!isfinite(c.exact_cost));
-    ck_assert_str_eq(c.method, "low-rank");
+    decision_free(&d);
+    d = chosen(problem_of(&f), &how, false);
+    ck_assert(!isfinite(cost(&d, "exact")));
+    ck_assert_str_eq(d.taken->method->name, "low-rank");
+    decision_free(&d);
     fixture_free(&f);
 }
 END_TEST
@@ -236,15 +248,14 @@ START_TEST(low_rank_is_no_rival) {
     build_problem p = *problem_of(&f);
     p.centre = (const double(*)[3])centre;
     p.normal = (const float(*)[3])normal;
-    classify_options how = usual;
-    scene_class brief, whole;
-    ck_assert_int_eq(classify_scene(&p, &how, &brief, &error), LAM_OK);
-    how.thorough = true;
-    ck_assert_int_eq(classify_scene(&p, &how, &whole, &error), LAM_OK);
-    ck_assert_double_lt(whole.low_rank_cost, whole.sparse_cost);
-    ck_assert_double_lt(whole.sparse_cost, whole.hierarchical_cost);
-    ck_assert_str_eq(brief.method, "sparse");
-    ck_assert_str_eq(whole.method, "sparse");
+    const build_options how = build_presets("auto");
+    decision brief = chosen(&p, &how, false), whole = chosen(&p, &how, true);
+    ck_assert_double_lt(cost(&whole, "low-rank"), cost(&whole, "sparse"));
+    ck_assert_double_lt(cost(&whole, "sparse"), cost(&whole, "hierarchical"));
+    ck_assert_str_eq(brief.taken->method->name, "sparse");
+    ck_assert_str_eq(whole.taken->method->name, "sparse");
+    decision_free(&brief);
+    decision_free(&whole);
     free(centre);
     free(normal);
     fixture_free(&f);
@@ -253,11 +264,12 @@ END_TEST
 
 START_TEST(a_threshold_that_is_given_stays) {
     fixture f = random_pairs(1, 0);
-    classify_options how = usual;
-    how.threshold = 1e-3;
-    const scene_class c = classified(&f, &how);
-    ck_assert_double_eq(c.threshold, 1e-3);
-    ck_assert_double_gt(c.entries, 0);
+    build_options how = build_presets("auto");
+    set_number(&how, "threshold", 1e-3);
+    decision d = chosen(problem_of(&f), &how, false);
+    ck_assert_double_eq(decision_figure(&d, "sparse", "threshold", -1), 1e-3);
+    ck_assert_double_gt(decision_figure(&d, "sparse", "entries", -1), 0);
+    decision_free(&d);
     fixture_free(&f);
 }
 END_TEST

@@ -85,7 +85,7 @@ START_TEST(a_sphere_is_one_patch) {
         r.F.indptr[i + 1] = (i + 1) * n;
     }
     /* One surface: as if the room's faces were smooth at the edges. */
-    memset(r.geometry.surface, 0, n * sizeof *r.geometry.surface);
+    memset(r.surface, 0, n * sizeof *r.surface);
     coarse_mesh c = create(room_problem(&r), (coarse_options){.coherence = 1});
     ck_assert_uint_eq(c.k, 1);
     ck_assert_float_eq(c.coherence[0], 1);
@@ -146,7 +146,7 @@ END_TEST
 /* Of everything: sees both ways along each axis. Of the six directions, where surfaces are too many. */
 START_TEST(too_many_surfaces_begin_as_directions) {
     room r = room_create(hall, 4, .5f, 1);
-    for (size_t i = 0; i < r.m.n; i++) r.geometry.surface[i] = (uint32_t)i;
+    for (size_t i = 0; i < r.m.n; i++) r.surface[i] = (uint32_t)i;
     coarse_mesh c = create(room_problem(&r), (coarse_options){.patches = 6});
     for (size_t p = 0; p < 6; p++)
         for (uint64_t i = c.begin[p]; i < c.begin[p + 1]; i++) ck_assert_uint_eq(c.element[i] / 16, p);
@@ -203,8 +203,8 @@ START_TEST(halves_are_cut_across_the_longest_side) {
         for (int d = 0; d < 3; d++) {
             double low = 1, high = 0;
             for (uint64_t i = c.begin[p]; i < c.begin[p + 1]; i++) {
-                low = fmin(low, r.geometry.centre[c.element[i]][d]);
-                high = fmax(high, r.geometry.centre[c.element[i]][d]);
+                low = fmin(low, r.centre[c.element[i]][d]);
+                high = fmax(high, r.centre[c.element[i]][d]);
             }
             ck_assert(high - low < 1 / 8. + 1e-9); /* two cells: centres 1/8 apart */
         }
@@ -218,7 +218,7 @@ END_TEST
 START_TEST(what_lies_in_one_place_is_split_too) {
     room r = room_create(hall, 3, .5f, 1);
     for (size_t i = 0; i < r.m.n; i++)
-        for (int d = 0; d < 3; d++) r.geometry.centre[i][d] = 0;
+        for (int d = 0; d < 3; d++) r.centre[i][d] = 0;
     for (size_t k = 7; k <= 54; k += 47) {
         coarse_mesh c = create(room_problem(&r), (coarse_options){.patches = k});
         ck_assert_uint_eq(c.k, k);
@@ -243,7 +243,7 @@ START_TEST(proximity_takes_the_nearest) {
     for (size_t i = 0; i < n; i++)
         for (int d = 0; d < 3; d++) {
             const double place = random_lcg_unit(&state);
-            if (r.m.normal[i][d] == 0) r.geometry.centre[i][d] += .6 * (place - .5);
+            if (r.m.normal[i][d] == 0) r.centre[i][d] += .6 * (place - .5);
         }
     coarse_mesh a = create(room_problem(&r), (coarse_options){.patches = k});
     coarse_mesh b = create(room_problem(&r), (coarse_options){.patches = k, .proximity = true});
@@ -253,7 +253,7 @@ START_TEST(proximity_takes_the_nearest) {
         for (uint64_t i = a.begin[p]; i < a.begin[p + 1]; i++) {
             owner[a.element[i]] = p;
             for (int d = 0; d < 3; d++)
-                centre[p][d] += r.m.area[a.element[i]] * r.geometry.centre[a.element[i]][d] / a.area[p];
+                centre[p][d] += r.m.area[a.element[i]] * r.centre[a.element[i]][d] / a.area[p];
         }
     ck_assert_uint_eq(b.k, k);
     for (size_t p = 0; p < k; p++)
@@ -263,14 +263,13 @@ START_TEST(proximity_takes_the_nearest) {
             ck_assert_uint_eq(a.element[a.begin[p]] / 64, e / 64);
             for (size_t q = 0; q < k; q++)
                 if (a.element[a.begin[q]] / 64 == e / 64)
-                    nearest = fmin(nearest, distance(r.geometry.centre[e], centre[q]));
-            const double own = distance(r.geometry.centre[e], centre[p]);
+                    nearest = fmin(nearest, distance(r.centre[e], centre[q]));
+            const double own = distance(r.centre[e], centre[p]);
             moved += owner[e] != p;
             if (own > nearest * (1 + 1e-9)) { /* stays because it is its patch's nearest */
                 ck_assert_uint_eq(owner[e], p);
                 for (uint64_t j = a.begin[p]; j < a.begin[p + 1]; j++)
-                    ck_assert_double_ge(distance(r.geometry.centre[a.element[j]], centre[p]),
-                                        own * (1 - 1e-9));
+                    ck_assert_double_ge(distance(r.centre[a.element[j]], centre[p]), own * (1 - 1e-9));
                 kept++;
             }
         }
@@ -301,7 +300,7 @@ END_TEST
 START_TEST(proximity_empties_no_patch) {
     room r = room_create(hall, 3, .5f, 1);
     for (size_t i = 0; i < r.m.n; i++)
-        for (int d = 0; d < 3; d++) r.geometry.centre[i][d] = 1;
+        for (int d = 0; d < 3; d++) r.centre[i][d] = 1;
     coarse_mesh c = create(room_problem(&r), (coarse_options){.patches = 20, .proximity = true});
     ck_assert_uint_eq(c.k, 20);
     coarse_mesh_free(&c);

@@ -6,6 +6,7 @@
 #include "solver/operator/refine/form_factor_rows.h"
 #include "solver/operator/refine/refinement.h"
 #include "store/store.h"
+#include "support/building.h"
 #include "support/certified.h"
 #include "support/scene.h"
 #include "support/suite.h"
@@ -189,8 +190,7 @@ static certified subject(const view *v, const char *method, double epsilon, doub
                                    .order = v->order,
                                    .centre = (const double(*)[3])centre,
                                    .normal = (const float(*)[3])v->m.normal};
-    const build_options options = {
-        .method = method, .factorizer = "auto", .epsilon = epsilon, .budget = {.alpha = .5}, .levels = -1};
+    const build_options options = options_with(method, epsilon);
     build_report report;
     lam_operator *op = NULL;
     lam_form_factors *F = NULL;

@@ -45,8 +45,8 @@ static void make_room(double closed, uint64_t seed, room *r) {
     free(G);
 }
 
-static light_columns problem_of(const room *r, size_t m, const float *E, const float *H0) {
-    return (light_columns){.n = N, .F = &r->F, .area = r->area, .rho = r->rho, .m = m, .E = E, .H0 = H0};
+static many_lights_input problem_of(const room *r, size_t m, const float *E, const float *H0) {
+    return (many_lights_input){.n = N, .F = &r->F, .area = r->area, .rho = r->rho, .m = m, .E = E, .H0 = H0};
 }
 
 static float *random_light(size_t m, uint64_t seed) {
@@ -103,10 +103,10 @@ START_TEST(light_is_that_of_the_dense_solution) {
             float *E = lights & 1 ? random_light(m, 5) : NULL, *H0 = lights & 2 ? random_light(m, 7) : NULL;
             float *T = test_allocate(m * N, sizeof *T);
             double *exact = exact_light(&r, m, E, H0);
-            const light_columns c = problem_of(&r, m, E, H0);
-            columns_report report;
+            const many_lights_input c = problem_of(&r, m, E, H0);
+            many_lights_report report;
             lam_error error = {0};
-            ck_assert_msg(columns_solve(&c, 1e-6, T, &report, &error) == LAM_OK, "%s", error.message);
+            ck_assert_msg(many_lights_solve(&c, 1e-6, T, &report, &error) == LAM_OK, "%s", error.message);
             ck_assert_double_le(report.residual, 1e-6);
             /* The residual bounds the error by 1 / (1 - largest rho) in the scaled norm. */
             ck_assert_double_le(worst_error(&r, m, T, exact), 2e-5);
@@ -125,12 +125,12 @@ START_TEST(bits_do_not_depend_on_threads) {
     make_room(.98, 9, &r);
     float *E = random_light(M, 2), *one = test_allocate(M * N, sizeof *one),
           *four = test_allocate(M * N, sizeof *four);
-    const light_columns c = problem_of(&r, M, E, NULL);
-    columns_report report;
+    const many_lights_input c = problem_of(&r, M, E, NULL);
+    many_lights_report report;
     omp_set_num_threads(1);
-    ck_assert_int_eq(columns_solve(&c, 1e-6, one, &report, NULL), LAM_OK);
+    ck_assert_int_eq(many_lights_solve(&c, 1e-6, one, &report, NULL), LAM_OK);
     omp_set_num_threads(4);
-    ck_assert_int_eq(columns_solve(&c, 1e-6, four, &report, NULL), LAM_OK);
+    ck_assert_int_eq(many_lights_solve(&c, 1e-6, four, &report, NULL), LAM_OK);
     ck_assert_mem_eq(one, four, M * N * sizeof *one);
     free(E);
     free(one);
@@ -146,8 +146,8 @@ START_TEST(jacobi_sweeps_as_the_equation_says) {
     make_room(.98, 4, &r);
     float *E = random_light(M, 2), *H0 = random_light(M, 6), *T = test_allocate(M * N, sizeof *T);
     double *B = test_allocate(N, sizeof *B), *H = test_allocate(N, sizeof *H);
-    const light_columns c = problem_of(&r, M, E, H0);
-    ck_assert_int_eq(columns_jacobi(&c, SWEEPS, T, NULL), LAM_OK);
+    const many_lights_input c = problem_of(&r, M, E, H0);
+    ck_assert_int_eq(many_lights_jacobi(&c, SWEEPS, T, NULL), LAM_OK);
     for (size_t v = 0; v < M; v++) {
         for (size_t i = 0; i < N; i++) B[i] = (double)E[v * N + i] + (double)r.rho[i] * (double)H0[v * N + i];
         for (int sweep = 0; sweep < SWEEPS; sweep++) {
@@ -163,7 +163,7 @@ START_TEST(jacobi_sweeps_as_the_equation_says) {
                                     1e-5 * (rho_or_one(r.rho[i]) * H[i] + 1e-6));
     }
     double *exact = exact_light(&r, M, E, H0);
-    ck_assert_int_eq(columns_jacobi(&c, 600, T, NULL), LAM_OK);
+    ck_assert_int_eq(many_lights_jacobi(&c, 600, T, NULL), LAM_OK);
     ck_assert_double_le(worst_error(&r, M, T, exact), 2e-5);
     free(exact);
     free(E);
@@ -182,10 +182,10 @@ START_TEST(nearly_no_loss_ends) {
     float data[] = {1, 1}, rho[] = {0x1.fffffep-1f, 0x1.fffffep-1f}, E[] = {1, 0, 0, 0}, T[4];
     const double area[] = {1, 1};
     const csr F = {.n = 2, .indptr = indptr, .indices = indices, .data = data};
-    const light_columns c = {.n = 2, .F = &F, .area = area, .rho = rho, .m = 2, .E = E};
-    columns_report report;
+    const many_lights_input c = {.n = 2, .F = &F, .area = area, .rho = rho, .m = 2, .E = E};
+    many_lights_report report;
     lam_error error = {0};
-    const lam_status status = columns_solve(&c, 1e-6, T, &report, &error);
+    const lam_status status = many_lights_solve(&c, 1e-6, T, &report, &error);
     if (status == LAM_OK)
         for (int k = 0; k < 4; k++) ck_assert(isfinite(T[k]));
     else
@@ -210,9 +210,9 @@ START_TEST(gradients_are_conjugate) {
         indptr[i + 1] = entries;
     }
     const csr F = {.n = LINE, .indptr = indptr, .indices = indices, .data = data};
-    const light_columns c = {.n = LINE, .F = &F, .area = area, .rho = rho, .m = 1, .E = E};
-    columns_report report;
-    ck_assert_int_eq(columns_solve(&c, 1e-6, T, &report, NULL), LAM_OK);
+    const many_lights_input c = {.n = LINE, .F = &F, .area = area, .rho = rho, .m = 1, .E = E};
+    many_lights_report report;
+    ck_assert_int_eq(many_lights_solve(&c, 1e-6, T, &report, NULL), LAM_OK);
     ck_assert_uint_le(report.sweeps, 55); /* 44; by directions that are not conjugate 84 */
 }
 END_TEST
@@ -227,12 +227,12 @@ START_TEST(stops_when_told) {
     make_room(.98, 4, &r);
     float *E = random_light(2, 2), T[2 * N];
     const progress told = {.cancelled = at_once};
-    light_columns c = problem_of(&r, 2, E, NULL);
-    columns_report report;
+    many_lights_input c = problem_of(&r, 2, E, NULL);
+    many_lights_report report;
     lam_error error = {0};
     c.progress = &told;
-    ck_assert_int_eq(columns_solve(&c, 1e-6, T, &report, &error), LAM_ERR_CANCELLED);
-    ck_assert_int_eq(columns_jacobi(&c, 9, T, &error), LAM_ERR_CANCELLED);
+    ck_assert_int_eq(many_lights_solve(&c, 1e-6, T, &report, &error), LAM_ERR_CANCELLED);
+    ck_assert_int_eq(many_lights_jacobi(&c, 9, T, &error), LAM_ERR_CANCELLED);
     free(E);
     csr_free(&r.F);
 }

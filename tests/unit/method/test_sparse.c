@@ -3,6 +3,7 @@
 #include "solver/method/sparse/sparse_inverse.h"
 #include "solver/operator/sparse.h"
 #include "support/box_problem.h"
+#include "support/building.h"
 #include "support/suite.h"
 #include "support/transport.h"
 
@@ -17,14 +18,14 @@ static fixture subject(unsigned divisions) {
     return f;
 }
 
-static build_options options_of(double threshold, sparse_correction correction) {
-    return (build_options){.method = "sparse",
-                           .factorizer = "auto",
-                           .epsilon = .05,
-                           .budget = {.alpha = .5},
-                           .levels = -1,
-                           .threshold = threshold,
-                           .correction = correction};
+enum { NONE, DELTA, DISCARDED };
+static const char *const corrections[] = {"none", "delta", "discarded"};
+
+static build_options options_of(double threshold, int correction) {
+    build_options options = build_presets("sparse");
+    set_number(&options, "threshold", threshold);
+    set_text(&options, "correction", corrections[correction]);
+    return options;
 }
 
 static lam_operator *build(const build_problem *problem, const build_options *options, build_report *report) {
@@ -153,28 +154,27 @@ START_TEST(corrections_do_what_they_say) {
     build_report report;
     float *E = test_allocate(n, sizeof *E), *truth = test_allocate(n, sizeof *truth);
     float *out = test_allocate(n, sizeof *out);
-    const build_options exact = {
-        .method = "exact", .factorizer = "auto", .epsilon = .05, .budget = {.alpha = .5}};
+    const build_options exact = build_presets("exact");
     lam_operator *whole = build(problem_of(&f), &exact, &report);
     for (size_t i = 0; i < n; i++) E[i] = 1;
     for (int q = LAM_RADIOSITY; q <= LAM_IRRADIANCE; q++) {
         apply(whole, (lam_quantity)q, E, truth);
         double missing[3] = {0};
-        for (sparse_correction c = SPARSE_NONE; c <= SPARSE_DISCARDED; c++) {
+        for (int c = NONE; c <= DISCARDED; c++) {
             const build_options how = options_of(.02, c);
             lam_operator *op = build(&f.problem, &how, &report);
-            ck_assert_double_eq(report.threshold, .02);
+            ck_assert_double_eq(report_get(&report, "threshold", -1), .02);
             apply(op, (lam_quantity)q, E, out);
             for (size_t i = 0; i < n; i++) {
                 missing[c] += (double)(truth[i] - out[i]) / (double)n;
                 ck_each(out[i] <= truth[i] * (1 + 1e-5f));
-                if (c == SPARSE_DELTA) ck_each(fabsf(out[i] - truth[i]) <= 1e-5f * truth[i]);
+                if (c == DELTA) ck_each(fabsf(out[i] - truth[i]) <= 1e-5f * truth[i]);
             }
             lam_operator_close(op);
         }
-        ck_assert_double_gt(missing[SPARSE_NONE], 1.2 * missing[SPARSE_DISCARDED]);
-        ck_assert_double_gt(missing[SPARSE_DISCARDED], 100 * fabs(missing[SPARSE_DELTA]));
-        const build_options fine = options_of(1e-9, SPARSE_NONE);
+        ck_assert_double_gt(missing[NONE], 1.2 * missing[DISCARDED]);
+        ck_assert_double_gt(missing[DISCARDED], 100 * fabs(missing[DELTA]));
+        const build_options fine = options_of(1e-9, NONE);
         lam_operator *op = build(&f.problem, &fine, &report);
         apply(op, (lam_quantity)q, E, out);
         for (size_t i = 0; i < n; i++) ck_each(fabsf(out[i] - truth[i]) <= 2e-6f * truth[i]);
@@ -212,14 +212,14 @@ END_TEST
 START_TEST(memory_bounds_the_entries) {
     fixture f = subject(8);
     build_report report;
-    build_options how = options_of(1e-6, SPARSE_DELTA);
+    build_options how = options_of(1e-6, DELTA);
     lam_operator *op = build(problem_of(&f), &how, &report);
     const size_t all = lam_operator_bytes(op);
     lam_operator_close(op);
-    ck_assert_double_eq(report.threshold, 1e-6);
+    ck_assert_double_eq(report_get(&report, "threshold", -1), 1e-6);
     how.memory = all / 4;
     op = build(&f.problem, &how, &report);
-    ck_assert_double_gt(report.threshold, 1e-6);
+    ck_assert_double_gt(report_get(&report, "threshold", -1), 1e-6);
     ck_assert_uint_le(lam_operator_bytes(op), all / 4 + 16 * f.m.n);
     ck_assert_ptr_nonnull(strstr(report.reason, "raised"));
     lam_operator_close(op);
@@ -243,11 +243,16 @@ START_TEST(bad_requests_are_refused) {
     build_report report;
     lam_operator *op = NULL;
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
-        const build_options how = options_of(bad[k], SPARSE_DELTA);
+        build_options how = options_of(1e-3, DELTA);
+        ck_assert_int_eq(build_set_number(&how, "threshold", bad[k], &error), LAM_ERR_ARGUMENT);
+        ck_assert_ptr_nonnull(strstr(error.message, "--threshold"));
+        if (bad[k] == 0) continue; /* not given */
+        ((sparse_options *)own_options(&how, "sparse"))->threshold = bad[k];
+        error.message[0] = '\0';
         ck_assert_int_eq(build_operator(problem_of(&f), &how, &op, &report, &error), LAM_ERR_ARGUMENT);
         ck_assert_ptr_nonnull(strstr(error.message, "--threshold"));
     }
-    build_options how = options_of(1e-3, SPARSE_DELTA);
+    build_options how = options_of(1e-3, DELTA);
     how.progress = &(progress){.cancelled = always};
     ck_assert_int_eq(build_operator(&f.problem, &how, &op, &report, &error), LAM_ERR_CANCELLED);
     ck_assert_ptr_null(op);

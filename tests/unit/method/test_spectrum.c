@@ -1,5 +1,5 @@
 /* Counts of singular values, against all of them by LAPACK. */
-#include "solver/method/spectrum.h"
+#include "solver/method/low_rank/spectrum.h"
 #include "support/subject.h"
 
 /* Pairs of elements that see only each other, by .25: half the eigenvalues are .25, half -.25. */

@@ -4,6 +4,7 @@
 #include "solver/bench/scenes.h"
 #include "solver/bench/stability.h"
 #include "solver/operator/refine/refinement.h"
+#include "support/building.h"
 #include "support/certified.h"
 #include "support/dense.h"
 #include "support/scene.h"
@@ -17,13 +18,8 @@ static lam_error error;
 /* --- subjects ------------------------------------------------------------------------------------------ */
 
 static lam_operator *build(build_problem *problem, const char *method, double epsilon) {
-    const build_options options = {.method = method,
-                                   .factorizer = "auto",
-                                   .epsilon = epsilon,
-                                   .budget = {.alpha = .5},
-                                   .levels = -1,
-                                   .threshold = .01,
-                                   .correction = SPARSE_DELTA};
+    build_options options = options_with(method, epsilon);
+    set_number(&options, "threshold", .01);
     build_report report;
     lam_operator *op = NULL;
     ck_ok(build_operator(problem, &options, &op, &report, &error));

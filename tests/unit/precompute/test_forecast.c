@@ -3,6 +3,7 @@
 #include "solver/formfactor/rays/rays.h"
 #include "solver/precompute/forecast.h"
 #include "support/box.h"
+#include "support/building.h"
 #include "support/scene.h"
 #include "support/suite.h"
 
@@ -55,13 +56,19 @@ END_TEST
 
 /* Two matrices of 4, 2 or 1 bytes a value; the whole inverse has no choice. */
 START_TEST(fewer_bits_take_less_of_the_disk) {
-    forecast f = {.n = 5000, .n_channels = 1, .recipe = {.method = RECIPE_RAYS, .rays = 512}, .rank = 100};
+    build_options how = build_presets("low-rank");
+    set_number(&how, "rank", 100);
+    forecast f = {.n = 5000,
+                  .n_channels = 1,
+                  .recipe = {.method = RECIPE_RAYS, .rays = 512},
+                  .method = method_find("low-rank"),
+                  .build = &how};
     const double single = forecast_store_bytes(&f), all = 2. * 5000 * 100;
     f.precision = PANEL_F16;
     ck_assert_double_eq(single - forecast_store_bytes(&f), 2 * all);
     f.precision = PANEL_I8;
     ck_assert_double_eq(single - forecast_store_bytes(&f), 3 * all);
-    f.exact = true;
+    f.method = method_find("exact");
     const double inverse = forecast_store_bytes(&f);
     f.precision = PANEL_F32;
     ck_assert_double_eq(forecast_store_bytes(&f), inverse);
@@ -100,7 +107,10 @@ START_TEST(what_does_not_fit_is_refused) {
     folder_remove(folder);
 
     /* Hemicubes of a small scene see everything: packed weights and the triangle pass the rows themselves. */
-    forecast dense = {.n = 5000, .n_channels = 1, .recipe = recipes[4], .rank = 8};
+    build_options how = build_presets("low-rank");
+    set_number(&how, "rank", 8);
+    forecast dense = {
+        .n = 5000, .n_channels = 1, .recipe = recipes[4], .method = method_find("low-rank"), .build = &how};
     const double without = forecast_bytes(&dense);
     dense.scratch = true;
     const double with = forecast_bytes(&dense);

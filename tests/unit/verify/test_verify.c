@@ -40,8 +40,7 @@ static void trace(const mesh *m, const uint32_t *order, uint64_t seed, form_fact
 }
 
 static void build(sample *s, const uint32_t *order) {
-    const build_options how = {
-        .method = "exact", .factorizer = "auto", .epsilon = .1, .budget = {.alpha = .5}, .levels = -1};
+    const build_options how = build_presets("exact");
     const build_problem problem = problem_of(s, order);
     build_report report;
     MUST(build_operator(&problem, &how, &s->op, &report, error));

@@ -1,4 +1,4 @@
-#include "solver/method/low_rank/norm.h"
+#include "solver/method/norm.h"
 
 #include "solver/base/random.h"
 
@@ -108,23 +108,5 @@ done:
     free(D.y);
     free(D.x_single);
     free(D.t);
-    return status;
-}
-
-lam_status norm_of_error_frobenius(const scaled_matrix *S, const tall_factors *f, double *norm,
-                                   lam_error *error) {
-    lam_status status = LAM_OK;
-    enum { COLUMNS = 256 };
-    double left = 0;
-    for (size_t first = 0; first < S->n; first += COLUMNS) {
-        sparse_block block = {0};
-        TRY(scaled_block(S, first, S->n - first < COLUMNS ? S->n : first + COLUMNS, &block, error));
-        for (uint64_t p = 0; p < block.indptr[S->n]; p++)
-            left += (double)block.data[p] * (double)block.data[p];
-        sparse_block_free(&block);
-    }
-    for (size_t k = 0; k < f->n * f->rank; k++) left -= (double)f->Q[k] * (double)f->Q[k];
-    *norm = sqrt(fmax(left, 0));
-done:
     return status;
 }

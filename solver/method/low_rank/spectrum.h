@@ -1,6 +1,6 @@
 /* How the singular values of S fall, without finding one of them. */
-#ifndef LAMBERT_METHOD_SPECTRUM_H
-#define LAMBERT_METHOD_SPECTRUM_H
+#ifndef LAMBERT_METHOD_LOW_RANK_SPECTRUM_H
+#define LAMBERT_METHOD_LOW_RANK_SPECTRUM_H
 
 #include "solver/base/progress.h"
 #include "solver/linalg/scaled.h"
@@ -29,5 +29,14 @@ double spectrum_above(const spectrum *s, double x);
 /* Sum of the squares of those up to x over that of all: the square of |S - S_k|_F / |S|_F for the best S_k
  * that keeps what is above x. 0 where S is 0. */
 double spectrum_tail(const spectrum *s, double x);
+
+/* Factorizers keep their bound everywhere and so more columns than a rank needs: their error is about .7 of
+ * the bound. The rank that one of bound epsilon is going to have, and the square of what it leaves out of S
+ * over |S|_F^2, by this measure. */
+double spectrum_rank(const spectrum *s, double epsilon);
+double spectrum_left(const spectrum *s, double epsilon);
+
+/* Lanczos steps that are enough for these. */
+enum { SPECTRUM_STEPS = 40 };
 
 #endif

@@ -1,7 +1,10 @@
-#include "solver/method/low_rank/fold_factors.h"
+#include "solver/method/tall_factors.h"
 
 #include "solver/linalg/core.h"
 #include "solver/linalg/dense.h"
+#include "solver/method/method.h"
+
+#include <lapacke.h>
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,8 +12,29 @@
 /* Rows that are multiplied at a time: work for every thread, and little beside U. */
 enum { FOLD_ROWS = 8192 };
 
-lam_status finish_fold(size_t n, size_t k, const float *core, const float *reflectance, const uint32_t *order,
-                       float *U, lam_error *error) {
+void tall_factors_free(tall_factors *f) {
+    free(f->Q);
+    free(f->V);
+    *f = (tall_factors){0};
+}
+
+lam_status orthonormal_columns(size_t n, size_t k, float *Q, lam_error *error) {
+    lam_status status = LAM_OK;
+    /* Rows of Q are columns to LAPACK: the QR of Q is the LQ of what it sees. */
+    const lapack_int rows = (lapack_int)k, columns = (lapack_int)n;
+    float *tau = memory_allocate(k, sizeof *tau, "QR", error);
+    if (tau == NULL) TRY(LAM_ERR_MEMORY);
+    lapack_int info = LAPACKE_sgelqf(LAPACK_COL_MAJOR, rows, columns, Q, rows, tau);
+    if (info == 0) info = LAPACKE_sorglq(LAPACK_COL_MAJOR, rows, columns, rows, Q, rows, tau);
+    if (info == LAPACK_WORK_MEMORY_ERROR) FAIL(error, LAM_ERR_MEMORY, "QR of %zu columns: out of memory", k);
+    if (info != 0) FAIL(error, LAM_ERR_NUMERIC, "QR of %zu columns: LAPACK returned %d", k, (int)info);
+done:
+    free(tau);
+    return status;
+}
+
+lam_status factors_fold(size_t n, size_t k, const float *core, const float *reflectance,
+                        const uint32_t *order, float *U, lam_error *error) {
     const size_t most = n < FOLD_ROWS ? n : FOLD_ROWS;
     float *block = memory_allocate(most, k * sizeof *block, "operator", error);
     if (block == NULL) return LAM_ERR_MEMORY;
@@ -53,8 +77,8 @@ done:
     return status;
 }
 
-lam_status finish_low_rank(const build_problem *problem, const scaled_matrix *S, tall_factors *f,
-                           bool keep_factors, lam_operator **op, double *rcond, lam_error *error) {
+lam_status operator_of_factors(const build_problem *problem, const scaled_matrix *S, tall_factors *f,
+                               bool keep_factors, lam_operator **op, double *rcond, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n, C = problem->n_channels, k = f->rank;
     float *U = NULL, *V = NULL, *core = NULL;
@@ -69,7 +93,7 @@ lam_status finish_low_rank(const build_problem *problem, const scaled_matrix *S,
         *rcond = fmin(*rcond, one);
     }
     if (C == 1 && !keep_factors) {
-        TRY(finish_fold(n, k, core, problem->reflectance, NULL, U, error));
+        TRY(factors_fold(n, k, core, problem->reflectance, NULL, U, error));
         status = operator_low_rank_create_folded(n, k, problem->reflectance, U, V, op, error);
     } else {
         status = operator_low_rank_create_factored(n, k, C, problem->reflectance, U, V, core, op, error);

@@ -1,4 +1,4 @@
-#include "solver/method/spectrum.h"
+#include "solver/method/low_rank/spectrum.h"
 
 #include "solver/method/low_rank/sketch.h"
 
@@ -171,4 +171,14 @@ double spectrum_tail(const spectrum *s, double x) {
         if (s->value[k] <= x) tail += square;
     }
     return all > 0 ? tail / all : 0;
+}
+
+static const double bound_reached = .7;
+
+double spectrum_rank(const spectrum *s, double epsilon) {
+    return fmax(1, spectrum_above(s, bound_reached * epsilon));
+}
+
+double spectrum_left(const spectrum *s, double epsilon) {
+    return spectrum_tail(s, bound_reached * epsilon);
 }

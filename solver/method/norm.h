@@ -1,26 +1,16 @@
 /* The norm of what a factorization left out. */
-#ifndef LAMBERT_METHOD_LOW_RANK_NORM_H
-#define LAMBERT_METHOD_LOW_RANK_NORM_H
+#ifndef LAMBERT_METHOD_NORM_H
+#define LAMBERT_METHOD_NORM_H
 
 #include "solver/base/progress.h"
 #include "solver/linalg/scaled.h"
-#include "solver/method/low_rank/tsvd.h"
+#include "solver/method/tall_factors.h"
 
 /* |S - Q V^T|_2 to about a per cent from below: Lanczos steps on the square of the difference, which is what
  * a power iteration with memory is. f as a factorizer returns it. Cost: a few dozen products with S, Q and V.
  * Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC, LAM_ERR_CANCELLED, those of the source of S. */
 lam_status norm_of_error(const scaled_matrix *S, const tall_factors *f, const progress *p, double *norm,
                          lam_error *error);
-
-/* |S - B X^T|_2, X and B [n][m], to about a tenth from below: power iteration on the square of the difference
- * with eight vectors at once, six passes. Errors as above. */
-lam_status norm_estimate(const scaled_matrix *S, size_t m, const float *X, const float *B, uint64_t seed,
-                         double *norm, lam_error *error);
-
-/* |S - Q V^T|_F = sqrt(|S|_F^2 - |Q|_F^2), which holds where Q = S V and V is orthonormal: in single
- * precision to 1e-6 of |S|_F^2 under the root. One pass. Errors: LAM_ERR_MEMORY, those of the source of S. */
-lam_status norm_of_error_frobenius(const scaled_matrix *S, const tall_factors *f, double *norm,
-                                   lam_error *error);
 
 /* w = D^T D q of some matrix D; q and w are [n]. */
 typedef lam_status norm_product(void *context, const double *q, double *w, lam_error *error);

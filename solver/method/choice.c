@@ -1,0 +1,161 @@
+#include "solver/method/choice.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+bool decision_claimed(const decision *so_far) {
+    for (size_t k = 0; k < so_far->n_candidates; k++)
+        if (so_far->candidates[k].claim > CLAIM_USUAL) return true;
+    return false;
+}
+
+double decision_rival(const decision *so_far) {
+    double cost = INFINITY;
+    for (size_t k = 0; k < so_far->n_candidates; k++)
+        if (!so_far->candidates[k].outdone) cost = fmin(cost, so_far->candidates[k].cost);
+    return cost;
+}
+
+const candidate *decision_find(const decision *d, const char *method) {
+    for (size_t k = 0; k < d->n_candidates; k++)
+        if (strcmp(d->candidates[k].method->name, method) == 0) return &d->candidates[k];
+    return NULL;
+}
+
+double decision_figure(const decision *d, const char *object, const char *name, double otherwise) {
+    for (size_t k = 0; k < d->n_candidates; k++) {
+        const candidate *c = &d->candidates[k];
+        if (c->object == NULL || strcmp(c->object, object) != 0) continue;
+        for (size_t f = 0; f < c->n_figures; f++)
+            if (strcmp(c->figures[f].name, name) == 0) return c->figures[f].value;
+    }
+    return otherwise;
+}
+
+void candidate_figure(candidate *c, const char *name, double value) {
+    c->figures[c->n_figures].name = name;
+    c->figures[c->n_figures++].value = value;
+}
+
+void decision_free(decision *d) {
+    for (size_t k = 0; k < d->n_candidates; k++) lam_operator_close(d->candidates[k].op);
+    free(d->candidates);
+    *d = (decision){.n_candidates = 0};
+}
+
+/* The candidate with the highest claim, and of those the one with the lowest cost; the first of equal ones.
+ */
+static const candidate *best(const decision *d) {
+    const candidate *found = NULL;
+    for (size_t k = 0; k < d->n_candidates; k++) {
+        const candidate *c = &d->candidates[k];
+        if (c->claim == CLAIM_COST && (c->outdone || !isfinite(c->cost))) continue;
+        if (found == NULL || c->claim > found->claim || (c->claim == found->claim && c->cost < found->cost))
+            found = c;
+    }
+    return found != NULL ? found : decision_find(d, method_fallback()->name);
+}
+
+/* Before F is known: true if all others are ruled out already. */
+static bool is_final(const decision *d) {
+    if (d->taken->claim > CLAIM_USUAL) return true;
+    for (size_t k = 0; k < d->n_candidates; k++) {
+        const candidate *c = &d->candidates[k];
+        if (c != d->taken && !c->outdone && (c->open || isfinite(c->cost))) return false;
+    }
+    return true;
+}
+
+/* The reason: what is known of F, what was found for the method taken, how long others would take. */
+static void explain(decision *d) {
+    const candidate *own = d->taken;
+    size_t length = 0;
+    const size_t size = sizeof d->reason;
+    if (d->density >= 0) length += (size_t)snprintf(d->reason, size, "F is %.3g %% dense", 100 * d->density);
+    if (own->found[0] != '\0')
+        length +=
+            (size_t)snprintf(d->reason + length, size - length, "%s%s", length > 0 ? ", " : "", own->found);
+    for (size_t k = 0; k < d->n_candidates && isfinite(own->cost) && length < size; k++) {
+        const candidate *c = &d->candidates[k];
+        if (c == own || !isfinite(c->cost) || c->cost < own->cost) continue;
+        length += (size_t)snprintf(d->reason + length, size - length, "; %s would take %.3g times as long",
+                                   c->method->name, c->cost / own->cost);
+    }
+    if (length == 0) snprintf(d->reason, size, "chosen before the form factors are known");
+}
+
+/* The method whose own options were given, of those that auto may take. */
+static const build_method *asked_for(const build_options *options) {
+    for (size_t k = 0; method_at(k) != NULL; k++) {
+        const build_method *m = method_at(k);
+        if (m->weigh != NULL && m->is_asked != NULL && m->is_asked(options, method_own_const(options, m)))
+            return m;
+    }
+    return NULL;
+}
+
+static lam_status take_named(const build_problem *problem, const build_options *options, decision *d,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    const build_method *m = method_find(options->method);
+    if (m == NULL) {
+        char words[160];
+        snprintf(words, sizeof words, "%s", method_choices());
+        for (char *c = words; *c != '\0'; c++)
+            if (*c == '|') *c = ' ';
+        FAIL(error, LAM_ERR_ARGUMENT, "--method %.40s: must be one of: %s", options->method, words);
+    }
+    d->candidates = memory_allocate(1, sizeof *d->candidates, "choice of a method", error);
+    if (d->candidates == NULL) TRY(LAM_ERR_MEMORY);
+    d->n_candidates = 1;
+    d->candidates[0] = (candidate){.method = m, .claim = CLAIM_OPTIONS, .cost = INFINITY};
+    memcpy(&d->candidates[0].own, method_own_const(options, m), sizeof d->candidates[0].own);
+    d->taken = d->candidates;
+    d->final = true;
+    snprintf(d->reason, sizeof d->reason, "asked for by --method");
+    if (problem->stream != NULL && !(m->flags & METHOD_STREAMS))
+        FAIL(error, LAM_ERR_ARGUMENT, "--method %s: needs rows of form factors that are held", m->name);
+done:
+    return status;
+}
+
+lam_status choose_method(const build_problem *problem, const build_options *options, bool thorough,
+                         decision *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const double n = (double)problem->n;
+    decision d = {.problem = problem,
+                  .options = options,
+                  .thorough = thorough,
+                  .density = problem->F != NULL ? (double)problem->F->indptr[problem->n] / (n * n) : -1,
+                  .most = options->memory > 0 ? (double)options->memory / sizeof(float) : INFINITY,
+                  .asked = asked_for(options)};
+    if (strcmp(options->method, "auto") != 0) {
+        TRY(take_named(problem, options, &d, error));
+        *out = d;
+        d = (decision){.n_candidates = 0};
+        goto done;
+    }
+    if (d.asked != NULL && d.asked->check != NULL)
+        TRY(d.asked->check(method_own_const(options, d.asked), error));
+    d.candidates = memory_allocate(METHODS_MOST, sizeof *d.candidates, "choice of a method", error);
+    if (d.candidates == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; method_at(k) != NULL; k++) {
+        const build_method *m = method_at(k);
+        if (m->weigh == NULL || (problem->stream != NULL && !(m->flags & METHOD_STREAMS))) continue;
+        candidate *c = &d.candidates[d.n_candidates];
+        *c = (candidate){.method = m, .cost = INFINITY};
+        memcpy(&c->own, method_own_const(options, m), sizeof c->own);
+        TRY(m->weigh(&d, &c->own, c, error));
+        d.n_candidates++;
+    }
+    d.taken = best(&d);
+    d.final = problem->F != NULL || problem->stream != NULL || is_final(&d);
+    explain(&d);
+    *out = d;
+    d = (decision){.n_candidates = 0};
+done:
+    decision_free(&d);
+    return status;
+}

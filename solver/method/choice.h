@@ -1,0 +1,85 @@
+/* --method auto: one function weighs all methods for a problem and says why it takes one of them. */
+#ifndef LAMBERT_METHOD_CHOICE_H
+#define LAMBERT_METHOD_CHOICE_H
+
+#include "solver/method/method.h"
+
+/* The cost of an answer is counted in coefficients that it reads: 2 n k of low rank, n^2 of the whole
+ * inverse. The column of an entry of a sparse matrix is one more number, and the value that it is multiplied
+ * by lies anywhere: such an entry was measured to take the time of CHOICE_SCATTERED coefficients of a dense
+ * matrix. */
+#define CHOICE_SCATTERED 4.
+
+/* Why a method may be taken whatever an answer costs; the highest claim wins, and equal ones by cost. */
+typedef enum choice_claim {
+    CLAIM_COST,    /* none: by the cost of an answer */
+    CLAIM_USUAL,   /* before F is known: what most problems get */
+    CLAIM_SMALL,   /* the problem is so small that nothing else is worth it */
+    CLAIM_OPTIONS, /* an option that was given has a meaning for this method only */
+    CLAIM_INPUT    /* the problem has an input that only this method takes */
+} choice_claim;
+
+/* The candidacy of one method for a problem. weigh fills it; it begins with an infinite cost. */
+typedef struct candidate {
+    const build_method *method;
+    choice_claim claim;
+    double cost;    /* INFINITY: it cannot be had, or is not known as nothing depends on it */
+    double left;    /* share of S in the Frobenius norm that it leaves out beyond epsilon, which the light of
+                       single elements lacks; 0: none */
+    bool certain;   /* cost is no estimate, and the operator has no error beside rounding */
+    bool open;      /* F is not known yet, and could show that this method suits it best */
+    bool outdone;   /* another candidate keeps the bound for single elements too: cost does not count */
+    char found[96]; /* result of a look at F: "rank estimate 40 at epsilon 0.05"; empty: nothing */
+    /* The same as numbers, for `lambert classify --json`, as the member `object` of its document. */
+    const char *object;
+    size_t n_figures;
+    struct choice_figure {
+        const char *name;
+        double value;
+    } figures[4];
+    method_values own;  /* the options to build it with: as given, or as was found to suit epsilon */
+    lam_operator *op;   /* where only building it says what it costs; else NULL */
+    build_report built; /* of op */
+} candidate;
+
+typedef struct decision {
+    const build_problem *problem;
+    const build_options *options;
+    bool thorough;             /* also methods that cannot be taken are weighed, for a report */
+    double density;            /* of F; negative before it is known */
+    double most;               /* coefficients that memory holds; INFINITY: no limit */
+    const build_method *asked; /* method whose own options were given, which the others lack; NULL */
+    size_t n_candidates;
+    candidate *candidates;
+    const candidate *taken;
+    char reason[256]; /* without the name of the method */
+    bool final;       /* no look at F can change it */
+} decision;
+
+/* Weighs the methods in the order of the list where options->method is auto, else takes that one. With
+ * neither F nor stream in the problem, says what is going to be taken as far as that is known.
+ *
+ * The hierarchical operator is built to see what it costs: nothing cheaper tells. Then the decision holds it
+ * (taken->op), and whoever wants to use it sets op to NULL. Free with decision_free, which closes all others.
+ * Cost: that of the hierarchical operator, a hundred rows of sparse inverses, else at most 40 products of S
+ * with eight vectors and a few dozen with 32. Errors: LAM_ERR_ARGUMENT for an unknown method or one that
+ * cannot use a stream, LAM_ERR_MEMORY, LAM_ERR_NUMERIC, LAM_ERR_CANCELLED. */
+lam_status choose_method(const build_problem *problem, const build_options *options, bool thorough,
+                         decision *out, lam_error *error);
+void decision_free(decision *d);
+
+/* True once a method has a claim, so that costs decide nothing. */
+bool decision_claimed(const decision *so_far);
+
+/* The lowest cost of those that count; INFINITY: none. */
+double decision_rival(const decision *so_far);
+
+/* The candidate of a method of this name; NULL: it was not weighed. */
+const candidate *decision_find(const decision *d, const char *method);
+
+/* A figure of a candidate that bears this object name; otherwise where nobody reports it. */
+double decision_figure(const decision *d, const char *object, const char *name, double otherwise);
+
+void candidate_figure(candidate *c, const char *name, double value);
+
+#endif

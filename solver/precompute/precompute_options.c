@@ -1,0 +1,232 @@
+/* The options of lambert precompute: every row with its preset, limits and help. Those of methods stand in
+ * the tables of the methods. */
+#include "solver/daylight/sky_tiles.h"
+#include "solver/formfactor/recipe.h"
+#include "solver/precompute/precompute.h"
+
+#include <string.h>
+
+/* NULL: none. */
+static lam_status parse_sky(const char *text, void *field, lam_error *error) {
+    lam_status status = LAM_OK;
+    sky_tiling tiling = {0};
+    const char **sky = field;
+    lam_error why = {0};
+    *sky = NULL;
+    if (strcmp(text, "none") == 0) return LAM_OK;
+    status = sky_tiling_create(text, 'z', &tiling, &why);
+    if (status != LAM_OK) FAIL(error, status, "--sky %s", why.message);
+    *sky = text;
+done:
+    sky_tiling_free(&tiling);
+    return status;
+}
+
+#define FIELD(member) offsetof(precompute_options, member)
+static const option_row output_rows[] = {
+    {.name = "output",
+     .letter = 'o',
+     .kind = OPTION_TEXT,
+     .offset = FIELD(output),
+     .argument = "STORE.h5",
+     .help = "Where the store goes"},
+    {0},
+};
+
+static const option_row mesh_rows[] = {
+    {.name = "subdivide",
+     .kind = OPTION_COUNT,
+     .offset = FIELD(subdivide),
+     .argument = "LEVELS",
+     .least = 1,
+     .most = 12,
+     .help = "Divide each face into 4, LEVELS times"},
+    {.name = "max-edge",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(max_edge),
+     .argument = "METRES",
+     .above = true,
+     .help = "Divide until no edge is longer than this"},
+    {.name = "elements",
+     .kind = OPTION_COUNT,
+     .offset = FIELD(elements),
+     .argument = "N",
+     .least = 1,
+     .most = 4e9,
+     .help = "Divide into about N elements"},
+    {.name = "unit",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(unit),
+     .argument = "METRES",
+     .preset = "1",
+     .above = true,
+     .help = "Length of the unit of the file"},
+    {.name = "up",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(up),
+     .otherwise = "y for glTF, z for other formats",
+     .choices = "x|y|z",
+     .help = "Axis that points up"},
+    {.name = "two-sided",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(two_sided),
+     .help = "Make two elements of every face: first all fronts, then all backs"},
+    {.name = "reflectance",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(reflectance),
+     .argument = "X",
+     .least = 0,
+     .most = 1,
+     .below = true,
+     .help = "Grey reflectance of every face, in place of that in the file"},
+    {0},
+};
+
+static const option_row sample_rows[] = {
+    {.name = "rays",
+     .kind = OPTION_COUNT_AUTO,
+     .offset = FIELD(rays),
+     .argument = "N|auto",
+     .preset = "auto",
+     .least = 1,
+     .most = 1 << 24,
+     .help = "Rays from every element; auto follows from --epsilon and --quality"},
+    {.name = "sky",
+     .kind = OPTION_CUSTOM,
+     .offset = FIELD(sky),
+     .argument = "none|tregenza|reinhart:MF|grid:AxB",
+     .preset = "none",
+     .parse = parse_sky,
+     .help = "Tiles of the sky that may light the store: 145, 144 MF^2 + 1, or A sectors by B bands"},
+    {0},
+};
+
+static const option_row form_factor_rows[] = {
+    {.name = "form-factors",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(form_factors),
+     .preset = "rays",
+     .choices = "rays|hemicube",
+     .help = "Method that finds them"},
+    {.name = "resolution",
+     .kind = OPTION_COUNT,
+     .offset = FIELD(resolution),
+     .argument = "PIXELS",
+     .preset = "512",
+     .least = RECIPE_RESOLUTION_LEAST,
+     .most = RECIPE_RESOLUTION_MOST,
+     .help = "Pixels along the top of a hemicube, an even number"},
+    {.name = "quality",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(quality),
+     .preset = "normal",
+     .choices = "draft|normal|high",
+     .help = "draft: rays whose noise is at most 1/2 of epsilon. normal and high: pair by pair, unoccluded "
+             "factors by contour integrals and cubature, and rays for occlusion only; where there are too "
+             "many pairs, near pairs so and other pairs by rays with a noise of 1/4 or 1/8 of epsilon"},
+    {.name = "ground-albedo",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(ground_albedo),
+     .argument = "X",
+     .preset = "0",
+     .least = 0,
+     .most = 1,
+     .help = "Share of the light of the sky that the ground below the horizon reflects"},
+    {.name = "keep-form-factors",
+     .kind = OPTION_OPTIONAL,
+     .offset = FIELD(keep_form_factors),
+     .choices = "compressed",
+     .help = "Keep the form factors in the store, for refined answers and for other operators of the same "
+             "scene. compressed: for refined answers only, in a wavelet basis without its small "
+             "coefficients, whose loss the certificates include"},
+    {0},
+};
+
+/* The words of --method are those of the list of methods. */
+static option_row method_rows[] = {
+    {.name = "method",
+     .kind = OPTION_CHOICE,
+     .offset = FIELD(build.method),
+     .preset = "auto",
+     .help = "Kind of operator"},
+    {0},
+};
+
+/* The help of these stands with the methods. */
+static const option_row emitter_rows[] = {
+    {.name = "emitters", .kind = OPTION_TEXT, .offset = FIELD(emitters), .argument = "FILE|group=NAME|sky"},
+    {0},
+};
+
+static const option_row work_rows[] = {
+    {.name = "threads",
+     .kind = OPTION_COUNT,
+     .offset = FIELD(threads),
+     .argument = "T",
+     .otherwise = "one per core",
+     .least = 1,
+     .most = 1024,
+     .help = "Threads"},
+    {.name = "memory",
+     .kind = OPTION_SIZE,
+     .offset = FIELD(memory),
+     .argument = "SIZE",
+     .otherwise = "70 % of the free memory",
+     .help = "Memory to stay within, such as 500M or 16G"},
+    {.name = "seed",
+     .kind = OPTION_COUNT,
+     .offset = FIELD(seed),
+     .argument = "S",
+     .preset = "1",
+     .help = "Seed of all sampling"},
+    {.name = "quiet",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(quiet),
+     .help = "Print no log and no progress line"},
+    {.name = "progress",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(progress),
+     .help = "Print a progress line even if standard error is no terminal"},
+    {0},
+};
+
+static const option_row resource_rows[] = {
+    {.name = "scratch",
+     .kind = OPTION_TEXT,
+     .offset = FIELD(scratch),
+     .argument = "DIR",
+     .help = "Keep finished rows of form factors in this folder: the same command after a stop continues "
+             "from them, and rows that do not fit into memory stay there"},
+    {.name = "probes",
+     .kind = OPTION_COUNT_AUTO,
+     .offset = FIELD(probes),
+     .argument = "P|auto",
+     .preset = "auto",
+     .least = 0,
+     .most = 1e6,
+     .help = "Single elements that the error is measured with; auto: 200, or 32 above 10240 elements; 0: no "
+             "measurement"},
+    {0},
+};
+
+size_t precompute_tables(precompute_options *o, bool to_classify, option_table tables[PRECOMPUTE_TABLES]) {
+    size_t n = 0;
+    *o = (precompute_options){.reflectance = -1, .build = {.method = "auto"}};
+    method_rows[0].choices = method_choices();
+    if (!to_classify) tables[n++] = (option_table){NULL, output_rows, o};
+    tables[n++] = (option_table){"mesh (preset: every face of the file is one element)", mesh_rows, o};
+    tables[n++] = (option_table){"form factors", sample_rows, o};
+    if (!to_classify) {
+        tables[n++] = (option_table){"", form_factor_rows, o};
+        tables[n++] = (option_table){"operator", method_rows, o};
+    }
+    tables[n++] = (option_table){to_classify ? "operator" : "", build_rows, &o->build};
+    tables[n++] = (option_table){"", emitter_rows, o};
+    for (size_t k = 0; method_at(k) != NULL; k++)
+        if (method_at(k)->rows != NULL)
+            tables[n++] = (option_table){method_at(k)->name, method_at(k)->rows, &o->build.of[k]};
+    if (!to_classify) tables[n++] = (option_table){"resources", resource_rows, o};
+    tables[n++] = (option_table){to_classify ? "resources" : "", work_rows, o};
+    tables[n] = (option_table){.rows = NULL};
+    return n;
+}
