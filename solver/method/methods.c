@@ -6,13 +6,20 @@
 #include <stdio.h>
 #include <string.h>
 
-extern const build_method method_emitters, method_exact, method_hierarchical, method_low_rank,
-    method_two_mesh, method_sparse;
-
-/* Adding a method is one word above and one here. auto weighs them in this order: one that asks what others
+/* The list of methods: adding one is a line here. auto weighs them in this order: one that asks what others
  * cost stands behind them. */
-static const build_method *const methods[] = {&method_emitters, &method_exact,    &method_hierarchical,
-                                              &method_low_rank, &method_two_mesh, &method_sparse};
+#define METHOD_LIST(METHOD)                                                                                  \
+    METHOD(emitters)                                                                                         \
+    METHOD(exact)                                                                                            \
+    METHOD(hierarchical)                                                                                     \
+    METHOD(low_rank)                                                                                         \
+    METHOD(two_mesh)                                                                                         \
+    METHOD(sparse)
+
+#define METHOD_DECLARE(name) extern const build_method method_##name;
+METHOD_LIST(METHOD_DECLARE)
+#define METHOD_ADDRESS(name) &method_##name,
+static const build_method *const methods[] = {METHOD_LIST(METHOD_ADDRESS)};
 enum { METHODS = sizeof methods / sizeof *methods };
 _Static_assert((int)METHODS <= (int)METHODS_MOST, "build_options has room for the options of each method");
 

@@ -5,9 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const operator_kind *const operator_kinds[] = {&operator_exact,    &operator_low_rank,
-                                                      &operator_two_mesh, &operator_sparse,
-                                                      &operator_emitters, &operator_hierarchical};
+#define OPERATOR_KIND_ADDRESS(name) &operator_##name,
+static const operator_kind *const operator_kinds[] = {OPERATOR_KINDS(OPERATOR_KIND_ADDRESS)};
 
 const operator_kind *operator_kind_find(const char *name) {
     for (size_t i = 0; i < sizeof operator_kinds / sizeof *operator_kinds; i++)

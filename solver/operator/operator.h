@@ -17,7 +17,7 @@ typedef struct operator_description {
     size_t bytes;          /* of the arrays a solve reads */
 } operator_description;
 
-/* One kind: a const table at the end of its file, listed in operator.c, which is all that knows its name.
+/* One kind: a const table at the end of its file, listed below, and known by name nowhere else.
  *
  * A kind computes the bounced light P = rho' (M~ - I)/rho E, one row per position, where rho'_i = rho_i, or 1
  * where rho_i = 0 (contract, /operator, last line): B_i = E_i + P_i where rho_i > 0, else E_i, and
@@ -66,12 +66,17 @@ struct lam_operator {
     size_t n_threads;   /* of one answer */
 };
 
-extern const operator_kind operator_exact;
-extern const operator_kind operator_low_rank;
-extern const operator_kind operator_two_mesh;
-extern const operator_kind operator_sparse;
-extern const operator_kind operator_emitters;
-extern const operator_kind operator_hierarchical;
+/* The list of kinds: adding one is a line here. */
+#define OPERATOR_KINDS(KIND)                                                                                 \
+    KIND(exact)                                                                                              \
+    KIND(low_rank)                                                                                           \
+    KIND(two_mesh)                                                                                           \
+    KIND(sparse)                                                                                             \
+    KIND(emitters)                                                                                           \
+    KIND(hierarchical)
+
+#define OPERATOR_KIND_DECLARE(name) extern const operator_kind operator_##name;
+OPERATOR_KINDS(OPERATOR_KIND_DECLARE)
 
 /* The kind of this name, or NULL. */
 const operator_kind *operator_kind_find(const char *name);
