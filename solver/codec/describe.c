@@ -77,6 +77,20 @@ static void add_size_figure(json_t *out, const json_t *operator_attributes, cons
         json_object_set_new(out, "density", json_integer(1));
 }
 
+/* The figures that the method reported: attributes of /operator beside those with a member of their own. */
+static void add_report(json_t *out, json_t *operator_attributes) {
+    static const char *const shown[] = {"kind",    "form",      "layout", "method", "reason",
+                                        "epsilon", "precision", "rank",   "density"};
+    json_t *report = json_object(), *value;
+    const char *name;
+    json_object_foreach(operator_attributes, name, value) {
+        size_t k = 0;
+        while (k < sizeof shown / sizeof *shown && strcmp(shown[k], name) != 0) k++;
+        if (k == sizeof shown / sizeof *shown) json_object_set(report, name, value);
+    }
+    json_object_set_new(out, "report", report);
+}
+
 static lam_status add_error(store *s, json_t *out, lam_error *error) {
     static const char *const groups[] = {"single", "lights", "random"};
     lam_status status = LAM_OK;
@@ -197,6 +211,7 @@ lam_status describe_store(store *s, json_t **out, lam_error *error) {
     json_object_set_new(made, "precision",
                         precision != NULL ? json_deep_copy(precision) : json_string("f32"));
     json_object_set_new(made, "bytes", json_integer((json_int_t)bytes));
+    add_report(made, operator_attributes);
     TRY(add_groups(s, dims[1], made, error));
     TRY(add_emitters(s, made, error));
     TRY(add_sky(s, made, error));

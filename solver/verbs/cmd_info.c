@@ -106,6 +106,9 @@ static void print_text(const json_t *about) {
     print_value("density", json_object_get(about, "density"));
     print_value("precision", json_object_get(about, "precision"));
     print_bytes(json_number_value(json_object_get(about, "bytes")));
+    const char *name;
+    json_t *value;
+    json_object_foreach(json_object_get(about, "report"), name, value) print_value(name, value);
     print_groups(json_object_get(about, "groups"));
     print_sky(json_object_get(about, "sky"));
     print_error(json_object_get(about, "error"));
