@@ -123,7 +123,7 @@ static const file_recipe recipes[] = {
      .status = LAM_ERR_FORMAT,
      .word = "/mesh/area"},
     {.what = "kind unknown", .kind = "magic", .status = LAM_ERR_FORMAT, .word = "unknown kind 'magic'"},
-    {.what = "panels", .layout = "panel64", .status = LAM_ERR_UNSUPPORTED, .word = "panel64"},
+    {.what = "panels", .layout = "panel64", .status = LAM_ERR_FORMAT, .word = "panel64"},
     {.what = "layout unknown", .layout = "columns", .status = LAM_ERR_FORMAT, .word = "'columns'"},
     {.what = "no form", .form = "-", .status = LAM_ERR_FORMAT, .word = "form"},
     {.what = "form unknown", .form = "loose", .status = LAM_ERR_FORMAT, .word = "'loose'"},
