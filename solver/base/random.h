@@ -8,16 +8,16 @@
 /* 2^64 over the golden ratio: the step of SplitMix64, which also keeps seeds of neighbours apart. */
 #define RANDOM_STEP 0x9E3779B97F4A7C15u
 
-/* Scatters x; its lower 33 bits are not as good as those of random_mix. */
+/* The first half of random_mix, enough for one sampling offset. */
 static inline uint64_t random_scatter(uint64_t x) {
     x = (x ^ x >> 30) * 0xBF58476D1CE4E5B9u;
-    return (x ^ x >> 27) * 0x94D049BB133111EBu;
+    return x ^ x >> 27;
 }
 
 /* The finalizer of SplitMix64, a bijection. random_mix(seed + RANDOM_STEP * purpose) seeds a stream of its
  * own for each purpose. */
 static inline uint64_t random_mix(uint64_t x) {
-    x = random_scatter(x);
+    x = random_scatter(x) * 0x94D049BB133111EBu;
     return x ^ x >> 31;
 }
 

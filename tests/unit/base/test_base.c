@@ -19,6 +19,7 @@ START_TEST(random_numbers_keep_their_bits) {
     ck_assert(random_next(&state) == random_hash(0));
     ck_assert(random_hash(0) == 0xE220A8397B1DCDAFu);
     ck_assert(random_mix(RANDOM_STEP) == random_hash(0));
+    ck_assert(random_to_double(random_scatter(RANDOM_STEP)) == 0x1.bda0985aeb8d8p-2);
     state = 1;
     ck_assert(random_lcg(&state) == 7806831264735756412u && state == 7806831264735756412u);
     ck_assert(random_to_double(UINT64_MAX) == 1 - 0x1p-53);
