@@ -96,7 +96,8 @@ done:
     return status;
 }
 
-/* Where each emitter is alone: by it a weight is told from an emission. */
+/* Finds for each emitter a place where no other emitter sends anything: there an emission shows its weight.
+ */
 static lam_status find_own(emitters *self, lam_error *error) {
     const size_t n = self->base.n, s = self->a.s, m = self->a.n_tiles, C = self->base.n_channels;
     const emitter_arrays *a = &self->a;

@@ -68,7 +68,8 @@ static lam_status weights_of_one(const emitters *self, size_t c, const float *E,
         const uint32_t at = self->own[c * s + k];
         if (at == EMITTERS_NONE)
             FAIL(error, LAM_ERR_ARGUMENT,
-                 "emitter %zu (%.40s) is nowhere alone, so that its weight cannot be told from an emission; "
+                 "emitter %zu (%.40s) shares every place with another one, so an emission does not show its "
+                 "weight; "
                  "give \"emitters\", a weight each",
                  k, self->a.names[k]);
         const float *from = at < n ? E : L;

@@ -77,7 +77,7 @@ done:
     return status;
 }
 
-/* With what it lacks of even light. */
+/* With the correction of its mean error. */
 static lam_status lift_even_light(hierarchical *self, lam_error *error) {
     const size_t n = self->base.n, C = self->base.n_channels;
     float *by = NULL;

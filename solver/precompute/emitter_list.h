@@ -1,4 +1,4 @@
-/* --emitters FILE|group=NAME,...|sky: what is to shine alone, once it is known what the scene has. */
+/* --emitters FILE|group=NAME,...|sky: the emitters that alone are going to shine, once the scene is read. */
 #ifndef LAMBERT_PRECOMPUTE_EMITTER_LIST_H
 #define LAMBERT_PRECOMPUTE_EMITTER_LIST_H
 

@@ -76,7 +76,7 @@ static void log_form_factors(precompute_state *state) {
                       100 * f->absorbed_share);
 }
 
-/* One line of what is to come, and whether the disks can hold it. */
+/* Logs the forecast; fails where the disks have no room. */
 static lam_status announce(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;

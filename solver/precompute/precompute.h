@@ -4,7 +4,6 @@
 
 #include "solver/base/terminal.h"
 #include "solver/method/choice.h"
-#include "solver/precompute/recipe_choice.h"
 #include "solver/scene/mesh.h"
 
 /* The options, as the rows of precompute_tables fill them; texts point into argv. The members below the line

@@ -1,5 +1,5 @@
-/* The options of lambert precompute: every row with its preset, limits and help. Those of methods stand in
- * the tables of the methods. */
+/* The options of lambert precompute: every row with its preset, limits and help. A method keeps its own rows
+ * in its own table. */
 #include "solver/daylight/sky_tiles.h"
 #include "solver/formfactor/recipe.h"
 #include "solver/precompute/precompute.h"

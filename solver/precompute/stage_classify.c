@@ -1,9 +1,9 @@
-/* A scene's form factors, roughly, and what they say of the scene. */
+/* lambert classify: few rays per element, and all methods weighed by them. */
 #include "solver/precompute/precompute_state.h"
 
 #include <math.h>
 
-/* Rays of all elements together, and of one: more say little that matters here. */
+/* Rays of all elements together, and of one: more rays change a choice rarely. */
 static const double rays_of_all = 0x1p28, rays_least = 256, rays_most = 4096;
 
 /* As many rays as their number allows: a power of two. */

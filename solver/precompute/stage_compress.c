@@ -10,7 +10,8 @@ static double bytes_of_rows(const precompute_state *state) {
     return state->m.n > FORM_FACTORS_ROWS_MOST ? entries / 2 : entries;
 }
 
-/* The share of the numbers of rows that may be kept: beside them there are bounds and first light. */
+/* Largest share of the entries of rows that compressed form factors may have: beside them they store bounds
+ * and first light. */
 static const double worth_it = .9;
 
 lam_status stage_compress(precompute_state *state, lam_error *error) {
@@ -51,7 +52,8 @@ lam_status stage_compress(precompute_state *state, lam_error *error) {
     }
     forecast_format_bytes((double)compressed_bytes(&state->compressed), compressed);
     terminal_log(
-        state->t, "form factors compressed: %.3g numbers an element, %s of %s; first light of %zu groups",
+        state->t,
+        "form factors compressed: %.3g coefficients per element, %s of %s; first light of %zu groups",
         (double)state->compressed.S.indptr[m->n] / (double)m->n, compressed, plain, state->compressed.n_lit);
 done:
     free(shines);

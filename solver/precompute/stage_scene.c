@@ -63,6 +63,62 @@ static double elements_after(const mesh *m, const precompute_options *o) {
     return fmax(n, (double)o->elements);
 }
 
+/* The options that decide. */
+typedef struct choice_request {
+    const char *quality; /* "draft", "normal", "high" */
+    double epsilon;
+    uint64_t rays;     /* OPTION_AUTO */
+    size_t resolution; /* of hemicubes in place of rays; 0: none */
+    uint64_t seed;
+    bool sky;      /* light that leaves the scene matters too */
+    bool filtered; /* the method takes out most of the noise of rays: few are enough */
+} choice_request;
+
+/* Above this number of elements all pairs take too long. */
+enum { CHOICE_PAIRS_MOST = 32768 };
+
+/* The accuracy that a quality stands for. */
+typedef struct quality_level {
+    const char *name;
+    double noise_share; /* of rays: part of epsilon that their noise may be */
+    double filtered;    /* the same where the method takes most of it out again */
+    double accuracy;    /* of pairs: standard error of a factor that is partly hidden; 0: plain rays */
+} quality_level;
+
+static const quality_level levels[] = {
+    {"draft", 1. / 2, 2.5, 0},
+    {"normal", 1. / 4, 1.25, 7e-5},
+    /* A third of the 2e-4 that a partly hidden factor of .1 may be off by. */
+    {"high", 1. / 8, .625, 7e-6},
+};
+
+static const quality_level *level_of(const char *name) {
+    size_t k = 0;
+    while (k + 1 < sizeof levels / sizeof levels[0] && strcmp(levels[k].name, name) != 0) k++;
+    return &levels[k];
+}
+
+/* Rays that keep the noise of the samples the quality's part below epsilon, or the number given. */
+static size_t choice_rays(const choice_request *asked) {
+    if (asked->rays != OPTION_AUTO) return (size_t)asked->rays;
+    const quality_level *level = level_of(asked->quality);
+    return recipe_auto_rays(asked->epsilon, asked->filtered ? level->filtered : level->noise_share);
+}
+
+/* The recipe: hemicubes where they are asked for, plain rays where their number is given or at draft, else
+ * pairs, all where that is affordable and else the near ones. */
+static recipe choice_recipe(const choice_request *asked, bool all_pairs) {
+    const quality_level *level = level_of(asked->quality);
+    recipe r = {.method = RECIPE_RAYS, .rays = choice_rays(asked), .seed = asked->seed};
+    if (asked->resolution > 0)
+        return (recipe){.method = RECIPE_HEMICUBE, .resolution = asked->resolution, .seed = asked->seed};
+    if (asked->rays != OPTION_AUTO || level->accuracy == 0) return r;
+    r.method = all_pairs ? RECIPE_PAIRS : RECIPE_NEAR_PAIRS;
+    r.accuracy = level->accuracy;
+    if (all_pairs && !asked->sky) r.rays = RECIPE_RAYS_FEW;
+    return r;
+}
+
 bool state_keeps(const precompute_options *o) {
     return o->keep_form_factors != NULL;
 }
@@ -100,7 +156,7 @@ static choice_request request_of(const precompute_state *state) {
     const bool hemicube = is_hemicube(o);
     return (choice_request){.quality = hemicube ? "normal" : o->quality,
                             .epsilon = o->build.epsilon,
-                            .rays = hemicube && !o->from_store ? CHOICE_AUTO : o->rays,
+                            .rays = hemicube && !o->from_store ? OPTION_AUTO : o->rays,
                             .resolution = hemicube && !o->from_store ? (size_t)o->resolution : 0,
                             .seed = o->seed,
                             .sky = o->sky != NULL,
@@ -128,7 +184,7 @@ recipe state_judge_recipe(const precompute_state *state, uint64_t seed) {
     const choice_request asked = request_of(state);
     const recipe *of = &state->recipe;
     recipe r = recipe_of_judge(of, choice_rays(&asked), seed);
-    if (state->options->from_store && r.method == RECIPE_RAYS && asked.rays != CHOICE_AUTO)
+    if (state->options->from_store && r.method == RECIPE_RAYS && asked.rays != OPTION_AUTO)
         r.rays = (size_t)asked.rays;
     return r;
 }
