@@ -29,7 +29,7 @@ extern "C" {
 typedef enum lam_status { LAM_STATUS_LIST(LAM_STATUS_ENUM) } lam_status;
 #undef LAM_STATUS_ENUM
 
-/* What went wrong, in one line that names the object, the value and the limit. Owned by the caller. */
+/* An error: its code, and one line that names the object, the value and the limit. Owned by the caller. */
 typedef struct lam_error {
     lam_status status;
     char message[480];
@@ -61,8 +61,9 @@ size_t lam_operator_bytes(const lam_operator *op);
 /* The contract's name of its kind ("low_rank", ...); owned by the operator. */
 const char *lam_operator_kind(const lam_operator *op);
 
-/* How many threads one answer may use (1 unless told), for vectors large enough to be worth it. Before the
- * operator is shared and before its work area is asked for; the bits do not depend on it. */
+/* Sets the number of threads that one answer may use, 1 by default; short vectors are answered by one. Call
+ * it before the operator is shared and before lam_operator_work_bytes. The bits of an answer do not depend on
+ * it. */
 void lam_operator_set_threads(lam_operator *op, size_t n_threads);
 
 /* Bytes of work area that lam_operator_apply, _selected and its adjoint need for n_rhs vectors; 0 when that
@@ -93,7 +94,7 @@ lam_status lam_operator_apply_selected(const lam_operator *op, size_t n_rhs, lam
                                        const uint32_t *selected, float *out, void *work, size_t work_bytes,
                                        lam_error *error);
 
-/* What one caller wants of a pass shared with others: as the arguments of lam_operator_apply_lit. */
+/* The share of one caller in a pass over the operator: the arguments of lam_operator_apply_lit. */
 typedef struct lam_part {
     size_t n_rhs;
     lam_quantity quantity;
@@ -107,9 +108,9 @@ typedef struct lam_part {
 lam_status lam_operator_apply_parts(const lam_operator *op, size_t n_parts, const lam_part *parts, void *work,
                                     size_t work_bytes, lam_error *error);
 
-/* How many emitters a store of few emitters answers for; 0 of any other operator, which answers any emission.
- * Where it is not 0 the four functions above and below end in LAM_ERR_ARGUMENT, and these take their place.
- */
+/* The number of emitters that a store of few emitters answers for; 0 of any other operator, which answers any
+ * emission. Where it is not 0, lam_operator_apply, its variants and its adjoint end in LAM_ERR_ARGUMENT, and
+ * lam_operator_apply_emitters and lam_operator_adjoint_emitters take their place. */
 size_t lam_operator_emitters(const lam_operator *op);
 
 /* The name of emitter k; owned by the operator. */
@@ -179,7 +180,8 @@ lam_status lam_refine(const lam_refiner *refiner, size_t n_rhs, lam_quantity qua
                       const double *H0, const float *start, double tolerance, double *out,
                       double *certificates, size_t *iterations, lam_error *error);
 
-/* What the elements of a store receive directly from the tiles of a sky: immutable once open. */
+/* The irradiance that the elements of a store receive directly from the tiles of a sky; immutable once open.
+ */
 typedef struct lam_sky lam_sky;
 
 /* Opens the store at path and loads its sky; *sky is NULL when it has none. The caller closes it with

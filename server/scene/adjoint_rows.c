@@ -283,8 +283,8 @@ bool adjoint_row_suffices(const scene *s, const adjoint_row *row, const radiosit
     return true;
 }
 
-/* means += contributions of spots and skies. Those of value 0 are skipped, so that NaN of the row does no
- * harm. */
+/* means += contributions of spots and skies. A contribution of value 0 is skipped, so that NaN of the row
+ * does no harm. */
 static void add_spots(const scene *s, const adjoint_row *row, const radiosity_request *request,
                       double *means) {
     const size_t n = s->n, C = s->n_channels, m = tiles_of(s);

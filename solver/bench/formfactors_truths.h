@@ -25,7 +25,7 @@ typedef struct formfactors_enclosure {
      * and receives on all. */
     bool strips;
     const double *F;     /* [n_surfaces][n_surfaces] */
-    double F_within;     /* how far F as published may be off */
+    double F_within;     /* error bound of F as published */
     const double *E, *B; /* [n_surfaces], W/m^2, at a reflectance of .1; or NULL */
     double B_within;     /* W/m^2 */
 } formfactors_enclosure;

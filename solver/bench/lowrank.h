@@ -71,7 +71,7 @@ typedef struct lowrank_case {
     double threshold;               /* sparse; 0: its preset */
     const emitter_source *emitters; /* of the method emitters; else NULL */
     const csr *independent;         /* another sample of F, or NULL: no total error */
-    first_light *first;             /* what single elements give, better than that sample; or NULL */
+    first_light *first;             /* of single elements, more exact than that sample; or NULL */
     bool weighed;                   /* stored is found */
 } lowrank_case;
 

@@ -80,8 +80,8 @@ static int check_together(const precompute_options *o, const option_result *give
     return 0;
 }
 
-/* True if an option about form factors had no effect. Those of a store leave only the judge to cast rays; the
- * judge of a hemicube chooses its own number of them. */
+/* True if an option about form factors had no effect. With form factors from a store only the judge casts
+ * rays; with a hemicube it chooses their number itself. */
 static bool unused_by_form_factors(const char *name, const precompute_options *o) {
     const bool hemicube = strcmp(o->form_factors, "hemicube") == 0;
     if (strcmp(name, "form-factors") == 0) return o->from_store;

@@ -122,10 +122,10 @@ def make_tables():
               ("loop", None, "requests in turns"), ("format", None, "of request and answer"),
               ("per_second", "1/s", "evaluations: answers"), ("p50_ms", "ms", "median of the first request"),
               ("p50_second_ms", "ms", "median of the second"), ("note", None, "why it was not run")),
-        Table("codec", "What dense JSON answers say of their time", *SIZE,
+        Table("codec", "Times that dense JSON answers state", *SIZE,
               ("parse_ms", "ms", "median of 9 answers"), ("solve_ms", "ms", "likewise"), ("encode_ms", "ms", "likewise"),
               ("codec_ms", "ms", "parse and encode, median"), ("codec_best_ms", "ms", "parse and encode, least")),
-        Table("ratios", "What the service costs beside its solves", *SIZE,
+        Table("ratios", "Cost of the service relative to its solves", *SIZE,
               ("what", None, "medians of rounds in which both sides had their turn"), ("measured", "", "the ratio"),
               ("wanted", None, "the target at this size; empty: none"),
               ("outcome", None, "met, missed, not run, too few answers")))}
@@ -362,8 +362,8 @@ class Size:
         self.start_ready("ready", 0, 0)
         self.start_nginx()
         self.start_ready("sleeping", self.solve_s, sleepers)
-        # lambertd shares passes, and so gives more answers than solves run at once. How much later than others the
-        # slowest answers come depends on the rate: the second sleeping server has about lambertd's.
+        # lambertd shares passes, and so gives more answers than solves run at once. The delay of the slowest answers
+        # depends on the rate, so the second sleeping server has about lambertd's rate.
         rates = [self.load("npy", MANY, server, self.seconds)["per_second"] for server in ("lambertd", "sleeping")
                  if bench.wrk and server not in self.absent]
         as_many = round(sleepers * rates[0] / rates[1]) if len(rates) == 2 and rates[1] > 0 else sleepers

@@ -1,4 +1,5 @@
-/* How the error of a hierarchical factorization is shared among the levels of its tree. */
+/* Shares the permitted error of a hierarchical factorization among the levels of its tree (after
+ * Aguerre 2016, eq. 3.10). */
 #ifndef LAMBERT_METHOD_LOW_RANK_BUDGET_H
 #define LAMBERT_METHOD_LOW_RANK_BUDGET_H
 
@@ -17,17 +18,17 @@ enum { BUDGET_LEVELS_MOST = 20 };
  * sqrt(2) e_ch in place of squares.) */
 typedef struct budget {
     double alpha; /* the root's share of epsilon^2, in (0, 1) */
-    /* The part of what the root leaves that level l = 1 ... levels takes; together 1. */
+    /* The parts of the rest that levels l = 1 ... levels take; together 1. */
     double part[BUDGET_LEVELS_MOST + 1];
 } budget;
 
 /* Parts that fall by a ratio from level to level, but for the leaves where leaf > 0: those take it. */
 void budget_divide(budget *b, int levels, double ratio, double leaf);
 
-/* Whether any level has a part. */
+/* True if any level has a part. */
 bool budget_divided(const budget *b);
 
-/* What a node of each level may leave out, p[0] of the root to p[levels] of a leaf. */
+/* p[l]: the error that a node of level l may leave, p[0] of the root to p[levels] of a leaf. */
 void budget_share(const budget *b, double epsilon, int levels, double p[BUDGET_LEVELS_MOST + 1]);
 
 #endif

@@ -1,4 +1,5 @@
-/* What randomized factorizers share: random matrices and orthonormal bases of tall blocks. */
+/* Random matrices and orthonormal bases of tall blocks, for the randomized factorizers (Halko et al. 2011).
+ */
 #ifndef LAMBERT_METHOD_LOW_RANK_SKETCH_H
 #define LAMBERT_METHOD_LOW_RANK_SKETCH_H
 

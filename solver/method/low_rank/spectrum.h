@@ -1,4 +1,4 @@
-/* How the singular values of S fall, without finding one of them. */
+/* Estimates how the singular values of S fall, without computing any of them. */
 #ifndef LAMBERT_METHOD_LOW_RANK_SPECTRUM_H
 #define LAMBERT_METHOD_LOW_RANK_SPECTRUM_H
 

@@ -167,7 +167,7 @@ static lam_status plane_patches(raster *r, int axis, size_t cut, bool behind, pa
             const region *best = &both[area[1] > area[0]];
             for (size_t j = 0; j < best->n[1]; j++)
                 memset(&r->mask[(at[1] + j) * n[0] + at[0]], 0, best->n[0]);
-            for (int k = 0; k < 4; k++) { /* what is behind the cut looks back along the axis */
+            for (int k = 0; k < 4; k++) { /* faces of blocks behind the cut face backwards along the axis */
                 const int corner = behind ? 3 - k : k;
                 const bool far[2] = {corner == 1 || corner == 2, corner >= 2};
                 corners[k][axis] = r->at[axis][cut];

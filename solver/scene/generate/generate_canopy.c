@@ -142,8 +142,7 @@ lam_status generate_canopy(scene_draft *d, const generate_options *options, lam_
     if (trees == NULL) TRY(LAM_ERR_MEMORY);
     TRY(plant(&list, trees, n, options->seed, error));
     TRY(patches_draw(&list, d, options, (size_t)fmax(1, bare_share * (double)wanted), error));
-    const size_t leaves =
-        wanted > d->n_faces + 2 * n ? (wanted - d->n_faces) / 2 : n; /* what is left to draw */
+    const size_t leaves = wanted > d->n_faces + 2 * n ? (wanted - d->n_faces) / 2 : n; /* two faces each */
     TRY(scene_draft_group(d, "leaf", &green, error));
     for (size_t i = 0; i < n; i++) {
         uint64_t r = random_stream(options->seed, 3 + i);

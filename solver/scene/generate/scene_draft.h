@@ -14,7 +14,7 @@ typedef struct scene_draft_material {
 typedef struct scene_draft {
     bool counting;    /* faces are counted, not kept */
     double stretch;   /* of cells along a quad's first edge; 0 means 1 */
-    const void *plan; /* what a scene_draft_builder is to draw, where its options do not say it; not owned */
+    const void *plan; /* of a scene_draft_builder, beside its options; not owned */
     size_t n_faces;
     point_table points;
     struct scene_draft_face {
