@@ -146,8 +146,6 @@ void table_print(const table *t, FILE *stream) {
     fputc('\n', stream);
 }
 
-/* --- suites --------------------------------------------------------------------------------------------- */
-
 const bench_suite bench_suites[] = {
     {.name = "formfactors", .run = bench_formfactors},
     {.name = "lowrank", .run = bench_lowrank},

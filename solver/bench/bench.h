@@ -8,8 +8,6 @@
 #include <stdint.h>
 #include <stdio.h>
 
-/* --- tables --------------------------------------------------------------------------------------------- */
-
 /* A column holds texts, or numbers in one unit ("" for a ratio). Its texts outlive its table. */
 typedef struct table_column {
     const char *name; /* of a CSV column and a JSON member: snake_case */
@@ -59,8 +57,6 @@ lam_status table_json(const table *t, const table_run *run, FILE *stream, lam_er
 
 /* The title and aligned columns, numbers to three digits. */
 void table_print(const table *t, FILE *stream);
-
-/* --- suites --------------------------------------------------------------------------------------------- */
 
 /* The receiver of results, table by table. */
 typedef struct bench_sink {

@@ -65,8 +65,6 @@ double city_density(const city *c) {
     return (double)c->f.F.indptr[c->m.n] / (n * n);
 }
 
-/* --- cities under their sky --------------------------------------------------------------------------- */
-
 void city_light_free(city_light *d) {
     free(d->E);
     free(d->B);
@@ -141,8 +139,6 @@ done:
     free(B);
     return status;
 }
-
-/* --- density of form factors -------------------------------------------------------------------------- */
 
 /* Table 4.5, in percent: [variant][size][terrain]. */
 static const double theirs[CITY_VARIANTS][CITY_SIZES][CITY_TERRAINS] = {
@@ -253,8 +249,6 @@ done:
     table_free(&out);
     return status;
 }
-
-/* --- the suite ---------------------------------------------------------------------------------------- */
 
 lam_status bench_cities(const bench_run *run, lam_error *error) {
     lam_status status = LAM_OK;

@@ -11,8 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* --- figure 5.1 --------------------------------------------------------------------------------------- */
-
 /* Density of section 5.2.1, in percent: the Cornell box "around 20 %", city 1, of 8,897 elements, "less than
  * 1 %". */
 static double their_density(const bench_run *run, const lowrank_scene *s) {
@@ -85,8 +83,6 @@ done:
     table_free(&out);
     return status;
 }
-
-/* --- figure 4.1 --------------------------------------------------------------------------------------- */
 
 enum { POINTS = 80, EXACT_MOST = 2600, EXACT_MOST_FULL = 9000 };
 
@@ -254,8 +250,6 @@ done:
     table_free(&curves);
     return status;
 }
-
-/* --- the scenes --------------------------------------------------------------------------------------- */
 
 /* City 1 and the Cornell box, two scenes with the properties of the other two of the thesis, and more. */
 const char *const map_scenes[MAP_SCENES] = {"city 1", "rooms", "anechoic", "cornell", "city 2",

@@ -12,9 +12,6 @@ enum { RAYS = 4096, POINTS = 120, WAYS = 3 };
 /* Corrections of a sparse inverse. */
 static const char *const ways[WAYS] = {"none", "delta", "discarded"};
 
-/* --- figure 4.5 -------------------------------------------------------------------------------------------
- */
-
 /* Means over the tiles for every element: the converged radiosity, and E + R F E of the first two bounces. */
 typedef struct mean_light {
     double *B, *first; /* [n] */
@@ -148,9 +145,6 @@ done:
     free(room);
     return status;
 }
-
-/* --- figure 4.10 ------------------------------------------------------------------------------------------
- */
 
 static lam_status tiles_of_city(const bench_run *run, const city *c, const city_light *d, table *out,
                                 lam_error *error) {

@@ -75,8 +75,6 @@ lam_status formfactors_open_scene(const bench_run *run, size_t lots, mesh *out, 
     return scene_file(run->scene, out, error);
 }
 
-/* --- resolution of hemicubes -------------------------------------------------------------------------- */
-
 /* The thesis' table 4.6: cities 1 to 3 of 35,588 elements, on its graphics card of 2016. */
 enum { ROWS = 5, CITIES = 3 };
 static const struct {
@@ -170,8 +168,6 @@ done:
     table_free(&out);
     return status;
 }
-
-/* --- throughput of rays ------------------------------------------------------------------------------- */
 
 static const table_column throughput_columns[] = {
     {"scene", NULL, "name of the scene"},
@@ -342,8 +338,6 @@ done:
     table_free(&out);
     return status;
 }
-
-/* --- the suite ---------------------------------------------------------------------------------------- */
 
 lam_status bench_formfactors(const bench_run *run, lam_error *error) {
     lam_status status = LAM_OK;

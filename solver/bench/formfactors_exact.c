@@ -8,8 +8,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* --- closed forms ------------------------------------------------------------------------------------- */
-
 static const table_column case_columns[] = {
     {"case", NULL, "the configuration"},
     {"source", NULL, "source of the truth"},
@@ -163,8 +161,6 @@ done:
     free(sums);
     return status;
 }
-
-/* --- enclosures --------------------------------------------------------------------------------------- */
 
 static const table_column pair_columns[] = {
     {"enclosure", NULL, "name of the enclosure"},

@@ -187,9 +187,6 @@ const formfactors_truth formfactors_truths[] = {
     {NULL, NULL, 0, NULL, 0, 0, 0, false},
 };
 
-/* --- enclosures ------------------------------------------------------------------------------------------
- */
-
 static const int l_room_surface[] = {0, 1, 2, 3, 4, 5, 6, 6, 6, 7, 7, 7};
 /* Exact: walls in full view of each other by the closed forms C-11 and C-14; of walls partly behind the
  * corner the exchange of two vertical lines of height h at distance d,

@@ -16,8 +16,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* --- scenes ------------------------------------------------------------------------------------------- */
-
 /* Above this many elements all pairs would take minutes. */
 enum { PAIRS_MOST = 24000, RAYS = 4096, REPEATS_MOST = 9 };
 
@@ -131,9 +129,6 @@ done:
     return status;
 }
 
-/* --- a courtyard of two storeys ---------------------------------------------------------------------------
- */
-
 /* Cuts rectangles into cells of about one size. */
 typedef struct builder {
     double cell;
@@ -222,9 +217,6 @@ done:
     return status;
 }
 
-/* --- one factorization ------------------------------------------------------------------------------------
- */
-
 factorizer_options lowrank_options(const bench_run *run, double epsilon, size_t rank) {
     return (factorizer_options){.epsilon = epsilon,
                                 .rank = rank,
@@ -289,8 +281,6 @@ done:
     scaled_free(&S);
     return status;
 }
-
-/* --- one operator ------------------------------------------------------------------------------------- */
 
 build_problem lowrank_problem(const lowrank_scene *s) {
     return (build_problem){.n = s->m.n,
@@ -393,8 +383,6 @@ done:
     lam_operator_close(op);
     return status;
 }
-
-/* --- the suite ---------------------------------------------------------------------------------------- */
 
 enum { ROOMS_MOST = 4 };
 

@@ -39,9 +39,6 @@ static uint64_t *runs_of(size_t n, size_t k, lam_error *error) {
     return begin;
 }
 
-/* --- V^T E, table 1 ---------------------------------------------------------------------------------------
- */
-
 typedef struct product {
     size_t n, k;
     float *V_rows, *V_columns, *E, *t;
@@ -139,9 +136,6 @@ done:
     table_free(&out);
     return status;
 }
-
-/* --- B~, tables 2 to 5 ------------------------------------------------------------------------------------
- */
 
 typedef struct solve {
     const lam_operator *op;

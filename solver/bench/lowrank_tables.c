@@ -10,9 +10,6 @@ enum { REPEATS = 3 };
 /* A figure that the thesis does not give. */
 static const double none = NAN;
 
-/* --- table 3.1 -------------------------------------------------------------------------------------------
- */
-
 lam_status lowrank_of_alpha(const bench_run *run, const lowrank_scene *s, lam_error *error) {
     static const table_column columns[] = {
         {"alpha", "", "share of the bound that the root may take"},
@@ -48,9 +45,6 @@ done:
     table_free(&out);
     return status;
 }
-
-/* --- tables 3.2 and 3.3 ----------------------------------------------------------------------------------
- */
 
 typedef struct thesis_size {
     size_t n;
@@ -124,9 +118,6 @@ done:
     return status;
 }
 
-/* --- table 3.4 -------------------------------------------------------------------------------------------
- */
-
 /* Eq. 3.16: m n^2 [2^-l + sum_i 2^(i-l) prod_{j > l-i} rho_j^2]; rho[l] of the leaves, rho[1] below the root.
  */
 static double cost_of_levels(double n, int levels, const double *rho) {
@@ -195,9 +186,6 @@ done:
     table_free(&out);
     return status;
 }
-
-/* --- table 3.5 -------------------------------------------------------------------------------------------
- */
 
 static void add_factorizer(table *out, const lowrank_scene *s, const char *name, const char *how,
                            const lowrank_result *r, double hf_seconds, const double theirs[2]) {
@@ -268,8 +256,6 @@ done:
     table_free(&out);
     return status;
 }
-
-/* --- figures 3.3 to 3.5 ------------------------------------------------------------------------------- */
 
 enum { LEVELS_MOST = 9, RANK_EPSILONS = 4, MANY = 5000 };
 
@@ -365,8 +351,6 @@ done:
     table_free(&out);
     return status;
 }
-
-/* --- tables 3.6 and 3.7: radiosity -------------------------------------------------------------------- */
 
 enum { RADIOSITY_EPSILONS = 5, PROBES = 500, PROBES_OF_LARGE = 64, LARGE = 5000 };
 

@@ -90,8 +90,6 @@ static const option_command command = {
     .most_arguments = SUITES_MOST,
 };
 
-/* --- results -------------------------------------------------------------------------------------------- */
-
 /* The folder of results; files are called SUITE-NAME.csv and .json. */
 typedef struct results {
     const char *folder, *suite;
@@ -180,8 +178,6 @@ static void say(void *context, const char *line) {
     const results *r = context;
     terminal_log(r->t, "%s", line);
 }
-
-/* --- scripts -------------------------------------------------------------------------------------------- */
 
 /* The folder of this program, where lambertd is too; its name ends in a slash. */
 static lam_status programs_folder(char folder[PATH_MAX], lam_error *error) {
@@ -325,8 +321,6 @@ static lam_status script_run(const bench_run *run, const char *const arguments[]
 done:
     return status;
 }
-
-/* --- suites --------------------------------------------------------------------------------------------- */
 
 /* Usage errors of any suite come before the first is run. */
 static int find_suites(const option_result *given, const bench_suite *found[SUITES_MOST]) {

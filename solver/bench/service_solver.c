@@ -142,8 +142,6 @@ done:
     return status;
 }
 
-/* --- solves --------------------------------------------------------------------------------------------- */
-
 /* One solve after the other, into B, for that long and at least once; times may be NULL. A first one, which
  * brings pages and caches, is not counted. */
 static lam_status solve_on(const solver *s, double seconds, float *B, double *times, size_t *count,
@@ -206,8 +204,6 @@ static lam_status solve_beside(solver *s, int threads, double seconds, lam_error
     if (status == LAM_OK) printf("nan nan %.9g %zu\n", (double)count / (clock_seconds() - start), count);
     return status;
 }
-
-/* --- commands ------------------------------------------------------------------------------------------- */
 
 static void solver_free(solver *s) {
     lam_operator_close(s->op);

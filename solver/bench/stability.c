@@ -20,9 +20,6 @@ void stability_free(stability_problem *p) {
     *p = (stability_problem){0};
 }
 
-/* --- problems ---------------------------------------------------------------------------------------------
- */
-
 static lam_status allocate(stability_problem *p, size_t n, size_t entries, lam_error *error) {
     p->n = n;
     p->area = memory_allocate(n, sizeof *p->area, "problem", error);
@@ -175,9 +172,6 @@ done:
     return status;
 }
 
-/* --- an operator on probation ------------------------------------------------------------------------------
- */
-
 /* Emissions and answers, [PROBES][n]: one bright element, every third element, all elements, and twice the
  * first plus the second. */
 typedef struct probation {
@@ -314,8 +308,6 @@ done:
     free(q.exact);
     return status;
 }
-
-/* --- the suite ---------------------------------------------------------------------------------------- */
 
 static const table_column stability_columns[] = {
     {"problem", NULL, "name of the problem"},

@@ -11,8 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* --- every kind at several settings ------------------------------------------------------------------- */
-
 /* Elements up to which the whole inverse is built in a bearable time. */
 enum { EXACT_MOST = 12288 };
 
@@ -182,8 +180,6 @@ done:
     return status;
 }
 
-/* --- at equal error ----------------------------------------------------------------------------------- */
-
 static const table_column equal_columns[] = {
     {"scene", NULL, "name of the scene"},
     {"elements", "", "n"},
@@ -266,8 +262,6 @@ static void add_equal(const lowrank_scene *s, const kind_curve curves[KINDS], ta
             }
         }
 }
-
-/* --- the suite ---------------------------------------------------------------------------------------- */
 
 /* Rays in a scene file with too many elements for pairs: about so many of all elements together, and so many
  * of each at least. */

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* All-over lights, and how many probes of a group tell the reference's own noise. */
+/* Probes of random emission, and probes of a group by which the reference's own noise is measured. */
 enum { RANDOM_PROBES = 8, NOISE_PROBES = 32 };
 
 /* Rows of a product that a thread takes at once. */
@@ -19,14 +19,14 @@ enum { ROWS_AT_ONCE = 1024 };
 /* Residual at which a reference counts as converged: four digits below the smallest error worth printing. */
 static const double reference_tolerance = 1e-8;
 
-/* Indirect light below this share of all light is none: no ray found what the element sees, and what is left
- * is what the reference's iteration did not converge to 0. */
+/* Indirect light below this share of all light counts as none: no ray found what the element sees, and the
+ * rest is the remainder of the reference's iteration. */
 static const double dark = 1e-6;
 
 enum { SINGLE, LIGHTS, RANDOM, N_GROUPS };
 
-/* Emissions E with the operator's radiosity, both [m][C][n], and what is summed up for each of them. Group g
- * has probes begin[g] ... begin[g + 1] - 1. */
+/* Emissions E with the operator's radiosity, both [m][C][n], and the sums of each. Group g has
+ * probes begin[g] ... begin[g + 1] - 1. */
 typedef struct probes {
     size_t m;
     size_t begin[N_GROUPS + 1];
@@ -125,7 +125,7 @@ static lam_status apply(const lam_operator *op, const probes *p, lam_quantity qu
     return status;
 }
 
-/* Finds out what light the probes themselves give, of which few elements shine. */
+/* Computes the first light H of the probes in which few elements emit. */
 static lam_status find_first_light(const judge_input *input, probes *p, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = input->problem->n, C = input->problem->n_channels;
@@ -148,8 +148,8 @@ done:
     return status;
 }
 
-/* Emissions of the probes for a reference: E, or what bounces on of the light R H that they are known to
- * give. */
+/* Emission and first guess of a probe for a reference: E and B, or, where its first light H is known, R F R H
+ * and B - E - R H, so that the reference finds only the further bounces. */
 static void reference_emission(const build_problem *problem, const csr *F, const probes *p, size_t v,
                                size_t c, double *E, double *B, double *scratch) {
     const size_t n = problem->n, C = problem->n_channels, at = (v * C + c) * n;
@@ -170,7 +170,7 @@ static void reference_emission(const build_problem *problem, const csr *F, const
     }
 }
 
-/* From what bounces on to all light. */
+/* Adds E + R H to the further bounces, where H is known. */
 static void add_first_light(const build_problem *problem, const csr *F, const probes *p, size_t v, size_t c,
                             double *B) {
     const size_t n = problem->n, at = (v * problem->n_channels + c) * n;
@@ -243,10 +243,10 @@ static void finish_figure(error_figures *f, size_t count) {
     f->std = sqrt(fmax(0, f->std / (double)count - f->mean * f->mean));
 }
 
-/* Relative and indirect figures of each group against one F. */
+/* Relative and indirect figures of each group against one F: those of the total error, or of the operator's.
+ */
 static lam_status figures_against(const judge_input *input, const csr *F, probes *p,
-                                  error_figures *relative[N_GROUPS], error_figures *indirect[N_GROUPS],
-                                  lam_error *error) {
+                                  error_group *groups[N_GROUPS], bool total, lam_error *error) {
     lam_status status = LAM_OK;
     comparison c = {input->problem, p};
     size_t *all = memory_allocate(p->m, sizeof *all, "probes", error);
@@ -257,20 +257,22 @@ static lam_status figures_against(const judge_input *input, const csr *F, probes
     memset(p->error_norm, 0, p->m * sizeof *p->error_norm);
     TRY(each_reference(input, F, p, all, p->m, compare, &c, error));
     for (int g = 0; g < N_GROUPS; g++) {
+        error_figures *relative = total ? &groups[g]->total_relative : &groups[g]->operator_relative;
+        error_figures *indirect = total ? &groups[g]->total_indirect : &groups[g]->operator_indirect;
         size_t bright = 0, lit = 0;
         for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
             if (p->B_norm[v] > 0) {
-                add_figure(relative[g], sqrt(p->error_norm[v] / p->B_norm[v]));
+                add_figure(relative, sqrt(p->error_norm[v] / p->B_norm[v]));
                 bright++;
             }
             /* An element that nothing sees has no indirect light to be wrong about. */
             if (p->indirect_norm[v] > dark * dark * p->B_norm[v]) {
-                add_figure(indirect[g], sqrt(p->error_norm[v] / p->indirect_norm[v]));
+                add_figure(indirect, sqrt(p->error_norm[v] / p->indirect_norm[v]));
                 lit++;
             }
         }
-        finish_figure(relative[g], bright);
-        finish_figure(indirect[g], lit);
+        finish_figure(relative, bright);
+        finish_figure(indirect, lit);
     }
 done:
     free(all);
@@ -289,7 +291,7 @@ static void keep_half(void *context, size_t channel, const double *B) {
         memcpy(h->B + (v * h->n_channels + channel) * h->n, B + v * h->n, h->n * sizeof *B);
 }
 
-/* Half the distance between the halves' solutions, over the indirect light: the standard error of their mean.
+/* Half the distance between the halves' solutions, over the indirect light: the standard error of their mean;
  * negative where there is no indirect light. */
 static double half_distance(const build_problem *problem, const float *E, const double *x, const double *y) {
     double difference = 0, indirect = 0, all = 0;
@@ -369,8 +371,8 @@ done:
     return status;
 }
 
-/* Of an operator of emitters, some of them alone and all with random weights: E + rho H0 is what they send,
- * as they stand in for elements. */
+/* Probes of an operator of emitters: single emitters, and random weights of all of them. Their emission for
+ * the reference is E + rho H0, with H0 from the sky. */
 static lam_status emitter_emissions(const lam_operator *op, const judge_input *input, probes *p,
                                     lam_error *error) {
     lam_status status = LAM_OK;
@@ -420,7 +422,6 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     const size_t vector = problem->n * problem->n_channels;
     error_report found = {0};
     error_group *groups[N_GROUPS] = {&found.single, &found.lights, &found.random};
-    error_figures *relative[N_GROUPS], *indirect[N_GROUPS];
     probes p = {0};
     const size_t s = lam_operator_emitters(op), most = s > 0 ? s : problem->n;
     const size_t counts[N_GROUPS] = {input->probes < most ? input->probes : most, any_light(op, input),
@@ -438,19 +439,11 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     progress_report(input->progress, "judge", 0);
     TRY(apply(op, &p, LAM_RADIOSITY, p.B, error));
     TRY(physics(op, input, &p, groups, error));
-    for (int g = 0; g < N_GROUPS; g++) {
-        relative[g] = &groups[g]->operator_relative;
-        indirect[g] = &groups[g]->operator_indirect;
-    }
-    TRY(figures_against(input, problem->F, &p, relative, indirect, error));
+    TRY(figures_against(input, problem->F, &p, groups, false, error));
     progress_report(input->progress, "judge", .33);
     if (input->independent != NULL) {
         TRY(find_first_light(input, &p, error));
-        for (int g = 0; g < N_GROUPS; g++) {
-            relative[g] = &groups[g]->total_relative;
-            indirect[g] = &groups[g]->total_indirect;
-        }
-        TRY(figures_against(input, input->independent, &p, relative, indirect, error));
+        TRY(figures_against(input, input->independent, &p, groups, true, error));
         progress_report(input->progress, "judge", .67);
         if (input->halves[0] != NULL) TRY(measure_noise(input, &p, groups, error));
     }

@@ -69,9 +69,6 @@ const void *method_own_const(const build_options *options, const build_method *m
     return &options->of[index_of(method)];
 }
 
-/* --- options ----------------------------------------------------------------------------------------------
- */
-
 const option_row build_rows[] = {
     {.name = "epsilon",
      .kind = OPTION_NUMBER,
@@ -154,9 +151,6 @@ static lam_status check_numbers(const option_row *rows, const void *fields, lam_
 done:
     return status;
 }
-
-/* --- building ---------------------------------------------------------------------------------------------
- */
 
 lam_status method_build(const build_method *m, const build_problem *problem, const build_options *options,
                         const void *own, lam_operator **op, build_report *report, lam_error *error) {

@@ -35,8 +35,6 @@ const emitters *operator_emitters_of(const lam_operator *op) {
     return op->kind == &operator_emitters ? (const emitters *)op : NULL;
 }
 
-/* --- what must fit ------------------------------------------------------------------------------------ */
-
 static lam_status check_light(const emitter_arrays *a, size_t n, size_t n_channels, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t rows = n_channels * a->s;
@@ -150,8 +148,6 @@ done:
     if (self != NULL) lam_operator_close(&self->base);
     return status;
 }
-
-/* --- the store ---------------------------------------------------------------------------------------- */
 
 static lam_status load_emission(store *s, size_t rows, emitter_arrays *a, lam_error *error) {
     csr E;

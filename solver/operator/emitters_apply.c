@@ -41,8 +41,6 @@ static void sum_tiles(const emitters *self, size_t c, const float *W, float *L) 
             L[t] += W[k] * a->L[(c * a->s + k) * a->n_tiles + t];
 }
 
-/* --- weights ------------------------------------------------------------------------------------------ */
-
 static bool is_close(float x, float y) {
     return fabsf(x - y) <= close_enough * fmaxf(fabsf(x), fabsf(y));
 }
@@ -158,8 +156,6 @@ lam_status operator_emitters_light_double(const lam_operator *op, size_t n_rhs, 
     free(L);
     return LAM_OK;
 }
-
-/* --- answers ------------------------------------------------------------------------------------------ */
 
 static lam_status check(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *in,
                         const float *out, const void *work, size_t work_bytes, lam_error *error) {

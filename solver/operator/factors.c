@@ -65,8 +65,6 @@ done:
     return status;
 }
 
-/* --- the store ----------------------------------------------------------------------------------------- */
-
 lam_status factors_load(store *s, size_t n, size_t n_channels, factors *out, lam_error *error) {
     lam_status status = LAM_OK;
     char *form = NULL;
@@ -166,8 +164,6 @@ void factors_describe(const factors *f, operator_description *description) {
     for (size_t c = 0; f->core != NULL && c < f->n_channels; c++)
         description->bytes += panel_bytes(&f->core[c]);
 }
-
-/* --- products ------------------------------------------------------------------------------------------ */
 
 size_t factors_work_bytes(const factors *f, size_t n_rhs, size_t V_bytes) {
     size_t m, t_bytes, total = 0;

@@ -138,8 +138,6 @@ done:
     return status;
 }
 
-/* --- the store ----------------------------------------------------------------------------------------- */
-
 /* Areas in the order of positions, and that order; NULL: mesh order. */
 static lam_status read_area(store *s, size_t n, double **out, uint32_t **out_order, lam_error *error) {
     lam_status status = LAM_OK;
@@ -205,8 +203,6 @@ static lam_status hierarchical_save(const lam_operator *op, store *s, lam_error 
 done:
     return status;
 }
-
-/* --- the products -------------------------------------------------------------------------------------- */
 
 /* Steps, coefficients and flags of some positions. */
 static size_t some_bytes(const wavelet_plan *plan) {

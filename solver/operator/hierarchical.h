@@ -28,9 +28,7 @@ lam_status operator_hierarchical_create(size_t n, size_t n_channels, const float
 lam_status operator_hierarchical_correct(lam_operator *op, const double *missing, const double *light,
                                          lam_error *error);
 
-/* --- half a symmetric matrix in a store: hierarchical_store.c ------------------------------------------ */
-
-/* A symmetric matrix with its numbers in half precision, times scale. */
+/* A symmetric matrix with its numbers in half precision, times scale; defined in hierarchical_store.c. */
 typedef struct half_matrix {
     size_t n;               /* rows and columns, empty ones included */
     csr rows;               /* all of it, both triangles */

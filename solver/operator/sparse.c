@@ -69,9 +69,6 @@ done:
     return status;
 }
 
-/* --- the store -------------------------------------------------------------------------------------------
- */
-
 static lam_status sparse_load(store *s, size_t n, size_t n_channels, const float *reflectance,
                               lam_operator **op, lam_error *error) {
     lam_status status = LAM_OK;
@@ -115,9 +112,6 @@ static lam_status sparse_save(const lam_operator *op, store *s, lam_error *error
 done:
     return status;
 }
-
-/* --- the products ----------------------------------------------------------------------------------------
- */
 
 static size_t sparse_work_bytes(const lam_operator *op, size_t n_rhs) {
     size_t bytes = sparse_product_work(op->n, n_rhs), total = WORK_AREA_ALIGN;

@@ -6,8 +6,8 @@
 #include "solver/method/choice.h"
 #include "solver/scene/mesh.h"
 
-/* The options, as the rows of precompute_tables fill them; texts point into argv. The members below the line
- * belong to the verb. */
+/* The options, as the rows of precompute_tables fill them; texts point into argv. The members after
+ * progress belong to the verb. */
 typedef struct precompute_options {
     const char *output;
     uint64_t subdivide, elements;
@@ -25,7 +25,6 @@ typedef struct precompute_options {
     const char *scratch;           /* a folder, or NULL */
     uint64_t seed, probes;         /* probes: OPTION_AUTO */
     bool quiet, progress;
-    /* --- */
     const char *input;
     bool from_store;
     const char *command;   /* for the record */

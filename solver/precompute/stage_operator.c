@@ -189,9 +189,6 @@ done:
     return status;
 }
 
-/* --- errors -----------------------------------------------------------------------------------------------
- */
-
 static void log_figures(terminal *t, const char *name, const error_group *g, bool has_total) {
     if (g->probes == 0) return;
     if (has_total)

@@ -37,9 +37,6 @@ lam_status verify_checksums(examination *e, check *c, lam_error *error) {
     return check_failed(c, store_verify(e->s, error), error);
 }
 
-/* --- mesh ------------------------------------------------------------------------------------------------
- */
-
 /* Areas and normals against those of the vertices; the first that differs is named. */
 static lam_status measure_again(const mesh *m, check *c, lam_error *error) {
     lam_status status = LAM_OK;
@@ -94,9 +91,6 @@ done:
     free(recorded);
     return check_failed(c, status, error);
 }
-
-/* --- form factors ----------------------------------------------------------------------------------------
- */
 
 static int compare_index(const void *a, const void *b) {
     const uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
@@ -190,9 +184,6 @@ lam_status verify_form_factors(examination *e, check *c, lam_error *error) {
               worst);
     return LAM_OK;
 }
-
-/* --- the scene -------------------------------------------------------------------------------------------
- */
 
 /* Per group: area, then area times reflectance and emission of every channel. Refinement changes none. */
 static double *group_content(const mesh *m, size_t width, lam_error *error) {

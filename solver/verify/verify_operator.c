@@ -198,9 +198,6 @@ done:
     return check_failed(c, status, error);
 }
 
-/* --- error -----------------------------------------------------------------------------------------------
- */
-
 /* One figure, stated and measured again over n probes of another draw: means differ by the standard error of
  * either, lights (one probe) by the noise of the samples they were measured against. */
 static void compare_figure(store *s, const char *group, const char *against, const error_figures *again,

@@ -43,8 +43,6 @@ static void die(const char *what, const char *why) {
     exit(1);
 }
 
-/* --- sleeping ------------------------------------------------------------------------------------------- */
-
 static void enqueue(server *s, request *r) {
     pthread_mutex_lock(&s->lock);
     if (s->first == NULL)
@@ -82,8 +80,6 @@ static void *sleep_for_others(void *context) {
     }
     return NULL;
 }
-
-/* --- HTTP ----------------------------------------------------------------------------------------------- */
 
 static enum MHD_Result answer(server *s, struct MHD_Connection *connection, const char *path) {
     const size_t file = path[0] == '/' && path[1] >= '0' && path[1] <= '9' && path[2] == '\0'
@@ -132,8 +128,6 @@ static void on_completed(void *context, struct MHD_Connection *connection, void 
     free(*request_context);
     *request_context = NULL;
 }
-
-/* --- beginning and end ---------------------------------------------------------------------------------- */
 
 static void read_file(server *s, const char *path) {
     FILE *file = fopen(path, "rb");

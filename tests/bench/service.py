@@ -131,8 +131,6 @@ def make_tables():
               ("outcome", None, "met, missed, not run, too few answers")))}
 
 
-# --- programs ---------------------------------------------------------------------------------------------
-
 def die_with_parent():
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
@@ -205,8 +203,6 @@ class Solver(Program):
         return {"p50": p50, "p99": p99, "per_second": per_second, "count": count, "threads": threads}
 
 
-# --- HTTP -------------------------------------------------------------------------------------------------
-
 def post(path, kind, body):
     """A request as bytes."""
     return (f"POST {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: {kind}\r\nAccept: {kind}\r\n"
@@ -274,8 +270,6 @@ class Client:
         while time.perf_counter() < end:
             self.must(request, what)
 
-
-# --- one size of operator ---------------------------------------------------------------------------------
 
 class Size:
     """An operator of n x k: solved in process and served by every server, in turns, as the machine's speed drifts."""
@@ -418,8 +412,6 @@ class Size:
             nginx.stop()
         self.absent["nginx"] = "not run: nginx does not start"
 
-    # --- load ---
-
     def why_not(self, server):
         return None if self.bench.wrk is None else self.absent.get(server, "")
 
@@ -503,8 +495,6 @@ class Size:
             per_second, sent, self.answer_bytes[form], per_second * (sent + self.answer_bytes[form]) * 1e-6, requests,
             len(self.runs[key]), note)
 
-    # --- an optimizer's loop ---
-
     def loop(self, client, *requests):
         """Answers a second, and the median time of each request, of requests in turns."""
         for request in requests:
@@ -574,8 +564,6 @@ class Size:
         medians = [statistics.median(column) for column in zip(*times)]
         self.bench.tables["codec"].add(self.n, self.k, *medians, min(both for *_, both in times))
         return medians[-1]
-
-    # --- ratios ---
 
     def ratio(self, above, figure, below):
         """The median over rounds of a figure over that of something else in the same round."""

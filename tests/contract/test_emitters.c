@@ -16,8 +16,6 @@ static void setup(void) {
     allocations_left = -1;
 }
 
-/* --- a problem ----------------------------------------------------------------------------------------- */
-
 /* Everything in double; T is rho' H. */
 typedef struct problem {
     float rho[C * N], first_bounce[M * N], L[C * S * M], E[C * S * N];
@@ -281,8 +279,6 @@ START_TEST(wrong_calls_are_refused) {
     free(p);
 }
 END_TEST
-
-/* --- the store ------------------------------------------------------------------------------------------ */
 
 static lam_status save(const problem *p, const lam_operator *op, lam_error *cause) {
     lam_status status = LAM_OK;

@@ -12,8 +12,6 @@ static size_t vector_size(const transport *t) {
     return t->n * t->n_channels;
 }
 
-/* --- right: against the truth in double ---------------------------------------------------------------- */
-
 /* Judges one vector of all channels by the truth. B rounds twice more (the sum, or a division), and what the
  * tolerance itself leaves out is of second order: (1 + u)^300 - 300 u < 300 u / 50000. */
 static void check_vector(const transport *t, bool adjoint, lam_quantity quantity, const float *in,
@@ -128,8 +126,6 @@ START_TEST(is_linear) {
 }
 END_TEST
 
-/* --- elements without reflectance, and darkness -------------------------------------------------------- */
-
 START_TEST(without_reflectance_nothing_bounces_but_light_arrives) {
     const transport *t = transport_kept(_i);
     size_t size = vector_size(t), n = t->n, black = 0;
@@ -206,8 +202,6 @@ START_TEST(darkness_stays_dark) {
     free(zero);
 }
 END_TEST
-
-/* --- the same bits, whatever is around ----------------------------------------------------------------- */
 
 START_TEST(bits_do_not_depend_on_the_batch) {
     static const size_t batches[] = {1, 3, 16, 17, 40};
@@ -367,8 +361,6 @@ START_TEST(callers_who_share_passes_get_their_own_bits) {
     free(work);
 }
 END_TEST
-
-/* --- the work area and other arguments ----------------------------------------------------------------- */
 
 START_TEST(work_area_is_not_overrun) {
     enum { GUARD = 256 };

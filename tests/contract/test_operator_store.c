@@ -12,8 +12,6 @@ static void setup(void) {
     allocations_left = -1;
 }
 
-/* --- saving and loading -------------------------------------------------------------------------------- */
-
 static lam_status save(const lam_operator *op, lam_error *cause) {
     lam_status status = LAM_OK;
     store *s = NULL;
@@ -103,8 +101,6 @@ START_TEST(every_failed_allocation_is_an_error) {
     ck_assert_int_gt(failures[1], 3);
 }
 END_TEST
-
-/* --- files that cannot be ------------------------------------------------------------------------------- */
 
 static const file_recipe recipes[] = {
     {.what = "good, folded"},
@@ -267,8 +263,6 @@ START_TEST(missing_arguments_and_files_are_errors) {
     lam_operator_close(NULL);
 }
 END_TEST
-
-/* --- builders' arrays ----------------------------------------------------------------------------------- */
 
 static float *constant(size_t count, float value) {
     float *x = test_allocate(count, sizeof *x);

@@ -106,8 +106,6 @@ class Daemon:
         self.process.kill()
         self.process.wait()
 
-    # --- requests
-
     def connect(self):
         return http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
 

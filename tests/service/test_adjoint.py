@@ -224,8 +224,6 @@ class Gradients(Both):
                     wanted += g * (H.reshape(wanted.shape) - H0)
                 self.close(found["reflectance"].reshape(wanted.shape), wanted, np.abs(wanted).max(), (name, quantity))
 
-    # --- encodings
-
     def test_npy(self):
         for name, scene in self.scenes.items():
             g = np.random.default_rng(6).standard_normal((scene.C, scene.n)).astype("<f4")
@@ -252,8 +250,6 @@ class Gradients(Both):
                 "quantity": "indirect"}
         backwards = dict(reversed(body.items()))
         self.assertEqual(self.ask("grey", body).json()["gradient"], self.ask("grey", backwards).json()["gradient"])
-
-    # --- refusals
 
     def refuse(self, body, status, *words, pointer=None, name="grey", **more):
         answer = self.daemon.post(f"/v1/scenes/{name}/adjoint", body, **more)

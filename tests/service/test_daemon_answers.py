@@ -163,8 +163,6 @@ class Answers(unittest.TestCase):
             self.assertGreaterEqual(value, 0)
         self.assertNotIn("error", self.solve("exact", {"emission": [1] * 40}).json())
 
-    # --- NPY
-
     def load(self, answer, dtype):
         self.assertEqual(answer.headers["Content-Type"], "application/x-npy")
         array = np.load(io.BytesIO(answer.body))
@@ -246,8 +244,6 @@ class Answers(unittest.TestCase):
     def test_content_type(self):
         for kind in "application/json", "application/json; charset=utf-8", "Application/JSON", None:
             self.solve("grey", {"emission": [1] * 60}, kind=kind)
-
-    # --- what a store says of itself
 
     def test_scenes(self):
         listed = {s["name"]: s for s in self.daemon.get("/v1/scenes").json()["scenes"]}

@@ -14,8 +14,6 @@ TOLERANCE = 1e-5  # as in test_daemon_answers.py
 
 
 class Clients(Case):
-    # --- many clients, bad clients
-
     def test_a_hundred_clients_get_their_own_answers(self):
         path, scene = self.store()
         failures = []
@@ -170,8 +168,6 @@ class Clients(Case):
                     self.assertIn(kind, answer)
                     if kind == "radiosity":
                         self.assertAlmostEqual(answer["radiosity"][0], wanted[i], delta=TOLERANCE * wanted[i])
-
-    # --- token, log, socket
 
     def test_token(self):
         path, _ = self.store()

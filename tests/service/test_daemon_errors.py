@@ -85,8 +85,6 @@ class Errors(unittest.TestCase):
     def refuse_npy(self, body, status, *words, **more):
         self.refuse(body, status, *words, kind="application/x-npy", **more)
 
-    # --- 400
-
     def test_not_json(self):
         whole = json.dumps({"emission": [1] * N})
         for body in (
@@ -108,8 +106,6 @@ class Errors(unittest.TestCase):
     def test_a_fault_in_the_grammar_is_told_before_one_in_the_meaning(self):
         self.refuse('{"emission":[-1, 2', 400, "not JSON")
         self.refuse('{"quantity":"heat","emission":[1]} x', 400, "not JSON")
-
-    # --- 404, 405, 415
 
     def test_no_such_route(self):
         for path in ("/", "/nothing", "/v1", "/v1/", "/v1/scenes/", "/v1/scenes/grey/", "/v1/scenes/grey/mesh", "//",
@@ -157,8 +153,6 @@ class Errors(unittest.TestCase):
         for kind in "text/plain", "application/x-www-form-urlencoded", "application/jsonx", "application/octet-stream", "":
             self.refuse("not looked at", 415, "Content-Type", kind=kind)
         self.refuse(b"\x1f\x8b", 415, "Content-Encoding", headers={"Content-Encoding": "gzip"})
-
-    # --- 413
 
     def test_body_over_the_limit(self):
         fits = json.dumps({"emission": [1] * N}).ljust(MAX_BODY)
@@ -211,8 +205,6 @@ class Errors(unittest.TestCase):
                 for _ in range(10_000):
                     s.sendall(b"4000\r\n" + b" " * 0x4000 + b"\r\n")
         self.still_works()
-
-    # --- 422: the emission
 
     def test_wrong_length(self):
         for count in 0, 1, N - 1, N + 1, 2 * N:
@@ -364,8 +356,6 @@ class Errors(unittest.TestCase):
         self.refuse({"emission": {"sky": [1, 2, 3, [4, 5]]}}, 422, "must be 3", name="dusk", pointer=at + "/3")
         self.refuse({"emission": {"sky": [1, 2, 3, [4, 5, -6]]}}, 422, "-6", name="dusk", pointer=at + "/3/2")
 
-    # --- NPY
-
     def test_npy_that_is_not(self):
         good = npy(np.ones(N, "<f4"))
         for body in (b"", b"x", good[:5], good[:9], good[:60], b"\x93NUMPX" + good[6:], b'{"emission":[1]}',
@@ -408,8 +398,6 @@ class Errors(unittest.TestCase):
                 E = np.ones((2, N), dtype)
                 E[1, 7] = value
                 self.refuse_npy(npy(E), 422, f" {N + 7} ", words)
-
-    # --- the order of the checks: route, method, scene, type, length, body
 
     def test_order(self):
         broken = {"Content-Type": "text/plain"}

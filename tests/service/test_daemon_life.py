@@ -20,8 +20,6 @@ TOLERANCE = 1e-5  # as in test_daemon_answers.py
 
 
 class Life(Case):
-    # --- the command line
-
     def test_help_and_version(self):
         asked = self.run_once("--help")
         self.assertEqual(asked.returncode, 0)
@@ -62,8 +60,6 @@ class Life(Case):
                 ended = self.run_once(path, *arguments)
                 self.assertEqual(ended.returncode, 1, arguments)
                 self.assertEqual(len(ended.stderr.splitlines()), 1, ended.stderr)
-
-    # --- stores
 
     def spoil(self):
         """Files that are not to be served, beside a sound one; what their refusal has to say."""
@@ -145,8 +141,6 @@ class Life(Case):
             self.assertEqual(daemon.get("/v1/scenes/second").json()["name"], "second")
             self.assertEqual(daemon.radiosity("second", {"emission": [1] * 60}).json()["scene"], "second")
 
-    # --- reloading
-
     def test_reload_swaps_without_dropping_a_request(self):
         path, first = self.store(seed=1)
         second = Scene(60, seed=2)
@@ -217,8 +211,6 @@ class Life(Case):
             daemon.signal(signal.SIGHUP)
             daemon.wait_for("reloaded: 2 scenes")
             self.assertEqual(self.names(daemon), ["b", "c"])
-
-    # --- the end
 
     def test_sigterm_finishes_an_upload_that_has_begun(self):
         path, scene = self.store()

@@ -85,8 +85,6 @@ class Mapped(unittest.TestCase):
         self.assertEqual(len(lines), 1, daemon.errors())
         self.assertIn(f"{path}: {words}", lines[0])
 
-    # --- answers
-
     def test_answers(self):
         with Daemon(self.store("box"), self.store("sky"), self.store("small")) as daemon:
             self.check(daemon, "box", self.scene)
@@ -123,8 +121,6 @@ class Mapped(unittest.TestCase):
             self.assertEqual(answer.status, 200, answer)
             B = np.load(io.BytesIO(answer.body))
             np.testing.assert_array_equal(B.ravel(), np.load(out).astype(np.float32).ravel())
-
-    # --- damage
 
     def test_a_flipped_bit_takes_its_scene_out(self):
         for dataset, at, words in (("operator/Y", 0, "/operator/Y is damaged in MiB 1 of 2"),
@@ -230,8 +226,6 @@ class Mapped(unittest.TestCase):
                 if answer.status == 200:
                     self.assertTrue(answer.json()["radiosity"] == right)  # a diff of so much would take minutes
 
-    # --- reloading
-
     def test_what_is_unchanged_stays_mapped(self):
         path, other = self.store("box"), self.store("other")
         with Daemon(path, other, f"{path}:again") as daemon:
@@ -300,8 +294,6 @@ class Mapped(unittest.TestCase):
             while len(self.mappings(daemon)) != 1 and time.monotonic() < deadline:
                 time.sleep(0.01)
             self.assertEqual(len(self.mappings(daemon)), 1, self.mappings(daemon))
-
-    # --- memory
 
     def mappings(self, daemon):
         """Lines of /proc/PID/maps of the stores' files."""

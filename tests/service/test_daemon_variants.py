@@ -90,8 +90,6 @@ class Variants(unittest.TestCase):
             self.assertIn(word, what["detail"])
         return what
 
-    # --- right
-
     def test_a_variant_answers_as_the_scene_would(self):
         scene = self.store(sky=7)
         with self.daemon() as daemon:
@@ -190,8 +188,6 @@ class Variants(unittest.TestCase):
                 self.made(daemon, RED)
             self.assertEqual(held[1] - held[0], 3 * 5 * 5 * 4)
 
-    # --- DELETE
-
     def test_delete(self):
         scene = self.store()
         with self.daemon() as daemon:
@@ -212,8 +208,6 @@ class Variants(unittest.TestCase):
             self.problem(self.ask(daemon, "DELETE", "/v1/scenes/colour/reflectance", {"groups": {}}), 422, "groups")
             self.problem(self.ask(daemon, "DELETE", "/v1/scenes/colour/reflectance", "[", ), 400)
             self.check(daemon, "colour", scene)
-
-    # --- refused
 
     def test_refused_before_the_body(self):
         self.store()
@@ -327,8 +321,6 @@ class Variants(unittest.TestCase):
             self.assertEqual(self.ask(daemon, "DELETE", "/v1/scenes/two@y").status, 204)
             self.problem(self.ask(daemon, "GET", "/v1/scenes/two@y"), 404)
 
-    # --- in the background
-
     def slow_store(self, n=2000, channels=3):
         """A variant of it takes long to build: many columns. Of few elements, it is the inversion that does."""
         rng = np.random.default_rng(5)
@@ -387,8 +379,6 @@ class Variants(unittest.TestCase):
                 # One after the other: when the next is ready, so is the one before.
                 self.made(daemon, RED, str(i % 2))
                 self.problem(self.ask(daemon, "GET", "/v1/scenes/slow@red"), 404)
-
-    # --- SIGHUP
 
     def reload(self, daemon, times):
         daemon.signal(signal.SIGHUP)

@@ -119,8 +119,6 @@ class Faults(unittest.TestCase):
     def daemon(self, *more, **how):
         return Daemon(self.folder / "grey.h5", "--threads", 2, "--token-file", self.folder / "token", *more, **how)
 
-    # --- memory
-
     def ask(self, daemon, request):
         """The answer, or None where there was none, or not a whole one."""
         method, path, headers, body = request
@@ -190,8 +188,6 @@ class Faults(unittest.TestCase):
                 self.assertIn((answer.status, settled(answer)), wanted)
 
 
-    # --- clocks
-
     def test_clocks_that_jump(self):
         """The wall's clock may be set to any time: who is served goes on, and who is silent is cut when it should be."""
         controls = Controls(self.folder / "controls")
@@ -226,8 +222,6 @@ class Faults(unittest.TestCase):
         return [(method, path, tuple(headers.items()), body) for method, path, headers, body in requests(N)
                 if path.startswith("/v1/scenes/grey/") and method == "POST" and "moon" not in str(body)
                 and body != '{"emission":[1,' and len(str(body)) > 60][:5]
-
-    # --- processes
 
     def test_killed_and_started_again(self):
         """On the same port and the same socket, under load: nothing is left over that stands in the way, and the answers

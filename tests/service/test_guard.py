@@ -73,8 +73,6 @@ class Guard(unittest.TestCase):
     def serves(self, daemon):
         self.assertEqual(daemon.radiosity("box", SOLVE).status, 200)
 
-    # --- memory
-
     def test_bodies_of_all_clients_are_bounded_together(self):
         with Daemon(self.box, "--max-body", "4M", "--max-buffered", "4M") as daemon:
             first = daemon.raw()
@@ -106,8 +104,6 @@ class Guard(unittest.TestCase):
                 until(lambda: metrics(daemon)[("lambertd_body_bytes",)] == MIB)
             until(lambda: metrics(daemon)[("lambertd_body_bytes",)] == 0)
             self.assertEqual(daemon.radiosity("box", whole).status, 200)
-
-    # --- connections and descriptors
 
     def test_idle_clients_make_place(self):
         with Daemon(self.box, "--max-connections", 8) as daemon:
@@ -156,8 +152,6 @@ class Guard(unittest.TestCase):
                 s.close()
             kept.close()
             self.serves(daemon)
-
-    # --- time: who is slow
 
     def drip(self, s, data, pause):
         """Sends byte by byte until the other side ends it; what came meanwhile."""
@@ -300,8 +294,6 @@ class Guard(unittest.TestCase):
                 clients *= 2
                 self.assertLess(clients, 256, "no solve takes long enough to tell")
             self.assertEqual(answers, [200] * asked)
-
-    # --- others
 
     def test_one_client_does_not_hold_up_another(self):
         """Large requests of one client, many at a time and pipelined, while another asks small ones."""

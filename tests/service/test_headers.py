@@ -63,8 +63,6 @@ class Headers(unittest.TestCase):
             return self.daemon.ask("POST", path, body or self.body, {"Content-Type": "application/json", **headers})
         return self.daemon.get(path, headers=headers)
 
-    # --- codings
-
     def test_json_is_coded_when_asked_for(self):
         plain = self.ask(None).json()
         for asked, coding in ((None, None), ("", None), ("identity", None), ("gzip", "gzip"), ("zstd", "zstd"),
@@ -99,8 +97,6 @@ class Headers(unittest.TestCase):
             answer = self.ask(None, **{"Content-Encoding": coding})
             self.assertEqual(answer.status, 415)
             self.assertIn("Content-Encoding", answer.json()["detail"])
-
-    # --- entity tags
 
     def test_tags(self):
         for path in "/v1/scenes", "/v1/scenes/box", "/v1/openapi.json":
@@ -140,8 +136,6 @@ class Headers(unittest.TestCase):
                 self.assertEqual(answer.status, 200)
                 self.assertNotEqual(answer.headers["ETag"], tag)
 
-    # --- request ids
-
     def test_request_ids(self):
         made, known = [], []
         for own in "a", "x" * 64, "2026-11-22T10:00:00.5_a+b/c=", "0af7651916cd43dd8448eb211c80319c":
@@ -167,8 +161,6 @@ class Headers(unittest.TestCase):
         lines = {e["id"]: e for e in map(json.loads, self.log.read_text().splitlines())}
         self.assertEqual((lines["coded"]["coding"], lines["plain"]["coding"]), ("zstd", "identity"))
         self.assertLess(lines["coded"]["sent"], lines["plain"]["sent"])
-
-    # --- metrics
 
     def test_metrics_are_read_by_prometheus(self):
         with Daemon(self.path) as daemon:

@@ -120,8 +120,6 @@ class OpenApi(unittest.TestCase):
     def named(self, name):
         return {"$ref": f"#/components/schemas/{name}"}
 
-    # --- the document
-
     def test_it_is_the_file(self):
         self.assertEqual((self.answer.status, self.answer.headers["Content-Type"]), (200, "application/json"))
         self.assertEqual(self.answer.body, (ROUTES.parent / "openapi.json").read_bytes())
@@ -178,8 +176,6 @@ class OpenApi(unittest.TestCase):
             self.assertEqual("401" in operation["responses"], path.startswith("/v1/"))
             self.assertEqual("404" in operation["responses"], bool(holes))
         self.assertEqual(len(set(names)), len(names))
-
-    # --- the document and the daemon
 
     def test_it_has_the_routes_that_there_are(self):
         table = re.findall(r'\.method = "([A-Z]+)",\s+\.pattern = "([^"]+)"', ROUTES.read_text())

@@ -95,8 +95,6 @@ class Reduce(unittest.TestCase):
         yield {"groups": {}}, np.zeros((C, n))
         yield {"elements": [], "values": []}, np.zeros((C, n))
 
-    # --- figures
-
     def test_all_figures(self):
         for name, scene in self.scenes.items():
             if name == "many":
@@ -279,8 +277,6 @@ class Reduce(unittest.TestCase):
                 self.assertEqual([s["name"] for s in daemon.get("/v1/scenes").json()["scenes"]], ["whole"])
                 for name in "nan", "negative", "endless":
                     self.assertRegex(daemon.output() + daemon.errors(), name + r"\.h5: /mesh/area\[7\] = .*, must be at least 0")
-
-    # --- refusals
 
     def refuse(self, reduce, status, *words, pointer=None, emission=None, name="grey", accept=None, **more):
         body = dict({"emission": emission or {"groups": {"lamp": 1}}, "reduce": reduce}, **more)

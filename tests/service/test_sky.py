@@ -51,8 +51,6 @@ class Sky(unittest.TestCase):
         """Operators of full rank: single precision, over some hundred terms."""
         np.testing.assert_allclose(got, wanted, atol=2e-5 * np.abs(wanted).max(), err_msg=str(what))
 
-    # --- the store
-
     def test_store(self):
         for name, tiling, count, albedo in (("exact", "tregenza", 145, 0.3), ("colour", "grid:12x11", 132, 0.0),
                                             ("folded", "reinhart:2", 577, 0.0)):
@@ -159,8 +157,6 @@ class Sky(unittest.TestCase):
                 if options[0] == "--quality":  # the sky needs more rays than the pairs do
                     self.assertEqual(f["form_factors"].attrs["rays"], 65536)
 
-    # --- solve
-
     def test_solve(self):
         for name, path in self.stores.items():
             t = self.truth[name]
@@ -218,8 +214,6 @@ class Sky(unittest.TestCase):
             self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1), done.stderr)
             self.assertIn(wanted, done.stderr)
             self.assertFalse((self.folder / "no.npy").exists())
-
-    # --- the daemon
 
     def test_daemon(self):
         for name, path in self.stores.items():

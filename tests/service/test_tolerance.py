@@ -91,8 +91,6 @@ class Tolerance(unittest.TestCase):
         cls.daemon = Daemon(*(f"{path}:{name}" for name, path in cls.stores.items()))
         cls.addClassCleanup(cls.daemon.__exit__, None, None, None)
 
-    # --- the truth
-
     def dense(self, name, E, L=None):
         """B, H and E' [C][n] of E [C][n] and L [C][m]."""
         truth = self.truth[name]
@@ -123,8 +121,6 @@ class Tolerance(unittest.TestCase):
 
     def sky(self, name):
         return np.broadcast_to([4, 0, 1, .5] * 3, (self.truth[name].C, 12)).astype(float)
-
-    # --- what is right
 
     def test_certificates_cover_the_error(self):
         for name in [*BUILDS, "upper"]:
@@ -322,8 +318,6 @@ class Tolerance(unittest.TestCase):
             self.assertLess(certificate, 1e-6 * np.abs(B - E).max())
         self.assertNotEqual(answer["radiosity"], base["radiosity"])
 
-    # --- what is refused
-
     def refused(self, status, words, name, body, pointer="/tolerance"):
         if not isinstance(body, str):
             body = json.dumps(body)
@@ -377,8 +371,6 @@ class Tolerance(unittest.TestCase):
                 self.assertIn("form_factors/data", answer.json()["detail"])
             answer = daemon.radiosity("damaged", {"emission": {"groups": {"lamp": 3}}})
             self.assertEqual(answer.status, 200, answer)
-
-    # --- the tool
 
     def solve(self, name, *options, suffix="npy"):
         out = self.folder / f"out.{suffix}"

@@ -54,8 +54,6 @@ class TwoMesh(unittest.TestCase):
         self.assertEqual(len(done.stderr.strip().splitlines()), 1, done.stderr)
         self.assertIn(wanted, done.stderr)
 
-    # --- the store ---------------------------------------------------------------------------------------------
-
     def test_defaults(self):
         store, log = self.build(probes=8)
         about = json.loads(must("info", store, "--json").stdout)
@@ -220,8 +218,6 @@ class TwoMesh(unittest.TestCase):
                 sums.append([file["operator/" + name][()].tobytes() for name in ("I", "order", "coherence")])
         self.assertEqual(sums[0], sums[1])
 
-    # --- pictures ----------------------------------------------------------------------------------------------
-
     def colours(self, image):
         pixels = decode_png(image)
         found, counts = numpy.unique(pixels.reshape(-1, pixels.shape[2]), axis=0, return_counts=True)
@@ -281,8 +277,6 @@ class TwoMesh(unittest.TestCase):
         done = must("precompute", self.factors, "-o", self.path("e.h5"), "--method", "exact", "--factorizer", "qr",
                     "--probes", 0)
         self.assertIn("exact does not use --factorizer", done.stderr)
-
-    # --- what is refused ---------------------------------------------------------------------------------------
 
     def test_wrong_usage(self):
         out = self.path("never.h5")

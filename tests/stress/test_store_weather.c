@@ -57,9 +57,6 @@ START_TEST(every_failed_allocation_is_an_error) {
 }
 END_TEST
 
-/* --- damage ------------------------------------------------------------------------------------------------
- */
-
 typedef struct damage_count {
     long found, harmless;
 } damage_count;
@@ -179,9 +176,6 @@ START_TEST(a_file_that_changes_under_the_reader) {
 }
 END_TEST
 
-/* --- foreign files -----------------------------------------------------------------------------------------
- */
-
 /* A sample as tests/support/foreign_stores.py changes it, and the status that reading all of it must answer.
  */
 static const struct foreign {
@@ -270,9 +264,6 @@ START_TEST(foreign_files_are_refused) {
 }
 END_TEST
 
-/* --- no room -----------------------------------------------------------------------------------------------
- */
-
 /* A limit on the size of files stands for a disk that is full at that byte: the write that passes it fails.
  * From the first byte to the last: an error that says so, the older file whole, nothing beside it. */
 START_TEST(a_full_disk_leaves_the_older_file) {
@@ -330,9 +321,6 @@ START_TEST(a_full_disk_in_a_large_array) {
     free(values);
 }
 END_TEST
-
-/* --- a writer that dies ------------------------------------------------------------------------------------
- */
 
 /* Killed after some arrays, while writing more: the target is as it was, and the next one can be made. */
 START_TEST(a_killed_writer_leaves_the_target) {

@@ -45,16 +45,10 @@ lam_status sample_fill(store *s, uint64_t salt, lam_error *error);
 
 lam_status sample_write(const char *path, uint64_t salt, lam_error *error);
 
-/* --- reading all of it ------------------------------------------------------------------------------------
- */
-
 /* Everything the sample has and a few things it has not, in one number. */
 lam_status sample_read_open(store *s, uint64_t *out, lam_error *error);
 
 lam_status sample_read(const char *path, uint64_t *reading, lam_error *error);
-
-/* --- files -------------------------------------------------------------------------------------------------
- */
 
 /* A fresh folder in path [64]. */
 void sample_folder(char path[64]);

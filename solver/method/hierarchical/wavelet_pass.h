@@ -32,7 +32,8 @@ typedef struct wavelet_pass_input {
  *     (Phi_a S; Psi_a S) = Q_a (Phi_left S; Phi_right S),
  * on the scaling functions of column clusters, and coarsens the columns level by level by the same Q_b.
  * Psi_a S yields the coefficients Psi_a S Psi_b^T of all b that are no finer than a; they are final. The
- * coefficients of finer b follow from symmetry. Phi_a S stops below the height of the parent and waits for the sibling.
+ * coefficients of finer b follow from symmetry. Phi_a S stops below the height of the parent and waits for
+ * the sibling.
  *
  * Of a one-sided F1, S = S1 + S1^T, and Psi_a S1 Psi_b^T for a finer b is no transpose of what b found. So
  * Phi_a S1 Psi_b^T is carried up beside Phi_a S1 (fine_column in wavelet_entries.h), and the transpose is

@@ -41,9 +41,6 @@ lam_status gram_add(gram *g, size_t n, const float *A, lam_error *error) {
     return LAM_OK;
 }
 
-/* --- sparse rows -----------------------------------------------------------------------------------------
- */
-
 /* Rows with few entries, and the first entry of each tile in each of them. */
 typedef struct thin_rows {
     size_t n, tiles;
@@ -156,9 +153,6 @@ done:
     free(thin.begin);
     return status;
 }
-
-/* --- eigenvectors ----------------------------------------------------------------------------------------
- */
 
 /* LAPACKE_ssyevd asks LAPACK for the size of the work area, which comes back rounded to single precision: too
  * small from about 2,900 columns on. The sizes here are those of the manual of ssyevd. */

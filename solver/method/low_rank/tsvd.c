@@ -53,9 +53,6 @@ static lam_status take_vectors(const gram *g, size_t rank, float **V, lam_error 
     return LAM_OK;
 }
 
-/* --- dense and sparse blocks -----------------------------------------------------------------------------
- */
-
 /* A dense block, a sparse one, or the Q of several parts side by side. */
 typedef struct tall_block {
     size_t n, m;

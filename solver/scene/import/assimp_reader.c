@@ -50,8 +50,6 @@ static bool is_mirrored(const affine *t) {
            0;
 }
 
-/* --- materials ----------------------------------------------------------------------------------------- */
-
 static bool colour_of(const struct aiMaterial *m, const char *key, double out[3]) {
     struct aiColor4D c;
     if (aiGetMaterialColor(m, key, 0, 0, &c) != aiReturn_SUCCESS) return false;
@@ -102,8 +100,6 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
 done:
     return status;
 }
-
-/* --- nodes --------------------------------------------------------------------------------------------- */
 
 /* A node's name in the file, or "": the library invents some, such as <STL_BINARY>, or nodes[3] in a glTF. */
 static lam_status name_of_node(assimp_state *a, const struct aiNode *node, uint32_t *object,
@@ -164,8 +160,6 @@ static lam_status read_node(assimp_state *a, const struct aiNode *node, const af
 done:
     return status;
 }
-
-/* --- files --------------------------------------------------------------------------------------------- */
 
 static uint32_t little_endian(const char *bytes) {
     const unsigned char *b = (const unsigned char *)bytes;

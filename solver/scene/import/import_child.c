@@ -27,8 +27,6 @@ typedef struct reply_header {
 
 static const char reply_magic[8] = "lamsoup";
 
-/* --- child --------------------------------------------------------------------------------------------- */
-
 static bool send_bytes(int fd, const void *data, size_t bytes) {
     for (const char *at = data; bytes > 0;) {
         const ssize_t sent = write(fd, at, bytes);
@@ -110,8 +108,6 @@ static _Noreturn void child_main(scene_reader *reader, const char *path, const c
     const bool sent = send_reply(fd, result, &error, &s);
     _exit(sent ? 0 : 1); /* not exit: what the parent would do at its end is not for a copy of it */
 }
-
-/* --- parent -------------------------------------------------------------------------------------------- */
 
 typedef struct reply_pipe {
     int fd;

@@ -66,8 +66,6 @@ static size_t read_numbers(const char *text, size_t count, double *out) {
     return n;
 }
 
-/* --- MTL ----------------------------------------------------------------------------------------------- */
-
 static lam_status read_colour(const char *path, uint32_t line, const char *text, double out[3],
                               lam_error *error) {
     lam_status status = LAM_OK;
@@ -155,8 +153,6 @@ static lam_status read_libraries(const char *path, uint32_t line, char *names, i
 done:
     return status;
 }
-
-/* --- OBJ ----------------------------------------------------------------------------------------------- */
 
 typedef struct obj_state {
     const char *path;

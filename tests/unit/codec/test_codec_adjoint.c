@@ -60,8 +60,6 @@ static unsigned read_adjoint(fixture *f, const char *text, size_t length, adjoin
     return why.status;
 }
 
-/* --- reduce -------------------------------------------------------------------------------------------- */
-
 /* A linear reduction leaves sparse vectors as they were said, in whatever order the members come. */
 START_TEST(linear_reductions_stay_sparse) {
     static const char *const texts[] = {
@@ -188,8 +186,6 @@ START_TEST(spots_have_a_limit) {
     group_index_free(&f.groups);
 }
 END_TEST
-
-/* --- adjoint ------------------------------------------------------------------------------------------- */
 
 static const char *const good_requests[] = {
     "{\"cotangent\":[1,-2.5,3,0,5]}",

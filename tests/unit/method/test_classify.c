@@ -92,9 +92,6 @@ START_TEST(samples_tell_of_the_whole) {
 }
 END_TEST
 
-/* --- the choice ------------------------------------------------------------------------------------------
- */
-
 enum { N = 1200, EACH = 330 };
 
 /* F of N like elements: one neighbour takes the share near of what each sees, and as many others as each

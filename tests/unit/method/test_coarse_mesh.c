@@ -32,8 +32,6 @@ static coarse_mesh create(const build_problem *problem, coarse_options options) 
     return c;
 }
 
-/* --- coherence ----------------------------------------------------------------------------------------- */
-
 /* Elements 0 ... 5 see group 0 by a, group 1 by b, each group of area 1. */
 static coherence_figures figures_of(const double (*F)[2], const double *area, size_t count) {
     float v[12];
@@ -125,8 +123,6 @@ START_TEST(coherence_is_what_a_patch_keeps_of_S) {
     room_free(&r);
 }
 END_TEST
-
-/* --- splitting ----------------------------------------------------------------------------------------- */
 
 START_TEST(patches_are_as_many_as_asked_for) {
     static const size_t wanted[] = {1, 2, 5, 6, 7, 20, 53, 95, 96, 97, 1000};
@@ -227,8 +223,6 @@ START_TEST(what_lies_in_one_place_is_split_too) {
     room_free(&r);
 }
 END_TEST
-
-/* --- assignment ---------------------------------------------------------------------------------------- */
 
 static double distance(const double a[3], const double b[3]) {
     return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]);

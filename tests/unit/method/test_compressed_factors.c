@@ -61,8 +61,6 @@ static void light(const view *v, int which, double *x) {
     }
 }
 
-/* --- products ------------------------------------------------------------------------------------------ */
-
 START_TEST(doubles_are_the_same_basis) {
     view v = make_view(_i);
     compressed_factors c = finished(&v, 1e-3);
@@ -176,8 +174,6 @@ START_TEST(threads_change_nothing) {
     view_free(&v);
 }
 END_TEST
-
-/* --- refined answers ----------------------------------------------------------------------------------- */
 
 static certified subject(const view *v, const char *method, double epsilon, double threshold) {
     double(*centre)[3] = test_allocate(v->m.n, sizeof *centre);

@@ -8,8 +8,6 @@
 
 #include <omp.h>
 
-/* --- the reference ------------------------------------------------------------------------------------- */
-
 /* V_jp = A_j / A_p for the patches of an operator, [n][k] in mesh order; the caller frees. */
 static double *dense_V(const room *r, const operator_patches *patches) {
     double *V = test_allocate(r->m.n * patches->k, sizeof *V);
@@ -134,9 +132,6 @@ START_TEST(as_many_patches_as_elements_is_exact) {
     room_free(&r);
 }
 END_TEST
-
-/* --- what holds whatever the patches ---------------------------------------------------------------------
- */
 
 /* Rows of U V^T sum to those of F, so that uniform light in a closed room stays exact: E = 1 gives
  * 1 / (1 - rho) everywhere, at any number of patches, by inclusion or proximity. Rows of F sum to 1 within
@@ -272,9 +267,6 @@ START_TEST(the_norm_of_the_error_is_measured) {
     room_free(&r);
 }
 END_TEST
-
-/* --- the QR variant --------------------------------------------------------------------------------------
- */
 
 /* S~ = Q Q^T S with Q's span holding that of S W: the best in that span, so no worse than S W W^T. */
 START_TEST(qr_is_no_worse) {

@@ -7,8 +7,6 @@
 
 static lam_error error;
 
-/* --- edges --------------------------------------------------------------------------------------------- */
-
 START_TEST(nothing_seen_is_direct_light) {
     static const char *const factorizers[] = {"auto", "qr"};
     room r = room_create(hall, 3, .5f, 1);
@@ -81,8 +79,6 @@ START_TEST(one_element) {
     mesh_free(&m);
 }
 END_TEST
-
-/* --- errors -------------------------------------------------------------------------------------------- */
 
 static void check_refused(const build_problem *problem, const build_options *options, lam_status expected,
                           const char *word) {

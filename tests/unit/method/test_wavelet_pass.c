@@ -5,8 +5,6 @@
 
 static lam_error error;
 
-/* --- the pass ------------------------------------------------------------------------------------------ */
-
 START_TEST(a_pass_finds_every_coefficient) {
     subject s = wavelet_subject_make(_i);
     const size_t n = s.m.n;
@@ -211,8 +209,6 @@ START_TEST(one_even_light_is_put_in) {
     wavelet_subject_free(&s);
 }
 END_TEST
-
-/* --- the inverse --------------------------------------------------------------------------------------- */
 
 enum { ONE_FOR_ALL, BLACK_IN_PARTS, EACH_ITS_OWN, REFLECTANCES };
 

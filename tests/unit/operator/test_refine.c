@@ -15,8 +15,6 @@
 
 static lam_error error;
 
-/* --- subjects ------------------------------------------------------------------------------------------ */
-
 static lam_operator *build(build_problem *problem, const char *method, double epsilon) {
     build_options options = options_with(method, epsilon);
     set_number(&options, "threshold", .01);
@@ -74,8 +72,6 @@ static void check_all(const certified *s) {
     free(H0);
 }
 
-/* --- what is hard on numbers --------------------------------------------------------------------------- */
-
 static const double reflectances[] = {.5, .99, .9999};
 
 START_TEST(hard_problems) {
@@ -96,8 +92,6 @@ START_TEST(hard_problems) {
     stability_free(&p);
 }
 END_TEST
-
-/* --- scenes -------------------------------------------------------------------------------------------- */
 
 START_TEST(scenes) {
     view v = make_view(_i);
@@ -285,8 +279,6 @@ START_TEST(emitters_start_from_their_light) {
     stability_free(&p);
 }
 END_TEST
-
-/* --- stores -------------------------------------------------------------------------------------------- */
 
 static void write_store(const char *path, const mesh *m, const form_factors *f) {
     store *s = NULL;

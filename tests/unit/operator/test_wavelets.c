@@ -4,8 +4,6 @@
 
 static lam_error error;
 
-/* --- the tree ------------------------------------------------------------------------------------------ */
-
 START_TEST(every_element_is_in_one_leaf_of_one_plane) {
     subject s = wavelet_subject_make(_i);
     const plane_tree *t = &s.tree;
@@ -43,8 +41,6 @@ START_TEST(every_element_is_in_one_leaf_of_one_plane) {
     wavelet_subject_free(&s);
 }
 END_TEST
-
-/* --- the basis ----------------------------------------------------------------------------------------- */
 
 START_TEST(the_basis_is_orthonormal) {
     subject s = wavelet_subject_make(_i);

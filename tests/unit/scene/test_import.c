@@ -46,8 +46,6 @@ static void write_mtl(const char *text) {
 
 #define SQUARE "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
-/* --- groups -------------------------------------------------------------------------------------------- */
-
 START_TEST(groups_follow_objects_then_materials) {
     import_report report;
     write_mtl("newmtl red\nKd .6 .1 .1\nnewmtl grey paint\nKd .5 .5 .5\n");
@@ -125,8 +123,6 @@ START_TEST(mirrored_nodes_keep_their_fronts) {
     mesh_free(&m);
 }
 END_TEST
-
-/* --- materials ----------------------------------------------------------------------------------------- */
 
 START_TEST(diffuse_of_one_or_more_is_clamped_with_a_warning) {
     import_report report;
@@ -214,8 +210,6 @@ START_TEST(missing_material_files_are_named_with_their_line) {
     mesh_free(&m);
 }
 END_TEST
-
-/* --- geometry ------------------------------------------------------------------------------------------ */
 
 START_TEST(planar_convex_quads_stay_and_others_become_triangles) {
     import_report report;

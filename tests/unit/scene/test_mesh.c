@@ -299,8 +299,6 @@ START_TEST(fewer_elements_than_faces_changes_nothing) {
 }
 END_TEST
 
-/* --- store --------------------------------------------------------------------------------------------- */
-
 static lam_status save_and_load(const mesh *m, mesh *loaded, double **row_sums, lam_error *error) {
     char folder[64], path[256];
     store *s = NULL;

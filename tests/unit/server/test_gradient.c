@@ -106,8 +106,6 @@ START_TEST(gradients_are_differences) {
 }
 END_TEST
 
-/* --- figures ------------------------------------------------------------------------------------------- */
-
 /* Elements 0 2 4 are "a.x", 1 3 "a.y", 5 6 "b", none "empty". */
 static group_index make_groups(void) {
     static const char *const names[4] = {"a.x", "a.y", "b", "empty"};
