@@ -157,9 +157,9 @@ size_t lam_form_factors_bytes(const lam_form_factors *F);
 typedef struct lam_refiner lam_refiner;
 
 /* Makes ready: finds a bound on |(I - R F)^-1| for every channel. op and F are of one store and outlive it.
- * Freed by lam_refiner_free. Allocates; uses the threads that op was told. Cost: a few products with F.
- * Errors: LAM_ERR_ARGUMENT (another number of elements), LAM_ERR_MEMORY, LAM_ERR_NUMERIC (reflectance times
- * row sum is too close to 1 for anything to be certified). */
+ * Freed by lam_refiner_free. Allocates; uses as many threads as op (lam_operator_set_threads). Cost: a few
+ * products with F. Errors: LAM_ERR_ARGUMENT (another number of elements), LAM_ERR_MEMORY, LAM_ERR_NUMERIC
+ * (reflectance times row sum is too close to 1 for anything to be certified). */
 lam_status lam_refiner_create(const lam_operator *op, const lam_form_factors *F, lam_refiner **out,
                               lam_error *error);
 void lam_refiner_free(lam_refiner *refiner);
@@ -168,14 +168,14 @@ void lam_refiner_free(lam_refiner *refiner);
  *     |B - B~| <= tolerance |B~ - E'|      in the maximum norm, 0 < tolerance < 1
  * (where nothing bounces B~ is E', with the rounding of E + rho H0).
  * E, H0 (NULL: none) and out are [n_rhs][C][n] in mesh order; E and H0 from 0 to 1e100.
- * certificates [n_rhs] gets what no number of that vector of out is further than from the quantity that F
- * gives, in the unit of E, rounding counted; iterations [n_rhs] how often F was multiplied for it.
- * start [n_rhs][C][n] is a first guess of the indirect light, NULL: the operator's answer, or 0 of an
- * operator of few emitters, which refines without its help. Allocates. A vector's bits depend neither on its
- * batch nor on threads; any number of threads may call. Cost: a product with F and one answer an iteration;
- * a factor of about a thirtieth of the error each for a low-rank operator of epsilon .1.
- * Errors: LAM_ERR_ARGUMENT; LAM_ERR_NUMERIC where the tolerance is more than double can certify, or than
- * 2000 iterations reach, with the bound reached; LAM_ERR_MEMORY. */
+ * certificates [n_rhs] gets a bound on the difference between any value of that vector of out and the
+ * quantity that F gives, in the unit of E, rounding included; iterations [n_rhs] the number of products with
+ * F for it. start [n_rhs][C][n] is a first guess of the indirect light, NULL: the operator's answer, or 0 of
+ * an operator of few emitters, which refines without its help. Allocates. A vector's bits depend neither on
+ * its batch nor on threads; any number of threads may call. Cost: a product with F and one answer an
+ * iteration; a factor of about a thirtieth of the error each for a low-rank operator of epsilon .1. Errors:
+ * LAM_ERR_ARGUMENT; LAM_ERR_NUMERIC where the tolerance is more than double can certify, or than 2000
+ * iterations reach, with the bound reached; LAM_ERR_MEMORY. */
 lam_status lam_refine(const lam_refiner *refiner, size_t n_rhs, lam_quantity quantity, const double *E,
                       const double *H0, const float *start, double tolerance, double *out,
                       double *certificates, size_t *iterations, lam_error *error);

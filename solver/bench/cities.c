@@ -232,7 +232,7 @@ lam_status cities_density(const bench_run *run, lam_error *error) {
         {"deviation", "%", "standard error of the density, as only a sample of the rows was measured"},
         {"theirs", "%", "table 4.5 of the thesis"},
         {"ratio", "", "density over that of the thesis"},
-        {"rays", "%", "density of the same rows by 4,096 rays an element, one way"}};
+        {"rays", "%", "density of the same rows by 4,096 rays per element, one way"}};
     lam_status status = LAM_OK;
     table out = {.name = "density",
                  .title = "Density of form factors (tables 4.1 and 4.5)",

@@ -42,7 +42,7 @@ static const table_column columns[] = {
     {"ratio", "", "low_rank_ms over query_ms"},
     {"single", "", "total indirect error, one bright element, mean of 16"},
     {"lights", "", "the scene's light"},
-    {"all_over", "", "random emission of all elements"},
+    {"random", "", "random emission of all elements"},
     {"uniform", "", "|B~ - 1| / |1| where E = 1 - rho s"},
 };
 
@@ -133,9 +133,9 @@ static lam_status add_size(const bench_run *run, size_t elements, grown *before,
     TRY(bench_check(run, error));
     TRY(scene_generated(&box, &m, error));
     TRY(lowrank_open(run, "closed cornell", &m, NULL, &s, error));
-    const form_factor_options look = {.recipe = how, .progress = run->progress, .stage = "near pairs"};
+    const form_factor_options rays_only = {.recipe = how, .progress = run->progress, .stage = "near pairs"};
     const double before_it = lowrank_begin_peak(), started = clock_seconds();
-    TRY(ray_rows_create(&s.m, &look, &rays, error));
+    TRY(ray_rows_create(&s.m, &rays_only, &rays, error));
     const double near = clock_seconds() - started;
     ray_rows_stream(rays, run->seed + 2000, &stream);
     build_problem problem = lowrank_problem(&s);

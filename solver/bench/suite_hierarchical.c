@@ -39,7 +39,7 @@ typedef struct kind_curve {
 } kind_curve;
 
 static const char *const kinds[KINDS] = {"hierarchical", "low-rank", "2msc", "sparse", "exact", "emitters"};
-static const char *const light_names[LIGHTS] = {"single", "lights", "all over"};
+static const char *const light_names[LIGHTS] = {"single", "lights", "random"};
 
 /* epsilon; k/n of 2msc; the threshold of a sparse inverse */
 static const double settings[KINDS][SETTINGS_MOST] = {{.2, .1, .05, .02, .01},
@@ -65,10 +65,10 @@ static const table_column points_columns[] = {
     {"stored_mb", "MB", "size of the operator in a store"},
     {"single", "", "total indirect error, one bright element, mean"},
     {"lights", "", "the scene's lights (of emitters: all of them)"},
-    {"all_over", "", "likewise for random emission of all elements"},
+    {"random", "", "likewise for random emission of all elements"},
     {"single_relative", "", "total relative error of the same"},
     {"lights_relative", "", "the same"},
-    {"all_over_relative", "", "the same"},
+    {"random_relative", "", "the same"},
 };
 
 /* Reference form factors: pair by pair, or, in large scenes, by the same recipe with another seed. */

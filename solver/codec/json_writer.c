@@ -179,8 +179,8 @@ bool json_write_floats(buffer *b, const float *values, size_t count) {
 bool json_write_double(buffer *b, double value) {
     char text[32];
     assert(isfinite(value));
-    /* Up to 15 digits come back as they were written, so what has fewer is told by 15, without its zeros; but
-     * near the least of doubles fewer do. */
+    /* A number of at most 15 digits survives the way through a double, so that 15 digits without trailing
+     * zeros reproduce it; denormal numbers have fewer. */
     int precision = fabs(value) < 1e-290 ? 1 : 15;
     do snprintf(text, sizeof text, "%.*g", precision, value);
     while (precision++ < 17 && strtod(text, NULL) != value);

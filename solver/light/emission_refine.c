@@ -2,7 +2,7 @@
 
 #include <stdlib.h>
 
-enum { AT_ONCE = 16 }; /* vectors between two looks at a signal */
+enum { AT_ONCE = 16 }; /* vectors between two checks for a signal */
 
 void refined_light_free(refined_light *r) {
     free(r->values);

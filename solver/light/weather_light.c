@@ -113,9 +113,9 @@ lam_status weather_light_add(const weather_options *options, store *s, const mes
                         few ? sky : NULL, sun, error));
     e->sun = sun;
     terminal_log(t,
-                 few ? "the sun: %zu rays an element and hour; what bounces of it comes from its tile, as a "
-                       "store of few emitters has it"
-                     : "the sun: %zu rays an element and hour, through all bounces",
+                 few ? "the sun: %zu rays per element and hour; its reflected light is that of its tile, "
+                       "because the store has few emitters"
+                     : "the sun: %zu rays per element and hour, through all bounces",
                  options->sun_points);
 done:
     weather_skies_free(&made);

@@ -29,7 +29,7 @@ typedef struct candidate {
     bool certain;   /* cost is no estimate, and the operator has no error beside rounding */
     bool open;      /* F is not known yet, and could show that this method suits it best */
     bool outdone;   /* another candidate keeps the bound for single elements too: cost does not count */
-    char found[96]; /* result of a look at F: "rank estimate 40 at epsilon 0.05"; empty: nothing */
+    char found[96]; /* figures estimated from F: "rank estimate 40 at epsilon 0.05"; empty: nothing */
     /* The same as numbers, for `lambert classify --json`, as the member `object` of its document. */
     const char *object;
     size_t n_figures;
@@ -53,7 +53,7 @@ typedef struct decision {
     candidate *candidates;
     const candidate *taken;
     char reason[256]; /* without the name of the method */
-    bool final;       /* no look at F can change it */
+    bool final;       /* F cannot change it */
 } decision;
 
 /* Weighs the methods in the order of the list where options->method is auto, else takes that one. With

@@ -84,8 +84,8 @@ static void gather(const block *b, const float *y, float *x) {
                 y != NULL && v < b->count ? b->root_area[i] * y[(b->first + v) * b->n + i] : 0;
 }
 
-/* y = S x row by row, S = A^1/2 F A^-1/2; each row is then what `finish` makes of it. Sums of what finish
- * returns for its rows go into b->sums. */
+/* Computes y = S x row by row, S = A^1/2 F A^-1/2. `finish` turns each row of S x into a row of the result,
+ * and its sums over all rows go into b->sums. */
 typedef void finish_row(block *b, size_t i, const float *S_x, double *sums);
 
 static void multiply_S(block *b, const float *x, finish_row *finish, double *sums) {
@@ -250,7 +250,7 @@ static void scatter(const block *b, const float *x, float *T) {
         for (size_t i = 0; i < b->n; i++) T[(b->first + v) * b->n + i] = x[i * b->width + v];
 }
 
-/* Blocks of columns: `each` makes of one what then lies in q. */
+/* Calls `each` for blocks of columns; its result lies in q. */
 typedef lam_status each_block(block *b, void *context, lam_error *error);
 
 static lam_status in_blocks(const many_lights_input *c, each_block *each, void *context, float *T,

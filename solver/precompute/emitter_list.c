@@ -10,7 +10,7 @@ void emitter_list_free(emitter_list *list) {
     *list = (emitter_list){.s = 0};
 }
 
-/* Room for s names of at most so many bytes. */
+/* Room for s names of at most `each` bytes. */
 static lam_status reserve_names(size_t s, size_t each, emitter_list *list, lam_error *error) {
     list->names = memory_allocate(s, sizeof *list->names + each, "names of emitters", error);
     if (list->names == NULL) return LAM_ERR_MEMORY;

@@ -32,14 +32,14 @@ double forecast_bytes(const forecast *f);
 /* LAM_ERR_MEMORY when that passes limit; the message names the option that would make it fit. */
 lam_status forecast_check(const forecast *f, double limit, lam_error *error);
 
-/* Seconds that finding the form factors takes, and those of the judge: from rays a second, measured, and from
- * what each thread needs for the rest, which was measured once. */
+/* Seconds that the form factors take, and those of the judge: from the measured rays per second, and from
+ * constants for the rest of the work of a thread, which were measured once. */
 typedef struct forecast_times {
     double form_factors, judge;
 } forecast_times;
 forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n_threads);
 
-/* Rays that look for other elements from one; a hemicube is a ray for each of its pixels. Bytes: of the rows
+/* Rays cast from one element; a hemicube is a ray for each of its pixels. Bytes: of the rows
  * of a merged sample, of packed rows, of one tile of a sky, of the judge's two samples and their mean, of the
  * operator in the store. */
 double forecast_rays(double n, const recipe *r);

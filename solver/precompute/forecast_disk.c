@@ -1,4 +1,4 @@
-/* Bytes of the store and of the scratch folder, and whether the disks have room for them. */
+/* Bytes of the store and of the scratch folder, and a check that the disks have room for them. */
 #include "solver/formfactor/formfactor.h"
 #include "solver/precompute/forecast.h"
 

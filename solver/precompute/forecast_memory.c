@@ -1,17 +1,17 @@
-/* Bytes of memory that a precompute takes, and what would fit. */
+/* Bytes of memory that a precompute takes, and options that would make it fit. */
 #include "solver/precompute/forecast.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-/* Below this many rays or pixels a forecast is not worth making cheaper. */
+/* Fewer rays or pixels than these are not proposed. */
 enum { FEWEST_RAYS = 256, LOWEST_RESOLUTION = 32 };
 
 /* Memory of a panel of rows that is merged or expanded. */
 static const double merge_bytes = 128e6;
 
-/* Rays that look for other elements from one; a hemicube is a ray for each of its pixels. */
+/* Rays cast from one element; a hemicube is a ray for each of its pixels. */
 double forecast_rays(double n, const recipe *r) {
     switch (r->method) {
     case RECIPE_PAIRS:
@@ -40,7 +40,7 @@ double forecast_rows_bytes(double n, const recipe *r) {
     return sample_bytes(n, forecast_rays(n, r));
 }
 
-/* Bytes of packed rows: a gap in groups of seven bits, of which one bit tells of a count above 1, or a
+/* Bytes of packed rows: a gap in groups of seven bits, of which one bit marks a count above 1, or a
  * weight; the row's own figures. */
 double forecast_packed_bytes(double n, const recipe *r) {
     if (r->method == RECIPE_PAIRS) return 2 * 4.5 * n * n; /* as found, and as seen */
@@ -50,8 +50,8 @@ double forecast_packed_bytes(double n, const recipe *r) {
     return n * (entries * bytes + 24);
 }
 
-/* The peak while one sample is found: packed rows and the triangle they are merged into, or that and the rows
- * in its place; of pairs one triangle with what is known of each, and again as such. */
+/* The peak while one sample is found: packed rows and the triangle they are merged into, or the triangle and
+ * the rows made of it; with pairs the triangle with the state of each pair, and the triangle of factors. */
 static double trace_bytes(double n, const recipe *r, bool to_disk, bool large) {
     const double sample = forecast_rows_bytes(n, r);
     if (r->method == RECIPE_PAIRS) return fmax(sample, 9 * n * n);
@@ -137,7 +137,7 @@ double forecast_bytes(const forecast *f) {
     return of_mesh + peak;
 }
 
-/* Halves what the rows are found with; false when that is little already. */
+/* Halves the rays or pixels; false when they are few already. */
 static bool sample_less(recipe *r) {
     switch (r->method) {
     case RECIPE_PAIRS:

@@ -4,7 +4,7 @@
 #include <omp.h>
 #include <stdlib.h>
 
-/* As form_factors_save would write them. */
+/* Bytes of the rows as form_factors_save would write them. */
 static double bytes_of_rows(const precompute_state *state) {
     const double entries = (double)state->f.F.indptr[state->m.n] * (sizeof(uint32_t) + sizeof(float));
     return state->m.n > FORM_FACTORS_ROWS_MOST ? entries / 2 : entries;

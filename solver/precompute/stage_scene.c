@@ -1,4 +1,4 @@
-/* The first stages of a precompute: what comes in, its mesh, and whether memory holds what is to come. */
+/* The first stages of a precompute: input, mesh, and a recipe for which memory suffices. */
 #include "solver/base/atomic_file.h"
 #include "solver/precompute/precompute_state.h"
 #include "solver/scene/import/import.h"
@@ -9,7 +9,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-/* Above this many elements a probe is dear: fewer are measured at defaults. */
+/* Above this many elements a probe is expensive: by default fewer are measured. */
 enum { PROBES = 200, PROBES_OF_LARGE = 32, LARGE = 10240 };
 
 bool precompute_takes_as_store(const char *path) {
@@ -127,7 +127,7 @@ bool state_compresses(const precompute_options *o) {
     return state_keeps(o) && *o->keep_form_factors != '\0';
 }
 
-/* Bytes of rows from which on they are rather found twice, where a judge needs them, than held. */
+/* Rows of more bytes than these are computed a second time for the judge, not held. */
 static const double held_most = 0x1p26;
 
 /* The method that n elements are going to get, as far as it is known before their form factors are; *final:

@@ -213,27 +213,27 @@ done:
 }
 
 /* The exposure, or the range of colours, that fits the light in view. */
-static picture_options look_of_light(const fields *f, const view *v) {
+static picture_options options_of_light(const fields *f, const view *v) {
     tone_histogram histogram = {0};
-    picture_options look = {.width = view_width(f)};
+    picture_options style = {.width = view_width(f)};
     picture_measure(&v->scene, &v->camera, &histogram);
     if (f->false_color)
-        look.range = round_up(tone_histogram_quantile(&histogram, .99) / exp2(f->exposure));
+        style.range = round_up(tone_histogram_quantile(&histogram, .99) / exp2(f->exposure));
     else
-        look.exposure = tone_exposure(&histogram) * exp2(f->exposure);
-    return look;
+        style.exposure = tone_exposure(&histogram) * exp2(f->exposure);
+    return style;
 }
 
-static lam_status draw(const fields *f, const view *v, const picture_options *look, terminal *t,
+static lam_status draw(const fields *f, const view *v, const picture_options *style, terminal *t,
                        lam_error *error) {
     lam_status status = LAM_OK;
     const progress how = terminal_progress(t);
     const camera *c = &v->camera;
     image picture = {0};
-    const size_t channels = look->range > 0 || shade_channels(v->shown) == 3 ? 3 : 1;
+    const size_t channels = style->range > 0 || shade_channels(v->shown) == 3 ? 3 : 1;
     TRY(image_create(f->size.width, f->size.height, channels, &picture, error));
-    TRY(picture_draw(&v->scene, c, look, &how, &picture, error));
-    if (look->range > 0) picture_legend(look->range, &picture);
+    TRY(picture_draw(&v->scene, c, style, &how, &picture, error));
+    if (style->range > 0) picture_legend(style->range, &picture);
     TRY(image_write_png(&picture, f->output, error));
     terminal_log(t, "camera %.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.4g", c->eye[0], c->eye[1], c->eye[2],
                  c->eye[0] + c->forward[0], c->eye[1] + c->forward[1], c->eye[2] + c->forward[2],
@@ -262,12 +262,12 @@ static lam_status render(const char *path, const fields *f, terminal *t, lam_err
         FAIL(error, LAM_ERR_ARGUMENT,
              "%s: the scene has no light of its own; give --emit GROUP=V, --emission or --sky", path);
     TRY(view_aim(f, v.m.n_channels, f->smooth, &v, error));
-    const picture_options look = look_of_light(f, &v);
-    TRY(draw(f, &v, &look, t, error));
+    const picture_options style = options_of_light(f, &v);
+    TRY(draw(f, &v, &style, t, error));
     if (f->false_color)
-        terminal_log(t, "colours from 0 to %g W/m2", look.range);
+        terminal_log(t, "colours from 0 to %g W/m2", style.range);
     else
-        terminal_log(t, "white is about %.3g W/m2", 1 / look.exposure);
+        terminal_log(t, "white is about %.3g W/m2", 1 / style.exposure);
 done:
     view_close(&v);
     light_close(&lit);
@@ -284,13 +284,13 @@ static bool needs_no_light(const fields *f) {
 
 /* The values of --quantity visible, in colours up to the largest. */
 static lam_status visible_values(const fields *f, store *s, size_t n, terminal *t, float **values,
-                                 picture_options *look, lam_error *error) {
+                                 picture_options *style, lam_error *error) {
     lam_status status = LAM_OK;
     double mean, most;
     TRY(store_view_visible(s, n, values, &mean, &most, error));
-    *look = (picture_options){.width = view_width(f), .range = most > 0 ? round_up(most) : 1};
+    *style = (picture_options){.width = view_width(f), .range = most > 0 ? round_up(most) : 1};
     terminal_log(t, "an element sees %.3g others on average, %.6g at most; colours from 0 to %g", mean, most,
-                 look->range);
+                 style->range);
 done:
     return status;
 }
@@ -298,11 +298,11 @@ done:
 /* The values of --quantity coherence or patch, one channel or three, and how to show them. The least coherent
  * patch is a little above black, so that it is seen. */
 static lam_status patch_values(const fields *f, store *s, size_t n, terminal *t, float **values,
-                               picture_options *look, lam_error *error) {
+                               picture_options *style, lam_error *error) {
     lam_status status = LAM_OK;
     float smallest;
     size_t n_patches;
-    *look = (picture_options){.width = view_width(f), .plain = true};
+    *style = (picture_options){.width = view_width(f), .plain = true};
     if (strcmp(f->quantity, "patch") == 0) {
         TRY(store_view_patches(s, values, &n_patches, error));
         terminal_log(t, "%zu patches", n_patches);
@@ -310,7 +310,7 @@ static lam_status patch_values(const fields *f, store *s, size_t n, terminal *t,
     }
     TRY(store_view_coherence(s, values, &smallest, error));
     if (f->false_color) {
-        *look = (picture_options){.width = view_width(f), .range = 1};
+        *style = (picture_options){.width = view_width(f), .range = 1};
         terminal_log(t, "colours from coherence 0 to 1");
         return LAM_OK;
     }
@@ -326,15 +326,15 @@ done:
 static lam_status render_unlit(const char *path, const fields *f, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
     view v = {.s = NULL};
-    picture_options look;
+    picture_options style;
     TRY(view_open(path, f, &v, error));
     if (is_visible(f))
-        TRY(visible_values(f, v.s, v.m.n, t, &v.values, &look, error));
+        TRY(visible_values(f, v.s, v.m.n, t, &v.values, &style, error));
     else
-        TRY(patch_values(f, v.s, v.m.n, t, &v.values, &look, error));
+        TRY(patch_values(f, v.s, v.m.n, t, &v.values, &style, error));
     memset(v.lit, true, v.m.n);
     TRY(view_aim(f, strcmp(f->quantity, "patch") == 0 ? 3 : 1, false, &v, error));
-    TRY(draw(f, &v, &look, t, error));
+    TRY(draw(f, &v, &style, t, error));
 done:
     view_close(&v);
     return status;

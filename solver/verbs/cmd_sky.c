@@ -91,8 +91,8 @@ static lam_status make_skies(const char *path, const fields *f, terminal *t, lam
     atomic_file file = {0};
     TRY(atomic_file_check(f->output, error));
     TRY(sky_tiling_create(f->tiles != NULL ? f->tiles : "tregenza", 'z', &tiling, error));
-    const year_options wish = {.photometric = f->photometric, .sun_in_tiles = true};
-    TRY(weather_skies_read(path, &tiling, &wish, t, &made, error));
+    const year_options year = {.photometric = f->photometric, .sun_in_tiles = true};
+    TRY(weather_skies_read(path, &tiling, &year, t, &made, error));
     TRY(atomic_file_open(f->output, &file, error));
     TRY(output_array(file.stream, 2, (const size_t[2]){made.n, tiling.n_tiles}, made.L, NULL, error));
     TRY(atomic_file_commit(&file, error));

@@ -163,18 +163,19 @@ done:
 }
 
 /* Figures of the year in place of the batch; *values is freed with free(). */
-static lam_status solve_year(const annual_options *wish, const emission *light, const lam_operator *op,
+static lam_status solve_year(const annual_options *annual, const emission *light, const lam_operator *op,
                              const lam_sky *sky, size_t n_selected, const uint32_t *selected, terminal *t,
                              solution *out, float **values, lam_error *error) {
     lam_status status = LAM_OK;
     const progress steps = terminal_progress(t);
     annual_summary sum = {0};
-    TRY(annual_apply(wish, light, op, sky, out->quantity, n_selected, selected, &steps, values, &sum, error));
+    TRY(annual_apply(annual, light, op, sky, out->quantity, n_selected, selected, &steps, values, &sum,
+                     error));
     terminal_log(t, "a year of %s: %zu vectors of %g h, %zu with light", codec_quantity_name(out->quantity),
-                 sum.n, wish->hours, sum.lit);
-    if (annual_has_shares(wish)) terminal_log(t, "shares are of %zu vectors", sum.counted);
+                 sum.n, annual->hours, sum.lit);
+    if (annual_has_shares(annual)) terminal_log(t, "shares are of %zu vectors", sum.counted);
     if (sum.lit == 0) terminal_warn(t, "no vector has any light");
-    out->n_vectors = wish->n_figures;
+    out->n_vectors = annual->n_figures;
     out->batch = true;
 done:
     return status;

@@ -105,7 +105,7 @@ static double entry(const csr *F, size_t i, uint32_t j) {
     return at == NULL ? 0 : (double)F->data[F->indptr[i] + (uint64_t)(at - first)];
 }
 
-/* Of compressed ones what light that is 1 everywhere brings, within what they say of themselves. */
+/* Row sums of compressed form factors, by their product with 1, within the bounds that they state. */
 static lam_status verify_compressed(examination *e, check *c, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = e->m.n;
@@ -119,7 +119,7 @@ static lam_status verify_compressed(examination *e, check *c, lam_error *error) 
         status = check_failed(c, status, error);
         goto done;
     }
-    /* By S alone: what groups send is kept beside it, and would be all of this light. */
+    /* By S alone: the stored first light of the groups would give the whole of this product. */
     compressed_factors *held = F->compressed;
     held->n_lit = 0;
     work = memory_allocate(compressed_work(held), sizeof *work, "form factors", error);
@@ -134,7 +134,7 @@ static lam_status verify_compressed(examination *e, check *c, lam_error *error) 
             goto done;
         }
     check_say(c, VERDICT_OK,
-              "compressed, rows sum to what /mesh/row_sums says within their bounds, %.2g at most", most);
+              "compressed, row sums agree with /mesh/row_sums within their bounds, %.2g at most", most);
 done:
     lam_form_factors_close(F);
     free(one);

@@ -1,4 +1,4 @@
-/* The checks of `lambert verify`: what a store promises, tested again. */
+/* The checks of `lambert verify`: they test again the properties that a store states. */
 #ifndef LAMBERT_VERIFY_VERIFY_H
 #define LAMBERT_VERIFY_VERIFY_H
 
@@ -18,7 +18,7 @@ typedef struct check {
     char detail[480];
 } check;
 
-/* A store under examination; what a check has loaded is there for the next. */
+/* A store under examination; data that a check has loaded stays for the next. */
 typedef struct examination {
     store *s;
     const char *scene; /* a scene file to compare with, or NULL */
@@ -42,7 +42,7 @@ verify_check verify_checksums, verify_mesh, verify_form_factors, verify_sky, ver
 /* Sets a verdict with its detail. */
 void check_say(check *c, verdict v, const char *format, ...) __attribute__((format(printf, 3, 4)));
 
-/* Turns a failure of what was examined into a verdict; a lack of memory and a cancellation stay failures. */
+/* Turns an error of the examined store into a verdict; a lack of memory and a cancellation stay failures. */
 lam_status check_failed(check *c, lam_status status, const lam_error *error);
 
 #endif

@@ -4,8 +4,8 @@
  *     bench_hierarchical SCENE JUDGE SINGLES LAMPS RANDOMS STORE.h5 ...
  *
  * B - E = R H + D,  (I - R F') D = R F' (R H), with H the light that E itself gives: of single elements pair
- * by pair, of lamps (squares of a plane) by some of their elements for each element, of light all over by F',
- * as all that bounces on is. F' is of the recipe JUDGE. As CSV. */
+ * by pair, of lamps (squares of a plane) by some of their elements for each element, of random emission by
+ * F', as all that bounces on is. F' is of the recipe JUDGE. As CSV. */
 #include "solver/base/clock.h"
 #include "solver/base/random.h"
 #include "solver/bench/stats.h"
@@ -26,7 +26,7 @@ enum { MOST_PROBES = 96, ROUNDS = 31 };
 /* Edge of a lamp over the scene's largest extent. */
 static const double lamp_width = .24;
 
-/* An answer of light all over, of one element's light, of light all over for some elements. */
+/* An answer to random emission, to one element's emission, and to random emission for some elements. */
 enum { WHOLE, FROM_ONE, FOR_SOME, WAYS, SOME = 100 };
 static const char *const way_names[WAYS] = {"whole", "from_one", "for_some"};
 

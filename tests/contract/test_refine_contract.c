@@ -39,7 +39,7 @@ static void subject_free(certified *s) {
     lam_form_factors_close(s->F);
 }
 
-/* Light all over, one bright element, a lamp a million times as bright as the rest, in turns. */
+/* Random emission, one bright element, a lamp a million times as bright as the rest, in turns. */
 static double *light(const lam_operator *op, size_t n_rhs, uint64_t seed) {
     const size_t n = op->n, rows = n_rhs * op->n_channels;
     double *E = test_allocate(rows * n, sizeof *E);

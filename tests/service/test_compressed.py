@@ -54,7 +54,7 @@ class Compressed(unittest.TestCase):
         return self.folder / name
 
     def light(self):
-        """A lamp, a wall and a lamp, light all over."""
+        """A lamp, a wall and a lamp, light from every element."""
         t, E = self.truth, np.zeros((3, self.truth.C, self.truth.n))
         lamp, floor = (t.group == t.groups.index(name) for name in ("lamp", "floor"))
         E[0, :, lamp], E[1, :, floor], E[1, :, lamp] = 4, .5, 2
@@ -71,7 +71,7 @@ class Compressed(unittest.TestCase):
         for name in ("tree", "low"):
             done = lambert("verify", self.stores[name], "--probes", 2)
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-            self.assertRegex(done.stdout, "ok +form factors +compressed, rows sum to what")
+            self.assertRegex(done.stdout, "ok +form factors +compressed, row sums agree with ")
         self.assertIn("kept as           compressed", must("info", self.stores["tree"]).stdout)
 
     def test_python_of_a_hierarchical_store(self):

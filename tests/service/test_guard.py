@@ -288,7 +288,7 @@ class Guard(unittest.TestCase):
                 counts = metrics(daemon)
                 route = ("route", "/v1/scenes/{name}/radiosity")
                 label = "lambertd_request_duration_seconds"
-                # Until some took longer than the time-out and the second between two looks.
+                # Until some took longer than the time-out and the second between two checks.
                 if counts[(f"{label}_count", route)] > counts[(f"{label}_bucket", ("le", "2.5"), route)]:
                     break
                 clients *= 2

@@ -1,5 +1,5 @@
-"""The sun of a weather file in `lambert solve`: in tiles it is what `lambert sky` makes of it; itself, it throws the
-shadows that geometry says, at every hour, whichever way is up, and bounces."""
+"""The sun of a weather file in `lambert solve`: in tiles it gives the sky of `lambert sky`; as a disc it casts the
+shadows that the geometry determines, at every hour, for either up axis, and its light is reflected."""
 
 import pathlib
 import tempfile
@@ -168,7 +168,7 @@ class Sun(unittest.TestCase):
         self.assertGreater(np.abs(few_indirect - indirect).max(), .01 * indirect.max())
         said = must("solve", self.few, "--weather", self.day, "--sun", "exact", "-o",
                     self.folder / "few.npy").stderr
-        self.assertIn("what bounces of it comes from its tile", said)
+        self.assertIn("its reflected light is that of its tile", said)
 
     def test_tiles_are_those_of_the_sky_verb(self):
         sky, out = self.folder / "day.npy", self.folder / "tiles.npy"

@@ -1,4 +1,5 @@
-/* low-rank: factorize S, then Sherman-Morrison-Woodbury (thesis eq. 2.8) with the areas scaled back. */
+/* Method low-rank: factorizes S, then applies Sherman-Morrison-Woodbury (Aguerre 2016, eq. 2.8) with the
+ * areas scaled back. */
 #include "solver/base/clock.h"
 #include "solver/method/choice.h"
 #include "solver/method/low_rank/factorizer.h"

@@ -8,7 +8,7 @@
 /* X [n][m] with independent standard Gaussian entries, the same for a seed whatever the threads. */
 void sketch_gaussian(uint64_t seed, size_t n, size_t m, float *X);
 
-/* A column of a sparse Gaussian matrix: so many entries, which may share a row. */
+/* The entries of a column of a sparse Gaussian matrix; several may share a row. */
 enum { SKETCH_ENTRIES = 8 };
 
 typedef struct sketch_entry {

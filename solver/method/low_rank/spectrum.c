@@ -127,7 +127,7 @@ lam_status spectrum_find(const scaled_matrix *S, size_t steps, uint64_t seed, co
     columns_scale(n, r.X, factor);
     for (size_t s = 0; s < r.steps; s++) {
         if (progress_cancelled(told)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
-        progress_report(told, "look at singular values", (double)s / (double)r.steps);
+        progress_report(told, "estimate of singular values", (double)s / (double)r.steps);
         TRY(step(&r, S, s, error));
     }
     TRY(add_nodes(&r, nodes, &n_nodes, error));

@@ -213,7 +213,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     lam_status status = LAM_OK;
     imported_faces s = {0};
     mesh made = {0};
-    import_report told = {0};
+    import_report found = {0};
     const char *extension = extension_of(path);
     const bool is_obj = strcasecmp(extension, "obj") == 0;
     const bool is_gltf = strcasecmp(extension, "gltf") == 0 || strcasecmp(extension, "glb") == 0;
@@ -228,18 +228,18 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     made.up = options->up != 0 ? options->up : is_gltf ? 'y' : 'z';
     TRY(copy_geometry(&s, path, options->unit, &made, error));
     TRY(name_groups(&s, &made, error));
-    TRY(apply_materials(&s, path, options, &made, &told, error));
+    TRY(apply_materials(&s, path, options, &made, &found, error));
     if (!is_obj) warn_of_lost_precision(&s, path, &made);
     mesh_geometry_hash(&made, made.source_hash);
-    told.dropped_faces = s.dropped;
+    found.dropped_faces = s.dropped;
     if (s.warnings.omitted > 0)
-        snprintf(told.warnings, sizeof told.warnings, "%.*s\n%llu more warnings",
-                 (int)sizeof told.warnings - 64, s.warnings.text, (unsigned long long)s.warnings.omitted);
+        snprintf(found.warnings, sizeof found.warnings, "%.*s\n%llu more warnings",
+                 (int)sizeof found.warnings - 64, s.warnings.text, (unsigned long long)s.warnings.omitted);
     else
-        snprintf(told.warnings, sizeof told.warnings, "%s", s.warnings.text);
+        snprintf(found.warnings, sizeof found.warnings, "%s", s.warnings.text);
     *m = made;
     made = (mesh){0};
-    if (report != NULL) *report = told;
+    if (report != NULL) *report = found;
 done:
     mesh_free(&made);
     imported_faces_free(&s);

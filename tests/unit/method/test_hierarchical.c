@@ -229,7 +229,7 @@ START_TEST(some_elements) {
     uint32_t *which = test_allocate(2500, sizeof *which);
     uint64_t seed = 4;
     ck_assert_uint_eq(n, 2400);
-    E[n / 7] = 2; /* one element, a wall, all over */
+    E[n / 7] = 2; /* one element, a wall, every element */
     for (size_t i = 0; i < n; i++) {
         E[n + i] = problem->normal[i][2] > .5f ? 1 : 0;
         E[2 * n + i] = (float)random_lcg_unit(&seed);

@@ -43,7 +43,7 @@ static certified subject(const char *name, const char *method, double epsilon, s
     return certified_make(name, op, F);
 }
 
-/* One bright element, a lamp in dim light, light all over; H0 of a sky that some elements see. */
+/* One bright element, a lamp in dim light, random emission; H0 of a sky that some elements see. */
 static void light(const certified *s, size_t n_rhs, double *E, double *H0) {
     const size_t n = s->op->n;
     uint64_t seed = 12;
@@ -164,7 +164,7 @@ START_TEST(rows_in_the_way_are_multiplied) {
 }
 END_TEST
 
-/* Iterations to 1e-6, of light all over. */
+/* Iterations to 1e-6, of random emission. */
 static size_t iterations_of(const certified *s) {
     const size_t n = s->op->n;
     double *E = test_allocate(n, sizeof *E), *out = test_allocate(n, sizeof *out), certificate;
