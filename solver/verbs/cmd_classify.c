@@ -1,4 +1,4 @@
-/* lambert classify: says what kind of scene it is and which operator suits it. */
+/* lambert classify: reports the properties of a scene and the operator that suits it. */
 #include "solver/precompute/precompute.h"
 #include "solver/verbs/verbs.h"
 
@@ -40,7 +40,7 @@ static json_t *number_or_null(double x) {
     return isfinite(x) && x >= 0 ? json_real(x) : json_null();
 }
 
-/* The figures of a candidate as an object; null where it was not looked at. */
+/* The figures of a candidate as an object; null where it was not weighed. */
 static json_t *figures_of(const candidate *c) {
     json_t *object = c->n_figures > 0 ? json_object() : json_null();
     for (size_t k = 0; k < c->n_figures; k++)

@@ -162,7 +162,7 @@ done:
     return status;
 }
 
-/* Figures of the year in place of the batch; *values is freed with free(). */
+/* Replaces the batch by figures of the year; *values is freed with free(). */
 static lam_status solve_year(const annual_options *annual, const emission *light, const lam_operator *op,
                              const lam_sky *sky, size_t n_selected, const uint32_t *selected, terminal *t,
                              solution *out, float **values, lam_error *error) {
@@ -226,7 +226,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
              "%s: the scene has no light of its own; give --emit GROUP=V, --emission FILE%s", path,
              lit.sky != NULL ? ", --sky FILE or --weather FILE" : "");
     if (lit.own) terminal_log(t, "no --emit, --emission, --sky or --weather: the scene's own light");
-    /* With --reduce only figures are written, with -o too. */
+    /* With --reduce only figures are written, also with -o. */
     TRY(wanted_elements(&m, reductions, n_reductions, &n_selected, &selected, error));
     if (f->weather != NULL) {
         const weather_options hours = {.path = f->weather,
@@ -284,7 +284,7 @@ done:
     return status;
 }
 
-/* The figures of --annual and the options that are about them. */
+/* The figures of --annual and their options. */
 static lam_status read_year(const fields *f, annual_options *year, lam_error *error) {
     lam_status status = LAM_OK;
     for (size_t i = 0; i < f->annual.count; i++) TRY(annual_add(year, f->annual.items[i], error));

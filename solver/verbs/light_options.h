@@ -15,7 +15,7 @@ typedef struct light_options {
 /* The rows of a table that fills light_options. */
 extern const option_row light_rows[];
 
-/* Checks what needs no store; an error is wrong usage. */
+/* Checks what does not depend on the store; an error is wrong usage. */
 lam_status light_check(const light_options *options, lam_error *error);
 
 /* A store's operator and sky, and the light that options ask for. */

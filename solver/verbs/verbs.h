@@ -1,5 +1,5 @@
-/* The verbs of `lambert`: each gets its own command line (argv[0] is the verb) and returns the exit status:
- * 0 done, 1 it failed, 2 wrong usage. */
+/* The verbs of `lambert`: each gets its own command line (argv[0] is the verb) and returns the exit status: 0
+ * success, 1 failure, 2 wrong usage. */
 #ifndef LAMBERT_VERBS_VERBS_H
 #define LAMBERT_VERBS_VERBS_H
 

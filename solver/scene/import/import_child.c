@@ -90,7 +90,7 @@ static int confine(int fd, const child_limits *limits) {
     limit(RLIMIT_FSIZE, 0, 0);
     limit(RLIMIT_NOFILE, 32, 32);
     limit(RLIMIT_CPU, limits->cpu_seconds, limits->cpu_seconds + 1);
-#ifndef LAMBERT_SANITIZED /* whose shadow memory is larger than any limit */
+#ifndef LAMBERT_SANITIZED /* the shadow memory of a sanitizer is larger than any limit */
     limit(RLIMIT_AS, limits->memory_bytes, limits->memory_bytes);
 #endif
     return 3;
@@ -106,7 +106,7 @@ static _Noreturn void child_main(scene_reader *reader, const char *path, const c
         status_fail(&error, LAM_ERR_MEMORY, "%s: the importer needs more than its %zu MiB of memory", path,
                     limits->memory_bytes >> 20);
     const bool sent = send_reply(fd, result, &error, &s);
-    _exit(sent ? 0 : 1); /* not exit: what the parent would do at its end is not for a copy of it */
+    _exit(sent ? 0 : 1); /* _exit: handlers of exit belong to the parent */
 }
 
 typedef struct reply_pipe {
@@ -185,7 +185,7 @@ static lam_status receive_reply(reply_pipe *pipe, const char *path, size_t most_
     const bool says_why = header.message[0] != '\0' && strpbrk(header.message, "\r\n") == NULL;
     if (sound && says_why && header.status > LAM_OK && header.status <= LAM_ERR_INTERNAL)
         FAIL(error, (lam_status)header.status, "%s", header.message);
-    const uint64_t most = most_bytes / 8; /* nothing sent is smaller per entry, but for names */
+    const uint64_t most = most_bytes / 8; /* except for names, no entry is smaller in the pipe */
     sound = sound && header.status == LAM_OK && header.n_points < most && header.n_elements < most &&
             header.n_points < TABLE_NONE && header.n_elements < TABLE_NONE && header.n_elements > 0 &&
             header.object_bytes < most && header.material_bytes < most && header.n_materials < most;
@@ -260,7 +260,7 @@ lam_status import_in_child(scene_reader *reader, const char *path, const child_l
     /* The kernel limits the processor time; the clock only ends a child that sleeps. */
     from_child.deadline_ms = clock_ms() + 1e3 * (4 * (double)limits->cpu_seconds + 2);
     status = receive_reply(&from_child, path, limits->memory_bytes, &received, &whole, error);
-    if (status != LAM_OK || !whole) kill(child, SIGKILL); /* changes nothing for one that is dying already */
+    if (status != LAM_OK || !whole) kill(child, SIGKILL); /* has no effect on a child that has ended */
     while (waitpid(child, &wait_status, 0) < 0 && errno == EINTR) continue;
     if (status == LAM_OK && !whole) status = child_verdict(path, limits, from_child.late, wait_status, error);
     if (status != LAM_OK) goto done;

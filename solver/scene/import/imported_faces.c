@@ -12,7 +12,7 @@
 void import_warn(import_warnings *w, const char *format, ...) {
     const size_t used = strlen(w->text), room = sizeof w->text - used;
     va_list arguments;
-    if (w->omitted > 0 || room < 3) { /* once one is left out, so are the later ones */
+    if (w->omitted > 0 || room < 3) { /* a line that follows an omitted one is omitted too */
         w->omitted++;
         return;
     }
@@ -99,7 +99,7 @@ static lam_status check_polygons(const imported_faces *s, const char *path, doub
     double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
     for (size_t v = 0; v < s->n_vertices; v++)
         for (int k = 0; k < 3; k++)
-            if (!(fabs(s->vertices[v][k]) < 1e30)) /* squares of what is larger would overflow */
+            if (!(fabs(s->vertices[v][k]) < 1e30)) /* the square of a larger coordinate would overflow */
                 FAIL(error, LAM_ERR_FORMAT, "%s: vertex %zu: coordinate %g is not a usable number", path, v,
                      s->vertices[v][k]);
     for (size_t i = 0; i < s->n_polygons; i++) {

@@ -186,7 +186,8 @@ static lam_status read_face(obj_state *o, uint32_t line, const char *text, lam_e
         const long long given = strtoll(text, &stop, 10);
         if (stop == text || (*stop != '\0' && *stop != '/' && !is_blank(*stop)))
             FAIL(error, LAM_ERR_FORMAT, "%s:%u: '%.40s' is not a vertex of a face", o->path, line, text);
-        /* Negative: counted back from the vertex read last. Positive ones may come later in the file. */
+        /* A negative index counts back from the vertex read last. A positive one may refer to a later line.
+         */
         const long long index = given < 0 ? (long long)o->s->n_vertices + given : given - 1;
         if (errno != 0 || given == 0 || index < 0 || index >= (long long)TABLE_NONE)
             FAIL(error, LAM_ERR_FORMAT,

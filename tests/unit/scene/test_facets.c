@@ -1,4 +1,5 @@
-/* Facets: elements of one plane cast against as one, and found again by where they were met. */
+/* Facets: rays meet the elements of one plane as one facet, and the element is found from the place of the
+ * hit. */
 #include "solver/base/random.h"
 #include "solver/bench/scenes.h"
 #include "solver/formfactor/visibility/sample.h"
@@ -22,7 +23,7 @@ static facets joined(const mesh *m) {
     return f;
 }
 
-/* (u, v) of a point in a piece; whether it is inside. */
+/* (u, v) of a point in a piece; true if the point is inside. */
 static bool in_piece(const mesh *m, const uint32_t piece[4], const double p[3], float *u, float *v) {
     const bool quad = corner_count(piece) == 4;
     const double *o = m->vertices[piece[0]], *a = m->vertices[piece[1]],
@@ -53,7 +54,7 @@ static void point_in(const mesh *m, size_t element, uint64_t *state, double p[3]
     }
 }
 
-/* Points of every element lie in a piece of its facet, and are found to be of that element. */
+/* Points of every element lie in a piece of its facet, and are assigned to that element. */
 static void check_points(const mesh *m, const facets *f) {
     facet_grids g;
     uint64_t state = 5;
@@ -94,7 +95,7 @@ static double area_of(const mesh *m, const uint32_t piece[4]) {
     return area;
 }
 
-/* Every element has its facet, facets hold what their pieces cover, and face the same way. */
+/* Every element has its facet; a facet has the area of its pieces, and its elements face the same way. */
 static void check_cover(const mesh *m, const facets *f) {
     size_t elements = 0;
     for (size_t k = 0; k < f->n; k++) {
@@ -113,7 +114,8 @@ static void check_cover(const mesh *m, const facets *f) {
     ck_assert_uint_eq(elements, m->n);
 }
 
-/* Every side of a piece is the side of another piece the other way round: nothing passes between them. */
+/* Every side of a piece is the side of another piece in the opposite direction, so that no ray passes between
+ * them. */
 static void check_closed(const mesh *m, const facets *f) {
     for (size_t p = 0; p < f->n_pieces; p++) {
         const size_t corners = corner_count(f->pieces[p]);
@@ -146,7 +148,7 @@ START_TEST(a_box_is_six) {
 }
 END_TEST
 
-/* An evenly divided mesh lies in cells that one element fills: nothing is looked for. */
+/* An evenly divided mesh lies in cells that one element fills, so that no search is needed. */
 START_TEST(even_divisions_need_no_search) {
     const double size[3] = {10, 6, 3};
     mesh m = box_mesh(size, 7, .5f);
@@ -162,7 +164,7 @@ START_TEST(even_divisions_need_no_search) {
 }
 END_TEST
 
-/* Halves every quad, and moves what a function says. */
+/* Halves every quad, and moves the vertices by a function. */
 static mesh bent_box(unsigned divisions, void (*bend)(double p[3])) {
     const double size[3] = {1, 1, 1};
     mesh from = box_mesh(size, divisions, .5f), m = {0};
@@ -191,7 +193,7 @@ static void hills(double p[3]) {
         p[2] += .3 * sin(7 * p[0]) * cos(5 * p[1]) * p[0];
 }
 
-/* A rough ceiling stays as it is: walls keep the corners that they share with it, and no others. */
+/* A rough ceiling stays as it is: walls keep the corners that they share with it, and no other corners. */
 START_TEST(walls_keep_the_corners_of_what_is_not_joined) {
     enum { DIVISIONS = 9 };
     mesh m = bent_box(DIVISIONS, hills);
@@ -206,7 +208,7 @@ START_TEST(walls_keep_the_corners_of_what_is_not_joined) {
 }
 END_TEST
 
-/* Bends of less than single precision are none, larger ones are. */
+/* Bends below single precision are ignored, larger ones are kept. */
 static double rise;
 
 static void roof(double p[3]) {
@@ -226,8 +228,8 @@ START_TEST(a_bend_parts) {
 }
 END_TEST
 
-/* Strips side by side whose tops make a bow: no corner of it is off its neighbours' line by more than flat,
- * the bow as a whole is. */
+/* Strips side by side whose tops make a bow: each corner is off its neighbours' line by less than the
+ * tolerance `flat`, the bow as a whole is off by more. */
 START_TEST(a_bow_is_no_line) {
     enum { STRIPS = 20000 };
     mesh m = {0};
@@ -262,8 +264,8 @@ START_TEST(a_floor_with_holes) {
 }
 END_TEST
 
-/* The same rays, against facets, with and without the word that they go together, and against elements; none
- * leaves what is closed. */
+/* The same rays against facets, with and without the flag that the elements go together, and against
+ * elements; none leaves a closed scene. */
 static void check_rays(const mesh *m, size_t rays, bool closed) {
     visibility *of_facets, *of_elements;
     size_t other = 0, apart = 0, seen = 0;

@@ -113,7 +113,7 @@ START_TEST(cornell_box_is_whole) {
     options.elements = sizes[_i];
     mesh m = generated(&options, NULL);
     size_t lamps = 0;
-    /* the floor is the room's less both footprints, whatever the grid: nothing lies under a block */
+    /* the floor is the room's less both footprints, whatever the grid: no floor lies under a block */
     ck_assert_double_eq_tol(group_area(&m, "floor", NULL),
                             .556 * .5592 - footprint_area(short_block) - footprint_area(tall_block), 1e-12);
     ck_assert_double_eq_tol(group_area(&m, "lamp", &lamps), .130 * .105, 1e-15);
@@ -155,7 +155,7 @@ START_TEST(cornell_box_has_its_materials) {
                 ck_assert_float_eq(m.reflectance[c * m.n + i], expected[e].reflectance[c]);
                 ck_assert_float_eq(m.emission[c * m.n + i], expected[e].emission[c]);
             }
-    /* the open front: from its middle, half of all directions leave */
+    /* the open front: half of all directions from its middle leave */
     assert_sees(&m, .278, 0, .27, 2 * M_PI);
     mesh_free(&m);
     options.reflectance = .5;
@@ -189,8 +189,7 @@ END_TEST
 
 START_TEST(convex_pieces_add_up) {
     const convex cell = {.n = 4, .p = {{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
-    /* A turned square of area .5, moved across the cell; what they share is what is cut off, once each way.
-     */
+    /* A turned square of area .5, moved across the cell: the shared part is cut off once in either order. */
     for (int step = 0; step <= 60; step++) {
         const double x = -.6 + .0371 * step, y = -.3 + .0273 * step;
         const convex block = {.n = 4, .p = {{x, y - .5}, {x + .5, y}, {x, y + .5}, {x - .5, y}}};

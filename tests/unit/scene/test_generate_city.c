@@ -29,7 +29,7 @@ static const double *corner(const mesh *m, size_t i, size_t k) {
     return m->vertices[m->elements[i][k]];
 }
 
-/* Of an element, seen from above: what it hides of the plan, negative when it is seen from below. */
+/* The area that an element covers in plan; negative when it faces down. */
 static double plan_area(const mesh *m, size_t i) {
     double twice = 0;
     for (size_t k = 0; k < 4; k++) {
@@ -139,8 +139,8 @@ START_TEST(city_covers_its_site_once) {
 END_TEST
 
 /* The surface has no gaps but around the site: the integral of the front's normal over it is that of any
- * surface with the same rim, and where it is flat, of the site. A wall that ended above its ground or a roof
- * beside its walls would turn it, and so would a footprint with a floor. */
+ * surface with the same rim, and where the rim is flat, of the site. A wall that ended above its ground, a
+ * roof beside its walls or a footprint with a floor would change the integral. */
 START_TEST(city_has_no_gaps) {
     for (int t = 0; t < 3; t++) {
         mesh m = city(terrains[t], 3, 1500, 2);
@@ -158,7 +158,8 @@ START_TEST(city_has_no_gaps) {
 }
 END_TEST
 
-/* Where elements of the ground meet in a corner, and where walls stand on it, heights agree: by position. */
+/* Where elements of the ground meet in a corner, and where walls stand on it, heights agree; corners are
+ * compared by position. */
 START_TEST(city_ground_is_one_surface) {
     for (int t = 1; t < 3; t++) {
         mesh m = city(terrains[t], 1, 1000, 1);

@@ -162,8 +162,8 @@ START_TEST(no_two_faces_lie_on_one_another) {
 END_TEST
 
 /* The surface has no gaps but those below and around an open scene, whose sides are alike: the integral of
- * the front's normal over it is nothing, or what lies open below. A face too many or missing would turn it.
- */
+ * the front's normal over it is 0, or the area that is open below. A face too many or missing would change
+ * it. */
 START_TEST(the_surface_has_no_gaps) {
     mesh m = scene(kinds[_i].name, kinds[_i].large, 4);
     const size_t sheets = kinds[_i].sheets == NULL ? m.n_groups : group_find(&m, kinds[_i].sheets);
@@ -187,8 +187,9 @@ END_TEST
 /* The fate of rays from every element. */
 typedef struct tally {
     size_t all, gone, backs;
-    size_t far;   /* met what is 8 m away or more, seen from above */
-    size_t parts; /* between which no light goes, over however many bounces; what sees only the sky is none */
+    size_t far;   /* share of rays that meet something 8 m away or more, from above */
+    size_t parts; /* parts between which no light goes, over any number of bounces; elements that see only the
+                     sky do not count */
 } tally;
 
 static tally cast_from_all(const mesh *m, size_t rays, uint64_t seed) {
@@ -231,7 +232,7 @@ static tally cast_from_all(const mesh *m, size_t rays, uint64_t seed) {
     return t;
 }
 
-/* None meets a back; in a closed scene none leaves, from an open one some do. */
+/* No ray meets a back face; in a closed scene none leaves, from an open one some do. */
 START_TEST(rays_stay_on_the_lit_side) {
     mesh m = scene(kinds[_i].name, kinds[_i].large, 5);
     const tally t = cast_from_all(&m, 64, 3);
@@ -245,7 +246,7 @@ START_TEST(rays_stay_on_the_lit_side) {
 }
 END_TEST
 
-/* Every room has a way to every other, but what it sees is itself; rooms come with the elements they need. */
+/* Every room is connected to every other, but sees only itself; rooms come with the elements they need. */
 START_TEST(rooms_are_joined_by_bent_corridors) {
     static const struct {
         size_t elements, fewest, most;
@@ -276,8 +277,8 @@ START_TEST(rooms_are_joined_by_bent_corridors) {
 }
 END_TEST
 
-/* As many openings as make a tree of the cells, and two to the outside: with fewer some cells could not be
- * reached (rays tell), with more there would be a way round. */
+/* The openings make a tree of the cells, and two lead outside: with fewer some cells could not be reached
+ * (rays show it), with more there would be a cycle. */
 START_TEST(maze_is_a_tree) {
     const size_t sizes[] = {0, 300, 2000, 20000};
     for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++) {
@@ -298,7 +299,8 @@ START_TEST(maze_is_a_tree) {
 END_TEST
 
 /* Four times as many elements are pyramids of half the width, each of sixteen as before. They fill the 6 m
- * between the tips at both ends, and are as high as wide, or the width that their area tells would not. */
+ * between the tips at both ends, and are as high as wide, or the width that follows from their area would
+ * differ. */
 START_TEST(pyramids_grow_in_number) {
     double foot = 0;
     for (size_t elements = 1000; elements <= 16000; elements *= 4) {

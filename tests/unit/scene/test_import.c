@@ -29,7 +29,7 @@ static mesh good_text(const char *text, import_report *report) {
     return m;
 }
 
-/* The text is refused with a message that names the file and says this. */
+/* Checks that the text is refused with a message that names the file and contains this text. */
 static void bad_text(const char *text, const char *says) {
     mesh m = {0};
     lam_error error = {0};
@@ -101,7 +101,7 @@ START_TEST(gltf_groups_are_nodes) {
 END_TEST
 
 START_TEST(mirrored_nodes_keep_their_fronts) {
-    /* One triangle that looks along z, in a plain node and in one mirrored in x. */
+    /* One triangle that faces along z, in a plain node and in one mirrored in x. */
     static const char gltf[] =
         "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0,1]}],"
         "\"nodes\":[{\"name\":\"plain\",\"mesh\":0},"

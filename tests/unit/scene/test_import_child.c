@@ -1,4 +1,4 @@
-/* The importer's child process may do what it likes: it is survived and told in one line. */
+/* The importer's child process may fail in any way: the parent survives it and reports it in one line. */
 #include "support/suite.h"
 
 #include "solver/scene/import/imported_faces.h"
@@ -71,7 +71,7 @@ static lam_status writes_a_file(const char *path, imported_faces *s, lam_error *
     return reads_well(path, s, error);
 }
 
-/* Something on every descriptor but standard input, output and error, where the reply's pipe must be. */
+/* Opens a file on every descriptor but standard input, output and error, where the reply's pipe must be. */
 static lam_status babbles(const char *path, imported_faces *s, lam_error *error) {
     (void)path, (void)s, (void)error;
     static const char nonsense[65536] = "lamsoup";
@@ -82,7 +82,7 @@ static lam_status babbles(const char *path, imported_faces *s, lam_error *error)
 
 static lam_status lies_about_corners(const char *path, imported_faces *s, lam_error *error) {
     (void)path;
-    /* after imported_faces_split there is nobody who checks this but the parent: an element added by hand */
+    /* only the parent checks after imported_faces_split: an element is added by hand */
     lam_status status = reads_well(path, s, error);
     struct imported_element *element = calloc(64, sizeof *element);
     for (int i = 0; i < 4; i++) element->corners[i] = 1000000;
@@ -112,7 +112,8 @@ START_TEST(child_is_survived) {
         {sleeps, LAM_ERR_FORMAT, "more than its 1 s"},
         {babbles, LAM_ERR_INTERNAL, "damaged reply"},
         {lies_about_corners, LAM_ERR_INTERNAL, "damaged reply"},
-#ifndef LAMBERT_SANITIZED /* where address space cannot be limited, and a killed write ends otherwise */
+#ifndef LAMBERT_SANITIZED /* where address space cannot be limited, and a killed write ends in another way   \
+                           */
         {hoards, LAM_ERR_MEMORY, "more than its 1024 MiB"},
 #endif
         {writes_a_file, LAM_ERR_FORMAT, "crashed (signal 25)"}, /* SIGXFSZ */

@@ -1,4 +1,4 @@
-/* Importing files that others made, whole, broken and damaged. */
+/* Imports files of other programs, whole, broken and damaged. */
 #include "support/suite.h"
 
 #include "solver/scene/import/imported_faces.h"
@@ -18,7 +18,7 @@ static void teardown(void) {
     folder_remove(folder);
 }
 
-/* A mesh that came out is sound; a refusal is one line that names the file. */
+/* An imported mesh is sound; a refusal is one line that names the file. */
 static void assert_loads_or_refuses(const char *path) {
     const import_options options = import_plain();
     mesh m = {0};
@@ -162,7 +162,7 @@ START_TEST(damaged_files_never_hurt) {
         const import_options options = {.unit = 1, .reflectance = -1, .cpu_seconds = 5};
         mesh m = {0};
         lam_error error = {0};
-        /* the library may crash on what it was not made for: that, too, is an answer of one line */
+        /* the library may crash on damaged input; the answer is one line all the same */
         if (scene_import(path, &options, &m, NULL, &error) != LAM_OK)
             ck_assert_msg(strstr(error.message, folder) != NULL, "%s", error.message);
         mesh_free(&m);

@@ -84,7 +84,7 @@ START_TEST(two_sided_meshes_have_backs) {
     measured.area = NULL;
     measured.normal = NULL;
     ck_assert_int_eq(mesh_measure(&measured, &error),
-                     LAM_OK); /* the backs' own corners say where they look */
+                     LAM_OK); /* the normal of a back follows from its own corners */
     for (size_t i = 0; i < 6; i++) {
         ck_assert_double_eq(m.area[i + 6], m.area[i]);
         ck_assert_uint_eq(m.elements[i + 6][3] == MESH_NO_VERTEX, i == 5);
@@ -349,7 +349,7 @@ START_TEST(store_keeps_every_bit) {
 }
 END_TEST
 
-/* One defect each; what the message must name. */
+/* One defect each, and the text that the message must contain. */
 static void spoil(mesh *m, int defect) {
     switch (defect) {
     case 0:

@@ -1,4 +1,4 @@
-/* Surfaces: what touches and faces about the same way. */
+/* Surfaces: elements that touch and face about the same way. */
 #include "solver/scene/surfaces.h"
 #include "support/box.h"
 #include "support/suite.h"
@@ -12,7 +12,7 @@ static size_t surfaces_of(const mesh *m, uint32_t *surface) {
     return count;
 }
 
-/* Every cell of box_mesh has four vertices of its own: they are found to be the same places. */
+/* Every cell of box_mesh has four vertices of its own: equal places are recognized. */
 START_TEST(a_box_has_six) {
     const double size[3] = {10, 6, 3};
     mesh m = box_mesh(size, 5, .5f);
