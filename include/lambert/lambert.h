@@ -200,8 +200,8 @@ size_t lam_sky_elements(const lam_sky *sky);
  * Cost: O(mn) a row, less for tiles that are dark. */
 void lam_sky_irradiance(const lam_sky *sky, size_t n_rows, const float *L, float *H0);
 
-/* L = first_bounce g, its transpose: what a sum over g of H0 says of every tile. g is [n_rows][n], L is
- * [n_rows][m]. */
+/* L = first_bounce g, the transpose: the gradient of <g, H0> by the radiance of every tile. g is [n_rows][n],
+ * L is [n_rows][m]. */
 void lam_sky_adjoint(const lam_sky *sky, size_t n_rows, const float *g, float *L);
 
 #pragma GCC visibility pop

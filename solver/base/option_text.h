@@ -25,7 +25,7 @@ bool option_is_verb(const option_command *command);
 void option_text_help(const option_command *command, const option_table *tables);
 void option_text_help_verbs(const option_command *program, const option_verb *verbs);
 
-/* A manual page in roff; of a program with verbs what comes before and after the sections of its verbs. */
+/* A manual page in roff; of a program with verbs its parts before and after the sections of the verbs. */
 void option_text_manual(const option_command *command, const option_table *tables);
 void option_text_manual_begin(const option_command *program, const option_verb *verbs);
 void option_text_manual_end(const option_command *program);
@@ -33,7 +33,7 @@ void option_text_manual_end(const option_command *program);
 /* The words of --print-completion. */
 #define OPTION_SHELLS "bash|zsh|fish"
 
-/* Completion of a command; of a program with verbs what comes before and after the commands of its verbs. */
+/* Completion of a command; of a program with verbs its parts before and after the commands of the verbs. */
 void option_text_completion(const char *shell, const option_command *command, const option_table *tables);
 void option_text_completion_begin(const char *shell, const option_command *program);
 void option_text_completion_end(const char *shell, const option_command *program, const option_verb *verbs);

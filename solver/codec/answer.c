@@ -44,7 +44,7 @@ bool answer_begin(buffer *b, const answer_shape *shape, const media_accept *as, 
            no_memory(why);
 }
 
-/* Refuses what would be written as something else than it is. */
+/* Refuses an answer that is outside the range of its format. */
 static bool refuse_range(double limit, problem *why) {
     if (limit < (double)FLT_MAX)
         return problem_set(why, PROBLEM_NOT_IN_ENCODING,
@@ -112,8 +112,7 @@ bool answer_placed(buffer *b, const answer_shape *shape, problem *why) {
     return true;
 }
 
-/* Behind the channels of a vector before, what stands between; each vector in brackets where there are
- * several. */
+/* Appends the separator behind the row before; each vector stands in brackets where there are several. */
 static bool before_row(buffer *b, const answer_shape *shape, size_t vector, size_t c) {
     if (c > 0) return buffer_append(b, ",", 1);
     return (vector == 0 || buffer_append(b, ",", 1)) && (shape->n_channels == 1 || buffer_append(b, "[", 1));

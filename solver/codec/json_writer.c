@@ -61,7 +61,7 @@ static inline void shortest_digits(float value, uint32_t *digits, int *exponent)
     double scale = power_of_ten(s);
     double y = x * scale, gap = half_gap * scale - 1e-4;
 
-    int64_t best = (int64_t)(y + 0.5); /* signed: what a CPU converts at once */
+    int64_t best = (int64_t)(y + 0.5); /* signed: one instruction converts it */
     int dropped = 0;
     int64_t unit = 10;
     for (int k = 1; k <= 9; k++, unit *= 10) {

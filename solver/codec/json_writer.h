@@ -6,7 +6,7 @@
 
 #include <stdint.h>
 
-/* Longest text of one float; what it is written in. */
+/* The longest text of one float, and a buffer for it. */
 #define JSON_FLOAT_MAX 16
 #define JSON_FLOAT_ROOM 32
 

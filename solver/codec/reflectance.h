@@ -25,9 +25,9 @@ typedef struct reflectance_request {
 
 void reflectance_request_free(reflectance_request *request);
 
-/* {"variant":NAME, "groups":{GROUP: a number or one for each channel, ...}}; a group's name means what it
- * means in an emission. False with *why filled; request must be freed either way. 400: not JSON; 422: what
- * the contract lists, a reflectance outside [0, 1); 503. */
+/* {"variant":NAME, "groups":{GROUP: a number or one for each channel, ...}}; group names are those of
+ * emissions. False with *why filled; request must be freed either way. 400: not JSON; 422: a request that the
+ * contract refuses, a reflectance outside [0, 1); 503. */
 bool codec_read_reflectance(const reflectance_scene *scene, const char *text, size_t length,
                             reflectance_request *request, problem *why);
 

@@ -74,7 +74,7 @@ done:
     return status;
 }
 
-/* Reads the next line, an error where the file ends; what is its name. */
+/* Reads the next line, an error where the file ends; the error names the line by `what`. */
 static lam_status reader_need(reader *r, const char *what, lam_error *error) {
     bool more = false;
     const lam_status status = reader_next(r, &more, error);

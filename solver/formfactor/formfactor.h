@@ -17,8 +17,8 @@ typedef struct pairs_report {
     double open;     /* no visibility segment was blocked */
     double hidden;   /* every one was */
     double mixed;    /* some were, or a neighbouring pair came out differently: estimated by many segments */
-    double accuracy; /* standard error of a mixed pair's factor: the one asked for, or what the number of
-                        segments allowed */
+    double accuracy; /* standard error of a mixed pair's factor: as requested, or as the number of segments
+                        allowed */
 } pairs_report;
 
 /* Above this many elements a store keeps the upper triangle A_i F_ij, j > i, in place of rows: half the

@@ -68,7 +68,7 @@ static bool is_final(const decision *d) {
     return true;
 }
 
-/* The reason: what is known of F, what was found for the method taken, how long others would take. */
+/* Writes the reason: the figures of F, those of the method taken, and the costs of the others. */
 static void explain(decision *d) {
     const candidate *own = d->taken;
     size_t length = 0;

@@ -10,10 +10,11 @@
  * matrix. */
 #define CHOICE_SCATTERED 4.
 
-/* Why a method may be taken whatever an answer costs; the highest claim wins, and equal ones by cost. */
+/* The grounds on which a method may be taken; the highest claim wins, and among equal ones the lowest cost.
+ */
 typedef enum choice_claim {
     CLAIM_COST,    /* none: by the cost of an answer */
-    CLAIM_USUAL,   /* before F is known: what most problems get */
+    CLAIM_USUAL,   /* before F is known: the method of most problems */
     CLAIM_SMALL,   /* the problem is so small that nothing else is worth it */
     CLAIM_OPTIONS, /* an option that was given has a meaning for this method only */
     CLAIM_INPUT    /* the problem has an input that only this method takes */
@@ -38,7 +39,7 @@ typedef struct candidate {
         double value;
     } figures[4];
     method_values own;  /* the options to build it with: as given, or as was found to suit epsilon */
-    lam_operator *op;   /* where only building it says what it costs; else NULL */
+    lam_operator *op;   /* where its cost is known only after the build; else NULL */
     build_report built; /* of op */
 } candidate;
 
@@ -57,13 +58,13 @@ typedef struct decision {
 } decision;
 
 /* Weighs the methods in the order of the list where options->method is auto, else takes that one. With
- * neither F nor stream in the problem, says what is going to be taken as far as that is known.
+ * neither F nor stream in the problem, decides as far as is possible without them.
  *
- * The hierarchical operator is built to see what it costs: nothing cheaper tells. Then the decision holds it
- * (taken->op), and whoever wants to use it sets op to NULL. Free with decision_free, which closes all others.
- * Cost: that of the hierarchical operator, a hundred rows of sparse inverses, else at most 40 products of S
- * with eight vectors and a few dozen with 32. Errors: LAM_ERR_ARGUMENT for an unknown method or one that
- * cannot use a stream, LAM_ERR_MEMORY, LAM_ERR_NUMERIC, LAM_ERR_CANCELLED. */
+ * The cost of the hierarchical operator is known only after its build. Then the decision holds the operator
+ * (taken->op), and a caller that takes it over sets op to NULL. Free with decision_free, which closes all
+ * others. Cost: that of the hierarchical operator, a hundred rows of sparse inverses, else at most 40
+ * products of S with eight vectors and a few dozen with 32. Errors: LAM_ERR_ARGUMENT for an unknown method or
+ * one that cannot use a stream, LAM_ERR_MEMORY, LAM_ERR_NUMERIC, LAM_ERR_CANCELLED. */
 lam_status choose_method(const build_problem *problem, const build_options *options, bool thorough,
                          decision *out, lam_error *error);
 void decision_free(decision *d);

@@ -6,8 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* The list of methods: adding one is a line here. auto weighs them in this order: one that asks what others
- * cost stands behind them. */
+/* The list of methods: adding one is a line here. auto weighs them in this order: a method that asks for the
+ * cost of others stands behind them. */
 #define METHOD_LIST(METHOD)                                                                                  \
     METHOD(emitters)                                                                                         \
     METHOD(exact)                                                                                            \

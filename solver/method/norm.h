@@ -1,4 +1,4 @@
-/* The norm of what a factorization left out. */
+/* The norm of the error of a factorization. */
 #ifndef LAMBERT_METHOD_NORM_H
 #define LAMBERT_METHOD_NORM_H
 

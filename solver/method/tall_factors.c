@@ -20,7 +20,7 @@ void tall_factors_free(tall_factors *f) {
 
 lam_status orthonormal_columns(size_t n, size_t k, float *Q, lam_error *error) {
     lam_status status = LAM_OK;
-    /* Rows of Q are columns to LAPACK: the QR of Q is the LQ of what it sees. */
+    /* LAPACK is column-major and sees Q^T: the QR of Q is the LQ of Q^T. */
     const lapack_int rows = (lapack_int)k, columns = (lapack_int)n;
     float *tau = memory_allocate(k, sizeof *tau, "QR", error);
     if (tau == NULL) TRY(LAM_ERR_MEMORY);

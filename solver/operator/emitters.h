@@ -33,7 +33,7 @@ typedef struct emitters {
     /* [C s]: an element, or (n and above) a tile n + t, where no other emitter sends anything; EMITTERS_NONE:
      * there is none. */
     uint32_t *own;
-    float *own_value; /* [C s], what it sends there */
+    float *own_value; /* [C s], its emission or radiance there */
 } emitters;
 
 #define EMITTERS_NONE UINT32_MAX

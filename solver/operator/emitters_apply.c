@@ -244,7 +244,8 @@ static void pull_back(const lam_operator *op, size_t c, lam_quantity quantity, c
             pulled[i] = rho[i] > 0 ? g[i] : 0;
 }
 
-/* w [s] += what g says of emission (radiosity), or, by - rho H0, of the sky (indirect). other: [n]. */
+/* w [s] += the transpose of the emitters' emission times g (radiosity), or of -rho H0 of their skies times g
+ * (indirect). other: [n]. */
 static void adjoint_of_light(const lam_operator *op, size_t c, lam_quantity quantity, const float *g,
                              float *other, float *L, float *w) {
     const emitters *self = operator_emitters_of(op);

@@ -290,7 +290,7 @@ static void hierarchical_apply(const lam_operator *op, size_t n_rhs, const float
 /* Where more than one in so many steps is needed, the whole answer is as quick. */
 enum { SOME_STEPS = 4 };
 
-/* For some elements: what is above them in the tree, and the rows of K that it takes. */
+/* For some elements: only their ancestors in the tree and the rows of K of these. */
 static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const float *E,
                                         size_t n_selected, const uint32_t *selected, float *P, void *work) {
     const hierarchical *self = (const hierarchical *)op;

@@ -13,7 +13,7 @@
  * by missing. */
 typedef struct mean_correction {
     size_t n, n_channels;
-    float *missing; /* [C][n], by position, what half precision holds; NULL: nothing is missing */
+    float *missing; /* [C][n], by position, rounded to half precision; NULL: nothing is missing */
     double *light;  /* [C], m^2 */
     float *lift;    /* [C][n], made by mean_correction_lift */
 } mean_correction;

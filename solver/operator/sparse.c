@@ -1,6 +1,6 @@
-/* kind "sparse": rows of M~ - I in CSR, and for what was left out of them one number a row (Aguerre 2016,
- * section 4.4.2). An answer costs what is stored, a row alone what is stored of it, light of few elements
- * what is stored of their columns. */
+/* kind "sparse": rows of M~ - I in CSR, and one number per row for its dropped entries (Aguerre 2016, section
+ * 4.4.2). The cost of an answer is the number of stored entries: of all rows, of the selected rows, or of the
+ * columns of the emitting elements. */
 #include "solver/operator/sparse.h"
 
 #include "solver/base/work_area.h"

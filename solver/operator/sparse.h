@@ -6,8 +6,8 @@
 #include "solver/operator/operator.h"
 
 typedef struct sparse_arrays {
-    csr *M;        /* [C], of n rows each: P without what was left out; rows and columns are positions */
-    float *delta;  /* [C][n] by position, what each row lacks of its sum; or NULL */
+    csr *M;        /* [C], of n rows each: P without its dropped entries; rows and columns are positions */
+    float *delta;  /* [C][n] by position, the sum of each row's dropped entries; or NULL */
     float *weight; /* [n] by position, its sum is 1; NULL with delta */
 } sparse_arrays;
 

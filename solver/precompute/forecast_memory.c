@@ -25,7 +25,7 @@ double forecast_rays(double n, const recipe *r) {
     return (double)r->rays;
 }
 
-/* Bytes of one tile of a sky: what each element receives of it, and where it is. */
+/* Bytes of one tile of a sky: the irradiance of each element, and the tile itself. */
 double forecast_tile_bytes(double n) {
     return 4 * n + 100;
 }
@@ -70,7 +70,7 @@ static double stream_bytes(double n, const recipe *r) {
     return r->method == RECIPE_NEAR_PAIRS ? n * fmin(n, near_share * (double)r->rays) * near_bytes : 0;
 }
 
-/* Of the rows of a sample, what lies in memory; those of pairs always do. */
+/* The part of a sample's rows that lies in memory; rows by pairs always do. */
 static double held_bytes(const forecast *f, double bytes, const recipe *r) {
     return f->large && r->method != RECIPE_PAIRS ? 0 : bytes;
 }

@@ -34,8 +34,8 @@ typedef struct precompute_options {
 /* Tables of options at most: those of precompute, of every method, and the last, which has no rows. */
 enum { PRECOMPUTE_TABLES = 8 + METHODS_MOST };
 
-/* The tables that fill o, whose fields without presets they set first. to_classify: only those that say what
- * the scene is and what suits it. Returns how many there are. */
+/* The tables that fill o, whose fields without presets they set first. to_classify: only those of the
+ * scene and of the choice of a method. Returns their number. */
 size_t precompute_tables(precompute_options *o, bool to_classify, option_table tables[PRECOMPUTE_TABLES]);
 
 /* True for an HDF5 file, or one that is named so: it is taken for a store. */
@@ -48,8 +48,8 @@ bool precompute_takes_as_store(const char *path);
 lam_status precompute_classify(const precompute_options *options, terminal *t, decision *out, size_t *n,
                                size_t *rays_used, lam_error *error);
 
-/* Does it all; on an error nothing is written. report says what was built; unused lists the options among
- * those given that the method built had no use for: "--alpha, --levels". */
+/* Runs all stages; on an error nothing is written. report describes the operator built; unused lists the
+ * options among those given that the method built had no use for: "--alpha, --levels". */
 typedef struct precompute_result {
     build_report report;
     char unused[256];

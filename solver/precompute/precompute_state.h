@@ -21,7 +21,7 @@ typedef struct precompute_state {
     double (*centre)[3]; /* [n], with surface where a method needs them */
     uint32_t *surface;
     form_factors f;
-    const build_method *expected;  /* by what is known before the form factors are */
+    const build_method *expected;  /* as chosen before the form factors are known */
     bool holds;                    /* rows of F are needed whatever the method is */
     bool streamed;                 /* rows of F are found as the method asks for them; f has none */
     ray_rows *rays;                /* of these, until the operator is built */

@@ -116,8 +116,8 @@ done:
     return status;
 }
 
-/* Puts *op, in f32, in another precision in its place and logs what that adds to its error: |P' - P|/|P| of
- * the bounced light P, area-weighted, channels stacked, for some single elements and for some emissions that
+/* Replaces *op, in f32, by one of another precision, and logs the error that this adds: |P' - P|/|P| of the
+ * reflected light P, area-weighted, channels stacked, for some single elements and for some emissions that
  * are random everywhere. A kind that has no choice stays as it is. */
 static lam_status precision_replace(lam_operator **op, panel_precision precision, const double *area,
                                     uint64_t seed, terminal *t, lam_error *error) {
@@ -237,7 +237,7 @@ lam_status stage_judge(precompute_state *state, lam_error *error) {
                  .context = state};
     uint64_t purpose = SEED_JUDGE_FIRST, own;
     for (int h = 0; h < 2; h++) {
-        /* Independent of what was factorized: kept form factors may have any seed. */
+        /* Independent of the F that was factorized: kept form factors may have any seed. */
         do own = precompute_seed(seed, purpose++);
         while (own == state->f.recipe.seed);
         j.halves[h] = state_judge_recipe(state, own);

@@ -160,7 +160,7 @@ done:
     return status;
 }
 
-/* sum A E = sum A [(1 - rho) H + B (1 - s)], s the row sums: what is emitted is absorbed or leaves. */
+/* sum A E = sum A [(1 - rho) H + B (1 - s)], s the row sums: emitted power is absorbed or leaves. */
 lam_status verify_energy(examination *e, check *c, lam_error *error) {
     lam_status status = LAM_OK;
     float *B = NULL, *H = NULL;

@@ -23,7 +23,8 @@ typedef struct pair_far_table {
     double *centre[3], *normal[3], *radius;
     double *reach;        /* the radius, or beyond everything where no product rule fits the element */
     double *corner[4][3]; /* a triangle's last one twice */
-    pair_far_points rule[PAIR_FAR_RULES]; /* the one for what is further first: 4 points an element, then 9 */
+    pair_far_points
+        rule[PAIR_FAR_RULES]; /* the one for larger distances first: 4 points per element, then 9 */
 } pair_far_table;
 
 /* tolerance is that of pair_factor_exchange. Freed by pair_far_table_free. Errors: LAM_ERR_MEMORY. */

@@ -377,7 +377,7 @@ static void forecast(const method_scale *scale, const void *own, method_forecast
                              .stored = stored_bytes * each * scale->n * scale->n_channels};
 }
 
-/* The transforms of an answer cost this much per element; its coefficients cost what sparse entries do. */
+/* The cost of an answer's transforms per element; a coefficient costs as much as a sparse entry. */
 static const double transform_cost = 40;
 
 /* Nothing cheaper than building it tells how many coefficients there are. */

@@ -153,8 +153,9 @@ static bool is_asked(const build_options *options, const void *own) {
            strcmp(options->precision, "f32") != 0;
 }
 
-/* Its cost, 2 n k, from an estimate of the spectrum of S. A rank says nothing of the light of single
- * elements: an operator that was built and keeps epsilon there too leaves low rank no part in the choice. */
+/* The cost, 2 n k, from an estimate of the spectrum of S. The rank for a bound on |S - Q V^T| does not bound
+ * the error of single elements, so an operator that was built and keeps epsilon for these too is preferred.
+ */
 static lam_status weigh(const decision *so_far, void *own, candidate *out, lam_error *error) {
     lam_status status = LAM_OK;
     const build_problem *p = so_far->problem;

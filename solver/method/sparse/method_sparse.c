@@ -226,9 +226,9 @@ done:
     return status;
 }
 
-/* Some rows of sparse inverses say what threshold keeps to epsilon, and how many entries are left then. A
- * dense F has no sparse inverse that is of use; where the noise of F is above epsilon, an inverse of it is
- * noise, and a method that filters the noise is better. */
+/* Estimates the threshold that keeps the error to epsilon, and the entries that are left, from some rows of
+ * sparse inverses. A dense F has no useful sparse inverse; where the noise of F is above epsilon, an inverse
+ * of it is noise, and a method that filters the noise is better. */
 static lam_status weigh(const decision *so_far, void *own, candidate *out, lam_error *error) {
     lam_status status = LAM_OK;
     sparse_options *o = own;

@@ -215,7 +215,7 @@ done:
     return status;
 }
 
-/* A number of patches takes the place of what would split them; of the factorizers it knows qr alone. */
+/* With --rank the options that split patches have no effect; qr is the only factorizer of this method. */
 static bool ignores(const void *own, const build_report *report, const char *option) {
     const two_mesh_options *o = own;
     (void)report;

@@ -451,7 +451,7 @@ lam_status outlines_cut(outlines *o, lam_error *error) {
         c.stamp == NULL || c.outer == NULL || c.hole == NULL)
         TRY(LAM_ERR_MEMORY);
     follow_all(&c);
-    /* A part that is not joined makes corners of what its neighbours had left out: they are cut again. */
+    /* A part that is not joined restores corners that its neighbours had left out: they are cut again. */
     for (size_t round = 0, failed = 1; failed > 0; round++) {
         if (round == ROUNDS_MOST) memset(o->alone, true, o->n_parts * sizeof *o->alone);
         TRY(cut_all(&c, &failed, error));
