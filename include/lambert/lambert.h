@@ -75,7 +75,7 @@ size_t lam_operator_work_bytes(const lam_operator *op, size_t n_rhs);
  * E and out are [n_rhs][C][n] in mesh order and must not overlap. work holds work_bytes, at least what
  * lam_operator_work_bytes says, aligned as malloc does; its content is lost. Allocates nothing.
  * A vector's bits do not depend on the batch it is in.
- * Cost: O(nk) a vector for a low-rank operator. Errors: LAM_ERR_ARGUMENT. */
+ * Cost: O(nk) per vector for a low-rank operator. Errors: LAM_ERR_ARGUMENT. */
 lam_status lam_operator_apply(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
                               float *out, void *work, size_t work_bytes, lam_error *error);
 
@@ -87,7 +87,7 @@ lam_status lam_operator_apply_lit(const lam_operator *op, size_t n_rhs, lam_quan
 
 /* The same for some elements only, of which no other row is computed: out is [n_rhs][C][n_selected], in the
  * order of selected, which may name an element twice; bit for bit what the whole answer has there. E and H0
- * are whole. Cost: O((n + n_selected) k) a vector for a low-rank operator, less where E is sparse. Errors:
+ * are whole. Cost: O((n + n_selected) k) per vector for a low-rank operator, less where E is sparse. Errors:
  * also LAM_ERR_ARGUMENT for an element that is not below n. */
 lam_status lam_operator_apply_selected(const lam_operator *op, size_t n_rhs, lam_quantity quantity,
                                        const float *E, const float *H0, size_t n_selected,
@@ -123,7 +123,7 @@ lam_status lam_operator_weights(const lam_operator *op, size_t n_rhs, const floa
                                 const float *L, float *W, lam_error *error);
 
 /* out = the quantity under emitters of weights W [n_rhs][C][s]: out is [n_rhs][C][n], or, where selected is
- * not NULL, [n_rhs][C][n_selected]. Otherwise as lam_operator_apply_selected. Cost: O(ns) a vector. */
+ * not NULL, [n_rhs][C][n_selected]. Otherwise as lam_operator_apply_selected. Cost: O(ns) per vector. */
 lam_status lam_operator_apply_emitters(const lam_operator *op, size_t n_rhs, lam_quantity quantity,
                                        const float *W, size_t n_selected, const uint32_t *selected,
                                        float *out, void *work, size_t work_bytes, lam_error *error);
@@ -139,7 +139,7 @@ lam_status lam_operator_apply_adjoint(const lam_operator *op, size_t n_rhs, lam_
                                       lam_error *error);
 
 /* The form factors F that a store keeps (lambert precompute --keep-form-factors), as rows of single
- * precision, 8 bytes an entry, or compressed, with bounds on what that leaves out; immutable once open. */
+ * precision, 8 bytes per entry, or compressed, with bounds on what that leaves out; immutable once open. */
 typedef struct lam_form_factors lam_form_factors;
 
 /* Opens the store at path and loads them; *F is NULL when it keeps none. The caller closes them with
@@ -197,7 +197,7 @@ size_t lam_sky_elements(const lam_sky *sky);
 
 /* H0 = first_bounce^T L for n_rows rows (vectors times channels): L is [n_rows][m], W/(m^2 sr), H0 is
  * [n_rows][n] in mesh order. Allocates nothing; a row's bits do not depend on its neighbours.
- * Cost: O(mn) a row, less for tiles that are dark. */
+ * Cost: O(mn) per row, less for tiles that are dark. */
 void lam_sky_irradiance(const lam_sky *sky, size_t n_rows, const float *L, float *H0);
 
 /* L = first_bounce g, the transpose: the gradient of <g, H0> by the radiance of every tile. g is [n_rows][n],

@@ -318,7 +318,7 @@ lam_status formfactors_throughput(const bench_run *run, lam_error *error) {
     const bool quick = run->scale == BENCH_QUICK, full = run->scale == BENCH_FULL;
     const size_t passes = quick ? 2 : full ? PASSES_MOST : 5;
     table out = {.name = "throughput",
-                 .title = "Throughput: rays a second beside a bare loop over the same rays",
+                 .title = "Throughput: rays per second beside a bare loop over the same rays",
                  .columns = throughput_columns,
                  .n_columns = sizeof throughput_columns / sizeof *throughput_columns,
                  .printed = true};

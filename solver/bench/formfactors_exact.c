@@ -43,7 +43,7 @@ typedef struct method_summary {
     double hidden_worst, zero_worst;
 } method_summary;
 
-/* The bar of an estimate F_ij, by what the method says of itself and what a user knows.
+/* The error bar of an estimate F_ij, from the figures that the method reports and those that a user knows.
  * Rays: two standard errors of independent rays. Of the counts c_ij and c_ji of N rays each,
  *     F = (c_ij + c_ji) / N * A_j / (A_i + A_j)
  * so the variance is [F_ij (1 - F_ij) + F_ji (1 - F_ji)] / N * (A_j / (A_i + A_j))^2; the points of a

@@ -74,7 +74,8 @@ static const option_command command = {
     .name = "lambert bench",
     .arguments = "SUITE... [-o DIR]",
     .summary =
-        "Measure. Suites: formfactors (error against exact values and against time, rays a second), lowrank "
+        "Measure. Suites: formfactors (error against exact values and against time, rays per second), "
+        "lowrank "
         "(factorizations and two meshes beside the tables of the papers), stability (operators of problems "
         "that are "
         "numerically hard), cities (sparse inverses, few emitters and Jacobi sweeps beside the tables of the "
@@ -306,8 +307,7 @@ done:
     return status;
 }
 
-/* Runs a script with so many arguments at most; where it fails it has told why on its output or standard
- * error. */
+/* Runs a script; a script that fails has written the reason to its output or to standard error. */
 static lam_status script_run(const bench_run *run, const char *const arguments[], lam_error *error) {
     lam_status status = LAM_OK;
     pid_t pid = 0;

@@ -164,7 +164,8 @@ done:
     return status;
 }
 
-/* One solve after the other by so many threads: median, 99 % quantile, solves a second, their number. */
+/* Solves one after the other, each by `threads` threads: median, 99 % quantile, solves per second, their
+ * number. */
 static lam_status solve_alone(solver *s, int threads, double seconds, lam_error *error) {
     lam_status status = LAM_OK;
     size_t count = 0;

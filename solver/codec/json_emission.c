@@ -223,7 +223,7 @@ static bool read_sky(parser *p) {
     return read_side(p, p->scene->n_tiles, "tile", L);
 }
 
-/* One weight an emitter. */
+/* One weight for each emitter. */
 static bool read_emitters(parser *p) {
     float *W;
     if (p->scene->n_emitters == 0)

@@ -21,8 +21,8 @@ typedef struct sunlight {
     float *given;  /* [n]: one vector that is known; the members above are then unused */
 } sunlight;
 
-/* Takes over suns [n_vectors], also on an error. Rays are n_points an element, of those wanted or, where that
- * is NULL, of all. in_tiles: the sky whose answers have the sun in a tile, or NULL. The light of the
+/* Takes over suns [n_vectors], also on an error. Rays are n_points per element, of those wanted or, where
+ * that is NULL, of all. in_tiles: the sky whose answers have the sun in a tile, or NULL. The light of the
  * ground on an element is found from the tiles that it does not see, where first_bounce = a F_ground c: the
  * least of first_bounce / c, at most the share of an open ground at this inclination, a (1 - n_up) / 2.
  * Errors: those of the store's /sky, LAM_ERR_MEMORY, LAM_ERR_INTERNAL. */

@@ -97,7 +97,7 @@ size_t panel_work_bytes(const panel *a, size_t m);
 /* T_v = a^T X_v for m vectors: X_v = X + v x_stride holds n numbers, T_v = T + v t_stride gets k.
  * Rows where every X_v is 0 are not read. Sums over rows end in double; the bits of T_v depend on X_v alone,
  * not on the batch nor on the number of threads.
- * work is aligned to WORK_AREA_ALIGN. Cost: O(nk) a vector, one pass over a for PANEL_VECTORS of them. */
+ * work is aligned to WORK_AREA_ALIGN. Cost: O(nk) per vector, one pass over a for PANEL_VECTORS of them. */
 void panel_project(const panel *a, size_t m, const float *X, size_t x_stride, float *T, size_t t_stride,
                    void *work);
 

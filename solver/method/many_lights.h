@@ -30,8 +30,8 @@ typedef struct many_lights_report {
 lam_status many_lights_solve(const many_lights_input *c, double tolerance, float *T,
                              many_lights_report *report, lam_error *error);
 
-/* The same by so many Jacobi sweeps, B := E' + R F B from B = E' (Aguerre 2016, eqs. 2.5 and 4.8), as the
- * thesis does it: for comparison. */
+/* The same by a given number of Jacobi sweeps, B := E' + R F B from B = E' (Aguerre 2016, eqs. 2.5 and 4.8),
+ * for comparison. */
 lam_status many_lights_jacobi(const many_lights_input *c, size_t sweeps, float *T, lam_error *error);
 
 #endif

@@ -44,7 +44,7 @@ void factors_describe(const factors *f, operator_description *description);
  * V_bytes; 0 when that overflows. */
 size_t factors_work_bytes(const factors *f, size_t n_rhs, size_t V_bytes);
 
-/* Room for T, [n_rhs][C][stride], of which the kind fills k numbers a row. */
+/* Room for T, [n_rhs][C][stride], of which the kind fills k numbers per row. */
 float *factors_take_columns(const factors *f, size_t n_rhs, void **work);
 
 /* P from T for all rows or, with selected not NULL, for n_selected elements. */

@@ -63,7 +63,7 @@ static double trace_bytes(double n, const recipe *r, bool to_disk, bool large) {
 }
 
 /* Near pairs alone, where nothing else is held: measured 7 (a Cornell box of 163,687 elements) to 33 (a city
- * of 39,999) an element at 512 rays; as found and in rows. */
+ * of 39,999) per element at 512 rays; as found and in rows. */
 static const double near_share = .25, near_bytes = 17;
 
 static double stream_bytes(double n, const recipe *r) {

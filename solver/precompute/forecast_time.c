@@ -4,7 +4,8 @@
 #include <math.h>
 #include <stdio.h>
 
-/* Processor seconds a pair, beside rays: packing, merging, some 30 sweeps, expanding; and of pair by pair. */
+/* Processor seconds per pair, beside rays: packing, merging, some 30 sweeps, expanding; and of pair by pair.
+ */
 static const double merge_seconds = 1.2e-7, pair_seconds = 4e-7;
 
 static double sample_seconds(double n, const recipe *r, double rays_per_second, double n_threads) {

@@ -189,7 +189,7 @@ END_TEST
 
 /* Weights come back from what they send out; what no weights send is refused. The last emitter is nowhere
  * alone, so it is left out here. */
-START_TEST(weights_are_told_from_light) {
+START_TEST(weights_follow_from_light) {
     enum { FEW = 6 };
     problem *p = make_problem();
     lam_operator *op = good_operator(p, FEW);
@@ -383,7 +383,7 @@ int main(void) {
     tcase_add_checked_fixture(cases, setup, operator_file_teardown);
     tcase_add_test(cases, answers_are_sums);
     tcase_add_test(cases, adjoint_is_the_transpose);
-    tcase_add_test(cases, weights_are_told_from_light);
+    tcase_add_test(cases, weights_follow_from_light);
     tcase_add_test(cases, wrong_calls_are_refused);
     tcase_add_test(cases, what_is_saved_comes_back_bit_for_bit);
     tcase_add_test(cases, memory_that_fails_is_not_lost);

@@ -28,7 +28,7 @@ enum { COMPRESS_LIT_MOST = 16 };
 /* out: the entries of the upper triangle of S = W A^1/2 F A^-1/2 W^T above the threshold. All of S is
  * computed, in double, node by node, so that the norm of what is dropped is exact. Not finished
  * (compressed_finish); freed with compressed_free; n is 0 if more than `most` coefficients were needed. Cost:
- * O(n^2), 500 n operations for each of n / 3 nodes; memory: about 60 n numbers a thread. Errors:
+ * O(n^2), 500 n operations for each of n / 3 nodes; memory: about 60 n numbers per thread. Errors:
  * LAM_ERR_MEMORY, LAM_ERR_CANCELLED, LAM_ERR_NUMERIC. */
 lam_status compress_form_factors(const compress_input *input, compressed_factors *out, lam_error *error);
 

@@ -13,7 +13,7 @@ enum { BUDGET_LEVELS_MOST = 20 };
  * the first part lets only what is orthogonal to W through, the second only what is in W. For any x, split as
  * x = y + W z with W^T y = 0, |(A - Q V^T) x| <= e_ch |y| + e_p |z| with e_p what its own truncation leaves,
  * and |y|^2 + |z|^2 = |x|^2, so |A - Q V^T|_2^2 <= e_p^2 + |A (I - W W^T)|_2^2 <= e_p^2 + e_1^2 + e_2^2 by
- * theorem 3.1 of the thesis; in the Frobenius norm both are equalities. Hence over all 2^l nodes of level l
+ * theorem 3.1 of Aguerre 2016; in the Frobenius norm both are equalities. Hence over all 2^l nodes of level l
  * that leave p_l each, sum_l 2^l p_l^2 <= epsilon^2 keeps the bound. (Aguerre 2016, eq. 3.10, adds e_p +
  * sqrt(2) e_ch in place of squares.) */
 typedef struct budget {

@@ -1,6 +1,6 @@
 /* The sub-Gaussian randomized SVD (Aizenbud and Averbuch 2016; Aguerre 2016, algorithm 3): sketches by sparse
  * Gaussian matrices, and S X found from a sketch of S by least squares instead of by another pass. As both
- * sketches can be taken at once, one pass is enough where the thesis has two. */
+ * sketches can be taken at once, one pass suffices in place of the two of algorithm 3. */
 #include "solver/linalg/dense.h"
 #include "solver/method/low_rank/sketch.h"
 #include "store/status.h"

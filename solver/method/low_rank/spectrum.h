@@ -15,9 +15,9 @@ typedef struct spectrum {
 void spectrum_free(spectrum *s);
 
 /* Stochastic Lanczos quadrature (Golub and Meurant 2010, ch. 11): a random unit vector meets all
- * eigenvectors of S alike, so the Gauss rule that Lanczos steps from it lead to counts eigenvalues; eight
- * vectors go together and their rules are put together. The number above x is right to a few hundredths of
- * itself where the values lie close, and is of no use for the few largest one by one. Cost: `steps` products
+ * eigenvectors of S alike, so the Gauss rule of the Lanczos steps from it counts eigenvalues; the rules of
+ * eight vectors are joined. The number above x is accurate to a few per cent where the values lie close, and
+ * useless for the few largest. Cost: `steps` products
  * of S with eight vectors, memory for 24 n numbers. Deterministic in seed.
  * Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC, LAM_ERR_CANCELLED, those of the source of S. */
 lam_status spectrum_find(const scaled_matrix *S, size_t steps, uint64_t seed, const progress *told,

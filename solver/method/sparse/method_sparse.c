@@ -98,7 +98,7 @@ done:
     return status;
 }
 
-/* Weights of the mean of E: areas, or, as in the thesis, the same for every element. */
+/* Weights of the mean of E: areas, or, as in Aguerre 2016, the same for every element. */
 static void set_weights(const build_problem *problem, sparse_correction correction, float *weight) {
     double sum = 0;
     for (size_t i = 0; i < problem->n; i++) sum += problem->area[i];

@@ -34,7 +34,7 @@ static buffer make(npy_type type, size_t rank, const size_t *shape, size_t count
     return b;
 }
 
-/* The rounding told is what the array itself shows, and the largest of all that were written. */
+/* The reported rounding is that of the array itself, the largest of all values written. */
 START_TEST(doubles_tell_their_rounding) {
     const double values[] = {1, 1.0 / 3, -2e-3, 700.1, 0};
     enum { COUNT = sizeof values / sizeof *values };

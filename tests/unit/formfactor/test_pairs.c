@@ -196,8 +196,8 @@ START_TEST(an_occluder_never_raises_a_factor) {
 }
 END_TEST
 
-/* With fewer segments than all mixed pairs ask for each is found less accurately, with more more so, and that
- * is told. */
+/* With fewer segments than all mixed pairs request, each factor is less accurate, with more it is more
+ * accurate, and the accuracy is reported. */
 START_TEST(segments_are_shared) {
     static const struct {
         double accuracy, least, most;

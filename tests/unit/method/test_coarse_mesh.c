@@ -210,7 +210,7 @@ START_TEST(halves_are_cut_across_the_longest_side) {
 }
 END_TEST
 
-/* Elements all in one place can be told apart only by number. */
+/* Elements at the same place differ only in their number. */
 START_TEST(what_lies_in_one_place_is_split_too) {
     room r = room_create(hall, 3, .5f, 1);
     for (size_t i = 0; i < r.m.n; i++)

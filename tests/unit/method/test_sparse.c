@@ -208,7 +208,8 @@ START_TEST(bits_do_not_depend_on_threads) {
 }
 END_TEST
 
-/* The threshold rises until all fits, and is told; where the forecast is passed nothing is kept. */
+/* The threshold rises until all entries fit, and is reported; where the forecast is exceeded nothing is kept.
+ */
 START_TEST(memory_bounds_the_entries) {
     fixture f = subject(8);
     build_report report;

@@ -289,7 +289,7 @@ static void write_store(const char *path, const mesh *m, const form_factors *f) 
     ck_ok(store_seal(s, &error));
 }
 
-/* Rows and the triangle give the same F, to the bit, and none is told as none. */
+/* Rows and the triangle give the same F, to the bit; a store without F gives NULL. */
 START_TEST(both_storages) {
     char folder[64], path[128];
     view v = make_view(CITY);

@@ -60,7 +60,7 @@ START_TEST(what_is_gone_reads_as_zeros) {
 }
 END_TEST
 
-START_TEST(ranges_are_told_apart) {
+START_TEST(ranges_differ) {
     size_t offset = 1;
     map_range *low = map_guard_add(mapping, 2 * page), *high = map_guard_add(mapping + 2 * page, 6 * page);
     ck_assert_int_eq(ftruncate(fd, 0), 0);
@@ -134,7 +134,7 @@ int main(void) {
     TCase *tests = tcase_create("map_guard");
     tcase_add_checked_fixture(tests, setup, teardown);
     tcase_add_test(tests, what_is_gone_reads_as_zeros);
-    tcase_add_test(tests, ranges_are_told_apart);
+    tcase_add_test(tests, ranges_differ);
     tcase_add_test(tests, threads_that_block_signals_live_too);
     tcase_add_test_raise_signal(tests, a_fault_elsewhere_ends_the_process, SIGBUS);
     tcase_add_test_raise_signal(tests, a_signal_that_was_sent_ends_the_process, SIGBUS);
