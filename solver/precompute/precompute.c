@@ -38,7 +38,7 @@ uint64_t precompute_seed(uint64_t seed, seed_purpose purpose) {
 }
 
 static void log_stage(precompute_state *state, const char *stage, double started) {
-    terminal_log(state->t, "%-14s%8.2f s", stage, clock_seconds() - started);
+    terminal_log_stage(state->t, stage, clock_seconds() - started);
 }
 
 static void log_form_factors(precompute_state *state) {

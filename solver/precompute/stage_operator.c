@@ -153,7 +153,7 @@ static void log_report(const precompute_state *state) {
     const precompute_options *o = state->options;
     char line[512];
     for (size_t k = 0; k < r->n_steps; k++)
-        terminal_log(state->t, "%-14s%8.2f s", r->steps[k].name, r->steps[k].seconds);
+        terminal_log_stage(state->t, r->steps[k].name, r->steps[k].seconds);
     report_line(r, line, sizeof line);
     terminal_log(state->t, "%s", line);
     if (r->below_noise)

@@ -1,5 +1,6 @@
 /* lambert precompute: turns a scene into a store. */
 #include "solver/base/atomic_file.h"
+#include "solver/codec/describe.h"
 #include "solver/precompute/precompute.h"
 #include "solver/verbs/verbs.h"
 
@@ -18,6 +19,36 @@ static const option_command command = {
     .least_arguments = 1,
     .most_arguments = 1,
 };
+
+static const option_row json_rows[] = {
+    {.name = "json",
+     .kind = OPTION_FLAG,
+     .help = "Print the description of the store and the seconds of each stage as JSON"},
+    {0},
+};
+
+/* The answer of `lambert info --json`, with the path of the store and the seconds of each stage. */
+static lam_status print_json(const char *path, const terminal *t, lam_error *error) {
+    lam_status status = LAM_OK;
+    store *s = NULL;
+    json_t *about = NULL, *seconds = json_object();
+    char *text = NULL;
+    TRY(store_open(path, &s, error));
+    TRY(describe_store(s, &about, error));
+    for (size_t k = 0; k < t->n_done; k++)
+        json_object_set_new(seconds, t->done[k].name, json_real(t->done[k].seconds));
+    json_object_set_new(about, "output", json_string(path));
+    json_object_set(about, "seconds", seconds);
+    text = json_dumps(about, JSON_INDENT(2));
+    if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory to describe it", path);
+    puts(text);
+done:
+    free(text);
+    json_decref(seconds);
+    json_decref(about);
+    store_close(s);
+    return status;
+}
 
 static bool same_file(const char *a, const char *b) {
     struct stat of_a, of_b;
@@ -111,13 +142,16 @@ static void log_unused(terminal *t, const option_result *given, const precompute
 
 int cmd_precompute(int argc, char **argv) {
     precompute_options o;
-    option_table tables[PRECOMPUTE_TABLES];
+    option_table tables[PRECOMPUTE_TABLES + 1];
+    bool json = false;
     option_result given = {0};
     lam_error error = {0};
     terminal term;
     precompute_result result = {.unused = ""};
     char *line = command_line(argc, argv), *continues = NULL;
-    precompute_tables(&o, false, tables);
+    const size_t n_tables = precompute_tables(&o, false, tables);
+    tables[n_tables] = (option_table){"", json_rows, &json};
+    tables[n_tables + 1] = (option_table){.rows = NULL};
     int code = options_parse(&command, tables, argc, argv, &given);
     if (code == OPTIONS_GO) {
         o.input = given.arguments[0];
@@ -143,5 +177,6 @@ int cmd_precompute(int argc, char **argv) {
     if (code != 0) return code;
     log_unused(&term, &given, &o, &result);
     terminal_log(&term, "%s", o.output);
+    if (json && print_json(o.output, &term, &error) != LAM_OK) return terminal_fail(&term, &error);
     return 0;
 }

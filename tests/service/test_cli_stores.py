@@ -188,5 +188,48 @@ class Stores(Case):
         self.assertRegex(done.stdout, r"(?m)^BROKEN +scene +stale: group .*material")
 
 
+class Json(Case):
+    def test_precompute_describes_its_store(self):
+        out = self.path("a.h5")
+        done = must("precompute", self.box, "-o", out, "--method", "exact", "--rays", 64, "--probes", 4, "--quiet",
+                    "--json")
+        answer = json.loads(done.stdout)
+        self.assertEqual(done.stderr, "")
+        self.assertEqual(answer.pop("output"), out)
+        seconds = answer.pop("seconds")
+        self.assertLessEqual({"import", "mesh", "form factors", "invert", "judge", "store"}, set(seconds))
+        self.assertTrue(all(value >= 0 for value in seconds.values()))
+        self.assertEqual(answer, json.loads(must("info", out, "--json").stdout))
+        for name in ("elements", "channels", "kind", "method", "reason", "bytes", "error"):
+            self.assertIn(name, answer)
+
+    def test_solve_prints_the_same_as_json(self):
+        emission, refined = self.path("batch.npy"), ("--tolerance", "1e-6")
+        n = 6 * 4 * 4
+        numpy.save(emission, numpy.random.default_rng(7).random((24, n), dtype=numpy.float32))
+        for more in ((), ("--quantity", "indirect"), ("--emission", emission), refined):
+            light = () if "--emission" in more else ("--emit", "floor=2")
+            table = must("solve", self.store, *light, *more).stdout
+            answer = json.loads(must("solve", self.store, *light, *more, "--json").stdout)
+            self.assertEqual(answer["quantity"], "indirect" if "indirect" in more else "radiosity")
+            self.assertEqual(("certificate" in answer, "error" in answer), (more == refined, more != refined))
+            rows = [line.split() for line in table.splitlines()[1:] if not line.startswith("stated")]
+            self.assertEqual([row[0] for row in rows], list(answer["groups"]))
+            for name, elements, area, *means in rows:
+                group = answer["groups"][name]
+                self.assertEqual(int(elements), group["elements"])
+                self.assertAlmostEqual(float(area), group["area"], delta=1e-3 * group["area"])
+                numpy.testing.assert_allclose([float(x) for x in means], numpy.ravel(group["mean"]), rtol=1e-5)
+        reduced = ("solve", self.store, "--emit", "floor=2", "--reduce", "ceiling=mean,max")
+        must(*reduced, "-o", self.path("a.json"))
+        with open(self.path("a.json"), encoding="utf-8") as file:
+            self.assertEqual(json.loads(must(*reduced, "--json").stdout), json.load(file))
+        year = ("solve", self.store, "--emission", emission, "--annual", "sum", "--annual", "autonomy=.5")
+        answer = json.loads(must(*year, "--json").stdout)["annual"]
+        self.assertEqual(list(answer), ["sum", "autonomy_0.5"])
+        self.assertEqual(set(answer["sum"]["floor"]), {"elements", "area", "mean"})
+        self.refused(2, "--json or -o", "solve", self.store, "--json", "-o", self.path("a.npy"))
+
+
 if __name__ == "__main__":
     unittest.main()
