@@ -343,11 +343,16 @@ int cmd_solve(int argc, char **argv) {
     if (f.quantity == NULL) f.quantity = year.n_figures > 0 ? "irradiance" : "radiosity";
     reduction reductions[OPTION_LIST_MAX] = {0};
     size_t n_reductions = 0;
-    for (size_t i = 0; i < f.reduce.count; i++)
-        if (reductions_add(reductions, &n_reductions, f.reduce.items[i], &error) != LAM_OK)
-            return options_usage(verb.name, "%s", error.message);
-    terminal_open(&term, verb.name, false, false);
-    const lam_status status = solve(given.arguments[0], &f, &year, reductions, n_reductions, &term, &error);
+    lam_status status = LAM_OK;
+    for (size_t i = 0; status == LAM_OK && i < f.reduce.count; i++)
+        status = reductions_add(reductions, &n_reductions, f.reduce.items[i], &error);
+    if (status != LAM_OK) {
+        code = options_usage(verb.name, "%s", error.message);
+    } else {
+        terminal_open(&term, verb.name, false, false);
+        status = solve(given.arguments[0], &f, &year, reductions, n_reductions, &term, &error);
+        code = status == LAM_OK ? 0 : terminal_fail(&term, &error);
+    }
     reductions_free(reductions, n_reductions);
-    return status == LAM_OK ? 0 : terminal_fail(&term, &error);
+    return code;
 }
