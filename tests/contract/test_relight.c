@@ -231,7 +231,7 @@ int main(void) {
     Suite *suite = suite_create("relit operators");
     TCase *tests = tcase_create("relight");
     tcase_set_timeout(tests, 120);
-    tcase_add_loop_test(tests, the_bits_are_those_of_an_operator_built_so, 0, 16);
+    tcase_add_loop_test(tests, the_bits_are_those_of_an_operator_built_so, 0, 12);
     tcase_add_loop_test(tests, a_relit_operator_goes_into_a_store, 0, 2);
     tcase_add_loop_test(tests, what_has_no_factors_cannot_be_relit, 0, 4);
     tcase_add_loop_test(tests, bad_reflectances_are_refused, 0, 4);
