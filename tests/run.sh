@@ -62,8 +62,8 @@ cmake --preset tsan -DLAMBERT_TEST_PROGRAM="$PWD/build/dev/lambert" >/dev/null
 run_ctest tsan -j $((jobs + 1)) -R 'service\.(daemon|reduce|guard|headers)|unit\.(batch|adjoint_rows|guard_parts)'
 unset CK_FORK OPENBLAS_NUM_THREADS OMP_NUM_THREADS LAMBERTD_OMP_THREAD_LIMIT
 
-step "a daemon to which memory, clocks and kill -9 happen; an installation into an empty prefix"
-run_ctest dev -R 'service\.(faults|install)$'
+step "a daemon to which memory, clocks and kill -9 happen; an installation; the commands of all documents"
+run_ctest dev -R 'service\.(faults|install|documents)$'
 
 step "a warning-free build by clang, its unit and contract tests, clang-tidy"
 build clang

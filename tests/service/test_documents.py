@@ -1,0 +1,150 @@
+"""README and manual: every command in them runs, every link leads somewhere, every option they name exists.
+
+Blocks of a document are one script, run in an empty folder. ```sh runs as it stands. ```sh slow runs on small scenes
+(--elements at most 600, suites of bench with --quick). ```sh elsewhere is run by .ci/run: the test looks the line up
+there. A ```json block is the answer that the request before it has to get, up to times and rounding.
+"""
+import json
+import math
+import os
+import pathlib
+import re
+import shutil
+import socket
+import subprocess
+import tempfile
+import unittest
+
+import weather
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+MANUAL = ROOT / "deploy" / "docs"
+DOCUMENTS = [path.resolve() for path in (ROOT / "README.md", *sorted(MANUAL.glob("*.md")))]
+LAMBERT, LAMBERTD = os.environ["LAMBERT"], os.environ["LAMBERTD"]
+PORT_IN_DOCUMENTS = "127.0.0.1:8317"
+# Options of other programs that the documents name.
+FOREIGN = {"--once", "--fail-with-body", "--target", "--build", "--prefix", "--cflags", "--libs", "--install", "--preset", "--static"}
+
+
+def blocks(document):
+    """(language with its marks, text) of every fenced block."""
+    return re.findall(r"^```([^\n]*)\n(.*?)^```", document.read_text(), re.M | re.S)
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+def made_small(text):
+    text = re.sub(r"--elements (\d+)", lambda m: f"--elements {min(int(m[1]), 600)}", text)
+    return re.sub(r"^(lambert bench .*)$", r"\1 --quick", text, flags=re.M)
+
+
+def alike(expected, got, path=""):
+    """The first difference of two answers, or None; numbers to 1 %, times and errors only by their names."""
+    if isinstance(expected, dict) and isinstance(got, dict):
+        if expected.keys() != got.keys():
+            return f"{path}: members {sorted(got)} instead of {sorted(expected)}"
+        for key in expected:
+            if key not in ("time_ms", "error"):
+                why = alike(expected[key], got[key], f"{path}/{key}")
+                if why:
+                    return why
+        return None
+    if isinstance(expected, list) and isinstance(got, list) and len(expected) == len(got):
+        return next(filter(None, (alike(e, g, f"{path}/{i}") for i, (e, g) in enumerate(zip(expected, got)))), None)
+    if isinstance(expected, float) and isinstance(got, (int, float)):
+        return None if math.isclose(expected, got, rel_tol=.01) else f"{path}: {got} instead of {expected}"
+    return None if expected == got else f"{path}: {got!r} instead of {expected!r}"
+
+
+class Documents(unittest.TestCase):
+    def run_document(self, document):
+        port = free_port()
+        script, answers = ["trap 'kill $(jobs -p) 2>/dev/null || true' EXIT"], []
+        for mark, text in blocks(document):
+            if mark in ("sh", "sh slow"):
+                script.append(made_small(text) if mark == "sh slow" else text)
+            elif mark == "json":
+                # The answer is the text printed since the last mark.
+                script.append(f"echo; echo '=== answer {len(answers)}'")
+                answers.append(json.loads(text))
+        with tempfile.TemporaryDirectory() as folder:
+            tools = pathlib.Path(folder, "tools")
+            work = pathlib.Path(folder, "work")
+            tools.mkdir()
+            work.mkdir()
+            (tools / "lambert").symlink_to(LAMBERT)
+            (tools / "lambertd").write_text(f'#!/bin/sh\nexec "{LAMBERTD}" --listen 127.0.0.1:{port} "$@"\n')
+            (tools / "lambertd").chmod(0o755)
+            (work / "oakland.epw").write_text(weather.epw(weather.a_year()))
+            path = f"{tools}:{pathlib.Path(LAMBERT).parent}:/usr/bin:{os.environ['PATH']}"
+            text = "\n".join(script).replace(PORT_IN_DOCUMENTS, f"127.0.0.1:{port}")
+            done = subprocess.run(["bash", "-eu", "-o", "pipefail", "-c", text], cwd=work, capture_output=True, text=True,
+                                  timeout=800, check=False, env={**os.environ, "PATH": path})
+            self.assertEqual(done.returncode, 0, f"{document.name}: {done.stderr[-2000:]}\n{done.stdout[-2000:]}")
+        for i, expected in enumerate(answers):
+            printed = done.stdout.split(f"=== answer {i}\n")[0].strip().splitlines()
+            self.assertIsNone(alike(expected, json.loads(printed[-1])), f"{document.name}: answer {i}")
+
+    def test_options_exist(self):
+        verbs = re.findall(r"^  (\w+) ", subprocess.run([LAMBERT, "--help"], capture_output=True, text=True, check=True).stdout, re.M)
+        self.assertGreater(len(verbs), 5)
+        known = set(FOREIGN)
+        for command in [[LAMBERTD, "--help"], [LAMBERT, "--help"], *([LAMBERT, verb, "--help"] for verb in verbs)]:
+            known |= set(re.findall(r"--[a-z0-9-]+", subprocess.run(command, capture_output=True, text=True, check=True).stdout))
+        for document in DOCUMENTS:
+            for option in set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]+", document.read_text())):
+                self.assertTrue(option in known, f"{document.name} names {option}, which no program has")
+
+    def test_links_lead_somewhere(self):
+        count = 0
+        for document in DOCUMENTS:
+            text = re.sub(r"^```.*?^```", "", document.read_text(), flags=re.M | re.S)
+            links = re.findall(r"\]\(([^)]+)\)", text) + re.findall(r"^\[[^\]]+\]: (\S+)", text, re.M)
+            for link in links + re.findall(r'src="([^"]+)"', text):
+                if link.startswith("http"):
+                    continue
+                name, _, anchor = link.partition("#")
+                target = (document.parent / name).resolve() if name else document
+                self.assertTrue(target.exists(), f"{document.name}: {link}")
+                if anchor:
+                    heads = re.findall(r"^#+ (.*)$", target.read_text(), re.M)
+                    anchors = {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+                    self.assertIn(anchor, anchors, f"{document.name}: {link}")
+                count += 1
+        self.assertGreater(count, 20)
+
+    def test_commands_elsewhere_are_run_there(self):
+        runs = "".join((ROOT / name).read_text() for name in (".ci/run", "deploy/demo.sh", "tests/run.sh", "tests/quick.sh"))
+        runs += "".join(script.read_text() for script in (ROOT / "tests" / "service").glob("test_install*.py"))
+        found = 0
+        for document in DOCUMENTS:
+            for mark, text in blocks(document):
+                self.assertIn(mark, ("", "sh", "sh slow", "sh elsewhere", "json", "c", "text"), document.name)
+                if mark != "sh elsewhere":
+                    continue
+                for line in text.splitlines():
+                    command = line.split("#")[0].strip()
+                    if command:
+                        found += 1
+                        self.assertTrue(command in runs, f"{document.name}: nothing runs {command}")
+        self.assertGreater(found, 1)
+
+    def test_readme_is_short(self):
+        self.assertLessEqual(len((ROOT / "README.md").read_text().splitlines()), 200)
+
+
+def add_document(document):
+    name = "test_commands_of_" + document.stem.lower().replace("-", "_")
+    setattr(Documents, name, lambda self: self.run_document(document))
+
+
+for each in DOCUMENTS:
+    if any(mark in ("sh", "sh slow") for mark, _ in blocks(each)):
+        add_document(each)
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
