@@ -23,7 +23,7 @@ DOCUMENTS = [path.resolve() for path in (ROOT / "README.md", *sorted(MANUAL.glob
 LAMBERT, LAMBERTD = os.environ["LAMBERT"], os.environ["LAMBERTD"]
 PORT_IN_DOCUMENTS = "127.0.0.1:8317"
 # Options of other programs that the documents name.
-FOREIGN = {"--once", "--fail-with-body", "--target", "--build", "--prefix", "--cflags", "--libs", "--install", "--preset", "--static"}
+FOREIGN = {"--once", "--data-binary", "--fail-with-body", "--target", "--build", "--prefix", "--cflags", "--libs", "--install", "--preset", "--static"}
 
 
 def blocks(document):
@@ -96,8 +96,10 @@ class Documents(unittest.TestCase):
         for command in [[LAMBERTD, "--help"], [LAMBERT, "--help"], *([LAMBERT, verb, "--help"] for verb in verbs)]:
             known |= set(re.findall(r"--[a-z0-9-]+", subprocess.run(command, capture_output=True, text=True, check=True).stdout))
         for document in DOCUMENTS:
-            for option in set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]+", document.read_text())):
-                self.assertTrue(option in known, f"{document.name} names {option}, which no program has")
+            if document.name == "CHANGELOG.md":  # it also names options that are gone
+                continue
+            named = set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]+", document.read_text()))
+            self.assertEqual(sorted(named - known), [], f"{document.name} names options that no program has")
 
     def test_links_lead_somewhere(self):
         count = 0
