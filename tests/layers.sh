@@ -24,6 +24,7 @@ declare -A allowed=(
     [solver/linalg]="$below_linalg"
     [solver/operator]="$below_operator solver/operator/wavelet/"
     [solver/operator/wavelet]="$below_operator"
+    [solver/operator/blocks]="$below_operator"
     [solver/operator/refine]="$operator"
     [solver/codec]="$below_linalg solver/operator/operator.h"
     [solver/daylight]="$below_linalg"

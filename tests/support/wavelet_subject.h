@@ -3,10 +3,10 @@
 #define LAMBERT_TESTS_WAVELET_SUBJECT_H
 
 #include "solver/formfactor/formfactor.h"
-#include "solver/method/hierarchical/plane_tree.h"
 #include "solver/method/hierarchical/wavelet_basis.h"
 #include "solver/method/hierarchical/wavelet_inverse.h"
 #include "solver/method/hierarchical/wavelet_pass.h"
+#include "solver/operator/blocks/plane_tree.h"
 #include "solver/operator/wavelet/wavelet_plan.h"
 #include "support/box_problem.h"
 #include "support/dense.h"

@@ -1,9 +1,9 @@
 #include "solver/base/array_grow.h"
 #include "solver/method/hierarchical/compress_bound.h"
 
-#include "solver/method/hierarchical/plane_tree.h"
 #include "solver/method/hierarchical/subtrees.h"
 #include "solver/method/hierarchical/wavelet_basis.h"
+#include "solver/operator/blocks/plane_tree.h"
 
 #include "store/status.h"
 

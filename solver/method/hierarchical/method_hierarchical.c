@@ -4,11 +4,11 @@
 #include "solver/base/clock.h"
 #include "solver/base/random.h"
 #include "solver/method/choice.h"
-#include "solver/method/hierarchical/plane_tree.h"
 #include "solver/method/hierarchical/wavelet_basis.h"
 #include "solver/method/hierarchical/wavelet_entries.h"
 #include "solver/method/hierarchical/wavelet_inverse.h"
 #include "solver/method/hierarchical/wavelet_pass.h"
+#include "solver/operator/blocks/plane_tree.h"
 #include "solver/operator/hierarchical.h"
 
 #include <math.h>

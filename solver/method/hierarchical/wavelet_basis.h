@@ -4,7 +4,7 @@
 #ifndef LAMBERT_METHOD_HIERARCHICAL_WAVELET_BASIS_H
 #define LAMBERT_METHOD_HIERARCHICAL_WAVELET_BASIS_H
 
-#include "solver/method/hierarchical/plane_tree.h"
+#include "solver/operator/blocks/plane_tree.h"
 #include "solver/operator/wavelet/wavelets.h"
 
 /* area, centre: [n], by element. out is freed with wavelets_free. Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC. */

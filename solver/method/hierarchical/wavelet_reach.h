@@ -5,7 +5,7 @@
 #ifndef LAMBERT_METHOD_HIERARCHICAL_WAVELET_REACH_H
 #define LAMBERT_METHOD_HIERARCHICAL_WAVELET_REACH_H
 
-#include "solver/method/hierarchical/plane_tree.h"
+#include "solver/operator/blocks/plane_tree.h"
 #include "solver/operator/wavelet/wavelets.h"
 
 /* A node as the walk down the tree needs it, in half a cache line: a sphere around all its elements, and the

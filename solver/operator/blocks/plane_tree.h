@@ -1,7 +1,7 @@
 /* A binary tree of clusters over the elements of a mesh. Elements in one plane are halved across their longer
  * side down to a few elements a leaf; above, planes are joined by position and normal. */
-#ifndef LAMBERT_METHOD_HIERARCHICAL_PLANE_TREE_H
-#define LAMBERT_METHOD_HIERARCHICAL_PLANE_TREE_H
+#ifndef LAMBERT_OPERATOR_BLOCKS_PLANE_TREE_H
+#define LAMBERT_OPERATOR_BLOCKS_PLANE_TREE_H
 
 #include "lambert/lambert.h"
 

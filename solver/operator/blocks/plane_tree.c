@@ -1,4 +1,4 @@
-#include "solver/method/hierarchical/plane_tree.h"
+#include "solver/operator/blocks/plane_tree.h"
 
 #include "store/status.h"
 

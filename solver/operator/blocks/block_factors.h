@@ -1,0 +1,59 @@
+/* Form factors as blocks on a tree of clusters (Hanrahan, Salzman and Aupperle 1991): light between two
+ * clusters that see each other across some distance takes a few numbers, whatever the number of their
+ * elements, A_i F_ij = A_i A_j  m_a(i)^T L m_b(j)    for all elements i of node a and j of node b, with
+ * m_t(i) = (1, u, v) at the centroid of element i, in coordinates of the plane of t that run from -1 to 1
+ * across t. Every pair of elements belongs to one block at most; pairs in none see nothing of each other. */
+#ifndef LAMBERT_OPERATOR_BLOCKS_BLOCK_FACTORS_H
+#define LAMBERT_OPERATOR_BLOCKS_BLOCK_FACTORS_H
+
+#include "solver/operator/blocks/plane_tree.h"
+
+/* 1, u, v */
+enum { BLOCK_FUNCTIONS = 3 };
+
+#define BLOCK_NO_NODE UINT32_MAX
+
+/* Nodes are numbered: the clusters of the tree (postorder), then the elements by position. In the frame of
+ * its plane, u = (x - centre[0]) * over[0], v = (y - centre[1]) * over[1]. A node with one function (a single
+ * element, or a cluster of several planes) has over 0: m = (1, 0, 0). */
+typedef struct block_node {
+    uint32_t begin, end; /* its positions */
+    uint32_t parent;     /* BLOCK_NO_NODE: it is the root. The parent of an element is its leaf */
+    double centre[2], over[2];
+} block_node;
+
+/* One direction of the light: S of the other one is the transpose. a != b. */
+typedef struct cluster_block {
+    uint32_t a, b;
+    float L[BLOCK_FUNCTIONS][BLOCK_FUNCTIONS]; /* 1/m^2 */
+} cluster_block;
+
+typedef struct block_factors {
+    size_t n, n_clusters;
+    uint32_t *order;    /* [n], position -> element */
+    block_node *nodes;  /* [n_clusters + n] */
+    double (*place)[2]; /* [n] centroids by position, in the frame of the plane */
+    double *area;       /* [n] by position, m^2 */
+    double *balance; /* [n] by position: F_ij of the blocks is multiplied by balance_i balance_j, so that rows
+                        have the sums that they must have; NULL: 1 */
+    size_t n_blocks;
+    cluster_block *blocks; /* [n_blocks], by a, then by b */
+} block_factors;
+
+void block_factors_free(block_factors *f);
+
+/* Nodes, order, places and areas of a tree; no blocks. area and centre [n] by element. Errors:
+ * LAM_ERR_MEMORY. */
+lam_status block_factors_begin(const plane_tree *tree, const double *area, const double (*centre)[3],
+                               block_factors *out, lam_error *error);
+
+/* Call once after the blocks were set: sorts them and prepares products. Errors: LAM_ERR_MEMORY. */
+lam_status block_factors_end(block_factors *f, lam_error *error);
+
+/* y = F x for n_vectors vectors, [n][n_vectors] by position, y != x: moments of x go up the tree, through the
+ * blocks, and down again, in O(n + n_blocks) steps for each vector. The bits do not depend on the number of
+ * threads. Errors: LAM_ERR_MEMORY. */
+lam_status block_factors_multiply(const block_factors *f, size_t n_vectors, const double *x, double *y,
+                                  lam_error *error);
+
+#endif
