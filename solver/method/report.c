@@ -6,10 +6,39 @@
 #include <stdio.h>
 #include <string.h>
 
+/* The words of every figure that a method reports; the unit stands behind the value. */
+static const report_words words[] = {
+    {"factorizer", "factorizer", ""},
+    {"rcond", "reciprocal condition number", ""},
+    {"epsilon", "norm error at most", ""},
+    {"measured_norm_error", "measured norm error", ""},
+    {"norm", "order of the norm", ""},
+    {"rank", "rank", ""},
+    {"levels", "levels of the tree", ""},
+    {"passes", "passes over the form factors", ""},
+    {"budget", "errors of the steps add up by", ""},
+    {"alpha", "share of the last step in the error", ""},
+    {"assign", "elements join patches by", ""},
+    {"coherence_min", "smallest coherence of a patch", ""},
+    {"patch_area_min", "smallest area of a patch", "m2"},
+    {"threshold", "values dropped below", ""},
+    {"correction", "correction of dropped values", ""},
+    {"probe_residual", "residual of random emission", ""},
+    {"uniform_error", "error of uniform radiosity", ""},
+    {"residual", "largest residual of an emitter", ""},
+    {"sweeps", "most products with the form factors", ""},
+};
+
+const report_words *report_words_of(const char *name) {
+    for (size_t k = 0; k < sizeof words / sizeof *words; k++)
+        if (strcmp(words[k].name, name) == 0) return &words[k];
+    return NULL;
+}
+
 static report_figure *place_of(build_report *report, const char *name) {
     size_t k = 0;
     while (k < report->n_figures && strcmp(report->figures[k].name, name) != 0) k++;
-    assert(k < REPORT_FIGURES);
+    assert(k < REPORT_FIGURES && report_words_of(name) != NULL);
     if (k == report->n_figures) report->n_figures++;
     return &report->figures[k];
 }
@@ -50,15 +79,22 @@ double report_seconds(const build_report *report) {
     return sum;
 }
 
+/* "rank 20", "smallest area of a patch 0.2 m2"; counts are written out. */
+static int write_figure(const report_figure *f, char *text, size_t size) {
+    const report_words *w = report_words_of(f->name);
+    const char *space = w->unit[0] != '\0' ? " " : "";
+    if (f->text != NULL) return snprintf(text, size, "%s %s", w->label, f->text);
+    return snprintf(text, size, f->whole ? "%s %.0f%s%s" : "%s %.3g%s%s", w->label, f->number, space,
+                    w->unit);
+}
+
 void report_line(const build_report *report, char *line, size_t size) {
     size_t length = 0;
     line[0] = '\0';
     for (size_t k = 0; k < report->n_figures && length < size; k++) {
-        const report_figure *f = &report->figures[k];
-        const char *comma = k > 0 ? ", " : "";
-        const int n = f->text != NULL
-                          ? snprintf(line + length, size - length, "%s%s %s", comma, f->name, f->text)
-                          : snprintf(line + length, size - length, "%s%s %.3g", comma, f->name, f->number);
+        if (k > 0) length += (size_t)snprintf(line + length, size - length, ", ");
+        if (length >= size) break;
+        const int n = write_figure(&report->figures[k], line + length, size - length);
         length += n > 0 ? (size_t)n : 0;
     }
 }

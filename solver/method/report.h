@@ -1,4 +1,5 @@
-/* The report of a build: named figures, which the store, the log and `lambert info` walk. */
+/* The report of a build: named figures, which the store, the log and `lambert info` walk. Each name has its
+ * words in the table of report.c. */
 #ifndef LAMBERT_METHOD_REPORT_H
 #define LAMBERT_METHOD_REPORT_H
 
@@ -9,7 +10,7 @@
 enum { REPORT_FIGURES = 20, REPORT_STEPS = 4 };
 
 typedef struct report_figure {
-    const char *name; /* static, as the attribute of /operator that it becomes */
+    const char *name; /* static, as the attribute of /operator that it becomes; report_words_of knows it */
     const char *text; /* static; NULL: a number */
     double number;
     bool whole; /* stored as an integer */
@@ -47,7 +48,16 @@ bool report_is(const build_report *report, const char *name, const char *text);
 void report_step_add(build_report *report, const char *name, double seconds);
 double report_seconds(const build_report *report);
 
-/* The figures in one line: "rank 20, norm 2, ...". */
+/* A figure in words: the label that a reader sees in the place of its name, and its unit. */
+typedef struct report_words {
+    const char *name, *label;
+    const char *unit; /* "" for a text and for a plain number */
+} report_words;
+
+/* The words of the figure of this name, static; NULL if no method reports such a figure. */
+const report_words *report_words_of(const char *name);
+
+/* The figures in one line, in words: "rank 20, smallest area of a patch 0.2 m2, ...". */
 void report_line(const build_report *report, char *line, size_t size);
 
 /* Writes the figures as attributes of /operator. */

@@ -2,6 +2,7 @@
 #include "solver/base/options.h"
 #include "solver/base/terminal.h"
 #include "solver/codec/describe.h"
+#include "solver/method/report.h"
 #include "solver/verbs/verbs.h"
 
 #include <stdio.h>
@@ -28,15 +29,38 @@ static const option_command verb = {
     .most_arguments = 1,
 };
 
+static void write_value(const json_t *value) {
+    if (json_is_string(value))
+        printf("%s", json_string_value(value));
+    else if (json_is_integer(value))
+        printf("%" JSON_INTEGER_FORMAT, json_integer_value(value));
+    else
+        printf("%.4g", json_number_value(value));
+}
+
 static void print_value(const char *label, const json_t *value) {
     if (value == NULL || json_is_null(value)) return;
     printf("%-18s", label);
-    if (json_is_string(value))
-        printf("%s\n", json_string_value(value));
-    else if (json_is_integer(value))
-        printf("%" JSON_INTEGER_FORMAT "\n", json_integer_value(value));
-    else
-        printf("%.4g\n", json_number_value(value));
+    write_value(value);
+    puts("");
+}
+
+/* Prints the figures of the method and the recipe of its form factors, one on a line. A name without words of
+ * its own is printed with spaces in the place of underscores. */
+static void print_report(json_t *report) {
+    const char *name, *head = "figures";
+    json_t *value;
+    json_object_foreach(report, name, value) {
+        const report_words *words = report_words_of(name);
+        printf("%-18s", head);
+        head = "";
+        for (const char *at = words != NULL ? words->label : name; *at != '\0'; at++)
+            putchar(*at == '_' ? ' ' : *at);
+        putchar(' ');
+        write_value(value);
+        printf("%s%s\n", words != NULL && words->unit[0] != '\0' ? " " : "",
+               words != NULL ? words->unit : "");
+    }
 }
 
 static void print_bytes(double bytes) {
@@ -106,9 +130,7 @@ static void print_text(const json_t *about) {
     print_value("density", json_object_get(about, "density"));
     print_value("precision", json_object_get(about, "precision"));
     print_bytes(json_number_value(json_object_get(about, "bytes")));
-    const char *name;
-    json_t *value;
-    json_object_foreach(json_object_get(about, "report"), name, value) print_value(name, value);
+    print_report(json_object_get(about, "report"));
     print_groups(json_object_get(about, "groups"));
     print_sky(json_object_get(about, "sky"));
     print_error(json_object_get(about, "error"));

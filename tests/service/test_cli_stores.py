@@ -53,6 +53,29 @@ class Stores(Case):
                     "low-rank", "--epsilon", ".1")
         self.assertIn("below the sampling noise", done.stderr)
 
+    def test_log_and_info_name_figures_in_words(self):
+        """The log and `info` print words; the store and JSON keep the names of the attributes."""
+        methods = {"exact": (), "low-rank": (), "2msc": (), "sparse": (), "hierarchical": (),
+                   "emitters": ("--emitters", "group=floor")}
+        found = set()
+        for method, options in methods.items():
+            with self.subTest(method=method):
+                done = must("precompute", self.box, "-o", self.path("a.h5"), "--method", method, "--rays", 64,
+                            "--probes", 0, *options)
+                report = json.loads(must("info", self.path("a.h5"), "--json").stdout)["report"]
+                text = must("info", self.path("a.h5")).stdout
+                block = text[text.index("figures "):text.index("\ngroups ")].splitlines()
+                self.assertEqual(len(block), len(report))
+                for line in block:
+                    self.assertNotIn("_", line)
+                    self.assertEqual(line[:18].strip() or "figures", "figures")
+                logged = done.stderr.split("factorizer ", 1)[1].splitlines()[0]
+                self.assertNotIn("_", logged)
+                self.assertIn("reciprocal condition number ", logged)
+                self.assertRegex("\n".join(block), r"(?m)^ +reciprocal condition number [0-9.]+$")
+                found |= set(report)
+        self.assertLessEqual({"rcond", "measured_norm_error", "patch_area_min", "probe_residual", "sweeps"}, found)
+
     def test_from_a_store_with_form_factors(self):
         for method in ("exact", "low-rank"):
             direct, again = self.path(method + ".h5"), self.path(method + "-again.h5")

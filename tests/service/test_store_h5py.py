@@ -368,7 +368,7 @@ class StoreTest(unittest.TestCase):
                 root = np.sqrt(store.area)
                 left = root[:, None] * (store.F - UV) / root
                 expected = np.linalg.norm(left, 2)
-                self.assertIn(f"measured_norm_error {measured:.3g}, norm 2", made.stderr)
+                self.assertIn(f"measured norm error {measured:.3g}, order of the norm 2", made.stderr)
                 # by power iteration to about a per cent
                 self.assertLess(abs(measured - expected), 0.03 * expected + store.n * ROUND)
                 self.assertEqual(epsilon, 0.2 if rank is None else measured)
