@@ -101,8 +101,8 @@ static lam_status take_named(const build_problem *problem, const build_options *
     lam_status status = LAM_OK;
     const build_method *m = method_find(options->method);
     if (m == NULL) {
-        char words[160];
-        snprintf(words, sizeof words, "%s", method_choices());
+        char words[METHOD_CHOICES_BYTES];
+        method_choices(words);
         for (char *c = words; *c != '\0'; c++)
             if (*c == '|') *c = ' ';
         FAIL(error, LAM_ERR_ARGUMENT, "--method %.40s: must be one of: %s", options->method, words);

@@ -105,10 +105,13 @@ typedef struct build_method {
                         lam_operator **op, build_report *report, lam_error *error);
 } build_method;
 
-/* The list: the k-th method, NULL beyond the last; the method of a name, or NULL; "auto|exact|...". */
+/* The list: the k-th method, NULL beyond the last; the method of a name, or NULL. */
 const build_method *method_at(size_t k);
 const build_method *method_find(const char *name);
-const char *method_choices(void);
+
+/* Fills words with the values of --method: "auto|exact|...". */
+enum { METHOD_CHOICES_BYTES = 16 * (METHODS_MOST + 1) };
+void method_choices(char words[METHOD_CHOICES_BYTES]);
 
 /* The method that auto takes where no other can be had; it takes little memory at any size. */
 const build_method *method_fallback(void);

@@ -2,6 +2,7 @@
 #include "solver/method/choice.h"
 #include "solver/method/method.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -37,13 +38,12 @@ const build_method *method_fallback(void) {
     return &method_low_rank;
 }
 
-const char *method_choices(void) {
-    static char words[16 * METHODS_MOST];
-    if (words[0] == '\0') {
-        char *end = stpcpy(words, "auto");
-        for (size_t k = 0; k < METHODS; k++) end += sprintf(end, "|%s", methods[k]->name);
+void method_choices(char words[METHOD_CHOICES_BYTES]) {
+    size_t length = (size_t)sprintf(words, "auto");
+    for (size_t k = 0; k < METHODS; k++) {
+        length += (size_t)snprintf(words + length, METHOD_CHOICES_BYTES - length, "|%s", methods[k]->name);
+        assert(length < METHOD_CHOICES_BYTES);
     }
-    return words;
 }
 
 bool method_has_option(const build_method *method, const char *option) {

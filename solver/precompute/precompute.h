@@ -6,7 +6,7 @@
 #include "solver/method/choice.h"
 #include "solver/scene/mesh.h"
 
-/* The options, as the rows of precompute_tables fill them; texts point into argv. The members after
+/* The options, as the rows of precompute_tables_make fill them; texts point into argv. The members after
  * progress belong to the verb. */
 typedef struct precompute_options {
     const char *output;
@@ -31,12 +31,22 @@ typedef struct precompute_options {
     const char *continues; /* the message of a cancelled run whose finished rows the folder holds */
 } precompute_options;
 
-/* Tables of options at most: those of precompute, of every method, and the last, which has no rows. */
-enum { PRECOMPUTE_TABLES = 8 + METHODS_MOST };
+/* The tables of options, and the row of --method, whose words are those of the list of methods. The tables
+ * refer to that row and its words: the struct must stay where it is. */
+enum { PRECOMPUTE_TABLES = 9, PRECOMPUTE_TABLES_MOST = PRECOMPUTE_TABLES + METHODS_MOST + 2 };
+typedef struct precompute_tables {
+    size_t n_tables;                             /* without the last, which has no rows */
+    option_table tables[PRECOMPUTE_TABLES_MOST]; /* the methods have one each, and the verb has one */
+    option_row method_rows[2];
+    char methods[METHOD_CHOICES_BYTES];
+} precompute_tables;
 
-/* The tables that fill o, whose fields without presets they set first. to_classify: only those of the
- * scene and of the choice of a method. Returns their number. */
-size_t precompute_tables(precompute_options *o, bool to_classify, option_table tables[PRECOMPUTE_TABLES]);
+/* Makes the tables that fill o, whose fields without presets it sets first. to_classify: only those of the
+ * scene and of the choice of a method. */
+void precompute_tables_make(precompute_options *o, bool to_classify, precompute_tables *out);
+
+/* Adds a table of the verb's own, once. */
+void precompute_tables_add(precompute_tables *t, const option_row *rows, void *fields);
 
 /* True for an HDF5 file, or one that is named so: it is taken for a store. */
 bool precompute_takes_as_store(const char *path);

@@ -4,6 +4,7 @@
 #include "solver/formfactor/recipe.h"
 #include "solver/precompute/precompute.h"
 
+#include <assert.h>
 #include <string.h>
 
 /* NULL: none. */
@@ -142,16 +143,6 @@ static const option_row form_factor_rows[] = {
     {0},
 };
 
-/* The words of --method are those of the list of methods. */
-static option_row method_rows[] = {
-    {.name = "method",
-     .kind = OPTION_CHOICE,
-     .offset = FIELD(build.method),
-     .preset = "auto",
-     .help = "Kind of operator"},
-    {0},
-};
-
 /* The help of these stands with the methods. */
 static const option_row emitter_rows[] = {
     {.name = "emitters", .kind = OPTION_TEXT, .offset = FIELD(emitters), .argument = "FILE|group=NAME|sky"},
@@ -209,24 +200,38 @@ static const option_row resource_rows[] = {
     {0},
 };
 
-size_t precompute_tables(precompute_options *o, bool to_classify, option_table tables[PRECOMPUTE_TABLES]) {
-    size_t n = 0;
+static void add(precompute_tables *t, const char *heading, const option_row *rows, void *fields) {
+    assert(t->n_tables + 1 < sizeof t->tables / sizeof *t->tables);
+    t->tables[t->n_tables++] = (option_table){heading, rows, fields};
+    t->tables[t->n_tables] = (option_table){.rows = NULL};
+}
+
+void precompute_tables_make(precompute_options *o, bool to_classify, precompute_tables *out) {
     *o = (precompute_options){.reflectance = -1, .build = {.method = "auto"}};
-    method_rows[0].choices = method_choices();
-    if (!to_classify) tables[n++] = (option_table){NULL, output_rows, o};
-    tables[n++] = (option_table){"mesh (preset: every face of the file is one element)", mesh_rows, o};
-    tables[n++] = (option_table){"form factors", sample_rows, o};
+    out->n_tables = 0;
+    method_choices(out->methods);
+    out->method_rows[0] = (option_row){.name = "method",
+                                       .kind = OPTION_CHOICE,
+                                       .offset = FIELD(build.method),
+                                       .preset = "auto",
+                                       .choices = out->methods,
+                                       .help = "Kind of operator"};
+    out->method_rows[1] = (option_row){.name = NULL};
+    if (!to_classify) add(out, NULL, output_rows, o);
+    add(out, "mesh (preset: every face of the file is one element)", mesh_rows, o);
+    add(out, "form factors", sample_rows, o);
     if (!to_classify) {
-        tables[n++] = (option_table){"", form_factor_rows, o};
-        tables[n++] = (option_table){"operator", method_rows, o};
+        add(out, "", form_factor_rows, o);
+        add(out, "operator", out->method_rows, o);
     }
-    tables[n++] = (option_table){to_classify ? "operator" : "", build_rows, &o->build};
-    tables[n++] = (option_table){"", emitter_rows, o};
+    add(out, to_classify ? "operator" : "", build_rows, &o->build);
+    add(out, "", emitter_rows, o);
     for (size_t k = 0; method_at(k) != NULL; k++)
-        if (method_at(k)->rows != NULL)
-            tables[n++] = (option_table){method_at(k)->name, method_at(k)->rows, &o->build.of[k]};
-    if (!to_classify) tables[n++] = (option_table){"resources", resource_rows, o};
-    tables[n++] = (option_table){to_classify ? "resources" : "", work_rows, o};
-    tables[n] = (option_table){.rows = NULL};
-    return n;
+        if (method_at(k)->rows != NULL) add(out, method_at(k)->name, method_at(k)->rows, &o->build.of[k]);
+    if (!to_classify) add(out, "resources", resource_rows, o);
+    add(out, to_classify ? "resources" : "", work_rows, o);
+}
+
+void precompute_tables_add(precompute_tables *t, const option_row *rows, void *fields) {
+    add(t, "", rows, fields);
 }

@@ -76,7 +76,7 @@ done:
 int cmd_classify(int argc, char **argv) {
     fields f = {0};
     precompute_options o;
-    option_table tables[PRECOMPUTE_TABLES + 1];
+    precompute_tables tables;
     static const option_command verb = {
         .name = "lambert classify",
         .arguments = "SCENE",
@@ -91,10 +91,9 @@ int cmd_classify(int argc, char **argv) {
     terminal term;
     decision found = {.n_candidates = 0};
     size_t rays = 0, n = 0;
-    const size_t n_tables = precompute_tables(&o, true, tables);
-    tables[n_tables] = (option_table){"", own_rows, &f};
-    tables[n_tables + 1] = (option_table){.rows = NULL};
-    const int code = options_parse(&verb, tables, argc, argv, &given);
+    precompute_tables_make(&o, true, &tables);
+    precompute_tables_add(&tables, own_rows, &f);
+    const int code = options_parse(&verb, tables.tables, argc, argv, &given);
     if (code != OPTIONS_GO) return code;
     if ((o.subdivide > 0) + (o.max_edge > 0) + (o.elements > 0) > 1)
         return options_usage(verb.name, "--subdivide, --max-edge and --elements exclude each other");

@@ -142,17 +142,16 @@ static void log_unused(terminal *t, const option_result *given, const precompute
 
 int cmd_precompute(int argc, char **argv) {
     precompute_options o;
-    option_table tables[PRECOMPUTE_TABLES + 1];
+    precompute_tables tables;
     bool json = false;
     option_result given = {0};
     lam_error error = {0};
     terminal term;
     precompute_result result = {.unused = ""};
     char *line = command_line(argc, argv), *continues = NULL;
-    const size_t n_tables = precompute_tables(&o, false, tables);
-    tables[n_tables] = (option_table){"", json_rows, &json};
-    tables[n_tables + 1] = (option_table){.rows = NULL};
-    int code = options_parse(&command, tables, argc, argv, &given);
+    precompute_tables_make(&o, false, &tables);
+    precompute_tables_add(&tables, json_rows, &json);
+    int code = options_parse(&command, tables.tables, argc, argv, &given);
     if (code == OPTIONS_GO) {
         o.input = given.arguments[0];
         o.from_store = precompute_takes_as_store(o.input);
