@@ -21,7 +21,7 @@ extern "C" {
     X(LAM_ERR_VERSION, "another version of the format")                                                      \
     X(LAM_ERR_DAMAGED, "damaged file")                                                                       \
     X(LAM_ERR_NUMERIC, "numerically impossible")                                                             \
-    X(LAM_ERR_UNSUPPORTED, "not supported yet")                                                              \
+    X(LAM_ERR_UNSUPPORTED, "not supported")                                                                  \
     X(LAM_ERR_CANCELLED, "cancelled")                                                                        \
     X(LAM_ERR_INTERNAL, "internal error")
 

@@ -203,7 +203,7 @@ bool parser_fill_sides(parser *p) {
 
 bool parser_end(parser *p, bool good) {
     json_end(&p->r);
-    if (!good && (p->why->status == 422 || p->why->status == 501)) {
+    if (!good && p->why->status == 422) {
         json_begin(&p->r, p->r.start, (size_t)(p->r.end - p->r.start));
         if (!json_skip(&p->r) || !json_finish(&p->r)) parser_fault(p);
         json_end(&p->r);

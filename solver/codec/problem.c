@@ -36,7 +36,6 @@ static const struct {
     [PROBLEM_NOT_REFINED] = {422, MANUAL "not-refined", "The answer cannot be refined to this tolerance"},
     [PROBLEM_TOO_MANY_VARIANTS] = {429, MANUAL "too-many-variants", "There are too many variants"},
     [PROBLEM_INTERNAL] = {500, MANUAL "internal", "The daemon failed"},
-    [PROBLEM_NOT_YET] = {501, MANUAL "not-yet", "The daemon does not do this"},
     [PROBLEM_NO_MEMORY] = {503, MANUAL "no-memory", "Memory is short; try again later"},
     [PROBLEM_UNAVAILABLE] = {503, MANUAL "unavailable", "The daemon or the scene is busy; try again later"},
 };

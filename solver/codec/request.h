@@ -68,7 +68,7 @@ typedef struct radiosity_request {
 void radiosity_request_free(radiosity_request *request);
 
 /* All three return false with *why filled; request must be freed either way.
- * text[length] must be NUL. 400: not JSON, or not NPY; 422: what the contract lists; 501: not supported yet.
+ * text[length] must be NUL. 400: not JSON, or not NPY; 422: what the contract lists.
  * E then holds every vector, but for a linear reduction of sparse vectors, which stay spots, so that reading
  * it costs no more than the text is long. With any other reduction, select names the elements of its groups.
  */

@@ -75,7 +75,9 @@ lam_status recipe_load(store *s, const recipe_names *names, recipe *out, lam_err
     size_t k = 0;
     while (k < N_METHODS && strcmp(method, method_names[k]) != 0) k++;
     if (k == N_METHODS)
-        FAIL(error, LAM_ERR_UNSUPPORTED, "%s: %s attribute %s is '%.20s', which is not supported",
+        FAIL(error, LAM_ERR_UNSUPPORTED,
+             "%s: %s attribute %s is '%.20s', which is not supported; precompute the scene again, or use the "
+             "version of lambert that wrote the store",
              store_path(s), group, names->method, method);
     r.method = (recipe_method)k;
     TRY(store_get_integer(s, group, "rays", &rays, error));

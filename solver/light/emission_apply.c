@@ -143,7 +143,7 @@ lam_status emission_pass_light(emission_pass *p, size_t n, const size_t *vectors
     if (p->W != NULL) {
         if (p->sun != NULL)
             FAIL(error, LAM_ERR_UNSUPPORTED,
-                 "--tolerance beside --sun exact of a store of few emitters is not supported yet; use --sun "
+                 "--tolerance beside --sun exact of a store of few emitters is not supported; use --sun "
                  "tiles, or a store of another method");
         TRY(find_weights(p, n, vectors, error));
         TRY(operator_emitters_light_double(p->op, n, p->W, E, H0, error));

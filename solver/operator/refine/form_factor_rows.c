@@ -18,8 +18,9 @@ static lam_status read_storage(store *s, storage *out, lam_error *error) {
     while (k < STORAGES && strcmp(text, names[k]) != 0) k++;
     if (k == STORAGES)
         FAIL(error, LAM_ERR_UNSUPPORTED,
-             "%s: /form_factors has the storage '%.20s', which this version does not know", store_path(s),
-             text);
+             "%s: /form_factors has the storage '%.20s', which is not supported; precompute the scene again, "
+             "or use the version of lambert that wrote the store",
+             store_path(s), text);
     *out = (storage)k;
 done:
     free(text);
@@ -114,8 +115,7 @@ lam_status form_factor_rows_read(store *s, size_t n, const double *area, const l
     if (how == STORAGE_COMPRESSED)
         FAIL(error, LAM_ERR_UNSUPPORTED,
              "%s: its form factors are compressed, which refines answers but makes no operator; precompute "
-             "the "
-             "scene again, or keep them with --keep-form-factors alone",
+             "the scene again, or keep them with --keep-form-factors alone",
              store_path(s));
     *rows = how == STORAGE_ROWS;
     TRY(read_csr(s, held, error));
