@@ -1,13 +1,16 @@
 #include "server/queue/metrics.h"
 
+#include "solver/codec/problem.h"
+
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-/* Statuses of answers; 0 stands for a client that left. */
-static const unsigned statuses[] = {0,   200, 202, 204, 304, 400, 401, 404, 405,
-                                    409, 411, 413, 415, 422, 429, 500, 503};
-#define N_STATUSES (sizeof statuses / sizeof statuses[0])
+/* Statuses of answers that are no problems; 0 stands for a client that left. The other ones are those of the
+ * classes of problems. */
+static const unsigned successes[] = {0, 200, 202, 204, 304};
+#define N_SUCCESSES (sizeof successes / sizeof successes[0])
+#define MOST_STATUSES (N_SUCCESSES + PROBLEM_COUNT)
 
 /* Seconds; the last bucket has no bound. */
 static const double latencies[] = {.0005, .001, .0025, .005, .01, .025, .05, .1, .25, .5, 1, 2.5, 5, 10};
@@ -17,7 +20,7 @@ static const size_t batches[] = {1, 2, 4, 8, 16, 32, 64};
 #define N_BATCHES (sizeof batches / sizeof batches[0])
 
 typedef struct route_counts {
-    uint64_t by_status[N_STATUSES + 1]; /* the last: any other */
+    uint64_t by_status[MOST_STATUSES + 1]; /* at n_statuses: any other */
     uint64_t by_latency[N_LATENCIES + 1];
     double seconds;
 } route_counts;
@@ -26,17 +29,36 @@ struct metrics {
     pthread_mutex_t lock;
     size_t n_labels;
     const char *const *labels;
+    size_t n_statuses;
+    unsigned statuses[MOST_STATUSES];
     size_t in_flight;
     uint64_t by_batch[N_BATCHES + 1];
     uint64_t vectors;
     route_counts routes[];
 };
 
+/* The index of a status; n_statuses for any other. */
+static size_t find_status(const metrics *m, unsigned status) {
+    size_t s = 0;
+    while (s < m->n_statuses && m->statuses[s] != status) s++;
+    return s;
+}
+
+static void list_statuses(metrics *m) {
+    for (; m->n_statuses < N_SUCCESSES; m->n_statuses++)
+        m->statuses[m->n_statuses] = successes[m->n_statuses];
+    for (int kind = PROBLEM_NONE; kind < PROBLEM_COUNT; kind++) {
+        const unsigned status = problem_status((problem_kind)kind);
+        if (find_status(m, status) == m->n_statuses) m->statuses[m->n_statuses++] = status;
+    }
+}
+
 lam_status metrics_create(size_t n_labels, const char *const *labels, metrics **out, lam_error *error) {
     metrics *m = memory_allocate(1, sizeof *m + n_labels * sizeof m->routes[0], "metrics", error);
     if (m == NULL) return LAM_ERR_MEMORY;
     m->n_labels = n_labels;
     m->labels = labels;
+    list_statuses(m);
     pthread_mutex_init(&m->lock, NULL);
     *out = m;
     return LAM_OK;
@@ -55,8 +77,8 @@ void metrics_begin(metrics *m) {
 }
 
 void metrics_end(metrics *m, size_t label, unsigned status, double seconds) {
-    size_t s = 0, l = 0;
-    while (s < N_STATUSES && statuses[s] != status) s++;
+    const size_t s = find_status(m, status);
+    size_t l = 0;
     while (l < N_LATENCIES && seconds > latencies[l]) l++;
     pthread_mutex_lock(&m->lock);
     m->in_flight--;
@@ -91,10 +113,10 @@ static bool write_requests(const metrics *m, buffer *b) {
     bool written =
         write_head(b, name, "counter", "Requests by route and status; 0: the client left before the answer.");
     for (size_t r = 0; r < m->n_labels; r++)
-        for (size_t s = 0; s <= N_STATUSES; s++) {
+        for (size_t s = 0; s <= m->n_statuses; s++) {
             if (m->routes[r].by_status[s] == 0) continue;
             char status[8] = "other";
-            if (s < N_STATUSES) snprintf(status, sizeof status, "%u", statuses[s]);
+            if (s < m->n_statuses) snprintf(status, sizeof status, "%u", m->statuses[s]);
             written = written && buffer_printf(b, "%s{route=\"%s\",status=\"%s\"} %llu\n", name, m->labels[r],
                                                status, (unsigned long long)m->routes[r].by_status[s]);
         }

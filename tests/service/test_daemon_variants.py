@@ -226,6 +226,7 @@ class Variants(unittest.TestCase):
             self.problem(self.put(daemon, RED, scene="colour@red"), 409, "variant itself")
         with self.daemon(token=False) as daemon:
             self.problem(self.put(daemon, RED), 403, "--token-file")
+            self.assertRegex(daemon.get("/metrics").body.decode(), r'lambertd_requests_total\{route=".*",status="403"\} 1')
         with self.daemon(most=0) as daemon:
             self.problem(self.put(daemon, RED), 403, "--max-variants")
             self.problem(self.ask(daemon, "DELETE", "/v1/scenes/colour@red"), 404)
