@@ -350,8 +350,9 @@ static lam_status check_root(store *s, lam_error *error) {
     TRY(status);
     TRY(store_get_integer(s, "/", "version", &version, error));
     if (version != STORE_VERSION)
-        FAIL(error, LAM_ERR_VERSION, "%s: of format version %lld, this program reads version %d", s->path,
-             (long long)version, STORE_VERSION);
+        FAIL(error, LAM_ERR_VERSION, "%s: of format version %lld, this program reads version %d; %s", s->path,
+             (long long)version, STORE_VERSION,
+             version > STORE_VERSION ? "use a newer lambert or precompute it again" : "precompute it again");
     if (store_exists(s, "/checksum") == 0 || !is_group(s, "/checksum"))
         FAIL(error, LAM_ERR_FORMAT, "%s: has no /checksum: it was never finished", s->path);
 done:

@@ -169,8 +169,8 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
         FAIL(error, LAM_ERR_FORMAT, "%s: holds no operator; precompute it again", options->path);
     TRY(memory_of(s, &made->memory, &made->bytes, error));
     if (made->memory > options->memory)
-        FAIL(error, LAM_ERR_MEMORY, "%s: takes %llu bytes, of --max-memory %llu are left", options->path,
-             (unsigned long long)made->memory, (unsigned long long)options->memory);
+        FAIL(error, LAM_ERR_MEMORY, "%s: takes %llu bytes, %llu are left of --max-memory; raise it",
+             options->path, (unsigned long long)made->memory, (unsigned long long)options->memory);
     TRY(store_verify_group(s, options->verify ? "/" : "/mesh", error));
     TRY(store_map_file(s, error));
     TRY(operator_load(s, &made->op, error));

@@ -26,7 +26,8 @@ lam_status atomic_file_check(const char *path, lam_error *error) {
     if (stat(path, &about) == 0 && S_ISDIR(about.st_mode))
         FAIL(error, LAM_ERR_IO, "%s: is a directory; give -o a file", path);
     if (stat(directory, &about) != 0)
-        FAIL(error, LAM_ERR_IO, "%s: cannot be written: %s: %s", path, directory, strerror(errno));
+        FAIL(error, LAM_ERR_IO, "%s: cannot be written: %s: %s; make the directory or choose another", path,
+             directory, strerror(errno));
     if (!S_ISDIR(about.st_mode))
         FAIL(error, LAM_ERR_IO, "%s: cannot be written: %s is not a directory", path, directory);
     if (access(directory, W_OK | X_OK) != 0)
@@ -72,6 +73,8 @@ lam_status atomic_file_commit(atomic_file *out, lam_error *error) {
     lam_status status = LAM_OK;
     errno = 0;
     bool failed = ferror(out->stream) != 0;
+    /* A write that was refused earlier left no reason behind: one more byte brings it back. */
+    if (failed) putc(0, out->stream);
     failed = fflush(out->stream) != 0 || failed;
     failed = fsync(fileno(out->stream)) != 0 || failed;
     int reason = errno;

@@ -12,6 +12,8 @@
 lam_status option_number(const char *what, const char *text, double *value, lam_error *error) {
     lam_status status = LAM_OK;
     char *end = NULL;
+    if (strchr(text, ',') != NULL && strspn(text, "+-,.0123456789eE") == strlen(text))
+        FAIL(error, LAM_ERR_ARGUMENT, "%s %s: not a number; the decimal mark is a point", what, text);
     /* strtod would skip spaces and read "inf", "nan" and hexadecimal: none of these is meant here. */
     if (text[0] == '\0' || strspn(text, "+-.0123456789eE") != strlen(text))
         FAIL(error, LAM_ERR_ARGUMENT, "%s %s: not a number", what, text);
@@ -25,6 +27,8 @@ done:
 
 lam_status option_count(const char *what, const char *text, uint64_t *value, lam_error *error) {
     lam_status status = LAM_OK;
+    if (text[0] == '-' && text[1] != '\0' && strspn(text + 1, "0123456789") == strlen(text + 1))
+        FAIL(error, LAM_ERR_ARGUMENT, "%s %s: must not be negative", what, text);
     if (text[0] == '\0' || strspn(text, "0123456789") != strlen(text))
         FAIL(error, LAM_ERR_ARGUMENT, "%s %s: not a whole number", what, text);
     errno = 0;

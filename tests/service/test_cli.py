@@ -58,7 +58,9 @@ class Usage(Case):
                 ("--max-edge 0: must be above 0", "precompute a.obj -o b.h5 --max-edge 0"),
                 ("--reflectance 1: must be at least 0 and below 1", "precompute a.obj -o b.h5 --reflectance 1"),
                 ("--rays 0: must be at least 1", "precompute a.obj -o b.h5 --rays 0"),
-                ("--rays -5: not a whole number", "precompute a.obj -o b.h5 --rays -5"),
+                ("--rays -5: must not be negative", "precompute a.obj -o b.h5 --rays -5"),
+                ("--rays -5.5: not a whole number", "precompute a.obj -o b.h5 --rays -5.5"),
+                ("--epsilon 0,05: not a number; the decimal mark is a point", "precompute a.obj -o b.h5 --epsilon 0,05"),
                 ("--rays 1e3: not a whole number", "precompute a.obj -o b.h5 --rays 1e3"),
                 ("too large", "precompute a.obj -o b.h5 --seed 18446744073709551616"),
                 ("--levels 21: must be at least 0 and at most 20", "precompute a.obj -o b.h5 --levels 21"),
@@ -131,7 +133,14 @@ class Files(Case):
             pass
         self.failed("No such file", "precompute", self.path("none.obj"), "-o", self.path("a.h5"))
         self.failed("Is a directory", "precompute", self.folder, "-o", self.path("a.h5"))
-        self.failed("empty.obj", "precompute", self.path("empty.obj"), "-o", self.path("a.h5"))
+        self.failed("empty.obj: the scene is empty: it has no faces; check that the file", "precompute",
+                    self.path("empty.obj"), "-o", self.path("a.h5"))
+        photo = b"\xff\xd8\xff\xe0\x00\x10JFIF\x00\x01" + bytes(range(256)) * 8
+        for name, wanted in (("photo.obj", "it has no faces; check that"), ("photo.jpg", "(OBJ, glTF, GLB, PLY, STL, OFF)")):
+            with open(self.path(name), "wb") as file:
+                file.write(photo)
+            self.failed(wanted, "precompute", self.path(name), "-o", self.path("a.h5"))
+            os.remove(self.path(name))
         self.failed("No such file", "precompute", self.path("none.h5"), "-o", self.path("a.h5"))
         self.failed("foreign.h5", "precompute", foreign, "-o", self.path("a.h5"))
         for verb in ("info", "solve", "verify"):
@@ -157,7 +166,8 @@ class Files(Case):
         for verb, source, name in (("precompute", self.box, "a.h5"), ("solve", self.store, "a.npy"),
                                    ("generate", "box", "a.obj")):
             light = ("--emit", "floor=1") if verb == "solve" else ()
-            self.refused(1, "No such file or directory", verb, source, "-o", self.path("none/" + name), *light)
+            self.refused(1, "No such file or directory; make the directory", verb, source, "-o",
+                         self.path("none/" + name), *light)
             os.makedirs(self.path(verb + name))
             self.refused(1, "is a directory", verb, source, "-o", self.path(verb + name), *light)
         self.refused(2, "is the scene itself", "precompute", self.box, "-o", self.box)
@@ -192,7 +202,8 @@ class Files(Case):
         def tiny():
             resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
         for name in ("c.npy", "c.json", "c.csv", "c.ply", "c.vtu"):
-            self.failed(name, "solve", self.store, "--emit", "floor=1", "-o", self.path(name), preexec_fn=tiny)
+            done = self.failed(name, "solve", self.store, "--emit", "floor=1", "-o", self.path(name), preexec_fn=tiny)
+            self.assertIn("File too large", done.stderr)
         self.assertEqual(os.listdir(self.folder), ["a.h5"])
 
 

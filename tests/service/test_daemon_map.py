@@ -340,7 +340,7 @@ class Mapped(unittest.TestCase):
             lines = daemon.errors().splitlines()
             self.assertEqual(len(lines), 1, lines)
             self.assertTrue(lines[0].startswith(f"refused {other}: takes {sizes['other']} bytes, "), lines)
-            self.assertIn("--max-memory", lines[0])
+            self.assertIn("are left of --max-memory; raise it", lines[0])
             self.check(daemon, "box", self.scene)
             # It is the sum that counts: without box there is room.
             box.unlink()

@@ -256,7 +256,7 @@ START_TEST(foreign_files_are_refused) {
         else
             check_message(name);
         if (status == LAM_ERR_VERSION) /* which was found and which is read */
-            ck_assert_ptr_nonnull(strstr(error.message, "reads version 1"));
+            ck_assert_ptr_nonnull(strstr(error.message, "reads version 1; "));
         seen++;
     }
     ck_assert_int_eq(pclose(made), 0);

@@ -229,7 +229,9 @@ lam_status assimp_read(const char *path, imported_faces *s, lam_error *error) {
                     strength);
     a.scene = import_scene(path, padded, padded_length);
     if (a.scene == NULL)
-        FAIL(error, LAM_ERR_FORMAT, "%s: not a scene that can be read: %.300s", path, aiGetErrorString());
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s: not a scene that can be read (OBJ, glTF, GLB, PLY, STL, OFF): %.300s", path,
+             aiGetErrorString());
     a.materials = memory_allocate(a.scene->mNumMaterials, sizeof *a.materials, "materials", error);
     if (a.materials == NULL) TRY(LAM_ERR_MEMORY);
     for (unsigned i = 0; i < a.scene->mNumMaterials; i++) TRY(read_material(&a, i, error));

@@ -118,7 +118,12 @@ static lam_status check_polygons(const imported_faces *s, const char *path, doub
             }
         }
     }
-    if (s->n_polygons == 0) FAIL(error, LAM_ERR_FORMAT, "%s: the scene is empty: it has no faces", path);
+    if (s->n_polygons == 0)
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s: the scene is empty: it has no faces; check that the file is of the format that its "
+             "extension "
+             "names and that its surfaces were exported",
+             path);
     *extent = sqrt((high[0] - low[0]) * (high[0] - low[0]) + (high[1] - low[1]) * (high[1] - low[1]) +
                    (high[2] - low[2]) * (high[2] - low[2]));
 done:
