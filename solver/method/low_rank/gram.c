@@ -2,11 +2,11 @@
 
 #include "solver/base/parallel.h"
 #include "solver/linalg/dense.h"
+#include "solver/method/low_rank/eigen.h"
 #include "store/status.h"
 
 #include <lapacke.h>
 
-#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -154,44 +154,28 @@ done:
     return status;
 }
 
-/* LAPACKE_ssyevd asks LAPACK for the size of the work area, which comes back rounded to single precision: too
- * small from about 2,900 columns on. The sizes here are those of the manual of ssyevd. */
-static lapack_int eigen_single(size_t m, char job, float *G, float *w) {
-    const bool vectors = job == 'V';
-    const size_t n_work = vectors ? 1 + 6 * m + 2 * m * m : 1 + 2 * m, n_integers = vectors ? 3 + 5 * m : 1;
-    float *work = malloc(n_work * sizeof *work);
-    lapack_int *integers = malloc(n_integers * sizeof *integers);
-    lapack_int info = LAPACK_WORK_MEMORY_ERROR;
-    if (n_work <= INT_MAX && work != NULL && integers != NULL)
-        info = LAPACKE_ssyevd_work(LAPACK_COL_MAJOR, job, 'L', (lapack_int)m, G, (lapack_int)m, w, work,
-                                   (lapack_int)n_work, integers, (lapack_int)n_integers);
-    free(work);
-    free(integers);
-    return info;
-}
-
 /* LAPACK is column-major: our upper triangle is its lower one. */
 lam_status gram_eigen(gram *g, bool vectors, double *values, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t m = g->m;
-    const char job = vectors ? 'V' : 'N';
     float *w = NULL;
-    lapack_int info = 0;
+    int info = 0;
     if (g->single != NULL) {
         w = memory_allocate(m, sizeof *w, "factorization", error);
         if (w == NULL) TRY(LAM_ERR_MEMORY);
-        if (m > 0) info = eigen_single(m, job, g->single, w);
+        info = eigen_single(m, vectors, g->single, w);
         if (info == 0)
             for (size_t i = 0; i < m; i++) values[i] = (double)w[i];
     } else if (m > 0) {
-        info = LAPACKE_dsyevd(LAPACK_COL_MAJOR, job, 'L', (lapack_int)m, g->full, (lapack_int)m, values);
+        info = LAPACKE_dsyevd(LAPACK_COL_MAJOR, vectors ? 'V' : 'N', 'L', (lapack_int)m, g->full,
+                              (lapack_int)m, values);
     }
     if (info == LAPACK_WORK_MEMORY_ERROR)
         FAIL(error, LAM_ERR_MEMORY,
              "eigenvectors of a block of %zu columns: out of memory; use more --levels", m);
     if (info != 0)
         FAIL(error, LAM_ERR_NUMERIC, "eigenvectors of a block of %zu columns: LAPACK syevd returned %d", m,
-             (int)info);
+             info);
 done:
     free(w);
     return status;

@@ -1,10 +1,10 @@
 /* All eigenvectors of S: S = X L X^T, so that Q = X L and V = X, ordered by |l|, are its singular value
  * decomposition. The best approximation of any rank (Eckart and Young 1936), in n^2 memory and n^3 time. */
+#include "solver/method/low_rank/eigen.h"
 #include "solver/method/low_rank/factorizer.h"
 
 #include <lapacke.h>
 
-#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -21,22 +21,14 @@ static int by_falling_size(const void *a, const void *b) {
 
 static lam_status eigenvectors(size_t n, float *S, float *w, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n_work = 1 + 6 * n + 2 * n * n, n_integers = 3 + 5 * n;
-    float *work = NULL;
-    lapack_int *integers = NULL;
-    /* LAPACK counts its work area, 2 n^2 numbers, in 32 bits. */
-    if (n_work > INT_MAX)
-        FAIL(error, LAM_ERR_ARGUMENT, "--factorizer svd: %zu elements, at most 32766; use hf or rsi", n);
-    work = memory_allocate(n_work, sizeof *work, "factorization", error);
-    integers = memory_allocate(n_integers, sizeof *integers, "factorization", error);
-    if (work == NULL || integers == NULL) TRY(LAM_ERR_MEMORY);
-    const lapack_int info =
-        LAPACKE_ssyevd_work(LAPACK_COL_MAJOR, 'V', 'L', (lapack_int)n, S, (lapack_int)n, w, work,
-                            (lapack_int)n_work, integers, (lapack_int)n_integers);
-    if (info != 0) FAIL(error, LAM_ERR_NUMERIC, "eigenvectors of S: LAPACK ssyevd returned %d", (int)info);
+    if (n > EIGEN_SINGLE_MOST)
+        FAIL(error, LAM_ERR_ARGUMENT, "--factorizer svd: %zu elements, at most %d; use hf or rsi", n,
+             EIGEN_SINGLE_MOST);
+    const int info = eigen_single(n, true, S, w);
+    if (info == LAPACK_WORK_MEMORY_ERROR)
+        FAIL(error, LAM_ERR_MEMORY, "--factorizer svd: %zu elements: out of memory; use hf or rsi", n);
+    if (info != 0) FAIL(error, LAM_ERR_NUMERIC, "eigenvectors of S: LAPACK ssyevd returned %d", info);
 done:
-    free(work);
-    free(integers);
     return status;
 }
 
@@ -56,7 +48,7 @@ static lam_status svd_factorize(const scaled_matrix *S, const factorizer_options
     if (vectors == NULL || w == NULL || sorted == NULL || squares == NULL) TRY(LAM_ERR_MEMORY);
     TRY(scaled_dense(S, vectors, error));
     progress_report(options->progress, "factorize", .1);
-    if (n > 0) TRY(eigenvectors(n, vectors, w, error));
+    TRY(eigenvectors(n, vectors, w, error));
     if (progress_cancelled(options->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
     for (size_t i = 0; i < n; i++) sorted[i] = (eigenvalue){w[i], (uint32_t)i};
     if (n > 0) qsort(sorted, n, sizeof *sorted, by_falling_size);
