@@ -1,10 +1,10 @@
+#include "solver/method/hierarchical/compress.h"
+
 #include "solver/base/array_grow.h"
 #include "solver/method/hierarchical/compress_bound.h"
-
 #include "solver/method/hierarchical/subtrees.h"
 #include "solver/method/hierarchical/wavelet_basis.h"
 #include "solver/operator/blocks/plane_tree.h"
-
 #include "store/status.h"
 
 #include <math.h>
@@ -294,7 +294,7 @@ static lam_status prepare(const compress_input *input, compressed_factors *c, la
     TRY(wavelet_basis_make(&tree, input->area, input->centre, &c->basis, error));
     c->order = tree.order;
     tree.order = NULL;
-    TRY(compress_light_groups(input, c, error));
+    TRY(compress_light_groups(input->F, input->area, input->group, input->n_groups, input->shines, c, error));
     TRY(compressed_place(c, input->area, input->group, error));
 done:
     plane_tree_free(&tree);
@@ -318,8 +318,8 @@ lam_status compress_form_factors(const compress_input *input, compressed_factors
     job.up = memory_allocate(c.basis.n_nodes, sizeof *job.up, "form factors", error);
     job.lost = memory_allocate(c.basis.n_nodes, c.n_classes * sizeof *job.lost, "form factors", error);
     if (sizes == NULL || size_of == NULL || job.up == NULL || job.lost == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(compress_sizes(input, &c, sizes, error));
-    TRY(compress_shares(input, &c, share, error));
+    TRY(compress_sizes(input->F, input->area, &c, sizes, error));
+    TRY(compress_shares(input->area, &c, share, error));
     spread_sizes(&c, sizes, size_of);
     job.position = position;
     job.size_of = size_of;

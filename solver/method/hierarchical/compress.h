@@ -22,9 +22,6 @@ typedef struct compress_input {
 /* The threshold for an operator of this epsilon, far below it. */
 double compress_threshold(double epsilon);
 
-/* Groups whose direct illumination is stored, at most. */
-enum { COMPRESS_LIT_MOST = 16 };
-
 /* out: the entries of the upper triangle of S = W A^1/2 F A^-1/2 W^T above the threshold. All of S is
  * computed, in double, node by node, so that the norm of what is dropped is exact. Not finished
  * (compressed_finish); freed with compressed_free; n is 0 if more than `most` coefficients were needed. Cost:

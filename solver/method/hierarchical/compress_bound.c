@@ -44,18 +44,17 @@ static void size_node(const wavelets *w, size_t t, const double *area, const uin
 }
 
 /* Frobenius norm of A_i^1/2 F_ij A_j^-1/2 over the elements of a leaf. */
-static double rows_of_leaf(const compress_input *input, const wavelet_node *a, const uint32_t *order) {
-    const csr *F = input->F;
+static double rows_of_leaf(const csr *F, const double *area, const wavelet_node *a, const uint32_t *order) {
     double squares = 0;
     for (size_t p = a->begin; p < a->begin + a->n_elements; p++) {
         const size_t i = order[p];
         for (uint64_t e = F->indptr[i]; e < F->indptr[i + 1]; e++)
-            squares += input->area[i] / input->area[F->indices[e]] * (double)F->data[e] * (double)F->data[e];
+            squares += area[i] / area[F->indices[e]] * (double)F->data[e] * (double)F->data[e];
     }
     return sqrt(squares);
 }
 
-lam_status compress_sizes(const compress_input *input, const compressed_factors *c, node_sizes *out,
+lam_status compress_sizes(const csr *F, const double *area, const compressed_factors *c, node_sizes *out,
                           lam_error *error) {
     const wavelets *w = &c->basis;
     double(*values)[WAVELET_SCALING] = memory_allocate(w->n, sizeof *values, "form factors", error);
@@ -63,32 +62,33 @@ lam_status compress_sizes(const compress_input *input, const compressed_factors 
     for (size_t t = 0; t < w->n_nodes; t++) {
         const wavelet_node *a = &w->nodes[t];
         out[t] = (node_sizes){.rows = 0};
-        size_node(w, t, input->area, c->order, values, &out[t]);
+        size_node(w, t, area, c->order, values, &out[t]);
         out[t].rows =
-            a->from_left > 0 ? hypot(out[a->left].rows, out[t - 1].rows) : rows_of_leaf(input, a, c->order);
+            a->from_left > 0 ? hypot(out[a->left].rows, out[t - 1].rows) : rows_of_leaf(F, area, a, c->order);
     }
     free(values);
     return LAM_OK;
 }
 
 /* Chooses groups by descending area, emitters before all others. */
-static lam_status choose_lit(const compress_input *input, compressed_factors *c, lam_error *error) {
+static lam_status choose_lit(const double *area, const uint32_t *group, size_t n_groups, const bool *shines,
+                             compressed_factors *c, lam_error *error) {
     lam_status status = LAM_OK;
-    double *size = memory_allocate(input->n_groups, sizeof *size, "form factors", error);
+    double *size = memory_allocate(n_groups, sizeof *size, "form factors", error);
     double whole = 0;
     c->lit_group = memory_allocate(COMPRESS_LIT_MOST, sizeof *c->lit_group, "form factors", error);
     if (size == NULL || c->lit_group == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < c->n; i++) {
-        size[input->group[i]] += input->area[i];
-        whole += input->area[i];
+        size[group[i]] += area[i];
+        whole += area[i];
     }
-    for (size_t g = 0; g < input->n_groups; g++)
-        if (size[g] > 0 && input->shines != NULL && input->shines[g]) size[g] += whole;
+    for (size_t g = 0; g < n_groups; g++)
+        if (size[g] > 0 && shines != NULL && shines[g]) size[g] += whole;
     while (c->n_lit < COMPRESS_LIT_MOST) {
         size_t largest = 0;
-        for (size_t g = 1; g < input->n_groups; g++)
+        for (size_t g = 1; g < n_groups; g++)
             if (size[g] > size[largest]) largest = g;
-        if (input->n_groups == 0 || !(size[largest] > 0)) break;
+        if (n_groups == 0 || !(size[largest] > 0)) break;
         size[largest] = 0;
         c->lit_group[c->n_lit++] = (uint32_t)largest;
     }
@@ -97,19 +97,20 @@ done:
     return status;
 }
 
-lam_status compress_light_groups(const compress_input *input, compressed_factors *c, lam_error *error) {
+lam_status compress_light_groups(const csr *F, const double *area, const uint32_t *group, size_t n_groups,
+                                 const bool *shines, compressed_factors *c, lam_error *error) {
     lam_status status = LAM_OK;
-    uint32_t *slot = memory_allocate(input->n_groups, sizeof *slot, "form factors", error);
-    TRY(choose_lit(input, c, error));
+    uint32_t *slot = memory_allocate(n_groups, sizeof *slot, "form factors", error);
+    TRY(choose_lit(area, group, n_groups, shines, c, error));
     c->lit = memory_allocate(c->n_lit, c->n * sizeof *c->lit, "form factors", error);
     if (slot == NULL || c->lit == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t g = 0; g < input->n_groups; g++) slot[g] = UINT32_MAX;
+    for (size_t g = 0; g < n_groups; g++) slot[g] = UINT32_MAX;
     for (size_t g = 0; g < c->n_lit; g++) slot[c->lit_group[g]] = (uint32_t)g;
     for (size_t i = 0; i < c->n; i++) {
         double sums[COMPRESS_LIT_MOST] = {0};
-        for (uint64_t e = input->F->indptr[i]; e < input->F->indptr[i + 1]; e++) {
-            const uint32_t g = slot[input->group[input->F->indices[e]]];
-            if (g != UINT32_MAX) sums[g] += (double)input->F->data[e];
+        for (uint64_t e = F->indptr[i]; e < F->indptr[i + 1]; e++) {
+            const uint32_t g = slot[group[F->indices[e]]];
+            if (g != UINT32_MAX) sums[g] += (double)F->data[e];
         }
         for (size_t g = 0; g < c->n_lit; g++) c->lit[g * c->n + i] = (float)sums[g];
     }
@@ -118,8 +119,7 @@ done:
     return status;
 }
 
-lam_status compress_shares(const compress_input *input, const compressed_factors *c, double *share,
-                           lam_error *error) {
+lam_status compress_shares(const double *area, const compressed_factors *c, double *share, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = c->n, K = c->n_classes;
     double *x = memory_allocate(n, sizeof *x, "form factors", error);
@@ -131,7 +131,7 @@ lam_status compress_shares(const compress_input *input, const compressed_factors
         double all = 0;
         for (size_t i = 0; i < n; i++) {
             x[i] = (double)c->lit[g * n + i];
-            all += input->area[i] * x[i] * x[i];
+            all += area[i] * x[i] * x[i];
         }
         compressed_norms(c, x, norms, work);
         for (size_t k = 0; k < K && all > 0; k++) share[k] += norms[k] * norms[k] / all;
