@@ -36,13 +36,8 @@ typedef struct fields {
 
 #define FIELD(member) offsetof(fields, member)
 static const option_row rows[] = {
-    {.name = "output",
-     .letter = 'o',
-     .kind = OPTION_TEXT,
-     .offset = FIELD(output),
-     .argument = "DIR",
-     .preset = "lambert-bench",
-     .help = "Folder of the results; it is made if it is missing"},
+    OPTION_ROW_OUTPUT(FIELD(output), "DIR", .preset = "lambert-bench",
+                      .help = "Folder of the results; it is made if it is missing"),
     {.name = "full",
      .kind = OPTION_FLAG,
      .offset = FIELD(full),
@@ -61,12 +56,7 @@ static const option_row rows[] = {
      .argument = "SCENE",
      .help = "formfactors: the open scene of throughput and resolution, every face an element (houses); "
              "hierarchical: the only scene, divided where it is coarse"},
-    {.name = "seed",
-     .kind = OPTION_COUNT,
-     .offset = FIELD(seed),
-     .argument = "S",
-     .preset = "1",
-     .help = "Seed of all sampling"},
+    OPTION_ROW_SEED(FIELD(seed), .help = "Seed of all sampling"),
     {0},
 };
 

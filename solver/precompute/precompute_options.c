@@ -3,6 +3,7 @@
 #include "solver/daylight/sky_tiles.h"
 #include "solver/formfactor/recipe.h"
 #include "solver/precompute/precompute.h"
+#include "solver/scene/mesh_options.h"
 
 #include <assert.h>
 #include <string.h>
@@ -25,12 +26,7 @@ done:
 
 #define FIELD(member) offsetof(precompute_options, member)
 static const option_row output_rows[] = {
-    {.name = "output",
-     .letter = 'o',
-     .kind = OPTION_TEXT,
-     .offset = FIELD(output),
-     .argument = "STORE.h5",
-     .help = "Where the store goes"},
+    OPTION_ROW_OUTPUT(FIELD(output), "STORE.h5", .help = "Where the store goes"),
     {0},
 };
 
@@ -48,13 +44,7 @@ static const option_row mesh_rows[] = {
      .argument = "METRES",
      .above = true,
      .help = "Divide until no edge is longer than this"},
-    {.name = "elements",
-     .kind = OPTION_COUNT,
-     .offset = FIELD(elements),
-     .argument = "N",
-     .least = 1,
-     .most = 4e9,
-     .help = "Divide into about N elements"},
+    OPTION_ROW_ELEMENTS(FIELD(elements), 4e9, .help = "Divide into about N elements"),
     {.name = "unit",
      .kind = OPTION_NUMBER,
      .offset = FIELD(unit),
@@ -72,14 +62,8 @@ static const option_row mesh_rows[] = {
      .kind = OPTION_FLAG,
      .offset = FIELD(two_sided),
      .help = "Make two elements of every face: first all fronts, then all backs"},
-    {.name = "reflectance",
-     .kind = OPTION_NUMBER,
-     .offset = FIELD(reflectance),
-     .argument = "X",
-     .least = 0,
-     .most = 1,
-     .below = true,
-     .help = "Grey reflectance of every face, in place of that in the file"},
+    OPTION_ROW_REFLECTANCE(FIELD(reflectance),
+                           .help = "Grey reflectance of every face, in place of that in the file"),
     {0},
 };
 
@@ -164,12 +148,7 @@ static const option_row work_rows[] = {
      .argument = "SIZE",
      .otherwise = "70 % of the free memory",
      .help = "Memory to stay within, such as 500M or 16G"},
-    {.name = "seed",
-     .kind = OPTION_COUNT,
-     .offset = FIELD(seed),
-     .argument = "S",
-     .preset = "1",
-     .help = "Seed of all sampling"},
+    OPTION_ROW_SEED(FIELD(seed), .help = "Seed of all sampling"),
     {.name = "quiet",
      .kind = OPTION_FLAG,
      .offset = FIELD(quiet),

@@ -3,6 +3,7 @@
 #include "solver/base/options.h"
 #include "solver/base/terminal.h"
 #include "solver/scene/generate/generate.h"
+#include "solver/scene/mesh_options.h"
 #include "solver/verbs/verbs.h"
 
 #include <stdio.h>
@@ -30,33 +31,10 @@ done:
 
 #define FIELD(member) offsetof(fields, member)
 static const option_row rows[] = {
-    {.name = "output",
-     .letter = 'o',
-     .kind = OPTION_TEXT,
-     .offset = FIELD(output),
-     .argument = "SCENE.obj",
-     .help = "Where the scene goes; its materials go beside it"},
-    {.name = "elements",
-     .kind = OPTION_COUNT,
-     .offset = FIELD(elements),
-     .argument = "N",
-     .least = 1,
-     .most = 1e9,
-     .help = "About this many faces"},
-    {.name = "reflectance",
-     .kind = OPTION_NUMBER,
-     .offset = FIELD(reflectance),
-     .argument = "X",
-     .least = 0,
-     .most = 1,
-     .below = true,
-     .help = "Grey reflectance of every face"},
-    {.name = "seed",
-     .kind = OPTION_COUNT,
-     .offset = FIELD(seed),
-     .argument = "S",
-     .preset = "1",
-     .help = "Seed of the random parts of city, rooms, maze and canopy"},
+    OPTION_ROW_OUTPUT(FIELD(output), "SCENE.obj", .help = "Where the scene goes; its materials go beside it"),
+    OPTION_ROW_ELEMENTS(FIELD(elements), 1e9, .help = "About this many faces"),
+    OPTION_ROW_REFLECTANCE(FIELD(reflectance), .help = "Grey reflectance of every face"),
+    OPTION_ROW_SEED(FIELD(seed), .help = "Seed of the random parts of city, rooms, maze and canopy"),
     {0},
 };
 static const option_row box_rows[] = {

@@ -69,12 +69,7 @@ done:
 
 #define FIELD(member) offsetof(fields, member)
 static const option_row rows[] = {
-    {.name = "output",
-     .letter = 'o',
-     .kind = OPTION_TEXT,
-     .offset = FIELD(output),
-     .argument = "IMAGE.png",
-     .help = "Where the picture goes"},
+    OPTION_ROW_OUTPUT(FIELD(output), "IMAGE.png", .help = "Where the picture goes"),
     {0},
 };
 static const option_row view_rows[] = {

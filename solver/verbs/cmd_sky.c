@@ -37,14 +37,12 @@ done:
 
 #define FIELD(member) offsetof(fields, member)
 static const option_row rows[] = {
-    {.name = "output",
-     .letter = 'o',
-     .kind = OPTION_TEXT,
-     .offset = FIELD(output),
-     .argument = "SKY.npy",
-     .help = "Where the skies go: float32 [hours][tiles], W/(m2 sr), the batch that `lambert solve --sky` "
-             "takes for a store of one channel. A store of three channels takes [hours][3][tiles], every row "
-             "three times; a matrix whose components differ is written so"},
+    OPTION_ROW_OUTPUT(
+        FIELD(output), "SKY.npy",
+        .help =
+            "Where the skies go: float32 [hours][tiles], W/(m2 sr), the batch that `lambert solve --sky` "
+            "takes for a store of one channel. A store of three channels takes [hours][3][tiles], every row "
+            "three times; a matrix whose components differ is written so"),
     {.name = "tiles",
      .kind = OPTION_CUSTOM,
      .offset = FIELD(tiles),

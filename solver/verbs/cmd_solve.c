@@ -307,13 +307,7 @@ int cmd_solve(int argc, char **argv) {
     char formats[OUTPUT_FORMATS], output_help[2 * OUTPUT_FORMATS];
     output_formats(false, formats);
     snprintf(output_help, sizeof output_help, "%s; without it the mean of every group is printed", formats);
-    const option_row output_rows[] = {{.name = "output",
-                                       .letter = 'o',
-                                       .kind = OPTION_TEXT,
-                                       .offset = FIELD(output),
-                                       .argument = "FILE",
-                                       .help = output_help},
-                                      {0}};
+    const option_row output_rows[] = {OPTION_ROW_OUTPUT(FIELD(output), "FILE", .help = output_help), {0}};
     const option_table tables[] = {
         {NULL, output_rows, &f},
         {LIGHT_HEADING, light_rows, &f.light},
