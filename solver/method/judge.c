@@ -179,12 +179,24 @@ static void add_first_light(const build_problem *problem, const csr *F, const pr
         B[i] += (double)p->E[at + i] + (double)problem->reflectance[c * n + i] * p->first[at + i];
 }
 
-/* Calls visit, a channel at a time, with the converged B of the m probes which[]: B is [m][n]. */
+/* The probes which[] that a reference solves, and the shares of the judge's work before and after it. */
+typedef struct reference_job {
+    const csr *F;
+    const probes *p;
+    const size_t *which; /* [m] */
+    size_t m;
+    double begin, end;
+} reference_job;
+
+/* Calls visit, a channel at a time, with the converged B of the probes: B is [m][n]. */
 typedef void visit_reference(void *context, size_t channel, const double *B);
 
-static lam_status each_reference(const judge_input *input, const csr *F, const probes *p, const size_t *which,
-                                 size_t m, visit_reference *visit, void *context, lam_error *error) {
+static lam_status each_reference(const judge_input *input, const reference_job *job, visit_reference *visit,
+                                 void *context, lam_error *error) {
     lam_status status = LAM_OK;
+    const csr *F = job->F;
+    const probes *p = job->p;
+    const size_t *which = job->which, m = job->m;
     const build_problem *problem = input->problem;
     const size_t n = problem->n, n_channels = problem->n_channels;
     reference *r = NULL;
@@ -202,6 +214,8 @@ static lam_status each_reference(const judge_input *input, const csr *F, const p
         r = NULL;
         for (size_t v = 0; v < m; v++) add_first_light(problem, F, p, which[v], c, B + v * n);
         visit(context, c, B);
+        progress_report(input->progress, "judge",
+                        job->begin + (job->end - job->begin) * (double)(c + 1) / (double)n_channels);
     }
 done:
     reference_destroy(r);
@@ -249,13 +263,15 @@ static lam_status figures_against(const judge_input *input, const csr *F, probes
                                   error_group *groups[N_GROUPS], bool total, lam_error *error) {
     lam_status status = LAM_OK;
     comparison c = {input->problem, p};
+    const double share = input->independent == NULL ? 1 : 1. / 3;
     size_t *all = memory_allocate(p->m, sizeof *all, "probes", error);
+    const reference_job job = {F, p, all, p->m, total ? share : 0, total ? 2 * share : share};
     if (all == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t v = 0; v < p->m; v++) all[v] = v;
     memset(p->B_norm, 0, p->m * sizeof *p->B_norm);
     memset(p->indirect_norm, 0, p->m * sizeof *p->indirect_norm);
     memset(p->error_norm, 0, p->m * sizeof *p->error_norm);
-    TRY(each_reference(input, F, p, all, p->m, compare, &c, error));
+    TRY(each_reference(input, &job, compare, &c, error));
     for (int g = 0; g < N_GROUPS; g++) {
         error_figures *relative = total ? &groups[g]->total_relative : &groups[g]->operator_relative;
         error_figures *indirect = total ? &groups[g]->total_indirect : &groups[g]->operator_indirect;
@@ -318,7 +334,8 @@ static lam_status measure_noise(const judge_input *input, const probes *p, error
     for (int h = 0; h < 2; h++) {
         half[h].B = memory_allocate(m, vector * sizeof *half[h].B, "reference noise", error);
         if (half[h].B == NULL) TRY(LAM_ERR_MEMORY);
-        TRY(each_reference(input, input->halves[h], p, which, m, keep_half, &half[h], error));
+        const reference_job job = {input->halves[h], p, which, m, (4. + h) / 6, (5. + h) / 6};
+        TRY(each_reference(input, &job, keep_half, &half[h], error));
     }
     size_t v = 0;
     for (int g = 0; g < N_GROUPS; g++) {
@@ -440,11 +457,9 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     TRY(apply(op, &p, LAM_RADIOSITY, p.B, error));
     TRY(physics(op, input, &p, groups, error));
     TRY(figures_against(input, problem->F, &p, groups, false, error));
-    progress_report(input->progress, "judge", .33);
     if (input->independent != NULL) {
         TRY(find_first_light(input, &p, error));
         TRY(figures_against(input, input->independent, &p, groups, true, error));
-        progress_report(input->progress, "judge", .67);
         if (input->halves[0] != NULL) TRY(measure_noise(input, &p, groups, error));
     }
     progress_report(input->progress, "judge", 1);

@@ -96,7 +96,8 @@ static lam_status announce(precompute_state *state, lam_error *error) {
     /* The share of partly hidden pairs is not known before. */
     const bool pairs = state->recipe.method == RECIPE_PAIRS || state->recipe.method == RECIPE_NEAR_PAIRS;
     if (!o->from_store) snprintf(made, sizeof made, " form factors %s%s,", seconds, pairs ? " or more" : "");
-    if (state->probes > 0) snprintf(judged, sizeof judged, " the judge's %s,", judging);
+    /* Its solves come on top of its samples. */
+    if (state->probes > 0) snprintf(judged, sizeof judged, " the judge %s or more,", judging);
     if (state->scratch != NULL) snprintf(kept, sizeof kept, ", scratch up to %s", scratch_room);
     terminal_log(state->t, "forecast:%s%s at %.3g Mray/s of a trial; memory up to %s, store up to %s%s", made,
                  judged, rate * 1e-6, memory, stored, kept);

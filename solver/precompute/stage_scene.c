@@ -294,6 +294,43 @@ done:
     return status;
 }
 
+/* Above this share of the area in one element, a mesh that was not divided is called coarse. */
+static const double coarse_share = .02;
+enum { COARSE_ADVICE = 5000 };
+
+/* Logs what shows a wrong axis or unit, or a mesh too coarse to show light. */
+static void log_mesh(const precompute_state *state) {
+    const mesh *m = &state->m;
+    const precompute_options *o = state->options;
+    const char axes[] = {'x', 'y', 'z'};
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    double size[3] = {0, 0, 0}, height = 0, area = 0, largest = 0;
+    size_t n_wide = 0;
+    for (size_t v = 0; v < m->n_vertices; v++)
+        for (int k = 0; k < 3; k++) {
+            low[k] = fmin(low[k], m->vertices[v][k]);
+            high[k] = fmax(high[k], m->vertices[v][k]);
+        }
+    for (int k = 0; k < 3; k++)
+        if (axes[k] == m->up)
+            height = high[k] - low[k];
+        else
+            size[n_wide++] = high[k] - low[k];
+    for (size_t i = 0; i < m->n; i++) {
+        area += m->area[i];
+        largest = fmax(largest, m->area[i]);
+    }
+    terminal_log(state->t, "%zu elements in %zu groups, %zu channel%s%s", m->n, m->n_groups, m->n_channels,
+                 m->n_channels == 1 ? "" : "s", m->two_sided ? ", two-sided" : "");
+    terminal_log(state->t, "%.4g m x %.4g m, %.4g m high, %c up; --up and --unit set axis and unit", size[0],
+                 size[1], height, m->up);
+    if (o->subdivide == 0 && o->max_edge == 0 && o->elements == 0 && largest > coarse_share * area)
+        terminal_log(state->t,
+                     "one element has %.0f %% of the area, and light does not vary across an element: "
+                     "--elements %d divides the faces",
+                     100 * largest / area, COARSE_ADVICE);
+}
+
 lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
@@ -315,9 +352,7 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
         TRY(emitter_list_read(o->emitters, &state->m, state->sky_tiles, &state->emitters, error));
         TRY(choose_recipe_that_fits(state, (double)state->m.n, error));
     }
-    terminal_log(state->t, "%zu elements in %zu groups, %zu channel%s%s", state->m.n, state->m.n_groups,
-                 state->m.n_channels, state->m.n_channels == 1 ? "" : "s",
-                 state->m.two_sided ? ", two-sided" : "");
+    log_mesh(state);
 done:
     return status;
 }

@@ -53,6 +53,24 @@ class Stores(Case):
                     "low-rank", "--epsilon", ".1")
         self.assertIn("below the sampling noise", done.stderr)
 
+    def test_log_shows_axes_and_a_coarse_mesh(self):
+        """A designer sees at once that y should be up, that the unit is not metres, that the mesh is too coarse."""
+        room = self.path("room.obj")
+        with open(room, "w", encoding="ascii") as file:
+            file.write("v 0 0 0\nv 4 0 0\nv 4 3 0\nv 0 3 0\nv 0 0 2.5\nv 4 0 2.5\nv 4 3 2.5\nv 0 3 2.5\n"
+                       "f 1 2 3 4\nf 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n")
+        quick = ("-o", self.path("a.h5"), "--rays", 64, "--probes", 0)
+        coarse = "--elements 5000 divides the faces"
+        said = must("precompute", room, *quick).stderr
+        self.assertIn("\n4 m x 3 m, 2.5 m high, z up; --up and --unit", said)
+        # The floor has 12 of 59 square metres.
+        self.assertIn("one element has 20 % of the area, and light does not vary across an element: " + coarse, said)
+        said = must("precompute", room, *quick, "--up", "y", "--unit", .001, "--elements", 24).stderr
+        self.assertIn("\n0.004 m x 0.0025 m, 0.003 m high, y up", said)
+        self.assertNotIn(coarse, said)
+        # A mesh that is fine already needs no advice: each of 96 faces has 1 %.
+        self.assertNotIn(coarse, must("precompute", self.box, *quick).stderr)
+
     def test_log_and_info_name_figures_in_words(self):
         """The log and `info` print words; the store and JSON keep the names of the attributes."""
         methods = {"exact": (), "low-rank": (), "2msc": (), "sparse": (), "hierarchical": (),

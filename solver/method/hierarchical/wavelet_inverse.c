@@ -7,8 +7,12 @@
 #include "solver/operator/hierarchical.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* Products of a doubling. */
+enum { PRODUCTS = 4 };
 
 /* 2^24 bounces suffice up to rho = 1 - 1e-6. */
 enum { DOUBLINGS_MOST = 24 };
@@ -46,6 +50,8 @@ typedef struct product_job {
     const float *weight; /* [n], of coefficients */
     float *inverse_weight;
     inverse_work *works; /* [n_threads] */
+    char stage[32];      /* for progress: "inverse, doubling 3" */
+    size_t n_products;   /* of this doubling, that are done */
 } product_job;
 
 typedef struct numbered {
@@ -85,7 +91,6 @@ typedef struct row_rule {
     const void *context;
     bool by_size; /* entries by descending magnitude, else by column */
     bool divided; /* entries are stored over the weight of their column */
-    const char *stage;
 } row_rule;
 
 static lam_status store_row(const product_job *job, const row_rule *rule, size_t i, size_t count,
@@ -171,7 +176,8 @@ static lam_status make_rows(const product_job *job, const row_rule *rule, csr *o
                                 &made.length[i], &one);
 #pragma omp critical(wavelet_inverse_progress)
             {
-                progress_report(job->input->progress, rule->stage, (double)++n_done / (double)blocks);
+                progress_report(job->input->progress, job->stage,
+                                ((double)job->n_products + (double)++n_done / (double)blocks) / PRODUCTS);
                 if (now == LAM_OK && progress_cancelled(job->input->progress))
                     now = status_fail(&one, LAM_ERR_CANCELLED, "cancelled");
                 if (now != LAM_OK && !failed) {
@@ -278,7 +284,7 @@ static lam_status scale_rows(const product_job *job, const csr *R, const csr *B,
     if (least == NULL) TRY(LAM_ERR_MEMORY);
     find_least(job, A, least);
     const scaled_rows s = {R, B, job->weight, least};
-    const row_rule rule = {make_scaled, keep_used, &s, true, true, "inverse"};
+    const row_rule rule = {make_scaled, keep_used, &s, true, true};
     TRY(make_rows(job, &rule, out, error));
 done:
     free(least);
@@ -299,7 +305,7 @@ static lam_status multiply(const product_job *job, const csr *A, const csr *B, c
                             .keep = input->inner * input->threshold,
                             .skip = input->skipped * input->threshold,
                             .terms = terms};
-    const row_rule rule = {make_product, keep_upper, &p, false, false, "inverse"};
+    const row_rule rule = {make_product, keep_upper, &p, false, false};
     TRY(make_rows(job, &rule, &upper, error));
     TRY(csr_mirror(&upper, out, error));
 done:
@@ -349,7 +355,7 @@ static void replace(csr *a, csr *b) {
     *b = (csr){.n = 0};
 }
 
-static lam_status run(const product_job *job, csr *out, wavelet_inverse_report *report, lam_error *error) {
+static lam_status run(product_job *job, csr *out, wavelet_inverse_report *report, lam_error *error) {
     lam_status status = LAM_OK;
     const wavelet_inverse_input *input = job->input;
     csr R = {.n = 0}, K = {.n = 0}, Z = {.n = 0}, RK = {.n = 0}, RZ = {.n = 0}, next_K = {.n = 0},
@@ -359,10 +365,15 @@ static lam_status run(const product_job *job, csr *out, wavelet_inverse_report *
     TRY(csr_mirror(input->S, &K, error));
     TRY(csr_mirror(input->S, &Z, error));
     while (Z.indptr[Z.n] > 0 && report->doublings < DOUBLINGS_MOST) {
+        snprintf(job->stage, sizeof job->stage, "inverse, doubling %zu", report->doublings + 1);
+        job->n_products = 0;
         TRY(scale_rows(job, &R, &K, &Z, &RK, error));
+        job->n_products = 1;
         TRY(multiply(job, &Z, &RK, &K, &report->terms, &next_K, error));
         csr_free(&RK);
+        job->n_products = 2;
         TRY(scale_rows(job, &R, &Z, &Z, &RZ, error));
+        job->n_products = 3;
         TRY(multiply(job, &Z, &RZ, NULL, &report->terms, &next_Z, error));
         csr_free(&RZ);
         replace(&K, &next_K);

@@ -5,6 +5,7 @@
 #include "solver/method/reference.h"
 #include "support/box_problem.h"
 #include "support/building.h"
+#include "support/followed.h"
 #include "support/suite.h"
 
 static build_options defaults(void) {
@@ -213,16 +214,23 @@ START_TEST(judge_finds_the_exact_operator_exact) {
         options.method = methods[method];
         build_report built;
         lam_operator *op = build(problem_of(&f), &options, &built);
+        followed seen = {.n_stages = 0};
+        const progress told = {.report = followed_report, .context = &seen};
         const judge_input input = {.problem = &f.problem,
                                    .row_sums = row_sums,
                                    .emission = f.m.emission,
                                    .independent = &f.F,
                                    .halves = {&f.F, &f.F},
                                    .probes = 40,
-                                   .seed = 1};
+                                   .seed = 1,
+                                   .progress = &told};
         error_report report;
         lam_error error = {0};
         ck_assert_msg(judge_operator(op, &input, &report, &error) == LAM_OK, "%s", error.message);
+        /* The beginning, four references of a channel each, the end. */
+        ck_assert_uint_eq(seen.n_stages, 1);
+        ck_assert_uint_eq(seen.n_reports, 6);
+        ck_assert(seen.share == 1);
         ck_assert_uint_eq(report.single.probes, 40);
         ck_assert_uint_eq(report.lights.probes, 1);
         const error_group *groups[3] = {&report.single, &report.lights, &report.random};

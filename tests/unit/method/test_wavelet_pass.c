@@ -1,6 +1,7 @@
 /* F in a basis of wavelets and its inverse there, against dense matrices in double. */
 #include "solver/base/random.h"
 #include "solver/method/hierarchical/wavelet_entries.h"
+#include "support/followed.h"
 #include "support/wavelet_subject.h"
 
 static lam_error error;
@@ -288,6 +289,8 @@ START_TEST(doubling_inverts) {
     double *S = dense_S(&s), *A = test_allocate(n * n, sizeof *A), *K = test_allocate(n * n, sizeof *K);
     csr in = pass(&s, 0, weight, 2), found, again;
     wavelet_inverse_report report;
+    followed seen = {.n_stages = 0};
+    const progress told = {.report = followed_report, .context = &seen};
     wavelet_inverse_input input = {.basis = &s.basis,
                                    .S = &in,
                                    .rho = rho,
@@ -295,8 +298,12 @@ START_TEST(doubling_inverts) {
                                    .threshold = 1e-6f,
                                    .inner = .01f,
                                    .skipped = .001f,
-                                   .n_threads = 1};
+                                   .n_threads = 1,
+                                   .progress = &told};
     ck_ok(wavelet_inverse(&input, &found, &report, &error));
+    ck_assert_uint_eq(seen.n_stages, report.doublings);
+    ck_assert(report.doublings == 0 || seen.share == 1);
+    input.progress = NULL;
     /* K = S (I - R S)^-1 */
     for (size_t p = 0; p < n; p++)
         for (size_t q = 0; q < n; q++) A[p * n + q] = (p == q ? 1 : 0) - (double)rho[p] * S[p * n + q];
