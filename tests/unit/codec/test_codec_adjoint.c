@@ -2,56 +2,40 @@
  * refused; cut and changed ones do no harm. The members that both share with others: test_codec_json.c. */
 #include "solver/codec/adjoint.h"
 #include "solver/codec/json_reader.h"
+#include "support/request_text.h"
 #include "support/suite.h"
 
 #include <string.h>
 
-enum { N = 5, N_GROUPS = 4, C_MAX = 3 };
+enum { N = REQUEST_ELEMENTS, C_MAX = 3 };
 
-typedef struct fixture {
-    group_index groups;
-    codec_scene scene;
-} fixture;
+typedef request_scene fixture;
 
 /* Elements 1 and 4 are box.red (group 1), 3 box.blue (group 3), 2 lamp (group 0), 0 wall (group 2). */
 static fixture make_scene(size_t n_channels) {
-    static const char *const names[N_GROUPS] = {"lamp", "box.red", "wall", "box.blue"};
     static const uint32_t group[N] = {2, 1, 0, 3, 1};
-    fixture f = {0};
-    char **block = calloc(1, N_GROUPS * (sizeof *block + 16));
-    ck_assert_ptr_nonnull(block);
-    for (size_t g = 0; g < N_GROUPS; g++) {
-        block[g] = (char *)(block + N_GROUPS) + 16 * g;
-        strcpy(block[g], names[g]);
-    }
-    ck_assert_int_eq(group_index_make(N, group, N_GROUPS, block, &f.groups, NULL), LAM_OK);
-    f.scene = (codec_scene){
-        .n = N, .n_channels = n_channels, .n_tiles = 3, .max_batch = 8, .max_bytes = 4096, .max_rows = 2};
+    fixture f = request_scene_make(group, n_channels);
+    f.scene.max_rows = 2;
     return f;
 }
 
-/* In memory of its very size, so that AddressSanitizer sees a step beyond its NUL. */
-static char *exact_copy(const char *text, size_t length) {
-    char *exact = malloc(length + 1);
-    ck_assert_ptr_nonnull(exact);
-    memcpy(exact, text, length);
-    exact[length] = '\0';
-    return exact;
-}
-
-static unsigned read_radiosity(fixture *f, const char *text, radiosity_request *request) {
+static unsigned read_radiosity_of(fixture *f, const char *text, size_t length, radiosity_request *request) {
     problem why;
-    char *exact = exact_copy(text, strlen(text));
+    char *exact = request_text_exact(text, length);
     f->scene.groups = &f->groups;
-    const bool good = codec_read_json(&f->scene, exact, strlen(text), request, &why);
+    const bool good = codec_read_json(&f->scene, exact, length, request, &why);
     ck_assert_int_eq(good, why.status == 0);
     free(exact);
     return why.status;
 }
 
+static unsigned read_radiosity(fixture *f, const char *text, radiosity_request *request) {
+    return read_radiosity_of(f, text, strlen(text), request);
+}
+
 static unsigned read_adjoint(fixture *f, const char *text, size_t length, adjoint_request *request) {
     problem why;
-    char *exact = exact_copy(text, length);
+    char *exact = request_text_exact(text, length);
     f->scene.groups = &f->groups;
     const bool good = codec_read_adjoint_json(&f->scene, exact, length, request, &why);
     ck_assert_int_eq(good, why.status == 0);
@@ -244,15 +228,7 @@ START_TEST(a_request_cut_anywhere_is_not_json) {
 }
 END_TEST
 
-static uint64_t next_random(uint64_t *state) {
-    *state ^= *state << 13;
-    *state ^= *state >> 7;
-    *state ^= *state << 17;
-    return *state;
-}
-
 START_TEST(changed_requests_never_do_harm) {
-    static const char pieces[] = "{}[],:\"\\0123456789.eE+-NIntf \x80\xC3\xFF\x00u";
     static const char *const radiosities[] = {
         "{\"emission\":{\"groups\":{\"box\":1}},\"reduce\":{\"groups\":[\"box\",\"lamp\"],\"with\":[\"mean\"]"
         "}}",
@@ -263,19 +239,15 @@ START_TEST(changed_requests_never_do_harm) {
     size_t counts[3] = {0};
     for (int round = 0; round < 200000; round++) {
         char text[256];
-        const size_t which = next_random(&state) % (N_GOOD + 2);
+        const size_t which = request_text_random(&state) % (N_GOOD + 2);
         const char *from = which < N_GOOD ? good_requests[which] : radiosities[which - N_GOOD];
         const size_t length = strlen(from);
         memcpy(text, from, length + 1);
-        for (uint64_t changes = 1 + next_random(&state) % 3; changes > 0; changes--) {
-            char c = next_random(&state) % 2 ? pieces[next_random(&state) % (sizeof pieces - 1)]
-                                             : (char)next_random(&state);
-            text[next_random(&state) % length] = c == '\0' && which >= N_GOOD ? ' ' : c;
-        }
+        request_text_change(text, length, &state);
         adjoint_request adjoint = {0};
         radiosity_request radiosity = {0};
-        const unsigned status =
-            which < N_GOOD ? read_adjoint(&f, text, length, &adjoint) : read_radiosity(&f, text, &radiosity);
+        const unsigned status = which < N_GOOD ? read_adjoint(&f, text, length, &adjoint)
+                                               : read_radiosity_of(&f, text, length, &radiosity);
         ck_assert_msg(status == 0 || status == 400 || status == 422, "%u: %s", status, text);
         json_reader r;
         json_begin(&r, text, length);

@@ -1,44 +1,25 @@
 /* The JSON reader against a published suite of cases, and requests that are cut, changed or hostile. */
 #include "solver/codec/json_reader.h"
-#include "solver/codec/request.h"
+#include "support/request_text.h"
 #include "support/suite.h"
 
 #include <dirent.h>
 #include <string.h>
 
-enum { N = 5, N_GROUPS = 4 };
+enum { N = REQUEST_ELEMENTS, N_GROUPS = REQUEST_GROUPS };
 
-typedef struct fixture {
-    group_index groups;
-    codec_scene scene;
-} fixture;
+typedef request_scene fixture;
 
 static fixture make_scene(size_t n_channels) {
-    static const char *const names[N_GROUPS] = {"lamp", "box.red", "wall", "box.blue"};
     static const uint32_t group[N] = {2, 0, 1, 3, 1};
-    fixture f = {0};
-    /* One block, as store_read_texts gives it. */
-    char **block = calloc(1, N_GROUPS * (sizeof *block + 16));
-    ck_assert_ptr_nonnull(block);
-    for (size_t g = 0; g < N_GROUPS; g++) {
-        block[g] = (char *)(block + N_GROUPS) + 16 * g;
-        strcpy(block[g], names[g]);
-    }
-    ck_assert_int_eq(group_index_make(N, group, N_GROUPS, block, &f.groups, NULL), LAM_OK);
-    f.scene =
-        (codec_scene){.n = N, .n_channels = n_channels, .n_tiles = 3, .max_batch = 8, .max_bytes = 4096};
-    return f;
+    return request_scene_make(group, n_channels);
 }
 
-/* The status that a request of this text has: 0 when it is good. The text lies in memory of its very size, so
- * that AddressSanitizer sees a step beyond its NUL. */
+/* The status that a request of this text has: 0 when it is good. */
 static unsigned status_of(fixture *f, const char *text, size_t length, radiosity_request *request) {
     radiosity_request own = {0};
     problem why;
-    char *exact = malloc(length + 1);
-    ck_assert_ptr_nonnull(exact);
-    memcpy(exact, text, length);
-    exact[length] = '\0';
+    char *exact = request_text_exact(text, length);
     f->scene.groups = &f->groups;
     bool good = codec_read_json(&f->scene, exact, length, request == NULL ? &own : request, &why);
     ck_assert_int_eq(good, why.status == 0);
@@ -202,28 +183,16 @@ START_TEST(a_request_cut_anywhere_is_not_json) {
 }
 END_TEST
 
-static uint64_t next_random(uint64_t *state) {
-    *state ^= *state << 13;
-    *state ^= *state >> 7;
-    *state ^= *state << 17;
-    return *state;
-}
-
 START_TEST(changed_requests_never_do_harm) {
     fixture f = make_scene(1);
-    static const char pieces[] = "{}[],:\"\\0123456789.eE+-NIntf \x80\xC3\xFF\x00u";
     uint64_t state = 0x1234567;
     size_t counts[3] = {0};
     for (int round = 0; round < 200000; round++) {
         char text[256];
-        const char *from = good_requests[next_random(&state) % N_GOOD];
+        const char *from = good_requests[request_text_random(&state) % N_GOOD];
         size_t length = strlen(from);
         memcpy(text, from, length + 1);
-        for (uint64_t changes = 1 + next_random(&state) % 3; changes > 0; changes--) {
-            size_t at = next_random(&state) % length;
-            text[at] = next_random(&state) % 2 ? pieces[next_random(&state) % (sizeof pieces - 1)]
-                                               : (char)next_random(&state);
-        }
+        request_text_change(text, length, &state);
         unsigned status = status_of(&f, text, length, NULL);
         ck_assert_msg(status == 0 || status == 400 || status == 422, "%u: %s", status, text);
         ck_assert_int_eq(status == 400, !is_json(text, length));

@@ -2,6 +2,7 @@
  * right. */
 #include "solver/codec/json_reader.h"
 #include "solver/codec/json_writer.h"
+#include "support/request_text.h"
 #include "support/suite.h"
 
 #include <float.h>
@@ -25,13 +26,6 @@ static uint32_t to_bits(float value) {
     uint32_t bits;
     memcpy(&bits, &value, sizeof bits);
     return bits;
-}
-
-static uint64_t next_random(uint64_t *state) {
-    *state ^= *state << 13;
-    *state ^= *state >> 7;
-    *state ^= *state << 17;
-    return *state;
 }
 
 static float read_float(const char *text) {
@@ -106,11 +100,11 @@ START_TEST(random_floats_round_trip) {
     uint64_t state = 42;
     int longer = 0, count = 500000;
     for (int i = 0; i < count; i++) {
-        uint32_t bits = (uint32_t)next_random(&state);
+        uint32_t bits = (uint32_t)request_text_random(&state);
         if ((bits & 0x7F800000u) != 0x7F800000u) longer += check_round_trip(from_bits(bits));
     }
     for (int i = 0; i < count; i++)
-        longer += check_round_trip((float)(next_random(&state) % 1000000) * 1e-3f);
+        longer += check_round_trip((float)(request_text_random(&state) % 1000000) * 1e-3f);
     /* Decimals at the very middle of two floats are not used, nor the wider gap above a power of two. */
     ck_assert_int_lt(longer, count / 50);
 }
@@ -152,7 +146,7 @@ END_TEST
 START_TEST(doubles_round_trip) {
     uint64_t state = 7;
     for (int i = 0; i < 100000 / SHARE; i++) {
-        uint64_t bits = next_random(&state);
+        uint64_t bits = request_text_random(&state);
         double value;
         memcpy(&value, &bits, sizeof value);
         if (!isfinite(value)) continue;
@@ -173,7 +167,7 @@ END_TEST
 START_TEST(doubles_are_as_short_as_can_be) {
     uint64_t state = 17;
     for (int i = 0; i < 30000 / SHARE; i++) {
-        uint64_t bits = next_random(&state);
+        uint64_t bits = request_text_random(&state);
         double value;
         char text[40];
         memcpy(&value, &bits, sizeof value);
@@ -203,23 +197,23 @@ START_TEST(decimals_are_rounded_right) {
     uint64_t state = 99;
     char text[128];
     for (int i = 0; i < 500000 / SHARE; i++) {
-        int digits = 1 + (int)(next_random(&state) % 25);
+        int digits = 1 + (int)(request_text_random(&state) % 25);
         size_t at = 0;
-        if (next_random(&state) % 2) text[at++] = '-';
-        text[at++] = (char)('1' + next_random(&state) % 9);
+        if (request_text_random(&state) % 2) text[at++] = '-';
+        text[at++] = (char)('1' + request_text_random(&state) % 9);
         for (int d = 1; d < digits; d++) {
             if (d == 1) text[at++] = '.';
-            text[at++] = (char)('0' + next_random(&state) % 10);
+            text[at++] = (char)('0' + request_text_random(&state) % 10);
         }
-        snprintf(text + at, sizeof text - at, "e%d", (int)(next_random(&state) % 700) - 350);
+        snprintf(text + at, sizeof text - at, "e%d", (int)(request_text_random(&state) % 700) - 350);
         ck_assert_msg(read_double(text) == strtod(text, NULL), "%s", text);
         float f = read_float(text);
         ck_assert_msg(to_bits(f) == to_bits(strtof(text, NULL)), "%s is read as %a", text, (double)f);
     }
     for (int i = 0; i < 100000 / SHARE; i++) {
-        uint32_t bits = (uint32_t)(next_random(&state) % 0x7F7FFFFFu);
+        uint32_t bits = (uint32_t)(request_text_random(&state) % 0x7F7FFFFFu);
         double middle = ((double)from_bits(bits) + (double)from_bits(bits + 1)) / 2;
-        snprintf(text, sizeof text, "%.*g", 17 + (int)(next_random(&state) % 30), middle);
+        snprintf(text, sizeof text, "%.*g", 17 + (int)(request_text_random(&state) % 30), middle);
         ck_assert_msg(read_float(text) == strtof(text, NULL), "%s is read as %a", text,
                       (double)read_float(text));
     }
@@ -238,27 +232,30 @@ START_TEST(plain_numbers_are_the_same_numbers) {
         float wanted[COUNT];
         size_t at = 1;
         for (int k = 0; k < COUNT; k++) {
-            const uint64_t form = next_random(&state) % 8;
-            const uint32_t bits = (uint32_t)(next_random(&state) % 0x7F7FFFFFu);
+            const uint64_t form = request_text_random(&state) % 8;
+            const uint32_t bits = (uint32_t)(request_text_random(&state) % 0x7F7FFFFFu);
             const double value = (double)from_bits(bits);
             if (form < 3)
                 snprintf(number, sizeof number, "%.9g", value);
             else if (form == 3)
-                snprintf(number, sizeof number, "%.*f", (int)(next_random(&state) % 20),
-                         (double)(next_random(&state) % 1000000) / 7);
+                snprintf(number, sizeof number, "%.*f", (int)(request_text_random(&state) % 20),
+                         (double)(request_text_random(&state) % 1000000) / 7);
             else if (form == 4)
-                snprintf(number, sizeof number, "%.*g", 15 + (int)(next_random(&state) % 12),
+                snprintf(number, sizeof number, "%.*g", 15 + (int)(request_text_random(&state) % 12),
                          (value + (double)from_bits(bits + 1)) / 2);
             else if (form == 5)
-                snprintf(number, sizeof number, "%lluE%+d", (unsigned long long)(next_random(&state) >> 3),
-                         (int)(next_random(&state) % 60) - 45);
+                snprintf(number, sizeof number, "%lluE%+d",
+                         (unsigned long long)(request_text_random(&state) >> 3),
+                         (int)(request_text_random(&state) % 60) - 45);
             else if (form == 6)
                 snprintf(number, sizeof number, "-%u", (unsigned)(bits % 100));
             else
-                snprintf(number, sizeof number, "0.%08u", (unsigned)(next_random(&state) % 100000000));
+                snprintf(number, sizeof number, "0.%08u",
+                         (unsigned)(request_text_random(&state) % 100000000));
             wanted[k] = strtof(number, NULL);
             at += (size_t)snprintf(text + at, sizeof text - at, "%s%s%s%s", k > 0 ? "," : "",
-                                   spaces[next_random(&state) % 6], number, spaces[next_random(&state) % 6]);
+                                   spaces[request_text_random(&state) % 6], number,
+                                   spaces[request_text_random(&state) % 6]);
         }
         snprintf(text + at, sizeof text - at, "]");
         json_reader r;

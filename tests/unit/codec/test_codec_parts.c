@@ -2,6 +2,7 @@
 #include "solver/codec/groups.h"
 #include "solver/codec/json_parser.h"
 #include "solver/codec/problem.h"
+#include "support/request_text.h"
 #include "support/suite.h"
 
 #include <stdlib.h>
@@ -38,17 +39,11 @@ START_TEST(a_set_knows_what_it_holds) {
 }
 END_TEST
 
+/* Every element is a group. */
 static group_index make_groups(size_t n, const char *const *names) {
-    group_index groups;
     uint32_t *group = calloc(n, sizeof *group);
-    size_t bytes = n * sizeof(char *);
-    for (size_t g = 0; g < n; g++) bytes += strlen(names[g]) + 1;
-    char **copies = malloc(bytes), *to = (char *)(copies + n); /* one block, as a store's names are */
-    for (size_t g = 0; g < n; g++, to += strlen(to) + 1) {
-        copies[g] = strcpy(to, names[g]);
-        group[g] = (uint32_t)g;
-    }
-    ck_assert_int_eq(group_index_make(n, group, n, copies, &groups, NULL), LAM_OK);
+    for (size_t g = 0; g < n; g++) group[g] = (uint32_t)g;
+    const group_index groups = named_groups(n, group, n, names);
     free(group);
     return groups;
 }

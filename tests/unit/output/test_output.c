@@ -1,6 +1,7 @@
 /* Figures of groups that a command line asks for, and arrays as files, on a mesh made by hand. */
 #include "solver/codec/request.h"
 #include "solver/output/output.h"
+#include "support/request_text.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -13,12 +14,7 @@ static uint32_t group[N] = {0, 1, 1, 2};
 static const char *const names[] = {"lamp", "table.top", "table.leg"};
 
 static group_index make_groups(void) {
-    group_index groups;
-    char **copies = calloc(1, 3 * (sizeof *copies + 16)); /* one block, as a store's names are */
-    ck_assert_ptr_nonnull(copies);
-    for (int g = 0; g < 3; g++) copies[g] = strcpy((char *)(copies + 3) + 16 * g, names[g]);
-    ck_assert_int_eq(group_index_make(N, group, 3, copies, &groups, NULL), LAM_OK);
-    return groups;
+    return named_groups(N, group, 3, names);
 }
 
 START_TEST(test_reduce) {

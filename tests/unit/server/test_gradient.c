@@ -2,6 +2,7 @@
  * H = H0 + F B, converged in double; and figures over groups, against sums written out. */
 #include "server/scene/gradient.h"
 #include "solver/codec/group_figures.h"
+#include "support/request_text.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -110,15 +111,7 @@ END_TEST
 static group_index make_groups(void) {
     static const char *const names[4] = {"a.x", "a.y", "b", "empty"};
     static const uint32_t group[N] = {0, 1, 0, 1, 0, 2, 2};
-    group_index groups = {0};
-    char **block = calloc(1, 4 * (sizeof *block + 16));
-    ck_assert_ptr_nonnull(block);
-    for (size_t g = 0; g < 4; g++) {
-        block[g] = (char *)(block + 4) + 16 * g;
-        strcpy(block[g], names[g]);
-    }
-    ck_assert_int_eq(group_index_make(N, group, 4, block, &groups, NULL), LAM_OK);
-    return groups;
+    return named_groups(N, group, 4, names);
 }
 
 static void add(reduce_request *r, const group_index *groups, const char *name, bool good) {
