@@ -357,7 +357,10 @@ lam_status lowrank_judge(const bench_run *run, const lowrank_scene *s, const low
     const judge_input input = {.problem = &problem,
                                .row_sums = s->f.row_sums,
                                .emission = s->m.emission,
-                               .independent = of->independent,
+                               .own = factor_product_of_rows(problem.F),
+                               .independent = of->independent != NULL
+                                                  ? factor_product_of_rows(of->independent)
+                                                  : (factor_product){.n = 0},
                                .first_light = of->first != NULL ? first_light_for_judge : NULL,
                                .first_light_context = of->first,
                                .probes = s->m.n < of->probes ? s->m.n : of->probes,

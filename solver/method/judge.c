@@ -13,9 +13,6 @@
 /* Probes of random emission, and probes of a group by which the reference's own noise is measured. */
 enum { RANDOM_PROBES = 8, NOISE_PROBES = 32 };
 
-/* Rows of a product that a thread takes at once. */
-enum { ROWS_AT_ONCE = 1024 };
-
 /* Residual at which a reference counts as converged: four digits below the smallest error worth printing. */
 static const double reference_tolerance = 1e-8;
 
@@ -150,38 +147,42 @@ done:
 
 /* Emission and first guess of a probe for a reference: E and B, or, where its first light H is known, R F R H
  * and B - E - R H, so that the reference finds only the further bounces. */
-static void reference_emission(const build_problem *problem, const csr *F, const probes *p, size_t v,
-                               size_t c, double *E, double *B, double *scratch) {
+static lam_status reference_emission(const judge_input *input, const factor_product *F, const probes *p,
+                                     size_t v, size_t c, double *E, double *B, double *scratch,
+                                     lam_error *error) {
+    lam_status status = LAM_OK;
+    const build_problem *problem = input->problem;
     const size_t n = problem->n, C = problem->n_channels, at = (v * C + c) * n;
     const float *rho = problem->reflectance + c * n;
-    const bool known = F != problem->F && p->known != NULL && p->known[v];
+    const bool known = F != &input->own && p->known != NULL && p->known[v];
     for (size_t i = 0; i < n; i++) {
         E[i] = (double)p->E[at + i];
         B[i] = (double)p->B[at + i];
         if (known) scratch[i] = (double)rho[i] * p->first[at + i];
     }
-    if (!known) return;
-#pragma omp parallel for schedule(dynamic, 1)
-    for (size_t first = 0; first < n; first += ROWS_AT_ONCE)
-        csr_multiply_rows(F, first, first + ROWS_AT_ONCE < n ? first + ROWS_AT_ONCE : n, 1, scratch, E);
+    if (!known) goto done;
+    TRY(F->multiply(F->context, 1, scratch, E, error));
     for (size_t i = 0; i < n; i++) {
         B[i] = fmax(B[i] - (double)p->E[at + i] - scratch[i], 0);
         E[i] *= (double)rho[i];
     }
+done:
+    return status;
 }
 
 /* Adds E + R H to the further bounces, where H is known. */
-static void add_first_light(const build_problem *problem, const csr *F, const probes *p, size_t v, size_t c,
-                            double *B) {
+static void add_first_light(const judge_input *input, const factor_product *F, const probes *p, size_t v,
+                            size_t c, double *B) {
+    const build_problem *problem = input->problem;
     const size_t n = problem->n, at = (v * problem->n_channels + c) * n;
-    if (F == problem->F || p->known == NULL || !p->known[v]) return;
+    if (F == &input->own || p->known == NULL || !p->known[v]) return;
     for (size_t i = 0; i < n; i++)
         B[i] += (double)p->E[at + i] + (double)problem->reflectance[c * n + i] * p->first[at + i];
 }
 
 /* The probes which[] that a reference solves, and the shares of the judge's work before and after it. */
 typedef struct reference_job {
-    const csr *F;
+    const factor_product *F;
     const probes *p;
     const size_t *which; /* [m] */
     size_t m;
@@ -194,7 +195,7 @@ typedef void visit_reference(void *context, size_t channel, const double *B);
 static lam_status each_reference(const judge_input *input, const reference_job *job, visit_reference *visit,
                                  void *context, lam_error *error) {
     lam_status status = LAM_OK;
-    const csr *F = job->F;
+    const factor_product *F = job->F;
     const probes *p = job->p;
     const size_t *which = job->which, m = job->m;
     const build_problem *problem = input->problem;
@@ -206,13 +207,13 @@ static lam_status each_reference(const judge_input *input, const reference_job *
     if (E == NULL || B == NULL || scratch == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t c = 0; c < n_channels; c++) {
         for (size_t v = 0; v < m; v++)
-            reference_emission(problem, F, p, which[v], c, E + v * n, B + v * n, scratch);
+            TRY(reference_emission(input, F, p, which[v], c, E + v * n, B + v * n, scratch, error));
         if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
-        TRY(reference_create(F, problem->area, problem->reflectance + c * n, REFERENCE_AUTO, &r, error));
+        TRY(reference_create_of(F, problem->area, problem->reflectance + c * n, REFERENCE_AUTO, &r, error));
         TRY(reference_solve(r, m, E, B, reference_tolerance, input->progress, error));
         reference_destroy(r);
         r = NULL;
-        for (size_t v = 0; v < m; v++) add_first_light(problem, F, p, which[v], c, B + v * n);
+        for (size_t v = 0; v < m; v++) add_first_light(input, F, p, which[v], c, B + v * n);
         visit(context, c, B);
         progress_report(input->progress, "judge",
                         job->begin + (job->end - job->begin) * (double)(c + 1) / (double)n_channels);
@@ -259,11 +260,11 @@ static void finish_figure(error_figures *f, size_t count) {
 
 /* Relative and indirect figures of each group against one F: those of the total error, or of the operator's.
  */
-static lam_status figures_against(const judge_input *input, const csr *F, probes *p,
+static lam_status figures_against(const judge_input *input, const factor_product *F, probes *p,
                                   error_group *groups[N_GROUPS], bool total, lam_error *error) {
     lam_status status = LAM_OK;
     comparison c = {input->problem, p};
-    const double share = input->independent == NULL ? 1 : 1. / 3;
+    const double share = input->independent.n == 0 ? 1 : 1. / 3;
     size_t *all = memory_allocate(p->m, sizeof *all, "probes", error);
     const reference_job job = {F, p, all, p->m, total ? share : 0, total ? 2 * share : share};
     if (all == NULL) TRY(LAM_ERR_MEMORY);
@@ -334,7 +335,7 @@ static lam_status measure_noise(const judge_input *input, const probes *p, error
     for (int h = 0; h < 2; h++) {
         half[h].B = memory_allocate(m, vector * sizeof *half[h].B, "reference noise", error);
         if (half[h].B == NULL) TRY(LAM_ERR_MEMORY);
-        const reference_job job = {input->halves[h], p, which, m, (4. + h) / 6, (5. + h) / 6};
+        const reference_job job = {&input->halves[h], p, which, m, (4. + h) / 6, (5. + h) / 6};
         TRY(each_reference(input, &job, keep_half, &half[h], error));
     }
     size_t v = 0;
@@ -456,58 +457,17 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     progress_report(input->progress, "judge", 0);
     TRY(apply(op, &p, LAM_RADIOSITY, p.B, error));
     TRY(physics(op, input, &p, groups, error));
-    TRY(figures_against(input, problem->F, &p, groups, false, error));
-    if (input->independent != NULL) {
+    TRY(figures_against(input, &input->own, &p, groups, false, error));
+    if (input->independent.n > 0) {
         TRY(find_first_light(input, &p, error));
-        TRY(figures_against(input, input->independent, &p, groups, true, error));
-        if (input->halves[0] != NULL) TRY(measure_noise(input, &p, groups, error));
+        TRY(figures_against(input, &input->independent, &p, groups, true, error));
+        if (input->halves[0].n > 0) TRY(measure_noise(input, &p, groups, error));
     }
     progress_report(input->progress, "judge", 1);
-    found.has_total = input->independent != NULL;
+    found.has_total = input->independent.n > 0;
     found.seconds = clock_seconds() - start;
     *report = found;
 done:
     probes_free(&p);
-    return status;
-}
-
-static lam_status save_figures(store *s, const char *group, const char *what, const error_figures *f,
-                               lam_error *error) {
-    lam_status status = LAM_OK;
-    char name[64];
-    const char *const statistic[3] = {"mean", "std", "max"};
-    const double value[3] = {f->mean, f->std, f->max};
-    for (int i = 0; i < 3; i++) {
-        snprintf(name, sizeof name, "%s_%s", what, statistic[i]);
-        TRY(store_set_number(s, group, name, value[i], error));
-    }
-done:
-    return status;
-}
-
-static lam_status save_group(store *s, const char *name, const error_group *g, bool has_total,
-                             lam_error *error) {
-    lam_status status = LAM_OK;
-    if (g->probes == 0) return LAM_OK;
-    TRY(store_set_integer(s, name, "probes", (int64_t)g->probes, error));
-    if (has_total) {
-        TRY(save_figures(s, name, "total_relative", &g->total_relative, error));
-        TRY(save_figures(s, name, "total_indirect", &g->total_indirect, error));
-        TRY(store_set_number(s, name, "reference_noise", g->reference_noise, error));
-    }
-    TRY(save_figures(s, name, "operator_relative", &g->operator_relative, error));
-    TRY(save_figures(s, name, "operator_indirect", &g->operator_indirect, error));
-    TRY(store_set_number(s, name, "negative_share", g->negative_share, error));
-    TRY(store_set_number(s, name, "energy_balance", g->energy_balance, error));
-done:
-    return status;
-}
-
-lam_status judge_save(const error_report *report, store *s, lam_error *error) {
-    lam_status status = LAM_OK;
-    TRY(save_group(s, "/error/single", &report->single, report->has_total, error));
-    TRY(save_group(s, "/error/lights", &report->lights, report->has_total, error));
-    TRY(save_group(s, "/error/random", &report->random, report->has_total, error));
-done:
     return status;
 }

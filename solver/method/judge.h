@@ -2,6 +2,7 @@
 #ifndef LAMBERT_METHOD_JUDGE_H
 #define LAMBERT_METHOD_JUDGE_H
 
+#include "solver/linalg/factor_product.h"
 #include "solver/method/method.h"
 
 /* Mean, standard deviation and largest value over the probes of a group. */
@@ -26,10 +27,12 @@ typedef struct error_report {
 
 typedef struct judge_input {
     const build_problem *problem;
-    const double *row_sums; /* [n] of problem->F */
-    const float *emission;  /* [C][n], the scene's own */
-    const csr *independent; /* the mean of two more samples of F, or NULL: no total error */
-    const csr *halves[2];   /* those two samples, for the reference's own noise */
+    const double *row_sums;     /* [n] of own */
+    const float *emission;      /* [C][n], the scene's own */
+    factor_product own;         /* the very F that the operator was built from */
+    factor_product independent; /* a better F that shares no sample with it, the mean of two samples or the
+                                   finer of two; n = 0: no total error */
+    factor_product halves[2];   /* those two, for the reference's own noise; n = 0: it is not measured */
     /* H = F E, [n], closer than by the independent sample, where few elements shine; *known is false where
      * many do. NULL: there is none. The reference then takes only the further bounces of that light from the
      * sample. */

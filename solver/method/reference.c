@@ -11,7 +11,7 @@ enum { BLOCK = 32, MAX_SWEEPS = 5000 };
 
 struct reference {
     size_t n;
-    const csr *F;
+    factor_product F;
     const double *area;
     const float *rho;
     double *lu; /* I - R F, row-major, factorized as its transpose; NULL: iterated */
@@ -21,13 +21,14 @@ struct reference {
 static lam_status factorize(reference *r, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = r->n;
+    const csr *F = r->F.rows;
     r->lu = memory_allocate(n * n, sizeof *r->lu, "dense reference", error);
     r->pivots = memory_allocate(n, sizeof *r->pivots, "dense reference", error);
     if (r->lu == NULL || r->pivots == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < n; i++) {
         r->lu[i * n + i] = 1;
-        for (uint64_t p = r->F->indptr[i]; p < r->F->indptr[i + 1]; p++)
-            r->lu[i * n + r->F->indices[p]] -= (double)r->rho[i] * (double)r->F->data[p];
+        for (uint64_t p = F->indptr[i]; p < F->indptr[i + 1]; p++)
+            r->lu[i * n + F->indices[p]] -= (double)r->rho[i] * (double)F->data[p];
     }
     const lapack_int info =
         LAPACKE_dgetrf(LAPACK_COL_MAJOR, (lapack_int)n, (lapack_int)n, r->lu, (lapack_int)n, r->pivots);
@@ -40,11 +41,18 @@ done:
 
 lam_status reference_create(const csr *F, const double *area, const float *reflectance, reference_way way,
                             reference **out, lam_error *error) {
+    const factor_product product = factor_product_of_rows(F);
+    return reference_create_of(&product, area, reflectance, way, out, error);
+}
+
+lam_status reference_create_of(const factor_product *F, const double *area, const float *reflectance,
+                               reference_way way, reference **out, lam_error *error) {
     lam_status status = LAM_OK;
+    const bool small = F->n <= REFERENCE_DENSE_ELEMENTS;
     reference *r = memory_allocate(1, sizeof *r, "reference", error);
     if (r == NULL) return LAM_ERR_MEMORY;
-    *r = (reference){.n = F->n, .F = F, .area = area, .rho = reflectance};
-    if (way == REFERENCE_DENSE || (way == REFERENCE_AUTO && F->n <= REFERENCE_DENSE_ELEMENTS))
+    *r = (reference){.n = F->n, .F = *F, .area = area, .rho = reflectance};
+    if (F->rows != NULL && (way == REFERENCE_DENSE || (way == REFERENCE_AUTO && small)))
         TRY(factorize(r, error));
     *out = r;
     r = NULL;
@@ -78,22 +86,20 @@ typedef struct iteration {
     double *root_area, *root_rho; /* [n] */
 } iteration;
 
-/* out = S in, row by row: S = A^1/2 F A^-1/2. t is scratch. */
-static void multiply_S(const reference *ref, iteration *it, const double *in, double *out) {
+/* out = S in: S = A^1/2 F A^-1/2. t is scratch. */
+static lam_status multiply_S(const reference *ref, iteration *it, const double *in, double *out,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
     const size_t n = it->n, m = it->m;
-#pragma omp parallel if (n >= 2048)
-    {
-#pragma omp for schedule(static)
-        for (size_t i = 0; i < n; i++)
-            for (size_t v = 0; v < m; v++) it->t[i * m + v] = in[i * m + v] / it->root_area[i];
-#pragma omp for schedule(dynamic, 1)
-        for (size_t first = 0; first < n; first += 64) {
-            const size_t last = first + 64 < n ? first + 64 : n;
-            csr_multiply_rows(ref->F, first, last, m, it->t, out);
-            for (size_t i = first; i < last; i++)
-                for (size_t v = 0; v < m; v++) out[i * m + v] *= it->root_area[i];
-        }
-    }
+#pragma omp parallel for schedule(static) if (n >= 2048)
+    for (size_t i = 0; i < n; i++)
+        for (size_t v = 0; v < m; v++) it->t[i * m + v] = in[i * m + v] / it->root_area[i];
+    TRY(ref->F.multiply(ref->F.context, m, it->t, out, error));
+#pragma omp parallel for schedule(static) if (n >= 2048)
+    for (size_t i = 0; i < n; i++)
+        for (size_t v = 0; v < m; v++) out[i * m + v] *= it->root_area[i];
+done:
+    return status;
 }
 
 /* sums[v] = sum_i x_iv y_iv */
@@ -107,13 +113,14 @@ static void dots(const iteration *it, const double *x, const double *y, double *
  * A^1/2 times the irradiance: b = e + R h, safe where rho = 0. */
 static lam_status iterate(const reference *ref, iteration *it, double tolerance, const progress *p,
                           lam_error *error) {
+    lam_status status = LAM_OK;
     const size_t n = it->n, m = it->m;
     double rr[BLOCK], uu[BLOCK], pKp[BLOCK], next[BLOCK];
     /* r = R^1/2 S (e + R^1/2 u) - u */
     for (size_t i = 0; i < n; i++)
         for (size_t v = 0; v < m; v++)
             it->p[i * m + v] = it->e[i * m + v] + it->root_rho[i] * it->u[i * m + v];
-    multiply_S(ref, it, it->p, it->r);
+    TRY(multiply_S(ref, it, it->p, it->r, error));
     for (size_t i = 0; i < n; i++)
         for (size_t v = 0; v < m; v++)
             it->r[i * m + v] = it->root_rho[i] * it->r[i * m + v] - it->u[i * m + v];
@@ -121,17 +128,17 @@ static lam_status iterate(const reference *ref, iteration *it, double tolerance,
     dots(it, it->r, it->r, rr);
 
     for (int sweep = 0; sweep < MAX_SWEEPS; sweep++) {
-        if (progress_cancelled(p)) return status_fail(error, LAM_ERR_CANCELLED, "cancelled");
+        if (progress_cancelled(p)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         dots(it, it->u, it->u, uu);
         bool converged = true;
         for (size_t v = 0; v < m; v++) converged = converged && rr[v] <= tolerance * tolerance * uu[v];
-        if (converged) return LAM_OK;
+        if (converged) goto done;
 
         /* Kp = p - R^1/2 S R^1/2 p; Kp holds R^1/2 p meanwhile, its second half the image. */
         for (size_t i = 0; i < n; i++)
             for (size_t v = 0; v < m; v++) it->Kp[i * m + v] = it->root_rho[i] * it->p[i * m + v];
         double *image = it->Kp + n * m;
-        multiply_S(ref, it, it->Kp, image);
+        TRY(multiply_S(ref, it, it->Kp, image, error));
         for (size_t i = 0; i < n; i++)
             for (size_t v = 0; v < m; v++)
                 it->Kp[i * m + v] = it->p[i * m + v] - it->root_rho[i] * image[i * m + v];
@@ -148,9 +155,10 @@ static lam_status iterate(const reference *ref, iteration *it, double tolerance,
             for (size_t v = 0; v < m; v++) it->p[i * m + v] = it->r[i * m + v] + pKp[v] * it->p[i * m + v];
         memcpy(rr, next, sizeof rr);
     }
-    return status_fail(error, LAM_ERR_NUMERIC,
-                       "the reference did not converge in %d sweeps; lower the largest reflectance",
-                       MAX_SWEEPS);
+    FAIL(error, LAM_ERR_NUMERIC, "the reference did not converge in %d sweeps; lower the largest reflectance",
+         MAX_SWEEPS);
+done:
+    return status;
 }
 
 static lam_status iteration_init(iteration *it, const reference *ref, size_t m, lam_error *error) {
@@ -201,7 +209,7 @@ static lam_status solve_block(const reference *ref, iteration *it, const double 
     for (size_t i = 0; i < n; i++)
         for (size_t v = 0; v < m; v++)
             it->p[i * m + v] = it->e[i * m + v] + it->root_rho[i] * it->u[i * m + v];
-    multiply_S(ref, it, it->p, it->r);
+    TRY(multiply_S(ref, it, it->p, it->r, error));
     for (size_t i = 0; i < n; i++)
         for (size_t v = 0; v < m; v++)
             B[v * n + i] = E[v * n + i] + (double)ref->rho[i] * it->r[i * m + v] / it->root_area[i];

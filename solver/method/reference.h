@@ -3,7 +3,7 @@
 #define LAMBERT_METHOD_REFERENCE_H
 
 #include "solver/base/progress.h"
-#include "solver/linalg/csr.h"
+#include "solver/linalg/factor_product.h"
 
 /* Up to this many elements a reference is a dense LU. */
 #define REFERENCE_DENSE_ELEMENTS 8192
@@ -17,6 +17,9 @@ typedef enum reference_way { REFERENCE_AUTO, REFERENCE_DENSE, REFERENCE_ITERATED
  * Dense: factorizes I - R F, O(n^3). Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC. */
 lam_status reference_create(const csr *F, const double *area, const float *reflectance, reference_way way,
                             reference **out, lam_error *error);
+/* The same; form factors that are no rows are iterated. */
+lam_status reference_create_of(const factor_product *F, const double *area, const float *reflectance,
+                               reference_way way, reference **out, lam_error *error);
 void reference_destroy(reference *r);
 
 /* B of m emissions, both [m][n]. B holds a guess on entry (E will do), which an iteration starts from.

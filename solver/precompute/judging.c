@@ -19,16 +19,18 @@ lam_status judging_run(const judging *j, const lam_operator *op, error_report *o
     TRY(form_factors_mean(&half[0], &half[1], &mean, error));
     /* The direct illumination of one element by rays is mostly noise. */
     if (recipe_noise(&j->f->recipe) > 0) TRY(first_light_create(j->m, j->first_light_seed, &first, error));
-    const judge_input input = {.problem = j->problem,
-                               .row_sums = j->f->row_sums,
-                               .emission = j->m->emission,
-                               .independent = &mean.F,
-                               .halves = {&half[0].F, &half[1].F},
-                               .first_light = first != NULL ? first_light_for_judge : NULL,
-                               .first_light_context = first,
-                               .probes = j->probes,
-                               .seed = j->probes_seed,
-                               .progress = j->progress};
+    const judge_input input = {
+        .problem = j->problem,
+        .row_sums = j->f->row_sums,
+        .emission = j->m->emission,
+        .own = factor_product_of_rows(j->problem->F),
+        .independent = factor_product_of_rows(&mean.F),
+        .halves = {factor_product_of_rows(&half[0].F), factor_product_of_rows(&half[1].F)},
+        .first_light = first != NULL ? first_light_for_judge : NULL,
+        .first_light_context = first,
+        .probes = j->probes,
+        .seed = j->probes_seed,
+        .progress = j->progress};
     TRY(judge_operator(op, &input, out, error));
 done:
     first_light_destroy(first);

@@ -219,8 +219,9 @@ START_TEST(judge_finds_the_exact_operator_exact) {
         const judge_input input = {.problem = &f.problem,
                                    .row_sums = row_sums,
                                    .emission = f.m.emission,
-                                   .independent = &f.F,
-                                   .halves = {&f.F, &f.F},
+                                   .own = factor_product_of_rows(&f.F),
+                                   .independent = factor_product_of_rows(&f.F),
+                                   .halves = {factor_product_of_rows(&f.F), factor_product_of_rows(&f.F)},
                                    .probes = 40,
                                    .seed = 1,
                                    .progress = &told};
@@ -290,8 +291,9 @@ START_TEST(judge_ignores_what_sees_nothing) {
     const judge_input input = {.problem = &problem,
                                .row_sums = row_sums,
                                .emission = emission,
-                               .independent = &F,
-                               .halves = {&F, &F},
+                               .own = factor_product_of_rows(&F),
+                               .independent = factor_product_of_rows(&F),
+                               .halves = {factor_product_of_rows(&F), factor_product_of_rows(&F)},
                                .probes = 40,
                                .seed = 1};
     error_report report;

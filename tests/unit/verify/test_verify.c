@@ -64,13 +64,15 @@ static sample make_sample(void) {
     MUST(form_factors_mean(&half[0], &half[1], &mean, error));
     build(&s, order);
     const build_problem problem = problem_of(&s, order);
-    const judge_input input = {.problem = &problem,
-                               .row_sums = s.f.row_sums,
-                               .emission = s.m.emission,
-                               .independent = &mean.F,
-                               .halves = {&half[0].F, &half[1].F},
-                               .probes = PROBES,
-                               .seed = 1};
+    const judge_input input = {
+        .problem = &problem,
+        .row_sums = s.f.row_sums,
+        .emission = s.m.emission,
+        .own = factor_product_of_rows(problem.F),
+        .independent = factor_product_of_rows(&mean.F),
+        .halves = {factor_product_of_rows(&half[0].F), factor_product_of_rows(&half[1].F)},
+        .probes = PROBES,
+        .seed = 1};
     MUST(judge_operator(s.op, &input, &s.errors, error));
     form_factors_free(&half[0]);
     form_factors_free(&half[1]);
