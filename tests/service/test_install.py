@@ -74,6 +74,19 @@ class Install(unittest.TestCase):
         version = run(self.prefix / "bin" / "lambert", "--version").split()[1]
         self.assertEqual(self.flags("--modversion"), [version])
 
+    def test_manual_pages_and_completion(self):
+        """Each is what the installed program prints, where man and the shells look for it."""
+        for program in ("lambert", "lambertd"):
+            for option, place in (("--print-manual", f"man/man1/{program}.1"),
+                                  ("--print-completion=bash", f"bash-completion/completions/{program}"),
+                                  ("--print-completion=zsh", f"zsh/site-functions/_{program}"),
+                                  ("--print-completion=fish", f"fish/vendor_completions.d/{program}.fish")):
+                with self.subTest(place=place):
+                    printed = run(self.prefix / "bin" / program, option)
+                    self.assertGreater(len(printed.splitlines()), 10)
+                    self.assertEqual((self.prefix / "share" / place).read_text(), printed)
+        self.assertTrue((self.prefix / "share/man/man1/lambert.1").read_text().startswith(".TH LAMBERT 1 "))
+
     def test_symbols(self):
         """Both libraries export the functions of lambert.h and no others; jansson is not needed."""
         header = (self.prefix / "include/lambert/lambert.h").read_text()

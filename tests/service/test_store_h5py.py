@@ -7,8 +7,10 @@ import functools
 import os
 import pathlib
 import re
+import sys
 import tempfile
 import unittest
+import unittest.mock
 
 import h5py
 import numpy as np
@@ -67,6 +69,22 @@ def load_xxhash():
     library.XXH3_64bits.restype = ctypes.c_uint64
     library.XXH3_64bits.argtypes = [ctypes.c_char_p, ctypes.c_size_t]
     return lambda data: library.XXH3_64bits(bytes(data), len(data))
+
+
+class XxhashPackage:
+    """The functions of Python's package xxhash that an example uses, by the C library."""
+
+    def __init__(self):
+        self.data = b""
+
+    xxh3_64 = classmethod(lambda cls: cls())
+    xxh3_64_intdigest = staticmethod(load_xxhash())
+
+    def update(self, data):
+        self.data += data
+
+    def hexdigest(self):
+        return f"{self.xxh3_64_intdigest(self.data):016x}"
 
 
 class Store:
@@ -406,6 +424,21 @@ class StoreTest(unittest.TestCase):
                 self.assertEqual(expected, [int(s) for s in sums[array][()]], array)
                 everything += array.encode() + b"\0" + sums[array][()].tobytes()
             self.assertEqual(f"{xxh3(everything):016x}", self.text(f["checksum"].attrs, "xxh3"))
+
+    @each_store
+    def test_python_of_the_checksums(self, name, path):
+        """The reader in deploy/examples accepts what was written, and no store in which one number differs."""
+        changed = self.root / "changed.h5"
+        changed.write_bytes(path.read_bytes())
+        with unittest.mock.patch.dict(sys.modules, xxhash=XxhashPackage):
+            names = example("read_checksums.py", path)
+            with h5py.File(path, "r") as f:
+                arrays = sorted((p for p in datasets(f) if not p.startswith("/checksum/")), key=str.encode)
+            self.assertEqual(sorted(names["paths"], key=str.encode), arrays)
+            with h5py.File(changed, "r+") as f:
+                f["mesh/area"][-1] *= 2
+            with self.assertRaises(AssertionError):
+                example("read_checksums.py", changed)
 
     def test_python_of_the_documentation(self):
         """The reader in deploy/examples computes what this file does."""
