@@ -15,14 +15,15 @@ enum { BLOCK_FUNCTIONS = 3 };
 
 /* Nodes are numbered: the clusters of the tree (postorder), then the elements by position. In the frame of
  * its plane, u = (x - centre[0]) * over[0], v = (y - centre[1]) * over[1]. A node with one function (a single
- * element, or a cluster of several planes) has over 0: m = (1, 0, 0). */
+ * element, or a cluster of several planes) has over 0: m = (1, 0, 0). A node in one plane may have over 0 on
+ * an axis along which all its centroids lie at its centre, and on no other. */
 typedef struct block_node {
     uint32_t begin, end; /* its positions */
     uint32_t parent;     /* BLOCK_NO_NODE: it is the root. The parent of an element is its leaf */
     double centre[2], over[2];
 } block_node;
 
-/* One direction of the light: S of the other one is the transpose. a != b. */
+/* One direction of the light: S of the other one is the transpose. a and b have no element in common. */
 typedef struct cluster_block {
     uint32_t a, b;
     float L[BLOCK_FUNCTIONS][BLOCK_FUNCTIONS]; /* 1/m^2 */
@@ -37,17 +38,24 @@ typedef struct block_factors {
     double *balance; /* [n] by position: F_ij of the blocks is multiplied by balance_i balance_j, so that rows
                         have the sums that they must have; NULL: 1 */
     size_t n_blocks;
-    cluster_block *blocks; /* [n_blocks], by a, then by b */
+    cluster_block
+        *blocks; /* [n_blocks], malloc; after block_factors_end a stands before b, by a, then by b */
+    /* Of block_factors_end: the blocks of a node as a are from[t] ... from[t + 1] - 1, those as b are
+     * into[into_from[t]] ... into[into_from[t + 1] - 1], by a. */
+    size_t *from, *into_from; /* [n_clusters + n + 1] */
+    uint32_t *into;           /* [n_blocks] */
 } block_factors;
 
 void block_factors_free(block_factors *f);
 
-/* Nodes, order, places and areas of a tree; no blocks. area and centre [n] by element. Errors:
- * LAM_ERR_MEMORY. */
+/* Nodes, order, places and areas of a tree; no blocks. area and centre [n] by element. The rectangles of
+ * nodes in a plane are those around the centroids; the caller may widen them until blocks refer to them.
+ * Errors: LAM_ERR_MEMORY. */
 lam_status block_factors_begin(const plane_tree *tree, const double *area, const double (*centre)[3],
                                block_factors *out, lam_error *error);
 
-/* Call once after the blocks were set: sorts them and prepares products. Errors: LAM_ERR_MEMORY. */
+/* Call once after the blocks were set: sorts them, turns those whose b stands before a, and prepares
+ * products. Cost: O(n + n_blocks). Errors: LAM_ERR_MEMORY, also for 2^32 blocks and more. */
 lam_status block_factors_end(block_factors *f, lam_error *error);
 
 /* y = F x for n_vectors vectors, [n][n_vectors] by position, y != x: moments of x go up the tree, through the

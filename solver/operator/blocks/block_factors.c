@@ -1,0 +1,149 @@
+#include "solver/operator/blocks/block_factors.h"
+
+#include "store/status.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void block_factors_free(block_factors *f) {
+    free(f->order);
+    free(f->nodes);
+    free(f->place);
+    free(f->area);
+    free(f->balance);
+    free(f->blocks);
+    free(f->from);
+    free(f->into_from);
+    free(f->into);
+    *f = (block_factors){.n = 0};
+}
+
+typedef struct rectangle {
+    double low[2], high[2];
+} rectangle;
+
+static void widen(rectangle *r, const rectangle *by) {
+    for (int axis = 0; axis < 2; axis++) {
+        r->low[axis] = fmin(r->low[axis], by->low[axis]);
+        r->high[axis] = fmax(r->high[axis], by->high[axis]);
+    }
+}
+
+/* Areas and places of the elements of a leaf, and their nodes; returns the rectangle around them. */
+static rectangle place_elements(const plane_tree *tree, size_t leaf, const double *area,
+                                const double (*centre)[3], block_factors *f) {
+    const plane_cluster *c = &tree->clusters[leaf];
+    const plane_frame *frame = &tree->frames[c->frame];
+    rectangle around = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
+    for (uint32_t p = c->begin; p < c->end; p++) {
+        const uint32_t i = tree->order[p];
+        rectangle point;
+        for (int axis = 0; axis < 2; axis++) {
+            double at = 0;
+            for (int d = 0; d < 3; d++) at += frame->axis[axis][d] * (centre[i][d] - frame->origin[d]);
+            f->place[p][axis] = point.low[axis] = point.high[axis] = at;
+        }
+        f->area[p] = area[i];
+        f->nodes[f->n_clusters + p] = (block_node){
+            .begin = p, .end = p + 1, .parent = (uint32_t)leaf, .centre = {f->place[p][0], f->place[p][1]}};
+        widen(&around, &point);
+    }
+    return around;
+}
+
+static void set_rectangle(const rectangle *r, block_node *node) {
+    for (int axis = 0; axis < 2; axis++) {
+        node->centre[axis] = (r->low[axis] + r->high[axis]) / 2;
+        node->over[axis] = r->high[axis] > r->low[axis] ? 2 / (r->high[axis] - r->low[axis]) : 0;
+    }
+}
+
+lam_status block_factors_begin(const plane_tree *tree, const double *area, const double (*centre)[3],
+                               block_factors *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = tree->n, n_clusters = tree->n_clusters;
+    block_factors f = {.n = n, .n_clusters = n_clusters};
+    rectangle *around = memory_allocate(n_clusters, sizeof *around, "blocks", error);
+    f.order = memory_allocate(n, sizeof *f.order, "blocks", error);
+    f.nodes = memory_allocate(n_clusters + n, sizeof *f.nodes, "blocks", error);
+    f.place = memory_allocate(n, sizeof *f.place, "blocks", error);
+    f.area = memory_allocate(n, sizeof *f.area, "blocks", error);
+    if (around == NULL || f.order == NULL || f.nodes == NULL || f.place == NULL || f.area == NULL)
+        TRY(LAM_ERR_MEMORY);
+    memcpy(f.order, tree->order, n * sizeof *f.order);
+    for (size_t t = 0; t < n_clusters; t++) {
+        const plane_cluster *c = &tree->clusters[t];
+        block_node *node = &f.nodes[t];
+        *node = (block_node){.begin = c->begin, .end = c->end, .parent = BLOCK_NO_NODE};
+        if (!c->leaf) f.nodes[c->left].parent = f.nodes[t - 1].parent = (uint32_t)t;
+        if (c->frame == PLANE_ABOVE) continue;
+        if (c->leaf) {
+            around[t] = place_elements(tree, t, area, centre, &f);
+        } else {
+            around[t] = around[t - 1];
+            widen(&around[t], &around[c->left]);
+        }
+        set_rectangle(&around[t], node);
+    }
+    *out = f;
+    f = (block_factors){.n = 0};
+done:
+    free(around);
+    block_factors_free(&f);
+    return status;
+}
+
+/* Swaps a and b where b stands before a. */
+static void turn(const block_node *nodes, cluster_block *k) {
+    if (nodes[k->a].begin < nodes[k->b].begin) return;
+    const cluster_block was = *k;
+    k->a = was.b;
+    k->b = was.a;
+    for (int r = 0; r < BLOCK_FUNCTIONS; r++)
+        for (int c = 0; c < BLOCK_FUNCTIONS; c++) k->L[r][c] = was.L[c][r];
+}
+
+/* from[t] = the number of blocks that have a node below t as a (or as b), for t up to n_nodes. */
+static void count_blocks(const block_factors *f, size_t n_nodes, bool as_b, size_t *from) {
+    memset(from, 0, (n_nodes + 1) * sizeof *from);
+    for (size_t k = 0; k < f->n_blocks; k++) from[(as_b ? f->blocks[k].b : f->blocks[k].a) + 1]++;
+    for (size_t t = 0; t < n_nodes; t++) from[t + 1] += from[t];
+}
+
+/* out = the blocks by b, those of one b in their present order. */
+static void order_by_b(const block_factors *f, size_t n_nodes, size_t *from, uint32_t *out) {
+    for (size_t k = 0; k < f->n_blocks; k++) out[from[f->blocks[k].b]++] = (uint32_t)k;
+    memmove(from + 1, from, n_nodes * sizeof *from);
+    from[0] = 0;
+}
+
+lam_status block_factors_end(block_factors *f, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n_nodes = f->n_clusters + f->n, count = f->n_blocks;
+    cluster_block *sorted = NULL;
+    if (count > UINT32_MAX) FAIL(error, LAM_ERR_MEMORY, "%zu blocks, must be below 2^32", count);
+    f->from = memory_allocate(n_nodes + 1, sizeof *f->from, "blocks", error);
+    f->into_from = memory_allocate(n_nodes + 1, sizeof *f->into_from, "blocks", error);
+    f->into = memory_allocate(count, sizeof *f->into, "blocks", error);
+    sorted = memory_allocate(count, sizeof *sorted, "blocks", error);
+    if (f->from == NULL || f->into_from == NULL || f->into == NULL || sorted == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < count; k++) turn(f->nodes, &f->blocks[k]);
+    /* Two stable sorts: by b, then by a. */
+    count_blocks(f, n_nodes, true, f->into_from);
+    order_by_b(f, n_nodes, f->into_from, f->into);
+    count_blocks(f, n_nodes, false, f->from);
+    for (size_t k = 0; k < count; k++) {
+        const cluster_block *from = &f->blocks[f->into[k]];
+        sorted[f->from[from->a]++] = *from;
+    }
+    memmove(f->from + 1, f->from, n_nodes * sizeof *f->from);
+    f->from[0] = 0;
+    free(f->blocks);
+    f->blocks = sorted;
+    sorted = NULL;
+    order_by_b(f, n_nodes, f->into_from, f->into);
+done:
+    free(sorted);
+    return status;
+}
