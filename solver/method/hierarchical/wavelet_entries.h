@@ -49,7 +49,7 @@ lam_status wavelet_impose_row_sums(const wavelets *w, const uint32_t *order, con
 enum { ENTRY_LANES = 3 };
 
 /* Column j of the rows of S1 that a node a carries up: of[l] = (Phi_a S1 W^T)_lj, Phi_a the scaling functions
- * of a, j a wavelet of a node finer than the parent of a, and the weight of that node. */
+ * of a, and the weight of the node of j (wavelet_pass.h carries nodes finer than the parent of a alone). */
 typedef struct fine_column {
     uint32_t j;
     float weight;

@@ -23,6 +23,21 @@ typedef struct block_node {
     double centre[2], over[2];
 } block_node;
 
+/* Coordinates in the parent from those in a child: u' = shift + scale u. All elements of a child with over 0
+ * lie at its centre; of a parent with over 0 the constant alone counts. */
+typedef struct block_step {
+    double shift[2], scale[2];
+} block_step;
+
+static inline block_step block_step_up(const block_node *child, const block_node *parent) {
+    block_step s;
+    for (int axis = 0; axis < 2; axis++) {
+        s.shift[axis] = (child->centre[axis] - parent->centre[axis]) * parent->over[axis];
+        s.scale[axis] = child->over[axis] != 0 ? parent->over[axis] / child->over[axis] : 0;
+    }
+    return s;
+}
+
 /* One direction of the light: S of the other one is the transpose. a and b have no element in common. */
 typedef struct cluster_block {
     uint32_t a, b;

@@ -22,21 +22,6 @@ typedef struct panel {
     void *x, *y, *up, *down;
 } panel;
 
-/* Coordinates of the parent from those of a child: u' = shift + scale u. Of a child whose over is 0 all
- * elements lie at its centre, and of a parent whose over is 0 nothing but the constant counts. */
-typedef struct step {
-    double shift[2], scale[2];
-} step;
-
-static inline step step_to(const block_node *child, const block_node *parent) {
-    step s;
-    for (int axis = 0; axis < 2; axis++) {
-        s.shift[axis] = (child->centre[axis] - parent->centre[axis]) * parent->over[axis];
-        s.scale[axis] = child->over[axis] != 0 ? parent->over[axis] / child->over[axis] : 0;
-    }
-    return s;
-}
-
 #define KERNEL(name) name##_one
 #define TARGET
 #define LANES one

@@ -3,6 +3,7 @@
 #include "solver/operator/blocks/block_factors.h"
 #include "support/dense.h"
 #include "support/failing_memory.h"
+#include "support/random_blocks.h"
 #include "support/suite.h"
 
 #include <float.h>
@@ -41,55 +42,6 @@ static void make_places(places *s, uint64_t *seed) {
     for (size_t i = 0; i < ELEMENTS; i++) s->area[i] = .1 + random_lcg_unit(seed);
 }
 
-/* m_t(i), i by position. */
-static void functions_at(const block_factors *f, uint32_t t, size_t i, double m[BLOCK_FUNCTIONS]) {
-    m[0] = 1;
-    for (int d = 0; d < 2; d++) m[1 + d] = (f->place[i][d] - f->nodes[t].centre[d]) * f->nodes[t].over[d];
-}
-
-/* Adds a block to the dense matrices F and its magnitudes, in both directions. */
-static void add_dense(const block_factors *f, const cluster_block *k, double *F, double *size) {
-    for (size_t i = f->nodes[k->a].begin; i < f->nodes[k->a].end; i++)
-        for (size_t j = f->nodes[k->b].begin; j < f->nodes[k->b].end; j++) {
-            double x[BLOCK_FUNCTIONS], y[BLOCK_FUNCTIONS], value = 0, sum = 0;
-            functions_at(f, k->a, i, x);
-            functions_at(f, k->b, j, y);
-            for (int r = 0; r < BLOCK_FUNCTIONS; r++)
-                for (int c = 0; c < BLOCK_FUNCTIONS; c++) {
-                    value += x[r] * (double)k->L[r][c] * y[c];
-                    sum += fabs(x[r] * (double)k->L[r][c] * y[c]);
-                }
-            const double even = f->balance != NULL ? f->balance[i] * f->balance[j] : 1;
-            F[i * f->n + j] += even * value * f->area[j];
-            F[j * f->n + i] += even * value * f->area[i];
-            size[i * f->n + j] += even * sum * f->area[j];
-            size[j * f->n + i] += even * sum * f->area[i];
-        }
-}
-
-/* Random blocks in either direction, each pair of elements in one at most. */
-static void random_blocks(block_factors *f, uint64_t *seed) {
-    const size_t n = f->n, n_nodes = f->n_clusters + n;
-    bool *taken = test_allocate(n * n, sizeof *taken);
-    f->blocks = test_allocate(ROUNDS, sizeof *f->blocks);
-    for (int round = 0; round < ROUNDS; round++) {
-        cluster_block *k = &f->blocks[f->n_blocks];
-        k->a = (uint32_t)(random_lcg_unit(seed) * (double)n_nodes);
-        k->b = (uint32_t)(random_lcg_unit(seed) * (double)n_nodes);
-        const block_node *a = &f->nodes[k->a], *b = &f->nodes[k->b];
-        bool fits = a->end <= b->begin || b->end <= a->begin;
-        for (size_t i = a->begin; fits && i < a->end; i++)
-            for (size_t j = b->begin; j < b->end; j++) fits = fits && !taken[i * n + j];
-        if (!fits) continue;
-        for (size_t i = a->begin; i < a->end; i++)
-            for (size_t j = b->begin; j < b->end; j++) taken[i * n + j] = taken[j * n + i] = true;
-        for (int r = 0; r < BLOCK_FUNCTIONS; r++)
-            for (int c = 0; c < BLOCK_FUNCTIONS; c++) k->L[r][c] = (float)(random_lcg_unit(seed) - .3);
-        f->n_blocks++;
-    }
-    free(taken);
-}
-
 enum { PLAIN, BALANCED, WIDENED, EMPTY, CASES };
 
 /* Rectangles that reach beyond the centroids, each in its own way. */
@@ -113,8 +65,8 @@ static block_factors subject(int which, plane_tree *tree, double *F, double *siz
     if (which == WIDENED) widen(tree, &f, &seed);
     if (which == BALANCED) f.balance = test_allocate(ELEMENTS, sizeof *f.balance);
     for (size_t p = 0; f.balance != NULL && p < ELEMENTS; p++) f.balance[p] = .5 + random_lcg_unit(&seed);
-    if (which != EMPTY) random_blocks(&f, &seed);
-    for (size_t k = 0; k < f.n_blocks; k++) add_dense(&f, &f.blocks[k], F, size);
+    if (which != EMPTY) random_blocks(&f, ROUNDS, &seed);
+    for (size_t k = 0; k < f.n_blocks; k++) block_add_dense(&f, &f.blocks[k], F, size);
     ck_ok(block_factors_end(&f, &error));
     free(s);
     return f;
@@ -149,7 +101,7 @@ START_TEST(nodes_follow_the_tree) {
             if (c->frame != PLANE_ABOVE) flat += a->over[d] == 0;
             for (size_t i = a->begin; a->over[d] != 0 && i < a->end; i++) {
                 double m[BLOCK_FUNCTIONS];
-                functions_at(&f, t, i, m);
+                block_functions_at(&f, t, i, m);
                 low = fmin(low, m[1 + d]);
                 high = fmax(high, m[1 + d]);
             }
@@ -194,7 +146,7 @@ START_TEST(blocks_are_sorted_and_turned) {
     ck_assert_uint_gt(of_clusters, 20);
     /* The matrix is the one of the blocks as they were given. */
     memset(size, 0, ELEMENTS * ELEMENTS * sizeof *size);
-    for (size_t k = 0; k < f.n_blocks; k++) add_dense(&f, &f.blocks[k], again, size);
+    for (size_t k = 0; k < f.n_blocks; k++) block_add_dense(&f, &f.blocks[k], again, size);
     for (size_t k = 0; k < ELEMENTS * ELEMENTS; k++)
         ck_each(fabs(F[k] - again[k]) <= 16 * DBL_EPSILON * size[k]);
     block_factors_free(&f);
