@@ -96,6 +96,12 @@ static const build_method *asked_for(const build_options *options) {
     return NULL;
 }
 
+/* True if the method can build from the form factors of the problem, or if there are none yet. */
+static bool can_use(const build_problem *problem, const build_method *m) {
+    return (problem->stream == NULL || (m->flags & METHOD_STREAMS)) &&
+           (problem->blocks == NULL || (m->flags & METHOD_BLOCKS));
+}
+
 static lam_status take_named(const build_problem *problem, const build_options *options, decision *d,
                              lam_error *error) {
     lam_status status = LAM_OK;
@@ -115,7 +121,7 @@ static lam_status take_named(const build_problem *problem, const build_options *
     d->taken = d->candidates;
     d->final = true;
     snprintf(d->reason, sizeof d->reason, "asked for by --method");
-    if (problem->stream != NULL && !(m->flags & METHOD_STREAMS))
+    if (!can_use(problem, m))
         FAIL(error, LAM_ERR_ARGUMENT, "--method %s: needs rows of form factors that are held", m->name);
 done:
     return status;
@@ -139,11 +145,14 @@ lam_status choose_method(const build_problem *problem, const build_options *opti
     }
     if (d.asked != NULL && d.asked->check != NULL)
         TRY(d.asked->check(method_own_const(options, d.asked), error));
+    if (d.asked != NULL && !can_use(problem, d.asked))
+        FAIL(error, LAM_ERR_ARGUMENT, "options of --method %s: it needs rows of form factors that are held",
+             d.asked->name);
     d.candidates = memory_allocate(METHODS_MOST, sizeof *d.candidates, "choice of a method", error);
     if (d.candidates == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t k = 0; method_at(k) != NULL; k++) {
         const build_method *m = method_at(k);
-        if (m->weigh == NULL || (problem->stream != NULL && !(m->flags & METHOD_STREAMS))) continue;
+        if (m->weigh == NULL || !can_use(problem, m)) continue;
         candidate *c = &d.candidates[d.n_candidates];
         *c = (candidate){.method = m, .cost = INFINITY};
         memcpy(&c->own, method_own_const(options, m), sizeof c->own);
@@ -151,7 +160,7 @@ lam_status choose_method(const build_problem *problem, const build_options *opti
         d.n_candidates++;
     }
     d.taken = best(&d);
-    d.final = problem->F != NULL || problem->stream != NULL || is_final(&d);
+    d.final = problem->F != NULL || problem->stream != NULL || problem->blocks != NULL || is_final(&d);
     explain(&d);
     *out = d;
     d = (decision){.n_candidates = 0};

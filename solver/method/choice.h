@@ -58,13 +58,13 @@ typedef struct decision {
 } decision;
 
 /* Weighs the methods in the order of the list where options->method is auto, else takes that one. With
- * neither F nor stream in the problem, decides as far as is possible without them.
+ * neither F nor stream nor blocks in the problem, decides as far as is possible without them.
  *
  * The cost of the hierarchical operator is known only after its build. Then the decision holds the operator
  * (taken->op), and a caller that takes it over sets op to NULL. Free with decision_free, which closes all
  * others. Cost: that of the hierarchical operator, a hundred rows of sparse inverses, else at most 40
  * products of S with eight vectors and a few dozen with 32. Errors: LAM_ERR_ARGUMENT for an unknown method or
- * one that cannot use a stream, LAM_ERR_MEMORY, LAM_ERR_NUMERIC, LAM_ERR_CANCELLED. */
+ * one that cannot use a stream or blocks, LAM_ERR_MEMORY, LAM_ERR_NUMERIC, LAM_ERR_CANCELLED. */
 lam_status choose_method(const build_problem *problem, const build_options *options, bool thorough,
                          decision *out, lam_error *error);
 void decision_free(decision *d);

@@ -9,6 +9,7 @@
 #include "solver/linalg/csr.h"
 #include "solver/linalg/row_source.h"
 #include "solver/method/report.h"
+#include "solver/operator/blocks/block_factors.h"
 #include "solver/operator/operator.h"
 
 /* The emitters that alone are going to shine: numbers of emitter k come k C at a time. */
@@ -27,10 +28,12 @@ typedef struct build_problem {
     size_t n_channels;
     const double *area;       /* [n] */
     const float *reflectance; /* [C][n], in [0, 1) */
-    const csr *F;             /* NULL where there is a stream, and before the form factors are found */
-    row_stream *stream;       /* NULL where there is F; METHOD_STREAMS */
-    const uint32_t *order;    /* [n] */
-    double noise;             /* sampling error of S in the 2-norm, about; 0: not known */
+    const csr *F;             /* NULL where there are others, and before the form factors are found */
+    row_stream *stream;       /* of rows of F, in place of F; METHOD_STREAMS */
+    const block_factors
+        *blocks;           /* in place of F, on the tree of centre and normal (PLANE_LEAF); METHOD_BLOCKS */
+    const uint32_t *order; /* [n] */
+    double noise;          /* sampling error of S in the 2-norm, about; 0: not known */
     /* NULL where no method needs them: METHOD_GEOMETRY. */
     const double (*centre)[3];      /* [n] centroids, m */
     const float (*normal)[3];       /* [n] unit */
@@ -80,6 +83,7 @@ enum {
     METHOD_GEOMETRY = 1,      /* it needs centres, normals and surfaces */
     METHOD_STREAMS = 2,       /* it can build from a stream of rows instead of F */
     METHOD_FILTERS_NOISE = 4, /* it leaves out most of the noise of rays, so fewer rays are enough */
+    METHOD_BLOCKS = 8,        /* it can build from blocks of form factors instead of F */
 };
 
 /* One method. own points to a struct of the method that its rows fill; a NULL function has no effect.

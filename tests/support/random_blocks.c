@@ -47,3 +47,19 @@ void random_blocks(block_factors *f, size_t rounds, uint64_t *seed) {
     }
     free(taken);
 }
+
+void blocks_of_pairs(const csr *F, block_factors *f) {
+    const uint32_t first = (uint32_t)f->n_clusters;
+    uint32_t *position = test_allocate(f->n, sizeof *position);
+    f->blocks = test_allocate(F->indptr[f->n], sizeof *f->blocks);
+    for (size_t p = 0; p < f->n; p++) position[f->order[p]] = (uint32_t)p;
+    for (size_t i = 0; i < f->n; i++)
+        for (uint64_t e = F->indptr[i]; e < F->indptr[i + 1]; e++) {
+            const uint32_t j = F->indices[e];
+            if (j <= i) continue;
+            cluster_block *made = &f->blocks[f->n_blocks++];
+            *made = (cluster_block){.a = first + position[i], .b = first + position[j]};
+            made->L[0][0] = (float)((double)F->data[e] / f->area[position[j]]);
+        }
+    free(position);
+}

@@ -2,6 +2,7 @@
 #ifndef LAMBERT_TESTS_RANDOM_BLOCKS_H
 #define LAMBERT_TESTS_RANDOM_BLOCKS_H
 
+#include "solver/linalg/csr.h"
 #include "solver/operator/blocks/block_factors.h"
 #include "support/dense.h"
 
@@ -14,5 +15,9 @@ void block_add_dense(const block_factors *f, const cluster_block *k, double *F, 
 /* Fills f with what is found in `rounds` trials, in either direction; a pair of elements is in one block at
  * most. */
 void random_blocks(block_factors *f, size_t rounds, uint64_t *seed);
+
+/* Fills f with blocks of two elements each, from rows of F by element; of each pair the row of the first
+ * element counts. */
+void blocks_of_pairs(const csr *F, block_factors *f);
 
 #endif

@@ -2,9 +2,10 @@
  * light between distant clusters, its further bounces and light between neighbours take few coefficients
  * (Gortler et al. 1993; Beylkin et al. 1991). */
 #include "solver/base/clock.h"
-#include "solver/base/random.h"
 #include "solver/method/choice.h"
+#include "solver/method/hierarchical/self_check.h"
 #include "solver/method/hierarchical/wavelet_basis.h"
+#include "solver/method/hierarchical/wavelet_blocks.h"
 #include "solver/method/hierarchical/wavelet_entries.h"
 #include "solver/method/hierarchical/wavelet_inverse.h"
 #include "solver/method/hierarchical/wavelet_pass.h"
@@ -32,9 +33,6 @@ static const option_row rows[] = {
      .above = true},
     {0},
 };
-
-/* Elements of a leaf at most. */
-enum { LEAF = 6 };
 
 /* Coefficients are kept from this share of epsilon on. */
 static const double share_of_epsilon = .02;
@@ -121,152 +119,85 @@ done:
     return status;
 }
 
-/* Random emissions, all emissions, rows of F that a thread multiplies at a time. */
-enum { PROBES = 4, EMISSIONS = PROBES + 1, ROWS_AT_ONCE = 1024 };
-/* Of streamed F one row in ONE_IN is used, within these limits. */
-enum { ONE_IN = 32, OTHERS_LEAST = 64, OTHERS_MOST = 2048 };
+/* S in the basis, on its way. */
+typedef struct expansion {
+    const build_problem *problem;
+    const plane_tree *tree;
+    const wavelets *basis;
+    const float *weight; /* [n_nodes] */
+    const double *area;  /* [n], by position */
+    float threshold;     /* of S */
+    double radii;        /* reach of a node */
+    size_t n_threads;
+    const progress *progress;
+} expansion;
 
-/* Emissions, of which the last gives uniform radiosity, their answers, and h = F B~ of the random ones. */
-typedef struct check {
-    float *E, *B; /* [EMISSIONS][C][n] */
-    double *h;    /* [PROBES][C][count], at `elements` */
-    void *work;
-    size_t work_bytes, count;
-    uint32_t *elements; /* [count]; NULL: all of them in mesh order */
-} check;
-
-static void check_free(check *s) {
-    free(s->E);
-    free(s->B);
-    free(s->h);
-    free(s->work);
-    free(s->elements);
-}
-
-static size_t rows_tried(const build_problem *problem) {
-    const size_t n = problem->n, some = n / ONE_IN;
-    if (problem->stream == NULL) return n;
-    const size_t count = some < OTHERS_LEAST ? OTHERS_LEAST : some > OTHERS_MOST ? OTHERS_MOST : some;
-    return count < n ? count : n;
-}
-
-static lam_status check_make(const build_problem *problem, const lam_operator *op, check *s,
-                             lam_error *error) {
+/* S from rows of F. row_sums: of the stream, or `sums` [n], which are set. */
+static lam_status expand_rows(const expansion *x, double *sums, const double **row_sums, csr *S,
+                              lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = problem->n, C = problem->n_channels;
-    *s = (check){.work_bytes = lam_operator_work_bytes(op, EMISSIONS), .count = rows_tried(problem)};
-    s->E = memory_allocate(EMISSIONS * C, n * sizeof *s->E, "self-check", error);
-    s->B = memory_allocate(EMISSIONS * C, n * sizeof *s->B, "self-check", error);
-    s->h = memory_allocate(PROBES * C, s->count * sizeof *s->h, "self-check", error);
-    s->work = memory_allocate(1, s->work_bytes, "self-check", error);
-    if (s->E == NULL || s->B == NULL || s->h == NULL || s->work == NULL) TRY(LAM_ERR_MEMORY);
-    if (problem->stream == NULL) goto done;
-    s->elements = memory_allocate(s->count, sizeof *s->elements, "self-check", error);
-    if (s->elements == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t k = 0; k < s->count; k++) s->elements[k] = problem->order[k * n / s->count];
+    row_stream *const stream = x->problem->stream;
+    row_source held;
+    if (stream == NULL) row_source_of_csr(&held, x->problem->F);
+    const wavelet_pass_input pass = {.basis = x->basis,
+                                     .rows = stream != NULL ? &stream->rows : &held,
+                                     .one_sided = stream != NULL,
+                                     .area = x->problem->area,
+                                     .tree = x->tree,
+                                     .threshold = x->threshold,
+                                     .weight = x->weight,
+                                     .centre = x->problem->centre,
+                                     .reach = x->radii,
+                                     .n_threads = x->n_threads,
+                                     .progress = x->progress};
+    TRY(wavelet_pass(&pass, S, error));
+    *row_sums = sums;
+    if (stream == NULL) {
+        sum_rows(x->problem->F, sums);
+        goto done;
+    }
+    TRY(stream->close(stream->context, row_sums, error));
+    TRY(wavelet_impose_row_sums(x->basis, x->tree->order, x->area, *row_sums, x->threshold, x->weight, S,
+                                error));
 done:
     return status;
 }
 
-/* h of all elements. */
-static lam_status multiply(const build_problem *problem, const check *s, lam_error *error) {
-    const size_t n = problem->n;
-    double *x = memory_allocate(n, sizeof *x, "self-check", error);
-    if (x == NULL) return LAM_ERR_MEMORY;
-    for (size_t v = 0; v < PROBES * problem->n_channels; v++) {
-        for (size_t i = 0; i < n; i++) x[i] = (double)s->B[v * n + i];
-#pragma omp parallel for schedule(dynamic, 1)
-        for (size_t first = 0; first < n; first += ROWS_AT_ONCE)
-            csr_multiply_rows(problem->F, first, first + ROWS_AT_ONCE < n ? first + ROWS_AT_ONCE : n, 1, x,
-                              s->h + v * n);
-    }
-    free(x);
-    return LAM_OK;
-}
-
-/* h of some elements, by rows of the independent sample. */
-static lam_status multiply_others(const build_problem *problem, const check *s, lam_error *error) {
+/* Blocks refer to clusters and positions of their own tree. */
+static lam_status check_tree(const plane_tree *tree, const block_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = problem->n;
-#pragma omp parallel for schedule(dynamic, 1)
-    for (size_t k = 0; k < s->count; k++) {
-        row_block row;
-        lam_error why = {.message = ""};
-        const lam_status one = row_source_get(&problem->stream->others, &s->elements[k], 1, &row, &why);
-        if (one != LAM_OK) {
-#pragma omp critical(self_check_failed)
-            status = status_fail(error, one, "%s", why.message);
-            continue;
-        }
-        for (size_t v = 0; v < PROBES * problem->n_channels; v++) {
-            const float *B = s->B + v * n;
-            double sum = 0;
-            for (size_t e = 0; e < row.length[0]; e++)
-                sum += (double)row.data[0][e] * (double)B[row.indices[0][e]];
-            s->h[v * s->count + k] = sum;
-        }
-        row_block_free(&row);
-    }
+    bool same = f->n == tree->n && f->n_clusters == tree->n_clusters;
+    for (size_t t = 0; same && t < f->n_clusters; t++)
+        same = f->nodes[t].begin == tree->clusters[t].begin && f->nodes[t].end == tree->clusters[t].end;
+    if (!same || memcmp(f->order, tree->order, f->n * sizeof *f->order) != 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "the blocks of form factors are on another tree of clusters");
+done:
     return status;
 }
 
-/* |E - (B~ - rho F B~)| / |E| of one emission and channel. */
-static double residual(const build_problem *problem, const check *s, size_t e, size_t c) {
-    const size_t n = problem->n, v = e * problem->n_channels + c;
-    const float *rho = problem->reflectance + c * n, *E = s->E + v * n, *B = s->B + v * n;
-    double left = 0, all = 0;
-    for (size_t k = 0; k < s->count; k++) {
-        const size_t i = s->elements != NULL ? s->elements[k] : k;
-        const double r = (double)E[i] - ((double)B[i] - (double)rho[i] * s->h[v * s->count + k]);
-        left += problem->area[i] * r * r;
-        all += problem->area[i] * (double)E[i] * (double)E[i];
-    }
-    return sqrt(left / all);
-}
-
-/* |B~ - 1| / |1| of the last emission. */
-static double uniform_error(const build_problem *problem, const check *s, size_t c) {
-    const size_t n = problem->n;
-    const float *B = s->B + (PROBES * problem->n_channels + c) * n;
-    double off = 0, area = 0;
-    for (size_t i = 0; i < n; i++) {
-        off += problem->area[i] * ((double)B[i] - 1) * ((double)B[i] - 1);
-        area += problem->area[i];
-    }
-    return sqrt(off / area);
-}
-
-/* Tests op on random emissions by its residual, and on uniform radiosity, whose emission is known, and
- * reports probe_residual  |E - (I - R F) B~| / |E|, the mean over PROBES random emissions; with streamed F
- * only some rows count, of an independent sample, with its noise uniform_error   |B~ - 1| / |1| for E = 1 -
- * rho s, s the row sums of F, for which B = 1. */
-static lam_status self_check(const build_problem *problem, const double *row_sums, const lam_operator *op,
-                             uint64_t seed, build_report *report, lam_error *error) {
+/* S from blocks, and sums [n]. Its coefficients are those of F without the balance, which is put into the row
+ * sums. */
+static lam_status expand_blocks(const expansion *x, double *sums, csr *S, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = problem->n, C = problem->n_channels;
-    check s;
-    TRY(check_make(problem, op, &s, error));
-    for (size_t e = 0; e < EMISSIONS; e++)
-        for (size_t i = 0; i < n; i++)
-            for (size_t c = 0; c < C; c++) {
-                const uint64_t bits = random_lcg(&seed);
-                s.E[(e * C + c) * n + i] =
-                    e < PROBES ? random_to_float(bits)
-                               : (float)fmax(1 - (double)problem->reflectance[c * n + i] * row_sums[i], 0);
-            }
-    TRY(lam_operator_apply(op, EMISSIONS, LAM_RADIOSITY, s.E, s.B, s.work, s.work_bytes, error));
-    TRY(problem->stream == NULL ? multiply(problem, &s, error) : multiply_others(problem, &s, error));
-    double mean_residual = 0, largest = 0;
-    for (size_t e = 0; e < PROBES; e++) {
-        double worst = 0;
-        for (size_t c = 0; c < C; c++) worst = fmax(worst, residual(problem, &s, e, c));
-        mean_residual += worst / PROBES;
-    }
-    for (size_t c = 0; c < C; c++) largest = fmax(largest, uniform_error(problem, &s, c));
-    report_number(report, "probe_residual", mean_residual);
-    report_number(report, "uniform_error", largest);
+    const block_factors *f = x->problem->blocks;
+    const wavelet_blocks_input input = {.blocks = f,
+                                        .basis = x->basis,
+                                        .threshold = x->threshold,
+                                        .weight = x->weight,
+                                        .n_threads = x->n_threads,
+                                        .progress = x->progress};
+    double *ones = memory_allocate(f->n, sizeof *ones, "operator", error);
+    double *product = memory_allocate(f->n, sizeof *product, "operator", error);
+    if (ones == NULL || product == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(check_tree(x->tree, f, error));
+    for (size_t p = 0; p < f->n; p++) ones[p] = 1;
+    TRY(block_factors_multiply(f, 1, ones, product, error));
+    for (size_t p = 0; p < f->n; p++) sums[f->order[p]] = product[p];
+    TRY(wavelet_blocks(&input, S, error));
+    TRY(wavelet_impose_row_sums(x->basis, x->tree->order, x->area, sums, x->threshold, x->weight, S, error));
 done:
-    check_free(&s);
+    free(ones);
+    free(product);
     return status;
 }
 
@@ -281,41 +212,30 @@ static lam_status build(const build_problem *problem, const build_options *optio
     hierarchical_arrays arrays = {.K = memory_allocate(C, sizeof *arrays.K, "operator", error)};
     wavelet_inverse_report inverted = {.doublings = 0};
     csr S = {.n = 0};
-    row_source held;
     lam_operator *made = NULL;
     float *weight = NULL, *rho = memory_allocate(n, sizeof *rho, "operator", error);
     double *area = memory_allocate(n, sizeof *area, "operator", error), entries = 0;
     double *sums = memory_allocate(n, sizeof *sums, "operator", error);
     const double *row_sums = sums;
-    row_stream *const stream = problem->stream;
     bool corrected = false;
     if (arrays.K == NULL || rho == NULL || area == NULL || sums == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(plane_tree_make(n, problem->centre, problem->normal, LEAF, &tree, error));
+    TRY(plane_tree_make(n, problem->centre, problem->normal, PLANE_LEAF, &tree, error));
     TRY(wavelet_basis_make(&tree, problem->area, problem->centre, &arrays.basis, error));
     TRY(make_weights(&arrays.basis, &weight, error));
-    if (stream == NULL) row_source_of_csr(&held, problem->F);
-    const wavelet_pass_input pass = {.basis = &arrays.basis,
-                                     .rows = stream != NULL ? &stream->rows : &held,
-                                     .one_sided = stream != NULL,
-                                     .area = problem->area,
-                                     .tree = &tree,
-                                     .threshold = (float)threshold * (threshold > least ? share_of_S : 1),
-                                     .weight = weight,
-                                     .centre = problem->centre,
-                                     .reach = reach / cbrt(threshold),
-                                     .n_threads = n_threads,
-                                     .progress = options->progress};
-    TRY(wavelet_pass(&pass, &S, error));
     for (size_t p = 0; p < n; p++) area[p] = problem->area[tree.order[p]];
-    if (stream != NULL) {
-        TRY(stream->close(stream->context, &row_sums, error));
-        TRY(wavelet_impose_row_sums(&arrays.basis, tree.order, area, row_sums, pass.threshold, weight, &S,
-                                    error));
-    } else {
-        sum_rows(problem->F, sums);
-    }
+    const expansion x = {.problem = problem,
+                         .tree = &tree,
+                         .basis = &arrays.basis,
+                         .weight = weight,
+                         .area = area,
+                         .threshold = (float)threshold * (threshold > least ? share_of_S : 1),
+                         .radii = reach / cbrt(threshold),
+                         .n_threads = n_threads,
+                         .progress = options->progress};
+    TRY(problem->blocks != NULL ? expand_blocks(&x, sums, &S, error)
+                                : expand_rows(&x, sums, &row_sums, &S, error));
     const double expanded = clock_seconds();
-    report_step_add(report, stream != NULL ? "rays, wavelets" : "wavelets", expanded - started);
+    report_step_add(report, problem->stream != NULL ? "rays, wavelets" : "wavelets", expanded - started);
     for (size_t c = 0; c < C; c++) {
         for (size_t p = 0; p < n; p++) rho[p] = problem->reflectance[c * n + tree.order[p]];
         const wavelet_inverse_input inverse = {.basis = &arrays.basis,
@@ -394,6 +314,7 @@ static lam_status weigh(const decision *so_far, void *own, candidate *out, lam_e
         if (p->stream != NULL)
             snprintf(out->found, sizeof out->found,
                      "too large for the whole inverse, too noisy for a sparse one");
+        if (p->blocks != NULL) snprintf(out->found, sizeof out->found, "the form factors are blocks");
         return LAM_OK;
     }
     if (p->centre == NULL || p->normal == NULL || (decision_claimed(so_far) && !so_far->thorough))
@@ -414,7 +335,7 @@ const build_method method_hierarchical = {
     .summary = "wavelets on a tree of clusters; most scenes",
     .kind = &operator_hierarchical,
     .rows = rows,
-    .flags = METHOD_GEOMETRY | METHOD_STREAMS | METHOD_FILTERS_NOISE,
+    .flags = METHOD_GEOMETRY | METHOD_STREAMS | METHOD_BLOCKS | METHOD_FILTERS_NOISE,
     .forecast = forecast,
     .weigh = weigh,
     .build = build,

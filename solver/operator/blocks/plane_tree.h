@@ -23,6 +23,9 @@ typedef struct plane_cluster {
 
 #define PLANE_ABOVE UINT32_MAX
 
+/* Elements of a leaf at most, in the trees of multiwavelets and of the blocks that go into them. */
+enum { PLANE_LEAF = 6 };
+
 typedef struct plane_tree {
     size_t n, n_clusters, n_frames;
     uint32_t *order;         /* [n], position -> element */

@@ -6,6 +6,7 @@
 #include "support/box_problem.h"
 #include "support/building.h"
 #include "support/dense.h"
+#include "support/random_blocks.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -165,6 +166,120 @@ START_TEST(noise_sets_the_threshold) {
 }
 END_TEST
 
+/* F of the problem as blocks of two elements, on the tree that the method makes. */
+static block_factors blocks_of(const build_problem *problem) {
+    plane_tree tree;
+    block_factors f;
+    ck_ok(plane_tree_make(problem->n, problem->centre, problem->normal, PLANE_LEAF, &tree, &error));
+    ck_ok(block_factors_begin(&tree, problem->area, problem->centre, &f, &error));
+    blocks_of_pairs(problem->F, &f);
+    ck_ok(block_factors_end(&f, &error));
+    plane_tree_free(&tree);
+    return f;
+}
+
+/* Largest difference of the irradiance by two operators, over the largest irradiance. */
+static double apart(const lam_operator *a, const lam_operator *b, size_t n, const float *E) {
+    const size_t bytes = lam_operator_work_bytes(a, 1);
+    float *x = test_allocate(n, sizeof *x), *y = test_allocate(n, sizeof *y);
+    void *work = test_allocate(1, bytes);
+    double most = 0, largest = 0;
+    ck_ok(lam_operator_apply(a, 1, LAM_IRRADIANCE, E, x, work, bytes, &error));
+    ck_ok(lam_operator_apply(b, 1, LAM_IRRADIANCE, E, y, work, bytes, &error));
+    for (size_t i = 0; i < n; i++) most = fmax(most, fabs((double)x[i] - (double)y[i]));
+    for (size_t i = 0; i < n; i++) largest = fmax(largest, fabs((double)y[i]));
+    free(x);
+    free(y);
+    free(work);
+    return most / largest;
+}
+
+/* The operator is the one of the same F as rows; a balance gives it the row sums that it must have. */
+START_TEST(blocks_in_place_of_rows) {
+    closed s = closed_make(room, 10, .6f);
+    const build_problem *problem = of(&s);
+    const size_t n = problem->n;
+    block_factors f = blocks_of(problem);
+    build_report of_rows, of_blocks;
+    build_problem other = *problem;
+    float *E = test_allocate(2 * n, sizeof *E), *H = test_allocate(n, sizeof *H);
+    void *work;
+    uint64_t seed = 6;
+    other.F = NULL;
+    other.blocks = &f;
+    for (size_t i = 0; i < n; i++) {
+        E[i] = (float)random_lcg_unit(&seed);
+        E[n + i] = i / 40 == 3;
+    }
+    lam_operator *rows = build(problem, .002, &of_rows), *blocks = build(&other, .002, &of_blocks);
+    for (size_t light = 0; light < 2; light++) {
+        ck_assert_double_lt(indirect_error(problem, blocks, E + light * n), .006);
+        ck_assert_double_lt(apart(blocks, rows, n, E + light * n), .1 * .002);
+    }
+    ck_assert_double_eq_tol(report_get(&of_rows, "probe_residual", -1),
+                            report_get(&of_blocks, "probe_residual", -1), 1e-6);
+    ck_assert_double_lt(report_get(&of_blocks, "uniform_error", -1), 1e-6);
+    lam_operator_close(rows);
+    lam_operator_close(blocks);
+    /* Rows of sums s: E = 1 - rho s makes B = 1, H = s. */
+    double *ones = test_allocate(n, sizeof *ones), *sums = test_allocate(n, sizeof *sums);
+    f.balance = test_allocate(n, sizeof *f.balance);
+    for (size_t p = 0; p < n; p++) f.balance[p] = .98 + .04 * random_lcg_unit(&seed);
+    for (size_t p = 0; p < n; p++) ones[p] = 1;
+    ck_ok(block_factors_multiply(&f, 1, ones, sums, &error));
+    for (size_t p = 0; p < n; p++)
+        E[f.order[p]] = (float)(1 - (double)problem->reflectance[f.order[p]] * sums[p]);
+    blocks = build(&other, .002, &of_blocks);
+    work = test_allocate(1, lam_operator_work_bytes(blocks, 1));
+    ck_ok(lam_operator_apply(blocks, 1, LAM_IRRADIANCE, E, H, work, lam_operator_work_bytes(blocks, 1),
+                             &error));
+    double most = 0;
+    for (size_t p = 0; p < n; p++) most = fmax(most, fabs((double)H[f.order[p]] - sums[p]));
+    /* Sums differ by up to .02. */
+    ck_assert_double_lt(most, .001);
+    ck_assert_double_lt(report_get(&of_blocks, "probe_residual", -1), .002);
+    ck_assert_double_lt(report_get(&of_blocks, "uniform_error", -1), .1 * .002);
+    lam_operator_close(blocks);
+    block_factors_free(&f);
+    free(E);
+    free(H);
+    free(work);
+    free(ones);
+    free(sums);
+    closed_free(&s);
+}
+END_TEST
+
+/* Blocks are for methods that can use them, and on the method's own tree. */
+START_TEST(blocks_that_do_not_fit) {
+    closed s = closed_make(unit_cube, 4, .5f);
+    build_problem problem = *of(&s);
+    block_factors f = blocks_of(&problem);
+    build_options options = build_presets("exact");
+    build_report report;
+    lam_operator *op = NULL;
+    problem.F = NULL;
+    problem.blocks = &f;
+    ck_assert_int_eq(build_operator(&problem, &options, &op, &report, &error), LAM_ERR_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "exact"));
+    options = build_presets("auto");
+    ck_ok(build_set(&options, "rank", "10", &error));
+    ck_assert_int_eq(build_operator(&problem, &options, &op, &report, &error), LAM_ERR_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "low-rank"));
+    options = build_presets("auto");
+    ck_ok(build_operator(&problem, &options, &op, &report, &error));
+    ck_assert_str_eq(report.method, "hierarchical");
+    lam_operator_close(op);
+    op = NULL;
+    f.order[0] = f.order[1];
+    ck_assert_int_eq(build_operator(&problem, &options, &op, &report, &error), LAM_ERR_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "another tree"));
+    ck_assert_ptr_null(op);
+    block_factors_free(&f);
+    closed_free(&s);
+}
+END_TEST
+
 START_TEST(it_wants_to_know_where_elements_are) {
     closed s = closed_make(unit_cube, 2, .5f);
     const build_options options = build_presets("hierarchical");
@@ -264,6 +379,8 @@ int main(void) {
     tcase_add_test(tests, noise_sets_the_threshold);
     tcase_add_test(tests, even_light_is_made_up_for);
     tcase_add_test(tests, some_elements);
+    tcase_add_test(tests, blocks_in_place_of_rows);
+    tcase_add_test(tests, blocks_that_do_not_fit);
     tcase_add_test(tests, it_wants_to_know_where_elements_are);
     suite_add_tcase(suite, tests);
     return suite_run(suite);

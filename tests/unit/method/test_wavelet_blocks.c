@@ -106,20 +106,9 @@ END_TEST
 
 /* F of pairs of elements, each a block. */
 static block_factors pairs_of(const subject *s) {
-    const size_t n = s->m.n;
     block_factors f = begin(s);
-    uint32_t *position = test_allocate(n, sizeof *position);
-    f.blocks = test_allocate(s->F.indptr[n], sizeof *f.blocks);
-    for (size_t p = 0; p < n; p++) position[f.order[p]] = (uint32_t)p;
-    for (size_t i = 0; i < n; i++)
-        for (uint64_t e = s->F.indptr[i]; e < s->F.indptr[i + 1]; e++) {
-            const uint32_t j = s->F.indices[e], first = (uint32_t)f.n_clusters;
-            if (j < i) continue;
-            f.blocks[f.n_blocks++] = (cluster_block){first + position[i], first + position[j],
-                                                     .L[0][0] = (float)((double)s->F.data[e] / s->m.area[j])};
-        }
+    blocks_of_pairs(&s->F, &f);
     ck_ok(block_factors_end(&f, &error));
-    free(position);
     return f;
 }
 
