@@ -1,14 +1,67 @@
 """A folder of stores for tests of a lambertd, and what they wait for."""
 
+import contextlib
+import json
+import os
 import pathlib
+import shutil
+import signal
 import subprocess
 import tempfile
+import threading
 import time
 import unittest
 
+import numpy as np
 
-from daemon import LAMBERTD, PATIENCE
+from daemon import LAMBERTD, PATIENCE, Daemon
 from make_store import Scene
+
+TOLERANCE = 1e-5  # as in test_daemon_answers.py: sums of 3,000 products, in single precision only over 128 of them
+
+
+@contextlib.contextmanager
+def replaced_under_load(test, path, stores, scenes, n_clients, n_rounds, answers):
+    """A daemon whose store at path was replaced in every round by the one of two stores that it does not serve, while
+    clients asked: each answer is that of one scene or the other, both occur, and so many come between two rounds."""
+    E = np.random.default_rng(3).random((1, scenes[0].n))
+    wanted = [scene.solve(E)[0] for scene in scenes]
+    test.assertGreater(np.abs(wanted[0] - wanted[1]).max(), 100 * TOLERANCE * wanted[0].max())
+    body = json.dumps({"emission": E[0].tolist()})
+    stop, seen, failures = threading.Event(), [0, 0], []
+
+    def client(daemon):
+        connection = daemon.connect()
+        try:
+            while not stop.is_set():
+                given = np.array(daemon.radiosity("box", body, connection=connection).json()["radiosity"])
+                seen[[np.abs(given - w).max() <= TOLERANCE * w.max() for w in wanted].index(True)] += 1
+        except Exception as failure:
+            failures.append(failure)
+        finally:
+            connection.close()
+
+    with Daemon(path) as daemon:
+        clients = [threading.Thread(target=client, args=(daemon,)) for _ in range(n_clients)]
+        for c in clients:
+            c.start()
+        try:
+            for round_number in range(1, n_rounds + 1):
+                before = sum(seen)
+                while sum(seen) < before + answers and not failures:
+                    time.sleep(0.001)
+                spare = shutil.copy(stores[round_number % 2], path.with_name("spare"))
+                os.replace(spare, path)
+                daemon.signal(signal.SIGHUP)
+                daemon.wait_for("reloaded: 1 scene", round_number)
+        finally:
+            stop.set()
+            for c in clients:
+                c.join()
+        test.assertEqual(failures, [])
+        test.assertGreater(min(seen), 0)
+        test.assertEqual(daemon.errors(), "")
+        yield daemon
 
 
 class Case(unittest.TestCase):

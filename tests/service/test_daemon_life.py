@@ -12,11 +12,9 @@ import unittest
 import h5py
 import numpy as np
 
-from daemon_case import Case
 from daemon import LAMBERTD, PATIENCE, Daemon
+from daemon_case import Case, replaced_under_load
 from make_store import Scene
-
-TOLERANCE = 1e-5  # as in test_daemon_answers.py
 
 
 class Life(Case):
@@ -144,48 +142,11 @@ class Life(Case):
     def test_reload_swaps_without_dropping_a_request(self):
         path, first = self.store(seed=1)
         second = Scene(60, seed=2)
-        spare = self.folder / "spare"
-        shutil.copy(path, self.folder / "first")
-        second.write(self.folder / "second")
-        E = np.random.default_rng(3).random((1, 60))
-        wanted = [scene.solve(E)[0] for scene in (first, second)]
-        self.assertGreater(np.abs(wanted[0] - wanted[1]).max(), 100 * TOLERANCE)
-        body = json.dumps({"emission": E[0].tolist()})
-        stop, seen, failures = threading.Event(), [0, 0], []
-
-        def client(daemon):
-            connection = daemon.connect()
-            try:
-                while not stop.is_set():
-                    answer = daemon.radiosity("box", body, connection=connection)
-                    given = np.array(answer.json()["radiosity"])
-                    which = [np.abs(given - w).max() <= TOLERANCE * w.max() for w in wanted]
-                    seen[which.index(True)] += 1
-            except Exception as failure:
-                failures.append(failure)
-            finally:
-                connection.close()
-
-        with Daemon(path) as daemon:
-            clients = [threading.Thread(target=client, args=(daemon,)) for _ in range(4)]
-            for c in clients:
-                c.start()
-            try:
-                for round_number in range(1, 11):
-                    before = sum(seen)
-                    while sum(seen) < before + 8 and not failures:
-                        time.sleep(0.001)
-                    shutil.copy(self.folder / ("second" if round_number % 2 else "first"), spare)
-                    os.replace(spare, path)
-                    daemon.signal(signal.SIGHUP)
-                    daemon.wait_for("reloaded: 1 scene", round_number)
-            finally:
-                stop.set()
-                for c in clients:
-                    c.join()
-            self.assertEqual(failures, [])
-            self.assertGreater(min(seen), 0)
-            self.assertEqual(daemon.errors(), "")
+        stores = [self.folder / "first", self.folder / "second"]
+        shutil.copy(path, stores[0])
+        second.write(stores[1])
+        with replaced_under_load(self, path, stores, (first, second), n_clients=4, n_rounds=10, answers=8):
+            pass
 
     def test_a_store_that_fails_to_reload_stays_as_it_was(self):
         path, scene = self.store()

@@ -18,9 +18,9 @@ import numpy as np
 
 from command import must
 from daemon import LAMBERTD, PATIENCE, Daemon
+from daemon_case import TOLERANCE, replaced_under_load
 from make_store import Scene
 
-TOLERANCE = 1e-5  # as in test_daemon_answers.py: sums of 3,000 products, in single precision only over 128 of them
 N, RANK, TILES = 3000, 100, 100
 BYTES = 4 * N * RANK  # of Y, V, U and first_bounce: 1.14 MiB, which is worth a mapping
 
@@ -251,44 +251,9 @@ class Mapped(unittest.TestCase):
 
     def test_replaced_under_load(self):
         path = self.store("box")
-        E = np.random.default_rng(3).random((1, N))
-        wanted = [scene.solve(E)[0] for scene in (self.scene, self.other)]
-        self.assertGreater(np.abs(wanted[0] - wanted[1]).max(), 100 * TOLERANCE * wanted[0].max())
         self.other.write(self.folder / "second")
-        body = json.dumps({"emission": E[0].tolist()})
-        stop, seen, failures = threading.Event(), [0, 0], []
-
-        def client(daemon):
-            connection = daemon.connect()
-            try:
-                while not stop.is_set():
-                    given = np.array(daemon.radiosity("box", body, connection=connection).json()["radiosity"])
-                    seen[[np.abs(given - w).max() <= TOLERANCE * w.max() for w in wanted].index(True)] += 1
-            except Exception as failure:
-                failures.append(failure)
-            finally:
-                connection.close()
-
-        with Daemon(path) as daemon:
-            clients = [threading.Thread(target=client, args=(daemon,)) for _ in range(3)]
-            for c in clients:
-                c.start()
-            try:
-                for round_number in range(1, 7):
-                    before = sum(seen)
-                    while sum(seen) < before + 6 and not failures:
-                        time.sleep(0.001)
-                    source = self.folder / "second" if round_number % 2 else self.made / "box.h5"
-                    os.replace(shutil.copy(source, self.folder / "spare"), path)
-                    daemon.signal(signal.SIGHUP)
-                    daemon.wait_for("reloaded: 1 scene", round_number)
-            finally:
-                stop.set()
-                for c in clients:
-                    c.join()
-            self.assertEqual(failures, [])
-            self.assertGreater(min(seen), 0)
-            self.assertEqual(daemon.errors(), "")
+        with replaced_under_load(self, path, (self.made / "box.h5", self.folder / "second"), (self.scene, self.other),
+                                 n_clients=3, n_rounds=6, answers=6) as daemon:
             # Of the files that went nothing is left.
             deadline = time.monotonic() + PATIENCE
             while len(self.mappings(daemon)) != 1 and time.monotonic() < deadline:

@@ -2,14 +2,13 @@
 
 import json
 import os
-import tempfile
 import unittest
 
 import h5py
 import numpy
 
-from command import lambert, must
-from daemon import Daemon
+from command import must
+from method_case import MethodCase
 from png_file import decode_png
 
 BACKGROUND = 38
@@ -24,35 +23,19 @@ def patches_of(store):
                 file["mesh/area"][()], group["coherence"][()])
 
 
-class TwoMesh(unittest.TestCase):
+class TwoMesh(MethodCase):
+    method, kind = "2msc", "two_mesh"
+
     @classmethod
     def setUpClass(cls):
-        folder = tempfile.TemporaryDirectory(prefix="lambert-two-mesh-")
-        cls.addClassCleanup(folder.cleanup)
-        cls.folder = folder.name
+        super().setUpClass()
         cls.factors = cls.path("box.h5")
         must("generate", "box", "--size", "4,3,2", "--divisions", 8, "--reflectance", .5, "-o", cls.path("box.obj"))
         must("precompute", cls.path("box.obj"), "-o", cls.factors, "--method", "exact", "--probes", 0,
              "--keep-form-factors", "--quiet")
-        must("generate", "cornell", "--elements", 700, "-o", cls.path("cornell.obj"))
-        cls.cornell = cls.path("cornell.h5")
-        must("precompute", cls.path("cornell.obj"), "-o", cls.cornell, "--rays", 256, "--probes", 4,
-             "--method", "2msc", "--quiet")
-
-    @classmethod
-    def path(cls, name):
-        return os.path.join(cls.folder, name)
 
     def build(self, *options, name="out.h5", probes=0):
-        done = must("precompute", self.factors, "-o", self.path(name), "--method", "2msc", "--probes", probes,
-                    "--rays", 256, *options)
-        return self.path(name), done.stderr
-
-    def refused(self, status, wanted, *arguments):
-        done = lambert(*arguments)
-        self.assertEqual(done.returncode, status, (arguments, done.stderr))
-        self.assertEqual(len(done.stderr.strip().splitlines()), 1, done.stderr)
-        self.assertIn(wanted, done.stderr)
+        return super().build("--rays", 256, *options, name=name, probes=probes)
 
     def test_defaults(self):
         store, log = self.build(probes=8)
@@ -197,26 +180,10 @@ class TwoMesh(unittest.TestCase):
         self.assertEqual(done.stderr.count("error"), 0)
 
     def test_the_daemon_serves_it(self):
-        """The same bits from a socket as from `lambert solve`, for one lighting and in a batch."""
-        must("solve", self.cornell, "--emit", "lamp=17,12,4", "-o", self.path("B.npy"))
-        expected = numpy.load(self.path("B.npy")).reshape(3, -1)
-        lamp = {"groups": {"lamp": [17, 12, 4]}}
-        with Daemon(self.cornell) as daemon:
-            one = daemon.post("/v1/scenes/cornell/radiosity", {"emission": lamp}).json()
-            batch = daemon.post("/v1/scenes/cornell/radiosity",
-                                {"emissions": [{"groups": {"floor": 3}}, lamp]}).json()
-            self.assertEqual(daemon.get("/v1/scenes/cornell").json()["kind"], "two_mesh")
-        numpy.testing.assert_array_equal(numpy.array(one["radiosity"], numpy.float32), expected)
-        numpy.testing.assert_array_equal(numpy.array(batch["radiosity"][1], numpy.float32), expected)
+        self.check_daemon()
 
     def test_same_bits(self):
-        sums = []
-        for threads in (1, 3):
-            must("precompute", self.factors, "-o", self.path("t.h5"), "--method", "2msc", "--probes", 0,
-                 "--assign", "proximity", "--quiet", threads=threads)
-            with h5py.File(self.path("t.h5")) as file:
-                sums.append([file["operator/" + name][()].tobytes() for name in ("I", "order", "coherence")])
-        self.assertEqual(sums[0], sums[1])
+        self.check_same_bits(("I", "order", "coherence"), "--assign", "proximity")
 
     def colours(self, image):
         pixels = decode_png(image)
