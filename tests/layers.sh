@@ -37,6 +37,7 @@ declare -A allowed=(
     [solver/formfactor/rows]="$formfactor solver/formfactor/visibility/"
     [solver/formfactor/pairs]="$formfactor solver/formfactor/visibility/ solver/formfactor/rows/"
     [solver/formfactor/rays]="$formfactor solver/formfactor/visibility/ solver/formfactor/rows/ solver/formfactor/pairs/"
+    [solver/walk]="lambert/ solver/base/ solver/scene/mesh.h solver/formfactor/leaving.h solver/formfactor/visibility/"
     [solver/method]="$operator"
     ["solver/method/*"]="$operator $method_shared"
     [solver/light]="$operator solver/codec/ solver/daylight/ $scene solver/formfactor/"

@@ -3,11 +3,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* A scene is closed where a smaller share of its rays than this leaves. In single precision a few rays slip
- * between elements that meet without sharing vertices, or start behind a neighbour and hit its back. The
- * repair distributes their share over the row. */
-static const double crack_share = 1e-4;
-
 static double area_mean(const mesh *m, const double *x) {
     double sum = 0, total = 0;
     for (size_t i = 0; i < m->n; i++) {
@@ -20,15 +15,15 @@ static double area_mean(const mesh *m, const double *x) {
 void leaving_measure(form_factors *f, const mesh *m) {
     f->leaving_share = area_mean(m, f->leaving);
     f->absorbed_share = area_mean(m, f->absorbed);
-    f->closed = f->leaving_share < crack_share;
+    f->closed = f->leaving_share < LEAVING_CRACKS;
 }
 
 static double absorbed(const form_factors *f, size_t element) {
-    return f->absorbed_share < crack_share ? 0 : f->absorbed[element];
+    return f->absorbed_share < LEAVING_CRACKS ? 0 : f->absorbed[element];
 }
 
 bool leaving_nothing(const form_factors *f) {
-    return f->closed && f->absorbed_share < crack_share;
+    return f->closed && f->absorbed_share < LEAVING_CRACKS;
 }
 
 double leaving_outside(const form_factors *f, size_t element) {

@@ -1,0 +1,128 @@
+/* The scene of walks, and the checks and memory that both ways to walk share. */
+#include "solver/formfactor/leaving.h"
+#include "solver/walk/walk_steps.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Rays that decide whether a scene is closed, in parts that do not depend on the number of threads. */
+enum { PARTS = 64, RAYS_OF_PART = 4096 };
+
+static void count_lost(const walk_scene *s, const double *before, size_t part, size_t *left, size_t *backs) {
+    walk_starts starts;
+    walk_starts_init(&starts, 0, part, RAYS_OF_PART);
+    for (size_t begun = 0; begun < RAYS_OF_PART; begun += VISIBILITY_PACKET) {
+        walker w[VISIBILITY_PACKET];
+        hit_packet hits;
+        size_t k = 0;
+        for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+            walk_starts_next(&starts, before, s->m->n, &w[i], &k);
+            w[i].at = (uint32_t)k;
+        }
+        walk_cast(s, w, VISIBILITY_PACKET, &hits);
+        for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+            *left += hits.element[i] == VISIBILITY_NOTHING;
+            *backs += hits.element[i] != VISIBILITY_NOTHING && hits.back[i];
+        }
+    }
+}
+
+/* Sets closed and fronts by the shares of rays, spread by area, that leave and that hit backs. */
+static lam_status look_around(walk_scene *s, lam_error *error) {
+    const size_t n = s->m->n;
+    const double most = LEAVING_CRACKS * PARTS * RAYS_OF_PART;
+    size_t left = 0, backs = 0;
+    double *before = memory_allocate(n + 1, sizeof *before, "walks", error);
+    if (before == NULL) return LAM_ERR_MEMORY;
+    walk_accumulate(n, s->m->area, before);
+#pragma omp parallel for schedule(dynamic, 1) reduction(+ : left, backs)
+    for (size_t part = 0; part < PARTS; part++) count_lost(s, before, part, &left, &backs);
+    s->closed = (double)left < most;
+    s->fronts = (double)backs < most;
+    free(before);
+    return LAM_OK;
+}
+
+lam_status walk_scene_create(const mesh *m, walk_scene **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    walk_scene *s = memory_allocate(1, sizeof *s, "walks", error);
+    if (s == NULL) return LAM_ERR_MEMORY;
+    s->m = m;
+    TRY(visibility_create(m, &s->v, error));
+    TRY(look_around(s, error));
+    *out = s;
+    s = NULL;
+done:
+    walk_scene_free(s);
+    return status;
+}
+
+void walk_scene_free(walk_scene *s) {
+    if (s == NULL) return;
+    visibility_destroy(s->v);
+    free(s);
+}
+
+void walk_estimates_free(walk_estimates *e) {
+    free(e->mean);
+    free(e->error);
+    free(e->largest);
+    free(e->visits);
+    *e = (walk_estimates){.n_rhs = 0};
+}
+
+static lam_status check(const mesh *m, const walk_problem *p, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t count = m->n_channels * m->n;
+    if (p->walks == 0) FAIL(error, LAM_ERR_ARGUMENT, "0 walks: must be at least 1");
+    for (size_t r = 0; r < p->n_rhs; r++)
+        for (size_t i = 0; i < count; i++) {
+            const double value = (double)p->E[r * count + i];
+            if (!(value >= 0 && isfinite(value)))
+                FAIL(error, LAM_ERR_ARGUMENT, "emission[%zu][%zu] = %g, must be at least 0", r, i % m->n,
+                     value);
+        }
+    for (size_t i = 0; i < m->n; i++)
+        if (p->target[i] != WALK_NO_TARGET && p->target[i] >= p->n_targets)
+            FAIL(error, LAM_ERR_ARGUMENT, "target[%zu] = %u, must be below %zu", i, p->target[i],
+                 p->n_targets);
+done:
+    return status;
+}
+
+lam_status walk_estimates_create(const walk_scene *s, const walk_problem *problem, walk_estimates *out,
+                                 lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t channels = s->m->n_channels, targets = problem->n_targets;
+    size_t visited, count;
+    walk_estimates e = {.n_rhs = problem->n_rhs, .n_channels = channels, .n_targets = targets};
+    TRY(check(s->m, problem, error));
+    if (!size_multiply(problem->n_rhs, targets, &visited) || !size_multiply(visited, channels, &count))
+        FAIL(error, LAM_ERR_MEMORY, "walks: too many estimates");
+    e.walks = ((problem->walks - 1) / WALK_BATCHES + 1) * WALK_BATCHES;
+    e.mean = memory_allocate(count, sizeof *e.mean, "estimates by walks", error);
+    e.error = memory_allocate(count, sizeof *e.error, "estimates by walks", error);
+    e.largest = memory_allocate(count, sizeof *e.largest, "estimates by walks", error);
+    e.visits = memory_allocate(visited, sizeof *e.visits, "estimates by walks", error);
+    if (e.mean == NULL || e.error == NULL || e.largest == NULL || e.visits == NULL) TRY(LAM_ERR_MEMORY);
+    *out = e;
+    e = (walk_estimates){.n_rhs = 0};
+done:
+    walk_estimates_free(&e);
+    return status;
+}
+
+void walk_add_emission(const mesh *m, const walk_problem *problem, walk_estimates *e) {
+    const size_t targets = e->n_targets, rows = e->n_rhs * e->n_channels;
+    if (problem->quantity != LAM_RADIOSITY) return;
+    for (size_t t = 0; t < targets; t++) {
+        double area = 0;
+        for (size_t i = 0; i < m->n; i++) area += problem->target[i] == t ? m->area[i] : 0;
+        for (size_t row = 0; row < rows && area > 0; row++) {
+            double power = 0;
+            for (size_t i = 0; i < m->n; i++)
+                if (problem->target[i] == t) power += m->area[i] * (double)problem->E[row * m->n + i];
+            e->mean[row * targets + t] += power / area;
+        }
+    }
+}

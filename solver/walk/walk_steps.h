@@ -1,0 +1,83 @@
+/* The steps of walks, eight side by side: rays, ends and Russian roulette. Knows neither targets nor
+ * emissions. */
+#ifndef LAMBERT_WALK_WALK_STEPS_H
+#define LAMBERT_WALK_WALK_STEPS_H
+
+#include "solver/formfactor/visibility/visibility.h"
+#include "solver/walk/walk.h"
+
+enum { WALK_CHANNELS = 3 };
+
+struct walk_scene {
+    const mesh *m;
+    visibility *v;
+    bool closed; /* rays leave through cracks only */
+    bool fronts; /* rays hit backs through cracks only */
+};
+
+/* One walk. */
+typedef struct walker {
+    uint32_t at;                  /* the element that its next ray leaves */
+    unsigned lost;                /* rays through cracks since it came there */
+    double place[4];              /* in [0, 1): two for the point, two for the direction */
+    double weight[WALK_CHANNELS]; /* of what it has met; power when it was shot */
+    uint64_t random;              /* its own stream */
+} walker;
+
+/* All walks of an estimate, for progress. */
+typedef struct walk_run {
+    const progress *progress;
+    const char *stage;
+    double begun, all; /* walks */
+    bool stop;
+} walk_run;
+
+/* Walks that share a stream of starts. start sets element, place, weight and random of the next walk, or
+ * returns false after the last one; arrive is called when a walk comes to the front of an element. */
+typedef struct walk_batch {
+    const walk_scene *scene;
+    walk_run *run;
+    bool (*start)(void *context, walker *w);
+    void (*arrive)(void *context, const walker *w, uint32_t element);
+    void *context;
+} walk_batch;
+
+/* Takes all walks of a batch from their start to their end, or until run->stop. */
+void walk_batch_go(const walk_batch *b);
+
+/* Casts the next rays of n walks, at most VISIBILITY_PACKET, from their places. */
+void walk_cast(const walk_scene *s, const walker *w, size_t n, hit_packet *hits);
+
+/* The starts of one batch: low-discrepancy places, and strata of what elements are chosen by. */
+typedef struct walk_starts {
+    size_t next, count;
+    double turn; /* of the strata */
+    uint32_t shift[4];
+    uint64_t random;
+    size_t cursor;
+} walk_starts;
+
+/* key tells the batches of a seed apart. */
+void walk_starts_init(walk_starts *s, uint64_t seed, uint64_t key, size_t count);
+
+/* The place and the stream of the next walk, and the index k with before[k] <= x < before[k + 1] for its
+ * stratum x of [0, before[n]), n > 0: with the probability (before[k + 1] - before[k]) / before[n]. */
+bool walk_starts_next(walk_starts *s, const double *before, size_t n, walker *w, size_t *k);
+
+/* before[k + 1] = sum of share[0 ... k]; returns before[n]. */
+double walk_accumulate(size_t n, const double *share, double *before);
+
+/* Checks a problem and allocates its estimates. */
+lam_status walk_estimates_create(const walk_scene *s, const walk_problem *problem, walk_estimates *out,
+                                 lam_error *error);
+
+/* The mean and its standard error from the means of the batches, batch b at values[b * stride]. */
+void walk_batches_join(const double *values, size_t stride, double *mean, double *error);
+
+/* Adds the mean emission of the targets where the quantity is the radiosity. */
+void walk_add_emission(const mesh *m, const walk_problem *problem, walk_estimates *e);
+
+/* LAM_ERR_CANCELLED where a run was stopped. */
+lam_status walk_run_end(const walk_run *run, lam_error *error);
+
+#endif
