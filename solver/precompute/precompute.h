@@ -81,6 +81,7 @@ typedef enum seed_purpose {
     SEED_VERIFY_SECOND = 12,
     SEED_VERIFY_PROBES = 13,
     SEED_VERIFY_FIRST_LIGHT = 14,
+    SEED_VERIFY_WALKS = 15,
     SEED_LINEAR_FIRST = 1, /* emissions that verify adds up: their seeds are counted, not given by a user */
     SEED_LINEAR_SECOND = 2
 } seed_purpose;

@@ -4,12 +4,13 @@
 #include "solver/verify/verify.h"
 
 #include <jansson.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 typedef struct fields {
-    uint64_t probes;
+    uint64_t probes, walks;
     bool json;
 } fields;
 
@@ -23,6 +24,16 @@ static const option_row rows[] = {
      .help = "Single elements that the error is measured again with; 0: no measurement",
      .least = 0,
      .most = 1e6},
+    {.name = "walks",
+     .kind = OPTION_COUNT,
+     .offset = FIELD(walks),
+     .argument = "N",
+     .preset = "0",
+     .help =
+         "Random walks for each emission and each element, which the answers for groups and some elements "
+         "are compared with; 0: no comparison",
+     .least = 0,
+     .most = 1e9},
     {.name = "json", .kind = OPTION_FLAG, .offset = FIELD(json), .help = "Print the checks as JSON"},
     {0},
 };
@@ -49,19 +60,51 @@ static const struct {
     {"linearity", verify_linearity},
     {"energy", verify_energy},
     {"error", verify_error},
+    {"walks", verify_walks},
     {"scene", verify_scene},
 };
 #define N_CHECKS (sizeof checks / sizeof checks[0])
 
 static const char *const words[] = {"ok", "BROKEN", "skipped"};
 
-static lam_status print_json(const char *path, const check *done, bool broken, lam_error *error) {
+/* One line for each emission and group or element: the channel with the largest score. */
+static void print_compared(const examination *e) {
+    for (size_t k = 0; k < e->n_compared; k += e->m.n_channels) {
+        const walk_comparison *w = &e->compared[k];
+        char at[32];
+        for (size_t c = 1; c < e->m.n_channels; c++)
+            if (fabs(e->compared[k + c].score) > fabs(w->score)) w = &e->compared[k + c];
+        snprintf(at, sizeof at, "element %zu", w->element);
+        printf("        %+7.1f  operator %-11.6g walks %-11.6g +- %-8.2g  %s under %s\n", w->score, w->answer,
+               w->mean, w->error, w->group != NULL ? w->group : at, w->emission);
+    }
+}
+
+static json_t *compared_json(const examination *e) {
+    json_t *list = json_array();
+    for (size_t k = 0; k < e->n_compared; k++) {
+        const walk_comparison *w = &e->compared[k];
+        json_t *one = json_pack("{s:s, s:I, s:f, s:f, s:f, s:f}", "emission", w->emission, "channel",
+                                (json_int_t)w->channel, "operator", w->answer, "walks", w->mean,
+                                "standard_error", w->error, "z", w->score);
+        if (w->group != NULL)
+            json_object_set_new(one, "group", json_string(w->group));
+        else
+            json_object_set_new(one, "element", json_integer((json_int_t)w->element));
+        json_array_append_new(list, one);
+    }
+    return list;
+}
+
+static lam_status print_json(const char *path, const check *done, const examination *e, bool broken,
+                             lam_error *error) {
     lam_status status = LAM_OK;
     json_t *list = json_array();
     for (size_t i = 0; i < N_CHECKS; i++)
         json_array_append_new(list, json_pack("{s:s, s:s, s:s}", "name", done[i].name, "result",
                                               words[done[i].verdict], "detail", done[i].detail));
     json_t *root = json_pack("{s:s, s:b, s:o}", "store", path, "ok", !broken, "checks", list);
+    if (e->n_compared > 0) json_object_set_new(root, "walks", compared_json(e));
     char *text = json_dumps(root, JSON_INDENT(2));
     if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: the result cannot be written as JSON", path);
     puts(text);
@@ -89,10 +132,11 @@ static lam_status verify(const char *path, const fields *f, examination *e, bool
         *broken = *broken || done[i].verdict == VERDICT_BROKEN;
         if (!f->json) {
             printf("%-8s%-14s%s\n", words[done[i].verdict], done[i].name, done[i].detail);
+            if (checks[i].run == verify_walks) print_compared(e);
             fflush(stdout);
         }
     }
-    if (f->json) TRY(print_json(path, done, *broken, error));
+    if (f->json) TRY(print_json(path, done, e, *broken, error));
 done:
     return status;
 }
@@ -109,8 +153,10 @@ int cmd_verify(int argc, char **argv) {
     terminal_open(&term, verb.name, false, false);
     term.nothing = "not every check was made";
     const progress how = terminal_progress(&term);
-    examination e = {
-        .scene = given.n_arguments > 1 ? given.arguments[1] : NULL, .probes = f.probes, .progress = &how};
+    examination e = {.scene = given.n_arguments > 1 ? given.arguments[1] : NULL,
+                     .probes = f.probes,
+                     .walks = f.walks,
+                     .progress = &how};
     const lam_status status = verify(given.arguments[0], &f, &e, &broken, &term, &error);
     examination_free(&e);
     if (status != LAM_OK) return terminal_fail(&term, &error);

@@ -13,6 +13,7 @@ void examination_free(examination *e) {
     lam_operator_close(e->op);
     form_factors_free(&e->f);
     free(e->row_sums);
+    free(e->compared);
     mesh_free(&e->m);
     store_close(e->s);
 }

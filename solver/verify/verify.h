@@ -10,25 +10,37 @@
 
 typedef enum verdict { VERDICT_OK, VERDICT_BROKEN, VERDICT_SKIPPED } verdict;
 
-#define VERIFY_MAX 8
-
 typedef struct check {
     const char *name;
     verdict verdict;
     char detail[480];
 } check;
 
+/* The operator's mean irradiance of a group or of one element in a channel, beside that of walks. */
+typedef struct walk_comparison {
+    const char
+        *emission;     /* the name of the group or of the emitter that emits alone; or "uniform", "mixture" */
+    const char *group; /* NULL: a single element */
+    size_t element;    /* without a group */
+    size_t channel;
+    double answer, mean, error; /* the operator's, that of the walks, its standard error */
+    double score;               /* (answer - mean) / error, as walk_score says */
+} walk_comparison;
+
 /* A store under examination; data that a check has loaded stays for the next. */
 typedef struct examination {
     store *s;
     const char *scene; /* a scene file to compare with, or NULL */
     size_t probes;     /* 0: the error is not measured again */
+    size_t walks;      /* of each emission and from each element; 0: none */
     const progress *progress;
     mesh m;
     double *row_sums;
     form_factors f; /* kept ones, or regenerated */
     lam_operator *op;
     bool has_mesh;
+    walk_comparison *compared; /* [n_compared] by verify_walks; the channels of a mean stand together */
+    size_t n_compared;
 } examination;
 
 void examination_free(examination *e);
@@ -37,7 +49,21 @@ void examination_free(examination *e);
 typedef lam_status verify_check(examination *e, check *c, lam_error *error);
 
 verify_check verify_checksums, verify_mesh, verify_form_factors, verify_sky, verify_operator,
-    verify_linearity, verify_energy, verify_error, verify_scene;
+    verify_linearity, verify_energy, verify_error, verify_walks, verify_scene;
+
+/* Numbers of one emission: a channel has one for each element, or, of an operator of emitters, a weight each.
+ */
+size_t examination_inputs(const examination *e);
+
+/* The operator's answer [m][C][n] to m emissions, which the caller frees. Errors: LAM_ERR_MEMORY. */
+lam_status examination_apply(const examination *e, size_t m, lam_quantity quantity, const float *E,
+                             float **out, lam_error *error);
+
+/* True where there is no operator to test, which the verdict then says. */
+bool examination_skips(const examination *e, check *c);
+
+/* Reads a number that the store states; false where it states none. */
+bool examination_stated(store *s, const char *group, const char *name, double *value);
 
 /* Sets a verdict with its detail. */
 void check_say(check *c, verdict v, const char *format, ...) __attribute__((format(printf, 3, 4)));

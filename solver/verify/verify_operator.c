@@ -14,15 +14,13 @@
 /* Rounding of a single-precision product over n terms, relative to the largest value. */
 static const double rounding = 1e-5;
 
-/* Numbers of one emission: a channel has one for each element, or, of an operator of emitters, a weight each.
- */
-static size_t input_size(const examination *e) {
+size_t examination_inputs(const examination *e) {
     const size_t s = lam_operator_emitters(e->op);
     return e->m.n_channels * (s > 0 ? s : e->m.n);
 }
 
-static lam_status apply(const examination *e, size_t m, lam_quantity quantity, const float *E, float **out,
-                        lam_error *error) {
+lam_status examination_apply(const examination *e, size_t m, lam_quantity quantity, const float *E,
+                             float **out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t bytes = lam_operator_work_bytes(e->op, m);
     float *values = memory_allocate(e->m.n * e->m.n_channels, m * sizeof *values, "a solution", error);
@@ -40,7 +38,7 @@ done:
     return status;
 }
 
-static bool skip(const examination *e, check *c) {
+bool examination_skips(const examination *e, check *c) {
     if (e->has_mesh && e->op != NULL) return false;
     check_say(c, VERDICT_SKIPPED, "no operator to test");
     return true;
@@ -63,14 +61,14 @@ lam_status verify_operator(examination *e, check *c, lam_error *error) {
     if (e->op->kind->check != NULL && !e->op->kind->check(e->op, e->m.area, detail, sizeof detail))
         check_say(c, VERDICT_BROKEN, "%s", detail);
     /* Uniform emission: a value that is not finite anywhere in the operator shows in the answer. */
-    const size_t count = e->m.n * e->m.n_channels, inputs = input_size(e);
+    const size_t count = e->m.n * e->m.n_channels, inputs = examination_inputs(e);
     E = memory_allocate(inputs, sizeof *E, "an emission", error);
     if (E == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < inputs; i++) E[i] = 1;
     for (size_t q = 0; q < 3 && c->verdict == VERDICT_OK; q++) {
         free(out);
         out = NULL;
-        TRY(apply(e, 1, quantities[q], E, &out, error));
+        TRY(examination_apply(e, 1, quantities[q], E, &out, error));
         for (size_t i = 0; i < count && c->verdict == VERDICT_OK; i++)
             if (!isfinite(out[i]))
                 check_say(c, VERDICT_BROKEN, "the answer of element %zu is not finite", i % e->m.n);
@@ -84,8 +82,8 @@ done:
 lam_status verify_linearity(examination *e, check *c, lam_error *error) {
     lam_status status = LAM_OK;
     float *E = NULL, *out = NULL;
-    if (skip(e, c)) return LAM_OK;
-    const size_t count = e->m.n * e->m.n_channels, inputs = input_size(e);
+    if (examination_skips(e, c)) return LAM_OK;
+    const size_t count = e->m.n * e->m.n_channels, inputs = examination_inputs(e);
     uint64_t state = 1;
     E = memory_allocate(inputs, 3 * sizeof *E, "emissions", error);
     if (E == NULL) TRY(LAM_ERR_MEMORY);
@@ -95,7 +93,7 @@ lam_status verify_linearity(examination *e, check *c, lam_error *error) {
         E[2 * inputs + i] = E[i] + 2 * E[inputs + i];
         state++;
     }
-    TRY(apply(e, 3, LAM_RADIOSITY, E, &out, error));
+    TRY(examination_apply(e, 3, LAM_RADIOSITY, E, &out, error));
     double worst = 0, largest = 0;
     for (size_t i = 0; i < count; i++) {
         const double expected = (double)out[i] + 2 * (double)out[count + i];
@@ -111,7 +109,7 @@ done:
     return check_failed(c, status, error);
 }
 
-static bool stated(store *s, const char *group, const char *name, double *value) {
+bool examination_stated(store *s, const char *group, const char *name, double *value) {
     return store_has(s, group) && store_has_attribute(s, group, name) &&
            store_get_number(s, group, name, value, NULL) == LAM_OK;
 }
@@ -122,9 +120,9 @@ static bool stated(store *s, const char *group, const char *name, double *value)
  * reflectance. */
 static double allowed_imbalance(store *s, bool own, double emitted, double area, double received) {
     double value;
-    if (own && stated(s, "/error/lights", "energy_balance", &value))
+    if (own && examination_stated(s, "/error/lights", "energy_balance", &value))
         return (1.1 * value + rounding) * emitted;
-    if (!own && stated(s, "/error/random", "operator_indirect_max", &value))
+    if (!own && examination_stated(s, "/error/random", "operator_indirect_max", &value))
         return 2 * value * sqrt(area * received) + rounding * emitted;
     return -1;
 }
@@ -140,7 +138,7 @@ typedef struct lit {
 static lam_status light_up(const examination *e, lit *l, lam_error *error) {
     lam_status status = LAM_OK;
     const mesh *m = &e->m;
-    const size_t count = m->n * m->n_channels, inputs = input_size(e);
+    const size_t count = m->n * m->n_channels, inputs = examination_inputs(e);
     l->E = memory_allocate(count, sizeof *l->E, "an emission", error);
     l->input = memory_allocate(inputs, sizeof *l->input, "an emission", error);
     if (l->E == NULL || l->input == NULL) TRY(LAM_ERR_MEMORY);
@@ -165,13 +163,13 @@ lam_status verify_energy(examination *e, check *c, lam_error *error) {
     lam_status status = LAM_OK;
     float *B = NULL, *H = NULL;
     lit light = {.own = false};
-    if (skip(e, c)) return LAM_OK;
+    if (examination_skips(e, c)) return LAM_OK;
     const mesh *m = &e->m;
     const size_t count = m->n * m->n_channels;
     double emitted = 0, accounted = 0, area = 0, received = 0;
     TRY(light_up(e, &light, error));
-    TRY(apply(e, 1, LAM_RADIOSITY, light.input, &B, error));
-    TRY(apply(e, 1, LAM_IRRADIANCE, light.input, &H, error));
+    TRY(examination_apply(e, 1, LAM_RADIOSITY, light.input, &B, error));
+    TRY(examination_apply(e, 1, LAM_IRRADIANCE, light.input, &H, error));
     for (size_t i = 0; i < count; i++) {
         const double direct = light.H0 != NULL ? (double)light.H0[i] : 0;
         const double a = m->area[i % m->n], h = (double)H[i] - direct;
@@ -274,7 +272,7 @@ lam_status verify_error(examination *e, check *c, lam_error *error) {
     lam_status status = LAM_OK;
     error_report again = {.seconds = 0};
     recipe from = {.rays = 0};
-    if (skip(e, c)) return LAM_OK;
+    if (examination_skips(e, c)) return LAM_OK;
     if (e->probes == 0 || !store_has(e->s, "/error/single")) {
         check_say(c, VERDICT_SKIPPED, e->probes == 0 ? "not measured again (--probes 0)" : "none is stated");
         return LAM_OK;

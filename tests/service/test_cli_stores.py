@@ -1,6 +1,7 @@
 """Black box: stores that `lambert precompute` makes, and what `info` and `verify` say of them."""
 
 import json
+import re
 import shutil
 import unittest
 
@@ -195,10 +196,45 @@ class Stores(Case):
 
     def test_verify(self):
         done = must("verify", self.store, self.box, "--probes", 6)
-        self.assertEqual([line.split()[0] for line in done.stdout.splitlines()], ["ok"] * 3 + ["skipped"] + ["ok"] * 5)  # no sky
+        self.assertEqual([line.split()[0] for line in done.stdout.splitlines()],
+                         ["ok"] * 3 + ["skipped"] + ["ok"] * 4 + ["skipped", "ok"])  # no sky, no walks
         answer = json.loads(must("verify", self.store, "--probes", 0, "--json").stdout)
         self.assertTrue(answer["ok"])
         self.assertEqual({check["name"]: check["result"] for check in answer["checks"]}["scene"], "skipped")
+
+    def test_verify_with_walks(self):
+        self.assertNotIn("walks", json.loads(must("verify", self.store, "--probes", 0, "--json").stdout))
+        command = ("verify", self.store, "--probes", 0, "--walks", 20000)
+        answer = json.loads(must(*command, "--json").stdout)
+        check = next(check for check in answer["checks"] if check["name"] == "walks")
+        self.assertEqual(check["result"], "ok", check["detail"])
+        # Uniform emission, each of the six groups alone (none emits by itself) and a mixture: groups and 8 elements.
+        walks = answer["walks"]
+        self.assertEqual(len(walks), 8 * (6 + 8))
+        self.assertEqual({walk["emission"] for walk in walks} - {"uniform", "mixture"},
+                         {walk["group"] for walk in walks if "group" in walk})
+        self.assertEqual(sorted({walk["element"] for walk in walks if "element" in walk}), list(range(6, 96, 12)))
+        # A closed box with one reflectance r under uniform emission 1: H = 1 / (1 - r).
+        for walk in walks:
+            self.assertEqual(walk["channel"], 0)
+            self.assertAlmostEqual(walk["z"], (walk["operator"] - walk["walks"]) / walk["standard_error"], 6)
+            if walk["emission"] == "uniform":
+                self.assertAlmostEqual(walk["operator"], 1 / (1 - self.reflectance()), 4)
+                self.assertLess(abs(walk["walks"] * (1 - self.reflectance()) - 1), .1)
+        lines = must(*command, threads=1).stdout.splitlines()
+        at = next(k for k, line in enumerate(lines) if re.match(r"ok +walks ", line))
+        self.assertIn(f"of {len(walks)} means is {max(abs(walk['z']) for walk in walks):.1f} (", lines[at])
+        for walk, line in zip(walks, lines[at + 1:]):  # the same for any number of threads
+            name = walk.get("group", f"element {walk.get('element')}")
+            self.assertEqual(line.split(), f"{walk['z']:+.1f} operator {walk['operator']:.6g} walks {walk['walks']:.6g} "
+                             f"+- {walk['standard_error']:.2g} {name} under {walk['emission']}".split())
+        self.refused(2, "--walks -1: must not be negative", "verify", self.store, "--walks", "-1")
+        self.refused(2, "--walks 1000000001: must be", "verify", self.store, "--walks", "1000000001")
+        self.refused(2, "--walks 1e3: not a whole number", "verify", self.store, "--walks", "1e3")
+
+    def reflectance(self):
+        with h5py.File(self.store) as file:
+            return float(file["mesh/reflectance"][0, 0])
 
     def test_verify_finds_a_flipped_byte(self):
         with h5py.File(self.store) as file:

@@ -1,6 +1,7 @@
 /* `lambert verify` on stores whose checksums are right and whose content is not. */
 #include "solver/method/judge.h"
 #include "solver/verify/verify.h"
+#include "solver/walk/walk.h"
 #include "support/box.h"
 #include "support/scene.h"
 #include "support/suite.h"
@@ -113,9 +114,10 @@ static void save(const sample *s, const char *path) {
     MUST(store_seal(out, error));
 }
 
-static verify_check *const checks[] = {verify_checksums, verify_mesh,      verify_form_factors, verify_sky,
-                                       verify_operator,  verify_linearity, verify_energy,       verify_error};
-enum { CHECKSUMS, MESH, FORM_FACTORS, SKY, OPERATOR, LINEARITY, ENERGY, ERROR, N_CHECKS };
+static verify_check *const checks[] = {verify_checksums, verify_mesh,     verify_form_factors,
+                                       verify_sky,       verify_operator, verify_linearity,
+                                       verify_energy,    verify_error,    verify_walks};
+enum { CHECKSUMS, MESH, FORM_FACTORS, SKY, OPERATOR, LINEARITY, ENERGY, ERROR, WALKS, N_CHECKS };
 
 /* Saves, opens and examines a sample. */
 static void examine(const sample *s, check done[N_CHECKS]) {
@@ -123,7 +125,7 @@ static void examine(const sample *s, check done[N_CHECKS]) {
     folder_make(folder);
     snprintf(path, sizeof path, "%s/a.h5", folder);
     save(s, path);
-    examination e = {.probes = PROBES};
+    examination e = {.probes = PROBES, .walks = 1000};
     MUST(store_open(path, &e.s, error));
     memset(done, 0, N_CHECKS * sizeof *done);
     for (size_t i = 0; i < N_CHECKS; i++) MUST(checks[i](&e, &done[i], error));
@@ -279,6 +281,56 @@ START_TEST(test_patches_that_weigh_wrong) {
 }
 END_TEST
 
+/* Walks against an operator of exact form factors, with the rows of one wall scaled: the check, and the
+ * chance of its largest score. */
+static double walk_beside(float scale, check *found) {
+    sample s = make_sample();
+    char folder[64], file[128];
+    uint32_t order[54];
+    double worst = 0;
+    csr F = box_form_factors((double[]){1, 1, 1}, 3, s.m.area);
+    for (uint64_t p = 0; p < F.indptr[9]; p++) F.data[p] *= scale;
+    csr_free(&s.f.F);
+    s.f.F = F;
+    MUST(mesh_z_order(&s.m, order, error));
+    lam_operator_close(s.op);
+    build(&s, order);
+    folder_make(folder);
+    snprintf(file, sizeof file, "%s/a.h5", folder);
+    save(&s, file);
+    examination e = {.walks = 100000};
+    MUST(store_open(file, &e.s, error));
+    MUST(verify_mesh(&e, found, error));
+    MUST(verify_operator(&e, found, error));
+    MUST(verify_walks(&e, found, error));
+    /* Uniform, the one group that emits, a mixture; the group, and elements 3, 10, ... 50. */
+    ck_assert_uint_eq(e.n_compared, 3 * (1 + 8));
+    for (size_t k = 0; k < e.n_compared; k++) worst = fmax(worst, fabs(e.compared[k].score));
+    ck_assert_str_eq(e.compared[0].emission, "uniform");
+    ck_assert_str_eq(e.compared[1].group, "lamp");
+    ck_assert_uint_eq(e.compared[3].element, 3);
+    const double chance = walk_chance(worst, e.n_compared);
+    examination_free(&e);
+    folder_remove(folder);
+    free_sample(&s);
+    return chance;
+}
+
+/* The store states the errors of sampled form factors: 2 % for one wall is less, and yet seen; a half is
+ * more.
+ */
+START_TEST(test_walks_beside_an_operator) {
+    check found;
+    ck_assert_double_gt(walk_beside(1, &found), 1e-3);
+    ck_assert_msg(found.verdict == VERDICT_OK, "%s", found.detail);
+    ck_assert_double_lt(walk_beside(1.02f, &found), 1e-6);
+    ck_assert_msg(found.verdict == VERDICT_OK, "%s", found.detail);
+    ck_assert_ptr_nonnull(strstr(found.detail, "element 3 under"));
+    ck_assert_double_lt(walk_beside(1.5f, &found), 1e-6);
+    ck_assert_msg(found.verdict == VERDICT_BROKEN, "%s", found.detail);
+}
+END_TEST
+
 int main(void) {
     Suite *s = suite_create("verify");
     TCase *c = tcase_create("all");
@@ -290,6 +342,7 @@ int main(void) {
     tcase_add_test(c, test_a_sky_that_shines_through_walls);
     tcase_add_test(c, test_a_mesh_that_is_not_its_vertices);
     tcase_add_test(c, test_patches_that_weigh_wrong);
+    tcase_add_test(c, test_walks_beside_an_operator);
     suite_add_tcase(s, c);
     return suite_run(s);
 }

@@ -1,0 +1,291 @@
+/* The check of an operator by random walks, which share nothing with the form factors that it was built from.
+ */
+#include "solver/base/random.h"
+#include "solver/operator/emitters.h"
+#include "solver/precompute/precompute.h"
+#include "solver/verify/verify.h"
+#include "solver/walk/walk.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+/* At most so many groups or emitters shine alone; so many groups are compared, and so many elements. */
+enum { ALONE_MOST = 8, GROUPS_MOST = 32, ELEMENTS = 8 };
+
+/* A difference beyond the stated error counts where chance gives one as large less often than this. */
+static const double certain = 1e-4;
+
+/* Rounding of a mean of single-precision answers, relative to it. */
+static const double rounding = 1e-6;
+
+/* The emissions: uniform, groups or emitters alone, and a random mixture of all of them. */
+typedef struct lights {
+    size_t n;
+    const char *names[ALONE_MOST + 2];
+    float *input; /* [n][inputs of a channel], as the operator takes them */
+    float *E;     /* [n][C][n], with what the elements reflect of a sky: E + rho H0 */
+    float *H0;    /* [n][C][n], or NULL: no sky */
+} lights;
+
+static void lights_free(lights *l) {
+    free(l->input);
+    free(l->E);
+    free(l->H0);
+}
+
+/* The largest values of an array, in their order: indices into it, at most `most`, none of a value 0. */
+static size_t find_largest(const double *value, size_t n, size_t most, size_t *largest) {
+    size_t found = 0;
+    for (size_t i = 0; i < n; i++) {
+        if (!(value[i] > 0)) continue;
+        size_t at = found < most ? found++ : most;
+        for (; at > 0 && value[largest[at - 1]] < value[i]; at--)
+            if (at < most) largest[at] = largest[at - 1];
+        if (at < most) largest[at] = i;
+    }
+    return found;
+}
+
+/* Per group its area, or, with power, the power that it emits. */
+static double *group_sums(const mesh *m, bool power, lam_error *error) {
+    double *sums = memory_allocate(m->n_groups, sizeof *sums, "groups", error);
+    for (size_t i = 0; i < m->n && sums != NULL; i++) {
+        double of = power ? 0 : 1;
+        for (size_t c = 0; c < m->n_channels && power; c++) of += (double)m->emission[c * m->n + i];
+        sums[m->group[i]] += of * m->area[i];
+    }
+    return sums;
+}
+
+/* The groups that emit, or, where none does, the largest ones. */
+static lam_status find_bright_groups(const mesh *m, size_t groups[ALONE_MOST], size_t *count,
+                                     lam_error *error) {
+    for (int by_area = 0; by_area < 2; by_area++) {
+        double *sums = group_sums(m, by_area == 0, error);
+        if (sums == NULL) return LAM_ERR_MEMORY;
+        *count = find_largest(sums, m->n_groups, ALONE_MOST, groups);
+        free(sums);
+        if (*count > 0) break;
+    }
+    return LAM_OK;
+}
+
+/* Sets the inputs of every light; source s of a channel is a group or an emitter, of_input says which one an
+ * input belongs to. */
+static void fill_inputs(const examination *e, const size_t *alone, const uint32_t *of_input, size_t n_sources,
+                        lights *l) {
+    const size_t inputs = examination_inputs(e), per_channel = inputs / e->m.n_channels;
+    for (size_t k = 0; k < inputs; k++) {
+        const size_t source = of_input != NULL ? of_input[k % per_channel] : k % per_channel;
+        l->input[k] = 1;
+        for (size_t a = 0; a + 2 < l->n; a++) l->input[(1 + a) * inputs + k] = source == alone[a];
+        l->input[(l->n - 1) * inputs + k] =
+            random_to_float(random_hash(k / per_channel * n_sources + source + 1));
+    }
+}
+
+static lam_status lights_create(const examination *e, lights *l, lam_error *error) {
+    lam_status status = LAM_OK;
+    const mesh *m = &e->m;
+    const size_t count = m->n * m->n_channels, inputs = examination_inputs(e);
+    const size_t n_emitters = lam_operator_emitters(e->op);
+    size_t alone[ALONE_MOST], n_alone = n_emitters < ALONE_MOST ? n_emitters : ALONE_MOST;
+    for (size_t a = 0; a < n_alone; a++) alone[a] = a;
+    if (n_emitters == 0) TRY(find_bright_groups(m, alone, &n_alone, error));
+    l->n = n_alone + 2;
+    l->names[0] = "uniform";
+    for (size_t a = 0; a < n_alone; a++)
+        l->names[1 + a] =
+            n_emitters > 0 ? lam_operator_emitter_name(e->op, alone[a]) : m->group_names[alone[a]];
+    l->names[l->n - 1] = "mixture";
+    l->input = memory_allocate(inputs, l->n * sizeof *l->input, "emissions", error);
+    l->E = memory_allocate(count, l->n * sizeof *l->E, "emissions", error);
+    if (l->input == NULL || l->E == NULL) TRY(LAM_ERR_MEMORY);
+    fill_inputs(e, alone, n_emitters > 0 ? NULL : m->group, n_emitters > 0 ? n_emitters : m->n_groups, l);
+    if (n_emitters == 0) {
+        for (size_t k = 0; k < l->n * count; k++) l->E[k] = l->input[k];
+        goto done;
+    }
+    l->H0 = memory_allocate(count, l->n * sizeof *l->H0, "emissions", error);
+    if (l->H0 == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(operator_emitters_light(e->op, l->n, l->input, l->E, l->H0, error));
+    for (size_t k = 0; k < l->n * count; k++) l->E[k] += m->reflectance[k % count] * l->H0[k];
+done:
+    return status;
+}
+
+/* Targets of walks: groups, or single elements. */
+typedef struct targets {
+    size_t n;
+    const char *groups[GROUPS_MOST]; /* NULL: the target is an element */
+    size_t elements[ELEMENTS];
+    uint32_t *of; /* [n of the mesh] */
+    double area[GROUPS_MOST];
+} targets;
+
+static void choose_elements(const mesh *m, targets *t) {
+    t->n = m->n < ELEMENTS ? m->n : ELEMENTS;
+    for (size_t i = 0; i < m->n; i++) t->of[i] = WALK_NO_TARGET;
+    for (size_t k = 0; k < t->n; k++) {
+        const size_t element = (2 * k + 1) * m->n / (2 * t->n);
+        t->groups[k] = NULL;
+        t->elements[k] = element;
+        t->area[k] = m->area[element];
+        t->of[element] = (uint32_t)k;
+    }
+}
+
+static lam_status choose_groups(const mesh *m, targets *t, lam_error *error) {
+    size_t groups[GROUPS_MOST];
+    double *area = group_sums(m, false, error);
+    if (area == NULL) return LAM_ERR_MEMORY;
+    t->n = find_largest(area, m->n_groups, GROUPS_MOST, groups);
+    for (size_t i = 0; i < m->n; i++) t->of[i] = WALK_NO_TARGET;
+    for (size_t k = 0; k < t->n; k++) {
+        t->groups[k] = m->group_names[groups[k]];
+        t->area[k] = area[groups[k]];
+        for (size_t i = 0; i < m->n; i++)
+            if (m->group[i] == groups[k]) t->of[i] = (uint32_t)k;
+    }
+    free(area);
+    return LAM_OK;
+}
+
+/* An answer H [n lights][C][n of the mesh] of the operator, and its largest differences from walks. */
+typedef struct judgement {
+    const lights *l;
+    const float *H;
+    double *received; /* [n lights]: sum A H^2 over elements and channels */
+    double stated[2]; /* the stated error of any emission, of one group or emitter alone; negative: none */
+    double beyond;    /* the largest score of a difference beyond the stated error */
+} judgement;
+
+/* Adds the comparisons of some targets. The bound on a mean is that of verify_energy: an error h of H in the
+ * area norm moves the mean over the area A by at most |h| / A^1/2, twice because the stated error weighs H by
+ * the reflectance. */
+static void compare(examination *e, judgement *j, const targets *t, const walk_estimates *found) {
+    const mesh *m = &e->m;
+    const size_t channels = m->n_channels;
+    for (size_t p = 0; p < j->l->n * t->n * channels; p++) {
+        const size_t channel = p % channels, target = p / channels % t->n, light = p / channels / t->n;
+        const size_t row = light * channels + channel, k = row * t->n + target;
+        double answer = 0;
+        for (size_t i = 0; i < m->n; i++)
+            if (t->of[i] == target) answer += m->area[i] * (double)j->H[row * m->n + i];
+        answer /= t->area[target];
+        const double score = walk_score(found, k, answer, rounding * answer);
+        const double difference = fabs(answer - found->mean[k]);
+        const double stated = j->stated[light > 0 && light + 1 < j->l->n];
+        const double allowed = 2 * 1.1 * stated * sqrt(j->received[light] / t->area[target]);
+        e->compared[e->n_compared++] =
+            (walk_comparison){.emission = j->l->names[light],
+                              .group = t->groups[target],
+                              .element = t->groups[target] == NULL ? t->elements[target] : 0,
+                              .channel = channel,
+                              .answer = answer,
+                              .mean = found->mean[k],
+                              .error = score != 0 ? difference / fabs(score) : found->error[k],
+                              .score = score};
+        if (difference > allowed) j->beyond = fmax(j->beyond, fabs(score) * (1 - allowed / difference));
+    }
+}
+
+/* Walks for groups are shot, for elements they are gathered. */
+static lam_status walk_all(examination *e, judgement *j, lam_error *error) {
+    lam_status status = LAM_OK;
+    const mesh *m = &e->m;
+    walk_scene *scene = NULL;
+    walk_estimates found = {.n_rhs = 0};
+    targets t = {.of = memory_allocate(m->n, sizeof *t.of, "targets of walks", error)};
+    e->compared = memory_allocate(j->l->n * m->n_channels, (GROUPS_MOST + ELEMENTS) * sizeof *e->compared,
+                                  "comparisons", error);
+    if (t.of == NULL || e->compared == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(walk_scene_create(m, &scene, error));
+    walk_problem problem = {.n_rhs = j->l->n,
+                            .E = j->l->E,
+                            .quantity = LAM_IRRADIANCE,
+                            .target = t.of,
+                            .walks = e->walks,
+                            .seed = precompute_seed(0, SEED_VERIFY_WALKS),
+                            .progress = e->progress};
+    TRY(choose_groups(m, &t, error));
+    problem.n_targets = t.n;
+    problem.stage = "walks from lights";
+    TRY(walk_shoot(scene, &problem, &found, error));
+    compare(e, j, &t, &found);
+    walk_estimates_free(&found);
+    choose_elements(m, &t);
+    problem.n_targets = t.n;
+    problem.stage = "walks from elements";
+    TRY(walk_gather(scene, &problem, &found, error));
+    compare(e, j, &t, &found);
+done:
+    walk_estimates_free(&found);
+    walk_scene_free(scene);
+    free(t.of);
+    return status;
+}
+
+/* The largest error that a store states for any emission, and for one light alone. */
+static void read_stated(store *s, double stated[2]) {
+    static const char *const groups[] = {"/error/random", "/error/lights", "/error/single"};
+    double value;
+    stated[0] = examination_stated(s, groups[0], "total_indirect_max", &value) ? value : -1;
+    stated[1] = stated[0];
+    for (int k = 1; k < 3 && stated[0] >= 0; k++)
+        if (examination_stated(s, groups[k], "total_indirect_max", &value))
+            stated[1] = fmax(stated[1], value);
+}
+
+static void conclude(const examination *e, const judgement *j, check *c) {
+    const walk_comparison *worst = &e->compared[0];
+    char at[32];
+    for (size_t k = 1; k < e->n_compared; k++)
+        if (fabs(e->compared[k].score) > fabs(worst->score)) worst = &e->compared[k];
+    snprintf(at, sizeof at, "element %zu", worst->element);
+    const bool known = j->stated[0] >= 0;
+    const bool broken = known && walk_chance(j->beyond, e->n_compared) < certain;
+    const double chance = 100 * walk_chance(worst->score, e->n_compared);
+    check_say(c,
+              !known   ? VERDICT_SKIPPED
+              : broken ? VERDICT_BROKEN
+                       : VERDICT_OK,
+              "largest |z| of %zu means is %.1f (%s under %s), by chance alone in %.*g %% of cases; %s",
+              e->n_compared, fabs(worst->score), worst->group != NULL ? worst->group : at, worst->emission,
+              chance < 10 ? 1 : 3, chance,
+              !known   ? "the store states no error to compare with"
+              : broken ? "differs by more than the stated error"
+                       : "within the stated error");
+}
+
+lam_status verify_walks(examination *e, check *c, lam_error *error) {
+    lam_status status = LAM_OK;
+    lights l = {.n = 0};
+    judgement j = {.l = &l};
+    float *H = NULL;
+    if (examination_skips(e, c)) return LAM_OK;
+    if (e->walks == 0) {
+        check_say(c, VERDICT_SKIPPED, "no random walks (--walks 0)");
+        return LAM_OK;
+    }
+    const mesh *m = &e->m;
+    const size_t count = m->n * m->n_channels;
+    TRY(lights_create(e, &l, error));
+    TRY(examination_apply(e, l.n, LAM_IRRADIANCE, l.input, &H, error));
+    j.received = memory_allocate(l.n, sizeof *j.received, "a solution", error);
+    if (j.received == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < l.n * count; k++) {
+        if (l.H0 != NULL) H[k] -= l.H0[k];
+        j.received[k / count] += m->area[k % m->n] * (double)H[k] * (double)H[k];
+    }
+    j.H = H;
+    read_stated(e->s, j.stated);
+    TRY(walk_all(e, &j, error));
+    conclude(e, &j, c);
+done:
+    lights_free(&l);
+    free(H);
+    free(j.received);
+    return check_failed(c, status, error);
+}
