@@ -107,7 +107,7 @@ START_TEST(furnace) {
     double B[54];
     for (size_t i = 0; i < m.n; i++) E[i] = 2;
     for (size_t i = 0; i < m.n; i++) B[i] = 2 / (1 - (double)rho[_i]);
-    const walk_problem p = {.n_rhs = 1, .E = E, .n_targets = m.n, .target = target, .walks = 5000, .seed = 1};
+    const walk_problem p = {.n_rhs = 1, .E = E, .n_targets = m.n, .target = target, .walks = 2000, .seed = 1};
     check_both(&m, &p, B, NULL);
     free(target);
     mesh_free(&m);
@@ -141,7 +141,7 @@ START_TEST(room_of_six_faces) {
     m.reflectance[5] = .7f;
     const float E[6] = {0, 0, 0, 0, 0, 1};
     const double B[6] = {.244787308, .244787308, .249787404, .249787404, .136329470, 1.135385436};
-    const walk_problem p = {.n_rhs = 1, .E = E, .n_targets = 6, .target = target, .walks = 400000, .seed = 3};
+    const walk_problem p = {.n_rhs = 1, .E = E, .n_targets = 6, .target = target, .walks = 100000, .seed = 3};
     check_both(&m, &p, B, NULL);
     free(target);
     mesh_free(&m);
@@ -159,7 +159,7 @@ START_TEST(cube_with_a_bright_face) {
         E[i] = i < 16;
         B[i] = i < 16 ? 1.102645712 : i < 32 ? .171829422 : .181381216;
     }
-    const walk_problem p = {.n_rhs = 1, .E = E, .n_targets = 6, .target = target, .walks = 400000, .seed = 4};
+    const walk_problem p = {.n_rhs = 1, .E = E, .n_targets = 6, .target = target, .walks = 100000, .seed = 4};
     check_both(&m, &p, B, NULL);
     mesh_free(&m);
 }
@@ -390,7 +390,7 @@ START_TEST(a_wall_that_receives_too_much_is_noticed) {
                                 .quantity = LAM_IRRADIANCE,
                                 .n_targets = 6,
                                 .target = target,
-                                .walks = w == 0 ? 200000 : 1000000,
+                                .walks = w == 0 ? 100000 : 1000000,
                                 .seed = 9};
         walk_estimates e;
         ck_ok(ways[w](s, &p, &e, &error));
