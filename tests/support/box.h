@@ -4,8 +4,8 @@
 
 #include "solver/linalg/csr.h"
 #include "solver/scene/mesh.h"
+#include "support/suite.h"
 
-#include <check.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,5 @@
 #include "support/building.h"
-
-#include <check.h>
+#include "support/suite.h"
 
 void set_number(build_options *options, const char *name, double value) {
     lam_error why = {.message = ""};

@@ -2,7 +2,8 @@
 #ifndef LAMBERT_TESTS_DENSE_H
 #define LAMBERT_TESTS_DENSE_H
 
-#include <check.h>
+#include "support/suite.h"
+
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>

@@ -4,8 +4,8 @@
 
 #include "solver/formfactor/rows/row_code.h"
 #include "solver/linalg/csr.h"
+#include "support/suite.h"
 
-#include <check.h>
 #include <stdlib.h>
 
 /* The caller frees the result with csr_free. */

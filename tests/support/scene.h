@@ -4,8 +4,8 @@
 
 #include "solver/scene/generate/generate.h"
 #include "solver/scene/import/import.h"
+#include "support/suite.h"
 
-#include <check.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -4,8 +4,8 @@
 
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/rows/row_code.h"
+#include "support/suite.h"
 
-#include <check.h>
 #include <stdlib.h>
 
 /* A square of counts or weights, and the same packed. */

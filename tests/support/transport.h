@@ -9,8 +9,8 @@
 #include "solver/operator/sparse.h"
 #include "support/dense.h"
 #include "support/random_basis.h"
+#include "support/suite.h"
 
-#include <check.h>
 #include <float.h>
 #include <math.h>
 #include <stdint.h>

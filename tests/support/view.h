@@ -6,8 +6,7 @@
 #include "solver/formfactor/formfactor.h"
 #include "support/dense.h"
 #include "support/scene.h"
-
-#include <check.h>
+#include "support/suite.h"
 
 typedef struct view {
     const char *name;

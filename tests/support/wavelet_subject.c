@@ -151,7 +151,7 @@ double *whole(const csr *upper) {
     for (size_t i = 0; i < n; i++)
         for (uint64_t e = upper->indptr[i]; e < upper->indptr[i + 1]; e++) {
             const uint32_t j = upper->indices[e];
-            ck_each(j >= i && (e == upper->indptr[i] || j > upper->indices[e - 1]));
+            ck_assert(j >= i && (e == upper->indptr[i] || j > upper->indices[e - 1]));
             A[i * n + j] = A[j * n + i] = (double)upper->data[e];
         }
     return A;

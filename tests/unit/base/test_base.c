@@ -35,11 +35,11 @@ START_TEST(arrays_grow_and_keep_their_content) {
     ck_assert_ptr_nonnull(values);
     for (uint32_t i = 0; i < 100000; i++) {
         const size_t before = capacity;
-        ck_each(array_grow(&values, &capacity, i + 1, sizeof *values, "values", &error) == LAM_OK);
+        ck_assert(array_grow(&values, &capacity, i + 1, sizeof *values, "values", &error) == LAM_OK);
         grown += capacity != before;
         values[i] = i;
     }
-    for (uint32_t i = 0; i < 100000; i++) ck_each(values[i] == i);
+    for (uint32_t i = 0; i < 100000; i++) ck_assert(values[i] == i);
     ck_assert_uint_le(grown, 20); /* log(1e5 / 64) / log(1.5) = 18.1 */
     const size_t before = capacity;
     const uint32_t *there = values;
@@ -75,9 +75,9 @@ START_TEST(a_work_area_holds_what_was_added) {
     for (size_t shift = 0; shift < WORK_AREA_ALIGN; shift++) {
         void *rest = work_area_begin(memory + shift);
         char *one = work_area_take(&rest, 1), *two = work_area_take(&rest, 65);
-        ck_each((uintptr_t)one % WORK_AREA_ALIGN == 0 && one >= memory + shift &&
-                one < memory + shift + WORK_AREA_ALIGN);
-        ck_each(two == one + WORK_AREA_ALIGN && rest == two + 2 * WORK_AREA_ALIGN);
+        ck_assert((uintptr_t)one % WORK_AREA_ALIGN == 0 && one >= memory + shift &&
+                  one < memory + shift + WORK_AREA_ALIGN);
+        ck_assert(two == one + WORK_AREA_ALIGN && rest == two + 2 * WORK_AREA_ALIGN);
     }
 }
 END_TEST

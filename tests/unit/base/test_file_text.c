@@ -44,7 +44,7 @@ START_TEST(a_pipe_is_read_to_its_end) {
     }
     ck_assert_int_eq(file_text(pipe_path, &text, &length, &error), LAM_OK);
     ck_assert_uint_eq(length, LENGTH);
-    for (int i = 0; i < LENGTH; i++) ck_each(text[i] == 'a' + i % 26);
+    for (int i = 0; i < LENGTH; i++) ck_assert(text[i] == 'a' + i % 26);
     free(text);
     unlink(pipe_path);
     rmdir(path);

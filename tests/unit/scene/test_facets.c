@@ -71,10 +71,10 @@ static void check_points(const mesh *m, const facets *f) {
                 uint32_t found = i;
                 if (f->piece_facet[p] != facet || !in_piece(m, f->pieces[p], at, &u, &v)) continue;
                 if (!alone) facet_grids_find(&g, 1, &p, &u, &v, &found);
-                ck_each(found == i);
+                ck_assert(found == i);
                 pieces++;
             }
-            ck_each(pieces > 0);
+            ck_assert(pieces > 0);
         }
     }
     facet_grids_free(&g);
@@ -102,10 +102,10 @@ static void check_cover(const mesh *m, const facets *f) {
         double of_elements = 0, of_pieces = 0;
         for (uint32_t i = f->first[k]; i < f->first[k + 1]; i++) {
             const uint32_t element = f->elements[i];
-            ck_each(f->of_element[element] == k);
+            ck_assert(f->of_element[element] == k);
             of_elements += m->area[element];
             elements++;
-            for (int d = 0; d < 3; d++) ck_each(fabsf(f->normal[k][d] - m->normal[element][d]) < 2e-3f);
+            for (int d = 0; d < 3; d++) ck_assert(fabsf(f->normal[k][d] - m->normal[element][d]) < 2e-3f);
         }
         for (size_t p = 0; p < f->n_pieces; p++)
             if (f->piece_facet[p] == k) of_pieces += area_of(m, f->pieces[p]);
@@ -128,7 +128,7 @@ static void check_closed(const mesh *m, const facets *f) {
                     mates += memcmp(m->vertices[f->pieces[q][l]], b, sizeof *m->vertices) == 0 &&
                              memcmp(m->vertices[f->pieces[q][(l + 1) % others]], a, sizeof *m->vertices) == 0;
             }
-            ck_each(mates == 1);
+            ck_assert(mates == 1);
         }
     }
 }
@@ -287,7 +287,7 @@ static void check_rays(const mesh *m, size_t rays, bool closed) {
                 seen += a.element[k] != VISIBILITY_NOTHING;
                 other += a.element[k] != b.element[k] || a.back[k] != b.back[k];
                 apart += a.element[k] != together.element[k] || a.back[k] != together.back[k];
-                ck_each(!closed || a.element[k] != VISIBILITY_NOTHING);
+                ck_assert(!closed || a.element[k] != VISIBILITY_NOTHING);
             }
         }
     }

@@ -53,9 +53,9 @@ START_TEST(it_has_the_elements_asked_for) {
         ck_assert_msg(fabs((double)m.n - wanted) <= .01 * wanted, "%s: %zu elements instead of %g",
                       kind->name, m.n, wanted);
         for (size_t i = 0; i < m.n; i++) {
-            ck_each(m.area[i] > 1e-7);
+            ck_assert(m.area[i] > 1e-7);
             for (size_t c = 0; c < m.n_channels; c++) {
-                ck_each(m.reflectance[c * m.n + i] > .05f && m.reflectance[c * m.n + i] < .9f);
+                ck_assert(m.reflectance[c * m.n + i] > .05f && m.reflectance[c * m.n + i] < .9f);
                 lamps = lamps || m.emission[c * m.n + i] > 0;
             }
         }
@@ -107,7 +107,7 @@ START_TEST(it_takes_a_reflectance) {
     ck_assert_int_eq(scene_generate(&options, path, NULL, &error), LAM_OK);
     mesh m = import_good(path, &report);
     ck_assert_uint_eq(m.n_channels, 1);
-    for (size_t i = 0; i < m.n; i++) ck_each(m.reflectance[i] == .25f);
+    for (size_t i = 0; i < m.n; i++) ck_assert(m.reflectance[i] == .25f);
     folder_remove(folder);
     mesh_free(&m);
 }
@@ -145,7 +145,7 @@ START_TEST(no_two_faces_lie_on_one_another) {
     for (size_t i = 0; i < m.n; i++) {
         double p[3];
         mesh_centroid(&m, i, p);
-        ck_each(is_in(&m, i, p));
+        ck_assert(is_in(&m, i, p));
         for (size_t j = 0; j < m.n; j++) {
             float cosine = 0;
             for (int d = 0; d < 3; d++) cosine += m.normal[i][d] * m.normal[j][d];

@@ -3,7 +3,6 @@
 #include "store/store_private.h"
 #include "support/suite.h"
 
-#include <check.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
