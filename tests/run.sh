@@ -53,7 +53,7 @@ run_ctest asan -j $((jobs + 1))
 
 step "the daemon under ThreadSanitizer"
 build tsan lambertd unit_batch unit_adjoint_rows unit_guard_parts
-build dev lambert lambertd lambert-bench lambert_shared lambert_static faults
+build dev lambert lambertd lambert-bench lambert_shared lambert_static ready_server faults
 export TSAN_OPTIONS=suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1:exitcode=66
 # OpenMP's runtime is not instrumented: its barriers would look like races, so a pass has one thread here; for the
 # daemon alone, as NumPy's BLAS waits for ever under such a limit.
@@ -62,8 +62,8 @@ cmake --preset tsan -DLAMBERT_TEST_PROGRAM="$PWD/build/dev/lambert" >/dev/null
 run_ctest tsan -j $((jobs + 1)) -R 'service\.(daemon|reduce|guard|headers)|unit\.(batch|adjoint_rows|guard_parts)'
 unset CK_FORK OPENBLAS_NUM_THREADS OMP_NUM_THREADS LAMBERTD_OMP_THREAD_LIMIT
 
-step "a daemon to which memory, clocks and kill -9 happen; an installation; the commands of all documents"
-run_ctest dev -R 'service\.(faults|install|documents)$'
+step "optimised: faults around the daemon; an installation; the commands of all documents; the script of bench service"
+run_ctest dev -j $((jobs + 1)) -R 'service\.(faults|install|documents|bench_servers)$'
 
 step "a warning-free build by clang, its unit and contract tests, clang-tidy"
 build clang
