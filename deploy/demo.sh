@@ -36,10 +36,10 @@ stop_daemon() {
 trap stop_daemon EXIT
 trap 'exit 130' INT TERM
 
-echo "== packages"
+echo "== packages (minutes where many are missing)"
 ./deploy/install-packages
 
-echo "== build"
+echo "== build (a minute or more the first time; log: $out/build.log)"
 cmake -S . -B build/release -DCMAKE_BUILD_TYPE=Release >"$out/configure.log" || { cat "$out/configure.log"; exit 1; }
 cmake --build build/release -j "$(nproc)" --target lambert lambertd >"$out/build.log" 2>&1 ||
     { tail -n 40 "$out/build.log"; exit 1; }
@@ -54,7 +54,8 @@ fi
 store=$out/$(basename "${scene%.*}").h5
 
 echo "== precompute"
-echo "lambert precompute $scene -o $store ${how[*]}"
+printf '%q ' lambert precompute "$scene" -o "$store" "${how[@]}"
+echo
 "$lambert" precompute "$scene" -o "$store" "${how[@]}"
 
 echo "== daemon"

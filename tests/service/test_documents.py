@@ -23,7 +23,7 @@ DOCUMENTS = [path.resolve() for path in (ROOT / "README.md", *sorted(MANUAL.glob
 LAMBERT, LAMBERTD = os.environ["LAMBERT"], os.environ["LAMBERTD"]
 PORT_IN_DOCUMENTS = "127.0.0.1:8317"
 # Options of other programs that the documents name.
-FOREIGN = {"--once", "--data-binary", "--fail-with-body", "--target", "--build", "--prefix", "--cflags", "--libs", "--install", "--preset", "--static"}
+FOREIGN = {"--once", "--data-binary", "--fail-with-body", "--target", "--build", "--prefix", "--cflags", "--libs", "--install", "--preset", "--static", "--test-dir"}
 
 
 def blocks(document):
@@ -134,6 +134,14 @@ class Documents(unittest.TestCase):
                         found += 1
                         self.assertTrue(command in runs, f"{document.name}: nothing runs {command}")
         self.assertGreater(found, 1)
+
+    def test_presets_are_named(self):
+        presets = json.loads((ROOT / "CMakePresets.json").read_text())["configurePresets"]
+        text = (MANUAL / "developing.md").read_text()
+        names = [preset["name"] for preset in presets if not preset.get("hidden")]
+        self.assertGreater(len(names), 5)
+        for name in names:
+            self.assertRegex(text, rf"`(cmake --preset )?{name}`", f"developing.md does not name the preset {name}")
 
     def test_readme_is_short(self):
         self.assertLessEqual(len((ROOT / "README.md").read_text().splitlines()), 200)
