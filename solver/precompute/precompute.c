@@ -41,6 +41,10 @@ static void log_stage(precompute_state *state, const char *stage, double started
     terminal_log_stage(state->t, stage, clock_seconds() - started);
 }
 
+/* Above this share of leaving light the faces of a room are likely to look outward: a city of 500 elements
+ * loses .71. */
+static const double outward_share = .9;
+
 static void log_form_factors(precompute_state *state) {
     const form_factors *f = &state->f;
     char how[64];
@@ -50,6 +54,11 @@ static void log_form_factors(precompute_state *state) {
                  "%.2g on average, at most %.2g",
                  how, 100 * f->leaving_share, f->closed ? " (closed)" : "", 100 * f->absorbed_share,
                  f->repair_mean, f->repair_max);
+    if (f->leaving_share > outward_share && !state->m.two_sided)
+        terminal_log(
+            state->t,
+            "nearly all light leaves the scene; if this is a room, its faces look outward: turn them, or "
+            "give --two-sided");
     if (f->pairs.accuracy > recipe_accuracy(&f->recipe))
         terminal_log(state->t,
                      "many pairs are partly hidden: their factors have a standard error of %.2g, not %.2g; "

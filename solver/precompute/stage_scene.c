@@ -44,9 +44,11 @@ lam_status stage_load_scene(precompute_state *state, lam_error *error) {
     TRY(scene_import(o->input, &how, &state->m, &report, error));
     log_warnings(state->t, report.warnings);
     if (report.dropped_faces > 0)
-        terminal_log(state->t, "%zu faces of zero area were dropped", report.dropped_faces);
+        terminal_log(state->t, "%zu face%s of zero area dropped", report.dropped_faces,
+                     report.dropped_faces == 1 ? "" : "s");
     if (report.clamped > 0)
-        terminal_log(state->t, "%zu materials reflected all light or more: set below 1", report.clamped);
+        terminal_log(state->t, "%zu material%s reflected all light or more: set below 1", report.clamped,
+                     report.clamped == 1 ? "" : "s");
 done:
     return status;
 }

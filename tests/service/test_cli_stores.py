@@ -69,6 +69,15 @@ class Stores(Case):
         said = must("precompute", room, *quick, "--up", "y", "--unit", .001, "--elements", 24).stderr
         self.assertIn("\n0.004 m x 0.0025 m, 0.003 m high, y up", said)
         self.assertNotIn(coarse, said)
+        # Turned inside out, as a modeller's cube is, the room loses all light, and the log says why.
+        outward = "its faces look outward: turn them"
+        self.assertNotIn(outward, said)
+        with open(room, encoding="ascii") as file:
+            lines = file.read().splitlines()
+        with open(room, "w", encoding="ascii") as file:
+            file.write("\n".join("f " + " ".join(reversed(line.split()[1:])) if line[0] == "f" else line for line in lines) + "\n")
+        self.assertIn(outward, must("precompute", room, *quick).stderr)
+        self.assertNotIn(outward, must("precompute", room, *quick, "--two-sided").stderr)
         # A mesh that is fine already needs no advice: each of 96 faces has 1 %.
         self.assertNotIn(coarse, must("precompute", self.box, *quick).stderr)
 
