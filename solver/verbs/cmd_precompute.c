@@ -56,6 +56,13 @@ static bool same_file(const char *a, const char *b) {
            of_a.st_ino == of_b.st_ino;
 }
 
+/* True where a store would replace a file of another kind: a scene or a picture after a slip of the hand. */
+static bool is_other_file(const char *path) {
+    struct stat about;
+    return stat(path, &about) == 0 && S_ISREG(about.st_mode) && about.st_size > 0 &&
+           !precompute_takes_as_store(path);
+}
+
 /* The command line as one text that a shell would read the same way; the caller frees. */
 static char *command_line(int argc, char **argv) {
     size_t length = 32;
@@ -108,6 +115,10 @@ static int check_together(const precompute_options *o, const option_result *give
         return options_usage(command.name, "--resolution %" PRIu64 ": must be even", o->resolution);
     if (!o->from_store && same_file(o->input, o->output))
         return options_usage(command.name, "-o %s: is the scene itself", o->output);
+    if (is_other_file(o->output))
+        return options_usage(command.name,
+                             "-o %s: there is a file that is not a store; give another name or remove it",
+                             o->output);
     return 0;
 }
 

@@ -171,6 +171,18 @@ class Files(Case):
             os.makedirs(self.path(verb + name))
             self.refused(1, "is a directory", verb, source, "-o", self.path(verb + name), *light)
         self.refused(2, "is the scene itself", "precompute", self.box, "-o", self.box)
+        other = self.path("other.obj")
+        shutil.copy(self.box, other)
+        self.refused(2, "other.obj: there is a file that is not a store", "precompute", self.box, "-o", other)
+        with open(self.box, "rb") as one, open(other, "rb") as two:
+            self.assertEqual(one.read(), two.read())
+        # A store may be replaced whatever its name, and so may an empty file.
+        for name in "kept", "new":
+            if name == "kept":
+                shutil.copy(self.store, self.path(name))
+            else:
+                open(self.path(name), "wb").close()
+            must("precompute", self.box, "-o", self.path(name), "--rays", 64, "--probes", 0)
 
     @unittest.skipIf(os.geteuid() == 0, "root may write anywhere")
     def test_unwritable_directory(self):
