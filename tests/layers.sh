@@ -36,6 +36,7 @@ declare -A allowed=(
     [solver/formfactor/visibility]="$formfactor"
     [solver/formfactor/rows]="$formfactor solver/formfactor/visibility/"
     [solver/formfactor/pairs]="$formfactor solver/formfactor/visibility/ solver/formfactor/rows/"
+    [solver/formfactor/blocks]="$formfactor solver/formfactor/visibility/ solver/formfactor/pairs/"
     [solver/formfactor/rays]="$formfactor solver/formfactor/visibility/ solver/formfactor/rows/ solver/formfactor/pairs/"
     [solver/walk]="lambert/ solver/base/ solver/scene/mesh.h solver/formfactor/leaving.h solver/formfactor/visibility/"
     [solver/method]="$operator"
@@ -54,7 +55,7 @@ declare -A allowed=(
     [server/route]="$operator solver/codec/ server/net/ server/queue/ server/scene/ server/config.h"
     [server/http]="$operator solver/codec/ server/net/ server/queue/ server/scene/ server/route/ server/config.h"
     [server]="$operator solver/codec/ server/"
-    [tests/bench]="lambert/ store/ solver/ server/"
+    [tests/bench]="lambert/ store/ solver/ server/ support/"
 )
 
 # third-party header: the only files or folders that may include it

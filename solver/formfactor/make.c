@@ -2,6 +2,7 @@
 #include "solver/formfactor/formfactor.h"
 
 #include "solver/base/clock.h"
+#include "solver/formfactor/blocks/blocks.h"
 #include "solver/formfactor/leaving.h"
 #include "solver/formfactor/pairs/pairs.h"
 #include "solver/formfactor/rays/hemicube.h"
@@ -142,6 +143,8 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
     case RECIPE_NEAR_PAIRS:
         TRY(make_by_near_pairs(m, v, order, options, &f, error));
         break;
+    case RECIPE_BLOCKS:
+        FAIL(error, LAM_ERR_ARGUMENT, "blocks of form factors are no rows; give another --form-factors");
     }
     if (asked->sky != NULL) TRY(leaving_to_sky(&f, m->n, error));
     if (!options->upper) TRY(form_factors_expand(&f, m->area, error));
@@ -149,6 +152,94 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
     f = (form_factors){0};
 done:
     visibility_destroy(v);
+    form_factors_free(&f);
+    return status;
+}
+
+/* Sweeps of the balance: each takes most of what is left of the row sums' error. */
+enum { SWEEPS = 8 };
+
+/* F' = D F D with rows that sum to 1 in a closed scene, and to at most 1 in others: D := D / s^1/2, s the row
+ * sums. Sets the row sums of f, and how much they were repaired. */
+static lam_status balance_blocks(const mesh *m, form_factors *f, block_factors *blocks, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = m->n;
+    const bool closed = leaving_nothing(f);
+    double *ones = memory_allocate(n, sizeof *ones, "form factors", error), area = 0;
+    double *sums = memory_allocate(n, sizeof *sums, "form factors", error);
+    blocks->balance = memory_allocate(n, sizeof *blocks->balance, "form factors", error);
+    f->row_sums = memory_allocate(n, sizeof *f->row_sums, "form factors", error);
+    if (ones == NULL || sums == NULL || blocks->balance == NULL || f->row_sums == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t p = 0; p < n; p++) ones[p] = blocks->balance[p] = 1;
+    for (int sweep = 0; sweep <= SWEEPS; sweep++) {
+        TRY(block_factors_multiply(blocks, 1, ones, sums, error));
+        for (size_t p = 0; sweep == 0 && p < n; p++) {
+            const double off = fabs(sums[p] - (closed ? 1 : fmin(sums[p], 1)));
+            area += blocks->area[p];
+            f->repair_mean += blocks->area[p] * off;
+            f->repair_max = fmax(f->repair_max, off);
+        }
+        for (size_t p = 0; sweep < SWEEPS && p < n; p++)
+            if (sums[p] > 0 && (closed || sums[p] > 1)) blocks->balance[p] /= sqrt(sums[p]);
+    }
+    f->repair_mean /= area;
+    f->repair_products = SWEEPS + 1;
+    for (size_t p = 0; p < n; p++) {
+        f->row_sums[blocks->order[p]] = fmin(sums[p], 1);
+        if (closed) f->closure_error = fmax(f->closure_error, fabs(sums[p] - 1));
+    }
+done:
+    free(ones);
+    free(sums);
+    return status;
+}
+
+lam_status form_factors_tree(const mesh *m, plane_tree *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    double(*centre)[3] = memory_allocate(m->n, sizeof *centre, "centroids", error);
+    if (centre == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < m->n; i++) mesh_centroid(m, i, centre[i]);
+    TRY(plane_tree_make(m->n, (const double(*)[3])centre, (const float(*)[3])m->normal, PLANE_LEAF, out,
+                        error));
+done:
+    free(centre);
+    return status;
+}
+
+lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const plane_tree *tree, bool judge,
+                                    const form_factor_options *options, form_factors *out,
+                                    block_factors *blocks, lam_error *error) {
+    lam_status status = LAM_OK;
+    const recipe *r = &options->recipe;
+    form_factors f = {.recipe = *r};
+    block_factors made = {.n = 0};
+    packed_rows counts = {0};
+    visibility *v = NULL;
+    form_factor_options few = {.recipe = {.method = RECIPE_RAYS, .rays = r->rays, .seed = r->seed}};
+    const block_options how = {.open = r->accuracy,
+                               .shadow = recipe_shadow(r),
+                               .exact = recipe_tolerance(r),
+                               .by_scene = judge,
+                               .seed = r->seed,
+                               .progress = options->progress,
+                               .stage = options->stage};
+    TRY(recipe_check(r, error));
+    f.leaving = memory_allocate(m->n, sizeof *f.leaving, "form factors", error);
+    f.absorbed = memory_allocate(m->n, sizeof *f.absorbed, "form factors", error);
+    if (f.leaving == NULL || f.absorbed == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(visibility_create(m, &v, error));
+    TRY(rays_count(m, v, order, &few, &counts, f.leaving, f.absorbed, error));
+    leaving_measure(&f, m);
+    TRY(blocks_find(m, v, tree, &how, &made, &f.blocks, error));
+    TRY(balance_blocks(m, &f, &made, error));
+    *out = f;
+    *blocks = made;
+    f = (form_factors){0};
+    made = (block_factors){.n = 0};
+done:
+    packed_rows_free(&counts);
+    visibility_destroy(v);
+    block_factors_free(&made);
     form_factors_free(&f);
     return status;
 }

@@ -7,7 +7,7 @@
 
 enum { MIN_AUTO_RAYS = 256, MAX_AUTO_RAYS = 65536 };
 
-static const char *const method_names[] = {"rays", "hemicube", "pairs", "near-pairs"};
+static const char *const method_names[] = {"rays", "hemicube", "pairs", "near-pairs", "blocks"};
 enum { N_METHODS = sizeof method_names / sizeof method_names[0] };
 
 const recipe_names recipe_of_form_factors = {"/form_factors", "method", "seed"};
@@ -48,6 +48,9 @@ void recipe_describe(const recipe *r, char text[64]) {
     case RECIPE_NEAR_PAIRS:
         snprintf(text, 64, "near pairs to %.2g, %zu rays per element", recipe_accuracy(r), r->rays);
         break;
+    case RECIPE_BLOCKS:
+        snprintf(text, 64, "blocks of clusters to %.2g", r->accuracy);
+        break;
     }
 }
 
@@ -83,7 +86,7 @@ lam_status recipe_load(store *s, const recipe_names *names, recipe *out, lam_err
     TRY(store_get_integer(s, group, "rays", &rays, error));
     TRY(store_get_integer(s, group, names->seed, &seed, error));
     if (r.method == RECIPE_HEMICUBE) TRY(store_get_integer(s, group, "resolution", &resolution, error));
-    if (r.method == RECIPE_PAIRS || r.method == RECIPE_NEAR_PAIRS)
+    if (r.method != RECIPE_RAYS && r.method != RECIPE_HEMICUBE)
         TRY(store_get_number(s, group, "accuracy", &r.accuracy, error));
     r.rays = rays < 0 ? 0 : (size_t)rays;
     r.resolution = resolution < 0 ? 0 : (size_t)resolution;
@@ -109,6 +112,18 @@ double recipe_accuracy(const recipe *r) {
     return r->method == RECIPE_NEAR_PAIRS ? fmax(r->accuracy, .5 * recipe_near(r)) : r->accuracy;
 }
 
+double recipe_shadow(const recipe *r) {
+    /* Measured in a closed Cornell box: single elements, which feel shadows, and lamps then err alike. */
+    static const double shadow_share = 10. / 3;
+    return fmin(shadow_share * r->accuracy, 1);
+}
+
+size_t recipe_rays_beside_blocks(size_t n) {
+    enum { OF_ALL = 1 << 21, LEAST = 8 };
+    const size_t each = (OF_ALL / n + LEAST - 1) / LEAST * LEAST;
+    return each < LEAST ? LEAST : each > RECIPE_RAYS_FEW ? RECIPE_RAYS_FEW : each;
+}
+
 size_t recipe_auto_rays(double epsilon, double share) {
     /* sqrt(2 / rays) <= share epsilon */
     const double wanted = 2 / (share * epsilon * share * epsilon);
@@ -123,10 +138,14 @@ double recipe_noise(const recipe *r) {
     return r->method == RECIPE_RAYS || r->method == RECIPE_NEAR_PAIRS ? sqrt(2 / (double)r->rays) : 0;
 }
 
+/* Blocks of the judge: errors fall as the square root of this, or faster. */
+static const double judge_share = .25;
+
 recipe recipe_of_judge(const recipe *judged, size_t rays_beside_hemicubes, uint64_t seed) {
     recipe r = *judged;
     if (judged->method == RECIPE_HEMICUBE) r = (recipe){.method = RECIPE_RAYS, .rays = rays_beside_hemicubes};
     if (r.method == RECIPE_PAIRS && r.rays > RECIPE_RAYS_FEW) r.rays = RECIPE_RAYS_FEW;
+    if (r.method == RECIPE_BLOCKS) r.accuracy *= judge_share;
     r.seed = seed;
     return r;
 }

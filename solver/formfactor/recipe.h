@@ -5,13 +5,20 @@
 #include "store/status.h"
 #include "store/store.h"
 
-typedef enum recipe_method { RECIPE_RAYS, RECIPE_HEMICUBE, RECIPE_PAIRS, RECIPE_NEAR_PAIRS } recipe_method;
+typedef enum recipe_method {
+    RECIPE_RAYS,
+    RECIPE_HEMICUBE,
+    RECIPE_PAIRS,
+    RECIPE_NEAR_PAIRS,
+    RECIPE_BLOCKS
+} recipe_method;
 
 typedef struct recipe {
     recipe_method method;
-    size_t rays;       /* from every element; for pairs they only find the share that leaves the scene */
+    size_t rays; /* from every element; for pairs and blocks they only find the share that leaves the scene */
     size_t resolution; /* of a hemicube: pixels along its top, even; else 0 */
-    double accuracy;   /* of (near) pairs: standard error of the factor of a partly occluded pair; else 0 */
+    double accuracy;   /* of (near) pairs: standard error of the factor of a partly occluded pair; of blocks:
+                          bound of   the error of one in S, 2-norm; else 0 */
     uint64_t seed;     /* of all samples */
 } recipe;
 
@@ -20,7 +27,7 @@ enum { RECIPE_RAYS_MOST = 1 << 24, RECIPE_RESOLUTION_LEAST = 4, RECIPE_RESOLUTIO
 /* Rays beside pairs without a sky: they only find whether the scene is closed and has turned faces. */
 enum { RECIPE_RAYS_FEW = 256 };
 
-/* "rays", "hemicube", "pairs", "near-pairs" */
+/* "rays", "hemicube", "pairs", "near-pairs", "blocks" */
 const char *recipe_name(recipe_method method);
 
 /* LAM_ERR_ARGUMENT for a value out of bounds, naming the option. */
@@ -50,6 +57,12 @@ double recipe_tolerance(const recipe *r);
  * keeps a large element from being near to all the small ones that see it. */
 double recipe_near(const recipe *r);
 
+/* The bound of the 2-norm of a partly hidden block: its shadow is resolved down to this. */
+double recipe_shadow(const recipe *r);
+
+/* Rays beside the blocks of n elements: they only find whether the scene is closed and has turned faces. */
+size_t recipe_rays_beside_blocks(size_t n);
+
 /* The standard error of the factor of a partly occluded pair: accuracy, and for near pairs at least half of
  * 1/rays. An element has about ten of those, so that their variance is some hundredths of that of its rays.
  */
@@ -64,7 +77,7 @@ double recipe_noise(const recipe *r);
 
 /* The recipe of the independent sample that another one is judged by: the same with another seed. For
  * hemicubes, which would only repeat themselves, it is rays; for pairs it omits the rays that only a sky
- * needs. */
+ * needs; of blocks it asks for a quarter of the error. */
 recipe recipe_of_judge(const recipe *judged, size_t rays_beside_hemicubes, uint64_t seed);
 
 #endif

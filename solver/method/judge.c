@@ -2,7 +2,7 @@
 
 #include "solver/base/clock.h"
 #include "solver/base/random.h"
-#include "solver/method/reference.h"
+#include "solver/method/guided_reference.h"
 #include "solver/operator/emitters.h"
 
 #include <math.h>
@@ -12,9 +12,6 @@
 
 /* Probes of random emission, and probes of a group by which the reference's own noise is measured. */
 enum { RANDOM_PROBES = 8, NOISE_PROBES = 32 };
-
-/* Residual at which a reference counts as converged: four digits below the smallest error worth printing. */
-static const double reference_tolerance = 1e-8;
 
 /* Indirect light below this share of all light counts as none: no ray found what the element sees, and the
  * rest is the remainder of the reference's iteration. */
@@ -182,6 +179,7 @@ static void add_first_light(const judge_input *input, const factor_product *F, c
 
 /* The probes which[] that a reference solves, and the shares of the judge's work before and after it. */
 typedef struct reference_job {
+    const lam_operator *op;
     const factor_product *F;
     const probes *p;
     const size_t *which; /* [m] */
@@ -210,7 +208,7 @@ static lam_status each_reference(const judge_input *input, const reference_job *
             TRY(reference_emission(input, F, p, which[v], c, E + v * n, B + v * n, scratch, error));
         if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         TRY(reference_create_of(F, problem->area, problem->reflectance + c * n, REFERENCE_AUTO, &r, error));
-        TRY(reference_solve(r, m, E, B, reference_tolerance, input->progress, error));
+        TRY(guided_reference_solve(r, F, job->op, c, m, E, B, input->progress, error));
         reference_destroy(r);
         r = NULL;
         for (size_t v = 0; v < m; v++) add_first_light(input, F, p, which[v], c, B + v * n);
@@ -260,13 +258,13 @@ static void finish_figure(error_figures *f, size_t count) {
 
 /* Relative and indirect figures of each group against one F: those of the total error, or of the operator's.
  */
-static lam_status figures_against(const judge_input *input, const factor_product *F, probes *p,
-                                  error_group *groups[N_GROUPS], bool total, lam_error *error) {
+static lam_status figures_against(const lam_operator *op, const judge_input *input, const factor_product *F,
+                                  probes *p, error_group *groups[N_GROUPS], bool total, lam_error *error) {
     lam_status status = LAM_OK;
     comparison c = {input->problem, p};
     const double share = input->independent.n == 0 ? 1 : 1. / 3;
     size_t *all = memory_allocate(p->m, sizeof *all, "probes", error);
-    const reference_job job = {F, p, all, p->m, total ? share : 0, total ? 2 * share : share};
+    const reference_job job = {op, F, p, all, p->m, total ? share : 0, total ? 2 * share : share};
     if (all == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t v = 0; v < p->m; v++) all[v] = v;
     memset(p->B_norm, 0, p->m * sizeof *p->B_norm);
@@ -321,8 +319,8 @@ static double half_distance(const build_problem *problem, const float *E, const 
     return indirect > dark * dark * all ? sqrt(difference / indirect) : -1;
 }
 
-static lam_status measure_noise(const judge_input *input, const probes *p, error_group *groups[N_GROUPS],
-                                lam_error *error) {
+static lam_status measure_noise(const lam_operator *op, const judge_input *input, const probes *p,
+                                error_group *groups[N_GROUPS], lam_error *error) {
     lam_status status = LAM_OK;
     const build_problem *problem = input->problem;
     const size_t vector = problem->n_channels * problem->n;
@@ -335,7 +333,7 @@ static lam_status measure_noise(const judge_input *input, const probes *p, error
     for (int h = 0; h < 2; h++) {
         half[h].B = memory_allocate(m, vector * sizeof *half[h].B, "reference noise", error);
         if (half[h].B == NULL) TRY(LAM_ERR_MEMORY);
-        const reference_job job = {&input->halves[h], p, which, m, (4. + h) / 6, (5. + h) / 6};
+        const reference_job job = {op, &input->halves[h], p, which, m, (4. + h) / 6, (5. + h) / 6};
         TRY(each_reference(input, &job, keep_half, &half[h], error));
     }
     size_t v = 0;
@@ -457,11 +455,11 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     progress_report(input->progress, "judge", 0);
     TRY(apply(op, &p, LAM_RADIOSITY, p.B, error));
     TRY(physics(op, input, &p, groups, error));
-    TRY(figures_against(input, &input->own, &p, groups, false, error));
+    TRY(figures_against(op, input, &input->own, &p, groups, false, error));
     if (input->independent.n > 0) {
         TRY(find_first_light(input, &p, error));
-        TRY(figures_against(input, &input->independent, &p, groups, true, error));
-        if (input->halves[0].n > 0) TRY(measure_noise(input, &p, groups, error));
+        TRY(figures_against(op, input, &input->independent, &p, groups, true, error));
+        if (input->halves[0].n > 0) TRY(measure_noise(op, input, &p, groups, error));
     }
     progress_report(input->progress, "judge", 1);
     found.has_total = input->independent.n > 0;

@@ -13,11 +13,17 @@ static inline bool bench_recipe(const char *text, uint64_t seed, recipe *out) {
     const bool near = strncmp(text, "near:", 5) == 0;
     *out = (recipe){
         .method = near ? RECIPE_NEAR_PAIRS : RECIPE_RAYS, .seed = seed, .accuracy = near ? normal : 0};
-    if (strcmp(text, "pairs") == 0)
+    if (strcmp(text, "pairs") == 0 || strncmp(text, "pairs@", 6) == 0)
         *out = (recipe){.method = RECIPE_PAIRS, .rays = 256, .seed = seed, .accuracy = normal};
     else
         out->rays = strtoull(near ? text + 5 : text, NULL, 10);
     return out->rays > 0;
+}
+
+/* The file after an @, NULL: none. */
+static inline const char *bench_recipe_file(const char *text) {
+    const char *at = strchr(text, '@');
+    return at != NULL ? at + 1 : NULL;
 }
 
 #endif

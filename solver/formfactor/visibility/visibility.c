@@ -139,6 +139,10 @@ void visibility_destroy(visibility *v) {
     free(v);
 }
 
+const facets *visibility_facets(const visibility *v) {
+    return &v->facets;
+}
+
 void visibility_recentre(const visibility *v, const double point[3], float recentred[3]) {
     for (int d = 0; d < 3; d++) recentred[d] = (float)(point[d] - v->centre[d]);
 }

@@ -3,7 +3,7 @@
 #ifndef LAMBERT_FORMFACTOR_VISIBILITY_VISIBILITY_H
 #define LAMBERT_FORMFACTOR_VISIBILITY_VISIBILITY_H
 
-#include "solver/scene/mesh.h"
+#include "solver/scene/facet/facets.h"
 
 typedef struct visibility visibility;
 
@@ -39,6 +39,9 @@ void visibility_recentre(const visibility *v, const double point[3], float recen
 /* The same for a packet of points. */
 void visibility_recentre_packet(const visibility *v, const double points[3][VISIBILITY_PACKET],
                                 float recentred[3][VISIBILITY_PACKET]);
+
+/* The primitives. */
+const facets *visibility_facets(const visibility *v);
 
 /* The distance, in metres, by which single precision may move a point of the scene. */
 double visibility_rounding(const visibility *v);

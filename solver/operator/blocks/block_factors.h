@@ -6,6 +6,7 @@
 #ifndef LAMBERT_OPERATOR_BLOCKS_BLOCK_FACTORS_H
 #define LAMBERT_OPERATOR_BLOCKS_BLOCK_FACTORS_H
 
+#include "solver/linalg/factor_product.h"
 #include "solver/operator/blocks/plane_tree.h"
 
 /* 1, u, v */
@@ -78,5 +79,8 @@ lam_status block_factors_end(block_factors *f, lam_error *error);
  * threads. Errors: LAM_ERR_MEMORY. */
 lam_status block_factors_multiply(const block_factors *f, size_t n_vectors, const double *x, double *y,
                                   lam_error *error);
+
+/* Products in mesh order, balance included. f must outlive it. */
+factor_product block_factors_product(const block_factors *f);
 
 #endif

@@ -180,3 +180,23 @@ done:
     free(p.down);
     return status;
 }
+
+static lam_status multiply_in_mesh_order(const void *context, size_t m, const double *x, double *y,
+                                         lam_error *error) {
+    lam_status status = LAM_OK;
+    const block_factors *f = context;
+    double *in = memory_allocate(f->n, m * sizeof *in, "blocks", error);
+    double *out = memory_allocate(f->n, m * sizeof *out, "blocks", error);
+    if (in == NULL || out == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t p = 0; p < f->n; p++) memcpy(in + p * m, x + f->order[p] * m, m * sizeof *in);
+    TRY(block_factors_multiply(f, m, in, out, error));
+    for (size_t p = 0; p < f->n; p++) memcpy(y + f->order[p] * m, out + p * m, m * sizeof *out);
+done:
+    free(in);
+    free(out);
+    return status;
+}
+
+factor_product block_factors_product(const block_factors *f) {
+    return (factor_product){.n = f->n, .multiply = multiply_in_mesh_order, .context = f};
+}

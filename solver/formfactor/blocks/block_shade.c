@@ -1,0 +1,85 @@
+#include "solver/formfactor/blocks/block_shade.h"
+
+#include "solver/formfactor/visibility/sample.h"
+
+#include <math.h>
+
+/* Both ends of the segments. */
+typedef struct segment_ends {
+    double from[SEGMENT_LANES][3], to[SEGMENT_LANES][3];
+    uint32_t elements[2][SEGMENT_LANES];
+} segment_ends;
+
+/* A point of a node by (u, v) in the unit square. Its element is set only where it is asked for. */
+static void take_point(const flat_clusters *f, uint32_t node, const double at[2], bool element_too,
+                       double place[2], double point[3], uint32_t *element) {
+    if (f->of[node].full && !element_too) {
+        for (int k = 0; k < 2; k++) place[k] = 2 * at[k] - 1;
+        flat_cluster_point(f, node, place[0], place[1], point);
+        return;
+    }
+    *element = flat_cluster_sample(f, node, at[0], at[1], place, point);
+}
+
+/* Bits of the segments that Embree finds blocked. */
+static void block_by_scene(const visibility *v, const segment_ends *ends, seen_segment *out) {
+    for (size_t first = 0; first < SEGMENT_LANES; first += VISIBILITY_PACKET) {
+        ray_packet packet;
+        for (size_t k = 0; k < VISIBILITY_PACKET; k++) {
+            float from[3], to[3];
+            visibility_recentre(v, ends->from[first + k], from);
+            visibility_recentre(v, ends->to[first + k], to);
+            for (int d = 0; d < 3; d++) {
+                packet.origin[d][k] = from[d];
+                packet.direction[d][k] = to[d] - from[d];
+            }
+        }
+        const unsigned blocked = visibility_blocked(v, &packet, VISIBILITY_PACKET, &ends->elements[0][first],
+                                                    &ends->elements[1][first]);
+        for (size_t k = 0; k < VISIBILITY_PACKET; k++) out[first + k].seen = (blocked >> k & 1) ? 0 : 1;
+    }
+}
+
+static void block_by_candidates(const shade_scene *s, const double origin[3], const candidates *among,
+                                const segment_ends *ends, seen_segment *out) {
+    segment_lanes lanes;
+    float blocked[SEGMENT_LANES];
+    for (int k = 0; k < SEGMENT_LANES; k++)
+        for (int d = 0; d < 3; d++) {
+            lanes.from[d][k] = (float)(ends->from[k][d] - origin[d]);
+            lanes.to[d][k] = (float)(ends->to[k][d] - origin[d]);
+        }
+    occluders_block(s->occluders, among, origin, &lanes, blocked);
+    for (int k = 0; k < SEGMENT_LANES; k++) out[k].seen = 1 - (double)blocked[k];
+}
+
+void shade_segments(const shade_scene *s, uint32_t a, uint32_t b, const candidates *among, size_t first,
+                    seen_segment out[SEGMENT_LANES], double *kernel) {
+    const flat_clusters *f = s->f;
+    const bool by_scene = among->count == OCCLUDERS_UNKNOWN;
+    segment_ends ends = {.elements = {{0}}};
+    pair_sampler sampler;
+    pair_sampler_init(&sampler, s->seed, a, b);
+    for (size_t k = 0; k < SEGMENT_LANES; k++) {
+        double at[4];
+        pair_sampler_place(&sampler, (uint32_t)(first + k), at);
+        take_point(f, a, at, by_scene, out[k].place, ends.from[k], &ends.elements[0][k]);
+        take_point(f, b, at + 2, by_scene, out[k].place + 2, ends.to[k], &ends.elements[1][k]);
+    }
+    if (by_scene)
+        block_by_scene(s->v, &ends, out);
+    else
+        block_by_candidates(s, f->of[a].centre, among, &ends, out);
+    if (kernel == NULL) return;
+    const double *normals[2] = {f->planes[f->of[a].plane].normal, f->planes[f->of[b].plane].normal};
+    for (int k = 0; k < SEGMENT_LANES; k++) {
+        double r2 = 0, leaving = 0, arriving = 0;
+        for (int d = 0; d < 3; d++) {
+            const double r = ends.to[k][d] - ends.from[k][d];
+            r2 += r * r;
+            leaving += r * normals[0][d];
+            arriving -= r * normals[1][d];
+        }
+        kernel[k] = leaving > 0 && arriving > 0 ? leaving * arriving / (r2 * r2) : 0;
+    }
+}

@@ -1,0 +1,33 @@
+/* Form factors by blocks of clusters (Hanrahan, Salzman and Aupperle 1991; in wavelets Gortler et al. 1993):
+ * the two trees of a pair of clusters are descended until the light between them is smooth enough, or so
+ * little that it does not matter how it is distributed. */
+#ifndef LAMBERT_FORMFACTOR_BLOCKS_BLOCKS_H
+#define LAMBERT_FORMFACTOR_BLOCKS_BLOCKS_H
+
+#include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/visibility/visibility.h"
+
+typedef struct block_options {
+    double
+        open; /* of blocks that nothing crosses: bound of the 2-norm of their error in S = A^1/2 F A^-1/2 */
+    double shadow; /* of partly hidden blocks: bound of their own 2-norm */
+    double exact;  /* of single pairs, unoccluded: relative tolerance */
+    bool by_scene; /* segments are cast against the whole scene by Embree, also where few pieces stand between
+                    */
+    uint64_t seed; /* of visibility segments */
+    const progress *progress;
+    const char *stage;
+} block_options;
+
+/* Finds the blocks of all pairs of planes of a tree. Visible shares come from segments against the occluders
+ * in between, or from Embree where these are many, and from nothing where none is. The bits do not depend on
+ * the number of threads: segments are seeded by the pair of clusters. report may be NULL. out is freed by
+ * block_factors_free.
+ *
+ * Cost: blocks grow like n^1/2 in rooms of large planes; partly hidden ones do not grow with n (measured).
+ * Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+lam_status blocks_find(const mesh *m, const visibility *v, const plane_tree *tree,
+                       const block_options *options, block_factors *out, block_report *report,
+                       lam_error *error);
+
+#endif

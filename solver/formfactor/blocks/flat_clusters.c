@@ -1,0 +1,178 @@
+#include "solver/formfactor/blocks/flat_clusters.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Nothing shorter than this share of the extent of the scene is a distance. */
+static const double least_length = 1e-7;
+/* A rectangle is full where its elements leave out no more than this share. */
+static const double same_area = 1e-6;
+
+void flat_clusters_free(flat_clusters *f) {
+    free(f->of);
+    free(f->planes);
+    free(f->before);
+    *f = (flat_clusters){.m = NULL};
+}
+
+static double dot3(const double *a, const double *b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void set_plane(const plane_frame *frame, flat_plane *p) {
+    for (int d = 0; d < 3; d++) {
+        p->origin[d] = frame->origin[d];
+        for (int k = 0; k < 2; k++) p->axis[k][d] = frame->axis[k][d];
+        const int e = (d + 1) % 3, g = (d + 2) % 3;
+        p->normal[d] = frame->axis[0][e] * frame->axis[1][g] - frame->axis[0][g] * frame->axis[1][e];
+    }
+    p->level = dot3(p->normal, p->origin);
+}
+
+typedef struct rectangle {
+    double low[2], high[2];
+} rectangle;
+
+static rectangle of_element(const mesh *m, uint32_t element, const flat_plane *p) {
+    rectangle r = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
+    for (size_t c = 0; c < mesh_corners(m, element); c++)
+        for (int k = 0; k < 2; k++) {
+            const double at =
+                dot3(p->axis[k], m->vertices[m->elements[element][c]]) - dot3(p->axis[k], p->origin);
+            r.low[k] = fmin(r.low[k], at);
+            r.high[k] = fmax(r.high[k], at);
+        }
+    return r;
+}
+
+static rectangle joined(const rectangle *a, const rectangle *b) {
+    return (rectangle){{fmin(a->low[0], b->low[0]), fmin(a->low[1], b->low[1])},
+                       {fmax(a->high[0], b->high[0]), fmax(a->high[1], b->high[1])}};
+}
+
+static void set_cluster(const flat_plane *p, const rectangle *r, double area, uint32_t plane,
+                        flat_cluster *out) {
+    *out = (flat_cluster){.area = area, .plane = plane};
+    double middle[2];
+    for (int k = 0; k < 2; k++) {
+        out->half[k] = .5 * (r->high[k] - r->low[k]);
+        middle[k] = .5 * (r->high[k] + r->low[k]);
+    }
+    for (int d = 0; d < 3; d++)
+        out->centre[d] = p->origin[d] + middle[0] * p->axis[0][d] + middle[1] * p->axis[1][d];
+    out->radius = hypot(out->half[0], out->half[1]);
+    out->full = area >= (1 - same_area) * 4 * out->half[0] * out->half[1];
+}
+
+/* The scene's largest extent times least_length. */
+static double slack_of(const mesh *m) {
+    double centre[3], radius;
+    mesh_bounds(m, centre, &radius);
+    return 2 * radius * least_length;
+}
+
+lam_status flat_clusters_make(const mesh *m, const plane_tree *tree, block_factors *blocks,
+                              flat_clusters *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = m->n, n_clusters = blocks->n_clusters, n_nodes = n_clusters + n;
+    flat_clusters f = {.m = m, .tree = blocks, .n_planes = tree->n_frames, .slack = slack_of(m)};
+    rectangle *bounds = memory_allocate(n_nodes, sizeof *bounds, "clusters", error);
+    f.of = memory_allocate(n_nodes, sizeof *f.of, "clusters", error);
+    f.planes = memory_allocate(f.n_planes, sizeof *f.planes, "clusters", error);
+    f.before = memory_allocate(n + 1, sizeof *f.before, "clusters", error);
+    if (bounds == NULL || f.of == NULL || f.planes == NULL || f.before == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < f.n_planes; k++) set_plane(&tree->frames[k], &f.planes[k]);
+    for (size_t p = 0; p < n; p++) f.before[p + 1] = f.before[p] + blocks->area[p];
+    for (size_t t = 0; t < n_clusters; t++) {
+        const plane_cluster *c = &tree->clusters[t];
+        block_node *node = &blocks->nodes[t];
+        if (c->frame == PLANE_ABOVE) {
+            f.of[t].plane = PLANE_ABOVE;
+            continue;
+        }
+        const flat_plane *plane = &f.planes[c->frame];
+        for (uint32_t p = c->begin; c->leaf && p < c->end; p++) {
+            const size_t own = n_clusters + p;
+            bounds[own] = of_element(m, blocks->order[p], plane);
+            bounds[t] = p == c->begin ? bounds[own] : joined(&bounds[t], &bounds[own]);
+            set_cluster(plane, &bounds[own], blocks->area[p], c->frame, &f.of[own]);
+        }
+        if (!c->leaf) bounds[t] = joined(&bounds[c->left], &bounds[t - 1]);
+        set_cluster(plane, &bounds[t], f.before[c->end] - f.before[c->begin], c->frame, &f.of[t]);
+        for (int k = 0; k < 2; k++) {
+            node->centre[k] = .5 * (bounds[t].low[k] + bounds[t].high[k]);
+            node->over[k] = f.of[t].half[k] > 0 ? 1 / f.of[t].half[k] : 0;
+        }
+    }
+    *out = f;
+    f = (flat_clusters){.m = NULL};
+done:
+    free(bounds);
+    flat_clusters_free(&f);
+    return status;
+}
+
+void flat_cluster_corners(const flat_clusters *f, uint32_t node, double corner[4][3]) {
+    static const double side[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+    for (int c = 0; c < 4; c++) flat_cluster_point(f, node, side[c][0], side[c][1], corner[c]);
+}
+
+void flat_cluster_point(const flat_clusters *f, uint32_t node, double u, double v, double point[3]) {
+    const flat_cluster *c = &f->of[node];
+    const flat_plane *p = &f->planes[c->plane];
+    for (int d = 0; d < 3; d++)
+        point[d] = c->centre[d] + u * c->half[0] * p->axis[0][d] + v * c->half[1] * p->axis[1][d];
+}
+
+double flat_cluster_distance(const flat_clusters *f, uint32_t node, const double point[3]) {
+    const flat_cluster *c = &f->of[node];
+    const flat_plane *p = &f->planes[c->plane];
+    const double away[3] = {point[0] - c->centre[0], point[1] - c->centre[1], point[2] - c->centre[2]};
+    const double u = fmax(fabs(dot3(away, p->axis[0])) - c->half[0], 0);
+    const double v = fmax(fabs(dot3(away, p->axis[1])) - c->half[1], 0), w = dot3(away, p->normal);
+    return sqrt(u * u + v * v + w * w);
+}
+
+/* The element below a node at which the given share of its area ends, and the rest of that share within it.
+ */
+static uint32_t element_at(const flat_clusters *f, uint32_t node, double share, double *rest) {
+    const block_node *range = &f->tree->nodes[node];
+    const double at = f->before[range->begin] + share * (f->before[range->end] - f->before[range->begin]);
+    uint32_t low = range->begin, high = range->end - 1;
+    while (low < high) {
+        const uint32_t middle = low + (high - low + 1) / 2;
+        if (f->before[middle] <= at)
+            low = middle;
+        else
+            high = middle - 1;
+    }
+    *rest = fmin(fmax((at - f->before[low]) / (f->before[low + 1] - f->before[low]), 0), 1);
+    return low;
+}
+
+/* The point of an element at (u, w) in the unit square, as polygon_point has it. */
+static void element_point(const mesh *m, uint32_t element, double u, double w, double point[3]) {
+    const uint32_t *v = m->elements[element];
+    const double *a = m->vertices[v[0]], *b = m->vertices[v[1]], *c = m->vertices[v[2]];
+    if (v[3] == MESH_NO_VERTEX) { /* the square folded along its diagonal */
+        const bool beyond = u + w > 1;
+        const double s = beyond ? 1 - u : u, t = beyond ? 1 - w : w;
+        for (int d = 0; d < 3; d++) point[d] = a[d] + s * (b[d] - a[d]) + t * (c[d] - a[d]);
+        return;
+    }
+    const double *e = m->vertices[v[3]];
+    for (int d = 0; d < 3; d++)
+        point[d] = (1 - w) * ((1 - u) * a[d] + u * b[d]) + w * ((1 - u) * e[d] + u * c[d]);
+}
+
+uint32_t flat_cluster_sample(const flat_clusters *f, uint32_t node, double u, double v, double place[2],
+                             double point[3]) {
+    const flat_cluster *c = &f->of[node];
+    const flat_plane *p = &f->planes[c->plane];
+    double along;
+    const uint32_t position = element_at(f, node, u, &along);
+    element_point(f->m, f->tree->order[position], along, v, point);
+    const double away[3] = {point[0] - c->centre[0], point[1] - c->centre[1], point[2] - c->centre[2]};
+    for (int k = 0; k < 2; k++) place[k] = c->half[k] > 0 ? dot3(away, p->axis[k]) / c->half[k] : 0;
+    return f->tree->order[position];
+}

@@ -1,0 +1,52 @@
+/* Rectangles about the clusters of elements of one plane, and about single elements: the geometry that form
+ * factors by blocks are found with. Nodes are numbered as in block_factors.h: clusters, then elements by
+ * position. */
+#ifndef LAMBERT_FORMFACTOR_BLOCKS_FLAT_CLUSTERS_H
+#define LAMBERT_FORMFACTOR_BLOCKS_FLAT_CLUSTERS_H
+
+#include "solver/formfactor/pairs/polygon.h"
+#include "solver/operator/blocks/block_factors.h"
+
+/* A plane: the points x with normal . x = level. Coordinates in it are (x - origin) . axis. */
+typedef struct flat_plane {
+    double origin[3], axis[2][3], normal[3], level;
+} flat_plane;
+
+typedef struct flat_cluster {
+    double centre[3], half[2]; /* of the rectangle, along the axes of its plane; radius: half its diagonal */
+    double radius, area;       /* area: that of its elements */
+    uint32_t plane;            /* PLANE_ABOVE: several planes, and nothing else here is set */
+    bool full;                 /* the elements fill the rectangle */
+} flat_cluster;
+
+typedef struct flat_clusters {
+    const mesh *m;
+    const block_factors *tree;
+    flat_cluster *of; /* [n_clusters + n] */
+    flat_plane *planes;
+    size_t n_planes;
+    double *before; /* [n + 1], the area of all elements before a position */
+    double slack;   /* metres: less than this is no distance */
+} flat_clusters;
+
+/* Measures all nodes, and widens nodes of blocks from the rectangles of centroids to those of the elements.
+ * mesh and blocks must outlive out. Cost: O(n log n). Errors: LAM_ERR_MEMORY. */
+lam_status flat_clusters_make(const mesh *m, const plane_tree *tree, block_factors *blocks,
+                              flat_clusters *out, lam_error *error);
+void flat_clusters_free(flat_clusters *f);
+
+/* The corners of the rectangle, in turn. */
+void flat_cluster_corners(const flat_clusters *f, uint32_t node, double corner[4][3]);
+
+/* The point at (u, v) in [-1, 1]^2 of the rectangle. */
+void flat_cluster_point(const flat_clusters *f, uint32_t node, double u, double v, double point[3]);
+
+/* The distance of a point from the rectangle. */
+double flat_cluster_distance(const flat_clusters *f, uint32_t node, const double point[3]);
+
+/* A point that is uniform over the area of the elements for (u, v) uniform in the unit square; its place in
+ * the rectangle, in [-1, 1]^2, and its element. */
+uint32_t flat_cluster_sample(const flat_clusters *f, uint32_t node, double u, double v, double place[2],
+                             double point[3]);
+
+#endif
