@@ -104,6 +104,8 @@ typedef struct build_method {
     bool (*is_asked)(const struct build_options *options, const void *own);
     /* The method's part in the choice of --method auto (choice.h); NULL: auto never takes it. */
     lam_status (*weigh)(const struct decision *so_far, void *own, struct candidate *out, lam_error *error);
+    /* METHOD_BLOCKS: the bound of the error of one block (recipe.accuracy) that suits the operator. */
+    double (*block_accuracy)(const void *own);
     /* Fills op (closed by the caller) and report. Errors: LAM_ERR_NUMERIC, _MEMORY, _CANCELLED, _ARGUMENT. */
     lam_status (*build)(const build_problem *problem, const build_options *options, const void *own,
                         lam_operator **op, build_report *report, lam_error *error);

@@ -42,6 +42,7 @@ forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n
 /* Rays cast from one element; a hemicube is a ray for each of its pixels. Bytes: of the rows
  * of a merged sample, of packed rows, of one tile of a sky, of the judge's two samples and their mean, of the
  * operator in the store. */
+double forecast_blocks(double n, const recipe *r);
 double forecast_rays(double n, const recipe *r);
 double forecast_rows_bytes(double n, const recipe *r);
 double forecast_packed_bytes(double n, const recipe *r);

@@ -6,11 +6,12 @@
 
 /* Processor seconds per pair, beside rays: packing, merging, some 30 sweeps, expanding; and of pair by pair.
  */
-static const double merge_seconds = 1.2e-7, pair_seconds = 4e-7;
+static const double merge_seconds = 1.2e-7, pair_seconds = 4e-7, block_seconds = 1.2e-6;
 
 static double sample_seconds(double n, const recipe *r, double rays_per_second, double n_threads) {
     const double pairs = n * n / 2;
     if (r->method == RECIPE_PAIRS) return pairs * pair_seconds / n_threads;
+    if (r->method == RECIPE_BLOCKS) return forecast_blocks(n, r) * block_seconds / n_threads;
     const double rays = forecast_rays(n, r), entries = fmin(pairs, n * rays);
     return n * rays / rays_per_second + entries * merge_seconds / n_threads;
 }

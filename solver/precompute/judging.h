@@ -1,5 +1,5 @@
-/* The error of an operator against two new samples of the form factors and their mean: the one procedure of
- * precompute and of verify. */
+/* The error of an operator against two new samples of the form factors and their mean, or, of blocks, against
+ * finer ones: the one procedure of precompute and of verify. */
 #ifndef LAMBERT_PRECOMPUTE_JUDGING_H
 #define LAMBERT_PRECOMPUTE_JUDGING_H
 
@@ -12,6 +12,7 @@ typedef struct judging {
     const uint32_t *order;
     const build_problem *problem; /* with the F that the operator was built from */
     const form_factors *f;        /* of problem: its recipe and row sums */
+    const plane_tree *tree;       /* of problem->blocks, where there are */
     recipe halves[2];             /* of the two samples */
     const char *scratch_names[2];
     const char *stages[2]; /* for progress */

@@ -27,6 +27,8 @@ void state_free(precompute_state *state) {
     free(state->surface);
     form_factors_free(&state->f);
     ray_rows_destroy(state->rays);
+    plane_tree_free(&state->tree);
+    block_factors_free(&state->blocks);
     compressed_free(&state->compressed);
     emitter_list_free(&state->emitters);
     scratch_close(state->scratch, false);
@@ -72,6 +74,7 @@ static void log_form_factors(precompute_state *state) {
                      100 * facing / all, 100 * f->pairs.certain / facing, 100 * f->pairs.open / facing,
                      100 * f->pairs.hidden / facing);
     }
+    state_log_blocks(state);
     const sky_bounce *sky = &f->sky;
     if (sky->first_bounce != NULL)
         terminal_log(state->t, "sky: %s, %zu tiles, ground albedo %g", sky->tiling.name, sky->tiling.n_tiles,
@@ -188,7 +191,9 @@ lam_status precompute_run(const precompute_options *options, const option_result
     TRY(announce(&state, error));
     if (!options->from_store) {
         started = clock_seconds();
-        TRY(state.streamed ? stage_near_pairs(&state, error) : stage_form_factors(&state, error));
+        TRY(state.recipe.method == RECIPE_BLOCKS ? stage_blocks(&state, error)
+            : state.streamed                     ? stage_near_pairs(&state, error)
+                                                 : stage_form_factors(&state, error));
         log_stage(&state, state.streamed ? "near pairs" : "form factors", started);
     }
     if (!state.streamed) log_form_factors(&state);

@@ -90,9 +90,13 @@ static const option_row form_factor_rows[] = {
     {.name = "form-factors",
      .kind = OPTION_CHOICE,
      .offset = FIELD(form_factors),
-     .preset = "rays",
-     .choices = "rays|hemicube",
-     .help = "Method that finds them"},
+     .preset = "auto",
+     .choices = "auto|rays|blocks|hemicube",
+     .help = "Method that finds them. rays: pairs of elements, near ones or all, and rays, as --quality "
+             "says. blocks: "
+             "clusters of elements at a time, for scenes of large planes. auto: blocks where they suit the "
+             "scene and "
+             "the operator, else rays"},
     {.name = "resolution",
      .kind = OPTION_COUNT,
      .offset = FIELD(resolution),

@@ -25,6 +25,8 @@ typedef struct precompute_state {
     bool holds;                    /* rows of F are needed whatever the method is */
     bool streamed;                 /* rows of F are found as the method asks for them; f has none */
     ray_rows *rays;                /* of these, until the operator is built */
+    plane_tree tree;               /* of the elements, once blocks are considered */
+    block_factors blocks;          /* the form factors where the recipe is blocks; f has no rows then */
     row_stream stream;             /* of rays */
     compressed_factors compressed; /* of f; n is 0 where they are kept as they are, or not */
     recipe recipe;                 /* of f */
@@ -68,6 +70,15 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error);
 
 /* Opens the folder for rows where one was given and is needed. */
 lam_status stage_open_scratch(precompute_state *state, lam_error *error);
+
+/* Blocks of form factors: false where options or the size of the scene rule them out; the recipe of blocks in
+ * place of that of state where the scene is one for them, or where they are asked for, with the method that
+ * is expected (final: nothing can change it); the stage; a line of the log: stage_blocks.c. */
+bool state_may_have_blocks(const precompute_state *state);
+lam_status state_choose_blocks(precompute_state *state, const build_method *method, bool final,
+                               lam_error *error);
+lam_status stage_blocks(precompute_state *state, lam_error *error);
+void state_log_blocks(const precompute_state *state);
 
 /* Form factors of a scene, or of a stream the near pairs alone: precompute.c. */
 lam_status stage_form_factors(precompute_state *state, lam_error *error);

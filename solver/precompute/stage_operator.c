@@ -33,7 +33,8 @@ lam_status state_problem(precompute_state *state, bool geometry, build_problem *
                                .n_channels = state->m.n_channels,
                                .area = state->m.area,
                                .reflectance = state->m.reflectance,
-                               .F = state->rays != NULL ? NULL : &f->F,
+                               .F = state->rays != NULL || state->blocks.n > 0 ? NULL : &f->F,
+                               .blocks = state->blocks.n > 0 ? &state->blocks : NULL,
                                .stream = state->rays != NULL ? &state->stream : NULL,
                                .order = state->order,
                                .noise = recipe_noise(&f->recipe)};
@@ -225,6 +226,7 @@ lam_status stage_judge(precompute_state *state, lam_error *error) {
                  .order = state->order,
                  .problem = &problem,
                  .f = &state->f,
+                 .tree = &state->tree,
                  .scratch_names = {"judge-1.rows", "judge-2.rows"},
                  .stages = {"form factors for the judge, 1 of 2", "form factors for the judge, 2 of 2"},
                  .scratch = state->scratch,

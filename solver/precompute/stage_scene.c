@@ -336,6 +336,8 @@ static void log_mesh(const precompute_state *state) {
 lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
+    const build_method *method;
+    bool final;
     /* --elements counts both sides. */
     const mesh_refinement refinement = {.subdivide_levels = (unsigned)o->subdivide,
                                         .max_edge = o->max_edge,
@@ -345,6 +347,10 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
         TRY(mesh_refine(&state->m, &refinement, error));
     if (o->two_sided) TRY(mesh_make_two_sided(&state->m, error));
     TRY(choose_recipe_that_fits(state, (double)state->m.n, error));
+    if (state_may_have_blocks(state)) {
+        TRY(expect_method(state, (double)state->m.n, 0, &method, &final, error));
+        TRY(state_choose_blocks(state, method, final, error));
+    }
     state->order = memory_allocate(state->m.n, sizeof *state->order, "the order of the elements", error);
     if (state->order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&state->m, state->order, error));

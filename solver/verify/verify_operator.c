@@ -238,24 +238,41 @@ static recipe recipe_again(const examination *e, const recipe *of, seed_purpose 
     return recipe_of_judge(of, judge_rays(e), precompute_seed(of->seed, half));
 }
 
-static lam_status measure_again(examination *e, const recipe *from, error_report *out, lam_error *error) {
+/* The form factors that the operator was built from, where the store does not keep them: rows in e, or
+ * blocks. */
+static lam_status find_again(examination *e, const recipe *from, const uint32_t *order, plane_tree *tree,
+                             block_factors *blocks, lam_error *error) {
     lam_status status = LAM_OK;
     const form_factor_options how = {.recipe = *from, .progress = e->progress, .stage = "form factors"};
+    if (e->f.F.indptr != NULL) return LAM_OK;
+    if (from->method != RECIPE_BLOCKS) return form_factors_make(&e->m, order, &how, &e->f, error);
+    TRY(form_factors_tree(&e->m, tree, error));
+    TRY(form_factors_make_blocks(&e->m, order, tree, false, &how, &e->f, blocks, error));
+done:
+    return status;
+}
+
+static lam_status measure_again(examination *e, const recipe *from, error_report *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    plane_tree tree = {.n = 0};
+    block_factors blocks = {.n = 0};
     uint32_t *order = memory_allocate(e->m.n, sizeof *order, "the order of the elements", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&e->m, order, error));
-    if (e->f.F.indptr == NULL) TRY(form_factors_make(&e->m, order, &how, &e->f, error));
+    TRY(find_again(e, from, order, &tree, &blocks, error));
     const build_problem problem = {.n = e->m.n,
                                    .n_channels = e->m.n_channels,
                                    .area = e->m.area,
                                    .reflectance = e->m.reflectance,
-                                   .F = &e->f.F,
+                                   .F = blocks.n > 0 ? NULL : &e->f.F,
+                                   .blocks = blocks.n > 0 ? &blocks : NULL,
                                    .order = order};
     const judging j = {
         .m = &e->m,
         .order = order,
         .problem = &problem,
         .f = &e->f,
+        .tree = &tree,
         .halves = {recipe_again(e, from, SEED_VERIFY_FIRST), recipe_again(e, from, SEED_VERIFY_SECOND)},
         .stages = {"form factors", "form factors"},
         .probes_seed = precompute_seed(from->seed, SEED_VERIFY_PROBES),
@@ -264,6 +281,8 @@ static lam_status measure_again(examination *e, const recipe *from, error_report
         .progress = e->progress};
     TRY(judging_run(&j, e->op, out, error));
 done:
+    plane_tree_free(&tree);
+    block_factors_free(&blocks);
     free(order);
     return status;
 }

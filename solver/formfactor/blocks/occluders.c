@@ -136,7 +136,7 @@ typedef struct hull {
 } hull;
 
 /* Planes through an edge of one rectangle and a corner of the other one with both rectangles on one side.
- * Those that are found twice or more stand there as often, as far as there is room. */
+ * A plane that is found several times stands there as often, as far as there is room. */
 static void make_hull(const double corner[2][4][3], double slack, hull *out) {
     out->n = 0;
     for (int side = 0; side < 2; side++)

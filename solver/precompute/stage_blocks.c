@@ -1,0 +1,102 @@
+/* Form factors by blocks of clusters: whether a scene is one for them, and the stage that finds them. */
+#include "solver/precompute/precompute_state.h"
+
+#include <string.h>
+
+/* Elements of a plane, on average, from which on clusters of it take part in most of the light. A city of
+ * houses has 6, a furnished room of triangles 1 to 2, rooms of walls 100 and more. */
+static const double elements_of_plane = 32;
+/* With fewer elements all methods are weighed by rows that cost little. */
+enum { ELEMENTS_LEAST = 4096 };
+/* All pairs of planes are visited. */
+enum { PLANES_MOST = 4096 };
+
+bool state_may_have_blocks(const precompute_state *state) {
+    const precompute_options *o = state->options;
+    const bool asked = strcmp(o->form_factors, "blocks") == 0;
+    if (o->from_store || state->holds || !(asked || strcmp(o->form_factors, "auto") == 0)) return false;
+    if (asked) return true;
+    return o->sky == NULL && !state_keeps(o) && o->scratch == NULL && o->emitters == NULL &&
+           o->rays == OPTION_AUTO && strcmp(o->quality, "draft") != 0 && state->m.n >= ELEMENTS_LEAST;
+}
+
+static lam_status make_tree(precompute_state *state, lam_error *error) {
+    return state->tree.n > 0 ? LAM_OK : form_factors_tree(&state->m, &state->tree, error);
+}
+
+static bool suits(const plane_tree *tree) {
+    return tree->n_frames <= PLANES_MOST && (double)tree->n >= elements_of_plane * (double)tree->n_frames;
+}
+
+/* Refuses options that --form-factors blocks cannot be given together with. */
+static lam_status check_asked(const precompute_state *state, const build_method *method, bool final,
+                              lam_error *error) {
+    const precompute_options *o = state->options;
+    const char *other = NULL;
+    if (o->sky != NULL) other = "--sky";
+    if (state_keeps(o)) other = "--keep-form-factors";
+    if (o->scratch != NULL) other = "--scratch";
+    if (o->emitters != NULL) other = "--emitters";
+    if (other != NULL)
+        return status_fail(error, LAM_ERR_ARGUMENT,
+                           "--form-factors blocks: cannot be given together with %s, which needs rows; give "
+                           "--form-factors rays",
+                           other);
+    if (final && !(method->flags & METHOD_BLOCKS))
+        return status_fail(error, LAM_ERR_ARGUMENT,
+                           "--form-factors blocks: --method %s needs rows; give --form-factors rays",
+                           method->name);
+    if (state->tree.n_frames > PLANES_MOST)
+        return status_fail(
+            error, LAM_ERR_ARGUMENT,
+            "--form-factors blocks: the elements lie in %zu planes, at most %d are possible; give "
+            "--form-factors rays",
+            state->tree.n_frames, PLANES_MOST);
+    return LAM_OK;
+}
+
+lam_status state_choose_blocks(precompute_state *state, const build_method *method, bool final,
+                               lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = state->options;
+    const bool asked = strcmp(o->form_factors, "blocks") == 0, able = (method->flags & METHOD_BLOCKS) != 0;
+    const build_method *built = able ? method : method_fallback();
+    if (!state_may_have_blocks(state)) return LAM_OK;
+    if (final && !able && !asked) return LAM_OK;
+    TRY(make_tree(state, error));
+    if (asked) TRY(check_asked(state, method, final, error));
+    if (!asked && !suits(&state->tree)) goto done;
+    state->recipe = (recipe){.method = RECIPE_BLOCKS,
+                             .rays = recipe_rays_beside_blocks(state->m.n),
+                             .accuracy = built->block_accuracy(method_own_const(&o->build, built)),
+                             .seed = o->seed};
+    if (strcmp(o->quality, "high") == 0) state->recipe.accuracy /= 4;
+    state->expected = built;
+    state->streamed = state->large = false;
+done:
+    return status;
+}
+
+lam_status stage_blocks(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const form_factor_options how = {
+        .recipe = state->recipe, .progress = &state->progress, .stage = "form factors"};
+    TRY(make_tree(state, error));
+    TRY(form_factors_make_blocks(&state->m, state->order, &state->tree, false, &how, &state->f,
+                                 &state->blocks, error));
+done:
+    return status;
+}
+
+void state_log_blocks(const precompute_state *state) {
+    const block_report *b = &state->f.blocks;
+    const double all = .5 * (double)state->m.n * (double)(state->m.n - 1);
+    if (state->blocks.n == 0) return;
+    terminal_log(
+        state->t,
+        "%zu blocks of %zu planes: %.3g linear, %.3g partly hidden by %.3g segments, %.3g pairs of elements; "
+        "%.1f %% of all pairs face away, %.1f %% are plainly hidden",
+        state->blocks.n_blocks, state->tree.n_frames, (double)b->linear, (double)b->shaded,
+        (double)b->segments, (double)(b->pairs + b->shaded_pairs), 100 * b->elements_away / all,
+        100 * b->elements_hidden / all);
+}

@@ -1,0 +1,88 @@
+"""Form factors by blocks of clusters, from the command line: when they are taken, what they cannot be given with, and
+that their answers are those of pairs within the stated error."""
+
+import os
+import unittest
+
+import h5py
+import numpy
+
+from case import Case
+from command import must
+
+
+class Blocks(Case):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.room = os.path.join(cls.shared.name, "room.obj")
+        must("generate", "cornell", "--closed", "--elements", 4300, "--reflectance", .5, "-o",
+             cls.room)
+
+    def precompute(self, name, *options):
+        store = self.path(name)
+        done = must("precompute", self.room, "-o", store, "--epsilon", .2, *options)
+        return store, done.stderr
+
+    @staticmethod
+    def attributes(store, group="/operator"):
+        with h5py.File(store) as file:
+            return dict(file[group].attrs)
+
+    def test_auto_takes_blocks_for_large_planes(self):
+        store, log = self.precompute("auto.h5", "--probes", 0)
+        self.assertEqual(self.attributes(store)["form_factors"], b"blocks")
+        self.assertRegex(log, r"\d+ blocks of 16 planes: .* linear, .* partly hidden")
+        rays, log = self.precompute("rays.h5", "--probes", 0, "--form-factors", "rays", "--quality", "draft",
+                                    "--method", "hierarchical")
+        self.assertEqual(self.attributes(rays)["form_factors"], b"rays")
+        self.assertNotIn("blocks of", log)
+
+    def test_answers_are_those_of_pairs(self):
+        blocks, _ = self.precompute("blocks.h5", "--probes", 0)
+        pairs, _ = self.precompute("pairs.h5", "--probes", 0, "--form-factors", "rays", "--method", "exact")
+        count = h5py.File(blocks)["/mesh/elements"].shape[0]
+        emission = numpy.random.default_rng(1).random((1, count)).astype("f4")
+        lamp = numpy.zeros((1, count), "f4")
+        lamp[:, : count // 50] = 1
+        for light, allowed in ((emission, .006), (lamp, .05)):
+            numpy.save(self.path("e.npy"), light)
+            answers = []
+            for store in (blocks, pairs):
+                must("solve", store, "--emission", self.path("e.npy"), "--quantity", "indirect", "-o",
+                     self.path("b.npy"))
+                answers.append(numpy.load(self.path("b.npy")).astype("f8"))
+            off = numpy.linalg.norm(answers[0] - answers[1]) / numpy.linalg.norm(answers[1])
+            self.assertLess(off, allowed)
+
+    def test_the_judge_states_what_verify_finds(self):
+        store, _ = self.precompute("judged.h5", "--probes", 8)
+        stated = self.attributes(store, "/error/single")
+        self.assertLess(stated["total_indirect_mean"], .15)
+        self.assertLess(self.attributes(store, "/error/random")["total_indirect_mean"], .006)
+        self.assertGreater(stated["reference_noise"], 0)
+        self.assertLess(stated["reference_noise"], stated["total_indirect_mean"])
+        done = must("verify", store, "--probes", 8)
+        self.assertRegex(done.stdout, r"ok +error")
+
+    def test_what_needs_rows_is_refused(self):
+        for options, reason in ((("--sky", "tregenza"), "--sky"), (("--keep-form-factors",), "--keep-form-factors"),
+                                (("--scratch", self.path("rows")), "--scratch"),
+                                (("--method", "low-rank", "--rank", 8), "--method low-rank needs rows")):
+            done = self.failed(reason, "precompute", self.room, "-o", self.path("no.h5"), "--form-factors", "blocks",
+                               *options)
+            self.assertIn("--form-factors blocks: ", done.stderr)
+            self.assertIn("give --form-factors rays", done.stderr)
+            self.assertFalse(os.path.exists(self.path("no.h5")))
+
+    def test_houses_are_no_scene_for_blocks(self):
+        city = self.path("city.obj")
+        must("generate", "city", "--elements", 4500, "-o", city)
+        done = must("precompute", city, "-o", self.path("city.h5"), "--probes", 0, "--method", "hierarchical",
+                    "--epsilon", .5)
+        self.assertNotIn("blocks of", done.stderr)
+        self.assertEqual(self.attributes(self.path("city.h5"))["form_factors"], b"pairs")
+
+
+if __name__ == "__main__":
+    unittest.main()
