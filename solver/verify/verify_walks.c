@@ -246,17 +246,19 @@ static void conclude(const examination *e, const judgement *j, check *c) {
     snprintf(at, sizeof at, "element %zu", worst->element);
     const bool known = j->stated[0] >= 0;
     const bool broken = known && walk_chance(j->beyond, e->n_compared) < certain;
-    const double chance = 100 * walk_chance(worst->score, e->n_compared);
-    check_say(c,
-              !known   ? VERDICT_SKIPPED
-              : broken ? VERDICT_BROKEN
-                       : VERDICT_OK,
-              "largest |z| of %zu means is %.1f (%s under %s), by chance alone in %.*g %% of cases; %s",
-              e->n_compared, fabs(worst->score), worst->group != NULL ? worst->group : at, worst->emission,
-              chance < 10 ? 1 : 3, chance,
-              !known   ? "the store states no error to compare with"
-              : broken ? "differs by more than the stated error"
-                       : "within the stated error");
+    /* Below 1e-10 the chance is lost in rounding. */
+    const double chance = fmax(1e-10, 100 * walk_chance(worst->score, e->n_compared));
+    check_say(
+        c,
+        !known   ? VERDICT_SKIPPED
+        : broken ? VERDICT_BROKEN
+                 : VERDICT_OK,
+        "largest |z| of %zu means is %.1f (%s under %s), by chance alone in at most %.*g %% of cases; %s",
+        e->n_compared, fabs(worst->score), worst->group != NULL ? worst->group : at, worst->emission,
+        chance < 10 ? 1 : 3, chance,
+        !known   ? "the store states no error to compare with"
+        : broken ? "differs by more than the stated error"
+                 : "within the stated error");
 }
 
 lam_status verify_walks(examination *e, check *c, lam_error *error) {
