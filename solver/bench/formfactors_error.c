@@ -61,7 +61,10 @@ static lam_status solve(const bench_run *run, const lit_scene *s, const csr *F, 
     for (size_t c = 0; c < s->m.n_channels; c++) {
         light(s, c, E);
         TRY(bench_check(run, error));
-        TRY(reference_create(F, s->m.area, s->m.reflectance + c * n, REFERENCE_AUTO, &r, error));
+        const factor_product product = factor_product_of_rows(F);
+        const float *rho = s->m.reflectance + c * n;
+        const reference_way way = reference_choose(&product, s->m.area, rho, VECTORS, false);
+        TRY(reference_create(F, s->m.area, rho, way, &r, error));
         TRY(reference_solve(r, VECTORS, E, B + c * VECTORS * n, tolerance, run->progress, error));
         reference_destroy(r);
         r = NULL;

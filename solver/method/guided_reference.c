@@ -48,7 +48,8 @@ lam_status guided_reference_solve(const reference *r, const factor_product *F, c
                                   lam_error *error) {
     operator_guide of = {op, channel};
     const reference_guide guide = {answer_by_operator, &of};
-    if (F->rows != NULL || lam_operator_emitters(op) > 0)
+    if (reference_is_dense(r) || lam_operator_emitters(op) > 0)
         return reference_solve(r, m, E, B, reference_tolerance, p, error);
-    return reference_solve_guided(r, m, E, B, guided_tolerance, &guide, p, error);
+    return reference_solve_guided(r, m, E, B, F->rows != NULL ? reference_tolerance : guided_tolerance,
+                                  &guide, p, error);
 }

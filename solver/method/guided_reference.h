@@ -6,8 +6,8 @@
 #include "solver/operator/operator.h"
 
 /* B of m emissions in one channel, both [m][n], B a guess on entry, to four digits below the smallest error
- * worth printing. Form factors that are rows are solved by themselves; those that only multiply with op as
- * the guide of reference_solve_guided, unless op answers only to emitters. Errors: those of
+ * worth printing. An LU is solved by itself; an iteration has op as the guide of reference_solve_guided,
+ * unless op answers only to emitters. Errors: those of
  * reference_solve_guided. */
 lam_status guided_reference_solve(const reference *r, const factor_product *F, const lam_operator *op,
                                   size_t channel, size_t m, const double *E, double *B, const progress *p,

@@ -207,7 +207,10 @@ static lam_status each_reference(const judge_input *input, const reference_job *
         for (size_t v = 0; v < m; v++)
             TRY(reference_emission(input, F, p, which[v], c, E + v * n, B + v * n, scratch, error));
         if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
-        TRY(reference_create_of(F, problem->area, problem->reflectance + c * n, REFERENCE_AUTO, &r, error));
+        const float *rho = problem->reflectance + c * n;
+        const bool guided = lam_operator_emitters(job->op) == 0;
+        const reference_way way = reference_choose(F, problem->area, rho, m, guided);
+        TRY(reference_create_of(F, problem->area, rho, way, &r, error));
         TRY(guided_reference_solve(r, F, job->op, c, m, E, B, input->progress, error));
         reference_destroy(r);
         r = NULL;

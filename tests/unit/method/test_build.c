@@ -1,4 +1,5 @@
 /* The builders and the reference against closed forms (exact form factors in, nine digits out). */
+#include "solver/method/guided_reference.h"
 #include "solver/method/judge.h"
 #include "solver/method/low_rank/factorizer.h"
 #include "solver/method/method.h"
@@ -66,6 +67,67 @@ START_TEST(reference_cube) {
     }
     free(E);
     free(B);
+    fixture_free(&f);
+}
+END_TEST
+
+/* An LU, conjugate gradients and the guidance of an operator that is off by epsilon: one solution. Conjugate
+ * gradients leave a residual of 1e-8 |u|, an error of at most 1 / (1 - rho) = 5 times that. */
+START_TEST(all_ways_of_a_reference_agree) {
+    enum { DIVISIONS = 8, N = 6 * DIVISIONS * DIVISIONS, M = 3 };
+    fixture f = fixture_box(room, DIVISIONS, .8f);
+    const factor_product F = factor_product_of_rows(&f.F);
+    build_options options = defaults();
+    build_report report;
+    lam_error error = {0};
+    lam_operator *op = build(problem_of(&f), &options, &report);
+    double *E = calloc(M * N, sizeof *E), *B[3];
+    for (size_t i = 0; i < N; i++) {
+        E[N + i] = i % 7 == 0;
+        E[2 * N + i] = 1;
+    }
+    E[5] = 1;
+    for (int k = 0; k < 3; k++) {
+        reference *r = NULL;
+        B[k] = calloc(M * N, sizeof *B[k]);
+        memcpy(B[k], E, M * N * sizeof *E);
+        const reference_way way = k == 0 ? REFERENCE_DENSE : REFERENCE_ITERATED;
+        ck_ok(reference_create(&f.F, f.m.area, f.m.reflectance, way, &r, &error));
+        if (k < 2)
+            ck_ok(reference_solve(r, M, E, B[k], 1e-8, NULL, &error));
+        else
+            ck_ok(guided_reference_solve(r, &F, op, 0, M, E, B[k], NULL, &error));
+        reference_destroy(r);
+    }
+    for (int k = 1; k < 3; k++)
+        for (size_t v = 0; v < M; v++) {
+            double off = 0, all = 0;
+            for (size_t i = v * N; i < (v + 1) * N; i++) {
+                off += f.m.area[i % N] * (B[k][i] - B[0][i]) * (B[k][i] - B[0][i]);
+                all += f.m.area[i % N] * B[0][i] * B[0][i];
+            }
+            ck_assert_double_le(sqrt(off / all), 1e-7);
+        }
+    for (int k = 0; k < 3; k++) free(B[k]);
+    free(E);
+    lam_operator_close(op);
+    fixture_free(&f);
+}
+END_TEST
+
+/* A few emissions do not pay an LU, hundreds do; a guide makes iterations cheaper. */
+START_TEST(reference_is_chosen_by_its_cost) {
+    fixture f = fixture_box(unit_cube, 12, .7f);
+    const factor_product F = factor_product_of_rows(&f.F), no_rows = {.n = F.n};
+    ck_assert_int_eq(reference_choose(&F, f.m.area, f.m.reflectance, 2, false), REFERENCE_ITERATED);
+    ck_assert_int_eq(reference_choose(&F, f.m.area, f.m.reflectance, 200, false), REFERENCE_DENSE);
+    size_t m[2] = {1, 1};
+    for (int guided = 0; guided < 2; guided++)
+        while (reference_choose(&F, f.m.area, f.m.reflectance, m[guided], guided) == REFERENCE_ITERATED &&
+               m[guided] < 1000)
+            m[guided]++;
+    ck_assert_uint_lt(m[0], m[1]);
+    ck_assert_int_eq(reference_choose(&no_rows, f.m.area, f.m.reflectance, 200, false), REFERENCE_ITERATED);
     fixture_free(&f);
 }
 END_TEST
@@ -356,6 +418,8 @@ int main(void) {
     TCase *cases = tcase_create("build");
     tcase_set_timeout(cases, 300);
     tcase_add_loop_test(cases, reference_cube, 0, 3);
+    tcase_add_test(cases, all_ways_of_a_reference_agree);
+    tcase_add_test(cases, reference_is_chosen_by_its_cost);
     tcase_add_loop_test(cases, exact_cube, 0, 3);
     tcase_add_test(cases, room_one_element_per_face);
     tcase_add_test(cases, sphere_has_rank_one);
