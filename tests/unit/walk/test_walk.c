@@ -184,6 +184,30 @@ START_TEST(plates_with_an_occluder) {
 }
 END_TEST
 
+/* A ceiling that is too short by a gap: below 10^-4 of all area it is a crack, whose rays are cast again, and
+ * B = E / (1 - rho). A wider gap g lets B = E / (1 - rho (1 - g)) of the light out, nearly: rays that come to
+ * the gap are evenly spread after so many bounces. */
+START_TEST(cracks_and_gaps) {
+    const double gap = (double[]){6e-5, 4e-4}[_i], rho = (double).9995f;
+    mesh m = box_mesh((double[]){1, 1, 1}, 1, .9995f);
+    lam_error error = {0};
+    for (size_t v = 4 * 5; v < 4 * 6; v++)
+        if (m.vertices[v][0] > .5) m.vertices[v][0] -= 6 * gap;
+    ck_ok(mesh_measure(&m, &error));
+    const float E[6] = {1, 1, 1, 1, 1, 1};
+    const uint32_t target[6] = {0};
+    const walk_problem p = {.n_rhs = 1, .E = E, .n_targets = 1, .target = target, .walks = 4800, .seed = 12};
+    walk_scene *s = open_scene(&m);
+    walk_estimates e;
+    ck_ok(walk_gather(s, &p, &e, &error));
+    const double B = 1 / (1 - rho * (_i == 0 ? 1 : 1 - gap));
+    ck_assert_double_le(fabs(walk_score(&e, 0, B, 0)), 4);
+    walk_estimates_free(&e);
+    walk_scene_free(s);
+    mesh_free(&m);
+}
+END_TEST
+
 /* A coloured box with uneven reflectances, one in six of them 0, lit by a few elements. */
 typedef struct lit_box {
     mesh m;
@@ -444,6 +468,7 @@ int main(void) {
     tcase_add_test(c, room_of_six_faces);
     tcase_add_test(c, cube_with_a_bright_face);
     tcase_add_loop_test(c, plates_with_an_occluder, 0, 4);
+    tcase_add_loop_test(c, cracks_and_gaps, 0, 2);
     tcase_add_loop_test(c, every_element_of_a_coloured_box, 0, 3);
     tcase_add_loop_test(c, scenes_with_occlusion, 0, 4);
     tcase_add_loop_test(c, standard_errors_are_right, 0, 2);
