@@ -42,7 +42,7 @@ static lam_status check_asked(const precompute_state *state, const build_method 
                            "--form-factors blocks: cannot be given together with %s, which needs rows; give "
                            "--form-factors rays",
                            other);
-    if (final && !(method->flags & METHOD_BLOCKS))
+    if (final && strcmp(o->build.method, "auto") != 0 && !(method->flags & METHOD_BLOCKS))
         return status_fail(error, LAM_ERR_ARGUMENT,
                            "--form-factors blocks: --method %s needs rows; give --form-factors rays",
                            method->name);
@@ -55,13 +55,20 @@ static lam_status check_asked(const precompute_state *state, const build_method 
     return LAM_OK;
 }
 
+/* The first method that can build from blocks. */
+static const build_method *method_of_blocks(void) {
+    size_t k = 0;
+    while (method_at(k) != NULL && !(method_at(k)->flags & METHOD_BLOCKS)) k++;
+    return method_at(k);
+}
+
 lam_status state_choose_blocks(precompute_state *state, const build_method *method, bool final,
                                lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
     const bool asked = strcmp(o->form_factors, "blocks") == 0, able = (method->flags & METHOD_BLOCKS) != 0;
-    const build_method *built = able ? method : method_fallback();
-    if (!state_may_have_blocks(state)) return LAM_OK;
+    const build_method *built = able ? method : method_of_blocks();
+    if (!state_may_have_blocks(state) || built == NULL) return LAM_OK;
     if (final && !able && !asked) return LAM_OK;
     TRY(make_tree(state, error));
     if (asked) TRY(check_asked(state, method, final, error));

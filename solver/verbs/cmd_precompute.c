@@ -145,8 +145,9 @@ static void log_unused(terminal *t, const option_result *given, const precompute
         length += (size_t)sprintf(list + length, "%s--%s", length > 0 ? ", " : "", name);
     }
     if (length > 0)
-        terminal_log(t, "%s does not use %s", o->from_store ? "a store with form factors" : o->form_factors,
-                     list);
+        terminal_log(t, "%s%s does not use %s",
+                     o->from_store ? "a store with form factors" : "--form-factors ",
+                     o->from_store ? "" : o->form_factors, list);
     if (result->unused[0] != '\0')
         terminal_log(t, "%s does not use %s", result->report.method, result->unused);
 }

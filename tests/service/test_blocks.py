@@ -16,8 +16,7 @@ class Blocks(Case):
     def setUpClass(cls):
         super().setUpClass()
         cls.room = os.path.join(cls.shared.name, "room.obj")
-        must("generate", "cornell", "--closed", "--elements", 4300, "--reflectance", .5, "-o",
-             cls.room)
+        must("generate", "cornell", "--closed", "--elements", 1000, "--reflectance", .5, "-o", cls.room)
 
     def precompute(self, name, *options):
         store = self.path(name)
@@ -30,16 +29,18 @@ class Blocks(Case):
             return dict(file[group].attrs)
 
     def test_auto_takes_blocks_for_large_planes(self):
+        self.room = self.path("large.obj")
+        must("generate", "cornell", "--closed", "--elements", 4200, "--reflectance", .5, "-o", self.room)
         store, log = self.precompute("auto.h5", "--probes", 0)
         self.assertEqual(self.attributes(store)["form_factors"], b"blocks")
         self.assertRegex(log, r"\d+ blocks of 16 planes: .* linear, .* partly hidden")
         rays, log = self.precompute("rays.h5", "--probes", 0, "--form-factors", "rays", "--quality", "draft",
-                                    "--method", "hierarchical")
+                                    "--rays", 64, "--method", "hierarchical")
         self.assertEqual(self.attributes(rays)["form_factors"], b"rays")
         self.assertNotIn("blocks of", log)
 
     def test_answers_are_those_of_pairs(self):
-        blocks, _ = self.precompute("blocks.h5", "--probes", 0)
+        blocks, _ = self.precompute("blocks.h5", "--probes", 0, "--form-factors", "blocks")
         pairs, _ = self.precompute("pairs.h5", "--probes", 0, "--form-factors", "rays", "--method", "exact")
         count = h5py.File(blocks)["/mesh/elements"].shape[0]
         emission = numpy.random.default_rng(1).random((1, count)).astype("f4")
@@ -56,7 +57,7 @@ class Blocks(Case):
             self.assertLess(off, allowed)
 
     def test_the_judge_states_what_verify_finds(self):
-        store, _ = self.precompute("judged.h5", "--probes", 8)
+        store, _ = self.precompute("judged.h5", "--probes", 8, "--form-factors", "blocks")
         stated = self.attributes(store, "/error/single")
         self.assertLess(stated["total_indirect_mean"], .15)
         self.assertLess(self.attributes(store, "/error/random")["total_indirect_mean"], .006)
@@ -75,13 +76,20 @@ class Blocks(Case):
             self.assertIn("give --form-factors rays", done.stderr)
             self.assertFalse(os.path.exists(self.path("no.h5")))
 
-    def test_houses_are_no_scene_for_blocks(self):
-        city = self.path("city.obj")
-        must("generate", "city", "--elements", 4500, "-o", city)
-        done = must("precompute", city, "-o", self.path("city.h5"), "--probes", 0, "--method", "hierarchical",
-                    "--epsilon", .5)
-        self.assertNotIn("blocks of", done.stderr)
-        self.assertEqual(self.attributes(self.path("city.h5"))["form_factors"], b"pairs")
+    def test_more_planes_than_blocks_can_take_are_refused(self):
+        sphere, sides = self.path("sphere.obj"), 66
+        with open(sphere, "w") as file:
+            for i in range(1, sides):
+                for j in range(sides):
+                    up, around = numpy.pi * i / sides, 2 * numpy.pi * j / sides
+                    radius = numpy.sin(up)
+                    file.write(f"v {radius * numpy.cos(around)} {radius * numpy.sin(around)} {numpy.cos(up)}\n")
+            for i in range(sides - 2):
+                for j in range(sides):
+                    a, b = i * sides + j + 1, i * sides + (j + 1) % sides + 1
+                    file.write(f"f {a} {a + sides} {b + sides} {b}\n")
+        self.failed("planes, at most 4096 are possible; give --form-factors rays", "precompute", sphere, "-o",
+                    self.path("no.h5"), "--form-factors", "blocks")
 
 
 if __name__ == "__main__":

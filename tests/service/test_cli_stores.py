@@ -183,7 +183,7 @@ class Stores(Case):
                              (b"hemicube", 48))
 
         done = must("precompute", self.box, "-o", again, "--resolution", 32, "--rays", 64, "--probes", 0)
-        self.assertIn("rays does not use --resolution", done.stderr)
+        self.assertIn("--form-factors auto does not use --resolution", done.stderr)
 
     def test_judged_by_another_sample_whatever_the_seeds(self):
         # With the F of seed s kept, another seed must not make the judge draw s again: then total = operator.

