@@ -12,6 +12,8 @@
 
 /* Probes of random emission, and probes of a group by which the reference's own noise is measured. */
 enum { RANDOM_PROBES = 8, NOISE_PROBES = 32 };
+/* The latter where F is no rows: what it measures is a bias that probes share, and no noise of their own. */
+enum { NOISE_PROBES_GUIDED = 8 };
 
 /* Indirect light below this share of all light counts as none: no ray found what the element sees, and the
  * rest is the remainder of the reference's iteration. */
@@ -327,10 +329,10 @@ static lam_status measure_noise(const lam_operator *op, const judge_input *input
     lam_status status = LAM_OK;
     const build_problem *problem = input->problem;
     const size_t vector = problem->n_channels * problem->n;
+    const size_t most = input->halves[0].rows != NULL ? NOISE_PROBES : NOISE_PROBES_GUIDED;
     size_t which[N_GROUPS * NOISE_PROBES], m = 0;
     for (int g = 0; g < N_GROUPS; g++)
-        for (size_t v = p->begin[g]; v < p->begin[g + 1] && v < p->begin[g] + NOISE_PROBES; v++)
-            which[m++] = v;
+        for (size_t v = p->begin[g]; v < p->begin[g + 1] && v < p->begin[g] + most; v++) which[m++] = v;
     half_solutions half[2] = {{problem->n, problem->n_channels, m, NULL},
                               {problem->n, problem->n_channels, m, NULL}};
     for (int h = 0; h < 2; h++) {

@@ -10,11 +10,13 @@ typedef struct segment_ends {
     uint32_t elements[2][SEGMENT_LANES];
 } segment_ends;
 
-/* A point of a node by (u, v) in the unit square. Its element is set only where it is asked for. */
-static void take_point(const flat_clusters *f, uint32_t node, const double at[2], bool element_too,
-                       double place[2], double point[3], uint32_t *element) {
-    if (f->of[node].full && !element_too) {
+/* A point of a node by (u, v) in the unit square. Of a full rectangle its element is any of the plane:
+ * nothing in the planes of both ends blocks a segment. */
+static void take_point(const flat_clusters *f, uint32_t node, const double at[2], double place[2],
+                       double point[3], uint32_t *element) {
+    if (f->of[node].full) {
         for (int k = 0; k < 2; k++) place[k] = 2 * at[k] - 1;
+        *element = f->tree->order[f->tree->nodes[node].begin];
         flat_cluster_point(f, node, place[0], place[1], point);
         return;
     }
@@ -63,8 +65,8 @@ void shade_segments(const shade_scene *s, uint32_t a, uint32_t b, const candidat
     for (size_t k = 0; k < SEGMENT_LANES; k++) {
         double at[4];
         pair_sampler_place(&sampler, (uint32_t)(first + k), at);
-        take_point(f, a, at, by_scene, out[k].place, ends.from[k], &ends.elements[0][k]);
-        take_point(f, b, at + 2, by_scene, out[k].place + 2, ends.to[k], &ends.elements[1][k]);
+        take_point(f, a, at, out[k].place, ends.from[k], &ends.elements[0][k]);
+        take_point(f, b, at + 2, out[k].place + 2, ends.to[k], &ends.elements[1][k]);
     }
     if (by_scene)
         block_by_scene(s->v, &ends, out);

@@ -163,6 +163,7 @@ static void make_hull(const double corner[2][4][3], double slack, hull *out) {
 
 typedef struct between {
     const flat_clusters *f;
+    const flat_cluster *cluster[2];
     const flat_plane *plane[2];
     double corner[2][4][3], low[3], high[3];
     hull hull;
@@ -186,6 +187,10 @@ static bool is_outside_hull(between *w, const occluder *o) {
 static bool may_block(between *w, const occluder *o) {
     const double slack = w->f->slack;
     double low = INFINITY, high = -INFINITY;
+    const double one = dot3(o->normal, w->cluster[0]->centre) - o->level;
+    const double two = dot3(o->normal, w->cluster[1]->centre) - o->level;
+    if (one * two > 0 && fabs(one) >= w->cluster[0]->radius && fabs(two) >= w->cluster[1]->radius)
+        return false;
     for (int k = 0; k < 8; k++) {
         const double at = dot3(o->normal, w->corner[k / 4][k % 4]) - o->level;
         low = at < low ? at : low;
@@ -231,7 +236,9 @@ static bool try_all(const occluders *o, between *w, candidates *out) {
 
 void occluders_between(const occluders *o, const flat_clusters *f, uint32_t a, uint32_t b,
                        const candidates *among, candidates *out) {
-    between w = {.f = f, .plane = {&f->planes[f->of[a].plane], &f->planes[f->of[b].plane]}};
+    between w = {.f = f,
+                 .cluster = {&f->of[a], &f->of[b]},
+                 .plane = {&f->planes[f->of[a].plane], &f->planes[f->of[b].plane]}};
     bool known = true;
     out->count = 0;
     if (o->n == 0) return;
