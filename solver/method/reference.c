@@ -91,15 +91,22 @@ static double sweeps_expected(size_t n, const double *area, const float *rho) {
  * 4 for eight digits (hierarchical, a Cornell box of 5,005 elements). */
 static const double guided_steps = 6;
 
+static double dense_seconds(double n, double m) {
+    return n * n * (n * lu_seconds + m * solve_seconds);
+}
+
+double reference_seconds(double n, double entries, double m) {
+    const double iterated = entries * m * guided_steps * sweep_seconds;
+    return n > REFERENCE_DENSE_ELEMENTS ? iterated : fmin(iterated, dense_seconds(n, m));
+}
+
 reference_way reference_choose(const factor_product *F, const double *area, const float *rho, size_t m,
                                bool guided) {
-    const double n = (double)F->n;
     if (F->rows == NULL || F->n > REFERENCE_DENSE_ELEMENTS) return REFERENCE_ITERATED;
     const double entries = (double)F->rows->indptr[F->n];
-    const double dense = n * n * (n * lu_seconds + (double)m * solve_seconds);
     const double sweeps = guided ? guided_steps : sweeps_expected(F->n, area, rho);
     const double iterated = entries * (double)m * sweeps * sweep_seconds;
-    return dense <= iterated ? REFERENCE_DENSE : REFERENCE_ITERATED;
+    return dense_seconds((double)F->n, (double)m) <= iterated ? REFERENCE_DENSE : REFERENCE_ITERATED;
 }
 
 static lam_status solve_dense(const reference *r, size_t m, const double *E, double *B, lam_error *error) {

@@ -13,6 +13,10 @@ typedef struct reference reference;
 
 typedef enum reference_way { REFERENCE_DENSE, REFERENCE_ITERATED } reference_way;
 
+/* Seconds of one thread that the cheaper way takes for m emissions with a guide, of n elements whose form
+ * factors have that many entries: for a forecast. */
+double reference_seconds(double n, double entries, double m);
+
 /* The way that takes less time for m emissions, by the operations of both: n^3 of the LU and n^2 m of its
  * solves against m products with F for each of the sweeps that the mean reflectance lets expect, or, guided,
  * of a few steps of reference_solve_guided. It is the same on every machine. Form factors that are no rows

@@ -2,6 +2,7 @@
 #ifndef LAMBERT_PRECOMPUTE_FORECAST_H
 #define LAMBERT_PRECOMPUTE_FORECAST_H
 
+#include "solver/formfactor/pairs/pairs_sample.h"
 #include "solver/formfactor/recipe.h"
 #include "solver/formfactor/scratch.h"
 #include "solver/linalg/panel.h"
@@ -13,6 +14,7 @@ typedef struct forecast {
     size_t n, n_channels;
     size_t sky_tiles;            /* 0: no sky */
     recipe recipe, judge_recipe; /* of the form factors and of the judge's samples */
+    pairs_cost cost;             /* of recipe, where a sample of its pairs was taken; else 0 */
     size_t probes;               /* 0: no independent samples */
     bool from_store;             /* form factors are there already */
     bool scratch;                /* rows go to a scratch folder as they are found */
@@ -32,10 +34,11 @@ double forecast_bytes(const forecast *f);
 /* LAM_ERR_MEMORY when that passes limit; the message names the option that would make it fit. */
 lam_status forecast_check(const forecast *f, double limit, lam_error *error);
 
-/* Seconds that the form factors take, and those of the judge: from the measured rays per second, and from
- * constants for the rest of the work of a thread, which were measured once. */
+/* Seconds that the form factors take, those of the judge's own samples, and its solves against rows: from a
+ * sample of the pairs, or from the measured rays per second, and from constants for the rest of the work of a
+ * thread, which were measured once. */
 typedef struct forecast_times {
-    double form_factors, judge;
+    double form_factors, judge, solves;
 } forecast_times;
 forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n_threads);
 

@@ -1,4 +1,5 @@
 /* Seconds that form factors and the judge take. Bytes as text. */
+#include "solver/method/reference.h"
 #include "solver/precompute/forecast.h"
 
 #include <math.h>
@@ -16,15 +17,29 @@ static double sample_seconds(double n, const recipe *r, double rays_per_second, 
     return n * rays / rays_per_second + entries * merge_seconds / n_threads;
 }
 
+/* Four references: two with all probes, and two, for the noise of the sample, with some of each sort. */
+static double solve_seconds(const forecast *f) {
+    enum { OTHER_PROBES = 9, NOISE_PROBES = 32 };
+    const double n = (double)f->n, probes = (double)f->probes, some = fmin(probes, NOISE_PROBES);
+    const double entries =
+        f->cost.entries > 0 ? f->cost.entries : forecast_rows_bytes(n, &f->judge_recipe) / 8;
+    return 2 * (double)f->n_channels *
+           (reference_seconds(n, entries, probes + OTHER_PROBES) +
+            reference_seconds(n, entries, some + OTHER_PROBES));
+}
+
 forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n_threads) {
     const double n = (double)f->n;
     forecast_times times = {0};
-    const double once = sample_seconds(n, &f->recipe, rays_per_second, n_threads);
+    /* Of rays alone the measured rate says more than the fixed cost of one. */
+    const bool counted = f->cost.seconds > 0 && f->recipe.method != RECIPE_RAYS;
+    const double once =
+        counted ? f->cost.seconds / n_threads : sample_seconds(n, &f->recipe, rays_per_second, n_threads);
+    const double half = counted ? once : sample_seconds(n, &f->judge_recipe, rays_per_second, n_threads);
     if (!f->from_store)
         times.form_factors = f->streamed ? n * forecast_rays(n, &f->recipe) / rays_per_second : once;
-    if (f->probes > 0)
-        times.judge =
-            2 * sample_seconds(n, &f->judge_recipe, rays_per_second, n_threads) + (f->streamed ? once : 0);
+    if (f->probes > 0) times.judge = 2 * half + (f->streamed ? once : 0);
+    if (f->probes > 0 && f->recipe.method != RECIPE_BLOCKS) times.solves = solve_seconds(f) / n_threads;
     return times;
 }
 

@@ -104,12 +104,15 @@ static lam_status announce(precompute_state *state, lam_error *error) {
     forecast_format_bytes(forecast_store_bytes(&f), stored);
     forecast_format_bytes(forecast_scratch_bytes(&f), scratch_room);
     clock_format_seconds(times.form_factors, seconds);
-    clock_format_seconds(times.judge, judging);
-    /* The share of partly hidden pairs is not known before. */
-    const bool pairs = state->recipe.method == RECIPE_PAIRS || state->recipe.method == RECIPE_NEAR_PAIRS;
+    clock_format_seconds(times.judge + times.solves, judging);
+    /* The share of partly hidden pairs is not known before, but for a sample. */
+    const bool pairs = state->cost.seconds == 0 &&
+                       (state->recipe.method == RECIPE_PAIRS || state->recipe.method == RECIPE_NEAR_PAIRS);
     if (!o->from_store) snprintf(made, sizeof made, " form factors %s%s,", seconds, pairs ? " or more" : "");
-    /* Its solves come on top of its samples. */
-    if (state->probes > 0) snprintf(judged, sizeof judged, " the judge %s or more,", judging);
+    /* Answers of the operator come on top, and the products of blocks. */
+    if (state->probes > 0)
+        snprintf(judged, sizeof judged, " the judge %s%s,", judging,
+                 state->cost.seconds > 0 ? "" : " or more");
     if (state->scratch != NULL) snprintf(kept, sizeof kept, ", scratch up to %s", scratch_room);
     terminal_log(state->t, "forecast:%s%s at %.3g Mray/s of a trial; memory up to %s, store up to %s%s", made,
                  judged, rate * 1e-6, memory, stored, kept);

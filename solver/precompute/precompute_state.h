@@ -3,6 +3,7 @@
 #define LAMBERT_PRECOMPUTE_PRECOMPUTE_STATE_H
 
 #include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/pairs/pairs_sample.h"
 #include "solver/formfactor/rays/ray_rows.h"
 #include "solver/method/hierarchical/compress.h"
 #include "solver/method/judge.h"
@@ -30,7 +31,11 @@ typedef struct precompute_state {
     row_stream stream;             /* of rays */
     compressed_factors compressed; /* of f; n is 0 where they are kept as they are, or not */
     recipe recipe;                 /* of f */
-    bool large;                    /* its rows and the judge's lie in the scratch folder */
+    pairs_cost cost;   /* of recipes with pairs, from a sample; seconds is 0 where none was taken */
+    bool dear;         /* all pairs would take too long */
+    bool plain;        /* and near pairs would too: rays alone are taken */
+    size_t least_rays; /* in place of all pairs that are dear */
+    bool large;        /* its rows and the judge's lie in the scratch folder */
     size_t sky_tiles;
     size_t probes;
     emitter_list emitters;
@@ -79,6 +84,14 @@ lam_status state_choose_blocks(precompute_state *state, const build_method *meth
                                lam_error *error);
 lam_status stage_blocks(precompute_state *state, lam_error *error);
 void state_log_blocks(const precompute_state *state);
+
+/* Near pairs and rays as options and quality ask for: stage_scene.c. */
+recipe state_near_recipe(const precompute_state *state);
+
+/* Weighs all pairs, where these are the recipe so far, against near pairs and rays by the cost of a sample of
+ * both, sets cost, dear, plain and least_rays, and logs why: stage_pairs.c. A new choice of the recipe
+ * follows where dear is set. */
+lam_status state_weigh_pairs(precompute_state *state, lam_error *error);
 
 /* Form factors of a scene, or of a stream the near pairs alone: precompute.c. */
 lam_status stage_form_factors(precompute_state *state, lam_error *error);

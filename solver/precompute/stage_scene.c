@@ -72,8 +72,10 @@ typedef struct choice_request {
     uint64_t rays;     /* OPTION_AUTO */
     size_t resolution; /* of hemicubes in place of rays; 0: none */
     uint64_t seed;
-    bool sky;      /* light that leaves the scene matters too */
-    bool filtered; /* the method takes out most of the noise of rays: few are enough */
+    size_t least_rays; /* of rays that are not given */
+    bool plain;        /* no pairs */
+    bool sky;          /* light that leaves the scene matters too */
+    bool filtered;     /* the method takes out most of the noise of rays: few are enough */
 } choice_request;
 
 /* Above this number of elements all pairs take too long. */
@@ -104,7 +106,9 @@ static const quality_level *level_of(const char *name) {
 static size_t choice_rays(const choice_request *asked) {
     if (asked->rays != OPTION_AUTO) return (size_t)asked->rays;
     const quality_level *level = level_of(asked->quality);
-    return recipe_auto_rays(asked->epsilon, asked->filtered ? level->filtered : level->noise_share);
+    const size_t rays =
+        recipe_auto_rays(asked->epsilon, asked->filtered ? level->filtered : level->noise_share);
+    return rays > asked->least_rays ? rays : asked->least_rays;
 }
 
 /* The recipe: hemicubes where they are asked for, plain rays where their number is given or at draft, else
@@ -114,7 +118,7 @@ static recipe choice_recipe(const choice_request *asked, bool all_pairs) {
     recipe r = {.method = RECIPE_RAYS, .rays = choice_rays(asked), .seed = asked->seed};
     if (asked->resolution > 0)
         return (recipe){.method = RECIPE_HEMICUBE, .resolution = asked->resolution, .seed = asked->seed};
-    if (asked->rays != OPTION_AUTO || level->accuracy == 0) return r;
+    if (asked->rays != OPTION_AUTO || level->accuracy == 0 || asked->plain) return r;
     r.method = all_pairs ? RECIPE_PAIRS : RECIPE_NEAR_PAIRS;
     r.accuracy = level->accuracy;
     if (all_pairs && !asked->sky) r.rays = RECIPE_RAYS_FEW;
@@ -161,6 +165,8 @@ static choice_request request_of(const precompute_state *state) {
                             .rays = hemicube && !o->from_store ? OPTION_AUTO : o->rays,
                             .resolution = hemicube && !o->from_store ? (size_t)o->resolution : 0,
                             .seed = o->seed,
+                            .least_rays = state->least_rays,
+                            .plain = state->plain,
                             .sky = o->sky != NULL,
                             .filtered = (state->expected->flags & METHOD_FILTERS_NOISE) != 0};
 }
@@ -182,6 +188,11 @@ done:
     return status;
 }
 
+recipe state_near_recipe(const precompute_state *state) {
+    const choice_request asked = request_of(state);
+    return choice_recipe(&asked, false);
+}
+
 recipe state_judge_recipe(const precompute_state *state, uint64_t seed) {
     const choice_request asked = request_of(state);
     const recipe *of = &state->recipe;
@@ -200,6 +211,7 @@ forecast state_forecast(const precompute_state *state, double n) {
                       .sky_tiles = state->sky_tiles,
                       .recipe = state->recipe,
                       .judge_recipe = state_judge_recipe(state, 0),
+                      .cost = state->cost,
                       .probes = o->probes == OPTION_AUTO ? PROBES_OF_LARGE : o->probes,
                       .from_store = o->from_store,
                       .scratch = o->scratch != NULL,
@@ -238,7 +250,7 @@ static lam_status choose_recipe_that_fits(precompute_state *state, double n, lam
     TRY(expect_method(state, n, 0, &state->expected, &final, error));
     const choice_request asked = request_of(state);
     const int disk_too = o->scratch != NULL,
-              pairs_too = n <= CHOICE_PAIRS_MOST || n <= (double)choice_rays(&asked);
+              pairs_too = !state->dear && (n <= CHOICE_PAIRS_MOST || n <= (double)choice_rays(&asked));
     for (int way = 0; way <= 2 * disk_too + 1; way++) {
         const bool all_pairs = way % 2 == 0;
         if (all_pairs && !pairs_too) continue;
@@ -351,6 +363,8 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
         TRY(expect_method(state, (double)state->m.n, 0, &method, &final, error));
         TRY(state_choose_blocks(state, method, final, error));
     }
+    TRY(state_weigh_pairs(state, error));
+    if (state->dear) TRY(choose_recipe_that_fits(state, (double)state->m.n, error));
     state->order = memory_allocate(state->m.n, sizeof *state->order, "the order of the elements", error);
     if (state->order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&state->m, state->order, error));

@@ -12,6 +12,7 @@ typedef struct bag {
     cluster_link *links;
     size_t n, capacity;
     double hidden_pairs, distant_pairs;
+    cluster_link_work work;
     bool out_of_memory;
 } bag;
 
@@ -90,16 +91,21 @@ static void visit(walk *w, uint32_t a, uint32_t b, const uint32_t *candidates, s
     shaft s;
     shaft_init(&s, one, two, w->options->slack);
     const size_t n_within = shaft_filter(&s, w->m, t, candidates, n_candidates, leaves, within);
+    w->found->work.shafts++;
+    w->found->work.candidates += (double)(n_candidates + n_within);
     /* With a threshold even an open link descends to the leaves: some of its pairs may be below it. */
     if (n_within == 0 && (!near || leaves)) {
         bag_add(w->found, a, b, true);
         return;
     }
     /* The near field has so few pairs that testing each is cheaper than testing clusters. */
-    if (n_within > 0 && !near &&
-        occlusion_is_total(w->o, t, one, two, factor_bound(fmax(one->area, two->area), distance2))) {
-        w->found->hidden_pairs += pairs_between(one, two);
-        return;
+    if (n_within > 0 && !near) {
+        w->found->work.occlusion++;
+        if (occlusion_is_total(w->o, t, one, two, factor_bound(fmax(one->area, two->area), distance2))) {
+            w->found->work.hidden++;
+            w->found->hidden_pairs += pairs_between(one, two);
+            return;
+        }
     }
     if (leaves) {
         bag_add(w->found, a, b, false);
@@ -114,31 +120,30 @@ typedef struct task {
     uint32_t a, b;
 } task;
 
-enum { TASKS_WANTED = 1024 };
+/* Parts of a descent; those that a sample is drawn from, so small that a few hundred stand for all. */
+enum { TASKS_WANTED = 1024, TASKS_TO_SAMPLE = 32768 };
 
-/* Splits the descent into pairs of clusters that threads take one by one. */
-static size_t make_tasks(const cluster_tree *t, task tasks[TASKS_WANTED + 2]) {
-    size_t n = 1;
-    tasks[0] = (task){0, 0};
-    for (size_t at = 0; at < n && n + 2 <= TASKS_WANTED;) {
-        const task now = tasks[at];
+/* Splits the descent into about as many pairs of clusters as wanted, which threads take one by one: those
+ * with a leaf, and then the others. tasks has room for wanted + 2, queue for 3 (wanted + 2). */
+static size_t make_tasks(const cluster_tree *t, size_t wanted, task *tasks, task *queue) {
+    size_t n = 0, head = 0, tail = 1;
+    queue[0] = (task){0, 0};
+    while (head < tail && n + (tail - head) + 2 <= wanted) {
+        const task now = queue[head++];
         const cluster *a = &t->clusters[now.a], *b = &t->clusters[now.b];
         if (cluster_is_leaf(a) || cluster_is_leaf(b)) {
-            at++;
-            continue;
-        }
-        memmove(tasks + at, tasks + at + 1, (n - at - 1) * sizeof *tasks);
-        n--;
-        if (now.a == now.b) {
-            tasks[n++] = (task){a->child[0], a->child[0]};
-            tasks[n++] = (task){a->child[0], a->child[1]};
-            tasks[n++] = (task){a->child[1], a->child[1]};
+            tasks[n++] = now;
+        } else if (now.a == now.b) {
+            queue[tail++] = (task){a->child[0], a->child[0]};
+            queue[tail++] = (task){a->child[0], a->child[1]};
+            queue[tail++] = (task){a->child[1], a->child[1]};
         } else {
             const bool split_a = extent2(a) >= extent2(b);
             for (int k = 0; k < 2; k++)
-                tasks[n++] = (task){split_a ? a->child[k] : now.a, split_a ? now.b : b->child[k]};
+                queue[tail++] = (task){split_a ? a->child[k] : now.a, split_a ? now.b : b->child[k]};
         }
     }
+    while (head < tail) tasks[n++] = queue[head++];
     return n;
 }
 
@@ -146,13 +151,17 @@ static size_t make_tasks(const cluster_tree *t, task tasks[TASKS_WANTED + 2]) {
 static lam_status gather(const cluster_tree *t, const bag *bags, size_t n_bags, cluster_links *out,
                          lam_error *error) {
     lam_status status = LAM_OK;
-    cluster_links l = {0};
+    cluster_links l = {.share = 1};
     size_t *next = NULL;
     for (size_t k = 0; k < n_bags; k++) {
         if (bags[k].out_of_memory) FAIL(error, LAM_ERR_MEMORY, "links of clusters: out of memory");
         l.n += bags[k].n;
         l.hidden_pairs += bags[k].hidden_pairs;
         l.distant_pairs += bags[k].distant_pairs;
+        l.work.shafts += bags[k].work.shafts;
+        l.work.candidates += bags[k].work.candidates;
+        l.work.occlusion += bags[k].work.occlusion;
+        l.work.hidden += bags[k].work.hidden;
     }
     l.links = memory_allocate(l.n, sizeof *l.links, "links of clusters", error);
     l.of_cluster = memory_allocate(t->n_clusters + 1, sizeof *l.of_cluster, "links of clusters", error);
@@ -175,13 +184,18 @@ done:
 lam_status cluster_links_find(const mesh *m, const cluster_tree *t, const occlusion *o,
                               const cluster_link_options *options, cluster_links *out, lam_error *error) {
     lam_status status = LAM_OK;
-    task tasks[TASKS_WANTED + 2];
-    const size_t n_tasks = make_tasks(t, tasks);
-    bag *bags = memory_allocate(n_tasks, sizeof *bags, "links of clusters", error);
-    if (bags == NULL) return LAM_ERR_MEMORY;
+    const size_t step = options->one_of > 1 ? options->one_of : 1;
+    const size_t wanted = step > 1 ? TASKS_TO_SAMPLE : TASKS_WANTED;
+    size_t n_tasks = 0;
+    bag *bags = NULL;
+    task *tasks = memory_allocate(4 * (wanted + 2), sizeof *tasks, "links of clusters", error);
+    if (tasks == NULL) return LAM_ERR_MEMORY;
+    n_tasks = make_tasks(t, wanted, tasks, tasks + wanted + 2);
+    bags = memory_allocate(n_tasks, sizeof *bags, "links of clusters", error);
+    if (bags == NULL) TRY(LAM_ERR_MEMORY);
     bool cancelled = false;
 #pragma omp parallel for schedule(dynamic, 1)
-    for (size_t k = 0; k < n_tasks; k++) {
+    for (size_t k = step / 2; k < n_tasks; k += step) {
         static const uint32_t root = 0;
         bool stop;
 #pragma omp atomic read
@@ -196,8 +210,10 @@ lam_status cluster_links_find(const mesh *m, const cluster_tree *t, const occlus
     }
     if (cancelled) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
     TRY(gather(t, bags, n_tasks, out, error));
+    out->share = (double)((n_tasks - step / 2 + step - 1) / step) / (double)n_tasks;
 done:
-    for (size_t k = 0; k < n_tasks; k++) free(bags[k].links);
+    for (size_t k = 0; bags != NULL && k < n_tasks; k++) free(bags[k].links);
     free(bags);
+    free(tasks);
     return status;
 }

@@ -12,17 +12,28 @@ typedef struct cluster_link {
     bool open; /* no element occludes any of these pairs */
 } cluster_link;
 
+/* The work that finding links took. */
+typedef struct cluster_link_work {
+    double shafts;     /* built */
+    double candidates; /* clusters that shafts were given, and that they kept */
+    double occlusion;  /* pairs of clusters that got occlusion_is_total */
+    double hidden;     /* of these, those that were */
+} cluster_link_work;
+
 typedef struct cluster_links {
     cluster_link *links; /* sorted by a */
     size_t n;
     size_t *of_cluster;   /* [n_clusters + 1]: where the links of each a begin */
     double hidden_pairs;  /* of elements, in clusters that are totally occluded from each other */
     double distant_pairs; /* of elements, below the threshold */
+    cluster_link_work work;
+    double share; /* of the descent that was made: 1, or about that of a sample */
 } cluster_links;
 
 typedef struct cluster_link_options {
     double threshold; /* leaves out pairs whose mean factor 2 g / (A_i + A_j) is provably below; 0: none */
     double slack;     /* the distance by which rounding may move a point */
+    size_t one_of;    /* a sample: one of this many parts of the descent, evenly spread; 0: all of it */
     const progress *progress;
 } cluster_link_options;
 

@@ -440,23 +440,26 @@ static double segments_most(size_t n, double accuracy) {
  * nearly ten times more accurate. */
 static const double segments_least = 8e6;
 
+pairs_options pairs_options_of(const recipe *r, size_t n, double threshold) {
+    const bool near = threshold > 0;
+    return (pairs_options){.tolerance = recipe_tolerance(r),
+                           .accuracy = recipe_accuracy(r),
+                           .segments = VISIBILITY_PACKET,
+                           .segments_least = near ? 0 : segments_least,
+                           .segments_most =
+                               near ? (double)n * (double)r->rays : segments_most(n, r->accuracy),
+                           .threshold = threshold,
+                           .keep_hidden = near,
+                           .seed = r->seed,
+                           .recipe = r};
+}
+
 lam_status pairs_find(const mesh *m, const visibility *v, const form_factor_options *options,
                       double threshold, form_factors *f, csr *G, lam_error *error) {
-    const recipe *r = &options->recipe;
-    const bool near = threshold > 0;
-    const pairs_options how = {.tolerance = recipe_tolerance(r),
-                               .accuracy = recipe_accuracy(r),
-                               .segments = VISIBILITY_PACKET,
-                               .segments_least = near ? 0 : segments_least,
-                               .segments_most =
-                                   near ? (double)m->n * (double)r->rays : segments_most(m->n, r->accuracy),
-                               .threshold = threshold,
-                               .keep_hidden = near,
-                               .seed = r->seed,
-                               .progress = options->progress,
-                               .stage = options->stage,
-                               .scratch = options->scratch,
-                               .scratch_name = options->scratch_name,
-                               .recipe = r};
+    pairs_options how = pairs_options_of(&options->recipe, m->n, threshold);
+    how.progress = options->progress;
+    how.stage = options->stage;
+    how.scratch = options->scratch;
+    how.scratch_name = options->scratch_name;
     return pairs_exchange(m, v, &how, G, &f->pairs, &f->rows_kept, error);
 }

@@ -34,8 +34,11 @@ typedef struct pairs_options {
 lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_options *options, csr *G,
                           pairs_report *report, size_t *kept, lam_error *error);
 
-/* pairs_exchange with the tolerance, accuracy and numbers of segments that a recipe asks for. With a
- * threshold above 0, hidden pairs are kept as zeros, because they replace rays. Sets f->pairs and
+/* The tolerance, accuracy and numbers of segments that a recipe, which must outlive them, asks for with n
+ * elements. With a threshold above 0, hidden pairs are kept as zeros, because they replace rays. */
+pairs_options pairs_options_of(const recipe *r, size_t n, double threshold);
+
+/* pairs_exchange with pairs_options_of a recipe. Sets f->pairs and
  * f->rows_kept. Errors: as for form_factors_make. */
 lam_status pairs_find(const mesh *m, const visibility *v, const form_factor_options *options,
                       double threshold, form_factors *f, csr *G, lam_error *error);

@@ -1,0 +1,89 @@
+/* All pairs, near pairs or rays: the choice by the cost of a sample. */
+#include "solver/base/terminal.h"
+#include "solver/precompute/precompute_state.h"
+#include "support/building.h"
+#include "support/scene.h"
+#include "support/suite.h"
+
+#include <omp.h>
+
+/* The outcome of the choice for a generated scene of about n elements. */
+typedef struct outcome {
+    bool dear, plain;
+    size_t rays;
+    double seconds, entries;
+} outcome;
+
+static outcome weigh(const char *scene, size_t n, const char *quality, int n_threads) {
+    lam_error error = {0};
+    terminal t;
+    const generate_options how = {.kind = scene, .elements = n, .seed = 1, .reflectance = -1};
+    const precompute_options options = {
+        .form_factors = "auto", .quality = quality, .rays = OPTION_AUTO, .build = build_presets("auto")};
+    precompute_state state = {.options = &options, .t = &t, .expected = method_find("hierarchical")};
+    state.recipe = (recipe){.method = RECIPE_PAIRS, .rays = RECIPE_RAYS_FEW, .accuracy = 7e-5};
+    terminal_open(&t, "test", true, false);
+    state.progress = terminal_progress(&t);
+    state.m = generate_good(&how);
+    const int before = omp_get_max_threads();
+    omp_set_num_threads(n_threads);
+    ck_ok(state_weigh_pairs(&state, &error));
+    omp_set_num_threads(before);
+    const outcome found = {state.dear, state.plain, state.least_rays, state.cost.seconds, state.cost.entries};
+    mesh_free(&state.m);
+    return found;
+}
+
+/* Leaves of a canopy hide one another everywhere: their pairs cost a minute and a half, rays nine seconds. */
+START_TEST(a_soup_gets_rays) {
+    const outcome one = weigh("canopy", 6000, "normal", 1), three = weigh("canopy", 6000, "normal", 3);
+    ck_assert(one.dear);
+    ck_assert(one.plain);
+    ck_assert_uint_gt(one.rays, 0);
+    ck_assert_double_gt(one.seconds, 0);
+    /* The same bits from any number of threads. */
+    ck_assert_int_eq(one.dear, three.dear);
+    ck_assert_int_eq(one.plain, three.plain);
+    ck_assert_uint_eq(one.rays, three.rays);
+    ck_assert_double_eq(one.seconds, three.seconds);
+    ck_assert_double_eq(one.entries, three.entries);
+}
+END_TEST
+
+START_TEST(a_plain_room_keeps_its_pairs) {
+    for (int k = 0; k < 2; k++) {
+        const outcome found = weigh("cornell", k == 0 ? 600 : 3000, "normal", 2);
+        ck_assert(!found.dear);
+        ck_assert_uint_eq(found.rays, 0);
+        ck_assert_double_gt(found.seconds, 0);
+    }
+}
+END_TEST
+
+/* High quality asks for the accuracy of pairs, and may take longer. */
+START_TEST(high_quality_keeps_pairs_for_longer) {
+    ck_assert(weigh("canopy", 4000, "normal", 2).dear);
+    ck_assert(!weigh("canopy", 4000, "high", 2).dear);
+}
+END_TEST
+
+/* Twice the elements have four times the pairs. */
+START_TEST(more_elements_cost_more) {
+    const outcome few = weigh("cornell", 1600, "normal", 2), many = weigh("cornell", 3200, "normal", 2);
+    /* Four times the pairs, and some of the cost is a floor of segments. */
+    ck_assert_double_gt(many.seconds, 1.2 * few.seconds);
+    ck_assert_double_gt(many.entries, 2 * few.entries);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("weigh_pairs");
+    TCase *cases = tcase_create("weigh_pairs");
+    tcase_set_timeout(cases, 300);
+    tcase_add_test(cases, a_soup_gets_rays);
+    tcase_add_test(cases, a_plain_room_keeps_its_pairs);
+    tcase_add_test(cases, high_quality_keeps_pairs_for_longer);
+    tcase_add_test(cases, more_elements_cost_more);
+    suite_add_tcase(suite, cases);
+    return suite_run(suite);
+}
