@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# All tests: layers, layout and clang-tidy, then every test under AddressSanitizer and UndefinedBehaviorSanitizer, then
-# the daemon's tests under ThreadSanitizer, with faults around it and installed, then a warning-free build by the other
-# compiler. The builds are the presets of CMakePresets.json, in build/.
+# All tests: layers, layout and clang-tidy, then all but four tests under AddressSanitizer and UndefinedBehaviorSanitizer,
+# the daemon's under ThreadSanitizer, those four (faults, installation, documents, servers of the bench) as users have the
+# programs, then a warning-free build by the other compiler. The builds are the presets of CMakePresets.json, in build/.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 jobs=$(nproc)
