@@ -320,7 +320,7 @@ void occluders_block(const occluders *o, const candidates *among, const double o
             const float e3 = edge[3][0] * p0 + edge[3][1] * p1 + edge[3][2] * p2 + edge[3][3];
             const float low_a = e0 < e1 ? e0 : e1, low_b = e2 < e3 ? e2 : e3;
             const float low = low_a < low_b ? low_a : low_b;
-            blocked[k] = (from * to < 0) & (low > 0) ? 1.f : blocked[k];
+            blocked[k] = ((from * to < 0) & (low > 0)) ? 1.f : blocked[k];
         }
     }
 }
