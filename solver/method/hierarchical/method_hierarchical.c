@@ -184,8 +184,8 @@ done:
     return status;
 }
 
-/* S from blocks, and sums [n]. Its coefficients are those of F without the balance, which is put into the row
- * sums. */
+/* S from blocks, and the row sums [n] of F, which are imposed: within a cluster the balance counts by its
+ * mean and its slopes alone. */
 static lam_status expand_blocks(const expansion *x, double *sums, csr *S, lam_error *error) {
     lam_status status = LAM_OK;
     const block_factors *f = x->problem->blocks;

@@ -47,6 +47,11 @@ typedef struct open_column {
     uint32_t node;
 } open_column;
 
+/* The weight of an element in S: A^1/2, times its balance. */
+static double weight_of(const block_factors *f, size_t position) {
+    return sqrt(f->area[position]) * (f->balance != NULL ? f->balance[position] : 1);
+}
+
 /* The working area of one thread. */
 typedef struct blocks_work {
     column_item *items;
@@ -197,7 +202,7 @@ static inline void add_item(const blocks_row *r, const column_item *item, size_t
     for (size_t g = 0; g < n_left; g++)
         for (size_t c = 0; c < BLOCK_FUNCTIONS; c++) {
             if (groups > 1) {
-                left[g][c] = sqrt(f->area[k->a - f->n_clusters]) * (double)k->L[0][c];
+                left[g][c] = weight_of(f, k->a - f->n_clusters) * (double)k->L[0][c];
                 continue;
             }
             const double *m = r->job->moments[r->node].of[g];
@@ -208,7 +213,7 @@ static inline void add_item(const blocks_row *r, const column_item *item, size_t
         const uint32_t p = k->b - (uint32_t)f->n_clusters;
         const size_t slot = p - w->nodes[f->nodes[k->b].parent].begin;
         for (size_t g = 0; g < n_left; g++)
-            in[slot][(lane + g) / GROUP][(lane + g) % GROUP] += (float)(left[g][0] * sqrt(f->area[p]));
+            in[slot][(lane + g) / GROUP][(lane + g) % GROUP] += (float)(left[g][0] * weight_of(f, p));
         return;
     }
     const size_t slot = slot_of(w, k->b);
@@ -369,7 +374,7 @@ static void find_moments(const block_factors *f, const wavelets *w, size_t node,
         const bool leaf = a->from_left == 0, from_left = m < a->from_left;
         const size_t child = leaf ? f->n_clusters + a->begin + m : from_left ? a->left : node - 1;
         const block_step s = block_step_up(&f->nodes[child], &f->nodes[node]);
-        const double root[BLOCK_FUNCTIONS] = {leaf ? sqrt(f->area[a->begin + m]) : 0, 0, 0};
+        const double root[BLOCK_FUNCTIONS] = {leaf ? weight_of(f, a->begin + m) : 0, 0, 0};
         const double *was = leaf ? root : all[child].of[from_left ? m : m - a->from_left];
         const double now[BLOCK_FUNCTIONS] = {was[0], s.shift[0] * was[0] + s.scale[0] * was[1],
                                              s.shift[1] * was[0] + s.scale[1] * was[2]};

@@ -132,6 +132,36 @@ START_TEST(pairs_give_what_rows_give) {
 }
 END_TEST
 
+/* Of pairs of elements any balance is found exactly, of clusters one that is the same all over. */
+START_TEST(balance_is_kept) {
+    subject s = wavelet_subject_make(_i);
+    const size_t n = s.m.n;
+    uint64_t seed = 5;
+    for (int clusters = 0; clusters < 2; clusters++) {
+        block_factors f = begin(&s);
+        f.balance = test_allocate(n, sizeof *f.balance);
+        for (size_t p = 0; p < n; p++) f.balance[p] = clusters ? .8 : .5 + random_lcg_unit(&seed);
+        if (clusters)
+            random_blocks(&f, ROUNDS, &seed);
+        else
+            blocks_of_pairs(&s.F, &f);
+        double *S = dense_of_blocks(&f), *truth = in_basis(&s, S);
+        ck_ok(block_factors_end(&f, &error));
+        float *weight = ones(&s.basis);
+        csr found = blocks_of(&s, &f, 0, weight, 2);
+        double *all = whole(&found);
+        ck_assert_double_le(largest_difference(n * n, all, truth), 3 * TRANSFORM_U * frobenius(n, S));
+        block_factors_free(&f);
+        csr_free(&found);
+        free(weight);
+        free(S);
+        free(truth);
+        free(all);
+    }
+    wavelet_subject_free(&s);
+}
+END_TEST
+
 /* Two squares of one element each: the root is the only node above the leaves. */
 START_TEST(the_smallest_tree) {
     const double area[2] = {4, 1}, centre[2][3] = {{0, 0, 0}, {0, 0, 1}};
@@ -232,6 +262,7 @@ int main(void) {
     tcase_set_timeout(tests, 300);
     tcase_add_loop_test(tests, random_blocks_in_the_basis, 0, SUBJECTS);
     tcase_add_loop_test(tests, pairs_give_what_rows_give, 0, SUBJECTS);
+    tcase_add_loop_test(tests, balance_is_kept, 0, SUBJECTS);
     tcase_add_test(tests, the_smallest_tree);
     tcase_add_test(tests, progress_is_told_and_stops);
     tcase_add_test(tests, memory_runs_out);
