@@ -99,12 +99,12 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
 /* The tree of a mesh's elements on which blocks are found. Errors: LAM_ERR_MEMORY. */
 lam_status form_factors_tree(const mesh *m, plane_tree *out, lam_error *error);
 
-/* The same by blocks of clusters (RECIPE_BLOCKS) on a tree of the elements with leaves of PLANE_LEAF: blocks
- * holds the form factors, freed by block_factors_free, and out all but rows. In a closed scene their balance
- * gives rows the sum 1, in others it keeps sums at most 1. judge: visible shares come from the whole scene by
- * Embree, so that a judge shares nothing with those of single occluders but the proofs that nothing, or one
- * piece, stands between. No sky, no scratch folder. Cost: about a microsecond for each of some n^1/2 blocks.
- * Errors: LAM_ERR_ARGUMENT, LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+/* The same by blocks of clusters (RECIPE_BLOCKS) on a tree of the elements with leaves of PLANE_LEAF, which
+ * must outlive blocks: these hold the form factors, freed by block_factors_free, and out all but rows. In a
+ * closed scene their balance gives rows the sum 1, in others it keeps sums at most 1. judge: visible shares
+ * come from the whole scene by Embree, so that a judge shares nothing with those of single occluders but the
+ * proofs that nothing, or one piece, stands between. No sky, no scratch folder. Cost: about a microsecond for
+ * each of some n^1/2 blocks. Errors: LAM_ERR_ARGUMENT, LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
 lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const plane_tree *tree, bool judge,
                                     const form_factor_options *options, form_factors *out,
                                     block_factors *blocks, lam_error *error);

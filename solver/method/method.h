@@ -26,14 +26,13 @@ typedef struct emitter_source {
 typedef struct build_problem {
     size_t n;
     size_t n_channels;
-    const double *area;       /* [n] */
-    const float *reflectance; /* [C][n], in [0, 1) */
-    const csr *F;             /* NULL where there are others, and before the form factors are found */
-    row_stream *stream;       /* of rows of F, in place of F; METHOD_STREAMS */
-    const block_factors
-        *blocks;           /* in place of F, on the tree of centre and normal (PLANE_LEAF); METHOD_BLOCKS */
-    const uint32_t *order; /* [n] */
-    double noise;          /* sampling error of S in the 2-norm, about; 0: not known */
+    const double *area;          /* [n] */
+    const float *reflectance;    /* [C][n], in [0, 1) */
+    const csr *F;                /* NULL where there are others, and before the form factors are found */
+    row_stream *stream;          /* of rows of F, in place of F; METHOD_STREAMS */
+    const block_factors *blocks; /* in place of F, on a tree with leaves of PLANE_LEAF; METHOD_BLOCKS */
+    const uint32_t *order;       /* [n] */
+    double noise;                /* sampling error of S in the 2-norm, about; 0: not known */
     /* NULL where no method needs them: METHOD_GEOMETRY. */
     const double (*centre)[3];      /* [n] centroids, m */
     const float (*normal)[3];       /* [n] unit */

@@ -16,7 +16,8 @@ static lam_status judge_by_blocks(const judging *j, const lam_operator *op, erro
     for (int h = 0; h < 2; h++) {
         form_factor_options how = {.recipe = j->halves[h], .progress = j->progress, .stage = j->stages[h]};
         if (h == 1) how.recipe.accuracy *= tolerance_ratio;
-        TRY(form_factors_make_blocks(j->m, j->order, j->tree, true, &how, &about[h], &half[h], error));
+        TRY(form_factors_make_blocks(j->m, j->order, j->problem->blocks->tree, true, &how, &about[h],
+                                     &half[h], error));
         form_factors_free(&about[h]);
     }
     const judge_input input = {.problem = j->problem,

@@ -12,7 +12,6 @@ typedef struct judging {
     const uint32_t *order;
     const build_problem *problem; /* with the F that the operator was built from */
     const form_factors *f;        /* of problem: its recipe and row sums */
-    const plane_tree *tree;       /* of problem->blocks, where there are */
     recipe halves[2];             /* of the two samples */
     const char *scratch_names[2];
     const char *stages[2]; /* for progress */

@@ -226,7 +226,6 @@ lam_status stage_judge(precompute_state *state, lam_error *error) {
                  .order = state->order,
                  .problem = &problem,
                  .f = &state->f,
-                 .tree = &state->tree,
                  .scratch_names = {"judge-1.rows", "judge-2.rows"},
                  .stages = {"form factors for the judge, 1 of 2", "form factors for the judge, 2 of 2"},
                  .scratch = state->scratch,

@@ -272,7 +272,6 @@ static lam_status measure_again(examination *e, const recipe *from, error_report
         .order = order,
         .problem = &problem,
         .f = &e->f,
-        .tree = &tree,
         .halves = {recipe_again(e, from, SEED_VERIFY_FIRST), recipe_again(e, from, SEED_VERIFY_SECOND)},
         .stages = {"form factors", "form factors"},
         .probes_seed = precompute_seed(from->seed, SEED_VERIFY_PROBES),

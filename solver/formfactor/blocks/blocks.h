@@ -19,10 +19,10 @@ typedef struct block_options {
     const char *stage;
 } block_options;
 
-/* Finds the blocks of all pairs of planes of a tree. Visible shares come from segments against the occluders
- * in between, or from Embree where these are many, and from nothing where none is. The bits do not depend on
- * the number of threads: segments are seeded by the pair of clusters. report may be NULL. out is freed by
- * block_factors_free.
+/* Finds the blocks of all pairs of planes of a tree, which must outlive them. Visible shares come from
+ * segments against the occluders in between, or from Embree where these are many, and from nothing where none
+ * is. The bits do not depend on the number of threads: segments are seeded by the pair of clusters. report
+ * may be NULL. out is freed by block_factors_free.
  *
  * Cost: blocks grow like n^1/2 in rooms of large planes; partly hidden ones do not grow with n (measured).
  * Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */

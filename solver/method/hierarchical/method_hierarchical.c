@@ -16,7 +16,6 @@
 #include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 typedef struct hierarchical_options {
     double epsilon;
@@ -172,18 +171,6 @@ done:
     return status;
 }
 
-/* Blocks refer to clusters and positions of their own tree. */
-static lam_status check_tree(const plane_tree *tree, const block_factors *f, lam_error *error) {
-    lam_status status = LAM_OK;
-    bool same = f->n == tree->n && f->n_clusters == tree->n_clusters;
-    for (size_t t = 0; same && t < f->n_clusters; t++)
-        same = f->nodes[t].begin == tree->clusters[t].begin && f->nodes[t].end == tree->clusters[t].end;
-    if (!same || memcmp(f->order, tree->order, f->n * sizeof *f->order) != 0)
-        FAIL(error, LAM_ERR_ARGUMENT, "the blocks of form factors are on another tree of clusters");
-done:
-    return status;
-}
-
 /* S from blocks, and the row sums [n] of F, which are imposed: within a cluster the balance counts by its
  * mean and its slopes alone. */
 static lam_status expand_blocks(const expansion *x, double *sums, csr *S, lam_error *error) {
@@ -198,7 +185,6 @@ static lam_status expand_blocks(const expansion *x, double *sums, csr *S, lam_er
     double *ones = memory_allocate(f->n, sizeof *ones, "operator", error);
     double *product = memory_allocate(f->n, sizeof *product, "operator", error);
     if (ones == NULL || product == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(check_tree(x->tree, f, error));
     for (size_t p = 0; p < f->n; p++) ones[p] = 1;
     TRY(block_factors_multiply(f, 1, ones, product, error));
     for (size_t p = 0; p < f->n; p++) sums[f->order[p]] = product[p];
@@ -218,7 +204,8 @@ static lam_status build(const build_problem *problem, const build_options *optio
     const double least = share_of_noise * problem->noise;
     const shares *const share = problem->blocks != NULL ? &shares_of_blocks : &shares_of_rows;
     const double threshold = fmax(share->of_epsilon * epsilon, least);
-    plane_tree tree = {.n = 0};
+    plane_tree made_tree = {.n = 0};
+    const plane_tree *const tree = problem->blocks != NULL ? problem->blocks->tree : &made_tree;
     hierarchical_arrays arrays = {.K = memory_allocate(C, sizeof *arrays.K, "operator", error)};
     wavelet_inverse_report inverted = {.doublings = 0};
     csr S = {.n = 0};
@@ -229,12 +216,13 @@ static lam_status build(const build_problem *problem, const build_options *optio
     const double *row_sums = sums;
     bool corrected = false;
     if (arrays.K == NULL || rho == NULL || area == NULL || sums == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(plane_tree_make(n, problem->centre, problem->normal, PLANE_LEAF, &tree, error));
-    TRY(wavelet_basis_make(&tree, problem->area, problem->centre, &arrays.basis, error));
+    if (problem->blocks == NULL)
+        TRY(plane_tree_make(n, problem->centre, problem->normal, PLANE_LEAF, &made_tree, error));
+    TRY(wavelet_basis_make(tree, problem->area, problem->centre, &arrays.basis, error));
     TRY(make_weights(&arrays.basis, &weight, error));
-    for (size_t p = 0; p < n; p++) area[p] = problem->area[tree.order[p]];
+    for (size_t p = 0; p < n; p++) area[p] = problem->area[tree->order[p]];
     const expansion x = {.problem = problem,
-                         .tree = &tree,
+                         .tree = tree,
                          .basis = &arrays.basis,
                          .weight = weight,
                          .area = area,
@@ -247,7 +235,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
     const double expanded = clock_seconds();
     report_step_add(report, problem->stream != NULL ? "rays, wavelets" : "wavelets", expanded - started);
     for (size_t c = 0; c < C; c++) {
-        for (size_t p = 0; p < n; p++) rho[p] = problem->reflectance[c * n + tree.order[p]];
+        for (size_t p = 0; p < n; p++) rho[p] = problem->reflectance[c * n + tree->order[p]];
         const wavelet_inverse_input inverse = {.basis = &arrays.basis,
                                                .S = &S,
                                                .rho = rho,
@@ -261,9 +249,9 @@ static lam_status build(const build_problem *problem, const build_options *optio
         entries += (double)arrays.K[c].indptr[n];
     }
     const size_t n_shapes = arrays.basis.n_shapes, n_nodes = arrays.basis.n_nodes;
-    TRY(operator_hierarchical_create(n, C, problem->reflectance, area, tree.order, &arrays, &made, error));
+    TRY(operator_hierarchical_create(n, C, problem->reflectance, area, tree->order, &arrays, &made, error));
     lam_operator_set_threads(made, n_threads);
-    TRY(correct_mean(problem, row_sums, epsilon, tree.order, made, &corrected, error));
+    TRY(correct_mean(problem, row_sums, epsilon, tree->order, made, &corrected, error));
     report_number(report, "threshold", threshold);
     report_step_add(report, "invert", clock_seconds() - expanded);
     snprintf(
@@ -271,7 +259,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
         "threshold %.2g by %s, %.3g stored coefficients per element (%.3g of S), %zu planes, %zu clusters "
         "of %zu shapes%s",
         threshold, threshold > least ? "--epsilon" : "the noise of the rays", entries / (double)(n * C),
-        (double)S.indptr[n] / (double)n, tree.n_frames, n_nodes, n_shapes,
+        (double)S.indptr[n] / (double)n, tree->n_frames, n_nodes, n_shapes,
         corrected ? "; the mean error of uniform emission is corrected" : "");
     TRY(self_check(problem, row_sums, made, options->seed, report, error));
     *op = made;
@@ -280,7 +268,7 @@ done:
     lam_operator_close(made);
     csr_free(&S);
     hierarchical_arrays_free(&arrays, C);
-    plane_tree_free(&tree);
+    plane_tree_free(&made_tree);
     free(weight);
     free(rho);
     free(area);

@@ -7,7 +7,6 @@
 #include <string.h>
 
 void block_factors_free(block_factors *f) {
-    free(f->order);
     free(f->nodes);
     free(f->place);
     free(f->area);
@@ -63,15 +62,12 @@ lam_status block_factors_begin(const plane_tree *tree, const double *area, const
                                block_factors *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = tree->n, n_clusters = tree->n_clusters;
-    block_factors f = {.n = n, .n_clusters = n_clusters};
+    block_factors f = {.tree = tree, .n = n, .n_clusters = n_clusters, .order = tree->order};
     rectangle *around = memory_allocate(n_clusters, sizeof *around, "blocks", error);
-    f.order = memory_allocate(n, sizeof *f.order, "blocks", error);
     f.nodes = memory_allocate(n_clusters + n, sizeof *f.nodes, "blocks", error);
     f.place = memory_allocate(n, sizeof *f.place, "blocks", error);
     f.area = memory_allocate(n, sizeof *f.area, "blocks", error);
-    if (around == NULL || f.order == NULL || f.nodes == NULL || f.place == NULL || f.area == NULL)
-        TRY(LAM_ERR_MEMORY);
-    memcpy(f.order, tree->order, n * sizeof *f.order);
+    if (around == NULL || f.nodes == NULL || f.place == NULL || f.area == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t t = 0; t < n_clusters; t++) {
         const plane_cluster *c = &tree->clusters[t];
         block_node *node = &f.nodes[t];

@@ -46,11 +46,12 @@ typedef struct cluster_block {
 } cluster_block;
 
 typedef struct block_factors {
-    size_t n, n_clusters;
-    uint32_t *order;    /* [n], position -> element */
-    block_node *nodes;  /* [n_clusters + n] */
-    double (*place)[2]; /* [n] centroids by position, in the frame of the plane */
-    double *area;       /* [n] by position, m^2 */
+    const plane_tree *tree; /* it outlives the blocks */
+    size_t n, n_clusters;   /* of the tree */
+    const uint32_t *order;  /* [n], position -> element, of the tree */
+    block_node *nodes;      /* [n_clusters + n] */
+    double (*place)[2];     /* [n] centroids by position, in the frame of the plane */
+    double *area;           /* [n] by position, m^2 */
     double *balance; /* [n] by position: F_ij of the blocks is multiplied by balance_i balance_j, so that rows
                         have the sums that they must have; NULL: 1 */
     size_t n_blocks;
@@ -64,9 +65,9 @@ typedef struct block_factors {
 
 void block_factors_free(block_factors *f);
 
-/* Nodes, order, places and areas of a tree; no blocks. area and centre [n] by element. The rectangles of
- * nodes in a plane are those around the centroids; the caller may widen them until blocks refer to them.
- * Errors: LAM_ERR_MEMORY. */
+/* Nodes, places and areas of a tree, which must outlive them; no blocks. area and centre [n] by element. The
+ * rectangles of nodes in a plane are those around the centroids; the caller may widen them until blocks refer
+ * to them. Errors: LAM_ERR_MEMORY. */
 lam_status block_factors_begin(const plane_tree *tree, const double *area, const double (*centre)[3],
                                block_factors *out, lam_error *error);
 

@@ -81,7 +81,7 @@ static size_t elements_of(const block_factors *f, size_t t) {
 }
 
 static bool is_leaf(const block_factors *f, size_t t) {
-    return f->nodes[f->n_clusters + f->nodes[t].begin].parent == t;
+    return f->tree->clusters[t].leaf;
 }
 
 static lam_status cut(const block_factors *f, product *out, lam_error *error) {

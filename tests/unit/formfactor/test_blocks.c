@@ -8,16 +8,15 @@
 
 #include <omp.h>
 
-static block_factors find(const mesh *m, double open, double shadow, block_report *report) {
+/* On a tree that the caller frees. */
+static block_factors find(const mesh *m, plane_tree *tree, double open, double shadow, block_report *report) {
     lam_error error = {.message = ""};
     const block_options options = {.open = open, .shadow = shadow, .exact = 1e-6, .seed = 1};
     visibility *v = NULL;
-    plane_tree tree;
     block_factors f;
     ck_ok(visibility_create(m, &v, &error));
-    ck_ok(form_factors_tree(m, &tree, &error));
-    ck_ok(blocks_find(m, v, &tree, &options, &f, report, &error));
-    plane_tree_free(&tree);
+    ck_ok(form_factors_tree(m, tree, &error));
+    ck_ok(blocks_find(m, v, tree, &options, &f, report, &error));
     visibility_destroy(v);
     return f;
 }
@@ -62,18 +61,22 @@ START_TEST(plates_are_right) {
     const size_t n_cases = _i == 0 ? sizeof plates_cases / sizeof *plates_cases : 2;
     for (size_t c = 0; c < n_cases; c++) {
         mesh m = fine_plates(c == 0 ? NULL : plates_cases[c].occluder, plates_places[_i]);
-        block_factors f = find(&m, 1e-5, 3e-4, NULL);
+        plane_tree tree;
+        block_factors f = find(&m, &tree, 1e-5, 3e-4, NULL);
         ck_assert_double_eq_tol(factor_between(&m, &f, 64), plates_cases[c].F,
                                 (c == 0 ? 2e-5 : 2e-3) * plates_cases[c].F);
         block_factors_free(&f);
+        plane_tree_free(&tree);
         mesh_free(&m);
     }
     mesh m = fine_plates(plates_hidden, plates_places[_i]);
     block_report report;
-    block_factors f = find(&m, 1e-5, 3e-4, &report);
+    plane_tree tree;
+    block_factors f = find(&m, &tree, 1e-5, 3e-4, &report);
     ck_assert_double_eq(factor_between(&m, &f, 64), 0); /* edges must not leak */
     ck_assert_uint_gt(report.hidden, 0);
     block_factors_free(&f);
+    plane_tree_free(&tree);
     mesh_free(&m);
 }
 END_TEST
@@ -85,7 +88,8 @@ START_TEST(rooms_are_proven_open) {
     for (int k = 0; k < 3; k++) {
         mesh m = box_mesh(size, 12, .5f);
         block_report report;
-        block_factors f = find(&m, pow(10, -2 - k), 1e-3, &report);
+        plane_tree tree;
+        block_factors f = find(&m, &tree, pow(10, -2 - k), 1e-3, &report);
         double *one = malloc(m.n * sizeof *one), *sums = malloc(m.n * sizeof *sums);
         ck_assert_uint_eq(report.segments, 0);
         ck_assert_uint_eq(report.hidden + report.shaded + report.shaded_pairs, 0);
@@ -96,6 +100,7 @@ START_TEST(rooms_are_proven_open) {
         free(one);
         free(sums);
         block_factors_free(&f);
+        plane_tree_free(&tree);
         mesh_free(&m);
     }
     ck_assert_double_lt(off[0], .2);
@@ -143,11 +148,13 @@ START_TEST(errors_fall_with_the_tolerances) {
     ck_ok(visibility_create(&m, &v, &error));
     ck_ok(pairs_exchange(&m, v, &exact, &G, &ignored, NULL, &error));
     for (int k = 0; k < 3; k++) {
-        block_factors f = find(&m, 3e-2 * pow(.1, k), 3e-2 * pow(.1, k), NULL);
+        plane_tree tree;
+        block_factors f = find(&m, &tree, 3e-2 * pow(.1, k), 3e-2 * pow(.1, k), NULL);
         const double now = distance_from_pairs(&m, &f, &G);
         ck_assert_double_lt(now, .6 * last);
         last = now;
         block_factors_free(&f);
+        plane_tree_free(&tree);
     }
     ck_assert_double_lt(last, 3e-3);
     csr_free(&G);
@@ -159,15 +166,19 @@ END_TEST
 START_TEST(threads_do_not_change_bits) {
     const int most = omp_get_max_threads();
     mesh m = closed_cornell(800);
+    plane_tree tree[2];
     block_factors f[2];
     for (int k = 0; k < 2; k++) {
         omp_set_num_threads(k == 0 ? 1 : 3);
-        f[k] = find(&m, 1e-3, 1e-3, NULL);
+        f[k] = find(&m, &tree[k], 1e-3, 1e-3, NULL);
     }
     omp_set_num_threads(most);
     ck_assert_uint_eq(f[0].n_blocks, f[1].n_blocks);
     ck_assert_mem_eq(f[0].blocks, f[1].blocks, f[0].n_blocks * sizeof *f[0].blocks);
-    for (int k = 0; k < 2; k++) block_factors_free(&f[k]);
+    for (int k = 0; k < 2; k++) {
+        block_factors_free(&f[k]);
+        plane_tree_free(&tree[k]);
+    }
     mesh_free(&m);
 }
 END_TEST
@@ -175,7 +186,8 @@ END_TEST
 /* Every pair of elements is in one block at most, and elements of one plane in none. */
 START_TEST(no_pair_counts_twice) {
     mesh m = closed_cornell(300);
-    block_factors f = find(&m, 1e-3, 1e-3, NULL);
+    plane_tree tree;
+    block_factors f = find(&m, &tree, 1e-3, 1e-3, NULL);
     uint8_t *seen = calloc(m.n * m.n, 1);
     for (size_t k = 0; k < f.n_blocks; k++) {
         const block_node *a = &f.nodes[f.blocks[k].a], *b = &f.nodes[f.blocks[k].b];
@@ -188,6 +200,7 @@ START_TEST(no_pair_counts_twice) {
     }
     free(seen);
     block_factors_free(&f);
+    plane_tree_free(&tree);
     mesh_free(&m);
 }
 END_TEST
