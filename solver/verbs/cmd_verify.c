@@ -74,9 +74,9 @@ static void print_compared(const examination *e) {
         char at[32];
         for (size_t c = 1; c < e->m.n_channels; c++)
             if (fabs(e->compared[k + c].score) > fabs(w->score)) w = &e->compared[k + c];
-        snprintf(at, sizeof at, "element %zu", w->element);
-        printf("        %+7.1f  operator %-11.6g walks %-11.6g +- %-8.2g  %s under %s\n", w->score, w->answer,
-               w->mean, w->error, w->group != NULL ? w->group : at, w->emission);
+        printf("        %+7.1f  operator %-11.6g walks %-11.6g +- %-8.2g  %s under %s%s\n", w->score,
+               w->answer, w->mean, w->error, walk_comparison_target(w, at), w->emission,
+               w->dark ? ", dark" : "");
     }
 }
 
@@ -84,9 +84,9 @@ static json_t *compared_json(const examination *e) {
     json_t *list = json_array();
     for (size_t k = 0; k < e->n_compared; k++) {
         const walk_comparison *w = &e->compared[k];
-        json_t *one = json_pack("{s:s, s:I, s:f, s:f, s:f, s:f}", "emission", w->emission, "channel",
-                                (json_int_t)w->channel, "operator", w->answer, "walks", w->mean,
-                                "standard_error", w->error, "z", w->score);
+        json_t *one = json_pack("{s:s, s:b, s:I, s:f, s:f, s:f, s:f}", "emission", w->emission, "dark",
+                                (int)w->dark, "channel", (json_int_t)w->channel, "operator", w->answer,
+                                "walks", w->mean, "standard_error", w->error, "z", w->score);
         if (w->group != NULL)
             json_object_set_new(one, "group", json_string(w->group));
         else

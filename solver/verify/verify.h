@@ -20,12 +20,17 @@ typedef struct check {
 typedef struct walk_comparison {
     const char
         *emission;     /* the name of the group or of the emitter that emits alone; or "uniform", "mixture" */
+    bool dark;         /* no walk came from the emission to any element */
     const char *group; /* NULL: a single element */
     size_t element;    /* without a group */
     size_t channel;
     double answer, mean, error; /* the operator's, that of the walks, its standard error */
     double score;               /* (answer - mean) / error, as walk_score says */
+    double beyond; /* |score| of the part of the difference beyond the stated error; 0: within it */
 } walk_comparison;
+
+/* The name of its group, or "element 17", for which text is. */
+const char *walk_comparison_target(const walk_comparison *w, char text[32]);
 
 /* A store under examination; data that a check has loaded stays for the next. */
 typedef struct examination {

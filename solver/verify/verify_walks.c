@@ -136,12 +136,13 @@ static void choose_elements(const mesh *m, targets *t) {
     }
 }
 
+/* All other groups are target n, which nothing is compared with: it counts what comes to them. */
 static lam_status choose_groups(const mesh *m, targets *t, lam_error *error) {
     size_t groups[GROUPS_MOST];
     double *area = group_sums(m, false, error);
     if (area == NULL) return LAM_ERR_MEMORY;
     t->n = find_largest(area, m->n_groups, GROUPS_MOST, groups);
-    for (size_t i = 0; i < m->n; i++) t->of[i] = WALK_NO_TARGET;
+    for (size_t i = 0; i < m->n; i++) t->of[i] = (uint32_t)t->n;
     for (size_t k = 0; k < t->n; k++) {
         t->groups[k] = m->group_names[groups[k]];
         t->area[k] = area[groups[k]];
@@ -152,42 +153,76 @@ static lam_status choose_groups(const mesh *m, targets *t, lam_error *error) {
     return LAM_OK;
 }
 
-/* An answer H [n lights][C][n of the mesh] of the operator, and its largest differences from walks. */
+/* An answer of the operator, and the difference from walks that the store allows it. */
 typedef struct judgement {
     const lights *l;
-    const float *H;
-    double *received; /* [n lights]: sum A H^2 over elements and channels */
-    double stated[2]; /* the stated error of any emission, of one group or emitter alone; negative: none */
-    double beyond;    /* the largest score of a difference beyond the stated error */
+    float *H;      /* [n lights][C][n of the mesh] */
+    bool *dark;    /* [n lights]: no walk came from it to any element */
+    double *error; /* [n lights]: the stated error of H in the area norm */
+    bool known;    /* the store states all of them */
 } judgement;
+
+/* The largest error that a store states for any emission, or for one light alone; negative: none. */
+static double stated_error(store *s, const char *name, bool alone) {
+    double most, value;
+    if (!examination_stated(s, "/error/random", name, &most)) return -1;
+    if (alone && examination_stated(s, "/error/lights", name, &value)) most = fmax(most, value);
+    if (alone && examination_stated(s, "/error/single", name, &value)) most = fmax(most, value);
+    return most;
+}
+
+/* (sum A x^2)^1/2 over elements and channels, x [C][n]. */
+static double area_norm(const mesh *m, const float *x) {
+    double sum = 0;
+    for (size_t k = 0; k < m->n_channels * m->n; k++) sum += m->area[k % m->n] * (double)x[k] * (double)x[k];
+    return sqrt(sum);
+}
+
+/* Fills dark, error and known. The indirect error is relative to the light that is received. As for the
+ * judge, it says nothing of a dark emission, which has none: that is held to the relative error, for which
+ * the judge measures dark emissions too. It is relative to B, which is E there. */
+static void allow(const examination *e, const walk_estimates *shot, judgement *j) {
+    const size_t count = e->m.n * e->m.n_channels;
+    j->known = true;
+    for (size_t light = 0; light < j->l->n; light++) {
+        const bool alone = light > 0 && light + 1 < j->l->n;
+        uint64_t visits = 0;
+        for (size_t t = 0; t < shot->n_targets; t++) visits += shot->visits[light * shot->n_targets + t];
+        j->dark[light] = visits == 0;
+        const double stated =
+            stated_error(e->s, visits == 0 ? "total_relative_max" : "total_indirect_max", alone);
+        j->known = j->known && stated >= 0;
+        j->error[light] = stated * area_norm(&e->m, (visits == 0 ? j->l->E : j->H) + light * count);
+    }
+}
 
 /* Adds the comparisons of some targets. The bound on a mean is that of verify_energy: an error h of H in the
  * area norm moves the mean over the area A by at most |h| / A^1/2, twice because the stated error weighs H by
  * the reflectance. */
-static void compare(examination *e, judgement *j, const targets *t, const walk_estimates *found) {
+static void compare(examination *e, const judgement *j, const targets *t, const walk_estimates *found) {
     const mesh *m = &e->m;
     const size_t channels = m->n_channels;
     for (size_t p = 0; p < j->l->n * t->n * channels; p++) {
         const size_t channel = p % channels, target = p / channels % t->n, light = p / channels / t->n;
-        const size_t row = light * channels + channel, k = row * t->n + target;
+        const size_t row = light * channels + channel, k = row * found->n_targets + target;
         double answer = 0;
         for (size_t i = 0; i < m->n; i++)
             if (t->of[i] == target) answer += m->area[i] * (double)j->H[row * m->n + i];
         answer /= t->area[target];
         const double score = walk_score(found, k, answer, rounding * answer);
         const double difference = fabs(answer - found->mean[k]);
-        const double stated = j->stated[light > 0 && light + 1 < j->l->n];
-        const double allowed = 2 * 1.1 * stated * sqrt(j->received[light] / t->area[target]);
+        const double allowed = 2 * 1.1 * j->error[light] / sqrt(t->area[target]);
         e->compared[e->n_compared++] =
             (walk_comparison){.emission = j->l->names[light],
+                              .dark = j->dark[light],
                               .group = t->groups[target],
                               .element = t->groups[target] == NULL ? t->elements[target] : 0,
                               .channel = channel,
                               .answer = answer,
                               .mean = found->mean[k],
                               .error = score != 0 ? difference / fabs(score) : found->error[k],
-                              .score = score};
-        if (difference > allowed) j->beyond = fmax(j->beyond, fabs(score) * (1 - allowed / difference));
+                              .score = score,
+                              .beyond = difference > allowed ? fabs(score) * (1 - allowed / difference) : 0};
     }
 }
 
@@ -210,9 +245,10 @@ static lam_status walk_all(examination *e, judgement *j, lam_error *error) {
                             .seed = precompute_seed(0, SEED_VERIFY_WALKS),
                             .progress = e->progress};
     TRY(choose_groups(m, &t, error));
-    problem.n_targets = t.n;
+    problem.n_targets = t.n + 1;
     problem.stage = "walks from lights";
     TRY(walk_shoot(scene, &problem, &found, error));
+    allow(e, &found, j);
     compare(e, j, &t, &found);
     walk_estimates_free(&found);
     choose_elements(m, &t);
@@ -227,67 +263,59 @@ done:
     return status;
 }
 
-/* The largest error that a store states for any emission, and for one light alone. */
-static void read_stated(store *s, double stated[2]) {
-    static const char *const groups[] = {"/error/random", "/error/lights", "/error/single"};
-    double value;
-    stated[0] = examination_stated(s, groups[0], "total_indirect_max", &value) ? value : -1;
-    stated[1] = stated[0];
-    for (int k = 1; k < 3 && stated[0] >= 0; k++)
-        if (examination_stated(s, groups[k], "total_indirect_max", &value))
-            stated[1] = fmax(stated[1], value);
+const char *walk_comparison_target(const walk_comparison *w, char text[32]) {
+    if (w->group != NULL) return w->group;
+    snprintf(text, 32, "element %zu", w->element);
+    return text;
 }
 
 static void conclude(const examination *e, const judgement *j, check *c) {
-    const walk_comparison *worst = &e->compared[0];
-    char at[32];
-    for (size_t k = 1; k < e->n_compared; k++)
-        if (fabs(e->compared[k].score) > fabs(worst->score)) worst = &e->compared[k];
-    snprintf(at, sizeof at, "element %zu", worst->element);
-    const bool known = j->stated[0] >= 0;
-    const bool broken = known && walk_chance(j->beyond, e->n_compared) < certain;
+    const walk_comparison *worst = &e->compared[0], *beyond = &e->compared[0];
+    char at[32], end[256] = "within the stated error";
+    for (size_t k = 1; k < e->n_compared; k++) {
+        const walk_comparison *w = &e->compared[k];
+        if (fabs(w->score) > fabs(worst->score)) worst = w;
+        if (w->beyond > beyond->beyond) beyond = w;
+    }
+    const bool broken = j->known && walk_chance(beyond->beyond, e->n_compared) < certain;
+    if (broken)
+        snprintf(end, sizeof end, "%s under %s differs by more than the stated error",
+                 walk_comparison_target(beyond, at), beyond->emission);
+    if (!j->known) snprintf(end, sizeof end, "the store states no error to compare with");
     /* Below 1e-10 the chance is lost in rounding. */
     const double chance = fmax(1e-10, 100 * walk_chance(worst->score, e->n_compared));
     check_say(
         c,
-        !known   ? VERDICT_SKIPPED
-        : broken ? VERDICT_BROKEN
-                 : VERDICT_OK,
+        !j->known ? VERDICT_SKIPPED
+        : broken  ? VERDICT_BROKEN
+                  : VERDICT_OK,
         "largest |z| of %zu means is %.1f (%s under %s), by chance alone in at most %.*g %% of cases; %s",
-        e->n_compared, fabs(worst->score), worst->group != NULL ? worst->group : at, worst->emission,
-        chance < 10 ? 1 : 3, chance,
-        !known   ? "the store states no error to compare with"
-        : broken ? "differs by more than the stated error"
-                 : "within the stated error");
+        e->n_compared, fabs(worst->score), walk_comparison_target(worst, at), worst->emission,
+        chance < 10 ? 1 : 3, chance, end);
 }
 
 lam_status verify_walks(examination *e, check *c, lam_error *error) {
     lam_status status = LAM_OK;
     lights l = {.n = 0};
     judgement j = {.l = &l};
-    float *H = NULL;
     if (examination_skips(e, c)) return LAM_OK;
     if (e->walks == 0) {
         check_say(c, VERDICT_SKIPPED, "no random walks (--walks 0)");
         return LAM_OK;
     }
-    const mesh *m = &e->m;
-    const size_t count = m->n * m->n_channels;
+    const size_t count = e->m.n * e->m.n_channels;
     TRY(lights_create(e, &l, error));
-    TRY(examination_apply(e, l.n, LAM_IRRADIANCE, l.input, &H, error));
-    j.received = memory_allocate(l.n, sizeof *j.received, "a solution", error);
-    if (j.received == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t k = 0; k < l.n * count; k++) {
-        if (l.H0 != NULL) H[k] -= l.H0[k];
-        j.received[k / count] += m->area[k % m->n] * (double)H[k] * (double)H[k];
-    }
-    j.H = H;
-    read_stated(e->s, j.stated);
+    TRY(examination_apply(e, l.n, LAM_IRRADIANCE, l.input, &j.H, error));
+    j.dark = memory_allocate(l.n, sizeof *j.dark, "a solution", error);
+    j.error = memory_allocate(l.n, sizeof *j.error, "a solution", error);
+    if (j.dark == NULL || j.error == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < l.n * count && l.H0 != NULL; k++) j.H[k] -= l.H0[k];
     TRY(walk_all(e, &j, error));
     conclude(e, &j, c);
 done:
     lights_free(&l);
-    free(H);
-    free(j.received);
+    free(j.H);
+    free(j.dark);
+    free(j.error);
     return check_failed(c, status, error);
 }

@@ -237,7 +237,23 @@ class Stores(Case):
             name = walk.get("group", f"element {walk.get('element')}")
             self.assertEqual(line.split(), f"{walk['z']:+.1f} operator {walk['operator']:.6g} walks {walk['walks']:.6g} "
                              f"+- {walk['standard_error']:.2g} {name} under {walk['emission']}".split())
+            self.assertFalse(walk["dark"])
         self.refused(2, "--walks -1: must not be negative", "verify", self.store, "--walks", "-1")
+
+    def test_verify_of_light_that_reaches_nothing(self):
+        # The wavelets of a maze leak a little of the light of the tops of its walls, which see nothing.
+        scene, store = self.path("maze.obj"), self.path("maze.h5")
+        must("generate", "maze", "--elements", 300, "-o", scene)
+        must("precompute", scene, "-o", store, "--form-factors", "blocks", "--method", "hierarchical", "--probes", 8)
+        command = ("verify", store, "--probes", 0, "--walks", 20000)
+        walks = json.loads(must(*command, "--json").stdout)["walks"]
+        self.assertEqual({(walk["emission"], walk["dark"]) for walk in walks},
+                         {("uniform", False), ("wall", False), ("floor", False), ("wall-top", True), ("mixture", False)})
+        self.assertEqual({walk["walks"] for walk in walks if walk["dark"]}, {0})
+        self.assertNotEqual({walk["operator"] for walk in walks if walk["dark"]}, {0})
+        out = must(*command).stdout
+        self.assertEqual(out.count(" under wall-top, dark\n"), sum(walk["dark"] for walk in walks))
+        self.assertEqual(out.count(", dark\n"), sum(walk["dark"] for walk in walks))
         self.refused(2, "--walks 1000000001: must be", "verify", self.store, "--walks", "1000000001")
         self.refused(2, "--walks 1e3: not a whole number", "verify", self.store, "--walks", "1e3")
 

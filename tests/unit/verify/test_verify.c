@@ -281,28 +281,36 @@ START_TEST(test_patches_that_weigh_wrong) {
 }
 END_TEST
 
+/* Saves a sample with an operator of the form factors F, which it takes, and compares that with walks. The
+ * caller frees e. */
+static void compare_walks(sample *s, csr F, examination *e, check *found) {
+    char folder[64], file[128];
+    uint32_t order[54];
+    csr_free(&s->f.F);
+    s->f.F = F;
+    MUST(mesh_z_order(&s->m, order, error));
+    lam_operator_close(s->op);
+    build(s, order);
+    folder_make(folder);
+    snprintf(file, sizeof file, "%s/a.h5", folder);
+    save(s, file);
+    *e = (examination){.walks = 100000};
+    MUST(store_open(file, &e->s, error));
+    MUST(verify_mesh(e, found, error));
+    MUST(verify_operator(e, found, error));
+    MUST(verify_walks(e, found, error));
+    folder_remove(folder);
+}
+
 /* Walks against an operator of exact form factors, with the rows of one wall scaled: the check, and the
  * chance of its largest score. */
 static double walk_beside(float scale, check *found) {
     sample s = make_sample();
-    char folder[64], file[128];
-    uint32_t order[54];
+    examination e;
     double worst = 0;
     csr F = box_form_factors((double[]){1, 1, 1}, 3, s.m.area);
     for (uint64_t p = 0; p < F.indptr[9]; p++) F.data[p] *= scale;
-    csr_free(&s.f.F);
-    s.f.F = F;
-    MUST(mesh_z_order(&s.m, order, error));
-    lam_operator_close(s.op);
-    build(&s, order);
-    folder_make(folder);
-    snprintf(file, sizeof file, "%s/a.h5", folder);
-    save(&s, file);
-    examination e = {.walks = 100000};
-    MUST(store_open(file, &e.s, error));
-    MUST(verify_mesh(&e, found, error));
-    MUST(verify_operator(&e, found, error));
-    MUST(verify_walks(&e, found, error));
+    compare_walks(&s, F, &e, found);
     /* Uniform, the one group that emits, a mixture; the group, and elements 3, 10, ... 50. */
     ck_assert_uint_eq(e.n_compared, 3 * (1 + 8));
     for (size_t k = 0; k < e.n_compared; k++) worst = fmax(worst, fabs(e.compared[k].score));
@@ -311,7 +319,6 @@ static double walk_beside(float scale, check *found) {
     ck_assert_uint_eq(e.compared[3].element, 3);
     const double chance = walk_chance(worst, e.n_compared);
     examination_free(&e);
-    folder_remove(folder);
     free_sample(&s);
     return chance;
 }
@@ -331,6 +338,99 @@ START_TEST(test_walks_beside_an_operator) {
 }
 END_TEST
 
+/* Raises the box; elements from ... to - 1 look outward: they see nothing, and swallow what comes to their
+ * backs. The exact form factors, but for a share of those between them and the other ones, which leaks. */
+static csr turn_outward(sample *s, double height, size_t from, size_t to, float leak) {
+    for (size_t v = 0; v < s->m.n_vertices; v++) s->m.vertices[v][2] *= height;
+    MUST(mesh_measure(&s->m, error));
+    csr F = box_form_factors((double[]){1, 1, height}, 3, s->m.area);
+    for (size_t i = from; i < to; i++) {
+        const uint32_t second = s->m.elements[i][1];
+        s->m.elements[i][1] = s->m.elements[i][3];
+        s->m.elements[i][3] = second;
+    }
+    MUST(mesh_measure(&s->m, error));
+    for (size_t i = 0; i < F.n; i++)
+        for (uint64_t p = F.indptr[i]; p < F.indptr[i + 1]; p++)
+            if ((i >= from && i < to) || (F.indices[p] >= from && F.indices[p] < to)) F.data[p] *= leak;
+    return F;
+}
+
+/* Gives element i the group of[i]; all names must outlive the sample. */
+static void give_groups(sample *s, size_t n_groups, char *const *names, const uint32_t of[54]) {
+    free(s->m.group_names);
+    s->m.group_names = malloc(n_groups * sizeof *s->m.group_names);
+    ck_assert_ptr_nonnull(s->m.group_names);
+    memcpy(s->m.group_names, names, n_groups * sizeof *names);
+    memcpy(s->m.group, of, 54 * sizeof *of);
+    s->m.n_groups = n_groups;
+}
+
+/* The lamp looks outward, so that its light reaches nothing: the stated relative error of 1 % allows a mean
+ * over the five other walls of 2 * 1.1 * .01 / sqrt(5) = .0098. A leak l gives them l / 5 and, since four
+ * fifths of what they reflect come to them again, 1 / (1 - .5 * .8) as much by all bounces: l / 3. */
+static void check_leak(float leak, verdict expected, const char *say) {
+    static char lamp[] = "lamp", room[] = "room";
+    sample s = make_sample();
+    examination e;
+    check found;
+    uint32_t of[54];
+    for (size_t i = 0; i < 54; i++) of[i] = i >= 9;
+    give_groups(&s, 2, (char *[]){lamp, room}, of);
+    error_group *const stated[] = {&s.errors.single, &s.errors.lights, &s.errors.random};
+    for (size_t k = 0; k < 3; k++) {
+        stated[k]->total_relative.max = .01;
+        stated[k]->total_indirect.max = .05;
+    }
+    compare_walks(&s, turn_outward(&s, 1, 0, 9, leak), &e, &found);
+    ck_assert_uint_eq(e.n_compared, 3 * (2 + 8));
+    for (size_t k = 0; k < e.n_compared; k++)
+        ck_assert_int_eq(e.compared[k].dark, strcmp(e.compared[k].emission, "lamp") == 0);
+    ck_assert_msg(found.verdict == expected, "leak %g: %s", (double)leak, found.detail);
+    ck_assert_msg(strstr(found.detail, say) != NULL, "leak %g: %s", (double)leak, found.detail);
+    examination_free(&e);
+    free_sample(&s);
+}
+
+/* The largest |z| is that of another mean, which the error of what it receives allows. */
+START_TEST(test_a_lamp_that_shines_on_nothing) {
+    check_leak(0, VERDICT_OK, "within the stated error");
+    check_leak(.02f, VERDICT_OK, "within the stated error");
+    check_leak(.05f, VERDICT_BROKEN, "; room under lamp differs by more than the stated error");
+}
+END_TEST
+
+/* The light of the floor reaches only the black ceiling, whose nine groups are smaller than those of the
+ * walls and none of the 32 that are compared. */
+START_TEST(test_a_lamp_that_shines_on_small_groups) {
+    static char names[46][4];
+    char *name[46];
+    sample s = make_sample();
+    examination e;
+    check found;
+    uint32_t of[54];
+    for (size_t g = 0; g < 46; g++) {
+        name[g] = names[g];
+        snprintf(names[g], sizeof names[g], "g%zu", g);
+    }
+    for (uint32_t i = 0; i < 54; i++) {
+        of[i] = i < 36 ? i : i < 45 ? 36 : i - 8;
+        s.m.emission[i] = of[i] == 36;
+        if (i >= 45) s.m.reflectance[i] = 0;
+    }
+    give_groups(&s, 46, name, of);
+    compare_walks(&s, turn_outward(&s, 3, 0, 36, 0), &e, &found);
+    ck_assert_uint_eq(e.n_compared, 3 * (32 + 8));
+    for (size_t k = 0; k < e.n_compared; k++) {
+        ck_assert(e.compared[k].group == NULL || atoi(e.compared[k].group + 1) <= 36);
+        ck_assert(!e.compared[k].dark);
+    }
+    ck_assert_msg(found.verdict == VERDICT_OK, "%s", found.detail);
+    examination_free(&e);
+    free_sample(&s);
+}
+END_TEST
+
 int main(void) {
     Suite *s = suite_create("verify");
     TCase *c = tcase_create("all");
@@ -343,6 +443,8 @@ int main(void) {
     tcase_add_test(c, test_a_mesh_that_is_not_its_vertices);
     tcase_add_test(c, test_patches_that_weigh_wrong);
     tcase_add_test(c, test_walks_beside_an_operator);
+    tcase_add_test(c, test_a_lamp_that_shines_on_nothing);
+    tcase_add_test(c, test_a_lamp_that_shines_on_small_groups);
     suite_add_tcase(s, c);
     return suite_run(s);
 }
