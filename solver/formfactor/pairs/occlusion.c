@@ -1,5 +1,6 @@
 #include "solver/formfactor/pairs/occlusion.h"
 
+#include "solver/formfactor/pairs/affine_segments.h"
 #include "solver/formfactor/visibility/sample.h"
 
 #include <math.h>
@@ -63,36 +64,31 @@ static void segment_set(segment_bundle *s, const occlusion *o, int k, uint32_t i
 typedef struct piece_pair {
     uint32_t i, j;
     const polygon *a, *b;
+    bool affine; /* both are */
+    affine_pair maps;
     pair_sampler sampler;
 } piece_pair;
 
-/* segment_set for all lanes of two affine polygons, without the areas: these are the same for all points of
- * an affine polygon, and only ratios of kernels count. */
+static piece_pair piece_pair_of(uint64_t seed, uint32_t i, const polygon *a, uint32_t j, const polygon *b) {
+    piece_pair two = {.i = i, .j = j, .a = a, .b = b, .affine = a->affine && b->affine};
+    if (two.affine) two.maps = (affine_pair){affine_map_of(a), affine_map_of(b)};
+    pair_sampler_init(&two.sampler, seed, i, j);
+    return two;
+}
+
 static void segments_of_affine(segment_bundle *s, const occlusion *o, const piece_pair *two, size_t first) {
-    double x[4][VISIBILITY_PACKET], from[3][VISIBILITY_PACKET], to[3][VISIBILITY_PACKET];
-    float end[3][VISIBILITY_PACKET];
+    double x[4][VISIBILITY_PACKET];
     pair_sampler_packet(&two->sampler, (uint32_t)first, x);
-    polygon_affine_points(two->a, x[0], x[1], from);
-    polygon_affine_points(two->b, x[2], x[3], to);
-    visibility_recentre_packet(o->v, from, s->segments.origin);
-    visibility_recentre_packet(o->v, to, end);
-    for (int d = 0; d < 3; d++)
-        for (int k = 0; k < VISIBILITY_PACKET; k++)
-            s->segments.direction[d][k] = end[d][k] - s->segments.origin[d][k];
-    const double *n_a = two->a->normal, *n_b = two->b->normal;
+    affine_segments(&two->maps, x, visibility_centre(o->v), s->segments.origin, s->segments.direction,
+                    s->kernel);
     for (int k = 0; k < VISIBILITY_PACKET; k++) {
-        const double r[3] = {to[0][k] - from[0][k], to[1][k] - from[1][k], to[2][k] - from[2][k]};
-        const double r2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
-        const double leaving = r[0] * n_a[0] + r[1] * n_a[1] + r[2] * n_a[2];
-        const double arriving = -(r[0] * n_b[0] + r[1] * n_b[1] + r[2] * n_b[2]);
-        s->kernel[k] = leaving > 0 && arriving > 0 ? leaving * arriving / (r2 * r2) : 0;
         s->from[k] = two->i;
         s->to[k] = two->j;
     }
 }
 
 static void segments_of(segment_bundle *s, const occlusion *o, const piece_pair *two, size_t first) {
-    if (two->a->affine && two->b->affine) {
+    if (two->affine) {
         segments_of_affine(s, o, two, first);
         return;
     }
@@ -120,8 +116,7 @@ occlusion_verdict occlusion_test(const occlusion *o, uint32_t i, uint32_t j, dou
     const size_t segments = first_segments(factor_of(o, i, j, g));
     double part = 0, all = 0;
     bool any_open = false, any_blocked = false;
-    piece_pair two = {.i = i, .j = j, .a = &o->polygons[i], .b = &o->polygons[j]};
-    pair_sampler_init(&two.sampler, o->seed, i, j);
+    const piece_pair two = piece_pair_of(o->seed, i, &o->polygons[i], j, &o->polygons[j]);
     for (size_t first = 0; first < segments && !(any_open && any_blocked); first += VISIBILITY_PACKET) {
         double kernel[VISIBILITY_PACKET];
         const unsigned blocked = cast(o, &two, first, kernel);
@@ -193,8 +188,7 @@ static double visible_exchange(const occlusion *o, const segment_budget *pair, c
     enum { MOST_SPLITS = 14 };
     const double g = pair_factor_exchange(o->rules, a, b, o->tolerance);
     if (g <= 0) return 0;
-    piece_pair two = {.i = pair->i, .j = pair->j, .a = a, .b = b};
-    pair_sampler_init(&two.sampler, o->seed + path, pair->i, pair->j);
+    const piece_pair two = piece_pair_of(o->seed + path, pair->i, a, pair->j, b);
     const double packets = ceil(g * pair->segments_per_area / VISIBILITY_PACKET);
     if (splits == MOST_SPLITS || packets <= 1 || kernel_is_even(o, &two))
         return g * visible_share(o, &two, (size_t)packets * VISIBILITY_PACKET);
@@ -213,8 +207,7 @@ static double visible_exchange(const occlusion *o, const segment_budget *pair, c
 static double accuracy_for(const occlusion *o, uint32_t i, uint32_t j, double F) {
     enum { PILOT = 64 };
     if (F <= .1) return o->accuracy;
-    piece_pair two = {.i = i, .j = j, .a = &o->polygons[i], .b = &o->polygons[j]};
-    pair_sampler_init(&two.sampler, o->seed, i, j);
+    const piece_pair two = piece_pair_of(o->seed, i, &o->polygons[i], j, &o->polygons[j]);
     return o->accuracy * fmax(1, 10 * F * visible_share(o, &two, PILOT));
 }
 

@@ -129,18 +129,6 @@ void polygon_halve(const polygon *p, polygon halves[2]) {
     }
 }
 
-void polygon_affine_points(const polygon *p, const double u[8], const double w[8], double points[3][8]) {
-    const bool triangle = p->n == 3; /* the square folded along its diagonal */
-    for (int d = 0; d < 3; d++) {
-        const double from = p->corner[0][d], one = p->corner[1][d] - from,
-                     two = p->corner[triangle ? 2 : 3][d] - from;
-        for (int k = 0; k < 8; k++) {
-            const bool beyond = triangle && u[k] + w[k] > 1;
-            points[d][k] = from + (beyond ? 1 - u[k] : u[k]) * one + (beyond ? 1 - w[k] : w[k]) * two;
-        }
-    }
-}
-
 double polygon_point(const polygon *p, double u, double w, double point[3]) {
     const double *a = p->corner[0], *b = p->corner[1], *c = p->corner[2], *e = p->corner[3];
     double along_u[3], along_w[3];

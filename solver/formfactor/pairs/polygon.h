@@ -28,9 +28,6 @@ double polygon_area(const polygon *p);
 /* Cuts a triangle in the middle of its longest side, a quad in the middle of its longer pair of sides. */
 void polygon_halve(const polygon *p, polygon halves[2]);
 
-/* Eight points of an affine polygon at (u, w) in the unit square, one array for each component. */
-void polygon_affine_points(const polygon *p, const double u[8], const double w[8], double points[3][8]);
-
 /* The point of a triangle or a quad at (u, w) in the unit square; returns the Jacobian of the map there. */
 double polygon_point(const polygon *p, double u, double w, double point[3]);
 

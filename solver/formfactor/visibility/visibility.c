@@ -147,10 +147,8 @@ void visibility_recentre(const visibility *v, const double point[3], float recen
     for (int d = 0; d < 3; d++) recentred[d] = (float)(point[d] - v->centre[d]);
 }
 
-void visibility_recentre_packet(const visibility *v, const double points[3][VISIBILITY_PACKET],
-                                float recentred[3][VISIBILITY_PACKET]) {
-    for (int d = 0; d < 3; d++)
-        for (int k = 0; k < VISIBILITY_PACKET; k++) recentred[d][k] = (float)(points[d][k] - v->centre[d]);
+const double *visibility_centre(const visibility *v) {
+    return v->centre;
 }
 
 double visibility_rounding(const visibility *v) {
@@ -406,6 +404,20 @@ static void refuse_both_ends(const struct RTCFilterFunctionNArguments *args) {
     }
 }
 
+/* Moves both ends above their elements' planes by more than rounding: nearly all segments then meet neither
+ * of these elements, and the filter is not called for them, which would take a fifth of all time. */
+static void lift_ends(const visibility *v, uint32_t from, uint32_t to, size_t lane,
+                      struct RTCRayHit8 *packet) {
+    const float height = 2 * v->rounding;
+    const float *n = v->mesh->normal[from], *m = v->mesh->normal[to];
+    packet->ray.org_x[lane] += height * n[0];
+    packet->ray.org_y[lane] += height * n[1];
+    packet->ray.org_z[lane] += height * n[2];
+    packet->ray.dir_x[lane] += height * (m[0] - n[0]);
+    packet->ray.dir_y[lane] += height * (m[1] - n[1]);
+    packet->ray.dir_z[lane] += height * (m[2] - n[2]);
+}
+
 unsigned visibility_blocked(const visibility *v, const ray_packet *segments, size_t n_segments,
                             const uint32_t *from, const uint32_t *to) {
     struct RTCRayHit8 packet __attribute__((aligned(32)));
@@ -419,6 +431,7 @@ unsigned visibility_blocked(const visibility *v, const ray_packet *segments, siz
         packet.ray.tfar[i] = 1;
         packet.ray.id[i] = (unsigned)i;
         if (i >= n_segments) continue;
+        lift_ends(v, from[i], to[i], i, &packet);
         context.from[i] = v->facets.of_element[from[i] < v->n_fronts ? from[i] : from[i] - v->n_fronts];
         context.to[i] = v->facets.of_element[to[i] < v->n_fronts ? to[i] : to[i] - v->n_fronts];
     }

@@ -36,9 +36,8 @@ void visibility_destroy(visibility *v);
 /* A point of the scene relative to the scene's centre, in single precision. */
 void visibility_recentre(const visibility *v, const double point[3], float recentred[3]);
 
-/* The same for a packet of points. */
-void visibility_recentre_packet(const visibility *v, const double points[3][VISIBILITY_PACKET],
-                                float recentred[3][VISIBILITY_PACKET]);
+/* The scene's centre, [3]. */
+const double *visibility_centre(const visibility *v);
 
 /* The primitives. */
 const facets *visibility_facets(const visibility *v);
