@@ -8,6 +8,7 @@
 #include "solver/formfactor/rays/hemicube.h"
 #include "solver/formfactor/rays/rays.h"
 #include "solver/formfactor/repair.h"
+#include "solver/formfactor/row_scaling.h"
 #include "solver/formfactor/rows/upper.h"
 #include "solver/formfactor/visibility/visibility.h"
 #include "solver/linalg/csr.h"
@@ -156,41 +157,78 @@ done:
     return status;
 }
 
-/* Sweeps of the balance: each takes most of what is left of the row sums' error. */
-enum { SWEEPS = 8 };
-
-/* F' = D F D with rows that sum to 1 in a closed scene, and to at most 1 in others: D := D / s^1/2, s the row
- * sums. Sets the row sums of f, and how much they were repaired. */
-static lam_status balance_blocks(const mesh *m, form_factors *f, block_factors *blocks, lam_error *error) {
+/* r_i = A_i (F' 1)_i with F' = D F D. */
+static lam_status sums_of_blocks(void *context, const double *d, double *r, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = m->n;
-    const bool closed = leaving_nothing(f);
-    double *ones = memory_allocate(n, sizeof *ones, "form factors", error), area = 0;
-    double *sums = memory_allocate(n, sizeof *sums, "form factors", error);
-    blocks->balance = memory_allocate(n, sizeof *blocks->balance, "form factors", error);
-    f->row_sums = memory_allocate(n, sizeof *f->row_sums, "form factors", error);
-    if (ones == NULL || sums == NULL || blocks->balance == NULL || f->row_sums == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t p = 0; p < n; p++) ones[p] = blocks->balance[p] = 1;
-    for (int sweep = 0; sweep <= SWEEPS; sweep++) {
-        TRY(block_factors_multiply(blocks, 1, ones, sums, error));
-        for (size_t p = 0; sweep == 0 && p < n; p++) {
-            const double off = fabs(sums[p] - (closed ? 1 : fmin(sums[p], 1)));
-            area += blocks->area[p];
-            f->repair_mean += blocks->area[p] * off;
-            f->repair_max = fmax(f->repair_max, off);
-        }
-        for (size_t p = 0; sweep < SWEEPS && p < n; p++)
-            if (sums[p] > 0 && (closed || sums[p] > 1)) blocks->balance[p] /= sqrt(sums[p]);
+    block_factors *blocks = context;
+    double *ones = memory_allocate(blocks->n, sizeof *ones, "form factors", error);
+    if (ones == NULL) return LAM_ERR_MEMORY;
+    for (size_t p = 0; p < blocks->n; p++) {
+        ones[p] = 1;
+        blocks->balance[p] = d[p];
     }
-    f->repair_mean /= area;
-    f->repair_products = SWEEPS + 1;
-    for (size_t p = 0; p < n; p++) {
-        f->row_sums[blocks->order[p]] = fmin(sums[p], 1);
-        if (closed) f->closure_error = fmax(f->closure_error, fabs(sums[p] - 1));
-    }
+    TRY(block_factors_multiply(blocks, 1, ones, r, error));
+    for (size_t p = 0; p < blocks->n; p++) r[p] *= blocks->area[p];
 done:
     free(ones);
-    free(sums);
+    return status;
+}
+
+/* Sweeps of the balance of an open scene, where only rows that sum to more than 1 are scaled down, or of a
+ * closed one that no scaling closes. */
+enum { SWEEPS = 8 };
+
+static lam_status balance_open(row_scaling *c, double *before, lam_error *error) {
+    lam_status status = LAM_OK;
+    for (size_t p = 0; p < c->n; p++) c->d[p] = 1;
+    for (int sweep = 0; sweep < SWEEPS; sweep++) {
+        TRY(c->sums(c->context, c->d, c->r, error));
+        c->products++;
+        for (size_t p = 0; p < c->n; p++) {
+            if (sweep == 0) before[p] = fmax(c->r[p], c->area[p]);
+            if (c->r[p] > c->area[p]) c->d[p] *= sqrt(c->area[p] / c->r[p]);
+        }
+    }
+done:
+    return status;
+}
+
+/* F' = D F D with rows that sum to 1 in a closed scene, and to at most 1 in others. Sets the row sums of f,
+ * and how much they were repaired. */
+static lam_status balance_blocks(form_factors *f, block_factors *blocks, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = blocks->n;
+    const bool closed = leaving_nothing(f);
+    double *before = memory_allocate(n, sizeof *before, "form factors", error), area = 0;
+    double *d = memory_allocate(n, sizeof *d, "form factors", error);
+    double *r = memory_allocate(n, sizeof *r, "form factors", error);
+    blocks->balance = memory_allocate(n, sizeof *blocks->balance, "form factors", error);
+    f->row_sums = memory_allocate(n, sizeof *f->row_sums, "form factors", error);
+    if (before == NULL || d == NULL || r == NULL || blocks->balance == NULL || f->row_sums == NULL)
+        TRY(LAM_ERR_MEMORY);
+    row_scaling c = {.n = n,
+                     .area = blocks->area,
+                     .sums = sums_of_blocks,
+                     .context = blocks,
+                     .sweeps_most = SWEEPS,
+                     .d = d,
+                     .r = r};
+    TRY(closed ? row_scaling_settle(&c, before, error) : balance_open(&c, before, error));
+    TRY(sums_of_blocks(blocks, d, r, error));
+    f->repair_products = c.products + 1;
+    for (size_t p = 0; p < n; p++) {
+        const double sum = r[p] / blocks->area[p], off = fabs(before[p] / blocks->area[p] - 1);
+        area += blocks->area[p];
+        f->repair_mean += blocks->area[p] * off;
+        f->repair_max = fmax(f->repair_max, off);
+        f->row_sums[blocks->order[p]] = fmin(sum, 1);
+        if (closed) f->closure_error = fmax(f->closure_error, fabs(sum - 1));
+    }
+    f->repair_mean /= area;
+done:
+    free(before);
+    free(d);
+    free(r);
     return status;
 }
 
@@ -231,7 +269,7 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
     TRY(rays_count(m, v, order, &few, &counts, f.leaving, f.absorbed, error));
     leaving_measure(&f, m);
     TRY(blocks_find(m, v, tree, &how, &made, &f.blocks, error));
-    TRY(balance_blocks(m, &f, &made, error));
+    TRY(balance_blocks(&f, &made, error));
     *out = f;
     *blocks = made;
     f = (form_factors){0};

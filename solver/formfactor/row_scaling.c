@@ -1,0 +1,146 @@
+#include "solver/formfactor/row_scaling.h"
+
+#include "solver/linalg/core.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Sweeps end when every row sum is this close to its target (single precision cannot hold more), or after the
+ * last: the remaining difference goes outside. */
+static const double sweep_tolerance = 2e-8;
+
+/* Of Anderson's extrapolation: previous steps that are kept, sweeps that are tried, and the factor by which
+ * the worst row may exceed the best one so far. */
+enum { STEPS = 5, MAX_STEPS = 60, GROWTH_MOST = 4 };
+/* Added to the unit diagonal of the normal equations, which nearly parallel steps make singular. */
+static const double alike = 1e-11;
+
+static lam_status measure(row_scaling *c, lam_error *error) {
+    const lam_status status = c->sums(c->context, c->d, c->r, error);
+    c->products++;
+    c->worst = 0;
+    for (size_t i = 0; i < c->n; i++)
+        if (c->r[i] > 0) c->worst = fmax(c->worst, fabs(c->r[i] / c->area[i] - 1));
+    return status;
+}
+
+/* d_i <- d_i sqrt(A_i / r_i) until r_i = A_i. The root damps the sweep: without it d oscillates where F is
+ * bipartite (two facing plates). Leaves r and worst up to date. */
+static lam_status sweep(row_scaling *c, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(measure(c, error));
+    for (int count = 0; count < c->sweeps_most && c->worst > sweep_tolerance; count++) {
+        for (size_t i = 0; i < c->n; i++)
+            if (c->r[i] > 0) c->d[i] *= sqrt(c->area[i] / c->r[i]);
+        TRY(measure(c, error));
+    }
+done:
+    return status;
+}
+
+/* The last steps of x = log d and of f = log(A / r) / 2, which a sweep adds to x. */
+typedef struct history {
+    size_t n, held, next;
+    double *x, *f;                 /* [n], before the present step */
+    double *dx[STEPS], *df[STEPS]; /* [n] each */
+} history;
+
+static lam_status history_create(history *h, size_t n, lam_error *error) {
+    double *all = memory_allocate(n, (2 + 2 * STEPS) * sizeof *all, "row scales", error);
+    *h = (history){.n = n, .x = all};
+    if (all == NULL) return LAM_ERR_MEMORY;
+    h->f = all + n;
+    for (size_t k = 0; k < STEPS; k++) {
+        h->dx[k] = all + (2 + 2 * k) * n;
+        h->df[k] = all + (3 + 2 * k) * n;
+    }
+    return LAM_OK;
+}
+
+static double product(const double *a, const double *b, const double *weight, size_t n) {
+    double sum = 0;
+    for (size_t i = 0; i < n; i++) sum += weight[i] * a[i] * b[i];
+    return sum;
+}
+
+/* gamma = argmin |f - sum gamma_k df_k|, weighted by areas, by the normal equations of the df_k scaled to
+ * length 1; false where these are singular. */
+static bool least_squares(const history *h, const double *f, const double *area, double gamma[STEPS]) {
+    double A[STEPS * STEPS], b[STEPS], length[STEPS], rcond;
+    const size_t held = h->held;
+    for (size_t k = 0; k < held; k++) {
+        for (size_t l = 0; l <= k; l++)
+            A[k * held + l] = A[l * held + k] = product(h->df[k], h->df[l], area, h->n);
+        b[k] = product(h->df[k], f, area, h->n);
+        length[k] = sqrt(A[k * held + k]);
+        if (!(length[k] > 0)) return false;
+    }
+    for (size_t k = 0; k < held; k++) {
+        for (size_t l = 0; l < held; l++) A[k * held + l] /= length[k] * length[l];
+        A[k * held + k] += alike; /* the diagonal is 1 */
+    }
+    if (core_invert(held, A, &rcond, NULL) != LAM_OK) return false;
+    for (size_t k = 0; k < held; k++) {
+        gamma[k] = 0;
+        for (size_t l = 0; l < held; l++) gamma[k] += A[k * held + l] * b[l] / length[l];
+        gamma[k] /= length[k];
+    }
+    return true;
+}
+
+/* Finds the scaling of sweep from d = 1 with far fewer sweeps: each is extrapolated from the steps before
+ * (Anderson 1965). before receives the row sums of d = 1. settled is false where it does not converge:
+ * perhaps no scaling closes every row. */
+static lam_status extrapolate(row_scaling *c, double *before, bool *settled, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = c->n;
+    history h = {0};
+    double least = INFINITY;
+    *settled = false;
+    TRY(history_create(&h, n, error));
+    for (size_t i = 0; i < n; i++) c->d[i] = 1;
+    TRY(measure(c, error));
+    memcpy(before, c->r, n * sizeof *before);
+    for (int count = 0; count < MAX_STEPS; count++) {
+        *settled = c->worst <= sweep_tolerance;
+        if (*settled || c->worst > GROWTH_MOST * least) break;
+        least = fmin(least, c->worst);
+        double *dx = h.dx[h.next], *df = h.df[h.next], gamma[STEPS];
+        for (size_t i = 0; i < n; i++) {
+            const double x = log(c->d[i]), f = c->r[i] > 0 ? .5 * log(c->area[i] / c->r[i]) : 0;
+            dx[i] = x - h.x[i];
+            df[i] = f - h.f[i];
+            h.x[i] = x;
+            h.f[i] = f;
+        }
+        if (count > 0) {
+            h.next = (h.next + 1) % STEPS;
+            if (h.held < STEPS) h.held++;
+        }
+        if (!least_squares(&h, h.f, c->area, gamma)) h.held = 0;
+        for (size_t i = 0; i < n; i++) {
+            double x = h.x[i] + h.f[i];
+            for (size_t k = 0; k < h.held; k++) x -= gamma[k] * (h.dx[k][i] + h.df[k][i]);
+            c->d[i] = exp(x);
+        }
+        TRY(measure(c, error));
+    }
+done:
+    free(h.x);
+    return status;
+}
+
+lam_status row_scaling_settle(row_scaling *c, double *before, lam_error *error) {
+    lam_status status = LAM_OK;
+    bool settled;
+    TRY(extrapolate(c, before, &settled, error));
+    if (!settled) {
+        for (size_t i = 0; i < c->n; i++) c->d[i] = 1;
+        TRY(sweep(c, error));
+    }
+    for (size_t i = 0; i < c->n; i++)
+        if (c->r[i] > c->area[i]) c->d[i] *= c->area[i] / c->r[i];
+done:
+    return status;
+}
