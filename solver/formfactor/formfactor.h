@@ -22,10 +22,12 @@ typedef struct pairs_report {
                         allowed */
 } pairs_report;
 
-/* The number of blocks that each rule decided. */
+/* The number of blocks that each rule decided. Pairs of elements of different planes are in a block, or are
+ * among elements_away or elements_hidden, by geometry, or among elements_unseen: partly hidden as far as
+ * geometry says, but all their segments were blocked. */
 typedef struct block_report {
     uint64_t visits, away, hidden, linear, pairs, shaded, shaded_pairs, segments;
-    double elements_away, elements_hidden; /* pairs of elements in such blocks */
+    double elements_away, elements_hidden, elements_unseen; /* pairs of elements */
 } block_report;
 
 /* Above this many elements a store keeps the upper triangle A_i F_ij, j > i, in place of rows: half the

@@ -109,7 +109,7 @@ static const candidates *segments_among(const find_work *w, const candidates *am
 static lam_status add_pair(find_work *w, uint32_t a, uint32_t b, const candidates *among) {
     cluster_block made = {.a = a, .b = b};
     double exchange = exchange_of_pair(w, a, b);
-    if (among == NULL) {
+    if (among == NULL && exchange > 0) {
         w->report.pairs++;
     } else if (exchange > 0) {
         double all = 0, seen = 0;
@@ -125,7 +125,10 @@ static lam_status add_pair(find_work *w, uint32_t a, uint32_t b, const candidate
             }
         }
         w->report.segments += PAIR_ROUNDS * SEGMENT_LANES;
+        w->report.elements_unseen += !(seen > 0);
         exchange *= all > 0 ? seen / all : 0;
+    } else {
+        w->report.elements_away++;
     }
     if (!(exchange > 0)) return LAM_OK;
     block_numbers_of_pair(&w->finder->flat, exchange, &made);
@@ -160,7 +163,10 @@ static lam_status add_shaded(find_work *w, uint32_t a, uint32_t b, const candida
     for (int k = 0; k < SEGMENT_LANES; k++) seen += segments[k].seen;
     w->report.shaded++;
     w->report.segments += SEGMENT_LANES;
-    if (seen == 0) return LAM_OK;
+    if (seen == 0) {
+        w->report.elements_unseen += (double)size_of(w->finder, a) * (double)size_of(w->finder, b);
+        return LAM_OK;
+    }
     const visible_share share = visible_share_fit(segments, SEGMENT_LANES);
     block_numbers_set(&w->finder->flat, seen < SEGMENT_LANES ? &share : NULL, &made);
     return add_block(w, &made);
@@ -283,6 +289,7 @@ static void add_report(const block_report *from, block_report *to) {
     to->segments += from->segments;
     to->elements_away += from->elements_away;
     to->elements_hidden += from->elements_hidden;
+    to->elements_unseen += from->elements_unseen;
 }
 
 /* The state of all threads. */

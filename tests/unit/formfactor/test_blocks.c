@@ -1,49 +1,16 @@
-/* Form factors by blocks: closed forms with and without something in between, row sums, and the same bits
- * from any number of threads. */
-#include "solver/formfactor/blocks/blocks.h"
+/* Form factors by blocks: closed forms with and without something in between, at several scales and places,
+ * and convergence to pairs. */
 #include "solver/formfactor/pairs/pairs.h"
+#include "support/blocks.h"
 #include "support/plates.h"
 #include "support/scene.h"
 #include "support/suite.h"
 
-#include <omp.h>
-
-/* On a tree that the caller frees. */
-static block_factors find(const mesh *m, plane_tree *tree, double open, double shadow, block_report *report) {
-    lam_error error = {.message = ""};
-    const block_options options = {.open = open, .shadow = shadow, .exact = 1e-6, .seed = 1};
-    visibility *v = NULL;
-    block_factors f;
-    ck_ok(visibility_create(m, &v, &error));
-    ck_ok(form_factors_tree(m, tree, &error));
-    ck_ok(blocks_find(m, v, tree, &options, &f, report, &error));
-    visibility_destroy(v);
-    return f;
-}
-
-/* y = F x, by element. */
-static void multiply(const block_factors *f, const double *x, double *y) {
-    lam_error error = {.message = ""};
-    double *in = malloc(f->n * sizeof *in), *out = malloc(f->n * sizeof *out);
-    for (size_t p = 0; p < f->n; p++) in[p] = x[f->order[p]];
-    ck_ok(block_factors_multiply(f, 1, in, out, &error));
-    for (size_t p = 0; p < f->n; p++) y[f->order[p]] = out[p];
-    free(in);
-    free(out);
-}
-
 /* F from elements [0, half) to [half, 2 half). */
 static double factor_between(const mesh *m, const block_factors *f, size_t half) {
-    double *x = calloc(m->n, sizeof *x), *y = malloc(m->n * sizeof *y), power = 0, area = 0;
-    for (size_t i = half; i < 2 * half; i++) x[i] = 1;
-    multiply(f, x, y);
-    for (size_t i = 0; i < half; i++) {
-        power += m->area[i] * y[i];
-        area += m->area[i];
-    }
-    free(x);
-    free(y);
-    return power / area;
+    double area = 0;
+    for (size_t i = 0; i < half; i++) area += m->area[i];
+    return blocks_exchange(m, f, 0, half, half, half) / area;
 }
 
 /* Both plates in 64 elements, what is between them in as many. */
@@ -62,7 +29,7 @@ START_TEST(plates_are_right) {
     for (size_t c = 0; c < n_cases; c++) {
         mesh m = fine_plates(c == 0 ? NULL : plates_cases[c].occluder, plates_places[_i]);
         plane_tree tree;
-        block_factors f = find(&m, &tree, 1e-5, 3e-4, NULL);
+        block_factors f = blocks_of(&m, &tree, 1e-5, 3e-4, NULL);
         ck_assert_double_eq_tol(factor_between(&m, &f, 64), plates_cases[c].F,
                                 (c == 0 ? 2e-5 : 2e-3) * plates_cases[c].F);
         block_factors_free(&f);
@@ -72,7 +39,7 @@ START_TEST(plates_are_right) {
     mesh m = fine_plates(plates_hidden, plates_places[_i]);
     block_report report;
     plane_tree tree;
-    block_factors f = find(&m, &tree, 1e-5, 3e-4, &report);
+    block_factors f = blocks_of(&m, &tree, 1e-5, 3e-4, &report);
     ck_assert_double_eq(factor_between(&m, &f, 64), 0); /* edges must not leak */
     ck_assert_uint_gt(report.hidden, 0);
     block_factors_free(&f);
@@ -89,12 +56,12 @@ START_TEST(rooms_are_proven_open) {
         mesh m = box_mesh(size, 12, .5f);
         block_report report;
         plane_tree tree;
-        block_factors f = find(&m, &tree, pow(10, -2 - k), 1e-3, &report);
+        block_factors f = blocks_of(&m, &tree, pow(10, -2 - k), 1e-3, &report);
         double *one = malloc(m.n * sizeof *one), *sums = malloc(m.n * sizeof *sums);
         ck_assert_uint_eq(report.segments, 0);
         ck_assert_uint_eq(report.hidden + report.shaded + report.shaded_pairs, 0);
         for (size_t i = 0; i < m.n; i++) one[i] = 1;
-        multiply(&f, one, sums);
+        blocks_multiply(&f, one, sums);
         off[k] = 0;
         for (size_t i = 0; i < m.n; i++) off[k] = fmax(off[k], fabs(sums[i] - 1));
         free(one);
@@ -119,7 +86,7 @@ static double distance_from_pairs(const mesh *m, const block_factors *f, const c
     double *x = calloc(m->n, sizeof *x), *y = malloc(m->n * sizeof *y), wrong = 0, all = 0, *exact;
     exact = calloc(m->n, sizeof *exact);
     for (size_t i = 0; i < m->n; i++) x[i] = (double)(i * 2654435761u % 1000) / 1000;
-    multiply(f, x, y);
+    blocks_multiply(f, x, y);
     for (size_t i = 0; i < m->n; i++)
         for (uint64_t p = G->indptr[i]; p < G->indptr[i + 1]; p++) {
             const size_t j = G->indices[p];
@@ -149,7 +116,7 @@ START_TEST(errors_fall_with_the_tolerances) {
     ck_ok(pairs_exchange(&m, v, &exact, &G, &ignored, NULL, &error));
     for (int k = 0; k < 3; k++) {
         plane_tree tree;
-        block_factors f = find(&m, &tree, 3e-2 * pow(.1, k), 3e-2 * pow(.1, k), NULL);
+        block_factors f = blocks_of(&m, &tree, 3e-2 * pow(.1, k), 3e-2 * pow(.1, k), NULL);
         const double now = distance_from_pairs(&m, &f, &G);
         ck_assert_double_lt(now, .6 * last);
         last = now;
@@ -159,48 +126,6 @@ START_TEST(errors_fall_with_the_tolerances) {
     ck_assert_double_lt(last, 3e-3);
     csr_free(&G);
     visibility_destroy(v);
-    mesh_free(&m);
-}
-END_TEST
-
-START_TEST(threads_do_not_change_bits) {
-    const int most = omp_get_max_threads();
-    mesh m = closed_cornell(800);
-    plane_tree tree[2];
-    block_factors f[2];
-    for (int k = 0; k < 2; k++) {
-        omp_set_num_threads(k == 0 ? 1 : 3);
-        f[k] = find(&m, &tree[k], 1e-3, 1e-3, NULL);
-    }
-    omp_set_num_threads(most);
-    ck_assert_uint_eq(f[0].n_blocks, f[1].n_blocks);
-    ck_assert_mem_eq(f[0].blocks, f[1].blocks, f[0].n_blocks * sizeof *f[0].blocks);
-    for (int k = 0; k < 2; k++) {
-        block_factors_free(&f[k]);
-        plane_tree_free(&tree[k]);
-    }
-    mesh_free(&m);
-}
-END_TEST
-
-/* Every pair of elements is in one block at most, and elements of one plane in none. */
-START_TEST(no_pair_counts_twice) {
-    mesh m = closed_cornell(300);
-    plane_tree tree;
-    block_factors f = find(&m, &tree, 1e-3, 1e-3, NULL);
-    uint8_t *seen = calloc(m.n * m.n, 1);
-    for (size_t k = 0; k < f.n_blocks; k++) {
-        const block_node *a = &f.nodes[f.blocks[k].a], *b = &f.nodes[f.blocks[k].b];
-        for (size_t p = a->begin; p < a->end; p++)
-            for (size_t q = b->begin; q < b->end; q++) {
-                const size_t i = f.order[p], j = f.order[q];
-                ck_assert(seen[i * m.n + j] == 0 && seen[j * m.n + i] == 0);
-                seen[i * m.n + j] = 1;
-            }
-    }
-    free(seen);
-    block_factors_free(&f);
-    plane_tree_free(&tree);
     mesh_free(&m);
 }
 END_TEST
@@ -235,8 +160,6 @@ int main(void) {
     tcase_add_loop_test(cases, plates_are_right, 0, sizeof plates_places / sizeof *plates_places);
     tcase_add_test(cases, rooms_are_proven_open);
     tcase_add_test(cases, errors_fall_with_the_tolerances);
-    tcase_add_test(cases, threads_do_not_change_bits);
-    tcase_add_test(cases, no_pair_counts_twice);
     tcase_add_test(cases, cancelled_work_ends);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
