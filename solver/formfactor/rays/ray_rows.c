@@ -161,9 +161,6 @@ static lam_status begin_block(const ray_rows *r, const uint32_t *elements, size_
                        sizeof *to->indices + sizeof *to->data);
 }
 
-/* Rays of a batch. */
-enum { AT_ONCE = 512 };
-
 /* The rays of an element, batch by batch. */
 typedef struct ray_batch {
     ray_context rays;
@@ -171,7 +168,7 @@ typedef struct ray_batch {
     element_sampler sampler;
     size_t element, first, n_rays;
     ray_tally tally;
-    uint32_t met[AT_ONCE]; /* elements that the last batch hit, without near ones */
+    uint32_t met[RAYS_AT_ONCE]; /* elements that the last batch hit, without near ones */
 } ray_batch;
 
 static void ray_batch_begin(const ray_rows *r, size_t element, uint64_t seed, const sky_bounce *sky,
@@ -188,7 +185,7 @@ static void ray_batch_begin(const ray_rows *r, size_t element, uint64_t seed, co
 /* Casts the next batch; count is the number of entries of met. False after the last one. */
 static bool ray_batch_next(ray_batch *g, double *sky, size_t *count) {
     if (g->first >= g->n_rays) return false;
-    const size_t last = g->first + AT_ONCE < g->n_rays ? g->first + AT_ONCE : g->n_rays;
+    const size_t last = g->first + RAYS_AT_ONCE < g->n_rays ? g->first + RAYS_AT_ONCE : g->n_rays;
     const size_t all = rays_meet(&g->rays, &g->sampler, g->element, g->first, last, g->met, &g->tally, sky);
     *count = 0;
     for (size_t k = 0; k < all; k++) /* a plane does not see itself */

@@ -8,15 +8,17 @@ _Static_assert((int)SKY_PACKET == VISIBILITY_PACKET, "packets go through the sky
 size_t rays_meet(const ray_context *c, const element_sampler *sampler, size_t element, size_t first,
                  size_t last, uint32_t *met, ray_tally *tally, double *sky) {
     static const double ones[VISIBILITY_PACKET] = {1, 1, 1, 1, 1, 1, 1, 1};
-    uint32_t self[VISIBILITY_PACKET];
+    uint32_t self[VISIBILITY_PACKET], order[RAYS_AT_ONCE + VISIBILITY_PACKET];
     size_t count = 0;
     for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = (uint32_t)element;
-    for (size_t ray = first; ray < last; ray += VISIBILITY_PACKET) {
+    element_sampler_order(sampler, (uint32_t)first, last - first, order);
+    for (int i = 0; i < VISIBILITY_PACKET; i++) order[last - first + (size_t)i] = (uint32_t)first;
+    for (size_t ray = 0; ray < last - first; ray += VISIBILITY_PACKET) {
         ray_packet rays;
         hit_packet hits;
-        const size_t n = last - ray < VISIBILITY_PACKET ? last - ray : VISIBILITY_PACKET;
-        element_sampler_packet(sampler, (uint32_t)ray, &rays);
-        visibility_cast(c->v, &rays, n, self, 0, &hits);
+        const size_t left = last - first - ray, n = left < VISIBILITY_PACKET ? left : VISIBILITY_PACKET;
+        element_sampler_packet_of(sampler, order + ray, &rays);
+        visibility_cast(c->v, &rays, n, self, VISIBILITY_TOGETHER, &hits);
         unsigned leaving = 0;
         for (size_t i = 0; i < n; i++) {
             if (hits.element[i] == VISIBILITY_NOTHING) {
@@ -33,9 +35,6 @@ size_t rays_meet(const ray_context *c, const element_sampler *sampler, size_t el
     return count;
 }
 
-/* Rays whose hits are counted at once. */
-enum { AT_ONCE = 512 };
-
 /* The context of a row_maker that counts rays. */
 typedef struct count_context {
     ray_context rays;
@@ -48,10 +47,10 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
     const count_context *c = context;
     element_sampler sampler;
     ray_tally tally = {0};
-    uint32_t met[AT_ONCE];
+    uint32_t met[RAYS_AT_ONCE];
     element_sampler_init(&sampler, c->rays.m, c->rays.v, element, c->rays.seed);
-    for (size_t first = 0; first < c->n_rays; first += AT_ONCE) {
-        const size_t last = first + AT_ONCE < c->n_rays ? first + AT_ONCE : c->n_rays;
+    for (size_t first = 0; first < c->n_rays; first += RAYS_AT_ONCE) {
+        const size_t last = first + RAYS_AT_ONCE < c->n_rays ? first + RAYS_AT_ONCE : c->n_rays;
         const size_t count = rays_meet(&c->rays, &sampler, element, first, last, met, &tally, pool->sky);
         for (size_t k = 0; k < count; k++) row_pool_add(pool, met[k], 1);
     }
@@ -89,13 +88,9 @@ void rays_cast_some(const mesh *m, const visibility *v, const uint32_t *order, s
         const size_t element = order[k * m->n / n_elements];
         element_sampler sampler;
         element_sampler_init(&sampler, m, v, element, 0);
-        uint32_t self[VISIBILITY_PACKET];
-        for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = (uint32_t)element;
-        for (size_t ray = 0; ray < rays; ray += VISIBILITY_PACKET) {
-            ray_packet packet;
-            hit_packet hits;
-            element_sampler_packet(&sampler, (uint32_t)ray, &packet);
-            visibility_cast(v, &packet, VISIBILITY_PACKET, self, 0, &hits);
-        }
+        const ray_context context = {.m = m, .v = v};
+        ray_tally tally = {0};
+        uint32_t met[RAYS_AT_ONCE];
+        (void)rays_meet(&context, &sampler, element, 0, rays, met, &tally, NULL);
     }
 }

@@ -28,10 +28,13 @@ typedef struct ray_tally {
     size_t left, lost; /* rays that left the scene, rays that hit back faces */
 } ray_tally;
 
-/* Casts rays first ... last-1 of an element, first a multiple of VISIBILITY_PACKET. Writes to met, with room
- * for all of them, the elements whose fronts they hit, ray by ray, and returns how many. The others are added
- * to tally and, where the context has a sky, to its bins sky, [m + 1]. Depends on the element and the seed
- * alone. */
+/* Rays that are cast and counted together. */
+enum { RAYS_AT_ONCE = SAMPLE_ORDERED };
+
+/* Casts rays first ... last-1 of an element, at most RAYS_AT_ONCE, in the order of element_sampler_order.
+ * Writes to met, with room for all of them, the elements whose fronts they hit, ray by ray, and returns how
+ * many. The others are added to tally and, where the context has a sky, to its bins sky, [m + 1]. Depends on
+ * the element and the seed alone. */
 size_t rays_meet(const ray_context *c, const element_sampler *sampler, size_t element, size_t first,
                  size_t last, uint32_t *met, ray_tally *tally, double *sky);
 

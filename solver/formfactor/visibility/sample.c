@@ -136,14 +136,46 @@ void pair_sampler_packet(const pair_sampler *s, uint32_t first, double x[4][VISI
             x[d][k] = (double)(s->shift[d] + (first + k) * kronecker_step[d]) * 0x1p-32;
 }
 
+/* The cells of the square that directions are made of: CELLS of them along each axis. */
+enum { CELL_BITS = 4, CELLS = 1 << CELL_BITS, CELL_SHIFT = 32 - CELL_BITS };
+
+/* The place of a cell in Morton order, x and y below CELLS: their bits in turn. */
+static inline uint32_t morton(uint32_t x, uint32_t y) {
+    uint32_t bits = x | y << 16;
+    bits = (bits | bits << 2) & 0x33333333u;
+    bits = (bits | bits << 1) & 0x55555555u;
+    return (bits & 0xFFFFu) | bits >> 15;
+}
+
+void element_sampler_order(const element_sampler *s, uint32_t first, size_t count,
+                           uint32_t order[SAMPLE_ORDERED]) {
+    uint16_t begin[CELLS * CELLS + 1] = {0};
+    uint8_t cell[SAMPLE_ORDERED];
+    for (size_t k = 0; k < count; k++) {
+        const uint32_t x = s->shift[2] + (first + (uint32_t)k) * kronecker_step[2],
+                       y = s->shift[3] + (first + (uint32_t)k) * kronecker_step[3];
+        cell[k] = (uint8_t)morton(x >> CELL_SHIFT, y >> CELL_SHIFT);
+        begin[cell[k] + 1]++;
+    }
+    for (size_t c = 0; c < CELLS * CELLS; c++) begin[c + 1] = (uint16_t)(begin[c + 1] + begin[c]);
+    for (size_t k = 0; k < count; k++) order[begin[cell[k]]++] = first + (uint32_t)k;
+}
+
 void element_sampler_packet(const element_sampler *s, uint32_t first, ray_packet *rays) {
+    uint32_t index[VISIBILITY_PACKET];
+    for (uint32_t i = 0; i < VISIBILITY_PACKET; i++) index[i] = first + i;
+    element_sampler_packet_of(s, index, rays);
+}
+
+void element_sampler_packet_of(const element_sampler *s, const uint32_t index[VISIBILITY_PACKET],
+                               ray_packet *rays) {
     const element_frame *f = &s->frame;
     float x[4][VISIBILITY_PACKET];
     /* Without the pragma the compiler vectorizes over the axes, not over the rays. */
     for (int d = 0; d < 4; d++)
 #pragma omp simd
         for (uint32_t i = 0; i < VISIBILITY_PACKET; i++)
-            x[d][i] = fraction(s->shift[d] + (first + i) * kronecker_step[d]);
+            x[d][i] = fraction(s->shift[d] + index[i] * kronecker_step[d]);
 
     if (s->parallelogram) {
         for (int d = 0; d < 3; d++)

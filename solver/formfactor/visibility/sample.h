@@ -29,6 +29,18 @@ void element_sampler_init(element_sampler *s, const mesh *m, const visibility *v
 /* Rays first ... first+7 of the element: origins uniform over its area, directions cosine-weighted. */
 void element_sampler_packet(const element_sampler *s, uint32_t first, ray_packet *rays);
 
+/* The same for any eight rays. */
+void element_sampler_packet_of(const element_sampler *s, const uint32_t index[VISIBILITY_PACKET],
+                               ray_packet *rays);
+
+/* Rays that element_sampler_order sorts at most. */
+enum { SAMPLE_ORDERED = 1024 };
+
+/* order, [count]: the rays first ... first+count-1, those of similar directions beside each other. A packet
+ * of such rays meets the same parts of the scene and is cast in about 60 % of the time. */
+void element_sampler_order(const element_sampler *s, uint32_t first, size_t count,
+                           uint32_t order[SAMPLE_ORDERED]);
+
 /* The point of the element at (u, w) in the unit square; the map preserves area. */
 void element_sampler_point(const element_sampler *s, float u, float w, float point[3]);
 

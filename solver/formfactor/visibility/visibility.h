@@ -45,9 +45,9 @@ const facets *visibility_facets(const visibility *v);
 /* The distance, in metres, by which single precision may move a point of the scene. */
 double visibility_rounding(const visibility *v);
 
-/* CULL_BACK ignores back faces instead of reporting them. TOGETHER declares a coherent packet (one origin,
- * similar directions): the hits are the same, twice as fast (an incoherent packet is cast at two thirds of
- * the speed). */
+/* CULL_BACK ignores back faces instead of reporting them. TOGETHER declares a coherent packet (near
+ * origins, similar directions): the hits are the same, twice as fast (an incoherent packet is cast at two
+ * thirds of the speed). */
 enum { VISIBILITY_CULL_BACK = 1, VISIBILITY_TOGETHER = 2 };
 
 /* Casts the first n_rays rays of a packet. self[i] is the element that a ray leaves, which it never hits
