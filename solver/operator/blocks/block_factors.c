@@ -15,6 +15,8 @@ void block_factors_free(block_factors *f) {
     free(f->from);
     free(f->into_from);
     free(f->into);
+    free(f->pieces);
+    free(f->above);
     *f = (block_factors){.n = 0};
 }
 
@@ -114,10 +116,34 @@ static void order_by_b(const block_factors *f, size_t n_nodes, size_t *from, uin
     from[0] = 0;
 }
 
+/* Cuts the tree into the largest subtrees of at most some elements, which threads take one at a time, and the
+ * clusters above them. */
+static lam_status cut(block_factors *f, lam_error *error) {
+    const size_t most = f->n / 64 + 8;
+    size_t first = 0;
+    f->pieces = memory_allocate(f->n_clusters, sizeof *f->pieces, "blocks", error);
+    f->above = memory_allocate(f->n_clusters, sizeof *f->above, "blocks", error);
+    if (f->pieces == NULL || f->above == NULL) return LAM_ERR_MEMORY;
+    f->n_pieces = f->n_above = 0;
+    for (size_t t = 0; t < f->n_clusters; t++) {
+        const block_node *node = &f->nodes[t];
+        if (node->end - node->begin > most) {
+            f->above[f->n_above++] = (uint32_t)t;
+            first = t + 1;
+        } else if (node->parent == BLOCK_NO_NODE ||
+                   f->nodes[node->parent].end - f->nodes[node->parent].begin > most) {
+            f->pieces[f->n_pieces++] = (block_piece){first, t + 1};
+            first = t + 1;
+        }
+    }
+    return LAM_OK;
+}
+
 lam_status block_factors_end(block_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n_nodes = f->n_clusters + f->n, count = f->n_blocks;
     cluster_block *sorted = NULL;
+    TRY(cut(f, error));
     if (count > UINT32_MAX) FAIL(error, LAM_ERR_MEMORY, "%zu blocks, must be below 2^32", count);
     f->from = memory_allocate(n_nodes + 1, sizeof *f->from, "blocks", error);
     f->into_from = memory_allocate(n_nodes + 1, sizeof *f->into_from, "blocks", error);

@@ -45,6 +45,11 @@ typedef struct cluster_block {
     float L[BLOCK_FUNCTIONS][BLOCK_FUNCTIONS]; /* 1/m^2 */
 } cluster_block;
 
+/* Clusters [first, last) of a subtree. */
+typedef struct block_piece {
+    size_t first, last;
+} block_piece;
+
 typedef struct block_factors {
     const plane_tree *tree; /* it outlives the blocks */
     size_t n, n_clusters;   /* of the tree */
@@ -61,6 +66,9 @@ typedef struct block_factors {
      * into[into_from[t]] ... into[into_from[t + 1] - 1], by a. */
     size_t *from, *into_from; /* [n_clusters + n + 1] */
     uint32_t *into;           /* [n_blocks] */
+    block_piece *pieces;      /* [n_pieces]: the largest subtrees of few elements, which threads share */
+    uint32_t *above;          /* [n_above], the clusters above them, children first */
+    size_t n_pieces, n_above;
 } block_factors;
 
 void block_factors_free(block_factors *f);
@@ -80,6 +88,25 @@ lam_status block_factors_end(block_factors *f, lam_error *error);
  * threads. Errors: LAM_ERR_MEMORY. */
 lam_status block_factors_multiply(const block_factors *f, size_t n_vectors, const double *x, double *y,
                                   lam_error *error);
+
+/* Vectors of a product: x[v] and y[v] are vector v, whose numbers stand `step` apart, by position or by
+ * element. */
+typedef struct block_vectors {
+    size_t count, step;
+    bool by_element;
+    const double *const *x;
+    double *const *y;
+} block_vectors;
+
+/* Vectors that share a pass; more of them take several. */
+enum { BLOCK_VECTORS = 8 };
+
+/* Bytes of work of a product with this many vectors. */
+size_t block_factors_work(const block_factors *f, size_t n_vectors);
+
+/* block_factors_multiply of at most BLOCK_VECTORS vectors in memory of the caller; it cannot fail. No y is an
+ * x. */
+void block_factors_apply(const block_factors *f, const block_vectors *vectors, void *work, size_t n_threads);
 
 /* Products in mesh order, balance included. f must outlive it. */
 factor_product block_factors_product(const block_factors *f);

@@ -5,20 +5,21 @@
 
 #include "store/status.h"
 
+#include <omp.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* Vectors of a wide panel; prefetch distance, in blocks; nodes that a thread takes at a time. */
-enum { WIDE = 8, AHEAD = 6, NODES_AT_ONCE = 256 };
+enum { WIDE = BLOCK_VECTORS, AHEAD = 6, NODES_AT_ONCE = 256, LINE = 64 };
 typedef double wide __attribute__((vector_size(8 * WIDE), may_alias));
 
-/* Some vectors on their way: `count` of those from x to y, [n][n_vectors], and in panels beside each other
- * numbers of elements [n] and moments of clusters [n_clusters][BLOCK_FUNCTIONS]. */
+/* Vectors on their way, and in panels beside each other numbers of elements [n] and moments of clusters
+ * [n_clusters][BLOCK_FUNCTIONS]. */
 typedef struct panel {
     const block_factors *f;
-    const double *from;
-    double *to;
-    size_t n_vectors, count;
+    const block_vectors *vectors;
+    const uint32_t *order; /* NULL: vectors are by position */
     void *x, *y, *up, *down;
 } panel;
 
@@ -64,137 +65,105 @@ static const product_kernels one_kernels = KERNELS(one);
 static const product_kernels wide_kernels[] = CPU_TABLE(KERNELS(portable), KERNELS(avx2), KERNELS(avx512));
 #undef KERNELS
 
-/* Nodes [first, last), a subtree that one thread takes at a time. */
-typedef struct piece {
-    size_t first, last;
-} piece;
-
-/* The largest subtrees of at most this many elements. */
-typedef struct product {
-    const block_factors *f;
-    piece *pieces; /* [n_pieces] */
-    size_t most, n_pieces;
-} product;
-
-static size_t elements_of(const block_factors *f, size_t t) {
-    return f->nodes[t].end - f->nodes[t].begin;
-}
-
 static bool is_leaf(const block_factors *f, size_t t) {
     return f->tree->clusters[t].leaf;
 }
 
-static lam_status cut(const block_factors *f, product *out, lam_error *error) {
-    size_t first = 0;
-    *out = (product){.f = f, .most = f->n / 64 + 8};
-    out->pieces = memory_allocate(f->n_clusters, sizeof *out->pieces, "blocks", error);
-    if (out->pieces == NULL) return LAM_ERR_MEMORY;
-    for (size_t t = 0; t < f->n_clusters; t++) {
-        const uint32_t parent = f->nodes[t].parent;
-        if (elements_of(f, t) > out->most) {
-            first = t + 1;
-        } else if (parent == BLOCK_NO_NODE || elements_of(f, parent) > out->most) {
-            out->pieces[out->n_pieces++] = (piece){first, t + 1};
-            first = t + 1;
-        }
-    }
-    return LAM_OK;
-}
-
 /* Moments from the elements to the root. The topmost node of a piece waits for the pass above. */
-static void pass_up(const product *c, const product_kernels *kernels, const panel *p) {
-    const block_factors *f = c->f;
-#pragma omp parallel for schedule(dynamic, 1)
-    for (size_t k = 0; k < c->n_pieces; k++)
-        for (size_t t = c->pieces[k].first; t < c->pieces[k].last; t++) {
+static void pass_up(const panel *p, const product_kernels *kernels, int n_threads) {
+    const block_factors *f = p->f;
+#pragma omp parallel for schedule(dynamic, 1) num_threads(n_threads) if (n_threads > 1)
+    for (size_t k = 0; k < f->n_pieces; k++)
+        for (size_t t = f->pieces[k].first; t < f->pieces[k].last; t++) {
             if (is_leaf(f, t)) kernels->load_leaf(p, t);
-            if (t + 1 < c->pieces[k].last) kernels->raise(p, t);
+            if (t + 1 < f->pieces[k].last) kernels->raise(p, t);
         }
-    for (size_t k = 0; k < c->n_pieces; k++)
-        if (f->nodes[c->pieces[k].last - 1].parent != BLOCK_NO_NODE) kernels->raise(p, c->pieces[k].last - 1);
-    for (size_t t = 0; t < f->n_clusters; t++) {
-        if (elements_of(f, t) <= c->most) continue;
+    for (size_t k = 0; k < f->n_pieces; k++)
+        if (f->nodes[f->pieces[k].last - 1].parent != BLOCK_NO_NODE) kernels->raise(p, f->pieces[k].last - 1);
+    for (size_t k = 0; k < f->n_above; k++) {
+        const size_t t = f->above[k];
         if (is_leaf(f, t)) kernels->load_leaf(p, t);
         if (f->nodes[t].parent != BLOCK_NO_NODE) kernels->raise(p, t);
     }
 }
 
-static void pass_blocks(const product *c, const product_kernels *kernels, const panel *p) {
-    const size_t n_nodes = c->f->n_clusters + c->f->n;
-#pragma omp parallel for schedule(dynamic, NODES_AT_ONCE)
+static void pass_blocks(const panel *p, const product_kernels *kernels, int n_threads) {
+    const size_t n_nodes = p->f->n_clusters + p->f->n;
+#pragma omp parallel for schedule(dynamic, NODES_AT_ONCE) num_threads(n_threads) if (n_threads > 1)
     for (size_t t = 0; t < n_nodes; t++) kernels->gather_blocks(p, t);
 }
 
-static void pass_down(const product *c, const product_kernels *kernels, const panel *p) {
-    const block_factors *f = c->f;
-    for (size_t t = f->n_clusters; t-- > 0;) {
-        if (elements_of(f, t) <= c->most) continue;
+static void pass_down(const panel *p, const product_kernels *kernels, int n_threads) {
+    const block_factors *f = p->f;
+    for (size_t k = f->n_above; k-- > 0;) {
+        const size_t t = f->above[k];
         if (f->nodes[t].parent != BLOCK_NO_NODE) kernels->lower(p, t);
         if (is_leaf(f, t)) kernels->store_leaf(p, t);
     }
-#pragma omp parallel for schedule(dynamic, 1)
-    for (size_t k = 0; k < c->n_pieces; k++)
-        for (size_t t = c->pieces[k].last; t-- > c->pieces[k].first;) {
+#pragma omp parallel for schedule(dynamic, 1) num_threads(n_threads) if (n_threads > 1)
+    for (size_t k = 0; k < f->n_pieces; k++)
+        for (size_t t = f->pieces[k].last; t-- > f->pieces[k].first;) {
             if (f->nodes[t].parent != BLOCK_NO_NODE) kernels->lower(p, t);
             if (is_leaf(f, t)) kernels->store_leaf(p, t);
         }
 }
 
-static void *lines(size_t count, size_t bytes, lam_error *error) {
-    size_t all;
-    void *made = NULL;
-    if (size_multiply(count, bytes, &all) && all < SIZE_MAX / 2)
-        made = aligned_alloc(64, (all + 63) / 64 * 64);
-    if (made == NULL)
-        status_fail(error, LAM_ERR_MEMORY, "blocks: cannot allocate %zu x %zu bytes", count, bytes);
-    return made;
+/* Bytes of a panel's numbers, in whole cache lines. */
+static size_t lines(size_t count, size_t n_vectors) {
+    const size_t bytes = count * sizeof(double) * (n_vectors > 1 ? WIDE : 1);
+    return (bytes + LINE - 1) / LINE * LINE;
+}
+
+size_t block_factors_work(const block_factors *f, size_t n_vectors) {
+    return LINE + 2 * lines(f->n, n_vectors) + 2 * lines(f->n_clusters * BLOCK_FUNCTIONS, n_vectors);
+}
+
+void block_factors_apply(const block_factors *f, const block_vectors *vectors, void *work, size_t n_threads) {
+    const size_t element = lines(f->n, vectors->count),
+                 cluster = lines(f->n_clusters * BLOCK_FUNCTIONS, vectors->count);
+    const product_kernels *kernels = vectors->count > 1 ? &wide_kernels[cpu_best()] : &one_kernels;
+    char *const first = (char *)work + (LINE - (uintptr_t)work % LINE) % LINE;
+    const panel p = {.f = f,
+                     .vectors = vectors,
+                     .order = vectors->by_element ? f->order : NULL,
+                     .x = first,
+                     .y = first + element,
+                     .up = first + 2 * element,
+                     .down = first + 2 * element + cluster};
+    memset(p.up, 0, cluster);
+    pass_up(&p, kernels, (int)n_threads);
+    pass_blocks(&p, kernels, (int)n_threads);
+    pass_down(&p, kernels, (int)n_threads);
+}
+
+/* Vectors [n][n_vectors], some at a time. */
+static lam_status multiply(const block_factors *f, bool by_element, size_t n_vectors, const double *x,
+                           double *y, lam_error *error) {
+    const double *from[WIDE];
+    double *to[WIDE];
+    void *work = memory_allocate(block_factors_work(f, n_vectors), 1, "blocks", error);
+    if (work == NULL) return LAM_ERR_MEMORY;
+    for (size_t first = 0; first < n_vectors; first += WIDE) {
+        const size_t count = n_vectors - first < WIDE ? n_vectors - first : WIDE;
+        for (size_t v = 0; v < count; v++) {
+            from[v] = x + first + v;
+            to[v] = y + first + v;
+        }
+        const block_vectors vectors = {count, n_vectors, by_element, from, to};
+        block_factors_apply(f, &vectors, work, (size_t)omp_get_max_threads());
+    }
+    free(work);
+    return LAM_OK;
 }
 
 lam_status block_factors_multiply(const block_factors *f, size_t n_vectors, const double *x, double *y,
                                   lam_error *error) {
-    lam_status status = LAM_OK;
-    product c = {.f = f};
-    const size_t each = sizeof(double) * (n_vectors > 1 ? WIDE : 1), cluster = BLOCK_FUNCTIONS * each;
-    panel p = {.f = f, .n_vectors = n_vectors};
-    p.x = lines(f->n, each, error);
-    p.y = lines(f->n, each, error);
-    p.up = lines(f->n_clusters, cluster, error);
-    p.down = lines(f->n_clusters, cluster, error);
-    if (p.x == NULL || p.y == NULL || p.up == NULL || p.down == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(cut(f, &c, error));
-    const product_kernels *kernels = n_vectors > 1 ? &wide_kernels[cpu_best()] : &one_kernels;
-    for (size_t first = 0; first < n_vectors; first += WIDE) {
-        p.from = x + first;
-        p.to = y + first;
-        p.count = n_vectors - first < WIDE ? n_vectors - first : WIDE;
-        memset(p.up, 0, f->n_clusters * cluster);
-        pass_up(&c, kernels, &p);
-        pass_blocks(&c, kernels, &p);
-        pass_down(&c, kernels, &p);
-    }
-done:
-    free(c.pieces);
-    free(p.x);
-    free(p.y);
-    free(p.up);
-    free(p.down);
-    return status;
+    return multiply(f, false, n_vectors, x, y, error);
 }
 
 static lam_status multiply_in_mesh_order(const void *context, size_t m, const double *x, double *y,
                                          lam_error *error) {
-    lam_status status = LAM_OK;
-    const block_factors *f = context;
-    double *in = memory_allocate(f->n, m * sizeof *in, "blocks", error);
-    double *out = memory_allocate(f->n, m * sizeof *out, "blocks", error);
-    if (in == NULL || out == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t p = 0; p < f->n; p++) memcpy(in + p * m, x + f->order[p] * m, m * sizeof *in);
-    TRY(block_factors_multiply(f, m, in, out, error));
-    for (size_t p = 0; p < f->n; p++) memcpy(y + f->order[p] * m, out + p * m, m * sizeof *out);
-done:
-    free(in);
-    free(out);
-    return status;
+    return multiply(context, true, m, x, y, error);
 }
 
 factor_product block_factors_product(const block_factors *f) {
