@@ -27,6 +27,7 @@ typedef struct pairs_report {
  * geometry says, but all their segments were blocked. */
 typedef struct block_report {
     uint64_t visits, away, hidden, linear, pairs, shaded, shaded_pairs, segments;
+    uint64_t reduced; /* whose slopes were reduced so that no form factor is negative */
     double elements_away, elements_hidden, elements_unseen; /* pairs of elements */
 } block_report;
 

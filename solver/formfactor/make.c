@@ -189,6 +189,11 @@ static lam_status balance_open(row_scaling *c, double *before, lam_error *error)
             if (c->r[p] > c->area[p]) c->d[p] *= sqrt(c->area[p] / c->r[p]);
         }
     }
+    /* The root leaves a rest above 1. */
+    TRY(c->sums(c->context, c->d, c->r, error));
+    c->products++;
+    for (size_t p = 0; p < c->n; p++)
+        if (c->r[p] > c->area[p]) c->d[p] *= c->area[p] / c->r[p];
 done:
     return status;
 }

@@ -3,6 +3,7 @@
 #include "solver/base/array_grow.h"
 #include "solver/formfactor/blocks/block_shade.h"
 #include "solver/formfactor/pairs/pair_factor.h"
+#include "solver/operator/blocks/block_range.h"
 
 #include <math.h>
 #include <omp.h>
@@ -362,6 +363,7 @@ lam_status blocks_find(const mesh *m, const visibility *v, const plane_tree *tre
                        lam_error *error) {
     lam_status status = LAM_OK;
     const int n_threads = omp_get_max_threads();
+    size_t n_reduced = 0;
     block_factors made = {.n = 0};
     occluders pieces = {.n = 0};
     pair_list pairs = {.list = NULL};
@@ -383,9 +385,11 @@ lam_status blocks_find(const mesh *m, const visibility *v, const plane_tree *tre
     TRY(team.status);
     TRY(join_lists(works, n_threads, &made, error));
     TRY(block_factors_end(&made, error));
+    TRY(block_factors_reduce(&made, &n_reduced, error));
     if (report != NULL) {
         *report = (block_report){.visits = 0};
         for (int t = 0; t < n_threads; t++) add_report(&works[t].report, report);
+        report->reduced = n_reduced;
     }
     *out = made;
     made = (block_factors){.n = 0};

@@ -45,6 +45,14 @@ static rectangle of_element(const mesh *m, uint32_t element, const flat_plane *p
     return r;
 }
 
+/* The centroid lies within but for rounding. */
+static void include(rectangle *r, const double point[2]) {
+    for (int k = 0; k < 2; k++) {
+        r->low[k] = fmin(r->low[k], point[k]);
+        r->high[k] = fmax(r->high[k], point[k]);
+    }
+}
+
 static rectangle joined(const rectangle *a, const rectangle *b) {
     return (rectangle){{fmin(a->low[0], b->low[0]), fmin(a->low[1], b->low[1])},
                        {fmax(a->high[0], b->high[0]), fmax(a->high[1], b->high[1])}};
@@ -94,6 +102,7 @@ lam_status flat_clusters_make(const mesh *m, const plane_tree *tree, block_facto
         for (uint32_t p = c->begin; c->leaf && p < c->end; p++) {
             const size_t own = n_clusters + p;
             bounds[own] = of_element(m, blocks->order[p], plane);
+            include(&bounds[own], blocks->place[p]);
             bounds[t] = p == c->begin ? bounds[own] : joined(&bounds[t], &bounds[own]);
             set_cluster(plane, &bounds[own], blocks->area[p], c->frame, &f.of[own]);
         }
@@ -101,7 +110,8 @@ lam_status flat_clusters_make(const mesh *m, const plane_tree *tree, block_facto
         set_cluster(plane, &bounds[t], f.before[c->end] - f.before[c->begin], c->frame, &f.of[t]);
         for (int k = 0; k < 2; k++) {
             node->centre[k] = .5 * (bounds[t].low[k] + bounds[t].high[k]);
-            node->over[k] = f.of[t].half[k] > 0 ? 1 / f.of[t].half[k] : 0;
+            /* Rounding would make the coordinates of narrower ones arbitrary. */
+            node->over[k] = f.of[t].half[k] > f.slack ? 1 / f.of[t].half[k] : 0;
         }
     }
     *out = f;
