@@ -139,7 +139,8 @@ lam_status lam_operator_apply_adjoint(const lam_operator *op, size_t n_rhs, lam_
                                       lam_error *error);
 
 /* The form factors F that a store keeps (lambert precompute --keep-form-factors), as rows of single
- * precision, 8 bytes per entry, or compressed, with bounds on what that leaves out; immutable once open. */
+ * precision, 8 bytes per entry, as blocks of clusters, or compressed, with bounds on what that leaves out;
+ * immutable once open. */
 typedef struct lam_form_factors lam_form_factors;
 
 /* Opens the store at path and loads them; *F is NULL when it keeps none. The caller closes them with

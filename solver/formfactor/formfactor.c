@@ -3,6 +3,7 @@
 #include "solver/formfactor/formfactor.h"
 
 #include "solver/formfactor/rows/upper.h"
+#include "solver/operator/blocks/block_store.h"
 #include "solver/operator/refine/form_factor_rows.h"
 
 #include <stdlib.h>
@@ -63,9 +64,9 @@ done:
     return status;
 }
 
-lam_status form_factors_save_about(const form_factors *f, const char *storage, store *s, lam_error *error) {
+lam_status form_factors_save_about(const form_factors *f, size_t n, const char *storage, store *s,
+                                   lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n = f->upper.indptr == NULL ? f->F.n : f->upper.n;
     TRY(store_write(s, GROUP "/leaving", STORE_F64, 1, &n, f->leaving, error));
     TRY(store_write(s, GROUP "/absorbed", STORE_F64, 1, &n, f->absorbed, error));
     if (f->repair != NULL) TRY(store_write(s, GROUP "/repair", STORE_F64, 1, &n, f->repair, error));
@@ -87,7 +88,16 @@ lam_status form_factors_save(const form_factors *f, store *s, lam_error *error) 
     lam_status status = LAM_OK;
     const bool rows = f->upper.indptr == NULL;
     TRY(csr_save(rows ? &f->F : &f->upper, GROUP, s, error));
-    TRY(form_factors_save_about(f, rows ? "rows" : "upper", s, error));
+    TRY(form_factors_save_about(f, rows ? f->F.n : f->upper.n, rows ? "rows" : "upper", s, error));
+done:
+    return status;
+}
+
+lam_status form_factors_save_blocks(const form_factors *f, const block_factors *blocks, store *s,
+                                    lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(block_factors_save(blocks, s, error));
+    TRY(form_factors_save_about(f, blocks->n, "blocks", s, error));
 done:
     return status;
 }
@@ -110,13 +120,12 @@ done:
     return status;
 }
 
-lam_status form_factors_load(store *s, const mesh *m, const large_place *large, form_factors *out,
-                             lam_error *error) {
+/* All but the form factors themselves; row_sums is for the caller to fill. */
+static lam_status load_about(store *s, const mesh *m, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
-    form_factors f = {0};
-    csr held = {0};
     const size_t n = m->n;
     char *recorded = NULL, found[33];
+    void *data;
     if (!store_has(s, GROUP))
         FAIL(error, LAM_ERR_FORMAT, "%s holds no /form_factors; make it again with --keep-form-factors",
              store_path(s));
@@ -126,27 +135,60 @@ lam_status form_factors_load(store *s, const mesh *m, const large_place *large, 
         FAIL(error, LAM_ERR_FORMAT,
              "%s: the form factors belong to geometry %.32s, the mesh is %s; precompute from the scene again",
              store_path(s), recorded, found);
-    TRY(load_attributes(s, &f, error));
-    f.row_sums = memory_allocate(n, sizeof *f.row_sums, "form factors", error);
-    if (f.row_sums == NULL) TRY(LAM_ERR_MEMORY);
-
-    void *data;
-    bool rows = true;
-    status = form_factor_rows_read(s, n, m->area, large, &held, &rows, f.row_sums, error);
-    *(rows ? &f.F : &f.upper) = held;
-    if (status != LAM_OK) goto done;
+    TRY(load_attributes(s, f, error));
+    f->row_sums = memory_allocate(n, sizeof *f->row_sums, "form factors", error);
+    if (f->row_sums == NULL) TRY(LAM_ERR_MEMORY);
     TRY(store_read(s, GROUP "/leaving", STORE_F64, 1, (size_t[]){n}, &data, error));
-    f.leaving = data;
+    f->leaving = data;
     TRY(store_read(s, GROUP "/absorbed", STORE_F64, 1, (size_t[]){n}, &data, error));
-    f.absorbed = data;
+    f->absorbed = data;
     if (store_has(s, GROUP "/repair")) {
         TRY(store_read(s, GROUP "/repair", STORE_F64, 1, (size_t[]){n}, &data, error));
-        f.repair = data;
+        f->repair = data;
+    }
+done:
+    free(recorded);
+    return status;
+}
+
+lam_status form_factors_load(store *s, const mesh *m, const large_place *large, form_factors *out,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    form_factors f = {0};
+    csr held = {0};
+    bool rows = true;
+    TRY(load_about(s, m, &f, error));
+    status = form_factor_rows_read(s, m->n, m->area, large, &held, &rows, f.row_sums, error);
+    *(rows ? &f.F : &f.upper) = held;
+    if (status != LAM_OK) goto done;
+    *out = f;
+    f = (form_factors){0};
+done:
+    form_factors_free(&f);
+    return status;
+}
+
+lam_status form_factors_load_blocks(store *s, const mesh *m, plane_tree *tree, block_factors *blocks,
+                                    form_factors *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    form_factors f = {0};
+    double *ones = memory_allocate(m->n, 2 * sizeof *ones, "form factors", error);
+    if (ones == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(load_about(s, m, &f, error));
+    TRY(block_factors_load(s, m->n, m->area, tree, blocks, error));
+    for (size_t p = 0; p < m->n; p++) ones[p] = 1;
+    TRY(block_factors_multiply(blocks, 1, ones, ones + m->n, error));
+    for (size_t p = 0; p < m->n; p++) {
+        const double sum = ones[m->n + p];
+        if (!(sum <= 1 + 1e-5))
+            FAIL(error, LAM_ERR_FORMAT, "%s: form factors of element %u sum to %g, must be at most 1",
+                 store_path(s), blocks->order[p], sum);
+        f.row_sums[blocks->order[p]] = sum < 1 ? sum : 1;
     }
     *out = f;
     f = (form_factors){0};
 done:
-    free(recorded);
+    free(ones);
     form_factors_free(&f);
     return status;
 }

@@ -141,9 +141,17 @@ lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_
 /* /form_factors of a store, rows or the upper triangle as they are; sky_bounce_save and sky_bounce_load
  * handle /sky. large as above. */
 lam_status form_factors_save(const form_factors *f, store *s, lam_error *error);
-/* Saves everything but the rows; storage is the attribute that says how the rows are stored. */
-lam_status form_factors_save_about(const form_factors *f, const char *storage, store *s, lam_error *error);
+/* Saves everything of n elements but the rows; storage is the attribute that says how these are stored. */
+lam_status form_factors_save_about(const form_factors *f, size_t n, const char *storage, store *s,
+                                   lam_error *error);
 lam_status form_factors_load(store *s, const mesh *m, const large_place *large, form_factors *out,
                              lam_error *error);
+
+/* Form factors of form_factors_make_blocks: what form_factors_load gives but for the rows, and in their place
+ * the blocks and their tree, which must stay where it is and outlive them. */
+lam_status form_factors_save_blocks(const form_factors *f, const block_factors *blocks, store *s,
+                                    lam_error *error);
+lam_status form_factors_load_blocks(store *s, const mesh *m, plane_tree *tree, block_factors *blocks,
+                                    form_factors *out, lam_error *error);
 
 #endif

@@ -8,9 +8,16 @@
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 
+/* Bytes of a stored block, its numbers and its place, and its share of the tree. */
+static const double kept_block_bytes = 50;
+
 double forecast_store_bytes(const forecast *f) {
     const double n = (double)f->n, rows = forecast_rows_bytes(n, &f->recipe);
-    const double kept = !f->keep ? 0 : f->n > FORM_FACTORS_ROWS_MOST ? rows / 2 : rows;
+    const bool blocks = f->recipe.method == RECIPE_BLOCKS;
+    const double kept = !f->keep                        ? 0
+                        : blocks                        ? kept_block_bytes * forecast_blocks(n, &f->recipe)
+                        : f->n > FORM_FACTORS_ROWS_MOST ? rows / 2
+                                                        : rows;
     return forecast_operator_bytes(f) + kept + forecast_tile_bytes(n) * (double)f->sky_tiles + 300 * n;
 }
 

@@ -126,8 +126,9 @@ static const option_row form_factor_rows[] = {
      .offset = FIELD(keep_form_factors),
      .choices = "compressed",
      .help = "Keep the form factors in the store, for refined answers and for other operators of the same "
-             "scene. compressed: for refined answers only, in a wavelet basis without its small "
-             "coefficients, whose loss the certificates include"},
+             "scene; blocks are kept as blocks, which other methods than hierarchical cannot use. "
+             "compressed: for refined answers only, in a wavelet basis without its small coefficients, "
+             "whose loss the certificates include"},
     {0},
 };
 

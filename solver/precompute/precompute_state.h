@@ -83,6 +83,9 @@ bool state_may_have_blocks(const precompute_state *state);
 lam_status state_choose_blocks(precompute_state *state, const build_method *method, bool final,
                                lam_error *error);
 lam_status stage_blocks(precompute_state *state, lam_error *error);
+
+/* The blocks that a store keeps; refuses options that need rows: stage_blocks.c. */
+lam_status state_load_blocks(precompute_state *state, store *s, lam_error *error);
 void state_log_blocks(const precompute_state *state);
 
 /* Near pairs and rays as options and quality ask for: stage_scene.c. */

@@ -16,7 +16,7 @@ bool state_may_have_blocks(const precompute_state *state) {
     const bool asked = strcmp(o->form_factors, "blocks") == 0;
     if (o->from_store || state->holds || !(asked || strcmp(o->form_factors, "auto") == 0)) return false;
     if (asked) return true;
-    return o->sky == NULL && !state_keeps(o) && o->scratch == NULL && o->emitters == NULL &&
+    return o->sky == NULL && !state_compresses(o) && o->scratch == NULL && o->emitters == NULL &&
            o->rays == OPTION_AUTO && strcmp(o->quality, "draft") != 0 && state->m.n >= ELEMENTS_LEAST;
 }
 
@@ -34,7 +34,7 @@ static lam_status check_asked(const precompute_state *state, const build_method 
     const precompute_options *o = state->options;
     const char *other = NULL;
     if (o->sky != NULL) other = "--sky";
-    if (state_keeps(o)) other = "--keep-form-factors";
+    if (state_compresses(o)) other = "--keep-form-factors=compressed";
     if (o->scratch != NULL) other = "--scratch";
     if (o->emitters != NULL) other = "--emitters";
     if (other != NULL)
@@ -84,6 +84,25 @@ done:
     return status;
 }
 
+lam_status state_load_blocks(precompute_state *state, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = state->options;
+    const bool named = strcmp(o->build.method, "auto") != 0;
+    const char *asked = NULL;
+    if (o->emitters != NULL) asked = "--emitters";
+    if (state_compresses(o)) asked = "--keep-form-factors=compressed";
+    if (named && !(state->expected->flags & METHOD_BLOCKS)) asked = state->expected->name;
+    if (asked != NULL)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "%s: its form factors are blocks of clusters, and %s%s needs rows; precompute the scene with "
+             "--form-factors rays",
+             o->input, asked == state->expected->name ? "--method " : "", asked);
+    if (!(state->expected->flags & METHOD_BLOCKS)) state->expected = method_of_blocks();
+    TRY(form_factors_load_blocks(s, &state->m, &state->tree, &state->blocks, &state->f, error));
+done:
+    return status;
+}
+
 lam_status stage_blocks(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const form_factor_options how = {
@@ -102,6 +121,10 @@ void state_log_blocks(const precompute_state *state) {
     const block_report *b = &state->f.blocks;
     const double all = .5 * (double)state->m.n * (double)(state->m.n - 1);
     if (state->blocks.n == 0) return;
+    if (b->visits == 0) { /* of a store */
+        terminal_log(state->t, "%zu blocks of %zu planes", state->blocks.n_blocks, state->tree.n_frames);
+        return;
+    }
     terminal_log(
         state->t,
         "%zu blocks of %zu planes: %.3g linear, %.3g partly hidden by %.3g segments, %.3g pairs of elements; "

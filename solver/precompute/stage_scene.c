@@ -1,5 +1,6 @@
 /* The first stages of a precompute: input, mesh, and a recipe for which memory suffices. */
 #include "solver/base/atomic_file.h"
+#include "solver/operator/refine/form_factor_rows.h"
 #include "solver/precompute/precompute_state.h"
 #include "solver/scene/import/import.h"
 
@@ -289,15 +290,21 @@ lam_status stage_load_store(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
     double *row_sums = NULL;
+    form_factor_storage how = STORAGE_ROWS;
     TRY(store_open(state->options->input, &s, error));
     TRY(mesh_load(s, &state->m, &row_sums, error));
     if (store_has(s, "/form_factors")) {
+        TRY(form_factors_storage(s, &how, error));
         TRY(recipe_load(s, &recipe_of_form_factors, &state->f.recipe, error));
         TRY(choose_recipe_that_fits(state, (double)state->m.n, error));
     }
     if (state->large) TRY(open_scratch(state, error));
-    TRY(form_factors_load(s, &state->m, state_large_place(state), &state->f, error));
-    TRY(form_factors_expand(&state->f, state->m.area, error));
+    if (how == STORAGE_BLOCKS && !state->holds) {
+        TRY(state_load_blocks(state, s, error));
+    } else {
+        TRY(form_factors_load(s, &state->m, state_large_place(state), &state->f, error));
+        TRY(form_factors_expand(&state->f, state->m.area, error));
+    }
     if (store_has(s, "/sky")) TRY(sky_bounce_load(s, state->m.n, &state->f.sky, error));
     if (state->options->reflectance >= 0)
         for (size_t i = 0; i < state->m.n * state->m.n_channels; i++)

@@ -30,7 +30,9 @@ lam_status stage_store(precompute_state *state, lam_error *error) {
     TRY(terminal_check(error));
     if (state->compressed.n > 0) {
         TRY(compressed_save(&state->compressed, s, error));
-        TRY(form_factors_save_about(&state->f, "compressed", s, error));
+        TRY(form_factors_save_about(&state->f, state->m.n, "compressed", s, error));
+    } else if (state_keeps(o) && state->blocks.n > 0) {
+        TRY(form_factors_save_blocks(&state->f, &state->blocks, s, error));
     } else if (state_keeps(o)) {
         if (state->m.n > FORM_FACTORS_ROWS_MOST) TRY(form_factors_gather(&state->f, state->m.area, error));
         TRY(form_factors_save(&state->f, s, error));

@@ -102,6 +102,11 @@ lam_status store_view_visible(store *s, size_t n, float **values, double *mean, 
              "%s: compressed form factors do not tell which elements see each other; precompute it with "
              "--keep-form-factors alone",
              store_path(s));
+    if (strcmp(storage, "blocks") == 0)
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "%s: blocks of form factors do not tell which elements see each other; precompute it with "
+             "--form-factors rays --keep-form-factors",
+             store_path(s));
     TRY(store_read(s, "/form_factors/indptr", STORE_U64, 1, dims, &ends, error));
     TRY(store_read(s, "/form_factors/indices", STORE_U32, 1, entries, &columns, error));
     counts = memory_allocate(n, sizeof *counts, "counts", error);

@@ -12,6 +12,8 @@
 void examination_free(examination *e) {
     lam_operator_close(e->op);
     form_factors_free(&e->f);
+    block_factors_free(&e->blocks);
+    plane_tree_free(&e->tree);
     free(e->row_sums);
     free(e->compared);
     mesh_free(&e->m);
@@ -145,14 +147,34 @@ done:
     return status;
 }
 
+/* Blocks have been checked once they are loaded; their row sums here. */
+static lam_status verify_blocks(examination *e, check *c, lam_error *error) {
+    const lam_status loaded = form_factors_load_blocks(e->s, &e->m, &e->tree, &e->blocks, &e->f, error);
+    if (loaded != LAM_OK) {
+        block_factors_free(&e->blocks);
+        plane_tree_free(&e->tree);
+        return check_failed(c, loaded, error);
+    }
+    for (size_t i = 0; i < e->m.n; i++) /* The same sums in another order at most. */
+        if (!(fabs(e->f.row_sums[i] - e->row_sums[i]) <= 1e-6)) {
+            check_say(c, VERDICT_BROKEN, "row %zu sums to %.9g, /mesh/row_sums says %.9g", i,
+                      e->f.row_sums[i], e->row_sums[i]);
+            return LAM_OK;
+        }
+    check_say(c, VERDICT_OK, "%zu blocks, none is negative, row sums agree with /mesh/row_sums",
+              e->blocks.n_blocks);
+    return LAM_OK;
+}
+
 lam_status verify_form_factors(examination *e, check *c, lam_error *error) {
-    bool in_rows = false;
+    form_factor_storage how = STORAGE_ROWS;
     if (!e->has_mesh || !store_has(e->s, "/form_factors")) {
         check_say(c, VERDICT_SKIPPED, e->has_mesh ? "none are kept" : "no mesh to compare with");
         return LAM_OK;
     }
-    lam_status loaded = form_factors_in_rows(e->s, &in_rows, error);
-    if (loaded == LAM_OK && !in_rows) return verify_compressed(e, c, error);
+    lam_status loaded = form_factors_storage(e->s, &how, error);
+    if (loaded == LAM_OK && how == STORAGE_COMPRESSED) return verify_compressed(e, c, error);
+    if (loaded == LAM_OK && how == STORAGE_BLOCKS) return verify_blocks(e, c, error);
     if (loaded == LAM_OK) loaded = form_factors_load(e->s, &e->m, NULL, &e->f, error);
     if (loaded == LAM_OK) loaded = form_factors_expand(&e->f, e->m.area, error);
     if (loaded != LAM_OK) return check_failed(c, loaded, error);

@@ -41,7 +41,9 @@ typedef struct examination {
     const progress *progress;
     mesh m;
     double *row_sums;
-    form_factors f; /* kept ones, or regenerated */
+    form_factors f; /* kept ones, or regenerated: with rows, or blocks in their place */
+    plane_tree tree;
+    block_factors blocks;
     lam_operator *op;
     bool has_mesh;
     walk_comparison *compared; /* [n_compared] by verify_walks; the channels of a mean stand together */

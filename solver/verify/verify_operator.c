@@ -227,8 +227,12 @@ static size_t judge_rays(const examination *e) {
     return recipe_auto_rays(epsilon, .25);
 }
 
+static bool has_form_factors(const examination *e) {
+    return e->f.F.indptr != NULL || e->blocks.n > 0;
+}
+
 static lam_status read_recipe(examination *e, recipe *out, lam_error *error) {
-    if (e->f.F.indptr == NULL) return recipe_load(e->s, &recipe_of_operator, out, error);
+    if (!has_form_factors(e)) return recipe_load(e->s, &recipe_of_operator, out, error);
     *out = e->f.recipe;
     return LAM_OK;
 }
@@ -238,34 +242,31 @@ static recipe recipe_again(const examination *e, const recipe *of, seed_purpose 
     return recipe_of_judge(of, judge_rays(e), precompute_seed(of->seed, half));
 }
 
-/* The form factors that the operator was built from, where the store does not keep them: rows in e, or
- * blocks. */
-static lam_status find_again(examination *e, const recipe *from, const uint32_t *order, plane_tree *tree,
-                             block_factors *blocks, lam_error *error) {
+/* The form factors that the operator was built from, where the store does not keep them. */
+static lam_status find_again(examination *e, const recipe *from, const uint32_t *order, lam_error *error) {
     lam_status status = LAM_OK;
     const form_factor_options how = {.recipe = *from, .progress = e->progress, .stage = "form factors"};
-    if (e->f.F.indptr != NULL) return LAM_OK;
+    if (has_form_factors(e)) return LAM_OK;
     if (from->method != RECIPE_BLOCKS) return form_factors_make(&e->m, order, &how, &e->f, error);
-    TRY(form_factors_tree(&e->m, tree, error));
-    TRY(form_factors_make_blocks(&e->m, order, tree, false, &how, &e->f, blocks, error));
+    TRY(form_factors_tree(&e->m, &e->tree, error));
+    TRY(form_factors_make_blocks(&e->m, order, &e->tree, false, &how, &e->f, &e->blocks, error));
 done:
     return status;
 }
 
 static lam_status measure_again(examination *e, const recipe *from, error_report *out, lam_error *error) {
     lam_status status = LAM_OK;
-    plane_tree tree = {.n = 0};
-    block_factors blocks = {.n = 0};
+    const block_factors *const blocks = &e->blocks;
     uint32_t *order = memory_allocate(e->m.n, sizeof *order, "the order of the elements", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&e->m, order, error));
-    TRY(find_again(e, from, order, &tree, &blocks, error));
+    TRY(find_again(e, from, order, error));
     const build_problem problem = {.n = e->m.n,
                                    .n_channels = e->m.n_channels,
                                    .area = e->m.area,
                                    .reflectance = e->m.reflectance,
-                                   .F = blocks.n > 0 ? NULL : &e->f.F,
-                                   .blocks = blocks.n > 0 ? &blocks : NULL,
+                                   .F = blocks->n > 0 ? NULL : &e->f.F,
+                                   .blocks = blocks->n > 0 ? blocks : NULL,
                                    .order = order};
     const judging j = {
         .m = &e->m,
@@ -280,8 +281,6 @@ static lam_status measure_again(examination *e, const recipe *from, error_report
         .progress = e->progress};
     TRY(judging_run(&j, e->op, out, error));
 done:
-    plane_tree_free(&tree);
-    block_factors_free(&blocks);
     free(order);
     return status;
 }

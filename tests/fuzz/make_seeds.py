@@ -55,6 +55,8 @@ with tempfile.TemporaryDirectory() as scratch:
     run("generate", "box", "--divisions", 3, "-o", "box.obj")
     run("precompute", "box.obj", "--probes", 0, "--quiet", "-o", folder / "store" / "compressed.h5", "--method",
         "hierarchical", "--epsilon", .99, "--keep-form-factors=compressed")
+    run("precompute", "box.obj", "--probes", 0, "--quiet", "-o", folder / "store" / "blocks.h5", "--form-factors", "blocks",
+        "--epsilon", .99, "--keep-form-factors")
 
 # The reply of the importing process: a header, then points, elements, names, materials.
 header = struct.pack("<8sQ480s2048sQ7Q", b"lamsoup", 0, b"", b"", 0, 3, 1, 1, 2, 1, 2, 0)

@@ -67,7 +67,8 @@ class Blocks(Case):
         self.assertRegex(done.stdout, r"ok +error")
 
     def test_what_needs_rows_is_refused(self):
-        for options, reason in ((("--sky", "tregenza"), "--sky"), (("--keep-form-factors",), "--keep-form-factors"),
+        for options, reason in ((("--sky", "tregenza"), "--sky"),
+                                (("--keep-form-factors=compressed",), "--keep-form-factors=compressed"),
                                 (("--scratch", self.path("rows")), "--scratch"),
                                 (("--method", "low-rank", "--rank", 8), "--method low-rank needs rows")):
             done = self.failed(reason, "precompute", self.room, "-o", self.path("no.h5"), "--form-factors", "blocks",

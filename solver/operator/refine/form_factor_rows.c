@@ -7,10 +7,8 @@
 
 #define GROUP FORM_FACTORS_GROUP
 
-typedef enum storage { STORAGE_ROWS, STORAGE_UPPER, STORAGE_COMPRESSED, STORAGES } storage;
-
-static lam_status read_storage(store *s, storage *out, lam_error *error) {
-    static const char *const names[STORAGES] = {"rows", "upper", "compressed"};
+lam_status form_factors_storage(store *s, form_factor_storage *out, lam_error *error) {
+    static const char *const names[STORAGES] = {"rows", "upper", "compressed", "blocks"};
     lam_status status = LAM_OK;
     char *text = NULL;
     int k = 0;
@@ -21,18 +19,9 @@ static lam_status read_storage(store *s, storage *out, lam_error *error) {
              "%s: /form_factors has the storage '%.20s', which is not supported; precompute the scene again, "
              "or use the version of lambert that wrote the store",
              store_path(s), text);
-    *out = (storage)k;
+    *out = (form_factor_storage)k;
 done:
     free(text);
-    return status;
-}
-
-lam_status form_factors_in_rows(store *s, bool *in_rows, lam_error *error) {
-    storage how = STORAGE_ROWS;
-    *in_rows = false;
-    if (!store_has(s, GROUP)) return LAM_OK;
-    const lam_status status = read_storage(s, &how, error);
-    *in_rows = status == LAM_OK && how != STORAGE_COMPRESSED;
     return status;
 }
 
@@ -109,13 +98,18 @@ done:
 lam_status form_factor_rows_read(store *s, size_t n, const double *area, const large_place *place, csr *held,
                                  bool *rows, double *row_sums, lam_error *error) {
     lam_status status = LAM_OK;
-    storage how = STORAGE_ROWS;
+    form_factor_storage how = STORAGE_ROWS;
     *held = (csr){.n = n, .place = place};
-    TRY(read_storage(s, &how, error));
+    TRY(form_factors_storage(s, &how, error));
     if (how == STORAGE_COMPRESSED)
         FAIL(error, LAM_ERR_UNSUPPORTED,
              "%s: its form factors are compressed, which refines answers but makes no operator; precompute "
              "the scene again, or keep them with --keep-form-factors alone",
+             store_path(s));
+    if (how == STORAGE_BLOCKS)
+        FAIL(error, LAM_ERR_UNSUPPORTED,
+             "%s: its form factors are blocks of clusters, where rows are needed; precompute the scene with "
+             "--form-factors rays --keep-form-factors",
              store_path(s));
     *rows = how == STORAGE_ROWS;
     TRY(read_csr(s, held, error));
@@ -199,12 +193,16 @@ lam_status form_factors_size(store *s, size_t *kept, size_t *most, lam_error *er
     store_type type;
     size_t rows_of[STORE_MAX_RANK] = {0}, entries[STORE_MAX_RANK] = {0};
     int rank;
-    storage how = STORAGE_ROWS;
-    TRY(read_storage(s, &how, error));
+    form_factor_storage how = STORAGE_ROWS;
+    TRY(form_factors_storage(s, &how, error));
     const bool rows = how == STORAGE_ROWS;
     if (how == STORAGE_COMPRESSED) {
         TRY(compressed_size(s, kept, error));
         *most = *kept;
+        goto done;
+    }
+    if (how == STORAGE_BLOCKS) {
+        TRY(block_factors_stored(s, kept, most, error));
         goto done;
     }
     TRY(store_array_info(s, GROUP "/indptr", &type, &rank, rows_of, error));
@@ -234,9 +232,19 @@ done:
     return status;
 }
 
+static lam_status open_blocks(store *s, lam_form_factors *f, lam_error *error) {
+    lam_status status = LAM_OK;
+    f->blocks = memory_allocate(1, sizeof *f->blocks, "form factors", error);
+    f->row_norms = memory_allocate(f->n, sizeof *f->row_norms, "form factors", error);
+    if (f->blocks == NULL || f->row_norms == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(kept_blocks_load(s, f->n, f->area, f->blocks, f->row_sums, f->row_norms, error));
+done:
+    return status;
+}
+
 lam_status form_factors_open(store *s, lam_form_factors **out, lam_error *error) {
     lam_status status = LAM_OK;
-    storage how = STORAGE_ROWS;
+    form_factor_storage how = STORAGE_ROWS;
     lam_form_factors *made = NULL;
     csr held = {.n = 0};
     size_t n = 0;
@@ -251,9 +259,9 @@ lam_status form_factors_open(store *s, lam_form_factors **out, lam_error *error)
     made->n = n;
     made->row_sums = memory_allocate(n, sizeof *made->row_sums, "form factors", error);
     if (made->row_sums == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(read_storage(s, &how, error));
-    if (how == STORAGE_COMPRESSED) {
-        TRY(open_compressed(s, made, error));
+    TRY(form_factors_storage(s, &how, error));
+    if (how == STORAGE_COMPRESSED || how == STORAGE_BLOCKS) {
+        TRY(how == STORAGE_BLOCKS ? open_blocks(s, made, error) : open_compressed(s, made, error));
         *out = made;
         made = NULL;
         goto done;
@@ -320,6 +328,30 @@ done:
     return status;
 }
 
+lam_status form_factors_of_blocks(plane_tree *tree, block_factors *f, lam_form_factors **out,
+                                  lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = f->n;
+    lam_form_factors *made = memory_allocate(1, sizeof *made, "form factors", error);
+    if (made == NULL) TRY(LAM_ERR_MEMORY);
+    made->n = n;
+    made->area = memory_allocate(n, sizeof *made->area, "form factors", error);
+    made->row_sums = memory_allocate(n, sizeof *made->row_sums, "form factors", error);
+    made->row_norms = memory_allocate(n, sizeof *made->row_norms, "form factors", error);
+    made->blocks = memory_allocate(1, sizeof *made->blocks, "form factors", error);
+    if (made->area == NULL || made->row_sums == NULL || made->row_norms == NULL || made->blocks == NULL)
+        TRY(LAM_ERR_MEMORY);
+    for (size_t p = 0; p < n; p++) made->area[f->order[p]] = f->area[p];
+    TRY(kept_blocks_make(tree, f, made->blocks, made->row_sums, made->row_norms, error));
+    *out = made;
+    made = NULL;
+done:
+    block_factors_free(f);
+    plane_tree_free(tree);
+    lam_form_factors_close(made);
+    return status;
+}
+
 lam_status lam_form_factors_open(const char *path, lam_form_factors **out, lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
@@ -340,11 +372,14 @@ void lam_form_factors_close(lam_form_factors *f) {
     free(f->row_norms);
     if (f->compressed != NULL) compressed_free(f->compressed);
     free(f->compressed);
+    if (f->blocks != NULL) kept_blocks_free(f->blocks);
+    free(f->blocks);
     free(f);
 }
 
 size_t lam_form_factors_bytes(const lam_form_factors *f) {
     if (f->compressed != NULL) return compressed_bytes(f->compressed);
+    if (f->blocks != NULL) return kept_blocks_bytes(f->blocks);
     return (size_t)f->F.indptr[f->F.n] * (sizeof *f->F.indices + sizeof *f->F.data) +
            (f->F.n + 1) * sizeof *f->F.indptr;
 }

@@ -5,6 +5,7 @@
 
 #include "solver/linalg/csr.h"
 #include "solver/operator/refine/compressed_factors.h"
+#include "solver/operator/refine/kept_blocks.h"
 
 #include <math.h>
 
@@ -22,15 +23,29 @@ static inline float upper_factor(float exchange, double area) {
 lam_status form_factor_rows_read(store *s, size_t n, const double *area, const large_place *place, csr *held,
                                  bool *rows, double *row_sums, lam_error *error);
 
-/* F of an open store, as rows or compressed; the certificate of a refined answer refers to it. */
+/* The forms in which a store keeps its form factors. */
+typedef enum form_factor_storage {
+    STORAGE_ROWS,
+    STORAGE_UPPER,
+    STORAGE_COMPRESSED,
+    STORAGE_BLOCKS,
+    STORAGES
+} form_factor_storage;
+
+/* Of a store that has form factors. Errors: those of store_get_text, LAM_ERR_UNSUPPORTED for another storage.
+ */
+lam_status form_factors_storage(store *s, form_factor_storage *out, lam_error *error);
+
+/* F of an open store, as rows, compressed or as blocks; the certificate of a refined answer refers to it. */
 struct lam_form_factors {
     size_t n;
-    csr F;                          /* empty when compressed */
+    csr F;                          /* rows; else empty */
     double *area;                   /* [n], m^2 */
     double *row_sums;               /* [n], of F */
     double *row_norms;              /* [n], (sum_j F_ij^2 / A_j)^1/2; NULL when compressed */
     uint64_t longest;               /* entries of the longest row */
-    compressed_factors *compressed; /* NULL: rows */
+    compressed_factors *compressed; /* NULL: not so */
+    kept_blocks *blocks;            /* NULL: not so */
 };
 
 /* Loads them; *out = NULL when the store has none. lam_form_factors_close frees them. Errors: as
@@ -44,8 +59,10 @@ lam_status form_factors_of_rows(csr *F, const double *area, lam_form_factors **o
 lam_status form_factors_of_compressed(compressed_factors *c, const double *area, const double *row_sums,
                                       lam_form_factors **out, lam_error *error);
 
-/* *in_rows = the store has form factors as rows or pairs, not compressed. Errors: as store_get_text. */
-lam_status form_factors_in_rows(store *s, bool *in_rows, lam_error *error);
+/* From blocks with a balance and their tree (taken over, also on an error). Errors: those of
+ * kept_blocks_make. */
+lam_status form_factors_of_blocks(plane_tree *tree, block_factors *f, lam_form_factors **out,
+                                  lam_error *error);
 
 /* Memory of form_factors_open in bytes: *kept after loading, *most while loading. Errors:
  * those of store_get_text and store_array_info, LAM_ERR_UNSUPPORTED. */

@@ -302,10 +302,12 @@ static void find_irradiance(refinement *s, const int *exponents, const double *H
         }
         double moved = refiner->row_most * col->bound +
                        refiner->roundings * (largest - 2 * col->least * refiner->row_most);
+        if (!refiner_has_rows(refiner))
+            moved += refiner_product_rounding(refiner, refine_most(n, s->z + c * n));
         if (s->scratch != NULL) {
             double lost;
             (void)refinement_compression(s, c, false, s->z + c * n, &lost);
-            moved += lost + refiner_product_rounding(refiner, refine_most(n, s->z + c * n));
+            moved += lost;
         }
         certificates[c / C] = fmax(certificates[c / C], ldexp(moved, exponents[c]) + rounded);
     }

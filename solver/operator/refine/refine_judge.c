@@ -39,13 +39,14 @@ static double area_norm(size_t n, const double *area, const double *x, double la
 }
 
 /* The number of rows with rho k / v |r|_A above `allowed`, which stand first; 0 when they are too large a
- * share of F. */
+ * share of F, or F is not there as rows. */
 static size_t rows_in_question(const lam_refiner *refiner, const refine_channel *channel, double norm,
                                double allowed) {
     const csr *F = &refiner->F->F;
-    const uint64_t room = F->indptr[F->n] / SHARE_OF_ROWS;
     uint64_t entries = 0;
     size_t count = 0;
+    if (!refiner_has_rows(refiner)) return 0;
+    const uint64_t room = F->indptr[F->n] / SHARE_OF_ROWS;
     for (; count < F->n && channel->rows[count].mean * norm > allowed; count++) {
         const size_t i = channel->rows[count].element;
         entries += F->indptr[i + 1] - F->indptr[i];

@@ -33,6 +33,7 @@ void refinement_free(refinement *s) {
     free(s->again);
     free(s->helped);
     free(s->scratch);
+    free(s->product_work);
     *s = (refinement){.n_columns = 0};
 }
 
@@ -43,10 +44,17 @@ static size_t scratch_of(const lam_refiner *refiner) {
     return c == NULL ? 0 : 3 * c->n + compressed_work(c);
 }
 
+/* Bytes of work of a product with n_columns vectors by blocks. */
+static size_t work_of_product(const lam_refiner *refiner, size_t n_columns) {
+    const kept_blocks *b = refiner->F->blocks;
+    return b == NULL ? 0 : block_factors_work(&b->f, n_columns < BLOCK_VECTORS ? n_columns : BLOCK_VECTORS);
+}
+
 size_t refinement_bytes(const lam_refiner *refiner) {
     const size_t C = refiner->op->n_channels, n = refiner->op->n;
     return C * (n * ((5 + 2 * REFINE_WINDOW) * sizeof(double) + 2 * sizeof(float)) +
-                scratch_of(refiner) * sizeof(double));
+                scratch_of(refiner) * sizeof(double)) +
+           work_of_product(refiner, C);
 }
 
 static lam_status reserve(size_t rows, size_t row_bytes, void *out, lam_error *error) {
@@ -74,7 +82,8 @@ lam_status refinement_create(const lam_refiner *refiner, size_t n_vectors, refin
     TRY(reserve(REFINE_WINDOW * m, n * sizeof(double), &s.kept_Z, error));
     TRY(reserve(REFINE_WINDOW * m, n * sizeof(double), &s.kept_Q, error));
     if (s.scratch_stride > 0) TRY(reserve(m, s.scratch_stride * sizeof(double), &s.scratch, error));
-    if (m > 1 && s.scratch == NULL) { /* one vector is not copied */
+    if (refiner->F->blocks != NULL) TRY(reserve(work_of_product(refiner, m), 1, &s.product_work, error));
+    if (m > 1 && refiner_has_rows(refiner)) { /* one vector is not copied */
         TRY(reserve(n, CSR_DOUBLES_WIDTH * sizeof(double), &s.X, error));
         TRY(reserve(n, CSR_DOUBLES_WIDTH * sizeof(double), &s.Y, error));
     }
@@ -134,9 +143,32 @@ static void multiply_some(refinement *s, size_t m, const size_t *columns, const 
         for (size_t k = 0; k < m; k++) to[columns[k] * n + i] = Y[i * width + k];
 }
 
+/* The same by blocks, as many columns at a time as share a pass. */
+static void multiply_by_blocks(refinement *s, const bool *chosen, const double *X, double *Y) {
+    const size_t n = s->refiner->op->n;
+    const double *from[BLOCK_VECTORS];
+    double *to[BLOCK_VECTORS];
+    block_vectors some = {.step = 1, .by_element = true, .x = from, .y = to};
+    for (size_t c = 0; c < s->n_columns; c++) {
+        if (!chosen[c]) continue;
+        s->columns[c].passes++;
+        from[some.count] = X + c * n;
+        to[some.count++] = Y + c * n;
+        if (some.count < BLOCK_VECTORS) continue;
+        block_factors_apply(&s->refiner->F->blocks->f, &some, s->product_work, s->refiner->op->n_threads);
+        some.count = 0;
+    }
+    if (some.count > 0)
+        block_factors_apply(&s->refiner->F->blocks->f, &some, s->product_work, s->refiner->op->n_threads);
+}
+
 void refinement_multiply(refinement *s, const bool *chosen, const double *X, double *Y) {
     const size_t n = s->refiner->op->n;
     size_t some[CSR_DOUBLES_WIDTH], m = 0;
+    if (s->refiner->F->blocks != NULL) {
+        multiply_by_blocks(s, chosen, X, Y);
+        return;
+    }
     for (size_t c = 0; c < s->n_columns; c++) {
         if (!chosen[c]) continue;
         s->columns[c].passes++;
@@ -220,9 +252,9 @@ static void restart(refinement *s, size_t c, const double *x, const double *h) {
         largest = all > largest ? all : largest;
         rho_most = fmax(rho_most, (double)rho[i]);
     }
-    const double product = s->scratch != NULL
-                               ? rho_most * refiner_product_rounding(refiner, refine_most(n, x))
-                               : refiner->roundings * largest;
+    const double product = refiner_has_rows(refiner)
+                               ? refiner->roundings * largest
+                               : rho_most * refiner_product_rounding(refiner, refine_most(n, x));
     col->error = product + 2 * REFINE_U * refine_most(n, r);
     col->n_kept = 0;
 }

@@ -17,7 +17,10 @@
  * certificate still holds for F: the residual of the answer Q = P + r = R F~ (E' + P) is
  *     R F (E' + Q) - Q = R F~ r + R (F - F~)(E' + Q),
  *     so   b_i = rho_i (s_i |r|_max + delta_i(r) + delta_i(E' + Q)).
- * The last term does not decrease with r. */
+ * The last term does not decrease with r.
+ *
+ * Blocks. Products are with F itself, but for a rounding that has a bound of its own, and no pair is negative
+ * (kept_blocks.h). s and k are upper bounds. A row of F is not multiplied alone. */
 #ifndef LAMBERT_OPERATOR_REFINE_REFINEMENT_H
 #define LAMBERT_OPERATOR_REFINE_REFINEMENT_H
 
@@ -91,7 +94,8 @@ typedef struct refinement {
     double *lit;    /* E' */
     double *P, *r, *z, *q;
     double *kept_Z, *kept_Q; /* [REFINE_WINDOW][columns][n] */
-    double *X, *Y;           /* the vectors of a product, [n][CSR_DOUBLES_WIDTH] */
+    double *X, *Y;           /* the vectors of a product with rows, [n][CSR_DOUBLES_WIDTH] */
+    void *product_work;      /* of one with blocks */
     float *narrow_in, *narrow_out;
     void *work;
     size_t work_bytes;
@@ -118,6 +122,11 @@ void refinement_solve(refinement *s);
 /* Sets r, P, bound, done and stuck of a column. True when r should be computed anew from P. */
 bool refinement_judge(refinement *s, size_t column);
 
+/* True where F is there as rows: their products are rounded relative to themselves. */
+static inline bool refiner_has_rows(const lam_refiner *refiner) {
+    return refiner->F->compressed == NULL && refiner->F->blocks == NULL;
+}
+
 /* A bound on |A^-1 R F r|_max for an r of this maximum norm; it is sharpened only until it is at most
  * `allowed`. Cost: at most an eighth of a product with F. */
 double refine_left(const lam_refiner *refiner, const refine_channel *channel, const double *r, double r_most,
@@ -135,8 +144,11 @@ static inline double refine_most(size_t n, const double *x) {
 
 /* A bound on the rounding of (F x)_i for an x of this maximum norm. */
 static inline double refiner_product_rounding(const lam_refiner *refiner, double x_most) {
-    const compressed_factors *c = refiner->F->compressed;
-    return (refiner->roundings * refiner->row_most + (c != NULL ? c->rounding : 0)) * x_most;
+    const lam_form_factors *F = refiner->F;
+    const double of_product = F->compressed != NULL ? F->compressed->rounding
+                              : F->blocks != NULL   ? F->blocks->rounding
+                                                    : 0;
+    return (refiner->roundings * refiner->row_most + of_product) * x_most;
 }
 
 /* delta(x) of compressed form factors, [n], in the column's scratch, and its largest; `second` takes the
