@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# All tests: layers, layout and clang-tidy, then all but four tests under AddressSanitizer and UndefinedBehaviorSanitizer,
-# the daemon's under ThreadSanitizer, those four (faults, installation, documents, servers of the bench) as users have the
-# programs, then a warning-free build by the other compiler. The builds are the presets of CMakePresets.json, in build/.
+# All tests: layers and layout, then all but a few tests under AddressSanitizer and UndefinedBehaviorSanitizer, a
+# warning-free build by the other compiler with its unit and contract tests and clang-tidy, the daemon's tests under
+# ThreadSanitizer, and those few (AS_USERS in tests/CMakeLists.txt) with programs as users have them. The builds are the
+# presets of CMakePresets.json, in build/.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 jobs=$(nproc)
@@ -48,28 +49,28 @@ build asan
 # Only leaks that pass through our code count; the interpreter and the graphics libraries keep their own.
 export ASAN_OPTIONS=detect_leaks=1 LSAN_OPTIONS=suppressions=$PWD/tests/support/lsan.supp:print_suppressions=0
 export UBSAN_OPTIONS=print_stacktrace=1
-# One test more than cores: those of slow clients and of time limits mostly wait.
-run_ctest asan -j $((jobs + 1))
-
-step "the daemon under ThreadSanitizer"
-build tsan lambertd unit_batch unit_adjoint_rows unit_guard_parts
-build dev lambert lambertd lambert-bench lambert_shared lambert_static ready_server faults
-export TSAN_OPTIONS=suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1:exitcode=66
-# OpenMP's runtime is not instrumented: its barriers would look like races, so a pass has one thread here; for the
-# daemon alone, as NumPy's BLAS waits for ever under such a limit.
-export CK_FORK=no OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 LAMBERTD_OMP_THREAD_LIMIT=1
-cmake --preset tsan -DLAMBERT_TEST_PROGRAM="$PWD/build/dev/lambert" >/dev/null
-run_ctest tsan -j $((jobs + 1)) -R 'service\.(daemon|reduce|guard|headers)|unit\.(batch|adjoint_rows|guard_parts)'
-unset CK_FORK OPENBLAS_NUM_THREADS OMP_NUM_THREADS LAMBERTD_OMP_THREAD_LIMIT
-
-step "optimised: faults around the daemon; an installation; the commands of all documents; the script of bench service"
-run_ctest dev -j $((jobs + 1)) -R 'service\.(faults|install|documents|bench_servers)$'
+# A process for each check would have its leaks looked for each time: half of the time of the contract. One test more than
+# cores: those of slow clients and of time limits mostly wait.
+CK_FORK=no run_ctest asan -j $((jobs + 1))
 
 step "a warning-free build by clang, its unit and contract tests, clang-tidy"
 build clang
 run_ctest clang -L 'unit|contract' -j "$jobs"
 git ls-files 'solver/*.c' 'server/*.c' 'store/*.c' | xargs -P "$jobs" -n 8 clang-tidy --quiet -p build/clang \
     >"$logs/tidy" 2>/dev/null || { cat "$logs/tidy"; total_failed=$((total_failed + 1)); }
+
+step "the daemon under ThreadSanitizer"
+build tsan lambertd unit_batch unit_adjoint_rows unit_guard_parts
+export TSAN_OPTIONS=suppressions=$PWD/tests/support/tsan.supp:halt_on_error=1:exitcode=66
+# OpenMP's runtime is not instrumented: its barriers would look like races, so a pass has one thread here; for the
+# daemon alone, as NumPy's BLAS waits for ever under such a limit.
+export CK_FORK=no OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 LAMBERTD_OMP_THREAD_LIMIT=1
+cmake --preset tsan -DLAMBERT_TEST_PROGRAM="$PWD/build/clang/lambert" >/dev/null
+run_ctest tsan -j $((jobs + 1)) -R 'service\.(daemon|reduce|guard|headers)|unit\.(batch|adjoint_rows|guard_parts)'
+unset CK_FORK OPENBLAS_NUM_THREADS OMP_NUM_THREADS LAMBERTD_OMP_THREAD_LIMIT
+
+step "programs as users have them: faults, kills, an installation, the commands of all documents, the bench"
+run_ctest clang -j $((jobs + 1)) -L as_users
 
 step "totals"
 echo "$total_passed passed, $total_failed failed"

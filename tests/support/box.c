@@ -14,11 +14,21 @@ box_cell box_cell_of(const double size[3], unsigned divisions, size_t i) {
     return cell;
 }
 
+/* Room for `added` more rows behind `count`, which doubles: a sanitizer copies an array whenever it grows. */
+static void *grow(void *array, size_t count, size_t added, size_t row_bytes) {
+    size_t room = 1;
+    while (room < count) room *= 2;
+    if (array != NULL && count + added <= room) return array;
+    while (room < count + added) room *= 2;
+    array = realloc(array, room * row_bytes);
+    ck_assert_ptr_nonnull(array);
+    return array;
+}
+
 void mesh_add_quad(mesh *m, const double corners[4][3]) {
     const size_t v = m->n_vertices;
-    m->vertices = realloc(m->vertices, (v + 4) * sizeof *m->vertices);
-    m->elements = realloc(m->elements, (m->n + 1) * sizeof *m->elements);
-    ck_assert(m->vertices != NULL && m->elements != NULL);
+    m->vertices = grow(m->vertices, v, 4, sizeof *m->vertices);
+    m->elements = grow(m->elements, m->n, 1, sizeof *m->elements);
     memcpy(m->vertices[v], corners, 4 * sizeof *m->vertices);
     for (uint32_t c = 0; c < 4; c++) m->elements[m->n][c] = (uint32_t)v + c;
     m->n_vertices += 4;
@@ -39,6 +49,9 @@ void mesh_add_cell(mesh *m, const box_cell *cell, bool positive) {
 
 void mesh_finish(mesh *m, float reflectance) {
     lam_error error = {0};
+    m->vertices = realloc(m->vertices, m->n_vertices * sizeof *m->vertices);
+    m->elements = realloc(m->elements, m->n * sizeof *m->elements);
+    ck_assert(m->vertices != NULL && m->elements != NULL);
     ck_assert_msg(mesh_measure(m, &error) == LAM_OK, "%s", error.message);
     m->n_channels = 1;
     m->reflectance = malloc(m->n * sizeof(float));
