@@ -4,8 +4,8 @@
 #include "solver/operator/hierarchical.h"
 
 #include "solver/base/work_area.h"
-#include "solver/linalg/sliced.h"
 #include "solver/linalg/sparse_product.h"
+#include "solver/linalg/tiled.h"
 #include "solver/operator/mean_correction.h"
 #include "solver/operator/wavelet/wavelet_plan.h"
 
@@ -22,7 +22,7 @@ typedef struct hierarchical {
     wavelets basis;
     wavelet_plan plan; /* of the coefficients that any K has */
     half_matrix *K;    /* [C] */
-    sliced_rows *fast; /* [C], the rows of K */
+    tiled_rows *fast;  /* [C], the rows of K */
     float *root_area;  /* [n] A^1/2, by position */
     float *left;       /* [C][n] rho' A^-1/2, by position */
     mean_correction even;
@@ -37,7 +37,7 @@ void hierarchical_arrays_free(hierarchical_arrays *arrays, size_t n_channels) {
 
 static void hierarchical_destroy(lam_operator *op) {
     hierarchical *self = (hierarchical *)op;
-    for (size_t c = 0; self->fast != NULL && c < op->n_channels; c++) sliced_free(&self->fast[c]);
+    for (size_t c = 0; self->fast != NULL && c < op->n_channels; c++) tiled_free(&self->fast[c]);
     for (size_t c = 0; self->K != NULL && c < op->n_channels; c++) csr_free(&self->K[c].rows);
     free(self->fast);
     free(self->K);
@@ -101,22 +101,44 @@ done:
     return status;
 }
 
+/* first [n_used + 1]: the coefficients of a node are a group of rows, and those of several nodes where they
+ * fit. Returns the number of groups. */
+static size_t group_coefficients(const wavelet_plan *plan, uint32_t *first) {
+    size_t n_groups = 0, begin = 0, end = 0; /* of the last group */
+    for (size_t t = 0; t <= plan->n_steps; t++) {
+        size_t count = t < plan->n_steps ? plan->steps[t].own : plan->n_used - end;
+        for (size_t most = TILE; count > 0; count -= most) {
+            most = count < TILE ? count : TILE;
+            if (n_groups == 0 || end - begin + most > TILE) {
+                begin = end;
+                first[n_groups++] = (uint32_t)begin;
+            }
+            end += most;
+        }
+    }
+    first[n_groups] = (uint32_t)end;
+    return n_groups;
+}
+
 /* Makes of basis and K the arrays that answers read. */
 static lam_status finish(hierarchical *self, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = self->base.n, C = self->base.n_channels;
     bool *used = memory_allocate(n, sizeof *used, "operator", error);
-    if (used == NULL) TRY(LAM_ERR_MEMORY);
+    uint32_t *first = memory_allocate(n + 1, sizeof *first, "operator", error);
+    if (used == NULL || first == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t c = 0; c < C; c++)
         for (size_t i = 0; i < n; i++)
             used[i] = used[i] || self->K[c].rows.indptr[i + 1] > self->K[c].rows.indptr[i];
     TRY(wavelet_plan_create(&self->basis, used, &self->plan, error));
+    const size_t n_groups = group_coefficients(&self->plan, first);
     for (size_t c = 0; c < C; c++) {
         TRY(half_matrix_compact(&self->K[c], self->plan.coefficient, self->plan.n_used, error));
-        TRY(sliced_create(&self->K[c].rows, self->K[c].scale, &self->fast[c], error));
+        TRY(tiled_create(&self->K[c].rows, self->K[c].scale, n_groups, first, &self->fast[c], error));
     }
 done:
     free(used);
+    free(first);
     return status;
 }
 
@@ -214,9 +236,9 @@ static size_t hierarchical_work_bytes(const lam_operator *op, size_t n_rhs) {
     const hierarchical *self = (const hierarchical *)op;
     const size_t used = self->plan.n_used, product = sparse_product_work(used, 1);
     size_t side, vectors, coefficients, slots, total = WORK_AREA_ALIGN;
-    if (product == 0 || !size_multiply(sliced_work(used, n_rhs), sizeof(float), &side) ||
+    if (product == 0 || !size_multiply(tiled_work(used, n_rhs), sizeof(float), &side) ||
         !size_multiply(op->n, n_rhs * sizeof(float), &vectors) ||
-        !size_multiply(used, n_rhs * sizeof(float), &coefficients) ||
+        !size_multiply(used + TILED_PAST, n_rhs * sizeof(float), &coefficients) ||
         !size_multiply(wavelet_plan_work(&self->plan), n_rhs * sizeof(float), &slots) ||
         !work_area_add(&total, vectors) || !work_area_add(&total, coefficients) ||
         !work_area_add(&total, coefficients) || !work_area_add(&total, slots) ||
@@ -224,6 +246,13 @@ static size_t hierarchical_work_bytes(const lam_operator *op, size_t n_rhs) {
         !work_area_add(&total, product))
         return 0;
     return total;
+}
+
+/* Room for the coefficients of n_rhs vectors and what a product may read behind them. */
+static float *take_coefficients(void **work, const wavelet_plan *plan, size_t n_rhs) {
+    float *made = work_area_take(work, (n_rhs * plan->n_used + TILED_PAST) * sizeof *made);
+    memset(made + n_rhs * plan->n_used, 0, TILED_PAST * sizeof *made);
+    return made;
 }
 
 /* out_v = K_c in_v: light of few elements by its columns, other vectors together. */
@@ -236,7 +265,7 @@ static void multiply_core(const hierarchical *self, size_t c, size_t m, const fl
         last = v;
         while (last < m && !sparse_product_by_columns(K, in + last * n)) last++;
         if (last > v) {
-            sliced_multiply(&self->fast[c], last - v, in + v * n, out + v * n, side, n_threads);
+            tiled_multiply(&self->fast[c], last - v, in + v * n, out + v * n, side, n_threads);
         } else {
             sparse_product(&symmetric, 1, in + v * n, n, 0, NULL, NULL, out + v * n, n, product);
             last++;
@@ -264,10 +293,10 @@ static void apply(const lam_operator *op, bool adjoint, size_t n_rhs, const floa
     const wavelet_plan *plan = &self->plan;
     const size_t n = op->n, C = op->n_channels, n_threads = op->n_threads;
     float *X = work_area_take(&work, n_rhs * n * sizeof *X);
-    float *from = work_area_take(&work, n_rhs * plan->n_used * sizeof *from);
+    float *from = take_coefficients(&work, plan, n_rhs);
     float *to = work_area_take(&work, n_rhs * plan->n_used * sizeof *to);
     float *slots = work_area_take(&work, n_rhs * wavelet_plan_work(plan) * sizeof *slots);
-    float *side = work_area_take(&work, sliced_work(plan->n_used, n_rhs) * sizeof *side);
+    float *side = work_area_take(&work, tiled_work(plan->n_used, n_rhs) * sizeof *side);
     for (size_t c = 0; c < C; c++) {
         const float *left = self->left + c * n, *root = self->root_area;
         scale(n_rhs, n, adjoint ? left : root, in + c * n, C * n, X, n, n_threads);
@@ -297,10 +326,10 @@ static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, co
     const wavelet_plan *plan = &self->plan;
     const size_t n = op->n, C = op->n_channels, used = plan->n_used, n_threads = op->n_threads;
     float *X = work_area_take(&work, n_rhs * n * sizeof *X);
-    float *from = work_area_take(&work, n_rhs * used * sizeof *from);
+    float *from = take_coefficients(&work, plan, n_rhs);
     float *to = work_area_take(&work, n_rhs * used * sizeof *to);
     float *slots = work_area_take(&work, n_rhs * wavelet_plan_work(plan) * sizeof *slots);
-    float *side = work_area_take(&work, sliced_work(used, n_rhs) * sizeof *side);
+    float *side = work_area_take(&work, tiled_work(used, n_rhs) * sizeof *side);
     uint32_t *steps = work_area_take(&work, plan->n_steps * sizeof *steps);
     uint32_t *rows = work_area_take(&work, used * sizeof *rows);
     uint32_t *positions = work_area_take(&work, n * sizeof *positions);
@@ -326,7 +355,7 @@ static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, co
             if (some && sparse_product_by_columns(K, from + v * used))
                 multiply_core(self, c, 1, from + v * used, to, side, work);
             else if (some)
-                sliced_multiply_rows(&self->fast[c], n_rows, rows, from + v * used, to);
+                tiled_multiply_rows(&self->fast[c], n_rows, rows, from + v * used, to);
             if (some) wavelet_plan_inverse_some(plan, n_steps, steps, to, X + v * n, slots);
             const mean_correction *even = &self->even;
             const float *lift = even->missing != NULL ? even->lift + c * n : NULL;
@@ -352,7 +381,7 @@ static void hierarchical_describe(const lam_operator *op, operator_description *
     for (size_t c = 0; c < op->n_channels; c++) {
         const size_t stored = (size_t)self->K[c].rows.indptr[self->plan.n_used];
         entries += (double)stored;
-        description->bytes += sliced_bytes(&self->fast[c]);
+        description->bytes += tiled_bytes(&self->fast[c]);
     }
     description->bytes += mean_correction_bytes(&self->even);
     description->bytes += wavelet_plan_bytes(&self->plan) + (1 + op->n_channels) * op->n * sizeof(float);
@@ -370,7 +399,7 @@ const operator_kind operator_hierarchical = {
     .apply_adjoint = hierarchical_apply_adjoint,
     .destroy = hierarchical_destroy,
     .describe = hierarchical_describe,
-    /* Both triangles twice, in rows and in slices, with values and indices of four bytes where the store has
-     * two. */
+    /* Both triangles twice, in rows of eight bytes a number and in tiles, of which one of 22 bytes holds
+     * three numbers or four; the store has four bytes a number of one triangle. */
     .unpacked = 8,
 };
