@@ -55,7 +55,8 @@ static wavelet_extent extent_of(const sphere *s, const wavelet_node *a, uint32_t
     wavelet_extent made = {.radius = (float)(margin * s->radius),
                            .reach = (float)(margin * (1 + radii) * s->radius),
                            .height = height,
-                           .left = a->from_left > 0 ? a->left : WAVELET_NONE};
+                           .left = a->from_left > 0 ? a->left : WAVELET_NONE,
+                           .end = a->begin + a->n_elements};
     for (int d = 0; d < 3; d++) made.centre[d] = (float)s->centre[d];
     return made;
 }
@@ -181,23 +182,27 @@ done:
     return status;
 }
 
-size_t wavelet_cells(const wavelet_reach *r, size_t leaf, uint32_t *out, uint32_t *work) {
+size_t wavelet_cells(const wavelet_reach *r, size_t leaf, const uint32_t *lit, size_t n_lit, uint32_t *out,
+                     uint32_t *work) {
     const wavelet_node *nodes = r->basis->nodes;
     const uint32_t root = (uint32_t)r->basis->n_nodes - 1, top = r->height[root];
     uint32_t *const above = work, *const waiting =
                                       work + top + 1; /* above[h]: ancestor of height <= h; waiting: stack */
-    size_t found = 0, n_waiting = 0;
+    size_t found = 0, n_waiting = 0, next = 0;
     uint32_t a = (uint32_t)leaf;
     for (uint32_t h = 0; h <= top; h++) {
         while (nodes[a].parent != WAVELET_NONE && r->height[nodes[a].parent] <= h) a = nodes[a].parent;
         above[h] = a;
     }
     waiting[n_waiting++] = root;
-    while (n_waiting > 0) {
+    /* Nodes come in the order of their positions, so that lit[next] is the first that none before held. */
+    while (n_waiting > 0 && next < n_lit) {
         const uint32_t b = waiting[--n_waiting];
         const wavelet_extent *e = &r->extent[b];
+        if (lit[next] >= e->end) continue;
         if (e->left == WAVELET_NONE || !wavelet_is_near(r, above[e->height], b)) {
             out[found++] = b;
+            while (next < n_lit && lit[next] < e->end) next++;
             continue;
         }
         __builtin_prefetch(&r->extent[b - 1]);

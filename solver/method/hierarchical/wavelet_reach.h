@@ -13,7 +13,7 @@
 typedef struct wavelet_extent {
     float centre[3], radius, reach;
     uint32_t height, left; /* left child; WAVELET_NONE: a leaf */
-    uint32_t unused;
+    uint32_t end;          /* the position behind its last */
 } wavelet_extent;
 
 /* The scaling functions of a node in closed form: function k at position p is
@@ -60,7 +60,10 @@ static inline bool wavelet_is_near(const wavelet_reach *r, size_t a, size_t b) {
 
 /* The cells of a leaf: clusters that partition all positions, in ascending order. A node b is divided while
  * it is near the highest ancestor of `leaf` that is no higher than b: no ancestor needs its finer columns
- * otherwise. out has room for n_leaves, work for 2 height(root) + 4 numbers. Returns their number. */
-size_t wavelet_cells(const wavelet_reach *r, size_t leaf, uint32_t *out, uint32_t *work);
+ * otherwise. Only those that hold one of the positions lit [n_lit], ascending, are found. out has room for
+ * n_leaves or n_lit, whichever is less, work for 2 height(root) + 4 numbers. Returns their number. Cost: the
+ * nodes above lit positions, not all nodes, which a leaf in a crowd of planes is near. */
+size_t wavelet_cells(const wavelet_reach *r, size_t leaf, const uint32_t *lit, size_t n_lit, uint32_t *out,
+                     uint32_t *work);
 
 #endif

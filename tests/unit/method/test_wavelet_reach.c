@@ -1,4 +1,5 @@
 /* Where the rows of a leaf begin, and what far clusters make of them at once. */
+#include "solver/base/random.h"
 #include "support/wavelet_subject.h"
 
 static lam_error error;
@@ -55,6 +56,33 @@ START_TEST(far_clusters_at_once) {
 }
 END_TEST
 
+/* Of some positions, from few to all but a few, the cells that hold them, in order and no others. */
+static void cells_of_some(const wavelet_reach *r, size_t leaf, const uint32_t *cells, size_t count) {
+    const wavelets *w = r->basis;
+    uint32_t *lit = test_allocate(w->n, sizeof *lit), *found = test_allocate(r->n_leaves, sizeof *found);
+    uint32_t *work = test_allocate(2 * r->height[w->n_nodes - 1] + 4, sizeof *work);
+    uint64_t seed = leaf;
+    for (int share = 1; share < 1000; share *= 4) {
+        size_t n_lit = 0, next = 0, at = 0;
+        for (size_t p = 0; p < w->n; p++)
+            if (random_unit(&seed) * share < .97) lit[n_lit++] = (uint32_t)p;
+        const size_t n_found = wavelet_cells(r, leaf, lit, n_lit, found, work);
+        for (size_t c = 0; c < count; c++) {
+            const wavelet_node *b = &w->nodes[cells[c]];
+            const size_t before = next;
+            while (next < n_lit && lit[next] < b->begin + b->n_elements) next++;
+            if (next == before) continue;
+            ck_assert_uint_lt(at, n_found);
+            ck_assert_uint_eq(found[at++], cells[c]);
+        }
+        ck_assert_uint_eq(at, n_found);
+    }
+    ck_assert_uint_eq(wavelet_cells(r, leaf, lit, 0, found, work), 0);
+    free(lit);
+    free(found);
+    free(work);
+}
+
 /* Cells share out all positions. None is near to a node above the leaf that is as high at most, and of none
  * that was divided is that so; brothers divide alike what is as high as their parent. */
 START_TEST(cells_of_a_leaf) {
@@ -64,10 +92,13 @@ START_TEST(cells_of_a_leaf) {
     const size_t N = w->n_nodes;
     uint32_t *cells = test_allocate(r.n_leaves, sizeof *cells);
     uint32_t *work = test_allocate(2 * r.height[N - 1] + 4, sizeof *work);
+    uint32_t *every = test_allocate(w->n, sizeof *every);
     size_t coarse = 0;
+    for (size_t p = 0; p < w->n; p++) every[p] = (uint32_t)p;
     for (size_t leaf = 0; leaf < N; leaf++) {
         if (w->nodes[leaf].from_left > 0) continue;
-        const size_t count = wavelet_cells(&r, leaf, cells, work);
+        const size_t count = wavelet_cells(&r, leaf, every, w->n, cells, work);
+        if (leaf % 5 == 0) cells_of_some(&r, leaf, cells, count);
         size_t next = 0;
         for (size_t c = 0; c < count; c++) {
             const wavelet_node *b = &w->nodes[cells[c]];
@@ -82,6 +113,7 @@ START_TEST(cells_of_a_leaf) {
         ck_assert_uint_eq(next, w->n);
     }
     ck_assert((coarse > 0) == (_i != BOX)); /* which is so small that all is near */
+    free(every);
     free(cells);
     free(work);
     wavelet_reach_free(&r);
