@@ -37,7 +37,8 @@ forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n
         counted ? f->cost.seconds / n_threads : sample_seconds(n, &f->recipe, rays_per_second, n_threads);
     const double half = counted ? once : sample_seconds(n, &f->judge_recipe, rays_per_second, n_threads);
     if (!f->from_store)
-        times.form_factors = f->streamed ? n * forecast_rays(n, &f->recipe) / rays_per_second : once;
+        times.form_factors =
+            f->streamed && !counted ? n * forecast_rays(n, &f->recipe) / rays_per_second : once;
     if (f->probes > 0) times.judge = 2 * half + (f->streamed ? once : 0);
     if (f->probes > 0 && f->recipe.method != RECIPE_BLOCKS) times.solves = solve_seconds(f) / n_threads;
     return times;

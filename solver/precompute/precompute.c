@@ -225,6 +225,7 @@ lam_status precompute_run(const precompute_options *options, const option_result
     scratch_close(state.scratch, true);
     state.scratch = NULL;
     result->report = state.built;
+    memcpy(result->advice, state.advice, sizeof result->advice);
     list_unused(&state, given, result->unused);
 done:
     state_free(&state);

@@ -59,10 +59,12 @@ lam_status precompute_classify(const precompute_options *options, terminal *t, d
                                size_t *rays_used, lam_error *error);
 
 /* Runs all stages; on an error nothing is written. report describes the operator built; unused lists the
- * options among those given that the method built had no use for: "--alpha, --levels". */
+ * options among those given that the method built had no use for: "--alpha, --levels"; advice is the line of
+ * error_advice.h, which was logged as a warning, or "". */
 typedef struct precompute_result {
     build_report report;
     char unused[256];
+    char advice[256];
 } precompute_result;
 lam_status precompute_run(const precompute_options *options, const option_result *given, terminal *t,
                           precompute_result *result, lam_error *error);

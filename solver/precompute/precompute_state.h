@@ -8,6 +8,7 @@
 #include "solver/method/hierarchical/compress.h"
 #include "solver/method/judge.h"
 #include "solver/precompute/emitter_list.h"
+#include "solver/precompute/error_advice.h"
 #include "solver/precompute/forecast.h"
 #include "solver/precompute/precompute.h"
 
@@ -32,9 +33,9 @@ typedef struct precompute_state {
     compressed_factors compressed; /* of f; n is 0 where they are kept as they are, or not */
     recipe recipe;                 /* of f */
     pairs_cost cost;   /* of recipes with pairs, from a sample; seconds is 0 where none was taken */
-    bool dear;         /* all pairs would take too long */
-    bool plain;        /* and near pairs would too: rays alone are taken */
-    size_t least_rays; /* in place of all pairs that are dear */
+    bool dear;         /* the pairs of the recipe so far would take too long */
+    bool plain;        /* near pairs would too: rays alone are taken */
+    size_t least_rays; /* in place of pairs that are dear */
     bool large;        /* its rows and the judge's lie in the scratch folder */
     size_t sky_tiles;
     size_t probes;
@@ -43,6 +44,7 @@ typedef struct precompute_state {
     lam_operator *op;
     build_report built;
     error_report errors;
+    char advice[ERROR_ADVICE_BYTES]; /* on them; "" where there is none */
 } precompute_state;
 
 /* The state at the beginning of a precompute; frees it: precompute.c. */
@@ -92,8 +94,8 @@ void state_log_blocks(const precompute_state *state);
 recipe state_near_recipe(const precompute_state *state);
 
 /* Weighs all pairs, where these are the recipe so far, against near pairs and rays by the cost of a sample of
- * both, sets cost, dear, plain and least_rays, and logs why: stage_pairs.c. A new choice of the recipe
- * follows where dear is set. */
+ * both, and near pairs against rays alone, sets cost, dear, plain and least_rays, and logs why:
+ * stage_pairs.c. A new choice of the recipe follows where dear is set. */
 lam_status state_weigh_pairs(precompute_state *state, lam_error *error);
 
 /* Form factors of a scene, or of a stream the near pairs alone: precompute.c. */

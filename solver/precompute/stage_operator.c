@@ -7,6 +7,7 @@
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>
+#include <string.h>
 
 static lam_status find_geometry(precompute_state *state, lam_error *error) {
     const mesh *m = &state->m;
@@ -212,6 +213,17 @@ static lam_status trace_again(precompute_state *state, lam_error *error) {
     return status;
 }
 
+static void give_advice(precompute_state *state) {
+    const precompute_options *o = state->options;
+    const error_advice_input input = {.errors = &state->errors,
+                                      .recipe = state->f.recipe,
+                                      .epsilon = o->build.epsilon,
+                                      .finest = strcmp(o->quality, "high") == 0,
+                                      .from_store = o->from_store};
+    error_advice(&input, state->advice);
+    if (state->advice[0] != '\0') terminal_warn(state->t, "%s", state->advice);
+}
+
 static void log_half(void *context, const form_factors *half) {
     state_log_kept(context, half);
 }
@@ -247,6 +259,7 @@ lam_status stage_judge(precompute_state *state, lam_error *error) {
     log_figures(state->t, "single", &state->errors.single, state->errors.has_total);
     log_figures(state->t, "lights", &state->errors.lights, state->errors.has_total);
     log_figures(state->t, "random", &state->errors.random, state->errors.has_total);
+    give_advice(state);
 done:
     return status;
 }

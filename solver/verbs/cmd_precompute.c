@@ -27,8 +27,10 @@ static const option_row json_rows[] = {
     {0},
 };
 
-/* The answer of `lambert info --json`, with the path of the store and the seconds of each stage. */
-static lam_status print_json(const char *path, const terminal *t, lam_error *error) {
+/* The answer of `lambert info --json`, with the path of the store, the seconds of each stage, and the advice
+ * on its errors where there is one. */
+static lam_status print_json(const char *path, const terminal *t, const precompute_result *result,
+                             lam_error *error) {
     lam_status status = LAM_OK;
     store *s = NULL;
     json_t *about = NULL, *seconds = json_object();
@@ -39,6 +41,7 @@ static lam_status print_json(const char *path, const terminal *t, lam_error *err
         json_object_set_new(seconds, t->done[k].name, json_real(t->done[k].seconds));
     json_object_set_new(about, "output", json_string(path));
     json_object_set(about, "seconds", seconds);
+    if (result->advice[0] != '\0') json_object_set_new(about, "advice", json_string(result->advice));
     text = json_dumps(about, JSON_INDENT(2));
     if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory to describe it", path);
     puts(text);
@@ -159,7 +162,7 @@ int cmd_precompute(int argc, char **argv) {
     option_result given = {0};
     lam_error error = {0};
     terminal term;
-    precompute_result result = {.unused = ""};
+    precompute_result result = {.unused = "", .advice = ""};
     char *line = command_line(argc, argv), *continues = NULL;
     precompute_tables_make(&o, false, &tables);
     precompute_tables_add(&tables, json_rows, &json);
@@ -188,6 +191,6 @@ int cmd_precompute(int argc, char **argv) {
     if (code != 0) return code;
     log_unused(&term, &given, &o, &result);
     terminal_log(&term, "%s", o.output);
-    if (json && print_json(o.output, &term, &error) != LAM_OK) return terminal_fail(&term, &error);
+    if (json && print_json(o.output, &term, &result, &error) != LAM_OK) return terminal_fail(&term, &error);
     return 0;
 }

@@ -1,6 +1,8 @@
-"""All pairs, near pairs or rays, from the command line: the log says which are taken and why. unit.weigh_pairs tests that
-threads do not change the choice."""
+"""All pairs, near pairs or rays, from the command line: the log says which are taken and why, and a warning which option lowers
+an error that is large all the same. unit.weigh_pairs tests that threads do not change the choice."""
 
+import json
+import re
 import unittest
 
 import h5py
@@ -31,6 +33,28 @@ class PairsOrRays(Case):
         self.assertRegex(log, r"all pairs are taken: about .* s of one thread, by a sample of them\n")
         self.assertNotIn("not all pairs", log)
         self.assertEqual(operator["form_factors"], b"pairs")
+
+    def test_a_large_error_names_an_option(self):
+        city, store = self.path("city.obj"), self.path("city.h5")
+        must("generate", "city", "--elements", 600, "-o", city)
+        said = r"warning: the indirect error of random emission is stated as [\d.]+, above 0.03; --rays (\d+) would lower it\n"
+
+        def stated(*options):
+            done = must("precompute", city, "-o", store, "--probes", 4, "--json", *options, threads=2)
+            answer = json.loads(done.stdout)
+            with h5py.File(store) as file:
+                return done.stderr, answer.get("advice"), file["/error/random"].attrs["total_indirect_mean"]
+
+        log, advice, error = stated("--rays", 64)
+        self.assertGreater(error, .03)
+        self.assertRegex(log, said)
+        self.assertIn(advice, log)
+        _, _, less = stated("--rays", re.search(said, log).group(1))
+        self.assertLess(less, error)
+        log, advice, error = stated()
+        self.assertLess(error, .03)
+        self.assertNotIn("would lower it", log)
+        self.assertIsNone(advice)
 
 
 if __name__ == "__main__":

@@ -14,14 +14,17 @@ typedef struct outcome {
     double seconds, entries;
 } outcome;
 
-static outcome weigh(const char *scene, size_t n, const char *quality, int n_threads) {
+static outcome weigh_recipe(const char *scene, size_t n, const char *quality, int n_threads,
+                            recipe_method method, double memory) {
     lam_error error = {0};
     terminal t;
     const generate_options how = {.kind = scene, .elements = n, .seed = 1, .reflectance = -1};
     const precompute_options options = {
         .form_factors = "auto", .quality = quality, .rays = OPTION_AUTO, .build = build_presets("auto")};
-    precompute_state state = {.options = &options, .t = &t, .expected = method_find("hierarchical")};
-    state.recipe = (recipe){.method = RECIPE_PAIRS, .rays = RECIPE_RAYS_FEW, .accuracy = 7e-5};
+    precompute_state state = {
+        .options = &options, .t = &t, .expected = method_find("hierarchical"), .memory = memory};
+    state.recipe =
+        (recipe){.method = method, .rays = method == RECIPE_PAIRS ? RECIPE_RAYS_FEW : 512, .accuracy = 7e-5};
     terminal_open(&t, "test", true, false);
     state.progress = terminal_progress(&t);
     state.m = generate_good(&how);
@@ -32,6 +35,10 @@ static outcome weigh(const char *scene, size_t n, const char *quality, int n_thr
     const outcome found = {state.dear, state.plain, state.least_rays, state.cost.seconds, state.cost.entries};
     mesh_free(&state.m);
     return found;
+}
+
+static outcome weigh(const char *scene, size_t n, const char *quality, int n_threads) {
+    return weigh_recipe(scene, n, quality, n_threads, RECIPE_PAIRS, 1e15);
 }
 
 /* Leaves of a canopy hide one another everywhere: their pairs cost a minute and a half, rays nine seconds. */
@@ -76,6 +83,41 @@ START_TEST(more_elements_cost_more) {
 }
 END_TEST
 
+/* Near pairs of leaves stand in a crowd and cost many times what rays do; those of walls cost next to
+ * nothing.
+ */
+START_TEST(near_pairs_are_weighed_too) {
+    const outcome soup = weigh_recipe("canopy", 9000, "normal", 1, RECIPE_NEAR_PAIRS, 1e15),
+                  again = weigh_recipe("canopy", 9000, "normal", 3, RECIPE_NEAR_PAIRS, 1e15),
+                  room = weigh_recipe("cornell", 40000, "normal", 2, RECIPE_NEAR_PAIRS, 1e15);
+    ck_assert(soup.dear);
+    ck_assert(soup.plain);
+    ck_assert_uint_ge(soup.rays, 2 * 512);
+    ck_assert_uint_eq(soup.rays, again.rays);
+    ck_assert_double_eq(soup.seconds, again.seconds);
+    ck_assert(!room.dear);
+    ck_assert(!room.plain);
+    ck_assert_uint_eq(room.rays, 0);
+    ck_assert_double_gt(room.seconds, 0);
+}
+END_TEST
+
+/* Where there is no memory for the rows of twice the rays, near pairs stay; with just enough for these there
+ * are no more. */
+START_TEST(rays_in_place_of_near_pairs_must_fit) {
+    const outcome tight = weigh_recipe("canopy", 9000, "normal", 2, RECIPE_NEAR_PAIRS, 1e6),
+                  free = weigh_recipe("canopy", 9000, "normal", 2, RECIPE_NEAR_PAIRS, 1e15);
+    ck_assert(!tight.dear);
+    ck_assert_double_gt(tight.seconds, free.seconds);
+    ck_assert_uint_gt(free.rays, 1024);
+    /* Rows of 1,024 rays take at most 8 n 2,048 bytes = 147 MB and those of 2,048 twice that, beside the 128
+     * MB of merging. */
+    const outcome enough = weigh_recipe("canopy", 9000, "normal", 2, RECIPE_NEAR_PAIRS, 350e6);
+    ck_assert(enough.dear);
+    ck_assert_uint_eq(enough.rays, 1024);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("weigh_pairs");
     TCase *cases = tcase_create("weigh_pairs");
@@ -84,6 +126,8 @@ int main(void) {
     tcase_add_test(cases, a_plain_room_keeps_its_pairs);
     tcase_add_test(cases, high_quality_keeps_pairs_for_longer);
     tcase_add_test(cases, more_elements_cost_more);
+    tcase_add_test(cases, near_pairs_are_weighed_too);
+    tcase_add_test(cases, rays_in_place_of_near_pairs_must_fit);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }

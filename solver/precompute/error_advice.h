@@ -1,0 +1,26 @@
+/* The one line that a precompute ends with where a stated error is large: which error, and the option that
+ * would lower it. */
+#ifndef LAMBERT_PRECOMPUTE_ERROR_ADVICE_H
+#define LAMBERT_PRECOMPUTE_ERROR_ADVICE_H
+
+#include "solver/formfactor/recipe.h"
+#include "solver/method/judge.h"
+
+enum { ERROR_ADVICE_BYTES = 256 };
+
+/* The makings of a store whose errors were measured. */
+typedef struct error_advice_input {
+    const error_report *errors;
+    recipe recipe; /* of the form factors */
+    double epsilon;
+    bool finest;     /* --quality high already */
+    bool from_store; /* form factors are those of a store */
+} error_advice_input;
+
+/* text: about the scene's own lights or random emission, whichever has the larger indirect error, where that
+ * is above .03; else empty. Single elements never count: their error is that of the noise of one element's
+ * light, for which --tolerance is there. The option follows from where most of the error is: compression
+ * gets a smaller --epsilon, rays more of them, N ~ 1 / error^2, and the rest --quality high. */
+void error_advice(const error_advice_input *input, char text[ERROR_ADVICE_BYTES]);
+
+#endif

@@ -1,0 +1,95 @@
+/* The line about a large error: when there is one, about which emission, and with which option. */
+#include "solver/precompute/error_advice.h"
+#include "support/suite.h"
+
+#include <string.h>
+
+/* The advice where total and operator errors of the lights (0: none) and of random emission are such. */
+static void advice_of(recipe r, double lights, double of_lights, double random, double of_random,
+                      char text[ERROR_ADVICE_BYTES]) {
+    const error_report errors = {.lights = {.probes = lights > 0,
+                                            .total_indirect = {lights, 0, lights},
+                                            .operator_indirect = {of_lights, 0, of_lights}},
+                                 .random = {.probes = 8,
+                                            .total_indirect = {random, 0, random},
+                                            .operator_indirect = {of_random, 0, of_random}},
+                                 .has_total = true};
+    const error_advice_input input = {.errors = &errors, .recipe = r, .epsilon = .05};
+    memset(text, 'x', ERROR_ADVICE_BYTES);
+    error_advice(&input, text);
+}
+
+static const recipe rays = {.method = RECIPE_RAYS, .rays = 1024},
+                    pairs = {.method = RECIPE_PAIRS, .rays = 256},
+                    blocks = {.method = RECIPE_BLOCKS, .rays = 8}, cubes = {.method = RECIPE_HEMICUBE},
+                    near = {.method = RECIPE_NEAR_PAIRS, .rays = 512};
+
+START_TEST(a_small_error_needs_none) {
+    char text[ERROR_ADVICE_BYTES];
+    advice_of(rays, 0, 0, .0299, .001, text);
+    ck_assert_str_eq(text, "");
+    advice_of(rays, .03, .03, .03, .03, text);
+    ck_assert_str_eq(text, "");
+    const error_report unknown = {.random = {.probes = 8, .total_indirect = {.9, 0, .9}}};
+    const error_advice_input input = {.errors = &unknown, .recipe = rays, .epsilon = .05};
+    error_advice(&input, text);
+    ck_assert_str_eq(text, "");
+}
+END_TEST
+
+/* Noise falls with the root of the rays: 1.5 times too much takes 2.25 times the rays, 4,096 as a power. */
+START_TEST(noise_takes_rays) {
+    char text[ERROR_ADVICE_BYTES];
+    advice_of(rays, 0, 0, .034, .01, text);
+    ck_assert_str_eq(
+        text, "the indirect error of random emission is stated as 0.034, above 0.03; --rays 2048 would "
+              "lower it");
+    advice_of(rays, .045, .01, .034, .01, text);
+    ck_assert_str_eq(text,
+                     "the indirect error of the scene's own lights is stated as 0.045, above 0.03; --rays "
+                     "4096 would lower it");
+    advice_of(near, .2, 0, .5, .1, text);
+    ck_assert_ptr_nonnull(strstr(text, "random emission is stated as 0.5"));
+    ck_assert_ptr_nonnull(strstr(text, "--rays 262144 ")); /* 512 (.5 / .03)^2 = 142,222 */
+    advice_of(rays, 30, 0, .034, .01, text);
+    ck_assert_ptr_nonnull(strstr(text, "--rays 16777216 ")); /* the most that there may be */
+}
+END_TEST
+
+START_TEST(compression_takes_epsilon) {
+    char text[ERROR_ADVICE_BYTES];
+    advice_of(rays, 0, 0, .06, .05, text);
+    ck_assert_ptr_nonnull(strstr(text, "; --epsilon 0.02 would"));
+    advice_of(pairs, .1, .099, .01, 0, text);
+    ck_assert_ptr_nonnull(strstr(text, "; --epsilon 0.01 would"));
+    advice_of(blocks, .05, 0, .01, 0, text); /* the accuracy of blocks follows from it too */
+    ck_assert_ptr_nonnull(strstr(text, "; --epsilon 0.03 would"));
+}
+END_TEST
+
+START_TEST(other_recipes) {
+    char text[ERROR_ADVICE_BYTES];
+    advice_of(pairs, .1, .01, .01, 0, text);
+    ck_assert_ptr_nonnull(strstr(text, "; --quality high would"));
+    advice_of(cubes, .1, .01, .01, 0, text);
+    ck_assert_ptr_nonnull(strstr(text, "; --form-factors rays would"));
+    const error_report errors = {.random = {.probes = 8, .total_indirect = {.05, 0, .05}}, .has_total = true};
+    const error_advice_input fine = {.errors = &errors, .recipe = pairs, .epsilon = .05, .finest = true},
+                             kept = {.errors = &errors, .recipe = rays, .epsilon = .05, .from_store = true};
+    error_advice(&fine, text);
+    ck_assert_ptr_nonnull(strstr(text, "; a finer mesh would"));
+    error_advice(&kept, text);
+    ck_assert_ptr_nonnull(strstr(text, "; the scene precomputed with --rays 4096 would"));
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("error_advice");
+    TCase *cases = tcase_create("error_advice");
+    tcase_add_test(cases, a_small_error_needs_none);
+    tcase_add_test(cases, noise_takes_rays);
+    tcase_add_test(cases, compression_takes_epsilon);
+    tcase_add_test(cases, other_recipes);
+    suite_add_tcase(suite, cases);
+    return suite_run(suite);
+}
