@@ -21,7 +21,7 @@ static const double seconds_spent = 12;
 enum { DOUBLED_MOST = 2 };
 
 /* Where there are too many elements for all pairs anyway: 1,024 rays alone leave a bright triangle no more
- * error than near pairs beside 512 (in a part of a town .19 and .23), and random emission less. */
+ * error than near pairs beside 512 (in a part of a town .21 and .23), and random emission less. */
 enum { MORE_RAYS_OF_MANY = 2 };
 
 static lam_status cost_of(precompute_state *state, const recipe *r, pairs_cost *out, lam_error *error) {

@@ -91,6 +91,7 @@ typedef struct row_rule {
     const void *context;
     bool by_size; /* entries by descending magnitude, else by column */
     bool divided; /* entries are stored over the weight of their column */
+    bool silent;  /* these rows are no product, of which progress tells */
 } row_rule;
 
 static lam_status store_row(const product_job *job, const row_rule *rule, size_t i, size_t count,
@@ -176,8 +177,8 @@ static lam_status make_rows(const product_job *job, const row_rule *rule, csr *o
                                 &made.length[i], &one);
 #pragma omp critical(wavelet_inverse_progress)
             {
-                progress_report(job->input->progress, job->stage,
-                                ((double)job->n_products + (double)++n_done / (double)blocks) / PRODUCTS);
+                const double share = ((double)job->n_products + (double)++n_done / (double)blocks) / PRODUCTS;
+                if (!rule->silent) progress_report(job->input->progress, job->stage, share);
                 if (now == LAM_OK && progress_cancelled(job->input->progress))
                     now = status_fail(&one, LAM_ERR_CANCELLED, "cancelled");
                 if (now != LAM_OK && !failed) {
@@ -223,6 +224,42 @@ static size_t make_scaled(const void *context, size_t i, inverse_work *d) {
 static bool keep_used(const void *context, size_t i, uint32_t j, float value) {
     const scaled_rows *s = context;
     return fabsf(value) >= s->least[i] * s->weight[j];
+}
+
+/* The same where rows of B are over the weights of their columns and sorted by magnitude, and those of R B
+ * become so. Terms r_ik b_kj below least_i are left out: each gives terms a_hi r_ik b_kj of A R B that are
+ * below the bound of those that may be. */
+static size_t make_scaled_of_sorted(const void *context, size_t i, inverse_work *d) {
+    const scaled_rows *s = context;
+    size_t count = 0;
+    for (uint64_t e = s->R->indptr[i]; e < s->R->indptr[i + 1]; e++) {
+        const uint32_t k = s->R->indices[e];
+        const float r = s->R->data[e], least = s->least[i] / fabsf(r);
+        for (uint64_t f = s->B->indptr[k]; f < s->B->indptr[k + 1] && fabsf(s->B->data[f]) >= least; f++)
+            add(d, s->B->indices[f], r * s->B->data[f], &count);
+    }
+    return count;
+}
+
+static bool keep_used_of_sorted(const void *context, size_t i, uint32_t j, float value) {
+    const scaled_rows *s = context;
+    (void)j;
+    return fabsf(value) >= s->least[i];
+}
+
+/* Row i of B. */
+static size_t make_copy(const void *context, size_t i, inverse_work *d) {
+    const csr *B = context;
+    size_t count = 0;
+    for (uint64_t e = B->indptr[i]; e < B->indptr[i + 1]; e++) add(d, B->indices[e], B->data[e], &count);
+    return count;
+}
+
+static bool keep_all(const void *context, size_t i, uint32_t j, float value) {
+    (void)context;
+    (void)i;
+    (void)j;
+    return value != 0;
 }
 
 /* Row i of base + A B. Rows of B are sorted by magnitude over the weight of the column, so that the loop over
@@ -275,18 +312,28 @@ static void find_least(const product_job *job, const csr *A, float *least) {
     }
 }
 
-/* out = R B without entries that A (R B) does not use, rows sorted by magnitude over the weight of the
- * column. */
+/* Entries of R per row from which on sorting B first takes less time: R is diagonal where planes have one
+ * reflectance each, and couples each function with its ancestors where clusters of planes have several. */
+enum { COUPLED = 2 };
+
+/* out = R B without entries that A (R B) does not use, over the weight of the column, rows sorted by
+ * magnitude. */
 static lam_status scale_rows(const product_job *job, const csr *R, const csr *B, const csr *A, csr *out,
                              lam_error *error) {
     lam_status status = LAM_OK;
+    csr sorted = {.n = 0};
     float *least = memory_allocate(A->n, sizeof *least, "wavelets", error);
     if (least == NULL) TRY(LAM_ERR_MEMORY);
     find_least(job, A, least);
-    const scaled_rows s = {R, B, job->weight, least};
-    const row_rule rule = {make_scaled, keep_used, &s, true, true};
-    TRY(make_rows(job, &rule, out, error));
+    const bool coupled = R->indptr[R->n] > COUPLED * (uint64_t)R->n;
+    const row_rule sort = {make_copy, keep_all, B, .by_size = true, .divided = true, .silent = true};
+    if (coupled) TRY(make_rows(job, &sort, &sorted, error));
+    const scaled_rows s = {R, coupled ? &sorted : B, job->weight, least};
+    const row_rule plain = {make_scaled, keep_used, &s, .by_size = true, .divided = true},
+                   of_sorted = {make_scaled_of_sorted, keep_used_of_sorted, &s, .by_size = true};
+    TRY(make_rows(job, coupled ? &of_sorted : &plain, out, error));
 done:
+    csr_free(&sorted);
     free(least);
     return status;
 }
@@ -305,7 +352,7 @@ static lam_status multiply(const product_job *job, const csr *A, const csr *B, c
                             .keep = input->inner * input->threshold,
                             .skip = input->skipped * input->threshold,
                             .terms = terms};
-    const row_rule rule = {make_product, keep_upper, &p, false, false};
+    const row_rule rule = {make_product, keep_upper, &p, .by_size = false};
     TRY(make_rows(job, &rule, &upper, error));
     TRY(csr_mirror(&upper, out, error));
 done:
