@@ -8,8 +8,9 @@
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 
-/* Bytes of a stored block, its numbers and its place, and its share of the tree. */
-static const double kept_block_bytes = 50;
+/* Bytes of a stored block and its share of the tree: measured 19 (a Cornell box of 10,249 elements), 24 (of
+ * 40,978) and 28 (of 163,687). */
+static const double kept_block_bytes = 32;
 
 double forecast_store_bytes(const forecast *f) {
     const double n = (double)f->n, rows = forecast_rows_bytes(n, &f->recipe);

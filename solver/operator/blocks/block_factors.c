@@ -139,19 +139,23 @@ static lam_status cut(block_factors *f, lam_error *error) {
     return LAM_OK;
 }
 
-lam_status block_factors_end(block_factors *f, lam_error *error) {
-    lam_status status = LAM_OK;
+/* True where each block has a before b, and stands behind those of smaller a, or of the same a and smaller b.
+ */
+static bool is_sorted(const block_factors *f) {
+    for (size_t k = 0; k < f->n_blocks; k++) {
+        const cluster_block *here = &f->blocks[k], *last = &f->blocks[k > 0 ? k - 1 : 0];
+        if (f->nodes[here->a].begin >= f->nodes[here->b].begin) return false;
+        if (here->a < last->a || (here->a == last->a && here->b < last->b)) return false;
+    }
+    return true;
+}
+
+/* Two stable sorts: by b, then by a. */
+static lam_status sort_blocks(block_factors *f, lam_error *error) {
     const size_t n_nodes = f->n_clusters + f->n, count = f->n_blocks;
-    cluster_block *sorted = NULL;
-    TRY(cut(f, error));
-    if (count > UINT32_MAX) FAIL(error, LAM_ERR_MEMORY, "%zu blocks, must be below 2^32", count);
-    f->from = memory_allocate(n_nodes + 1, sizeof *f->from, "blocks", error);
-    f->into_from = memory_allocate(n_nodes + 1, sizeof *f->into_from, "blocks", error);
-    f->into = memory_allocate(count, sizeof *f->into, "blocks", error);
-    sorted = memory_allocate(count, sizeof *sorted, "blocks", error);
-    if (f->from == NULL || f->into_from == NULL || f->into == NULL || sorted == NULL) TRY(LAM_ERR_MEMORY);
+    cluster_block *sorted = memory_allocate(count, sizeof *sorted, "blocks", error);
+    if (sorted == NULL) return LAM_ERR_MEMORY;
     for (size_t k = 0; k < count; k++) turn(f->nodes, &f->blocks[k]);
-    /* Two stable sorts: by b, then by a. */
     count_blocks(f, n_nodes, true, f->into_from);
     order_by_b(f, n_nodes, f->into_from, f->into);
     count_blocks(f, n_nodes, false, f->from);
@@ -159,13 +163,24 @@ lam_status block_factors_end(block_factors *f, lam_error *error) {
         const cluster_block *from = &f->blocks[f->into[k]];
         sorted[f->from[from->a]++] = *from;
     }
-    memmove(f->from + 1, f->from, n_nodes * sizeof *f->from);
-    f->from[0] = 0;
     free(f->blocks);
     f->blocks = sorted;
-    sorted = NULL;
+    return LAM_OK;
+}
+
+lam_status block_factors_end(block_factors *f, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n_nodes = f->n_clusters + f->n, count = f->n_blocks;
+    TRY(cut(f, error));
+    if (count > UINT32_MAX) FAIL(error, LAM_ERR_MEMORY, "%zu blocks, must be below 2^32", count);
+    f->from = memory_allocate(n_nodes + 1, sizeof *f->from, "blocks", error);
+    f->into_from = memory_allocate(n_nodes + 1, sizeof *f->into_from, "blocks", error);
+    f->into = memory_allocate(count, sizeof *f->into, "blocks", error);
+    if (f->from == NULL || f->into_from == NULL || f->into == NULL) TRY(LAM_ERR_MEMORY);
+    if (!is_sorted(f)) TRY(sort_blocks(f, error));
+    count_blocks(f, n_nodes, false, f->from);
+    count_blocks(f, n_nodes, true, f->into_from);
     order_by_b(f, n_nodes, f->into_from, f->into);
 done:
-    free(sorted);
     return status;
 }

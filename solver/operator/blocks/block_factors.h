@@ -79,8 +79,9 @@ void block_factors_free(block_factors *f);
 lam_status block_factors_begin(const plane_tree *tree, const double *area, const double (*centre)[3],
                                block_factors *out, lam_error *error);
 
-/* Call once after the blocks were set: sorts them, turns those whose b stands before a, and prepares
- * products. Cost: O(n + n_blocks). Errors: LAM_ERR_MEMORY, also for 2^32 blocks and more. */
+/* Call once after the blocks were set: turns those whose b stands before a, sorts them, unless they are so
+ * already, and prepares products. Cost: O(n + n_blocks). Errors: LAM_ERR_MEMORY, also for 2^32 blocks and
+ * more. */
 lam_status block_factors_end(block_factors *f, lam_error *error);
 
 /* y = F x for n_vectors vectors, [n][n_vectors] by position, y != x: moments of x go up the tree, through the

@@ -395,8 +395,9 @@ lam_status block_factors_stored(store *s, size_t *kept, size_t *most, lam_error 
     if (clusters[0] > largest || elements[0] > largest || blocks[0] > largest)
         FAIL(error, LAM_ERR_MEMORY, "%s: " GROUP " is larger than memory can be", store_path(s));
     *kept = CLUSTER_BYTES * clusters[0] + ELEMENT_BYTES * elements[0] + BLOCK_BYTES * blocks[0];
-    /* The numbers as stored, or the blocks once more while they are sorted. */
-    *most = *kept + sizeof(block_range) * (clusters[0] + elements[0]) + sizeof(cluster_block) * blocks[0];
+    /* Their numbers as stored, then the ranges of nodes. */
+    *most = *kept + sizeof(block_range) * (clusters[0] + elements[0]) +
+            BLOCK_FUNCTIONS * BLOCK_FUNCTIONS * sizeof(float) * blocks[0];
 done:
     return status;
 }

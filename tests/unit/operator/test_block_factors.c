@@ -212,9 +212,10 @@ START_TEST(memory_runs_out) {
         lam_status status = block_factors_begin(&tree, s->area, (const double(*)[3])s->centre, &f, &error);
         const bool begun = status == LAM_OK;
         if (begun) {
-            f.n_blocks = 1;
-            f.blocks = test_allocate(1, sizeof *f.blocks);
-            f.blocks[0] = whole.blocks[0];
+            f.n_blocks = 2; /* to be sorted */
+            f.blocks = test_allocate(2, sizeof *f.blocks);
+            f.blocks[0] = whole.blocks[1];
+            f.blocks[1] = whole.blocks[0];
             status = block_factors_end(&f, &error);
         }
         if (status == LAM_OK) status = block_factors_multiply(&f, 1, x, F, &error);

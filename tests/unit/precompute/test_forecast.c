@@ -75,6 +75,28 @@ START_TEST(fewer_bits_take_less_of_the_disk) {
 }
 END_TEST
 
+/* Bytes of /form_factors as blocks of closed Cornell boxes at --epsilon .05. */
+START_TEST(kept_blocks_have_room) {
+    static const struct {
+        size_t n;
+        double bytes;
+    } measured[] = {{10249, 11012548}, {40978, 21732512}, {163687, 44764156}};
+    build_options how = build_presets("hierarchical");
+    for (size_t k = 0; k < sizeof measured / sizeof *measured; k++) {
+        forecast f = {.n = measured[k].n,
+                      .n_channels = 1,
+                      .recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 4e-4},
+                      .method = method_find("hierarchical"),
+                      .build = &how};
+        const double without = forecast_store_bytes(&f);
+        f.keep = true;
+        const double kept = forecast_store_bytes(&f) - without;
+        ck_assert_double_ge(kept, measured[k].bytes);
+        ck_assert_double_le(kept, 2 * measured[k].bytes);
+    }
+}
+END_TEST
+
 START_TEST(more_work_takes_longer) {
     forecast f = {.n = 100000, .n_channels = 1, .recipe = recipes[1], .judge_recipe = recipes[1]};
     const forecast_times one = forecast_seconds(&f, 1e7, 2);
@@ -129,6 +151,7 @@ int main(void) {
     tcase_set_timeout(cases, 300);
     tcase_add_loop_test(cases, files_are_within_the_forecast, 0, sizeof recipes / sizeof *recipes);
     tcase_add_test(cases, fewer_bits_take_less_of_the_disk);
+    tcase_add_test(cases, kept_blocks_have_room);
     tcase_add_test(cases, more_work_takes_longer);
     tcase_add_test(cases, what_does_not_fit_is_refused);
     suite_add_tcase(suite, cases);
