@@ -173,7 +173,7 @@ static bool sample_less(recipe *r) {
 
 /* "--rays 1024" or "--resolution 512" */
 static void format_recipe(const recipe *r, char text[40]) {
-    if (r->method == RECIPE_PAIRS || r->method == RECIPE_NEAR_PAIRS)
+    if (r->method == RECIPE_PAIRS || r->method == RECIPE_NEAR_PAIRS || r->method == RECIPE_BLOCKS)
         snprintf(text, 40, "%s", recipe_name(r->method));
     else if (r->method == RECIPE_HEMICUBE)
         snprintf(text, 40, "--resolution %zu", r->resolution);

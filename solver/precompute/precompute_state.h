@@ -78,10 +78,10 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error);
 /* Opens the folder for rows where one was given and is needed. */
 lam_status stage_open_scratch(precompute_state *state, lam_error *error);
 
-/* Blocks of form factors: false where options or the size of the scene rule them out; the recipe of blocks in
- * place of that of state where the scene is one for them, or where they are asked for, with the method that
- * is expected (final: nothing can change it); the stage; a line of the log: stage_blocks.c. */
-bool state_may_have_blocks(const precompute_state *state);
+/* Blocks of form factors: false where options or the number n of elements rule them out; the recipe of blocks
+ * in place of that of state where the scene is one for them, or where they are asked for, with the method
+ * that is expected (final: nothing can change it); the stage; a line of the log: stage_blocks.c. */
+bool state_may_have_blocks(const precompute_state *state, double n);
 lam_status state_choose_blocks(precompute_state *state, const build_method *method, bool final,
                                lam_error *error);
 lam_status stage_blocks(precompute_state *state, lam_error *error);

@@ -11,13 +11,13 @@ enum { ELEMENTS_LEAST = 4096 };
 /* All pairs of planes are visited. */
 enum { PLANES_MOST = 4096 };
 
-bool state_may_have_blocks(const precompute_state *state) {
+bool state_may_have_blocks(const precompute_state *state, double n) {
     const precompute_options *o = state->options;
     const bool asked = strcmp(o->form_factors, "blocks") == 0;
     if (o->from_store || state->holds || !(asked || strcmp(o->form_factors, "auto") == 0)) return false;
     if (asked) return true;
     return o->sky == NULL && !state_compresses(o) && o->scratch == NULL && o->emitters == NULL &&
-           o->rays == OPTION_AUTO && strcmp(o->quality, "draft") != 0 && state->m.n >= ELEMENTS_LEAST;
+           o->rays == OPTION_AUTO && strcmp(o->quality, "draft") != 0 && n >= ELEMENTS_LEAST;
 }
 
 static lam_status make_tree(precompute_state *state, lam_error *error) {
@@ -68,7 +68,7 @@ lam_status state_choose_blocks(precompute_state *state, const build_method *meth
     const precompute_options *o = state->options;
     const bool asked = strcmp(o->form_factors, "blocks") == 0, able = (method->flags & METHOD_BLOCKS) != 0;
     const build_method *built = able ? method : method_of_blocks();
-    if (!state_may_have_blocks(state) || built == NULL) return LAM_OK;
+    if (!state_may_have_blocks(state, (double)state->m.n) || built == NULL) return LAM_OK;
     if (final && !able && !asked) return LAM_OK;
     TRY(make_tree(state, error));
     if (asked) TRY(check_asked(state, method, final, error));

@@ -237,14 +237,17 @@ done:
     return status;
 }
 
+static bool fits(const precompute_state *state, double n) {
+    const forecast f = state_forecast(state, n);
+    return forecast_bytes(&f) <= state->memory;
+}
+
 /* Chooses the recipe for n elements: all pairs where they are affordable, or no more than the rays that would
- * do, else rays; in memory, or, where there is a scratch folder and no other way, on disk. Fails where none
- * fits. */
-static lam_status choose_recipe_that_fits(precompute_state *state, double n, lam_error *error) {
+ * do, else rays; in memory, or, where there is a scratch folder and no other way, on disk. */
+static lam_status choose_recipe(precompute_state *state, double n, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
     bool final;
-    forecast f;
     TRY(count_tiles(state, error));
     if (n > 4e9)
         FAIL(error, LAM_ERR_MEMORY, "%s: %.3g elements, must be below 4e9; refine less", o->input, n);
@@ -258,9 +261,50 @@ static lam_status choose_recipe_that_fits(precompute_state *state, double n, lam
         state->large = way >= 2;
         state->recipe = o->from_store ? state->f.recipe : choice_recipe(&asked, all_pairs);
         TRY(choose_stream(state, n, error));
-        f = state_forecast(state, n);
-        if (forecast_bytes(&f) <= state->memory) break;
+        if (fits(state, n)) break;
     }
+done:
+    return status;
+}
+
+/* The same; fails where none fits. */
+static lam_status choose_recipe_that_fits(precompute_state *state, double n, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(choose_recipe(state, n, error));
+    const forecast f = state_forecast(state, n);
+    TRY(forecast_check(&f, state->memory, error));
+done:
+    return status;
+}
+
+/* Blocks take less memory than rows. Before the mesh is refined, where blocks may come, only that memory is
+ * checked which the coarsest of them need. */
+static lam_status check_before_mesh(precompute_state *state, double n, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(choose_recipe(state, n, error));
+    forecast f = state_forecast(state, n);
+    if (!fits(state, n) && state_may_have_blocks(state, n))
+        f.recipe = f.judge_recipe = (recipe){.method = RECIPE_BLOCKS, .rays = 1, .accuracy = 1};
+    TRY(forecast_check(&f, state->memory, error));
+done:
+    return status;
+}
+
+/* The recipe of the mesh as it is now: blocks where they suit the scene, unless memory has room for rows
+ * alone. */
+static lam_status choose_final_recipe(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const double n = (double)state->m.n;
+    const build_method *method;
+    bool final;
+    TRY(choose_recipe(state, n, error));
+    if (state_may_have_blocks(state, n)) {
+        const bool rows_fit = fits(state, n), asked = strcmp(state->options->form_factors, "blocks") == 0;
+        TRY(expect_method(state, n, 0, &method, &final, error));
+        TRY(state_choose_blocks(state, method, final, error));
+        if (rows_fit && !asked && !fits(state, n)) TRY(choose_recipe(state, n, error));
+    }
+    const forecast f = state_forecast(state, n);
     TRY(forecast_check(&f, state->memory, error));
 done:
     return status;
@@ -355,21 +399,15 @@ static void log_mesh(const precompute_state *state) {
 lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
-    const build_method *method;
-    bool final;
     /* --elements counts both sides. */
     const mesh_refinement refinement = {.subdivide_levels = (unsigned)o->subdivide,
                                         .max_edge = o->max_edge,
                                         .elements = o->two_sided ? (o->elements + 1) / 2 : o->elements};
-    TRY(choose_recipe_that_fits(state, elements_after(&state->m, o), error));
+    TRY(check_before_mesh(state, elements_after(&state->m, o), error));
     if (refinement.subdivide_levels > 0 || refinement.max_edge > 0 || refinement.elements > 0)
         TRY(mesh_refine(&state->m, &refinement, error));
     if (o->two_sided) TRY(mesh_make_two_sided(&state->m, error));
-    TRY(choose_recipe_that_fits(state, (double)state->m.n, error));
-    if (state_may_have_blocks(state)) {
-        TRY(expect_method(state, (double)state->m.n, 0, &method, &final, error));
-        TRY(state_choose_blocks(state, method, final, error));
-    }
+    TRY(choose_final_recipe(state, error));
     TRY(state_weigh_pairs(state, error));
     if (state->dear) TRY(choose_recipe_that_fits(state, (double)state->m.n, error));
     state->order = memory_allocate(state->m.n, sizeof *state->order, "the order of the elements", error);

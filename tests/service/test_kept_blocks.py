@@ -106,6 +106,19 @@ class KeptBlocks(Case):
         done = must("solve", store, "--emit", "lamp=1", "--tolerance", 1e-6, "-o", self.path("a.npy"))
         self.assertIn("refined to 1e-06", done.stderr)
 
+    def test_memory_that_rows_pass_is_enough(self):
+        """Rows of 36,000 elements take 436 MB by forecast, blocks less. Too little for either is refused."""
+        scene, store = self.path("large.obj"), self.path("large.h5")
+        must("generate", "cornell", "--closed", "--elements", 5000, "--reflectance", .5, "-o", scene)
+        line = ("precompute", scene, "-o", store, "--elements", 36000, "--method", "hierarchical", "--epsilon", .2, "--probes",
+                0, "--keep-form-factors", "--memory")
+        self.failed("need about", *line, "400M", "--form-factors", "rays")
+        must(*line, "400M")
+        with h5py.File(store) as f:
+            self.assertEqual(f["form_factors"].attrs["storage"], b"blocks")
+        done = self.failed("with blocks need about", *line, "20M")
+        self.assertIn("--memory allows 20M; fits: ", done.stderr)
+
     def test_python_of_the_format(self):
         names = example("read_blocks.py", self.kept)
         with h5py.File(self.kept) as f:
