@@ -72,6 +72,7 @@ typedef struct method_scale {
     double n, n_channels;
     double noise;      /* of S, 2-norm; 0: none */
     double n_emitters; /* 0: none, or not read yet */
+    double n_blocks;   /* of form factors; 0: they are rows */
 } method_scale;
 
 struct decision;

@@ -38,9 +38,9 @@ static double sample_bytes(double n, double rays) {
 }
 
 /* Blocks in rooms of large planes: measured 7.6e5 (a Cornell box of 10,249 elements) and 2.0e6 (of 163,687)
- * at an accuracy of 3e-4, 3.3e5 and 9.3e5 at 1e-3. */
+ * at an accuracy of 3e-4, 3.3e5 and 9.3e5 at 1e-3; 6.1e6 (of 2,620,549) at 4e-4. */
 double forecast_blocks(double n, const recipe *r) {
-    return fmin(7.6e5 * pow(n / 1e4, .35) * pow(r->accuracy / 3e-4, -.7), n * n / 2);
+    return fmin(7.6e5 * pow(n / 1e4, .4) * pow(r->accuracy / 3e-4, -.7), n * n / 2);
 }
 
 /* Bytes of a block, its places in both orders, and the nodes of its trees per element. */
@@ -99,10 +99,12 @@ double forecast_reference_bytes(const forecast *f) {
 static method_forecast method_bytes(const forecast *f) {
     method_forecast made = {.building = 0};
     if (f->method == NULL) return made;
-    const method_scale scale = {.n = (double)f->n,
-                                .n_channels = (double)f->n_channels,
-                                .noise = recipe_noise(&f->recipe),
-                                .n_emitters = (double)f->emitters};
+    const method_scale scale = {
+        .n = (double)f->n,
+        .n_channels = (double)f->n_channels,
+        .noise = recipe_noise(&f->recipe),
+        .n_emitters = (double)f->emitters,
+        .n_blocks = f->recipe.method == RECIPE_BLOCKS ? forecast_blocks((double)f->n, &f->recipe) : 0};
     f->method->forecast(&scale, method_own_const(f->build, f->method), &made);
     if (f->method->kind->narrow != NULL) {
         const double share = (double)panel_value_size(f->precision) / (double)panel_value_size(PANEL_F32);

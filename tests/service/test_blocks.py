@@ -2,13 +2,14 @@
 that their answers are those of pairs within the stated error."""
 
 import os
+import re
 import unittest
 
 import h5py
 import numpy
 
 from case import Case
-from command import must
+from command import lambert, must
 
 
 class Blocks(Case):
@@ -38,6 +39,23 @@ class Blocks(Case):
                                     "--rays", 64, "--method", "hierarchical")
         self.assertEqual(self.attributes(rays)["form_factors"], b"rays")
         self.assertNotIn("blocks of", log)
+
+    def test_memory_that_is_too_small_for_rows_has_room_for_blocks(self):
+        self.room = self.path("large.obj")
+        must("generate", "cornell", "--closed", "--elements", 4200, "--reflectance", .5, "-o", self.room)
+        most = {}
+        for way in "rays", "auto":
+            log = self.precompute("one.h5", "--probes", 0, "--form-factors", way, "--method", "hierarchical")[1]
+            most[way] = int(re.search(r"memory up to (\d+)M", log)[1])
+        self.assertLess(2 * most["auto"], most["rays"])
+        store, _ = self.precompute("auto.h5", "--probes", 0, "--memory", f"{most['rays'] - 1}M")
+        self.assertEqual(self.attributes(store)["form_factors"], b"blocks")
+        refused = lambert("precompute", self.room, "-o", self.path("no.h5"), "--epsilon", .2, "--probes", 0, "--memory",
+                          f"{most['auto'] // 2}M")
+        self.assertEqual(refused.returncode, 1)
+        self.assertRegex(refused.stderr.splitlines()[-1],
+                         rf"elements with blocks need about {most['auto']}M of memory, --memory allows")
+        self.assertFalse(os.path.exists(self.path("no.h5")))
 
     def test_answers_are_those_of_pairs(self):
         blocks, _ = self.precompute("blocks.h5", "--probes", 0, "--form-factors", "blocks")
