@@ -29,7 +29,8 @@ typedef struct build_report {
     report_figure figures[REPORT_FIGURES];
     size_t n_steps;
     report_step steps[REPORT_STEPS];
-    double cost;      /* of an answer, as choice.h counts it, where the method knows it; 0: not */
+    double cost;   /* of an answer, as choice.h counts it, where the method knows it; 0: not */
+    bool by_noise; /* the compression follows the noise of rays, so that a smaller epsilon changes nothing */
     bool below_noise; /* the bound asked for is below the noise of the form factors, which is stored too */
 } build_report;
 

@@ -25,7 +25,7 @@ static void advise(const error_advice_input *input, const error_group *g, char o
     const recipe *r = &input->recipe;
     const double error = g->total_indirect.mean, of_operator = g->operator_indirect.mean;
     const bool compressed = of_operator * of_operator > compression_share * error * error;
-    if (compressed || r->method == RECIPE_BLOCKS)
+    if (r->method == RECIPE_BLOCKS || (compressed && !input->by_noise))
         snprintf(option, 64, "--epsilon %g", one_digit(input->epsilon * error_most / error));
     else if (r->method == RECIPE_RAYS || r->method == RECIPE_NEAR_PAIRS)
         snprintf(option, 64, "--rays %zu", rays_for(r->rays, error));

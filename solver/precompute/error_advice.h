@@ -13,6 +13,7 @@ typedef struct error_advice_input {
     const error_report *errors;
     recipe recipe; /* of the form factors */
     double epsilon;
+    bool by_noise;   /* of the operator: build_report */
     bool finest;     /* --quality high already */
     bool from_store; /* form factors are those of a store */
 } error_advice_input;
@@ -20,7 +21,8 @@ typedef struct error_advice_input {
 /* text: about the scene's own lights or random emission, whichever has the larger indirect error, where that
  * is above .03; else empty. Single elements never count: their error is that of the noise of one element's
  * light, for which --tolerance is there. The option follows from where most of the error is: compression
- * gets a smaller --epsilon, rays more of them, N ~ 1 / error^2, and the rest --quality high. */
+ * gets a smaller --epsilon, rays, and compression that follows their noise, more of them, N ~ 1 / error^2,
+ * and the rest --quality high. */
 void error_advice(const error_advice_input *input, char text[ERROR_ADVICE_BYTES]);
 
 #endif

@@ -218,6 +218,7 @@ static void give_advice(precompute_state *state) {
     const error_advice_input input = {.errors = &state->errors,
                                       .recipe = state->f.recipe,
                                       .epsilon = o->build.epsilon,
+                                      .by_noise = state->built.by_noise,
                                       .finest = strcmp(o->quality, "high") == 0,
                                       .from_store = o->from_store};
     error_advice(&input, state->advice);

@@ -253,6 +253,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
     lam_operator_set_threads(made, n_threads);
     TRY(correct_mean(problem, row_sums, epsilon, tree->order, made, &corrected, error));
     report_number(report, "threshold", threshold);
+    report->by_noise = !(threshold > least);
     report_step_add(report, "invert", clock_seconds() - expanded);
     snprintf(
         report->detail, sizeof report->detail,

@@ -78,6 +78,12 @@ START_TEST(other_recipes) {
                              kept = {.errors = &errors, .recipe = rays, .epsilon = .05, .from_store = true};
     error_advice(&fine, text);
     ck_assert_ptr_nonnull(strstr(text, "; a finer mesh would"));
+    const error_report coarse = {
+        .random = {.probes = 8, .total_indirect = {.05, 0, .05}, .operator_indirect = {.049, 0, .049}},
+        .has_total = true};
+    const error_advice_input noisy = {.errors = &coarse, .recipe = rays, .epsilon = .05, .by_noise = true};
+    error_advice(&noisy, text); /* compressed as far as the rays' noise lets it be */
+    ck_assert_ptr_nonnull(strstr(text, "; --rays 4096 would"));
     error_advice(&kept, text);
     ck_assert_ptr_nonnull(strstr(text, "; the scene precomputed with --rays 4096 would"));
 }
