@@ -286,6 +286,19 @@ static void scale(size_t m, size_t n, const float *by, const float *from, size_t
     }
 }
 
+/* Vectors of which one channel is 0 have an answer of 0 there, whatever stands beside them in a pass. */
+static bool is_dark(const float *in, size_t n) {
+    for (size_t p = 0; p < n; p++)
+        if (in[p] != 0) return false;
+    return true;
+}
+
+static bool are_dark(const float *in, size_t n, size_t stride, size_t n_rhs) {
+    for (size_t v = 0; v < n_rhs; v++)
+        if (!is_dark(in + v * stride, n)) return false;
+    return true;
+}
+
 /* out = left W^T K W right in, left = R' A^-1/2 and right = A^1/2, or transposed. */
 static void apply(const lam_operator *op, bool adjoint, size_t n_rhs, const float *in, float *out,
                   void *work) {
@@ -299,6 +312,10 @@ static void apply(const lam_operator *op, bool adjoint, size_t n_rhs, const floa
     float *side = work_area_take(&work, tiled_work(plan->n_used, n_rhs) * sizeof *side);
     for (size_t c = 0; c < C; c++) {
         const float *left = self->left + c * n, *root = self->root_area;
+        if (are_dark(in + c * n, n, C * n, n_rhs)) {
+            for (size_t v = 0; v < n_rhs; v++) memset(out + (v * C + c) * n, 0, n * sizeof *out);
+            continue;
+        }
         scale(n_rhs, n, adjoint ? left : root, in + c * n, C * n, X, n, n_threads);
         wavelet_plan_forward(plan, n_rhs, X, from, slots, n_threads);
         multiply_core(self, c, n_rhs, from, to, side, work);
@@ -306,6 +323,7 @@ static void apply(const lam_operator *op, bool adjoint, size_t n_rhs, const floa
         scale(n_rhs, n, adjoint ? root : left, X, n, out + c * n, C * n, n_threads);
         for (size_t v = 0; v < n_rhs; v++) {
             const size_t row = (v * C + c) * n;
+            if (n_rhs > 1 && is_dark(in + row, n)) memset(out + row, 0, n * sizeof *out);
             const double sum = mean_correction_sum(&self->even, c, adjoint, root, in + row);
             mean_correction_add(&self->even, c, adjoint, root, sum, out + row);
         }
@@ -345,6 +363,11 @@ static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, co
     for (size_t c = 0; c < C; c++) {
         const csr *K = &self->K[c].rows;
         const float *left = self->left + c * n;
+        if (are_dark(E + c * n, n, C * n, n_rhs)) {
+            for (size_t v = 0; v < n_rhs; v++)
+                memset(P + (v * C + c) * n_selected, 0, n_selected * sizeof *P);
+            continue;
+        }
         scale(n_rhs, n, self->root_area, E + c * n, C * n, X, n, n_threads);
         wavelet_plan_forward(plan, n_rhs, X, from, slots, n_threads);
         if (!some) {
@@ -352,6 +375,10 @@ static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, co
             wavelet_plan_inverse(plan, n_rhs, to, X, slots, n_threads);
         }
         for (size_t v = 0; v < n_rhs; v++) {
+            if (is_dark(E + (v * C + c) * n, n)) {
+                memset(P + (v * C + c) * n_selected, 0, n_selected * sizeof *P);
+                continue;
+            }
             if (some && sparse_product_by_columns(K, from + v * used))
                 multiply_core(self, c, 1, from + v * used, to, side, work);
             else if (some)

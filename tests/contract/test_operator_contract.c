@@ -203,6 +203,27 @@ START_TEST(darkness_stays_dark) {
 }
 END_TEST
 
+/* Light of one channel stays there, and is that of all channels together. */
+START_TEST(channels_do_not_mix) {
+    const transport *t = transport_kept(_i);
+    const size_t size = vector_size(t), n = t->n;
+    float *all = random_vectors(size, 9), *one = test_allocate(size, sizeof *one);
+    for (size_t c = 0; c < t->n_channels; c++)
+        for (int q = 0; q < QUANTITIES; q++)
+            for (int adjoint = 0; adjoint < 2; adjoint++) {
+                memset(one, 0, size * sizeof *one);
+                memcpy(one + c * n, all + c * n, n * sizeof *one);
+                float *of_one = transport_apply(t->op, adjoint, 1, quantities[q], one);
+                float *of_all = transport_apply(t->op, adjoint, 1, quantities[q], all);
+                for (size_t i = 0; i < size; i++) ck_assert(of_one[i] == (i / n == c ? of_all[i] : 0));
+                free(of_one);
+                free(of_all);
+            }
+    free(all);
+    free(one);
+}
+END_TEST
+
 START_TEST(bits_do_not_depend_on_the_batch) {
     static const size_t batches[] = {1, 3, 16, 17, 40};
     const transport *t = transport_kept(_i);
@@ -211,6 +232,7 @@ START_TEST(bits_do_not_depend_on_the_batch) {
     /* One bright element: alone it reads few rows, beside others all. */
     for (size_t i = 0; i < size; i++)
         if (i != t->n / 3) in[2 * size + i] = 0;
+    for (size_t i = 0; i < t->n; i++) in[size + i] = 0; /* a dark channel beside lit ones */
     for (int q = 0; q < QUANTITIES; q++)
         for (int adjoint = 0; adjoint < 2; adjoint++) {
             float *single = test_allocate(40 * size, sizeof *single);
@@ -287,6 +309,7 @@ START_TEST(selected_elements_have_the_same_bits) {
     uint32_t selected[SELECTED];
     lam_error error = {.message = ""};
     for (size_t r = 0; r < SELECTED; r++) selected[r] = (uint32_t)((r * r * 7 + 150) % t->n);
+    for (size_t i = 0; i < t->n; i++) E[size + i] = 0; /* a dark channel */
     for (int q = 0; q < QUANTITIES; q++)
         for (int lit = 0; lit < 2; lit++)
             for (size_t count = 0; count <= SELECTED; count += SELECTED / 2) {
@@ -445,6 +468,7 @@ int main(void) {
     tcase_add_loop_test(tests, without_reflectance_nothing_bounces_but_light_arrives, 0, TRANSPORTS);
     tcase_add_loop_test(tests, sky_lights_what_reflects, 0, TRANSPORTS);
     tcase_add_loop_test(tests, darkness_stays_dark, 0, TRANSPORTS);
+    tcase_add_loop_test(tests, channels_do_not_mix, 0, TRANSPORTS);
     tcase_add_loop_test(tests, bits_do_not_depend_on_the_batch, 0, TRANSPORTS);
     tcase_add_loop_test(tests, eight_threads_give_the_same_bits, 0, TRANSPORTS);
     tcase_add_loop_test(tests, selected_elements_have_the_same_bits, 0, TRANSPORTS);
