@@ -4,7 +4,6 @@
 
 #include <float.h>
 #include <math.h>
-#include <omp.h>
 #include <stdlib.h>
 
 /* Roundings of a level, on the way up or down: of the coordinates of a step (3), of two products and their
@@ -20,12 +19,10 @@ void kept_blocks_free(kept_blocks *k) {
     plane_tree_free(&k->tree);
 }
 
-/* The value that a block counts with, at least 0. */
-typedef double block_value(const void *context, const cluster_block *k);
-
-/* out_i = sum_j value(block of i and j) weight_j, both [n] by position; sums [2][nodes]. */
-static void add_up(const block_factors *f, block_value *value, const void *context, const double *weight,
-                   double *sums, double *out) {
+/* out_i = sum_j value[block of i and j] weight_j, both [n] by position, values at least 0; sums [2][nodes].
+ * One thread, as a daemon that loads form factors has others to serve. */
+static void add_up(const block_factors *f, const double *value, const double *weight, double *sums,
+                   double *out) {
     const size_t n = f->n, n_clusters = f->n_clusters, n_nodes = n_clusters + n;
     double *const up = sums, *const down = sums + n_nodes;
     for (size_t t = 0; t < n_clusters; t++) up[t] = 0;
@@ -34,13 +31,10 @@ static void add_up(const block_factors *f, block_value *value, const void *conte
         if (k < n) up[t] = weight[k];
         if (f->nodes[t].parent != BLOCK_NO_NODE) up[f->nodes[t].parent] += up[t];
     }
-#pragma omp parallel for schedule(dynamic, 256)
-    for (size_t t = 0; t < n_nodes; t++) {
-        down[t] = 0;
-        for (size_t k = f->from[t]; k < f->from[t + 1]; k++)
-            down[t] += value(context, &f->blocks[k]) * up[f->blocks[k].b];
-        for (size_t k = f->into_from[t]; k < f->into_from[t + 1]; k++)
-            down[t] += value(context, &f->blocks[f->into[k]]) * up[f->blocks[f->into[k]].a];
+    for (size_t t = 0; t < n_nodes; t++) down[t] = 0;
+    for (size_t k = 0; k < f->n_blocks; k++) {
+        down[f->blocks[k].a] += value[k] * up[f->blocks[k].b];
+        down[f->blocks[k].b] += value[k] * up[f->blocks[k].a];
     }
     /* Parents stand behind their children, and elements behind all clusters. */
     for (size_t t = n_clusters; t-- > 0;)
@@ -48,17 +42,11 @@ static void add_up(const block_factors *f, block_value *value, const void *conte
     for (size_t p = 0; p < n; p++) out[p] = down[n_clusters + p] + down[f->nodes[n_clusters + p].parent];
 }
 
-static double sum_of(const void *context, const cluster_block *k) {
+static double sum_of(const cluster_block *k) {
     double sum = 0;
-    (void)context;
     for (int r = 0; r < BLOCK_FUNCTIONS; r++)
         for (int c = 0; c < BLOCK_FUNCTIONS; c++) sum += fabs((double)k->L[r][c]);
     return sum;
-}
-
-static double square_of_most(const void *ranges, const cluster_block *k) {
-    const double most = block_most(ranges, k);
-    return most * most;
 }
 
 /* Levels of clusters above an element, at most; blocks of one node, at most. */
@@ -74,8 +62,8 @@ static void measure(const block_factors *f, uint32_t *level, size_t *n_levels, s
     }
 }
 
-static lam_status find_rounding(const block_factors *f, double *weight, double *sums, double *out,
-                                double *rounding, lam_error *error) {
+static lam_status find_rounding(const block_factors *f, double *value, double *weight, double *sums,
+                                double *out, double *rounding, lam_error *error) {
     size_t n_levels, n_blocks;
     double largest = 0;
     uint32_t *level = memory_allocate(f->n_clusters, sizeof *level, "form factors", error);
@@ -83,7 +71,8 @@ static lam_status find_rounding(const block_factors *f, double *weight, double *
     measure(f, level, &n_levels, &n_blocks);
     free(level);
     for (size_t p = 0; p < f->n; p++) weight[p] = f->area[p] * f->balance[p];
-    add_up(f, sum_of, NULL, weight, sums, out);
+    for (size_t k = 0; k < f->n_blocks; k++) value[k] = sum_of(&f->blocks[k]);
+    add_up(f, value, weight, sums, out);
     for (size_t p = 0; p < f->n; p++) largest = fmax(largest, f->balance[p] * out[p]);
     const double count =
         (2. * LEVEL_ROUNDINGS * (double)(n_levels + 1) + OTHER_ROUNDINGS + (double)n_blocks) *
@@ -93,12 +82,16 @@ static lam_status find_rounding(const block_factors *f, double *weight, double *
 }
 
 /* F_ij^2 / A_j <= A_j d_i^2 d_j^2 max f^2. */
-static lam_status find_norms(const block_factors *f, double *weight, double *sums, double *out,
+static lam_status find_norms(const block_factors *f, double *value, double *weight, double *sums, double *out,
                              double *row_norms, lam_error *error) {
     block_range *ranges = NULL;
     if (block_ranges(f, &ranges, error) != LAM_OK) return LAM_ERR_MEMORY;
     for (size_t p = 0; p < f->n; p++) weight[p] = f->area[p] * f->balance[p] * f->balance[p];
-    add_up(f, square_of_most, ranges, weight, sums, out);
+    for (size_t k = 0; k < f->n_blocks; k++) {
+        const double most = block_most(ranges, &f->blocks[k]);
+        value[k] = most * most;
+    }
+    add_up(f, value, weight, sums, out);
     for (size_t p = 0; p < f->n; p++) row_norms[f->order[p]] = margin * f->balance[p] * sqrt(out[p]);
     free(ranges);
     return LAM_OK;
@@ -112,14 +105,18 @@ lam_status kept_blocks_make(plane_tree *tree, block_factors *f, kept_blocks *out
     double *weight = memory_allocate(n, sizeof *weight, "form factors", error);
     double *sums = memory_allocate(f->n_clusters + n, 2 * sizeof *sums, "form factors", error);
     double *of_row = memory_allocate(n, sizeof *of_row, "form factors", error);
+    double *value = memory_allocate(f->n_blocks, sizeof *value, "form factors", error);
+    void *work = memory_allocate(block_factors_work(f, 1), 1, "form factors", error);
+    const block_vectors ones = {1, 1, false, (const double *const[]){weight}, (double *const[]){of_row}};
     *tree = (plane_tree){.n = 0};
     *f = (block_factors){.n = 0};
     made.f.tree = &made.tree;
-    if (weight == NULL || sums == NULL || of_row == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(find_rounding(&made.f, weight, sums, of_row, &made.rounding, error));
-    TRY(find_norms(&made.f, weight, sums, of_row, row_norms, error));
+    if (weight == NULL || sums == NULL || of_row == NULL || value == NULL || work == NULL)
+        TRY(LAM_ERR_MEMORY);
+    TRY(find_rounding(&made.f, value, weight, sums, of_row, &made.rounding, error));
+    TRY(find_norms(&made.f, value, weight, sums, of_row, row_norms, error));
     for (size_t p = 0; p < n; p++) weight[p] = 1;
-    TRY(block_factors_multiply(&made.f, 1, weight, of_row, error));
+    block_factors_apply(&made.f, &ones, work, 1);
     for (size_t p = 0; p < n; p++) {
         const size_t i = made.f.order[p];
         row_sums[i] = of_row[p] + made.rounding;
@@ -134,6 +131,8 @@ done:
     free(weight);
     free(sums);
     free(of_row);
+    free(value);
+    free(work);
     kept_blocks_free(&made);
     return status;
 }
