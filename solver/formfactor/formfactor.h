@@ -26,8 +26,11 @@ typedef struct pairs_report {
  * among elements_away or elements_hidden, by geometry, or among elements_unseen: partly hidden as far as
  * geometry says, but all their segments were blocked. */
 typedef struct block_report {
-    uint64_t visits, away, hidden, linear, pairs, shaded, shaded_pairs, segments;
-    uint64_t reduced; /* whose slopes were reduced so that no form factor is negative */
+    double visits, away, hidden, linear, pairs, shaded, shaded_pairs, segments;
+    double sifted;  /* pieces of facets that might stand between two clusters */
+    double tests;   /* of segments against pieces */
+    double cast;    /* segments against the whole scene */
+    double reduced; /* whose slopes were reduced so that no form factor is negative */
     double elements_away, elements_hidden, elements_unseen; /* pairs of elements */
 } block_report;
 

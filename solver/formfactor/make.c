@@ -259,13 +259,10 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
     packed_rows counts = {0};
     visibility *v = NULL;
     form_factor_options few = {.recipe = {.method = RECIPE_RAYS, .rays = r->rays, .seed = r->seed}};
-    const block_options how = {.open = r->accuracy,
-                               .shadow = recipe_shadow(r),
-                               .exact = recipe_tolerance(r),
-                               .by_scene = judge,
-                               .seed = r->seed,
-                               .progress = options->progress,
-                               .stage = options->stage};
+    block_options how = block_options_of(r);
+    how.by_scene = judge;
+    how.progress = options->progress;
+    how.stage = options->stage;
     TRY(recipe_check(r, error));
     f.leaving = memory_allocate(m->n, sizeof *f.leaving, "form factors", error);
     f.absorbed = memory_allocate(m->n, sizeof *f.absorbed, "form factors", error);

@@ -19,6 +19,9 @@ typedef struct block_options {
     const char *stage;
 } block_options;
 
+/* Those that a recipe asks for, without progress. */
+block_options block_options_of(const recipe *r);
+
 /* Finds the blocks of all pairs of planes of a tree, which must outlive them. Visible shares come from
  * segments against the occluders in between, or from Embree where these are many, and from nothing where none
  * is. The bits do not depend on the number of threads: segments are seeded by the pair of clusters. report

@@ -42,6 +42,13 @@ static void set_occluder(const mesh *m, const uint32_t vertices[4], occluder *o)
     cross(one, two, o->normal);
     scale_to_unit(o->normal);
     o->level = dot3(o->normal, o->corner[0]);
+    for (int d = 0; d < 3; d++) {
+        o->low[d] = o->high[d] = o->corner[0][d];
+        for (uint32_t c = 1; c < o->n_corners; c++) {
+            o->low[d] = fmin(o->low[d], o->corner[c][d]);
+            o->high[d] = fmax(o->high[d], o->corner[c][d]);
+        }
+    }
     for (uint32_t c = 0; c < 4; c++) {
         const uint32_t from = c < o->n_corners ? c : o->n_corners - 1, to = (from + 1) % o->n_corners;
         double along[3], inward[3];
@@ -135,8 +142,15 @@ typedef struct hull {
     double normal[HULL_PLANES][3], level[HULL_PLANES];
 } hull;
 
-/* Planes through an edge of one rectangle and a corner of the other one with both rectangles on one side.
- * A plane that is found several times stands there as often, as far as there is room. */
+/* A plane through parallel edges, or through edges that meet, is found up to four times. */
+static bool has_plane(const hull *h, const double normal[3], double level, double slack) {
+    static const double same_normal = 1 - 1e-9;
+    for (int k = 0; k < h->n; k++)
+        if (dot3(h->normal[k], normal) > same_normal && fabs(h->level[k] - level) <= slack) return true;
+    return false;
+}
+
+/* Planes through an edge of one rectangle and a corner of the other one with both rectangles on one side. */
 static void make_hull(const double corner[2][4][3], double slack, hull *out) {
     out->n = 0;
     for (int side = 0; side < 2; side++)
@@ -156,7 +170,9 @@ static void make_hull(const double corner[2][4][3], double slack, hull *out) {
                 }
                 if (low < -slack && high > slack) continue;
                 const double sign = high > slack ? -1 : 1;
-                for (int d = 0; d < 3; d++) out->normal[out->n][d] = sign * normal[d];
+                for (int d = 0; d < 3; d++) normal[d] *= sign;
+                if (has_plane(out, normal, sign * level, slack)) continue;
+                memcpy(out->normal[out->n], normal, sizeof normal);
                 out->level[out->n++] = sign * level;
             }
 }
@@ -208,6 +224,10 @@ static bool may_block(between *w, const occluder *o) {
 
 /* Adds a piece to the candidates; false where there are too many. */
 static bool try_one(const occluders *o, between *w, uint32_t k, candidates *out) {
+    const occluder *piece = &o->of[k];
+    out->examined++;
+    for (int d = 0; d < 3; d++)
+        if (piece->low[d] > w->high[d] || piece->high[d] < w->low[d]) return true;
     if (!may_block(w, &o->of[k])) return true;
     if (out->count == OCCLUDERS_MOST) return false;
     out->of[out->count++] = k;
@@ -240,7 +260,7 @@ void occluders_between(const occluders *o, const flat_clusters *f, uint32_t a, u
                  .cluster = {&f->of[a], &f->of[b]},
                  .plane = {&f->planes[f->of[a].plane], &f->planes[f->of[b].plane]}};
     bool known = true;
-    out->count = 0;
+    out->count = out->examined = 0;
     if (o->n == 0) return;
     flat_cluster_corners(f, a, w.corner[0]);
     flat_cluster_corners(f, b, w.corner[1]);

@@ -9,7 +9,8 @@
 /* A triangle or a parallelogram in its plane: a point x of the plane is inside where edge[e] . (x, 1) >= 0
  * for all. */
 typedef struct occluder {
-    double corner[4][3], normal[3], level;
+    double low[3], high[3], normal[3], level;
+    double corner[4][3];
     double edge[4][4]; /* of a triangle the last one stands twice */
     uint32_t n_corners;
 } occluder;
@@ -37,6 +38,7 @@ enum { OCCLUDERS_MOST = 128 };
 /* The occluders that may stand between two nodes: count of them, or any (count is OCCLUDERS_UNKNOWN). */
 typedef struct candidates {
     int count;
+    int examined; /* pieces that were compared with the two */
     uint32_t of[OCCLUDERS_MOST];
 } candidates;
 

@@ -1,0 +1,273 @@
+#include "solver/formfactor/blocks/block_walk.h"
+
+#include "solver/base/array_grow.h"
+#include "solver/base/random.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Where one cluster lies on both sides of the plane of the other, a linear kernel is off by at most this
+ * share of its bound (block_kernel_most). */
+static const double share_crossing = .15;
+/* Segments of a partly hidden block: SEGMENT_LANES; of a pair of elements: twice as many. */
+enum { PAIR_ROUNDS = 2 };
+
+size_t block_finder_size(const block_finder *k, uint32_t t) {
+    const block_node *node = &k->flat.tree->nodes[t];
+    return node->end - node->begin;
+}
+
+node_children block_finder_children(const block_finder *k, uint32_t t) {
+    const plane_cluster *c = &k->tree->clusters[t];
+    node_children out = {.count = 0};
+    if (!c->leaf) {
+        out.of[out.count++] = c->left;
+        out.of[out.count++] = t - 1;
+    } else {
+        for (uint32_t p = c->begin; p < c->end; p++) out.of[out.count++] = (uint32_t)k->n_clusters + p;
+    }
+    return out;
+}
+
+static lam_status add_block(block_walk *w, const cluster_block *made) {
+    block_list *to = &w->found;
+    if (array_grow(&to->list, &to->capacity, to->count + 1, sizeof *to->list, "blocks", w->error) != LAM_OK)
+        return LAM_ERR_MEMORY;
+    to->list[to->count++] = *made;
+    return LAM_OK;
+}
+
+static lam_status visit(block_walk *w, uint32_t a, uint32_t b, const candidates *among);
+
+/* Visits the children of one of two nodes: of the first where it is of more weight and no single element. */
+static lam_status split(block_walk *w, uint32_t a, uint32_t b, const candidates *among, double weight_a,
+                        double weight_b) {
+    lam_status status = LAM_OK;
+    const size_t n_clusters = w->finder->n_clusters;
+    const bool first = a < n_clusters && (b >= n_clusters || weight_a >= weight_b);
+    const node_children below = block_finder_children(w->finder, first ? a : b);
+    for (int k = 0; k < below.count; k++)
+        TRY(first ? visit(w, below.of[k], b, among) : visit(w, a, below.of[k], among));
+done:
+    return status;
+}
+
+static double exchange_of_pair(const block_walk *w, uint32_t a, uint32_t b) {
+    const block_finder *k = w->finder;
+    polygon shapes[2];
+    const uint32_t *order = k->flat.tree->order;
+    polygon_of_element(k->flat.m, order[a - k->n_clusters], &shapes[0]);
+    polygon_of_element(k->flat.m, order[b - k->n_clusters], &shapes[1]);
+    return pair_factor_exchange(&k->rules, &shapes[0], &shapes[1], k->options->exact);
+}
+
+/* The candidates that segments are tested against. */
+static const candidates *segments_among(const block_walk *w, const candidates *among) {
+    static const candidates whole_scene = {.count = OCCLUDERS_UNKNOWN};
+    return w->finder->options->by_scene ? &whole_scene : among;
+}
+
+static void count_segments(block_walk *w, const candidates *among, int rounds) {
+    const double segments = rounds * SEGMENT_LANES;
+    w->report.segments += segments;
+    if (among->count == OCCLUDERS_UNKNOWN)
+        w->report.cast += segments;
+    else
+        w->report.tests += segments * among->count;
+}
+
+/* A pair of elements; among NULL: nothing stands between. */
+static lam_status add_pair(block_walk *w, uint32_t a, uint32_t b, const candidates *among) {
+    cluster_block made = {.a = a, .b = b};
+    double exchange = exchange_of_pair(w, a, b);
+    if (among == NULL && exchange > 0) {
+        w->report.pairs++;
+    } else if (exchange > 0) {
+        double all = 0, seen = 0;
+        w->report.shaded_pairs++;
+        for (size_t round = 0; round < PAIR_ROUNDS; round++) {
+            seen_segment segments[SEGMENT_LANES];
+            double kernel[SEGMENT_LANES];
+            shade_segments(&w->finder->shade, a, b, segments_among(w, among), round * SEGMENT_LANES, segments,
+                           kernel);
+            for (int k = 0; k < SEGMENT_LANES; k++) {
+                all += kernel[k];
+                seen += kernel[k] * segments[k].seen;
+            }
+        }
+        count_segments(w, segments_among(w, among), PAIR_ROUNDS);
+        w->report.elements_unseen += !(seen > 0);
+        exchange *= all > 0 ? seen / all : 0;
+    } else {
+        w->report.elements_away++;
+    }
+    if (!(exchange > 0)) return LAM_OK;
+    block_numbers_of_pair(&w->finder->flat, exchange, &made);
+    return add_block(w, &made);
+}
+
+/* True where a kernel that is linear on both clusters is near enough to the true one. most: its largest
+ * value. */
+static bool is_smooth(const block_walk *w, uint32_t a, uint32_t b, double most, bool crosses) {
+    const flat_clusters *f = &w->finder->flat;
+    const double norm = most * sqrt(f->of[a].area * f->of[b].area);
+    if (crosses) return share_crossing * norm <= w->finder->options->open;
+    return block_kernel_roughness(f, a, b, 2) * norm <= w->finder->options->open;
+}
+
+/* Of two clusters that are not smooth the one that lies on both sides of the other's plane is split, else the
+ * larger one. */
+static lam_status split_for_smoothness(block_walk *w, uint32_t a, uint32_t b, const bool behind[2],
+                                       const candidates *among) {
+    const flat_clusters *f = &w->finder->flat;
+    const size_t n_clusters = w->finder->n_clusters;
+    if (behind[0] && a < n_clusters) return split(w, a, b, among, 1, 0);
+    if (behind[1] && b < n_clusters) return split(w, a, b, among, 0, 1);
+    return split(w, a, b, among, f->of[a].radius, f->of[b].radius);
+}
+
+static lam_status add_shaded(block_walk *w, uint32_t a, uint32_t b, const candidates *among) {
+    cluster_block made = {.a = a, .b = b};
+    seen_segment segments[SEGMENT_LANES];
+    double seen = 0;
+    shade_segments(&w->finder->shade, a, b, segments_among(w, among), 0, segments, NULL);
+    for (int k = 0; k < SEGMENT_LANES; k++) seen += segments[k].seen;
+    w->report.shaded++;
+    count_segments(w, segments_among(w, among), 1);
+    if (seen == 0) {
+        w->report.elements_unseen +=
+            (double)block_finder_size(w->finder, a) * (double)block_finder_size(w->finder, b);
+        return LAM_OK;
+    }
+    const visible_share share = visible_share_fit(segments, SEGMENT_LANES);
+    block_numbers_set(&w->finder->flat, seen < SEGMENT_LANES ? &share : NULL, &made);
+    return add_block(w, &made);
+}
+
+/* Splits the side that moves the shadow more: the one that is farther from the occluder. */
+static lam_status visit_shaded(block_walk *w, uint32_t a, uint32_t b, double most, const bool behind[2],
+                               const candidates *among) {
+    const block_finder *k = w->finder;
+    const flat_clusters *f = &k->flat;
+    const bool crosses = behind[0] || behind[1];
+    if (a >= k->n_clusters && b >= k->n_clusters) return add_pair(w, a, b, among);
+    if (most * sqrt(f->of[a].area * f->of[b].area) > k->options->shadow) {
+        const double place = occluders_place(&k->pieces, f, a, b, among);
+        return split(w, a, b, among, f->of[a].radius * (1 - place), f->of[b].radius * place);
+    }
+    if (!is_smooth(w, a, b, most, crosses)) return split_for_smoothness(w, a, b, behind, among);
+    return add_shaded(w, a, b, among);
+}
+
+static lam_status decide(block_walk *w, uint32_t a, uint32_t b, const candidates *among) {
+    const block_finder *k = w->finder;
+    const flat_clusters *f = &k->flat;
+    const double elements = (double)block_finder_size(k, a) * (double)block_finder_size(k, b);
+    bool behind[2];
+    candidates mine = {.count = 0};
+    w->report.visits++;
+    const double most = block_kernel_most(f, a, b, behind);
+    if (!(most > 0)) {
+        w->report.away++;
+        w->report.elements_away += elements;
+        return LAM_OK;
+    }
+    if (among == NULL || among->count != 0) {
+        occluders_between(&k->pieces, f, a, b, among, &mine);
+        w->report.sifted += mine.examined;
+    }
+    if (mine.count > 0 && occluders_hide(&k->pieces, f, a, b, &mine)) {
+        w->report.hidden++;
+        w->report.elements_hidden += elements;
+        return LAM_OK;
+    }
+    if (mine.count != 0) return visit_shaded(w, a, b, most, behind, &mine);
+    if (is_smooth(w, a, b, most, behind[0] || behind[1])) {
+        cluster_block made = {.a = a, .b = b};
+        w->report.linear++;
+        block_numbers_set(f, NULL, &made);
+        return add_block(w, &made);
+    }
+    if (a >= k->n_clusters && b >= k->n_clusters) return add_pair(w, a, b, NULL);
+    return split_for_smoothness(w, a, b, behind, &mine);
+}
+
+/* All of the pair, or where pairs are sampled one of so many, which counts for as many. */
+static lam_status visit(block_walk *w, uint32_t a, uint32_t b, const candidates *among) {
+    lam_status status = LAM_OK;
+    block_sampling *s = &w->sampling;
+    const int before = s->stage;
+    const double elements = (double)block_finder_size(w->finder, a) * (double)block_finder_size(w->finder, b);
+    int stage = before;
+    while (stage < s->n_stages && elements <= s->limit[stage]) stage++;
+    if (stage == before) return decide(w, a, b, among);
+    const uint64_t one_of = UINT64_C(1) << (stage - before);
+    if (random_hash((uint64_t)a << 32 | b) % one_of != 0) return LAM_OK;
+    const block_report so_far = w->report;
+    w->report = (block_report){.visits = 0};
+    s->stage = stage;
+    status = decide(w, a, b, among);
+    s->stage = before;
+    const block_report found = w->report;
+    w->report = so_far;
+    block_report_add(&found, (double)one_of, &w->report);
+    return status;
+}
+
+lam_status block_walk_visit(block_walk *w, uint32_t a, uint32_t b) {
+    return visit(w, a, b, NULL);
+}
+
+void block_report_add(const block_report *from, double times, block_report *to) {
+    to->visits += times * from->visits;
+    to->away += times * from->away;
+    to->hidden += times * from->hidden;
+    to->linear += times * from->linear;
+    to->pairs += times * from->pairs;
+    to->shaded += times * from->shaded;
+    to->shaded_pairs += times * from->shaded_pairs;
+    to->segments += times * from->segments;
+    to->sifted += times * from->sifted;
+    to->tests += times * from->tests;
+    to->cast += times * from->cast;
+    to->elements_away += times * from->elements_away;
+    to->elements_hidden += times * from->elements_hidden;
+    to->elements_unseen += times * from->elements_unseen;
+}
+
+lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tree *tree,
+                             const block_options *options, block_factors *nodes, block_finder *out,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    *out = (block_finder){.options = options, .tree = tree, .n_clusters = tree->n_clusters};
+    double(*centre)[3] = memory_allocate(m->n, sizeof *centre, "blocks", error);
+    if (centre == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < m->n; i++) mesh_centroid(m, i, centre[i]);
+    TRY(block_factors_begin(tree, m->area, (const double(*)[3])centre, nodes, error));
+    TRY(flat_clusters_make(m, tree, nodes, &out->flat, error));
+    TRY(occluders_make(m, visibility_facets(v), &out->pieces, error));
+    pair_factor_rules_init(&out->rules);
+    out->shade = (shade_scene){.f = &out->flat, .occluders = &out->pieces, .v = v, .seed = options->seed};
+done:
+    free(centre);
+    return status;
+}
+
+void block_finder_free(block_finder *k) {
+    occluders_free(&k->pieces);
+    flat_clusters_free(&k->flat);
+}
+
+lam_status block_finder_planes(const block_finder *k, uint32_t **out, size_t *count, lam_error *error) {
+    const plane_tree *tree = k->tree;
+    uint32_t *roots = memory_allocate(tree->n_frames, sizeof *roots, "blocks", error);
+    if (roots == NULL) return LAM_ERR_MEMORY;
+    *count = 0;
+    for (uint32_t t = 0; t < tree->n_clusters; t++) {
+        const uint32_t parent = k->flat.tree->nodes[t].parent;
+        if (tree->clusters[t].frame == PLANE_ABOVE) continue;
+        if (parent == BLOCK_NO_NODE || tree->clusters[parent].frame == PLANE_ABOVE) roots[(*count)++] = t;
+    }
+    *out = roots;
+    return LAM_OK;
+}

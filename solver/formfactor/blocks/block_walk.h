@@ -1,0 +1,68 @@
+/* The descent of the trees of two planes: which blocks there are between them, and the work that it takes. */
+#ifndef LAMBERT_FORMFACTOR_BLOCKS_BLOCK_WALK_H
+#define LAMBERT_FORMFACTOR_BLOCKS_BLOCK_WALK_H
+
+#include "solver/formfactor/blocks/block_shade.h"
+#include "solver/formfactor/blocks/blocks.h"
+#include "solver/formfactor/pairs/pair_factor.h"
+
+/* All that the walks of a scene share. */
+typedef struct block_finder {
+    const block_options *options;
+    const plane_tree *tree;
+    flat_clusters flat;
+    occluders pieces;
+    shade_scene shade;
+    pair_factor_rules rules;
+    size_t n_clusters;
+} block_finder;
+
+/* Begins the nodes of blocks as well (block_factors_begin). out must stay where it is until it is freed, also
+ * after an error. Errors: LAM_ERR_MEMORY. */
+lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tree *tree,
+                             const block_options *options, block_factors *nodes, block_finder *out,
+                             lam_error *error);
+void block_finder_free(block_finder *k);
+
+/* The topmost clusters of all planes; the caller frees them. */
+lam_status block_finder_planes(const block_finder *k, uint32_t **out, size_t *count, lam_error *error);
+
+/* The elements of a node. */
+size_t block_finder_size(const block_finder *k, uint32_t t);
+
+/* The children of a node: two clusters, or the elements of a leaf. */
+typedef struct node_children {
+    uint32_t of[8];
+    int count;
+} node_children;
+node_children block_finder_children(const block_finder *k, uint32_t t);
+
+typedef struct block_list {
+    cluster_block *list;
+    size_t count, capacity;
+} block_list;
+
+/* A sample of the descent (Knuth 1975, estimating the size of a tree): of pairs of nodes with at most
+ * limit[k] pairs of elements one of two is visited and counts twice in the report, for each k anew. The
+ * limits fall; none: all are visited. */
+enum { BLOCK_STAGES_MOST = 8 };
+typedef struct block_sampling {
+    double limit[BLOCK_STAGES_MOST];
+    int n_stages, stage; /* stages: those passed so far */
+} block_sampling;
+
+/* The work of one thread. */
+typedef struct block_walk {
+    const block_finder *finder;
+    block_sampling sampling;
+    block_list found;
+    block_report report;
+    lam_error *error;
+} block_walk;
+
+/* Adds the blocks of two nodes of different planes. Errors: LAM_ERR_MEMORY. */
+lam_status block_walk_visit(block_walk *w, uint32_t a, uint32_t b);
+
+void block_report_add(const block_report *from, double times, block_report *to);
+
+#endif

@@ -1,0 +1,71 @@
+/* The forecast of the work of blocks beside the work itself. */
+#include "solver/formfactor/blocks/blocks_sample.h"
+#include "support/blocks.h"
+#include "support/scene.h"
+
+#include <omp.h>
+
+static const struct {
+    const char *kind;
+    size_t elements;
+} scenes[] = {{"cornell", 6000}, {"rooms", 3000}, {"maze", 2000}, {"atrium", 2000}, {"city", 1500}};
+enum { SCENES = sizeof scenes / sizeof *scenes };
+
+static block_report sample(const mesh *m, int n_threads, block_report *whole) {
+    lam_error error = {.message = ""};
+    const block_options options = {.open = blocks_open, .shadow = blocks_shadow, .exact = 1e-5, .seed = 1};
+    const int most = omp_get_max_threads();
+    plane_tree tree;
+    block_report found;
+    visibility *v = NULL;
+    ck_ok(visibility_create(m, &v, &error));
+    ck_ok(form_factors_tree(m, &tree, &error));
+    omp_set_num_threads(n_threads);
+    ck_ok(blocks_sample(m, v, &tree, &options, &found, &error));
+    omp_set_num_threads(most);
+    if (whole != NULL) {
+        block_factors f;
+        ck_ok(blocks_find(m, v, &tree, &options, &f, whole, &error));
+        block_factors_free(&f);
+    }
+    plane_tree_free(&tree);
+    visibility_destroy(v);
+    return found;
+}
+
+/* Within half as much again: of the work that costs most in some scene. */
+static void check_near(const char *kind, const char *what, double found, double all) {
+    ck_assert_msg(found <= 1.5 * all && all <= 1.5 * found, "%s, %s: %g for %g", kind, what, found, all);
+}
+
+START_TEST(a_sample_tells_the_work) {
+    const generate_options how = {.kind = scenes[_i].kind,
+                                  .elements = scenes[_i].elements,
+                                  .seed = 1,
+                                  .variant = 1,
+                                  .terrain = "flat",
+                                  .reflectance = .5};
+    mesh m = generate_good(&how);
+    block_report whole;
+    const block_report found = sample(&m, 1, &whole), again = sample(&m, 3, NULL);
+    check_near(how.kind, "visits", found.visits, whole.visits);
+    check_near(how.kind, "pieces", found.sifted, whole.sifted);
+    check_near(how.kind, "segments", found.segments, whole.segments);
+    check_near(how.kind, "blocks", found.linear + found.pairs + found.shaded + found.shaded_pairs,
+               whole.linear + whole.pairs + whole.shaded + whole.shaded_pairs);
+    /* The same figures from any number of threads. */
+    ck_assert_double_eq(found.visits, again.visits);
+    ck_assert_double_eq(found.sifted, again.sifted);
+    ck_assert_double_eq(found.segments, again.segments);
+    mesh_free(&m);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("blocks sample");
+    TCase *cases = tcase_create("blocks sample");
+    tcase_set_timeout(cases, 240);
+    tcase_add_loop_test(cases, a_sample_tells_the_work, 0, SCENES);
+    suite_add_tcase(suite, cases);
+    return suite_run(suite);
+}
