@@ -35,7 +35,10 @@ forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n
     const bool counted = f->cost.seconds > 0 && f->recipe.method != RECIPE_RAYS;
     const double once =
         counted ? f->cost.seconds / n_threads : sample_seconds(n, &f->recipe, rays_per_second, n_threads);
-    const double half = counted ? once : sample_seconds(n, &f->judge_recipe, rays_per_second, n_threads);
+    const bool finer = f->recipe.method == RECIPE_BLOCKS; /* the judge's blocks */
+    const double more = finer ? forecast_blocks(n, &f->judge_recipe) / forecast_blocks(n, &f->recipe) : 1;
+    const double half =
+        counted ? once * more : sample_seconds(n, &f->judge_recipe, rays_per_second, n_threads);
     if (!f->from_store)
         times.form_factors =
             f->streamed && !counted ? n * forecast_rays(n, &f->recipe) / rays_per_second : once;

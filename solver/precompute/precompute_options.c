@@ -94,9 +94,8 @@ static const option_row form_factor_rows[] = {
      .choices = "auto|rays|blocks|hemicube",
      .help = "Method that finds them. rays: pairs of elements, near ones or all, and rays, as --quality "
              "says. blocks: "
-             "clusters of elements at a time, for scenes of large planes. auto: blocks where they suit the "
-             "scene and "
-             "the operator, else rays"},
+             "clusters of elements at a time, for scenes of large planes. auto: blocks where the operator "
+             "can be built from them and they cost less, by a sample of them, else rays"},
     {.name = "resolution",
      .kind = OPTION_COUNT,
      .offset = FIELD(resolution),

@@ -32,11 +32,11 @@ typedef struct precompute_state {
     row_stream stream;             /* of rays */
     compressed_factors compressed; /* of f; n is 0 where they are kept as they are, or not */
     recipe recipe;                 /* of f */
-    pairs_cost cost;   /* of recipes with pairs, from a sample; seconds is 0 where none was taken */
-    bool dear;         /* the pairs of the recipe so far would take too long */
-    bool plain;        /* near pairs would too: rays alone are taken */
-    size_t least_rays; /* in place of pairs that are dear */
-    bool large;        /* its rows and the judge's lie in the scratch folder */
+    pairs_cost cost;               /* of the recipe, from a sample; seconds is 0 where none was taken */
+    bool dear;                     /* the pairs of the recipe so far would take too long */
+    bool plain;                    /* near pairs would too: rays alone are taken */
+    size_t least_rays;             /* in place of pairs that are dear */
+    bool large;                    /* its rows and the judge's lie in the scratch folder */
     size_t sky_tiles;
     size_t probes;
     emitter_list emitters;
@@ -79,8 +79,9 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error);
 lam_status stage_open_scratch(precompute_state *state, lam_error *error);
 
 /* Blocks of form factors: false where options or the number n of elements rule them out; the recipe of blocks
- * in place of that of state where the scene is one for them, or where they are asked for, with the method
- * that is expected (final: nothing can change it); the stage; a line of the log: stage_blocks.c. */
+ * in place of that of state where they are asked for, where rows do not fit into memory, or where blocks cost
+ * less by a sample, which the log says and which sets cost, with the method that is expected (final: nothing
+ * can change it); the stage; a line of the log: stage_blocks.c. */
 bool state_may_have_blocks(const precompute_state *state, double n);
 lam_status state_choose_blocks(precompute_state *state, const build_method *method, bool final,
                                lam_error *error);

@@ -1,11 +1,16 @@
-/* Form factors by blocks of clusters: whether a scene is one for them, and the stage that finds them. */
+/* Form factors by blocks of clusters: the choice of them by what they cost, and the stage that finds them. */
+#include "solver/base/clock.h"
+#include "solver/formfactor/blocks/blocks_sample.h"
 #include "solver/precompute/precompute_state.h"
 
 #include <string.h>
 
-/* Elements of a plane, on average, from which on clusters of it take part in most of the light. A city of
- * houses has 6, a furnished room of triangles 1 to 2, rooms of walls 100 and more. */
-static const double elements_of_plane = 32;
+/* Blocks may take this many times as long as rays: in rooms they leave a third of the error of rays, or less.
+ * All pairs have as small an error. */
+static const double times_rays = 1.5;
+/* With fewer elements in a plane, on average, clusters are elements, and there is nothing to weigh. A city of
+ * houses has 3 to 6, a furnished room of triangles 1 to 2, rooms of walls 100 and more. */
+static const double elements_of_plane = 3;
 /* With fewer elements all methods are weighed by rows that cost little. */
 enum { ELEMENTS_LEAST = 4096 };
 /* All pairs of planes are visited. */
@@ -24,7 +29,7 @@ static lam_status make_tree(precompute_state *state, lam_error *error) {
     return state->tree.n > 0 ? LAM_OK : form_factors_tree(&state->m, &state->tree, error);
 }
 
-static bool suits(const plane_tree *tree) {
+static bool is_possible(const plane_tree *tree) {
     return tree->n_frames <= PLANES_MOST && (double)tree->n >= elements_of_plane * (double)tree->n_frames;
 }
 
@@ -62,6 +67,44 @@ static const build_method *method_of_blocks(void) {
     return method_at(k);
 }
 
+/* The cost of the recipe so far, which is not blocks. Rays alone are enough to know where these cost more
+ * than blocks. */
+static lam_status find_other_cost(precompute_state *state, const blocks_cost *blocks, pairs_cost *out,
+                                  lam_error *error) {
+    lam_status status = LAM_OK;
+    const recipe rays = {.method = RECIPE_RAYS, .rays = state->recipe.rays};
+    *out = state->cost;
+    if (out->seconds > 0) return LAM_OK;
+    if (state->recipe.method != RECIPE_PAIRS)
+        TRY(pairs_forecast(&state->m, &rays, &state->progress, out, error));
+    if (out->seconds < blocks->seconds)
+        TRY(pairs_forecast(&state->m, &state->recipe, &state->progress, out, error));
+done:
+    return status;
+}
+
+/* Weighs blocks against the recipe so far, by samples of both; logs why. */
+static lam_status weigh(precompute_state *state, const recipe *blocks, bool *taken, lam_error *error) {
+    lam_status status = LAM_OK;
+    const recipe *other = &state->recipe;
+    const double times = other->method == RECIPE_PAIRS ? 1 : times_rays;
+    blocks_cost cost;
+    pairs_cost least;
+    char time[32], other_time[32], what[64];
+    TRY(blocks_forecast(&state->m, &state->tree, blocks, &state->progress, &cost, error));
+    TRY(find_other_cost(state, &cost, &least, error));
+    *taken = cost.seconds <= times * least.seconds;
+    clock_format_seconds(cost.seconds, time);
+    clock_format_seconds(least.seconds, other_time);
+    recipe_describe(other, what);
+    terminal_log(state->t,
+                 "blocks of clusters are %s: about %s of one thread, by a sample of them, and %s %s",
+                 *taken ? "taken instead" : "not taken", time, what, other_time);
+    if (*taken) state->cost = (pairs_cost){.seconds = cost.seconds, .entries = 2 * cost.blocks};
+done:
+    return status;
+}
+
 lam_status state_choose_blocks(precompute_state *state, const build_method *method, bool final,
                                lam_error *error) {
     lam_status status = LAM_OK;
@@ -72,12 +115,18 @@ lam_status state_choose_blocks(precompute_state *state, const build_method *meth
     if (final && !able && !asked) return LAM_OK;
     TRY(make_tree(state, error));
     if (asked) TRY(check_asked(state, method, final, error));
-    if (!asked && !suits(&state->tree)) goto done;
-    state->recipe = (recipe){.method = RECIPE_BLOCKS,
-                             .rays = recipe_rays_beside_blocks(state->m.n),
-                             .accuracy = built->block_accuracy(method_own_const(&o->build, built)),
-                             .seed = o->seed};
-    if (strcmp(o->quality, "high") == 0) state->recipe.accuracy /= 4;
+    if (!asked && !is_possible(&state->tree)) goto done;
+    recipe blocks = {.method = RECIPE_BLOCKS,
+                     .rays = recipe_rays_beside_blocks(state->m.n),
+                     .accuracy = built->block_accuracy(method_own_const(&o->build, built)),
+                     .seed = o->seed};
+    if (strcmp(o->quality, "high") == 0) blocks.accuracy /= 4;
+    bool taken = asked;
+    const forecast f = state_forecast(state, (double)state->m.n);
+    taken = taken || forecast_bytes(&f) > state->memory;
+    if (!taken) TRY(weigh(state, &blocks, &taken, error));
+    if (!taken) goto done;
+    state->recipe = blocks;
     state->expected = built;
     state->streamed = state->large = false;
 done:

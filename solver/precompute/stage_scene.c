@@ -290,20 +290,33 @@ done:
     return status;
 }
 
-/* The recipe of the mesh as it is now: blocks where they suit the scene, unless memory has room for rows
- * alone. */
+/* Blocks in place of the recipe so far, unless memory has room for rows alone. */
+static lam_status try_blocks(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const double n = (double)state->m.n;
+    const bool rows_fit = fits(state, n), asked = strcmp(state->options->form_factors, "blocks") == 0;
+    const build_method *method;
+    bool final;
+    if (!state_may_have_blocks(state, n)) return LAM_OK;
+    TRY(expect_method(state, n, 0, &method, &final, error));
+    TRY(state_choose_blocks(state, method, final, error));
+    if (rows_fit && !asked && !fits(state, n)) TRY(choose_recipe(state, n, error));
+done:
+    return status;
+}
+
+/* The recipe of the mesh as it is now. Blocks are weighed against all pairs once these are weighed against
+ * rays, but before near pairs are, which costs more than blocks do in large rooms. */
 static lam_status choose_final_recipe(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const double n = (double)state->m.n;
-    const build_method *method;
-    bool final;
+    const bool asked = strcmp(state->options->form_factors, "blocks") == 0;
     TRY(choose_recipe(state, n, error));
-    if (state_may_have_blocks(state, n)) {
-        const bool rows_fit = fits(state, n), asked = strcmp(state->options->form_factors, "blocks") == 0;
-        TRY(expect_method(state, n, 0, &method, &final, error));
-        TRY(state_choose_blocks(state, method, final, error));
-        if (rows_fit && !asked && !fits(state, n)) TRY(choose_recipe(state, n, error));
-    }
+    const bool pairs_first = state->recipe.method == RECIPE_PAIRS && !asked && fits(state, n);
+    if (!pairs_first) TRY(try_blocks(state, error));
+    TRY(state_weigh_pairs(state, error));
+    if (state->dear) TRY(choose_recipe(state, n, error));
+    if (pairs_first) TRY(try_blocks(state, error));
     const forecast f = state_forecast(state, n);
     TRY(forecast_check(&f, state->memory, error));
 done:
@@ -408,8 +421,6 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
         TRY(mesh_refine(&state->m, &refinement, error));
     if (o->two_sided) TRY(mesh_make_two_sided(&state->m, error));
     TRY(choose_final_recipe(state, error));
-    TRY(state_weigh_pairs(state, error));
-    if (state->dear) TRY(choose_recipe_that_fits(state, (double)state->m.n, error));
     state->order = memory_allocate(state->m.n, sizeof *state->order, "the order of the elements", error);
     if (state->order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&state->m, state->order, error));

@@ -19,7 +19,7 @@ typedef struct block_options {
     const char *stage;
 } block_options;
 
-/* Those that a recipe asks for, without progress. */
+/* The options of a recipe, without progress. */
 block_options block_options_of(const recipe *r);
 
 /* Finds the blocks of all pairs of planes of a tree, which must outlive them. Visible shares come from

@@ -1,0 +1,81 @@
+/* Blocks of clusters or pairs and rays: the choice by the cost of samples. */
+#include "solver/base/terminal.h"
+#include "solver/precompute/precompute_state.h"
+#include "support/building.h"
+#include "support/scene.h"
+#include "support/suite.h"
+
+#include <omp.h>
+
+/* The choice for a generated scene of about n elements, where the recipe so far is `other`. */
+typedef struct outcome {
+    recipe_method method;
+    double seconds;
+} outcome;
+
+static outcome choose(const char *scene, size_t n, recipe other, int n_threads) {
+    lam_error error = {.message = ""};
+    terminal t;
+    const generate_options how = {.kind = scene,
+                                  .elements = n,
+                                  .seed = 1,
+                                  .reflectance = .5,
+                                  .closed = true,
+                                  .variant = 1,
+                                  .terrain = "flat"};
+    const precompute_options options = {
+        .form_factors = "auto", .quality = "normal", .rays = OPTION_AUTO, .build = build_presets("auto")};
+    precompute_state state = {.options = &options,
+                              .t = &t,
+                              .expected = method_find("hierarchical"),
+                              .recipe = other,
+                              .memory = 8e9};
+    terminal_open(&t, "test", true, false);
+    state.progress = terminal_progress(&t);
+    state.m = generate_good(&how);
+    const int before = omp_get_max_threads();
+    omp_set_num_threads(n_threads);
+    ck_ok(state_choose_blocks(&state, method_find("hierarchical"), true, &error));
+    omp_set_num_threads(before);
+    const outcome found = {state.recipe.method, state.cost.seconds};
+    mesh_free(&state.m);
+    plane_tree_free(&state.tree);
+    return found;
+}
+
+static const recipe all_pairs = {.method = RECIPE_PAIRS, .rays = RECIPE_RAYS_FEW, .accuracy = 7e-5},
+                    few_rays = {.method = RECIPE_RAYS, .rays = 256};
+
+START_TEST(a_room_of_large_planes_gets_blocks) {
+    const outcome one = choose("cornell", 4200, all_pairs, 1), three = choose("cornell", 4200, all_pairs, 3);
+    ck_assert_int_eq(one.method, RECIPE_BLOCKS);
+    ck_assert_double_gt(one.seconds, 0);
+    ck_assert_int_eq(three.method, RECIPE_BLOCKS);
+    ck_assert_double_eq(one.seconds, three.seconds);
+}
+END_TEST
+
+/* Its planes have three elements each, and all sorts of houses stand between them: its blocks cost as much as
+ * its pairs, and many times as much as its rays. */
+START_TEST(a_city_does_not) {
+    ck_assert_int_eq(choose("city", 4200, few_rays, 2).method, RECIPE_RAYS);
+}
+END_TEST
+
+START_TEST(a_small_scene_is_not_weighed) {
+    const outcome found = choose("cornell", 2000, all_pairs, 1);
+    ck_assert_int_eq(found.method, RECIPE_PAIRS);
+    ck_assert_double_eq(found.seconds, 0);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("choose blocks");
+    TCase *cases = tcase_create("choose blocks");
+    tcase_set_timeout(cases, 120);
+    tcase_add_test(cases, a_room_of_large_planes_gets_blocks);
+    tcase_add_test(cases, a_city_does_not);
+    tcase_add_test(cases, a_small_scene_is_not_weighed);
+    suite_add_tcase(suite, cases);
+    return suite_run(suite);
+}
