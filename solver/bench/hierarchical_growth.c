@@ -1,22 +1,23 @@
-/* Closed grey Cornell boxes of growing size: time and memory of a hierarchical operator beside one of low
- * rank. */
+/* Closed grey Cornell boxes of growing size: time, memory and errors of a hierarchical operator, of blocks
+ * and of rays, beside one of low rank. */
 #include "solver/base/clock.h"
 #include "solver/bench/lowrank.h"
 #include "solver/bench/scenes.h"
 #include "solver/formfactor/rays/ray_rows.h"
+#include "solver/precompute/judging.h"
 
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>
 
-enum { SIZES = 4, SOLVES = 31, SOLVES_OF_LARGE = 7, LARGE_SOLVE = 1 << 28 };
+enum { SIZES = 5, SOLVES = 31, SOLVES_OF_LARGE = 7, LARGE_SOLVE = 1 << 28 };
 
-/* The recipe of large scenes at defaults serves all sizes, so that time grows at an equal number of rays. */
-enum { RAYS = 512 };
-static const double accuracy = 7e-5, epsilon = .05, reflectance = .6;
+/* Rays of near pairs at all sizes, so that time grows at an equal number of them; beyond NEAR_MOST elements
+ * their rows take more memory than they are worth. The bound of blocks is the one at defaults. */
+enum { RAYS = 512, NEAR_MOST = 200000 };
+static const double accuracy = 7e-5, block_accuracy = 4e-4, epsilon = .05, reflectance = .6;
 
-/* Largest number of elements at which errors are measured, and the probes of that. */
-enum { JUDGED_MOST = 200000, PROBES = 16, PROBES_QUICK = 4 };
+enum { PROBES = 16, PROBES_QUICK = 4 };
 
 /* The rank of HF at 163,840 elements and epsilon .05, which grows like the square root of n: the thesis needs
  * 3,981 for that box (table 3.5). */
@@ -27,8 +28,9 @@ static const double memory_share = .5;
 
 static const table_column columns[] = {
     {"elements", "", "n"},
-    {"near_pairs_s", "s", "time of near pairs"},
-    {"wavelets_s", "s", "time of 512 rays per element and of their wavelet transform"},
+    {"form_factors", NULL, "blocks: of clusters; near-pairs: beside 512 rays per element"},
+    {"form_factors_s", "s", "time of blocks with their tree, or of near pairs"},
+    {"wavelets_s", "s", "time of their wavelet transform, with the rays beside near pairs"},
     {"inverse_s", "s", "time of the inverse and its checks"},
     {"build_s", "s", "sum of these times"},
     {"peak_mb", "MB", "peak of memory during the build"},
@@ -43,6 +45,7 @@ static const table_column columns[] = {
     {"single", "", "total indirect error, one bright element, mean of 16"},
     {"lights", "", "the scene's light"},
     {"random", "", "random emission of all elements"},
+    {"noise", "", "noise of the reference for one bright element"},
     {"uniform", "", "|B~ - 1| / |1| where E = 1 - rho s"},
 };
 
@@ -76,132 +79,190 @@ done:
     return status;
 }
 
-/* Errors of the operator against form factors of another seed; its own form factors are computed once more.
- */
-static lam_status judge(const bench_run *run, lowrank_scene *s, const recipe *own, lam_operator *op,
-                        error_report *out, lam_error *error) {
-    lam_status status = LAM_OK;
-    form_factors independent = {.row_sums = NULL};
-    first_light *first = NULL;
-    const form_factor_options how = {.recipe = {.method = RECIPE_NEAR_PAIRS,
-                                                .rays = 4 * RAYS,
-                                                .accuracy = accuracy,
-                                                .seed = run->seed + 1000},
-                                     .progress = run->progress,
-                                     .stage = "independent form factors"};
-    TRY(lowrank_trace(run, s, own, error));
-    const build_problem problem = lowrank_problem(s);
-    TRY(form_factors_make(&s->m, s->z_order, &how, &independent, error));
-    TRY(form_factors_expand(&independent, s->m.area, error));
-    TRY(first_light_create(&s->m, run->seed, &first, error));
-    const judge_input input = {.problem = &problem,
-                               .row_sums = s->f.row_sums,
-                               .emission = s->m.emission,
-                               .own = factor_product_of_rows(problem.F),
-                               .independent = factor_product_of_rows(&independent.F),
-                               .first_light = first_light_for_judge,
-                               .first_light_context = first,
-                               .probes = run->scale == BENCH_QUICK ? PROBES_QUICK : PROBES,
-                               .seed = run->seed,
-                               .progress = run->progress};
-    TRY(judge_operator(op, &input, out, error));
-done:
-    first_light_destroy(first);
-    form_factors_free(&independent);
-    return status;
+/* A box, and its blocks, which one operator is built from and both are judged beside. */
+typedef struct box {
+    lowrank_scene s;
+    plane_tree tree;
+    block_factors blocks;
+    form_factors about; /* the blocks; no rows */
+    double blocks_s, low_rank_ms;
+    size_t rank;
+} box;
+
+static void box_free(box *b) {
+    block_factors_free(&b->blocks);
+    form_factors_free(&b->about);
+    plane_tree_free(&b->tree);
+    lowrank_scene_free(&b->s);
+}
+
+static build_problem problem_of_blocks(const box *b) {
+    build_problem problem = lowrank_problem(&b->s);
+    problem.F = NULL;
+    problem.blocks = &b->blocks;
+    problem.noise = recipe_noise(&b->about.recipe);
+    return problem;
+}
+
+/* Errors against blocks of a quarter of the bound, for either operator. */
+static lam_status judge(const bench_run *run, const box *b, const lam_operator *op, error_report *out,
+                        lam_error *error) {
+    const build_problem problem = problem_of_blocks(b);
+    judging j = {.m = &b->s.m,
+                 .order = b->s.z_order,
+                 .problem = &problem,
+                 .f = &b->about,
+                 .stages = {"blocks for the judge, 1 of 2", "blocks for the judge, 2 of 2"},
+                 .probes_seed = run->seed,
+                 .probes = run->scale == BENCH_QUICK ? PROBES_QUICK : PROBES,
+                 .progress = run->progress};
+    for (uint64_t h = 0; h < 2; h++) j.halves[h] = recipe_of_judge(&b->about.recipe, 0, run->seed + 1000 + h);
+    return judging_run(&j, op, out, error);
 }
 
 typedef struct grown {
     double n, build_s;
 } grown;
 
-static lam_status add_size(const bench_run *run, size_t elements, grown *before, table *out,
-                           lam_error *error) {
-    lam_status status = LAM_OK;
-    const generate_options box = {
-        .kind = "cornell", .closed = true, .elements = elements, .reflectance = reflectance, .seed = 1};
-    const recipe how = {.method = RECIPE_NEAR_PAIRS, .rays = RAYS, .accuracy = accuracy, .seed = run->seed};
-    build_options options = build_presets("hierarchical");
-    mesh m = {0};
-    lowrank_scene s = {.name = NULL};
-    lam_operator *op = NULL;
+/* Time and memory of a build. */
+typedef struct cost {
+    double form_factors_s, peak;
     build_report built;
-    error_report judgement = {.has_total = false}, *const e = &judgement;
-    double query, low_rank, stored;
+} cost;
+
+static lam_status add_row(const bench_run *run, const box *b, const char *name, lam_operator *op,
+                          const cost *c, grown *before, table *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const double n = (double)b->s.m.n, build = c->form_factors_s + report_seconds(&c->built);
     operator_description about = {.density = -1};
-    ray_rows *rays = NULL;
-    row_stream stream;
-    TRY(bench_check(run, error));
-    TRY(scene_generated(&box, &m, error));
-    TRY(lowrank_open(run, "closed cornell", &m, NULL, &s, error));
-    const form_factor_options rays_only = {.recipe = how, .progress = run->progress, .stage = "near pairs"};
-    const double before_it = lowrank_begin_peak(), started = clock_seconds();
-    TRY(ray_rows_create(&s.m, &rays_only, &rays, error));
-    const double near = clock_seconds() - started;
-    ray_rows_stream(rays, run->seed + 2000, &stream);
-    build_problem problem = lowrank_problem(&s);
-    problem.F = NULL;
-    problem.stream = &stream;
-    problem.noise = recipe_noise(&how);
-    const double n = (double)s.m.n;
-    options.seed = run->seed;
-    options.progress = run->progress;
-    TRY(build_set_number(&options, "epsilon", epsilon, error));
-    TRY(build_operator(&problem, &options, &op, &built, error));
-    const double peak = lowrank_peak(before_it);
-    ray_rows_destroy(rays);
-    rays = NULL;
+    error_report e = {.has_total = false};
+    double query, stored;
     lam_operator_set_threads(op, (size_t)omp_get_max_threads());
     TRY(lowrank_time_answer(op, SOLVES, &query, error));
     TRY(lowrank_stored_bytes(op, &stored, error));
     operator_describe(op, &about);
-    const size_t rank = (size_t)(rank_known * sqrt(n / rank_known_at));
-    const bool judged = s.m.n <= JUDGED_MOST;
-    if (judged) TRY(judge(run, &s, &how, op, &judgement, error));
-    lam_operator_close(op);
-    op = NULL;
-    form_factors_free(&s.f);
-    s.f = (form_factors){.row_sums = NULL};
-    TRY(time_low_rank(run, &s.m, rank, &low_rank, error));
-    const double build = near + report_seconds(&built);
+    TRY(judge(run, b, op, &e, error));
     table_number(out, n);
-    table_number(out, near);
-    table_number(out, built.steps[0].seconds);
-    table_number(out, built.steps[1].seconds);
+    table_text(out, name);
+    table_number(out, c->form_factors_s);
+    table_number(out, c->built.steps[0].seconds);
+    table_number(out, c->built.steps[1].seconds);
     table_number(out, build);
-    table_number(out, 1e-6 * peak);
+    table_number(out, 1e-6 * c->peak);
     table_number(out, before->n > 0 ? log(build / before->build_s) / log(n / before->n) : NAN);
     table_number(out, .5 * about.density * n);
     table_number(out, 1e-6 * stored);
     table_number(out, 1e3 * query);
-    table_number(out, (double)rank);
-    table_number(out, 1e3 * low_rank);
-    table_number(out, low_rank / query);
-    table_number(out, judged ? e->single.total_indirect.mean : NAN);
-    table_number(out, judged ? e->lights.total_indirect.mean : NAN);
-    table_number(out, judged ? e->random.total_indirect.mean : NAN);
-    table_number(out, report_get(&built, "uniform_error", NAN));
+    table_number(out, (double)b->rank);
+    table_number(out, b->low_rank_ms);
+    table_number(out, b->low_rank_ms / (1e3 * query));
+    table_number(out, e.single.total_indirect.mean);
+    table_number(out, e.lights.total_indirect.mean);
+    table_number(out, e.random.total_indirect.mean);
+    table_number(out, e.single.reference_noise);
+    table_number(out, report_get(&c->built, "uniform_error", NAN));
     *before = (grown){.n = n, .build_s = build};
+done:
+    return status;
+}
+
+static lam_status build(const bench_run *run, const build_problem *problem, lam_operator **op,
+                        build_report *built, lam_error *error) {
+    lam_status status = LAM_OK;
+    build_options options = build_presets("hierarchical");
+    options.seed = run->seed;
+    options.progress = run->progress;
+    TRY(build_set_number(&options, "epsilon", epsilon, error));
+    TRY(build_operator(problem, &options, op, built, error));
+done:
+    return status;
+}
+
+static lam_status add_blocks(const bench_run *run, box *b, grown *before, table *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    lam_operator *op = NULL;
+    cost c = {.peak = 0};
+    const form_factor_options how = {.recipe = {.method = RECIPE_BLOCKS,
+                                                .rays = recipe_rays_beside_blocks(b->s.m.n),
+                                                .accuracy = block_accuracy,
+                                                .seed = run->seed},
+                                     .progress = run->progress,
+                                     .stage = "blocks"};
+    const double before_it = lowrank_begin_peak(), started = clock_seconds();
+    TRY(form_factors_tree(&b->s.m, &b->tree, error));
+    TRY(form_factors_make_blocks(&b->s.m, b->s.z_order, &b->tree, false, &how, &b->about, &b->blocks, error));
+    c.form_factors_s = clock_seconds() - started;
+    const build_problem problem = problem_of_blocks(b);
+    TRY(build(run, &problem, &op, &c.built, error));
+    c.peak = lowrank_peak(before_it);
+    TRY(add_row(run, b, "blocks", op, &c, before, out, error));
+done:
+    lam_operator_close(op);
+    return status;
+}
+
+static lam_status add_near_pairs(const bench_run *run, const box *b, grown *before, table *out,
+                                 lam_error *error) {
+    lam_status status = LAM_OK;
+    lam_operator *op = NULL;
+    cost c = {.peak = 0};
+    ray_rows *rays = NULL;
+    row_stream stream;
+    const form_factor_options how = {
+        .recipe = {.method = RECIPE_NEAR_PAIRS, .rays = RAYS, .accuracy = accuracy, .seed = run->seed},
+        .progress = run->progress,
+        .stage = "near pairs"};
+    const double before_it = lowrank_begin_peak(), started = clock_seconds();
+    TRY(ray_rows_create(&b->s.m, &how, &rays, error));
+    c.form_factors_s = clock_seconds() - started;
+    ray_rows_stream(rays, run->seed + 2000, &stream);
+    build_problem problem = lowrank_problem(&b->s);
+    problem.F = NULL;
+    problem.stream = &stream;
+    problem.noise = recipe_noise(&how.recipe);
+    TRY(build(run, &problem, &op, &c.built, error));
+    c.peak = lowrank_peak(before_it);
+    TRY(add_row(run, b, "near-pairs", op, &c, before, out, error));
 done:
     lam_operator_close(op);
     ray_rows_destroy(rays);
-    lowrank_scene_free(&s);
+    return status;
+}
+
+/* before: of either recipe */
+static lam_status add_size(const bench_run *run, size_t elements, grown before[2], table *out,
+                           lam_error *error) {
+    lam_status status = LAM_OK;
+    const generate_options walls = {
+        .kind = "cornell", .closed = true, .elements = elements, .reflectance = reflectance, .seed = 1};
+    mesh m = {0};
+    box b = {.s = {.name = NULL}};
+    TRY(bench_check(run, error));
+    TRY(scene_generated(&walls, &m, error));
+    TRY(lowrank_open(run, "closed cornell", &m, NULL, &b.s, error));
+    b.rank = (size_t)(rank_known * sqrt((double)b.s.m.n / rank_known_at));
+    TRY(time_low_rank(run, &b.s.m, b.rank, &b.low_rank_ms, error));
+    b.low_rank_ms *= 1e3;
+    TRY(add_blocks(run, &b, &before[0], out, error));
+    if (b.s.m.n <= NEAR_MOST) TRY(add_near_pairs(run, &b, &before[1], out, error));
+done:
+    box_free(&b);
     mesh_free(&m);
     return status;
 }
 
 lam_status hierarchical_growth(const bench_run *run, lam_error *error) {
     static const size_t sizes[3][SIZES] = {
-        {320, 640, 0, 0}, {10240, 40960, 163840, 0}, {10240, 40960, 163840, 655360}};
+        {320, 640}, {10240, 40960, 163840, 655360}, {10240, 40960, 163840, 655360, 2621440}};
     lam_status status = LAM_OK;
-    grown before = {.n = 0};
+    grown before[2] = {{.n = 0}, {.n = 0}};
     table out = {.name = "growth",
                  .title = "Growth: closed grey Cornell boxes at epsilon .05",
                  .columns = columns,
                  .n_columns = sizeof columns / sizeof *columns,
                  .printed = true};
     for (size_t k = 0; k < SIZES && sizes[run->scale][k] > 0; k++)
-        TRY(add_size(run, sizes[run->scale][k], &before, &out, error));
+        TRY(add_size(run, sizes[run->scale][k], before, &out, error));
     TRY(bench_table(run, &out, error));
 done:
     table_free(&out);

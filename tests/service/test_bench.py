@@ -186,13 +186,15 @@ class Hierarchical(unittest.TestCase):
             self.assertLessEqual(float(row["least_mb"]), min(others))
 
     def test_growth(self):
-        small, large = self.tables["growth"]
-        self.assertEqual(small["exponent"], "")
-        self.assertGreater(float(large["elements"]), 1.9 * float(small["elements"]))
-        for row in small, large:
-            self.assertLess(float(row["uniform"]), 1e-3)
-            self.assertAlmostEqual(float(row["ratio"]), float(row["low_rank_ms"]) / float(row["query_ms"]), 3)
-            self.assertLess(float(row["single"]), .2)
+        for recipe in "blocks", "near-pairs":
+            small, large = (row for row in self.tables["growth"] if row["form_factors"] == recipe)
+            self.assertEqual(small["exponent"], "")
+            self.assertGreater(float(large["elements"]), 1.9 * float(small["elements"]))
+            for row in small, large:
+                self.assertLess(float(row["uniform"]), 1e-3)
+                self.assertAlmostEqual(float(row["ratio"]), float(row["low_rank_ms"]) / float(row["query_ms"]), 3)
+                self.assertLess(float(row["noise"]), float(row["single"]))
+                self.assertLess(float(row["single"]), .2)
 
 
 class Cities(unittest.TestCase):
