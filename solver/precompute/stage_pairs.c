@@ -21,7 +21,8 @@ static const double seconds_spent = 12;
 enum { DOUBLED_MOST = 2 };
 
 /* Where there are too many elements for all pairs anyway: 1,024 rays alone leave a bright triangle no more
- * error than near pairs beside 512 (in a part of a town .21 and .23), and random emission less. */
+ * error than near pairs beside 512 (in a part of a town .21 and .23); random emission is then off by .017 in
+ * a town of 36,267 triangles. */
 enum { MORE_RAYS_OF_MANY = 2 };
 
 static lam_status cost_of(precompute_state *state, const recipe *r, pairs_cost *out, lam_error *error) {
@@ -71,13 +72,12 @@ done:
 static lam_status weigh_near_pairs(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const recipe near = state->recipe;
-    recipe plain = {.method = RECIPE_RAYS, .rays = MORE_RAYS_OF_MANY * near.rays, .seed = near.seed};
+    const recipe plain = {.method = RECIPE_RAYS, .rays = MORE_RAYS_OF_MANY * near.rays, .seed = near.seed};
     pairs_cost of_plain;
     char near_time[32], plain_time[32], what[64];
     TRY(cost_of(state, &near, &state->cost, error));
     TRY(cost_of(state, &plain, &of_plain, error));
     if (of_plain.seconds >= state->cost.seconds || !fits(state, &plain)) goto done;
-    TRY(spend_more(state, &plain, &of_plain, error));
     clock_format_seconds(state->cost.seconds, near_time);
     clock_format_seconds(of_plain.seconds, plain_time);
     recipe_describe(&plain, what);
