@@ -85,7 +85,7 @@ typedef struct box {
     plane_tree tree;
     block_factors blocks;
     form_factors about; /* the blocks; no rows */
-    double blocks_s, low_rank_ms;
+    double low_rank_ms;
     size_t rank;
 } box;
 
