@@ -97,8 +97,7 @@ static lam_status weigh(precompute_state *state, const recipe *blocks, bool *tak
     clock_format_seconds(cost.seconds, time);
     clock_format_seconds(least.seconds, other_time);
     recipe_describe(other, what);
-    terminal_log(state->t,
-                 "blocks of clusters are %s: about %s of one thread, by a sample of them, and %s %s",
+    terminal_log(state->t, "blocks of clusters are %s: about %s of one thread, by a sample of them; %s: %s",
                  *taken ? "taken instead" : "not taken", time, what, other_time);
     if (*taken) state->cost = (pairs_cost){.seconds = cost.seconds, .entries = 2 * cost.blocks};
 done:

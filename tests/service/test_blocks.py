@@ -34,8 +34,8 @@ class Blocks(Case):
         must("generate", "cornell", "--closed", "--elements", 4200, "--reflectance", .5, "-o", self.room)
         store, log = self.precompute("auto.h5", "--probes", 0)
         self.assertEqual(self.attributes(store)["form_factors"], b"blocks")
-        self.assertRegex(log, r"blocks of clusters are taken instead: about .* s of one thread, by a sample of them, and "
-                              r"pair by pair to .* s\n")
+        self.assertRegex(log, r"blocks of clusters are taken instead: about .* s of one thread, by a sample of them; "
+                              r"pair by pair to .*: .* s\n")
         self.assertRegex(log, r"forecast: form factors [\d.]+ s,")
         self.assertRegex(log, r"\d+ blocks of 16 planes: .* linear, .* partly hidden")
         rays, log = self.precompute("rays.h5", "--probes", 0, "--form-factors", "rays", "--quality", "draft",
