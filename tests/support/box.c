@@ -14,21 +14,23 @@ box_cell box_cell_of(const double size[3], unsigned divisions, size_t i) {
     return cell;
 }
 
-/* Room for `added` more rows behind `count`, which doubles: a sanitizer copies an array whenever it grows. */
-static void *grow(void *array, size_t count, size_t added, size_t row_bytes) {
+/* Room for `added` more rows behind `count`, which doubles until a mesh is finished: a sanitizer copies an
+ * array whenever it grows. */
+static void *grow(const mesh *m, void *array, size_t count, size_t added, size_t row_bytes) {
     size_t room = 1;
     while (room < count) room *= 2;
-    if (array != NULL && count + added <= room) return array;
+    const bool finished = m->reflectance != NULL;
+    if (!finished && array != NULL && count + added <= room) return array;
     while (room < count + added) room *= 2;
-    array = realloc(array, room * row_bytes);
+    array = realloc(array, (finished ? count + added : room) * row_bytes);
     ck_assert_ptr_nonnull(array);
     return array;
 }
 
 void mesh_add_quad(mesh *m, const double corners[4][3]) {
     const size_t v = m->n_vertices;
-    m->vertices = grow(m->vertices, v, 4, sizeof *m->vertices);
-    m->elements = grow(m->elements, m->n, 1, sizeof *m->elements);
+    m->vertices = grow(m, m->vertices, v, 4, sizeof *m->vertices);
+    m->elements = grow(m, m->elements, m->n, 1, sizeof *m->elements);
     memcpy(m->vertices[v], corners, 4 * sizeof *m->vertices);
     for (uint32_t c = 0; c < 4; c++) m->elements[m->n][c] = (uint32_t)v + c;
     m->n_vertices += 4;
