@@ -19,4 +19,7 @@
 /* Runs a suite; the exit status. */
 int suite_run(Suite *suite);
 
+/* The same with a process for each check, whatever CK_FORK says: some of them end theirs. */
+int suite_run_apart(Suite *suite);
+
 #endif

@@ -19,7 +19,9 @@ static inline bool has_function(const block_node *node, int r) {
 }
 
 static size_t functions_of(const block_node *node) {
-    return (size_t)(1 + (node->over[0] != 0) + (node->over[1] != 0));
+    size_t count = 0;
+    for (int r = 0; r < BLOCK_FUNCTIONS; r++) count += has_function(node, r) ? 1 : 0;
+    return count;
 }
 
 static void pack_tree(const block_factors *f, uint32_t (*clusters)[CLUSTER_NUMBERS], double (*rectangles)[4],

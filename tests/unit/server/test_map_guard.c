@@ -140,5 +140,5 @@ int main(void) {
     tcase_add_test_raise_signal(tests, a_signal_that_was_sent_ends_the_process, SIGBUS);
     tcase_add_test(tests, places_run_out);
     suite_add_tcase(suite, tests);
-    return suite_run(suite);
+    return suite_run_apart(suite);
 }
