@@ -15,6 +15,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Repairs exchange areas with the shares of the rays that leave. */
 static lam_status close_upper(form_factors *f, const mesh *m, lam_error *error) {
@@ -157,20 +158,20 @@ done:
     return status;
 }
 
+typedef struct balanced_blocks {
+    block_factors *blocks;
+    const double *ones; /* [n] */
+} balanced_blocks;
+
 /* r_i = A_i (F' 1)_i with F' = D F D. */
 static lam_status sums_of_blocks(void *context, const double *d, double *r, lam_error *error) {
     lam_status status = LAM_OK;
-    block_factors *blocks = context;
-    double *ones = memory_allocate(blocks->n, sizeof *ones, "form factors", error);
-    if (ones == NULL) return LAM_ERR_MEMORY;
-    for (size_t p = 0; p < blocks->n; p++) {
-        ones[p] = 1;
-        blocks->balance[p] = d[p];
-    }
-    TRY(block_factors_multiply(blocks, 1, ones, r, error));
+    const balanced_blocks *of = context;
+    const block_factors *blocks = of->blocks;
+    memcpy(blocks->balance, d, blocks->n * sizeof *d);
+    TRY(block_factors_multiply(blocks, 1, of->ones, r, error));
     for (size_t p = 0; p < blocks->n; p++) r[p] *= blocks->area[p];
 done:
-    free(ones);
     return status;
 }
 
@@ -207,19 +208,23 @@ static lam_status balance_blocks(form_factors *f, block_factors *blocks, lam_err
     double *before = memory_allocate(n, sizeof *before, "form factors", error), area = 0;
     double *d = memory_allocate(n, sizeof *d, "form factors", error);
     double *r = memory_allocate(n, sizeof *r, "form factors", error);
+    double *ones = memory_allocate(n, sizeof *ones, "form factors", error);
     blocks->balance = memory_allocate(n, sizeof *blocks->balance, "form factors", error);
     f->row_sums = memory_allocate(n, sizeof *f->row_sums, "form factors", error);
-    if (before == NULL || d == NULL || r == NULL || blocks->balance == NULL || f->row_sums == NULL)
+    if (before == NULL || d == NULL || r == NULL || ones == NULL || blocks->balance == NULL ||
+        f->row_sums == NULL)
         TRY(LAM_ERR_MEMORY);
+    for (size_t p = 0; p < n; p++) ones[p] = 1;
+    balanced_blocks of = {blocks, ones};
     row_scaling c = {.n = n,
                      .area = blocks->area,
                      .sums = sums_of_blocks,
-                     .context = blocks,
+                     .context = &of,
                      .sweeps_most = SWEEPS,
                      .d = d,
                      .r = r};
     TRY(closed ? row_scaling_settle(&c, before, error) : balance_open(&c, before, error));
-    TRY(sums_of_blocks(blocks, d, r, error));
+    TRY(sums_of_blocks(&of, d, r, error));
     f->repair_products = c.products + 1;
     for (size_t p = 0; p < n; p++) {
         const double sum = r[p] / blocks->area[p], off = fabs(before[p] / blocks->area[p] - 1);
@@ -234,6 +239,7 @@ done:
     free(before);
     free(d);
     free(r);
+    free(ones);
     return status;
 }
 

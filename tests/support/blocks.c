@@ -17,6 +17,12 @@ block_factors blocks_of(const mesh *m, plane_tree *tree, double open, double sha
     return blocks_with(m, tree, &options, report);
 }
 
+block_factors blocks_of_seed(const mesh *m, plane_tree *tree, uint64_t seed) {
+    const block_options options = {
+        .open = blocks_open, .shadow = blocks_shadow, .exact = 1e-6, .by_scene = seed % 2 == 1, .seed = seed};
+    return blocks_with(m, tree, &options, NULL);
+}
+
 void blocks_multiply(const block_factors *f, const double *x, double *y) {
     lam_error error = {.message = ""};
     double *in = malloc(f->n * sizeof *in), *out = malloc(f->n * sizeof *out);

@@ -17,6 +17,9 @@ block_factors blocks_of(const mesh *m, plane_tree *tree, double open, double sha
 block_factors blocks_with(const mesh *m, plane_tree *tree, const block_options *options,
                           block_report *report);
 
+/* The same at those defaults, of a seed; segments of odd ones go through the whole scene. */
+block_factors blocks_of_seed(const mesh *m, plane_tree *tree, uint64_t seed);
+
 /* y = F x, by element. */
 void blocks_multiply(const block_factors *f, const double *x, double *y);
 

@@ -159,10 +159,10 @@ static lam_status visit_shaded(block_walk *w, uint32_t a, uint32_t b, double mos
     return add_shaded(w, a, b, among);
 }
 
-static lam_status decide(block_walk *w, uint32_t a, uint32_t b, const candidates *among) {
+/* elements: the pairs of elements that a and b stand for. */
+static lam_status decide(block_walk *w, uint32_t a, uint32_t b, double elements, const candidates *among) {
     const block_finder *k = w->finder;
     const flat_clusters *f = &k->flat;
-    const double elements = (double)block_finder_size(k, a) * (double)block_finder_size(k, b);
     bool behind[2];
     candidates mine = {.count = 0};
     w->report.visits++;
@@ -200,13 +200,13 @@ static lam_status visit(block_walk *w, uint32_t a, uint32_t b, const candidates 
     const double elements = (double)block_finder_size(w->finder, a) * (double)block_finder_size(w->finder, b);
     int stage = before;
     while (stage < s->n_stages && elements <= s->limit[stage]) stage++;
-    if (stage == before) return decide(w, a, b, among);
+    if (stage == before) return decide(w, a, b, elements, among);
     const uint64_t one_of = UINT64_C(1) << (stage - before);
     if (random_hash((uint64_t)a << 32 | b) % one_of != 0) return LAM_OK;
     const block_report so_far = w->report;
     w->report = (block_report){.visits = 0};
     s->stage = stage;
-    status = decide(w, a, b, among);
+    status = decide(w, a, b, elements, among);
     s->stage = before;
     const block_report found = w->report;
     w->report = so_far;

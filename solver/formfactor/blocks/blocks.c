@@ -11,6 +11,7 @@
 
 /* A piece of work is a pair of clusters with at most this share of all pairs of elements. */
 static const double piece_share = 1. / 512;
+
 typedef struct node_pair {
     uint32_t a, b;
     double elements; /* pairs of them */

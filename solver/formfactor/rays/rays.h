@@ -38,7 +38,8 @@ enum { RAYS_AT_ONCE = SAMPLE_ORDERED };
 size_t rays_meet(const ray_context *c, const element_sampler *sampler, size_t element, size_t first,
                  size_t last, uint32_t *met, ray_tally *tally, double *sky);
 
-/* Casts rays from n_elements elements, spread over the order, and ignores their hits: to time them. */
+/* Casts rays, at most RAYS_AT_ONCE, from each of n_elements elements, spread over the order, and ignores
+ * their hits: to time them. */
 void rays_cast_some(const mesh *m, const visibility *v, const uint32_t *order, size_t n_elements,
                     size_t rays);
 

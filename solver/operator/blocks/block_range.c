@@ -45,7 +45,7 @@ lam_status block_ranges(const block_factors *f, block_range **out, lam_error *er
     return LAM_OK;
 }
 
-static double sum_of(const cluster_block *k) {
+double block_magnitude(const cluster_block *k) {
     double sum = 0;
     for (int r = 0; r < BLOCK_FUNCTIONS; r++)
         for (int c = 0; c < BLOCK_FUNCTIONS; c++) sum += fabs((double)k->L[r][c]);
@@ -72,11 +72,11 @@ static double least_slope(const block_range *ranges, const cluster_block *k, dou
 }
 
 double block_least(const block_range *ranges, const cluster_block *k) {
-    return (double)k->L[0][0] + least_slope(ranges, k, 1) - slack * sum_of(k);
+    return (double)k->L[0][0] + least_slope(ranges, k, 1) - slack * block_magnitude(k);
 }
 
 double block_most(const block_range *ranges, const cluster_block *k) {
-    return (double)k->L[0][0] - least_slope(ranges, k, -1) + slack * sum_of(k);
+    return (double)k->L[0][0] - least_slope(ranges, k, -1) + slack * block_magnitude(k);
 }
 
 /* The functions of a node at corner 0 ... 3 of its range. */

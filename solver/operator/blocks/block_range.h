@@ -20,13 +20,16 @@ typedef struct block_range {
 /* The ranges of all nodes, [n_clusters + n], freed with free. Errors: LAM_ERR_MEMORY. */
 lam_status block_ranges(const block_factors *f, block_range **out, lam_error *error);
 
+/* sum |L_rc|, which bounds the density of a block on its nodes. */
+double block_magnitude(const cluster_block *k);
+
 /* A lower and an upper bound of the density of a block in 1/m^2, whose numbers are finite. */
 double block_least(const block_range *ranges, const cluster_block *k);
 double block_most(const block_range *ranges, const cluster_block *k);
 
-/* Makes all blocks of f non-negative: where one falls below 0, its slopes are reduced by a common factor, so
- * that the value at the centres of both nodes stays. Returns the number of these blocks in n_reduced (may be
- * NULL). Cost: O(n + n_blocks). Errors: LAM_ERR_MEMORY. */
+/* Makes all blocks of f non-negative: where one falls below 0, its slopes are changed as little as possible
+ * in the 2-norm over both nodes; the value at their centres stays, unless it is negative itself. Returns the
+ * number of these blocks in n_reduced (may be NULL). Cost: O(n + n_blocks). Errors: LAM_ERR_MEMORY. */
 lam_status block_factors_reduce(block_factors *f, size_t *n_reduced, lam_error *error);
 
 #endif

@@ -42,13 +42,6 @@ static void add_up(const block_factors *f, const double *value, const double *we
     for (size_t p = 0; p < n; p++) out[p] = down[n_clusters + p] + down[f->nodes[n_clusters + p].parent];
 }
 
-static double sum_of(const cluster_block *k) {
-    double sum = 0;
-    for (int r = 0; r < BLOCK_FUNCTIONS; r++)
-        for (int c = 0; c < BLOCK_FUNCTIONS; c++) sum += fabs((double)k->L[r][c]);
-    return sum;
-}
-
 /* Levels of clusters above an element, at most; blocks of one node, at most. */
 static void measure(const block_factors *f, uint32_t *level, size_t *n_levels, size_t *n_blocks) {
     *n_levels = *n_blocks = 0;
@@ -71,7 +64,7 @@ static lam_status find_rounding(const block_factors *f, double *value, double *w
     measure(f, level, &n_levels, &n_blocks);
     free(level);
     for (size_t p = 0; p < f->n; p++) weight[p] = f->area[p] * f->balance[p];
-    for (size_t k = 0; k < f->n_blocks; k++) value[k] = sum_of(&f->blocks[k]);
+    for (size_t k = 0; k < f->n_blocks; k++) value[k] = block_magnitude(&f->blocks[k]);
     add_up(f, value, weight, sums, out);
     for (size_t p = 0; p < f->n; p++) largest = fmax(largest, f->balance[p] * out[p]);
     const double count =

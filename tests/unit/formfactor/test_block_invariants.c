@@ -82,13 +82,8 @@ START_TEST(light_is_neither_lost_nor_won) {
     for (size_t i = 0; i < m.n; i++) one[i] = 1;
     for (size_t i = 0; i < m.n; i++) area += m.area[i];
     for (int s = 0; s < SEEDS; s++) {
-        const block_options options = {.open = blocks_open,
-                                       .shadow = blocks_shadow,
-                                       .exact = 1e-6,
-                                       .by_scene = s % 2 == 1,
-                                       .seed = (uint64_t)s + 1};
         plane_tree tree;
-        block_factors f = blocks_with(&m, &tree, &options, NULL);
+        block_factors f = blocks_of_seed(&m, &tree, (uint64_t)s);
         double mean = 0;
         blocks_multiply(&f, one, sums);
         for (size_t i = 0; i < m.n; i++) mean += m.area[i] * (sums[i] - 1) / area;

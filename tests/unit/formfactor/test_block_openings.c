@@ -100,13 +100,8 @@ START_TEST(small_openings_lose_nothing) {
     mesh m = two_rooms(hole, thickness, cell, count);
     double sum = 0, square = 0, most = 0;
     for (int s = 0; s < SEEDS; s++) {
-        const block_options options = {.open = blocks_open,
-                                       .shadow = blocks_shadow,
-                                       .exact = 1e-6,
-                                       .by_scene = s % 2 == 1,
-                                       .seed = (uint64_t)s + 1};
         plane_tree tree;
-        block_factors f = blocks_with(&m, &tree, &options, NULL);
+        block_factors f = blocks_of_seed(&m, &tree, (uint64_t)s);
         const double exchange = blocks_exchange(&m, &f, 0, count[0], count[0], count[1]);
         sum += exchange / SEEDS;
         square += exchange * exchange / SEEDS;
