@@ -119,4 +119,7 @@ lam_status lowrank_of_index_vector(const bench_run *run, lam_error *error);
  * coefficients per element, beside an operator of low rank. */
 lam_status hierarchical_growth(const bench_run *run, lam_error *error);
 
+/* Another: what a mesh leaves out, with values constant on elements and smooth. */
+lam_status hierarchical_smooth(const bench_run *run, lam_error *error);
+
 #endif

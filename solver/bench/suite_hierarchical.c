@@ -323,6 +323,7 @@ lam_status bench_hierarchical(const bench_run *run, lam_error *error) {
     }
     TRY(bench_table(run, &points, error));
     TRY(bench_table(run, &equal, error));
+    if (run->scene == NULL) TRY(hierarchical_smooth(run, error));
     if (run->scene == NULL) TRY(hierarchical_growth(run, error));
 done:
     lowrank_scene_free(&s);

@@ -112,29 +112,31 @@ lam_status output_array(FILE *stream, size_t rank, const size_t *shape, const fl
 }
 
 static lam_status output_npy(const solution *s, FILE *stream, lam_error *error) {
-    size_t shape[3], rank = 0;
+    size_t shape[4], rank = 0;
     if (s->batch) shape[rank++] = s->n_vectors;
     if (s->m->n_channels > 1) shape[rank++] = s->m->n_channels;
     shape[rank++] = s->m->n;
-    return output_array(stream, rank, shape, s->values, s->refined, error);
+    if (s->corners != NULL) shape[rank++] = 4;
+    return output_array(stream, rank, shape, s->corners != NULL ? s->corners : s->values, s->refined, error);
 }
 
 /* A format of files: the writer of an extension. */
 static const struct {
     const char *extension;
     lam_status (*write)(const solution *s, FILE *stream, lam_error *error);
-    bool takes_figures; /* also figures of groups in place of vectors */
+    bool takes[OUTPUT_CONTENTS]; /* elements, groups, corners */
 } formats[] = {
-    {"npy", output_npy, false}, {"json", output_json, true}, {"csv", output_csv, true},
-    {"ply", output_ply, false}, {"vtu", output_vtu, false},
+    {"npy", output_npy, {true, false, true}}, {"json", output_json, {true, true, false}},
+    {"csv", output_csv, {true, true, false}}, {"ply", output_ply, {true, false, true}},
+    {"vtu", output_vtu, {true, false, true}},
 };
 #define N_FORMATS (sizeof formats / sizeof *formats)
 
-void output_formats(bool figures, char text[OUTPUT_FORMATS]) {
+void output_formats(output_content content, char text[OUTPUT_FORMATS]) {
     size_t length = 0, left = 0;
-    for (size_t k = 0; k < N_FORMATS; k++) left += !figures || formats[k].takes_figures;
+    for (size_t k = 0; k < N_FORMATS; k++) left += formats[k].takes[content];
     for (size_t k = 0; k < N_FORMATS && length < OUTPUT_FORMATS; k++) {
-        if (figures && !formats[k].takes_figures) continue;
+        if (!formats[k].takes[content]) continue;
         left--;
         length += (size_t)snprintf(text + length, OUTPUT_FORMATS - length, ".%s%s", formats[k].extension,
                                    left > 1    ? ", "
@@ -152,14 +154,15 @@ static size_t find_format(const char *path) {
     return k;
 }
 
-lam_status output_check(const char *path, bool reduced, lam_error *error) {
+lam_status output_check(const char *path, output_content content, lam_error *error) {
+    static const char *const options[OUTPUT_CONTENTS] = {"values of elements", "--reduce", "--smooth"};
     lam_status status = LAM_OK;
     const size_t format = find_format(path);
     char text[OUTPUT_FORMATS];
-    output_formats(reduced && format < N_FORMATS, text);
+    output_formats(format < N_FORMATS ? content : OUTPUT_ELEMENTS, text);
     if (format == N_FORMATS) FAIL(error, LAM_ERR_ARGUMENT, "-o %s: must end in %s", path, text);
-    if (reduced && !formats[format].takes_figures)
-        FAIL(error, LAM_ERR_ARGUMENT, "-o %s: --reduce goes into %s only", path, text);
+    if (!formats[format].takes[content])
+        FAIL(error, LAM_ERR_ARGUMENT, "-o %s: %s goes into %s only", path, options[content], text);
 done:
     return status;
 }

@@ -34,6 +34,7 @@ typedef struct solution {
     bool batch;
     const char *const *names; /* [n_vectors], of figures of a year in place of vectors; NULL: numbers */
     const float *values;      /* [n_vectors][C][n]; NULL where they are refined: */
+    const float *corners;     /* [n_vectors][C][n][4] beside values, the 4th of a triangle NaN; or NULL */
     const double *refined;    /* [n_vectors][C][n], and, of each vector, [n_vectors]: */
     const double *certificates;
     const size_t *iterations;
@@ -45,13 +46,20 @@ typedef struct solution {
 /* Computes the figures of every reduction. LAM_ERR_MEMORY. */
 lam_status reductions_fill(solution *s, lam_error *error);
 
-/* Puts ".npy, .json or .csv", all formats, or those that figures of groups can be written in, into text. */
-#define OUTPUT_FORMATS 128
-void output_formats(bool figures, char text[OUTPUT_FORMATS]);
+/* A file holds values of elements, figures of groups in place of them, or values of corners. */
+typedef enum output_content {
+    OUTPUT_ELEMENTS,
+    OUTPUT_GROUPS,
+    OUTPUT_CORNERS,
+    OUTPUT_CONTENTS
+} output_content;
 
-/* Checks that a file of this name can be written: LAM_ERR_ARGUMENT names the extensions that can, or
- * those for reductions. */
-lam_status output_check(const char *path, bool reduced, lam_error *error);
+/* Puts ".npy, .json or .csv", the formats of a content, into text. */
+#define OUTPUT_FORMATS 128
+void output_formats(output_content content, char text[OUTPUT_FORMATS]);
+
+/* Checks that a file of this name can be written: LAM_ERR_ARGUMENT names the extensions that can. */
+lam_status output_check(const char *path, output_content content, lam_error *error);
 
 /* Writes path in the format of its extension, whole or not at all. */
 lam_status output_write(const solution *s, const char *path, lam_error *error);

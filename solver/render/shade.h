@@ -9,11 +9,10 @@ typedef struct shade shade;
 #define SHADE_MAX_CHANNELS 3
 
 /* values[c * n + i] is the value of element i in channel c; only the first SHADE_MAX_CHANNELS are kept.
- * smooth averages at the vertices of a surface, elements of one group that meet at less than 20 degrees. A
- * vertex inside another element's edge takes that edge's value, so that no crack shows. The mesh must outlive
- * it. Errors: LAM_ERR_MEMORY. */
-lam_status shade_create(const mesh *m, size_t n_channels, const float *values, bool smooth, shade **out,
-                        lam_error *error);
+ * smooth: inside elements as smooth_corners says, with E its part that does not vary there, or NULL. The mesh
+ * must outlive it. Errors: LAM_ERR_MEMORY. */
+lam_status shade_create(const mesh *m, size_t n_channels, const float *values, const float *E, bool smooth,
+                        shade **out, lam_error *error);
 void shade_destroy(shade *s);
 
 size_t shade_channels(const shade *s);

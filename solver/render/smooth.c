@@ -1,405 +1,245 @@
 #include "solver/render/smooth.h"
 
-#include "solver/scene/union_find.h"
-
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* The cosine of 20 degrees. */
-#define SURFACE_COS 0.93969262
+/* Where so many elements meet, each is compared with this many that follow it. */
+enum { MOST_AROUND = 64 };
+/* Share of the trace that is added to the diagonal of the normal equations, so that neighbours in one line
+ * give a gradient along it. */
+static const double ridge = 1e-9;
+/* The most that a gradient may change R_i within the element, in steps to its neighbours. */
+static const double steps_most = 2;
 
-/* Each corner at a point is compared with at most this many previous ones. */
-#define MANY_CORNERS 256
+/* The normal equations of the gradients, in axes u, v of each element's plane. */
+typedef struct gradients {
+    double (*centre)[3], (*u)[3], (*v)[3]; /* [n] */
+    double (*normal)[3];                   /* [n]: sums of du du, du dv, dv dv, each over d^2 */
+    double (*slope)[2];                    /* [n][C]: sums of du dR, dv dR over d^2; then the gradient */
+    double *step;                          /* [n][C]: the largest |dR| */
+} gradients;
 
-#define NONE 0xFFFFFFFFu
+typedef struct smoothing {
+    const smooth_nodes *nodes;
+    const mesh *m;
+    size_t n_channels;
+    float *rest;             /* [C][n]: the values without E */
+    uint32_t *from, *around; /* elements at a node: around[from[j]] ... around[from[j + 1] - 1] */
+    gradients g;
+    double *at_node; /* [n_nodes][C] */
+} smoothing;
 
-/* Points hashed by cubic cells; each cell is a chain. */
-typedef struct point_grid {
-    double cell;
-    size_t n_heads; /* a power of 2 */
-    uint32_t *heads, *next;
-    const double (*points)[3];
-} point_grid;
-
-static int64_t grid_cell(const point_grid *g, double x) {
-    return (int64_t)floor(fmin(fmax(x / g->cell, -4e18), 4e18));
+static void smoothing_free(smoothing *s) {
+    free(s->rest);
+    free(s->from);
+    free(s->around);
+    free(s->g.centre);
+    free(s->g.u);
+    free(s->g.v);
+    free(s->g.normal);
+    free(s->g.slope);
+    free(s->g.step);
+    free(s->at_node);
 }
 
-static size_t grid_hash(const point_grid *g, const int64_t cell[3]) {
-    uint64_t h = 0;
-    for (int d = 0; d < 3; d++) {
-        h = (h ^ (uint64_t)cell[d]) * 0x9E3779B97F4A7C15u;
-        h ^= h >> 29;
-    }
-    return (size_t)h & (g->n_heads - 1);
-}
-
-static lam_status grid_create(const double (*points)[3], size_t n, double cell, point_grid *g,
-                              lam_error *error) {
-    *g = (point_grid){.cell = cell, .n_heads = 16, .points = points};
-    while (g->n_heads < n) g->n_heads *= 2;
-    g->heads = memory_allocate(g->n_heads, sizeof *g->heads, "smoothing", error);
-    g->next = memory_allocate(n, sizeof *g->next, "smoothing", error);
-    if (g->heads == NULL || g->next == NULL) return LAM_ERR_MEMORY;
-    for (size_t i = 0; i < g->n_heads; i++) g->heads[i] = NONE;
+static lam_status allocate(smoothing *s, size_t n, lam_error *error) {
+    const size_t n_nodes = s->nodes->n_nodes, C = s->n_channels;
+    const char *const what = "smoothing";
+    s->rest = memory_allocate(n, C * sizeof *s->rest, what, error);
+    s->from = memory_allocate(n_nodes + 2, sizeof *s->from, what, error);
+    s->around = memory_allocate(4 * n + n_nodes, sizeof *s->around, what, error);
+    s->g.centre = memory_allocate(n, sizeof *s->g.centre, what, error);
+    s->g.u = memory_allocate(n, sizeof *s->g.u, what, error);
+    s->g.v = memory_allocate(n, sizeof *s->g.v, what, error);
+    s->g.normal = memory_allocate(n, sizeof *s->g.normal, what, error);
+    s->g.slope = memory_allocate(n, C * sizeof *s->g.slope, what, error);
+    s->g.step = memory_allocate(n, C * sizeof *s->g.step, what, error);
+    s->at_node = memory_allocate(n_nodes, C * sizeof *s->at_node, what, error);
+    if (s->rest == NULL || s->from == NULL || s->around == NULL || s->g.centre == NULL || s->g.u == NULL ||
+        s->g.v == NULL || s->g.normal == NULL || s->g.slope == NULL || s->g.step == NULL ||
+        s->at_node == NULL)
+        return LAM_ERR_MEMORY;
     return LAM_OK;
 }
 
-static void grid_free(point_grid *g) {
-    free(g->heads);
-    free(g->next);
-}
-
-static void grid_add(point_grid *g, uint32_t i) {
-    const int64_t cell[3] = {grid_cell(g, g->points[i][0]), grid_cell(g, g->points[i][1]),
-                             grid_cell(g, g->points[i][2])};
-    const size_t head = grid_hash(g, cell);
-    g->next[i] = g->heads[head];
-    g->heads[head] = i;
-}
-
-/* Visits the points in the 27 cells around a point, and others with the same hash. */
-static void grid_near(const point_grid *g, const double point[3], void (*visit)(void *context, uint32_t i),
-                      void *context) {
-    int64_t centre[3];
-    for (int d = 0; d < 3; d++) centre[d] = grid_cell(g, point[d]);
-    for (int k = 0; k < 27; k++) {
-        const int64_t cell[3] = {centre[0] + k % 3 - 1, centre[1] + k / 3 % 3 - 1, centre[2] + k / 9 - 1};
-        for (uint32_t i = g->heads[grid_hash(g, cell)]; i != NONE; i = g->next[i]) visit(context, i);
-    }
-}
-
-/* An edge of an element between two nodes. */
-typedef struct edge {
-    uint64_t key; /* its nodes, the smaller first */
-    uint32_t element;
-    uint32_t corner; /* its first; the second is the next corner */
-} edge;
-
-/* A node inside an edge: its value is (1 - t) a + t b. */
-typedef struct constraint {
-    uint32_t a, b;
-    double t;
-    double length; /* of that edge; 0: none */
-} constraint;
-
-typedef struct smoother {
-    const mesh *m;
-    double tolerance; /* metres */
-    uint32_t *welded; /* [v]: the first vertex at this place */
-    smooth_nodes *nodes;
-    uint32_t *node_vertex;   /* [n_nodes] */
-    uint32_t *node_element;  /* [n_nodes]: one of the elements it belongs to */
-    constraint *constraints; /* [n_nodes] */
-} smoother;
-
-static bool same_surface(const mesh *m, uint32_t i, uint32_t j) {
-    const float *a = m->normal[i], *b = m->normal[j];
-    return m->group[i] == m->group[j] && (double)(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) > SURFACE_COS;
-}
-
-static double distance(const double a[3], const double b[3]) {
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
-                (a[2] - b[2]) * (a[2] - b[2]));
-}
-
-typedef struct weld_query {
-    const smoother *s;
-    const double *point;
-    uint32_t found;
-} weld_query;
-
-static void weld_visit(void *context, uint32_t i) {
-    weld_query *q = context;
-    if (i < q->found && distance(q->s->m->vertices[i], q->point) <= q->s->tolerance) q->found = i;
-}
-
-static lam_status weld(smoother *s, lam_error *error) {
-    lam_status status = LAM_OK;
+/* Lists the elements at each node: those with a corner there, and the one in whose edge it lies. */
+static void list_around(smoothing *s) {
+    const smooth_nodes *nodes = s->nodes;
     const mesh *m = s->m;
-    point_grid grid = {0};
-    TRY(grid_create((const double(*)[3])m->vertices, m->n_vertices, 4 * s->tolerance, &grid, error));
-    s->welded = memory_allocate(m->n_vertices, sizeof *s->welded, "smoothing", error);
-    if (s->welded == NULL) TRY(LAM_ERR_MEMORY);
-    for (uint32_t i = 0; i < m->n_vertices; i++) {
-        weld_query q = {s, m->vertices[i], NONE};
-        grid_near(&grid, m->vertices[i], weld_visit, &q);
-        s->welded[i] = q.found == NONE ? i : q.found;
-        if (q.found == NONE) grid_add(&grid, i);
-    }
-done:
-    grid_free(&grid);
-    return status;
-}
-
-/* One corner of an element and its welded vertex. */
-typedef struct corner {
-    uint32_t vertex, element, number;
-} corner;
-
-static int compare_corners(const void *left, const void *right) {
-    const corner *a = left, *b = right;
-    if (a->vertex != b->vertex) return a->vertex < b->vertex ? -1 : 1;
-    if (a->element != b->element) return a->element < b->element ? -1 : 1;
-    return (a->number > b->number) - (a->number < b->number);
-}
-
-/* Gives the corners at one place their nodes: one node for each surface. */
-static void join_corners(smoother *s, const corner *corners, uint32_t *parent, size_t count) {
-    for (size_t i = 0; i < count; i++) parent[i] = (uint32_t)i;
-    for (size_t i = 0; i < count; i++)
-        for (size_t j = i > MANY_CORNERS ? i - MANY_CORNERS : 0; j < i; j++) {
-            if (!same_surface(s->m, corners[i].element, corners[j].element)) continue;
-            const uint32_t x = union_find_root(parent, (uint32_t)i), y = union_find_root(parent, (uint32_t)j);
-            union_find_join(parent, x > y ? x : y, x > y ? y : x);
-        }
-    for (size_t i = 0; i < count; i++) {
-        const uint32_t root = union_find_root(parent, (uint32_t)i);
-        uint32_t *node = &s->nodes->corner[corners[i].element][corners[i].number];
-        if (root == i) { /* the smallest of its set, so met first */
-            s->node_vertex[s->nodes->n_nodes] = corners[i].vertex;
-            s->node_element[s->nodes->n_nodes] = corners[i].element;
-            *node = (uint32_t)s->nodes->n_nodes++;
-        } else {
-            *node = s->nodes->corner[corners[root].element][corners[root].number];
-        }
-    }
-}
-
-static lam_status make_nodes(smoother *s, lam_error *error) {
-    lam_status status = LAM_OK;
-    const mesh *m = s->m;
-    size_t count = 0;
-    corner *corners = memory_allocate(m->n, 4 * sizeof *corners, "smoothing", error);
-    uint32_t *parent = memory_allocate(m->n, 4 * sizeof *parent, "smoothing", error);
-    s->nodes->corner = memory_allocate(m->n, sizeof *s->nodes->corner, "smoothing", error);
-    s->node_vertex = memory_allocate(m->n, 4 * sizeof *s->node_vertex, "smoothing", error);
-    s->node_element = memory_allocate(m->n, 4 * sizeof *s->node_element, "smoothing", error);
-    if (corners == NULL || parent == NULL || s->nodes->corner == NULL || s->node_vertex == NULL ||
-        s->node_element == NULL)
-        TRY(LAM_ERR_MEMORY);
+    uint32_t *const from = s->from + 1; /* counts first; then places, which end as the next node's first */
+    for (size_t i = 0; i < m->n; i++)
+        for (size_t k = 0; k < mesh_corners(m, i); k++) from[nodes->corner[i][k] + 1]++;
+    for (size_t j = 0; j < nodes->n_nodes; j++) from[j + 1] += nodes->ties[j].length > 0;
+    for (size_t j = 0; j < nodes->n_nodes; j++) from[j + 1] += from[j];
     for (uint32_t i = 0; i < m->n; i++)
-        for (uint32_t k = 0; k < mesh_corners(m, i); k++)
-            corners[count++] = (corner){s->welded[m->elements[i][k]], i, k};
-    qsort(corners, count, sizeof *corners, compare_corners);
-    for (size_t first = 0, last; first < count; first = last) {
-        for (last = first + 1; last < count && corners[last].vertex == corners[first].vertex;) last++;
-        join_corners(s, corners + first, parent, last - first);
-    }
-done:
-    free(corners);
-    free(parent);
-    return status;
+        for (size_t k = 0; k < mesh_corners(m, i); k++) s->around[from[nodes->corner[i][k]]++] = i;
+    for (size_t j = 0; j < nodes->n_nodes; j++)
+        if (nodes->ties[j].length > 0) s->around[from[j]++] = nodes->ties[j].element;
 }
 
-/* The angle of an element at a corner. */
+static void set_axes(const mesh *m, gradients *g) {
+    for (size_t i = 0; i < m->n; i++) {
+        const float *normal = m->normal[i];
+        const double *a = m->vertices[m->elements[i][0]], *b = m->vertices[m->elements[i][1]];
+        double *u = g->u[i], *v = g->v[i], length = 0;
+        mesh_centroid(m, i, g->centre[i]);
+        for (int d = 0; d < 3; d++) length += (b[d] - a[d]) * (b[d] - a[d]);
+        for (int d = 0; d < 3; d++) u[d] = length > 0 ? (b[d] - a[d]) / sqrt(length) : 0;
+        for (int d = 0; d < 3; d++) {
+            const int e = (d + 1) % 3, f = (d + 2) % 3;
+            v[d] = (double)normal[e] * u[f] - (double)normal[f] * u[e];
+        }
+    }
+}
+
+/* The place of a point in the axes of an element. */
+static void place_in(const gradients *g, size_t i, const double point[3], double out[2]) {
+    out[0] = out[1] = 0;
+    for (int d = 0; d < 3; d++) {
+        const double apart = point[d] - g->centre[i][d];
+        out[0] += apart * g->u[i][d];
+        out[1] += apart * g->v[i][d];
+    }
+}
+
+/* Adds a neighbour to the normal equations of an element. One that shares two nodes counts twice. */
+static void add_neighbour(smoothing *s, size_t i, size_t j) {
+    gradients *g = &s->g;
+    const size_t n = s->m->n;
+    double d[2];
+    place_in(g, i, g->centre[j], d);
+    const double square = d[0] * d[0] + d[1] * d[1];
+    if (i == j || !(square > 0)) return;
+    g->normal[i][0] += d[0] * d[0] / square;
+    g->normal[i][1] += d[0] * d[1] / square;
+    g->normal[i][2] += d[1] * d[1] / square;
+    for (size_t c = 0; c < s->n_channels; c++) {
+        const double step = (double)s->rest[c * n + j] - (double)s->rest[c * n + i];
+        double *slope = g->slope[i * s->n_channels + c], *most = &g->step[i * s->n_channels + c];
+        slope[0] += d[0] * step / square;
+        slope[1] += d[1] * step / square;
+        *most = fmax(*most, fabs(step));
+    }
+}
+
+static void solve_gradients(smoothing *s) {
+    gradients *g = &s->g;
+    const mesh *m = s->m;
+    for (size_t i = 0; i < m->n; i++) {
+        const double *N = g->normal[i], trace = N[0] + N[2];
+        const double a = N[0] + ridge * trace, b = N[1], c = N[2] + ridge * trace, det = a * c - b * b;
+        for (size_t channel = 0; channel < s->n_channels; channel++) {
+            double *slope = g->slope[i * s->n_channels + channel], most = 0;
+            const double right[2] = {slope[0], slope[1]};
+            slope[0] = det > 0 ? (c * right[0] - b * right[1]) / det : 0;
+            slope[1] = det > 0 ? (a * right[1] - b * right[0]) / det : 0;
+            for (size_t k = 0; k < mesh_corners(m, i); k++) {
+                double at[2];
+                place_in(g, i, m->vertices[m->elements[i][k]], at);
+                most = fmax(most, fabs(slope[0] * at[0] + slope[1] * at[1]));
+            }
+            const double allowed = steps_most * g->step[i * s->n_channels + channel];
+            for (int d = 0; d < 2 && most > allowed; d++) slope[d] *= allowed / most;
+        }
+    }
+}
+
+static void find_gradients(smoothing *s) {
+    for (size_t j = 0; j < s->nodes->n_nodes; j++)
+        for (uint32_t p = s->from[j]; p < s->from[j + 1]; p++)
+            for (uint32_t q = p + 1; q < s->from[j + 1] && q <= p + MOST_AROUND; q++) {
+                add_neighbour(s, s->around[p], s->around[q]);
+                add_neighbour(s, s->around[q], s->around[p]);
+            }
+    solve_gradients(s);
+}
+
+/* The angle of an element at a corner: weights by it do not depend on how a surface is cut into triangles. */
 static double corner_angle(const mesh *m, size_t element, size_t k) {
     const size_t count = mesh_corners(m, element);
     const double *here = m->vertices[m->elements[element][k]];
     const double *after = m->vertices[m->elements[element][(k + 1) % count]];
     const double *before = m->vertices[m->elements[element][(k + count - 1) % count]];
-    double product = 0, lengths = distance(here, after) * distance(here, before);
-    for (int d = 0; d < 3; d++) product += (after[d] - here[d]) * (before[d] - here[d]);
+    double product = 0, one = 0, other = 0;
+    for (int d = 0; d < 3; d++) {
+        product += (after[d] - here[d]) * (before[d] - here[d]);
+        one += (after[d] - here[d]) * (after[d] - here[d]);
+        other += (before[d] - here[d]) * (before[d] - here[d]);
+    }
+    const double lengths = sqrt(one * other);
     return lengths > 0 ? acos(fmax(-1, fmin(1, product / lengths))) : 0;
 }
 
-/* A node's value: the mean of its elements, weighted by their angles there, so that the way a surface is cut
- * into triangles does not show. */
-static lam_status average(smoother *s, size_t n_channels, const float *values, lam_error *error) {
-    lam_status status = LAM_OK;
+/* The mean at each node of the lines that end there. */
+static lam_status average(smoothing *s, lam_error *error) {
     const mesh *m = s->m;
-    smooth_nodes *nodes = s->nodes;
-    double *sums = memory_allocate(nodes->n_nodes, (n_channels + 1) * sizeof *sums, "smoothing", error);
-    nodes->values = memory_allocate(nodes->n_nodes, n_channels * sizeof *nodes->values, "smoothing", error);
-    if (sums == NULL || nodes->values == NULL) TRY(LAM_ERR_MEMORY);
+    const size_t C = s->n_channels, n_nodes = s->nodes->n_nodes;
+    double *weights = memory_allocate(n_nodes, sizeof *weights, "smoothing", error);
+    if (weights == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < m->n; i++)
         for (size_t k = 0; k < mesh_corners(m, i); k++) {
-            double *sum = sums + nodes->corner[i][k] * (n_channels + 1);
+            const uint32_t node = s->nodes->corner[i][k];
             const double weight = corner_angle(m, i, k) + 1e-9;
-            for (size_t c = 0; c < n_channels; c++) sum[c] += weight * (double)values[c * m->n + i];
-            sum[n_channels] += weight;
+            double at[2];
+            place_in(&s->g, i, m->vertices[m->elements[i][k]], at);
+            weights[node] += weight;
+            for (size_t c = 0; c < C; c++) {
+                const double *slope = s->g.slope[i * C + c];
+                const double line = (double)s->rest[c * m->n + i] + slope[0] * at[0] + slope[1] * at[1];
+                s->at_node[node * C + c] += weight * line;
+            }
         }
-    for (size_t j = 0; j < nodes->n_nodes; j++)
-        for (size_t c = 0; c < n_channels; c++)
-            nodes->values[j * n_channels + c] =
-                (float)(sums[j * (n_channels + 1) + c] / sums[j * (n_channels + 1) + n_channels]);
-done:
-    free(sums);
-    return status;
-}
-
-static int compare_edges(const void *left, const void *right) {
-    const edge *a = left, *b = right;
-    if (a->key != b->key) return a->key < b->key ? -1 : 1;
-    if (a->element != b->element) return a->element < b->element ? -1 : 1;
-    return (a->corner > b->corner) - (a->corner < b->corner);
-}
-
-static void edge_nodes(const smoother *s, const edge *e, uint32_t *a, uint32_t *b) {
-    *a = s->nodes->corner[e->element][e->corner];
-    *b = s->nodes->corner[e->element][(e->corner + 1) % mesh_corners(s->m, e->element)];
-}
-
-/* The edges of only one element: boundaries, and edges that meet only a part of another one. *edges is freed
- * by the caller. */
-static lam_status lone_edges(const smoother *s, edge **edges, size_t *count, lam_error *error) {
-    const mesh *m = s->m;
-    size_t all = 0, kept = 0;
-    edge *list = memory_allocate(m->n, 4 * sizeof *list, "smoothing", error);
-    if (list == NULL) return LAM_ERR_MEMORY;
-    for (uint32_t i = 0; i < m->n; i++)
-        for (uint32_t k = 0; k < mesh_corners(m, i); k++) {
-            edge e = {0, i, k};
-            uint32_t a, b;
-            edge_nodes(s, &e, &a, &b);
-            e.key = a < b ? (uint64_t)a << 32 | b : (uint64_t)b << 32 | a;
-            list[all++] = e;
-        }
-    qsort(list, all, sizeof *list, compare_edges);
-    for (size_t first = 0, last; first < all; first = last) {
-        for (last = first + 1; last < all && list[last].key == list[first].key;) last++;
-        if (last == first + 1) list[kept++] = list[first];
-    }
-    *edges = list;
-    *count = kept;
+    for (size_t j = 0; j < n_nodes; j++)
+        for (size_t c = 0; c < C; c++) s->at_node[j * C + c] = fmax(0, s->at_node[j * C + c] / weights[j]);
+    free(weights);
     return LAM_OK;
 }
 
-typedef struct hang_query {
-    smoother *s;
-    const edge *e;
-    uint32_t a, b;
-    const double *from, *to;
-    double length;
-} hang_query;
-
-/* Constrains a node inside the edge to the values of its ends; the longest of several such edges wins. */
-static void hang_visit(void *context, uint32_t node) {
-    hang_query *q = context;
-    smoother *s = q->s;
-    const double *point = s->m->vertices[s->node_vertex[node]];
-    double along = 0, off = 0;
-    if (node == q->a || node == q->b || s->constraints[node].length >= q->length) return;
-    for (int d = 0; d < 3; d++) along += (point[d] - q->from[d]) * (q->to[d] - q->from[d]);
-    const double t = along / (q->length * q->length);
-    if (t * q->length <= s->tolerance || (1 - t) * q->length <= s->tolerance) return;
-    for (int d = 0; d < 3; d++) {
-        const double apart = point[d] - (q->from[d] + t * (q->to[d] - q->from[d]));
-        off += apart * apart;
-    }
-    if (off > s->tolerance * s->tolerance || !same_surface(s->m, s->node_element[node], q->e->element))
-        return;
-    s->constraints[node] = (constraint){q->a, q->b, t, q->length};
-}
-
-/* Finds the nodes inside edges by walking along each edge through a grid. */
-static lam_status find_hanging(smoother *s, const edge *edges, size_t count, lam_error *error) {
-    lam_status status = LAM_OK;
-    point_grid grid = {0};
-    double total = 0, longest = 0;
-    const size_t n_nodes = s->nodes->n_nodes;
-    double(*points)[3] = memory_allocate(n_nodes, sizeof *points, "smoothing", error);
-    bool *added = memory_allocate(n_nodes, sizeof *added, "smoothing", error);
-    if (points == NULL || added == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t j = 0; j < n_nodes; j++)
-        memcpy(points[j], s->m->vertices[s->node_vertex[j]], sizeof points[j]);
-    for (size_t i = 0; i < count; i++) {
-        uint32_t a, b;
-        edge_nodes(s, &edges[i], &a, &b);
-        total += distance(points[a], points[b]);
-        longest = fmax(longest, distance(points[a], points[b]));
-    }
-    /* About one node per cell, and no edge through more than some thousand cells. */
-    const double cell = fmax(fmax(total / (double)(count + 1), longest / 4096), 4 * s->tolerance);
-    TRY(grid_create((const double(*)[3])points, n_nodes, cell, &grid, error));
-    for (size_t i = 0; i < count; i++) {
-        uint32_t ends[2];
-        edge_nodes(s, &edges[i], &ends[0], &ends[1]);
-        for (int k = 0; k < 2; k++) {
-            if (!added[ends[k]]) grid_add(&grid, ends[k]);
-            added[ends[k]] = true;
-        }
-    }
-    for (size_t i = 0; i < count; i++) {
-        hang_query q = {.s = s, .e = &edges[i]};
-        edge_nodes(s, &edges[i], &q.a, &q.b);
-        q.from = points[q.a];
-        q.to = points[q.b];
-        q.length = distance(q.from, q.to);
-        const size_t steps = (size_t)(q.length / cell) + 1;
-        if (!(q.length > s->tolerance)) continue;
-        for (size_t step = 0; step <= steps; step++) {
-            double place[3];
-            const double t = (double)step / (double)steps;
-            for (int d = 0; d < 3; d++) place[d] = q.from[d] + t * (q.to[d] - q.from[d]);
-            grid_near(&grid, place, hang_visit, &q);
-        }
-    }
-done:
-    grid_free(&grid);
-    free(points);
-    free(added);
-    return status;
-}
-
-/* Gives hanging nodes the values of their edges. The ends of an edge may hang themselves, even in a cycle;
+/* Gives nodes in edges the values of these. The ends of an edge may be in edges themselves, even in a cycle;
  * the passes then converge, because each value is a mean of others. */
-static void apply_constraints(smoother *s, size_t n_channels) {
-    float *values = s->nodes->values;
+static void tie(smoothing *s) {
+    const size_t C = s->n_channels;
     double change = 1, largest = 0;
     for (int pass = 0; pass < 64 && change > 1e-6 * largest; pass++) {
         change = 0;
         for (size_t j = 0; j < s->nodes->n_nodes; j++) {
-            const constraint *tie = &s->constraints[j];
-            if (!(tie->length > 0)) continue;
-            for (size_t c = 0; c < n_channels; c++) {
-                const double value = (1 - tie->t) * (double)values[tie->a * n_channels + c] +
-                                     tie->t * (double)values[tie->b * n_channels + c];
-                change = fmax(change, fabs(value - (double)values[j * n_channels + c]));
+            const smooth_tie *t = &s->nodes->ties[j];
+            if (!(t->length > 0)) continue;
+            for (size_t c = 0; c < C; c++) {
+                double *here = &s->at_node[j * C + c];
+                const double value = (1 - t->t) * s->at_node[t->a * C + c] + t->t * s->at_node[t->b * C + c];
+                change = fmax(change, fabs(value - *here));
                 largest = fmax(largest, fabs(value));
-                values[j * n_channels + c] = (float)value;
+                *here = value;
             }
         }
     }
 }
 
-lam_status smooth_create(const mesh *m, size_t n_channels, const float *values, smooth_nodes *out,
-                         lam_error *error) {
+lam_status smooth_corners(const smooth_nodes *nodes, const mesh *m, size_t n_channels, const float *values,
+                          const float *E, float *corners, lam_error *error) {
     lam_status status = LAM_OK;
-    smooth_nodes nodes = {0};
-    smoother s = {.m = m, .nodes = &nodes};
-    edge *edges = NULL;
-    size_t n_edges;
-    double centre[3];
-    mesh_bounds(m, centre, &s.tolerance);
-    s.tolerance *= 1e-6;
-    TRY(weld(&s, error));
-    TRY(make_nodes(&s, error));
-    TRY(average(&s, n_channels, values, error));
-    TRY(lone_edges(&s, &edges, &n_edges, error));
-    s.constraints = memory_allocate(nodes.n_nodes, sizeof *s.constraints, "smoothing", error);
-    if (s.constraints == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(find_hanging(&s, edges, n_edges, error));
-    apply_constraints(&s, n_channels);
-    *out = nodes;
-    nodes = (smooth_nodes){0};
+    smoothing s = {.nodes = nodes, .m = m, .n_channels = n_channels};
+    TRY(allocate(&s, m->n, error));
+    for (size_t k = 0; k < n_channels * m->n; k++) s.rest[k] = values[k] - (E != NULL ? E[k] : 0);
+    list_around(&s);
+    set_axes(m, &s.g);
+    find_gradients(&s);
+    TRY(average(&s, error));
+    tie(&s);
+    for (size_t c = 0; c < n_channels; c++)
+        for (size_t i = 0; i < m->n; i++) {
+            float *out = corners + 4 * (c * m->n + i);
+            out[3] = NAN;
+            for (size_t k = 0; k < mesh_corners(m, i); k++)
+                out[k] = (float)(s.at_node[nodes->corner[i][k] * n_channels + c]) +
+                         (E != NULL ? E[c * m->n + i] : 0);
+        }
 done:
-    smooth_free(&nodes);
-    free(edges);
-    free(s.welded);
-    free(s.node_vertex);
-    free(s.node_element);
-    free(s.constraints);
+    smoothing_free(&s);
     return status;
-}
-
-void smooth_free(smooth_nodes *nodes) {
-    if (nodes == NULL) return;
-    free(nodes->corner);
-    free(nodes->values);
-    *nodes = (smooth_nodes){0};
 }
 
 void smooth_weights(const double (*corners)[3], size_t n_corners, const double normal[3],

@@ -109,7 +109,11 @@ static const option_row view_rows[] = {
      .kind = OPTION_FLAG,
      .offset = FIELD(false_color),
      .help = "Draw values as colours, with a legend"},
-    {.name = "smooth", .kind = OPTION_FLAG, .offset = FIELD(smooth), .help = "Interpolate within a surface"},
+    {.name = "smooth",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(smooth),
+     .help = "Draw light that varies inside elements, linear between "
+             "the corners of a surface: nearer to a finer mesh, too"},
     {0},
 };
 
@@ -192,12 +196,14 @@ done:
 }
 
 /* Makes the scene and the camera of a view that has values. */
-static lam_status view_aim(const fields *f, size_t n_channels, bool smooth, view *v, lam_error *error) {
+/* E: of the values, or NULL. */
+static lam_status view_aim(const fields *f, size_t n_channels, bool smooth, const float *E, view *v,
+                           lam_error *error) {
     lam_status status = LAM_OK;
     const double aspect = (double)view_width(f) / (double)f->size.height;
     const camera_option *given = &f->camera;
     TRY(visibility_create(&v->m, &v->seen, error));
-    TRY(shade_create(&v->m, n_channels, v->values, smooth, &v->shown, error));
+    TRY(shade_create(&v->m, n_channels, v->values, E, smooth, &v->shown, error));
     v->scene = (picture_scene){.mesh = &v->m, .visibility = v->seen, .shade = v->shown, .glows = v->glows};
     if (given->given)
         TRY(camera_look(given->eye, given->target, given->fov, aspect, v->m.up, &v->camera, error));
@@ -256,7 +262,7 @@ static lam_status render(const char *path, const fields *f, terminal *t, lam_err
     if (lit.own && memchr(v.glows, true, v.m.n) == NULL && memchr(v.lit, true, v.m.n) == NULL)
         FAIL(error, LAM_ERR_ARGUMENT,
              "%s: the scene has no light of its own; give --emit GROUP=V, --emission or --sky", path);
-    TRY(view_aim(f, v.m.n_channels, f->smooth, &v, error));
+    TRY(view_aim(f, v.m.n_channels, f->smooth, quantity == LAM_RADIOSITY ? lit.light.E : NULL, &v, error));
     const picture_options style = options_of_light(f, &v);
     TRY(draw(f, &v, &style, t, error));
     if (f->false_color)
@@ -328,7 +334,7 @@ static lam_status render_unlit(const char *path, const fields *f, terminal *t, l
     else
         TRY(patch_values(f, v.s, v.m.n, t, &v.values, &style, error));
     memset(v.lit, true, v.m.n);
-    TRY(view_aim(f, strcmp(f->quantity, "patch") == 0 ? 3 : 1, false, &v, error));
+    TRY(view_aim(f, strcmp(f->quantity, "patch") == 0 ? 3 : 1, false, NULL, &v, error));
     TRY(draw(f, &v, &style, t, error));
 done:
     view_close(&v);

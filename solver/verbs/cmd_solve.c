@@ -6,6 +6,7 @@
 #include "solver/light/emission_refine.h"
 #include "solver/light/weather_light.h"
 #include "solver/output/output.h"
+#include "solver/render/smooth.h"
 #include "solver/verbs/light_options.h"
 #include "solver/verbs/verbs.h"
 
@@ -19,7 +20,7 @@ typedef struct fields {
     const char *weather, *sun, *quantity, *output, *occupied;
     double hours, tolerance;
     uint64_t sun_points;
-    bool photometric, json;
+    bool photometric, json, smooth;
 } fields;
 
 #define FIELD(member) offsetof(fields, member)
@@ -65,6 +66,11 @@ static const option_row answer_rows[] = {
      .offset = FIELD(reduce),
      .argument = "GROUP=FIGURE",
      .help = "mean, sum, min, max, uniformity or variance of a group; may be repeated"},
+    {.name = "smooth",
+     .kind = OPTION_FLAG,
+     .offset = FIELD(smooth),
+     .help = "Write the light at the corners of elements, which neighbours give it, beside the mean (.ply, "
+             ".vtu) or in its place (.npy: one more dimension, 4, NaN where a triangle has no corner)"},
     {.name = "json",
      .kind = OPTION_FLAG,
      .offset = FIELD(json),
@@ -199,6 +205,29 @@ static void take_refined(const refined_light *refined, solution *out, double tol
                  iterations == 1 ? "" : "s", out->n_vectors > 1 ? " at most" : "");
 }
 
+/* The answers at the corners of elements, *corners freed with free(). Emission varies from element to element
+ * where it is given so, and not inside of one. */
+static lam_status find_corners(const solution *s, const emission *light, float **corners, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t C = s->m->n_channels, all = C * s->m->n;
+    const bool emits = s->quantity == LAM_RADIOSITY && s->names == NULL && light->E != NULL;
+    smooth_nodes nodes = {0};
+    float *made = memory_allocate(s->n_vectors, 4 * all * sizeof *made, "values at corners", error);
+    if (made == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(smooth_nodes_create(s->m, &nodes, error));
+    for (size_t v = 0; v < s->n_vectors; v++) {
+        const float *E = emits ? light->E + (light->steady ? 0 : v * all) : NULL;
+        TRY(terminal_check(error));
+        TRY(smooth_corners(&nodes, s->m, C, s->values + v * all, E, made + 4 * v * all, error));
+    }
+    *corners = made;
+    made = NULL;
+done:
+    smooth_nodes_free(&nodes);
+    free(made);
+    return status;
+}
+
 static lam_status solve(const char *path, const fields *f, const annual_options *year, reduction *reductions,
                         size_t n_reductions, terminal *t, lam_error *error) {
     lam_status status = LAM_OK;
@@ -207,7 +236,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     lit_store lit = {0};
     lam_quantity quantity = LAM_RADIOSITY;
     double *row_sums = NULL;
-    float *values = NULL;
+    float *values = NULL, *corners = NULL;
     refined_light refined = {0};
     char *scene = NULL;
     uint32_t *selected = NULL;
@@ -262,6 +291,8 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
                            &values, error));
     }
     out.values = values;
+    if (f->smooth) TRY(find_corners(&out, &lit.light, &corners, error));
+    out.corners = corners;
     TRY(reductions_fill(&out, error));
     out.relative = out.indirect = -1;
     if (f->tolerance == 0) stated_error(s, &out.relative, &out.indirect);
@@ -275,6 +306,7 @@ done:
     free(scene);
     free(selected);
     free(values);
+    free(corners);
     refined_light_free(&refined);
     free(row_sums);
     sunlight_free(&sun);
@@ -305,7 +337,7 @@ int cmd_solve(int argc, char **argv) {
     terminal term;
     annual_options year = {.hours = 1, .from = 0, .to = 24};
     char formats[OUTPUT_FORMATS], output_help[2 * OUTPUT_FORMATS];
-    output_formats(false, formats);
+    output_formats(OUTPUT_ELEMENTS, formats);
     snprintf(output_help, sizeof output_help, "%s; without it the mean of every group is printed", formats);
     const option_row output_rows[] = {OPTION_ROW_OUTPUT(FIELD(output), "FILE", .help = output_help), {0}};
     const option_table tables[] = {
@@ -330,7 +362,12 @@ int cmd_solve(int argc, char **argv) {
     if (f.tolerance > 0 && f.annual.count > 0)
         return options_usage(verb.name, "--tolerance is not for --annual");
     if (f.json && f.output != NULL) return options_usage(verb.name, "give --json or -o, not both");
-    if (f.output != NULL && output_check(f.output, f.reduce.count > 0, &error) != LAM_OK)
+    if (f.smooth && (f.output == NULL || f.reduce.count > 0 || f.tolerance > 0))
+        return options_usage(verb.name, "--smooth is for -o, without --reduce and --tolerance");
+    const output_content content = f.smooth             ? OUTPUT_CORNERS
+                                   : f.reduce.count > 0 ? OUTPUT_GROUPS
+                                                        : OUTPUT_ELEMENTS;
+    if (f.output != NULL && output_check(f.output, content, &error) != LAM_OK)
         return options_usage(verb.name, "%s", error.message);
     if (read_year(&f, &year, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
     /* Studies of daylight ask for the light that a place receives. */

@@ -141,7 +141,7 @@ class Hierarchical(unittest.TestCase):
         assert done.returncode == 0, done.stderr
         cls.printed = json.loads(done.stdout)
         cls.tables = {}
-        for name in "hierarchical", "equal-error", "growth":
+        for name in "hierarchical", "equal-error", "smooth", "growth":
             with open(os.path.join(cls.out, f"hierarchical-{name}.csv"), encoding="utf-8", newline="") as stream:
                 cls.tables[name] = list(csv.DictReader(stream))
 
@@ -184,6 +184,16 @@ class Hierarchical(unittest.TestCase):
                       if other["scene"] == row["scene"] and other["kind"] == row["least_kind"]
                       and float(other[row["light"]]) <= float(row["error"])]
             self.assertLessEqual(float(row["least_mb"]), min(others))
+
+    def test_smooth(self):
+        small, large = self.tables["smooth"]
+        for row in small, large:
+            self.assertEqual(int(row["finer"]), 16 * int(row["elements"]))
+            self.assertLess(float(row["means"]), float(row["constant"]))
+            self.assertAlmostEqual(float(row["ratio"]), float(row["constant"]) / float(row["smooth"]), 4)
+        # Some ten elements to a wall do not resolve the shadows; from there on their light is nearly linear.
+        self.assertLess(float(large["smooth"]), float(large["constant"]))
+        self.assertLess(float(large["smooth"]), float(small["smooth"]))
 
     def test_growth(self):
         for recipe in "blocks", "near-pairs":

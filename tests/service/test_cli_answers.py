@@ -10,7 +10,7 @@ import h5py
 import numpy
 
 from case import Case
-from command import must
+from command import lambert, must
 
 
 class Answers(Case):
@@ -60,6 +60,61 @@ class Answers(Case):
             [("corners", "u1"), ("vertices", "<u4", 4), ("group", "<u4"), ("value", "<f4")]))
         self.assertEqual((len(faces), set(faces["corners"])), (96, {4}))
         numpy.testing.assert_array_equal(faces["value"], B)
+
+    def test_corners(self):
+        # The light of a floor falls off towards its rim, so that corners at the rim have less than the mean there.
+        light = ("--emit", "ceiling=3")
+        B = numpy.load(self.solve("a.npy", *light))
+        smooth = numpy.load(self.solve("s.npy", "--smooth", *light))
+        self.assertEqual((smooth.shape, smooth.dtype.str), ((96, 4), "<f4"))
+        with h5py.File(self.store) as file:
+            names = [name.decode() for name in file["mesh/group_names"][:]]
+            floor = file["mesh/group"][:] == names.index("floor")
+            ceiling = file["mesh/group"][:] == names.index("ceiling")
+            vertices, elements = file["mesh/vertices"][:], file["mesh/elements"][:]
+        places = vertices[elements]
+        middle = numpy.all(numpy.abs(places - .5)[..., :2] < 1e-9, axis=-1)
+        rim = numpy.all(numpy.minimum(places, 1 - places)[..., :2] < 1e-9, axis=-1)
+        self.assertEqual((middle[floor].sum(), rim[floor].sum()), (4, 4))
+        self.assertLess(smooth[floor][rim[floor]].max(), B[floor].min())
+        self.assertEqual(len(set(smooth[floor][middle[floor]])), 1)
+        self.assertGreater(smooth[floor][middle[floor]][0], B[floor].mean())
+        # Emission does not vary inside an element: the ceiling has 3 and what the walls give it.
+        indirect = numpy.load(self.solve("i.npy", "--smooth", "--quantity", "indirect", *light))
+        numpy.testing.assert_allclose(smooth[ceiling] - 3, indirect[ceiling], rtol=1e-5)
+        # Other formats have the same, at one point for each corner, beside the means.
+        tree = xml.etree.ElementTree.parse(self.solve("s.vtu", "--smooth", *light))
+        points = {array.get("Name"): array.text.split() for array in tree.find(".//PointData")}
+        cells = {array.get("Name"): array.text.split() for array in tree.find(".//CellData")}
+        numpy.testing.assert_array_equal(numpy.array(points["radiosity"], "f4"), smooth.ravel())
+        numpy.testing.assert_array_equal(numpy.array(cells["radiosity"], "f4"), B)
+        at = numpy.array(tree.find(".//Points/DataArray").text.split(), float).reshape(-1, 3)
+        connectivity = [int(word) for word in tree.find(".//Cells/DataArray").text.split()]
+        numpy.testing.assert_array_equal(at[connectivity], places.reshape(-1, 3))
+        with open(self.solve("s.ply", "--smooth", *light), "rb") as file:
+            header, body = file.read().split(b"end_header\n", 1)
+        self.assertIn(b"element vertex 384", header)
+        vertex = numpy.frombuffer(body, numpy.dtype([("at", "<f8", 3), ("value", "<f4")]), 384)
+        faces = numpy.frombuffer(body[28 * 384:], numpy.dtype(
+            [("corners", "u1"), ("vertices", "<u4", 4), ("group", "<u4"), ("value", "<f4")]))
+        numpy.testing.assert_array_equal(vertex["value"][faces["vertices"]], smooth)
+        numpy.testing.assert_array_equal(vertex["at"][faces["vertices"]], places)
+        numpy.testing.assert_array_equal(faces["value"], B)
+        # A batch has a vector more in front, each as if alone.
+        E = numpy.zeros((2, 96))
+        E[0, 7], E[1] = 5, 1
+        numpy.save(self.path("e.npy"), E)
+        both = numpy.load(self.solve("b.npy", "--smooth", "--emission", self.path("e.npy")))
+        self.assertEqual(both.shape, (2, 96, 4))
+        numpy.save(self.path("e1.npy"), E[1])
+        numpy.testing.assert_array_equal(
+            both[1], numpy.load(self.solve("b1.npy", "--smooth", "--emission", self.path("e1.npy"))))
+        for arguments, words in ((("-o", "x.csv"), ".npy, .ply or .vtu only"), (("-o", "x.npy", "--reduce", "floor=mean"),
+                                 "without --reduce"), ((), "is for -o"), (("-o", "x.npy", "--tolerance", "1e-3"),
+                                                                          "--tolerance")):
+            done = lambert("solve", self.store, "--smooth", *light, *arguments)
+            self.assertEqual(done.returncode, 2, arguments)
+            self.assertIn(words, done.stderr)
 
     def test_emission_files_agree_with_groups(self):
         wanted = numpy.load(self.solve("a.npy", "--emit", "floor=3"))
