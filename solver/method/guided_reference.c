@@ -2,54 +2,320 @@
 
 #include "solver/operator/emitters.h"
 
+#include "store/status.h"
+
+#include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
-/* Residual at which a reference counts as converged: four digits below the smallest error worth printing. */
-static const double reference_tolerance = 1e-8;
-/* The same where F is no rows, and each step costs as much as all of the operator's answers. */
-static const double guided_tolerance = 1e-6;
+/* A correction is the error that is judged: of this share of it nothing is printed. */
+static const double correction_tolerance = 1e-4;
+/* A guide whose steps shrink less than this is of no use. */
+static const double rate_most = .5;
+/* Columns, of a probe and a channel, that are solved together: a whole number of probes, and of panels of
+ * blocks. */
+enum { COLUMNS = 16, PROBES_LEAST = 8 };
+/* The same of one channel without a guide. */
+enum { ALONE = 32 };
 
-/* The operator that is judged, on one channel, as the guide of an iteration. */
+/* The vectors of some probes, [m][C][n], those of the product [n][m C]. */
+typedef struct guided {
+    double *d, *x, *y;
+    double *last;  /* [m] length of the step before */
+    size_t *which; /* [m] probes that are not done */
+    size_t count;
+    bool *unguided; /* [m] */
+} guided;
+
+static void guided_free(guided *g) {
+    free(g->d);
+    free(g->x);
+    free(g->y);
+    free(g->last);
+    free(g->which);
+    free(g->unguided);
+}
+
+static lam_status guided_init(guided *g, const reference_system *s, size_t m, lam_error *error) {
+    const size_t values = m * s->n_channels * s->n;
+    *g = (guided){.d = memory_allocate(values, sizeof *g->d, "reference", error),
+                  .x = memory_allocate(values, sizeof *g->x, "reference", error),
+                  .y = memory_allocate(values, sizeof *g->y, "reference", error),
+                  .last = memory_allocate(m, sizeof *g->last, "reference", error),
+                  .which = memory_allocate(m, sizeof *g->which, "reference", error),
+                  .unguided = memory_allocate(m, sizeof *g->unguided, "reference", error)};
+    if (g->d == NULL || g->x == NULL || g->y == NULL || g->last == NULL || g->which == NULL ||
+        g->unguided == NULL)
+        return LAM_ERR_MEMORY;
+    return LAM_OK;
+}
+
+/* The length of one probe by area, channels stacked. */
+static double length(const reference_system *s, const double *x) {
+    double sum = 0;
+    for (size_t c = 0; c < s->n_channels; c++)
+        for (size_t i = 0; i < s->n; i++) sum += s->area[i] * x[c * s->n + i] * x[c * s->n + i];
+    return sqrt(sum);
+}
+
+/* r_v := r_v - d_v + R F d_v of the probes that are not done; d is [count][C][n]. */
+static lam_status reduce_residual(const reference_system *s, guided *g, double *r, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = s->n, C = s->n_channels, columns = g->count * C;
+#pragma omp parallel for schedule(static) if (n >= 2048)
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < columns; k++) g->x[i * columns + k] = g->d[k * n + i];
+    TRY(s->F->multiply(s->F->context, columns, g->x, g->y, error));
+#pragma omp parallel for schedule(static) if (n >= 2048)
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < columns; k++) {
+            const size_t c = k % C, at = (g->which[k / C] * C + c) * n + i;
+            r[at] += (double)s->reflectance[c * n + i] * g->y[i * columns + k] - g->d[k * n + i];
+        }
+done:
+    return status;
+}
+
+/* Takes the steps d [count][C][n], and keeps the probes that are not done, with their steps, for another one.
+ * A step that is not taken is useless: its probe is to be solved without the guide. */
+static void take_steps(const reference_system *s, guided *g, double tolerance, bool first, double *X) {
+    const size_t vector = s->n_channels * s->n;
+    size_t left = 0;
+    for (size_t k = 0; k < g->count; k++) {
+        const size_t v = g->which[k];
+        const double *d = g->d + k * vector, now = length(s, d);
+        const double rate = first ? 1 : now > 0 ? now / g->last[v] : 0;
+        if (!first && !(rate <= rate_most)) {
+            g->unguided[v] = true;
+            continue;
+        }
+        for (size_t i = 0; i < vector; i++) X[v * vector + i] += d[i];
+        g->last[v] = now;
+        /* The steps that are left sum to now (rate + rate^2 + ...). */
+        if (now == 0 || (!first && now * rate <= tolerance * (1 - rate) * length(s, X + v * vector)))
+            continue;
+        if (left < k) memcpy(g->d + left * vector, d, vector * sizeof *d);
+        g->which[left++] = v;
+    }
+    g->count = left;
+}
+
+/* Adds the solution to what is left of the probes that the guide did not help. */
+static lam_status solve_unguided(const reference_system *s, const bool *unguided, size_t m, const double *r,
+                                 double *X, double tolerance, const progress *p, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = s->n, C = s->n_channels;
+    reference *one = NULL;
+    double *E = NULL, *B = NULL;
+    size_t count = 0;
+    for (size_t v = 0; v < m; v++) count += unguided[v];
+    if (count == 0) return LAM_OK;
+    E = memory_allocate(count, n * sizeof *E, "reference", error);
+    B = memory_allocate(count, n * sizeof *B, "reference", error);
+    if (E == NULL || B == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t c = 0; c < C; c++) {
+        size_t k = 0;
+        for (size_t v = 0; v < m; v++)
+            if (unguided[v]) memcpy(E + k++ * n, r + (v * C + c) * n, n * sizeof *E);
+        memcpy(B, E, count * n * sizeof *B);
+        TRY(reference_create_of(s->F, s->area, s->reflectance + c * n, REFERENCE_ITERATED, &one, error));
+        TRY(reference_solve(one, count, E, B, tolerance, p, error));
+        reference_destroy(one);
+        one = NULL;
+        k = 0;
+        for (size_t v = 0; v < m; v++) {
+            if (!unguided[v]) continue;
+            for (size_t i = 0; i < n; i++) X[(v * C + c) * n + i] += B[k * n + i];
+            k++;
+        }
+    }
+done:
+    reference_destroy(one);
+    free(E);
+    free(B);
+    return status;
+}
+
+lam_status guided_reference_correct(const reference_system *s, size_t m, double *r, double *X,
+                                    double tolerance, const reference_guide *guide, const progress *p,
+                                    lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t vector = s->n_channels * s->n;
+    guided g = {.count = 0};
+    TRY(guided_init(&g, s, m, error));
+    memset(X, 0, m * vector * sizeof *X);
+    for (size_t v = 0; v < m; v++) g.which[g.count++] = v;
+    for (bool first = true; g.count > 0; first = false) {
+        if (progress_cancelled(p)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+        if (!first) TRY(reduce_residual(s, &g, r, error));
+        const double *in = r;
+        if (g.count < m) { /* x is free here */
+            for (size_t k = 0; k < g.count; k++)
+                memcpy(g.x + k * vector, r + g.which[k] * vector, vector * sizeof *r);
+            in = g.x;
+        }
+        TRY(guide->answer(guide->context, g.count, in, g.d, error));
+        take_steps(s, &g, tolerance, first, X);
+    }
+    TRY(solve_unguided(s, g.unguided, m, r, X, tolerance, p, error));
+done:
+    guided_free(&g);
+    return status;
+}
+
+/* The operator that is judged, as a guide. */
 typedef struct operator_guide {
     const lam_operator *op;
-    size_t channel;
+    float *in, *out;
+    void *work;
+    size_t bytes;
 } operator_guide;
 
-static lam_status answer_one(const operator_guide *g, const double *E, float *in, float *out, void *work,
-                             size_t bytes, double *B, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = lam_operator_elements(g->op), at = g->channel * n;
-    for (size_t i = 0; i < n; i++) in[at + i] = (float)E[i];
-    TRY(lam_operator_apply(g->op, 1, LAM_RADIOSITY, in, out, work, bytes, error));
-    for (size_t i = 0; i < n; i++) B[i] = (double)out[at + i];
-done:
-    return status;
+static void operator_guide_free(operator_guide *g) {
+    free(g->in);
+    free(g->out);
+    free(g->work);
 }
 
-static lam_status answer_by_operator(void *context, size_t m, const double *E, double *B, lam_error *error) {
+/* For up to most answers. */
+static lam_status operator_guide_init(operator_guide *g, const lam_operator *op, size_t most,
+                                      lam_error *error) {
+    const size_t vector = lam_operator_elements(op) * lam_operator_channels(op);
+    *g = (operator_guide){.op = op, .bytes = lam_operator_work_bytes(op, most)};
+    g->in = memory_allocate(most, vector * sizeof *g->in, "reference", error);
+    g->out = memory_allocate(most, vector * sizeof *g->out, "reference", error);
+    g->work = memory_allocate(1, g->bytes, "reference", error);
+    return g->in == NULL || g->out == NULL || g->work == NULL ? LAM_ERR_MEMORY : LAM_OK;
+}
+
+static lam_status answer_by_operator(void *context, size_t m, const double *r, double *X, lam_error *error) {
     lam_status status = LAM_OK;
     const operator_guide *g = context;
-    const size_t n = lam_operator_elements(g->op), vector = n * lam_operator_channels(g->op);
-    const size_t bytes = lam_operator_work_bytes(g->op, 1);
-    float *in = memory_allocate(vector, sizeof *in, "reference", error);
-    float *out = memory_allocate(vector, sizeof *out, "reference", error);
-    void *work = memory_allocate(1, bytes, "reference", error);
-    if (in == NULL || out == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t v = 0; v < m; v++) TRY(answer_one(g, E + v * n, in, out, work, bytes, B + v * n, error));
+    const size_t count = m * lam_operator_elements(g->op) * lam_operator_channels(g->op);
+#pragma omp parallel for schedule(static) if (count >= 65536)
+    for (size_t i = 0; i < count; i++) g->in[i] = (float)r[i];
+    TRY(lam_operator_apply(g->op, m, LAM_RADIOSITY, g->in, g->out, g->work, g->bytes, error));
+#pragma omp parallel for schedule(static) if (count >= 65536)
+    for (size_t i = 0; i < count; i++) X[i] = (double)g->out[i];
 done:
-    free(in);
-    free(out);
-    free(work);
     return status;
 }
 
-lam_status guided_reference_solve(const reference *r, const factor_product *F, const lam_operator *op,
-                                  size_t channel, size_t m, const double *E, double *B, const progress *p,
-                                  lam_error *error) {
-    operator_guide of = {op, channel};
+/* Columns of answers: all channels of `count` answers, or one channel of them. */
+typedef struct columns {
+    const size_t *which;
+    size_t count, channel, n_channels; /* channels `channel` ... */
+} columns;
+
+/* r = E - B~ + R F B~, or, where the first light H is known, E - B~ + R H + R F (B~ - E): what B = B~ + x
+ * lacks, (I - R F) x = r. x and y are [n][columns], r is [columns][n]. */
+static lam_status residual(const reference_system *s, const reference_answers *a, const columns *of,
+                           double *x, double *y, double *r, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = s->n, C = s->n_channels, count = of->count * of->n_channels;
+#pragma omp parallel for schedule(static) if (n >= 2048)
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < count; k++) {
+            const size_t v = of->which[k / of->n_channels];
+            const size_t at = (v * C + of->channel + k % of->n_channels) * n + i;
+            const bool known = a->first != NULL && a->known[v];
+            x[i * count + k] = (double)a->B[at] - (known ? (double)a->E[at] : 0);
+        }
+    TRY(s->F->multiply(s->F->context, count, x, y, error));
+#pragma omp parallel for schedule(static) if (n >= 2048)
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < count; k++) {
+            const size_t v = of->which[k / of->n_channels], c = of->channel + k % of->n_channels;
+            const size_t at = (v * C + c) * n + i;
+            const double H = y[i * count + k] + (a->first != NULL && a->known[v] ? a->first[at] : 0);
+            r[k * n + i] = (double)a->E[at] - (double)a->B[at] + (double)s->reflectance[c * n + i] * H;
+        }
+done:
+    return status;
+}
+
+/* The numbers of a batch. */
+typedef struct batch {
+    double *x, *y, *r, *X;
+} batch;
+
+static void batch_free(batch *b) {
+    free(b->x);
+    free(b->y);
+    free(b->r);
+    free(b->X);
+}
+
+static lam_status batch_init(batch *b, size_t n, size_t count, lam_error *error) {
+    double **const all[] = {&b->x, &b->y, &b->r, &b->X};
+    *b = (batch){.x = NULL};
+    for (size_t k = 0; k < 4; k++) {
+        *all[k] = memory_allocate(count, n * sizeof **all[k], "reference", error);
+        if (*all[k] == NULL) return LAM_ERR_MEMORY;
+    }
+    return LAM_OK;
+}
+
+static lam_status each_guided(const reference_system *s, const reference_answers *a, size_t m,
+                              const size_t *which, visit_correction *visit, void *context, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = s->n, C = s->n_channels;
+    size_t most = COLUMNS / C < PROBES_LEAST ? PROBES_LEAST : COLUMNS / C;
+    most = most < m ? most : m;
+    operator_guide of = {.op = NULL};
     const reference_guide guide = {answer_by_operator, &of};
-    if (reference_is_dense(r) || lam_operator_emitters(op) > 0)
-        return reference_solve(r, m, E, B, reference_tolerance, p, error);
-    return reference_solve_guided(r, m, E, B, F->rows != NULL ? reference_tolerance : guided_tolerance,
-                                  &guide, p, error);
+    batch b = {.x = NULL};
+    TRY(batch_init(&b, n, most * C, error));
+    TRY(operator_guide_init(&of, a->op, most, error));
+    for (size_t first = 0; first < m; first += most) {
+        const columns some = {which + first, m - first < most ? m - first : most, 0, C};
+        TRY(residual(s, a, &some, b.x, b.y, b.r, error));
+        TRY(guided_reference_correct(s, some.count, b.r, b.X, correction_tolerance, &guide, a->progress,
+                                     error));
+        for (size_t k = 0; k < some.count * C; k++) visit(context, which[first + k / C], k % C, b.X + k * n);
+        progress_report(a->progress, "judge",
+                        a->begin + (a->end - a->begin) * (double)(first + some.count) / (double)m);
+    }
+done:
+    operator_guide_free(&of);
+    batch_free(&b);
+    return status;
+}
+
+/* One channel after the other: an LU takes 8 n^2 bytes. */
+static lam_status each_alone(const reference_system *s, const reference_answers *a, reference_way way,
+                             size_t m, const size_t *which, visit_correction *visit, void *context,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = s->n, C = s->n_channels;
+    reference *one = NULL;
+    batch b = {.x = NULL};
+    TRY(batch_init(&b, n, m < ALONE ? m : ALONE, error));
+    for (size_t c = 0; c < C; c++) {
+        TRY(reference_create_of(s->F, s->area, s->reflectance + c * n, way, &one, error));
+        for (size_t first = 0; first < m; first += ALONE) {
+            const columns some = {which + first, m - first < ALONE ? m - first : ALONE, c, 1};
+            if (progress_cancelled(a->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+            TRY(residual(s, a, &some, b.x, b.y, b.r, error));
+            memcpy(b.X, b.r, some.count * n * sizeof *b.X);
+            TRY(reference_solve(one, some.count, b.r, b.X, correction_tolerance, a->progress, error));
+            for (size_t k = 0; k < some.count; k++) visit(context, which[first + k], c, b.X + k * n);
+        }
+        reference_destroy(one);
+        one = NULL;
+        progress_report(a->progress, "judge", a->begin + (a->end - a->begin) * (double)(c + 1) / (double)C);
+    }
+done:
+    reference_destroy(one);
+    batch_free(&b);
+    return status;
+}
+
+lam_status guided_reference_each(const reference_system *s, const reference_answers *a, size_t m,
+                                 const size_t *which, visit_correction *visit, void *context,
+                                 lam_error *error) {
+    const bool may_guide = lam_operator_emitters(a->op) == 0;
+    const reference_way way = reference_choose(s->F, s->area, s->reflectance, m, may_guide);
+    if (may_guide && way == REFERENCE_ITERATED) return each_guided(s, a, m, which, visit, context, error);
+    return each_alone(s, a, way, m, which, visit, context, error);
 }

@@ -1,16 +1,53 @@
-/* Converged references for the judge, some of them with the help of the operator that is judged. */
+/* Corrections of an operator's answers to the converged solution of given form factors, in double: the
+ * operator that is judged guides the iteration, but decides nothing about where it ends. */
 #ifndef LAMBERT_METHOD_GUIDED_REFERENCE_H
 #define LAMBERT_METHOD_GUIDED_REFERENCE_H
 
 #include "solver/method/reference.h"
 #include "solver/operator/operator.h"
 
-/* B of m emissions in one channel, both [m][n], B a guess on entry, to four digits below the smallest error
- * worth printing. An LU is solved by itself; an iteration has op as the guide of reference_solve_guided,
- * unless op answers only to emitters. Errors: those of
- * reference_solve_guided. */
-lam_status guided_reference_solve(const reference *r, const factor_product *F, const lam_operator *op,
-                                  size_t channel, size_t m, const double *E, double *B, const progress *p,
-                                  lam_error *error);
+/* An approximate answer X to emissions r, both [m][C][n], by an operator that is judged. */
+typedef struct reference_guide {
+    lam_status (*answer)(void *context, size_t m, const double *r, double *X, lam_error *error);
+    void *context;
+} reference_guide;
+
+/* A system of C channels: (I - R F) x = r. */
+typedef struct reference_system {
+    size_t n, n_channels;
+    const factor_product *F;  /* with reciprocity */
+    const double *area;       /* [n] */
+    const float *reflectance; /* [C][n] */
+} reference_system;
+
+/* X of m right sides r, both [m][C][n]; r is used up. Each is X := X + M r, r := r - (I - R F) M r with the
+ * guide M, until the steps that are left, a geometric series, are below tolerance |X|; where a step is more
+ * than half of the one before, by reference_solve from there on. Right sides come to their ends one by one.
+ * With a guide that is off by a few hundredths it takes one product with F for each two digits.
+ * Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC, LAM_ERR_CANCELLED, and those of the guide. */
+lam_status guided_reference_correct(const reference_system *s, size_t m, double *r, double *X,
+                                    double tolerance, const reference_guide *guide, const progress *p,
+                                    lam_error *error);
+
+/* Emissions of an operator, and its answers. */
+typedef struct reference_answers {
+    const lam_operator *op;
+    const float *E, *B; /* [][C][n] emission and the operator's radiosity */
+    const double
+        *first; /* [][C][n] H, the light that E itself gives, in place of F E where `known`; NULL: F E
+                 */
+    const bool *known;
+    const progress *progress;
+    double begin, end; /* of the progress of "judge" */
+} reference_answers;
+
+/* Gets x [n], the converged B - B~ of answer v in a channel. */
+typedef void visit_correction(void *context, size_t v, size_t channel, const double *x);
+
+/* Visits the corrections of the answers which[m], converged to four digits of themselves: of an LU where that
+ * takes less time, else guided by the operator, unless it answers only to emitters. Errors: those above. */
+lam_status guided_reference_each(const reference_system *s, const reference_answers *a, size_t m,
+                                 const size_t *which, visit_correction *visit, void *context,
+                                 lam_error *error);
 
 #endif

@@ -10,10 +10,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Probes of random emission, and probes of a group by which the reference's own noise is measured. */
-enum { RANDOM_PROBES = 8, NOISE_PROBES = 32 };
-/* The latter where F is no rows: what it measures is a bias that probes share, and no noise of their own. */
-enum { NOISE_PROBES_GUIDED = 8 };
+/* Probes of random emission, and those of a group by which the reference's own noise is measured: it is
+ * alike for all probes of a group, so that a few give it to a fifth. */
+enum { RANDOM_PROBES = 8, NOISE_PROBES = 8 };
 
 /* Indirect light below this share of all light counts as none: no ray found what the element sees, and the
  * rest is the remainder of the reference's iteration. */
@@ -144,109 +143,38 @@ done:
     return status;
 }
 
-/* Emission and first guess of a probe for a reference: E and B, or, where its first light H is known, R F R H
- * and B - E - R H, so that the reference finds only the further bounces. */
-static lam_status reference_emission(const judge_input *input, const factor_product *F, const probes *p,
-                                     size_t v, size_t c, double *E, double *B, double *scratch,
-                                     lam_error *error) {
-    lam_status status = LAM_OK;
-    const build_problem *problem = input->problem;
-    const size_t n = problem->n, C = problem->n_channels, at = (v * C + c) * n;
-    const float *rho = problem->reflectance + c * n;
-    const bool known = F != &input->own && p->known != NULL && p->known[v];
-    for (size_t i = 0; i < n; i++) {
-        E[i] = (double)p->E[at + i];
-        B[i] = (double)p->B[at + i];
-        if (known) scratch[i] = (double)rho[i] * p->first[at + i];
-    }
-    if (!known) goto done;
-    TRY(F->multiply(F->context, 1, scratch, E, error));
-    for (size_t i = 0; i < n; i++) {
-        B[i] = fmax(B[i] - (double)p->E[at + i] - scratch[i], 0);
-        E[i] *= (double)rho[i];
-    }
-done:
-    return status;
-}
-
-/* Adds E + R H to the further bounces, where H is known. */
-static void add_first_light(const judge_input *input, const factor_product *F, const probes *p, size_t v,
-                            size_t c, double *B) {
-    const build_problem *problem = input->problem;
-    const size_t n = problem->n, at = (v * problem->n_channels + c) * n;
-    if (F == &input->own || p->known == NULL || !p->known[v]) return;
-    for (size_t i = 0; i < n; i++)
-        B[i] += (double)p->E[at + i] + (double)problem->reflectance[c * n + i] * p->first[at + i];
-}
-
-/* The probes which[] that a reference solves, and the shares of the judge's work before and after it. */
-typedef struct reference_job {
-    const lam_operator *op;
-    const factor_product *F;
-    const probes *p;
-    const size_t *which; /* [m] */
+/* The corrections of some probes, kept: [m][C][n]. */
+typedef struct kept_corrections {
     size_t m;
-    double begin, end;
-} reference_job;
+    const size_t *which; /* [m], ascending */
+    double *x;           /* NULL: none are kept */
+} kept_corrections;
 
-/* Calls visit, a channel at a time, with the converged B of the probes: B is [m][n]. */
-typedef void visit_reference(void *context, size_t channel, const double *B);
-
-static lam_status each_reference(const judge_input *input, const reference_job *job, visit_reference *visit,
-                                 void *context, lam_error *error) {
-    lam_status status = LAM_OK;
-    const factor_product *F = job->F;
-    const probes *p = job->p;
-    const size_t *which = job->which, m = job->m;
-    const build_problem *problem = input->problem;
-    const size_t n = problem->n, n_channels = problem->n_channels;
-    reference *r = NULL;
-    double *E = memory_allocate(m, n * sizeof *E, "reference emissions", error);
-    double *B = memory_allocate(m, n * sizeof *B, "reference solutions", error);
-    double *scratch = memory_allocate(n, sizeof *scratch, "reference solutions", error);
-    if (E == NULL || B == NULL || scratch == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t c = 0; c < n_channels; c++) {
-        for (size_t v = 0; v < m; v++)
-            TRY(reference_emission(input, F, p, which[v], c, E + v * n, B + v * n, scratch, error));
-        if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
-        const float *rho = problem->reflectance + c * n;
-        const bool guided = lam_operator_emitters(job->op) == 0;
-        const reference_way way = reference_choose(F, problem->area, rho, m, guided);
-        TRY(reference_create_of(F, problem->area, rho, way, &r, error));
-        TRY(guided_reference_solve(r, F, job->op, c, m, E, B, input->progress, error));
-        reference_destroy(r);
-        r = NULL;
-        for (size_t v = 0; v < m; v++) add_first_light(input, F, p, which[v], c, B + v * n);
-        visit(context, c, B);
-        progress_report(input->progress, "judge",
-                        job->begin + (job->end - job->begin) * (double)(c + 1) / (double)n_channels);
-    }
-done:
-    reference_destroy(r);
-    free(E);
-    free(B);
-    free(scratch);
-    return status;
+static void keep(const kept_corrections *to, const build_problem *problem, size_t v, size_t channel,
+                 const double *x) {
+    const size_t n = problem->n;
+    if (to->x == NULL) return;
+    for (size_t k = 0; k < to->m; k++)
+        if (to->which[k] == v) memcpy(to->x + (k * problem->n_channels + channel) * n, x, n * sizeof *x);
 }
 
 typedef struct comparison {
     const build_problem *problem;
     probes *p;
+    const kept_corrections *kept;
 } comparison;
 
-/* Adds one channel to |B|^2, |B - E|^2 and |B~ - B|^2 of every probe. */
-static void compare(void *context, size_t channel, const double *B) {
+/* Adds one channel to |B|^2, |B - E|^2 and |B~ - B|^2 of a probe. */
+static void compare(void *context, size_t v, size_t channel, const double *x) {
     const comparison *c = context;
-    const size_t n = c->problem->n, n_channels = c->problem->n_channels;
-    for (size_t v = 0; v < c->p->m; v++) {
-        const float *E = c->p->E + (v * n_channels + channel) * n, *approximate = c->p->B + (E - c->p->E);
-        for (size_t i = 0; i < n; i++) {
-            const double b = B[v * n + i], a = c->problem->area[i];
-            c->p->B_norm[v] += a * b * b;
-            c->p->indirect_norm[v] += a * (b - (double)E[i]) * (b - (double)E[i]);
-            c->p->error_norm[v] += a * ((double)approximate[i] - b) * ((double)approximate[i] - b);
-        }
+    const size_t n = c->problem->n, at = (v * c->problem->n_channels + channel) * n;
+    for (size_t i = 0; i < n; i++) {
+        const double b = (double)c->p->B[at + i] + x[i], a = c->problem->area[i];
+        c->p->B_norm[v] += a * b * b;
+        c->p->indirect_norm[v] += a * (b - (double)c->p->E[at + i]) * (b - (double)c->p->E[at + i]);
+        c->p->error_norm[v] += a * x[i] * x[i];
     }
+    keep(c->kept, c->problem, v, channel, x);
 }
 
 static void add_figure(error_figures *f, double x) {
@@ -261,21 +189,41 @@ static void finish_figure(error_figures *f, size_t count) {
     f->std = sqrt(fmax(0, f->std / (double)count - f->mean * f->mean));
 }
 
+static reference_system system_of(const build_problem *problem, const factor_product *F) {
+    return (reference_system){problem->n, problem->n_channels, F, problem->area, problem->reflectance};
+}
+
+/* total: with the first light that is known. */
+static reference_answers answers_of(const lam_operator *op, const judge_input *input, const probes *p,
+                                    bool total, double begin, double end) {
+    return (reference_answers){.op = op,
+                               .E = p->E,
+                               .B = p->B,
+                               .first = total ? p->first : NULL,
+                               .known = p->known,
+                               .progress = input->progress,
+                               .begin = begin,
+                               .end = end};
+}
+
 /* Relative and indirect figures of each group against one F: those of the total error, or of the operator's.
  */
 static lam_status figures_against(const lam_operator *op, const judge_input *input, const factor_product *F,
-                                  probes *p, error_group *groups[N_GROUPS], bool total, lam_error *error) {
+                                  probes *p, bool total, const kept_corrections *kept,
+                                  error_group *groups[N_GROUPS], lam_error *error) {
     lam_status status = LAM_OK;
-    comparison c = {input->problem, p};
+    comparison c = {input->problem, p, kept};
     const double share = input->independent.n == 0 ? 1 : 1. / 3;
+    const reference_system system = system_of(input->problem, F);
+    const reference_answers answers =
+        answers_of(op, input, p, total, total ? share : 0, total ? 2 * share : share);
     size_t *all = memory_allocate(p->m, sizeof *all, "probes", error);
-    const reference_job job = {op, F, p, all, p->m, total ? share : 0, total ? 2 * share : share};
     if (all == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t v = 0; v < p->m; v++) all[v] = v;
     memset(p->B_norm, 0, p->m * sizeof *p->B_norm);
     memset(p->indirect_norm, 0, p->m * sizeof *p->indirect_norm);
     memset(p->error_norm, 0, p->m * sizeof *p->error_norm);
-    TRY(each_reference(input, &job, compare, &c, error));
+    TRY(guided_reference_each(&system, &answers, p->m, all, compare, &c, error));
     for (int g = 0; g < N_GROUPS; g++) {
         error_figures *relative = total ? &groups[g]->total_relative : &groups[g]->operator_relative;
         error_figures *indirect = total ? &groups[g]->total_indirect : &groups[g]->operator_indirect;
@@ -299,24 +247,23 @@ done:
     return status;
 }
 
-/* The converged solutions of one half of the independent sample: [m][C][n]. */
-typedef struct half_solutions {
-    size_t n, n_channels, m;
-    double *B;
-} half_solutions;
+typedef struct half_corrections {
+    const build_problem *problem;
+    kept_corrections kept;
+} half_corrections;
 
-static void keep_half(void *context, size_t channel, const double *B) {
-    const half_solutions *h = context;
-    for (size_t v = 0; v < h->m; v++)
-        memcpy(h->B + (v * h->n_channels + channel) * h->n, B + v * h->n, h->n * sizeof *B);
+static void keep_half(void *context, size_t v, size_t channel, const double *x) {
+    const half_corrections *h = context;
+    keep(&h->kept, h->problem, v, channel, x);
 }
 
-/* Half the distance between the halves' solutions, over the indirect light: the standard error of their mean;
- * negative where there is no indirect light. */
-static double half_distance(const build_problem *problem, const float *E, const double *x, const double *y) {
+/* Half the distance between the halves' solutions B~ + x, over the indirect light: the standard error of
+ * their mean; negative where there is no indirect light. */
+static double half_distance(const build_problem *problem, const float *E, const float *B, const double *x,
+                            const double *y) {
     double difference = 0, indirect = 0, all = 0;
     for (size_t i = 0; i < problem->n_channels * problem->n; i++) {
-        const double a = problem->area[i % problem->n], mean = .5 * (x[i] + y[i]);
+        const double a = problem->area[i % problem->n], mean = (double)B[i] + .5 * (x[i] + y[i]);
         difference += a * .25 * (x[i] - y[i]) * (x[i] - y[i]);
         indirect += a * (mean - (double)E[i]) * (mean - (double)E[i]);
         all += a * mean * mean;
@@ -324,30 +271,42 @@ static double half_distance(const build_problem *problem, const float *E, const 
     return indirect > dark * dark * all ? sqrt(difference / indirect) : -1;
 }
 
+/* Of each group some probes: their numbers, for [N_GROUPS * NOISE_PROBES]. */
+static size_t noise_probes(const probes *p, size_t *which) {
+    size_t m = 0;
+    for (int g = 0; g < N_GROUPS; g++)
+        for (size_t v = p->begin[g]; v < p->begin[g + 1] && v < p->begin[g] + NOISE_PROBES; v++)
+            which[m++] = v;
+    return m;
+}
+
+/* known: the corrections of these probes by `independent`. */
 static lam_status measure_noise(const lam_operator *op, const judge_input *input, const probes *p,
-                                error_group *groups[N_GROUPS], lam_error *error) {
+                                const kept_corrections *known, error_group *groups[N_GROUPS],
+                                lam_error *error) {
     lam_status status = LAM_OK;
     const build_problem *problem = input->problem;
-    const size_t vector = problem->n_channels * problem->n;
-    const size_t most = input->halves[0].rows != NULL ? NOISE_PROBES : NOISE_PROBES_GUIDED;
-    size_t which[N_GROUPS * NOISE_PROBES], m = 0;
-    for (int g = 0; g < N_GROUPS; g++)
-        for (size_t v = p->begin[g]; v < p->begin[g + 1] && v < p->begin[g] + most; v++) which[m++] = v;
-    half_solutions half[2] = {{problem->n, problem->n_channels, m, NULL},
-                              {problem->n, problem->n_channels, m, NULL}};
+    const size_t vector = problem->n_channels * problem->n, m = known->m;
+    double *x[2] = {NULL, NULL};
+    const double *half[2];
     for (int h = 0; h < 2; h++) {
-        half[h].B = memory_allocate(m, vector * sizeof *half[h].B, "reference noise", error);
-        if (half[h].B == NULL) TRY(LAM_ERR_MEMORY);
-        const reference_job job = {op, &input->halves[h], p, which, m, (4. + h) / 6, (5. + h) / 6};
-        TRY(each_reference(input, &job, keep_half, &half[h], error));
+        half[h] = known->x;
+        if (input->halves[h].context == input->independent.context) continue;
+        half[h] = x[h] = memory_allocate(m, vector * sizeof *x[h], "reference noise", error);
+        if (x[h] == NULL) TRY(LAM_ERR_MEMORY);
+        half_corrections to = {problem, {m, known->which, x[h]}};
+        const reference_system system = system_of(problem, &input->halves[h]);
+        const reference_answers answers = answers_of(op, input, p, true, (4. + h) / 6, (5. + h) / 6);
+        TRY(guided_reference_each(&system, &answers, m, known->which, keep_half, &to, error));
     }
-    size_t v = 0;
+    size_t k = 0;
     for (int g = 0; g < N_GROUPS; g++) {
         double sum = 0;
         size_t lit = 0;
-        for (; v < m && which[v] < p->begin[g + 1]; v++) {
-            const double noise = half_distance(problem, p->E + which[v] * vector, half[0].B + v * vector,
-                                               half[1].B + v * vector);
+        for (; k < m && known->which[k] < p->begin[g + 1]; k++) {
+            const size_t at = known->which[k] * vector;
+            const double noise =
+                half_distance(problem, p->E + at, p->B + at, half[0] + k * vector, half[1] + k * vector);
             if (noise < 0) continue;
             sum += noise;
             lit++;
@@ -355,8 +314,8 @@ static lam_status measure_noise(const lam_operator *op, const judge_input *input
         groups[g]->reference_noise = lit > 0 ? sum / (double)lit : 0;
     }
 done:
-    free(half[0].B);
-    free(half[1].B);
+    free(x[0]);
+    free(x[1]);
     return status;
 }
 
@@ -444,6 +403,8 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     error_report found = {0};
     error_group *groups[N_GROUPS] = {&found.single, &found.lights, &found.random};
     probes p = {0};
+    size_t which[N_GROUPS * NOISE_PROBES];
+    kept_corrections kept = {.m = 0};
     const size_t s = lam_operator_emitters(op), most = s > 0 ? s : problem->n;
     const size_t counts[N_GROUPS] = {input->probes < most ? input->probes : most, any_light(op, input),
                                      RANDOM_PROBES};
@@ -460,17 +421,23 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     progress_report(input->progress, "judge", 0);
     TRY(apply(op, &p, LAM_RADIOSITY, p.B, error));
     TRY(physics(op, input, &p, groups, error));
-    TRY(figures_against(op, input, &input->own, &p, groups, false, error));
+    TRY(figures_against(op, input, &input->own, &p, false, &kept, groups, error));
     if (input->independent.n > 0) {
         TRY(find_first_light(input, &p, error));
-        TRY(figures_against(op, input, &input->independent, &p, groups, true, error));
-        if (input->halves[0].n > 0) TRY(measure_noise(op, input, &p, groups, error));
+        if (input->halves[0].n > 0) {
+            kept = (kept_corrections){.m = noise_probes(&p, which), .which = which};
+            kept.x = memory_allocate(kept.m, vector * sizeof *kept.x, "reference noise", error);
+            if (kept.x == NULL) TRY(LAM_ERR_MEMORY);
+        }
+        TRY(figures_against(op, input, &input->independent, &p, true, &kept, groups, error));
+        if (input->halves[0].n > 0) TRY(measure_noise(op, input, &p, &kept, groups, error));
     }
     progress_report(input->progress, "judge", 1);
     found.has_total = input->independent.n > 0;
     found.seconds = clock_seconds() - start;
     *report = found;
 done:
+    free(kept.x);
     probes_free(&p);
     return status;
 }

@@ -19,7 +19,7 @@ double reference_seconds(double n, double entries, double m);
 
 /* The way that takes less time for m emissions, by the operations of both: n^3 of the LU and n^2 m of its
  * solves against m products with F for each of the sweeps that the mean reflectance lets expect, or, guided,
- * of a few steps of reference_solve_guided. It is the same on every machine. Form factors that are no rows
+ * of a few steps of guided_reference_correct. It is the same on every machine. Form factors that are no rows
  * are iterated. */
 reference_way reference_choose(const factor_product *F, const double *area, const float *reflectance,
                                size_t m, bool guided);
@@ -42,17 +42,5 @@ bool reference_is_dense(const reference *r);
  * Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC (no convergence), LAM_ERR_CANCELLED. */
 lam_status reference_solve(const reference *r, size_t m, const double *E, double *B, double tolerance,
                            const progress *p, lam_error *error);
-
-/* An approximate answer B [m][n] to emissions E [m][n], by an operator that is judged. */
-typedef struct reference_guide {
-    lam_status (*answer)(void *context, size_t m, const double *E, double *B, lam_error *error);
-    void *context;
-} reference_guide;
-
-/* The same solution by B := B + M (E - (I - R F) B) with the guide M, as long as each step is at most half of
- * the one before, and from there on as above: where M is off by a few hundredths, a step gives one to two
- * digits, in place of a third of one. Errors: also those of the guide. */
-lam_status reference_solve_guided(const reference *r, size_t m, const double *E, double *B, double tolerance,
-                                  const reference_guide *guide, const progress *p, lam_error *error);
 
 #endif

@@ -139,12 +139,15 @@ double forecast_bytes(const forecast *f) {
     const double held = f->streamed ? stream_bytes(n, &f->recipe) : sample;
     double peak = fmax(f->streamed ? held : trace, held + fmax(op.building, op.loaded + compress_bytes(f)));
     if (f->probes > 0) {
-        /* Two more samples and their mean, beside the first; emissions, answers and the vectors of the
-         * iteration per probe. */
-        const double probes = (double)f->probes + 9;
+        /* Two more samples and their mean, beside the first; of each probe its emission, its answers and its
+         * first light, of some the corrections by each sample, and the vectors of the solutions that are
+         * found at once. */
+        const double probes = (double)f->probes + 9, of_noise = 3 * 17 * 8,
+                     at_once = fmax(16, 8 * n_channels);
         const recipe *r = &f->judge_recipe;
         const double references = held_bytes(f, forecast_reference_bytes(f), r);
-        const double judge = probes * n * (12 * n_channels + 72) + (n <= 8192 ? 8 * n * n : 0);
+        const double judge = n * (20 * probes * n_channels + of_noise * n_channels + 72 * at_once) +
+                             (n <= 8192 ? 8 * n * n : 0);
         const double second =
             held_bytes(f, forecast_rows_bytes(n, r), r) + trace_bytes(n, r, f->scratch, f->large);
         peak = fmax(peak, sample + op.loaded + fmax(references + judge, second));

@@ -19,7 +19,7 @@ static double sample_seconds(double n, const recipe *r, double rays_per_second, 
 
 /* Four references: two with all probes, and two, for the noise of the sample, with some of each sort. */
 static double solve_seconds(const forecast *f) {
-    enum { OTHER_PROBES = 9, NOISE_PROBES = 32 };
+    enum { OTHER_PROBES = 9, NOISE_PROBES = 8 };
     const double n = (double)f->n, probes = (double)f->probes, some = fmin(probes, NOISE_PROBES);
     const double entries =
         f->cost.entries > 0 ? f->cost.entries : forecast_rows_bytes(n, &f->judge_recipe) / 8;

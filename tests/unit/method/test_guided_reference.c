@@ -1,94 +1,105 @@
-/* References of what only multiplies: with a guide as near as an operator is, with one that is of no use, and
- * cancelled.
- */
-#include "solver/method/reference.h"
+/* Corrections with a guide: as near as an operator is, of no use, of no use for one probe, in two channels,
+ * cancelled. */
+#include "solver/method/guided_reference.h"
 #include "support/box.h"
 #include "support/suite.h"
 
 #include "store/status.h"
 
-enum { SIDE = 5, N = 6 * SIDE * SIDE, M = 3 };
+enum { SIDE = 5, N = 6 * SIDE * SIDE, M = 3, C = 2, VECTOR = C * N };
 
 static const double size[3] = {10, 6, 3};
 
-/* A guide: the true answer with an error of its own, counting its calls. */
+typedef struct subject {
+    mesh m;
+    csr F;
+    float rho[VECTOR];
+    double r[M * VECTOR], exact[M * VECTOR], X[M * VECTOR];
+    reference *dense[C];
+    factor_product product;
+    reference_system system;
+    size_t columns; /* multiplied by F so far */
+} subject;
+
+/* A guide: the true answer with an error of its own. */
 typedef struct teacher {
-    const reference *dense;
-    double off; /* of the answer, relative */
+    const subject *s;
+    double off;  /* of the answer, relative */
+    bool misled; /* the second of all M probes gets nonsense */
     int calls;
 } teacher;
 
-static lam_status teach(void *context, size_t m, const double *E, double *B, lam_error *error) {
+static lam_status teach(void *context, size_t m, const double *r, double *X, lam_error *error) {
     lam_status status = LAM_OK;
     teacher *t = context;
     t->calls++;
-    TRY(reference_solve(t->dense, m, E, B, 0, NULL, error));
-    for (size_t k = 0; k < m * N; k++) B[k] = (1 + t->off * (k % 2 == 0 ? 1 : -1)) * B[k];
+    for (size_t k = 0; k < m * C; k++)
+        TRY(reference_solve(t->s->dense[k % C], 1, r + k * N, X + k * N, 0, NULL, error));
+    for (size_t k = 0; k < m * VECTOR; k++) X[k] = (1 + t->off * (k % 2 == 0 ? 1 : -1)) * X[k];
+    for (size_t i = VECTOR; t->misled && m == M && i < (size_t)2 * VECTOR; i++) X[i] *= -30;
 done:
     return status;
 }
 
 static lam_status multiply(const void *context, size_t m, const double *x, double *y, lam_error *error) {
+    subject *s = (subject *)(uintptr_t)context;
     (void)error;
-    csr_multiply_rows(context, 0, N, m, x, y);
+    s->columns += m;
+    csr_multiply_rows(&s->F, 0, N, m, x, y);
     return LAM_OK;
 }
 
-typedef struct subject {
-    mesh m;
-    csr F;
-    float rho[N];
-    double E[M * N], exact[M * N];
-    reference *dense, *product;
-} subject;
-
 static void subject_make(subject *s) {
     lam_error error = {.message = ""};
+    s->columns = 0;
     s->m = box_mesh(size, SIDE, .5f);
     s->F = box_form_factors(size, SIDE, s->m.area);
-    for (size_t i = 0; i < N; i++) s->rho[i] = .2f + .6f * (float)(i % 7) / 7;
-    for (size_t k = 0; k < M * N; k++) s->E[k] = k % N == 11 * (k / N) ? 1 : .01 * (double)(k % 5);
-    const factor_product product = {.n = N, .multiply = multiply, .context = &s->F};
-    ck_ok(reference_create(&s->F, s->m.area, s->rho, REFERENCE_DENSE, &s->dense, &error));
-    ck_ok(reference_create_of(&product, s->m.area, s->rho, REFERENCE_ITERATED, &s->product, &error));
-    ck_ok(reference_solve(s->dense, M, s->E, s->exact, 0, NULL, &error));
+    for (size_t i = 0; i < VECTOR; i++) s->rho[i] = (i < N ? .2f : .4f) + .4f * (float)(i % 7) / 7;
+    for (size_t k = 0; k < M * VECTOR; k++)
+        s->r[k] = k % VECTOR == 11 * (k / VECTOR) ? 1 : .01 * ((double)(k % 5) - 2);
+    s->product = (factor_product){.n = N, .multiply = multiply, .context = s};
+    s->system = (reference_system){N, C, &s->product, s->m.area, s->rho};
+    for (size_t c = 0; c < C; c++)
+        ck_ok(reference_create(&s->F, s->m.area, s->rho + c * N, REFERENCE_DENSE, &s->dense[c], &error));
+    for (size_t k = 0; k < M * C; k++)
+        ck_ok(reference_solve(s->dense[k % C], 1, s->r + k * N, s->exact + k * N, 0, NULL, &error));
 }
 
 static void subject_free(subject *s) {
-    reference_destroy(s->dense);
-    reference_destroy(s->product);
+    for (size_t c = 0; c < C; c++) reference_destroy(s->dense[c]);
     csr_free(&s->F);
     mesh_free(&s->m);
 }
 
-static double distance(const subject *s, const double *B) {
+/* |X - x| / |x| of a probe, by area. */
+static double distance(const subject *s, size_t probe) {
     double off = 0, all = 0;
-    for (size_t k = 0; k < M * N; k++) {
-        off += (B[k] - s->exact[k]) * (B[k] - s->exact[k]);
-        all += s->exact[k] * s->exact[k];
+    for (size_t k = probe * VECTOR; k < (probe + 1) * VECTOR; k++) {
+        off += s->m.area[k % N] * (s->X[k] - s->exact[k]) * (s->X[k] - s->exact[k]);
+        all += s->m.area[k % N] * s->exact[k] * s->exact[k];
     }
     return sqrt(off / all);
 }
 
-/* An error of .03 leaves .001, .00003 ... of the first guess. */
+/* Steps of an error q leave q^k after k of them: the last one that is taken knows that the next is not
+ * needed. One product with F comes between two steps. */
 START_TEST(a_good_guide_needs_few_steps) {
     lam_error error = {.message = ""};
     static const struct {
-        double off;
-        int most;
-    } cases[] = {{.03, 7}, {.001, 4}};
+        double off, tolerance;
+        int calls;
+    } cases[] = {{.03, 1e-7, 5}, {.001, 1e-7, 3}, {.001, 1e-4, 2}, {.03, 1e-2, 2}};
     subject s;
-    subject_make(&s);
-    for (size_t c = 0; c < 2; c++) {
-        teacher t = {s.dense, cases[c].off, 0};
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        subject_make(&s);
+        teacher t = {.s = &s, .off = cases[c].off};
         const reference_guide guide = {teach, &t};
-        double B[M * N];
-        memcpy(B, s.E, sizeof B);
-        ck_ok(reference_solve_guided(s.product, M, s.E, B, 1e-7, &guide, NULL, &error));
-        ck_assert_double_lt(distance(&s, B), 1e-7);
-        ck_assert_int_le(t.calls, cases[c].most);
+        ck_ok(guided_reference_correct(&s.system, M, s.r, s.X, cases[c].tolerance, &guide, NULL, &error));
+        for (size_t v = 0; v < M; v++) ck_assert_double_le(distance(&s, v), 1.5 * cases[c].tolerance);
+        ck_assert_int_eq(t.calls, cases[c].calls);
+        ck_assert_uint_eq(s.columns, (size_t)(M * C * (t.calls - 1)));
+        subject_free(&s);
     }
-    subject_free(&s);
 }
 END_TEST
 
@@ -96,16 +107,42 @@ END_TEST
 START_TEST(a_bad_guide_does_no_harm) {
     lam_error error = {.message = ""};
     subject s;
-    subject_make(&s);
     for (int k = 0; k < 2; k++) {
-        teacher t = {s.dense, k == 0 ? .9 : 30, 0};
+        subject_make(&s);
+        teacher t = {.s = &s, .off = k == 0 ? .9 : 30};
         const reference_guide guide = {teach, &t};
-        double B[M * N];
-        memcpy(B, s.E, sizeof B);
-        ck_ok(reference_solve_guided(s.product, M, s.E, B, 1e-7, &guide, NULL, &error));
-        ck_assert_double_lt(distance(&s, B), 1e-5);
+        ck_ok(guided_reference_correct(&s.system, M, s.r, s.X, 1e-7, &guide, NULL, &error));
+        for (size_t v = 0; v < M; v++) ck_assert_double_lt(distance(&s, v), 1e-5);
         ck_assert_int_lt(t.calls, 5);
+        subject_free(&s);
     }
+}
+END_TEST
+
+/* One probe that the guide misleads does not keep it from the others. */
+START_TEST(each_probe_goes_its_own_way) {
+    lam_error error = {.message = ""};
+    subject s;
+    subject_make(&s);
+    teacher t = {.s = &s, .off = .01, .misled = true};
+    const reference_guide guide = {teach, &t};
+    ck_ok(guided_reference_correct(&s.system, M, s.r, s.X, 2e-8, &guide, NULL, &error));
+    for (size_t v = 0; v < M; v++) ck_assert_double_lt(distance(&s, v), v == 1 ? 1e-6 : 4e-8);
+    ck_assert_int_eq(t.calls, 4);
+    subject_free(&s);
+}
+END_TEST
+
+START_TEST(nothing_lacking_needs_no_product) {
+    lam_error error = {.message = ""};
+    subject s;
+    subject_make(&s);
+    memset(s.r, 0, sizeof s.r);
+    teacher t = {.s = &s};
+    const reference_guide guide = {teach, &t};
+    ck_ok(guided_reference_correct(&s.system, M, s.r, s.X, 1e-8, &guide, NULL, &error));
+    for (size_t k = 0; k < M * VECTOR; k++) ck_assert_double_eq(s.X[k], 0);
+    ck_assert_uint_eq(s.columns, 0);
     subject_free(&s);
 }
 END_TEST
@@ -115,8 +152,8 @@ static bool stop_at_once(void *context) {
     return true;
 }
 
-static lam_status refuse(void *context, size_t m, const double *E, double *B, lam_error *error) {
-    (void)context, (void)m, (void)E, (void)B;
+static lam_status refuse(void *context, size_t m, const double *r, double *X, lam_error *error) {
+    (void)context, (void)m, (void)r, (void)X;
     return status_fail(error, LAM_ERR_NUMERIC, "no answer");
 }
 
@@ -125,13 +162,11 @@ START_TEST(errors_pass_through) {
     const progress cancelled = {.cancelled = stop_at_once};
     const reference_guide guide = {refuse, NULL};
     subject s;
-    double B[M * N];
     subject_make(&s);
-    memcpy(B, s.E, sizeof B);
-    ck_assert_int_eq(reference_solve_guided(s.product, M, s.E, B, 1e-7, &guide, NULL, &error),
+    ck_assert_int_eq(guided_reference_correct(&s.system, M, s.r, s.X, 1e-7, &guide, NULL, &error),
                      LAM_ERR_NUMERIC);
     ck_assert_str_eq(error.message, "no answer");
-    ck_assert_int_eq(reference_solve_guided(s.product, M, s.E, B, 1e-7, &guide, &cancelled, &error),
+    ck_assert_int_eq(guided_reference_correct(&s.system, M, s.r, s.X, 1e-7, &guide, &cancelled, &error),
                      LAM_ERR_CANCELLED);
     subject_free(&s);
 }
@@ -142,6 +177,8 @@ int main(void) {
     TCase *cases = tcase_create("guided reference");
     tcase_add_test(cases, a_good_guide_needs_few_steps);
     tcase_add_test(cases, a_bad_guide_does_no_harm);
+    tcase_add_test(cases, each_probe_goes_its_own_way);
+    tcase_add_test(cases, nothing_lacking_needs_no_product);
     tcase_add_test(cases, errors_pass_through);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
