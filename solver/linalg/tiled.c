@@ -1,10 +1,8 @@
 #include "solver/linalg/tiled.h"
 
 #include "solver/base/cpu.h"
-#include "solver/base/half.h"
 #include "store/status.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,116 +10,140 @@
 #include <immintrin.h>
 #endif
 
-/* Groups that a thread takes at a time; multiplications below which one thread works; vectors side by side.
- */
-enum { GROUPS_AT_ONCE = 64, THREADS_WORTH = 100000, WIDTH = 16 };
+/* Groups that a thread takes at a time; multiplications below which one thread works; vectors side by side;
+ * fours whose digits are converted at once. */
+enum { GROUPS_AT_ONCE = 64, THREADS_WORTH = 100000, WIDTH = 16, CHUNK = 32 };
 
-/* Halves behind the last that a register may read. */
-enum { VALUES_PAST = 16 - TILE_LANES };
+/* By columns, products are added in memory, which is slower than in a register: columns are taken when they
+ * hold less than 1/COLUMNS_SHARE of all tiles. */
+enum { COLUMNS_SHARE = 8 };
+
+/* Columns and steps, and fours, behind the last that a register may read. */
+enum { COLUMNS_PAST = 4, FOURS_PAST = 1 };
+
+/* From the sum of a plane to that of the next lower one. */
+static const float radix = 256;
 
 void tiled_free(tiled_rows *t) {
     free(t->first);
     free(t->group_of);
+    free(t->step);
     free(t->begin);
-    free(t->columns);
-    free(t->values);
+    free(t->fours);
     *t = (tiled_rows){.n = 0};
 }
 
-static lam_status check(const csr *a, float scale, size_t n_groups, const uint32_t *first, lam_error *error) {
+static size_t part_of(const tiled_rows *t, size_t group, size_t plane) {
+    return (group + 1) * t->n_planes - 1 - plane;
+}
+
+/* The tiles of a plane by rows, those of the lower triangle included: of group g at[begin[g]] to
+ * at[begin[g + 1] - 1], by ascending column, twice the number of a tile, and one more where it is transposed.
+ */
+typedef struct plane_rows {
+    uint64_t *begin, *at;
+} plane_rows;
+
+static lam_status sort_plane(const tile_matrix *m, size_t plane, size_t n_groups, plane_rows *out,
+                             lam_error *error) {
     lam_status status = LAM_OK;
-    int exponent;
-    if (!(scale > 0) || frexpf(scale, &exponent) != .5f)
-        FAIL(error, LAM_ERR_ARGUMENT, "scale = %g, must be a power of two", (double)scale);
-    if (first[0] != 0 || first[n_groups] != a->n)
-        FAIL(error, LAM_ERR_ARGUMENT, "groups are from %u to %u, must be from 0 to %zu", (unsigned)first[0],
-             (unsigned)first[n_groups], a->n);
-    for (size_t g = 0; g < n_groups; g++)
-        if (first[g + 1] <= first[g] || first[g + 1] - first[g] > TILE)
-            FAIL(error, LAM_ERR_ARGUMENT, "group %zu has rows from %u to %u, must have 1 to 3", g,
-                 (unsigned)first[g], (unsigned)first[g + 1]);
-    for (uint64_t e = 0; e < a->indptr[a->n]; e++)
-        if (scale * float_of_half(half_of_float(a->data[e] / scale)) != a->data[e])
-            FAIL(error, LAM_ERR_ARGUMENT, "entry %zu = %.9g, must be %g times a number of half precision",
-                 (size_t)e, (double)a->data[e], (double)scale);
+    const size_t count = m->count[plane];
+    const tile *tiles = m->tiles[plane];
+    uint64_t *begin = memory_allocate(n_groups + 2, sizeof *begin, "operator", error), *at = NULL;
+    if (begin == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < count; k++) {
+        begin[tiles[k].row + 2]++;
+        if (tiles[k].column != tiles[k].row) begin[tiles[k].column + 2]++;
+    }
+    for (size_t g = 0; g < n_groups; g++) begin[g + 2] += begin[g + 1];
+    at = memory_allocate((size_t)begin[n_groups + 1], sizeof *at, "operator", error);
+    if (at == NULL) TRY(LAM_ERR_MEMORY);
+    /* A row gets its tiles of the lower triangle, from rows above it, before its own. */
+    for (size_t k = 0; k < count; k++) {
+        at[begin[tiles[k].row + 1]++] = 2 * k;
+        if (tiles[k].column != tiles[k].row) at[begin[tiles[k].column + 1]++] = 2 * k + 1;
+    }
+    *out = (plane_rows){begin, at};
+    begin = NULL;
+    at = NULL;
 done:
+    free(begin);
+    free(at);
     return status;
 }
 
-/* The entries of a group's rows that no tile has yet. */
-typedef struct heads {
-    uint64_t at[TILE], end[TILE];
-    size_t count; /* rows */
-} heads;
-
-static heads heads_of(const csr *a, const tiled_rows *t, size_t g) {
-    heads h = {.count = t->first[g + 1] - t->first[g]};
-    for (size_t r = 0; r < h.count; r++) {
-        h.at[r] = a->indptr[t->first[g] + r];
-        h.end[r] = a->indptr[t->first[g] + r + 1];
+/* Cuts the tiles of a group into fours whose columns are near enough to the first; returns how many, and
+ * writes them to `to` unless that is NULL. */
+static size_t pack(const tiled_rows *t, const tile_matrix *m, size_t plane, const plane_rows *rows, size_t g,
+                   tile_four *to) {
+    size_t fours = 0, used = TILES_AT_ONCE;
+    uint32_t base = 0;
+    for (uint64_t k = rows->begin[g]; k < rows->begin[g + 1]; k++) {
+        const tile *from = &m->tiles[plane][rows->at[k] / 2];
+        const bool transposed = rows->at[k] % 2 == 1;
+        const uint32_t column = t->first[transposed ? from->row : from->column];
+        if (used == TILES_AT_ONCE || column - base > UINT16_MAX) {
+            base = column;
+            used = 0;
+            fours++;
+        }
+        if (to != NULL) {
+            tile_four *four = &to[fours - 1];
+            four->base = base;
+            four->beyond[used] = (uint16_t)(column - base);
+            for (size_t r = 0; r < TILE; r++)
+                for (size_t c = 0; c < TILE; c++)
+                    four->values[r][used * TILE + c] = transposed ? from->values[c][r] : from->values[r][c];
+        }
+        used++;
     }
-    return h;
+    return fours;
 }
 
-/* The next group of columns with an entry; n_groups: there is none. */
-static size_t next_group(const csr *a, const tiled_rows *t, const heads *h) {
-    size_t next = t->n_groups;
-    for (size_t r = 0; r < h->count; r++)
-        if (h->at[r] < h->end[r] && t->group_of[a->indices[h->at[r]]] < next)
-            next = t->group_of[a->indices[h->at[r]]];
-    return next;
-}
-
-/* Takes the entries in the columns of a group; to: row r of the tile begins at to + r TILE_LANES, or NULL. */
-static void take_tile(const csr *a, const tiled_rows *t, size_t columns, heads *h, uint16_t *to) {
-    for (size_t r = 0; r < h->count; r++)
-        for (; h->at[r] < h->end[r] && t->group_of[a->indices[h->at[r]]] == columns; h->at[r]++)
-            if (to != NULL)
-                to[r * TILE_LANES + a->indices[h->at[r]] - t->first[columns]] =
-                    half_of_float(a->data[h->at[r]] / t->scale);
-}
-
-static void count_fours(const csr *a, tiled_rows *t) {
-    for (size_t g = 0; g < t->n_groups; g++) {
-        heads h = heads_of(a, t, g);
-        size_t tiles = 0, columns;
-        for (; (columns = next_group(a, t, &h)) < t->n_groups; tiles++) take_tile(a, t, columns, &h, NULL);
-        t->begin[g + 1] = t->begin[g] + (tiles + TILES_AT_ONCE - 1) / TILES_AT_ONCE;
+static lam_status make_fours(tiled_rows *t, const tile_matrix *m, lam_error *error) {
+    lam_status status = LAM_OK;
+    plane_rows rows[TILE_PLANES] = {{NULL, NULL}};
+    for (size_t d = 0; d < t->n_planes; d++) TRY(sort_plane(m, d, t->n_groups, &rows[d], error));
+    for (size_t g = 0; g < t->n_groups; g++)
+        for (size_t d = t->n_planes; d-- > 0;) {
+            const size_t k = part_of(t, g, d);
+            t->begin[k + 1] = t->begin[k] + pack(t, m, d, &rows[d], g, NULL);
+        }
+    t->fours = memory_allocate((size_t)t->begin[t->n_groups * t->n_planes] + FOURS_PAST, sizeof *t->fours,
+                               "operator", error);
+    if (t->fours == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t g = 0; g < t->n_groups; g++)
+        for (size_t d = 0; d < t->n_planes; d++)
+            pack(t, m, d, &rows[d], g, t->fours + t->begin[part_of(t, g, d)]);
+done:
+    for (size_t d = 0; d < TILE_PLANES; d++) {
+        free(rows[d].begin);
+        free(rows[d].at);
     }
+    return status;
 }
 
-static void fill(const csr *a, tiled_rows *t) {
-    for (size_t g = 0; g < t->n_groups; g++) {
-        heads h = heads_of(a, t, g);
-        size_t columns;
-        for (size_t tile = t->begin[g] * TILES_AT_ONCE; (columns = next_group(a, t, &h)) < t->n_groups;
-             tile++) {
-            t->columns[tile] = t->first[columns];
-            take_tile(a, t, columns, &h,
-                      t->values + tile / TILES_AT_ONCE * TILE * TILE_LANES + tile % TILES_AT_ONCE * TILE);
+lam_status tiled_create(const tile_matrix *upper, size_t n_groups, const tile_group *groups,
+                        const float *step, tiled_rows *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    tiled_rows made = {.n_groups = n_groups, .n_planes = 1};
+    for (size_t g = 0; g < n_groups; g++) made.n += groups[g].size;
+    for (size_t d = 0; d < TILE_PLANES; d++)
+        if (upper->count[d] > 0) made.n_planes = d + 1;
+    made.first = memory_allocate(n_groups + 1, sizeof *made.first, "operator", error);
+    made.group_of = memory_allocate(made.n, sizeof *made.group_of, "operator", error);
+    made.step = memory_allocate(made.n + COLUMNS_PAST, sizeof *made.step, "operator", error);
+    made.begin = memory_allocate(n_groups * made.n_planes + 1, sizeof *made.begin, "operator", error);
+    if (made.first == NULL || made.group_of == NULL || made.step == NULL || made.begin == NULL)
+        TRY(LAM_ERR_MEMORY);
+    for (size_t g = 0; g < n_groups; g++) {
+        made.first[g + 1] = made.first[g] + groups[g].size;
+        for (size_t i = made.first[g]; i < made.first[g + 1]; i++) {
+            made.group_of[i] = (uint32_t)g;
+            made.step[i] = step[g];
         }
     }
-}
-
-lam_status tiled_create(const csr *a, float scale, size_t n_groups, const uint32_t *first, tiled_rows *out,
-                        lam_error *error) {
-    lam_status status = LAM_OK;
-    tiled_rows made = {.n = a->n, .n_groups = n_groups, .scale = scale};
-    TRY(check(a, scale, n_groups, first, error));
-    made.first = memory_allocate(n_groups + 1, sizeof *made.first, "operator", error);
-    made.group_of = memory_allocate(a->n, sizeof *made.group_of, "operator", error);
-    made.begin = memory_allocate(n_groups + 1, sizeof *made.begin, "operator", error);
-    if (made.first == NULL || made.group_of == NULL || made.begin == NULL) TRY(LAM_ERR_MEMORY);
-    memcpy(made.first, first, (n_groups + 1) * sizeof *first);
-    for (size_t g = 0; g < n_groups; g++)
-        for (uint32_t i = first[g]; i < first[g + 1]; i++) made.group_of[i] = (uint32_t)g;
-    count_fours(a, &made);
-    const size_t fours = (size_t)made.begin[n_groups];
-    made.columns = memory_allocate(fours, TILES_AT_ONCE * sizeof *made.columns, "operator", error);
-    made.values =
-        memory_allocate(fours * TILE * TILE_LANES + VALUES_PAST, sizeof *made.values, "operator", error);
-    if (made.columns == NULL || made.values == NULL) TRY(LAM_ERR_MEMORY);
-    fill(a, &made);
+    TRY(make_fours(&made, upper, error));
     *out = made;
     made = (tiled_rows){.n = 0};
 done:
@@ -129,47 +151,95 @@ done:
     return status;
 }
 
-/* Adds the partial sums in a fixed order of pairs, which is that of all kernels. */
+/* Tile t of a four, of a group of rows; false where the four has fewer. */
+static bool tile_of(const tiled_rows *t, const tile_four *four, size_t group, size_t k, tile *out) {
+    bool any = false;
+    *out = (tile){.row = (uint32_t)group, .column = t->group_of[four->base + four->beyond[k]]};
+    for (size_t r = 0; r < TILE; r++)
+        for (size_t c = 0; c < TILE; c++) {
+            out->values[r][c] = four->values[r][k * TILE + c];
+            any = any || out->values[r][c] != 0;
+        }
+    return any;
+}
+
+lam_status tiled_upper(const tiled_rows *t, tile_matrix *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    tile_matrix made = {.count = {0}};
+    size_t room[TILE_PLANES] = {0};
+    tile found;
+    for (size_t d = 0; d < t->n_planes; d++)
+        for (size_t g = 0; g < t->n_groups; g++) {
+            const size_t part = part_of(t, g, d);
+            for (uint64_t f = t->begin[part]; f < t->begin[part + 1]; f++)
+                for (size_t k = 0; k < TILES_AT_ONCE; k++)
+                    if (tile_of(t, &t->fours[f], g, k, &found) && found.column >= g)
+                        TRY(tile_matrix_append(&made, d, &found, room, error));
+        }
+    *out = made;
+    made = (tile_matrix){.count = {0}};
+done:
+    tile_matrix_free(&made);
+    return status;
+}
+
+/* Adds the partial sums in a fixed order, which is that of all kernels and of a register that is halved. */
 static float sum_of_lanes(const float *lanes) {
-    float pairs[TILE_LANES / 2];
-    for (size_t l = 0; l < TILE_LANES / 2; l++) pairs[l] = lanes[l] + lanes[l + TILE_LANES / 2];
-    return (pairs[0] + pairs[3]) + (pairs[1] + pairs[4]) + (pairs[2] + pairs[5]);
+    float quarter[4];
+    for (size_t l = 0; l < 4; l++) quarter[l] = (lanes[l] + lanes[l + 8]) + lanes[l + 4];
+    return (quarter[0] + quarter[2]) + (quarter[1] + quarter[3]);
 }
 
 #define KERNEL(name) name##_portable
 #define TARGET
-#define SCALAR_FMA(a, b, c) ((c) + (a) * (b))
-#define FLOATS_OF_HALVES(from, to)                                                                           \
-    for (size_t l = 0; l < TILE_LANES; l++) (to)[l] = float_of_half((from)[l])
-#include "solver/linalg/tiled_wide.inc"
+#define LANE_FLOATS 4
+#define LANES_FMA(a, b, c) ((c) + (a) * (b))
+#include "solver/linalg/tiled_kernels.inc"
 
 static void group_portable(const tiled_rows *t, size_t g, const float *x, float *y) {
     float sums[TILE][TILE_LANES] = {{0}};
-    for (uint64_t k = t->begin[g]; k < t->begin[g + 1]; k++)
-        for (size_t r = 0; r < TILE; r++)
-            for (size_t l = 0; l < TILE_LANES; l++)
-                sums[r][l] += float_of_half(t->values[(k * TILE + r) * TILE_LANES + l]) *
-                              x[t->columns[k * TILES_AT_ONCE + l / TILE] + l % TILE];
-    for (size_t r = 0; t->first[g] + r < t->first[g + 1]; r++)
-        y[t->first[g] + r] = t->scale * sum_of_lanes(sums[r]);
+    for (size_t part = g * t->n_planes; part < (g + 1) * t->n_planes; part++) {
+        for (size_t l = 0; l < TILE * TILE_LANES; l++) sums[l / TILE_LANES][l % TILE_LANES] *= radix;
+        for (uint64_t f = t->begin[part]; f < t->begin[part + 1]; f++)
+            for (size_t r = 0; r < TILE; r++)
+                for (size_t l = 0; l < TILE_LANES; l++)
+                    sums[r][l] += (float)t->fours[f].values[r][l] *
+                                  x[t->fours[f].base + t->fours[f].beyond[l / TILE] + l % TILE];
+    }
+    for (size_t r = 0, i = t->first[g]; i < t->first[g + 1]; r++, i++)
+        y[i] = t->step[i] * sum_of_lanes(sums[r]);
 }
 
 #ifdef CPU_AVX2_TARGET
 #define KERNEL(name) name##_avx2
 #define TARGET CPU_AVX2_TARGET
-#define SCALAR_FMA(a, b, c) __builtin_fmaf(a, b, c)
-#define FLOATS_OF_HALVES(from, to)                                                                           \
-    _mm256_storeu_ps(to, _mm256_cvtph_ps(_mm_loadu_si128((const __m128i *)(const void *)(from))));           \
-    _mm_storeu_ps((to) + 8, _mm_cvtph_ps(_mm_loadl_epi64((const __m128i *)(const void *)((from) + 8))))
-#include "solver/linalg/tiled_wide.inc"
+#define LANE_FLOATS 8
+#define LANES_FMA(a, b, c) (lanes) _mm256_fmadd_ps((__m256)(a), (__m256)(b), (__m256)(c))
+#include "solver/linalg/tiled_kernels.inc"
 
 #define KERNEL(name) name##_avx512
 #define TARGET CPU_AVX512_TARGET
-#define SCALAR_FMA(a, b, c) __builtin_fmaf(a, b, c)
-#define FLOATS_OF_HALVES(from, to)                                                                           \
-    _mm256_storeu_ps(to, _mm256_cvtph_ps(_mm_loadu_si128((const __m128i *)(const void *)(from))));           \
-    _mm_storeu_ps((to) + 8, _mm_cvtph_ps(_mm_loadl_epi64((const __m128i *)(const void *)((from) + 8))))
-#include "solver/linalg/tiled_wide.inc"
+#define LANE_FLOATS 16
+#define LANES_FMA(a, b, c) (lanes) _mm512_fmadd_ps((__m512)(a), (__m512)(b), (__m512)(c))
+#include "solver/linalg/tiled_kernels.inc"
+
+/* y of a group from a quarter of its lanes, [TILE][4]; the fourth row is for show. */
+CPU_AVX2_TARGET static inline void finish_group(const tiled_rows *t, size_t g, __m128 a, __m128 b, __m128 c,
+                                                float *y) {
+    __m128 d = _mm_setzero_ps();
+    const uint32_t first = t->first[g], size = t->first[g + 1] - first;
+    _MM_TRANSPOSE4_PS(a, b, c, d);
+    const __m128 sums =
+        _mm_mul_ps(_mm_loadu_ps(t->step + first), _mm_add_ps(_mm_add_ps(a, c), _mm_add_ps(b, d)));
+    if (size == TILE) {
+        _mm_storel_pi((__m64 *)(void *)(y + first), sums);
+        _mm_store_ss(y + first + 2, _mm_movehl_ps(sums, sums));
+    } else {
+        float each[4];
+        _mm_storeu_ps(each, sums);
+        for (uint32_t r = 0; r < size; r++) y[first + r] = each[r];
+    }
+}
 
 /* Lanes 0 to 7 and 8 to 11 of a row of four tiles. */
 CPU_AVX2_TARGET static void group_avx2(const tiled_rows *t, size_t g, const float *x, float *y) {
@@ -178,96 +248,145 @@ CPU_AVX2_TARGET static void group_avx2(const tiled_rows *t, size_t g, const floa
                   right = _mm256_setr_epi32(2, 4, 5, 6, 0, 0, 0, 0);
     __m256 low[TILE] = {_mm256_setzero_ps(), _mm256_setzero_ps(), _mm256_setzero_ps()};
     __m128 high[TILE] = {_mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps()};
-    for (uint64_t k = t->begin[g]; k < t->begin[g + 1]; k++) {
-        const uint32_t *c = t->columns + k * TILES_AT_ONCE;
-        const uint16_t *v = t->values + k * TILE * TILE_LANES;
-        const __m256 a = _mm256_loadu2_m128(x + c[1], x + c[0]), b = _mm256_loadu2_m128(x + c[3], x + c[2]);
-        const __m256 X =
-            _mm256_blend_ps(_mm256_permutevar8x32_ps(a, left), _mm256_permutevar8x32_ps(b, middle), 0xC0);
-        const __m128 Z = _mm256_castps256_ps128(_mm256_permutevar8x32_ps(b, right));
+    for (size_t part = g * t->n_planes; part < (g + 1) * t->n_planes; part++) {
         for (size_t r = 0; r < TILE; r++) {
-            const uint16_t *h = v + r * TILE_LANES;
-            low[r] = _mm256_fmadd_ps(_mm256_cvtph_ps(_mm_loadu_si128((const __m128i *)(const void *)h)), X,
-                                     low[r]);
-            high[r] = _mm_fmadd_ps(_mm_cvtph_ps(_mm_loadl_epi64((const __m128i *)(const void *)(h + 8))), Z,
-                                   high[r]);
+            low[r] = _mm256_mul_ps(low[r], _mm256_set1_ps(radix));
+            high[r] = _mm_mul_ps(high[r], _mm_set1_ps(radix));
+        }
+        for (uint64_t f = t->begin[part]; f < t->begin[part + 1]; f++) {
+            const tile_four *four = &t->fours[f];
+            const float *from = x + four->base;
+            const __m256 a = _mm256_loadu2_m128(from + four->beyond[1], from + four->beyond[0]);
+            const __m256 b = _mm256_loadu2_m128(from + four->beyond[3], from + four->beyond[2]);
+            const __m256 X =
+                _mm256_blend_ps(_mm256_permutevar8x32_ps(a, left), _mm256_permutevar8x32_ps(b, middle), 0xC0);
+            const __m128 Z = _mm256_castps256_ps128(_mm256_permutevar8x32_ps(b, right));
+            for (size_t r = 0; r < TILE; r++) {
+                const int8_t *v = four->values[r];
+                int32_t last;
+                memcpy(&last, v + 8, sizeof last);
+                low[r] = _mm256_fmadd_ps(_mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(
+                                             _mm_loadl_epi64((const __m128i *)(const void *)v))),
+                                         X, low[r]);
+                high[r] =
+                    _mm_fmadd_ps(_mm_cvtepi32_ps(_mm_cvtepi8_epi32(_mm_cvtsi32_si128(last))), Z, high[r]);
+            }
         }
     }
-    for (size_t r = 0; t->first[g] + r < t->first[g + 1]; r++) {
-        float lanes[TILE_LANES];
-        _mm256_storeu_ps(lanes, low[r]);
-        _mm_storeu_ps(lanes + 8, high[r]);
-        y[t->first[g] + r] = t->scale * sum_of_lanes(lanes);
-    }
+    __m128 quarter[TILE];
+    for (size_t r = 0; r < TILE; r++)
+        quarter[r] =
+            _mm_add_ps(_mm_add_ps(_mm256_castps256_ps128(low[r]), high[r]), _mm256_extractf128_ps(low[r], 1));
+    finish_group(t, g, quarter[0], quarter[1], quarter[2], y);
 }
 
 CPU_AVX512_TARGET static void group_avx512(const tiled_rows *t, size_t g, const float *x, float *y) {
     const __m512i packed = _mm512_setr_epi32(0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, 0, 0, 0, 0);
-    __m512 sums[TILE] = {_mm512_setzero_ps(), _mm512_setzero_ps(), _mm512_setzero_ps()};
-    for (uint64_t k = t->begin[g]; k < t->begin[g + 1]; k++) {
-        const uint32_t *c = t->columns + k * TILES_AT_ONCE;
-        const uint16_t *v = t->values + k * TILE * TILE_LANES;
-        const __m256 a = _mm256_loadu2_m128(x + c[1], x + c[0]), b = _mm256_loadu2_m128(x + c[3], x + c[2]);
-        const __m512 X =
-            _mm512_maskz_permutexvar_ps(0xFFF, packed, _mm512_insertf32x8(_mm512_castps256_ps512(a), b, 1));
-        for (size_t r = 0; r < TILE; r++) {
-            const __m256i h = _mm256_loadu_si256((const __m256i *)(const void *)(v + r * TILE_LANES));
-            sums[r] = _mm512_fmadd_ps(_mm512_cvtph_ps(h), X, sums[r]);
+    __m512 lanes[TILE] = {_mm512_setzero_ps(), _mm512_setzero_ps(), _mm512_setzero_ps()};
+    for (size_t part = g * t->n_planes; part < (g + 1) * t->n_planes; part++) {
+        for (size_t r = 0; r < TILE; r++) lanes[r] = _mm512_mul_ps(lanes[r], _mm512_set1_ps(radix));
+        for (uint64_t f = t->begin[part]; f < t->begin[part + 1]; f++) {
+            const tile_four *four = &t->fours[f];
+            const float *from = x + four->base;
+            const __m256 a = _mm256_loadu2_m128(from + four->beyond[1], from + four->beyond[0]);
+            const __m256 b = _mm256_loadu2_m128(from + four->beyond[3], from + four->beyond[2]);
+            const __m512 X = _mm512_maskz_permutexvar_ps(0xFFF, packed,
+                                                         _mm512_insertf32x8(_mm512_castps256_ps512(a), b, 1));
+            for (size_t r = 0; r < TILE; r++) {
+                const __m128i v = _mm_loadu_si128((const __m128i *)(const void *)four->values[r]);
+                lanes[r] = _mm512_fmadd_ps(_mm512_cvtepi32_ps(_mm512_cvtepi8_epi32(v)), X, lanes[r]);
+            }
         }
     }
-    for (size_t r = 0; t->first[g] + r < t->first[g + 1]; r++) {
-        float lanes[16];
-        _mm512_storeu_ps(lanes, sums[r]);
-        y[t->first[g] + r] = t->scale * sum_of_lanes(lanes);
-    }
+    __m128 quarter[TILE];
+    for (size_t r = 0; r < TILE; r++)
+        quarter[r] =
+            _mm_add_ps(_mm_add_ps(_mm512_castps512_ps128(lanes[r]), _mm512_extractf32x4_ps(lanes[r], 2)),
+                       _mm512_extractf32x4_ps(lanes[r], 1));
+    finish_group(t, g, quarter[0], quarter[1], quarter[2], y);
 }
 #endif
 
-/* one: a group of rows times one vector; wide: times WIDTH, side is [n + TILED_PAST][WIDTH], of which m are
- * written to Y. */
+/* Of a group of rows and the columns times their steps: one vector x; WIDTH vectors, side is
+ * [n + COLUMNS_PAST][WIDTH], of which m are written to Y; the transposed rows times x added to y. */
 typedef struct kernels {
     void (*one)(const tiled_rows *t, size_t g, const float *x, float *y);
     void (*wide)(const tiled_rows *t, size_t g, size_t m, const float *side, float *Y);
+    void (*columns)(const tiled_rows *t, size_t g, const float *x, float *y);
 } kernels;
 
 #define KERNELS(name)                                                                                        \
-    { group_##name, wide_##name }
+    { group_##name, wide_##name, columns_##name }
 static const kernels kernels_of[] = CPU_TABLE(KERNELS(portable), KERNELS(avx2), KERNELS(avx512));
 #undef KERNELS
 
 size_t tiled_work(size_t n, size_t m) {
-    return m > 1 ? (n + TILED_PAST) * WIDTH : 0;
+    return (n + COLUMNS_PAST) * (m > 1 ? WIDTH : 1);
 }
 
 void tiled_multiply(const tiled_rows *t, size_t m, const float *X, float *Y, float *work, size_t n_threads) {
     const kernels run = kernels_of[cpu_best()];
-    const size_t n = t->n;
-    const bool many = n_threads > 1 && t->begin[t->n_groups] * TILE * TILE_LANES * m > THREADS_WORTH;
+    const size_t n = t->n, width = m > 1 ? WIDTH : 1;
+    const bool many =
+        n_threads > 1 && t->begin[t->n_groups * t->n_planes] * TILE * TILE_LANES * m > THREADS_WORTH;
 #pragma omp parallel num_threads((int)n_threads) if (many)
     {
-        if (m > 1)
 #pragma omp for schedule(static)
-            for (size_t p = 0; p < n + TILED_PAST; p++)
-                for (size_t v = 0; v < WIDTH; v++) work[p * WIDTH + v] = v < m && p < n ? X[v * n + p] : 0;
+        for (size_t p = 0; p < n + COLUMNS_PAST; p++)
+            for (size_t v = 0; v < width; v++)
+                work[p * width + v] = v < m && p < n ? t->step[p] * X[v * n + p] : 0;
 #pragma omp for schedule(dynamic, GROUPS_AT_ONCE)
         for (size_t g = 0; g < t->n_groups; g++) {
             if (m > 1)
                 run.wide(t, g, m, work, Y);
             else
-                run.one(t, g, X, Y);
+                run.one(t, g, work, Y);
         }
     }
 }
 
-void tiled_multiply_rows(const tiled_rows *t, size_t count, const uint32_t *rows, const float *x, float *y) {
+/* work [n + COLUMNS_PAST] = the columns' steps times x. */
+static void scale_columns(const tiled_rows *t, const float *x, float *work) {
+    for (size_t p = 0; p < t->n; p++) work[p] = t->step[p] * x[p];
+    memset(work + t->n, 0, COLUMNS_PAST * sizeof *work);
+}
+
+void tiled_multiply_rows(const tiled_rows *t, size_t count, const uint32_t *rows, const float *x, float *y,
+                         float *work) {
     const kernels run = kernels_of[cpu_best()];
+    scale_columns(t, x, work);
     for (size_t k = 0; k < count; k++)
         if (k == 0 || t->group_of[rows[k]] != t->group_of[rows[k - 1]])
-            run.one(t, t->group_of[rows[k]], x, y);
+            run.one(t, t->group_of[rows[k]], work, y);
+}
+
+static bool is_dark(const tiled_rows *t, size_t g, const float *x) {
+    for (size_t i = t->first[g]; i < t->first[g + 1]; i++)
+        if (x[i] != 0) return false;
+    return true;
+}
+
+bool tiled_few_columns(const tiled_rows *t, const float *x) {
+    const uint64_t most = t->begin[t->n_groups * t->n_planes] / COLUMNS_SHARE;
+    uint64_t met = 0;
+    for (size_t g = 0; g < t->n_groups; g++) {
+        if (is_dark(t, g, x)) continue;
+        met += t->begin[(g + 1) * t->n_planes] - t->begin[g * t->n_planes];
+        if (met > most) return false;
+    }
+    return true;
+}
+
+void tiled_multiply_columns(const tiled_rows *t, const float *x, float *y, float *work) {
+    const kernels run = kernels_of[cpu_best()];
+    memset(work, 0, (t->n + COLUMNS_PAST) * sizeof *work);
+    for (size_t g = 0; g < t->n_groups; g++)
+        if (!is_dark(t, g, x)) run.columns(t, g, x, work);
+    for (size_t i = 0; i < t->n; i++) y[i] = t->step[i] * work[i];
 }
 
 size_t tiled_bytes(const tiled_rows *t) {
-    return (size_t)t->begin[t->n_groups] *
-               (TILES_AT_ONCE * sizeof *t->columns + TILE * TILE_LANES * sizeof *t->values) +
-           t->n_groups * (sizeof *t->first + sizeof *t->begin);
+    const size_t parts = t->n_groups * t->n_planes;
+    return (size_t)t->begin[parts] * sizeof *t->fours + parts * sizeof *t->begin + t->n * sizeof *t->step +
+           t->n_groups * sizeof *t->first;
 }

@@ -79,16 +79,22 @@ static inline float finish(lam_quantity quantity, float rho, float lit, float P,
     return 0.0f;
 }
 
-/* One row of out (mesh order) from the same row of E' and of P (position order) and of H0 (mesh order, NULL:
- * 0). out may be P when there is no order. */
-static void finish_row(const lam_operator *op, size_t c, lam_quantity quantity, const float *lit,
+/* E' = E + rho H0 of an element. */
+static inline float light(const float *rho, const float *E, const float *H0, size_t i) {
+    return H0 != NULL ? E[i] + rho[i] * H0[i] : E[i];
+}
+
+/* One row of out from the same row of E and of H0 (NULL: 0), all in mesh order, and of P (position order).
+ * out may be P when there is no order. Elements are taken in mesh order, as scattered reads cost less than
+ * scattered writes. */
+static void finish_row(const lam_operator *op, size_t c, lam_quantity quantity, const float *E,
                        const float *H0, const float *P, float *out) {
     const float *rho = op->reflectance + c * op->n;
 #pragma omp parallel for schedule(static)                                                                    \
     num_threads((int)op->n_threads) if (op->n_threads > 1 && op->n >= THREADS_WORTH)
-    for (size_t p = 0; p < op->n; p++) {
-        const size_t i = op->order != NULL ? op->order[p] : p;
-        out[i] = finish(quantity, rho[i], lit[p], P[p], H0 != NULL ? H0[i] : 0.0f);
+    for (size_t i = 0; i < op->n; i++) {
+        const float h = H0 != NULL ? H0[i] : 0.0f;
+        out[i] = finish(quantity, rho[i], light(rho, E, H0, i), P[operator_position(op, i)], h);
     }
 }
 
@@ -110,7 +116,7 @@ static void light_row(const lam_operator *op, size_t c, const float *E, const fl
     num_threads((int)op->n_threads) if (op->n_threads > 1 && op->n >= THREADS_WORTH)
     for (size_t p = 0; p < op->n; p++) {
         const size_t i = op->order != NULL ? op->order[p] : p;
-        lit[p] = H0 != NULL ? E[i] + rho[i] * H0[i] : E[i];
+        lit[p] = light(rho, E, H0, i);
     }
 }
 
@@ -145,7 +151,7 @@ static void apply_pass(const lam_operator *op, const pass *in, float *out, void 
         const float *H0 = in->H0 != NULL ? in->H0 + row * n : NULL;
         const size_t c = row % op->n_channels;
         if (in->selected == NULL)
-            finish_row(op, c, in->quantity, lit + row * n, H0, P + row * n, out + row * n);
+            finish_row(op, c, in->quantity, in->E + row * n, H0, P + row * n, out + row * n);
         else
             finish_selected(op, c, in->quantity, lit + row * n, H0, in->n_selected, in->selected, !choose,
                             P + row * (choose ? in->n_selected : n), out + row * in->n_selected);
@@ -199,7 +205,7 @@ static void share_pass(const lam_operator *op, size_t n_parts, const lam_part *p
                     const float *H0 = part->H0 != NULL ? part->H0 + row * n : NULL;
                     float *lit_row = lit + done_rows * n;
                     if (handing_out)
-                        finish_row(op, c, part->quantity, lit_row, H0, P + done_rows * n,
+                        finish_row(op, c, part->quantity, part->E + row * n, H0, P + done_rows * n,
                                    part->out + row * n);
                     else
                         light_row(op, c, part->E + row * n, H0, lit_row);

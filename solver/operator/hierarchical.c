@@ -4,10 +4,8 @@
 #include "solver/operator/hierarchical.h"
 
 #include "solver/base/work_area.h"
-#include "solver/linalg/sparse_product.h"
 #include "solver/linalg/tiled.h"
 #include "solver/operator/mean_correction.h"
-#include "solver/operator/wavelet/wavelet_plan.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -21,26 +19,31 @@ typedef struct hierarchical {
     lam_operator base;
     wavelets basis;
     wavelet_plan plan; /* of the coefficients that any K has */
-    half_matrix *K;    /* [C] */
-    tiled_rows *fast;  /* [C], the rows of K */
-    float *root_area;  /* [n] A^1/2, by position */
-    float *left;       /* [C][n] rho' A^-1/2, by position */
+    size_t n_groups;
+    tile_group *groups; /* [n_groups], by number in the basis, all that the plan has */
+    float *step;        /* [n_groups] */
+    tiled_rows *K;      /* [C] */
+    double n_numbers;   /* of all K, both triangles */
+    float *root_area;   /* [n] A^1/2, by position */
+    float *left;        /* [C][n] rho' A^-1/2, by position */
     mean_correction even;
 } hierarchical;
 
 void hierarchical_arrays_free(hierarchical_arrays *arrays, size_t n_channels) {
     for (size_t c = 0; arrays->K != NULL && c < n_channels; c++) csr_free(&arrays->K[c]);
     free(arrays->K);
+    free(arrays->step);
     wavelets_free(&arrays->basis);
     arrays->K = NULL;
+    arrays->step = NULL;
 }
 
 static void hierarchical_destroy(lam_operator *op) {
     hierarchical *self = (hierarchical *)op;
-    for (size_t c = 0; self->fast != NULL && c < op->n_channels; c++) tiled_free(&self->fast[c]);
-    for (size_t c = 0; self->K != NULL && c < op->n_channels; c++) csr_free(&self->K[c].rows);
-    free(self->fast);
+    for (size_t c = 0; self->K != NULL && c < op->n_channels; c++) tiled_free(&self->K[c]);
     free(self->K);
+    free(self->groups);
+    free(self->step);
     free(self->root_area);
     free(self->left);
     mean_correction_free(&self->even);
@@ -58,10 +61,8 @@ static lam_status start(size_t n, size_t n_channels, const float *reflectance, c
     TRY(operator_init(&self->base, &operator_hierarchical, n, n_channels, reflectance, error));
     self->root_area = memory_allocate(n, sizeof *self->root_area, "operator", error);
     self->K = memory_allocate(n_channels, sizeof *self->K, "operator", error);
-    self->fast = memory_allocate(n_channels, sizeof *self->fast, "operator", error);
     self->left = memory_allocate(n_channels, n * sizeof *self->left, "operator", error);
-    if (self->root_area == NULL || self->left == NULL || self->K == NULL || self->fast == NULL)
-        TRY(LAM_ERR_MEMORY);
+    if (self->root_area == NULL || self->left == NULL || self->K == NULL) TRY(LAM_ERR_MEMORY);
     TRY(operator_set_order(&self->base, order, error));
     for (size_t p = 0; p < n; p++) {
         self->root_area[p] = (float)sqrt(area[p]);
@@ -101,44 +102,39 @@ done:
     return status;
 }
 
-/* first [n_used + 1]: the coefficients of a node are a group of rows, and those of several nodes where they
- * fit. Returns the number of groups. */
-static size_t group_coefficients(const wavelet_plan *plan, uint32_t *first) {
-    size_t n_groups = 0, begin = 0, end = 0; /* of the last group */
-    for (size_t t = 0; t <= plan->n_steps; t++) {
-        size_t count = t < plan->n_steps ? plan->steps[t].own : plan->n_used - end;
-        for (size_t most = TILE; count > 0; count -= most) {
-            most = count < TILE ? count : TILE;
-            if (n_groups == 0 || end - begin + most > TILE) {
-                begin = end;
-                first[n_groups++] = (uint32_t)begin;
-            }
-            end += most;
-        }
-    }
-    first[n_groups] = (uint32_t)end;
-    return n_groups;
-}
+/* The largest number over its step, as tile_matrix_round says. */
+static const double most_steps = 0x1p29;
 
-/* Makes of basis and K the arrays that answers read. */
-static lam_status finish(hierarchical *self, lam_error *error) {
+/* Makes the arrays that answers read of the upper triangles K [C]. */
+static lam_status round_K(hierarchical *self, const csr *K, const float *step, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = self->base.n, C = self->base.n_channels;
+    tile_matrix tiles = {.count = {0}};
+    float largest = 0;
     bool *used = memory_allocate(n, sizeof *used, "operator", error);
-    uint32_t *first = memory_allocate(n + 1, sizeof *first, "operator", error);
-    if (used == NULL || first == NULL) TRY(LAM_ERR_MEMORY);
+    if (used == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t c = 0; c < C; c++)
         for (size_t i = 0; i < n; i++)
-            used[i] = used[i] || self->K[c].rows.indptr[i + 1] > self->K[c].rows.indptr[i];
+            for (uint64_t e = K[c].indptr[i]; e < K[c].indptr[i + 1]; e++) {
+                const float value = K[c].data[e];
+                if (!isfinite(value))
+                    FAIL(error, LAM_ERR_NUMERIC, "K[%zu] = %g, must be finite", (size_t)e, (double)value);
+                if (value == 0) continue;
+                used[i] = used[K[c].indices[e]] = true;
+                largest = fmaxf(largest, fabsf(value));
+            }
     TRY(wavelet_plan_create(&self->basis, used, &self->plan, error));
-    const size_t n_groups = group_coefficients(&self->plan, first);
+    TRY(hierarchical_groups(&self->plan, step, (float)sqrt((double)largest / most_steps), &self->n_groups,
+                            &self->groups, &self->step, error));
     for (size_t c = 0; c < C; c++) {
-        TRY(half_matrix_compact(&self->K[c], self->plan.coefficient, self->plan.n_used, error));
-        TRY(tiled_create(&self->K[c].rows, self->K[c].scale, n_groups, first, &self->fast[c], error));
+        TRY(tile_matrix_round(&K[c], self->n_groups, self->groups, self->step, &tiles, error));
+        self->n_numbers += (double)tile_matrix_numbers(&tiles);
+        TRY(tiled_create(&tiles, self->n_groups, self->groups, self->step, &self->K[c], error));
+        tile_matrix_free(&tiles);
     }
 done:
+    tile_matrix_free(&tiles);
     free(used);
-    free(first);
     return status;
 }
 
@@ -148,15 +144,70 @@ lam_status operator_hierarchical_create(size_t n, size_t n_channels, const float
     lam_status status = LAM_OK;
     hierarchical *self = NULL;
     TRY(start(n, n_channels, reflectance, area, order, &self, error));
-    for (size_t c = 0; c < n_channels; c++) TRY(half_matrix_create(&arrays->K[c], &self->K[c], error));
     self->basis = arrays->basis;
     arrays->basis = (wavelets){.n = 0};
-    TRY(finish(self, error));
+    TRY(round_K(self, arrays->K, arrays->step, error));
     *op = &self->base;
     self = NULL;
 done:
     hierarchical_arrays_free(arrays, n_channels);
     if (self != NULL) lam_operator_close(&self->base);
+    return status;
+}
+
+/* Reads groups and tiles. */
+static lam_status load_tiles(hierarchical *self, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    char group[48];
+    const size_t n = self->base.n;
+    tile_matrix tiles = {.count = {0}};
+    bool *used = memory_allocate(n, sizeof *used, "operator", error);
+    if (used == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(hierarchical_load_groups(s, n, &self->n_groups, &self->groups, &self->step, error));
+    size_t count = 0;
+    for (size_t g = 0; g < self->n_groups; g++)
+        for (size_t r = 0; r < self->groups[g].size; r++, count++) used[self->groups[g].first + r] = true;
+    TRY(wavelet_plan_create(&self->basis, used, &self->plan, error));
+    if (count != self->plan.n_used)
+        FAIL(error, LAM_ERR_NUMERIC,
+             "groups/rows has %zu coefficients, must have all %zu of its nodes and of the root", count,
+             self->plan.n_used);
+    for (size_t c = 0; c < self->base.n_channels; c++) {
+        snprintf(group, sizeof group, "/operator/K/%zu", c);
+        TRY(hierarchical_load_tiles(s, group, self->n_groups, self->groups, &tiles, error));
+        self->n_numbers += (double)tile_matrix_numbers(&tiles);
+        TRY(tiled_create(&tiles, self->n_groups, self->groups, self->step, &self->K[c], error));
+        tile_matrix_free(&tiles);
+    }
+done:
+    tile_matrix_free(&tiles);
+    free(used);
+    return status;
+}
+
+/* Reads numbers in half precision and rounds them as if they had just been found. */
+static lam_status load_halves(hierarchical *self, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    char group[48];
+    const size_t C = self->base.n_channels;
+    double threshold;
+    float *step = NULL;
+    csr *K = memory_allocate(C, sizeof *K, "operator", error);
+    if (K == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t c = 0; c < C; c++) {
+        snprintf(group, sizeof group, "/operator/K/%zu", c);
+        TRY(hierarchical_load_halves(s, group, self->base.n, &K[c], error));
+    }
+    TRY(store_get_number(s, "/operator", "threshold", &threshold, error));
+    if (!(threshold > 0 && threshold <= 1))
+        FAIL(error, LAM_ERR_FORMAT, "%s: /operator has the threshold %g, must be above 0 and at most 1",
+             store_path(s), threshold);
+    TRY(hierarchical_steps(&self->basis, threshold, &step, error));
+    TRY(round_K(self, K, step, error));
+done:
+    for (size_t c = 0; K != NULL && c < C; c++) csr_free(&K[c]);
+    free(K);
+    free(step);
     return status;
 }
 
@@ -189,20 +240,15 @@ done:
 static lam_status hierarchical_load(store *s, size_t n, size_t n_channels, const float *reflectance,
                                     lam_operator **op, lam_error *error) {
     lam_status status = LAM_OK;
-    char group[48];
     double *area = NULL;
     uint32_t *order = NULL;
     hierarchical *self = NULL;
     TRY(read_area(s, n, &area, &order, error));
     TRY(start(n, n_channels, reflectance, area, order, &self, error));
     TRY(wavelets_load(s, "/operator/basis", n, &self->basis, error));
-    for (size_t c = 0; c < n_channels; c++) {
-        snprintf(group, sizeof group, "/operator/K/%zu", c);
-        TRY(half_matrix_load(s, group, n, &self->K[c], error));
-    }
     TRY(mean_correction_load(s, n, n_channels, &self->even, error));
     TRY(lift_even_light(self, error));
-    TRY(finish(self, error));
+    TRY(store_has(s, "/operator/groups") ? load_tiles(self, s, error) : load_halves(self, s, error));
     *op = &self->base;
     self = NULL;
 done:
@@ -216,13 +262,18 @@ static lam_status hierarchical_save(const lam_operator *op, store *s, lam_error 
     lam_status status = LAM_OK;
     const hierarchical *self = (const hierarchical *)op;
     char group[48];
+    tile_matrix tiles = {.count = {0}};
     TRY(wavelets_save(&self->basis, "/operator/basis", s, error));
+    TRY(hierarchical_save_groups(self->n_groups, self->groups, self->step, s, error));
     for (size_t c = 0; c < op->n_channels; c++) {
         snprintf(group, sizeof group, "/operator/K/%zu", c);
-        TRY(half_matrix_save(&self->K[c], group, s, error));
+        TRY(tiled_upper(&self->K[c], &tiles, error));
+        TRY(hierarchical_save_tiles(&tiles, self->n_groups, group, s, error));
+        tile_matrix_free(&tiles);
     }
     TRY(mean_correction_save(&self->even, s, error));
 done:
+    tile_matrix_free(&tiles);
     return status;
 }
 
@@ -234,42 +285,30 @@ static size_t some_bytes(const wavelet_plan *plan) {
 
 static size_t hierarchical_work_bytes(const lam_operator *op, size_t n_rhs) {
     const hierarchical *self = (const hierarchical *)op;
-    const size_t used = self->plan.n_used, product = sparse_product_work(used, 1);
-    size_t side, vectors, coefficients, slots, total = WORK_AREA_ALIGN;
-    if (product == 0 || !size_multiply(tiled_work(used, n_rhs), sizeof(float), &side) ||
+    const size_t used = self->plan.n_used;
+    size_t product, vectors, coefficients, slots, total = WORK_AREA_ALIGN;
+    if (!size_multiply(tiled_work(used, n_rhs), sizeof(float), &product) ||
         !size_multiply(op->n, n_rhs * sizeof(float), &vectors) ||
-        !size_multiply(used + TILED_PAST, n_rhs * sizeof(float), &coefficients) ||
+        !size_multiply(used, n_rhs * sizeof(float), &coefficients) ||
         !size_multiply(wavelet_plan_work(&self->plan), n_rhs * sizeof(float), &slots) ||
         !work_area_add(&total, vectors) || !work_area_add(&total, coefficients) ||
         !work_area_add(&total, coefficients) || !work_area_add(&total, slots) ||
-        !work_area_add(&total, some_bytes(&self->plan)) || !work_area_add(&total, side) ||
-        !work_area_add(&total, product))
+        !work_area_add(&total, some_bytes(&self->plan)) || !work_area_add(&total, product))
         return 0;
     return total;
 }
 
-/* Room for the coefficients of n_rhs vectors and what a product may read behind them. */
-static float *take_coefficients(void **work, const wavelet_plan *plan, size_t n_rhs) {
-    float *made = work_area_take(work, (n_rhs * plan->n_used + TILED_PAST) * sizeof *made);
-    memset(made + n_rhs * plan->n_used, 0, TILED_PAST * sizeof *made);
-    return made;
-}
-
 /* out_v = K_c in_v: light of few elements by its columns, other vectors together. */
 static void multiply_core(const hierarchical *self, size_t c, size_t m, const float *in, float *out,
-                          float *side, void *product) {
-    const csr *K = &self->K[c].rows;
-    const size_t n = K->n, n_threads = self->base.n_threads;
-    const sparse_pair symmetric = {K, K, n_threads};
+                          float *work) {
+    const tiled_rows *K = &self->K[c];
     for (size_t v = 0, last; v < m; v = last) {
         last = v;
-        while (last < m && !sparse_product_by_columns(K, in + last * n)) last++;
-        if (last > v) {
-            tiled_multiply(&self->fast[c], last - v, in + v * n, out + v * n, side, n_threads);
-        } else {
-            sparse_product(&symmetric, 1, in + v * n, n, 0, NULL, NULL, out + v * n, n, product);
-            last++;
-        }
+        while (last < m && !tiled_few_columns(K, in + last * K->n)) last++;
+        if (last > v)
+            tiled_multiply(K, last - v, in + v * K->n, out + v * K->n, work, self->base.n_threads);
+        else
+            tiled_multiply_columns(K, in + v * K->n, out + last++ * K->n, work);
     }
 }
 
@@ -306,10 +345,9 @@ static void apply(const lam_operator *op, bool adjoint, size_t n_rhs, const floa
     const wavelet_plan *plan = &self->plan;
     const size_t n = op->n, C = op->n_channels, n_threads = op->n_threads;
     float *X = work_area_take(&work, n_rhs * n * sizeof *X);
-    float *from = take_coefficients(&work, plan, n_rhs);
+    float *from = work_area_take(&work, n_rhs * plan->n_used * sizeof *from);
     float *to = work_area_take(&work, n_rhs * plan->n_used * sizeof *to);
     float *slots = work_area_take(&work, n_rhs * wavelet_plan_work(plan) * sizeof *slots);
-    float *side = work_area_take(&work, tiled_work(plan->n_used, n_rhs) * sizeof *side);
     for (size_t c = 0; c < C; c++) {
         const float *left = self->left + c * n, *root = self->root_area;
         if (are_dark(in + c * n, n, C * n, n_rhs)) {
@@ -318,7 +356,7 @@ static void apply(const lam_operator *op, bool adjoint, size_t n_rhs, const floa
         }
         scale(n_rhs, n, adjoint ? left : root, in + c * n, C * n, X, n, n_threads);
         wavelet_plan_forward(plan, n_rhs, X, from, slots, n_threads);
-        multiply_core(self, c, n_rhs, from, to, side, work);
+        multiply_core(self, c, n_rhs, from, to, work);
         wavelet_plan_inverse(plan, n_rhs, to, X, slots, n_threads);
         scale(n_rhs, n, adjoint ? root : left, X, n, out + c * n, C * n, n_threads);
         for (size_t v = 0; v < n_rhs; v++) {
@@ -344,10 +382,9 @@ static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, co
     const wavelet_plan *plan = &self->plan;
     const size_t n = op->n, C = op->n_channels, used = plan->n_used, n_threads = op->n_threads;
     float *X = work_area_take(&work, n_rhs * n * sizeof *X);
-    float *from = take_coefficients(&work, plan, n_rhs);
+    float *from = work_area_take(&work, n_rhs * used * sizeof *from);
     float *to = work_area_take(&work, n_rhs * used * sizeof *to);
     float *slots = work_area_take(&work, n_rhs * wavelet_plan_work(plan) * sizeof *slots);
-    float *side = work_area_take(&work, tiled_work(used, n_rhs) * sizeof *side);
     uint32_t *steps = work_area_take(&work, plan->n_steps * sizeof *steps);
     uint32_t *rows = work_area_take(&work, used * sizeof *rows);
     uint32_t *positions = work_area_take(&work, n * sizeof *positions);
@@ -361,7 +398,6 @@ static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, co
     const bool some = few && n_steps * SOME_STEPS < plan->n_steps;
     if (some) n_rows = wavelet_plan_coefficients(plan, n_steps, steps, rows);
     for (size_t c = 0; c < C; c++) {
-        const csr *K = &self->K[c].rows;
         const float *left = self->left + c * n;
         if (are_dark(E + c * n, n, C * n, n_rhs)) {
             for (size_t v = 0; v < n_rhs; v++)
@@ -371,7 +407,7 @@ static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, co
         scale(n_rhs, n, self->root_area, E + c * n, C * n, X, n, n_threads);
         wavelet_plan_forward(plan, n_rhs, X, from, slots, n_threads);
         if (!some) {
-            multiply_core(self, c, n_rhs, from, to, side, work);
+            multiply_core(self, c, n_rhs, from, to, work);
             wavelet_plan_inverse(plan, n_rhs, to, X, slots, n_threads);
         }
         for (size_t v = 0; v < n_rhs; v++) {
@@ -379,10 +415,10 @@ static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, co
                 memset(P + (v * C + c) * n_selected, 0, n_selected * sizeof *P);
                 continue;
             }
-            if (some && sparse_product_by_columns(K, from + v * used))
-                multiply_core(self, c, 1, from + v * used, to, side, work);
+            if (some && tiled_few_columns(&self->K[c], from + v * used))
+                tiled_multiply_columns(&self->K[c], from + v * used, to, work);
             else if (some)
-                tiled_multiply_rows(&self->fast[c], n_rows, rows, from + v * used, to);
+                tiled_multiply_rows(&self->K[c], n_rows, rows, from + v * used, to, work);
             if (some) wavelet_plan_inverse_some(plan, n_steps, steps, to, X + v * n, slots);
             const mean_correction *even = &self->even;
             const float *lift = even->missing != NULL ? even->lift + c * n : NULL;
@@ -404,16 +440,11 @@ static void hierarchical_apply_adjoint(const lam_operator *op, size_t n_rhs, flo
 static void hierarchical_describe(const lam_operator *op, operator_description *description) {
     const hierarchical *self = (const hierarchical *)op;
     const double whole = (double)op->n * (double)op->n * (double)op->n_channels;
-    double entries = 0;
-    for (size_t c = 0; c < op->n_channels; c++) {
-        const size_t stored = (size_t)self->K[c].rows.indptr[self->plan.n_used];
-        entries += (double)stored;
-        description->bytes += tiled_bytes(&self->fast[c]);
-    }
+    for (size_t c = 0; c < op->n_channels; c++) description->bytes += tiled_bytes(&self->K[c]);
     description->bytes += mean_correction_bytes(&self->even);
     description->bytes += wavelet_plan_bytes(&self->plan) + (1 + op->n_channels) * op->n * sizeof(float);
-    description->precision = "f16"; /* of K in the store */
-    description->density = entries / whole;
+    description->precision = "i8"; /* of K */
+    description->density = self->n_numbers / whole;
 }
 
 const operator_kind operator_hierarchical = {
@@ -426,7 +457,7 @@ const operator_kind operator_hierarchical = {
     .apply_adjoint = hierarchical_apply_adjoint,
     .destroy = hierarchical_destroy,
     .describe = hierarchical_describe,
-    /* Both triangles twice, in rows of eight bytes a number and in tiles, of which one of 22 bytes holds
-     * three numbers or four; the store has four bytes a number of one triangle. */
-    .unpacked = 8,
+    /* Both triangles in tiles, of 12 bytes each; the store has of one triangle two bytes for a tile and one
+     * for each number in it, of which there are three or four. */
+    .unpacked = 5,
 };

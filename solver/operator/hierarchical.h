@@ -2,21 +2,22 @@
 #ifndef LAMBERT_OPERATOR_HIERARCHICAL_H
 #define LAMBERT_OPERATOR_HIERARCHICAL_H
 
-#include "solver/linalg/csr.h"
+#include "solver/linalg/tiles.h"
 #include "solver/operator/operator.h"
-#include "solver/operator/wavelet/wavelets.h"
+#include "solver/operator/wavelet/wavelet_plan.h"
 
 /* H_c = A^-1/2 W^T K_c W A^1/2 E_c, with K_c = W A^1/2 F (I - R_c F)^-1 A^-1/2 W^T, symmetric whatever R is,
  * of which entries below the threshold are left out. */
 typedef struct hierarchical_arrays {
     wavelets basis;
-    csr *K; /* [C], of n rows each: the upper triangle, the diagonal included */
+    csr *K;      /* [C], of n rows each: the upper triangle, the diagonal included */
+    float *step; /* [n], by coefficient: K_ij is rounded to a multiple of step_i step_j at most */
 } hierarchical_arrays;
 
 void hierarchical_arrays_free(hierarchical_arrays *arrays, size_t n_channels);
 
 /* area [n] is by position, that is in the order of the basis, which order [n] says (copied; NULL: mesh
- * order). Numbers of K are rounded to half precision. Takes over what arrays points to, also on an error, and
+ * order). Takes over what arrays points to, also on an error, and
  * zeroes it. Errors: as operator_init; LAM_ERR_NUMERIC for an area or a number that cannot be. */
 lam_status operator_hierarchical_create(size_t n, size_t n_channels, const float *reflectance,
                                         const double *area, const uint32_t *order,
@@ -28,28 +29,38 @@ lam_status operator_hierarchical_create(size_t n, size_t n_channels, const float
 lam_status operator_hierarchical_correct(lam_operator *op, const double *missing, const double *light,
                                          lam_error *error);
 
-/* A symmetric matrix with its numbers in half precision, times scale; defined in hierarchical_store.c. */
-typedef struct half_matrix {
-    size_t n;               /* rows and columns, empty ones included */
-    csr rows;               /* all of it, both triangles */
-    const uint32_t *number; /* of its rows and columns, ascending; NULL: all n. Not owned */
-    float scale;
-} half_matrix;
+/* The steps that keep the error of rounding K far below that of the numbers left out: out [n] by coefficient,
+ * for a threshold of 1 in coefficients of weight 1 (wavelets_weights), is freed by the caller. Errors:
+ * LAM_ERR_MEMORY. */
+lam_status hierarchical_steps(const wavelets *basis, double threshold, float **out, lam_error *error);
 
-/* From the upper triangle of a; its numbers are rounded. Errors: LAM_ERR_NUMERIC, LAM_ERR_MEMORY. */
-lam_status half_matrix_create(const csr *a, half_matrix *out, lam_error *error);
-
-/* Leaves out rows and columns that are not among number [count], which has all that are not empty and must
- * outlive m. Errors: LAM_ERR_MEMORY. */
-lam_status half_matrix_compact(half_matrix *m, const uint32_t *number, size_t count, lam_error *error);
+/* Cuts the coefficients of a plan into groups of neighbours in the basis, of at most TILE: those of a node,
+ * and of several nodes where they fit. group_step is the smallest step of a group's coefficients, but at
+ * least `least`. The caller frees groups and group_step, [n_groups]. Errors: LAM_ERR_MEMORY. */
+lam_status hierarchical_groups(const wavelet_plan *plan, const float *step, float least, size_t *n_groups,
+                               tile_group **groups, float **group_step, lam_error *error);
 
 /* Both triangles of a symmetric matrix from its upper one, without zeros; freed with csr_free. Errors:
  * LAM_ERR_MEMORY. */
 lam_status csr_mirror(const csr *upper, csr *out, lam_error *error);
 
-/* GROUP/count [n] u16 (u32 where a row has more than 65,535), gap [nnz] u16, data [nnz] f16, and the group's
- * attribute scale. Errors: as store_read; LAM_ERR_FORMAT where they do not fit together. */
-lam_status half_matrix_save(const half_matrix *m, const char *group, store *s, lam_error *error);
-lam_status half_matrix_load(store *s, const char *group, size_t n, half_matrix *out, lam_error *error);
+/* Of a K: GROUP/count [planes][n_groups] u16 (u32 where a row has more than 65,535 tiles), tile [tiles] u16,
+ * far u32, digit i8, as store/FORMAT.md says. Errors: as store_read; LAM_ERR_FORMAT where they do not fit
+ * together, LAM_ERR_NUMERIC for a tile that cannot be. */
+lam_status hierarchical_save_tiles(const tile_matrix *m, size_t n_groups, const char *group, store *s,
+                                   lam_error *error);
+lam_status hierarchical_load_tiles(store *s, const char *group, size_t n_groups, const tile_group *groups,
+                                   tile_matrix *out, lam_error *error);
+
+/* The upper triangle of a K of n rows in half precision: GROUP/count, gap, data and the group's attribute
+ * scale. Errors: as of tiles. */
+lam_status hierarchical_load_halves(store *s, const char *group, size_t n, csr *out, lam_error *error);
+
+/* /operator/groups: rows [n_groups][2] u32 and step [n_groups] f32, the rows ascending and below n. Errors:
+ * as store_read; LAM_ERR_NUMERIC. */
+lam_status hierarchical_save_groups(size_t n_groups, const tile_group *groups, const float *step, store *s,
+                                    lam_error *error);
+lam_status hierarchical_load_groups(store *s, size_t n, size_t *n_groups, tile_group **groups, float **step,
+                                    lam_error *error);
 
 #endif

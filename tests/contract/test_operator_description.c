@@ -26,7 +26,8 @@ START_TEST(says_what_it_is) {
         const size_t stored = (size_t)(description.density * (double)(t->n_channels * t->n * t->n) + .5);
         ck_assert_double_eq_tol(description.density, .05, .02);
         ck_assert_ptr_null(description.form);
-        ck_assert_uint_ge(description.bytes, 4 * stored); /* an index and a number of 16 bits */
+        ck_assert_str_eq(description.precision, "i8");
+        ck_assert_uint_ge(description.bytes, 12 * stored / 9); /* nine numbers of a tile, with its column */
     } else if (strcmp(t->kind, "exact") == 0) {
         ck_assert_double_eq(description.density, 1);
         ck_assert_ptr_null(description.form);

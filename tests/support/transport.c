@@ -107,13 +107,15 @@ static void make_up_for_even_light(transport *t, const double *area, uint64_t *s
     free(light);
 }
 
-/* P = R' A^-1/2 W^T K W A^1/2, K random, symmetric and of few numbers, which half precision has; of more
+/* P = R' A^-1/2 W^T K W A^1/2, K random, symmetric and of few numbers, multiples of the steps; of more
  * channels it is made up for even light, too. */
 static void make_hierarchical(transport *t, const transport_parts *parts) {
     uint64_t *state = parts->state;
     lam_error error = {.message = ""};
     const size_t n = t->n, C = t->n_channels, square = n * n;
-    hierarchical_arrays arrays = {.K = test_allocate(C, sizeof *arrays.K)};
+    hierarchical_arrays arrays = {.K = test_allocate(C, sizeof *arrays.K),
+                                  .step = test_allocate(n, sizeof *arrays.step)};
+    for (size_t i = 0; i < n; i++) arrays.step[i] = .125f;
     double *W = test_allocate(square, sizeof *W), *size = test_allocate(square, sizeof *size),
            *area = test_allocate(n, sizeof *area), *K = test_allocate(square, sizeof *K);
     const double roundings = random_basis(n, state, &arrays.basis, W, size);

@@ -35,9 +35,6 @@ static const option_row rows[] = {
 
 /* Coefficients below this share of the 2-norm of the sampling error, sqrt(2 / rays), are mostly noise. */
 static const double share_of_noise = .055;
-/* The weight of a coefficient is the number of elements below its node to the power -level_exponent: fine
- * coefficients are mostly noise. */
-static const double level_exponent = .25;
 /* The threshold of K is `of_epsilon` times epsilon. Coefficients of S are kept from the share `of_S` of it on
  * (from the whole, where the threshold is the noise), of intermediate products from `inner`, terms of
  * products from `skipped`. */
@@ -58,25 +55,8 @@ static const double share_of_block = 2;
 static const double reach = 1.2;
 
 /* Largest error of the irradiance of uniform emission that is not corrected: over epsilon, and the error of
- * half precision. */
+ * rounding. */
 static const double share_corrected = .1, least_corrected = 5e-4;
-
-/* (elements below)^-level_exponent over its geometric mean, that of every coefficient. */
-static lam_status make_weights(const wavelets *w, float **out, lam_error *error) {
-    double sum = 0;
-    float *made = memory_allocate(w->n_nodes, sizeof *made, "wavelets", error);
-    if (made == NULL) return LAM_ERR_MEMORY;
-    for (size_t t = 0; t < w->n_nodes; t++) {
-        const wavelet_node *a = &w->nodes[t];
-        const size_t count = a->inputs - (t + 1 < w->n_nodes ? a->scaling : 0);
-        sum -= level_exponent * (double)count * log((double)a->n_elements);
-    }
-    const double mean = exp(sum / (double)w->n);
-    for (size_t t = 0; t < w->n_nodes; t++)
-        made[t] = (float)(pow((double)w->nodes[t].n_elements, -level_exponent) / mean);
-    *out = made;
-    return LAM_OK;
-}
 
 /* Row sums of F. */
 static void sum_rows(const csr *F, double *sums) {
@@ -219,7 +199,8 @@ static lam_status build(const build_problem *problem, const build_options *optio
     if (problem->blocks == NULL)
         TRY(plane_tree_make(n, problem->centre, problem->normal, PLANE_LEAF, &made_tree, error));
     TRY(wavelet_basis_make(tree, problem->area, problem->centre, &arrays.basis, error));
-    TRY(make_weights(&arrays.basis, &weight, error));
+    TRY(wavelets_weights(&arrays.basis, &weight, error));
+    TRY(hierarchical_steps(&arrays.basis, threshold, &arrays.step, error));
     for (size_t p = 0; p < n; p++) area[p] = problem->area[tree->order[p]];
     const expansion x = {.problem = problem,
                          .tree = tree,
@@ -283,10 +264,10 @@ done:
  * rays. */
 static const double noise_share = 2.7;
 
-/* Bytes of a coefficient in memory: both triangles, as rows and in tiles; in a store; and while it is built
+/* Bytes of a coefficient in memory: both triangles in tiles of 12 bytes; in a store; and while it is built
  * from rows, beside two kilobytes per element for the tree (measured: 5.7 kB per element at 27 coefficients,
  * 16 kB at 114). */
-static const double loaded_bytes = 32, stored_bytes = 4, building_bytes = 130, element_bytes = 2000;
+static const double loaded_bytes = 10, stored_bytes = 2.5, building_bytes = 130, element_bytes = 2000;
 
 /* Coefficients for a block of form factors, at most: measured 2.0 to 2.4 (Cornell boxes of 163,687 and
  * 2,620,549 elements); bytes of one while it is built from blocks: measured 16 to 34 of as many. */

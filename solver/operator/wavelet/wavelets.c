@@ -23,6 +23,24 @@ void wavelets_heights(const wavelets *w, uint32_t *out) {
     }
 }
 
+static const double level_exponent = .25;
+
+lam_status wavelets_weights(const wavelets *w, float **out, lam_error *error) {
+    double sum = 0;
+    float *made = memory_allocate(w->n_nodes, sizeof *made, "wavelets", error);
+    if (made == NULL) return LAM_ERR_MEMORY;
+    for (size_t t = 0; t < w->n_nodes; t++) {
+        const wavelet_node *a = &w->nodes[t];
+        const size_t count = a->inputs - (t + 1 < w->n_nodes ? a->scaling : 0);
+        sum -= level_exponent * (double)count * log((double)a->n_elements);
+    }
+    const double mean = exp(sum / (double)w->n);
+    for (size_t t = 0; t < w->n_nodes; t++)
+        made[t] = (float)(pow((double)w->nodes[t].n_elements, -level_exponent) / mean);
+    *out = made;
+    return LAM_OK;
+}
+
 static lam_status check_shapes(const wavelets *w, lam_error *error) {
     lam_status status = LAM_OK;
     size_t count = 0;

@@ -58,6 +58,11 @@ void wavelets_free(wavelets *w);
 /* out [n_nodes] = the height of each node: the longest path to a leaf below it; leaves have 0. */
 void wavelets_heights(const wavelets *w, uint32_t *out);
 
+/* out [n_nodes] = the weight of each node's coefficients beside a threshold: the number of elements below it
+ * to the power -1/4, over the geometric mean of that of all coefficients, as fine coefficients are mostly
+ * noise. The caller frees it. Errors: LAM_ERR_MEMORY. */
+lam_status wavelets_weights(const wavelets *w, float **out, lam_error *error);
+
 /* Builds the basis from the shape of every node in postorder (node_shapes [n_nodes], copied). It takes over
  * shapes and basis, also on an error. Errors: LAM_ERR_NUMERIC when the nodes are no tree of n elements, a
  * shape is out of bounds or a number is not finite; LAM_ERR_MEMORY. */

@@ -1,6 +1,5 @@
-/* Sparse rows in tiles: groups of one to three, empty and long ones, against double, and the same bits in any
- * batch. */
-#include "solver/base/half.h"
+/* Symmetric matrices in tiles: rounded to the steps of rows and columns, and products with them, against
+ * double, and the same bits in any batch. */
 #include "solver/base/random.h"
 #include "solver/linalg/tiled.h"
 #include "support/dense.h"
@@ -12,84 +11,160 @@ enum { N = 700, VECTORS = 16 };
 
 static lam_error error;
 
-/* Rows of 0 to 20 numbers, some of up to 300, alone or in runs. */
-static csr random_rows(float scale, uint64_t *state) {
-    csr a = {.n = N,
-             .indptr = test_allocate(N + 1, sizeof *a.indptr),
-             .indices = test_allocate(N * N, sizeof *a.indices),
-             .data = test_allocate(N * N, sizeof *a.data)};
-    for (size_t i = 0; i < N; i++) {
+/* The upper triangle of rows of 0 to 20 numbers, some of up to 300, alone or in runs; of `digits` digits. */
+static csr random_rows(size_t n, const float *step, int digits, uint64_t *state) {
+    csr a = {.n = n,
+             .indptr = test_allocate(n + 1, sizeof *a.indptr),
+             .indices = test_allocate(n * n, sizeof *a.indices),
+             .data = test_allocate(n * n, sizeof *a.data)};
+    for (size_t i = 0; i < n; i++) {
         const size_t most = i % 50 == 7 ? 300 : i % 3 == 0 ? 0 : 20;
-        const double share = random_lcg_unit(state) * (double)most / N;
+        const double share = random_lcg_unit(state) * (double)most / (double)n;
         uint64_t last = a.indptr[i];
-        for (size_t j = 0; j < N && most > 0; j++) {
+        for (size_t j = i; j < n && most > 0; j++) {
             const bool follows = last > a.indptr[i] && a.indices[last - 1] + 1 == j;
-            if (random_lcg_unit(state) > (follows ? .5 : share) && !(i == 1 && j == N - 1)) continue;
+            if (random_lcg_unit(state) > (follows ? .5 : share) && !(i == 1 && j == n - 1)) continue;
+            const double most_steps = exp2(random_lcg_unit(state) * (8 * digits - 3));
             a.indices[last] = (uint32_t)j;
-            a.data[last++] = scale * float_of_half(half_of_float((float)(random_lcg_unit(state) - .3)));
+            a.data[last++] =
+                (float)((random_lcg_unit(state) - .3) * most_steps * (double)step[i] * (double)step[j]);
         }
         a.indptr[i + 1] = last;
     }
     return a;
 }
 
-/* Groups of one to three; the last has one row. Returns their number. */
-static size_t random_groups(uint32_t *first, uint64_t *state) {
+/* Groups of one to three rows, the last of one; between some of them a row of no group. */
+static size_t random_groups(size_t n, tile_group *groups, float *step, float *row_step, uint64_t *state) {
     size_t n_groups = 0, end = 0;
-    while (end < N) {
-        const size_t most = 1 + (size_t)(3 * random_lcg_unit(state)), left = N - 1 - end;
-        first[n_groups++] = (uint32_t)end;
-        end += left == 0 ? 1 : most < left ? most : left;
+    while (end < n) {
+        const size_t most = 1 + (size_t)(3 * random_lcg_unit(state)), left = n - 1 - end;
+        const size_t size = left == 0 ? 1 : most < left ? most : left;
+        groups[n_groups] = (tile_group){(uint32_t)end, (uint32_t)size};
+        step[n_groups] = (float)(.01 + random_lcg_unit(state));
+        for (size_t r = 0; r < size; r++) row_step[end + r] = step[n_groups];
+        n_groups++;
+        end += size;
     }
-    first[n_groups] = N;
     return n_groups;
 }
 
-static void check_against_double(const csr *a, const float *X, const float *Y) {
+/* All of a matrix of tiles, [n][n]. */
+static double *dense_of(const tile_matrix *m, size_t n, const tile_group *groups, const float *row_step) {
+    double *K = test_allocate(n * n, sizeof *K), digit = 1;
+    for (size_t d = 0; d < TILE_PLANES; d++, digit *= 256)
+        for (size_t k = 0; k < m->count[d]; k++) {
+            const tile *t = &m->tiles[d][k];
+            ck_assert_uint_ge(t->column, t->row);
+            ck_assert(k == 0 || t[-1].row < t->row || (t[-1].row == t->row && t[-1].column < t->column));
+            for (size_t r = 0; r < groups[t->row].size; r++)
+                for (size_t c = 0; c < groups[t->column].size; c++) {
+                    const size_t i = groups[t->row].first + r, j = groups[t->column].first + c;
+                    if (j < i) continue; /* in a tile on the diagonal, which has it twice */
+                    K[i * n + j] += digit * t->values[r][c] * (double)row_step[i] * (double)row_step[j];
+                    K[j * n + i] = K[i * n + j];
+                }
+        }
+    return K;
+}
+
+static void check_rounding(const csr *a, const double *K, const float *row_step) {
+    const size_t n = a->n;
+    for (size_t i = 0; i < n; i++) {
+        uint64_t e = a->indptr[i];
+        for (size_t j = i; j < n; j++) {
+            const bool there = e < a->indptr[i + 1] && a->indices[e] == j;
+            const double wanted = there ? (double)a->data[e++] : 0;
+            ck_assert_double_le(fabs(K[i * n + j] - wanted),
+                                (there ? .5000001 : 0) * (double)row_step[i] * (double)row_step[j]);
+        }
+    }
+}
+
+static void check_against_double(size_t n, const double *K, const float *X, const float *Y) {
     for (size_t v = 0; v < VECTORS; v++)
-        for (size_t i = 0; i < N; i++) {
+        for (size_t i = 0; i < n; i++) {
             double sum = 0, size = 0;
-            for (uint64_t e = a->indptr[i]; e < a->indptr[i + 1]; e++) {
-                const double product = (double)a->data[e] * (double)X[v * N + a->indices[e]];
+            for (size_t j = 0; j < n; j++) {
+                const double product = K[i * n + j] * (double)X[v * n + j];
                 sum += product;
-                size += fabs(product);
+                /* The sum of a number's digits is at most 1.02 times the number and half a lower digit. */
+                size += 2 * fabs(product);
             }
-            /* A product is rounded when it is made, with its lane's sum (of at most a fourth of N/3 tiles
-             * that may be left alone), and in four sums of lanes. */
-            ck_assert(fabs((double)Y[v * N + i] - sum) <= (N / 4 + 5) * (FLT_EPSILON / 2) * size);
+            /* A product is rounded when the column is scaled, when it is made, with its lane's sum (of at
+             * most a fourth of n/3 tiles of each plane that may be left alone), in four sums of lanes, and
+             * with the row's step. */
+            ck_assert_double_le(fabs((double)Y[v * n + i] - sum),
+                                ((double)n / 4 * TILE_PLANES + 8) * (FLT_EPSILON / 2) * size);
         }
 }
 
+static size_t count_numbers(size_t n, const double *K) {
+    size_t count = 0;
+    for (size_t k = 0; k < n * n; k++) count += K[k] != 0;
+    return count;
+}
+
+static void check_same(const tile_matrix *a, const tile_matrix *b) {
+    for (size_t d = 0; d < TILE_PLANES; d++) {
+        ck_assert_uint_eq(a->count[d], b->count[d]);
+        ck_assert(a->count[d] == 0 ||
+                  memcmp(a->tiles[d], b->tiles[d], a->count[d] * sizeof *a->tiles[d]) == 0);
+    }
+}
+
 START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
-    static const float scales[] = {1, 0x1p-9f};
+    const int digits = 1 + _i;
     uint64_t state = 3;
-    csr a = random_rows(scales[_i], &state);
     tiled_rows t;
-    uint32_t first[N + 1], rows[40];
-    float *X = test_allocate(VECTORS * N + TILED_PAST, sizeof *X), *one = test_allocate(N, sizeof *one),
+    tile_matrix m, back;
+    tile_group groups[N];
+    float step[N], row_step[N];
+    uint32_t rows[40];
+    float *X = test_allocate(VECTORS * N, sizeof *X), *one = test_allocate(N, sizeof *one),
           *Y = test_allocate(VECTORS * N, sizeof *Y);
-    float *work = aligned_alloc(64, (tiled_work(N, VECTORS) + 16) * sizeof *work);
-    const size_t n_groups = random_groups(first, &state);
-    ck_ok(tiled_create(&a, scales[_i], n_groups, first, &t, &error));
+    float *work = aligned_alloc(64, (tiled_work(N, VECTORS) + 16) / 16 * 16 * sizeof *work);
+    const size_t n_groups = random_groups(N, groups, step, row_step, &state);
+    csr a = random_rows(N, row_step, digits, &state);
+    ck_ok(tile_matrix_round(&a, n_groups, groups, step, &m, &error));
+    ck_assert_uint_gt(m.count[digits - 1], 0);
+    double *K = dense_of(&m, N, groups, row_step);
+    check_rounding(&a, K, row_step);
+    ck_assert_uint_eq(tile_matrix_numbers(&m), count_numbers(N, K));
+    ck_ok(tiled_create(&m, n_groups, groups, step, &t, &error));
+    ck_assert_uint_eq(t.n_planes, (size_t)digits);
+    ck_ok(tiled_upper(&t, &back, &error));
+    check_same(&m, &back);
     for (size_t k = 0; k < VECTORS * N; k++) X[k] = (float)(random_lcg_unit(&state) - .4);
-    for (size_t k = 0; k < TILED_PAST; k++) X[VECTORS * N + k] = 1e30f;
-    for (size_t m = 1; m <= VECTORS; m += 5)
+    for (size_t m_at_once = 1; m_at_once <= VECTORS; m_at_once += 5)
         for (size_t n_threads = 1; n_threads < 4; n_threads += 2) {
             for (size_t k = 0; k < VECTORS * N; k++) Y[k] = NAN;
-            tiled_multiply(&t, m, X, Y, work, n_threads);
-            for (size_t v = 0; v < m; v++) {
+            tiled_multiply(&t, m_at_once, X, Y, work, n_threads);
+            for (size_t v = 0; v < m_at_once; v++) {
                 tiled_multiply(&t, 1, X + v * N, one, work, 1);
                 ck_assert_mem_eq(one, Y + v * N, N * sizeof *one);
             }
         }
-    check_against_double(&a, X, Y);
+    check_against_double(N, K, X, Y);
     for (size_t k = 0; k < 40; k++) rows[k] = (uint32_t)(k * 17 + 7 * (k % 3));
     tiled_multiply(&t, 1, X, one, work, 1);
     for (size_t i = 0; i < N; i++) Y[i] = NAN;
-    tiled_multiply_rows(&t, 40, rows, X, Y);
+    tiled_multiply_rows(&t, 40, rows, X, Y, work);
     for (size_t k = 0; k < 40; k++) ck_assert_float_eq(Y[rows[k]], one[rows[k]]);
+    /* By columns: of all vectors, one has many and the others few. */
+    for (size_t k = 0; k < VECTORS * N; k++)
+        if (k >= N && k % N % 97 != k / N) X[k] = 0;
+    ck_assert(!tiled_few_columns(&t, X) && tiled_few_columns(&t, X + N));
+    for (size_t v = 0; v < VECTORS; v++) {
+        for (size_t i = 0; i < N; i++) Y[v * N + i] = NAN;
+        tiled_multiply_columns(&t, X + v * N, Y + v * N, work);
+    }
+    check_against_double(N, K, X, Y);
     tiled_free(&t);
+    tile_matrix_free(&m);
+    tile_matrix_free(&back);
     csr_free(&a);
+    free(K);
     free(X);
     free(Y);
     free(one);
@@ -97,38 +172,89 @@ START_TEST(products_are_right_and_do_not_depend_on_the_batch) {
 }
 END_TEST
 
-START_TEST(rows_are_stored_in_tiles) {
-    /* Rows 0 to 2 and 3 to 4; entries in columns 0 and 4 of row 1, and 4 of row 3. */
-    uint64_t indptr[] = {0, 0, 2, 2, 3, 3};
-    uint32_t indices[] = {0, 4, 4};
-    float data[] = {.5f, 2, 3};
-    const uint32_t first[] = {0, 3, 5}, high[] = {0, 4, 5}, short_of[] = {0, 3};
-    const csr a = {.n = 5, .indptr = indptr, .indices = indices, .data = data};
+/* Columns beyond 16 bits of distance from the first of a four; rows outside all groups. */
+START_TEST(tiles_may_be_far_from_each_other) {
+    enum { FAR = 70000 };
+    uint64_t *indptr = test_allocate(FAR + 3, sizeof *indptr);
+    uint32_t indices[] = {0, 4, FAR - 1, FAR + 1}, *places = test_allocate(FAR, sizeof *places);
+    float data[] = {3, -5, 7, 11}, *X = test_allocate(FAR, sizeof *X), *Y = test_allocate(FAR, sizeof *Y);
+    tile_group *groups = test_allocate(FAR, sizeof *groups);
+    float *step = test_allocate(FAR, sizeof *step),
+          *work = aligned_alloc(64, (tiled_work(FAR, 1) + 16) / 16 * 16 * sizeof *work);
     tiled_rows t;
-    ck_ok(tiled_create(&a, .5f, 2, first, &t, &error));
+    tile_matrix m, back;
+    const csr a = {.n = FAR + 2, .indptr = indptr, .indices = indices, .data = data};
+    for (size_t i = 1; i <= FAR + 2; i++) indptr[i] = 4;
+    /* Rows 1 and 2 are in no group. */
+    for (size_t g = 0; g < FAR; g++) {
+        groups[g] = (tile_group){(uint32_t)(g == 0 ? 0 : g + 2), 1};
+        step[g] = 1;
+        X[g] = (float)(g % 7);
+    }
+    ck_ok(tile_matrix_round(&a, FAR, groups, step, &m, &error));
+    ck_ok(tiled_create(&m, FAR, groups, step, &t, &error));
+    ck_assert_uint_eq(t.n, FAR);
+    ck_assert_uint_eq(t.begin[1], 2);
+    ck_ok(tiled_upper(&t, &back, &error));
+    check_same(&m, &back);
+    tiled_multiply(&t, 1, X, Y, work, 1);
+    ck_assert_float_eq(Y[0], 3 * X[0] - 5 * X[2] + 7 * X[FAR - 3] + 11 * X[FAR - 1]);
+    ck_assert_float_eq(Y[2], -5 * X[0]);
+    ck_assert_float_eq(Y[FAR - 1], 11 * X[0]);
+    tiled_free(&t);
+    tile_matrix_free(&m);
+    tile_matrix_free(&back);
+    free(indptr);
+    free(places);
+    free(X);
+    free(Y);
+    free(groups);
+    free(step);
+    free(work);
+}
+END_TEST
+
+START_TEST(rows_are_stored_in_tiles) {
+    /* Rows 0 to 2 and 3 to 4; numbers at (1, 1), (1, 2), (0, 4) and (3, 3). */
+    uint64_t indptr[] = {0, 1, 3, 3, 4, 4};
+    uint32_t indices[] = {4, 1, 2, 3};
+    float data[] = {.26f, 128, 32, -127.5f * 4};
+    const tile_group groups[] = {{0, 3}, {3, 2}};
+    const float step[] = {.5f, 2};
+    const csr a = {.n = 5, .indptr = indptr, .indices = indices, .data = data};
+    tile_matrix m;
+    tiled_rows t;
+    ck_ok(tile_matrix_round(&a, 2, groups, step, &m, &error));
+    ck_assert_uint_eq(m.count[0], 2);
+    ck_assert_uint_eq(m.count[1], 1);
+    /* 512 = 2 256 has no lower digit, and 128 = 256 - 128 has two; .26 rounds to 0; -127.5 to the even -128.
+     */
+    ck_assert_int_eq(m.tiles[0][0].values[1][1], 0);
+    ck_assert_int_eq(m.tiles[0][0].values[1][2], -128);
+    ck_assert_int_eq(m.tiles[0][0].values[2][1], -128);
+    ck_assert_int_eq(m.tiles[1][0].values[1][1], 2);
+    ck_assert_int_eq(m.tiles[1][0].values[1][2], 1);
+    ck_assert_uint_eq(m.tiles[0][1].row, 1);
+    ck_assert_int_eq(m.tiles[0][1].values[0][0], -128);
+    ck_assert_uint_eq(tile_matrix_numbers(&m), 4);
+    ck_ok(tiled_create(&m, 2, groups, step, &t, &error));
     ck_assert_uint_eq(t.begin[1], 1);
     ck_assert_uint_eq(t.begin[2], 2);
-    ck_assert_uint_eq(t.columns[0], 0);
-    ck_assert_uint_eq(t.columns[1], 3);
-    ck_assert_uint_eq(t.columns[4], 3);
-    for (size_t k = 0; k < 2 * TILE * TILE_LANES; k++) {
-        const float wanted = k == TILE_LANES ? 1 : k == TILE_LANES + TILE + 1 ? 4 : k == 37 ? 6 : 0;
-        ck_assert_float_eq(float_of_half(t.values[k]), wanted);
-    }
+    ck_assert_uint_eq(t.begin[3], 2);
+    ck_assert_uint_eq(t.begin[4], 3);
+    ck_assert_int_eq(t.fours[0].values[1][1], 2);
+    ck_assert_int_eq(t.fours[1].values[2][1], -128);
+    ck_assert_uint_eq(t.fours[2].base, 3);
     tiled_free(&t);
-    ck_assert(tiled_create(&a, .3f, 2, first, &t, &error) == LAM_ERR_ARGUMENT);
-    ck_assert(tiled_create(&a, .5f, 2, high, &t, &error) == LAM_ERR_ARGUMENT);
-    ck_assert(tiled_create(&a, .5f, 1, short_of, &t, &error) == LAM_ERR_ARGUMENT);
-    data[1] = 1 + 0x1p-20f;
-    ck_assert(tiled_create(&a, .5f, 2, first, &t, &error) == LAM_ERR_ARGUMENT);
-    ck_assert_ptr_nonnull(strstr(error.message, "entry 1 = 1.00000095, must be 0.5 times"));
+    tile_matrix_free(&m);
 }
 END_TEST
 
 int main(void) {
-    Suite *suite = suite_create("rows in tiles");
+    Suite *suite = suite_create("tiles");
     TCase *tests = tcase_create("products");
-    tcase_add_loop_test(tests, products_are_right_and_do_not_depend_on_the_batch, 0, 2);
+    tcase_add_loop_test(tests, products_are_right_and_do_not_depend_on_the_batch, 0, TILE_PLANES);
+    tcase_add_test(tests, tiles_may_be_far_from_each_other);
     tcase_add_test(tests, rows_are_stored_in_tiles);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
