@@ -8,6 +8,9 @@
  * the threshold then, and that of an answer a tenth of what the numbers below the threshold would have added.
  */
 static const double step_share = .5;
+/* The step of the root's scaling functions over that: most of uniform emission is theirs, which K answers
+ * exactly before it is rounded. They are one to four rows, for a digit more of each number. */
+static const float root_share = 1.f / 256;
 
 lam_status hierarchical_steps(const wavelets *basis, double threshold, float **out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -19,6 +22,8 @@ lam_status hierarchical_steps(const wavelets *basis, double threshold, float **o
         const size_t end = t + 1 < basis->n_nodes ? a->first + a->inputs - a->scaling : basis->n;
         for (size_t i = a->first; i < end; i++) made[i] = (float)sqrt(step_share * threshold) * weight[t];
     }
+    for (size_t i = basis->n - basis->nodes[basis->n_nodes - 1].scaling; i < basis->n; i++)
+        made[i] *= root_share;
     *out = made;
     made = NULL;
 done:
