@@ -267,3 +267,36 @@ lam_status csr_replace(const csr *A, const csr *B, csr *out, lam_error *error) {
     const combination c = {.A = A, .B = B, .u = 1, .w = 1, .replace = true};
     return combine(&c, out, error);
 }
+
+lam_status csr_mirror(const csr *a, const char *what, csr *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = a->n;
+    csr made = {.n = n, .indptr = memory_allocate(n + 1, sizeof *made.indptr, what, error)};
+    if (made.indptr == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < n; i++)
+        for (uint64_t e = a->indptr[i]; e < a->indptr[i + 1]; e++) {
+            if (a->data[e] == 0) continue;
+            made.indptr[i + 1]++;
+            if (a->indices[e] != i) made.indptr[a->indices[e] + 1]++;
+        }
+    TRY(csr_begin_rows(&made, what, error));
+    /* Row j gets its lower part from rows i < j, in their order, before its own. */
+    for (size_t i = 0; i < n; i++)
+        for (uint64_t e = a->indptr[i]; e < a->indptr[i + 1]; e++) {
+            const uint32_t j = a->indices[e];
+            if (a->data[e] == 0) continue;
+            uint64_t to = made.indptr[i]++;
+            made.indices[to] = j;
+            made.data[to] = a->data[e];
+            if (j == i) continue;
+            to = made.indptr[j]++;
+            made.indices[to] = (uint32_t)i;
+            made.data[to] = a->data[e];
+        }
+    csr_end_rows(&made);
+    *out = made;
+    made = (csr){.n = 0};
+done:
+    csr_free(&made);
+    return status;
+}

@@ -49,4 +49,8 @@ lam_status csr_combine(const csr *A, float u, const csr *B, float w, csr *out, l
 /* out = A with the entries of B added or put in place of its own; entries that are 0 in B are dropped. */
 lam_status csr_replace(const csr *A, const csr *B, csr *out, lam_error *error);
 
+/* Both triangles of a symmetric matrix from its upper one, whose rows ascend, without zeros; freed with
+ * csr_free. Cost: O(nnz). Errors: LAM_ERR_MEMORY, naming what. */
+lam_status csr_mirror(const csr *upper, const char *what, csr *out, lam_error *error);
+
 #endif

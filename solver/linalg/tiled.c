@@ -48,7 +48,7 @@ static lam_status sort_plane(const tile_matrix *m, size_t plane, size_t n_groups
                              lam_error *error) {
     lam_status status = LAM_OK;
     const size_t count = m->count[plane];
-    const tile *tiles = m->tiles[plane];
+    const tile_digits *tiles = m->tiles[plane];
     uint64_t *begin = memory_allocate(n_groups + 2, sizeof *begin, "operator", error), *at = NULL;
     if (begin == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t k = 0; k < count; k++) {
@@ -79,7 +79,7 @@ static size_t pack(const tiled_rows *t, const tile_matrix *m, size_t plane, cons
     size_t fours = 0, used = TILES_AT_ONCE;
     uint32_t base = 0;
     for (uint64_t k = rows->begin[g]; k < rows->begin[g + 1]; k++) {
-        const tile *from = &m->tiles[plane][rows->at[k] / 2];
+        const tile_digits *from = &m->tiles[plane][rows->at[k] / 2];
         const bool transposed = rows->at[k] % 2 == 1;
         const uint32_t column = t->first[transposed ? from->row : from->column];
         if (used == TILES_AT_ONCE || column - base > UINT16_MAX) {
@@ -152,9 +152,9 @@ done:
 }
 
 /* Tile t of a four, of a group of rows; false where the four has fewer. */
-static bool tile_of(const tiled_rows *t, const tile_four *four, size_t group, size_t k, tile *out) {
+static bool tile_of(const tiled_rows *t, const tile_four *four, size_t group, size_t k, tile_digits *out) {
     bool any = false;
-    *out = (tile){.row = (uint32_t)group, .column = t->group_of[four->base + four->beyond[k]]};
+    *out = (tile_digits){.row = (uint32_t)group, .column = t->group_of[four->base + four->beyond[k]]};
     for (size_t r = 0; r < TILE; r++)
         for (size_t c = 0; c < TILE; c++) {
             out->values[r][c] = four->values[r][k * TILE + c];
@@ -167,7 +167,7 @@ lam_status tiled_upper(const tiled_rows *t, tile_matrix *out, lam_error *error) 
     lam_status status = LAM_OK;
     tile_matrix made = {.count = {0}};
     size_t room[TILE_PLANES] = {0};
-    tile found;
+    tile_digits found;
     for (size_t d = 0; d < t->n_planes; d++)
         for (size_t g = 0; g < t->n_groups; g++) {
             const size_t part = part_of(t, g, d);

@@ -12,7 +12,7 @@ void tile_matrix_free(tile_matrix *m) {
     *m = (tile_matrix){.count = {0}};
 }
 
-lam_status tile_matrix_append(tile_matrix *m, size_t plane, const tile *t, size_t room[TILE_PLANES],
+lam_status tile_matrix_append(tile_matrix *m, size_t plane, const tile_digits *t, size_t room[TILE_PLANES],
                               lam_error *error) {
     if (array_grow(&m->tiles[plane], &room[plane], m->count[plane] + 1, sizeof *t, "operator", error) !=
         LAM_OK)
@@ -41,7 +41,7 @@ static lam_status append_digits(tile_matrix *m, size_t row, size_t column, int64
                                 size_t room[TILE_PLANES], lam_error *error) {
     bool left = true;
     for (size_t d = 0; d < TILE_PLANES && left; d++) {
-        tile t = {.row = (uint32_t)row, .column = (uint32_t)column};
+        tile_digits t = {.row = (uint32_t)row, .column = (uint32_t)column};
         bool any = false;
         left = false;
         for (size_t r = 0; r < TILE; r++)
@@ -93,9 +93,9 @@ done:
     return status;
 }
 
-static bool has_digit(const tile_matrix *m, size_t plane, size_t at, const tile *like, size_t bit) {
+static bool has_digit(const tile_matrix *m, size_t plane, size_t at, const tile_digits *like, size_t bit) {
     if (at == m->count[plane]) return false;
-    const tile *t = &m->tiles[plane][at];
+    const tile_digits *t = &m->tiles[plane][at];
     return t->row == like->row && t->column == like->column && t->values[bit / TILE][bit % TILE] != 0;
 }
 
@@ -104,9 +104,9 @@ size_t tile_matrix_numbers(const tile_matrix *m) {
     for (size_t d = 0; d < TILE_PLANES; d++) {
         size_t at[TILE_PLANES] = {0}; /* the tile of each lower plane that is not before t */
         for (size_t k = 0; k < m->count[d]; k++) {
-            const tile *t = &m->tiles[d][k];
+            const tile_digits *t = &m->tiles[d][k];
             for (size_t e = 0; e < d; e++)
-                for (const tile *f = m->tiles[e]; at[e] < m->count[e]; at[e]++)
+                for (const tile_digits *f = m->tiles[e]; at[e] < m->count[e]; at[e]++)
                     if (f[at[e]].row > t->row || (f[at[e]].row == t->row && f[at[e]].column >= t->column))
                         break;
             for (size_t bit = 0; bit < TILE * TILE; bit++) {

@@ -16,16 +16,16 @@ typedef struct tile_group {
 } tile_group;
 
 /* Digits of the numbers in group `column` of group `row`; 0 beyond the sizes of both. */
-typedef struct tile {
+typedef struct tile_digits {
     uint32_t row, column;
     int8_t values[TILE][TILE];
-} tile;
+} tile_digits;
 
 /* The upper triangle: of each plane the tiles with column >= row, by ascending row, then column; those on
  * the diagonal are whole. */
 typedef struct tile_matrix {
     size_t count[TILE_PLANES];
-    tile *tiles[TILE_PLANES];
+    tile_digits *tiles[TILE_PLANES];
 } tile_matrix;
 
 void tile_matrix_free(tile_matrix *m);
@@ -40,7 +40,7 @@ lam_status tile_matrix_round(const csr *a, size_t n_groups, const tile_group *gr
 size_t tile_matrix_numbers(const tile_matrix *m);
 
 /* Appends a tile to a plane of room[d] tiles. Errors: LAM_ERR_MEMORY. */
-lam_status tile_matrix_append(tile_matrix *m, size_t plane, const tile *t, size_t room[TILE_PLANES],
+lam_status tile_matrix_append(tile_matrix *m, size_t plane, const tile_digits *t, size_t room[TILE_PLANES],
                               lam_error *error);
 
 #endif

@@ -10,10 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Probes of random emission, and those of a group by which the reference's own noise is measured: it is
- * alike for all probes of a group, so that a few give it to a fifth. */
-enum { RANDOM_PROBES = 8, NOISE_PROBES = 8 };
-
 /* Indirect light below this share of all light counts as none: no ray found what the element sees, and the
  * rest is the remainder of the reference's iteration. */
 static const double dark = 1e-6;
@@ -271,11 +267,11 @@ static double half_distance(const build_problem *problem, const float *E, const 
     return indirect > dark * dark * all ? sqrt(difference / indirect) : -1;
 }
 
-/* Of each group some probes: their numbers, for [N_GROUPS * NOISE_PROBES]. */
+/* Of each group some probes: their numbers, for [N_GROUPS * JUDGE_NOISE_PROBES]. */
 static size_t noise_probes(const probes *p, size_t *which) {
     size_t m = 0;
     for (int g = 0; g < N_GROUPS; g++)
-        for (size_t v = p->begin[g]; v < p->begin[g + 1] && v < p->begin[g] + NOISE_PROBES; v++)
+        for (size_t v = p->begin[g]; v < p->begin[g + 1] && v < p->begin[g] + JUDGE_NOISE_PROBES; v++)
             which[m++] = v;
     return m;
 }
@@ -403,11 +399,11 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     error_report found = {0};
     error_group *groups[N_GROUPS] = {&found.single, &found.lights, &found.random};
     probes p = {0};
-    size_t which[N_GROUPS * NOISE_PROBES];
+    size_t which[N_GROUPS * JUDGE_NOISE_PROBES];
     kept_corrections kept = {.m = 0};
     const size_t s = lam_operator_emitters(op), most = s > 0 ? s : problem->n;
     const size_t counts[N_GROUPS] = {input->probes < most ? input->probes : most, any_light(op, input),
-                                     RANDOM_PROBES};
+                                     JUDGE_RANDOM_PROBES};
     TRY(probes_init(&p, counts, problem, error));
     for (int g = 0; g < N_GROUPS; g++) groups[g]->probes = counts[g];
     if (s > 0)

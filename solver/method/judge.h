@@ -5,6 +5,10 @@
 #include "solver/linalg/factor_product.h"
 #include "solver/method/method.h"
 
+/* Probes of random emission, and those of a group, at most, that the reference's own noise is measured by, as
+ * each of them is to be solved with both halves of the sample. */
+enum { JUDGE_RANDOM_PROBES = 8, JUDGE_NOISE_PROBES = 8 };
+
 /* Mean, standard deviation and largest value over the probes of a group. */
 typedef struct error_figures {
     double mean, std, max;

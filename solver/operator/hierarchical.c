@@ -102,6 +102,15 @@ done:
     return status;
 }
 
+/* Takes the tiles of a channel over, and frees them. */
+static lam_status take_tiles(hierarchical *self, size_t c, tile_matrix *tiles, lam_error *error) {
+    self->n_numbers += (double)tile_matrix_numbers(tiles);
+    const lam_status status =
+        tiled_create(tiles, self->n_groups, self->groups, self->step, &self->K[c], error);
+    tile_matrix_free(tiles);
+    return status;
+}
+
 /* The largest number over its step, as tile_matrix_round says. */
 static const double most_steps = 0x1p29;
 
@@ -128,12 +137,9 @@ static lam_status round_K(hierarchical *self, const csr *K, const float *step, l
                             &self->groups, &self->step, error));
     for (size_t c = 0; c < C; c++) {
         TRY(tile_matrix_round(&K[c], self->n_groups, self->groups, self->step, &tiles, error));
-        self->n_numbers += (double)tile_matrix_numbers(&tiles);
-        TRY(tiled_create(&tiles, self->n_groups, self->groups, self->step, &self->K[c], error));
-        tile_matrix_free(&tiles);
+        TRY(take_tiles(self, c, &tiles, error));
     }
 done:
-    tile_matrix_free(&tiles);
     free(used);
     return status;
 }
@@ -175,12 +181,9 @@ static lam_status load_tiles(hierarchical *self, store *s, lam_error *error) {
     for (size_t c = 0; c < self->base.n_channels; c++) {
         snprintf(group, sizeof group, "/operator/K/%zu", c);
         TRY(hierarchical_load_tiles(s, group, self->n_groups, self->groups, &tiles, error));
-        self->n_numbers += (double)tile_matrix_numbers(&tiles);
-        TRY(tiled_create(&tiles, self->n_groups, self->groups, self->step, &self->K[c], error));
-        tile_matrix_free(&tiles);
+        TRY(take_tiles(self, c, &tiles, error));
     }
 done:
-    tile_matrix_free(&tiles);
     free(used);
     return status;
 }

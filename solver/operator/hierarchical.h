@@ -29,8 +29,8 @@ lam_status operator_hierarchical_create(size_t n, size_t n_channels, const float
 lam_status operator_hierarchical_correct(lam_operator *op, const double *missing, const double *light,
                                          lam_error *error);
 
-/* The steps that keep the error of rounding K far below that of the numbers left out: out [n] by coefficient,
- * for a threshold of 1 in coefficients of weight 1 (wavelets_weights), is freed by the caller. Errors:
+/* The steps that keep the error of rounding K far below that of the numbers left out by a threshold of
+ * coefficients of weight 1 (wavelets_weights): out [n] by coefficient is freed by the caller. Errors:
  * LAM_ERR_MEMORY. */
 lam_status hierarchical_steps(const wavelets *basis, double threshold, float **out, lam_error *error);
 
@@ -39,10 +39,6 @@ lam_status hierarchical_steps(const wavelets *basis, double threshold, float **o
  * least `least`. The caller frees groups and group_step, [n_groups]. Errors: LAM_ERR_MEMORY. */
 lam_status hierarchical_groups(const wavelet_plan *plan, const float *step, float least, size_t *n_groups,
                                tile_group **groups, float **group_step, lam_error *error);
-
-/* Both triangles of a symmetric matrix from its upper one, without zeros; freed with csr_free. Errors:
- * LAM_ERR_MEMORY. */
-lam_status csr_mirror(const csr *upper, csr *out, lam_error *error);
 
 /* Of a K: GROUP/count [planes][n_groups] u16 (u32 where a row has more than 65,535 tiles), tile [tiles] u16,
  * far u32, digit i8, as store/FORMAT.md says. Errors: as store_read; LAM_ERR_FORMAT where they do not fit

@@ -12,40 +12,6 @@
  * groups from the tile before it; GAP_FAR: the next number of `far` is the distance. */
 enum { MASK_BITS = TILE * TILE, GAP_FAR = UINT16_MAX >> MASK_BITS };
 
-/* Rows come out ascending as those of a are. */
-lam_status csr_mirror(const csr *a, csr *out, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = a->n;
-    csr made = {.n = n, .indptr = memory_allocate(n + 1, sizeof *made.indptr, "operator", error)};
-    if (made.indptr == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t i = 0; i < n; i++)
-        for (uint64_t e = a->indptr[i]; e < a->indptr[i + 1]; e++) {
-            if (a->data[e] == 0) continue;
-            made.indptr[i + 1]++;
-            if (a->indices[e] != i) made.indptr[a->indices[e] + 1]++;
-        }
-    TRY(csr_begin_rows(&made, "operator", error));
-    /* Row j gets its lower part from rows i < j, in their order, before its own. */
-    for (size_t i = 0; i < n; i++)
-        for (uint64_t e = a->indptr[i]; e < a->indptr[i + 1]; e++) {
-            const uint32_t j = a->indices[e];
-            if (a->data[e] == 0) continue;
-            uint64_t to = made.indptr[i]++;
-            made.indices[to] = j;
-            made.data[to] = a->data[e];
-            if (j == i) continue;
-            to = made.indptr[j]++;
-            made.indices[to] = (uint32_t)i;
-            made.data[to] = a->data[e];
-        }
-    csr_end_rows(&made);
-    *out = made;
-    made = (csr){.n = 0};
-done:
-    csr_free(&made);
-    return status;
-}
-
 /* The steps of the upper triangle's tiles from one to the next, and their digits. */
 typedef struct tile_codes {
     void *counts; /* [TILE_PLANES][n_groups] u16 or u32 */
@@ -67,7 +33,7 @@ static void encode_tiles(const tile_matrix *m, size_t n_planes, size_t n_groups,
                          tile_codes *out) {
     for (size_t d = 0; d < n_planes; d++)
         for (size_t k = 0; k < m->count[d]; k++) {
-            const tile *t = &m->tiles[d][k];
+            const tile_digits *t = &m->tiles[d][k];
             const bool follows = k > 0 && t[-1].row == t->row;
             const uint32_t gap = t->column - (follows ? t[-1].column : t->row);
             unsigned mask = 0;
@@ -156,7 +122,8 @@ typedef struct tile_reader {
 } tile_reader;
 
 /* The tile after `before` in its row; before = NULL: the first. */
-static lam_status read_tile(tile_reader *from, size_t row, const tile *before, tile *out, lam_error *error) {
+static lam_status read_tile(tile_reader *from, size_t row, const tile_digits *before, tile_digits *out,
+                            lam_error *error) {
     lam_status status = LAM_OK;
     const tile_codes *codes = from->codes;
     const unsigned code = codes->tiles[from->tile], mask = code & ((1u << MASK_BITS) - 1);
@@ -171,7 +138,7 @@ static lam_status read_tile(tile_reader *from, size_t row, const tile *before, t
     if (column >= from->n_groups || (before != NULL && gap == 0))
         FAIL(error, LAM_ERR_NUMERIC, "%s: row %zu steps to column %zu, must be ascending and below %zu",
              from->group, row, column, from->n_groups);
-    *out = (tile){.row = (uint32_t)row, .column = (uint32_t)column};
+    *out = (tile_digits){.row = (uint32_t)row, .column = (uint32_t)column};
     for (unsigned bit = 0; bit < MASK_BITS; bit++) {
         const size_t r = bit / TILE, c = bit % TILE;
         if ((mask >> bit & 1) == 0) continue;
@@ -228,7 +195,7 @@ lam_status hierarchical_load_tiles(store *s, const char *group, size_t n_groups,
         if (made.tiles[d] == NULL) TRY(LAM_ERR_MEMORY);
         for (size_t g = 0; g < n_groups; g++)
             for (size_t k = 0; k < of_row[g]; k++, made.count[d]++) {
-                tile *const at = &made.tiles[d][made.count[d]];
+                tile_digits *const at = &made.tiles[d][made.count[d]];
                 TRY(read_tile(&from, g, k > 0 ? at - 1 : NULL, at, error));
             }
     }

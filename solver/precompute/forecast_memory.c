@@ -1,4 +1,5 @@
 /* Bytes of memory that a precompute takes, and options that would make it fit. */
+#include "solver/method/judge.h"
 #include "solver/precompute/forecast.h"
 
 #include <math.h>
@@ -142,7 +143,8 @@ double forecast_bytes(const forecast *f) {
         /* Two more samples and their mean, beside the first; of each probe its emission, its answers and its
          * first light, of some the corrections by each sample, and the vectors of the solutions that are
          * found at once. */
-        const double probes = (double)f->probes + 9, of_noise = 3 * 17 * 8,
+        const double others = JUDGE_RANDOM_PROBES + 1, probes = (double)f->probes + others,
+                     of_noise = 3 * sizeof(double) * (2 * JUDGE_NOISE_PROBES + 1),
                      at_once = fmax(16, 8 * n_channels);
         const recipe *r = &f->judge_recipe;
         const double references = held_bytes(f, forecast_reference_bytes(f), r);

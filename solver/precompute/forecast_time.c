@@ -1,4 +1,5 @@
 /* Seconds that form factors and the judge take. Bytes as text. */
+#include "solver/method/judge.h"
 #include "solver/method/reference.h"
 #include "solver/precompute/forecast.h"
 
@@ -19,13 +20,12 @@ static double sample_seconds(double n, const recipe *r, double rays_per_second, 
 
 /* Four references: two with all probes, and two, for the noise of the sample, with some of each sort. */
 static double solve_seconds(const forecast *f) {
-    enum { OTHER_PROBES = 9, NOISE_PROBES = 8 };
-    const double n = (double)f->n, probes = (double)f->probes, some = fmin(probes, NOISE_PROBES);
+    const double others = JUDGE_RANDOM_PROBES + 1, n = (double)f->n, probes = (double)f->probes;
+    const double some = fmin(probes, JUDGE_NOISE_PROBES);
     const double entries =
         f->cost.entries > 0 ? f->cost.entries : forecast_rows_bytes(n, &f->judge_recipe) / 8;
     return 2 * (double)f->n_channels *
-           (reference_seconds(n, entries, probes + OTHER_PROBES) +
-            reference_seconds(n, entries, some + OTHER_PROBES));
+           (reference_seconds(n, entries, probes + others) + reference_seconds(n, entries, some + others));
 }
 
 forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n_threads) {

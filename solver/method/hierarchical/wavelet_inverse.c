@@ -354,7 +354,7 @@ static lam_status multiply(const product_job *job, const csr *A, const csr *B, c
                             .terms = terms};
     const row_rule rule = {make_product, keep_upper, &p, .by_size = false};
     TRY(make_rows(job, &rule, &upper, error));
-    TRY(csr_mirror(&upper, out, error));
+    TRY(csr_mirror(&upper, "operator", out, error));
 done:
     csr_free(&upper);
     return status;
@@ -408,9 +408,9 @@ static lam_status run(product_job *job, csr *out, wavelet_inverse_report *report
     csr R = {.n = 0}, K = {.n = 0}, Z = {.n = 0}, RK = {.n = 0}, RZ = {.n = 0}, next_K = {.n = 0},
         next_Z = {.n = 0}, upper = {.n = 0};
     TRY(wavelet_diagonal(input->basis, input->rho, &upper, error));
-    TRY(csr_mirror(&upper, &R, error));
-    TRY(csr_mirror(input->S, &K, error));
-    TRY(csr_mirror(input->S, &Z, error));
+    TRY(csr_mirror(&upper, "operator", &R, error));
+    TRY(csr_mirror(input->S, "operator", &K, error));
+    TRY(csr_mirror(input->S, "operator", &Z, error));
     while (Z.indptr[Z.n] > 0 && report->doublings < DOUBLINGS_MOST) {
         snprintf(job->stage, sizeof job->stage, "inverse, doubling %zu", report->doublings + 1);
         job->n_products = 0;

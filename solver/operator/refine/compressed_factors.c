@@ -104,7 +104,7 @@ done:
 
 lam_status compressed_finish(compressed_factors *c, lam_error *error) {
     csr mirrored = {.n = 0};
-    const lam_status status = csr_mirror(&c->S, &mirrored, error);
+    const lam_status status = csr_mirror(&c->S, "form factors", &mirrored, error);
     if (status != LAM_OK) return status;
     csr_free(&c->S);
     c->S = mirrored;

@@ -96,17 +96,17 @@ START_TEST(tilted_plates) {
         ck_assert_double_eq_tol(uniform_sky(&dark, 0), M_PI * F, noise(F) + rounded);
         ck_assert_double_eq_tol(uniform_sky(&light, 0), M_PI * (F + albedo * (1 - F)), noise(F) + rounded);
         for (size_t t = 0; t < 145; t++) {
-            const sky_tile *seen = &dark.sky.tiling.tiles[t];
-            const double towards = -sin(tilt) * seen->centre[1] + cos(tilt) * seen->centre[2];
+            const sky_tile *tile = &dark.sky.tiling.tiles[t];
+            const double towards = -sin(tilt) * tile->centre[1] + cos(tilt) * tile->centre[2];
             const double got = (double)dark.sky.first_bounce[t];
             /* 12 degrees, the radius of all directions of a tile about its centre and a little more, are .21.
              */
             if (towards < -.21) ck_assert_double_eq(got, 0);
             if (towards > .21)
-                ck_assert_double_eq_tol(got, seen->solid_angle * towards,
-                                        noise(got / M_PI) + .01 * seen->solid_angle);
+                ck_assert_double_eq_tol(got, tile->solid_angle * towards,
+                                        noise(got / M_PI) + .01 * tile->solid_angle);
             /* The ground lights in proportion to what a tile sends down. */
-            const double back = albedo * (1 - F) * seen->cosine;
+            const double back = albedo * (1 - F) * tile->cosine;
             ck_assert_double_eq_tol((double)light.sky.first_bounce[t] - got, back, back * noise(F) + rounded);
         }
         form_factors_free(&dark);
@@ -147,11 +147,11 @@ START_TEST(hemicube_of_a_level_plate) {
     form_factors f = trace(&m, &how, "tregenza", 0);
     ck_assert_double_eq_tol(uniform_sky(&f, 0), M_PI, rounded);
     for (size_t t = 0; t < 145; t++) {
-        const sky_tile *seen = &f.sky.tiling.tiles[t];
-        const double border = 2 * (seen->altitude[1] - seen->altitude[0]) +
-                              2 * (seen->azimuth[1] - seen->azimuth[0]) * cos(seen->altitude[0]);
-        ck_assert_double_eq_tol((double)f.sky.first_bounce[t], seen->cosine,
-                                border * 2 * sqrt(2) / 256 * sin(seen->altitude[1]));
+        const sky_tile *tile = &f.sky.tiling.tiles[t];
+        const double border = 2 * (tile->altitude[1] - tile->altitude[0]) +
+                              2 * (tile->azimuth[1] - tile->azimuth[0]) * cos(tile->altitude[0]);
+        ck_assert_double_eq_tol((double)f.sky.first_bounce[t], tile->cosine,
+                                border * 2 * sqrt(2) / 256 * sin(tile->altitude[1]));
     }
     form_factors_free(&f);
     mesh_free(&m);

@@ -54,7 +54,7 @@ static double *dense_of(const tile_matrix *m, size_t n, const tile_group *groups
     double *K = test_allocate(n * n, sizeof *K), digit = 1;
     for (size_t d = 0; d < TILE_PLANES; d++, digit *= 256)
         for (size_t k = 0; k < m->count[d]; k++) {
-            const tile *t = &m->tiles[d][k];
+            const tile_digits *t = &m->tiles[d][k];
             ck_assert_uint_ge(t->column, t->row);
             ck_assert(k == 0 || t[-1].row < t->row || (t[-1].row == t->row && t[-1].column < t->column));
             for (size_t r = 0; r < groups[t->row].size; r++)

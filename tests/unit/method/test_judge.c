@@ -8,8 +8,6 @@
 
 #include "store/status.h"
 
-/* NOISE_PROBES: of a group, as in judge.c. */
-enum { NOISE_PROBES = 8 };
 enum { SIDE = 2, N = 6 * SIDE * SIDE, C = 2, VECTOR = C * N };
 enum { OWN, BETTER, HALF, OTHER_HALF, SAMPLES };
 
@@ -145,7 +143,8 @@ static expected find_expected(const subject *s, const lighting *l, bool halves_o
         out.operator_mean += figure(s, 1, B, own, own, E) / N;
         out.total_mean += total / N;
         out.total_max = fmax(out.total_max, total);
-        if (v < NOISE_PROBES) out.noise += figure(s, .5, half[0], half[1], mean, E) / NOISE_PROBES;
+        if (v < JUDGE_NOISE_PROBES)
+            out.noise += figure(s, .5, half[0], half[1], mean, E) / JUDGE_NOISE_PROBES;
     }
     return out;
 }
