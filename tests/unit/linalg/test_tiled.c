@@ -108,8 +108,12 @@ static size_t count_numbers(size_t n, const double *K) {
 static void check_same(const tile_matrix *a, const tile_matrix *b) {
     for (size_t d = 0; d < TILE_PLANES; d++) {
         ck_assert_uint_eq(a->count[d], b->count[d]);
-        ck_assert(a->count[d] == 0 ||
-                  memcmp(a->tiles[d], b->tiles[d], a->count[d] * sizeof *a->tiles[d]) == 0);
+        for (size_t k = 0; k < a->count[d]; k++) {
+            const tile_digits *t = &a->tiles[d][k], *u = &b->tiles[d][k];
+            ck_assert_uint_eq(t->row, u->row);
+            ck_assert_uint_eq(t->column, u->column);
+            ck_assert_mem_eq(t->values, u->values, sizeof t->values);
+        }
     }
 }
 
