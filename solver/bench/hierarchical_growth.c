@@ -1,7 +1,7 @@
 /* Closed grey Cornell boxes of growing size: time, memory and errors of a hierarchical operator, of blocks
  * and of rays, beside one of low rank. */
 #include "solver/base/clock.h"
-#include "solver/bench/lowrank.h"
+#include "solver/bench/hierarchical.h"
 #include "solver/bench/scenes.h"
 #include "solver/formfactor/rays/ray_rows.h"
 #include "solver/precompute/judging.h"

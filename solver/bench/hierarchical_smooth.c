@@ -1,6 +1,6 @@
 /* Light inside elements: answers on a mesh against those on one 16 times finer, constant on each element or
  * smooth. */
-#include "solver/bench/lowrank.h"
+#include "solver/bench/hierarchical.h"
 #include "solver/bench/scenes.h"
 #include "solver/method/reference.h"
 #include "solver/render/shade.h"

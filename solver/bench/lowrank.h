@@ -115,11 +115,4 @@ lam_status lowrank_of_methods(const bench_run *run, lam_error *error);
 /* Tables 1 to 5 of Fernández et al. 2011: the index vector, and frames a second. */
 lam_status lowrank_of_index_vector(const bench_run *run, lam_error *error);
 
-/* A part of the suite hierarchical: closed Cornell boxes of growing size; time, memory and stored
- * coefficients per element, beside an operator of low rank. */
-lam_status hierarchical_growth(const bench_run *run, lam_error *error);
-
-/* Another: what a mesh leaves out, with values constant on elements and smooth. */
-lam_status hierarchical_smooth(const bench_run *run, lam_error *error);
-
 #endif

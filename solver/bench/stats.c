@@ -26,3 +26,15 @@ double stats_mean(const double *x, size_t n) {
     for (size_t i = 0; i < n; i++) sum += x[i];
     return n > 0 ? sum / (double)n : NAN;
 }
+
+double stats_cost_at(size_t n, const double *error, const double *cost, double most) {
+    double least = INFINITY;
+    for (size_t k = 0; k < n; k++) {
+        if (!(error[k] <= most)) continue;
+        least = fmin(least, cost[k]);
+        if (k == 0 || !(error[k - 1] > most && error[k] > 0)) continue;
+        const double part = log(error[k - 1] / most) / log(error[k - 1] / error[k]);
+        least = fmin(least, cost[k - 1] * pow(cost[k] / cost[k - 1], part));
+    }
+    return least;
+}

@@ -13,4 +13,8 @@ double stats_median(double *x, size_t n);
 
 double stats_mean(const double *x, size_t n);
 
+/* The least cost of an error of at most `most`, by n settings from coarse to fine: the cost of one of them,
+ * or between one that errs by more and the next by powers; infinite where none is fine enough. */
+double stats_cost_at(size_t n, const double *error, const double *cost, double most);
+
 #endif

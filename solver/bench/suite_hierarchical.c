@@ -1,8 +1,9 @@
 /* Suite hierarchical: this kind of operator beside all others on every scene. */
 #include "solver/bench/cities.h"
 #include "solver/bench/formfactors.h"
-#include "solver/bench/lowrank.h"
+#include "solver/bench/hierarchical.h"
 #include "solver/bench/scenes.h"
+#include "solver/bench/stats.h"
 #include "solver/method/choice.h"
 
 #include <libgen.h>
@@ -136,7 +137,7 @@ static bool is_tried(const bench_run *run, const lowrank_scene *s, size_t kind, 
 }
 
 static lam_status measure_scene(const bench_run *run, const lowrank_scene *s, kind_curve curves[KINDS],
-                                table *out, lam_error *error) {
+                                table *out, hierarchical_plane *plane, lam_error *error) {
     lam_status status = LAM_OK;
     form_factors independent = {.row_sums = NULL};
     first_light *first = NULL;
@@ -173,6 +174,7 @@ static lam_status measure_scene(const bench_run *run, const lowrank_scene *s, ki
             add_row(s, kinds[k], value, &v, out);
             curves[k].at[curves[k].n++] = point_of(value, &v);
         }
+    TRY(hierarchical_plane_add(run, s, &independent.F, first, plane, error));
 done:
     free(E);
     first_light_destroy(first);
@@ -202,21 +204,14 @@ static double cost_of(const kind_point *p, size_t offset) {
     return *(const double *)((const char *)p + offset);
 }
 
-/* The least cost of a kind for an error of at most `error`: that of a setting, or interpolated by powers
- * between a coarser setting and the next; infinite where no setting is fine enough. */
+/* The least cost of a kind for an error of at most `error`. */
 static double least_cost(const kind_curve *c, size_t light, double error, size_t offset) {
-    double least = INFINITY;
+    double errors[SETTINGS_MOST], costs[SETTINGS_MOST];
     for (size_t k = 0; k < c->n; k++) {
-        const double now = c->at[k].error[light], cost = cost_of(&c->at[k], offset);
-        if (!(now <= error)) continue;
-        least = fmin(least, cost);
-        const double before = k > 0 ? c->at[k - 1].error[light] : NAN;
-        if (!(before > error && now > 0)) continue;
-        const double part = log(before / error) / log(before / now);
-        least =
-            fmin(least, cost_of(&c->at[k - 1], offset) * pow(cost / cost_of(&c->at[k - 1], offset), part));
+        errors[k] = c->at[k].error[light];
+        costs[k] = cost_of(&c->at[k], offset);
     }
-    return least;
+    return stats_cost_at(c->n, errors, costs, error);
 }
 
 /* The least cost of all kinds but hierarchical that answer for any emission. */
@@ -309,6 +304,8 @@ lam_status bench_hierarchical(const bench_run *run, lam_error *error) {
                    .columns = equal_columns,
                    .n_columns = sizeof equal_columns / sizeof *equal_columns,
                    .printed = true};
+    hierarchical_plane plane;
+    hierarchical_plane_begin(&plane);
     if (curves == NULL) TRY(LAM_ERR_MEMORY);
     const bool quick = run->scale == BENCH_QUICK;
     const size_t n_scenes = run->scene != NULL ? 1 : quick ? MAP_MAIN : MAP_SCENES;
@@ -317,12 +314,13 @@ lam_status bench_hierarchical(const bench_run *run, lam_error *error) {
             TRY(open_file(run, name, &s, error));
         else
             TRY(map_scene_open(run, map_scenes[k], elements_of[run->scale], &s, error));
-        TRY(measure_scene(run, &s, curves, &points, error));
+        TRY(measure_scene(run, &s, curves, &points, &plane, error));
         add_equal(&s, curves, &equal);
         lowrank_scene_free(&s);
     }
     TRY(bench_table(run, &points, error));
     TRY(bench_table(run, &equal, error));
+    TRY(hierarchical_plane_end(run, &plane, error));
     if (run->scene == NULL) TRY(hierarchical_smooth(run, error));
     if (run->scene == NULL) TRY(hierarchical_growth(run, error));
 done:
@@ -330,5 +328,6 @@ done:
     free(curves);
     table_free(&points);
     table_free(&equal);
+    hierarchical_plane_free(&plane);
     return status;
 }

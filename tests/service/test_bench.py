@@ -141,7 +141,7 @@ class Hierarchical(unittest.TestCase):
         assert done.returncode == 0, done.stderr
         cls.printed = json.loads(done.stdout)
         cls.tables = {}
-        for name in "hierarchical", "equal-error", "smooth", "growth":
+        for name in "hierarchical", "equal-error", "plane", "plane-equal", "smooth", "growth":
             with open(os.path.join(cls.out, f"hierarchical-{name}.csv"), encoding="utf-8", newline="") as stream:
                 cls.tables[name] = list(csv.DictReader(stream))
 
@@ -184,6 +184,32 @@ class Hierarchical(unittest.TestCase):
                       if other["scene"] == row["scene"] and other["kind"] == row["least_kind"]
                       and float(other[row["light"]]) <= float(row["error"])]
             self.assertLessEqual(float(row["least_mb"]), min(others))
+
+    def test_plane(self):
+        rows = self.tables["plane"]
+        ways = {"rays", "near pairs", "pairs", "blocks"}
+        for scene in "city 1", "cornell":
+            of = [row for row in rows if row["scene"] == scene]
+            self.assertEqual({row["form_factors"] for row in of}, ways)
+            for way in ways:
+                coarse, middle, fine = (row for row in of if row["form_factors"] == way)
+                # Errors fall with epsilon; the reference of a quick run is of rays, whose noise hides that of single
+                # elements, but not that of the operator in random emission.
+                self.assertLess(float(fine["random"]), float(coarse["random"]), way)
+                self.assertGreater(float(middle["stored_mb"]), float(coarse["stored_mb"]))
+                self.assertGreater(float(middle["form_factors_s"]), 0)
+                self.assertEqual(scene == "city 1", middle["lights"] == "")
+        points = {(row["scene"], row["epsilon"]): row for row in rows if row["form_factors"] == "blocks"}
+        for row in self.tables["plane-equal"]:
+            own = points[row["scene"], row["epsilon"]]
+            self.assertEqual(row["error"], own[row["light"]])
+            spent = float(own["form_factors_s"]) + float(own["build_s"])
+            self.assertAlmostEqual(float(row["time_s"]), spent, delta=1e-3 * spent)
+            if row["other"] == "-":
+                self.assertEqual(row["ratio"], "")
+                continue
+            self.assertAlmostEqual(float(row["ratio"]), float(row["other_s"]) / float(row["time_s"]),
+                                   delta=1e-3 * float(row["ratio"]))
 
     def test_smooth(self):
         small, large = self.tables["smooth"]

@@ -23,6 +23,20 @@ START_TEST(quantiles) {
 }
 END_TEST
 
+/* Errors fall as 1, .25, .0625 and NaN; costs rise as 1, 4, 16. */
+START_TEST(cost_at_an_error) {
+    const double error[] = {1, .25, .0625, NAN}, cost[] = {1, 4, 16, 2}, dear[] = {8, 4, 16, 2};
+    ck_assert_double_eq(stats_cost_at(4, error, cost, 1), 1);
+    ck_assert_double_eq_tol(stats_cost_at(4, error, cost, .5), 2, 1e-14);
+    ck_assert_double_eq_tol(stats_cost_at(4, error, cost, .125), 8, 1e-14);
+    ck_assert_double_eq(stats_cost_at(4, error, cost, 3), 1);
+    ck_assert(isinf(stats_cost_at(4, error, cost, .01)));
+    ck_assert(isinf(stats_cost_at(0, error, cost, 1)));
+    /* The finer one may be the cheaper one. */
+    ck_assert_double_eq(stats_cost_at(4, error, dear, 1), 4);
+}
+END_TEST
+
 static const table_column columns[] = {
     {"what", NULL, "a text"}, {"much", "s", "a number"}, {"more", "", "another"}};
 
@@ -192,6 +206,7 @@ int main(void) {
     Suite *suite = suite_create("bench");
     TCase *cases = tcase_create("bench");
     tcase_add_test(cases, quantiles);
+    tcase_add_test(cases, cost_at_an_error);
     tcase_add_test(cases, csv_quotes);
     tcase_add_test(cases, json_parses);
     tcase_add_test(cases, terminal_columns_align);
