@@ -42,11 +42,11 @@ typedef struct shares {
     double of_epsilon;
     float of_S, inner, skipped;
 } shares;
-static const shares shares_of_rows = {.of_epsilon = .02, .of_S = .5f, .inner = .25f, .skipped = .005f};
+static const shares shares_of_rows = {.of_epsilon = .02, .of_S = .5f, .inner = .25f, .skipped = .004f};
 /* Blocks have no noise, and their inverse deserves more coefficients, each of which costs less: at a
  * threshold of 2e-4 in a Cornell box of 10,249 elements, this takes a quarter of the time of the shares of
  * rows and errs by 2 % more. */
-static const shares shares_of_blocks = {.of_epsilon = .004, .of_S = 1, .inner = 1, .skipped = .1f};
+static const shares shares_of_blocks = {.of_epsilon = .004, .of_S = 1, .inner = 1, .skipped = .085f};
 /* The error of a block over the threshold. */
 static const double share_of_block = 2;
 /* Times the radius of a node over the cube root of the threshold: the reach of the node (wavelet_reach.h).

@@ -1,8 +1,9 @@
 /* K = S (I - R S)^-1 in a wavelet basis, R being the diagonal matrix of reflectances, by doubling of its
  * Neumann series,
- *     K_2m = K_m + Z_m R K_m,   Z_2m = Z_m R Z_m,   K_1 = Z_1 = S,
- * with K_m the sum of m bounces and Z_m = S (R S)^(m-1). Both are symmetric, and nothing is divided by R.
- * Small entries are dropped after every product, so that matrices stay sparse. */
+ *     Z_2m = Z_m R Z_m,   K_2m = K_m + Z_2m + Z_m R (K_m - Z_m),   K_1 = Z_1 = S,
+ * with K_m the sum of m bounces and Z_m = S (R S)^(m-1), so that the first doubling takes one product. Both
+ * are symmetric, and nothing is divided by R. Small entries are dropped after every product, so that matrices
+ * stay sparse. */
 #ifndef LAMBERT_METHOD_HIERARCHICAL_WAVELET_INVERSE_H
 #define LAMBERT_METHOD_HIERARCHICAL_WAVELET_INVERSE_H
 

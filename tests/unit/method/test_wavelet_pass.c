@@ -320,6 +320,18 @@ START_TEST(doubling_inverts) {
     ck_ok(wavelet_inverse(&input, &again, &report, &error));
     ck_assert_mem_eq(found.indptr, again.indptr, (n + 1) * sizeof *found.indptr);
     ck_assert_mem_eq(found.data, again.data, found.indptr[n] * sizeof *found.data);
+    csr_free(&again);
+    /* Weights of a build, of which none is above 10, change the thresholds alone. */
+    float *uneven = NULL;
+    ck_ok(wavelets_weights(&s.basis, &uneven, &error));
+    for (size_t t = 0; t < s.basis.n_nodes; t++) ck_assert_float_le(uneven[t], 10);
+    input.weight = uneven;
+    input.threshold = 1e-8f;
+    ck_ok(wavelet_inverse(&input, &again, &report, &error));
+    free(all);
+    all = whole(&again);
+    ck_assert_double_le(largest_difference(n * n, all, truth), 1e-4);
+    free(uneven);
     csr_free(&in);
     csr_free(&found);
     csr_free(&again);
