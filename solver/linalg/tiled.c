@@ -21,6 +21,14 @@ enum { COLUMNS_SHARE = 8 };
 /* Columns and steps, and fours, behind the last that a register may read. */
 enum { COLUMNS_PAST = 4, FOURS_PAST = 1 };
 
+/* Bytes from a four to the one that is asked for ahead, where the fours are more than a cache of a core
+ * holds: measured at 22 MB, a fifth less time than without, 1.5 to 6 kB alike; at 4 MB 3 % more. */
+enum { AHEAD = 3072, CACHED = 8 << 20 };
+
+static size_t bytes_ahead(const tiled_rows *t) {
+    return t->begin[t->n_groups * t->n_planes] * sizeof *t->fours > CACHED ? AHEAD : 0;
+}
+
 /* From the sum of a plane to that of the next lower one. */
 static const float radix = 256;
 
@@ -243,6 +251,7 @@ CPU_AVX2_TARGET static inline void finish_group(const tiled_rows *t, size_t g, _
 
 /* Lanes 0 to 7 and 8 to 11 of a row of four tiles. */
 CPU_AVX2_TARGET static void group_avx2(const tiled_rows *t, size_t g, const float *x, float *y) {
+    const size_t ahead = bytes_ahead(t);
     const __m256i left = _mm256_setr_epi32(0, 1, 2, 4, 5, 6, 0, 0),
                   middle = _mm256_setr_epi32(0, 0, 0, 0, 0, 0, 0, 1),
                   right = _mm256_setr_epi32(2, 4, 5, 6, 0, 0, 0, 0);
@@ -256,6 +265,7 @@ CPU_AVX2_TARGET static void group_avx2(const tiled_rows *t, size_t g, const floa
         for (uint64_t f = t->begin[part]; f < t->begin[part + 1]; f++) {
             const tile_four *four = &t->fours[f];
             const float *from = x + four->base;
+            _mm_prefetch((const char *)four + ahead, _MM_HINT_T0);
             const __m256 a = _mm256_loadu2_m128(from + four->beyond[1], from + four->beyond[0]);
             const __m256 b = _mm256_loadu2_m128(from + four->beyond[3], from + four->beyond[2]);
             const __m256 X =
@@ -281,6 +291,7 @@ CPU_AVX2_TARGET static void group_avx2(const tiled_rows *t, size_t g, const floa
 }
 
 CPU_AVX512_TARGET static void group_avx512(const tiled_rows *t, size_t g, const float *x, float *y) {
+    const size_t ahead = bytes_ahead(t);
     const __m512i packed = _mm512_setr_epi32(0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, 0, 0, 0, 0);
     __m512 lanes[TILE] = {_mm512_setzero_ps(), _mm512_setzero_ps(), _mm512_setzero_ps()};
     for (size_t part = g * t->n_planes; part < (g + 1) * t->n_planes; part++) {
@@ -288,6 +299,7 @@ CPU_AVX512_TARGET static void group_avx512(const tiled_rows *t, size_t g, const 
         for (uint64_t f = t->begin[part]; f < t->begin[part + 1]; f++) {
             const tile_four *four = &t->fours[f];
             const float *from = x + four->base;
+            _mm_prefetch((const char *)four + ahead, _MM_HINT_T0);
             const __m256 a = _mm256_loadu2_m128(from + four->beyond[1], from + four->beyond[0]);
             const __m256 b = _mm256_loadu2_m128(from + four->beyond[3], from + four->beyond[2]);
             const __m512 X = _mm512_maskz_permutexvar_ps(0xFFF, packed,

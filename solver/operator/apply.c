@@ -66,6 +66,9 @@ done:
 /* Rows shorter than this are finished by one thread. */
 #define THREADS_WORTH 65536
 
+/* Elements that a thread finishes at a time. */
+enum { BLOCK = 8192 };
+
 /* One element of the quantity: from E' = E + rho H0, P and H0. */
 static inline float finish(lam_quantity quantity, float rho, float lit, float P, float H0) {
     switch (quantity) {
@@ -79,22 +82,24 @@ static inline float finish(lam_quantity quantity, float rho, float lit, float P,
     return 0.0f;
 }
 
-/* E' = E + rho H0 of an element. */
-static inline float light(const float *rho, const float *E, const float *H0, size_t i) {
-    return H0 != NULL ? E[i] + rho[i] * H0[i] : E[i];
-}
-
 /* One row of out from the same row of E and of H0 (NULL: 0), all in mesh order, and of P (position order).
  * out may be P when there is no order. Elements are taken in mesh order, as scattered reads cost less than
  * scattered writes. */
 static void finish_row(const lam_operator *op, size_t c, lam_quantity quantity, const float *E,
                        const float *H0, const float *P, float *out) {
     const float *rho = op->reflectance + c * op->n;
+    const size_t blocks = (op->n + BLOCK - 1) / BLOCK;
 #pragma omp parallel for schedule(static)                                                                    \
     num_threads((int)op->n_threads) if (op->n_threads > 1 && op->n >= THREADS_WORTH)
-    for (size_t i = 0; i < op->n; i++) {
-        const float h = H0 != NULL ? H0[i] : 0.0f;
-        out[i] = finish(quantity, rho[i], light(rho, E, H0, i), P[operator_position(op, i)], h);
+    for (size_t b = 0; b < blocks; b++) {
+        const size_t first = b * BLOCK, last = first + BLOCK < op->n ? first + BLOCK : op->n;
+        if (quantity == LAM_RADIOSITY && H0 == NULL) /* most answers */
+            for (size_t i = first; i < last; i++)
+                out[i] = rho[i] > 0.0f ? E[i] + P[operator_position(op, i)] : E[i];
+        else
+            for (size_t i = first; i < last; i++)
+                out[i] = finish(quantity, rho[i], operator_light(rho, E, H0, i), P[operator_position(op, i)],
+                                H0 != NULL ? H0[i] : 0.0f);
     }
 }
 
@@ -116,7 +121,7 @@ static void light_row(const lam_operator *op, size_t c, const float *E, const fl
     num_threads((int)op->n_threads) if (op->n_threads > 1 && op->n >= THREADS_WORTH)
     for (size_t p = 0; p < op->n; p++) {
         const size_t i = op->order != NULL ? op->order[p] : p;
-        lit[p] = light(rho, E, H0, i);
+        lit[p] = operator_light(rho, E, H0, i);
     }
 }
 
@@ -132,10 +137,11 @@ static void apply_pass(const lam_operator *op, const pass *in, float *out, void 
     const size_t n = op->n, rows = in->count * op->n_channels, row_bytes = n * sizeof(float);
     const bool choose = in->selected != NULL && op->kind->apply_selected != NULL;
     const bool apart = in->selected != NULL ? !choose : op->order != NULL;
+    const bool gathers = in->selected == NULL && op->kind->apply_lit != NULL;
     const float *lit = in->E;
     float *P = out;
     void *rest = work_area_begin(work);
-    if (op->order != NULL || in->H0 != NULL) {
+    if (!gathers && (op->order != NULL || in->H0 != NULL)) {
         float *positions = work_area_take(&rest, rows * row_bytes);
         for (size_t row = 0; row < rows; row++)
             light_row(op, row % op->n_channels, in->E + row * n, in->H0 != NULL ? in->H0 + row * n : NULL,
@@ -143,7 +149,9 @@ static void apply_pass(const lam_operator *op, const pass *in, float *out, void 
         lit = positions;
     }
     if (apart) P = work_area_take(&rest, rows * row_bytes);
-    if (choose)
+    if (gathers)
+        op->kind->apply_lit(op, in->count, in->E, in->H0, P, rest);
+    else if (choose)
         op->kind->apply_selected(op, in->count, lit, in->n_selected, in->selected, P, rest);
     else
         op->kind->apply(op, in->count, lit, P, rest);

@@ -3,31 +3,10 @@
  * threshold. An answer is two transforms of O(n) and a product with K. */
 #include "solver/operator/hierarchical.h"
 
-#include "solver/base/work_area.h"
-#include "solver/linalg/tiled.h"
-#include "solver/operator/mean_correction.h"
-
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Numbers that a thread scales at once. */
-enum { BLOCK = 8192 };
-
-typedef struct hierarchical {
-    lam_operator base;
-    wavelets basis;
-    wavelet_plan plan; /* of the coefficients that any K has */
-    size_t n_groups;
-    tile_group *groups; /* [n_groups], by number in the basis, all that the plan has */
-    float *step;        /* [n_groups] */
-    tiled_rows *K;      /* [C] */
-    double n_numbers;   /* of all K, both triangles */
-    float *root_area;   /* [n] A^1/2, by position */
-    float *left;        /* [C][n] rho' A^-1/2, by position */
-    mean_correction even;
-} hierarchical;
 
 void hierarchical_arrays_free(hierarchical_arrays *arrays, size_t n_channels) {
     for (size_t c = 0; arrays->K != NULL && c < n_channels; c++) csr_free(&arrays->K[c]);
@@ -280,166 +259,6 @@ done:
     return status;
 }
 
-/* Steps, coefficients and flags of some positions. */
-static size_t some_bytes(const wavelet_plan *plan) {
-    return 4 * WORK_AREA_ALIGN + plan->n_steps * (sizeof(uint32_t) + 1) +
-           (plan->n_used + plan->n) * sizeof(uint32_t);
-}
-
-static size_t hierarchical_work_bytes(const lam_operator *op, size_t n_rhs) {
-    const hierarchical *self = (const hierarchical *)op;
-    const size_t used = self->plan.n_used;
-    size_t product, vectors, coefficients, slots, total = WORK_AREA_ALIGN;
-    if (!size_multiply(tiled_work(used, n_rhs), sizeof(float), &product) ||
-        !size_multiply(op->n, n_rhs * sizeof(float), &vectors) ||
-        !size_multiply(used, n_rhs * sizeof(float), &coefficients) ||
-        !size_multiply(wavelet_plan_work(&self->plan), n_rhs * sizeof(float), &slots) ||
-        !work_area_add(&total, vectors) || !work_area_add(&total, coefficients) ||
-        !work_area_add(&total, coefficients) || !work_area_add(&total, slots) ||
-        !work_area_add(&total, some_bytes(&self->plan)) || !work_area_add(&total, product))
-        return 0;
-    return total;
-}
-
-/* out_v = K_c in_v: light of few elements by its columns, other vectors together. */
-static void multiply_core(const hierarchical *self, size_t c, size_t m, const float *in, float *out,
-                          float *work) {
-    const tiled_rows *K = &self->K[c];
-    for (size_t v = 0, last; v < m; v = last) {
-        last = v;
-        while (last < m && !tiled_few_columns(K, in + last * K->n)) last++;
-        if (last > v)
-            tiled_multiply(K, last - v, in + v * K->n, out + v * K->n, work, self->base.n_threads);
-        else
-            tiled_multiply_columns(K, in + v * K->n, out + last++ * K->n, work);
-    }
-}
-
-/* to_v = by from_v, element by element. */
-static void scale(size_t m, size_t n, const float *by, const float *from, size_t from_stride, float *to,
-                  size_t to_stride, size_t n_threads) {
-    const size_t blocks = (n + BLOCK - 1) / BLOCK;
-#pragma omp parallel for schedule(static) num_threads((int)n_threads) if (n_threads > 1 && m * blocks > 8)
-    for (size_t k = 0; k < m * blocks; k++) {
-        const size_t v = k / blocks, first = k % blocks * BLOCK, last = first + BLOCK < n ? first + BLOCK : n;
-        const float *x = from + v * from_stride;
-        float *y = to + v * to_stride;
-        for (size_t p = first; p < last; p++) y[p] = by[p] * x[p];
-    }
-}
-
-/* Vectors of which one channel is 0 have an answer of 0 there, whatever stands beside them in a pass. */
-static bool is_dark(const float *in, size_t n) {
-    for (size_t p = 0; p < n; p++)
-        if (in[p] != 0) return false;
-    return true;
-}
-
-static bool are_dark(const float *in, size_t n, size_t stride, size_t n_rhs) {
-    for (size_t v = 0; v < n_rhs; v++)
-        if (!is_dark(in + v * stride, n)) return false;
-    return true;
-}
-
-/* out = left W^T K W right in, left = R' A^-1/2 and right = A^1/2, or transposed. */
-static void apply(const lam_operator *op, bool adjoint, size_t n_rhs, const float *in, float *out,
-                  void *work) {
-    const hierarchical *self = (const hierarchical *)op;
-    const wavelet_plan *plan = &self->plan;
-    const size_t n = op->n, C = op->n_channels, n_threads = op->n_threads;
-    float *X = work_area_take(&work, n_rhs * n * sizeof *X);
-    float *from = work_area_take(&work, n_rhs * plan->n_used * sizeof *from);
-    float *to = work_area_take(&work, n_rhs * plan->n_used * sizeof *to);
-    float *slots = work_area_take(&work, n_rhs * wavelet_plan_work(plan) * sizeof *slots);
-    for (size_t c = 0; c < C; c++) {
-        const float *left = self->left + c * n, *root = self->root_area;
-        if (are_dark(in + c * n, n, C * n, n_rhs)) {
-            for (size_t v = 0; v < n_rhs; v++) memset(out + (v * C + c) * n, 0, n * sizeof *out);
-            continue;
-        }
-        scale(n_rhs, n, adjoint ? left : root, in + c * n, C * n, X, n, n_threads);
-        wavelet_plan_forward(plan, n_rhs, X, from, slots, n_threads);
-        multiply_core(self, c, n_rhs, from, to, work);
-        wavelet_plan_inverse(plan, n_rhs, to, X, slots, n_threads);
-        scale(n_rhs, n, adjoint ? root : left, X, n, out + c * n, C * n, n_threads);
-        for (size_t v = 0; v < n_rhs; v++) {
-            const size_t row = (v * C + c) * n;
-            if (n_rhs > 1 && is_dark(in + row, n)) memset(out + row, 0, n * sizeof *out);
-            const double sum = mean_correction_sum(&self->even, c, adjoint, root, in + row);
-            mean_correction_add(&self->even, c, adjoint, root, sum, out + row);
-        }
-    }
-}
-
-static void hierarchical_apply(const lam_operator *op, size_t n_rhs, const float *E, float *P, void *work) {
-    apply(op, false, n_rhs, E, P, work);
-}
-
-/* Where more than one in so many steps is needed, the whole answer is as quick. */
-enum { SOME_STEPS = 4 };
-
-/* For some elements: only their ancestors in the tree and the rows of K of these. */
-static void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const float *E,
-                                        size_t n_selected, const uint32_t *selected, float *P, void *work) {
-    const hierarchical *self = (const hierarchical *)op;
-    const wavelet_plan *plan = &self->plan;
-    const size_t n = op->n, C = op->n_channels, used = plan->n_used, n_threads = op->n_threads;
-    float *X = work_area_take(&work, n_rhs * n * sizeof *X);
-    float *from = work_area_take(&work, n_rhs * used * sizeof *from);
-    float *to = work_area_take(&work, n_rhs * used * sizeof *to);
-    float *slots = work_area_take(&work, n_rhs * wavelet_plan_work(plan) * sizeof *slots);
-    uint32_t *steps = work_area_take(&work, plan->n_steps * sizeof *steps);
-    uint32_t *rows = work_area_take(&work, used * sizeof *rows);
-    uint32_t *positions = work_area_take(&work, n * sizeof *positions);
-    uint8_t *flags = work_area_take(&work, plan->n_steps);
-    size_t n_steps = plan->n_steps, n_rows = used;
-    memset(flags, 0, plan->n_steps);
-    const bool few = n_selected <= n;
-    for (size_t r = 0; few && r < n_selected; r++)
-        positions[r] = (uint32_t)operator_position(op, selected[r]);
-    if (few) n_steps = wavelet_plan_paths(plan, n_selected, positions, flags, steps);
-    const bool some = few && n_steps * SOME_STEPS < plan->n_steps;
-    if (some) n_rows = wavelet_plan_coefficients(plan, n_steps, steps, rows);
-    for (size_t c = 0; c < C; c++) {
-        const float *left = self->left + c * n;
-        if (are_dark(E + c * n, n, C * n, n_rhs)) {
-            for (size_t v = 0; v < n_rhs; v++)
-                memset(P + (v * C + c) * n_selected, 0, n_selected * sizeof *P);
-            continue;
-        }
-        scale(n_rhs, n, self->root_area, E + c * n, C * n, X, n, n_threads);
-        wavelet_plan_forward(plan, n_rhs, X, from, slots, n_threads);
-        if (!some) {
-            multiply_core(self, c, n_rhs, from, to, work);
-            wavelet_plan_inverse(plan, n_rhs, to, X, slots, n_threads);
-        }
-        for (size_t v = 0; v < n_rhs; v++) {
-            if (is_dark(E + (v * C + c) * n, n)) {
-                memset(P + (v * C + c) * n_selected, 0, n_selected * sizeof *P);
-                continue;
-            }
-            if (some && tiled_few_columns(&self->K[c], from + v * used))
-                tiled_multiply_columns(&self->K[c], from + v * used, to, work);
-            else if (some)
-                tiled_multiply_rows(&self->K[c], n_rows, rows, from + v * used, to, work);
-            if (some) wavelet_plan_inverse_some(plan, n_steps, steps, to, X + v * n, slots);
-            const mean_correction *even = &self->even;
-            const float *lift = even->missing != NULL ? even->lift + c * n : NULL;
-            const float sum =
-                (float)mean_correction_sum(even, c, false, self->root_area, E + (v * C + c) * n);
-            for (size_t r = 0; r < n_selected; r++) {
-                const size_t p = operator_position(op, selected[r]);
-                const float found = left[p] * X[v * n + p];
-                P[(v * C + c) * n_selected + r] = lift != NULL ? found + sum * lift[p] : found;
-            }
-        }
-    }
-}
-
-static void hierarchical_apply_adjoint(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work) {
-    apply(op, true, n_rhs, g, w, work);
-}
-
 static void hierarchical_describe(const lam_operator *op, operator_description *description) {
     const hierarchical *self = (const hierarchical *)op;
     const double whole = (double)op->n * (double)op->n * (double)op->n_channels;
@@ -458,6 +277,7 @@ const operator_kind operator_hierarchical = {
     .apply = hierarchical_apply,
     .apply_selected = hierarchical_apply_selected,
     .apply_adjoint = hierarchical_apply_adjoint,
+    .apply_lit = hierarchical_apply_lit,
     .destroy = hierarchical_destroy,
     .describe = hierarchical_describe,
     /* Both triangles in tiles, of 12 bytes each; the store has of one triangle two bytes for a tile and one

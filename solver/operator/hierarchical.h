@@ -2,7 +2,8 @@
 #ifndef LAMBERT_OPERATOR_HIERARCHICAL_H
 #define LAMBERT_OPERATOR_HIERARCHICAL_H
 
-#include "solver/linalg/tiles.h"
+#include "solver/linalg/tiled.h"
+#include "solver/operator/mean_correction.h"
 #include "solver/operator/operator.h"
 #include "solver/operator/wavelet/wavelet_plan.h"
 
@@ -13,6 +14,30 @@ typedef struct hierarchical_arrays {
     csr *K;      /* [C], of n rows each: the upper triangle, the diagonal included */
     float *step; /* [n], by coefficient: K_ij is rounded to a multiple of step_i step_j at most */
 } hierarchical_arrays;
+
+/* A loaded operator. */
+typedef struct hierarchical {
+    lam_operator base;
+    wavelets basis;
+    wavelet_plan plan; /* of the coefficients that any K has */
+    size_t n_groups;
+    tile_group *groups; /* [n_groups], by number in the basis, all that the plan has */
+    float *step;        /* [n_groups] */
+    tiled_rows *K;      /* [C] */
+    double n_numbers;   /* of all K, both triangles */
+    float *root_area;   /* [n] A^1/2, by position */
+    float *left;        /* [C][n] rho' A^-1/2, by position */
+    mean_correction even;
+} hierarchical;
+
+/* The products of the kind (operator.h), in hierarchical_apply.c. */
+size_t hierarchical_work_bytes(const lam_operator *op, size_t n_rhs);
+void hierarchical_apply(const lam_operator *op, size_t n_rhs, const float *E, float *P, void *work);
+void hierarchical_apply_adjoint(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work);
+void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const float *E, size_t n_selected,
+                                 const uint32_t *selected, float *P, void *work);
+void hierarchical_apply_lit(const lam_operator *op, size_t n_rhs, const float *E, const float *H0, float *P,
+                            void *work);
 
 void hierarchical_arrays_free(hierarchical_arrays *arrays, size_t n_channels);
 

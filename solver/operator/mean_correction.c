@@ -90,29 +90,16 @@ done:
     return status;
 }
 
-double mean_correction_sum(const mean_correction *e, size_t c, bool adjoint, const float *root,
-                           const float *x) {
-    double sum = 0;
-    if (e->missing == NULL) return 0;
-    const float *lift = e->lift + c * e->n;
-    if (adjoint) {
-        for (size_t p = 0; p < e->n; p++) sum += (double)lift[p] * (double)x[p];
-    } else {
-        for (size_t p = 0; p < e->n; p++) sum += (double)(root[p] * root[p]) * (double)x[p];
-    }
-    return sum / e->light[c];
-}
+/* Partial sums side by side, as one would wait for each addition in turn. */
+enum { PARTS = 8 };
 
-void mean_correction_add(const mean_correction *e, size_t c, bool adjoint, const float *root, double sum,
-                         float *y) {
-    const float factor = (float)sum;
-    if (e->missing == NULL || factor == 0) return;
-    const float *lift = e->lift + c * e->n;
-    if (adjoint) {
-        for (size_t p = 0; p < e->n; p++) y[p] += factor * (root[p] * root[p]);
-    } else {
-        for (size_t p = 0; p < e->n; p++) y[p] += factor * lift[p];
-    }
+double mean_correction_sum(const float *by, const float *x, size_t count) {
+    double parts[PARTS] = {0};
+    size_t p = 0;
+    for (; p + PARTS <= count; p += PARTS)
+        for (size_t k = 0; k < PARTS; k++) parts[k] += (double)by[p + k] * (double)x[p + k];
+    for (size_t k = 0; p < count; p++, k++) parts[k] += (double)by[p] * (double)x[p];
+    return ((parts[0] + parts[1]) + (parts[2] + parts[3])) + ((parts[4] + parts[5]) + (parts[6] + parts[7]));
 }
 
 lam_status mean_correction_lift(mean_correction *e, const float *by, lam_error *error) {

@@ -34,12 +34,9 @@ lam_status mean_correction_load(store *s, size_t n, size_t n_channels, mean_corr
 /* lift = by missing, by [C][n] by position: before the first product. Errors: LAM_ERR_MEMORY. */
 lam_status mean_correction_lift(mean_correction *e, const float *by, lam_error *error);
 
-/* y += lift (sum_j A_j x_j) / light of channel c, or, adjoint, y += A (sum_i lift_i x_i) / light: [n] by
- * position, root = A^1/2. Where nothing is missing y stays. sum: what mean_correction_sum says. */
-double mean_correction_sum(const mean_correction *e, size_t c, bool adjoint, const float *root,
-                           const float *x);
-void mean_correction_add(const mean_correction *e, size_t c, bool adjoint, const float *root, double sum,
-                         float *y);
+/* sum_p by_p x_p of some positions. A product adds y += lift (sum_j A_j x_j) / light, or, adjoint,
+ * y += A (sum_i lift_i x_i) / light. */
+double mean_correction_sum(const float *by, const float *x, size_t count);
 
 /* Bytes that a product reads. */
 size_t mean_correction_bytes(const mean_correction *e);

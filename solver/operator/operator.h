@@ -28,10 +28,12 @@ typedef struct operator_description {
  * A kind may leave NULL: apply and apply_adjoint, where it answers for its own emitters only
  * (emitters_apply.c); apply_selected, the rows of apply for the n_selected elements selected
  * (operator_position says where they are), P being [n_rhs][C][n_selected] (without it all rows are computed);
- * set_threads, which passes n_threads on to its arrays; narrow, which makes the operator again with its large
- * arrays in another precision, all of its own; relight, which makes it again under other reflectances, its
- * large arrays those of op; check, which compares the operator with the areas of its mesh and, where they
- * disagree, writes the reason to detail and returns false. */
+ * apply_lit, which is apply of E' = E + rho H0 (operator_light), E and H0 (NULL: 0) being in mesh order;
+ * set_threads, which passes n_threads on to its arrays;
+ * narrow, which makes the operator again with its large arrays in another precision, all of its own; relight,
+ * which makes it again under other reflectances, its large arrays those of op; check, which compares the
+ * operator with the areas of its mesh and, where they disagree, writes the reason to detail and returns
+ * false. */
 #define OPERATOR_PASS 16 /* a larger batch is cut into passes */
 
 typedef struct operator_kind {
@@ -44,6 +46,8 @@ typedef struct operator_kind {
     void (*apply_adjoint)(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work);
     void (*apply_selected)(const lam_operator *op, size_t n_rhs, const float *E, size_t n_selected,
                            const uint32_t *selected, float *P, void *work);
+    void (*apply_lit)(const lam_operator *op, size_t n_rhs, const float *E, const float *H0, float *P,
+                      void *work);
     void (*set_threads)(lam_operator *op, size_t n_threads);
     lam_status (*narrow)(const lam_operator *op, panel_precision precision, lam_operator **out,
                          lam_error *error);
@@ -103,6 +107,11 @@ static inline size_t operator_position(const lam_operator *op, size_t element) {
 static inline float operator_reflectance_or_one(const lam_operator *op, size_t c, size_t position) {
     float rho = op->reflectance[c * op->n + (op->order != NULL ? op->order[position] : position)];
     return rho > 0.0f ? rho : 1.0f;
+}
+
+/* E' = E + rho H0 of an element; H0 may be NULL: 0. */
+static inline float operator_light(const float *rho, const float *E, const float *H0, size_t i) {
+    return H0 != NULL ? E[i] + rho[i] * H0[i] : E[i];
 }
 
 /* Makes op, in f32, again with its large arrays in another precision; the caller frees out with

@@ -96,7 +96,7 @@ static lam_status transform(const wavelets *w, const float *x, float *c, lam_err
     TRY(wavelet_plan_create(w, used, &plan, error));
     work = memory_allocate(wavelet_plan_work(&plan), sizeof *work, "wavelets", error);
     if (work == NULL) TRY(LAM_ERR_MEMORY);
-    wavelet_plan_forward(&plan, 1, x, c, work, 1);
+    wavelet_plan_forward(&plan, 1, NULL, NULL, x, c, work, 1);
 done:
     wavelet_plan_free(&plan);
     free(used);

@@ -269,8 +269,17 @@ static void leave_dark(const wavelet_plan *plan, const wavelet_piece *piece, flo
     memset(s + (piece->last - 1) * WAVELET_SCALING, 0, WAVELET_SCALING * sizeof *s);
 }
 
-void wavelet_plan_forward(const wavelet_plan *plan, size_t m, const float *X, float *C, float *work,
-                          size_t n_threads) {
+/* The first position of a piece, and that behind its last. */
+static size_t piece_begin(const wavelet_plan *plan, const wavelet_piece *piece) {
+    return plan->steps[piece->last - 1].begin;
+}
+
+static size_t piece_end(const wavelet_plan *plan, const wavelet_piece *piece) {
+    return piece_begin(plan, piece) + plan->steps[piece->last - 1].count;
+}
+
+void wavelet_plan_forward(const wavelet_plan *plan, size_t m, wavelet_visit *fill, void *context,
+                          const float *X, float *C, float *work, size_t n_threads) {
     transform *const run = forward[cpu_best()];
     const size_t room = wavelet_plan_work(plan), n_pieces = plan->n_pieces;
     const plan_step *root = &plan->steps[plan->n_steps - 1];
@@ -279,6 +288,7 @@ void wavelet_plan_forward(const wavelet_plan *plan, size_t m, const float *X, fl
     for (size_t k = 0; k < m * n_pieces; k++) {
         const size_t v = k / n_pieces;
         const wavelet_piece *piece = &plan->pieces[k % n_pieces];
+        if (fill != NULL) fill(context, v, k % n_pieces, piece_begin(plan, piece), piece_end(plan, piece));
         if (is_dark(plan, piece, X + v * plan->n))
             leave_dark(plan, piece, C + v * plan->n_used, work + v * room);
         else
@@ -293,8 +303,8 @@ void wavelet_plan_forward(const wavelet_plan *plan, size_t m, const float *X, fl
     }
 }
 
-void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, float *X, float *work,
-                          size_t n_threads) {
+void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, float *X, wavelet_visit *use,
+                          void *context, float *work, size_t n_threads) {
     transform *const run = inverse[cpu_best()];
     const size_t room = wavelet_plan_work(plan), n_pieces = plan->n_pieces;
     const plan_step *root = &plan->steps[plan->n_steps - 1];
@@ -310,6 +320,7 @@ void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, fl
         const size_t v = k / n_pieces;
         const wavelet_piece *piece = &plan->pieces[k % n_pieces];
         run(plan, piece->first, piece->last, NULL, C + v * plan->n_used, X + v * plan->n, work + v * room);
+        if (use != NULL) use(context, v, k % n_pieces, piece_begin(plan, piece), piece_end(plan, piece));
     }
 }
 

@@ -41,12 +41,17 @@ static inline size_t wavelet_plan_work(const wavelet_plan *plan) {
     return plan->n_steps * WAVELET_SCALING;
 }
 
+/* Work on one piece of vector v, its positions first to last - 1, by the thread that transforms it while they
+ * are in its cache: X_v gets its numbers before the forward transform, or is read after the inverse. Either
+ * may be NULL. */
+typedef void wavelet_visit(void *context, size_t v, size_t piece, size_t first, size_t last);
+
 /* C_v = W X_v, the used coefficients alone, and X_v = W^T C_v: X_v = X + v n, C_v = C + v n_used. The forward
  * transform skips pieces in which X_v is 0. The bits depend on neither m nor n_threads. */
-void wavelet_plan_forward(const wavelet_plan *plan, size_t m, const float *X, float *C, float *work,
-                          size_t n_threads);
-void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, float *X, float *work,
-                          size_t n_threads);
+void wavelet_plan_forward(const wavelet_plan *plan, size_t m, wavelet_visit *fill, void *context,
+                          const float *X, float *C, float *work, size_t n_threads);
+void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, float *X, wavelet_visit *use,
+                          void *context, float *work, size_t n_threads);
 
 /* The steps on the paths from the root to some positions, ascending: out has room for n_steps, flags
  * [n_steps] are 0 before and after. Returns their number. */

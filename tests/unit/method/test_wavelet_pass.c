@@ -346,6 +346,58 @@ START_TEST(doubling_inverts) {
 }
 END_TEST
 
+/* Where the first two bounces cancel, K_2 has no entry and Z_2 has one: S_02 = -r S_01 S_12. */
+START_TEST(bounces_that_cancel) {
+    enum { PLACES = 3 };
+    subject s = wavelet_subject_make(BOX);
+    const size_t n = s.m.n;
+    const float r = .5f, a = .5f, rows[PLACES][PLACES] = {{0, a, -r * a * a}, {a, 0, a}, {-r * a * a, a, 0}};
+    float *rho = test_allocate(n, sizeof *rho), *weight = ones(&s.basis);
+    double A[PLACES * PLACES], K[PLACES * PLACES] = {0};
+    csr in = {.n = n,
+              .indptr = test_allocate(n + 1, sizeof *in.indptr),
+              .indices = test_allocate(PLACES, sizeof *in.indices),
+              .data = test_allocate(PLACES, sizeof *in.data)};
+    csr found;
+    wavelet_inverse_report report;
+    for (size_t p = 0; p < n; p++) rho[p] = r;
+    for (size_t i = 0, used = 0; i < n; in.indptr[++i] = used)
+        for (size_t j = i + 1; j < PLACES; j++) {
+            in.indices[used] = (uint32_t)j;
+            in.data[used++] = rows[i][j];
+        }
+    const wavelet_inverse_input input = {.basis = &s.basis,
+                                         .S = &in,
+                                         .rho = rho,
+                                         .weight = weight,
+                                         .threshold = 1e-6f,
+                                         .inner = .01f,
+                                         .skipped = .001f,
+                                         .n_threads = 1};
+    ck_ok(wavelet_inverse(&input, &found, &report, &error));
+    for (size_t k = 0; k < PLACES * PLACES; k++)
+        A[k] = (k % (PLACES + 1) == 0 ? 1 : 0) - (double)r * (double)rows[k / PLACES][k % PLACES];
+    invert(PLACES, A);
+    for (size_t i = 0; i < PLACES; i++)
+        for (size_t k = 0; k < PLACES; k++)
+            for (size_t j = 0; j < PLACES; j++) K[i * PLACES + j] += (double)rows[i][k] * A[k * PLACES + j];
+    ck_assert_uint_eq(found.indptr[n], found.indptr[PLACES]);
+    for (size_t i = 0; i < PLACES; i++)
+        for (size_t j = i; j < PLACES; j++) {
+            double value = 0;
+            for (uint64_t e = found.indptr[i]; e < found.indptr[i + 1]; e++)
+                if (found.indices[e] == j) value = (double)found.data[e];
+            /* Single precision of numbers below 1, and bounces whose terms are below 1e-8. */
+            ck_assert_double_le(fabs(value - K[i * PLACES + j]), 1e-6);
+        }
+    csr_free(&in);
+    csr_free(&found);
+    free(rho);
+    free(weight);
+    wavelet_subject_free(&s);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("wavelet pass");
     TCase *tests = tcase_create("wavelet pass");
@@ -357,6 +409,7 @@ int main(void) {
     tcase_add_loop_test(tests, one_even_light_is_put_in, 0, SUBJECTS);
     tcase_add_loop_test(tests, reflectances_in_the_basis, 0, SUBJECTS * REFLECTANCES);
     tcase_add_loop_test(tests, what_is_skipped_is_small, 0, SUBJECTS);
+    tcase_add_test(tests, bounces_that_cancel);
     tcase_add_loop_test(tests, doubling_inverts, 0, SUBJECTS * REFLECTANCES);
     suite_add_tcase(suite, tests);
     return suite_run(suite);

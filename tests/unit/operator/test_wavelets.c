@@ -2,6 +2,8 @@
 #include "solver/base/random.h"
 #include "support/wavelet_subject.h"
 
+#include <string.h>
+
 static lam_error error;
 
 START_TEST(every_element_is_in_one_leaf_of_one_plane) {
@@ -107,13 +109,27 @@ START_TEST(grids_have_few_shapes) {
 }
 END_TEST
 
-/* Pieces for threads, several vectors, and any number of threads: the same bits. */
+/* Copies a piece, and counts the positions. */
+typedef struct visited {
+    const float *from;
+    float *X;
+    size_t n, positions;
+} visited;
+
+static void visit(void *context, size_t v, size_t piece, size_t first, size_t last) {
+    visited *seen = context;
+    (void)piece;
+    for (size_t p = v * seen->n + first; p < v * seen->n + last; p++) seen->X[p] = seen->from[p];
+    __atomic_fetch_add(&seen->positions, last - first, __ATOMIC_RELAXED);
+}
+
+/* Pieces for threads, several vectors, any number of threads, and pieces that are visited: the same bits. */
 START_TEST(bits_do_not_depend_on_threads) {
     enum { SIDE = 120, N = SIDE * SIDE, VECTORS = 3 };
     double(*centre)[3] = test_allocate(N, sizeof *centre), *area = test_allocate(N, sizeof *area);
     float(*normal)[3] = test_allocate(N, sizeof *normal);
     float *X = test_allocate(VECTORS * N, sizeof *X), *one = test_allocate(VECTORS * N, sizeof *one),
-          *many = test_allocate(VECTORS * N, sizeof *many);
+          *many = test_allocate(VECTORS * N, sizeof *many), *Y = test_allocate(VECTORS * N, sizeof *Y);
     plane_tree tree;
     wavelets w;
     uint64_t seed = 9;
@@ -136,10 +152,28 @@ START_TEST(bits_do_not_depend_on_threads) {
         if (p != N / 2) X[2 * N + p] = 0;
     }
     for (int back = 0; back < 2; back++) {
-        for (size_t v = 0; v < VECTORS; v++)
-            (back ? wavelet_plan_inverse : wavelet_plan_forward)(&plan, 1, X + v * N, one + v * N, work, 1);
-        (back ? wavelet_plan_inverse : wavelet_plan_forward)(&plan, VECTORS, X, many, work, 4);
+        visited seen = {.from = X, .X = Y, .n = N};
+        memset(Y, 0, VECTORS * N * sizeof *Y);
+        for (size_t v = 0; v < VECTORS; v++) {
+            if (back)
+                wavelet_plan_inverse(&plan, 1, X + v * N, one + v * N, NULL, NULL, work, 1);
+            else
+                wavelet_plan_forward(&plan, 1, NULL, NULL, X + v * N, one + v * N, work, 1);
+        }
+        if (back) {
+            wavelet_plan_inverse(&plan, VECTORS, X, many, NULL, NULL, work, 4);
+            ck_assert_mem_eq(one, many, VECTORS * N * sizeof *one);
+            seen.from = many;
+            wavelet_plan_inverse(&plan, VECTORS, X, many, visit, &seen, work, 4);
+            ck_assert_mem_eq(one, Y, VECTORS * N * sizeof *one);
+        } else {
+            wavelet_plan_forward(&plan, VECTORS, NULL, NULL, X, many, work, 4);
+            ck_assert_mem_eq(one, many, VECTORS * N * sizeof *one);
+            wavelet_plan_forward(&plan, VECTORS, visit, &seen, Y, many, work, 4);
+            ck_assert_mem_eq(X, Y, VECTORS * N * sizeof *one);
+        }
         ck_assert_mem_eq(one, many, VECTORS * N * sizeof *one);
+        ck_assert_uint_eq(seen.positions, VECTORS * N);
     }
     wavelet_plan_free(&plan);
     wavelets_free(&w);
@@ -150,6 +184,7 @@ START_TEST(bits_do_not_depend_on_threads) {
     free(X);
     free(one);
     free(many);
+    free(Y);
     free(work);
 }
 END_TEST
@@ -174,8 +209,8 @@ START_TEST(a_plan_leaves_out_what_is_not_used) {
     float *work = test_allocate(wavelet_plan_work(&plan), sizeof *work);
     transform(&s, false, x, c);
     for (size_t p = 0; p < n; p++) back[p] = NAN;
-    wavelet_plan_forward(&plan, 1, x, some, work, 1);
-    wavelet_plan_inverse(&plan, 1, some, back, work, 1);
+    wavelet_plan_forward(&plan, 1, NULL, NULL, x, some, work, 1);
+    wavelet_plan_inverse(&plan, 1, some, back, NULL, NULL, work, 1);
     for (size_t k = 0; k < plan.n_used; k++) {
         const uint32_t at = plan.coefficient[k];
         ck_assert(k == 0 || at > plan.coefficient[k - 1]);
