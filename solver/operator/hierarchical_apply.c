@@ -113,13 +113,6 @@ static void use(void *context, size_t v, size_t piece, size_t first, size_t last
     for (size_t p = first; p < last; p++) out[p] = bounced(left, lift, factor, X, p);
 }
 
-/* Vectors of which one channel is 0 have an answer of 0 there, whatever stands beside them in a pass. */
-static bool is_dark(const float *in, size_t n) {
-    for (size_t p = 0; p < n; p++)
-        if (in[p] != 0) return false;
-    return true;
-}
-
 /* Room for m vectors, of which `in`, E, H0, out and c are still to be set. */
 typedef struct areas {
     channel h;
@@ -137,23 +130,34 @@ static areas take_areas(const hierarchical *self, size_t m, void **work) {
     return a;
 }
 
-/* X and its coefficients; false where all light of the channel is 0: then X is 0. */
-static bool analyse(areas *a, size_t m) {
+/* True when all light of a channel is 0, of which nothing bounces. */
+static bool is_dark(const channel *h, size_t m) {
+    const size_t n = h->self->base.n;
+    for (size_t v = 0; v < m; v++) {
+        const size_t row = v * h->stride;
+        if (!wavelet_is_dark((h->in != NULL ? h->in : h->E) + row, n) ||
+            (h->in == NULL && h->H0 != NULL && !wavelet_is_dark(h->H0 + row, n)))
+            return false;
+    }
+    return true;
+}
+
+/* X and its coefficients. */
+static void analyse(areas *a, size_t m) {
     const hierarchical *self = a->h.self;
     wavelet_plan_forward(&self->plan, m, fill, &a->h, a->h.X, a->from, a->slots, self->base.n_threads);
-    return !is_dark(a->from, m * self->plan.n_used);
 }
 
 /* All m vectors of a channel. */
 static void apply_channel(areas *a, size_t m, void *work) {
     const hierarchical *self = a->h.self;
-    if (analyse(a, m)) {
-        multiply_core(self, a->h.c, m, a->from, a->to, work);
-        wavelet_plan_inverse(&self->plan, m, a->to, a->h.X, use, &a->h, a->slots, self->base.n_threads);
+    if (is_dark(&a->h, m)) {
+        for (size_t v = 0; v < m; v++) memset(a->h.out + v * a->h.stride, 0, self->base.n * sizeof *a->h.out);
         return;
     }
-    memset(a->h.X, 0, m * self->base.n * sizeof *a->h.X);
-    for (size_t v = 0; v < m; v++) use(&a->h, v, 0, 0, self->base.n);
+    analyse(a, m);
+    multiply_core(self, a->h.c, m, a->from, a->to, work);
+    wavelet_plan_inverse(&self->plan, m, a->to, a->h.X, use, &a->h, a->slots, self->base.n_threads);
 }
 
 void hierarchical_apply(const lam_operator *op, size_t n_rhs, const float *E, float *P, void *work) {
@@ -216,11 +220,12 @@ void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const flo
         const float *lift = self->even.missing != NULL ? self->even.lift + c * n : NULL;
         a.h.c = c;
         a.h.in = E + c * n;
-        if (!analyse(&a, n_rhs)) {
+        if (is_dark(&a.h, n_rhs)) {
             for (size_t v = 0; v < n_rhs; v++)
                 memset(P + (v * C + c) * n_selected, 0, n_selected * sizeof *P);
             continue;
         }
+        analyse(&a, n_rhs);
         if (!some) {
             multiply_core(self, c, n_rhs, a.from, a.to, work);
             wavelet_plan_inverse(plan, n_rhs, a.to, a.h.X, NULL, NULL, a.slots, op->n_threads);

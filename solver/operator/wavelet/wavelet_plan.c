@@ -11,6 +11,9 @@
  * a subtree that becomes one matrix. */
 enum { PIECE_ELEMENTS = 4096, WHOLE_ELEMENTS = 96 };
 
+/* Numbers that are compared with 0 at once. */
+enum { LOOKED_AT = 64 };
+
 void wavelet_plan_free(wavelet_plan *plan) {
     free(plan->steps);
     free(plan->matrices);
@@ -254,12 +257,20 @@ typedef void transform(const wavelet_plan *plan, size_t first, size_t last, cons
 static transform *const forward[] = CPU_TABLE(forward_portable, forward_avx2, forward_avx2),
                         *const inverse[] = CPU_TABLE(inverse_portable, inverse_avx2, inverse_avx2);
 
+bool wavelet_is_dark(const float *x, size_t count) {
+    for (size_t first = 0; first < count; first += LOOKED_AT) {
+        const size_t last = first + LOOKED_AT < count ? first + LOOKED_AT : count;
+        int lit = 0;
+        for (size_t p = first; p < last; p++) lit |= x[p] != 0;
+        if (lit) return false;
+    }
+    return true;
+}
+
 /* True when all of a piece is 0. */
 static bool is_dark(const wavelet_plan *plan, const wavelet_piece *piece, const float *x) {
     const plan_step *top = &plan->steps[piece->last - 1];
-    for (size_t p = top->begin; p < (size_t)top->begin + top->count; p++)
-        if (x[p] != 0) return false;
-    return true;
+    return wavelet_is_dark(x + top->begin, top->count);
 }
 
 /* Writes the transform of a piece that is 0. */

@@ -41,6 +41,9 @@ static inline size_t wavelet_plan_work(const wavelet_plan *plan) {
     return plan->n_steps * WAVELET_SCALING;
 }
 
+/* True when all of x [count] is 0. */
+bool wavelet_is_dark(const float *x, size_t count);
+
 /* Work on one piece of vector v, its positions first to last - 1, by the thread that transforms it while they
  * are in its cache: X_v gets its numbers before the forward transform, or is read after the inverse. Either
  * may be NULL. */
