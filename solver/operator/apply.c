@@ -67,7 +67,7 @@ done:
 #define THREADS_WORTH 65536
 
 /* Elements that a thread finishes at a time. */
-enum { BLOCK = 8192 };
+enum { BLOCK = 256 };
 
 /* One element of the quantity: from E' = E + rho H0, P and H0. */
 static inline float finish(lam_quantity quantity, float rho, float lit, float P, float H0) {

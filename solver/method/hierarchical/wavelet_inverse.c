@@ -217,7 +217,7 @@ static lam_status make_products(const void *context, size_t i, row_work *w, lam_
     w->count = 0;
     if (length == 0) {
         TRY(row_work_room(w, 1, p->K->length[i], &to, error));
-        memcpy(to, p->K->row[i], p->K->length[i] * sizeof *to);
+        if (p->K->length[i] > 0) memcpy(to, p->K->row[i], p->K->length[i] * sizeof *to);
         w->done[1].used += p->K->length[i];
         goto done;
     }
