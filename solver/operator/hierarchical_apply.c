@@ -1,6 +1,6 @@
-/* The products of kind "hierarchical". What comes before the forward transform and after the inverse (the
- * order of elements, areas, reflectances, the correction of the mean error) is done piece by piece of the
- * tree, while a piece is in the cache of the thread that transforms it. */
+/* The products of kind "hierarchical". The order of elements, areas, reflectances and the correction of the
+ * mean error are taken along piece by piece of the tree, right before the forward transform of a piece and
+ * right after its inverse, while it is in the cache of the thread that transforms it. */
 #include "solver/base/work_area.h"
 #include "solver/operator/hierarchical.h"
 
