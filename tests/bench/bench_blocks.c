@@ -5,6 +5,7 @@
  * by the probes of judged_probes.h. A line for each pair of tolerances, as CSV. */
 #include "solver/base/clock.h"
 #include "solver/formfactor/blocks/blocks.h"
+#include "solver/formfactor/leaving.h"
 #include "support/judged_probes.h"
 #include "tests/bench/bench_recipe.h"
 
@@ -24,8 +25,19 @@ static double cpu_seconds(void) {
     return (double)clock() / CLOCKS_PER_SEC;
 }
 
-/* F' = D F D with row sums of 1: a closed scene. */
-static void balance(block_factors *f) {
+/* Few rays tell a closed scene. */
+static bool is_closed(const judged_probes *b) {
+    lam_error error = {.message = ""};
+    const form_factor_options few = {.recipe = {.method = RECIPE_RAYS, .rays = 32, .seed = 1}};
+    form_factors f;
+    if (form_factors_make(&b->m, b->order, &few, &f, &error) != LAM_OK) die(error.message);
+    const bool closed = leaving_nothing(&f);
+    form_factors_free(&f);
+    return closed;
+}
+
+/* F' = D F D with row sums of 1 in a closed scene, else of at most 1. */
+static void balance(block_factors *f, bool closed) {
     lam_error error = {.message = ""};
     double *one = malloc(f->n * sizeof *one), *sums = malloc(f->n * sizeof *sums);
     double *d = malloc(f->n * sizeof *d);
@@ -36,9 +48,10 @@ static void balance(block_factors *f) {
         double off = 0, all = 0;
         if (block_factors_multiply(f, 1, one, sums, &error) != LAM_OK) die(error.message);
         for (size_t p = 0; p < f->n; p++) {
-            off += f->area[p] * (sums[p] - 1) * (sums[p] - 1);
+            const double wrong = closed || sums[p] > 1 ? sums[p] - 1 : 0;
+            off += f->area[p] * wrong * wrong;
             all += f->area[p];
-            d[p] /= sqrt(fmax(sums[p], .05));
+            d[p] /= sqrt(fmax(1 + wrong, .05));
         }
         if (sweep == 0 || sweep == SWEEPS - 1) fprintf(stderr, "row sums off by %.2e\n", sqrt(off / all));
     }
@@ -69,7 +82,8 @@ static void solve(const judged_probes *b, const block_factors *f, double *B) {
     free(y);
 }
 
-static void judge(const judged_probes *b, const visibility *v, const plane_tree *tree, const char *text) {
+static void judge(const judged_probes *b, const visibility *v, const plane_tree *tree, bool closed,
+                  const char *text) {
     lam_error error = {.message = ""};
     const size_t n = b->m.n, V = b->n_probes;
     block_factors f;
@@ -84,7 +98,7 @@ static void judge(const judged_probes *b, const visibility *v, const plane_tree 
     if (blocks_find(&b->m, v, tree, &options, &f, &found, &error) != LAM_OK) die(error.message);
     cpu = cpu_seconds() - cpu;
     wall = clock_seconds() - wall;
-    balance(&f);
+    balance(&f, closed);
     double *B = malloc(n * V * sizeof *B);
     float *one = malloc(n * sizeof *one);
     if (B == NULL || one == NULL) die("not enough memory");
@@ -94,23 +108,26 @@ static void judge(const judged_probes *b, const visibility *v, const plane_tree 
            1e-6 * (double)(f.n_blocks * sizeof *f.blocks));
     for (size_t g = 0, k = 0; g < PROBE_GROUPS; g++) {
         double mean = 0, most = 0;
+        size_t lit = 0; /* those that give any indirect light */
         for (size_t end = k + b->counts[g]; k < end; k++) {
             for (size_t p = 0; p < n; p++) one[f.order[p]] = (float)B[p * V + k];
             const double off = judged_probes_error(b, k, one);
-            mean += off / (double)b->counts[g];
+            if (!isfinite(off)) continue;
+            mean += off;
             most = fmax(most, off);
+            lit++;
         }
-        printf(",%.5f,%.5f", mean, most);
+        printf(",%.5f,%.5f", mean / (double)lit, most);
     }
     printf("\n");
     fprintf(stderr,
             "visits %llu: away %llu (%.3g pairs), hidden %llu (%.3g), linear %llu, pairs %llu, shaded %llu, "
-            "shaded pairs %llu, segments %llu, reduced %llu\n",
+            "shaded pairs %llu, segments %llu, reduced %llu, pieces %.3g, tests %.3g\n",
             (unsigned long long)found.visits, (unsigned long long)found.away, found.elements_away,
             (unsigned long long)found.hidden, found.elements_hidden, (unsigned long long)found.linear,
             (unsigned long long)found.pairs, (unsigned long long)found.shaded,
             (unsigned long long)found.shaded_pairs, (unsigned long long)found.segments,
-            (unsigned long long)found.reduced);
+            (unsigned long long)found.reduced, found.sifted, found.tests);
     fflush(stdout);
     free(B);
     free(one);
@@ -136,10 +153,11 @@ int main(int argc, char **argv) {
     if (form_factors_tree(&b.m, &tree, &error) != LAM_OK) die(error.message);
     fprintf(stderr, "tree of %zu planes, %zu clusters %.3f s\n", tree.n_frames, tree.n_clusters,
             clock_seconds() - started);
+    const bool closed = is_closed(&b);
     printf("tolerances,n,seconds,cpu_seconds,solve_seconds,blocks,MB");
     for (int g = 0; g < PROBE_GROUPS; g++) printf(",%s,%s_most", probe_groups[g], probe_groups[g]);
     printf("\n");
-    for (int k = 6; k < argc; k++) judge(&b, v, &tree, argv[k]);
+    for (int k = 6; k < argc; k++) judge(&b, v, &tree, closed, argv[k]);
     plane_tree_free(&tree);
     visibility_destroy(v);
     judged_probes_free(&b);

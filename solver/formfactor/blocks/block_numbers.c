@@ -120,15 +120,17 @@ void block_numbers_of_pair(const flat_clusters *f, double exchange, cluster_bloc
     block->L[0][0] = (float)(exchange / (f->of[block->a].area * f->of[block->b].area));
 }
 
-double block_kernel_most(const flat_clusters *f, uint32_t a, uint32_t b, bool behind[2]) {
+double block_kernel_most(const flat_clusters *f, uint32_t a, uint32_t b, const flat_pair *at,
+                         bool behind[2]) {
+    enum { CORNERS = FLAT_CORNERS / 2 };
     const flat_cluster *c[2] = {&f->of[a], &f->of[b]};
     const flat_plane *p[2] = {&f->planes[c[0]->plane], &f->planes[c[1]->plane]};
-    double corner[2][4][3], height[2][4], low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-    flat_cluster_corners(f, a, corner[0]);
-    flat_cluster_corners(f, b, corner[1]);
+    double height[2][CORNERS], low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
     for (int e = 0; e < 2; e++) {
-        for (int k = 0; k < 4; k++) {
-            height[e][k] = dot3(p[1 - e]->normal, corner[e][k]) - p[1 - e]->level;
+        const double *n = p[1 - e]->normal;
+        for (int k = 0; k < CORNERS; k++) {
+            const int i = CORNERS * e + k;
+            height[e][k] = n[0] * at->x[0][i] + n[1] * at->x[1][i] + n[2] * at->x[2][i] - p[1 - e]->level;
             low[e] = height[e][k] < low[e] ? height[e][k] : low[e];
             high[e] = height[e][k] > high[e] ? height[e][k] : high[e];
         }
@@ -141,11 +143,14 @@ double block_kernel_most(const flat_clusters *f, uint32_t a, uint32_t b, bool be
         return d > 0 ? fmin(1, high[0] * high[1] / (d * d)) / (M_PI * d * d) : INFINITY;
     }
     double most = kernel(p[0]->normal, p[1]->normal, c[0]->centre, c[1]->centre);
-    for (int i = 0; i < 4; i++)
-        for (int j = 0; j < 4; j++) {
-            const double r[3] = {corner[1][j][0] - corner[0][i][0], corner[1][j][1] - corner[0][i][1],
-                                 corner[1][j][2] - corner[0][i][2]};
-            const double r2 = dot3(r, r), least = f->slack * f->slack, cosines = height[0][i] * height[1][j];
+    for (int i = 0; i < CORNERS; i++)
+        for (int j = 0; j < CORNERS; j++) {
+            double r2 = 0;
+            for (int d = 0; d < 3; d++) {
+                const double r = at->x[d][CORNERS + j] - at->x[d][i];
+                r2 += r * r;
+            }
+            const double least = f->slack * f->slack, cosines = height[0][i] * height[1][j];
             const double here = cosines / (M_PI * (r2 > least ? r2 * r2 : least * least));
             most = height[0][i] > 0 && height[1][j] > 0 && here > most ? here : most;
         }

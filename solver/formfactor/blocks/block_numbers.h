@@ -28,8 +28,9 @@ void block_numbers_of_pair(const flat_clusters *f, double exchange, cluster_bloc
 /* The largest value of the kernel between two clusters, as found at corners and centres; *crosses is set
  * where one of them lies on both sides of the plane of the other, and the value is a bound then. 0: they face
  * away from each other. behind [2]: the first, the second cluster lies partly behind the plane of the other.
+ * at: their corners.
  */
-double block_kernel_most(const flat_clusters *f, uint32_t a, uint32_t b, bool behind[2]);
+double block_kernel_most(const flat_clusters *f, uint32_t a, uint32_t b, const flat_pair *at, bool behind[2]);
 
 /* A bound of the error of a kernel's approximation by `order` points an axis on either cluster, as a share of
  * its largest value: (p + 1) (r_a^-p + r_b^-p), r = z + sqrt(z^2 - 1), z the distance of a cluster's centre

@@ -164,19 +164,21 @@ static lam_status decide(block_walk *w, uint32_t a, uint32_t b, double elements,
     const block_finder *k = w->finder;
     const flat_clusters *f = &k->flat;
     bool behind[2];
+    flat_pair at;
     candidates mine = {.count = 0};
     w->report.visits++;
-    const double most = block_kernel_most(f, a, b, behind);
+    flat_clusters_pair(f, a, b, &at);
+    const double most = block_kernel_most(f, a, b, &at, behind);
     if (!(most > 0)) {
         w->report.away++;
         w->report.elements_away += elements;
         return LAM_OK;
     }
     if (among == NULL || among->count != 0) {
-        occluders_between(&k->pieces, f, a, b, among, &mine);
+        occluders_between(&k->pieces, f, a, b, &at, among, &mine);
         w->report.sifted += mine.examined;
     }
-    if (mine.count > 0 && occluders_hide(&k->pieces, f, a, b, &mine)) {
+    if (mine.hidden) {
         w->report.hidden++;
         w->report.elements_hidden += elements;
         return LAM_OK;
@@ -245,7 +247,7 @@ lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tre
     for (size_t i = 0; i < m->n; i++) mesh_centroid(m, i, centre[i]);
     TRY(block_factors_begin(tree, m->area, (const double(*)[3])centre, nodes, error));
     TRY(flat_clusters_make(m, tree, nodes, &out->flat, error));
-    TRY(occluders_make(m, visibility_facets(v), &out->pieces, error));
+    TRY(occluders_make(m, visibility_facets(v), out->flat.slack, &out->pieces, error));
     pair_factor_rules_init(&out->rules);
     out->shade = (shade_scene){.f = &out->flat, .occluders = &out->pieces, .v = v, .seed = options->seed};
 done:

@@ -122,9 +122,20 @@ done:
     return status;
 }
 
-void flat_cluster_corners(const flat_clusters *f, uint32_t node, double corner[4][3]) {
-    static const double side[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
-    for (int c = 0; c < 4; c++) flat_cluster_point(f, node, side[c][0], side[c][1], corner[c]);
+void flat_clusters_pair(const flat_clusters *f, uint32_t a, uint32_t b, flat_pair *out) {
+    for (int e = 0; e < 2; e++) {
+        const flat_cluster *c = &f->of[e == 0 ? a : b];
+        const flat_plane *p = &f->planes[c->plane];
+        for (int d = 0; d < 3; d++) {
+            double *x = out->x[d] + (size_t)e * FLAT_CORNERS / 2;
+            const double u = c->half[0] * p->axis[0][d], v = c->half[1] * p->axis[1][d];
+            const double less = c->centre[d] - u, more = c->centre[d] + u;
+            x[0] = less - v;
+            x[1] = more - v;
+            x[2] = more + v;
+            x[3] = less + v;
+        }
+    }
 }
 
 void flat_cluster_point(const flat_clusters *f, uint32_t node, double u, double v, double point[3]) {

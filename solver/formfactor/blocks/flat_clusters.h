@@ -35,8 +35,12 @@ lam_status flat_clusters_make(const mesh *m, const plane_tree *tree, block_facto
                               flat_clusters *out, lam_error *error);
 void flat_clusters_free(flat_clusters *f);
 
-/* The corners of the rectangle, in turn. */
-void flat_cluster_corners(const flat_clusters *f, uint32_t node, double corner[4][3]);
+/* The corners of two rectangles side by side, the first's before the second's. */
+enum { FLAT_CORNERS = 8 };
+typedef struct flat_pair {
+    double x[3][FLAT_CORNERS];
+} flat_pair;
+void flat_clusters_pair(const flat_clusters *f, uint32_t a, uint32_t b, flat_pair *out);
 
 /* The point at (u, v) in [-1, 1]^2 of the rectangle. */
 void flat_cluster_point(const flat_clusters *f, uint32_t node, double u, double v, double point[3]);

@@ -1,5 +1,7 @@
 #include "solver/formfactor/blocks/occluders.h"
 
+#include "solver/formfactor/blocks/occluder_join.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -112,16 +114,21 @@ static void make_box(occluders *o, box_key *keys, size_t at, uint32_t first, uin
     o->boxes[at] = box;
 }
 
-lam_status occluders_make(const mesh *m, const facets *f, occluders *out, lam_error *error) {
+lam_status occluders_make(const mesh *m, const facets *f, double slack, occluders *out, lam_error *error) {
     lam_status status = LAM_OK;
     occluders o = {.n = f->n_pieces};
-    box_key *keys = memory_allocate(o.n, sizeof *keys, "occluders", error);
+    box_key *keys = NULL;
+    uint32_t(*pieces)[4] = memory_allocate(o.n, sizeof *pieces, "occluders", error);
+    if (pieces == NULL) TRY(LAM_ERR_MEMORY);
+    memcpy(pieces, f->pieces, o.n * sizeof *pieces);
+    TRY(occluders_join(m, slack, pieces, &o.n, error));
+    keys = memory_allocate(o.n, sizeof *keys, "occluders", error);
     o.of = memory_allocate(o.n, sizeof *o.of, "occluders", error);
     o.list = memory_allocate(o.n, sizeof *o.list, "occluders", error);
     o.boxes = memory_allocate(2 * o.n + 1, sizeof *o.boxes, "occluders", error);
     if (keys == NULL || o.of == NULL || o.list == NULL || o.boxes == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t k = 0; k < o.n; k++) {
-        set_occluder(m, f->pieces[k], &o.of[k]);
+        set_occluder(m, pieces[k], &o.of[k]);
         o.list[k] = (uint32_t)k;
     }
     o.n_boxes = 1;
@@ -129,181 +136,10 @@ lam_status occluders_make(const mesh *m, const facets *f, occluders *out, lam_er
     *out = o;
     o = (occluders){.n = 0};
 done:
+    free(pieces);
     free(keys);
     occluders_free(&o);
     return status;
-}
-
-/* The hull of two rectangles by its supporting planes: a point x is outside where normal . x >= level for
- * one. */
-enum { HULL_PLANES = 32 };
-typedef struct hull {
-    int n;
-    double normal[HULL_PLANES][3], level[HULL_PLANES];
-} hull;
-
-/* A plane through parallel edges, or through edges that meet, is found up to four times. */
-static bool has_plane(const hull *h, const double normal[3], double level, double slack) {
-    static const double same_normal = 1 - 1e-9;
-    for (int k = 0; k < h->n; k++)
-        if (dot3(h->normal[k], normal) > same_normal && fabs(h->level[k] - level) <= slack) return true;
-    return false;
-}
-
-/* Planes through an edge of one rectangle and a corner of the other one with both rectangles on one side. */
-static void make_hull(const double corner[2][4][3], double slack, hull *out) {
-    out->n = 0;
-    for (int side = 0; side < 2; side++)
-        for (int e = 0; e < 4; e++)
-            for (int c = 0; c < 4 && out->n < HULL_PLANES; c++) {
-                double along[3], across[3], normal[3], low = 0, high = 0;
-                subtract(corner[side][(e + 1) % 4], corner[side][e], along);
-                subtract(corner[1 - side][c], corner[side][e], across);
-                cross(along, across, normal);
-                if (!(dot3(normal, normal) > slack * slack * slack * slack)) continue;
-                scale_to_unit(normal);
-                double level = dot3(normal, corner[side][e]);
-                for (int k = 0; k < 8; k++) {
-                    const double beyond = dot3(normal, corner[k / 4][k % 4]) - level;
-                    low = beyond < low ? beyond : low;
-                    high = beyond > high ? beyond : high;
-                }
-                if (low < -slack && high > slack) continue;
-                const double sign = high > slack ? -1 : 1;
-                for (int d = 0; d < 3; d++) normal[d] *= sign;
-                if (has_plane(out, normal, sign * level, slack)) continue;
-                memcpy(out->normal[out->n], normal, sizeof normal);
-                out->level[out->n++] = sign * level;
-            }
-}
-
-typedef struct between {
-    const flat_clusters *f;
-    const flat_cluster *cluster[2];
-    const flat_plane *plane[2];
-    double corner[2][4][3], low[3], high[3];
-    hull hull;
-    bool has_hull;
-} between;
-
-static bool is_outside_hull(between *w, const occluder *o) {
-    if (!w->has_hull) {
-        w->has_hull = true;
-        make_hull((const double(*)[4][3])w->corner, w->f->slack, &w->hull);
-    }
-    for (int h = 0; h < w->hull.n; h++) {
-        bool outside = true;
-        for (uint32_t c = 0; c < o->n_corners && outside; c++)
-            outside = dot3(w->hull.normal[h], o->corner[c]) >= w->hull.level[h] - w->f->slack;
-        if (outside) return true;
-    }
-    return false;
-}
-
-static bool may_block(between *w, const occluder *o) {
-    const double slack = w->f->slack;
-    double low = INFINITY, high = -INFINITY;
-    const double one = dot3(o->normal, w->cluster[0]->centre) - o->level;
-    const double two = dot3(o->normal, w->cluster[1]->centre) - o->level;
-    if (one * two > 0 && fabs(one) >= w->cluster[0]->radius && fabs(two) >= w->cluster[1]->radius)
-        return false;
-    for (int k = 0; k < 8; k++) {
-        const double at = dot3(o->normal, w->corner[k / 4][k % 4]) - o->level;
-        low = at < low ? at : low;
-        high = at > high ? at : high;
-    }
-    if (low >= -slack || high <= slack) return false;
-    for (int side = 0; side < 2; side++) {
-        bool in_front = false;
-        for (uint32_t c = 0; c < o->n_corners; c++)
-            in_front = in_front || dot3(w->plane[side]->normal, o->corner[c]) > w->plane[side]->level + slack;
-        if (!in_front) return false;
-    }
-    return !is_outside_hull(w, o);
-}
-
-/* Adds a piece to the candidates; false where there are too many. */
-static bool try_one(const occluders *o, between *w, uint32_t k, candidates *out) {
-    const occluder *piece = &o->of[k];
-    out->examined++;
-    for (int d = 0; d < 3; d++)
-        if (piece->low[d] > w->high[d] || piece->high[d] < w->low[d]) return true;
-    if (!may_block(w, &o->of[k])) return true;
-    if (out->count == OCCLUDERS_MOST) return false;
-    out->of[out->count++] = k;
-    return true;
-}
-
-static bool try_all(const occluders *o, between *w, candidates *out) {
-    enum { DEPTH = 64 };
-    uint32_t stack[DEPTH];
-    int depth = 0;
-    stack[depth++] = 0;
-    while (depth > 0) {
-        const occluder_box *box = &o->boxes[stack[--depth]];
-        bool apart = false;
-        for (int d = 0; d < 3; d++) apart = apart || box->low[d] > w->high[d] || box->high[d] < w->low[d];
-        if (apart) continue;
-        if (box->count == 0) {
-            stack[depth++] = box->first;
-            stack[depth++] = box->first + 1;
-        }
-        for (uint32_t k = 0; k < box->count; k++)
-            if (!try_one(o, w, o->list[box->first + k], out)) return false;
-    }
-    return true;
-}
-
-void occluders_between(const occluders *o, const flat_clusters *f, uint32_t a, uint32_t b,
-                       const candidates *among, candidates *out) {
-    between w = {.f = f,
-                 .cluster = {&f->of[a], &f->of[b]},
-                 .plane = {&f->planes[f->of[a].plane], &f->planes[f->of[b].plane]}};
-    bool known = true;
-    out->count = out->examined = 0;
-    if (o->n == 0) return;
-    flat_cluster_corners(f, a, w.corner[0]);
-    flat_cluster_corners(f, b, w.corner[1]);
-    for (int d = 0; d < 3; d++) {
-        w.low[d] = INFINITY, w.high[d] = -INFINITY;
-        for (int k = 0; k < 8; k++) {
-            w.low[d] = fmin(w.low[d], w.corner[k / 4][k % 4][d]);
-            w.high[d] = fmax(w.high[d], w.corner[k / 4][k % 4][d]);
-        }
-    }
-    if (among == NULL || among->count == OCCLUDERS_UNKNOWN)
-        known = try_all(o, &w, out);
-    else
-        for (int k = 0; k < among->count && known; k++) known = try_one(o, &w, among->of[k], out);
-    if (!known) out->count = OCCLUDERS_UNKNOWN;
-}
-
-/* All sixteen segments between corners cross a convex piece, so all others do. */
-static bool hides(const occluder *o, const double corner[2][4][3], double slack) {
-    double height[2][4];
-    for (int k = 0; k < 8; k++) height[k / 4][k % 4] = dot3(o->normal, corner[k / 4][k % 4]) - o->level;
-    const double sign = height[0][0] > 0 ? 1 : -1;
-    for (int k = 0; k < 4; k++)
-        if (sign * height[0][k] < slack || sign * height[1][k] > -slack) return false;
-    for (int i = 0; i < 4; i++)
-        for (int j = 0; j < 4; j++) {
-            const double t = height[0][i] / (height[0][i] - height[1][j]);
-            double at[3];
-            for (int d = 0; d < 3; d++) at[d] = corner[0][i][d] + t * (corner[1][j][d] - corner[0][i][d]);
-            for (int e = 0; e < 4; e++)
-                if (dot3(o->edge[e], at) + o->edge[e][3] < 0) return false;
-        }
-    return true;
-}
-
-bool occluders_hide(const occluders *o, const flat_clusters *f, uint32_t a, uint32_t b,
-                    const candidates *among) {
-    double corner[2][4][3];
-    flat_cluster_corners(f, a, corner[0]);
-    flat_cluster_corners(f, b, corner[1]);
-    for (int k = 0; k < among->count; k++)
-        if (hides(&o->of[among->of[k]], (const double(*)[4][3])corner, f->slack)) return true;
-    return false;
 }
 
 double occluders_place(const occluders *o, const flat_clusters *f, uint32_t a, uint32_t b,

@@ -6,8 +6,8 @@
 #include "solver/formfactor/blocks/flat_clusters.h"
 #include "solver/scene/facet/facets.h"
 
-/* A triangle or a parallelogram in its plane: a point x of the plane is inside where edge[e] . (x, 1) >= 0
- * for all. */
+/* A triangle or a convex quadrilateral in its plane: a point x of the plane is inside where edge[e] . (x, 1)
+ * >= 0 for all. */
 typedef struct occluder {
     double low[3], high[3], normal[3], level;
     double corner[4][3];
@@ -28,8 +28,8 @@ typedef struct occluders {
     size_t n_boxes;
 } occluders;
 
-/* Errors: LAM_ERR_MEMORY. */
-lam_status occluders_make(const mesh *m, const facets *f, occluders *out, lam_error *error);
+/* The pieces of facets, joined. slack as in flat_clusters. Errors: LAM_ERR_MEMORY. */
+lam_status occluders_make(const mesh *m, const facets *f, double slack, occluders *out, lam_error *error);
 void occluders_free(occluders *o);
 
 /* Candidates at most; more of them are as good as unknown. */
@@ -39,20 +39,18 @@ enum { OCCLUDERS_MOST = 128 };
 typedef struct candidates {
     int count;
     int examined; /* pieces that were compared with the two */
+    bool hidden;  /* one of them blocks every segment between the two */
     uint32_t of[OCCLUDERS_MOST];
 } candidates;
 
 enum { OCCLUDERS_UNKNOWN = -1 };
 
 /* Keeps those of `among` (NULL or unknown: all of the scene) that may block a segment between the rectangles
- * of a and b: they cross the convex hull of both and are in front of both planes. Exact up to slack for
- * convex pieces. */
+ * of a and b, with corners `at`. Left out are pieces that a plane through one of their edges, or their own
+ * plane, holds apart from both rectangles, and those behind the plane of either; up to slack. Where one of
+ * them blocks every segment, out->hidden is set and the others are left out. */
 void occluders_between(const occluders *o, const flat_clusters *f, uint32_t a, uint32_t b,
-                       const candidates *among, candidates *out);
-
-/* True where one of the candidates blocks every segment between the two rectangles. */
-bool occluders_hide(const occluders *o, const flat_clusters *f, uint32_t a, uint32_t b,
-                    const candidates *among);
+                       const flat_pair *at, const candidates *among, candidates *out);
 
 /* The share of the way from a to b at which the first candidate stands, between .05 and .95. */
 double occluders_place(const occluders *o, const flat_clusters *f, uint32_t a, uint32_t b,

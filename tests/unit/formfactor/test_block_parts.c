@@ -1,5 +1,6 @@
-/* The parts of form factors by blocks, one by one: the fit of the visible share, the numbers of a block, and
- * the proof that one piece hides two clusters from each other. */
+/* The parts of form factors by blocks, one by one: the fit of the visible share, the numbers of a block, the
+ * pieces that may stand between two clusters, and the proof that one of them hides these from each other. */
+#include "solver/base/random.h"
 #include "solver/formfactor/blocks/block_numbers.h"
 #include "solver/formfactor/blocks/occluders.h"
 #include "solver/formfactor/formfactor.h"
@@ -27,7 +28,7 @@ static void parts_make(parts *p) {
     ck_ok(block_factors_begin(&p->tree, p->m.area, (const double(*)[3])centre, &p->blocks, &error));
     ck_ok(flat_clusters_make(&p->m, &p->tree, &p->blocks, &p->flat, &error));
     ck_ok(visibility_create(&p->m, &p->v, &error));
-    ck_ok(occluders_make(&p->m, visibility_facets(p->v), &p->pieces, &error));
+    ck_ok(occluders_make(&p->m, visibility_facets(p->v), p->flat.slack, &p->pieces, &error));
     free(centre);
 }
 
@@ -178,9 +179,11 @@ START_TEST(one_piece_hides_what_it_covers_entirely) {
         parts_make(&p);
         const uint32_t low = plane_of(&p, 0), high = plane_of(&p, 64);
         candidates among;
-        occluders_between(&p.pieces, &p.flat, low, high, NULL, &among);
+        flat_pair at;
+        flat_clusters_pair(&p.flat, low, high, &at);
+        occluders_between(&p.pieces, &p.flat, low, high, &at, NULL, &among);
         ck_assert_int_gt(among.count, 0);
-        ck_assert(occluders_hide(&p.pieces, &p.flat, low, high, &among) == hidden);
+        ck_assert(among.hidden == hidden);
         parts_free(&p);
     }
 }
@@ -200,6 +203,141 @@ START_TEST(light_passes_a_corner) {
 }
 END_TEST
 
+/* A random rectangle about a point, with sides of up to twice the size and a random normal. */
+static void add_random_rectangle(mesh *m, const double at[3], double size, uint64_t *state) {
+    double x[4][3], side[2][3], normal[3], length[2] = {0, 0};
+    for (int k = 0; k < 2; k++)
+        for (int d = 0; d < 3; d++) side[k][d] = random_between(state, -1, 1);
+    for (int d = 0; d < 3; d++) length[0] += side[0][d] * side[0][d];
+    for (int d = 0; d < 3; d++) side[0][d] /= sqrt(length[0]);
+    for (int d = 0; d < 3; d++) {
+        const int e = (d + 1) % 3, g = (d + 2) % 3;
+        normal[d] = side[0][e] * side[1][g] - side[0][g] * side[1][e];
+    }
+    for (int d = 0; d < 3; d++) {
+        const int e = (d + 1) % 3, g = (d + 2) % 3;
+        side[1][d] = normal[e] * side[0][g] - normal[g] * side[0][e];
+        length[1] += side[1][d] * side[1][d];
+    }
+    for (int d = 0; d < 3; d++) side[1][d] /= sqrt(length[1]);
+    const double half[2] = {size * random_between(state, .2, 1), size * random_between(state, .2, 1)};
+    for (int c = 0; c < 4; c++)
+        for (int d = 0; d < 3; d++)
+            x[c][d] = at[d] + (c == 0 || c == 3 ? -1 : 1) * half[0] * side[0][d] +
+                      (c < 2 ? -1 : 1) * half[1] * side[1][d];
+    mesh_add_quad(m, (const double(*)[3])x);
+}
+
+/* The place u, v in [-1, 1]^2 of one of two rectangles. */
+static void point_of(const flat_pair *at, int side, double u, double v, double out[3]) {
+    for (int d = 0; d < 3; d++) {
+        const double *x = at->x[d] + (size_t)side * FLAT_CORNERS / 2;
+        out[d] = x[0] + .5 * (1 + u) * (x[1] - x[0]) + .5 * (1 + v) * (x[3] - x[0]);
+    }
+}
+
+/* True where a segment crosses a quad, whose corners all lie to its left as seen along it, or to its right.
+ */
+static bool crosses(const double quad[4][3], const double x[3], const double y[3]) {
+    int left = 0, right = 0;
+    double normal[3], from = 0, to = 0;
+    for (int d = 0; d < 3; d++) {
+        const int e = (d + 1) % 3, g = (d + 2) % 3;
+        normal[d] = (quad[1][e] - quad[0][e]) * (quad[3][g] - quad[0][g]) -
+                    (quad[1][g] - quad[0][g]) * (quad[3][e] - quad[0][e]);
+        from += normal[d] * (x[d] - quad[0][d]);
+        to += normal[d] * (y[d] - quad[0][d]);
+    }
+    for (int k = 0; k < 4; k++) {
+        const double *p = quad[k], *q = quad[(k + 1) % 4];
+        double volume = 0;
+        for (int d = 0; d < 3; d++) {
+            const int e = (d + 1) % 3, g = (d + 2) % 3;
+            volume += (y[d] - x[d]) * ((p[e] - x[e]) * (q[g] - x[g]) - (p[g] - x[g]) * (q[e] - x[e]));
+        }
+        left += volume > 0;
+        right += volume < 0;
+    }
+    return ((from < 0) != (to < 0)) && (left == 4 || right == 4);
+}
+
+/* Random rectangles at three places of a line, the middle one at one of several distances: where a segment
+ * between the outer two crosses it, it is a candidate; it hides where all between corners do, and only there.
+ * Of pieces that none of many segments crosses, a plane through an edge of the piece tells all but those that
+ * only one through an edge of a rectangle would. */
+START_TEST(candidates_are_those_that_segments_cross) {
+    enum { SCENES = 3000, STEPS = 6 };
+    int n_crossed = 0, n_hidden = 0, n_clear = 0, n_kept = 0;
+    uint64_t state = 5;
+    for (int scene = 0; scene < SCENES; scene++) {
+        const double apart = 1 + 2 * fabs(random_between(&state, -1, 1)),
+                     share = .5 + .4 * random_between(&state, -1, 1);
+        const double places[3][3] = {
+            {0, 0, 0},
+            {random_between(&state, -1, 1), random_between(&state, -1, 1), share * apart},
+            {0, 0, apart}};
+        parts p = {.m = {.n = 0}};
+        for (int k = 0; k < 3; k++)
+            add_random_rectangle(&p.m, places[k], k == 1 && scene % 2 == 1 ? 4 : 1, &state);
+        mesh_finish(&p.m, .5f);
+        parts_make(&p);
+        const uint32_t a = node_of(&p, 0), b = node_of(&p, 2);
+        double quad[4][3];
+        flat_pair at;
+        candidates among;
+        int n_met = 0, n_corners_met = 0;
+        bool facing[2] = {false, false}, found = false;
+        for (int k = 0; k < 4; k++) memcpy(quad[k], p.m.vertices[p.m.elements[1][k]], sizeof quad[k]);
+        flat_clusters_pair(&p.flat, a, b, &at);
+        for (int k = 0; k < 4; k++) {
+            double height[2] = {-p.flat.planes[p.flat.of[a].plane].level,
+                                -p.flat.planes[p.flat.of[b].plane].level};
+            for (int d = 0; d < 3; d++) {
+                height[0] += p.flat.planes[p.flat.of[a].plane].normal[d] * quad[k][d];
+                height[1] += p.flat.planes[p.flat.of[b].plane].normal[d] * quad[k][d];
+            }
+            for (int e = 0; e < 2; e++) facing[e] = facing[e] || height[e] > p.flat.slack;
+        }
+        for (int k = 0; k < STEPS * STEPS * STEPS * STEPS; k++) {
+            double x[3], y[3], place[4];
+            bool corners = true;
+            for (int d = 0, rest = k; d < 4; d++, rest /= STEPS) {
+                place[d] = 2. * (rest % STEPS) / (STEPS - 1) - 1;
+                corners = corners && fabs(place[d]) > .999;
+            }
+            point_of(&at, 0, place[0], place[1], x);
+            point_of(&at, 1, place[2], place[3], y);
+            const bool met = crosses((const double(*)[3])quad, x, y);
+            n_met += met;
+            n_corners_met += met && corners;
+        }
+        occluders_between(&p.pieces, &p.flat, a, b, &at, NULL, &among);
+        for (int k = 0; k < among.count; k++)
+            for (int c = 0; c < 4; c++)
+                found = found || memcmp(p.pieces.of[among.of[k]].corner[c], quad[0], sizeof quad[0]) == 0;
+        if (facing[0] && facing[1]) {
+            if (n_met > 0) ck_assert(found);
+            n_crossed += n_met > 0;
+            n_clear += n_met == 0;
+            n_kept += n_met == 0 && found;
+            if (n_corners_met == 16) {
+                n_hidden++;
+                ck_assert_int_eq(n_met, STEPS * STEPS * STEPS * STEPS);
+                ck_assert(among.hidden);
+            }
+        } else {
+            ck_assert(!found);
+        }
+        if (n_met < STEPS * STEPS * STEPS * STEPS) ck_assert(!among.hidden);
+        parts_free(&p);
+    }
+    ck_assert_int_gt(n_crossed, SCENES / 10);
+    ck_assert_int_gt(n_hidden, SCENES / 100);
+    ck_assert_int_gt(n_clear, SCENES / 100);
+    ck_assert_int_lt(2 * n_kept, n_clear);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("parts of blocks");
     TCase *tests = tcase_create("parts");
@@ -209,6 +347,7 @@ int main(void) {
     tcase_add_test(tests, a_triangle_is_taken_at_its_centroid);
     tcase_add_test(tests, one_piece_hides_what_it_covers_entirely);
     tcase_add_test(tests, light_passes_a_corner);
+    tcase_add_test(tests, candidates_are_those_that_segments_cross);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }

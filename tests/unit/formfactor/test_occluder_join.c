@@ -1,0 +1,196 @@
+/* Pieces joined into larger convex ones: how many are left, and that they cover the same points once. */
+#include "solver/base/random.h"
+#include "solver/formfactor/blocks/occluder_join.h"
+#include "support/dense.h"
+#include "support/scene.h"
+#include "support/suite.h"
+
+static lam_error error;
+static const double slack = 1e-6;
+
+/* A grid of cells between corner(i, j) and its neighbours, without those of `left_out`; of triangles: each
+ * cell in two, by either diagonal in turn. The cells share vertices. */
+enum { SIDE = 6 };
+typedef struct grid {
+    double axis[2][3], origin[3];
+    bool triangles, left_out[SIDE][SIDE];
+} grid;
+
+static mesh grid_mesh(const grid *g) {
+    enum { POINTS = SIDE + 1 };
+    mesh m = {.n = 0};
+    m.vertices = test_allocate(POINTS * POINTS, sizeof *m.vertices);
+    m.elements = test_allocate(2 * SIDE * SIDE, sizeof *m.elements);
+    m.n_vertices = POINTS * POINTS;
+    for (uint32_t j = 0; j < POINTS; j++)
+        for (uint32_t i = 0; i < POINTS; i++)
+            for (int d = 0; d < 3; d++)
+                m.vertices[j * POINTS + i][d] =
+                    g->origin[d] + (double)(i * i + 3 * i) * g->axis[0][d] + (double)j * g->axis[1][d];
+    for (uint32_t j = 0; j < SIDE; j++)
+        for (uint32_t i = 0; i < SIDE; i++) {
+            const uint32_t a = j * POINTS + i, b = a + 1, c = a + 1 + POINTS, d = a + POINTS;
+            if (g->left_out[j][i]) continue;
+            if (!g->triangles) {
+                memcpy(m.elements[m.n++], (uint32_t[4]){a, b, c, d}, sizeof *m.elements);
+                continue;
+            }
+            const bool turned = (i + j) % 2 == 1;
+            memcpy(m.elements[m.n++], (uint32_t[4]){a, b, turned ? d : c, MESH_NO_VERTEX},
+                   sizeof *m.elements);
+            memcpy(m.elements[m.n++], (uint32_t[4]){turned ? b : a, c, d, MESH_NO_VERTEX},
+                   sizeof *m.elements);
+        }
+    return m;
+}
+
+/* Pieces left of those of a mesh; the caller frees *out. */
+static size_t join(const mesh *m, uint32_t (**out)[4]) {
+    size_t count = m->n;
+    *out = test_allocate(m->n, sizeof **out);
+    memcpy(*out, m->elements, m->n * sizeof **out);
+    ck_ok(occluders_join(m, slack, *out, &count, &error));
+    return count;
+}
+
+static size_t count_joined(const grid *g) {
+    mesh m = grid_mesh(g);
+    uint32_t(*pieces)[4];
+    const size_t count = join(&m, &pieces);
+    free(pieces);
+    free(m.vertices);
+    free(m.elements);
+    return count;
+}
+
+static const grid tilted = {.axis = {{.3, .1, .2}, {-.2, .6, 0}}, .origin = {5, -3, 2}};
+
+START_TEST(a_grid_becomes_one_piece) {
+    grid g = tilted;
+    ck_assert_uint_eq(count_joined(&g), 1);
+    g.triangles = true;
+    ck_assert_uint_eq(count_joined(&g), 1);
+}
+END_TEST
+
+/* A hole within a rectangle takes four rectangles, a door three, a corner two. */
+START_TEST(holes_stay_open) {
+    grid hole = tilted, door = tilted, notch = tilted;
+    hole.left_out[2][3] = hole.left_out[2][2] = hole.left_out[3][3] = hole.left_out[3][2] = true;
+    door.left_out[0][1] = door.left_out[1][1] = true;
+    notch.left_out[5][5] = true;
+    ck_assert_uint_eq(count_joined(&hole), 4);
+    ck_assert_uint_eq(count_joined(&door), 3);
+    ck_assert_uint_eq(count_joined(&notch), 2);
+}
+END_TEST
+
+/* True where a point of the plane of axes lies inside a convex piece. */
+static bool covers(const mesh *m, const uint32_t piece[4], const double x[3], const double normal[3]) {
+    const uint32_t n = piece[3] == MESH_NO_VERTEX ? 3 : 4;
+    for (uint32_t c = 0; c < n; c++) {
+        const double *p = m->vertices[piece[c]], *q = m->vertices[piece[(c + 1) % n]];
+        double inward = 0;
+        for (int d = 0; d < 3; d++) {
+            const int e = (d + 1) % 3, h = (d + 2) % 3;
+            inward += normal[d] * ((q[e] - p[e]) * (x[h] - p[h]) - (q[h] - p[h]) * (x[e] - p[e]));
+        }
+        if (inward < 0) return false;
+    }
+    return true;
+}
+
+START_TEST(the_same_points_are_covered_once) {
+    enum { POINTS = 400, TRIALS = 60 };
+    uint64_t state = 3;
+    size_t before = 0, after = 0;
+    for (int trial = 0; trial < TRIALS; trial++) {
+        grid g = tilted;
+        double normal[3];
+        g.triangles = trial % 2 == 1;
+        for (int k = 0; k < SIDE * SIDE; k++) g.left_out[k / SIDE][k % SIDE] = random_unit(&state) < .3;
+        for (int d = 0; d < 3; d++) {
+            const int e = (d + 1) % 3, h = (d + 2) % 3;
+            normal[d] = g.axis[0][e] * g.axis[1][h] - g.axis[0][h] * g.axis[1][e];
+        }
+        mesh m = grid_mesh(&g);
+        uint32_t(*pieces)[4];
+        const size_t count = join(&m, &pieces);
+        before += m.n;
+        after += count;
+        for (int k = 0; k < POINTS; k++) {
+            const double u = random_between(&state, 0, SIDE * SIDE + 3 * SIDE);
+            const double v = random_between(&state, 0, SIDE);
+            double x[3];
+            int own = 0, joined = 0;
+            for (int d = 0; d < 3; d++) x[d] = g.origin[d] + u * g.axis[0][d] + v * g.axis[1][d];
+            for (size_t p = 0; p < m.n; p++) own += covers(&m, m.elements[p], x, normal);
+            for (size_t p = 0; p < count; p++) joined += covers(&m, pieces[p], x, normal);
+            ck_assert_int_eq(own, joined);
+        }
+        free(pieces);
+        free(m.vertices);
+        free(m.elements);
+    }
+    ck_assert_uint_lt(2 * after, before);
+}
+END_TEST
+
+/* Two squares that share an edge, the second turned up by `rise` metres at its far side. */
+static size_t count_of_two(double rise, bool turned, double aside) {
+    double x[6][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {2, aside, rise}, {2, 1 + aside, rise}};
+    uint32_t elements[2][4] = {{0, 1, 2, 3}, {1, 4, 5, 2}};
+    if (turned) memcpy(elements[1], (uint32_t[4]){2, 5, 4, 1}, sizeof elements[1]);
+    const mesh m = {.n = 2, .n_vertices = 6, .vertices = x, .elements = elements};
+    uint32_t(*pieces)[4];
+    const size_t count = join(&m, &pieces);
+    free(pieces);
+    return count;
+}
+
+START_TEST(only_plane_convex_unions_are_joined) {
+    ck_assert_uint_eq(count_of_two(0, false, 0), 1);
+    ck_assert_uint_eq(count_of_two(.3 * slack, false, 0), 1);
+    ck_assert_uint_eq(count_of_two(3 * slack, false, 0), 2);
+    ck_assert_uint_eq(count_of_two(0, true, 0), 2);           /* a front and a back */
+    ck_assert_uint_eq(count_of_two(0, false, .5), 2);         /* a bend */
+    ck_assert_uint_eq(count_of_two(0, false, .3 * slack), 1); /* none */
+}
+END_TEST
+
+/* A strip of many cells, each turned by less than slack against the one before: its pieces stay within some
+ * slack of the cells. The outline of what is joined differs by up to slack times its length in area. */
+START_TEST(small_bends_do_not_add_up) {
+    enum { CELLS = 200 };
+    double x[2 * CELLS + 2][3];
+    uint32_t elements[CELLS][4];
+    for (uint32_t k = 0; k <= CELLS; k++)
+        for (int c = 0; c < 2; c++)
+            memcpy(x[2 * k + (uint32_t)c], (double[3]){k, c + .4 * slack * k * k, 0}, sizeof x[0]);
+    for (uint32_t k = 0; k < CELLS; k++)
+        memcpy(elements[k], (uint32_t[4]){2 * k, 2 * k + 2, 2 * k + 3, 2 * k + 1}, sizeof elements[k]);
+    const mesh m = {.n = CELLS, .n_vertices = 2 * CELLS + 2, .vertices = x, .elements = elements};
+    uint32_t(*pieces)[4];
+    const size_t count = join(&m, &pieces);
+    ck_assert_uint_gt(count, 10);
+    for (size_t p = 0; p < count; p++) {
+        /* A chord of n cells lies .4 slack (n/2)^2 from the curve. */
+        const double length = fabs(x[pieces[p][1]][0] - x[pieces[p][0]][0]);
+        ck_assert_double_le(.4 * length * length / 4, 4);
+    }
+    free(pieces);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("occluder join");
+    TCase *tests = tcase_create("occluder join");
+    tcase_set_timeout(tests, 120);
+    tcase_add_test(tests, a_grid_becomes_one_piece);
+    tcase_add_test(tests, holes_stay_open);
+    tcase_add_test(tests, the_same_points_are_covered_once);
+    tcase_add_test(tests, only_plane_convex_unions_are_joined);
+    tcase_add_test(tests, small_bends_do_not_add_up);
+    suite_add_tcase(suite, tests);
+    return suite_run(suite);
+}
