@@ -71,8 +71,9 @@ typedef struct form_factor_options {
     const char *sky;          /* a tiling: rays that leave are binned by its tiles; NULL: none */
     double ground_albedo;
     sky_bounce *bounce; /* set by form_factors_make: the bins of the sky */
-    size_t only_first;  /* rays_count and hemicube_trace find only this many rows of the order and leave the
-                           others  empty; not with a scratch folder; 0: all */
+    bool without_rows; /* rays_count leaves all rows empty: only the shares that leave the scene are wanted */
+    size_t only_first; /* rays_count and hemicube_trace find only this many rows of the order and leave the
+                          others  empty; not with a scratch folder; 0: all */
 } form_factor_options;
 
 /* Finds the form factors by a recipe, merges the two estimates of each pair by reciprocity and repairs the
@@ -109,8 +110,10 @@ lam_status form_factors_tree(const mesh *m, plane_tree *out, lam_error *error);
  * must outlive blocks: these hold the form factors, freed by block_factors_free, and out all but rows. In a
  * closed scene their balance gives rows the sum 1, in others it keeps sums at most 1. judge: visible shares
  * come from the whole scene by Embree, so that a judge shares nothing with those of single occluders but the
- * proofs that nothing, or one piece, stands between. No sky, no scratch folder. Cost: about a microsecond for
- * each of some n^1/2 blocks. Errors: LAM_ERR_ARGUMENT, LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+ * proofs that nothing, or one piece, stands between. With a sky, recipe.rays of an element find its share of
+ * each tile, and what the blocks leave of its row is distributed so. No scratch folder. Cost: about a
+ * microsecond for each of some n^1/2 blocks, and n recipe.rays rays. Errors: LAM_ERR_ARGUMENT,
+ * LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
 lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const plane_tree *tree, bool judge,
                                     const form_factor_options *options, form_factors *out,
                                     block_factors *blocks, lam_error *error);

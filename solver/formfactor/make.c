@@ -160,17 +160,21 @@ done:
 
 typedef struct balanced_blocks {
     block_factors *blocks;
-    const double *ones; /* [n] */
+    const double *ones;    /* [n] */
+    const double *outside; /* [n], the shares that leave to a sky or meet back faces; NULL: not balanced */
 } balanced_blocks;
 
-/* r_i = A_i (F' 1)_i with F' = D F D. */
+/* r_i = A_i ((F' 1)_i + d_i outside_i) with F' = D F D. */
 static lam_status sums_of_blocks(void *context, const double *d, double *r, lam_error *error) {
     lam_status status = LAM_OK;
     const balanced_blocks *of = context;
     const block_factors *blocks = of->blocks;
     memcpy(blocks->balance, d, blocks->n * sizeof *d);
     TRY(block_factors_multiply(blocks, 1, of->ones, r, error));
-    for (size_t p = 0; p < blocks->n; p++) r[p] *= blocks->area[p];
+    for (size_t p = 0; p < blocks->n; p++) {
+        if (of->outside != NULL) r[p] += d[p] * of->outside[p];
+        r[p] *= blocks->area[p];
+    }
 done:
     return status;
 }
@@ -199,23 +203,28 @@ done:
     return status;
 }
 
-/* F' = D F D with rows that sum to 1 in a closed scene, and to at most 1 in others. Sets the row sums of f,
- * and how much they were repaired. */
+/* F' = D F D with rows that sum to 1 in a closed scene, and to at most 1 in others. Beside a sky, whose many
+ * rays tell each element's share outside better than a block tells its own, rows sum to 1 with that share,
+ * which is scaled with them. Sets the row sums of f, and how much they were repaired. */
 static lam_status balance_blocks(form_factors *f, block_factors *blocks, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = blocks->n;
-    const bool closed = leaving_nothing(f);
+    const bool closed = leaving_nothing(f), sky = !closed && f->sky.first_bounce != NULL;
+    double *outside = memory_allocate(n, sizeof *outside, "form factors", error);
     double *before = memory_allocate(n, sizeof *before, "form factors", error), area = 0;
     double *d = memory_allocate(n, sizeof *d, "form factors", error);
     double *r = memory_allocate(n, sizeof *r, "form factors", error);
     double *ones = memory_allocate(n, sizeof *ones, "form factors", error);
     blocks->balance = memory_allocate(n, sizeof *blocks->balance, "form factors", error);
     f->row_sums = memory_allocate(n, sizeof *f->row_sums, "form factors", error);
-    if (before == NULL || d == NULL || r == NULL || ones == NULL || blocks->balance == NULL ||
-        f->row_sums == NULL)
+    if (outside == NULL || before == NULL || d == NULL || r == NULL || ones == NULL ||
+        blocks->balance == NULL || f->row_sums == NULL)
         TRY(LAM_ERR_MEMORY);
-    for (size_t p = 0; p < n; p++) ones[p] = 1;
-    balanced_blocks of = {blocks, ones};
+    for (size_t p = 0; p < n; p++) {
+        ones[p] = 1;
+        outside[p] = sky ? leaving_outside(f, blocks->order[p]) : 0;
+    }
+    balanced_blocks of = {blocks, ones, sky ? outside : NULL};
     row_scaling c = {.n = n,
                      .area = blocks->area,
                      .sums = sums_of_blocks,
@@ -223,7 +232,7 @@ static lam_status balance_blocks(form_factors *f, block_factors *blocks, lam_err
                      .sweeps_most = SWEEPS,
                      .d = d,
                      .r = r};
-    TRY(closed ? row_scaling_settle(&c, before, error) : balance_open(&c, before, error));
+    TRY(closed || sky ? row_scaling_settle(&c, before, error) : balance_open(&c, before, error));
     TRY(sums_of_blocks(&of, d, r, error));
     f->repair_products = c.products + 1;
     for (size_t p = 0; p < n; p++) {
@@ -231,11 +240,12 @@ static lam_status balance_blocks(form_factors *f, block_factors *blocks, lam_err
         area += blocks->area[p];
         f->repair_mean += blocks->area[p] * off;
         f->repair_max = fmax(f->repair_max, off);
-        f->row_sums[blocks->order[p]] = fmin(sum, 1);
+        f->row_sums[blocks->order[p]] = fmin(sum - d[p] * outside[p], 1);
         if (closed) f->closure_error = fmax(f->closure_error, fabs(sum - 1));
     }
     f->repair_mean /= area;
 done:
+    free(outside);
     free(before);
     free(d);
     free(r);
@@ -264,7 +274,8 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
     block_factors made = {.n = 0};
     packed_rows counts = {0};
     visibility *v = NULL;
-    form_factor_options few = {.recipe = {.method = RECIPE_RAYS, .rays = r->rays, .seed = r->seed}};
+    form_factor_options few = {.recipe = {.method = RECIPE_RAYS, .rays = r->rays, .seed = r->seed},
+                               .without_rows = true};
     block_options how = block_options_of(r);
     how.by_scene = judge;
     how.progress = options->progress;
@@ -273,11 +284,17 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
     f.leaving = memory_allocate(m->n, sizeof *f.leaving, "form factors", error);
     f.absorbed = memory_allocate(m->n, sizeof *f.absorbed, "form factors", error);
     if (f.leaving == NULL || f.absorbed == NULL) TRY(LAM_ERR_MEMORY);
+    if (options->sky != NULL) {
+        TRY(sky_bounce_create(options->sky, m->up, options->ground_albedo, m->n, &f.sky, error));
+        few.bounce = &f.sky;
+    }
     TRY(visibility_create(m, &v, error));
     TRY(rays_count(m, v, order, &few, &counts, f.leaving, f.absorbed, error));
+    packed_rows_free(&counts);
     leaving_measure(&f, m);
     TRY(blocks_find(m, v, tree, &how, &made, &f.blocks, error));
     TRY(balance_blocks(&f, &made, error));
+    if (options->sky != NULL) TRY(leaving_to_sky(&f, m->n, error));
     *out = f;
     *blocks = made;
     f = (form_factors){0};

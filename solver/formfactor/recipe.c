@@ -144,7 +144,8 @@ static const double judge_share = .25;
 recipe recipe_of_judge(const recipe *judged, size_t rays_beside_hemicubes, uint64_t seed) {
     recipe r = *judged;
     if (judged->method == RECIPE_HEMICUBE) r = (recipe){.method = RECIPE_RAYS, .rays = rays_beside_hemicubes};
-    if (r.method == RECIPE_PAIRS && r.rays > RECIPE_RAYS_FEW) r.rays = RECIPE_RAYS_FEW;
+    const bool few = r.method == RECIPE_PAIRS || r.method == RECIPE_BLOCKS;
+    if (few && r.rays > RECIPE_RAYS_FEW) r.rays = RECIPE_RAYS_FEW;
     if (r.method == RECIPE_BLOCKS) r.accuracy *= judge_share;
     r.seed = seed;
     return r;

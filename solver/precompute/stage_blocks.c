@@ -21,8 +21,8 @@ bool state_may_have_blocks(const precompute_state *state, double n) {
     const bool asked = strcmp(o->form_factors, "blocks") == 0;
     if (o->from_store || state->holds || !(asked || strcmp(o->form_factors, "auto") == 0)) return false;
     if (asked) return true;
-    return o->sky == NULL && !state_compresses(o) && o->scratch == NULL && o->emitters == NULL &&
-           o->rays == OPTION_AUTO && strcmp(o->quality, "draft") != 0 && n >= ELEMENTS_LEAST;
+    return !state_compresses(o) && o->scratch == NULL && o->emitters == NULL && o->rays == OPTION_AUTO &&
+           strcmp(o->quality, "draft") != 0 && n >= ELEMENTS_LEAST;
 }
 
 static lam_status make_tree(precompute_state *state, lam_error *error) {
@@ -38,7 +38,6 @@ static lam_status check_asked(const precompute_state *state, const build_method 
                               lam_error *error) {
     const precompute_options *o = state->options;
     const char *other = NULL;
-    if (o->sky != NULL) other = "--sky";
     if (state_compresses(o)) other = "--keep-form-factors=compressed";
     if (o->scratch != NULL) other = "--scratch";
     if (o->emitters != NULL) other = "--emitters";
@@ -83,6 +82,19 @@ done:
     return status;
 }
 
+/* The rays that a sky takes beside blocks. */
+static lam_status add_sky(precompute_state *state, const recipe *blocks, blocks_cost *cost,
+                          lam_error *error) {
+    lam_status status = LAM_OK;
+    const recipe rays = {.method = RECIPE_RAYS, .rays = blocks->rays};
+    pairs_cost of_rays;
+    if (state->options->sky == NULL) return LAM_OK;
+    TRY(pairs_forecast(&state->m, &rays, &state->progress, &of_rays, error));
+    cost->seconds += of_rays.seconds;
+done:
+    return status;
+}
+
 /* Weighs blocks against the recipe so far, by samples of both; logs why. */
 static lam_status weigh(precompute_state *state, const recipe *blocks, bool *taken, lam_error *error) {
     lam_status status = LAM_OK;
@@ -92,6 +104,7 @@ static lam_status weigh(precompute_state *state, const recipe *blocks, bool *tak
     pairs_cost least;
     char time[32], other_time[32], what[64];
     TRY(blocks_forecast(&state->m, &state->tree, blocks, &state->progress, &cost, error));
+    TRY(add_sky(state, blocks, &cost, error));
     TRY(find_other_cost(state, &cost, &least, error));
     *taken = cost.seconds <= times * least.seconds;
     clock_format_seconds(cost.seconds, time);
@@ -115,8 +128,9 @@ lam_status state_choose_blocks(precompute_state *state, const build_method *meth
     TRY(make_tree(state, error));
     if (asked) TRY(check_asked(state, method, final, error));
     if (!asked && !is_possible(&state->tree)) goto done;
+    /* The rays of a sky are those that find its share beside pairs, too. */
     recipe blocks = {.method = RECIPE_BLOCKS,
-                     .rays = recipe_rays_beside_blocks(state->m.n),
+                     .rays = o->sky != NULL ? state->recipe.rays : recipe_rays_beside_blocks(state->m.n),
                      .accuracy = built->block_accuracy(method_own_const(&o->build, built)),
                      .seed = o->seed};
     if (strcmp(o->quality, "high") == 0) blocks.accuracy /= 4;
@@ -153,8 +167,11 @@ done:
 
 lam_status stage_blocks(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
-    const form_factor_options how = {
-        .recipe = state->recipe, .progress = &state->progress, .stage = "form factors"};
+    const form_factor_options how = {.recipe = state->recipe,
+                                     .progress = &state->progress,
+                                     .stage = "form factors",
+                                     .sky = state->options->sky,
+                                     .ground_albedo = state->options->ground_albedo};
     TRY(make_tree(state, error));
     TRY(form_factors_make_blocks(&state->m, state->order, &state->tree, false, &how, &state->f,
                                  &state->blocks, error));

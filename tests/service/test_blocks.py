@@ -88,8 +88,7 @@ class Blocks(Case):
         self.assertRegex(done.stdout, r"ok +error")
 
     def test_what_needs_rows_is_refused(self):
-        for options, reason in ((("--sky", "tregenza"), "--sky"),
-                                (("--keep-form-factors=compressed",), "--keep-form-factors=compressed"),
+        for options, reason in ((("--keep-form-factors=compressed",), "--keep-form-factors=compressed"),
                                 (("--scratch", self.path("rows")), "--scratch"),
                                 (("--method", "low-rank", "--rank", 8), "--method low-rank needs rows")):
             done = self.failed(reason, "precompute", self.room, "-o", self.path("no.h5"), "--form-factors", "blocks",
@@ -97,6 +96,20 @@ class Blocks(Case):
             self.assertIn("--form-factors blocks: ", done.stderr)
             self.assertIn("give --form-factors rays", done.stderr)
             self.assertFalse(os.path.exists(self.path("no.h5")))
+
+    def test_a_sky_lights_blocks_as_it_lights_pairs(self):
+        """All that the tiles of two bands give a court, through direct light and what is reflected."""
+        court, answers = self.path("court.obj"), []
+        must("generate", "patio", "--elements", 700, "--reflectance", .5, "-o", court)
+        numpy.save(self.path("sky.npy"), numpy.linspace(.5, 1, 8, dtype="f4")[None])
+        for method in ("blocks", "rays"):
+            done = must("precompute", court, "-o", self.path("court.h5"), "--method", "hierarchical", "--probes", 0,
+                        "--epsilon", .01, "--form-factors", method, "--sky", "grid:4x2", "--ground-albedo", .2)
+            self.assertIn("sky: grid:4x2, 8 tiles, ground albedo 0.2", done.stderr)
+            must("solve", self.path("court.h5"), "--sky", self.path("sky.npy"), "-o", self.path("b.npy"))
+            answers.append(numpy.load(self.path("b.npy")).astype("f8").ravel())
+        self.assertGreater(answers[1].max(), .5)
+        self.assertLess(numpy.linalg.norm(answers[0] - answers[1]), .03 * numpy.linalg.norm(answers[1]))
 
     def test_faces_that_coincide_are_told_and_lose_no_light(self):
         """A closed box with two of its floors in one place, each of which sees all walls: the rows are repaired, and the

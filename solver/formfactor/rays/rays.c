@@ -39,6 +39,7 @@ size_t rays_meet(const ray_context *c, const element_sampler *sampler, size_t el
 typedef struct count_context {
     ray_context rays;
     size_t n_rays;
+    bool without_rows;
 } count_context;
 
 /* Traces one element; every ray has the weight 1. */
@@ -52,7 +53,7 @@ static void trace_element(const void *context, size_t element, row_pool *pool, d
     for (size_t first = 0; first < c->n_rays; first += RAYS_AT_ONCE) {
         const size_t last = first + RAYS_AT_ONCE < c->n_rays ? first + RAYS_AT_ONCE : c->n_rays;
         const size_t count = rays_meet(&c->rays, &sampler, element, first, last, met, &tally, pool->sky);
-        for (size_t k = 0; k < count; k++) row_pool_add(pool, met[k], 1);
+        for (size_t k = 0; k < count && !c->without_rows; k++) row_pool_add(pool, met[k], 1);
     }
     *leaving = (double)tally.left / (double)c->n_rays;
     *absorbed = (double)tally.lost / (double)c->n_rays;
@@ -63,7 +64,8 @@ lam_status rays_count(const mesh *m, const visibility *v, const uint32_t *order,
                       double *absorbed, lam_error *error) {
     const count_context context = {
         .rays = {.m = m, .v = v, .seed = options->recipe.seed, .sky = options->bounce},
-        .n_rays = options->recipe.rays};
+        .n_rays = options->recipe.rays,
+        .without_rows = options->without_rows};
     const row_maker maker = {.make = trace_element,
                              .context = &context,
                              .kind = ROW_COUNTS,
