@@ -108,7 +108,7 @@ static void judge(const judged_probes *b, const visibility *v, const plane_tree 
            1e-6 * (double)(f.n_blocks * sizeof *f.blocks));
     for (size_t g = 0, k = 0; g < PROBE_GROUPS; g++) {
         double mean = 0, most = 0;
-        size_t lit = 0; /* those that give any indirect light */
+        size_t lit = 0; /* probes with any indirect light */
         for (size_t end = k + b->counts[g]; k < end; k++) {
             for (size_t p = 0; p < n; p++) one[f.order[p]] = (float)B[p * V + k];
             const double off = judged_probes_error(b, k, one);
