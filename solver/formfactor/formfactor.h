@@ -12,14 +12,15 @@
 
 /* The number of pairs of elements that each step of pairs.h decided. */
 typedef struct pairs_report {
-    double facing;   /* face each other and are above the threshold */
-    double certain;  /* of those: no element reaches into the shaft between their clusters */
-    double settled;  /* so small that the occlusion test is accurate enough */
-    double open;     /* no visibility segment was blocked */
-    double hidden;   /* every one was */
-    double mixed;    /* some were, or a neighbouring pair came out differently: estimated by many segments */
-    double accuracy; /* standard error of a mixed pair's factor: as requested, or as the number of segments
-                        allowed */
+    double facing;    /* face each other and are above the threshold */
+    double certain;   /* of those: no element reaches into the shaft between their clusters */
+    double settled;   /* so small that the occlusion test is accurate enough */
+    double open;      /* no visibility segment was blocked */
+    double hidden;    /* every one was */
+    double projected; /* partly hidden by few occluders: their visible parts are integrated */
+    double mixed;     /* some were, or a neighbouring pair came out differently: estimated by many segments */
+    double accuracy;  /* standard error of a mixed pair's factor: as requested, or as the number of segments
+                         allowed */
 } pairs_report;
 
 /* The number of blocks that each rule decided. Pairs of elements of different planes are in a block, or are

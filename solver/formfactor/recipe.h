@@ -75,9 +75,10 @@ size_t recipe_auto_rays(double epsilon, double share);
 /* About the 2-norm of the sampling noise in S; 0 where it is unknown or negligible. */
 double recipe_noise(const recipe *r);
 
-/* The recipe of the independent sample that another one is judged by: the same with another seed. For
- * hemicubes, which would only repeat themselves, it is rays; for pairs and blocks it omits the rays that
- * only a sky needs; of blocks it asks for a quarter of the error. */
+/* The recipe of the independent sample that another one is judged by: the same with another seed, which also
+ * moves the points of the cubature of projected pairs (projection.h). For hemicubes, which would only repeat
+ * themselves, it is rays; for pairs and blocks it omits the rays that only a sky needs; of blocks it asks for
+ * a quarter of the error. */
 recipe recipe_of_judge(const recipe *judged, size_t rays_beside_hemicubes, uint64_t seed);
 
 #endif

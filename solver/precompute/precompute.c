@@ -68,11 +68,13 @@ static void log_form_factors(precompute_state *state) {
                      f->pairs.accuracy, recipe_accuracy(&f->recipe));
     if (f->pairs.facing > 0) {
         const double all = .5 * (double)state->m.n * (double)(state->m.n - 1), facing = f->pairs.facing;
-        terminal_log(state->t,
-                     "%.1f %% of all pairs taken one by one; of those %.1f %% have nothing between them, "
-                     "%.1f %% are plainly open, %.1f %% plainly hidden",
-                     100 * facing / all, 100 * f->pairs.certain / facing, 100 * f->pairs.open / facing,
-                     100 * f->pairs.hidden / facing);
+        terminal_log(
+            state->t,
+            "%.1f %% of all pairs taken one by one; of those %.1f %% have nothing between them, "
+            "%.1f %% are plainly open, %.1f %% plainly hidden, %.1f %% have few occluders, which are "
+            "projected",
+            100 * facing / all, 100 * f->pairs.certain / facing, 100 * f->pairs.open / facing,
+            100 * f->pairs.hidden / facing, 100 * f->pairs.projected / facing);
     }
     state_log_blocks(state);
     const sky_bounce *sky = &f->sky;

@@ -54,6 +54,30 @@ static double factor_bound(double area, double distance2) {
     return area < apart ? area / apart : 1;
 }
 
+typedef enum cluster_state { CLUSTERS_OPEN, CLUSTERS_HIDDEN, CLUSTERS_MIXED } cluster_state;
+
+/* Of two clusters with elements in their shaft: open where no occluder is between them, hidden where one
+ * covers them, or, where there are too many to know, where all segments are blocked. */
+static cluster_state look_between(walk *w, const cluster *a, const cluster *b, const shaft *s,
+                                  double distance2) {
+    const bool near = w->options->threshold > 0;
+    if (w->options->occluders != NULL) {
+        link_occluders among;
+        joined_occluders_between(w->options->occluders, s, a, b, &among);
+        if (among.count == 0) return CLUSTERS_OPEN;
+        if (among.count > 0)
+            return !near && joined_occluders_hide(w->options->occluders, &among, a, b) ? CLUSTERS_HIDDEN
+                                                                                       : CLUSTERS_MIXED;
+    }
+    /* The near field has so few pairs that testing each is cheaper than testing clusters. */
+    if (near) return CLUSTERS_MIXED;
+    w->found->work.occlusion++;
+    if (!occlusion_is_total(w->o, w->t, a, b, factor_bound(fmax(a->area, b->area), distance2)))
+        return CLUSTERS_MIXED;
+    w->found->work.hidden++;
+    return CLUSTERS_HIDDEN;
+}
+
 /* With more candidates than this, the shaft between two leaves of the near field is not built. */
 enum { CROWD = 16 };
 
@@ -98,14 +122,15 @@ static void visit(walk *w, uint32_t a, uint32_t b, const uint32_t *candidates, s
         bag_add(w->found, a, b, true);
         return;
     }
-    /* The near field has so few pairs that testing each is cheaper than testing clusters. */
-    if (n_within > 0 && !near) {
-        w->found->work.occlusion++;
-        if (occlusion_is_total(w->o, t, one, two, factor_bound(fmax(one->area, two->area), distance2))) {
-            w->found->work.hidden++;
-            w->found->hidden_pairs += pairs_between(one, two);
-            return;
-        }
+    const cluster_state between =
+        n_within > 0 && (!near || leaves) ? look_between(w, one, two, &s, distance2) : CLUSTERS_MIXED;
+    if (between == CLUSTERS_OPEN) {
+        bag_add(w->found, a, b, true);
+        return;
+    }
+    if (between == CLUSTERS_HIDDEN) {
+        w->found->hidden_pairs += pairs_between(one, two);
+        return;
     }
     if (leaves) {
         bag_add(w->found, a, b, false);

@@ -3,6 +3,7 @@
 #ifndef LAMBERT_FORMFACTOR_PAIRS_CLUSTER_LINKS_H
 #define LAMBERT_FORMFACTOR_PAIRS_CLUSTER_LINKS_H
 
+#include "solver/formfactor/pairs/joined_occluders.h"
 #include "solver/formfactor/pairs/occlusion.h"
 
 /* All pairs of an element of a with an element of b, whose positions are greater; a == b: all pairs within
@@ -33,13 +34,15 @@ typedef struct cluster_links {
 typedef struct cluster_link_options {
     double threshold; /* leaves out pairs whose mean factor 2 g / (A_i + A_j) is provably below; 0: none */
     double slack;     /* the distance by which rounding may move a point */
-    size_t one_of;    /* a sample: one of this many parts of the descent, evenly spread; 0: all of it */
+    const joined_occluders *occluders; /* NULL: clusters that hide each other are found by segments alone */
+    size_t one_of; /* a sample: one of this many parts of the descent, evenly spread; 0: all of it */
     const progress *progress;
 } cluster_link_options;
 
 /* Descends through pairs of clusters of the tree. Clusters that face away or are below the threshold get no
- * link, nor, without a threshold, do clusters that occlusion_is_total. The result is the same for any number
- * of threads. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. Freed by cluster_links_free. */
+ * link, nor, without a threshold, do clusters that one occluder hides, or that occlusion_is_total where too
+ * many occluders stand between to know. The result is the same for any number of threads. Errors:
+ * LAM_ERR_MEMORY, LAM_ERR_CANCELLED. Freed by cluster_links_free. */
 lam_status cluster_links_find(const mesh *m, const cluster_tree *t, const occlusion *o,
                               const cluster_link_options *options, cluster_links *out, lam_error *error);
 void cluster_links_free(cluster_links *l);

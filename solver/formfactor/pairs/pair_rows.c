@@ -58,7 +58,8 @@ pair_state pair_rows_state(const pair_rows *rows, uint32_t p, uint32_t q) {
         else
             high = middle;
     }
-    return low < end && b->other[low] == wanted ? (pair_state)(b->state[low] & ~PAIR_SETTLED) : PAIR_UNKNOWN;
+    return low < end && b->other[low] == wanted ? (pair_state)(b->state[low] & ~(PAIR_SETTLED | PAIR_EXACT))
+                                                : PAIR_UNKNOWN;
 }
 
 lam_status pair_rows_open(scratch *s, const char *name, const char geometry[33], const recipe *r, size_t n,

@@ -8,9 +8,9 @@
 #include "solver/linalg/csr.h"
 
 /* The occlusion of a pair: CERTAIN by an empty shaft, OPEN, HIDDEN or MIXED by an occlusion test. The flag
- * SETTLED beside it: the test was accurate enough. */
+ * SETTLED beside it: the test was accurate enough; EXACT: by projection, not by segments. */
 typedef enum pair_state { PAIR_UNKNOWN, PAIR_CERTAIN, PAIR_OPEN, PAIR_HIDDEN, PAIR_MIXED } pair_state;
-enum { PAIR_SETTLED = 8, PAIR_BLOCK_ROWS = 64 };
+enum { PAIR_SETTLED = 8, PAIR_EXACT = 16, PAIR_BLOCK_ROWS = 64 };
 
 /* The pairs of PAIR_BLOCK_ROWS rows, one array a member: positions ascending in a row, exchange areas,
  * states. */

@@ -2,6 +2,8 @@
 
 #include "solver/base/array_grow.h"
 #include "solver/formfactor/pairs/cluster_links.h"
+#include "solver/formfactor/pairs/element_neighbours.h"
+#include "solver/formfactor/pairs/few_occluders.h"
 #include "solver/formfactor/pairs/pair_far.h"
 #include "solver/formfactor/pairs/pair_rows.h"
 
@@ -11,14 +13,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NEIGHBOURS_MOST = 12 };
-
 typedef struct pairs_run {
     const mesh *m;
     const pairs_options *options;
     pair_factor_rules rules;
     polygon *polygons; /* [n], by element */
     occlusion occlusion;
+    few_occluders few;
+    bool projects; /* few applies */
     cluster_tree tree;
     uint32_t *leaf;   /* [n], the leaf of a position */
     uint32_t *parent; /* of each cluster */
@@ -32,12 +34,15 @@ typedef struct pairs_run {
 typedef struct reach {
     uint32_t first, last;
     bool open;
+    uint32_t among; /* its occluders in leaf_reaches, where it is not open */
 } reach;
 
 /* All the partners of a leaf; room that is used again for the next one. */
 typedef struct leaf_reaches {
     reach *reaches;
     size_t n, capacity;
+    link_occluders *among;
+    size_t n_among, among_capacity;
 } leaf_reaches;
 
 static int compare_reaches(const void *a, const void *b) {
@@ -45,17 +50,34 @@ static int compare_reaches(const void *a, const void *b) {
     return (one->first > two->first) - (one->first < two->first);
 }
 
+/* Adds the occluders between two clusters. */
+static bool add_occluders(const pairs_run *run, const cluster *a, const cluster *b, leaf_reaches *out) {
+    link_occluders *one;
+    if (array_grow(&out->among, &out->among_capacity, out->n_among + 1, sizeof *out->among, "pairs", NULL) !=
+        LAM_OK)
+        return false;
+    one = &out->among[out->n_among++];
+    one->count = OCCLUDERS_UNCOUNTED;
+    if (!run->projects) return true;
+    shaft s;
+    shaft_init(&s, a, b, run->few.occluders.slack);
+    joined_occluders_between(&run->few.occluders, &s, a, b, one);
+    return true;
+}
+
 /* The links of a leaf and of its ancestors, sorted by position; their positions do not overlap. */
 static bool find_reaches(const pairs_run *run, uint32_t leaf, leaf_reaches *out) {
-    out->n = 0;
+    out->n = out->n_among = 0;
     for (uint32_t c = leaf;; c = run->parent[c]) {
         const size_t first = run->links.of_cluster[c], last = run->links.of_cluster[c + 1];
         if (array_grow(&out->reaches, &out->capacity, out->n + (last - first), sizeof *out->reaches, "pairs",
                        NULL) != LAM_OK)
             return false;
         for (size_t k = first; k < last; k++) {
-            const cluster *b = &run->tree.clusters[run->links.links[k].b];
-            out->reaches[out->n++] = (reach){b->first, b->last, run->links.links[k].open};
+            const cluster_link *link = &run->links.links[k];
+            const cluster *b = &run->tree.clusters[link->b];
+            out->reaches[out->n++] = (reach){b->first, b->last, link->open, (uint32_t)out->n_among};
+            if (!link->open && !add_occluders(run, &run->tree.clusters[c], b, out)) return false;
         }
         if (c == 0) break;
     }
@@ -69,10 +91,25 @@ static double factor_of(const pairs_run *run, uint32_t i, uint32_t j, double g) 
     return 2 * g / (run->m->area[i] + run->m->area[j]);
 }
 
-/* The occlusion test of a pair; where it is accurate enough the pair is settled and g becomes its visible
- * part. */
-static int look_at(const pairs_run *run, uint32_t i, uint32_t j, double *g) {
+/* Settles a pair with few occluders by projection: g becomes its visible part. PAIR_UNKNOWN: it has more. */
+static int project(const pairs_run *run, uint32_t i, uint32_t j, const link_occluders *among, double *g) {
+    double share = 1, work = 0;
+    if (!run->projects) return PAIR_UNKNOWN;
+    const double tolerance = few_occluders_tolerance(&run->few, i, j, *g, run->options->accuracy);
+    const few_verdict found = few_occluders_share(&run->few, among, i, j, tolerance, &share, &work);
+    *g *= share;
+    return found == FEW_UNDECIDED ? PAIR_UNKNOWN
+           : found == FEW_OPEN    ? PAIR_CERTAIN
+           : found == FEW_HIDDEN  ? PAIR_HIDDEN | PAIR_EXACT
+                                  : PAIR_MIXED | PAIR_EXACT;
+}
+
+/* The occlusion of a pair by projection, or its occlusion test; where that is accurate enough the pair is
+ * settled and g becomes its visible part. */
+static int look_at(const pairs_run *run, uint32_t i, uint32_t j, const link_occluders *among, double *g) {
     double seen;
+    const int projected = project(run, i, j, among, g);
+    if (projected != PAIR_UNKNOWN) return projected;
     const occlusion_verdict verdict = occlusion_test(&run->occlusion, i, j, *g, &seen);
     const int state = verdict == OCCLUSION_NONE    ? PAIR_OPEN
                       : verdict == OCCLUSION_TOTAL ? PAIR_HIDDEN
@@ -101,7 +138,7 @@ static bool find_row(const pairs_run *run, uint32_t position, const leaf_reaches
                     g = pair_factor_exchange(&run->rules, &run->polygons[i], &run->polygons[j],
                                              run->options->tolerance);
                 if (!((float)g > 0) || factor_of(run, i, j, g) < run->options->threshold) continue;
-                const int state = r->open ? PAIR_CERTAIN : look_at(run, i, j, &g);
+                const int state = r->open ? PAIR_CERTAIN : look_at(run, i, j, &to->among[r->among], &g);
                 pair_block_add(block, first + c, (float)g, (uint8_t)state);
             }
         }
@@ -147,38 +184,50 @@ static bool at_a_border(const pairs_run *run, uint32_t i, uint32_t j, pair_state
 
 /* True where a pair gets occlusion_estimate. */
 static bool is_mixed(const pairs_run *run, uint32_t i, uint32_t j, uint8_t state) {
-    if (state == PAIR_CERTAIN || (state & PAIR_SETTLED) != 0) return false;
+    if (state == PAIR_CERTAIN || (state & (PAIR_SETTLED | PAIR_EXACT)) != 0) return false;
     return state == PAIR_MIXED || at_a_border(run, i, j, (pair_state)state);
 }
 
-/* The number of segments that the mixed pairs of one block take at the accuracy asked for. */
-static double segments_of_block(const pairs_run *run, size_t index) {
+/* The number of segments that pairs take at the accuracy asked for: mixed ones, and those that projection has
+ * saved. */
+typedef struct segment_count {
+    double mixed, saved;
+} segment_count;
+
+static segment_count segments_of_block(const pairs_run *run, size_t index) {
     const pair_block *block = &run->rows.blocks[index];
-    double sum = 0;
+    segment_count sum = {0, 0};
     size_t r = 0;
     for (size_t at = 0; at < block->used; at++) {
         while (at >= block->begin[r + 1]) r++;
         const uint32_t i = run->tree.element[pair_rows_first(index) + r],
                        j = run->tree.element[block->other[at]];
         if (is_mixed(run, i, j, block->state[at]))
-            sum += occlusion_segments(&run->occlusion, i, j, (double)block->exchange[at]);
+            sum.mixed += occlusion_segments(&run->occlusion, i, j, (double)block->exchange[at]);
+        else if (block->state[at] == (PAIR_MIXED | PAIR_EXACT))
+            sum.saved += occlusion_segments(&run->occlusion, i, j, (double)block->exchange[at]);
     }
     return sum;
 }
 
-/* Scales the accuracy so that all mixed pairs together take between segments_least and segments_most
- * segments: the error of N segments is proportional to N^-3/4. */
+/* Scales the accuracy so that all mixed pairs together take between segments_least, or their share of it, and
+ * segments_most segments: the error of N segments is proportional to N^-3/4. */
 static lam_status share_segments(pairs_run *run, lam_error *error) {
     const size_t n_blocks = run->rows.n_blocks;
-    double wanted = 0;
-    double *of_block = memory_allocate(n_blocks, sizeof *of_block, "pairs", error);
+    segment_count all = {0, 0};
+    segment_count *of_block = memory_allocate(n_blocks, sizeof *of_block, "pairs", error);
     if (of_block == NULL) return LAM_ERR_MEMORY;
 #pragma omp parallel for schedule(dynamic, 4)
     for (size_t b = 0; b < n_blocks; b++) of_block[b] = segments_of_block(run, b);
-    for (size_t b = 0; b < n_blocks; b++) wanted += of_block[b];
+    for (size_t b = 0; b < n_blocks; b++) {
+        all.mixed += of_block[b].mixed;
+        all.saved += of_block[b].saved;
+    }
     free(of_block);
-    const double cast = fmin(fmax(wanted, run->options->segments_least), run->options->segments_most);
-    if (wanted > 0) run->occlusion.accuracy *= pow(wanted / cast, .75);
+    if (!(all.mixed > 0)) return LAM_OK;
+    const double least = run->options->segments_least * all.mixed / (all.mixed + all.saved);
+    const double cast = fmin(fmax(all.mixed, least), run->options->segments_most);
+    run->occlusion.accuracy *= pow(all.mixed / cast, .75);
     return LAM_OK;
 }
 
@@ -189,7 +238,7 @@ static void refine_block(pairs_run *run, size_t index, bool known, pairs_report 
     size_t r = 0;
     for (size_t at = 0; at < block->used; at++) {
         while (at >= block->begin[r + 1]) r++;
-        const pair_state state = (pair_state)(block->state[at] & ~PAIR_SETTLED);
+        const pair_state state = (pair_state)(block->state[at] & ~(PAIR_SETTLED | PAIR_EXACT));
         const uint32_t i = run->tree.element[pair_rows_first(index) + r],
                        j = run->tree.element[block->other[at]];
         sum->facing++;
@@ -197,6 +246,9 @@ static void refine_block(pairs_run *run, size_t index, bool known, pairs_report 
             sum->certain++;
         } else if (block->state[at] & PAIR_SETTLED) {
             sum->settled++;
+        } else if (block->state[at] & PAIR_EXACT) {
+            sum->projected += state == PAIR_MIXED;
+            sum->hidden += state == PAIR_HIDDEN;
         } else if (is_mixed(run, i, j, block->state[at])) {
             sum->mixed++;
             if (!known)
@@ -240,6 +292,7 @@ static void add_report(pairs_report *sum, const pairs_report *more) {
     sum->settled += more->settled;
     sum->open += more->open;
     sum->hidden += more->hidden;
+    sum->projected += more->projected;
     sum->mixed += more->mixed;
 }
 
@@ -291,7 +344,10 @@ static lam_status pass_run(pass *p, lam_error *error) {
         if (progress_cancelled(o->progress))
             pass_fail(p, status_fail(&why, LAM_ERR_CANCELLED, "cancelled"), &why);
     }
-    for (size_t k = 0; k < n_threads; k++) free(reaches[k].reaches);
+    for (size_t k = 0; k < n_threads; k++) {
+        free(reaches[k].reaches);
+        free(reaches[k].among);
+    }
     free(reaches);
     if (p->status != LAM_OK && error != NULL) *error = p->error;
     return p->status;
@@ -325,52 +381,6 @@ done:
     return status;
 }
 
-typedef struct edge_use {
-    uint32_t low, high, element;
-} edge_use;
-
-static int compare_edges(const void *a, const void *b) {
-    const edge_use *one = a, *two = b;
-    if (one->low != two->low) return one->low < two->low ? -1 : 1;
-    if (one->high != two->high) return one->high < two->high ? -1 : 1;
-    return one->element < two->element ? -1 : one->element > two->element;
-}
-
-static void add_neighbour(uint32_t list[NEIGHBOURS_MOST], uint32_t element) {
-    for (int k = 0; k < NEIGHBOURS_MOST; k++) {
-        if (list[k] == element) return;
-        if (list[k] == UINT32_MAX) {
-            list[k] = element;
-            return;
-        }
-    }
-}
-
-/* neighbours, [n]: the elements that share both vertices of an edge, then UINT32_MAX. */
-static lam_status neighbours_find(const mesh *m, uint32_t (*neighbours)[NEIGHBOURS_MOST], lam_error *error) {
-    size_t n_edges = 0;
-    edge_use *edges = memory_allocate(m->n, 4 * sizeof *edges, "neighbours", error);
-    if (edges == NULL) return LAM_ERR_MEMORY;
-    for (size_t i = 0; i < m->n; i++) {
-        const uint32_t *corner = m->elements[i];
-        const size_t corners = mesh_corners(m, i);
-        for (size_t c = 0; c < corners; c++) {
-            const uint32_t a = corner[c], b = corner[(c + 1) % corners];
-            edges[n_edges++] = (edge_use){a < b ? a : b, a < b ? b : a, (uint32_t)i};
-        }
-    }
-    qsort(edges, n_edges, sizeof *edges, compare_edges);
-    memset(neighbours, 0xff, m->n * sizeof *neighbours);
-    for (size_t e = 0; e + 1 < n_edges; e++)
-        for (size_t f = e + 1; f < n_edges && edges[f].low == edges[e].low && edges[f].high == edges[e].high;
-             f++) {
-            add_neighbour(neighbours[edges[e].element], edges[f].element);
-            add_neighbour(neighbours[edges[f].element], edges[e].element);
-        }
-    free(edges);
-    return LAM_OK;
-}
-
 static lam_status find_parents(pairs_run *run, lam_error *error) {
     const cluster_tree *t = &run->tree;
     run->parent = memory_allocate(t->n_clusters, sizeof *run->parent, "pairs", error);
@@ -392,7 +402,7 @@ lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_option
     const size_t n = m->n;
     const double slack = visibility_rounding(v);
     pairs_run run = {.m = m, .options = options};
-    const cluster_link_options how = {
+    cluster_link_options how = {
         .threshold = options->threshold, .slack = slack, .progress = options->progress};
     pair_factor_rules_init(&run.rules);
     run.polygons = memory_allocate(n, sizeof *run.polygons, "pairs", error);
@@ -408,9 +418,15 @@ lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_option
                                 .accuracy = options->accuracy,
                                 .segments = options->segments,
                                 .seed = options->seed};
-    TRY(neighbours_find(m, run.neighbours, error));
+    if (options->occluders > 0) {
+        TRY(few_occluders_make(m, v, run.polygons, &run.rules, options->seed, options->occluders, &run.few,
+                               error));
+        run.projects = few_occluders_apply(&run.few);
+    }
+    TRY(element_neighbours_find(m, run.neighbours, error));
     TRY(cluster_tree_build(m, slack, &run.tree, error));
     TRY(pair_far_table_build(run.polygons, &run.tree, &run.rules, options->tolerance, &run.far, error));
+    if (run.projects) how.occluders = &run.few.occluders;
     TRY(cluster_links_find(m, &run.tree, &run.occlusion, &how, &run.links, error));
     TRY(find_parents(&run, error));
     TRY(run_passes(&run, report, kept, error));
@@ -423,6 +439,7 @@ done:
     free(run.neighbours);
     free(run.parent);
     free(run.leaf);
+    few_occluders_free(&run.few);
     pair_far_table_free(&run.far);
     cluster_links_free(&run.links);
     cluster_tree_free(&run.tree);
@@ -448,6 +465,7 @@ pairs_options pairs_options_of(const recipe *r, size_t n, double threshold) {
                            .segments_least = near ? 0 : segments_least,
                            .segments_most =
                                near ? (double)n * (double)r->rays : segments_most(n, r->accuracy),
+                           .occluders = near ? 0 : PAIR_OCCLUDERS_MOST,
                            .threshold = threshold,
                            .keep_hidden = near,
                            .seed = r->seed,

@@ -1,5 +1,6 @@
 /* Form factors pair by pair: A_i F_ij = g_ij V_ij, with the unoccluded exchange area g by quadrature
- * (pair_factor.h, pair_far.h) and the visible share V by visibility segments (occlusion.h). */
+ * (pair_factor.h, pair_far.h) and the visible share V by projection where few occluders stand between
+ * (few_occluders.h), else by visibility segments (occlusion.h). */
 #ifndef LAMBERT_FORMFACTOR_PAIRS_PAIRS_H
 #define LAMBERT_FORMFACTOR_PAIRS_PAIRS_H
 
@@ -8,10 +9,11 @@
 
 typedef struct pairs_options {
     double tolerance; /* of the unoccluded factor, relative */
-    double accuracy;  /* standard error of the factor of a partly occluded pair */
+    double accuracy;  /* standard error of the factor of a partly occluded pair; a third by projection */
     size_t segments;  /* the least for a mixed pair; a multiple of 8 */
     /* Bounds for all mixed pairs together: accuracy is relaxed or tightened to meet them. */
-    double segments_least, segments_most;
+    double segments_least, segments_most; /* of segments_least only the share that projection leaves */
+    int occluders;    /* pairs with at most so many between them are projected; 0: segments for all */
     double threshold; /* only pairs whose mean factor 2 g / (A_i + A_j) is above; 0: all */
     bool keep_hidden; /* totally occluded pairs stay in the rows as explicit zeros */
     uint64_t seed;
@@ -25,7 +27,7 @@ typedef struct pairs_options {
 /* The exchange areas A_i F_ij = A_j F_ji of all pairs, j > i, as sparse rows freed by csr_free.
  * 1. Pairs of clusters (cluster_links.h): an empty shaft makes all their pairs unoccluded; clusters whose
  * every segment is blocked make them hidden.
- * 2. Each other pair gets an occlusion test.
+ * 2. Of the others, a pair with few occluders is projected, and each other pair gets an occlusion test.
  * 3. A pair is mixed where its segments disagree, or where the pair of a neighbouring element came out
  *    differently, which finds shadow edges that eight segments miss. Mixed pairs get occlusion_estimate.
  * The result is the same for any number of threads. Memory: 9 bytes for each pair that faces and is not

@@ -3,6 +3,7 @@
 #include "solver/formfactor/pairs/pairs_sample.h"
 
 #include "solver/formfactor/pairs/cluster_links.h"
+#include "solver/formfactor/pairs/few_occluders.h"
 #include "solver/formfactor/pairs/pair_far.h"
 
 #include <math.h>
@@ -15,6 +16,8 @@ typedef struct sample_run {
     pair_factor_rules rules;
     polygon *polygons; /* [n], by element */
     occlusion occlusion;
+    few_occluders few;
+    bool projects; /* few applies */
     cluster_tree tree;
     pair_far_table far;
     cluster_links links;
@@ -25,9 +28,23 @@ typedef struct sample_run {
  * segments than the mean. */
 static const double at_border = .2;
 
-/* Counts the pairs of the position with first ... last-1. */
-static void count_row(const sample_run *run, uint32_t position, uint32_t first, uint32_t last, bool open,
-                      pairs_work *work) {
+/* Counts a pair that is projected; false where it has too many occluders. */
+static bool count_projection(const sample_run *run, uint32_t i, uint32_t j, double g,
+                             const link_occluders *among, pairs_work *work) {
+    double share;
+    if (!run->projects) return false;
+    work->sifted++;
+    const double tolerance = few_occluders_tolerance(&run->few, i, j, g, run->options->accuracy);
+    const few_verdict found =
+        few_occluders_share(&run->few, among, i, j, tolerance, &share, &work->projection);
+    work->seen += found == FEW_OPEN || found == FEW_PARTIAL;
+    if (found == FEW_PARTIAL) work->saved += occlusion_segments(&run->occlusion, i, j, g);
+    return found != FEW_UNDECIDED;
+}
+
+/* Counts the pairs of the position with first ... last-1; among: NULL for an open link. */
+static void count_row(const sample_run *run, uint32_t position, uint32_t first, uint32_t last,
+                      const link_occluders *among, pairs_work *work) {
     enum { PIECE = 64 };
     const uint32_t i = run->tree.element[position];
     for (uint32_t begin = first; begin < last; begin += PIECE) {
@@ -46,10 +63,11 @@ static void count_row(const sample_run *run, uint32_t position, uint32_t first, 
             if (!((float)g > 0) || 2 * g / (run->m->area[i] + run->m->area[j]) < run->options->threshold)
                 continue;
             work->facing++;
-            if (open) {
+            if (among == NULL) {
                 work->seen++;
                 continue;
             }
+            if (count_projection(run, i, j, g, among, work)) continue;
             work->tests++;
             const occlusion_verdict verdict = occlusion_test(&run->occlusion, i, j, g, &seen);
             work->seen += verdict != OCCLUSION_TOTAL;
@@ -76,7 +94,13 @@ static void count_rows(const sample_run *run, double n_pairs, pairs_work *work) 
             if (at <= next) continue;
             next += step;
             taken += b->last - first;
-            count_row(run, p, first, b->last, l->open, work);
+            link_occluders among = {.count = OCCLUDERS_UNCOUNTED};
+            if (!l->open && run->projects) {
+                shaft s;
+                shaft_init(&s, a, b, run->few.occluders.slack);
+                joined_occluders_between(&run->few.occluders, &s, a, b, &among);
+            }
+            count_row(run, p, first, b->last, l->open ? NULL : &among, work);
         }
     }
     const double scale = taken > 0 ? rows / taken : 0;
@@ -85,6 +109,9 @@ static void count_rows(const sample_run *run, double n_pairs, pairs_work *work) 
     work->facing *= scale;
     work->seen *= scale;
     work->tests *= scale;
+    work->sifted *= scale;
+    work->projection *= scale;
+    work->saved *= scale;
     work->segments *= scale;
 }
 
@@ -100,6 +127,9 @@ static void scale_to_all(const sample_run *run, pairs_work *work) {
     work->facing *= all;
     work->seen *= all;
     work->tests *= all;
+    work->sifted *= all;
+    work->projection *= all;
+    work->saved *= all;
     work->segments *= all;
 }
 
@@ -111,10 +141,10 @@ lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options 
     const double slack = visibility_rounding(v);
     sample_run run = {.m = m, .options = options};
     pairs_work work = {0};
-    const cluster_link_options how = {.threshold = options->threshold,
-                                      .slack = slack,
-                                      .one_of = m->n < SAMPLED_FROM ? 1 : ONE_OF,
-                                      .progress = options->progress};
+    cluster_link_options how = {.threshold = options->threshold,
+                                .slack = slack,
+                                .one_of = m->n < SAMPLED_FROM ? 1 : ONE_OF,
+                                .progress = options->progress};
     double n_pairs = 0;
     pair_factor_rules_init(&run.rules);
     run.polygons = memory_allocate(m->n, sizeof *run.polygons, "pairs", error);
@@ -128,6 +158,12 @@ lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options 
                                 .accuracy = options->accuracy,
                                 .segments = options->segments,
                                 .seed = options->seed};
+    if (options->occluders > 0) {
+        TRY(few_occluders_make(m, v, run.polygons, &run.rules, options->seed, options->occluders, &run.few,
+                               error));
+        run.projects = few_occluders_apply(&run.few);
+        if (run.projects) how.occluders = &run.few.occluders;
+    }
     TRY(cluster_tree_build(m, slack, &run.tree, error));
     TRY(pair_far_table_build(run.polygons, &run.tree, &run.rules, options->tolerance, &run.far, error));
     TRY(cluster_links_find(m, &run.tree, &run.occlusion, &how, &run.links, error));
@@ -141,6 +177,7 @@ lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options 
     *out = work;
 done:
     free(run.polygons);
+    few_occluders_free(&run.few);
     pair_far_table_free(&run.far);
     cluster_links_free(&run.links);
     cluster_tree_free(&run.tree);
@@ -151,7 +188,7 @@ done:
  * Cornell boxes, a maze, rooms, a canopy and a part of a town (12,541 triangles). */
 static const double shaft_seconds = 5e-7, candidate_seconds = 8e-8, hidden_seconds = 5e-5,
                     tried_seconds = 5e-8, close_seconds = 3e-6, test_seconds = 9e-7, segment_seconds = 1.1e-7,
-                    entry_seconds = 1e-7, ray_seconds = 1e-7;
+                    sift_seconds = 2e-6, projection_seconds = 7e-8, entry_seconds = 1e-7, ray_seconds = 1e-7;
 
 /* Entries of the triangle per ray: many hit what others hit. */
 static const double ray_entries = .3;
@@ -169,12 +206,13 @@ lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, pai
         TRY(visibility_create(m, &v, error));
         TRY(pairs_sample(m, v, &options, &w, error));
     }
-    const double segments =
-        w.segments > 0 ? fmin(fmax(w.segments, options.segments_least), options.segments_most) : 0;
+    const double least = w.segments > 0 ? options.segments_least * w.segments / (w.segments + w.saved) : 0;
+    const double segments = fmin(fmax(w.segments, least), options.segments_most);
     const double entries = w.seen + (r->method == RECIPE_PAIRS ? 0 : fmin(rays * ray_entries, n * n / 2));
     *out = (pairs_cost){.seconds = w.shafts * shaft_seconds + w.candidates * candidate_seconds +
                                    w.hidden * hidden_seconds + w.tried * tried_seconds +
                                    w.close * close_seconds + w.tests * test_seconds +
+                                   w.sifted * sift_seconds + w.projection * projection_seconds +
                                    segments * segment_seconds + entries * entry_seconds + rays * ray_seconds,
                         .entries = 2 * entries};
 done:

@@ -12,7 +12,10 @@ typedef struct pairs_work {
     double facing;                                /* of those tried, not 0 and above the threshold */
     double seen;                                  /* of those facing, not plainly hidden */
     double tests;                                 /* occlusion tests */
+    double sifted;                                /* pairs given to projection, decided or not */
+    double projection;                            /* points times 1 + occluders there */
     double segments;                              /* that mixed pairs ask for */
+    double saved;                                 /* that projected pairs would ask for */
 } pairs_work;
 
 /* Counts are the same for any number of threads. Cost: a sixty-fourth of finding links, or all of it for few

@@ -45,7 +45,7 @@ void shaft_init(shaft *s, const cluster *a, const cluster *b, double slack) {
     add_hull(s, a, b, 2, 0, slack);
 }
 
-static bool misses_box(const shaft *s, const double low[3], const double high[3]) {
+bool shaft_misses_box(const shaft *s, const double low[3], const double high[3]) {
     for (int d = 0; d < 3; d++)
         if (low[d] >= s->high[d] || high[d] <= s->low[d]) return true;
     for (int k = 0; k < s->n_planes; k++) {
@@ -56,28 +56,34 @@ static bool misses_box(const shaft *s, const double low[3], const double high[3]
     return false;
 }
 
-bool shaft_misses_element(const shaft *s, const mesh *m, uint32_t element) {
-    const uint32_t *corner = m->elements[element];
-    const size_t corners = mesh_corners(m, element);
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t c = 0; c < corners; c++)
-        for (int d = 0; d < 3; d++) {
-            const double x = m->vertices[corner[c]][d];
-            low[d] = x < low[d] ? x : low[d];
-            high[d] = x > high[d] ? x : high[d];
+bool shaft_misses_points(const shaft *s, int n, const double (*points)[3]) {
+    for (int d = 0; d < 3; d++) {
+        double low = INFINITY, high = -INFINITY;
+        for (int c = 0; c < n; c++) {
+            low = points[c][d] < low ? points[c][d] : low;
+            high = points[c][d] > high ? points[c][d] : high;
         }
-    for (int d = 0; d < 3; d++)
-        if (low[d] >= s->high[d] || high[d] <= s->low[d]) return true;
+        if (low >= s->high[d] || high <= s->low[d]) return true;
+    }
     for (int k = 0; k < s->n_planes; k++) {
         double least = INFINITY;
-        for (size_t c = 0; c < corners; c++) {
-            const double *x = m->vertices[corner[c]];
+        for (int c = 0; c < n; c++) {
+            const double *x = points[c];
             const double at = s->normal[k][0] * x[0] + s->normal[k][1] * x[1] + s->normal[k][2] * x[2];
             least = at < least ? at : least;
         }
         if (least >= s->level[k]) return true;
     }
     return false;
+}
+
+bool shaft_misses_element(const shaft *s, const mesh *m, uint32_t element) {
+    const uint32_t *corner = m->elements[element];
+    const size_t corners = mesh_corners(m, element);
+    double points[4][3];
+    for (size_t c = 0; c < corners; c++)
+        for (int d = 0; d < 3; d++) points[c][d] = m->vertices[corner[c]][d];
+    return shaft_misses_points(s, (int)corners, (const double(*)[3])points);
 }
 
 static bool misses_leaf(const shaft *s, const mesh *m, const cluster_tree *t, const cluster *leaf) {
@@ -105,7 +111,7 @@ size_t shaft_filter(const shaft *s, const mesh *m, const cluster_tree *t, const 
         while (depth > 0) {
             const uint32_t at = stack[--depth];
             const cluster *c = &t->clusters[at];
-            if (misses_box(s, c->low, c->high)) continue;
+            if (shaft_misses_box(s, c->low, c->high)) continue;
             if (cluster_is_leaf(c)) {
                 if (misses_leaf(s, m, t, c)) continue;
             } else if (extent2(c->low, c->high) > small && depth + 2 <= DEPTH &&

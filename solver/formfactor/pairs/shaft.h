@@ -18,6 +18,10 @@ typedef struct shaft {
  * only touches it is outside. */
 void shaft_init(shaft *s, const cluster *a, const cluster *b, double slack);
 
+/* True where a box, or the hull of n points, is found to lie outside a shaft. */
+bool shaft_misses_box(const shaft *s, const double low[3], const double high[3]);
+bool shaft_misses_points(const shaft *s, int n, const double (*points)[3]);
+
 /* True where an element lies wholly outside a shaft. */
 bool shaft_misses_element(const shaft *s, const mesh *m, uint32_t element);
 

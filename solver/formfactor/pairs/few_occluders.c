@@ -1,0 +1,62 @@
+#include "solver/formfactor/pairs/few_occluders.h"
+
+#include <math.h>
+
+lam_status few_occluders_make(const mesh *m, const visibility *v, const polygon *polygons,
+                              const pair_factor_rules *rules, uint64_t seed, int most, few_occluders *out,
+                              lam_error *error) {
+    few_occluders f = {.m = m,
+                       .facets = visibility_facets(v),
+                       .polygons = polygons,
+                       .rules = rules,
+                       .seed = seed,
+                       .most = most < PAIR_OCCLUDERS_MOST ? most : PAIR_OCCLUDERS_MOST};
+    const lam_status status = joined_occluders_make(m, f.facets, visibility_rounding(v), &f.occluders, error);
+    if (status == LAM_OK) *out = f;
+    return status;
+}
+
+void few_occluders_free(few_occluders *f) {
+    joined_occluders_free(&f->occluders);
+}
+
+bool few_occluders_apply(const few_occluders *f) {
+    return f->most > 0 && f->occluders.n <= SCENE_OCCLUDERS_MOST;
+}
+
+double few_occluders_tolerance(const few_occluders *f, uint32_t i, uint32_t j, double g, double accuracy) {
+    return accuracy / 3 * fmin(f->m->area[i], f->m->area[j]) / g;
+}
+
+/* Both sides of a two-sided element lie in one facet. */
+static uint32_t facet_of(const few_occluders *f, uint32_t element) {
+    const size_t n_fronts = f->m->two_sided ? f->m->n / 2 : f->m->n;
+    return f->facets->of_element[element < n_fronts ? element : element - n_fronts];
+}
+
+few_verdict few_occluders_share(const few_occluders *f, const link_occluders *among, uint32_t i, uint32_t j,
+                                double tolerance, double *share, double *work) {
+    polygon a, b;
+    pair_occluders between;
+    if (among->count == OCCLUDERS_UNCOUNTED) return FEW_UNDECIDED;
+    polygon_in_front(&f->polygons[i], &f->polygons[j], &a);
+    polygon_in_front(&f->polygons[j], &f->polygons[i], &b);
+    if (a.n == 0 || b.n == 0) return FEW_UNDECIDED;
+    const uint32_t own[2] = {facet_of(f, i), facet_of(f, j)};
+    pair_occluders_find(&f->occluders, among, &a, &b, own, &between);
+    if (between.hidden) {
+        *share = 0;
+        return FEW_HIDDEN;
+    }
+    if (between.count == OCCLUDERS_UNCOUNTED || between.count > f->most) return FEW_UNDECIDED;
+    if (between.count == 0) {
+        *share = 1;
+        return FEW_OPEN;
+    }
+    const projection p = {f->rules, &f->occluders, f->seed};
+    const projected_pair pair = {i, j, &a, &b, &between};
+    const double found = projection_share(&p, &pair, tolerance, work);
+    if (found < 0) return FEW_UNDECIDED;
+    *share = found;
+    return found <= 0 ? FEW_HIDDEN : FEW_PARTIAL;
+}

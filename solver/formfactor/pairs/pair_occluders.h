@@ -1,0 +1,28 @@
+/* The occluders that may stand between two elements, found by planes: those of the occluder, of both
+ * elements, and the supporting planes of the pair. Knows no light. */
+#ifndef LAMBERT_FORMFACTOR_PAIRS_PAIR_OCCLUDERS_H
+#define LAMBERT_FORMFACTOR_PAIRS_PAIR_OCCLUDERS_H
+
+#include "solver/formfactor/pairs/joined_occluders.h"
+#include "solver/formfactor/pairs/polygon.h"
+
+/* Between two elements, at most. */
+enum { PAIR_OCCLUDERS_MOST = 8 };
+
+typedef struct pair_occluders {
+    int count;   /* or OCCLUDERS_UNCOUNTED */
+    bool hidden; /* one of them covers the pair */
+    uint32_t of[PAIR_OCCLUDERS_MOST];
+} pair_occluders;
+
+/* Finds the occluders of a link that may block a segment between a and b, which face each other wholly;
+ * own_facets: of the two elements, which block no segment of theirs. Count 0 proves that none does. */
+void pair_occluders_find(const joined_occluders *o, const link_occluders *among, const polygon *a,
+                         const polygon *b, const uint32_t own_facets[2], pair_occluders *out);
+
+/* Bits of those of a pair, among the bits given, that may block a segment between b and a part of a. hidden:
+ * one of them covers the part. */
+unsigned pair_occluders_of_part(const joined_occluders *o, const pair_occluders *among, unsigned bits,
+                                const polygon *part, const polygon *b, bool *hidden);
+
+#endif

@@ -1,0 +1,486 @@
+/* The visible share of pairs with few occluders: the cut of a target against brute subdivision of it, pairs
+ * against exact values, and openings between rooms. */
+#include "solver/base/random.h"
+#include "solver/formfactor/pairs/few_occluders.h"
+#include "solver/formfactor/pairs/pairs.h"
+#include "solver/formfactor/pairs/shadow_cut.h"
+#include "support/plates.h"
+#include "support/suite.h"
+
+#include <math.h>
+#include <omp.h>
+
+/* A pair and the occluders between, by hand. */
+typedef struct setting {
+    mesh m;
+    visibility *v;
+    polygon a, b;
+    joined_occluders occluders;
+    link_occluders all;
+} setting;
+
+static double unit(uint64_t *state) {
+    return random_lcg_unit(state);
+}
+
+/* A triangle or a quad about a place between and around the plates, of any direction: some cross the target's
+ * plane, some lie behind it, behind the point's plane, or are slivers. */
+static void add_random_occluder(mesh *m, uint64_t *state) {
+    double at[3], one[3], two[3], corner[4][3];
+    const double size = unit(state) < .2 ? .02 : .1 + .5 * unit(state), thin = unit(state) < .2 ? 1e-3 : 1;
+    for (int d = 0; d < 3; d++) {
+        at[d] = (d == 2 ? -.1 : -.3) + (d == 2 ? 1.2 : 1.6) * unit(state);
+        one[d] = size * (2 * unit(state) - 1);
+        two[d] = thin * size * (2 * unit(state) - 1);
+    }
+    if (unit(state) < .3) one[2] = two[2] = 0;            /* parallel to the plates */
+    if (unit(state) < .1) at[2] = one[2] = two[2] = 0;    /* in the plane of the point */
+    if (unit(state) < .1) at[2] = 1, one[2] = two[2] = 0; /* in that of the target */
+    for (int d = 0; d < 3; d++) {
+        corner[0][d] = at[d];
+        corner[1][d] = at[d] + one[d];
+        corner[2][d] = at[d] + one[d] + two[d];
+        corner[3][d] = at[d] + two[d];
+    }
+    mesh_add_quad(m, (const double(*)[3])corner);
+    if (unit(state) < .4) m->elements[m->n - 1][3] = MESH_NO_VERTEX;
+}
+
+static void setting_open(setting *s, mesh m) {
+    lam_error error = {0};
+    s->m = m;
+    ck_assert_msg(visibility_create(&s->m, &s->v, &error) == LAM_OK, "%s", error.message);
+    ck_assert(joined_occluders_make(&s->m, visibility_facets(s->v), visibility_rounding(s->v), &s->occluders,
+                                    &error) == LAM_OK);
+    polygon_of_element(&s->m, 0, &s->a);
+    polygon_of_element(&s->m, 1, &s->b);
+    s->all.count = 0;
+    ck_assert_uint_le(s->occluders.n, LINK_OCCLUDERS_MOST);
+    for (size_t k = 0; k < s->occluders.n; k++) s->all.of[s->all.count++] = (uint32_t)k;
+}
+
+static void setting_close(setting *s) {
+    joined_occluders_free(&s->occluders);
+    visibility_destroy(s->v);
+    mesh_free(&s->m);
+}
+
+/* Brute force: does the segment cross the occluder? By the signs of volumes of tetrahedra, not by planes. */
+static double volume(const double a[3], const double b[3], const double c[3], const double d[3]) {
+    double u[3], v[3], w[3];
+    for (int k = 0; k < 3; k++) u[k] = b[k] - a[k], v[k] = c[k] - a[k], w[k] = d[k] - a[k];
+    return u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) +
+           u[2] * (v[0] * w[1] - v[1] * w[0]);
+}
+
+static bool crosses(const mesh *m, size_t element, const double x[3], const double y[3]) {
+    const size_t n = mesh_corners(m, element);
+    const double *c[4];
+    for (size_t k = 0; k < n; k++) c[k] = m->vertices[m->elements[element][k]];
+    for (size_t k = 1; k + 1 < n; k++) {
+        const double from = volume(c[0], c[k], c[k + 1], x), to = volume(c[0], c[k], c[k + 1], y);
+        if (!(from * to < 0)) continue;
+        const double one = volume(x, y, c[0], c[k]), two = volume(x, y, c[k], c[k + 1]),
+                     three = volume(x, y, c[k + 1], c[0]);
+        if ((one > 0) == (two > 0) && (two > 0) == (three > 0)) return true;
+    }
+    return false;
+}
+
+static bool blocked(const mesh *m, const double x[3], const double y[3]) {
+    for (size_t e = 2; e < m->n; e++)
+        if (crosses(m, e, x, y)) return true;
+    return false;
+}
+
+/* F from x = (x, y, 0) to the visible part of the unit square at z = 1 by N x N cells. unsure: that of cells
+ * beside one of another state, which bounds the error of cells that a shadow's edge crosses. */
+static double brute_factor(const mesh *m, const double x[3], double *unsure) {
+    enum { N = 160 };
+    static bool dark[N][N];
+    static double part[N][N];
+    double sum = 0;
+    *unsure = 0;
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++) {
+            const double y[3] = {(i + .5) / N, (j + .5) / N, 1};
+            double r2 = 1;
+            for (int d = 0; d < 2; d++) r2 += (y[d] - x[d]) * (y[d] - x[d]);
+            part[i][j] = 1 / (M_PI * r2 * r2 * N * N);
+            dark[i][j] = blocked(m, x, y);
+            sum += dark[i][j] ? 0 : part[i][j];
+        }
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++) {
+            bool differs = false;
+            for (int p = i - 1; p <= i + 1; p++)
+                for (int q = j - 1; q <= j + 1; q++)
+                    differs = differs || (p >= 0 && q >= 0 && p < N && q < N && dark[p][q] != dark[i][j]);
+            if (differs) *unsure += part[i][j];
+        }
+    return sum;
+}
+
+/* Every way in which an occluder can lie. A sliver thinner than a cell is seen by no neighbour: its shadow is
+ * at most .02 x 1e-3 long and wide, or .6 x 6e-4, magnified by 1 over its height, and those near the point
+ * are left out by the tolerance's last term for all but points in them, which sums of areas cannot show. */
+START_TEST(cut_is_brute_subdivision) {
+    uint64_t state = 11 + (uint64_t)_i;
+    size_t partial = 0;
+    for (int trial = 0; trial < 12; trial++) {
+        setting s;
+        pair_occluders among = {.count = 0};
+        const size_t count = 1 + (size_t)(unit(&state) * PAIR_OCCLUDERS_MOST);
+        mesh m = plates(NULL);
+        for (size_t k = 0; k < count; k++) add_random_occluder(&m, &state);
+        lam_error error = {0};
+        free(m.area);
+        free(m.normal);
+        m.area = NULL;
+        m.normal = NULL;
+        ck_assert_msg(mesh_measure(&m, &error) == LAM_OK, "%s", error.message);
+        setting_open(&s, m);
+        /* Without the plates, which block nothing. */
+        for (size_t k = 0; k < s.occluders.n; k++)
+            if (s.occluders.of[k].facet >= 2 && among.count < PAIR_OCCLUDERS_MOST)
+                among.of[among.count++] = (uint32_t)k;
+        const projection p = {.occluders = &s.occluders};
+        const projected_pair pair = {0, 1, &s.a, &s.b, &among};
+        for (int point = 0; point < 4; point++) {
+            const double x[3] = {unit(&state), unit(&state), 0}, up[3] = {0, 0, 1};
+            double full, unsure;
+            const double found = projection_point_factor(&p, &pair, x, up, &full);
+            const double brute = brute_factor(&s.m, x, &unsure);
+            ck_assert_double_ge(found, 0);
+            ck_assert_double_le(found, full);
+            /* Midpoints of cells err by about 1/N^2 of the whole; lone dark cells are slivers. */
+            ck_assert_msg(fabs(found - brute) <= unsure + 1e-4 * full, "trial %d: %.9g, not %.9g within %g",
+                          trial, found, brute, unsure);
+            partial += found > 0 && found < full - 1e-9;
+            /* Occluders that planes throw out block nothing. */
+            pair_occluders left;
+            const uint32_t none[2] = {MESH_NO_VERTEX - 1, MESH_NO_VERTEX - 1};
+            pair_occluders_find(&s.occluders, &s.all, &s.a, &s.b, none, &left);
+            ck_assert_int_ne(left.count, OCCLUDERS_UNCOUNTED);
+            const projected_pair sifted = {0, 1, &s.a, &s.b, &left};
+            const double again = left.hidden ? 0 : projection_point_factor(&p, &sifted, x, up, NULL);
+            ck_assert_double_eq_tol(again, found, 1e-9);
+        }
+        setting_close(&s);
+    }
+    ck_assert_uint_gt(partial, 8);
+}
+END_TEST
+
+static csr exchange(const mesh *m, double accuracy, uint64_t seed, pairs_report *report) {
+    const pairs_options options = {.tolerance = 1e-8,
+                                   .accuracy = accuracy,
+                                   .segments = 8,
+                                   .segments_most = 1e12,
+                                   .occluders = PAIR_OCCLUDERS_MOST,
+                                   .seed = seed};
+    lam_error error = {0};
+    visibility *v = NULL;
+    csr G = {0};
+    ck_assert_msg(visibility_create(m, &v, &error) == LAM_OK, "%s", error.message);
+    ck_assert_msg(pairs_exchange(m, v, &options, &G, report, NULL, &error) == LAM_OK, "%s", error.message);
+    visibility_destroy(v);
+    return G;
+}
+
+/* The accuracy is that of a factor; the exact values are far beyond it, also where the places are 1e6 away,
+ * where single precision leaves .06 m of the coordinates of segments and joins. */
+START_TEST(occluded_plates_are_exact) {
+    static const double accuracies[] = {1e-4, 1e-6};
+    for (size_t c = 1; c < sizeof plates_cases / sizeof *plates_cases; c++) {
+        mesh m = plates(plates_cases[c].occluder);
+        plates_move(&m, plates_places[_i][0], plates_places[_i][1]);
+        for (int a = 0; a < 2; a++)
+            for (uint64_t seed = 1; seed <= 3; seed++) {
+                pairs_report report;
+                csr G = exchange(&m, accuracies[a], seed, &report);
+                ck_assert_double_eq(report.projected, 1);
+                ck_assert_double_eq(report.mixed, 0);
+                /* And what single precision of an entry rounds. */
+                ck_assert_double_eq_tol(csr_entry(&G, 0, 1) / m.area[0], plates_cases[c].F,
+                                        accuracies[a] + 1e-7);
+                csr_free(&G);
+            }
+        mesh_free(&m);
+    }
+    mesh m = plates(plates_hidden);
+    plates_move(&m, plates_places[_i][0], plates_places[_i][1]);
+    pairs_report report;
+    csr G = exchange(&m, 1e-4, 1, &report);
+    ck_assert_double_eq(csr_entry(&G, 0, 1), 0); /* exactly: edges must not leak */
+    csr_free(&G);
+    mesh_free(&m);
+}
+END_TEST
+
+/* Quarters that together hide all, none of which does alone: the pieces meet without a crack. */
+START_TEST(pieces_leave_no_crack) {
+    static const double from[4][4] = {{0, .4, 0, .7}, {.4, 1, 0, .7}, {0, .4, .7, 1}, {.4, 1, .7, 1}};
+    for (int pieces = 3; pieces <= 4; pieces++) {
+        mesh m = plates(NULL);
+        for (int k = 0; k < pieces; k++) {
+            const double z = .5 + .0 * k;
+            const box_cell c = {.axis = 2,
+                                .level = z,
+                                .from = {from[k][0], from[k][2], z},
+                                .to = {from[k][1], from[k][3], z}};
+            mesh_add_cell(&m, &c, true);
+        }
+        lam_error error = {0};
+        free(m.area);
+        free(m.normal);
+        m.area = NULL;
+        m.normal = NULL;
+        ck_assert(mesh_measure(&m, &error) == LAM_OK);
+        pairs_report report;
+        csr G = exchange(&m, 1e-5, 1, &report);
+        if (pieces == 4) ck_assert_double_eq_tol(csr_entry(&G, 0, 1), 0, 1e-12);
+        if (pieces == 3) ck_assert_double_gt(csr_entry(&G, 0, 1), .01);
+        csr_free(&G);
+        mesh_free(&m);
+    }
+}
+END_TEST
+
+/* A floor and a wall that share an edge with a partition across both leave each half with its half. */
+START_TEST(touching_elements_are_exact) {
+    const box_cell floor = {.axis = 2, .level = 0, .from = {0, 0, 0}, .to = {1, 1, 0}},
+                   side = {.axis = 0, .level = 0, .from = {0, 0, 0}, .to = {0, 1, 1}},
+                   partition = {.axis = 1, .level = .5, .from = {0, .5, 0}, .to = {1, .5, 1}},
+                   half_floor = {.axis = 2, .level = 0, .from = {0, 0, 0}, .to = {1, .5, 0}},
+                   half_side = {.axis = 0, .level = 0, .from = {0, 0, 0}, .to = {0, .5, 1}};
+    mesh m = {0}, half = {0};
+    mesh_add_cell(&m, &floor, true);
+    mesh_add_cell(&m, &side, true);
+    mesh_add_cell(&m, &partition, true);
+    mesh_add_cell(&m, &partition, false);
+    mesh_finish(&m, .5f);
+    mesh_add_cell(&half, &half_floor, true);
+    mesh_add_cell(&half, &half_side, true);
+    mesh_finish(&half, .5f);
+    pairs_report report;
+    csr of_half = exchange(&half, 1e-5, 1, &report);
+    for (int a = 0; a < 2; a++) {
+        const double accuracy = a == 0 ? 1e-4 : 1e-5;
+        csr G = exchange(&m, accuracy, 1, &report);
+        ck_assert_double_eq(report.projected, 1);
+        ck_assert_double_eq_tol(csr_entry(&G, 0, 1), 2 * csr_entry(&of_half, 0, 1), accuracy);
+        csr_free(&G);
+    }
+    csr_free(&of_half);
+    mesh_free(&m);
+    mesh_free(&half);
+}
+END_TEST
+
+/* A wall with a square hole between two rooms, as cells about the hole. */
+static void add_wall(mesh *m, double x, bool positive, double hole) {
+    const double lines[6] = {0, .6, 1.5 - hole / 2, 1.5 + hole / 2, 2.4, 3};
+    for (int i = 0; i < 5; i++)
+        for (int j = 0; j < 5; j++) {
+            const box_cell c = {.axis = 0,
+                                .level = x,
+                                .from = {x, lines[i], lines[j]},
+                                .to = {x, lines[i + 1], lines[j + 1]}};
+            if (i != 2 || j != 2) mesh_add_cell(m, &c, positive);
+        }
+}
+
+static void add_other_walls(mesh *m, double from, bool second) {
+    const double size[3] = {3, 3, 3};
+    for (size_t k = 0; k < 6 * 4 * 4; k++) {
+        box_cell c = box_cell_of(size, 4, k);
+        if (c.axis == 0 && (c.level == 0) == second) continue;
+        const bool inward = c.level == 0;
+        c.from[0] += from, c.to[0] += from;
+        if (c.axis == 0) c.level += from;
+        mesh_add_cell(m, &c, inward);
+    }
+}
+
+static double opposed_squares(double a, double c) {
+    if (!(c > 0)) return 1;
+    const double x = a / c, s = sqrt(1 + x * x);
+    return 2 / (M_PI * x * x) *
+           (log(s * s / sqrt(1 + 2 * x * x)) + 2 * x * s * atan(x / s) - 2 * x * atan(x));
+}
+
+/* All the light from one room that reaches the other one passes the hole, or both ends of the reveal: the
+ * exchange of both rooms is hole^2, times F of two opposed squares. Each projected pair errs by a third of
+ * accuracy x area at most. In a thin wall errors of pairs are independent, so that their sum stays within
+ * three times the root of their squares. In a thick one the visible corner of a pair that is nearly hidden
+ * may fall between all points, so that light is lost in each such pair, but none is gained. */
+START_TEST(openings_lose_nothing) {
+    static const double cases[][2] = {{.02, 0}, {.1, 0},  {.5, 0},  {1, 0},
+                                      {.1, .2}, {.2, .2}, {.5, .2}, {1, .2}};
+    const double hole = cases[_i][0], thickness = cases[_i][1], accuracy = 7e-6;
+    mesh m = {0};
+    add_other_walls(&m, 0, false);
+    add_wall(&m, 3, false, hole);
+    const size_t first = m.n;
+    add_other_walls(&m, 3 + thickness, true);
+    add_wall(&m, 3 + thickness, true, hole);
+    const size_t second = m.n;
+    if (thickness > 0) {
+        const double low = 1.5 - hole / 2, high = 1.5 + hole / 2;
+        for (int axis = 1; axis < 3; axis++)
+            for (int end = 0; end < 2; end++) {
+                box_cell c = {.axis = axis,
+                              .level = end == 0 ? low : high,
+                              .from = {3, low, low},
+                              .to = {3 + thickness, high, high}};
+                c.from[axis] = c.to[axis] = c.level;
+                mesh_add_cell(&m, &c, end == 0);
+            }
+    }
+    mesh_finish(&m, .5f);
+    pairs_report report;
+    csr G = exchange(&m, accuracy, 1, &report);
+    double sum = 0, square = 0, all = 0;
+    for (size_t i = 0; i < first; i++)
+        for (size_t j = first; j < second; j++) {
+            const double g = csr_entry(&G, i, j), bound = accuracy / 3 * fmin(m.area[i], m.area[j]);
+            sum += g;
+            if (g > 0) square += bound * bound;
+            all += bound;
+        }
+    const double truth = hole * hole * opposed_squares(hole, thickness);
+    const double gained = 3 * sqrt(square), lost = thickness > 0 ? all : gained;
+    ck_assert_msg(sum - truth <= gained && truth - sum <= fmin(lost, .5 * truth + gained),
+                  "hole %g, wall %g: %g, not %g within %g and %g", hole, thickness, sum, truth, lost, gained);
+    csr_free(&G);
+    mesh_free(&m);
+}
+END_TEST
+
+/* A closed room with a box in it: rows sum to 1, bits are the same for any number of threads, and two seeds
+ * have errors of their own, half of whose distance is about as large as the error of either. */
+START_TEST(closed_room_with_a_box) {
+    const double size[3] = {3, 3, 2}, box[3] = {.9, 1.1, .8};
+    const double accuracy = 1e-4;
+    mesh m = box_mesh(size, 4, .5f);
+    for (size_t k = 0; k < 6 * 2 * 2; k++) {
+        box_cell c = box_cell_of(box, 2, k);
+        const bool outward = c.level != 0;
+        const double move[3] = {.83, .67, .31};
+        for (int d = 0; d < 3; d++) c.from[d] += move[d], c.to[d] += move[d];
+        c.level += move[c.axis];
+        mesh_add_cell(&m, &c, outward);
+    }
+    lam_error error = {0};
+    free(m.area);
+    free(m.normal);
+    m.area = NULL;
+    m.normal = NULL;
+    ck_assert(mesh_measure(&m, &error) == LAM_OK);
+    float *grey = realloc(m.reflectance, m.n * sizeof *grey);
+    ck_assert_ptr_nonnull(grey);
+    for (size_t i = 0; i < m.n; i++) grey[i] = .5f;
+    m.reflectance = grey;
+    pairs_report report;
+    csr G[3], fine = exchange(&m, 1e-6, 9, &report);
+    const int threads = omp_get_max_threads();
+    for (int k = 0; k < 3; k++) {
+        omp_set_num_threads(k == 1 ? 4 : 1);
+        G[k] = exchange(&m, accuracy, k == 2 ? 2 : 1, &report);
+    }
+    omp_set_num_threads(threads);
+    ck_assert_double_gt(report.projected, m.n);
+    ck_assert_double_eq(report.mixed, 0);
+    ck_assert_uint_eq(G[0].indptr[m.n], G[1].indptr[m.n]);
+    ck_assert_mem_eq(G[0].data, G[1].data, G[0].indptr[m.n] * sizeof *G[0].data);
+    double wrong[2] = {0, 0}, apart = 0, worst = 0;
+    for (size_t i = 0; i < m.n; i++)
+        for (size_t j = i + 1; j < m.n; j++) {
+            const double area = fmin(m.area[i], m.area[j]), exact = csr_entry(&fine, i, j) / area;
+            const double one = csr_entry(&G[0], i, j) / area, two = csr_entry(&G[2], i, j) / area;
+            wrong[0] += (one - exact) * (one - exact);
+            wrong[1] += (two - exact) * (two - exact);
+            apart += .25 * (one - two) * (one - two);
+            worst = fmax(worst, fabs(one - exact));
+        }
+    /* The tolerance asked of a pair is a third of the accuracy, by an estimate. */
+    ck_assert_double_le(worst, accuracy);
+    /* Independent errors would have sqrt(1/2); half of that would still warn. */
+    for (int k = 0; k < 2; k++) ck_assert_double_ge(sqrt(apart), .35 * sqrt(wrong[k]));
+    for (size_t i = 0; i < m.n; i++) {
+        double sum = 0;
+        for (size_t j = 0; j < m.n; j++)
+            if (j != i) sum += i < j ? csr_entry(&fine, i, j) : csr_entry(&fine, j, i);
+        /* Each of its pairs within the accuracy. */
+        ck_assert_double_eq_tol(sum / m.area[i], 1, 1e-6 * (double)m.n);
+    }
+    for (int k = 0; k < 3; k++) csr_free(&G[k]);
+    csr_free(&fine);
+    mesh_free(&m);
+}
+END_TEST
+
+/* Joined pieces cover the same area: a grid is one polygon, also where its cells share no vertices, one with
+ * a hole is a few, and a bent one is not joined across the bend. */
+START_TEST(pieces_are_joined) {
+    static const struct {
+        bool hole, bent;
+        size_t most;
+    } cases[] = {{false, false, 1}, {true, false, 8}, {false, true, 2}};
+    for (size_t k = 0; k < 3; k++) {
+        enum { N = 6 };
+        mesh m = {0};
+        lam_error error = {0};
+        double area = 0, joined = 0;
+        for (int i = 0; i < N; i++)
+            for (int j = 0; j < N; j++) {
+                if (cases[k].hole && i >= 2 && i < 4 && j >= 2 && j < 4) continue;
+                double corner[4][3];
+                for (int c = 0; c < 4; c++) {
+                    corner[c][0] = i + (c == 1 || c == 2);
+                    corner[c][1] = j + (c >= 2);
+                    corner[c][2] = cases[k].bent ? fmax(0, corner[c][0] - N / 2) : 0;
+                }
+                mesh_add_quad(&m, (const double(*)[3])corner);
+            }
+        mesh_finish(&m, .5f);
+        visibility *v;
+        joined_occluders o;
+        ck_assert(visibility_create_of_elements(&m, &v, &error) == LAM_OK);
+        ck_assert(joined_occluders_make(&m, visibility_facets(v), visibility_rounding(v), &o, &error) ==
+                  LAM_OK);
+        ck_assert_uint_ge(o.n, 1);
+        ck_assert_uint_le(o.n, cases[k].most);
+        for (size_t e = 0; e < m.n; e++) area += m.area[e];
+        for (size_t p = 0; p < o.n; p++) {
+            double twice[3] = {0};
+            for (int c = 0; c < o.of[p].n; c++) {
+                const double *x = o.of[p].corner[c], *y = o.of[p].corner[(c + 1) % o.of[p].n];
+                for (int d = 0; d < 3; d++)
+                    twice[d] += x[(d + 1) % 3] * y[(d + 2) % 3] - x[(d + 2) % 3] * y[(d + 1) % 3];
+            }
+            for (int d = 0; d < 3; d++) joined += .5 * twice[d] * o.of[p].normal[d];
+        }
+        ck_assert_double_eq_tol(joined, area, 1e-9 * area);
+        joined_occluders_free(&o);
+        visibility_destroy(v);
+        mesh_free(&m);
+    }
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("projection");
+    TCase *cases = tcase_create("projection");
+    tcase_set_timeout(cases, 300);
+    tcase_add_loop_test(cases, cut_is_brute_subdivision, 0, 4);
+    tcase_add_loop_test(cases, occluded_plates_are_exact, 0, sizeof plates_places / sizeof *plates_places);
+    tcase_add_test(cases, pieces_leave_no_crack);
+    tcase_add_test(cases, touching_elements_are_exact);
+    tcase_add_loop_test(cases, openings_lose_nothing, 0, 8);
+    tcase_add_test(cases, closed_room_with_a_box);
+    tcase_add_test(cases, pieces_are_joined);
+    suite_add_tcase(suite, cases);
+    return suite_run(suite);
+}
