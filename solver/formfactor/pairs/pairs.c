@@ -34,7 +34,7 @@ typedef struct pairs_run {
 typedef struct reach {
     uint32_t first, last;
     bool open;
-    uint32_t among; /* its occluders in leaf_reaches, where it is not open */
+    uint32_t among; /* its occluders in leaf_reaches, where it is not open and pairs are projected */
 } reach;
 
 /* All the partners of a leaf; room that is used again for the next one. */
@@ -57,8 +57,6 @@ static bool add_occluders(const pairs_run *run, const cluster *a, const cluster 
         LAM_OK)
         return false;
     one = &out->among[out->n_among++];
-    one->count = OCCLUDERS_UNCOUNTED;
-    if (!run->projects) return true;
     shaft s;
     shaft_init(&s, a, b, run->few.occluders.slack);
     joined_occluders_between(&run->few.occluders, &s, a, b, one);
@@ -77,7 +75,8 @@ static bool find_reaches(const pairs_run *run, uint32_t leaf, leaf_reaches *out)
             const cluster_link *link = &run->links.links[k];
             const cluster *b = &run->tree.clusters[link->b];
             out->reaches[out->n++] = (reach){b->first, b->last, link->open, (uint32_t)out->n_among};
-            if (!link->open && !add_occluders(run, &run->tree.clusters[c], b, out)) return false;
+            if (!link->open && run->projects && !add_occluders(run, &run->tree.clusters[c], b, out))
+                return false;
         }
         if (c == 0) break;
     }
@@ -91,10 +90,11 @@ static double factor_of(const pairs_run *run, uint32_t i, uint32_t j, double g) 
     return 2 * g / (run->m->area[i] + run->m->area[j]);
 }
 
-/* Settles a pair with few occluders by projection: g becomes its visible part. PAIR_UNKNOWN: it has more. */
+/* Settles a pair with few occluders by projection: g becomes its visible part. PAIR_UNKNOWN: it has more.
+ * among: NULL where none is projected. */
 static int project(const pairs_run *run, uint32_t i, uint32_t j, const link_occluders *among, double *g) {
     double share = 1, work = 0;
-    if (!run->projects) return PAIR_UNKNOWN;
+    if (among == NULL) return PAIR_UNKNOWN;
     const double tolerance = few_occluders_tolerance(&run->few, i, j, *g, run->options->accuracy);
     const few_verdict found = few_occluders_share(&run->few, among, i, j, tolerance, &share, &work);
     *g *= share;
@@ -125,6 +125,7 @@ static bool find_row(const pairs_run *run, uint32_t position, const leaf_reaches
     const uint32_t i = run->tree.element[position];
     for (size_t k = 0; k < to->n; k++) {
         const reach *r = &to->reaches[k];
+        const link_occluders *among = !r->open && run->projects ? &to->among[r->among] : NULL;
         const uint32_t begin = r->first > position ? r->first : position + 1;
         for (uint32_t first = begin; first < r->last; first += PIECE) {
             double exchange[PIECE];
@@ -138,7 +139,7 @@ static bool find_row(const pairs_run *run, uint32_t position, const leaf_reaches
                     g = pair_factor_exchange(&run->rules, &run->polygons[i], &run->polygons[j],
                                              run->options->tolerance);
                 if (!((float)g > 0) || factor_of(run, i, j, g) < run->options->threshold) continue;
-                const int state = r->open ? PAIR_CERTAIN : look_at(run, i, j, &to->among[r->among], &g);
+                const int state = r->open ? PAIR_CERTAIN : look_at(run, i, j, among, &g);
                 pair_block_add(block, first + c, (float)g, (uint8_t)state);
             }
         }
