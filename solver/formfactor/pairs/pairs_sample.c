@@ -188,7 +188,7 @@ done:
  * Cornell boxes, a maze, rooms, a canopy and a part of a town (12,541 triangles). */
 static const double shaft_seconds = 5e-7, candidate_seconds = 8e-8, hidden_seconds = 5e-5,
                     tried_seconds = 5e-8, close_seconds = 3e-6, test_seconds = 9e-7, segment_seconds = 1.1e-7,
-                    sift_seconds = 2e-6, projection_seconds = 7e-8, entry_seconds = 1e-7, ray_seconds = 1e-7;
+                    sift_seconds = 1e-6, projection_seconds = 7e-8, entry_seconds = 1e-7, ray_seconds = 1e-7;
 
 /* Entries of the triangle per ray: many hit what others hit. */
 static const double ray_entries = .3;
