@@ -104,7 +104,7 @@ static build_problem problem_of_blocks(const box *b) {
     return problem;
 }
 
-/* Errors against blocks of a quarter of the bound, for either operator. */
+/* Errors against blocks of half the bound, for either operator. */
 static lam_status judge(const bench_run *run, const box *b, const lam_operator *op, error_report *out,
                         lam_error *error) {
     const build_problem problem = problem_of_blocks(b);
@@ -112,7 +112,7 @@ static lam_status judge(const bench_run *run, const box *b, const lam_operator *
                  .order = b->s.z_order,
                  .problem = &problem,
                  .f = &b->about,
-                 .stages = {"blocks for the judge, 1 of 2", "blocks for the judge, 2 of 2"},
+                 .stages = {"blocks for the judge", ""},
                  .probes_seed = run->seed,
                  .probes = run->scale == BENCH_QUICK ? PROBES_QUICK : PROBES,
                  .progress = run->progress};
@@ -190,7 +190,7 @@ static lam_status add_blocks(const bench_run *run, box *b, grown *before, table 
                                      .stage = "blocks"};
     const double before_it = lowrank_begin_peak(), started = clock_seconds();
     TRY(form_factors_tree(&b->s.m, &b->tree, error));
-    TRY(form_factors_make_blocks(&b->s.m, b->s.z_order, &b->tree, false, &how, &b->about, &b->blocks, error));
+    TRY(form_factors_make_blocks(&b->s.m, b->s.z_order, &b->tree, NULL, &how, &b->about, &b->blocks, error));
     c.form_factors_s = clock_seconds() - started;
     const build_problem problem = problem_of_blocks(b);
     TRY(build(run, &problem, &op, &c.built, error));

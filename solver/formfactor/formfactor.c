@@ -36,34 +36,6 @@ lam_status form_factors_gather(form_factors *f, const double *area, lam_error *e
     return upper_gather(&f->upper, area, error);
 }
 
-lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_factors *out,
-                             lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = a->F.n;
-    form_factors f = *a;
-    f.F = (csr){.n = n};
-    f.upper = (csr){0};
-    f.row_sums = f.leaving = f.absorbed = f.repair = NULL;
-    f.sky = (sky_bounce){0};
-    f.recipe.rays = a->recipe.rays + b->recipe.rays;
-    f.row_sums = memory_allocate(n, sizeof *f.row_sums, "form factors", error);
-    f.leaving = memory_allocate(n, sizeof *f.leaving, "form factors", error);
-    f.absorbed = memory_allocate(n, sizeof *f.absorbed, "form factors", error);
-    if (f.row_sums == NULL || f.leaving == NULL || f.absorbed == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(csr_combine(&a->F, .5f, &b->F, .5f, &f.F, error));
-#pragma omp parallel for schedule(static, 64)
-    for (size_t i = 0; i < n; i++) {
-        for (uint64_t p = f.F.indptr[i]; p < f.F.indptr[i + 1]; p++) f.row_sums[i] += (double)f.F.data[p];
-        f.leaving[i] = .5 * (a->leaving[i] + b->leaving[i]);
-        f.absorbed[i] = .5 * (a->absorbed[i] + b->absorbed[i]);
-    }
-    *out = f;
-    f = (form_factors){0};
-done:
-    form_factors_free(&f);
-    return status;
-}
-
 lam_status form_factors_save_about(const form_factors *f, size_t n, const char *storage, store *s,
                                    lam_error *error) {
     lam_status status = LAM_OK;

@@ -46,8 +46,8 @@ typedef struct form_factors {
     double *row_sums; /* [n], of F after repair, <= 1 */
     double *leaving;  /* [n], share of an element's rays that left the scene */
     double *absorbed; /* [n], share that hit a back face */
-    double *repair; /* [n], row sum + outside share - 1 before repair; NULL for a mean and for older stores */
-    sky_bounce sky; /* zero without a sky */
+    double *repair;   /* [n], row sum + outside share - 1 before repair; NULL for older stores */
+    sky_bounce sky;   /* zero without a sky */
     recipe recipe;
     size_t rows_kept;     /* rows that an interrupted run had left in the scratch folder */
     pairs_report pairs;   /* of recipes with pairs, when just made */
@@ -109,15 +109,17 @@ lam_status form_factors_tree(const mesh *m, plane_tree *out, lam_error *error);
 
 /* The same by blocks of clusters (RECIPE_BLOCKS) on a tree of the elements with leaves of PLANE_LEAF, which
  * must outlive blocks: these hold the form factors, freed by block_factors_free, and out all but rows. In a
- * closed scene their balance gives rows the sum 1, in others it keeps sums at most 1. judge: visible shares
- * come from the whole scene by Embree, so that a judge shares nothing with those of single occluders but the
- * proofs that nothing, or one piece, stands between. With a sky, recipe.rays of an element find its share of
- * each tile, and what the blocks leave of its row is distributed so. No scratch folder. Cost: about a
- * microsecond for each of some n^1/2 blocks, and n recipe.rays rays. Errors: LAM_ERR_ARGUMENT,
- * LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
-lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const plane_tree *tree, bool judge,
-                                    const form_factor_options *options, form_factors *out,
-                                    block_factors *blocks, lam_error *error);
+ * closed scene their balance gives rows the sum 1, in others it keeps sums at most 1. With a sky,
+ * recipe.rays of an element find its share of each tile, and what the blocks leave of its row is distributed
+ * so. judged: those that the blocks are to judge, or NULL. Visible shares then come from the whole scene by
+ * Embree, so that a judge shares nothing with those of single occluders but the proofs that nothing, or one
+ * piece, stands between; that the scene is closed is taken from judged, and no ray is cast for it; out has
+ * neither leaving nor absorbed, nor a sky. No scratch folder. Cost: about a microsecond for each of some
+ * n^1/2 blocks, and without judged n recipe.rays rays. Errors: LAM_ERR_ARGUMENT, LAM_ERR_MEMORY,
+ * LAM_ERR_CANCELLED. */
+lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const plane_tree *tree,
+                                    const form_factors *judged, const form_factor_options *options,
+                                    form_factors *out, block_factors *blocks, lam_error *error);
 
 void form_factors_free(form_factors *f);
 
@@ -139,11 +141,6 @@ lam_status form_factors_ray_rate(const mesh *m, const uint32_t *order, double *r
  * LAM_ERR_ARGUMENT for another recipe, LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
 lam_status form_factors_count_seen(const mesh *m, const recipe *how, const uint32_t *elements, size_t count,
                                    const progress *steps, const char *stage, size_t *seen, lam_error *error);
-
-/* The mean of the rows of two independent samples of the same mesh, without a sky: a reference with half the
- * variance. */
-lam_status form_factors_mean(const form_factors *a, const form_factors *b, form_factors *out,
-                             lam_error *error);
 
 /* /form_factors of a store, rows or the upper triangle as they are; sky_bounce_save and sky_bounce_load
  * handle /sky. large as above. */

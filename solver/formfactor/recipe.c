@@ -139,7 +139,7 @@ double recipe_noise(const recipe *r) {
 }
 
 /* Blocks of the judge: errors fall as the square root of this, or faster. */
-static const double judge_share = .25;
+static const double judge_share = .5;
 
 recipe recipe_of_judge(const recipe *judged, size_t rays_beside_hemicubes, uint64_t seed) {
     recipe r = *judged;
@@ -147,6 +147,8 @@ recipe recipe_of_judge(const recipe *judged, size_t rays_beside_hemicubes, uint6
     const bool few = r.method == RECIPE_PAIRS || r.method == RECIPE_BLOCKS;
     if (few && r.rays > RECIPE_RAYS_FEW) r.rays = RECIPE_RAYS_FEW;
     if (r.method == RECIPE_BLOCKS) r.accuracy *= judge_share;
+    const bool noisy = judged->method == RECIPE_RAYS || judged->method == RECIPE_NEAR_PAIRS;
+    if (noisy && r.rays > 1) r.rays /= 2;
     r.seed = seed;
     return r;
 }

@@ -78,7 +78,7 @@ double recipe_noise(const recipe *r);
 /* The recipe of the independent sample that another one is judged by: the same with another seed, which also
  * moves the points of the cubature of projected pairs (projection.h). For hemicubes, which would only repeat
  * themselves, it is rays; for pairs and blocks it omits the rays that only a sky needs; of blocks it asks for
- * a quarter of the error. */
+ * half of the error; of rays it is one of two, of half the rays each. */
 recipe recipe_of_judge(const recipe *judged, size_t rays_beside_hemicubes, uint64_t seed);
 
 #endif

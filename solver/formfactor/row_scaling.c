@@ -16,6 +16,10 @@ enum { STEPS = 5, MAX_STEPS = 60, GROWTH_MOST = 4 };
 /* Added to the unit diagonal of the normal equations, which nearly parallel steps make singular. */
 static const double alike = 1e-11;
 
+static double tolerance_of(const row_scaling *c) {
+    return c->tolerance > 0 ? c->tolerance : sweep_tolerance;
+}
+
 static lam_status measure(row_scaling *c, lam_error *error) {
     const lam_status status = c->sums(c->context, c->d, c->r, error);
     c->products++;
@@ -30,7 +34,7 @@ static lam_status measure(row_scaling *c, lam_error *error) {
 static lam_status sweep(row_scaling *c, lam_error *error) {
     lam_status status = LAM_OK;
     TRY(measure(c, error));
-    for (int count = 0; count < c->sweeps_most && c->worst > sweep_tolerance; count++) {
+    for (int count = 0; count < c->sweeps_most && c->worst > tolerance_of(c); count++) {
         for (size_t i = 0; i < c->n; i++)
             if (c->r[i] > 0) c->d[i] *= sqrt(c->area[i] / c->r[i]);
         TRY(measure(c, error));
@@ -103,7 +107,7 @@ static lam_status extrapolate(row_scaling *c, double *before, bool *settled, lam
     TRY(measure(c, error));
     memcpy(before, c->r, n * sizeof *before);
     for (int count = 0; count < MAX_STEPS; count++) {
-        *settled = c->worst <= sweep_tolerance;
+        *settled = c->worst <= tolerance_of(c);
         if (*settled || c->worst > GROWTH_MOST * least) break;
         least = fmin(least, c->worst);
         double *dx = h.dx[h.next], *df = h.df[h.next], gamma[STEPS];

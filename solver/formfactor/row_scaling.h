@@ -17,15 +17,16 @@ typedef struct row_scaling {
     const double *area; /* [n] */
     row_sums_of *sums;
     void *context;
-    int sweeps_most; /* without extrapolation, where that does not settle */
-    double *d, *r;   /* [n], of the caller */
+    int sweeps_most;  /* without extrapolation, where that does not settle */
+    double tolerance; /* of r_i / A_i; 0: 2e-8 */
+    double *d, *r;    /* [n], of the caller */
     double worst;
     size_t products; /* calls of sums */
 } row_scaling;
 
-/* Finds d with r_i = A_i to 2e-8. Where no scaling closes every row, rows with r_i > A_i are scaled down, and
- * their pairs with them. before [n] receives the row sums of d = 1. Cost: about 15 products in closed rooms.
- * Errors: LAM_ERR_MEMORY, and those of sums. */
+/* Finds d with r_i = A_i to the tolerance. Where no scaling closes every row, rows with r_i > A_i are scaled
+ * down, and their pairs with them. before [n] receives the row sums of d = 1. Cost: about 15 products in
+ * closed rooms. Errors: LAM_ERR_MEMORY, and those of sums. */
 lam_status row_scaling_settle(row_scaling *c, double *before, lam_error *error);
 
 #endif

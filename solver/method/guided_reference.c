@@ -8,13 +8,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A correction is the error that is judged: of this share of it nothing is printed. */
-static const double correction_tolerance = 1e-4;
+/* A correction is the error that is judged: figures have three digits, of which noise leaves two. */
+static const double correction_tolerance = 2e-3;
 /* A guide whose steps shrink less than this is of no use. */
 static const double rate_most = .5;
 /* Columns, of a probe and a channel, that are solved together: a whole number of probes, and of panels of
  * blocks. */
-enum { COLUMNS = 16, PROBES_LEAST = 8 };
+enum { COLUMNS = 24, PROBES_LEAST = 8 };
 /* The same of one channel without a guide. */
 enum { ALONE = 32 };
 
@@ -273,8 +273,6 @@ static lam_status each_guided(const reference_system *s, const reference_answers
         TRY(guided_reference_correct(s, some.count, b.r, b.X, correction_tolerance, &guide, a->progress,
                                      error));
         for (size_t k = 0; k < some.count * C; k++) visit(context, which[first + k / C], k % C, b.X + k * n);
-        progress_report(a->progress, "judge",
-                        a->begin + (a->end - a->begin) * (double)(first + some.count) / (double)m);
     }
 done:
     operator_guide_free(&of);
@@ -303,12 +301,16 @@ static lam_status each_alone(const reference_system *s, const reference_answers 
         }
         reference_destroy(one);
         one = NULL;
-        progress_report(a->progress, "judge", a->begin + (a->end - a->begin) * (double)(c + 1) / (double)C);
     }
 done:
     reference_destroy(one);
     batch_free(&b);
     return status;
+}
+
+bool guided_reference_is_dense(const reference_system *s, const lam_operator *op, size_t m) {
+    const bool may_guide = lam_operator_emitters(op) == 0;
+    return reference_choose(s->F, s->area, s->reflectance, m, may_guide) == REFERENCE_DENSE;
 }
 
 lam_status guided_reference_each(const reference_system *s, const reference_answers *a, size_t m,

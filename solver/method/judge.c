@@ -1,176 +1,164 @@
 #include "solver/method/judge.h"
 
 #include "solver/base/clock.h"
-#include "solver/base/random.h"
 #include "solver/method/guided_reference.h"
-#include "solver/operator/emitters.h"
+#include "solver/method/judge_probes.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* Indirect light below this share of all light counts as none: no ray found what the element sees, and the
  * rest is the remainder of the reference's iteration. */
 static const double dark = 1e-6;
+/* Probes of a group are enough where the standard error of their mean is below this share of it. */
+static const double certain = .1;
+/* Noise below this share of a figure may be taken out of it. */
+static const double noise_most = 1. / 3;
+/* Random emissions are all alike. Where the references are no twins the noise is measured by some of the
+ * first round: random emission, the lights, and some single elements. */
+enum { RANDOM_LEAST = 4, NOISE_PROBES = 8 };
 
-enum { SINGLE, LIGHTS, RANDOM, N_GROUPS };
+/* Figures of a group so far: sums of x, of x^2 in std, and the largest. */
+typedef struct tally {
+    error_figures relative, indirect;
+    size_t bright, lit;
+} tally;
 
-/* Emissions E with the operator's radiosity, both [m][C][n], and the sums of each. Group g has
- * probes begin[g] ... begin[g + 1] - 1. */
-typedef struct probes {
-    size_t m;
-    size_t begin[N_GROUPS + 1];
-    float *E, *B;
-    float *W, *H0; /* [m][C][s], [m][C][n]: of an operator of emitters, else NULL */
-    double *B_norm, *indirect_norm, *error_norm; /* [m] squares, area-weighted, channels stacked */
-    double *first; /* [m][C][n], the light H that E itself gives, where known; NULL: of none */
-    bool *known;   /* [m] */
-} probes;
+/* Of a group: figures with the noise in them, and means of squares over the indirect light, of all lit probes
+ * and of those whose other correction is known. */
+typedef struct group_tally {
+    size_t done, n_operator, n_coarse;
+    tally own, total;
+    double error, noise, variance, coarse; /* sums of those of squares; the variance over indirect^2 */
+} group_tally;
 
-static void probes_free(probes *p) {
-    free(p->E);
-    free(p->W);
-    free(p->H0);
-    free(p->B);
-    free(p->B_norm);
-    free(p->indirect_norm);
-    free(p->error_norm);
-    free(p->first);
-    free(p->known);
-    *p = (probes){0};
+/* Squares, area-weighted, channels stacked. */
+typedef struct squares {
+    double B, indirect, error; /* |B|^2, |B - E|^2, |x|^2 */
+    double noise, variance;    /* |t|^2, sum 4 (A x t)^2 */
+    double coarse;             /* |other_share (x - y)|^2 of the coarser reference */
+} squares;
+
+/* The emissions of a round, their first light H and its spread D, [m][C][n], and corrections by each
+ * reference. */
+typedef struct measured {
+    const judge_input *input;
+    bool at_once; /* these are all */
+    probes p;
+    double *first, *spread;
+    bool *known;
+    double *x, *y; /* y: by the other reference; NULL: of none */
+} measured;
+
+static void measured_free(measured *m) {
+    probes_free(&m->p);
+    free(m->first);
+    free(m->spread);
+    free(m->known);
+    free(m->x);
+    free(m->y);
 }
 
-static lam_status probes_init(probes *p, const size_t counts[N_GROUPS], const build_problem *problem,
-                              lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t vector = problem->n * problem->n_channels;
-    *p = (probes){0};
-    for (int g = 0; g < N_GROUPS; g++) p->begin[g + 1] = p->begin[g] + counts[g];
-    const size_t m = p->m = p->begin[N_GROUPS];
-    p->E = memory_allocate(m, vector * sizeof *p->E, "probes", error);
-    p->B = memory_allocate(m, vector * sizeof *p->B, "probes", error);
-    p->B_norm = memory_allocate(m, sizeof *p->B_norm, "probes", error);
-    p->indirect_norm = memory_allocate(m, sizeof *p->indirect_norm, "probes", error);
-    p->error_norm = memory_allocate(m, sizeof *p->error_norm, "probes", error);
-    if (p->E == NULL || p->B == NULL || p->B_norm == NULL || p->indirect_norm == NULL ||
-        p->error_norm == NULL)
-        TRY(LAM_ERR_MEMORY);
-done:
-    if (status != LAM_OK) probes_free(p);
-    return status;
-}
-
-/* One bright element a probe, drawn without repetition. */
-static lam_status single_emissions(const build_problem *problem, uint64_t seed, probes *p, lam_error *error) {
-    const size_t n = problem->n;
-    uint32_t *deck = memory_allocate(n, sizeof *deck, "probes", error);
-    if (deck == NULL) return LAM_ERR_MEMORY;
-    for (size_t i = 0; i < n; i++) deck[i] = (uint32_t)i;
-    for (size_t v = 0; v < p->begin[LIGHTS]; v++) {
-        const size_t other = v + (size_t)(random_unit(&seed) * (double)(n - v));
-        const uint32_t element = deck[other];
-        deck[other] = deck[v];
-        for (size_t c = 0; c < problem->n_channels; c++)
-            p->E[(v * problem->n_channels + c) * n + element] = 1;
-    }
-    free(deck);
-    return LAM_OK;
-}
-
-static void random_emissions(const build_problem *problem, uint64_t seed, probes *p) {
-    const size_t vector = problem->n_channels * problem->n;
-    for (size_t i = p->begin[RANDOM] * vector; i < p->m * vector; i++) p->E[i] = (float)random_unit(&seed);
-}
-
-/* out = quantity of the operator for every probe, a few at a time. */
-static lam_status apply(const lam_operator *op, const probes *p, lam_quantity quantity, float *out,
-                        lam_error *error) {
-    enum { AT_ONCE = 16 };
-    lam_status status = LAM_OK;
-    const size_t vector = lam_operator_elements(op) * lam_operator_channels(op);
-    const size_t n_batches = (p->m + AT_ONCE - 1) / AT_ONCE;
-    const size_t bytes = lam_operator_work_bytes(op, AT_ONCE);
-#pragma omp parallel for schedule(dynamic, 1)
-    for (size_t b = 0; b < n_batches; b++) {
-        const size_t first = b * AT_ONCE, count = p->m - first < AT_ONCE ? p->m - first : AT_ONCE;
-        lam_error one = {0};
-        void *work = memory_allocate(1, bytes, "work area", &one);
-        lam_status result = LAM_ERR_MEMORY;
-        if (work != NULL && p->W != NULL)
-            result = lam_operator_apply_emitters(
-                op, count, quantity, p->W + first * lam_operator_emitters(op) * lam_operator_channels(op), 0,
-                NULL, out + first * vector, work, bytes, &one);
-        else if (work != NULL)
-            result = lam_operator_apply(op, count, quantity, p->E + first * vector, out + first * vector,
-                                        work, bytes, &one);
-        free(work);
-        if (result != LAM_OK) {
-#pragma omp critical(judge_apply)
-            {
-                status = result;
-                if (error != NULL) *error = one;
-            }
-        }
-    }
-    return status;
+static size_t vector_of(const judge_input *input) {
+    return input->problem->n * input->problem->n_channels;
 }
 
 /* Computes the first light H of the probes in which few elements emit. */
-static lam_status find_first_light(const judge_input *input, probes *p, lam_error *error) {
+static lam_status find_first_light(measured *m, lam_error *error) {
     lam_status status = LAM_OK;
+    const judge_input *input = m->input;
     const size_t n = input->problem->n, C = input->problem->n_channels;
-    if (input->first_light == NULL || p->W != NULL) return LAM_OK;
-    p->first = memory_allocate(p->m, C * n * sizeof *p->first, "probes", error);
-    p->known = memory_allocate(p->m, sizeof *p->known, "probes", error);
-    if (p->first == NULL || p->known == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t v = 0; v < p->begin[RANDOM]; v++)
+    if (input->first_light == NULL || m->p.W != NULL) return LAM_OK;
+    m->first = memory_allocate(m->p.m, C * n * sizeof *m->first, "probes", error);
+    m->spread = memory_allocate(m->p.m, C * n * sizeof *m->spread, "probes", error);
+    m->known = memory_allocate(m->p.m, sizeof *m->known, "probes", error);
+    if (m->first == NULL || m->spread == NULL || m->known == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t v = m->p.begin[JUDGE_LIGHTS]; v < m->p.m; v++) {
+        if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         for (size_t c = 0; c < C; c++) {
-            const float *E = p->E + v * C * n;
-            double *H = p->first + v * C * n;
+            const float *E = m->p.E + v * C * n;
+            double *H = m->first + v * C * n, *D = m->spread + v * C * n;
             if (c > 0 && memcmp(E, E + c * n, n * sizeof *E) == 0) {
                 memcpy(H + c * n, H, n * sizeof *H);
+                memcpy(D + c * n, D, n * sizeof *D);
                 continue;
             }
-            TRY(input->first_light(input->first_light_context, E + c * n, H + c * n, &p->known[v], error));
-            if (!p->known[v]) break;
+            TRY(input->first_light(input->first_light_context, E + c * n, H + c * n, D + c * n, &m->known[v],
+                                   error));
+            if (!m->known[v]) break;
         }
+    }
 done:
     return status;
 }
 
-/* The corrections of some probes, kept: [m][C][n]. */
-typedef struct kept_corrections {
-    size_t m;
-    const size_t *which; /* [m], ascending */
-    double *x;           /* NULL: none are kept */
-} kept_corrections;
-
-static void keep(const kept_corrections *to, const build_problem *problem, size_t v, size_t channel,
-                 const double *x) {
-    const size_t n = problem->n;
-    if (to->x == NULL) return;
-    for (size_t k = 0; k < to->m; k++)
-        if (to->which[k] == v) memcpy(to->x + (k * problem->n_channels + channel) * n, x, n * sizeof *x);
+static reference_system system_of(const judge_input *input, const factor_product *F) {
+    const build_problem *problem = input->problem;
+    return (reference_system){problem->n, problem->n_channels, F, problem->area, problem->reflectance};
 }
 
-typedef struct comparison {
-    const build_problem *problem;
-    probes *p;
-    const kept_corrections *kept;
-} comparison;
+typedef struct corrections {
+    const judge_input *input;
+    double *x; /* [m][C][n] */
+} corrections;
 
-/* Adds one channel to |B|^2, |B - E|^2 and |B~ - B|^2 of a probe. */
-static void compare(void *context, size_t v, size_t channel, const double *x) {
-    const comparison *c = context;
-    const size_t n = c->problem->n, at = (v * c->problem->n_channels + channel) * n;
+static void keep(void *context, size_t v, size_t channel, const double *x) {
+    const corrections *to = context;
+    const size_t n = to->input->problem->n, C = to->input->problem->n_channels;
+    memcpy(to->x + (v * C + channel) * n, x, n * sizeof *x);
+}
+
+/* x [m][C][n]: corrections of the first m answers by F; first: with the first light that is known. */
+static lam_status solve(const lam_operator *op, const measured *m, const factor_product *F, bool first,
+                        size_t count, double *x, lam_error *error) {
+    lam_status status = LAM_OK;
+    const reference_system system = system_of(m->input, F);
+    const reference_answers answers = {.op = op,
+                                       .E = m->p.E,
+                                       .B = m->p.B,
+                                       .first = first ? m->first : NULL,
+                                       .known = m->known,
+                                       .progress = m->input->progress};
+    corrections to = {m->input, x};
+    size_t *all = memory_allocate(count, sizeof *all, "probes", error);
+    if (all == NULL) return LAM_ERR_MEMORY;
+    for (size_t v = 0; v < count; v++) all[v] = v;
+    TRY(guided_reference_each(&system, &answers, count, all, keep, &to, error));
+done:
+    free(all);
+    return status;
+}
+
+/* Of probe v by correction x, or by x and y together where there are two, which are twins or not. */
+static squares squares_of(const measured *m, size_t v, const double *x, const double *y, bool total) {
+    const judge_input *input = m->input;
+    const build_problem *problem = input->problem;
+    const size_t n = problem->n, C = problem->n_channels, first = v * C * n;
+    const bool twins = y != NULL && input->twins, spread = total && m->known != NULL && m->known[v];
+    squares s = {.B = 0};
     for (size_t i = 0; i < n; i++) {
-        const double b = (double)c->p->B[at + i] + x[i], a = c->problem->area[i];
-        c->p->B_norm[v] += a * b * b;
-        c->p->indirect_norm[v] += a * (b - (double)c->p->E[at + i]) * (b - (double)c->p->E[at + i]);
-        c->p->error_norm[v] += a * x[i] * x[i];
+        const double a = problem->area[i];
+        double product = 0;
+        for (size_t c = 0; c < C; c++) {
+            const size_t k = c * n + i, at = first + k;
+            const double off = twins ? .5 * (x[at] + y[at]) : x[at], b = (double)m->p.B[at] + off,
+                         bounced = b - (double)m->p.E[at];
+            const double half = twins ? .5 * (x[at] - y[at]) : 0;
+            const double light = spread ? (double)problem->reflectance[k] * m->spread[at] : 0;
+            const double t2 = half * half + light * light;
+            s.B += a * b * b;
+            s.indirect += a * bounced * bounced;
+            s.error += a * off * off;
+            s.noise += a * t2;
+            if (y != NULL && !twins) s.coarse += a * (x[at] - y[at]) * (x[at] - y[at]);
+            /* Channels share the geometry, and so the noise. */
+            product += a * fabs(off) * sqrt(t2);
+        }
+        s.variance += 4 * product * product;
     }
-    keep(c->kept, c->problem, v, channel, x);
+    s.coarse *= input->other_share * input->other_share;
+    return s;
 }
 
 static void add_figure(error_figures *f, double x) {
@@ -179,160 +167,71 @@ static void add_figure(error_figures *f, double x) {
     f->max = fmax(f->max, x);
 }
 
-static void finish_figure(error_figures *f, size_t count) {
-    if (count == 0) return;
-    f->mean /= (double)count;
-    f->std = sqrt(fmax(0, f->std / (double)count - f->mean * f->mean));
+/* An element that nothing sees has no indirect light to be wrong about. */
+static bool is_lit(const squares *s) {
+    return s->indirect > dark * dark * s->B;
 }
 
-static reference_system system_of(const build_problem *problem, const factor_product *F) {
-    return (reference_system){problem->n, problem->n_channels, F, problem->area, problem->reflectance};
-}
-
-/* total: with the first light that is known. */
-static reference_answers answers_of(const lam_operator *op, const judge_input *input, const probes *p,
-                                    bool total, double begin, double end) {
-    return (reference_answers){.op = op,
-                               .E = p->E,
-                               .B = p->B,
-                               .first = total ? p->first : NULL,
-                               .known = p->known,
-                               .progress = input->progress,
-                               .begin = begin,
-                               .end = end};
-}
-
-/* Relative and indirect figures of each group against one F: those of the total error, or of the operator's.
- */
-static lam_status figures_against(const lam_operator *op, const judge_input *input, const factor_product *F,
-                                  probes *p, bool total, const kept_corrections *kept,
-                                  error_group *groups[N_GROUPS], lam_error *error) {
-    lam_status status = LAM_OK;
-    comparison c = {input->problem, p, kept};
-    const double share = input->independent.n == 0 ? 1 : 1. / 3;
-    const reference_system system = system_of(input->problem, F);
-    const reference_answers answers =
-        answers_of(op, input, p, total, total ? share : 0, total ? 2 * share : share);
-    size_t *all = memory_allocate(p->m, sizeof *all, "probes", error);
-    if (all == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t v = 0; v < p->m; v++) all[v] = v;
-    memset(p->B_norm, 0, p->m * sizeof *p->B_norm);
-    memset(p->indirect_norm, 0, p->m * sizeof *p->indirect_norm);
-    memset(p->error_norm, 0, p->m * sizeof *p->error_norm);
-    TRY(guided_reference_each(&system, &answers, p->m, all, compare, &c, error));
-    for (int g = 0; g < N_GROUPS; g++) {
-        error_figures *relative = total ? &groups[g]->total_relative : &groups[g]->operator_relative;
-        error_figures *indirect = total ? &groups[g]->total_indirect : &groups[g]->operator_indirect;
-        size_t bright = 0, lit = 0;
-        for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
-            if (p->B_norm[v] > 0) {
-                add_figure(relative, sqrt(p->error_norm[v] / p->B_norm[v]));
-                bright++;
-            }
-            /* An element that nothing sees has no indirect light to be wrong about. */
-            if (p->indirect_norm[v] > dark * dark * p->B_norm[v]) {
-                add_figure(indirect, sqrt(p->error_norm[v] / p->indirect_norm[v]));
-                lit++;
-            }
-        }
-        finish_figure(relative, bright);
-        finish_figure(indirect, lit);
+static void add_squares(tally *t, const squares *s) {
+    if (s->B > 0) {
+        add_figure(&t->relative, sqrt(s->error / s->B));
+        t->bright++;
     }
-done:
-    free(all);
-    return status;
-}
-
-typedef struct half_corrections {
-    const build_problem *problem;
-    kept_corrections kept;
-} half_corrections;
-
-static void keep_half(void *context, size_t v, size_t channel, const double *x) {
-    const half_corrections *h = context;
-    keep(&h->kept, h->problem, v, channel, x);
-}
-
-/* Half the distance between the halves' solutions B~ + x, over the indirect light: the standard error of
- * their mean; negative where there is no indirect light. */
-static double half_distance(const build_problem *problem, const float *E, const float *B, const double *x,
-                            const double *y) {
-    double difference = 0, indirect = 0, all = 0;
-    for (size_t i = 0; i < problem->n_channels * problem->n; i++) {
-        const double a = problem->area[i % problem->n], mean = (double)B[i] + .5 * (x[i] + y[i]);
-        difference += a * .25 * (x[i] - y[i]) * (x[i] - y[i]);
-        indirect += a * (mean - (double)E[i]) * (mean - (double)E[i]);
-        all += a * mean * mean;
+    if (is_lit(s)) {
+        add_figure(&t->indirect, sqrt(s->error / s->indirect));
+        t->lit++;
     }
-    return indirect > dark * dark * all ? sqrt(difference / indirect) : -1;
 }
 
-/* Of each group some probes: their numbers, for [N_GROUPS * JUDGE_NOISE_PROBES]. */
-static size_t noise_probes(const probes *p, size_t *which) {
-    size_t m = 0;
-    for (int g = 0; g < N_GROUPS; g++)
-        for (size_t v = p->begin[g]; v < p->begin[g + 1] && v < p->begin[g] + JUDGE_NOISE_PROBES; v++)
-            which[m++] = v;
-    return m;
+/* scale: of all figures. */
+static error_figures finished(const error_figures *f, size_t count, double scale) {
+    if (count == 0) return (error_figures){.mean = 0};
+    const double mean = f->mean / (double)count, square = f->std / (double)count;
+    return (error_figures){scale * mean, scale * sqrt(fmax(0, square - mean * mean)), scale * f->max};
 }
 
-/* known: the corrections of these probes by `independent`. */
-static lam_status measure_noise(const lam_operator *op, const judge_input *input, const probes *p,
-                                const kept_corrections *known, error_group *groups[N_GROUPS],
-                                lam_error *error) {
-    lam_status status = LAM_OK;
-    const build_problem *problem = input->problem;
-    const size_t vector = problem->n_channels * problem->n, m = known->m;
-    double *x[2] = {NULL, NULL};
-    const double *half[2];
-    for (int h = 0; h < 2; h++) {
-        half[h] = known->x;
-        if (input->halves[h].context == input->independent.context) continue;
-        half[h] = x[h] = memory_allocate(m, vector * sizeof *x[h], "reference noise", error);
-        if (x[h] == NULL) TRY(LAM_ERR_MEMORY);
-        half_corrections to = {problem, {m, known->which, x[h]}};
-        const reference_system system = system_of(problem, &input->halves[h]);
-        const reference_answers answers = answers_of(op, input, p, true, (4. + h) / 6, (5. + h) / 6);
-        TRY(guided_reference_each(&system, &answers, m, known->which, keep_half, &to, error));
-    }
-    size_t k = 0;
-    for (int g = 0; g < N_GROUPS; g++) {
-        double sum = 0;
-        size_t lit = 0;
-        for (; k < m && known->which[k] < p->begin[g + 1]; k++) {
-            const size_t at = known->which[k] * vector;
-            const double noise =
-                half_distance(problem, p->E + at, p->B + at, half[0] + k * vector, half[1] + k * vector);
-            if (noise < 0) continue;
-            sum += noise;
-            lit++;
-        }
-        groups[g]->reference_noise = lit > 0 ? sum / (double)lit : 0;
-    }
-done:
-    free(x[0]);
-    free(x[1]);
-    return status;
+/* noisy: the other correction of the probe is known. */
+static void add_total(const measured *m, size_t v, bool noisy, group_tally *t) {
+    const squares s = squares_of(m, v, m->x, noisy ? m->y : NULL, true);
+    add_squares(&t->total, &s);
+    if (!is_lit(&s)) return;
+    t->error += s.error / s.indirect;
+    t->noise += s.noise / s.indirect;
+    t->variance += s.variance / (s.indirect * s.indirect);
+    t->coarse += s.coarse / s.indirect;
+    t->n_coarse += noisy;
 }
 
-/* Negative power over all power, and sum A E against sum A [(1 - rho) H + B (1 - s)], of each group. */
-static lam_status physics(const lam_operator *op, const judge_input *input, const probes *p,
-                          error_group *groups[N_GROUPS], lam_error *error) {
-    lam_status status = LAM_OK;
-    const build_problem *problem = input->problem;
-    const size_t n = problem->n, vector = n * problem->n_channels;
-    float *H = memory_allocate(p->m, vector * sizeof *H, "probes", error);
-    if (H == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(apply(op, p, LAM_IRRADIANCE, H, error));
-    for (int g = 0; g < N_GROUPS; g++) {
+/* The figures of a group without the noise, over those with it. */
+static double share_left(const group_tally *t) {
+    return t->error > 0 ? sqrt(fmax(0, 1 - t->noise / t->error)) : 1;
+}
+
+/* The standard error of an indirect figure f by that of its square, f^2 +- sqrt(variance), and the error of a
+ * reference that is not taken out. Probes share the noise of form factors, so that many of them are no better
+ * than one. */
+static double noise_of(const group_tally *t) {
+    if (t->n_coarse == 0) return 0;
+    const double lit = (double)t->total.lit, f2 = fmax(0, t->error - t->noise) / lit;
+    const double off = sqrt(t->variance / lit);
+    const double left = fmax(sqrt(f2 + off) - sqrt(f2), sqrt(f2) - sqrt(fmax(0, f2 - off)));
+    return sqrt(left * left + t->coarse / (double)t->n_coarse);
+}
+
+/* Negative power over all power, and sum A E against sum A [(1 - rho) H + B (1 - s)], means of each group. */
+static void add_physics(const measured *m, error_group *groups[JUDGE_GROUPS]) {
+    const build_problem *problem = m->input->problem;
+    const size_t n = problem->n, vector = vector_of(m->input);
+    const probes *p = &m->p;
+    for (int g = 0; g < JUDGE_GROUPS; g++) {
         const double count = (double)(p->begin[g + 1] - p->begin[g]);
         for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
             double negative = 0, all = 0, emitted = 0, accounted = 0;
             for (size_t i = 0; i < vector; i++) {
                 const double a = problem->area[i % n], b = (double)p->B[v * vector + i];
-                const double s = input->row_sums[i % n],
+                const double s = m->input->row_sums[i % n],
                              direct = p->H0 != NULL ? (double)p->H0[v * vector + i] : 0;
-                const double h = (double)H[v * vector + i] - direct;
+                const double h = (double)p->H[v * vector + i] - direct;
                 negative += a * fmax(-b, 0);
                 all += a * fabs(b);
                 emitted += a * (double)p->E[v * vector + i];
@@ -342,98 +241,129 @@ static lam_status physics(const lam_operator *op, const judge_input *input, cons
             if (emitted > 0) groups[g]->energy_balance += fabs(emitted - accounted) / emitted / count;
         }
     }
-done:
-    free(H);
-    return status;
 }
 
-/* Probes of an operator of emitters: single emitters, and random weights of all of them. Their emission for
- * the reference is E + rho H0, with H0 from the sky. */
-static lam_status emitter_emissions(const lam_operator *op, const judge_input *input, probes *p,
-                                    lam_error *error) {
+/* Nobody knows how many rounds there will be. */
+static void report_round(const judge_input *input, size_t round, double part) {
+    progress_report(input->progress, "judge", 1 - 1 / ((double)round + 1 + part));
+}
+
+/* Emissions of one round, against all references. The operator's own error, and the noise where the
+ * references are no twins, are found in the first round. */
+static lam_status measure(const lam_operator *op, measured *m, size_t round, group_tally *t,
+                          lam_error *error) {
     lam_status status = LAM_OK;
-    const build_problem *problem = input->problem;
-    const size_t s = lam_operator_emitters(op), C = problem->n_channels, vector = C * problem->n;
-    uint64_t seed = input->seed;
-    p->W = memory_allocate(p->m, s * C * sizeof *p->W, "probes", error);
-    p->H0 = memory_allocate(p->m, vector * sizeof *p->H0, "probes", error);
-    if (p->W == NULL || p->H0 == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t v = 0; v < p->m; v++)
-        for (size_t c = 0; c < C; c++)
-            for (size_t k = 0; k < s; k++)
-                p->W[(v * C + c) * s + k] = v >= p->begin[RANDOM]           ? (float)random_unit(&seed)
-                                            : k == v * s / p->begin[LIGHTS] ? 1
-                                                                            : 0;
-    if (p->begin[RANDOM] > p->begin[LIGHTS])
-        TRY(lam_operator_weights(op, 1, input->emission, 0, NULL, p->W + p->begin[LIGHTS] * C * s, error));
-    TRY(operator_emitters_light(op, p->m, p->W, p->E, p->H0, error));
-    for (size_t v = 0; v < p->m; v++)
-        for (size_t i = 0; i < vector; i++)
-            p->E[v * vector + i] += problem->reflectance[i] * p->H0[v * vector + i];
+    const judge_input *input = m->input;
+    const probes *p = &m->p;
+    const bool first = round == 0;
+    const bool total = input->independent.n > 0, noisy = input->other.n > 0 && (first || input->twins);
+    const size_t n_noisy = input->twins || m->at_once ? p->m : p->m < NOISE_PROBES ? p->m : NOISE_PROBES;
+    m->x = memory_allocate(p->m, vector_of(input) * sizeof *m->x, "reference", error);
+    if (m->x == NULL) TRY(LAM_ERR_MEMORY);
+    if (first) {
+        TRY(solve(op, m, &input->own, false, p->m, m->x, error));
+        for (int g = 0; g < JUDGE_GROUPS; g++)
+            for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
+                const squares s = squares_of(m, v, m->x, NULL, false);
+                add_squares(&t[g].own, &s);
+                t[g].n_operator++;
+            }
+    }
+    if (!total) goto done;
+    report_round(input, round, .3);
+    TRY(find_first_light(m, error));
+    TRY(solve(op, m, &input->independent, true, p->m, m->x, error));
+    if (noisy) {
+        report_round(input, round, .6);
+        m->y = memory_allocate(n_noisy, vector_of(input) * sizeof *m->y, "reference", error);
+        if (m->y == NULL) TRY(LAM_ERR_MEMORY);
+        TRY(solve(op, m, &input->other, true, n_noisy, m->y, error));
+    }
+    for (int g = 0; g < JUDGE_GROUPS; g++)
+        for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) add_total(m, v, noisy && v < n_noisy, &t[g]);
 done:
     return status;
 }
 
-/* True if the scene has light of its own that the operator can answer. */
-static bool any_light(const lam_operator *op, const judge_input *input) {
-    if (lam_operator_emitters(op) > 0) {
-        const size_t s = lam_operator_emitters(op), C = input->problem->n_channels;
-        float *W = memory_allocate(s * C, sizeof *W, "weights", NULL);
-        bool any = W != NULL && lam_operator_weights(op, 1, input->emission, 0, NULL, W, NULL) == LAM_OK,
-             lit = false;
-        for (size_t k = 0; any && k < s * C; k++) lit = lit || W[k] > 0;
-        free(W);
-        return any && lit;
+/* True where the mean over the probes of a group is known well enough. */
+static bool is_certain(const judge_input *input, const group_tally *t) {
+    const tally *by = input->independent.n > 0 ? &t->total : &t->own;
+    const error_figures f = finished(&by->indirect, by->lit, 1);
+    return by->lit == 0 || f.std <= certain * f.mean * sqrt((double)by->lit);
+}
+
+/* The probes of the next round; false where there are none. An LU takes all of them at once. */
+static bool next_counts(const judge_input *input, const probe_source *source, const group_tally *t,
+                        bool at_once, size_t counts[JUDGE_GROUPS]) {
+    const size_t least[JUDGE_GROUPS] = {RANDOM_LEAST, 1,
+                                        input->probes_least > 0 ? input->probes_least : input->probes};
+    size_t all = 0;
+    for (int g = 0; g < JUDGE_GROUPS; g++) {
+        const size_t left = source->most[g] - source->made[g];
+        const size_t step = g == JUDGE_RANDOM ? RANDOM_LEAST : JUDGE_AT_ONCE;
+        const bool enough = t[g].done >= least[g] && is_certain(input, &t[g]);
+        counts[g] = enough ? 0 : at_once || left < step ? left : step;
+        all += counts[g];
     }
-    for (size_t i = 0; i < input->problem->n * input->problem->n_channels; i++)
-        if (input->emission[i] > 0) return true;
+    return all > 0;
+}
+
+static void finish_group(const judge_input *input, const group_tally *t, error_group *g) {
+    g->probes = t->done;
+    g->operator_probes = t->n_operator;
+    if (t->done == 0) return;
+    g->operator_relative = finished(&t->own.relative, t->own.bright, 1);
+    g->operator_indirect = finished(&t->own.indirect, t->own.lit, 1);
+    if (input->independent.n == 0) return;
+    const error_figures plain = finished(&t->total.indirect, t->total.lit, 1);
+    g->reference_noise = noise_of(t);
+    g->is_bound = !(g->reference_noise <= noise_most * share_left(t) * plain.mean);
+    const double scale = g->is_bound ? 1 : share_left(t);
+    g->total_relative = finished(&t->total.relative, t->total.bright, scale);
+    g->total_indirect = finished(&t->total.indirect, t->total.lit, scale);
+}
+
+/* True where a reference is an LU, of whose probes none is worth leaving out. */
+static bool is_dense(const lam_operator *op, const judge_input *input, size_t m) {
+    const factor_product *const all[] = {&input->own, &input->independent, &input->other};
+    for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
+        const reference_system s = system_of(input, all[k]);
+        if (all[k]->n > 0 && guided_reference_is_dense(&s, op, m)) return true;
+    }
     return false;
 }
 
 lam_status judge_operator(const lam_operator *op, const judge_input *input, error_report *report,
                           lam_error *error) {
     lam_status status = LAM_OK;
-    const build_problem *problem = input->problem;
     const double start = clock_seconds();
-    const size_t vector = problem->n * problem->n_channels;
     error_report found = {0};
-    error_group *groups[N_GROUPS] = {&found.single, &found.lights, &found.random};
-    probes p = {0};
-    size_t which[N_GROUPS * JUDGE_NOISE_PROBES];
-    kept_corrections kept = {.m = 0};
-    const size_t s = lam_operator_emitters(op), most = s > 0 ? s : problem->n;
-    const size_t counts[N_GROUPS] = {input->probes < most ? input->probes : most, any_light(op, input),
-                                     JUDGE_RANDOM_PROBES};
-    TRY(probes_init(&p, counts, problem, error));
-    for (int g = 0; g < N_GROUPS; g++) groups[g]->probes = counts[g];
-    if (s > 0)
-        TRY(emitter_emissions(op, input, &p, error));
-    else
-        TRY(single_emissions(problem, input->seed, &p, error));
-    if (counts[LIGHTS] > 0 && s == 0)
-        memcpy(p.E + p.begin[LIGHTS] * vector, input->emission, vector * sizeof *p.E);
-    if (s == 0) random_emissions(problem, input->seed + 1, &p);
-
+    error_group *groups[JUDGE_GROUPS] = {&found.random, &found.lights, &found.single};
+    group_tally t[JUDGE_GROUPS] = {{.done = 0}};
+    size_t counts[JUDGE_GROUPS], rounds = 0;
+    probe_source source;
+    measured m = {.input = input};
+    TRY(probe_source_make(input->problem, op, input->emission, input->probes, JUDGE_RANDOM_PROBES,
+                          input->seed, &source, error));
+    const bool at_once = is_dense(op, input, source.most[0] + source.most[1] + source.most[2]);
     progress_report(input->progress, "judge", 0);
-    TRY(apply(op, &p, LAM_RADIOSITY, p.B, error));
-    TRY(physics(op, input, &p, groups, error));
-    TRY(figures_against(op, input, &input->own, &p, false, &kept, groups, error));
-    if (input->independent.n > 0) {
-        TRY(find_first_light(input, &p, error));
-        if (input->halves[0].n > 0) {
-            kept = (kept_corrections){.m = noise_probes(&p, which), .which = which};
-            kept.x = memory_allocate(kept.m, vector * sizeof *kept.x, "reference noise", error);
-            if (kept.x == NULL) TRY(LAM_ERR_MEMORY);
-        }
-        TRY(figures_against(op, input, &input->independent, &p, true, &kept, groups, error));
-        if (input->halves[0].n > 0) TRY(measure_noise(op, input, &p, &kept, groups, error));
+    for (; next_counts(input, &source, t, at_once, counts); rounds++) {
+        if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+        measured_free(&m);
+        m = (measured){.input = input, .at_once = at_once};
+        TRY(probes_next(&source, counts, rounds == 0, &m.p, error));
+        TRY(measure(op, &m, rounds, t, error));
+        if (rounds == 0) add_physics(&m, groups);
+        for (int g = 0; g < JUDGE_GROUPS; g++) t[g].done += counts[g];
+        report_round(input, rounds, 1);
     }
+    for (int g = 0; g < JUDGE_GROUPS; g++) finish_group(input, &t[g], groups[g]);
     progress_report(input->progress, "judge", 1);
     found.has_total = input->independent.n > 0;
     found.seconds = clock_seconds() - start;
     *report = found;
 done:
-    free(kept.x);
-    probes_free(&p);
+    probe_source_free(&source);
+    measured_free(&m);
     return status;
 }

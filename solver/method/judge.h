@@ -5,9 +5,8 @@
 #include "solver/linalg/factor_product.h"
 #include "solver/method/method.h"
 
-/* Probes of random emission, and those of a group, at most, that the reference's own noise is measured by, as
- * each of them is to be solved with both halves of the sample. */
-enum { JUDGE_RANDOM_PROBES = 8, JUDGE_NOISE_PROBES = 8 };
+/* Probes that are solved together; of random emission at most. */
+enum { JUDGE_AT_ONCE = 16, JUDGE_RANDOM_PROBES = 8 };
 
 /* Mean, standard deviation and largest value over the probes of a group. */
 typedef struct error_figures {
@@ -16,11 +15,13 @@ typedef struct error_figures {
 
 typedef struct error_group {
     size_t probes;                                      /* 0: nothing measured, nothing stored */
+    size_t operator_probes;                             /* of them, for the operator's own error */
     error_figures total_relative, total_indirect;       /* against an independent sample of F */
     error_figures operator_relative, operator_indirect; /* against the very F that was factorized */
-    double reference_noise; /* indirect: half the spread between the two halves of the independent sample */
-    double negative_share;  /* power of negative radiosity over all, mean */
-    double energy_balance;  /* |emitted - absorbed - left| / emitted, mean */
+    double reference_noise; /* indirect: standard error of total_indirect by the noise of the reference */
+    bool is_bound; /* that is more than a third: the noise is not taken out, and total_... are bounds */
+    double negative_share; /* power of negative radiosity over all, mean */
+    double energy_balance; /* |emitted - absorbed - left| / emitted, mean */
 } error_group;
 
 typedef struct error_report {
@@ -34,20 +35,33 @@ typedef struct judge_input {
     const double *row_sums;     /* [n] of own */
     const float *emission;      /* [C][n], the scene's own */
     factor_product own;         /* the very F that the operator was built from */
-    factor_product independent; /* a better F that shares no sample with it, the mean of two samples or the
-                                   finer of two; n = 0: no total error */
-    factor_product halves[2];   /* those two, for the reference's own noise; n = 0: it is not measured */
-    /* H = F E, [n], closer than by the independent sample, where few elements shine; *known is false where
-     * many do. NULL: there is none. The reference then takes only the further bounces of that light from the
-     * sample. */
-    lam_status (*first_light)(void *context, const float *E, double *H, bool *known, lam_error *error);
+    factor_product independent; /* an F that shares no sample with it; n = 0: no total error */
+    /* Another one; n = 0: the noise of the reference is not measured. twins: both are independent samples of
+     * the same quality. Else this one is coarser, and other_share of the distance between the solutions by
+     * both is the error of that by `independent`. */
+    factor_product other;
+    bool twins;
+    double other_share;
+    /* H = F E, [n], closer than by these, where few elements shine; *known is false where many do. D [n]:
+     * half the difference of two independent estimates whose mean is H. NULL: there is none. The reference
+     * then takes only the further bounces of that light from the samples. */
+    lam_status (*first_light)(void *context, const float *E, double *H, double *D, bool *known,
+                              lam_error *error);
     void *first_light_context;
-    size_t probes; /* single elements */
+    size_t probes;       /* single elements at most */
+    size_t probes_least; /* of them; 0: all. More are taken until the standard error of the mean of their
+                            errors is below a tenth of that mean */
     uint64_t seed;
     const progress *progress;
 } judge_input;
 
-/* Measures. Cost: a converged solve per probe and reference, started from the operator's own answer. */
+/* Measures. With x the correction of an answer by the reference, B = B~ + x, the squared error is |x|^2 less
+ * the power of the noise in x, which is taken out of a group's mean square, and of its figures in proportion.
+ * Of twins, x = (x_1 + x_2) / 2 and the noise is (x_1 - x_2) / 2, which leaves <x_1, x_2>: in this the noise
+ * of two independent samples has no part on average. So is rho D, the noise of the first light. Of a finer
+ * and a coarser reference the noise is stated alone. reference_noise is the standard error that is left: of
+ * |x|^2 it is sqrt(sum 4 (A x t)^2) over all elements, t being the noise that was taken out. Cost: a
+ * converged solve per probe and reference, started from the operator's own answer. */
 lam_status judge_operator(const lam_operator *op, const judge_input *input, error_report *report,
                           lam_error *error);
 

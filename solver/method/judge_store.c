@@ -26,7 +26,9 @@ static lam_status save_group(store *s, const char *name, const error_group *g, b
         TRY(save_figures(s, name, "total_relative", &g->total_relative, error));
         TRY(save_figures(s, name, "total_indirect", &g->total_indirect, error));
         TRY(store_set_number(s, name, "reference_noise", g->reference_noise, error));
+        TRY(store_set_integer(s, name, "total_is_bound", g->is_bound, error));
     }
+    TRY(store_set_integer(s, name, "operator_probes", (int64_t)g->operator_probes, error));
     TRY(save_figures(s, name, "operator_relative", &g->operator_relative, error));
     TRY(save_figures(s, name, "operator_indirect", &g->operator_indirect, error));
     TRY(store_set_number(s, name, "negative_share", g->negative_share, error));

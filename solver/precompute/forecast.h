@@ -15,7 +15,8 @@ typedef struct forecast {
     size_t sky_tiles;            /* 0: no sky */
     recipe recipe, judge_recipe; /* of the form factors and of the judge's samples */
     pairs_cost cost;             /* of recipe, where a sample of its pairs was taken; else 0 */
-    size_t probes;               /* 0: no independent samples */
+    size_t probes;               /* at most; 0: no independent samples */
+    size_t probes_least;         /* 0: all */
     bool from_store;             /* form factors are there already */
     bool scratch;                /* rows go to a scratch folder as they are found */
     bool large;                  /* and whole samples lie there, as memory is too small for them */
@@ -43,7 +44,7 @@ typedef struct forecast_times {
 forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n_threads);
 
 /* Rays cast from one element; a hemicube is a ray for each of its pixels. Bytes: of the rows
- * of a merged sample, of packed rows, of one tile of a sky, of the judge's two samples and their mean, of the
+ * of a merged sample, of packed rows, of one tile of a sky, of the judge's two samples, of the
  * operator in the store. */
 double forecast_blocks(double n, const recipe *r);
 double forecast_rays(double n, const recipe *r);

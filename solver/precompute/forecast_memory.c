@@ -1,5 +1,6 @@
 /* Bytes of memory that a precompute takes, and options that would make it fit. */
 #include "solver/method/judge.h"
+#include "solver/method/reference.h"
 #include "solver/precompute/forecast.h"
 
 #include <math.h>
@@ -88,12 +89,10 @@ static double held_bytes(const forecast *f, double bytes, const recipe *r) {
     return f->large && r->method != RECIPE_PAIRS && r->method != RECIPE_BLOCKS ? 0 : bytes;
 }
 
-/* Bytes of the judge's two samples and their mean. */
+/* Bytes of the judge's two samples, or its blocks. */
 double forecast_reference_bytes(const forecast *f) {
-    const double n = (double)f->n, one = forecast_rows_bytes(n, &f->judge_recipe);
-    const bool dense = f->judge_recipe.method == RECIPE_PAIRS;
-    if (f->judge_recipe.method == RECIPE_BLOCKS) return 2 * one;
-    return 2 * one + (dense ? one : sample_bytes(n, 2 * (double)f->judge_recipe.rays));
+    const double one = forecast_rows_bytes((double)f->n, &f->judge_recipe);
+    return f->judge_recipe.method == RECIPE_BLOCKS ? one : 2 * one;
 }
 
 /* The share of the method; nothing where no operator is built. */
@@ -131,8 +130,20 @@ static double compress_bytes(const forecast *f) {
     return n * (compressed_element_bytes + compressed_number_bytes * numbers);
 }
 
+/* Of each probe of a round its emission, two answers, its first light with its spread, and corrections by two
+ * references; the vectors of the solutions that are found at once; an LU, which takes all probes in one
+ * round; and the walk of first light, whose nodes are those of blocks. */
+static double judge_bytes(const forecast *f) {
+    const double n = (double)f->n, n_channels = (double)f->n_channels, others = JUDGE_RANDOM_PROBES + 1;
+    const bool dense = f->n <= REFERENCE_DENSE_ELEMENTS && f->judge_recipe.method != RECIPE_BLOCKS;
+    const double all = (double)f->probes + others, round = dense ? all : fmin(all, JUDGE_AT_ONCE + 5);
+    const double walk = f->judge_recipe.method == RECIPE_BLOCKS ? block_element_bytes + 60 : 0;
+    return n * (44 * round * n_channels + 72 * fmin(round * n_channels, fmax(24, 8 * n_channels)) + walk) +
+           (dense ? 8 * n * n : 0);
+}
+
 double forecast_bytes(const forecast *f) {
-    const double n = (double)f->n, n_channels = (double)f->n_channels;
+    const double n = (double)f->n;
     const method_forecast op = method_bytes(f);
     const double of_mesh = 400 * n + forecast_tile_bytes(n) * (double)f->sky_tiles;
     const double sample = held_bytes(f, forecast_rows_bytes(n, &f->recipe), &f->recipe);
@@ -140,16 +151,9 @@ double forecast_bytes(const forecast *f) {
     const double held = f->streamed ? stream_bytes(n, &f->recipe) : sample;
     double peak = fmax(f->streamed ? held : trace, held + fmax(op.building, op.loaded + compress_bytes(f)));
     if (f->probes > 0) {
-        /* Two more samples and their mean, beside the first; of each probe its emission, its answers and its
-         * first light, of some the corrections by each sample, and the vectors of the solutions that are
-         * found at once. */
-        const double others = JUDGE_RANDOM_PROBES + 1, probes = (double)f->probes + others,
-                     of_noise = 3 * sizeof(double) * (2 * JUDGE_NOISE_PROBES + 1),
-                     at_once = fmax(16, 8 * n_channels);
         const recipe *r = &f->judge_recipe;
         const double references = held_bytes(f, forecast_reference_bytes(f), r);
-        const double judge = n * (20 * probes * n_channels + of_noise * n_channels + 72 * at_once) +
-                             (n <= 8192 ? 8 * n * n : 0);
+        const double judge = judge_bytes(f);
         const double second =
             held_bytes(f, forecast_rows_bytes(n, r), r) + trace_bytes(n, r, f->scratch, f->large);
         peak = fmax(peak, sample + op.loaded + fmax(references + judge, second));

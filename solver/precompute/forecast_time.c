@@ -18,14 +18,17 @@ static double sample_seconds(double n, const recipe *r, double rays_per_second, 
     return n * rays / rays_per_second + entries * merge_seconds / n_threads;
 }
 
-/* Four references: two with all probes, and two, for the noise of the sample, with some of each sort. */
+/* Single elements that defaults take on average. */
+static const double probes_expected = 48;
+
+/* Three references: the form factors of the operator, for the probes of the first round, and two others. */
 static double solve_seconds(const forecast *f) {
-    const double others = JUDGE_RANDOM_PROBES + 1, n = (double)f->n, probes = (double)f->probes;
-    const double some = fmin(probes, JUDGE_NOISE_PROBES);
-    const double entries =
-        f->cost.entries > 0 ? f->cost.entries : forecast_rows_bytes(n, &f->judge_recipe) / 8;
-    return 2 * (double)f->n_channels *
-           (reference_seconds(n, entries, probes + others) + reference_seconds(n, entries, some + others));
+    const double others = JUDGE_RANDOM_PROBES + 1, n = (double)f->n, most = (double)f->probes;
+    const double probes = (f->probes_least > 0 ? fmin(most, probes_expected) : most) + others;
+    const double own = f->cost.entries > 0 ? f->cost.entries : forecast_rows_bytes(n, &f->recipe) / 8;
+    const double entries = forecast_rows_bytes(n, &f->judge_recipe) / 8;
+    return (double)f->n_channels * (reference_seconds(n, own, fmin(probes, JUDGE_AT_ONCE)) +
+                                    2 * reference_seconds(n, entries, probes));
 }
 
 forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n_threads) {
@@ -42,7 +45,7 @@ forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n
     if (!f->from_store)
         times.form_factors =
             f->streamed && !counted ? n * forecast_rays(n, &f->recipe) / rays_per_second : once;
-    if (f->probes > 0) times.judge = 2 * half + (f->streamed ? once : 0);
+    if (f->probes > 0) times.judge = (finer ? 1 : 2) * half + (f->streamed ? once : 0);
     if (f->probes > 0 && f->recipe.method != RECIPE_BLOCKS) times.solves = solve_seconds(f) / n_threads;
     return times;
 }

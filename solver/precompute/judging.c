@@ -1,46 +1,49 @@
 #include "solver/precompute/judging.h"
 
+#include "solver/formfactor/blocks/block_light.h"
 #include "solver/formfactor/pairs/first_light.h"
 
-/* Of two blocks of form factors with this ratio of tolerances the errors, which fall as the square root of
- * them, are as 1 to 1.7: if they are independent, half the distance of the two is the error of the finer one.
- */
-static const double tolerance_ratio = 3;
+/* Errors of blocks fall as the square root of their bound, or faster. Where the judge's bound is half that of
+ * the blocks that are judged, an error e of its own makes sqrt(2) e of theirs; these are independent, so that
+ * the distance of both solutions is sqrt(3) e, or more. */
+static const double share_of_distance = .57735026918962576451;
 
-/* Against blocks of a quarter of the tolerance, found with other segments. */
+/* Against blocks of half the tolerance, found with other segments, and the first light of few elements by a
+ * walk of its own. The blocks that are judged tell the noise of the others. */
 static lam_status judge_by_blocks(const judging *j, const lam_operator *op, error_report *out,
                                   lam_error *error) {
     lam_status status = LAM_OK;
-    form_factors about[2] = {{.row_sums = NULL}, {.row_sums = NULL}};
-    block_factors half[2] = {{.n = 0}, {.n = 0}};
-    for (int h = 0; h < 2; h++) {
-        form_factor_options how = {.recipe = j->halves[h], .progress = j->progress, .stage = j->stages[h]};
-        if (h == 1) how.recipe.accuracy *= tolerance_ratio;
-        TRY(form_factors_make_blocks(j->m, j->order, j->problem->blocks->tree, true, &how, &about[h],
-                                     &half[h], error));
-        form_factors_free(&about[h]);
-    }
+    form_factors about = {.row_sums = NULL};
+    block_factors finer = {.n = 0};
+    block_light *first = NULL;
+    const plane_tree *tree = j->problem->blocks->tree;
+    const form_factor_options how = {.recipe = j->halves[0], .progress = j->progress, .stage = j->stages[0]};
+    TRY(form_factors_make_blocks(j->m, j->order, tree, j->f, &how, &about, &finer, error));
+    TRY(block_light_create(j->m, tree, j->first_light_seed, &first, error));
     const judge_input input = {.problem = j->problem,
                                .row_sums = j->f->row_sums,
                                .emission = j->m->emission,
                                .own = block_factors_product(j->problem->blocks),
-                               .independent = block_factors_product(&half[0]),
-                               .halves = {block_factors_product(&half[0]), block_factors_product(&half[1])},
+                               .independent = block_factors_product(&finer),
+                               .other = block_factors_product(j->problem->blocks),
+                               .other_share = share_of_distance,
+                               .first_light = block_light_for_judge,
+                               .first_light_context = first,
                                .probes = j->probes,
+                               .probes_least = j->probes_least,
                                .seed = j->probes_seed,
                                .progress = j->progress};
     TRY(judge_operator(op, &input, out, error));
 done:
-    for (int h = 0; h < 2; h++) {
-        form_factors_free(&about[h]);
-        block_factors_free(&half[h]);
-    }
+    block_light_destroy(first);
+    form_factors_free(&about);
+    block_factors_free(&finer);
     return status;
 }
 
 lam_status judging_run(const judging *j, const lam_operator *op, error_report *out, lam_error *error) {
     lam_status status = LAM_OK;
-    form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}}, mean = {.row_sums = NULL};
+    form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}};
     first_light *first = NULL;
     if (j->problem->blocks != NULL) return judge_by_blocks(j, op, out, error);
     for (int h = 0; h < 2; h++) {
@@ -53,26 +56,25 @@ lam_status judging_run(const judging *j, const lam_operator *op, error_report *o
         TRY(form_factors_make(j->m, j->order, &how, &half[h], error));
         if (j->sampled != NULL) j->sampled(j->context, &half[h]);
     }
-    TRY(form_factors_mean(&half[0], &half[1], &mean, error));
     /* The direct illumination of one element by rays is mostly noise. */
     if (recipe_noise(&j->f->recipe) > 0) TRY(first_light_create(j->m, j->first_light_seed, &first, error));
-    const judge_input input = {
-        .problem = j->problem,
-        .row_sums = j->f->row_sums,
-        .emission = j->m->emission,
-        .own = factor_product_of_rows(j->problem->F),
-        .independent = factor_product_of_rows(&mean.F),
-        .halves = {factor_product_of_rows(&half[0].F), factor_product_of_rows(&half[1].F)},
-        .first_light = first != NULL ? first_light_for_judge : NULL,
-        .first_light_context = first,
-        .probes = j->probes,
-        .seed = j->probes_seed,
-        .progress = j->progress};
+    const judge_input input = {.problem = j->problem,
+                               .row_sums = j->f->row_sums,
+                               .emission = j->m->emission,
+                               .own = factor_product_of_rows(j->problem->F),
+                               .independent = factor_product_of_rows(&half[0].F),
+                               .other = factor_product_of_rows(&half[1].F),
+                               .twins = true,
+                               .first_light = first != NULL ? first_light_for_judge : NULL,
+                               .first_light_context = first,
+                               .probes = j->probes,
+                               .probes_least = j->probes_least,
+                               .seed = j->probes_seed,
+                               .progress = j->progress};
     TRY(judge_operator(op, &input, out, error));
 done:
     first_light_destroy(first);
     form_factors_free(&half[0]);
     form_factors_free(&half[1]);
-    form_factors_free(&mean);
     return status;
 }

@@ -12,6 +12,9 @@
 #include "solver/precompute/forecast.h"
 #include "solver/precompute/precompute.h"
 
+/* Single elements by which an operator is judged at least, unless --probes gives their number. */
+enum { PROBES_LEAST = 32 };
+
 typedef struct precompute_state {
     const precompute_options *options;
     terminal *t;

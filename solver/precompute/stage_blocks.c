@@ -173,8 +173,8 @@ lam_status stage_blocks(precompute_state *state, lam_error *error) {
                                      .sky = state->options->sky,
                                      .ground_albedo = state->options->ground_albedo};
     TRY(make_tree(state, error));
-    TRY(form_factors_make_blocks(&state->m, state->order, &state->tree, false, &how, &state->f,
-                                 &state->blocks, error));
+    TRY(form_factors_make_blocks(&state->m, state->order, &state->tree, NULL, &how, &state->f, &state->blocks,
+                                 error));
 done:
     return status;
 }

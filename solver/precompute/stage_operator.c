@@ -192,10 +192,11 @@ done:
 }
 
 static void log_figures(terminal *t, const char *name, const error_group *g, bool has_total) {
+    const char *at_most = g->is_bound ? "at most " : "";
     if (g->probes == 0) return;
     if (has_total)
-        terminal_log(t, "%-8s total relative %.3g, indirect %.3g (noise of the reference %.2g)", name,
-                     g->total_relative.mean, g->total_indirect.mean, g->reference_noise);
+        terminal_log(t, "%-8s total relative %s%.3g, indirect %s%.3g (noise of the reference %.2g)", name,
+                     at_most, g->total_relative.mean, at_most, g->total_indirect.mean, g->reference_noise);
     terminal_log(t, "%-8s operator relative %.3g, indirect %.3g", name, g->operator_relative.mean,
                  g->operator_indirect.mean);
 }
@@ -246,6 +247,7 @@ lam_status stage_judge(precompute_state *state, lam_error *error) {
                  .probes_seed = precompute_seed(seed, SEED_PROBES),
                  .first_light_seed = precompute_seed(seed, SEED_FIRST_LIGHT),
                  .probes = state->probes,
+                 .probes_least = state->options->probes == OPTION_AUTO ? PROBES_LEAST : 0,
                  .progress = &state->progress,
                  .sampled = log_half,
                  .context = state};

@@ -10,8 +10,8 @@
 #include <string.h>
 #include <sys/stat.h>
 
-/* Above this many elements a probe is expensive: by default fewer are measured. */
-enum { PROBES = 200, PROBES_OF_LARGE = 32, LARGE = 10240 };
+/* Single elements by which an operator is judged at most, unless --probes gives their number. */
+enum { PROBES = 200 };
 
 bool precompute_takes_as_store(const char *path) {
     static const unsigned char signature[8] = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
@@ -196,11 +196,10 @@ recipe state_near_recipe(const precompute_state *state) {
 
 recipe state_judge_recipe(const precompute_state *state, uint64_t seed) {
     const choice_request asked = request_of(state);
-    const recipe *of = &state->recipe;
-    recipe r = recipe_of_judge(of, choice_rays(&asked), seed);
-    if (state->options->from_store && r.method == RECIPE_RAYS && asked.rays != OPTION_AUTO)
-        r.rays = (size_t)asked.rays;
-    return r;
+    recipe of = state->recipe;
+    if (state->options->from_store && of.method == RECIPE_RAYS && asked.rays != OPTION_AUTO)
+        of.rays = (size_t)asked.rays;
+    return recipe_of_judge(&of, choice_rays(&asked), seed);
 }
 
 forecast state_forecast(const precompute_state *state, double n) {
@@ -213,7 +212,8 @@ forecast state_forecast(const precompute_state *state, double n) {
                       .recipe = state->recipe,
                       .judge_recipe = state_judge_recipe(state, 0),
                       .cost = state->cost,
-                      .probes = o->probes == OPTION_AUTO ? PROBES_OF_LARGE : o->probes,
+                      .probes = o->probes == OPTION_AUTO ? PROBES : o->probes,
+                      .probes_least = o->probes == OPTION_AUTO ? PROBES_LEAST : 0,
                       .from_store = o->from_store,
                       .scratch = o->scratch != NULL,
                       .large = state->large,
@@ -424,7 +424,7 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
     state->order = memory_allocate(state->m.n, sizeof *state->order, "the order of the elements", error);
     if (state->order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&state->m, state->order, error));
-    state->probes = o->probes != OPTION_AUTO ? o->probes : state->m.n > LARGE ? PROBES_OF_LARGE : PROBES;
+    state->probes = o->probes != OPTION_AUTO ? o->probes : PROBES;
     if (state->probes > state->m.n) state->probes = state->m.n;
     if (o->emitters != NULL) {
         TRY(emitter_list_read(o->emitters, &state->m, state->sky_tiles, &state->emitters, error));

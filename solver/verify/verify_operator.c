@@ -210,7 +210,7 @@ static void compare_figure(store *s, const char *group, const char *against, con
         snprintf(key, sizeof key, "%s_indirect_%s", against, ends[k]);
         if (!store_has(s, path) || store_get_number(s, path, key, values[k], NULL) != LAM_OK) return;
     }
-    const double spread = fmax(std, again->std) / sqrt((double)probes);
+    const double spread = fmax(std, again->std) / sqrt(fmax(1, (double)probes));
     const double allowed = 1.1 * mean + 6 * spread + 3 * noise + rounding;
     if (!(again->mean <= allowed))
         check_say(c, VERDICT_BROKEN, "%s: %s indirect error %.3g, stated %.3g (at most %.3g)", group, against,
@@ -249,7 +249,7 @@ static lam_status find_again(examination *e, const recipe *from, const uint32_t 
     if (has_form_factors(e)) return LAM_OK;
     if (from->method != RECIPE_BLOCKS) return form_factors_make(&e->m, order, &how, &e->f, error);
     TRY(form_factors_tree(&e->m, &e->tree, error));
-    TRY(form_factors_make_blocks(&e->m, order, &e->tree, false, &how, &e->f, &e->blocks, error));
+    TRY(form_factors_make_blocks(&e->m, order, &e->tree, NULL, &how, &e->f, &e->blocks, error));
 done:
     return status;
 }
@@ -314,7 +314,7 @@ lam_status verify_error(examination *e, check *c, lam_error *error) {
         const error_group *g = groups[i].group;
         if (g->probes == 0) continue;
         compare_figure(e->s, groups[i].name, "total", &g->total_indirect, g->probes, g->reference_noise, c);
-        compare_figure(e->s, groups[i].name, "operator", &g->operator_indirect, g->probes, 0, c);
+        compare_figure(e->s, groups[i].name, "operator", &g->operator_indirect, g->operator_probes, 0, c);
     }
 done:
     return check_failed(c, status, error);

@@ -27,8 +27,11 @@ static void die(const char *what) {
 static void bounce(const judged_probes *b, const float *E, double *right) {
     lam_error error = {.message = ""};
     bool known;
-    if (first_light_of(b->first, E, right, &known, &error) != LAM_OK) die(error.message);
+    double *spread = malloc(b->m.n * sizeof *spread);
+    if (spread == NULL) die("not enough memory");
+    if (first_light_of(b->first, E, right, spread, &known, &error) != LAM_OK) die(error.message);
     if (!known) die("a lamp of too many elements");
+    free(spread);
     for (size_t i = 0; i < b->m.n; i++) right[i] *= (double)b->m.reflectance[i];
 }
 

@@ -108,7 +108,7 @@ typedef struct made_blocks {
 } made_blocks;
 
 /* Blocks point to the tree: made must stay where it is. */
-static void make(int scene, bool judge, made_blocks *made) {
+static void make(int scene, const form_factors *judged, made_blocks *made) {
     lam_error error = {.message = ""};
     const form_factor_options how = {
         .recipe = {.method = RECIPE_BLOCKS, .rays = 64, .accuracy = blocks_open, .seed = 1}};
@@ -116,7 +116,7 @@ static void make(int scene, bool judge, made_blocks *made) {
     made->order = malloc(made->m.n * sizeof *made->order);
     ck_ok(mesh_z_order(&made->m, made->order, &error));
     ck_ok(form_factors_tree(&made->m, &made->tree, &error));
-    ck_ok(form_factors_make_blocks(&made->m, made->order, &made->tree, judge, &how, &made->f, &made->blocks,
+    ck_ok(form_factors_make_blocks(&made->m, made->order, &made->tree, judged, &how, &made->f, &made->blocks,
                                    &error));
 }
 
@@ -132,7 +132,7 @@ static void unmake(made_blocks *made) {
  * vectors in double over some 12 levels, up and down. */
 START_TEST(exchange_is_symmetric_and_linear) {
     made_blocks made;
-    make(_i, false, &made);
+    make(_i, NULL, &made);
     const mesh *m = &made.m;
     const double c = .375;
     double *x = random_vector(m->n, 1), *y = random_vector(m->n, 2), *both = malloc(m->n * sizeof *both);
@@ -163,7 +163,7 @@ END_TEST
 START_TEST(a_furnace_is_white) {
     enum { BOUNCES = 200 };
     made_blocks made;
-    make(_i, false, &made);
+    make(_i, NULL, &made);
     const size_t n = made.m.n;
     double *rho = random_vector(n, 3), *B = calloc(n, sizeof *B), *H = calloc(n, sizeof *H);
     ck_assert(made.f.closed);
@@ -183,13 +183,16 @@ END_TEST
 
 START_TEST(bits_are_the_same_for_any_number_of_threads) {
     const int most = omp_get_max_threads();
+    made_blocks judged;
+    make(_i, NULL, &judged);
     for (int judge = 0; judge < 2; judge++) {
+        const form_factors *const of = judge ? &judged.f : NULL;
         made_blocks one, other;
         omp_set_num_threads(1);
-        make(_i, judge, &one);
+        make(_i, of, &one);
         for (int threads = 2; threads <= 3; threads++) {
             omp_set_num_threads(threads);
-            make(_i, judge, &other);
+            make(_i, of, &other);
             const size_t n = one.m.n, count = one.blocks.n_blocks;
             ck_assert_uint_eq(count, other.blocks.n_blocks);
             ck_assert_mem_eq(one.blocks.blocks, other.blocks.blocks, count * sizeof *one.blocks.blocks);
@@ -199,6 +202,7 @@ START_TEST(bits_are_the_same_for_any_number_of_threads) {
         }
         unmake(&one);
     }
+    unmake(&judged);
     omp_set_num_threads(most);
 }
 END_TEST

@@ -238,31 +238,6 @@ START_TEST(uneven_areas) {
 }
 END_TEST
 
-START_TEST(mean_halves_the_variance) {
-    const double size[3] = {1, 1, 1};
-    mesh m = box_mesh(size, 4, .5f);
-    form_factors a = trace(&m, 1024, 1), b = trace(&m, 1024, 2), mean = {0};
-    csr exact = box_form_factors(size, 4, m.area);
-    lam_error error = {0};
-    ck_assert_msg(form_factors_mean(&a, &b, &mean, &error) == LAM_OK, "%s", error.message);
-    mean.reciprocity_error = 0; /* a figure of repair; check_invariants compares every pair itself */
-    check_invariants(&m, &mean);
-    double square[3] = {0};
-    const csr *F[3] = {&a.F, &b.F, &mean.F};
-    for (int k = 0; k < 3; k++)
-        for (size_t i = 0; i < m.n; i++)
-            for (size_t j = 0; j < m.n; j++)
-                square[k] += pow(csr_entry(F[k], i, j) - csr_entry(&exact, i, j), 2);
-    /* 9,216 independent errors: the ratio of 1/2 is known to a few per cent. */
-    ck_assert_double_le(square[2], .6 * .5 * (square[0] + square[1]));
-    csr_free(&exact);
-    form_factors_free(&a);
-    form_factors_free(&b);
-    form_factors_free(&mean);
-    mesh_free(&m);
-}
-END_TEST
-
 START_TEST(auto_rays_follow_the_noise_law) {
     ck_assert_uint_eq(recipe_auto_rays(.1, .25), 4096); /* sqrt(2 / 3200) = .025 */
     ck_assert_uint_eq(recipe_auto_rays(.05, .25), 16384);
@@ -308,7 +283,6 @@ int main(void) {
     tcase_add_test(cases, two_sided_sheet);
     tcase_add_test(cases, bent_quad_does_not_see_itself);
     tcase_add_test(cases, uneven_areas);
-    tcase_add_test(cases, mean_halves_the_variance);
     tcase_add_test(cases, auto_rays_follow_the_noise_law);
     tcase_add_test(cases, bad_requests_are_refused);
     suite_add_tcase(suite, cases);

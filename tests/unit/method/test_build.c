@@ -273,23 +273,24 @@ START_TEST(judge_finds_the_exact_operator_exact) {
                                    .emission = f.m.emission,
                                    .own = factor_product_of_rows(&f.F),
                                    .independent = factor_product_of_rows(&f.F),
-                                   .halves = {factor_product_of_rows(&f.F), factor_product_of_rows(&f.F)},
+                                   .other = factor_product_of_rows(&f.F),
+                                   .twins = true,
                                    .probes = 40,
                                    .seed = 1,
                                    .progress = &told};
         error_report report;
         lam_error error = {0};
         ck_assert_msg(judge_operator(op, &input, &report, &error) == LAM_OK, "%s", error.message);
-        /* The beginning, two references of a channel each, the end: both halves are the reference itself. */
+        /* The beginning, three references, the end. */
         ck_assert_uint_eq(seen.n_stages, 1);
-        ck_assert_uint_ge(seen.n_reports, 4);
+        ck_assert_uint_ge(seen.n_reports, 5);
         ck_assert(seen.share == 1);
         ck_assert_uint_eq(report.single.probes, 40);
         ck_assert_uint_eq(report.lights.probes, 1);
         const error_group *groups[3] = {&report.single, &report.lights, &report.random};
         for (int g = 0; g < 3; g++) {
             ck_assert(groups[g]->probes > 0);
-            /* The same F on both sides: total and operator figures agree, the halves do not differ. */
+            /* The same F on both sides: total and operator figures agree, the samples do not differ. */
             ck_assert_double_eq_tol(groups[g]->total_indirect.mean, groups[g]->operator_indirect.mean, 1e-12);
             ck_assert_double_eq_tol(groups[g]->reference_noise, 0, 1e-12);
             ck_assert(groups[g]->operator_indirect.max >= groups[g]->operator_indirect.mean);
@@ -345,7 +346,8 @@ START_TEST(judge_ignores_what_sees_nothing) {
                                .emission = emission,
                                .own = factor_product_of_rows(&F),
                                .independent = factor_product_of_rows(&F),
-                               .halves = {factor_product_of_rows(&F), factor_product_of_rows(&F)},
+                               .other = factor_product_of_rows(&F),
+                               .twins = true,
                                .probes = 40,
                                .seed = 1};
     error_report report;

@@ -59,25 +59,23 @@ static sample make_sample(void) {
     uint32_t order[54];
     ck_assert_uint_eq(s.m.n, 54);
     MUST(mesh_z_order(&s.m, order, error));
-    form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}}, mean = {.row_sums = NULL};
+    form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}};
     trace(&s.m, order, SEED, &s.f);
     for (uint64_t h = 0; h < 2; h++) trace(&s.m, order, SEED + 1 + h, &half[h]);
-    MUST(form_factors_mean(&half[0], &half[1], &mean, error));
     build(&s, order);
     const build_problem problem = problem_of(&s, order);
-    const judge_input input = {
-        .problem = &problem,
-        .row_sums = s.f.row_sums,
-        .emission = s.m.emission,
-        .own = factor_product_of_rows(problem.F),
-        .independent = factor_product_of_rows(&mean.F),
-        .halves = {factor_product_of_rows(&half[0].F), factor_product_of_rows(&half[1].F)},
-        .probes = PROBES,
-        .seed = 1};
+    const judge_input input = {.problem = &problem,
+                               .row_sums = s.f.row_sums,
+                               .emission = s.m.emission,
+                               .own = factor_product_of_rows(problem.F),
+                               .independent = factor_product_of_rows(&half[0].F),
+                               .other = factor_product_of_rows(&half[1].F),
+                               .twins = true,
+                               .probes = PROBES,
+                               .seed = 1};
     MUST(judge_operator(s.op, &input, &s.errors, error));
     form_factors_free(&half[0]);
     form_factors_free(&half[1]);
-    form_factors_free(&mean);
     return s;
 }
 

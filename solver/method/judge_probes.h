@@ -1,0 +1,41 @@
+/* Emissions by which an operator is judged, some at a time, and its answers to them. Private to judge.c. */
+#ifndef LAMBERT_METHOD_JUDGE_PROBES_H
+#define LAMBERT_METHOD_JUDGE_PROBES_H
+
+#include "solver/method/method.h"
+
+/* In the order of a round. */
+enum { JUDGE_RANDOM, JUDGE_LIGHTS, JUDGE_SINGLE, JUDGE_GROUPS };
+
+/* A source of emissions: single elements (or emitters), drawn without repetition, the scene's own light, and
+ * random light of all elements (emitters). */
+typedef struct probe_source {
+    const build_problem *problem;
+    const lam_operator *op;
+    const float *emission; /* [C][n], the scene's own */
+    size_t most[JUDGE_GROUPS], made[JUDGE_GROUPS];
+    uint32_t *deck;        /* [n or emitters] drawn so far, then the others */
+    uint64_t draw, random; /* states */
+} probe_source;
+
+/* singles: at most. Errors: LAM_ERR_MEMORY. */
+lam_status probe_source_make(const build_problem *problem, const lam_operator *op, const float *emission,
+                             size_t singles, size_t randoms, uint64_t seed, probe_source *out,
+                             lam_error *error);
+void probe_source_free(probe_source *s);
+
+/* Emissions E and the operator's radiosity and irradiance, [m][C][n]; those of group g are begin[g] ...
+ * begin[g + 1] - 1. Of an operator of emitters W are their weights, [m][C][s], and H0 is the light of the
+ * sky, which E contains as rho H0; else both are NULL. */
+typedef struct probes {
+    size_t m, begin[JUDGE_GROUPS + 1];
+    float *E, *B, *H, *W, *H0;
+} probes;
+
+/* The next `counts` emissions and the answers to them; H is NULL unless irradiance is asked for. Errors:
+ * LAM_ERR_MEMORY, those of the operator. */
+lam_status probes_next(probe_source *s, const size_t counts[JUDGE_GROUPS], bool irradiance, probes *out,
+                       lam_error *error);
+void probes_free(probes *p);
+
+#endif
