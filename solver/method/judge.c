@@ -248,8 +248,14 @@ static void report_round(const judge_input *input, size_t round, double part) {
     progress_report(input->progress, "judge", 1 - 1 / ((double)round + 1 + part));
 }
 
-/* Emissions of one round, against all references. The operator's own error, and the noise where the
- * references are no twins, are found in the first round. */
+/* True where the mean of a figure over its probes is known well enough. */
+static bool is_certain(const tally *t) {
+    const error_figures f = finished(&t->indirect, t->lit, 1);
+    return t->lit == 0 || f.std <= certain * f.mean * sqrt((double)t->lit);
+}
+
+/* Emissions of one round, against all references. The operator's own error is found until it is certain, the
+ * noise where the references are no twins, are found in the first round. */
 static lam_status measure(const lam_operator *op, measured *m, size_t round, group_tally *t,
                           lam_error *error) {
     lam_status status = LAM_OK;
@@ -260,7 +266,7 @@ static lam_status measure(const lam_operator *op, measured *m, size_t round, gro
     const size_t n_noisy = input->twins || m->at_once ? p->m : p->m < NOISE_PROBES ? p->m : NOISE_PROBES;
     m->x = memory_allocate(p->m, vector_of(input) * sizeof *m->x, "reference", error);
     if (m->x == NULL) TRY(LAM_ERR_MEMORY);
-    if (first) {
+    if (first || !is_certain(&t[JUDGE_SINGLE].own)) {
         TRY(solve(op, m, &input->own, false, p->m, m->x, error));
         for (int g = 0; g < JUDGE_GROUPS; g++)
             for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
@@ -285,13 +291,6 @@ done:
     return status;
 }
 
-/* True where the mean over the probes of a group is known well enough. */
-static bool is_certain(const judge_input *input, const group_tally *t) {
-    const tally *by = input->independent.n > 0 ? &t->total : &t->own;
-    const error_figures f = finished(&by->indirect, by->lit, 1);
-    return by->lit == 0 || f.std <= certain * f.mean * sqrt((double)by->lit);
-}
-
 /* The probes of the next round; false where there are none. An LU takes all of them at once. */
 static bool next_counts(const judge_input *input, const probe_source *source, const group_tally *t,
                         bool at_once, size_t counts[JUDGE_GROUPS]) {
@@ -301,7 +300,8 @@ static bool next_counts(const judge_input *input, const probe_source *source, co
     for (int g = 0; g < JUDGE_GROUPS; g++) {
         const size_t left = source->most[g] - source->made[g];
         const size_t step = g == JUDGE_RANDOM ? RANDOM_LEAST : JUDGE_AT_ONCE;
-        const bool enough = t[g].done >= least[g] && is_certain(input, &t[g]);
+        const bool enough =
+            t[g].done >= least[g] && is_certain(input->independent.n > 0 ? &t[g].total : &t[g].own);
         counts[g] = enough ? 0 : at_once || left < step ? left : step;
         all += counts[g];
     }

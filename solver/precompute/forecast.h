@@ -35,7 +35,7 @@ double forecast_bytes(const forecast *f);
 /* LAM_ERR_MEMORY when that passes limit; the message names the option that would make it fit. */
 lam_status forecast_check(const forecast *f, double limit, lam_error *error);
 
-/* Seconds that the form factors take, those of the judge's own samples, and its solves against rows: from a
+/* Seconds that the form factors take, those of the judge's own samples, and its solves: from a
  * sample of the pairs, or from the measured rays per second, and from constants for the rest of the work of a
  * thread, which were measured once. */
 typedef struct forecast_times {

@@ -111,7 +111,7 @@ static lam_status announce(precompute_state *state, lam_error *error) {
     const bool pairs = state->cost.seconds == 0 &&
                        (state->recipe.method == RECIPE_PAIRS || state->recipe.method == RECIPE_NEAR_PAIRS);
     if (!o->from_store) snprintf(made, sizeof made, " form factors %s%s,", seconds, pairs ? " or more" : "");
-    /* Answers of the operator come on top, and the products of blocks. */
+    /* Answers of the operator come on top. */
     if (state->probes > 0)
         snprintf(judged, sizeof judged, " the judge %s%s,", judging,
                  state->cost.seconds > 0 ? "" : " or more");

@@ -97,6 +97,28 @@ START_TEST(kept_blocks_have_room) {
 }
 END_TEST
 
+/* Processor seconds of the judge of closed Cornell boxes at defaults, and those of one thread that a sample
+ * expects of their blocks. */
+START_TEST(the_judge_of_blocks_takes_as_long) {
+    static const struct {
+        size_t n;
+        double blocks, judge;
+    } measured[] = {{10249, 1.2, 3.2}, {163811, 3.6, 9.5}};
+    for (size_t k = 0; k < sizeof measured / sizeof *measured; k++) {
+        const forecast f = {.n = measured[k].n,
+                            .n_channels = 1,
+                            .recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 4e-4},
+                            .judge_recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 2e-4},
+                            .cost = {.seconds = measured[k].blocks},
+                            .probes = 200,
+                            .probes_least = 32};
+        const forecast_times times = forecast_seconds(&f, 1e7, 2);
+        ck_assert_double_ge(2 * (times.judge + times.solves), measured[k].judge / 1.5);
+        ck_assert_double_le(2 * (times.judge + times.solves), measured[k].judge * 1.5);
+    }
+}
+END_TEST
+
 START_TEST(more_work_takes_longer) {
     forecast f = {.n = 100000, .n_channels = 1, .recipe = recipes[1], .judge_recipe = recipes[1]};
     const forecast_times one = forecast_seconds(&f, 1e7, 2);
@@ -152,6 +174,7 @@ int main(void) {
     tcase_add_loop_test(cases, files_are_within_the_forecast, 0, sizeof recipes / sizeof *recipes);
     tcase_add_test(cases, fewer_bits_take_less_of_the_disk);
     tcase_add_test(cases, kept_blocks_have_room);
+    tcase_add_test(cases, the_judge_of_blocks_takes_as_long);
     tcase_add_test(cases, more_work_takes_longer);
     tcase_add_test(cases, what_does_not_fit_is_refused);
     suite_add_tcase(suite, cases);
