@@ -164,17 +164,21 @@ START_TEST(sky_lights_what_reflects) {
     float *out = test_allocate(count, sizeof *out);
     void *work = malloc(work_bytes);
     lam_error error;
-    for (size_t i = 0; i < count; i++) lit[i] = E[i] + t->reflectance[i % size] * H0[i];
-    for (int q = 0; q < QUANTITIES; q++) {
-        float *expected = transport_apply(t->op, false, n_rhs, quantities[q], lit);
+    /* At last the sky alone. */
+    for (int q = 0; q < 2 * QUANTITIES; q++) {
+        const lam_quantity quantity = quantities[q % QUANTITIES];
+        for (size_t i = 0; i < count; i++) {
+            if (q >= QUANTITIES) E[i] = 0;
+            lit[i] = E[i] + t->reflectance[i % size] * H0[i];
+        }
+        float *expected = transport_apply(t->op, false, n_rhs, quantity, lit);
         for (size_t i = 0; i < count; i++) {
             out[i] = NAN;
-            if (quantities[q] == LAM_IRRADIANCE) expected[i] += H0[i];
+            if (quantity == LAM_IRRADIANCE) expected[i] += H0[i];
         }
         memset(work, 0xff, work_bytes);
-        ck_assert_int_eq(
-            lam_operator_apply_lit(t->op, n_rhs, quantities[q], E, H0, out, work, work_bytes, &error),
-            LAM_OK);
+        ck_assert_int_eq(lam_operator_apply_lit(t->op, n_rhs, quantity, E, H0, out, work, work_bytes, &error),
+                         LAM_OK);
         ck_assert_mem_eq(out, expected, count * sizeof *out);
         free(expected);
     }
