@@ -84,10 +84,13 @@ void terminal_log(terminal *t, const char *format, ...) {
 
 void terminal_log_stage(terminal *t, const char *name, double seconds) {
     terminal_log(t, "%-14s%8.2f s", name, seconds);
-    if (t->n_done == TERMINAL_STAGES) return;
-    terminal_stage *stage = &t->done[t->n_done++];
+    size_t k = 0;
+    while (k < t->n_done && strncmp(t->done[k].name, name, sizeof t->done[k].name - 1) != 0) k++;
+    if (k == TERMINAL_STAGES) return;
+    terminal_stage *stage = &t->done[k];
     snprintf(stage->name, sizeof stage->name, "%s", name);
-    stage->seconds = seconds;
+    stage->seconds = k < t->n_done ? stage->seconds + seconds : seconds;
+    if (k == t->n_done) t->n_done++;
 }
 
 void terminal_warn(terminal *t, const char *format, ...) {

@@ -37,8 +37,8 @@ progress terminal_progress(terminal *t);
 /* One line of the log; nothing with quiet. Erases the progress line first. */
 void terminal_log(terminal *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-/* Logs "NAME   1.23 s" and keeps it in done, of which later stages than the TERMINAL_STAGES-th are left out.
- */
+/* Logs "NAME   1.23 s" and keeps it in done, where equal names add up, and of which later stages than the
+ * TERMINAL_STAGES-th are left out. */
 void terminal_log_stage(terminal *t, const char *name, double seconds);
 
 /* One line that quiet does not silence: "PROGRAM: warning: ...". */

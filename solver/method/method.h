@@ -84,6 +84,8 @@ enum {
     METHOD_STREAMS = 2,       /* it can build from a stream of rows instead of F */
     METHOD_FILTERS_NOISE = 4, /* it leaves out most of the noise of rays, so fewer rays are enough */
     METHOD_BLOCKS = 8,        /* it can build from blocks of form factors instead of F */
+    METHOD_KEEPS_EPSILON =
+        16, /* its epsilon is an error of answers, which trials keep where it is measured */
 };
 
 /* One method. own points to a struct of the method that its rows fill; a NULL function has no effect.

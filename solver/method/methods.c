@@ -78,8 +78,11 @@ const option_row build_rows[] = {
      .least = 0,
      .most = 1,
      .above = true,
-     .help = "low-rank: bound on the error of the factorization in the 2-norm; hierarchical: fifty times the "
-             "smallest coefficient that is stored; auto: the error at which methods are compared"},
+     .help =
+         "low-rank: bound on the error of the factorization in the 2-norm; hierarchical: the "
+         "stated indirect error of the scene's own lights, which up to three trials keep where it is given "
+         "and measured (--probes), begun with coefficients above a fiftieth of it; auto: the error at which "
+         "methods are compared"},
     {.name = "store-precision",
      .kind = OPTION_CHOICE,
      .offset = offsetof(build_options, precision),

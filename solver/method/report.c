@@ -11,6 +11,8 @@ static const report_words words[] = {
     {"factorizer", "factorizer", ""},
     {"rcond", "reciprocal condition number", ""},
     {"epsilon", "norm error at most", ""},
+    {"epsilon_stated", "error that --epsilon is about, as stated", ""},
+    {"trials", "trials", ""},
     {"measured_norm_error", "measured norm error", ""},
     {"norm", "order of the norm", ""},
     {"rank", "rank", ""},

@@ -1,5 +1,8 @@
 #include "solver/precompute/error_advice.h"
 
+#include "solver/precompute/forecast.h"
+#include "solver/precompute/trial.h"
+
 #include <math.h>
 #include <stdio.h>
 
@@ -14,38 +17,47 @@ static double one_digit(double x) {
     return floor(x / unit + 1e-9) * unit;
 }
 
-/* The least power of two times rays that lowers an error, which is as rays^-1/2, to error_most. */
-static size_t rays_for(size_t rays, double error) {
+/* The least power of two times rays that lowers an error, which is as rays^-1/2, to most. */
+static size_t rays_for(size_t rays, double error, double most) {
     size_t more = 2 * rays;
-    while (more < RECIPE_RAYS_MOST && (double)rays * pow(error / error_most, 2) > (double)more) more *= 2;
+    while (more < RECIPE_RAYS_MOST && (double)rays * pow(error / most, 2) > (double)more) more *= 2;
     return more < RECIPE_RAYS_MOST ? more : RECIPE_RAYS_MOST;
 }
 
-static void advise(const error_advice_input *input, const error_group *g, char option[64]) {
+static void advise(const error_advice_input *input, const error_group *g, double most, char option[64]) {
     const recipe *r = &input->recipe;
     const double error = g->total_indirect.mean, of_operator = g->operator_indirect.mean;
     const bool compressed = of_operator * of_operator > compression_share * error * error;
-    if (r->method == RECIPE_BLOCKS || (compressed && !input->by_noise))
-        snprintf(option, 64, "--epsilon %g", one_digit(input->epsilon * error_most / error));
+    char memory[32];
+    forecast_format_bytes(input->lacking, memory);
+    if (input->lacking > 0)
+        snprintf(option, 64, "--memory %s", memory);
+    else if (r->method == RECIPE_BLOCKS && input->spent && !compressed)
+        snprintf(option, 64, "--form-factors rays");
+    else if (r->method == RECIPE_BLOCKS || (compressed && !input->by_noise))
+        snprintf(option, 64, "--epsilon %g", one_digit(input->epsilon * most / error));
     else if (r->method == RECIPE_RAYS || r->method == RECIPE_NEAR_PAIRS)
-        snprintf(option, 64, "--rays %zu", rays_for(r->rays, error));
+        snprintf(option, 64, "--rays %zu", rays_for(r->rays, error, most));
     else if (r->method == RECIPE_HEMICUBE)
         snprintf(option, 64, "--form-factors rays");
     else
-        snprintf(option, 64, input->finest ? "a finer mesh" : "--quality high");
+        snprintf(option, 64, input->finest || input->spent ? "a finer mesh" : "--quality high");
 }
 
 void error_advice(const error_advice_input *input, char text[ERROR_ADVICE_BYTES]) {
     const error_report *e = input->errors;
+    const double most = input->asked > 0 ? input->asked : error_most;
     const bool lights =
-        e->lights.probes > 0 && !(e->lights.total_indirect.mean < e->random.total_indirect.mean);
+        e->lights.probes > 0 &&
+        (input->asked > 0 || !(e->lights.total_indirect.mean < e->random.total_indirect.mean));
     const error_group *g = lights ? &e->lights : &e->random;
     char option[64];
     text[0] = '\0';
-    if (!e->has_total || !(g->total_indirect.mean > error_most)) return;
-    advise(input, g, option);
+    if (!e->has_total || !(g->total_indirect.mean > most)) return;
+    advise(input, g, most, option);
     snprintf(text, ERROR_ADVICE_BYTES,
-             "the indirect error of %s is stated as %.2g, above %g; %s%s would lower it",
-             lights ? "the scene's own lights" : "random emission", g->total_indirect.mean, error_most,
-             input->from_store ? "the scene precomputed with " : "", option);
+             "the indirect error of %s is stated as %.2g, above %g%s; %s%s would lower it",
+             lights ? "the scene's own lights" : "random emission", g->total_indirect.mean, most,
+             input->asked > 0 ? " of --epsilon" : "", input->from_store ? "the scene precomputed with " : "",
+             option);
 }

@@ -16,8 +16,11 @@ static double memory_of(const precompute_options *o) {
 }
 
 precompute_state state_begin(const precompute_options *options, terminal *t) {
-    return (precompute_state){
-        .options = options, .t = t, .progress = terminal_progress(t), .memory = memory_of(options)};
+    return (precompute_state){.options = options,
+                              .t = t,
+                              .progress = terminal_progress(t),
+                              .memory = memory_of(options),
+                              .trial = {.epsilon = options->build.epsilon}};
 }
 
 void state_free(precompute_state *state) {
@@ -33,6 +36,7 @@ void state_free(precompute_state *state) {
     emitter_list_free(&state->emitters);
     scratch_close(state->scratch, false);
     lam_operator_close(state->op);
+    trial_made_free(&state->trial.best);
 }
 
 uint64_t precompute_seed(uint64_t seed, seed_purpose purpose) {
@@ -177,10 +181,58 @@ static void list_unused(const precompute_state *state, const option_result *give
     }
 }
 
+/* Form factors, unless they are there, operator and judge. */
+static lam_status run_trial(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    double started = clock_seconds();
+    const bool made = state->f.row_sums != NULL;
+    if (!made) {
+        TRY(state->recipe.method == RECIPE_BLOCKS ? stage_blocks(state, error)
+            : state->streamed                     ? stage_near_pairs(state, error)
+                                                  : stage_form_factors(state, error));
+        log_stage(state, state->streamed ? "near pairs" : "form factors", started);
+    }
+    if (!state->streamed && state->trial.count == 0) log_form_factors(state);
+
+    TRY(stage_operator(state, error));
+    if (state->streamed && state->trial.count == 0) log_form_factors(state);
+    TRY(terminal_check(error));
+
+    if (state->probes > 0) {
+        started = clock_seconds();
+        TRY(stage_judge(state, error));
+        log_stage(state, "judge", started);
+    }
+    TRY(terminal_check(error));
+done:
+    return status;
+}
+
+/* Trials until --epsilon is kept. One that memory has no room for leaves the best of those before. */
+static lam_status run_trials(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    do {
+        status = run_trial(state, error);
+        if (status == LAM_ERR_MEMORY && state->trial.best.op != NULL) {
+            terminal_warn(state->t, "trial %zu: %s", state->trial.count + 1, error->message);
+            *error = (lam_error){.message = ""};
+            state_take_back(state);
+            break;
+        }
+        TRY(status);
+    } while (state_next_trial(state));
+    state_report_trials(state);
+    state_advise(state);
+    status = LAM_OK;
+done:
+    return status;
+}
+
 lam_status precompute_run(const precompute_options *options, const option_result *given, terminal *t,
                           precompute_result *result, lam_error *error) {
     lam_status status = LAM_OK;
     precompute_state state = state_begin(options, t);
+    if (options_given(given, "epsilon")) state.trial.asked = options->build.epsilon;
 
     double started = clock_seconds();
     TRY(options->from_store ? stage_load_store(&state, error) : stage_load_scene(&state, error));
@@ -194,18 +246,7 @@ lam_status precompute_run(const precompute_options *options, const option_result
 
     TRY(stage_open_scratch(&state, error));
     TRY(announce(&state, error));
-    if (!options->from_store) {
-        started = clock_seconds();
-        TRY(state.recipe.method == RECIPE_BLOCKS ? stage_blocks(&state, error)
-            : state.streamed                     ? stage_near_pairs(&state, error)
-                                                 : stage_form_factors(&state, error));
-        log_stage(&state, state.streamed ? "near pairs" : "form factors", started);
-    }
-    if (!state.streamed) log_form_factors(&state);
-
-    TRY(stage_operator(&state, error));
-    if (state.streamed) log_form_factors(&state);
-    TRY(terminal_check(error));
+    TRY(run_trials(&state, error));
 
     if (state_compresses(options)) {
         started = clock_seconds();
@@ -213,13 +254,6 @@ lam_status precompute_run(const precompute_options *options, const option_result
         log_stage(&state, "compress", started);
         TRY(terminal_check(error));
     }
-
-    if (state.probes > 0) {
-        started = clock_seconds();
-        TRY(stage_judge(&state, error));
-        log_stage(&state, "judge", started);
-    }
-    TRY(terminal_check(error));
 
     started = clock_seconds();
     TRY(stage_store(&state, error));

@@ -11,6 +11,28 @@
 #include "solver/precompute/error_advice.h"
 #include "solver/precompute/forecast.h"
 #include "solver/precompute/precompute.h"
+#include "solver/precompute/trial.h"
+
+/* All that a trial of --epsilon makes. */
+typedef struct trial_made {
+    form_factors f; /* row_sums are NULL: those of the state */
+    block_factors blocks;
+    lam_operator *op; /* NULL: nothing was made */
+    build_report built;
+    error_report errors;
+    double epsilon; /* that it was built for */
+} trial_made;
+
+/* The trials of an --epsilon that is an error to keep. */
+typedef struct trial_course {
+    double asked;    /* 0: nothing is kept */
+    double epsilon;  /* that the operator is built for */
+    size_t count;    /* of trials that ended */
+    double lacking;  /* bytes that a finer trial would have needed; 0: memory was no limit */
+    double factors;  /* that part of the error before the form factors were made anew; 0: they were not */
+    bool spent;      /* which hardly lowered it: they are not made again */
+    trial_made best; /* before the last */
+} trial_course;
 
 /* Single elements by which an operator is judged at least, unless --probes gives their number. */
 enum { PROBES_LEAST = 32 };
@@ -47,6 +69,7 @@ typedef struct precompute_state {
     lam_operator *op;
     build_report built;
     error_report errors;
+    trial_course trial;
     char advice[ERROR_ADVICE_BYTES]; /* on them; "" where there is none */
 } precompute_state;
 
@@ -114,6 +137,21 @@ build_options state_build_options(const precompute_state *state);
 
 lam_status stage_operator(precompute_state *state, lam_error *error);
 lam_status stage_judge(precompute_state *state, lam_error *error);
+
+/* Warns of a stated error that is large, or above that of --epsilon, and names the option that lowers it:
+ * stage_operator.c. */
+void state_advise(precompute_state *state);
+
+/* After form factors, operator and judge: where --epsilon asks for a smaller error, turns the knobs and
+ * releases all that is to be made again; false: the best trial is in place. The trial that was put aside in
+ * place of one that failed. The figures of the trials, into the report: stage_trials.c. */
+bool state_next_trial(precompute_state *state);
+void state_take_back(precompute_state *state);
+void state_report_trials(precompute_state *state);
+void trial_made_free(trial_made *made);
+
+/* The accuracy of pairs at --quality high: stage_scene.c. */
+double state_finest_accuracy(void);
 
 /* Compresses the form factors where that was asked for and takes less than they do: stage_compress.c. */
 lam_status stage_compress(precompute_state *state, lam_error *error);

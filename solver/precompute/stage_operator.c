@@ -52,9 +52,12 @@ build_options state_build_options(const precompute_state *state) {
     const csr *F = &state->f.F;
     const double rows = F->place != NULL || F->indptr == NULL ? 0 : (double)F->indptr[state->m.n] * 8;
     build_options how = state->options->build;
+    lam_error none;
     how.memory = (size_t)fmax(1, state->memory - rows - 400 * (double)state->m.n);
     how.seed = state->options->seed;
     how.progress = &state->progress;
+    if (state->trial.epsilon != how.epsilon) /* of a trial: below one that is in its limits */
+        (void)build_set_number(&how, "epsilon", state->trial.epsilon, &none);
     return how;
 }
 
@@ -214,14 +217,19 @@ static lam_status trace_again(precompute_state *state, lam_error *error) {
     return status;
 }
 
-static void give_advice(precompute_state *state) {
+void state_advise(precompute_state *state) {
     const precompute_options *o = state->options;
     const error_advice_input input = {.errors = &state->errors,
                                       .recipe = state->f.recipe,
-                                      .epsilon = o->build.epsilon,
+                                      .asked = state->trial.count > 0 ? state->trial.asked : 0,
+                                      .epsilon = state->trial.epsilon,
+                                      .lacking = state->trial.lacking,
+                                      .spent = state->trial.spent,
                                       .by_noise = state->built.by_noise,
-                                      .finest = strcmp(o->quality, "high") == 0,
+                                      .finest = strcmp(o->quality, "high") == 0 ||
+                                                state->f.recipe.accuracy <= state_finest_accuracy(),
                                       .from_store = o->from_store};
+    if (state->probes == 0) return;
     error_advice(&input, state->advice);
     if (state->advice[0] != '\0') terminal_warn(state->t, "%s", state->advice);
 }
@@ -262,7 +270,6 @@ lam_status stage_judge(precompute_state *state, lam_error *error) {
     log_figures(state->t, "single", &state->errors.single, state->errors.has_total);
     log_figures(state->t, "lights", &state->errors.lights, state->errors.has_total);
     log_figures(state->t, "random", &state->errors.random, state->errors.has_total);
-    give_advice(state);
 done:
     return status;
 }

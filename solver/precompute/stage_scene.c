@@ -103,6 +103,10 @@ static const quality_level *level_of(const char *name) {
     return &levels[k];
 }
 
+double state_finest_accuracy(void) {
+    return level_of("high")->accuracy;
+}
+
 /* Rays that keep the noise of the samples the quality's part below epsilon, or the number given. */
 static size_t choice_rays(const choice_request *asked) {
     if (asked->rays != OPTION_AUTO) return (size_t)asked->rays;

@@ -89,6 +89,35 @@ START_TEST(other_recipes) {
 }
 END_TEST
 
+/* The error that --epsilon asks for is that of the lights alone, where there are any. */
+START_TEST(an_error_asked_for) {
+    char text[ERROR_ADVICE_BYTES];
+    const error_report errors = {
+        .lights = {.probes = 1, .total_indirect = {.012, 0, .012}, .operator_indirect = {.002, 0, .002}},
+        .random = {.probes = 8, .total_indirect = {.5, 0, .5}, .operator_indirect = {.5, 0, .5}},
+        .has_total = true};
+    error_advice_input input = {.errors = &errors, .recipe = rays, .asked = .012, .epsilon = .001};
+    error_advice(&input, text);
+    ck_assert_str_eq(text, "");
+    input.asked = .01; /* 1,024 (.012 / .01)^2 = 1,475 */
+    error_advice(&input, text);
+    ck_assert_str_eq(text, "the indirect error of the scene's own lights is stated as 0.012, above 0.01 of "
+                           "--epsilon; --rays 2048 would lower it");
+    input.lacking = 0x1p31;
+    error_advice(&input, text);
+    ck_assert_ptr_nonnull(strstr(text, "; --memory 2.0G would"));
+    input = (error_advice_input){.errors = &errors, .recipe = blocks, .asked = .01, .epsilon = .001};
+    error_advice(&input, text); /* the largest number of one digit below .001 / 1.2 */
+    ck_assert_ptr_nonnull(strstr(text, "; --epsilon 0.0008 would"));
+    input.spent = true;
+    error_advice(&input, text);
+    ck_assert_ptr_nonnull(strstr(text, "; --form-factors rays would"));
+    input.recipe = pairs;
+    error_advice(&input, text);
+    ck_assert_ptr_nonnull(strstr(text, "; a finer mesh would"));
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("error_advice");
     TCase *cases = tcase_create("error_advice");
@@ -96,6 +125,7 @@ int main(void) {
     tcase_add_test(cases, noise_takes_rays);
     tcase_add_test(cases, compression_takes_epsilon);
     tcase_add_test(cases, other_recipes);
+    tcase_add_test(cases, an_error_asked_for);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }

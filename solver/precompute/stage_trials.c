@@ -1,0 +1,160 @@
+/* --epsilon kept: after a trial, that is form factors, operator and judge, either it is good enough, or the
+ * next one gets finer knobs (trial.h). The best stays. */
+#include "solver/precompute/precompute_state.h"
+
+#include <stdlib.h>
+
+void trial_made_free(trial_made *made) {
+    form_factors_free(&made->f);
+    block_factors_free(&made->blocks);
+    lam_operator_close(made->op);
+    *made = (trial_made){.op = NULL};
+}
+
+/* Puts the operator of the trial that just ended aside. */
+static void set_aside(precompute_state *state) {
+    trial_made_free(&state->trial.best);
+    state->trial.best = (trial_made){
+        .op = state->op, .built = state->built, .errors = state->errors, .epsilon = state->trial.epsilon};
+    state->op = NULL;
+}
+
+/* Makes room for other form factors. The operator put aside keeps those that it was built from, their rows
+ * only where the store keeps them. */
+static void release_factors(precompute_state *state) {
+    trial_made *best = &state->trial.best;
+    if (!state_keeps(state->options)) {
+        csr_free(&state->f.F);
+        block_factors_free(&state->blocks);
+    }
+    if (best->f.row_sums == NULL) {
+        best->f = state->f;
+        best->blocks = state->blocks;
+    } else {
+        form_factors_free(&state->f);
+        block_factors_free(&state->blocks);
+    }
+    state->f = (form_factors){.row_sums = NULL};
+    state->blocks = (block_factors){.n = 0};
+}
+
+void state_take_back(precompute_state *state) {
+    trial_made *best = &state->trial.best;
+    lam_operator_close(state->op);
+    state->op = best->op;
+    state->built = best->built;
+    state->errors = best->errors;
+    state->trial.epsilon = best->epsilon;
+    best->op = NULL;
+    if (best->f.row_sums == NULL) return;
+    form_factors_free(&state->f);
+    block_factors_free(&state->blocks);
+    state->f = best->f;
+    state->blocks = best->blocks;
+    best->f = (form_factors){.row_sums = NULL};
+    best->blocks = (block_factors){.n = 0};
+}
+
+static double error_of(const error_report *errors) {
+    return trial_group(errors)->total_indirect.mean;
+}
+
+/* Bytes of the next trial, beside the operator, and where they are kept the form factors, of this one. */
+static double bytes_of(precompute_state *state, const trial_knobs *next) {
+    const recipe before = state->recipe;
+    const bool streamed = state->streamed, again = trial_recipes_differ(&before, &next->recipe);
+    build_options how = state_build_options(state);
+    lam_error none;
+    double beside = (double)lam_operator_bytes(state->op);
+    if (again && state_keeps(state->options)) beside += forecast_rows_bytes((double)state->m.n, &before);
+    (void)build_set_number(&how, "epsilon", next->epsilon, &none); /* below one that is in its limits */
+    state->recipe = next->recipe;
+    state->streamed = streamed && again; /* else the judge's rows are there */
+    forecast f = state_forecast(state, (double)state->m.n);
+    state->recipe = before;
+    state->streamed = streamed;
+    f.build = &how;
+    f.cost = (pairs_cost){.seconds = 0};
+    return forecast_bytes(&f) + beside;
+}
+
+/* Takes turns back until memory suffices: rays are halved, blocks made coarser; false where none is left. */
+static bool fit(precompute_state *state, const trial_knobs *from, trial_knobs *next) {
+    while (bytes_of(state, next) > state->memory) {
+        recipe *r = &next->recipe;
+        state->trial.lacking = bytes_of(state, next);
+        if (!trial_recipes_differ(&from->recipe, r)) return false;
+        r->rays = r->rays / 2 > from->recipe.rays ? r->rays / 2 : from->recipe.rays;
+        r->accuracy = r->accuracy * 2 < from->recipe.accuracy ? r->accuracy * 2 : from->recipe.accuracy;
+    }
+    return next->epsilon != from->epsilon || trial_recipes_differ(&from->recipe, &next->recipe);
+}
+
+/* Rows of a store are as they are, and those of a scratch folder are kept for a run that goes on. */
+static trial_limits limits_of(const precompute_state *state) {
+    const precompute_options *o = state->options;
+    const bool made = !o->from_store && o->scratch == NULL && !state->trial.spent;
+    return (trial_limits){
+        .rays = made && o->rays == OPTION_AUTO, .accuracy = made, .finest = state_finest_accuracy()};
+}
+
+/* Finer form factors are no use where they left more than this share of their part of the error: a finer
+ * bound changes nothing where blocks are single pairs of elements. */
+static const double spent_share = .9;
+
+/* The knobs of the next trial; false: there is none, as nothing can be turned. */
+static bool turn(precompute_state *state, const trial_knobs *from, trial_knobs *next) {
+    const trial_errors errors = trial_errors_of(trial_group(&state->errors), state->built.by_noise);
+    state->trial.spent = state->trial.spent ||
+                         (state->trial.factors > 0 && errors.factors > spent_share * state->trial.factors);
+    trial_limits limits = limits_of(state);
+    state->trial.factors = 0;
+    state->trial.lacking = 0;
+    if (!trial_turn(state->trial.asked, &errors, &limits, from, next)) return false;
+    if (fit(state, from, next)) return true;
+    limits.rays = limits.accuracy = false;
+    return trial_turn(state->trial.asked, &errors, &limits, from, next) && fit(state, from, next);
+}
+
+bool state_next_trial(precompute_state *state) {
+    trial_course *all = &state->trial;
+    const trial_knobs from = {.epsilon = all->epsilon, .recipe = state->recipe};
+    trial_knobs next = from;
+    char knobs[TRIAL_TEXT] = "";
+    const error_group *g = trial_group(&state->errors);
+    const double error = g->total_indirect.mean;
+    if (all->asked == 0 || state->probes == 0 ||
+        !(method_find(state->built.method)->flags & METHOD_KEEPS_EPSILON))
+        return false;
+    all->count++;
+    const bool better = all->best.op == NULL || error < error_of(&all->best.errors);
+    const bool again = error > all->asked && all->count < TRIALS_MOST && turn(state, &from, &next);
+    if (again) trial_describe(&from, &next, knobs);
+    terminal_log(state->t, "trial %zu: the indirect error of %s is stated as %.2g, --epsilon asks for %g%s%s",
+                 all->count, g == &state->errors.lights ? "the scene's own lights" : "random emission", error,
+                 all->asked, again ? "; next: " : "", knobs);
+    if (!again) {
+        if (!better) state_take_back(state);
+        return false;
+    }
+    if (better) set_aside(state);
+    lam_operator_close(state->op);
+    state->op = NULL;
+    if (trial_recipes_differ(&from.recipe, &next.recipe)) {
+        all->factors = trial_errors_of(g, state->built.by_noise).factors;
+        release_factors(state);
+    } else {
+        state->streamed = false; /* the rows are there, as the judge needed them */
+    }
+    state->recipe = next.recipe;
+    all->epsilon = next.epsilon;
+    return true;
+}
+
+void state_report_trials(precompute_state *state) {
+    const trial_course *all = &state->trial;
+    if (all->count == 0) return;
+    report_number(&state->built, "epsilon", all->asked);
+    report_number(&state->built, "epsilon_stated", error_of(&state->errors));
+    report_count(&state->built, "trials", (double)all->count);
+}

@@ -1,0 +1,97 @@
+#include "solver/precompute/trial.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* Of the error asked for: the laws are no exact ones. */
+static const double aimed_share = .9;
+static const double turn_most = 64;
+static const double power_of_epsilon = .6, power_of_rays = -.5, power_of_pairs = 1, power_of_blocks = .5;
+
+const error_group *trial_group(const error_report *errors) {
+    return errors->lights.probes > 0 ? &errors->lights : &errors->random;
+}
+
+trial_errors trial_errors_of(const error_group *g, bool by_noise) {
+    const double total = g->total_indirect.mean, compression = g->operator_indirect.mean;
+    return (trial_errors){.total = total,
+                          .compression = compression,
+                          .factors = sqrt(fmax(total * total - compression * compression, 0)),
+                          .by_noise = by_noise};
+}
+
+/* The factor of a knob that takes an error, which is as its power, from one value to another below it. */
+static double factor_for(double from, double to, double power) {
+    return fmin(fmax(pow(to / from, 1 / power), 1 / turn_most), turn_most);
+}
+
+static bool finer_recipe(const trial_limits *limits, double error, double wanted, recipe *r) {
+    const recipe before = *r;
+    if (!(wanted < error)) return false;
+    switch (r->method) {
+    case RECIPE_RAYS:
+    case RECIPE_NEAR_PAIRS:
+        while (limits->rays && r->rays < RECIPE_RAYS_MOST &&
+               (double)r->rays < (double)before.rays * factor_for(error, wanted, power_of_rays))
+            r->rays *= 2;
+        if (r->rays > RECIPE_RAYS_MOST) r->rays = RECIPE_RAYS_MOST;
+        break;
+    case RECIPE_PAIRS:
+        if (limits->accuracy && r->accuracy > limits->finest)
+            r->accuracy = fmax(r->accuracy * factor_for(error, wanted, power_of_pairs), limits->finest);
+        break;
+    case RECIPE_BLOCKS:
+        if (limits->accuracy) r->accuracy *= factor_for(error, wanted, power_of_blocks);
+        break;
+    case RECIPE_HEMICUBE:
+        break;
+    }
+    return trial_recipes_differ(&before, r);
+}
+
+static bool finer_epsilon(double error, double wanted, double *epsilon) {
+    if (!(wanted < error)) return false;
+    *epsilon *= factor_for(error, wanted, power_of_epsilon);
+    return true;
+}
+
+/* The size that one part of the error may have where the other one is `other` and stays. */
+static double rest_of(double wanted, double other) {
+    return fmax(sqrt(fmax(wanted * wanted - other * other, 0)), other / 2);
+}
+
+bool trial_turn(double asked, const trial_errors *errors, const trial_limits *limits, const trial_knobs *from,
+                trial_knobs *next) {
+    const double wanted = aimed_share * asked, half = wanted * sqrt(.5);
+    const double C = errors->compression, F = errors->factors;
+    *next = *from;
+    /* Compression then follows the rays. */
+    if (errors->by_noise) return finer_recipe(limits, errors->total, wanted, &next->recipe);
+    const bool both = fmin(C, F) > half;
+    const double wanted_F = both ? half : C > F ? F : rest_of(wanted, C);
+    const bool turned = finer_recipe(limits, F, wanted_F, &next->recipe);
+    const double wanted_C = both && turned ? half : F >= C && turned ? C : rest_of(wanted, F);
+    return finer_epsilon(C, wanted_C, &next->epsilon) || turned;
+}
+
+bool trial_recipes_differ(const recipe *a, const recipe *b) {
+    return a->method != b->method || a->rays != b->rays || a->resolution != b->resolution ||
+           a->accuracy != b->accuracy || a->seed != b->seed;
+}
+
+void trial_describe(const trial_knobs *from, const trial_knobs *to, char text[TRIAL_TEXT]) {
+    char epsilon[64] = "", rays[48] = "", accuracy[64] = "";
+    const bool turned = to->epsilon != from->epsilon;
+    if (turned)
+        snprintf(epsilon, sizeof epsilon, "coefficients for --epsilon %.2g in place of %.2g", to->epsilon,
+                 from->epsilon);
+    if (to->recipe.rays != from->recipe.rays)
+        snprintf(rays, sizeof rays, "%s%zu rays in place of %zu", turned ? ", " : "", to->recipe.rays,
+                 from->recipe.rays);
+    if (to->recipe.accuracy != from->recipe.accuracy)
+        snprintf(accuracy, sizeof accuracy, "%s%s to %.2g in place of %.2g", turned ? ", " : "",
+                 to->recipe.method == RECIPE_BLOCKS ? "blocks" : "pairs", to->recipe.accuracy,
+                 from->recipe.accuracy);
+    snprintf(text, TRIAL_TEXT, "%s%s%s", epsilon, rays, accuracy);
+}

@@ -1,0 +1,49 @@
+/* --epsilon as an error that is kept: the knobs of a build, and how a finished trial turns them. */
+#ifndef LAMBERT_PRECOMPUTE_TRIAL_H
+#define LAMBERT_PRECOMPUTE_TRIAL_H
+
+#include "solver/formfactor/recipe.h"
+#include "solver/method/judge.h"
+
+/* Operators that are built for one --epsilon, at most. */
+enum { TRIALS_MOST = 3 };
+
+typedef struct trial_knobs {
+    double epsilon; /* that the operator is built for: its threshold */
+    recipe recipe;  /* of the form factors: rays, or the accuracy of pairs or blocks */
+} trial_knobs;
+
+/* The knobs of a recipe that may be turned, and the finest accuracy of pairs. */
+typedef struct trial_limits {
+    bool rays, accuracy;
+    double finest;
+} trial_limits;
+
+/* The stated error of a trial, and its parts, which add up in squares: compression is the error against the
+ * very F that the operator was built from, factors the rest of it. */
+typedef struct trial_errors {
+    double total, compression, factors;
+    bool by_noise; /* the threshold follows the noise of rays, and not epsilon */
+} trial_errors;
+
+/* The group that --epsilon is about: the scene's own lights, or random emission where it has none. */
+const error_group *trial_group(const error_report *errors);
+trial_errors trial_errors_of(const error_group *g, bool by_noise);
+
+/* True if a finer trial is worth while for a total error of at most `asked`, which errors->total is above,
+ * and sets *next. The larger part is turned, and the smaller one too where it is more than half of the
+ * squared error asked for; a part without a free knob stays, and the other is not pushed below half of it.
+ * Laws: the noise of rays falls as N^-1/2; an error of pairs as their accuracy; of blocks as the root of
+ * theirs (at most); compression as epsilon^.6 (measured: .58 to 1.03, Cornell boxes of 641 and 5,000
+ * elements). No knob is turned by more than a factor of 64. */
+bool trial_turn(double asked, const trial_errors *errors, const trial_limits *limits, const trial_knobs *from,
+                trial_knobs *next);
+
+/* True if the form factors of the two differ. */
+bool trial_recipes_differ(const recipe *a, const recipe *b);
+
+/* "coefficients for --epsilon 0.002 in place of 0.01, 4096 rays in place of 512": the knobs that differ. */
+enum { TRIAL_TEXT = 160 };
+void trial_describe(const trial_knobs *from, const trial_knobs *to, char text[TRIAL_TEXT]);
+
+#endif
