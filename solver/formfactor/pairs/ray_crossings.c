@@ -74,10 +74,9 @@ static ray ray_of(const mesh *m, size_t i, uint64_t *seed) {
 #define LESS(a, b) ((a) < (b) ? (a) : (b))
 #define MORE(a, b) ((a) > (b) ? (a) : (b))
 
-/* entry[i]: the distance at which a ray enters box i; infinite where it misses it. Boxes that are flat are
- * crossed in spite of rounding. */
+/* entry[i]: the distance at which a ray enters box i; infinite where it misses it. Those of a
+ * box that is flat are equal in its direction, whatever rounding does. */
 static void find_entries(const ray *r, const boxes *b, size_t n, float *restrict entry) {
-    const float slack = (float)b->slack;
     float from[3], times[3];
     for (int k = 0; k < 3; k++) {
         from[k] = (float)(r->origin[k] - b->corner[k]);
@@ -93,7 +92,7 @@ static void find_entries(const ray *r, const boxes *b, size_t n, float *restrict
             first = MORE(first, near);
             last = LESS(last, far);
         }
-        entry[i] = first <= last + slack ? first : INFINITY;
+        entry[i] = first <= last ? first : INFINITY;
     }
 }
 

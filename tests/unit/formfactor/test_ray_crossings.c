@@ -53,13 +53,23 @@ START_TEST(a_square_alone) {
     const ray_crossings w = crossings(&m, 7);
     ck_assert_double_eq(w.boxes, 2);
     ck_assert_double_eq(w.hits, 0);
+    /* Nor by its own ray, in a plane where rounding places the origin above or below. */
+    const float tilted = (float)sqrt(1. / 3);
+    double slope[3][3] = {{1.1, .3, .7}, {.3, 1.9, -.1}, {.6, .1, 1.4}};
+    for (int v = 0; v < 3; v++) slope[v][2] = 2.1 - slope[v][0] - slope[v][1];
+    uint32_t triangle[1][4] = {{0, 1, 2, MESH_NO_VERTEX}};
+    float up[1][3] = {{tilted, tilted, tilted}};
+    const mesh one = {.n_vertices = 3, .vertices = slope, .n = 1, .elements = triangle, .normal = up};
+    ck_assert_double_eq(crossings(&one, 7).boxes, 1);
+    ck_assert_double_eq(crossings(&one, 7).hits, 0);
 }
 END_TEST
 
 /* A square of side 2 h at height h above a small one sees it with the factor of a point below its centre,
  * (4 / pi) X / sqrt(1 + X^2) atan(X / sqrt(1 + X^2)), X = 1 of a quarter: .5541. Of rays from both, half come
  * from the small one; those of the large one hit it with the factor times the ratio of areas, 1e-4. The
- * sample of 256 rays has a standard deviation of sqrt(.277 * .723 / 256) = .028. */
+ * sample of 256 rays has a standard deviation of sqrt(.277 * .723 / 256) = .028, a quarter of that for 16 of
+ * them. */
 START_TEST(the_share_of_hits_is_a_form_factor) {
     const double e = .005;
     double corners[8][3] = {{-e, -e, 0}, {e, -e, 0}, {e, e, 0}, {-e, e, 0},
@@ -70,6 +80,11 @@ START_TEST(the_share_of_hits_is_a_form_factor) {
     double hits = 0;
     for (uint64_t seed = 1; seed <= 16; seed++) hits += crossings(&m, seed * 1000).hits / 16;
     ck_assert_double_eq_tol(hits, .5541 / 2, 4 * .028 / 4);
+    /* Half of the square in the same box: half of the factor. */
+    elements[1][3] = MESH_NO_VERTEX;
+    hits = 0;
+    for (uint64_t seed = 1; seed <= 16; seed++) hits += crossings(&m, seed * 1000).hits / 16;
+    ck_assert_double_eq_tol(hits, .5541 / 4, 4 * .022 / 4);
 }
 END_TEST
 
