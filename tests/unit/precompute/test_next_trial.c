@@ -1,0 +1,180 @@
+/* The trials of --epsilon: which operator and form factors stay, and when they end. Operators and form
+ * factors are real, errors are made up. */
+#include "solver/base/terminal.h"
+#include "solver/precompute/precompute_state.h"
+#include "support/scene.h"
+#include "support/suite.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+static const double asked = .01;
+
+static void begin(precompute_options *options, terminal *t, precompute_state *state) {
+    const generate_options how = {.kind = "box", .size = {1, 1, 1}, .divisions = 2, .reflectance = .5};
+    lam_error error = {.message = ""};
+    *options = (precompute_options){.form_factors = "rays",
+                                    .quality = "draft",
+                                    .rays = OPTION_AUTO,
+                                    .probes = 1,
+                                    .build = build_presets("hierarchical")};
+    terminal_open(t, "test", true, false);
+    *state = state_begin(options, t);
+    state->memory = 1e12;
+    state->probes = 1;
+    state->expected = method_find("hierarchical");
+    state->recipe = (recipe){.method = RECIPE_RAYS, .rays = 256, .seed = 1};
+    state->trial.asked = asked;
+    state->m = generate_good(&how);
+    state->order = memory_allocate(state->m.n, sizeof *state->order, "order", &error);
+    ck_assert_ptr_nonnull(state->order);
+    ck_ok(mesh_z_order(&state->m, state->order, &error));
+}
+
+/* Form factors, unless they are there, and operator, whose stated errors are these. */
+static void make(precompute_state *state, double total, double compression) {
+    lam_error error = {.message = ""};
+    if (state->f.row_sums == NULL) ck_ok(stage_form_factors(state, &error));
+    ck_assert_ptr_null(state->op);
+    ck_ok(stage_operator(state, &error));
+    state->built.by_noise = false;
+    state->errors = (error_report){.random = {.probes = 8,
+                                              .total_indirect = {total, 0, total},
+                                              .operator_indirect = {compression, 0, compression}},
+                                   .has_total = true};
+}
+
+START_TEST(an_error_that_is_kept_ends_it) {
+    precompute_options options;
+    terminal t;
+    precompute_state state;
+    begin(&options, &t, &state);
+    make(&state, .01, .001);
+    ck_assert(!state_next_trial(&state));
+    ck_assert_uint_eq(state.trial.count, 1);
+    state_report_trials(&state);
+    ck_assert_double_eq(report_get(&state.built, "epsilon", 0), .01);
+    ck_assert_double_eq(report_get(&state.built, "epsilon_stated", 0), .01);
+    ck_assert_double_eq(report_get(&state.built, "trials", 0), 1);
+    state_free(&state);
+}
+END_TEST
+
+/* More rays made it worse: the first operator is back, and the row sums and the recipe of its form factors.
+ */
+START_TEST(the_best_comes_back) {
+    precompute_options options;
+    terminal t;
+    precompute_state state;
+    const bool keeps = _i == 1;
+    begin(&options, &t, &state);
+    if (keeps) options.keep_form_factors = "";
+    make(&state, .02, .001);
+    const lam_operator *best = state.op;
+    const double *sums = state.f.row_sums, epsilon = state.trial.epsilon;
+    ck_assert(state_next_trial(&state));
+    ck_assert_uint_gt(state.recipe.rays, 256);
+    ck_assert_ptr_null(state.f.row_sums);
+    make(&state, .05, .04); /* the threshold is turned next, of the same form factors */
+    ck_assert(state_next_trial(&state));
+    ck_assert_double_lt(state.trial.epsilon, epsilon);
+    ck_assert_ptr_nonnull(state.f.row_sums);
+    ck_assert_uint_gt(state.f.recipe.rays, 256);
+    make(&state, .03, .029);
+    ck_assert(!state_next_trial(&state)); /* three trials at most */
+    ck_assert_ptr_eq(state.op, best);
+    ck_assert_ptr_eq(state.f.row_sums, sums);
+    ck_assert_uint_eq(state.f.recipe.rays, 256);
+    ck_assert_double_eq(state.errors.random.total_indirect.mean, .02);
+    ck_assert_double_eq(state.trial.epsilon, epsilon);
+    ck_assert_int_eq(state.f.F.indptr != NULL, keeps);
+    state_report_trials(&state);
+    ck_assert_double_eq(report_get(&state.built, "trials", 0), 3);
+    ck_assert_double_eq(report_get(&state.built, "epsilon_stated", 0), .02);
+    state_free(&state);
+}
+END_TEST
+
+/* The threshold alone: form factors stay, and the last trial if it is the best. */
+START_TEST(form_factors_are_used_again) {
+    precompute_options options;
+    terminal t;
+    precompute_state state;
+    begin(&options, &t, &state);
+    make(&state, .02, .0199);
+    const double *sums = state.f.row_sums;
+    ck_assert(state_next_trial(&state));
+    ck_assert_ptr_eq(state.f.row_sums, sums);
+    make(&state, .015, .0149);
+    const lam_operator *last = state.op;
+    options.from_store = true;
+    state.errors.random.operator_indirect.mean =
+        0; /* now all is left to form factors, which are those of a store */
+    ck_assert(!state_next_trial(&state));
+    ck_assert_ptr_eq(state.op, last);
+    ck_assert_double_eq(state.errors.random.total_indirect.mean, .015);
+    state_free(&state);
+}
+END_TEST
+
+/* Finer form factors that leave their error as it was are not made finer again. */
+START_TEST(a_knob_without_effect_is_left) {
+    precompute_options options;
+    terminal t;
+    precompute_state state;
+    begin(&options, &t, &state);
+    make(&state, .02, .001);
+    ck_assert(state_next_trial(&state));
+    make(&state, .0195, .001);
+    const size_t rays = state.recipe.rays;
+    ck_assert(!state_next_trial(&state));
+    ck_assert(state.trial.spent);
+    ck_assert_uint_eq(state.recipe.rays, rays);
+    state_free(&state);
+}
+END_TEST
+
+/* Memory has no room for more rays: their number stays, and the bytes that are lacking are known. */
+START_TEST(memory_is_a_limit) {
+    precompute_options options;
+    terminal t;
+    precompute_state state;
+    begin(&options, &t, &state);
+    make(&state, .02, .001);
+    state.memory = 1;
+    ck_assert(!state_next_trial(&state));
+    ck_assert_uint_eq(state.recipe.rays, 256);
+    ck_assert_double_gt(state.trial.lacking, 1);
+    state_free(&state);
+}
+END_TEST
+
+START_TEST(nothing_is_tried_where_nothing_was_asked_or_measured) {
+    for (int k = 0; k < 3; k++) {
+        precompute_options options;
+        terminal t;
+        precompute_state state;
+        begin(&options, &t, &state);
+        make(&state, .02, .001);
+        if (k == 0) state.trial.asked = 0;
+        if (k == 1) state.probes = 0;
+        if (k == 2) state.built.method = "exact";
+        ck_assert(!state_next_trial(&state));
+        ck_assert_uint_eq(state.trial.count, 0);
+        state_free(&state);
+    }
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("next trial");
+    TCase *cases = tcase_create("next trial");
+    tcase_add_test(cases, an_error_that_is_kept_ends_it);
+    tcase_add_loop_test(cases, the_best_comes_back, 0, 2);
+    tcase_add_test(cases, form_factors_are_used_again);
+    tcase_add_test(cases, a_knob_without_effect_is_left);
+    tcase_add_test(cases, memory_is_a_limit);
+    tcase_add_test(cases, nothing_is_tried_where_nothing_was_asked_or_measured);
+    suite_add_tcase(suite, cases);
+    return suite_run(suite);
+}
