@@ -74,8 +74,8 @@ static ray ray_of(const mesh *m, size_t i, uint64_t *seed) {
 #define LESS(a, b) ((a) < (b) ? (a) : (b))
 #define MORE(a, b) ((a) > (b) ? (a) : (b))
 
-/* entry[i]: the distance at which a ray enters box i; infinite where it misses it. Those of a
- * box that is flat are equal in its direction, whatever rounding does. */
+/* entry[i]: the distance at which a ray enters box i; infinite where it misses it. The two
+ * sides of a flat box are equal in its direction, whatever rounding does. */
 static void find_entries(const ray *r, const boxes *b, size_t n, float *restrict entry) {
     float from[3], times[3];
     for (int k = 0; k < 3; k++) {
