@@ -60,29 +60,47 @@ static void mean_normal(const maker *k, size_t begin, size_t end, double mean[3]
     for (int d = 0; d < 3; d++) mean[d] = length > 0 ? mean[d] / length : d == 2;
 }
 
+/* True where all normals differ from their mean by at most this in each coordinate. */
+static bool are_alike(const maker *k, size_t begin, size_t end, double most) {
+    double mean[3];
+    mean_normal(k, begin, end, mean);
+    for (size_t p = begin; p < end; p++)
+        for (int d = 0; d < 3; d++)
+            if (fabs((double)k->normal[k->tree->order[p]][d] - mean[d]) > most) return false;
+    return true;
+}
+
 /* False for elements whose normals drift in small steps, as those of a sphere do. */
 static bool is_plane(const maker *k, size_t begin, size_t end) {
     double mean[3], low = INFINITY, high = -INFINITY;
+    if (!are_alike(k, begin, end, 2 * same_normal)) return false;
     mean_normal(k, begin, end, mean);
     for (size_t p = begin; p < end; p++) {
-        const uint32_t i = k->tree->order[p];
-        const double at = dot3(mean, k->centre[i]);
+        const double at = dot3(mean, k->centre[k->tree->order[p]]);
         low = fmin(low, at);
         high = fmax(high, at);
-        for (int d = 0; d < 3; d++)
-            if (fabs((double)k->normal[i][d] - mean[d]) > 2 * same_normal) return false;
     }
     return high - low <= 4 * same_plane * k->extent;
 }
 
 enum { PLANE_KEYS = 4 };
+/* Where normals of many directions make one chain of small steps, ever smaller steps are taken, each this
+ * share of the one before, down to this: then elements of one plane, which differ by rounding alone, are
+ * still found. */
+static const double finer_step = .25, finest_step = 1e-3;
 
 /* Splits a range into planes: sorted by the three coordinates of the normal in turn, then by the offset, it
- * is cut wherever the key jumps. */
-static void split_planes(maker *k, size_t begin, size_t end, int level) {
-    if (level == PLANE_KEYS) {
-        if (is_plane(k, begin, end)) {
-            k->group_end[k->n_groups++] = (uint32_t)end;
+ * is cut wherever the key jumps by more than `step` of what may differ. Unlike normals are taken apart by
+ * finer steps first: offsets along the mean of them say nothing of planes. */
+static void split_planes(maker *k, size_t begin, size_t end, int level, double step) {
+    const bool unlike = level == 3 && !are_alike(k, begin, end, 2 * step * same_normal);
+    if (level == PLANE_KEYS && is_plane(k, begin, end)) {
+        k->group_end[k->n_groups++] = (uint32_t)end;
+        return;
+    }
+    if (level == PLANE_KEYS || unlike) {
+        if (step > finest_step) {
+            split_planes(k, begin, end, 0, finer_step * step);
         } else {
             for (size_t p = begin; p < end; p++) k->group_end[k->n_groups++] = (uint32_t)(p + 1);
         }
@@ -95,12 +113,12 @@ static void split_planes(maker *k, size_t begin, size_t end, int level) {
         k->keys[p] = (key){level < 3 ? (double)k->normal[i][level] : dot3(mean, k->centre[i]), i};
     }
     sort_by_keys(k, begin, end);
-    const double leap = level < 3 ? same_normal : same_plane * k->extent;
+    const double leap = step * (level < 3 ? same_normal : same_plane * k->extent);
     /* The recursion overwrites keys [first, last), which are not read again. */
     for (size_t first = begin; first < end;) {
         size_t last = first + 1;
         while (last < end && k->keys[last].value - k->keys[last - 1].value <= leap) last++;
-        split_planes(k, first, last, level + 1);
+        split_planes(k, first, last, level + 1, step);
         first = last;
     }
 }
@@ -310,7 +328,7 @@ lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*no
         }
     }
     for (int d = 0; d < 3; d++) k.extent = fmax(k.extent, high[d] - low[d]);
-    split_planes(&k, 0, n, 0);
+    split_planes(&k, 0, n, 0, 1);
     begins = memory_allocate(k.n_groups + 1, sizeof *begins, "clusters", error);
     tree.frames = memory_allocate(k.n_groups, sizeof *tree.frames, "clusters", error);
     if (begins == NULL || tree.frames == NULL) TRY(LAM_ERR_MEMORY);
