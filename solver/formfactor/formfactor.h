@@ -28,6 +28,9 @@ typedef struct pairs_report {
  * geometry says, but all their segments were blocked. */
 typedef struct block_report {
     double visits, away, hidden, linear, pairs, shaded, shaded_pairs, segments;
+    bool joined; /* there are blocks of clusters of several planes, as nothing hides anything */
+    double even; /* blocks of clusters of several planes, and the pairs of points they were sampled at */
+    double sampled;
     double sifted;  /* pieces of facets that might stand between two clusters */
     double tests;   /* of segments against pieces */
     double cast;    /* segments against the whole scene */

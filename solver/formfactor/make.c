@@ -3,6 +3,7 @@
 
 #include "solver/base/clock.h"
 #include "solver/formfactor/blocks/blocks.h"
+#include "solver/formfactor/blocks/unhidden.h"
 #include "solver/formfactor/leaving.h"
 #include "solver/formfactor/pairs/pairs.h"
 #include "solver/formfactor/rays/hemicube.h"
@@ -207,42 +208,50 @@ done:
  * emission that were judged. */
 static const double judge_balance = 3e-6;
 
-/* F' = D F D with rows that sum to 1, to a tolerance (0: the least), in a closed scene, and to at most 1 in
- * others. Beside a sky, whose many rays tell each element's share outside better than a block tells its own,
- * rows sum to 1 with that share, which is scaled with them. Sets the row sums of f, and how much they were
- * repaired. */
-static lam_status balance_blocks(form_factors *f, block_factors *blocks, double tolerance, lam_error *error) {
+/* No row sum is smaller than this: a scaling cannot make it 0. */
+static const double least_target = 1e-9;
+
+/* F' = D F D with the given row sums [n], by element, to a tolerance (0: the least); targets NULL: rows that
+ * sum to 1 in a closed scene, and to at most 1 in others. Beside a sky, whose many rays tell each element's
+ * share outside better than a block tells its own, rows without targets sum to 1 with that share, which is
+ * scaled with them. Sets the row sums of f, and how much they were repaired. */
+static lam_status balance_blocks(form_factors *f, block_factors *blocks, const double *targets,
+                                 double tolerance, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = blocks->n;
-    const bool closed = leaving_nothing(f), sky = !closed && f->sky.first_bounce != NULL;
+    const bool closed = targets == NULL && leaving_nothing(f);
+    const bool sky = targets == NULL && !closed && f->sky.first_bounce != NULL;
     double *outside = memory_allocate(n, sizeof *outside, "form factors", error);
+    double *wanted = memory_allocate(n, sizeof *wanted, "form factors", error); /* A_i times the row sum */
     double *before = memory_allocate(n, sizeof *before, "form factors", error), area = 0;
     double *d = memory_allocate(n, sizeof *d, "form factors", error);
     double *r = memory_allocate(n, sizeof *r, "form factors", error);
     double *ones = memory_allocate(n, sizeof *ones, "form factors", error);
     blocks->balance = memory_allocate(n, sizeof *blocks->balance, "form factors", error);
     f->row_sums = memory_allocate(n, sizeof *f->row_sums, "form factors", error);
-    if (outside == NULL || before == NULL || d == NULL || r == NULL || ones == NULL ||
+    if (outside == NULL || wanted == NULL || before == NULL || d == NULL || r == NULL || ones == NULL ||
         blocks->balance == NULL || f->row_sums == NULL)
         TRY(LAM_ERR_MEMORY);
     for (size_t p = 0; p < n; p++) {
         ones[p] = 1;
         outside[p] = sky ? leaving_outside(f, blocks->order[p]) : 0;
+        wanted[p] = blocks->area[p] * (targets != NULL ? fmax(targets[blocks->order[p]], least_target) : 1);
     }
     balanced_blocks of = {blocks, ones, sky ? outside : NULL};
     row_scaling c = {.n = n,
-                     .area = blocks->area,
+                     .area = wanted,
                      .sums = sums_of_blocks,
                      .context = &of,
                      .sweeps_most = SWEEPS,
                      .tolerance = tolerance,
                      .d = d,
                      .r = r};
-    TRY(closed || sky ? row_scaling_settle(&c, before, error) : balance_open(&c, before, error));
+    TRY(closed || sky || targets != NULL ? row_scaling_settle(&c, before, error)
+                                         : balance_open(&c, before, error));
     TRY(sums_of_blocks(&of, d, r, error));
     f->repair_products = c.products + 1;
     for (size_t p = 0; p < n; p++) {
-        const double sum = r[p] / blocks->area[p], off = fabs(before[p] / blocks->area[p] - 1);
+        const double sum = r[p] / blocks->area[p], off = fabs(before[p] / wanted[p] - 1);
         area += blocks->area[p];
         f->repair_mean += blocks->area[p] * off;
         f->repair_max = fmax(f->repair_max, off);
@@ -256,6 +265,7 @@ done:
     free(d);
     free(r);
     free(ones);
+    free(wanted);
     return status;
 }
 
@@ -298,6 +308,8 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
     form_factors f = {.recipe = *r};
     block_factors made = {.n = 0};
     visibility *v = NULL;
+    double *targets = NULL;
+    bool known = false;
     block_options how = block_options_of(r);
     how.by_scene = judged != NULL;
     how.progress = options->progress;
@@ -314,7 +326,12 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
         f.absorbed_share = judged->absorbed_share;
     }
     TRY(blocks_find(m, v, tree, &how, &made, &f.blocks, error));
-    TRY(balance_blocks(&f, &made, judged != NULL ? judge_balance : 0, error));
+    if (f.blocks.joined) {
+        targets = memory_allocate(m->n, sizeof *targets, "form factors", error);
+        if (targets == NULL) TRY(LAM_ERR_MEMORY);
+        TRY(unhidden_row_sums(m, &known, targets, error));
+    }
+    TRY(balance_blocks(&f, &made, known ? targets : NULL, judged != NULL ? judge_balance : 0, error));
     if (f.sky.first_bounce != NULL) TRY(leaving_to_sky(&f, m->n, error));
     *out = f;
     *blocks = made;
@@ -322,6 +339,7 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
     made = (block_factors){.n = 0};
 done:
     visibility_destroy(v);
+    free(targets);
     block_factors_free(&made);
     form_factors_free(&f);
     return status;

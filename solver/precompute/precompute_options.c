@@ -92,10 +92,12 @@ static const option_row form_factor_rows[] = {
      .offset = FIELD(form_factors),
      .preset = "auto",
      .choices = "auto|rays|blocks|hemicube",
-     .help = "Method that finds them. rays: pairs of elements, near ones or all, and rays, as --quality "
-             "says. blocks: "
-             "clusters of elements at a time, for scenes of large planes. auto: blocks where the operator "
-             "can be built from them and they cost less, by a sample of them, else rays"},
+     .help =
+         "Method that finds them. rays: pairs of elements, near ones or all, and rays, as --quality "
+         "says. blocks: "
+         "clusters of elements at a time, for scenes of large planes, or in which nothing hides anything. "
+         "auto: blocks where the operator "
+         "can be built from them and they cost less, by a sample of them, else rays"},
     {.name = "resolution",
      .kind = OPTION_COUNT,
      .offset = FIELD(resolution),

@@ -1,6 +1,7 @@
 /* Form factors by blocks of clusters: the choice of them by what they cost, and the stage that finds them. */
 #include "solver/base/clock.h"
 #include "solver/formfactor/blocks/blocks_sample.h"
+#include "solver/formfactor/blocks/unhidden.h"
 #include "solver/precompute/precompute_state.h"
 
 #include <string.h>
@@ -8,13 +9,8 @@
 /* Blocks may take this many times as long as rays: in rooms they leave a third of the error of rays, or less.
  * All pairs have as small an error. */
 static const double times_rays = 1.5;
-/* With fewer elements in a plane, on average, clusters are elements, and there is nothing to weigh. A city of
- * houses has 3 to 6, a furnished room of triangles 1 to 2, rooms of walls 100 and more. */
-static const double elements_of_plane = 3;
 /* With fewer elements all methods are weighed by rows that cost little. */
 enum { ELEMENTS_LEAST = 4096 };
-/* All pairs of planes are visited. */
-enum { PLANES_MOST = 4096 };
 
 bool state_may_have_blocks(const precompute_state *state, double n) {
     const precompute_options *o = state->options;
@@ -29,13 +25,15 @@ static lam_status make_tree(precompute_state *state, lam_error *error) {
     return state->tree.n > 0 ? LAM_OK : form_factors_tree(&state->m, &state->tree, error);
 }
 
-static bool is_possible(const plane_tree *tree) {
-    return tree->n_frames <= PLANES_MOST && (double)tree->n >= elements_of_plane * (double)tree->n_frames;
+/* Blocks of large planes, or of clusters of several planes where nothing hides anything. */
+static lam_status find_possible(const precompute_state *state, bool *out, lam_error *error) {
+    *out = blocks_are_planar(&state->tree);
+    return *out ? LAM_OK : mesh_is_unhidden(&state->m, &state->tree, out, error);
 }
 
 /* Refuses options that --form-factors blocks cannot be given together with. */
 static lam_status check_asked(const precompute_state *state, const build_method *method, bool final,
-                              lam_error *error) {
+                              bool possible, lam_error *error) {
     const precompute_options *o = state->options;
     const char *other = NULL;
     if (state_compresses(o)) other = "--keep-form-factors=compressed";
@@ -50,12 +48,12 @@ static lam_status check_asked(const precompute_state *state, const build_method 
         return status_fail(error, LAM_ERR_ARGUMENT,
                            "--form-factors blocks: --method %s needs rows; give --form-factors rays",
                            method->name);
-    if (state->tree.n_frames > PLANES_MOST)
+    if (!possible && state->tree.n_frames > BLOCK_PLANES_MOST)
         return status_fail(
             error, LAM_ERR_ARGUMENT,
             "--form-factors blocks: the elements lie in %zu planes, at most %d are possible; give "
             "--form-factors rays",
-            state->tree.n_frames, PLANES_MOST);
+            state->tree.n_frames, BLOCK_PLANES_MOST);
     return LAM_OK;
 }
 
@@ -122,12 +120,14 @@ lam_status state_choose_blocks(precompute_state *state, const build_method *meth
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
     const bool asked = strcmp(o->form_factors, "blocks") == 0, able = (method->flags & METHOD_BLOCKS) != 0;
+    bool possible = false;
     const build_method *built = able ? method : method_of_blocks();
     if (!state_may_have_blocks(state, (double)state->m.n) || built == NULL) return LAM_OK;
     if (final && !able && !asked) return LAM_OK;
     TRY(make_tree(state, error));
-    if (asked) TRY(check_asked(state, method, final, error));
-    if (!asked && !is_possible(&state->tree)) goto done;
+    TRY(find_possible(state, &possible, error));
+    if (asked) TRY(check_asked(state, method, final, possible, error));
+    if (!asked && !possible) goto done;
     /* The rays of a sky are those that find its share beside pairs, too. */
     recipe blocks = {.method = RECIPE_BLOCKS,
                      .rays = o->sky != NULL ? state->recipe.rays : recipe_rays_beside_blocks(state->m.n),
@@ -190,13 +190,13 @@ void state_log_blocks(const precompute_state *state) {
         terminal_log(state->t, "%zu blocks of %zu planes", state->blocks.n_blocks, state->tree.n_frames);
         return;
     }
-    terminal_log(
-        state->t,
-        "%zu blocks of %zu planes: %.3g linear, %.3g partly hidden by %.3g segments, %.3g pairs of elements; "
-        "%.1f %% of all pairs face away, %.1f %% are plainly hidden",
-        state->blocks.n_blocks, state->tree.n_frames, (double)b->linear, (double)b->shaded,
-        (double)b->segments, (double)(b->pairs + b->shaded_pairs), 100 * b->elements_away / all,
-        100 * b->elements_hidden / all);
+    terminal_log(state->t,
+                 "%zu blocks of %zu planes: %.3g linear, %.3g even, %.3g partly hidden by %.3g segments, "
+                 "%.3g pairs of elements; "
+                 "%.1f %% of all pairs face away, %.1f %% are plainly hidden",
+                 state->blocks.n_blocks, state->tree.n_frames, (double)b->linear, b->even, (double)b->shaded,
+                 (double)b->segments, (double)(b->pairs + b->shaded_pairs), 100 * b->elements_away / all,
+                 100 * b->elements_hidden / all);
     if (state->f.repair_mean > repair_expected)
         terminal_warn(
             state->t,

@@ -2,6 +2,8 @@
 
 #include "solver/base/array_grow.h"
 #include "solver/base/random.h"
+#include "solver/formfactor/blocks/joined_kernel.h"
+#include "solver/formfactor/blocks/unhidden.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,6 +11,16 @@
 /* Where one cluster lies on both sides of the plane of the other, a linear kernel is off by at most this
  * share of its bound (block_kernel_most). */
 static const double share_crossing = .15;
+/* Clusters of several planes have a block where at least this many radii of the larger one lie between their
+ * spheres. */
+static const double separation = .5;
+/* The kernel of such a block may vary by this share of itself, times the root of the bound of the 2-norm that
+ * open blocks err by: .1 at the bound of the default. The error of single elements in bowls of 1,500 elements
+ * is then .04 to .09; a bound of the norm alone would leave .6, as no block of small clusters has much of it.
+ */
+static const double spread_most = 5;
+/* Clusters in planes that meet others at many edges have linear blocks up to this roughness. */
+static const double rough_most = .3;
 /* Segments of a partly hidden block: SEGMENT_LANES; of a pair of elements: twice as many. */
 enum { PAIR_ROUNDS = 2 };
 
@@ -111,6 +123,7 @@ static lam_status add_pair(block_walk *w, uint32_t a, uint32_t b, const candidat
 static bool is_smooth(const block_walk *w, uint32_t a, uint32_t b, double most, bool crosses) {
     const flat_clusters *f = &w->finder->flat;
     const double norm = most * sqrt(f->of[a].area * f->of[b].area);
+    if (w->finder->joined && (crosses || block_kernel_roughness(f, a, b, 2) > rough_most)) return false;
     if (crosses) return share_crossing * norm <= w->finder->options->open;
     return block_kernel_roughness(f, a, b, 2) * norm <= w->finder->options->open;
 }
@@ -159,6 +172,38 @@ static lam_status visit_shaded(block_walk *w, uint32_t a, uint32_t b, double mos
     return add_shaded(w, a, b, among);
 }
 
+/* Two nodes, one of which joins several planes: the kernel is even on both, or the larger one is split. */
+static lam_status decide_joined(block_walk *w, uint32_t a, uint32_t b, const candidates *among) {
+    const block_finder *k = w->finder;
+    const flat_cluster *x = &k->flat.of[a], *y = &k->flat.of[b];
+    const double away[3] = {y->centre[0] - x->centre[0], y->centre[1] - x->centre[1],
+                            y->centre[2] - x->centre[2]};
+    const double apart = sqrt(away[0] * away[0] + away[1] * away[1] + away[2] * away[2]);
+    if (apart - x->radius - y->radius >= separation * fmax(x->radius, y->radius)) {
+        const double spread = joined_kernel_spread(&k->flat, k->options->seed, a, b);
+        w->report.sampled += JOINED_SAMPLES;
+        if (spread <= spread_most * sqrt(k->options->open)) {
+            const double mean = joined_kernel_mean(&k->flat, k->options->seed, a, b);
+            cluster_block made = {.a = a, .b = b, .L = {{(float)mean}}};
+            w->report.sampled += JOINED_SAMPLES;
+            w->report.even++;
+            return add_block(w, &made);
+        }
+    }
+    return split(w, a, b, among, x->radius, y->radius);
+}
+
+/* The pairs of nodes within a node. Within a plane there is no light. */
+static lam_status decide_within(block_walk *w, uint32_t t, const candidates *among) {
+    lam_status status = LAM_OK;
+    if (w->finder->flat.of[t].plane != PLANE_ABOVE) return LAM_OK;
+    const node_children below = block_finder_children(w->finder, t);
+    for (int i = 0; i < below.count; i++)
+        for (int j = i; j < below.count; j++) TRY(visit(w, below.of[i], below.of[j], among));
+done:
+    return status;
+}
+
 /* elements: the pairs of elements that a and b stand for. */
 static lam_status decide(block_walk *w, uint32_t a, uint32_t b, double elements, const candidates *among) {
     const block_finder *k = w->finder;
@@ -167,6 +212,8 @@ static lam_status decide(block_walk *w, uint32_t a, uint32_t b, double elements,
     flat_pair at;
     candidates mine = {.count = 0};
     w->report.visits++;
+    if (a == b) return decide_within(w, a, among);
+    if (f->of[a].plane == PLANE_ABOVE || f->of[b].plane == PLANE_ABOVE) return decide_joined(w, a, b, among);
     flat_clusters_pair(f, a, b, &at);
     const double most = block_kernel_most(f, a, b, &at, behind);
     if (!(most > 0)) {
@@ -217,7 +264,8 @@ static lam_status visit(block_walk *w, uint32_t a, uint32_t b, const candidates 
 }
 
 lam_status block_walk_visit(block_walk *w, uint32_t a, uint32_t b) {
-    return visit(w, a, b, NULL);
+    static const candidates none = {.count = 0};
+    return visit(w, a, b, w->finder->joined ? &none : NULL);
 }
 
 void block_report_add(const block_report *from, double times, block_report *to) {
@@ -225,6 +273,8 @@ void block_report_add(const block_report *from, double times, block_report *to) 
     to->away += times * from->away;
     to->hidden += times * from->hidden;
     to->linear += times * from->linear;
+    to->even += times * from->even;
+    to->sampled += times * from->sampled;
     to->pairs += times * from->pairs;
     to->shaded += times * from->shaded;
     to->shaded_pairs += times * from->shaded_pairs;
@@ -248,6 +298,7 @@ lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tre
     TRY(block_factors_begin(tree, m->area, (const double(*)[3])centre, nodes, error));
     TRY(flat_clusters_make(m, tree, nodes, &out->flat, error));
     TRY(occluders_make(m, visibility_facets(v), out->flat.slack, &out->pieces, error));
+    if (!blocks_are_planar(tree)) TRY(mesh_is_unhidden(m, tree, &out->joined, error));
     pair_factor_rules_init(&out->rules);
     out->shade = (shade_scene){.f = &out->flat, .occluders = &out->pieces, .v = v, .seed = options->seed};
 done:
@@ -265,7 +316,8 @@ lam_status block_finder_planes(const block_finder *k, uint32_t **out, size_t *co
     uint32_t *roots = memory_allocate(tree->n_frames, sizeof *roots, "blocks", error);
     if (roots == NULL) return LAM_ERR_MEMORY;
     *count = 0;
-    for (uint32_t t = 0; t < tree->n_clusters; t++) {
+    if (k->joined) roots[(*count)++] = (uint32_t)tree->n_clusters - 1;
+    for (uint32_t t = 0; !k->joined && t < tree->n_clusters; t++) {
         const uint32_t parent = k->flat.tree->nodes[t].parent;
         if (tree->clusters[t].frame == PLANE_ABOVE) continue;
         if (parent == BLOCK_NO_NODE || tree->clusters[parent].frame == PLANE_ABOVE) roots[(*count)++] = t;

@@ -15,6 +15,7 @@ typedef struct block_finder {
     shade_scene shade;
     pair_factor_rules rules;
     size_t n_clusters;
+    bool joined; /* clusters of several planes have blocks too, and nothing hides anything */
 } block_finder;
 
 /* Begins the nodes of blocks as well (block_factors_begin). out must stay where it is until it is freed, also
@@ -24,7 +25,8 @@ lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tre
                              lam_error *error);
 void block_finder_free(block_finder *k);
 
-/* The topmost clusters of all planes; the caller frees them. */
+/* The nodes whose pairs are to be visited: the topmost clusters of all planes, or the root with itself where
+ * clusters are joined; the caller frees them. */
 lam_status block_finder_planes(const block_finder *k, uint32_t **out, size_t *count, lam_error *error);
 
 /* The elements of a node. */
@@ -60,7 +62,8 @@ typedef struct block_walk {
     lam_error *error;
 } block_walk;
 
-/* Adds the blocks of two nodes of different planes. Errors: LAM_ERR_MEMORY. */
+/* Adds the blocks of two nodes of different planes, or of a node above planes with itself. Errors:
+ * LAM_ERR_MEMORY. */
 lam_status block_walk_visit(block_walk *w, uint32_t a, uint32_t b);
 
 void block_report_add(const block_report *from, double times, block_report *to);

@@ -30,6 +30,15 @@ static lam_status add_work(const block_finder *k, uint32_t a, uint32_t b, pair_l
     return LAM_OK;
 }
 
+/* With fewer elements in a plane, on average, clusters are elements. A city of houses has 3 to 6, a furnished
+ * room of triangles 1 to 2, rooms of walls 100 and more. */
+static const double elements_of_plane = 3;
+
+bool blocks_are_planar(const plane_tree *tree) {
+    return tree->n_frames <= BLOCK_PLANES_MOST &&
+           (double)tree->n >= elements_of_plane * (double)tree->n_frames;
+}
+
 static int larger_first(const void *left, const void *right) {
     const node_pair *a = left, *b = right;
     if (a->elements != b->elements) return a->elements > b->elements ? -1 : 1;
@@ -37,7 +46,18 @@ static int larger_first(const void *left, const void *right) {
     return a->b < b->b ? -1 : a->b > b->b;
 }
 
-/* All pairs of planes, the larger ones split, the largest first. */
+/* Replaces a pair of a node with itself by the pairs of its children. */
+static lam_status split_within(const block_finder *k, size_t at, pair_list *pairs, lam_error *error) {
+    lam_status status = LAM_OK;
+    const node_children below = block_finder_children(k, pairs->list[at].a);
+    pairs->list[at] = pairs->list[--pairs->count];
+    for (int i = 0; i < below.count; i++)
+        for (int j = i; j < below.count; j++) TRY(add_work(k, below.of[i], below.of[j], pairs, error));
+done:
+    return status;
+}
+
+/* All pairs of planes, or of the root with itself, the larger ones split, the largest first. */
 static lam_status find_work_pairs(const block_finder *k, pair_list *out, lam_error *error) {
     lam_status status = LAM_OK;
     uint32_t *roots = NULL;
@@ -45,13 +65,18 @@ static lam_status find_work_pairs(const block_finder *k, pair_list *out, lam_err
     const double most = fmax(64, piece_share * (double)k->tree->n * (double)k->tree->n);
     TRY(block_finder_planes(k, &roots, &n_roots, error));
     for (size_t i = 0; i < n_roots; i++)
-        for (size_t j = i + 1; j < n_roots; j++) TRY(add_work(k, roots[i], roots[j], out, error));
+        for (size_t j = k->joined ? i : i + 1; j < n_roots; j++)
+            TRY(add_work(k, roots[i], roots[j], out, error));
     for (size_t at = 0; at < out->count;) {
         const node_pair pair = out->list[at];
         const bool first = block_finder_size(k, pair.a) >= block_finder_size(k, pair.b);
         const uint32_t larger = first ? pair.a : pair.b;
         if (pair.elements <= most || k->tree->clusters[larger].leaf) {
             at++;
+            continue;
+        }
+        if (pair.a == pair.b) {
+            TRY(split_within(k, at, out, error));
             continue;
         }
         const node_children below = block_finder_children(k, larger);
@@ -157,7 +182,7 @@ lam_status blocks_find(const mesh *m, const visibility *v, const plane_tree *tre
     TRY(block_factors_end(&made, error));
     TRY(block_factors_reduce(&made, &n_reduced, error));
     if (report != NULL) {
-        *report = (block_report){.visits = 0};
+        *report = (block_report){.joined = k.joined};
         for (int t = 0; t < n_threads; t++) block_report_add(&works[t].report, 1, report);
         report->reduced = (double)n_reduced;
     }

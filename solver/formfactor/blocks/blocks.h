@@ -19,10 +19,18 @@ typedef struct block_options {
     const char *stage;
 } block_options;
 
+/* True where clusters in planes are worth having: the planes are few, and have several elements each. */
+bool blocks_are_planar(const plane_tree *tree);
+
+/* All pairs of planes of a scene are visited, so that there may be no more than these; where nothing hides
+ * anything (unhidden.h), there are blocks of clusters of several planes, and any number is possible. */
+enum { BLOCK_PLANES_MOST = 4096 };
+
 /* The options of a recipe, without progress. */
 block_options block_options_of(const recipe *r);
 
-/* Finds the blocks of all pairs of planes of a tree, which must outlive them. Visible shares come from
+/* Finds the blocks of all pairs of planes of a tree, which must outlive them. Where the tree is not planar
+ * and nothing hides anything, clusters of several planes have blocks of one number. Visible shares come from
  * segments against the occluders in between, or from Embree where these are many, and from nothing where none
  * is. The bits do not depend on the number of threads: segments are seeded by the pair of clusters. report
  * may be NULL. out is freed by block_factors_free.

@@ -72,6 +72,45 @@ static void set_cluster(const flat_plane *p, const rectangle *r, double area, ui
     out->full = area >= (1 - same_area) * 4 * out->half[0] * out->half[1];
 }
 
+/* The box around all corners of a cluster, along the axes of the scene. */
+typedef struct corner_box {
+    double low[3], high[3];
+} corner_box;
+
+static void include_corner(corner_box *box, const double *point) {
+    for (int d = 0; d < 3; d++) {
+        box->low[d] = fmin(box->low[d], point[d]);
+        box->high[d] = fmax(box->high[d], point[d]);
+    }
+}
+
+/* The box of a cluster, from its elements or from the boxes of its children. */
+static corner_box box_of(const mesh *m, const plane_tree *tree, const corner_box *boxes, size_t t) {
+    const plane_cluster *c = &tree->clusters[t];
+    corner_box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (uint32_t p = c->begin; c->leaf && p < c->end; p++) {
+        const uint32_t *corners = m->elements[tree->order[p]];
+        for (size_t k = 0; k < corner_count(corners); k++) include_corner(&box, m->vertices[corners[k]]);
+    }
+    for (int side = 0; !c->leaf && side < 2; side++) {
+        const corner_box *child = &boxes[side == 0 ? c->left : t - 1];
+        include_corner(&box, child->low);
+        include_corner(&box, child->high);
+    }
+    return box;
+}
+
+/* A cluster of several planes. */
+static void set_above(const corner_box *box, double area, flat_cluster *out) {
+    double square = 0;
+    *out = (flat_cluster){.area = area, .plane = PLANE_ABOVE};
+    for (int d = 0; d < 3; d++) {
+        out->centre[d] = .5 * (box->low[d] + box->high[d]);
+        square += pow(.5 * (box->high[d] - box->low[d]), 2);
+    }
+    out->radius = sqrt(square);
+}
+
 /* The scene's largest extent times least_length. */
 static double slack_of(const mesh *m) {
     double centre[3], radius;
@@ -85,17 +124,20 @@ lam_status flat_clusters_make(const mesh *m, const plane_tree *tree, block_facto
     const size_t n = m->n, n_clusters = blocks->n_clusters, n_nodes = n_clusters + n;
     flat_clusters f = {.m = m, .tree = blocks, .n_planes = tree->n_frames, .slack = slack_of(m)};
     rectangle *bounds = memory_allocate(n_nodes, sizeof *bounds, "clusters", error);
+    corner_box *boxes = memory_allocate(n_clusters, sizeof *boxes, "clusters", error);
     f.of = memory_allocate(n_nodes, sizeof *f.of, "clusters", error);
     f.planes = memory_allocate(f.n_planes, sizeof *f.planes, "clusters", error);
     f.before = memory_allocate(n + 1, sizeof *f.before, "clusters", error);
-    if (bounds == NULL || f.of == NULL || f.planes == NULL || f.before == NULL) TRY(LAM_ERR_MEMORY);
+    if (bounds == NULL || boxes == NULL || f.of == NULL || f.planes == NULL || f.before == NULL)
+        TRY(LAM_ERR_MEMORY);
     for (size_t k = 0; k < f.n_planes; k++) set_plane(&tree->frames[k], &f.planes[k]);
     for (size_t p = 0; p < n; p++) f.before[p + 1] = f.before[p] + blocks->area[p];
     for (size_t t = 0; t < n_clusters; t++) {
         const plane_cluster *c = &tree->clusters[t];
         block_node *node = &blocks->nodes[t];
+        boxes[t] = box_of(m, tree, boxes, t);
         if (c->frame == PLANE_ABOVE) {
-            f.of[t].plane = PLANE_ABOVE;
+            set_above(&boxes[t], f.before[c->end] - f.before[c->begin], &f.of[t]);
             continue;
         }
         const flat_plane *plane = &f.planes[c->frame];
@@ -118,6 +160,7 @@ lam_status flat_clusters_make(const mesh *m, const plane_tree *tree, block_facto
     f = (flat_clusters){.m = NULL};
 done:
     free(bounds);
+    free(boxes);
     flat_clusters_free(&f);
     return status;
 }
@@ -189,10 +232,12 @@ static void element_point(const mesh *m, uint32_t element, double u, double w, d
 uint32_t flat_cluster_sample(const flat_clusters *f, uint32_t node, double u, double v, double place[2],
                              double point[3]) {
     const flat_cluster *c = &f->of[node];
-    const flat_plane *p = &f->planes[c->plane];
     double along;
     const uint32_t position = element_at(f, node, u, &along);
     element_point(f->m, f->tree->order[position], along, v, point);
+    place[0] = place[1] = 0;
+    if (c->plane == PLANE_ABOVE) return f->tree->order[position];
+    const flat_plane *p = &f->planes[c->plane];
     const double away[3] = {point[0] - c->centre[0], point[1] - c->centre[1], point[2] - c->centre[2]};
     for (int k = 0; k < 2; k++) place[k] = c->half[k] > 0 ? dot3(away, p->axis[k]) / c->half[k] : 0;
     return f->tree->order[position];

@@ -15,8 +15,8 @@ typedef struct flat_plane {
 typedef struct flat_cluster {
     double centre[3], half[2]; /* of the rectangle, along the axes of its plane; radius: half its diagonal */
     double radius, area;       /* area: that of its elements */
-    uint32_t plane;            /* PLANE_ABOVE: several planes, and nothing else here is set */
-    bool full;                 /* the elements fill the rectangle */
+    uint32_t plane;            /* PLANE_ABOVE: several planes. Centre and radius are those of a box then */
+    bool full;                 /* the elements fill the rectangle; false above planes */
 } flat_cluster;
 
 typedef struct flat_clusters {
@@ -49,7 +49,7 @@ void flat_cluster_point(const flat_clusters *f, uint32_t node, double u, double 
 double flat_cluster_distance(const flat_clusters *f, uint32_t node, const double point[3]);
 
 /* A point that is uniform over the area of the elements for (u, v) uniform in the unit square; its place in
- * the rectangle, in [-1, 1]^2, and its element. */
+ * the rectangle, in [-1, 1]^2 (0 above planes), and its element. */
 uint32_t flat_cluster_sample(const flat_clusters *f, uint32_t node, double u, double v, double place[2],
                              double point[3]);
 
