@@ -90,8 +90,8 @@ static lam_status solve_channel(const bench_run *run, const lowrank_scene *s, co
     const size_t n = s->m.n, C = s->m.n_channels;
     const factor_product product = factor_product_of_rows(F);
     reference *of = NULL;
-    double *E = memory_allocate(n, 3 * sizeof *E, "a reference", error), *H = E == NULL ? NULL : E + n,
-           *P = E == NULL ? NULL : E + 2 * n;
+    double *E = memory_allocate(n, 4 * sizeof *E, "a reference", error), *H = E == NULL ? NULL : E + n,
+           *P = E == NULL ? NULL : E + 2 * n, *noise = E == NULL ? NULL : E + 3 * n;
     if (E == NULL) TRY(LAM_ERR_MEMORY);
     TRY(reference_create(F, s->m.area, s->m.reflectance + c * n,
                          reference_choose(&product, s->m.area, s->m.reflectance + c * n, t->m, false), &of,
@@ -100,7 +100,7 @@ static lam_status solve_channel(const bench_run *run, const lowrank_scene *s, co
         const size_t at = (v * C + c) * n;
         bool known = false;
         for (size_t i = 0; i < n; i++) E[i] = (double)t->E[at + i];
-        if (first != NULL) TRY(first_light_for_judge(first, t->E + at, H, &known, error));
+        if (first != NULL) TRY(first_light_for_judge(first, t->E + at, H, noise, &known, error));
         if (!known) TRY(product.multiply(product.context, 1, E, H, error));
         for (size_t i = 0; i < n; i++) P[i] = H[i] *= (double)s->m.reflectance[c * n + i];
         TRY(reference_solve(of, 1, H, P, tolerance, run->progress, error));

@@ -18,6 +18,8 @@ static const double pair_tolerance = 1e-5;
 static const double radii_away = 2;
 /* Segments of each of two halves between a source and an element that it does not see all of. */
 enum { HALVES = 2, SEGMENTS = 8 };
+/* Pairs of a source and a piece at most, each of which takes about a microsecond. */
+static const double visits_most = 5e6;
 /* One of so many elements may shine at most; pieces of the receivers that threads take one at a time. */
 enum { SHARE_LIT = 4, PIECES = 64, LEAST_OF_PIECE = 8 };
 
@@ -66,6 +68,19 @@ static void cut(block_light *l, uint32_t t, size_t most) {
     cut(l, t - 1, most);
 }
 
+/* Lists the largest clusters of one plane each. */
+static lam_status find_planes(block_light *l, lam_error *error) {
+    l->planes = memory_allocate(l->tree->n_frames, sizeof *l->planes, "direct illumination", error);
+    if (l->planes == NULL) return LAM_ERR_MEMORY;
+    for (uint32_t t = 0; t < l->tree->n_clusters; t++) {
+        const uint32_t parent = l->nodes.nodes[t].parent;
+        if (l->tree->clusters[t].frame == PLANE_ABOVE) continue;
+        if (parent == BLOCK_NO_NODE || l->tree->clusters[parent].frame == PLANE_ABOVE)
+            l->planes[l->n_planes++] = t;
+    }
+    return LAM_OK;
+}
+
 lam_status block_light_create(const mesh *m, const plane_tree *tree, uint64_t seed, block_light **out,
                               lam_error *error) {
     lam_status status = LAM_OK;
@@ -77,7 +92,7 @@ lam_status block_light_create(const mesh *m, const plane_tree *tree, uint64_t se
     for (uint64_t h = 0; h < HALVES; h++) l->seeds[h] = random_stream(seed, h);
     TRY(visibility_create(m, &l->v, error));
     TRY(block_finder_make(m, l->v, tree, &l->options, &l->nodes, &l->finder, error));
-    TRY(block_finder_planes(&l->finder, &l->planes, &l->n_planes, error));
+    TRY(find_planes(l, error));
     l->pieces = memory_allocate(tree->n_clusters, sizeof *l->pieces, "direct illumination", error);
     if (l->pieces == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t k = 0; k < l->n_planes; k++) cut(l, l->planes[k], m->n / PIECES + LEAST_OF_PIECE);
@@ -174,8 +189,11 @@ static void add_smooth(const shining *s, uint32_t a, uint32_t b, double *light) 
 /* H of element b by source a where nothing stands between. */
 static double open_light(const shining *s, uint32_t a, uint32_t b) {
     bool behind[2];
+    flat_pair at;
     double light[BLOCK_FUNCTIONS] = {0};
-    if (count_lit(s, a) == 0 || !(block_kernel_most(&s->l->finder.flat, a, b, behind) > 0)) return 0;
+    if (count_lit(s, a) == 0) return 0;
+    flat_clusters_pair(&s->l->finder.flat, a, b, &at);
+    if (!(block_kernel_most(&s->l->finder.flat, a, b, &at, behind) > 0)) return 0;
     if (is_smooth(s, a, b, behind)) {
         add_smooth(s, a, b, light);
     } else if (is_element(s, a)) {
@@ -268,10 +286,13 @@ static void visit(const shining *s, uint32_t a, uint32_t b, const candidates *am
     const block_finder *k = &s->l->finder;
     const bool elements = is_element(s, a) && is_element(s, b);
     bool behind[2];
+    flat_pair at;
     candidates mine = {.count = 0};
-    if (count_lit(s, a) == 0 || !(block_kernel_most(&k->flat, a, b, behind) > 0)) return;
-    if (among == NULL || among->count != 0) occluders_between(&k->pieces, &k->flat, a, b, among, &mine);
-    if (mine.count > 0 && occluders_hide(&k->pieces, &k->flat, a, b, &mine)) return;
+    if (count_lit(s, a) == 0) return;
+    flat_clusters_pair(&k->flat, a, b, &at);
+    if (!(block_kernel_most(&k->flat, a, b, &at, behind) > 0)) return;
+    if (among == NULL || among->count != 0) occluders_between(&k->pieces, &k->flat, a, b, &at, among, &mine);
+    if (mine.hidden) return;
     if (mine.count != 0) {
         const bool near = !can_sample(s, a, b);
         if (is_element(s, b) && !near)
@@ -345,18 +366,21 @@ static lam_status shining_make(const block_light *l, const float *E, shining *s,
 
 lam_status block_light_of(const block_light *l, const float *E, double *H, double *D, bool *known,
                           lam_error *error) {
+    static const candidates none = {.count = 0}; /* nothing hides anything */
     lam_status status = LAM_OK;
     shining s = {.l = l};
     TRY(shining_make(l, E, &s, error));
-    *known = s.before[l->m->n] <= l->m->n / SHARE_LIT;
-    if (!*known) goto done;
-    find_moments(&s);
     for (size_t k = 0; k < l->n_planes; k++)
         if (count_lit(&s, l->planes[k]) > 0) s.sources[s.n_sources++] = narrow(&s, l->planes[k]);
-            /* Every piece is of one thread, and takes its sources in their order. */
+    *known =
+        s.before[l->m->n] <= l->m->n / SHARE_LIT && (double)s.n_sources * (double)l->n_pieces <= visits_most;
+    if (!*known) goto done;
+    find_moments(&s);
+    /* Every piece is of one thread, and takes its sources in their order. */
 #pragma omp parallel for schedule(dynamic, 1)
     for (size_t p = 0; p < l->n_pieces; p++)
-        for (size_t k = 0; k < s.n_sources; k++) visit(&s, s.sources[k], l->pieces[p], NULL);
+        for (size_t k = 0; k < s.n_sources; k++)
+            visit(&s, s.sources[k], l->pieces[p], l->finder.joined ? &none : NULL);
     hand_down(&s, H, D);
 done:
     shining_free(&s);
