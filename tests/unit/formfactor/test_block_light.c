@@ -14,9 +14,9 @@
 
 /* A sanitizer watches fewer elements. */
 #ifdef LAMBERT_SANITIZED
-enum { ELEMENTS = 500, SEEDS = 4 };
+enum { ELEMENTS = 500, SEEDS = 4, FINE = 40 };
 #else
-enum { ELEMENTS = 2000, SEEDS = 16 };
+enum { ELEMENTS = 2000, SEEDS = 16, FINE = 60 };
 #endif
 
 static lam_error error;
@@ -141,6 +141,29 @@ static void light_up(lit *s, const uint32_t *order, int emission) {
     for (size_t k = 0; emission == 2 && k < count; k++) s->E[order[n / 5 + k]] = 1 + (float)(k % 5);
 }
 
+/* One element far from clusters of many elements, whose light is linear in both coordinates. */
+START_TEST(large_clusters) {
+    mesh m = box_mesh(room, FINE, .5f);
+    visibility *v = NULL;
+    double off, noise;
+    lit s;
+    polygon *polygons = test_allocate(m.n, sizeof *polygons);
+    for (size_t i = 0; i < m.n; i++) polygon_of_element(&m, i, &polygons[i]);
+    ck_ok(visibility_create(&m, &v, &error));
+    lit_make(&m, NULL, &s);
+    s.E[m.n / 7] = 1;
+    find_truth_by_pairs(&s, v, polygons);
+    find_light(&s, 1);
+    distances(&s, &off, &noise);
+    ck_assert_double_lt(sqrt(off), 3e-4);
+    ck_assert(noise == 0);
+    lit_free(&s);
+    visibility_destroy(v);
+    mesh_free(&m);
+    free(polygons);
+}
+END_TEST
+
 /* The distance to the truth is what half the difference of both halves says, and the mean over all seeds is
  * off by the root of their number less: nothing favours light or dark. */
 START_TEST(shadows) {
@@ -245,6 +268,7 @@ int main(void) {
     TCase *tests = tcase_create("light");
     tcase_set_timeout(tests, 300);
     tcase_add_test(tests, a_box);
+    tcase_add_test(tests, large_clusters);
     tcase_add_test(tests, shadows);
     tcase_add_test(tests, too_many_and_none);
     tcase_add_test(tests, bits_are_the_same_for_any_number_of_threads);

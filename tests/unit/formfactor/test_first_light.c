@@ -90,7 +90,8 @@ START_TEST(shadows) {
         ck_assert_double_lt(sqrt(off2), emission == 0 ? .01 : .02);
         /* A tenth of the receivers has most of the noise, whose squares over all seeds are known to
          * sqrt(2 / 1600); that of the form factors is a quarter of it at most. */
-        ck_assert_double_gt(noise2, .8 * off2);
+        /* Pairs in the open agree to 1e-4: their factors are in single precision, and small. */
+        ck_assert_double_gt(noise2, .8 * off2 - 1e-8);
         ck_assert_double_lt(noise2, 1.25 * off2);
     }
     form_factors_free(&f);
