@@ -79,13 +79,16 @@ static lam_status judge(const judged_probes *b, const char *path, lam_error *err
     printf("%s,%zu,%s,%.3f", path, n, lam_operator_kind(op), (double)about.bytes * 1e-6);
     for (size_t g = 0, k = 0; g < PROBE_GROUPS; g++) {
         double mean = 0, most = 0;
+        size_t lit = 0; /* probes with any indirect light */
         for (size_t end = k + b->counts[g]; k < end; k++) {
             TRY(lam_operator_apply(op, 1, LAM_INDIRECT, b->E + k * n, out, work, bytes, error));
             const double off = judged_probes_error(b, k, out);
-            mean += off / (double)b->counts[g];
+            if (!isfinite(off)) continue;
+            mean += off;
             most = fmax(most, off);
+            lit++;
         }
-        printf(",%.4f,%.4f", mean, most);
+        printf(",%.4f,%.4f", mean / (double)lit, most);
     }
     TRY(time_answers(b, op, out, work, bytes, error));
     printf("\n");
