@@ -47,8 +47,10 @@ static const shares shares_of_rows = {.of_epsilon = .02, .of_S = .5f, .inner = .
  * threshold of 2e-4 in a Cornell box of 10,249 elements, this takes a quarter of the time of the shares of
  * rows and errs by 2 % more. */
 static const shares shares_of_blocks = {.of_epsilon = .004, .of_S = 1, .inner = 1, .skipped = .085f};
-/* The error of a block over the threshold. */
-static const double share_of_block = 2;
+/* The error of a block over the threshold: at 2 blocks are most of the error, .0244 of single elements and
+ * .0116 of the lamp in a Cornell box of 163,687 elements, and .0221 and .0099 at 1.4, for a seventh more
+ * time. */
+static const double share_of_block = 1.4;
 /* Times the radius of a node over the cube root of the threshold: the reach of the node (wavelet_reach.h).
  * The light from beyond eight radii changes no coefficient by more than a threshold of .0026, as was
  * measured. */
