@@ -34,8 +34,8 @@ trial_errors trial_errors_of(const error_group *g, bool by_noise);
  * and sets *next. The larger part is turned, and the smaller one too where it is more than half of the
  * squared error asked for; a part without a free knob stays, and the other is not pushed below half of it.
  * Laws: the noise of rays falls as N^-1/2; an error of pairs as their accuracy; of blocks as the root of
- * theirs (at most); compression as epsilon^.6 (measured: .58 to 1.03, Cornell boxes of 641 and 5,000
- * elements). No knob is turned by more than a factor of 64. */
+ * theirs (at most); compression as epsilon^.6 (.58 to 1.03 in a Cornell box of 641 elements). No knob is
+ * turned by more than a factor of 64. */
 bool trial_turn(double asked, const trial_errors *errors, const trial_limits *limits, const trial_knobs *from,
                 trial_knobs *next);
 

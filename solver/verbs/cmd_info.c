@@ -81,7 +81,10 @@ static void print_figures(const char *name, const json_t *group, const char *aga
         if (!json_is_number(figure)) return;
         value[i] = json_number_value(figure);
     }
-    printf("  %-8s%-10s%12.3g%12.3g%12.3g%12.3g\n", name, against, value[0], value[1], value[2], value[3]);
+    const bool bound =
+        strcmp(against, "total") == 0 && json_integer_value(json_object_get(group, "total_is_bound")) != 0;
+    printf("  %-8s%-10s%12.3g%12.3g%12.3g%12.3g%s\n", name, against, value[0], value[1], value[2], value[3],
+           bound ? "  at most" : "");
 }
 
 static void print_error(const json_t *figures) {
@@ -96,7 +99,8 @@ static void print_error(const json_t *figures) {
         print_figures(names[i], group, "total");
         print_figures(names[i], group, "operator");
     }
-    puts("  total: against an independent sample of the form factors\n"
+    puts("  total: against an independent sample of the form factors; at most: its noise is more than a "
+         "third\n"
          "  operator: against the sample that it was built from");
 }
 
