@@ -1,5 +1,7 @@
 #include "solver/formfactor/pairs/few_occluders.h"
 
+#include "solver/formfactor/pairs/windows.h"
+
 #include <math.h>
 
 lam_status few_occluders_make(const mesh *m, const visibility *v, const polygon *polygons,
@@ -10,7 +12,7 @@ lam_status few_occluders_make(const mesh *m, const visibility *v, const polygon 
                        .polygons = polygons,
                        .rules = rules,
                        .seed = seed,
-                       .most = most < PAIR_OCCLUDERS_MOST ? most : PAIR_OCCLUDERS_MOST};
+                       .most = most < UNCUT_OCCLUDERS_MOST ? most : UNCUT_OCCLUDERS_MOST};
     const lam_status status = joined_occluders_make(m, f.facets, visibility_rounding(v), &f.occluders, error);
     if (status == LAM_OK) *out = f;
     return status;
@@ -35,7 +37,7 @@ static uint32_t facet_of(const few_occluders *f, uint32_t element) {
 }
 
 few_verdict few_occluders_share(const few_occluders *f, const link_occluders *among, uint32_t i, uint32_t j,
-                                double tolerance, double *share, double *work) {
+                                double g, double tolerance, double *share, double *work) {
     polygon a, b;
     pair_occluders between;
     if (among->count == OCCLUDERS_UNCOUNTED) return FEW_UNDECIDED;
@@ -48,13 +50,26 @@ few_verdict few_occluders_share(const few_occluders *f, const link_occluders *am
         *share = 0;
         return FEW_HIDDEN;
     }
-    if (between.count == OCCLUDERS_UNCOUNTED || between.count > f->most) return FEW_UNDECIDED;
-    if (between.count == 0) {
+    double full = 0; /* g where windows cut the pair */
+    if (between.count != 0 && between.count != 1) {
+        const windows_found found = windows_cut(&f->occluders, among, own, &a, &b);
+        if (found == WINDOWS_CUT) {
+            pair_occluders_find(&f->occluders, among, &a, &b, own, &between);
+            full = g;
+        }
+        if (found == WINDOWS_CLOSED || between.hidden) {
+            *share = 0;
+            return FEW_HIDDEN;
+        }
+    }
+    if (between.count == OCCLUDERS_UNCOUNTED || between.count > (full > 0 ? PAIR_OCCLUDERS_MOST : f->most))
+        return FEW_UNDECIDED;
+    if (between.count == 0 && full <= 0) {
         *share = 1;
         return FEW_OPEN;
     }
     const projection p = {f->rules, &f->occluders, f->seed};
-    const projected_pair pair = {i, j, &a, &b, &between};
+    const projected_pair pair = {i, j, &a, &b, &between, full};
     const double found = projection_share(&p, &pair, tolerance, work);
     if (found < 0) return FEW_UNDECIDED;
     *share = found;

@@ -13,7 +13,7 @@ typedef struct few_occluders {
     const polygon *polygons; /* [n] */
     const pair_factor_rules *rules;
     uint64_t seed;
-    int most; /* occluders of a pair, up to PAIR_OCCLUDERS_MOST */
+    int most; /* occluders of a pair, up to UNCUT_OCCLUDERS_MOST */
 } few_occluders;
 
 typedef enum few_verdict { FEW_UNDECIDED, FEW_OPEN, FEW_HIDDEN, FEW_PARTIAL } few_verdict;
@@ -38,6 +38,6 @@ void few_occluders_free(few_occluders *f);
  * otherwise. tolerance: of the share. FEW_UNDECIDED: too many occluders, share stays unchanged. Adds to
  * *work as projection_share. */
 few_verdict few_occluders_share(const few_occluders *f, const link_occluders *among, uint32_t i, uint32_t j,
-                                double tolerance, double *share, double *work);
+                                double g, double tolerance, double *share, double *work);
 
 #endif

@@ -6,8 +6,9 @@
 #include "solver/formfactor/pairs/joined_occluders.h"
 #include "solver/formfactor/pairs/polygon.h"
 
-/* Between two elements, at most. */
-enum { PAIR_OCCLUDERS_MOST = 8 };
+/* Between two elements, at most; as many as are projected of a pair that no window (windows.h) has cut: the
+ * cost of a point grows with them, and the whole of such a pair has more points. */
+enum { PAIR_OCCLUDERS_MOST = 16, UNCUT_OCCLUDERS_MOST = 8 };
 
 typedef struct pair_occluders {
     int count;   /* or OCCLUDERS_UNCOUNTED */

@@ -96,7 +96,7 @@ static int project(const pairs_run *run, uint32_t i, uint32_t j, const link_occl
     double share = 1, work = 0;
     if (among == NULL) return PAIR_UNKNOWN;
     const double tolerance = few_occluders_tolerance(&run->few, i, j, *g, run->options->accuracy);
-    const few_verdict found = few_occluders_share(&run->few, among, i, j, tolerance, &share, &work);
+    const few_verdict found = few_occluders_share(&run->few, among, i, j, *g, tolerance, &share, &work);
     *g *= share;
     return found == FEW_UNDECIDED ? PAIR_UNKNOWN
            : found == FEW_OPEN    ? PAIR_CERTAIN
@@ -466,7 +466,7 @@ pairs_options pairs_options_of(const recipe *r, size_t n, double threshold) {
                            .segments_least = near ? 0 : segments_least,
                            .segments_most =
                                near ? (double)n * (double)r->rays : segments_most(n, r->accuracy),
-                           .occluders = near ? 0 : PAIR_OCCLUDERS_MOST,
+                           .occluders = near ? 0 : UNCUT_OCCLUDERS_MOST,
                            .threshold = threshold,
                            .keep_hidden = near,
                            .seed = r->seed,

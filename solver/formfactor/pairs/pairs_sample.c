@@ -37,7 +37,7 @@ static bool count_projection(const sample_run *run, uint32_t i, uint32_t j, doub
     work->sifted++;
     const double tolerance = few_occluders_tolerance(&run->few, i, j, g, run->options->accuracy);
     const few_verdict found =
-        few_occluders_share(&run->few, among, i, j, tolerance, &share, &work->projection);
+        few_occluders_share(&run->few, among, i, j, g, tolerance, &share, &work->projection);
     work->seen += found == FEW_OPEN || found == FEW_PARTIAL;
     if (found == FEW_PARTIAL) work->saved += occlusion_segments(&run->occlusion, i, j, g);
     return found != FEW_UNDECIDED;

@@ -27,7 +27,7 @@ double polygon_area(const polygon *p) {
     return .5 * sqrt(dot(twice, twice));
 }
 
-static void measure_extent(polygon *p) {
+void polygon_set_extent(polygon *p) {
     memset(p->centre, 0, sizeof p->centre);
     for (int c = 0; c < p->n; c++)
         for (int d = 0; d < 3; d++) p->centre[d] += p->corner[c][d] / p->n;
@@ -48,7 +48,7 @@ void polygon_measure(polygon *p) {
     area_vector(p, twice);
     const double length = sqrt(dot(twice, twice));
     for (int d = 0; d < 3; d++) p->normal[d] = twice[d] / length;
-    measure_extent(p);
+    polygon_set_extent(p);
 }
 
 void polygon_of_element(const mesh *m, size_t element, polygon *out) {
@@ -81,7 +81,7 @@ void polygon_in_front(const polygon *p, const polygon *other, polygon *out) {
         }
     }
     if (made.n < 3) made.n = 0;
-    if (made.n > 0) measure_extent(&made);
+    if (made.n > 0) polygon_set_extent(&made);
     *out = made;
 }
 
@@ -125,7 +125,7 @@ void polygon_halve(const polygon *p, polygon halves[2]) {
             memcpy(out->corner[2], p->n == 4 ? p->corner[across] : opposite, sizeof middle);
             if (p->n == 4) memcpy(out->corner[3], opposite, sizeof middle);
         }
-        measure_extent(out);
+        polygon_set_extent(out);
     }
 }
 

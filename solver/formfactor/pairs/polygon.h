@@ -18,6 +18,9 @@ typedef struct polygon {
 /* Sets normal, centre, radius and affine from the corners, which must span an area. */
 void polygon_measure(polygon *p);
 
+/* Sets centre, radius and affine from the corners. */
+void polygon_set_extent(polygon *p);
+
 void polygon_of_element(const mesh *m, size_t element, polygon *out);
 
 /* The part of p in front of the plane of other; empty where no corner is in front by more than rounding. */

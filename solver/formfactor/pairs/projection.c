@@ -38,6 +38,7 @@ typedef struct cells {
     double node[2][NODES], weight[2][NODES]; /* by direction */
     double second[NODES], third[NODES];      /* w 5 P_2, w 7 P_3 at the nodes of the rule */
     int n, n_lines;                          /* n_lines: negative before they are found */
+    double full;                             /* of the pair; 0: that of the cells */
     bool failed;
     int work;
     cell of[CELLS_MOST];
@@ -258,6 +259,30 @@ static void split_in_middle(cells *c, const cell *one, int direction) {
     add_cells(c, 4, (const double(*)[3])half, one->bits, true);
 }
 
+/* Cuts all cells of a pair of which a window shows little: F then rises to a plateau within less than the
+ * distance of two points, which the cells' sums do not tell. */
+static void cut_at_lines(cells *c) {
+    enum { CUT_MOST = 16 };
+    static const double little = .1;
+    double visible = 0, full = 0;
+    for (int k = 0; k < c->n; k++) {
+        visible += c->of[k].sums.visible;
+        full += c->of[k].sums.full;
+    }
+    if (c->failed || visible > little * full) return;
+    find_lines(c);
+    for (int k = 0; k < c->n && c->n < CUT_MOST;) {
+        const cell one = c->of[k];
+        const break_line *line = line_across(c, &one);
+        if (line == NULL) {
+            k++;
+            continue;
+        }
+        c->of[k] = c->of[--c->n];
+        split_at_line(c, &one, line);
+    }
+}
+
 /* Splits the cell with the largest error until the whole is within the tolerance: the cells' errors are
  * independent. */
 static void refine(cells *c, double tolerance) {
@@ -270,16 +295,17 @@ static void refine(cells *c, double tolerance) {
             full += c->of[k].sums.full;
         }
         if (!(full > 0)) return;
+        const double share = c->full > 0 ? 0 : visible / full;
         for (int k = 0; k < c->n; k++) {
             int rough;
-            const double error = cell_error(&c->of[k], visible / full, &rough);
+            const double error = cell_error(&c->of[k], share, &rough);
             square += error * error;
             if (error <= most) continue;
             most = error;
             worst = k;
             direction = rough;
         }
-        if (sqrt(square) <= tolerance * full) return;
+        if (sqrt(square) <= tolerance * (c->full > 0 ? c->full : full)) return;
         if (c->n_lines < 0) find_lines(c);
         const cell one = c->of[worst];
         const break_line *line = line_across(c, &one);
@@ -301,7 +327,7 @@ static bool over_first(const projection *p, const projected_pair *pair) {
         const double b = fabs(dot(o->normal, pair->b->centre) - o->level);
         nearer += (a - b) / (a + b + 1e-300);
     }
-    nearer /= pair->among->count;
+    if (pair->among->count > 0) nearer /= pair->among->count;
     return nearer + (pair->b->radius - pair->a->radius) / (pair->b->radius + pair->a->radius) >= 0;
 }
 
@@ -315,11 +341,13 @@ double projection_share(const projection *p, const projected_pair *pair, double 
     c.among = pair->among;
     c.n = 0;
     c.n_lines = -1;
+    c.full = pair->full;
     c.failed = false;
     c.work = 0;
     shadow_cut_init(&c.cut, p->occluders, pair->among, c.to);
     set_nodes(&c, pair);
     add_cells(&c, c.over->n, c.over->corner, (1u << pair->among->count) - 1, false);
+    if (c.full > 0) cut_at_lines(&c);
     refine(&c, tolerance);
     *work += c.work;
     if (c.failed) return -1;
@@ -327,6 +355,7 @@ double projection_share(const projection *p, const projected_pair *pair, double 
         visible += c.of[k].sums.visible;
         full += c.of[k].sums.full;
     }
+    if (c.full > 0) full = c.full;
     return full > 0 ? fmin(fmax(visible / full, 0), 1) : 0;
 }
 

@@ -14,11 +14,13 @@ typedef struct projection {
     uint64_t seed; /* of the cubature: another seed has other points */
 } projection;
 
-/* A partly hidden pair: the parts of elements i and j in front of each other's planes. */
+/* A partly hidden pair: the parts of elements i and j in front of each other's planes, or parts of these that
+ * hold all that sees the other element. */
 typedef struct projected_pair {
     uint32_t i, j;
     const polygon *a, *b;
-    const pair_occluders *among; /* 1 to PAIR_OCCLUDERS_MOST */
+    const pair_occluders *among; /* up to PAIR_OCCLUDERS_MOST */
+    double full;                 /* of a cut pair: the unoccluded exchange area of whole elements; else 0 */
 } projected_pair;
 
 /* V, from 0 to 1, with an error of about tolerance; exactly 0 or 1 where every point says so. Negative: there
