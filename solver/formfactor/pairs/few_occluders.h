@@ -35,8 +35,8 @@ lam_status few_occluders_make(const mesh *m, const visibility *v, const polygon 
 void few_occluders_free(few_occluders *f);
 
 /* The visible share of elements i and j of a link, 0 or 1 where that is proven or where no point says
- * otherwise. tolerance: of the share. FEW_UNDECIDED: too many occluders, share stays unchanged. Adds to
- * *work as projection_share. */
+ * otherwise. g: the unoccluded exchange area; tolerance: of the share. FEW_UNDECIDED: too many occluders,
+ * share stays unchanged. Adds to *work as projection_share. */
 few_verdict few_occluders_share(const few_occluders *f, const link_occluders *among, uint32_t i, uint32_t j,
                                 double g, double tolerance, double *share, double *work);
 
