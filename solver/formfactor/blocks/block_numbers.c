@@ -125,13 +125,15 @@ double block_kernel_most(const flat_clusters *f, uint32_t a, uint32_t b, const f
     enum { CORNERS = FLAT_CORNERS / 2 };
     const flat_cluster *c[2] = {&f->of[a], &f->of[b]};
     const flat_plane *p[2] = {&f->planes[c[0]->plane], &f->planes[c[1]->plane]};
+    const double rise = c[0]->rise + c[1]->rise; /* elements may be higher by this */
     double height[2][CORNERS], low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
     for (int e = 0; e < 2; e++) {
         const double *n = p[1 - e]->normal;
         for (int k = 0; k < CORNERS; k++) {
             const int i = CORNERS * e + k;
-            height[e][k] = n[0] * at->x[0][i] + n[1] * at->x[1][i] + n[2] * at->x[2][i] - p[1 - e]->level;
+            height[e][k] = n[0] * at->x[0][i] + n[1] * at->x[1][i] + n[2] * at->x[2][i] - c[1 - e]->level;
             low[e] = height[e][k] < low[e] ? height[e][k] : low[e];
+            height[e][k] += rise;
             high[e] = height[e][k] > high[e] ? height[e][k] : high[e];
         }
         behind[e] = low[e] < -f->slack;

@@ -164,6 +164,7 @@ static lam_status visit_shaded(block_walk *w, uint32_t a, uint32_t b, double mos
     const flat_clusters *f = &k->flat;
     const bool crosses = behind[0] || behind[1];
     if (a >= k->n_clusters && b >= k->n_clusters) return add_pair(w, a, b, among);
+    if (among->amid[0] || among->amid[1]) return split(w, a, b, among, among->amid[0], !among->amid[0]);
     if (most * sqrt(f->of[a].area * f->of[b].area) > k->options->shadow) {
         const double place = occluders_place(&k->pieces, f, a, b, among);
         return split(w, a, b, among, f->of[a].radius * (1 - place), f->of[b].radius * place);

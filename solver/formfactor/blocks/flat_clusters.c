@@ -5,6 +5,9 @@
 
 /* Nothing shorter than this share of the extent of the scene is a distance. */
 static const double least_length = 1e-7;
+/* Coordinates that are written with few digits put elements of one plane at heights that differ by less than
+ * this share of the extent: millimetres in a kilometre. */
+static const double least_height = 1e-6;
 /* A rectangle is full where its elements leave out no more than this share. */
 static const double same_area = 1e-6;
 
@@ -26,22 +29,24 @@ static void set_plane(const plane_frame *frame, flat_plane *p) {
         const int e = (d + 1) % 3, g = (d + 2) % 3;
         p->normal[d] = frame->axis[0][e] * frame->axis[1][g] - frame->axis[0][g] * frame->axis[1][e];
     }
-    p->level = dot3(p->normal, p->origin);
 }
 
+/* Bounds along both axes and of heights. */
 typedef struct rectangle {
-    double low[2], high[2];
+    double low[3], high[3], lowest_top;
 } rectangle;
 
 static rectangle of_element(const mesh *m, uint32_t element, const flat_plane *p) {
-    rectangle r = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
-    for (size_t c = 0; c < mesh_corners(m, element); c++)
-        for (int k = 0; k < 2; k++) {
-            const double at =
-                dot3(p->axis[k], m->vertices[m->elements[element][c]]) - dot3(p->axis[k], p->origin);
+    rectangle r = {.low = {INFINITY, INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY, -INFINITY}};
+    for (size_t c = 0; c < mesh_corners(m, element); c++) {
+        const double *x = m->vertices[m->elements[element][c]];
+        for (int k = 0; k < 3; k++) {
+            const double at = k < 2 ? dot3(p->axis[k], x) - dot3(p->axis[k], p->origin) : dot3(p->normal, x);
             r.low[k] = fmin(r.low[k], at);
             r.high[k] = fmax(r.high[k], at);
         }
+    }
+    r.lowest_top = r.high[2];
     return r;
 }
 
@@ -54,22 +59,32 @@ static void include(rectangle *r, const double point[2]) {
 }
 
 static rectangle joined(const rectangle *a, const rectangle *b) {
-    return (rectangle){{fmin(a->low[0], b->low[0]), fmin(a->low[1], b->low[1])},
-                       {fmax(a->high[0], b->high[0]), fmax(a->high[1], b->high[1])}};
+    rectangle r = {.lowest_top = fmin(a->lowest_top, b->lowest_top)};
+    for (int k = 0; k < 3; k++) {
+        r.low[k] = fmin(a->low[k], b->low[k]);
+        r.high[k] = fmax(a->high[k], b->high[k]);
+    }
+    return r;
 }
 
-static void set_cluster(const flat_plane *p, const rectangle *r, double area, uint32_t plane,
+static void set_cluster(const flat_plane *p, const rectangle *r, double area, uint32_t plane, double slack,
                         flat_cluster *out) {
-    *out = (flat_cluster){.area = area, .plane = plane};
+    *out = (flat_cluster){.area = area,
+                          .plane = plane,
+                          .level = .5 * (r->low[2] + r->high[2]),
+                          .rise = .5 * (r->high[2] - r->low[2]),
+                          .lowest_top = r->lowest_top};
+    const double above = out->level - dot3(p->normal, p->origin);
     double middle[2];
     for (int k = 0; k < 2; k++) {
         out->half[k] = .5 * (r->high[k] - r->low[k]);
         middle[k] = .5 * (r->high[k] + r->low[k]);
     }
     for (int d = 0; d < 3; d++)
-        out->centre[d] = p->origin[d] + middle[0] * p->axis[0][d] + middle[1] * p->axis[1][d];
+        out->centre[d] =
+            p->origin[d] + middle[0] * p->axis[0][d] + middle[1] * p->axis[1][d] + above * p->normal[d];
     out->radius = hypot(out->half[0], out->half[1]);
-    out->full = area >= (1 - same_area) * 4 * out->half[0] * out->half[1];
+    out->full = out->rise <= slack && area >= (1 - same_area) * 4 * out->half[0] * out->half[1];
 }
 
 /* The box around all corners of a cluster, along the axes of the scene. */
@@ -111,18 +126,22 @@ static void set_above(const corner_box *box, double area, flat_cluster *out) {
     out->radius = sqrt(square);
 }
 
-/* The scene's largest extent times least_length. */
-static double slack_of(const mesh *m) {
+static double extent_of(const mesh *m) {
     double centre[3], radius;
     mesh_bounds(m, centre, &radius);
-    return 2 * radius * least_length;
+    return 2 * radius;
 }
 
 lam_status flat_clusters_make(const mesh *m, const plane_tree *tree, block_factors *blocks,
                               flat_clusters *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = m->n, n_clusters = blocks->n_clusters, n_nodes = n_clusters + n;
-    flat_clusters f = {.m = m, .tree = blocks, .n_planes = tree->n_frames, .slack = slack_of(m)};
+    const double extent = extent_of(m);
+    flat_clusters f = {.m = m,
+                       .tree = blocks,
+                       .n_planes = tree->n_frames,
+                       .slack = least_length * extent,
+                       .flush = least_height * extent};
     rectangle *bounds = memory_allocate(n_nodes, sizeof *bounds, "clusters", error);
     corner_box *boxes = memory_allocate(n_clusters, sizeof *boxes, "clusters", error);
     f.of = memory_allocate(n_nodes, sizeof *f.of, "clusters", error);
@@ -146,10 +165,10 @@ lam_status flat_clusters_make(const mesh *m, const plane_tree *tree, block_facto
             bounds[own] = of_element(m, blocks->order[p], plane);
             include(&bounds[own], blocks->place[p]);
             bounds[t] = p == c->begin ? bounds[own] : joined(&bounds[t], &bounds[own]);
-            set_cluster(plane, &bounds[own], blocks->area[p], c->frame, &f.of[own]);
+            set_cluster(plane, &bounds[own], blocks->area[p], c->frame, f.slack, &f.of[own]);
         }
         if (!c->leaf) bounds[t] = joined(&bounds[c->left], &bounds[t - 1]);
-        set_cluster(plane, &bounds[t], f.before[c->end] - f.before[c->begin], c->frame, &f.of[t]);
+        set_cluster(plane, &bounds[t], f.before[c->end] - f.before[c->begin], c->frame, f.slack, &f.of[t]);
         for (int k = 0; k < 2; k++) {
             node->centre[k] = .5 * (bounds[t].low[k] + bounds[t].high[k]);
             /* Rounding would make the coordinates of narrower ones arbitrary. */

@@ -7,16 +7,20 @@
 #include "solver/formfactor/pairs/polygon.h"
 #include "solver/operator/blocks/block_factors.h"
 
-/* A plane: the points x with normal . x = level. Coordinates in it are (x - origin) . axis. */
+/* A plane through its origin. Coordinates in it are (x - origin) . axis, a height is normal . x. The elements
+ * of a plane may differ in height: walls of two houses that stand nearly in a row. */
 typedef struct flat_plane {
-    double origin[3], axis[2][3], normal[3], level;
+    double origin[3], axis[2][3], normal[3];
 } flat_plane;
 
 typedef struct flat_cluster {
     double centre[3], half[2]; /* of the rectangle, along the axes of its plane; radius: half its diagonal */
     double radius, area;       /* area: that of its elements */
-    uint32_t plane;            /* PLANE_ABOVE: several planes. Centre and radius are those of a box then */
-    bool full;                 /* the elements fill the rectangle; false above planes */
+    /* Heights: that of the rectangle, how far the corners of its elements are from it at most, and the lowest
+     * one of the highest corners of each element. 0 above planes. */
+    double level, rise, lowest_top;
+    uint32_t plane; /* PLANE_ABOVE: several planes. Centre and radius are those of a box then */
+    bool full;      /* the elements fill the rectangle at its height; false above planes */
 } flat_cluster;
 
 typedef struct flat_clusters {
@@ -27,6 +31,7 @@ typedef struct flat_clusters {
     size_t n_planes;
     double *before; /* [n + 1], the area of all elements before a position */
     double slack;   /* metres: less than this is no distance */
+    double flush;   /* metres: elements of a plane that differ in height by less hide nothing of each other */
 } flat_clusters;
 
 /* Measures all nodes, and widens nodes of blocks from the rectangles of centroids to those of the elements.

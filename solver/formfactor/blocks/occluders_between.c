@@ -10,18 +10,21 @@
 typedef struct between {
     const flat_pair *at;
     const flat_plane *plane[2];
-    double low[3], high[3], slack;
+    const flat_cluster *of[2];
+    double low[3], high[3], slack, flush;
+    double rise; /* the elements are off their rectangles by this at most */
 } between;
 
-/* True where the piece reaches in front of both planes. */
-static bool is_in_front(const between *w, const occluder *o) {
+/* True where the piece reaches in front of some element of both clusters; amid is set where it does not of
+ * all. An element's own piece never does. */
+static bool is_in_front(const between *w, const occluder *o, bool amid[2]) {
     for (int side = 0; side < 2; side++) {
-        const double *n = w->plane[side]->normal, level = w->plane[side]->level + w->slack;
-        bool in_front = false;
+        const double *n = w->plane[side]->normal;
+        double top = -INFINITY;
         for (uint32_t c = 0; c < o->n_corners; c++)
-            in_front =
-                in_front || n[0] * o->corner[c][0] + n[1] * o->corner[c][1] + n[2] * o->corner[c][2] > level;
-        if (!in_front) return false;
+            top = fmax(top, n[0] * o->corner[c][0] + n[1] * o->corner[c][1] + n[2] * o->corner[c][2]);
+        if (top <= w->of[side]->lowest_top + w->flush) return false;
+        amid[side] = top <= w->of[side]->level + w->of[side]->rise + w->flush;
     }
     return true;
 }
@@ -34,9 +37,10 @@ static void take_heights(const flat_pair *at, const double plane[4], double out[
 
 typedef enum blocking { BLOCKS_NOTHING, BLOCKS_SOME, BLOCKS_ALL } blocking;
 
-static blocking what_blocks(const between *w, const occluder *o) {
+static blocking what_blocks(const between *w, const occluder *o, bool amid[2]) {
     enum { FIRST = FLAT_CORNERS / 2 };
-    const double slack = w->slack, own[4] = {o->normal[0], o->normal[1], o->normal[2], -o->level};
+    const double slack = w->slack, rise = w->rise, margin = slack - rise,
+                 own[4] = {o->normal[0], o->normal[1], o->normal[2], -o->level};
     double height[FLAT_CORNERS], above[FLAT_CORNERS], below[FLAT_CORNERS];
     double low = INFINITY, high = -INFINITY, first_low = INFINITY, first_high = -INFINITY;
     take_heights(w->at, own, height);
@@ -47,27 +51,28 @@ static blocking what_blocks(const between *w, const occluder *o) {
         first_low = low;
         first_high = high;
     }
-    if (low >= -slack || high <= slack) return BLOCKS_NOTHING;
+    if (low >= -margin || high <= margin) return BLOCKS_NOTHING;
     double second_low = INFINITY, second_high = -INFINITY;
     for (int k = FIRST; k < FLAT_CORNERS; k++) {
         second_low = height[k] < second_low ? height[k] : second_low;
         second_high = height[k] > second_high ? height[k] : second_high;
     }
-    /* 1 / h of the corners on either side, 0 on the other one. A corner in the plane counts for both sides,
-     * with the least height. */
+    /* 1 / h of the corners on either side, 0 on the other one. A corner that may lie in the plane counts for
+     * both sides, with the least height. */
 #pragma omp simd
     for (int k = 0; k < FLAT_CORNERS; k++) {
         const double size = fabs(height[k]), over = 1 / (size > slack ? size : slack);
-        above[k] = height[k] >= -slack ? over : 0;
-        below[k] = height[k] <= slack ? over : 0;
+        above[k] = height[k] >= -slack - rise ? over : 0;
+        below[k] = height[k] <= slack + rise ? over : 0;
     }
     bool all = (first_low >= slack && second_high <= -slack) || (first_high <= -slack && second_low >= slack);
+    all = all && rise <= w->flush;
     for (uint32_t e = 0; e < o->n_corners; e++) {
         double g[FLAT_CORNERS], most_above = -INFINITY, most_below = -INFINITY, least_above = INFINITY,
                                 least_below = INFINITY;
         take_heights(w->at, o->edge[e], g);
         for (int k = 0; k < FLAT_CORNERS; k++) {
-            const double up = (g[k] - slack) * above[k], down = (g[k] - slack) * below[k];
+            const double up = (g[k] - margin) * above[k], down = (g[k] - margin) * below[k];
             if (above[k] > 0) most_above = up > most_above ? up : most_above;
             if (below[k] > 0) most_below = down > most_below ? down : most_below;
         }
@@ -80,7 +85,7 @@ static blocking what_blocks(const between *w, const occluder *o) {
         }
         all = least_above + least_below >= 0;
     }
-    if (!is_in_front(w, o)) return BLOCKS_NOTHING;
+    if (!is_in_front(w, o, amid)) return BLOCKS_NOTHING;
     return all ? BLOCKS_ALL : BLOCKS_SOME;
 }
 
@@ -90,8 +95,10 @@ static bool try_one(const occluders *o, const between *w, uint32_t k, candidates
     out->examined++;
     for (int d = 0; d < 3; d++)
         if (piece->low[d] > w->high[d] || piece->high[d] < w->low[d]) return true;
-    const blocking found = what_blocks(w, piece);
+    bool amid[2] = {false, false};
+    const blocking found = what_blocks(w, piece, amid);
     if (found == BLOCKS_NOTHING) return true;
+    for (int side = 0; side < 2; side++) out->amid[side] = out->amid[side] || amid[side];
     if (found == BLOCKS_ALL) {
         out->hidden = true;
         out->of[0] = k;
@@ -127,10 +134,14 @@ static void try_all(const occluders *o, const between *w, candidates *out) {
 
 void occluders_between(const occluders *o, const flat_clusters *f, uint32_t a, uint32_t b,
                        const flat_pair *at, const candidates *among, candidates *out) {
-    between w = {
-        .at = at, .plane = {&f->planes[f->of[a].plane], &f->planes[f->of[b].plane]}, .slack = f->slack};
+    between w = {.at = at,
+                 .plane = {&f->planes[f->of[a].plane], &f->planes[f->of[b].plane]},
+                 .of = {&f->of[a], &f->of[b]},
+                 .slack = f->slack,
+                 .flush = f->flush,
+                 .rise = fmax(f->of[a].rise, f->of[b].rise)};
     out->count = out->examined = 0;
-    out->hidden = false;
+    out->hidden = out->amid[0] = out->amid[1] = false;
     if (o->n == 0) return;
     for (int d = 0; d < 3; d++) {
         w.low[d] = w.high[d] = at->x[d][0];
@@ -138,6 +149,8 @@ void occluders_between(const occluders *o, const flat_clusters *f, uint32_t a, u
             w.low[d] = at->x[d][k] < w.low[d] ? at->x[d][k] : w.low[d];
             w.high[d] = at->x[d][k] > w.high[d] ? at->x[d][k] : w.high[d];
         }
+        w.low[d] -= w.rise;
+        w.high[d] += w.rise;
     }
     if (among == NULL || among->count == OCCLUDERS_UNKNOWN) {
         try_all(o, &w, out);

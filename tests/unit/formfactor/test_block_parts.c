@@ -290,8 +290,7 @@ START_TEST(candidates_are_those_that_segments_cross) {
         for (int k = 0; k < 4; k++) memcpy(quad[k], p.m.vertices[p.m.elements[1][k]], sizeof quad[k]);
         flat_clusters_pair(&p.flat, a, b, &at);
         for (int k = 0; k < 4; k++) {
-            double height[2] = {-p.flat.planes[p.flat.of[a].plane].level,
-                                -p.flat.planes[p.flat.of[b].plane].level};
+            double height[2] = {-p.flat.of[a].level, -p.flat.of[b].level};
             for (int d = 0; d < 3; d++) {
                 height[0] += p.flat.planes[p.flat.of[a].plane].normal[d] * quad[k][d];
                 height[1] += p.flat.planes[p.flat.of[b].plane].normal[d] * quad[k][d];
@@ -338,6 +337,82 @@ START_TEST(candidates_are_those_that_segments_cross) {
 }
 END_TEST
 
+/* A wall, a board of its size close before it, and a wall beside these that stands farther in front, all of
+ * the same plane; a wall far away that faces them, and a strip of floor between wall and board; also with x
+ * turned round: the board hides the wall and not itself, and no cluster of both is hidden as a whole or taken
+ * for flat. */
+START_TEST(a_board_before_a_wall_hides_only_the_wall) {
+    enum { WALL, BOARD, FAR, STRIP, BESIDE, ALL };
+    const double step = 1e-3, away = 20;
+    const box_cell cells[] = {{0, 0, {0, 0, 0}, {0, 1, 1}},
+                              {0, step, {step, 0, 0}, {step, 1, 1}},
+                              {0, away, {away, 0, 0}, {away, 1, 1}},
+                              {2, 0, {0, 0, 0}, {.4 * step, 1, 0}},
+                              {0, 3 * step, {3 * step, 2, 0}, {3 * step, 3, 1}}};
+    const double sign = _i == 0 ? 1 : -1;
+    parts p = {.m = {.n = 0}};
+    for (int k = 0; k < ALL; k++) {
+        box_cell c = cells[k];
+        if (c.axis == 0) c.level *= sign;
+        c.from[0] = fmin(sign * cells[k].from[0], sign * cells[k].to[0]);
+        c.to[0] = fmax(sign * cells[k].from[0], sign * cells[k].to[0]);
+        mesh_add_cell(&p.m, &c, (k != FAR) == (c.axis == 2 || sign > 0));
+    }
+    mesh_finish(&p.m, .5f);
+    parts_make(&p);
+    const uint32_t both = plane_of(&p, WALL), far = node_of(&p, FAR), strip = node_of(&p, STRIP);
+    const uint32_t single[2] = {node_of(&p, WALL), node_of(&p, BOARD)};
+    bool behind[2];
+    candidates among;
+    flat_pair at;
+    ck_assert_uint_eq(both, plane_of(&p, BOARD));
+    ck_assert(!p.flat.of[both].full && p.flat.of[single[0]].full);
+    ck_assert_double_eq_tol(p.flat.of[both].rise, 1.5 * step, 1e-12);
+    for (int k = 0; k < 2; k++) {
+        flat_clusters_pair(&p.flat, single[k], far, &at);
+        ck_assert_double_eq_tol(p.flat.of[single[k]].level, k * step, 1e-12);
+        ck_assert_double_eq_tol(at.x[0][0], sign * k * step, 1e-12);
+        occluders_between(&p.pieces, &p.flat, single[k], far, &at, NULL, &among);
+        ck_assert(among.hidden == (k == 0));
+        ck_assert_int_eq(among.count, k == 0);
+    }
+    for (int turned = 0; turned < 2; turned++) {
+        const uint32_t ends[2] = {turned ? far : both, turned ? both : far};
+        flat_clusters_pair(&p.flat, ends[0], ends[1], &at);
+        occluders_between(&p.pieces, &p.flat, ends[0], ends[1], &at, NULL, &among);
+        bool board = false;
+        for (int k = 0; k < among.count; k++)
+            board = board || (fabs(p.pieces.of[among.of[k]].low[0] - sign * step) < 1e-12 &&
+                              p.pieces.of[among.of[k]].high[1] < 1.5);
+        ck_assert(board && !among.hidden);
+        ck_assert(among.amid[turned] && !among.amid[1 - turned]);
+    }
+    flat_clusters_pair(&p.flat, both, strip, &at); /* it is in front of the wall */
+    ck_assert_double_gt(block_kernel_most(&p.flat, both, strip, &at, behind), 0);
+    parts_free(&p);
+}
+END_TEST
+
+/* The same by blocks that may be as large as the cluster of both. */
+START_TEST(a_board_has_the_light_of_its_wall) {
+    const box_cell wall = {0, 0, {0, 0, 0}, {0, 1, 1}}, board = {0, 1e-3, {1e-3, 0, 0}, {1e-3, 1, 1}},
+                   far = {0, 20, {20, 0, 0}, {20, 1, 1}};
+    const double truth = box_exchange(&board, &far);
+    mesh m = {.n = 0};
+    mesh_add_cell(&m, &wall, true);
+    mesh_add_cell(&m, &board, true);
+    mesh_add_cell(&m, &far, false);
+    mesh_finish(&m, .5f);
+    plane_tree tree;
+    block_factors f = blocks_of(&m, &tree, 1, 1, NULL);
+    ck_assert_double_eq(blocks_exchange(&m, &f, 0, 1, 2, 1), 0);
+    ck_assert_double_eq_tol(blocks_exchange(&m, &f, 1, 1, 2, 1), truth, .01 * truth);
+    block_factors_free(&f);
+    plane_tree_free(&tree);
+    mesh_free(&m);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("parts of blocks");
     TCase *tests = tcase_create("parts");
@@ -348,6 +423,8 @@ int main(void) {
     tcase_add_test(tests, one_piece_hides_what_it_covers_entirely);
     tcase_add_test(tests, light_passes_a_corner);
     tcase_add_test(tests, candidates_are_those_that_segments_cross);
+    tcase_add_loop_test(tests, a_board_before_a_wall_hides_only_the_wall, 0, 2);
+    tcase_add_test(tests, a_board_has_the_light_of_its_wall);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
