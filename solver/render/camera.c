@@ -1,5 +1,7 @@
 #include "solver/render/camera.h"
 
+#include "solver/base/vector3.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,18 +13,8 @@
 #define CENTRING_PASSES 12
 #define RAISED_ELEVATION 25.0
 
-static double dot(const double a[3], const double b[3]) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(const double a[3], const double b[3], double out[3]) {
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
 static void scale_to_unit(double a[3]) {
-    double length = sqrt(dot(a, a));
+    double length = sqrt(dot3(a, a));
     for (int d = 0; d < 3; d++) a[d] /= length;
 }
 
@@ -35,7 +27,7 @@ static void scene_axes(char up, double axes_up[3], double north[3], double east[
         north[2] = -1;
     else
         north[1] = 1;
-    cross(north, axes_up, east);
+    cross3(north, axes_up, east);
 }
 
 /* forward is a unit vector. */
@@ -44,10 +36,10 @@ static void orient(camera *c, const double forward[3], char up, double fov, doub
     scene_axes(up, axes_up, north, east);
     memcpy(c->forward, forward, sizeof c->forward);
     /* A camera that faces straight up or down has north at the top. */
-    const double *upright = fabs(dot(forward, axes_up)) > 1 - 1e-9 ? north : axes_up;
-    cross(forward, upright, c->right);
+    const double *upright = fabs(dot3(forward, axes_up)) > 1 - 1e-9 ? north : axes_up;
+    cross3(forward, upright, c->right);
     scale_to_unit(c->right);
-    cross(c->right, c->forward, c->up);
+    cross3(c->right, c->forward, c->up);
     c->tan_y = tan(fov / 2 * M_PI / 180);
     c->tan_x = c->tan_y * aspect;
 }
@@ -89,10 +81,10 @@ static void fit(const mesh *m, camera *c) {
     for (size_t i = 0; i < m->n_vertices; i++) {
         double offset[3];
         for (int d = 0; d < 3; d++) offset[d] = m->vertices[i][d] - centre[d];
-        double z = -dot(offset, c->forward);
+        double z = -dot3(offset, c->forward);
         nearest = fmax(nearest, z);
         for (int a = 0; a < 2; a++) {
-            double side = dot(offset, axis[a]);
+            double side = dot3(offset, axis[a]);
             most[a][0] = fmax(most[a][0], side + z * tangent[a]);
             most[a][1] = fmax(most[a][1], -side + z * tangent[a]);
         }
@@ -115,7 +107,7 @@ static void centre_view(const mesh *m, camera *c) {
         for (size_t i = 0; i < m->n_vertices; i++) {
             double offset[3];
             for (int d = 0; d < 3; d++) offset[d] = m->vertices[i][d] - c->eye[d];
-            const double depth = dot(offset, c->forward), slope = dot(offset, along) / depth;
+            const double depth = dot3(offset, c->forward), slope = dot3(offset, along) / depth;
             low = fmin(low, slope);
             high = fmax(high, slope);
             nearest = fmin(nearest, depth);

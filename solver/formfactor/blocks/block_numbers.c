@@ -1,5 +1,7 @@
 #include "solver/formfactor/blocks/block_numbers.h"
 
+#include "solver/base/vector3.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -11,10 +13,6 @@ static const double node = .57735026918962576451;
 static const double ridge = .02;
 /* Below this many radii between centre and cluster nothing is smooth. */
 static const double nearest = 1.05;
-
-static double dot3(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 /* Of the points that lie in front of both planes: cos cos' / (pi r^2), r from x to y. */
 static double kernel(const double *normal_x, const double *normal_y, const double *x, const double *y) {

@@ -1,5 +1,7 @@
 #include "solver/formfactor/blocks/flat_clusters.h"
 
+#include "solver/base/vector3.h"
+
 #include <math.h>
 #include <stdlib.h>
 
@@ -16,10 +18,6 @@ void flat_clusters_free(flat_clusters *f) {
     free(f->planes);
     free(f->before);
     *f = (flat_clusters){.m = NULL};
-}
-
-static double dot3(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 static void set_plane(const plane_frame *frame, flat_plane *p) {

@@ -1,5 +1,7 @@
 #include "solver/formfactor/blocks/occluder_join.h"
 
+#include "solver/base/vector3.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,10 +28,6 @@ typedef struct joining {
     size_t n_edges;
     bool *used; /* [n], in this round */
 } joining;
-
-static double dot3(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 static void cross_of(const mesh *m, uint32_t from, uint32_t at, uint32_t to, double out[3]) {
     double a[3], b[3];

@@ -1,5 +1,6 @@
 #include "solver/formfactor/blocks/occluders.h"
 
+#include "solver/base/vector3.h"
 #include "solver/formfactor/blocks/occluder_join.h"
 
 #include <math.h>
@@ -16,18 +17,6 @@ void occluders_free(occluders *o) {
     *o = (occluders){.n = 0};
 }
 
-static double dot3(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void subtract(const double *a, const double *b, double *out) {
-    for (int d = 0; d < 3; d++) out[d] = a[d] - b[d];
-}
-
-static void cross(const double *a, const double *b, double *out) {
-    for (int d = 0; d < 3; d++) out[d] = a[(d + 1) % 3] * b[(d + 2) % 3] - a[(d + 2) % 3] * b[(d + 1) % 3];
-}
-
 static double scale_to_unit(double *x) {
     const double length = sqrt(dot3(x, x));
     for (int d = 0; d < 3; d++) x[d] /= length;
@@ -39,9 +28,9 @@ static void set_occluder(const mesh *m, const uint32_t vertices[4], occluder *o)
     *o = (occluder){.n_corners = (uint32_t)corner_count(vertices)};
     for (uint32_t c = 0; c < o->n_corners; c++)
         memcpy(o->corner[c], m->vertices[vertices[c]], sizeof o->corner[c]);
-    subtract(o->corner[1], o->corner[0], one);
-    subtract(o->corner[2], o->corner[0], two);
-    cross(one, two, o->normal);
+    subtract3(o->corner[1], o->corner[0], one);
+    subtract3(o->corner[2], o->corner[0], two);
+    cross3(one, two, o->normal);
     scale_to_unit(o->normal);
     o->level = dot3(o->normal, o->corner[0]);
     for (int d = 0; d < 3; d++) {
@@ -54,8 +43,8 @@ static void set_occluder(const mesh *m, const uint32_t vertices[4], occluder *o)
     for (uint32_t c = 0; c < 4; c++) {
         const uint32_t from = c < o->n_corners ? c : o->n_corners - 1, to = (from + 1) % o->n_corners;
         double along[3], inward[3];
-        subtract(o->corner[to], o->corner[from], along);
-        cross(o->normal, along, inward);
+        subtract3(o->corner[to], o->corner[from], along);
+        cross3(o->normal, along, inward);
         scale_to_unit(inward);
         memcpy(o->edge[c], inward, sizeof inward);
         o->edge[c][3] = -dot3(inward, o->corner[from]);

@@ -1,5 +1,6 @@
 #include "solver/formfactor/blocks/unhidden.h"
 
+#include "solver/base/vector3.h"
 #include "solver/formfactor/pairs/polygon.h"
 #include "store/status.h"
 
@@ -26,10 +27,6 @@ typedef struct vertex_box {
 typedef struct element_plane {
     double normal[3], level;
 } element_plane;
-
-static double dot3(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 static void widen(double low[3], double high[3], const double *least, const double *most) {
     for (int d = 0; d < 3; d++) {

@@ -1,5 +1,7 @@
 #include "solver/formfactor/pairs/clusters.h"
 
+#include "solver/base/vector3.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,10 +24,6 @@ void cluster_tree_free(cluster_tree *t) {
     free(t->element);
     free(t->position);
     *t = (cluster_tree){0};
-}
-
-static double dot(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 static void measure_box(const builder *b, cluster *c) {
@@ -54,13 +52,13 @@ static void measure_directions(const builder *b, cluster *c) {
     double sum[3] = {0};
     for (uint32_t p = c->first; p < c->last; p++)
         for (int d = 0; d < 3; d++) sum[d] += b->features[b->tree.element[p]].normal[d];
-    const double length = sqrt(dot(sum, sum));
+    const double length = sqrt(dot3(sum, sum));
     c->spread = 3.2; /* above pi: no bound */
     if (length < 1e-6 * (c->last - c->first)) return;
     for (int d = 0; d < 3; d++) c->normal[d] = sum[d] / length;
     double least = 1;
     for (uint32_t p = c->first; p < c->last; p++)
-        least = fmin(least, dot(b->features[b->tree.element[p]].normal, c->normal));
+        least = fmin(least, dot3(b->features[b->tree.element[p]].normal, c->normal));
     /* Normals are in single precision: the rounding of a cosine near 1 is an angle of up to 1e-3. */
     c->spread = acos(fmax(least, -1)) + 1e-3;
     if (least < 1 - 1e-9) return;
@@ -68,7 +66,7 @@ static void measure_directions(const builder *b, cluster *c) {
     for (uint32_t p = c->first; p < c->last; p++) {
         const uint32_t e = b->tree.element[p];
         for (size_t k = 0; k < mesh_corners(m, e); k++) {
-            const double level = dot(m->vertices[m->elements[e][k]], c->normal);
+            const double level = dot3(m->vertices[m->elements[e][k]], c->normal);
             low = fmin(low, level);
             high = fmax(high, level);
         }
@@ -193,9 +191,9 @@ static bool behind(const cluster *a, const cluster *b, double slack) {
         apart[d] = .5 * (b->low[d] + b->high[d] - a->low[d] - a->high[d]);
         size += wide * wide;
     }
-    const double distance = sqrt(dot(apart, apart)), radius = sqrt(size);
+    const double distance = sqrt(dot3(apart, apart)), radius = sqrt(size);
     if (!(distance > radius)) return false;
-    const double angle = acos(fmin(fmax(dot(apart, a->normal) / distance, -1), 1));
+    const double angle = acos(fmin(fmax(dot3(apart, a->normal) / distance, -1), 1));
     return angle - asin(radius / distance) - a->spread > 1.5707963267948966;
 }
 

@@ -1,5 +1,7 @@
 #include "solver/formfactor/pairs/joined_occluders.h"
 
+#include "solver/base/vector3.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,36 +16,24 @@ void joined_occluders_free(joined_occluders *o) {
     *o = (joined_occluders){.n = 0};
 }
 
-static double dot(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void subtract(const double *a, const double *b, double *out) {
-    for (int d = 0; d < 3; d++) out[d] = a[d] - b[d];
-}
-
-static void cross(const double *a, const double *b, double *out) {
-    for (int d = 0; d < 3; d++) out[d] = a[(d + 1) % 3] * b[(d + 2) % 3] - a[(d + 2) % 3] * b[(d + 1) % 3];
-}
-
 /* Sets an occluder from its corners; false where it is thinner than slack. */
 static bool set_occluder(joined_occluder *o, double slack) {
     double twice[3] = {0};
     for (int c = 1; c + 1 < o->n; c++) {
         double one[3], two[3], part[3];
-        subtract(o->corner[c], o->corner[0], one);
-        subtract(o->corner[c + 1], o->corner[0], two);
-        cross(one, two, part);
+        subtract3(o->corner[c], o->corner[0], one);
+        subtract3(o->corner[c + 1], o->corner[0], two);
+        cross3(one, two, part);
         for (int d = 0; d < 3; d++) twice[d] += part[d];
     }
-    const double area = sqrt(dot(twice, twice));
+    const double area = sqrt(dot3(twice, twice));
     double longest = 0;
     o->level = 0;
     for (int d = 0; d < 3; d++) o->low[d] = INFINITY, o->high[d] = -INFINITY;
     for (int c = 0; c < o->n; c++) {
         double along[3];
-        subtract(o->corner[(c + 1) % o->n], o->corner[c], along);
-        longest = fmax(longest, dot(along, along));
+        subtract3(o->corner[(c + 1) % o->n], o->corner[c], along);
+        longest = fmax(longest, dot3(along, along));
         for (int d = 0; d < 3; d++) {
             o->low[d] = fmin(o->low[d], o->corner[c][d]);
             o->high[d] = fmax(o->high[d], o->corner[c][d]);
@@ -52,15 +42,15 @@ static bool set_occluder(joined_occluder *o, double slack) {
     longest = sqrt(longest);
     if (!(area > slack * longest)) return false;
     for (int d = 0; d < 3; d++) o->normal[d] = twice[d] / area;
-    for (int c = 0; c < o->n; c++) o->level += dot(o->normal, o->corner[c]) / o->n;
+    for (int c = 0; c < o->n; c++) o->level += dot3(o->normal, o->corner[c]) / o->n;
     for (int c = 0; c < o->n; c++) {
         double along[3], inward[3];
-        subtract(o->corner[(c + 1) % o->n], o->corner[c], along);
-        cross(o->normal, along, inward);
-        const double length = sqrt(dot(inward, inward));
+        subtract3(o->corner[(c + 1) % o->n], o->corner[c], along);
+        cross3(o->normal, along, inward);
+        const double length = sqrt(dot3(inward, inward));
         if (!(length > 0)) return false;
         for (int d = 0; d < 3; d++) o->edge[c][d] = inward[d] / length;
-        o->edge[c][3] = -dot(o->edge[c], o->corner[c]);
+        o->edge[c][3] = -dot3(o->edge[c], o->corner[c]);
     }
     return true;
 }
@@ -72,8 +62,8 @@ static bool coincide(const joined_occluder *a, const joined_occluder *b, double 
         bool found = false;
         for (int k = 0; k < b->n && !found; k++) {
             double apart[3];
-            subtract(a->corner[c], b->corner[k], apart);
-            found = dot(apart, apart) <= slack * slack;
+            subtract3(a->corner[c], b->corner[k], apart);
+            found = dot3(apart, apart) <= slack * slack;
         }
         if (!found) return false;
     }
@@ -234,7 +224,7 @@ static void box_corners(const cluster *c, double corner[8][3]) {
 /* All segments between corners of the boxes cross a convex occluder, so all others do. */
 static bool hides(const joined_occluder *o, const double corner[2][8][3], double slack) {
     double height[2][8];
-    for (int k = 0; k < 16; k++) height[k / 8][k % 8] = dot(o->normal, corner[k / 8][k % 8]) - o->level;
+    for (int k = 0; k < 16; k++) height[k / 8][k % 8] = dot3(o->normal, corner[k / 8][k % 8]) - o->level;
     const double sign = height[0][0] > 0 ? 1 : -1;
     for (int k = 0; k < 8; k++)
         if (sign * height[0][k] <= slack || sign * height[1][k] >= -slack) return false;
@@ -244,7 +234,7 @@ static bool hides(const joined_occluder *o, const double corner[2][8][3], double
             double at[3];
             for (int d = 0; d < 3; d++) at[d] = corner[0][i][d] + t * (corner[1][k][d] - corner[0][i][d]);
             for (int e = 0; e < o->n; e++)
-                if (dot(o->edge[e], at) + o->edge[e][3] < -slack) return false;
+                if (dot3(o->edge[e], at) + o->edge[e][3] < -slack) return false;
         }
     return true;
 }

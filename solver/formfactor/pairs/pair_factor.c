@@ -1,17 +1,11 @@
 #include "solver/formfactor/pairs/pair_factor.h"
 
+#include "solver/base/vector3.h"
+
 #include <math.h>
 #include <string.h>
 
 static const double pi = 3.14159265358979323846;
-
-static double dot(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void subtract(const double *a, const double *b, double *out) {
-    for (int d = 0; d < 3; d++) out[d] = a[d] - b[d];
-}
 
 /* Gauss and Legendre: Newton's iteration for the roots of P_n. */
 static void gauss_init(gauss_rule *g, int n) {
@@ -59,7 +53,7 @@ static void edge_of(const polygon *p, int c, double scale, edge *e) {
         e->from[d] = scale * from[d];
         e->along[d] = scale * (to[d] - from[d]);
     }
-    e->length = sqrt(dot(e->along, e->along));
+    e->length = sqrt(dot3(e->along, e->along));
     for (int d = 0; d < 3 && e->length > 0; d++) e->along[d] /= e->length;
 }
 
@@ -74,10 +68,10 @@ static double twice_integrated(double x, double h) {
  */
 static double parallel_edges(const edge *one, const edge *two, double cosine) {
     double v[3];
-    subtract(one->from, two->from, v);
-    double x = dot(v, two->along);
+    subtract3(one->from, two->from, v);
+    double x = dot3(v, two->along);
     for (int d = 0; d < 3; d++) v[d] -= x * two->along[d];
-    const double h = sqrt(dot(v, v));
+    const double h = sqrt(dot3(v, v));
     if (cosine < 0) x -= one->length;
     return twice_integrated(x + one->length, h) - twice_integrated(x, h) -
            twice_integrated(x + one->length - two->length, h) + twice_integrated(x - two->length, h);
@@ -89,9 +83,9 @@ static double parallel_edges(const edge *one, const edge *two, double cosine) {
 static double point_to_edge(const edge *one, const edge *two, double s) {
     double v[3];
     for (int d = 0; d < 3; d++) v[d] = one->from[d] + s * one->along[d] - two->from[d];
-    const double a = dot(v, two->along), b = two->length - a;
+    const double a = dot3(v, two->along), b = two->length - a;
     for (int d = 0; d < 3; d++) v[d] -= a * two->along[d];
-    const double h2 = dot(v, v), h = sqrt(h2), from2 = a * a + h2, to2 = b * b + h2;
+    const double h2 = dot3(v, v), h = sqrt(h2), from2 = a * a + h2, to2 = b * b + h2;
     return (to2 > 0 ? b * log(to2) : 0) + (from2 > 0 ? a * log(from2) : 0) - 2 * two->length +
            2 * h * atan2(h * two->length, h2 - a * b);
 }
@@ -100,8 +94,8 @@ static double point_to_edge(const edge *one, const edge *two, double s) {
  * edge two and to its two ends. */
 static int steep_places(const edge *one, const edge *two, double cosine, double places[3]) {
     double v[3], candidates[3];
-    subtract(two->from, one->from, v);
-    const double to_start = dot(v, one->along), along_two = dot(v, two->along);
+    subtract3(two->from, one->from, v);
+    const double to_start = dot3(v, one->along), along_two = dot3(v, two->along);
     candidates[0] = to_start;
     candidates[1] = to_start + cosine * two->length;
     const double sine2 = 1 - cosine * cosine;
@@ -119,10 +113,10 @@ static int steep_places(const edge *one, const edge *two, double cosine, double 
 
 static double distance_to_edge(const double point[3], const edge *e) {
     double v[3];
-    subtract(point, e->from, v);
-    const double s = fmin(fmax(dot(v, e->along), 0), e->length);
+    subtract3(point, e->from, v);
+    const double s = fmin(fmax(dot3(v, e->along), 0), e->length);
     for (int d = 0; d < 3; d++) v[d] -= s * e->along[d];
-    return sqrt(dot(v, v));
+    return sqrt(dot3(v, v));
 }
 
 /* Quadrature over edge one, the shorter, of the closed form over edge two. */
@@ -166,7 +160,7 @@ static double two_edges(const pair_factor_rules *rules, const edge *a, const edg
     const edge *one = a->length <= b->length ? a : b, *two = one == a ? b : a;
     double off[3];
     for (int d = 0; d < 3; d++) off[d] = one->along[d] - cosine * two->along[d];
-    if (dot(off, off) < 1e-24 && one->length > .01 * two->length) return parallel_edges(one, two, cosine);
+    if (dot3(off, off) < 1e-24 && one->length > .01 * two->length) return parallel_edges(one, two, cosine);
     return skew_edges(rules, one, two, cosine);
 }
 
@@ -176,14 +170,14 @@ static double contour(const pair_factor_rules *rules, const polygon *a, const po
     const double scale = 1 / fmax(distance, a->radius + b->radius);
     edge of_a[POLYGON_CORNERS], of_b[POLYGON_CORNERS];
     polygon near_a = *a, near_b = *b;
-    for (int c = 0; c < a->n; c++) subtract(a->corner[c], a->centre, near_a.corner[c]);
-    for (int c = 0; c < b->n; c++) subtract(b->corner[c], a->centre, near_b.corner[c]);
+    for (int c = 0; c < a->n; c++) subtract3(a->corner[c], a->centre, near_a.corner[c]);
+    for (int c = 0; c < b->n; c++) subtract3(b->corner[c], a->centre, near_b.corner[c]);
     for (int c = 0; c < a->n; c++) edge_of(&near_a, c, scale, &of_a[c]);
     for (int c = 0; c < b->n; c++) edge_of(&near_b, c, scale, &of_b[c]);
     double sum = 0;
     for (int i = 0; i < a->n; i++)
         for (int j = 0; j < b->n; j++) {
-            const double cosine = dot(of_a[i].along, of_b[j].along);
+            const double cosine = dot3(of_a[i].along, of_b[j].along);
             if (fabs(cosine) < 1e-15 || of_a[i].length == 0 || of_b[j].length == 0) continue;
             sum += cosine * two_edges(rules, &of_a[i], &of_b[j], cosine);
         }
@@ -283,8 +277,8 @@ double pair_factor_exchange(const pair_factor_rules *rules, const polygon *a, co
     polygon_in_front(a, b, &seen_a);
     if (seen_a.n == 0) return 0;
     double r[3];
-    subtract(seen_a.centre, seen_b.centre, r);
-    const double distance = sqrt(dot(r, r));
+    subtract3(seen_a.centre, seen_b.centre, r);
+    const double distance = sqrt(dot3(r, r));
     const gauss_rule *far = far_rule(rules, &seen_a, &seen_b, distance, tolerance);
     return far != NULL ? cubature(&seen_a, &seen_b, far) : contour(rules, &seen_a, &seen_b, distance);
 }

@@ -1,5 +1,7 @@
 #include "solver/formfactor/pairs/pair_occluders.h"
 
+#include "solver/base/vector3.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -18,35 +20,23 @@ typedef struct pair_sides {
     supports supports;
 } pair_sides;
 
-static double dot(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void subtract(const double *a, const double *b, double *out) {
-    for (int d = 0; d < 3; d++) out[d] = a[d] - b[d];
-}
-
-static void cross(const double *a, const double *b, double *out) {
-    for (int d = 0; d < 3; d++) out[d] = a[(d + 1) % 3] * b[(d + 2) % 3] - a[(d + 2) % 3] * b[(d + 1) % 3];
-}
-
 /* The plane through an edge of p and a corner of q that has both wholly on one side, if there is one. */
 static void add_support(supports *s, const polygon *p, int edge, const polygon *q, double slack) {
     const double *from = p->corner[edge], *to = p->corner[(edge + 1) % p->n];
     double along[3];
-    subtract(to, from, along);
+    subtract3(to, from, along);
     for (int c = 0; c < q->n; c++) {
         double across[3], normal[3], to_centre[3];
-        subtract(q->corner[c], from, across);
-        cross(along, across, normal);
-        const double length = sqrt(dot(normal, normal));
+        subtract3(q->corner[c], from, across);
+        cross3(along, across, normal);
+        const double length = sqrt(dot3(normal, normal));
         if (!(length > slack * slack)) continue;
-        subtract(p->centre, from, to_centre);
-        const double sign = dot(normal, to_centre) > 0 ? -1 : 1;
+        subtract3(p->centre, from, to_centre);
+        const double sign = dot3(normal, to_centre) > 0 ? -1 : 1;
         for (int d = 0; d < 3; d++) normal[d] *= sign / length;
-        const double level = dot(normal, from);
+        const double level = dot3(normal, from);
         bool all = true;
-        for (int k = 0; k < q->n && all; k++) all = dot(normal, q->corner[k]) - level <= slack;
+        for (int k = 0; k < q->n && all; k++) all = dot3(normal, q->corner[k]) - level <= slack;
         if (!all) continue;
         memcpy(s->normal[s->n], normal, sizeof normal);
         s->level[s->n++] = level;
@@ -65,7 +55,7 @@ static bool is_outside(pair_sides *p, const joined_occluder *o) {
     for (int k = 0; k < p->supports.n; k++) {
         bool outside = true;
         for (int c = 0; c < o->n && outside; c++)
-            outside = dot(p->supports.normal[k], o->corner[c]) >= p->supports.level[k] - p->slack;
+            outside = dot3(p->supports.normal[k], o->corner[c]) >= p->supports.level[k] - p->slack;
         if (outside) return true;
     }
     return false;
@@ -85,7 +75,7 @@ static standing compare_crossings(const joined_occluder *o, const polygon *a, co
             double at[3];
             for (int d = 0; d < 3; d++) at[d] = a->corner[i][d] + t * (b->corner[j][d] - a->corner[i][d]);
             for (int e = 0; e < o->n; e++) {
-                const double inside = dot(o->edge[e], at) + o->edge[e][3];
+                const double inside = dot3(o->edge[e], at) + o->edge[e][3];
                 least[e] = inside < least[e] ? inside : least[e];
                 most[e] = inside > most[e] ? inside : most[e];
             }
@@ -104,7 +94,7 @@ static standing where_it_stands(pair_sides *p, const joined_occluder *o) {
         const polygon *one = p->side[side];
         low[side] = INFINITY, high[side] = -INFINITY;
         for (int c = 0; c < one->n; c++) {
-            height[side][c] = dot(o->normal, one->corner[c]) - o->level;
+            height[side][c] = dot3(o->normal, one->corner[c]) - o->level;
             low[side] = height[side][c] < low[side] ? height[side][c] : low[side];
             high[side] = height[side][c] > high[side] ? height[side][c] : high[side];
         }
@@ -116,8 +106,8 @@ static standing where_it_stands(pair_sides *p, const joined_occluder *o) {
         double front = -INFINITY;
         for (int c = 0; c < o->n; c++) {
             double to[3];
-            subtract(o->corner[c], one->centre, to);
-            front = fmax(front, dot(one->normal, to));
+            subtract3(o->corner[c], one->centre, to);
+            front = fmax(front, dot3(one->normal, to));
         }
         if (front <= p->slack) return STANDS_BESIDE;
     }

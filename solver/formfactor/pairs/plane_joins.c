@@ -1,6 +1,7 @@
 #include "solver/formfactor/pairs/plane_joins.h"
 
 #include "solver/base/array_grow.h"
+#include "solver/base/vector3.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -46,18 +47,6 @@ typedef struct placed {
     uint32_t vertex;
 } placed;
 
-static double dot(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void subtract(const double *a, const double *b, double *out) {
-    for (int d = 0; d < 3; d++) out[d] = a[d] - b[d];
-}
-
-static void cross(const double *a, const double *b, double *out) {
-    for (int d = 0; d < 3; d++) out[d] = a[(d + 1) % 3] * b[(d + 2) % 3] - a[(d + 2) % 3] * b[(d + 1) % 3];
-}
-
 static int by_place(const void *left, const void *right) {
     const placed *a = left, *b = right;
     for (int d = 0; d < 3; d++)
@@ -87,12 +76,12 @@ static lam_status find_places(joiner *j, lam_error *error) {
  * counter-clockwise. */
 static double bulge(const mesh *m, const double normal[3], uint32_t a, uint32_t b, uint32_t c) {
     double along[3], to[3], across[3];
-    subtract(m->vertices[c], m->vertices[a], along);
-    subtract(m->vertices[b], m->vertices[a], to);
-    const double length = sqrt(dot(along, along));
+    subtract3(m->vertices[c], m->vertices[a], along);
+    subtract3(m->vertices[b], m->vertices[a], to);
+    const double length = sqrt(dot3(along, along));
     if (!(length > 0)) return 0;
-    cross(to, along, across);
-    return dot(across, normal) / length;
+    cross3(to, along, across);
+    return dot3(across, normal) / length;
 }
 
 /* Removes x, y, x: two sides that run along each other. Returns how many corners are left. */
@@ -129,13 +118,13 @@ static int strict_corners(const joiner *j, const uint32_t *corner, int n, const 
     }
     if (n < 3) return 0;
     double turned = 0, previous[3], along[3], turn[3];
-    subtract(j->m->vertices[out[0]], j->m->vertices[out[n - 1]], previous);
+    subtract3(j->m->vertices[out[0]], j->m->vertices[out[n - 1]], previous);
     for (int k = 0; k < n; k++) {
-        subtract(j->m->vertices[out[(k + 1) % n]], j->m->vertices[out[k]], along);
-        cross(previous, along, turn);
-        const double sine = dot(turn, normal);
+        subtract3(j->m->vertices[out[(k + 1) % n]], j->m->vertices[out[k]], along);
+        cross3(previous, along, turn);
+        const double sine = dot3(turn, normal);
         if (!(sine > 0)) return 0;
-        turned += atan2(sine, dot(previous, along));
+        turned += atan2(sine, dot3(previous, along));
         memcpy(previous, along, sizeof along);
     }
     /* Once around, not twice. */
@@ -168,9 +157,10 @@ static void normal_of(const joiner *j, const outline *o, double normal[3]) {
 static bool in_plane_of(const joiner *j, const outline *o, const outline *plane) {
     double normal[3];
     normal_of(j, plane, normal);
-    const double level = dot(normal, j->m->vertices[j->pool[plane->first]]);
+    const double level = dot3(normal, j->m->vertices[j->pool[plane->first]]);
     for (int c = 0; c < o->n; c++)
-        if (fabs(dot(normal, j->m->vertices[j->pool[o->first + (size_t)c]]) - level) > j->slack) return false;
+        if (fabs(dot3(normal, j->m->vertices[j->pool[o->first + (size_t)c]]) - level) > j->slack)
+            return false;
     return true;
 }
 
@@ -182,7 +172,7 @@ static lam_status join_two(joiner *j, outline *a, uint32_t at_a, outline *b, uin
     int n = 0;
     normal_of(j, a, normal[0]);
     normal_of(j, b, normal[1]);
-    if (a->n + b->n > OUTLINE_MOST || dot(normal[0], normal[1]) < 1 - 1e-6) return LAM_OK;
+    if (a->n + b->n > OUTLINE_MOST || dot3(normal[0], normal[1]) < 1 - 1e-6) return LAM_OK;
     if (!in_plane_of(j, a, b) || !in_plane_of(j, b, a)) return LAM_OK;
     for (int k = 0; k < a->n; k++) made[n++] = j->pool[a->first + (size_t)(((int)at_a + 1 + k) % a->n)];
     for (int k = 0; k + 2 < b->n; k++) made[n++] = j->pool[b->first + (size_t)(((int)at_b + 2 + k) % b->n)];
@@ -227,8 +217,8 @@ static lam_status join_round(joiner *j, size_t *joined, lam_error *error) {
             double along[3];
             if (a->low != b->low || a->high != b->high) break;
             if (a->forward == b->forward || n_shared == n_sides) continue;
-            subtract(j->m->vertices[a->high], j->m->vertices[a->low], along);
-            j->shared[n_shared++] = (shared_side){dot(along, along), (uint32_t)k, (uint32_t)l};
+            subtract3(j->m->vertices[a->high], j->m->vertices[a->low], along);
+            j->shared[n_shared++] = (shared_side){dot3(along, along), (uint32_t)k, (uint32_t)l};
         }
     }
     if (n_shared > 0) qsort(j->shared, n_shared, sizeof *j->shared, by_length);
@@ -245,11 +235,11 @@ done:
 /* True where four corners lie within slack of one plane. */
 static bool is_flat(const mesh *m, const uint32_t corner[4], double slack) {
     double one[3], two[3], normal[3], to[3];
-    subtract(m->vertices[corner[2]], m->vertices[corner[0]], one);
-    subtract(m->vertices[corner[3]], m->vertices[corner[1]], two);
-    cross(one, two, normal);
-    subtract(m->vertices[corner[1]], m->vertices[corner[0]], to);
-    return fabs(dot(normal, to)) <= 2 * slack * sqrt(dot(normal, normal));
+    subtract3(m->vertices[corner[2]], m->vertices[corner[0]], one);
+    subtract3(m->vertices[corner[3]], m->vertices[corner[1]], two);
+    cross3(one, two, normal);
+    subtract3(m->vertices[corner[1]], m->vertices[corner[0]], to);
+    return fabs(dot3(normal, to)) <= 2 * slack * sqrt(dot3(normal, normal));
 }
 
 /* The pieces of all facets as outlines. */

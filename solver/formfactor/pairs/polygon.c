@@ -1,11 +1,9 @@
 #include "solver/formfactor/pairs/polygon.h"
 
+#include "solver/base/vector3.h"
+
 #include <math.h>
 #include <string.h>
-
-static double dot(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 /* Twice the area vector, by Newell's formula about the first corner. */
 static void area_vector(const polygon *p, double out[3]) {
@@ -24,7 +22,7 @@ static void area_vector(const polygon *p, double out[3]) {
 double polygon_area(const polygon *p) {
     double twice[3];
     area_vector(p, twice);
-    return .5 * sqrt(dot(twice, twice));
+    return .5 * sqrt(dot3(twice, twice));
 }
 
 void polygon_set_extent(polygon *p) {
@@ -35,7 +33,7 @@ void polygon_set_extent(polygon *p) {
     for (int c = 0; c < p->n; c++) {
         double r[3];
         for (int d = 0; d < 3; d++) r[d] = p->corner[c][d] - p->centre[d];
-        p->radius = fmax(p->radius, sqrt(dot(r, r)));
+        p->radius = fmax(p->radius, sqrt(dot3(r, r)));
     }
     double off = 0;
     for (int d = 0; d < 3 && p->n == 4; d++)
@@ -46,7 +44,7 @@ void polygon_set_extent(polygon *p) {
 void polygon_measure(polygon *p) {
     double twice[3];
     area_vector(p, twice);
-    const double length = sqrt(dot(twice, twice));
+    const double length = sqrt(dot3(twice, twice));
     for (int d = 0; d < 3; d++) p->normal[d] = twice[d] / length;
     polygon_set_extent(p);
 }
@@ -63,7 +61,7 @@ void polygon_in_front(const polygon *p, const polygon *other, polygon *out) {
     for (int c = 0; c < p->n; c++) {
         double r[3];
         for (int d = 0; d < 3; d++) r[d] = p->corner[c][d] - other->centre[d];
-        height[c] = dot(r, other->normal);
+        height[c] = dot3(r, other->normal);
         most = fmax(most, height[c]);
     }
     /* Rounding moves corners of the plane itself off it. */
@@ -150,6 +148,6 @@ double polygon_point(const polygon *p, double u, double w, double point[3]) {
     double area[3];
     for (int d = 0; d < 3; d++)
         area[d] = along_u[(d + 1) % 3] * along_w[(d + 2) % 3] - along_u[(d + 2) % 3] * along_w[(d + 1) % 3];
-    const double jacobian = sqrt(dot(area, area));
+    const double jacobian = sqrt(dot3(area, area));
     return p->n == 3 ? .5 * jacobian : jacobian;
 }

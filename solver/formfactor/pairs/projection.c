@@ -1,6 +1,7 @@
 #include "solver/formfactor/pairs/projection.h"
 
 #include "solver/base/random.h"
+#include "solver/base/vector3.h"
 #include "solver/formfactor/pairs/shadow_cut.h"
 
 #include <math.h>
@@ -45,18 +46,6 @@ typedef struct cells {
     break_line lines[LINES_MOST];
 } cells;
 
-static double dot(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void subtract(const double *a, const double *b, double *out) {
-    for (int d = 0; d < 3; d++) out[d] = a[d] - b[d];
-}
-
-static void cross(const double *a, const double *b, double *out) {
-    for (int d = 0; d < 3; d++) out[d] = a[(d + 1) % 3] * b[(d + 2) % 3] - a[(d + 2) % 3] * b[(d + 1) % 3];
-}
-
 /* Gauss nodes moved by u -> u + c u (1 - u) with c from the seed and the pair, which keeps cubics exact. Two
  * seeds then miss the breaks of F at different places. */
 static void set_nodes(cells *c, const projected_pair *pair) {
@@ -92,8 +81,8 @@ static void sum_cell(cells *c, cell *one) {
                 x[d] = (1 - w) * ((1 - u) * corner[0][d] + u * corner[1][d]) +
                        w * ((1 - u) * corner[3][d] + u * corner[2][d]);
             }
-            cross(along_u, along_w, area);
-            const double weight = dot(area, c->over->normal) * c->weight[0][i] * c->weight[1][j];
+            cross3(along_u, along_w, area);
+            const double weight = dot3(area, c->over->normal) * c->weight[0][i] * c->weight[1][j];
             value[0] = shadow_cut_factor(&c->cut, one->bits, x, c->over->normal, &value[1]);
             if (one->hidden) value[0] = 0;
             if (value[0] < 0) c->failed = true;
@@ -163,10 +152,10 @@ static void add_cells(cells *c, int n, const double (*corner)[3], unsigned bits,
 static void add_line(cells *c, const double normal[3], const double at[3]) {
     break_line line;
     double low = INFINITY, high = -INFINITY;
-    const double length = sqrt(dot(normal, normal)), level = dot(normal, at);
+    const double length = sqrt(dot3(normal, normal)), level = dot3(normal, at);
     if (c->n_lines == LINES_MOST || !(length > 0)) return;
     for (int k = 0; k < c->over->n; k++) {
-        const double place = dot(normal, c->over->corner[k]) - level;
+        const double place = dot3(normal, c->over->corner[k]) - level;
         low = fmin(low, place);
         high = fmax(high, place);
     }
@@ -186,14 +175,14 @@ static void find_lines(cells *c) {
         add_line(c, o->normal, o->corner[0]);
         for (int e = 0; e < o->n; e++) {
             double along[3];
-            subtract(o->corner[(e + 1) % o->n], o->corner[e], along);
+            subtract3(o->corner[(e + 1) % o->n], o->corner[e], along);
             for (int f = 0; f < c->to->n; f++) {
                 double other[3], turned[3], across[3], normal[3];
-                subtract(c->to->corner[(f + 1) % c->to->n], c->to->corner[f], other);
-                cross(along, other, turned);
-                if (dot(turned, turned) > 1e-12 * dot(along, along) * dot(other, other)) continue;
-                subtract(o->corner[e], c->to->corner[f], across);
-                cross(along, across, normal);
+                subtract3(c->to->corner[(f + 1) % c->to->n], c->to->corner[f], other);
+                cross3(along, other, turned);
+                if (dot3(turned, turned) > 1e-12 * dot3(along, along) * dot3(other, other)) continue;
+                subtract3(o->corner[e], c->to->corner[f], across);
+                cross3(along, across, normal);
                 add_line(c, normal, o->corner[e]);
             }
         }
@@ -207,7 +196,7 @@ static const break_line *line_across(const cells *c, const cell *one) {
     for (int l = 0; l < c->n_lines; l++) {
         double low = INFINITY, high = -INFINITY;
         for (int k = 0; k < 4; k++) {
-            const double place = dot(c->lines[l].normal, one->corner[k]) - c->lines[l].level;
+            const double place = dot3(c->lines[l].normal, one->corner[k]) - c->lines[l].level;
             low = fmin(low, place);
             high = fmax(high, place);
         }
@@ -224,8 +213,8 @@ static void split_at_line(cells *c, const cell *one, const break_line *line) {
     int n[2] = {0, 0};
     for (int k = 0; k < 4; k++) {
         const double *from = one->corner[k], *to = one->corner[(k + 1) % 4];
-        const double here = dot(line->normal, from) - line->level,
-                     there = dot(line->normal, to) - line->level;
+        const double here = dot3(line->normal, from) - line->level,
+                     there = dot3(line->normal, to) - line->level;
         if (same_point(from, to)) continue; /* a triangle */
         for (int side = 0; side < 2; side++)
             if (side == 0 ? here >= 0 : here <= 0) memcpy(sides[side][n[side]++], from, sizeof sides[0][0]);
@@ -323,8 +312,8 @@ static bool over_first(const projection *p, const projected_pair *pair) {
     double nearer = 0;
     for (int k = 0; k < pair->among->count; k++) {
         const joined_occluder *o = &p->occluders->of[pair->among->of[k]];
-        const double a = fabs(dot(o->normal, pair->a->centre) - o->level);
-        const double b = fabs(dot(o->normal, pair->b->centre) - o->level);
+        const double a = fabs(dot3(o->normal, pair->a->centre) - o->level);
+        const double b = fabs(dot3(o->normal, pair->b->centre) - o->level);
         nearer += (a - b) / (a + b + 1e-300);
     }
     if (pair->among->count > 0) nearer /= pair->among->count;

@@ -1,6 +1,7 @@
 #include "solver/formfactor/pairs/ray_crossings.h"
 
 #include "solver/base/random.h"
+#include "solver/base/vector3.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -44,10 +45,6 @@ static lam_status boxes_make(const mesh *m, boxes *out, lam_error *error) {
         }
     }
     return LAM_OK;
-}
-
-static double dot(const double a[3], const double b[3]) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 /* A cosine distribution: the normal and a random unit vector (Marsaglia 1972) add up to its directions. */
@@ -101,9 +98,9 @@ static double meets(const ray *r, const mesh *m, size_t i) {
     const size_t count = corner_count(m->elements[i]);
     const double normal[3] = {m->normal[i][0], m->normal[i][1], m->normal[i][2]};
     const double *a = m->vertices[m->elements[i][0]];
-    const double towards = dot(normal, r->direction);
+    const double towards = dot3(normal, r->direction);
     const double to[3] = {a[0] - r->origin[0], a[1] - r->origin[1], a[2] - r->origin[2]};
-    const double t = dot(normal, to) / towards;
+    const double t = dot3(normal, to) / towards;
     if (!(t > 0) || !isfinite(t)) return INFINITY;
     for (size_t v = 0; v < count; v++) {
         const double *p = m->vertices[m->elements[i][v]], *q = m->vertices[m->elements[i][(v + 1) % count]];
@@ -115,7 +112,7 @@ static double meets(const ray *r, const mesh *m, size_t i) {
         const double across[3] = {normal[1] * edge[2] - normal[2] * edge[1],
                                   normal[2] * edge[0] - normal[0] * edge[2],
                                   normal[0] * edge[1] - normal[1] * edge[0]};
-        if (dot(across, from) < 0) return INFINITY;
+        if (dot3(across, from) < 0) return INFINITY;
     }
     return t;
 }

@@ -1,5 +1,7 @@
 #include "solver/formfactor/pairs/shadow_cut.h"
 
+#include "solver/base/vector3.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -24,48 +26,36 @@ typedef struct half_plane {
 
 static const double pi = 3.14159265358979323846;
 
-static double dot(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void subtract(const double *a, const double *b, double *out) {
-    for (int d = 0; d < 3; d++) out[d] = a[d] - b[d];
-}
-
-static void cross(const double *a, const double *b, double *out) {
-    for (int d = 0; d < 3; d++) out[d] = a[(d + 1) % 3] * b[(d + 2) % 3] - a[(d + 2) % 3] * b[(d + 1) % 3];
-}
-
 /* The plane through x, p and q has the normal (p - x) x (q - x) = p x q - x x (q - p). */
 static void set_plane(cone_plane *plane, const shadow_cut *c, const double p[3], const double q[3]) {
     double along[3];
-    cross(p, q, plane->none);
-    subtract(q, p, along);
-    cross(along, c->e1, plane->one);
-    cross(along, c->e2, plane->two);
-    plane->one[3] = dot(plane->none, c->e1);
-    plane->two[3] = dot(plane->none, c->e2);
+    cross3(p, q, plane->none);
+    subtract3(q, p, along);
+    cross3(along, c->e1, plane->one);
+    cross3(along, c->e2, plane->two);
+    plane->one[3] = dot3(plane->none, c->e1);
+    plane->two[3] = dot3(plane->none, c->e2);
 }
 
 void shadow_cut_init(shadow_cut *c, const joined_occluders *o, const pair_occluders *among,
                      const polygon *target) {
     double first[3];
     memcpy(c->origin, target->corner[0], sizeof c->origin);
-    subtract(target->corner[1], target->corner[0], first);
+    subtract3(target->corner[1], target->corner[0], first);
     /* A clipped polygon may begin with two equal corners. */
-    for (int k = 2; k < target->n && !(dot(first, first) > 0); k++)
-        subtract(target->corner[k], target->corner[0], first);
-    const double length = sqrt(dot(first, first));
+    for (int k = 2; k < target->n && !(dot3(first, first) > 0); k++)
+        subtract3(target->corner[k], target->corner[0], first);
+    const double length = sqrt(dot3(first, first));
     for (int d = 0; d < 3; d++) c->e1[d] = first[d] / length;
-    cross(target->normal, c->e1, c->e2);
+    cross3(target->normal, c->e1, c->e2);
     c->radius = 2 * target->radius;
     c->n = target->n;
     c->n_cones = among->count;
     for (int k = 0; k < c->n; k++) {
         double to[3];
-        subtract(target->corner[k], c->origin, to);
-        c->s[k] = dot(to, c->e1);
-        c->t[k] = dot(to, c->e2);
+        subtract3(target->corner[k], c->origin, to);
+        c->s[k] = dot3(to, c->e1);
+        c->t[k] = dot3(to, c->e2);
     }
     c->rounding = 1e-12 * c->radius;
     for (int k = 0; k < c->n_cones; k++) {
@@ -74,16 +64,16 @@ void shadow_cut_init(shadow_cut *c, const joined_occluders *o, const pair_occlud
         double corner[OCCLUDER_CORNERS][3];
         cone->n = one->n;
         memcpy(cone->normal, one->normal, sizeof cone->normal);
-        cone->level = one->level - dot(one->normal, c->origin);
-        cone->along[0] = dot(one->normal, c->e1);
-        cone->along[1] = dot(one->normal, c->e2);
+        cone->level = one->level - dot3(one->normal, c->origin);
+        cone->along[0] = dot3(one->normal, c->e1);
+        cone->along[1] = dot3(one->normal, c->e2);
         cone->low = INFINITY, cone->high = -INFINITY;
         for (int v = 0; v < c->n; v++) {
             const double height = cone->along[0] * c->s[v] + cone->along[1] * c->t[v] - cone->level;
             cone->low = fmin(cone->low, height);
             cone->high = fmax(cone->high, height);
         }
-        for (int e = 0; e < one->n; e++) subtract(one->corner[e], c->origin, corner[e]);
+        for (int e = 0; e < one->n; e++) subtract3(one->corner[e], c->origin, corner[e]);
         for (int e = 0; e < one->n; e++) set_plane(&cone->plane[e], c, corner[e], corner[(e + 1) % one->n]);
     }
 }
@@ -127,7 +117,7 @@ static bool cut(const part *p, const half_plane *h, part *inside, part *outside)
  * the target is in it. */
 static int cone_of(const shadow_cut *c, const shadow_cone *o, const double x[3],
                    half_plane out[OCCLUDER_CORNERS + 1]) {
-    const double height = dot(o->normal, x) - o->level;
+    const double height = dot3(o->normal, x) - o->level;
     const double side = height > 0 ? 1 : -1;
     int n = 0;
     if (!(fabs(height) > c->rounding)) return 0;
@@ -136,8 +126,8 @@ static int cone_of(const shadow_cut *c, const shadow_cone *o, const double x[3],
      * point outwards. */
     for (int e = 0; e < o->n; e++) {
         const cone_plane *p = &o->plane[e];
-        out[n++] = half_plane_of(side * dot(x, p->none), -side * (p->one[3] - dot(x, p->one)),
-                                 -side * (p->two[3] - dot(x, p->two)), c->radius);
+        out[n++] = half_plane_of(side * dot3(x, p->none), -side * (p->one[3] - dot3(x, p->one)),
+                                 -side * (p->two[3] - dot3(x, p->two)), c->radius);
     }
     if (side > 0 ? o->high > 0 : o->low < 0)
         out[n++] = half_plane_of(side * o->level, -side * o->along[0], -side * o->along[1], c->radius);
@@ -188,15 +178,15 @@ static double part_factor(const shadow_cut *c, const part *p, const double base[
     double corner[PART_CORNERS + 1][3], length2[PART_CORNERS + 1], sum = 0;
     for (int k = 0; k < p->n; k++) {
         for (int d = 0; d < 3; d++) corner[k][d] = base[d] + p->s[k] * c->e1[d] + p->t[k] * c->e2[d];
-        length2[k] = dot(corner[k], corner[k]);
+        length2[k] = dot3(corner[k], corner[k]);
     }
     memcpy(corner[p->n], corner[0], sizeof corner[0]);
     length2[p->n] = length2[0];
     for (int k = 0; k < p->n; k++) {
         double across[3];
-        cross(corner[k], corner[k + 1], across);
-        sum -= dot(across, n) * angle_over_sine(dot(across, across), dot(corner[k], corner[k + 1]),
-                                                length2[k], length2[k + 1]);
+        cross3(corner[k], corner[k + 1], across);
+        sum -= dot3(across, n) * angle_over_sine(dot3(across, across), dot3(corner[k], corner[k + 1]),
+                                                 length2[k], length2[k + 1]);
     }
     return sum / (2 * pi);
 }

@@ -1,22 +1,12 @@
 #include "solver/formfactor/pairs/windows.h"
 
+#include "solver/base/vector3.h"
+
 #include <math.h>
 #include <string.h>
 
 /* WINDOWS_MOST: planes with a window; PIECES_MOST: open pieces of one, with more it is taken as all open. */
 enum { WINDOWS_MOST = 4, PIECES_MOST = 64 };
-
-static double dot(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void subtract(const double *a, const double *b, double *out) {
-    for (int d = 0; d < 3; d++) out[d] = a[d] - b[d];
-}
-
-static void cross(const double *a, const double *b, double *out) {
-    for (int d = 0; d < 3; d++) out[d] = a[(d + 1) % 3] * b[(d + 2) % 3] - a[(d + 2) % 3] * b[(d + 1) % 3];
-}
 
 /* Keeps what of p lies where normal . x >= level. Where that has too many corners p stays as it is: what is
  * cut away is proven, what is left is not. n = 0: nothing is left. */
@@ -24,7 +14,7 @@ static void keep_above(polygon *p, const double normal[3], double level) {
     polygon left = *p;
     double height[POLYGON_CORNERS];
     left.n = 0;
-    for (int c = 0; c < p->n; c++) height[c] = dot(normal, p->corner[c]) - level;
+    for (int c = 0; c < p->n; c++) height[c] = dot3(normal, p->corner[c]) - level;
     for (int c = 0; c < p->n; c++) {
         const int next = (c + 1) % p->n;
         if (height[c] >= 0) {
@@ -55,7 +45,7 @@ typedef struct wall {
 
 static void widen(wall *w, const double at[3]) {
     for (int d = 0; d < 2; d++) {
-        const double place = dot(w->axis[d], at);
+        const double place = dot3(w->axis[d], at);
         w->low[d] = fmin(w->low[d], place);
         w->high[d] = fmax(w->high[d], place);
     }
@@ -112,7 +102,7 @@ static bool crossing_box(wall *w, const polygon *a, const polygon *b, double *si
     for (int s = 0; s < 2; s++) {
         low[s] = INFINITY, high[s] = -INFINITY;
         for (int c = 0; c < both[s]->n; c++) {
-            height[s][c] = dot(o->normal, both[s]->corner[c]) - o->level;
+            height[s][c] = dot3(o->normal, both[s]->corner[c]) - o->level;
             low[s] = fmin(low[s], height[s][c]);
             high[s] = fmax(high[s], height[s][c]);
         }
@@ -138,7 +128,7 @@ static bool crossing_box(wall *w, const polygon *a, const polygon *b, double *si
 static void set_axes(wall *w) {
     const joined_occluder *o = w->in[0];
     memcpy(w->axis[0], o->edge[0], sizeof w->axis[0]);
-    cross(o->normal, w->axis[0], w->axis[1]);
+    cross3(o->normal, w->axis[0], w->axis[1]);
 }
 
 /* Finds the window of a wall. */
@@ -170,23 +160,23 @@ static void cut_by_edges(polygon *p, const polygon *near, const polygon *far, do
             const polygon *with = both[s], *other = both[1 - s];
             const double *from = with->corner[e];
             double along[3];
-            subtract(with->corner[(e + 1) % with->n], from, along);
+            subtract3(with->corner[(e + 1) % with->n], from, along);
             for (int c = 0; c < other->n && p->n > 0; c++) {
                 double across[3], normal[3], least = INFINITY, most = -INFINITY;
-                subtract(other->corner[c], from, across);
-                cross(along, across, normal);
-                const double length = sqrt(dot(normal, normal));
+                subtract3(other->corner[c], from, across);
+                cross3(along, across, normal);
+                const double length = sqrt(dot3(normal, normal));
                 if (!(length > slack * slack)) continue;
                 for (int d = 0; d < 3; d++) normal[d] /= length;
-                const double level = dot(normal, from);
+                const double level = dot3(normal, from);
                 double near_low = INFINITY, near_high = -INFINITY;
                 for (int k = 0; k < far->n; k++) {
-                    const double height = dot(normal, far->corner[k]) - level;
+                    const double height = dot3(normal, far->corner[k]) - level;
                     least = fmin(least, height);
                     most = fmax(most, height);
                 }
                 for (int k = 0; k < near->n; k++) {
-                    const double height = dot(normal, near->corner[k]) - level;
+                    const double height = dot3(normal, near->corner[k]) - level;
                     near_low = fmin(near_low, height);
                     near_high = fmax(near_high, height);
                 }
@@ -203,8 +193,8 @@ static void cut_by_edges(polygon *p, const polygon *near, const polygon *far, do
 /* True where all light from b passes window `far` before window `near`. */
 static bool is_before(const window *near, const window *far, double slack) {
     for (int c = 0; c < 4; c++)
-        if (dot(far->normal, near->box.corner[c]) - far->level < -slack ||
-            dot(near->normal, far->box.corner[c]) - near->level > slack)
+        if (dot3(far->normal, near->box.corner[c]) - far->level < -slack ||
+            dot3(near->normal, far->box.corner[c]) - near->level > slack)
             return false;
     return true;
 }
@@ -228,8 +218,8 @@ static bool drop_repeated(polygon *p) {
     kept.n = 0;
     for (int c = 0; c < p->n; c++) {
         double apart[3];
-        subtract(p->corner[c], p->corner[(c + 1) % p->n], apart);
-        if (dot(apart, apart) > 1e-18 * p->radius * p->radius)
+        subtract3(p->corner[c], p->corner[(c + 1) % p->n], apart);
+        if (dot3(apart, apart) > 1e-18 * p->radius * p->radius)
             memcpy(kept.corner[kept.n++], p->corner[c], sizeof kept.corner[0]);
     }
     if (kept.n < 3) return false;
@@ -252,7 +242,7 @@ windows_found windows_cut(const joined_occluders *o, const link_occluders *among
             if (one->facet == own_facets[0] || one->facet == own_facets[1]) continue;
             bool in_plane = true;
             for (int c = 0; c < one->n && in_plane; c++)
-                in_plane = fabs(dot(first->normal, one->corner[c]) - first->level) <= o->slack;
+                in_plane = fabs(dot3(first->normal, one->corner[c]) - first->level) <= o->slack;
             if (!in_plane) continue;
             done |= (uint64_t)1 << l;
             w.in[w.count++] = one;

@@ -1,5 +1,6 @@
 #include "solver/operator/blocks/plane_tree.h"
 
+#include "solver/base/vector3.h"
 #include "store/status.h"
 
 #include <math.h>
@@ -35,10 +36,6 @@ void plane_tree_free(plane_tree *tree) {
     free(tree->clusters);
     free(tree->frames);
     *tree = (plane_tree){.n = 0};
-}
-
-static double dot3(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 static int by_value(const void *left, const void *right) {
