@@ -291,7 +291,7 @@ static void visit(const shining *s, uint32_t a, uint32_t b, const candidates *am
     if (count_lit(s, a) == 0) return;
     flat_clusters_pair(&k->flat, a, b, &at);
     if (!(block_kernel_most(&k->flat, a, b, &at, behind) > 0)) return;
-    if (among == NULL || among->count != 0) occluders_between(&k->pieces, &k->flat, a, b, &at, among, &mine);
+    if (among == NULL || among->count != 0) candidates_between(&k->pieces, &k->flat, a, b, &at, among, &mine);
     if (mine.hidden) return;
     if (mine.count != 0) {
         const bool near = !can_sample(s, a, b);

@@ -51,14 +51,14 @@ static void block_by_candidates(const shade_scene *s, const double origin[3], co
             lanes.from[d][k] = (float)(ends->from[k][d] - origin[d]);
             lanes.to[d][k] = (float)(ends->to[k][d] - origin[d]);
         }
-    occluders_block(s->occluders, among, origin, &lanes, blocked);
+    candidates_block(s->occluders, among, origin, &lanes, blocked);
     for (int k = 0; k < SEGMENT_LANES; k++) out[k].seen = 1 - (double)blocked[k];
 }
 
 void shade_segments(const shade_scene *s, uint32_t a, uint32_t b, const candidates *among, size_t first,
                     seen_segment out[SEGMENT_LANES], double *kernel) {
     const flat_clusters *f = s->f;
-    const bool by_scene = among->count == OCCLUDERS_UNKNOWN;
+    const bool by_scene = among->count == CANDIDATES_UNKNOWN;
     segment_ends ends = {.elements = {{0}}};
     pair_sampler sampler;
     pair_sampler_init(&sampler, s->seed, a, b);

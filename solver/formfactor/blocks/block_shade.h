@@ -3,7 +3,7 @@
 #define LAMBERT_FORMFACTOR_BLOCKS_BLOCK_SHADE_H
 
 #include "solver/formfactor/blocks/block_numbers.h"
-#include "solver/formfactor/blocks/occluders.h"
+#include "solver/formfactor/blocks/candidates.h"
 #include "solver/formfactor/visibility/visibility.h"
 
 typedef struct shade_scene {

@@ -75,14 +75,14 @@ static double exchange_of_pair(const block_walk *w, uint32_t a, uint32_t b) {
 
 /* The candidates that segments are tested against. */
 static const candidates *segments_among(const block_walk *w, const candidates *among) {
-    static const candidates whole_scene = {.count = OCCLUDERS_UNKNOWN};
+    static const candidates whole_scene = {.count = CANDIDATES_UNKNOWN};
     return w->finder->options->by_scene ? &whole_scene : among;
 }
 
 static void count_segments(block_walk *w, const candidates *among, int rounds) {
     const double segments = rounds * SEGMENT_LANES;
     w->report.segments += segments;
-    if (among->count == OCCLUDERS_UNKNOWN)
+    if (among->count == CANDIDATES_UNKNOWN)
         w->report.cast += segments;
     else
         w->report.tests += segments * among->count;
@@ -166,7 +166,7 @@ static lam_status visit_shaded(block_walk *w, uint32_t a, uint32_t b, double mos
     if (a >= k->n_clusters && b >= k->n_clusters) return add_pair(w, a, b, among);
     if (among->amid[0] || among->amid[1]) return split(w, a, b, among, among->amid[0], !among->amid[0]);
     if (most * sqrt(f->of[a].area * f->of[b].area) > k->options->shadow) {
-        const double place = occluders_place(&k->pieces, f, a, b, among);
+        const double place = candidates_place(&k->pieces, f, a, b, among);
         return split(w, a, b, among, f->of[a].radius * (1 - place), f->of[b].radius * place);
     }
     if (!is_smooth(w, a, b, most, crosses)) return split_for_smoothness(w, a, b, behind, among);
@@ -223,7 +223,7 @@ static lam_status decide(block_walk *w, uint32_t a, uint32_t b, double elements,
         return LAM_OK;
     }
     if (among == NULL || among->count != 0) {
-        occluders_between(&k->pieces, f, a, b, &at, among, &mine);
+        candidates_between(&k->pieces, f, a, b, &at, among, &mine);
         w->report.sifted += mine.examined;
     }
     if (mine.hidden) {

@@ -1,7 +1,7 @@
 #include "solver/formfactor/pairs/cluster_links.h"
 
 #include "solver/base/array_grow.h"
-#include "solver/formfactor/pairs/shaft.h"
+#include "solver/formfactor/pairs/cluster_shaft.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -63,11 +63,11 @@ static cluster_state look_between(walk *w, const cluster *a, const cluster *b, c
     const bool near = w->options->threshold > 0;
     if (w->options->occluders != NULL) {
         link_occluders among;
-        joined_occluders_between(w->options->occluders, s, a, b, &among);
+        link_occluders_find(w->options->occluders, s, a, b, &among);
         if (among.count == 0) return CLUSTERS_OPEN;
         if (among.count > 0)
-            return !near && joined_occluders_hide(w->options->occluders, &among, a, b) ? CLUSTERS_HIDDEN
-                                                                                       : CLUSTERS_MIXED;
+            return !near && link_occluders_hide(w->options->occluders, &among, a, b) ? CLUSTERS_HIDDEN
+                                                                                     : CLUSTERS_MIXED;
     }
     /* The near field has so few pairs that testing each is cheaper than testing clusters. */
     if (near) return CLUSTERS_MIXED;
@@ -113,8 +113,8 @@ static void visit(walk *w, uint32_t a, uint32_t b, const uint32_t *candidates, s
     }
     uint32_t within[SHAFT_CANDIDATES];
     shaft s;
-    shaft_init(&s, one, two, w->options->slack);
-    const size_t n_within = shaft_filter(&s, w->m, t, candidates, n_candidates, leaves, within);
+    cluster_shaft_init(&s, one, two, w->options->slack);
+    const size_t n_within = cluster_shaft_filter(&s, w->m, t, candidates, n_candidates, leaves, within);
     w->found->work.shafts++;
     w->found->work.candidates += (double)(n_candidates + n_within);
     /* With a threshold even an open link descends to the leaves: some of its pairs may be below it. */

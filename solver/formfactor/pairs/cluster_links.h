@@ -3,7 +3,7 @@
 #ifndef LAMBERT_FORMFACTOR_PAIRS_CLUSTER_LINKS_H
 #define LAMBERT_FORMFACTOR_PAIRS_CLUSTER_LINKS_H
 
-#include "solver/formfactor/pairs/joined_occluders.h"
+#include "solver/formfactor/pairs/link_occluders.h"
 #include "solver/formfactor/pairs/occlusion.h"
 
 /* All pairs of an element of a with an element of b, whose positions are greater; a == b: all pairs within
@@ -34,7 +34,7 @@ typedef struct cluster_links {
 typedef struct cluster_link_options {
     double threshold; /* leaves out pairs whose mean factor 2 g / (A_i + A_j) is provably below; 0: none */
     double slack;     /* the distance by which rounding may move a point */
-    const joined_occluders *occluders; /* NULL: clusters that hide each other are found by segments alone */
+    const occluders *occluders; /* NULL: clusters that hide each other are found by segments alone */
     size_t one_of; /* a sample: one of this many parts of the descent, evenly spread; 0: all of it */
     const progress *progress;
 } cluster_link_options;

@@ -13,13 +13,13 @@ lam_status few_occluders_make(const mesh *m, const visibility *v, const polygon 
                        .rules = rules,
                        .seed = seed,
                        .most = most < UNCUT_OCCLUDERS_MOST ? most : UNCUT_OCCLUDERS_MOST};
-    const lam_status status = joined_occluders_make(m, f.facets, visibility_rounding(v), &f.occluders, error);
+    const lam_status status = occluders_make(m, f.facets, visibility_rounding(v), &f.occluders, error);
     if (status == LAM_OK) *out = f;
     return status;
 }
 
 void few_occluders_free(few_occluders *f) {
-    joined_occluders_free(&f->occluders);
+    occluders_free(&f->occluders);
 }
 
 bool few_occluders_apply(const few_occluders *f) {

@@ -7,7 +7,7 @@
 #include "solver/formfactor/visibility/visibility.h"
 
 typedef struct few_occluders {
-    joined_occluders occluders;
+    occluders occluders;
     const mesh *m;
     const facets *facets;
     const polygon *polygons; /* [n] */
@@ -19,8 +19,8 @@ typedef struct few_occluders {
 typedef enum few_verdict { FEW_UNDECIDED, FEW_OPEN, FEW_HIDDEN, FEW_PARTIAL } few_verdict;
 
 /* Scenes with more occluders are left to segments: so many stand between most of their pairs that finding
- * this out costs more than the few that projection decides gain. A Cornell box has 41 (636 elements), rooms
- * 30 (of 1,498), a maze 59 (1,513); a canopy 693 (1,499), a patio 993 (1,508). */
+ * this out costs more than the few that projection decides gain. A Cornell box has 40 (636 elements), rooms
+ * 28 (of 1,498), a maze 59 (1,513); a canopy 693 (1,499), a patio 933 (1,508). */
 enum { SCENE_OCCLUDERS_MOST = 256 };
 bool few_occluders_apply(const few_occluders *f);
 

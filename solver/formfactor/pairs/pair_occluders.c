@@ -44,7 +44,7 @@ static void add_support(supports *s, const polygon *p, int edge, const polygon *
     }
 }
 
-static bool is_outside(pair_sides *p, const joined_occluder *o) {
+static bool is_outside(pair_sides *p, const occluder *o) {
     if (!p->has_supports) {
         p->has_supports = true;
         p->supports.n = 0;
@@ -65,7 +65,7 @@ typedef enum standing { STANDS_BESIDE, STANDS_BETWEEN, STANDS_BEFORE_ALL } stand
 
 /* Where the two elements lie on different sides of the occluder's plane, the segments between their corners
  * cross it in points whose hull holds those of all other segments. */
-static standing compare_crossings(const joined_occluder *o, const polygon *a, const polygon *b,
+static standing compare_crossings(const occluder *o, const polygon *a, const polygon *b,
                                   const double height[2][POLYGON_CORNERS], double slack) {
     double least[OCCLUDER_CORNERS], most[OCCLUDER_CORNERS];
     for (int e = 0; e < o->n; e++) least[e] = INFINITY, most[e] = -INFINITY;
@@ -88,7 +88,7 @@ static standing compare_crossings(const joined_occluder *o, const polygon *a, co
     return all ? STANDS_BEFORE_ALL : STANDS_BETWEEN;
 }
 
-static standing where_it_stands(pair_sides *p, const joined_occluder *o) {
+static standing where_it_stands(pair_sides *p, const occluder *o) {
     double height[2][POLYGON_CORNERS], low[2], high[2];
     for (int side = 0; side < 2; side++) {
         const polygon *one = p->side[side];
@@ -121,8 +121,8 @@ static standing where_it_stands(pair_sides *p, const joined_occluder *o) {
     return is_outside(p, o) ? STANDS_BESIDE : STANDS_BETWEEN;
 }
 
-void pair_occluders_find(const joined_occluders *o, const link_occluders *among, const polygon *a,
-                         const polygon *b, const uint32_t own_facets[2], pair_occluders *out) {
+void pair_occluders_find(const occluders *o, const link_occluders *among, const polygon *a, const polygon *b,
+                         const uint32_t own_facets[2], pair_occluders *out) {
     pair_sides p = {.side = {a, b}, .slack = o->slack, .has_supports = false};
     out->count = 0;
     out->hidden = false;
@@ -132,7 +132,7 @@ void pair_occluders_find(const joined_occluders *o, const link_occluders *among,
     }
     bool too_many = false;
     for (int k = 0; k < among->count; k++) {
-        const joined_occluder *one = &o->of[among->of[k]];
+        const occluder *one = &o->of[among->of[k]];
         if (one->facet == own_facets[0] || one->facet == own_facets[1]) continue;
         const standing found = where_it_stands(&p, one);
         if (found == STANDS_BEFORE_ALL) {
@@ -150,7 +150,7 @@ void pair_occluders_find(const joined_occluders *o, const link_occluders *among,
     if (too_many) out->count = OCCLUDERS_UNCOUNTED;
 }
 
-unsigned pair_occluders_of_part(const joined_occluders *o, const pair_occluders *among, unsigned bits,
+unsigned pair_occluders_of_part(const occluders *o, const pair_occluders *among, unsigned bits,
                                 const polygon *part, const polygon *b, bool *hidden) {
     pair_sides p = {.side = {part, b}, .slack = o->slack, .has_supports = false};
     unsigned left = 0;

@@ -3,7 +3,7 @@
 #ifndef LAMBERT_FORMFACTOR_PAIRS_PAIR_OCCLUDERS_H
 #define LAMBERT_FORMFACTOR_PAIRS_PAIR_OCCLUDERS_H
 
-#include "solver/formfactor/pairs/joined_occluders.h"
+#include "solver/formfactor/pairs/link_occluders.h"
 #include "solver/formfactor/pairs/polygon.h"
 
 /* Between two elements, at most; as many as are projected of a pair that no window (windows.h) has cut: the
@@ -18,12 +18,12 @@ typedef struct pair_occluders {
 
 /* Finds the occluders of a link that may block a segment between a and b, which face each other wholly;
  * own_facets: of the two elements, which block no segment of theirs. Count 0 proves that none does. */
-void pair_occluders_find(const joined_occluders *o, const link_occluders *among, const polygon *a,
-                         const polygon *b, const uint32_t own_facets[2], pair_occluders *out);
+void pair_occluders_find(const occluders *o, const link_occluders *among, const polygon *a, const polygon *b,
+                         const uint32_t own_facets[2], pair_occluders *out);
 
 /* Bits of those of a pair, among the bits given, that may block a segment between b and a part of a. hidden:
  * one of them covers the part. */
-unsigned pair_occluders_of_part(const joined_occluders *o, const pair_occluders *among, unsigned bits,
+unsigned pair_occluders_of_part(const occluders *o, const pair_occluders *among, unsigned bits,
                                 const polygon *part, const polygon *b, bool *hidden);
 
 #endif

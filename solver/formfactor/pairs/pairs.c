@@ -58,8 +58,8 @@ static bool add_occluders(const pairs_run *run, const cluster *a, const cluster 
         return false;
     one = &out->among[out->n_among++];
     shaft s;
-    shaft_init(&s, a, b, run->few.occluders.slack);
-    joined_occluders_between(&run->few.occluders, &s, a, b, one);
+    cluster_shaft_init(&s, a, b, run->few.occluders.slack);
+    link_occluders_find(&run->few.occluders, &s, a, b, one);
     return true;
 }
 

@@ -98,8 +98,8 @@ static void count_rows(const sample_run *run, double n_pairs, pairs_work *work) 
             link_occluders among = {.count = OCCLUDERS_UNCOUNTED};
             if (!l->open && run->projects) {
                 shaft s;
-                shaft_init(&s, a, b, run->few.occluders.slack);
-                joined_occluders_between(&run->few.occluders, &s, a, b, &among);
+                cluster_shaft_init(&s, a, b, run->few.occluders.slack);
+                link_occluders_find(&run->few.occluders, &s, a, b, &among);
             }
             count_row(run, p, first, b->last, l->open ? NULL : &among, work);
         }

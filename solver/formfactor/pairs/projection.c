@@ -171,7 +171,7 @@ static void add_line(cells *c, const double normal[3], const double at[3]) {
 static void find_lines(cells *c) {
     c->n_lines = 0;
     for (int k = 0; k < c->among->count; k++) {
-        const joined_occluder *o = &c->p->occluders->of[c->among->of[k]];
+        const occluder *o = &c->p->occluders->of[c->among->of[k]];
         add_line(c, o->normal, o->corner[0]);
         for (int e = 0; e < o->n; e++) {
             double along[3];
@@ -311,7 +311,7 @@ static void refine(cells *c, double tolerance) {
 static bool over_first(const projection *p, const projected_pair *pair) {
     double nearer = 0;
     for (int k = 0; k < pair->among->count; k++) {
-        const joined_occluder *o = &p->occluders->of[pair->among->of[k]];
+        const occluder *o = &p->occluders->of[pair->among->of[k]];
         const double a = fabs(dot3(o->normal, pair->a->centre) - o->level);
         const double b = fabs(dot3(o->normal, pair->b->centre) - o->level);
         nearer += (a - b) / (a + b + 1e-300);

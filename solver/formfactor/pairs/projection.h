@@ -10,7 +10,7 @@
 
 typedef struct projection {
     const pair_factor_rules *rules;
-    const joined_occluders *occluders;
+    const occluders *occluders;
     uint64_t seed; /* of the cubature: another seed has other points */
 } projection;
 

@@ -37,8 +37,7 @@ static void set_plane(cone_plane *plane, const shadow_cut *c, const double p[3],
     plane->two[3] = dot3(plane->none, c->e2);
 }
 
-void shadow_cut_init(shadow_cut *c, const joined_occluders *o, const pair_occluders *among,
-                     const polygon *target) {
+void shadow_cut_init(shadow_cut *c, const occluders *o, const pair_occluders *among, const polygon *target) {
     double first[3];
     memcpy(c->origin, target->corner[0], sizeof c->origin);
     subtract3(target->corner[1], target->corner[0], first);
@@ -59,7 +58,7 @@ void shadow_cut_init(shadow_cut *c, const joined_occluders *o, const pair_occlud
     }
     c->rounding = 1e-12 * c->radius;
     for (int k = 0; k < c->n_cones; k++) {
-        const joined_occluder *one = &o->of[among->of[k]];
+        const occluder *one = &o->of[among->of[k]];
         shadow_cone *cone = &c->cone[k];
         double corner[OCCLUDER_CORNERS][3];
         cone->n = one->n;

@@ -26,8 +26,7 @@ typedef struct shadow_cut {
     shadow_cone cone[PAIR_OCCLUDERS_MOST];
 } shadow_cut;
 
-void shadow_cut_init(shadow_cut *c, const joined_occluders *o, const pair_occluders *among,
-                     const polygon *target);
+void shadow_cut_init(shadow_cut *c, const occluders *o, const pair_occluders *among, const polygon *target);
 
 /* F from the point x, with unit normal n, to the parts of the target that the occluders of the bits given
  * leave, for a target in front of x and x in front of it; full: to all of it. Negative: there are too many

@@ -35,8 +35,8 @@ static void keep_above(polygon *p, const double normal[3], double level) {
 
 /* A plane and the occluders in it. */
 typedef struct wall {
-    const joined_occluders *o;
-    const joined_occluder *in[LINK_OCCLUDERS_MOST];
+    const occluders *o;
+    const occluder *in[LINK_OCCLUDERS_MOST];
     int count;
     double axis[2][3];      /* unit, in the plane */
     double low[2], high[2]; /* along the axes: of the box about all open pieces */
@@ -57,7 +57,7 @@ static void open_pieces(wall *w, const polygon *piece, int first) {
     polygon rest = *piece;
     if (w->pieces > PIECES_MOST) return;
     for (int k = first; k < w->count; k++) {
-        const joined_occluder *o = w->in[k];
+        const occluder *o = w->in[k];
         polygon inside = rest;
         for (int e = 0; e < o->n && inside.n > 0; e++)
             keep_above(&inside, o->edge[e], -o->edge[e][3] - w->o->slack);
@@ -77,7 +77,7 @@ static void open_pieces(wall *w, const polygon *piece, int first) {
 }
 
 static void box_of(const wall *w, polygon *out) {
-    const joined_occluder *o = w->in[0];
+    const occluder *o = w->in[0];
     *out = (polygon){.n = 4};
     for (int c = 0; c < 4; c++)
         for (int d = 0; d < 3; d++)
@@ -95,7 +95,7 @@ typedef struct window {
 /* The box of the points where segments between a and b cross the plane: those between corners hold the others
  * in their hull. False where a and b are not on different sides of the plane. */
 static bool crossing_box(wall *w, const polygon *a, const polygon *b, double *side) {
-    const joined_occluder *o = w->in[0];
+    const occluder *o = w->in[0];
     const polygon *both[2] = {a, b};
     const double slack = w->o->slack;
     double height[2][POLYGON_CORNERS], low[2], high[2];
@@ -126,7 +126,7 @@ static bool crossing_box(wall *w, const polygon *a, const polygon *b, double *si
 
 /* The axes of a wall, along the first side of its first occluder. */
 static void set_axes(wall *w) {
-    const joined_occluder *o = w->in[0];
+    const occluder *o = w->in[0];
     memcpy(w->axis[0], o->edge[0], sizeof w->axis[0]);
     cross3(o->normal, w->axis[0], w->axis[1]);
 }
@@ -228,17 +228,17 @@ static bool drop_repeated(polygon *p) {
     return true;
 }
 
-windows_found windows_cut(const joined_occluders *o, const link_occluders *among,
-                          const uint32_t own_facets[2], polygon *a, polygon *b) {
+windows_found windows_cut(const occluders *o, const link_occluders *among, const uint32_t own_facets[2],
+                          polygon *a, polygon *b) {
     window found[WINDOWS_MOST];
     int n = 0;
     uint64_t done = 0;
     for (int k = 0; k < among->count && n < WINDOWS_MOST; k++) {
         wall w = {.o = o, .count = 0};
-        const joined_occluder *first = &o->of[among->of[k]];
+        const occluder *first = &o->of[among->of[k]];
         if (done >> k & 1) continue;
         for (int l = k; l < among->count; l++) {
-            const joined_occluder *one = &o->of[among->of[l]];
+            const occluder *one = &o->of[among->of[l]];
             if (one->facet == own_facets[0] || one->facet == own_facets[1]) continue;
             bool in_plane = true;
             for (int c = 0; c < one->n && in_plane; c++)

@@ -4,7 +4,7 @@
 #ifndef LAMBERT_FORMFACTOR_PAIRS_WINDOWS_H
 #define LAMBERT_FORMFACTOR_PAIRS_WINDOWS_H
 
-#include "solver/formfactor/pairs/joined_occluders.h"
+#include "solver/formfactor/pairs/link_occluders.h"
 #include "solver/formfactor/pairs/polygon.h"
 
 typedef enum windows_found { WINDOWS_NONE, WINDOWS_CUT, WINDOWS_CLOSED } windows_found;
@@ -13,7 +13,7 @@ typedef enum windows_found { WINDOWS_NONE, WINDOWS_CUT, WINDOWS_CLOSED } windows
  * become; WINDOWS_CLOSED: none is open at all, and a and b stay unchanged; both are proven within the slack
  * of the occluders. own_facets: of the two elements, which block no segment of theirs. Cost: O(occluders^2)
  * in a plane, at most. */
-windows_found windows_cut(const joined_occluders *o, const link_occluders *among,
-                          const uint32_t own_facets[2], polygon *a, polygon *b);
+windows_found windows_cut(const occluders *o, const link_occluders *among, const uint32_t own_facets[2],
+                          polygon *a, polygon *b);
 
 #endif

@@ -2,7 +2,7 @@
  * pieces that may stand between two clusters, and the proof that one of them hides these from each other. */
 #include "solver/base/random.h"
 #include "solver/formfactor/blocks/block_numbers.h"
-#include "solver/formfactor/blocks/occluders.h"
+#include "solver/formfactor/blocks/candidates.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/visibility/visibility.h"
 #include "support/blocks.h"
@@ -181,7 +181,7 @@ START_TEST(one_piece_hides_what_it_covers_entirely) {
         candidates among;
         flat_pair at;
         flat_clusters_pair(&p.flat, low, high, &at);
-        occluders_between(&p.pieces, &p.flat, low, high, &at, NULL, &among);
+        candidates_between(&p.pieces, &p.flat, low, high, &at, NULL, &among);
         ck_assert_int_gt(among.count, 0);
         ck_assert(among.hidden == hidden);
         parts_free(&p);
@@ -310,7 +310,7 @@ START_TEST(candidates_are_those_that_segments_cross) {
             n_met += met;
             n_corners_met += met && corners;
         }
-        occluders_between(&p.pieces, &p.flat, a, b, &at, NULL, &among);
+        candidates_between(&p.pieces, &p.flat, a, b, &at, NULL, &among);
         for (int k = 0; k < among.count; k++)
             for (int c = 0; c < 4; c++)
                 found = found || memcmp(p.pieces.of[among.of[k]].corner[c], quad[0], sizeof quad[0]) == 0;
@@ -372,14 +372,14 @@ START_TEST(a_board_before_a_wall_hides_only_the_wall) {
         flat_clusters_pair(&p.flat, single[k], far, &at);
         ck_assert_double_eq_tol(p.flat.of[single[k]].level, k * step, 1e-12);
         ck_assert_double_eq_tol(at.x[0][0], sign * k * step, 1e-12);
-        occluders_between(&p.pieces, &p.flat, single[k], far, &at, NULL, &among);
+        candidates_between(&p.pieces, &p.flat, single[k], far, &at, NULL, &among);
         ck_assert(among.hidden == (k == 0));
         ck_assert_int_eq(among.count, k == 0);
     }
     for (int turned = 0; turned < 2; turned++) {
         const uint32_t ends[2] = {turned ? far : both, turned ? both : far};
         flat_clusters_pair(&p.flat, ends[0], ends[1], &at);
-        occluders_between(&p.pieces, &p.flat, ends[0], ends[1], &at, NULL, &among);
+        candidates_between(&p.pieces, &p.flat, ends[0], ends[1], &at, NULL, &among);
         bool board = false;
         for (int k = 0; k < among.count; k++)
             board = board || (fabs(p.pieces.of[among.of[k]].low[0] - sign * step) < 1e-12 &&

@@ -2,8 +2,8 @@
  */
 #include "solver/base/random.h"
 #include "solver/formfactor/pairs/cluster_links.h"
+#include "solver/formfactor/pairs/cluster_shaft.h"
 #include "solver/formfactor/pairs/pair_far.h"
-#include "solver/formfactor/pairs/shaft.h"
 #include "support/box.h"
 #include "support/suite.h"
 
@@ -280,7 +280,7 @@ START_TEST(shafts_miss_only_what_is_not_between) {
         for (int k = 0; k < 4; k++) u[k] = random_lcg_unit(&state);
         const cluster *a = &t->clusters[pick[0]], *b = &t->clusters[pick[1]];
         shaft box;
-        shaft_init(&box, a, b, slack);
+        cluster_shaft_init(&box, a, b, slack);
         const bool misses = shaft_misses_element(&box, &s->m, pick[2]);
         missed += misses;
         hit += !misses;

@@ -1,9 +1,11 @@
 /* Pieces joined into larger convex ones: how many are left, and that they cover the same points once. */
 #include "solver/base/random.h"
-#include "solver/formfactor/blocks/occluder_join.h"
+#include "solver/formfactor/visibility/occluder_join.h"
 #include "support/dense.h"
 #include "support/scene.h"
 #include "support/suite.h"
+
+#include <math.h>
 
 static lam_error error;
 static const double slack = 1e-6;
@@ -44,18 +46,20 @@ static mesh grid_mesh(const grid *g) {
     return m;
 }
 
-/* Pieces left of those of a mesh; the caller frees *out. */
-static size_t join(const mesh *m, uint32_t (**out)[4]) {
-    size_t count = m->n;
-    *out = test_allocate(m->n, sizeof **out);
-    memcpy(*out, m->elements, m->n * sizeof **out);
-    ck_ok(occluders_join(m, slack, *out, &count, &error));
+/* Pieces left of those of a mesh, each element of which is a facet; the caller frees *out. */
+static size_t join(const mesh *m, joined_piece **out) {
+    size_t count = 0;
+    uint32_t *facet = test_allocate(m->n, sizeof *facet);
+    for (uint32_t k = 0; k < m->n; k++) facet[k] = k;
+    const facets f = {.n = m->n, .n_pieces = m->n, .pieces = m->elements, .piece_facet = facet};
+    ck_ok(occluders_join(m, &f, slack, out, &count, &error));
+    free(facet);
     return count;
 }
 
 static size_t count_joined(const grid *g) {
     mesh m = grid_mesh(g);
-    uint32_t(*pieces)[4];
+    joined_piece *pieces;
     const size_t count = join(&m, &pieces);
     free(pieces);
     free(m.vertices);
@@ -86,10 +90,10 @@ START_TEST(holes_stay_open) {
 END_TEST
 
 /* True where a point of the plane of axes lies inside a convex piece. */
-static bool covers(const mesh *m, const uint32_t piece[4], const double x[3], const double normal[3]) {
-    const uint32_t n = piece[3] == MESH_NO_VERTEX ? 3 : 4;
+static bool covers(const mesh *m, uint32_t n, const uint32_t *corner, const double x[3],
+                   const double normal[3]) {
     for (uint32_t c = 0; c < n; c++) {
-        const double *p = m->vertices[piece[c]], *q = m->vertices[piece[(c + 1) % n]];
+        const double *p = m->vertices[corner[c]], *q = m->vertices[corner[(c + 1) % n]];
         double inward = 0;
         for (int d = 0; d < 3; d++) {
             const int e = (d + 1) % 3, h = (d + 2) % 3;
@@ -114,7 +118,7 @@ START_TEST(the_same_points_are_covered_once) {
             normal[d] = g.axis[0][e] * g.axis[1][h] - g.axis[0][h] * g.axis[1][e];
         }
         mesh m = grid_mesh(&g);
-        uint32_t(*pieces)[4];
+        joined_piece *pieces;
         const size_t count = join(&m, &pieces);
         before += m.n;
         after += count;
@@ -124,8 +128,9 @@ START_TEST(the_same_points_are_covered_once) {
             double x[3];
             int own = 0, joined = 0;
             for (int d = 0; d < 3; d++) x[d] = g.origin[d] + u * g.axis[0][d] + v * g.axis[1][d];
-            for (size_t p = 0; p < m.n; p++) own += covers(&m, m.elements[p], x, normal);
-            for (size_t p = 0; p < count; p++) joined += covers(&m, pieces[p], x, normal);
+            for (size_t p = 0; p < m.n; p++)
+                own += covers(&m, (uint32_t)corner_count(m.elements[p]), m.elements[p], x, normal);
+            for (size_t p = 0; p < count; p++) joined += covers(&m, pieces[p].n, pieces[p].corner, x, normal);
             ck_assert_int_eq(own, joined);
         }
         free(pieces);
@@ -142,7 +147,7 @@ static size_t count_of_two(double rise, bool turned, double aside) {
     uint32_t elements[2][4] = {{0, 1, 2, 3}, {1, 4, 5, 2}};
     if (turned) memcpy(elements[1], (uint32_t[4]){2, 5, 4, 1}, sizeof elements[1]);
     const mesh m = {.n = 2, .n_vertices = 6, .vertices = x, .elements = elements};
-    uint32_t(*pieces)[4];
+    joined_piece *pieces;
     const size_t count = join(&m, &pieces);
     free(pieces);
     return count;
@@ -153,7 +158,7 @@ static size_t count_folded(void) {
     double x[6][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {.5, 0, 0}, {.5, 1, 0}};
     uint32_t elements[2][4] = {{0, 1, 2, 3}, {2, 1, 4, 5}};
     const mesh m = {.n = 2, .n_vertices = 6, .vertices = x, .elements = elements};
-    uint32_t(*pieces)[4];
+    joined_piece *pieces;
     const size_t count = join(&m, &pieces);
     free(pieces);
     return count;
@@ -164,7 +169,7 @@ static size_t count_dart(void) {
     double x[4][3] = {{0, 0, 0}, {3, 1, 0}, {1, 1, 0}, {1, 3, 0}};
     uint32_t elements[2][4] = {{0, 1, 2, MESH_NO_VERTEX}, {0, 2, 3, MESH_NO_VERTEX}};
     const mesh m = {.n = 2, .n_vertices = 4, .vertices = x, .elements = elements};
-    uint32_t(*pieces)[4];
+    joined_piece *pieces;
     const size_t count = join(&m, &pieces);
     free(pieces);
     return count;
@@ -194,14 +199,84 @@ START_TEST(small_bends_do_not_add_up) {
     for (uint32_t k = 0; k < CELLS; k++)
         memcpy(elements[k], (uint32_t[4]){2 * k, 2 * k + 2, 2 * k + 3, 2 * k + 1}, sizeof elements[k]);
     const mesh m = {.n = CELLS, .n_vertices = 2 * CELLS + 2, .vertices = x, .elements = elements};
-    uint32_t(*pieces)[4];
+    joined_piece *pieces;
     const size_t count = join(&m, &pieces);
     ck_assert_uint_gt(count, 10);
     for (size_t p = 0; p < count; p++) {
-        const double length = fabs(x[pieces[p][1]][0] - x[pieces[p][0]][0]);
+        const double length = fabs(x[pieces[p].corner[1]][0] - x[pieces[p].corner[0]][0]);
         ck_assert_double_le(.4 * length * length / 4, 2);
     }
     free(pieces);
+}
+END_TEST
+
+/* A fan of triangles about the first corner of a regular polygon. */
+static size_t count_fan(uint32_t sides, uint32_t *corners) {
+    double x[16][3];
+    uint32_t elements[16][4];
+    for (uint32_t k = 0; k < sides; k++)
+        memcpy(x[k], (double[3]){cos(2 * M_PI * k / sides), sin(2 * M_PI * k / sides), 0}, sizeof x[k]);
+    for (uint32_t k = 0; k + 2 < sides; k++)
+        memcpy(elements[k], (uint32_t[4]){0, k + 1, k + 2, MESH_NO_VERTEX}, sizeof elements[k]);
+    const mesh m = {.n = sides - 2, .n_vertices = sides, .vertices = x, .elements = elements};
+    joined_piece *pieces;
+    const size_t count = join(&m, &pieces);
+    *corners = 0;
+    for (size_t p = 0; p < count; p++) *corners += pieces[p].n;
+    free(pieces);
+    return count;
+}
+
+/* k pieces that share k - 1 edges have 2 (k - 1) corners more than the polygon. */
+START_TEST(wide_pieces_have_eight_corners_at_most) {
+    uint32_t corners;
+    for (uint32_t sides = 3; sides <= OCCLUDER_CORNERS; sides++) {
+        ck_assert_uint_eq(count_fan(sides, &corners), 1);
+        ck_assert_uint_eq(corners, sides);
+    }
+    const size_t count = count_fan(OCCLUDER_CORNERS + 1, &corners);
+    ck_assert_uint_eq(count, 2);
+    ck_assert_uint_eq(corners, OCCLUDER_CORNERS + 1 + 2 * (count - 1));
+}
+END_TEST
+
+/* Two squares whose common corners are vertices of their own at the same places, or a little apart. */
+START_TEST(vertices_at_one_place_are_one) {
+    for (int apart = 0; apart < 2; apart++) {
+        double x[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+                          {1, 0, 0}, {2, 0, 0}, {2, 1, 0}, {1, 1 + 1e-3 * apart, 0}};
+        uint32_t elements[2][4] = {{0, 1, 2, 3}, {4, 5, 6, 7}};
+        const mesh m = {.n = 2, .n_vertices = 8, .vertices = x, .elements = elements};
+        joined_piece *pieces;
+        const size_t count = join(&m, &pieces);
+        ck_assert_uint_eq(count, 1 + (size_t)apart);
+        ck_assert_uint_eq(pieces[0].facet, apart ? 0 : MESH_NO_VERTEX);
+        free(pieces);
+    }
+}
+END_TEST
+
+/* A quad that is bent along a diagonal, or has a corner that points inwards, is two triangles, and so is not
+ * a quad with a straight corner, nor one of which two corners are at one place. */
+START_TEST(quads_that_are_not_plane_and_convex_are_triangles) {
+    static const struct {
+        double third[3];
+        size_t count;
+        uint32_t corners;
+    } cases[] = {
+        {{1, 1, 0}, 1, 4}, {{1, 1, .1}, 2, 6}, {{.2, .2, 0}, 2, 6}, {{.5, .5, 0}, 1, 3}, {{0, 1, 0}, 1, 3}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        double x[4][3] = {{0, 0, 0}, {1, 0, 0}, {0}, {0, 1, 0}};
+        uint32_t elements[1][4] = {{0, 1, 2, 3}}, corners = 0;
+        memcpy(x[2], cases[k].third, sizeof x[2]);
+        const mesh m = {.n = 1, .n_vertices = 4, .vertices = x, .elements = elements};
+        joined_piece *pieces;
+        const size_t count = join(&m, &pieces);
+        for (size_t p = 0; p < count; p++) corners += pieces[p].n;
+        ck_assert_uint_eq(count, cases[k].count);
+        ck_assert_uint_eq(corners, cases[k].corners);
+        free(pieces);
+    }
 }
 END_TEST
 
@@ -214,6 +289,9 @@ int main(void) {
     tcase_add_test(tests, the_same_points_are_covered_once);
     tcase_add_test(tests, only_plane_convex_unions_are_joined);
     tcase_add_test(tests, small_bends_do_not_add_up);
+    tcase_add_test(tests, wide_pieces_have_eight_corners_at_most);
+    tcase_add_test(tests, vertices_at_one_place_are_one);
+    tcase_add_test(tests, quads_that_are_not_plane_and_convex_are_triangles);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }

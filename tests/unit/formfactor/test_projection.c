@@ -15,7 +15,7 @@ typedef struct setting {
     mesh m;
     visibility *v;
     polygon a, b;
-    joined_occluders occluders;
+    occluders occluders;
     link_occluders all;
 } setting;
 
@@ -50,8 +50,8 @@ static void setting_open(setting *s, mesh m) {
     lam_error error = {0};
     s->m = m;
     ck_assert_msg(visibility_create(&s->m, &s->v, &error) == LAM_OK, "%s", error.message);
-    ck_assert(joined_occluders_make(&s->m, visibility_facets(s->v), visibility_rounding(s->v), &s->occluders,
-                                    &error) == LAM_OK);
+    ck_assert(occluders_make(&s->m, visibility_facets(s->v), visibility_rounding(s->v), &s->occluders,
+                             &error) == LAM_OK);
     polygon_of_element(&s->m, 0, &s->a);
     polygon_of_element(&s->m, 1, &s->b);
     s->all.count = 0;
@@ -60,7 +60,7 @@ static void setting_open(setting *s, mesh m) {
 }
 
 static void setting_close(setting *s) {
-    joined_occluders_free(&s->occluders);
+    occluders_free(&s->occluders);
     visibility_destroy(s->v);
     mesh_free(&s->m);
 }
@@ -425,55 +425,6 @@ START_TEST(closed_room_with_a_box) {
 }
 END_TEST
 
-/* Joined pieces cover the same area: a grid is one polygon, also where its cells share no vertices, one with
- * a hole is a few, and a bent one is not joined across the bend. */
-START_TEST(pieces_are_joined) {
-    static const struct {
-        bool hole, bent;
-        size_t most;
-    } cases[] = {{false, false, 1}, {true, false, 8}, {false, true, 2}};
-    for (size_t k = 0; k < 3; k++) {
-        enum { N = 6 };
-        mesh m = {0};
-        lam_error error = {0};
-        double area = 0, joined = 0;
-        for (int i = 0; i < N; i++)
-            for (int j = 0; j < N; j++) {
-                if (cases[k].hole && i >= 2 && i < 4 && j >= 2 && j < 4) continue;
-                double corner[4][3];
-                for (int c = 0; c < 4; c++) {
-                    corner[c][0] = i + (c == 1 || c == 2);
-                    corner[c][1] = j + (c >= 2);
-                    corner[c][2] = cases[k].bent ? fmax(0, corner[c][0] - N / 2) : 0;
-                }
-                mesh_add_quad(&m, (const double(*)[3])corner);
-            }
-        mesh_finish(&m, .5f);
-        visibility *v;
-        joined_occluders o;
-        ck_assert(visibility_create_of_elements(&m, &v, &error) == LAM_OK);
-        ck_assert(joined_occluders_make(&m, visibility_facets(v), visibility_rounding(v), &o, &error) ==
-                  LAM_OK);
-        ck_assert_uint_ge(o.n, 1);
-        ck_assert_uint_le(o.n, cases[k].most);
-        for (size_t e = 0; e < m.n; e++) area += m.area[e];
-        for (size_t p = 0; p < o.n; p++) {
-            double twice[3] = {0};
-            for (int c = 0; c < o.of[p].n; c++) {
-                const double *x = o.of[p].corner[c], *y = o.of[p].corner[(c + 1) % o.of[p].n];
-                for (int d = 0; d < 3; d++)
-                    twice[d] += x[(d + 1) % 3] * y[(d + 2) % 3] - x[(d + 2) % 3] * y[(d + 1) % 3];
-            }
-            for (int d = 0; d < 3; d++) joined += .5 * twice[d] * o.of[p].normal[d];
-        }
-        ck_assert_double_eq_tol(joined, area, 1e-9 * area);
-        joined_occluders_free(&o);
-        visibility_destroy(v);
-        mesh_free(&m);
-    }
-}
-END_TEST
-
 int main(void) {
     Suite *suite = suite_create("projection");
     TCase *cases = tcase_create("projection");
@@ -484,7 +435,6 @@ int main(void) {
     tcase_add_test(cases, touching_elements_are_exact);
     tcase_add_loop_test(cases, openings_lose_nothing, 0, 15);
     tcase_add_test(cases, closed_room_with_a_box);
-    tcase_add_test(cases, pieces_are_joined);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }

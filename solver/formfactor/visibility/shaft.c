@@ -1,4 +1,4 @@
-#include "solver/formfactor/pairs/shaft.h"
+#include "solver/formfactor/visibility/shaft.h"
 
 #include <math.h>
 
@@ -10,7 +10,7 @@ static void add_plane(shaft *s, const double normal[3], double level) {
 /* Adds the planes of the hull that are not planes of the common box. Projected to the axes u and v, the hull
  * of two rectangles has an edge from one to the other in each quadrant where one reaches further along u and
  * the other further along v. */
-static void add_hull(shaft *s, const cluster *a, const cluster *b, int u, int v, double slack) {
+static void add_hull(shaft *s, const shaft_box *a, const shaft_box *b, int u, int v, double slack) {
     for (int quadrant = 0; quadrant < 4; quadrant++) {
         const double along_u = quadrant & 1 ? 1 : -1, along_v = quadrant & 2 ? 1 : -1;
         const double a_u = along_u > 0 ? a->high[u] : a->low[u], a_v = along_v > 0 ? a->high[v] : a->low[v];
@@ -25,24 +25,20 @@ static void add_hull(shaft *s, const cluster *a, const cluster *b, int u, int v,
     }
 }
 
-/* Only elements in front of a cluster's plane occlude its elements. */
-static void add_front(shaft *s, const cluster *c, double slack) {
-    if (!c->plane) return;
-    const double back[3] = {-c->normal[0], -c->normal[1], -c->normal[2]};
-    add_plane(s, back, -c->level - slack);
-}
-
-void shaft_init(shaft *s, const cluster *a, const cluster *b, double slack) {
+void shaft_of_boxes(shaft *s, const shaft_box *a, const shaft_box *b, double slack) {
     s->n_planes = 0;
     for (int d = 0; d < 3; d++) {
         s->low[d] = fmin(a->low[d], b->low[d]) + slack;
         s->high[d] = fmax(a->high[d], b->high[d]) - slack;
     }
-    add_front(s, a, slack);
-    add_front(s, b, slack);
     add_hull(s, a, b, 0, 1, slack);
     add_hull(s, a, b, 1, 2, slack);
     add_hull(s, a, b, 2, 0, slack);
+}
+
+void shaft_cut(shaft *s, const double normal[3], double level) {
+    const double back[3] = {-normal[0], -normal[1], -normal[2]};
+    add_plane(s, back, -level);
 }
 
 bool shaft_misses_box(const shaft *s, const double low[3], const double high[3]) {
@@ -84,44 +80,4 @@ bool shaft_misses_element(const shaft *s, const mesh *m, uint32_t element) {
     for (size_t c = 0; c < corners; c++)
         for (int d = 0; d < 3; d++) points[c][d] = m->vertices[corner[c]][d];
     return shaft_misses_points(s, (int)corners, (const double(*)[3])points);
-}
-
-static bool misses_leaf(const shaft *s, const mesh *m, const cluster_tree *t, const cluster *leaf) {
-    for (uint32_t p = leaf->first; p < leaf->last; p++)
-        if (!shaft_misses_element(s, m, t->element[p])) return false;
-    return true;
-}
-
-static double extent2(const double low[3], const double high[3]) {
-    double sum = 0;
-    for (int d = 0; d < 3; d++) sum += (high[d] - low[d]) * (high[d] - low[d]);
-    return sum;
-}
-
-size_t shaft_filter(const shaft *s, const mesh *m, const cluster_tree *t, const uint32_t *candidates,
-                    size_t n_candidates, bool finest, uint32_t out[SHAFT_CANDIDATES]) {
-    /* Clusters of an eighth of the shaft's diagonal are kept whole: the shafts inside this one split them. */
-    enum { DEPTH = 128 };
-    const double small = finest ? 0 : extent2(s->low, s->high) / 64;
-    size_t n_out = 0;
-    for (size_t k = 0; k < n_candidates; k++) {
-        uint32_t stack[DEPTH];
-        size_t depth = 0;
-        stack[depth++] = candidates[k];
-        while (depth > 0) {
-            const uint32_t at = stack[--depth];
-            const cluster *c = &t->clusters[at];
-            if (shaft_misses_box(s, c->low, c->high)) continue;
-            if (cluster_is_leaf(c)) {
-                if (misses_leaf(s, m, t, c)) continue;
-            } else if (extent2(c->low, c->high) > small && depth + 2 <= DEPTH &&
-                       n_out + depth + (n_candidates - k) + 2 <= SHAFT_CANDIDATES) {
-                stack[depth++] = c->child[1];
-                stack[depth++] = c->child[0];
-                continue;
-            }
-            out[n_out++] = at;
-        }
-    }
-    return n_out;
 }

@@ -3,7 +3,7 @@
  * above the plane to a corner q at -h_q < 0 cross it. Of an affine function g, whose values at the corners
  * are g_p and g_q, the value at such a point has the sign of g_p / h_p + g_q / h_q, so that its bounds over
  * all of these are the sums of the bounds over p and over q. */
-#include "solver/formfactor/blocks/occluders.h"
+#include "solver/formfactor/blocks/candidates.h"
 
 #include <math.h>
 
@@ -21,7 +21,7 @@ static bool is_in_front(const between *w, const occluder *o, bool amid[2]) {
     for (int side = 0; side < 2; side++) {
         const double *n = w->plane[side]->normal;
         double top = -INFINITY;
-        for (uint32_t c = 0; c < o->n_corners; c++)
+        for (int c = 0; c < o->n; c++)
             top = fmax(top, n[0] * o->corner[c][0] + n[1] * o->corner[c][1] + n[2] * o->corner[c][2]);
         if (top <= w->of[side]->lowest_top + w->flush) return false;
         amid[side] = top <= w->of[side]->level + w->of[side]->rise + w->flush;
@@ -67,7 +67,7 @@ static blocking what_blocks(const between *w, const occluder *o, bool amid[2]) {
     }
     bool all = (first_low >= slack && second_high <= -slack) || (first_high <= -slack && second_low >= slack);
     all = all && rise <= w->flush;
-    for (uint32_t e = 0; e < o->n_corners; e++) {
+    for (int e = 0; e < o->n; e++) {
         double g[FLAT_CORNERS], most_above = -INFINITY, most_below = -INFINITY, least_above = INFINITY,
                                 least_below = INFINITY;
         take_heights(w->at, o->edge[e], g);
@@ -105,35 +105,47 @@ static bool try_one(const occluders *o, const between *w, uint32_t k, candidates
         out->count = 1;
         return false;
     }
-    if (out->count == OCCLUDERS_MOST) {
-        out->count = OCCLUDERS_UNKNOWN;
+    if (out->count == CANDIDATES_MOST) {
+        out->count = CANDIDATES_UNKNOWN;
         return false;
     }
     out->of[out->count++] = k;
     return true;
 }
 
-static void try_all(const occluders *o, const between *w, candidates *out) {
-    enum { DEPTH = 64 };
-    uint32_t stack[DEPTH];
-    int depth = 0;
-    stack[depth++] = 0;
-    while (depth > 0) {
-        const occluder_box *box = &o->boxes[stack[--depth]];
-        bool apart = false;
-        for (int d = 0; d < 3; d++) apart = apart || box->low[d] > w->high[d] || box->high[d] < w->low[d];
-        if (apart) continue;
-        if (box->count == 0) {
-            stack[depth++] = box->first;
-            stack[depth++] = box->first + 1;
+/* The hull of the boxes of both, in front of both. A tree is searched for what reaches into it. */
+static void take_shaft(const between *w, shaft *s) {
+    enum { CORNERS = FLAT_CORNERS / 2 };
+    shaft_box box[2];
+    for (int side = 0; side < 2; side++)
+        for (int d = 0; d < 3; d++) {
+            const double *x = w->at->x[d] + CORNERS * side;
+            double low = x[0], high = x[0];
+            for (int k = 1; k < CORNERS; k++) {
+                low = x[k] < low ? x[k] : low;
+                high = x[k] > high ? x[k] : high;
+            }
+            box[side].low[d] = low - w->rise - w->slack;
+            box[side].high[d] = high + w->rise + w->slack;
         }
-        for (uint32_t k = 0; k < box->count; k++)
-            if (!try_one(o, w, o->list[box->first + k], out)) return;
-    }
+    shaft_of_boxes(s, &box[0], &box[1], 0);
+    for (int side = 0; side < 2; side++)
+        shaft_cut(s, w->plane[side]->normal, w->of[side]->lowest_top + w->flush);
 }
 
-void occluders_between(const occluders *o, const flat_clusters *f, uint32_t a, uint32_t b,
-                       const flat_pair *at, const candidates *among, candidates *out) {
+static void try_all(const occluders *o, const between *w, candidates *out) {
+    shaft s;
+    const uint32_t *found;
+    uint32_t count;
+    take_shaft(w, &s);
+    for (occluder_search search = occluder_search_begin(o, &s);
+         occluder_search_next(&search, &found, &count);)
+        for (uint32_t k = 0; k < count; k++)
+            if (!try_one(o, w, found[k], out)) return;
+}
+
+void candidates_between(const occluders *o, const flat_clusters *f, uint32_t a, uint32_t b,
+                        const flat_pair *at, const candidates *among, candidates *out) {
     between w = {.at = at,
                  .plane = {&f->planes[f->of[a].plane], &f->planes[f->of[b].plane]},
                  .of = {&f->of[a], &f->of[b]},
@@ -152,7 +164,7 @@ void occluders_between(const occluders *o, const flat_clusters *f, uint32_t a, u
         w.low[d] -= w.rise;
         w.high[d] += w.rise;
     }
-    if (among == NULL || among->count == OCCLUDERS_UNKNOWN) {
+    if (among == NULL || among->count == CANDIDATES_UNKNOWN) {
         try_all(o, &w, out);
         return;
     }

@@ -1,0 +1,23 @@
+/* The occluders between two clusters, and the proof that one of them hides them from each other. */
+#ifndef LAMBERT_FORMFACTOR_PAIRS_LINK_OCCLUDERS_H
+#define LAMBERT_FORMFACTOR_PAIRS_LINK_OCCLUDERS_H
+
+#include "solver/formfactor/pairs/cluster_shaft.h"
+#include "solver/formfactor/visibility/occluders.h"
+
+/* Occluders that may stand between two clusters; count: or OCCLUDERS_UNCOUNTED, where there are more. */
+enum { LINK_OCCLUDERS_MOST = 48, OCCLUDERS_UNCOUNTED = -1 };
+typedef struct link_occluders {
+    int count;
+    uint32_t of[LINK_OCCLUDERS_MOST];
+} link_occluders;
+
+/* Finds the occluders that reach into the shaft s of a and b and have points of both on different sides.
+ * Count 0 proves that nothing is between them. */
+void link_occluders_find(const occluders *o, const shaft *s, const cluster *a, const cluster *b,
+                         link_occluders *out);
+
+/* True where one of those covers each of the clusters from the other. */
+bool link_occluders_hide(const occluders *o, const link_occluders *among, const cluster *a, const cluster *b);
+
+#endif

@@ -1,0 +1,51 @@
+/* Occluders of a scene: large convex polygons, joined from the pieces of its facets, in a tree of boxes. A
+ * room has a few dozens, however finely it is divided. Knows no light. */
+#ifndef LAMBERT_FORMFACTOR_VISIBILITY_OCCLUDERS_H
+#define LAMBERT_FORMFACTOR_VISIBILITY_OCCLUDERS_H
+
+#include "solver/formfactor/visibility/occluder_join.h"
+#include "solver/formfactor/visibility/shaft.h"
+
+/* A planar convex polygon that hides from both sides: a point x of its plane is inside where edge[e] . (x, 1)
+ * >= 0 for all. */
+typedef struct occluder {
+    double low[3], high[3], normal[3], level; /* unit; normal . x = level */
+    int n;
+    uint32_t facet;                     /* MESH_NO_VERTEX: of several, in one plane */
+    double edge[OCCLUDER_CORNERS][4];   /* the distance of x from the edge, inwards, metres */
+    double corner[OCCLUDER_CORNERS][3]; /* counter-clockwise about the normal */
+} occluder;
+
+/* first: of children first, first + 1 (count 0), or of count entries of list. */
+typedef struct occluder_node {
+    double low[3], high[3];
+    uint32_t first, count;
+} occluder_node;
+
+typedef struct occluders {
+    size_t n, n_nodes;
+    occluder *of;   /* [n] */
+    uint32_t *list; /* [n], in the order of the nodes */
+    occluder_node *nodes;
+    double slack; /* metres: rounding may move a point by that much */
+} occluders;
+
+/* The joined pieces (occluder_join.h) of all facets. Of two with the same corners one is kept, and those
+ * thinner than slack are left out. Cost: O(n log n). Freed by occluders_free. Errors: LAM_ERR_MEMORY. */
+lam_status occluders_make(const mesh *m, const facets *f, double slack, occluders *out, lam_error *error);
+void occluders_free(occluders *o);
+
+/* A search of the tree for the occluders that may reach into a shaft. Both must outlive it. Cost: O(log n +
+ * found). */
+typedef struct occluder_search {
+    const occluders *all;
+    const shaft *within;
+    uint32_t stack[64]; /* twice as many as the halvings of 2^32 occluders */
+    int depth;
+} occluder_search;
+occluder_search occluder_search_begin(const occluders *o, const shaft *within);
+
+/* The next few of them: *count entries of *found; false: there are no more. */
+bool occluder_search_next(occluder_search *s, const uint32_t **found, uint32_t *count);
+
+#endif
