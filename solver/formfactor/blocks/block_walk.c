@@ -88,36 +88,6 @@ static void count_segments(block_walk *w, const candidates *among, int rounds) {
         w->report.tests += segments * among->count;
 }
 
-/* A pair of elements; among NULL: nothing stands between. */
-static lam_status add_pair(block_walk *w, uint32_t a, uint32_t b, const candidates *among) {
-    cluster_block made = {.a = a, .b = b};
-    double exchange = exchange_of_pair(w, a, b);
-    if (among == NULL && exchange > 0) {
-        w->report.pairs++;
-    } else if (exchange > 0) {
-        double all = 0, seen = 0;
-        w->report.shaded_pairs++;
-        for (size_t round = 0; round < PAIR_ROUNDS; round++) {
-            seen_segment segments[SEGMENT_LANES];
-            double kernel[SEGMENT_LANES];
-            shade_segments(&w->finder->shade, a, b, segments_among(w, among), round * SEGMENT_LANES, segments,
-                           kernel);
-            for (int k = 0; k < SEGMENT_LANES; k++) {
-                all += kernel[k];
-                seen += kernel[k] * segments[k].seen;
-            }
-        }
-        count_segments(w, segments_among(w, among), PAIR_ROUNDS);
-        w->report.elements_unseen += !(seen > 0);
-        exchange *= all > 0 ? seen / all : 0;
-    } else {
-        w->report.elements_away++;
-    }
-    if (!(exchange > 0)) return LAM_OK;
-    block_numbers_of_pair(&w->finder->flat, exchange, &made);
-    return add_block(w, &made);
-}
-
 /* True where a kernel that is linear on both clusters is near enough to the true one. most: its largest
  * value. */
 static bool is_smooth(const block_walk *w, uint32_t a, uint32_t b, double most, bool crosses) {
@@ -126,6 +96,44 @@ static bool is_smooth(const block_walk *w, uint32_t a, uint32_t b, double most, 
     if (w->finder->joined && (crosses || block_kernel_roughness(f, a, b, 2) > rough_most)) return false;
     if (crosses) return share_crossing * norm <= w->finder->options->open;
     return block_kernel_roughness(f, a, b, 2) * norm <= w->finder->options->open;
+}
+
+static lam_status add_linear(block_walk *w, uint32_t a, uint32_t b) {
+    cluster_block made = {.a = a, .b = b};
+    block_numbers_set(&w->finder->flat, NULL, &made);
+    return add_block(w, &made);
+}
+
+/* A pair of elements of which the share V of the light is visible. */
+static lam_status add_pair(block_walk *w, uint32_t a, uint32_t b, double V) {
+    cluster_block made = {.a = a, .b = b};
+    const double exchange = V * exchange_of_pair(w, a, b);
+    w->report.elements_away += !(exchange > 0);
+    if (!(exchange > 0)) return LAM_OK;
+    block_numbers_of_pair(&w->finder->flat, exchange, &made);
+    return add_block(w, &made);
+}
+
+/* A pair of elements with candidates between them, whose exchange area is found only where they see each
+ * other. */
+static lam_status add_shaded_pair(block_walk *w, uint32_t a, uint32_t b, double most, bool crosses,
+                                  const candidates *among) {
+    double all = 0, seen = 0;
+    for (size_t round = 0; round < PAIR_ROUNDS; round++) {
+        seen_segment segments[SEGMENT_LANES];
+        double kernel[SEGMENT_LANES];
+        shade_segments(&w->finder->shade, a, b, among, round * SEGMENT_LANES, segments, kernel);
+        for (int k = 0; k < SEGMENT_LANES; k++) {
+            all += kernel[k];
+            seen += kernel[k] * segments[k].seen;
+        }
+    }
+    count_segments(w, among, PAIR_ROUNDS);
+    w->report.shaded_pairs++;
+    w->report.elements_unseen += !(seen > 0);
+    if (!(seen > 0)) return LAM_OK;
+    if (seen >= all && is_smooth(w, a, b, most, crosses)) return add_linear(w, a, b);
+    return add_pair(w, a, b, seen / all);
 }
 
 /* Of two clusters that are not smooth the one that lies on both sides of the other's plane is split, else the
@@ -143,10 +151,10 @@ static lam_status add_shaded(block_walk *w, uint32_t a, uint32_t b, const candid
     cluster_block made = {.a = a, .b = b};
     seen_segment segments[SEGMENT_LANES];
     double seen = 0;
-    shade_segments(&w->finder->shade, a, b, segments_among(w, among), 0, segments, NULL);
+    shade_segments(&w->finder->shade, a, b, among, 0, segments, NULL);
     for (int k = 0; k < SEGMENT_LANES; k++) seen += segments[k].seen;
     w->report.shaded++;
-    count_segments(w, segments_among(w, among), 1);
+    count_segments(w, among, 1);
     if (seen == 0) {
         w->report.elements_unseen +=
             (double)block_finder_size(w->finder, a) * (double)block_finder_size(w->finder, b);
@@ -157,20 +165,40 @@ static lam_status add_shaded(block_walk *w, uint32_t a, uint32_t b, const candid
     return add_block(w, &made);
 }
 
+/* The bound of the 2-norm of a block. */
+static double norm_of(const block_walk *w, uint32_t a, uint32_t b, double most) {
+    const flat_clusters *f = &w->finder->flat;
+    return most * sqrt(f->of[a].area * f->of[b].area);
+}
+
+/* True where a block of these nodes is not split, however many candidates stand between. */
+static bool ends_here(const block_walk *w, uint32_t a, uint32_t b, double most, bool crosses) {
+    const size_t n_clusters = w->finder->n_clusters;
+    if (a >= n_clusters && b >= n_clusters) return true;
+    return norm_of(w, a, b, most) <= w->finder->options->shadow && is_smooth(w, a, b, most, crosses);
+}
+
+static lam_status end_shaded(block_walk *w, uint32_t a, uint32_t b, double most, bool crosses,
+                             const candidates *among) {
+    const size_t n_clusters = w->finder->n_clusters;
+    const candidates *tested = segments_among(w, among);
+    if (a >= n_clusters && b >= n_clusters) return add_shaded_pair(w, a, b, most, crosses, tested);
+    return add_shaded(w, a, b, tested);
+}
+
 /* Splits the side that moves the shadow more: the one that is farther from the occluder. */
 static lam_status visit_shaded(block_walk *w, uint32_t a, uint32_t b, double most, const bool behind[2],
                                const candidates *among) {
     const block_finder *k = w->finder;
     const flat_clusters *f = &k->flat;
     const bool crosses = behind[0] || behind[1];
-    if (a >= k->n_clusters && b >= k->n_clusters) return add_pair(w, a, b, among);
     if (among->amid[0] || among->amid[1]) return split(w, a, b, among, among->amid[0], !among->amid[0]);
-    if (most * sqrt(f->of[a].area * f->of[b].area) > k->options->shadow) {
+    if (ends_here(w, a, b, most, crosses)) return end_shaded(w, a, b, most, crosses, among);
+    if (norm_of(w, a, b, most) > k->options->shadow) {
         const double place = candidates_place(&k->pieces, f, a, b, among);
         return split(w, a, b, among, f->of[a].radius * (1 - place), f->of[b].radius * place);
     }
-    if (!is_smooth(w, a, b, most, crosses)) return split_for_smoothness(w, a, b, behind, among);
-    return add_shaded(w, a, b, among);
+    return split_for_smoothness(w, a, b, behind, among);
 }
 
 /* Two nodes, one of which joins several planes: the kernel is even on both, or the larger one is split. */
@@ -205,6 +233,11 @@ done:
     return status;
 }
 
+/* True where all elements of a node are at one height: nothing stands before some of them only. */
+static bool is_level(const flat_clusters *f, uint32_t t) {
+    return f->of[t].rise <= f->slack;
+}
+
 /* elements: the pairs of elements that a and b stand for. */
 static lam_status decide(block_walk *w, uint32_t a, uint32_t b, double elements, const candidates *among) {
     const block_finder *k = w->finder;
@@ -222,6 +255,11 @@ static lam_status decide(block_walk *w, uint32_t a, uint32_t b, double elements,
         w->report.elements_away += elements;
         return LAM_OK;
     }
+    const bool crosses = behind[0] || behind[1];
+    /* Candidates cost more to sift than to test: those of the parent do where the outcome is the same. */
+    if (among != NULL && among->count > 0 && is_level(f, a) && is_level(f, b) &&
+        ends_here(w, a, b, most, crosses))
+        return end_shaded(w, a, b, most, crosses, among);
     if (among == NULL || among->count != 0) {
         candidates_between(&k->pieces, f, a, b, &at, among, &mine);
         w->report.sifted += mine.examined;
@@ -232,13 +270,14 @@ static lam_status decide(block_walk *w, uint32_t a, uint32_t b, double elements,
         return LAM_OK;
     }
     if (mine.count != 0) return visit_shaded(w, a, b, most, behind, &mine);
-    if (is_smooth(w, a, b, most, behind[0] || behind[1])) {
-        cluster_block made = {.a = a, .b = b};
+    if (is_smooth(w, a, b, most, crosses)) {
         w->report.linear++;
-        block_numbers_set(f, NULL, &made);
-        return add_block(w, &made);
+        return add_linear(w, a, b);
     }
-    if (a >= k->n_clusters && b >= k->n_clusters) return add_pair(w, a, b, NULL);
+    if (a >= k->n_clusters && b >= k->n_clusters) {
+        w->report.pairs++;
+        return add_pair(w, a, b, 1);
+    }
     return split_for_smoothness(w, a, b, behind, &mine);
 }
 

@@ -52,6 +52,8 @@ static bool set_occluder(const mesh *m, const joined_piece *piece, double slack,
         for (int d = 0; d < 3; d++) o->edge[c][d] = inward[d] / length;
         o->edge[c][3] = -dot3(o->edge[c], o->corner[c]);
     }
+    for (int c = 0; c < OCCLUDER_CORNERS; c++)
+        for (int d = 0; d < 4; d++) o->across[d][c] = o->edge[c % o->n][d];
     return true;
 }
 

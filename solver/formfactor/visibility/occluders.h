@@ -13,6 +13,7 @@ typedef struct occluder {
     int n;
     uint32_t facet;                     /* MESH_NO_VERTEX: of several, in one plane */
     double edge[OCCLUDER_CORNERS][4];   /* the distance of x from the edge, inwards, metres */
+    double across[4][OCCLUDER_CORNERS]; /* the edges by component, repeated to fill */
     double corner[OCCLUDER_CORNERS][3]; /* counter-clockwise about the normal */
 } occluder;
 
