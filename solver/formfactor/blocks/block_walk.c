@@ -21,7 +21,8 @@ static const double separation = .5;
 static const double spread_most = 5;
 /* Clusters in planes that meet others at many edges have linear blocks up to this roughness. */
 static const double rough_most = .3;
-/* Segments of a partly hidden block: SEGMENT_LANES; of a pair of elements: twice as many. */
+/* Segments of a partly hidden block, and of a pair of elements within the bound of blocks: SEGMENT_LANES; of
+ * other pairs twice as many. */
 enum { PAIR_ROUNDS = 2 };
 
 size_t block_finder_size(const block_finder *k, uint32_t t) {
@@ -98,6 +99,12 @@ static bool is_smooth(const block_walk *w, uint32_t a, uint32_t b, double most, 
     return block_kernel_roughness(f, a, b, 2) * norm <= w->finder->options->open;
 }
 
+/* The bound of the 2-norm of a block. */
+static double norm_of(const block_walk *w, uint32_t a, uint32_t b, double most) {
+    const flat_clusters *f = &w->finder->flat;
+    return most * sqrt(f->of[a].area * f->of[b].area);
+}
+
 static lam_status add_linear(block_walk *w, uint32_t a, uint32_t b) {
     cluster_block made = {.a = a, .b = b};
     block_numbers_set(&w->finder->flat, NULL, &made);
@@ -119,7 +126,8 @@ static lam_status add_pair(block_walk *w, uint32_t a, uint32_t b, double V) {
 static lam_status add_shaded_pair(block_walk *w, uint32_t a, uint32_t b, double most, bool crosses,
                                   const candidates *among) {
     double all = 0, seen = 0;
-    for (size_t round = 0; round < PAIR_ROUNDS; round++) {
+    const int rounds = norm_of(w, a, b, most) > w->finder->options->shadow ? PAIR_ROUNDS : 1;
+    for (size_t round = 0; round < (size_t)rounds; round++) {
         seen_segment segments[SEGMENT_LANES];
         double kernel[SEGMENT_LANES];
         shade_segments(&w->finder->shade, a, b, among, round * SEGMENT_LANES, segments, kernel);
@@ -128,7 +136,7 @@ static lam_status add_shaded_pair(block_walk *w, uint32_t a, uint32_t b, double 
             seen += kernel[k] * segments[k].seen;
         }
     }
-    count_segments(w, among, PAIR_ROUNDS);
+    count_segments(w, among, rounds);
     w->report.shaded_pairs++;
     w->report.elements_unseen += !(seen > 0);
     if (!(seen > 0)) return LAM_OK;
@@ -163,12 +171,6 @@ static lam_status add_shaded(block_walk *w, uint32_t a, uint32_t b, const candid
     const visible_share share = visible_share_fit(segments, SEGMENT_LANES);
     block_numbers_set(&w->finder->flat, seen < SEGMENT_LANES ? &share : NULL, &made);
     return add_block(w, &made);
-}
-
-/* The bound of the 2-norm of a block. */
-static double norm_of(const block_walk *w, uint32_t a, uint32_t b, double most) {
-    const flat_clusters *f = &w->finder->flat;
-    return most * sqrt(f->of[a].area * f->of[b].area);
 }
 
 /* True where a block of these nodes is not split, however many candidates stand between. */
