@@ -2,43 +2,26 @@
 
 #include "solver/base/clock.h"
 #include "solver/method/guided_reference.h"
+#include "solver/method/judge_figures.h"
 #include "solver/method/judge_probes.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Indirect light below this share of all light counts as none: no ray found what the element sees, and the
- * rest is the remainder of the reference's iteration. */
-static const double dark = 1e-6;
 /* Probes of a group are enough where the standard error of their mean is below this share of it. */
 static const double certain = .1;
 /* Noise below this share of a figure may be taken out of it. */
 static const double noise_most = 1. / 3;
 /* Random emissions are all alike. Where the references are no twins the noise is measured by some of the
  * first round: random emission, the lights, and some single elements. */
-enum { RANDOM_LEAST = 4, NOISE_PROBES = 8 };
+enum { RANDOM_LEAST = 4, NOISE_PROBES = 12 };
 
-/* Figures of a group so far: sums of x, of x^2 in std, and the largest. */
-typedef struct tally {
-    error_figures relative, indirect;
-    size_t bright, lit;
-} tally;
-
-/* Of a group: figures with the noise in them, and means of squares over the indirect light, of all lit probes
- * and of those whose other correction is known. */
+/* Figures of a group so far: against the operator's own F, and against the references. */
 typedef struct group_tally {
-    size_t done, n_operator, n_coarse;
-    tally own, total;
-    double error, noise, variance, coarse; /* sums of those of squares; the variance over indirect^2 */
+    size_t done, n_operator;
+    figure_group own, total;
 } group_tally;
-
-/* Squares, area-weighted, channels stacked. */
-typedef struct squares {
-    double B, indirect, error; /* |B|^2, |B - E|^2, |x|^2 */
-    double noise, variance;    /* |t|^2, sum 4 (A x t)^2 */
-    double coarse;             /* |other_share (x - y)|^2 of the coarser reference */
-} squares;
 
 /* The emissions of a round, their first light H and its spread D, [m][C][n], and corrections by each
  * reference. */
@@ -130,92 +113,20 @@ done:
     return status;
 }
 
-/* Of probe v by correction x, or by x and y together where there are two, which are twins or not. */
-static squares squares_of(const measured *m, size_t v, const double *x, const double *y, bool total) {
+/* Probe v with its corrections x and y (NULL: not known), by the references of the total error or by the
+ * operator's own. */
+static figure_probe probe_of(const measured *m, size_t v, const double *x, const double *y, bool total) {
     const judge_input *input = m->input;
-    const build_problem *problem = input->problem;
-    const size_t n = problem->n, C = problem->n_channels, first = v * C * n;
-    const bool twins = y != NULL && input->twins, spread = total && m->known != NULL && m->known[v];
-    squares s = {.B = 0};
-    for (size_t i = 0; i < n; i++) {
-        const double a = problem->area[i];
-        double product = 0;
-        for (size_t c = 0; c < C; c++) {
-            const size_t k = c * n + i, at = first + k;
-            const double off = twins ? .5 * (x[at] + y[at]) : x[at], b = (double)m->p.B[at] + off,
-                         bounced = b - (double)m->p.E[at];
-            const double half = twins ? .5 * (x[at] - y[at]) : 0;
-            const double light = spread ? (double)problem->reflectance[k] * m->spread[at] : 0;
-            const double t2 = half * half + light * light;
-            s.B += a * b * b;
-            s.indirect += a * bounced * bounced;
-            s.error += a * off * off;
-            s.noise += a * t2;
-            if (y != NULL && !twins) s.coarse += a * (x[at] - y[at]) * (x[at] - y[at]);
-            /* Channels share the geometry, and so the noise. */
-            product += a * fabs(off) * sqrt(t2);
-        }
-        s.variance += 4 * product * product;
-    }
-    s.coarse *= input->other_share * input->other_share;
-    return s;
-}
-
-static void add_figure(error_figures *f, double x) {
-    f->mean += x;
-    f->std += x * x;
-    f->max = fmax(f->max, x);
-}
-
-/* An element that nothing sees has no indirect light to be wrong about. */
-static bool is_lit(const squares *s) {
-    return s->indirect > dark * dark * s->B;
-}
-
-static void add_squares(tally *t, const squares *s) {
-    if (s->B > 0) {
-        add_figure(&t->relative, sqrt(s->error / s->B));
-        t->bright++;
-    }
-    if (is_lit(s)) {
-        add_figure(&t->indirect, sqrt(s->error / s->indirect));
-        t->lit++;
-    }
-}
-
-/* scale: of all figures. */
-static error_figures finished(const error_figures *f, size_t count, double scale) {
-    if (count == 0) return (error_figures){.mean = 0};
-    const double mean = f->mean / (double)count, square = f->std / (double)count;
-    return (error_figures){scale * mean, scale * sqrt(fmax(0, square - mean * mean)), scale * f->max};
-}
-
-/* noisy: the other correction of the probe is known. */
-static void add_total(const measured *m, size_t v, bool noisy, group_tally *t) {
-    const squares s = squares_of(m, v, m->x, noisy ? m->y : NULL, true);
-    add_squares(&t->total, &s);
-    if (!is_lit(&s)) return;
-    t->error += s.error / s.indirect;
-    t->noise += s.noise / s.indirect;
-    t->variance += s.variance / (s.indirect * s.indirect);
-    t->coarse += s.coarse / s.indirect;
-    t->n_coarse += noisy;
-}
-
-/* The figures of a group without the noise, over those with it. */
-static double share_left(const group_tally *t) {
-    return t->error > 0 ? sqrt(fmax(0, 1 - t->noise / t->error)) : 1;
-}
-
-/* The standard error of an indirect figure f by that of its square, f^2 +- sqrt(variance), and the error of a
- * reference that is not taken out. Probes share the noise of form factors, so that many of them are no better
- * than one. */
-static double noise_of(const group_tally *t) {
-    if (t->n_coarse == 0) return 0;
-    const double lit = (double)t->total.lit, f2 = fmax(0, t->error - t->noise) / lit;
-    const double off = sqrt(t->variance / lit);
-    const double left = fmax(sqrt(f2 + off) - sqrt(f2), sqrt(f2) - sqrt(fmax(0, f2 - off)));
-    return sqrt(left * left + t->coarse / (double)t->n_coarse);
+    const size_t first = v * vector_of(input);
+    const bool spread = total && m->known != NULL && m->known[v];
+    return (figure_probe){.problem = input->problem,
+                          .E = m->p.E + first,
+                          .B = m->p.B + first,
+                          .x = x + first,
+                          .y = y != NULL ? y + first : NULL,
+                          .spread = spread ? m->spread + first : NULL,
+                          .relation = input->relation,
+                          .other_share = input->other_share};
 }
 
 /* Negative power over all power, and sum A E against sum A [(1 - rho) H + B (1 - s)], means of each group. */
@@ -248,10 +159,17 @@ static void report_round(const judge_input *input, size_t round, double part) {
     progress_report(input->progress, "judge", 1 - 1 / ((double)round + 1 + part));
 }
 
+/* The number of emissions of a group, 0 where they are endless. */
+static size_t all_of(const lam_operator *op, int group) {
+    if (group == JUDGE_RANDOM) return 0;
+    if (group == JUDGE_LIGHTS) return 1;
+    return lam_operator_emitters(op) > 0 ? lam_operator_emitters(op) : lam_operator_elements(op);
+}
+
 /* True where the mean of a figure over its probes is known well enough. */
-static bool is_certain(const tally *t) {
-    const error_figures f = finished(&t->indirect, t->lit, 1);
-    return t->lit == 0 || f.std <= certain * f.mean * sqrt((double)t->lit);
+static bool is_certain(const figure_tally *t, size_t all) {
+    const double spread = figures_spread(t, all);
+    return spread >= 0 && spread * (double)t->count <= certain * t->plain.f;
 }
 
 /* Emissions of one round, against all references. The operator's own error is found until it is certain, the
@@ -262,16 +180,17 @@ static lam_status measure(const lam_operator *op, measured *m, size_t round, gro
     const judge_input *input = m->input;
     const probes *p = &m->p;
     const bool first = round == 0;
-    const bool total = input->independent.n > 0, noisy = input->other.n > 0 && (first || input->twins);
-    const size_t n_noisy = input->twins || m->at_once ? p->m : p->m < NOISE_PROBES ? p->m : NOISE_PROBES;
+    const bool each = input->relation != REFERENCE_COARSER;
+    const bool total = input->independent.n > 0, noisy = input->other.n > 0 && (first || each);
+    const size_t n_noisy = each || m->at_once ? p->m : p->m < NOISE_PROBES ? p->m : NOISE_PROBES;
     m->x = memory_allocate(p->m, vector_of(input) * sizeof *m->x, "reference", error);
     if (m->x == NULL) TRY(LAM_ERR_MEMORY);
-    if (first || !is_certain(&t[JUDGE_SINGLE].own)) {
+    if (first || !is_certain(&t[JUDGE_SINGLE].own.indirect, all_of(op, JUDGE_SINGLE))) {
         TRY(solve(op, m, &input->own, false, p->m, m->x, error));
         for (int g = 0; g < JUDGE_GROUPS; g++)
             for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
-                const squares s = squares_of(m, v, m->x, NULL, false);
-                add_squares(&t[g].own, &s);
+                const figure_probe one = probe_of(m, v, m->x, NULL, false);
+                figures_add(&one, &t[g].own);
                 t[g].n_operator++;
             }
     }
@@ -286,41 +205,54 @@ static lam_status measure(const lam_operator *op, measured *m, size_t round, gro
         TRY(solve(op, m, &input->other, true, n_noisy, m->y, error));
     }
     for (int g = 0; g < JUDGE_GROUPS; g++)
-        for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) add_total(m, v, noisy && v < n_noisy, &t[g]);
+        for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
+            const figure_probe one = probe_of(m, v, m->x, noisy && v < n_noisy ? m->y : NULL, true);
+            figures_add(&one, &t[g].total);
+        }
 done:
     return status;
 }
 
 /* The probes of the next round; false where there are none. An LU takes all of them at once. */
-static bool next_counts(const judge_input *input, const probe_source *source, const group_tally *t,
-                        bool at_once, size_t counts[JUDGE_GROUPS]) {
+static bool next_counts(const lam_operator *op, const judge_input *input, const probe_source *source,
+                        const group_tally *t, bool at_once, size_t counts[JUDGE_GROUPS]) {
     const size_t least[JUDGE_GROUPS] = {RANDOM_LEAST, 1,
                                         input->probes_least > 0 ? input->probes_least : input->probes};
     size_t all = 0;
     for (int g = 0; g < JUDGE_GROUPS; g++) {
         const size_t left = source->most[g] - source->made[g];
         const size_t step = g == JUDGE_RANDOM ? RANDOM_LEAST : JUDGE_AT_ONCE;
-        const bool enough =
-            t[g].done >= least[g] && is_certain(input->independent.n > 0 ? &t[g].total : &t[g].own);
+        const figure_group *of = input->independent.n > 0 ? &t[g].total : &t[g].own;
+        const bool enough = t[g].done >= least[g] && is_certain(&of->indirect, all_of(op, g));
         counts[g] = enough ? 0 : at_once || left < step ? left : step;
         all += counts[g];
     }
     return all > 0;
 }
 
-static void finish_group(const judge_input *input, const group_tally *t, error_group *g) {
+/* The total errors. repeated: as in figures_noise. */
+static void finish_total(const group_tally *t, double repeated, error_group *g) {
+    g->reference_noise = figures_noise(&t->total.indirect, repeated, false);
+    g->total_relative = figures_mean(&t->total.relative);
+    g->total_indirect = figures_mean(&t->total.indirect);
+    g->is_bound = !(g->reference_noise <= noise_most * g->total_indirect.mean);
+    if (!g->is_bound) return;
+    g->reference_noise = figures_noise(&t->total.indirect, repeated, true);
+    g->total_relative = figures_bound(&t->total.relative, figures_noise(&t->total.relative, repeated, true));
+    g->total_indirect = figures_bound(&t->total.indirect, g->reference_noise);
+}
+
+/* all: the number of emissions of the group; 0: endless. */
+static void finish_group(const judge_input *input, const group_tally *t, bool single, size_t all,
+                         error_group *g) {
     g->probes = t->done;
     g->operator_probes = t->n_operator;
     if (t->done == 0) return;
-    g->operator_relative = finished(&t->own.relative, t->own.bright, 1);
-    g->operator_indirect = finished(&t->own.indirect, t->own.lit, 1);
+    g->operator_relative = figures_mean(&t->own.relative);
+    g->operator_indirect = figures_mean(&t->own.indirect);
     if (input->independent.n == 0) return;
-    const error_figures plain = finished(&t->total.indirect, t->total.lit, 1);
-    g->reference_noise = noise_of(t);
-    g->is_bound = !(g->reference_noise <= noise_most * share_left(t) * plain.mean);
-    const double scale = g->is_bound ? 1 : share_left(t);
-    g->total_relative = finished(&t->total.relative, t->total.bright, scale);
-    g->total_indirect = finished(&t->total.indirect, t->total.lit, scale);
+    g->probes_noise = figures_spread(&t->total.indirect, all);
+    finish_total(t, single ? (double)t->done / (double)all : 0, g);
 }
 
 /* True where a reference is an LU, of whose probes none is worth leaving out. */
@@ -347,7 +279,7 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
                           input->seed, &source, error));
     const bool at_once = is_dense(op, input, source.most[0] + source.most[1] + source.most[2]);
     progress_report(input->progress, "judge", 0);
-    for (; next_counts(input, &source, t, at_once, counts); rounds++) {
+    for (; next_counts(op, input, &source, t, at_once, counts); rounds++) {
         if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         measured_free(&m);
         m = (measured){.input = input, .at_once = at_once};
@@ -357,7 +289,8 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
         for (int g = 0; g < JUDGE_GROUPS; g++) t[g].done += counts[g];
         report_round(input, rounds, 1);
     }
-    for (int g = 0; g < JUDGE_GROUPS; g++) finish_group(input, &t[g], groups[g]);
+    for (int g = 0; g < JUDGE_GROUPS; g++)
+        finish_group(input, &t[g], g == JUDGE_SINGLE, all_of(op, g), groups[g]);
     progress_report(input->progress, "judge", 1);
     found.has_total = input->independent.n > 0;
     found.seconds = clock_seconds() - start;

@@ -18,8 +18,11 @@ typedef struct error_group {
     size_t operator_probes;                             /* of them, for the operator's own error */
     error_figures total_relative, total_indirect;       /* against an independent sample of F */
     error_figures operator_relative, operator_indirect; /* against the very F that was factorized */
-    double reference_noise; /* indirect: standard error of total_indirect by the noise of the reference */
-    bool is_bound; /* that is more than a third: the noise is not taken out, and total_... are bounds */
+    double reference_noise; /* standard error of the mean of total_indirect by the noise of the reference */
+    double probes_noise;    /* the same by the choice of probes; negative: of one probe nobody knows */
+    /* The noise of the reference is more than a third of the mean: it is not taken out, and the figures of
+     * total are upper bounds, with twice their standard error added. */
+    bool is_bound;
     double negative_share; /* power of negative radiosity over all, mean */
     double energy_balance; /* |emitted - absorbed - left| / emitted, mean */
 } error_group;
@@ -30,18 +33,20 @@ typedef struct error_report {
     double seconds;
 } error_report;
 
+/* The other reference beside the independent one: a sample of the same quality, that shares nothing with it;
+ * the same disturbed by a sample of its own noise; a coarser one, of which other_share of the distance is the
+ * error of the independent one. */
+typedef enum reference_relation { REFERENCE_TWIN, REFERENCE_DISTURBED, REFERENCE_COARSER } reference_relation;
+
 typedef struct judge_input {
     const build_problem *problem;
     const double *row_sums;     /* [n] of own */
     const float *emission;      /* [C][n], the scene's own */
     factor_product own;         /* the very F that the operator was built from */
     factor_product independent; /* an F that shares no sample with it; n = 0: no total error */
-    /* Another one; n = 0: the noise of the reference is not measured. twins: both are independent samples of
-     * the same quality. Else this one is coarser, and other_share of the distance between the solutions by
-     * both is the error of that by `independent`. */
-    factor_product other;
-    bool twins;
-    double other_share;
+    factor_product other;       /* another one; n = 0: the noise of the reference is not measured */
+    reference_relation relation;
+    double other_share; /* of REFERENCE_COARSER */
     /* H = F E, [n], closer than by these, where few elements shine; *known is false where many do. D [n]:
      * half the difference of two independent estimates whose mean is H. NULL: there is none. The reference
      * then takes only the further bounces of that light from the samples. */
@@ -55,13 +60,12 @@ typedef struct judge_input {
     const progress *progress;
 } judge_input;
 
-/* Measures. With x the correction of an answer by the reference, B = B~ + x, the squared error is |x|^2 less
- * the power of the noise in x, which is taken out of a group's mean square, and of its figures in proportion.
- * Of twins, x = (x_1 + x_2) / 2 and the noise is (x_1 - x_2) / 2, which leaves <x_1, x_2>: in this the noise
- * of two independent samples has no part on average. So is rho D, the noise of the first light. Of a finer
- * and a coarser reference the noise is stated alone. reference_noise is the standard error that is left: of
- * |x|^2 it is sqrt(sum 4 (A x t)^2) over all elements, t being the noise that was taken out. Cost: a
- * converged solve per probe and reference, started from the operator's own answer. */
+/* Measures. With x the correction of an answer by the reference, B = B~ + x, a squared error is |x|^2 less
+ * the power of the noise in x, by a sample t of it (judge_figures.h). Of twins, x = (x_1 + x_2) / 2 and
+ * t = (x_1 - x_2) / 2, which leaves <x_1, x_2>: in this the noise of two independent samples has no part on
+ * average. Of a disturbed reference t is the distance of both solutions. To t comes rho D, the noise of the
+ * first light. Of a finer and a coarser reference the noise is stated alone. Cost: a converged solve per
+ * probe and reference, started from the operator's own answer. */
 lam_status judge_operator(const lam_operator *op, const judge_input *input, error_report *report,
                           lam_error *error);
 

@@ -26,6 +26,7 @@ static lam_status save_group(store *s, const char *name, const error_group *g, b
         TRY(save_figures(s, name, "total_relative", &g->total_relative, error));
         TRY(save_figures(s, name, "total_indirect", &g->total_indirect, error));
         TRY(store_set_number(s, name, "reference_noise", g->reference_noise, error));
+        if (g->probes_noise >= 0) TRY(store_set_number(s, name, "probes_noise", g->probes_noise, error));
         TRY(store_set_integer(s, name, "total_is_bound", g->is_bound, error));
     }
     TRY(store_set_integer(s, name, "operator_probes", (int64_t)g->operator_probes, error));

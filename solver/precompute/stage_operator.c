@@ -6,6 +6,7 @@
 
 #include <math.h>
 #include <omp.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -196,10 +197,14 @@ done:
 
 static void log_figures(terminal *t, const char *name, const error_group *g, bool has_total) {
     const char *at_most = g->is_bound ? "at most " : "";
+    char probes[64] = "";
     if (g->probes == 0) return;
+    if (g->probes_noise > 0)
+        snprintf(probes, sizeof probes, ", of %zu probes %.2g", g->probes, g->probes_noise);
     if (has_total)
-        terminal_log(t, "%-8s total relative %s%.3g, indirect %s%.3g (noise of the reference %.2g)", name,
-                     at_most, g->total_relative.mean, at_most, g->total_indirect.mean, g->reference_noise);
+        terminal_log(t, "%-8s total relative %s%.3g, indirect %s%.3g (noise of the reference %.2g%s)", name,
+                     at_most, g->total_relative.mean, at_most, g->total_indirect.mean, g->reference_noise,
+                     probes);
     terminal_log(t, "%-8s operator relative %.3g, indirect %.3g", name, g->operator_relative.mean,
                  g->operator_indirect.mean);
 }

@@ -70,21 +70,33 @@ static void print_bytes(double bytes) {
     printf("%-18s%.4g %s\n", "operator", bytes, units[unit]);
 }
 
+/* Adds the standard error of the mean total error, where the store states it. */
+static void print_noise(const json_t *group) {
+    static const char *const keys[] = {"reference_noise", "probes_noise"};
+    static const char *const words[] = {"reference", "probes"};
+    for (int i = 0; i < 2; i++) {
+        const json_t *noise = json_object_get(group, keys[i]);
+        if (json_is_number(noise))
+            printf("%s%s %.2g", i == 0 ? "  +- " : ", ", words[i], json_number_value(noise));
+    }
+}
+
 /* Prints the mean and the largest error of a group of probes on one line. */
 static void print_figures(const char *name, const json_t *group, const char *against) {
     char key[64];
     double value[4];
     static const char *const figures[] = {"relative_mean", "relative_max", "indirect_mean", "indirect_max"};
+    const bool total = strcmp(against, "total") == 0;
     for (int i = 0; i < 4; i++) {
         snprintf(key, sizeof key, "%s_%s", against, figures[i]);
         const json_t *figure = json_object_get(group, key);
         if (!json_is_number(figure)) return;
         value[i] = json_number_value(figure);
     }
-    const bool bound =
-        strcmp(against, "total") == 0 && json_integer_value(json_object_get(group, "total_is_bound")) != 0;
-    printf("  %-8s%-10s%12.3g%12.3g%12.3g%12.3g%s\n", name, against, value[0], value[1], value[2], value[3],
-           bound ? "  at most" : "");
+    const bool bound = total && json_integer_value(json_object_get(group, "total_is_bound")) != 0;
+    printf("  %-8s%-10s%12.3g%12.3g%12.3g%12.3g", name, against, value[0], value[1], value[2], value[3]);
+    if (total) print_noise(group);
+    puts(bound ? "  at most" : "");
 }
 
 static void print_error(const json_t *figures) {
@@ -101,7 +113,9 @@ static void print_error(const json_t *figures) {
     }
     puts("  total: against an independent sample of the form factors; at most: its noise is more than a "
          "third\n"
-         "  operator: against the sample that it was built from");
+         "  operator: against the sample that it was built from\n"
+         "  +-: standard errors of the mean indirect error, by the noise of that sample and by the choice of "
+         "probes");
 }
 
 /* Prints as many groups as fit on a screen: a city has hundreds of them. */

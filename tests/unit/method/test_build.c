@@ -274,7 +274,7 @@ START_TEST(judge_finds_the_exact_operator_exact) {
                                    .own = factor_product_of_rows(&f.F),
                                    .independent = factor_product_of_rows(&f.F),
                                    .other = factor_product_of_rows(&f.F),
-                                   .twins = true,
+                                   .relation = REFERENCE_TWIN,
                                    .probes = 40,
                                    .seed = 1,
                                    .progress = &told};
@@ -347,7 +347,7 @@ START_TEST(judge_ignores_what_sees_nothing) {
                                .own = factor_product_of_rows(&F),
                                .independent = factor_product_of_rows(&F),
                                .other = factor_product_of_rows(&F),
-                               .twins = true,
+                               .relation = REFERENCE_TWIN,
                                .probes = 40,
                                .seed = 1};
     error_report report;

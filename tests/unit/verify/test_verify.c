@@ -70,7 +70,7 @@ static sample make_sample(void) {
                                .own = factor_product_of_rows(problem.F),
                                .independent = factor_product_of_rows(&half[0].F),
                                .other = factor_product_of_rows(&half[1].F),
-                               .twins = true,
+                               .relation = REFERENCE_TWIN,
                                .probes = PROBES,
                                .seed = 1};
     MUST(judge_operator(s.op, &input, &s.errors, error));

@@ -1,0 +1,149 @@
+#include "solver/method/judge_figures.h"
+
+#include <math.h>
+
+/* Indirect light below this share of all light counts as none: no ray found what the element sees, and the
+ * rest is the remainder of the reference's iteration. */
+static const double dark = 1e-6;
+
+/* Of element i in channel c. */
+typedef struct number {
+    double b, bounced, off, noise; /* B, B - E, x, t */
+    double apart;                  /* error of x by the coarser reference */
+} number;
+
+static number number_at(const figure_probe *p, size_t k) {
+    const double x = p->x[k], y = p->y != NULL ? p->y[k] : x;
+    number one = {.off = x};
+    if (p->relation == REFERENCE_TWIN) one.off = .5 * (x + y), one.noise = .5 * (x - y);
+    if (p->relation == REFERENCE_DISTURBED) one.noise = y - x;
+    if (p->relation == REFERENCE_COARSER) one.apart = p->other_share * (x - y);
+    one.b = (double)p->B[k] + one.off;
+    one.bounced = one.b - (double)p->E[k];
+    return one;
+}
+
+static double light_at(const figure_probe *p, size_t k) {
+    return p->spread != NULL ? (double)p->problem->reflectance[k] * p->spread[k] : 0;
+}
+
+/* Squares, area-weighted, channels stacked. */
+typedef struct squares {
+    double b, bounced, off, noise, apart;
+} squares;
+
+static squares squares_of(const figure_probe *p) {
+    const size_t n = p->problem->n, C = p->problem->n_channels;
+    squares s = {.b = 0};
+    for (size_t k = 0; k < C * n; k++) {
+        const double a = p->problem->area[k % n], light = light_at(p, k);
+        const number one = number_at(p, k);
+        s.b += a * one.b * one.b;
+        s.bounced += a * one.bounced * one.bounced;
+        s.off += a * one.off * one.off;
+        s.noise += a * (one.noise * one.noise + light * light);
+        s.apart += a * one.apart * one.apart;
+    }
+    return s;
+}
+
+/* Sums of 2 A x t, 2 A (B - E) t and 2 A B t over the elements of each part. Channels share the geometry, and
+ * so the noise. */
+typedef struct noise_sums {
+    double off[FIGURE_PARTS], bounced[FIGURE_PARTS], b[FIGURE_PARTS];
+} noise_sums;
+
+static void find_noise(const figure_probe *p, noise_sums *out) {
+    const size_t n = p->problem->n, C = p->problem->n_channels;
+    *out = (noise_sums){.off = {0}};
+    for (size_t i = 0; i < n; i++) {
+        const size_t part = i * FIGURE_PARTS / n;
+        for (size_t k = i; k < C * n; k += n) {
+            const number one = number_at(p, k);
+            const double at = 2 * p->problem->area[i] * (one.noise + light_at(p, k));
+            out->off[part] += at * one.off;
+            out->bounced[part] += at * one.bounced;
+            out->b[part] += at * one.b;
+        }
+    }
+}
+
+/* The larger distance of f to the roots of f^2 +- sigma. */
+static double root_noise(double f2, double sigma) {
+    const double f = sqrt(f2);
+    return fmax(sqrt(f2 + sigma) - f, f - sqrt(fmax(0, f2 - sigma)));
+}
+
+/* Adds f, whose squared noise in part k is z_k = (off_k - f^2 light_k) / |d|^2. Returns df. */
+static double add_noisy(double f2, double d2, const double *off, const double *light, figure_sums *to) {
+    double z[FIGURE_PARTS], variance = 0, df = 0;
+    for (int k = 0; k < FIGURE_PARTS; k++) {
+        z[k] = (off[k] - f2 * light[k]) / d2;
+        variance += z[k] * z[k];
+    }
+    if (variance > 0) {
+        const double sigma = sqrt(variance);
+        df = root_noise(f2, sigma);
+        for (int k = 0; k < FIGURE_PARTS; k++) to->noise[k] += z[k] * df / sigma;
+    }
+    to->f += sqrt(f2);
+    to->f2 += f2;
+    to->most = fmax(to->most, sqrt(f2));
+    return df;
+}
+
+static void add_figure(const figure_probe *p, const squares *s, double d2, const double *off,
+                       const double *light, figure_tally *t) {
+    const double plain = sqrt(s->off / d2), coarse = sqrt(s->apart / d2);
+    const double df = add_noisy(s->off / d2, d2, off, light, &t->plain);
+    (void)add_noisy(fmax(0, s->off - s->noise) / d2, d2, off, light, &t->less);
+    t->count++;
+    t->bound = fmax(t->bound, plain + 2 * hypot(df, coarse));
+    if (p->y == NULL) return;
+    t->coarse += coarse;
+    t->coarse_plain += plain;
+}
+
+void figures_add(const figure_probe *p, figure_group *to) {
+    const squares s = squares_of(p);
+    noise_sums noise = {.off = {0}};
+    if (s.noise > 0) find_noise(p, &noise);
+    to->relative.tried++;
+    to->indirect.tried++;
+    if (s.b > 0) add_figure(p, &s, s.b, noise.off, noise.b, &to->relative);
+    if (s.bounced > dark * dark * s.b) add_figure(p, &s, s.bounced, noise.off, noise.bounced, &to->indirect);
+}
+
+double figures_noise(const figure_tally *t, double repeated, bool bound) {
+    const figure_sums *of = bound ? &t->plain : &t->less;
+    double sum = 0;
+    if (t->count == 0) return 0;
+    for (int k = 0; k < FIGURE_PARTS; k++) sum += of->noise[k] * of->noise[k];
+    const double coarse = t->coarse_plain > 0 ? t->coarse / t->coarse_plain * t->plain.f : 0;
+    return sqrt(sum * (1 + repeated) + coarse * coarse) / (double)t->count;
+}
+
+double figures_spread(const figure_tally *t, size_t all) {
+    const double m = (double)t->count, share = all > 0 ? (double)t->tried / (double)all : 0;
+    if (share >= 1 || (t->count == 0 && t->tried > 1)) return 0;
+    if (t->count < 2) return -1;
+    const double variance = fmax(0, t->plain.f2 - t->plain.f * t->plain.f / m) / (m - 1);
+    return sqrt(variance / m * (1 - share));
+}
+
+static error_figures figures_of(const figure_sums *s, size_t count) {
+    if (count == 0) return (error_figures){.mean = 0};
+    const double mean = s->f / (double)count, square = s->f2 / (double)count;
+    return (error_figures){mean, sqrt(fmax(0, square - mean * mean)), s->most};
+}
+
+error_figures figures_mean(const figure_tally *t) {
+    return figures_of(&t->less, t->count);
+}
+
+error_figures figures_bound(const figure_tally *t, double noise) {
+    error_figures f = figures_of(&t->plain, t->count);
+    f.mean += 2 * noise;
+    f.max = fmax(f.mean, t->bound);
+    return f;
+}
