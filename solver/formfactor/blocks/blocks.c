@@ -141,20 +141,25 @@ static void find_all(find_team *team, int n_threads) {
     }
 }
 
+/* All blocks behind those of the first thread. */
 static lam_status join_lists(block_walk *works, int n_threads, block_factors *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    block_list *all = &works[0].found;
     size_t count = 0;
     for (int k = 0; k < n_threads; k++) count += works[k].found.count;
-    out->blocks = memory_allocate(count, sizeof *out->blocks, "blocks", error);
-    if (out->blocks == NULL) return LAM_ERR_MEMORY;
-    for (int k = 0; k < n_threads; k++) {
+    TRY(array_resize(&all->list, count, sizeof *all->list, "blocks", error));
+    for (int k = 1; k < n_threads; k++) {
         block_list *from = &works[k].found;
-        if (from->count > 0)
-            memcpy(out->blocks + out->n_blocks, from->list, from->count * sizeof *from->list);
-        out->n_blocks += from->count;
+        if (from->count > 0) memcpy(all->list + all->count, from->list, from->count * sizeof *from->list);
+        all->count += from->count;
         free(from->list);
         *from = (block_list){.list = NULL};
     }
-    return LAM_OK;
+    out->blocks = all->list;
+    out->n_blocks = all->count;
+    all->list = NULL;
+done:
+    return status;
 }
 
 block_options block_options_of(const recipe *r) {

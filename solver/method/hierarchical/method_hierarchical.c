@@ -215,12 +215,13 @@ static lam_status build(const build_problem *problem, const build_options *optio
                          .progress = options->progress};
     TRY(problem->blocks != NULL ? expand_blocks(&x, sums, &S, error)
                                 : expand_rows(&x, sums, &row_sums, &S, error));
-    const double expanded = clock_seconds();
+    const double expanded = clock_seconds(), numbers_of_S = (double)S.indptr[n];
     report_step_add(report, problem->stream != NULL ? "rays, wavelets" : "wavelets", expanded - started);
     for (size_t c = 0; c < C; c++) {
         for (size_t p = 0; p < n; p++) rho[p] = problem->reflectance[c * n + tree->order[p]];
         const wavelet_inverse_input inverse = {.basis = &arrays.basis,
                                                .S = &S,
+                                               .last = c + 1 == C,
                                                .rho = rho,
                                                .weight = weight,
                                                .threshold = (float)threshold,
@@ -243,7 +244,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
         "threshold %.2g by %s, %.3g stored coefficients per element (%.3g of S), %zu planes, %zu clusters "
         "of %zu shapes%s",
         threshold, threshold > least ? "--epsilon" : "the noise of the rays", entries / (double)(n * C),
-        (double)S.indptr[n] / (double)n, tree->n_frames, n_nodes, n_shapes,
+        numbers_of_S / (double)n, tree->n_frames, n_nodes, n_shapes,
         corrected ? "; the mean error of uniform emission is corrected" : "");
     TRY(self_check(problem, row_sums, made, options->seed, report, error));
     *op = made;

@@ -82,87 +82,113 @@ static float find_least(const term_rows *Z, float skip, size_t n_threads, float 
     return smallest;
 }
 
-/* Row i of A, or of A - B, without entries below `least`. */
+/* Sums up row i of A - B; B may be NULL. */
+static void add_difference(row_work *w, const term_rows *A, const term_rows *B, size_t i) {
+    w->count = 0;
+    for (size_t e = 0; e < A->length[i]; e++) row_work_add(w, A->row[i][e].column, A->row[i][e].value);
+    for (size_t e = 0; B != NULL && e < B->length[i]; e++)
+        row_work_add(w, B->row[i][e].column, -B->row[i][e].value);
+}
+
+/* to = by times the row that is summed up, sorted by magnitude, without entries below `least`; the sums are 0
+ * again. Returns how many are left. */
+static size_t take_sorted(row_work *w, float by, float least, row_term *to) {
+    size_t used = 0;
+    for (size_t k = 0; k < w->count; k++) {
+        const uint32_t j = w->columns[k];
+        const float value = by * w->sums[j];
+        w->spare[used] = (row_term){j, value};
+        used += fabsf(value) >= least;
+        w->sums[j] = 0;
+    }
+    row_terms_sort(used, w->spare, to);
+    return used;
+}
+
+/* Row i of A, or of A - B, sorted by magnitude, without entries below `least`. */
 typedef struct difference_rows {
     const term_rows *A, *B; /* B: NULL or another */
     float least;
-    bool sorted; /* by magnitude */
 } difference_rows;
 
 static lam_status make_difference(const void *context, size_t i, row_work *w, lam_error *error) {
     lam_status status = LAM_OK;
     const difference_rows *d = context;
     row_term *to = NULL;
-    size_t used = 0;
-    w->count = 0;
-    for (size_t e = 0; e < d->A->length[i]; e++)
-        row_work_add(w, d->A->row[i][e].column, d->A->row[i][e].value);
-    for (size_t e = 0; d->B != NULL && e < d->B->length[i]; e++)
-        row_work_add(w, d->B->row[i][e].column, -d->B->row[i][e].value);
+    add_difference(w, d->A, d->B, i);
     TRY(row_work_room(w, 0, w->count, &to, error));
-    row_term *const found = d->sorted ? w->spare : to;
-    for (size_t k = 0; k < w->count; k++) {
-        const uint32_t j = w->columns[k];
-        found[used] = (row_term){j, w->sums[j]};
-        used += fabsf(w->sums[j]) >= d->least;
-        w->sums[j] = 0;
-    }
-    if (d->sorted) row_terms_sort(used, found, to);
-    w->done[0].used += used;
+    w->done[0].used += take_sorted(w, 1, d->least, to);
 done:
     for (size_t k = 0; status != LAM_OK && k < w->count; k++) w->sums[w->columns[k]] = 0;
     return status;
 }
 
-/* Row i of R B, sorted by magnitude, without entries below least_i, which enter no product. Terms r_ik b_kj
- * below least_i are left out: each gives terms z_hi r_ik b_kj of Z R B that are below the bound of those that
- * may be. */
+/* Row i of R (A - B), sorted by magnitude, without entries below least_i, which enter no product. Terms r_ik
+ * a_kj below least_i are left out: each gives terms z_hi r_ik a_kj of Z R A that are below the bound of those
+ * that may be. B is NULL, or R is diagonal. */
 typedef struct scaled_rows {
     const csr *R;
-    const term_rows *B;
+    const term_rows *A, *B;
     const float *least;
-    bool sorted; /* rows of B are sorted by magnitude */
 } scaled_rows;
+
+/* to = r times the terms of row k of A that are not below least_i; returns their number. */
+static size_t scale_row(const scaled_rows *s, uint64_t e, size_t i, bool sorted, row_term *to) {
+    const uint32_t k = s->R->indices[e];
+    const float r = s->R->data[e], least = s->least[i] / fabsf(r);
+    const row_term *from = s->A->row[k], *const last = from + s->A->length[k];
+    size_t used = 0;
+    for (; from < last && !(sorted && fabsf(from->value) < least); from++) {
+        to[used] = (row_term){from->column, r * from->value};
+        used += fabsf(from->value) >= least;
+    }
+    return used;
+}
 
 static lam_status make_scaled(const void *context, size_t i, row_work *w, lam_error *error) {
     lam_status status = LAM_OK;
     const scaled_rows *s = context;
+    const uint64_t e = s->R->indptr[i];
+    row_term *to = NULL;
+    w->count = 0;
+    if (s->least[i] == INFINITY) goto done;
+    if (s->B == NULL) {
+        TRY(row_work_room(w, 0, s->A->length[s->R->indices[e]], &to, error));
+        const size_t used = scale_row(s, e, i, false, w->spare);
+        row_terms_sort(used, w->spare, to);
+        w->done[0].used += used;
+    } else {
+        add_difference(w, s->A, s->B, i);
+        TRY(row_work_room(w, 0, w->count, &to, error));
+        w->done[0].used += take_sorted(w, s->R->data[e], s->least[i], to);
+    }
+done:
+    for (size_t k = 0; status != LAM_OK && k < w->count; k++) w->sums[w->columns[k]] = 0;
+    return status;
+}
+
+/* Rows of A are sorted by magnitude. */
+static lam_status make_coupled(const void *context, size_t i, row_work *w, lam_error *error) {
+    lam_status status = LAM_OK;
+    const scaled_rows *s = context;
     const uint64_t begin = s->R->indptr[i], end = s->R->indptr[i + 1];
     row_term *to = NULL;
-    size_t used = 0;
     w->count = 0;
     if (s->least[i] == INFINITY) goto done;
     if (end - begin == 1) {
-        const uint32_t k = s->R->indices[begin];
-        const float r = s->R->data[begin], least = s->least[i] / fabsf(r);
-        const row_term *from = s->B->row[k];
-        TRY(row_work_room(w, 0, s->B->length[k], &to, error));
-        row_term *const found = s->sorted ? to : w->spare;
-        for (size_t e = 0; e < s->B->length[k]; e++) {
-            const bool kept = fabsf(from[e].value) >= least;
-            if (s->sorted && !kept) break;
-            found[used] = (row_term){from[e].column, r * from[e].value};
-            used += kept;
-        }
-        if (!s->sorted) row_terms_sort(used, w->spare, to);
-    } else {
-        for (uint64_t e = begin; e < end; e++) {
-            const uint32_t k = s->R->indices[e];
-            const float r = s->R->data[e], least = s->least[i] / fabsf(r);
-            const row_term *from = s->B->row[k], *const last = from + s->B->length[k];
-            for (; from < last && fabsf(from->value) >= least; from++)
-                row_work_add(w, from->column, r * from->value);
-        }
-        TRY(row_work_room(w, 0, w->count, &to, error));
-        for (size_t k = 0; k < w->count; k++) {
-            const uint32_t j = w->columns[k];
-            w->spare[used] = (row_term){j, w->sums[j]};
-            used += fabsf(w->sums[j]) >= s->least[i];
-            w->sums[j] = 0;
-        }
-        row_terms_sort(used, w->spare, to);
+        TRY(row_work_room(w, 0, s->A->length[s->R->indices[begin]], &to, error));
+        w->done[0].used += scale_row(s, begin, i, true, to);
+        goto done;
     }
-    w->done[0].used += used;
+    for (uint64_t e = begin; e < end; e++) {
+        const uint32_t k = s->R->indices[e];
+        const float r = s->R->data[e], least = s->least[i] / fabsf(r);
+        const row_term *from = s->A->row[k], *const last = from + s->A->length[k];
+        for (; from < last && fabsf(from->value) >= least; from++)
+            row_work_add(w, from->column, r * from->value);
+    }
+    TRY(row_work_room(w, 0, w->count, &to, error));
+    w->done[0].used += take_sorted(w, 1, s->least[i], to);
 done:
     for (size_t k = 0; status != LAM_OK && k < w->count; k++) w->sums[w->columns[k]] = 0;
     return status;
@@ -173,21 +199,22 @@ static lam_status scale_rows(const doubling *d, const term_rows *A, const term_r
                              term_rows *out, lam_error *error) {
     lam_status status = LAM_OK;
     float most = 0;
-    for (uint64_t e = 0; e < d->R.indptr[d->R.n]; e++) most = fmaxf(most, fabsf(d->R.data[e]));
     term_rows less = {.n = 0};
-    const difference_rows difference = {A, B, smallest / most, d->coupled};
-    const rows_pass subtract = pass_of(d, make_difference, &difference);
-    const bool made = B != NULL || d->coupled;
-    if (made) TRY(term_rows_make(&subtract, &less, error));
-    const scaled_rows scaled = {&d->R, made ? &less : A, d->least, d->coupled};
-    const rows_pass scale = pass_of(d, make_scaled, &scaled);
+    if (d->coupled) {
+        for (uint64_t e = 0; e < d->R.indptr[d->R.n]; e++) most = fmaxf(most, fabsf(d->R.data[e]));
+        const difference_rows difference = {A, B, smallest / most};
+        const rows_pass subtract = pass_of(d, make_difference, &difference);
+        TRY(term_rows_make(&subtract, &less, error));
+    }
+    const scaled_rows scaled = {&d->R, d->coupled ? &less : A, d->coupled ? NULL : B, d->least};
+    const rows_pass scale = pass_of(d, d->coupled ? make_coupled : make_scaled, &scaled);
     TRY(term_rows_make(&scale, out, error));
 done:
     term_rows_free(&less);
     return status;
 }
 
-/* Row i of Z R Z, and of K + Z R Z + Z R (K - Z). */
+/* Row i of Z R Z, and of K + Z R Z + Z R (K - Z); RD without rows: K = Z. */
 typedef struct product_rows {
     const term_rows *K, *Z, *RZ, *RD;
     float keep, skip;
@@ -229,7 +256,7 @@ static lam_status make_products(const void *context, size_t i, row_work *w, lam_
         used += fabsf(w->sums[j]) > p->keep;
     }
     w->done[0].used += used;
-    add_product(w, length, p->Z->row[i], p->RD, p->skip);
+    if (p->RD->n > 0) add_product(w, length, p->Z->row[i], p->RD, p->skip);
     for (size_t e = 0; e < p->K->length[i]; e++)
         row_work_add(w, p->K->row[i][e].column, p->K->row[i][e].value);
     TRY(row_work_room(w, 1, w->count, &to, error));
@@ -295,11 +322,13 @@ static lam_status double_bounces(doubling *d, term_rows *K, term_rows *Z, lam_er
     term_rows RZ = {.n = 0}, RD = {.n = 0}, next[ROW_OUTPUTS] = {{.n = 0}};
     const float smallest = find_least(last, skip, input->n_threads, d->least);
     TRY(scale_rows(d, last, NULL, smallest, &RZ, error));
-    TRY(scale_rows(d, K, last, smallest, &RD, error));
+    if (last != K) TRY(scale_rows(d, K, last, smallest, &RD, error));
     const product_rows product = {K, last, &RZ, &RD, input->inner * input->threshold, skip};
     rows_pass multiply = pass_of(d, make_products, &product);
     multiply.n_outputs = ROW_OUTPUTS;
     multiply.stage = d->stage;
+    multiply.spent[0] = K;
+    multiply.spent[1] = last != K ? Z : NULL;
     TRY(term_rows_make(&multiply, next, error));
     term_rows_free(Z);
     term_rows_free(K);
@@ -323,7 +352,9 @@ static lam_status run(doubling *d, csr *out, wavelet_inverse_report *report, lam
     for (size_t i = 0; i < n; i++)
         for (uint64_t e = d->R.indptr[i]; e < d->R.indptr[i + 1]; e++)
             d->R.data[e] *= d->weight[i] * d->weight[d->R.indices[e]];
+    csr_free(&upper);
     TRY(csr_mirror(input->S, "operator", &S, error));
+    if (input->last) csr_free(input->S);
     const light_rows light = {&S, d->weight};
     const rows_pass start = pass_of(d, make_light, &light);
     TRY(term_rows_make(&start, &K, error));

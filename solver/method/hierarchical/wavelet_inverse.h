@@ -11,9 +11,12 @@
 #include "solver/linalg/csr.h"
 #include "solver/operator/wavelet/wavelets.h"
 
+#include <stdbool.h>
+
 typedef struct wavelet_inverse_input {
     const wavelets *basis;
-    const csr *S;
+    csr *S;
+    bool last;           /* nobody needs S afterwards: it is freed on the way */
     const float *rho;    /* [n], by position, in [0, 1) */
     const float *weight; /* [n_nodes] */
     float threshold;     /* K_ij is kept above threshold weight_i weight_j */

@@ -9,8 +9,8 @@
 enum { ROWS_AT_ONCE = 256 };
 
 void term_rows_free(term_rows *a) {
-    for (size_t k = 0; a->stores != NULL && k < a->n_stores; k++) free(a->stores[k]);
-    free(a->stores);
+    for (size_t k = 0; a->blocks != NULL && k < a->n_blocks; k++) free(a->blocks[k]);
+    free(a->blocks);
     free(a->row);
     free(a->length);
     *a = (term_rows){.n = 0};
@@ -58,37 +58,52 @@ lam_status row_work_room(row_work *w, size_t output, size_t count, row_term **ou
     return status;
 }
 
-/* Where rows are while stores grow: an offset in the store of the thread that made the block. */
-typedef struct row_places {
-    uint32_t *owner;               /* [blocks] */
-    uint64_t *offset[ROW_OUTPUTS]; /* [n] */
-} row_places;
-
-static lam_status make_block(const rows_pass *pass, size_t block, row_work *w, const row_places *at,
-                             term_rows *out, lam_error *error) {
+/* Moves the rows of a block that are done into memory of their size. */
+static lam_status keep_block(const row_store *done, size_t block, size_t first, size_t last, term_rows *out,
+                             lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t last = (block + 1) * ROWS_AT_ONCE < pass->n ? (block + 1) * ROWS_AT_ONCE : pass->n;
-    for (size_t i = block * ROWS_AT_ONCE; i < last; i++) {
-        for (size_t o = 0; o < pass->n_outputs; o++) at->offset[o][i] = w->done[o].used;
-        TRY(pass->make(pass->context, i, w, error));
-        for (size_t o = 0; o < pass->n_outputs; o++)
-            out[o].length[i] = (uint32_t)(w->done[o].used - at->offset[o][i]);
-    }
+    size_t used = 0;
+    if (done->used == 0) return LAM_OK;
+    TRY(array_resize(&out->blocks[block], done->used, sizeof *done->terms, "wavelets", error));
+    memcpy(out->blocks[block], done->terms, done->used * sizeof *done->terms);
+    for (size_t i = first; i < last; used += out->length[i++])
+        if (out->length[i] > 0) out->row[i] = out->blocks[block] + used;
 done:
     return status;
 }
 
-/* Takes the stores over from the threads. */
-static void take_stores(const rows_pass *pass, const row_places *at, size_t o, term_rows *out) {
-    for (size_t k = 0; k < pass->n_threads; k++) {
-        out->stores[k] = pass->works[k].done[o].terms;
-        pass->works[k].done[o] = (row_store){.used = 0};
+/* Frees the terms of a block, whose rows are then empty. */
+static void spend_block(term_rows *a, size_t block, size_t first, size_t last) {
+    free(a->blocks[block]);
+    a->blocks[block] = NULL;
+    for (size_t i = first; i < last; i++) {
+        a->row[i] = NULL;
+        a->length[i] = 0;
     }
-    for (size_t i = 0; i < pass->n; i++)
-        out->row[i] = out->length[i] > 0 ? out->stores[at->owner[i / ROWS_AT_ONCE]] + at->offset[o][i] : NULL;
 }
 
-static lam_status make_all(const rows_pass *pass, const row_places *at, term_rows *made, lam_error *error) {
+static lam_status make_block(const rows_pass *pass, size_t block, row_work *w, term_rows *out,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t first = block * ROWS_AT_ONCE,
+                 last = first + ROWS_AT_ONCE < pass->n ? first + ROWS_AT_ONCE : pass->n;
+    for (size_t o = 0; o < pass->n_outputs; o++) w->done[o].used = 0;
+    for (size_t i = first; i < last; i++) {
+        size_t before[ROW_OUTPUTS];
+        for (size_t o = 0; o < pass->n_outputs; o++) before[o] = w->done[o].used;
+        TRY(pass->make(pass->context, i, w, error));
+        for (size_t o = 0; o < pass->n_outputs; o++)
+            out[o].length[i] = (uint32_t)(w->done[o].used - before[o]);
+    }
+    for (size_t o = 0; o < ROW_OUTPUTS; o++)
+        if (pass->spent[o] != NULL) spend_block(pass->spent[o], block, first, last);
+    for (size_t o = 0; o < pass->n_outputs; o++)
+        TRY(keep_block(&w->done[o], block, first, last, &out[o], error));
+done:
+    return status;
+}
+
+static lam_status make_all(const rows_pass *pass, term_rows *made, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t blocks = (pass->n + ROWS_AT_ONCE - 1) / ROWS_AT_ONCE;
     int failed = 0;
@@ -102,8 +117,7 @@ static lam_status make_all(const rows_pass *pass, const row_places *at, term_row
         for (size_t block = 0; block < blocks; block++) {
             lam_error one = {.message = ""};
             if (__atomic_load_n(&failed, __ATOMIC_RELAXED)) continue;
-            at->owner[block] = (uint32_t)mine;
-            lam_status now = make_block(pass, block, &pass->works[mine], at, made, &one);
+            lam_status now = make_block(pass, block, &pass->works[mine], made, &one);
 #pragma omp critical(wavelet_terms_progress)
             {
                 n_done++;
@@ -125,33 +139,21 @@ lam_status term_rows_make(const rows_pass *pass, term_rows *out, lam_error *erro
     lam_status status = LAM_OK;
     const size_t n = pass->n, blocks = (n + ROWS_AT_ONCE - 1) / ROWS_AT_ONCE;
     term_rows made[ROW_OUTPUTS] = {{.n = 0}};
-    row_places at = {.owner = memory_allocate(blocks, sizeof *at.owner, "wavelets", error)};
-    if (at.owner == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t o = 0; o < pass->n_outputs; o++) {
-        at.offset[o] = memory_allocate(n, sizeof *at.offset[o], "wavelets", error);
-        made[o] = (term_rows){
-            .n = n,
-            .n_stores = pass->n_threads,
-            .row = memory_allocate(n, sizeof *made[o].row, "wavelets", error),
-            .length = memory_allocate(n, sizeof *made[o].length, "wavelets", error),
-            .stores = memory_allocate(pass->n_threads, sizeof *made[o].stores, "wavelets", error)};
-        if (at.offset[o] == NULL || made[o].row == NULL || made[o].length == NULL || made[o].stores == NULL)
-            TRY(LAM_ERR_MEMORY);
+        made[o] = (term_rows){.n = n,
+                              .n_blocks = blocks,
+                              .row = memory_allocate(n, sizeof *made[o].row, "wavelets", error),
+                              .length = memory_allocate(n, sizeof *made[o].length, "wavelets", error),
+                              .blocks = memory_allocate(blocks, sizeof *made[o].blocks, "wavelets", error)};
+        if (made[o].row == NULL || made[o].length == NULL || made[o].blocks == NULL) TRY(LAM_ERR_MEMORY);
     }
-    for (size_t k = 0; k < pass->n_threads; k++)
-        for (size_t o = 0; o < ROW_OUTPUTS; o++) pass->works[k].done[o].used = 0;
-    TRY(make_all(pass, &at, made, error));
+    TRY(make_all(pass, made, error));
     for (size_t o = 0; o < pass->n_outputs; o++) {
-        take_stores(pass, &at, o, &made[o]);
         out[o] = made[o];
         made[o] = (term_rows){.n = 0};
     }
 done:
-    free(at.owner);
-    for (size_t o = 0; o < ROW_OUTPUTS; o++) {
-        free(at.offset[o]);
-        term_rows_free(&made[o]);
-    }
+    for (size_t o = 0; o < ROW_OUTPUTS; o++) term_rows_free(&made[o]);
     return status;
 }
 

@@ -1,5 +1,5 @@
 /* Sparse matrices on their way through products: rows of columns and values side by side, made in parallel
- * and left where the threads wrote them. It knows nothing of wavelets or light. */
+ * block by block of rows. It knows nothing of wavelets or light. */
 #ifndef LAMBERT_METHOD_HIERARCHICAL_WAVELET_TERMS_H
 #define LAMBERT_METHOD_HIERARCHICAL_WAVELET_TERMS_H
 
@@ -13,12 +13,12 @@ typedef struct row_term {
     float value;
 } row_term;
 
-/* Row i is row[i][0 .. length[i] - 1], in no order of columns; the rows lie in the stores of the threads. */
+/* Row i is row[i][0 .. length[i] - 1], in no order of columns; the rows of a block lie behind each other. */
 typedef struct term_rows {
-    size_t n, n_stores;
+    size_t n, n_blocks;
     row_term **row;    /* [n] */
     uint32_t *length;  /* [n] */
-    row_term **stores; /* [n_stores] */
+    row_term **blocks; /* [n_blocks] */
 } term_rows;
 
 void term_rows_free(term_rows *a);
@@ -37,7 +37,7 @@ typedef struct row_store {
     size_t used, capacity;
 } row_store;
 
-/* The working area of a thread: the row that it sums up and the rows that are done. */
+/* The working area of a thread: the row that it sums up and the rows of its block that are done. */
 typedef struct row_work {
     float *sums;       /* [n], all 0 between rows */
     uint32_t *columns; /* [n + ROW_SPARE], those where sums are not 0 */
@@ -74,6 +74,9 @@ typedef struct rows_pass {
     const void *context;
     const progress *progress; /* asked for cancellation */
     const char *stage;        /* under which the share of rows is reported; NULL: it is not */
+    /* Matrices of which row i of the outputs takes row i alone, apart, or NULL: their terms are freed block
+       by block as they are used up, and the caller frees the rest. */
+    term_rows *spent[ROW_OUTPUTS];
 } rows_pass;
 
 /* out [n_outputs]: all rows; the bits do not depend on the number of threads. Errors: LAM_ERR_MEMORY,

@@ -147,6 +147,73 @@ START_TEST(a_pass_that_fails_leaves_its_outputs) {
 }
 END_TEST
 
+/* Row i of A + B, of two matrices that are used up. */
+typedef struct summed {
+    const term_rows *a, *b;
+    size_t fails;
+} summed;
+
+static lam_status make_sum(const void *context, size_t i, row_work *w, lam_error *e) {
+    lam_status status = LAM_OK;
+    const summed *s = context;
+    row_term *to = NULL;
+    w->count = 0;
+    if (i == s->fails) FAIL(e, LAM_ERR_NUMERIC, "row %zu", i);
+    for (size_t k = 0; k < s->a->length[i]; k++)
+        row_work_add(w, s->a->row[i][k].column, s->a->row[i][k].value);
+    for (size_t k = 0; k < s->b->length[i]; k++)
+        row_work_add(w, s->b->row[i][k].column, s->b->row[i][k].value);
+    TRY(row_work_room(w, 0, w->count, &to, e));
+    for (size_t k = 0; k < w->count; k++) {
+        to[k] = (row_term){w->columns[k], w->sums[w->columns[k]]};
+        w->sums[w->columns[k]] = 0;
+    }
+    w->done[0].used += w->count;
+done:
+    return status;
+}
+
+/* Matrices that are used up are empty afterwards, and what is left of them after a failure can be freed. */
+START_TEST(used_up_rows_are_freed) {
+    uint64_t state = 6;
+    double *a = random_matrix(&state), *sum = test_allocate((size_t)N * N, sizeof *sum);
+    const square s = {a, N};
+    for (size_t n_threads = 1; n_threads <= 3; n_threads += 2)
+        for (int fails = 0; fails < 2; fails++) {
+            row_work *works = NULL;
+            term_rows from[2], found = {.n = 0};
+            ck_ok(row_works_make(N, n_threads, &works, &error));
+            const rows_pass first = pass_of(n_threads, works, &s);
+            ck_ok(term_rows_make(&first, from, &error));
+            for (size_t i = 0; i < (size_t)N * N; i++) sum[i] = 0;
+            for (size_t i = 0; i < N; i++)
+                for (int o = 0; o < 2; o++)
+                    for (size_t k = 0; k < from[o].length[i]; k++)
+                        sum[i * N + from[o].row[i][k].column] += (double)from[o].row[i][k].value;
+            const summed both = {&from[0], &from[1], fails == 1 ? 700 : N};
+            const rows_pass second = {.n = N,
+                                      .n_threads = n_threads,
+                                      .n_outputs = 1,
+                                      .works = works,
+                                      .make = make_sum,
+                                      .context = &both,
+                                      .spent = {&from[0], &from[1]}};
+            ck_assert_int_eq(term_rows_make(&second, &found, &error), fails == 1 ? LAM_ERR_NUMERIC : LAM_OK);
+            /* One rounding of a sum below N. */
+            if (fails == 0) compare(&found, sum, 6e-8 * N);
+            for (int o = 0; o < 2; o++)
+                if (fails == 0) ck_assert_uint_eq(term_rows_count(&from[o]), 0);
+            for (size_t k = 0; k < found.n_blocks; k++)
+                for (int o = 0; o < 2; o++) ck_assert_ptr_null(from[o].blocks[k]);
+            for (int o = 0; o < 2; o++) term_rows_free(&from[o]);
+            term_rows_free(&found);
+            row_works_free(works, n_threads);
+        }
+    free(a);
+    free(sum);
+}
+END_TEST
+
 /* A sum that cancels keeps its place and is not listed again. */
 START_TEST(sums_that_cancel_are_listed_once) {
     row_work *works = NULL;
@@ -195,6 +262,7 @@ int main(void) {
     tcase_set_timeout(tests, 120);
     tcase_add_test(tests, rows_are_those_of_any_threads);
     tcase_add_test(tests, a_pass_that_fails_leaves_its_outputs);
+    tcase_add_test(tests, used_up_rows_are_freed);
     tcase_add_test(tests, sums_that_cancel_are_listed_once);
     tcase_add_test(tests, terms_are_sorted_to_an_eighth);
     suite_add_tcase(suite, tests);
