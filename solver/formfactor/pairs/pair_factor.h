@@ -5,24 +5,8 @@
 #ifndef LAMBERT_FORMFACTOR_PAIRS_PAIR_FACTOR_H
 #define LAMBERT_FORMFACTOR_PAIRS_PAIR_FACTOR_H
 
+#include "solver/formfactor/pairs/pair_rules.h"
 #include "solver/formfactor/pairs/polygon.h"
-
-enum { GAUSS_NODES_MOST = 24, GAUSS_RULES = 7, CUBATURE_RULES = 4, STEEP_NODES = 105 };
-
-/* Nodes on [0, 1] and their weights. */
-typedef struct gauss_rule {
-    int n;
-    double node[GAUSS_NODES_MOST], weight[GAUSS_NODES_MOST];
-} gauss_rule;
-
-/* Integration rules; immutable after pair_factor_rules_init. */
-typedef struct pair_factor_rules {
-    gauss_rule gauss[GAUSS_RULES]; /* 1, 2, 3, 4, 8, 16, 24 nodes */
-    /* tanh-sinh (Takahasi and Mori 1974), for integrands that are steep at an end */
-    double steep_node[STEEP_NODES], steep_weight[STEEP_NODES];
-} pair_factor_rules;
-
-void pair_factor_rules_init(pair_factor_rules *rules);
 
 /* q: a product rule of nodes x nodes points on each polygon keeps the relative tolerance where the centres
  * are 1 + q radii of the larger polygon apart. */

@@ -1,4 +1,5 @@
 /* Unoccluded form factors by quadrature, against published closed forms. */
+#include "solver/base/vector3.h"
 #include "solver/formfactor/pairs/pair_factor.h"
 #include "support/suite.h"
 
@@ -167,6 +168,133 @@ START_TEST(halves_sum_to_the_whole) {
 }
 END_TEST
 
+/* Double integral of ln r^2 over two edges, slowly: a closed form over the second, and over the first 8 Gauss
+ * nodes on each of many intervals, which halve towards its ends and the places where it is nearest to the
+ * line of the second and to its ends. The last are 2^-40 of the whole, which leaves 1e-12 of it. */
+static double slow_edges(const pair_factor_rules *rules, const double *from, const double *to,
+                         const double *other_from, const double *other_to) {
+    enum { RULE = 5, LEVELS = 40 };
+    const gauss_rule *g = &rules->gauss[RULE];
+    double along[3], other[3], v[3], places[5] = {0, 1};
+    int n = 2;
+    subtract3(to, from, along);
+    subtract3(other_to, other_from, other);
+    subtract3(other_from, from, v);
+    const double own = dot3(along, along), across = dot3(other, other), both = dot3(along, other);
+    const double candidates[3] = {dot3(v, along) / own, (dot3(v, along) + both) / own,
+                                  (dot3(v, along) * across - dot3(v, other) * both) /
+                                      (own * across - both * both)};
+    for (int c = 0; c < 3; c++) {
+        int at = n;
+        if (!(candidates[c] > 1e-12 && candidates[c] < 1 - 1e-12)) continue;
+        for (; places[at - 1] > candidates[c]; at--) places[at] = places[at - 1];
+        places[at] = candidates[c];
+        n++;
+    }
+    double sum = 0;
+    for (int piece = 0; piece + 1 < n; piece++)
+        for (int k = -LEVELS; k < LEVELS; k++) {
+            const double width = places[piece + 1] - places[piece];
+            const double low = k == -LEVELS ? 0 : k < 0 ? ldexp(1, k - 1) : 1 - ldexp(1, -k - 1);
+            const double high = k < 0 ? ldexp(1, k) : k + 1 == LEVELS ? 1 : 1 - ldexp(1, -k - 2);
+            for (int q = 0; q < g->n; q++) {
+                const double s = places[piece] + width * (low + (high - low) * g->node[q]);
+                double r[3];
+                for (int d = 0; d < 3; d++) r[d] = from[d] + s * along[d] - other_from[d];
+                const double length = sqrt(across), a = dot3(r, other) / length, b = length - a;
+                for (int d = 0; d < 3; d++) r[d] -= a * other[d] / length;
+                const double h = sqrt(dot3(r, r)), from2 = a * a + h * h, to2 = b * b + h * h;
+                sum += g->weight[q] * width * (high - low) *
+                       ((to2 > 0 ? b * log(to2) : 0) + (from2 > 0 ? a * log(from2) : 0) - 2 * length +
+                        2 * h * atan2(h * length, h * h - a * b));
+            }
+        }
+    return sum * sqrt(own);
+}
+
+/* A_a F_ab by the contour integral, slowly; terms: sum of the magnitudes of its terms, whose rounding it has.
+ */
+static double slow_exchange(const pair_factor_rules *rules, const polygon *one, const polygon *two,
+                            double *terms) {
+    polygon a, b;
+    double sum = 0;
+    *terms = 0;
+    polygon_in_front(one, two, &a);
+    polygon_in_front(two, one, &b);
+    for (int i = 0; i < a.n; i++)
+        for (int j = 0; j < b.n; j++) {
+            const double *const ends[4] = {a.corner[i], a.corner[(i + 1) % a.n], b.corner[j],
+                                           b.corner[(j + 1) % b.n]};
+            double u[3], v[3];
+            subtract3(ends[1], ends[0], u);
+            subtract3(ends[3], ends[2], v);
+            if (!(dot3(u, u) > 0 && dot3(v, v) > 0)) continue;
+            const double cosine = dot3(u, v) / sqrt(dot3(u, u) * dot3(v, v));
+            /* The grading above takes the nearest point of lines, which parallel ones lack. */
+            const double term =
+                cosine == 0 ? 0 : cosine * slow_edges(rules, ends[0], ends[1], ends[2], ends[3]);
+            sum += term / (4 * acos(-1));
+            *terms += fabs(term);
+        }
+    return sum;
+}
+
+/* The corners of a triangle beside another one. */
+typedef struct neighbour_case {
+    const char *name;
+    double corner[3][3];
+} neighbour_case;
+
+/* Triangles that share an edge, nearly flat as in a fine bowl or folded, that share a corner, that meet in
+ * a corner and the middle of an edge, that cross the other's plane, and that are near, with edges that are
+ * nearly parallel: against a slow integral, to the tolerance. */
+START_TEST(near_pairs_keep_the_tolerance) {
+    static const double flat[3][3] = {{0, 0, 0}, {1, 0, 0}, {.3, .9, 0}};
+    static const neighbour_case cases[] = {
+        {"edge, nearly flat", {{1, 0, 0}, {0, 0, 0}, {.6, -.8, .02}}},
+        {"edge, very flat", {{1, 0, 0}, {0, 0, 0}, {.6, -.8, 3e-4}}},
+        {"edge, upright", {{1, 0, 0}, {0, 0, 0}, {.4, 0, .9}}},
+        {"edge, folded", {{1, 0, 0}, {0, 0, 0}, {.4, .8, .2}}},
+        {"edge, narrow", {{1, 0, 0}, {0, 0, 0}, {.98, -.03, .01}}},
+        {"corner", {{0, 0, 0}, {-.9, .2, .3}, {-.3, -.8, .4}}},
+        {"corner, nearly flat", {{1, 0, 0}, {1.2, -.9, .03}, {1.9, .1, .02}}},
+        {"corner in an edge", {{.45, 0, 0}, {.1, -.9, .5}, {.9, -.7, .6}}},
+        {"crossing", {{1.2, 0, -.4}, {1.4, .9, .3}, {1.3, -.5, .8}}},
+        {"near", {{.2, -.05, .02}, {.8, -.06, .03}, {.5, -.7, .2}}},
+        {"above", {{.1, .1, .05}, {.3, .7, .06}, {.9, .2, .07}}},
+        {"parallel but for .03", {{.97, -.1, .01}, {.0, -.13, .012}, {.5, -.8, .1}}},
+        {"parallel but for .002", {{1, -.1, .02}, {0, -.102, .02}, {.5, -.8, .1}}},
+        {"parallel but for 5e-4", {{1, -.1, .02}, {0, -.1005, .02}, {.5, -.8, .1}}},
+        {"parallel but for 1e-5", {{1, -.1, .02}, {0, -.10001, .02}, {.5, -.8, .1}}},
+        {"parallel but for 1e-9", {{1, -.1, .02}, {0, -.100000001, .02}, {.5, -.8, .1}}},
+    };
+    pair_factor_rules rules;
+    pair_factor_rules_init(&rules);
+    const polygon a = make(3, flat);
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        polygon b = make(3, cases[k].corner);
+        if (dot3(b.normal, a.centre) < dot3(b.normal, b.centre)) {
+            double turned[3][3];
+            for (int c = 0; c < 3; c++) memcpy(turned[c], cases[k].corner[2 - c], sizeof turned[c]);
+            b = make(3, (const double(*)[3])turned);
+        }
+        double terms;
+        const double slow = slow_exchange(&rules, &a, &b, &terms);
+        ck_assert_double_gt(slow, 0);
+        for (double tolerance = 1e-8; tolerance < .1; tolerance *= 100) {
+            const double found = pair_factor_exchange(&rules, &a, &b, tolerance),
+                         back = pair_factor_exchange(&rules, &b, &a, tolerance);
+            /* Some dozen roundings of each of the terms. */
+            const double allowed = tolerance * slow + 12 * DBL_EPSILON * terms;
+            ck_assert_msg(fabs(found - slow) <= allowed, "%s: %.12g, slowly %.12g, tolerance %g",
+                          cases[k].name, found, slow, tolerance);
+            ck_assert_msg(fabs(back - slow) <= allowed, "%s: back %.12g, slowly %.12g, tolerance %g",
+                          cases[k].name, back, slow, tolerance);
+        }
+    }
+}
+END_TEST
+
 /* The halves fill the polygon, and the areas that its points stand for sum to its own: by the midpoint
  * rule, which is exact for areas linear in u and w, as those of a bilinear quad are. */
 START_TEST(pieces_and_points_fill_the_polygon) {
@@ -222,6 +350,7 @@ int main(void) {
     tcase_add_test(cases, room_and_small_elements);
     tcase_add_test(cases, what_is_behind_is_not_seen);
     tcase_add_loop_test(cases, halves_sum_to_the_whole, 0, 2);
+    tcase_add_test(cases, near_pairs_keep_the_tolerance);
     tcase_add_test(cases, pieces_and_points_fill_the_polygon);
     tcase_add_test(cases, scale_and_place);
     suite_add_tcase(suite, cases);
