@@ -133,10 +133,13 @@ lam_status form_factors_expand(form_factors *f, const double *area, lam_error *e
 /* The inverse of form_factors_expand, exact: expanded again, the rows have the same bits. */
 lam_status form_factors_gather(form_factors *f, const double *area, lam_error *error);
 
-/* Rays per second of all threads, measured for some hundredths of a second on some elements: for a forecast.
- * order and errors as for form_factors_make. */
-lam_status form_factors_ray_rate(const mesh *m, const uint32_t *order, double *rays_per_second,
-                                 lam_error *error);
+/* Rays that all threads cast for some hundredths of a second from some elements: for a forecast. */
+typedef struct ray_trial {
+    double rays, seconds, processor_seconds; /* of all threads together */
+} ray_trial;
+
+/* order and errors as for form_factors_make. */
+lam_status form_factors_try_rays(const mesh *m, const uint32_t *order, ray_trial *out, lam_error *error);
 
 /* seen[k]: the number of elements that elements[k] sees by the recipe, RECIPE_RAYS or RECIPE_HEMICUBE:
  * entries of its row before the two estimates of a pair are merged, as in Aguerre 2016, table 4.1. The

@@ -345,23 +345,21 @@ done:
     return status;
 }
 
-lam_status form_factors_ray_rate(const mesh *m, const uint32_t *order, double *rays_per_second,
-                                 lam_error *error) {
-    enum { ELEMENTS = 256, RAYS = 512, LONG_ENOUGH = 16 };
-    static const double trial_seconds = .02;
+lam_status form_factors_try_rays(const mesh *m, const uint32_t *order, ray_trial *out, lam_error *error) {
+    enum { ELEMENTS = 256, RAYS = 512, LONG_ENOUGH = 32 };
+    static const double trial_seconds = .04;
     lam_status status = LAM_OK;
     visibility *v = NULL;
     TRY(visibility_create(m, &v, error));
     rays_cast_some(m, v, order, ELEMENTS, VISIBILITY_PACKET); /* starts threads and fills caches */
-    size_t cast = 0;
-    const double started = clock_seconds();
-    double seconds = 0;
-    for (int k = 0; k < LONG_ENOUGH && seconds < trial_seconds; k++) {
+    const double started = clock_seconds(), used = clock_processor_seconds();
+    *out = (ray_trial){.rays = 0};
+    for (int k = 0; k < LONG_ENOUGH && out->seconds < trial_seconds; k++) {
         rays_cast_some(m, v, order, ELEMENTS, RAYS);
-        cast += ELEMENTS * RAYS;
-        seconds = clock_seconds() - started;
+        out->rays += ELEMENTS * RAYS;
+        out->seconds = fmax(clock_seconds() - started, 1e-6);
     }
-    *rays_per_second = (double)cast / fmax(seconds, 1e-6);
+    out->processor_seconds = fmax(clock_processor_seconds() - used, 1e-6);
 done:
     visibility_destroy(v);
     return status;

@@ -65,14 +65,17 @@ typedef struct method_forecast {
     double building; /* at the peak, while the operator is made */
     double loaded;   /* by the operator in memory, in single precision where its kind can be narrowed */
     double stored;   /* by its arrays in the store, likewise */
+    double seconds;  /* of a processor, while it is made; 0: not known */
 } method_forecast;
 
 /* The size of a build, as far as it is known before. */
 typedef struct method_scale {
     double n, n_channels;
-    double noise;      /* of S, 2-norm; 0: none */
-    double n_emitters; /* 0: none, or not read yet */
-    double n_blocks;   /* of form factors; 0: they are rows */
+    double noise;        /* of S, 2-norm; 0: none */
+    double n_emitters;   /* 0: none, or not read yet */
+    double n_blocks;     /* of form factors; 0: they are rows */
+    double single_share; /* of the blocks: that of pairs of elements */
+    double entries;      /* of the rows; 0: not known */
 } method_scale;
 
 struct decision;

@@ -35,13 +35,23 @@ double forecast_bytes(const forecast *f);
 /* LAM_ERR_MEMORY when that passes limit; the message names the option that would make it fit. */
 lam_status forecast_check(const forecast *f, double limit, lam_error *error);
 
-/* Seconds that the form factors take, those of the judge's own samples, and its solves: from a
- * sample of the pairs, or from the measured rays per second, and from constants for the rest of the work of a
- * thread, which were measured once. */
+/* The pace of this machine, as short trials have it (machine_pace.h, ray_trial). */
+typedef struct forecast_rates {
+    double ray_seconds; /* processor seconds of a ray in this scene */
+    double slowness;    /* over the machine that the constants are of */
+    double processors;  /* that the process gets */
+} forecast_rates;
+
+/* Processor seconds of the stages: of the form factors and of the judge's own samples from a sample of their
+ * work, or from the cost of a ray; of the operator, 0 where its method does not tell, and of the judge's
+ * solves from constants. */
 typedef struct forecast_times {
-    double form_factors, judge, solves;
+    double form_factors, operate, judge, solves;
 } forecast_times;
-forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n_threads);
+forecast_times forecast_seconds(const forecast *f, const forecast_rates *rates);
+
+/* Seconds of a clock on the wall. */
+double forecast_wall_seconds(double processor_seconds, const forecast_rates *rates);
 
 /* Rays cast from one element; a hemicube is a ray for each of its pixels. Bytes: of the rows
  * of a merged sample, of packed rows, of one tile of a sky, of the judge's two samples, of the

@@ -1,4 +1,4 @@
-/* Seconds that form factors and the judge take. Bytes as text. */
+/* Seconds that form factors, the operator and the judge take. Bytes as text. */
 #include "solver/method/judge.h"
 #include "solver/method/reference.h"
 #include "solver/precompute/forecast.h"
@@ -6,23 +6,38 @@
 #include <math.h>
 #include <stdio.h>
 
-/* Processor seconds per pair, beside rays: packing, merging, some 30 sweeps, expanding; and of pair by pair.
- */
-static const double merge_seconds = 1.2e-7, pair_seconds = 4e-7, block_seconds = 1.2e-6;
+/* Processor seconds per entry of the triangle, beside rays: packing, merging, sweeps, expanding; of a
+ * row of rays; of pair by pair; of a block, found, sorted and balanced. */
+static const double merge_seconds = 6e-8, row_seconds = 2.4e-5, pair_seconds = 4e-7, block_seconds = 1.2e-6;
+/* Entries of the triangle per ray where no sample tells: many rays hit what others hit. */
+static const double ray_entries = .3;
 
-static double sample_seconds(double n, const recipe *r, double rays_per_second, double n_threads) {
+static bool is_counted(const forecast *f) {
+    return f->cost.measured > 0;
+}
+
+/* Of one sample by a recipe. entries: of the triangle, of f->recipe by its sample, or 0. */
+static double sample_seconds(double n, const recipe *r, double entries, const forecast_rates *rates) {
     const double pairs = n * n / 2;
-    if (r->method == RECIPE_PAIRS) return pairs * pair_seconds / n_threads;
-    if (r->method == RECIPE_BLOCKS) return forecast_blocks(n, r) * block_seconds / n_threads;
-    const double rays = forecast_rays(n, r), entries = fmin(pairs, n * rays);
-    return n * rays / rays_per_second + entries * merge_seconds / n_threads;
+    if (r->method == RECIPE_PAIRS) return pairs * pair_seconds * rates->slowness;
+    if (r->method == RECIPE_BLOCKS) return forecast_blocks(n, r) * block_seconds * rates->slowness;
+    const double rays = n * forecast_rays(n, r);
+    const double merged = entries > 0 ? entries : fmin(pairs, ray_entries * rays);
+    return rays * rates->ray_seconds + (n * row_seconds + merged * merge_seconds) * rates->slowness;
+}
+
+/* Blocks that a sample found, or those of a law. */
+static double blocks_of(const forecast *f, const recipe *r) {
+    const double n = (double)f->n, law = forecast_blocks(n, r);
+    if (!is_counted(f) || f->recipe.method != RECIPE_BLOCKS) return law;
+    return f->cost.entries / 2 * law / forecast_blocks(n, &f->recipe);
 }
 
 /* Single elements that defaults take on average. */
 static const double probes_expected = 48;
-/* Processor seconds of a probe, per block and per element, with its direct light: of two Cornell boxes
- * (10,249 and 163,811 elements), what the judge takes beside finding its blocks. */
-static const double probe_block_seconds = 2.2e-8, probe_element_seconds = 2e-8;
+/* Processor seconds of a probe, per block and per element, with its direct light: of three Cornell boxes
+ * (10,249 to 163,811 elements), rooms, a maze and a patio, what the judge takes beside finding its blocks. */
+static const double probe_block_seconds = 1.1e-8, probe_element_seconds = 1e-7;
 
 /* Three references: the form factors of the operator, for the probes of the first round, and two others. */
 static double solve_seconds(const forecast *f) {
@@ -30,30 +45,50 @@ static double solve_seconds(const forecast *f) {
     const double probes = (f->probes_least > 0 ? fmin(most, probes_expected) : most) + others;
     if (f->recipe.method == RECIPE_BLOCKS)
         return (double)f->n_channels * probes *
-               (probe_block_seconds * forecast_blocks(n, &f->judge_recipe) + probe_element_seconds * n);
+               (probe_block_seconds * blocks_of(f, &f->judge_recipe) + probe_element_seconds * n);
     const double own = f->cost.entries > 0 ? f->cost.entries : forecast_rows_bytes(n, &f->recipe) / 8;
-    const double entries = forecast_rows_bytes(n, &f->judge_recipe) / 8;
+    const double entries = f->cost.entries > 0 ? own : forecast_rows_bytes(n, &f->judge_recipe) / 8;
     return (double)f->n_channels * (reference_seconds(n, own, fmin(probes, JUDGE_AT_ONCE)) +
                                     2 * reference_seconds(n, entries, probes));
 }
 
-forecast_times forecast_seconds(const forecast *f, double rays_per_second, int n_threads) {
+static double operator_seconds(const forecast *f) {
+    method_forecast made = {.building = 0};
     const double n = (double)f->n;
+    if (f->method == NULL) return 0;
+    const method_scale scale = {.n = n,
+                                .n_channels = (double)f->n_channels,
+                                .noise = recipe_noise(&f->recipe),
+                                .n_emitters = (double)f->emitters,
+                                .n_blocks = f->recipe.method == RECIPE_BLOCKS ? blocks_of(f, &f->recipe) : 0,
+                                .single_share = f->cost.single_share,
+                                .entries = f->cost.entries > 0 ? f->cost.entries
+                                                               : forecast_rows_bytes(n, &f->recipe) / 8};
+    f->method->forecast(&scale, method_own_const(f->build, f->method), &made);
+    return made.seconds;
+}
+
+forecast_times forecast_seconds(const forecast *f, const forecast_rates *rates) {
+    const double n = (double)f->n;
+    const recipe *own = &f->recipe, *of_judge = &f->judge_recipe;
     forecast_times times = {0};
     /* Of rays alone the measured rate says more than the fixed cost of one. */
-    const bool counted = f->cost.seconds > 0 && f->recipe.method != RECIPE_RAYS;
-    const double once =
-        counted ? f->cost.seconds / n_threads : sample_seconds(n, &f->recipe, rays_per_second, n_threads);
-    const bool finer = f->recipe.method == RECIPE_BLOCKS; /* the judge's blocks */
-    const double more = finer ? forecast_blocks(n, &f->judge_recipe) / forecast_blocks(n, &f->recipe) : 1;
-    const double half =
-        counted ? once * more : sample_seconds(n, &f->judge_recipe, rays_per_second, n_threads);
+    const bool rays = own->method == RECIPE_RAYS, counted = is_counted(f) && !rays;
+    const double entries = rays ? f->cost.entries / 2 : 0;
+    const double once = counted ? f->cost.measured : sample_seconds(n, own, entries, rates);
+    const bool finer = own->method == RECIPE_BLOCKS; /* the judge's blocks */
+    const double more = finer ? blocks_of(f, of_judge) / blocks_of(f, own) : 1;
+    const double half = counted ? once * more : sample_seconds(n, of_judge, entries / 2, rates);
     if (!f->from_store)
-        times.form_factors =
-            f->streamed && !counted ? n * forecast_rays(n, &f->recipe) / rays_per_second : once;
+        times.form_factors = f->streamed && !counted ? n * forecast_rays(n, own) * rates->ray_seconds : once;
+    times.operate = operator_seconds(f) * rates->slowness;
     if (f->probes > 0) times.judge = (finer ? 1 : 2) * half + (f->streamed ? once : 0);
-    if (f->probes > 0) times.solves = solve_seconds(f) / n_threads;
+    if (f->probes > 0) times.solves = solve_seconds(f) * rates->slowness;
     return times;
+}
+
+double forecast_wall_seconds(double processor_seconds, const forecast_rates *rates) {
+    return processor_seconds / rates->processors;
 }
 
 void forecast_format_bytes(double bytes, char text[32]) {

@@ -94,40 +94,6 @@ static void log_form_factors(precompute_state *state) {
                       100 * f->absorbed_share);
 }
 
-/* Logs the forecast; fails where the disks have no room. */
-static lam_status announce(precompute_state *state, lam_error *error) {
-    lam_status status = LAM_OK;
-    const precompute_options *o = state->options;
-    const forecast f = state_forecast(state, (double)state->m.n);
-    char memory[32], stored[32], seconds[32], judging[32], scratch_room[32];
-    char made[64] = "", judged[64] = "", kept[64] = "";
-    double rate;
-    TRY(forecast_check_disk(&f, o->output, state->scratch, o->scratch, error));
-    if (state->t->quiet || (o->from_store && state->probes == 0)) goto done;
-    TRY(form_factors_ray_rate(&state->m, state->order, &rate, error));
-    const forecast_times times = forecast_seconds(&f, rate, omp_get_max_threads());
-    forecast_format_bytes(forecast_bytes(&f), memory);
-    forecast_format_bytes(forecast_store_bytes(&f), stored);
-    forecast_format_bytes(forecast_scratch_bytes(&f), scratch_room);
-    clock_format_seconds(times.form_factors, seconds);
-    clock_format_seconds(times.judge + times.solves, judging);
-    /* The share of partly hidden pairs is not known before, but for a sample. */
-    const bool pairs = state->cost.seconds == 0 &&
-                       (state->recipe.method == RECIPE_PAIRS || state->recipe.method == RECIPE_NEAR_PAIRS);
-    if (!o->from_store) snprintf(made, sizeof made, " form factors %s%s,", seconds, pairs ? " or more" : "");
-    /* Answers of the operator come on top. */
-    if (state->probes > 0)
-        snprintf(judged, sizeof judged, " the judge %s%s,", judging,
-                 state->cost.seconds > 0 ? "" : " or more");
-    if (state->scratch != NULL) snprintf(kept, sizeof kept, ", scratch up to %s", scratch_room);
-    terminal_log(state->t, "forecast:%s%s at %.3g Mray/s of a trial; memory up to %s, store up to %s%s", made,
-                 judged, rate * 1e-6, memory, stored, kept);
-    if (state->large)
-        terminal_log(state->t, "rows are kept in %s, as memory is too small for them", o->scratch);
-done:
-    return status;
-}
-
 void state_log_kept(precompute_state *state, const form_factors *f) {
     if (f->rows_kept > 0)
         terminal_log(state->t, "%zu of %zu rows were in %s already", f->rows_kept, state->m.n,
@@ -181,10 +147,18 @@ static void list_unused(const precompute_state *state, const option_result *give
     }
 }
 
+/* Processor seconds since *used, which becomes now. */
+static double since(double *used) {
+    const double before = *used;
+    *used = clock_processor_seconds();
+    return *used - before;
+}
+
 /* Form factors, unless they are there, operator and judge. */
 static lam_status run_trial(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
-    double started = clock_seconds();
+    const bool first = state->trial.count == 0;
+    double started = clock_seconds(), used = clock_processor_seconds();
     const bool made = state->f.row_sums != NULL;
     if (!made) {
         TRY(state->recipe.method == RECIPE_BLOCKS ? stage_blocks(state, error)
@@ -192,10 +166,12 @@ static lam_status run_trial(precompute_state *state, lam_error *error) {
                                                   : stage_form_factors(state, error));
         log_stage(state, state->streamed ? "near pairs" : "form factors", started);
     }
-    if (!state->streamed && state->trial.count == 0) log_form_factors(state);
+    if (first) state->spent.form_factors = since(&used);
+    if (!state->streamed && first) log_form_factors(state);
 
     TRY(stage_operator(state, error));
-    if (state->streamed && state->trial.count == 0) log_form_factors(state);
+    if (first) state->spent.operate = since(&used);
+    if (state->streamed && first) log_form_factors(state);
     TRY(terminal_check(error));
 
     if (state->probes > 0) {
@@ -203,6 +179,7 @@ static lam_status run_trial(precompute_state *state, lam_error *error) {
         TRY(stage_judge(state, error));
         log_stage(state, "judge", started);
     }
+    if (first) state->spent.judge = since(&used);
     TRY(terminal_check(error));
 done:
     return status;
@@ -222,6 +199,7 @@ static lam_status run_trials(precompute_state *state, lam_error *error) {
         TRY(status);
     } while (state_next_trial(state));
     state_report_trials(state);
+    state_log_times(state);
     state_advise(state);
     status = LAM_OK;
 done:
@@ -234,7 +212,8 @@ lam_status precompute_run(const precompute_options *options, const option_result
     precompute_state state = state_begin(options, t);
     if (options_given(given, "epsilon")) state.trial.asked = options->build.epsilon;
 
-    double started = clock_seconds();
+    double started = state.started = clock_seconds();
+    state.started_used = clock_processor_seconds();
     TRY(options->from_store ? stage_load_store(&state, error) : stage_load_scene(&state, error));
     log_stage(&state, "import", started);
     TRY(terminal_check(error));
@@ -245,7 +224,7 @@ lam_status precompute_run(const precompute_options *options, const option_result
     TRY(terminal_check(error));
 
     TRY(stage_open_scratch(&state, error));
-    TRY(announce(&state, error));
+    TRY(stage_forecast(&state, error));
     TRY(run_trials(&state, error));
 
     if (state_compresses(options)) {
@@ -261,6 +240,8 @@ lam_status precompute_run(const precompute_options *options, const option_result
     scratch_close(state.scratch, true);
     state.scratch = NULL;
     result->report = state.built;
+    result->forecast = state.expected_times;
+    result->spent = state.spent;
     memcpy(result->advice, state.advice, sizeof result->advice);
     list_unused(&state, given, result->unused);
 done:

@@ -4,6 +4,7 @@
 
 #include "solver/base/terminal.h"
 #include "solver/method/choice.h"
+#include "solver/precompute/forecast.h"
 #include "solver/scene/mesh.h"
 
 /* The options, as the rows of precompute_tables_make fill them; texts point into argv. The members after
@@ -24,6 +25,8 @@ typedef struct precompute_options {
     uint64_t threads, memory;      /* memory: bytes; 0: 70 % of what is free */
     const char *scratch;           /* a folder, or NULL */
     uint64_t seed, probes;         /* probes: OPTION_AUTO */
+    uint64_t trials;               /* of an --epsilon that is kept, at most */
+    double time;                   /* seconds; 0: no limit */
     bool quiet, progress;
     const char *input;
     bool from_store;
@@ -65,6 +68,7 @@ typedef struct precompute_result {
     build_report report;
     char unused[256];
     char advice[256];
+    forecast_times forecast, spent; /* processor seconds of the stages: the forecast, and the truth */
 } precompute_result;
 lam_status precompute_run(const precompute_options *options, const option_result *given, terminal *t,
                           precompute_result *result, lam_error *error);

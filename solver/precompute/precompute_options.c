@@ -3,6 +3,7 @@
 #include "solver/daylight/sky_tiles.h"
 #include "solver/formfactor/recipe.h"
 #include "solver/precompute/precompute.h"
+#include "solver/precompute/trial.h"
 #include "solver/scene/mesh_options.h"
 
 #include <assert.h>
@@ -182,6 +183,22 @@ static const option_row resource_rows[] = {
      .most = 1e6,
      .help = "Single elements that the error is measured with; auto: 200, or 32 above 10240 elements; 0: no "
              "measurement"},
+    {.name = "trials",
+     .kind = OPTION_COUNT,
+     .offset = FIELD(trials),
+     .argument = "N",
+     .preset = "3",
+     .least = 1,
+     .most = TRIALS_MOST,
+     .help = "Operators that are built at most until the error that --epsilon asks for is kept"},
+    {.name = "time",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(time),
+     .argument = "SECONDS",
+     .otherwise = "as long as it takes",
+     .above = true,
+     .help = "Take the form factors, rays and epsilon of the smallest error that is forecast to be ready "
+             "within this time on this machine, the judge included, and log the options that stand for them"},
     {0},
 };
 

@@ -39,6 +39,8 @@ enum { PROBES_LEAST = 32 };
 
 typedef struct precompute_state {
     const precompute_options *options;
+    precompute_options chosen;    /* with --time: the options, once it has chosen the recipe */
+    double started, started_used; /* by the clock, and by processor seconds */
     terminal *t;
     progress progress;
     double memory;    /* bytes */
@@ -71,11 +73,22 @@ typedef struct precompute_state {
     error_report errors;
     trial_course trial;
     char advice[ERROR_ADVICE_BYTES]; /* on them; "" where there is none */
+    forecast_rates rates;            /* of the machine; processors is 0 before they are measured */
+    forecast_times expected_times,
+        spent; /* processor seconds of the first trial: the forecast and the truth */
 } precompute_state;
 
 /* The state at the beginning of a precompute; frees it: precompute.c. */
 precompute_state state_begin(const precompute_options *options, terminal *t);
 void state_free(precompute_state *state);
+
+/* Measures the rates of the machine, once, and the processors that the run has had so far, anew:
+ * stage_forecast.c. The forecast in the log: fails where the disks
+ * have no room. The forecast of the stages beside their times, in the log. */
+lam_status state_measure_rates(precompute_state *state, lam_error *error);
+void state_update_processors(precompute_state *state);
+lam_status stage_forecast(precompute_state *state, lam_error *error);
+void state_log_times(const precompute_state *state);
 
 /* Says how many rows were in the scratch folder already. */
 void state_log_kept(precompute_state *state, const form_factors *f);
@@ -103,6 +116,19 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error);
 
 /* Opens the folder for rows where one was given and is needed. */
 lam_status stage_open_scratch(precompute_state *state, lam_error *error);
+
+/* --time: forecasts the recipes that are possible, and goes on with the options of the best that fits, or of
+ * the cheapest, with a warning: stage_budget.c. */
+lam_status stage_budget(precompute_state *state, lam_error *error);
+
+/* All pairs, as defaults take them where they can: stage_scene.c. */
+recipe state_pairs_recipe(const precompute_state *state);
+
+/* The first method that builds from blocks. True where blocks are possible, of which the tree is made; fails
+ * where they were asked for and cannot be had: stage_blocks.c. */
+const build_method *state_method_of_blocks(void);
+lam_status state_blocks_possible(precompute_state *state, const build_method *method, bool *possible,
+                                 lam_error *error);
 
 /* Blocks of form factors: false where options or the number n of elements rule them out; the recipe of blocks
  * in place of that of state where they are asked for, where rows do not fit into memory, or where blocks cost

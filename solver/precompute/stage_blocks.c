@@ -57,16 +57,31 @@ static lam_status check_asked(const precompute_state *state, const build_method 
     return LAM_OK;
 }
 
-/* The first method that can build from blocks. */
-static const build_method *method_of_blocks(void) {
+const build_method *state_method_of_blocks(void) {
     size_t k = 0;
     while (method_at(k) != NULL && !(method_at(k)->flags & METHOD_BLOCKS)) k++;
     return method_at(k);
 }
 
+lam_status state_blocks_possible(precompute_state *state, const build_method *method, bool *possible,
+                                 lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = state->options;
+    const bool asked = strcmp(o->form_factors, "blocks") == 0;
+    *possible = false;
+    if (!asked && (state_compresses(o) || state->m.n < ELEMENTS_LEAST)) goto done;
+    TRY(make_tree(state, error));
+    TRY(find_possible(state, possible, error));
+    if (!asked) goto done;
+    TRY(check_asked(state, method, true, *possible, error));
+    *possible = true;
+done:
+    return status;
+}
+
 /* The cost of the recipe so far, which is not blocks. Rays alone are enough to know where these cost more
  * than blocks. */
-static lam_status find_other_cost(precompute_state *state, const blocks_cost *blocks, pairs_cost *out,
+static lam_status find_other_cost(precompute_state *state, const pairs_cost *blocks, pairs_cost *out,
                                   lam_error *error) {
     lam_status status = LAM_OK;
     const recipe rays = {.method = RECIPE_RAYS, .rays = state->recipe.rays};
@@ -81,14 +96,14 @@ done:
 }
 
 /* The rays that a sky takes beside blocks. */
-static lam_status add_sky(precompute_state *state, const recipe *blocks, blocks_cost *cost,
-                          lam_error *error) {
+static lam_status add_sky(precompute_state *state, const recipe *blocks, pairs_cost *cost, lam_error *error) {
     lam_status status = LAM_OK;
     const recipe rays = {.method = RECIPE_RAYS, .rays = blocks->rays};
     pairs_cost of_rays;
     if (state->options->sky == NULL) return LAM_OK;
     TRY(pairs_forecast(&state->m, &rays, &state->progress, &of_rays, error));
     cost->seconds += of_rays.seconds;
+    cost->measured += of_rays.measured;
 done:
     return status;
 }
@@ -98,8 +113,7 @@ static lam_status weigh(precompute_state *state, const recipe *blocks, bool *tak
     lam_status status = LAM_OK;
     const recipe *other = &state->recipe;
     const double times = other->method == RECIPE_PAIRS ? 1 : times_rays;
-    blocks_cost cost;
-    pairs_cost least;
+    pairs_cost cost, least;
     char time[32], other_time[32], what[64];
     TRY(blocks_forecast(&state->m, &state->tree, blocks, &state->progress, &cost, error));
     TRY(add_sky(state, blocks, &cost, error));
@@ -110,7 +124,7 @@ static lam_status weigh(precompute_state *state, const recipe *blocks, bool *tak
     recipe_describe(other, what);
     terminal_log(state->t, "blocks of clusters are %s: about %s of one thread, by a sample of them; %s: %s",
                  *taken ? "taken instead" : "not taken", time, what, other_time);
-    if (*taken) state->cost = (pairs_cost){.seconds = cost.seconds, .entries = 2 * cost.blocks};
+    if (*taken) state->cost = cost;
 done:
     return status;
 }
@@ -121,7 +135,7 @@ lam_status state_choose_blocks(precompute_state *state, const build_method *meth
     const precompute_options *o = state->options;
     const bool asked = strcmp(o->form_factors, "blocks") == 0, able = (method->flags & METHOD_BLOCKS) != 0;
     bool possible = false;
-    const build_method *built = able ? method : method_of_blocks();
+    const build_method *built = able ? method : state_method_of_blocks();
     if (!state_may_have_blocks(state, (double)state->m.n) || built == NULL) return LAM_OK;
     if (final && !able && !asked) return LAM_OK;
     TRY(make_tree(state, error));
@@ -159,7 +173,7 @@ lam_status state_load_blocks(precompute_state *state, store *s, lam_error *error
              "%s: its form factors are blocks of clusters, and %s%s needs rows; precompute the scene with "
              "--form-factors rays",
              o->input, asked == state->expected->name ? "--method " : "", asked);
-    if (!(state->expected->flags & METHOD_BLOCKS)) state->expected = method_of_blocks();
+    if (!(state->expected->flags & METHOD_BLOCKS)) state->expected = state_method_of_blocks();
     TRY(form_factors_load_blocks(s, &state->m, &state->tree, &state->blocks, &state->f, error));
 done:
     return status;

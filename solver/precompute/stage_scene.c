@@ -198,6 +198,11 @@ recipe state_near_recipe(const precompute_state *state) {
     return choice_recipe(&asked, false);
 }
 
+recipe state_pairs_recipe(const precompute_state *state) {
+    const choice_request asked = request_of(state);
+    return choice_recipe(&asked, true);
+}
+
 recipe state_judge_recipe(const precompute_state *state, uint64_t seed) {
     const choice_request asked = request_of(state);
     recipe of = state->recipe;
@@ -424,10 +429,14 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
     if (refinement.subdivide_levels > 0 || refinement.max_edge > 0 || refinement.elements > 0)
         TRY(mesh_refine(&state->m, &refinement, error));
     if (o->two_sided) TRY(mesh_make_two_sided(&state->m, error));
-    TRY(choose_final_recipe(state, error));
     state->order = memory_allocate(state->m.n, sizeof *state->order, "the order of the elements", error);
     if (state->order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&state->m, state->order, error));
+    if (o->time > 0) {
+        TRY(stage_budget(state, error));
+        o = state->options;
+    }
+    TRY(choose_final_recipe(state, error));
     state->probes = o->probes != OPTION_AUTO ? o->probes : PROBES;
     if (state->probes > state->m.n) state->probes = state->m.n;
     if (o->emitters != NULL) {

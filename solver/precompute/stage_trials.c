@@ -128,7 +128,7 @@ bool state_next_trial(precompute_state *state) {
         return false;
     all->count++;
     const bool better = all->best.op == NULL || error < error_of(&all->best.errors);
-    const bool again = error > all->asked && all->count < TRIALS_MOST && turn(state, &from, &next);
+    const bool again = error > all->asked && all->count < state->options->trials && turn(state, &from, &next);
     if (again) trial_describe(&from, &next, knobs);
     terminal_log(state->t, "trial %zu: the indirect error of %s is stated as %.2g, --epsilon asks for %g%s%s",
                  all->count, g == &state->errors.lights ? "the scene's own lights" : "random emission", error,

@@ -27,8 +27,13 @@ static const option_row json_rows[] = {
     {0},
 };
 
-/* The answer of `lambert info --json`, with the path of the store, the seconds of each stage, and the advice
- * on its errors where there is one. */
+static json_t *times_json(const forecast_times *t) {
+    return json_pack("{s:f, s:f, s:f}", "form factors", t->form_factors, "operator", t->operate, "judge",
+                     t->judge + t->solves);
+}
+
+/* The answer of `lambert info --json`, with the path of the store, the seconds of each stage, the processor
+ * seconds of the main ones as forecast and as taken, and the advice on its errors where there is one. */
 static lam_status print_json(const char *path, const terminal *t, const precompute_result *result,
                              lam_error *error) {
     lam_status status = LAM_OK;
@@ -41,6 +46,9 @@ static lam_status print_json(const char *path, const terminal *t, const precompu
         json_object_set_new(seconds, t->done[k].name, json_real(t->done[k].seconds));
     json_object_set_new(about, "output", json_string(path));
     json_object_set(about, "seconds", seconds);
+    json_object_set_new(about, "processor_seconds", times_json(&result->spent));
+    if (result->forecast.form_factors + result->forecast.judge > 0)
+        json_object_set_new(about, "forecast_processor_seconds", times_json(&result->forecast));
     if (result->advice[0] != '\0') json_object_set_new(about, "advice", json_string(result->advice));
     text = json_dumps(about, JSON_INDENT(2));
     if (text == NULL) FAIL(error, LAM_ERR_MEMORY, "%s: not enough memory to describe it", path);
@@ -91,6 +99,30 @@ static char *command_line(int argc, char **argv) {
     return text;
 }
 
+/* --time chooses these itself, or they need time that it does not forecast. */
+static int check_time(const precompute_options *o, const option_result *given) {
+    static const char *const chosen[] = {"epsilon", "rays", "quality", "resolution", "trials"};
+    static const char *const not_forecast[] = {"emitters", "scratch"};
+    const build_method *method = method_find(o->build.method);
+    if (!(o->time > 0)) return 0;
+    for (size_t i = 0; i < sizeof chosen / sizeof *chosen; i++)
+        if (options_given(given, chosen[i]))
+            return options_usage(command.name, "--time chooses --%s: give one of the two", chosen[i]);
+    for (size_t i = 0; i < sizeof not_forecast / sizeof *not_forecast; i++)
+        if (options_given(given, not_forecast[i]))
+            return options_usage(command.name, "--time: is not supported together with --%s",
+                                 not_forecast[i]);
+    if (o->from_store)
+        return options_usage(command.name, "--time: a store has its form factors already; precompute from "
+                                           "its scene instead");
+    if (strcmp(o->form_factors, "hemicube") == 0)
+        return options_usage(command.name, "--time: is not supported together with --form-factors hemicube");
+    if (method != NULL && !(method->flags & METHOD_BLOCKS))
+        return options_usage(command.name, "--time: is not supported together with --method %s",
+                             method->name);
+    return 0;
+}
+
 /* 0, or the status of wrong usage where arguments do not go together. */
 static int check_together(const precompute_options *o, const option_result *given) {
     static const char *const of_mesh[] = {"subdivide", "max-edge", "elements", "unit", "up", "two-sided"};
@@ -118,6 +150,7 @@ static int check_together(const precompute_options *o, const option_result *give
         return options_usage(command.name, "--resolution %" PRIu64 ": must be even", o->resolution);
     if (!o->from_store && same_file(o->input, o->output))
         return options_usage(command.name, "-o %s: is the scene itself", o->output);
+    if (check_time(o, given) != 0) return 2;
     if (is_other_file(o->output))
         return options_usage(command.name,
                              "-o %s: there is a file that is not a store; give another name or remove it",

@@ -232,7 +232,7 @@ class Forecast(unittest.TestCase):
             must("generate", "box", "--divisions", "3", "-o", scene)
             said = must("precompute", scene, "-o", store, "--rays", "1000", "--scratch", folder).stderr
             line = next(line for line in said.splitlines() if line.startswith("forecast: "))
-            self.assertRegex(line, r"^forecast: form factors [\d.]+ s, the judge [\d.]+ s or more, at [\d.e+]+ Mray/s of a trial; "
+            self.assertRegex(line, r"^forecast: form factors [\d.]+ s, the judge [\d.]+ s, at [\d.e+-]+ Mray/s of [\d.]+ processors; "
                                    r"memory up to \d+M, store up to \d+M, scratch up to \d+M$")
             self.assertLess(said.index(line), said.index("form factors  "))
 

@@ -283,7 +283,7 @@ static lam_status decide(block_walk *w, uint32_t a, uint32_t b, double elements,
     return split_for_smoothness(w, a, b, behind, &mine);
 }
 
-/* All of the pair, or where pairs are sampled one of so many, which counts for as many. */
+/* All of the pair, or where pairs are sampled one of so many. */
 static lam_status visit(block_walk *w, uint32_t a, uint32_t b, const candidates *among) {
     lam_status status = LAM_OK;
     block_sampling *s = &w->sampling;
@@ -299,9 +299,8 @@ static lam_status visit(block_walk *w, uint32_t a, uint32_t b, const candidates 
     s->stage = stage;
     status = decide(w, a, b, elements, among);
     s->stage = before;
-    const block_report found = w->report;
+    block_report_add(&w->report, 1, &s->part[stage]);
     w->report = so_far;
-    block_report_add(&found, (double)one_of, &w->report);
     return status;
 }
 

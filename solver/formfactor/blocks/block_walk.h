@@ -45,12 +45,14 @@ typedef struct block_list {
 } block_list;
 
 /* A sample of the descent (Knuth 1975, estimating the size of a tree): of pairs of nodes with at most
- * limit[k] pairs of elements one of two is visited and counts twice in the report, for each k anew. The
- * limits fall; none: all are visited. */
+ * limit[k] pairs of elements one of two is visited, for each k anew. The work in stage k, that of pairs below
+ * k limits, stands in part[k] and is a 2^-k of all such work; that in stage 0 is in the report of the walk.
+ * The limits fall; none: all pairs are visited. */
 enum { BLOCK_STAGES_MOST = 8 };
 typedef struct block_sampling {
     double limit[BLOCK_STAGES_MOST];
     int n_stages, stage; /* stages: those passed so far */
+    block_report part[BLOCK_STAGES_MOST + 1];
 } block_sampling;
 
 /* The work of one thread. */

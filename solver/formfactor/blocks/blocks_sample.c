@@ -1,5 +1,6 @@
 #include "solver/formfactor/blocks/blocks_sample.h"
 
+#include "solver/base/clock.h"
 #include "solver/formfactor/blocks/block_walk.h"
 
 #include <math.h>
@@ -11,7 +12,8 @@ static const double first_share = 1. / 1024, next_share = 1. / 4;
 enum { STAGES = 6 };
 
 lam_status blocks_sample(const mesh *m, const visibility *v, const plane_tree *tree,
-                         const block_options *options, block_report *out, lam_error *error) {
+                         const block_options *options, block_report *out, blocks_trial *trial,
+                         lam_error *error) {
     lam_status status = LAM_OK;
     block_factors nodes = {.n = 0};
     uint32_t *roots = NULL;
@@ -22,6 +24,7 @@ lam_status blocks_sample(const mesh *m, const visibility *v, const plane_tree *t
     for (int s = 0; s < STAGES; s++) w.sampling.limit[s] = .5 * n * n * first_share * pow(next_share, s);
     TRY(block_finder_make(m, v, tree, options, &nodes, &k, error));
     TRY(block_finder_planes(&k, &roots, &n_roots, error));
+    const double started = clock_thread_seconds();
     for (size_t i = 0; i < n_roots; i++) {
         if (progress_cancelled(options->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         for (size_t j = k.joined ? i : i + 1; j < n_roots; j++) {
@@ -29,7 +32,13 @@ lam_status blocks_sample(const mesh *m, const visibility *v, const plane_tree *t
             w.found.count = 0; /* only the report counts */
         }
     }
+    if (trial != NULL) {
+        *trial = (blocks_trial){.work = w.report, .seconds = clock_thread_seconds() - started};
+        for (int s = 1; s <= STAGES; s++) block_report_add(&w.sampling.part[s], 1, &trial->work);
+        trial->work.joined = k.joined;
+    }
     *out = w.report;
+    for (int s = 1; s <= STAGES; s++) block_report_add(&w.sampling.part[s], (double)(1 << s), out);
     out->joined = k.joined;
 done:
     free(w.found.list);
@@ -46,26 +55,35 @@ static const double visit_seconds = 2.2e-7, sifted_seconds = 4.7e-8, linear_seco
                     cast_seconds = 3e-7;
 /* A pair where elements touch at angles everywhere: a bowl of 40,000 triangles. */
 static const double joined_pair_seconds = 8e-6;
-/* Sorting and balancing a block: what is left of three Cornell boxes (10,249 to 655,418 elements), quiet. */
-static const double finish_seconds = 1.2e-6;
+/* Sorting and balancing, per block and per element: what is left of two Cornell boxes, rooms, a maze and a
+ * patio (8,000 to 40,978 elements). */
+static const double finish_seconds = 6.5e-7, element_seconds = 5e-6;
+
+/* Of the walk alone. */
+static double walk_seconds(const block_report *w) {
+    return w->visits * visit_seconds + w->sifted * sifted_seconds + w->linear * linear_seconds +
+           w->sampled * even_seconds +
+           (w->pairs + w->shaded_pairs) * (w->joined ? joined_pair_seconds : pair_seconds) +
+           w->segments * segment_seconds + w->tests * test_seconds + w->cast * cast_seconds;
+}
 
 lam_status blocks_forecast(const mesh *m, const plane_tree *tree, const recipe *r, const progress *p,
-                           blocks_cost *out, lam_error *error) {
+                           pairs_cost *out, lam_error *error) {
     lam_status status = LAM_OK;
     block_options options = block_options_of(r);
     block_report w;
+    blocks_trial trial;
     visibility *v = NULL;
     options.progress = p;
     TRY(visibility_create(m, &v, error));
-    TRY(blocks_sample(m, v, tree, &options, &w, error));
+    TRY(blocks_sample(m, v, tree, &options, &w, &trial, error));
     const double blocks = w.linear + w.even + w.pairs + w.shaded + w.shaded_pairs;
-    *out = (blocks_cost){.seconds =
-                             w.visits * visit_seconds + w.sifted * sifted_seconds +
-                             w.linear * linear_seconds + w.sampled * even_seconds +
-                             (w.pairs + w.shaded_pairs) * (w.joined ? joined_pair_seconds : pair_seconds) +
-                             w.segments * segment_seconds + w.tests * test_seconds + w.cast * cast_seconds +
-                             blocks * finish_seconds,
-                         .blocks = blocks};
+    const double walk = walk_seconds(&w), finish = blocks * finish_seconds + (double)m->n * element_seconds;
+    const double pace = sample_pace(trial.seconds, walk_seconds(&trial.work));
+    *out = (pairs_cost){.seconds = walk + finish,
+                        .measured = walk * pace + finish,
+                        .entries = 2 * blocks,
+                        .single_share = blocks > 0 ? (w.pairs + w.shaded_pairs) / blocks : 0};
 done:
     visibility_destroy(v);
     return status;

@@ -3,21 +3,23 @@
 #define LAMBERT_FORMFACTOR_BLOCKS_BLOCKS_SAMPLE_H
 
 #include "solver/formfactor/blocks/blocks.h"
+#include "solver/formfactor/pairs/pairs_sample.h"
 
-/* About the report of blocks_find. No clock is read: the same scene has the same figures, for any number of
- * threads. Cost: about a thirtieth of finding the blocks. Errors: LAM_ERR_MEMORY,
- * LAM_ERR_CANCELLED. */
-lam_status blocks_sample(const mesh *m, const visibility *v, const plane_tree *tree,
-                         const block_options *options, block_report *out, lam_error *error);
+/* The walk of a sample: the work that it did, and the processor seconds that this took. */
+typedef struct blocks_trial {
+    block_report work;
+    double seconds;
+} blocks_trial;
 
-typedef struct blocks_cost {
-    double seconds; /* of one thread */
-    double blocks;
-} blocks_cost;
-
-/* The cost of finding blocks by a recipe, from blocks_sample and fixed costs of each kind of work. Errors:
+/* About the report of blocks_find. It reads no clock: the same scene has the same figures, for any number of
+ * threads. trial, or NULL, is of the walk itself. Cost: about a thirtieth of finding the blocks. Errors:
  * LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+lam_status blocks_sample(const mesh *m, const visibility *v, const plane_tree *tree,
+                         const block_options *options, block_report *out, blocks_trial *trial,
+                         lam_error *error);
+
+/* The cost of finding blocks by a recipe, from blocks_sample. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
 lam_status blocks_forecast(const mesh *m, const plane_tree *tree, const recipe *r, const progress *p,
-                           blocks_cost *out, lam_error *error);
+                           pairs_cost *out, lam_error *error);
 
 #endif

@@ -2,6 +2,7 @@
  */
 #include "solver/formfactor/pairs/pairs_sample.h"
 
+#include "solver/base/clock.h"
 #include "solver/formfactor/pairs/cluster_links.h"
 #include "solver/formfactor/pairs/few_occluders.h"
 #include "solver/formfactor/pairs/pair_far.h"
@@ -80,10 +81,10 @@ static void count_row(const sample_run *run, uint32_t position, uint32_t first, 
 }
 
 /* The rows of all links, one after the other, of which every step-th is counted. */
-static void count_rows(const sample_run *run, double n_pairs, pairs_work *work) {
+static void count_rows(const sample_run *run, double n_pairs, pairs_work *work, pairs_trial *trial) {
     enum { WANTED = 40000 };
     const double step = fmax(1, floor(n_pairs / WANTED));
-    double at = 0, rows = 0, taken = 0, next = floor(step / 2);
+    double at = 0, rows = 0, taken = 0, next = floor(step / 2), started = 0, seconds = 0;
     for (size_t k = 0; k < run->links.n; k++) {
         const cluster_link *l = &run->links.links[k];
         const cluster *a = &run->tree.clusters[l->a], *b = &run->tree.clusters[l->b];
@@ -101,9 +102,12 @@ static void count_rows(const sample_run *run, double n_pairs, pairs_work *work) 
                 cluster_shaft_init(&s, a, b, run->few.occluders.slack);
                 link_occluders_find(&run->few.occluders, &s, a, b, &among);
             }
+            started = clock_thread_seconds();
             count_row(run, p, first, b->last, l->open ? NULL : &among, work);
+            seconds += clock_thread_seconds() - started;
         }
     }
+    if (trial != NULL) *trial = (pairs_trial){.work = *work, .seconds = seconds};
     const double scale = taken > 0 ? rows / taken : 0;
     work->tried *= scale;
     work->close *= scale;
@@ -136,7 +140,7 @@ static void scale_to_all(const sample_run *run, pairs_work *work) {
 
 /* The sample of links is a sixty-fourth of the descent, of few elements all of it. */
 lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options *options, pairs_work *out,
-                        lam_error *error) {
+                        pairs_trial *trial, lam_error *error) {
     enum { SAMPLED_FROM = 1500, ONE_OF = 64 };
     lam_status status = LAM_OK;
     const double slack = visibility_rounding(v);
@@ -173,7 +177,7 @@ lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options 
                       *b = &run.tree.clusters[run.links.links[k].b];
         n_pairs += (double)(a->last - a->first) * (double)(b->last - b->first) / (a == b ? 2 : 1);
     }
-    count_rows(&run, n_pairs, &work);
+    count_rows(&run, n_pairs, &work, trial);
     scale_to_all(&run, &work);
     *out = work;
 done:
@@ -218,28 +222,42 @@ done:
     return status;
 }
 
+double sample_pace(double seconds, double expected) {
+    static const double too_short = 1e-3, most = 8;
+    if (!(seconds > too_short) || !(expected > 0)) return 1;
+    return fmin(fmax(seconds / expected, 1 / most), most);
+}
+
+/* Of rows of pairs, without their segments, which the sample does not cast. */
+static double rows_seconds(const pairs_work *w) {
+    return w->tried * tried_seconds + w->close * close_seconds + w->tests * test_seconds +
+           w->sifted * sift_seconds + w->projection * projection_seconds;
+}
+
 lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, pairs_cost *out,
                           lam_error *error) {
     lam_status status = LAM_OK;
     const double threshold = r->method == RECIPE_NEAR_PAIRS ? recipe_near(r) : 0;
     pairs_options options = pairs_options_of(r, m->n, threshold);
     pairs_work w = {0};
+    pairs_trial trial = {.seconds = 0};
     visibility *v = NULL;
     pairs_cost of_rays;
     options.progress = p;
     TRY(rays_forecast(m, r, &of_rays, error));
     if (r->method != RECIPE_RAYS) {
         TRY(visibility_create(m, &v, error));
-        TRY(pairs_sample(m, v, &options, &w, error));
+        TRY(pairs_sample(m, v, &options, &w, &trial, error));
     }
     const double least = w.segments > 0 ? options.segments_least * w.segments / (w.segments + w.saved) : 0;
     const double segments = fmin(fmax(w.segments, least), options.segments_most);
     const double entries = w.seen + of_rays.entries;
-    *out = (pairs_cost){.seconds = w.shafts * shaft_seconds + w.candidates * candidate_seconds +
-                                   w.hidden * hidden_seconds + w.tried * tried_seconds +
-                                   w.close * close_seconds + w.tests * test_seconds +
-                                   w.sifted * sift_seconds + w.projection * projection_seconds +
-                                   segments * segment_seconds + entries * entry_seconds + of_rays.seconds,
+    const double links =
+        w.shafts * shaft_seconds + w.candidates * candidate_seconds + w.hidden * hidden_seconds;
+    const double rows = rows_seconds(&w), rest = segments * segment_seconds + entries * entry_seconds;
+    const double pace = sample_pace(trial.seconds, rows_seconds(&trial.work));
+    *out = (pairs_cost){.seconds = links + rows + rest + of_rays.seconds,
+                        .measured = (links + rows) * pace + rest + of_rays.seconds,
                         .entries = 2 * entries};
 done:
     visibility_destroy(v);

@@ -18,19 +18,32 @@ typedef struct pairs_work {
     double saved;                                 /* that projected pairs would ask for */
 } pairs_work;
 
-/* Counts are the same for any number of threads. Cost: a sixty-fourth of finding links, or all of it for few
- * elements, and some 40,000 pairs of elements. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+/* The rows of pairs that were counted: the work that this did, and the processor seconds that it took. */
+typedef struct pairs_trial {
+    pairs_work work;
+    double seconds;
+} pairs_trial;
+
+/* Counts are the same for any number of threads. trial, or NULL, is of the rows alone. Cost: a sixty-fourth
+ * of finding links, or all of it for few elements, and some 40,000 pairs of elements. Errors: LAM_ERR_MEMORY,
+ * LAM_ERR_CANCELLED. */
 lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options *options, pairs_work *out,
-                        lam_error *error);
+                        pairs_trial *trial, lam_error *error);
+
+/* The processor seconds of a sample over those that fixed costs let expect: the pace of this machine in this
+ * scene, from 1/8 to 8; 1 where the sample was too short to tell. */
+double sample_pace(double seconds, double expected);
 
 typedef struct pairs_cost {
-    double seconds; /* of one thread */
-    double entries; /* of F */
+    double seconds;      /* of one thread, by fixed costs of each kind of work: for a choice */
+    double measured;     /* the same at the pace of the sample on this machine: for a forecast */
+    double entries;      /* of F, or twice the blocks */
+    double single_share; /* of blocks: that of pairs of elements; else 0 */
 } pairs_cost;
 
 /* The cost of form factors by RECIPE_PAIRS, RECIPE_NEAR_PAIRS or RECIPE_RAYS, rays included, from
- * pairs_sample and fixed costs of each kind of work. No clock is read: the same scene has the same figures,
- * however busy the machine is. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+ * pairs_sample. seconds and entries depend on no clock: the same scene has the same figures, however busy the
+ * machine is. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
 lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, pairs_cost *out,
                           lam_error *error);
 

@@ -276,6 +276,29 @@ static const double loaded_bytes = 10, stored_bytes = 2.5, building_bytes = 130,
  * 2,620,549 elements); bytes of one while it is built from blocks: measured 16 to 34 of as many. */
 static const double coefficients_of_block = 3, building_bytes_of_blocks = 60;
 
+/* Processor seconds of the expansion of S per block, per entry of rows and per element, and of the inverse of
+ * a channel per element, per coefficient of S and per pair of coefficients of a row, which its products
+ * multiply: by fits to two Cornell boxes, rooms, a maze, a patio and a city at four epsilons, and to five
+ * scenes by rays. Rows are weighed by other methods first. */
+static const double expand_block_seconds = 2e-7, expand_entry_seconds = 6e-8, expand_element_seconds = 4e-6,
+                    invert_element_seconds = 1e-6, invert_seconds = 4.5e-7, multiply_seconds = 2.5e-9,
+                    multiply_rows_seconds = 7e-9;
+/* Coefficients of S per element, from b blocks per element of which a share are pairs of elements:
+ * 2.2 b^.68 (1 + 1.6 share). At the preset epsilon and above, the seconds are within half as much again; at a
+ * quarter of it those of a Cornell box are twice what it takes. */
+static const double kept_of_blocks = 2.2, power_of_blocks = .68, kept_of_pairs = 1.6;
+
+static double seconds_of(const method_scale *scale, double numbers_of_rows) {
+    const double n = scale->n, blocks = scale->n_blocks;
+    const double of_blocks =
+        kept_of_blocks * pow(blocks / n, power_of_blocks) * (1 + kept_of_pairs * scale->single_share);
+    const double numbers = blocks > 0 ? of_blocks : numbers_of_rows;
+    const double expand = blocks > 0 ? blocks * expand_block_seconds : scale->entries * expand_entry_seconds;
+    const double multiply = blocks > 0 ? multiply_seconds : multiply_rows_seconds;
+    return expand + n * expand_element_seconds +
+           scale->n_channels * n * (invert_element_seconds + numbers * (invert_seconds + numbers * multiply));
+}
+
 static void forecast(const method_scale *scale, const void *own, method_forecast *out) {
     const double epsilon = ((const hierarchical_options *)own)->epsilon, blocks = scale->n_blocks;
     const double of_rows = scale->n * 66 * sqrt(.05 / fmax(epsilon, noise_share * scale->noise));
@@ -283,7 +306,8 @@ static void forecast(const method_scale *scale, const void *own, method_forecast
     *out = (method_forecast){.building = blocks > 0 ? building_bytes_of_blocks * count * scale->n_channels
                                                     : element_bytes * scale->n + building_bytes * count,
                              .loaded = loaded_bytes * count * scale->n_channels,
-                             .stored = stored_bytes * count * scale->n_channels};
+                             .stored = stored_bytes * count * scale->n_channels,
+                             .seconds = seconds_of(scale, of_rows / scale->n)};
 }
 
 static double block_accuracy(const void *own) {

@@ -11,7 +11,7 @@ static const struct {
 } scenes[] = {{"cornell", 6000}, {"rooms", 3000}, {"maze", 2000}, {"atrium", 2000}, {"city", 1500}};
 enum { SCENES = sizeof scenes / sizeof *scenes };
 
-static block_report sample(const mesh *m, int n_threads, block_report *whole) {
+static block_report sample(const mesh *m, int n_threads, block_report *whole, blocks_trial *trial) {
     lam_error error = {.message = ""};
     const block_options options = {.open = blocks_open, .shadow = blocks_shadow, .exact = 1e-5, .seed = 1};
     const int most = omp_get_max_threads();
@@ -21,7 +21,7 @@ static block_report sample(const mesh *m, int n_threads, block_report *whole) {
     ck_ok(visibility_create(m, &v, &error));
     ck_ok(form_factors_tree(m, &tree, &error));
     omp_set_num_threads(n_threads);
-    ck_ok(blocks_sample(m, v, &tree, &options, &found, &error));
+    ck_ok(blocks_sample(m, v, &tree, &options, &found, trial, &error));
     omp_set_num_threads(most);
     if (whole != NULL) {
         block_factors f;
@@ -47,7 +47,8 @@ START_TEST(a_sample_tells_the_work) {
                                   .reflectance = .5};
     mesh m = generate_good(&how);
     block_report whole;
-    const block_report found = sample(&m, 1, &whole), again = sample(&m, 3, NULL);
+    blocks_trial trial;
+    const block_report found = sample(&m, 1, &whole, &trial), again = sample(&m, 3, NULL, NULL);
     check_near(how.kind, "visits", found.visits, whole.visits);
     check_near(how.kind, "pieces", found.sifted, whole.sifted);
     check_near(how.kind, "segments", found.segments, whole.segments);
@@ -57,6 +58,12 @@ START_TEST(a_sample_tells_the_work) {
     ck_assert_double_eq(found.visits, again.visits);
     ck_assert_double_eq(found.sifted, again.sifted);
     ck_assert_double_eq(found.segments, again.segments);
+    /* The walk of the sample did a fraction of the work that it stands for: each pair of nodes below the
+     * first of the limits counts at least twice, and nearly all work is below. */
+    ck_assert_double_gt(trial.seconds, 0);
+    ck_assert_double_gt(trial.work.visits, 0);
+    ck_assert_double_gt(found.visits, 2 * trial.work.visits);
+    ck_assert_double_gt(found.segments, 2 * trial.work.segments);
     mesh_free(&m);
 }
 END_TEST

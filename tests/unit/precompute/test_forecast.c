@@ -97,6 +97,8 @@ START_TEST(kept_blocks_have_room) {
 }
 END_TEST
 
+static const forecast_rates rates = {.ray_seconds = 2e-7, .slowness = 1, .processors = 2};
+
 /* Processor seconds of the judge of closed Cornell boxes at defaults, and those of one thread that a sample
  * expects of their blocks. */
 START_TEST(the_judge_of_blocks_takes_as_long) {
@@ -105,30 +107,72 @@ START_TEST(the_judge_of_blocks_takes_as_long) {
         double blocks, judge;
     } measured[] = {{10249, 1.2, 3.2}, {163811, 3.6, 9.5}};
     for (size_t k = 0; k < sizeof measured / sizeof *measured; k++) {
-        const forecast f = {.n = measured[k].n,
-                            .n_channels = 1,
+        forecast f = {.n = measured[k].n,
+                      .n_channels = 1,
+                      .recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 4e-4},
+                      .judge_recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 2e-4},
+                      .cost = {.seconds = measured[k].blocks, .measured = measured[k].blocks},
+                      .probes = 200,
+                      .probes_least = 32};
+        f.cost.entries = 2 * forecast_blocks((double)f.n, &f.recipe);
+        const forecast_times times = forecast_seconds(&f, &rates);
+        ck_assert_double_eq(times.form_factors, measured[k].blocks);
+        ck_assert_double_ge(times.judge + times.solves, measured[k].judge / 1.5);
+        ck_assert_double_le(times.judge + times.solves, measured[k].judge * 1.5);
+    }
+}
+END_TEST
+
+/* Processor seconds of the hierarchical operator from blocks with the bound of epsilon, as found in closed
+ * Cornell boxes of three channels, rooms and a maze of one: within half as much again. Blocks per element and
+ * the share of pairs of elements are those of a sample. */
+START_TEST(the_operator_takes_as_long) {
+    static const struct {
+        double n, n_channels, blocks, single_share, seconds;
+    } measured[] = {{10249, 3, 98599, .11, .18},  {10249, 3, 801234, .14, .92}, {40978, 3, 436353, .1, .96},
+                    {40978, 3, 1210401, .1, 2.1}, {8004, 1, 894785, .38, .5},   {8001, 1, 486646, .6, .57},
+                    {8006, 3, 1183660, .67, 4.18}};
+    build_options how = build_presets("hierarchical");
+    for (size_t k = 0; k < sizeof measured / sizeof *measured; k++) {
+        const forecast f = {.n = (size_t)measured[k].n,
+                            .n_channels = (size_t)measured[k].n_channels,
                             .recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 4e-4},
                             .judge_recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 2e-4},
-                            .cost = {.seconds = measured[k].blocks},
-                            .probes = 200,
-                            .probes_least = 32};
-        const forecast_times times = forecast_seconds(&f, 1e7, 2);
-        ck_assert_double_ge(2 * (times.judge + times.solves), measured[k].judge / 1.5);
-        ck_assert_double_le(2 * (times.judge + times.solves), measured[k].judge * 1.5);
+                            .cost = {.measured = 1,
+                                     .entries = 2 * measured[k].blocks,
+                                     .single_share = measured[k].single_share},
+                            .method = method_find("hierarchical"),
+                            .build = &how};
+        const forecast_times times = forecast_seconds(&f, &rates);
+        ck_assert_msg(times.operate >= measured[k].seconds / 1.5 &&
+                          times.operate <= measured[k].seconds * 1.5,
+                      "%g elements, %g blocks: %g for %g s", measured[k].n, measured[k].blocks, times.operate,
+                      measured[k].seconds);
     }
 }
 END_TEST
 
 START_TEST(more_work_takes_longer) {
     forecast f = {.n = 100000, .n_channels = 1, .recipe = recipes[1], .judge_recipe = recipes[1]};
-    const forecast_times one = forecast_seconds(&f, 1e7, 2);
-    ck_assert_double_ge(one.form_factors, 100000 * 300 / 1e7);
+    const forecast_times one = forecast_seconds(&f, &rates);
+    forecast_rates slow = rates;
+    ck_assert_double_ge(one.form_factors, 100000. * 300 * 2e-7);
     ck_assert_double_eq(one.judge, 0);
     f.probes = 8;
-    ck_assert_double_eq(forecast_seconds(&f, 1e7, 2).judge, 2 * one.form_factors);
-    ck_assert_double_gt(forecast_seconds(&f, 5e6, 2).form_factors, one.form_factors);
+    ck_assert_double_eq(forecast_seconds(&f, &rates).judge, 2 * one.form_factors);
+    slow.ray_seconds *= 2;
+    ck_assert_double_gt(forecast_seconds(&f, &slow).form_factors, one.form_factors);
+    slow = rates;
+    slow.slowness = 2;
+    ck_assert_double_gt(forecast_seconds(&f, &slow).form_factors, one.form_factors);
+    ck_assert_double_eq(forecast_seconds(&f, &slow).solves, 2 * forecast_seconds(&f, &rates).solves);
+    ck_assert_double_eq(forecast_wall_seconds(3, &rates), 1.5);
+    /* The pace of a sample, where one was taken, in place of constants. */
+    f.recipe = (recipe){.method = RECIPE_PAIRS, .rays = 16, .accuracy = 1e-4};
+    f.cost = (pairs_cost){.seconds = 1, .measured = 7, .entries = 1e6};
+    ck_assert_double_eq(forecast_seconds(&f, &rates).form_factors, 7);
     f.from_store = true;
-    ck_assert_double_eq(forecast_seconds(&f, 1e7, 2).form_factors, 0);
+    ck_assert_double_eq(forecast_seconds(&f, &rates).form_factors, 0);
 }
 END_TEST
 
@@ -175,6 +219,7 @@ int main(void) {
     tcase_add_test(cases, fewer_bits_take_less_of_the_disk);
     tcase_add_test(cases, kept_blocks_have_room);
     tcase_add_test(cases, the_judge_of_blocks_takes_as_long);
+    tcase_add_test(cases, the_operator_takes_as_long);
     tcase_add_test(cases, more_work_takes_longer);
     tcase_add_test(cases, what_does_not_fit_is_refused);
     suite_add_tcase(suite, cases);

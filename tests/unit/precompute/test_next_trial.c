@@ -17,6 +17,7 @@ static void begin(precompute_options *options, terminal *t, precompute_state *st
                                     .quality = "draft",
                                     .rays = OPTION_AUTO,
                                     .probes = 1,
+                                    .trials = TRIALS_MOST,
                                     .build = build_presets("hierarchical")};
     terminal_open(t, "test", true, false);
     *state = state_begin(options, t);

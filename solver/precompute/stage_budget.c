@@ -1,0 +1,234 @@
+/* --time: forecasts of all recipes before the work begins, and the options of the one that is taken. From
+ * there on the run is that of these options, and no clock has a part in it. */
+#include "solver/base/clock.h"
+#include "solver/formfactor/blocks/blocks_sample.h"
+#include "solver/precompute/budget.h"
+#include "solver/precompute/precompute_state.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* Single elements of the judge, unless --probes gives their number, and in the cheapest recipe. */
+enum { PROBES_OF_BUDGET = 32, PROBES_OF_CHEAPEST = 8 };
+/* Of the budget, the share that the forecast may fill: importing, samples and the store take some, too, and
+ * forecasts are right within half as much again. */
+static const double share_filled = .8;
+/* Pairs cost more than these seconds each; above this many elements defaults do not take all of them. */
+static const double pair_least_seconds = 1.5e-7;
+enum { PAIRS_ELEMENTS_MOST = 32768 };
+/* A finer sample of blocks is taken while all blocks of the one before are forecast to take at most this many
+ * budgets. */
+static const double finer_share = 1;
+
+/* Costs of blocks at some accuracies, the coarsest first. */
+enum { SAMPLES_MOST = 3 };
+typedef struct block_costs {
+    size_t count;
+    double accuracy[SAMPLES_MOST];
+    pairs_cost cost[SAMPLES_MOST];
+} block_costs;
+
+static const double sampled_epsilons[SAMPLES_MOST] = {.4, .05, .012};
+/* Blocks as a power of their accuracy where one sample alone tells (forecast_blocks). */
+static const double power_of_accuracy = -.7;
+
+/* The part that all candidates share. */
+typedef struct budget_run {
+    precompute_state *state;
+    const build_method *method;
+    block_costs blocks;
+    pairs_cost rays; /* of RAYS_SAMPLED from each element */
+} budget_run;
+enum { RAYS_SAMPLED = 1024 };
+
+static double accuracy_of(const budget_run *run, double epsilon) {
+    build_options build = run->state->options->build;
+    lam_error none;
+    (void)build_set_number(&build, "epsilon", epsilon, &none);
+    return run->method->block_accuracy(method_own_const(&build, run->method));
+}
+
+/* Of a law y = c x^p through the two samples nearest to an accuracy. */
+static double along(const block_costs *c, double accuracy, double (*figure)(const pairs_cost *)) {
+    size_t k = 0;
+    if (c->count == 1) return figure(&c->cost[0]) * pow(accuracy / c->accuracy[0], power_of_accuracy);
+    while (k + 2 < c->count && accuracy < c->accuracy[k + 1]) k++;
+    const double low = fmax(figure(&c->cost[k]), 1e-9), high = fmax(figure(&c->cost[k + 1]), 1e-9);
+    const double p = log(high / low) / log(c->accuracy[k + 1] / c->accuracy[k]);
+    return low * pow(accuracy / c->accuracy[k], p);
+}
+
+static double measured_of(const pairs_cost *c) {
+    return c->measured;
+}
+
+static double entries_of(const pairs_cost *c) {
+    return c->entries;
+}
+
+static lam_status sample_blocks(budget_run *run, double seconds, lam_error *error) {
+    lam_status status = LAM_OK;
+    precompute_state *state = run->state;
+    block_costs *c = &run->blocks;
+    for (size_t k = 0; k < SAMPLES_MOST; k++) {
+        const recipe r = {.method = RECIPE_BLOCKS,
+                          .rays = recipe_rays_beside_blocks(state->m.n),
+                          .accuracy = accuracy_of(run, sampled_epsilons[k]),
+                          .seed = state->options->seed};
+        TRY(blocks_forecast(&state->m, &state->tree, &r, &state->progress, &c->cost[k], error));
+        c->accuracy[k] = r.accuracy;
+        c->count = k + 1;
+        if (forecast_wall_seconds(c->cost[k].measured, &state->rates) > finer_share * seconds) break;
+    }
+done:
+    return status;
+}
+
+/* The options of a candidate. */
+static lam_status set_options(const budget_recipe *r, const build_method *method, precompute_options *o,
+                              lam_error *error) {
+    o->form_factors = r->kind == BUDGET_BLOCKS ? "blocks" : "rays";
+    if (r->rays > 0) o->rays = r->rays;
+    if (r->quality != NULL) o->quality = r->quality;
+    o->build.method = method->name;
+    o->probes = r->probes;
+    o->trials = 1;
+    return build_set(&o->build, "epsilon", r->epsilon, error);
+}
+
+/* Seconds of a candidate on the wall, or less than 0. */
+static lam_status find_seconds(const budget_run *run, budget_recipe *r, const pairs_cost *of_pairs,
+                               lam_error *error) {
+    lam_status status = LAM_OK;
+    precompute_options options = *run->state->options;
+    precompute_state probe = *run->state; /* a view, never freed */
+    const double n = (double)probe.m.n;
+    TRY(set_options(r, run->method, &options, error));
+    probe.options = &options;
+    probe.expected = run->method;
+    probe.recipe = (recipe){.method = RECIPE_RAYS, .rays = r->rays, .seed = options.seed};
+    if (r->kind == BUDGET_BLOCKS) {
+        probe.recipe.method = RECIPE_BLOCKS;
+        probe.recipe.rays = recipe_rays_beside_blocks(probe.m.n);
+        probe.recipe.accuracy = run->method->block_accuracy(method_own_const(&options.build, run->method));
+        probe.cost = (pairs_cost){.measured = along(&run->blocks, probe.recipe.accuracy, measured_of),
+                                  .entries = along(&run->blocks, probe.recipe.accuracy, entries_of),
+                                  .single_share = run->blocks.cost[run->blocks.count - 1].single_share};
+    } else if (r->kind == BUDGET_PAIRS) {
+        probe.recipe = state_pairs_recipe(&probe);
+        probe.cost = *of_pairs;
+    } else {
+        probe.cost = run->rays;
+        probe.cost.entries = fmin(run->rays.entries * (double)r->rays / RAYS_SAMPLED, n * n);
+    }
+    probe.cost.seconds = probe.cost.measured;
+    const forecast f = state_forecast(&probe, n);
+    if (forecast_bytes(&f) > probe.memory) goto done;
+    const forecast_times t = forecast_seconds(&f, &probe.rates);
+    r->seconds = forecast_wall_seconds(t.form_factors + t.operate + t.judge + t.solves, &probe.rates);
+done:
+    return status;
+}
+
+/* The recipe of defaults at a quality, where that is all pairs, and its cost. */
+static lam_status weigh_pairs(const budget_run *run, const char *quality, bool *taken, pairs_cost *cost,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    precompute_options options = *run->state->options;
+    precompute_state probe = *run->state;
+    terminal silent = *probe.t;
+    silent.quiet = true;
+    silent.live = false;
+    options.form_factors = "rays";
+    options.quality = quality;
+    options.build.method = run->method->name;
+    probe.options = &options;
+    probe.expected = run->method;
+    probe.t = &silent;
+    probe.recipe = state_pairs_recipe(&probe);
+    TRY(state_weigh_pairs(&probe, error));
+    *taken = !probe.dear;
+    *cost = probe.cost;
+done:
+    return status;
+}
+
+/* Seconds of all candidates. */
+static lam_status find_all_seconds(budget_run *run, double seconds, budget_recipe *list, size_t count,
+                                   lam_error *error) {
+    lam_status status = LAM_OK;
+    const char *weighed = NULL;
+    pairs_cost of_pairs = {.seconds = 0};
+    bool pairs = false;
+    const recipe rays = {.method = RECIPE_RAYS, .rays = RAYS_SAMPLED};
+    TRY(pairs_forecast(&run->state->m, &rays, &run->state->progress, &run->rays, error));
+    for (size_t k = 0; k < count; k++) {
+        if (list[k].kind == BUDGET_PAIRS && list[k].quality != weighed) {
+            weighed = list[k].quality;
+            TRY(weigh_pairs(run, weighed, &pairs, &of_pairs, error));
+            if (forecast_wall_seconds(of_pairs.measured, &run->state->rates) > seconds) pairs = false;
+            if (!pairs) break; /* a higher quality costs more */
+        }
+        TRY(find_seconds(run, &list[k], &of_pairs, error));
+    }
+done:
+    return status;
+}
+
+static void log_choice(precompute_state *state, const budget_run *run, const budget_recipe *r, bool probes) {
+    char options[BUDGET_TEXT], seconds[32];
+    budget_options(r, run->method->name, probes, options);
+    clock_format_seconds(r->seconds, seconds);
+    terminal_log(state->t,
+                 "--time %g: forecast %s, indirect error of single elements about %.2g; the same store "
+                 "without --time: %s",
+                 state->options->time, seconds, r->error, options);
+}
+
+lam_status stage_budget(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = state->options;
+    const double n = (double)state->m.n;
+    const bool given = o->probes != OPTION_AUTO;
+    bool blocks = false;
+    budget_run run = {.state = state, .method = state_method_of_blocks()};
+    budget_recipe list[BUDGET_RECIPES_MOST + 1];
+    TRY(state_measure_rates(state, error));
+    state_update_processors(state);
+    double seconds = share_filled * o->time - (clock_seconds() - state->started);
+    if (strcmp(o->form_factors, "rays") != 0) TRY(state_blocks_possible(state, run.method, &blocks, error));
+    if (blocks) TRY(sample_blocks(&run, seconds, error));
+    state_update_processors(state);
+    const double least_of_pairs = forecast_wall_seconds(n * n / 2 * pair_least_seconds, &state->rates);
+    const bool rays = strcmp(o->form_factors, "blocks") != 0;
+    size_t count = budget_list(blocks, rays, rays && n <= PAIRS_ELEMENTS_MOST && least_of_pairs < seconds,
+                               given ? o->probes : PROBES_OF_BUDGET, list);
+    TRY(find_all_seconds(&run, seconds, list, count, error));
+    seconds = share_filled * o->time - (clock_seconds() - state->started);
+    const size_t cheapest = budget_cheapest(list, count);
+    if (cheapest == count)
+        FAIL(error, LAM_ERR_MEMORY, "--time: %zu elements do not fit into --memory by any recipe",
+             state->m.n);
+    if (!given) {
+        list[count] = list[cheapest];
+        list[count].probes = PROBES_OF_CHEAPEST;
+        TRY(find_seconds(&run, &list[count], NULL, error));
+        count++;
+    }
+    size_t taken = budget_pick(list, count, seconds);
+    if (taken == count) {
+        char needs[32];
+        taken = budget_cheapest(list, count);
+        clock_format_seconds(list[taken].seconds + clock_seconds() - state->started, needs);
+        terminal_warn(state->t, "--time %g: the cheapest recipe is forecast to take %s, and is taken",
+                      o->time, needs);
+    }
+    state->chosen = *o;
+    TRY(set_options(&list[taken], run.method, &state->chosen, error));
+    state->options = &state->chosen;
+    state->trial.asked = state->trial.epsilon = state->chosen.build.epsilon;
+    log_choice(state, &run, &list[taken], !given);
+done:
+    return status;
+}

@@ -1,0 +1,87 @@
+/* The forecast of a precompute, and how it came true. */
+#include "solver/base/clock.h"
+#include "solver/formfactor/blocks/blocks_sample.h"
+#include "solver/precompute/machine_pace.h"
+#include "solver/precompute/precompute_state.h"
+
+#include <math.h>
+#include <omp.h>
+#include <stdio.h>
+
+lam_status state_measure_rates(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    ray_trial rays;
+    double slowness;
+    if (state->rates.processors > 0) return LAM_OK;
+    TRY(form_factors_try_rays(&state->m, state->order, &rays, error));
+    TRY(machine_slowness_measure(&slowness, error));
+    state->rates = (forecast_rates){.ray_seconds = rays.processor_seconds / rays.rays,
+                                    .slowness = slowness,
+                                    .processors = omp_get_max_threads()};
+done:
+    return status;
+}
+
+/* The share of its time that a thread has computed so far: import, mesh and samples are of one thread. On a
+ * busy machine a trial of some hundredths of a second alone would tell little. */
+void state_update_processors(precompute_state *state) {
+    static const double least = .05;
+    const double used = clock_processor_seconds() - state->started_used;
+    const double share = used / fmax(clock_seconds() - state->started, 1e-6);
+    state->rates.processors = omp_get_max_threads() * fmin(fmax(share, least), 1);
+}
+
+/* A sample of a recipe that was asked for, and not weighed against others. A hemicube has none. */
+static lam_status find_cost(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const recipe *r = &state->recipe;
+    if (state->options->from_store || state->cost.measured > 0 || r->method == RECIPE_HEMICUBE) return LAM_OK;
+    TRY(r->method == RECIPE_BLOCKS
+            ? blocks_forecast(&state->m, &state->tree, r, &state->progress, &state->cost, error)
+            : pairs_forecast(&state->m, r, &state->progress, &state->cost, error));
+done:
+    return status;
+}
+
+lam_status stage_forecast(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = state->options;
+    forecast f = state_forecast(state, (double)state->m.n);
+    char memory[32], stored[32], seconds[32], building[32], judging[32], scratch_room[32];
+    char made[64] = "", built[64] = "", judged[64] = "", kept[64] = "";
+    TRY(forecast_check_disk(&f, o->output, state->scratch, o->scratch, error));
+    if (state->t->quiet || (o->from_store && state->probes == 0)) goto done;
+    TRY(find_cost(state, error));
+    TRY(state_measure_rates(state, error));
+    state_update_processors(state);
+    f = state_forecast(state, (double)state->m.n);
+    const forecast_rates *rates = &state->rates;
+    const forecast_times times = state->expected_times = forecast_seconds(&f, rates);
+    forecast_format_bytes(forecast_bytes(&f), memory);
+    forecast_format_bytes(forecast_store_bytes(&f), stored);
+    forecast_format_bytes(forecast_scratch_bytes(&f), scratch_room);
+    clock_format_seconds(forecast_wall_seconds(times.form_factors, rates), seconds);
+    clock_format_seconds(forecast_wall_seconds(times.operate, rates), building);
+    clock_format_seconds(forecast_wall_seconds(times.judge + times.solves, rates), judging);
+    if (!o->from_store) snprintf(made, sizeof made, " form factors %s,", seconds);
+    if (times.operate > 0) snprintf(built, sizeof built, " the operator %s,", building);
+    if (state->probes > 0) snprintf(judged, sizeof judged, " the judge %s,", judging);
+    if (state->scratch != NULL) snprintf(kept, sizeof kept, ", scratch up to %s", scratch_room);
+    terminal_log(state->t,
+                 "forecast:%s%s%s at %.3g Mray/s of %.2g processors; memory up to %s, store up to %s%s", made,
+                 built, judged, 1e-6 * rates->processors / rates->ray_seconds, rates->processors, memory,
+                 stored, kept);
+    if (state->large)
+        terminal_log(state->t, "rows are kept in %s, as memory is too small for them", o->scratch);
+done:
+    return status;
+}
+
+void state_log_times(const precompute_state *state) {
+    const forecast_times *f = &state->expected_times, *t = &state->spent;
+    if (!(f->form_factors + f->judge + f->solves > 0)) return;
+    terminal_log(state->t,
+                 "processor seconds, forecast and taken: form factors %.2g %.2g, operator %.2g %.2g, judge "
+                 "%.2g %.2g",
+                 f->form_factors, t->form_factors, f->operate, t->operate, f->judge + f->solves, t->judge);
+}
