@@ -6,6 +6,7 @@
 #include "solver/formfactor/blocks/unhidden.h"
 #include "solver/formfactor/leaving.h"
 #include "solver/formfactor/pairs/pairs.h"
+#include "solver/formfactor/pairs/pairs_twice.h"
 #include "solver/formfactor/rays/hemicube.h"
 #include "solver/formfactor/rays/rays.h"
 #include "solver/formfactor/repair.h"
@@ -68,18 +69,23 @@ done:
     return status;
 }
 
-static lam_status make_by_pairs(const mesh *m, const visibility *v, const uint32_t *order,
-                                const form_factor_options *options, form_factors *f, lam_error *error) {
-    lam_status status = LAM_OK;
+/* The share of each element that leaves the scene, by rays that are cast for nothing else. */
+static lam_status find_leaving(const mesh *m, const visibility *v, const uint32_t *order,
+                               const form_factor_options *options, form_factors *f, lam_error *error) {
     packed_rows counts = {0};
     form_factor_options silent = *options;
     silent.progress = NULL;
     silent.scratch = NULL;
+    const lam_status status = rays_count(m, v, order, &silent, &counts, f->leaving, f->absorbed, error);
+    packed_rows_free(&counts);
+    return status;
+}
+
+/* Repairs the rows of all pairs. */
+static lam_status close_pairs(form_factors *f, const mesh *m, lam_error *error) {
+    lam_status status = LAM_OK;
     double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) return LAM_ERR_MEMORY;
-    TRY(rays_count(m, v, order, &silent, &counts, f->leaving, f->absorbed, error));
-    packed_rows_free(&counts);
-    TRY(pairs_find(m, v, options, 0, f, &f->upper, error));
     leaving_measure(f, m);
     if (!leaving_nothing(f)) {
         /* outside_i = 1 - sum_j g_ij / A_i */
@@ -92,8 +98,56 @@ static lam_status make_by_pairs(const mesh *m, const visibility *v, const uint32
     }
     TRY(repair_close(&f->upper, m->area, outside, f, error));
 done:
-    packed_rows_free(&counts);
     free(outside);
+    return status;
+}
+
+static lam_status make_by_pairs(const mesh *m, const visibility *v, const uint32_t *order,
+                                const form_factor_options *options, form_factors *f, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(find_leaving(m, v, order, options, f, error));
+    TRY(pairs_find(m, v, options, 0, f, &f->upper, error));
+    TRY(close_pairs(f, m, error));
+done:
+    return status;
+}
+
+lam_status form_factors_make_twice(const mesh *m, const uint32_t *order, const form_factor_options *options,
+                                   uint64_t other_seed, const char *const stages[2], form_factors out[2],
+                                   lam_error *error) {
+    lam_status status = LAM_OK;
+    visibility *v = NULL;
+    form_factors f[2] = {{.recipe = options->recipe}, {.recipe = options->recipe}};
+    csr G[2] = {{.n = 0}, {.n = 0}};
+    pairs_options how = pairs_options_of(&options->recipe, m->n, 0);
+    how.progress = options->progress;
+    TRY(recipe_check(&options->recipe, error));
+    for (int h = 0; h < 2; h++) {
+        f[h].leaving = memory_allocate(m->n, sizeof *f[h].leaving, "form factors", error);
+        f[h].absorbed = memory_allocate(m->n, sizeof *f[h].absorbed, "form factors", error);
+        if (f[h].leaving == NULL || f[h].absorbed == NULL) TRY(LAM_ERR_MEMORY);
+    }
+    TRY(visibility_create(m, &v, error));
+    TRY(find_leaving(m, v, order, options, &f[0], error));
+    memcpy(f[1].leaving, f[0].leaving, m->n * sizeof *f[0].leaving);
+    memcpy(f[1].absorbed, f[0].absorbed, m->n * sizeof *f[0].absorbed);
+    TRY(pairs_exchange_twice(m, v, &how, other_seed, stages, G, &f[0].pairs, error));
+    for (int h = 0; h < 2; h++) {
+        f[h].upper = G[h];
+        G[h] = (csr){.n = 0};
+        TRY(close_pairs(&f[h], m, error));
+        TRY(form_factors_expand(&f[h], m->area, error));
+    }
+    for (int h = 0; h < 2; h++) {
+        out[h] = f[h];
+        f[h] = (form_factors){.row_sums = NULL};
+    }
+done:
+    visibility_destroy(v);
+    for (int h = 0; h < 2; h++) {
+        csr_free(&G[h]);
+        form_factors_free(&f[h]);
+    }
     return status;
 }
 

@@ -142,6 +142,12 @@ static double judge_bytes(const forecast *f) {
            (dense ? 8 * n * n : 0);
 }
 
+/* Both samples of the judge's pairs are found together: of each pair its state, both triangles, and two more
+ * that are made of them, 9 + 2 * 8 + 2 * 8 bytes. */
+static bool shares_pairs(const forecast *f) {
+    return f->judge_recipe.method == RECIPE_PAIRS && !f->scratch;
+}
+
 double forecast_bytes(const forecast *f) {
     const double n = (double)f->n;
     const method_forecast op = method_bytes(f);
@@ -154,8 +160,9 @@ double forecast_bytes(const forecast *f) {
         const recipe *r = &f->judge_recipe;
         const double references = held_bytes(f, forecast_reference_bytes(f), r);
         const double judge = judge_bytes(f);
-        const double second =
-            held_bytes(f, forecast_rows_bytes(n, r), r) + trace_bytes(n, r, f->scratch, f->large);
+        const double second = shares_pairs(f) ? 20.5 * n * n
+                                              : held_bytes(f, forecast_rows_bytes(n, r), r) +
+                                                    trace_bytes(n, r, f->scratch, f->large);
         peak = fmax(peak, sample + op.loaded + fmax(references + judge, second));
     }
     return of_mesh + peak;

@@ -82,7 +82,9 @@ forecast_times forecast_seconds(const forecast *f, const forecast_rates *rates) 
     if (!f->from_store)
         times.form_factors = f->streamed && !counted ? n * forecast_rays(n, own) * rates->ray_seconds : once;
     times.operate = operator_seconds(f) * rates->slowness;
-    if (f->probes > 0) times.judge = (finer ? 1 : 2) * half + (f->streamed ? once : 0);
+    /* Both samples of pairs share what is projected, and the number of segments of one. */
+    const bool shared = of_judge->method == RECIPE_PAIRS && !f->scratch;
+    if (f->probes > 0) times.judge = (finer ? 1 : shared ? 1.1 : 2) * half + (f->streamed ? once : 0);
     if (f->probes > 0) times.solves = solve_seconds(f) * rates->slowness;
     return times;
 }

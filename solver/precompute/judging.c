@@ -42,11 +42,14 @@ done:
     return status;
 }
 
-lam_status judging_run(const judging *j, const lam_operator *op, error_report *out, lam_error *error) {
+/* True where both samples share the pairs that are projected: rows in a scratch folder are of one sample. */
+static bool shares_pairs(const judging *j) {
+    return j->halves[0].method == RECIPE_PAIRS && j->scratch == NULL;
+}
+
+/* Two independent samples, or a reference and the same disturbed by its noise. */
+static lam_status make_halves(const judging *j, form_factors half[2], lam_error *error) {
     lam_status status = LAM_OK;
-    form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}};
-    first_light *first = NULL;
-    if (j->problem->blocks != NULL) return judge_by_blocks(j, op, out, error);
     for (int h = 0; h < 2; h++) {
         const form_factor_options how = {.recipe = j->halves[h],
                                          .progress = j->progress,
@@ -54,9 +57,21 @@ lam_status judging_run(const judging *j, const lam_operator *op, error_report *o
                                          .scratch = j->scratch,
                                          .scratch_name = j->scratch_names[h],
                                          .large = j->large};
+        if (shares_pairs(j))
+            return form_factors_make_twice(j->m, j->order, &how, j->halves[1].seed, j->stages, half, error);
         TRY(form_factors_make(j->m, j->order, &how, &half[h], error));
         if (j->sampled != NULL) j->sampled(j->context, &half[h]);
     }
+done:
+    return status;
+}
+
+lam_status judging_run(const judging *j, const lam_operator *op, error_report *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}};
+    first_light *first = NULL;
+    if (j->problem->blocks != NULL) return judge_by_blocks(j, op, out, error);
+    TRY(make_halves(j, half, error));
     /* The direct illumination of one element by rays is mostly noise. */
     if (recipe_noise(&j->f->recipe) > 0) TRY(first_light_create(j->m, j->first_light_seed, &first, error));
     const judge_input input = {.problem = j->problem,
@@ -65,7 +80,7 @@ lam_status judging_run(const judging *j, const lam_operator *op, error_report *o
                                .own = factor_product_of_rows(j->problem->F),
                                .independent = factor_product_of_rows(&half[0].F),
                                .other = factor_product_of_rows(&half[1].F),
-                               .relation = REFERENCE_TWIN,
+                               .relation = shares_pairs(j) ? REFERENCE_DISTURBED : REFERENCE_TWIN,
                                .first_light = first != NULL ? first_light_for_judge : NULL,
                                .first_light_context = first,
                                .probes = j->probes,

@@ -46,7 +46,7 @@ void pair_block_shrink(pair_block *b) {
     block_resize(b, b->used); /* nothing is lost where that fails */
 }
 
-pair_state pair_rows_state(const pair_rows *rows, uint32_t p, uint32_t q) {
+bool pair_rows_find(const pair_rows *rows, uint32_t p, uint32_t q, const pair_block **block, size_t *at) {
     const uint32_t row = p < q ? p : q, wanted = p < q ? q : p;
     const pair_block *b = &rows->blocks[row / PAIR_BLOCK_ROWS];
     size_t low = b->begin[row % PAIR_BLOCK_ROWS];
@@ -58,8 +58,16 @@ pair_state pair_rows_state(const pair_rows *rows, uint32_t p, uint32_t q) {
         else
             high = middle;
     }
-    return low < end && b->other[low] == wanted ? (pair_state)(b->state[low] & ~(PAIR_SETTLED | PAIR_EXACT))
-                                                : PAIR_UNKNOWN;
+    *block = b;
+    *at = low;
+    return low < end && b->other[low] == wanted;
+}
+
+pair_state pair_rows_state(const pair_rows *rows, uint32_t p, uint32_t q) {
+    const pair_block *b;
+    size_t at;
+    if (!pair_rows_find(rows, p, q, &b, &at)) return PAIR_UNKNOWN;
+    return (pair_state)(b->state[at] & ~(PAIR_SETTLED | PAIR_EXACT));
 }
 
 lam_status pair_rows_open(scratch *s, const char *name, const char geometry[33], const recipe *r, size_t n,

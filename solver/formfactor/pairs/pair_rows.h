@@ -53,6 +53,9 @@ void pair_block_shrink(pair_block *b);
 /* The state of the pair of two positions; PAIR_UNKNOWN where it is in no row. */
 pair_state pair_rows_state(const pair_rows *rows, uint32_t p, uint32_t q);
 
+/* The place of the pair of two positions; false where it is in no row. */
+bool pair_rows_find(const pair_rows *rows, uint32_t p, uint32_t q, const pair_block **block, size_t *at);
+
 /* A scratch file of such rows, and its blocks written and read. order is the tree's, position to element. */
 lam_status pair_rows_open(scratch *s, const char *name, const char geometry[33], const recipe *r, size_t n,
                           const uint32_t *order, row_file **out, lam_error *error);

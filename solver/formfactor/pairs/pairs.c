@@ -6,6 +6,7 @@
 #include "solver/formfactor/pairs/few_occluders.h"
 #include "solver/formfactor/pairs/pair_far.h"
 #include "solver/formfactor/pairs/pair_rows.h"
+#include "solver/formfactor/pairs/pairs_twice.h"
 
 #include <math.h>
 #include <omp.h>
@@ -108,6 +109,9 @@ static int project(const pairs_run *run, uint32_t i, uint32_t j, const link_occl
  * settled and g becomes its visible part. */
 static int look_at(const pairs_run *run, uint32_t i, uint32_t j, const link_occluders *among, double *g) {
     double seen;
+    const known_pairs *known = run->options->known;
+    const int before = known != NULL ? known_pairs_look(known, i, j, run->options->seed, g) : PAIR_UNKNOWN;
+    if (before != PAIR_UNKNOWN) return before;
     const int projected = project(run, i, j, among, g);
     if (projected != PAIR_UNKNOWN) return projected;
     const occlusion_verdict verdict = occlusion_test(&run->occlusion, i, j, *g, &seen);
@@ -397,6 +401,13 @@ static lam_status find_parents(pairs_run *run, lam_error *error) {
     return LAM_OK;
 }
 
+/* Moves the pairs that were found. */
+static void keep_pairs(pairs_run *run, known_pairs *to) {
+    *to = (known_pairs){run->rows, run->tree.position};
+    run->rows = (pair_rows){.n = 0};
+    run->tree.position = NULL;
+}
+
 lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_options *options, csr *G,
                           pairs_report *report, size_t *kept, lam_error *error) {
     lam_status status = LAM_OK;
@@ -416,7 +427,7 @@ lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_option
                                 .polygons = run.polygons,
                                 .rules = &run.rules,
                                 .tolerance = options->tolerance,
-                                .accuracy = options->accuracy,
+                                .accuracy = options->accuracy * fmax(options->coarser, 1),
                                 .segments = options->segments,
                                 .seed = options->seed};
     if (options->occluders > 0) {
@@ -434,6 +445,7 @@ lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_option
     report->hidden += run.links.hidden_pairs;
     report->facing += run.links.hidden_pairs;
     TRY(pair_rows_gather(&run.rows, run.tree.element, options->keep_hidden, G, error));
+    if (options->keep != NULL) keep_pairs(&run, options->keep);
 done:
     pair_rows_free(&run.rows);
     free(run.polygons);

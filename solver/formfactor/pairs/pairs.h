@@ -7,6 +7,9 @@
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/visibility/visibility.h"
 
+/* Pairs of a first sample (pairs_twice.h). */
+typedef struct known_pairs known_pairs;
+
 typedef struct pairs_options {
     double tolerance; /* of the unoccluded factor, relative */
     double accuracy;  /* standard error of the factor of a partly occluded pair; a third by projection */
@@ -17,6 +20,9 @@ typedef struct pairs_options {
     double threshold; /* only pairs whose mean factor 2 g / (A_i + A_j) is above; 0: all */
     bool keep_hidden; /* totally occluded pairs stay in the rows as explicit zeros */
     uint64_t seed;
+    double coarser;           /* the error of segments is so many times the accuracy; 0: once */
+    known_pairs *keep;        /* gets the pairs that are found; NULL: nothing does */
+    const known_pairs *known; /* those settled there are taken as they are, but for some; NULL: none */
     const progress *progress;
     const char *stage;
     scratch *scratch; /* where rows are kept as they are found; NULL: in memory only */

@@ -150,11 +150,21 @@ START_TEST(noise_by_rays_is_the_spread_of_seeds) {
 }
 END_TEST
 
+/* Both samples share the pairs that are projected. */
+START_TEST(noise_by_pairs_is_the_spread_of_seeds) {
+    const recipe r = {.method = RECIPE_PAIRS, .rays = RECIPE_RAYS_FEW, .accuracy = 2e-3, .seed = 1};
+    recipe of_truth = r;
+    of_truth.accuracy = 2e-5;
+    check_scene("cornell", &r, &of_truth);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("judged_scenes");
     TCase *cases = tcase_create("judged_scenes");
     tcase_set_timeout(cases, 120);
     tcase_add_loop_test(cases, noise_by_rays_is_the_spread_of_seeds, 0, 5);
+    tcase_add_test(cases, noise_by_pairs_is_the_spread_of_seeds);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }
