@@ -1,7 +1,6 @@
 /* Form factors by blocks of clusters: the choice of them by what they cost, and the stage that finds them. */
 #include "solver/base/clock.h"
 #include "solver/formfactor/blocks/blocks_sample.h"
-#include "solver/formfactor/blocks/unhidden.h"
 #include "solver/precompute/precompute_state.h"
 
 #include <string.h>
@@ -26,9 +25,8 @@ static lam_status make_tree(precompute_state *state, lam_error *error) {
 }
 
 /* Blocks of large planes, or of clusters of several planes where nothing hides anything. */
-static lam_status find_possible(const precompute_state *state, bool *out, lam_error *error) {
-    *out = blocks_are_planar(&state->tree);
-    return *out ? LAM_OK : mesh_is_unhidden(&state->m, &state->tree, out, error);
+static bool is_possible(const precompute_state *state) {
+    return blocks_are_planar(&state->tree) || state->tree.view == PLANE_VIEW_UNHIDDEN;
 }
 
 /* Refuses options that --form-factors blocks cannot be given together with. */
@@ -71,7 +69,7 @@ lam_status state_blocks_possible(precompute_state *state, const build_method *me
     *possible = false;
     if (!asked && (state_compresses(o) || state->m.n < ELEMENTS_LEAST)) goto done;
     TRY(make_tree(state, error));
-    TRY(find_possible(state, possible, error));
+    *possible = is_possible(state);
     if (!asked) goto done;
     TRY(check_asked(state, method, true, *possible, error));
     *possible = true;
@@ -134,12 +132,11 @@ lam_status state_choose_blocks(precompute_state *state, const build_method *meth
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
     const bool asked = strcmp(o->form_factors, "blocks") == 0, able = (method->flags & METHOD_BLOCKS) != 0;
-    bool possible = false;
     const build_method *built = able ? method : state_method_of_blocks();
     if (!state_may_have_blocks(state, (double)state->m.n) || built == NULL) return LAM_OK;
     if (final && !able && !asked) return LAM_OK;
     TRY(make_tree(state, error));
-    TRY(find_possible(state, &possible, error));
+    const bool possible = is_possible(state);
     if (asked) TRY(check_asked(state, method, final, possible, error));
     if (!asked && !possible) goto done;
     /* The rays of a sky are those that find its share beside pairs, too. */

@@ -217,8 +217,8 @@ static void cast_packet(const shining *s, const pair_sampler *sampler, uint32_t 
         double at[4], place[2], points[2][3], r2 = 0, leaving = 0, arriving = 0;
         float from[3], to[3];
         pair_sampler_place(sampler, first + k, at);
-        ends[0][k] = flat_cluster_sample(f, a, at[0], at[1], place, points[0]);
-        ends[1][k] = flat_cluster_sample(f, b, at[2], at[3], place, points[1]);
+        ends[0][k] = f->tree->order[flat_cluster_sample(f, a, at[0], at[1], place, points[0])];
+        ends[1][k] = f->tree->order[flat_cluster_sample(f, b, at[2], at[3], place, points[1])];
         visibility_recentre(s->l->v, points[0], from);
         visibility_recentre(s->l->v, points[1], to);
         for (int d = 0; d < 3; d++) {

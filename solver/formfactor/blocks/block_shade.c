@@ -20,7 +20,7 @@ static void take_point(const flat_clusters *f, uint32_t node, const double at[2]
         flat_cluster_point(f, node, place[0], place[1], point);
         return;
     }
-    *element = flat_cluster_sample(f, node, at[0], at[1], place, point);
+    *element = f->tree->order[flat_cluster_sample(f, node, at[0], at[1], place, point)];
 }
 
 /* Bits of the segments that Embree finds blocked. */

@@ -4,7 +4,7 @@
 
 #include "solver/formfactor/blocks/block_shade.h"
 #include "solver/formfactor/blocks/blocks.h"
-#include "solver/formfactor/pairs/pair_factor.h"
+#include "solver/formfactor/blocks/joined_kernel.h"
 
 /* All that the walks of a scene share. */
 typedef struct block_finder {
@@ -15,7 +15,12 @@ typedef struct block_finder {
     shade_scene shade;
     pair_factor_rules rules;
     size_t n_clusters;
-    bool joined; /* clusters of several planes have blocks too, and nothing hides anything */
+    bool joined;              /* clusters of several planes have blocks too, and nothing hides anything */
+    joined_element *elements; /* [n] by position, where clusters are joined */
+    joined_kernel kernel;
+    double
+        spread; /* the share of itself that the kernel of such a block may vary by, if it is of middle size */
+    double exact; /* relative tolerance of single pairs, unoccluded */
 } block_finder;
 
 /* Begins the nodes of blocks as well (block_factors_begin). out must stay where it is until it is freed, also

@@ -54,7 +54,7 @@ static const double visit_seconds = 2.2e-7, sifted_seconds = 4.7e-8, linear_seco
                     even_seconds = 6e-8, pair_seconds = 9e-7, segment_seconds = 4e-8, test_seconds = 1.2e-9,
                     cast_seconds = 3e-7;
 /* A pair where elements touch at angles everywhere: a bowl of 40,000 triangles. */
-static const double joined_pair_seconds = 8e-6;
+static const double joined_pair_seconds = 3e-6;
 /* Sorting and balancing, per block and per element: what is left of two Cornell boxes, rooms, a maze and a
  * patio (8,000 to 40,978 elements). */
 static const double finish_seconds = 6.5e-7, element_seconds = 5e-6;

@@ -253,9 +253,9 @@ uint32_t flat_cluster_sample(const flat_clusters *f, uint32_t node, double u, do
     const uint32_t position = element_at(f, node, u, &along);
     element_point(f->m, f->tree->order[position], along, v, point);
     place[0] = place[1] = 0;
-    if (c->plane == PLANE_ABOVE) return f->tree->order[position];
+    if (c->plane == PLANE_ABOVE) return position;
     const flat_plane *p = &f->planes[c->plane];
     const double away[3] = {point[0] - c->centre[0], point[1] - c->centre[1], point[2] - c->centre[2]};
     for (int k = 0; k < 2; k++) place[k] = c->half[k] > 0 ? dot3(away, p->axis[k]) / c->half[k] : 0;
-    return f->tree->order[position];
+    return position;
 }

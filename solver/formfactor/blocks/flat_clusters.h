@@ -54,7 +54,7 @@ void flat_cluster_point(const flat_clusters *f, uint32_t node, double u, double 
 double flat_cluster_distance(const flat_clusters *f, uint32_t node, const double point[3]);
 
 /* A point that is uniform over the area of the elements for (u, v) uniform in the unit square; its place in
- * the rectangle, in [-1, 1]^2 (0 above planes), and its element. */
+ * the rectangle, in [-1, 1]^2 (0 above planes), and the position of its element. */
 uint32_t flat_cluster_sample(const flat_clusters *f, uint32_t node, double u, double v, double place[2],
                              double point[3]);
 

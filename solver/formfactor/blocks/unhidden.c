@@ -1,121 +1,26 @@
 #include "solver/formfactor/blocks/unhidden.h"
 
 #include "solver/base/vector3.h"
+#include "solver/formfactor/blocks/blocks.h"
+#include "solver/formfactor/pairs/open_scene.h"
 #include "solver/formfactor/pairs/polygon.h"
 #include "store/status.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-/* Nothing shorter than this share of the extent of the scene is a distance. */
-static const double least_length = 1e-7;
-
-/* Nodes that wait while a tree is descended: halves hold a quarter of a node or more, so that a path of 2^32
- * elements has at most 32 / log2(4/3) = 78 nodes. */
-enum { WAITING_MOST = 128 };
 /* Edges of a boundary that row sums are worth. */
 enum { EDGES_MOST = 2048 };
 /* Elements within this many of their radii of the boundary see it differently from point to point. */
 static const double near_boundary = 8;
 
-/* The box around all vertices of a cluster. */
-typedef struct vertex_box {
-    double middle[3], half[3];
-} vertex_box;
-
-/* A plane: normal . x = level. */
-typedef struct element_plane {
-    double normal[3], level;
-} element_plane;
-
-static void widen(double low[3], double high[3], const double *least, const double *most) {
-    for (int d = 0; d < 3; d++) {
-        low[d] = fmin(low[d], least[d]);
-        high[d] = fmax(high[d], most[d]);
-    }
-}
-
-static vertex_box box_of(const mesh *m, const plane_tree *tree, const vertex_box *boxes, size_t t) {
-    const plane_cluster *c = &tree->clusters[t];
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    vertex_box out;
-    for (uint32_t p = c->begin; c->leaf && p < c->end; p++) {
-        const uint32_t *corners = m->elements[tree->order[p]];
-        for (size_t k = 0; k < corner_count(corners); k++)
-            widen(low, high, m->vertices[corners[k]], m->vertices[corners[k]]);
-    }
-    for (int side = 0; !c->leaf && side < 2; side++) {
-        const vertex_box *child = &boxes[side == 0 ? c->left : t - 1];
-        double least[3], most[3];
-        for (int d = 0; d < 3; d++) {
-            least[d] = child->middle[d] - child->half[d];
-            most[d] = child->middle[d] + child->half[d];
-        }
-        widen(low, high, least, most);
-    }
-    for (int d = 0; d < 3; d++) {
-        out.middle[d] = .5 * (low[d] + high[d]);
-        out.half[d] = .5 * (high[d] - low[d]);
-    }
-    return out;
-}
-
-static element_plane plane_of(const mesh *m, size_t element) {
-    polygon shape;
-    element_plane out;
-    polygon_of_element(m, element, &shape);
-    for (int d = 0; d < 3; d++) out.normal[d] = shape.normal[d];
-    out.level = dot3(shape.normal, shape.centre);
-    return out;
-}
-
-static bool is_in_front(const mesh *m, const element_plane *plane, size_t element, double slack) {
-    const uint32_t *corners = m->elements[element];
-    for (size_t k = 0; k < corner_count(corners); k++)
-        if (dot3(plane->normal, m->vertices[corners[k]]) < plane->level - slack) return false;
-    return true;
-}
-
-/* True where no cluster of the tree has a vertex behind a plane; waiting: room for WAITING_MOST. */
-static bool all_in_front(const mesh *m, const plane_tree *tree, const vertex_box *boxes,
-                         const element_plane *plane, double slack, uint32_t *waiting) {
-    size_t n_waiting = 0;
-    waiting[n_waiting++] = (uint32_t)tree->n_clusters - 1;
-    while (n_waiting > 0) {
-        const uint32_t t = waiting[--n_waiting];
-        const vertex_box *box = &boxes[t];
-        double least = dot3(plane->normal, box->middle) - plane->level;
-        for (int d = 0; d < 3; d++) least -= fabs(plane->normal[d]) * box->half[d];
-        if (least >= -slack) continue;
-        const plane_cluster *c = &tree->clusters[t];
-        for (uint32_t p = c->begin; c->leaf && p < c->end; p++)
-            if (!is_in_front(m, plane, tree->order[p], slack)) return false;
-        if (c->leaf) continue;
-        waiting[n_waiting++] = c->left;
-        waiting[n_waiting++] = t - 1;
-    }
-    return true;
-}
-
-lam_status mesh_is_unhidden(const mesh *m, const plane_tree *tree, bool *out, lam_error *error) {
+lam_status plane_tree_look(const mesh *m, plane_tree *tree, lam_error *error) {
     lam_status status = LAM_OK;
-    double centre[3], radius;
-    vertex_box *boxes = memory_allocate(tree->n_clusters, sizeof *boxes, "clusters", error);
-    if (boxes == NULL) TRY(LAM_ERR_MEMORY);
-    mesh_bounds(m, centre, &radius);
-    for (size_t t = 0; t < tree->n_clusters; t++) boxes[t] = box_of(m, tree, boxes, t);
-    int hidden = 0;
-#pragma omp parallel for schedule(dynamic, 64)
-    for (size_t p = 0; p < m->n; p++) {
-        uint32_t waiting[WAITING_MOST];
-        if (__atomic_load_n(&hidden, __ATOMIC_RELAXED)) continue;
-        const element_plane plane = plane_of(m, tree->order[p]);
-        if (!all_in_front(m, tree, boxes, &plane, 2 * radius * least_length, waiting))
-            __atomic_store_n(&hidden, 1, __ATOMIC_RELAXED);
-    }
-    *out = hidden == 0;
+    bool unhidden = false;
+    if (blocks_are_planar(tree)) return LAM_OK;
+    TRY(mesh_is_unhidden(m, &unhidden, error));
+    tree->view = unhidden ? PLANE_VIEW_UNHIDDEN : PLANE_VIEW_HIDDEN;
 done:
-    free(boxes);
     return status;
 }
 

@@ -1,17 +1,17 @@
-/* The proof that nothing in a scene can hide anything, as in a convex room or a bowl seen from inside. */
+/* Scenes in which nothing can hide anything (open_scene.h): trees that know it, and row sums without samples.
+ */
 #ifndef LAMBERT_FORMFACTOR_BLOCKS_UNHIDDEN_H
 #define LAMBERT_FORMFACTOR_BLOCKS_UNHIDDEN_H
 
 #include "solver/operator/blocks/plane_tree.h"
 #include "solver/scene/mesh.h"
 
-/* *out = true where all vertices of the mesh lie in front of the plane of every element or in it, up to 1e-7
- * of the extent of the scene: a segment between two points of the scene then ends in front of all planes, and
- * crosses none. tree: of the mesh. Cost: a few hundred boxes for each element where the answer is yes, and
- * mostly one element where it is no. Errors: LAM_ERR_MEMORY. */
-lam_status mesh_is_unhidden(const mesh *m, const plane_tree *tree, bool *out, lam_error *error);
+/* Sets view of a tree of the mesh whose planes are not large enough for blocks of their own
+ * (blocks_are_planar), by mesh_is_unhidden, so that all who need to know share one proof. Errors:
+ * LAM_ERR_MEMORY. */
+lam_status plane_tree_look(const mesh *m, plane_tree *tree, lam_error *error);
 
-/* The row sums of F [n], without any sampling, of a scene for which mesh_is_unhidden is true: by Lambert's
+/* The row sums of F [n], without any sampling, of a scene in which nothing hides anything: by Lambert's
  * formula (1760) for what a point p with normal n sees of all other elements,
  *     1 - 1/(2 pi) sum over edges e of the boundary of theta_e n . (x_e x y_e) / |x_e x y_e|,
  * where x_e, y_e lead from p to the ends of e and theta_e is the angle between them: the edges of neighbours

@@ -2,6 +2,7 @@
 
 #include "solver/base/array_grow.h"
 #include "solver/formfactor/pairs/cluster_shaft.h"
+#include "solver/formfactor/pairs/open_scene.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -89,7 +90,7 @@ static void visit(walk *w, uint32_t a, uint32_t b, const uint32_t *candidates, s
     if (a == b) {
         if (one->plane) return;
         if (cluster_is_leaf(one)) {
-            bag_add(w->found, a, a, false);
+            bag_add(w->found, a, a, n_candidates == 0);
             return;
         }
         visit(w, one->child[0], one->child[0], candidates, n_candidates);
@@ -219,6 +220,7 @@ lam_status cluster_links_find(const mesh *m, const cluster_tree *t, const occlus
     bags = memory_allocate(n_tasks, sizeof *bags, "links of clusters", error);
     if (bags == NULL) TRY(LAM_ERR_MEMORY);
     bool cancelled = false;
+    const size_t n_candidates = clusters_hide_nothing(m, t) ? 0 : 1;
 #pragma omp parallel for schedule(dynamic, 1)
     for (size_t k = step / 2; k < n_tasks; k += step) {
         static const uint32_t root = 0;
@@ -227,7 +229,7 @@ lam_status cluster_links_find(const mesh *m, const cluster_tree *t, const occlus
         stop = cancelled;
         if (stop) continue;
         walk w = {.m = m, .t = t, .o = o, .options = options, .found = &bags[k]};
-        visit(&w, tasks[k].a, tasks[k].b, &root, 1);
+        visit(&w, tasks[k].a, tasks[k].b, &root, n_candidates);
         if (progress_cancelled(options->progress)) {
 #pragma omp atomic write
             cancelled = true;

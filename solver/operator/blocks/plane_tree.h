@@ -26,11 +26,15 @@ typedef struct plane_cluster {
 /* Elements of a leaf at most, in the trees of multiwavelets and of the blocks that go into them. */
 enum { PLANE_LEAF = 6 };
 
+/* A fact about the mesh of a tree: elements may hide something of each other, or nothing. */
+typedef enum plane_view { PLANE_VIEW_UNKNOWN, PLANE_VIEW_HIDDEN, PLANE_VIEW_UNHIDDEN } plane_view;
+
 typedef struct plane_tree {
     size_t n, n_clusters, n_frames;
     uint32_t *order;         /* [n], position -> element */
     plane_cluster *clusters; /* [n_clusters], postorder */
     plane_frame *frames;     /* [n_frames] */
+    plane_view view;         /* unknown until someone who knows the mesh says it */
 } plane_tree;
 
 void plane_tree_free(plane_tree *tree);
