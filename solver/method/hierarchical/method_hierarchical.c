@@ -8,6 +8,7 @@
 #include "solver/method/hierarchical/wavelet_blocks.h"
 #include "solver/method/hierarchical/wavelet_entries.h"
 #include "solver/method/hierarchical/wavelet_inverse.h"
+#include "solver/method/hierarchical/wavelet_norm.h"
 #include "solver/method/hierarchical/wavelet_pass.h"
 #include "solver/operator/blocks/plane_tree.h"
 #include "solver/operator/hierarchical.h"
@@ -51,6 +52,11 @@ static const shares shares_of_blocks = {.of_epsilon = .004, .of_S = 1, .inner = 
  * .0116 of the lamp in a Cornell box of 163,687 elements, and .0221 and .0099 at 1.4, for a seventh more
  * time. */
 static const double share_of_block = 1.4;
+/* The rows of S that single elements shine by are as small as its Frobenius norm, and coefficients that are
+ * dropped are a larger share of them. Errors go as the root of the threshold (measured: .033, .025, .017 in a
+ * hemisphere of 4,489 triangles at 1, 1/2 and 1/4 of it), so that it falls with the square of the norm below
+ * this one. Rooms have 6 to 15, whatever the number of elements, a sphere 1, a hemisphere .5. */
+static const double norm_least = 1.5;
 /* Times the radius of a node over the cube root of the threshold: the reach of the node (wavelet_reach.h).
  * The light from beyond eight radii changes no coefficient by more than a threshold of .0026, as was
  * measured. */
@@ -178,6 +184,20 @@ done:
     return status;
 }
 
+/* The threshold without noise over epsilon. */
+static lam_status threshold_share(const build_problem *problem, double *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    double norm = INFINITY;
+    if (problem->blocks != NULL)
+        TRY(wavelet_norm_of_blocks(problem->blocks, &norm, error));
+    else if (problem->stream == NULL)
+        norm = wavelet_norm_of_rows(problem->F, problem->area);
+    *out = (problem->blocks != NULL ? &shares_of_blocks : &shares_of_rows)->of_epsilon *
+           (norm > 0 ? fmin(norm * norm / (norm_least * norm_least), 1) : 1);
+done:
+    return status;
+}
+
 static lam_status build(const build_problem *problem, const build_options *options, const void *own,
                         lam_operator **op, build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
@@ -185,7 +205,6 @@ static lam_status build(const build_problem *problem, const build_options *optio
     const double started = clock_seconds(), epsilon = ((const hierarchical_options *)own)->epsilon;
     const double least = share_of_noise * problem->noise;
     const shares *const share = problem->blocks != NULL ? &shares_of_blocks : &shares_of_rows;
-    const double threshold = fmax(share->of_epsilon * epsilon, least);
     plane_tree made_tree = {.n = 0};
     const plane_tree *const tree = problem->blocks != NULL ? problem->blocks->tree : &made_tree;
     hierarchical_arrays arrays = {.K = memory_allocate(C, sizeof *arrays.K, "operator", error)};
@@ -193,11 +212,13 @@ static lam_status build(const build_problem *problem, const build_options *optio
     csr S = {.n = 0};
     lam_operator *made = NULL;
     float *weight = NULL, *rho = memory_allocate(n, sizeof *rho, "operator", error);
-    double *area = memory_allocate(n, sizeof *area, "operator", error), entries = 0;
+    double *area = memory_allocate(n, sizeof *area, "operator", error), entries = 0, of_epsilon = 0;
     double *sums = memory_allocate(n, sizeof *sums, "operator", error);
     const double *row_sums = sums;
     bool corrected = false;
     if (arrays.K == NULL || rho == NULL || area == NULL || sums == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(threshold_share(problem, &of_epsilon, error));
+    const double threshold = fmax(of_epsilon * epsilon, least);
     if (problem->blocks == NULL)
         TRY(plane_tree_make(n, problem->centre, problem->normal, PLANE_LEAF, &made_tree, error));
     TRY(wavelet_basis_make(tree, problem->area, problem->centre, &arrays.basis, error));

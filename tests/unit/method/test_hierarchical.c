@@ -166,6 +166,37 @@ START_TEST(noise_sets_the_threshold) {
 }
 END_TEST
 
+/* The threshold of scenes whose rows are small falls with the square of the Frobenius norm of S, so that
+ * single elements err by no more than where rows are full: here a fifth of those of a cube. */
+START_TEST(small_rows_lower_the_threshold) {
+    static const double share = .2, epsilon = .05;
+    closed s = closed_make(unit_cube, 8, .5f);
+    build_report report;
+    double error_of[2];
+    for (int k = 0; k < 2; k++) {
+        const build_problem *problem = of(&s);
+        const size_t n = problem->n;
+        const csr *F = problem->F;
+        double square = 0;
+        for (size_t i = 0; i < n; i++)
+            for (uint64_t e = F->indptr[i]; e < F->indptr[i + 1]; e++)
+                square += pow((double)F->data[e], 2) * problem->area[i] / problem->area[F->indices[e]];
+        lam_operator *op = build(problem, epsilon, &report);
+        const double least = 1.5 * 1.5, expected = .02 * epsilon * fmin(square / least, 1);
+        ck_assert_double_eq_tol(report_get(&report, "threshold", -1), expected, 1e-9 * expected);
+        ck_assert_int_eq(square < least, k == 1);
+        float *E = test_allocate(n, sizeof *E);
+        for (size_t i = 0; i < n; i++) E[i] = i == 5;
+        error_of[k] = indirect_error(problem, op, E);
+        free(E);
+        lam_operator_close(op);
+        for (uint64_t e = 0; e < F->indptr[n]; e++) s.f.F.data[e] *= (float)share;
+    }
+    ck_assert_double_le(error_of[1], 1.2 * error_of[0]);
+    closed_free(&s);
+}
+END_TEST
+
 /* F of the problem as blocks of two elements, on a tree that the caller frees. It is not the one that the
  * method makes for rows, whose leaves are larger. */
 static block_factors blocks_of(const build_problem *problem, plane_tree *tree) {
@@ -379,6 +410,7 @@ int main(void) {
     tcase_add_test(tests, epsilon_is_what_it_costs);
     tcase_add_test(tests, black_and_white);
     tcase_add_test(tests, noise_sets_the_threshold);
+    tcase_add_test(tests, small_rows_lower_the_threshold);
     tcase_add_test(tests, even_light_is_made_up_for);
     tcase_add_test(tests, some_elements);
     tcase_add_test(tests, blocks_in_place_of_rows);

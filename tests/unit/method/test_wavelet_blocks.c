@@ -1,6 +1,7 @@
 /* Blocks of form factors in a basis of wavelets, against dense matrices in double. */
 #include "solver/base/random.h"
 #include "solver/method/hierarchical/wavelet_blocks.h"
+#include "solver/method/hierarchical/wavelet_norm.h"
 #include "support/failing_memory.h"
 #include "support/random_blocks.h"
 #include "support/wavelet_subject.h"
@@ -189,6 +190,14 @@ START_TEST(the_smallest_tree) {
     ck_assert_double_le(fabs(all[0] - truth[0]), 1e-7);
     ck_assert_double_le(fabs(fabs(all[1]) - truth[1]), 1e-7);
     ck_assert_double_le(fabs(all[3] - truth[2]), 1e-7);
+    /* Its Frobenius norm, also where F is balanced to halves of it. */
+    double norm = 0, halves[2] = {.5, 1};
+    ck_ok(wavelet_norm_of_blocks(&f, &norm, &error));
+    ck_assert_double_eq_tol(norm, .2 * sqrt(2), 1e-7);
+    f.balance = halves;
+    ck_ok(wavelet_norm_of_blocks(&f, &norm, &error));
+    ck_assert_double_eq_tol(norm, .1 * sqrt(2), 1e-7);
+    f.balance = NULL;
     block_factors_free(&f);
     plane_tree_free(&s.tree);
     wavelets_free(&s.basis);
