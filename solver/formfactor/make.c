@@ -327,10 +327,11 @@ lam_status form_factors_tree(const mesh *m, plane_tree *out, lam_error *error) {
     lam_status status = LAM_OK;
     plane_tree tree = {.n = 0};
     double(*centre)[3] = memory_allocate(m->n, sizeof *centre, "centroids", error);
+    const element_corners corners = {(const double(*)[3])m->vertices, (const uint32_t(*)[4])m->elements};
     if (centre == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < m->n; i++) mesh_centroid(m, i, centre[i]);
-    TRY(plane_tree_make(m->n, (const double(*)[3])centre, (const float(*)[3])m->normal, PLANE_LEAF, &tree,
-                        error));
+    TRY(plane_tree_make(m->n, (const double(*)[3])centre, (const float(*)[3])m->normal, &corners, PLANE_LEAF,
+                        &tree, error));
     TRY(plane_tree_look(m, &tree, error));
     *out = tree;
     tree = (plane_tree){.n = 0};

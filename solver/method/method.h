@@ -37,6 +37,7 @@ typedef struct build_problem {
     const double (*centre)[3];      /* [n] centroids, m */
     const float (*normal)[3];       /* [n] unit */
     const uint32_t *surface;        /* [n] below n: equal where elements lie on one surface */
+    const element_corners *corners; /* of the tree of clusters; NULL: it does without */
     const emitter_source *emitters; /* NULL: none asked for */
 } build_problem;
 

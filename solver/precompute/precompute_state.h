@@ -49,6 +49,7 @@ typedef struct precompute_state {
     uint32_t *order;
     double (*centre)[3]; /* [n], with surface where a method needs them */
     uint32_t *surface;
+    element_corners corners; /* a view of m */
     form_factors f;
     const build_method *expected;  /* as chosen before the form factors are known */
     bool holds;                    /* rows of F are needed whatever the method is */

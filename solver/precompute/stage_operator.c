@@ -45,6 +45,9 @@ lam_status state_problem(precompute_state *state, bool geometry, build_problem *
     problem->centre = (const double(*)[3])state->centre;
     problem->normal = (const float(*)[3])state->m.normal;
     problem->surface = state->surface;
+    state->corners =
+        (element_corners){(const double(*)[3])state->m.vertices, (const uint32_t(*)[4])state->m.elements};
+    problem->corners = &state->corners;
 done:
     return status;
 }

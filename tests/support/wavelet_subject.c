@@ -39,8 +39,9 @@ subject wavelet_subject_make(int which) {
     const size_t n = s.m.n;
     s.centre = test_allocate(n, sizeof *s.centre);
     for (size_t i = 0; i < n; i++) mesh_centroid(&s.m, i, s.centre[i]);
-    ck_ok(
-        plane_tree_make(n, (const double(*)[3])s.centre, (const float(*)[3])s.m.normal, 6, &s.tree, &error));
+    const element_corners corners = {(const double(*)[3])s.m.vertices, (const uint32_t(*)[4])s.m.elements};
+    ck_ok(plane_tree_make(n, (const double(*)[3])s.centre, (const float(*)[3])s.m.normal, &corners, 6,
+                          &s.tree, &error));
     ck_ok(wavelet_basis_make(&s.tree, s.m.area, (const double(*)[3])s.centre, &s.basis, &error));
     s.plan = plan_of_all(&s.basis);
     return s;

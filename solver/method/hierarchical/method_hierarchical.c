@@ -220,7 +220,8 @@ static lam_status build(const build_problem *problem, const build_options *optio
     TRY(threshold_share(problem, &of_epsilon, error));
     const double threshold = fmax(of_epsilon * epsilon, least);
     if (problem->blocks == NULL)
-        TRY(plane_tree_make(n, problem->centre, problem->normal, PLANE_LEAF, &made_tree, error));
+        TRY(plane_tree_make(n, problem->centre, problem->normal, problem->corners, PLANE_LEAF, &made_tree,
+                            error));
     TRY(wavelet_basis_make(tree, problem->area, problem->centre, &arrays.basis, error));
     TRY(wavelets_weights(&arrays.basis, &weight, error));
     TRY(hierarchical_steps(&arrays.basis, threshold, &arrays.step, error));

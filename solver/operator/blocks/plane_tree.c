@@ -1,6 +1,7 @@
 #include "solver/operator/blocks/plane_tree.h"
 
 #include "solver/base/vector3.h"
+#include "solver/operator/blocks/plane_walls.h"
 #include "store/status.h"
 
 #include <math.h>
@@ -14,6 +15,12 @@ static const double same_normal = 2e-3, same_plane = 1e-4;
 static const double facing_weight = .35;
 /* A gap counts as wide if it is at least this share of the widest one near the middle of a cluster. */
 static const double wide_gap = .6;
+/* A wall parts a cluster where it covers at least this share of its line within the cluster, and leaves at
+ * least this share of the elements on either side. */
+static const double least_wall = .25, least_side = 1. / 32;
+
+/* Planes of fewer elements are not parted by walls: their clusters are small. */
+enum { PARTED_LEAST = 24 };
 
 typedef struct key {
     double value;
@@ -29,6 +36,7 @@ typedef struct maker {
     uint32_t *group_end; /* [n_groups], where in the order groups end */
     size_t n_groups;
     plane_tree *tree;
+    plane_wall *walls; /* on the plane that is parted */
 } maker;
 
 void plane_tree_free(plane_tree *tree) {
@@ -156,14 +164,15 @@ static void sort_on_axis(maker *k, const plane_frame *f, int axis, size_t begin,
     sort_by_keys(k, begin, end);
 }
 
-static double extent_on_axis(const maker *k, const plane_frame *f, int axis, size_t begin, size_t end) {
-    double low = INFINITY, high = -INFINITY;
-    for (size_t p = begin; p < end; p++) {
-        const double at = on_axis(k, f, axis, k->tree->order[p]);
-        low = fmin(low, at);
-        high = fmax(high, at);
-    }
-    return high - low;
+static plane_extent extent_of(const maker *k, const plane_frame *f, size_t begin, size_t end) {
+    plane_extent e = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
+    for (size_t p = begin; p < end; p++)
+        for (int axis = 0; axis < 2; axis++) {
+            const double at = on_axis(k, f, axis, k->tree->order[p]);
+            e.low[axis] = fmin(e.low[axis], at);
+            e.high[axis] = fmax(e.high[axis], at);
+        }
+    return e;
 }
 
 /* Sorts the elements of a leaf row by row with a tolerance, so that congruent leaves get the same matrix in
@@ -182,6 +191,74 @@ static void sort_leaf(maker *k, const plane_frame *f, size_t begin, size_t end) 
         }
 }
 
+static double beyond(const maker *k, const plane_frame *f, const plane_wall *wall, uint32_t i) {
+    return wall->across[0] * on_axis(k, f, 0, i) + wall->across[1] * on_axis(k, f, 1, i) - wall->offset;
+}
+
+/* Sorts a range of elements by their distance from a wall; returns the first one beyond it. */
+static size_t sort_by_wall(maker *k, const plane_frame *f, const plane_wall *wall, size_t begin, size_t end) {
+    size_t cut = begin;
+    for (size_t p = begin; p < end; p++) {
+        const uint32_t i = k->tree->order[p];
+        k->keys[p] = (key){beyond(k, f, wall, i), i};
+        cut += k->keys[p].value < 0;
+    }
+    sort_by_keys(k, begin, end);
+    return cut;
+}
+
+/* Where a line of walls, of which `covered` within a cluster is wall, parts it: the share of the wall times
+ * the root of the smaller side's share of the elements; 0 where it parts nothing. */
+static double worth_of_wall(const maker *k, const plane_frame *f, const plane_wall *wall, double covered,
+                            size_t begin, size_t end, const plane_extent *e) {
+    double from, to;
+    size_t less = 0;
+    if (!plane_wall_chord(wall, e, &from, &to) || covered < least_wall * (to - from)) return 0;
+    for (size_t p = begin; p < end; p++) less += beyond(k, f, wall, k->tree->order[p]) < 0;
+    const size_t count = end - begin, smaller = less < count - less ? less : count - less;
+    if ((double)smaller < least_side * (double)count) return 0;
+    return covered / (to - from) * sqrt((double)smaller / (double)count);
+}
+
+/* The wall that parts a cluster best, of walls [*n_walls] on its plane, of which those within the cluster
+ * come first, *n_walls of them; NULL: none does. */
+static const plane_wall *best_wall(const maker *k, const plane_frame *f, size_t begin, size_t end,
+                                   const plane_extent *e, size_t *n_walls) {
+    const plane_wall *best = NULL;
+    double most = 0;
+    *n_walls = plane_walls_within(k->walls, *n_walls, e);
+    for (size_t first = 0, last; first < *n_walls; first = last) {
+        double covered = 0;
+        for (last = first; last < *n_walls && k->walls[last].line == k->walls[first].line; last++) {
+            double from, to;
+            if (!plane_wall_chord(&k->walls[last], e, &from, &to)) continue;
+            covered += fmax(0, fmin(to, k->walls[last].end) - fmax(from, k->walls[last].begin));
+        }
+        const double worth = worth_of_wall(k, f, &k->walls[first], covered, begin, end, e);
+        if (worth <= most) continue;
+        most = worth;
+        best = &k->walls[first];
+    }
+    return best;
+}
+
+/* Parts a range of a plane into rooms, on which the first n_walls walls may stand, and notes where they end.
+ */
+static void part_range(maker *k, const plane_frame *f, size_t begin, size_t end, size_t n_walls) {
+    const plane_wall *wall = NULL;
+    if (end - begin >= PARTED_LEAST) {
+        const plane_extent e = extent_of(k, f, begin, end);
+        wall = best_wall(k, f, begin, end, &e, &n_walls);
+    }
+    if (wall == NULL) {
+        k->group_end[k->n_groups++] = (uint32_t)end;
+        return;
+    }
+    const size_t cut = sort_by_wall(k, f, wall, begin, end);
+    part_range(k, f, begin, cut, n_walls);
+    part_range(k, f, cut, end, n_walls);
+}
+
 /* Clusters of a plane or a part of it; returns the topmost. */
 static uint32_t split_plane(maker *k, uint32_t frame, size_t begin, size_t end) {
     const plane_frame *f = &k->tree->frames[frame];
@@ -191,8 +268,8 @@ static uint32_t split_plane(maker *k, uint32_t frame, size_t begin, size_t end) 
         sort_leaf(k, f, begin, end);
         return add_cluster(k, made);
     }
-    const int axis = extent_on_axis(k, f, 1, begin, end) > 1.0001 * extent_on_axis(k, f, 0, begin, end);
-    sort_on_axis(k, f, axis, begin, end);
+    const plane_extent e = extent_of(k, f, begin, end);
+    sort_on_axis(k, f, e.high[1] - e.low[1] > 1.0001 * (e.high[0] - e.low[0]), begin, end);
     const size_t cut = cut_of(k->keys, begin, end);
     made.left = split_plane(k, frame, begin, cut);
     (void)split_plane(k, frame, cut, end);
@@ -304,8 +381,44 @@ done:
     return status;
 }
 
-lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*normal)[3], size_t leaf_most,
-                           plane_tree *out, lam_error *error) {
+/* Frames of the planes, which are brought into tree order; *begins as by place_planes. */
+static lam_status make_frames(maker *k, uint32_t **begins, lam_error *error) {
+    lam_status status = LAM_OK;
+    plane_tree *tree = k->tree;
+    free(*begins);
+    free(tree->frames);
+    *begins = memory_allocate(k->n_groups + 1, sizeof **begins, "clusters", error);
+    tree->frames = memory_allocate(k->n_groups, sizeof *tree->frames, "clusters", error);
+    if (*begins == NULL || tree->frames == NULL) TRY(LAM_ERR_MEMORY);
+    tree->n_frames = k->n_groups;
+    TRY(place_planes(k, *begins, error));
+    for (size_t g = 0; g < k->n_groups; g++) set_frame(k, (*begins)[g], (*begins)[g + 1], &tree->frames[g]);
+done:
+    return status;
+}
+
+/* Parts planes where walls stand on them: the groups are rooms of planes then. */
+static lam_status part_planes(maker *k, const uint32_t *begins, const element_corners *corners,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    wall_finder *finder = NULL;
+    const plane_tree *tree = k->tree;
+    TRY(wall_finder_create(tree, begins, corners, same_plane * k->extent, &finder, error));
+    k->n_groups = 0;
+    for (size_t g = 0; g < tree->n_frames; g++) {
+        size_t n_walls = 0;
+        if (begins[g + 1] - begins[g] >= PARTED_LEAST)
+            TRY(wall_finder_find(finder, g, &k->walls, &n_walls, error));
+        part_range(k, &tree->frames[g], begins[g], begins[g + 1], n_walls);
+    }
+done:
+    wall_finder_destroy(finder);
+    return status;
+}
+
+lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*normal)[3],
+                           const element_corners *corners, size_t leaf_most, plane_tree *out,
+                           lam_error *error) {
     lam_status status = LAM_OK;
     plane_tree tree = {.n = n};
     maker k = {.centre = centre, .normal = normal, .leaf_most = leaf_most, .tree = &tree};
@@ -326,12 +439,11 @@ lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*no
     }
     for (int d = 0; d < 3; d++) k.extent = fmax(k.extent, high[d] - low[d]);
     split_planes(&k, 0, n, 0, 1);
-    begins = memory_allocate(k.n_groups + 1, sizeof *begins, "clusters", error);
-    tree.frames = memory_allocate(k.n_groups, sizeof *tree.frames, "clusters", error);
-    if (begins == NULL || tree.frames == NULL) TRY(LAM_ERR_MEMORY);
-    tree.n_frames = k.n_groups;
-    TRY(place_planes(&k, begins, error));
-    for (size_t g = 0; g < k.n_groups; g++) set_frame(&k, begins[g], begins[g + 1], &tree.frames[g]);
+    TRY(make_frames(&k, &begins, error));
+    if (corners != NULL) {
+        TRY(part_planes(&k, begins, corners, error));
+        if (k.n_groups > tree.n_frames) TRY(make_frames(&k, &begins, error));
+    }
     (void)join_planes(&k, begins, 0, k.n_groups);
     *out = tree;
     tree = (plane_tree){.n = 0};

@@ -1,5 +1,6 @@
-/* A binary tree of clusters over the elements of a mesh. Elements in one plane are halved across their longer
- * side down to a few elements a leaf; above, planes are joined by position and normal. */
+/* A binary tree of clusters over the elements of a mesh. Elements in one plane are parted where walls stand
+ * on it, and halved across their longer side down to a few elements a leaf; above, planes are joined by
+ * position and normal. */
 #ifndef LAMBERT_OPERATOR_BLOCKS_PLANE_TREE_H
 #define LAMBERT_OPERATOR_BLOCKS_PLANE_TREE_H
 
@@ -37,11 +38,19 @@ typedef struct plane_tree {
     plane_view view;         /* unknown until someone who knows the mesh says it */
 } plane_tree;
 
+/* The corners of elements. */
+typedef struct element_corners {
+    const double (*vertices)[3]; /* m */
+    const uint32_t (
+        *elements)[4]; /* [n] below the number of vertices; the fourth of a triangle: UINT32_MAX */
+} element_corners;
+
 void plane_tree_free(plane_tree *tree);
 
-/* centre [n], unit normal [n]; a leaf has at most leaf_most elements. Deterministic. Cost: O(n log n).
- * Errors: LAM_ERR_MEMORY. */
-lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*normal)[3], size_t leaf_most,
-                           plane_tree *out, lam_error *error);
+/* centre [n], unit normal [n]; a leaf has at most leaf_most elements. corners NULL: walls are not looked for.
+ * Deterministic. Cost: O(n log n). Errors: LAM_ERR_MEMORY. */
+lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*normal)[3],
+                           const element_corners *corners, size_t leaf_most, plane_tree *out,
+                           lam_error *error);
 
 #endif

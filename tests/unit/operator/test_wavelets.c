@@ -139,7 +139,7 @@ START_TEST(bits_do_not_depend_on_threads) {
         normal[i][2] = 1;
         area[i] = 1;
     }
-    ck_ok(plane_tree_make(N, (const double(*)[3])centre, (const float(*)[3])normal, 6, &tree, &error));
+    ck_ok(plane_tree_make(N, (const double(*)[3])centre, (const float(*)[3])normal, NULL, 6, &tree, &error));
     ck_ok(wavelet_basis_make(&tree, area, (const double(*)[3])centre, &w, &error));
     wavelet_plan plan = plan_of_all(&w);
     ck_assert_uint_gt(plan.n_pieces, 2);
