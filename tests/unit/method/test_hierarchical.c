@@ -160,7 +160,8 @@ START_TEST(noise_sets_the_threshold) {
     (void)of(&s);
     s.problem.noise = .2;
     lam_operator_close(build(&s.problem, .01, &report));
-    ck_assert_double_eq_tol(report_get(&report, "threshold", -1), .055 * .2, 1e-12);
+    /* The rows sum to 1, to 1e-6 in single precision. */
+    ck_assert_double_eq_tol(report_get(&report, "threshold", -1), .055 * .2, 1e-6 * .055 * .2);
     ck_assert_ptr_nonnull(strstr(report.reason, "noise"));
     closed_free(&s);
 }
@@ -193,6 +194,45 @@ START_TEST(small_rows_lower_the_threshold) {
         for (uint64_t e = 0; e < F->indptr[n]; e++) s.f.F.data[e] *= (float)share;
     }
     ck_assert_double_le(error_of[1], 1.2 * error_of[0]);
+    closed_free(&s);
+}
+END_TEST
+
+/* The threshold by the noise of a scene, over the one that the recipe's noise alone would set. */
+static double share_of_recipe(closed *s) {
+    build_report report;
+    s->problem.noise = .2;
+    lam_operator_close(build(&s->problem, .001, &report));
+    return report_get(&report, "threshold", -1) / (.055 * .2);
+}
+
+/* The noise is that of the rows: the root of the mean of sum_j 2 A_i F_ij / (A_i + A_j). */
+START_TEST(noise_is_that_of_the_rows) {
+    closed s = closed_make(unit_cube, 6, .5f);
+    const build_problem *problem = of(&s);
+    const size_t n = problem->n;
+    csr *F = &s.f.F;
+    build_report report;
+    double *area = s.f.m.area, sum = 0;
+    /* Rows of a closed scene of equal elements sum to 1, to 1e-6 in single precision. */
+    ck_assert_double_eq_tol(share_of_recipe(&s), 1, 1e-6);
+    /* A quarter of every row, and half of the noise. */
+    for (uint64_t e = 0; e < F->indptr[n]; e++) F->data[e] *= .25f;
+    ck_assert_double_eq_tol(share_of_recipe(&s), .5, 1e-6);
+    /* And half of the threshold by epsilon, where that is above the noise. */
+    lam_operator_close(build(problem, 1, &report));
+    ck_assert_double_eq_tol(report_get(&report, "threshold", -1), .5 * .02, 1e-6 * .5 * .02);
+    /* Small elements beside large ones, and the same S_ij = (A_i / A_j)^1/2 F_ij: a term is that times
+     * 2 (A_i A_j)^1/2 / (A_i + A_j), here 8/17 between both sizes. */
+    for (size_t i = 0; i < n; i++) area[i] *= i % 3 == 0 ? 1 : 1. / 16;
+    for (size_t i = 0; i < n; i++)
+        for (uint64_t e = F->indptr[i]; e < F->indptr[i + 1]; e++) {
+            const size_t j = F->indices[e];
+            sum += (double)F->data[e] * ((i % 3 == 0) == (j % 3 == 0) ? 1 : 8. / 17);
+            F->data[e] *= (float)sqrt(area[j] / area[i]);
+        }
+    ck_assert_double_eq_tol(share_of_recipe(&s), sqrt(sum / (double)n), 1e-6);
+    ck_assert_double_lt(share_of_recipe(&s), .45);
     closed_free(&s);
 }
 END_TEST
@@ -411,6 +451,7 @@ int main(void) {
     tcase_add_test(tests, black_and_white);
     tcase_add_test(tests, noise_sets_the_threshold);
     tcase_add_test(tests, small_rows_lower_the_threshold);
+    tcase_add_test(tests, noise_is_that_of_the_rows);
     tcase_add_test(tests, even_light_is_made_up_for);
     tcase_add_test(tests, some_elements);
     tcase_add_test(tests, blocks_in_place_of_rows);
