@@ -53,6 +53,10 @@ forecast_times forecast_seconds(const forecast *f, const forecast_rates *rates);
 /* Seconds of a clock on the wall. */
 double forecast_wall_seconds(double processor_seconds, const forecast_rates *rates);
 
+/* The single elements, between probes_least and probes, that take no longer than the form factors, by what is
+ * counted of both: no clock is read, so that the same scene has the same probes on every machine. */
+size_t forecast_probes(const forecast *f);
+
 /* Rays cast from one element; a hemicube is a ray for each of its pixels. Bytes: of the rows
  * of a merged sample, of packed rows, of one tile of a sky, of the judge's two samples, of the
  * operator in the store. */

@@ -39,9 +39,38 @@ static const double probes_expected = 48;
  * (10,249 to 163,811 elements), rooms, a maze and a patio, what the judge takes beside finding its blocks. */
 static const double probe_block_seconds = 1.1e-8, probe_element_seconds = 1e-7;
 
+/* Processor seconds of a ray, on no machine in particular; of a probe per channel and element beside the
+ * products with F: some eight answers of the operator that guides two solutions, vectors, and its direct
+ * light (a hotel room of 99,021 elements). */
+static const double ray_seconds = 3.3e-7, guided_element_seconds = 1.6e-6;
+/* Probes may always take these. */
+static const double probes_enough = 1;
+
+/* Of the probes beyond the least. */
+static double probe_seconds(const forecast *f) {
+    const double n = (double)f->n, C = (double)f->n_channels;
+    if (f->recipe.method == RECIPE_BLOCKS)
+        return C * (probe_block_seconds * forecast_blocks(n, &f->judge_recipe) + probe_element_seconds * n);
+    const double entries = forecast_rows_bytes(n, &f->judge_recipe) / 8;
+    const double least = (double)f->probes_least, most = (double)f->probes;
+    const double more = reference_seconds(n, entries, most) - reference_seconds(n, entries, least);
+    const double guided = f->n > REFERENCE_DENSE_ELEMENTS ? guided_element_seconds * n : 0;
+    return C * (2 * more / (most - least) + guided);
+}
+
+size_t forecast_probes(const forecast *f) {
+    const double n = (double)f->n;
+    if (f->probes_least == 0 || f->probes <= f->probes_least) return f->probes;
+    const forecast_rates fixed = {.ray_seconds = ray_seconds, .slowness = 1, .processors = 1};
+    const double build = f->cost.seconds > 0 ? f->cost.seconds : sample_seconds(n, &f->recipe, 0, &fixed);
+    const double count = fmax(build, probes_enough) / probe_seconds(f);
+    if (!(count > (double)f->probes_least)) return f->probes_least;
+    return count < (double)f->probes ? (size_t)count : f->probes;
+}
+
 /* Three references: the form factors of the operator, for the probes of the first round, and two others. */
 static double solve_seconds(const forecast *f) {
-    const double others = JUDGE_RANDOM_PROBES + 1, n = (double)f->n, most = (double)f->probes;
+    const double others = JUDGE_RANDOM_PROBES + 1, n = (double)f->n, most = (double)forecast_probes(f);
     const double probes = (f->probes_least > 0 ? fmin(most, probes_expected) : most) + others;
     if (f->recipe.method == RECIPE_BLOCKS)
         return (double)f->n_channels * probes *

@@ -181,8 +181,8 @@ static const option_row resource_rows[] = {
      .preset = "auto",
      .least = 0,
      .most = 1e6,
-     .help = "Single elements that the error is measured with; auto: 200, or 32 above 10240 elements; 0: no "
-             "measurement"},
+     .help = "Single elements that the error is measured with; auto: 32 to 200, until the mean is certain or "
+             "they take as long as the form factors; 0: no measurement"},
     {.name = "trials",
      .kind = OPTION_COUNT,
      .offset = FIELD(trials),

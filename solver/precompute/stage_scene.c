@@ -437,7 +437,8 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
         o = state->options;
     }
     TRY(choose_final_recipe(state, error));
-    state->probes = o->probes != OPTION_AUTO ? o->probes : PROBES;
+    const forecast f = state_forecast(state, (double)state->m.n);
+    state->probes = forecast_probes(&f);
     if (state->probes > state->m.n) state->probes = state->m.n;
     if (o->emitters != NULL) {
         TRY(emitter_list_read(o->emitters, &state->m, state->sky_tiles, &state->emitters, error));

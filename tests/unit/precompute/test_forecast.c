@@ -152,6 +152,43 @@ START_TEST(the_operator_takes_as_long) {
 }
 END_TEST
 
+/* Single elements take as long as the form factors, but at least 32 are taken. */
+START_TEST(probes_have_a_budget) {
+    forecast f = {.n = 99021,
+                  .n_channels = 3,
+                  .recipe = {.method = RECIPE_RAYS, .rays = 1024},
+                  .judge_recipe = {.method = RECIPE_RAYS, .rays = 512},
+                  .probes = 200,
+                  .probes_least = 32};
+    const size_t some = forecast_probes(&f);
+    ck_assert_uint_gt(some, 32);
+    ck_assert_uint_lt(some, 200);
+    f.n_channels = 1; /* a third of the work for each */
+    ck_assert_uint_ge(forecast_probes(&f), 2 * some);
+    f.n_channels = 3;
+    f.recipe.rays = 256;
+    ck_assert_uint_eq(forecast_probes(&f), 32);
+    f.cost.seconds = 1e4; /* by a sample: of more use than the number of rays */
+    ck_assert_uint_eq(forecast_probes(&f), 200);
+    f.probes_least = 0; /* --probes gives their number */
+    f.cost.seconds = 0;
+    ck_assert_uint_eq(forecast_probes(&f), 200);
+    f = (forecast){.n = 500, .n_channels = 3, .recipe = recipes[0], .judge_recipe = recipes[0]};
+    f.probes = 200;
+    f.probes_least = 32; /* an LU solves for all of them */
+    ck_assert_uint_eq(forecast_probes(&f), 200);
+    f = (forecast){.n = 163811,
+                   .n_channels = 1,
+                   .recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 4e-4},
+                   .judge_recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 2e-4},
+                   .cost = {.seconds = 3.6},
+                   .probes = 200,
+                   .probes_least = 32};
+    ck_assert_uint_ge(forecast_probes(&f), 32);
+    ck_assert_uint_lt(forecast_probes(&f), 100);
+}
+END_TEST
+
 START_TEST(more_work_takes_longer) {
     forecast f = {.n = 100000, .n_channels = 1, .recipe = recipes[1], .judge_recipe = recipes[1]};
     const forecast_times one = forecast_seconds(&f, &rates);
@@ -220,6 +257,7 @@ int main(void) {
     tcase_add_test(cases, kept_blocks_have_room);
     tcase_add_test(cases, the_judge_of_blocks_takes_as_long);
     tcase_add_test(cases, the_operator_takes_as_long);
+    tcase_add_test(cases, probes_have_a_budget);
     tcase_add_test(cases, more_work_takes_longer);
     tcase_add_test(cases, what_does_not_fit_is_refused);
     suite_add_tcase(suite, cases);
