@@ -37,7 +37,7 @@ static double blocks_of(const forecast *f, const recipe *r) {
 static const double probes_expected = 48;
 /* Processor seconds of a probe, per block and per element, with its direct light: of three Cornell boxes
  * (10,249 to 163,811 elements), rooms, a maze and a patio, what the judge takes beside finding its blocks. */
-static const double probe_block_seconds = 1.1e-8, probe_element_seconds = 1e-7;
+static const double probe_block_seconds = 9e-9, probe_element_seconds = 3e-7;
 
 /* Processor seconds of a ray, on no machine in particular; of a probe per channel and element beside the
  * products with F: some eight answers of the operator that guides two solutions, vectors, and its direct
@@ -105,11 +105,14 @@ forecast_times forecast_seconds(const forecast *f, const forecast_rates *rates) 
     const bool rays = own->method == RECIPE_RAYS, counted = is_counted(f) && !rays;
     const double entries = rays ? f->cost.entries / 2 : 0;
     const double once = counted ? f->cost.measured : sample_seconds(n, own, entries, rates);
+    /* Of blocks, those that find how much light leaves the scene; the judge needs none. */
+    const double beside = own->method == RECIPE_BLOCKS ? n * (double)own->rays * rates->ray_seconds : 0;
     const bool finer = own->method == RECIPE_BLOCKS; /* the judge's blocks */
     const double more = finer ? blocks_of(f, of_judge) / blocks_of(f, own) : 1;
     const double half = counted ? once * more : sample_seconds(n, of_judge, entries / 2, rates);
     if (!f->from_store)
-        times.form_factors = f->streamed && !counted ? n * forecast_rays(n, own) * rates->ray_seconds : once;
+        times.form_factors =
+            f->streamed && !counted ? n * forecast_rays(n, own) * rates->ray_seconds : once + beside;
     times.operate = operator_seconds(f) * rates->slowness;
     /* Both samples of pairs share what is projected, and the number of segments of one. */
     const bool shared = of_judge->method == RECIPE_PAIRS && !f->scratch;

@@ -180,6 +180,13 @@ static lam_status run_trial(precompute_state *state, lam_error *error) {
         log_stage(state, "judge", started);
     }
     if (first) state->spent.judge = since(&used);
+    if (first && state->streamed) { /* rows are found as the operator asks for them */
+        forecast_times *const times[] = {&state->expected_times, &state->spent};
+        for (int k = 0; k < 2; k++) {
+            times[k]->operate += times[k]->form_factors;
+            times[k]->form_factors = 0;
+        }
+    }
     TRY(terminal_check(error));
 done:
     return status;

@@ -93,7 +93,7 @@ done:
     return status;
 }
 
-/* The rays that a sky takes beside blocks. */
+/* The rays that a sky takes beside blocks; a forecast counts those of any blocks. */
 static lam_status add_sky(precompute_state *state, const recipe *blocks, pairs_cost *cost, lam_error *error) {
     lam_status status = LAM_OK;
     const recipe rays = {.method = RECIPE_RAYS, .rays = blocks->rays};
@@ -101,7 +101,6 @@ static lam_status add_sky(precompute_state *state, const recipe *blocks, pairs_c
     if (state->options->sky == NULL) return LAM_OK;
     TRY(pairs_forecast(&state->m, &rays, &state->progress, &of_rays, error));
     cost->seconds += of_rays.seconds;
-    cost->measured += of_rays.measured;
 done:
     return status;
 }
