@@ -22,12 +22,12 @@ static mesh make_scene(const char *kind, size_t elements) {
 }
 
 /* The unoccluded factor, which both samples share, is found far better. */
-static pairs_options options_of(double accuracy, int occluders, uint64_t seed) {
+static pairs_options options_of(double accuracy, int projected, uint64_t seed) {
     return (pairs_options){.tolerance = 1e-8,
                            .accuracy = accuracy,
                            .segments = 8,
                            .segments_most = 1e12,
-                           .occluders = occluders,
+                           .occluders = projected,
                            .seed = seed};
 }
 
@@ -47,7 +47,7 @@ typedef struct squares {
     size_t disturbed, pairs;
 } squares;
 
-static squares measure(const mesh *m, const visibility *v, double accuracy, int occluders) {
+static squares measure(const mesh *m, const visibility *v, double accuracy, int projected) {
     lam_error error = {.message = ""};
     squares sum = {.error = 0};
     csr fine;
@@ -58,7 +58,7 @@ static squares measure(const mesh *m, const visibility *v, double accuracy, int 
     ck_ok(pairs_exchange(m, v, &finest, &fine, &report, NULL, &error));
     double *const truth = dense_of(&fine), *bias = calloc(count, sizeof *bias);
     for (uint64_t seed = 0; seed < SEEDS; seed++) {
-        const pairs_options how = options_of(accuracy, occluders, 2 * seed + 1);
+        const pairs_options how = options_of(accuracy, projected, 2 * seed + 1);
         csr G[2], one;
         ck_ok(pairs_exchange_twice(m, v, &how, 2 * seed + 2, stages, G, &report, &error));
         ck_ok(pairs_exchange(m, v, &how, &one, &report, NULL, &error));
@@ -88,18 +88,18 @@ static squares measure(const mesh *m, const visibility *v, double accuracy, int 
 }
 
 /* times: that errors and noise may differ by. */
-static void compare(const char *kind, int occluders, bool projects, double times) {
+static void compare(const char *kind, int projected, bool projects, double times) {
     lam_error error = {.message = ""};
     visibility *v;
     mesh m = make_scene(kind, 150);
     ck_ok(visibility_create(&m, &v, &error));
-    const squares s = measure(&m, v, 7e-4, occluders);
+    const squares s = measure(&m, v, 7e-4, projected);
     ck_assert_uint_gt(s.disturbed, 0);
     ck_assert_msg(s.error < times * times * s.noise && s.noise < times * times * s.error,
                   "error %g, noise %g", sqrt(s.error), sqrt(s.noise));
     /* N segments have an error as N^-3/4, few of them as N^-1/2: the mean of two samples of N/2 has one or
      * 2^(1/2) times the squared error of one of N. With N each it would be half. */
-    if (occluders == 0)
+    if (projected == 0)
         ck_assert_msg(s.error > .8 * s.alone && s.error < 1.8 * s.alone, "error %g, of one sample %g",
                       sqrt(s.error), sqrt(s.alone));
     /* Of projected pairs one in eight is projected twice. */
