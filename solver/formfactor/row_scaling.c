@@ -23,9 +23,11 @@ static double tolerance_of(const row_scaling *c) {
 static lam_status measure(row_scaling *c, lam_error *error) {
     const lam_status status = c->sums(c->context, c->d, c->r, error);
     c->products++;
-    c->worst = 0;
+    double worst = 0;
+#pragma omp parallel for schedule(static) reduction(max : worst)
     for (size_t i = 0; i < c->n; i++)
-        if (c->r[i] > 0) c->worst = fmax(c->worst, fabs(c->r[i] / c->area[i] - 1));
+        if (c->r[i] > 0) worst = fmax(worst, fabs(c->r[i] / c->area[i] - 1));
+    c->worst = worst;
     return status;
 }
 
@@ -48,6 +50,7 @@ typedef struct history {
     size_t n, held, next;
     double *x, *f;                 /* [n], before the present step */
     double *dx[STEPS], *df[STEPS]; /* [n] each */
+    double products[STEPS][STEPS]; /* of the df held */
 } history;
 
 static lam_status history_create(history *h, size_t n, lam_error *error) {
@@ -62,26 +65,53 @@ static lam_status history_create(history *h, size_t n, lam_error *error) {
     return LAM_OK;
 }
 
-static double product(const double *a, const double *b, const double *weight, size_t n) {
-    double sum = 0;
-    for (size_t i = 0; i < n; i++) sum += weight[i] * a[i] * b[i];
-    return sum;
+/* Numbers that are summed up apart, so that sums do not depend on the number of threads. */
+enum { SUMMED_APART = 4096 };
+
+/* sums_k = sum_i weight_i a_i b_k,i for `count` vectors b. Errors: LAM_ERR_MEMORY. */
+static lam_status products_with(const double *weight, const double *a, size_t count, double *const *b,
+                                size_t n, double *sums, lam_error *error) {
+    const size_t parts = (n + SUMMED_APART - 1) / SUMMED_APART;
+    double(*part)[STEPS] = memory_allocate(parts, sizeof *part, "row scales", error);
+    if (part == NULL) return LAM_ERR_MEMORY;
+#pragma omp parallel for schedule(static)
+    for (size_t p = 0; p < parts; p++) {
+        const size_t first = p * SUMMED_APART, last = first + SUMMED_APART < n ? first + SUMMED_APART : n;
+        for (size_t k = 0; k < count; k++)
+            for (size_t i = first; i < last; i++) part[p][k] += weight[i] * a[i] * b[k][i];
+    }
+    for (size_t k = 0; k < count; k++) {
+        sums[k] = 0;
+        for (size_t p = 0; p < parts; p++) sums[k] += part[p][k];
+    }
+    free(part);
+    return LAM_OK;
+}
+
+/* The products of the step that was taken last with all that are held. */
+static lam_status history_add(history *h, const double *area, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t added = h->next;
+    double sums[STEPS];
+    h->next = (h->next + 1) % STEPS;
+    if (h->held < STEPS) h->held++;
+    TRY(products_with(area, h->df[added], h->held, h->df, h->n, sums, error));
+    for (size_t k = 0; k < h->held; k++) h->products[k][added] = h->products[added][k] = sums[k];
+done:
+    return status;
 }
 
 /* gamma = argmin |f - sum gamma_k df_k|, weighted by areas, by the normal equations of the df_k scaled to
- * length 1; false where these are singular. */
-static bool least_squares(const history *h, const double *f, const double *area, double gamma[STEPS]) {
-    double A[STEPS * STEPS], b[STEPS], length[STEPS], rcond;
+ * length 1, b_k = <f, df_k>; false where these are singular. */
+static bool least_squares(const history *h, const double b[STEPS], double gamma[STEPS]) {
+    double A[STEPS * STEPS], length[STEPS], rcond;
     const size_t held = h->held;
     for (size_t k = 0; k < held; k++) {
-        for (size_t l = 0; l <= k; l++)
-            A[k * held + l] = A[l * held + k] = product(h->df[k], h->df[l], area, h->n);
-        b[k] = product(h->df[k], f, area, h->n);
-        length[k] = sqrt(A[k * held + k]);
+        length[k] = sqrt(h->products[k][k]);
         if (!(length[k] > 0)) return false;
     }
     for (size_t k = 0; k < held; k++) {
-        for (size_t l = 0; l < held; l++) A[k * held + l] /= length[k] * length[l];
+        for (size_t l = 0; l < held; l++) A[k * held + l] = h->products[k][l] / (length[k] * length[l]);
         A[k * held + k] += alike; /* the diagonal is 1 */
     }
     if (core_invert(held, A, &rcond, NULL) != LAM_OK) return false;
@@ -110,7 +140,8 @@ static lam_status extrapolate(row_scaling *c, double *before, bool *settled, lam
         *settled = c->worst <= tolerance_of(c);
         if (*settled || c->worst > GROWTH_MOST * least) break;
         least = fmin(least, c->worst);
-        double *dx = h.dx[h.next], *df = h.df[h.next], gamma[STEPS];
+        double *dx = h.dx[h.next], *df = h.df[h.next], b[STEPS], gamma[STEPS];
+#pragma omp parallel for schedule(static)
         for (size_t i = 0; i < n; i++) {
             const double x = log(c->d[i]), f = c->r[i] > 0 ? .5 * log(c->area[i] / c->r[i]) : 0;
             dx[i] = x - h.x[i];
@@ -118,11 +149,10 @@ static lam_status extrapolate(row_scaling *c, double *before, bool *settled, lam
             h.x[i] = x;
             h.f[i] = f;
         }
-        if (count > 0) {
-            h.next = (h.next + 1) % STEPS;
-            if (h.held < STEPS) h.held++;
-        }
-        if (!least_squares(&h, h.f, c->area, gamma)) h.held = 0;
+        if (count > 0) TRY(history_add(&h, c->area, error));
+        TRY(products_with(c->area, h.f, h.held, h.df, n, b, error));
+        if (!least_squares(&h, b, gamma)) h.held = h.next = 0;
+#pragma omp parallel for schedule(static)
         for (size_t i = 0; i < n; i++) {
             double x = h.x[i] + h.f[i];
             for (size_t k = 0; k < h.held; k++) x -= gamma[k] * (h.dx[k][i] + h.df[k][i]);
