@@ -15,7 +15,7 @@ enum { SIZES = 5, SOLVES = 31, SOLVES_OF_LARGE = 7, LARGE_SOLVE = 1 << 28 };
 /* Rays of near pairs at all sizes, so that time grows at an equal number of them; beyond NEAR_MOST elements
  * their rows take more memory than they are worth. The bound of blocks is the one at defaults. */
 enum { RAYS = 512, NEAR_MOST = 200000 };
-static const double accuracy = 7e-5, block_accuracy = 2.8e-4, epsilon = .05, reflectance = .6;
+static const double accuracy = 7e-5, block_accuracy = 2.4e-4, epsilon = .05, reflectance = .6;
 
 enum { PROBES = 16, PROBES_QUICK = 4 };
 

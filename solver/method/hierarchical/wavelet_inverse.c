@@ -4,6 +4,7 @@
 #include "store/status.h"
 
 #include <math.h>
+#include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -278,23 +279,54 @@ static int by_column(const void *left, const void *right) {
     return a->column < b->column ? -1 : a->column > b->column;
 }
 
-/* out: entries of the upper triangle of K above the threshold, times their weights. Rows of K lose the
- * others. */
-static lam_status final_upper(const doubling *d, term_rows *K, csr *out, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t n = K->n, n_threads = d->input->n_threads;
-    const float threshold = d->input->threshold, *weight = d->weight;
-    csr made = {.n = n, .indptr = memory_allocate(n + 1, sizeof *made.indptr, "wavelets", error)};
-    if (made.indptr == NULL) TRY(LAM_ERR_MEMORY);
-#pragma omp parallel for schedule(static) num_threads((int)n_threads)
-    for (size_t i = 0; i < n; i++) {
+/* Rows first to last - 1 of K, those of a node, lose their lower triangle, entries that are not above
+ * `entry`, and tiles, all entries between two nodes, whose 2-norm is not above `tile`. They are sorted by
+ * column. */
+static void keep_tiles(const uint32_t *node_of, float entry, float tile, size_t first, size_t last,
+                       term_rows *K, row_work *w) {
+    w->count = 0;
+    for (size_t i = first; i < last; i++)
+        for (size_t e = 0; e < K->length[i]; e++) {
+            const row_term *k = &K->row[i][e];
+            row_work_add(w, node_of[k->column], k->value * k->value);
+        }
+    for (size_t i = first; i < last; i++) {
         row_term *const row = K->row[i];
         uint32_t kept = 0;
         for (size_t e = 0; e < K->length[i]; e++)
-            if (row[e].column >= i && fabsf(row[e].value) > threshold) row[kept++] = row[e];
+            if (row[e].column >= i && fabsf(row[e].value) > entry &&
+                w->sums[node_of[row[e].column]] > tile * tile)
+                row[kept++] = row[e];
         if (kept > 1) qsort(row, kept, sizeof *row, by_column);
         K->length[i] = kept;
     }
+    for (size_t k = 0; k < w->count; k++) w->sums[w->columns[k]] = 0;
+}
+
+/* The coefficients of node t are first to last - 1; those of the root include its scaling functions. */
+static size_t last_of(const wavelets *w, size_t t) {
+    const wavelet_node *a = &w->nodes[t];
+    return t + 1 < w->n_nodes ? a->first + a->inputs - a->scaling : w->n;
+}
+
+/* out: the entries of the upper triangle of K that are kept, times their weights. Rows of K lose the others.
+ */
+static lam_status final_upper(const doubling *d, term_rows *K, csr *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const wavelet_inverse_input *input = d->input;
+    const wavelets *const basis = input->basis;
+    const size_t n = K->n, n_threads = input->n_threads;
+    const float entry = input->entry * input->threshold, tile = input->tile * input->threshold,
+                *weight = d->weight;
+    uint32_t *node_of = memory_allocate(n, sizeof *node_of, "wavelets", error);
+    csr made = {.n = n, .indptr = memory_allocate(n + 1, sizeof *made.indptr, "wavelets", error)};
+    if (made.indptr == NULL || node_of == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t t = 0; t < basis->n_nodes; t++)
+        for (size_t i = basis->nodes[t].first; i < last_of(basis, t); i++) node_of[i] = (uint32_t)t;
+#pragma omp parallel for schedule(dynamic, 256) num_threads((int)n_threads)
+    for (size_t t = 0; t < basis->n_nodes; t++)
+        keep_tiles(node_of, entry, tile, basis->nodes[t].first, last_of(basis, t), K,
+                   &d->works[omp_get_thread_num()]);
     for (size_t i = 0; i < n; i++) made.indptr[i + 1] = made.indptr[i] + K->length[i];
     made.indices = memory_allocate((size_t)made.indptr[n], sizeof *made.indices, "wavelets", error);
     made.data = memory_allocate((size_t)made.indptr[n], sizeof *made.data, "wavelets", error);
@@ -309,6 +341,7 @@ static lam_status final_upper(const doubling *d, term_rows *K, csr *out, lam_err
     *out = made;
     made = (csr){.n = 0};
 done:
+    free(node_of);
     csr_free(&made);
     return status;
 }

@@ -19,9 +19,11 @@ typedef struct wavelet_inverse_input {
     bool last;           /* nobody needs S afterwards: it is freed on the way */
     const float *rho;    /* [n], by position, in [0, 1) */
     const float *weight; /* [n_nodes] */
-    float threshold;     /* K_ij is kept above threshold weight_i weight_j */
-    float inner;         /* entries of products are kept above this share of it */
-    float skipped;       /* terms of products are left out below this share of it */
+    float threshold;     /* of all shares, times weight_i weight_j: */
+    float entry, tile; /* K_ij is kept above `entry`, where all K between two nodes, over their weights, have
+                          a 2-norm above `tile` */
+    float inner;       /* entries of products are kept above this share of it */
+    float skipped;     /* terms of products are left out below this share of it */
     size_t n_threads;
     const progress *progress;
 } wavelet_inverse_input;

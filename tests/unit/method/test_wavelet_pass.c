@@ -260,6 +260,7 @@ START_TEST(what_is_skipped_is_small) {
                                    .rho = rho,
                                    .weight = weight,
                                    .threshold = 1e-3f,
+                                   .entry = 1,
                                    .inner = .25f,
                                    .skipped = .005f,
                                    .n_threads = 1};
@@ -282,6 +283,63 @@ START_TEST(what_is_skipped_is_small) {
 }
 END_TEST
 
+/* Of all entries those are kept that are large enough and stand in a tile that is, and in both triangles
+ * alike.
+ */
+START_TEST(tiles_are_kept_whole) {
+    subject s = wavelet_subject_make(_i);
+    const size_t n = s.m.n;
+    float *rho = reflectance(&s, EACH_ITS_OWN), *weight = NULL;
+    ck_ok(wavelets_weights(&s.basis, &weight, &error));
+    csr in = pass(&s, 0, weight, 2), found, all;
+    wavelet_inverse_report report;
+    wavelet_inverse_input input = {.basis = &s.basis,
+                                   .S = &in,
+                                   .rho = rho,
+                                   .weight = weight,
+                                   .threshold = 1e-3f,
+                                   .inner = .25f,
+                                   .skipped = .005f,
+                                   .n_threads = 2};
+    ck_ok(wavelet_inverse(&input, &all, &report, &error));
+    input.entry = .5f;
+    input.tile = 3;
+    ck_ok(wavelet_inverse(&input, &found, &report, &error));
+    size_t *node_of = test_allocate(n, sizeof *node_of), kept = 0, small = 0, lone = 0;
+    for (size_t t = 0; t < s.basis.n_nodes; t++)
+        for (size_t i = s.basis.nodes[t].first; i < n; i++) node_of[i] = t;
+    double *norm = test_allocate(s.basis.n_nodes * s.basis.n_nodes, sizeof *norm);
+    double *a = whole(&all), *b = whole(&found);
+    for (size_t k = 0; k < n * n; k++) {
+        const size_t t = node_of[k / n], u = node_of[k % n];
+        const double light = a[k] / ((double)weight[t] * (double)weight[u]);
+        norm[t * s.basis.n_nodes + u] += light * light;
+    }
+    for (size_t k = 0; k < n * n; k++) {
+        const size_t t = node_of[k / n], u = node_of[k % n];
+        const double least = 1e-3 * (double)weight[t] * (double)weight[u], share = fabs(a[k]) / least,
+                     tile = sqrt(norm[t * s.basis.n_nodes + u]) / 1e-3;
+        /* Both triangles differ by what was left out of products, and sums are rounded. */
+        if (fabs(share - .5) < .02 || fabs(tile - 3) < .1) continue;
+        ck_assert(b[k] == (share > .5 && tile > 3 ? a[k] : 0));
+        kept += share > .5 && tile > 3;
+        small += share > .5 && share < 1 && tile > 3;
+        lone += share > 1 && tile < 3;
+    }
+    ck_assert(kept > small && small > 0 && lone > 0);
+    csr_free(&in);
+    csr_free(&found);
+    csr_free(&all);
+    free(rho);
+    free(weight);
+    free(node_of);
+    free(norm);
+    free(a);
+    free(b);
+    wavelet_subject_free(&s);
+}
+END_TEST
+
 START_TEST(doubling_inverts) {
     subject s = wavelet_subject_make(_i % SUBJECTS);
     const size_t n = s.m.n;
@@ -296,6 +354,7 @@ START_TEST(doubling_inverts) {
                                    .rho = rho,
                                    .weight = weight,
                                    .threshold = 1e-6f,
+                                   .entry = 1,
                                    .inner = .01f,
                                    .skipped = .001f,
                                    .n_threads = 1,
@@ -371,6 +430,7 @@ START_TEST(bounces_that_cancel) {
                                          .rho = rho,
                                          .weight = weight,
                                          .threshold = 1e-6f,
+                                         .entry = 1,
                                          .inner = .01f,
                                          .skipped = .001f,
                                          .n_threads = 1};
@@ -409,6 +469,7 @@ int main(void) {
     tcase_add_loop_test(tests, one_even_light_is_put_in, 0, SUBJECTS);
     tcase_add_loop_test(tests, reflectances_in_the_basis, 0, SUBJECTS * REFLECTANCES);
     tcase_add_loop_test(tests, what_is_skipped_is_small, 0, SUBJECTS);
+    tcase_add_loop_test(tests, tiles_are_kept_whole, 0, SUBJECTS);
     tcase_add_test(tests, bounces_that_cancel);
     tcase_add_loop_test(tests, doubling_inverts, 0, SUBJECTS * REFLECTANCES);
     suite_add_tcase(suite, tests);
