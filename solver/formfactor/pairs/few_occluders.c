@@ -23,7 +23,26 @@ void few_occluders_free(few_occluders *f) {
 }
 
 bool few_occluders_apply(const few_occluders *f) {
-    return f->most > 0 && f->occluders.n <= SCENE_OCCLUDERS_MOST;
+    return f->most > 0 && f->occluders.n > 0 && f->occluders.n <= FEW_OCCLUDERS;
+}
+
+bool few_occluders_pay(const few_occluders *f, const cluster_tree *t, const cluster_links *links) {
+    enum { SAMPLE = 2000 };
+    const size_t step = links->n / SAMPLE + 1;
+    size_t counted = 0, uncounted = 0;
+    if (f->most == 0 || f->occluders.n <= FEW_OCCLUDERS) return few_occluders_apply(f);
+    for (size_t k = 0; k < links->n; k += step) {
+        const cluster_link *link = &links->links[k];
+        const cluster *a = &t->clusters[link->a], *b = &t->clusters[link->b];
+        link_occluders among;
+        shaft s;
+        if (link->open || link->a == link->b) continue;
+        cluster_shaft_init(&s, a, b, f->occluders.slack);
+        link_occluders_find(&f->occluders, &s, a, b, &among);
+        counted += among.count >= 0;
+        uncounted += among.count < 0;
+    }
+    return counted > uncounted;
 }
 
 double few_occluders_tolerance(const few_occluders *f, uint32_t i, uint32_t j, double g, double accuracy) {

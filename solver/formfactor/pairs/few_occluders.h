@@ -3,6 +3,7 @@
 #ifndef LAMBERT_FORMFACTOR_PAIRS_FEW_OCCLUDERS_H
 #define LAMBERT_FORMFACTOR_PAIRS_FEW_OCCLUDERS_H
 
+#include "solver/formfactor/pairs/cluster_links.h"
 #include "solver/formfactor/pairs/projection.h"
 #include "solver/formfactor/visibility/visibility.h"
 
@@ -18,11 +19,12 @@ typedef struct few_occluders {
 
 typedef enum few_verdict { FEW_UNDECIDED, FEW_OPEN, FEW_HIDDEN, FEW_PARTIAL } few_verdict;
 
-/* Scenes with more occluders are left to segments: so many stand between most of their pairs that finding
- * this out costs more than the few that projection decides gain. A Cornell box has 40 (636 elements), rooms
- * 28 (of 1,498), a maze 59 (1,513); a canopy 693 (1,499), a patio 933 (1,508). */
-enum { SCENE_OCCLUDERS_MOST = 256 };
+/* True where the scene has occluders, and few enough that clusters are compared with them too. */
 bool few_occluders_apply(const few_occluders *f);
+
+/* True where pairs of these links are to be projected: where few_occluders_apply, or few stand between most
+ * of a sample of the links. Else finding them costs more than projection gains. */
+bool few_occluders_pay(const few_occluders *f, const cluster_tree *t, const cluster_links *links);
 
 /* The tolerance of a pair's share that keeps its factor, F_ij or F_ji, to a third of the accuracy that
  * segments would have: projection is fast enough for it. */

@@ -23,12 +23,13 @@ void link_occluders_find(const occluders *o, const shaft *s, const cluster *a, c
                          link_occluders *out) {
     const uint32_t *found;
     uint32_t count;
+    const int most = o->n <= FEW_OCCLUDERS ? LINK_OCCLUDERS_MOST : LINK_OCCLUDERS_AMID_MANY;
     out->count = 0;
     for (occluder_search search = occluder_search_begin(o, s); occluder_search_next(&search, &found, &count);)
         for (uint32_t k = 0; k < count; k++) {
             const occluder *one = &o->of[found[k]];
             if (shaft_misses_points(s, one->n, one->corner) || !is_between(one, a, b, o->slack)) continue;
-            if (out->count == LINK_OCCLUDERS_MOST) {
+            if (out->count == most) {
                 out->count = OCCLUDERS_UNCOUNTED;
                 return;
             }

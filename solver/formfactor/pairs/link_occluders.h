@@ -5,8 +5,10 @@
 #include "solver/formfactor/pairs/cluster_shaft.h"
 #include "solver/formfactor/visibility/occluders.h"
 
-/* Occluders that may stand between two clusters; count: or OCCLUDERS_UNCOUNTED, where there are more. */
-enum { LINK_OCCLUDERS_MOST = 48, OCCLUDERS_UNCOUNTED = -1 };
+/* Occluders that may stand between two clusters, at most: of a scene that has FEW_OCCLUDERS, or more. Where
+ * there are more between, count is OCCLUDERS_UNCOUNTED. */
+enum { LINK_OCCLUDERS_MOST = 48, LINK_OCCLUDERS_AMID_MANY = 8, FEW_OCCLUDERS = 256 };
+enum { OCCLUDERS_UNCOUNTED = -1 };
 typedef struct link_occluders {
     int count;
     uint32_t of[LINK_OCCLUDERS_MOST];

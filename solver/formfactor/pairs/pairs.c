@@ -21,7 +21,7 @@ typedef struct pairs_run {
     polygon *polygons; /* [n], by element */
     occlusion occlusion;
     few_occluders few;
-    bool projects; /* few applies */
+    bool projects; /* pairs with few occluders */
     cluster_tree tree;
     uint32_t *leaf;   /* [n], the leaf of a position */
     uint32_t *parent; /* of each cluster */
@@ -433,13 +433,13 @@ lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_option
     if (options->occluders > 0) {
         TRY(few_occluders_make(m, v, run.polygons, &run.rules, options->seed, options->occluders, &run.few,
                                error));
-        run.projects = few_occluders_apply(&run.few);
     }
     TRY(element_neighbours_find(m, run.neighbours, error));
     TRY(cluster_tree_build(m, slack, &run.tree, error));
     TRY(pair_far_table_build(run.polygons, &run.tree, &run.rules, options->tolerance, &run.far, error));
-    if (run.projects) how.occluders = &run.few.occluders;
+    if (few_occluders_apply(&run.few)) how.occluders = &run.few.occluders;
     TRY(cluster_links_find(m, &run.tree, &run.occlusion, &how, &run.links, error));
+    run.projects = options->occluders > 0 && few_occluders_pay(&run.few, &run.tree, &run.links);
     TRY(find_parents(&run, error));
     TRY(run_passes(&run, report, kept, error));
     report->hidden += run.links.hidden_pairs;

@@ -19,7 +19,7 @@ typedef struct sample_run {
     polygon *polygons; /* [n], by element */
     occlusion occlusion;
     few_occluders few;
-    bool projects; /* few applies */
+    bool projects; /* pairs with few occluders */
     cluster_tree tree;
     pair_far_table far;
     cluster_links links;
@@ -166,12 +166,12 @@ lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options 
     if (options->occluders > 0) {
         TRY(few_occluders_make(m, v, run.polygons, &run.rules, options->seed, options->occluders, &run.few,
                                error));
-        run.projects = few_occluders_apply(&run.few);
-        if (run.projects) how.occluders = &run.few.occluders;
+        if (few_occluders_apply(&run.few)) how.occluders = &run.few.occluders;
     }
     TRY(cluster_tree_build(m, slack, &run.tree, error));
     TRY(pair_far_table_build(run.polygons, &run.tree, &run.rules, options->tolerance, &run.far, error));
     TRY(cluster_links_find(m, &run.tree, &run.occlusion, &how, &run.links, error));
+    run.projects = options->occluders > 0 && few_occluders_pay(&run.few, &run.tree, &run.links);
     for (size_t k = 0; k < run.links.n; k++) {
         const cluster *a = &run.tree.clusters[run.links.links[k].a],
                       *b = &run.tree.clusters[run.links.links[k].b];

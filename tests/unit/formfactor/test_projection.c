@@ -425,6 +425,50 @@ START_TEST(closed_room_with_a_box) {
 }
 END_TEST
 
+/* Plates, half hidden by one square between them, in a scene of more than FEW_OCCLUDERS: `pieces` squares lie
+ * aside in one plane, or at different heights between the plates. */
+static mesh plates_among_many(bool between, size_t pieces) {
+    mesh m = plates(NULL);
+    mesh more = {0};
+    for (size_t e = 0; e < m.n; e++) {
+        double corner[4][3];
+        for (int c = 0; c < 4; c++) memcpy(corner[c], m.vertices[m.elements[e][c]], sizeof corner[c]);
+        mesh_add_quad(&more, (const double(*)[3])corner);
+    }
+    mesh_free(&m);
+    for (size_t k = 0; k <= pieces; k++) {
+        const bool hides = k == pieces;
+        const double x = hides ? 0 : (between ? .05 : 3) + .05 * (double)(k % 18),
+                     y = hides ? 0 : .05 * (double)(k / 18);
+        const double z = hides || !between ? .5 : .2 + .001 * (double)k, width = hides ? .5 : .03,
+                     depth = hides ? 1 : .03;
+        const double corner[4][3] = {
+            {x, y, z}, {x + width, y, z}, {x + width, y + depth, z}, {x, y + depth, z}};
+        mesh_add_quad(&more, corner);
+    }
+    mesh_finish(&more, .5f);
+    return more;
+}
+
+/* With few candidates between most clusters the pair of plates is projected, and exact as it is alone; with
+ * many it gets segments. */
+START_TEST(scenes_of_many_occluders_project_where_few_stand_between) {
+    enum { PIECES = 300 };
+    for (int between = 0; between < 2; between++) {
+        pairs_report report;
+        mesh m = plates_among_many(between == 1, PIECES);
+        csr G = exchange(&m, 1e-4, 1, &report);
+        const double F = csr_entry(&G, 0, 1) / m.area[0];
+        if (between == 1) ck_assert_double_eq(report.projected, 0);
+        if (between == 1) ck_assert_double_lt(F, plates_cases[2].F - 1e-3);
+        if (between == 0) ck_assert_double_ge(report.projected, 1);
+        if (between == 0) ck_assert_double_eq_tol(F, plates_cases[2].F, 1e-4 + 1e-7);
+        csr_free(&G);
+        mesh_free(&m);
+    }
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("projection");
     TCase *cases = tcase_create("projection");
@@ -435,6 +479,7 @@ int main(void) {
     tcase_add_test(cases, touching_elements_are_exact);
     tcase_add_loop_test(cases, openings_lose_nothing, 0, 15);
     tcase_add_test(cases, closed_room_with_a_box);
+    tcase_add_test(cases, scenes_of_many_occluders_project_where_few_stand_between);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }
