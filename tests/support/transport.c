@@ -42,6 +42,10 @@ static void make_sparse(transport *t, const transport_parts *parts) {
         for (size_t p = 0; p < n; p++)
             arrays.weight[p] = (float)(2. * (double)(p + 1) / (double)(n * (n + 1)));
     }
+    if (strstr(t->name, "parts") != NULL) {
+        arrays.part = test_allocate(n, sizeof *arrays.part);
+        for (size_t p = 0; p < n; p++) arrays.part[p] = p % 5 < 2 ? 0 : 2; /* the part 1 is empty */
+    }
     for (size_t c = 0; c < C; c++) {
         double *P = t->P + c * n * n, *magnitude = t->magnitude + c * n * n;
         csr *M = &arrays.M[c];
@@ -68,8 +72,9 @@ static void make_sparse(transport *t, const transport_parts *parts) {
             if (arrays.delta != NULL) arrays.delta[p] = (float)lost;
             for (size_t q = 0; q < n; q++) {
                 const size_t j = t->order != NULL ? t->order[q] : q;
+                const bool lit = arrays.part == NULL || arrays.part[p] == arrays.part[q];
                 const double spread =
-                    arrays.delta != NULL ? (double)arrays.delta[p] * (double)arrays.weight[q] : 0;
+                    arrays.delta != NULL && lit ? (double)arrays.delta[p] * (double)arrays.weight[q] : 0;
                 magnitude[i * n + j] = fabs(P[i * n + j]) + fabs(spread);
                 P[i * n + j] += spread;
             }

@@ -57,6 +57,7 @@ double sum_roundings(size_t count);
     X(TWO_MESH_I8, "two meshes, folded, i8", "two_mesh", PANEL_I8, make_low_rank)                            \
     X(TWO_MESH_COLOUR_I8, "two meshes, 3 channels, i8", "two_mesh", PANEL_I8, make_low_rank)                 \
     X(SPARSE, "sparse, with delta", "sparse", PANEL_F32, make_sparse)                                        \
+    X(SPARSE_PARTS, "sparse, with delta of parts", "sparse", PANEL_F32, make_sparse)                         \
     X(SPARSE_COLOUR, "sparse, 3 channels", "sparse", PANEL_F32, make_sparse)                                 \
     X(HIERARCHICAL, "hierarchical", "hierarchical", PANEL_F32, make_hierarchical)                            \
     X(HIERARCHICAL_COLOUR, "hierarchical, 3 channels", "hierarchical", PANEL_F32, make_hierarchical)         \

@@ -1,6 +1,7 @@
 /* sparse: for scenes that hide most of themselves, where F has few entries and no low rank (Aguerre 2016,
  * chapter 4). */
 #include "solver/base/clock.h"
+#include "solver/linalg/csr_parts.h"
 #include "solver/method/choice.h"
 #include "solver/method/reference.h"
 #include "solver/method/sparse/sparse_inverse.h"
@@ -98,13 +99,33 @@ done:
     return status;
 }
 
-/* Weights of the mean of E: areas, or, as in Aguerre 2016, the same for every element. */
-static void set_weights(const build_problem *problem, sparse_correction correction, float *weight) {
-    double sum = 0;
-    for (size_t i = 0; i < problem->n; i++) sum += problem->area[i];
-    for (size_t p = 0; p < problem->n; p++)
-        weight[p] = correction == SPARSE_DELTA ? (float)(problem->area[problem->order[p]] / sum)
-                                               : 1 / (float)problem->n;
+/* Weights of the mean of E: areas, or, as in Aguerre 2016, the same for every element; in each of the parts
+ * of the scene between which F has no entry, and which get no light of each other. */
+static lam_status set_weights(const build_problem *problem, sparse_correction correction,
+                              sparse_arrays *arrays, size_t *n_parts, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = problem->n;
+    double *sums = NULL;
+    uint32_t *of_element = memory_allocate(n, sizeof *of_element, "operator", error);
+    arrays->part = memory_allocate(n, sizeof *arrays->part, "operator", error);
+    if (of_element == NULL || arrays->part == NULL) TRY(LAM_ERR_MEMORY);
+    csr_parts(problem->F, of_element, n_parts);
+    sums = memory_allocate(*n_parts, sizeof *sums, "operator", error);
+    if (sums == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < n; i++) sums[of_element[i]] += correction == SPARSE_DELTA ? problem->area[i] : 1;
+    for (size_t p = 0; p < n; p++) {
+        const uint32_t i = problem->order[p], part = of_element[i];
+        arrays->part[p] = part;
+        arrays->weight[p] = (float)((correction == SPARSE_DELTA ? problem->area[i] : 1) / sums[part]);
+    }
+    if (*n_parts == 1) {
+        free(arrays->part);
+        arrays->part = NULL;
+    }
+done:
+    free(of_element);
+    free(sums);
+    return status;
 }
 
 static lam_status build(const build_problem *problem, const build_options *options, const void *own,
@@ -119,13 +140,13 @@ static lam_status build(const build_problem *problem, const build_options *optio
     const sparse_correction correction = correction_of(o);
     const double asked = o->threshold > 0 ? o->threshold : usual_threshold;
     double entries = 0, threshold = asked;
-    size_t bounces = 0, left = options->memory;
+    size_t bounces = 0, left = options->memory, n_parts = 1;
     if (arrays.M == NULL) TRY(LAM_ERR_MEMORY);
     if (correction != SPARSE_NONE) {
         arrays.delta = memory_allocate(n, C * sizeof *arrays.delta, "operator", error);
         arrays.weight = memory_allocate(n, sizeof *arrays.weight, "operator", error);
         if (arrays.delta == NULL || arrays.weight == NULL) TRY(LAM_ERR_MEMORY);
-        set_weights(problem, correction, arrays.weight);
+        TRY(set_weights(problem, correction, &arrays, &n_parts, error));
     }
     TRY(fitting_threshold(problem, options->memory, &threshold, error));
     for (size_t c = 0; c < C; c++) {

@@ -1,6 +1,7 @@
 /* Sparse rows: their product and what the check refuses. */
 #include "solver/base/random.h"
 #include "solver/linalg/csr.h"
+#include "solver/linalg/csr_parts.h"
 #include "solver/linalg/csr_rows.h"
 #include "solver/linalg/sparse_product.h"
 #include "support/suite.h"
@@ -226,6 +227,42 @@ START_TEST(bad_rows_are_refused) {
 }
 END_TEST
 
+/* Few entries, symmetric in pattern, some of them 0, against labels that neighbours lower until none changes.
+ */
+START_TEST(parts_are_what_entries_join) {
+    enum { N = 60 };
+    uint64_t indptr[N + 1], seed = 3 + (uint64_t)_i;
+    uint32_t indices[N * N], part[N], label[N];
+    float data[N * N], dense[N][N] = {{0}};
+    size_t count = 0, expected = 0;
+    for (size_t e = 0; e < 4 * (size_t)_i; e++) {
+        const size_t i = (size_t)(random_lcg_unit(&seed) * N), j = (size_t)(random_lcg_unit(&seed) * N);
+        dense[i][j] = dense[j][i] = e % 4 == 1 ? -1 : 1; /* -1: stored as 0 */
+    }
+    indptr[0] = 0;
+    for (size_t i = 0; i < N; i++) {
+        indptr[i + 1] = indptr[i];
+        for (size_t j = 0; j < N; j++)
+            if (dense[i][j] != 0) {
+                indices[indptr[i + 1]] = (uint32_t)j;
+                data[indptr[i + 1]++] = dense[i][j] > 0 ? 1e-20f : 0;
+            }
+    }
+    for (size_t i = 0; i < N; i++) label[i] = (uint32_t)i;
+    for (size_t round = 0; round < N; round++)
+        for (size_t i = 0; i < N; i++)
+            for (size_t j = 0; j < N; j++)
+                if (dense[i][j] > 0 && label[j] < label[i]) label[i] = label[j];
+    csr_parts(&(csr){.n = N, .indptr = indptr, .indices = indices, .data = data}, part, &count);
+    for (size_t i = 0; i < N; i++) {
+        ck_assert_uint_lt(part[i], count);
+        for (size_t j = 0; j < i; j++) ck_assert((label[i] == label[j]) == (part[i] == part[j]));
+        if (label[i] == i) ck_assert_uint_eq(part[i], expected++);
+    }
+    ck_assert_uint_eq(count, expected);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("csr");
     TCase *tests = tcase_create("csr");
@@ -235,6 +272,7 @@ int main(void) {
     tcase_add_test(tests, products_of_doubles_side_by_side);
     tcase_add_test(tests, products_cost_what_they_touch);
     tcase_add_test(tests, bad_rows_are_refused);
+    tcase_add_loop_test(tests, parts_are_what_entries_join, 0, 40);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
