@@ -42,7 +42,7 @@ static const double probe_block_seconds = 9e-9, probe_element_seconds = 3e-7;
 /* Processor seconds of a ray, on no machine in particular; of a probe per channel and element beside the
  * products with F: some eight answers of the operator that guides two solutions, vectors, and its direct
  * light (a hotel room of 99,021 elements). */
-static const double ray_seconds = 3.3e-7, guided_element_seconds = 1.6e-6;
+static const double ray_seconds = 3.3e-7, guided_element_seconds = 7e-7;
 /* Probes may always take these. */
 static const double probes_enough = 1;
 

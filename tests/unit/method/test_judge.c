@@ -2,7 +2,7 @@
  * with two channels, against two samples that are twins or not, with first light that is known and its
  * spread. And what they say of an operator whose error is known, by noisy references. */
 #include "solver/base/random.h"
-#include "solver/method/judge.h"
+#include "solver/method/judge_figures.h"
 #include "solver/method/reference.h"
 #include "support/box.h"
 #include "support/suite.h"
@@ -428,12 +428,27 @@ START_TEST(stated_errors_are_true_within_their_noise) {
 }
 END_TEST
 
+/* Figures of 1, 2, 3 and 4: of endless many probes the mean has sqrt(5/3 / 4). */
+START_TEST(the_choice_of_probes_has_a_standard_error) {
+    const figure_tally four = {.tried = 4, .count = 4, .plain = {.f = 10, .f2 = 30}},
+                       one = {.tried = 1, .count = 1, .plain = {.f = 2, .f2 = 4}},
+                       unlit = {.tried = 8, .count = 4, .plain = {.f = 10, .f2 = 30}};
+    ck_assert_double_eq_tol(figures_spread(&four, 0), sqrt(5. / 12), 1e-12);
+    ck_assert_double_eq_tol(figures_spread(&four, 16), sqrt(5. / 12 * .75), 1e-12);
+    ck_assert_double_eq_tol(figures_spread(&unlit, 16), sqrt(5. / 12 * .5), 1e-12);
+    ck_assert(figures_spread(&four, 4) == 0);
+    ck_assert(figures_spread(&one, 1) == 0);
+    ck_assert(figures_spread(&one, 16) < 0);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("judge");
     TCase *cases = tcase_create("judge");
     tcase_set_timeout(cases, 120);
     tcase_add_loop_test(cases, figures_are_those_of_dense_solutions, 0, 12);
     tcase_add_loop_test(cases, stated_errors_are_true_within_their_noise, 0, 3);
+    tcase_add_test(cases, the_choice_of_probes_has_a_standard_error);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }
