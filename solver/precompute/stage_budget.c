@@ -17,6 +17,9 @@ static const double share_filled = .8;
 /* Pairs cost more than these seconds each; above this many elements defaults do not take all of them. */
 static const double pair_least_seconds = 1.5e-7;
 enum { PAIRS_ELEMENTS_MOST = 32768 };
+/* A sample of pairs takes about so many of them, each of these seconds where it is projected, and at high
+ * quality this many times as long; it may take a quarter of the budget. */
+static const double sampled_pairs = 40000, sampled_pair_seconds = 2e-5, high_times = 8, share_sampled = .25;
 /* A finer sample of blocks is taken while all blocks of the one before are forecast to take at most this many
  * budgets. */
 static const double finer_share = 1;
@@ -161,12 +164,16 @@ static lam_status find_all_seconds(budget_run *run, double seconds, budget_recip
     const char *weighed = NULL;
     pairs_cost of_pairs = {.seconds = 0};
     bool pairs = false;
+    double took = 0;
     const recipe rays = {.method = RECIPE_RAYS, .rays = RAYS_SAMPLED};
     TRY(pairs_forecast(&run->state->m, &rays, &run->state->progress, &run->rays, error));
     for (size_t k = 0; k < count; k++) {
         if (list[k].kind == BUDGET_PAIRS && list[k].quality != weighed) {
+            const double before = clock_seconds();
+            if (weighed != NULL && high_times * took > share_sampled * seconds) break;
             weighed = list[k].quality;
             TRY(weigh_pairs(run, weighed, &pairs, &of_pairs, error));
+            took = clock_seconds() - before;
             if (forecast_wall_seconds(of_pairs.measured, &run->state->rates) > seconds) pairs = false;
             if (!pairs) break; /* a higher quality costs more */
         }
@@ -200,10 +207,12 @@ lam_status stage_budget(precompute_state *state, lam_error *error) {
     if (strcmp(o->form_factors, "rays") != 0) TRY(state_blocks_possible(state, run.method, &blocks, error));
     if (blocks) TRY(sample_blocks(&run, seconds, error));
     state_update_processors(state);
-    const double least_of_pairs = forecast_wall_seconds(n * n / 2 * pair_least_seconds, &state->rates);
+    const double all = n * n / 2, sampling = fmin(all, sampled_pairs) * sampled_pair_seconds;
+    const bool pairs = n <= PAIRS_ELEMENTS_MOST &&
+                       forecast_wall_seconds(all * pair_least_seconds, &state->rates) < seconds &&
+                       forecast_wall_seconds(sampling, &state->rates) < share_sampled * seconds;
     const bool rays = strcmp(o->form_factors, "blocks") != 0;
-    size_t count = budget_list(blocks, rays, rays && n <= PAIRS_ELEMENTS_MOST && least_of_pairs < seconds,
-                               given ? o->probes : PROBES_OF_BUDGET, list);
+    size_t count = budget_list(blocks, rays, rays && pairs, given ? o->probes : PROBES_OF_BUDGET, list);
     TRY(find_all_seconds(&run, seconds, list, count, error));
     seconds = share_filled * o->time - (clock_seconds() - state->started);
     const size_t cheapest = budget_cheapest(list, count);
