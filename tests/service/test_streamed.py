@@ -56,9 +56,12 @@ class Streamed(unittest.TestCase):
         with h5py.File(self.store) as one, h5py.File(held) as two:
             np.testing.assert_allclose(one["mesh/row_sums"][()], two["mesh/row_sums"][()], atol=1e-4)
             self.assertLess(one["operator"].attrs["uniform_error"], 2e-3)
-            for name in "rays", "form_factors", "threshold":
+            for name in "rays", "form_factors":
                 if name in two["operator"].attrs:
                     self.assertEqual(one["operator"].attrs[name], two["operator"].attrs[name])
+            # The threshold follows the noise of the rows, for the stream by 64 rays of 1,024 elements. In a closed box each row has the
+            # sum 1, and terms 2 A_i / (A_i + A_j) within .3 of 1: a standard error of their mean of .3 / 32 = .009 at most, half for the root.
+            np.testing.assert_allclose(one["operator"].attrs["threshold"], two["operator"].attrs["threshold"], rtol=.015)
         for path in self.store, held:
             must("verify", path, "--probes", 4)
 

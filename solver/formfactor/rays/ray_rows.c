@@ -21,8 +21,12 @@ struct ray_rows {
     double *near_sums;  /* [n], row sums of near */
     double *own;        /* [n], row sums of F1 without near pairs */
     uint64_t *received; /* [n], row sums of A^-1 (A F1)^T without near pairs, in units */
+    double noise_share;
     uint64_t other_seed;
 };
+
+/* The elements and rays that tell the share of the noise. */
+enum { NOISE_ELEMENTS = 1024, NOISE_RAYS = 64 };
 
 bool ray_rows_can(const recipe *r) {
     return r->method == RECIPE_RAYS || r->method == RECIPE_NEAR_PAIRS;
@@ -37,6 +41,30 @@ void ray_rows_destroy(ray_rows *r) {
     free(r->own);
     free(r->received);
     free(r);
+}
+
+/* sum_j 2 A_i F_ij / (A_i + A_j) of an element by some rays. */
+static double noise_of_element(const ray_rows *r, size_t i) {
+    const ray_context context = {.m = r->m, .v = r->v, .seed = r->f.recipe.seed};
+    const double *area = r->m->area;
+    uint32_t met[RAYS_AT_ONCE];
+    element_sampler sampler;
+    ray_tally tally = {0};
+    double sum = 0;
+    element_sampler_init(&sampler, r->m, r->v, i, r->f.recipe.seed);
+    const size_t count = rays_meet(&context, &sampler, i, 0, NOISE_RAYS, met, &tally, NULL);
+    for (size_t k = 0; k < count; k++)
+        if (met[k] != i) sum += 2 * area[i] / (area[i] + area[met[k]]);
+    return sum / NOISE_RAYS;
+}
+
+static double find_noise_share(const ray_rows *r) {
+    const size_t n = r->m->n, count = n < NOISE_ELEMENTS ? n : NOISE_ELEMENTS;
+    double of[NOISE_ELEMENTS], sum = 0;
+#pragma omp parallel for schedule(dynamic, 16)
+    for (size_t k = 0; k < count; k++) of[k] = noise_of_element(r, k * n / count);
+    for (size_t k = 0; k < count; k++) sum += of[k];
+    return sqrt(sum / (double)count);
 }
 
 lam_status ray_rows_create(const mesh *m, const form_factor_options *options, ray_rows **out,
@@ -62,6 +90,7 @@ lam_status ray_rows_create(const mesh *m, const form_factor_options *options, ra
     if (options->sky != NULL)
         TRY(sky_bounce_create(options->sky, m->up, options->ground_albedo, n, &r->f.sky, error));
     TRY(visibility_create(m, &r->v, error));
+    r->noise_share = find_noise_share(r);
     if (options->recipe.method == RECIPE_NEAR_PAIRS) {
         TRY(pairs_find(m, r->v, options, recipe_near(&options->recipe), &r->f, &r->near, error));
         TRY(upper_expand(&r->near, m->area, r->near_sums, error));
@@ -311,7 +340,8 @@ done:
 void ray_rows_stream(ray_rows *r, uint64_t other_seed, row_stream *out) {
     const row_source source = {.n = r->m->n, .context = r};
     r->other_seed = other_seed;
-    *out = (row_stream){.rows = source, .close = close_rows, .context = r, .others = source};
+    *out = (row_stream){
+        .rows = source, .close = close_rows, .context = r, .noise_share = r->noise_share, .others = source};
     out->rows.rows = find_rows;
     out->others.rows = find_other_rows;
 }

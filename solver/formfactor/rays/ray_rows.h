@@ -24,7 +24,8 @@ void ray_rows_destroy(ray_rows *r);
  * which weighs the two estimates of a pair by their inverse variances (upper.h); for near pairs F1 = F/2.
  * close: the row sums s = sum / (sum + outside), with sum of A^-1 (A F1 + (A F1)^T) and outside the share of
  * the rays that hit no front. The same for any sequence of rows. others: one-sided F by rays of another seed,
- * scaled to those sums. */
+ * scaled to those sums. noise_share: the root of the mean of sum_j 2 A_i F_ij / (A_i + A_j), by 64 rays of
+ * each of 1,024 elements, to about 1 %. */
 void ray_rows_stream(ray_rows *r, uint64_t other_seed, row_stream *out);
 
 /* Moves everything of form_factors but the rows out of r, after the stream was closed. */

@@ -37,6 +37,8 @@ static const option_row rows[] = {
 /* Coefficients below this share of the 2-norm of the sampling error are mostly noise: of sqrt(2 / rays) in a
  * closed scene of equal elements, of less in others (noise_of_rows). */
 static const double share_of_noise = .055;
+/* No scene counts as having less noise than this share, not even one in which nothing sees anything. */
+static const double noise_least = .1;
 /* The threshold of K is `of_epsilon` times epsilon. Coefficients of S are kept from the share `of_S` of it on
  * (from the whole, where the threshold is the noise), of intermediate products from `inner`, terms of
  * products from `skipped`, and of K those above `entry` in tiles, all between two nodes, above `tile`. */
@@ -249,12 +251,14 @@ static lam_status build(const build_problem *problem, const build_options *optio
     double *area = memory_allocate(n, sizeof *area, "operator", error), entries = 0, of_epsilon = 0;
     double *sums = memory_allocate(n, sizeof *sums, "operator", error);
     const double *row_sums = sums;
-    double noise = 1; /* over that of a closed scene; rows of a stream are not known yet */
+    double noise = 1; /* over that of a closed scene of equal elements */
     bool corrected = false;
     if (arrays.K == NULL || rho == NULL || area == NULL || sums == NULL) TRY(LAM_ERR_MEMORY);
     TRY(threshold_share(problem, &of_epsilon, error));
     if (problem->noise > 0 && problem->F != NULL)
         TRY(noise_of_rows(problem->F, problem->area, &noise, error));
+    if (problem->stream != NULL && problem->stream->noise_share > 0) noise = problem->stream->noise_share;
+    noise = fmax(noise, noise_least);
     const double least = noise * share_of_noise * problem->noise;
     const double threshold = fmax(noise * of_epsilon * epsilon, least);
     if (problem->blocks == NULL)

@@ -354,12 +354,30 @@ START_TEST(only_one_method_does_with_a_stream) {
 }
 END_TEST
 
+/* The share of the noise is that of all rows. Terms 2 A_i / (A_i + A_j) of 64 rays lie between 0 and 2, so
+ * that the mean over n elements has a standard error of 1 / (64 n)^1/2 at most, .005 of 600. */
+START_TEST(noise_is_known_before_the_rows) {
+    subject s;
+    subject_make(_i, 600, NULL, &s);
+    const size_t n = s.m.n;
+    double *G = both_sides(&s, false, 4), sum = 0;
+    ck_assert_uint_ge(n, 500);
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++) sum += 2 * G[i * n + j] / (s.m.area[i] + s.m.area[j]) / (double)n;
+    ck_assert_double_eq_tol(s.stream.noise_share * s.stream.noise_share, sum, 3 * .006);
+    ck_assert(_i == OPEN || _i == OPEN_NEAR ? sum < .6 : sum > .95);
+    free(G);
+    subject_free(&s);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("ray rows");
     TCase *tests = tcase_create("ray rows");
     tcase_set_timeout(tests, 300);
     tcase_add_loop_test(tests, both_sides_are_what_is_merged, 0, CASES);
     tcase_add_loop_test(tests, other_rows_are_another_sample, 0, CASES);
+    tcase_add_loop_test(tests, noise_is_known_before_the_rows, 0, CASES);
     tcase_add_test(tests, a_sky_is_shared_out);
     tcase_add_test(tests, pairs_do_not_come_row_by_row);
     tcase_add_loop_test(tests, operators_are_as_good, 0, CASES);

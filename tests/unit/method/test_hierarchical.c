@@ -233,6 +233,9 @@ START_TEST(noise_is_that_of_the_rows) {
         }
     ck_assert_double_eq_tol(share_of_recipe(&s), sqrt(sum / (double)n), 1e-6);
     ck_assert_double_lt(share_of_recipe(&s), .45);
+    /* Where nothing sees anything a threshold is left. */
+    for (uint64_t e = 0; e < F->indptr[n]; e++) F->data[e] = 0;
+    ck_assert_double_eq_tol(share_of_recipe(&s), .1, 1e-12);
     closed_free(&s);
 }
 END_TEST
