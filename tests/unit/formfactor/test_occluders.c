@@ -102,7 +102,7 @@ START_TEST(searches_find_all_that_reach_in) {
     mesh m = {0};
     visibility *v;
     uint64_t state = 11;
-    size_t all = 0, met = 0, within = 0;
+    size_t all = 0, met = 0, within = 0, in_box = 0;
     for (int k = 0; k < SQUARES; k++) {
         double corner[4][3];
         const double x = random_unit(&state), y = random_unit(&state), z = random_unit(&state);
@@ -137,12 +137,19 @@ START_TEST(searches_find_all_that_reach_in) {
             ck_assert_int_le(times[p], 1);
             if (reaches) ck_assert_int_eq(times[p], 1);
             if (reaches) ck_assert_double_gt(o.of[p].low[2], .2);
+            /* One that lies in a box, in front of the plane, is in the shaft. */
+            bool inside = o.of[p].low[2] > .2;
+            for (int d = 0; d < 3; d++)
+                inside = inside && o.of[p].low[d] > box[0].low[d] && o.of[p].high[d] < box[0].high[d];
+            if (inside) ck_assert_int_eq(times[p], 1);
+            in_box += inside;
             all++;
             met += (size_t)times[p];
             within += reaches;
         }
     }
     ck_assert_uint_gt(within, SHAFTS);
+    ck_assert_uint_gt(in_box, 5);
     ck_assert_uint_lt(met, all / 4);
     occluders_free(&o);
     visibility_destroy(v);
