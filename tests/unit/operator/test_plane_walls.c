@@ -154,7 +154,7 @@ START_TEST(a_door_parts_as_long_as_a_quarter_is_wall) {
     add_wall(y, (double[2]){11, 5}, (double[2]){11, 8}, 3, 0, 2);
     check_sides(y, 1, 0, 11);
     y->n = FLOOR;
-    add_wall(y, (double[2]){11, 3}, (double[2]){11, 5.4}, 1, 0, 2);
+    add_wall(y, (double[2]){11, 3}, (double[2]){11, 5.4}, 3, 0, 2);
     check_sides(y, 1, 0, 11);
     y->n = FLOOR;
     add_wall(y, (double[2]){11, 3}, (double[2]){11, 3.8}, 1, 0, 2);
@@ -185,6 +185,11 @@ START_TEST(what_does_not_stand_on_the_floor_parts_nothing) {
         free(y);
     }
     yard *y = yard_make();
+    /* Of one plane, behind the floor here and in front of it elsewhere. */
+    add_wall(y, (double[2]){3, 0}, (double[2]){3, 8}, 1, -2, 0);
+    add_wall(y, (double[2]){3, 20}, (double[2]){3, 22}, 1, 0, 2);
+    ck_assert_uint_eq(count_parts(y), 1);
+    y->n = FLOOR;
     add_wall(y, (double[2]){0, 0}, (double[2]){0, 8}, 1, 0, 2);
     add_wall(y, (double[2]){16, 8}, (double[2]){16, 0}, 1, 0, 2);
     add_wall(y, (double[2]){20, 8}, (double[2]){20, 0}, 1, 0, 2);
