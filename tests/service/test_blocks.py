@@ -37,7 +37,7 @@ class Blocks(Case):
         self.assertRegex(log, r"blocks of clusters are taken instead: about .* s of one thread, by a sample of them; "
                               r"pair by pair to .*: .* s\n")
         self.assertRegex(log, r"forecast: form factors [\d.]+ s,")
-        self.assertRegex(log, r"\d+ blocks of 16 planes: .* linear, .* partly hidden")
+        self.assertRegex(log, r"\d+ blocks of \d+ planes: .* linear, .* partly hidden")
         rays, log = self.precompute("rays.h5", "--probes", 0, "--form-factors", "rays", "--quality", "draft",
                                     "--rays", 64, "--method", "hierarchical")
         self.assertEqual(self.attributes(rays)["form_factors"], b"rays")
