@@ -318,11 +318,14 @@ static lam_status final_upper(const doubling *d, term_rows *K, csr *out, lam_err
     const size_t n = K->n, n_threads = input->n_threads;
     const float entry = input->entry * input->threshold, tile = input->tile * input->threshold,
                 *weight = d->weight;
-    uint32_t *node_of = memory_allocate(n, sizeof *node_of, "wavelets", error);
+    uint32_t *node_of = memory_allocate(n, sizeof *node_of, "wavelets", error), numbered = 0;
     csr made = {.n = n, .indptr = memory_allocate(n + 1, sizeof *made.indptr, "wavelets", error)};
     if (made.indptr == NULL || node_of == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t t = 0; t < basis->n_nodes; t++)
-        for (size_t i = basis->nodes[t].first; i < last_of(basis, t); i++) node_of[i] = (uint32_t)t;
+    /* Planes of single elements have more nodes than coefficients: those without any have no number. */
+    for (size_t t = 0; t < basis->n_nodes; t++) {
+        for (size_t i = basis->nodes[t].first; i < last_of(basis, t); i++) node_of[i] = numbered;
+        numbered += last_of(basis, t) > basis->nodes[t].first;
+    }
 #pragma omp parallel for schedule(dynamic, 256) num_threads((int)n_threads)
     for (size_t t = 0; t < basis->n_nodes; t++)
         keep_tiles(node_of, entry, tile, basis->nodes[t].first, last_of(basis, t), K,
