@@ -36,11 +36,20 @@ static const double sampled_epsilons[SAMPLES_MOST] = {.4, .05, .012};
 /* Blocks as a power of their accuracy where one sample alone tells (forecast_blocks). */
 static const double power_of_accuracy = -.7;
 
+/* Costs of all pairs at each quality that was weighed. */
+enum { QUALITIES_MOST = 2 };
+typedef struct quality_costs {
+    size_t count;
+    const char *quality[QUALITIES_MOST];
+    pairs_cost cost[QUALITIES_MOST];
+} quality_costs;
+
 /* The part that all candidates share. */
 typedef struct budget_run {
     precompute_state *state;
     const build_method *method;
     block_costs blocks;
+    quality_costs pairs;
     pairs_cost rays; /* of RAYS_SAMPLED from each element */
 } budget_run;
 enum { RAYS_SAMPLED = 1024 };
@@ -101,8 +110,7 @@ static lam_status set_options(const budget_recipe *r, const build_method *method
 }
 
 /* Seconds of a candidate on the wall, or less than 0. */
-static lam_status find_seconds(const budget_run *run, budget_recipe *r, const pairs_cost *of_pairs,
-                               lam_error *error) {
+static lam_status find_seconds(const budget_run *run, budget_recipe *r, lam_error *error) {
     lam_status status = LAM_OK;
     precompute_options options = *run->state->options;
     precompute_state probe = *run->state; /* a view, never freed */
@@ -120,7 +128,9 @@ static lam_status find_seconds(const budget_run *run, budget_recipe *r, const pa
                                   .single_share = run->blocks.cost[run->blocks.count - 1].single_share};
     } else if (r->kind == BUDGET_PAIRS) {
         probe.recipe = state_pairs_recipe(&probe);
-        probe.cost = *of_pairs;
+        size_t k = 0;
+        while (k + 1 < run->pairs.count && run->pairs.quality[k] != r->quality) k++;
+        probe.cost = run->pairs.cost[k];
     } else {
         probe.cost = run->rays;
         probe.cost.entries = fmin(run->rays.entries * (double)r->rays / RAYS_SAMPLED, n * n);
@@ -161,23 +171,26 @@ done:
 static lam_status find_all_seconds(budget_run *run, double seconds, budget_recipe *list, size_t count,
                                    lam_error *error) {
     lam_status status = LAM_OK;
-    const char *weighed = NULL;
-    pairs_cost of_pairs = {.seconds = 0};
+    quality_costs *const weighed = &run->pairs;
     bool pairs = false;
     double took = 0;
     const recipe rays = {.method = RECIPE_RAYS, .rays = RAYS_SAMPLED};
     TRY(pairs_forecast(&run->state->m, &rays, &run->state->progress, &run->rays, error));
     for (size_t k = 0; k < count; k++) {
-        if (list[k].kind == BUDGET_PAIRS && list[k].quality != weighed) {
+        if (list[k].kind == BUDGET_PAIRS &&
+            (weighed->count == 0 || list[k].quality != weighed->quality[weighed->count - 1])) {
             const double before = clock_seconds();
-            if (weighed != NULL && high_times * took > share_sampled * seconds) break;
-            weighed = list[k].quality;
-            TRY(weigh_pairs(run, weighed, &pairs, &of_pairs, error));
+            if (weighed->count == QUALITIES_MOST) break;
+            pairs_cost *const cost = &weighed->cost[weighed->count];
+            if (weighed->count > 0 && high_times * took > share_sampled * seconds) break;
+            weighed->quality[weighed->count] = list[k].quality;
+            TRY(weigh_pairs(run, list[k].quality, &pairs, cost, error));
+            weighed->count++;
             took = clock_seconds() - before;
-            if (forecast_wall_seconds(of_pairs.measured, &run->state->rates) > seconds) pairs = false;
+            if (forecast_wall_seconds(cost->measured, &run->state->rates) > seconds) pairs = false;
             if (!pairs) break; /* a higher quality costs more */
         }
-        TRY(find_seconds(run, &list[k], &of_pairs, error));
+        TRY(find_seconds(run, &list[k], error));
     }
 done:
     return status;
@@ -222,7 +235,7 @@ lam_status stage_budget(precompute_state *state, lam_error *error) {
     if (!given) {
         list[count] = list[cheapest];
         list[count].probes = PROBES_OF_CHEAPEST;
-        TRY(find_seconds(&run, &list[count], NULL, error));
+        TRY(find_seconds(&run, &list[count], error));
         count++;
     }
     size_t taken = budget_pick(list, count, seconds);

@@ -303,6 +303,11 @@ class Json(Case):
         seconds = answer.pop("seconds")
         self.assertLessEqual({"import", "mesh", "form factors", "invert", "judge", "store"}, set(seconds))
         self.assertTrue(all(value >= 0 for value in seconds.values()))
+        for name in ("processor_seconds", "forecast_processor_seconds"):
+            used = answer.pop(name, {})
+            self.assertTrue(all(value >= 0 for value in used.values()))
+            if name == "processor_seconds":
+                self.assertLessEqual({"form factors", "operator", "judge"}, set(used))
         self.assertEqual(answer, json.loads(must("info", out, "--json").stdout))
         for name in ("elements", "channels", "kind", "method", "reason", "bytes", "error"):
             self.assertIn(name, answer)

@@ -152,7 +152,7 @@ static lam_status make_scaled(const void *context, size_t i, row_work *w, lam_er
     const uint64_t e = s->R->indptr[i];
     row_term *to = NULL;
     w->count = 0;
-    if (s->least[i] == INFINITY) goto done;
+    if (s->least[i] == INFINITY || e == s->R->indptr[i + 1]) goto done; /* black elements alone have no row */
     if (s->B == NULL) {
         TRY(row_work_room(w, 0, s->A->length[s->R->indices[e]], &to, error));
         const size_t used = scale_row(s, e, i, false, w->spare);
@@ -384,10 +384,11 @@ static lam_status run(doubling *d, csr *out, wavelet_inverse_report *report, lam
     term_rows K = {.n = 0}, Z = {.n = 0};
     TRY(wavelet_diagonal(input->basis, input->rho, &upper, error));
     TRY(csr_mirror(&upper, "operator", &d->R, error));
-    d->coupled = d->R.indptr[n] > n;
     for (size_t i = 0; i < n; i++)
-        for (uint64_t e = d->R.indptr[i]; e < d->R.indptr[i + 1]; e++)
+        for (uint64_t e = d->R.indptr[i]; e < d->R.indptr[i + 1]; e++) {
+            d->coupled = d->coupled || d->R.indices[e] != i;
             d->R.data[e] *= d->weight[i] * d->weight[d->R.indices[e]];
+        }
     csr_free(&upper);
     TRY(csr_mirror(input->S, "operator", &S, error));
     if (input->last) csr_free(input->S);

@@ -211,7 +211,7 @@ START_TEST(one_even_light_is_put_in) {
 }
 END_TEST
 
-enum { ONE_FOR_ALL, BLACK_IN_PARTS, EACH_ITS_OWN, REFLECTANCES };
+enum { ONE_FOR_ALL, BLACK_IN_PARTS, EACH_ITS_OWN, ALL_BUT_ONE_BLACK, ALL_BLACK, REFLECTANCES };
 
 static float *reflectance(const subject *s, int which) {
     float *rho = test_allocate(s->m.n, sizeof *rho);
@@ -220,6 +220,8 @@ static float *reflectance(const subject *s, int which) {
         const uint32_t i = s->tree.order[p];
         rho[p] = which == ONE_FOR_ALL                     ? .8f
                  : which == EACH_ITS_OWN                  ? (float)(.95 * random_lcg_unit(&seed))
+                 : which == ALL_BUT_ONE_BLACK             ? .7f * (i == 1)
+                 : which == ALL_BLACK                     ? 0
                  : s->m.normal[i][2] > .5f || i % 50 == 0 ? 0
                                                           : .6f;
     }
