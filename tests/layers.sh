@@ -93,7 +93,7 @@ for file in $(git ls-files 'include/*.h' 'store/*.[ch]' 'solver/*.[ch]' 'solver/
             echo "layers: $file includes \"$header\"; beside its own $folder/ may include: ${allowed[$folder_rule]}"
             broken=$((broken + 1))
         fi
-    done < <(sed -n 's/^ *# *include *"\([^"]*\)".*/\1/p' "$file")
+    done < <(sed -n -E 's/^ *# *(include|define CPU_KERNELS) *"([^"]*)".*/\2/p' "$file")
     while read -r header; do
         [ -n "$header" ] || continue
         for third in "${!home[@]}"; do

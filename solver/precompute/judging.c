@@ -50,6 +50,10 @@ static bool shares_pairs(const judging *j) {
 /* Two independent samples, or a reference and the same disturbed by its noise. */
 static lam_status make_halves(const judging *j, form_factors half[2], lam_error *error) {
     lam_status status = LAM_OK;
+    if (shares_pairs(j)) {
+        const form_factor_options both = {.recipe = j->halves[0], .progress = j->progress};
+        return form_factors_make_twice(j->m, j->order, &both, j->halves[1].seed, j->stages, half, error);
+    }
     for (int h = 0; h < 2; h++) {
         const form_factor_options how = {.recipe = j->halves[h],
                                          .progress = j->progress,
@@ -57,8 +61,6 @@ static lam_status make_halves(const judging *j, form_factors half[2], lam_error 
                                          .scratch = j->scratch,
                                          .scratch_name = j->scratch_names[h],
                                          .large = j->large};
-        if (shares_pairs(j))
-            return form_factors_make_twice(j->m, j->order, &how, j->halves[1].seed, j->stages, half, error);
         TRY(form_factors_make(j->m, j->order, &how, &half[h], error));
         if (j->sampled != NULL) j->sampled(j->context, &half[h]);
     }

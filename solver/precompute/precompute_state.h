@@ -75,17 +75,17 @@ typedef struct precompute_state {
     trial_course trial;
     char advice[ERROR_ADVICE_BYTES]; /* on them; "" where there is none */
     forecast_rates rates;            /* of the machine; processors is 0 before they are measured */
-    forecast_times expected_times,
-        spent; /* processor seconds of the first trial: the forecast and the truth */
+    forecast_times expected_times;   /* the forecast of the first trial */
+    forecast_times spent;            /* what it took */
 } precompute_state;
 
 /* The state at the beginning of a precompute; frees it: precompute.c. */
 precompute_state state_begin(const precompute_options *options, terminal *t);
 void state_free(precompute_state *state);
 
-/* Measures the rates of the machine, once, and the processors that the run has had so far, anew:
- * stage_forecast.c. The forecast in the log: fails where the disks
- * have no room. The forecast of the stages beside their times, in the log. */
+/* stage_forecast.c. Measures the rates of the machine, once; and anew the processors that the run has had so
+ * far. Logs the forecast, and fails where the disks have no room. Logs the forecast of the stages beside what
+ * they took. */
 lam_status state_measure_rates(precompute_state *state, lam_error *error);
 void state_update_processors(precompute_state *state);
 lam_status stage_forecast(precompute_state *state, lam_error *error);

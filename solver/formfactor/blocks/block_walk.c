@@ -179,18 +179,20 @@ static lam_status add_shaded(block_walk *w, uint32_t a, uint32_t b, const candid
     return add_block(w, &made);
 }
 
+static bool are_elements(const block_finder *k, uint32_t a, uint32_t b) {
+    return a >= k->n_clusters && b >= k->n_clusters;
+}
+
 /* True where a block of these nodes is not split, however many candidates stand between. */
 static bool ends_here(const block_walk *w, uint32_t a, uint32_t b, double most, bool crosses) {
-    const size_t n_clusters = w->finder->n_clusters;
-    if (a >= n_clusters && b >= n_clusters) return true;
+    if (are_elements(w->finder, a, b)) return true;
     return norm_of(w, a, b, most) <= w->finder->options->shadow && is_smooth(w, a, b, most, crosses);
 }
 
 static lam_status end_shaded(block_walk *w, uint32_t a, uint32_t b, double most, bool crosses,
                              const candidates *among) {
-    const size_t n_clusters = w->finder->n_clusters;
     const candidates *tested = segments_among(w, among);
-    if (a >= n_clusters && b >= n_clusters) return add_shaded_pair(w, a, b, most, crosses, tested);
+    if (are_elements(w->finder, a, b)) return add_shaded_pair(w, a, b, most, crosses, tested);
     return add_shaded(w, a, b, tested);
 }
 
@@ -289,7 +291,7 @@ static lam_status decide(block_walk *w, uint32_t a, uint32_t b, double elements,
         w->report.linear++;
         return add_linear(w, a, b);
     }
-    if (a >= k->n_clusters && b >= k->n_clusters) {
+    if (are_elements(k, a, b)) {
         w->report.pairs++;
         return add_pair(w, a, b, 1);
     }

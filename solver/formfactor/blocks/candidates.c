@@ -15,19 +15,8 @@ double candidates_place(const occluders *o, const flat_clusters *f, uint32_t a, 
     return from * to < 0 ? fmin(fmax(from / (from - to), .05), .95) : .5;
 }
 
-#ifdef CPU_AVX2_TARGET
-#define KERNEL(name) name##_avx512
-#define TARGET CPU_AVX512_TARGET
-#include "solver/formfactor/blocks/candidates_kernels.inc"
-
-#define KERNEL(name) name##_avx2
-#define TARGET CPU_AVX2_TARGET
-#include "solver/formfactor/blocks/candidates_kernels.inc"
-#endif
-
-#define KERNEL(name) name##_portable
-#define TARGET
-#include "solver/formfactor/blocks/candidates_kernels.inc"
+#define CPU_KERNELS "solver/formfactor/blocks/candidates_kernels.inc"
+#include "solver/base/cpu_kernels.inc"
 
 void candidates_block(const occluders *o, const candidates *among, const double origin[3],
                       const segment_lanes *s, float blocked[SEGMENT_LANES]) {

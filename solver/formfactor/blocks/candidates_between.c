@@ -18,19 +18,8 @@ typedef struct between {
 
 typedef enum blocking { BLOCKS_NOTHING, BLOCKS_SOME, BLOCKS_ALL } blocking;
 
-#ifdef CPU_AVX2_TARGET
-#define KERNEL(name) name##_avx512
-#define TARGET CPU_AVX512_TARGET
-#include "solver/formfactor/blocks/candidates_between_kernels.inc"
-
-#define KERNEL(name) name##_avx2
-#define TARGET CPU_AVX2_TARGET
-#include "solver/formfactor/blocks/candidates_between_kernels.inc"
-#endif
-
-#define KERNEL(name) name##_portable
-#define TARGET
-#include "solver/formfactor/blocks/candidates_between_kernels.inc"
+#define CPU_KERNELS "solver/formfactor/blocks/candidates_between_kernels.inc"
+#include "solver/base/cpu_kernels.inc"
 
 static bool sift(const occluder *of, const between *w, const uint32_t *list, uint32_t count,
                  candidates *out) {

@@ -24,9 +24,8 @@ static void set_plane(const plane_frame *frame, flat_plane *p) {
     for (int d = 0; d < 3; d++) {
         p->origin[d] = frame->origin[d];
         for (int k = 0; k < 2; k++) p->axis[k][d] = frame->axis[k][d];
-        const int e = (d + 1) % 3, g = (d + 2) % 3;
-        p->normal[d] = frame->axis[0][e] * frame->axis[1][g] - frame->axis[0][g] * frame->axis[1][e];
     }
+    cross3(frame->axis[0], frame->axis[1], p->normal);
 }
 
 /* Bounds along both axes and of heights. */

@@ -69,14 +69,9 @@ static double seen_at(const boundary *b, const double point[3], const double nor
     for (size_t e = 0; e < b->count; e++) {
         const double *from = b->m->vertices[b->edges[e].from], *to = b->m->vertices[b->edges[e].to];
         double x[3], y[3], across[3];
-        for (int d = 0; d < 3; d++) {
-            x[d] = from[d] - point[d];
-            y[d] = to[d] - point[d];
-        }
-        for (int d = 0; d < 3; d++) {
-            const int f = (d + 1) % 3, g = (d + 2) % 3;
-            across[d] = x[f] * y[g] - x[g] * y[f];
-        }
+        subtract3(from, point, x);
+        subtract3(to, point, y);
+        cross3(x, y, across);
         const double length = sqrt(dot3(across, across));
         least = fmin(least, fmin(dot3(x, x), dot3(y, y)));
         if (length > 0) sum += b->edges[e].times * atan2(length, dot3(x, y)) * dot3(normal, across) / length;

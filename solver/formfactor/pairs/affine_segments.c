@@ -19,19 +19,8 @@ affine_map affine_map_of(const polygon *p) {
     return m;
 }
 
-#ifdef CPU_AVX2_TARGET
-#define KERNEL(name) name##_avx512
-#define TARGET CPU_AVX512_TARGET
-#include "solver/formfactor/pairs/affine_segments_kernels.inc"
-
-#define KERNEL(name) name##_avx2
-#define TARGET CPU_AVX2_TARGET
-#include "solver/formfactor/pairs/affine_segments_kernels.inc"
-#endif
-
-#define KERNEL(name) name##_plain
-#define TARGET
-#include "solver/formfactor/pairs/affine_segments_kernels.inc"
+#define CPU_KERNELS "solver/formfactor/pairs/affine_segments_kernels.inc"
+#include "solver/base/cpu_kernels.inc"
 
 void affine_segments(const affine_pair *p, const double x[4][AFFINE_SEGMENTS], const double centre[3],
                      float origin[3][AFFINE_SEGMENTS], float direction[3][AFFINE_SEGMENTS],
@@ -39,6 +28,6 @@ void affine_segments(const affine_pair *p, const double x[4][AFFINE_SEGMENTS], c
     typedef void kernel(const affine_pair *, const double[4][AFFINE_SEGMENTS], const double[3],
                         float[3][AFFINE_SEGMENTS], float[3][AFFINE_SEGMENTS], double[AFFINE_SEGMENTS]);
     static kernel *const table[] =
-        CPU_TABLE(affine_segments_plain, affine_segments_avx2, affine_segments_avx512);
+        CPU_TABLE(affine_segments_portable, affine_segments_avx2, affine_segments_avx512);
     table[cpu_best()](p, x, centre, origin, direction, K);
 }

@@ -55,9 +55,15 @@ static double parallel_edges(const edge *one, const edge *two, double cosine) {
            twice_integrated(x + one->length - two->length, h) + twice_integrated(x - two->length, h);
 }
 
+/* The angle that an edge of a length subtends from a point that is `away` from its line and whose foot lies
+ * `before` behind its begin. */
+static double subtended(double before, double length, double away) {
+    return atan2(away * length, away * away - before * (length - before));
+}
+
 /* Integral of ln r^2 over edge two from the point at s on edge one: with x along edge two and h the distance
- * from its line, x ln(x^2 + h^2) - 2 x + 2 h atan(x/h) between the ends. The two atan are one atan2, the
- * angle that the edge subtends. */
+ * from its line, x ln(x^2 + h^2) - 2 x + 2 h atan(x/h) between the ends. The two atan make the angle that the
+ * edge subtends. */
 static double point_to_edge(const edge *one, const edge *two, double s) {
     double v[3];
     for (int d = 0; d < 3; d++) v[d] = one->from[d] + s * one->along[d] - two->from[d];
@@ -65,7 +71,7 @@ static double point_to_edge(const edge *one, const edge *two, double s) {
     for (int d = 0; d < 3; d++) v[d] -= a * two->along[d];
     const double h2 = dot3(v, v), h = sqrt(h2), from2 = a * a + h2, to2 = b * b + h2;
     return (to2 > 0 ? b * log(to2) : 0) + (from2 > 0 ? a * log(from2) : 0) - 2 * two->length +
-           2 * h * atan2(h * two->length, h2 - a * b);
+           2 * h * subtended(a, two->length, h);
 }
 
 /* The places on edge one, in (0, length), where the integrand may be steep: the points nearest to the line of
@@ -130,12 +136,6 @@ static double narrow_edges(const pair_factor_rules *rules, const edge *one, cons
         sum += part * length;
     }
     return sum;
-}
-
-/* The angle that an edge of a length subtends from a point that is `away` from its line and whose foot lies
- * `before` behind its begin. */
-static double subtended(double before, double length, double away) {
-    return atan2(away * length, away * away - before * (length - before));
 }
 
 static double logarithm_of(contour *c, int i, int j) {

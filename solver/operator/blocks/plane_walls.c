@@ -186,11 +186,10 @@ static lam_status add_segment(wall_finder *f, const uint32_t *element, const pla
             coordinates(plane->frame, points[j], made.along[1]);
         }
     if (longest <= f->same || is_border(&made, &plane->extent, f->same)) return LAM_OK;
-    const double pi = acos(-1);
     /* From -pi/4 on, so that directions along the axes lie far from where angles wrap. */
     made.angle = atan2(made.along[1][1] - made.along[0][1], made.along[1][0] - made.along[0][0]);
-    while (made.angle < -.25 * pi) made.angle += pi;
-    while (made.angle >= .75 * pi) made.angle -= pi;
+    while (made.angle < -.25 * M_PI) made.angle += M_PI;
+    while (made.angle >= .75 * M_PI) made.angle -= M_PI;
     if (array_grow(&f->segments, &f->segments_room, f->n_segments + 1, sizeof *f->segments, "clusters",
                    error) != LAM_OK)
         return LAM_ERR_MEMORY;

@@ -249,6 +249,20 @@ START_TEST(reflectances_in_the_basis) {
 }
 END_TEST
 
+/* As a build has it, or (not rough) so fine that only rounding is left. */
+static wavelet_inverse_input input_of(const subject *s, csr *S, const float *rho, const float *weight,
+                                      bool rough) {
+    return (wavelet_inverse_input){.basis = &s->basis,
+                                   .S = S,
+                                   .rho = rho,
+                                   .weight = weight,
+                                   .threshold = rough ? 1e-3f : 1e-6f,
+                                   .entry = 1,
+                                   .inner = rough ? .25f : .01f,
+                                   .skipped = rough ? .005f : .001f,
+                                   .n_threads = 1};
+}
+
 /* Terms that products leave out, and what of R B they make no use of, add up to little: entries that are
  * there either way differ by less than a threshold. */
 START_TEST(what_is_skipped_is_small) {
@@ -257,15 +271,7 @@ START_TEST(what_is_skipped_is_small) {
     float *rho = reflectance(&s, EACH_ITS_OWN), *weight = ones(&s.basis);
     csr in = pass(&s, 0, weight, 2), some, all;
     wavelet_inverse_report report;
-    wavelet_inverse_input input = {.basis = &s.basis,
-                                   .S = &in,
-                                   .rho = rho,
-                                   .weight = weight,
-                                   .threshold = 1e-3f,
-                                   .entry = 1,
-                                   .inner = .25f,
-                                   .skipped = .005f,
-                                   .n_threads = 1};
+    wavelet_inverse_input input = input_of(&s, &in, rho, weight, true);
     ck_ok(wavelet_inverse(&input, &some, &report, &error));
     input.skipped = 0;
     ck_ok(wavelet_inverse(&input, &all, &report, &error));
@@ -295,14 +301,9 @@ START_TEST(tiles_are_kept_whole) {
     ck_ok(wavelets_weights(&s.basis, &weight, &error));
     csr in = pass(&s, 0, weight, 2), found, all;
     wavelet_inverse_report report;
-    wavelet_inverse_input input = {.basis = &s.basis,
-                                   .S = &in,
-                                   .rho = rho,
-                                   .weight = weight,
-                                   .threshold = 1e-3f,
-                                   .inner = .25f,
-                                   .skipped = .005f,
-                                   .n_threads = 2};
+    wavelet_inverse_input input = input_of(&s, &in, rho, weight, true);
+    input.entry = 0;
+    input.n_threads = 2;
     ck_ok(wavelet_inverse(&input, &all, &report, &error));
     input.entry = .5f;
     input.tile = 3;
@@ -351,16 +352,8 @@ START_TEST(doubling_inverts) {
     wavelet_inverse_report report;
     followed seen = {.n_stages = 0};
     const progress told = {.report = followed_report, .context = &seen};
-    wavelet_inverse_input input = {.basis = &s.basis,
-                                   .S = &in,
-                                   .rho = rho,
-                                   .weight = weight,
-                                   .threshold = 1e-6f,
-                                   .entry = 1,
-                                   .inner = .01f,
-                                   .skipped = .001f,
-                                   .n_threads = 1,
-                                   .progress = &told};
+    wavelet_inverse_input input = input_of(&s, &in, rho, weight, false);
+    input.progress = &told;
     ck_ok(wavelet_inverse(&input, &found, &report, &error));
     ck_assert_uint_eq(seen.n_stages, report.doublings);
     ck_assert(report.doublings == 0 || seen.share == 1);
@@ -427,15 +420,7 @@ START_TEST(bounces_that_cancel) {
             in.indices[used] = (uint32_t)j;
             in.data[used++] = rows[i][j];
         }
-    const wavelet_inverse_input input = {.basis = &s.basis,
-                                         .S = &in,
-                                         .rho = rho,
-                                         .weight = weight,
-                                         .threshold = 1e-6f,
-                                         .entry = 1,
-                                         .inner = .01f,
-                                         .skipped = .001f,
-                                         .n_threads = 1};
+    const wavelet_inverse_input input = input_of(&s, &in, rho, weight, false);
     ck_ok(wavelet_inverse(&input, &found, &report, &error));
     for (size_t k = 0; k < PLACES * PLACES; k++)
         A[k] = (k % (PLACES + 1) == 0 ? 1 : 0) - (double)r * (double)rows[k / PLACES][k % PLACES];

@@ -22,6 +22,19 @@ static double *random_matrix(uint64_t *state) {
     return a;
 }
 
+/* Takes the row that is summed up as one of an output, and begins another. */
+static lam_status take_row(row_work *w, size_t output, lam_error *e) {
+    row_term *to = NULL;
+    if (row_work_room(w, output, w->count, &to, e) != LAM_OK) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < w->count; k++) {
+        to[k] = (row_term){w->columns[k], w->sums[w->columns[k]]};
+        w->sums[w->columns[k]] = 0;
+    }
+    w->done[output].used += w->count;
+    w->count = 0;
+    return LAM_OK;
+}
+
 /* Row i of A in output 0, and of A A in output 1. */
 typedef struct square {
     const double *a;
@@ -31,28 +44,16 @@ typedef struct square {
 static lam_status make_square(const void *context, size_t i, row_work *w, lam_error *e) {
     lam_status status = LAM_OK;
     const square *s = context;
-    row_term *to = NULL;
     w->count = 0;
     if (i == s->fails) FAIL(e, LAM_ERR_NUMERIC, "row %zu", i);
     for (size_t j = 0; j < N; j++)
         if (s->a[i * N + j] != 0) row_work_add(w, (uint32_t)j, (float)s->a[i * N + j]);
-    TRY(row_work_room(w, 0, w->count, &to, e));
-    for (size_t k = 0; k < w->count; k++) {
-        to[k] = (row_term){w->columns[k], w->sums[w->columns[k]]};
-        w->sums[w->columns[k]] = 0;
-    }
-    w->done[0].used += w->count;
-    w->count = 0;
+    TRY(take_row(w, 0, e));
     for (size_t k = 0; k < N; k++)
         for (size_t j = 0; s->a[i * N + k] != 0 && j < N; j++)
             if (s->a[k * N + j] != 0)
                 row_work_add(w, (uint32_t)j, (float)(s->a[i * N + k] * s->a[k * N + j]));
-    TRY(row_work_room(w, 1, w->count, &to, e));
-    for (size_t k = 0; k < w->count; k++) {
-        to[k] = (row_term){w->columns[k], w->sums[w->columns[k]]};
-        w->sums[w->columns[k]] = 0;
-    }
-    w->done[1].used += w->count;
+    TRY(take_row(w, 1, e));
 done:
     return status;
 }
@@ -156,19 +157,13 @@ typedef struct summed {
 static lam_status make_sum(const void *context, size_t i, row_work *w, lam_error *e) {
     lam_status status = LAM_OK;
     const summed *s = context;
-    row_term *to = NULL;
     w->count = 0;
     if (i == s->fails) FAIL(e, LAM_ERR_NUMERIC, "row %zu", i);
     for (size_t k = 0; k < s->a->length[i]; k++)
         row_work_add(w, s->a->row[i][k].column, s->a->row[i][k].value);
     for (size_t k = 0; k < s->b->length[i]; k++)
         row_work_add(w, s->b->row[i][k].column, s->b->row[i][k].value);
-    TRY(row_work_room(w, 0, w->count, &to, e));
-    for (size_t k = 0; k < w->count; k++) {
-        to[k] = (row_term){w->columns[k], w->sums[w->columns[k]]};
-        w->sums[w->columns[k]] = 0;
-    }
-    w->done[0].used += w->count;
+    TRY(take_row(w, 0, e));
 done:
     return status;
 }
