@@ -17,7 +17,7 @@ static const double share_filled = .8;
 /* Pairs cost more than these seconds each; above this many elements defaults do not take all of them. */
 static const double pair_least_seconds = 1.5e-7;
 enum { PAIRS_ELEMENTS_MOST = 32768 };
-/* A sample of pairs takes about so many of them, each of these seconds where it is projected, and at high
+/* A sample of pairs takes at most so many of them, each of these seconds where it is projected, and at high
  * quality this many times as long; it may take a quarter of the budget. */
 static const double sampled_pairs = 40000, sampled_pair_seconds = 2e-5, high_times = 8, share_sampled = .25;
 /* A finer sample of blocks is taken while all blocks of the one before are forecast to take at most this many

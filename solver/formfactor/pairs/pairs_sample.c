@@ -80,10 +80,12 @@ static void count_row(const sample_run *run, uint32_t position, uint32_t first, 
     }
 }
 
-/* The rows of all links, one after the other, of which every step-th is counted. */
+/* The rows of all links, one after the other, of which every step-th is counted: some of the pairs of a large
+ * scene, a sixteenth of those of a small one, where a sample should cost little beside the work itself. */
 static void count_rows(const sample_run *run, double n_pairs, pairs_work *work, pairs_trial *trial) {
-    enum { WANTED = 40000 };
-    const double step = fmax(1, floor(n_pairs / WANTED));
+    enum { LEAST = 4000, MOST = 40000, SHARE = 16 };
+    const double wanted = fmin(fmax(n_pairs / SHARE, LEAST), MOST);
+    const double step = fmax(1, floor(n_pairs / wanted));
     double at = 0, rows = 0, taken = 0, next = floor(step / 2), started = 0, seconds = 0;
     for (size_t k = 0; k < run->links.n; k++) {
         const cluster_link *l = &run->links.links[k];
