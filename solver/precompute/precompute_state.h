@@ -76,7 +76,7 @@ typedef struct precompute_state {
     char advice[ERROR_ADVICE_BYTES]; /* on them; "" where there is none */
     forecast_rates rates;            /* of the machine; processors is 0 before they are measured */
     forecast_times expected_times;   /* the forecast of the first trial */
-    forecast_times spent;            /* what it took */
+    forecast_times spent;            /* the time of the same stages */
 } precompute_state;
 
 /* The state at the beginning of a precompute; frees it: precompute.c. */
@@ -84,8 +84,8 @@ precompute_state state_begin(const precompute_options *options, terminal *t);
 void state_free(precompute_state *state);
 
 /* stage_forecast.c. Measures the rates of the machine, once; and anew the processors that the run has had so
- * far. Logs the forecast, and fails where the disks have no room. Logs the forecast of the stages beside what
- * they took. */
+ * far. Logs the forecast, and fails where the disks have no room. Logs the forecast of the stages beside
+ * their times. */
 lam_status state_measure_rates(precompute_state *state, lam_error *error);
 void state_update_processors(precompute_state *state);
 lam_status stage_forecast(precompute_state *state, lam_error *error);
