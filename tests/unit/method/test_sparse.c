@@ -188,6 +188,65 @@ START_TEST(corrections_do_what_they_say) {
 }
 END_TEST
 
+/* Two rooms that do not see each other, the second of half the size: delta makes light that is even in each
+ * of them exact, of as much as it shines there, and leaves the other one dark. */
+START_TEST(delta_stays_within_parts) {
+    static const double small[3] = {1, 1.2, .8};
+    fixture f[2] = {subject(4), fixture_box(small, 3, .5f)};
+    const size_t n[2] = {f[0].m.n, f[1].m.n}, all = n[0] + n[1];
+    const uint64_t entries = f[0].F.indptr[n[0]] + f[1].F.indptr[n[1]];
+    double *area = test_allocate(all, sizeof *area);
+    float *rho = test_allocate(all, sizeof *rho), *E = test_allocate(all, sizeof *E);
+    float *truth = test_allocate(all, sizeof *truth), *out = test_allocate(all, sizeof *out);
+    uint32_t *order = test_allocate(all, sizeof *order);
+    csr F = {.n = all, .indptr = test_allocate(all + 1, sizeof *F.indptr)};
+    build_report report;
+    ck_ok(csr_reserve(&F, entries, &error));
+    for (size_t k = 0, at = 0; k < 2; k++)
+        for (size_t i = 0; i < n[k]; i++) {
+            const size_t row = k * n[0] + i;
+            area[row] = f[k].m.area[i];
+            rho[row] = f[k].m.reflectance[i];
+            order[row] = (uint32_t)(all - 1 - row); /* no position is that of its element */
+            for (uint64_t e = f[k].F.indptr[i]; e < f[k].F.indptr[i + 1]; e++) {
+                F.indices[at] = (uint32_t)(k * n[0]) + f[k].F.indices[e];
+                F.data[at++] = f[k].F.data[e];
+            }
+            F.indptr[row + 1] = at;
+        }
+    build_problem problem = *problem_of(&f[0]);
+    problem.n = all;
+    problem.F = &F;
+    problem.area = area;
+    problem.reflectance = rho;
+    problem.order = order;
+    problem.centre = NULL;
+    problem.normal = NULL;
+    problem.surface = NULL;
+    const build_options exact = build_presets("exact"), how = options_of(.02, DELTA);
+    lam_operator *whole = build(&problem, &exact, &report), *op = build(&problem, &how, &report);
+    for (size_t lit = 0; lit < 2; lit++) {
+        for (size_t i = 0; i < all; i++) E[i] = (i >= n[0]) == lit ? 2 : 0;
+        apply(whole, LAM_IRRADIANCE, E, truth);
+        apply(op, LAM_IRRADIANCE, E, out);
+        for (size_t i = 0; i < all; i++) {
+            ck_assert((truth[i] > 0) == (E[i] > 0));
+            ck_assert(fabsf(out[i] - truth[i]) <= 1e-5f * truth[i]);
+        }
+    }
+    lam_operator_close(whole);
+    lam_operator_close(op);
+    csr_free(&F);
+    free(area);
+    free(rho);
+    free(E);
+    free(truth);
+    free(out);
+    free(order);
+    for (int k = 0; k < 2; k++) fixture_free(&f[k]);
+}
+END_TEST
+
 START_TEST(bits_do_not_depend_on_threads) {
     fixture f = subject(6);
     sparse_inverse s[2];
@@ -267,6 +326,7 @@ int main(void) {
     tcase_set_timeout(cases, 300);
     tcase_add_loop_test(cases, rows_are_those_of_the_thesis, 0, 4);
     tcase_add_test(cases, corrections_do_what_they_say);
+    tcase_add_test(cases, delta_stays_within_parts);
     tcase_add_test(cases, bits_do_not_depend_on_threads);
     tcase_add_test(cases, memory_bounds_the_entries);
     tcase_add_test(cases, bad_requests_are_refused);
