@@ -35,9 +35,12 @@ double forecast_bytes(const forecast *f);
 /* LAM_ERR_MEMORY when that passes limit; the message names the option that would make it fit. */
 lam_status forecast_check(const forecast *f, double limit, lam_error *error);
 
+/* Processor seconds of a ray, on no machine in particular. */
+static const double forecast_ray_seconds = 3.3e-7;
+
 /* The pace of this machine, as short trials have it (machine_pace.h, ray_trial). */
 typedef struct forecast_rates {
-    double ray_seconds; /* processor seconds of a ray in this scene */
+    double ray_seconds; /* processor seconds of a ray in this scene, or in any where rays do little */
     double slowness;    /* over the machine that the constants are of */
     double processors;  /* that the process gets */
 } forecast_rates;

@@ -39,10 +39,9 @@ static const double probes_expected = 48;
  * (10,249 to 163,811 elements), rooms, a maze and a patio, what the judge takes beside finding its blocks. */
 static const double probe_block_seconds = 9e-9, probe_element_seconds = 3e-7;
 
-/* Processor seconds of a ray, on no machine in particular; of a probe per channel and element beside the
- * products with F: some eight answers of the operator that guides two solutions, vectors, and its direct
- * light (a hotel room of 99,021 elements). */
-static const double ray_seconds = 3.3e-7, guided_element_seconds = 7e-7;
+/* Of a probe per channel and element beside the products with F: some eight answers of the operator that
+ * guides two solutions, vectors, and its direct light (a hotel room of 99,021 elements). */
+static const double guided_element_seconds = 7e-7;
 /* Probes may always take these. */
 static const double probes_enough = 1;
 
@@ -61,7 +60,7 @@ static double probe_seconds(const forecast *f) {
 size_t forecast_probes(const forecast *f) {
     const double n = (double)f->n;
     if (f->probes_least == 0 || f->probes <= f->probes_least) return f->probes;
-    const forecast_rates fixed = {.ray_seconds = ray_seconds, .slowness = 1, .processors = 1};
+    const forecast_rates fixed = {.ray_seconds = forecast_ray_seconds, .slowness = 1, .processors = 1};
     const double build = f->cost.seconds > 0 ? f->cost.seconds : sample_seconds(n, &f->recipe, 0, &fixed);
     const double count = fmax(build, probes_enough) / probe_seconds(f);
     if (!(count > (double)f->probes_least)) return f->probes_least;

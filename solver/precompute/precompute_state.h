@@ -83,10 +83,10 @@ typedef struct precompute_state {
 precompute_state state_begin(const precompute_options *options, terminal *t);
 void state_free(precompute_state *state);
 
-/* stage_forecast.c. Measures the rates of the machine, once; and anew the processors that the run has had so
- * far. Logs the forecast, and fails where the disks have no room. Logs the forecast of the stages beside
- * their times. */
-lam_status state_measure_rates(precompute_state *state, lam_error *error);
+/* stage_forecast.c. Measures the rates of the machine, once (cast: that of rays in the scene, too); and anew
+ * the processors that the run has had so far. Logs the forecast, and fails where the disks have no room. Logs
+ * the forecast of the stages beside their times. */
+lam_status state_measure_rates(precompute_state *state, bool cast, lam_error *error);
 void state_update_processors(precompute_state *state);
 lam_status stage_forecast(precompute_state *state, lam_error *error);
 void state_log_times(const precompute_state *state);

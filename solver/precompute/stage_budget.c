@@ -214,7 +214,7 @@ lam_status stage_budget(precompute_state *state, lam_error *error) {
     bool blocks = false;
     budget_run run = {.state = state, .method = state_method_of_blocks()};
     budget_recipe list[BUDGET_RECIPES_MOST + 1];
-    TRY(state_measure_rates(state, error));
+    TRY(state_measure_rates(state, true, error));
     state_update_processors(state);
     double seconds = share_filled * o->time - (clock_seconds() - state->started);
     if (strcmp(o->form_factors, "rays") != 0) TRY(state_blocks_possible(state, run.method, &blocks, error));

@@ -8,14 +8,15 @@
 #include <omp.h>
 #include <stdio.h>
 
-lam_status state_measure_rates(precompute_state *state, lam_error *error) {
+lam_status state_measure_rates(precompute_state *state, bool cast, lam_error *error) {
     lam_status status = LAM_OK;
-    ray_trial rays;
+    ray_trial rays = {.rays = 0};
     double slowness;
     if (state->rates.processors > 0) return LAM_OK;
-    TRY(form_factors_try_rays(&state->m, state->order, &rays, error));
+    if (cast) TRY(form_factors_try_rays(&state->m, state->order, &rays, error));
     TRY(machine_slowness_measure(&slowness, error));
-    state->rates = (forecast_rates){.ray_seconds = rays.processor_seconds / rays.rays,
+    state->rates = (forecast_rates){.ray_seconds = cast ? rays.processor_seconds / rays.rays
+                                                        : slowness * forecast_ray_seconds,
                                     .slowness = slowness,
                                     .processors = omp_get_max_threads()};
 done:
@@ -48,11 +49,14 @@ lam_status stage_forecast(precompute_state *state, lam_error *error) {
     const precompute_options *o = state->options;
     forecast f = state_forecast(state, (double)state->m.n);
     char memory[32], stored[32], seconds[32], building[32], judging[32], scratch_room[32];
-    char made[64] = "", built[64] = "", judged[64] = "", kept[64] = "";
+    char made[64] = "", built[64] = "", judged[64] = "", kept[64] = "", rate[64] = "";
     TRY(forecast_check_disk(&f, o->output, state->scratch, o->scratch, error));
     if (state->t->quiet || (o->from_store && state->probes == 0)) goto done;
     TRY(find_cost(state, error));
-    TRY(state_measure_rates(state, error));
+    /* Beside blocks few rays are cast, unless there is a sky: a tree of all elements for a trial takes
+     * longer. */
+    const bool cast = state->recipe.method != RECIPE_BLOCKS || o->sky != NULL;
+    TRY(state_measure_rates(state, cast, error));
     state_update_processors(state);
     f = state_forecast(state, (double)state->m.n);
     const forecast_rates *rates = &state->rates;
@@ -67,10 +71,10 @@ lam_status stage_forecast(precompute_state *state, lam_error *error) {
     if (times.operate > 0) snprintf(built, sizeof built, " the operator %s,", building);
     if (state->probes > 0) snprintf(judged, sizeof judged, " the judge %s,", judging);
     if (state->scratch != NULL) snprintf(kept, sizeof kept, ", scratch up to %s", scratch_room);
-    terminal_log(state->t,
-                 "forecast:%s%s%s at %.3g Mray/s of %.2g processors; memory up to %s, store up to %s%s", made,
-                 built, judged, 1e-6 * rates->processors / rates->ray_seconds, rates->processors, memory,
-                 stored, kept);
+    if (cast)
+        snprintf(rate, sizeof rate, " at %.3g Mray/s of", 1e-6 * rates->processors / rates->ray_seconds);
+    terminal_log(state->t, "forecast:%s%s%s%s %.2g processors; memory up to %s, store up to %s%s", made,
+                 built, judged, cast ? rate : " on", rates->processors, memory, stored, kept);
     if (state->large)
         terminal_log(state->t, "rows are kept in %s, as memory is too small for them", o->scratch);
 done:
