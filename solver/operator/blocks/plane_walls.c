@@ -134,6 +134,26 @@ static bool may_stand_on(const box *b, const plane_in_space *plane, double same)
     return low <= same && high > same;
 }
 
+/* True where the line in which another plane meets this one runs through the rectangle, not along its border:
+ * at coordinates (u, v) with a u + b v = c. Of a town's ground, which all houses stand on, no element is then
+ * looked at for the walls of a house. */
+static bool line_crosses(const plane_in_space *plane, const plane_frame *other, double same) {
+    double normal[3], between[3], low = 0, high = 0;
+    cross3(other->axis[0], other->axis[1], normal);
+    subtract3(other->origin, plane->frame->origin, between);
+    const double a = dot3(normal, plane->frame->axis[0]), b = dot3(normal, plane->frame->axis[1]);
+    const double c = dot3(normal, between), length = hypot(a, b);
+    if (length < same_direction) return true; /* nearly parallel: there is no one line */
+    for (int corner = 0; corner < 4; corner++) {
+        const double u = corner & 1 ? plane->extent.high[0] : plane->extent.low[0];
+        const double v = corner & 2 ? plane->extent.high[1] : plane->extent.low[1];
+        const double distance = (a * u + b * v - c) / length;
+        low = corner == 0 ? distance : fmin(low, distance);
+        high = corner == 0 ? distance : fmax(high, distance);
+    }
+    return low < -same && high > same;
+}
+
 /* Points where the outline of an element meets the plane, at most two for each of its edges; 0 where it has
  * nothing in front. */
 static size_t points_on(const wall_finder *f, const uint32_t *element, const plane_in_space *plane,
@@ -276,6 +296,7 @@ lam_status wall_finder_find(wall_finder *f, size_t plane, plane_wall **walls, si
         if (!may_stand_on(&f->groups[g], &here, f->same)) continue;
         for (size_t q = g * PLANES_OF_BOX; q < (g + 1) * PLANES_OF_BOX && q < tree->n_frames; q++) {
             if (q == plane || !may_stand_on(&f->planes[q], &here, f->same)) continue;
+            if (!line_crosses(&here, &tree->frames[q], f->same)) continue;
             for (size_t p = f->begins[q]; p < f->begins[q + 1]; p++)
                 TRY(add_segment(f, f->corners->elements[tree->order[p]], &here, error));
         }

@@ -27,8 +27,8 @@ lam_status wall_finder_create(const plane_tree *tree, const uint32_t *begins, co
 void wall_finder_destroy(wall_finder *f);
 
 /* walls [*count]: on a plane, within the rectangle of its corners, sorted by line and begin; they belong to
- * the finder until its next call. Cost: a box test for each 32 planes, for each plane near this one, and a
- * test for each element of planes that touch it. Errors: LAM_ERR_MEMORY. */
+ * the finder until its next call. Cost: a box test for each 32 planes and for each plane near this one, and a
+ * test for each element of planes that meet it within its rectangle. Errors: LAM_ERR_MEMORY. */
 lam_status wall_finder_find(wall_finder *f, size_t plane, plane_wall **walls, size_t *count,
                             lam_error *error);
 
