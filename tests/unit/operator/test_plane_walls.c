@@ -136,6 +136,21 @@ START_TEST(a_wall_of_pieces_and_sheets_is_one) {
 }
 END_TEST
 
+/* Most elements lie at one end, so that their mean centre does too. */
+START_TEST(a_wall_far_from_most_elements_parts_the_floor) {
+    enum { FINE = 16 };
+    yard *y = yard_make();
+    const double side = 1. / FINE;
+    for (int k = 0; k < FINE * FINE; k++)
+        add(y, (double[3]){ALONG + k % FINE * side, k / FINE * side, 0}, (double[3]){side, 0, 0},
+            (double[3]){0, side, 0});
+    ck_assert_uint_eq(count_parts(y), 1);
+    add_wall(y, (double[2]){3, 0}, (double[2]){3, 8}, 1, 0, 2);
+    check_sides(y, 1, 0, 3);
+    free(y);
+}
+END_TEST
+
 /* No vertex lies on the floor; a triangle counts as a quadrilateral does. */
 START_TEST(a_wall_through_the_floor_parts_it) {
     yard *y = yard_make();
@@ -246,6 +261,7 @@ int main(void) {
     Suite *suite = suite_create("plane walls");
     TCase *walls = tcase_create("walls");
     tcase_add_test(walls, a_wall_parts_the_floor);
+    tcase_add_test(walls, a_wall_far_from_most_elements_parts_the_floor);
     tcase_add_test(walls, a_wall_of_pieces_and_sheets_is_one);
     tcase_add_test(walls, a_wall_through_the_floor_parts_it);
     tcase_add_test(walls, a_door_parts_as_long_as_a_quarter_is_wall);
