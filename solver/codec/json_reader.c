@@ -1,5 +1,7 @@
 #include "solver/codec/json_reader.h"
 
+#include "solver/base/utf8.h"
+
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -109,22 +111,6 @@ bool json_next_member(json_reader *r, json_slice *key) {
     if (r->at == r->end || *r->at != ':') return json_fail(r, "':' is expected behind a key");
     r->at++;
     return true;
-}
-
-size_t utf8_sequence(const char *at, const char *end) {
-    const unsigned char *b = (const unsigned char *)at;
-    size_t left = (size_t)(end - at);
-    if (left == 0) return 0;
-    if (b[0] < 0x80) return 1;
-    size_t length = b[0] >= 0xF0 ? 4 : b[0] >= 0xE0 ? 3 : 2;
-    if (b[0] < 0xC2 || b[0] > 0xF4 || left < length) return 0;
-    for (size_t i = 1; i < length; i++)
-        if ((b[i] & 0xC0) != 0x80) return 0;
-    /* The second byte excludes overlong forms, surrogates and what lies beyond U+10FFFF. */
-    if ((b[0] == 0xE0 && b[1] < 0xA0) || (b[0] == 0xED && b[1] > 0x9F) || (b[0] == 0xF0 && b[1] < 0x90) ||
-        (b[0] == 0xF4 && b[1] > 0x8F))
-        return 0;
-    return length;
 }
 
 static bool read_hex4(const char *at, const char *end, unsigned *value) {

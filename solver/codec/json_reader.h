@@ -79,7 +79,4 @@ bool json_fail(json_reader *r, const char *fault);
 /* Nothing but white space may be left. */
 bool json_finish(json_reader *r);
 
-/* Bytes of the valid UTF-8 sequence that starts at `at`, 0 when there is none before `end`. */
-size_t utf8_sequence(const char *at, const char *end);
-
 #endif

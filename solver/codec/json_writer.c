@@ -1,6 +1,6 @@
 #include "solver/codec/json_writer.h"
 
-#include "solver/codec/json_reader.h"
+#include "solver/base/utf8.h"
 
 #include <assert.h>
 #include <math.h>

@@ -14,6 +14,7 @@ typedef struct precompute_options {
     uint64_t subdivide, elements;
     double max_edge, unit, reflectance; /* reflectance: negative, the file's own */
     const char *up;                     /* NULL: by the file */
+    const char *assets;                 /* a folder, or NULL */
     bool two_sided;
     const char *form_factors, *quality; /* "rays" or "hemicube"; "draft", ... */
     uint64_t rays, resolution;          /* rays: OPTION_AUTO */

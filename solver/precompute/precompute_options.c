@@ -65,6 +65,7 @@ static const option_row mesh_rows[] = {
      .help = "Make two elements of every face: first all fronts, then all backs"},
     OPTION_ROW_REFLECTANCE(FIELD(reflectance),
                            .help = "Grey reflectance of every face, in place of that in the file"),
+    OPTION_ROW_ASSETS(FIELD(assets)),
     {0},
 };
 

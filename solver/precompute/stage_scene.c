@@ -39,8 +39,10 @@ static void log_warnings(terminal *t, const char *warnings) {
 lam_status stage_load_scene(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
-    const import_options how = {
-        .unit = o->unit, .up = o->up != NULL ? o->up[0] : 0, .reflectance = o->reflectance};
+    const import_options how = {.unit = o->unit,
+                                .up = o->up != NULL ? o->up[0] : 0,
+                                .reflectance = o->reflectance,
+                                .assets = o->assets};
     import_report report = {0};
     TRY(scene_import(o->input, &how, &state->m, &report, error));
     log_warnings(state->t, report.warnings);
@@ -48,8 +50,8 @@ lam_status stage_load_scene(precompute_state *state, lam_error *error) {
         terminal_log(state->t, "%zu face%s of zero area dropped", report.dropped_faces,
                      report.dropped_faces == 1 ? "" : "s");
     if (report.clamped > 0)
-        terminal_log(state->t, "%zu material%s reflected all light or more: set below 1", report.clamped,
-                     report.clamped == 1 ? "" : "s");
+        terminal_log(state->t, "%zu material%s reflected all light or more, or nearly: set to .9999",
+                     report.clamped, report.clamped == 1 ? "" : "s");
 done:
     return status;
 }

@@ -18,4 +18,11 @@
         .most = 1, .below = true, __VA_ARGS__                                                                \
     }
 
+/* --assets DIR, a text or NULL. */
+#define OPTION_ROW_ASSETS(place)                                                                             \
+    {                                                                                                        \
+        .name = "assets", .kind = OPTION_TEXT, .offset = (place), .argument = "DIR",                         \
+        .help = "Folder of files that the scene names and that do not lie in its own; others are not read"   \
+    }
+
 #endif

@@ -1,5 +1,5 @@
 /* lambert verify: checks a store and prints one line for each check. */
-#include "solver/base/options.h"
+#include "solver/scene/mesh_options.h"
 #include "solver/verbs/verbs.h"
 #include "solver/verify/verify.h"
 
@@ -11,6 +11,7 @@
 
 typedef struct fields {
     uint64_t probes, walks;
+    const char *assets;
     bool json;
 } fields;
 
@@ -34,6 +35,7 @@ static const option_row rows[] = {
          "are compared with; 0: no comparison",
      .least = 0,
      .most = 1e9},
+    OPTION_ROW_ASSETS(FIELD(assets)),
     {.name = "json", .kind = OPTION_FLAG, .offset = FIELD(json), .help = "Print the checks as JSON"},
     {0},
 };
@@ -154,6 +156,7 @@ int cmd_verify(int argc, char **argv) {
     term.nothing = "not every check was made";
     const progress how = terminal_progress(&term);
     examination e = {.scene = given.n_arguments > 1 ? given.arguments[1] : NULL,
+                     .assets = f.assets,
                      .probes = f.probes,
                      .walks = f.walks,
                      .progress = &how};

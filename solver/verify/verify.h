@@ -35,9 +35,10 @@ const char *walk_comparison_target(const walk_comparison *w, char text[32]);
 /* A store under examination; data that a check has loaded stays for the next. */
 typedef struct examination {
     store *s;
-    const char *scene; /* a scene file to compare with, or NULL */
-    size_t probes;     /* 0: the error is not measured again */
-    size_t walks;      /* of each emission and from each element; 0: none */
+    const char *scene;  /* a scene file to compare with, or NULL */
+    const char *assets; /* folder of files that it names, or NULL */
+    size_t probes;      /* 0: the error is not measured again */
+    size_t walks;       /* of each emission and from each element; 0: none */
     const progress *progress;
     mesh m;
     double *row_sums;

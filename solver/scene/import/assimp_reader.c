@@ -4,6 +4,7 @@
 #include "solver/base/file_text.h"
 #include "solver/scene/import/imported_faces.h"
 
+#include <assimp/cfileio.h>
 #include <assimp/cimport.h>
 #include <assimp/config.h>
 #include <assimp/material.h>
@@ -83,6 +84,8 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
     imported_material fresh = {.defined = 1};
     fresh.has_diffuse =
         colour_of(m, colour_base, fresh.diffuse) || colour_of(m, colour_diffuse, fresh.diffuse);
+    fresh.textured = aiGetMaterialTextureCount(m, aiTextureType_DIFFUSE) > 0 ||
+                     aiGetMaterialTextureCount(m, aiTextureType_BASE_COLOR) > 0;
     colour_of(m, colour_emissive, fresh.emission);
     if (aiGetMaterialFloatArray(m, emissive_intensity, 0, 0, &strength, NULL) == aiReturn_SUCCESS)
         for (int c = 0; c < 3; c++) fresh.emission[c] *= strength;
@@ -93,10 +96,10 @@ static lam_status read_material(assimp_state *a, unsigned index, lam_error *erro
         v = &a->s->values[a->materials[index]];
     }
     *v = fresh;
-    if (aiGetMaterialTextureCount(m, aiTextureType_DIFFUSE) > 0 ||
-        aiGetMaterialTextureCount(m, aiTextureType_BASE_COLOR) > 0 ||
-        aiGetMaterialTextureCount(m, aiTextureType_EMISSIVE) > 0)
-        import_warn(&a->s->warnings, "%s: the texture of material '%s' is ignored", a->path, name);
+    if (aiGetMaterialTextureCount(m, aiTextureType_EMISSIVE) > 0)
+        import_warn(&a->s->warnings,
+                    "%s: the texture of material '%s' is ignored; its emission is the plain factor", a->path,
+                    name);
 done:
     return status;
 }
@@ -111,7 +114,7 @@ static lam_status name_of_node(assimp_state *a, const struct aiNode *node, uint3
     if (name[0] == '\0' || name[0] == '<') return LAM_OK;
     if (a->gltf && sscanf(name, "nodes[%u]%n", &number, &end) == 1 && end > 0 && name[end] == '\0')
         return LAM_OK;
-    return name_table_add(&a->s->objects, name, strlen(name), object, error);
+    return imported_faces_add_object(a->s, name, strlen(name), object, error);
 }
 
 static lam_status read_mesh(assimp_state *a, const struct aiMesh *m, const affine *t, uint32_t object,
@@ -201,15 +204,101 @@ static lam_status glb_padded(const char *glb, size_t length, char **out, size_t 
     return LAM_OK;
 }
 
-static const struct aiScene *import_scene(const char *path, const char *padded, size_t padded_length) {
+/* A file in memory, as the library reads it: the scene itself, or one that the scene names. */
+typedef struct open_file {
+    struct aiFile calls;
+    const char *bytes;
+    char *owned; /* the bytes of a file that the scene names */
+    size_t length, at;
+} open_file;
+
+/* The files that the library may open. */
+typedef struct scene_files {
+    const char *path, *assets, *bytes;
+    size_t length;
+    char outside[256]; /* the file refused first, or empty */
+} scene_files;
+
+static size_t read_file(struct aiFile *calls, char *out, size_t size, size_t count) {
+    open_file *f = (open_file *)calls->UserData;
+    if (size == 0) return 0;
+    const size_t left = (f->length - f->at) / size, n = count < left ? count : left;
+    memcpy(out, f->bytes + f->at, n * size);
+    f->at += n * size;
+    return n;
+}
+
+static size_t write_nothing(struct aiFile *calls, const char *bytes, size_t size, size_t count) {
+    (void)calls, (void)bytes, (void)size, (void)count;
+    return 0;
+}
+
+static size_t tell_file(struct aiFile *calls) {
+    return ((const open_file *)calls->UserData)->at;
+}
+
+static size_t file_size(struct aiFile *calls) {
+    return ((const open_file *)calls->UserData)->length;
+}
+
+static aiReturn seek_file(struct aiFile *calls, size_t offset, enum aiOrigin origin) {
+    open_file *f = (open_file *)calls->UserData;
+    const size_t base = origin == aiOrigin_SET ? 0 : origin == aiOrigin_CUR ? f->at : f->length;
+    const size_t to = base + offset; /* an offset back from the end wraps round to it */
+    if (to > f->length) return aiReturn_FAILURE;
+    f->at = to;
+    return aiReturn_SUCCESS;
+}
+
+static void flush_nothing(struct aiFile *calls) {
+    (void)calls;
+}
+
+static void close_file(struct aiFileIO *io, struct aiFile *calls) {
+    open_file *f = (open_file *)calls->UserData;
+    (void)io;
+    free(f->owned);
+    free(f);
+}
+
+static struct aiFile *open_for_library(struct aiFileIO *io, const char *name, const char *mode) {
+    scene_files *files = (scene_files *)io->UserData;
+    lam_error ignored = {0};
+    char full[ASSET_PATH];
+    const char *slash = strrchr(files->path, '/');
+    const size_t folder = slash == NULL ? 0 : (size_t)(slash - files->path) + 1;
+    if (mode[0] != 'r') return NULL;
+    open_file *f = memory_allocate(1, sizeof *f, name, &ignored);
+    if (f == NULL) return NULL;
+    f->calls = (struct aiFile){.ReadProc = read_file,
+                               .WriteProc = write_nothing,
+                               .TellProc = tell_file,
+                               .FileSizeProc = file_size,
+                               .SeekProc = seek_file,
+                               .FlushProc = flush_nothing,
+                               .UserData = (char *)f};
+    f->bytes = files->bytes;
+    f->length = files->length;
+    if (strcmp(name, files->path) == 0) return &f->calls;
+    if (strncmp(name, files->path, folder) == 0) name += folder; /* the library has put it before */
+    const asset_place place = asset_find(files->path, files->assets, name, full);
+    if (place == ASSET_FOUND && file_text(full, &f->owned, &f->length, &ignored) == LAM_OK) {
+        f->bytes = f->owned;
+        return &f->calls;
+    }
+    if (place == ASSET_OUTSIDE && files->outside[0] == '\0')
+        snprintf(files->outside, sizeof files->outside, "%s", name);
+    free(f);
+    return NULL;
+}
+
+static const struct aiScene *import_scene(scene_files *files) {
+    struct aiFileIO io = {.OpenProc = open_for_library, .CloseProc = close_file, .UserData = (char *)files};
     struct aiPropertyStore *properties = aiCreatePropertyStore();
     if (properties == NULL) return NULL;
     aiSetImportPropertyInteger(properties, AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, 1);
     /* No post-processing: it joins, reorders and triangulates. */
-    const struct aiScene *scene =
-        padded != NULL
-            ? aiImportFileFromMemoryWithProperties(padded, (unsigned)padded_length, 0, "glb", properties)
-            : aiImportFileExWithProperties(path, 0, NULL, properties);
+    const struct aiScene *scene = aiImportFileExWithProperties(files->path, 0, &io, properties);
     aiReleasePropertyStore(properties);
     return scene;
 }
@@ -227,7 +316,19 @@ lam_status assimp_read(const char *path, imported_faces *s, lam_error *error) {
     if (a.gltf && memmem(bytes, length, strength, sizeof strength - 1) != NULL)
         import_warn(&s->warnings, "%s: %s is not read; emissions are the plain emissive factors", path,
                     strength);
-    a.scene = import_scene(path, padded, padded_length);
+    if (a.gltf) TRY(gltf_check_head(path, bytes, length, error));
+    TRY(ply_check_head(path, bytes, length, error));
+    scene_files files = {.path = path,
+                         .assets = s->assets,
+                         .bytes = padded != NULL ? padded : bytes,
+                         .length = padded != NULL ? padded_length : length};
+    a.scene = import_scene(&files);
+    if (files.outside[0] != '\0')
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s: it names the file '%s', which lies outside the scene's folder; --assets with its folder "
+             "lets it "
+             "be read",
+             path, files.outside);
     if (a.scene == NULL)
         FAIL(error, LAM_ERR_FORMAT,
              "%s: not a scene that can be read (OBJ, glTF, GLB, PLY, STL, OFF): %.300s", path,

@@ -1,6 +1,7 @@
 /* Turns the faces that the child read into a mesh: groups, materials, units. */
 #include "solver/scene/import/import.h"
 #include "solver/base/array_grow.h"
+#include "solver/base/utf8.h"
 #include "solver/scene/import/imported_faces.h"
 
 #include <float.h>
@@ -10,10 +11,10 @@
 #include <string.h>
 #include <strings.h>
 
-/* The reflectance of faces without a diffuse colour, and the one that replaces a diffuse value of 1 or more.
- */
+/* The reflectance of faces without a diffuse colour, or with a texture's, and the largest that a file's
+ * colour gives: light between two white walls must die out. */
 static const double default_reflectance = .5;
-static const double largest_reflectance = .999;
+static const double largest_reflectance = .9999;
 
 static const char *extension_of(const char *path) {
     const char *slash = strrchr(path, '/'), *dot = strrchr(path, '.');
@@ -23,8 +24,13 @@ static const char *extension_of(const char *path) {
 static void stem_of(const char *path, char *out, size_t size) {
     const char *slash = strrchr(path, '/'), *name = slash == NULL ? path : slash + 1;
     const char *dot = strrchr(name, '.');
-    const size_t length = dot == NULL || dot == name ? strlen(name) : (size_t)(dot - name);
-    snprintf(out, size, "%.*s", (int)(length < size ? length : size - 1), name);
+    size_t length = dot == NULL || dot == name ? strlen(name) : (size_t)(dot - name);
+    if (utf8_is_valid(name, length)) {
+        snprintf(out, size, "%.*s", (int)(length < size ? length : size - 1), name);
+        return;
+    }
+    if (length > (size - 1) / 2) length = (size - 1) / 2;
+    out[utf8_of_latin1(name, length, out)] = '\0';
 }
 
 /* Checks and clamps the values of the materials that faces use, in place. */
@@ -41,6 +47,12 @@ static lam_status settle_materials(imported_faces *s, const char *path, const bo
                         v->defined ? "has no diffuse colour" : "is not defined", default_reflectance);
             for (int c = 0; c < 3; c++) v->diffuse[c] = default_reflectance;
         }
+        if (v->textured) {
+            import_warn(&s->warnings,
+                        "%s: the texture of material '%s' is not read; its reflectance is set to %g", path,
+                        name, default_reflectance);
+            for (int c = 0; c < 3; c++) v->diffuse[c] = default_reflectance;
+        }
         for (int c = 0; c < 3; c++) {
             if (!(v->diffuse[c] >= 0) || !isfinite(v->diffuse[c]))
                 FAIL(error, LAM_ERR_FORMAT, "%s: material '%s': diffuse value %g, must be in [0, 1)", path,
@@ -49,13 +61,14 @@ static lam_status settle_materials(imported_faces *s, const char *path, const bo
                 FAIL(error, LAM_ERR_FORMAT,
                      "%s: material '%s': emission %g, must not be negative and must be finite", path, name,
                      v->emission[c]);
-            if ((float)v->diffuse[c] >= 1) clamped = true;
-            v->diffuse[c] = (float)v->diffuse[c] >= 1 ? largest_reflectance : v->diffuse[c];
+            if (!(v->diffuse[c] > largest_reflectance)) continue;
+            clamped = true;
+            v->diffuse[c] = largest_reflectance;
         }
         if (!clamped) continue;
         report->clamped++;
-        import_warn(&s->warnings, "%s: material '%s': a diffuse value of 1 or more is clamped to %g", path,
-                    name, largest_reflectance);
+        import_warn(&s->warnings, "%s: material '%s': a diffuse value above %g is clamped to it", path, name,
+                    largest_reflectance);
     }
 done:
     return status;
@@ -80,6 +93,7 @@ static lam_status apply_materials(imported_faces *s, const char *path, const imp
     const bool overridden = options->reflectance >= 0;
     for (size_t i = 0; overridden && i < s->materials.n; i++) {
         s->values[i].has_diffuse = 1;
+        s->values[i].textured = 0;
         for (int c = 0; c < 3; c++) s->values[i].diffuse[c] = options->reflectance;
     }
     if (unnamed > 0 && !overridden)
@@ -220,6 +234,7 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     const child_limits limits = {
         .cpu_seconds = options->cpu_seconds > 0 ? options->cpu_seconds : 120,
         .memory_bytes = options->memory_bytes > 0 ? options->memory_bytes : (size_t)8 << 30,
+        .assets = options->assets,
     };
     TRY(check_options(options, error));
     TRY(import_in_child(is_obj ? obj_read : assimp_read, path, &limits, &s, error));
@@ -232,6 +247,9 @@ lam_status scene_import(const char *path, const import_options *options, mesh *m
     if (!is_obj) warn_of_lost_precision(&s, path, &made);
     mesh_geometry_hash(&made, made.source_hash);
     found.dropped_faces = s.dropped;
+    if (s.latin1 > 0)
+        import_warn(&s.warnings, "%s: %zu name%s not UTF-8, read as Latin-1", path, s.latin1,
+                    s.latin1 == 1 ? " is" : "s are");
     if (s.warnings.omitted > 0)
         snprintf(found.warnings, sizeof found.warnings, "%.*s\n%llu more warnings",
                  (int)sizeof found.warnings - 64, s.warnings.text, (unsigned long long)s.warnings.omitted);

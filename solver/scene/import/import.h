@@ -8,13 +8,14 @@ typedef struct import_options {
     double unit;          /* metres per unit of the file; 1 */
     char up;              /* 'x', 'y', 'z', or 0: y for glTF, z otherwise */
     double reflectance;   /* for every face, grey; negative: the file's own */
+    const char *assets;   /* folder that files which the scene names may lie in, beside its own; NULL: none */
     unsigned cpu_seconds; /* limit for the child; 0 gives 120 */
     size_t memory_bytes;  /* limit for the child; 0 gives 8 GiB */
 } import_options;
 
 typedef struct import_report {
     size_t dropped_faces; /* of zero area */
-    size_t clamped;       /* materials whose diffuse value was 1 or more */
+    size_t clamped;       /* materials whose diffuse value was too near to 1, or more */
     char warnings[2048];  /* one line each, '\n' between them; cut with a count when there are more */
 } import_report;
 

@@ -22,7 +22,7 @@ typedef struct reply_header {
     uint64_t status;
     char message[sizeof((lam_error *)0)->message];
     import_warnings warnings;
-    uint64_t n_points, n_elements, n_objects, object_bytes, n_materials, material_bytes, dropped;
+    uint64_t n_points, n_elements, n_objects, object_bytes, n_materials, material_bytes, dropped, latin1;
 } reply_header;
 
 static const char reply_magic[8] = "lamsoup";
@@ -53,6 +53,7 @@ static bool send_reply(int fd, lam_status result, const lam_error *error, const 
     header.n_materials = s->materials.n;
     header.material_bytes = s->materials.text_bytes;
     header.dropped = s->dropped;
+    header.latin1 = s->latin1;
     return send_bytes(fd, &header, sizeof header) &&
            send_bytes(fd, s->points.points, s->points.n * sizeof *s->points.points) &&
            send_bytes(fd, s->elements, s->n_elements * sizeof *s->elements) &&
@@ -97,7 +98,7 @@ static int confine(int fd, const child_limits *limits) {
 }
 
 static _Noreturn void child_main(scene_reader *reader, const char *path, const child_limits *limits, int fd) {
-    imported_faces s = {0};
+    imported_faces s = {.assets = limits->assets};
     lam_error error = {0};
     fd = confine(fd, limits);
     lam_status result = reader(path, &s, &error);
@@ -211,6 +212,7 @@ static lam_status receive_reply(reply_pipe *pipe, const char *path, size_t most_
         FAIL(error, LAM_ERR_INTERNAL, "%s: the importer sent a damaged reply", path);
     s->warnings = header.warnings;
     s->dropped = header.dropped;
+    s->latin1 = header.latin1;
 done:
     free(objects);
     free(materials);

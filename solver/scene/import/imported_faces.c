@@ -1,6 +1,7 @@
 #include "solver/scene/import/imported_faces.h"
 
 #include "solver/base/array_grow.h"
+#include "solver/base/utf8.h"
 
 #include <errno.h>
 #include <math.h>
@@ -66,10 +67,31 @@ lam_status imported_faces_add_polygon(imported_faces *s, const uint32_t *corners
     return LAM_OK;
 }
 
+/* Adds a name to one of the tables as UTF-8. */
+static lam_status add_name(imported_faces *s, name_table *names, const char *name, size_t length,
+                           uint32_t *index, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *text = NULL;
+    if (utf8_is_valid(name, length)) return name_table_add(names, name, length, index, error);
+    text = memory_allocate(length, 2, "a name", error);
+    if (text == NULL) return LAM_ERR_MEMORY;
+    const size_t before = names->n;
+    TRY(name_table_add(names, text, utf8_of_latin1(name, length, text), index, error));
+    s->latin1 += names->n > before;
+done:
+    free(text);
+    return status;
+}
+
+lam_status imported_faces_add_object(imported_faces *s, const char *name, size_t length, uint32_t *index,
+                                     lam_error *error) {
+    return add_name(s, &s->objects, name, length, index, error);
+}
+
 lam_status imported_faces_add_material(imported_faces *s, const char *name, size_t length, uint32_t *index,
                                        lam_error *error) {
     const size_t before = s->materials.n;
-    lam_status status = name_table_add(&s->materials, name, length, index, error);
+    lam_status status = add_name(s, &s->materials, name, length, index, error);
     if (status != LAM_OK || s->materials.n == before) return status;
     if (array_grow(&s->values, &s->value_capacity, s->materials.n, sizeof *s->values, "materials", error) !=
         LAM_OK)

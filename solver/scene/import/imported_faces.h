@@ -20,6 +20,7 @@ typedef struct imported_material {
     double diffuse[3], emission[3];
     uint64_t defined;     /* 0: the file only names it */
     uint64_t has_diffuse; /* 0: the file gives none */
+    uint64_t textured;    /* 1: the diffuse colour is a texture's, which is not read */
 } imported_material;
 
 typedef struct imported_faces {
@@ -45,6 +46,8 @@ typedef struct imported_faces {
     name_table objects, materials;
     imported_material *values; /* [materials.n] */
     size_t value_capacity;
+    size_t latin1;      /* names that were not UTF-8 and were read as Latin-1 */
+    const char *assets; /* folder that files of the scene may lie in beside the scene's own; NULL: none */
     import_warnings warnings;
 } imported_faces;
 
@@ -54,7 +57,10 @@ lam_status imported_faces_add_vertex(imported_faces *s, const double vertex[3], 
 lam_status imported_faces_add_polygon(imported_faces *s, const uint32_t *corners, size_t n, uint32_t object,
                                       uint32_t material, uint32_t line, lam_error *error);
 
-/* The index of the material of this name, made with no values when it is new. */
+/* The index of the object of this name, or of the material, which is made with no values when it is new. A
+ * name that is not UTF-8 is read as Latin-1, and counted. */
+lam_status imported_faces_add_object(imported_faces *s, const char *name, size_t length, uint32_t *index,
+                                     lam_error *error);
 lam_status imported_faces_add_material(imported_faces *s, const char *name, size_t length, uint32_t *index,
                                        lam_error *error);
 
@@ -62,6 +68,21 @@ lam_status imported_faces_add_material(imported_faces *s, const char *name, size
  * counted in dropped. Equal vertices are shared, unused ones dropped. Errors: LAM_ERR_FORMAT for an empty
  * scene or a bad index. */
 lam_status imported_faces_split(imported_faces *s, const char *path, lam_error *error);
+
+/* Where a file that a scene names lies. */
+typedef enum asset_place { ASSET_MISSING, ASSET_FOUND, ASSET_OUTSIDE } asset_place;
+enum { ASSET_PATH = 4096 };
+
+/* Looks for file, which the file scene names: beside the scene, then in assets, unless that is NULL. out: its
+ * path. ASSET_OUTSIDE: it exists, but lies neither below the scene's folder nor below assets, links resolved.
+ */
+asset_place asset_find(const char *scene, const char *assets, const char *file, char out[ASSET_PATH]);
+
+/* Refuse a glTF or GLB that requires an extension which changes what is read and is not read here, and a PLY
+ * that is shorter than its header says: a library may take minutes to notice. Other faults are the library's
+ * to tell. */
+lam_status gltf_check_head(const char *path, const char *bytes, size_t length, lam_error *error);
+lam_status ply_check_head(const char *path, const char *bytes, size_t length, lam_error *error);
 
 /* A reader of one family of formats; runs in the child. */
 typedef lam_status scene_reader(const char *path, imported_faces *s, lam_error *error);
@@ -73,6 +94,7 @@ scene_reader assimp_read;
 typedef struct child_limits {
     unsigned cpu_seconds;
     size_t memory_bytes;
+    const char *assets; /* of imported_faces */
 } child_limits;
 
 lam_status import_in_child(scene_reader *reader, const char *path, const child_limits *limits,

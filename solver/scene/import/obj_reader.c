@@ -9,7 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 /* A text cut into lines, each NUL-terminated, without leading or trailing blanks; '\' joins a line to the
  * next.
@@ -19,6 +18,19 @@ typedef struct line_cursor {
     uint32_t number; /* of the line given last, from 1 */
     uint32_t following;
 } line_cursor;
+
+/* Passes over a byte order mark, which some editors put before UTF-8. */
+static lam_status begin_lines(const char *path, char *text, size_t length, line_cursor *cursor,
+                              lam_error *error) {
+    static const char mark[] = "\xEF\xBB\xBF";
+    lam_status status = LAM_OK;
+    const size_t skip = length >= 3 && memcmp(text, mark, 3) == 0 ? 3 : 0;
+    if (length >= 2 && (memcmp(text, "\xFF\xFE", 2) == 0 || memcmp(text, "\xFE\xFF", 2) == 0))
+        FAIL(error, LAM_ERR_FORMAT, "%s: the text is UTF-16; save it as UTF-8", path);
+    *cursor = (line_cursor){.next = text + skip, .end = text + length};
+done:
+    return status;
+}
 
 static bool is_blank(char c) {
     return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
@@ -82,8 +94,9 @@ static lam_status read_mtl(const char *path, imported_faces *s, lam_error *error
     size_t length = 0;
     uint32_t current = TABLE_NONE;
     char *rest, *text = NULL;
+    line_cursor cursor;
     TRY(file_text(path, &text, &length, error));
-    line_cursor cursor = {.next = text, .end = text + length};
+    TRY(begin_lines(path, text, length, &cursor, error));
     for (char *line; (line = next_line(&cursor)) != NULL;) {
         if ((rest = after_keyword(line, "newmtl")) != NULL) {
             TRY(imported_faces_add_material(s, rest, strlen(rest), &current, error));
@@ -100,9 +113,11 @@ static lam_status read_mtl(const char *path, imported_faces *s, lam_error *error
             s->values[current].has_diffuse = 1;
         } else if ((rest = after_keyword(line, "Ke")) != NULL) {
             TRY(read_colour(path, cursor.number, rest, s->values[current].emission, error));
-        } else if (after_keyword(line, "map_Kd") != NULL || after_keyword(line, "map_Ke") != NULL) {
-            import_warn(&s->warnings, "%s:%u: the texture of material '%s' is ignored", path, cursor.number,
-                        name_table_get(&s->materials, current));
+        } else if (after_keyword(line, "map_Kd") != NULL) {
+            s->values[current].textured = 1;
+        } else if (after_keyword(line, "map_Ke") != NULL) {
+            import_warn(&s->warnings, "%s:%u: the texture of material '%s' is ignored; its emission is Ke",
+                        path, cursor.number, name_table_get(&s->materials, current));
         }
     }
 done:
@@ -110,21 +125,20 @@ done:
     return status;
 }
 
-/* Reads file, relative to the OBJ's folder unless it is an absolute path; *found is false where it does not
- * exist. */
-static lam_status read_library(const char *path, const char *file, imported_faces *s, bool *found,
-                               lam_error *error) {
+/* Reads a material file; *found is false where it does not exist. */
+static lam_status read_library(const char *path, uint32_t line, const char *file, imported_faces *s,
+                               bool *found, lam_error *error) {
     lam_status status = LAM_OK;
-    const char *slash = strrchr(path, '/');
-    const size_t folder = file[0] == '/' || slash == NULL ? 0 : (size_t)(slash - path) + 1;
-    char *full = memory_allocate(folder + strlen(file) + 1, 1, path, error);
-    if (full == NULL) return LAM_ERR_MEMORY;
-    memcpy(full, path, folder);
-    strcpy(full + folder, file);
-    *found = file[0] != '\0' && access(full, F_OK) == 0;
+    char full[ASSET_PATH];
+    const asset_place place = asset_find(path, s->assets, file, full);
+    *found = place == ASSET_FOUND;
+    if (place == ASSET_OUTSIDE)
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s:%u: the material file '%s' lies outside the scene's folder; --assets with its folder lets "
+             "it be read",
+             path, line, file);
     if (*found) TRY(read_mtl(full, s, error));
 done:
-    free(full);
     return status;
 }
 
@@ -133,7 +147,7 @@ static lam_status read_libraries(const char *path, uint32_t line, char *names, i
                                  lam_error *error) {
     lam_status status = LAM_OK;
     bool found;
-    TRY(read_library(path, names, s, &found, error));
+    TRY(read_library(path, line, names, s, &found, error));
     while (!found && *names != '\0') {
         char *file = names, *out = names;
         for (; *names != '\0' && !is_blank(*names); names++) {
@@ -143,7 +157,7 @@ static lam_status read_libraries(const char *path, uint32_t line, char *names, i
         while (is_blank(*names)) names++;
         const bool more = *names != '\0';
         if (out < names) *out = '\0';
-        TRY(read_library(path, file, s, &found, error));
+        TRY(read_library(path, line, file, s, &found, error));
         if (!found)
             FAIL(error, LAM_ERR_FORMAT,
                  "%s:%u: the material file '%s' is missing; put it beside the OBJ or remove the mtllib line",
@@ -208,7 +222,7 @@ done:
 /* The index of a name in the table of objects; TABLE_NONE for an empty one. */
 static lam_status read_name(imported_faces *s, const char *name, uint32_t *index, lam_error *error) {
     *index = TABLE_NONE;
-    return *name == '\0' ? LAM_OK : name_table_add(&s->objects, name, strlen(name), index, error);
+    return *name == '\0' ? LAM_OK : imported_faces_add_object(s, name, strlen(name), index, error);
 }
 
 lam_status obj_read(const char *path, imported_faces *s, lam_error *error) {
@@ -216,8 +230,9 @@ lam_status obj_read(const char *path, imported_faces *s, lam_error *error) {
     obj_state o = {.path = path, .s = s, .object = TABLE_NONE, .group = TABLE_NONE, .material = TABLE_NONE};
     size_t length = 0;
     char *rest, *text = NULL;
+    line_cursor cursor;
     TRY(file_text(path, &text, &length, error));
-    line_cursor cursor = {.next = text, .end = text + length};
+    TRY(begin_lines(path, text, length, &cursor, error));
     for (char *line; (line = next_line(&cursor)) != NULL;) {
         if ((rest = after_keyword(line, "v")) != NULL)
             TRY(read_vertex(&o, cursor.number, rest, error));

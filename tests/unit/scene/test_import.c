@@ -134,12 +134,40 @@ START_TEST(diffuse_of_one_or_more_is_clamped_with_a_warning) {
     ck_assert_ptr_nonnull(strstr(report.warnings, "material 'too bright'"));
     ck_assert_ptr_null(strstr(report.warnings, "unused"));
     ck_assert_uint_eq(m.n_channels, 3);
-    const float reflectance[3][2] = {{.999f, .2f}, {.999f, .999f}, {.999f, .1f}};
+    const float reflectance[3][2] = {{.9999f, .2f}, {.9999f, .9999f}, {.9999f, .1f}};
     for (size_t c = 0; c < 3; c++)
         for (size_t i = 0; i < 2; i++) {
             ck_assert_float_eq(m.reflectance[c * 2 + i], reflectance[c][i]);
             ck_assert_float_eq(m.emission[c * 2 + i], i == 1 ? 3.f - (float)c : 0.f);
         }
+    mesh_free(&m);
+}
+END_TEST
+
+/* A value of 1 is not darker than one that stays. */
+START_TEST(brighter_colours_never_become_darker) {
+    import_report report;
+    write_mtl("newmtl a\nKd .9999 .9999 .9999\nnewmtl b\nKd .99995 .99995 .99995\nnewmtl c\nKd 1 1 1\n");
+    mesh m = good_text(
+        "mtllib scene.mtl\n" SQUARE "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\nusemtl c\nf 1 2 4\n", &report);
+    ck_assert_uint_eq(report.clamped, 2);
+    for (size_t i = 0; i < 3; i++) ck_assert_float_eq(m.reflectance[i], .9999f);
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(textures_that_are_not_read_have_a_default_and_a_warning) {
+    import_report report;
+    write_mtl(
+        "newmtl carpet\nKd 1 1 1\nmap_Kd carpet.png\nnewmtl lamp\nKd .2 .2 .2\nKe 3 3 3\nmap_Ke lamp.png\n");
+    mesh m = good_text("mtllib scene.mtl\n" SQUARE "usemtl carpet\nf 1 2 3\nusemtl lamp\nf 1 3 4\n", &report);
+    ck_assert_ptr_nonnull(
+        strstr(report.warnings, "texture of material 'carpet' is not read; its reflectance is set"));
+    ck_assert_ptr_nonnull(strstr(report.warnings, "scene.mtl:7: the texture of material 'lamp' is ignored"));
+    ck_assert_uint_eq(report.clamped, 0);
+    ck_assert_float_eq(m.reflectance[0], .5f);
+    ck_assert_float_eq(m.reflectance[1], .2f);
+    ck_assert_float_eq(m.emission[1], 3);
     mesh_free(&m);
 }
 END_TEST
@@ -418,6 +446,8 @@ int main(void) {
     tcase_add_test(tests, gltf_groups_are_nodes);
     tcase_add_test(tests, mirrored_nodes_keep_their_fronts);
     tcase_add_test(tests, diffuse_of_one_or_more_is_clamped_with_a_warning);
+    tcase_add_test(tests, brighter_colours_never_become_darker);
+    tcase_add_test(tests, textures_that_are_not_read_have_a_default_and_a_warning);
     tcase_add_test(tests, missing_colours_have_a_default_and_a_warning);
     tcase_add_test(tests, bad_colours_are_errors);
     tcase_add_test(tests, reflectance_option_overrides_but_keeps_emission);

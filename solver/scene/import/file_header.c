@@ -1,0 +1,103 @@
+/* Checks of a file's head before the importing library reads it: glTF extensions that it needs, and a PLY's
+ * numbers of vertices and faces. Run in the child. */
+#include "solver/scene/import/imported_faces.h"
+
+#include <ctype.h>
+#include <jansson.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* True for extensions without which positions, faces and plain colours are read right. */
+static bool is_readable(const char *extension) {
+    static const char *const beginnings[] = {"KHR_materials_",
+                                             "KHR_texture_",
+                                             "EXT_texture_",
+                                             "MSFT_texture_",
+                                             "KHR_lights_",
+                                             "KHR_xmp",
+                                             "KHR_draco_mesh_compression"};
+    for (size_t i = 0; i < sizeof beginnings / sizeof *beginnings; i++)
+        if (strncmp(extension, beginnings[i], strlen(beginnings[i])) == 0) return true;
+    return false;
+}
+
+static size_t little_endian(const char *bytes) {
+    const unsigned char *b = (const unsigned char *)bytes;
+    return b[0] | (size_t)b[1] << 8 | (size_t)b[2] << 16 | (size_t)b[3] << 24;
+}
+
+lam_status gltf_check_head(const char *path, const char *bytes, size_t length, lam_error *error) {
+    lam_status status = LAM_OK;
+    if (length >= 20 && memcmp(bytes, "glTF", 4) == 0) { /* a GLB, whose first chunk is the JSON */
+        const size_t size = little_endian(bytes + 12);
+        if (memcmp(bytes + 16, "JSON", 4) != 0 || size > length - 20) return LAM_OK;
+        bytes += 20;
+        length = size;
+    }
+    json_t *root = json_loadb(bytes, length, 0, NULL), *name;
+    size_t i;
+    json_array_foreach(json_object_get(root, "extensionsRequired"), i, name) {
+        const char *extension = json_string_value(name);
+        if (extension != NULL && !is_readable(extension))
+            FAIL(error, LAM_ERR_FORMAT,
+                 "%s: it requires the extension '%.60s', which is not read; export it without", path,
+                 extension);
+    }
+done: /* where the JSON is broken, the library says so */
+    json_decref(root);
+    return status;
+}
+
+/* Bytes of one number of a binary PLY; 0 for a type that is not known. */
+static double size_of_type(const char *type) {
+    static const char *const names[] = {"char",  "uchar",   "int8",   "uint8",  "short", "ushort",
+                                        "int16", "uint16",  "int",    "uint",   "int32", "uint32",
+                                        "float", "float32", "double", "float64"};
+    static const unsigned char bytes[] = {1, 1, 1, 1, 2, 2, 2, 2, 4, 4, 4, 4, 4, 4, 8, 8};
+    for (size_t i = 0; i < sizeof bytes; i++)
+        if (strcmp(type, names[i]) == 0) return bytes[i];
+    return 0;
+}
+
+lam_status ply_check_head(const char *path, const char *bytes, size_t length, lam_error *error) {
+    lam_status status = LAM_OK;
+    static const char last[] = "end_header";
+    char first[32], second[32], third[32], element[32] = "";
+    double least = 0, count = 0,
+           most = 0; /* bytes that all must have; entries of this element, and of the largest */
+    char largest[32] = "";
+    bool ascii = true;
+    const char *end =
+        length > 3 && memcmp(bytes, "ply", 3) == 0 ? memmem(bytes, length, last, sizeof last - 1) : NULL;
+    if (end == NULL) return LAM_OK;
+    for (const char *line = bytes; line < end;) {
+        const char *stop = memchr(line, '\n', (size_t)(end - line));
+        char text[128];
+        if (stop == NULL) return LAM_OK; /* lines that end in carriage returns alone: the library's affair */
+        snprintf(text, sizeof text, "%.*s", (int)(stop - line < 127 ? stop - line : 127), line);
+        line = stop + 1;
+        const int words = sscanf(text, "%31s %31s %31s", first, second, third);
+        if (words < 3) continue;
+        if (strcmp(first, "format") == 0) {
+            ascii = strcmp(second, "ascii") == 0;
+        } else if (strcmp(first, "element") == 0) {
+            snprintf(element, sizeof element, "%s", second);
+            count = strtod(third, NULL);
+            if (count > most) {
+                most = count;
+                memcpy(largest, element, sizeof largest);
+            }
+        } else if (strcmp(first, "property") == 0) {
+            /* A digit and a blank or a line's end each; a list has at least its length. */
+            least += count * (ascii ? 2 : size_of_type(strcmp(second, "list") == 0 ? third : second));
+        }
+    }
+    const double room = (double)(length - (size_t)(end - bytes)) - (double)(sizeof last - 1);
+    if (least > room + 1) /* the last line may lack its end */
+        FAIL(error, LAM_ERR_FORMAT,
+             "%s: cut off: its header names %.0f entries of '%s', and %.0f bytes follow, too few for them",
+             path, most, largest, room > 0 ? room : 0);
+done:
+    return status;
+}
