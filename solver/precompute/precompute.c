@@ -1,4 +1,5 @@
 #include "solver/precompute/precompute.h"
+#include "solver/formfactor/facing.h"
 
 #include "solver/base/clock.h"
 #include "solver/base/random.h"
@@ -87,11 +88,42 @@ static void log_form_factors(precompute_state *state) {
                      sky->ground_albedo);
     if (sky->first_bounce != NULL && f->closed)
         terminal_warn(state->t, "the scene is closed: no element sees the sky");
-    if (f->absorbed_share > .01 && !state->m.two_sided)
-        terminal_warn(state->t,
-                      "%.1f %% of the light meets back faces and is lost there: turn the faces, or give "
-                      "--two-sided",
-                      100 * f->absorbed_share);
+}
+
+/* Above this share of light that meets backs, faces are likely to be turned. */
+static const double backs_share = .01;
+
+/* Names the groups whose backs take light. Blocks do not tell it from light that leaves. */
+static lam_status warn_of_backs(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const form_factors *f = &state->f;
+    const mesh *m = &state->m;
+    facing_survey survey = {.share = 0};
+    char groups[256] = "";
+    size_t used = 0, left = 0;
+    const bool may =
+        f->recipe.method == RECIPE_BLOCKS ? f->leaving_share > backs_share : f->absorbed_share > backs_share;
+    if (!may || m->two_sided) return LAM_OK;
+    TRY(facing_survey_make(m, &survey, error));
+    if (!(survey.share > backs_share)) goto done;
+    for (size_t g = 0; g < m->n_groups; g++) left += survey.group_shares[g] > 0;
+    for (int k = 0; k < 3 && left > 0; k++, left--) { /* the largest first */
+        size_t most = 0;
+        for (size_t g = 1; g < m->n_groups; g++)
+            if (survey.group_shares[g] > survey.group_shares[most]) most = g;
+        used += (size_t)snprintf(groups + used, sizeof groups - used, "%s%.60s %.1f %%", k == 0 ? "" : ", ",
+                                 m->group_names[most], 100 * survey.group_shares[most]);
+        survey.group_shares[most] = 0;
+    }
+    if (left > 0) snprintf(groups + used, sizeof groups - used, ", %zu more", left);
+    terminal_warn(
+        state->t,
+        "%.1f %% of the light meets the backs of %zu faces or more and is lost there (%s): --orient turns "
+        "faces where rays can decide it, and with --two-sided both sides reflect",
+        100 * survey.share, survey.faces, groups);
+done:
+    facing_survey_free(&survey);
+    return status;
 }
 
 void state_log_kept(precompute_state *state, const form_factors *f) {
@@ -172,6 +204,7 @@ static lam_status run_trial(precompute_state *state, lam_error *error) {
     TRY(stage_operator(state, error));
     if (first) state->spent.operate = since(&used);
     if (state->streamed && first) log_form_factors(state);
+    if (first) TRY(warn_of_backs(state, error));
     TRY(terminal_check(error));
 
     if (state->probes > 0) {

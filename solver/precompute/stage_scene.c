@@ -1,5 +1,6 @@
 /* The first stages of a precompute: input, mesh, and a recipe for which memory suffices. */
 #include "solver/base/atomic_file.h"
+#include "solver/formfactor/facing.h"
 #include "solver/operator/refine/form_factor_rows.h"
 #include "solver/precompute/precompute_state.h"
 #include "solver/scene/import/import.h"
@@ -36,6 +37,17 @@ static void log_warnings(terminal *t, const char *warnings) {
     }
 }
 
+/* Turns faces; the hash of the source stays that of the file. */
+static lam_status orient(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    facing_turned turned;
+    TRY(facing_orient(&state->m, &state->progress, &turned, error));
+    terminal_log(state->t, "%zu of %zu faces turned; for %zu the side was not decided", turned.turned,
+                 state->m.n, turned.undecided);
+done:
+    return status;
+}
+
 lam_status stage_load_scene(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
@@ -52,6 +64,7 @@ lam_status stage_load_scene(precompute_state *state, lam_error *error) {
     if (report.clamped > 0)
         terminal_log(state->t, "%zu material%s reflected all light or more, or nearly: set to .9999",
                      report.clamped, report.clamped == 1 ? "" : "s");
+    if (o->orient) TRY(orient(state, error));
 done:
     return status;
 }

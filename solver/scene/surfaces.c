@@ -36,8 +36,7 @@ static int corner_order(const void *a, const void *b) {
     return (p->element > q->element) - (p->element < q->element);
 }
 
-/* places[v]: one number for all vertices at one place. */
-static lam_status weld(const mesh *m, uint32_t *places, lam_error *error) {
+lam_status mesh_places(const mesh *m, uint32_t *places, lam_error *error) {
     place *sorted = memory_allocate(m->n_vertices, sizeof *sorted, "surfaces", error);
     double centre[3], radius;
     if (sorted == NULL) return LAM_ERR_MEMORY;
@@ -72,7 +71,7 @@ lam_status mesh_surfaces(const mesh *m, uint32_t *surface, size_t *n_surfaces, l
     size_t n_corners = 0, count = 0;
     parent = memory_allocate(m->n, sizeof *parent, "surfaces", error);
     if (places == NULL || corners == NULL || parent == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(weld(m, places, error));
+    TRY(mesh_places(m, places, error));
     for (uint32_t i = 0; i < m->n; i++) {
         for (size_t k = 0; k < mesh_corners(m, i); k++)
             corners[n_corners++] = (corner){places[m->elements[i][k]], i};

@@ -10,4 +10,7 @@
  * O(n log n). Errors: LAM_ERR_MEMORY. */
 lam_status mesh_surfaces(const mesh *m, uint32_t *surface, size_t *n_surfaces, lam_error *error);
 
+/* places[v], v < n_vertices: one number for all vertices that are closer than a millionth of the scene. */
+lam_status mesh_places(const mesh *m, uint32_t *places, lam_error *error);
+
 #endif
