@@ -81,6 +81,40 @@ class Stores(Case):
         # A mesh that is fine already needs no advice: each of 96 faces has 1 %.
         self.assertNotIn(coarse, must("precompute", self.box, *quick).stderr)
 
+    def test_turned_faces_are_told_and_turned_back(self):
+        right, wrong = self.path("right.obj"), self.path("wrong.obj")
+        must("generate", "patio", "-o", right, "--elements", 1500)
+        with open(right, encoding="ascii") as file:
+            lines = file.read().splitlines()
+        faces = [k for k, line in enumerate(lines) if line.startswith("f ")]
+        for k in faces[::5]:
+            lines[k] = "f " + " ".join(reversed(lines[k].split()[1:]))
+        with open(wrong, "w", encoding="ascii") as file:
+            file.write("\n".join(lines) + "\n")
+        quick = ("--rays", 16, "--probes", 0, "--method", "sparse")
+        normals = {}
+        for name, scene, options in (("right", right, ()), ("wrong", wrong, ()), ("turned", wrong, ("--orient",)),
+                                     ("kept", right, ("--orient",))):
+            store = self.path(name + ".h5")
+            said = must("precompute", scene, "-o", store, *quick, *options).stderr
+            with self.subTest(name=name):
+                if name == "wrong":
+                    self.assertRegex(said, r"warning: [12]\d\.\d % of the light meets the backs of \d+ faces or more and is "
+                                           r"lost there \(\w+ \d+\.\d %, .*--orient")
+                else:
+                    self.assertNotIn("meets the backs", said)
+                    count = {"turned": len(faces[::5]), "kept": 0}.get(name)
+                    if count is not None:
+                        self.assertIn("\n%d of %d faces turned;" % (count, len(faces)), "\n" + said)
+            with h5py.File(store) as file:
+                corners = file["mesh/vertices"][:][file["mesh/elements"][:][:, :3].astype(int)]
+            normals[name] = numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        self.assertLess((normals["right"] * normals["wrong"]).sum(axis=1).min(), 0)
+        for name in ("turned", "kept"):
+            self.assertGreater((normals["right"] * normals[name]).sum(axis=1).min(), 0)
+        # The store knows its scene: the hash is that of the file, before faces were turned.
+        self.assertIn("same geometry", must("verify", self.path("turned.h5"), wrong, "--probes", 0).stdout)
+
     def test_log_and_info_name_figures_in_words(self):
         """The log and `info` print words; the store and JSON keep the names of the attributes."""
         methods = {"exact": (), "low-rank": (), "2msc": (), "sparse": (), "hierarchical": (),
