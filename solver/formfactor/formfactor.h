@@ -64,6 +64,8 @@ typedef struct form_factors {
     size_t repair_products;         /* products with the matrix that the repair took, when just made */
 } form_factors;
 
+struct block_scene; /* blocks/blocks.h */
+
 typedef struct form_factor_options {
     recipe recipe;
     const progress *progress;
@@ -76,6 +78,8 @@ typedef struct form_factor_options {
     double ground_albedo;
     sky_bounce *bounce; /* set by form_factors_make: the bins of the sky */
     bool without_rows; /* rays_count leaves all rows empty: only the shares that leave the scene are wanted */
+    struct block_scene *ready; /* of form_factors_make_blocks: the mesh on its tree, which can only be
+                                  destroyed afterwards; NULL: it makes its own */
     size_t only_first; /* rays_count and hemicube_trace find only this many rows of the order and leave the
                           others  empty; not with a scratch folder; 0: all */
 } form_factor_options;

@@ -367,7 +367,7 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
     const recipe *r = &options->recipe;
     form_factors f = {.recipe = *r};
     block_factors made = {.n = 0};
-    visibility *v = NULL;
+    block_scene *own = NULL, *scene = options->ready;
     double *targets = NULL;
     bool known = false;
     block_options how = block_options_of(r);
@@ -375,17 +375,20 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
     how.progress = options->progress;
     how.stage = options->stage;
     TRY(recipe_check(r, error));
-    TRY(visibility_create(m, &v, error));
+    if (scene == NULL) {
+        TRY(block_scene_make(m, tree, &own, error));
+        scene = own;
+    }
     if (judged == NULL) {
         if (options->sky != NULL)
             TRY(sky_bounce_create(options->sky, m->up, options->ground_albedo, m->n, &f.sky, error));
-        TRY(find_outside(m, v, order, r, &f, error));
+        TRY(find_outside(m, block_scene_visibility(scene), order, r, &f, error));
     } else {
         f.closed = judged->closed;
         f.leaving_share = judged->leaving_share;
         f.absorbed_share = judged->absorbed_share;
     }
-    TRY(blocks_find(m, v, tree, &how, &made, &f.blocks, error));
+    TRY(blocks_find_in(scene, &how, &made, &f.blocks, error));
     if (f.blocks.joined) {
         targets = memory_allocate(m->n, sizeof *targets, "form factors", error);
         if (targets == NULL) TRY(LAM_ERR_MEMORY);
@@ -398,7 +401,7 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
     f = (form_factors){0};
     made = (block_factors){.n = 0};
 done:
-    visibility_destroy(v);
+    block_scene_destroy(own);
     free(targets);
     block_factors_free(&made);
     form_factors_free(&f);

@@ -31,6 +31,7 @@ void state_free(precompute_state *state) {
     free(state->surface);
     form_factors_free(&state->f);
     ray_rows_destroy(state->rays);
+    block_scene_destroy(state->ready);
     plane_tree_free(&state->tree);
     block_factors_free(&state->blocks);
     compressed_free(&state->compressed);

@@ -2,6 +2,7 @@
 #ifndef LAMBERT_PRECOMPUTE_PRECOMPUTE_STATE_H
 #define LAMBERT_PRECOMPUTE_PRECOMPUTE_STATE_H
 
+#include "solver/formfactor/blocks/blocks.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/pairs/pairs_sample.h"
 #include "solver/formfactor/rays/ray_rows.h"
@@ -56,6 +57,7 @@ typedef struct precompute_state {
     bool streamed;                 /* rows of F are found as the method asks for them; f has none */
     ray_rows *rays;                /* of these, until the operator is built */
     plane_tree tree;               /* of the elements, once blocks are considered */
+    block_scene *ready;            /* the mesh on that tree, from a forecast of blocks to these; or NULL */
     block_factors blocks;          /* the form factors where the recipe is blocks; f has no rows then */
     row_stream stream;             /* of rays */
     compressed_factors compressed; /* of f; n is 0 where they are kept as they are, or not */
@@ -138,6 +140,9 @@ lam_status state_blocks_possible(precompute_state *state, const build_method *me
 bool state_may_have_blocks(const precompute_state *state, double n);
 lam_status state_choose_blocks(precompute_state *state, const build_method *method, bool final,
                                lam_error *error);
+/* The cost of blocks by a recipe, from a sample of them. */
+lam_status state_forecast_blocks(precompute_state *state, const recipe *blocks, pairs_cost *cost,
+                                 lam_error *error);
 lam_status stage_blocks(precompute_state *state, lam_error *error);
 
 /* The blocks that a store keeps; refuses options that need rows: stage_blocks.c. */

@@ -105,6 +105,20 @@ done:
     return status;
 }
 
+lam_status state_forecast_blocks(precompute_state *state, const recipe *blocks, pairs_cost *cost,
+                                 lam_error *error) {
+    lam_status status = LAM_OK;
+    if (state->ready == NULL) TRY(block_scene_make(&state->m, &state->tree, &state->ready, error));
+    TRY(blocks_forecast(state->ready, blocks, &state->progress, cost, error));
+done:
+    return status;
+}
+
+static void forget_ready(precompute_state *state) {
+    block_scene_destroy(state->ready);
+    state->ready = NULL;
+}
+
 /* Weighs blocks against the recipe so far, by samples of both; logs why. */
 static lam_status weigh(precompute_state *state, const recipe *blocks, bool *taken, lam_error *error) {
     lam_status status = LAM_OK;
@@ -112,7 +126,7 @@ static lam_status weigh(precompute_state *state, const recipe *blocks, bool *tak
     const double times = other->method == RECIPE_PAIRS ? 1 : times_rays;
     pairs_cost cost, least;
     char time[32], other_time[32], what[64];
-    TRY(blocks_forecast(&state->m, &state->tree, blocks, &state->progress, &cost, error));
+    TRY(state_forecast_blocks(state, blocks, &cost, error));
     TRY(add_sky(state, blocks, &cost, error));
     TRY(find_other_cost(state, &cost, &least, error));
     *taken = cost.seconds <= times * least.seconds;
@@ -121,7 +135,10 @@ static lam_status weigh(precompute_state *state, const recipe *blocks, bool *tak
     recipe_describe(other, what);
     terminal_log(state->t, "blocks of clusters are %s: about %s of one thread, by a sample of them; %s: %s",
                  *taken ? "taken instead" : "not taken", time, what, other_time);
-    if (*taken) state->cost = cost;
+    if (*taken)
+        state->cost = cost;
+    else
+        forget_ready(state);
 done:
     return status;
 }
@@ -180,12 +197,14 @@ lam_status stage_blocks(precompute_state *state, lam_error *error) {
     const form_factor_options how = {.recipe = state->recipe,
                                      .progress = &state->progress,
                                      .stage = "form factors",
+                                     .ready = state->ready,
                                      .sky = state->options->sky,
                                      .ground_albedo = state->options->ground_albedo};
     TRY(make_tree(state, error));
     TRY(form_factors_make_blocks(&state->m, state->order, &state->tree, NULL, &how, &state->f, &state->blocks,
                                  error));
 done:
+    forget_ready(state);
     return status;
 }
 

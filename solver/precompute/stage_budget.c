@@ -88,7 +88,7 @@ static lam_status sample_blocks(budget_run *run, double seconds, lam_error *erro
                           .rays = recipe_rays_beside_blocks(state->m.n),
                           .accuracy = accuracy_of(run, sampled_epsilons[k]),
                           .seed = state->options->seed};
-        TRY(blocks_forecast(&state->m, &state->tree, &r, &state->progress, &c->cost[k], error));
+        TRY(state_forecast_blocks(state, &r, &c->cost[k], error));
         c->accuracy[k] = r.accuracy;
         c->count = k + 1;
         if (forecast_wall_seconds(c->cost[k].measured, &state->rates) > finer_share * seconds) break;

@@ -38,7 +38,7 @@ static lam_status find_cost(precompute_state *state, lam_error *error) {
     const recipe *r = &state->recipe;
     if (state->options->from_store || state->cost.measured > 0 || r->method == RECIPE_HEMICUBE) return LAM_OK;
     TRY(r->method == RECIPE_BLOCKS
-            ? blocks_forecast(&state->m, &state->tree, r, &state->progress, &state->cost, error)
+            ? state_forecast_blocks(state, r, &state->cost, error)
             : pairs_forecast(&state->m, r, &state->progress, &state->cost, error));
 done:
     return status;

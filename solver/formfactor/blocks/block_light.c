@@ -91,7 +91,8 @@ lam_status block_light_create(const mesh *m, const plane_tree *tree, uint64_t se
     l->options.exact = pair_tolerance;
     for (uint64_t h = 0; h < HALVES; h++) l->seeds[h] = random_stream(seed, h);
     TRY(visibility_create(m, &l->v, error));
-    TRY(block_finder_make(m, l->v, tree, &l->options, &l->nodes, &l->finder, error));
+    TRY(block_finder_make(m, l->v, tree, &l->nodes, &l->finder, error));
+    TRY(block_finder_set(&l->finder, &l->options, error));
     TRY(find_planes(l, error));
     l->pieces = memory_allocate(tree->n_clusters, sizeof *l->pieces, "direct illumination", error);
     if (l->pieces == NULL) TRY(LAM_ERR_MEMORY);

@@ -343,11 +343,10 @@ void block_report_add(const block_report *from, double times, block_report *to) 
     to->elements_unseen += times * from->elements_unseen;
 }
 
-lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tree *tree,
-                             const block_options *options, block_factors *nodes, block_finder *out,
-                             lam_error *error) {
+lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tree *tree, block_factors *nodes,
+                             block_finder *out, lam_error *error) {
     lam_status status = LAM_OK;
-    *out = (block_finder){.options = options, .tree = tree, .n_clusters = tree->n_clusters};
+    *out = (block_finder){.tree = tree, .n_clusters = tree->n_clusters};
     double(*centre)[3] = memory_allocate(m->n, sizeof *centre, "blocks", error);
     if (centre == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < m->n; i++) mesh_centroid(m, i, centre[i]);
@@ -357,19 +356,25 @@ lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tre
     out->joined = tree->view == PLANE_VIEW_UNHIDDEN;
     if (tree->view == PLANE_VIEW_UNKNOWN && !blocks_are_planar(tree))
         TRY(mesh_is_unhidden(m, &out->joined, error));
-    out->spread = spread_most * sqrt(options->open);
-    out->exact = out->joined ? fmax(options->exact, share_of_spread * out->spread) : options->exact;
     pair_factor_rules_init(&out->rules);
-    if (out->joined) {
-        out->elements = memory_allocate(m->n, sizeof *out->elements, "blocks", error);
-        if (out->elements == NULL) TRY(LAM_ERR_MEMORY);
-        joined_elements_set(&out->flat, out->elements);
-        out->kernel = (joined_kernel){&out->flat, out->elements, &out->rules, out->exact, options->seed};
-    }
-    out->shade = (shade_scene){.f = &out->flat, .occluders = &out->pieces, .v = v, .seed = options->seed};
+    out->shade = (shade_scene){.f = &out->flat, .occluders = &out->pieces, .v = v};
 done:
     free(centre);
     return status;
+}
+
+lam_status block_finder_set(block_finder *k, const block_options *options, lam_error *error) {
+    k->options = options;
+    k->spread = spread_most * sqrt(options->open);
+    k->exact = k->joined ? fmax(options->exact, share_of_spread * k->spread) : options->exact;
+    k->shade.seed = options->seed;
+    if (k->joined && k->elements == NULL) {
+        k->elements = memory_allocate(k->tree->n, sizeof *k->elements, "blocks", error);
+        if (k->elements == NULL) return LAM_ERR_MEMORY;
+        joined_elements_set(&k->flat, k->elements);
+    }
+    k->kernel = (joined_kernel){&k->flat, k->elements, &k->rules, k->exact, options->seed};
+    return LAM_OK;
 }
 
 void block_finder_free(block_finder *k) {

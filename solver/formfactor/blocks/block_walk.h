@@ -23,12 +23,19 @@ typedef struct block_finder {
     double exact; /* relative tolerance of single pairs, unoccluded */
 } block_finder;
 
-/* Begins the nodes of blocks as well (block_factors_begin). out must stay where it is until it is freed, also
- * after an error. Errors: LAM_ERR_MEMORY. */
-lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tree *tree,
-                             const block_options *options, block_factors *nodes, block_finder *out,
-                             lam_error *error);
+/* All that no option changes; begins the nodes of blocks as well (block_factors_begin). out must stay where it
+ * is until it is freed, also after an error. Errors: LAM_ERR_MEMORY. */
+lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tree *tree, block_factors *nodes,
+                             block_finder *out, lam_error *error);
+/* Options in place of those before, if there were any; they must outlive their use. Errors: LAM_ERR_MEMORY. */
+lam_status block_finder_set(block_finder *k, const block_options *options, lam_error *error);
 void block_finder_free(block_finder *k);
+
+struct block_scene {
+    visibility *v;
+    block_factors nodes; /* n is 0 once blocks were found */
+    block_finder finder;
+};
 
 /* The nodes whose pairs are to be visited: the topmost clusters of all planes, or the root with itself where
  * clusters are joined; the caller frees them. */
@@ -43,11 +50,6 @@ typedef struct node_children {
     int count;
 } node_children;
 node_children block_finder_children(const block_finder *k, uint32_t t);
-
-typedef struct block_list {
-    cluster_block *list;
-    size_t count, capacity;
-} block_list;
 
 /* A sample of the descent (Knuth 1975, estimating the size of a tree): of pairs of nodes with at most
  * limit[k] pairs of elements one of two is visited, for each k anew. The work in stage k, that of pairs below

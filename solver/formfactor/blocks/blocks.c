@@ -141,24 +141,15 @@ static void find_all(find_team *team, int n_threads) {
     }
 }
 
-/* All blocks behind those of the first thread. */
+/* The blocks of all threads, which lose them. */
 static lam_status join_lists(block_walk *works, int n_threads, block_factors *out, lam_error *error) {
     lam_status status = LAM_OK;
-    block_list *all = &works[0].found;
-    size_t count = 0;
-    for (int k = 0; k < n_threads; k++) count += works[k].found.count;
-    TRY(array_resize(&all->list, count, sizeof *all->list, "blocks", error));
-    for (int k = 1; k < n_threads; k++) {
-        block_list *from = &works[k].found;
-        if (from->count > 0) memcpy(all->list + all->count, from->list, from->count * sizeof *from->list);
-        all->count += from->count;
-        free(from->list);
-        *from = (block_list){.list = NULL};
-    }
-    out->blocks = all->list;
-    out->n_blocks = all->count;
-    all->list = NULL;
-done:
+    block_list *lists = memory_allocate((size_t)n_threads, sizeof *lists, "blocks", error);
+    if (lists == NULL) return LAM_ERR_MEMORY;
+    for (int t = 0; t < n_threads; t++) lists[t] = works[t].found;
+    status = block_factors_end_lists(out, (size_t)n_threads, lists, error);
+    for (int t = 0; t < n_threads; t++) works[t].found = lists[t];
+    free(lists);
     return status;
 }
 
@@ -167,39 +158,78 @@ block_options block_options_of(const recipe *r) {
         .open = r->accuracy, .shadow = recipe_shadow(r), .exact = recipe_tolerance(r), .seed = r->seed};
 }
 
-lam_status blocks_find(const mesh *m, const visibility *v, const plane_tree *tree,
-                       const block_options *options, block_factors *out, block_report *report,
-                       lam_error *error) {
+/* Takes the nodes of the blocks. */
+static lam_status find(block_finder *k, const block_options *options, block_factors *nodes,
+                       block_factors *out, block_report *report, lam_error *error) {
     lam_status status = LAM_OK;
     const int n_threads = omp_get_max_threads();
     size_t n_reduced = 0;
-    block_factors made = {.n = 0};
     pair_list pairs = {.list = NULL};
-    block_finder k = {.options = options};
     block_walk *works = memory_allocate((size_t)n_threads, sizeof *works, "blocks", error);
     if (works == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(block_finder_make(m, v, tree, options, &made, &k, error));
-    for (int t = 0; t < n_threads; t++) works[t].finder = &k;
-    TRY(find_work_pairs(&k, &pairs, error));
-    find_team team = {.finder = &k, .pairs = &pairs, .works = works, .error = error};
+    TRY(block_finder_set(k, options, error));
+    for (int t = 0; t < n_threads; t++) works[t].finder = k;
+    TRY(find_work_pairs(k, &pairs, error));
+    find_team team = {.finder = k, .pairs = &pairs, .works = works, .error = error};
     for (size_t p = 0; p < pairs.count; p++) team.all += pairs.list[p].elements;
     find_all(&team, n_threads);
     TRY(team.status);
-    TRY(join_lists(works, n_threads, &made, error));
-    TRY(block_factors_end(&made, error));
-    TRY(block_factors_reduce(&made, &n_reduced, error));
+    TRY(join_lists(works, n_threads, nodes, error));
+    TRY(block_factors_reduce(nodes, &n_reduced, error));
     if (report != NULL) {
-        *report = (block_report){.joined = k.joined};
+        *report = (block_report){.joined = k->joined};
         for (int t = 0; t < n_threads; t++) block_report_add(&works[t].report, 1, report);
         report->reduced = (double)n_reduced;
     }
-    *out = made;
-    made = (block_factors){.n = 0};
+    *out = *nodes;
+    *nodes = (block_factors){.n = 0};
 done:
     for (int t = 0; works != NULL && t < n_threads; t++) free(works[t].found.list);
     free(works);
     free(pairs.list);
-    block_finder_free(&k);
-    block_factors_free(&made);
     return status;
+}
+
+lam_status blocks_find(const mesh *m, const visibility *v, const plane_tree *tree,
+                       const block_options *options, block_factors *out, block_report *report,
+                       lam_error *error) {
+    lam_status status = LAM_OK;
+    block_factors nodes = {.n = 0};
+    block_finder k = {.tree = tree};
+    TRY(block_finder_make(m, v, tree, &nodes, &k, error));
+    TRY(find(&k, options, &nodes, out, report, error));
+done:
+    block_finder_free(&k);
+    block_factors_free(&nodes);
+    return status;
+}
+
+lam_status blocks_find_in(block_scene *s, const block_options *options, block_factors *out,
+                          block_report *report, lam_error *error) {
+    return find(&s->finder, options, &s->nodes, out, report, error);
+}
+
+lam_status block_scene_make(const mesh *m, const plane_tree *tree, block_scene **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    block_scene *s = memory_allocate(1, sizeof *s, "blocks", error);
+    if (s == NULL) return LAM_ERR_MEMORY;
+    TRY(visibility_create(m, &s->v, error));
+    TRY(block_finder_make(m, s->v, tree, &s->nodes, &s->finder, error));
+    *out = s;
+    s = NULL;
+done:
+    block_scene_destroy(s);
+    return status;
+}
+
+void block_scene_destroy(block_scene *s) {
+    if (s == NULL) return;
+    block_finder_free(&s->finder);
+    block_factors_free(&s->nodes);
+    visibility_destroy(s->v);
+    free(s);
+}
+
+const visibility *block_scene_visibility(const block_scene *s) {
+    return s->v;
 }

@@ -26,6 +26,13 @@ bool blocks_are_planar(const plane_tree *tree);
  * anything (unhidden.h), there are blocks of clusters of several planes, and any number is possible. */
 enum { BLOCK_PLANES_MOST = 4096 };
 
+/* A scene made ready for blocks on a tree of its elements, for a forecast and then for the blocks. mesh and
+ * tree must outlive it. Errors: LAM_ERR_MEMORY, LAM_ERR_INTERNAL. */
+typedef struct block_scene block_scene;
+lam_status block_scene_make(const mesh *m, const plane_tree *tree, block_scene **out, lam_error *error);
+void block_scene_destroy(block_scene *s);
+const visibility *block_scene_visibility(const block_scene *s);
+
 /* The options of a recipe, without progress. */
 block_options block_options_of(const recipe *r);
 
@@ -40,5 +47,8 @@ block_options block_options_of(const recipe *r);
 lam_status blocks_find(const mesh *m, const visibility *v, const plane_tree *tree,
                        const block_options *options, block_factors *out, block_report *report,
                        lam_error *error);
+/* The same in a scene that is ready; it can only be destroyed afterwards, also after an error. */
+lam_status blocks_find_in(block_scene *s, const block_options *options, block_factors *out,
+                          block_report *report, lam_error *error);
 
 #endif

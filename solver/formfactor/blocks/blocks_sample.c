@@ -11,23 +11,21 @@
 static const double first_share = 1. / 1024, next_share = 1. / 4;
 enum { STAGES = 6 };
 
-lam_status blocks_sample(const mesh *m, const visibility *v, const plane_tree *tree,
-                         const block_options *options, block_report *out, blocks_trial *trial,
-                         lam_error *error) {
+lam_status blocks_sample(block_scene *scene, const block_options *options, block_report *out,
+                         blocks_trial *trial, lam_error *error) {
     lam_status status = LAM_OK;
-    block_factors nodes = {.n = 0};
     uint32_t *roots = NULL;
     size_t n_roots = 0;
-    block_finder k = {.options = options};
-    const double n = (double)m->n;
-    block_walk w = {.finder = &k, .sampling = {.n_stages = STAGES}, .error = error};
+    block_finder *const k = &scene->finder;
+    const double n = (double)k->tree->n;
+    block_walk w = {.finder = k, .sampling = {.n_stages = STAGES}, .error = error};
     for (int s = 0; s < STAGES; s++) w.sampling.limit[s] = .5 * n * n * first_share * pow(next_share, s);
-    TRY(block_finder_make(m, v, tree, options, &nodes, &k, error));
-    TRY(block_finder_planes(&k, &roots, &n_roots, error));
+    TRY(block_finder_set(k, options, error));
+    TRY(block_finder_planes(k, &roots, &n_roots, error));
     const double started = clock_thread_seconds();
     for (size_t i = 0; i < n_roots; i++) {
         if (progress_cancelled(options->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
-        for (size_t j = k.joined ? i : i + 1; j < n_roots; j++) {
+        for (size_t j = k->joined ? i : i + 1; j < n_roots; j++) {
             TRY(block_walk_visit(&w, roots[i], roots[j]));
             w.found.count = 0; /* only the report counts */
         }
@@ -35,16 +33,14 @@ lam_status blocks_sample(const mesh *m, const visibility *v, const plane_tree *t
     if (trial != NULL) {
         *trial = (blocks_trial){.work = w.report, .seconds = clock_thread_seconds() - started};
         for (int s = 1; s <= STAGES; s++) block_report_add(&w.sampling.part[s], 1, &trial->work);
-        trial->work.joined = k.joined;
+        trial->work.joined = k->joined;
     }
     *out = w.report;
     for (int s = 1; s <= STAGES; s++) block_report_add(&w.sampling.part[s], (double)(1 << s), out);
-    out->joined = k.joined;
+    out->joined = k->joined;
 done:
     free(w.found.list);
     free(roots);
-    block_finder_free(&k);
-    block_factors_free(&nodes);
     return status;
 }
 
@@ -69,24 +65,21 @@ static double walk_seconds(const block_report *w) {
            w->cast * cast_seconds;
 }
 
-lam_status blocks_forecast(const mesh *m, const plane_tree *tree, const recipe *r, const progress *p,
-                           pairs_cost *out, lam_error *error) {
+lam_status blocks_forecast(block_scene *scene, const recipe *r, const progress *p, pairs_cost *out,
+                           lam_error *error) {
     lam_status status = LAM_OK;
     block_options options = block_options_of(r);
     block_report w;
     blocks_trial trial;
-    visibility *v = NULL;
     options.progress = p;
-    TRY(visibility_create(m, &v, error));
-    TRY(blocks_sample(m, v, tree, &options, &w, &trial, error));
+    TRY(blocks_sample(scene, &options, &w, &trial, error));
     const double blocks = w.linear + w.even + w.pairs + w.shaded + w.shaded_pairs;
-    const double walk = walk_seconds(&w), finish = blocks * finish_seconds + (double)m->n * element_seconds;
+    const double walk = walk_seconds(&w), finish = blocks * finish_seconds + (double)scene->nodes.n * element_seconds;
     const double pace = sample_pace(trial.seconds, walk_seconds(&trial.work));
     *out = (pairs_cost){.seconds = walk + finish,
                         .measured = walk * pace + finish,
                         .entries = 2 * blocks,
                         .single_share = blocks > 0 ? (w.pairs + w.shaded_pairs) / blocks : 0};
 done:
-    visibility_destroy(v);
     return status;
 }

@@ -14,12 +14,11 @@ typedef struct blocks_trial {
 /* About the report of blocks_find. It reads no clock: the same scene has the same figures, for any number of
  * threads. trial, or NULL, is of the walk itself. Cost: about a thirtieth of finding the blocks. Errors:
  * LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
-lam_status blocks_sample(const mesh *m, const visibility *v, const plane_tree *tree,
-                         const block_options *options, block_report *out, blocks_trial *trial,
-                         lam_error *error);
+lam_status blocks_sample(block_scene *scene, const block_options *options, block_report *out,
+                         blocks_trial *trial, lam_error *error);
 
 /* The cost of finding blocks by a recipe, from blocks_sample. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
-lam_status blocks_forecast(const mesh *m, const plane_tree *tree, const recipe *r, const progress *p,
-                           pairs_cost *out, lam_error *error);
+lam_status blocks_forecast(block_scene *scene, const recipe *r, const progress *p, pairs_cost *out,
+                           lam_error *error);
 
 #endif

@@ -3,6 +3,7 @@
 #include "store/status.h"
 
 #include <math.h>
+#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -103,22 +104,35 @@ static void turn(const block_node *nodes, cluster_block *k) {
 }
 
 /* from[t] = the number of blocks that have a node below t as a (or as b), for t up to n_nodes. */
-static void count_blocks(const block_factors *f, size_t n_nodes, bool as_b, size_t *from) {
+static void count_blocks(size_t n_lists, const block_list *lists, size_t n_nodes, bool as_b, size_t *from) {
     memset(from, 0, (n_nodes + 1) * sizeof *from);
-    for (size_t k = 0; k < f->n_blocks; k++) from[(as_b ? f->blocks[k].b : f->blocks[k].a) + 1]++;
+    for (size_t l = 0; l < n_lists; l++)
+        for (size_t k = 0; k < lists[l].count; k++)
+            from[(as_b ? lists[l].list[k].b : lists[l].list[k].a) + 1]++;
     for (size_t t = 0; t < n_nodes; t++) from[t + 1] += from[t];
 }
 
-/* from[t] is the first of node t again, where it has become that behind its last. */
-static void end_counts(size_t n_nodes, size_t *from) {
-    memmove(from + 1, from, n_nodes * sizeof *from);
-    from[0] = 0;
+/* Counts by a and by b, at once. */
+static void count_both(const block_factors *f, size_t n_lists, const block_list *lists) {
+    const size_t n_nodes = f->n_clusters + f->n;
+#pragma omp parallel for schedule(static, 1)
+    for (int as_b = 0; as_b < 2; as_b++)
+        count_blocks(n_lists, lists, n_nodes, as_b == 1, as_b == 1 ? f->into_from : f->from);
 }
 
-/* out = the blocks by b, those of one b in their present order. */
-static void order_by_b(const block_factors *f, size_t n_nodes, size_t *from, uint32_t *out) {
-    for (size_t k = 0; k < f->n_blocks; k++) out[from[f->blocks[k].b]++] = (uint32_t)k;
-    end_counts(n_nodes, from);
+/* The first node of part k of n_parts, which hold about as many blocks each. */
+static uint32_t part_begin(const size_t *from, size_t n_nodes, size_t k, size_t n_parts) {
+    const size_t before = from[n_nodes] / n_parts * k;
+    size_t low = 0, high = n_nodes;
+    if (k == n_parts) return (uint32_t)n_nodes;
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (from[middle] < before)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return (uint32_t)low;
 }
 
 /* Cuts the tree into the largest subtrees of at most some elements, which threads take one at a time, and the
@@ -146,10 +160,10 @@ static lam_status cut(block_factors *f, lam_error *error) {
 
 /* True where each block has a before b, and stands behind those of smaller a, or of the same a and smaller b.
  */
-static bool is_sorted(const block_factors *f) {
-    for (size_t k = 0; k < f->n_blocks; k++) {
-        const cluster_block *here = &f->blocks[k], *last = &f->blocks[k > 0 ? k - 1 : 0];
-        if (f->nodes[here->a].begin >= f->nodes[here->b].begin) return false;
+static bool is_sorted(const block_node *nodes, const block_list *from) {
+    for (size_t k = 0; k < from->count; k++) {
+        const cluster_block *here = &from->list[k], *last = &from->list[k > 0 ? k - 1 : 0];
+        if (nodes[here->a].begin >= nodes[here->b].begin) return false;
         if (here->a < last->a || (here->a == last->a && here->b < last->b)) return false;
     }
     return true;
@@ -160,8 +174,8 @@ static int by_b(const void *left, const void *right) {
     return x->b < y->b ? -1 : x->b > y->b;
 }
 
-/* Blocks of one node up to which insertion is quicker; nodes that a thread takes at a time. */
-enum { FEW_BLOCKS = 24, NODES_AT_ONCE = 1024 };
+/* Blocks of one node up to which insertion is quicker. */
+enum { FEW_BLOCKS = 24 };
 
 static void sort_by_b(size_t count, cluster_block *blocks) {
     if (count > FEW_BLOCKS) {
@@ -176,47 +190,85 @@ static void sort_by_b(size_t count, cluster_block *blocks) {
     }
 }
 
-/* Brings the blocks of each a together where they are, along the cycles of the permutation, and sorts them by
- * b: no two have both nodes in common. */
-static lam_status sort_blocks(block_factors *f, lam_error *error) {
-    const size_t n_nodes = f->n_clusters + f->n, count = f->n_blocks;
-    uint32_t *place = memory_allocate(count, sizeof *place, "blocks", error);
-    if (place == NULL) return LAM_ERR_MEMORY;
-    for (size_t k = 0; k < count; k++) turn(f->nodes, &f->blocks[k]);
-    count_blocks(f, n_nodes, false, f->from);
-    for (size_t k = 0; k < count; k++) place[k] = (uint32_t)f->from[f->blocks[k].a]++;
-    end_counts(n_nodes, f->from);
-    for (size_t k = 0; k < count; k++)
-        while (place[k] != k) {
-            const uint32_t to = place[k];
-            const cluster_block there = f->blocks[to];
-            f->blocks[to] = f->blocks[k];
-            f->blocks[k] = there;
-            place[k] = place[to];
-            place[to] = to;
-        }
-    free(place);
-#pragma omp parallel for schedule(dynamic, NODES_AT_ONCE)
-    for (size_t t = 0; t < n_nodes; t++) sort_by_b(f->from[t + 1] - f->from[t], f->blocks + f->from[t]);
-    return LAM_OK;
+/* The blocks of all lists by a, those of one a by b: no two have both nodes in common. Each thread takes
+ * those of some nodes a out of all lists. next [n_nodes]: room. */
+static void sort_blocks(const block_factors *f, size_t n_lists, const block_list *lists, size_t *next,
+                        cluster_block *out) {
+    const size_t n_nodes = f->n_clusters + f->n;
+#pragma omp parallel
+    {
+        const size_t n_parts = (size_t)omp_get_num_threads(), k = (size_t)omp_get_thread_num();
+        const uint32_t first = part_begin(f->from, n_nodes, k, n_parts),
+                       last = part_begin(f->from, n_nodes, k + 1, n_parts);
+        memcpy(next + first, f->from + first, (last - first) * sizeof *next);
+        for (size_t l = 0; l < n_lists; l++)
+            for (const cluster_block *b = lists[l].list, *end = b + lists[l].count; b < end; b++)
+                if (b->a >= first && b->a < last) out[next[b->a]++] = *b;
+        for (size_t t = first; t < last; t++) sort_by_b(f->from[t + 1] - f->from[t], out + f->from[t]);
+    }
 }
 
-lam_status block_factors_end(block_factors *f, lam_error *error) {
+/* f->into, the blocks by b, those of one b in their present order. next as above. */
+static void order_by_b(const block_factors *f, size_t *next) {
+    const size_t n_nodes = f->n_clusters + f->n;
+#pragma omp parallel
+    {
+        const size_t n_parts = (size_t)omp_get_num_threads(), part = (size_t)omp_get_thread_num();
+        const uint32_t first = part_begin(f->into_from, n_nodes, part, n_parts),
+                       last = part_begin(f->into_from, n_nodes, part + 1, n_parts);
+        memcpy(next + first, f->into_from + first, (last - first) * sizeof *next);
+        for (size_t k = 0; k < f->n_blocks; k++) {
+            const uint32_t b = f->blocks[k].b;
+            if (b >= first && b < last) f->into[next[b]++] = (uint32_t)k;
+        }
+    }
+}
+
+static void free_lists(size_t n_lists, block_list *lists) {
+    for (size_t l = 0; l < n_lists; l++) {
+        free(lists[l].list);
+        lists[l] = (block_list){.list = NULL};
+    }
+}
+
+lam_status block_factors_end_lists(block_factors *f, size_t n_lists, block_list *lists, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t n_nodes = f->n_clusters + f->n, count = f->n_blocks;
+    const size_t n_nodes = f->n_clusters + f->n;
+    size_t count = 0, *next = NULL;
+    for (size_t l = 0; l < n_lists; l++) count += lists[l].count;
     TRY(cut(f, error));
     if (count > UINT32_MAX) FAIL(error, LAM_ERR_MEMORY, "%zu blocks, must be below 2^32", count);
     f->from = memory_allocate(n_nodes + 1, sizeof *f->from, "blocks", error);
     f->into_from = memory_allocate(n_nodes + 1, sizeof *f->into_from, "blocks", error);
-    if (f->from == NULL || f->into_from == NULL) TRY(LAM_ERR_MEMORY);
-    if (is_sorted(f))
-        count_blocks(f, n_nodes, false, f->from);
-    else
-        TRY(sort_blocks(f, error));
     f->into = memory_allocate(count, sizeof *f->into, "blocks", error);
-    if (f->into == NULL) TRY(LAM_ERR_MEMORY);
-    count_blocks(f, n_nodes, true, f->into_from);
-    order_by_b(f, n_nodes, f->into_from, f->into);
+    next = memory_allocate(n_nodes, sizeof *next, "blocks", error);
+    if (f->from == NULL || f->into_from == NULL || f->into == NULL || next == NULL) TRY(LAM_ERR_MEMORY);
+    const bool sorted = n_lists == 1 && is_sorted(f->nodes, &lists[0]);
+    for (size_t l = 0; l < n_lists && !sorted; l++)
+#pragma omp parallel for schedule(static)
+        for (size_t k = 0; k < lists[l].count; k++) turn(f->nodes, &lists[l].list[k]);
+    count_both(f, n_lists, lists);
+    if (sorted) {
+        f->blocks = lists[0].list;
+        lists[0].list = NULL;
+    } else {
+        f->blocks = memory_allocate(count, sizeof *f->blocks, "blocks", error);
+        if (f->blocks == NULL) TRY(LAM_ERR_MEMORY);
+        sort_blocks(f, n_lists, lists, next, f->blocks);
+    }
+    f->n_blocks = count;
+    free_lists(n_lists, lists);
+    order_by_b(f, next);
 done:
+    free(next);
+    return status;
+}
+
+lam_status block_factors_end(block_factors *f, lam_error *error) {
+    block_list all = {.list = f->blocks, .count = f->n_blocks};
+    f->blocks = NULL;
+    f->n_blocks = 0;
+    const lam_status status = block_factors_end_lists(f, 1, &all, error);
+    free_lists(1, &all);
     return status;
 }

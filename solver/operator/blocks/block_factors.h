@@ -45,6 +45,12 @@ typedef struct cluster_block {
     float L[BLOCK_FUNCTIONS][BLOCK_FUNCTIONS]; /* 1/m^2 */
 } cluster_block;
 
+/* Blocks that grow in number (array_grow). */
+typedef struct block_list {
+    cluster_block *list;
+    size_t count, capacity;
+} block_list;
+
 /* Clusters [first, last) of a subtree. */
 typedef struct block_piece {
     size_t first, last;
@@ -80,9 +86,12 @@ lam_status block_factors_begin(const plane_tree *tree, const double *area, const
                                block_factors *out, lam_error *error);
 
 /* Call once after the blocks were set: turns those whose b stands before a, sorts them, unless they are so
- * already, and prepares products. Cost: O(n + n_blocks). Errors: LAM_ERR_MEMORY, also for 2^32 blocks and
- * more. */
+ * already, and prepares products. Cost: O(n + n_blocks), and to sort them as much memory again. Errors:
+ * LAM_ERR_MEMORY, also for 2^32 blocks and more. */
 lam_status block_factors_end(block_factors *f, lam_error *error);
+/* The same with the blocks of several lists, which are freed and empty afterwards; after an error the lists
+ * are the caller's, as they may be, with their blocks turned. */
+lam_status block_factors_end_lists(block_factors *f, size_t n_lists, block_list *lists, lam_error *error);
 
 /* y = F x for n_vectors vectors, [n][n_vectors] by position, y != x: moments of x go up the tree, through the
  * blocks, and down again, in O(n + n_blocks) steps for each vector. The bits do not depend on the number of

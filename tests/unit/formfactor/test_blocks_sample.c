@@ -17,19 +17,19 @@ static block_report sample(const mesh *m, int n_threads, block_report *whole, bl
     const int most = omp_get_max_threads();
     plane_tree tree;
     block_report found;
-    visibility *v = NULL;
-    ck_ok(visibility_create(m, &v, &error));
+    block_scene *scene = NULL;
     ck_ok(form_factors_tree(m, &tree, &error));
     omp_set_num_threads(n_threads);
-    ck_ok(blocks_sample(m, v, &tree, &options, &found, trial, &error));
+    ck_ok(block_scene_make(m, &tree, &scene, &error));
+    ck_ok(blocks_sample(scene, &options, &found, trial, &error));
     omp_set_num_threads(most);
     if (whole != NULL) {
         block_factors f;
-        ck_ok(blocks_find(m, v, &tree, &options, &f, whole, &error));
+        ck_ok(blocks_find_in(scene, &options, &f, whole, &error));
         block_factors_free(&f);
     }
+    block_scene_destroy(scene);
     plane_tree_free(&tree);
-    visibility_destroy(v);
     return found;
 }
 
