@@ -84,12 +84,13 @@ struct candidate;
 
 /* A method needs, or can do without, these of a problem. */
 enum {
-    METHOD_GEOMETRY = 1,      /* it needs centres, normals and surfaces */
+    METHOD_GEOMETRY = 1,      /* it needs centres and normals */
     METHOD_STREAMS = 2,       /* it can build from a stream of rows instead of F */
     METHOD_FILTERS_NOISE = 4, /* it leaves out most of the noise of rays, so fewer rays are enough */
     METHOD_BLOCKS = 8,        /* it can build from blocks of form factors instead of F */
     METHOD_KEEPS_EPSILON =
-        16, /* its epsilon is an error of answers, which trials keep where it is measured */
+        16,               /* its epsilon is an error of answers, which trials keep where it is measured */
+    METHOD_SURFACES = 32, /* it needs surfaces beside centres and normals */
 };
 
 /* One method. own points to a struct of the method that its rows fill; a NULL function has no effect.

@@ -161,10 +161,10 @@ lam_status state_weigh_pairs(precompute_state *state, lam_error *error);
 lam_status stage_form_factors(precompute_state *state, lam_error *error);
 lam_status stage_near_pairs(precompute_state *state, lam_error *error);
 
-/* The problem for methods: views of state, which must stay where it is. geometry: with centres, normals and
- * surfaces (METHOD_GEOMETRY). The options of a build, with the memory that form factors and mesh leave:
- * stage_operator.c. */
-lam_status state_problem(precompute_state *state, bool geometry, build_problem *problem, lam_error *error);
+/* The problem for methods: views of state, which must stay where it is. needs: METHOD_GEOMETRY and
+ * METHOD_SURFACES, as flags of a method. The options of a build, with the memory that form factors and mesh
+ * leave: stage_operator.c. */
+lam_status state_problem(precompute_state *state, unsigned needs, build_problem *problem, lam_error *error);
 build_options state_build_options(const precompute_state *state);
 
 lam_status stage_operator(precompute_state *state, lam_error *error);

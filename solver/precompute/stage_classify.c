@@ -33,7 +33,7 @@ lam_status precompute_classify(const precompute_options *options, terminal *t, d
         *rays_used = state.recipe.rays;
     }
     const build_options how = state_build_options(&state);
-    TRY(state_problem(&state, true, &problem, error));
+    TRY(state_problem(&state, METHOD_GEOMETRY | METHOD_SURFACES, &problem, error));
     TRY(choose_method(&problem, &how, true, out, error));
     *n = state.m.n;
     out->problem = NULL;

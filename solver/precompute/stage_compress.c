@@ -32,7 +32,7 @@ lam_status stage_compress(precompute_state *state, lam_error *error) {
     }
     for (size_t k = 0; k < m->n * m->n_channels; k++)
         if (m->emission[k] > 0) shines[m->group[k % m->n]] = true;
-    TRY(state_problem(state, true, &problem, error));
+    TRY(state_problem(state, METHOD_GEOMETRY, &problem, error));
     const compress_input input = {.F = &state->f.F,
                                   .area = m->area,
                                   .centre = problem.centre,

@@ -10,18 +10,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-static lam_status find_geometry(precompute_state *state, lam_error *error) {
+static lam_status find_geometry(precompute_state *state, unsigned needs, lam_error *error) {
     const mesh *m = &state->m;
     size_t n_surfaces;
-    if (state->centre != NULL) return LAM_OK;
-    state->centre = memory_allocate(m->n, sizeof *state->centre, "centroids", error);
+    if (state->centre == NULL) {
+        state->centre = memory_allocate(m->n, sizeof *state->centre, "centroids", error);
+        if (state->centre == NULL) return LAM_ERR_MEMORY;
+        for (size_t i = 0; i < m->n; i++) mesh_centroid(m, i, state->centre[i]);
+    }
+    if (!(needs & METHOD_SURFACES) || state->surface != NULL) return LAM_OK;
     state->surface = memory_allocate(m->n, sizeof *state->surface, "surfaces", error);
-    if (state->centre == NULL || state->surface == NULL) return LAM_ERR_MEMORY;
-    for (size_t i = 0; i < m->n; i++) mesh_centroid(m, i, state->centre[i]);
-    return mesh_surfaces(m, state->surface, &n_surfaces, error);
+    return state->surface == NULL ? LAM_ERR_MEMORY : mesh_surfaces(m, state->surface, &n_surfaces, error);
 }
 
-lam_status state_problem(precompute_state *state, bool geometry, build_problem *problem, lam_error *error) {
+lam_status state_problem(precompute_state *state, unsigned needs, build_problem *problem, lam_error *error) {
     lam_status status = LAM_OK;
     const form_factors *f = &state->f;
     state->emitting = (emitter_source){.s = state->emitters.s,
@@ -40,8 +42,8 @@ lam_status state_problem(precompute_state *state, bool geometry, build_problem *
                                .stream = state->rays != NULL ? &state->stream : NULL,
                                .order = state->order,
                                .noise = recipe_noise(&f->recipe)};
-    if (!geometry) goto done;
-    TRY(find_geometry(state, error));
+    if (!(needs & METHOD_GEOMETRY)) goto done;
+    TRY(find_geometry(state, needs, error));
     problem->centre = (const double(*)[3])state->centre;
     problem->normal = (const float(*)[3])state->m.normal;
     problem->surface = state->surface;
@@ -151,10 +153,10 @@ done:
     return status;
 }
 
-/* auto may take a method that needs the geometry. */
-static bool needs_geometry(const char *method) {
+/* auto may take a method that needs geometry and surfaces. */
+static unsigned needs_of(const char *method) {
     const build_method *m = method_find(method);
-    return m == NULL || (m->flags & METHOD_GEOMETRY);
+    return m == NULL ? METHOD_GEOMETRY | METHOD_SURFACES : m->flags;
 }
 
 static void log_report(const precompute_state *state) {
@@ -181,7 +183,7 @@ lam_status stage_operator(precompute_state *state, lam_error *error) {
     const build_options how = state_build_options(state);
     panel_precision precision = PANEL_F32;
     build_problem problem;
-    TRY(state_problem(state, needs_geometry(how.method), &problem, error));
+    TRY(state_problem(state, needs_of(how.method), &problem, error));
     TRY(build_operator(&problem, &how, &state->op, &state->built, error));
     if (state->streamed) {
         form_factors_free(&state->f);
@@ -251,7 +253,7 @@ lam_status stage_judge(precompute_state *state, lam_error *error) {
     const uint64_t seed = state->options->seed;
     build_problem problem;
     if (state->streamed) TRY(trace_again(state, error));
-    TRY(state_problem(state, false, &problem, error));
+    TRY(state_problem(state, 0, &problem, error));
     judging j = {.m = &state->m,
                  .order = state->order,
                  .problem = &problem,

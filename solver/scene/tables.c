@@ -101,3 +101,21 @@ void point_table_free(point_table *t) {
     free(t->slots.slots);
     *t = (point_table){0};
 }
+
+lam_status points_weld(size_t n, const double (*points)[3], uint32_t *place, lam_error *error) {
+    lam_status status = LAM_OK;
+    point_table table = {.n = 0};
+    uint32_t *first = memory_allocate(n, sizeof *first, "vertices", error); /* of each entry of the table */
+    if (first == NULL) return LAM_ERR_MEMORY;
+    for (uint32_t v = 0; v < n; v++) {
+        const size_t before = table.n;
+        uint32_t entry = 0;
+        TRY(point_table_add(&table, points[v], &entry, error));
+        if (table.n > before) first[entry] = v;
+        place[v] = first[entry];
+    }
+done:
+    point_table_free(&table);
+    free(first);
+    return status;
+}

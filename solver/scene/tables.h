@@ -42,4 +42,7 @@ typedef struct point_table {
 lam_status point_table_add(point_table *t, const double point[3], uint32_t *index, lam_error *error);
 void point_table_free(point_table *t);
 
+/* place[v] = the first of n points that is the same as point v. Cost: O(n). Errors: LAM_ERR_MEMORY. */
+lam_status points_weld(size_t n, const double (*points)[3], uint32_t *place, lam_error *error);
+
 #endif

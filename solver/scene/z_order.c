@@ -1,5 +1,7 @@
 #include "solver/scene/mesh.h"
 
+#include "solver/base/array_sort.h"
+
 #include <math.h>
 #include <stdlib.h>
 
@@ -52,7 +54,7 @@ lam_status mesh_z_order(const mesh *m, uint32_t *order, lam_error *error) {
         }
         keys[i] = (keyed){key, (uint32_t)i};
     }
-    qsort(keys, m->n, sizeof *keys, by_key);
+    array_sort(keys, m->n, sizeof *keys, by_key);
     for (size_t i = 0; i < m->n; i++) order[i] = keys[i].element;
     free(keys);
     return LAM_OK;

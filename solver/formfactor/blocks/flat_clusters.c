@@ -148,22 +148,29 @@ lam_status flat_clusters_make(const mesh *m, const plane_tree *tree, block_facto
         TRY(LAM_ERR_MEMORY);
     for (size_t k = 0; k < f.n_planes; k++) set_plane(&tree->frames[k], &f.planes[k]);
     for (size_t p = 0; p < n; p++) f.before[p + 1] = f.before[p] + blocks->area[p];
+#pragma omp parallel for schedule(static)
     for (size_t t = 0; t < n_clusters; t++) {
         const plane_cluster *c = &tree->clusters[t];
-        block_node *node = &blocks->nodes[t];
+        if (!c->leaf) continue;
         boxes[t] = box_of(m, tree, boxes, t);
-        if (c->frame == PLANE_ABOVE) {
-            set_above(&boxes[t], f.before[c->end] - f.before[c->begin], &f.of[t]);
-            continue;
-        }
         const flat_plane *plane = &f.planes[c->frame];
-        for (uint32_t p = c->begin; c->leaf && p < c->end; p++) {
+        for (uint32_t p = c->begin; p < c->end; p++) {
             const size_t own = n_clusters + p;
             bounds[own] = of_element(m, blocks->order[p], plane);
             include(&bounds[own], blocks->place[p]);
             bounds[t] = p == c->begin ? bounds[own] : joined(&bounds[t], &bounds[own]);
             set_cluster(plane, &bounds[own], blocks->area[p], c->frame, f.slack, &f.of[own]);
         }
+    }
+    for (size_t t = 0; t < n_clusters; t++) {
+        const plane_cluster *c = &tree->clusters[t];
+        block_node *node = &blocks->nodes[t];
+        if (!c->leaf) boxes[t] = box_of(m, tree, boxes, t);
+        if (c->frame == PLANE_ABOVE) {
+            set_above(&boxes[t], f.before[c->end] - f.before[c->begin], &f.of[t]);
+            continue;
+        }
+        const flat_plane *plane = &f.planes[c->frame];
         if (!c->leaf) bounds[t] = joined(&bounds[c->left], &bounds[t - 1]);
         set_cluster(plane, &bounds[t], f.before[c->end] - f.before[c->begin], c->frame, f.slack, &f.of[t]);
         for (int k = 0; k < 2; k++) {

@@ -1,6 +1,7 @@
 #include "solver/formfactor/visibility/occluder_join.h"
 
 #include "solver/base/vector3.h"
+#include "solver/scene/tables.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -29,37 +30,6 @@ typedef struct joining {
     size_t n_edges;
     bool *used; /* [n], in this round */
 } joining;
-
-typedef struct placed {
-    const double *at;
-    uint32_t vertex;
-} placed;
-
-static int compare_places(const double *a, const double *b) {
-    for (int d = 0; d < 3; d++)
-        if (a[d] < b[d] || a[d] > b[d]) return a[d] < b[d] ? -1 : 1;
-    return 0;
-}
-
-static int by_place(const void *left, const void *right) {
-    const placed *a = left, *b = right;
-    const int order = compare_places(a->at, b->at);
-    return order != 0 ? order : (a->vertex > b->vertex) - (a->vertex < b->vertex);
-}
-
-static lam_status find_places(joining *j, lam_error *error) {
-    const size_t n = j->m->n_vertices;
-    placed *points = memory_allocate(n, sizeof *points, "occluders", error);
-    if (points == NULL) return LAM_ERR_MEMORY;
-    for (size_t v = 0; v < n; v++) points[v] = (placed){j->m->vertices[v], (uint32_t)v};
-    if (n > 0) qsort(points, n, sizeof *points, by_place);
-    for (size_t k = 0, first = 0; k < n; k++) {
-        if (compare_places(points[k].at, points[first].at) != 0) first = k;
-        j->place[points[k].vertex] = points[first].vertex;
-    }
-    free(points);
-    return LAM_OK;
-}
 
 static void cross_of(const mesh *m, uint32_t from, uint32_t at, uint32_t to, double out[3]) {
     double a[3], b[3];
@@ -286,7 +256,7 @@ lam_status occluders_join(const mesh *m, const facets *f, double slack, joined_p
     j.place = memory_allocate(m->n_vertices, sizeof *j.place, "occluders", error);
     j.of = memory_allocate(f->n_pieces, OF_PIECE * sizeof *j.of, "occluders", error);
     if (j.place == NULL || j.of == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(find_places(&j, error));
+    TRY(points_weld(m->n_vertices, (const double(*)[3])m->vertices, j.place, error));
     for (size_t p = 0; p < f->n_pieces; p++) add_piece_of_facet(&j, f->pieces[p], f->piece_facet[p]);
     /* A union has no more corners than its two pieces less the two that both have. */
     j.edges = memory_allocate(j.n, FEW_CORNERS * sizeof *j.edges, "occluders", error);

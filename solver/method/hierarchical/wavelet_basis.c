@@ -78,22 +78,24 @@ static bool add_row(size_t inputs, size_t rows, const double *x, double least, s
 }
 
 /* Completes Q to a square: each further row is made of the unit vector of which most is left, the first of
- * equals. */
+ * equals. left[e] = 1 - sum_k Q_ke^2, the square of what the first rows leave of unit vector e. */
 static void complete(size_t inputs, size_t rows, square *Q) {
+    double left[WAVELET_INPUTS];
+    for (size_t e = 0; e < inputs; e++) {
+        left[e] = 1;
+        for (size_t k = 0; k < rows; k++) left[e] -= Q->at[k][e] * Q->at[k][e];
+    }
     for (; rows < inputs; rows++) {
-        double most = 0;
-        for (int pass = 0; pass < 2; pass++)
-            for (size_t e = 0; e < inputs; e++) {
-                double unit[WAVELET_INPUTS] = {0};
-                unit[e] = 1;
-                const double rest = make_orthogonal(inputs, rows, Q, unit);
-                if (pass == 0) {
-                    most = fmax(most, rest);
-                } else if (rest > .999 * most) {
-                    for (size_t j = 0; j < inputs; j++) Q->at[rows][j] = unit[j] / rest;
-                    break;
-                }
-            }
+        double most = 0, unit[WAVELET_INPUTS] = {0};
+        size_t first = 0;
+        for (size_t e = 0; e < inputs; e++) most = left[e] > most ? left[e] : most;
+        while (first + 1 < inputs && !(left[first] > .998 * most)) first++;
+        unit[first] = 1;
+        const double rest = make_orthogonal(inputs, rows, Q, unit);
+        for (size_t e = 0; e < inputs; e++) {
+            Q->at[rows][e] = unit[e] / rest;
+            left[e] -= Q->at[rows][e] * Q->at[rows][e];
+        }
     }
 }
 

@@ -224,6 +224,23 @@ static void order_by_b(const block_factors *f, size_t *next) {
     }
 }
 
+static void find_parts(block_factors *f) {
+    const uint32_t n_clusters = (uint32_t)f->n_clusters, n_nodes = n_clusters + (uint32_t)f->n;
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t k = 0; k < BLOCK_PARTS; k++) {
+        block_part part = {.first = part_begin(f->from, n_nodes, k, BLOCK_PARTS),
+                           .last = part_begin(f->from, n_nodes, k + 1, BLOCK_PARTS),
+                           .least_cluster = n_clusters,
+                           .least_element = n_nodes};
+        for (size_t at = f->from[part.first]; at < f->from[part.last]; at++) {
+            const uint32_t b = f->blocks[at].b;
+            uint32_t *const least = b < n_clusters ? &part.least_cluster : &part.least_element;
+            if (b < *least) *least = b;
+        }
+        f->parts[k] = part;
+    }
+}
+
 static void free_lists(size_t n_lists, block_list *lists) {
     for (size_t l = 0; l < n_lists; l++) {
         free(lists[l].list);
@@ -259,6 +276,7 @@ lam_status block_factors_end_lists(block_factors *f, size_t n_lists, block_list 
     f->n_blocks = count;
     free_lists(n_lists, lists);
     order_by_b(f, next);
+    find_parts(f);
 done:
     free(next);
     return status;

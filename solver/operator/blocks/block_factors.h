@@ -56,6 +56,15 @@ typedef struct block_piece {
     size_t first, last;
 } block_piece;
 
+/* Blocks are cut by their a into this many parts, about equal in number, whatever the number of threads. */
+enum { BLOCK_PARTS = 8 };
+
+/* The blocks of nodes a in [first, last), and the least cluster and the least element, as nodes, among their
+ * b, or where these end. */
+typedef struct block_part {
+    uint32_t first, last, least_cluster, least_element;
+} block_part;
+
 typedef struct block_factors {
     const plane_tree *tree; /* it outlives the blocks */
     size_t n, n_clusters;   /* of the tree */
@@ -72,8 +81,9 @@ typedef struct block_factors {
      * into[into_from[t]] ... into[into_from[t + 1] - 1], by a. */
     size_t *from, *into_from; /* [n_clusters + n + 1] */
     uint32_t *into;           /* [n_blocks] */
-    block_piece *pieces;      /* [n_pieces]: the largest subtrees of few elements, which threads share */
-    uint32_t *above;          /* [n_above], the clusters above them, children first */
+    block_part parts[BLOCK_PARTS];
+    block_piece *pieces; /* [n_pieces]: the largest subtrees of few elements, which threads share */
+    uint32_t *above;     /* [n_above], the clusters above them, children first */
     size_t n_pieces, n_above;
 } block_factors;
 

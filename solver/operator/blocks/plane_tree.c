@@ -1,5 +1,6 @@
 #include "solver/operator/blocks/plane_tree.h"
 
+#include "solver/base/array_sort.h"
 #include "solver/base/vector3.h"
 #include "solver/operator/blocks/plane_walls.h"
 #include "store/status.h"
@@ -53,7 +54,7 @@ static int by_value(const void *left, const void *right) {
 }
 
 static void sort_by_keys(maker *k, size_t begin, size_t end) {
-    qsort(k->keys + begin, end - begin, sizeof *k->keys, by_value);
+    array_sort(k->keys + begin, end - begin, sizeof *k->keys, by_value);
     for (size_t p = begin; p < end; p++) k->tree->order[p] = k->keys[p].element;
 }
 
@@ -337,13 +338,42 @@ static void order_planes(plane_key *planes, size_t count) {
     order_planes(planes + count / 2, count - count / 2);
 }
 
+/* The clusters of each plane, numbered from 0, from cluster 2 begins[g] on; counts [n_groups] gets their
+ * number. */
+static void split_all(const maker *k, const uint32_t *begins, uint32_t *counts) {
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t g = 0; g < k->n_groups; g++) {
+        plane_tree part = *k->tree;
+        maker own = *k;
+        part.clusters += 2 * (size_t)begins[g];
+        part.n_clusters = 0;
+        own.tree = &part;
+        (void)split_plane(&own, (uint32_t)g, begins[g], begins[g + 1]);
+        counts[g] = (uint32_t)part.n_clusters;
+    }
+}
+
+/* Moves the clusters of a plane to the end of those that are in place; returns the topmost. A plane of c
+ * elements has 2 c - 1 clusters at most, so that they move to the front. */
+static uint32_t take_plane(maker *k, size_t g, const uint32_t *begins, const uint32_t *counts) {
+    const uint32_t first = (uint32_t)k->tree->n_clusters;
+    const plane_cluster *from = k->tree->clusters + 2 * (size_t)begins[g];
+    for (uint32_t t = 0; t < counts[g]; t++) {
+        plane_cluster moved = from[t];
+        if (!moved.leaf) moved.left += first;
+        (void)add_cluster(k, moved);
+    }
+    return first + counts[g] - 1;
+}
+
 /* The clusters of planes [first, last), halved as by order_planes; returns the topmost. */
-static uint32_t join_planes(maker *k, const uint32_t *begins, size_t first, size_t last) {
-    if (last - first == 1) return split_plane(k, (uint32_t)first, begins[first], begins[last]);
+static uint32_t join_planes(maker *k, const uint32_t *begins, const uint32_t *counts, size_t first,
+                            size_t last) {
+    if (last - first == 1) return take_plane(k, first, begins, counts);
     const size_t middle = first + (last - first) / 2;
     plane_cluster made = {.begin = begins[first], .end = begins[last], .frame = PLANE_ABOVE};
-    made.left = join_planes(k, begins, first, middle);
-    (void)join_planes(k, begins, middle, last);
+    made.left = join_planes(k, begins, counts, first, middle);
+    (void)join_planes(k, begins, counts, middle, last);
     return add_cluster(k, made);
 }
 
@@ -422,7 +452,7 @@ lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*no
     lam_status status = LAM_OK;
     plane_tree tree = {.n = n};
     maker k = {.centre = centre, .normal = normal, .leaf_most = leaf_most, .tree = &tree};
-    uint32_t *begins = NULL;
+    uint32_t *begins = NULL, *counts = NULL;
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     tree.order = memory_allocate(n, sizeof *tree.order, "clusters", error);
     tree.clusters = memory_allocate(2 * n, sizeof *tree.clusters, "clusters", error);
@@ -444,13 +474,17 @@ lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*no
         TRY(part_planes(&k, begins, corners, error));
         if (k.n_groups > tree.n_frames) TRY(make_frames(&k, &begins, error));
     }
-    (void)join_planes(&k, begins, 0, k.n_groups);
+    counts = memory_allocate(k.n_groups, sizeof *counts, "clusters", error);
+    if (counts == NULL) TRY(LAM_ERR_MEMORY);
+    split_all(&k, begins, counts);
+    (void)join_planes(&k, begins, counts, 0, k.n_groups);
     *out = tree;
     tree = (plane_tree){.n = 0};
 done:
     free(k.keys);
     free(k.group_end);
     free(begins);
+    free(counts);
     plane_tree_free(&tree);
     return status;
 }

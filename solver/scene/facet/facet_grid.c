@@ -1,6 +1,7 @@
 #include "solver/scene/facet/facet_grid.h"
 
 #include "solver/base/array_grow.h"
+#include "solver/base/array_sort.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -16,6 +17,9 @@ static const double margin = 1e-5;
 
 /* The most cells per element, and the most cells of a facet beside these. */
 enum { CELLS_EACH = 4, CELLS_MORE = 16 };
+
+/* Facets of fewer elements are not worth a parallel region. */
+enum { MANY_ELEMENTS = 1024 };
 
 struct facet_grid {
     uint32_t nx, ny, first; /* cell (x, y) is cells[first + y nx + x] */
@@ -205,10 +209,11 @@ static lam_status gather(const mesh *m, const uint32_t *elements, size_t n, cons
         LAM_OK)
         return LAM_ERR_MEMORY;
     g->n = 0;
+#pragma omp parallel for schedule(static) if (n >= MANY_ELEMENTS)
+    for (size_t k = 0; k < n; k++) set_footprint(m, f, elements[k], &g->footprints[k]);
     for (size_t k = 0; k < n; k++) {
-        footprint *p = &g->footprints[k];
+        const footprint *p = &g->footprints[k];
         uint32_t x0, x1, y0, y1;
-        set_footprint(m, f, elements[k], p);
         cell_range(p->low[0], p->high[0], grid->nx, &x0, &x1);
         cell_range(p->low[1], p->high[1], grid->ny, &y0, &y1);
         for (uint32_t y = y0; y <= y1; y++)
@@ -222,7 +227,7 @@ static lam_status gather(const mesh *m, const uint32_t *elements, size_t n, cons
                 g->overlaps[g->n++] = (overlap){y * grid->nx + x, (uint32_t)k, worst >= -margin};
             }
     }
-    if (g->n > 1) qsort(g->overlaps, g->n, sizeof *g->overlaps, overlap_order);
+    array_sort(g->overlaps, g->n, sizeof *g->overlaps, overlap_order);
     return LAM_OK;
 }
 

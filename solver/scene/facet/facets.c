@@ -1,6 +1,8 @@
 #include "solver/scene/facet/facets.h"
 
+#include "solver/base/array_sort.h"
 #include "solver/scene/facet/facet_outline.h"
+#include "solver/scene/tables.h"
 #include "solver/scene/union_find.h"
 
 #include <math.h>
@@ -34,48 +36,15 @@ typedef struct joining {
     size_t n_edges, n_parts;
 } joining;
 
-typedef struct point {
-    double at[3];
-    uint32_t vertex;
-} point;
-
-static int point_order(const void *a, const void *b) {
-    const point *p = a, *q = b;
-    for (int d = 0; d < 3; d++)
-        if (p->at[d] < q->at[d] || p->at[d] > q->at[d]) return p->at[d] < q->at[d] ? -1 : 1;
-    return (p->vertex > q->vertex) - (p->vertex < q->vertex);
-}
-
-static int edge_order(const void *a, const void *b) {
-    const edge *p = a, *q = b;
-    if (p->low != q->low) return p->low < q->low ? -1 : 1;
-    if (p->high != q->high) return p->high < q->high ? -1 : 1;
-    return (p->element > q->element) - (p->element < q->element);
+/* Of edges with one low place. */
+static bool edge_before(const edge *a, const edge *b) {
+    return a->high != b->high ? a->high < b->high : a->element < b->element;
 }
 
 static int side_order(const void *a, const void *b) {
     const side *p = a, *q = b;
     if (p->part != q->part) return p->part < q->part ? -1 : 1;
     return (p->from > q->from) - (p->from < q->from);
-}
-
-/* place[v]: the first vertex at the same point. */
-static lam_status weld(joining *j, lam_error *error) {
-    const size_t n = j->m->n_vertices;
-    point *points = memory_allocate(n, sizeof *points, "facets", error);
-    if (points == NULL) return LAM_ERR_MEMORY;
-    for (size_t v = 0; v < n; v++) {
-        memcpy(points[v].at, j->m->vertices[v], sizeof points[v].at);
-        points[v].vertex = (uint32_t)v;
-    }
-    qsort(points, n, sizeof *points, point_order);
-    for (size_t k = 0, first = 0; k < n; k++) {
-        for (int d = 0; d < 3; d++)
-            if (points[k].at[d] < points[first].at[d] || points[k].at[d] > points[first].at[d]) first = k;
-        j->place[points[k].vertex] = points[first].vertex;
-    }
-    free(points);
-    return LAM_OK;
 }
 
 /* The distance of an element's farthest corner from the plane through a point. */
@@ -118,7 +87,36 @@ static void join_meeting(joining *j, edge *e, size_t count) {
     }
 }
 
-static void join_neighbours(joining *j) {
+/* Sorts edges by their places, then by their elements: those of one low place are few, and come in the order
+ * of elements. */
+static lam_status sort_edges(joining *j, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = j->m->n_vertices;
+    edge *sorted = memory_allocate(j->n_edges, sizeof *sorted, "facets", error);
+    size_t *from = memory_allocate(n + 1, sizeof *from, "facets", error);
+    if (sorted == NULL || from == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < j->n_edges; k++) from[j->edges[k].low + 1]++;
+    for (size_t v = 0; v < n; v++) from[v + 1] += from[v];
+    for (size_t k = 0; k < j->n_edges; k++) {
+        const edge *e = &j->edges[k];
+        sorted[from[e->low]++] = *e;
+    }
+    for (size_t v = 0, first = 0; v < n; first = from[v++])
+        for (size_t k = first + 1; k < from[v]; k++) {
+            const edge one = sorted[k];
+            size_t at = k;
+            for (; at > first && edge_before(&one, &sorted[at - 1]); at--) sorted[at] = sorted[at - 1];
+            sorted[at] = one;
+        }
+    memcpy(j->edges, sorted, j->n_edges * sizeof *sorted);
+done:
+    free(sorted);
+    free(from);
+    return status;
+}
+
+static lam_status join_neighbours(joining *j, lam_error *error) {
+    lam_status status = LAM_OK;
     const mesh *m = j->m;
     for (uint32_t i = 0; i < j->n; i++) {
         const size_t corners = mesh_corners(m, i);
@@ -130,7 +128,7 @@ static void join_neighbours(joining *j) {
                 (edge){from < to ? from : to, from < to ? to : from, i, from < to, false};
         }
     }
-    qsort(j->edges, j->n_edges, sizeof *j->edges, edge_order);
+    TRY(sort_edges(j, error));
     for (size_t first = 0, last; first < j->n_edges; first = last) {
         const edge *e = &j->edges[first];
         for (last = first + 1;
@@ -138,6 +136,8 @@ static void join_neighbours(joining *j) {
         }
         join_meeting(j, &j->edges[first], last - first);
     }
+done:
+    return status;
 }
 
 /* Numbers the parts by their first elements and measures them. A part is alone where it is one element or, as
@@ -197,7 +197,7 @@ static lam_status find_sides(joining *j, lam_error *error) {
                                               .to = e->forward ? e->high : e->low,
                                               .part = j->part[e->element]};
     }
-    qsort(j->sides.sides, j->sides.n, sizeof *j->sides.sides, side_order);
+    array_sort(j->sides.sides, j->sides.n, sizeof *j->sides.sides, side_order);
     return sides_cancel(j->m, j->flat, &j->sides, error);
 }
 
@@ -263,8 +263,8 @@ lam_status facets_join(const mesh *m, size_t n_elements, double flat, facets *ou
     j.part = memory_allocate(j.n, sizeof *j.part, "facets", error);
     j.edges = memory_allocate(j.n, 4 * sizeof *j.edges, "facets", error);
     if (j.place == NULL || j.parent == NULL || j.part == NULL || j.edges == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(weld(&j, error));
-    join_neighbours(&j);
+    TRY(points_weld(m->n_vertices, (const double(*)[3])m->vertices, j.place, error));
+    TRY(join_neighbours(&j, error));
     TRY(measure_parts(&j, error));
     TRY(find_sides(&j, error));
     o = (outlines){.m = m,

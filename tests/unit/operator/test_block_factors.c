@@ -157,8 +157,48 @@ START_TEST(blocks_are_sorted_and_turned) {
 }
 END_TEST
 
+/* Blocks of several lists, with ends of either order, are those of one list. */
+START_TEST(lists_are_joined) {
+    enum { LISTS = 3 };
+    plane_tree tree;
+    double *F = test_allocate(ELEMENTS * ELEMENTS, sizeof *F);
+    block_factors whole = subject(PLAIN, &tree, F, F);
+    const int most = omp_get_max_threads();
+    for (int threads = 1; threads <= 3; threads++) {
+        block_list lists[LISTS + 1] = {{.list = NULL}};
+        block_factors parted = {.n = 0};
+        parted.tree = &tree;
+        parted.n = whole.n;
+        parted.n_clusters = whole.n_clusters;
+        parted.nodes = test_allocate(whole.n_clusters + whole.n, sizeof *parted.nodes);
+        memcpy(parted.nodes, whole.nodes, (whole.n_clusters + whole.n) * sizeof *parted.nodes);
+        for (int l = 0; l < LISTS; l++) lists[l].list = test_allocate(whole.n_blocks, sizeof *lists[l].list);
+        for (size_t k = whole.n_blocks; k-- > 0;) {
+            block_list *to = &lists[k * 7 % LISTS];
+            cluster_block one = whole.blocks[k];
+            for (int r = 0; k % 2 == 1 && r < BLOCK_FUNCTIONS; r++)
+                for (int c = 0; c < BLOCK_FUNCTIONS; c++) one.L[r][c] = whole.blocks[k].L[c][r];
+            if (k % 2 == 1) one.a = whole.blocks[k].b, one.b = whole.blocks[k].a;
+            to->list[to->count++] = one;
+        }
+        omp_set_num_threads(threads);
+        ck_ok(block_factors_end_lists(&parted, LISTS + 1, lists, &error));
+        ck_assert_uint_eq(parted.n_blocks, whole.n_blocks);
+        ck_assert_mem_eq(parted.blocks, whole.blocks, whole.n_blocks * sizeof *whole.blocks);
+        ck_assert_mem_eq(parted.into, whole.into, whole.n_blocks * sizeof *whole.into);
+        for (int l = 0; l <= LISTS; l++) ck_assert(lists[l].list == NULL && lists[l].count == 0);
+        block_factors_free(&parted);
+    }
+    omp_set_num_threads(most);
+    block_factors_free(&whole);
+    plane_tree_free(&tree);
+    free(F);
+}
+END_TEST
+
 enum { VECTORS = 19 };
-static const size_t vectors_tried[] = {1, 7, VECTORS};
+/* 9: the last passes alone, in memory that others have used. */
+static const size_t vectors_tried[] = {1, 7, 9, VECTORS};
 
 START_TEST(a_product_is_that_of_the_dense_matrix) {
     plane_tree tree;
@@ -240,6 +280,7 @@ int main(void) {
     tcase_set_timeout(tests, 60);
     tcase_add_test(tests, nodes_follow_the_tree);
     tcase_add_test(tests, blocks_are_sorted_and_turned);
+    tcase_add_test(tests, lists_are_joined);
     tcase_add_loop_test(tests, a_product_is_that_of_the_dense_matrix, 0,
                         CASES * (int)(sizeof vectors_tried / sizeof *vectors_tried));
     tcase_add_test(tests, memory_runs_out);
