@@ -226,6 +226,7 @@ static lam_status sums_of_blocks(void *context, const double *d, double *r, lam_
     const block_factors *blocks = of->blocks;
     memcpy(blocks->balance, d, blocks->n * sizeof *d);
     TRY(block_factors_multiply(blocks, 1, of->ones, r, error));
+#pragma omp parallel for schedule(static)
     for (size_t p = 0; p < blocks->n; p++) {
         if (of->outside != NULL) r[p] += d[p] * of->outside[p];
         r[p] *= blocks->area[p];

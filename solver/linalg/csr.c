@@ -5,6 +5,7 @@
 #include "store/status.h"
 
 #include <math.h>
+#include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -67,6 +68,19 @@ lam_status csr_begin_rows(csr *a, const char *what, lam_error *error) {
     a->indices = memory_allocate(entries, sizeof *a->indices, what, error);
     a->data = memory_allocate(entries, sizeof *a->data, what, error);
     return a->indices != NULL && a->data != NULL ? LAM_OK : LAM_ERR_MEMORY;
+}
+
+size_t csr_part(const csr *a, size_t k, size_t n_parts) {
+    const uint64_t before = a->indptr[a->n] / n_parts * k;
+    size_t low = 0, high = a->n;
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (a->indptr[middle] < before)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return k == n_parts ? a->n : low;
 }
 
 void csr_end_rows(csr *a) {
@@ -268,6 +282,25 @@ lam_status csr_replace(const csr *A, const csr *B, csr *out, lam_error *error) {
     return combine(&c, out, error);
 }
 
+/* Rows [first, last) of the mirrored matrix, whose indptr are begins: row j gets its lower part from rows i <
+ * j, in their order, before its own. */
+static void mirror_rows(const csr *a, size_t first, size_t last, csr *out) {
+    for (size_t i = 0; i < last; i++)
+        for (uint64_t e = a->indptr[i]; e < a->indptr[i + 1]; e++) {
+            const uint32_t j = a->indices[e];
+            if (a->data[e] == 0) continue;
+            if (i >= first) {
+                const uint64_t to = out->indptr[i]++;
+                out->indices[to] = j;
+                out->data[to] = a->data[e];
+            }
+            if (j == i || j < first || j >= last) continue;
+            const uint64_t to = out->indptr[j]++;
+            out->indices[to] = (uint32_t)i;
+            out->data[to] = a->data[e];
+        }
+}
+
 lam_status csr_mirror(const csr *a, const char *what, csr *out, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = a->n;
@@ -280,19 +313,14 @@ lam_status csr_mirror(const csr *a, const char *what, csr *out, lam_error *error
             if (a->indices[e] != i) made.indptr[a->indices[e] + 1]++;
         }
     TRY(csr_begin_rows(&made, what, error));
-    /* Row j gets its lower part from rows i < j, in their order, before its own. */
-    for (size_t i = 0; i < n; i++)
-        for (uint64_t e = a->indptr[i]; e < a->indptr[i + 1]; e++) {
-            const uint32_t j = a->indices[e];
-            if (a->data[e] == 0) continue;
-            uint64_t to = made.indptr[i]++;
-            made.indices[to] = j;
-            made.data[to] = a->data[e];
-            if (j == i) continue;
-            to = made.indptr[j]++;
-            made.indices[to] = (uint32_t)i;
-            made.data[to] = a->data[e];
-        }
+#pragma omp parallel
+    {
+        /* Each thread fills the rows of a part. */
+        const size_t n_parts = (size_t)omp_get_num_threads(), part = (size_t)omp_get_thread_num();
+        const size_t first = csr_part(&made, part, n_parts), last = csr_part(&made, part + 1, n_parts);
+#pragma omp barrier
+        mirror_rows(a, first, last, &made);
+    }
     csr_end_rows(&made);
     *out = made;
     made = (csr){.n = 0};

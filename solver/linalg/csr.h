@@ -30,6 +30,9 @@ lam_status csr_reserve(csr *a, size_t entries, lam_error *error);
 lam_status csr_begin_rows(csr *a, const char *what, lam_error *error);
 void csr_end_rows(csr *a);
 
+/* The first row of part k of n_parts, which hold about as many entries each; n for k = n_parts. */
+size_t csr_part(const csr *a, size_t k, size_t n_parts);
+
 /* indptr ascending from 0 to nnz, indices ascending and below n, data finite. LAM_ERR_FORMAT names the row.
  */
 lam_status csr_check(const csr *a, size_t nnz, const char *name, lam_error *error);

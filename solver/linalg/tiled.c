@@ -112,14 +112,15 @@ static lam_status make_fours(tiled_rows *t, const tile_matrix *m, lam_error *err
     lam_status status = LAM_OK;
     plane_rows rows[TILE_PLANES] = {{NULL, NULL}};
     for (size_t d = 0; d < t->n_planes; d++) TRY(sort_plane(m, d, t->n_groups, &rows[d], error));
+#pragma omp parallel for schedule(static)
     for (size_t g = 0; g < t->n_groups; g++)
-        for (size_t d = t->n_planes; d-- > 0;) {
-            const size_t k = part_of(t, g, d);
-            t->begin[k + 1] = t->begin[k] + pack(t, m, d, &rows[d], g, NULL);
-        }
+        for (size_t d = 0; d < t->n_planes; d++)
+            t->begin[part_of(t, g, d) + 1] = pack(t, m, d, &rows[d], g, NULL);
+    for (size_t k = 0; k < t->n_groups * t->n_planes; k++) t->begin[k + 1] += t->begin[k];
     t->fours = memory_allocate((size_t)t->begin[t->n_groups * t->n_planes] + FOURS_PAST, sizeof *t->fours,
                                "operator", error);
     if (t->fours == NULL) TRY(LAM_ERR_MEMORY);
+#pragma omp parallel for schedule(static)
     for (size_t g = 0; g < t->n_groups; g++)
         for (size_t d = 0; d < t->n_planes; d++)
             pack(t, m, d, &rows[d], g, t->fours + t->begin[part_of(t, g, d)]);

@@ -37,9 +37,8 @@ static lam_status find_cost(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const recipe *r = &state->recipe;
     if (state->options->from_store || state->cost.measured > 0 || r->method == RECIPE_HEMICUBE) return LAM_OK;
-    TRY(r->method == RECIPE_BLOCKS
-            ? state_forecast_blocks(state, r, &state->cost, error)
-            : pairs_forecast(&state->m, r, &state->progress, &state->cost, error));
+    TRY(r->method == RECIPE_BLOCKS ? state_forecast_blocks(state, r, &state->cost, error)
+                                   : pairs_forecast(&state->m, r, &state->progress, &state->cost, error));
 done:
     return status;
 }

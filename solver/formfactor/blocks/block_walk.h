@@ -23,11 +23,12 @@ typedef struct block_finder {
     double exact; /* relative tolerance of single pairs, unoccluded */
 } block_finder;
 
-/* All that no option changes; begins the nodes of blocks as well (block_factors_begin). out must stay where it
- * is until it is freed, also after an error. Errors: LAM_ERR_MEMORY. */
+/* All that no option changes; begins the nodes of blocks as well (block_factors_begin). out must stay where
+ * it is until it is freed, also after an error. Errors: LAM_ERR_MEMORY. */
 lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tree *tree, block_factors *nodes,
                              block_finder *out, lam_error *error);
-/* Options in place of those before, if there were any; they must outlive their use. Errors: LAM_ERR_MEMORY. */
+/* Options in place of those before, if there were any; they must outlive their use. Errors: LAM_ERR_MEMORY.
+ */
 lam_status block_finder_set(block_finder *k, const block_options *options, lam_error *error);
 void block_finder_free(block_finder *k);
 

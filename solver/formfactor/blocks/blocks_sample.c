@@ -74,7 +74,8 @@ lam_status blocks_forecast(block_scene *scene, const recipe *r, const progress *
     options.progress = p;
     TRY(blocks_sample(scene, &options, &w, &trial, error));
     const double blocks = w.linear + w.even + w.pairs + w.shaded + w.shaded_pairs;
-    const double walk = walk_seconds(&w), finish = blocks * finish_seconds + (double)scene->nodes.n * element_seconds;
+    const double walk = walk_seconds(&w),
+                 finish = blocks * finish_seconds + (double)scene->nodes.n * element_seconds;
     const double pace = sample_pace(trial.seconds, walk_seconds(&trial.work));
     *out = (pairs_cost){.seconds = walk + finish,
                         .measured = walk * pace + finish,

@@ -1,11 +1,13 @@
 #include "solver/method/hierarchical/wavelet_entries.h"
 
 #include "solver/base/array_grow.h"
+#include "solver/method/hierarchical/wavelet_terms.h"
 #include "solver/operator/wavelet/wavelet_plan.h"
 
 #include "store/status.h"
 
 #include <math.h>
+#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,39 +23,61 @@ lam_status coefficient_list_add(coefficient_list *k, uint32_t i, uint32_t j, flo
     return LAM_OK;
 }
 
-static int by_column(const void *left, const void *right) {
-    const coefficient *a = left, *b = right;
-    return a->j < b->j ? -1 : a->j > b->j;
+/* Puts the coefficients of all lists into their rows, in no order; each thread takes those of some rows. */
+static void fill_rows(const coefficient_list *lists, size_t n_lists, csr *out) {
+#pragma omp parallel num_threads((int)n_lists)
+    {
+        const size_t n_parts = (size_t)omp_get_num_threads(), part = (size_t)omp_get_thread_num();
+        const size_t first = csr_part(out, part, n_parts), last = csr_part(out, part + 1, n_parts);
+#pragma omp barrier
+        for (size_t k = 0; k < n_lists; k++)
+            for (const coefficient *c = lists[k].list, *end = c + lists[k].count; c < end; c++) {
+                if (c->i < first || c->i >= last) continue;
+                const uint64_t to = out->indptr[c->i]++;
+                out->indices[to] = c->j;
+                out->data[to] = c->value;
+            }
+    }
+    csr_end_rows(out);
+}
+
+/* room [n_threads][2 longest] */
+static void sort_rows(csr *a, size_t n_threads, size_t longest, row_term *room) {
+#pragma omp parallel for schedule(dynamic, 256) num_threads((int)n_threads)
+    for (size_t i = 0; i < a->n; i++) {
+        row_term *const terms = room + (size_t)omp_get_thread_num() * 2 * longest;
+        const uint64_t first = a->indptr[i];
+        const size_t count = (size_t)(a->indptr[i + 1] - first);
+        for (size_t e = 0; e < count; e++) terms[e] = (row_term){a->indices[first + e], a->data[first + e]};
+        row_terms_by_column(count, terms, terms + longest);
+        for (size_t e = 0; e < count; e++) {
+            a->indices[first + e] = terms[e].column;
+            a->data[first + e] = terms[e].value;
+        }
+    }
 }
 
 lam_status coefficient_lists_join(size_t n, coefficient_list *lists, size_t n_lists, csr *out,
                                   lam_error *error) {
     lam_status status = LAM_OK;
     csr made = {.n = n, .indptr = memory_allocate(n + 1, sizeof *made.indptr, "wavelets", error)};
-    coefficient *all = NULL;
+    row_term *room = NULL;
+    size_t longest = 0;
     if (made.indptr == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t k = 0; k < n_lists; k++)
         for (size_t e = 0; e < lists[k].count; e++) made.indptr[lists[k].list[e].i + 1]++;
+    for (size_t i = 0; i < n; i++)
+        if (made.indptr[i + 1] > longest) longest = (size_t)made.indptr[i + 1];
+    room = memory_allocate(n_lists, 2 * longest * sizeof *room, "wavelets", error);
+    if (room == NULL) TRY(LAM_ERR_MEMORY);
     TRY(csr_begin_rows(&made, "wavelets", error));
-    all = memory_allocate((size_t)made.indptr[n], sizeof *all, "wavelets", error);
-    if (all == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t k = 0; k < n_lists; k++) {
-        for (size_t e = 0; e < lists[k].count; e++) all[made.indptr[lists[k].list[e].i]++] = lists[k].list[e];
-        coefficient_list_free(&lists[k]);
-    }
-    csr_end_rows(&made);
-#pragma omp parallel for schedule(dynamic, 256) num_threads((int)n_lists)
-    for (size_t i = 0; i < n; i++) {
-        qsort(all + made.indptr[i], (size_t)(made.indptr[i + 1] - made.indptr[i]), sizeof *all, by_column);
-        for (uint64_t e = made.indptr[i]; e < made.indptr[i + 1]; e++) {
-            made.indices[e] = all[e].j;
-            made.data[e] = all[e].value;
-        }
-    }
+    fill_rows(lists, n_lists, &made);
+    for (size_t k = 0; k < n_lists; k++) coefficient_list_free(&lists[k]);
+    sort_rows(&made, n_lists, longest, room);
     *out = made;
     made = (csr){.n = 0};
 done:
-    free(all);
+    free(room);
     csr_free(&made);
     return status;
 }

@@ -274,11 +274,6 @@ done:
     return status;
 }
 
-static int by_column(const void *left, const void *right) {
-    const row_term *a = left, *b = right;
-    return a->column < b->column ? -1 : a->column > b->column;
-}
-
 /* Rows first to last - 1 of K, those of a node, lose their lower triangle, entries that are not above
  * `entry`, and tiles, all entries between two nodes, whose 2-norm is not above `tile`. They are sorted by
  * column. */
@@ -297,7 +292,7 @@ static void keep_tiles(const uint32_t *node_of, float entry, float tile, size_t 
             if (row[e].column >= i && fabsf(row[e].value) > entry &&
                 w->sums[node_of[row[e].column]] > tile * tile)
                 row[kept++] = row[e];
-        if (kept > 1) qsort(row, kept, sizeof *row, by_column);
+        row_terms_by_column(kept, row, w->spare);
         K->length[i] = kept;
     }
     for (size_t k = 0; k < w->count; k++) w->sums[w->columns[k]] = 0;

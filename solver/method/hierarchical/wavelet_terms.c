@@ -192,3 +192,35 @@ void row_terms_sort(size_t count, const row_term *from, row_term *to) {
     for (size_t k = 0; k < count; k++) to[at[PLACE(from[k])]++] = from[k];
 #undef PLACE
 }
+
+/* to [last - first] = the sorted terms [first, middle) and [middle, last). */
+static void merge_terms(const row_term *from, size_t first, size_t middle, size_t last, row_term *to) {
+    size_t left = first, right = middle;
+    while (left < middle && right < last)
+        *to++ = from[from[right].column < from[left].column ? right++ : left++];
+    if (left < middle) memcpy(to, from + left, (middle - left) * sizeof *to);
+    if (right < last) memcpy(to, from + right, (last - right) * sizeof *to);
+}
+
+void row_terms_by_column(size_t count, row_term *terms, row_term *spare) {
+    row_term *from = terms, *to = spare;
+    for (size_t first = 0; first < count; first += SHORT_ROW)
+        for (size_t k = first + 1; k < count && k < first + SHORT_ROW; k++) {
+            const row_term one = terms[k];
+            size_t place = k;
+            for (; place > first && terms[place - 1].column > one.column; place--)
+                terms[place] = terms[place - 1];
+            terms[place] = one;
+        }
+    for (size_t run = SHORT_ROW; run < count; run *= 2) {
+        for (size_t first = 0; first < count; first += 2 * run) {
+            const size_t middle = first + run < count ? first + run : count,
+                         last = middle + run < count ? middle + run : count;
+            merge_terms(from, first, middle, last, to + first);
+        }
+        row_term *const swapped = from;
+        from = to;
+        to = swapped;
+    }
+    if (from != terms) memcpy(terms, from, count * sizeof *terms);
+}

@@ -88,4 +88,7 @@ lam_status term_rows_make(const rows_pass *pass, term_rows *out, lam_error *erro
  */
 void row_terms_sort(size_t count, const row_term *from, row_term *to);
 
+/* Sorts terms by column in place; equal columns stay in their order. spare: room for as many. O(n log n). */
+void row_terms_by_column(size_t count, row_term *terms, row_term *spare);
+
 #endif

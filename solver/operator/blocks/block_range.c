@@ -12,8 +12,8 @@ static const double slack = 1e-12;
  * negative: L is rounded by 6e-8 of its largest number. */
 static const double rest = 1e-5;
 
-/* Sweeps over the corners at most. */
-enum { SWEEPS = 16 };
+/* Sweeps over the corners at most; corners of a range. */
+enum { SWEEPS = 16, CORNERS = 4 };
 
 static void widen(block_range *r, const block_range *by) {
     for (int d = 0; d < 2; d++) {
@@ -56,7 +56,7 @@ double block_magnitude(const cluster_block *k) {
 static double least_slope(const block_range *ranges, const cluster_block *k, double sign) {
     const block_range *a = &ranges[k->a], *b = &ranges[k->b];
     double least = INFINITY;
-    for (int corner = 0; corner < 4; corner++) {
+    for (int corner = 0; corner < CORNERS; corner++) {
         const double u = corner & 1 ? a->high[0] : a->low[0], v = corner & 2 ? a->high[1] : a->low[1];
         double y[BLOCK_FUNCTIONS];
         for (int c = 0; c < BLOCK_FUNCTIONS; c++)
@@ -86,39 +86,50 @@ static void corner_of(const block_range *r, int corner, double m[BLOCK_FUNCTIONS
     m[2] = corner & 2 ? r->high[1] : r->low[1];
 }
 
-/* The nearest L, in the 2-norm over both rectangles, that is 0 where it was negative at this pair of corners;
- * L_00 stays. The functions 1, u, v have the mean squares 1, 1/3, 1/3. */
+/* The squares of the functions at a corner over their mean squares: 1 + 3 u^2 + 3 v^2. */
+static double square_of(const double x[BLOCK_FUNCTIONS]) {
+    return 1 + 3 * x[1] * x[1] + 3 * x[2] * x[2];
+}
+
+/* The nearest L, in the 2-norm over both rectangles, that is `least` where it was less at this pair of
+ * corners; L_00 stays. The functions 1, u, v have the mean squares 1, 1/3, 1/3. across: L y, which follows L.
+ */
 static bool lift_corner(const double x[BLOCK_FUNCTIONS], const double y[BLOCK_FUNCTIONS], double least,
-                        double L[BLOCK_FUNCTIONS][BLOCK_FUNCTIONS]) {
-    double value = 0, norm = 0;
+                        double across[BLOCK_FUNCTIONS], double L[BLOCK_FUNCTIONS][BLOCK_FUNCTIONS]) {
+    const double value = across[0] + x[1] * across[1] + x[2] * across[2];
+    if (value >= least) return false;
+    const double norm = square_of(x) * square_of(y) - 1;
+    if (!(norm > 0)) return false;
+    const double by = (least - value) / norm;
     for (int r = 0; r < BLOCK_FUNCTIONS; r++)
-        for (int c = 0; c < BLOCK_FUNCTIONS; c++) {
-            const double weight = (r > 0 ? 3 : 1) * (c > 0 ? 3 : 1);
-            value += x[r] * L[r][c] * y[c];
-            norm += r + c > 0 ? weight * x[r] * x[r] * y[c] * y[c] : 0;
+        for (int c = r == 0; c < BLOCK_FUNCTIONS; c++) {
+            const double more = by * (r > 0 ? 3 : 1) * (c > 0 ? 3 : 1) * x[r] * y[c];
+            L[r][c] += more;
+            across[r] += more * y[c];
         }
-    if (value >= least || !(norm > 0)) return false;
-    for (int r = 0; r < BLOCK_FUNCTIONS; r++)
-        for (int c = r == 0; c < BLOCK_FUNCTIONS; c++)
-            L[r][c] += (least - value) / norm * (r > 0 ? 3 : 1) * (c > 0 ? 3 : 1) * x[r] * y[c];
     return true;
 }
 
 /* Projections onto one corner after the other; what they leave below 0 takes a common factor. */
 static void reduce(const block_range *ranges, cluster_block *block) {
     const double middle = fmax((double)block->L[0][0], 0);
-    double L[BLOCK_FUNCTIONS][BLOCK_FUNCTIONS];
+    double L[BLOCK_FUNCTIONS][BLOCK_FUNCTIONS], x[CORNERS][BLOCK_FUNCTIONS], y[CORNERS][BLOCK_FUNCTIONS];
     bool lifted = true;
+    for (int corner = 0; corner < CORNERS; corner++) {
+        corner_of(&ranges[block->a], corner, x[corner]);
+        corner_of(&ranges[block->b], corner, y[corner]);
+    }
     for (int r = 0; r < BLOCK_FUNCTIONS; r++)
         for (int c = 0; c < BLOCK_FUNCTIONS; c++) L[r][c] = (double)block->L[r][c];
     L[0][0] = middle;
     for (int sweep = 0; sweep < SWEEPS && lifted; sweep++) {
         lifted = false;
-        for (int corner = 0; corner < 16; corner++) {
-            double x[BLOCK_FUNCTIONS], y[BLOCK_FUNCTIONS];
-            corner_of(&ranges[block->a], corner & 3, x);
-            corner_of(&ranges[block->b], corner >> 2, y);
-            lifted = lift_corner(x, y, rest * middle, L) || lifted;
+        for (int b = 0; b < CORNERS; b++) {
+            double across[BLOCK_FUNCTIONS];
+            for (int r = 0; r < BLOCK_FUNCTIONS; r++)
+                across[r] = L[r][0] + y[b][1] * L[r][1] + y[b][2] * L[r][2];
+            for (int a = 0; a < CORNERS; a++)
+                lifted = lift_corner(x[a], y[b], rest * middle, across, L) || lifted;
         }
     }
     for (int r = 0; r < BLOCK_FUNCTIONS; r++)
