@@ -23,11 +23,12 @@ typedef struct reference_system {
 /* X of m right sides r, both [m][C][n]; r is used up. Each is X := X + M r, r := r - (I - R F) M r with the
  * guide M, until the steps that are left, a geometric series, are below tolerance |X|; where a step is more
  * than half of the one before, by reference_solve from there on. Right sides come to their ends one by one.
- * With a guide that is off by a few hundredths it takes one product with F for each two digits.
+ * With a guide that is off by a few hundredths it takes one product with F for each two digits. rate as in
+ * reference_answers, NULL: no probe is trusted.
  * Errors: LAM_ERR_MEMORY, LAM_ERR_NUMERIC, LAM_ERR_CANCELLED, and those of the guide. */
 lam_status guided_reference_correct(const reference_system *s, size_t m, double *r, double *X,
-                                    double tolerance, const reference_guide *guide, const progress *p,
-                                    lam_error *error);
+                                    double tolerance, const reference_guide *guide, double *rate,
+                                    const progress *p, lam_error *error);
 
 /* Emissions of an operator, and its answers. */
 typedef struct reference_answers {
@@ -37,6 +38,9 @@ typedef struct reference_answers {
         *first; /* [][C][n] H, the light that E itself gives, in place of F E where `known`; NULL: F E
                  */
     const bool *known;
+    double *rate; /* the largest ratio of a step to the one before, of this operator and F so far; 0: of none.
+                     Below .005 of eight probes or more, others are left with their first step, which is then
+                     off by about so much. NULL: none is */
     const progress *progress;
 } reference_answers;
 

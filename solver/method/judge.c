@@ -23,10 +23,16 @@ typedef struct group_tally {
     figure_group own, total;
 } group_tally;
 
+/* The largest ratios of steps so far, of each reference (reference_answers). */
+typedef struct step_rates {
+    double own, independent, other;
+} step_rates;
+
 /* The emissions of a round, their first light H and its spread D, [m][C][n], and corrections by each
  * reference. */
 typedef struct measured {
     const judge_input *input;
+    step_rates *rates;
     bool at_once; /* these are all */
     probes p;
     double *first, *spread;
@@ -92,25 +98,36 @@ static void keep(void *context, size_t v, size_t channel, const double *x) {
     memcpy(to->x + (v * C + channel) * n, x, n * sizeof *x);
 }
 
-/* x [m][C][n]: corrections of the first m answers by F; first: with the first light that is known. */
+/* x [][C][n]: corrections of the answers which[count] by F; first: with the first light that is known. */
 static lam_status solve(const lam_operator *op, const measured *m, const factor_product *F, bool first,
-                        size_t count, double *x, lam_error *error) {
-    lam_status status = LAM_OK;
+                        size_t count, const size_t *which, double *rate, double *x, lam_error *error) {
     const reference_system system = system_of(m->input, F);
     const reference_answers answers = {.op = op,
                                        .E = m->p.E,
                                        .B = m->p.B,
                                        .first = first ? m->first : NULL,
                                        .known = m->known,
+                                       .rate = rate,
                                        .progress = m->input->progress};
     corrections to = {m->input, x};
-    size_t *all = memory_allocate(count, sizeof *all, "probes", error);
-    if (all == NULL) return LAM_ERR_MEMORY;
-    for (size_t v = 0; v < count; v++) all[v] = v;
-    TRY(guided_reference_each(&system, &answers, count, all, keep, &to, error));
-done:
-    free(all);
-    return status;
+    return guided_reference_each(&system, &answers, count, which, keep, &to, error);
+}
+
+/* y of the first n_noisy answers, by the other reference. Where that is the operator's own F, x has the
+ * corrections by it as long as no first light is taken, which are those of answers whose first light is not
+ * known. */
+static lam_status prepare_other(measured *m, size_t n_noisy, bool by_own, size_t *which, size_t *count,
+                                lam_error *error) {
+    const size_t vector = vector_of(m->input);
+    *count = 0;
+    m->y = memory_allocate(n_noisy, vector * sizeof *m->y, "reference", error);
+    if (m->y == NULL) return LAM_ERR_MEMORY;
+    for (size_t v = 0; v < n_noisy; v++)
+        if (!by_own || (m->known != NULL && m->known[v]))
+            which[(*count)++] = v;
+        else
+            memcpy(m->y + v * vector, m->x + v * vector, vector * sizeof *m->y);
+    return LAM_OK;
 }
 
 /* Probe v with its corrections x and y (NULL: not known), by the references of the total error or by the
@@ -172,6 +189,10 @@ static bool is_certain(const figure_tally *t, size_t all) {
     return spread >= 0 && spread * (double)t->count <= certain * t->plain.f;
 }
 
+static bool are_same(const factor_product *a, const factor_product *b) {
+    return a->context == b->context && a->multiply == b->multiply;
+}
+
 /* Emissions of one round, against all references. The operator's own error is found until it is certain, the
  * noise where the references are no twins, are found in the first round. */
 static lam_status measure(const lam_operator *op, measured *m, size_t round, group_tally *t,
@@ -182,11 +203,15 @@ static lam_status measure(const lam_operator *op, measured *m, size_t round, gro
     const bool first = round == 0;
     const bool each = input->relation != REFERENCE_COARSER;
     const bool total = input->independent.n > 0, noisy = input->other.n > 0 && (first || each);
+    const bool own = first || !is_certain(&t[JUDGE_SINGLE].own.indirect, all_of(op, JUDGE_SINGLE));
     const size_t n_noisy = each || m->at_once ? p->m : p->m < NOISE_PROBES ? p->m : NOISE_PROBES;
+    size_t *all = memory_allocate(p->m, sizeof *all, "probes", error);
+    size_t *others = memory_allocate(p->m, sizeof *others, "probes", error), n_others = 0;
     m->x = memory_allocate(p->m, vector_of(input) * sizeof *m->x, "reference", error);
-    if (m->x == NULL) TRY(LAM_ERR_MEMORY);
-    if (first || !is_certain(&t[JUDGE_SINGLE].own.indirect, all_of(op, JUDGE_SINGLE))) {
-        TRY(solve(op, m, &input->own, false, p->m, m->x, error));
+    if (m->x == NULL || all == NULL || others == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t v = 0; v < p->m; v++) all[v] = v;
+    if (own) {
+        TRY(solve(op, m, &input->own, false, p->m, all, &m->rates->own, m->x, error));
         for (int g = 0; g < JUDGE_GROUPS; g++)
             for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
                 const figure_probe one = probe_of(m, v, m->x, NULL, false);
@@ -197,19 +222,21 @@ static lam_status measure(const lam_operator *op, measured *m, size_t round, gro
     if (!total) goto done;
     report_round(input, round, .3);
     TRY(find_first_light(m, error));
-    TRY(solve(op, m, &input->independent, true, p->m, m->x, error));
-    if (noisy) {
-        report_round(input, round, .6);
-        m->y = memory_allocate(n_noisy, vector_of(input) * sizeof *m->y, "reference", error);
-        if (m->y == NULL) TRY(LAM_ERR_MEMORY);
-        TRY(solve(op, m, &input->other, true, n_noisy, m->y, error));
-    }
+    const bool by_own = are_same(&input->other, &input->own);
+    if (noisy) TRY(prepare_other(m, n_noisy, own && by_own, others, &n_others, error));
+    TRY(solve(op, m, &input->independent, true, p->m, all, &m->rates->independent, m->x, error));
+    report_round(input, round, .6);
+    if (n_others > 0)
+        TRY(solve(op, m, &input->other, true, n_others, others, by_own ? &m->rates->own : &m->rates->other,
+                  m->y, error));
     for (int g = 0; g < JUDGE_GROUPS; g++)
         for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
             const figure_probe one = probe_of(m, v, m->x, noisy && v < n_noisy ? m->y : NULL, true);
             figures_add(&one, &t[g].total);
         }
 done:
+    free(all);
+    free(others);
     return status;
 }
 
@@ -273,6 +300,7 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     error_group *groups[JUDGE_GROUPS] = {&found.random, &found.lights, &found.single};
     group_tally t[JUDGE_GROUPS] = {{.done = 0}};
     size_t counts[JUDGE_GROUPS], rounds = 0;
+    step_rates rates = {.own = 0};
     probe_source source;
     measured m = {.input = input};
     TRY(probe_source_make(input->problem, op, input->emission, input->probes, JUDGE_RANDOM_PROBES,
@@ -282,7 +310,7 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     for (; next_counts(op, input, &source, t, at_once, counts); rounds++) {
         if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         measured_free(&m);
-        m = (measured){.input = input, .at_once = at_once};
+        m = (measured){.input = input, .rates = &rates, .at_once = at_once};
         TRY(probes_next(&source, counts, rounds == 0, &m.p, error));
         TRY(measure(op, &m, rounds, t, error));
         if (rounds == 0) add_physics(&m, groups);

@@ -1,10 +1,13 @@
-/* Corrections with a guide: as near as an operator is, of no use, of no use for one probe, in two channels,
- * cancelled. */
+/* Corrections with a guide: as near as an operator is, of no use, of no use for one probe, with some probes
+ * that speak for others, in two channels, cancelled. */
 #include "solver/method/guided_reference.h"
 #include "support/box.h"
 #include "support/suite.h"
 
 #include "store/status.h"
+
+#include <stdlib.h>
+#include <string.h>
 
 enum { SIDE = 5, N = 6 * SIDE * SIDE, M = 3, C = 2, VECTOR = C * N };
 
@@ -94,7 +97,8 @@ START_TEST(a_good_guide_needs_few_steps) {
         subject_make(&s);
         teacher t = {.s = &s, .off = cases[c].off};
         const reference_guide guide = {teach, &t};
-        ck_ok(guided_reference_correct(&s.system, M, s.r, s.X, cases[c].tolerance, &guide, NULL, &error));
+        ck_ok(
+            guided_reference_correct(&s.system, M, s.r, s.X, cases[c].tolerance, &guide, NULL, NULL, &error));
         for (size_t v = 0; v < M; v++) ck_assert_double_le(distance(&s, v), 1.5 * cases[c].tolerance);
         ck_assert_int_eq(t.calls, cases[c].calls);
         ck_assert_uint_eq(s.columns, (size_t)(M * C * (t.calls - 1)));
@@ -111,7 +115,7 @@ START_TEST(a_bad_guide_does_no_harm) {
         subject_make(&s);
         teacher t = {.s = &s, .off = k == 0 ? .9 : 30};
         const reference_guide guide = {teach, &t};
-        ck_ok(guided_reference_correct(&s.system, M, s.r, s.X, 1e-7, &guide, NULL, &error));
+        ck_ok(guided_reference_correct(&s.system, M, s.r, s.X, 1e-7, &guide, NULL, NULL, &error));
         for (size_t v = 0; v < M; v++) ck_assert_double_lt(distance(&s, v), 1e-5);
         ck_assert_int_lt(t.calls, 5);
         subject_free(&s);
@@ -126,7 +130,7 @@ START_TEST(each_probe_goes_its_own_way) {
     subject_make(&s);
     teacher t = {.s = &s, .off = .01, .misled = true};
     const reference_guide guide = {teach, &t};
-    ck_ok(guided_reference_correct(&s.system, M, s.r, s.X, 2e-8, &guide, NULL, &error));
+    ck_ok(guided_reference_correct(&s.system, M, s.r, s.X, 2e-8, &guide, NULL, NULL, &error));
     for (size_t v = 0; v < M; v++) ck_assert_double_lt(distance(&s, v), v == 1 ? 1e-6 : 4e-8);
     ck_assert_int_eq(t.calls, 4);
     subject_free(&s);
@@ -140,10 +144,90 @@ START_TEST(nothing_lacking_needs_no_product) {
     memset(s.r, 0, sizeof s.r);
     teacher t = {.s = &s};
     const reference_guide guide = {teach, &t};
-    ck_ok(guided_reference_correct(&s.system, M, s.r, s.X, 1e-8, &guide, NULL, &error));
+    ck_ok(guided_reference_correct(&s.system, M, s.r, s.X, 1e-8, &guide, NULL, NULL, &error));
     for (size_t k = 0; k < M * VECTOR; k++) ck_assert_double_eq(s.X[k], 0);
     ck_assert_uint_eq(s.columns, 0);
     subject_free(&s);
+}
+END_TEST
+
+/* More probes than there are pilots, and their exact corrections. */
+enum { MANY = 12, PILOTS = 8 };
+
+typedef struct many {
+    subject s;
+    double r[MANY * VECTOR], exact[MANY * VECTOR], X[MANY * VECTOR];
+} many;
+
+static void many_make(many *t) {
+    lam_error error = {.message = ""};
+    subject_make(&t->s);
+    for (size_t k = 0; k < MANY * VECTOR; k++)
+        t->r[k] = k % VECTOR == 7 * (k / VECTOR) ? 1 : .01 * ((double)(k % 5) - 2);
+    for (size_t k = 0; k < MANY * C; k++)
+        ck_ok(reference_solve(t->s.dense[k % C], 1, t->r + k * N, t->exact + k * N, 0, NULL, &error));
+}
+
+/* The largest |X - x| / |x| of probes first ... last - 1. */
+static double many_distance(many *t, size_t first, size_t last) {
+    double most = 0;
+    for (size_t v = first; v < last; v++) {
+        memcpy(t->s.X, t->X + v * VECTOR, VECTOR * sizeof *t->X);
+        memcpy(t->s.exact, t->exact + v * VECTOR, VECTOR * sizeof *t->exact);
+        const double d = distance(&t->s, 0);
+        most = d > most ? d : most;
+    }
+    return most;
+}
+
+/* A guide that is off by .001 leaves .001 to .002 (the error of M r - x is .001 x, of alternating sign) after
+ * one step; the pilots show it, and have 1e-6 or so after their second one. With that rate no product is
+ * needed any more. */
+START_TEST(pilots_speak_for_the_others) {
+    lam_error error = {.message = ""};
+    many *t = calloc(1, sizeof *t);
+    double rate = 0, again[MANY * VECTOR];
+    ck_assert_ptr_nonnull(t);
+    many_make(t);
+    memcpy(again, t->r, sizeof again);
+    teacher of = {.s = &t->s, .off = .001};
+    const reference_guide guide = {teach, &of};
+    ck_ok(guided_reference_correct(&t->s.system, MANY, t->r, t->X, 2e-3, &guide, &rate, NULL, &error));
+    ck_assert_uint_eq(t->s.columns, PILOTS * C);
+    ck_assert_double_gt(rate, 1e-4);
+    ck_assert_double_lt(rate, 5e-3);
+    ck_assert_double_lt(many_distance(t, 0, PILOTS), 1e-5);
+    ck_assert_double_lt(many_distance(t, PILOTS, MANY), 5e-3);
+    ck_assert_double_gt(many_distance(t, PILOTS, MANY), 5e-4);
+    const double known = rate;
+    ck_ok(guided_reference_correct(&t->s.system, MANY, again, t->X, 2e-3, &guide, &rate, NULL, &error));
+    ck_assert_uint_eq(t->s.columns, PILOTS * C);
+    ck_assert_double_eq(rate, known);
+    ck_assert_double_lt(many_distance(t, 0, MANY), 5e-3);
+    subject_free(&t->s);
+    free(t);
+}
+END_TEST
+
+/* Pilots whose steps shrink by less, or of which the guide misleads one, speak for nobody: all probes
+ * converge as far as without them. */
+START_TEST(pilots_may_find_a_guide_too_bad) {
+    lam_error error = {.message = ""};
+    for (int k = 0; k < 3; k++) {
+        many *t = calloc(1, sizeof *t);
+        double rate = 0;
+        ck_assert_ptr_nonnull(t);
+        many_make(t);
+        teacher of = {.s = &t->s, .off = k == 0 ? .03 : k == 1 ? .9 : .001};
+        const reference_guide guide = {teach, &of};
+        ck_ok(guided_reference_correct(&t->s.system, MANY, t->r, t->X, 1e-4, &guide, k < 2 ? &rate : NULL,
+                                       NULL, &error));
+        ck_assert_double_lt(many_distance(t, 0, MANY), 1.5e-4);
+        if (k < 2) ck_assert_double_gt(rate, 5e-3);
+        if (k == 2) ck_assert_uint_ge(t->s.columns, MANY * C);
+        subject_free(&t->s);
+        free(t);
+    }
 }
 END_TEST
 
@@ -163,10 +247,10 @@ START_TEST(errors_pass_through) {
     const reference_guide guide = {refuse, NULL};
     subject s;
     subject_make(&s);
-    ck_assert_int_eq(guided_reference_correct(&s.system, M, s.r, s.X, 1e-7, &guide, NULL, &error),
+    ck_assert_int_eq(guided_reference_correct(&s.system, M, s.r, s.X, 1e-7, &guide, NULL, NULL, &error),
                      LAM_ERR_NUMERIC);
     ck_assert_str_eq(error.message, "no answer");
-    ck_assert_int_eq(guided_reference_correct(&s.system, M, s.r, s.X, 1e-7, &guide, &cancelled, &error),
+    ck_assert_int_eq(guided_reference_correct(&s.system, M, s.r, s.X, 1e-7, &guide, NULL, &cancelled, &error),
                      LAM_ERR_CANCELLED);
     subject_free(&s);
 }
@@ -178,6 +262,8 @@ int main(void) {
     tcase_add_test(cases, a_good_guide_needs_few_steps);
     tcase_add_test(cases, a_bad_guide_does_no_harm);
     tcase_add_test(cases, each_probe_goes_its_own_way);
+    tcase_add_test(cases, pilots_speak_for_the_others);
+    tcase_add_test(cases, pilots_may_find_a_guide_too_bad);
     tcase_add_test(cases, nothing_lacking_needs_no_product);
     tcase_add_test(cases, errors_pass_through);
     suite_add_tcase(suite, cases);
