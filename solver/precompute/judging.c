@@ -2,44 +2,118 @@
 
 #include "solver/formfactor/blocks/block_light.h"
 #include "solver/formfactor/pairs/first_light.h"
+#include "solver/operator/blocks/block_store.h"
+#include "solver/precompute/trial.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* The first light of one emission. */
+typedef struct light_kept {
+    float *E;      /* [n]; NULL: none is kept */
+    double *H, *D; /* [n] */
+    bool known;
+} light_kept;
+
+struct judge_references {
+    recipe halves[2];
+    form_factors half[2]; /* the samples; the first is about finer blocks */
+    block_factors finer;  /* n = 0: samples */
+    first_light *by_rays; /* the first light; both NULL: rows say it well enough */
+    block_light *by_blocks;
+    size_t n;
+    bool keeps;
+    light_kept lamp; /* of several elements, which takes as long as that of many single ones */
+};
+
+static void light_kept_free(light_kept *l) {
+    free(l->E);
+    free(l->H);
+    free(l->D);
+    *l = (light_kept){.E = NULL};
+}
+
+void judge_references_free_samples(judge_references *r) {
+    if (r == NULL) return;
+    for (int h = 0; h < 2; h++) form_factors_free(&r->half[h]);
+    block_factors_free(&r->finer);
+    r->half[0] = r->half[1] = (form_factors){.row_sums = NULL};
+    r->finer = (block_factors){.n = 0};
+}
+
+void judge_references_free(judge_references *r) {
+    if (r == NULL) return;
+    judge_references_free_samples(r);
+    first_light_destroy(r->by_rays);
+    block_light_destroy(r->by_blocks);
+    light_kept_free(&r->lamp);
+    free(r);
+}
+
+/* Of an entry of rows; of an element its nodes and places for the walk of light. */
+static const double entry_bytes = 8, walk_bytes = 400, lamp_bytes = 20;
+
+double judge_references_bytes(const judge_references *r) {
+    if (r == NULL) return 0;
+    double bytes = (r->by_blocks != NULL ? walk_bytes : 0) * (double)r->n + lamp_bytes * (double)r->n;
+    if (r->finer.n > 0) bytes += (double)block_factors_bytes(&r->finer);
+    for (int h = 0; h < 2; h++)
+        if (r->half[h].F.indptr != NULL) bytes += entry_bytes * (double)(r->n + r->half[h].F.indptr[r->n]);
+    return bytes;
+}
+
+static lam_status light_of(const judge_references *r, const float *E, double *H, double *D, bool *known,
+                           lam_error *error) {
+    if (r->by_blocks != NULL) return block_light_of(r->by_blocks, E, H, D, known, error);
+    return first_light_of(r->by_rays, E, H, D, known, error);
+}
+
+/* Keeps the light of E, unless memory is short: it is found once more then. */
+static void keep_light(judge_references *r, const float *E, const double *H, const double *D, bool known) {
+    light_kept l = {.E = memory_allocate(r->n, sizeof *l.E, "direct illumination", NULL),
+                    .H = memory_allocate(r->n, sizeof *l.H, "direct illumination", NULL),
+                    .D = memory_allocate(r->n, sizeof *l.D, "direct illumination", NULL),
+                    .known = known};
+    if (l.E == NULL || l.H == NULL || l.D == NULL) {
+        light_kept_free(&l);
+        return;
+    }
+    memcpy(l.E, E, r->n * sizeof *E);
+    memcpy(l.H, H, r->n * sizeof *H);
+    memcpy(l.D, D, r->n * sizeof *D);
+    r->lamp = l;
+}
+
+static lam_status light_for_judge(void *context, const float *E, double *H, double *D, bool *known,
+                                  lam_error *error) {
+    lam_status status = LAM_OK;
+    judge_references *r = context;
+    const light_kept *lamp = &r->lamp;
+    size_t bright = 0;
+    for (size_t i = 0; i < r->n; i++) bright += E[i] != 0;
+    const bool keeps = r->keeps && bright > 1;
+    if (keeps && lamp->E != NULL && memcmp(lamp->E, E, r->n * sizeof *E) == 0) {
+        memcpy(H, lamp->H, r->n * sizeof *H);
+        memcpy(D, lamp->D, r->n * sizeof *D);
+        *known = lamp->known;
+        return LAM_OK;
+    }
+    TRY(light_of(r, E, H, D, known, error));
+    if (keeps && lamp->E == NULL) keep_light(r, E, H, D, *known);
+done:
+    return status;
+}
 
 /* Errors of blocks fall as the square root of their bound, or faster. Where the judge's bound is half that of
  * the blocks that are judged, an error e of its own makes sqrt(2) e of theirs; these are independent, so that
  * the distance of both solutions is sqrt(3) e, or more. */
 static const double share_of_distance = .57735026918962576451;
 
-/* Against blocks of half the tolerance, found with other segments, and the first light of few elements by a
- * walk of its own. The blocks that are judged tell the noise of the others. */
-static lam_status judge_by_blocks(const judging *j, const lam_operator *op, error_report *out,
-                                  lam_error *error) {
-    lam_status status = LAM_OK;
-    form_factors about = {.row_sums = NULL};
-    block_factors finer = {.n = 0};
-    block_light *first = NULL;
+/* Blocks of half the tolerance, found with other segments. */
+static lam_status make_blocks(const judging *j, judge_references *r, lam_error *error) {
     const plane_tree *tree = j->problem->blocks->tree;
     const form_factor_options how = {.recipe = j->halves[0], .progress = j->progress, .stage = j->stages[0]};
-    TRY(form_factors_make_blocks(j->m, j->order, tree, j->f, &how, &about, &finer, error));
-    TRY(block_light_create(j->m, tree, j->first_light_seed, &first, error));
-    const judge_input input = {.problem = j->problem,
-                               .row_sums = j->f->row_sums,
-                               .emission = j->m->emission,
-                               .own = block_factors_product(j->problem->blocks),
-                               .independent = block_factors_product(&finer),
-                               .other = block_factors_product(j->problem->blocks),
-                               .relation = REFERENCE_COARSER,
-                               .other_share = share_of_distance,
-                               .first_light = block_light_for_judge,
-                               .first_light_context = first,
-                               .probes = j->probes,
-                               .probes_least = j->probes_least,
-                               .seed = j->probes_seed,
-                               .progress = j->progress};
-    TRY(judge_operator(op, &input, out, error));
-done:
-    block_light_destroy(first);
-    form_factors_free(&about);
-    block_factors_free(&finer);
-    return status;
+    return form_factors_make_blocks(j->m, j->order, tree, j->f, &how, &r->half[0], &r->finer, error);
 }
 
 /* True where both samples share the pairs that are projected: rows in a scratch folder are of one sample. */
@@ -68,31 +142,76 @@ done:
     return status;
 }
 
+/* True where the form factors of references were made for the same recipe. */
+static bool fits(const judging *j, const judge_references *r) {
+    return r->half[0].row_sums != NULL && (r->finer.n > 0) == (j->problem->blocks != NULL) &&
+           !trial_recipes_differ(&r->halves[0], &j->halves[0]) &&
+           !trial_recipes_differ(&r->halves[1], &j->halves[1]);
+}
+
+/* The form factors and the light that are lacking: of few elements by a walk of the tree, or by pairs. */
+static lam_status make_references(const judging *j, judge_references *r, lam_error *error) {
+    lam_status status = LAM_OK;
+    const bool blocks = j->problem->blocks != NULL;
+    if (!fits(j, r)) {
+        judge_references_free_samples(r);
+        memcpy(r->halves, j->halves, sizeof r->halves);
+        TRY(blocks ? make_blocks(j, r, error) : make_halves(j, r->half, error));
+    }
+    if (blocks && r->by_blocks == NULL)
+        TRY(block_light_create(j->m, j->problem->blocks->tree, j->first_light_seed, &r->by_blocks, error));
+    /* The direct illumination of one element by rays is mostly noise. */
+    if (!blocks && recipe_noise(&j->f->recipe) > 0 && r->by_rays == NULL)
+        TRY(first_light_create(j->m, j->first_light_seed, &r->by_rays, error));
+done:
+    return status;
+}
+
+/* The blocks that are judged tell the noise of finer ones; one of two samples that of the other. */
+static judge_input input_of(const judging *j, judge_references *r) {
+    const bool blocks = r->finer.n > 0;
+    const factor_product own =
+        blocks ? block_factors_product(j->problem->blocks) : factor_product_of_rows(j->problem->F);
+    return (judge_input){.problem = j->problem,
+                         .row_sums = j->f->row_sums,
+                         .emission = j->m->emission,
+                         .own = own,
+                         .independent = blocks ? block_factors_product(&r->finer)
+                                               : factor_product_of_rows(&r->half[0].F),
+                         .other = blocks ? own : factor_product_of_rows(&r->half[1].F),
+                         .relation = blocks            ? REFERENCE_COARSER
+                                     : shares_pairs(j) ? REFERENCE_DISTURBED
+                                                       : REFERENCE_TWIN,
+                         .other_share = blocks ? share_of_distance : 0,
+                         .first_light = r->by_blocks != NULL || r->by_rays != NULL ? light_for_judge : NULL,
+                         .first_light_context = r,
+                         .probes = j->probes,
+                         .probes_least = j->probes_least,
+                         .seed = j->probes_seed,
+                         .progress = j->progress};
+}
+
 lam_status judging_run(const judging *j, const lam_operator *op, error_report *out, lam_error *error) {
     lam_status status = LAM_OK;
-    form_factors half[2] = {{.row_sums = NULL}, {.row_sums = NULL}};
-    first_light *first = NULL;
-    if (j->problem->blocks != NULL) return judge_by_blocks(j, op, out, error);
-    TRY(make_halves(j, half, error));
-    /* The direct illumination of one element by rays is mostly noise. */
-    if (recipe_noise(&j->f->recipe) > 0) TRY(first_light_create(j->m, j->first_light_seed, &first, error));
-    const judge_input input = {.problem = j->problem,
-                               .row_sums = j->f->row_sums,
-                               .emission = j->m->emission,
-                               .own = factor_product_of_rows(j->problem->F),
-                               .independent = factor_product_of_rows(&half[0].F),
-                               .other = factor_product_of_rows(&half[1].F),
-                               .relation = shares_pairs(j) ? REFERENCE_DISTURBED : REFERENCE_TWIN,
-                               .first_light = first != NULL ? first_light_for_judge : NULL,
-                               .first_light_context = first,
-                               .probes = j->probes,
-                               .probes_least = j->probes_least,
-                               .seed = j->probes_seed,
-                               .progress = j->progress};
+    judge_references *r = NULL;
+    if (j->kept != NULL) {
+        r = *j->kept;
+        *j->kept = NULL;
+    }
+    if (r == NULL) {
+        r = memory_allocate(1, sizeof *r, "references", error);
+        if (r == NULL) TRY(LAM_ERR_MEMORY);
+        r->n = j->m->n;
+        r->keeps = j->kept != NULL;
+    }
+    TRY(make_references(j, r, error));
+    const judge_input input = input_of(j, r);
     TRY(judge_operator(op, &input, out, error));
+    if (j->kept != NULL) {
+        *j->kept = r;
+        r = NULL;
+    }
 done:
-    first_light_destroy(first);
-    form_factors_free(&half[0]);
-    form_factors_free(&half[1]);
+    judge_references_free(r);
     return status;
 }

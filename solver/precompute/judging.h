@@ -7,6 +7,15 @@
 #include "solver/method/judge.h"
 #include "solver/scene/mesh.h"
 
+/* The references of a judge, which do not depend on the operator: two samples of form factors, or finer
+ * blocks, and the first light. Mesh, order and tree of its judging must outlive them. */
+typedef struct judge_references judge_references;
+void judge_references_free(judge_references *r);
+void judge_references_free_samples(judge_references *r); /* the form factors; r may be NULL */
+
+/* Bytes in memory; of NULL 0. */
+double judge_references_bytes(const judge_references *r);
+
 typedef struct judging {
     const mesh *m;
     const uint32_t *order;
@@ -20,8 +29,12 @@ typedef struct judging {
     uint64_t probes_seed, first_light_seed;
     size_t probes, probes_least; /* as in judge_input */
     const progress *progress;
-    void (*sampled)(void *context, const form_factors *half); /* after each sample; or NULL */
+    void (*sampled)(void *context, const form_factors *half); /* after each sample that was made; or NULL */
     void *context;
+    judge_references **kept; /* NULL, or where the references stay for another operator of the same scene:
+                                of those of before, NULL at first, the form factors are taken where their
+                                recipes are the same, and the first light. Figures are those of new
+                                references, bit by bit */
 } judging;
 
 /* Errors: those of form_factors_make, first_light_create and judge_operator. */

@@ -39,6 +39,7 @@ void state_free(precompute_state *state) {
     scratch_close(state->scratch, false);
     lam_operator_close(state->op);
     trial_made_free(&state->trial.best);
+    judge_references_free(state->trial.references);
 }
 
 uint64_t precompute_seed(uint64_t seed, seed_purpose purpose) {

@@ -11,6 +11,7 @@
 #include "solver/precompute/emitter_list.h"
 #include "solver/precompute/error_advice.h"
 #include "solver/precompute/forecast.h"
+#include "solver/precompute/judging.h"
 #include "solver/precompute/precompute.h"
 #include "solver/precompute/trial.h"
 
@@ -33,6 +34,7 @@ typedef struct trial_course {
     double factors;  /* that part of the error before the form factors were made anew; 0: they were not */
     bool spent;      /* which hardly lowered it: they are not made again */
     trial_made best; /* before the last */
+    judge_references *references; /* of the judge, for a next trial of the same form factors; NULL: none */
 } trial_course;
 
 /* Single elements by which an operator is judged at least, unless --probes gives their number. */
@@ -175,9 +177,11 @@ lam_status stage_judge(precompute_state *state, lam_error *error);
 void state_advise(precompute_state *state);
 
 /* After form factors, operator and judge: where --epsilon asks for a smaller error, turns the knobs and
- * releases all that is to be made again; false: the best trial is in place. The trial that was put aside in
- * place of one that failed. The figures of the trials, into the report: stage_trials.c. */
+ * releases all that is to be made again; false: the best trial is in place. True where the trial
+ * that is being made may not be the last. The trial that was put aside in place of one that failed. The
+ * figures of the trials, into the report: stage_trials.c. */
 bool state_next_trial(precompute_state *state);
+bool state_may_try_again(const precompute_state *state);
 void state_take_back(precompute_state *state);
 void state_report_trials(precompute_state *state);
 void trial_made_free(trial_made *made);

@@ -47,7 +47,7 @@ lam_status stage_forecast(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
     forecast f = state_forecast(state, (double)state->m.n);
-    char memory[32], stored[32], seconds[32], building[32], judging[32], scratch_room[32];
+    char memory[32], stored[32], seconds[32], building[32], probing[32], scratch_room[32];
     char made[64] = "", built[64] = "", judged[64] = "", kept[64] = "", rate[64] = "";
     TRY(forecast_check_disk(&f, o->output, state->scratch, o->scratch, error));
     if (state->t->quiet || (o->from_store && state->probes == 0)) goto done;
@@ -65,10 +65,10 @@ lam_status stage_forecast(precompute_state *state, lam_error *error) {
     forecast_format_bytes(forecast_scratch_bytes(&f), scratch_room);
     clock_format_seconds(forecast_wall_seconds(times.form_factors, rates), seconds);
     clock_format_seconds(forecast_wall_seconds(times.operate, rates), building);
-    clock_format_seconds(forecast_wall_seconds(times.judge + times.solves, rates), judging);
+    clock_format_seconds(forecast_wall_seconds(times.judge + times.solves, rates), probing);
     if (!o->from_store) snprintf(made, sizeof made, " form factors %s,", seconds);
     if (times.operate > 0) snprintf(built, sizeof built, " the operator %s,", building);
-    if (state->probes > 0) snprintf(judged, sizeof judged, " the judge %s,", judging);
+    if (state->probes > 0) snprintf(judged, sizeof judged, " the judge %s,", probing);
     if (state->scratch != NULL) snprintf(kept, sizeof kept, ", scratch up to %s", scratch_room);
     if (cast)
         snprintf(rate, sizeof rate, " at %.3g Mray/s of", 1e-6 * rates->processors / rates->ray_seconds);

@@ -268,7 +268,8 @@ lam_status stage_judge(precompute_state *state, lam_error *error) {
                  .probes_least = state->options->probes == OPTION_AUTO ? PROBES_LEAST : 0,
                  .progress = &state->progress,
                  .sampled = log_half,
-                 .context = state};
+                 .context = state,
+                 .kept = state_may_try_again(state) ? &state->trial.references : NULL};
     uint64_t purpose = SEED_JUDGE_FIRST, own;
     for (int h = 0; h < 2; h++) {
         /* Independent of the F that was factorized: kept form factors may have any seed. */

@@ -116,6 +116,26 @@ static bool turn(precompute_state *state, const trial_knobs *from, trial_knobs *
     return trial_turn(state->trial.asked, &errors, &limits, from, next) && fit(state, from, next);
 }
 
+/* True if --epsilon of this method is an error to keep. */
+static bool keeps_epsilon(const precompute_state *state) {
+    return state->trial.asked > 0 && state->probes > 0 &&
+           (method_find(state->built.method)->flags & METHOD_KEEPS_EPSILON) != 0;
+}
+
+bool state_may_try_again(const precompute_state *state) {
+    return keeps_epsilon(state) && state->trial.count + 1 < state->options->trials;
+}
+
+/* The form factors of the judge stay where those of the operator do, and all of its references where memory
+ * has room for them beside the next operator. */
+static void release_references(precompute_state *state, const trial_knobs *next, bool same) {
+    judge_references **r = &state->trial.references;
+    if (!same) judge_references_free_samples(*r);
+    if (bytes_of(state, next) + judge_references_bytes(*r) <= state->memory) return;
+    judge_references_free(*r);
+    *r = NULL;
+}
+
 bool state_next_trial(precompute_state *state) {
     trial_course *all = &state->trial;
     const trial_knobs from = {.epsilon = all->epsilon, .recipe = state->recipe};
@@ -123,9 +143,7 @@ bool state_next_trial(precompute_state *state) {
     char knobs[TRIAL_TEXT] = "";
     const error_group *g = trial_group(&state->errors);
     const double error = g->total_indirect.mean;
-    if (all->asked == 0 || state->probes == 0 ||
-        !(method_find(state->built.method)->flags & METHOD_KEEPS_EPSILON))
-        return false;
+    if (!keeps_epsilon(state)) return false;
     all->count++;
     const bool better = all->best.op == NULL || error < error_of(&all->best.errors);
     const bool again = error > all->asked && all->count < state->options->trials && turn(state, &from, &next);
@@ -137,6 +155,7 @@ bool state_next_trial(precompute_state *state) {
         if (!better) state_take_back(state);
         return false;
     }
+    release_references(state, &next, !trial_recipes_differ(&from.recipe, &next.recipe));
     if (better) set_aside(state);
     lam_operator_close(state->op);
     state->op = NULL;
@@ -152,7 +171,9 @@ bool state_next_trial(precompute_state *state) {
 }
 
 void state_report_trials(precompute_state *state) {
-    const trial_course *all = &state->trial;
+    trial_course *all = &state->trial;
+    judge_references_free(all->references);
+    all->references = NULL;
     if (all->count == 0) return;
     report_number(&state->built, "epsilon", all->asked);
     report_number(&state->built, "epsilon_stated", error_of(&state->errors));
