@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
 
 /* The reflectance of faces without a diffuse colour, or with a texture's, and the largest that a file's
  * colour gives: light between two white walls must die out. */
@@ -212,12 +213,15 @@ static void warn_of_lost_precision(imported_faces *s, const char *path, const me
 
 static lam_status check_options(const import_options *options, lam_error *error) {
     lam_status status = LAM_OK;
+    struct stat about;
     if (!(options->unit > 0) || !isfinite(options->unit))
         FAIL(error, LAM_ERR_ARGUMENT, "unit = %g metres, must be positive", options->unit);
     if (options->up != 0 && options->up != 'x' && options->up != 'y' && options->up != 'z')
         FAIL(error, LAM_ERR_ARGUMENT, "up = '%c', must be x, y or z", options->up);
     if (isnan(options->reflectance) || (options->reflectance >= 0 && (float)options->reflectance >= 1))
         FAIL(error, LAM_ERR_ARGUMENT, "reflectance = %g, must be below 1", options->reflectance);
+    if (options->assets != NULL && (stat(options->assets, &about) != 0 || !S_ISDIR(about.st_mode)))
+        FAIL(error, LAM_ERR_ARGUMENT, "assets = '%s', must be a folder that can be read", options->assets);
 done:
     return status;
 }

@@ -119,6 +119,11 @@ START_TEST(files_outside_the_folder_need_assets) {
         ck_assert_float_eq(m.reflectance[0], .25f);
         mesh_free(&m);
     }
+    import_options nowhere = import_plain();
+    lam_error error = {0};
+    nowhere.assets = path;
+    ck_assert_int_eq(scene_import(path, &nowhere, &m, NULL, &error), LAM_ERR_ARGUMENT);
+    ck_assert_msg(strstr(error.message, "must be a folder") != NULL, "%s", error.message);
     /* A file that does not lie beside the scene is looked for among the assets. */
     file_write(inner, "scene.obj", "mtllib grey.mtl\n" SQUARE "usemtl a\nf 1 2 3 4\n", path);
     import_beside(path, NULL, "'grey.mtl' is missing", &m);
