@@ -32,6 +32,35 @@ mesh import_good(const char *path, import_report *report) {
     return m;
 }
 
+lam_status obj_import(const char *folder, const char *text, mesh *m, import_report *report,
+                      lam_error *error) {
+    char path[256];
+    const import_options options = import_plain();
+    file_write(folder, "scene.obj", text, path);
+    return scene_import(path, &options, m, report, error);
+}
+
+mesh obj_good(const char *folder, const char *text, import_report *report) {
+    mesh m = {0};
+    lam_error error = {0};
+    ck_assert_msg(obj_import(folder, text, &m, report, &error) == LAM_OK, "%s", error.message);
+    return m;
+}
+
+void obj_bad(const char *folder, const char *text, const char *says) {
+    mesh m = {0};
+    lam_error error = {0};
+    ck_assert_int_eq(obj_import(folder, text, &m, NULL, &error), LAM_ERR_FORMAT);
+    ck_assert_msg(strstr(error.message, folder) != NULL && strstr(error.message, says) != NULL, "%s",
+                  error.message);
+    ck_assert_ptr_null(m.vertices);
+}
+
+void mtl_write(const char *folder, const char *text) {
+    char path[256];
+    file_write(folder, "scene.mtl", text, path);
+}
+
 double total_area(const mesh *m) {
     double sum = 0;
     for (size_t i = 0; i < m->n; i++) sum += m->area[i];

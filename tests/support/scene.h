@@ -24,6 +24,14 @@ import_options import_plain(void);
 /* Imports with plain options; the test fails when that does. */
 mesh import_good(const char *path, import_report *report);
 
+/* Imports a text as scene.obj of the folder, with plain options; on LAM_OK m is the caller's. obj_good: the
+ * test fails unless that succeeds. obj_bad: it fails unless the text is refused by a message that names the
+ * folder and has `says` in it. mtl_write: the text becomes scene.mtl. */
+lam_status obj_import(const char *folder, const char *text, mesh *m, import_report *report, lam_error *error);
+mesh obj_good(const char *folder, const char *text, import_report *report);
+void obj_bad(const char *folder, const char *text, const char *says);
+void mtl_write(const char *folder, const char *text);
+
 double total_area(const mesh *m);
 
 /* A scene of `lambert generate`, imported with plain options. */

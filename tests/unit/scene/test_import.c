@@ -14,50 +14,21 @@ static void teardown(void) {
     folder_remove(folder);
 }
 
-/* Imports a text as scene.obj; on LAM_OK m is the caller's. */
-static lam_status import_text(const char *text, mesh *m, import_report *report, lam_error *error) {
-    char path[256];
-    const import_options options = import_plain();
-    file_write(folder, "scene.obj", text, path);
-    return scene_import(path, &options, m, report, error);
-}
-
-static mesh good_text(const char *text, import_report *report) {
-    mesh m = {0};
-    lam_error error = {0};
-    ck_assert_msg(import_text(text, &m, report, &error) == LAM_OK, "%s", error.message);
-    return m;
-}
-
-/* Checks that the text is refused with a message that names the file and contains this text. */
-static void bad_text(const char *text, const char *says) {
-    mesh m = {0};
-    lam_error error = {0};
-    ck_assert_int_eq(import_text(text, &m, NULL, &error), LAM_ERR_FORMAT);
-    ck_assert_msg(strstr(error.message, folder) != NULL && strstr(error.message, says) != NULL, "%s",
-                  error.message);
-    ck_assert_ptr_null(m.vertices);
-}
-
-static void write_mtl(const char *text) {
-    char path[256];
-    file_write(folder, "scene.mtl", text, path);
-}
-
 #define SQUARE "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
 START_TEST(groups_follow_objects_then_materials) {
     import_report report;
-    write_mtl("newmtl red\nKd .6 .1 .1\nnewmtl grey paint\nKd .5 .5 .5\n");
+    mtl_write(folder, "newmtl red\nKd .6 .1 .1\nnewmtl grey paint\nKd .5 .5 .5\n");
     mesh m =
-        good_text("mtllib scene.mtl\n" SQUARE "f 1 2 3\n" /* neither object nor material: the file's stem */
-                  "usemtl red\nf 1 2 4\n"                 /* no object: the material */
-                  "g roof  tiles\nf 1 3 4\n"              /* a group, as written */
-                  "o house\nf 2 3 4\n" /* an object of two materials, whatever its groups */
-                  "g wall\nusemtl grey paint\nf 1 2 3 4\n"
-                  "o roof  tiles\nusemtl red\nf 1 2 3\n" /* the same name again */
-                  "o mixed.thing\nf 4 3 2 1\n",
-                  &report);
+        obj_good(folder,
+                 "mtllib scene.mtl\n" SQUARE "f 1 2 3\n" /* neither object nor material: the file's stem */
+                 "usemtl red\nf 1 2 4\n"                 /* no object: the material */
+                 "g roof  tiles\nf 1 3 4\n"              /* a group, as written */
+                 "o house\nf 2 3 4\n"                    /* an object of two materials, whatever its groups */
+                 "g wall\nusemtl grey paint\nf 1 2 3 4\n"
+                 "o roof  tiles\nusemtl red\nf 1 2 3\n" /* the same name again */
+                 "o mixed.thing\nf 4 3 2 1\n",
+                 &report);
     const struct {
         const char *name;
         size_t n;
@@ -126,9 +97,10 @@ END_TEST
 
 START_TEST(diffuse_of_one_or_more_is_clamped_with_a_warning) {
     import_report report;
-    write_mtl("newmtl snow\nKd 1 1 1\nnewmtl too bright\nKd .2 1.5 .1\nKe 3 2 1\nnewmtl unused\nKd 9 9 9\n");
-    mesh m =
-        good_text("mtllib scene.mtl\n" SQUARE "usemtl snow\nf 1 2 3\nusemtl too bright\nf 1 3 4\n", &report);
+    mtl_write(folder,
+              "newmtl snow\nKd 1 1 1\nnewmtl too bright\nKd .2 1.5 .1\nKe 3 2 1\nnewmtl unused\nKd 9 9 9\n");
+    mesh m = obj_good(
+        folder, "mtllib scene.mtl\n" SQUARE "usemtl snow\nf 1 2 3\nusemtl too bright\nf 1 3 4\n", &report);
     ck_assert_uint_eq(report.clamped, 2);
     ck_assert_ptr_nonnull(strstr(report.warnings, "material 'snow'"));
     ck_assert_ptr_nonnull(strstr(report.warnings, "material 'too bright'"));
@@ -147,9 +119,11 @@ END_TEST
 /* A value of 1 is not darker than one that stays. */
 START_TEST(brighter_colours_never_become_darker) {
     import_report report;
-    write_mtl("newmtl a\nKd .9999 .9999 .9999\nnewmtl b\nKd .99995 .99995 .99995\nnewmtl c\nKd 1 1 1\n");
-    mesh m = good_text(
-        "mtllib scene.mtl\n" SQUARE "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\nusemtl c\nf 1 2 4\n", &report);
+    mtl_write(folder,
+              "newmtl a\nKd .9999 .9999 .9999\nnewmtl b\nKd .99995 .99995 .99995\nnewmtl c\nKd 1 1 1\n");
+    mesh m = obj_good(folder,
+                      "mtllib scene.mtl\n" SQUARE "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\nusemtl c\nf 1 2 4\n",
+                      &report);
     ck_assert_uint_eq(report.clamped, 2);
     for (size_t i = 0; i < 3; i++) ck_assert_float_eq(m.reflectance[i], .9999f);
     mesh_free(&m);
@@ -158,9 +132,11 @@ END_TEST
 
 START_TEST(textures_that_are_not_read_have_a_default_and_a_warning) {
     import_report report;
-    write_mtl(
+    mtl_write(
+        folder,
         "newmtl carpet\nKd 1 1 1\nmap_Kd carpet.png\nnewmtl lamp\nKd .2 .2 .2\nKe 3 3 3\nmap_Ke lamp.png\n");
-    mesh m = good_text("mtllib scene.mtl\n" SQUARE "usemtl carpet\nf 1 2 3\nusemtl lamp\nf 1 3 4\n", &report);
+    mesh m = obj_good(folder, "mtllib scene.mtl\n" SQUARE "usemtl carpet\nf 1 2 3\nusemtl lamp\nf 1 3 4\n",
+                      &report);
     ck_assert_ptr_nonnull(
         strstr(report.warnings, "texture of material 'carpet' is not read; its reflectance is set"));
     ck_assert_ptr_nonnull(strstr(report.warnings, "scene.mtl:7: the texture of material 'lamp' is ignored"));
@@ -174,10 +150,11 @@ END_TEST
 
 START_TEST(missing_colours_have_a_default_and_a_warning) {
     import_report report;
-    write_mtl("newmtl bare\nKs 1 1 1\nnewmtl grey\nKd .25 .25 .25\n");
-    mesh m = good_text("mtllib scene.mtl\n" SQUARE "f 1 2 3\nf 1 3 4\nusemtl bare\nf 1 2 4\n"
-                       "usemtl unheard\nf 2 3 4\nusemtl grey\nf 1 2 3 4\n",
-                       &report);
+    mtl_write(folder, "newmtl bare\nKs 1 1 1\nnewmtl grey\nKd .25 .25 .25\n");
+    mesh m = obj_good(folder,
+                      "mtllib scene.mtl\n" SQUARE "f 1 2 3\nf 1 3 4\nusemtl bare\nf 1 2 4\n"
+                      "usemtl unheard\nf 2 3 4\nusemtl grey\nf 1 2 3 4\n",
+                      &report);
     ck_assert_ptr_nonnull(strstr(report.warnings, "2 faces have no material"));
     ck_assert_ptr_nonnull(strstr(report.warnings, "'bare' has no diffuse colour"));
     ck_assert_ptr_nonnull(strstr(report.warnings, "'unheard' is not defined"));
@@ -189,16 +166,16 @@ END_TEST
 
 START_TEST(bad_colours_are_errors) {
     const char *const scene = "mtllib scene.mtl\n" SQUARE "usemtl a b\nf 1 2 3\n";
-    write_mtl("newmtl a b\nKd .5 -.1 .5\n");
-    bad_text(scene, "material 'a b': diffuse value -0.1");
-    write_mtl("newmtl a b\nKd .5 nan .5\n");
-    bad_text(scene, "material 'a b': diffuse value nan");
-    write_mtl("newmtl a b\nKd .5 .5 .5\nKe 0 1e999 0\n");
-    bad_text(scene, "material 'a b': emission inf");
-    write_mtl("newmtl a b\nKd .5 .5 .5\nKe 0 0 -1\n");
-    bad_text(scene, "material 'a b': emission -1");
-    write_mtl("\nnewmtl a b\nKd spectral x.rfl\n");
-    bad_text(scene, "scene.mtl:3: 'spectral x.rfl' is not a colour");
+    mtl_write(folder, "newmtl a b\nKd .5 -.1 .5\n");
+    obj_bad(folder, scene, "material 'a b': diffuse value -0.1");
+    mtl_write(folder, "newmtl a b\nKd .5 nan .5\n");
+    obj_bad(folder, scene, "material 'a b': diffuse value nan");
+    mtl_write(folder, "newmtl a b\nKd .5 .5 .5\nKe 0 1e999 0\n");
+    obj_bad(folder, scene, "material 'a b': emission inf");
+    mtl_write(folder, "newmtl a b\nKd .5 .5 .5\nKe 0 0 -1\n");
+    obj_bad(folder, scene, "material 'a b': emission -1");
+    mtl_write(folder, "\nnewmtl a b\nKd spectral x.rfl\n");
+    obj_bad(folder, scene, "scene.mtl:3: 'spectral x.rfl' is not a colour");
 }
 END_TEST
 
@@ -208,7 +185,7 @@ START_TEST(reflectance_option_overrides_but_keeps_emission) {
     lam_error error = {0};
     mesh m = {0};
     import_options options = {.unit = 1, .reflectance = .3};
-    write_mtl("newmtl lamp\nKd 2 .1 .1\nKe 3 2 1\n");
+    mtl_write(folder, "newmtl lamp\nKd 2 .1 .1\nKe 3 2 1\n");
     file_write(folder, "scene.obj", "mtllib scene.mtl\n" SQUARE "f 1 2 3\nusemtl lamp\nf 1 3 4\n", path);
     ck_assert_msg(scene_import(path, &options, &m, &report, &error) == LAM_OK, "%s", error.message);
     ck_assert_str_eq(report.warnings, "");
@@ -223,16 +200,17 @@ END_TEST
 
 START_TEST(missing_material_files_are_named_with_their_line) {
     char path[256];
-    bad_text(SQUARE "mtllib nowhere.mtl\nf 1 2 3\n",
-             "scene.obj:5: the material file 'nowhere.mtl' is missing");
-    write_mtl("newmtl a\nKd .1 .1 .1\n");
-    bad_text("mtllib scene.mtl nowhere.mtl\n" SQUARE "f 1 2 3\n",
-             "scene.obj:1: the material file 'nowhere.mtl'");
+    obj_bad(folder, SQUARE "mtllib nowhere.mtl\nf 1 2 3\n",
+            "scene.obj:5: the material file 'nowhere.mtl' is missing");
+    mtl_write(folder, "newmtl a\nKd .1 .1 .1\n");
+    obj_bad(folder, "mtllib scene.mtl nowhere.mtl\n" SQUARE "f 1 2 3\n",
+            "scene.obj:1: the material file 'nowhere.mtl'");
     file_write(folder, "with a blank.mtl", "newmtl b\nKd .2 .2 .2\n", path);
     import_report report;
-    mesh m = good_text("mtllib with a blank.mtl\nmtllib scene.mtl with\\ a\\ blank.mtl\n" SQUARE
-                       "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n",
-                       &report);
+    mesh m = obj_good(folder,
+                      "mtllib with a blank.mtl\nmtllib scene.mtl with\\ a\\ blank.mtl\n" SQUARE
+                      "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n",
+                      &report);
     ck_assert_float_eq(m.reflectance[0], .1f);
     ck_assert_float_eq(m.reflectance[1], .2f);
     mesh_free(&m);
@@ -241,15 +219,16 @@ END_TEST
 
 START_TEST(planar_convex_quads_stay_and_others_become_triangles) {
     import_report report;
-    mesh m = good_text(SQUARE "v 0 1 .5\nv .5 .5 0\nv .5 0 0\n"
-                              "f 1 2 3 4\n"   /* a quad */
-                              "f 1 2 3 5\n"   /* not planar: two triangles */
-                              "f 1 2 3 6\n"   /* a straight corner at 6: one triangle */
-                              "f 1 7 2 3 4\n" /* a straight corner at 7: a quad again */
-                              "f 1 2 2 3\n"   /* a corner twice: a triangle */
-                              "f 1 3 4 4 4\n" /* and again */
-                              "f 1 2 1 2\nf 1 7 2\nf 3 3 3\nf 1 2\np 1\nl 1 2 3\n",
-                       &report);
+    mesh m = obj_good(folder,
+                      SQUARE "v 0 1 .5\nv .5 .5 0\nv .5 0 0\n"
+                             "f 1 2 3 4\n"   /* a quad */
+                             "f 1 2 3 5\n"   /* not planar: two triangles */
+                             "f 1 2 3 6\n"   /* a straight corner at 6: one triangle */
+                             "f 1 7 2 3 4\n" /* a straight corner at 7: a quad again */
+                             "f 1 2 2 3\n"   /* a corner twice: a triangle */
+                             "f 1 3 4 4 4\n" /* and again */
+                             "f 1 2 1 2\nf 1 7 2\nf 3 3 3\nf 1 2\np 1\nl 1 2 3\n",
+                      &report);
     ck_assert_uint_eq(m.n, 7);
     size_t quads = 0;
     for (size_t i = 0; i < m.n; i++) quads += m.elements[i][3] != MESH_NO_VERTEX;
@@ -316,7 +295,7 @@ START_TEST(concave_polygons_keep_area_and_side) {
                 used += (size_t)snprintf(text + used, sizeof text - used, " %zu", i + 1);
             snprintf(text + used, sizeof text - used, "\n");
             import_report report;
-            mesh m = good_text(text, &report);
+            mesh m = obj_good(folder, text, &report);
             /* Coordinates round at 447587 * 2^-53 = 5e-11. Pieces of one plane whose normals agree do not
              * overlap when their areas sum up to the polygon's. */
             ck_assert_double_eq_tol(total_area(&m), shapes[s].area, 1e-8);
@@ -378,19 +357,19 @@ START_TEST(single_precision_far_from_the_origin_is_told) {
 END_TEST
 
 START_TEST(bad_geometry_is_refused_by_line) {
-    bad_text("", "scene is empty");
-    bad_text("f 1 2 3\n", "scene.obj:1: face refers to vertex 1, there are 0");
-    bad_text(SQUARE "f 1 2 9\n", "scene.obj:5: face refers to vertex 9, there are 4");
-    bad_text(SQUARE "f 1 2 99999999999999999999\n", "scene.obj:5: vertex index 99999999999999999999");
-    bad_text(SQUARE "f 1 2 4294967296\n", "scene.obj:5: vertex index 4294967296");
-    bad_text(SQUARE "f 1 two 3\n", "scene.obj:5: 'two 3' is not a vertex");
-    bad_text(SQUARE "f 1 2.5 3\n", "scene.obj:5");
-    bad_text(SQUARE "f 0 1 2\n", "scene.obj:5: vertex index 0");
-    bad_text("v 0 0\n", "scene.obj:1: a vertex needs three numbers");
-    bad_text("v 0 0 0\nv 1 inf 0\nv 0 1 0\nf 1 2 3\n", "scene.obj:2: vertex coordinate inf");
-    bad_text("v 0 0 0\nv 1 1e999 0\nv 0 1 0\nf 1 2 3\n", "scene.obj:2: vertex coordinate inf");
-    bad_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "none of its 1 faces has an area");
-    bad_text("v 0 0 0\nv 1 0 0\nv .5 1e-15 0\nf 1 2 3\n", "none of its 1 faces has an area");
+    obj_bad(folder, "", "scene is empty");
+    obj_bad(folder, "f 1 2 3\n", "scene.obj:1: face refers to vertex 1, there are 0");
+    obj_bad(folder, SQUARE "f 1 2 9\n", "scene.obj:5: face refers to vertex 9, there are 4");
+    obj_bad(folder, SQUARE "f 1 2 99999999999999999999\n", "scene.obj:5: vertex index 99999999999999999999");
+    obj_bad(folder, SQUARE "f 1 2 4294967296\n", "scene.obj:5: vertex index 4294967296");
+    obj_bad(folder, SQUARE "f 1 two 3\n", "scene.obj:5: 'two 3' is not a vertex");
+    obj_bad(folder, SQUARE "f 1 2.5 3\n", "scene.obj:5");
+    obj_bad(folder, SQUARE "f 0 1 2\n", "scene.obj:5: vertex index 0");
+    obj_bad(folder, "v 0 0\n", "scene.obj:1: a vertex needs three numbers");
+    obj_bad(folder, "v 0 0 0\nv 1 inf 0\nv 0 1 0\nf 1 2 3\n", "scene.obj:2: vertex coordinate inf");
+    obj_bad(folder, "v 0 0 0\nv 1 1e999 0\nv 0 1 0\nf 1 2 3\n", "scene.obj:2: vertex coordinate inf");
+    obj_bad(folder, "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "none of its 1 faces has an area");
+    obj_bad(folder, "v 0 0 0\nv 1 0 0\nv .5 1e-15 0\nf 1 2 3\n", "none of its 1 faces has an area");
 }
 END_TEST
 
@@ -422,8 +401,8 @@ START_TEST(warnings_are_cut_with_a_count) {
             (size_t)snprintf(obj + obj_used, sizeof obj - obj_used, "usemtl bright%d\nf 1 2 3 4\n", i);
     }
     import_report report;
-    write_mtl(mtl);
-    mesh m = good_text(obj, &report);
+    mtl_write(folder, mtl);
+    mesh m = obj_good(folder, obj, &report);
     ck_assert_uint_eq(report.clamped, 200);
     ck_assert_uint_eq(m.n_groups, 200);
     unsigned lines = 0, more = 0;

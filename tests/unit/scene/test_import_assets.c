@@ -18,61 +18,32 @@ static void teardown(void) {
     folder_remove(folder);
 }
 
-/* Imports a text as scene.obj; on LAM_OK m is the caller's. */
-static lam_status import_text(const char *text, mesh *m, import_report *report, lam_error *error) {
-    char path[256];
-    const import_options options = import_plain();
-    file_write(folder, "scene.obj", text, path);
-    return scene_import(path, &options, m, report, error);
-}
-
-static mesh good_text(const char *text, import_report *report) {
-    mesh m = {0};
-    lam_error error = {0};
-    ck_assert_msg(import_text(text, &m, report, &error) == LAM_OK, "%s", error.message);
-    return m;
-}
-
-/* Checks that the text is refused with a message that names the file and contains this text. */
-static void bad_text(const char *text, const char *says) {
-    mesh m = {0};
-    lam_error error = {0};
-    ck_assert_int_eq(import_text(text, &m, NULL, &error), LAM_ERR_FORMAT);
-    ck_assert_msg(strstr(error.message, folder) != NULL && strstr(error.message, says) != NULL, "%s",
-                  error.message);
-    ck_assert_ptr_null(m.vertices);
-}
-
-static void write_mtl(const char *text) {
-    char path[256];
-    file_write(folder, "scene.mtl", text, path);
-}
-
 #define SQUARE "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
 START_TEST(byte_order_marks_are_passed_over) {
     char path[256];
     import_report report;
-    mesh m = good_text("\xEF\xBB\xBF" SQUARE "g wall\nf 1 2 3 4\n", &report);
+    mesh m = obj_good(folder, "\xEF\xBB\xBF" SQUARE "g wall\nf 1 2 3 4\n", &report);
     ck_assert_uint_eq(m.n_vertices, 4);
     mesh_free(&m);
     file_write(folder, "scene.mtl", "\xEF\xBB\xBFnewmtl a\nKd .25 .25 .25\n", path);
-    m = good_text("mtllib scene.mtl\n" SQUARE "usemtl a\nf 1 2 3 4\n", &report);
+    m = obj_good(folder, "mtllib scene.mtl\n" SQUARE "usemtl a\nf 1 2 3 4\n", &report);
     ck_assert_float_eq(m.reflectance[0], .25f);
     mesh_free(&m);
-    bad_text("\xFF\xFEv", "UTF-16; save it as UTF-8");
+    obj_bad(folder, "\xFF\xFEv", "UTF-16; save it as UTF-8");
 }
 END_TEST
 
 /* Names of another encoding could not be told in JSON. */
 START_TEST(names_become_utf8) {
     import_report report;
-    write_mtl("newmtl wei\xDF\nKd .75 .75 .75\nnewmtl \xE2\x82\xAC\nKd .25 .25 .25\n");
-    mesh m = good_text("mtllib scene.mtl\n" SQUARE "g K\xFC"
-                       "che\nusemtl wei\xDF\nf 1 2 3\nusemtl \xE2\x82\xAC\n"
-                       "f 1 3 4\ng K\xFC"
-                       "che\nf 2 3 4\n",
-                       &report);
+    mtl_write(folder, "newmtl wei\xDF\nKd .75 .75 .75\nnewmtl \xE2\x82\xAC\nKd .25 .25 .25\n");
+    mesh m = obj_good(folder,
+                      "mtllib scene.mtl\n" SQUARE "g K\xFC"
+                      "che\nusemtl wei\xDF\nf 1 2 3\nusemtl \xE2\x82\xAC\n"
+                      "f 1 3 4\ng K\xFC"
+                      "che\nf 2 3 4\n",
+                      &report);
     ck_assert_uint_eq(m.n_groups, 2);
     ck_assert_str_eq(m.group_names[m.group[0]], "K\xC3\xBC"
                                                 "che.wei\xC3\x9F");
