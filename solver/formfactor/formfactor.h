@@ -8,6 +8,7 @@
 #include "solver/formfactor/sky_bounce.h"
 #include "solver/linalg/csr.h"
 #include "solver/operator/blocks/block_factors.h"
+#include "solver/operator/blocks/importance.h"
 #include "solver/scene/mesh.h"
 
 /* The number of pairs of elements that each step of pairs.h decided. */
@@ -74,6 +75,7 @@ typedef struct form_factor_options {
     scratch *scratch;         /* keeps rows as they are found; NULL: in memory only */
     const char *scratch_name; /* of the file there, one for each sample */
     const large_place *large; /* holds the result of rays or hemicubes; NULL: in memory */
+    importance *importance;   /* of blocks alone, which find `of` if it is NULL; NULL: all is read */
     const char *sky;          /* a tiling: rays that leave are binned by its tiles; NULL: none */
     double ground_albedo;
     sky_bounce *bounce; /* set by form_factors_make: the bins of the sky */

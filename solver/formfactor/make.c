@@ -3,6 +3,7 @@
 
 #include "solver/base/clock.h"
 #include "solver/formfactor/blocks/blocks.h"
+#include "solver/formfactor/blocks/blocks_importance.h"
 #include "solver/formfactor/blocks/unhidden.h"
 #include "solver/formfactor/leaving.h"
 #include "solver/formfactor/pairs/pairs.h"
@@ -388,6 +389,10 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
         f.closed = judged->closed;
         f.leaving_share = judged->leaving_share;
         f.absorbed_share = judged->absorbed_share;
+    }
+    if (options->importance != NULL) {
+        TRY(blocks_importance(m, block_scene_visibility(scene), tree, &how, options->importance, error));
+        how.importance = options->importance->of;
     }
     TRY(blocks_find_in(scene, &how, &made, &f.blocks, error));
     if (f.blocks.joined) {

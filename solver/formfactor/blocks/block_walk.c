@@ -3,9 +3,11 @@
 #include "solver/base/array_grow.h"
 #include "solver/base/random.h"
 #include "solver/formfactor/pairs/open_scene.h"
+#include "solver/operator/blocks/importance.h"
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Where one cluster lies on both sides of the plane of the other, a linear kernel is off by at most this
  * share of its bound (block_kernel_most). */
@@ -80,6 +82,15 @@ static double exchange_of_pair(const block_walk *w, uint32_t a, uint32_t b) {
     return pair_factor_exchange(&k->rules, &shapes[0], &shapes[1], k->exact);
 }
 
+/* Times the bounds of a block of two nodes: its error counts as often as the larger importance of both, y.
+ * Blocks whose number goes as the bound to the power -p, p about 1, have the least sum of (y e)^2 where
+ * errors e go as y^(-2 / (p + 2)). */
+static double bound_times(const block_finder *k, uint32_t a, uint32_t b) {
+    static const double power = -.7;
+    if (k->importance == NULL) return 1;
+    return importance_share * pow((double)fmaxf(k->importance[a], k->importance[b]), power);
+}
+
 /* The candidates that segments are tested against. */
 static const candidates *segments_among(const block_walk *w, const candidates *among) {
     static const candidates whole_scene = {.count = CANDIDATES_UNKNOWN};
@@ -100,9 +111,15 @@ static void count_segments(block_walk *w, const candidates *among, int rounds) {
 static bool is_smooth(const block_walk *w, uint32_t a, uint32_t b, double most, bool crosses) {
     const flat_clusters *f = &w->finder->flat;
     const double norm = most * sqrt(f->of[a].area * f->of[b].area);
+    const double open = w->finder->options->open * bound_times(w->finder, a, b);
     if (w->finder->joined && (crosses || block_kernel_roughness(f, a, b, 2) > rough_most)) return false;
-    if (crosses) return share_crossing * norm <= w->finder->options->open;
-    return block_kernel_roughness(f, a, b, 2) * norm <= w->finder->options->open;
+    if (crosses) return share_crossing * norm <= open;
+    return block_kernel_roughness(f, a, b, 2) * norm <= open;
+}
+
+/* The bound of the 2-norm of a block that is partly hidden. */
+static double shadow_most(const block_walk *w, uint32_t a, uint32_t b) {
+    return w->finder->options->shadow * bound_times(w->finder, a, b);
 }
 
 /* The bound of the 2-norm of a block. */
@@ -132,7 +149,7 @@ static lam_status add_pair(block_walk *w, uint32_t a, uint32_t b, double V) {
 static lam_status add_shaded_pair(block_walk *w, uint32_t a, uint32_t b, double most, bool crosses,
                                   const candidates *among) {
     double all = 0, seen = 0;
-    const int rounds = norm_of(w, a, b, most) > w->finder->options->shadow ? PAIR_ROUNDS : 1;
+    const int rounds = norm_of(w, a, b, most) > shadow_most(w, a, b) ? PAIR_ROUNDS : 1;
     for (size_t round = 0; round < (size_t)rounds; round++) {
         seen_segment segments[SEGMENT_LANES];
         double kernel[SEGMENT_LANES];
@@ -186,7 +203,7 @@ static bool are_elements(const block_finder *k, uint32_t a, uint32_t b) {
 /* True where a block of these nodes is not split, however many candidates stand between. */
 static bool ends_here(const block_walk *w, uint32_t a, uint32_t b, double most, bool crosses) {
     if (are_elements(w->finder, a, b)) return true;
-    return norm_of(w, a, b, most) <= w->finder->options->shadow && is_smooth(w, a, b, most, crosses);
+    return norm_of(w, a, b, most) <= shadow_most(w, a, b) && is_smooth(w, a, b, most, crosses);
 }
 
 static lam_status end_shaded(block_walk *w, uint32_t a, uint32_t b, double most, bool crosses,
@@ -204,7 +221,7 @@ static lam_status visit_shaded(block_walk *w, uint32_t a, uint32_t b, double mos
     const bool crosses = behind[0] || behind[1];
     if (among->amid[0] || among->amid[1]) return split(w, a, b, among, among->amid[0], !among->amid[0]);
     if (ends_here(w, a, b, most, crosses)) return end_shaded(w, a, b, most, crosses, among);
-    if (norm_of(w, a, b, most) > k->options->shadow) {
+    if (norm_of(w, a, b, most) > shadow_most(w, a, b)) {
         const double place = candidates_place(&k->pieces, f, a, b, among);
         return split(w, a, b, among, f->of[a].radius * (1 - place), f->of[b].radius * place);
     }
@@ -215,7 +232,7 @@ static lam_status visit_shaded(block_walk *w, uint32_t a, uint32_t b, double mos
 static double spread_allowed(const block_finder *k, uint32_t a, uint32_t b) {
     const double both = (double)block_finder_size(k, a) * (double)block_finder_size(k, b);
     const double share = sqrt(both) / (double)k->tree->n;
-    return k->spread * fmin(sqrt(share_of_block / share), spread_times_most);
+    return k->spread * fmin(sqrt(share_of_block / share), spread_times_most) * sqrt(bound_times(k, a, b));
 }
 
 /* Two nodes, one of which joins several planes: the kernel is even on both, or the larger one is split. */
@@ -363,25 +380,49 @@ done:
     return status;
 }
 
+/* Of clusters, then of elements by position. */
+static lam_status find_importance(block_finder *k, lam_error *error) {
+    lam_status status = LAM_OK;
+    const plane_tree *tree = k->tree;
+    const mesh *m = k->flat.m;
+    float *clusters = NULL;
+    TRY(importance_of_clusters(k->options->importance, m->area, tree, &clusters, error));
+    k->importance = memory_allocate(k->n_clusters + m->n, sizeof *k->importance, "blocks", error);
+    if (k->importance == NULL) TRY(LAM_ERR_MEMORY);
+    memcpy(k->importance, clusters, k->n_clusters * sizeof *clusters);
+    for (size_t p = 0; p < m->n; p++)
+        k->importance[k->n_clusters + p] = k->options->importance[tree->order[p]];
+done:
+    free(clusters);
+    return status;
+}
+
 lam_status block_finder_set(block_finder *k, const block_options *options, lam_error *error) {
+    lam_status status = LAM_OK;
     k->options = options;
     k->spread = spread_most * sqrt(options->open);
     k->exact = k->joined ? fmax(options->exact, share_of_spread * k->spread) : options->exact;
     k->shade.seed = options->seed;
+    free(k->importance);
+    k->importance = NULL;
+    if (options->importance != NULL) TRY(find_importance(k, error));
     if (k->joined && k->elements == NULL) {
         k->elements = memory_allocate(k->tree->n, sizeof *k->elements, "blocks", error);
-        if (k->elements == NULL) return LAM_ERR_MEMORY;
+        if (k->elements == NULL) TRY(LAM_ERR_MEMORY);
         joined_elements_set(&k->flat, k->elements);
     }
     k->kernel = (joined_kernel){&k->flat, k->elements, &k->rules, k->exact, options->seed};
-    return LAM_OK;
+done:
+    return status;
 }
 
 void block_finder_free(block_finder *k) {
     occluders_free(&k->pieces);
     flat_clusters_free(&k->flat);
     free(k->elements);
+    free(k->importance);
     k->elements = NULL;
+    k->importance = NULL;
 }
 
 lam_status block_finder_planes(const block_finder *k, uint32_t **out, size_t *count, lam_error *error) {

@@ -20,7 +20,8 @@ typedef struct block_finder {
     joined_kernel kernel;
     double
         spread; /* the share of itself that the kernel of such a block may vary by, if it is of middle size */
-    double exact; /* relative tolerance of single pairs, unoccluded */
+    double exact;      /* relative tolerance of single pairs, unoccluded */
+    float *importance; /* [n_clusters + n] of nodes, root mean square over their elements; NULL: all are 1 */
 } block_finder;
 
 /* All that no option changes; begins the nodes of blocks as well (block_factors_begin). out must stay where
