@@ -21,6 +21,7 @@ enum { RANDOM_LEAST = 4, NOISE_PROBES = 12 };
 typedef struct group_tally {
     size_t done, n_operator;
     figure_group own, total;
+    receiver_sums own_receivers, total_receivers;
 } group_tally;
 
 /* The largest ratios of steps so far, of each reference (reference_answers). */
@@ -216,6 +217,7 @@ static lam_status measure(const lam_operator *op, measured *m, size_t round, gro
             for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
                 const figure_probe one = probe_of(m, v, m->x, NULL, false);
                 figures_add(&one, &t[g].own);
+                if (input->read != NULL) receivers_add(&one, input->read, &t[g].own_receivers);
                 t[g].n_operator++;
             }
     }
@@ -233,11 +235,20 @@ static lam_status measure(const lam_operator *op, measured *m, size_t round, gro
         for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
             const figure_probe one = probe_of(m, v, m->x, noisy && v < n_noisy ? m->y : NULL, true);
             figures_add(&one, &t[g].total);
+            if (input->read != NULL) receivers_add(&one, input->read, &t[g].total_receivers);
         }
 done:
     free(all);
     free(others);
     return status;
+}
+
+double judge_total(const error_group *g) {
+    return g->receivers.known ? g->receivers.total_indirect : g->total_indirect.mean;
+}
+
+double judge_of_operator(const error_group *g) {
+    return g->receivers.known ? g->receivers.operator_indirect : g->operator_indirect.mean;
 }
 
 /* The probes of the next round; false where there are none. An LU takes all of them at once. */
@@ -275,6 +286,7 @@ static void finish_group(const judge_input *input, const group_tally *t, bool si
     g->probes = t->done;
     g->operator_probes = t->n_operator;
     if (t->done == 0) return;
+    if (input->read != NULL) g->receivers = receivers_of(&t->total_receivers, &t->own_receivers);
     g->operator_relative = figures_mean(&t->own.relative);
     g->operator_indirect = figures_mean(&t->own.indirect);
     if (input->independent.n == 0) return;

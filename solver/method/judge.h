@@ -13,6 +13,17 @@ typedef struct error_figures {
     double mean, std, max;
 } error_figures;
 
+/* Errors of the light of receivers, |B~ - B|_w / |B|_w with |x|_w^2 = sum over probes, channels and elements
+ * of A w x^2, w the weights of what is read: the errors of all probes together, as receivers see next to
+ * nothing of many a single element. */
+typedef struct receiver_figures {
+    bool known; /* false: all is read, or there is no such light */
+    double total_relative, total_indirect, operator_indirect;
+    double noise; /* error of the reference, likewise; above a third of total_indirect it is in the figures of
+                     total, which is_bound then calls upper bounds */
+    bool is_bound;
+} receiver_figures;
+
 typedef struct error_group {
     size_t probes;                                      /* 0: nothing measured, nothing stored */
     size_t operator_probes;                             /* of them, for the operator's own error */
@@ -25,7 +36,13 @@ typedef struct error_group {
     bool is_bound;
     double negative_share; /* power of negative radiosity over all, mean */
     double energy_balance; /* |emitted - absorbed - left| / emitted, mean */
+    receiver_figures receivers;
 } error_group;
+
+/* The indirect errors that were asked for: those of receivers where these are known, else the means over all
+ * elements. */
+double judge_total(const error_group *g);
+double judge_of_operator(const error_group *g);
 
 typedef struct error_report {
     error_group single, lights, random;
@@ -42,6 +59,7 @@ typedef struct judge_input {
     const build_problem *problem;
     const double *row_sums;     /* [n] of own */
     const float *emission;      /* [C][n], the scene's own */
+    const float *read;          /* [n], weights of what is read, by element; NULL: all is read */
     factor_product own;         /* the very F that the operator was built from */
     factor_product independent; /* an F that shares no sample with it; n = 0: no total error */
     factor_product other;       /* another one; n = 0: the noise of the reference is not measured */

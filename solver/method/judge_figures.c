@@ -5,6 +5,8 @@
 /* Indirect light below this share of all light counts as none: no ray found what the element sees, and the
  * rest is the remainder of the reference's iteration. */
 static const double dark = 1e-6;
+/* Noise below this share of a figure of receivers may be taken out of it. */
+static const double noise_most = 1. / 3;
 
 /* Of element i in channel c. */
 typedef struct number {
@@ -32,11 +34,13 @@ typedef struct squares {
     double b, bounced, off, noise, apart;
 } squares;
 
-static squares squares_of(const figure_probe *p) {
+/* read [n]: weights beside the area; NULL: 1. */
+static squares squares_of(const figure_probe *p, const float *read) {
     const size_t n = p->problem->n, C = p->problem->n_channels;
     squares s = {.b = 0};
     for (size_t k = 0; k < C * n; k++) {
-        const double a = p->problem->area[k % n], light = light_at(p, k);
+        const double weight = read != NULL ? (double)read[k % n] : 1;
+        const double a = weight * p->problem->area[k % n], light = light_at(p, k);
         const number one = number_at(p, k);
         s.b += a * one.b * one.b;
         s.bounced += a * one.bounced * one.bounced;
@@ -105,13 +109,41 @@ static void add_figure(const figure_probe *p, const squares *s, double d2, const
 }
 
 void figures_add(const figure_probe *p, figure_group *to) {
-    const squares s = squares_of(p);
+    const squares s = squares_of(p, NULL);
     noise_sums noise = {.off = {0}};
     if (s.noise > 0) find_noise(p, &noise);
     to->relative.tried++;
     to->indirect.tried++;
     if (s.b > 0) add_figure(p, &s, s.b, noise.off, noise.b, &to->relative);
     if (s.bounced > dark * dark * s.b) add_figure(p, &s, s.bounced, noise.off, noise.bounced, &to->indirect);
+}
+
+void receivers_add(const figure_probe *p, const float *read, receiver_sums *to) {
+    const squares s = squares_of(p, read);
+    to->b += s.b;
+    to->bounced += s.bounced;
+    to->off += s.off;
+    to->noise += s.noise;
+    if (p->y == NULL) return;
+    to->apart += s.apart;
+    to->apart_bounced += s.bounced;
+}
+
+receiver_figures receivers_of(const receiver_sums *total, const receiver_sums *own) {
+    receiver_figures f = {.known = false};
+    const receiver_sums *any = total->bounced > 0 ? total : own;
+    if (!(any->bounced > dark * dark * any->b)) return f;
+    f.known = true;
+    f.operator_indirect = own->bounced > 0 ? sqrt(own->off / own->bounced) : 0;
+    if (!(total->bounced > 0)) return f;
+    const double apart = total->apart_bounced > 0 ? total->apart / total->apart_bounced : 0;
+    double off = fmax(0, total->off - total->noise);
+    f.noise = sqrt(total->noise / total->bounced + apart);
+    f.is_bound = !(f.noise <= noise_most * sqrt(off / total->bounced));
+    if (f.is_bound) off = pow(sqrt(total->off) + f.noise * sqrt(total->bounced), 2);
+    f.total_indirect = sqrt(off / total->bounced);
+    f.total_relative = sqrt(off / total->b);
+    return f;
 }
 
 double figures_noise(const figure_tally *t, double repeated, bool bound) {

@@ -35,6 +35,18 @@ typedef struct figure_group {
     figure_tally relative, indirect; /* of the bright, of the lit probes */
 } figure_group;
 
+/* Sums over probes of the squares of receivers' light, of errors and of the noise in them. */
+typedef struct receiver_sums {
+    double b, bounced, off, noise;
+    double apart, apart_bounced; /* over the probes with y, of the coarser reference */
+} receiver_sums;
+
+/* Adds a probe by the weights read [n]. Cost: O(C n). */
+void receivers_add(const figure_probe *p, const float *read, receiver_sums *to);
+
+/* The total figures, and the operator's own. */
+receiver_figures receivers_of(const receiver_sums *total, const receiver_sums *own);
+
 /* Adds a probe. An element that nothing sees has no indirect light to be wrong about, and is not lit. Cost:
  * O(C n). */
 void figures_add(const figure_probe *p, figure_group *to);

@@ -17,6 +17,20 @@ done:
     return status;
 }
 
+static lam_status save_receivers(store *s, const char *name, const receiver_figures *f, bool has_total,
+                                 lam_error *error) {
+    lam_status status = LAM_OK;
+    if (!f->known) return LAM_OK;
+    TRY(store_set_number(s, name, "receivers_operator_indirect", f->operator_indirect, error));
+    if (!has_total) goto done;
+    TRY(store_set_number(s, name, "receivers_relative", f->total_relative, error));
+    TRY(store_set_number(s, name, "receivers_indirect", f->total_indirect, error));
+    TRY(store_set_number(s, name, "receivers_noise", f->noise, error));
+    TRY(store_set_integer(s, name, "receivers_is_bound", f->is_bound, error));
+done:
+    return status;
+}
+
 static lam_status save_group(store *s, const char *name, const error_group *g, bool has_total,
                              lam_error *error) {
     lam_status status = LAM_OK;
@@ -34,6 +48,7 @@ static lam_status save_group(store *s, const char *name, const error_group *g, b
     TRY(save_figures(s, name, "operator_indirect", &g->operator_indirect, error));
     TRY(store_set_number(s, name, "negative_share", g->negative_share, error));
     TRY(store_set_number(s, name, "energy_balance", g->energy_balance, error));
+    TRY(save_receivers(s, name, &g->receivers, has_total, error));
 done:
     return status;
 }

@@ -10,6 +10,7 @@
 #include "solver/linalg/row_source.h"
 #include "solver/method/report.h"
 #include "solver/operator/blocks/block_factors.h"
+#include "solver/operator/blocks/importance.h"
 #include "solver/operator/operator.h"
 
 /* The emitters that alone are going to shine: numbers of emitter k come k C at a time. */
@@ -39,6 +40,7 @@ typedef struct build_problem {
     const uint32_t *surface;        /* [n] below n: equal where elements lie on one surface */
     const element_corners *corners; /* of the tree of clusters; NULL: it does without */
     const emitter_source *emitters; /* NULL: none asked for */
+    const importance *importance;   /* of what is read, found; NULL: all is read */
 } build_problem;
 
 /* Methods at most, and bytes of the options of one. */
@@ -91,6 +93,7 @@ enum {
     METHOD_KEEPS_EPSILON =
         16,               /* its epsilon is an error of answers, which trials keep where it is measured */
     METHOD_SURFACES = 32, /* it needs surfaces beside centres and normals */
+    METHOD_READS = 64,    /* it uses the importance of what is read */
 };
 
 /* One method. own points to a struct of the method that its rows fill; a NULL function has no effect.

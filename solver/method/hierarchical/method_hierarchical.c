@@ -7,6 +7,7 @@
 #include "solver/method/hierarchical/wavelet_basis.h"
 #include "solver/method/hierarchical/wavelet_blocks.h"
 #include "solver/method/hierarchical/wavelet_entries.h"
+#include "solver/method/hierarchical/wavelet_importance.h"
 #include "solver/method/hierarchical/wavelet_inverse.h"
 #include "solver/method/hierarchical/wavelet_norm.h"
 #include "solver/method/hierarchical/wavelet_pass.h"
@@ -20,6 +21,7 @@
 
 typedef struct hierarchical_options {
     double epsilon;
+    const char *receivers, *importance; /* read by whoever makes the problem */
 } hierarchical_options;
 
 static const option_row rows[] = {
@@ -31,6 +33,18 @@ static const option_row rows[] = {
      .least = 0,
      .most = 1,
      .above = true},
+    {.name = "receivers",
+     .kind = OPTION_TEXT,
+     .offset = offsetof(hierarchical_options, receivers),
+     .argument = "GROUP,...",
+     .help = "The groups whose light is going to be read: errors are kept small there, and stated for it; "
+             "light elsewhere is only roughly right; --method auto then takes hierarchical"},
+    {.name = "importance",
+     .kind = OPTION_TEXT,
+     .offset = offsetof(hierarchical_options, importance),
+     .argument = "FILE",
+     .help = "The same with a weight for each group or element: a .json or .npy file like an emission, such "
+             "as {\"groups\": {\"desk\": 1, \"wall\": 0.2}}"},
     {0},
 };
 
@@ -245,6 +259,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
     const plane_tree *const tree = problem->blocks != NULL ? problem->blocks->tree : &made_tree;
     hierarchical_arrays arrays = {.K = memory_allocate(C, sizeof *arrays.K, "operator", error)};
     wavelet_inverse_report inverted = {.doublings = 0};
+    wavelet_importance important = {.times = NULL};
     csr S = {.n = 0};
     lam_operator *made = NULL;
     float *weight = NULL, *rho = memory_allocate(n, sizeof *rho, "operator", error);
@@ -266,6 +281,8 @@ static lam_status build(const build_problem *problem, const build_options *optio
                             error));
     TRY(wavelet_basis_make(tree, problem->area, problem->centre, &arrays.basis, error));
     TRY(wavelets_weights(&arrays.basis, &weight, error));
+    if (problem->importance != NULL)
+        TRY(wavelet_importance_make(problem->importance, problem->area, tree, weight, &important, error));
     TRY(hierarchical_steps(&arrays.basis, threshold, &arrays.step, error));
     for (size_t p = 0; p < n; p++) area[p] = problem->area[tree->order[p]];
     const expansion x = {.problem = problem,
@@ -291,6 +308,8 @@ static lam_status build(const build_problem *problem, const build_options *optio
                                                .threshold = (float)threshold,
                                                .entry = share->entry,
                                                .tile = share->tile,
+                                               .tile_times = important.times,
+                                               .tile_over = important.over,
                                                .inner = share->inner,
                                                .skipped = share->skipped,
                                                .n_threads = n_threads,
@@ -320,6 +339,7 @@ done:
     csr_free(&S);
     hierarchical_arrays_free(&arrays, C);
     plane_tree_free(&made_tree);
+    wavelet_importance_free(&important);
     free(weight);
     free(rho);
     free(area);
@@ -386,10 +406,17 @@ static const double transform_cost = 40;
 /* Nothing cheaper than building it tells how many coefficients there are. */
 static lam_status weigh(const decision *so_far, void *own, candidate *out, lam_error *error) {
     lam_status status = LAM_OK;
+    const hierarchical_options *o = own;
     const build_problem *p = so_far->problem;
     const double n = (double)p->n;
     operator_description about;
     out->object = "hierarchical";
+    if (o->receivers != NULL || o->importance != NULL) {
+        out->claim = CLAIM_INPUT;
+        snprintf(out->found, sizeof out->found, "no other method knows %s",
+                 o->receivers != NULL ? "--receivers" : "--importance");
+        return LAM_OK;
+    }
     if (so_far->asked != NULL) return LAM_OK;
     if (p->F == NULL) {
         out->open = true;
@@ -406,7 +433,7 @@ static lam_status weigh(const decision *so_far, void *own, candidate *out, lam_e
     operator_describe(out->op, &about);
     candidate_figure(out, "numbers", about.density * n);
     snprintf(out->found, sizeof out->found, "%.3g coefficients per element at epsilon %.3g",
-             about.density * n, ((const hierarchical_options *)own)->epsilon);
+             about.density * n, o->epsilon);
     if (so_far->options->memory == 0 || lam_operator_bytes(out->op) <= so_far->options->memory)
         out->cost = (CHOICE_SCATTERED * about.density * n + transform_cost) * n;
 done:
@@ -418,7 +445,8 @@ const build_method method_hierarchical = {
     .summary = "wavelets on a tree of clusters; most scenes",
     .kind = &operator_hierarchical,
     .rows = rows,
-    .flags = METHOD_GEOMETRY | METHOD_STREAMS | METHOD_BLOCKS | METHOD_FILTERS_NOISE | METHOD_KEEPS_EPSILON,
+    .flags = METHOD_GEOMETRY | METHOD_STREAMS | METHOD_BLOCKS | METHOD_FILTERS_NOISE | METHOD_KEEPS_EPSILON |
+             METHOD_READS,
     .forecast = forecast,
     .weigh = weigh,
     .block_accuracy = block_accuracy,

@@ -274,11 +274,26 @@ done:
     return status;
 }
 
+/* The tiles that are kept: number [n] of the node of a coefficient; node [n], that node, or NULL. */
+typedef struct kept_tiles {
+    const uint32_t *number, *node;
+    float entry, tile;
+    const float *times, *over;
+} kept_tiles;
+
+/* Times the thresholds: of entries of a node at coefficient j. */
+static float times_of(const kept_tiles *t, size_t node, size_t j) {
+    if (t->node == NULL) return 1;
+    const uint32_t other = t->node[j];
+    return t->times[node] * t->times[other] / fmaxf(t->over[node], t->over[other]);
+}
+
 /* Rows first to last - 1 of K, those of a node, lose their lower triangle, entries that are not above
  * `entry`, and tiles, all entries between two nodes, whose 2-norm is not above `tile`. They are sorted by
  * column. */
-static void keep_tiles(const uint32_t *node_of, float entry, float tile, size_t first, size_t last,
-                       term_rows *K, row_work *w) {
+static void keep_tiles(const kept_tiles *t, size_t node, size_t first, size_t last, term_rows *K,
+                       row_work *w) {
+    const uint32_t *const node_of = t->number;
     w->count = 0;
     for (size_t i = first; i < last; i++)
         for (size_t e = 0; e < K->length[i]; e++) {
@@ -288,10 +303,13 @@ static void keep_tiles(const uint32_t *node_of, float entry, float tile, size_t 
     for (size_t i = first; i < last; i++) {
         row_term *const row = K->row[i];
         uint32_t kept = 0;
-        for (size_t e = 0; e < K->length[i]; e++)
-            if (row[e].column >= i && fabsf(row[e].value) > entry &&
-                w->sums[node_of[row[e].column]] > tile * tile)
+        for (size_t e = 0; e < K->length[i]; e++) {
+            const size_t j = row[e].column;
+            if (j < i) continue;
+            const float times = times_of(t, node, j), tile = t->tile * times;
+            if (fabsf(row[e].value) > t->entry * times && w->sums[node_of[j]] > tile * tile)
                 row[kept++] = row[e];
+        }
         row_terms_by_column(kept, row, w->spare);
         K->length[i] = kept;
     }
@@ -311,9 +329,8 @@ static lam_status final_upper(const doubling *d, term_rows *K, csr *out, lam_err
     const wavelet_inverse_input *input = d->input;
     const wavelets *const basis = input->basis;
     const size_t n = K->n, n_threads = input->n_threads;
-    const float entry = input->entry * input->threshold, tile = input->tile * input->threshold,
-                *weight = d->weight;
-    uint32_t *node_of = memory_allocate(n, sizeof *node_of, "wavelets", error), numbered = 0;
+    const float *weight = d->weight;
+    uint32_t *node_of = memory_allocate(n, sizeof *node_of, "wavelets", error), numbered = 0, *nodes = NULL;
     csr made = {.n = n, .indptr = memory_allocate(n + 1, sizeof *made.indptr, "wavelets", error)};
     if (made.indptr == NULL || node_of == NULL) TRY(LAM_ERR_MEMORY);
     /* Planes of single elements have more nodes than coefficients: those without any have no number. */
@@ -321,10 +338,21 @@ static lam_status final_upper(const doubling *d, term_rows *K, csr *out, lam_err
         for (size_t i = basis->nodes[t].first; i < last_of(basis, t); i++) node_of[i] = numbered;
         numbered += last_of(basis, t) > basis->nodes[t].first;
     }
+    if (input->tile_over != NULL) {
+        nodes = memory_allocate(n, sizeof *nodes, "wavelets", error);
+        if (nodes == NULL) TRY(LAM_ERR_MEMORY);
+        for (size_t t = 0; t < basis->n_nodes; t++)
+            for (size_t i = basis->nodes[t].first; i < last_of(basis, t); i++) nodes[i] = (uint32_t)t;
+    }
+    const kept_tiles kept = {.number = node_of,
+                             .node = nodes,
+                             .entry = input->entry * input->threshold,
+                             .tile = input->tile * input->threshold,
+                             .times = input->tile_times,
+                             .over = input->tile_over};
 #pragma omp parallel for schedule(dynamic, 256) num_threads((int)n_threads)
     for (size_t t = 0; t < basis->n_nodes; t++)
-        keep_tiles(node_of, entry, tile, basis->nodes[t].first, last_of(basis, t), K,
-                   &d->works[omp_get_thread_num()]);
+        keep_tiles(&kept, t, basis->nodes[t].first, last_of(basis, t), K, &d->works[omp_get_thread_num()]);
     for (size_t i = 0; i < n; i++) made.indptr[i + 1] = made.indptr[i] + K->length[i];
     made.indices = memory_allocate((size_t)made.indptr[n], sizeof *made.indices, "wavelets", error);
     made.data = memory_allocate((size_t)made.indptr[n], sizeof *made.data, "wavelets", error);
@@ -340,6 +368,7 @@ static lam_status final_upper(const doubling *d, term_rows *K, csr *out, lam_err
     made = (csr){.n = 0};
 done:
     free(node_of);
+    free(nodes);
     csr_free(&made);
     return status;
 }
