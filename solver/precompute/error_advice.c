@@ -26,7 +26,7 @@ static size_t rays_for(size_t rays, double error, double most) {
 
 static void advise(const error_advice_input *input, const error_group *g, double most, char option[64]) {
     const recipe *r = &input->recipe;
-    const double error = g->total_indirect.mean, of_operator = g->operator_indirect.mean;
+    const double error = judge_total(g), of_operator = judge_of_operator(g);
     const bool compressed = of_operator * of_operator > compression_share * error * error;
     char memory[32];
     forecast_format_bytes(input->lacking, memory);
@@ -48,16 +48,15 @@ void error_advice(const error_advice_input *input, char text[ERROR_ADVICE_BYTES]
     const error_report *e = input->errors;
     const double most = input->asked > 0 ? input->asked : error_most;
     const bool lights =
-        e->lights.probes > 0 &&
-        (input->asked > 0 || !(e->lights.total_indirect.mean < e->random.total_indirect.mean));
+        e->lights.probes > 0 && (input->asked > 0 || !(judge_total(&e->lights) < judge_total(&e->random)));
     const error_group *g = lights ? &e->lights : &e->random;
     char option[64];
     text[0] = '\0';
-    if (!e->has_total || !(g->total_indirect.mean > most)) return;
+    if (!e->has_total || !(judge_total(g) > most)) return;
     advise(input, g, most, option);
     snprintf(text, ERROR_ADVICE_BYTES,
              "the indirect error of %s is stated as %.2g, above %g%s; %s%s would lower it",
-             lights ? "the scene's own lights" : "random emission", g->total_indirect.mean, most,
+             lights ? "the scene's own lights" : "random emission", judge_total(g), most,
              input->asked > 0 ? " of --epsilon" : "", input->from_store ? "the scene precomputed with " : "",
              option);
 }

@@ -109,11 +109,22 @@ done:
  * the distance of both solutions is sqrt(3) e, or more. */
 static const double share_of_distance = .57735026918962576451;
 
-/* Blocks of half the tolerance, found with other segments. */
+/* Blocks of half the tolerance, found with other segments. With receivers the tolerance is down to a fifth
+ * where there is little importance: errors of shadows go one way there, so that a reference which has half of
+ * them hides as much. */
 static lam_status make_blocks(const judging *j, judge_references *r, lam_error *error) {
+    lam_status status = LAM_OK;
     const plane_tree *tree = j->problem->blocks->tree;
-    const form_factor_options how = {.recipe = j->halves[0], .progress = j->progress, .stage = j->stages[0]};
-    return form_factors_make_blocks(j->m, j->order, tree, j->f, &how, &r->half[0], &r->finer, error);
+    importance judges = {.n = 0};
+    if (j->importance != NULL) TRY(importance_even_out(j->importance, &judges, error));
+    const form_factor_options how = {.recipe = j->halves[0],
+                                     .progress = j->progress,
+                                     .stage = j->stages[0],
+                                     .importance = judges.n > 0 ? &judges : NULL};
+    TRY(form_factors_make_blocks(j->m, j->order, tree, j->f, &how, &r->half[0], &r->finer, error));
+done:
+    importance_free(&judges);
+    return status;
 }
 
 /* True where both samples share the pairs that are projected: rows in a scratch folder are of one sample. */
@@ -175,6 +186,7 @@ static judge_input input_of(const judging *j, judge_references *r) {
     return (judge_input){.problem = j->problem,
                          .row_sums = j->f->row_sums,
                          .emission = j->m->emission,
+                         .read = j->importance != NULL ? j->importance->read : NULL,
                          .own = own,
                          .independent = blocks ? block_factors_product(&r->finer)
                                                : factor_product_of_rows(&r->half[0].F),

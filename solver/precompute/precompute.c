@@ -36,6 +36,7 @@ void state_free(precompute_state *state) {
     block_factors_free(&state->blocks);
     compressed_free(&state->compressed);
     emitter_list_free(&state->emitters);
+    importance_free(&state->importance);
     scratch_close(state->scratch, false);
     lam_operator_close(state->op);
     trial_made_free(&state->trial.best);

@@ -20,14 +20,15 @@ typedef struct precompute_options {
     uint64_t rays, resolution;          /* rays: OPTION_AUTO */
     const char *sky;                    /* a tiling, or NULL; from a store: that of the store */
     double ground_albedo;
-    const char *keep_form_factors; /* NULL: they are not kept; "": as they are; "compressed" */
-    const char *emitters;          /* FILE, group=NAME, sky; or NULL */
-    build_options build;           /* memory, seed and progress are set when the build begins */
-    uint64_t threads, memory;      /* memory: bytes; 0: 70 % of what is free */
-    const char *scratch;           /* a folder, or NULL */
-    uint64_t seed, probes;         /* probes: OPTION_AUTO */
-    uint64_t trials;               /* of an --epsilon that is kept, at most */
-    double time;                   /* seconds; 0: no limit */
+    const char *keep_form_factors;      /* NULL: they are not kept; "": as they are; "compressed" */
+    const char *emitters;               /* FILE, group=NAME, sky; or NULL */
+    const char *receivers, *importance; /* NAME,NAME; FILE; one of them, or both NULL */
+    build_options build;                /* memory, seed and progress are set when the build begins */
+    uint64_t threads, memory;           /* memory: bytes; 0: 70 % of what is free */
+    const char *scratch;                /* a folder, or NULL */
+    uint64_t seed, probes;              /* probes: OPTION_AUTO */
+    uint64_t trials;                    /* of an --epsilon that is kept, at most */
+    double time;                        /* seconds; 0: no limit */
     bool quiet, progress;
     const char *input;
     bool from_store;

@@ -140,8 +140,10 @@ static const option_row form_factor_rows[] = {
 };
 
 /* The help of these stands with the methods. */
-static const option_row emitter_rows[] = {
+static const option_row of_methods[] = {
     {.name = "emitters", .kind = OPTION_TEXT, .offset = FIELD(emitters), .argument = "FILE|group=NAME|sky"},
+    {.name = "receivers", .kind = OPTION_TEXT, .offset = FIELD(receivers), .argument = "GROUP,..."},
+    {.name = "importance", .kind = OPTION_TEXT, .offset = FIELD(importance), .argument = "FILE"},
     {0},
 };
 
@@ -232,7 +234,7 @@ void precompute_tables_make(precompute_options *o, bool to_classify, precompute_
         add(out, "operator", out->method_rows, o);
     }
     add(out, to_classify ? "operator" : "", build_rows, &o->build);
-    add(out, "", emitter_rows, o);
+    add(out, "", of_methods, o);
     for (size_t k = 0; method_at(k) != NULL; k++)
         if (method_at(k)->rows != NULL) add(out, method_at(k)->name, method_at(k)->rows, &o->build.of[k]);
     if (!to_classify) add(out, "resources", resource_rows, o);

@@ -194,13 +194,14 @@ done:
 
 lam_status stage_blocks(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
+    TRY(make_tree(state, error));
     const form_factor_options how = {.recipe = state->recipe,
                                      .progress = &state->progress,
                                      .stage = "form factors",
                                      .ready = state->ready,
+                                     .importance = state->importance.n > 0 ? &state->importance : NULL,
                                      .sky = state->options->sky,
                                      .ground_albedo = state->options->ground_albedo};
-    TRY(make_tree(state, error));
     TRY(form_factors_make_blocks(&state->m, state->order, &state->tree, NULL, &how, &state->f, &state->blocks,
                                  error));
 done:

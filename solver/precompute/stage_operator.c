@@ -41,6 +41,7 @@ lam_status state_problem(precompute_state *state, unsigned needs, build_problem 
                                .blocks = state->blocks.n > 0 ? &state->blocks : NULL,
                                .stream = state->rays != NULL ? &state->stream : NULL,
                                .order = state->order,
+                               .importance = state->importance.n > 0 ? &state->importance : NULL,
                                .noise = recipe_noise(&f->recipe)};
     if (!(needs & METHOD_GEOMETRY)) goto done;
     TRY(find_geometry(state, needs, error));
@@ -183,8 +184,10 @@ lam_status stage_operator(precompute_state *state, lam_error *error) {
     const build_options how = state_build_options(state);
     panel_precision precision = PANEL_F32;
     build_problem problem;
+    TRY(state_find_importance(state, error));
     TRY(state_problem(state, needs_of(how.method), &problem, error));
     TRY(build_operator(&problem, &how, &state->op, &state->built, error));
+    if (!(method_find(state->built.method)->flags & METHOD_READS)) importance_free(&state->importance);
     if (state->streamed) {
         form_factors_free(&state->f);
         state->f = ray_rows_take(state->rays);
@@ -212,6 +215,12 @@ static void log_figures(terminal *t, const char *name, const error_group *g, boo
                      probes);
     terminal_log(t, "%-8s operator relative %.3g, indirect %.3g", name, g->operator_relative.mean,
                  g->operator_indirect.mean);
+    if (!g->receivers.known) return;
+    const receiver_figures *r = &g->receivers;
+    at_most = r->is_bound ? "at most " : "";
+    if (has_total)
+        terminal_log(t, "%-8s receivers relative %s%.3g, indirect %s%.3g (noise of the reference %.2g)", name,
+                     at_most, r->total_relative, at_most, r->total_indirect, r->noise);
 }
 
 /* Rows that were not held are found again: the error of the operator itself is measured against them. */
@@ -258,6 +267,7 @@ lam_status stage_judge(precompute_state *state, lam_error *error) {
                  .order = state->order,
                  .problem = &problem,
                  .f = &state->f,
+                 .importance = state->importance.n > 0 ? &state->importance : NULL,
                  .scratch_names = {"judge-1.rows", "judge-2.rows"},
                  .stages = {"form factors for the judge, 1 of 2", "form factors for the judge, 2 of 2"},
                  .scratch = state->scratch,

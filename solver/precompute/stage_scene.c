@@ -447,11 +447,16 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
     state->order = memory_allocate(state->m.n, sizeof *state->order, "the order of the elements", error);
     if (state->order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&state->m, state->order, error));
+    TRY(state_read_importance(state, error));
     if (o->time > 0) {
         TRY(stage_budget(state, error));
         o = state->options;
     }
     TRY(choose_final_recipe(state, error));
+    if (state->recipe.method == RECIPE_BLOCKS && state->importance.n > 0 && state_keeps(o))
+        FAIL(error, LAM_ERR_ARGUMENT,
+             "--keep-form-factors: blocks that are found for receivers serve nothing else; leave out one of "
+             "both, or give --form-factors rays");
     const forecast f = state_forecast(state, (double)state->m.n);
     state->probes = forecast_probes(&f);
     if (state->probes > state->m.n) state->probes = state->m.n;

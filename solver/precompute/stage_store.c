@@ -1,6 +1,10 @@
 /* The store that a precompute writes, and its seal. */
 #include "solver/precompute/precompute_state.h"
 
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
 static lam_status save_report(const precompute_state *state, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     operator_description about;
@@ -12,6 +16,21 @@ static lam_status save_report(const precompute_state *state, store *s, lam_error
     /* The recipe of the form factors, so that they can be made again where they are not kept. */
     TRY(recipe_save(&state->f.recipe, &recipe_of_operator, s, error));
 done:
+    return status;
+}
+
+static lam_status save_importance(const precompute_state *state, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = state->options;
+    const bool groups = o->receivers != NULL;
+    const char *const value = groups ? o->receivers : o->importance;
+    const size_t length = strlen(value) + 16;
+    char *option = memory_allocate(length, 1, "store", error);
+    if (option == NULL) return LAM_ERR_MEMORY;
+    snprintf(option, length, "%s %s", groups ? "--receivers" : "--importance", value);
+    TRY(importance_save(&state->importance, option, s, error));
+done:
+    free(option);
     return status;
 }
 
@@ -40,6 +59,7 @@ lam_status stage_store(precompute_state *state, lam_error *error) {
     if (state->f.sky.first_bounce != NULL) TRY(sky_bounce_save(&state->f.sky, s, error));
     TRY(terminal_check(error));
     TRY(operator_save(state->op, s, error));
+    if (state->importance.n > 0) TRY(save_importance(state, s, error));
     TRY(save_report(state, s, error));
     if (state->probes > 0) TRY(judge_save(&state->errors, s, error));
     TRY(terminal_check(error));

@@ -56,7 +56,7 @@ void state_take_back(precompute_state *state) {
 }
 
 static double error_of(const error_report *errors) {
-    return trial_group(errors)->total_indirect.mean;
+    return judge_total(trial_group(errors));
 }
 
 /* Bytes of the next trial, beside the operator, and where they are kept the form factors, of this one. */
@@ -142,7 +142,7 @@ bool state_next_trial(precompute_state *state) {
     trial_knobs next = from;
     char knobs[TRIAL_TEXT] = "";
     const error_group *g = trial_group(&state->errors);
-    const double error = g->total_indirect.mean;
+    const double error = judge_total(g);
     if (!keeps_epsilon(state)) return false;
     all->count++;
     const bool better = all->best.op == NULL || error < error_of(&all->best.errors);

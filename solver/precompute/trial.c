@@ -14,7 +14,7 @@ const error_group *trial_group(const error_report *errors) {
 }
 
 trial_errors trial_errors_of(const error_group *g, bool by_noise) {
-    const double total = g->total_indirect.mean, compression = g->operator_indirect.mean;
+    const double total = judge_total(g), compression = judge_of_operator(g);
     return (trial_errors){.total = total,
                           .compression = compression,
                           .factors = sqrt(fmax(total * total - compression * compression, 0)),

@@ -99,8 +99,20 @@ static void print_figures(const char *name, const json_t *group, const char *aga
     puts(bound ? "  at most" : "");
 }
 
+/* The error of receivers, which has no largest one. */
+static void print_receivers(const char *name, const json_t *group) {
+    const json_t *relative = json_object_get(group, "receivers_relative"),
+                 *indirect = json_object_get(group, "receivers_indirect"),
+                 *noise = json_object_get(group, "receivers_noise");
+    if (!json_is_number(relative) || !json_is_number(indirect)) return;
+    printf("  %-8s%-10s%12.3g%12s%12.3g%12s  +- reference %.2g%s\n", name, "receivers",
+           json_number_value(relative), "", json_number_value(indirect), "", json_number_value(noise),
+           json_integer_value(json_object_get(group, "receivers_is_bound")) != 0 ? "  at most" : "");
+}
+
 static void print_error(const json_t *figures) {
     static const char *const names[] = {"single", "lights", "random"};
+    bool receivers = false;
     if (json_object_size(figures) == 0) {
         puts("errors            not measured (--probes 0)");
         return;
@@ -110,7 +122,12 @@ static void print_error(const json_t *figures) {
         const json_t *group = json_object_get(figures, names[i]);
         print_figures(names[i], group, "total");
         print_figures(names[i], group, "operator");
+        print_receivers(names[i], group);
+        receivers = receivers || json_object_get(group, "receivers_indirect") != NULL;
     }
+    if (receivers)
+        puts("  receivers: of the light that is read, all probes together; total: of the light of all "
+             "elements");
     puts("  total: against an independent sample of the form factors; at most: its noise is more than a "
          "third\n"
          "  operator: against the sample that it was built from\n"
@@ -139,6 +156,14 @@ static void print_sky(const json_t *sky) {
            json_number_value(json_object_get(sky, "ground_albedo")));
 }
 
+static void print_importance(const json_t *importance) {
+    if (!json_is_object(importance)) return;
+    const char *option = json_string_value(json_object_get(importance, "option"));
+    printf("%-18s%" JSON_INTEGER_FORMAT " elements, by %s; the light of others is only roughly right\n",
+           "read", json_integer_value(json_object_get(importance, "elements")),
+           option != NULL ? option : "?");
+}
+
 static void print_text(const json_t *about) {
     static const char *const plain[] = {"name",   "elements", "channels", "kind",
                                         "method", "reason",   "epsilon"};
@@ -151,6 +176,7 @@ static void print_text(const json_t *about) {
     print_report(json_object_get(about, "report"));
     print_groups(json_object_get(about, "groups"));
     print_sky(json_object_get(about, "sky"));
+    print_importance(json_object_get(about, "importance"));
     print_error(json_object_get(about, "error"));
     const json_t *provenance = json_object_get(about, "provenance");
     const json_t *form_factors = json_object_get(provenance, "form_factors");

@@ -147,6 +147,8 @@ static int check_together(const precompute_options *o, const option_result *give
     if (method == NULL) method = method_fallback(); /* auto may come to it */
     if (method->check != NULL && method->check(method_own_const(&o->build, method), &error) != LAM_OK)
         return options_usage(command.name, "%s", error.message);
+    if (o->receivers != NULL && o->importance != NULL)
+        return options_usage(command.name, "--receivers and --importance exclude each other");
     if (o->resolution % 2 != 0)
         return options_usage(command.name, "--resolution %" PRIu64 ": must be even", o->resolution);
     if (!o->from_store && same_file(o->input, o->output))

@@ -5,6 +5,7 @@
 #include "solver/light/annual.h"
 #include "solver/light/emission_refine.h"
 #include "solver/light/weather_light.h"
+#include "solver/operator/blocks/importance.h"
 #include "solver/output/output.h"
 #include "solver/render/smooth.h"
 #include "solver/verbs/light_options.h"
@@ -129,17 +130,43 @@ static bool is_dark(const emission *light, size_t count) {
     return true;
 }
 
-/* The mean total error for the scene's own lights, or for single elements; negative where there is none. */
-static void stated_error(store *s, double *relative, double *indirect) {
+/* The mean total error for the scene's own lights, or for single elements, or where only receivers are
+ * wanted, theirs; negative where there is none. */
+static void stated_error(store *s, bool receivers, double *relative, double *indirect) {
     static const char *const groups[] = {"/error/lights", "/error/single"};
+    const char *const names[2] = {receivers ? "receivers_relative" : "total_relative_mean",
+                                  receivers ? "receivers_indirect" : "total_indirect_mean"};
     *relative = *indirect = -1;
     for (size_t i = 0; i < sizeof groups / sizeof groups[0]; i++) {
-        if (!store_has(s, groups[i]) || !store_has_attribute(s, groups[i], "total_relative_mean")) continue;
-        if (store_get_number(s, groups[i], "total_relative_mean", relative, NULL) == LAM_OK &&
-            store_get_number(s, groups[i], "total_indirect_mean", indirect, NULL) == LAM_OK)
+        if (!store_has(s, groups[i]) || !store_has_attribute(s, groups[i], names[0])) continue;
+        if (store_get_number(s, groups[i], names[0], relative, NULL) == LAM_OK &&
+            store_get_number(s, groups[i], names[1], indirect, NULL) == LAM_OK)
             return;
         *relative = *indirect = -1;
     }
+}
+
+/* *only: the store was built for receivers, and no other element is wanted; warns where others are. */
+static lam_status check_receivers(store *s, size_t n, size_t n_selected, const uint32_t *selected,
+                                  terminal *t, bool *only, lam_error *error) {
+    lam_status status = LAM_OK;
+    importance read = {.n = 0};
+    size_t others = 0;
+    *only = false;
+    TRY(importance_load(s, n, &read, error));
+    if (read.n == 0) goto done;
+    const size_t count = selected != NULL ? n_selected : n;
+    for (size_t k = 0; k < count; k++) others += !(read.read[selected != NULL ? selected[k] : k] > 0);
+    *only = others == 0;
+    if (others > 0)
+        terminal_warn(
+            t,
+            "%zu of %zu elements are no receivers, which the store was built for: their light is only "
+            "roughly right",
+            others, count);
+done:
+    importance_free(&read);
+    return status;
 }
 
 /* The elements of the groups that are reduced, *selected freed with free(); NULL where all are wanted. */
@@ -241,6 +268,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     char *scene = NULL;
     uint32_t *selected = NULL;
     size_t n_selected = 0;
+    bool only_receivers = false;
     sunlight sun = {0};
     const char *names[ANNUAL_MOST];
     for (size_t k = 0; k < year->n_figures; k++) names[k] = year->figures[k].name;
@@ -257,6 +285,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     if (lit.own) terminal_log(t, "no --emit, --emission, --sky or --weather: the scene's own light");
     /* With --reduce only figures are written, also with -o. */
     TRY(wanted_elements(&m, reductions, n_reductions, &n_selected, &selected, error));
+    if (f->tolerance == 0) TRY(check_receivers(s, m.n, n_selected, selected, t, &only_receivers, error));
     if (f->weather != NULL) {
         const weather_options hours = {.path = f->weather,
                                        .photometric = f->photometric,
@@ -295,7 +324,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     out.corners = corners;
     TRY(reductions_fill(&out, error));
     out.relative = out.indirect = -1;
-    if (f->tolerance == 0) stated_error(s, &out.relative, &out.indirect);
+    if (f->tolerance == 0) stated_error(s, only_receivers, &out.relative, &out.indirect);
     if (f->output != NULL)
         TRY(output_write(&out, f->output, error));
     else if (f->json)

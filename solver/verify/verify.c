@@ -13,6 +13,7 @@ void examination_free(examination *e) {
     lam_operator_close(e->op);
     form_factors_free(&e->f);
     block_factors_free(&e->blocks);
+    importance_free(&e->importance);
     plane_tree_free(&e->tree);
     free(e->row_sums);
     free(e->compared);

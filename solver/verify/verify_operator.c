@@ -217,6 +217,22 @@ static void compare_figure(store *s, const char *group, const char *against, con
                   again->mean, mean, allowed);
 }
 
+/* The same of receivers, by the noise of both references: not of single elements, of which few may make most
+ * of the light that receivers see. */
+static void compare_receivers(store *s, const char *group, const receiver_figures *again, check *c) {
+    char path[32];
+    double stated, noise;
+    snprintf(path, sizeof path, "/error/%s", group);
+    if (!again->known || strcmp(group, "single") == 0 ||
+        !examination_stated(s, path, "receivers_indirect", &stated) ||
+        !examination_stated(s, path, "receivers_noise", &noise))
+        return;
+    const double allowed = 1.1 * stated + 3 * (noise + again->noise) + rounding;
+    if (!(again->total_indirect <= allowed))
+        check_say(c, VERDICT_BROKEN, "%s: receivers' indirect error %.3g, stated %.3g (at most %.3g)", group,
+                  again->total_indirect, stated, allowed);
+}
+
 /* A hemicube's judge takes as many rays as precompute does at defaults for the recorded epsilon: with other
  * options it may have taken others, and compare_figure allows for the noise that goes with the number. */
 static size_t judge_rays(const examination *e) {
@@ -242,10 +258,16 @@ static recipe recipe_again(const examination *e, const recipe *of, seed_purpose 
     return recipe_of_judge(of, judge_rays(e), precompute_seed(of->seed, half));
 }
 
+/* NULL: all is read. */
+static importance *importance_of(examination *e) {
+    return e->importance.n > 0 ? &e->importance : NULL;
+}
+
 /* The form factors that the operator was built from, where the store does not keep them. */
 static lam_status find_again(examination *e, const recipe *from, const uint32_t *order, lam_error *error) {
     lam_status status = LAM_OK;
-    const form_factor_options how = {.recipe = *from, .progress = e->progress, .stage = "form factors"};
+    const form_factor_options how = {
+        .recipe = *from, .progress = e->progress, .stage = "form factors", .importance = importance_of(e)};
     if (has_form_factors(e)) return LAM_OK;
     if (from->method != RECIPE_BLOCKS) return form_factors_make(&e->m, order, &how, &e->f, error);
     TRY(form_factors_tree(&e->m, &e->tree, error));
@@ -260,6 +282,7 @@ static lam_status measure_again(examination *e, const recipe *from, error_report
     uint32_t *order = memory_allocate(e->m.n, sizeof *order, "the order of the elements", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&e->m, order, error));
+    TRY(importance_load(e->s, e->m.n, &e->importance, error));
     TRY(find_again(e, from, order, error));
     const build_problem problem = {.n = e->m.n,
                                    .n_channels = e->m.n_channels,
@@ -273,6 +296,7 @@ static lam_status measure_again(examination *e, const recipe *from, error_report
         .order = order,
         .problem = &problem,
         .f = &e->f,
+        .importance = importance_of(e),
         .halves = {recipe_again(e, from, SEED_VERIFY_FIRST), recipe_again(e, from, SEED_VERIFY_SECOND)},
         .stages = {"form factors", "form factors"},
         .probes_seed = precompute_seed(from->seed, SEED_VERIFY_PROBES),
@@ -315,6 +339,7 @@ lam_status verify_error(examination *e, check *c, lam_error *error) {
         if (g->probes == 0) continue;
         compare_figure(e->s, groups[i].name, "total", &g->total_indirect, g->probes, g->reference_noise, c);
         compare_figure(e->s, groups[i].name, "operator", &g->operator_indirect, g->operator_probes, 0, c);
+        compare_receivers(e->s, groups[i].name, &g->receivers, c);
     }
 done:
     return check_failed(c, status, error);

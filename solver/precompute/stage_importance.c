@@ -1,0 +1,99 @@
+/* --receivers and --importance: the elements that are read, and from them the importance of all. */
+#include "solver/base/atomic_file.h"
+#include "solver/light/emission.h"
+#include "solver/precompute/precompute_state.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* E [C][n]: every element of the groups NAME,NAME emits 1. */
+static lam_status read_groups(const char *names, const emission_scene *scene, emission *out,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    const mesh *m = scene->m;
+    char *name = memory_allocate(strlen(names) + 1, 1, "--receivers", error);
+    if (name == NULL) return LAM_ERR_MEMORY;
+    TRY(emission_allocate("--receivers", m->n_channels, m->n, 1, &out->E, error));
+    out->n_vectors = 1;
+    for (const char *at = names;; at++) {
+        const size_t length = strcspn(at, ",");
+        memcpy(name, at, length);
+        name[length] = '\0';
+        TRY(emission_fill_group(scene, "--receivers", name, NULL, out->E, error));
+        at += length;
+        if (*at == '\0') break;
+    }
+done:
+    free(name);
+    return status;
+}
+
+static lam_status read_file(const char *path, const emission_scene *scene, emission *out, lam_error *error) {
+    char extension[16];
+    atomic_file_extension(path, extension);
+    if (strcmp(extension, "npy") != 0 && strcmp(extension, "json") != 0)
+        return status_fail(error, LAM_ERR_ARGUMENT, "--importance %.200s: must end in .npy or .json", path);
+    return emission_read(path, scene, out, error);
+}
+
+lam_status state_read_importance(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = state->options;
+    const mesh *m = &state->m;
+    const size_t n = m->n, C = m->n_channels;
+    emission_scene scene = {.m = NULL};
+    emission read = {.E = NULL};
+    float *w = NULL, most = 0;
+    if (o->receivers == NULL && o->importance == NULL) return LAM_OK;
+    TRY(emission_scene_create(m, &scene, error));
+    if (o->receivers != NULL)
+        TRY(read_groups(o->receivers, &scene, &read, error));
+    else
+        TRY(read_file(o->importance, &scene, &read, error));
+    if (read.n_vectors != 1)
+        FAIL(error, LAM_ERR_ARGUMENT, "--importance %.200s: has %zu vectors, must have 1", o->importance,
+             read.n_vectors);
+    w = memory_allocate(n, sizeof *w, "importance", error);
+    if (w == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t k = 0; k < n * C; k++) w[k % n] = fmaxf(w[k % n], read.E[k]);
+    for (size_t i = 0; i < n; i++) most = fmaxf(most, w[i]);
+    if (!(most > 0))
+        FAIL(error, LAM_ERR_ARGUMENT, "--importance %.200s: is 0 everywhere, must be above 0 somewhere",
+             o->importance);
+    if (!(state->expected->flags & METHOD_READS)) goto done;
+    for (size_t i = 0; i < n; i++) w[i] /= most;
+    state->importance = (importance){.n = n, .read = w};
+    w = NULL;
+done:
+    emission_free(&read);
+    emission_scene_free(&scene);
+    free(w);
+    return status;
+}
+
+/* Rows of a stream are found as the operator asks for them: a few rays of each element tell enough. */
+static lam_status find_by_rays(precompute_state *state, lam_error *error) {
+    enum { RAYS = 64 };
+    lam_status status = LAM_OK;
+    const form_factor_options how = {
+        .recipe = {.method = RECIPE_RAYS, .rays = RAYS, .seed = state->options->seed},
+        .progress = &state->progress,
+        .stage = "importance"};
+    form_factors f = {.row_sums = NULL};
+    TRY(form_factors_make(&state->m, state->order, &how, &f, error));
+    const factor_product F = factor_product_of_rows(&f.F);
+    TRY(importance_find(&F, state->m.n_channels, state->m.reflectance, &state->importance, error));
+done:
+    form_factors_free(&f);
+    return status;
+}
+
+lam_status state_find_importance(precompute_state *state, lam_error *error) {
+    if (state->importance.n == 0 || state->importance.of != NULL) return LAM_OK;
+    if (state->streamed) return find_by_rays(state, error);
+    const factor_product F =
+        state->blocks.n > 0 ? block_factors_product(&state->blocks) : factor_product_of_rows(&state->f.F);
+    return importance_find(&F, state->m.n_channels, state->m.reflectance, &state->importance, error);
+}

@@ -1,0 +1,158 @@
+"""Stores for receivers, from the command line: what is read is right, what is stated holds, others are warned of, and
+what is asked for in vain is refused."""
+
+import json
+import os
+import unittest
+
+import h5py
+import numpy
+
+from case import Case
+from command import lambert, must
+
+HOW = "--form-factors", "blocks", "--epsilon", .1, "--trials", 1
+
+
+class Importance(Case):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.room = os.path.join(cls.shared.name, "room.obj")
+        must("generate", "cornell", "--closed", "--elements", 2500, "--reflectance", .5, "-o", cls.room)
+        cls.store = os.path.join(cls.shared.name, "some.h5")
+        cls.log = must("precompute", cls.room, "-o", cls.store, *HOW, "--receivers", "lamp", "--probes", 8).stderr
+        cls.all = os.path.join(cls.shared.name, "all.h5")
+        must("precompute", cls.room, "-o", cls.all, *HOW, "--method", "hierarchical", "--probes", 0, "--quiet")
+
+    @classmethod
+    def is_read(cls):
+        with h5py.File(cls.store) as file:
+            names = [name.decode() if isinstance(name, bytes) else name for name in file["mesh/group_names"][()]]
+            return file["mesh/group"][()] == names.index("lamp"), file["mesh/area"][()]
+
+    def solve(self, store, light):
+        numpy.save(self.path("e.npy"), light)
+        done = must("solve", store, "--emission", self.path("e.npy"), "--quantity", "indirect", "-o", self.path("b.npy"))
+        return numpy.load(self.path("b.npy")).astype("f8").reshape(len(light), -1), done.stderr
+
+    def test_what_is_read_errs_as_stated_and_the_operator_is_smaller(self):
+        read, area = self.is_read()
+        rng = numpy.random.default_rng(2)
+        light = rng.random((3, len(area))).astype("f4")
+        exact = self.path("exact.h5")
+        must("precompute", self.room, "-o", exact, "--form-factors", "rays", "--method", "exact", "--probes", 0, "--quiet")
+        truth = self.solve(exact, light)[0]
+        off = {}
+        for store in self.store, self.all:
+            found = self.solve(store, light)[0]
+            off[store] = numpy.sqrt((area * read * (found - truth) ** 2).sum() / (area * read * truth ** 2).sum())
+        with h5py.File(self.store) as file:
+            stated = file["error/random"].attrs
+            # The reference of all pairs is exact to .0002 (accuracy of pairs and rounding).
+            self.assertLess(off[self.store], stated["receivers_indirect"] + stated["receivers_noise"] + .0005)
+            self.assertGreater(stated["total_indirect_mean"], 0)
+            some = file["operator"].attrs["density"]
+        with h5py.File(self.all) as file:
+            self.assertLess(some, .6 * file["operator"].attrs["density"])
+
+    def test_the_store_says_what_it_is_for(self):
+        read, _ = self.is_read()
+        with h5py.File(self.store) as file:
+            self.assertEqual(list(file["importance/elements"][()]), list(numpy.flatnonzero(read)))
+            self.assertTrue((file["importance/weights"][()] == 1).all())
+            for group in "single", "lights", "random":
+                self.assertIn("receivers_indirect", file["error"][group].attrs)
+        about = json.loads(must("info", self.store, "--json").stdout)
+        self.assertEqual(about["importance"], {"option": "--receivers lamp", "elements": int(read.sum())})
+        self.assertGreater(about["error"]["lights"]["receivers_indirect"], 0)
+        text = must("info", self.store).stdout
+        self.assertRegex(text, r"\nread +\d+ elements, by --receivers lamp; the light of others is only roughly right\n")
+        self.assertRegex(text, r"\n  lights  receivers ")
+        self.assertRegex(self.log, r"\nlights   receivers relative .*, indirect .* \(noise of the reference ")
+        self.assertIsNone(json.loads(must("info", self.all, "--json").stdout)["importance"])
+        self.assertNotIn("receivers", must("info", self.all).stdout)
+
+    def test_other_light_is_warned_of(self):
+        warning = "are no receivers, which the store was built for: their light is only roughly right"
+        self.assertIn(warning, must("solve", self.store).stderr)
+        self.assertIn(warning, must("solve", self.store, "--reduce", "floor=mean").stderr)
+        done = must("solve", self.store, "--reduce", "lamp=mean", "--json")
+        self.assertNotIn(warning, done.stderr)
+        with h5py.File(self.store) as file:
+            stated = file["error/lights"].attrs["receivers_indirect"]
+        self.assertEqual(json.loads(done.stdout)["error"]["indirect_mean"], stated)
+        self.assertNotIn(warning, must("solve", self.all).stderr)
+
+    def test_verify_finds_what_is_stated(self):
+        self.assertRegex(must("verify", self.store, "--probes", 8).stdout, r"\nok +error ")
+        other = self.path("other.h5")
+        with open(self.store, "rb") as one, open(other, "wb") as two:
+            two.write(one.read())
+        with h5py.File(other, "r+") as file:
+            file["error/lights"].attrs["receivers_indirect"] = 1e-6
+            file["error/lights"].attrs["receivers_noise"] = 1e-7
+        done = lambert("verify", other, "--probes", 8)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("lights: receivers' indirect error", done.stdout)
+
+    def test_files_give_weights_and_bits_do_not_depend_on_threads(self):
+        sums = []
+        with open(self.path("w.json"), "w", encoding="ascii") as file:
+            json.dump({"groups": {"lamp": 4, "floor": .5}}, file)
+        for threads in 1, 3:
+            out = self.path(f"w{threads}.h5")
+            must("precompute", self.room, "-o", out, *HOW, "--importance", self.path("w.json"), "--probes", 0, "--quiet",
+                 threads=threads)
+            with h5py.File(out) as file:
+                sums.append([file[name][()].tobytes() for name in ("operator/K/0/data", "importance/weights")
+                             if name in file] + [file["operator"].attrs["density"]])
+                self.assertEqual(sorted(set(file["importance/weights"][()])), [.125, 1])
+                self.assertEqual(file["importance"].attrs["option"], f"--importance {self.path('w.json')}".encode())
+        self.assertEqual(sums[0], sums[1])
+
+    def test_rows_and_streams_serve_receivers_too(self):
+        for name, options in ("pairs", ("--form-factors", "rays")), ("rays", ("--rays", 128)):
+            out = self.path(name + ".h5")
+            must("precompute", self.room, "-o", out, "--receivers", "lamp", *options, "--epsilon", .1, "--trials", 1,
+                 "--probes", 4, "--quiet")
+            with h5py.File(out) as file:
+                self.assertIn("importance", file)
+                self.assertEqual(file["operator"].attrs["method"], b"hierarchical")
+                self.assertGreater(file["error/random"].attrs["receivers_indirect"], 0)
+
+    def test_what_is_wrong_is_refused_in_one_line(self):
+        out = self.path("no.h5")
+
+        def last_line(status, wanted, *options):
+            done = lambert("precompute", self.room, "-o", out, *options)
+            self.assertEqual(done.returncode, status, done.stderr)
+            said = [line for line in done.stderr.splitlines() if line.startswith("lambert")]
+            self.assertEqual(len(said), 1, done.stderr)
+            self.assertIn(wanted, said[0])
+            self.assertFalse(os.path.exists(out))
+
+        last_line(1, '--receivers: the scene has no group "lmap"; did you mean "lamp"?', "--receivers", "lmap")
+        last_line(1, "--receivers", "--receivers", "lamp,")
+        last_line(2, "--receivers and --importance exclude each other", "--receivers", "lamp", "--importance", "w.json")
+        for text, wanted in (('{"groups":{"lmap":1}}', "lmap"), ('{"groups":{"lamp":-1}}', "-1"),
+                             ('{"groups":{"lamp":NaN}}', "w.json"), ('{"groups":{"lamp":1e999}}', "w.json"),
+                             ('{"groups":{"lamp":0}}', "is 0 everywhere, must be above 0 somewhere"),
+                             ('{"emissions":[{"groups":{"lamp":1}},{"groups":{"lamp":2}}]}', "has 2 vectors, must have 1"),
+                             ("", "w.json")):
+            with open(self.path("w.json"), "w", encoding="ascii") as file:
+                file.write(text)
+            last_line(1, wanted, "--importance", self.path("w.json"))
+        last_line(1, "missing.json", "--importance", self.path("missing.json"))
+        last_line(1, "--importance", "--importance", self.room)
+        last_line(1, "--keep-form-factors: blocks that are found for receivers serve nothing else", *HOW, "--receivers",
+                  "lamp", "--keep-form-factors")
+        done = must("precompute", self.box, "-o", out, "--method", "exact", "--rays", 64, "--probes", 0, "--receivers",
+                    "floor")
+        self.assertIn("exact does not use --receivers", done.stderr)
+        with h5py.File(out) as file:
+            self.assertNotIn("importance", file)
+
+
+if __name__ == "__main__":
+    unittest.main()
