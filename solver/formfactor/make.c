@@ -17,6 +17,7 @@
 #include "solver/linalg/csr.h"
 
 #include <math.h>
+#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -217,23 +218,24 @@ done:
 typedef struct balanced_blocks {
     block_factors *blocks;
     const double *ones;    /* [n] */
+    void *work;            /* of a product */
     const double *outside; /* [n], the shares that leave to a sky or meet back faces; NULL: not balanced */
 } balanced_blocks;
 
 /* r_i = A_i ((F' 1)_i + d_i outside_i) with F' = D F D. */
 static lam_status sums_of_blocks(void *context, const double *d, double *r, lam_error *error) {
-    lam_status status = LAM_OK;
     const balanced_blocks *of = context;
     const block_factors *blocks = of->blocks;
+    const block_vectors vectors = {.count = 1, .step = 1, .x = &of->ones, .y = &r};
+    (void)error;
     memcpy(blocks->balance, d, blocks->n * sizeof *d);
-    TRY(block_factors_multiply(blocks, 1, of->ones, r, error));
+    block_factors_apply(blocks, &vectors, of->work, (size_t)omp_get_max_threads());
 #pragma omp parallel for schedule(static)
     for (size_t p = 0; p < blocks->n; p++) {
         if (of->outside != NULL) r[p] += d[p] * of->outside[p];
         r[p] *= blocks->area[p];
     }
-done:
-    return status;
+    return LAM_OK;
 }
 
 /* Sweeps of the balance of an open scene, where only rows that sum to more than 1 are scaled down, or of a
@@ -283,17 +285,18 @@ static lam_status balance_blocks(form_factors *f, block_factors *blocks, const d
     double *d = memory_allocate(n, sizeof *d, "form factors", error);
     double *r = memory_allocate(n, sizeof *r, "form factors", error);
     double *ones = memory_allocate(n, sizeof *ones, "form factors", error);
+    void *work = memory_allocate(block_factors_work(blocks, 1), 1, "form factors", error);
     blocks->balance = memory_allocate(n, sizeof *blocks->balance, "form factors", error);
     f->row_sums = memory_allocate(n, sizeof *f->row_sums, "form factors", error);
     if (outside == NULL || wanted == NULL || before == NULL || d == NULL || r == NULL || ones == NULL ||
-        blocks->balance == NULL || f->row_sums == NULL)
+        work == NULL || blocks->balance == NULL || f->row_sums == NULL)
         TRY(LAM_ERR_MEMORY);
     for (size_t p = 0; p < n; p++) {
         ones[p] = 1;
         outside[p] = sky ? leaving_outside(f, blocks->order[p]) : 0;
         wanted[p] = blocks->area[p] * (targets != NULL ? fmax(targets[blocks->order[p]], least_target) : 1);
     }
-    balanced_blocks of = {blocks, ones, sky ? outside : NULL};
+    balanced_blocks of = {blocks, ones, work, sky ? outside : NULL};
     row_scaling c = {.n = n,
                      .area = wanted,
                      .sums = sums_of_blocks,
@@ -321,6 +324,7 @@ done:
     free(d);
     free(r);
     free(ones);
+    free(work);
     free(wanted);
     return status;
 }
