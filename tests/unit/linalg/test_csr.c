@@ -8,6 +8,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <omp.h>
 #include <string.h>
 
 static uint64_t random_state = 9;
@@ -263,6 +264,59 @@ START_TEST(parts_are_what_entries_join) {
 }
 END_TEST
 
+/* Every row of the symmetric matrix, with ascending columns, for any number of threads. */
+START_TEST(an_upper_triangle_is_mirrored) {
+    enum { N = 203 };
+    static const size_t sizes[] = {1, 2, 7, N};
+    lam_error error = {.message = ""};
+    const int most = omp_get_max_threads();
+    for (size_t s = 0; s < 4; s++) {
+        const size_t n = sizes[s];
+        csr a = random_rows(n), upper = {.n = n,
+                                         .indptr = calloc(n + 1, sizeof *upper.indptr),
+                                         .indices = malloc((n * n + 1) * sizeof *upper.indices),
+                                         .data = malloc((n * n + 1) * sizeof *upper.data)};
+        float *dense = calloc(n * n, sizeof *dense);
+        uint64_t used = 0;
+        for (size_t i = 0; i < n; upper.indptr[++i] = used)
+            for (uint64_t e = a.indptr[i]; e < a.indptr[i + 1]; e++) {
+                const uint32_t j = a.indices[e];
+                if (j < i) continue;
+                upper.indices[used] = j;
+                upper.data[used++] = e % 7 == 0 ? 0 : a.data[e]; /* zeros are left out */
+                dense[i * n + j] = dense[j * n + i] = upper.data[used - 1];
+            }
+        for (int threads = 1; threads <= 4; threads++) {
+            csr found;
+            size_t at = 0;
+            omp_set_num_threads(threads);
+            ck_ok(csr_mirror(&upper, "matrix", &found, &error));
+            for (size_t i = 0; i < n; i++) {
+                ck_assert_uint_eq(found.indptr[i], at);
+                for (size_t j = 0; j < n; j++) {
+                    if (dense[i * n + j] == 0) continue;
+                    ck_assert_uint_lt(at, found.indptr[i + 1]);
+                    ck_assert_uint_eq(found.indices[at], j);
+                    ck_assert(found.data[at++] == dense[i * n + j]);
+                }
+                ck_assert_uint_eq(found.indptr[i + 1], at);
+            }
+            for (size_t parts = 1; parts <= n + 3; parts++) {
+                ck_assert_uint_eq(csr_part(&found, 0, parts), 0);
+                ck_assert_uint_eq(csr_part(&found, parts, parts), n);
+                for (size_t k = 0; k < parts; k++)
+                    ck_assert_uint_le(csr_part(&found, k, parts), csr_part(&found, k + 1, parts));
+            }
+            csr_free(&found);
+        }
+        csr_free(&a);
+        csr_free(&upper);
+        free(dense);
+    }
+    omp_set_num_threads(most);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("csr");
     TCase *tests = tcase_create("csr");
@@ -272,6 +326,7 @@ int main(void) {
     tcase_add_test(tests, products_of_doubles_side_by_side);
     tcase_add_test(tests, products_cost_what_they_touch);
     tcase_add_test(tests, bad_rows_are_refused);
+    tcase_add_test(tests, an_upper_triangle_is_mirrored);
     tcase_add_loop_test(tests, parts_are_what_entries_join, 0, 40);
     suite_add_tcase(suite, tests);
     return suite_run(suite);

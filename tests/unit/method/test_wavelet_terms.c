@@ -251,6 +251,36 @@ START_TEST(terms_are_sorted_to_an_eighth) {
 }
 END_TEST
 
+/* Ascending columns; terms of one column, of which there are many, in their order. */
+START_TEST(terms_are_sorted_by_column) {
+    uint64_t state = 11;
+    row_term *terms = test_allocate(SORTED_MOST, sizeof *terms);
+    row_term *spare = test_allocate(SORTED_MOST, sizeof *spare);
+    uint32_t *column = test_allocate(SORTED_MOST, sizeof *column);
+    bool *seen = test_allocate(SORTED_MOST, sizeof *seen);
+    for (size_t count = 0; count <= SORTED_MOST; count = count < 40 ? count + 1 : count * 3 / 2) {
+        memset(seen, 0, SORTED_MOST * sizeof *seen);
+        for (size_t k = 0; k < count; k++) {
+            column[k] = (uint32_t)(random_lcg_unit(&state) * (double)count / 2);
+            terms[k] = (row_term){column[k], (float)k};
+        }
+        row_terms_by_column(count, terms, spare);
+        for (size_t k = 0; k < count; k++) {
+            const size_t was = (size_t)terms[k].value;
+            ck_assert(!seen[was] && column[was] == terms[k].column);
+            seen[was] = true;
+            if (k == 0) continue;
+            ck_assert_uint_le(terms[k - 1].column, terms[k].column);
+            if (terms[k - 1].column == terms[k].column) ck_assert(terms[k - 1].value < terms[k].value);
+        }
+    }
+    free(terms);
+    free(spare);
+    free(column);
+    free(seen);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("wavelet terms");
     TCase *tests = tcase_create("wavelet terms");
@@ -260,6 +290,7 @@ int main(void) {
     tcase_add_test(tests, used_up_rows_are_freed);
     tcase_add_test(tests, sums_that_cancel_are_listed_once);
     tcase_add_test(tests, terms_are_sorted_to_an_eighth);
+    tcase_add_test(tests, terms_are_sorted_by_column);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }

@@ -129,11 +129,52 @@ START_TEST(reduced_blocks_are_not_negative) {
 }
 END_TEST
 
+/* Where the light of one corner of a cluster alone is negative, the slopes change along the functions at that
+ * corner over their mean squares, (3 u, 3 v), until it is a 1e-5 of the value at the centre. */
+START_TEST(one_corner_is_projected) {
+    plane_tree tree;
+    block_factors f = subject(&tree);
+    block_range *ranges;
+    size_t reduced, tried = 0;
+    ck_ok(block_ranges(&f, &ranges, &error));
+    f.n_blocks = 1;
+    for (uint32_t t = 0; t < f.n_clusters; t++) {
+        const block_range *r = &ranges[t];
+        bool whole = f.nodes[t].begin > 0;
+        for (int d = 0; d < 2; d++)
+            whole = whole && fabs(r->low[d] + 1) < 1e-12 && fabs(r->high[d] - 1) < 1e-12;
+        if (!whole) continue;
+        for (int turned = 0; turned < 2; turned++) {
+            cluster_block *const k = &f.blocks[0];
+            const uint32_t element = (uint32_t)f.n_clusters;
+            *k = (cluster_block){.a = turned ? element : t, .b = turned ? t : element};
+            float *const u = turned ? &k->L[0][1] : &k->L[1][0], *const v =
+                                                                     turned ? &k->L[0][2] : &k->L[2][0];
+            k->L[0][0] = 1;
+            *u = 1.25f;
+            *v = .25f;
+            ck_ok(block_factors_reduce(&f, &reduced, &error));
+            ck_assert_uint_eq(reduced, 1);
+            /* 1 - u - v = -.5 becomes 1e-5 by (.5 + 1e-5) / 6 of (3, 3); single precision. */
+            ck_assert_double_le(fabs((double)*u - (1.25 - .250005)), 1e-6);
+            ck_assert_double_le(fabs((double)*v - (.25 - .250005)), 1e-6);
+            ck_assert(k->L[0][0] == 1 && k->L[1][1] == 0 && k->L[2][2] == 0);
+            tried++;
+        }
+    }
+    ck_assert_uint_gt(tried, 4);
+    free(ranges);
+    block_factors_free(&f);
+    plane_tree_free(&tree);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("block range");
     TCase *tests = tcase_create("block range");
     tcase_add_test(tests, bounds_hold);
     tcase_add_test(tests, reduced_blocks_are_not_negative);
+    tcase_add_test(tests, one_corner_is_projected);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
