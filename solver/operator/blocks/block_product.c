@@ -232,11 +232,120 @@ void block_factors_apply(const block_factors *f, const block_vectors *vectors, v
     pass_down(&p, kernels, (int)n_threads);
 }
 
+/* Parts of the blocks, by a, in the product with one vector: each adds to numbers of its own, which are then
+ * added in the order of the parts. */
+enum { ONE_PARTS = 8 };
+
+/* Of a part: numbers that arrive at elements [n] and clusters [n_clusters][BLOCK_FUNCTIONS]. */
+typedef struct arrived {
+    double *y, *down;
+} arrived;
+
+/* Adds L X_b to a's sums and L^T X_a to what arrives at b: every block is read once, where the pass for many
+ * vectors reads it in two places. */
+static void scatter_block(const panel *p, const cluster_block *k, const double xa[BLOCK_FUNCTIONS],
+                          double sums[BLOCK_FUNCTIONS], const arrived *to) {
+    const size_t n_clusters = p->f->n_clusters;
+    if (k->b >= n_clusters) {
+        const double xb = ((const double *)p->x)[k->b - n_clusters];
+        for (int r = 0; r < BLOCK_FUNCTIONS; r++) sums[r] += (double)k->L[r][0] * xb;
+        to->y[k->b - n_clusters] +=
+            (double)k->L[0][0] * xa[0] + (double)k->L[1][0] * xa[1] + (double)k->L[2][0] * xa[2];
+        return;
+    }
+    const double *const xb = (const double *)p->up + BLOCK_FUNCTIONS * (size_t)k->b;
+    double *const down = to->down + BLOCK_FUNCTIONS * (size_t)k->b;
+    for (int r = 0; r < BLOCK_FUNCTIONS; r++) {
+        sums[r] += (double)k->L[r][0] * xb[0] + (double)k->L[r][1] * xb[1] + (double)k->L[r][2] * xb[2];
+        down[r] += (double)k->L[0][r] * xa[0] + (double)k->L[1][r] * xa[1] + (double)k->L[2][r] * xa[2];
+    }
+}
+
+/* The blocks of the nodes first ... last - 1 as a; an element has the constant alone. */
+static void scatter_part(const panel *p, size_t first, size_t last, const arrived *to) {
+    const block_factors *f = p->f;
+    for (size_t t = first; t < last; t++) {
+        const bool element = t >= f->n_clusters;
+        double sums[BLOCK_FUNCTIONS] = {0}, xa[BLOCK_FUNCTIONS] = {0};
+        if (f->from[t] == f->from[t + 1]) continue;
+        if (element)
+            xa[0] = ((const double *)p->x)[t - f->n_clusters];
+        else
+            memcpy(xa, (const double *)p->up + BLOCK_FUNCTIONS * t, sizeof xa);
+        for (size_t k = f->from[t]; k < f->from[t + 1]; k++) scatter_block(p, &f->blocks[k], xa, sums, to);
+        if (element)
+            to->y[t - f->n_clusters] += sums[0];
+        else
+            for (int r = 0; r < BLOCK_FUNCTIONS; r++) to->down[BLOCK_FUNCTIONS * t + (size_t)r] += sums[r];
+    }
+}
+
+/* The first node behind this share of the blocks. */
+static size_t part_of_nodes(const block_factors *f, size_t part) {
+    const size_t n_nodes = f->n_clusters + f->n, wanted = f->n_blocks / ONE_PARTS * part;
+    size_t low = 0, high = n_nodes;
+    if (part == ONE_PARTS) return n_nodes;
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (f->from[middle] < wanted)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* The pass over the blocks for one vector; work [ONE_PARTS][n + n_clusters BLOCK_FUNCTIONS]. */
+static void pass_blocks_once(const panel *p, double *work) {
+    const block_factors *f = p->f;
+    const size_t n = f->n, each = n + f->n_clusters * BLOCK_FUNCTIONS;
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t part = 0; part < ONE_PARTS; part++) {
+        const arrived to = {work + part * each, work + part * each + n};
+        memset(to.y, 0, each * sizeof *work);
+        scatter_part(p, part_of_nodes(f, part), part_of_nodes(f, part + 1), &to);
+    }
+#pragma omp parallel for schedule(static)
+    for (size_t i = 0; i < each; i++) {
+        double sum = 0;
+        for (size_t part = 0; part < ONE_PARTS; part++) sum += work[part * each + i];
+        if (i < n)
+            ((double *)p->y)[i] = sum;
+        else
+            ((double *)p->down)[i - n] = sum;
+    }
+}
+
+/* block_factors_apply of one vector by position, with more work. */
+static lam_status multiply_one(const block_factors *f, bool by_element, const double *x, double *y,
+                               lam_error *error) {
+    const size_t each = f->n + f->n_clusters * BLOCK_FUNCTIONS;
+    const int n_threads = omp_get_max_threads();
+    const double *const from[] = {x};
+    double *const to[] = {y};
+    const block_vectors vectors = {1, 1, by_element, from, to};
+    double *numbers = memory_allocate(2 + ONE_PARTS, each * sizeof *numbers, "blocks", error);
+    if (numbers == NULL) return LAM_ERR_MEMORY;
+    const panel p = {.f = f,
+                     .vectors = &vectors,
+                     .order = by_element ? f->order : NULL,
+                     .x = numbers,
+                     .y = numbers + each,
+                     .up = numbers + f->n,
+                     .down = numbers + each + f->n};
+    pass_up(&p, &one_kernels, n_threads);
+    pass_blocks_once(&p, numbers + 2 * each);
+    pass_down(&p, &one_kernels, n_threads);
+    free(numbers);
+    return LAM_OK;
+}
+
 /* Vectors [n][n_vectors], some at a time. */
 static lam_status multiply(const block_factors *f, bool by_element, size_t n_vectors, const double *x,
                            double *y, lam_error *error) {
     const double *from[WIDE];
     double *to[WIDE];
+    if (n_vectors == 1) return multiply_one(f, by_element, x, y, error);
     void *work = memory_allocate(block_factors_work(f, n_vectors), 1, "blocks", error);
     if (work == NULL) return LAM_ERR_MEMORY;
     for (size_t first = 0; first < n_vectors; first += WIDE) {
