@@ -108,7 +108,9 @@ forecast_times forecast_seconds(const forecast *f, const forecast_rates *rates) 
     const double beside = own->method == RECIPE_BLOCKS ? n * (double)own->rays * rates->ray_seconds : 0;
     const bool finer = own->method == RECIPE_BLOCKS; /* the judge's blocks */
     const double more = finer ? blocks_of(f, of_judge) / blocks_of(f, own) : 1;
-    const double half = counted ? once * more : sample_seconds(n, of_judge, entries / 2, rates);
+    const double half = f->cost.finer > 0 ? f->cost.finer
+                        : counted         ? once * more
+                                          : sample_seconds(n, of_judge, entries / 2, rates);
     if (!f->from_store)
         times.form_factors =
             f->streamed && !counted ? n * forecast_rays(n, own) * rates->ray_seconds : once + beside;
