@@ -170,6 +170,7 @@ END_TEST
 int main(void) {
     Suite *suite = suite_create("next trial");
     TCase *cases = tcase_create("next trial");
+    tcase_set_timeout(cases, 120);
     tcase_add_test(cases, an_error_that_is_kept_ends_it);
     tcase_add_loop_test(cases, the_best_comes_back, 0, 2);
     tcase_add_test(cases, form_factors_are_used_again);
