@@ -29,9 +29,13 @@ static const double share_of_block = 1. / 2000, spread_times_most = 2;
 static const double share_of_spread = .01;
 /* Clusters in planes that meet others at many edges have linear blocks up to this roughness. */
 static const double rough_most = .3;
-/* Segments of a partly hidden block, and of a pair of elements within the bound of blocks: SEGMENT_LANES; of
- * other pairs twice as many. */
-enum { PAIR_ROUNDS = 2 };
+/* Segments of a partly hidden block, and of a pair of elements within the bound of blocks: SEGMENT_LANES, a
+ * round of them. A pair beyond the bound, which cannot be split, gets as many rounds as it takes to err no
+ * more than a block at the bound, N segments by N^-3/4 of its norm. The number does not depend on how many of
+ * the first ones are blocked: small openings would lose the light of pairs in which all are. */
+enum { PAIR_ROUNDS_LEAST = 2, PAIR_ROUNDS_MOST = 64 };
+/* So few candidates cost less to test than to sift. */
+enum { CANDIDATES_FEW = 4 };
 
 size_t block_finder_size(const block_finder *k, uint32_t t) {
     const block_node *node = &k->flat.tree->nodes[t];
@@ -134,37 +138,64 @@ static lam_status add_linear(block_walk *w, uint32_t a, uint32_t b) {
     return add_block(w, &made);
 }
 
-/* A pair of elements of which the share V of the light is visible. */
-static lam_status add_pair(block_walk *w, uint32_t a, uint32_t b, double V) {
+/* A pair of elements with this exchange area. */
+static lam_status add_exchange(block_walk *w, uint32_t a, uint32_t b, double exchange) {
     cluster_block made = {.a = a, .b = b};
-    const double exchange = V * exchange_of_pair(w, a, b);
     w->report.elements_away += !(exchange > 0);
     if (!(exchange > 0)) return LAM_OK;
     block_numbers_of_pair(&w->finder->flat, exchange, &made);
     return add_block(w, &made);
 }
 
-/* A pair of elements with candidates between them, whose exchange area is found only where they see each
- * other. */
+/* Many segments are worth candidates of the pair's own. Where they are few already, those are kept. */
+static const candidates *sift_for_pair(block_walk *w, uint32_t a, uint32_t b, const candidates *among,
+                                       candidates *out) {
+    const block_finder *k = w->finder;
+    flat_pair at;
+    if (among->count == CANDIDATES_UNKNOWN || among->count <= CANDIDATES_FEW) return among;
+    flat_clusters_pair(&k->flat, a, b, &at);
+    candidates_between(&k->pieces, &k->flat, a, b, &at, among, out);
+    w->report.sifted += out->examined;
+    return out;
+}
+
+static int rounds_of_pair(double norm, double bound) {
+    const double wanted = ceil(pow(norm / bound, 4. / 3));
+    return (int)fmin(fmax(wanted, PAIR_ROUNDS_LEAST), PAIR_ROUNDS_MOST);
+}
+
+/* A pair of elements with candidates between them. Its exchange area is found where the number of segments
+ * depends on it, or where some are open. */
 static lam_status add_shaded_pair(block_walk *w, uint32_t a, uint32_t b, double most, bool crosses,
                                   const candidates *among) {
-    double all = 0, seen = 0;
-    const int rounds = norm_of(w, a, b, most) > shadow_most(w, a, b) ? PAIR_ROUNDS : 1;
-    for (size_t round = 0; round < (size_t)rounds; round++) {
+    const flat_clusters *f = &w->finder->flat;
+    const double bound = shadow_most(w, a, b);
+    double all = 0, seen = 0, exchange = -1; /* below 0: not known */
+    int rounds = 1;
+    candidates mine;
+    w->report.shaded_pairs++;
+    if (norm_of(w, a, b, most) > bound) {
+        exchange = exchange_of_pair(w, a, b);
+        if (!(exchange > 0)) return add_exchange(w, a, b, 0);
+        rounds = rounds_of_pair(exchange / sqrt(f->of[a].area * f->of[b].area), bound);
+        if (rounds > PAIR_ROUNDS_LEAST) among = sift_for_pair(w, a, b, among, &mine);
+        if (among->hidden) rounds = 0;
+    }
+    for (int round = 0; round < rounds; round++) {
         seen_segment segments[SEGMENT_LANES];
         double kernel[SEGMENT_LANES];
-        shade_segments(&w->finder->shade, a, b, among, round * SEGMENT_LANES, segments, kernel);
+        shade_segments(&w->finder->shade, a, b, among, (size_t)round * SEGMENT_LANES, segments, kernel);
         for (int k = 0; k < SEGMENT_LANES; k++) {
             all += kernel[k];
             seen += kernel[k] * segments[k].seen;
         }
     }
     count_segments(w, among, rounds);
-    w->report.shaded_pairs++;
     w->report.elements_unseen += !(seen > 0);
     if (!(seen > 0)) return LAM_OK;
     if (seen >= all && is_smooth(w, a, b, most, crosses)) return add_linear(w, a, b);
-    return add_pair(w, a, b, seen / all);
+    if (exchange < 0) exchange = exchange_of_pair(w, a, b);
+    return add_exchange(w, a, b, exchange * seen / all);
 }
 
 /* Of two clusters that are not smooth the one that lies on both sides of the other's plane is split, else the
@@ -310,7 +341,7 @@ static lam_status decide(block_walk *w, uint32_t a, uint32_t b, double elements,
     }
     if (are_elements(k, a, b)) {
         w->report.pairs++;
-        return add_pair(w, a, b, 1);
+        return add_exchange(w, a, b, exchange_of_pair(w, a, b));
     }
     return split_for_smoothness(w, a, b, behind, &mine);
 }
@@ -372,7 +403,7 @@ lam_status block_finder_make(const mesh *m, const visibility *v, const plane_tre
     TRY(occluders_make(m, visibility_facets(v), out->flat.slack, &out->pieces, error));
     out->joined = tree->view == PLANE_VIEW_UNHIDDEN;
     if (tree->view == PLANE_VIEW_UNKNOWN && !blocks_are_planar(tree))
-        TRY(mesh_is_unhidden(m, &out->joined, error));
+        TRY(mesh_is_unhidden(m, &out->joined, NULL, error));
     pair_factor_rules_init(&out->rules);
     out->shade = (shade_scene){.f = &out->flat, .occluders = &out->pieces, .v = v};
 done:
