@@ -18,7 +18,7 @@ lam_status plane_tree_look(const mesh *m, plane_tree *tree, lam_error *error) {
     lam_status status = LAM_OK;
     bool unhidden = false;
     if (blocks_are_planar(tree)) return LAM_OK;
-    TRY(mesh_is_unhidden(m, &unhidden, error));
+    TRY(mesh_is_unhidden(m, &unhidden, NULL, error));
     tree->view = unhidden ? PLANE_VIEW_UNHIDDEN : PLANE_VIEW_HIDDEN;
 done:
     return status;
