@@ -17,12 +17,11 @@ bool clusters_hide_nothing(const mesh *m, const cluster_tree *t);
 /* True where clusters_hide_nothing would be but for dents that hide next to nothing, as those between rings
  * of unequal numbers of vertices. A segment that element Z blocks leaves, at one of its ends, a point behind
  * Z's plane towards the back of Z. So with H_Y the sum over Z of the unoccluded factors from Y to the back of
- * Z, at most 2 sum A H of the light sum A is hidden. In a surface whose neighbours share their edges H_Y is
- * all that is hidden of row Y: of the elements that a ray crosses beyond its first one as many show their
- * front as their back. *out: nothing is behind a plane by more than a hundredth of the extent,
- * each H_Y is at most OPEN_SCENE_ROW_MOST, and sum A H / sum A at most OPEN_SCENE_MEAN_MOST. hidden, unless
- * NULL, gets sum A H / sum A where *out is true. Cost: O(n log n) where the answer is yes, and mostly O(n)
- * where it is no. Errors: LAM_ERR_MEMORY. */
+ * Z, at most 2 sum A H of the light sum A is hidden. In a closed surface H_Y is all that is hidden of row
+ * Y: of the elements that a ray crosses beyond its first one as many show their front as their back. *out:
+ * nothing is behind a plane by more than a hundredth of the extent, each H_Y is at most OPEN_SCENE_ROW_MOST,
+ * and sum A H / sum A at most OPEN_SCENE_MEAN_MOST. hidden, unless NULL, gets sum A H / sum A where *out is
+ * true. Cost: O(n log n) where the answer is yes, and mostly O(n) where it is no. Errors: LAM_ERR_MEMORY. */
 lam_status mesh_is_unhidden(const mesh *m, bool *out, double *hidden, lam_error *error);
 
 #endif
