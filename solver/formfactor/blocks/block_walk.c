@@ -7,7 +7,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* Where one cluster lies on both sides of the plane of the other, a linear kernel is off by at most this
  * share of its bound (block_kernel_most). */
@@ -411,23 +410,6 @@ done:
     return status;
 }
 
-/* Of clusters, then of elements by position. */
-static lam_status find_importance(block_finder *k, lam_error *error) {
-    lam_status status = LAM_OK;
-    const plane_tree *tree = k->tree;
-    const mesh *m = k->flat.m;
-    float *clusters = NULL;
-    TRY(importance_of_clusters(k->options->importance, m->area, tree, &clusters, error));
-    k->importance = memory_allocate(k->n_clusters + m->n, sizeof *k->importance, "blocks", error);
-    if (k->importance == NULL) TRY(LAM_ERR_MEMORY);
-    memcpy(k->importance, clusters, k->n_clusters * sizeof *clusters);
-    for (size_t p = 0; p < m->n; p++)
-        k->importance[k->n_clusters + p] = k->options->importance[tree->order[p]];
-done:
-    free(clusters);
-    return status;
-}
-
 lam_status block_finder_set(block_finder *k, const block_options *options, lam_error *error) {
     lam_status status = LAM_OK;
     k->options = options;
@@ -436,7 +418,8 @@ lam_status block_finder_set(block_finder *k, const block_options *options, lam_e
     k->shade.seed = options->seed;
     free(k->importance);
     k->importance = NULL;
-    if (options->importance != NULL) TRY(find_importance(k, error));
+    if (options->importance != NULL)
+        TRY(importance_of_nodes(options->importance, k->flat.m->area, k->tree, &k->importance, error));
     if (k->joined && k->elements == NULL) {
         k->elements = memory_allocate(k->tree->n, sizeof *k->elements, "blocks", error);
         if (k->elements == NULL) TRY(LAM_ERR_MEMORY);

@@ -32,7 +32,7 @@ lam_status wavelet_importance_make(const importance *i, const double *area, cons
     lam_status status = LAM_OK;
     wavelet_importance made = {.times = NULL};
     float *y = NULL;
-    TRY(importance_of_clusters(i->of, area, tree, &y, error));
+    TRY(importance_of_nodes(i->of, area, tree, &y, error));
     TRY(find_most(i->read, tree, &made.over, error));
     made.times = memory_allocate(tree->n_clusters, sizeof *made.times, "operator", error);
     if (made.times == NULL) TRY(LAM_ERR_MEMORY);

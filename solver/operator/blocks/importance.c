@@ -116,11 +116,11 @@ done:
     return status;
 }
 
-lam_status importance_of_clusters(const float *of, const double *area, const plane_tree *tree, float **out,
-                                  lam_error *error) {
+lam_status importance_of_nodes(const float *of, const double *area, const plane_tree *tree, float **out,
+                               lam_error *error) {
     const size_t N = tree->n_clusters;
     double(*sums)[2] = memory_allocate(N, sizeof *sums, "importance", error); /* of A y^2, and of A */
-    float *made = memory_allocate(N, sizeof *made, "importance", error);
+    float *made = memory_allocate(N + tree->n, sizeof *made, "importance", error);
     if (sums == NULL || made == NULL) {
         free(sums);
         free(made);
@@ -136,6 +136,7 @@ lam_status importance_of_clusters(const float *of, const double *area, const pla
         for (int k = 0; !c->leaf && k < 2; k++) sums[t][k] = sums[c->left][k] + sums[t - 1][k];
         made[t] = (float)sqrt(sums[t][0] / sums[t][1]);
     }
+    for (size_t p = 0; p < tree->n; p++) made[N + p] = of[tree->order[p]];
     free(sums);
     *out = made;
     return LAM_OK;

@@ -38,10 +38,10 @@ lam_status importance_even_out(const importance *i, importance *out, lam_error *
 lam_status importance_save(const importance *i, const char *option, store *s, lam_error *error);
 lam_status importance_load(store *s, size_t n, importance *out, lam_error *error);
 
-/* out [n_clusters]: the root mean square over the elements of each cluster, by area, of `of` [n] by element.
- * A function of norm 1 that is spread over a cluster has this norm where it is multiplied by `of`. The caller
- * frees it. Errors: LAM_ERR_MEMORY. */
-lam_status importance_of_clusters(const float *of, const double *area, const plane_tree *tree, float **out,
-                                  lam_error *error);
+/* out [n_clusters + n], of clusters, then of elements by position: the root mean square over the elements of
+ * each, by area, of `of` [n] by element. A function of norm 1 that is spread over a cluster has this norm
+ * where it is multiplied by `of`. area [n] by element. The caller frees it. Errors: LAM_ERR_MEMORY. */
+lam_status importance_of_nodes(const float *of, const double *area, const plane_tree *tree, float **out,
+                               lam_error *error);
 
 #endif

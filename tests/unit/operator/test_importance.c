@@ -126,13 +126,13 @@ static plane_tree tree_of(double (*centre)[3], float (*normal)[3]) {
     return tree;
 }
 
-START_TEST(clusters_have_the_mean_square_of_their_elements) {
+START_TEST(nodes_have_the_mean_square_of_their_elements) {
     subject s;
     double centre[N][3] = {{0}};
     float normal[N][3] = {{0}}, *of = NULL;
     subject_make(&s);
     plane_tree tree = tree_of(centre, normal);
-    ck_ok(importance_of_clusters(s.read.read, s.area, &tree, &of, &error));
+    ck_ok(importance_of_nodes(s.read.read, s.area, &tree, &of, &error));
     ck_assert_uint_gt(tree.n_clusters, 8);
     for (size_t t = 0; t < tree.n_clusters; t++) {
         double square = 0, area = 0;
@@ -143,6 +143,7 @@ START_TEST(clusters_have_the_mean_square_of_their_elements) {
         }
         ck_assert_double_eq_tol((double)of[t], sqrt(square / area), 1e-6);
     }
+    for (size_t p = 0; p < N; p++) ck_assert_float_eq(of[tree.n_clusters + p], s.read.read[tree.order[p]]);
     free(of);
     plane_tree_free(&tree);
     importance_free(&s.read);
@@ -246,7 +247,7 @@ int main(void) {
     TCase *cases = tcase_create("importance");
     tcase_add_test(cases, importance_is_the_radiosity_of_what_is_read);
     tcase_add_test(cases, importance_weighs_what_changes);
-    tcase_add_test(cases, clusters_have_the_mean_square_of_their_elements);
+    tcase_add_test(cases, nodes_have_the_mean_square_of_their_elements);
     tcase_add_test(cases, a_reference_is_more_even);
     tcase_add_test(cases, stores_keep_the_weights);
     tcase_add_test(cases, memory_that_runs_out_leaves_nothing);
