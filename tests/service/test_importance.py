@@ -3,6 +3,7 @@ what is asked for in vain is refused."""
 
 import json
 import os
+import re
 import unittest
 
 import h5py
@@ -19,11 +20,11 @@ class Importance(Case):
     def setUpClass(cls):
         super().setUpClass()
         cls.room = os.path.join(cls.shared.name, "room.obj")
-        must("generate", "cornell", "--closed", "--elements", 2500, "--reflectance", .5, "-o", cls.room)
+        must("generate", "cornell", "--closed", "--elements", 1500, "--reflectance", .5, "-o", cls.room)
         cls.store = os.path.join(cls.shared.name, "some.h5")
         cls.log = must("precompute", cls.room, "-o", cls.store, *HOW, "--receivers", "lamp", "--probes", 8).stderr
         cls.all = os.path.join(cls.shared.name, "all.h5")
-        must("precompute", cls.room, "-o", cls.all, *HOW, "--method", "hierarchical", "--probes", 0, "--quiet")
+        cls.log_of_all = must("precompute", cls.room, "-o", cls.all, *HOW, "--method", "hierarchical", "--probes", 0).stderr
 
     @classmethod
     def is_read(cls):
@@ -55,6 +56,8 @@ class Importance(Case):
             some = file["operator"].attrs["density"]
         with h5py.File(self.all) as file:
             self.assertLess(some, .6 * file["operator"].attrs["density"])
+        blocks = [int(re.search(r"\n(\d+) blocks of ", log)[1]) for log in (self.log, self.log_of_all)]
+        self.assertLess(blocks[0], .9 * blocks[1])
 
     def test_the_store_says_what_it_is_for(self):
         read, _ = self.is_read()
