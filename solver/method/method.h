@@ -79,6 +79,7 @@ typedef struct method_scale {
     double n_blocks;     /* of form factors; 0: they are rows */
     double single_share; /* of the blocks: that of pairs of elements */
     double entries;      /* of the rows; 0: not known */
+    double n_planes;     /* of the tree of clusters; 0: not known */
 } method_scale;
 
 struct decision;

@@ -104,6 +104,7 @@ static method_forecast method_bytes(const forecast *f) {
         .n_channels = (double)f->n_channels,
         .noise = recipe_noise(&f->recipe),
         .n_emitters = (double)f->emitters,
+        .n_planes = (double)f->n_planes,
         .n_blocks = f->recipe.method == RECIPE_BLOCKS ? forecast_blocks((double)f->n, &f->recipe) : 0};
     f->method->forecast(&scale, method_own_const(f->build, f->method), &made);
     if (f->method->kind->narrow != NULL) {

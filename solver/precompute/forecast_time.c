@@ -88,6 +88,7 @@ static double operator_seconds(const forecast *f) {
                                 .n_channels = (double)f->n_channels,
                                 .noise = recipe_noise(&f->recipe),
                                 .n_emitters = (double)f->emitters,
+                                .n_planes = (double)f->n_planes,
                                 .n_blocks = f->recipe.method == RECIPE_BLOCKS ? blocks_of(f, &f->recipe) : 0,
                                 .single_share = f->cost.single_share,
                                 .entries = f->cost.entries > 0 ? f->cost.entries

@@ -231,6 +231,7 @@ forecast state_forecast(const precompute_state *state, double n) {
     panel_precision precision = PANEL_F32;
     (void)panel_precision_find(o->build.precision, &precision); /* one of the choices of the row */
     return (forecast){.n = (size_t)n,
+                      .n_planes = state->tree.n_frames,
                       .n_channels = state->m.n_channels,
                       .sky_tiles = state->sky_tiles,
                       .recipe = state->recipe,

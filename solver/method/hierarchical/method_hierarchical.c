@@ -80,6 +80,12 @@ static const double elements_of_threshold = 1e4, growth_of_threshold = 1. / 6;
  * hemisphere of 4,489 triangles at 1, 1/2 and 1/4 of it), so that it falls with the square of the norm below
  * this one. Rooms have 6 to 15, whatever the number of elements, a sphere 1, a hemisphere .5. */
 static const double norm_least = 1.5;
+/* Of rows the threshold falls with the elements per plane below so many, to a third at most. Wavelets find
+ * smooth light in planes alone: where planes have one or two elements, coefficients are the factors of pairs,
+ * which are less noise than those of smooth light, and the numbers left out are most of the error. With this
+ * share single elements of delft-block (1.4 elements in a plane) err by .069 for .093, of cities (5) by half.
+ */
+static const double elements_of_plane = 12, planes_least = 1. / 3;
 /* Times the radius of a node over the cube root of the threshold: the reach of the node (wavelet_reach.h).
  * The light from beyond eight radii changes no coefficient by more than a threshold of .0026, as was
  * measured. */
@@ -230,9 +236,16 @@ done:
     return status;
 }
 
-/* The threshold over epsilon, by the norm of S where F has no noise. Rows of rays have a norm by their noise,
- * too: noise_of_rows lowers their threshold. */
-static lam_status threshold_share(const build_problem *problem, double *out, lam_error *error) {
+/* The share that the threshold of rows falls to, by the planes of the tree. */
+static double share_of_planes(double n, double planes) {
+    return fmin(fmax(n / (elements_of_plane * planes), planes_least), 1);
+}
+
+/* The threshold over epsilon: by the norm of S where F has no noise, and of rows by `planes`, the share by
+ * the elements per plane, if that is less. Rows of rays have a norm by their noise, too: noise_of_rows lowers
+ * their threshold. */
+static lam_status threshold_share(const build_problem *problem, double planes, double *out,
+                                  lam_error *error) {
     lam_status status = LAM_OK;
     double norm = INFINITY;
     if (problem->blocks != NULL)
@@ -241,7 +254,7 @@ static lam_status threshold_share(const build_problem *problem, double *out, lam
         norm = wavelet_norm_of_rows(problem->F, problem->area);
     *out = norm > 0 ? fmin(norm * norm / (norm_least * norm_least), 1) : 1;
     if (problem->blocks == NULL)
-        *out *= shares_of_rows.of_epsilon;
+        *out = fmin(*out, planes) * shares_of_rows.of_epsilon;
     else
         *out *= shares_of_blocks.of_epsilon *
                 pow(fmax(1, (double)problem->n / elements_of_threshold), growth_of_threshold);
@@ -266,19 +279,21 @@ static lam_status build(const build_problem *problem, const build_options *optio
     double *area = memory_allocate(n, sizeof *area, "operator", error), entries = 0, of_epsilon = 0;
     double *sums = memory_allocate(n, sizeof *sums, "operator", error);
     const double *row_sums = sums;
-    double noise = 1; /* over that of a closed scene of equal elements */
+    double noise = 1, planes = 1; /* over that of a closed scene of equal elements; share_of_planes */
     bool corrected = false;
     if (arrays.K == NULL || rho == NULL || area == NULL || sums == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(threshold_share(problem, &of_epsilon, error));
+    if (problem->blocks == NULL) {
+        TRY(plane_tree_make(n, problem->centre, problem->normal, problem->corners, PLANE_LEAF, &made_tree,
+                            error));
+        planes = share_of_planes((double)n, (double)tree->n_frames);
+    }
+    TRY(threshold_share(problem, planes, &of_epsilon, error));
     if (problem->noise > 0 && problem->F != NULL)
         TRY(noise_of_rows(problem->F, problem->area, &noise, error));
     if (problem->stream != NULL && problem->stream->noise_share > 0) noise = problem->stream->noise_share;
     noise = fmax(noise, noise_least);
-    const double least = noise * share_of_noise * problem->noise;
+    const double least = noise * planes * share_of_noise * problem->noise;
     const double threshold = fmax(noise * of_epsilon * epsilon, least);
-    if (problem->blocks == NULL)
-        TRY(plane_tree_make(n, problem->centre, problem->normal, problem->corners, PLANE_LEAF, &made_tree,
-                            error));
     TRY(wavelet_basis_make(tree, problem->area, problem->centre, &arrays.basis, error));
     TRY(wavelets_weights(&arrays.basis, &weight, error));
     if (problem->importance != NULL)
@@ -347,11 +362,15 @@ done:
     return status;
 }
 
-/* Stored coefficients per element, at most: measured 26 to 66 at epsilon .05 where F is known well (a Cornell
- * box of 10,249 elements, a canopy of 2,500), fewer of larger scenes, and 114 at .003 in that box. Where the
- * noise of rays bounds them, as an epsilon of nearly three times that or less (noise_of_rows), 40 of a city
- * by 1,024 rays, 44 of a hotel room, 36 of Delft. */
-static const double noise_share = 1.6;
+/* Stored coefficients per element at epsilon .05 and with the threshold of large planes: measured 26 to 66
+ * where F is known well (a Cornell box of 10,249 elements), 69 to 101 of cities of 8,000, 87 of a canopy of
+ * 8,000, fewer of larger scenes, and 114 at .003 in that box. Where the noise of rays bounds them, as an
+ * epsilon of nearly three times that or less (noise_of_rows), 40 of a city by 1,024 rays, 44 of a hotel room,
+ * 36 of Delft. Memory is forecast for the most of them, time for usual ones. With a third of the threshold,
+ * where planes are small (share_of_planes), a canopy has 2.1 times as many, delft-block 1.6, and an inverse
+ * takes twice as long. */
+static const double noise_share = 1.6, numbers_most = 100, numbers_usual = 66, planes_power = -.7,
+                    planes_time_power = -.35;
 
 /* Bytes of a coefficient in memory: both triangles in tiles of 12 bytes; in a store; and while it is built
  * from rows, beside two kilobytes per element for the tree (measured: 5.7 kB per element at 27 coefficients,
@@ -387,13 +406,16 @@ static double seconds_of(const method_scale *scale, double numbers_of_rows) {
 
 static void forecast(const method_scale *scale, const void *own, method_forecast *out) {
     const double epsilon = ((const hierarchical_options *)own)->epsilon, blocks = scale->n_blocks;
-    const double of_rows = scale->n * 66 * sqrt(.05 / fmax(epsilon, noise_share * scale->noise));
+    const double planes = scale->n_planes > 0 ? share_of_planes(scale->n, scale->n_planes) : 1;
+    const double finer = scale->n * sqrt(.05 / fmax(epsilon, noise_share * scale->noise));
+    const double of_rows = numbers_most * finer * pow(planes, planes_power);
+    const double usual = numbers_usual * finer * pow(planes, planes_time_power);
     const double count = blocks > 0 ? coefficients_of_block * blocks : of_rows;
     *out = (method_forecast){.building = blocks > 0 ? building_bytes_of_blocks * count * scale->n_channels
                                                     : element_bytes * scale->n + building_bytes * count,
                              .loaded = loaded_bytes * count * scale->n_channels,
                              .stored = stored_bytes * count * scale->n_channels,
-                             .seconds = seconds_of(scale, of_rows / scale->n)};
+                             .seconds = seconds_of(scale, usual / scale->n)};
 }
 
 static double block_accuracy(const void *own) {

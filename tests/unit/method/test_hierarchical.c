@@ -167,6 +167,26 @@ START_TEST(noise_sets_the_threshold) {
 }
 END_TEST
 
+/* Where planes have fewer than 12 elements the threshold falls with their number, to a third at most, by the
+ * noise of rays as by epsilon: a face of a cube has 1, 4, 9 and 36. */
+START_TEST(small_planes_lower_the_threshold) {
+    static const unsigned divisions[] = {1, 2, 3, 6};
+    static const double share[] = {1. / 3, 1. / 3, 9. / 12, 1};
+    for (size_t k = 0; k < sizeof share / sizeof *share; k++) {
+        closed s = closed_make(unit_cube, divisions[k], .5f);
+        build_report report;
+        (void)of(&s);
+        s.problem.noise = .2;
+        lam_operator_close(build(&s.problem, .01, &report));
+        /* The rows sum to 1, to 1e-6 in single precision. */
+        ck_assert_double_eq_tol(report_get(&report, "threshold", -1), share[k] * .055 * .2, 1e-6 * .055 * .2);
+        lam_operator_close(build(&s.problem, 1, &report));
+        ck_assert_double_eq_tol(report_get(&report, "threshold", -1), share[k] * .02, 1e-6 * .02);
+        closed_free(&s);
+    }
+}
+END_TEST
+
 /* The threshold of scenes whose rows are small falls with the square of the Frobenius norm of S, so that
  * single elements err by no more than where rows are full: here a fifth of those of a cube. */
 START_TEST(small_rows_lower_the_threshold) {
@@ -453,6 +473,7 @@ int main(void) {
     tcase_add_test(tests, epsilon_is_what_it_costs);
     tcase_add_test(tests, black_and_white);
     tcase_add_test(tests, noise_sets_the_threshold);
+    tcase_add_test(tests, small_planes_lower_the_threshold);
     tcase_add_test(tests, small_rows_lower_the_threshold);
     tcase_add_test(tests, noise_is_that_of_the_rows);
     tcase_add_test(tests, even_light_is_made_up_for);
