@@ -50,8 +50,9 @@ typedef void visit_correction(void *context, size_t v, size_t channel, const dou
 /* True where guided_reference_each takes an LU for m answers. */
 bool guided_reference_is_dense(const reference_system *s, const lam_operator *op, size_t m);
 
-/* Visits the corrections of the answers which[m], converged to .002 of themselves: of an LU where that takes
- * less time, else guided by the operator, unless it answers only to emitters. Errors: those above. */
+/* Visits the corrections of the answers which[m], converged to .002 of themselves, or to .005 where `rate`
+ * allows it: of an LU where that takes less time, else guided by the operator, unless it answers only to
+ * emitters. Errors: those above. */
 lam_status guided_reference_each(const reference_system *s, const reference_answers *a, size_t m,
                                  const size_t *which, visit_correction *visit, void *context,
                                  lam_error *error);
