@@ -92,7 +92,8 @@ class Scene:
         for light in LIGHTS:
             rows = slice(begin, begin + len(self.emissions[light]))
             begin = rows.stop
-            lit = size[rows] > 0
+            # An element that sees next to nothing has a relative error of thousands.
+            lit = size[rows] > 1e-6 * size[rows].max(initial=0)
             # The mean of squares first: single differences may fall below 0.
             out.append(math.sqrt(max(np.mean(squared[rows][lit] / size[rows][lit]), 0)) if lit.any() else math.nan)
         return out

@@ -268,10 +268,14 @@ END_TEST
 static mesh slatted_plates(void) {
     lam_error error = {.message = ""};
     const mesh_refinement how = {.subdivide_levels = 1};
-    mesh m = plates(NULL);
+    const box_cell low = {.axis = 2, .level = 0, .from = {0, 0, 0}, .to = {1, 1, 0}};
+    const box_cell high = {.axis = 2, .level = 1, .from = {0, 0, 1}, .to = {1, 1, 1}};
+    mesh m = {.n = 0};
+    mesh_add_cell(&m, &low, true);
+    mesh_add_cell(&m, &high, false);
     for (int k = 0; k < 7; k++) {
-        const double at = .02 + .14 * k, high = .3 + .06 * k;
-        const box_cell slat = {.axis = 2, .level = high, .from = {at, 0, high}, .to = {at + .06, 1, high}};
+        const double at = .02 + .14 * k, level = .3 + .06 * k;
+        const box_cell slat = {.axis = 2, .level = level, .from = {at, 0, level}, .to = {at + .06, 1, level}};
         mesh_add_cell(&m, &slat, true);
         mesh_add_cell(&m, &slat, false);
     }
