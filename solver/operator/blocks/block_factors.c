@@ -1,5 +1,6 @@
 #include "solver/operator/blocks/block_factors.h"
 
+#include "solver/base/array_grow.h"
 #include "store/status.h"
 
 #include <math.h>
@@ -104,20 +105,17 @@ static void turn(const block_node *nodes, cluster_block *k) {
 }
 
 /* from[t] = the number of blocks that have a node below t as a (or as b), for t up to n_nodes. */
-static void count_blocks(size_t n_lists, const block_list *lists, size_t n_nodes, bool as_b, size_t *from) {
+static void count_blocks(const block_factors *f, size_t n_nodes, bool as_b, size_t *from) {
     memset(from, 0, (n_nodes + 1) * sizeof *from);
-    for (size_t l = 0; l < n_lists; l++)
-        for (size_t k = 0; k < lists[l].count; k++)
-            from[(as_b ? lists[l].list[k].b : lists[l].list[k].a) + 1]++;
+    for (size_t k = 0; k < f->n_blocks; k++) from[(as_b ? f->blocks[k].b : f->blocks[k].a) + 1]++;
     for (size_t t = 0; t < n_nodes; t++) from[t + 1] += from[t];
 }
 
 /* Counts by a and by b, at once. */
-static void count_both(const block_factors *f, size_t n_lists, const block_list *lists) {
-    const size_t n_nodes = f->n_clusters + f->n;
+static void count_both(const block_factors *f) {
 #pragma omp parallel for schedule(static, 1)
     for (int as_b = 0; as_b < 2; as_b++)
-        count_blocks(n_lists, lists, n_nodes, as_b == 1, as_b == 1 ? f->into_from : f->from);
+        count_blocks(f, f->n_clusters + f->n, as_b == 1, as_b == 1 ? f->into_from : f->from);
 }
 
 /* The first node of part k of n_parts, which hold about as many blocks each. */
@@ -160,10 +158,10 @@ static lam_status cut(block_factors *f, lam_error *error) {
 
 /* True where each block has a before b, and stands behind those of smaller a, or of the same a and smaller b.
  */
-static bool is_sorted(const block_node *nodes, const block_list *from) {
-    for (size_t k = 0; k < from->count; k++) {
-        const cluster_block *here = &from->list[k], *last = &from->list[k > 0 ? k - 1 : 0];
-        if (nodes[here->a].begin >= nodes[here->b].begin) return false;
+static bool is_sorted(const block_factors *f) {
+    for (size_t k = 0; k < f->n_blocks; k++) {
+        const cluster_block *here = &f->blocks[k], *last = &f->blocks[k > 0 ? k - 1 : 0];
+        if (f->nodes[here->a].begin >= f->nodes[here->b].begin) return false;
         if (here->a < last->a || (here->a == last->a && here->b < last->b)) return false;
     }
     return true;
@@ -190,22 +188,60 @@ static void sort_by_b(size_t count, cluster_block *blocks) {
     }
 }
 
-/* The blocks of all lists by a, those of one a by b: no two have both nodes in common. Each thread takes
- * those of some nodes a out of all lists. next [n_nodes]: room. */
-static void sort_blocks(const block_factors *f, size_t n_lists, const block_list *lists, size_t *next,
-                        cluster_block *out) {
+/* Blocks are sorted in parts of some nodes a each, so small that a part is sorted within a cache. */
+enum { SORTED_PARTS = 128 };
+
+/* Brings the blocks of each part together in place: each exchange brings one into its part. */
+static void part_blocks(cluster_block *blocks, const uint8_t *part_of, size_t next[SORTED_PARTS],
+                        const size_t end[SORTED_PARTS]) {
+    for (size_t p = 0; p < SORTED_PARTS; p++)
+        while (next[p] < end[p]) {
+            const cluster_block here = blocks[next[p]];
+            const size_t q = part_of[here.a], to = next[q]++;
+            if (q == p) continue;
+            blocks[next[p]] = blocks[to];
+            blocks[to] = here;
+        }
+}
+
+/* Sorts the blocks by a, those of one a by b: no two have both nodes in common. They stay where they are, but
+ * for one part for each thread at a time. */
+static lam_status sort_blocks(const block_factors *f, lam_error *error) {
+    lam_status status = LAM_OK;
     const size_t n_nodes = f->n_clusters + f->n;
-#pragma omp parallel
-    {
-        const size_t n_parts = (size_t)omp_get_num_threads(), k = (size_t)omp_get_thread_num();
-        const uint32_t first = part_begin(f->from, n_nodes, k, n_parts),
-                       last = part_begin(f->from, n_nodes, k + 1, n_parts);
-        memcpy(next + first, f->from + first, (last - first) * sizeof *next);
-        for (size_t l = 0; l < n_lists; l++)
-            for (const cluster_block *b = lists[l].list, *end = b + lists[l].count; b < end; b++)
-                if (b->a >= first && b->a < last) out[next[b->a]++] = *b;
-        for (size_t t = first; t < last; t++) sort_by_b(f->from[t + 1] - f->from[t], out + f->from[t]);
+    size_t next[SORTED_PARTS], end[SORTED_PARTS], longest = 0;
+    uint32_t first[SORTED_PARTS + 1];
+    cluster_block *room = NULL;
+    size_t *place =
+        memory_allocate(n_nodes, sizeof *place, "blocks", error); /* of the next block of a node */
+    uint8_t *part_of = memory_allocate(n_nodes, sizeof *part_of, "blocks", error);
+    if (place == NULL || part_of == NULL) TRY(LAM_ERR_MEMORY);
+    memcpy(place, f->from, n_nodes * sizeof *place);
+    for (size_t p = 0; p <= SORTED_PARTS; p++) first[p] = part_begin(f->from, n_nodes, p, SORTED_PARTS);
+    for (size_t p = 0; p < SORTED_PARTS; p++) {
+        memset(part_of + first[p], (int)p, first[p + 1] - first[p]);
+        next[p] = f->from[first[p]];
+        end[p] = f->from[first[p + 1]];
+        longest = end[p] - next[p] > longest ? end[p] - next[p] : longest;
     }
+    room = memory_allocate((size_t)omp_get_max_threads(), longest * sizeof *room, "blocks", error);
+    if (room == NULL) TRY(LAM_ERR_MEMORY);
+    part_blocks(f->blocks, part_of, next, end);
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t p = 0; p < SORTED_PARTS; p++) {
+        const size_t begin = f->from[first[p]], count = end[p] - begin;
+        cluster_block *const own = room + (size_t)omp_get_thread_num() * longest, *const all =
+                                                                                      f->blocks + begin;
+        for (size_t k = 0; k < count; k++) own[place[all[k].a]++ - begin] = all[k];
+        for (size_t t = first[p]; t < first[p + 1]; t++)
+            sort_by_b(f->from[t + 1] - f->from[t], own + (f->from[t] - begin));
+        if (count > 0) memcpy(all, own, count * sizeof *own);
+    }
+done:
+    free(room);
+    free(place);
+    free(part_of);
+    return status;
 }
 
 /* f->into, the blocks by b, those of one b in their present order. next as above. */
@@ -241,40 +277,44 @@ static void find_parts(block_factors *f) {
     }
 }
 
-static void free_lists(size_t n_lists, block_list *lists) {
-    for (size_t l = 0; l < n_lists; l++) {
-        free(lists[l].list);
-        lists[l] = (block_list){.list = NULL};
+/* All blocks behind those of the first list. */
+static lam_status join_lists(block_factors *f, size_t n_lists, block_list *lists, lam_error *error) {
+    lam_status status = LAM_OK;
+    block_list *const all = &lists[0];
+    size_t count = 0;
+    for (size_t l = 0; l < n_lists; l++) count += lists[l].count;
+    if (count > UINT32_MAX) FAIL(error, LAM_ERR_MEMORY, "%zu blocks, must be below 2^32", count);
+    if (n_lists > 1) TRY(array_resize(&all->list, count, sizeof *all->list, "blocks", error));
+    for (size_t l = 1; l < n_lists; l++) {
+        block_list *const from = &lists[l];
+        if (from->count > 0) memcpy(all->list + all->count, from->list, from->count * sizeof *from->list);
+        all->count += from->count;
+        free(from->list);
+        *from = (block_list){.list = NULL};
     }
+    f->blocks = all->list;
+    f->n_blocks = all->count;
+    *all = (block_list){.list = NULL};
+done:
+    return status;
 }
 
 lam_status block_factors_end_lists(block_factors *f, size_t n_lists, block_list *lists, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n_nodes = f->n_clusters + f->n;
-    size_t count = 0, *next = NULL;
-    for (size_t l = 0; l < n_lists; l++) count += lists[l].count;
+    size_t *next = NULL;
     TRY(cut(f, error));
-    if (count > UINT32_MAX) FAIL(error, LAM_ERR_MEMORY, "%zu blocks, must be below 2^32", count);
+    TRY(join_lists(f, n_lists, lists, error));
     f->from = memory_allocate(n_nodes + 1, sizeof *f->from, "blocks", error);
     f->into_from = memory_allocate(n_nodes + 1, sizeof *f->into_from, "blocks", error);
-    f->into = memory_allocate(count, sizeof *f->into, "blocks", error);
+    f->into = memory_allocate(f->n_blocks, sizeof *f->into, "blocks", error);
     next = memory_allocate(n_nodes, sizeof *next, "blocks", error);
     if (f->from == NULL || f->into_from == NULL || f->into == NULL || next == NULL) TRY(LAM_ERR_MEMORY);
-    const bool sorted = n_lists == 1 && is_sorted(f->nodes, &lists[0]);
-    for (size_t l = 0; l < n_lists && !sorted; l++)
-#pragma omp parallel for schedule(static)
-        for (size_t k = 0; k < lists[l].count; k++) turn(f->nodes, &lists[l].list[k]);
-    count_both(f, n_lists, lists);
-    if (sorted) {
-        f->blocks = lists[0].list;
-        lists[0].list = NULL;
-    } else {
-        f->blocks = memory_allocate(count, sizeof *f->blocks, "blocks", error);
-        if (f->blocks == NULL) TRY(LAM_ERR_MEMORY);
-        sort_blocks(f, n_lists, lists, next, f->blocks);
-    }
-    f->n_blocks = count;
-    free_lists(n_lists, lists);
+    const bool sorted = n_lists == 1 && is_sorted(f);
+#pragma omp parallel for schedule(static) if (!sorted)
+    for (size_t k = 0; k < (sorted ? 0 : f->n_blocks); k++) turn(f->nodes, &f->blocks[k]);
+    count_both(f);
+    if (!sorted) TRY(sort_blocks(f, error));
     order_by_b(f, next);
     find_parts(f);
 done:
@@ -287,6 +327,6 @@ lam_status block_factors_end(block_factors *f, lam_error *error) {
     f->blocks = NULL;
     f->n_blocks = 0;
     const lam_status status = block_factors_end_lists(f, 1, &all, error);
-    free_lists(1, &all);
+    free(all.list); /* after an error */
     return status;
 }

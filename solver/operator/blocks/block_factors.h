@@ -96,8 +96,8 @@ lam_status block_factors_begin(const plane_tree *tree, const double *area, const
                                block_factors *out, lam_error *error);
 
 /* Call once after the blocks were set: turns those whose b stands before a, sorts them, unless they are so
- * already, and prepares products. Cost: O(n + n_blocks), and to sort them as much memory again. Errors:
- * LAM_ERR_MEMORY, also for 2^32 blocks and more. */
+ * already, and prepares products. Cost: O(n + n_blocks). Errors: LAM_ERR_MEMORY, also for 2^32 blocks and
+ * more. */
 lam_status block_factors_end(block_factors *f, lam_error *error);
 /* The same with the blocks of several lists, which are freed and empty afterwards; after an error the lists
  * are the caller's, as they may be, with their blocks turned. */

@@ -393,6 +393,45 @@ START_TEST(pairs_of_an_open_scene_are_certain) {
 }
 END_TEST
 
+/* The sphere of a cluster of several planes is that around the box of all corners of its elements. */
+START_TEST(spheres_hold_their_elements) {
+    mesh m = bowl(RINGS, SECTORS, 1, false);
+    plane_tree tree;
+    block_factors nodes;
+    flat_clusters flat;
+    size_t tried = 0;
+    double(*centre)[3] = test_allocate(m.n, sizeof *centre);
+    for (size_t i = 0; i < m.n; i++) mesh_centroid(&m, i, centre[i]);
+    ck_ok(form_factors_tree(&m, &tree, &error));
+    ck_ok(block_factors_begin(&tree, m.area, (const double(*)[3])centre, &nodes, &error));
+    ck_ok(flat_clusters_make(&m, &tree, &nodes, &flat, &error));
+    for (size_t t = 0; t < tree.n_clusters; t++) {
+        const plane_cluster *c = &tree.clusters[t];
+        double low[3] = {9, 9, 9}, high[3] = {-9, -9, -9}, square = 0;
+        if (c->frame != PLANE_ABOVE) continue;
+        for (size_t p = c->begin; p < c->end; p++)
+            for (size_t k = 0; k < mesh_corners(&m, tree.order[p]); k++)
+                for (int d = 0; d < 3; d++) {
+                    const double at = m.vertices[m.elements[tree.order[p]][k]][d];
+                    low[d] = fmin(low[d], at);
+                    high[d] = fmax(high[d], at);
+                }
+        for (int d = 0; d < 3; d++) {
+            ck_assert_double_le(fabs(flat.of[t].centre[d] - (low[d] + high[d]) / 2), 1e-12);
+            square += (high[d] - low[d]) * (high[d] - low[d]) / 4;
+        }
+        ck_assert_double_le(fabs(flat.of[t].radius - sqrt(square)), 1e-12);
+        tried++;
+    }
+    ck_assert_uint_gt(tried, m.n / 8);
+    flat_clusters_free(&flat);
+    block_factors_free(&nodes);
+    plane_tree_free(&tree);
+    mesh_free(&m);
+    free(centre);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("joined blocks");
     TCase *tests = tcase_create("joined");
@@ -400,6 +439,7 @@ int main(void) {
     tcase_add_test(tests, planes_are_found_among_many_directions);
     tcase_add_test(tests, what_hides_nothing_is_proven);
     tcase_add_test(tests, dents_count_where_they_hide_light);
+    tcase_add_test(tests, spheres_hold_their_elements);
     tcase_add_loop_test(tests, even_blocks_are_means_of_all_pairs, 0, DEPTHS);
     tcase_add_loop_test(tests, products_are_those_of_all_pairs, 0, DEPTHS);
     tcase_add_loop_test(tests, row_sums_are_those_of_all_pairs, 0, DEPTHS);

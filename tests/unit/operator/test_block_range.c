@@ -152,12 +152,12 @@ START_TEST(one_corner_is_projected) {
                                                                      turned ? &k->L[0][2] : &k->L[2][0];
             k->L[0][0] = 1;
             *u = 1.25f;
-            *v = .25f;
+            *v = .5f;
             ck_ok(block_factors_reduce(&f, &reduced, &error));
             ck_assert_uint_eq(reduced, 1);
-            /* 1 - u - v = -.5 becomes 1e-5 by (.5 + 1e-5) / 6 of (3, 3); single precision. */
-            ck_assert_double_le(fabs((double)*u - (1.25 - .250005)), 1e-6);
-            ck_assert_double_le(fabs((double)*v - (.25 - .250005)), 1e-6);
+            /* 1 - u - v = -.75 becomes 1e-5 by (.75 + 1e-5) / 6 of (3, 3); single precision. */
+            ck_assert_double_le(fabs((double)*u - (1.25 - .375005)), 1e-6);
+            ck_assert_double_le(fabs((double)*v - (.5 - .375005)), 1e-6);
             ck_assert(k->L[0][0] == 1 && k->L[1][1] == 0 && k->L[2][2] == 0);
             tried++;
         }
