@@ -110,13 +110,6 @@ static bool lift_corner(const double x[BLOCK_FUNCTIONS], const double y[BLOCK_FU
     return true;
 }
 
-/* True where no slopes reach the value at the centres, as the functions of a node go from -1 to 1: then
- * block_least is positive, whatever the ranges are. */
-static bool is_surely_positive(const cluster_block *k) {
-    const double middle = (double)k->L[0][0];
-    return 2 * middle > (1 + 1e-9) * block_magnitude(k);
-}
-
 /* Projections onto one corner after the other; what they leave below 0 takes a common factor. */
 static void reduce(const block_range *ranges, cluster_block *block) {
     const double middle = fmax((double)block->L[0][0], 0);
@@ -154,7 +147,7 @@ lam_status block_factors_reduce(block_factors *f, size_t *n_reduced, lam_error *
     if (block_ranges(f, &ranges, error) != LAM_OK) return LAM_ERR_MEMORY;
 #pragma omp parallel for schedule(static, 4096) reduction(+ : count)
     for (size_t k = 0; k < f->n_blocks; k++) {
-        if (is_surely_positive(&f->blocks[k]) || block_least(ranges, &f->blocks[k]) >= 0) continue;
+        if (block_least(ranges, &f->blocks[k]) >= 0) continue;
         reduce(ranges, &f->blocks[k]);
         count++;
     }
