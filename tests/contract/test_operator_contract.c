@@ -480,5 +480,5 @@ int main(void) {
     tcase_add_loop_test(tests, work_area_is_not_overrun, 0, TRANSPORTS);
     tcase_add_loop_test(tests, bad_arguments_are_refused, 0, TRANSPORTS);
     suite_add_tcase(suite, tests);
-    return suite_run(suite);
+    return suite_run_together(suite);
 }

@@ -55,5 +55,5 @@ int main(void) {
     tcase_add_unchecked_fixture(tests, transport_keep_all, transport_free_all);
     tcase_add_loop_test(tests, says_what_it_is, 0, TRANSPORTS);
     suite_add_tcase(suite, tests);
-    return suite_run(suite);
+    return suite_run_together(suite);
 }

@@ -378,5 +378,5 @@ int main(void) {
     tcase_add_test(tests, rank_zero_is_direct_light_only);
     tcase_add_test(tests, sphere_is_exact_with_one_column);
     suite_add_tcase(suite, tests);
-    return suite_run(suite);
+    return suite_run_together(suite);
 }

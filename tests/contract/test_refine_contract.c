@@ -177,5 +177,5 @@ int main(void) {
     tcase_add_loop_test(tests, a_tolerance_too_small_is_refused, 0, TRANSPORTS);
     tcase_add_loop_test(tests, darkness_and_bad_arguments, 0, TRANSPORTS);
     suite_add_tcase(suite, tests);
-    return suite_run(suite);
+    return suite_run_together(suite);
 }

@@ -14,6 +14,10 @@ int suite_run(Suite *suite) {
     return run_by(suite, CK_FORK_GETENV);
 }
 
+int suite_run_together(Suite *suite) {
+    return run_by(suite, CK_NOFORK);
+}
+
 int suite_run_apart(Suite *suite) {
     return run_by(suite, CK_FORK);
 }

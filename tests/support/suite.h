@@ -19,6 +19,10 @@
 /* Runs a suite; the exit status. */
 int suite_run(Suite *suite);
 
+/* The same in one process: an unchecked fixture has run threads of OpenMP, and a process that is forked after
+ * that waits for them for ever. */
+int suite_run_together(Suite *suite);
+
 /* The same with a process for each check, whatever CK_FORK says: some of them end theirs. */
 int suite_run_apart(Suite *suite);
 
