@@ -162,7 +162,7 @@ static double brightness(const side_views *w, size_t side) {
     return (fronts - back_weight * backs) / (double)w->rays;
 }
 
-/* How much brighter the side that is the front now is than the other. */
+/* The brightness of the side that is the front now, less that of the other. */
 static double gain(const side_views *w, size_t patch) {
     const size_t front = 2 * patch + w->turned[patch];
     return brightness(w, front) - brightness(w, front ^ 1);

@@ -1,5 +1,4 @@
-/* Which way faces look: light that meets backs is lost, and rays tell which side of a face the light is on.
- */
+/* Sides of faces by rays: where light meets backs and is lost, and to which side a face should look. */
 #ifndef LAMBERT_FORMFACTOR_FACING_H
 #define LAMBERT_FORMFACTOR_FACING_H
 
