@@ -150,6 +150,41 @@ START_TEST(rays_decide_the_side) {
 }
 END_TEST
 
+/* Three leaves of a book share its spine, and hang together by no edge of two. */
+START_TEST(an_edge_of_three_joins_nothing) {
+    mesh m = {0};
+    mesh_sides s;
+    lam_error error = {0};
+    mesh_add_quad(&m, (const double[4][3]){{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}});
+    mesh_add_quad(&m, (const double[4][3]){{0, 0, 0}, {-1, 0, 0}, {-1, 1, 0}, {0, 1, 0}});
+    mesh_add_quad(&m, (const double[4][3]){{0, 0, 0}, {0, 0, 1}, {0, 1, 1}, {0, 1, 0}});
+    mesh_finish(&m, .5f);
+    ck_assert_msg(mesh_sides_find(&m, &s, &error) == LAM_OK, "%s", error.message);
+    ck_assert_uint_eq(s.n_patches, 3);
+    mesh_sides_free(&s);
+    mesh_free(&m);
+}
+END_TEST
+
+/* A room that looks outward, around a box most of whose area looks the right way, so that the room is
+ * brighter inside; if the box came first, it would turn to the dark between both. */
+START_TEST(the_largest_patch_is_turned_first) {
+    mesh m = {0}, right = {0};
+    for (int k = 0; k < 2; k++) {
+        mesh *const one = k == 0 ? &m : &right;
+        add_box(one, (const double[3]){0, 0, 0}, (const double[3]){4, 3, 2}, k == 1);
+        add_box(one, (const double[3]){.3, .3, .2}, (const double[3]){3.7, 2.7, 1.8}, false);
+        mesh_finish(one, .5f);
+    }
+    for (size_t i = 6; i < 12; i++) /* its top and its bottom, 47 % of its area */
+        if (fabsf(m.normal[i][2]) > .9f) mesh_turn(&m, i);
+    ck_assert_uint_eq(orient(&m).turned, 8);
+    ck_assert_uint_eq(count_equal(&m, &right), 12);
+    mesh_free(&m);
+    mesh_free(&right);
+}
+END_TEST
+
 /* Faces that share no edge: a soup. */
 START_TEST(soups_are_turned_face_by_face) {
     mesh m = {0};
@@ -199,6 +234,8 @@ int main(void) {
     tcase_add_test(tests, a_turned_face_keeps_its_corners);
     tcase_add_test(tests, neighbours_agree);
     tcase_add_test(tests, rays_decide_the_side);
+    tcase_add_test(tests, an_edge_of_three_joins_nothing);
+    tcase_add_test(tests, the_largest_patch_is_turned_first);
     tcase_add_test(tests, soups_are_turned_face_by_face);
     tcase_add_test(tests, what_is_alone_is_left);
     suite_add_tcase(suite, tests);

@@ -100,6 +100,15 @@ START_TEST(files_outside_the_folder_need_assets) {
     import_beside(path, NULL, "'grey.mtl' is missing", &m);
     import_beside(path, folder, NULL, &m);
     mesh_free(&m);
+    /* A folder whose name begins like that of the scene's is another. */
+    char beside[128];
+    snprintf(beside, sizeof beside, "%s/inner2", folder);
+    ck_assert_int_eq(mkdir(beside, 0700), 0);
+    file_write(beside, "grey.mtl", "newmtl a\nKd .25 .25 .25\n", path);
+    file_write(inner, "scene.obj", "mtllib ../inner2/grey.mtl\n" SQUARE "usemtl a\nf 1 2 3 4\n", path);
+    import_beside(path, NULL, "lies outside the scene's folder", &m);
+    import_beside(path, beside, NULL, &m);
+    mesh_free(&m);
     /* From the folder above, which has the folder of the assets in it. */
     file_write(folder, "above.obj", "mtllib inner/link.mtl\n" SQUARE "usemtl a\nf 1 2 3 4\n", path);
     import_beside(path, NULL, NULL, &m);
