@@ -1,5 +1,6 @@
 /* Blocks of clusters or pairs and rays: the choice by the cost of samples. */
 #include "solver/base/terminal.h"
+#include "solver/formfactor/blocks/blocks.h"
 #include "solver/precompute/precompute_state.h"
 #include "support/building.h"
 #include "support/scene.h"
@@ -38,6 +39,7 @@ static outcome choose(const char *scene, size_t n, recipe other, int n_threads) 
     ck_ok(state_choose_blocks(&state, method_find("hierarchical"), true, &error));
     omp_set_num_threads(before);
     const outcome found = {state.recipe.method, state.cost.seconds};
+    block_scene_destroy(state.ready);
     mesh_free(&state.m);
     plane_tree_free(&state.tree);
     return found;
