@@ -35,7 +35,7 @@ static void first_bounce(const bench *b, const occlusion *o, uint32_t e, double 
         const uint32_t j = (uint32_t)i;
         double g =
             j == e ? 0 : pair_factor_exchange(o->rules, &o->polygons[e], &o->polygons[j], o->tolerance);
-        if (g > 0) g = occlusion_estimate(o, e < j ? e : j, e < j ? j : e, g);
+        if (g > 0) g = occlusion_estimate(o, NULL, e < j ? e : j, e < j ? j : e, g);
         out[i] = (double)b->m.reflectance[i] * g / b->m.area[i];
     }
 }

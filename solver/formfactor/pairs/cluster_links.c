@@ -64,7 +64,8 @@ static cluster_state look_between(walk *w, const cluster *a, const cluster *b, c
     const bool near = w->options->threshold > 0;
     if (w->options->occluders != NULL) {
         link_occluders among;
-        link_occluders_find(w->options->occluders, s, a, b, &among);
+        link_occluders_find(w->options->occluders, s, a, b, link_occluders_projected(w->options->occluders),
+                            &among);
         if (among.count == 0) return CLUSTERS_OPEN;
         if (among.count > 0)
             return !near && link_occluders_hide(w->options->occluders, &among, a, b) ? CLUSTERS_HIDDEN

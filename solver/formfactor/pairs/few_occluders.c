@@ -26,11 +26,12 @@ bool few_occluders_apply(const few_occluders *f) {
     return f->most > 0 && f->occluders.n > 0 && f->occluders.n <= FEW_OCCLUDERS;
 }
 
-bool few_occluders_pay(const few_occluders *f, const cluster_tree *t, const cluster_links *links) {
+/* True where most links of a sample have up to `most` occluders. */
+static bool are_mostly_few(const few_occluders *f, const cluster_tree *t, const cluster_links *links,
+                           int most) {
     enum { SAMPLE = 2000 };
     const size_t step = links->n / SAMPLE + 1;
     size_t counted = 0, uncounted = 0;
-    if (f->most == 0 || f->occluders.n <= FEW_OCCLUDERS) return few_occluders_apply(f);
     for (size_t k = 0; k < links->n; k += step) {
         const cluster_link *link = &links->links[k];
         const cluster *a = &t->clusters[link->a], *b = &t->clusters[link->b];
@@ -38,11 +39,20 @@ bool few_occluders_pay(const few_occluders *f, const cluster_tree *t, const clus
         shaft s;
         if (link->open || link->a == link->b) continue;
         cluster_shaft_init(&s, a, b, f->occluders.slack);
-        link_occluders_find(&f->occluders, &s, a, b, &among);
+        link_occluders_find(&f->occluders, &s, a, b, most, &among);
         counted += among.count >= 0;
         uncounted += among.count < 0;
     }
     return counted > uncounted;
+}
+
+bool few_occluders_pay(const few_occluders *f, const cluster_tree *t, const cluster_links *links) {
+    if (f->most == 0 || f->occluders.n <= FEW_OCCLUDERS) return few_occluders_apply(f);
+    return are_mostly_few(f, t, links, link_occluders_projected(&f->occluders));
+}
+
+bool few_occluders_are_listed(const few_occluders *f, const cluster_tree *t, const cluster_links *links) {
+    return f->most > 0 && f->occluders.n > 0 && are_mostly_few(f, t, links, LINK_OCCLUDERS_MOST);
 }
 
 double few_occluders_tolerance(const few_occluders *f, uint32_t i, uint32_t j, double g, double accuracy) {
@@ -93,4 +103,17 @@ few_verdict few_occluders_share(const few_occluders *f, const link_occluders *am
     if (found < 0) return FEW_UNDECIDED;
     *share = found;
     return found <= 0 ? FEW_HIDDEN : FEW_PARTIAL;
+}
+
+few_verdict few_occluders_between(const few_occluders *f, const link_occluders *among, uint32_t i, uint32_t j,
+                                  pair_occluders *between) {
+    polygon a, b;
+    *between = (pair_occluders){.count = OCCLUDERS_UNCOUNTED};
+    polygon_in_front(&f->polygons[i], &f->polygons[j], &a);
+    polygon_in_front(&f->polygons[j], &f->polygons[i], &b);
+    if (a.n == 0 || b.n == 0) return FEW_UNDECIDED;
+    const uint32_t own[2] = {facet_of(f, i), facet_of(f, j)};
+    pair_occluders_find(&f->occluders, among, &a, &b, own, between);
+    if (between->hidden) return FEW_HIDDEN;
+    return between->count == 0 ? FEW_OPEN : FEW_UNDECIDED;
 }

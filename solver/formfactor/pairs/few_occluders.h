@@ -26,6 +26,10 @@ bool few_occluders_apply(const few_occluders *f);
  * of a sample of the links. Else finding them costs more than projection gains. */
 bool few_occluders_pay(const few_occluders *f, const cluster_tree *t, const cluster_links *links);
 
+/* True where segments are to be tested against lists: where up to LINK_OCCLUDERS_MOST stand between most of a
+ * sample of the links. */
+bool few_occluders_are_listed(const few_occluders *f, const cluster_tree *t, const cluster_links *links);
+
 /* The tolerance of a pair's share that keeps its factor, F_ij or F_ji, to a third of the accuracy that
  * segments would have: projection is fast enough for it. */
 double few_occluders_tolerance(const few_occluders *f, uint32_t i, uint32_t j, double g, double accuracy);
@@ -41,5 +45,10 @@ void few_occluders_free(few_occluders *f);
  * share stays unchanged. Adds to *work as projection_share. */
 few_verdict few_occluders_share(const few_occluders *f, const link_occluders *among, uint32_t i, uint32_t j,
                                 double g, double tolerance, double *share, double *work);
+
+/* The occluders that may block a segment between elements i and j of a link, or the one that blocks all, or
+ * OCCLUDERS_UNCOUNTED. FEW_OPEN and FEW_HIDDEN are proven. */
+few_verdict few_occluders_between(const few_occluders *f, const link_occluders *among, uint32_t i, uint32_t j,
+                                  pair_occluders *between);
 
 #endif

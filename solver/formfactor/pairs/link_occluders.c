@@ -19,11 +19,15 @@ static bool is_between(const occluder *o, const cluster *a, const cluster *b, do
     return (low[0] < -slack && high[1] > slack) || (low[1] < -slack && high[0] > slack);
 }
 
-void link_occluders_find(const occluders *o, const shaft *s, const cluster *a, const cluster *b,
+int link_occluders_projected(const occluders *o) {
+    enum { OF_FEW = 48, AMID_MANY = 8 };
+    return o->n <= FEW_OCCLUDERS ? OF_FEW : AMID_MANY;
+}
+
+void link_occluders_find(const occluders *o, const shaft *s, const cluster *a, const cluster *b, int most,
                          link_occluders *out) {
     const uint32_t *found;
     uint32_t count;
-    const int most = o->n <= FEW_OCCLUDERS ? LINK_OCCLUDERS_MOST : LINK_OCCLUDERS_AMID_MANY;
     out->count = 0;
     for (occluder_search search = occluder_search_begin(o, s); occluder_search_next(&search, &found, &count);)
         for (uint32_t k = 0; k < count; k++) {

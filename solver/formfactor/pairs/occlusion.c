@@ -64,13 +64,15 @@ static void segment_set(segment_bundle *s, const occlusion *o, int k, uint32_t i
 typedef struct piece_pair {
     uint32_t i, j;
     const polygon *a, *b;
-    bool affine; /* both are */
+    bool affine;               /* both are */
+    const segment_list *among; /* see occlusion_estimate */
     affine_pair maps;
     pair_sampler sampler;
 } piece_pair;
 
-static piece_pair piece_pair_of(uint64_t seed, uint32_t i, const polygon *a, uint32_t j, const polygon *b) {
-    piece_pair two = {.i = i, .j = j, .a = a, .b = b, .affine = a->affine && b->affine};
+static piece_pair piece_pair_of(uint64_t seed, const segment_list *among, uint32_t i, const polygon *a,
+                                uint32_t j, const polygon *b) {
+    piece_pair two = {.i = i, .j = j, .a = a, .b = b, .affine = a->affine && b->affine, .among = among};
     if (two.affine) two.maps = (affine_pair){affine_map_of(a), affine_map_of(b)};
     pair_sampler_init(&two.sampler, seed, i, j);
     return two;
@@ -105,6 +107,7 @@ static unsigned cast(const occlusion *o, const piece_pair *two, size_t first,
     segment_bundle s;
     segments_of(&s, o, two, first);
     memcpy(kernel, s.kernel, sizeof s.kernel);
+    if (two->among != NULL) return segment_occluders_block(o->occluders, two->among, &s.segments);
     return visibility_blocked(o->v, &s.segments, VISIBILITY_PACKET, s.from, s.to);
 }
 
@@ -116,7 +119,7 @@ occlusion_verdict occlusion_test(const occlusion *o, uint32_t i, uint32_t j, dou
     const size_t segments = first_segments(factor_of(o, i, j, g));
     double part = 0, all = 0;
     bool any_open = false, any_blocked = false;
-    const piece_pair two = piece_pair_of(o->seed, i, &o->polygons[i], j, &o->polygons[j]);
+    const piece_pair two = piece_pair_of(o->seed, NULL, i, &o->polygons[i], j, &o->polygons[j]);
     for (size_t first = 0; first < segments && !(any_open && any_blocked); first += VISIBILITY_PACKET) {
         double kernel[VISIBILITY_PACKET];
         const unsigned blocked = cast(o, &two, first, kernel);
@@ -150,7 +153,8 @@ static double visible_share(const occlusion *o, const piece_pair *two, size_t n_
 /* A pair that is estimated piece by piece. */
 typedef struct segment_budget {
     uint32_t i, j;
-    double segments_per_area; /* segments for each m^2 of exchange area: pieces share the pair's segments */
+    const segment_list *among; /* see occlusion_estimate */
+    double segments_per_area;  /* segments for each m^2 of exchange area: pieces share the pair's segments */
 } segment_budget;
 
 /* Effective sample size over sample size, (sum K)^2 / (N sum K^2): 1 where the kernel is constant. */
@@ -188,7 +192,7 @@ static double visible_exchange(const occlusion *o, const segment_budget *pair, c
     enum { MOST_SPLITS = 14 };
     const double g = pair_factor_exchange(o->rules, a, b, o->tolerance);
     if (g <= 0) return 0;
-    const piece_pair two = piece_pair_of(o->seed + path, pair->i, a, pair->j, b);
+    const piece_pair two = piece_pair_of(o->seed + path, pair->among, pair->i, a, pair->j, b);
     const double packets = ceil(g * pair->segments_per_area / VISIBILITY_PACKET);
     if (splits == MOST_SPLITS || packets <= 1 || kernel_is_even(o, &two))
         return g * visible_share(o, &two, (size_t)packets * VISIBILITY_PACKET);
@@ -204,10 +208,10 @@ static double visible_exchange(const occlusion *o, const segment_budget *pair, c
 
 /* The standard error to reach: o->accuracy, relaxed to 10 F V o->accuracy where the visible factor F V, by
  * PILOT segments, is above .1. */
-static double accuracy_for(const occlusion *o, uint32_t i, uint32_t j, double F) {
+static double accuracy_for(const occlusion *o, const segment_list *among, uint32_t i, uint32_t j, double F) {
     enum { PILOT = 64 };
     if (F <= .1) return o->accuracy;
-    const piece_pair two = piece_pair_of(o->seed, i, &o->polygons[i], j, &o->polygons[j]);
+    const piece_pair two = piece_pair_of(o->seed, among, i, &o->polygons[i], j, &o->polygons[j]);
     return o->accuracy * fmax(1, 10 * F * visible_share(o, &two, PILOT));
 }
 
@@ -217,10 +221,10 @@ double occlusion_segments(const occlusion *o, uint32_t i, uint32_t j, double g) 
     return (double)segments_for(o, F, o->accuracy * fmax(1, 5 * F));
 }
 
-double occlusion_estimate(const occlusion *o, uint32_t i, uint32_t j, double g) {
-    const double F = factor_of(o, i, j, g), accuracy = accuracy_for(o, i, j, F);
+double occlusion_estimate(const occlusion *o, const segment_list *among, uint32_t i, uint32_t j, double g) {
+    const double F = factor_of(o, i, j, g), accuracy = accuracy_for(o, among, i, j, F);
     const segment_budget pair = {
-        .i = i, .j = j, .segments_per_area = (double)segments_for(o, F, accuracy) / g};
+        .i = i, .j = j, .among = among, .segments_per_area = (double)segments_for(o, F, accuracy) / g};
     /* The exchange areas of the pieces sum to g only within the tolerance, and occlusion never adds. */
     return fmin(g, visible_exchange(o, &pair, &o->polygons[i], &o->polygons[j], 0, 0));
 }

@@ -6,6 +6,7 @@
 
 #include "solver/formfactor/pairs/clusters.h"
 #include "solver/formfactor/pairs/pair_factor.h"
+#include "solver/formfactor/pairs/segment_occluders.h"
 #include "solver/formfactor/visibility/visibility.h"
 
 /* The scene and the accuracy of its occlusion tests. All of it is only read, by any number of threads. */
@@ -18,6 +19,7 @@ typedef struct occlusion {
     double accuracy;  /* standard error of the factor of a partly occluded pair */
     size_t segments;  /* the least that occlusion_estimate casts; a multiple of VISIBILITY_PACKET */
     uint64_t seed;
+    const segment_occluder *occluders; /* of the lists; NULL: no pair has one */
 } occlusion;
 
 typedef enum occlusion_verdict { OCCLUSION_NONE, OCCLUSION_TOTAL, OCCLUSION_PARTIAL } occlusion_verdict;
@@ -30,8 +32,9 @@ occlusion_verdict occlusion_test(const occlusion *o, uint32_t i, uint32_t j, dou
 bool occlusion_test_suffices(const occlusion *o, uint32_t i, uint32_t j, double g);
 
 /* The visible part of g, never more than g. Its standard error is o->accuracy as a factor; for a visible
- * factor F above .1 it is 10 F times that. */
-double occlusion_estimate(const occlusion *o, uint32_t i, uint32_t j, double g);
+ * factor F above .1 it is 10 F times that. among: all occluders that may block a segment of the pair; NULL:
+ * any of the scene may. */
+double occlusion_estimate(const occlusion *o, const segment_list *among, uint32_t i, uint32_t j, double g);
 
 /* About how many segments occlusion_estimate will cast. */
 double occlusion_segments(const occlusion *o, uint32_t i, uint32_t j, double g);

@@ -61,6 +61,27 @@ static bool is_outside(pair_sides *p, const occluder *o) {
     return false;
 }
 
+/* The segments between two spheres lie within `radius` of that between their centres. */
+typedef struct capsule {
+    double from[3], along[3], length2, radius;
+} capsule;
+
+static capsule capsule_of(const pair_sides *p) {
+    capsule c = {.radius = fmax(p->side[0]->radius, p->side[1]->radius) + p->slack};
+    memcpy(c.from, p->side[0]->centre, sizeof c.from);
+    subtract3(p->side[1]->centre, c.from, c.along);
+    c.length2 = fmax(dot3(c.along, c.along), p->slack * p->slack);
+    return c;
+}
+
+static bool capsule_misses(const capsule *c, const occluder *o) {
+    double to[3];
+    subtract3(o->middle, c->from, to);
+    const double part = fmin(fmax(dot3(to, c->along) / c->length2, 0), 1), reach = c->radius + o->radius;
+    for (int d = 0; d < 3; d++) to[d] -= part * c->along[d];
+    return dot3(to, to) > reach * reach;
+}
+
 typedef enum standing { STANDS_BESIDE, STANDS_BETWEEN, STANDS_BEFORE_ALL } standing;
 
 /* Where the two elements lie on different sides of the occluder's plane, the segments between their corners
@@ -130,10 +151,12 @@ void pair_occluders_find(const occluders *o, const link_occluders *among, const 
         out->count = OCCLUDERS_UNCOUNTED;
         return;
     }
+    const capsule within = capsule_of(&p);
     bool too_many = false;
     for (int k = 0; k < among->count; k++) {
         const occluder *one = &o->of[among->of[k]];
-        if (one->facet == own_facets[0] || one->facet == own_facets[1]) continue;
+        if (capsule_misses(&within, one) || one->facet == own_facets[0] || one->facet == own_facets[1])
+            continue;
         const standing found = where_it_stands(&p, one);
         if (found == STANDS_BEFORE_ALL) {
             out->hidden = true;
@@ -142,7 +165,7 @@ void pair_occluders_find(const occluders *o, const link_occluders *among, const 
             return;
         }
         if (found == STANDS_BESIDE) continue;
-        if (out->count == PAIR_OCCLUDERS_MOST)
+        if (out->count == LISTED_OCCLUDERS_MOST)
             too_many = true;
         else
             out->of[out->count++] = among->of[k];

@@ -10,10 +10,13 @@
  * cost of a point grows with them, and the whole of such a pair has more points. */
 enum { PAIR_OCCLUDERS_MOST = 16, UNCUT_OCCLUDERS_MOST = 8 };
 
+/* As many as segments are tested against one by one; of more, the whole scene is searched. */
+enum { LISTED_OCCLUDERS_MOST = 64 };
+
 typedef struct pair_occluders {
     int count;   /* or OCCLUDERS_UNCOUNTED */
     bool hidden; /* one of them covers the pair */
-    uint32_t of[PAIR_OCCLUDERS_MOST];
+    uint32_t of[LISTED_OCCLUDERS_MOST];
 } pair_occluders;
 
 /* Finds the occluders of a link that may block a segment between a and b, which face each other wholly;

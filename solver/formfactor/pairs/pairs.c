@@ -1,9 +1,9 @@
 #include "solver/formfactor/pairs/pairs.h"
 
-#include "solver/base/array_grow.h"
 #include "solver/formfactor/pairs/cluster_links.h"
 #include "solver/formfactor/pairs/element_neighbours.h"
 #include "solver/formfactor/pairs/few_occluders.h"
+#include "solver/formfactor/pairs/leaf_reaches.h"
 #include "solver/formfactor/pairs/pair_far.h"
 #include "solver/formfactor/pairs/pair_rows.h"
 #include "solver/formfactor/pairs/pairs_twice.h"
@@ -21,7 +21,8 @@ typedef struct pairs_run {
     polygon *polygons; /* [n], by element */
     occlusion occlusion;
     few_occluders few;
-    bool projects; /* pairs with few occluders */
+    bool projects;            /* pairs with few occluders */
+    segment_occluder *listed; /* for lists of the occluders of pairs; NULL: there are none */
     cluster_tree tree;
     uint32_t *leaf;   /* [n], the leaf of a position */
     uint32_t *parent; /* of each cluster */
@@ -30,60 +31,6 @@ typedef struct pairs_run {
     uint32_t (*neighbours)[NEIGHBOURS_MOST]; /* [n], by element */
     pair_rows rows;
 } pairs_run;
-
-/* The positions first ... last-1 of a cluster that a leaf, or an ancestor of it, is linked with. */
-typedef struct reach {
-    uint32_t first, last;
-    bool open;
-    uint32_t among; /* its occluders in leaf_reaches, where it is not open and pairs are projected */
-} reach;
-
-/* All the partners of a leaf; room that is used again for the next one. */
-typedef struct leaf_reaches {
-    reach *reaches;
-    size_t n, capacity;
-    link_occluders *among;
-    size_t n_among, among_capacity;
-} leaf_reaches;
-
-static int compare_reaches(const void *a, const void *b) {
-    const reach *one = a, *two = b;
-    return (one->first > two->first) - (one->first < two->first);
-}
-
-/* Adds the occluders between two clusters. */
-static bool add_occluders(const pairs_run *run, const cluster *a, const cluster *b, leaf_reaches *out) {
-    link_occluders *one;
-    if (array_grow(&out->among, &out->among_capacity, out->n_among + 1, sizeof *out->among, "pairs", NULL) !=
-        LAM_OK)
-        return false;
-    one = &out->among[out->n_among++];
-    shaft s;
-    cluster_shaft_init(&s, a, b, run->few.occluders.slack);
-    link_occluders_find(&run->few.occluders, &s, a, b, one);
-    return true;
-}
-
-/* The links of a leaf and of its ancestors, sorted by position; their positions do not overlap. */
-static bool find_reaches(const pairs_run *run, uint32_t leaf, leaf_reaches *out) {
-    out->n = out->n_among = 0;
-    for (uint32_t c = leaf;; c = run->parent[c]) {
-        const size_t first = run->links.of_cluster[c], last = run->links.of_cluster[c + 1];
-        if (array_grow(&out->reaches, &out->capacity, out->n + (last - first), sizeof *out->reaches, "pairs",
-                       NULL) != LAM_OK)
-            return false;
-        for (size_t k = first; k < last; k++) {
-            const cluster_link *link = &run->links.links[k];
-            const cluster *b = &run->tree.clusters[link->b];
-            out->reaches[out->n++] = (reach){b->first, b->last, link->open, (uint32_t)out->n_among};
-            if (!link->open && run->projects && !add_occluders(run, &run->tree.clusters[c], b, out))
-                return false;
-        }
-        if (c == 0) break;
-    }
-    if (out->n > 0) qsort(out->reaches, out->n, sizeof *out->reaches, compare_reaches);
-    return true;
-}
 
 /* The mean factor of a pair, (A_i F_ij + A_j F_ji) / (A_i + A_j). Two ray estimates merged by their inverse
  * variances (upper.h) have the variance this / (2 rays) in S = A^1/2 F A^-1/2. */
@@ -123,13 +70,18 @@ static int look_at(const pairs_run *run, uint32_t i, uint32_t j, const link_occl
     return state | PAIR_SETTLED;
 }
 
+static const link_occluders *among_projected(const pairs_run *run, leaf_reaches *to, reach *r) {
+    const occluders *o = &run->few.occluders;
+    return leaf_reaches_among(&run->tree, o, link_occluders_projected(o), to, r);
+}
+
 /* The pairs of one position: unoccluded exchange areas and, unless the shaft was empty, occlusion tests. */
-static bool find_row(const pairs_run *run, uint32_t position, const leaf_reaches *to, pair_block *block) {
+static bool find_row(const pairs_run *run, uint32_t position, leaf_reaches *to, pair_block *block) {
     enum { PIECE = 64 };
     const uint32_t i = run->tree.element[position];
     for (size_t k = 0; k < to->n; k++) {
-        const reach *r = &to->reaches[k];
-        const link_occluders *among = !r->open && run->projects ? &to->among[r->among] : NULL;
+        reach *r = &to->reaches[k];
+        const link_occluders *among = NULL;
         const uint32_t begin = r->first > position ? r->first : position + 1;
         for (uint32_t first = begin; first < r->last; first += PIECE) {
             double exchange[PIECE];
@@ -143,6 +95,10 @@ static bool find_row(const pairs_run *run, uint32_t position, const leaf_reaches
                     g = pair_factor_exchange(&run->rules, &run->polygons[i], &run->polygons[j],
                                              run->options->tolerance);
                 if (!((float)g > 0) || factor_of(run, i, j, g) < run->options->threshold) continue;
+                if (among == NULL && !r->open && run->projects) {
+                    among = among_projected(run, to, r);
+                    if (among == NULL) return false;
+                }
                 const int state = r->open ? PAIR_CERTAIN : look_at(run, i, j, among, &g);
                 pair_block_add(block, first + c, (float)g, (uint8_t)state);
             }
@@ -158,7 +114,8 @@ static bool find_block(pairs_run *run, size_t index, leaf_reaches *to) {
     for (size_t r = 0; r < length && enough; r++) {
         const size_t at = first + r;
         block->begin[r] = block->used;
-        if (r == 0 || run->leaf[at] != run->leaf[at - 1]) enough = find_reaches(run, run->leaf[at], to);
+        if (r == 0 || run->leaf[at] != run->leaf[at - 1])
+            enough = leaf_reaches_find(&run->tree, &run->links, run->parent, run->leaf[at], to);
         enough = enough && find_row(run, (uint32_t)at, to, block);
     }
     for (size_t r = length; r <= PAIR_BLOCK_ROWS; r++) block->begin[r] = block->used;
@@ -236,9 +193,34 @@ static lam_status share_segments(pairs_run *run, lam_error *error) {
     return LAM_OK;
 }
 
+/* Sets *g to the visible part of a mixed pair. Segments are tested against a list of the pair's occluders
+ * where there are enough of them: making the list takes the time of some packets. */
+static bool refine_pair(const pairs_run *run, uint32_t position, uint32_t other, leaf_reaches *to, float *g) {
+    const double list_worth = 8 * VISIBILITY_PACKET;
+    const uint32_t i = run->tree.element[position], j = run->tree.element[other], leaf = run->leaf[position];
+    pair_occluders between;
+    segment_list list, *among = NULL;
+    if (run->listed != NULL && occlusion_segments(&run->occlusion, i, j, (double)*g) >= list_worth) {
+        if ((to->n == 0 || to->leaf != leaf) &&
+            !leaf_reaches_find(&run->tree, &run->links, run->parent, leaf, to))
+            return false;
+        const link_occluders *of_link = leaf_reaches_among(
+            &run->tree, &run->few.occluders, LINK_OCCLUDERS_MOST, to, leaf_reaches_at(to, other));
+        if (of_link == NULL) return false;
+        const few_verdict found = few_occluders_between(&run->few, of_link, i, j, &between);
+        if (found == FEW_OPEN) return true;
+        if (between.count != OCCLUDERS_UNCOUNTED) {
+            list = (segment_list){between.count, between.of};
+            among = &list;
+        }
+    }
+    *g = (float)occlusion_estimate(&run->occlusion, among, i, j, (double)*g);
+    return true;
+}
+
 /* Estimates the mixed pairs of one block. States stay unchanged, because at_a_border reads them. known: the
  * exchange areas come from a scratch file and are only counted. */
-static void refine_block(pairs_run *run, size_t index, bool known, pairs_report *sum) {
+static bool refine_block(pairs_run *run, size_t index, bool known, leaf_reaches *to, pairs_report *sum) {
     pair_block *block = &run->rows.blocks[index];
     size_t r = 0;
     for (size_t at = 0; at < block->used; at++) {
@@ -256,9 +238,9 @@ static void refine_block(pairs_run *run, size_t index, bool known, pairs_report 
             sum->hidden += state == PAIR_HIDDEN;
         } else if (is_mixed(run, i, j, block->state[at])) {
             sum->mixed++;
-            if (!known)
-                block->exchange[at] =
-                    (float)occlusion_estimate(&run->occlusion, i, j, (double)block->exchange[at]);
+            if (!known && !refine_pair(run, (uint32_t)(pair_rows_first(index) + r), block->other[at], to,
+                                       &block->exchange[at]))
+                return false;
         } else if (state == PAIR_OPEN) {
             sum->open++;
         } else {
@@ -266,6 +248,7 @@ static void refine_block(pairs_run *run, size_t index, bool known, pairs_report 
             block->exchange[at] = 0;
         }
     }
+    return true;
 }
 
 /* One pass over all blocks, either of tests or of estimates, and its scratch file. */
@@ -310,11 +293,12 @@ static lam_status pass_block(pass *p, size_t index, leaf_reaches *to, pairs_repo
             p->refine ? pair_rows_fetch_exchange(&run->rows, index, run->tree.element, p->file, error)
                       : pair_rows_fetch(&run->rows, index, run->tree.element, p->file, error);
         if (status != LAM_OK) return status;
-    } else if (!p->refine && !find_block(run, index, to)) {
+    }
+    const bool enough =
+        p->refine ? refine_block(run, index, known, to, more) : known || find_block(run, index, to);
+    if (!enough)
         return status_fail(error, LAM_ERR_MEMORY, "pairs of %zu elements: out of memory; use --quality draft",
                            run->m->n);
-    }
-    if (p->refine) refine_block(run, index, known, more);
     if (p->file == NULL || known) return LAM_OK;
     lam_status status;
 #pragma omp critical(pairs_file)
@@ -349,10 +333,7 @@ static lam_status pass_run(pass *p, lam_error *error) {
         if (progress_cancelled(o->progress))
             pass_fail(p, status_fail(&why, LAM_ERR_CANCELLED, "cancelled"), &why);
     }
-    for (size_t k = 0; k < n_threads; k++) {
-        free(reaches[k].reaches);
-        free(reaches[k].among);
-    }
+    for (size_t k = 0; k < n_threads; k++) leaf_reaches_free(&reaches[k]);
     free(reaches);
     if (p->status != LAM_OK && error != NULL) *error = p->error;
     return p->status;
@@ -440,6 +421,10 @@ lam_status pairs_exchange(const mesh *m, const visibility *v, const pairs_option
     if (few_occluders_apply(&run.few)) how.occluders = &run.few.occluders;
     TRY(cluster_links_find(m, &run.tree, &run.occlusion, &how, &run.links, error));
     run.projects = options->occluders > 0 && few_occluders_pay(&run.few, &run.tree, &run.links);
+    if (options->occluders > 0 && few_occluders_are_listed(&run.few, &run.tree, &run.links)) {
+        TRY(segment_occluders_make(&run.few.occluders, visibility_centre(v), &run.listed, error));
+        run.occlusion.occluders = run.listed;
+    }
     TRY(find_parents(&run, error));
     TRY(run_passes(&run, report, kept, error));
     report->hidden += run.links.hidden_pairs;
@@ -452,6 +437,7 @@ done:
     free(run.neighbours);
     free(run.parent);
     free(run.leaf);
+    free(run.listed);
     few_occluders_free(&run.few);
     pair_far_table_free(&run.far);
     cluster_links_free(&run.links);

@@ -102,7 +102,8 @@ static void count_rows(const sample_run *run, double n_pairs, pairs_work *work, 
             if (!l->open && run->projects) {
                 shaft s;
                 cluster_shaft_init(&s, a, b, run->few.occluders.slack);
-                link_occluders_find(&run->few.occluders, &s, a, b, &among);
+                link_occluders_find(&run->few.occluders, &s, a, b,
+                                    link_occluders_projected(&run->few.occluders), &among);
             }
             started = clock_thread_seconds();
             count_row(run, p, first, b->last, l->open ? NULL : &among, work);

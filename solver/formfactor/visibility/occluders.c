@@ -39,6 +39,12 @@ static bool set_occluder(const mesh *m, const joined_piece *piece, double slack,
             o->high[d] = fmax(o->high[d], o->corner[c][d]);
         }
     }
+    for (int d = 0; d < 3; d++) o->middle[d] = .5 * (o->low[d] + o->high[d]);
+    for (int c = 0; c < o->n; c++) {
+        double to[3];
+        subtract3(o->corner[c], o->middle, to);
+        o->radius = fmax(o->radius, sqrt(dot3(to, to)));
+    }
     longest = sqrt(longest);
     if (!(area > slack * longest)) return false;
     for (int d = 0; d < 3; d++) o->normal[d] = twice[d] / area;

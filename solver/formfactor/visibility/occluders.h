@@ -10,6 +10,7 @@
  * >= 0 for all. */
 typedef struct occluder {
     double low[3], high[3], normal[3], level; /* unit; normal . x = level */
+    double middle[3], radius;                 /* of a sphere about all corners */
     int n;
     uint32_t facet;                     /* MESH_NO_VERTEX: of several, in one plane */
     double edge[OCCLUDER_CORNERS][4];   /* the distance of x from the edge, inwards, metres */

@@ -125,7 +125,7 @@ static void find_truth_by_pairs(lit *s, const visibility *v, const polygon *poly
             const double g = pair_factor_exchange(&rules, &polygons[e], &polygons[i], o.tolerance);
             if (!(g > 0)) continue;
             if (occlusion_test(&o, low, high, g, &seen) == OCCLUSION_PARTIAL)
-                seen = occlusion_estimate(&o, low, high, g);
+                seen = occlusion_estimate(&o, NULL, low, high, g);
             s->truth[i] += (double)s->E[e] * seen / s->m->area[i];
         }
     }

@@ -1,0 +1,29 @@
+/* Eight segments at once against a short list of occluders, in single precision: where few of them may stand
+ * between a pair, this takes a fraction of a search through the whole scene. Knows no elements. */
+#ifndef LAMBERT_FORMFACTOR_PAIRS_SEGMENT_OCCLUDERS_H
+#define LAMBERT_FORMFACTOR_PAIRS_SEGMENT_OCCLUDERS_H
+
+#include "solver/formfactor/visibility/occluders.h"
+#include "solver/formfactor/visibility/visibility.h"
+
+/* An occluder in recentred coordinates: a point x of its plane is inside where edge[e] . (x, 1) > 0 for all.
+ * Occluders are larger than they are by slack, so that no segment passes where two of them meet. */
+typedef struct segment_occluder {
+    float normal[3], level, edge[OCCLUDER_CORNERS][4];
+    int n;
+} segment_occluder;
+
+/* The occluders that may block the segments of a pair. */
+typedef struct segment_list {
+    int count;
+    const uint32_t *of;
+} segment_list;
+
+/* centre: that of the recentred coordinates. *out is freed by free. Errors: LAM_ERR_MEMORY. */
+lam_status segment_occluders_make(const occluders *o, const double centre[3], segment_occluder **out,
+                                  lam_error *error);
+
+/* Bit k is set where one of the list blocks segment k, from its origin to origin + direction. */
+unsigned segment_occluders_block(const segment_occluder *of, const segment_list *list, const ray_packet *s);
+
+#endif
