@@ -69,19 +69,6 @@ done:
 /* Elements that a thread finishes at a time. */
 enum { BLOCK = 256 };
 
-/* One element of the quantity: from E' = E + rho H0, P and H0. */
-static inline float finish(lam_quantity quantity, float rho, float lit, float P, float H0) {
-    switch (quantity) {
-    case LAM_RADIOSITY: /* B = E' + P */
-        return rho > 0.0f ? lit + P : lit;
-    case LAM_IRRADIANCE: /* H = H0 + P / rho' */
-        return (rho > 0.0f ? P / rho : P) + H0;
-    case LAM_INDIRECT: /* B - E' */
-        return rho > 0.0f ? P : 0.0f;
-    }
-    return 0.0f;
-}
-
 /* One row of out from the same row of E and of H0 (NULL: 0), all in mesh order, and of P (position order).
  * out may be P when there is no order. Elements are taken in mesh order, as scattered reads cost less than
  * scattered writes. */
@@ -98,8 +85,8 @@ static void finish_row(const lam_operator *op, size_t c, lam_quantity quantity, 
                 out[i] = rho[i] > 0.0f ? E[i] + P[operator_position(op, i)] : E[i];
         else
             for (size_t i = first; i < last; i++)
-                out[i] = finish(quantity, rho[i], operator_light(rho, E, H0, i), P[operator_position(op, i)],
-                                H0 != NULL ? H0[i] : 0.0f);
+                out[i] = operator_finish(quantity, rho[i], operator_light(rho, E, H0, i),
+                                         P[operator_position(op, i)], H0 != NULL ? H0[i] : 0.0f);
     }
 }
 
@@ -110,7 +97,7 @@ static void finish_selected(const lam_operator *op, size_t c, lam_quantity quant
     const float *rho = op->reflectance + c * op->n;
     for (size_t r = 0; r < n_selected; r++) {
         const size_t i = selected[r], p = operator_position(op, i);
-        out[r] = finish(quantity, rho[i], lit[p], P[by_position ? p : r], H0 != NULL ? H0[i] : 0.0f);
+        out[r] = operator_finish(quantity, rho[i], lit[p], P[by_position ? p : r], H0 != NULL ? H0[i] : 0.0f);
     }
 }
 
@@ -137,11 +124,14 @@ static void apply_pass(const lam_operator *op, const pass *in, float *out, void 
     const size_t n = op->n, rows = in->count * op->n_channels, row_bytes = n * sizeof(float);
     const bool choose = in->selected != NULL && op->kind->apply_selected != NULL;
     const bool apart = in->selected != NULL ? !choose : op->order != NULL;
-    const bool gathers = in->selected == NULL && op->kind->apply_lit != NULL;
     const float *lit = in->E;
     float *P = out;
     void *rest = work_area_begin(work);
-    if (!gathers && (op->order != NULL || in->H0 != NULL)) {
+    if (in->selected == NULL && op->kind->answer != NULL) {
+        op->kind->answer(op, in->count, in->quantity, in->E, in->H0, out, rest);
+        return;
+    }
+    if (op->order != NULL || in->H0 != NULL) {
         float *positions = work_area_take(&rest, rows * row_bytes);
         for (size_t row = 0; row < rows; row++)
             light_row(op, row % op->n_channels, in->E + row * n, in->H0 != NULL ? in->H0 + row * n : NULL,
@@ -149,9 +139,7 @@ static void apply_pass(const lam_operator *op, const pass *in, float *out, void 
         lit = positions;
     }
     if (apart) P = work_area_take(&rest, rows * row_bytes);
-    if (gathers)
-        op->kind->apply_lit(op, in->count, in->E, in->H0, P, rest);
-    else if (choose)
+    if (choose)
         op->kind->apply_selected(op, in->count, lit, in->n_selected, in->selected, P, rest);
     else
         op->kind->apply(op, in->count, lit, P, rest);

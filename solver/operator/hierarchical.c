@@ -25,6 +25,7 @@ static void hierarchical_destroy(lam_operator *op) {
     free(self->step);
     free(self->root_area);
     free(self->left);
+    free(self->left_of_element);
     mean_correction_free(&self->even);
     wavelet_plan_free(&self->plan);
     wavelets_free(&self->basis);
@@ -41,14 +42,18 @@ static lam_status start(size_t n, size_t n_channels, const float *reflectance, c
     self->root_area = memory_allocate(n, sizeof *self->root_area, "operator", error);
     self->K = memory_allocate(n_channels, sizeof *self->K, "operator", error);
     self->left = memory_allocate(n_channels, n * sizeof *self->left, "operator", error);
-    if (self->root_area == NULL || self->left == NULL || self->K == NULL) TRY(LAM_ERR_MEMORY);
+    self->left_of_element = memory_allocate(n_channels, n * sizeof *self->left_of_element, "operator", error);
+    if (self->root_area == NULL || self->left == NULL || self->left_of_element == NULL || self->K == NULL)
+        TRY(LAM_ERR_MEMORY);
     TRY(operator_set_order(&self->base, order, error));
     for (size_t p = 0; p < n; p++) {
         self->root_area[p] = (float)sqrt(area[p]);
         if (!(self->root_area[p] > 0 && self->root_area[p] < INFINITY))
             FAIL(error, LAM_ERR_NUMERIC, "area of position %zu = %g, must be above 0", p, area[p]);
+        const size_t i = self->base.order != NULL ? self->base.order[p] : p;
         for (size_t c = 0; c < n_channels; c++)
-            self->left[c * n + p] = operator_reflectance_or_one(&self->base, c, p) / self->root_area[p];
+            self->left_of_element[c * n + i] = self->left[c * n + p] =
+                operator_reflectance_or_one(&self->base, c, p) / self->root_area[p];
     }
     *out = self;
     self = NULL;
@@ -277,7 +282,7 @@ const operator_kind operator_hierarchical = {
     .apply = hierarchical_apply,
     .apply_selected = hierarchical_apply_selected,
     .apply_adjoint = hierarchical_apply_adjoint,
-    .apply_lit = hierarchical_apply_lit,
+    .answer = hierarchical_answer,
     .destroy = hierarchical_destroy,
     .describe = hierarchical_describe,
     /* Both triangles in tiles, of 12 bytes each; the store has of one triangle two bytes for a tile and one

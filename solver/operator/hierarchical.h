@@ -21,12 +21,13 @@ typedef struct hierarchical {
     wavelets basis;
     wavelet_plan plan; /* of the coefficients that any K has */
     size_t n_groups;
-    tile_group *groups; /* [n_groups], by number in the basis, all that the plan has */
-    float *step;        /* [n_groups] */
-    tiled_rows *K;      /* [C] */
-    double n_numbers;   /* of all K, both triangles */
-    float *root_area;   /* [n] A^1/2, by position */
-    float *left;        /* [C][n] rho' A^-1/2, by position */
+    tile_group *groups;     /* [n_groups], by number in the basis, all that the plan has */
+    float *step;            /* [n_groups] */
+    tiled_rows *K;          /* [C] */
+    double n_numbers;       /* of all K, both triangles */
+    float *root_area;       /* [n] A^1/2, by position */
+    float *left;            /* [C][n] rho' A^-1/2, by position */
+    float *left_of_element; /* [C][n], the same in mesh order */
     mean_correction even;
 } hierarchical;
 
@@ -36,8 +37,8 @@ void hierarchical_apply(const lam_operator *op, size_t n_rhs, const float *E, fl
 void hierarchical_apply_adjoint(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work);
 void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const float *E, size_t n_selected,
                                  const uint32_t *selected, float *P, void *work);
-void hierarchical_apply_lit(const lam_operator *op, size_t n_rhs, const float *E, const float *H0, float *P,
-                            void *work);
+void hierarchical_answer(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
+                         const float *H0, float *out, void *work);
 
 void hierarchical_arrays_free(hierarchical_arrays *arrays, size_t n_channels);
 

@@ -1,6 +1,7 @@
 /* The products of kind "hierarchical". The order of elements, areas, reflectances and the correction of the
  * mean error are taken along piece by piece of the tree, right before the forward transform of a piece and
- * right after its inverse, while it is in the cache of the thread that transforms it. */
+ * right after its inverse, while it is in the cache of the thread that transforms it; those of an answer in
+ * mesh order are taken along where it is written. */
 #include "solver/base/work_area.h"
 #include "solver/operator/hierarchical.h"
 
@@ -50,10 +51,11 @@ typedef struct channel {
     size_t c, stride; /* from one vector to the next of in, E, H0 and out: C n */
     bool adjoint;
     const float *in;     /* by position, or NULL: */
-    const float *E, *H0; /* in mesh order, as of apply_lit */
-    float *X;            /* [m][n] */
-    double *sums;        /* [m][n_pieces], of areas times light, or, adjoint, of lift times in */
-    float *out;          /* by position */
+    const float *E, *H0; /* in mesh order, as of an answer */
+    lam_quantity quantity;
+    float *X;     /* [m][n] */
+    double *sums; /* [m][n_pieces], of areas times light, or, adjoint, of lift times in */
+    float *out;   /* by position; with E, the quantity in mesh order */
 } channel;
 
 /* X = right in, and the piece's sum of areas times light. */
@@ -91,9 +93,42 @@ static float mean_factor(const channel *h, size_t v) {
 
 /* P = left X + factor lift of a position. Adding 0 makes -0, which the transforms make of some zeros, one 0:
  * a vector that is dark has the same bits alone, where nothing is transformed. */
-static inline float bounced(const float *left, const float *lift, float factor, const float *X, size_t p) {
-    const float found = left[p] * X[p] + 0.0f;
+static inline float bounced(float left, const float *lift, float factor, const float *X, size_t p) {
+    const float found = left * X[p] + 0.0f;
     return factor != 0 ? found + factor * lift[p] : found;
+}
+
+/* The quantity of an element from its P. */
+static inline float answer_of(const channel *h, const float *E, const float *H0, size_t i, float P) {
+    const float *rho = h->self->base.reflectance + h->c * h->self->base.n;
+    return operator_finish(h->quantity, rho[i], operator_light(rho, E, H0, i), P, H0 != NULL ? H0[i] : 0.0f);
+}
+
+/* Elements that a thread finishes at a time, and those below which one thread does. */
+enum { BLOCK = 256, THREADS_WORTH = 65536 };
+
+/* An answer from X, in mesh order, as scattered reads cost less than scattered writes. */
+static void finish(const channel *h, size_t v) {
+    const hierarchical *self = h->self;
+    const size_t n = self->base.n, c = h->c, blocks = (n + BLOCK - 1) / BLOCK, threads = self->base.n_threads;
+    const float *left = self->left_of_element + c * n, *rho = self->base.reflectance + c * n,
+                *X = h->X + v * n;
+    const float *lift = self->even.missing != NULL ? self->even.lift + c * n : NULL;
+    const float *E = h->E + v * h->stride, *H0 = h->H0 != NULL ? h->H0 + v * h->stride : NULL;
+    const uint32_t *position = self->base.position;
+    const float factor = mean_factor(h, v);
+    float *out = h->out + v * h->stride;
+#pragma omp parallel for schedule(static) num_threads((int)threads) if (threads > 1 && n >= THREADS_WORTH)
+    for (size_t b = 0; b < blocks; b++) {
+        const size_t first = b * BLOCK, last = first + BLOCK < n ? first + BLOCK : n;
+        if (h->quantity == LAM_RADIOSITY && H0 == NULL && position != NULL) /* most answers */
+            for (size_t i = first; i < last; i++)
+                out[i] = rho[i] > 0.0f ? E[i] + bounced(left[i], lift, factor, X, position[i]) : E[i];
+        else
+            for (size_t i = first; i < last; i++)
+                out[i] = answer_of(h, E, H0, i,
+                                   bounced(left[i], lift, factor, X, operator_position(&self->base, i)));
+    }
 }
 
 /* out from X. */
@@ -110,7 +145,7 @@ static void use(void *context, size_t v, size_t piece, size_t first, size_t last
         for (size_t p = first; p < last; p++) out[p] = root[p] * X[p] + factor * (root[p] * root[p]) + 0.0f;
         return;
     }
-    for (size_t p = first; p < last; p++) out[p] = bounced(left, lift, factor, X, p);
+    for (size_t p = first; p < last; p++) out[p] = bounced(left[p], lift, factor, X, p);
 }
 
 /* Room for m vectors, of which `in`, E, H0, out and c are still to be set. */
@@ -148,16 +183,29 @@ static void analyse(areas *a, size_t m) {
     wavelet_plan_forward(&self->plan, m, fill, &a->h, a->h.X, a->from, a->slots, self->base.n_threads);
 }
 
+/* Writes what a dark channel gives. */
+static void leave_dark(const channel *h, size_t m) {
+    const size_t n = h->self->base.n;
+    for (size_t v = 0; v < m; v++) {
+        const size_t row = v * h->stride;
+        if (h->in != NULL) memset(h->out + row, 0, n * sizeof *h->out);
+        for (size_t i = 0; h->in == NULL && i < n; i++)
+            h->out[row + i] = answer_of(h, h->E + row, h->H0 != NULL ? h->H0 + row : NULL, i, 0);
+    }
+}
+
 /* All m vectors of a channel. */
 static void apply_channel(areas *a, size_t m, void *work) {
     const hierarchical *self = a->h.self;
     if (is_dark(&a->h, m)) {
-        for (size_t v = 0; v < m; v++) memset(a->h.out + v * a->h.stride, 0, self->base.n * sizeof *a->h.out);
+        leave_dark(&a->h, m);
         return;
     }
     analyse(a, m);
     multiply_core(self, a->h.c, m, a->from, a->to, work);
-    wavelet_plan_inverse(&self->plan, m, a->to, a->h.X, use, &a->h, a->slots, self->base.n_threads);
+    wavelet_plan_inverse(&self->plan, m, a->to, a->h.X, a->h.in != NULL ? use : NULL, &a->h, a->slots,
+                         self->base.n_threads);
+    for (size_t v = 0; a->h.in == NULL && v < m; v++) finish(&a->h, v);
 }
 
 void hierarchical_apply(const lam_operator *op, size_t n_rhs, const float *E, float *P, void *work) {
@@ -181,14 +229,15 @@ void hierarchical_apply_adjoint(const lam_operator *op, size_t n_rhs, float *g, 
     }
 }
 
-void hierarchical_apply_lit(const lam_operator *op, size_t n_rhs, const float *E, const float *H0, float *P,
-                            void *work) {
+void hierarchical_answer(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
+                         const float *H0, float *out, void *work) {
     areas a = take_areas((const hierarchical *)op, n_rhs, &work);
+    a.h.quantity = quantity;
     for (size_t c = 0; c < op->n_channels; c++) {
         a.h.c = c;
         a.h.E = E + c * op->n;
         a.h.H0 = H0 != NULL ? H0 + c * op->n : NULL;
-        a.h.out = P + c * op->n;
+        a.h.out = out + c * op->n;
         apply_channel(&a, n_rhs, work);
     }
 }
@@ -216,7 +265,6 @@ void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const flo
     const bool some = few && n_steps * SOME_STEPS < plan->n_steps;
     if (some) n_rows = wavelet_plan_coefficients(plan, n_steps, steps, rows);
     for (size_t c = 0; c < C; c++) {
-        const float *left = self->left + c * n;
         const float *lift = self->even.missing != NULL ? self->even.lift + c * n : NULL;
         a.h.c = c;
         a.h.in = E + c * n;
@@ -239,8 +287,8 @@ void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const flo
                 tiled_multiply_rows(&self->K[c], n_rows, rows, from, a.to, work);
             if (some) wavelet_plan_inverse_some(plan, n_steps, steps, a.to, X, a.slots);
             for (size_t r = 0; r < n_selected; r++)
-                P[(v * C + c) * n_selected + r] =
-                    bounced(left, lift, factor, X, operator_position(op, selected[r]));
+                P[(v * C + c) * n_selected + r] = bounced(self->left_of_element[c * n + selected[r]], lift,
+                                                          factor, X, operator_position(op, selected[r]));
         }
     }
 }

@@ -28,7 +28,8 @@ typedef struct operator_description {
  * A kind may leave NULL: apply and apply_adjoint, where it answers for its own emitters only
  * (emitters_apply.c); apply_selected, the rows of apply for the n_selected elements selected
  * (operator_position says where they are), P being [n_rhs][C][n_selected] (without it all rows are computed);
- * apply_lit, which is apply of E' = E + rho H0 (operator_light), E and H0 (NULL: 0) being in mesh order;
+ * answer, which is the quantity of E' = E + rho H0 (operator_finish), E, H0 (NULL: 0) and out being in mesh
+ * order, so that an answer in position order is never in memory;
  * set_threads, which passes n_threads on to its arrays;
  * narrow, which makes the operator again with its large arrays in another precision, all of its own; relight,
  * which makes it again under other reflectances, its large arrays those of op; check, which compares the
@@ -46,8 +47,8 @@ typedef struct operator_kind {
     void (*apply_adjoint)(const lam_operator *op, size_t n_rhs, float *g, float *w, void *work);
     void (*apply_selected)(const lam_operator *op, size_t n_rhs, const float *E, size_t n_selected,
                            const uint32_t *selected, float *P, void *work);
-    void (*apply_lit)(const lam_operator *op, size_t n_rhs, const float *E, const float *H0, float *P,
-                      void *work);
+    void (*answer)(const lam_operator *op, size_t n_rhs, lam_quantity quantity, const float *E,
+                   const float *H0, float *out, void *work);
     void (*set_threads)(lam_operator *op, size_t n_threads);
     lam_status (*narrow)(const lam_operator *op, panel_precision precision, lam_operator **out,
                          lam_error *error);
@@ -112,6 +113,19 @@ static inline float operator_reflectance_or_one(const lam_operator *op, size_t c
 /* E' = E + rho H0 of an element; H0 may be NULL: 0. */
 static inline float operator_light(const float *rho, const float *E, const float *H0, size_t i) {
     return H0 != NULL ? E[i] + rho[i] * H0[i] : E[i];
+}
+
+/* One element of the quantity: from E' = E + rho H0, P and H0. */
+static inline float operator_finish(lam_quantity quantity, float rho, float lit, float P, float H0) {
+    switch (quantity) {
+    case LAM_RADIOSITY: /* B = E' + P */
+        return rho > 0.0f ? lit + P : lit;
+    case LAM_IRRADIANCE: /* H = H0 + P / rho' */
+        return (rho > 0.0f ? P / rho : P) + H0;
+    case LAM_INDIRECT: /* B - E' */
+        return rho > 0.0f ? P : 0.0f;
+    }
+    return 0.0f;
 }
 
 /* Makes op, in f32, again with its large arrays in another precision; the caller frees out with
