@@ -1,5 +1,6 @@
 #include "solver/scene/sides.h"
 
+#include "solver/base/array_sort.h"
 #include "solver/scene/surfaces.h"
 
 #include <stdlib.h>
@@ -62,7 +63,7 @@ static lam_status sorted_edges(const mesh *m, edge **out, size_t *n_edges, lam_e
             if (from > to) edges[n++] = (edge){to, from, i, true};
         }
     }
-    qsort(edges, n, sizeof *edges, edge_order);
+    array_sort(edges, n, sizeof *edges, edge_order);
     *out = edges;
     *n_edges = n;
     edges = NULL;

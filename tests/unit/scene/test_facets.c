@@ -300,6 +300,33 @@ static void check_rays(const mesh *m, size_t rays, bool closed) {
     visibility_destroy(of_elements);
 }
 
+/* A square as a fan from its middle, whose triangles come in no order: all its edges within have one place.
+ */
+START_TEST(a_fan_is_one) {
+    enum { OF_SIDE = 50, TRIANGLES = 4 * OF_SIDE };
+    static const double corner[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    mesh m = {.n = TRIANGLES, .n_vertices = TRIANGLES + 1};
+    m.vertices = calloc(m.n_vertices, sizeof *m.vertices);
+    m.elements = calloc(m.n, sizeof *m.elements);
+    ck_assert(m.vertices != NULL && m.elements != NULL);
+    m.vertices[0][0] = m.vertices[0][1] = .5;
+    for (uint32_t k = 0; k < TRIANGLES; k++) {
+        const double *from = corner[k / OF_SIDE], *to = corner[(k / OF_SIDE + 1) % 4];
+        const double part = (double)(k % OF_SIDE) / OF_SIDE;
+        for (int d = 0; d < 2; d++) m.vertices[k + 1][d] = from[d] + part * (to[d] - from[d]);
+        const uint32_t triangle[4] = {0, k + 1, (k + 1) % TRIANGLES + 1, MESH_NO_VERTEX};
+        memcpy(m.elements[77 * k % TRIANGLES], triangle, sizeof triangle);
+    }
+    mesh_finish(&m, .5f);
+    facets f = joined(&m);
+    ck_assert_uint_eq(f.n, 1);
+    ck_assert_uint_le(f.n_pieces, 2);
+    check_points(&m, &f);
+    facets_free(&f);
+    mesh_free(&m);
+}
+END_TEST
+
 START_TEST(rays_meet_the_same_elements) {
     mesh cornell = {0}, houses = {0}, box = bent_box(9, hills);
     ck_assert_msg(scene_cornell(2560, &cornell, &error) == LAM_OK, "%s", error.message);
@@ -324,6 +351,7 @@ int main(void) {
     tcase_add_loop_test(cases, a_bend_parts, 0, 4);
     tcase_add_test(cases, a_bow_is_no_line);
     tcase_add_test(cases, a_floor_with_holes);
+    tcase_add_test(cases, a_fan_is_one);
     tcase_add_test(cases, rays_meet_the_same_elements);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
