@@ -3,8 +3,8 @@
 #include "solver/base/random.h"
 #include "solver/method/reference.h"
 #include "solver/precompute/forecast.h"
-#include "support/box_problem.h"
 #include "support/building.h"
+#include "support/closed_box.h"
 #include "support/dense.h"
 #include "support/random_blocks.h"
 #include "support/suite.h"
@@ -13,71 +13,11 @@
 
 static lam_error error;
 
-/* A box and where its elements are. */
-typedef struct closed {
-    fixture f;
-    build_problem problem;
-    double (*centre)[3];
-} closed;
-
-static closed closed_make(const double size[3], unsigned divisions, float reflectance) {
-    closed s = {.f = fixture_box(size, divisions, reflectance)};
-    s.problem = *problem_of(&s.f);
-    s.problem.F = &s.f.F;
-    s.centre = test_allocate(s.f.m.n, sizeof *s.centre);
-    for (size_t i = 0; i < s.f.m.n; i++) mesh_centroid(&s.f.m, i, s.centre[i]);
-    return s;
-}
-
-/* The problem as it lies now. */
-static const build_problem *of(closed *s) {
-    s->problem = *problem_of(&s->f);
-    s->problem.centre = (const double(*)[3])s->centre;
-    s->problem.normal = (const float(*)[3])s->f.m.normal;
-    return &s->problem;
-}
-
-static void closed_free(closed *s) {
-    free(s->centre);
-    fixture_free(&s->f);
-}
-
-static lam_operator *build(const build_problem *problem, double epsilon, build_report *report) {
-    const build_options options = options_with("hierarchical", epsilon);
-    lam_operator *op = NULL;
-    ck_ok(build_operator(problem, &options, &op, report, &error));
-    return op;
-}
-
-/* |B~ - B| / |B - E| by area, against a dense LU. */
-static double indirect_error(const build_problem *problem, const lam_operator *op, const float *E) {
-    const size_t n = problem->n;
-    reference *r = NULL;
-    double *e = test_allocate(n, sizeof *e), *B = test_allocate(n, sizeof *B), wrong = 0, all = 0;
-    float *out = test_allocate(n, sizeof *out);
-    const size_t bytes = lam_operator_work_bytes(op, 1);
-    void *work = test_allocate(1, bytes);
-    for (size_t i = 0; i < n; i++) e[i] = (double)E[i];
-    ck_ok(reference_create(problem->F, problem->area, problem->reflectance, REFERENCE_DENSE, &r, &error));
-    ck_ok(reference_solve(r, 1, e, B, 1e-12, NULL, &error));
-    ck_ok(lam_operator_apply(op, 1, LAM_RADIOSITY, E, out, work, bytes, &error));
-    for (size_t i = 0; i < n; i++) {
-        wrong += problem->area[i] * ((double)out[i] - B[i]) * ((double)out[i] - B[i]);
-        all += problem->area[i] * (B[i] - e[i]) * (B[i] - e[i]);
-    }
-    reference_destroy(r);
-    free(e);
-    free(B);
-    free(out);
-    free(work);
-    return sqrt(wrong / all);
-}
-
 /* One element, a part of a wall, all of it: a smaller epsilon keeps more and is nearer, and error goes with
  * it. */
 START_TEST(epsilon_is_what_it_costs) {
-    closed s = closed_make(room, 14, .7f); /* 1,176 elements */
-    const build_problem *problem = of(&s);
+    closed_box s = closed_box_make(room, 14, .7f); /* 1,176 elements */
+    const build_problem *problem = closed_box_problem(&s);
     const size_t n = problem->n;
     const double epsilons[] = {.1, .02, .002}, most[3] = {.12, .04, .006};
     float *E = test_allocate(3 * n, sizeof *E);
@@ -91,7 +31,7 @@ START_TEST(epsilon_is_what_it_costs) {
     for (int k = 0; k < 3; k++) {
         build_report report;
         operator_description about;
-        lam_operator *op = build(problem, epsilons[k], &report);
+        lam_operator *op = hierarchical_good(problem, epsilons[k], &report);
         operator_describe(op, &about);
         ck_assert_double_gt(about.density, 1.2 * density);
         density = about.density;
@@ -108,7 +48,7 @@ START_TEST(epsilon_is_what_it_costs) {
         ck_assert_double_ge(foreseen, stored);
         ck_assert_double_le(foreseen, 8 * stored);
         for (int light = 0; light < 3; light++)
-            ck_assert_double_lt(indirect_error(problem, op, E + light * n), most[k]);
+            ck_assert_double_lt(indirect_error(problem, op, NULL, E + light * n), most[k]);
         ck_assert_double_eq_tol(report_get(&report, "threshold", -1), .02 * epsilons[k], 1e-12);
         ck_assert_double_lt(report_get(&report, "uniform_error", -1), .1 * epsilons[k]);
         ck_assert_double_lt(report_get(&report, "probe_residual", -1), epsilons[k]);
@@ -117,23 +57,23 @@ START_TEST(epsilon_is_what_it_costs) {
         lam_operator_close(op);
     }
     free(E);
-    closed_free(&s);
+    closed_box_free(&s);
 }
 END_TEST
 
 /* Where nothing reflects irradiance is there all the same, and where nearly all does nothing grows. */
 START_TEST(black_and_white) {
-    closed s = closed_make(unit_cube, 8, .97f);
-    const build_problem *problem = of(&s);
+    closed_box s = closed_box_make(unit_cube, 8, .97f);
+    const build_problem *problem = closed_box_problem(&s);
     const size_t n = problem->n;
     build_report report;
     for (size_t i = 0; i < n; i += 3) s.f.m.reflectance[i] = 0;
-    lam_operator *op = build(problem, .002, &report);
+    lam_operator *op = hierarchical_good(problem, .002, &report);
     float *E = test_allocate(n, sizeof *E), *H = test_allocate(n, sizeof *H);
     double *B = test_allocate(n, sizeof *B), *truth = test_allocate(n, sizeof *truth), largest = 0;
     void *work = test_allocate(1, lam_operator_work_bytes(op, 1));
     for (size_t i = 0; i < n; i++) E[i] = i % 5 == 0 ? 1 : 0;
-    ck_assert_double_lt(indirect_error(problem, op, E), .01);
+    ck_assert_double_lt(indirect_error(problem, op, NULL, E), .01);
     ck_ok(lam_operator_apply(op, 1, LAM_RADIOSITY, E, H, work, lam_operator_work_bytes(op, 1), &error));
     for (size_t i = 0; i < n; i++) {
         if (i % 3 == 0) ck_assert(H[i] == E[i]);
@@ -149,21 +89,21 @@ START_TEST(black_and_white) {
     free(B);
     free(truth);
     free(work);
-    closed_free(&s);
+    closed_box_free(&s);
 }
 END_TEST
 
 /* A coefficient below the noise of rays is not kept, whatever epsilon asks for. */
 START_TEST(noise_sets_the_threshold) {
-    closed s = closed_make(unit_cube, 6, .5f);
+    closed_box s = closed_box_make(unit_cube, 6, .5f);
     build_report report;
-    (void)of(&s);
+    (void)closed_box_problem(&s);
     s.problem.noise = .2;
-    lam_operator_close(build(&s.problem, .01, &report));
+    lam_operator_close(hierarchical_good(&s.problem, .01, &report));
     /* The rows sum to 1, to 1e-6 in single precision. */
     ck_assert_double_eq_tol(report_get(&report, "threshold", -1), .055 * .2, 1e-6 * .055 * .2);
     ck_assert_ptr_nonnull(strstr(report.reason, "noise"));
-    closed_free(&s);
+    closed_box_free(&s);
 }
 END_TEST
 
@@ -173,16 +113,16 @@ START_TEST(small_planes_lower_the_threshold) {
     static const unsigned divisions[] = {1, 2, 3, 6};
     static const double share[] = {1. / 3, 1. / 3, 9. / 12, 1};
     for (size_t k = 0; k < sizeof share / sizeof *share; k++) {
-        closed s = closed_make(unit_cube, divisions[k], .5f);
+        closed_box s = closed_box_make(unit_cube, divisions[k], .5f);
         build_report report;
-        (void)of(&s);
+        (void)closed_box_problem(&s);
         s.problem.noise = .2;
-        lam_operator_close(build(&s.problem, .01, &report));
+        lam_operator_close(hierarchical_good(&s.problem, .01, &report));
         /* The rows sum to 1, to 1e-6 in single precision. */
         ck_assert_double_eq_tol(report_get(&report, "threshold", -1), share[k] * .055 * .2, 1e-6 * .055 * .2);
-        lam_operator_close(build(&s.problem, 1, &report));
+        lam_operator_close(hierarchical_good(&s.problem, 1, &report));
         ck_assert_double_eq_tol(report_get(&report, "threshold", -1), share[k] * .02, 1e-6 * .02);
-        closed_free(&s);
+        closed_box_free(&s);
     }
 }
 END_TEST
@@ -191,45 +131,45 @@ END_TEST
  * single elements err by no more than where rows are full: here a fifth of those of a cube. */
 START_TEST(small_rows_lower_the_threshold) {
     static const double share = .2, epsilon = .05;
-    closed s = closed_make(unit_cube, 8, .5f);
+    closed_box s = closed_box_make(unit_cube, 8, .5f);
     build_report report;
     double error_of[2];
     for (int k = 0; k < 2; k++) {
-        const build_problem *problem = of(&s);
+        const build_problem *problem = closed_box_problem(&s);
         const size_t n = problem->n;
         const csr *F = problem->F;
         double square = 0;
         for (size_t i = 0; i < n; i++)
             for (uint64_t e = F->indptr[i]; e < F->indptr[i + 1]; e++)
                 square += pow((double)F->data[e], 2) * problem->area[i] / problem->area[F->indices[e]];
-        lam_operator *op = build(problem, epsilon, &report);
+        lam_operator *op = hierarchical_good(problem, epsilon, &report);
         const double least = 1.5 * 1.5, expected = .02 * epsilon * fmin(square / least, 1);
         ck_assert_double_eq_tol(report_get(&report, "threshold", -1), expected, 1e-9 * expected);
         ck_assert_int_eq(square < least, k == 1);
         float *E = test_allocate(n, sizeof *E);
         for (size_t i = 0; i < n; i++) E[i] = i == 5;
-        error_of[k] = indirect_error(problem, op, E);
+        error_of[k] = indirect_error(problem, op, NULL, E);
         free(E);
         lam_operator_close(op);
         for (uint64_t e = 0; e < F->indptr[n]; e++) s.f.F.data[e] *= (float)share;
     }
     ck_assert_double_le(error_of[1], 1.2 * error_of[0]);
-    closed_free(&s);
+    closed_box_free(&s);
 }
 END_TEST
 
 /* The threshold by the noise of a scene, over the one that the recipe's noise alone would set. */
-static double share_of_recipe(closed *s) {
+static double share_of_recipe(closed_box *s) {
     build_report report;
     s->problem.noise = .2;
-    lam_operator_close(build(&s->problem, .001, &report));
+    lam_operator_close(hierarchical_good(&s->problem, .001, &report));
     return report_get(&report, "threshold", -1) / (.055 * .2);
 }
 
 /* The noise is that of the rows: the root of the mean of sum_j 2 A_i F_ij / (A_i + A_j). */
 START_TEST(noise_is_that_of_the_rows) {
-    closed s = closed_make(unit_cube, 6, .5f);
-    const build_problem *problem = of(&s);
+    closed_box s = closed_box_make(unit_cube, 6, .5f);
+    const build_problem *problem = closed_box_problem(&s);
     const size_t n = problem->n;
     csr *F = &s.f.F;
     build_report report;
@@ -240,7 +180,7 @@ START_TEST(noise_is_that_of_the_rows) {
     for (uint64_t e = 0; e < F->indptr[n]; e++) F->data[e] *= .25f;
     ck_assert_double_eq_tol(share_of_recipe(&s), .5, 1e-6);
     /* And half of the threshold by epsilon, where that is above the noise. */
-    lam_operator_close(build(problem, 1, &report));
+    lam_operator_close(hierarchical_good(problem, 1, &report));
     ck_assert_double_eq_tol(report_get(&report, "threshold", -1), .5 * .02, 1e-6 * .5 * .02);
     /* Small elements beside large ones, and the same S_ij = (A_i / A_j)^1/2 F_ij: a term is that times
      * 2 (A_i A_j)^1/2 / (A_i + A_j), here 8/17 between both sizes. */
@@ -256,7 +196,7 @@ START_TEST(noise_is_that_of_the_rows) {
     /* Where nothing sees anything a threshold is left. */
     for (uint64_t e = 0; e < F->indptr[n]; e++) F->data[e] = 0;
     ck_assert_double_eq_tol(share_of_recipe(&s), .1, 1e-12);
-    closed_free(&s);
+    closed_box_free(&s);
 }
 END_TEST
 
@@ -289,8 +229,8 @@ static double apart(const lam_operator *a, const lam_operator *b, size_t n, cons
 
 /* The operator is the one of the same F as rows; a balance gives it the row sums that it must have. */
 START_TEST(blocks_in_place_of_rows) {
-    closed s = closed_make(room, 10, .6f);
-    const build_problem *problem = of(&s);
+    closed_box s = closed_box_make(room, 10, .6f);
+    const build_problem *problem = closed_box_problem(&s);
     const size_t n = problem->n;
     plane_tree tree;
     block_factors f = blocks_of(problem, &tree);
@@ -306,9 +246,10 @@ START_TEST(blocks_in_place_of_rows) {
         E[n + i] = i / 40 == 3;
     }
     /* At these epsilons both keep coefficients from the same size on. */
-    lam_operator *rows = build(problem, .0004, &of_rows), *blocks = build(&other, .002, &of_blocks);
+    lam_operator *rows = hierarchical_good(problem, .0004, &of_rows),
+                 *blocks = hierarchical_good(&other, .002, &of_blocks);
     for (size_t light = 0; light < 2; light++) {
-        ck_assert_double_lt(indirect_error(problem, blocks, E + light * n), .006);
+        ck_assert_double_lt(indirect_error(problem, blocks, NULL, E + light * n), .006);
         ck_assert_double_lt(apart(blocks, rows, n, E + light * n), .1 * .002);
     }
     /* Of blocks more terms of the products are left out. */
@@ -325,7 +266,7 @@ START_TEST(blocks_in_place_of_rows) {
     ck_ok(block_factors_multiply(&f, 1, ones, sums, &error));
     for (size_t p = 0; p < n; p++)
         E[f.order[p]] = (float)(1 - (double)problem->reflectance[f.order[p]] * sums[p]);
-    blocks = build(&other, .002, &of_blocks);
+    blocks = hierarchical_good(&other, .002, &of_blocks);
     work = test_allocate(1, lam_operator_work_bytes(blocks, 1));
     ck_ok(lam_operator_apply(blocks, 1, LAM_IRRADIANCE, E, H, work, lam_operator_work_bytes(blocks, 1),
                              &error));
@@ -344,14 +285,14 @@ START_TEST(blocks_in_place_of_rows) {
     free(work);
     free(ones);
     free(sums);
-    closed_free(&s);
+    closed_box_free(&s);
 }
 END_TEST
 
 /* Blocks are for methods that can use them. */
 START_TEST(blocks_need_their_method) {
-    closed s = closed_make(unit_cube, 4, .5f);
-    build_problem problem = *of(&s);
+    closed_box s = closed_box_make(unit_cube, 4, .5f);
+    build_problem problem = *closed_box_problem(&s);
     plane_tree tree;
     block_factors f = blocks_of(&problem, &tree);
     build_options options = build_presets("exact");
@@ -371,26 +312,26 @@ START_TEST(blocks_need_their_method) {
     lam_operator_close(op);
     block_factors_free(&f);
     plane_tree_free(&tree);
-    closed_free(&s);
+    closed_box_free(&s);
 }
 END_TEST
 
 START_TEST(it_wants_to_know_where_elements_are) {
-    closed s = closed_make(unit_cube, 2, .5f);
+    closed_box s = closed_box_make(unit_cube, 2, .5f);
     const build_options options = build_presets("hierarchical");
     build_report report;
     lam_operator *op = NULL;
     ck_assert_int_eq(build_operator(problem_of(&s.f), &options, &op, &report, &error), LAM_ERR_ARGUMENT);
     ck_assert_ptr_null(op);
-    closed_free(&s);
+    closed_box_free(&s);
 }
 END_TEST
 
 /* Many small numbers that are left out are much of the light that is everywhere: it is given back, to E0 all
  * of it, and a threshold that loses little leaves it as it is. */
 START_TEST(even_light_is_made_up_for) {
-    closed s = closed_make(room, 14, .5f);
-    const build_problem *problem = of(&s);
+    closed_box s = closed_box_make(room, 14, .5f);
+    const build_problem *problem = closed_box_problem(&s);
     const size_t n = problem->n;
     float *E = test_allocate(n, sizeof *E), *lit = test_allocate(n, sizeof *lit);
     uint64_t seed = 8;
@@ -403,7 +344,7 @@ START_TEST(even_light_is_made_up_for) {
             const size_t j = F.indices[e];
             if ((i + j) * 2654435761u % 1000 < 800) F.data[e] = 0;
         }
-    coarse = build(problem, .9, &report);
+    coarse = hierarchical_good(problem, .9, &report);
     ck_assert_ptr_nonnull(strstr(report.reason, "the mean error of uniform emission is corrected"));
     /* Half precision, of what was missing. */
     ck_assert_double_lt(report_get(&report, "uniform_error", -1), 1e-3);
@@ -411,15 +352,15 @@ START_TEST(even_light_is_made_up_for) {
         lit[i] = (float)random_lcg_unit(&seed);
         E[i] = i % 2 == 0 ? 1.0f : .5f;
     }
-    ck_assert_double_lt(indirect_error(problem, coarse, E), .1);
-    ck_assert_double_lt(indirect_error(problem, coarse, lit), .2);
-    fine = build(problem, .002, &report);
+    ck_assert_double_lt(indirect_error(problem, coarse, NULL, E), .1);
+    ck_assert_double_lt(indirect_error(problem, coarse, NULL, lit), .2);
+    fine = hierarchical_good(problem, .002, &report);
     ck_assert_ptr_null(strstr(report.reason, "uniform emission"));
     free(E);
     free(lit);
     lam_operator_close(coarse);
     lam_operator_close(fine);
-    closed_free(&s);
+    closed_box_free(&s);
 }
 END_TEST
 
@@ -427,11 +368,11 @@ END_TEST
  */
 START_TEST(some_elements) {
     static const size_t counts[] = {1, 3, 40, 2500};
-    closed s = closed_make(room, 20, .5f);
-    const build_problem *problem = of(&s);
+    closed_box s = closed_box_make(room, 20, .5f);
+    const build_problem *problem = closed_box_problem(&s);
     const size_t n = problem->n;
     build_report report;
-    lam_operator *op = build(problem, .05, &report);
+    lam_operator *op = hierarchical_good(problem, .05, &report);
     const size_t bytes = lam_operator_work_bytes(op, 3);
     void *work = test_allocate(1, bytes);
     float *E = test_allocate(3 * n, sizeof *E), *all = test_allocate(3 * n, sizeof *all),
@@ -462,7 +403,7 @@ START_TEST(some_elements) {
     free(which);
     free(work);
     lam_operator_close(op);
-    closed_free(&s);
+    closed_box_free(&s);
 }
 END_TEST
 
