@@ -164,46 +164,6 @@ done:
     return status;
 }
 
-static uint32_t little_endian(const char *bytes) {
-    const unsigned char *b = (const unsigned char *)bytes;
-    return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
-}
-
-static void put_little_endian(char *bytes, uint32_t x) {
-    for (int k = 0; k < 4; k++) bytes[k] = (char)(x >> 8 * k & 255);
-}
-
-/* Some writers of GLB do not pad chunks to 4 bytes, which the library refuses. *out is a padded copy, freed
- * by the caller, or NULL where the file is not a GLB or is padded. */
-static lam_status glb_padded(const char *glb, size_t length, char **out, size_t *out_length,
-                             lam_error *error) {
-    size_t chunks = 0, uneven = 0, to = 12;
-    *out = NULL;
-    if (length < 12 || length > UINT32_MAX / 2 || memcmp(glb, "glTF", 4) != 0) return LAM_OK;
-    for (size_t at = 12; length - at >= 8; chunks++) {
-        const size_t size = little_endian(glb + at);
-        if (size > length - at - 8) return LAM_OK; /* truncated: the library says so */
-        uneven += size % 4 != 0;
-        at += 8 + size;
-    }
-    if (uneven == 0) return LAM_OK;
-    char *padded = memory_allocate(length + 3 * chunks, 1, "GLB", error);
-    if (padded == NULL) return LAM_ERR_MEMORY;
-    for (size_t at = 12; length - at >= 8;) {
-        const uint32_t size = little_endian(glb + at), pad = (4 - size % 4) % 4;
-        memcpy(padded + to, glb + at, 8 + size);
-        put_little_endian(padded + to, size + pad);
-        memset(padded + to + 8 + size, memcmp(glb + at + 4, "JSON", 4) == 0 ? ' ' : 0, pad);
-        at += 8 + size;
-        to += 8 + size + pad;
-    }
-    memcpy(padded, glb, 12);
-    put_little_endian(padded + 8, (uint32_t)to);
-    *out = padded;
-    *out_length = to;
-    return LAM_OK;
-}
-
 /* A file in memory, as the library reads it: the scene itself, or one that the scene names. */
 typedef struct open_file {
     struct aiFile calls;

@@ -1,8 +1,7 @@
-/* Checks of a file's head before the importing library reads it: glTF extensions that it needs, and a PLY's
- * numbers of vertices and faces. Run in the child. */
+/* Heads of files, before the importing library reads them: glTF extensions that are needed, chunks of a GLB
+ * that are not padded, and a PLY's numbers of vertices and faces. Runs in the child. */
 #include "solver/scene/import/imported_faces.h"
 
-#include <ctype.h>
 #include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,9 +21,13 @@ static bool is_readable(const char *extension) {
     return false;
 }
 
-static size_t little_endian(const char *bytes) {
+static uint32_t little_endian(const char *bytes) {
     const unsigned char *b = (const unsigned char *)bytes;
-    return b[0] | (size_t)b[1] << 8 | (size_t)b[2] << 16 | (size_t)b[3] << 24;
+    return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
+}
+
+static void put_little_endian(char *bytes, uint32_t x) {
+    for (int k = 0; k < 4; k++) bytes[k] = (char)(x >> 8 * k & 255);
 }
 
 lam_status gltf_check_head(const char *path, const char *bytes, size_t length, lam_error *error) {
@@ -47,6 +50,34 @@ lam_status gltf_check_head(const char *path, const char *bytes, size_t length, l
 done: /* where the JSON is broken, the library says so */
     json_decref(root);
     return status;
+}
+
+lam_status glb_padded(const char *glb, size_t length, char **out, size_t *out_length, lam_error *error) {
+    size_t chunks = 0, uneven = 0, to = 12;
+    *out = NULL;
+    if (length < 12 || length > UINT32_MAX / 2 || memcmp(glb, "glTF", 4) != 0) return LAM_OK;
+    for (size_t at = 12; length - at >= 8; chunks++) {
+        const size_t size = little_endian(glb + at);
+        if (size > length - at - 8) return LAM_OK; /* truncated: the library says so */
+        uneven += size % 4 != 0;
+        at += 8 + size;
+    }
+    if (uneven == 0) return LAM_OK;
+    char *padded = memory_allocate(length + 3 * chunks, 1, "GLB", error);
+    if (padded == NULL) return LAM_ERR_MEMORY;
+    for (size_t at = 12; length - at >= 8;) {
+        const uint32_t size = little_endian(glb + at), pad = (4 - size % 4) % 4;
+        memcpy(padded + to, glb + at, 8 + size);
+        put_little_endian(padded + to, size + pad);
+        memset(padded + to + 8 + size, memcmp(glb + at + 4, "JSON", 4) == 0 ? ' ' : 0, pad);
+        at += 8 + size;
+        to += 8 + size + pad;
+    }
+    memcpy(padded, glb, 12);
+    put_little_endian(padded + 8, (uint32_t)to);
+    *out = padded;
+    *out_length = to;
+    return LAM_OK;
 }
 
 /* Bytes of one number of a binary PLY; 0 for a type that is not known. */

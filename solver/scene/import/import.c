@@ -43,17 +43,15 @@ static lam_status settle_materials(imported_faces *s, const char *path, const bo
         const char *name = name_table_get(&s->materials, i);
         bool clamped = false;
         if (!used[i]) continue;
-        if (!v->has_diffuse) {
-            import_warn(&s->warnings, "%s: material '%s' %s; its reflectance is set to %g", path, name,
-                        v->defined ? "has no diffuse colour" : "is not defined", default_reflectance);
-            for (int c = 0; c < 3; c++) v->diffuse[c] = default_reflectance;
-        }
         if (v->textured) {
             import_warn(&s->warnings,
                         "%s: the texture of material '%s' is not read; its reflectance is set to %g", path,
                         name, default_reflectance);
-            for (int c = 0; c < 3; c++) v->diffuse[c] = default_reflectance;
+        } else if (!v->has_diffuse) {
+            import_warn(&s->warnings, "%s: material '%s' %s; its reflectance is set to %g", path, name,
+                        v->defined ? "has no diffuse colour" : "is not defined", default_reflectance);
         }
+        for (int c = 0; c < 3 && (v->textured || !v->has_diffuse); c++) v->diffuse[c] = default_reflectance;
         for (int c = 0; c < 3; c++) {
             if (!(v->diffuse[c] >= 0) || !isfinite(v->diffuse[c]))
                 FAIL(error, LAM_ERR_FORMAT, "%s: material '%s': diffuse value %g, must be in [0, 1)", path,

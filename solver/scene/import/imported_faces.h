@@ -84,6 +84,10 @@ asset_place asset_find(const char *scene, const char *assets, const char *file, 
 lam_status gltf_check_head(const char *path, const char *bytes, size_t length, lam_error *error);
 lam_status ply_check_head(const char *path, const char *bytes, size_t length, lam_error *error);
 
+/* Some writers of GLB do not pad chunks to 4 bytes, which the library refuses. *out is a padded copy, freed
+ * by the caller, or NULL where the file is not a GLB or is padded. Errors: LAM_ERR_MEMORY. */
+lam_status glb_padded(const char *glb, size_t length, char **out, size_t *out_length, lam_error *error);
+
 /* A reader of one family of formats; runs in the child. */
 typedef lam_status scene_reader(const char *path, imported_faces *s, lam_error *error);
 scene_reader obj_read;
