@@ -96,7 +96,7 @@ static void log_form_factors(precompute_state *state) {
 /* Above this share of light that meets backs, faces are likely to be turned. */
 static const double backs_share = .01;
 
-/* Names the groups whose backs take light. Blocks do not tell it from light that leaves. */
+/* Names the groups whose backs take light. */
 static lam_status warn_of_backs(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const form_factors *f = &state->f;
@@ -104,11 +104,8 @@ static lam_status warn_of_backs(precompute_state *state, lam_error *error) {
     facing_survey survey = {.share = 0};
     char groups[256] = "";
     size_t used = 0, left = 0;
-    const bool may =
-        f->recipe.method == RECIPE_BLOCKS ? f->leaving_share > backs_share : f->absorbed_share > backs_share;
-    if (!may || m->two_sided) return LAM_OK;
+    if (!(f->absorbed_share > backs_share) || m->two_sided) return LAM_OK;
     TRY(facing_survey_make(m, &survey, error));
-    if (!(survey.share > backs_share)) goto done;
     for (size_t g = 0; g < m->n_groups; g++) left += survey.group_shares[g] > 0;
     for (int k = 0; k < 3 && left > 0; k++, left--) { /* the largest first */
         size_t most = 0;
@@ -195,6 +192,7 @@ static lam_status run_trial(precompute_state *state, lam_error *error) {
     const bool first = state->trial.count == 0;
     double started = clock_seconds(), used = clock_processor_seconds();
     const bool made = state->f.row_sums != NULL;
+    if (state->recipe.method != RECIPE_BLOCKS) state_forget_ready(state);
     if (!made) {
         TRY(state->recipe.method == RECIPE_BLOCKS ? stage_blocks(state, error)
             : state->streamed                     ? stage_near_pairs(state, error)

@@ -143,9 +143,11 @@ lam_status state_blocks_possible(precompute_state *state, const build_method *me
 bool state_may_have_blocks(const precompute_state *state, double n);
 lam_status state_choose_blocks(precompute_state *state, const build_method *method, bool final,
                                lam_error *error);
-/* The cost of blocks by a recipe, from a sample of them. */
+/* The cost of blocks by a recipe, from a sample of them; the scene is ready for these then, until they are
+ * found or it is forgotten. */
 lam_status state_forecast_blocks(precompute_state *state, const recipe *blocks, pairs_cost *cost,
                                  lam_error *error);
+void state_forget_ready(precompute_state *state);
 lam_status stage_blocks(precompute_state *state, lam_error *error);
 
 /* The blocks that a store keeps; refuses options that need rows: stage_blocks.c. */

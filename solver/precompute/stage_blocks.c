@@ -114,7 +114,7 @@ done:
     return status;
 }
 
-static void forget_ready(precompute_state *state) {
+void state_forget_ready(precompute_state *state) {
     block_scene_destroy(state->ready);
     state->ready = NULL;
 }
@@ -138,7 +138,7 @@ static lam_status weigh(precompute_state *state, const recipe *blocks, bool *tak
     if (*taken)
         state->cost = cost;
     else
-        forget_ready(state);
+        state_forget_ready(state);
 done:
     return status;
 }
@@ -205,7 +205,7 @@ lam_status stage_blocks(precompute_state *state, lam_error *error) {
     TRY(form_factors_make_blocks(&state->m, state->order, &state->tree, NULL, &how, &state->f, &state->blocks,
                                  error));
 done:
-    forget_ready(state);
+    state_forget_ready(state);
     return status;
 }
 
