@@ -69,6 +69,7 @@ typedef struct method_forecast {
     double loaded;   /* by the operator in memory, in single precision where its kind can be narrowed */
     double stored;   /* by its arrays in the store, likewise */
     double seconds;  /* of a processor, while it is made; 0: not known */
+    double answer;   /* seconds of a processor for an answer of one channel, among many; 0: not known */
 } method_forecast;
 
 /* The size of a build, as far as it is known before. */
@@ -80,6 +81,7 @@ typedef struct method_scale {
     double single_share; /* of the blocks: that of pairs of elements */
     double entries;      /* of the rows; 0: not known */
     double n_planes;     /* of the tree of clusters; 0: not known */
+    double hits;         /* share of the rays from elements that hit anything; 0: not known */
 } method_scale;
 
 struct decision;

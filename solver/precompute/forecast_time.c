@@ -33,15 +33,41 @@ static double blocks_of(const forecast *f, const recipe *r) {
     return f->cost.entries / 2 * law / forecast_blocks(n, &f->recipe);
 }
 
+static method_forecast forecast_of_method(const forecast *f) {
+    method_forecast made = {.building = 0};
+    const double n = (double)f->n;
+    if (f->method == NULL) return made;
+    const method_scale scale = {.n = n,
+                                .n_channels = (double)f->n_channels,
+                                .noise = recipe_noise(&f->recipe),
+                                .n_emitters = (double)f->emitters,
+                                .n_planes = (double)f->n_planes,
+                                .n_blocks = f->recipe.method == RECIPE_BLOCKS ? blocks_of(f, &f->recipe) : 0,
+                                .single_share = f->cost.single_share,
+                                .hits = f->cost.hits,
+                                .entries = f->cost.entries > 0 ? f->cost.entries
+                                                               : forecast_rows_bytes(n, &f->recipe) / 8};
+    f->method->forecast(&scale, method_own_const(f->build, f->method), &made);
+    return made;
+}
+
 /* Single elements that defaults take on average. */
 static const double probes_expected = 48;
 /* Processor seconds of a probe, per block and per element, with its direct light: of three Cornell boxes
  * (10,249 to 163,811 elements), rooms, a maze and a patio, what the judge takes beside finding its blocks. */
 static const double probe_block_seconds = 9e-9, probe_element_seconds = 3e-7;
 
-/* Of a probe per channel and element beside the products with F: some eight answers of the operator that
- * guides two solutions, vectors, and its direct light (a hotel room of 99,021 elements). */
-static const double guided_element_seconds = 7e-7;
+/* A guide of two solutions gives some eight answers, with vectors and direct light; seconds of an element for
+ * all of them, where the method does not tell of its answers. */
+static const double guided_answers = 8, guided_element_seconds = 7e-7;
+
+/* Of a probe and channel beside the products with F. */
+static double guide_seconds(const forecast *f) {
+    if (f->n <= REFERENCE_DENSE_ELEMENTS) return 0;
+    const double answer = forecast_of_method(f).answer;
+    return answer > 0 ? guided_answers * answer : guided_element_seconds * (double)f->n;
+}
+
 /* Probes may always take these. */
 static const double probes_enough = 1;
 
@@ -53,8 +79,7 @@ static double probe_seconds(const forecast *f) {
     const double entries = forecast_rows_bytes(n, &f->judge_recipe) / 8;
     const double least = (double)f->probes_least, most = (double)f->probes;
     const double more = reference_seconds(n, entries, most) - reference_seconds(n, entries, least);
-    const double guided = f->n > REFERENCE_DENSE_ELEMENTS ? guided_element_seconds * n : 0;
-    return C * (2 * more / (most - least) + guided);
+    return C * (2 * more / (most - least) + guide_seconds(f));
 }
 
 size_t forecast_probes(const forecast *f) {
@@ -77,24 +102,7 @@ static double solve_seconds(const forecast *f) {
     const double own = f->cost.entries > 0 ? f->cost.entries : forecast_rows_bytes(n, &f->recipe) / 8;
     const double entries = f->cost.entries > 0 ? own : forecast_rows_bytes(n, &f->judge_recipe) / 8;
     return (double)f->n_channels * (reference_seconds(n, own, fmin(probes, JUDGE_AT_ONCE)) +
-                                    2 * reference_seconds(n, entries, probes));
-}
-
-static double operator_seconds(const forecast *f) {
-    method_forecast made = {.building = 0};
-    const double n = (double)f->n;
-    if (f->method == NULL) return 0;
-    const method_scale scale = {.n = n,
-                                .n_channels = (double)f->n_channels,
-                                .noise = recipe_noise(&f->recipe),
-                                .n_emitters = (double)f->emitters,
-                                .n_planes = (double)f->n_planes,
-                                .n_blocks = f->recipe.method == RECIPE_BLOCKS ? blocks_of(f, &f->recipe) : 0,
-                                .single_share = f->cost.single_share,
-                                .entries = f->cost.entries > 0 ? f->cost.entries
-                                                               : forecast_rows_bytes(n, &f->recipe) / 8};
-    f->method->forecast(&scale, method_own_const(f->build, f->method), &made);
-    return made.seconds;
+                                    2 * reference_seconds(n, entries, probes) + probes * guide_seconds(f));
 }
 
 forecast_times forecast_seconds(const forecast *f, const forecast_rates *rates) {
@@ -115,7 +123,7 @@ forecast_times forecast_seconds(const forecast *f, const forecast_rates *rates) 
     if (!f->from_store)
         times.form_factors =
             f->streamed && !counted ? n * forecast_rays(n, own) * rates->ray_seconds : once + beside;
-    times.operate = operator_seconds(f) * rates->slowness;
+    times.operate = forecast_of_method(f).seconds * rates->slowness;
     /* Both samples of pairs share what is projected, and the number of segments of one. */
     const bool shared = of_judge->method == RECIPE_PAIRS && !f->scratch;
     if (f->probes > 0) times.judge = (finer ? 1 : shared ? 1.1 : 2) * half + (f->streamed ? once : 0);

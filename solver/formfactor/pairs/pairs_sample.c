@@ -220,7 +220,8 @@ static lam_status rays_forecast(const mesh *m, const recipe *r, pairs_cost *out,
     TRY(ray_crossings_sample(m, SEED, &w, error));
     const double each = fmax((w.boxes - boxes_free) * box_seconds, ray_seconds);
     *out = (pairs_cost){.seconds = rays * each + n * row_seconds,
-                        .entries = fmin(rays * w.hits * ray_entries, n * n / 2)};
+                        .entries = fmin(rays * w.hits * ray_entries, n * n / 2),
+                        .hits = w.hits};
 done:
     return status;
 }
@@ -261,7 +262,8 @@ lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, pai
     const double pace = sample_pace(trial.seconds, rows_seconds(&trial.work));
     *out = (pairs_cost){.seconds = links + rows + rest + of_rays.seconds,
                         .measured = (links + rows) * pace + rest + of_rays.seconds,
-                        .entries = 2 * entries};
+                        .entries = 2 * entries,
+                        .hits = of_rays.hits};
 done:
     visibility_destroy(v);
     return status;

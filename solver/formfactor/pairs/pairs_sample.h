@@ -40,6 +40,7 @@ typedef struct pairs_cost {
     double entries;      /* of F, or twice the blocks */
     double single_share; /* of blocks: that of pairs of elements; else 0 */
     double finer;        /* of blocks: measured, of those that judge them; else 0 */
+    double hits;         /* of rays: the share that hits anything; 0: not known */
 } pairs_cost;
 
 /* The cost of form factors by RECIPE_PAIRS, RECIPE_NEAR_PAIRS or RECIPE_RAYS, rays included, from
