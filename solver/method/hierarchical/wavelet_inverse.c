@@ -222,17 +222,28 @@ typedef struct product_rows {
 } product_rows;
 
 /* sums_j += sum_k z_k b_kj. Rows of B are sorted by magnitude, so that the loop over a row ends at the first
- * term that may be left out. */
+ * term that may be left out. The working area is in locals: a count in memory would make each term wait for
+ * the one before. */
 static void add_product(row_work *w, size_t length, const row_term *z, const term_rows *B, float skip) {
-    size_t terms = 0;
+    enum { AHEAD = 4 };
+    float *const sums = w->sums;
+    uint32_t *const columns = w->columns;
+    size_t terms = 0, count = w->count;
     for (size_t e = 0; e < length; e++) {
+        if (e + AHEAD < length) {
+            __builtin_prefetch(B->row[z[e + AHEAD].column]);
+            __builtin_prefetch(B->row[z[e + AHEAD].column] + 8);
+        }
+        if (e + 2 * AHEAD < length) __builtin_prefetch(&B->row[z[e + 2 * AHEAD].column]);
+        if (e + 2 * AHEAD < length) __builtin_prefetch(&B->length[z[e + 2 * AHEAD].column]);
         const float by = z[e].value, least = skip / fabsf(by);
         const row_term *from = B->row[z[e].column], *const first = from,
                        *const last = from + B->length[z[e].column];
         for (; from < last && fabsf(from->value) >= least; from++)
-            row_work_add(w, from->column, by * from->value);
+            count = row_sum_add(sums, columns, count, from->column, by * from->value);
         terms += (size_t)(from - first);
     }
+    w->count = count;
     w->terms += (double)terms;
 }
 

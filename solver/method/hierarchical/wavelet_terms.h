@@ -51,13 +51,17 @@ typedef struct row_work {
 lam_status row_works_make(size_t n, size_t n_threads, row_work **out, lam_error *error);
 void row_works_free(row_work *works, size_t n_threads);
 
-/* sums_j += value */
-static inline void row_work_add(row_work *w, uint32_t j, float value) {
-    const float before = w->sums[j], after = before + value;
-    w->columns[w->count] = j;
-    w->count += before == 0;
+/* sums_j += value, where columns [count] are those that are not 0; returns their new number. */
+static inline size_t row_sum_add(float *sums, uint32_t *columns, size_t count, uint32_t j, float value) {
+    const float before = sums[j], after = before + value;
+    columns[count] = j;
     /* A sum that cancels to 0 is set to 1e-30, so that its column is not listed twice. */
-    w->sums[j] = after == 0 ? 1e-30f : after;
+    sums[j] = after == 0 ? 1e-30f : after;
+    return count + (before == 0);
+}
+
+static inline void row_work_add(row_work *w, uint32_t j, float value) {
+    w->count = row_sum_add(w->sums, w->columns, w->count, j, value);
 }
 
 /* Room for a row of `count` terms of an output, which is kept by adding its length to done[output].used.
