@@ -8,6 +8,7 @@
 #include "solver/method/hierarchical/wavelet_blocks.h"
 #include "solver/method/hierarchical/wavelet_entries.h"
 #include "solver/method/hierarchical/wavelet_importance.h"
+#include "solver/method/hierarchical/wavelet_impose.h"
 #include "solver/method/hierarchical/wavelet_inverse.h"
 #include "solver/method/hierarchical/wavelet_norm.h"
 #include "solver/method/hierarchical/wavelet_pass.h"
@@ -164,6 +165,21 @@ done:
     free(E);
     free(H);
     free(work);
+    return status;
+}
+
+/* Imposes on K of a channel the answer H = s of E = 1 - rho s, s the row sums of F. */
+static lam_status impose_uniform(const build_problem *problem, size_t c, const double *s,
+                                 const plane_tree *tree, const double *area,
+                                 const wavelet_inverse_input *inverse, csr *K, lam_error *error) {
+    const size_t n = problem->n;
+    double *E = memory_allocate(n, sizeof *E, "operator", error);
+    if (E == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < n; i++) E[i] = 1 - (double)problem->reflectance[c * n + i] * s[i];
+    const lam_status status =
+        wavelet_impose_answer(inverse->basis, tree->order, area, E, s, inverse->threshold,
+                              inverse->tile_over == NULL, inverse->weight, K, error);
+    free(E);
     return status;
 }
 
@@ -330,6 +346,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
                                                .n_threads = n_threads,
                                                .progress = options->progress};
         TRY(wavelet_inverse(&inverse, &arrays.K[c], &inverted, error));
+        TRY(impose_uniform(problem, c, row_sums, tree, area, &inverse, &arrays.K[c], error));
         entries += (double)arrays.K[c].indptr[n];
     }
     const size_t n_shapes = arrays.basis.n_shapes, n_nodes = arrays.basis.n_nodes;

@@ -33,18 +33,6 @@ lam_status coefficient_lists_join(size_t n, coefficient_list *lists, size_t n_li
 lam_status wavelet_add_transpose(const wavelets *w, const float *weight, float threshold, csr *S,
                                  lam_error *error);
 
-/* Imposes the row sums s of F on S: S A^1/2 = A^1/2 s. The scaling function of a root that carries constants
- * alone is A^1/2 / |A^1/2|, the last coefficient (wavelet_basis.h makes it positive), so that W A^1/2 s /
- * |A^1/2| is the last row and the last column of W S W^T. It replaces them, entries up to threshold weight_i
- * weight_root dropped. In a closed scene this leaves 1 on the diagonal: uniform radiosity is transported
- * exactly, and radiosity of mean 0 stays so.
- *
- * S: upper triangle; area by position, row_sums by element, order [n] elements by position, weight by node.
- * Does nothing where the root carries more than constants. Errors: LAM_ERR_MEMORY. */
-lam_status wavelet_impose_row_sums(const wavelets *w, const uint32_t *order, const double *area,
-                                   const double *row_sums, float threshold, const float *weight, csr *S,
-                                   lam_error *error);
-
 /* Scaling functions of a node, at most. */
 enum { ENTRY_LANES = 3 };
 

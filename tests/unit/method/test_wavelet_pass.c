@@ -1,6 +1,7 @@
 /* F in a basis of wavelets and its inverse there, against dense matrices in double. */
 #include "solver/base/random.h"
 #include "solver/method/hierarchical/wavelet_entries.h"
+#include "solver/method/hierarchical/wavelet_impose.h"
 #include "support/followed.h"
 #include "support/wavelet_subject.h"
 
