@@ -1,8 +1,10 @@
 #include "solver/linalg/tiled.h"
 
 #include "solver/base/cpu.h"
+#include "solver/base/work_shares.h"
 #include "store/status.h"
 
+#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -342,19 +344,22 @@ void tiled_multiply(const tiled_rows *t, size_t m, const float *X, float *Y, flo
     const size_t n = t->n, width = m > 1 ? WIDTH : 1;
     const bool many =
         n_threads > 1 && t->begin[t->n_groups * t->n_planes] * TILE * TILE_LANES * m > THREADS_WORTH;
+    work_shares groups;
+    work_shares_begin(&groups, t->n_groups, GROUPS_AT_ONCE, many ? n_threads : 1);
 #pragma omp parallel num_threads((int)n_threads) if (many)
     {
 #pragma omp for schedule(static)
         for (size_t p = 0; p < n + COLUMNS_PAST; p++)
             for (size_t v = 0; v < width; v++)
                 work[p * width + v] = v < m && p < n ? t->step[p] * X[v * n + p] : 0;
-#pragma omp for schedule(dynamic, GROUPS_AT_ONCE)
-        for (size_t g = 0; g < t->n_groups; g++) {
-            if (m > 1)
-                run.wide(t, g, m, work, Y);
-            else
-                run.one(t, g, work, Y);
-        }
+        size_t tried = 0, first = 0, last = 0;
+        while (work_shares_take(&groups, (size_t)omp_get_thread_num(), &tried, &first, &last))
+            for (size_t g = first; g < last; g++) {
+                if (m > 1)
+                    run.wide(t, g, m, work, Y);
+                else
+                    run.one(t, g, work, Y);
+            }
     }
 }
 

@@ -2,8 +2,10 @@
 
 #include "solver/base/array_grow.h"
 #include "solver/base/cpu.h"
+#include "solver/base/work_shares.h"
 #include "store/status.h"
 
+#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -294,9 +296,11 @@ void wavelet_plan_forward(const wavelet_plan *plan, size_t m, wavelet_visit *fil
     transform *const run = forward[cpu_best()];
     const size_t room = wavelet_plan_work(plan), n_pieces = plan->n_pieces;
     const plan_step *root = &plan->steps[plan->n_steps - 1];
-#pragma omp parallel for schedule(dynamic, 1)                                                                \
-    num_threads((int)n_threads) if (n_threads > 1 && m * n_pieces > 1)
-    for (size_t k = 0; k < m * n_pieces; k++) {
+    work_shares pieces;
+    work_shares_begin(&pieces, m * n_pieces, 1, n_threads);
+#pragma omp parallel num_threads((int)n_threads) if (n_threads > 1 && m * n_pieces > 1)
+    for (size_t tried = 0, k, end;
+         work_shares_take(&pieces, (size_t)omp_get_thread_num(), &tried, &k, &end);) {
         const size_t v = k / n_pieces;
         const wavelet_piece *piece = &plan->pieces[k % n_pieces];
         if (fill != NULL) fill(context, v, k % n_pieces, piece_begin(plan, piece), piece_end(plan, piece));
@@ -325,9 +329,11 @@ void wavelet_plan_inverse(const wavelet_plan *plan, size_t m, const float *C, fl
         for (size_t k = 0; k < root->scaling; k++) s[k] = c[plan->n_used - root->scaling + k];
         run(plan, 0, plan->n_above, plan->above, c, X + v * plan->n, work + v * room);
     }
-#pragma omp parallel for schedule(dynamic, 1)                                                                \
-    num_threads((int)n_threads) if (n_threads > 1 && m * n_pieces > 1)
-    for (size_t k = 0; k < m * n_pieces; k++) {
+    work_shares pieces;
+    work_shares_begin(&pieces, m * n_pieces, 1, n_threads);
+#pragma omp parallel num_threads((int)n_threads) if (n_threads > 1 && m * n_pieces > 1)
+    for (size_t tried = 0, k, end;
+         work_shares_take(&pieces, (size_t)omp_get_thread_num(), &tried, &k, &end);) {
         const size_t v = k / n_pieces;
         const wavelet_piece *piece = &plan->pieces[k % n_pieces];
         run(plan, piece->first, piece->last, NULL, C + v * plan->n_used, X + v * plan->n, work + v * room);
