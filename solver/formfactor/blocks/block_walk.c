@@ -2,6 +2,7 @@
 
 #include "solver/base/array_grow.h"
 #include "solver/base/random.h"
+#include "solver/formfactor/pairs/occlusion.h"
 #include "solver/formfactor/pairs/open_scene.h"
 #include "solver/operator/blocks/importance.h"
 
@@ -30,8 +31,8 @@ static const double share_of_spread = .01;
 static const double rough_most = .3;
 /* Segments of a partly hidden block, and of a pair of elements within the bound of blocks: SEGMENT_LANES, a
  * round of them. A pair beyond the bound, which cannot be split, gets as many rounds as it takes to err no
- * more than a block at the bound, N segments by N^-3/4 of its norm. The number does not depend on how many of
- * the first ones are blocked: small openings would lose the light of pairs in which all are. */
+ * more than a block at the bound, N segments by N^-SEGMENTS_POWER of its norm. The number does not depend on
+ * how many of the first ones are blocked: small openings would lose the light of pairs in which all are. */
 enum { PAIR_ROUNDS_LEAST = 2, PAIR_ROUNDS_MOST = 64 };
 /* So few candidates cost less to test than to sift. */
 enum { CANDIDATES_FEW = 4 };
@@ -159,7 +160,7 @@ static const candidates *sift_for_pair(block_walk *w, uint32_t a, uint32_t b, co
 }
 
 static int rounds_of_pair(double norm, double bound) {
-    const double wanted = ceil(pow(norm / bound, 4. / 3));
+    const double wanted = ceil(pow(norm / bound, 1 / SEGMENTS_POWER));
     return (int)fmin(fmax(wanted, PAIR_ROUNDS_LEAST), PAIR_ROUNDS_MOST);
 }
 

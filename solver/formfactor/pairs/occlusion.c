@@ -8,11 +8,9 @@
 
 enum { SEGMENTS_MOST = 1 << 22 };
 
-/* The number N of segments with 1.6 F N^-3/4 = accuracy. N segments of the low-discrepancy sequence estimate
- * the visible share with a standard error of about 1.6 N^-3/4 (measured on a plate between two plates, for N
- * from 16 to 165,000). */
+/* The number N of segments with SEGMENTS_ERROR F N^-SEGMENTS_POWER = accuracy. */
 static size_t segments_for(const occlusion *o, double F, double accuracy) {
-    const double wanted = fmin(pow(1.6 * F / accuracy, 4. / 3), SEGMENTS_MOST);
+    const double wanted = fmin(pow(SEGMENTS_ERROR * F / accuracy, 1 / SEGMENTS_POWER), SEGMENTS_MOST);
     const size_t packets = ((size_t)wanted + VISIBILITY_PACKET - 1) / VISIBILITY_PACKET;
     const size_t segments = packets * VISIBILITY_PACKET;
     return segments > o->segments ? segments : o->segments;

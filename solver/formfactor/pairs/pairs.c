@@ -173,7 +173,7 @@ static segment_count segments_of_block(const pairs_run *run, size_t index) {
 }
 
 /* Scales the accuracy so that all mixed pairs together take between segments_least, or their share of it, and
- * segments_most segments: the error of N segments is proportional to N^-3/4. */
+ * segments_most segments: the error of N segments is proportional to N^-SEGMENTS_POWER. */
 static lam_status share_segments(pairs_run *run, lam_error *error) {
     const size_t n_blocks = run->rows.n_blocks;
     segment_count all = {0, 0};
@@ -189,7 +189,7 @@ static lam_status share_segments(pairs_run *run, lam_error *error) {
     if (!(all.mixed > 0)) return LAM_OK;
     const double least = run->options->segments_least * all.mixed / (all.mixed + all.saved);
     const double cast = fmin(fmax(all.mixed, least), run->options->segments_most);
-    run->occlusion.accuracy *= pow(all.mixed / cast, .75);
+    run->occlusion.accuracy *= pow(all.mixed / cast, SEGMENTS_POWER);
     return LAM_OK;
 }
 
@@ -446,10 +446,10 @@ done:
 }
 
 /* The bound on segments for all mixed pairs: 32,768 per element and at least 64 million at the accuracy of
- * normal quality, 7e-5, scaled by the law of their error, N ~ accuracy^-4/3. */
+ * normal quality, 7e-5, scaled by the law of their error. */
 static double segments_most(size_t n, double accuracy) {
     const double an_element = 32768, enough = 64e6, normal = 7e-5;
-    return fmax(an_element * (double)n, enough) * pow(normal / accuracy, 4. / 3);
+    return fmax(an_element * (double)n, enough) * pow(normal / accuracy, 1 / SEGMENTS_POWER);
 }
 
 /* Few elements need few segments for the accuracy asked for. Half a second more makes their large factors

@@ -1,6 +1,7 @@
 #include "solver/formfactor/pairs/pairs_twice.h"
 
 #include "solver/base/random.h"
+#include "solver/formfactor/pairs/occlusion.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -105,8 +106,8 @@ lam_status pairs_exchange_twice(const mesh *m, const visibility *v, const pairs_
     pairs_report other;
     pairs_options how = *options;
     how.scratch = NULL;
-    /* Half the segments: their error is as N^-3/4. */
-    how.coarser = pow(2, .75);
+    /* Half the segments. */
+    how.coarser = pow(2, SEGMENTS_POWER);
     how.segments_least /= 2;
     how.segments_most /= 2;
     how.keep = &known;

@@ -44,7 +44,9 @@ void element_sampler_order(const element_sampler *s, uint32_t first, size_t coun
 /* The point of the element at (u, w) in the unit square; the map preserves area. */
 void element_sampler_point(const element_sampler *s, float u, float w, float point[3]);
 
-/* Point pairs on two elements. A sample depends on (seed, i, j, index) alone. */
+/* Point pairs on two elements: a Sobol' sequence, digitally shifted, so that each point is uniform in the
+ * cube. A sample depends on (seed, i, j, index) alone. Its first 2^k points are spread evenly; other numbers
+ * are hardly better than the next smaller power of two. */
 typedef struct pair_sampler {
     uint32_t shift[4];
 } pair_sampler;
@@ -54,7 +56,7 @@ void pair_sampler_init(pair_sampler *s, uint64_t seed, size_t i, size_t j);
 /* The index-th point of the unit cube in four dimensions: two for each of the elements. */
 void pair_sampler_place(const pair_sampler *s, uint32_t index, double x[4]);
 
-/* The points first ... first+7, one array for each dimension. */
+/* The points first ... first+7, one array for each dimension; first is a multiple of 8. */
 void pair_sampler_packet(const pair_sampler *s, uint32_t first, double x[4][VISIBILITY_PACKET]);
 
 #endif
