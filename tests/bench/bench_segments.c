@@ -68,7 +68,7 @@ int main(int argc, char **argv) {
         polygon_of_element(&m, i, &a);
         polygon_of_element(&m, j, &b);
         const double g = pair_factor_exchange(&rules, &a, &b, 1e-3) / fmin(m.area[i], m.area[j]);
-        if (!a.affine || !b.affine || g < least) continue;
+        if (g < least) continue;
         const affine_pair maps = {affine_map_of(&a), affine_map_of(&b)};
         double exact = share(v, &maps, i, j, 9, 64, &effective);
         if (effective < .4 || exact <= 0 || exact >= 1) continue;

@@ -1,6 +1,7 @@
 #include "solver/formfactor/pairs/affine_segments.h"
 
 #include "solver/base/cpu.h"
+#include "solver/base/vector3.h"
 
 #include <string.h>
 
@@ -8,13 +9,30 @@ typedef double lanes __attribute__((vector_size(8 * AFFINE_SEGMENTS), may_alias)
 typedef long long mask __attribute__((vector_size(8 * AFFINE_SEGMENTS), may_alias));
 typedef float floats __attribute__((vector_size(4 * AFFINE_SEGMENTS), may_alias));
 
+/* Twice the area of the triangle at a corner of a quad. */
+static double area_at(const polygon *p, int corner) {
+    double before[3], after[3], across[3];
+    subtract3(p->corner[(corner + 3) % 4], p->corner[corner], before);
+    subtract3(p->corner[(corner + 1) % 4], p->corner[corner], after);
+    cross3(after, before, across);
+    return dot3(across, p->normal);
+}
+
 affine_map affine_map_of(const polygon *p) {
-    affine_map m = {.folded = p->n == 3};
+    affine_map m = {.folded = p->n == 3, .twisted = p->n == 4 && !p->affine, .jacobian = {1, 0, 0}};
     for (int d = 0; d < 3; d++) {
         m.corner[d] = p->corner[0][d];
         m.side[0][d] = p->corner[1][d] - p->corner[0][d];
         m.side[1][d] = p->corner[m.folded ? 2 : 3][d] - p->corner[0][d];
         m.normal[d] = p->normal[d];
+        if (m.twisted) m.twist[d] = p->corner[0][d] - p->corner[1][d] + p->corner[2][d] - p->corner[3][d];
+    }
+    if (m.twisted) {
+        /* Linear in u and in w, as the corners lie in one plane. */
+        const double here = area_at(p, 0), of_u = area_at(p, 1), of_w = area_at(p, 3);
+        m.jacobian[0] = here / (of_u + of_w);
+        m.jacobian[1] = (of_u - here) / (of_u + of_w);
+        m.jacobian[2] = (of_w - here) / (of_u + of_w);
     }
     return m;
 }

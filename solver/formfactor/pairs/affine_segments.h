@@ -1,4 +1,4 @@
-/* Eight segments at once between points of two affine polygons, and the kernel of each. Knows no scene. */
+/* Eight segments at once between points of two triangles or quads, and the kernel of each. Knows no scene. */
 #ifndef LAMBERT_FORMFACTOR_PAIRS_AFFINE_SEGMENTS_H
 #define LAMBERT_FORMFACTOR_PAIRS_AFFINE_SEGMENTS_H
 
@@ -6,13 +6,15 @@
 
 enum { AFFINE_SEGMENTS = 8 };
 
-/* corner + u side[0] + w side[1] over the unit square, which a triangle folds along its diagonal. */
+/* corner + u side[0] + w side[1] + u w twist over the unit square, which a triangle folds along its diagonal.
+ * twist is 0 but for quads that are no parallelograms, whose Jacobian is jacobian . (1, u, w) up to a
+ * constant. */
 typedef struct affine_map {
-    double corner[3], side[2][3], normal[3];
-    bool folded;
+    double corner[3], side[2][3], twist[3], normal[3], jacobian[3];
+    bool folded, twisted;
 } affine_map;
 
-/* p is a triangle or a parallelogram. */
+/* p is a triangle or a planar quad. */
 affine_map affine_map_of(const polygon *p);
 
 /* Both ends of segments. */
@@ -21,8 +23,8 @@ typedef struct affine_pair {
 } affine_pair;
 
 /* The segments from (x[0], x[1]) of the one to (x[2], x[3]) of the other map: origin, relative to centre, and
- * direction in single precision; K = cos cos' / r^2 of each, 0 behind either polygon. K leaves out the areas,
- * which are the same for all points of an affine map, so that only ratios of it count. */
+ * direction in single precision; K = cos cos' / r^2 of each, times both Jacobians, 0 behind either polygon. K
+ * leaves out the areas, so that only ratios of it count. */
 void affine_segments(const affine_pair *p, const double x[4][AFFINE_SEGMENTS], const double centre[3],
                      float origin[3][AFFINE_SEGMENTS], float direction[3][AFFINE_SEGMENTS],
                      double K[AFFINE_SEGMENTS]);

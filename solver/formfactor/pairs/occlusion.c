@@ -1,5 +1,6 @@
 #include "solver/formfactor/pairs/occlusion.h"
 
+#include "solver/base/random.h"
 #include "solver/formfactor/pairs/affine_segments.h"
 #include "solver/formfactor/visibility/sample.h"
 
@@ -62,7 +63,6 @@ static void segment_set(segment_bundle *s, const occlusion *o, int k, uint32_t i
 typedef struct piece_pair {
     uint32_t i, j;
     const polygon *a, *b;
-    bool affine;               /* both are */
     const segment_list *among; /* see occlusion_estimate */
     affine_pair maps;
     pair_sampler sampler;
@@ -70,13 +70,13 @@ typedef struct piece_pair {
 
 static piece_pair piece_pair_of(uint64_t seed, const segment_list *among, uint32_t i, const polygon *a,
                                 uint32_t j, const polygon *b) {
-    piece_pair two = {.i = i, .j = j, .a = a, .b = b, .affine = a->affine && b->affine, .among = among};
-    if (two.affine) two.maps = (affine_pair){affine_map_of(a), affine_map_of(b)};
+    piece_pair two = {.i = i, .j = j, .a = a, .b = b, .among = among};
+    two.maps = (affine_pair){affine_map_of(a), affine_map_of(b)};
     pair_sampler_init(&two.sampler, seed, i, j);
     return two;
 }
 
-static void segments_of_affine(segment_bundle *s, const occlusion *o, const piece_pair *two, size_t first) {
+static void segments_of(segment_bundle *s, const occlusion *o, const piece_pair *two, size_t first) {
     double x[4][VISIBILITY_PACKET];
     pair_sampler_packet(&two->sampler, (uint32_t)first, x);
     affine_segments(&two->maps, x, visibility_centre(o->v), s->segments.origin, s->segments.direction,
@@ -84,18 +84,6 @@ static void segments_of_affine(segment_bundle *s, const occlusion *o, const piec
     for (int k = 0; k < VISIBILITY_PACKET; k++) {
         s->from[k] = two->i;
         s->to[k] = two->j;
-    }
-}
-
-static void segments_of(segment_bundle *s, const occlusion *o, const piece_pair *two, size_t first) {
-    if (two->affine) {
-        segments_of_affine(s, o, two, first);
-        return;
-    }
-    for (int k = 0; k < VISIBILITY_PACKET; k++) {
-        double x[4];
-        pair_sampler_place(&two->sampler, (uint32_t)first + (uint32_t)k, x);
-        segment_set(s, o, k, two->i, two->a, two->j, two->b, x);
     }
 }
 
@@ -134,18 +122,23 @@ occlusion_verdict occlusion_test(const occlusion *o, uint32_t i, uint32_t j, dou
     return any_open ? OCCLUSION_NONE : OCCLUSION_TOTAL;
 }
 
-/* The visible share of two pieces: sum K V / sum K. */
+/* The visible share of two pieces: sum K V / sum K. Segments behind either piece do not count: where few are
+ * in front, more are cast. */
 static double visible_share(const occlusion *o, const piece_pair *two, size_t n_segments) {
+    enum { TIMES_MOST = 32 };
     double seen = 0, all = 0;
-    for (size_t first = 0; first < n_segments; first += VISIBILITY_PACKET) {
+    size_t facing = 0;
+    for (size_t first = 0; facing < n_segments && first < TIMES_MOST * n_segments;
+         first += VISIBILITY_PACKET) {
         double kernel[VISIBILITY_PACKET];
         const unsigned blocked = cast(o, two, first, kernel);
         for (int k = 0; k < VISIBILITY_PACKET; k++) {
             all += kernel[k];
+            facing += kernel[k] > 0;
             if ((blocked >> k & 1) == 0) seen += kernel[k];
         }
     }
-    return all > 0 ? seen / all : 0;
+    return all > 0 ? seen / all : 1;
 }
 
 /* A pair that is estimated piece by piece. */
@@ -237,20 +230,20 @@ bool occlusion_is_total(const occlusion *o, const cluster_tree *t, const cluster
     /* Testing the pairs one by one is cheaper. */
     if ((double)VISIBILITY_PACKET * n_a * n_b < (double)segments) return false;
     size_t blocked = 0;
-    pair_sampler sampler, elements;
+    pair_sampler sampler;
     pair_sampler_init(&sampler, o->seed, a->first, b->first);
-    pair_sampler_init(&elements, ~o->seed, a->first, b->first);
+    /* Not of a sequence: each element is to meet each place on it. */
+    uint64_t elements = random_hash(~o->seed) ^ random_hash((uint64_t)a->first << 32 | b->first);
     for (uint32_t index = 0; blocked < segments; index += VISIBILITY_PACKET) {
         /* Clusters with few elements that face each other are better split. */
         if (index > 64 && blocked < index / 4) return false;
         segment_bundle s;
         unsigned facing = 0;
         for (uint32_t k = 0; k < VISIBILITY_PACKET; k++) {
-            double which[4], x[4];
-            pair_sampler_place(&elements, index + k, which);
+            double x[4];
             pair_sampler_place(&sampler, index + k, x);
-            const uint32_t i = t->element[a->first + (uint32_t)(which[0] * n_a)];
-            const uint32_t j = t->element[b->first + (uint32_t)(which[1] * n_b)];
+            const uint32_t i = t->element[a->first + (uint32_t)(random_unit(&elements) * n_a)];
+            const uint32_t j = t->element[b->first + (uint32_t)(random_unit(&elements) * n_b)];
             segment_set(&s, o, (int)k, i, &o->polygons[i], j, &o->polygons[j], x);
             facing |= (unsigned)(s.kernel[k] > 0) << k;
         }

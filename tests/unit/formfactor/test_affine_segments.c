@@ -27,21 +27,36 @@ static double kernel_of(const polygon *a, const double x[3], const polygon *b, c
     return leaving > 0 && arriving > 0 ? leaving * arriving / (r2 * r2) : 0;
 }
 
-/* Triangles and parallelograms in all four combinations, of which some points face away from each other.
- * A sum of a few products of numbers below 8 is off by some 2^-50, the kernel by that over its r^4 > 1e-3,
- * and a coordinate in single precision by 2^-24 times 8, once for each end. */
+/* Triangles, parallelograms and other planar quads in all combinations, of which some points face away from
+ * each other. A sum of a few products of numbers below 8 is off by some 2^-50, the kernel by that over its
+ * r^4 > 1e-3, and a coordinate in single precision by 2^-24 times 8, once for each end. */
 START_TEST(eight_segments_are_as_one) {
     const double triangle[3][3] = {{0, 0, 0}, {2, .1, .2}, {.3, 1.1, -.1}},
                  tilted[3][3] = {{.5, .2, 1}, {.4, 1.9, .9}, {1.9, .1, -.3}},
                  parallelogram[4][3] = {{0, 0, 0}, {2, .1, .2}, {2.3, 1.2, .1}, {.3, 1.1, -.1}},
                  other[4][3] = {{.5, .2, 1}, {.4, 1.9, .9}, {1.8, 1.8, -.4}, {1.9, .1, -.3}};
-    const polygon a = _i & 1 ? make(3, triangle) : make(4, parallelogram),
-                  b = _i & 2 ? make(3, tilted) : make(4, other);
+    /* The second corner of the other quads lies within the plane of the others. */
+    double trapezoid[4][3], kite[4][3];
+    for (int c = 0; c < 4; c++)
+        for (int d = 0; d < 3; d++) {
+            trapezoid[c][d] = parallelogram[c][d];
+            kite[c][d] = other[c][d];
+            if (c != 2) continue;
+            trapezoid[c][d] += .4 * (parallelogram[1][d] - parallelogram[0][d]);
+            kite[c][d] += .5 * (other[1][d] - other[0][d]) + .3 * (other[3][d] - other[0][d]);
+        }
+    const polygon a = _i % 3 == 0   ? make(3, triangle)
+                      : _i % 3 == 1 ? make(4, parallelogram)
+                                    : make(4, (const double(*)[3])trapezoid),
+                  b = _i / 3 == 0   ? make(3, tilted)
+                      : _i / 3 == 1 ? make(4, other)
+                                    : make(4, (const double(*)[3])kite);
     const affine_pair pair = {affine_map_of(&a), affine_map_of(&b)};
     const double centre[3] = {.7, -.3, .2};
     uint64_t seed = 5;
     size_t behind = 0, in_front = 0;
-    ck_assert(a.affine && b.affine);
+    ck_assert(a.affine == (_i % 3 != 2) && b.affine == (_i / 3 != 2));
+    double first = 0; /* the kernel over that of the points, which differ by a constant */
     for (int packet = 0; packet < 200; packet++) {
         double x[4][AFFINE_SEGMENTS], K[AFFINE_SEGMENTS];
         float origin[3][AFFINE_SEGMENTS], direction[3][AFFINE_SEGMENTS];
@@ -50,10 +65,12 @@ START_TEST(eight_segments_are_as_one) {
         affine_segments(&pair, x, centre, origin, direction, K);
         for (int k = 0; k < AFFINE_SEGMENTS; k++) {
             double from[3], to[3];
-            polygon_point(&a, x[0][k], x[1][k], from);
-            polygon_point(&b, x[2][k], x[3][k], to);
-            const double wanted = kernel_of(&a, from, &b, to);
-            ck_assert_double_eq_tol(K[k], wanted, 1e-9);
+            const double areas =
+                polygon_point(&a, x[0][k], x[1][k], from) * polygon_point(&b, x[2][k], x[3][k], to);
+            const double wanted = areas * kernel_of(&a, from, &b, to);
+            if (!(first > 0) && wanted > .1) first = K[k] / wanted;
+            if (first > 0) ck_assert_double_eq_tol(K[k], first * wanted, 1e-9 * first);
+            if (!(first > 0)) ck_assert((K[k] > 0) == (wanted > 0));
             behind += K[k] == 0;
             in_front += K[k] > 0;
             for (int d = 0; d < 3; d++) {
@@ -62,6 +79,7 @@ START_TEST(eight_segments_are_as_one) {
             }
         }
     }
+    ck_assert_double_gt(first, 0);
     ck_assert_uint_gt(behind, 20);
     ck_assert_uint_gt(in_front, 20);
 }
@@ -164,7 +182,7 @@ END_TEST
 int main(void) {
     Suite *suite = suite_create("affine_segments");
     TCase *cases = tcase_create("segments");
-    tcase_add_loop_test(cases, eight_segments_are_as_one, 0, 4);
+    tcase_add_loop_test(cases, eight_segments_are_as_one, 0, 9);
     tcase_add_test(cases, a_segment_of_no_length_has_no_kernel);
     tcase_add_loop_test(cases, only_what_stands_between_blocks, 0, 3);
     tcase_add_loop_test(cases, nothing_blocks_in_a_corner, 0, 3);
