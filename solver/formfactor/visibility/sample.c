@@ -1,6 +1,7 @@
 #include "solver/formfactor/visibility/sample.h"
 
 #include "solver/base/random.h"
+#include "solver/formfactor/visibility/sobol.h"
 #include "solver/scene/plane.h"
 
 #include <math.h>
@@ -33,6 +34,24 @@ void element_frame_init(element_frame *f, const mesh *m, size_t element) {
     }
 }
 
+/* The dimension of Sobol's sequence for a coordinate: the first two, which are more even in pairs than the
+ * others, for the direction, coordinates 2 and 3. */
+static inline int dimension_of(int coordinate) {
+    return coordinate ^ 2;
+}
+
+/* low[k]: the shifted coordinate of k; middle[k]: that of 32 k, without a shift. */
+static void set_tables(element_sampler *s, int d, uint32_t shift) {
+    const uint32_t *v = sobol_direction[dimension_of(d)];
+    s->low[d][0] = shift;
+    s->middle[d][0] = 0;
+    for (int bit = 0; bit < SAMPLE_TABLE_BITS; bit++)
+        for (int k = 0; k < 1 << bit; k++) {
+            s->low[d][(1 << bit) + k] = s->low[d][k] ^ v[bit];
+            s->middle[d][(1 << bit) + k] = s->middle[d][k] ^ v[bit + SAMPLE_TABLE_BITS];
+        }
+}
+
 void element_sampler_init(element_sampler *s, const mesh *m, const visibility *v, size_t element,
                           uint64_t seed) {
     const uint32_t *corner = m->elements[element];
@@ -58,10 +77,31 @@ void element_sampler_init(element_sampler *s, const mesh *m, const visibility *v
     }
     element_frame_init(&s->frame, m, element);
     uint64_t state = random_hash(seed) ^ random_hash((uint64_t)element + 1);
-    for (int d = 0; d < 4; d += 2) {
-        state = random_hash(state);
-        s->shift[d] = (uint32_t)state;
-        s->shift[d + 1] = (uint32_t)(state >> 32);
+    for (int d = 0; d < 4; d++) {
+        if (d % 2 == 0) state = random_hash(state);
+        set_tables(s, d, (uint32_t)(d % 2 == 0 ? state : state >> 32));
+    }
+}
+
+/* The part of a coordinate that the tables do not know. */
+static inline uint32_t of_high_bits(int d, uint32_t index) {
+    return sobol_coordinate(dimension_of(d), index >> 2 * SAMPLE_TABLE_BITS << 2 * SAMPLE_TABLE_BITS);
+}
+
+static inline uint32_t of_low_bits(const element_sampler *s, int d, uint32_t index) {
+    return s->low[d][index % SAMPLE_TABLE] ^ s->middle[d][index / SAMPLE_TABLE % SAMPLE_TABLE];
+}
+
+/* The points of a packet, whose indices mostly have the same high bits. */
+static void set_places(const element_sampler *s, const uint32_t index[VISIBILITY_PACKET],
+                       uint32_t place[4][VISIBILITY_PACKET]) {
+    uint32_t apart = 0;
+    for (int i = 1; i < VISIBILITY_PACKET; i++) apart |= (index[i] ^ index[0]) >> 2 * SAMPLE_TABLE_BITS;
+    for (int d = 0; d < 4; d++) {
+        const uint32_t high = of_high_bits(d, index[0]);
+        for (int i = 0; i < VISIBILITY_PACKET; i++) place[d][i] = of_low_bits(s, d, index[i]) ^ high;
+        for (int i = 0; i < VISIBILITY_PACKET && apart != 0; i++)
+            place[d][i] ^= high ^ of_high_bits(d, index[i]);
     }
 }
 
@@ -106,10 +146,11 @@ void element_sampler_point(const element_sampler *s, float u, float w, float poi
             u = (u - s->first_share) / (1 - s->first_share);
             piece = 1;
         }
-        if (u + w > 1) {
-            u = 1 - u;
-            w = 1 - w;
-        }
+        /* The halves of the square on either side of its diagonal, each sheared onto half of the triangle:
+         * the map preserves area and is continuous (Heitz 2019). */
+        const float half = .5f * (u < w ? u : w);
+        u -= half;
+        w -= half;
     }
     for (int d = 0; d < 3; d++)
         point[d] = s->corner[piece][d] + u * s->edge[piece][0][d] + w * s->edge[piece][1][d];
@@ -207,8 +248,8 @@ void element_sampler_order(const element_sampler *s, uint32_t first, size_t coun
     uint16_t begin[CELLS * CELLS + 1] = {0};
     uint8_t cell[SAMPLE_ORDERED];
     for (size_t k = 0; k < count; k++) {
-        const uint32_t x = s->shift[2] + (first + (uint32_t)k) * kronecker_step[2],
-                       y = s->shift[3] + (first + (uint32_t)k) * kronecker_step[3];
+        const uint32_t index = first + (uint32_t)k, x = of_low_bits(s, 2, index) ^ of_high_bits(2, index),
+                       y = of_low_bits(s, 3, index) ^ of_high_bits(3, index);
         cell[k] = (uint8_t)morton(x >> CELL_SHIFT, y >> CELL_SHIFT);
         begin[cell[k] + 1]++;
     }
@@ -226,11 +267,12 @@ void element_sampler_packet_of(const element_sampler *s, const uint32_t index[VI
                                ray_packet *rays) {
     const element_frame *f = &s->frame;
     float x[4][VISIBILITY_PACKET];
+    uint32_t place[4][VISIBILITY_PACKET];
+    set_places(s, index, place);
     /* Without the pragma the compiler vectorizes over the axes, not over the rays. */
     for (int d = 0; d < 4; d++)
 #pragma omp simd
-        for (uint32_t i = 0; i < VISIBILITY_PACKET; i++)
-            x[d][i] = fraction(s->shift[d] + index[i] * kronecker_step[d]);
+        for (uint32_t i = 0; i < VISIBILITY_PACKET; i++) x[d][i] = fraction(place[d][i]);
 
     if (s->parallelogram) {
         for (int d = 0; d < 3; d++)

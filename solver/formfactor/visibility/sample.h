@@ -13,6 +13,8 @@ typedef struct element_frame {
 /* Sets the frame of an element. */
 void element_frame_init(element_frame *f, const mesh *m, size_t element);
 
+enum { SAMPLE_TABLE_BITS = 5, SAMPLE_TABLE = 1 << SAMPLE_TABLE_BITS };
+
 /* The constants of sampling one element: its pieces in recentred coordinates and its frame. */
 typedef struct element_sampler {
     float corner[2][3]; /* origin of each half (a parallelogram has one piece) */
@@ -20,7 +22,9 @@ typedef struct element_sampler {
     bool parallelogram;
     float first_share; /* of the area that the first triangle takes */
     element_frame frame;
-    uint32_t shift[4]; /* of the sequence, from (seed, element) */
+    /* Sobol's sequence (sobol.h), shifted by random bits of (seed, element): coordinate d of point k is
+     * low[d][k mod 32] ^ middle[d][k / 32 mod 32] ^ that of the higher bits of k. */
+    uint32_t low[4][SAMPLE_TABLE], middle[4][SAMPLE_TABLE];
 } element_sampler;
 
 void element_sampler_init(element_sampler *s, const mesh *m, const visibility *v, size_t element,
