@@ -131,7 +131,8 @@ void walk_starts_init(walk_starts *s, uint64_t seed, uint64_t key, size_t count)
 }
 
 bool walk_starts_next(walk_starts *s, const double *before, size_t n, walker *w, size_t *k) {
-    /* The steps of pair_sampler's sequence: frac(phi^-d), phi^5 = phi + 1, in units of 2^-32. */
+    /* The 4-d Kronecker sequence of the generalised golden ratio (Roberts 2018): frac(phi^-d), phi^5 = phi +
+     * 1, in units of 2^-32. */
     static const uint32_t step[4] = {3679390609u, 3152041523u, 2700274807u, 2313257605u};
     if (s->next >= s->count) return false;
     const double x = ((double)s->next + s->turn) / (double)s->count * before[n];

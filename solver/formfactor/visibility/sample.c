@@ -6,10 +6,6 @@
 
 #include <math.h>
 
-/* Steps of the 4-d Kronecker sequence: frac(phi^-d), d = 1 ... 4, in units of 2^-32, where phi^5 = phi + 1
- * (the generalised golden ratio; Roberts 2018). */
-static const uint32_t kronecker_step[4] = {3679390609u, 3152041523u, 2700274807u, 2313257605u};
-
 static void set_piece(element_sampler *s, int piece, const double *a, const double *b, const double *c,
                       const visibility *v) {
     visibility_recentre(v, a, s->corner[piece]);
@@ -156,43 +152,6 @@ void element_sampler_point(const element_sampler *s, float u, float w, float poi
         point[d] = s->corner[piece][d] + u * s->edge[piece][0][d] + w * s->edge[piece][1][d];
 }
 
-/* Direction numbers of Sobol' (1967) in four dimensions, [bit of the index][dimension], by the primitive
- * polynomials 1, x + 1, x^2 + x + 1 and x^3 + x + 1 with the initial numbers of Joe and Kuo (2008). */
-static const uint32_t sobol[32][4] = {
-    {0x80000000u, 0x80000000u, 0x80000000u, 0x80000000u},
-    {0x40000000u, 0xc0000000u, 0xc0000000u, 0xc0000000u},
-    {0x20000000u, 0xa0000000u, 0x60000000u, 0x20000000u},
-    {0x10000000u, 0xf0000000u, 0x90000000u, 0x50000000u},
-    {0x08000000u, 0x88000000u, 0xe8000000u, 0xf8000000u},
-    {0x04000000u, 0xcc000000u, 0x5c000000u, 0x74000000u},
-    {0x02000000u, 0xaa000000u, 0x8e000000u, 0xa2000000u},
-    {0x01000000u, 0xff000000u, 0xc5000000u, 0x93000000u},
-    {0x00800000u, 0x80800000u, 0x68800000u, 0xd8800000u},
-    {0x00400000u, 0xc0c00000u, 0x9cc00000u, 0x25400000u},
-    {0x00200000u, 0xa0a00000u, 0xee600000u, 0x59e00000u},
-    {0x00100000u, 0xf0f00000u, 0x55900000u, 0xe6d00000u},
-    {0x00080000u, 0x88880000u, 0x80680000u, 0x78080000u},
-    {0x00040000u, 0xcccc0000u, 0xc09c0000u, 0xb40c0000u},
-    {0x00020000u, 0xaaaa0000u, 0x60ee0000u, 0x82020000u},
-    {0x00010000u, 0xffff0000u, 0x90550000u, 0xc3050000u},
-    {0x00008000u, 0x80008000u, 0xe8808000u, 0x208f8000u},
-    {0x00004000u, 0xc000c000u, 0x5cc0c000u, 0x51474000u},
-    {0x00002000u, 0xa000a000u, 0x8e606000u, 0xfbea2000u},
-    {0x00001000u, 0xf000f000u, 0xc5909000u, 0x75d93000u},
-    {0x00000800u, 0x88008800u, 0x6868e800u, 0xa0858800u},
-    {0x00000400u, 0xcc00cc00u, 0x9c9c5c00u, 0x914e5400u},
-    {0x00000200u, 0xaa00aa00u, 0xeeee8e00u, 0xdbe79e00u},
-    {0x00000100u, 0xff00ff00u, 0x5555c500u, 0x25db6d00u},
-    {0x00000080u, 0x80808080u, 0x8000e880u, 0x58800080u},
-    {0x00000040u, 0xc0c0c0c0u, 0xc0005cc0u, 0xe54000c0u},
-    {0x00000020u, 0xa0a0a0a0u, 0x60008e60u, 0x79e00020u},
-    {0x00000010u, 0xf0f0f0f0u, 0x9000c590u, 0xb6d00050u},
-    {0x00000008u, 0x88888888u, 0xe8006868u, 0x800800f8u},
-    {0x00000004u, 0xccccccccu, 0x5c009c9cu, 0xc00c0074u},
-    {0x00000002u, 0xaaaaaaaau, 0x8e00eeeeu, 0x200200a2u},
-    {0x00000001u, 0xffffffffu, 0xc5005555u, 0x50050093u},
-};
-
 /* The digital shift of the sequence for a pair. */
 void pair_sampler_init(pair_sampler *s, uint64_t seed, size_t i, size_t j) {
     uint64_t state = random_hash(random_hash(seed) ^ random_hash((uint64_t)i + 1)) ^
@@ -204,30 +163,19 @@ void pair_sampler_init(pair_sampler *s, uint64_t seed, size_t i, size_t j) {
     }
 }
 
-/* The shift and the direction numbers of the bits that are set. */
-static void add_bits(const pair_sampler *s, uint32_t index, uint32_t place[4]) {
-    for (int d = 0; d < 4; d++) place[d] = s->shift[d];
-    for (; index != 0; index &= index - 1) {
-        const uint32_t *of = sobol[__builtin_ctz(index)];
-        for (int d = 0; d < 4; d++) place[d] ^= of[d];
-    }
-}
-
 void pair_sampler_place(const pair_sampler *s, uint32_t index, double x[4]) {
-    uint32_t place[4];
-    add_bits(s, index, place);
-    for (int d = 0; d < 4; d++) x[d] = (double)place[d] * 0x1p-32;
+    for (int d = 0; d < 4; d++) x[d] = (double)(s->shift[d] ^ sobol_coordinate(d, index)) * 0x1p-32;
 }
 
 void pair_sampler_packet(const pair_sampler *s, uint32_t first, double x[4][VISIBILITY_PACKET]) {
-    uint32_t place[4];
-    add_bits(s, first & ~(VISIBILITY_PACKET - 1u), place);
     for (int d = 0; d < 4; d++) {
+        const uint32_t start = s->shift[d] ^ sobol_coordinate(d, first);
         uint32_t at[VISIBILITY_PACKET];
         /* The first three bits of the index. */
-        for (uint32_t k = 0; k < VISIBILITY_PACKET; k++) at[k] = place[d];
+        for (uint32_t k = 0; k < VISIBILITY_PACKET; k++) at[k] = start;
         for (int bit = 0; bit < 3; bit++)
-            for (uint32_t k = 0; k < VISIBILITY_PACKET; k++) at[k] ^= k >> bit & 1 ? sobol[bit][d] : 0;
+            for (uint32_t k = 0; k < VISIBILITY_PACKET; k++)
+                at[k] ^= k >> bit & 1 ? sobol_direction[d][bit] : 0;
         for (uint32_t k = 0; k < VISIBILITY_PACKET; k++) x[d][k] = (double)at[k] * 0x1p-32;
     }
 }
