@@ -168,17 +168,18 @@ done:
     return status;
 }
 
-/* Imposes on K of a channel the answer H = s of E = 1 - rho s, s the row sums of F. */
+/* Imposes on K of a channel the answer H = s of E = 1 - rho s, s the row sums of F. Not where importance
+ * makes light elsewhere only roughly right: there the mean of all elements is none of those that are read. */
 static lam_status impose_uniform(const build_problem *problem, size_t c, const double *s,
                                  const plane_tree *tree, const double *area,
                                  const wavelet_inverse_input *inverse, csr *K, lam_error *error) {
     const size_t n = problem->n;
+    if (inverse->tile_over != NULL) return LAM_OK;
     double *E = memory_allocate(n, sizeof *E, "operator", error);
     if (E == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < n; i++) E[i] = 1 - (double)problem->reflectance[c * n + i] * s[i];
-    const lam_status status =
-        wavelet_impose_answer(inverse->basis, tree->order, area, E, s, inverse->threshold,
-                              inverse->tile_over == NULL, inverse->weight, K, error);
+    const lam_status status = wavelet_impose_answer(inverse->basis, tree->order, area, E, s,
+                                                    inverse->threshold, inverse->weight, K, error);
     free(E);
     return status;
 }

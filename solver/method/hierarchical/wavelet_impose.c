@@ -98,8 +98,8 @@ static void answer_left(const csr *K, const double *u, double *v) {
 }
 
 lam_status wavelet_impose_answer(const wavelets *w, const uint32_t *order, const double *area,
-                                 const double *E, const double *H, float threshold, bool adds,
-                                 const float *weight, csr *K, lam_error *error) {
+                                 const double *E, const double *H, float threshold, const float *weight,
+                                 csr *K, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t r = w->n - 1;
     double *u = NULL, *y = NULL;
@@ -108,7 +108,7 @@ lam_status wavelet_impose_answer(const wavelets *w, const uint32_t *order, const
     if (!(u[r] > 0)) goto done;
     TRY(transform(w, order, area, H, &y, error));
     answer_left(K, u, y);
-    drop_small(w, adds ? threshold : INFINITY, weight, K, true, y);
+    drop_small(w, threshold, weight, K, true, y);
     for (size_t i = 0; i < r; i++) y[r] -= (double)(float)y[i] * u[i];
     y[r] /= u[r];
     TRY(set_last_column(y, K, error));

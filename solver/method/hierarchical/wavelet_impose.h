@@ -21,8 +21,8 @@ lam_status wavelet_impose_row_sums(const wavelets *w, const uint32_t *order, con
 /* Imposes an answer on K: of the emission E its irradiance is H, K u = v, u = W A^1/2 E, v = W A^1/2 H. Only
  * the last row and column, r, of the symmetric K change:
  *     K_ir = (v_i - sum_{j != r} K_ij u_j) / u_r,    K_rr = (v_r - sum_{j != r} K_rj u_j) / u_r.
- * An entry that K has not is left out up to threshold weight_i weight_root, and where `adds` is false; K_rr
- * is the one that is right beside those that stay. With E = 1 - rho s and H = s a furnace (rho the same
+ * An entry that K has not is left out up to threshold weight_i weight_root; K_rr is the one that is right
+ * beside those that stay. With E = 1 - rho s and H = s a furnace (rho the same
  * everywhere, s = 1) keeps K_rr = 1 / (1 - rho) alone in that row, as exactly as a float can be, however
  * many terms and bounces an inverse left out, and as u is the power of absorption, too, the balance of energy
  * sum A (1 - rho) H = sum A E holds for every emission.
@@ -30,7 +30,7 @@ lam_status wavelet_impose_row_sums(const wavelets *w, const uint32_t *order, con
  * K: upper triangle; E and H by element, otherwise as above. Does nothing either where E has no light in the
  * mean. O(n + entries). Errors: LAM_ERR_MEMORY. */
 lam_status wavelet_impose_answer(const wavelets *w, const uint32_t *order, const double *area,
-                                 const double *E, const double *H, float threshold, bool adds,
-                                 const float *weight, csr *K, lam_error *error);
+                                 const double *E, const double *H, float threshold, const float *weight,
+                                 csr *K, lam_error *error);
 
 #endif
