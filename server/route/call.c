@@ -56,9 +56,5 @@ codec_scene call_codec_scene(const call *in) {
 
 answer_notes call_notes(const call *in) {
     const scene *s = in->scene;
-    return (answer_notes){.scene = s->name,
-                          .has_time = true,
-                          .has_error = s->has_error,
-                          .relative_mean = s->relative_mean,
-                          .indirect_mean = s->indirect_mean};
+    return (answer_notes){.scene = s->name, .has_time = true};
 }

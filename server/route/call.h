@@ -56,8 +56,8 @@ void answer_refuse(answer *out, problem_kind kind, const char *format, ...)
 /* Makes the answer the JSON in b (taken over), or 503 if it could not be written. */
 void answer_json(answer *out, buffer *b, bool written);
 
-/* The scene as a body is read against, and the notes of an answer beside its numbers, for a route with
- * {name}. */
+/* The scene as a body is read against, and the notes of an answer beside its numbers and its
+ * error (scene_note_error), for a route with {name}. */
 codec_scene call_codec_scene(const call *in);
 answer_notes call_notes(const call *in);
 

@@ -111,6 +111,7 @@ static bool begin(call *in, answer *out) {
                               .batch = request->batch,
                               .n_values = request->select ? request->n_selected : of->n};
     in->n_rhs = request->n_rhs;
+    if (good) scene_note_error(of, request, &s->notes);
     good = good && figures_acceptable(in, request, &why);
     /* A linear reduction takes no pass and is answered at once. */
     const bool linear = good && request->reduce.linear, refine = good && request->tolerance > 0;

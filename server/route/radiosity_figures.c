@@ -131,6 +131,7 @@ bool quick_radiosity(call *in, answer *out) {
         notes.parse_ms = parsed - start;
         notes.solve_ms = -parsed;
         notes.quantity = request.quantity;
+        scene_note_error(s, &request, &notes);
         in->n_rhs = request.n_rhs;
         good = evaluate(in, &request, rows, &notes, &b, &why);
         adjoint_rows_release(s, request.reduce.n_names, rows);

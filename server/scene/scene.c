@@ -90,16 +90,36 @@ done:
     return status;
 }
 
-/* The total error for answers: of the scene's own lights, else of single elements, else none. */
-static void read_error(store *s, scene *made) {
-    static const char *const groups[] = {"/error/lights", "/error/single"};
-    for (size_t i = 0; i < 2 && !made->has_error; i++)
-        made->has_error =
-            store_has(s, groups[i]) && store_has_attribute(s, groups[i], "total_relative_mean") &&
-            store_has_attribute(s, groups[i], "total_indirect_mean") &&
-            store_get_number(s, groups[i], "total_relative_mean", &made->relative_mean, NULL) == LAM_OK &&
-            store_get_number(s, groups[i], "total_indirect_mean", &made->indirect_mean, NULL) == LAM_OK &&
-            isfinite(made->relative_mean) && isfinite(made->indirect_mean);
+/* The errors for answers, and the groups that have nothing but receivers. */
+static lam_status read_errors(store *s, scene *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    const group_index *groups = &made->groups;
+    TRY(stated_errors_read(s, made->n, &made->errors, error));
+    if (made->errors.read == NULL) goto done;
+    made->group_read = memory_allocate(groups->n_groups, sizeof *made->group_read, "receivers", error);
+    if (made->group_read == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t g = 0; g < groups->n_groups; g++)
+        made->group_read[g] = stated_errors_others(&made->errors, groups->start[g + 1] - groups->start[g],
+                                                   groups->elements + groups->start[g]) == 0;
+done:
+    return status;
+}
+
+/* True where the store was built for receivers and the request asks for nothing else. */
+static bool asks_receivers(const scene *s, const radiosity_request *request) {
+    const reduce_request *r = &request->reduce;
+    if (s->errors.read == NULL) return false;
+    if (!r->on)
+        return stated_errors_others(&s->errors, request->select ? request->n_selected : s->n,
+                                    request->select ? request->selected : NULL) == 0;
+    for (size_t k = 0; k < r->n_names; k++)
+        for (size_t g = 0; g < r->names[k].n_groups; g++)
+            if (!s->group_read[r->names[k].groups[g]]) return false;
+    return true;
+}
+
+void scene_note_error(const scene *s, const radiosity_request *request, answer_notes *notes) {
+    stated_errors_note(&s->errors, asks_receivers(s, request), notes);
 }
 
 static lam_status read_groups(store *s, scene *made, lam_error *error) {
@@ -186,7 +206,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     made->ledger = options->ledger;
     TRY(row_cache_create(ADJOINT_ROWS_BYTES, made->ledger, &made->rows, error));
     TRY(refined_create(s, made->op, options->stores, made->ledger, &made->refined, error));
-    read_error(s, made);
+    TRY(read_errors(s, made, error));
     TRY(describe_scene(s, made, &made->description, error));
     if (store_map_bytes(store_map_of(s)) > 0) made->map = store_map_hold(store_map_of(s));
     TRY(scene_health_create(made->path, made->map, options->verify, &made->health, error));
@@ -289,6 +309,8 @@ void scene_release(scene *s) {
         lam_sky_close(s->sky);
         group_index_free(&s->groups);
         free(s->area);
+        stated_errors_free(&s->errors);
+        free(s->group_read);
         scene_health_free(s->health);
         store_map_release(s->map);
         free(s->path);

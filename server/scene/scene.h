@@ -7,6 +7,8 @@
 #include "server/scene/refined.h"
 #include "server/scene/row_cache.h"
 #include "solver/codec/groups.h"
+#include "solver/codec/request.h"
+#include "solver/codec/stated_errors.h"
 #include "store/store_map.h"
 
 #include <stdatomic.h>
@@ -30,15 +32,15 @@ struct scene {
     lam_operator *op;
     const float *reflectance; /* [C][n], of op */
     group_index groups;
-    double *area;      /* [n], m^2 */
-    lam_sky *sky;      /* NULL: none */
-    size_t n_emitters; /* 0: the store answers any emission */
-    uint64_t bytes;    /* of /operator as stored; of a variant, of the cores alone */
-    uint64_t memory;   /* bytes counted against --max-memory, without work areas */
-    size_t work_bytes; /* largest work area of a thread that solves */
-    char *description; /* the JSON of GET /v1/scenes/NAME */
-    bool has_error;    /* of the store: total error for its own lights, or else for single elements */
-    double relative_mean, indirect_mean;
+    double *area;          /* [n], m^2 */
+    lam_sky *sky;          /* NULL: none */
+    size_t n_emitters;     /* 0: the store answers any emission */
+    uint64_t bytes;        /* of /operator as stored; of a variant, of the cores alone */
+    uint64_t memory;       /* bytes counted against --max-memory, without work areas */
+    size_t work_bytes;     /* largest work area of a thread that solves */
+    char *description;     /* the JSON of GET /v1/scenes/NAME */
+    stated_errors errors;  /* of the store; of a variant none */
+    bool *group_read;      /* [n_groups]: all its elements are receivers; NULL where the store is for all */
     memory_ledger *ledger; /* of memory taken later; or NULL */
     row_cache *rows;       /* adjoint rows for linear reductions; any thread */
     refined *refined;      /* the refiner of its answers, made when first needed */
@@ -75,6 +77,10 @@ uint64_t scene_work_memory(size_t n_threads, size_t work_bytes);
  * those of the base were measured under other reflectances. Any thread. Errors: LAM_ERR_MEMORY. */
 lam_status scene_open_variant(scene *base, const char *name, const char *groups, lam_operator *op,
                               scene **out, lam_error *error);
+
+/* Puts the error of the store for what is asked into notes: that of receivers where nothing else is asked.
+ * O(n_selected) of a store for receivers. Any thread. */
+void scene_note_error(const scene *s, const radiosity_request *request, answer_notes *notes);
 
 /* Adds a reference, to be dropped by scene_release. Any thread. */
 scene *scene_acquire(scene *s);

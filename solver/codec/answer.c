@@ -23,7 +23,9 @@ bool answer_tail(buffer *b, const answer_notes *notes) {
     return (!notes->has_error || notes->certificates != NULL ||
             (buffer_append_text(b, ",\"error\":{\"relative_mean\":") &&
              json_write_double(b, notes->relative_mean) && buffer_append_text(b, ",\"indirect_mean\":") &&
-             json_write_double(b, notes->indirect_mean) && buffer_append(b, "}", 1))) &&
+             json_write_double(b, notes->indirect_mean) &&
+             (notes->error_of == NULL || buffer_printf(b, ",\"of\":\"%s\"", notes->error_of)) &&
+             buffer_append(b, "}", 1))) &&
            (!notes->has_time ||
             buffer_printf(b, ",\"time_ms\":{\"parse\":%.3f,\"solve\":%.3f,\"encode\":%.3f}", notes->parse_ms,
                           notes->solve_ms, notes->encode_ms)) &&

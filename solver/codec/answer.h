@@ -20,6 +20,8 @@ typedef struct answer_notes {
     lam_quantity quantity;
     bool has_error;
     double relative_mean, indirect_mean;
+    const char *error_of; /* the elements that the error is of, "receivers" or "all", where a store was built
+                             for receivers; NULL: it was built for all */
     bool has_time;
     double parse_ms, solve_ms, encode_ms;
     /* [n_rhs] of a refined answer, in place of the store's error, else NULL: the bound on the error of every

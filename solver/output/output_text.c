@@ -60,5 +60,7 @@ void output_print(const solution *s) {
     else
         print_means(s);
     if (s->relative >= 0)
-        printf("stated error of the store: relative %.3g, indirect %.3g\n", s->relative, s->indirect);
+        printf("stated error of the store%s%s: relative %.3g, indirect %.3g\n",
+               s->error_of != NULL ? ", of the light of " : "", s->error_of != NULL ? s->error_of : "",
+               s->relative, s->indirect);
 }

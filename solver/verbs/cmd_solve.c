@@ -2,10 +2,10 @@
 #include "solver/base/atomic_file.h"
 #include "solver/base/terminal.h"
 #include "solver/codec/request.h"
+#include "solver/codec/stated_errors.h"
 #include "solver/light/annual.h"
 #include "solver/light/emission_refine.h"
 #include "solver/light/weather_light.h"
-#include "solver/operator/blocks/importance.h"
 #include "solver/output/output.h"
 #include "solver/render/smooth.h"
 #include "solver/verbs/light_options.h"
@@ -54,7 +54,7 @@ static const option_row weather_rows[] = {
      .help = "--weather in lux, as `lambert sky --photometric`"},
     {0},
 };
-static const option_row answer_rows[] = {
+static const option_row answer_options[] = {
     {.name = "quantity",
      .kind = OPTION_CHOICE,
      .offset = FIELD(quantity),
@@ -130,43 +130,23 @@ static bool is_dark(const emission *light, size_t count) {
     return true;
 }
 
-/* The mean total error for the scene's own lights, or for single elements, or where only receivers are
- * wanted, theirs; negative where there is none. */
-static void stated_error(store *s, bool receivers, double *relative, double *indirect) {
-    static const char *const groups[] = {"/error/lights", "/error/single"};
-    const char *const names[2] = {receivers ? "receivers_relative" : "total_relative_mean",
-                                  receivers ? "receivers_indirect" : "total_indirect_mean"};
-    *relative = *indirect = -1;
-    for (size_t i = 0; i < sizeof groups / sizeof groups[0]; i++) {
-        if (!store_has(s, groups[i]) || !store_has_attribute(s, groups[i], names[0])) continue;
-        if (store_get_number(s, groups[i], names[0], relative, NULL) == LAM_OK &&
-            store_get_number(s, groups[i], names[1], indirect, NULL) == LAM_OK)
-            return;
-        *relative = *indirect = -1;
-    }
-}
-
-/* *only: the store was built for receivers, and no other element is wanted; warns where others are. */
-static lam_status check_receivers(store *s, size_t n, size_t n_selected, const uint32_t *selected,
-                                  terminal *t, bool *only, lam_error *error) {
-    lam_status status = LAM_OK;
-    importance read = {.n = 0};
-    size_t others = 0;
-    *only = false;
-    TRY(importance_load(s, n, &read, error));
-    if (read.n == 0) goto done;
-    const size_t count = selected != NULL ? n_selected : n;
-    for (size_t k = 0; k < count; k++) others += !(read.read[selected != NULL ? selected[k] : k] > 0);
-    *only = others == 0;
+/* Takes the error that the store states for the elements that are wanted; warns where it was built for
+ * receivers and others are wanted. */
+static void take_error(const stated_errors *stated, size_t n_selected, const uint32_t *selected, terminal *t,
+                       solution *out) {
+    answer_notes notes = {.has_error = false};
+    const size_t count = selected != NULL ? n_selected : stated->n;
+    const size_t others = stated_errors_others(stated, count, selected);
+    stated_errors_note(stated, others == 0, &notes);
+    if (notes.has_error) out->relative = notes.relative_mean;
+    if (notes.has_error) out->indirect = notes.indirect_mean;
+    out->error_of = notes.error_of;
     if (others > 0)
         terminal_warn(
             t,
             "%zu of %zu elements are no receivers, which the store was built for: their light is only "
             "roughly right",
             others, count);
-done:
-    importance_free(&read);
-    return status;
 }
 
 /* The elements of the groups that are reduced, *selected freed with free(); NULL where all are wanted. */
@@ -268,7 +248,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     char *scene = NULL;
     uint32_t *selected = NULL;
     size_t n_selected = 0;
-    bool only_receivers = false;
+    stated_errors stated = {.n = 0};
     sunlight sun = {0};
     const char *names[ANNUAL_MOST];
     for (size_t k = 0; k < year->n_figures; k++) names[k] = year->figures[k].name;
@@ -285,7 +265,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     if (lit.own) terminal_log(t, "no --emit, --emission, --sky or --weather: the scene's own light");
     /* With --reduce only figures are written, also with -o. */
     TRY(wanted_elements(&m, reductions, n_reductions, &n_selected, &selected, error));
-    if (f->tolerance == 0) TRY(check_receivers(s, m.n, n_selected, selected, t, &only_receivers, error));
+    TRY(stated_errors_read(s, m.n, &stated, error));
     if (f->weather != NULL) {
         const weather_options hours = {.path = f->weather,
                                        .photometric = f->photometric,
@@ -306,8 +286,11 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
                     .quantity = quantity,
                     .n_vectors = lit.light.n_vectors,
                     .batch = lit.light.batch,
+                    .relative = -1,
+                    .indirect = -1,
                     .reductions = reductions,
                     .n_reductions = n_reductions};
+    if (f->tolerance == 0) take_error(&stated, n_selected, selected, t, &out);
     if (year->n_figures > 0) {
         out.names = names;
         TRY(solve_year(year, &lit.light, lit.op, lit.sky, n_selected, selected, t, &out, &values, error));
@@ -323,8 +306,6 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     if (f->smooth) TRY(find_corners(&out, &lit.light, &corners, error));
     out.corners = corners;
     TRY(reductions_fill(&out, error));
-    out.relative = out.indirect = -1;
-    if (f->tolerance == 0) stated_error(s, only_receivers, &out.relative, &out.indirect);
     if (f->output != NULL)
         TRY(output_write(&out, f->output, error));
     else if (f->json)
@@ -334,6 +315,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
 done:
     free(scene);
     free(selected);
+    stated_errors_free(&stated);
     free(values);
     free(corners);
     refined_light_free(&refined);
@@ -373,7 +355,7 @@ int cmd_solve(int argc, char **argv) {
         {NULL, output_rows, &f},
         {LIGHT_HEADING, light_rows, &f.light},
         {"", weather_rows, &f},
-        {"answer", answer_rows, &f},
+        {"answer", answer_options, &f},
         {"a year: figures of each element over a batch of skies or emissions, in place of the batch",
          year_rows, &f},
         {0}};

@@ -88,8 +88,10 @@ class Scene:
         other.core = np.stack([np.linalg.inv(np.eye(self.rank) - self.V.T @ (r[:, None] * self.U)) for r in other.rho])
         return other
 
-    def write(self, path, name="box", kind="low_rank", with_order=True, error=True, sky=0, keep_factors=False):
-        """sky: so many tiles, 0 for none. keep_factors: a grey store as coloured ones are."""
+    def write(self, path, name="box", kind="low_rank", with_order=True, error=True, sky=0, keep_factors=False,
+              receivers=()):
+        """sky: so many tiles, 0 for none. keep_factors: a grey store as coloured ones are. receivers: the elements
+        that the store says to be built for, none for all."""
         n, C = self.n, self.channels
         order = self.order if with_order else np.arange(n)
         with h5py.File(path, "w", libver=("v108", "v108")) as f:
@@ -118,6 +120,9 @@ class Scene:
                 tiles[:, 7], tiles[:, 8] = width, width / 2
                 arrays["/sky/tiles"] = tiles
                 arrays["/sky/first_bounce"] = self.first_bounce(sky)
+            if len(receivers):
+                arrays["/importance/elements"] = np.array(receivers, np.uint32)
+                arrays["/importance/weights"] = np.ones(len(receivers), np.float32)
             rho_stored = np.where(self.rho == 0, 1.0, self.rho)
             attributes = {"kind": kind, "layout": "rows", "reason": "a test", "epsilon": 0.05}
             if kind == "exact":
@@ -140,6 +145,8 @@ class Scene:
             width = max(len(g.encode()) for g in self.group_names)
             f.create_dataset("/mesh/group_names", data=np.array([g.encode() for g in self.group_names], f"S{width}"))
             set_attributes(f["operator"], attributes)
+            if len(receivers):
+                set_attributes(f["importance"], {"option": "--receivers some"})
             if sky:
                 set_attributes(f["sky"], {"tiling": f"grid:{sky}x1", "ground_albedo": 0.0, "up": "z"})
             set_attributes(f["mesh"], {"geometry_hash": "0" * 32, "name": name, "unit": 1.0, "up": "z", "two_sided": 0})
@@ -149,6 +156,9 @@ class Scene:
                     for norm in "relative", "indirect":
                         for figure in "mean", "std", "max":
                             figures[f"{against}_{norm}_{figure}"] = 0.125 if norm == "relative" else 0.25
+                if len(receivers):
+                    figures.update(receivers_relative=0.03125, receivers_indirect=0.0625, receivers_noise=0.0,
+                                   receivers_operator_indirect=0.0625, receivers_is_bound=0)
                 f.create_group("error")
                 for light in "single", "lights":
                     set_attributes(f["error"].create_group(light), figures)

@@ -1,6 +1,7 @@
 """lambertd answers what the store holds: every form of emission, selection, quantity and encoding."""
 
 import io
+import json
 import pathlib
 import tempfile
 import unittest
@@ -26,6 +27,8 @@ class Answers(unittest.TestCase):
         cls.plain = Scene(30, seed=3).write(path / "plain.h5", "plain", with_order=False, sky=3)
         cls.colour = Scene(50, channels=3, seed=4).write(path / "colour.h5", "colour")
         cls.exact3 = Scene(20, channels=3, seed=5).write(path / "exact3.h5", "exact3", kind="exact", sky=5)
+        desks = Scene(60, seed=6)
+        cls.desks = desks.write(path / "desks.h5", "desks", receivers=[*desks.members("floor"), *desks.members("lamp")[:-1]])
         cls.spaced = Scene(10, groups=("a~b/c", "größe", "x")).write(path / "spaced.h5", "two words/ä")
         cls.scenes = {name: getattr(cls, name) for name in ("grey", "exact", "plain", "colour", "exact3")}
         cls.daemon = Daemon("--stores", path, "--max-batch", 40)
@@ -163,6 +166,43 @@ class Answers(unittest.TestCase):
             self.assertGreaterEqual(value, 0)
         self.assertNotIn("error", self.solve("exact", {"emission": [1] * 40}).json())
 
+    RECEIVERS = {"relative_mean": 0.03125, "indirect_mean": 0.0625, "of": "receivers"}
+    ALL = {"relative_mean": 0.125, "indirect_mean": 0.25, "of": "all"}
+
+    def test_answers_of_receivers_alone_have_their_error(self):
+        floor, lamp, wall = (self.desks.members(name).tolist() for name in ("floor", "lamp", "wall"))
+        for select, error in (
+            ({"elements": floor[:3]}, self.RECEIVERS),
+            ({"elements": [lamp[0], *floor]}, self.RECEIVERS),
+            ({"elements": [*floor, wall[0]]}, self.ALL),
+            ({"elements": [wall[0], *floor]}, self.ALL),
+            ({"elements": lamp[-1:]}, self.ALL),
+            ({"groups": ["floor"]}, self.RECEIVERS),
+            ({"groups": ["floor", "lamp"]}, self.ALL),
+            (None, self.ALL),
+        ):
+            body = {"emission": [1] * 60, **({"select": select} if select else {})}
+            self.assertEqual(self.solve("desks", body).json()["error"], error, select)
+        # The second answer of a linear reduction is that of the thread which reads requests.
+        for names, error in (["floor"], self.RECEIVERS), (["lamp"], self.ALL), (["floor", "wall"], self.ALL):
+            for figures in ["mean"], ["max"], ["mean", "uniformity"]:
+                body = {"emission": {"groups": {"lamp": 1}}, "reduce": {"groups": names, "with": figures}}
+                for _ in range(2):
+                    self.assertEqual(self.solve("desks", body).json()["error"], error, (names, figures))
+        body = json.dumps({"cotangent": {"groups": {"floor": 1}}, "gradient": ["emission"]})
+        answer = self.daemon.post("/v1/scenes/desks/adjoint", body)
+        self.assertEqual(answer.status, 200)
+        self.assertNotIn("error", answer.json())
+
+    def test_a_scene_states_the_errors_of_receivers_by_name(self):
+        about = self.daemon.get("/v1/scenes/desks").json()
+        members = len(self.desks.members("floor")) + len(self.desks.members("lamp")) - 1
+        self.assertEqual(about["importance"], {"option": "--receivers some", "elements": members})
+        for light in "single", "lights":
+            self.assertEqual(about["error"][light]["receivers_indirect"], 0.0625)
+            self.assertEqual(about["error"][light]["total_indirect_mean"], 0.25)
+        self.assertIsNone(self.daemon.get("/v1/scenes/grey").json()["importance"])
+
     def load(self, answer, dtype):
         self.assertEqual(answer.headers["Content-Type"], "application/x-npy")
         array = np.load(io.BytesIO(answer.body))
@@ -247,7 +287,7 @@ class Answers(unittest.TestCase):
 
     def test_scenes(self):
         listed = {s["name"]: s for s in self.daemon.get("/v1/scenes").json()["scenes"]}
-        self.assertEqual(set(listed), set(self.scenes) | {"two words/ä"})
+        self.assertEqual(set(listed), set(self.scenes) | {"two words/ä", "desks"})
         self.assertEqual(list(listed), sorted(listed, key=lambda name: name.encode()))
         self.assertEqual(listed["exact3"],
                          {"name": "exact3", "elements": 20, "channels": 3, "kind": "exact",

@@ -84,7 +84,13 @@ class Importance(Case):
         self.assertNotIn(warning, done.stderr)
         with h5py.File(self.store) as file:
             stated = file["error/lights"].attrs["receivers_indirect"]
-        self.assertEqual(json.loads(done.stdout)["error"]["indirect_mean"], stated)
+            of_all = file["error/lights"].attrs["total_indirect_mean"]
+        error = json.loads(done.stdout)["error"]
+        self.assertEqual((error["indirect_mean"], error["of"]), (stated, "receivers"))
+        error = json.loads(must("solve", self.store, "--reduce", "lamp=mean", "--reduce", "floor=mean", "--json").stdout)["error"]
+        self.assertEqual((error["indirect_mean"], error["of"]), (of_all, "all"))
+        self.assertIn("stated error of the store, of the light of receivers: ", must("solve", self.store, "--reduce", "lamp=mean").stdout)
+        self.assertNotIn("of the light of", must("solve", self.all).stdout)
         self.assertNotIn(warning, must("solve", self.all).stderr)
 
     def test_verify_finds_what_is_stated(self):
