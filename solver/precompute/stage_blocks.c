@@ -1,5 +1,6 @@
 /* Form factors by blocks of clusters: the choice of them by what they cost, and the stage that finds them. */
 #include "solver/base/clock.h"
+#include "solver/formfactor/blocks/blocks_importance.h"
 #include "solver/formfactor/blocks/blocks_sample.h"
 #include "solver/precompute/precompute_state.h"
 
@@ -108,8 +109,14 @@ done:
 lam_status state_forecast_blocks(precompute_state *state, const recipe *blocks, pairs_cost *cost,
                                  lam_error *error) {
     lam_status status = LAM_OK;
+    importance *const read = state->importance.n > 0 ? &state->importance : NULL;
+    block_options coarse = block_options_of(blocks);
+    coarse.progress = &state->progress;
     if (state->ready == NULL) TRY(block_scene_make(&state->m, &state->tree, &state->ready, error));
-    TRY(blocks_forecast(state->ready, blocks, &state->progress, cost, error));
+    if (read != NULL)
+        TRY(blocks_importance(&state->m, block_scene_visibility(state->ready), &state->tree, &coarse, read,
+                              error));
+    TRY(blocks_forecast(state->ready, blocks, read, &state->progress, cost, error));
 done:
     return status;
 }

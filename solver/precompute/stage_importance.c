@@ -84,7 +84,8 @@ static lam_status find_by_rays(precompute_state *state, lam_error *error) {
     form_factors f = {.row_sums = NULL};
     TRY(form_factors_make(&state->m, state->order, &how, &f, error));
     const factor_product F = factor_product_of_rows(&f.F);
-    TRY(importance_find(&F, state->m.n_channels, state->m.reflectance, &state->importance, error));
+    TRY(importance_find(&F, state->m.n_channels, state->m.reflectance, state->m.area, &state->importance,
+                        error));
 done:
     form_factors_free(&f);
     return status;
@@ -95,5 +96,6 @@ lam_status state_find_importance(precompute_state *state, lam_error *error) {
     if (state->streamed) return find_by_rays(state, error);
     const factor_product F =
         state->blocks.n > 0 ? block_factors_product(&state->blocks) : factor_product_of_rows(&state->f.F);
-    return importance_find(&F, state->m.n_channels, state->m.reflectance, &state->importance, error);
+    return importance_find(&F, state->m.n_channels, state->m.reflectance, state->m.area, &state->importance,
+                           error);
 }

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""An office of which only desks are read: what --receivers saves, and what the desks' light errs by.
+"""A scene of which only some groups are read: what --receivers saves, and what the light there errs by.
 
-    receivers.py [--lambert PROGRAM] [--elements N] [--folder DIR] [--rounds R] [EPSILON ...]
+    receivers.py [--lambert PROGRAM] [--scene OBJ --receivers GROUP,...] [--elements N] [--folder DIR] [--rounds R] [EPSILON ...]
 
-builds operators with and without --receivers desk at each epsilon (preset .05 and .1), in turn, --probes 0, and prints
-processor seconds (the least of R rounds), bytes of the operator and errors as CSV: |B~ - B| / |B - E| over desks and
-over all elements, of the scene's lamps, of two random emissions, and of 24 single elements together. The reference is
-converged with blocks of a tenth of the bound or less, kept in DIR (preset: a folder that is removed).
+builds operators of a scene (preset: an office whose desks are read) with and without --receivers at each epsilon (preset
+.05 and .1), in turn, --probes 0, and prints processor seconds (the least of R rounds), bytes of the operator and errors
+as CSV: |B~ - B| / |B - E| over what is read and over all elements, of the scene's lamps, of two random emissions, and of
+48 single elements together; and, over all elements, of light that receivers alone emit: uniform, two random, 24 single
+ones. The reference is converged with blocks of a tenth of the bound or less, kept in DIR (preset: a folder that is removed).
 """
 import argparse
 import os
@@ -88,9 +89,11 @@ def run(lambert, *arguments):
 
 
 def measure(options, folder):
-    scene, reference = folder / "office.obj", folder / f"reference-{options.elements}.h5"
+    scene = pathlib.Path(options.scene) if options.scene else folder / "office.obj"
+    reference = folder / f"{scene.stem}-{options.elements}.h5"
     emission, out = folder / "emission.npy", folder / "answer.npy"
-    office().write(scene)
+    if not options.scene:
+        office().write(scene)
     build = "precompute", scene, "--elements", options.elements, "--method", "hierarchical", "--form-factors", "blocks", \
         "--trials", 1, "--probes", 0, "--quiet"
     if not reference.exists():
@@ -98,21 +101,33 @@ def measure(options, folder):
     with h5py.File(reference) as file:
         area, n = file["mesh/area"][()], len(file["mesh/area"])
         names = [name.decode() if isinstance(name, bytes) else name for name in file["mesh/group_names"][()]]
-        desks = area * (file["mesh/group"][()] == names.index("desk"))
-        lamps = file["mesh/emission"][0]
+        inside = numpy.isin(file["mesh/group"][()], [names.index(name) for name in options.receivers.split(",")])
+        channels, lamps = len(file["mesh/emission"]), file["mesh/emission"][()].max(axis=0)
     rng = numpy.random.default_rng(5)
-    single = numpy.zeros((24, n), "f4")
-    single[range(24), rng.choice(n, 24, replace=False)] = 1
-    numpy.save(emission, numpy.vstack([lamps[None], rng.random((2, n)), single]).astype("f4"))
-    sets = {"lamps": slice(0, 1), "random": slice(1, 3), "single": slice(3, 27)}
+
+    def singles(count, among):
+        light = numpy.zeros((count, n), "f4")
+        light[range(count), rng.choice(among, count, replace=False)] = 1
+        return light
+
+    single, of_receivers = singles(48, n), singles(min(24, inside.sum()), numpy.flatnonzero(inside))
+    lamps = lamps if lamps.max() > 0 else rng.random(n)
+    light = {"lamps": lamps[None], "random": rng.random((2, n)), "single": single,
+             "uniform_of_receivers": inside[None], "random_of_receivers": rng.random((2, n)) * inside, "single_of_receivers": of_receivers}
+    sets, count = {}, 0
+    for name, vectors in light.items():
+        sets[name] = slice(count, count := count + len(vectors))
+    E = numpy.vstack(list(light.values())).astype("f4")
+    numpy.save(emission, E if channels == 1 else numpy.repeat(E[:, None], channels, 1))
 
     def answers(store, *more):
         run(options.lambert, "solve", store, "--emission", emission, "--quantity", "indirect", "-o", out, *more)
-        return numpy.load(out).astype("f8").reshape(27, n)
+        return numpy.load(out).astype("f8").reshape(count, channels, n)
 
     truth = answers(reference, "--tolerance", 1e-4)
-    print("receivers,epsilon,processor_seconds,operator_MB," + ",".join(f"{where}_{k}" for where in ("desk", "all") for k in sets))
-    cases = [(epsilon, extra) for epsilon in options.epsilons for extra in ((), ("--receivers", "desk"))]
+    places = [("read", area * inside, name) for name in list(sets)[:3]] + [("all", area, name) for name in sets]
+    print("receivers,epsilon,processor_seconds,operator_MB," + ",".join(f"{where}_{name}" for where, _, name in places))
+    cases = [(epsilon, extra) for epsilon in options.epsilons for extra in ((), ("--receivers", options.receivers))]
     seconds = {case: [] for case in cases}
     for _ in range(options.rounds):
         for k, case in enumerate(cases):
@@ -121,9 +136,9 @@ def measure(options, folder):
         with h5py.File(folder / f"{k}.h5") as file:
             size = sum(item.nbytes for item in collect(file["operator"]))
         wrong = answers(folder / f"{k}.h5") - truth
-        errors = [numpy.sqrt((w * wrong[s] ** 2).sum() / (w * truth[s] ** 2).sum()) for w in (desks, area) for s in sets.values()]
-        print(f"{'desk' if case[1] else 'all'},{case[0]:g},{min(seconds[case]):.2f},{size / 1e6:.3f}," +
-              ",".join(f"{e:.4f}" for e in errors), flush=True)
+        errors = [numpy.sqrt((w * wrong[sets[name]] ** 2).sum() / (w * truth[sets[name]] ** 2).sum()) for _, w, name in places]
+        print(f"{options.receivers.replace(',', '+') if case[1] else 'all'},{case[0]:g},{min(seconds[case]):.2f},{size / 1e6:.3f}," +
+              ",".join(f"{e:.5f}" for e in errors), flush=True)
 
 
 def collect(group):
@@ -135,6 +150,8 @@ def collect(group):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--lambert", default="lambert")
+    parser.add_argument("--scene")
+    parser.add_argument("--receivers", default="desk")
     parser.add_argument("--elements", type=int, default=10000)
     parser.add_argument("--folder", type=pathlib.Path)
     parser.add_argument("--rounds", type=int, default=3)

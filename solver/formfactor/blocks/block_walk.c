@@ -92,7 +92,7 @@ static double exchange_of_pair(const block_walk *w, uint32_t a, uint32_t b) {
 static double bound_times(const block_finder *k, uint32_t a, uint32_t b) {
     static const double power = -.7;
     if (k->importance == NULL) return 1;
-    return importance_share * pow((double)fmaxf(k->importance[a], k->importance[b]), power);
+    return k->options->importance_share * pow((double)fmaxf(k->importance[a], k->importance[b]), power);
 }
 
 /* The candidates that segments are tested against. */

@@ -16,8 +16,9 @@ typedef struct block_options {
                     */
     uint64_t seed; /* of visibility segments */
     /* [n] by element, in (0, 1]: an error of a block counts as often as the larger importance of its two
-     * sides (importance.h), so that both bounds are over it. NULL: all are 1. */
+     * sides (importance.h), so that both bounds are over it, times the share. NULL: all are 1. */
     const float *importance;
+    double importance_share;
     const progress *progress;
     const char *stage;
 } block_options;

@@ -19,7 +19,7 @@ lam_status blocks_importance(const mesh *m, const visibility *v, const plane_tre
     coarse.stage = "importance";
     TRY(blocks_find(m, v, tree, &coarse, &made, NULL, error));
     const factor_product F = block_factors_product(&made);
-    TRY(importance_find(&F, m->n_channels, m->reflectance, io, error));
+    TRY(importance_find(&F, m->n_channels, m->reflectance, m->area, io, error));
 done:
     block_factors_free(&made);
     return status;

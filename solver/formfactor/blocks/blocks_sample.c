@@ -69,25 +69,59 @@ static double walk_seconds(const block_report *w) {
            w->cast * cast_seconds;
 }
 
-lam_status blocks_forecast(block_scene *scene, const recipe *r, const progress *p, pairs_cost *out,
-                           lam_error *error) {
+static double count_of(const block_report *w) {
+    return w->linear + w->even + w->pairs + w->shaded + w->shaded_pairs;
+}
+
+static double finish_of(const block_scene *scene, const block_report *w) {
+    return count_of(w) * finish_seconds + (double)scene->nodes.n * element_seconds;
+}
+
+/* Of the blocks w, which a judge finds against the whole scene. */
+static double judge_seconds(const block_scene *scene, const block_report *w, double pace) {
+    return (walk_seconds(w) + w->segments * scene_seconds) * pace + finish_of(scene, w) * finer_finish;
+}
+
+/* Receivers' blocks of half the bound are found by another importance: a sample of their own tells. */
+static lam_status sample_finer(block_scene *scene, const recipe *r, const importance *read, const progress *p,
+                               block_report *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const recipe half = recipe_of_judge(r, r->rays, 0);
+    block_options options = block_options_of(&half);
+    importance even = {.n = 0};
+    TRY(importance_even_out(read, &even, error));
+    options.progress = p;
+    options.importance = even.of;
+    options.importance_share = even.share_of_bounds;
+    TRY(blocks_sample(scene, &options, out, NULL, error));
+done:
+    importance_free(&even);
+    return status;
+}
+
+lam_status blocks_forecast(block_scene *scene, const recipe *r, const importance *read, const progress *p,
+                           pairs_cost *out, lam_error *error) {
     lam_status status = LAM_OK;
     block_options options = block_options_of(r);
-    block_report w;
+    block_report w, finer;
     blocks_trial trial;
     options.progress = p;
+    if (read != NULL) {
+        options.importance = read->of;
+        options.importance_share = read->share_of_bounds;
+    }
     TRY(blocks_sample(scene, &options, &w, &trial, error));
-    const double blocks = w.linear + w.even + w.pairs + w.shaded + w.shaded_pairs;
-    const double walk = walk_seconds(&w),
-                 finish = blocks * finish_seconds + (double)scene->nodes.n * element_seconds;
+    const double blocks = count_of(&w), walk = walk_seconds(&w), finish = finish_of(scene, &w);
     const double pace = sample_pace(trial.seconds, walk_seconds(&trial.work));
     const double single = blocks > 0 ? (w.pairs + w.shaded_pairs) / blocks : 0;
     const double more = single + (1 - single) * finer_times;
+    if (read != NULL) TRY(sample_finer(scene, r, read, p, &finer, error));
     *out = (pairs_cost){.seconds = walk + finish,
                         .measured = walk * pace + finish,
                         .entries = 2 * blocks,
                         .single_share = single,
-                        .finer = more * ((walk + w.segments * scene_seconds) * pace + finish * finer_finish)};
+                        .finer = read != NULL ? judge_seconds(scene, &finer, pace)
+                                              : more * judge_seconds(scene, &w, pace)};
 done:
     return status;
 }

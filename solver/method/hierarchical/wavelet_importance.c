@@ -37,7 +37,7 @@ lam_status wavelet_importance_make(const importance *i, const double *area, cons
     made.times = memory_allocate(tree->n_clusters, sizeof *made.times, "operator", error);
     if (made.times == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t t = 0; t < tree->n_clusters; t++) {
-        const double looser = sqrt(importance_share) * pow((double)y[t], -power);
+        const double looser = sqrt(i->share_of_thresholds) * pow((double)y[t], -power);
         made.times[t] = (float)(1 / looser);
         made.over[t] = fmaxf(made.over[t], (float)importance_least);
         weight[t] *= (float)looser;

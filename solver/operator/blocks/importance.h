@@ -13,21 +13,23 @@ typedef struct importance {
     size_t n;
     float *read; /* [n] by element: w over its largest value */
     float *of;   /* [n] by element: y, between importance_least and 1; NULL before it is found */
+    double share_of_bounds, share_of_thresholds; /* found with it: importance.c says how */
 } importance;
 
 /* No element has less importance, so that light which is not read is roughly right: it errs by some 4 times
- * as much. Thresholds of all errors are multiplied by the share, beside what importance allows, so that what
- * is read errs no more than where all is read. */
-extern const double importance_least, importance_share;
+ * as much. Bounds of blocks and thresholds of coefficients are multiplied by the shares, beside what
+ * importance allows, so that what is read errs no more than where all is read. */
+extern const double importance_least;
 
 void importance_free(importance *i);
 
-/* Finds y by rho [C][n], of which the largest of all channels counts, to within a hundredth. F may be coarse.
- * Cost: about ten products. Errors: LAM_ERR_MEMORY, those of the product. */
-lam_status importance_find(const factor_product *F, size_t n_channels, const float *rho, importance *io,
-                           lam_error *error);
+/* Finds y by rho [C][n], of which the largest of all channels counts, to within a hundredth, and the shares.
+ * F may be coarse; area [n]. Cost: about ten products. Errors: LAM_ERR_MEMORY, those of the product. */
+lam_status importance_find(const factor_product *F, size_t n_channels, const float *rho, const double *area,
+                           importance *io, lam_error *error);
 
-/* out: the importance of a reference, y^1/2, between y and 1, of what is read alike. The caller frees it.
+/* out: the importance of a reference, y^1/2, between y and 1, of what is read alike, with a share of bounds
+ * of half or more. The caller frees it.
  * Errors: LAM_ERR_MEMORY. */
 lam_status importance_even_out(const importance *i, importance *out, lam_error *error);
 

@@ -49,7 +49,8 @@ static block_options options_of(const subject *s, bool important, double finer) 
                            .shadow = blocks_shadow / finer,
                            .exact = 1e-6,
                            .seed = finer > 1 ? 2 : 1,
-                           .importance = important ? s->found.of : NULL};
+                           .importance = important ? s->found.of : NULL,
+                           .importance_share = .5};
 }
 
 static void find_importance(subject *s) {

@@ -1,4 +1,5 @@
 /* The forecast of the work of blocks beside the work itself. */
+#include "solver/formfactor/blocks/blocks_importance.h"
 #include "solver/formfactor/blocks/blocks_sample.h"
 #include "support/blocks.h"
 #include "support/scene.h"
@@ -68,11 +69,58 @@ START_TEST(a_sample_tells_the_work) {
 }
 END_TEST
 
+/* Blocks that are found for what the lamp of a box receives are a good deal fewer, and the forecast counts
+ * these, and those of half the bound that a judge takes. */
+START_TEST(forecasts_know_receivers) {
+    const generate_options how = {.kind = "cornell", .elements = 3000, .closed = true, .reflectance = .5};
+    const recipe r = {.method = RECIPE_BLOCKS, .rays = 1, .accuracy = blocks_open, .seed = 1};
+    const recipe judge = recipe_of_judge(&r, 1, 0);
+    lam_error error = {.message = ""};
+    mesh m = generate_good(&how);
+    importance read = {.n = m.n, .read = calloc(m.n, sizeof(float))}, even;
+    const size_t lamp = group_find(&m, "lamp");
+    plane_tree tree;
+    block_scene *scene = NULL;
+    pairs_cost of_all, of_read;
+    block_factors f;
+    block_report found, halves;
+    for (size_t i = 0; i < m.n; i++) read.read[i] = m.group[i] == lamp;
+    ck_ok(form_factors_tree(&m, &tree, &error));
+    ck_ok(block_scene_make(&m, &tree, &scene, &error));
+    block_options options = block_options_of(&r), finer = block_options_of(&judge);
+    ck_ok(blocks_importance(&m, block_scene_visibility(scene), &tree, &options, &read, &error));
+    ck_ok(blocks_forecast(scene, &r, NULL, NULL, &of_all, &error));
+    ck_ok(blocks_forecast(scene, &r, &read, NULL, &of_read, &error));
+    ck_ok(importance_even_out(&read, &even, &error));
+    options.importance = read.of;
+    options.importance_share = read.share_of_bounds;
+    ck_ok(blocks_find_in(scene, &options, &f, &found, &error));
+    block_factors_free(&f);
+    block_scene_destroy(scene);
+    finer.importance = even.of;
+    finer.importance_share = even.share_of_bounds;
+    ck_ok(block_scene_make(&m, &tree, &scene, &error));
+    ck_ok(blocks_sample(scene, &finer, &halves, NULL, &error));
+    check_near("cornell", "blocks for the lamp", of_read.entries / 2,
+               found.linear + found.even + found.pairs + found.shaded + found.shaded_pairs);
+    ck_assert_double_lt(of_read.entries, .9 * of_all.entries);
+    ck_assert_double_lt(of_read.seconds, of_all.seconds);
+    ck_assert_double_gt(of_read.finer / of_read.measured, 1);
+    ck_assert_double_gt(halves.segments, found.segments);
+    block_scene_destroy(scene);
+    importance_free(&even);
+    importance_free(&read);
+    plane_tree_free(&tree);
+    mesh_free(&m);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("blocks sample");
     TCase *cases = tcase_create("blocks sample");
     tcase_set_timeout(cases, 240);
     tcase_add_loop_test(cases, a_sample_tells_the_work, 0, SCENES);
+    tcase_add_test(cases, forecasts_know_receivers);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }

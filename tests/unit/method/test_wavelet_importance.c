@@ -24,7 +24,7 @@ START_TEST(what_is_read_is_as_good_for_fewer_coefficients) {
     for (size_t i = 0; i < n; i++) ones[i] = 1;
     for (size_t i = 0; i < wall / 5; i++) read.read[i] = 1;
     const factor_product F = factor_product_of_rows(problem->F);
-    ck_ok(importance_find(&F, 1, problem->reflectance, &read, &error));
+    ck_ok(importance_find(&F, 1, problem->reflectance, problem->area, &read, &error));
     some.importance = &read;
     E[n / 2] = E[n + n - 1] = 1;
     for (size_t i = 0; i < n; i++) {

@@ -74,7 +74,7 @@ START_TEST(importance_is_the_radiosity_of_what_is_read) {
     const factor_product F = product_of(&s);
     for (size_t i = 0; i < N; i++) ck_assert_double_lt(s.F[i][0] + s.F[i][N - 1], .9);
     s.read.read[5] = 1; /* more than 1 with what comes back */
-    ck_ok(importance_find(&F, C, s.rho, &s.read, &error));
+    ck_ok(importance_find(&F, C, s.rho, s.area, &s.read, &error));
     for (size_t i = 0; i < N; i++) {
         double y = 0;
         for (size_t j = 0; j < N; j++) y += M[i * N + j] * (double)s.read.read[j];
@@ -88,6 +88,36 @@ START_TEST(importance_is_the_radiosity_of_what_is_read) {
 }
 END_TEST
 
+/* 1.5 r within [.4, 1] and [.25, 1], r^2 = sum A y^2 / sum A by a dense inverse, where all is read, some
+ * elements, and one. y is known to 2.6e-3, and so is r. */
+START_TEST(shares_follow_the_mean_importance) {
+    static const size_t steps[] = {1, 2, 9, N}; /* every which element is read */
+    double last = 2;
+    for (size_t c = 0; c < sizeof steps / sizeof steps[0]; c++) {
+        subject s;
+        subject_make(&s);
+        double *M = inverse_of(&s), square = 0, area = 0;
+        const factor_product F = product_of(&s);
+        for (size_t i = 0; i < N; i++) s.read.read[i] = i % steps[c] == 0 ? 1 : 0;
+        ck_ok(importance_find(&F, C, s.rho, s.area, &s.read, &error));
+        for (size_t i = 0; i < N; i++) {
+            double y = 0;
+            for (size_t j = 0; j < N; j++) y += M[i * N + j] * (double)s.read.read[j];
+            square += s.area[i] * pow(fmin(fmax(y, 1. / 16), 1), 2);
+            area += s.area[i];
+        }
+        const double share = 1.5 * sqrt(square / area);
+        ck_assert_double_lt(share, last);
+        ck_assert_double_eq_tol(s.read.share_of_bounds, fmin(fmax(share, .4), 1), 1.5 * 2.6e-3);
+        ck_assert_double_eq_tol(s.read.share_of_thresholds, fmin(fmax(share, .25), 1), 1.5 * 2.6e-3);
+        last = share;
+        free(M);
+        importance_free(&s.read);
+    }
+    ck_assert_double_lt(last, .25);
+}
+END_TEST
+
 /* A change p of what elements give off, by an error of the light that they get, changes what is read by
  * sum A w (I - R F)^-1 p. Where all rho are equal that is sum A y p, as A_i F_ij = A_j F_ji. */
 START_TEST(importance_weighs_what_changes) {
@@ -97,7 +127,7 @@ START_TEST(importance_weighs_what_changes) {
     for (size_t i = 0; i < N; i++) s.rho[i] = s.rho[N + i] = .5f;
     double *M = inverse_of(&s), p[N], read = 0, weighed = 0, size = 0;
     const factor_product F = product_of(&s);
-    ck_ok(importance_find(&F, C, s.rho, &s.read, &error));
+    ck_ok(importance_find(&F, C, s.rho, s.area, &s.read, &error));
     for (size_t i = 0; i < N; i++) p[i] = (double)s.read.of[i] > 1.001 / 16 ? random_lcg_unit(&seed) : 0;
     for (size_t i = 0; i < N; i++) {
         double B = 0;
@@ -155,10 +185,17 @@ START_TEST(a_reference_is_more_even) {
     importance even;
     subject_make(&s);
     const factor_product F = product_of(&s);
-    ck_ok(importance_find(&F, C, s.rho, &s.read, &error));
+    ck_ok(importance_find(&F, C, s.rho, s.area, &s.read, &error));
     ck_ok(importance_even_out(&s.read, &even, &error));
     ck_assert_uint_eq(even.n, N);
     ck_assert_mem_eq(even.read, s.read.read, N * sizeof *even.read);
+    ck_assert_double_eq(even.share_of_bounds, fmax(s.read.share_of_bounds, .5));
+    ck_assert_double_eq(even.share_of_thresholds, s.read.share_of_thresholds);
+    ck_assert_double_lt(s.read.share_of_bounds, .5);
+    s.read.share_of_bounds = .7;
+    importance_free(&even);
+    ck_ok(importance_even_out(&s.read, &even, &error));
+    ck_assert_double_eq(even.share_of_bounds, .7);
     for (size_t i = 0; i < N; i++)
         ck_assert_double_eq_tol(pow((double)even.of[i], 2), (double)s.read.of[i], 1e-6);
     importance_free(&even);
@@ -233,7 +270,7 @@ START_TEST(memory_that_runs_out_leaves_nothing) {
     for (long k = 0; !made; k++) {
         ck_assert_int_lt(k, 16);
         allocations_left = k;
-        const lam_status status = importance_find(&F, C, s.rho, &s.read, &error);
+        const lam_status status = importance_find(&F, C, s.rho, s.area, &s.read, &error);
         allocations_left = -1;
         made = status == LAM_OK;
         ck_assert(made || (status == LAM_ERR_MEMORY && s.read.of == NULL));
@@ -246,6 +283,7 @@ int main(void) {
     Suite *suite = suite_create("importance");
     TCase *cases = tcase_create("importance");
     tcase_add_test(cases, importance_is_the_radiosity_of_what_is_read);
+    tcase_add_test(cases, shares_follow_the_mean_importance);
     tcase_add_test(cases, importance_weighs_what_changes);
     tcase_add_test(cases, nodes_have_the_mean_square_of_their_elements);
     tcase_add_test(cases, a_reference_is_more_even);
