@@ -109,6 +109,12 @@ START_TEST(what_is_read_is_as_good_for_less_work) {
     ck_assert_double_lt(distance(&s, steered, truth, true), 1.2 * distance(&s, even, truth, true));
     ck_assert_double_gt(distance(&s, steered, truth, false), 1.2 * distance(&s, even, truth, false));
     ck_assert_double_lt(of_steered.segments, .8 * of_even.segments);
+    /* With bounds of twice the share there are fewer blocks. */
+    block_report of_coarse;
+    block_options coarse = some;
+    coarse.importance_share *= 2;
+    light_of(&s, &coarse, even, &of_coarse);
+    ck_assert_double_lt(of_coarse.segments, .9 * of_steered.segments);
     free(even);
     free(steered);
     free(truth);
