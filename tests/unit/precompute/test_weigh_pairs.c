@@ -69,8 +69,8 @@ END_TEST
 
 /* High quality asks for the accuracy of pairs, and may take longer. */
 START_TEST(high_quality_keeps_pairs_for_longer) {
-    ck_assert(weigh("canopy", 6000, "normal", 2).dear);
-    ck_assert(!weigh("canopy", 6000, "high", 2).dear);
+    ck_assert(weigh("canopy", 4000, "normal", 2).dear);
+    ck_assert(!weigh("canopy", 4000, "high", 2).dear);
 }
 END_TEST
 
