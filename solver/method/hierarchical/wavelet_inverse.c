@@ -225,17 +225,10 @@ typedef struct product_rows {
  * term that may be left out. The working area is in locals: a count in memory would make each term wait for
  * the one before. */
 static void add_product(row_work *w, size_t length, const row_term *z, const term_rows *B, float skip) {
-    enum { AHEAD = 4 };
     float *const sums = w->sums;
     uint32_t *const columns = w->columns;
     size_t terms = 0, count = w->count;
     for (size_t e = 0; e < length; e++) {
-        if (e + AHEAD < length) {
-            __builtin_prefetch(B->row[z[e + AHEAD].column]);
-            __builtin_prefetch(B->row[z[e + AHEAD].column] + 8);
-        }
-        if (e + 2 * AHEAD < length) __builtin_prefetch(&B->row[z[e + 2 * AHEAD].column]);
-        if (e + 2 * AHEAD < length) __builtin_prefetch(&B->length[z[e + 2 * AHEAD].column]);
         const float by = z[e].value, least = skip / fabsf(by);
         const row_term *from = B->row[z[e].column], *const first = from,
                        *const last = from + B->length[z[e].column];

@@ -18,7 +18,7 @@ typedef struct importance {
 
 /* No element has less importance, so that light which is not read is roughly right: it errs by some 4 times
  * as much. Bounds of blocks and thresholds of coefficients are multiplied by the shares, beside what
- * importance allows, so that what is read errs no more than where all is read. */
+ * importance allows, so that what is read errs about as much as where all is read. */
 extern const double importance_least;
 
 void importance_free(importance *i);
