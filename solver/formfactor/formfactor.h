@@ -120,8 +120,9 @@ lam_status form_factors_make_twice(const mesh *m, const uint32_t *order, const f
                                    uint64_t other_seed, const char *const stages[2], form_factors out[2],
                                    lam_error *error);
 
-/* The tree of a mesh's elements on which blocks are found; its view is known where blocks may depend on it
- * (plane_tree_look). Errors: LAM_ERR_MEMORY. */
+/* The tree of a mesh's elements on which blocks are found; it keeps parts of the scene apart that exchange no
+ * light as far as rays show (visibility/parts.h), if its planes are large enough for blocks. Its view is
+ * known where blocks may depend on it (plane_tree_look). Errors: LAM_ERR_MEMORY. */
 lam_status form_factors_tree(const mesh *m, plane_tree *out, lam_error *error);
 
 /* The same by blocks of clusters (RECIPE_BLOCKS) on a tree of the elements with leaves of PLANE_LEAF, which

@@ -13,7 +13,7 @@
 #include "solver/formfactor/repair.h"
 #include "solver/formfactor/row_scaling.h"
 #include "solver/formfactor/rows/upper.h"
-#include "solver/formfactor/visibility/visibility.h"
+#include "solver/formfactor/visibility/parts.h"
 #include "solver/linalg/csr.h"
 
 #include <math.h>
@@ -329,21 +329,47 @@ done:
     return status;
 }
 
+/* The parts of a scene; NULL: one. */
+static lam_status find_parts(const mesh *m, uint32_t **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t count = 0;
+    visibility *v = NULL;
+    uint32_t *part = memory_allocate(m->n, sizeof *part, "parts of the scene", error);
+    if (part == NULL) return LAM_ERR_MEMORY;
+    TRY(visibility_create(m, &v, error));
+    TRY(visibility_parts(m, v, part, &count, error));
+    if (count == 1) goto done;
+    *out = part;
+    part = NULL;
+done:
+    free(part);
+    visibility_destroy(v);
+    return status;
+}
+
 lam_status form_factors_tree(const mesh *m, plane_tree *out, lam_error *error) {
     lam_status status = LAM_OK;
     plane_tree tree = {.n = 0};
+    uint32_t *part = NULL;
     double(*centre)[3] = memory_allocate(m->n, sizeof *centre, "centroids", error);
     const element_corners corners = {(const double(*)[3])m->vertices, (const uint32_t(*)[4])m->elements};
     if (centre == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < m->n; i++) mesh_centroid(m, i, centre[i]);
-    TRY(plane_tree_make(m->n, (const double(*)[3])centre, (const float(*)[3])m->normal, &corners, PLANE_LEAF,
-                        &tree, error));
+    TRY(plane_tree_make(m->n, (const double(*)[3])centre, (const float(*)[3])m->normal, &corners, NULL,
+                        PLANE_LEAF, &tree, error));
+    if (blocks_are_planar(&tree)) TRY(find_parts(m, &part, error));
+    if (part != NULL) {
+        plane_tree_free(&tree);
+        TRY(plane_tree_make(m->n, (const double(*)[3])centre, (const float(*)[3])m->normal, &corners, part,
+                            PLANE_LEAF, &tree, error));
+    }
     TRY(plane_tree_look(m, &tree, error));
     *out = tree;
     tree = (plane_tree){.n = 0};
 done:
     plane_tree_free(&tree);
     free(centre);
+    free(part);
     return status;
 }
 

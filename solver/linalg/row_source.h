@@ -44,10 +44,11 @@ typedef struct row_stream {
     /* Called once, after all rows: the row sums [n] of F, scaled so that closed scenes sum to 1. They live as
      * long as the stream. */
     lam_status (*close)(void *context, const double **row_sums, lam_error *error);
-    void *context;      /* of close */
-    double noise_share; /* of the rows of S by a sample: their noise over that of a closed scene of equal
-                           elements, above 0; 0: not known */
-    row_source others;  /* readable after close: rows of F of an independent sample, entries in any order */
+    void *context;        /* of close */
+    double noise_share;   /* of the rows of S by a sample: their noise over that of a closed scene of equal
+                             elements, above 0; 0: not known */
+    const uint32_t *part; /* [n]: parts of the scene that exchange no light, as far as known; NULL: one */
+    row_source others;    /* readable after close: rows of F of an independent sample, entries in any order */
 } row_stream;
 
 #endif

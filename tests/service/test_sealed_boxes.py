@@ -1,4 +1,4 @@
-"""Black box: a closed box stays dark to the last bit while another one is lit, in exact, 2msc and sparse operators."""
+"""Black box: a closed box stays dark to the last bit while another one is lit, in operators of every kind."""
 
 import os
 import tempfile
@@ -67,7 +67,9 @@ class SealedBoxes(unittest.TestCase):
 
     def test_each_kind(self):
         for method, *options in (["exact"], ["2msc"], ["sparse"], ["sparse", "--threshold", "1e-3"],
-                                 ["sparse", "--correction", "discarded"]):
+                                 ["sparse", "--correction", "discarded"], ["auto"], ["hierarchical"],
+                                 ["hierarchical", "--form-factors", "blocks"],
+                                 ["hierarchical", "--quality", "draft", "--epsilon", ".3"]):
             with self.subTest(method=method, options=options):
                 self.check_dark(0, "--method", method, *options)
 

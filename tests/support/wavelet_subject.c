@@ -26,8 +26,14 @@ wavelet_plan plan_of_all(const wavelets *basis) {
     return plan;
 }
 
-subject wavelet_subject_make(int which) {
+uint32_t wavelet_subject_part(const subject *s, size_t element) {
+    /* A third of the elements, and every third and its neighbour of the others. */
+    return element < s->m.n / 3 ? 0 : element % 3 == 0 ? 1 : 2;
+}
+
+subject wavelet_subject_make(int chosen) {
     subject s = {.W = NULL};
+    const int which = chosen % SUBJECTS;
     if (which == BOX || which == ROOM) {
         fixture f = fixture_box(which == BOX ? unit_cube : room, which == BOX ? 3 : 7, .5f);
         s.m = f.m;
@@ -39,10 +45,14 @@ subject wavelet_subject_make(int which) {
     const size_t n = s.m.n;
     s.centre = test_allocate(n, sizeof *s.centre);
     for (size_t i = 0; i < n; i++) mesh_centroid(&s.m, i, s.centre[i]);
+    uint32_t *part = test_allocate(n, sizeof *part);
+    for (size_t i = 0; i < n; i++) part[i] = wavelet_subject_part(&s, i);
     const element_corners corners = {(const double(*)[3])s.m.vertices, (const uint32_t(*)[4])s.m.elements};
-    ck_ok(plane_tree_make(n, (const double(*)[3])s.centre, (const float(*)[3])s.m.normal, &corners, 6,
-                          &s.tree, &error));
+    ck_ok(plane_tree_make(n, (const double(*)[3])s.centre, (const float(*)[3])s.m.normal, &corners,
+                          chosen < PARTED ? NULL : part, 6, &s.tree, &error));
+    free(part);
     ck_ok(wavelet_basis_make(&s.tree, s.m.area, (const double(*)[3])s.centre, &s.basis, &error));
+    ck_ok(wavelet_roots_make(&s.tree, &s.basis, &s.roots, &error));
     s.plan = plan_of_all(&s.basis);
     return s;
 }
@@ -56,6 +66,7 @@ void wavelet_subject_free(subject *s) {
     plane_tree_free(&s->tree);
     wavelet_plan_free(&s->plan);
     wavelets_free(&s->basis);
+    wavelet_roots_free(&s->roots);
 }
 
 void transform(const subject *s, bool back, const float *from, float *to) {

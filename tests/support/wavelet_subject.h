@@ -24,11 +24,16 @@ typedef struct subject {
     double (*centre)[3];
     plane_tree tree;
     wavelets basis;
+    wavelet_roots roots;
     wavelet_plan plan; /* of all coefficients */
     double *W;         /* [n][n], by its columns' positions; NULL until asked for */
 } subject;
 
-enum { BOX, ROOM, CITY, MAZE, SUBJECTS };
+/* From SUBJECTS on, in the same sequence, their trees keep three parts apart that F joins. */
+enum { BOX, ROOM, CITY, MAZE, SUBJECTS, PARTED = SUBJECTS, SUBJECTS_AND_PARTED = 2 * SUBJECTS, PARTS = 3 };
+
+/* The part of an element of a parted subject. */
+uint32_t wavelet_subject_part(const subject *s, size_t element);
 
 void scene(subject *s, const char *kind, size_t elements);
 

@@ -4,7 +4,7 @@
 #include "solver/formfactor/pairs/pairs.h"
 #include "solver/formfactor/rays/rays.h"
 #include "solver/formfactor/rows/upper.h"
-#include "solver/formfactor/visibility/visibility.h"
+#include "solver/formfactor/visibility/parts.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -22,6 +22,7 @@ struct ray_rows {
     double *own;        /* [n], row sums of F1 without near pairs */
     uint64_t *received; /* [n], row sums of A^-1 (A F1)^T without near pairs, in units */
     double noise_share;
+    uint32_t *part; /* [n]; NULL: one */
     uint64_t other_seed;
 };
 
@@ -40,6 +41,7 @@ void ray_rows_destroy(ray_rows *r) {
     free(r->near_sums);
     free(r->own);
     free(r->received);
+    free(r->part);
     free(r);
 }
 
@@ -67,6 +69,19 @@ static double find_noise_share(const ray_rows *r) {
     return sqrt(sum / (double)count);
 }
 
+static lam_status find_parts(ray_rows *r, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t count = 0;
+    r->part = memory_allocate(r->m->n, sizeof *r->part, "parts of the scene", error);
+    if (r->part == NULL) return LAM_ERR_MEMORY;
+    TRY(visibility_parts(r->m, r->v, r->part, &count, error));
+    if (count > 1) goto done;
+    free(r->part);
+    r->part = NULL;
+done:
+    return status;
+}
+
 lam_status ray_rows_create(const mesh *m, const form_factor_options *options, ray_rows **out,
                            lam_error *error) {
     lam_status status = LAM_OK;
@@ -91,6 +106,7 @@ lam_status ray_rows_create(const mesh *m, const form_factor_options *options, ra
         TRY(sky_bounce_create(options->sky, m->up, options->ground_albedo, n, &r->f.sky, error));
     TRY(visibility_create(m, &r->v, error));
     r->noise_share = find_noise_share(r);
+    TRY(find_parts(r, error));
     if (options->recipe.method == RECIPE_NEAR_PAIRS) {
         TRY(pairs_find(m, r->v, options, recipe_near(&options->recipe), &r->f, &r->near, error));
         TRY(upper_expand(&r->near, m->area, r->near_sums, error));
@@ -340,8 +356,12 @@ done:
 void ray_rows_stream(ray_rows *r, uint64_t other_seed, row_stream *out) {
     const row_source source = {.n = r->m->n, .context = r};
     r->other_seed = other_seed;
-    *out = (row_stream){
-        .rows = source, .close = close_rows, .context = r, .noise_share = r->noise_share, .others = source};
+    *out = (row_stream){.rows = source,
+                        .close = close_rows,
+                        .context = r,
+                        .noise_share = r->noise_share,
+                        .part = r->part,
+                        .others = source};
     out->rows.rows = find_rows;
     out->others.rows = find_other_rows;
 }

@@ -290,7 +290,7 @@ static void spread_sizes(const compressed_factors *c, const node_sizes *sizes, d
 static lam_status prepare(const compress_input *input, compressed_factors *c, lam_error *error) {
     lam_status status = LAM_OK;
     plane_tree tree = {.n = 0};
-    TRY(plane_tree_make(c->n, input->centre, input->normal, NULL, LEAF, &tree, error));
+    TRY(plane_tree_make(c->n, input->centre, input->normal, NULL, NULL, LEAF, &tree, error));
     TRY(wavelet_basis_make(&tree, input->area, input->centre, &c->basis, error));
     c->order = tree.order;
     tree.order = NULL;

@@ -171,14 +171,14 @@ done:
 /* Imposes on K of a channel the answer H = s of E = 1 - rho s, s the row sums of F. Not where importance
  * makes light elsewhere only roughly right: there the mean of all elements is none of those that are read. */
 static lam_status impose_uniform(const build_problem *problem, size_t c, const double *s,
-                                 const plane_tree *tree, const double *area,
+                                 const plane_tree *tree, const wavelet_roots *roots, const double *area,
                                  const wavelet_inverse_input *inverse, csr *K, lam_error *error) {
     const size_t n = problem->n;
     if (inverse->tile_over != NULL) return LAM_OK;
     double *E = memory_allocate(n, sizeof *E, "operator", error);
     if (E == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < n; i++) E[i] = 1 - (double)problem->reflectance[c * n + i] * s[i];
-    const lam_status status = wavelet_impose_answer(inverse->basis, tree->order, area, E, s,
+    const lam_status status = wavelet_impose_answer(inverse->basis, roots, tree->order, area, E, s,
                                                     inverse->threshold, inverse->weight, K, error);
     free(E);
     return status;
@@ -189,6 +189,7 @@ typedef struct expansion {
     const build_problem *problem;
     const plane_tree *tree;
     const wavelets *basis;
+    const wavelet_roots *roots;
     const float *weight; /* [n_nodes] */
     const double *area;  /* [n], by position */
     float threshold;     /* of S */
@@ -222,8 +223,8 @@ static lam_status expand_rows(const expansion *x, double *sums, const double **r
         goto done;
     }
     TRY(stream->close(stream->context, row_sums, error));
-    TRY(wavelet_impose_row_sums(x->basis, x->tree->order, x->area, *row_sums, x->threshold, x->weight, S,
-                                error));
+    TRY(wavelet_impose_row_sums(x->basis, x->roots, x->tree->order, x->area, *row_sums, x->threshold,
+                                x->weight, S, error));
 done:
     return status;
 }
@@ -246,7 +247,8 @@ static lam_status expand_blocks(const expansion *x, double *sums, csr *S, lam_er
     TRY(block_factors_multiply(f, 1, ones, product, error));
     for (size_t p = 0; p < f->n; p++) sums[f->order[p]] = product[p];
     TRY(wavelet_blocks(&input, S, error));
-    TRY(wavelet_impose_row_sums(x->basis, x->tree->order, x->area, sums, x->threshold, x->weight, S, error));
+    TRY(wavelet_impose_row_sums(x->basis, x->roots, x->tree->order, x->area, sums, x->threshold, x->weight, S,
+                                error));
 done:
     free(ones);
     free(product);
@@ -290,6 +292,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
     hierarchical_arrays arrays = {.K = memory_allocate(C, sizeof *arrays.K, "operator", error)};
     wavelet_inverse_report inverted = {.doublings = 0};
     wavelet_importance important = {.times = NULL};
+    wavelet_roots roots = {.count = 0};
     csr S = {.n = 0};
     lam_operator *made = NULL;
     float *weight = NULL, *rho = memory_allocate(n, sizeof *rho, "operator", error);
@@ -300,8 +303,8 @@ static lam_status build(const build_problem *problem, const build_options *optio
     bool corrected = false;
     if (arrays.K == NULL || rho == NULL || area == NULL || sums == NULL) TRY(LAM_ERR_MEMORY);
     if (problem->blocks == NULL) {
-        TRY(plane_tree_make(n, problem->centre, problem->normal, problem->corners, PLANE_LEAF, &made_tree,
-                            error));
+        TRY(wavelet_tree_make(n, problem->F, problem->stream != NULL ? problem->stream->part : NULL,
+                              problem->centre, problem->normal, problem->corners, &made_tree, error));
         planes = share_of_planes((double)n, (double)tree->n_frames);
     }
     TRY(threshold_share(problem, planes, &of_epsilon, error));
@@ -312,6 +315,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
     const double least = noise * planes * share_of_noise * problem->noise;
     const double threshold = fmax(noise * of_epsilon * epsilon, least);
     TRY(wavelet_basis_make(tree, problem->area, problem->centre, &arrays.basis, error));
+    TRY(wavelet_roots_make(tree, &arrays.basis, &roots, error));
     TRY(wavelets_weights(&arrays.basis, &weight, error));
     if (problem->importance != NULL)
         TRY(wavelet_importance_make(problem->importance, problem->area, tree, weight, &important, error));
@@ -320,6 +324,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
     const expansion x = {.problem = problem,
                          .tree = tree,
                          .basis = &arrays.basis,
+                         .roots = &roots,
                          .weight = weight,
                          .area = area,
                          .threshold = (float)threshold * (threshold > least ? share->of_S : 1),
@@ -347,22 +352,24 @@ static lam_status build(const build_problem *problem, const build_options *optio
                                                .n_threads = n_threads,
                                                .progress = options->progress};
         TRY(wavelet_inverse(&inverse, &arrays.K[c], &inverted, error));
-        TRY(impose_uniform(problem, c, row_sums, tree, area, &inverse, &arrays.K[c], error));
+        TRY(impose_uniform(problem, c, row_sums, tree, &roots, area, &inverse, &arrays.K[c], error));
         entries += (double)arrays.K[c].indptr[n];
     }
     const size_t n_shapes = arrays.basis.n_shapes, n_nodes = arrays.basis.n_nodes;
     TRY(operator_hierarchical_create(n, C, problem->reflectance, area, tree->order, &arrays, &made, error));
     lam_operator_set_threads(made, n_threads);
-    TRY(correct_mean(problem, row_sums, epsilon, tree->order, made, &corrected, error));
+    /* Light in proportion to the mean of all parts would not stay in its own. */
+    if (roots.count == 1) TRY(correct_mean(problem, row_sums, epsilon, tree->order, made, &corrected, error));
     report_number(report, "threshold", threshold);
     report->by_noise = !(threshold > least);
     report_step_add(report, "invert", clock_seconds() - expanded);
     snprintf(
         report->detail, sizeof report->detail,
         "threshold %.2g by %s, %.3g stored coefficients per element (%.3g of S), %zu planes, %zu clusters "
-        "of %zu shapes%s",
+        "of %zu shapes, %zu part%s%s",
         threshold, threshold > least ? "--epsilon" : "the noise of the rays", entries / (double)(n * C),
-        numbers_of_S / (double)n, tree->n_frames, n_nodes, n_shapes,
+        numbers_of_S / (double)n, tree->n_frames, n_nodes, n_shapes, roots.count,
+        roots.count == 1 ? "" : "s that exchange no light",
         corrected ? "; the mean error of uniform emission is corrected" : "");
     TRY(self_check(problem, row_sums, made, options->seed, report, error));
     *op = made;
@@ -373,6 +380,7 @@ done:
     hierarchical_arrays_free(&arrays, C);
     plane_tree_free(&made_tree);
     wavelet_importance_free(&important);
+    wavelet_roots_free(&roots);
     free(weight);
     free(rho);
     free(area);

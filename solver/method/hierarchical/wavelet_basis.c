@@ -1,12 +1,40 @@
 #include "solver/method/hierarchical/wavelet_basis.h"
 
 #include "solver/base/array_grow.h"
+#include "solver/linalg/csr_parts.h"
 
 #include "store/status.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+lam_status wavelet_tree_make(size_t n, const csr *F, const uint32_t *part, const double (*centre)[3],
+                             const float (*normal)[3], const element_corners *corners, plane_tree *out,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t n_parts = 0;
+    uint32_t *joined = NULL, *elements = NULL; /* of each part */
+    if (F != NULL) {
+        joined = memory_allocate(n, sizeof *joined, "clusters", error);
+        elements = memory_allocate(n, sizeof *elements, "clusters", error);
+        if (joined == NULL || elements == NULL) TRY(LAM_ERR_MEMORY);
+        csr_parts(F, joined, &n_parts);
+        for (size_t i = 0; i < n; i++) elements[joined[i]]++;
+        for (size_t i = 0; i < n; i++)
+            if (elements[joined[i]] == 1) joined[i] = (uint32_t)n_parts;
+    }
+    /* One part has the order of a tree that knows of none. */
+    TRY(plane_tree_make(n, centre, normal, corners,
+                        F == NULL     ? part
+                        : n_parts > 1 ? joined
+                                      : NULL,
+                        PLANE_LEAF, out, error));
+done:
+    free(joined);
+    free(elements);
+    return status;
+}
 
 /* Moments of a function: its products with A^1/2 times 1, u, v, u^2, uv, v^2, u and v being coordinates in
  * the plane. */
@@ -122,6 +150,14 @@ static size_t make_square(size_t inputs, const moments *M, bool linear, square *
     return scaling;
 }
 
+/* The matrix of a node whose children are apart, a permutation: the constant of the left one is its scaling
+ * function, the constant of the right one its last coefficient. */
+static void make_apart(size_t inputs, size_t from_left, square *Q) {
+    *Q = (square){.at = {{1}}};
+    for (size_t row = 1; row + 1 < inputs; row++) Q->at[row][row < from_left ? row : row + 1] = 1;
+    Q->at[inputs - 1][from_left] = 1;
+}
+
 typedef struct shape_table {
     wavelet_shape *shapes;
     float *basis;
@@ -227,7 +263,9 @@ lam_status wavelet_basis_make(const plane_tree *tree, const double *area, const 
         square Q;
         const bool linear = tree->clusters[t].frame != PLANE_ABOVE;
         const size_t inputs = gather_inputs(tree, t, area, centre, up, &M);
-        const size_t scaling = make_square(inputs, &M, linear, &Q);
+        const bool apart = tree->clusters[t].apart;
+        if (apart) make_apart(inputs, up[tree->clusters[t].left].scaling, &Q);
+        const size_t scaling = apart ? 1 : make_square(inputs, &M, linear, &Q);
         const wavelet_shape shape = {tree->clusters[t].leaf, (uint32_t)inputs, (uint32_t)scaling};
         TRY(find_shape(&table, &shape, &Q, &node_shapes[t], error));
         up[t].scaling = scaling;
@@ -249,5 +287,41 @@ done:
     free(table.slots);
     free(up);
     free(node_shapes);
+    return status;
+}
+
+void wavelet_roots_free(wavelet_roots *r) {
+    free(r->of_node);
+    free(r->of_coefficient);
+    *r = (wavelet_roots){.count = 0};
+}
+
+lam_status wavelet_roots_make(const plane_tree *tree, const wavelets *basis, wavelet_roots *out,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = basis->n, last = basis->n_nodes - 1;
+    wavelet_roots r = {.of_node = memory_allocate(basis->n_nodes, sizeof *r.of_node, "wavelets", error),
+                       .of_coefficient = memory_allocate(n, sizeof *r.of_coefficient, "wavelets", error),
+                       .count = 1};
+    if (r.of_node == NULL || r.of_coefficient == NULL) TRY(LAM_ERR_MEMORY);
+    r.of_node[last] = basis->nodes[last].scaling == 1 ? (uint32_t)n - 1 : WAVELET_NONE;
+    for (size_t k = n - basis->nodes[last].scaling; k < n; k++) r.of_coefficient[k] = r.of_node[last];
+    for (size_t t = basis->n_nodes; t-- > 0;) {
+        const wavelet_node *a = &basis->nodes[t];
+        const uint32_t end = a->first + a->inputs - a->scaling;
+        const bool apart = tree->clusters[t].apart;
+        const uint32_t root = r.of_node[t], right = apart ? end - 1 : root;
+        for (uint32_t k = a->first; k < end; k++)
+            r.of_coefficient[k] = k < a->first + a->from_left - apart ? root : right;
+        if (a->from_left > 0) {
+            r.of_node[a->left] = root;
+            r.of_node[t - 1] = right;
+        }
+        r.count += apart;
+    }
+    *out = r;
+    r = (wavelet_roots){.count = 0};
+done:
+    wavelet_roots_free(&r);
     return status;
 }

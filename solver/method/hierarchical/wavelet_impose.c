@@ -25,41 +25,71 @@ done:
     return status;
 }
 
-/* Leaves out of y [n] the entries but for the root's that are not above threshold weight_i weight_root;
- * those that A has in its last column stay where `kept` is true. */
-static void drop_small(const wavelets *w, float threshold, const float *weight, const csr *A, bool kept,
-                       double *y) {
+/* out [n] = the weight of each coefficient. Errors: LAM_ERR_MEMORY. */
+static lam_status spread_weights(const wavelets *w, const float *weight, float **out, lam_error *error) {
+    float *made = memory_allocate(w->n, sizeof *made, "wavelets", error);
+    if (made == NULL) return LAM_ERR_MEMORY;
     for (size_t t = 0; t < w->n_nodes; t++) {
         const wavelet_node *a = &w->nodes[t];
-        const double least = (double)(threshold * weight[t] * weight[w->n_nodes - 1]);
-        for (size_t i = a->first; i < a->first + a->inputs - a->scaling; i++) {
-            const uint64_t end = A->indptr[i + 1];
-            const bool has = end > A->indptr[i] && A->indices[end - 1] == A->n - 1;
-            if (!(kept && has) && !(fabs(y[i]) > least)) y[i] = 0;
-        }
+        for (size_t i = a->first; i < a->first + a->inputs - a->scaling; i++) made[i] = weight[t];
     }
+    for (size_t i = w->n - w->nodes[w->n_nodes - 1].scaling; i < w->n; i++) made[i] = weight[w->n_nodes - 1];
+    *out = made;
+    return LAM_OK;
 }
 
-/* Replaces the last column of the upper triangle by y [n] without its zeros. The entry of that column, if a
- * row has it, is the last of the row. */
-static lam_status set_last_column(const double *y, csr *A, lam_error *error) {
+/* The entry of row i in column j; NULL: there is none. */
+static const float *entry_of(const csr *A, size_t i, uint32_t j) {
+    for (uint64_t e = A->indptr[i + 1]; e-- > A->indptr[i] && A->indices[e] >= j;)
+        if (A->indices[e] == j) return &A->data[e];
+    return NULL;
+}
+
+/* Leaves out of y [n] the entries but for the roots' own that are not above threshold weight_i weight_root;
+ * those that A has in the columns of its roots stay where `kept` is true. */
+static lam_status drop_small(const wavelets *w, const uint32_t *root, float threshold, const float *weight,
+                             const csr *A, bool kept, double *y, lam_error *error) {
+    float *by = NULL;
+    if (spread_weights(w, weight, &by, error) != LAM_OK) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < w->n; i++) {
+        const uint32_t r = root[i];
+        if (r == WAVELET_NONE || r == i || (kept && entry_of(A, i, r) != NULL)) continue;
+        if (!(fabs(y[i]) > (double)(threshold * by[i] * by[r]))) y[i] = 0;
+    }
+    free(by);
+    return LAM_OK;
+}
+
+/* Replaces the entries (i, root[i]) of the upper triangle by y [n], zeros left out; rows whose root is
+ * WAVELET_NONE stay as they are. */
+static lam_status set_columns(const uint32_t *root, const double *y, csr *A, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = A->n;
     csr made = {.n = n, .indptr = memory_allocate(n + 1, sizeof *made.indptr, "wavelets", error)};
     if (made.indptr == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < n; i++) {
-        uint64_t end = A->indptr[i + 1];
-        if (end > A->indptr[i] && A->indices[end - 1] == n - 1) end--;
-        made.indptr[i + 1] = made.indptr[i] + (end - A->indptr[i]) + (y[i] != 0);
+        const bool set = root[i] != WAVELET_NONE;
+        made.indptr[i + 1] = made.indptr[i] + (A->indptr[i + 1] - A->indptr[i]) + (set && y[i] != 0) -
+                             (set && entry_of(A, i, root[i]) != NULL);
     }
     TRY(csr_reserve(&made, made.indptr[n], error));
     for (size_t i = 0; i < n; i++) {
-        const uint64_t to = made.indptr[i], last = made.indptr[i + 1], count = last - to - (y[i] != 0);
-        if (count > 0) memcpy(made.indices + to, A->indices + A->indptr[i], count * sizeof *made.indices);
-        if (count > 0) memcpy(made.data + to, A->data + A->indptr[i], count * sizeof *made.data);
-        if (y[i] == 0) continue;
-        made.indices[last - 1] = (uint32_t)(n - 1);
-        made.data[last - 1] = (float)y[i];
+        const uint32_t r = root[i];
+        uint64_t to = made.indptr[i], e = A->indptr[i];
+        for (; e < A->indptr[i + 1] && A->indices[e] < r; e++, to++) {
+            made.indices[to] = A->indices[e];
+            made.data[to] = A->data[e];
+        }
+        if (r == WAVELET_NONE) continue;
+        if (y[i] != 0) {
+            made.indices[to] = r;
+            made.data[to++] = (float)y[i];
+        }
+        for (; e < A->indptr[i + 1]; e++) {
+            if (A->indices[e] == r) continue;
+            made.indices[to] = A->indices[e];
+            made.data[to++] = A->data[e];
+        }
     }
     csr_free(A);
     *A = made;
@@ -69,51 +99,74 @@ done:
     return status;
 }
 
-lam_status wavelet_impose_row_sums(const wavelets *w, const uint32_t *order, const double *area,
-                                   const double *row_sums, float threshold, const float *weight, csr *S,
-                                   lam_error *error) {
+/* v_i -= sum_j A_ij u_j, but for the entry of the root of i. */
+static void subtract_others(const csr *A, const uint32_t *root, const double *u, double *v) {
+    for (size_t i = 0; i < A->n; i++)
+        for (uint64_t e = A->indptr[i]; e < A->indptr[i + 1]; e++) {
+            const uint32_t j = A->indices[e];
+            if (j == root[i]) continue;
+            v[i] -= (double)A->data[e] * u[j];
+            if (j != i) v[j] -= (double)A->data[e] * u[i];
+        }
+}
+
+/* Sets the entries of A in the columns of roots so that A u = v: v [n] is overwritten. Parts in which u_r of
+ * the root r is not above 0 stay as they are. */
+static lam_status impose(const wavelets *w, const wavelet_roots *roots, const double *u, float threshold,
+                         const float *weight, bool kept, double *v, csr *A, lam_error *error) {
     lam_status status = LAM_OK;
-    double length = 0, *y = NULL;
-    if (w->nodes[w->n_nodes - 1].scaling != 1) goto done;
-    TRY(transform(w, order, area, row_sums, &y, error));
-    for (size_t p = 0; p < w->n; p++) length += area[p];
-    for (size_t i = 0; i < w->n; i++) y[i] /= sqrt(length);
-    drop_small(w, threshold, weight, S, false, y);
-    TRY(set_last_column(y, S, error));
+    uint32_t *root = memory_allocate(w->n, sizeof *root, "wavelets", error);
+    if (root == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < w->n; i++) {
+        const uint32_t r = roots->of_coefficient[i];
+        root[i] = u[r] > 0 ? r : WAVELET_NONE;
+    }
+    subtract_others(A, root, u, v);
+    for (size_t i = 0; i < w->n; i++)
+        if (root[i] != WAVELET_NONE && root[i] != i) v[i] /= u[root[i]];
+    TRY(drop_small(w, root, threshold, weight, A, kept, v, error));
+    for (size_t i = 0; i < w->n; i++)
+        if (root[i] != WAVELET_NONE && root[i] != i) v[root[i]] -= (double)(float)v[i] * u[i];
+    for (size_t i = 0; i < w->n; i++)
+        if (root[i] == i) v[i] /= u[i];
+    TRY(set_columns(root, v, A, error));
 done:
-    free(y);
+    free(root);
     return status;
 }
 
-/* y = v - sum_{j != r} K_ij u_j of the rows i != r, r = n - 1, over u_r. */
-static void answer_left(const csr *K, const double *u, double *v) {
-    const size_t r = K->n - 1;
-    for (size_t i = 0; i < r; i++)
-        for (uint64_t e = K->indptr[i]; e < K->indptr[i + 1] && K->indices[e] != r; e++) {
-            const uint32_t j = K->indices[e];
-            v[i] -= (double)K->data[e] * u[j];
-            if (j != i) v[j] -= (double)K->data[e] * u[i];
-        }
-    for (size_t i = 0; i < r; i++) v[i] /= u[r];
-}
-
-lam_status wavelet_impose_answer(const wavelets *w, const uint32_t *order, const double *area,
-                                 const double *E, const double *H, float threshold, const float *weight,
-                                 csr *K, lam_error *error) {
+lam_status wavelet_impose_row_sums(const wavelets *w, const wavelet_roots *roots, const uint32_t *order,
+                                   const double *area, const double *row_sums, float threshold,
+                                   const float *weight, csr *S, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t r = w->n - 1;
-    double *u = NULL, *y = NULL;
-    if (w->nodes[w->n_nodes - 1].scaling != 1) goto done;
-    TRY(transform(w, order, area, E, &u, error));
-    if (!(u[r] > 0)) goto done;
-    TRY(transform(w, order, area, H, &y, error));
-    answer_left(K, u, y);
-    drop_small(w, threshold, weight, K, true, y);
-    for (size_t i = 0; i < r; i++) y[r] -= (double)(float)y[i] * u[i];
-    y[r] /= u[r];
-    TRY(set_last_column(y, K, error));
+    double *v = NULL, *u = memory_allocate(w->n, sizeof *u, "wavelets", error); /* W A^1/2 1 */
+    if (u == NULL) return LAM_ERR_MEMORY;
+    if (roots->of_coefficient[w->n - 1] == WAVELET_NONE) goto done;
+    TRY(transform(w, order, area, row_sums, &v, error));
+    for (size_t t = 0; t < w->n_nodes; t++) {
+        const wavelet_node *a = &w->nodes[t];
+        if (a->from_left > 0) continue;
+        for (size_t p = a->begin; p < a->begin + a->n_elements; p++) u[roots->of_node[t]] += area[p];
+    }
+    for (size_t i = 0; i < w->n; i++) u[i] = sqrt(u[i]);
+    TRY(impose(w, roots, u, threshold, weight, false, v, S, error));
 done:
     free(u);
-    free(y);
+    free(v);
+    return status;
+}
+
+lam_status wavelet_impose_answer(const wavelets *w, const wavelet_roots *roots, const uint32_t *order,
+                                 const double *area, const double *E, const double *H, float threshold,
+                                 const float *weight, csr *K, lam_error *error) {
+    lam_status status = LAM_OK;
+    double *u = NULL, *v = NULL;
+    if (roots->of_coefficient[w->n - 1] == WAVELET_NONE) goto done;
+    TRY(transform(w, order, area, E, &u, error));
+    TRY(transform(w, order, area, H, &v, error));
+    TRY(impose(w, roots, u, threshold, weight, true, v, K, error));
+done:
+    free(u);
+    free(v);
     return status;
 }

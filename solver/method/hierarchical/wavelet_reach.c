@@ -170,6 +170,8 @@ lam_status wavelet_reach_make(const wavelets *basis, const plane_tree *tree, con
             }
         }
         r.extent[t] = extent_of(&around[t], a, r.height[t], frame == PLANE_ABOVE ? INFINITY : radii);
+        /* No closed form holds for functions of one of its children alone: it is near everything. */
+        if (tree->clusters[t].apart) r.extent[t].radius = INFINITY;
         transform_products(w, t, P, a->from_left == 0 ? (const double(*)[LINEAR])leaf : NULL, &P[t]);
         r.affine[t] = affine_of(a->scaling, &P[t], frame != PLANE_ABOVE);
     }

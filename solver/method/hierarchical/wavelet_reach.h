@@ -42,6 +42,7 @@ typedef struct wavelet_reach {
 /* area, centre [n], by element; tree: of the basis. The reach of a node in one plane is `radii` times its
  * radius: its wavelets are orthogonal to the linear functions, and irradiance from far away is nearly linear
  * there. A node above planes has wavelets of constants only, and normals that differ: everything is near it.
+ * One whose children are apart is near everything, too, so that it is no cell.
  * A node has three scaling functions at most. Freed with wavelet_reach_free. Errors: LAM_ERR_MEMORY,
  * LAM_ERR_ARGUMENT. */
 lam_status wavelet_reach_make(const wavelets *basis, const plane_tree *tree, const double *area,

@@ -10,6 +10,8 @@
 
 /* In place of the left child of a leaf. */
 #define NO_CHILD UINT32_MAX
+/* In place of PLANE_ABOVE: of several parts of the scene. */
+#define PARTS_APART (UINT32_MAX - 1)
 
 enum { CLUSTER_NUMBERS = 4, FRAME_NUMBERS = 9 };
 
@@ -30,7 +32,8 @@ static void pack_tree(const block_factors *f, uint32_t (*clusters)[CLUSTER_NUMBE
     for (size_t t = 0; t < tree->n_clusters; t++) {
         const plane_cluster *c = &tree->clusters[t];
         const block_node *node = &f->nodes[t];
-        const uint32_t one[] = {c->begin, c->end, c->leaf ? NO_CHILD : c->left, c->frame};
+        const uint32_t one[] = {c->begin, c->end, c->leaf ? NO_CHILD : c->left,
+                                c->apart ? PARTS_APART : c->frame};
         const double rectangle[] = {node->centre[0], node->centre[1], node->over[0], node->over[1]};
         memcpy(clusters[t], one, sizeof one);
         memcpy(rectangles[t], rectangle, sizeof rectangle);
@@ -207,7 +210,8 @@ static lam_status read_tree(store *s, plane_tree *tree, lam_error *error) {
                                             .end = c[1],
                                             .left = c[2] == NO_CHILD ? 0 : c[2],
                                             .leaf = c[2] == NO_CHILD,
-                                            .frame = c[3]};
+                                            .apart = c[3] == PARTS_APART,
+                                            .frame = c[3] == PARTS_APART ? PLANE_ABOVE : c[3]};
     }
     for (size_t k = 0; k < tree->n_frames; k++) {
         const double *f = (const double *)frames + FRAME_NUMBERS * k;

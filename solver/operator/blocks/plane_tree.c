@@ -2,6 +2,7 @@
 
 #include "solver/base/array_sort.h"
 #include "solver/base/vector3.h"
+#include "solver/operator/blocks/plane_order.h"
 #include "solver/operator/blocks/plane_walls.h"
 #include "store/status.h"
 
@@ -12,8 +13,6 @@
 /* Elements of one plane: normals differ by at most this in each coordinate, offsets by this share of the
  * extent of the scene. */
 static const double same_normal = 2e-3, same_plane = 1e-4;
-/* A difference of normals of 1 counts as this share of the extent of the planes that are split. */
-static const double facing_weight = .35;
 /* A gap counts as wide if it is at least this share of the widest one near the middle of a cluster. */
 static const double wide_gap = .6;
 /* A wall parts a cluster where it covers at least this share of its line within the cluster, and leaves at
@@ -31,6 +30,7 @@ typedef struct key {
 typedef struct maker {
     const double (*centre)[3];
     const float (*normal)[3];
+    const uint32_t *part; /* [n], or NULL */
     size_t leaf_most;
     double extent;
     key *keys;           /* [n] */
@@ -127,6 +127,28 @@ static void split_planes(maker *k, size_t begin, size_t end, int level, double s
         split_planes(k, first, last, level + 1, step);
         first = last;
     }
+}
+
+/* Splits planes by the parts of the scene that their elements belong to. */
+static lam_status split_by_parts(maker *k, lam_error *error) {
+    const size_t n_planes = k->n_groups;
+    uint32_t *plane_end = memory_allocate(n_planes, sizeof *plane_end, "clusters", error);
+    if (plane_end == NULL) return LAM_ERR_MEMORY;
+    memcpy(plane_end, k->group_end, n_planes * sizeof *plane_end);
+    k->n_groups = 0;
+    for (size_t g = 0, begin = 0; g < n_planes; begin = plane_end[g++]) {
+        const size_t end = plane_end[g];
+        for (size_t p = begin; p < end; p++) {
+            const uint32_t i = k->tree->order[p];
+            k->keys[p] = (key){(double)k->part[i], i};
+        }
+        sort_by_keys(k, begin, end);
+        for (size_t p = begin + 1; p <= end; p++)
+            if (p == end || k->part[k->tree->order[p]] != k->part[k->tree->order[p - 1]])
+                k->group_end[k->n_groups++] = (uint32_t)p;
+    }
+    free(plane_end);
+    return LAM_OK;
 }
 
 static uint32_t add_cluster(maker *k, plane_cluster made) {
@@ -297,45 +319,8 @@ static void set_frame(maker *k, size_t begin, size_t end, plane_frame *f) {
         for (int d = 0; d < 3; d++) f->origin[d] += k->centre[k->tree->order[p]][d] / (double)(end - begin);
 }
 
-/* A plane: its range of positions, its mean centre and its mean normal. */
-typedef struct plane_place {
-    uint32_t begin, end;
-    double at[6];
-} plane_place;
-
-typedef struct plane_key {
-    double value;
-    plane_place place;
-} plane_key;
-
-static int by_plane(const void *left, const void *right) {
-    const plane_key *a = left, *b = right;
-    if (a->value != b->value) return a->value < b->value ? -1 : 1;
-    return a->place.begin < b->place.begin ? -1 : a->place.begin > b->place.begin;
-}
-
-/* Sorts planes into tree order: along the coordinate of centre or normal in which they differ most, then each
- * half. */
-static void order_planes(plane_key *planes, size_t count) {
-    double low[6], high[6], size = 0;
-    int longest = 0;
-    if (count < 2) return;
-    for (int d = 0; d < 6; d++) low[d] = INFINITY, high[d] = -INFINITY;
-    for (size_t g = 0; g < count; g++)
-        for (int d = 0; d < 6; d++) {
-            low[d] = fmin(low[d], planes[g].place.at[d]);
-            high[d] = fmax(high[d], planes[g].place.at[d]);
-        }
-    for (int d = 0; d < 3; d++) size = fmax(size, high[d] - low[d]);
-    for (int d = 0; d < 6; d++) {
-        const double here = (high[d] - low[d]) * (d < 3 ? 1 : facing_weight * size);
-        const double best = (high[longest] - low[longest]) * (longest < 3 ? 1 : facing_weight * size);
-        if (here > best) longest = d;
-    }
-    for (size_t g = 0; g < count; g++) planes[g].value = planes[g].place.at[longest];
-    qsort(planes, count, sizeof *planes, by_plane);
-    order_planes(planes, count / 2);
-    order_planes(planes + count / 2, count - count / 2);
+static uint32_t part_of(const maker *k, size_t position) {
+    return k->part != NULL ? k->part[k->tree->order[position]] : 0;
 }
 
 /* The clusters of each plane, numbered from 0, from cluster 2 begins[g] on; counts [n_groups] gets their
@@ -377,16 +362,41 @@ static uint32_t join_planes(maker *k, const uint32_t *begins, const uint32_t *co
     return add_cluster(k, made);
 }
 
+/* The parts whose planes begin at ends[first] and end at ends[last], halved; returns the topmost cluster. */
+static uint32_t join_parts(maker *k, const uint32_t *begins, const uint32_t *counts, const uint32_t *ends,
+                           size_t first, size_t last) {
+    if (last - first == 1) return join_planes(k, begins, counts, ends[first], ends[last]);
+    const size_t middle = first + (last - first) / 2;
+    plane_cluster made = {
+        .begin = begins[ends[first]], .end = begins[ends[last]], .apart = true, .frame = PLANE_ABOVE};
+    made.left = join_parts(k, begins, counts, ends, first, middle);
+    (void)join_parts(k, begins, counts, ends, middle, last);
+    return add_cluster(k, made);
+}
+
+/* Joins all planes. */
+static lam_status join_all(maker *k, const uint32_t *begins, const uint32_t *counts, lam_error *error) {
+    size_t n_parts = 0;
+    uint32_t *ends = memory_allocate(k->n_groups + 1, sizeof *ends, "clusters", error); /* ends[0] = 0 */
+    if (ends == NULL) return LAM_ERR_MEMORY;
+    for (size_t g = 1; g <= k->n_groups; g++)
+        if (g == k->n_groups || part_of(k, begins[g]) != part_of(k, begins[g - 1]))
+            ends[++n_parts] = (uint32_t)g;
+    (void)join_parts(k, begins, counts, ends, 0, n_parts);
+    free(ends);
+    return LAM_OK;
+}
+
 /* Brings planes and their elements into tree order; begins [n_groups + 1] gets the first position of each. */
 static lam_status place_planes(maker *k, uint32_t *begins, lam_error *error) {
     lam_status status = LAM_OK;
     plane_tree *tree = k->tree;
-    plane_key *planes = memory_allocate(k->n_groups, sizeof *planes, "clusters", error);
+    plane_place *planes = memory_allocate(k->n_groups, sizeof *planes, "clusters", error);
     uint32_t *order = memory_allocate(tree->n, sizeof *order, "clusters", error);
     if (planes == NULL || order == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t g = 0, begin = 0; g < k->n_groups; g++) {
-        plane_place *place = &planes[g].place;
-        *place = (plane_place){.begin = (uint32_t)begin, .end = k->group_end[g]};
+        plane_place *place = &planes[g];
+        *place = (plane_place){.begin = (uint32_t)begin, .end = k->group_end[g], .part = part_of(k, begin)};
         for (size_t p = begin; p < place->end; p++)
             for (int d = 0; d < 3; d++) {
                 const double share = 1 / (double)(place->end - begin);
@@ -395,12 +405,12 @@ static lam_status place_planes(maker *k, uint32_t *begins, lam_error *error) {
             }
         begin = place->end;
     }
-    order_planes(planes, k->n_groups);
+    plane_order(planes, k->n_groups);
     size_t used = 0;
     for (size_t g = 0; g < k->n_groups; g++) {
-        const size_t count = planes[g].place.end - planes[g].place.begin;
+        const size_t count = planes[g].end - planes[g].begin;
         begins[g] = (uint32_t)used;
-        memcpy(order + used, tree->order + planes[g].place.begin, count * sizeof *order);
+        memcpy(order + used, tree->order + planes[g].begin, count * sizeof *order);
         used += count;
     }
     begins[k->n_groups] = (uint32_t)used;
@@ -447,11 +457,11 @@ done:
 }
 
 lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*normal)[3],
-                           const element_corners *corners, size_t leaf_most, plane_tree *out,
-                           lam_error *error) {
+                           const element_corners *corners, const uint32_t *part, size_t leaf_most,
+                           plane_tree *out, lam_error *error) {
     lam_status status = LAM_OK;
     plane_tree tree = {.n = n};
-    maker k = {.centre = centre, .normal = normal, .leaf_most = leaf_most, .tree = &tree};
+    maker k = {.centre = centre, .normal = normal, .part = part, .leaf_most = leaf_most, .tree = &tree};
     uint32_t *begins = NULL, *counts = NULL;
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     tree.order = memory_allocate(n, sizeof *tree.order, "clusters", error);
@@ -469,6 +479,7 @@ lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*no
     }
     for (int d = 0; d < 3; d++) k.extent = fmax(k.extent, high[d] - low[d]);
     split_planes(&k, 0, n, 0, 1);
+    if (part != NULL) TRY(split_by_parts(&k, error));
     TRY(make_frames(&k, &begins, error));
     if (corners != NULL) {
         TRY(part_planes(&k, begins, corners, error));
@@ -477,7 +488,7 @@ lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*no
     counts = memory_allocate(k.n_groups, sizeof *counts, "clusters", error);
     if (counts == NULL) TRY(LAM_ERR_MEMORY);
     split_all(&k, begins, counts);
-    (void)join_planes(&k, begins, counts, 0, k.n_groups);
+    TRY(join_all(&k, begins, counts, error));
     *out = tree;
     tree = (plane_tree){.n = 0};
 done:

@@ -1,6 +1,6 @@
 /* A binary tree of clusters over the elements of a mesh. Elements in one plane are parted where walls stand
  * on it, and halved across their longer side down to a few elements a leaf; above, planes are joined by
- * position and normal. */
+ * position and normal, and last of all parts of the scene that exchange no light. */
 #ifndef LAMBERT_OPERATOR_BLOCKS_PLANE_TREE_H
 #define LAMBERT_OPERATOR_BLOCKS_PLANE_TREE_H
 
@@ -18,8 +18,8 @@ typedef struct plane_frame {
 /* Positions [begin, end). Children stand before their parent, the right one directly before it. */
 typedef struct plane_cluster {
     uint32_t begin, end, left;
-    bool leaf;
-    uint32_t frame; /* the frame of its plane; PLANE_ABOVE: several planes */
+    bool leaf, apart; /* apart: its children are of different parts of the scene */
+    uint32_t frame;   /* the frame of its plane; PLANE_ABOVE: several planes */
 } plane_cluster;
 
 #define PLANE_ABOVE UINT32_MAX
@@ -48,9 +48,10 @@ typedef struct element_corners {
 void plane_tree_free(plane_tree *tree);
 
 /* centre [n], unit normal [n]; a leaf has at most leaf_most elements. corners NULL: walls are not looked for.
+ * part [n]: clusters that are not apart have elements of one number; NULL: all are of one part.
  * Deterministic. Cost: O(n log n). Errors: LAM_ERR_MEMORY. */
 lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*normal)[3],
-                           const element_corners *corners, size_t leaf_most, plane_tree *out,
-                           lam_error *error);
+                           const element_corners *corners, const uint32_t *part, size_t leaf_most,
+                           plane_tree *out, lam_error *error);
 
 #endif

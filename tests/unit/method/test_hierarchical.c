@@ -204,7 +204,7 @@ END_TEST
  * method makes for rows, whose leaves are larger. */
 static block_factors blocks_of(const build_problem *problem, plane_tree *tree) {
     block_factors f;
-    ck_ok(plane_tree_make(problem->n, problem->centre, problem->normal, NULL, 4, tree, &error));
+    ck_ok(plane_tree_make(problem->n, problem->centre, problem->normal, NULL, NULL, 4, tree, &error));
     ck_ok(block_factors_begin(tree, problem->area, problem->centre, &f, &error));
     blocks_of_pairs(problem->F, &f);
     ck_ok(block_factors_end(&f, &error));

@@ -170,7 +170,7 @@ START_TEST(the_smallest_tree) {
     subject s = {.W = NULL};
     block_factors f;
     csr none, S;
-    ck_ok(plane_tree_make(2, centre, normal, NULL, 6, &s.tree, &error));
+    ck_ok(plane_tree_make(2, centre, normal, NULL, NULL, 6, &s.tree, &error));
     ck_ok(wavelet_basis_make(&s.tree, area, centre, &s.basis, &error));
     ck_ok(block_factors_begin(&s.tree, area, centre, &f, &error));
     ck_ok(block_factors_end(&f, &error));

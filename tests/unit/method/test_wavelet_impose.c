@@ -31,7 +31,8 @@ static sample sample_make(int which) {
     for (size_t p = 0; p < n; p++) a.area[p] = a.s.m.area[a.s.tree.order[p]];
     for (size_t i = 0; i < n; i++) a.H[i] = random_lcg_unit(&seed);
     /* The root's row of a closed scene has one entry alone. */
-    ck_ok(wavelet_impose_row_sums(&a.s.basis, a.s.tree.order, a.area, a.H, .04f, a.weight, &a.K, &error));
+    ck_ok(wavelet_impose_row_sums(&a.s.basis, &a.s.roots, a.s.tree.order, a.area, a.H, .04f, a.weight, &a.K,
+                                  &error));
     for (size_t i = 0; i < n; i++) a.E[i] = .5 + random_lcg_unit(&seed);
     for (size_t i = 0; i < n; i++) a.H[i] = random_lcg_unit(&seed);
     for (size_t i = 0; i < n; i++)
@@ -60,8 +61,8 @@ static double *imposed(const sample *a, float threshold) {
     ck_ok(csr_reserve(&K, K.indptr[a->n], &error));
     memcpy(K.indices, a->K.indices, K.indptr[a->n] * sizeof *K.indices);
     memcpy(K.data, a->K.data, K.indptr[a->n] * sizeof *K.data);
-    ck_ok(wavelet_impose_answer(&a->s.basis, a->s.tree.order, a->area, a->E, a->H, threshold, a->weight, &K,
-                                &error));
+    ck_ok(wavelet_impose_answer(&a->s.basis, &a->s.roots, a->s.tree.order, a->area, a->E, a->H, threshold,
+                                a->weight, &K, &error));
     double *out = whole(&K);
     csr_free(&K);
     return out;
@@ -77,14 +78,15 @@ static double row_left(const sample *a, const double *K, size_t i) {
     return fabs(left) / size;
 }
 
-/* Every row has its irradiance, and nothing but the last row and column is another. Numbers of K are rounded
- * once to floats, and W of the test is known as well as a transform in float. */
+/* Every row has its irradiance, and nothing but the roots' entries of their own parts is another. Numbers of
+ * K are rounded once to floats, and W of the test is known as well as a transform in float. */
 START_TEST(an_answer_is_imposed) {
     sample a = sample_make(_i);
     const size_t n = a.n;
     double *before = whole(&a.K), *after = imposed(&a, 0);
+    const uint32_t *root = a.s.roots.of_coefficient;
     for (size_t k = 0; k < n * n; k++)
-        if (k % n != n - 1 && k / n != n - 1) ck_assert(after[k] == before[k]);
+        if (k % n != root[k / n] && k / n != root[k % n]) ck_assert(after[k] == before[k]);
     double off = 0;
     for (size_t i = 0; i < n; i++) {
         ck_assert_double_lt(row_left(&a, after, i), TRANSFORM_U);
@@ -97,21 +99,29 @@ START_TEST(an_answer_is_imposed) {
 }
 END_TEST
 
-/* Entries that K has stay, others where they are above the threshold, and the root's own is right beside
+/* Entries that K has stay, others where they are above the threshold, and the roots' own are right beside
  * those that are left. */
 START_TEST(small_entries_are_left_out) {
     sample a = sample_make(_i);
-    const size_t n = a.n, r = n - 1;
+    const size_t n = a.n;
+    const uint32_t *root = a.s.roots.of_coefficient;
     const wavelets *const w = &a.s.basis;
     const float threshold = .03f;
-    double *least = test_allocate(n, sizeof *least);
+    float *of = test_allocate(n, sizeof *of);
+    of[n - 1] = a.weight[w->n_nodes - 1];
     for (size_t t = 0; t < w->n_nodes; t++)
         for (size_t k = 0; k < w->nodes[t].inputs - w->nodes[t].scaling; k++)
-            least[w->nodes[t].first + k] = (double)(threshold * a.weight[t] * a.weight[w->n_nodes - 1]);
+            of[w->nodes[t].first + k] = a.weight[t];
     double *before = whole(&a.K), *all = imposed(&a, 0), *some = imposed(&a, threshold);
     size_t stayed = 0, added = 0, dropped = 0;
-    for (size_t i = 0; i < r; i++) {
-        const bool had = before[i * n + r] != 0, large = fabs(all[i * n + r]) > least[i];
+    for (size_t i = 0; i < n; i++) {
+        const size_t r = root[i];
+        if (r == i) {
+            ck_assert_double_lt(row_left(&a, some, r), TRANSFORM_U);
+            continue;
+        }
+        const double least = (double)(threshold * of[i] * of[r]);
+        const bool had = before[i * n + r] != 0, large = fabs(all[i * n + r]) > least;
         ck_assert(some[i * n + r] == (had || large ? all[i * n + r] : 0));
         stayed += had;
         added += !had && large;
@@ -120,8 +130,7 @@ START_TEST(small_entries_are_left_out) {
     ck_assert_uint_gt(stayed, 0);
     ck_assert_uint_gt(added, 0);
     ck_assert_uint_gt(dropped, 0);
-    ck_assert_double_lt(row_left(&a, some, r), TRANSFORM_U);
-    free(least);
+    free(of);
     free(before);
     free(all);
     free(some);
@@ -217,7 +226,7 @@ static void check_furnace(const build_problem *rows, double s) {
     block_factors blocks;
     double mean;
     build_report report;
-    ck_ok(plane_tree_make(rows->n, rows->centre, rows->normal, NULL, 4, &tree, &error));
+    ck_ok(plane_tree_make(rows->n, rows->centre, rows->normal, NULL, NULL, 4, &tree, &error));
     ck_ok(block_factors_begin(&tree, rows->area, rows->centre, &blocks, &error));
     blocks_of_pairs(rows->F, &blocks);
     ck_ok(block_factors_end(&blocks, &error));
@@ -275,13 +284,46 @@ START_TEST(black_elements) {
 }
 END_TEST
 
+/* Row sums are imposed on the roots of all parts: S of a part's constant, and of others where F joins them.
+ */
+START_TEST(row_sums_are_imposed_on_parts) {
+    sample a = sample_make(PARTED + _i);
+    const size_t n = a.n;
+    const double *W = dense_W(&a.s);
+    double *S = NULL, *v = test_allocate(n, sizeof *v), *u = test_allocate(n, sizeof *u);
+    for (size_t i = 0; i < n; i++)
+        for (size_t p = 0; p < n; p++) {
+            u[i] += W[i * n + p] * sqrt(a.area[p]);
+            v[i] += W[i * n + p] * sqrt(a.area[p]) * a.H[a.s.tree.order[p]];
+        }
+    ck_ok(wavelet_impose_row_sums(&a.s.basis, &a.s.roots, a.s.tree.order, a.area, a.H, 0, a.weight, &a.K,
+                                  &error));
+    S = whole(&a.K);
+    for (size_t i = 0; i < n; i++) {
+        double left = v[i], size = fabs(v[i]);
+        for (size_t j = 0; j < n; j++) {
+            left -= S[i * n + j] * u[j];
+            size += fabs(S[i * n + j] * u[j]);
+        }
+        ck_assert_double_lt(fabs(left), 2 * TRANSFORM_U * (size + 1));
+        /* The constants of parts alone are no 0. */
+        ck_assert(a.s.roots.of_coefficient[i] == i || fabs(u[i]) < TRANSFORM_U);
+    }
+    free(S);
+    free(u);
+    free(v);
+    sample_free(&a);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("wavelet impose");
     TCase *tests = tcase_create("wavelet impose");
     tcase_set_timeout(tests, 300);
-    tcase_add_loop_test(tests, an_answer_is_imposed, 0, SUBJECTS);
-    tcase_add_loop_test(tests, small_entries_are_left_out, 0, SUBJECTS);
+    tcase_add_loop_test(tests, an_answer_is_imposed, 0, SUBJECTS_AND_PARTED);
+    tcase_add_loop_test(tests, small_entries_are_left_out, 0, SUBJECTS_AND_PARTED);
     tcase_add_test(tests, no_light_in_the_mean);
+    tcase_add_loop_test(tests, row_sums_are_imposed_on_parts, 0, SUBJECTS);
     tcase_add_loop_test(tests, furnaces, 0, 2);
     tcase_add_test(tests, black_elements);
     suite_add_tcase(suite, tests);

@@ -175,7 +175,7 @@ START_TEST(one_even_light_is_put_in) {
     for (size_t p = 0; p < n; p++) area[p] = s.m.area[s.tree.order[p]];
     for (size_t p = 0; p < n; p++) length += area[p];
     for (size_t i = 0; i < n; i++) sums[i] = random_lcg_unit(&seed);
-    ck_ok(wavelet_impose_row_sums(&s.basis, s.tree.order, area, sums, 0, weight, &S, &error));
+    ck_ok(wavelet_impose_row_sums(&s.basis, &s.roots, s.tree.order, area, sums, 0, weight, &S, &error));
     double *after = whole(&S), *y = test_allocate(n, sizeof *y);
     for (size_t k = 0; k < n * n; k++)
         if (k % n != n - 1 && k / n != n - 1) ck_assert(after[k] == before[k]);
@@ -189,14 +189,14 @@ START_TEST(one_even_light_is_put_in) {
     }
     csr_free(&S);
     S = pass(&s, 0, weight, 1);
-    ck_ok(wavelet_impose_row_sums(&s.basis, s.tree.order, area, sums, .02f, weight, &S, &error));
+    ck_ok(wavelet_impose_row_sums(&s.basis, &s.roots, s.tree.order, area, sums, .02f, weight, &S, &error));
     double *some = whole(&S);
     size_t kept = 0;
     for (size_t i = 0; i < n; i++) kept += some[i * n + n - 1] != 0;
     ck_assert_uint_gt(above, 1);
     ck_assert_uint_eq(kept, above);
     for (size_t i = 0; i < n; i++) sums[i] = 1;
-    ck_ok(wavelet_impose_row_sums(&s.basis, s.tree.order, area, sums, 1e-5f, weight, &S, &error));
+    ck_ok(wavelet_impose_row_sums(&s.basis, &s.roots, s.tree.order, area, sums, 1e-5f, weight, &S, &error));
     free(some);
     some = whole(&S);
     for (size_t i = 0; i < n; i++) ck_assert(fabs(some[i * n + n - 1] - (i == n - 1)) < TRANSFORM_U);

@@ -59,8 +59,8 @@ static block_factors subject(int which, plane_tree *tree, double *F, double *siz
     places *s = test_allocate(1, sizeof *s);
     block_factors f;
     make_places(s, &seed);
-    ck_ok(plane_tree_make(ELEMENTS, (const double(*)[3])s->centre, (const float(*)[3])s->normal, NULL, 6,
-                          tree, &error));
+    ck_ok(plane_tree_make(ELEMENTS, (const double(*)[3])s->centre, (const float(*)[3])s->normal, NULL, NULL,
+                          6, tree, &error));
     ck_ok(block_factors_begin(tree, s->area, (const double(*)[3])s->centre, &f, &error));
     if (which == WIDENED) widen(tree, &f, &seed);
     if (which == BALANCED) f.balance = test_allocate(ELEMENTS, sizeof *f.balance);

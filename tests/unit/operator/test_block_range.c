@@ -27,8 +27,8 @@ static block_factors subject(plane_tree *tree) {
         normal[i][first ? 2 : 0] = 1;
         area[i] = .5 + random_lcg_unit(&seed);
     }
-    ck_ok(plane_tree_make(ELEMENTS, (const double(*)[3])centre, (const float(*)[3])normal, NULL, 6, tree,
-                          &error));
+    ck_ok(plane_tree_make(ELEMENTS, (const double(*)[3])centre, (const float(*)[3])normal, NULL, NULL, 6,
+                          tree, &error));
     ck_ok(block_factors_begin(tree, area, (const double(*)[3])centre, &f, &error));
     random_blocks(&f, ROUNDS, &seed);
     /* Values from far below 0 to far above, of any size. */

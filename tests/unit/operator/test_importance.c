@@ -152,7 +152,8 @@ static plane_tree tree_of(double (*centre)[3], float (*normal)[3]) {
         centre[i][1 + turn] = (double)(i / 12);
         normal[i][2 - turn] = 1;
     }
-    ck_ok(plane_tree_make(N, (const double(*)[3])centre, (const float(*)[3])normal, NULL, 4, &tree, &error));
+    ck_ok(plane_tree_make(N, (const double(*)[3])centre, (const float(*)[3])normal, NULL, NULL, 4, &tree,
+                          &error));
     return tree;
 }
 

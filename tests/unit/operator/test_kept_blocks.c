@@ -52,8 +52,8 @@ static subject *make_subject(uint64_t seed, double most) {
     float(*normal)[3] = test_allocate(ELEMENTS, sizeof *normal);
     size_t reduced;
     make_places(centre, normal, s->area, &seed);
-    ck_ok(plane_tree_make(ELEMENTS, (const double(*)[3])centre, (const float(*)[3])normal, NULL, PLANE_LEAF,
-                          &s->tree, &error));
+    ck_ok(plane_tree_make(ELEMENTS, (const double(*)[3])centre, (const float(*)[3])normal, NULL, NULL,
+                          PLANE_LEAF, &s->tree, &error));
     ck_ok(block_factors_begin(&s->tree, s->area, (const double(*)[3])centre, &s->f, &error));
     random_blocks(&s->f, ROUNDS, &seed);
     ck_ok(block_factors_end(&s->f, &error));

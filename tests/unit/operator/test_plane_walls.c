@@ -66,8 +66,8 @@ static void add_wall(yard *y, const double from[2], const double to[2], int piec
 static plane_tree tree_of(const yard *y, bool with_walls) {
     const element_corners corners = {y->vertices, y->elements};
     plane_tree tree;
-    ck_ok(
-        plane_tree_make(y->n, y->centre, y->normal, with_walls ? &corners : NULL, PLANE_LEAF, &tree, &error));
+    ck_ok(plane_tree_make(y->n, y->centre, y->normal, with_walls ? &corners : NULL, NULL, PLANE_LEAF, &tree,
+                          &error));
     return tree;
 }
 
@@ -247,7 +247,7 @@ START_TEST(memory_that_runs_out_leaves_nothing) {
         ck_assert_int_lt(k, 64);
         allocations_left = k;
         const lam_status status =
-            plane_tree_make(y->n, y->centre, y->normal, &corners, PLANE_LEAF, &tree, &error);
+            plane_tree_make(y->n, y->centre, y->normal, &corners, NULL, PLANE_LEAF, &tree, &error);
         allocations_left = -1;
         made = status == LAM_OK;
         ck_assert(made || (status == LAM_ERR_MEMORY && tree.order == NULL));

@@ -44,6 +44,55 @@ START_TEST(every_element_is_in_one_leaf_of_one_plane) {
 }
 END_TEST
 
+/* Below nodes that are apart, and in no other, all elements are of one part, and each part is one subtree; no
+ * function of the basis, as floats, has elements of two parts. Roots are the constants of parts, and the last
+ * coefficients of theirs. */
+START_TEST(parts_are_kept_apart) {
+    subject s = wavelet_subject_make(PARTED + _i);
+    const plane_tree *t = &s.tree;
+    const size_t n = s.m.n;
+    const double *W = dense_W(&s);
+    size_t apart = 0;
+    for (size_t k = 0; k < t->n_clusters; k++) {
+        const plane_cluster *c = &t->clusters[k];
+        bool several = false;
+        for (uint32_t p = c->begin; p < c->end; p++)
+            several = several ||
+                      wavelet_subject_part(&s, t->order[p]) != wavelet_subject_part(&s, t->order[c->begin]);
+        ck_assert(c->apart == several);
+        ck_assert(!c->apart || c->frame == PLANE_ABOVE);
+        apart += c->apart;
+    }
+    ck_assert_uint_eq(apart, PARTS - 1);
+    ck_assert_uint_eq(s.roots.count, PARTS);
+    uint32_t root_of_part[PARTS];
+    for (size_t i = 0; i < PARTS; i++) root_of_part[i] = WAVELET_NONE;
+    for (size_t i = 0; i < n; i++) {
+        uint32_t part = PARTS;
+        const uint32_t root = s.roots.of_coefficient[i];
+        ck_assert_uint_ge(root, i);
+        for (size_t p = 0; p < n; p++) {
+            const uint32_t own = wavelet_subject_part(&s, t->order[p]);
+            if (W[i * n + p] == 0) continue;
+            ck_assert(part == PARTS || part == own);
+            part = own;
+        }
+        ck_assert_uint_lt(part, PARTS);
+        ck_assert(root_of_part[part] == WAVELET_NONE || root_of_part[part] == root);
+        root_of_part[part] = root;
+        if (root != i) continue;
+        double area = 0;
+        for (size_t e = 0; e < n; e++) area += wavelet_subject_part(&s, e) == part ? s.m.area[e] : 0;
+        for (size_t p = 0; p < n; p++) {
+            const uint32_t e = t->order[p];
+            const double constant = wavelet_subject_part(&s, e) == part ? sqrt(s.m.area[e] / area) : 0;
+            ck_assert_double_eq_tol(W[i * n + p], constant, TRANSFORM_U);
+        }
+    }
+    wavelet_subject_free(&s);
+}
+END_TEST
+
 START_TEST(the_basis_is_orthonormal) {
     subject s = wavelet_subject_make(_i);
     const size_t n = s.m.n;
@@ -139,7 +188,8 @@ START_TEST(bits_do_not_depend_on_threads) {
         normal[i][2] = 1;
         area[i] = 1;
     }
-    ck_ok(plane_tree_make(N, (const double(*)[3])centre, (const float(*)[3])normal, NULL, 6, &tree, &error));
+    ck_ok(plane_tree_make(N, (const double(*)[3])centre, (const float(*)[3])normal, NULL, NULL, 6, &tree,
+                          &error));
     ck_ok(wavelet_basis_make(&tree, area, (const double(*)[3])centre, &w, &error));
     wavelet_plan plan = plan_of_all(&w);
     ck_assert_uint_gt(plan.n_pieces, 2);
@@ -239,7 +289,8 @@ int main(void) {
     TCase *tests = tcase_create("wavelets");
     tcase_set_timeout(tests, 300);
     tcase_add_loop_test(tests, every_element_is_in_one_leaf_of_one_plane, 0, SUBJECTS);
-    tcase_add_loop_test(tests, the_basis_is_orthonormal, 0, SUBJECTS);
+    tcase_add_loop_test(tests, parts_are_kept_apart, 0, SUBJECTS);
+    tcase_add_loop_test(tests, the_basis_is_orthonormal, 0, SUBJECTS_AND_PARTED);
     tcase_add_loop_test(tests, smooth_functions_are_few_numbers, 0, SUBJECTS);
     tcase_add_test(tests, grids_have_few_shapes);
     tcase_add_test(tests, bits_do_not_depend_on_threads);
