@@ -6,9 +6,9 @@
 
 /* Seconds of one thread that all pairs may take whatever the alternative takes; at high quality they are
  * worth more, as rays are far less accurate. Beyond, they may take this many times as long as the
- * alternative. A canopy of 4,000 elements, forecast at 25 s, is off by .063 and .0054 by all pairs in 81
+ * alternative. A canopy of 4,000 elements, forecast at 18 s, is off by .063 and .0054 by all pairs in 81
  * processor s, judge included, and by .058 and .0071 by rays in 19, as the operator errs more than either. */
-static const double seconds_enough = 24, seconds_enough_high = 600, times_most = 3;
+static const double seconds_enough = 16, seconds_enough_high = 600, times_most = 2;
 
 /* In a soup of triangles even near pairs stand in a crowd. Then rays alone are taken, MORE_RAYS times as
  * many, where these take less time: in a part of a town (12,541 triangles) 512 rays and near pairs left

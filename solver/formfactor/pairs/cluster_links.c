@@ -1,6 +1,7 @@
 #include "solver/formfactor/pairs/cluster_links.h"
 
 #include "solver/base/array_grow.h"
+#include "solver/base/clock.h"
 #include "solver/formfactor/pairs/cluster_shaft.h"
 #include "solver/formfactor/pairs/open_scene.h"
 
@@ -189,6 +190,7 @@ static lam_status gather(const cluster_tree *t, const bag *bags, size_t n_bags, 
         l.work.candidates += bags[k].work.candidates;
         l.work.occlusion += bags[k].work.occlusion;
         l.work.hidden += bags[k].work.hidden;
+        l.work.seconds += bags[k].work.seconds;
     }
     l.links = memory_allocate(l.n, sizeof *l.links, "links of clusters", error);
     l.of_cluster = memory_allocate(t->n_clusters + 1, sizeof *l.of_cluster, "links of clusters", error);
@@ -230,7 +232,9 @@ lam_status cluster_links_find(const mesh *m, const cluster_tree *t, const occlus
         stop = cancelled;
         if (stop) continue;
         walk w = {.m = m, .t = t, .o = o, .options = options, .found = &bags[k]};
+        const double started = clock_thread_seconds();
         visit(&w, tasks[k].a, tasks[k].b, &root, n_candidates);
+        bags[k].work.seconds = clock_thread_seconds() - started;
         if (progress_cancelled(options->progress)) {
 #pragma omp atomic write
             cancelled = true;

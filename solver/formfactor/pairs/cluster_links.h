@@ -19,6 +19,7 @@ typedef struct cluster_link_work {
     double candidates; /* clusters that shafts were given, and that they kept */
     double occlusion;  /* pairs of clusters that got occlusion_is_total */
     double hidden;     /* of these, those that were */
+    double seconds;    /* of all threads: it alone depends on the machine */
 } cluster_link_work;
 
 typedef struct cluster_links {

@@ -194,13 +194,12 @@ static lam_status share_segments(pairs_run *run, lam_error *error) {
 }
 
 /* Sets *g to the visible part of a mixed pair. Segments are tested against a list of the pair's occluders
- * where there are enough of them: making the list takes the time of some packets. */
+ * where there are enough of them. */
 static bool refine_pair(const pairs_run *run, uint32_t position, uint32_t other, leaf_reaches *to, float *g) {
-    const double list_worth = 8 * VISIBILITY_PACKET;
     const uint32_t i = run->tree.element[position], j = run->tree.element[other], leaf = run->leaf[position];
     pair_occluders between;
     segment_list list, *among = NULL;
-    if (run->listed != NULL && occlusion_segments(&run->occlusion, i, j, (double)*g) >= list_worth) {
+    if (run->listed != NULL && occlusion_segments(&run->occlusion, i, j, (double)*g) >= SEGMENTS_LISTED) {
         if ((to->n == 0 || to->leaf != leaf) &&
             !leaf_reaches_find(&run->tree, &run->links, run->parent, leaf, to))
             return false;

@@ -20,6 +20,7 @@ typedef struct sample_run {
     occlusion occlusion;
     few_occluders few;
     bool projects; /* pairs with few occluders */
+    bool lists;    /* the occluders of pairs */
     cluster_tree tree;
     pair_far_table far;
     cluster_links links;
@@ -29,6 +30,52 @@ typedef struct sample_run {
  * (a Cornell box of 5,005 elements) to .47 (a furnished room of 516 triangles), but they ask for fewer
  * segments than the mean. */
 static const double at_border = .2;
+
+/* A link whose pairs are counted, and the occluders between its clusters. */
+typedef struct sampled_link {
+    const cluster *a, *b;
+    bool open;
+    shaft within; /* not of an open link */
+    link_occluders projected, listed;
+    bool is_searched; /* for those listed */
+} sampled_link;
+
+/* The counts of a sample. due: segments since the occluders of a pair were listed. */
+typedef struct sample_count {
+    pairs_work work;
+    double due;
+} sample_count;
+
+/* Lists the occluders of a pair, whose segments stand for `share` of all. */
+static void count_list(const sample_run *run, uint32_t i, uint32_t j, double share, sampled_link *link,
+                       pairs_work *work) {
+    pair_occluders between;
+    if (!link->is_searched)
+        link_occluders_find(&run->few.occluders, &link->within, link->a, link->b, LINK_OCCLUDERS_MOST,
+                            &link->listed);
+    link->is_searched = true;
+    if (few_occluders_between(&run->few, &link->listed, i, j, &between) == FEW_OPEN) {
+        work->proven += share;
+    } else if (between.count != OCCLUDERS_UNCOUNTED) {
+        work->listed += share;
+        work->list_tests += share * between.count;
+    }
+}
+
+/* Counts the segments of a pair that takes them with some probability; a pair for every EACH of them is
+ * looked at closely. */
+static void count_segments(const sample_run *run, uint32_t i, uint32_t j, double g, double probability,
+                           sampled_link *link, sample_count *sum) {
+    static const double each = 1024;
+    const double segments = occlusion_segments(&run->occlusion, i, j, g);
+    const bool is_listed = run->lists && segments >= SEGMENTS_LISTED;
+    sum->work.segments += probability * segments;
+    sum->work.lists += is_listed ? probability : 0;
+    sum->due += probability * segments;
+    const double share = floor(sum->due / each) * each;
+    sum->due -= share;
+    if (share > 0 && is_listed) count_list(run, i, j, share, link, &sum->work);
+}
 
 /* Counts a pair that is projected; false where it has too many occluders. */
 static bool count_projection(const sample_run *run, uint32_t i, uint32_t j, double g,
@@ -44,10 +91,11 @@ static bool count_projection(const sample_run *run, uint32_t i, uint32_t j, doub
     return found != FEW_UNDECIDED;
 }
 
-/* Counts the pairs of the position with first ... last-1; among: NULL for an open link. */
+/* Counts the pairs of the position with first ... last-1. */
 static void count_row(const sample_run *run, uint32_t position, uint32_t first, uint32_t last,
-                      const link_occluders *among, pairs_work *work) {
+                      sampled_link *link, sample_count *sum) {
     enum { PIECE = 64 };
+    pairs_work *const work = &sum->work;
     const uint32_t i = run->tree.element[position];
     for (uint32_t begin = first; begin < last; begin += PIECE) {
         double exchange[PIECE];
@@ -65,19 +113,26 @@ static void count_row(const sample_run *run, uint32_t position, uint32_t first, 
             if (!((float)g > 0) || 2 * g / (run->m->area[i] + run->m->area[j]) < run->options->threshold)
                 continue;
             work->facing++;
-            if (among == NULL) {
+            if (link->open) {
                 work->seen++;
                 continue;
             }
-            if (count_projection(run, i, j, g, among, work)) continue;
+            if (count_projection(run, i, j, g, &link->projected, work)) continue;
             work->tests++;
             const occlusion_verdict verdict = occlusion_test(&run->occlusion, i, j, g, &seen);
             work->seen += verdict != OCCLUSION_TOTAL;
             if (occlusion_test_suffices(&run->occlusion, i, j, g)) continue;
-            work->segments +=
-                (verdict == OCCLUSION_PARTIAL ? 1 : at_border) * occlusion_segments(&run->occlusion, i, j, g);
+            count_segments(run, i, j, g, verdict == OCCLUSION_PARTIAL ? 1 : at_border, link, sum);
         }
     }
+}
+
+static void scale_work(pairs_work *work, double scale) {
+    double *const counts[] = {&work->tried,     &work->close,  &work->facing,     &work->seen,
+                              &work->tests,     &work->sifted, &work->projection, &work->saved,
+                              &work->segments,  &work->lists,  &work->proven,     &work->listed,
+                              &work->list_tests};
+    for (size_t k = 0; k < sizeof counts / sizeof *counts; k++) *counts[k] *= scale;
 }
 
 /* The rows of all links, one after the other, of which every step-th is counted: some of the pairs of a large
@@ -87,6 +142,7 @@ static void count_rows(const sample_run *run, double n_pairs, pairs_work *work, 
     const double wanted = fmin(fmax(n_pairs / SHARE, LEAST), MOST);
     const double step = fmax(1, floor(n_pairs / wanted));
     double at = 0, rows = 0, taken = 0, next = floor(step / 2), started = 0, seconds = 0;
+    sample_count sum = {.due = 0};
     for (size_t k = 0; k < run->links.n; k++) {
         const cluster_link *l = &run->links.links[k];
         const cluster *a = &run->tree.clusters[l->a], *b = &run->tree.clusters[l->b];
@@ -98,29 +154,19 @@ static void count_rows(const sample_run *run, double n_pairs, pairs_work *work, 
             if (at <= next) continue;
             next += step;
             taken += b->last - first;
-            link_occluders among = {.count = OCCLUDERS_UNCOUNTED};
-            if (!l->open && run->projects) {
-                shaft s;
-                cluster_shaft_init(&s, a, b, run->few.occluders.slack);
-                link_occluders_find(&run->few.occluders, &s, a, b,
-                                    link_occluders_projected(&run->few.occluders), &among);
-            }
+            sampled_link link = {.a = a, .b = b, .open = l->open, .projected.count = OCCLUDERS_UNCOUNTED};
+            if (!l->open) cluster_shaft_init(&link.within, a, b, run->few.occluders.slack);
+            if (!l->open && run->projects)
+                link_occluders_find(&run->few.occluders, &link.within, a, b,
+                                    link_occluders_projected(&run->few.occluders), &link.projected);
             started = clock_thread_seconds();
-            count_row(run, p, first, b->last, l->open ? NULL : &among, work);
+            count_row(run, p, first, b->last, &link, &sum);
             seconds += clock_thread_seconds() - started;
         }
     }
-    if (trial != NULL) *trial = (pairs_trial){.work = *work, .seconds = seconds};
-    const double scale = taken > 0 ? rows / taken : 0;
-    work->tried *= scale;
-    work->close *= scale;
-    work->facing *= scale;
-    work->seen *= scale;
-    work->tests *= scale;
-    work->sifted *= scale;
-    work->projection *= scale;
-    work->saved *= scale;
-    work->segments *= scale;
+    if (trial != NULL) *trial = (pairs_trial){.work = sum.work, .seconds = seconds};
+    *work = sum.work;
+    scale_work(work, taken > 0 ? rows / taken : 0);
 }
 
 static void scale_to_all(const sample_run *run, pairs_work *work) {
@@ -130,15 +176,7 @@ static void scale_to_all(const sample_run *run, pairs_work *work) {
     work->candidates = all * l->candidates;
     work->occlusion = all * l->occlusion;
     work->hidden = all * l->hidden;
-    work->tried *= all;
-    work->close *= all;
-    work->facing *= all;
-    work->seen *= all;
-    work->tests *= all;
-    work->sifted *= all;
-    work->projection *= all;
-    work->saved *= all;
-    work->segments *= all;
+    scale_work(work, all);
 }
 
 /* The sample of links is a sixty-fourth of the descent, of few elements all of it. */
@@ -175,6 +213,7 @@ lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options 
     TRY(pair_far_table_build(run.polygons, &run.tree, &run.rules, options->tolerance, &run.far, error));
     TRY(cluster_links_find(m, &run.tree, &run.occlusion, &how, &run.links, error));
     run.projects = options->occluders > 0 && few_occluders_pay(&run.few, &run.tree, &run.links);
+    run.lists = options->occluders > 0 && few_occluders_are_listed(&run.few, &run.tree, &run.links);
     for (size_t k = 0; k < run.links.n; k++) {
         const cluster *a = &run.tree.clusters[run.links.links[k].a],
                       *b = &run.tree.clusters[run.links.links[k].b];
@@ -182,6 +221,7 @@ lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options 
     }
     count_rows(&run, n_pairs, &work, trial);
     scale_to_all(&run, &work);
+    if (trial != NULL) trial->link_seconds = run.links.work.seconds / run.links.share;
     *out = work;
 done:
     free(run.polygons);
@@ -192,11 +232,19 @@ done:
     return status;
 }
 
-/* Seconds of one thread of an AMD EPYC with AVX-512, 2026, by fits to a furnished room (516 triangles), two
- * Cornell boxes, a maze, rooms, a canopy and a part of a town (12,541 triangles). */
-static const double shaft_seconds = 5e-7, candidate_seconds = 8e-8, hidden_seconds = 5e-5,
-                    tried_seconds = 5e-8, close_seconds = 3e-6, test_seconds = 9e-7, segment_seconds = 1.1e-7,
-                    sift_seconds = 1e-6, projection_seconds = 7e-8, entry_seconds = 1e-7;
+/* Seconds of one thread of an AMD EPYC with AVX-512, 2026, with other work beside it, by fits to a furnished
+ * room (516 triangles), a pocket of 3,262, Cornell boxes, mazes, rooms, patios, atria, cities, anechoic rooms
+ * and canopies of 900 to 4,000 elements: of exact counts they give .7 to 1.2 times what these take. Finding
+ * links; the rows of pairs; segments against lists, of which a segment of a list and each occluder of it
+ * count, and those cast into the scene; entries. */
+static const double shaft_seconds = 5e-7, candidate_seconds = 5e-8, hidden_seconds = 5e-5,
+                    tried_seconds = 5e-8, close_seconds = 3.2e-6, test_seconds = 1.1e-6, sift_seconds = 7e-7,
+                    projection_seconds = 6e-8, list_seconds = 8e-6, listed_seconds = 2e-8,
+                    list_test_seconds = 1.2e-9, cast_seconds = 1.75e-7, entry_seconds = 1e-7;
+
+/* The rows of a sample lie apart, so that caches hold little of them: they take so many times as long as rows
+ * in turn, 1.1 to 1.5 in these scenes. */
+static const double times_apart = 1.35;
 
 /* Of a ray: each box of a triangle that it crosses, less boxes_free, and at least ray_seconds; of a row,
  * beside its rays. By fits to processor seconds, with other work beside, of 512 to 8,192 rays in a furnished
@@ -232,7 +280,15 @@ double sample_pace(double seconds, double expected) {
     return fmin(fmax(seconds / expected, 1 / most), most);
 }
 
-/* Of rows of pairs, without their segments, which the sample does not cast. */
+/* Of segments, which the sample does not cast; `all` are cast in place of those that were counted. */
+static double segments_seconds(const pairs_work *w, double all) {
+    const double times = w->segments > 0 ? all / w->segments : 0;
+    const double cast = fmax(w->segments - w->proven - w->listed, 0);
+    return w->lists * list_seconds +
+           times * (w->listed * listed_seconds + w->list_tests * list_test_seconds + cast * cast_seconds);
+}
+
+/* Of rows of pairs, without their segments. */
 static double rows_seconds(const pairs_work *w) {
     return w->tried * tried_seconds + w->close * close_seconds + w->tests * test_seconds +
            w->sifted * sift_seconds + w->projection * projection_seconds;
@@ -258,10 +314,10 @@ lam_status pairs_forecast(const mesh *m, const recipe *r, const progress *p, pai
     const double entries = w.seen + of_rays.entries;
     const double links =
         w.shafts * shaft_seconds + w.candidates * candidate_seconds + w.hidden * hidden_seconds;
-    const double rows = rows_seconds(&w), rest = segments * segment_seconds + entries * entry_seconds;
-    const double pace = sample_pace(trial.seconds, rows_seconds(&trial.work));
+    const double rows = rows_seconds(&w), rest = segments_seconds(&w, segments) + entries * entry_seconds;
+    const double pace = sample_pace(trial.seconds, times_apart * rows_seconds(&trial.work));
     *out = (pairs_cost){.seconds = links + rows + rest + of_rays.seconds,
-                        .measured = (links + rows) * pace + rest + of_rays.seconds,
+                        .measured = trial.link_seconds + rows * pace + rest + of_rays.seconds,
                         .entries = 2 * entries,
                         .hits = of_rays.hits};
 done:

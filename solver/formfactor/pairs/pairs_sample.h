@@ -14,17 +14,22 @@ typedef struct pairs_work {
     double tests;                                 /* occlusion tests */
     double sifted;                                /* pairs given to projection, decided or not */
     double projection;                            /* points times 1 + occluders there */
+    double saved;                                 /* segments that projected pairs would ask for */
     double segments;                              /* that mixed pairs ask for */
-    double saved;                                 /* that projected pairs would ask for */
+    double lists;                                 /* mixed pairs whose occluders are listed */
+    double proven;                                /* segments that an empty list saves */
+    double listed;                                /* segments that are tested against lists */
+    double list_tests;                            /* of these, times the lengths of the lists */
 } pairs_work;
 
-/* The rows of pairs that were counted: the work that this did, and the processor seconds that it took. */
+/* The rows of pairs that were counted: the work that this did, and the processor seconds that it took; and
+ * those that all links take, by the part of them that was found. */
 typedef struct pairs_trial {
     pairs_work work;
-    double seconds;
+    double seconds, link_seconds;
 } pairs_trial;
 
-/* Counts are the same for any number of threads. trial, or NULL, is of the rows alone. Cost: a sixty-fourth
+/* Counts are the same for any number of threads. trial may be NULL. Cost: a sixty-fourth
  * of finding links, or all of it for few elements, and some 40,000 pairs of elements. Errors: LAM_ERR_MEMORY,
  * LAM_ERR_CANCELLED. */
 lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options *options, pairs_work *out,

@@ -13,6 +13,9 @@ typedef struct segment_occluder {
     int n;
 } segment_occluder;
 
+/* Segments of a pair for which a list is made, at least: making it takes the time of some packets. */
+enum { SEGMENTS_LISTED = 8 * VISIBILITY_PACKET };
+
 /* The occluders that may block the segments of a pair. */
 typedef struct segment_list {
     int count;

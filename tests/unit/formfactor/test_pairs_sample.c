@@ -1,0 +1,104 @@
+/* The work of pairs that a sample of them counts, and its cost. */
+#include "solver/formfactor/pairs/pairs_sample.h"
+#include "support/scene.h"
+#include "support/suite.h"
+
+#include <omp.h>
+
+static mesh scene_of(const char *kind, size_t n) {
+    const generate_options how = {
+        .kind = kind, .elements = n, .seed = 1, .variant = 1, .terrain = "flat", .reflectance = .5};
+    return generate_good(&how);
+}
+
+static const recipe all_pairs = {.method = RECIPE_PAIRS, .rays = 16, .accuracy = 7e-5, .seed = 1};
+
+/* Of all pairs at normal quality; occluders: 0 where neither projection nor lists are allowed. */
+static pairs_work sample(const mesh *m, bool occluders, int n_threads, pairs_trial *trial) {
+    lam_error error = {.message = ""};
+    pairs_options options = pairs_options_of(&all_pairs, m->n, 0);
+    const int most = omp_get_max_threads();
+    visibility *v = NULL;
+    pairs_work found;
+    if (!occluders) options.occluders = 0;
+    ck_ok(visibility_create(m, &v, &error));
+    omp_set_num_threads(n_threads);
+    ck_ok(pairs_sample(m, v, &options, &found, trial, &error));
+    omp_set_num_threads(most);
+    visibility_destroy(v);
+    return found;
+}
+
+/* In a patio some 7 occluders, in an atrium 20, stand between pairs that take segments, as all pairs counted
+ * one by one have it: .8 to .9 of the segments are tested against lists, and a tenth needs none at all. */
+START_TEST(segments_are_tested_against_lists) {
+    static const struct {
+        const char *kind;
+        double shortest, longest;
+    } scenes[] = {{"patio", 4, 16}, {"atrium", 8, 40}};
+    mesh m = scene_of(scenes[_i].kind, 1000);
+    pairs_trial trial;
+    const pairs_work w = sample(&m, true, 1, &trial), other = sample(&m, true, 3, NULL),
+                     none = sample(&m, false, 1, NULL);
+    ck_assert_double_gt(w.segments, 0);
+    ck_assert_double_gt(w.listed, .5 * w.segments);
+    ck_assert_double_gt(w.proven, 0);
+    ck_assert_double_lt(w.proven, .3 * w.segments);
+    ck_assert_double_le(w.listed + w.proven, 1.01 * w.segments);
+    ck_assert_double_ge(w.list_tests, scenes[_i].shortest * w.listed);
+    ck_assert_double_le(w.list_tests, scenes[_i].longest * w.listed);
+    /* A list is made for some of the pairs that are looked at, and saves segments of 64 at least each. */
+    ck_assert_double_gt(w.lists, 0);
+    ck_assert_double_lt(w.lists, w.tests);
+    ck_assert_double_gt(w.segments, 64 * w.lists);
+    ck_assert_double_eq(none.lists + none.proven + none.listed + none.list_tests, 0);
+    ck_assert_double_gt(none.segments, 0);
+    /* The same bits from any number of threads; only seconds differ. */
+    ck_assert_double_eq(w.segments, other.segments);
+    ck_assert_double_eq(w.lists, other.lists);
+    ck_assert_double_eq(w.proven, other.proven);
+    ck_assert_double_eq(w.listed, other.listed);
+    ck_assert_double_eq(w.list_tests, other.list_tests);
+    ck_assert_double_gt(trial.link_seconds, 0);
+    ck_assert_double_gt(trial.seconds, 0);
+    mesh_free(&m);
+}
+END_TEST
+
+/* Walls of rooms are few: their pairs are projected, and take no segments. */
+START_TEST(projected_pairs_take_no_segments) {
+    mesh m = scene_of("rooms", 1000);
+    const pairs_work w = sample(&m, true, 1, NULL);
+    ck_assert_double_gt(w.sifted, 0);
+    ck_assert_double_gt(w.saved, 0);
+    ck_assert_double_eq(w.segments + w.lists + w.listed, 0);
+    mesh_free(&m);
+}
+END_TEST
+
+/* Segments against lists cost a tenth to a quarter of those cast into the scene, and segments are most of the
+ * work of an atrium's pairs: with lists it is less than if each segment took the 1.75e-7 s of a cast one. */
+START_TEST(lists_make_pairs_cheaper) {
+    lam_error error = {.message = ""};
+    mesh m = scene_of("atrium", 1000);
+    const pairs_work w = sample(&m, true, 1, NULL);
+    pairs_cost cost;
+    ck_ok(pairs_forecast(&m, &all_pairs, NULL, &cost, &error));
+    const double segments = fmin(w.segments, pairs_options_of(&all_pairs, m.n, 0).segments_most);
+    ck_assert_double_gt(cost.seconds, 2e-8 * segments);
+    ck_assert_double_lt(cost.seconds, 1.75e-7 * segments);
+    ck_assert_double_gt(cost.measured, 0);
+    mesh_free(&m);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("pairs_sample");
+    TCase *cases = tcase_create("pairs_sample");
+    tcase_set_timeout(cases, 120);
+    tcase_add_loop_test(cases, segments_are_tested_against_lists, 0, 2);
+    tcase_add_test(cases, projected_pairs_take_no_segments);
+    tcase_add_test(cases, lists_make_pairs_cheaper);
+    suite_add_tcase(suite, cases);
+    return suite_run(suite);
+}
