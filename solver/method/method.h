@@ -78,7 +78,6 @@ typedef struct method_scale {
     double noise;        /* of S, 2-norm; 0: none */
     double n_emitters;   /* 0: none, or not read yet */
     double n_blocks;     /* of form factors; 0: they are rows */
-    double single_share; /* of the blocks: that of pairs of elements */
     double entries;      /* of the rows; 0: not known */
     double n_planes;     /* of the tree of clusters; 0: not known */
     double hits;         /* share of the rays from elements that hit anything; 0: not known */

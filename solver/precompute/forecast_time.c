@@ -43,7 +43,6 @@ static method_forecast forecast_of_method(const forecast *f) {
                                 .n_emitters = (double)f->emitters,
                                 .n_planes = (double)f->n_planes,
                                 .n_blocks = f->recipe.method == RECIPE_BLOCKS ? blocks_of(f, &f->recipe) : 0,
-                                .single_share = f->cost.single_share,
                                 .hits = f->cost.hits,
                                 .entries = f->cost.entries > 0 ? f->cost.entries
                                                                : forecast_rows_bytes(n, &f->recipe) / 8};

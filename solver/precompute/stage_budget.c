@@ -124,8 +124,7 @@ static lam_status find_seconds(const budget_run *run, budget_recipe *r, lam_erro
         probe.recipe.rays = recipe_rays_beside_blocks(probe.m.n);
         probe.recipe.accuracy = run->method->block_accuracy(method_own_const(&options.build, run->method));
         probe.cost = (pairs_cost){.measured = along(&run->blocks, probe.recipe.accuracy, measured_of),
-                                  .entries = along(&run->blocks, probe.recipe.accuracy, entries_of),
-                                  .single_share = run->blocks.cost[run->blocks.count - 1].single_share};
+                                  .entries = along(&run->blocks, probe.recipe.accuracy, entries_of)};
     } else if (r->kind == BUDGET_PAIRS) {
         probe.recipe = state_pairs_recipe(&probe);
         size_t k = 0;

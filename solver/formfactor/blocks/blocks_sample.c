@@ -119,7 +119,6 @@ lam_status blocks_forecast(block_scene *scene, const recipe *r, const importance
     *out = (pairs_cost){.seconds = walk + finish,
                         .measured = walk * pace + finish,
                         .entries = 2 * blocks,
-                        .single_share = single,
                         .finer = read != NULL ? judge_seconds(scene, &finer, pace)
                                               : more * judge_seconds(scene, &w, pace)};
 done:

@@ -43,7 +43,6 @@ typedef struct pairs_cost {
     double seconds;      /* of one thread, by fixed costs of each kind of work: for a choice */
     double measured;     /* the same at the pace of the sample on this machine: for a forecast */
     double entries;      /* of F, or twice the blocks */
-    double single_share; /* of blocks: that of pairs of elements; else 0 */
     double finer;        /* of blocks: measured, of those that judge them; else 0 */
     double hits;         /* of rays: the share that hits anything; 0: not known */
 } pairs_cost;

@@ -124,26 +124,25 @@ START_TEST(the_judge_of_blocks_takes_as_long) {
 }
 END_TEST
 
-/* Processor seconds of the hierarchical operator from blocks, as found in closed Cornell boxes and a patio of
- * three channels, rooms and a maze of one, at epsilons of .0125 to .8: within half as much again. Blocks and
- * the share of pairs of elements are those of a sample. */
+/* Processor seconds of the hierarchical operator from blocks, as found in closed Cornell boxes, patios and an
+ * atrium of three channels, rooms, a maze and a large Cornell box of one, at epsilons of .0125 to .2: within
+ * half as much again. Blocks are those of a sample. */
 START_TEST(the_operator_takes_as_long) {
     static const struct {
-        double n, n_channels, blocks, single_share, seconds;
-    } measured[] = {
-        {10249, 3, 98599, .11, .18}, {10249, 3, 255716, .12, .38}, {10249, 3, 824000, .146, .92},
-        {10249, 3, 2.8e6, .2, 2.3},  {40978, 3, 436353, .1, .96},  {40978, 3, 1024000, .094, 2.1},
-        {40978, 3, 4.4e6, .1, 5.6},  {8004, 1, 404738, .36, .25},  {8004, 1, 1.21e6, .354, .5},
-        {8001, 1, 350663, .5, .28},  {8001, 1, 664000, .547, .57}, {8006, 3, 2.275e6, .686, 4.18}};
+        double n, n_channels, blocks, seconds;
+    } measured[] = {{8013, 3, 205500, .335},  {8013, 3, 774628, .80},   {8013, 3, 2.915e6, 1.78},
+                    {8004, 1, 544212, .19},   {8004, 1, 1.224e6, .39},  {8004, 1, 2.453e6, .75},
+                    {8001, 1, 473122, .15},   {8001, 1, 689696, .25},   {8001, 1, 853648, .40},
+                    {8006, 3, 1.347e6, .94},  {8006, 3, 2.897e6, 2.1},  {8006, 3, 4.814e6, 4.45},
+                    {8006, 3, 1.172e6, .97},  {8006, 3, 3.044e6, 2.2},  {8006, 3, 5.931e6, 4.96},
+                    {24016, 1, 3.052e6, 1.4}, {163811, 1, 2.504e6, 1.7}};
     build_options how = build_presets("hierarchical");
     for (size_t k = 0; k < sizeof measured / sizeof *measured; k++) {
         const forecast f = {.n = (size_t)measured[k].n,
                             .n_channels = (size_t)measured[k].n_channels,
                             .recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 4e-4},
                             .judge_recipe = {.method = RECIPE_BLOCKS, .rays = 16, .accuracy = 2e-4},
-                            .cost = {.measured = 1,
-                                     .entries = 2 * measured[k].blocks,
-                                     .single_share = measured[k].single_share},
+                            .cost = {.measured = 1, .entries = 2 * measured[k].blocks},
                             .method = method_find("hierarchical"),
                             .build = &how};
         const forecast_times times = forecast_seconds(&f, &rates);
