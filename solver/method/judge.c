@@ -178,10 +178,9 @@ static void report_round(const judge_input *input, size_t round, double part) {
 }
 
 /* The number of emissions of a group, 0 where they are endless. */
-static size_t all_of(const lam_operator *op, int group) {
+static size_t all_of(const probe_source *source, int group) {
     if (group == JUDGE_RANDOM) return 0;
-    if (group == JUDGE_LIGHTS) return 1;
-    return lam_operator_emitters(op) > 0 ? lam_operator_emitters(op) : lam_operator_elements(op);
+    return group == JUDGE_LIGHTS ? 1 : source->n_singles;
 }
 
 /* True where the mean of a figure over its probes is known well enough. */
@@ -196,15 +195,15 @@ static bool are_same(const factor_product *a, const factor_product *b) {
 
 /* Emissions of one round, against all references. The operator's own error is found until it is certain, the
  * noise where the references are no twins, are found in the first round. */
-static lam_status measure(const lam_operator *op, measured *m, size_t round, group_tally *t,
-                          lam_error *error) {
+static lam_status measure(const lam_operator *op, measured *m, const probe_source *source, size_t round,
+                          group_tally *t, lam_error *error) {
     lam_status status = LAM_OK;
     const judge_input *input = m->input;
     const probes *p = &m->p;
     const bool first = round == 0;
     const bool each = input->relation != REFERENCE_COARSER;
     const bool total = input->independent.n > 0, noisy = input->other.n > 0 && (first || each);
-    const bool own = first || !is_certain(&t[JUDGE_SINGLE].own.indirect, all_of(op, JUDGE_SINGLE));
+    const bool own = first || !is_certain(&t[JUDGE_SINGLE].own.indirect, all_of(source, JUDGE_SINGLE));
     const size_t n_noisy = each || m->at_once ? p->m : p->m < NOISE_PROBES ? p->m : NOISE_PROBES;
     size_t *all = memory_allocate(p->m, sizeof *all, "probes", error);
     size_t *others = memory_allocate(p->m, sizeof *others, "probes", error), n_others = 0;
@@ -252,8 +251,8 @@ double judge_of_operator(const error_group *g) {
 }
 
 /* The probes of the next round; false where there are none. An LU takes all of them at once. */
-static bool next_counts(const lam_operator *op, const judge_input *input, const probe_source *source,
-                        const group_tally *t, bool at_once, size_t counts[JUDGE_GROUPS]) {
+static bool next_counts(const judge_input *input, const probe_source *source, const group_tally *t,
+                        bool at_once, size_t counts[JUDGE_GROUPS]) {
     const size_t least[JUDGE_GROUPS] = {RANDOM_LEAST, 1,
                                         input->probes_least > 0 ? input->probes_least : input->probes};
     size_t all = 0;
@@ -261,7 +260,7 @@ static bool next_counts(const lam_operator *op, const judge_input *input, const 
         const size_t left = source->most[g] - source->made[g];
         const size_t step = g == JUDGE_RANDOM ? RANDOM_LEAST : JUDGE_AT_ONCE;
         const figure_group *of = input->independent.n > 0 ? &t[g].total : &t[g].own;
-        const bool enough = t[g].done >= least[g] && is_certain(&of->indirect, all_of(op, g));
+        const bool enough = t[g].done >= least[g] && is_certain(&of->indirect, all_of(source, g));
         counts[g] = enough ? 0 : at_once || left < step ? left : step;
         all += counts[g];
     }
@@ -280,6 +279,11 @@ static void finish_total(const group_tally *t, double repeated, error_group *g) 
     g->total_indirect = figures_bound(&t->total.indirect, g->reference_noise);
 }
 
+/* The elements that light of single emissions falls on: with sources more than the `all` that emit. */
+static size_t elements_of(const judge_input *input, size_t all) {
+    return input->emits != NULL ? input->problem->n : all;
+}
+
 /* all: the number of emissions of the group; 0: endless. */
 static void finish_group(const judge_input *input, const group_tally *t, bool single, size_t all,
                          error_group *g) {
@@ -291,7 +295,7 @@ static void finish_group(const judge_input *input, const group_tally *t, bool si
     g->operator_indirect = figures_mean(&t->own.indirect);
     if (input->independent.n == 0) return;
     g->probes_noise = figures_spread(&t->total.indirect, all);
-    finish_total(t, single ? (double)t->done / (double)all : 0, g);
+    finish_total(t, single ? (double)t->done / (double)elements_of(input, all) : 0, g);
 }
 
 /* True where a reference is an LU, of whose probes none is worth leaving out. */
@@ -315,22 +319,22 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     step_rates rates = {.own = 0};
     probe_source source;
     measured m = {.input = input};
-    TRY(probe_source_make(input->problem, op, input->emission, input->probes, JUDGE_RANDOM_PROBES,
-                          input->seed, &source, error));
+    TRY(probe_source_make(input->problem, op, input->emission, input->emits, input->probes,
+                          JUDGE_RANDOM_PROBES, input->seed, &source, error));
     const bool at_once = is_dense(op, input, source.most[0] + source.most[1] + source.most[2]);
     progress_report(input->progress, "judge", 0);
-    for (; next_counts(op, input, &source, t, at_once, counts); rounds++) {
+    for (; next_counts(input, &source, t, at_once, counts); rounds++) {
         if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         measured_free(&m);
         m = (measured){.input = input, .rates = &rates, .at_once = at_once};
         TRY(probes_next(&source, counts, rounds == 0, &m.p, error));
-        TRY(measure(op, &m, rounds, t, error));
+        TRY(measure(op, &m, &source, rounds, t, error));
         if (rounds == 0) add_physics(&m, groups);
         for (int g = 0; g < JUDGE_GROUPS; g++) t[g].done += counts[g];
         report_round(input, rounds, 1);
     }
     for (int g = 0; g < JUDGE_GROUPS; g++)
-        finish_group(input, &t[g], g == JUDGE_SINGLE, all_of(op, g), groups[g]);
+        finish_group(input, &t[g], g == JUDGE_SINGLE, all_of(&source, g), groups[g]);
     progress_report(input->progress, "judge", 1);
     found.has_total = input->independent.n > 0;
     found.seconds = clock_seconds() - start;

@@ -60,6 +60,7 @@ typedef struct judge_input {
     const double *row_sums;     /* [n] of own */
     const float *emission;      /* [C][n], the scene's own */
     const float *read;          /* [n], weights of what is read, by element; NULL: all is read */
+    const float *emits;         /* [n], above 0 of the elements that alone emit in probes; NULL: all */
     factor_product own;         /* the very F that the operator was built from */
     factor_product independent; /* an F that shares no sample with it; n = 0: no total error */
     factor_product other;       /* another one; n = 0: the noise of the reference is not measured */

@@ -7,7 +7,8 @@
 #include <string.h>
 
 /* True if the scene has light of its own that the operator can answer. */
-static bool any_light(const lam_operator *op, const build_problem *problem, const float *emission) {
+static bool any_light(const lam_operator *op, const build_problem *problem, const float *emission,
+                      const float *emits) {
     if (lam_operator_emitters(op) > 0) {
         const size_t count = lam_operator_emitters(op) * problem->n_channels;
         float *W = memory_allocate(count, sizeof *W, "weights", NULL);
@@ -18,23 +19,26 @@ static bool any_light(const lam_operator *op, const build_problem *problem, cons
         return any && lit;
     }
     for (size_t i = 0; i < problem->n * problem->n_channels; i++)
-        if (emission[i] > 0) return true;
+        if (emission[i] > 0 && (emits == NULL || emits[i % problem->n] > 0)) return true;
     return false;
 }
 
 lam_status probe_source_make(const build_problem *problem, const lam_operator *op, const float *emission,
-                             size_t singles, size_t randoms, uint64_t seed, probe_source *out,
-                             lam_error *error) {
+                             const float *emits, size_t singles, size_t randoms, uint64_t seed,
+                             probe_source *out, lam_error *error) {
     const size_t s = lam_operator_emitters(op), all = s > 0 ? s : problem->n;
     *out = (probe_source){.problem = problem,
                           .op = op,
                           .emission = emission,
-                          .most = {randoms, any_light(op, problem, emission), singles < all ? singles : all},
+                          .emits = emits,
+                          .most = {randoms, any_light(op, problem, emission, emits)},
                           .draw = seed,
                           .random = seed + 1};
     out->deck = memory_allocate(all, sizeof *out->deck, "probes", error);
     if (out->deck == NULL) return LAM_ERR_MEMORY;
-    for (size_t k = 0; k < all; k++) out->deck[k] = (uint32_t)k;
+    for (size_t k = 0; k < all; k++)
+        if (emits == NULL || emits[k] > 0) out->deck[out->n_singles++] = (uint32_t)k;
+    out->most[JUDGE_SINGLE] = singles < out->n_singles ? singles : out->n_singles;
     return LAM_OK;
 }
 
@@ -52,10 +56,10 @@ void probes_free(probes *p) {
     *p = (probes){.m = 0};
 }
 
-/* The next one of `all`, without repetition. */
-static size_t draw_single(probe_source *s, size_t all) {
+/* The next one of the deck, without repetition. */
+static size_t draw_single(probe_source *s) {
     const size_t v = s->made[JUDGE_SINGLE]++;
-    const size_t other = v + (size_t)(random_unit(&s->draw) * (double)(all - v));
+    const size_t other = v + (size_t)(random_unit(&s->draw) * (double)(s->n_singles - v));
     const uint32_t drawn = s->deck[other];
     s->deck[other] = s->deck[v];
     s->deck[v] = drawn;
@@ -66,7 +70,7 @@ static size_t draw_single(probe_source *s, size_t all) {
 static lam_status set_numbers(probe_source *s, int group, size_t count, float *numbers, lam_error *error) {
     const size_t C = s->problem->n_channels;
     if (group == JUDGE_SINGLE) {
-        const size_t at = draw_single(s, count);
+        const size_t at = draw_single(s);
         for (size_t c = 0; c < C; c++) numbers[c * count + at] = 1;
         return LAM_OK;
     }
@@ -77,6 +81,8 @@ static lam_status set_numbers(probe_source *s, int group, size_t count, float *n
         return lam_operator_weights(s->op, 1, s->emission, 0, NULL, numbers, error);
     else
         memcpy(numbers, s->emission, C * count * sizeof *numbers);
+    for (size_t k = 0; s->emits != NULL && k < C * count; k++)
+        if (!(s->emits[k % count] > 0)) numbers[k] = 0;
     return LAM_OK;
 }
 

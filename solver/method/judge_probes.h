@@ -8,20 +8,22 @@
 enum { JUDGE_RANDOM, JUDGE_LIGHTS, JUDGE_SINGLE, JUDGE_GROUPS };
 
 /* A source of emissions: single elements (or emitters), drawn without repetition, the scene's own light, and
- * random light of all elements (emitters). */
+ * random light of all elements (emitters); with sources, of these elements alone. */
 typedef struct probe_source {
     const build_problem *problem;
     const lam_operator *op;
     const float *emission; /* [C][n], the scene's own */
+    const float *emits;    /* [n], above 0 of elements that emit; NULL: all */
+    size_t n_singles;      /* in the deck */
     size_t most[JUDGE_GROUPS], made[JUDGE_GROUPS];
-    uint32_t *deck;        /* [n or emitters] drawn so far, then the others */
+    uint32_t *deck;        /* [n or emitters, or those that emit] drawn so far, then the others */
     uint64_t draw, random; /* states */
 } probe_source;
 
-/* singles: at most. Errors: LAM_ERR_MEMORY. */
+/* singles: at most; emits may be NULL, as it is of an operator of emitters. Errors: LAM_ERR_MEMORY. */
 lam_status probe_source_make(const build_problem *problem, const lam_operator *op, const float *emission,
-                             size_t singles, size_t randoms, uint64_t seed, probe_source *out,
-                             lam_error *error);
+                             const float *emits, size_t singles, size_t randoms, uint64_t seed,
+                             probe_source *out, lam_error *error);
 void probe_source_free(probe_source *s);
 
 /* Emissions E and the operator's radiosity and irradiance, [m][C][n]; those of group g are begin[g] ...

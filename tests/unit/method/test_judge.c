@@ -3,6 +3,7 @@
  * spread. And what they say of an operator whose error is known, by noisy references. */
 #include "solver/base/random.h"
 #include "solver/method/judge_figures.h"
+#include "solver/method/judge_probes.h"
 #include "solver/method/reference.h"
 #include "support/box.h"
 #include "support/suite.h"
@@ -442,6 +443,68 @@ START_TEST(the_choice_of_probes_has_a_standard_error) {
 }
 END_TEST
 
+/* With sources each of them is one of the single elements, random emission is theirs alone, and so is the
+ * scene's own light: of which there is none, as element 7 is no source. */
+START_TEST(sources_alone_emit) {
+    static const size_t sources[] = {2, 9, 11};
+    enum { SOURCES = sizeof sources / sizeof sources[0] };
+    lighting lights = {.known = false};
+    float emits[N] = {0};
+    subject s;
+    error_report report;
+    lam_error error = {.message = ""};
+    subject_make(&s);
+    for (size_t k = 0; k < SOURCES; k++) emits[sources[k]] = 1;
+    const build_problem problem = {
+        .n = N, .n_channels = C, .area = s.m.area, .reflectance = s.rho, .F = &s.F[OWN]};
+    judge_input input = {.problem = &problem,
+                         .row_sums = s.row_sums,
+                         .emission = s.emission,
+                         .emits = emits,
+                         .own = product_of(&s.F[OWN], true),
+                         .independent = product_of(&s.F[BETTER], true),
+                         .other = product_of(&s.F[OTHER], true),
+                         .relation = REFERENCE_DISTURBED,
+                         .first_light = known_light,
+                         .first_light_context = &lights,
+                         .probes = N,
+                         .seed = 5};
+    ck_ok(judge_operator(s.op, &input, &report, &error));
+    expectations sum = {.own = {.count = 0}};
+    for (size_t k = 0; k < SOURCES; k++) add_one(&s, sources[k], 1, false, REFERENCE_DISTURBED, true, &sum);
+    ck_assert_uint_eq(report.single.probes, SOURCES);
+    ck_assert(report.single.probes_noise == 0);
+    check_close(report.single.operator_indirect.mean, sum.own.plain.f / SOURCES, 2e-4);
+    /* Three of all elements are probes, and have the noise of light between them twice. */
+    const double twice = sqrt(1 + (double)SOURCES / N);
+    check_close(report.single.reference_noise, twice * noise_of(&sum.indirect, report.single.is_bound, false),
+                2e-3);
+    ck_assert_uint_eq(report.lights.probes, 0);
+    ck_assert_uint_gt(report.random.probes, 0);
+    emits[7] = 1;
+    lights.count = 0;
+    ck_ok(judge_operator(s.op, &input, &report, &error));
+    ck_assert_uint_eq(report.lights.probes, 1);
+    ck_assert_uint_eq(report.single.probes, SOURCES + 1);
+    /* The emissions themselves. */
+    probe_source source;
+    probes p;
+    for (size_t k = 0; k < VECTOR; k++) s.emission[k] = 3;
+    ck_ok(probe_source_make(&problem, s.op, s.emission, emits, N, 4, 5, &source, &error));
+    ck_assert_uint_eq(source.most[JUDGE_SINGLE], SOURCES + 1);
+    ck_ok(probes_next(&source, (size_t[]){4, 1, SOURCES + 1}, false, &p, &error));
+    for (size_t v = 0; v < p.m; v++)
+        for (size_t k = 0; k < VECTOR; k++) {
+            const float E = p.E[v * VECTOR + k];
+            if (emits[k % N] == 0) ck_assert_float_eq(E, 0);
+            if (emits[k % N] > 0 && v < p.begin[JUDGE_SINGLE]) ck_assert_float_gt(E, 0);
+        }
+    probes_free(&p);
+    probe_source_free(&source);
+    subject_free(&s);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("judge");
     TCase *cases = tcase_create("judge");
@@ -449,6 +512,7 @@ int main(void) {
     tcase_add_loop_test(cases, figures_are_those_of_dense_solutions, 0, 12);
     tcase_add_loop_test(cases, stated_errors_are_true_within_their_noise, 0, 3);
     tcase_add_test(cases, the_choice_of_probes_has_a_standard_error);
+    tcase_add_test(cases, sources_alone_emit);
     suite_add_tcase(suite, cases);
     return suite_run(suite);
 }
