@@ -422,8 +422,7 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
     }
     if (options->importance != NULL) {
         TRY(blocks_importance(m, block_scene_visibility(scene), tree, &how, options->importance, error));
-        how.importance = options->importance->of;
-        how.importance_share = options->importance->share_of_bounds;
+        how.importance = options->importance;
     }
     TRY(blocks_find_in(scene, &how, &made, &f.blocks, error));
     if (f.blocks.joined) {

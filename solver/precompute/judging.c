@@ -188,6 +188,7 @@ static judge_input input_of(const judging *j, judge_references *r) {
                          .row_sums = j->f->row_sums,
                          .emission = j->m->emission,
                          .read = j->importance != NULL ? j->importance->read : NULL,
+                         .emits = j->importance != NULL ? j->importance->emits : NULL,
                          .own = own,
                          .independent = blocks ? block_factors_product(&r->finer)
                                                : factor_product_of_rows(&r->half[0].F),

@@ -21,7 +21,7 @@ typedef struct judging {
     const uint32_t *order;
     const build_problem *problem; /* with the F that the operator was built from */
     const form_factors *f;        /* of problem: its recipe and row sums */
-    importance *importance;       /* of receivers, with which blocks were found; NULL: all is read */
+    importance *importance;       /* with which blocks were found; NULL: all is read, and emits */
     recipe halves[2];             /* of the two samples; of blocks the first is taken */
     const char *scratch_names[2];
     const char *stages[2]; /* for progress */

@@ -23,6 +23,7 @@ typedef struct precompute_options {
     const char *keep_form_factors;      /* NULL: they are not kept; "": as they are; "compressed" */
     const char *emitters;               /* FILE, group=NAME, sky; or NULL */
     const char *receivers, *importance; /* NAME,NAME; FILE; one of them, or both NULL */
+    const char *sources;                /* NAME,NAME; or NULL */
     build_options build;                /* memory, seed and progress are set when the build begins */
     uint64_t threads, memory;           /* memory: bytes; 0: 70 % of what is free */
     const char *scratch;                /* a folder, or NULL */

@@ -144,6 +144,7 @@ static const option_row of_methods[] = {
     {.name = "emitters", .kind = OPTION_TEXT, .offset = FIELD(emitters), .argument = "FILE|group=NAME|sky"},
     {.name = "receivers", .kind = OPTION_TEXT, .offset = FIELD(receivers), .argument = "GROUP,..."},
     {.name = "importance", .kind = OPTION_TEXT, .offset = FIELD(importance), .argument = "FILE"},
+    {.name = "sources", .kind = OPTION_TEXT, .offset = FIELD(sources), .argument = "GROUP,..."},
     {0},
 };
 

@@ -73,7 +73,7 @@ typedef struct precompute_state {
     size_t probes;
     emitter_list emitters;
     emitter_source emitting; /* a view of emitters, for methods */
-    importance importance;   /* n is 0 where all is read */
+    importance importance;   /* n is 0 where all is read, and may emit */
     lam_operator *op;
     build_report built;
     error_report errors;
@@ -166,9 +166,9 @@ lam_status state_weigh_pairs(precompute_state *state, lam_error *error);
 lam_status stage_form_factors(precompute_state *state, lam_error *error);
 lam_status stage_near_pairs(precompute_state *state, lam_error *error);
 
-/* --receivers and --importance, into importance; the importance of all elements by the form factors that were
- * found, or of a stream by a few rays, where it is not known: stage_importance.c. Where all is read they do
- * nothing. */
+/* --receivers, --importance and --sources, into importance; the importance of all elements by the form
+ * factors that were found, or of a stream by a few rays, where it is not known: stage_importance.c. Without
+ * these options they do nothing. */
 lam_status state_read_importance(precompute_state *state, lam_error *error);
 lam_status state_find_importance(precompute_state *state, lam_error *error);
 

@@ -1,4 +1,5 @@
-/* --receivers and --importance: the elements that are read, and from them the importance of all. */
+/* --receivers, --importance and --sources: the elements that are read and those that emit, and from them the
+ * importance of all. */
 #include "solver/base/atomic_file.h"
 #include "solver/light/emission.h"
 #include "solver/precompute/precompute_state.h"
@@ -9,19 +10,19 @@
 #include <string.h>
 
 /* E [C][n]: every element of the groups NAME,NAME emits 1. */
-static lam_status read_groups(const char *names, const emission_scene *scene, emission *out,
-                              lam_error *error) {
+static lam_status read_groups(const char *option, const char *names, const emission_scene *scene,
+                              emission *out, lam_error *error) {
     lam_status status = LAM_OK;
     const mesh *m = scene->m;
-    char *name = memory_allocate(strlen(names) + 1, 1, "--receivers", error);
+    char *name = memory_allocate(strlen(names) + 1, 1, option, error);
     if (name == NULL) return LAM_ERR_MEMORY;
-    TRY(emission_allocate("--receivers", m->n_channels, m->n, 1, &out->E, error));
+    TRY(emission_allocate(option, m->n_channels, m->n, 1, &out->E, error));
     out->n_vectors = 1;
     for (const char *at = names;; at++) {
         const size_t length = strcspn(at, ",");
         memcpy(name, at, length);
         name[length] = '\0';
-        TRY(emission_fill_group(scene, "--receivers", name, NULL, out->E, error));
+        TRY(emission_fill_group(scene, option, name, NULL, out->E, error));
         at += length;
         if (*at == '\0') break;
     }
@@ -38,22 +39,20 @@ static lam_status read_file(const char *path, const emission_scene *scene, emiss
     return emission_read(path, scene, out, error);
 }
 
-lam_status state_read_importance(precompute_state *state, lam_error *error) {
+/* out [n]: the largest of all channels over the largest of all elements, of groups NAME,NAME or, where groups
+ * are NULL, of a file of one emission. */
+static lam_status read_weights(const char *option, const char *groups, const char *file,
+                               const emission_scene *scene, float **out, lam_error *error) {
     lam_status status = LAM_OK;
-    const precompute_options *o = state->options;
-    const mesh *m = &state->m;
-    const size_t n = m->n, C = m->n_channels;
-    emission_scene scene = {.m = NULL};
+    const size_t n = scene->m->n, C = scene->m->n_channels;
     emission read = {.E = NULL};
     float *w = NULL, most = 0;
-    if (o->receivers == NULL && o->importance == NULL) return LAM_OK;
-    TRY(emission_scene_create(m, &scene, error));
-    if (o->receivers != NULL)
-        TRY(read_groups(o->receivers, &scene, &read, error));
+    if (groups != NULL)
+        TRY(read_groups(option, groups, scene, &read, error));
     else
-        TRY(read_file(o->importance, &scene, &read, error));
+        TRY(read_file(file, scene, &read, error));
     if (read.n_vectors != 1)
-        FAIL(error, LAM_ERR_ARGUMENT, "--importance %.200s: has %zu vectors, must have 1", o->importance,
+        FAIL(error, LAM_ERR_ARGUMENT, "--importance %.200s: has %zu vectors, must have 1", file,
              read.n_vectors);
     w = memory_allocate(n, sizeof *w, "importance", error);
     if (w == NULL) TRY(LAM_ERR_MEMORY);
@@ -61,15 +60,33 @@ lam_status state_read_importance(precompute_state *state, lam_error *error) {
     for (size_t i = 0; i < n; i++) most = fmaxf(most, w[i]);
     if (!(most > 0))
         FAIL(error, LAM_ERR_ARGUMENT, "--importance %.200s: is 0 everywhere, must be above 0 somewhere",
-             o->importance);
-    if (!(state->expected->flags & METHOD_READS)) goto done;
+             file);
     for (size_t i = 0; i < n; i++) w[i] /= most;
-    state->importance = (importance){.n = n, .read = w};
+    *out = w;
     w = NULL;
 done:
     emission_free(&read);
-    emission_scene_free(&scene);
     free(w);
+    return status;
+}
+
+lam_status state_read_importance(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = state->options;
+    const mesh *m = &state->m;
+    emission_scene scene = {.m = NULL};
+    importance made = {.n = m->n};
+    if (o->receivers == NULL && o->importance == NULL && o->sources == NULL) return LAM_OK;
+    TRY(emission_scene_create(m, &scene, error));
+    if (o->receivers != NULL || o->importance != NULL)
+        TRY(read_weights("--receivers", o->receivers, o->importance, &scene, &made.read, error));
+    if (o->sources != NULL) TRY(read_weights("--sources", o->sources, NULL, &scene, &made.emits, error));
+    if (!(state->expected->flags & METHOD_READS)) goto done;
+    state->importance = made;
+    made = (importance){.n = 0};
+done:
+    emission_scene_free(&scene);
+    importance_free(&made);
     return status;
 }
 
@@ -92,7 +109,7 @@ done:
 }
 
 lam_status state_find_importance(precompute_state *state, lam_error *error) {
-    if (state->importance.n == 0 || state->importance.of != NULL) return LAM_OK;
+    if (state->importance.n == 0 || importance_is_found(&state->importance)) return LAM_OK;
     if (state->streamed) return find_by_rays(state, error);
     const factor_product F =
         state->blocks.n > 0 ? block_factors_product(&state->blocks) : factor_product_of_rows(&state->f.F);

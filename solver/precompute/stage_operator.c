@@ -288,6 +288,7 @@ lam_status stage_judge(precompute_state *state, lam_error *error) {
         j.halves[h] = state_judge_recipe(state, own);
     }
     TRY(judging_run(&j, state->op, &state->errors, error));
+    if (state->importance.emits != NULL) terminal_log(state->t, "errors of emissions of the sources alone:");
     log_figures(state->t, "single", &state->errors.single, state->errors.has_total);
     log_figures(state->t, "lights", &state->errors.lights, state->errors.has_total);
     log_figures(state->t, "random", &state->errors.random, state->errors.has_total);

@@ -456,8 +456,9 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
     TRY(choose_final_recipe(state, error));
     if (state->recipe.method == RECIPE_BLOCKS && state->importance.n > 0 && state_keeps(o))
         FAIL(error, LAM_ERR_ARGUMENT,
-             "--keep-form-factors: blocks that are found for receivers serve nothing else; leave out one of "
-             "both, or give --form-factors rays");
+             "--keep-form-factors: blocks that are found for %s serve nothing else; leave out one of "
+             "both, or give --form-factors rays",
+             state->importance.read != NULL ? "receivers" : "sources");
     const forecast f = state_forecast(state, (double)state->m.n);
     state->probes = forecast_probes(&f);
     if (state->probes > state->m.n) state->probes = state->m.n;

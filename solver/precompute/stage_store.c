@@ -19,18 +19,26 @@ done:
     return status;
 }
 
+/* *out: "OPTION VALUE", freed with free(). */
+static lam_status name_option(const char *name, const char *value, char **out, lam_error *error) {
+    const size_t length = strlen(name) + strlen(value) + 2;
+    *out = memory_allocate(length, 1, "store", error);
+    if (*out == NULL) return LAM_ERR_MEMORY;
+    snprintf(*out, length, "%s %s", name, value);
+    return LAM_OK;
+}
+
 static lam_status save_importance(const precompute_state *state, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
-    const bool groups = o->receivers != NULL;
-    const char *const value = groups ? o->receivers : o->importance;
-    const size_t length = strlen(value) + 16;
-    char *option = memory_allocate(length, 1, "store", error);
-    if (option == NULL) return LAM_ERR_MEMORY;
-    snprintf(option, length, "%s %s", groups ? "--receivers" : "--importance", value);
-    TRY(importance_save(&state->importance, option, s, error));
+    char *option = NULL, *sources = NULL;
+    if (o->receivers != NULL) TRY(name_option("--receivers", o->receivers, &option, error));
+    if (o->importance != NULL) TRY(name_option("--importance", o->importance, &option, error));
+    if (o->sources != NULL) TRY(name_option("--sources", o->sources, &sources, error));
+    TRY(importance_save(&state->importance, option, sources, s, error));
 done:
     free(option);
+    free(sources);
     return status;
 }
 

@@ -45,7 +45,7 @@ typedef struct examination {
     form_factors f; /* kept ones, or regenerated: with rows, or blocks in their place */
     plane_tree tree;
     block_factors blocks;
-    importance importance; /* of receivers; n is 0 where all is read */
+    importance importance; /* n is 0 where all is read, and emits; loaded with the operator */
     lam_operator *op;
     bool has_mesh;
     walk_comparison *compared; /* [n_compared] by verify_walks; the channels of a mean stand together */

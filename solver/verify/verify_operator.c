@@ -54,6 +54,7 @@ lam_status verify_operator(examination *e, check *c, lam_error *error) {
         check_say(c, VERDICT_SKIPPED, "no mesh to light");
         return LAM_OK;
     }
+    TRY(importance_load(e->s, e->m.n, &e->importance, error));
     TRY(operator_load(e->s, &e->op, error));
     operator_describe(e->op, &about);
     check_say(c, VERDICT_OK, "%s, %s, %zu bytes, finite", lam_operator_kind(e->op),
@@ -127,7 +128,8 @@ static double allowed_imbalance(store *s, bool own, double emitted, double area,
     return -1;
 }
 
-/* The light whose energy is tested: the scene's own, or uniform emission, or all emitters at once. Their sky
+/* The light whose energy is tested: the scene's own, or uniform emission, both of sources alone where the
+ * operator is for these, or all emitters at once. Their sky
  * counts by the light that the elements reflect of it (E + rho H0), and is taken out of their irradiance. */
 typedef struct lit {
     bool own;
@@ -151,9 +153,17 @@ static lam_status light_up(const examination *e, lit *l, lam_error *error) {
         for (size_t i = 0; i < count; i++) l->E[i] += m->reflectance[i] * l->H0[i];
         goto done;
     }
-    for (size_t i = 0; i < count; i++) l->own = l->own || m->emission[i] > 0;
-    for (size_t i = 0; i < count; i++) l->input[i] = l->E[i] = l->own ? m->emission[i] : 1;
-    l->name = l->own ? "the scene's own light" : "uniform emission";
+    const float *emits = e->importance.emits;
+    for (size_t i = 0; i < count; i++)
+        l->own = l->own || (m->emission[i] > 0 && (emits == NULL || emits[i % m->n] > 0));
+    for (size_t i = 0; i < count; i++) {
+        const float share = emits != NULL ? emits[i % m->n] : 1;
+        l->input[i] = l->E[i] = share * (l->own ? m->emission[i] : 1);
+    }
+    if (emits != NULL)
+        l->name = l->own ? "the light of the sources" : "uniform emission of the sources";
+    else
+        l->name = l->own ? "the scene's own light" : "uniform emission";
 done:
     return status;
 }
@@ -258,7 +268,7 @@ static recipe recipe_again(const examination *e, const recipe *of, seed_purpose 
     return recipe_of_judge(of, judge_rays(e), precompute_seed(of->seed, half));
 }
 
-/* NULL: all is read. */
+/* NULL: all is read, and emits. */
 static importance *importance_of(examination *e) {
     return e->importance.n > 0 ? &e->importance : NULL;
 }
@@ -282,7 +292,6 @@ static lam_status measure_again(examination *e, const recipe *from, error_report
     uint32_t *order = memory_allocate(e->m.n, sizeof *order, "the order of the elements", error);
     if (order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&e->m, order, error));
-    TRY(importance_load(e->s, e->m.n, &e->importance, error));
     TRY(find_again(e, from, order, error));
     const build_problem problem = {.n = e->m.n,
                                    .n_channels = e->m.n_channels,

@@ -47,22 +47,23 @@ static size_t find_largest(const double *value, size_t n, size_t most, size_t *l
     return found;
 }
 
-/* Per group its area, or, with power, the power that it emits. */
-static double *group_sums(const mesh *m, bool power, lam_error *error) {
+/* Per group its area, or, with power, the power that it emits; with emits [n] that of sources alone. */
+static double *group_sums(const mesh *m, bool power, const float *emits, lam_error *error) {
     double *sums = memory_allocate(m->n_groups, sizeof *sums, "groups", error);
     for (size_t i = 0; i < m->n && sums != NULL; i++) {
         double of = power ? 0 : 1;
+        if (emits != NULL && !(emits[i] > 0)) continue;
         for (size_t c = 0; c < m->n_channels && power; c++) of += (double)m->emission[c * m->n + i];
         sums[m->group[i]] += of * m->area[i];
     }
     return sums;
 }
 
-/* The groups that emit, or, where none does, the largest ones. */
-static lam_status find_bright_groups(const mesh *m, size_t groups[ALONE_MOST], size_t *count,
-                                     lam_error *error) {
+/* The groups that emit, or, where none does, the largest ones; of sources where there are any. */
+static lam_status find_bright_groups(const mesh *m, const float *emits, size_t groups[ALONE_MOST],
+                                     size_t *count, lam_error *error) {
     for (int by_area = 0; by_area < 2; by_area++) {
-        double *sums = group_sums(m, by_area == 0, error);
+        double *sums = group_sums(m, by_area == 0, emits, error);
         if (sums == NULL) return LAM_ERR_MEMORY;
         *count = find_largest(sums, m->n_groups, ALONE_MOST, groups);
         free(sums);
@@ -72,7 +73,7 @@ static lam_status find_bright_groups(const mesh *m, size_t groups[ALONE_MOST], s
 }
 
 /* Sets the inputs of every light; source s of a channel is a group or an emitter, of_input says which one an
- * input belongs to. */
+ * input belongs to. Where the operator is for some elements that emit, others are dark. */
 static void fill_inputs(const examination *e, const size_t *alone, const uint32_t *of_input, size_t n_sources,
                         lights *l) {
     const size_t inputs = examination_inputs(e), per_channel = inputs / e->m.n_channels;
@@ -82,6 +83,8 @@ static void fill_inputs(const examination *e, const size_t *alone, const uint32_
         for (size_t a = 0; a + 2 < l->n; a++) l->input[(1 + a) * inputs + k] = source == alone[a];
         l->input[(l->n - 1) * inputs + k] =
             random_to_float(random_hash(k / per_channel * n_sources + source + 1));
+        const bool dark = e->importance.emits != NULL && !(e->importance.emits[k % per_channel] > 0);
+        for (size_t a = 0; dark && a < l->n; a++) l->input[a * inputs + k] = 0;
     }
 }
 
@@ -92,7 +95,7 @@ static lam_status lights_create(const examination *e, lights *l, lam_error *erro
     const size_t n_emitters = lam_operator_emitters(e->op);
     size_t alone[ALONE_MOST], n_alone = n_emitters < ALONE_MOST ? n_emitters : ALONE_MOST;
     for (size_t a = 0; a < n_alone; a++) alone[a] = a;
-    if (n_emitters == 0) TRY(find_bright_groups(m, alone, &n_alone, error));
+    if (n_emitters == 0) TRY(find_bright_groups(m, e->importance.emits, alone, &n_alone, error));
     l->n = n_alone + 2;
     l->names[0] = "uniform";
     for (size_t a = 0; a < n_alone; a++)
@@ -139,7 +142,7 @@ static void choose_elements(const mesh *m, targets *t) {
 /* All other groups are target n, which nothing is compared with: it counts what comes to them. */
 static lam_status choose_groups(const mesh *m, targets *t, lam_error *error) {
     size_t groups[GROUPS_MOST];
-    double *area = group_sums(m, false, error);
+    double *area = group_sums(m, false, NULL, error);
     if (area == NULL) return LAM_ERR_MEMORY;
     t->n = find_largest(area, m->n_groups, GROUPS_MOST, groups);
     for (size_t i = 0; i < m->n; i++) t->of[i] = (uint32_t)t->n;

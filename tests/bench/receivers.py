@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
-"""A scene of which only some groups are read: what --receivers saves, and what the light there errs by.
+"""A scene of which only some groups are read, or emit: what --receivers and --sources save, and what the light errs by.
 
-    receivers.py [--lambert PROGRAM] [--scene OBJ --receivers GROUP,...] [--elements N] [--folder DIR] [--rounds R] [EPSILON ...]
+    receivers.py [--lambert PROGRAM] [--scene OBJ] [--receivers GROUP,...] [--sources GROUP,...] [--elements N] [--folder DIR]
+                 [--rounds R] [EPSILON ...]
 
-builds operators of a scene (preset: an office whose desks are read) with and without --receivers at each epsilon (preset
-.05 and .1), in turn, --probes 0, and prints processor seconds (the least of R rounds), bytes of the operator and errors
-as CSV: |B~ - B| / |B - E| over what is read and over all elements, of the scene's lamps, of two random emissions, and of
-48 single elements together; and, over all elements, of light that receivers alone emit: uniform, two random, 24 single
-ones. The reference is converged with blocks of a tenth of the bound or less, kept in DIR (preset: a folder that is removed).
+builds operators of a scene (preset: an office whose desks are read) without these options, with each of them that is given,
+and with both, at each epsilon (preset .05 and .1), in turn, --probes 0, and prints processor seconds (the least of R
+rounds), bytes of the operator and errors as CSV: |B~ - B| / |B - E| over what is read (with --receivers) and over all
+elements, of the scene's lamps, of two random emissions, and of 48 single elements together; and of light that the sources
+alone emit (without --sources: the receivers): the scene's lamps among them, uniform, two random, 24 single ones. The
+reference is converged with blocks of a tenth of the bound or less, kept in DIR (preset: a folder that is removed).
 """
 import argparse
 import os
@@ -101,8 +103,11 @@ def measure(options, folder):
     with h5py.File(reference) as file:
         area, n = file["mesh/area"][()], len(file["mesh/area"])
         names = [name.decode() if isinstance(name, bytes) else name for name in file["mesh/group_names"][()]]
-        inside = numpy.isin(file["mesh/group"][()], [names.index(name) for name in options.receivers.split(",")])
+        group = file["mesh/group"][()]
         channels, lamps = len(file["mesh/emission"]), file["mesh/emission"][()].max(axis=0)
+    read, emits = (numpy.isin(group, [names.index(name) for name in given.split(",")]) if given else None
+                   for given in (options.receivers, options.sources))
+    inside = read if emits is None else emits
     rng = numpy.random.default_rng(5)
 
     def singles(count, among):
@@ -110,10 +115,12 @@ def measure(options, folder):
         light[range(count), rng.choice(among, count, replace=False)] = 1
         return light
 
-    single, of_receivers = singles(48, n), singles(min(24, inside.sum()), numpy.flatnonzero(inside))
+    single, single_of_some = singles(48, n), singles(min(24, inside.sum()), numpy.flatnonzero(inside))
     lamps = lamps if lamps.max() > 0 else rng.random(n)
-    light = {"lamps": lamps[None], "random": rng.random((2, n)), "single": single,
-             "uniform_of_receivers": inside[None], "random_of_receivers": rng.random((2, n)) * inside, "single_of_receivers": of_receivers}
+    light = {"lamps": lamps[None], "random": rng.random((2, n)), "single": single, "uniform_of_some": inside[None],
+             "random_of_some": rng.random((2, n)) * inside, "single_of_some": single_of_some}
+    if (lamps * inside).max() > 0:
+        light["lamps_of_some"] = (lamps * inside)[None]
     sets, count = {}, 0
     for name, vectors in light.items():
         sets[name] = slice(count, count := count + len(vectors))
@@ -125,9 +132,12 @@ def measure(options, folder):
         return numpy.load(out).astype("f8").reshape(count, channels, n)
 
     truth = answers(reference, "--tolerance", 1e-4)
-    places = [("read", area * inside, name) for name in list(sets)[:3]] + [("all", area, name) for name in sets]
-    print("receivers,epsilon,processor_seconds,operator_MB," + ",".join(f"{where}_{name}" for where, _, name in places))
-    cases = [(epsilon, extra) for epsilon in options.epsilons for extra in ((), ("--receivers", options.receivers))]
+    places = [("all", area, name) for name in sets]
+    if read is not None:
+        places = [("read", area * read, name) for name in list(sets)[:None if options.sources else 3]] + places
+    print("receivers,sources,epsilon,processor_seconds,operator_MB," + ",".join(f"{where}_{name}" for where, _, name in places))
+    extras = [()] + [(name, given) for name, given in (("--receivers", options.receivers), ("--sources", options.sources)) if given]
+    cases = [(epsilon, extra) for epsilon in options.epsilons for extra in extras + ([extras[1] + extras[2]] if extras[2:] else [])]
     seconds = {case: [] for case in cases}
     for _ in range(options.rounds):
         for k, case in enumerate(cases):
@@ -137,7 +147,8 @@ def measure(options, folder):
             size = sum(item.nbytes for item in collect(file["operator"]))
         wrong = answers(folder / f"{k}.h5") - truth
         errors = [numpy.sqrt((w * wrong[sets[name]] ** 2).sum() / (w * truth[sets[name]] ** 2).sum()) for _, w, name in places]
-        print(f"{options.receivers.replace(',', '+') if case[1] else 'all'},{case[0]:g},{min(seconds[case]):.2f},{size / 1e6:.3f}," +
+        given = [case[1][case[1].index(name) + 1].replace(",", "+") if name in case[1] else "all" for name in ("--receivers", "--sources")]
+        print(f"{given[0]},{given[1]},{case[0]:g},{min(seconds[case]):.2f},{size / 1e6:.3f}," +
               ",".join(f"{e:.5f}" for e in errors), flush=True)
 
 
@@ -151,12 +162,17 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--lambert", default="lambert")
     parser.add_argument("--scene")
-    parser.add_argument("--receivers", default="desk")
+    parser.add_argument("--receivers")
+    parser.add_argument("--sources")
     parser.add_argument("--elements", type=int, default=10000)
     parser.add_argument("--folder", type=pathlib.Path)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("epsilons", nargs="*", type=float, default=[.05, .1])
     options = parser.parse_args()
+    if not options.scene and not options.receivers and not options.sources:
+        options.receivers = "desk"
+    if not options.receivers and not options.sources:
+        parser.error("give --receivers or --sources")
     with tempfile.TemporaryDirectory(prefix="lambert-receivers-") as made:
         folder = options.folder or pathlib.Path(made)
         folder.mkdir(exist_ok=True)

@@ -86,13 +86,13 @@ static double exchange_of_pair(const block_walk *w, uint32_t a, uint32_t b) {
     return pair_factor_exchange(&k->rules, &shapes[0], &shapes[1], k->exact);
 }
 
-/* Times the bounds of a block of two nodes: its error counts as often as the larger importance of both, y.
+/* Times the bounds of a block of two nodes: its error counts as often as the importance between them, y.
  * Blocks whose number goes as the bound to the power -p, p about 1, have the least sum of (y e)^2 where
  * errors e go as y^(-2 / (p + 2)). */
 static double bound_times(const block_finder *k, uint32_t a, uint32_t b) {
     static const double power = -.7;
-    if (k->importance == NULL) return 1;
-    return k->options->importance_share * pow((double)fmaxf(k->importance[a], k->importance[b]), power);
+    const importance *i = k->options->importance;
+    return i == NULL ? 1 : i->share_of_bounds * pow(importance_between(&k->important, a, b), power);
 }
 
 /* The candidates that segments are tested against. */
@@ -417,10 +417,9 @@ lam_status block_finder_set(block_finder *k, const block_options *options, lam_e
     k->spread = spread_most * sqrt(options->open);
     k->exact = k->joined ? fmax(options->exact, share_of_spread * k->spread) : options->exact;
     k->shade.seed = options->seed;
-    free(k->importance);
-    k->importance = NULL;
+    importance_nodes_free(&k->important);
     if (options->importance != NULL)
-        TRY(importance_of_nodes(options->importance, k->flat.m->area, k->tree, &k->importance, error));
+        TRY(importance_nodes_make(options->importance, k->flat.m->area, k->tree, &k->important, error));
     if (k->joined && k->elements == NULL) {
         k->elements = memory_allocate(k->tree->n, sizeof *k->elements, "blocks", error);
         if (k->elements == NULL) TRY(LAM_ERR_MEMORY);
@@ -435,9 +434,8 @@ void block_finder_free(block_finder *k) {
     occluders_free(&k->pieces);
     flat_clusters_free(&k->flat);
     free(k->elements);
-    free(k->importance);
+    importance_nodes_free(&k->important);
     k->elements = NULL;
-    k->importance = NULL;
 }
 
 lam_status block_finder_planes(const block_finder *k, uint32_t **out, size_t *count, lam_error *error) {

@@ -20,8 +20,8 @@ typedef struct block_finder {
     joined_kernel kernel;
     double
         spread; /* the share of itself that the kernel of such a block may vary by, if it is of middle size */
-    double exact;      /* relative tolerance of single pairs, unoccluded */
-    float *importance; /* [n_clusters + n] of nodes, root mean square over their elements; NULL: all are 1 */
+    double exact;               /* relative tolerance of single pairs, unoccluded */
+    importance_nodes important; /* of the importance of the options */
 } block_finder;
 
 /* All that no option changes; begins the nodes of blocks as well (block_factors_begin). out must stay where

@@ -15,10 +15,9 @@ typedef struct block_options {
     bool by_scene; /* segments are cast against the whole scene by Embree, also where few pieces stand between
                     */
     uint64_t seed; /* of visibility segments */
-    /* [n] by element, in (0, 1]: an error of a block counts as often as the larger importance of its two
-     * sides (importance.h), so that both bounds are over it, times the share. NULL: all are 1. */
-    const float *importance;
-    double importance_share;
+    /* Found: an error of a block counts as often as the importance between its two sides (importance.h), so
+     * that both bounds are over it, times the share of bounds. NULL: all are 1. */
+    const importance *importance;
     const progress *progress;
     const char *stage;
 } block_options;

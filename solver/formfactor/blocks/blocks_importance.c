@@ -11,7 +11,7 @@ lam_status blocks_importance(const mesh *m, const visibility *v, const plane_tre
     lam_status status = LAM_OK;
     block_options coarse = *options;
     block_factors made = {.n = 0};
-    if (io->of != NULL) return LAM_OK;
+    if (importance_is_found(io)) return LAM_OK;
     coarse.open = fmax(open_most, options->open);
     coarse.shadow = fmax(shadow_most, options->shadow);
     coarse.exact = exact;

@@ -5,9 +5,9 @@
 #include "solver/formfactor/blocks/blocks.h"
 #include "solver/operator/blocks/importance.h"
 
-/* Sets io->of (importance_find) where it is NULL. tree, v and m as for blocks_find. The bits do not depend on
- * the number of threads. Cost: that of blocks to within .02, and some products.
- * Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+/* Finds io (importance_find) where it is not found. tree, v and m as for blocks_find. The bits do not depend
+ * on the number of threads. Cost: that of blocks to within .02, and some products. Errors: LAM_ERR_MEMORY,
+ * LAM_ERR_CANCELLED. */
 lam_status blocks_importance(const mesh *m, const visibility *v, const plane_tree *tree,
                              const block_options *options, importance *io, lam_error *error);
 

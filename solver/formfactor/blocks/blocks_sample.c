@@ -91,8 +91,7 @@ static lam_status sample_finer(block_scene *scene, const recipe *r, const import
     importance even = {.n = 0};
     TRY(importance_even_out(read, &even, error));
     options.progress = p;
-    options.importance = even.of;
-    options.importance_share = even.share_of_bounds;
+    options.importance = &even;
     TRY(blocks_sample(scene, &options, out, NULL, error));
 done:
     importance_free(&even);
@@ -106,10 +105,7 @@ lam_status blocks_forecast(block_scene *scene, const recipe *r, const importance
     block_report w, finer;
     blocks_trial trial;
     options.progress = p;
-    if (read != NULL) {
-        options.importance = read->of;
-        options.importance_share = read->share_of_bounds;
-    }
+    options.importance = read;
     TRY(blocks_sample(scene, &options, &w, &trial, error));
     const double blocks = count_of(&w), walk = walk_seconds(&w), finish = finish_of(scene, &w);
     const double pace = sample_pace(trial.seconds, walk_seconds(&trial.work));

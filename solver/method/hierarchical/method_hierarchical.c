@@ -22,7 +22,7 @@
 
 typedef struct hierarchical_options {
     double epsilon;
-    const char *receivers, *importance; /* read by whoever makes the problem */
+    const char *receivers, *importance, *sources; /* read by whoever makes the problem */
 } hierarchical_options;
 
 static const option_row rows[] = {
@@ -46,6 +46,13 @@ static const option_row rows[] = {
      .argument = "FILE",
      .help = "The same with a weight for each group or element: a .json or .npy file like an emission, such "
              "as {\"groups\": {\"desk\": 1, \"wall\": 0.2}}"},
+    {.name = "sources",
+     .kind = OPTION_TEXT,
+     .offset = offsetof(hierarchical_options, sources),
+     .argument = "GROUP,...",
+     .help = "The groups that alone are going to emit, in any way: errors are kept small, and stated, for "
+             "such emissions; answers to others are only roughly right; --method auto then takes "
+             "hierarchical"},
     {0},
 };
 
@@ -128,12 +135,15 @@ static lam_status noise_of_rows(const csr *F, const double *area, double *out, l
 }
 
 /* Corrects the mean error of the operator for E = 1 - rho s, whose answer is B = 1 and H = s, the row sums of
- * F, where that error is much beside epsilon: H += (s - H~) (sum_j A_j E_j) / (sum_j A_j (1 - rho_j s_j)). */
+ * F, where that error is much beside epsilon: H += (s - H~) (sum_j A_j E_j) / (sum_j A_j (1 - rho_j s_j)).
+ * Not with sources: most of that error is of elements that do not emit, and would be added to the light of
+ * those that do. */
 static lam_status correct_mean(const build_problem *problem, const double *s, double epsilon,
                                const uint32_t *order, lam_operator *op, bool *corrected, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = problem->n, C = problem->n_channels, bytes = lam_operator_work_bytes(op, 1);
     double share = 0;
+    if (problem->importance != NULL && problem->importance->emits != NULL) return LAM_OK;
     double *missing = memory_allocate(C, n * sizeof *missing, "operator", error);
     double *light = memory_allocate(C, sizeof *light, "operator", error);
     float *E = memory_allocate(C, n * sizeof *E, "operator", error);
@@ -169,12 +179,13 @@ done:
 }
 
 /* Imposes on K of a channel the answer H = s of E = 1 - rho s, s the row sums of F. Not where importance
- * makes light elsewhere only roughly right: there the mean of all elements is none of those that are read. */
+ * makes light elsewhere only roughly right: there the mean of all elements is none of those that are read, or
+ * that emit. */
 static lam_status impose_uniform(const build_problem *problem, size_t c, const double *s,
                                  const plane_tree *tree, const wavelet_roots *roots, const double *area,
                                  const wavelet_inverse_input *inverse, csr *K, lam_error *error) {
     const size_t n = problem->n;
-    if (inverse->tile_over != NULL) return LAM_OK;
+    if (inverse->tile_times != NULL) return LAM_OK;
     double *E = memory_allocate(n, sizeof *E, "operator", error);
     if (E == NULL) return LAM_ERR_MEMORY;
     for (size_t i = 0; i < n; i++) E[i] = 1 - (double)problem->reflectance[c * n + i] * s[i];
@@ -346,7 +357,8 @@ static lam_status build(const build_problem *problem, const build_options *optio
                                                .entry = share->entry,
                                                .tile = share->tile,
                                                .tile_times = important.times,
-                                               .tile_over = important.over,
+                                               .tile_read = important.read,
+                                               .tile_emits = important.emits,
                                                .inner = share->inner,
                                                .skipped = share->skipped,
                                                .n_threads = n_threads,
@@ -474,10 +486,12 @@ static lam_status weigh(const decision *so_far, void *own, candidate *out, lam_e
     const double n = (double)p->n;
     operator_description about;
     out->object = "hierarchical";
-    if (o->receivers != NULL || o->importance != NULL) {
+    if (o->receivers != NULL || o->importance != NULL || o->sources != NULL) {
         out->claim = CLAIM_INPUT;
         snprintf(out->found, sizeof out->found, "no other method knows %s",
-                 o->receivers != NULL ? "--receivers" : "--importance");
+                 o->receivers != NULL    ? "--receivers"
+                 : o->importance != NULL ? "--importance"
+                                         : "--sources");
         return LAM_OK;
     }
     if (so_far->asked != NULL) return LAM_OK;

@@ -9,18 +9,20 @@ static const double power = .25;
 
 void wavelet_importance_free(wavelet_importance *i) {
     free(i->times);
-    free(i->over);
+    free(i->read);
+    free(i->emits);
     *i = (wavelet_importance){.times = NULL};
 }
 
-/* out [n_clusters]: the largest of `read` [n] by element. */
-static lam_status find_most(const float *read, const plane_tree *tree, float **out, lam_error *error) {
+/* out [n_clusters]: the largest of x [n] by element, no less than importance_least; NULL of NULL. */
+static lam_status find_most(const float *x, const plane_tree *tree, float **out, lam_error *error) {
+    if (x == NULL) return LAM_OK;
     float *made = memory_allocate(tree->n_clusters, sizeof *made, "operator", error);
     if (made == NULL) return LAM_ERR_MEMORY;
     for (size_t t = 0; t < tree->n_clusters; t++) {
         const plane_cluster *c = &tree->clusters[t];
-        for (uint32_t p = c->begin; c->leaf && p < c->end; p++)
-            made[t] = fmaxf(made[t], read[tree->order[p]]);
+        made[t] = (float)importance_least;
+        for (uint32_t p = c->begin; c->leaf && p < c->end; p++) made[t] = fmaxf(made[t], x[tree->order[p]]);
         if (!c->leaf) made[t] = fmaxf(made[c->left], made[t - 1]);
     }
     *out = made;
@@ -31,21 +33,21 @@ lam_status wavelet_importance_make(const importance *i, const double *area, cons
                                    float *weight, wavelet_importance *out, lam_error *error) {
     lam_status status = LAM_OK;
     wavelet_importance made = {.times = NULL};
-    float *y = NULL;
-    TRY(importance_of_nodes(i->of, area, tree, &y, error));
-    TRY(find_most(i->read, tree, &made.over, error));
+    importance_nodes nodes = {.of = NULL};
+    TRY(importance_nodes_make(i, area, tree, &nodes, error));
+    TRY(find_most(i->read, tree, &made.read, error));
+    TRY(find_most(i->emits, tree, &made.emits, error));
     made.times = memory_allocate(tree->n_clusters, sizeof *made.times, "operator", error);
     if (made.times == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t t = 0; t < tree->n_clusters; t++) {
-        const double looser = sqrt(i->share_of_thresholds) * pow((double)y[t], -power);
+        const double looser = sqrt(i->share_of_thresholds) * pow(importance_at(&nodes, t), -power);
         made.times[t] = (float)(1 / looser);
-        made.over[t] = fmaxf(made.over[t], (float)importance_least);
         weight[t] *= (float)looser;
     }
     *out = made;
     made = (wavelet_importance){.times = NULL};
 done:
     wavelet_importance_free(&made);
-    free(y);
+    importance_nodes_free(&nodes);
     return status;
 }

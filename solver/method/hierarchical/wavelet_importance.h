@@ -4,15 +4,15 @@
 
 #include "solver/operator/blocks/importance.h"
 
-/* Of the nodes of a basis; all NULL: all is read. */
+/* Of the nodes of a basis; all NULL: all is read, and may emit. */
 typedef struct wavelet_importance {
-    float *times, *over; /* of wavelet_inverse_input */
+    float *times, *read, *emits; /* of wavelet_inverse_input */
 } wavelet_importance;
 
 /* Multiplies the weights [n_clusters] of the nodes of a tree, by which coefficients of S and of its powers
- * are dropped, by what their importance y allows, s^1/2 y^-1/4; sets out for K, whose row i matters only
- * where element i is read, and column j where j is. s < 1 makes up for what is lost elsewhere. area [n] by
- * element. Errors: LAM_ERR_MEMORY. */
+ * are dropped, by what their importance y z allows, s^1/2 (y z)^-1/4; sets out for K, whose entry i, j
+ * matters only where element i is read and j emits, or the other way round. s < 1 makes up for what is lost
+ * elsewhere. area [n] by element. Errors: LAM_ERR_MEMORY. */
 lam_status wavelet_importance_make(const importance *i, const double *area, const plane_tree *tree,
                                    float *weight, wavelet_importance *out, lam_error *error);
 void wavelet_importance_free(wavelet_importance *i);

@@ -282,14 +282,20 @@ done:
 typedef struct kept_tiles {
     const uint32_t *number, *node;
     float entry, tile;
-    const float *times, *over;
+    const float *times, *read, *emits; /* of nodes; the last two may be NULL */
 } kept_tiles;
+
+static float share_of(const float *x, size_t node) {
+    return x != NULL ? x[node] : 1;
+}
 
 /* Times the thresholds: of entries of a node at coefficient j. */
 static float times_of(const kept_tiles *t, size_t node, size_t j) {
     if (t->node == NULL) return 1;
     const uint32_t other = t->node[j];
-    return t->times[node] * t->times[other] / fmaxf(t->over[node], t->over[other]);
+    const float seen = fmaxf(share_of(t->read, node) * share_of(t->emits, other),
+                             share_of(t->read, other) * share_of(t->emits, node));
+    return t->times[node] * t->times[other] / seen;
 }
 
 /* Rows first to last - 1 of K, those of a node, lose their lower triangle, entries that are not above
@@ -342,7 +348,7 @@ static lam_status final_upper(const doubling *d, term_rows *K, csr *out, lam_err
         for (size_t i = basis->nodes[t].first; i < last_of(basis, t); i++) node_of[i] = numbered;
         numbered += last_of(basis, t) > basis->nodes[t].first;
     }
-    if (input->tile_over != NULL) {
+    if (input->tile_times != NULL) {
         nodes = memory_allocate(n, sizeof *nodes, "wavelets", error);
         if (nodes == NULL) TRY(LAM_ERR_MEMORY);
         for (size_t t = 0; t < basis->n_nodes; t++)
@@ -353,7 +359,8 @@ static lam_status final_upper(const doubling *d, term_rows *K, csr *out, lam_err
                              .entry = input->entry * input->threshold,
                              .tile = input->tile * input->threshold,
                              .times = input->tile_times,
-                             .over = input->tile_over};
+                             .read = input->tile_read,
+                             .emits = input->tile_emits};
 #pragma omp parallel for schedule(dynamic, 256) num_threads((int)n_threads)
     for (size_t t = 0; t < basis->n_nodes; t++)
         keep_tiles(&kept, t, basis->nodes[t].first, last_of(basis, t), K, &d->works[omp_get_thread_num()]);

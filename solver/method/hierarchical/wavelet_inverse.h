@@ -22,9 +22,9 @@ typedef struct wavelet_inverse_input {
     float threshold;     /* of all shares, times weight_i weight_j: */
     float entry, tile; /* K_ij is kept above `entry`, where all K between two nodes, over their weights, have
                           a 2-norm above `tile` */
-    /* [n_nodes], both NULL: 1. K is kept above entry and tile times tile_times_a tile_times_b over the larger
-     * tile_over of its nodes. */
-    const float *tile_times, *tile_over;
+    /* [n_nodes]; times NULL: 1. K is kept above entry and tile times tile_times_a tile_times_b over the
+     * larger of read_a emits_b and read_b emits_a; read, emits NULL: 1. */
+    const float *tile_times, *tile_read, *tile_emits;
     float inner;   /* entries of products are kept above this share of it */
     float skipped; /* terms of products are left out below this share of it */
     size_t n_threads;

@@ -49,8 +49,7 @@ static block_options options_of(const subject *s, bool important, double finer) 
                            .shadow = blocks_shadow / finer,
                            .exact = 1e-6,
                            .seed = finer > 1 ? 2 : 1,
-                           .importance = important ? s->found.of : NULL,
-                           .importance_share = .5};
+                           .importance = important ? &s->found : NULL};
 }
 
 static void find_importance(subject *s) {
@@ -60,6 +59,7 @@ static void find_importance(subject *s) {
     ck_ok(form_factors_tree(&s->m, &tree, &error));
     ck_ok(visibility_create(&s->m, &v, &error));
     ck_ok(blocks_importance(&s->m, v, &tree, &options, &s->found, &error));
+    s->found.share_of_bounds = .5;
     visibility_destroy(v);
     plane_tree_free(&tree);
 }
@@ -112,7 +112,9 @@ START_TEST(what_is_read_is_as_good_for_less_work) {
     /* With bounds of twice the share there are fewer blocks. */
     block_report of_coarse;
     block_options coarse = some;
-    coarse.importance_share *= 2;
+    importance looser = s.found;
+    looser.share_of_bounds *= 2;
+    coarse.importance = &looser;
     light_of(&s, &coarse, even, &of_coarse);
     ck_assert_double_lt(of_coarse.segments, .9 * of_steered.segments);
     free(even);

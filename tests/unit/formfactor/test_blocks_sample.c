@@ -92,13 +92,11 @@ START_TEST(forecasts_know_receivers) {
     ck_ok(blocks_forecast(scene, &r, NULL, NULL, &of_all, &error));
     ck_ok(blocks_forecast(scene, &r, &read, NULL, &of_read, &error));
     ck_ok(importance_even_out(&read, &even, &error));
-    options.importance = read.of;
-    options.importance_share = read.share_of_bounds;
+    options.importance = &read;
     ck_ok(blocks_find_in(scene, &options, &f, &found, &error));
     block_factors_free(&f);
     block_scene_destroy(scene);
-    finer.importance = even.of;
-    finer.importance_share = even.share_of_bounds;
+    finer.importance = &even;
     ck_ok(block_scene_make(&m, &tree, &scene, &error));
     ck_ok(blocks_sample(scene, &finer, &halves, NULL, &error));
     check_near("cornell", "blocks for the lamp", of_read.entries / 2,

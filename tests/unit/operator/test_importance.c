@@ -118,6 +118,41 @@ START_TEST(shares_follow_the_mean_importance) {
 }
 END_TEST
 
+/* With sources z is found as y is, from the elements that emit; shares are the products of those of either
+ * alone. Without receivers y is nowhere. */
+START_TEST(sources_have_an_importance_of_their_own) {
+    subject s, other;
+    subject_make(&s);
+    subject_make(&other);
+    const factor_product F = product_of(&s);
+    importance emits = {.n = N, .emits = test_allocate(N, sizeof(float))};
+    for (size_t i = 3; i < 12; i++) emits.emits[i] = other.read.read[i] = 1;
+    for (size_t i = 0; i < N; i++) other.read.read[i] = emits.emits[i];
+    ck_assert(!importance_is_found(&s.read));
+    ck_assert(!importance_is_found(&emits));
+    ck_ok(importance_find(&F, C, s.rho, s.area, &s.read, &error));
+    ck_ok(importance_find(&F, C, s.rho, s.area, &other.read, &error));
+    ck_ok(importance_find(&F, C, s.rho, s.area, &emits, &error));
+    ck_assert(importance_is_found(&s.read));
+    ck_assert(importance_is_found(&emits));
+    ck_assert_ptr_null(emits.of);
+    ck_assert_mem_eq(emits.lit, other.read.of, N * sizeof(float));
+    ck_assert_double_eq(emits.share_of_bounds, other.read.share_of_bounds);
+    ck_assert_double_eq(emits.share_of_thresholds, other.read.share_of_thresholds);
+    importance both = {.n = N, .read = s.read.read, .emits = emits.emits};
+    ck_ok(importance_find(&F, C, s.rho, s.area, &both, &error));
+    ck_assert_mem_eq(both.of, s.read.of, N * sizeof(float));
+    ck_assert_mem_eq(both.lit, emits.lit, N * sizeof(float));
+    ck_assert_double_eq(both.share_of_bounds, s.read.share_of_bounds * emits.share_of_bounds);
+    ck_assert_double_eq(both.share_of_thresholds, s.read.share_of_thresholds * emits.share_of_thresholds);
+    both.read = both.emits = NULL;
+    importance_free(&both);
+    importance_free(&emits);
+    importance_free(&s.read);
+    importance_free(&other.read);
+}
+END_TEST
+
 /* A change p of what elements give off, by an error of the light that they get, changes what is read by
  * sum A w (I - R F)^-1 p. Where all rho are equal that is sum A y p, as A_i F_ij = A_j F_ji. */
 START_TEST(importance_weighs_what_changes) {
@@ -160,10 +195,14 @@ static plane_tree tree_of(double (*centre)[3], float (*normal)[3]) {
 START_TEST(nodes_have_the_mean_square_of_their_elements) {
     subject s;
     double centre[N][3] = {{0}};
-    float normal[N][3] = {{0}}, *of = NULL;
+    float normal[N][3] = {{0}};
+    importance_nodes nodes;
+    importance found = {.n = N};
     subject_make(&s);
     plane_tree tree = tree_of(centre, normal);
-    ck_ok(importance_of_nodes(s.read.read, s.area, &tree, &of, &error));
+    found.of = s.read.read;
+    ck_ok(importance_nodes_make(&found, s.area, &tree, &nodes, &error));
+    ck_assert_ptr_null(nodes.lit);
     ck_assert_uint_gt(tree.n_clusters, 8);
     for (size_t t = 0; t < tree.n_clusters; t++) {
         double square = 0, area = 0;
@@ -172,10 +211,43 @@ START_TEST(nodes_have_the_mean_square_of_their_elements) {
             square += s.area[i] * (double)s.read.read[i] * (double)s.read.read[i];
             area += s.area[i];
         }
-        ck_assert_double_eq_tol((double)of[t], sqrt(square / area), 1e-6);
+        ck_assert_double_eq_tol((double)nodes.of[t], sqrt(square / area), 1e-6);
     }
-    for (size_t p = 0; p < N; p++) ck_assert_float_eq(of[tree.n_clusters + p], s.read.read[tree.order[p]]);
-    free(of);
+    for (size_t p = 0; p < N; p++)
+        ck_assert_float_eq(nodes.of[tree.n_clusters + p], s.read.read[tree.order[p]]);
+    importance_nodes_free(&nodes);
+    plane_tree_free(&tree);
+    importance_free(&s.read);
+}
+END_TEST
+
+/* The light between two nodes goes both ways, and counts by the way that matters more; of one that is read
+ * and one that emits it counts fully. */
+START_TEST(importance_between_nodes_is_a_product) {
+    subject s;
+    double centre[N][3] = {{0}};
+    float normal[N][3] = {{0}}, z[N];
+    subject_make(&s);
+    plane_tree tree = tree_of(centre, normal);
+    for (size_t i = 0; i < N; i++) z[i] = .1f + .9f * (float)(i % 4) / 3;
+    for (int k = 0; k < 3; k++) {
+        const importance some = {.n = N, .of = k != 1 ? s.read.read : NULL, .lit = k != 0 ? z : NULL};
+        importance_nodes nodes;
+        ck_ok(importance_nodes_make(&some, s.area, &tree, &nodes, &error));
+        for (size_t p = 0; p < N; p += 7)
+            for (size_t q = 0; q < N; q += 3) {
+                const size_t i = tree.order[p], j = tree.order[q], a = tree.n_clusters + p,
+                             b = tree.n_clusters + q;
+                const double yi = k != 1 ? (double)s.read.read[i] : 1,
+                             yj = k != 1 ? (double)s.read.read[j] : 1;
+                const double zi = k != 0 ? (double)z[i] : 1, zj = k != 0 ? (double)z[j] : 1;
+                ck_assert_double_eq(importance_between(&nodes, a, b), fmax(yi * zj, yj * zi));
+                ck_assert_double_eq(importance_between(&nodes, b, a), importance_between(&nodes, a, b));
+                ck_assert_double_eq(importance_at(&nodes, a), yi * zi);
+            }
+        importance_nodes_free(&nodes);
+        ck_assert_ptr_null(nodes.of);
+    }
     plane_tree_free(&tree);
     importance_free(&s.read);
 }
@@ -197,6 +269,18 @@ START_TEST(a_reference_is_more_even) {
     importance_free(&even);
     ck_ok(importance_even_out(&s.read, &even, &error));
     ck_assert_double_eq(even.share_of_bounds, .7);
+    importance_free(&even);
+    /* Of receivers and sources it keeps below its share of what it judges. */
+    s.read.share_of_bounds = .16;
+    s.read.emits = test_allocate(N, sizeof(float));
+    s.read.lit = test_allocate(N, sizeof(float));
+    s.read.emits[3] = s.read.lit[3] = 1;
+    s.read.lit[4] = .25f;
+    ck_ok(importance_even_out(&s.read, &even, &error));
+    ck_assert_double_eq(even.share_of_bounds, 1.25 * .16);
+    ck_assert_mem_eq(even.emits, s.read.emits, N * sizeof *even.emits);
+    ck_assert_float_eq(even.lit[3], 1);
+    ck_assert_float_eq(even.lit[4], .5f);
     for (size_t i = 0; i < N; i++)
         ck_assert_double_eq_tol(pow((double)even.of[i], 2), (double)s.read.of[i], 1e-6);
     importance_free(&even);
@@ -231,10 +315,14 @@ START_TEST(stores_keep_the_weights) {
     subject_make(&s);
     close(mkstemp(path));
     ck_ok(store_create(path, &made, &error));
-    ck_ok(importance_save(&s.read, "--receivers desk", made, &error));
+    s.read.emits = test_allocate(N, sizeof(float));
+    s.read.emits[2] = s.read.emits[50] = 1;
+    ck_ok(importance_save(&s.read, "--receivers desk", "--sources lamp", made, &error));
     ck_ok(store_seal(made, &error));
     ck_ok(read_store(path, &found));
     ck_assert_uint_eq(found.n, N);
+    ck_assert_ptr_null(found.lit);
+    ck_assert_mem_eq(found.emits, s.read.emits, N * sizeof *found.emits);
     ck_assert_ptr_null(found.of);
     ck_assert_mem_eq(found.read, s.read.read, N * sizeof *found.read);
     importance_free(&found);
@@ -252,6 +340,19 @@ START_TEST(stores_keep_the_weights) {
         ck_assert_int_eq(read_store(path, &found), LAM_ERR_FORMAT);
         ck_assert_ptr_nonnull(strstr(error.message, wrong[k].says));
         ck_assert_ptr_null(found.read);
+    }
+    /* Sources alone, and elements that no scene has. */
+    for (uint32_t last = N - 1; last <= N; last++) {
+        const uint32_t emit[2] = {1, last};
+        ck_ok(store_create(path, &made, &error));
+        ck_ok(store_write(made, "/sources/elements", STORE_U32, 1, (size_t[]){2}, emit, &error));
+        ck_ok(store_seal(made, &error));
+        ck_assert_int_eq(read_store(path, &found), last < N ? LAM_OK : LAM_ERR_FORMAT);
+        if (last == N) ck_assert_ptr_nonnull(strstr(error.message, "/sources/elements[1] = 60"));
+        if (last == N) continue;
+        ck_assert_ptr_null(found.read);
+        for (uint32_t i = 0; i < N; i++) ck_assert_float_eq(found.emits[i], i == 1 || i == last ? 1 : 0);
+        importance_free(&found);
     }
     /* None is no error. */
     ck_ok(store_create(path, &made, &error));
@@ -285,6 +386,8 @@ int main(void) {
     TCase *cases = tcase_create("importance");
     tcase_add_test(cases, importance_is_the_radiosity_of_what_is_read);
     tcase_add_test(cases, shares_follow_the_mean_importance);
+    tcase_add_test(cases, sources_have_an_importance_of_their_own);
+    tcase_add_test(cases, importance_between_nodes_is_a_product);
     tcase_add_test(cases, importance_weighs_what_changes);
     tcase_add_test(cases, nodes_have_the_mean_square_of_their_elements);
     tcase_add_test(cases, a_reference_is_more_even);
