@@ -90,17 +90,26 @@ done:
     return status;
 }
 
-/* The errors for answers, and the groups that have nothing but receivers. */
+/* *out [n_groups]: true where `others` counts none among the elements of a group. */
+static lam_status find_groups(const scene *made,
+                              size_t (*others)(const stated_errors *, size_t, const uint32_t *), bool **out,
+                              lam_error *error) {
+    const group_index *groups = &made->groups;
+    *out = memory_allocate(groups->n_groups, sizeof **out, "groups", error);
+    if (*out == NULL) return LAM_ERR_MEMORY;
+    for (size_t g = 0; g < groups->n_groups; g++)
+        (*out)[g] = others(&made->errors, groups->start[g + 1] - groups->start[g],
+                           groups->elements + groups->start[g]) == 0;
+    return LAM_OK;
+}
+
+/* The errors for answers, and the groups that have nothing but receivers, or but sources. */
 static lam_status read_errors(store *s, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
-    const group_index *groups = &made->groups;
     TRY(stated_errors_read(s, made->n, &made->errors, error));
-    if (made->errors.read == NULL) goto done;
-    made->group_read = memory_allocate(groups->n_groups, sizeof *made->group_read, "receivers", error);
-    if (made->group_read == NULL) TRY(LAM_ERR_MEMORY);
-    for (size_t g = 0; g < groups->n_groups; g++)
-        made->group_read[g] = stated_errors_others(&made->errors, groups->start[g + 1] - groups->start[g],
-                                                   groups->elements + groups->start[g]) == 0;
+    if (made->errors.read != NULL) TRY(find_groups(made, stated_errors_others, &made->group_read, error));
+    if (made->errors.emits != NULL)
+        TRY(find_groups(made, stated_errors_strangers, &made->group_emits, error));
 done:
     return status;
 }
@@ -118,8 +127,26 @@ static bool asks_receivers(const scene *s, const radiosity_request *request) {
     return true;
 }
 
+/* True where the store was built for sources and something else emits. */
+static bool has_strange_light(const scene *s, const radiosity_request *request) {
+    const size_t C = s->n_channels, rows = (request->E != NULL ? request->n_dense : 0) * C;
+    const side_rows *sky = &request->sky;
+    if (s->errors.emits == NULL) return false;
+    for (size_t k = 0; k < request->n_spots; k++) {
+        const emission_spot *spot = &request->spots[k];
+        bool lit = false;
+        for (size_t c = 0; c < C; c++) lit = lit || request->colours[k * C + c] != 0;
+        if (lit && !(spot->whole_group ? s->group_emits : s->errors.emits)[spot->where]) return true;
+    }
+    for (size_t k = 0; sky->values != NULL && k < sky->n * C * lam_sky_tiles(s->sky); k++)
+        if (sky->values[k] > 0) return true;
+    return stated_errors_is_strange(&s->errors, rows, request->E);
+}
+
 void scene_note_error(const scene *s, const radiosity_request *request, answer_notes *notes) {
-    stated_errors_note(&s->errors, asks_receivers(s, request), notes);
+    const answer_scope scope = {.receivers_only = asks_receivers(s, request),
+                                .strange = has_strange_light(s, request)};
+    stated_errors_note(&s->errors, scope, notes);
 }
 
 static lam_status read_groups(store *s, scene *made, lam_error *error) {
@@ -311,6 +338,7 @@ void scene_release(scene *s) {
         free(s->area);
         stated_errors_free(&s->errors);
         free(s->group_read);
+        free(s->group_emits);
         scene_health_free(s->health);
         store_map_release(s->map);
         free(s->path);

@@ -41,6 +41,7 @@ struct scene {
     char *description;     /* the JSON of GET /v1/scenes/NAME */
     stated_errors errors;  /* of the store; of a variant none */
     bool *group_read;      /* [n_groups]: all its elements are receivers; NULL where the store is for all */
+    bool *group_emits;     /* [n_groups]: all its elements are sources; NULL where any emission is answered */
     memory_ledger *ledger; /* of memory taken later; or NULL */
     row_cache *rows;       /* adjoint rows for linear reductions; any thread */
     refined *refined;      /* the refiner of its answers, made when first needed */
@@ -78,8 +79,9 @@ uint64_t scene_work_memory(size_t n_threads, size_t work_bytes);
 lam_status scene_open_variant(scene *base, const char *name, const char *groups, lam_operator *op,
                               scene **out, lam_error *error);
 
-/* Puts the error of the store for what is asked into notes: that of receivers where nothing else is asked.
- * O(n_selected) of a store for receivers. Any thread. */
+/* Puts the error of the store for what is asked into notes: that of receivers where nothing else is asked,
+ * and none where others than sources emit. O(n_selected) of a store for receivers, O(emission) of one for
+ * sources. Any thread. */
 void scene_note_error(const scene *s, const radiosity_request *request, answer_notes *notes);
 
 /* Adds a reference, to be dropped by scene_release. Any thread. */

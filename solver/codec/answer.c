@@ -7,6 +7,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
 static bool no_memory(problem *why) {
     return problem_set(why, PROBLEM_NO_MEMORY,
@@ -19,13 +20,21 @@ bool answer_head(buffer *b, size_t n, size_t n_channels, const answer_notes *not
                          codec_quantity_name(notes->quantity));
 }
 
+/* The figures, and the elements that they are of; without figures a word on why there are none. */
+static bool write_error(buffer *b, const answer_notes *notes) {
+    const char *of = notes->error_of, *from = notes->error_from;
+    if (!notes->has_error)
+        return from == NULL || strcmp(from, "others") != 0 ||
+               buffer_append_text(b, ",\"error\":{\"from\":\"others\"}");
+    return buffer_append_text(b, ",\"error\":{\"relative_mean\":") &&
+           json_write_double(b, notes->relative_mean) && buffer_append_text(b, ",\"indirect_mean\":") &&
+           json_write_double(b, notes->indirect_mean) &&
+           (of == NULL || buffer_printf(b, ",\"of\":\"%s\"", of)) &&
+           (from == NULL || buffer_printf(b, ",\"from\":\"%s\"", from)) && buffer_append(b, "}", 1);
+}
+
 bool answer_tail(buffer *b, const answer_notes *notes) {
-    return (!notes->has_error || notes->certificates != NULL ||
-            (buffer_append_text(b, ",\"error\":{\"relative_mean\":") &&
-             json_write_double(b, notes->relative_mean) && buffer_append_text(b, ",\"indirect_mean\":") &&
-             json_write_double(b, notes->indirect_mean) &&
-             (notes->error_of == NULL || buffer_printf(b, ",\"of\":\"%s\"", notes->error_of)) &&
-             buffer_append(b, "}", 1))) &&
+    return (notes->certificates != NULL || write_error(b, notes)) &&
            (!notes->has_time ||
             buffer_printf(b, ",\"time_ms\":{\"parse\":%.3f,\"solve\":%.3f,\"encode\":%.3f}", notes->parse_ms,
                           notes->solve_ms, notes->encode_ms)) &&

@@ -22,6 +22,8 @@ typedef struct answer_notes {
     double relative_mean, indirect_mean;
     const char *error_of; /* the elements that the error is of, "receivers" or "all", where a store was built
                              for receivers; NULL: it was built for all */
+    const char *error_from; /* "sources" where a store was built for these and they alone emit; "others": not
+                               they alone, and no error is stated; NULL: it was built for any emission */
     bool has_time;
     double parse_ms, solve_ms, encode_ms;
     /* [n_rhs] of a refined answer, in place of the store's error, else NULL: the bound on the error of every

@@ -181,24 +181,27 @@ done:
     return status;
 }
 
-/* The elements that the operator was built for; null where it was built for all. */
-static lam_status add_importance(store *s, json_t *out, lam_error *error) {
+/* The elements that the operator was built for, and the option that named them; null where it was built for
+ * all. */
+static lam_status add_elements(store *s, const char *group, const char *member, json_t *out,
+                               lam_error *error) {
     lam_status status = LAM_OK;
     json_t *attributes = NULL;
     size_t dims[STORE_MAX_RANK];
     store_type type;
     int rank;
-    if (!store_has(s, "/importance")) {
-        json_object_set_new(out, "importance", json_null());
+    char path[64];
+    if (!store_has(s, group)) {
+        json_object_set_new(out, member, json_null());
         return LAM_OK;
     }
-    TRY(attributes_of(s, "/importance", &attributes, error));
-    TRY(store_array_info(s, "/importance/elements", &type, &rank, dims, error));
+    snprintf(path, sizeof path, "%s/elements", group);
+    TRY(attributes_of(s, group, &attributes, error));
+    TRY(store_array_info(s, path, &type, &rank, dims, error));
     if (rank != 1)
-        FAIL(error, LAM_ERR_FORMAT, "%s: /importance/elements has %d dimensions, must have 1", store_path(s),
-             rank);
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s has %d dimensions, must have 1", store_path(s), path, rank);
     json_object_set_new(attributes, "elements", json_integer((json_int_t)dims[0]));
-    json_object_set(out, "importance", attributes);
+    json_object_set(out, member, attributes);
 done:
     json_decref(attributes);
     return status;
@@ -238,7 +241,8 @@ lam_status describe_store(store *s, json_t **out, lam_error *error) {
     TRY(add_groups(s, dims[1], made, error));
     TRY(add_emitters(s, made, error));
     TRY(add_sky(s, made, error));
-    TRY(add_importance(s, made, error));
+    TRY(add_elements(s, "/importance", "importance", made, error));
+    TRY(add_elements(s, "/sources", "sources", made, error));
     TRY(add_error(s, made, error));
     TRY(add_provenance(s, root, made, error));
     *out = json_incref(made);

@@ -7,6 +7,7 @@
 
 void stated_errors_free(stated_errors *e) {
     free(e->read);
+    free(e->emits);
     *e = (stated_errors){.n = 0};
 }
 
@@ -22,37 +23,62 @@ static stated_error read_error(store *s, const char *relative, const char *indir
     return found;
 }
 
+/* *out [n]: true where a weight is above 0; NULL of NULL. */
+static lam_status find_members(const float *weights, size_t n, bool **out, lam_error *error) {
+    if (weights == NULL) return LAM_OK;
+    *out = memory_allocate(n, sizeof **out, "receivers and sources", error);
+    if (*out == NULL) return LAM_ERR_MEMORY;
+    for (size_t i = 0; i < n; i++) (*out)[i] = weights[i] > 0;
+    return LAM_OK;
+}
+
 lam_status stated_errors_read(store *s, size_t n, stated_errors *out, lam_error *error) {
     lam_status status = LAM_OK;
     importance weights = {.n = 0};
     stated_errors made = {.n = n, .all = read_error(s, "total_relative_mean", "total_indirect_mean")};
     TRY(importance_load(s, n, &weights, error));
-    if (weights.n > 0) {
-        made.read = memory_allocate(n, sizeof *made.read, "receivers", error);
-        if (made.read == NULL) TRY(LAM_ERR_MEMORY);
-        for (size_t i = 0; i < n; i++) made.read[i] = weights.read[i] > 0;
-        made.receivers = read_error(s, "receivers_relative", "receivers_indirect");
-    }
+    TRY(find_members(weights.read, n, &made.read, error));
+    TRY(find_members(weights.emits, n, &made.emits, error));
+    if (made.read != NULL) made.receivers = read_error(s, "receivers_relative", "receivers_indirect");
     *out = made;
-    made.read = NULL;
+    made.read = made.emits = NULL;
 done:
     importance_free(&weights);
     free(made.read);
+    free(made.emits);
     return status;
 }
 
-size_t stated_errors_others(const stated_errors *e, size_t count, const uint32_t *selected) {
+static size_t count_others(const bool *members, size_t count, const uint32_t *selected) {
     size_t others = 0;
-    for (size_t k = 0; e->read != NULL && k < count; k++)
-        others += !e->read[selected != NULL ? selected[k] : k];
+    for (size_t k = 0; members != NULL && k < count; k++)
+        others += !members[selected != NULL ? selected[k] : k];
     return others;
 }
 
-void stated_errors_note(const stated_errors *e, bool only, answer_notes *notes) {
-    const bool receivers = only && e->read != NULL;
+size_t stated_errors_others(const stated_errors *e, size_t count, const uint32_t *selected) {
+    return count_others(e->read, count, selected);
+}
+
+size_t stated_errors_strangers(const stated_errors *e, size_t count, const uint32_t *selected) {
+    return count_others(e->emits, count, selected);
+}
+
+bool stated_errors_is_strange(const stated_errors *e, size_t n_rows, const float *E) {
+    bool strange = false;
+    if (e->emits == NULL) return false;
+    for (size_t row = 0; row < n_rows && !strange; row++)
+        for (size_t i = 0; i < e->n; i++) strange |= E[row * e->n + i] != 0 && !e->emits[i];
+    return strange;
+}
+
+void stated_errors_note(const stated_errors *e, answer_scope scope, answer_notes *notes) {
+    const bool receivers = scope.receivers_only && e->read != NULL;
+    const bool strange = scope.strange && e->emits != NULL;
     const stated_error *of = receivers ? &e->receivers : &e->all;
-    notes->has_error = of->known;
+    notes->has_error = of->known && !strange;
     notes->relative_mean = of->relative;
     notes->indirect_mean = of->indirect;
-    notes->error_of = e->read == NULL ? NULL : receivers ? "receivers" : "all";
+    notes->error_of = e->read == NULL || strange ? NULL : receivers ? "receivers" : "all";
+    notes->error_from = e->emits == NULL ? NULL : strange ? "others" : "sources";
 }

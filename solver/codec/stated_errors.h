@@ -16,6 +16,7 @@ typedef struct stated_errors {
     stated_error all;       /* means over probes, of the light of all elements */
     stated_error receivers; /* of the light of receivers; known only where the store was built for them */
     bool *read;             /* [n], true of receivers; NULL: the store was built for all elements */
+    bool *emits; /* [n], true of sources; NULL: for any emission. All figures are of theirs alone */
     size_t n;
 } stated_errors;
 
@@ -29,8 +30,22 @@ lam_status stated_errors_read(store *s, size_t n, stated_errors *out, lam_error 
  * the store was built for all. O(count). */
 size_t stated_errors_others(const stated_errors *e, size_t count, const uint32_t *selected);
 
-/* Puts the error of an answer, and the elements that it is of, into notes. only: nothing but the light of
- * receivers is in the answer. The error of receivers stands in no other answer. */
-void stated_errors_note(const stated_errors *e, bool only, answer_notes *notes);
+/* The number among count elements that are no sources; selected NULL: the first count elements. 0 where the
+ * store was built for any emission. O(count). */
+size_t stated_errors_strangers(const stated_errors *e, size_t count, const uint32_t *selected);
+
+/* True where a value of E [n_rows][n] is not 0 at an element that is no source. O(n_rows n), or O(1) where
+ * the store was built for any emission. */
+bool stated_errors_is_strange(const stated_errors *e, size_t n_rows, const float *E);
+
+/* The elements of an answer, beside those that a store was built for. */
+typedef struct answer_scope {
+    bool receivers_only; /* nothing but the light of receivers is in the answer */
+    bool strange;        /* an element emits that is no source, or a sky */
+} answer_scope;
+
+/* Puts the error of an answer, the elements that it is of, and those that emit, into notes. The error of
+ * receivers stands in no other answer, and no error in a strange one. */
+void stated_errors_note(const stated_errors *e, answer_scope scope, answer_notes *notes);
 
 #endif

@@ -39,9 +39,9 @@ typedef struct solution {
     const double *certificates;
     const size_t *iterations;
     reduction *reductions;
-    size_t n_reductions;       /* 0: the values themselves are written */
-    double relative, indirect; /* mean error that the store states; negative: not measured */
-    const char *error_of;      /* of answer_notes */
+    size_t n_reductions;               /* 0: the values themselves are written */
+    double relative, indirect;         /* mean error that the store states; negative: not measured */
+    const char *error_of, *error_from; /* of answer_notes */
 } solution;
 
 /* Computes the figures of every reduction. LAM_ERR_MEMORY. */

@@ -145,6 +145,7 @@ static lam_status write_all(const solution *s, bool means, FILE *stream, lam_err
                                 .relative_mean = s->relative,
                                 .indirect_mean = s->indirect,
                                 .error_of = s->error_of,
+                                .error_from = s->error_from,
                                 .certificates = s->certificates,
                                 .iterations = s->iterations};
     const bool vectors = !means && s->names == NULL && s->n_reductions == 0;

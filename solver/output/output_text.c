@@ -60,7 +60,8 @@ void output_print(const solution *s) {
     else
         print_means(s);
     if (s->relative >= 0)
-        printf("stated error of the store%s%s: relative %.3g, indirect %.3g\n",
+        printf("stated error of the store%s%s%s%s: relative %.3g, indirect %.3g\n",
                s->error_of != NULL ? ", of the light of " : "", s->error_of != NULL ? s->error_of : "",
+               s->error_from != NULL ? ", emitted by " : "", s->error_from != NULL ? s->error_from : "",
                s->relative, s->indirect);
 }

@@ -110,7 +110,8 @@ static void print_receivers(const char *name, const json_t *group) {
            json_integer_value(json_object_get(group, "receivers_is_bound")) != 0 ? "  at most" : "");
 }
 
-static void print_error(const json_t *figures) {
+/* sources: probes emitted in these alone. */
+static void print_error(const json_t *figures, bool sources) {
     static const char *const names[] = {"single", "lights", "random"};
     bool receivers = false;
     if (json_object_size(figures) == 0) {
@@ -128,6 +129,7 @@ static void print_error(const json_t *figures) {
     if (receivers)
         puts("  receivers: of the light that is read, all probes together; total: of the light of all "
              "elements");
+    if (sources) puts("  single, lights, random: of emissions of the sources alone");
     puts("  total: against an independent sample of the form factors; at most: its noise is more than a "
          "third\n"
          "  operator: against the sample that it was built from\n"
@@ -156,12 +158,12 @@ static void print_sky(const json_t *sky) {
            json_number_value(json_object_get(sky, "ground_albedo")));
 }
 
-static void print_importance(const json_t *importance) {
-    if (!json_is_object(importance)) return;
-    const char *option = json_string_value(json_object_get(importance, "option"));
-    printf("%-18s%" JSON_INTEGER_FORMAT " elements, by %s; the light of others is only roughly right\n",
-           "read", json_integer_value(json_object_get(importance, "elements")),
-           option != NULL ? option : "?");
+/* The elements that are read, or that emit, and what others are. */
+static void print_elements(const char *label, const json_t *elements, const char *others) {
+    if (!json_is_object(elements)) return;
+    const char *option = json_string_value(json_object_get(elements, "option"));
+    printf("%-18s%" JSON_INTEGER_FORMAT " elements, by %s; %s\n", label,
+           json_integer_value(json_object_get(elements, "elements")), option != NULL ? option : "?", others);
 }
 
 static void print_text(const json_t *about) {
@@ -176,8 +178,10 @@ static void print_text(const json_t *about) {
     print_report(json_object_get(about, "report"));
     print_groups(json_object_get(about, "groups"));
     print_sky(json_object_get(about, "sky"));
-    print_importance(json_object_get(about, "importance"));
-    print_error(json_object_get(about, "error"));
+    print_elements("read", json_object_get(about, "importance"), "the light of others is only roughly right");
+    print_elements("emit", json_object_get(about, "sources"),
+                   "light that others emit is only roughly right, and no error is stated for it");
+    print_error(json_object_get(about, "error"), json_is_object(json_object_get(about, "sources")));
     const json_t *provenance = json_object_get(about, "provenance");
     const json_t *form_factors = json_object_get(provenance, "form_factors");
     static const char *const origin[] = {"tool", "command", "created", "seed", "unit", "geometry_hash"};

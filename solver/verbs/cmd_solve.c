@@ -130,23 +130,31 @@ static bool is_dark(const emission *light, size_t count) {
     return true;
 }
 
-/* Takes the error that the store states for the elements that are wanted; warns where it was built for
- * receivers and others are wanted. */
-static void take_error(const stated_errors *stated, size_t n_selected, const uint32_t *selected, terminal *t,
-                       solution *out) {
+/* Takes the error that the store states for the elements that are wanted and the light; warns where it was
+ * built for receivers and others are wanted, or for sources and others emit. */
+static void take_error(const stated_errors *stated, const emission *light, size_t n_selected,
+                       const uint32_t *selected, terminal *t, solution *out) {
     answer_notes notes = {.has_error = false};
     const size_t count = selected != NULL ? n_selected : stated->n;
     const size_t others = stated_errors_others(stated, count, selected);
-    stated_errors_note(stated, others == 0, &notes);
+    const size_t rows = light->E != NULL ? (light->steady ? 1 : light->n_vectors) * out->m->n_channels : 0;
+    const answer_scope scope = {.receivers_only = others == 0,
+                                .strange =
+                                    light->L != NULL || stated_errors_is_strange(stated, rows, light->E)};
+    stated_errors_note(stated, scope, &notes);
     if (notes.has_error) out->relative = notes.relative_mean;
     if (notes.has_error) out->indirect = notes.indirect_mean;
     out->error_of = notes.error_of;
+    out->error_from = notes.error_from;
     if (others > 0)
         terminal_warn(
             t,
             "%zu of %zu elements are no receivers, which the store was built for: their light is only "
             "roughly right",
             others, count);
+    if (stated->emits != NULL && scope.strange)
+        terminal_warn(t, "there is light from elsewhere than the sources, which the store was built for: the "
+                         "answer is only roughly right, and no error is stated for it");
 }
 
 /* The elements of the groups that are reduced, *selected freed with free(); NULL where all are wanted. */
@@ -290,7 +298,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
                     .indirect = -1,
                     .reductions = reductions,
                     .n_reductions = n_reductions};
-    if (f->tolerance == 0) take_error(&stated, n_selected, selected, t, &out);
+    if (f->tolerance == 0) take_error(&stated, &lit.light, n_selected, selected, t, &out);
     if (year->n_figures > 0) {
         out.names = names;
         TRY(solve_year(year, &lit.light, lit.op, lit.sky, n_selected, selected, t, &out, &values, error));

@@ -89,9 +89,9 @@ class Scene:
         return other
 
     def write(self, path, name="box", kind="low_rank", with_order=True, error=True, sky=0, keep_factors=False,
-              receivers=()):
-        """sky: so many tiles, 0 for none. keep_factors: a grey store as coloured ones are. receivers: the elements
-        that the store says to be built for, none for all."""
+              receivers=(), sources=()):
+        """sky: so many tiles, 0 for none. keep_factors: a grey store as coloured ones are. receivers, sources: the
+        elements that the store says to be built for, none for all."""
         n, C = self.n, self.channels
         order = self.order if with_order else np.arange(n)
         with h5py.File(path, "w", libver=("v108", "v108")) as f:
@@ -123,6 +123,8 @@ class Scene:
             if len(receivers):
                 arrays["/importance/elements"] = np.array(receivers, np.uint32)
                 arrays["/importance/weights"] = np.ones(len(receivers), np.float32)
+            if len(sources):
+                arrays["/sources/elements"] = np.array(sources, np.uint32)
             rho_stored = np.where(self.rho == 0, 1.0, self.rho)
             attributes = {"kind": kind, "layout": "rows", "reason": "a test", "epsilon": 0.05}
             if kind == "exact":
@@ -147,6 +149,8 @@ class Scene:
             set_attributes(f["operator"], attributes)
             if len(receivers):
                 set_attributes(f["importance"], {"option": "--receivers some"})
+            if len(sources):
+                set_attributes(f["sources"], {"option": "--sources some"})
             if sky:
                 set_attributes(f["sky"], {"tiling": f"grid:{sky}x1", "ground_albedo": 0.0, "up": "z"})
             set_attributes(f["mesh"], {"geometry_hash": "0" * 32, "name": name, "unit": 1.0, "up": "z", "two_sided": 0})

@@ -29,6 +29,9 @@ class Answers(unittest.TestCase):
         cls.exact3 = Scene(20, channels=3, seed=5).write(path / "exact3.h5", "exact3", kind="exact", sky=5)
         desks = Scene(60, seed=6)
         cls.desks = desks.write(path / "desks.h5", "desks", receivers=[*desks.members("floor"), *desks.members("lamp")[:-1]])
+        lamps = Scene(60, seed=7)
+        cls.lamps = lamps.write(path / "lamps.h5", "lamps", sky=4, sources=[*lamps.members("lamp"), *lamps.members("wall")[1:]])
+        cls.both = lamps.write(path / "both.h5", "both", receivers=lamps.members("floor"), sources=lamps.members("lamp"))
         cls.spaced = Scene(10, groups=("a~b/c", "größe", "x")).write(path / "spaced.h5", "two words/ä")
         cls.scenes = {name: getattr(cls, name) for name in ("grey", "exact", "plain", "colour", "exact3")}
         cls.daemon = Daemon("--stores", path, "--max-batch", 40)
@@ -203,6 +206,58 @@ class Answers(unittest.TestCase):
             self.assertEqual(about["error"][light]["total_indirect_mean"], 0.25)
         self.assertIsNone(self.daemon.get("/v1/scenes/grey").json()["importance"])
 
+    SOURCES = {"relative_mean": 0.125, "indirect_mean": 0.25, "from": "sources"}
+    OTHERS = {"from": "others"}
+
+    def test_answers_to_sources_alone_have_an_error(self):
+        floor, lamp, wall = (self.lamps.members(name).tolist() for name in ("floor", "lamp", "wall"))
+        dense, other, colourless = np.zeros(60), np.zeros(60), np.zeros((1, 60))
+        dense[lamp], dense[wall[1]], colourless[0, wall[2]] = 2, 1, 3
+        other[wall[0]] = 1e-9
+        for light, error in (
+            ({"elements": lamp[:2], "values": [1, 2]}, self.SOURCES),
+            ({"elements": [lamp[0], floor[0]], "values": [1, 2]}, self.OTHERS),
+            ({"elements": [lamp[0], floor[0]], "values": [1, 0]}, self.SOURCES),
+            ({"elements": [wall[0]], "values": [1]}, self.OTHERS),
+            ({"elements": [wall[1]], "values": [1]}, self.SOURCES),
+            ({"groups": {"lamp": 17}}, self.SOURCES),
+            ({"groups": {"lamp": 17, "floor": 0}}, self.SOURCES),
+            ({"groups": {"lamp": 17, "floor": 1}}, self.OTHERS),
+            ({"groups": {"wall": 1}}, self.OTHERS),
+            (dense.tolist(), self.SOURCES),
+            (colourless.tolist(), self.SOURCES),
+            (other.tolist(), self.OTHERS),
+            ([1] * 60, self.OTHERS),
+            ([0] * 60, self.SOURCES),
+            ({"groups": {"lamp": 1}, "sky": [0, 0, 0, 0]}, self.SOURCES),
+            ({"groups": {"lamp": 1}, "sky": [0, 1, 0, 0]}, self.OTHERS),
+        ):
+            for more in {}, {"select": {"groups": ["floor"]}}, {"reduce": {"groups": ["floor"], "with": ["mean"]}}, \
+                    {"reduce": {"groups": ["floor"], "with": ["mean", "max"]}}:
+                for _ in range(2 if "reduce" in more else 1):
+                    answer = self.solve("lamps", {"emission": light, **more}).json()
+                    self.assertEqual(answer["error"], error, (light, more))
+        # One strange vector of a batch is enough, whichever it is.
+        for batch, error in ([{"groups": {"lamp": 1}}, {"groups": {"lamp": 2}}], self.SOURCES), \
+                ([{"groups": {"lamp": 1}}, {"groups": {"floor": 2}}], self.OTHERS), \
+                ([dense.tolist(), other.tolist()], self.OTHERS), ([other.tolist(), {"groups": {"lamp": 1}}], self.OTHERS):
+            self.assertEqual(self.solve("lamps", {"emissions": batch}).json()["error"], error)
+
+    def test_receivers_and_sources_together(self):
+        for light, select, error in (
+            ("lamp", "floor", {**self.RECEIVERS, "from": "sources"}), ("lamp", "wall", {**self.ALL, "from": "sources"}),
+            ("wall", "floor", self.OTHERS), ("wall", "wall", self.OTHERS),
+        ):
+            body = {"emission": {"groups": {light: 1}}, "select": {"groups": [select]}}
+            self.assertEqual(self.solve("both", body).json()["error"], error, (light, select))
+
+    def test_a_scene_names_its_sources(self):
+        members = len(self.lamps.members("lamp")) + len(self.lamps.members("wall")) - 1
+        about = self.daemon.get("/v1/scenes/lamps").json()
+        self.assertEqual(about["sources"], {"option": "--sources some", "elements": members})
+        self.assertIsNone(about["importance"])
+        self.assertIsNone(self.daemon.get("/v1/scenes/grey").json()["sources"])
+
     def load(self, answer, dtype):
         self.assertEqual(answer.headers["Content-Type"], "application/x-npy")
         array = np.load(io.BytesIO(answer.body))
@@ -287,7 +342,7 @@ class Answers(unittest.TestCase):
 
     def test_scenes(self):
         listed = {s["name"]: s for s in self.daemon.get("/v1/scenes").json()["scenes"]}
-        self.assertEqual(set(listed), set(self.scenes) | {"two words/ä", "desks"})
+        self.assertEqual(set(listed), set(self.scenes) | {"two words/ä", "desks", "lamps", "both"})
         self.assertEqual(list(listed), sorted(listed, key=lambda name: name.encode()))
         self.assertEqual(listed["exact3"],
                          {"name": "exact3", "elements": 20, "channels": 3, "kind": "exact",

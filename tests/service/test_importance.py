@@ -1,5 +1,5 @@
-"""Stores for receivers, from the command line: what is read is right, what is stated holds, others are warned of, and
-what is asked for in vain is refused."""
+"""Stores for receivers and for sources, from the command line: what is read or emitted there is right, what is stated
+holds, others are warned of, and what is asked for in vain is refused."""
 
 import json
 import os
@@ -24,6 +24,8 @@ class Importance(Case):
         cls.store = os.path.join(cls.shared.name, "some.h5")
         cls.log = must("precompute", cls.room, "-o", cls.store, *HOW, "--receivers", "lamp", "--probes", 8).stderr
         cls.all = os.path.join(cls.shared.name, "all.h5")
+        cls.lit = os.path.join(cls.shared.name, "lit.h5")
+        cls.log_of_lit = must("precompute", cls.room, "-o", cls.lit, *HOW, "--sources", "lamp", "--probes", 8).stderr
         cls.log_of_all = must("precompute", cls.room, "-o", cls.all, *HOW, "--method", "hierarchical", "--probes", 0).stderr
 
     @classmethod
@@ -59,6 +61,63 @@ class Importance(Case):
         blocks = [int(re.search(r"\n(\d+) blocks of ", log)[1]) for log in (self.log, self.log_of_all)]
         self.assertLess(blocks[0], .9 * blocks[1])
 
+    def test_light_of_sources_errs_as_stated(self):
+        emits, area = self.is_read()
+        rng = numpy.random.default_rng(4)
+        light = (rng.random((3, len(area))) * emits).astype("f4")
+        exact = self.path("exact.h5")
+        must("precompute", self.room, "-o", exact, "--form-factors", "rays", "--method", "exact", "--probes", 0, "--quiet")
+        truth, found = self.solve(exact, light)[0], self.solve(self.lit, light)[0]
+        off = numpy.sqrt((area * (found - truth) ** 2).sum() / (area * truth ** 2).sum())
+        with h5py.File(self.lit) as file:
+            stated = file["error/random"].attrs
+            self.assertLess(off, stated["total_indirect_mean"] + 3 * stated["reference_noise"] + .0005)
+            self.assertGreater(off, .3 * stated["total_indirect_mean"])
+            self.assertEqual(list(file["sources/elements"][()]), list(numpy.flatnonzero(emits)))
+            self.assertNotIn("importance", file)
+            self.assertNotIn("receivers_indirect", stated)
+            some = file["operator"].attrs["density"]
+        with h5py.File(self.store) as file:
+            # S is symmetric: the operator is that of the lamp as a receiver.
+            self.assertEqual(some, file["operator"].attrs["density"])
+        about = json.loads(must("info", self.lit, "--json").stdout)
+        self.assertEqual(about["sources"], {"option": "--sources lamp", "elements": int(emits.sum())})
+        self.assertIsNone(about["importance"])
+        text = must("info", self.lit).stdout
+        self.assertRegex(text, r"\nemit +\d+ elements, by --sources lamp; light that others emit is only roughly right, "
+                               r"and no error is stated for it\n")
+        self.assertIn("\n  single, lights, random: of emissions of the sources alone\n", text)
+        self.assertIn("\nerrors of emissions of the sources alone:\nsingle ", self.log_of_lit)
+        for said in must("info", self.all).stdout, must("info", self.store).stdout, self.log:
+            self.assertNotIn("sources", said)
+
+    def test_light_of_others_is_warned_of(self):
+        warning = "there is light from elsewhere than the sources, which the store was built for"
+        with h5py.File(self.lit) as file:
+            stated = file["error/lights"].attrs["total_indirect_mean"]
+        for light, strange in (("lamp=1",), False), (("floor=1",), True), (("lamp=1", "floor=1e-9"), True), ((), False):
+            done = must("solve", self.lit, *(word for item in light for word in ("--emit", item)), "--json")
+            self.assertEqual(warning in done.stderr, strange, light)
+            error = json.loads(done.stdout)["error"]
+            if strange:
+                self.assertEqual(error, {"from": "others"})
+            else:
+                self.assertEqual((error["indirect_mean"], error["from"]), (stated, "sources"))
+        self.assertIn("stated error of the store, emitted by sources: ", must("solve", self.lit).stdout)
+        self.assertNotIn("stated error", must("solve", self.lit, "--emit", "floor=1").stdout)
+
+    def test_receivers_and_sources_go_together(self):
+        out = self.path("both.h5")
+        must("precompute", self.room, "-o", out, *HOW, "--sources", "lamp", "--receivers", "floor", "--probes", 4, "--quiet")
+        with h5py.File(out) as file, h5py.File(self.lit) as lit:
+            self.assertLess(file["operator"].attrs["density"], .7 * lit["operator"].attrs["density"])
+            self.assertGreater(file["error/lights"].attrs["receivers_indirect"], 0)
+        done = must("solve", out, "--reduce", "floor=mean", "--json")
+        self.assertNotIn("warning", done.stderr)
+        error = json.loads(done.stdout)["error"]
+        self.assertEqual((error["of"], error["from"]), ("receivers", "sources"))
+        self.assertRegex(must("verify", out, "--probes", 4).stdout, r"\nok +error ")
+
     def test_the_store_says_what_it_is_for(self):
         read, _ = self.is_read()
         with h5py.File(self.store) as file:
@@ -92,6 +151,21 @@ class Importance(Case):
         self.assertIn("stated error of the store, of the light of receivers: ", must("solve", self.store, "--reduce", "lamp=mean").stdout)
         self.assertNotIn("of the light of", must("solve", self.all).stdout)
         self.assertNotIn(warning, must("solve", self.all).stderr)
+
+    def test_verify_lights_sources_alone(self):
+        done = must("verify", self.lit, "--probes", 8, "--walks", 2000)
+        self.assertRegex(done.stdout, r"\nok +error ")
+        self.assertRegex(done.stdout, r"\nok +energy .* of the light of the sources ")
+        self.assertRegex(done.stdout, r"\nok +walks ")
+        other = self.path("other.h5")
+        with open(self.lit, "rb") as one, open(other, "wb") as two:
+            two.write(one.read())
+        with h5py.File(other, "r+") as file:
+            for end in "mean", "max", "std":
+                file["error/random"].attrs[f"total_indirect_{end}"] = 1e-7
+        done = lambert("verify", other, "--probes", 8)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("random: total indirect error", done.stdout)
 
     def test_verify_finds_what_is_stated(self):
         self.assertRegex(must("verify", self.store, "--probes", 8).stdout, r"\nok +error ")
@@ -143,6 +217,8 @@ class Importance(Case):
 
         last_line(1, '--receivers: the scene has no group "lmap"; did you mean "lamp"?', "--receivers", "lmap")
         last_line(1, "--receivers", "--receivers", "lamp,")
+        last_line(1, '--sources: the scene has no group "lmap"; did you mean "lamp"?', "--sources", "lamp,lmap")
+        last_line(1, "--sources", "--sources", "lamp,")
         last_line(2, "--receivers and --importance exclude each other", "--receivers", "lamp", "--importance", "w.json")
         for text, wanted in (('{"groups":{"lmap":1}}', "lmap"), ('{"groups":{"lamp":-1}}', "-1"),
                              ('{"groups":{"lamp":NaN}}', "w.json"), ('{"groups":{"lamp":1e999}}', "w.json"),
@@ -156,6 +232,13 @@ class Importance(Case):
         last_line(1, "--importance", "--importance", self.room)
         last_line(1, "--keep-form-factors: blocks that are found for receivers serve nothing else", *HOW, "--receivers",
                   "lamp", "--keep-form-factors")
+        last_line(1, "--keep-form-factors: blocks that are found for sources serve nothing else", *HOW, "--sources", "lamp",
+                  "--keep-form-factors")
+        done = must("precompute", self.box, "-o", out, "--method", "exact", "--rays", 64, "--probes", 0, "--sources", "floor")
+        self.assertIn("exact does not use --sources", done.stderr)
+        with h5py.File(out) as file:
+            self.assertNotIn("sources", file)
+        os.remove(out)
         done = must("precompute", self.box, "-o", out, "--method", "exact", "--rays", 64, "--probes", 0, "--receivers",
                     "floor")
         self.assertIn("exact does not use --receivers", done.stderr)
