@@ -40,11 +40,11 @@ lam_status pairs_sample(const mesh *m, const visibility *v, const pairs_options 
 double sample_pace(double seconds, double expected);
 
 typedef struct pairs_cost {
-    double seconds;      /* of one thread, by fixed costs of each kind of work: for a choice */
-    double measured;     /* the same at the pace of the sample on this machine: for a forecast */
-    double entries;      /* of F, or twice the blocks */
-    double finer;        /* of blocks: measured, of those that judge them; else 0 */
-    double hits;         /* of rays: the share that hits anything; 0: not known */
+    double seconds;  /* of one thread, by fixed costs of each kind of work: for a choice */
+    double measured; /* the same at the pace of the sample on this machine: for a forecast */
+    double entries;  /* of F, or twice the blocks */
+    double finer;    /* of blocks: measured, of those that judge them; else 0 */
+    double hits;     /* of rays: the share that hits anything; 0: not known */
 } pairs_cost;
 
 /* The cost of form factors by RECIPE_PAIRS, RECIPE_NEAR_PAIRS or RECIPE_RAYS, rays included, from

@@ -92,7 +92,7 @@ static double opposed_squares(double a, double c) {
  * segment: at most the exchange that a seed found, and in a block that is bounded by its norm about
  * shadow sqrt(A_a A_b) / 16. */
 START_TEST(small_openings_lose_nothing) {
-    enum { SEEDS = 16 };
+    enum { SEEDS = 64 };
     static const double cell = .5;
     const double hole = holes[_i / 2], thickness = thicknesses[_i % 2];
     const double truth = hole * hole * opposed_squares(hole, thickness);

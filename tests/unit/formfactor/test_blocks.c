@@ -137,6 +137,20 @@ static double street_exchange(const rectangles *r, size_t i, size_t j, bool hide
     return box_exchange(&one, &two);
 }
 
+/* The planes of the first part of a scene: the second one of a street are elements that see nothing. */
+static size_t planes_of_first_part(const plane_tree *tree) {
+    size_t top = tree->n_clusters - 1, count = 0;
+    if (tree->clusters[top].apart) top = tree->clusters[top].left;
+    ck_assert(!tree->clusters[top].apart && (!tree->clusters[tree->n_clusters - 2].apart || top < 2));
+    for (size_t t = 0, last = PLANE_ABOVE; t <= top; t++) {
+        const uint32_t frame = tree->clusters[t].frame;
+        if (frame == PLANE_ABOVE || frame == last) continue;
+        last = frame;
+        count++;
+    }
+    return count;
+}
+
 /* Houses nearly in a row are one plane of the tree, though each has its own height in it: none is in its own
  * shadow, and a board on a wall hides what is behind it and nothing else, unless it is within 1e-6 of the
  * scene's extent. Steps up to that which still joins planes: 1e-4 of the extent, 5. Light that grazes an edge
@@ -149,7 +163,7 @@ START_TEST(elements_of_a_plane_differ_in_height) {
     plane_tree tree;
     block_factors f = blocks_of(&r.m, &tree, 1e-5, 1e-4, NULL);
     ck_assert_uint_eq(r.m.n, STREET_ALL);
-    ck_assert_uint_eq(tree.n_frames, 3);
+    ck_assert_uint_eq(planes_of_first_part(&tree), 3);
     double wrong = 0, all = 0, most = 0, *x = calloc(r.m.n, sizeof *x), *y = malloc(r.m.n * sizeof *y);
     for (size_t j = 0; j < r.m.n; j++) {
         memset(x, 0, r.m.n * sizeof *x);
