@@ -92,26 +92,27 @@ static double opposed_squares(double a, double c) {
  * segment: at most the exchange that a seed found, and in a block that is bounded by its norm about
  * shadow sqrt(A_a A_b) / 16. */
 START_TEST(small_openings_lose_nothing) {
-    enum { SEEDS = 64 };
     static const double cell = .5;
     const double hole = holes[_i / 2], thickness = thicknesses[_i % 2];
     const double truth = hole * hole * opposed_squares(hole, thickness);
+    /* Few segments meet the smallest holes. */
+    const int seeds = hole < .05 ? 64 : 16;
     size_t count[2];
     mesh m = two_rooms(hole, thickness, cell, count);
     double sum = 0, square = 0, most = 0;
-    for (int s = 0; s < SEEDS; s++) {
+    for (int s = 0; s < seeds; s++) {
         plane_tree tree;
         block_factors f = blocks_of_seed(&m, &tree, (uint64_t)s);
         const double exchange = blocks_exchange(&m, &f, 0, count[0], count[0], count[1]);
-        sum += exchange / SEEDS;
-        square += exchange * exchange / SEEDS;
+        sum += exchange / seeds;
+        square += exchange * exchange / seeds;
         most = fmax(most, exchange);
         block_factors_free(&f);
         plane_tree_free(&tree);
     }
     const double share = fmax(most, blocks_shadow * cell * cell / 16);
     const double variance = fmax(square - sum * sum, sum < .5 * truth ? truth * share : 0);
-    const double within = 2 * sqrt(variance / (SEEDS - 1)) + blocks_open * truth;
+    const double within = 2 * sqrt(variance / (seeds - 1)) + blocks_open * truth;
     ck_assert_msg(fabs(sum - truth) <= within, "hole %g, wall %g: %g, not %g within %g", hole, thickness, sum,
                   truth, within);
     mesh_free(&m);
