@@ -178,6 +178,24 @@ done:
     return status;
 }
 
+/* True unless elements that see something are of several parts of the scene. */
+static bool is_lit_in_one_part(const wavelets *basis, const wavelet_roots *roots, const uint32_t *order,
+                               const double *s) {
+    bool any = false;
+    uint32_t root = WAVELET_NONE;
+    for (size_t t = 0; t < basis->n_nodes; t++) {
+        const wavelet_node *a = &basis->nodes[t];
+        if (a->from_left > 0) continue;
+        for (size_t p = a->begin; p < a->begin + a->n_elements; p++) {
+            if (!(s[order[p]] > 0)) continue;
+            if (any && roots->of_node[t] != root) return false;
+            root = roots->of_node[t];
+            any = true;
+        }
+    }
+    return true;
+}
+
 /* Imposes on K of a channel the answer H = s of E = 1 - rho s, s the row sums of F. Not where importance
  * makes light elsewhere only roughly right: there the mean of all elements is none of those that are read, or
  * that emit. */
@@ -367,11 +385,12 @@ static lam_status build(const build_problem *problem, const build_options *optio
         TRY(impose_uniform(problem, c, row_sums, tree, &roots, area, &inverse, &arrays.K[c], error));
         entries += (double)arrays.K[c].indptr[n];
     }
+    const bool in_one_part = is_lit_in_one_part(&arrays.basis, &roots, tree->order, row_sums);
     const size_t n_shapes = arrays.basis.n_shapes, n_nodes = arrays.basis.n_nodes;
     TRY(operator_hierarchical_create(n, C, problem->reflectance, area, tree->order, &arrays, &made, error));
     lam_operator_set_threads(made, n_threads);
     /* Light in proportion to the mean of all parts would not stay in its own. */
-    if (roots.count == 1) TRY(correct_mean(problem, row_sums, epsilon, tree->order, made, &corrected, error));
+    if (in_one_part) TRY(correct_mean(problem, row_sums, epsilon, tree->order, made, &corrected, error));
     report_number(report, "threshold", threshold);
     report->by_noise = !(threshold > least);
     report_step_add(report, "invert", clock_seconds() - expanded);
