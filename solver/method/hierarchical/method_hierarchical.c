@@ -385,7 +385,9 @@ static lam_status build(const build_problem *problem, const build_options *optio
         TRY(impose_uniform(problem, c, row_sums, tree, &roots, area, &inverse, &arrays.K[c], error));
         entries += (double)arrays.K[c].indptr[n];
     }
-    const bool in_one_part = is_lit_in_one_part(&arrays.basis, &roots, tree->order, row_sums);
+    /* Parts of a stream are those of a few rays, and some of their elements see others after all. */
+    const bool in_one_part =
+        problem->stream != NULL || is_lit_in_one_part(&arrays.basis, &roots, tree->order, row_sums);
     const size_t n_shapes = arrays.basis.n_shapes, n_nodes = arrays.basis.n_nodes;
     TRY(operator_hierarchical_create(n, C, problem->reflectance, area, tree->order, &arrays, &made, error));
     lam_operator_set_threads(made, n_threads);
