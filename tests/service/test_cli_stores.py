@@ -277,7 +277,7 @@ class Stores(Case):
         self.refused(2, "--walks -1: must not be negative", "verify", self.store, "--walks", "-1")
 
     def test_verify_of_light_that_reaches_nothing(self):
-        # The wavelets of a maze leak a little of the light of the tops of its walls, which see nothing.
+        # The tops of the walls of a maze see nothing: they are a part of their own, and none of their light leaks.
         scene, store = self.path("maze.obj"), self.path("maze.h5")
         must("generate", "maze", "--elements", 300, "-o", scene)
         must("precompute", scene, "-o", store, "--form-factors", "blocks", "--method", "hierarchical", "--probes", 8)
@@ -286,7 +286,7 @@ class Stores(Case):
         self.assertEqual({(walk["emission"], walk["dark"]) for walk in walks},
                          {("uniform", False), ("wall", False), ("floor", False), ("wall-top", True), ("mixture", False)})
         self.assertEqual({walk["walks"] for walk in walks if walk["dark"]}, {0})
-        self.assertNotEqual({walk["operator"] for walk in walks if walk["dark"]}, {0})
+        self.assertEqual({walk["operator"] for walk in walks if walk["dark"]}, {0})
         out = must(*command).stdout
         self.assertEqual(out.count(" under wall-top, dark\n"), sum(walk["dark"] for walk in walks))
         self.assertEqual(out.count(", dark\n"), sum(walk["dark"] for walk in walks))

@@ -215,6 +215,11 @@ START_TEST(noise_is_neither) {
 }
 END_TEST
 
+static void add_entry(csr *F, size_t row, size_t column, float value) {
+    F->indices[F->indptr[row + 1]] = (uint32_t)column;
+    F->data[F->indptr[row + 1]++] = value;
+}
+
 /* Groups that see one other group each, of rank GROUPS and few entries: low rank is cheapest, but no rival of
  * a hierarchical operator, which places that say nothing of who sees whom make a large one; a sparse inverse
  * is. A look at all of it ends as the short one does. */
@@ -226,16 +231,18 @@ START_TEST(low_rank_is_no_rival) {
     float(*normal)[3] = calloc(N, sizeof *normal);
     uint64_t state = 11;
     f.F = (csr){.n = N, .indptr = calloc(N + 1, sizeof *f.F.indptr)};
-    ck_assert_int_eq(csr_reserve(&f.F, (size_t)N * OF_GROUP, &error), LAM_OK);
+    ck_assert_int_eq(csr_reserve(&f.F, (size_t)N * OF_GROUP + GROUPS, &error), LAM_OK);
     f.order = malloc(N * sizeof *f.order);
     f.m.area = malloc(N * sizeof *f.m.area);
     f.m.reflectance = malloc(N * sizeof *f.m.reflectance);
     for (size_t i = 0; i < N; i++) {
+        const size_t group = i / OF_GROUP;
+        const bool first = i % OF_GROUP == 0;
         f.F.indptr[i + 1] = f.F.indptr[i];
-        for (size_t k = 0; k < OF_GROUP; k++) {
-            f.F.indices[f.F.indptr[i + 1]] = (uint32_t)((i / OF_GROUP ^ 1) * OF_GROUP + k);
-            f.F.data[f.F.indptr[i + 1]++] = 1.f / OF_GROUP;
-        }
+        /* A trace of light joins pairs of groups, so that the scene is one part. */
+        if (first && group % 2 == 0 && group > 0) add_entry(&f.F, i, (group - 1) * OF_GROUP, 1e-6f);
+        for (size_t k = 0; k < OF_GROUP; k++) add_entry(&f.F, i, (group ^ 1) * OF_GROUP + k, 1.f / OF_GROUP);
+        if (first && group % 2 == 1 && group + 1 < GROUPS) add_entry(&f.F, i, (group + 1) * OF_GROUP, 1e-6f);
         f.order[i] = (uint32_t)i;
         f.m.area[i] = 1;
         f.m.reflectance[i] = .5f;
