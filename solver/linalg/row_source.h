@@ -47,7 +47,7 @@ typedef struct row_stream {
     void *context;        /* of close */
     double noise_share;   /* of the rows of S by a sample: their noise over that of a closed scene of equal
                              elements, above 0; 0: not known */
-    const uint32_t *part; /* [n]: parts of the scene that exchange no light, as far as known; NULL: one */
+    const uint32_t *part; /* [n]: parts of the scene as of plane_tree_make, as far as known; NULL: one */
     row_source others;    /* readable after close: rows of F of an independent sample, entries in any order */
 } row_stream;
 

@@ -1,6 +1,6 @@
 #include "solver/render/smooth_nodes.h"
 
-#include "solver/scene/union_find.h"
+#include "solver/base/union_find.h"
 
 #include <math.h>
 #include <stdlib.h>

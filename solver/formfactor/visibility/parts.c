@@ -1,21 +1,13 @@
 #include "solver/formfactor/visibility/parts.h"
 
 #include "solver/base/random.h"
+#include "solver/base/union_find.h"
 #include "solver/formfactor/visibility/sample.h"
 #include "store/status.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* The root of i in a forest whose roots point to themselves; paths are halved. */
-static uint32_t root_of(uint32_t *above, uint32_t i) {
-    while (above[i] != i) {
-        above[i] = above[above[i]];
-        i = above[i];
-    }
-    return i;
-}
 
 /* Ray number `round` of an element: from its centroid, cosine-weighted. */
 static void set_ray(const mesh *m, const visibility *v, size_t i, size_t round, size_t lane, ray_packet *to) {
@@ -55,60 +47,38 @@ static void cast_round(const mesh *m, const visibility *v, size_t round, const u
     }
 }
 
-/* The root of the largest part; of several, the first. sizes [n] is overwritten. */
-static uint32_t largest_part(uint32_t *above, size_t n, uint32_t *sizes) {
+/* A member of the largest part; of several, of the first. sizes [n] is overwritten. */
+static uint32_t member_of_largest(uint32_t *parent, size_t n, uint32_t *sizes) {
     uint32_t best = 0;
     memset(sizes, 0, n * sizeof *sizes);
-    for (size_t i = 0; i < n; i++) sizes[root_of(above, (uint32_t)i)]++;
+    for (size_t i = 0; i < n; i++) sizes[union_find_root(parent, (uint32_t)i)]++;
     for (size_t i = 0; i < n; i++)
         if (sizes[i] > sizes[best]) best = (uint32_t)i;
     return best;
-}
-
-/* Numbers parts by their first elements; those of one element become the last. */
-static size_t number_parts(uint32_t *above, size_t n, uint32_t *sizes) {
-    size_t count = 0;
-    (void)largest_part(above, n, sizes);
-    for (size_t i = 0; i < n; i++) above[i] = root_of(above, (uint32_t)i);
-    uint32_t *const number = sizes; /* of a root; the size of a part is not needed once it has one */
-    bool alone = false;
-    for (size_t i = 0; i < n; i++) {
-        if (above[i] != i) continue;
-        if (n > 1 && sizes[i] == 1) {
-            number[i] = UINT32_MAX;
-            alone = true;
-        } else {
-            number[i] = (uint32_t)count++;
-        }
-    }
-    for (size_t i = 0; i < n; i++)
-        above[i] = number[above[i]] == UINT32_MAX ? (uint32_t)count : number[above[i]];
-    return count + alone;
 }
 
 lam_status visibility_parts(const mesh *m, const visibility *v, uint32_t *part, size_t *count,
                             lam_error *error) {
     lam_status status = LAM_OK;
     const size_t n = m->n;
-    uint32_t *left = memory_allocate(n, sizeof *left, "parts of the scene", error);
+    uint32_t *left = memory_allocate(n, sizeof *left, "parts of the scene", error), largest = 0;
     uint32_t *met = memory_allocate(n, sizeof *met, "parts of the scene", error), *const sizes = met;
     size_t n_left = n;
     if (left == NULL || met == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < n; i++) part[i] = left[i] = (uint32_t)i;
     for (size_t round = 0; round < PARTS_RAYS && n_left > 0; round++) {
         cast_round(m, v, round, left, n_left, met);
-        for (size_t k = 0; k < n_left; k++) {
-            if (met[k] == VISIBILITY_NOTHING) continue;
-            const uint32_t a = root_of(part, left[k]), b = root_of(part, met[k]);
-            part[a > b ? a : b] = a > b ? b : a;
-        }
-        const uint32_t largest = largest_part(part, n, sizes);
+        for (size_t k = 0; k < n_left; k++)
+            if (met[k] != VISIBILITY_NOTHING) (void)union_find_join(part, left[k], met[k]);
+        /* After 1, 2, 4, ... rounds: it takes a pass over all elements. */
+        if ((round & (round + 1)) == 0) largest = member_of_largest(part, n, sizes);
         size_t kept = 0;
         for (size_t k = 0; k < n_left; k++)
-            if (root_of(part, left[k]) != largest) left[kept++] = left[k];
+            if (union_find_root(part, left[k]) != union_find_root(part, largest)) left[kept++] = left[k];
         n_left = kept;
     }
-    *count = number_parts(part, n, sizes);
+    *count = union_find_number(part, n);
+    union_find_mark_alone(part, n, *count, sizes);
 done:
     free(left);
     free(met);

@@ -3,6 +3,7 @@
  * (Gortler et al. 1993; Beylkin et al. 1991). */
 #include "solver/base/clock.h"
 #include "solver/method/choice.h"
+#include "solver/method/hierarchical/hierarchical_forecast.h"
 #include "solver/method/hierarchical/self_check.h"
 #include "solver/method/hierarchical/wavelet_basis.h"
 #include "solver/method/hierarchical/wavelet_blocks.h"
@@ -88,12 +89,6 @@ static const double elements_of_threshold = 1e4, growth_of_threshold = 1. / 6;
  * hemisphere of 4,489 triangles at 1, 1/2 and 1/4 of it), so that it falls with the square of the norm below
  * this one. Rooms have 6 to 15, whatever the number of elements, a sphere 1, a hemisphere .5. */
 static const double norm_least = 1.5;
-/* Of rows the threshold falls with the elements per plane below so many, to a third at most. Wavelets find
- * smooth light in planes alone: where planes have one or two elements, coefficients are the factors of pairs,
- * which are less noise than those of smooth light, and the numbers left out are most of the error. With this
- * share single elements of delft-block (1.4 elements in a plane) err by .069 for .093, of cities (5) by half.
- */
-static const double elements_of_plane = 12, planes_least = 1. / 3;
 /* Times the radius of a node over the cube root of the threshold: the reach of the node (wavelet_reach.h).
  * The light from beyond eight radii changes no coefficient by more than a threshold of .0026, as was
  * measured. */
@@ -176,24 +171,6 @@ done:
     free(H);
     free(work);
     return status;
-}
-
-/* True unless elements that see something are of several parts of the scene. */
-static bool is_lit_in_one_part(const wavelets *basis, const wavelet_roots *roots, const uint32_t *order,
-                               const double *s) {
-    bool any = false;
-    uint32_t root = WAVELET_NONE;
-    for (size_t t = 0; t < basis->n_nodes; t++) {
-        const wavelet_node *a = &basis->nodes[t];
-        if (a->from_left > 0) continue;
-        for (size_t p = a->begin; p < a->begin + a->n_elements; p++) {
-            if (!(s[order[p]] > 0)) continue;
-            if (any && roots->of_node[t] != root) return false;
-            root = roots->of_node[t];
-            any = true;
-        }
-    }
-    return true;
 }
 
 /* Imposes on K of a channel the answer H = s of E = 1 - rho s, s the row sums of F. Not where importance
@@ -284,11 +261,6 @@ done:
     return status;
 }
 
-/* The share that the threshold of rows falls to, by the planes of the tree. */
-static double share_of_planes(double n, double planes) {
-    return fmin(fmax(n / (elements_of_plane * planes), planes_least), 1);
-}
-
 /* The threshold over epsilon: by the norm of S where F has no noise, and of rows by `planes`, the share by
  * the elements per plane, if that is less. Rows of rays have a norm by their noise, too: noise_of_rows lowers
  * their threshold. */
@@ -328,13 +300,14 @@ static lam_status build(const build_problem *problem, const build_options *optio
     double *area = memory_allocate(n, sizeof *area, "operator", error), entries = 0, of_epsilon = 0;
     double *sums = memory_allocate(n, sizeof *sums, "operator", error);
     const double *row_sums = sums;
-    double noise = 1, planes = 1; /* over that of a closed scene of equal elements; share_of_planes */
+    double noise = 1,
+           planes = 1; /* over that of a closed scene of equal elements; hierarchical_share_of_planes */
     bool corrected = false;
     if (arrays.K == NULL || rho == NULL || area == NULL || sums == NULL) TRY(LAM_ERR_MEMORY);
     if (problem->blocks == NULL) {
         TRY(wavelet_tree_make(n, problem->F, problem->stream != NULL ? problem->stream->part : NULL,
                               problem->centre, problem->normal, problem->corners, &made_tree, error));
-        planes = share_of_planes((double)n, (double)tree->n_frames);
+        planes = hierarchical_share_of_planes((double)n, (double)tree->n_frames);
     }
     TRY(threshold_share(problem, planes, &of_epsilon, error));
     if (problem->noise > 0 && problem->F != NULL)
@@ -385,14 +358,12 @@ static lam_status build(const build_problem *problem, const build_options *optio
         TRY(impose_uniform(problem, c, row_sums, tree, &roots, area, &inverse, &arrays.K[c], error));
         entries += (double)arrays.K[c].indptr[n];
     }
-    /* Parts of a stream are those of a few rays, and some of their elements see others after all. */
-    const bool in_one_part =
-        problem->stream != NULL || is_lit_in_one_part(&arrays.basis, &roots, tree->order, row_sums);
     const size_t n_shapes = arrays.basis.n_shapes, n_nodes = arrays.basis.n_nodes;
     TRY(operator_hierarchical_create(n, C, problem->reflectance, area, tree->order, &arrays, &made, error));
     lam_operator_set_threads(made, n_threads);
-    /* Light in proportion to the mean of all parts would not stay in its own. */
-    if (in_one_part) TRY(correct_mean(problem, row_sums, epsilon, tree->order, made, &corrected, error));
+    /* Light in proportion to the mean of several parts would not stay in its own. */
+    if (roots.count <= 1 + (size_t)(tree->n_alone > 0))
+        TRY(correct_mean(problem, row_sums, epsilon, tree->order, made, &corrected, error));
     report_number(report, "threshold", threshold);
     report->by_noise = !(threshold > least);
     report_step_add(report, "invert", clock_seconds() - expanded);
@@ -421,75 +392,8 @@ done:
     return status;
 }
 
-/* Stored coefficients per element at epsilon .05 and with the threshold of large planes: measured 26 to 66
- * where F is known well (a Cornell box of 10,249 elements), 69 to 101 of cities of 8,000, 87 of a canopy of
- * 8,000, fewer of larger scenes, and 114 at .003 in that box. Where the noise of rays bounds them, as an
- * epsilon of nearly three times that or less (noise_of_rows), 40 of a city by 1,024 rays, 44 of a hotel room,
- * 36 of Delft. Memory is forecast for the most of them, time for usual ones. With a third of the threshold,
- * where planes are small (share_of_planes), a canopy has 2.1 times as many, delft-block 1.6, and an inverse
- * takes twice as long. */
-static const double noise_share = 1.6, numbers_most = 100, numbers_usual = 66, planes_power = -.7,
-                    planes_time_power = -.35;
-
-/* Bytes of a coefficient in memory: both triangles in tiles of 12 bytes; in a store; and while it is built
- * from rows, beside two kilobytes per element for the tree (measured: 5.7 kB per element at 27 coefficients,
- * 16 kB at 114). */
-static const double loaded_bytes = 10, stored_bytes = 2.5, building_bytes = 130, element_bytes = 2000;
-
-/* Coefficients for a block of form factors, at most: measured 2.0 to 2.4 (Cornell boxes of 163,687 and
- * 2,620,549 elements); bytes of one while it is built from blocks: measured 16 to 34 of as many. */
-static const double coefficients_of_block = 3, building_bytes_of_blocks = 60;
-
-/* Processor seconds of the expansion of S per block, per entry of rows and per element, and of the inverse of
- * a channel per element, per coefficient of S and per pair of coefficients of a row, which its products
- * multiply: by fits to two Cornell boxes, rooms, a maze, a patio and an atrium at three epsilons, and to five
- * scenes by rays. Rows are weighed by other methods first. */
-static const double expand_block_seconds = 9e-8, expand_entry_seconds = 6e-8, expand_element_seconds = 4e-6,
-                    invert_element_seconds = 1e-6, invert_seconds = 3e-7, multiply_seconds = 1e-9,
-                    multiply_rows_seconds = 7e-9;
-/* Coefficients of S per element, from b blocks per element as a sample has them: 1.8 b^.77, within a third of
- * those scenes (16 to 741 blocks, 17 to 388 coefficients). A sample counts up to 2.3 times the blocks that
- * are kept where most are pairs of elements, as many of these turn out hidden; pairs have more coefficients.
- */
-static const double kept_of_blocks = 1.8, power_of_blocks = .77;
-
-/* Light between small planes that stays in the scene makes products of more terms: times 1 + 2.4 (hits - .4)
- * (1 / share_of_planes - 1). Of a hotel room, which 7 % of the rays leave, this is 3.5 times the work that
- * towns take, which 60 % leave. */
-static const double hits_of_towns = .4, products_of_hits = 2.4;
-/* Processor seconds of an answer, among many, per stored coefficient: the judge of a hotel room takes .62 s
- * for a probe of three channels, of which products with F are .25 s and eight answers the rest. */
-static const double answer_number_seconds = 1.3e-9;
-
-static double products_between_planes(const method_scale *scale, double planes) {
-    return 1 + products_of_hits * fmax(scale->hits - hits_of_towns, 0) * (1 / planes - 1);
-}
-
-static double seconds_of(const method_scale *scale, double numbers_of_rows, double planes) {
-    const double n = scale->n, blocks = scale->n_blocks;
-    const double of_blocks = kept_of_blocks * pow(blocks / n, power_of_blocks);
-    const double numbers = blocks > 0 ? of_blocks : numbers_of_rows;
-    const double expand = blocks > 0 ? blocks * expand_block_seconds : scale->entries * expand_entry_seconds;
-    const double multiply =
-        blocks > 0 ? multiply_seconds : multiply_rows_seconds * products_between_planes(scale, planes);
-    return expand + n * expand_element_seconds +
-           scale->n_channels * n * (invert_element_seconds + numbers * (invert_seconds + numbers * multiply));
-}
-
 static void forecast(const method_scale *scale, const void *own, method_forecast *out) {
-    const double epsilon = ((const hierarchical_options *)own)->epsilon, blocks = scale->n_blocks;
-    const double planes = scale->n_planes > 0 ? share_of_planes(scale->n, scale->n_planes) : 1;
-    const double finer = scale->n * sqrt(.05 / fmax(epsilon, noise_share * scale->noise));
-    const double of_rows = numbers_most * finer * pow(planes, planes_power);
-    const double usual = numbers_usual * finer * pow(planes, planes_time_power);
-    const double count = blocks > 0 ? coefficients_of_block * blocks : of_rows;
-    *out = (method_forecast){
-        .building = blocks > 0 ? building_bytes_of_blocks * count * scale->n_channels
-                               : element_bytes * scale->n + building_bytes * count,
-        .loaded = loaded_bytes * count * scale->n_channels,
-        .stored = stored_bytes * count * scale->n_channels,
-        .seconds = seconds_of(scale, usual / scale->n, planes),
-        .answer = blocks > 0 ? 0 : answer_number_seconds * numbers_usual * finer * pow(planes, planes_power)};
+    hierarchical_forecast(scale, ((const hierarchical_options *)own)->epsilon, out);
 }
 
 static double block_accuracy(const void *own) {

@@ -1,6 +1,7 @@
 #include "solver/method/hierarchical/wavelet_basis.h"
 
 #include "solver/base/array_grow.h"
+#include "solver/base/union_find.h"
 #include "solver/linalg/csr_parts.h"
 
 #include "store/status.h"
@@ -14,15 +15,13 @@ lam_status wavelet_tree_make(size_t n, const csr *F, const uint32_t *part, const
                              lam_error *error) {
     lam_status status = LAM_OK;
     size_t n_parts = 0;
-    uint32_t *joined = NULL, *elements = NULL; /* of each part */
+    uint32_t *joined = NULL, *sizes = NULL;
     if (F != NULL) {
         joined = memory_allocate(n, sizeof *joined, "clusters", error);
-        elements = memory_allocate(n, sizeof *elements, "clusters", error);
-        if (joined == NULL || elements == NULL) TRY(LAM_ERR_MEMORY);
+        sizes = memory_allocate(n, sizeof *sizes, "clusters", error);
+        if (joined == NULL || sizes == NULL) TRY(LAM_ERR_MEMORY);
         csr_parts(F, joined, &n_parts);
-        for (size_t i = 0; i < n; i++) elements[joined[i]]++;
-        for (size_t i = 0; i < n; i++)
-            if (elements[joined[i]] == 1) joined[i] = (uint32_t)n_parts;
+        union_find_mark_alone(joined, n, n_parts, sizes);
     }
     /* One part has the order of a tree that knows of none. */
     TRY(plane_tree_make(n, centre, normal, corners,
@@ -32,7 +31,7 @@ lam_status wavelet_tree_make(size_t n, const csr *F, const uint32_t *part, const
                         PLANE_LEAF, out, error));
 done:
     free(joined);
-    free(elements);
+    free(sizes);
     return status;
 }
 

@@ -11,7 +11,7 @@
 #include "solver/operator/wavelet/wavelets.h"
 
 /* The tree of the basis of rows, with leaves of PLANE_LEAF. The parts of the scene that it keeps apart are
- * those that F does not join, elements that see nothing being one; where F is NULL, those of part [n] (NULL:
+ * those that F does not join; where F is NULL, those of part [n] (NULL:
  * one). Otherwise as plane_tree_make. Cost: O(n log n), and the entries of F if it has several parts. Errors:
  * LAM_ERR_MEMORY. */
 lam_status wavelet_tree_make(size_t n, const csr *F, const uint32_t *part, const double (*centre)[3],

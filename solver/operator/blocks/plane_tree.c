@@ -1,6 +1,7 @@
 #include "solver/operator/blocks/plane_tree.h"
 
 #include "solver/base/array_sort.h"
+#include "solver/base/union_find.h"
 #include "solver/base/vector3.h"
 #include "solver/operator/blocks/plane_order.h"
 #include "solver/operator/blocks/plane_walls.h"
@@ -489,6 +490,7 @@ lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*no
     if (counts == NULL) TRY(LAM_ERR_MEMORY);
     split_all(&k, begins, counts);
     TRY(join_all(&k, begins, counts, error));
+    for (size_t i = 0; part != NULL && i < n; i++) tree.n_alone += part[i] == UNION_FIND_ALONE;
     *out = tree;
     tree = (plane_tree){.n = 0};
 done:

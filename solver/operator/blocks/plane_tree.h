@@ -32,6 +32,7 @@ typedef enum plane_view { PLANE_VIEW_UNKNOWN, PLANE_VIEW_HIDDEN, PLANE_VIEW_UNHI
 
 typedef struct plane_tree {
     size_t n, n_clusters, n_frames;
+    size_t n_alone;          /* elements of UNION_FIND_ALONE, the last positions; 0 of a tree from a store */
     uint32_t *order;         /* [n], position -> element */
     plane_cluster *clusters; /* [n_clusters], postorder */
     plane_frame *frames;     /* [n_frames] */
@@ -48,7 +49,8 @@ typedef struct element_corners {
 void plane_tree_free(plane_tree *tree);
 
 /* centre [n], unit normal [n]; a leaf has at most leaf_most elements. corners NULL: walls are not looked for.
- * part [n]: clusters that are not apart have elements of one number; NULL: all are of one part.
+ * part [n]: clusters that are not apart have elements of one number; NULL: all are of one part. Elements of
+ * UNION_FIND_ALONE, which exchange light with no other one, stand at the end and are one part in that.
  * Deterministic. Cost: O(n log n). Errors: LAM_ERR_MEMORY. */
 lam_status plane_tree_make(size_t n, const double (*centre)[3], const float (*normal)[3],
                            const element_corners *corners, const uint32_t *part, size_t leaf_most,

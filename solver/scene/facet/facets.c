@@ -1,9 +1,9 @@
 #include "solver/scene/facet/facets.h"
 
 #include "solver/base/array_sort.h"
+#include "solver/base/union_find.h"
 #include "solver/scene/facet/facet_outline.h"
 #include "solver/scene/tables.h"
-#include "solver/scene/union_find.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,8 +1,8 @@
 /* Rooms joined by corridors with a bend: "Aguerre 2016, figure 5.1", above on the right. Each is a plain box,
  * which sees next to nothing of the others. */
 #include "solver/base/random.h"
+#include "solver/base/union_find.h"
 #include "solver/scene/generate/blocks.h"
-#include "solver/scene/union_find.h"
 
 #include <math.h>
 

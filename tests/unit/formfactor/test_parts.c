@@ -1,4 +1,5 @@
 /* Parts of scenes that exchange no light. */
+#include "solver/base/union_find.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/rays/ray_rows.h"
 #include "solver/formfactor/visibility/parts.h"
@@ -68,9 +69,8 @@ START_TEST(a_window_joins_parts) {
 }
 END_TEST
 
-/* Lone elements are one part, wherever they are, and the last: those that see nothing, and one that sees the
- * backs of others. */
-START_TEST(what_sees_nothing_is_one_part) {
+/* An element that sees nothing is alone, and one that sees the backs of others. */
+START_TEST(what_sees_nothing_is_alone) {
     mesh m = {.n = 0};
     const box_cell up = {2, 5, {0, 0, 5}, {1, 1, 5}}, below = {2, -5, {0, 0, -5}, {1, 1, -5}};
     mesh_add_cell(&m, &up, true);
@@ -82,8 +82,9 @@ START_TEST(what_sees_nothing_is_one_part) {
     size_t count;
     mesh_finish(&m, .5f);
     uint32_t *part = parts_of(&m, &count);
-    ck_assert_uint_eq(count, 2);
-    for (size_t i = 0; i < m.n; i++) ck_assert_uint_eq(part[i], i == 0 || i == m.n - 1);
+    ck_assert_uint_eq(count, 3);
+    for (size_t i = 0; i < m.n; i++)
+        ck_assert_uint_eq(part[i], i == 0 || i == m.n - 1 ? UNION_FIND_ALONE : 1);
     free(part);
     mesh_free(&m);
 }
@@ -134,7 +135,7 @@ int main(void) {
     tcase_set_timeout(tests, 120);
     tcase_add_test(tests, closed_boxes_are_parts);
     tcase_add_test(tests, a_window_joins_parts);
-    tcase_add_test(tests, what_sees_nothing_is_one_part);
+    tcase_add_test(tests, what_sees_nothing_is_alone);
     tcase_add_test(tests, parts_do_not_depend_on_threads);
     tcase_add_test(tests, trees_and_streams_know_parts);
     suite_add_tcase(suite, tests);

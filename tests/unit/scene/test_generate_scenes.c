@@ -1,9 +1,9 @@
 /* Properties that all generated scenes of many surfaces have. */
 #include "support/suite.h"
 
+#include "solver/base/union_find.h"
 #include "solver/formfactor/visibility/sample.h"
 #include "solver/formfactor/visibility/visibility.h"
-#include "solver/scene/union_find.h"
 #include "support/scene.h"
 
 typedef struct scene_kind {
