@@ -48,10 +48,10 @@ class SealedBoxes(unittest.TestCase):
     def path(cls, name):
         return os.path.join(cls.folder, name)
 
-    def check_dark(self, roundings, *options):
+    def check_dark(self, roundings, *options, scene="boxes.obj", store="boxes.h5"):
         """The largest irradiance of a dark box, over that of the lit one, in roundings of single precision."""
-        store = self.path("boxes.h5")
-        must("precompute", self.path("boxes.obj"), "-o", store, "--probes", 0, "--quiet", *options)
+        store = self.path(store)
+        must("precompute", self.path(scene), "-o", store, "--probes", 0, "--quiet", *options)
         n = 6 * SIDE * SIDE
         for lit in range(3):
             for elements in range(n), [7]:
@@ -72,6 +72,28 @@ class SealedBoxes(unittest.TestCase):
                                  ["hierarchical", "--quality", "draft", "--epsilon", ".3"]):
             with self.subTest(method=method, options=options):
                 self.check_dark(0, "--method", method, *options)
+
+    def test_beside_a_city(self):
+        """Few rays in a city leave a mean error of uniform emission to correct, which light of a box has no part in."""
+        city, both, store = (self.path(name) for name in ("city.obj", "both.obj", "both.h5"))
+        must("generate", "city", "--elements", 1000, "-o", city)
+        with open(city, encoding="ascii") as file:
+            lines = file.readlines()
+        with open(both, "w", encoding="ascii") as file:
+            file.write("mtllib boxes.mtl\n")
+            file.writelines(lines)
+            box(file, -5000, 1 + sum(line.startswith("v ") for line in lines), "far")
+        must("precompute", both, "-o", store, "--method", "hierarchical", "--rays", 64, "--probes", 0, "--quiet")
+        must("solve", store, "--emit", "far5=1", "--quantity", "irradiance", "-o", self.path("H.npy"))
+        H = numpy.load(self.path("H.npy")).reshape(-1, numpy.load(self.path("H.npy")).shape[-1])[0]
+        n = 6 * SIDE * SIDE
+        self.assertGreater(H[-n:].max(), 0)
+        self.assertEqual(abs(H[:-n]).max(), 0)
+
+    def test_kept_blocks(self):
+        """An operator of blocks from a store knows the parts of the scene as well."""
+        self.check_dark(0, "--form-factors", "blocks", "--method", "hierarchical", "--keep-form-factors", store="kept.h5")
+        self.check_dark(0, "--method", "hierarchical", "--epsilon", ".2", scene="kept.h5")
 
     def test_low_rank(self):
         """Columns of boxes that are alike may mix: each of at most n products is rounded once."""

@@ -27,8 +27,9 @@ wavelet_plan plan_of_all(const wavelets *basis) {
 }
 
 uint32_t wavelet_subject_part(const subject *s, size_t element) {
-    /* A third of the elements, and every third and its neighbour of the others. */
-    return element < s->m.n / 3 ? 0 : element % 3 == 0 ? 1 : 2;
+    /* Of boxes the third one is one plane. */
+    if (element < s->m.n / 3) return 0;
+    return memcmp(s->m.normal[element], s->m.normal[s->m.n - 1], sizeof s->m.normal[0]) == 0 ? 2 : 1;
 }
 
 subject wavelet_subject_make(int chosen) {

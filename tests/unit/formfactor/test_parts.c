@@ -72,7 +72,7 @@ END_TEST
 /* An element that sees nothing is alone, and one that sees the backs of others. */
 START_TEST(what_sees_nothing_is_alone) {
     mesh m = {.n = 0};
-    const box_cell up = {2, 5, {0, 0, 5}, {1, 1, 5}}, below = {2, -5, {0, 0, -5}, {1, 1, -5}};
+    const box_cell up = {2, 5, {0, 0, 5}, {1, 1, 5}}, below = {2, -.25, {0, 0, -.25}, {1, 1, -.25}};
     mesh_add_cell(&m, &up, true);
     for (size_t i = 0; i < CUBE; i++) {
         const box_cell cell = box_cell_of(unit_cube, SIDE, i);
@@ -85,6 +85,11 @@ START_TEST(what_sees_nothing_is_alone) {
     ck_assert_uint_eq(count, 3);
     for (size_t i = 0; i < m.n; i++)
         ck_assert_uint_eq(part[i], i == 0 || i == m.n - 1 ? UNION_FIND_ALONE : 1);
+    plane_tree tree;
+    ck_ok(form_factors_tree(&m, &tree, &error));
+    ck_assert_uint_eq(tree.n_alone, 2);
+    ck_assert_uint_eq(tree.order[m.n - 2] + tree.order[m.n - 1], m.n - 1);
+    plane_tree_free(&tree);
     free(part);
     mesh_free(&m);
 }
@@ -116,6 +121,7 @@ START_TEST(trees_and_streams_know_parts) {
         const form_factor_options how = {.recipe = {.method = RECIPE_RAYS, .rays = 64, .seed = 1}};
         mesh_finish(&m, .5f);
         ck_ok(form_factors_tree(&m, &tree, &error));
+        ck_assert_uint_eq(tree.n_alone, 0);
         for (size_t t = 0; t < tree.n_clusters; t++)
             ck_assert(tree.clusters[t].apart == (boxes == 2 && t == tree.n_clusters - 1));
         ck_ok(ray_rows_create(&m, &how, &rows, &error));
