@@ -282,6 +282,23 @@ done:
     return status;
 }
 
+/* The threshold of K at an epsilon, and the least one, below which coefficients are noise. planes: as of
+ * threshold_share. */
+static lam_status find_threshold(const build_problem *problem, double planes, double epsilon, double *least,
+                                 double *threshold, lam_error *error) {
+    lam_status status = LAM_OK;
+    double of_epsilon, noise = 1; /* over that of a closed scene of equal elements */
+    TRY(threshold_share(problem, planes, &of_epsilon, error));
+    if (problem->noise > 0 && problem->F != NULL)
+        TRY(noise_of_rows(problem->F, problem->area, &noise, error));
+    if (problem->stream != NULL && problem->stream->noise_share > 0) noise = problem->stream->noise_share;
+    noise = fmax(noise, noise_least);
+    *least = noise * planes * share_of_noise * problem->noise;
+    *threshold = fmax(noise * of_epsilon * epsilon, *least);
+done:
+    return status;
+}
+
 static lam_status build(const build_problem *problem, const build_options *options, const void *own,
                         lam_operator **op, build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
@@ -297,11 +314,10 @@ static lam_status build(const build_problem *problem, const build_options *optio
     csr S = {.n = 0};
     lam_operator *made = NULL;
     float *weight = NULL, *rho = memory_allocate(n, sizeof *rho, "operator", error);
-    double *area = memory_allocate(n, sizeof *area, "operator", error), entries = 0, of_epsilon = 0;
+    double *area = memory_allocate(n, sizeof *area, "operator", error), entries = 0;
     double *sums = memory_allocate(n, sizeof *sums, "operator", error);
     const double *row_sums = sums;
-    double noise = 1,
-           planes = 1; /* over that of a closed scene of equal elements; hierarchical_share_of_planes */
+    double planes = 1, least, threshold;
     bool corrected = false;
     if (arrays.K == NULL || rho == NULL || area == NULL || sums == NULL) TRY(LAM_ERR_MEMORY);
     if (problem->blocks == NULL) {
@@ -309,13 +325,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
                               problem->centre, problem->normal, problem->corners, &made_tree, error));
         planes = hierarchical_share_of_planes((double)n, (double)tree->n_frames);
     }
-    TRY(threshold_share(problem, planes, &of_epsilon, error));
-    if (problem->noise > 0 && problem->F != NULL)
-        TRY(noise_of_rows(problem->F, problem->area, &noise, error));
-    if (problem->stream != NULL && problem->stream->noise_share > 0) noise = problem->stream->noise_share;
-    noise = fmax(noise, noise_least);
-    const double least = noise * planes * share_of_noise * problem->noise;
-    const double threshold = fmax(noise * of_epsilon * epsilon, least);
+    TRY(find_threshold(problem, planes, epsilon, &least, &threshold, error));
     TRY(wavelet_basis_make(tree, problem->area, problem->centre, &arrays.basis, error));
     TRY(wavelet_roots_make(tree, &arrays.basis, &roots, error));
     TRY(wavelets_weights(&arrays.basis, &weight, error));
