@@ -75,12 +75,13 @@ typedef struct method_forecast {
 /* The size of a build, as far as it is known before. */
 typedef struct method_scale {
     double n, n_channels;
-    double noise;      /* of S, 2-norm; 0: none */
-    double n_emitters; /* 0: none, or not read yet */
-    double n_blocks;   /* of form factors; 0: they are rows */
-    double entries;    /* of the rows; 0: not known */
-    double n_planes;   /* of the tree of clusters; 0: not known */
-    double hits;       /* share of the rays from elements that hit anything; 0: not known */
+    double n_own_channels; /* of these, those whose reflectances no earlier one has; 0: all */
+    double noise;          /* of S, 2-norm; 0: none */
+    double n_emitters;     /* 0: none, or not read yet */
+    double n_blocks;       /* of form factors; 0: they are rows */
+    double entries;        /* of the rows; 0: not known */
+    double n_planes;       /* of the tree of clusters; 0: not known */
+    double hits;           /* share of the rays from elements that hit anything; 0: not known */
 } method_scale;
 
 struct decision;

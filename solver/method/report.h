@@ -23,8 +23,8 @@ typedef struct report_step {
 
 typedef struct build_report {
     const char *method; /* as built; static text */
-    char detail[256];   /* figures that the method adds to the reason */
-    char reason[704];   /* why this method, and detail */
+    char detail[288];   /* figures that the method adds to the reason */
+    char reason[736];   /* why this method, and detail */
     size_t n_figures;
     report_figure figures[REPORT_FIGURES];
     size_t n_steps;

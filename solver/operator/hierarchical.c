@@ -21,6 +21,7 @@ static void hierarchical_destroy(lam_operator *op) {
     hierarchical *self = (hierarchical *)op;
     for (size_t c = 0; self->K != NULL && c < op->n_channels; c++) tiled_free(&self->K[c]);
     free(self->K);
+    free(self->of_channel);
     free(self->groups);
     free(self->step);
     free(self->root_area);
@@ -31,7 +32,7 @@ static void hierarchical_destroy(lam_operator *op) {
     wavelets_free(&self->basis);
 }
 
-/* The shared part, areas, room for K. */
+/* The shared part, areas, room for K, of which each channel has its own so far. */
 static lam_status start(size_t n, size_t n_channels, const float *reflectance, const double *area,
                         const uint32_t *order, hierarchical **out, lam_error *error) {
     lam_status status = LAM_OK;
@@ -41,10 +42,13 @@ static lam_status start(size_t n, size_t n_channels, const float *reflectance, c
     TRY(operator_init(&self->base, &operator_hierarchical, n, n_channels, reflectance, error));
     self->root_area = memory_allocate(n, sizeof *self->root_area, "operator", error);
     self->K = memory_allocate(n_channels, sizeof *self->K, "operator", error);
+    self->of_channel = memory_allocate(n_channels, sizeof *self->of_channel, "operator", error);
     self->left = memory_allocate(n_channels, n * sizeof *self->left, "operator", error);
     self->left_of_element = memory_allocate(n_channels, n * sizeof *self->left_of_element, "operator", error);
-    if (self->root_area == NULL || self->left == NULL || self->left_of_element == NULL || self->K == NULL)
+    if (self->root_area == NULL || self->left == NULL || self->left_of_element == NULL || self->K == NULL ||
+        self->of_channel == NULL)
         TRY(LAM_ERR_MEMORY);
+    for (size_t c = 0; c < n_channels; c++) self->of_channel[c] = c;
     TRY(operator_set_order(&self->base, order, error));
     for (size_t p = 0; p < n; p++) {
         self->root_area[p] = (float)sqrt(area[p]);
@@ -86,9 +90,10 @@ done:
     return status;
 }
 
-/* Takes the tiles of a channel over, and frees them. */
+/* Takes the tiles of a channel, and of those that share them, over, and frees them. */
 static lam_status take_tiles(hierarchical *self, size_t c, tile_matrix *tiles, lam_error *error) {
-    self->n_numbers += (double)tile_matrix_numbers(tiles);
+    for (size_t k = 0; k < self->base.n_channels; k++)
+        if (self->of_channel[k] == c) self->n_numbers += (double)tile_matrix_numbers(tiles);
     const lam_status status =
         tiled_create(tiles, self->n_groups, self->groups, self->step, &self->K[c], error);
     tile_matrix_free(tiles);
@@ -107,7 +112,7 @@ static lam_status round_K(hierarchical *self, const csr *K, const float *step, l
     bool *used = memory_allocate(n, sizeof *used, "operator", error);
     if (used == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t c = 0; c < C; c++)
-        for (size_t i = 0; i < n; i++)
+        for (size_t i = 0; i < K[c].n; i++)
             for (uint64_t e = K[c].indptr[i]; e < K[c].indptr[i + 1]; e++) {
                 const float value = K[c].data[e];
                 if (!isfinite(value))
@@ -120,6 +125,7 @@ static lam_status round_K(hierarchical *self, const csr *K, const float *step, l
     TRY(hierarchical_groups(&self->plan, step, (float)sqrt((double)largest / most_steps), &self->n_groups,
                             &self->groups, &self->step, error));
     for (size_t c = 0; c < C; c++) {
+        if (self->of_channel[c] != c) continue;
         TRY(tile_matrix_round(&K[c], self->n_groups, self->groups, self->step, &tiles, error));
         TRY(take_tiles(self, c, &tiles, error));
     }
@@ -136,6 +142,8 @@ lam_status operator_hierarchical_create(size_t n, size_t n_channels, const float
     TRY(start(n, n_channels, reflectance, area, order, &self, error));
     self->basis = arrays->basis;
     arrays->basis = (wavelets){.n = 0};
+    for (size_t c = 0; c < n_channels; c++)
+        if (arrays->K[c].n == 0) self->of_channel[c] = operator_like_channel(n, reflectance, c);
     TRY(round_K(self, arrays->K, arrays->step, error));
     *op = &self->base;
     self = NULL;
@@ -163,6 +171,11 @@ static lam_status load_tiles(hierarchical *self, store *s, lam_error *error) {
              "groups/rows has %zu coefficients, must have all %zu of its nodes and of the root", count,
              self->plan.n_used);
     for (size_t c = 0; c < self->base.n_channels; c++) {
+        snprintf(group, sizeof group, "/operator/K/%zu", c);
+        if (!store_has(s, group)) self->of_channel[c] = operator_like_channel(n, self->base.reflectance, c);
+    }
+    for (size_t c = 0; c < self->base.n_channels; c++) {
+        if (self->of_channel[c] != c) continue;
         snprintf(group, sizeof group, "/operator/K/%zu", c);
         TRY(hierarchical_load_tiles(s, group, self->n_groups, self->groups, &tiles, error));
         TRY(take_tiles(self, c, &tiles, error));
@@ -253,6 +266,7 @@ static lam_status hierarchical_save(const lam_operator *op, store *s, lam_error 
     TRY(wavelets_save(&self->basis, "/operator/basis", s, error));
     TRY(hierarchical_save_groups(self->n_groups, self->groups, self->step, s, error));
     for (size_t c = 0; c < op->n_channels; c++) {
+        if (self->of_channel[c] != c) continue;
         snprintf(group, sizeof group, "/operator/K/%zu", c);
         TRY(tiled_upper(&self->K[c], &tiles, error));
         TRY(hierarchical_save_tiles(&tiles, self->n_groups, group, s, error));
@@ -267,7 +281,8 @@ done:
 static void hierarchical_describe(const lam_operator *op, operator_description *description) {
     const hierarchical *self = (const hierarchical *)op;
     const double whole = (double)op->n * (double)op->n * (double)op->n_channels;
-    for (size_t c = 0; c < op->n_channels; c++) description->bytes += tiled_bytes(&self->K[c]);
+    for (size_t c = 0; c < op->n_channels; c++)
+        if (self->of_channel[c] == c) description->bytes += tiled_bytes(&self->K[c]);
     description->bytes += mean_correction_bytes(&self->even);
     description->bytes += wavelet_plan_bytes(&self->plan) + (1 + op->n_channels) * op->n * sizeof(float);
     description->precision = "i8"; /* of K */

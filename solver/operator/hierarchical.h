@@ -11,7 +11,8 @@
  * of which entries below the threshold are left out. */
 typedef struct hierarchical_arrays {
     wavelets basis;
-    csr *K;      /* [C], of n rows each: the upper triangle, the diagonal included */
+    csr *K;      /* [C], of n rows each: the upper triangle, the diagonal included; without rows where an
+                    earlier channel has the same reflectances (operator_like_channel) */
     float *step; /* [n], by coefficient: K_ij is rounded to a multiple of step_i step_j at most */
 } hierarchical_arrays;
 
@@ -23,8 +24,9 @@ typedef struct hierarchical {
     size_t n_groups;
     tile_group *groups;     /* [n_groups], by number in the basis, all that the plan has */
     float *step;            /* [n_groups] */
-    tiled_rows *K;          /* [C] */
-    double n_numbers;       /* of all K, both triangles */
+    size_t *of_channel;     /* [C], the K of a channel: its own, or that of an earlier one which is alike */
+    tiled_rows *K;          /* [C]; empty where a channel has that of another */
+    double n_numbers;       /* of all channels, both triangles */
     float *root_area;       /* [n] A^1/2, by position */
     float *left;            /* [C][n] rho' A^-1/2, by position */
     float *left_of_element; /* [C][n], the same in mesh order */

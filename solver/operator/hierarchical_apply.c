@@ -33,7 +33,7 @@ size_t hierarchical_work_bytes(const lam_operator *op, size_t n_rhs) {
 /* out_v = K_c in_v: light of few elements by its columns, other vectors together. */
 static void multiply_core(const hierarchical *self, size_t c, size_t m, const float *in, float *out,
                           float *work) {
-    const tiled_rows *K = &self->K[c];
+    const tiled_rows *K = &self->K[self->of_channel[c]];
     for (size_t v = 0, last; v < m; v = last) {
         last = v;
         while (last < m && !tiled_few_columns(K, in + last * K->n)) last++;
@@ -265,6 +265,7 @@ void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const flo
     const bool some = few && n_steps * SOME_STEPS < plan->n_steps;
     if (some) n_rows = wavelet_plan_coefficients(plan, n_steps, steps, rows);
     for (size_t c = 0; c < C; c++) {
+        const tiled_rows *K = &self->K[self->of_channel[c]];
         const float *lift = self->even.missing != NULL ? self->even.lift + c * n : NULL;
         a.h.c = c;
         a.h.in = E + c * n;
@@ -281,10 +282,10 @@ void hierarchical_apply_selected(const lam_operator *op, size_t n_rhs, const flo
         for (size_t v = 0; v < n_rhs; v++) {
             const float *from = a.from + v * used, factor = mean_factor(&a.h, v);
             float *X = a.h.X + v * n;
-            if (some && tiled_few_columns(&self->K[c], from))
-                tiled_multiply_columns(&self->K[c], from, a.to, work);
+            if (some && tiled_few_columns(K, from))
+                tiled_multiply_columns(K, from, a.to, work);
             else if (some)
-                tiled_multiply_rows(&self->K[c], n_rows, rows, from, a.to, work);
+                tiled_multiply_rows(K, n_rows, rows, from, a.to, work);
             if (some) wavelet_plan_inverse_some(plan, n_steps, steps, a.to, X, a.slots);
             for (size_t r = 0; r < n_selected; r++)
                 P[(v * C + c) * n_selected + r] = bounced(self->left_of_element[c * n + selected[r]], lift,

@@ -51,6 +51,13 @@ done:
     return status;
 }
 
+size_t operator_like_channel(size_t n, const float *reflectance, size_t c) {
+    size_t like = 0;
+    while (like < c && memcmp(reflectance + like * n, reflectance + c * n, n * sizeof *reflectance) != 0)
+        like++;
+    return like;
+}
+
 lam_status operator_set_order(lam_operator *op, const uint32_t *order, lam_error *error) {
     lam_status status = LAM_OK;
     uint32_t *copy = NULL, *position = NULL;

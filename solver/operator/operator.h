@@ -110,6 +110,10 @@ static inline float operator_reflectance_or_one(const lam_operator *op, size_t c
     return rho > 0.0f ? rho : 1.0f;
 }
 
+/* The first channel whose reflectances [C][n] are those of channel c, bit by bit: c itself where no earlier
+ * one is alike. O(nc). */
+size_t operator_like_channel(size_t n, const float *reflectance, size_t c);
+
 /* E' = E + rho H0 of an element; H0 may be NULL: 0. */
 static inline float operator_light(const float *rho, const float *E, const float *H0, size_t i) {
     return H0 != NULL ? E[i] + rho[i] * H0[i] : E[i];

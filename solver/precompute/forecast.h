@@ -12,6 +12,7 @@
 
 typedef struct forecast {
     size_t n, n_channels;
+    size_t n_own_channels;       /* whose reflectances no earlier one has; 0: all */
     size_t n_planes;             /* of the tree of clusters; 0: not known */
     size_t sky_tiles;            /* 0: no sky */
     recipe recipe, judge_recipe; /* of the form factors and of the judge's samples */

@@ -102,6 +102,7 @@ static method_forecast method_bytes(const forecast *f) {
     const method_scale scale = {
         .n = (double)f->n,
         .n_channels = (double)f->n_channels,
+        .n_own_channels = (double)f->n_own_channels,
         .noise = recipe_noise(&f->recipe),
         .n_emitters = (double)f->emitters,
         .n_planes = (double)f->n_planes,

@@ -39,6 +39,7 @@ static method_forecast forecast_of_method(const forecast *f) {
     if (f->method == NULL) return made;
     const method_scale scale = {.n = n,
                                 .n_channels = (double)f->n_channels,
+                                .n_own_channels = (double)f->n_own_channels,
                                 .noise = recipe_noise(&f->recipe),
                                 .n_emitters = (double)f->emitters,
                                 .n_planes = (double)f->n_planes,

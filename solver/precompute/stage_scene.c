@@ -226,6 +226,13 @@ recipe state_judge_recipe(const precompute_state *state, uint64_t seed) {
     return recipe_of_judge(&of, choice_rays(&asked), seed);
 }
 
+/* Channels whose reflectances no earlier one has. */
+static size_t count_own_channels(const mesh *m) {
+    size_t own = 0;
+    for (size_t c = 0; c < m->n_channels; c++) own += operator_like_channel(m->n, m->reflectance, c) == c;
+    return own;
+}
+
 forecast state_forecast(const precompute_state *state, double n) {
     const precompute_options *o = state->options;
     panel_precision precision = PANEL_F32;
@@ -233,6 +240,7 @@ forecast state_forecast(const precompute_state *state, double n) {
     return (forecast){.n = (size_t)n,
                       .n_planes = state->tree.n_frames,
                       .n_channels = state->m.n_channels,
+                      .n_own_channels = count_own_channels(&state->m),
                       .sky_tiles = state->sky_tiles,
                       .recipe = state->recipe,
                       .judge_recipe = state_judge_recipe(state, 0),

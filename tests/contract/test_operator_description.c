@@ -27,7 +27,9 @@ START_TEST(says_what_it_is) {
         ck_assert_double_eq_tol(description.density, .05, .02);
         ck_assert_ptr_null(description.form);
         ck_assert_str_eq(description.precision, "i8");
-        ck_assert_uint_ge(description.bytes, 12 * stored / 9); /* nine numbers of a tile, with its column */
+        /* Two of three channels that are alike share their numbers. */
+        const size_t own = strstr(t->name, "alike") != NULL ? stored * 2 / 3 : stored;
+        ck_assert_uint_ge(description.bytes, 12 * own / 9); /* nine numbers of a tile, with its column */
     } else if (strcmp(t->kind, "exact") == 0) {
         ck_assert_double_eq(description.density, 1);
         ck_assert_ptr_null(description.form);

@@ -113,7 +113,7 @@ static void make_up_for_even_light(transport *t, const double *area, uint64_t *s
 }
 
 /* P = R' A^-1/2 W^T K W A^1/2, K random, symmetric and of few numbers, multiples of the steps; of more
- * channels it is made up for even light, too. */
+ * channels it is made up for even light, too. Channels that are alike have one K. */
 static void make_hierarchical(transport *t, const transport_parts *parts) {
     uint64_t *state = parts->state;
     lam_error error = {.message = ""};
@@ -126,6 +126,12 @@ static void make_hierarchical(transport *t, const transport_parts *parts) {
     const double roundings = random_basis(n, state, &arrays.basis, W, size);
     for (size_t p = 0; p < n; p++) area[p] = transport_area(t->order != NULL ? t->order[p] : p);
     for (size_t c = 0; c < C; c++) {
+        const size_t like = operator_like_channel(n, t->reflectance, c);
+        if (like < c) {
+            memcpy(t->P + c * square, t->P + like * square, square * sizeof *t->P);
+            memcpy(t->magnitude + c * square, t->magnitude + like * square, square * sizeof *t->magnitude);
+            continue;
+        }
         csr *upper = &arrays.K[c];
         *upper = (csr){.n = n,
                        .indptr = test_allocate(n + 1, sizeof *upper->indptr),
@@ -376,6 +382,8 @@ transport transport_make(transport_kind kind, bool ordered) {
         for (size_t j = 0; j < n; j++)
             for (size_t b = 0; b < k; b++) F[i * n + j] += (double)U[i * k + b] * (double)V[j * k + b];
     t.reflectance = random_reflectance(n, t.n_channels, &state);
+    if (strstr(t.name, "alike") != NULL)
+        memcpy(t.reflectance + 2 * n, t.reflectance, n * sizeof *t.reflectance);
     t.P = test_allocate(t.n_channels * n * n, sizeof *t.P);
     t.magnitude = test_allocate(t.n_channels * n * n, sizeof *t.magnitude);
     const transport_parts parts = {F, U, V, two_mesh ? begin : NULL, &state};

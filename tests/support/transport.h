@@ -41,7 +41,8 @@ typedef struct transport {
 double sum_roundings(size_t count);
 
 /* Every variant that the contract test judges: its name, its kind, the precision of its large arrays, and who
- * makes it. "3 channels", "folded" and "relit" in a name say so of the variant. */
+ * makes it. "3 channels", "folded" and "relit" in a name say so of the variant; of channels that are "alike"
+ * the last has the reflectances of the first. */
 #define TRANSPORT_LIST(X)                                                                                    \
     X(EXACT, "exact", "exact", PANEL_F32, make_exact)                                                        \
     X(EXACT_COLOUR, "exact, 3 channels", "exact", PANEL_F32, make_exact)                                     \
@@ -61,6 +62,7 @@ double sum_roundings(size_t count);
     X(SPARSE_COLOUR, "sparse, 3 channels", "sparse", PANEL_F32, make_sparse)                                 \
     X(HIERARCHICAL, "hierarchical", "hierarchical", PANEL_F32, make_hierarchical)                            \
     X(HIERARCHICAL_COLOUR, "hierarchical, 3 channels", "hierarchical", PANEL_F32, make_hierarchical)         \
+    X(HIERARCHICAL_ALIKE, "hierarchical, 3 channels, alike", "hierarchical", PANEL_F32, make_hierarchical)   \
     X(RELIT, "relit", "low_rank", PANEL_F32, make_low_rank)                                                  \
     X(RELIT_COLOUR_F16, "relit, 3 channels, f16", "low_rank", PANEL_F16, make_low_rank)                      \
     X(RELIT_TWO_MESH_F16, "two meshes, relit, f16", "two_mesh", PANEL_F16, make_low_rank)                    \

@@ -56,6 +56,11 @@ static double products_between_planes(const method_scale *scale, double planes) 
     return 1 + products_of_hits * fmax(scale->hits - hits_of_towns, 0) * (1 / planes - 1);
 }
 
+/* Channels that are alike share an operator. */
+static double channels_of(const method_scale *scale) {
+    return scale->n_own_channels > 0 ? scale->n_own_channels : scale->n_channels;
+}
+
 static double seconds_of(const method_scale *scale, double numbers_of_rows, double planes) {
     const double n = scale->n, blocks = scale->n_blocks;
     const double of_blocks = kept_of_blocks * pow(blocks / n, power_of_blocks);
@@ -64,7 +69,7 @@ static double seconds_of(const method_scale *scale, double numbers_of_rows, doub
     const double multiply =
         blocks > 0 ? multiply_seconds : multiply_rows_seconds * products_between_planes(scale, planes);
     return expand + n * expand_element_seconds +
-           scale->n_channels * n * (invert_element_seconds + numbers * (invert_seconds + numbers * multiply));
+           channels_of(scale) * n * (invert_element_seconds + numbers * (invert_seconds + numbers * multiply));
 }
 
 void hierarchical_forecast(const method_scale *scale, double epsilon, method_forecast *out) {
@@ -75,10 +80,10 @@ void hierarchical_forecast(const method_scale *scale, double epsilon, method_for
     const double usual = numbers_usual * finer * pow(planes, planes_time_power);
     const double count = blocks > 0 ? coefficients_of_block * blocks : of_rows;
     *out = (method_forecast){
-        .building = blocks > 0 ? building_bytes_of_blocks * count * scale->n_channels
+        .building = blocks > 0 ? building_bytes_of_blocks * count * channels_of(scale)
                                : element_bytes * scale->n + building_bytes * count,
-        .loaded = loaded_bytes * count * scale->n_channels,
-        .stored = stored_bytes * count * scale->n_channels,
+        .loaded = loaded_bytes * count * channels_of(scale),
+        .stored = stored_bytes * count * channels_of(scale),
         .seconds = seconds_of(scale, usual / scale->n, planes),
         .answer = blocks > 0 ? 0 : answer_number_seconds * numbers_usual * finer * pow(planes, planes_power)};
 }

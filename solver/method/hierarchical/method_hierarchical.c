@@ -347,11 +347,15 @@ static lam_status build(const build_problem *problem, const build_options *optio
                                 : expand_rows(&x, sums, &row_sums, &S, error));
     const double expanded = clock_seconds(), numbers_of_S = (double)S.indptr[n];
     report_step_add(report, problem->stream != NULL ? "rays, wavelets" : "wavelets", expanded - started);
+    size_t n_own = 0, last = 0; /* channels that no earlier one is like; the last of them */
+    for (size_t c = 0; c < C; c++)
+        if (operator_like_channel(n, problem->reflectance, c) == c) n_own++, last = c;
     for (size_t c = 0; c < C; c++) {
+        if (operator_like_channel(n, problem->reflectance, c) != c) continue;
         for (size_t p = 0; p < n; p++) rho[p] = problem->reflectance[c * n + tree->order[p]];
         const wavelet_inverse_input inverse = {.basis = &arrays.basis,
                                                .S = &S,
-                                               .last = c + 1 == C,
+                                               .last = c == last,
                                                .rho = rho,
                                                .weight = weight,
                                                .threshold = (float)threshold,
@@ -380,10 +384,10 @@ static lam_status build(const build_problem *problem, const build_options *optio
     snprintf(
         report->detail, sizeof report->detail,
         "threshold %.2g by %s, %.3g stored coefficients per element (%.3g of S), %zu planes, %zu clusters "
-        "of %zu shapes, %zu part%s%s",
-        threshold, threshold > least ? "--epsilon" : "the noise of the rays", entries / (double)(n * C),
+        "of %zu shapes, %zu part%s%s%s",
+        threshold, threshold > least ? "--epsilon" : "the noise of the rays", entries / (double)(n * n_own),
         numbers_of_S / (double)n, tree->n_frames, n_nodes, n_shapes, roots.count,
-        roots.count == 1 ? "" : "s that exchange no light",
+        roots.count == 1 ? "" : "s that exchange no light", n_own < C ? ", equal channels share them" : "",
         corrected ? "; the mean error of uniform emission is corrected" : "");
     TRY(self_check(problem, row_sums, made, options->seed, report, error));
     *op = made;

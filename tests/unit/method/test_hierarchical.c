@@ -2,6 +2,7 @@
  */
 #include "solver/base/random.h"
 #include "solver/method/reference.h"
+#include "solver/operator/hierarchical.h"
 #include "solver/precompute/forecast.h"
 #include "support/building.h"
 #include "support/closed_box.h"
@@ -88,6 +89,50 @@ START_TEST(black_and_white) {
     free(H);
     free(B);
     free(truth);
+    free(work);
+    closed_box_free(&s);
+}
+END_TEST
+
+/* Of three channels the first and the last reflect alike, and in the second turn all: these answer with the
+ * same bits, and as a grey scene does where there are no others, whose numbers steps of rounding fit too. */
+START_TEST(alike_channels_share_an_operator) {
+    closed_box s = closed_box_make(unit_cube, 6, .5f);
+    const build_problem *problem = closed_box_problem(&s);
+    const size_t n = problem->n, middle = _i == 0 ? 1 : 0;
+    build_problem colour = *problem;
+    build_report report;
+    float *rho = test_allocate(3 * n, sizeof *rho), *E = test_allocate(3 * n, sizeof *E),
+          *B = test_allocate(3 * n, sizeof *B), *grey = test_allocate(n, sizeof *grey);
+    for (size_t i = 0; i < n; i++) {
+        rho[i] = rho[2 * n + i] = problem->reflectance[i];
+        rho[n + i] = _i == 0 ? .7f : problem->reflectance[i];
+        E[i] = E[n + i] = E[2 * n + i] = i % 7 == 0 ? 1 : 0;
+    }
+    colour.n_channels = 3;
+    colour.reflectance = rho;
+    lam_operator *op = hierarchical_good(&colour, .01, &report);
+    const hierarchical *const made = (const hierarchical *)op;
+    ck_assert_uint_eq(made->of_channel[1], middle);
+    ck_assert_uint_eq(made->of_channel[2], 0);
+    ck_assert_uint_eq(made->K[2].n, 0);
+    ck_assert_ptr_nonnull(strstr(report.reason, "share"));
+    void *work = test_allocate(1, lam_operator_work_bytes(op, 1));
+    ck_ok(lam_operator_apply(op, 1, LAM_RADIOSITY, E, B, work, lam_operator_work_bytes(op, 1), &error));
+    ck_assert_mem_eq(B, B + 2 * n, n * sizeof *B);
+    lam_operator *alone = hierarchical_good(problem, .01, &report);
+    ck_assert_ptr_null(strstr(report.reason, "share"));
+    ck_ok(lam_operator_apply(alone, 1, LAM_RADIOSITY, E, grey, work, lam_operator_work_bytes(alone, 1),
+                             &error));
+    for (size_t i = 0; i < n; i++) ck_assert_double_eq_tol((double)B[i], (double)grey[i], 1e-3);
+    if (_i == 1) ck_assert_mem_eq(B + n, grey, n * sizeof *grey);
+    ck_assert(_i == 1 || memcmp(B, B + n, n * sizeof *B) != 0);
+    lam_operator_close(alone);
+    lam_operator_close(op);
+    free(rho);
+    free(E);
+    free(B);
+    free(grey);
     free(work);
     closed_box_free(&s);
 }
@@ -413,6 +458,7 @@ int main(void) {
     tcase_set_timeout(tests, 300);
     tcase_add_test(tests, epsilon_is_what_it_costs);
     tcase_add_test(tests, black_and_white);
+    tcase_add_loop_test(tests, alike_channels_share_an_operator, 0, 2);
     tcase_add_test(tests, noise_sets_the_threshold);
     tcase_add_test(tests, small_planes_lower_the_threshold);
     tcase_add_test(tests, small_rows_lower_the_threshold);
