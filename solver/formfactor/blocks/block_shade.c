@@ -62,11 +62,15 @@ void shade_segments(const shade_scene *s, uint32_t a, uint32_t b, const candidat
     segment_ends ends = {.elements = {{0}}};
     pair_sampler sampler;
     pair_sampler_init(&sampler, s->seed, a, b);
-    for (size_t k = 0; k < SEGMENT_LANES; k++) {
-        double at[4];
-        pair_sampler_place(&sampler, (uint32_t)(first + k), at);
-        take_point(f, a, at, out[k].place, ends.from[k], &ends.elements[0][k]);
-        take_point(f, b, at + 2, out[k].place + 2, ends.to[k], &ends.elements[1][k]);
+    for (size_t begin = 0; begin < SEGMENT_LANES; begin += VISIBILITY_PACKET) {
+        double x[4][VISIBILITY_PACKET];
+        pair_sampler_packet(&sampler, (uint32_t)(first + begin), x);
+        for (size_t p = 0; p < VISIBILITY_PACKET; p++) {
+            const size_t k = begin + p;
+            const double from[2] = {x[0][p], x[1][p]}, to[2] = {x[2][p], x[3][p]};
+            take_point(f, a, from, out[k].place, ends.from[k], &ends.elements[0][k]);
+            take_point(f, b, to, out[k].place + 2, ends.to[k], &ends.elements[1][k]);
+        }
     }
     if (by_scene)
         block_by_scene(s->v, &ends, out);

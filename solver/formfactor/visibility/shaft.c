@@ -1,9 +1,23 @@
 #include "solver/formfactor/visibility/shaft.h"
 
+#include "solver/base/cpu.h"
+
 #include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+typedef double lanes __attribute__((vector_size(8 * SHAFT_LANES), may_alias));
+typedef long long mask __attribute__((vector_size(8 * SHAFT_LANES), may_alias));
+typedef signed char lane_bytes __attribute__((vector_size(SHAFT_LANES))); /* 0 or -1 */
+
+static inline bool any_lane(lane_bytes cut) {
+    uint64_t all;
+    memcpy(&all, &cut, sizeof all);
+    return all != 0;
+}
 
 static void add_plane(shaft *s, const double normal[3], double level) {
-    for (int d = 0; d < 3; d++) s->normal[s->n_planes][d] = normal[d];
+    for (int d = 0; d < 3; d++) s->normal[d][s->n_planes] = normal[d];
     s->level[s->n_planes++] = level;
 }
 
@@ -27,6 +41,8 @@ static void add_hull(shaft *s, const shaft_box *a, const shaft_box *b, int u, in
 
 void shaft_of_boxes(shaft *s, const shaft_box *a, const shaft_box *b, double slack) {
     s->n_planes = 0;
+    memset(s->normal, 0, sizeof s->normal);
+    for (int k = 0; k < SHAFT_PLANES; k++) s->level[k] = INFINITY;
     for (int d = 0; d < 3; d++) {
         s->low[d] = fmin(a->low[d], b->low[d]) + slack;
         s->high[d] = fmax(a->high[d], b->high[d]) - slack;
@@ -41,18 +57,21 @@ void shaft_cut(shaft *s, const double normal[3], double level) {
     add_plane(s, back, -level);
 }
 
+#define CPU_KERNELS "solver/formfactor/visibility/shaft_kernels.inc"
+#include "solver/base/cpu_kernels.inc"
+
 bool shaft_misses_box(const shaft *s, const double low[3], const double high[3]) {
+    typedef bool kernel(const shaft *, const double *, const double *);
+    static kernel *const table[] = CPU_TABLE(box_is_cut_portable, box_is_cut_avx2, box_is_cut_avx512);
     for (int d = 0; d < 3; d++)
         if (low[d] >= s->high[d] || high[d] <= s->low[d]) return true;
-    for (int k = 0; k < s->n_planes; k++) {
-        double least = 0;
-        for (int d = 0; d < 3; d++) least += s->normal[k][d] * (s->normal[k][d] > 0 ? low[d] : high[d]);
-        if (least >= s->level[k]) return true;
-    }
-    return false;
+    return table[cpu_best()](s, low, high);
 }
 
 bool shaft_misses_points(const shaft *s, int n, const double (*points)[3]) {
+    typedef bool kernel(const shaft *, int, const double(*)[3]);
+    static kernel *const table[] =
+        CPU_TABLE(points_are_cut_portable, points_are_cut_avx2, points_are_cut_avx512);
     for (int d = 0; d < 3; d++) {
         double low = INFINITY, high = -INFINITY;
         for (int c = 0; c < n; c++) {
@@ -61,16 +80,7 @@ bool shaft_misses_points(const shaft *s, int n, const double (*points)[3]) {
         }
         if (low >= s->high[d] || high <= s->low[d]) return true;
     }
-    for (int k = 0; k < s->n_planes; k++) {
-        double least = INFINITY;
-        for (int c = 0; c < n; c++) {
-            const double *x = points[c];
-            const double at = s->normal[k][0] * x[0] + s->normal[k][1] * x[1] + s->normal[k][2] * x[2];
-            least = at < least ? at : least;
-        }
-        if (least >= s->level[k]) return true;
-    }
-    return false;
+    return table[cpu_best()](s, n, points);
 }
 
 bool shaft_misses_element(const shaft *s, const mesh *m, uint32_t element) {

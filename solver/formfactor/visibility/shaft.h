@@ -5,13 +5,15 @@
 
 #include "solver/scene/mesh.h"
 
-enum { SHAFT_PLANES = 14 };
+/* Twelve of the hull and two cuts, and room for whole vectors of SHAFT_LANES. */
+enum { SHAFT_LANES = 8, SHAFT_PLANES = 2 * SHAFT_LANES };
 
-/* A box cut by planes: a point x is inside where normal . x < level for each. */
+/* A box cut by planes: a point x is inside where normal . x < level for each. normal: by component; a plane
+ * beyond n_planes has level INFINITY. */
 typedef struct shaft {
     double low[3], high[3];
     int n_planes;
-    double normal[SHAFT_PLANES][3], level[SHAFT_PLANES];
+    double normal[3][SHAFT_PLANES], level[SHAFT_PLANES];
 } shaft;
 
 typedef struct shaft_box {
