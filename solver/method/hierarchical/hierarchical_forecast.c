@@ -69,7 +69,8 @@ static double seconds_of(const method_scale *scale, double numbers_of_rows, doub
     const double multiply =
         blocks > 0 ? multiply_seconds : multiply_rows_seconds * products_between_planes(scale, planes);
     return expand + n * expand_element_seconds +
-           channels_of(scale) * n * (invert_element_seconds + numbers * (invert_seconds + numbers * multiply));
+           channels_of(scale) * n *
+               (invert_element_seconds + numbers * (invert_seconds + numbers * multiply));
 }
 
 void hierarchical_forecast(const method_scale *scale, double epsilon, method_forecast *out) {
