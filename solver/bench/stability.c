@@ -4,6 +4,7 @@
 #include "solver/bench/scenes.h"
 #include "solver/formfactor/formfactor.h"
 #include "solver/method/reference.h"
+#include "solver/scene/surfaces.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -16,6 +17,9 @@ void stability_free(stability_problem *p) {
     free(p->area);
     free(p->reflectance);
     free(p->order);
+    free(p->centre);
+    free(p->normal);
+    free(p->surface);
     csr_free(&p->F);
     *p = (stability_problem){0};
 }
@@ -56,6 +60,23 @@ static lam_status cube_mesh(mesh *m, lam_error *error) {
     return scene_of_pieces(pieces, n, m, error);
 }
 
+/* The geometry of copies of a mesh: element i is element i modulo m->n of it. */
+static lam_status take_geometry(const mesh *m, stability_problem *p, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t n_surfaces = 0;
+    p->centre = memory_allocate(p->n, sizeof *p->centre, "problem", error);
+    p->normal = memory_allocate(p->n, sizeof *p->normal, "problem", error);
+    p->surface = memory_allocate(p->n, sizeof *p->surface, "problem", error);
+    if (p->centre == NULL || p->normal == NULL || p->surface == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(mesh_surfaces(m, p->surface, &n_surfaces, error));
+    for (size_t i = 0; i < p->n; i++) {
+        mesh_centroid(m, i, p->centre[i]);
+        memcpy(p->normal[i], m->normal[i], sizeof p->normal[i]);
+    }
+done:
+    return status;
+}
+
 static lam_status make_room(double rho, stability_problem *p, lam_error *error) {
     lam_status status = LAM_OK;
     mesh m = {0};
@@ -77,6 +98,7 @@ static lam_status make_room(double rho, stability_problem *p, lam_error *error) 
     p->F = f.F;
     f.F = (csr){0};
     p->closed = true;
+    TRY(take_geometry(&m, p, error));
 done:
     form_factors_free(&f);
     free(order);
@@ -190,13 +212,36 @@ static void set_probes(const stability_problem *p, float *E) {
     }
 }
 
+static bool is_emitters(const stability_way *way) {
+    return strcmp(way->method, "emitters") == 0;
+}
+
+bool stability_can(const stability_problem *p, const stability_way *way) {
+    static const char *const of_meshes[] = {"2msc", "hierarchical"};
+    for (size_t k = 0; k < sizeof of_meshes / sizeof *of_meshes; k++)
+        if (strcmp(way->method, of_meshes[k]) == 0) return p->centre != NULL;
+    return true;
+}
+
+/* The first three probes are the emitters of an operator of few, and the fourth is 2, 1 and 0 of them. */
+static const char *const emitter_names[PROBES - 1] = {"one", "third", "all"};
+static const float emitter_weights[PROBES][PROBES - 1] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {2, 1, 0}};
+
 static lam_status answer(probation *q, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t bytes = lam_operator_work_bytes(q->op, PROBES);
+    const bool few = lam_operator_emitters(q->op) > 0;
     void *work = memory_allocate(bytes, 1, "probation", error);
     if (work == NULL) return LAM_ERR_MEMORY;
-    TRY(lam_operator_apply(q->op, PROBES, LAM_RADIOSITY, q->E, q->B, work, bytes, error));
-    TRY(lam_operator_apply(q->op, PROBES, LAM_IRRADIANCE, q->E, q->H, work, bytes, error));
+    for (int k = 0; k < 2; k++) {
+        const lam_quantity quantity = k == 0 ? LAM_RADIOSITY : LAM_IRRADIANCE;
+        float *out = k == 0 ? q->B : q->H;
+        if (few)
+            TRY(lam_operator_apply_emitters(q->op, PROBES, quantity, emitter_weights[0], 0, NULL, out, work,
+                                            bytes, error));
+        else
+            TRY(lam_operator_apply(q->op, PROBES, quantity, q->E, out, work, bytes, error));
+    }
 done:
     free(work);
     return status;
@@ -267,39 +312,43 @@ lam_status stability_try(const stability_problem *p, const stability_way *way, s
     lam_status status = LAM_OK;
     lam_error why = {0};
     build_report built;
-    double most_rho = 0;
+    build_options how = build_presets(way->method);
+    probation q = {.p = p};
+    *out = (stability_result){.finite = true};
+    q.E = memory_allocate(PROBES * p->n, sizeof *q.E, "probation", error);
+    if (q.E == NULL) TRY(LAM_ERR_MEMORY);
+    set_probes(p, q.E);
+    const emitter_source emitters = {.s = PROBES - 1, .names = emitter_names, .E = q.E};
     const build_problem problem = {.n = p->n,
                                    .n_channels = 1,
                                    .area = p->area,
                                    .reflectance = p->reflectance,
                                    .F = &p->F,
-                                   .order = p->order};
-    build_options how = build_presets(way->method);
-    probation q = {.p = p};
-    *out = (stability_result){.finite = true};
-    TRY(build_set(&how, "factorizer", way->factorizer, error));
-    TRY(build_set_number(&how, "epsilon", way->epsilon, error));
+                                   .order = p->order,
+                                   .centre = (const double(*)[3])p->centre,
+                                   .normal = (const float(*)[3])p->normal,
+                                   .surface = p->surface,
+                                   .emitters = is_emitters(way) ? &emitters : NULL};
+    if (way->factorizer != NULL) TRY(build_set(&how, "factorizer", way->factorizer, error));
+    if (way->epsilon > 0) TRY(build_set_number(&how, "epsilon", way->epsilon, error));
     if (way->rank > 0) TRY(build_set_number(&how, "rank", (double)way->rank, error));
     out->status = build_operator(&problem, &how, &q.op, &built, &why);
     if (out->status == LAM_ERR_MEMORY) FAIL(error, LAM_ERR_MEMORY, "%s", why.message);
     snprintf(out->message, sizeof out->message, "%s", why.message);
     if (out->status != LAM_OK) goto done;
-    q.E = memory_allocate(PROBES * p->n, sizeof *q.E, "probation", error);
     q.B = memory_allocate(PROBES * p->n, sizeof *q.B, "probation", error);
     q.H = memory_allocate(PROBES * p->n, sizeof *q.H, "probation", error);
     q.exact = memory_allocate(PROBES * p->n, sizeof *q.exact, "probation", error);
-    if (q.E == NULL || q.B == NULL || q.H == NULL || q.exact == NULL) TRY(LAM_ERR_MEMORY);
-    set_probes(p, q.E);
+    if (q.B == NULL || q.H == NULL || q.exact == NULL) TRY(LAM_ERR_MEMORY);
     TRY(answer(&q, error));
     TRY(solve_exactly(&q, error));
     for (size_t k = 0; k < 3; k++) judge_probe(&q, k, out);
     judge_linearity(&q, out);
     judge_reciprocity(&q, out);
-    for (size_t i = 0; i < p->n; i++) most_rho = fmax(most_rho, (double)p->reflectance[i]);
     out->rank = (size_t)report_get(&built, "rank", 0);
     out->rcond = report_get(&built, "rcond", 1);
     out->norm = report_get(&built, "measured_norm_error", 0);
-    out->bound = out->norm / (1 - most_rho);
+    out->bound = report_get(&built, "relative_bound", 0);
 done:
     lam_operator_close(q.op);
     free(q.E);
@@ -319,7 +368,7 @@ static const table_column stability_columns[] = {
     {"norm", "", "|S - Q V^T|_2"},
     {"rcond", "", "reciprocal condition number of the matrix inverted"},
     {"relative", "", "largest |B~ - B|/|B| over the probes"},
-    {"bound", "", "norm / (1 - max rho)"},
+    {"bound", "", "norm / (1 - max rho); 0: none is known"},
     {"indirect", "", "largest |B~ - B|/|B - E|"},
     {"negative", "", "most negative radiosity over the largest"},
     {"energy", "", "relative error of the power balance in closed scenes"},
@@ -335,7 +384,8 @@ static lam_status add_result(const bench_run *run, const stability_problem *p, d
     char method[64];
     TRY(bench_check(run, error));
     TRY(stability_try(p, way, &r, error));
-    snprintf(method, sizeof method, "%s %s", way->method, way->factorizer);
+    snprintf(method, sizeof method, "%s%s%s", way->method, way->factorizer != NULL ? " " : "",
+             way->factorizer != NULL ? way->factorizer : "");
     table_text(out, p->name);
     table_number(out, rho);
     table_text(out, method);
@@ -359,11 +409,12 @@ done:
 lam_status bench_stability(const bench_run *run, lam_error *error) {
     static const double rhos[] = {.5, .9, .99, .999, .9999};
     static const stability_way ways[] = {
-        {"exact", "auto", .05, 0},       {"low-rank", "hf", .05, 0},   {"low-rank", "hf", .001, 0},
-        {"low-rank", "svd", .05, 0},     {"low-rank", "rsi", .05, 0},  {"low-rank", "sgrsvd", .05, 0},
-        {"low-rank", "hf", .05, 1},      {"low-rank", "svd", .05, 1},  {"low-rank", "rsi", .05, 1},
-        {"low-rank", "sgrsvd", .05, 1},  {"low-rank", "hf", .05, 999}, {"low-rank", "rsi", .05, 999},
-        {"low-rank", "sgrsvd", .05, 999}};
+        {"exact", "auto", .05, 0},        {"low-rank", "hf", .05, 0},     {"low-rank", "hf", .001, 0},
+        {"low-rank", "svd", .05, 0},      {"low-rank", "rsi", .05, 0},    {"low-rank", "sgrsvd", .05, 0},
+        {"low-rank", "hf", .05, 1},       {"low-rank", "svd", .05, 1},    {"low-rank", "rsi", .05, 1},
+        {"low-rank", "sgrsvd", .05, 1},   {"low-rank", "hf", .05, 999},   {"low-rank", "rsi", .05, 999},
+        {"low-rank", "sgrsvd", .05, 999}, {"2msc", NULL, 0, 0},           {"sparse", NULL, 0, 0},
+        {"emitters", NULL, 0, 0},         {"hierarchical", NULL, .05, 0}, {"hierarchical", NULL, .003, 0}};
     lam_status status = LAM_OK;
     stability_problem p = {0};
     table out = {.name = "operators",
@@ -375,8 +426,10 @@ lam_status bench_stability(const bench_run *run, lam_error *error) {
         for (size_t k = 0; k < sizeof rhos / sizeof *rhos; k++) {
             if (run->scale == BENCH_QUICK && k % 2 == 1) continue;
             TRY(stability_make(which, rhos[k], &p, error));
-            for (size_t w = 0; w < sizeof ways / sizeof *ways; w++)
+            for (size_t w = 0; w < sizeof ways / sizeof *ways; w++) {
+                if (!stability_can(&p, &ways[w])) continue;
                 TRY(add_result(run, &p, which == STABILITY_BLACK ? 0 : rhos[k], &ways[w], &out, error));
+            }
             stability_free(&p);
             if (which == STABILITY_BLACK) break;
         }

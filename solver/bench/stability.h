@@ -13,6 +13,10 @@ typedef struct stability_problem {
     float *reflectance;
     csr F;
     uint32_t *order;
+    /* Of a mesh; NULL where the problem is a matrix alone, which methods on clusters are not tried on. */
+    double (*centre)[3];
+    float (*normal)[3];
+    uint32_t *surface;
 } stability_problem;
 
 void stability_free(stability_problem *p);
@@ -30,12 +34,16 @@ enum {
 };
 lam_status stability_make(int which, double rho, stability_problem *out, lam_error *error);
 
-/* The settings of one operator of a problem. */
+/* The settings of one operator of a problem. A factorizer that is NULL and an epsilon or a rank of 0 are left
+ * as the method presets them. */
 typedef struct stability_way {
     const char *method, *factorizer;
     double epsilon;
-    size_t rank; /* 0: by epsilon */
+    size_t rank;
 } stability_way;
+
+/* False where the method needs a mesh and the problem has none. */
+bool stability_can(const stability_problem *p, const stability_way *way);
 
 /* The operator that was built, and its errors. */
 typedef struct stability_result {
@@ -44,7 +52,7 @@ typedef struct stability_result {
     size_t rank;
     double rcond, norm;        /* |S - Q V^T|, or 0 */
     double relative, indirect; /* largest over the probes: one bright element, a third of all, all alike */
-    double bound;              /* of relative, in the scaled norm: norm / (1 - max rho) */
+    double bound;              /* of relative, in the scaled norm: norm / (1 - max rho); 0: none is known */
     double negative;           /* the most negative radiosity over the largest one */
     double energy;             /* |sum A E - sum A (1 - rho) H| / sum A E of a closed scene, largest */
     double linearity;          /* |M (2 E1 + E2) - 2 M E1 - M E2| / |M (2 E1 + E2)| */

@@ -95,6 +95,15 @@ static lam_status difference_square(void *context, const double *q, double *w, l
     return status != LAM_OK ? status : difference_multiply(D, true, D->y, w, error);
 }
 
+void norm_report(const build_problem *problem, double norm, build_report *report) {
+    double brightest = 0;
+    for (size_t i = 0; i < problem->n_channels * problem->n; i++)
+        brightest = fmax(brightest, (double)problem->reflectance[i]);
+    report_number(report, "measured_norm_error", norm);
+    report_text(report, "norm", "2");
+    report_number(report, "relative_bound", norm / (1 - brightest));
+}
+
 lam_status norm_of_error(const scaled_matrix *S, const tall_factors *f, const progress *p, double *norm,
                          lam_error *error) {
     lam_status status = LAM_OK;

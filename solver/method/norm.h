@@ -4,6 +4,7 @@
 
 #include "solver/base/progress.h"
 #include "solver/linalg/scaled.h"
+#include "solver/method/method.h"
 #include "solver/method/tall_factors.h"
 
 /* |S - Q V^T|_2 to about a per cent from below: Lanczos steps on the square of the difference, which is what
@@ -19,5 +20,10 @@ typedef lam_status norm_product(void *context, const double *q, double *w, lam_e
  * the product. */
 lam_status norm_of_product(size_t n, norm_product *product, void *context, const progress *p, double *norm,
                            lam_error *error);
+
+/* Reports the norm of the error of factors and what it bounds: |B~ - B| / |B|, area-weighted, is at most
+ * norm / (1 - the largest reflectance) for any emission (thesis, eq. 2.9; row sums of F are at most 1, so
+ * that the largest singular value of R S is at most that reflectance). O(nC). */
+void norm_report(const build_problem *problem, double norm, build_report *report);
 
 #endif

@@ -15,6 +15,7 @@ static const report_words words[] = {
     {"trials", "trials", ""},
     {"measured_norm_error", "measured norm error", ""},
     {"norm", "order of the norm", ""},
+    {"relative_bound", "bound of the relative error", ""},
     {"rank", "rank", ""},
     {"levels", "levels of the tree", ""},
     {"passes", "passes over the form factors", ""},

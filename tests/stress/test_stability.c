@@ -21,8 +21,22 @@ static const stability_way ways[] = {
     {"low-rank", "hf", 1e-4, 0},    {"low-rank", "svd", .05, 0},    {"low-rank", "rsi", .05, 0},
     {"low-rank", "sgrsvd", .1, 0},  {"low-rank", "hf", .05, 1},     {"low-rank", "svd", .05, 1},
     {"low-rank", "rsi", .05, 1},    {"low-rank", "sgrsvd", .05, 1}, {"low-rank", "hf", .05, 9999},
-    {"low-rank", "svd", .05, 9999}, {"low-rank", "rsi", .05, 9999}, {"low-rank", "sgrsvd", .05, 9999}};
+    {"low-rank", "svd", .05, 9999}, {"low-rank", "rsi", .05, 9999}, {"low-rank", "sgrsvd", .05, 9999},
+    {"2msc", NULL, 0, 0},           {"sparse", NULL, 0, 0},         {"emitters", NULL, 0, 0},
+    {"hierarchical", NULL, .05, 0}, {"hierarchical", NULL, .003, 0}};
 enum { WAYS = sizeof ways / sizeof *ways };
+
+/* The relative error that a way allows, of reflectances up to `most`. Factors have their bound. Emitters are
+ * iterated to a residual of 1e-6. A sparse inverse drops less than 1e-4 of each entry of a bounce, and
+ * bounces make 1 / (1 - rho) of it. Uniform light is put into hierarchical operators exactly, so that what
+ * they drop does not add up from bounce to bounce: epsilon, whatever is reflected. */
+static double error_of(const stability_problem *p, const stability_way *way, const stability_result *r,
+                       double most) {
+    if (strcmp(way->method, "hierarchical") == 0) return way->epsilon;
+    if (strcmp(way->method, "emitters") == 0) return 1e-6 / (1 - most);
+    if (strcmp(way->method, "sparse") == 0) return (double)p->n * 1e-4 / (1 - most);
+    return r->bound;
+}
 
 static void check(const stability_problem *p, double rho, const stability_way *way) {
     stability_result r;
@@ -31,7 +45,7 @@ static void check(const stability_problem *p, double rho, const stability_way *w
     if (r.status != LAM_OK) {
         ck_assert_msg(r.status == LAM_ERR_NUMERIC && strstr(r.message, "use ") != NULL,
                       "%s, rho %g, %s %s: refused without a remedy: %s", p->name, rho, way->method,
-                      way->factorizer, r.message);
+                      way->factorizer != NULL ? way->factorizer : "", r.message);
         return;
     }
     /* The rounding of single precision: an n-th part of n rounded entries weighs as one, and a bounce that
@@ -39,23 +53,28 @@ static void check(const stability_problem *p, double rho, const stability_way *w
     double most = 0;
     for (size_t i = 0; i < p->n; i++) most = fmax(most, (double)p->reflectance[i]);
     const double rounding = 20 * (double)FLT_EPSILON / (1 - most);
-    const double allowed = r.bound + rounding;
+    const double allowed = error_of(p, way, &r, most) + rounding;
 #define CHECK(condition, what)                                                                               \
     ck_assert_msg(condition,                                                                                 \
                   "%s, rho %.9g, %s %s, epsilon %g, rank %zu: %s (relative %g, bound %g, negative %g, "      \
                   "energy %g, linearity %g, reciprocity %g, norm %g)",                                       \
-                  p->name, rho, way->method, way->factorizer, way->epsilon, way->rank, what, r.relative,     \
-                  r.bound, r.negative, r.energy, r.linearity, r.reciprocity, r.norm)
+                  p->name, rho, way->method, way->factorizer != NULL ? way->factorizer : "", way->epsilon,   \
+                  way->rank, what, r.relative, r.bound, r.negative, r.energy, r.linearity, r.reciprocity,    \
+                  r.norm)
     CHECK(r.finite, "not finite");
     CHECK(r.relative <= allowed, "error beyond its bound");
     /* No single B is further off than all together, and a bright one is among them. */
     CHECK(r.negative <= fmax(1e-6, sqrt((double)p->n) * allowed), "negative");
     CHECK(r.linearity <= 2e-6, "not linear");
-    /* H is off by at most |S~ - S| |B| and by what B is off. */
-    CHECK(r.energy <= 1e-6 + fmax(r.norm, 1e-6) / (1 - most) + rounding, "energy is lost");
+    /* H is off by at most |S~ - S| |B| and by what B is off. A sparse inverse drops by F_ij, so that light of
+     * an element that is tiny beside all others is lost. */
+    const double known = r.bound > 0 ? fmax(r.norm, 1e-6) / (1 - most) : fmax(allowed, 1e-6 / (1 - most));
+    if (strcmp(way->method, "sparse") != 0) CHECK(r.energy <= 1e-6 + known + rounding, "energy is lost");
     if (strcmp(way->method, "exact") == 0) CHECK(r.reciprocity <= 1e-5, "not reciprocal");
-    if (strcmp(way->factorizer, "sgrsvd") != 0)
-        CHECK(r.norm <= 1 + 1e-5, "a part of S that is larger than S"); /* S (I - V V^T) is not */
+    if (way->factorizer == NULL || strcmp(way->factorizer, "sgrsvd") != 0)
+        CHECK(strcmp(way->method, "2msc") == 0 || r.norm <= 1 + 1e-5,
+              "a part of S that is larger than S"); /* S (I - V V^T) is not */
+    if (strcmp(way->method, "hierarchical") == 0) CHECK(r.reciprocity <= 1e-5, "not reciprocal");
     if (way->rank >= p->n) CHECK(r.norm <= 1e-5, "the whole rank leaves something out");
 #undef CHECK
 }
@@ -67,7 +86,8 @@ START_TEST(hard_numbers) {
     const double rho = rhos[_i % RHOS];
     if (which == STABILITY_BLACK && _i % RHOS > 0) return; /* it has none */
     ck_assert_msg(stability_make(which, rho, &p, &error) == LAM_OK, "%s", error.message);
-    for (size_t w = 0; w < WAYS; w++) check(&p, rho, &ways[w]);
+    for (size_t w = 0; w < WAYS; w++)
+        if (stability_can(&p, &ways[w])) check(&p, rho, &ways[w]);
     stability_free(&p);
 }
 END_TEST

@@ -117,8 +117,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
         report_number(report, "alpha", o->alpha);
     }
     report_count(report, "rank", (double)k);
-    report_number(report, "measured_norm_error", norm);
-    report_text(report, "norm", "2");
+    norm_report(problem, norm, report);
     report->cost = cost_of(problem, k, o->keep_factors);
     report->below_noise = o->rank == 0 && o->epsilon < problem->noise;
     const double whole = (double)problem->n * (double)problem->n * (double)problem->n_channels;

@@ -45,6 +45,12 @@ static lam_status gather_block(gathering *g, size_t b, row_work *d, lam_error *e
         size_t bounces;
         row_work_compute(g->job, row, d, &g->discarded[row], &bounces);
         if (bounces > most) most = bounces;
+        if (bounces > ROW_BOUNCES)
+            FAIL(error, LAM_ERR_NUMERIC,
+                 "sparse inverse at --threshold %g: light of element %u is above it after %d bounces, as "
+                 "nearly "
+                 "all is reflected; use --method hierarchical or a larger --threshold",
+                 g->job->threshold, g->job->problem->order[row], ROW_BOUNCES);
         if (!row_work_store(d, &g->lengths[row + 1]))
             FAIL(error, LAM_ERR_MEMORY, "sparse inverse: out of memory");
     }

@@ -136,7 +136,7 @@ void row_work_compute(const rows_job *job, size_t row, row_work *d, double *disc
     for (uint64_t e = F->indptr[i]; e < F->indptr[i + 1]; e++)
         add_to(&d->next, job->position[F->indices[e]], rho * (double)F->data[e]);
     *discarded = drop_small(d, job->threshold);
-    for (*bounces = 1; d->n_T > 0; ++*bounces) {
+    for (*bounces = 1; d->n_T > 0 && *bounces <= ROW_BOUNCES; ++*bounces) {
         *discarded += bounce(d, &job->RF);
         *discarded += drop_small(d, job->threshold);
     }

@@ -51,8 +51,12 @@ typedef struct row_work {
 lam_status row_work_make(size_t n, row_work *d, lam_error *error);
 void row_work_free(row_work *d);
 
+/* Light that is above the threshold after so many bounces: where all reflect more than .995. Every bounce of
+ * a row may cost n^2. */
+enum { ROW_BOUNCES = 2000 };
+
 /* Sums the row of M~ - I at a position up in d->sum. The first bounce is the whole row of R F, with 1 in
- * place of rho = 0. */
+ * place of rho = 0. Above ROW_BOUNCES *bounces, it was given up. */
 void row_work_compute(const rows_job *job, size_t row, row_work *d, double *discarded, size_t *bounces);
 
 /* Appends d->sum to the rows that are done and clears it; false if memory is short. */

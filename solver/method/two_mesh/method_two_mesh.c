@@ -206,8 +206,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
     report_number(report, "epsilon", norm);
     report_number(report, "rcond", rcond);
     report_count(report, "rank", (double)k);
-    report_number(report, "measured_norm_error", norm);
-    report_text(report, "norm", "2");
+    norm_report(problem, norm, report);
 done:
     scaled_free(&S);
     coarse_mesh_free(&mesh);

@@ -244,6 +244,8 @@ START_TEST(furnace) {
         /* eq. 2.9 with equal areas: relative error at most epsilon / (1 - max rho). */
         ck_assert_double_le(sqrt(error),
                             report_get(&report, "measured_norm_error", 1) / (1 - (double)rhos[r]) + 1e-5);
+        ck_assert_double_eq_tol(report_get(&report, "relative_bound", -1) * (1 - (double)rhos[r]),
+                                report_get(&report, "measured_norm_error", 1), 1e-12);
         lam_operator_close(op);
         free(E);
         free(B);
