@@ -2,6 +2,7 @@
  * by tile. */
 #include "solver/bench/cities.h"
 #include "solver/bench/formfactors.h"
+#include "solver/bench/relaxation.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -176,8 +177,27 @@ done:
     return status;
 }
 
+/* Iterations beside the sparse inverse, under a sky whose tiles are all alike. */
+static lam_status relax_city(const bench_run *run, const city *c, const city_light *d, table *out,
+                             lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = c->m.n;
+    char name[16];
+    float *E = memory_allocate(n, sizeof *E, "light", error);
+    if (E == NULL) return LAM_ERR_MEMORY;
+    for (size_t k = 0; k < d->m * n; k++) E[k % n] += d->E[k];
+    snprintf(name, sizeof name, "city %u", c->variant);
+    const relaxation_case of = {.scene = name, .problem = &c->problem, .E = E};
+    TRY(relaxation_add(run, &of, out, error));
+    for (size_t k = 0; k < CITY_THRESHOLDS; k++)
+        TRY(relaxation_add_operator(run, &of, "sparse", "threshold", city_thresholds[k], out, error));
+done:
+    free(E);
+    return status;
+}
+
 static lam_status look_at(const bench_run *run, unsigned variant, size_t size, table *light, table *curves,
-                          table *tiles, lam_error *error) {
+                          table *relaxed, table *tiles, lam_error *error) {
     lam_status status = LAM_OK;
     const recipe rays = formfactors_rays(RAYS, run->seed);
     city c = {0};
@@ -185,6 +205,7 @@ static lam_status look_at(const bench_run *run, unsigned variant, size_t size, t
     TRY(city_open(run, variant, size, "flat", &rays, &c, error));
     TRY(city_light_make(run, &c, &d, error));
     if (light != NULL) TRY(light_of_city(run, &c, &d, light, curves, error));
+    if (relaxed != NULL) TRY(relax_city(run, &c, &d, relaxed, error));
     if (tiles != NULL) TRY(tiles_of_city(run, &c, &d, tiles, error));
 done:
     city_light_free(&d);
@@ -230,17 +251,20 @@ lam_status cities_radiosity(const bench_run *run, lam_error *error) {
                    .title = "Error of every sky (figure 4.10)",
                    .columns = tile_columns,
                    .n_columns = sizeof tile_columns / sizeof *tile_columns};
+    table relaxed = relaxation_table();
     /* Figure 4.10 is of 35,588 elements, which take minutes. */
     const bool full = run->scale == BENCH_FULL;
-    TRY(look_at(run, 1, 0, &light, &curves, NULL, error));
-    TRY(look_at(run, 3, 0, &light, &curves, full ? NULL : &tiles, error));
-    if (full) TRY(look_at(run, 3, 1, NULL, NULL, &tiles, error));
+    TRY(look_at(run, 1, 0, &light, &curves, &relaxed, NULL, error));
+    TRY(look_at(run, 3, 0, &light, &curves, &relaxed, full ? NULL : &tiles, error));
+    if (full) TRY(look_at(run, 3, 1, NULL, NULL, NULL, &tiles, error));
     TRY(bench_table(run, &light, error));
     TRY(bench_table(run, &curves, error));
+    TRY(bench_table(run, &relaxed, error));
     TRY(bench_table(run, &tiles, error));
 done:
     table_free(&light);
     table_free(&curves);
+    table_free(&relaxed);
     table_free(&tiles);
     return status;
 }

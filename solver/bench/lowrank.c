@@ -376,6 +376,7 @@ lam_status lowrank_judge(const bench_run *run, const lowrank_scene *s, const low
     TRY(build_set_number(&how, "epsilon", of->epsilon, error));
     if (of->rank > 0) TRY(build_set_number(&how, "rank", (double)of->rank, error));
     if (of->threshold > 0) TRY(build_set_number(&how, "threshold", of->threshold, error));
+    if (of->assign != NULL) TRY(build_set(&how, "assign", of->assign, error));
     TRY(build_operator(&problem, &how, &op, &verdict.built, error));
     TRY(lowrank_time_answer(op, LOWRANK_SOLVES_MOST, &verdict.answer_seconds, error));
     TRY(judge_operator(op, &input, &verdict.judged, error));
@@ -410,6 +411,8 @@ lam_status bench_lowrank(const bench_run *run, lam_error *error) {
     TRY(lowrank_of_rank(run, all, n, error));
     TRY(lowrank_of_radiosity(run, error));
     TRY(lowrank_of_methods(run, error));
+    TRY(lowrank_of_two_meshes(run, error));
+    TRY(lowrank_of_relaxation(run, error));
     TRY(lowrank_of_index_vector(run, error));
 done:
     for (size_t k = 0; k < ROOMS_MOST; k++) lowrank_scene_free(&rooms[k]);

@@ -69,6 +69,7 @@ typedef struct lowrank_case {
     size_t rank;                    /* 0: by epsilon */
     size_t probes;                  /* single elements, at most */
     double threshold;               /* sparse; 0: its preset */
+    const char *assign;             /* two meshes; NULL: its preset */
     const emitter_source *emitters; /* of the method emitters; else NULL */
     const csr *independent;         /* another sample of F, or NULL: no total error */
     first_light *first;             /* of single elements, more exact than that sample; or NULL */
@@ -111,6 +112,12 @@ lam_status lowrank_of_radiosity(const bench_run *run, lam_error *error);
 
 /* Every method: run time and memory against error, and two meshes against the SVD at equal k. */
 lam_status lowrank_of_methods(const bench_run *run, lam_error *error);
+
+/* Two meshes of real scenes, by either way to give elements to patches. */
+lam_status lowrank_of_two_meshes(const bench_run *run, lam_error *error);
+
+/* The lamps of two scenes by iterations without an operator, beside operators. */
+lam_status lowrank_of_relaxation(const bench_run *run, lam_error *error);
 
 /* Tables 1 to 5 of Fernández et al. 2011: the index vector, and frames a second. */
 lam_status lowrank_of_index_vector(const bench_run *run, lam_error *error);

@@ -2,9 +2,11 @@
  */
 #include "solver/bench/formfactors.h"
 #include "solver/bench/lowrank.h"
+#include "solver/bench/relaxation.h"
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { PROBES = 100, PROBES_OF_LARGE = 48, LARGE = 5000, KINDS = 7, SETTINGS_MOST = 5 };
@@ -106,6 +108,116 @@ lam_status lowrank_of_methods(const bench_run *run, lam_error *error) {
     for (int k = 0; k < 2 && sizes[run->scale][k] > 0; k++) {
         TRY(lowrank_cornell(run, sizes[run->scale][k], &s, error));
         TRY(measure(run, &s, &out, error));
+        lowrank_scene_free(&s);
+    }
+    TRY(bench_table(run, &out, error));
+done:
+    lowrank_scene_free(&s);
+    table_free(&out);
+    return status;
+}
+
+static lam_status add_two_meshes(const bench_run *run, const lowrank_scene *s, size_t rank,
+                                 const char *assign, double theirs, table *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    lowrank_verdict v;
+    const lowrank_case of = {.method = "2msc",
+                             .factorizer = "auto",
+                             .epsilon = .05,
+                             .rank = rank,
+                             .assign = assign,
+                             .probes = s->m.n > LARGE ? PROBES_OF_LARGE : PROBES};
+    TRY(lowrank_judge(run, s, &of, &v, error));
+    table_text(out, s->name);
+    table_number(out, (double)s->m.n);
+    table_text(out, assign);
+    table_number(out, report_get(&v.built, "rank", NAN));
+    table_number(out, report_get(&v.built, "measured_norm_error", NAN));
+    table_number(out, report_seconds(&v.built));
+    table_number(out, 1e3 * v.answer_seconds);
+    table_number(out, 1 / v.answer_seconds);
+    table_number(out, v.judged.single.operator_indirect.mean);
+    table_number(out, v.judged.random.operator_indirect.mean);
+    table_number(out, theirs);
+done:
+    return status;
+}
+
+/* The patio of Fernandez et al. 2011 (24,128 elements in 1,364 patches, 430 answers a second of a GPU), where
+ * time is given to it, and a box; real operators in place of table answers' arbitrary numbers. */
+lam_status lowrank_of_two_meshes(const bench_run *run, lam_error *error) {
+    static const table_column two_mesh_columns[] = {
+        {"scene", NULL, "name of the scene"},
+        {"elements", "", "n"},
+        {"assign", NULL,
+         "elements join the patch that they were split into, or the nearest that faces alike"},
+        {"patches", "", "k"},
+        {"norm", "", "|S - Q V^T|_2"},
+        {"build_s", "s", "time of the operator without form factors"},
+        {"answer_ms", "ms", "time of one B, median, one thread"},
+        {"fps", "1/s", "B a second"},
+        {"single_indirect", "", "|B~ - B|/|B - E|, one bright element, mean"},
+        {"random_indirect", "", "random emission of all elements"},
+        {"paper_gpu_not_run", "1/s", "as published; nothing ran on a GPU"}};
+    static const size_t sizes[3][2] = {{640, 640}, {2560, 2700}, {2560, 24128}};
+    static const char *const assigns[] = {"inclusion", "proximity"};
+    enum { PATCHES_OF_PATIO = 1364, PAPER_PATIO = 24128 };
+    lam_status status = LAM_OK;
+    lowrank_scene s = {.name = NULL};
+    table out = {.name = "two-meshes",
+                 .title = "Two meshes by inclusion and by proximity",
+                 .columns = two_mesh_columns,
+                 .n_columns = sizeof two_mesh_columns / sizeof *two_mesh_columns,
+                 .printed = true};
+    for (int k = 0; k < 2; k++) {
+        const size_t elements = sizes[run->scale][k];
+        TRY(k == 0 ? lowrank_cornell(run, elements, &s, error) : lowrank_patio(run, elements, &s, error));
+        const bool papers = k == 1 && elements == PAPER_PATIO;
+        const size_t patches = s.m.n * PATCHES_OF_PATIO / PAPER_PATIO;
+        for (size_t a = 0; a < sizeof assigns / sizeof *assigns; a++)
+            TRY(add_two_meshes(run, &s, patches, assigns[a], papers ? 430 : NAN, &out, error));
+        lowrank_scene_free(&s);
+    }
+    TRY(bench_table(run, &out, error));
+done:
+    lowrank_scene_free(&s);
+    table_free(&out);
+    return status;
+}
+
+/* The lamps of a scene, or a hundredth of its elements, close together, where it has none. */
+static lam_status relax(const bench_run *run, const lowrank_scene *s, table *out, lam_error *error) {
+    static const double epsilons[] = {.05, .003};
+    enum { LIT = 100 };
+    lam_status status = LAM_OK;
+    const size_t n = s->m.n;
+    bool shines = false;
+    build_problem problem = lowrank_problem(s);
+    problem.n_channels = 1;
+    float *E = memory_allocate(n, sizeof *E, "emission", error);
+    if (E == NULL) return LAM_ERR_MEMORY;
+    memcpy(E, s->m.emission, n * sizeof *E);
+    for (size_t i = 0; i < n; i++) shines = shines || E[i] > 0;
+    for (size_t k = 0; !shines && k <= n / LIT; k++) E[s->z_order[k]] = 1;
+    const relaxation_case of = {.scene = s->name, .problem = &problem, .E = E};
+    TRY(relaxation_add(run, &of, out, error));
+    for (size_t k = 0; k < sizeof epsilons / sizeof *epsilons; k++) {
+        TRY(relaxation_add_operator(run, &of, "low-rank", "epsilon", epsilons[k], out, error));
+        TRY(relaxation_add_operator(run, &of, "hierarchical", "epsilon", epsilons[k], out, error));
+    }
+done:
+    free(E);
+    return status;
+}
+
+lam_status lowrank_of_relaxation(const bench_run *run, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t elements = run->scale == BENCH_QUICK ? 640 : 2560;
+    lowrank_scene s = {.name = NULL};
+    table out = relaxation_table();
+    for (int k = 0; k < 2; k++) {
+        TRY(k == 0 ? lowrank_cornell(run, elements, &s, error) : lowrank_patio(run, elements, &s, error));
+        TRY(relax(run, &s, &out, error));
         lowrank_scene_free(&s);
     }
     TRY(bench_table(run, &out, error));

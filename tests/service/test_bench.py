@@ -244,7 +244,7 @@ class Cities(unittest.TestCase):
         done = lambert("bench", "cities", "--quick", "-o", out)
         assert done.returncode == 0, done.stderr
         cls.tables = {}
-        for name in "times", "errors", "emitters", "density":
+        for name in "times", "errors", "emitters", "density", "relaxation":
             with open(os.path.join(out, f"cities-{name}.csv"), encoding="utf-8", newline="") as stream:
                 cls.tables[name] = [{key: float(value) if value.replace(".", "").replace("e-", "").isdigit() else value
                                      for key, value in row.items()} for row in csv.DictReader(stream)]
@@ -279,6 +279,23 @@ class Cities(unittest.TestCase):
             self.assertEqual(row["emitters"], 132)
             self.assertLess(row["residual"], 1e-6)
             self.assertTrue(1e-5 < row["five_sweeps_error"] < .1, row)
+
+    def test_relaxation(self):
+        """Every iteration converges to the reference, Gauss-Seidel in fewer sweeps than Jacobi; stochastic shooting errs as
+        one over the root of its rays."""
+        products = {}
+        for row in self.tables["relaxation"]:
+            products.setdefault((row["scene"], row["method"]), []).append((row["error"], row["products"]))
+        for scene in "city 1", "city 3":
+            for method in "Jacobi", "Gauss-Seidel", "shooting", "conjugate gradients":
+                errors, steps = zip(*products[scene, method])
+                self.assertLess(errors[-1], 1e-6)
+                self.assertEqual(list(errors), sorted(errors, reverse=True))
+                self.assertEqual(list(steps), sorted(steps))
+            self.assertLess(products[scene, "Gauss-Seidel"][-1][1], products[scene, "Jacobi"][-1][1])
+            coarse, fine = products[scene, "stochastic shooting"]
+            self.assertTrue(.2 < (coarse[0] / fine[0]) ** 2 * coarse[1] / fine[1] < 5, (coarse, fine))
+            self.assertLess(products[scene, "sparse threshold 1e-05"][0][0], products[scene, "sparse threshold 0.001"][0][0])
 
     def test_density(self):
         rows = self.tables["density"]
