@@ -39,6 +39,13 @@ typedef struct block_report {
     double elements_away, elements_hidden, elements_unseen; /* pairs of elements */
 } block_report;
 
+/* The way of light out of a scene: by rays that leave, and by rays that meet backs. */
+typedef struct scene_outlet {
+    double crack_width; /* metres: a narrower gap is a crack */
+    double openings;    /* share of the light that leaves through wider gaps, by a sample */
+    bool fronts_only;   /* no ray meets a back but through cracks */
+} scene_outlet;
+
 /* Above this many elements a store keeps the upper triangle A_i F_ij, j > i, in place of rows: half the
  * bytes. */
 enum { FORM_FACTORS_ROWS_MOST = 10240 };
@@ -57,6 +64,7 @@ typedef struct form_factors {
     pairs_report pairs;   /* of recipes with pairs, when just made */
     block_report blocks;  /* of blocks, when just made */
     bool closed;          /* nothing leaves but through cracks between elements */
+    scene_outlet outlet;  /* the rays that decided that (leaving.h) */
     double leaving_share; /* area-weighted means */
     double absorbed_share;
     double closure_error;           /* largest |row sum - its target| after repair */

@@ -1,5 +1,8 @@
 #include "solver/formfactor/leaving.h"
 
+#include "solver/formfactor/visibility/openings.h"
+#include "solver/formfactor/visibility/sample.h"
+
 #include <math.h>
 #include <stdlib.h>
 
@@ -12,18 +15,103 @@ static double area_mean(const mesh *m, const double *x) {
     return total > 0 ? sum / total : 0;
 }
 
-void leaving_measure(form_factors *f, const mesh *m) {
+/* Lost rays of each kind that are followed, and rays that are cast at most to find one of them. */
+enum { FOLLOWED = 64, SEARCHED_MOST = 1 << 16, RAYS_BESIDE_HEMICUBES = 1024 };
+
+/* The lost rays of one kind: those that leave the scene, or those that meet backs. */
+typedef struct lost_rays {
+    const mesh *m;
+    const visibility *v;
+    const double *share; /* [n], of an element's rays that are lost so */
+    size_t n_rays;       /* of an element */
+    uint64_t seed;
+    bool back;
+    double width; /* of a crack */
+} lost_rays;
+
+/* The elements of FOLLOWED rays that are spread evenly over the lost light, sum A_i share_i = light. */
+static void elements_of_lost(const lost_rays *l, double light, uint32_t *element) {
+    double passed = 0;
+    size_t k = 0, last = 0;
+    for (size_t i = 0; i < l->m->n && k < FOLLOWED; i++) {
+        if (!(l->share[i] > 0)) continue;
+        passed += l->m->area[i] * l->share[i];
+        last = i;
+        for (; k < FOLLOWED && (k + .5) / FOLLOWED * light < passed; k++) element[k] = (uint32_t)i;
+    }
+    for (; k < FOLLOWED; k++) element[k] = (uint32_t)last;
+}
+
+/* Finds a lost ray of an element, from ray number `first` on, and follows it: 1 where it passes an opening, 0
+ * where it passes a crack, -1 where no ray was lost. */
+static int follow_one(const lost_rays *l, uint32_t element, size_t first) {
+    const size_t n = l->n_rays < SEARCHED_MOST ? l->n_rays : SEARCHED_MOST;
+    const size_t packets = (n + VISIBILITY_PACKET - 1) / VISIBILITY_PACKET;
+    element_sampler sampler;
+    uint32_t self[VISIBILITY_PACKET];
+    element_sampler_init(&sampler, l->m, l->v, element, l->seed);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) self[i] = element;
+    for (size_t p = 0; p < packets; p++) {
+        const size_t ray = (first + p) % packets * VISIBILITY_PACKET;
+        const size_t count = n - ray < VISIBILITY_PACKET ? n - ray : VISIBILITY_PACKET;
+        ray_packet rays;
+        hit_packet hits;
+        element_sampler_packet(&sampler, (uint32_t)ray, &rays);
+        visibility_cast(l->v, &rays, count, self, VISIBILITY_TOGETHER, &hits);
+        for (size_t i = 0; i < count; i++) {
+            const bool left = hits.element[i] == VISIBILITY_NOTHING;
+            if (l->back ? left || !hits.back[i] : !left) continue;
+            const float origin[3] = {rays.origin[0][i], rays.origin[1][i], rays.origin[2][i]};
+            const float direction[3] = {rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
+            return !openings_is_crack(l->v, l->m, l->width, origin, direction, element);
+        }
+    }
+    return -1;
+}
+
+/* The share of the lost light that passes openings; 0 where no ray was found again. */
+static double share_through_openings(const lost_rays *l, double light) {
+    uint32_t element[FOLLOWED];
+    int found[FOLLOWED];
+    size_t openings = 0, all = 0;
+    if (!(light > 0)) return 0;
+    elements_of_lost(l, light, element);
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t k = 0; k < FOLLOWED; k++) /* an element that is taken again begins with another ray */
+        found[k] = follow_one(l, element[k], k * l->n_rays / FOLLOWED / VISIBILITY_PACKET);
+    for (size_t k = 0; k < FOLLOWED; k++) {
+        openings += found[k] == 1;
+        all += found[k] >= 0;
+    }
+    return all > 0 ? (double)openings / (double)all : 0;
+}
+
+void leaving_measure(form_factors *f, const mesh *m, const visibility *v) {
+    lost_rays l = {.m = m,
+                   .v = v,
+                   .n_rays = f->recipe.rays > 0 ? f->recipe.rays : RAYS_BESIDE_HEMICUBES,
+                   .seed = f->recipe.seed,
+                   .width = openings_crack_width(m)};
+    double area = 0;
+    for (size_t i = 0; i < m->n; i++) area += m->area[i];
     f->leaving_share = area_mean(m, f->leaving);
     f->absorbed_share = area_mean(m, f->absorbed);
-    f->closed = f->leaving_share < LEAVING_CRACKS;
+    f->outlet = (scene_outlet){.crack_width = l.width};
+    l.share = f->leaving;
+    f->outlet.openings = share_through_openings(&l, area * f->leaving_share);
+    l.share = f->absorbed;
+    l.back = true;
+    f->outlet.fronts_only = share_through_openings(&l, area * f->absorbed_share) <= LEAVING_OPEN;
+    f->closed = f->recipe.closure == CLOSURE_MEASURED ? f->outlet.openings <= LEAVING_OPEN
+                                                      : f->recipe.closure == CLOSURE_CLOSED;
 }
 
 static double absorbed(const form_factors *f, size_t element) {
-    return f->absorbed_share < LEAVING_CRACKS ? 0 : f->absorbed[element];
+    return f->outlet.fronts_only ? 0 : f->absorbed[element];
 }
 
 bool leaving_nothing(const form_factors *f) {
-    return f->closed && f->absorbed_share < LEAVING_CRACKS;
+    return f->closed && f->outlet.fronts_only;
 }
 
 double leaving_outside(const form_factors *f, size_t element) {

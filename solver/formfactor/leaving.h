@@ -1,20 +1,24 @@
 /* The balance of a row of form factors: what the rays of element i do not deliver to other elements,
  *     1 = sum_j F_ij + leaving_i + absorbed_i,
- * with leaving_i the share of rays that leave the scene and absorbed_i the share that hits back faces. Both
- * are 0 in a closed scene, where the few rays that slip through cracks between elements count as noise. */
+ * with leaving_i the share of rays that leave the scene and absorbed_i the share that hits back faces. A
+ * scene is closed where rays leave through nothing but cracks, gaps that are narrower than a stated width
+ * (visibility/openings.h); no share of all light decides it, so that a small skylight lights a large hall. */
 #ifndef LAMBERT_FORMFACTOR_LEAVING_H
 #define LAMBERT_FORMFACTOR_LEAVING_H
 
 #include "solver/formfactor/formfactor.h"
+#include "solver/formfactor/visibility/visibility.h"
 
-/* A scene is closed where a smaller share of its rays than this leaves. In single precision a few rays slip
- * between elements that meet without sharing vertices, or start behind a neighbour and hit its back. The
- * repair distributes their share over the row. */
-#define LEAVING_CRACKS 1e-4
+/* Openings let light out where more than this share of the lost light that was followed passes gaps wider
+ * than a crack. */
+#define LEAVING_OPEN .1
 
-/* Sets f->closed and the area-weighted means leaving_share and absorbed_share from f->leaving and absorbed.
- */
-void leaving_measure(form_factors *f, const mesh *m);
+/* Sets f->leaving_share and absorbed_share, area-weighted means of f->leaving and absorbed, f->closed and
+ * f->outlet. Light that leaves through cracks, or meets backs through cracks, counts as noise: the repair
+ * distributes it over the row. f->recipe.closure overrules what rays find. Of each kind of lost light 64
+ * rays are followed, which are found by the recipe's seed. Cost: for each of them 400 rays, and those that
+ * are cast until one is lost. */
+void leaving_measure(form_factors *f, const mesh *m, const visibility *v);
 
 /* True where rows must sum to 1: no ray leaves or hits a back face but through cracks. Needs leaving_measure.
  */

@@ -22,10 +22,10 @@
 #include <string.h>
 
 /* Repairs exchange areas with the shares of the rays that leave. */
-static lam_status close_upper(form_factors *f, const mesh *m, lam_error *error) {
+static lam_status close_upper(form_factors *f, const mesh *m, const visibility *v, lam_error *error) {
     double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) return LAM_ERR_MEMORY;
-    leaving_measure(f, m);
+    leaving_measure(f, m, v);
     for (size_t i = 0; i < m->n; i++) outside[i] = leaving_outside(f, i);
     const lam_status status = repair_close(&f->upper, m->area, outside, f, error);
     free(outside);
@@ -34,13 +34,13 @@ static lam_status close_upper(form_factors *f, const mesh *m, lam_error *error) 
 
 /* Merges one-sided rows, whose entries are F_ij times rays, into the repaired upper triangle; frees the rows.
  */
-static lam_status merge_and_repair(form_factors *f, const mesh *m, packed_rows *rows, size_t rays,
-                                   const large_place *place, lam_error *error) {
+static lam_status merge_and_repair(form_factors *f, const mesh *m, const visibility *v, packed_rows *rows,
+                                   size_t rays, const large_place *place, lam_error *error) {
     lam_status status = LAM_OK;
     f->rows_kept = rows->kept;
     TRY(upper_merge(rows, rays, m->area, place, &f->upper, error));
     packed_rows_free(rows);
-    TRY(close_upper(f, m, error));
+    TRY(close_upper(f, m, v, error));
 done:
     return status;
 }
@@ -50,7 +50,7 @@ static lam_status make_by_rays(const mesh *m, const visibility *v, const uint32_
     lam_status status = LAM_OK;
     packed_rows counts = {0};
     TRY(rays_count(m, v, order, options, &counts, f->leaving, f->absorbed, error));
-    TRY(merge_and_repair(f, m, &counts, options->recipe.rays, options->large, error));
+    TRY(merge_and_repair(f, m, v, &counts, options->recipe.rays, options->large, error));
 done:
     packed_rows_free(&counts);
     return status;
@@ -64,7 +64,7 @@ static lam_status make_by_hemicubes(const mesh *m, const visibility *v, const ui
     TRY(hemicube_create(options->recipe.resolution, &h, error));
     TRY(hemicube_trace(&h, m, v, order, options, &rows, f->leaving, f->absorbed, error));
     /* The weights are form factors already, as if one ray had been cast. */
-    TRY(merge_and_repair(f, m, &rows, 1, options->large, error));
+    TRY(merge_and_repair(f, m, v, &rows, 1, options->large, error));
 done:
     hemicube_free(&h);
     packed_rows_free(&rows);
@@ -84,11 +84,11 @@ static lam_status find_leaving(const mesh *m, const visibility *v, const uint32_
 }
 
 /* Repairs the rows of all pairs. */
-static lam_status close_pairs(form_factors *f, const mesh *m, lam_error *error) {
+static lam_status close_pairs(form_factors *f, const mesh *m, const visibility *v, lam_error *error) {
     lam_status status = LAM_OK;
     double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) return LAM_ERR_MEMORY;
-    leaving_measure(f, m);
+    leaving_measure(f, m, v);
     if (!leaving_nothing(f)) {
         /* outside_i = 1 - sum_j g_ij / A_i */
         for (size_t i = 0; i < m->n; i++)
@@ -109,7 +109,7 @@ static lam_status make_by_pairs(const mesh *m, const visibility *v, const uint32
     lam_status status = LAM_OK;
     TRY(find_leaving(m, v, order, options, f, error));
     TRY(pairs_find(m, v, options, 0, f, &f->upper, error));
-    TRY(close_pairs(f, m, error));
+    TRY(close_pairs(f, m, v, error));
 done:
     return status;
 }
@@ -137,7 +137,7 @@ lam_status form_factors_make_twice(const mesh *m, const uint32_t *order, const f
     for (int h = 0; h < 2; h++) {
         f[h].upper = G[h];
         G[h] = (csr){.n = 0};
-        TRY(close_pairs(&f[h], m, error));
+        TRY(close_pairs(&f[h], m, v, error));
         TRY(form_factors_expand(&f[h], m->area, error));
     }
     for (int h = 0; h < 2; h++) {
@@ -166,7 +166,7 @@ static lam_status make_by_near_pairs(const mesh *m, const visibility *v, const u
     TRY(csr_replace(&counted, &near, &f->upper, error));
     csr_free(&near);
     csr_free(&counted);
-    TRY(close_upper(f, m, error));
+    TRY(close_upper(f, m, v, error));
 done:
     packed_rows_free(&counts);
     csr_free(&near);
@@ -386,7 +386,7 @@ static lam_status find_outside(const mesh *m, const visibility *v, const uint32_
     f->absorbed = memory_allocate(m->n, sizeof *f->absorbed, "form factors", error);
     if (f->leaving == NULL || f->absorbed == NULL) TRY(LAM_ERR_MEMORY);
     TRY(rays_count(m, v, order, &few, &counts, f->leaving, f->absorbed, error));
-    leaving_measure(f, m);
+    leaving_measure(f, m, v);
 done:
     packed_rows_free(&counts);
     return status;
@@ -419,6 +419,7 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
         f.closed = judged->closed;
         f.leaving_share = judged->leaving_share;
         f.absorbed_share = judged->absorbed_share;
+        f.outlet = judged->outlet;
     }
     if (options->importance != NULL) {
         TRY(blocks_importance(m, block_scene_visibility(scene), tree, &how, options->importance, error));

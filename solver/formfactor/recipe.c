@@ -10,6 +10,9 @@ enum { MIN_AUTO_RAYS = 256, MAX_AUTO_RAYS = 65536 };
 static const char *const method_names[] = {"rays", "hemicube", "pairs", "near-pairs", "blocks"};
 enum { N_METHODS = sizeof method_names / sizeof method_names[0] };
 
+static const char *const closure_names[] = {"measured", "closed", "open"};
+enum { N_CLOSURES = sizeof closure_names / sizeof closure_names[0] };
+
 const recipe_names recipe_of_form_factors = {"/form_factors", "method", "seed"};
 const recipe_names recipe_of_operator = {"/operator", "form_factors", "ray_seed"};
 
@@ -63,7 +66,26 @@ lam_status recipe_save(const recipe *r, const recipe_names *names, store *s, lam
     if (r->method == RECIPE_HEMICUBE)
         TRY(store_set_integer(s, group, "resolution", (int64_t)r->resolution, error));
     if (r->accuracy > 0) TRY(store_set_number(s, group, "accuracy", r->accuracy, error));
+    if (r->closure != CLOSURE_MEASURED)
+        TRY(store_set_text(s, group, "closure", closure_names[r->closure], error));
 done:
+    return status;
+}
+
+lam_status recipe_load_closure(store *s, const char *group, scene_closure *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    char *name = NULL;
+    size_t k = 0;
+    *out = CLOSURE_MEASURED;
+    if (!store_has_attribute(s, group, "closure")) goto done;
+    TRY(store_get_text(s, group, "closure", &name, error));
+    while (k < N_CLOSURES && strcmp(name, closure_names[k]) != 0) k++;
+    if (k == N_CLOSURES)
+        FAIL(error, LAM_ERR_FORMAT, "%s: %s attribute closure is '%.20s', must be closed or open",
+             store_path(s), group, name);
+    *out = (scene_closure)k;
+done:
+    free(name);
     return status;
 }
 
@@ -91,6 +113,7 @@ lam_status recipe_load(store *s, const recipe_names *names, recipe *out, lam_err
     r.rays = rays < 0 ? 0 : (size_t)rays;
     r.resolution = resolution < 0 ? 0 : (size_t)resolution;
     r.seed = (uint64_t)seed;
+    TRY(recipe_load_closure(s, group, &r.closure, error));
     if (recipe_check(&r, &why) != LAM_OK)
         FAIL(error, LAM_ERR_FORMAT, "%s: %s: %s", store_path(s), group, why.message);
     *out = r;
@@ -150,5 +173,6 @@ recipe recipe_of_judge(const recipe *judged, size_t rays_beside_hemicubes, uint6
     const bool noisy = judged->method == RECIPE_RAYS || judged->method == RECIPE_NEAR_PAIRS;
     if (noisy && r.rays > 1) r.rays /= 2;
     r.seed = seed;
+    r.closure = judged->closure;
     return r;
 }

@@ -13,6 +13,9 @@ typedef enum recipe_method {
     RECIPE_BLOCKS
 } recipe_method;
 
+/* Decides whether light leaves a scene: the rays (leaving.h), or the user. */
+typedef enum scene_closure { CLOSURE_MEASURED, CLOSURE_CLOSED, CLOSURE_OPEN } scene_closure;
+
 typedef struct recipe {
     recipe_method method;
     size_t rays; /* from every element; for pairs and blocks they only find the share that leaves the scene */
@@ -20,6 +23,7 @@ typedef struct recipe {
     double accuracy;   /* of (near) pairs: standard error of the factor of a partly occluded pair; of blocks:
                           bound of   the error of one in S, 2-norm; else 0 */
     uint64_t seed;     /* of all samples */
+    scene_closure closure;
 } recipe;
 
 enum { RECIPE_RAYS_MOST = 1 << 24, RECIPE_RESOLUTION_LEAST = 4, RECIPE_RESOLUTION_MOST = 4096 };
@@ -47,6 +51,10 @@ lam_status recipe_save(const recipe *r, const recipe_names *names, store *s, lam
 
 /* LAM_ERR_FORMAT when it is missing or out of bounds. */
 lam_status recipe_load(store *s, const recipe_names *names, recipe *out, lam_error *error);
+
+/* The closure alone, of a group that may have nothing else of a recipe: CLOSURE_MEASURED without an
+ * attribute. */
+lam_status recipe_load_closure(store *s, const char *group, scene_closure *out, lam_error *error);
 
 /* The relative tolerance of the unoccluded factors of pairs. */
 double recipe_tolerance(const recipe *r);

@@ -55,6 +55,27 @@ static void log_stage(precompute_state *state, const char *stage, double started
  * loses .71. */
 static const double outward_share = .9;
 
+/* Says why the scene counts as closed or open. */
+static void log_closure(const precompute_state *state) {
+    const form_factors *f = &state->f;
+    const char *const way = f->closed ? "closed" : "open", *const other = f->closed ? "=no" : "";
+    char why[96];
+    if (state->options->from_store) return; /* it was decided and said when the form factors were made */
+    if (f->recipe.closure != CLOSURE_MEASURED)
+        snprintf(why, sizeof why, "as --closed%s says", f->closed ? "" : "=no");
+    else if (!(f->leaving_share > 0))
+        snprintf(why, sizeof why, "no ray leaves it");
+    else if (f->closed)
+        snprintf(why, sizeof why, "light leaves through cracks narrower than %.2g m", f->outlet.crack_width);
+    else
+        snprintf(why, sizeof why, "%.0f %% of the light that leaves passes gaps wider than %.2g m",
+                 100 * f->outlet.openings, f->outlet.crack_width);
+    if (f->recipe.closure != CLOSURE_MEASURED || !(f->leaving_share > 0))
+        terminal_log(state->t, "the scene is %s: %s", way, why);
+    else
+        terminal_log(state->t, "the scene is %s: %s; --closed%s overrules that", way, why, other);
+}
+
 static void log_form_factors(precompute_state *state) {
     const form_factors *f = &state->f;
     char how[64];
@@ -64,6 +85,7 @@ static void log_form_factors(precompute_state *state) {
                  "%.2g on average, at most %.2g",
                  how, 100 * f->leaving_share, f->closed ? " (closed)" : "", 100 * f->absorbed_share,
                  f->repair_mean, f->repair_max);
+    log_closure(state);
     if (f->leaving_share > outward_share && !state->m.two_sided)
         terminal_log(
             state->t,
@@ -132,8 +154,14 @@ void state_log_kept(precompute_state *state, const form_factors *f) {
                      state->options->scratch);
 }
 
+scene_closure state_closure(const precompute_options *o) {
+    if (o->closed == NULL) return CLOSURE_MEASURED;
+    return strcmp(o->closed, "no") == 0 ? CLOSURE_OPEN : CLOSURE_CLOSED;
+}
+
 lam_status stage_form_factors(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
+    state->recipe.closure = state_closure(state->options);
     const form_factor_options how = {.recipe = state->recipe,
                                      .progress = &state->progress,
                                      .stage = "form factors",
@@ -149,6 +177,7 @@ done:
 }
 
 lam_status stage_near_pairs(precompute_state *state, lam_error *error) {
+    state->recipe.closure = state_closure(state->options);
     const form_factor_options how = {.recipe = state->recipe,
                                      .progress = &state->progress,
                                      .stage = "near pairs",

@@ -16,6 +16,7 @@ typedef struct precompute_options {
     const char *up;                     /* NULL: by the file */
     const char *assets;                 /* a folder, or NULL */
     bool two_sided, orient;
+    const char *closed;                 /* "": no light leaves; "no": it does; NULL: rays decide */
     const char *form_factors, *quality; /* "rays" or "hemicube"; "draft", ... */
     uint64_t rays, resolution;          /* rays: OPTION_AUTO */
     const char *sky;                    /* a tiling, or NULL; from a store: that of the store */

@@ -67,6 +67,13 @@ static const option_row mesh_rows[] = {
      .kind = OPTION_FLAG,
      .offset = FIELD(orient),
      .help = "Turn faces to the side that the light is on, where rays decide which that is"},
+    {.name = "closed",
+     .kind = OPTION_OPTIONAL,
+     .offset = FIELD(closed),
+     .choices = "no",
+     .help = "No light leaves the scene, whatever rays find: what they lose goes back to the row. no: light "
+             "leaves through every gap. Without it, light leaves through gaps wider than the diagonal of the "
+             "scene over 800, and narrower ones are cracks"},
     OPTION_ROW_REFLECTANCE(FIELD(reflectance),
                            .help = "Grey reflectance of every face, in place of that in the file"),
     OPTION_ROW_ASSETS(FIELD(assets)),

@@ -162,6 +162,9 @@ recipe state_near_recipe(const precompute_state *state);
  * stage_pairs.c. A new choice of the recipe follows where dear is set. */
 lam_status state_weigh_pairs(precompute_state *state, lam_error *error);
 
+/* The closure that --closed stands for: precompute.c. */
+scene_closure state_closure(const precompute_options *options);
+
 /* Form factors of a scene, or of a stream the near pairs alone: precompute.c. */
 lam_status stage_form_factors(precompute_state *state, lam_error *error);
 lam_status stage_near_pairs(precompute_state *state, lam_error *error);

@@ -202,6 +202,7 @@ done:
 lam_status stage_blocks(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     TRY(make_tree(state, error));
+    state->recipe.closure = state_closure(state->options);
     const form_factor_options how = {.recipe = state->recipe,
                                      .progress = &state->progress,
                                      .stage = "form factors",

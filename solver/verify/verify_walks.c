@@ -234,12 +234,14 @@ static lam_status walk_all(examination *e, judgement *j, lam_error *error) {
     lam_status status = LAM_OK;
     const mesh *m = &e->m;
     walk_scene *scene = NULL;
+    scene_closure closure;
     walk_estimates found = {.n_rhs = 0};
     targets t = {.of = memory_allocate(m->n, sizeof *t.of, "targets of walks", error)};
     e->compared = memory_allocate(j->l->n * m->n_channels, (GROUPS_MOST + ELEMENTS) * sizeof *e->compared,
                                   "comparisons", error);
     if (t.of == NULL || e->compared == NULL) TRY(LAM_ERR_MEMORY);
-    TRY(walk_scene_create(m, &scene, error));
+    TRY(recipe_load_closure(e->s, recipe_of_operator.group, &closure, error));
+    TRY(walk_scene_create(m, closure, &scene, error));
     walk_problem problem = {.n_rhs = j->l->n,
                             .E = j->l->E,
                             .quantity = LAM_IRRADIANCE,

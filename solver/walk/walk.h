@@ -7,6 +7,7 @@
 #define LAMBERT_WALK_WALK_H
 
 #include "lambert/lambert.h"
+#include "solver/formfactor/leaving.h"
 #include "solver/scene/mesh.h"
 
 /* The walks of an estimate are cut into this many batches, whose means give its standard error. */
@@ -19,10 +20,11 @@ enum { WALK_BATCHES = 32 };
 typedef struct walk_scene walk_scene;
 
 /* The mesh must outlive it; freed by walk_scene_free. As for form factors (leaving.h), a scene is closed
- * where fewer than one in 10^4 rays leave, and its fronts are all that is seen where fewer than that hit
- * backs: a walk whose ray slips through such a crack then leaves its element by another ray. Casts 2^18 rays
- * to find that out. Errors: LAM_ERR_MEMORY, LAM_ERR_INTERNAL. */
-lam_status walk_scene_create(const mesh *m, walk_scene **out, lam_error *error);
+ * where rays leave through nothing but cracks, or where closure says so, and its fronts are all that is seen
+ * where rays hit backs through nothing but cracks: a walk whose ray slips through a crack then leaves its
+ * element by another ray. Casts 2^18 rays at most to find that out. Errors: LAM_ERR_MEMORY,
+ * LAM_ERR_INTERNAL. */
+lam_status walk_scene_create(const mesh *m, scene_closure closure, walk_scene **out, lam_error *error);
 void walk_scene_free(walk_scene *s);
 
 /* The estimates asked for: the area mean of a quantity over each target, a set of elements. An element is in

@@ -1,55 +1,77 @@
 /* The scene of walks, and the checks and memory that both ways to walk share. */
 #include "solver/formfactor/leaving.h"
+#include "solver/formfactor/visibility/openings.h"
 #include "solver/walk/walk_steps.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-/* Rays that decide whether a scene is closed, in parts that do not depend on the number of threads. */
-enum { PARTS = 64, RAYS_OF_PART = 4096 };
+/* Rays that decide whether a scene is closed, in parts that do not depend on the number of threads; of the
+ * lost ones of each part and kind so many are followed. */
+enum { PARTS = 64, RAYS_OF_PART = 4096, FOLLOWED = 4 };
 
-static void count_lost(const walk_scene *s, const double *before, size_t part, size_t *left, size_t *backs) {
+/* Lost rays of a kind that were followed, and those of them that passed openings. */
+typedef struct followed {
+    size_t all, openings;
+} followed;
+
+static void follow_lost(const walk_scene *s, const double *before, double width, size_t part,
+                        followed *leaving, followed *backs) {
     walk_starts starts;
     walk_starts_init(&starts, 0, part, RAYS_OF_PART);
-    for (size_t begun = 0; begun < RAYS_OF_PART; begun += VISIBILITY_PACKET) {
+    for (size_t begun = 0; begun < RAYS_OF_PART && (leaving->all < FOLLOWED || backs->all < FOLLOWED);
+         begun += VISIBILITY_PACKET) {
         walker w[VISIBILITY_PACKET];
         hit_packet hits;
+        ray_packet rays;
         size_t k = 0;
         for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
             walk_starts_next(&starts, before, s->m->n, &w[i], &k);
             w[i].at = (uint32_t)k;
         }
-        walk_cast(s, w, VISIBILITY_PACKET, &hits);
+        walk_cast(s, w, VISIBILITY_PACKET, &rays, &hits);
         for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
-            *left += hits.element[i] == VISIBILITY_NOTHING;
-            *backs += hits.element[i] != VISIBILITY_NOTHING && hits.back[i];
+            const bool left = hits.element[i] == VISIBILITY_NOTHING;
+            followed *to = left ? leaving : backs;
+            if ((!left && !hits.back[i]) || to->all == FOLLOWED) continue;
+            const float origin[3] = {rays.origin[0][i], rays.origin[1][i], rays.origin[2][i]};
+            const float direction[3] = {rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
+            to->all++;
+            to->openings += !openings_is_crack(s->v, s->m, width, origin, direction, w[i].at);
         }
     }
 }
 
-/* Sets closed and fronts by the shares of rays, spread by area, that leave and that hit backs. */
-static lam_status look_around(walk_scene *s, lam_error *error) {
+/* Sets closed and fronts by rays, spread by area, that leave and that hit backs. */
+static lam_status look_around(walk_scene *s, scene_closure closure, lam_error *error) {
     const size_t n = s->m->n;
-    const double most = LEAVING_CRACKS * PARTS * RAYS_OF_PART;
-    size_t left = 0, backs = 0;
+    const double width = openings_crack_width(s->m);
+    followed of[PARTS][2] = {{{0, 0}, {0, 0}}}, sums[2] = {{0, 0}, {0, 0}};
     double *before = memory_allocate(n + 1, sizeof *before, "walks", error);
     if (before == NULL) return LAM_ERR_MEMORY;
     walk_accumulate(n, s->m->area, before);
-#pragma omp parallel for schedule(dynamic, 1) reduction(+ : left, backs)
-    for (size_t part = 0; part < PARTS; part++) count_lost(s, before, part, &left, &backs);
-    s->closed = (double)left < most;
-    s->fronts = (double)backs < most;
+#pragma omp parallel for schedule(dynamic, 1)
+    for (size_t part = 0; part < PARTS; part++)
+        follow_lost(s, before, width, part, &of[part][0], &of[part][1]);
+    for (size_t part = 0; part < PARTS; part++)
+        for (int kind = 0; kind < 2; kind++) {
+            sums[kind].all += of[part][kind].all;
+            sums[kind].openings += of[part][kind].openings;
+        }
+    s->closed = (double)sums[0].openings <= LEAVING_OPEN * (double)sums[0].all;
+    s->fronts = (double)sums[1].openings <= LEAVING_OPEN * (double)sums[1].all;
+    if (closure != CLOSURE_MEASURED) s->closed = closure == CLOSURE_CLOSED;
     free(before);
     return LAM_OK;
 }
 
-lam_status walk_scene_create(const mesh *m, walk_scene **out, lam_error *error) {
+lam_status walk_scene_create(const mesh *m, scene_closure closure, walk_scene **out, lam_error *error) {
     lam_status status = LAM_OK;
     walk_scene *s = memory_allocate(1, sizeof *s, "walks", error);
     if (s == NULL) return LAM_ERR_MEMORY;
     s->m = m;
     TRY(visibility_create(m, &s->v, error));
-    TRY(look_around(s, error));
+    TRY(look_around(s, closure, error));
     *out = s;
     s = NULL;
 done:

@@ -24,12 +24,11 @@ static void aim(const element_frame *f, double x, double y, float direction[3]) 
         direction[d] = along * f->tangent[d] + across * f->bitangent[d] + up * f->normal[d];
 }
 
-void walk_cast(const walk_scene *s, const walker *w, size_t n, hit_packet *hits) {
-    ray_packet rays;
+void walk_cast(const walk_scene *s, const walker *w, size_t n, ray_packet *rays, hit_packet *hits) {
     uint32_t self[VISIBILITY_PACKET];
     for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
         if (i >= n) { /* not cast, but read */
-            for (int d = 0; d < 3; d++) rays.origin[d][i] = rays.direction[d][i] = 0;
+            for (int d = 0; d < 3; d++) rays->origin[d][i] = rays->direction[d][i] = 0;
             self[i] = VISIBILITY_NOTHING;
             continue;
         }
@@ -41,12 +40,12 @@ void walk_cast(const walk_scene *s, const walker *w, size_t n, hit_packet *hits)
                               origin);
         aim(&sampler.frame, place[2], place[3], direction);
         for (int d = 0; d < 3; d++) {
-            rays.origin[d][i] = origin[d];
-            rays.direction[d][i] = direction[d];
+            rays->origin[d][i] = origin[d];
+            rays->direction[d][i] = direction[d];
         }
         self[i] = w[i].at;
     }
-    visibility_cast(s->v, &rays, n, self, 0, hits);
+    visibility_cast(s->v, rays, n, self, 0, hits);
 }
 
 static void draw_place(walker *w) {
@@ -100,6 +99,7 @@ static bool go_on(walk_run *run, size_t begun) {
 
 void walk_batch_go(const walk_batch *b) {
     walker w[VISIBILITY_PACKET];
+    ray_packet rays;
     hit_packet hits;
     size_t n = 0, begun = 0;
     if (!go_on(b->run, 0)) return;
@@ -109,7 +109,7 @@ void walk_batch_go(const walk_batch *b) {
             begun++;
         }
         if (n == 0) break;
-        walk_cast(b->scene, w, n, &hits);
+        walk_cast(b->scene, w, n, &rays, &hits);
         size_t kept = 0;
         for (size_t i = 0; i < n; i++)
             if (advance(b, &w[i], hits.element[i], hits.back[i])) w[kept++] = w[i];

@@ -46,7 +46,7 @@ typedef struct walk_batch {
 void walk_batch_go(const walk_batch *b);
 
 /* Casts the next rays of n walks, at most VISIBILITY_PACKET, from their places. */
-void walk_cast(const walk_scene *s, const walker *w, size_t n, hit_packet *hits);
+void walk_cast(const walk_scene *s, const walker *w, size_t n, ray_packet *rays, hit_packet *hits);
 
 /* The starts of one batch: low-discrepancy places, and strata of what elements are chosen by. */
 typedef struct walk_starts {

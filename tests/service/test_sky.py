@@ -42,6 +42,35 @@ class Sky(unittest.TestCase):
         done = run("precompute", cls.scene, "-o", cls.plain, "--probes", 0, "--rays", 64)
         assert done.returncode == 0, done.stderr
 
+    def test_closure(self):
+        """A box with a hole of a thousandth of its area is open, unless the user says otherwise."""
+        scene = self.folder / "hole.obj"
+        low, high = 0.5 - 0.0387, 0.5 + 0.0387
+        points = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
+        points += [(low, low, 1), (high, low, 1), (high, high, 1), (low, high, 1)]
+        faces = ["1 2 4 3", "1 3 7 5", "2 6 8 4", "1 5 6 2", "3 4 8 7", "5 9 10 6", "6 10 11 8", "8 11 12 7", "7 12 9 5"]
+        scene.write_text("".join("v %g %g %g\n" % p for p in points) + "".join("f %s\n" % f for f in faces))
+        power = {}
+        for closed, says in (([], "the scene is open: .* wider than 0.0022 m; --closed overrules that"),
+                             (["--closed"], "the scene is closed: as --closed says"),
+                             (["--closed=no"], "the scene is open: as --closed=no says")):
+            store = self.folder / "hole.h5"
+            done = run("precompute", scene, "-o", store, "--elements", 150, "--sky", "tregenza", "--ground-albedo", 1,
+                       "--reflectance", 0.5, "--probes", 0, "--keep-form-factors", *closed)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertRegex(done.stderr, says)
+            with h5py.File(store) as f:
+                for group in ("form_factors", "operator"):
+                    kept = f[group].attrs.get("closure", b"").decode()
+                    self.assertEqual(kept, {"--closed": "closed", "--closed=no": "open"}.get("".join(closed), ""))
+                power[tuple(closed)] = f["mesh/area"][:] @ f["sky/first_bounce"][:].sum(0) / np.pi
+        area = (high - low) ** 2
+        self.assertAlmostEqual(power[()], area, delta=0.02 * area)
+        self.assertEqual(power[("--closed",)], 0)
+        self.assertEqual(power[("--closed=no",)], power[()])
+        done = run("precompute", self.folder / "hole.h5", "-o", self.folder / "again.h5", "--closed")
+        self.assertEqual(done.returncode, 2, done.stderr)
+
     def npy(self, name, values):
         path = self.folder / name
         np.save(path, np.asarray(values))

@@ -335,7 +335,7 @@ static lam_status close_rows(void *context, const double **row_sums, lam_error *
     f->row_sums = memory_allocate(n, sizeof *f->row_sums, "row sums", error);
     f->repair = memory_allocate(n, sizeof *f->repair, "row sums", error);
     if (f->row_sums == NULL || f->repair == NULL) TRY(LAM_ERR_MEMORY);
-    leaving_measure(f, r->m);
+    leaving_measure(f, r->m, r->v);
     for (size_t i = 0; i < n; i++) {
         const double sum = r->near_sums[i] + r->own[i] + (double)r->received[i] * unit;
         const double all = sum + leaving_outside(f, i);

@@ -28,7 +28,7 @@ static uint32_t *alone(const mesh *m) {
 static walk_scene *open_scene(const mesh *m) {
     walk_scene *s = NULL;
     lam_error error = {0};
-    ck_ok(walk_scene_create(m, &s, &error));
+    ck_ok(walk_scene_create(m, CLOSURE_MEASURED, &s, &error));
     return s;
 }
 

@@ -18,7 +18,7 @@ START_TEST(refused_cancelled_and_dark) {
     mesh m = box_mesh((double[]){1, 1, 1}, 1, .5f);
     lam_error error = {0};
     walk_scene *s = NULL;
-    ck_ok(walk_scene_create(&m, &s, &error));
+    ck_ok(walk_scene_create(&m, CLOSURE_MEASURED, &s, &error));
     float E[6] = {0};
     uint32_t target[6] = {0, 0, 2, 2, WALK_NO_TARGET, WALK_NO_TARGET};
     const progress stop = {.cancelled = at_once};
