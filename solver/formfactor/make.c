@@ -71,33 +71,62 @@ done:
     return status;
 }
 
-/* The share of each element that leaves the scene, by rays that are cast for nothing else. */
+/* The share of each element that leaves the scene, by rays that are cast for nothing else; variance [n] or
+ * NULL. */
 static lam_status find_leaving(const mesh *m, const visibility *v, const uint32_t *order,
-                               const form_factor_options *options, form_factors *f, lam_error *error) {
+                               const form_factor_options *options, form_factors *f, double *variance,
+                               lam_error *error) {
     packed_rows counts = {0};
     form_factor_options silent = *options;
     silent.progress = NULL;
     silent.scratch = NULL;
+    silent.without_rows = true;
+    silent.variance = variance;
     const lam_status status = rays_count(m, v, order, &silent, &counts, f->leaving, f->absorbed, error);
     packed_rows_free(&counts);
     return status;
 }
 
-/* Repairs the rows of all pairs. */
-static lam_status close_pairs(form_factors *f, const mesh *m, const visibility *v, lam_error *error) {
+/* The variance that pairs give 1 - sum_j F_ij of an element, k, by the shares r_i that rays find outside with
+ * the variances v_i: E sum (p_i - r_i)^2 / v_i = n + k sum 1 / v_i. Less three standard errors of that sum,
+ * so that it is 0 where rays cannot tell. */
+static double variance_of_pairs(size_t n, const double *outside, const form_factors *f,
+                                const double *variance) {
+    double sum = 0, weights = 0;
+    for (size_t i = 0; i < n; i++) {
+        const double off = outside[i] - f->leaving[i] - f->absorbed[i];
+        sum += off * off / variance[i];
+        weights += 1 / variance[i];
+    }
+    return fmax(0, sum - (double)n - 3 * sqrt(2 * (double)n)) / weights;
+}
+
+/* outside_i = 1 - sum_j g_ij / A_i; with the variance of the rays' estimate of it the mean of both by inverse
+ * variances. */
+static void find_rests(const form_factors *f, const double *area, const double *variance, double *outside) {
+    const size_t n = f->upper.n;
+    for (size_t i = 0; i < n; i++)
+        for (uint64_t p = f->upper.indptr[i]; p < f->upper.indptr[i + 1]; p++) {
+            outside[i] += (double)f->upper.data[p];
+            outside[f->upper.indices[p]] += (double)f->upper.data[p];
+        }
+    for (size_t i = 0; i < n; i++) outside[i] = 1 - outside[i] / area[i];
+    const double of_pairs = variance != NULL ? variance_of_pairs(n, outside, f, variance) : 0;
+    for (size_t i = 0; i < n; i++) {
+        if (of_pairs > 0)
+            outside[i] += of_pairs / (of_pairs + variance[i]) * (f->leaving[i] + f->absorbed[i] - outside[i]);
+        outside[i] = fmax(0, outside[i]);
+    }
+}
+
+/* Repairs the rows of all pairs; variance [n] is that of f->leaving, or NULL. */
+static lam_status close_pairs(form_factors *f, const mesh *m, const visibility *v, const double *variance,
+                              lam_error *error) {
     lam_status status = LAM_OK;
     double *outside = memory_allocate(m->n, sizeof *outside, "form factors", error);
     if (outside == NULL) return LAM_ERR_MEMORY;
     leaving_measure(f, m, v);
-    if (!leaving_nothing(f)) {
-        /* outside_i = 1 - sum_j g_ij / A_i */
-        for (size_t i = 0; i < m->n; i++)
-            for (uint64_t p = f->upper.indptr[i]; p < f->upper.indptr[i + 1]; p++) {
-                outside[i] += (double)f->upper.data[p];
-                outside[f->upper.indices[p]] += (double)f->upper.data[p];
-            }
-        for (size_t i = 0; i < m->n; i++) outside[i] = fmax(0, 1 - outside[i] / m->area[i]);
-    }
+    if (!leaving_nothing(f)) find_rests(f, m->area, variance, outside);
     TRY(repair_close(&f->upper, m->area, outside, f, error));
 done:
     free(outside);
@@ -107,10 +136,16 @@ done:
 static lam_status make_by_pairs(const mesh *m, const visibility *v, const uint32_t *order,
                                 const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
-    TRY(find_leaving(m, v, order, options, f, error));
+    double *variance = NULL;
+    if (options->bounce != NULL) {
+        variance = memory_allocate(m->n, sizeof *variance, "form factors", error);
+        if (variance == NULL) return LAM_ERR_MEMORY;
+    }
+    TRY(find_leaving(m, v, order, options, f, variance, error));
     TRY(pairs_find(m, v, options, 0, f, &f->upper, error));
-    TRY(close_pairs(f, m, v, error));
+    TRY(close_pairs(f, m, v, variance, error));
 done:
+    free(variance);
     return status;
 }
 
@@ -130,14 +165,14 @@ lam_status form_factors_make_twice(const mesh *m, const uint32_t *order, const f
         if (f[h].leaving == NULL || f[h].absorbed == NULL) TRY(LAM_ERR_MEMORY);
     }
     TRY(visibility_create(m, &v, error));
-    TRY(find_leaving(m, v, order, options, &f[0], error));
+    TRY(find_leaving(m, v, order, options, &f[0], NULL, error));
     memcpy(f[1].leaving, f[0].leaving, m->n * sizeof *f[0].leaving);
     memcpy(f[1].absorbed, f[0].absorbed, m->n * sizeof *f[0].absorbed);
     TRY(pairs_exchange_twice(m, v, &how, other_seed, stages, G, &f[0].pairs, error));
     for (int h = 0; h < 2; h++) {
         f[h].upper = G[h];
         G[h] = (csr){.n = 0};
-        TRY(close_pairs(&f[h], m, v, error));
+        TRY(close_pairs(&f[h], m, v, NULL, error));
         TRY(form_factors_expand(&f[h], m->area, error));
     }
     for (int h = 0; h < 2; h++) {
@@ -188,6 +223,7 @@ lam_status form_factors_make(const mesh *m, const uint32_t *order, const form_fa
     if (asked->sky != NULL)
         TRY(sky_bounce_create(asked->sky, m->up, asked->ground_albedo, m->n, &f.sky, error));
     own.bounce = asked->sky != NULL ? &f.sky : NULL;
+    own.n_aimed = &f.n_aimed;
     TRY(visibility_create(m, &v, error));
     switch (options->recipe.method) {
     case RECIPE_RAYS:
@@ -375,12 +411,16 @@ done:
 
 /* Finds by rays if the scene is closed and has turned faces, and each element's share of the tiles of a sky
  * that f has. */
-static lam_status find_outside(const mesh *m, const visibility *v, const uint32_t *order, const recipe *r,
-                               form_factors *f, lam_error *error) {
+static lam_status find_outside(const mesh *m, const visibility *v, const uint32_t *order,
+                               const form_factor_options *options, form_factors *f, lam_error *error) {
     lam_status status = LAM_OK;
     packed_rows counts = {0};
+    const recipe *r = &options->recipe;
     const form_factor_options few = {.recipe = {.method = RECIPE_RAYS, .rays = r->rays, .seed = r->seed},
                                      .without_rows = true,
+                                     .portals = options->portals,
+                                     .n_portals = options->n_portals,
+                                     .n_aimed = &f->n_aimed,
                                      .bounce = f->sky.first_bounce != NULL ? &f->sky : NULL};
     f->leaving = memory_allocate(m->n, sizeof *f->leaving, "form factors", error);
     f->absorbed = memory_allocate(m->n, sizeof *f->absorbed, "form factors", error);
@@ -414,7 +454,7 @@ lam_status form_factors_make_blocks(const mesh *m, const uint32_t *order, const 
     if (judged == NULL) {
         if (options->sky != NULL)
             TRY(sky_bounce_create(options->sky, m->up, options->ground_albedo, m->n, &f.sky, error));
-        TRY(find_outside(m, block_scene_visibility(scene), order, r, &f, error));
+        TRY(find_outside(m, block_scene_visibility(scene), order, options, &f, error));
     } else {
         f.closed = judged->closed;
         f.leaving_share = judged->leaving_share;

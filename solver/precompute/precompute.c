@@ -108,9 +108,13 @@ static void log_form_factors(precompute_state *state) {
     }
     state_log_blocks(state);
     const sky_bounce *sky = &f->sky;
+    char aimed[64] = "";
+    if (f->n_aimed > 0)
+        snprintf(aimed, sizeof aimed, "; rays are aimed at %zu opening%s", f->n_aimed,
+                 f->n_aimed == 1 ? "" : "s");
     if (sky->first_bounce != NULL)
-        terminal_log(state->t, "sky: %s, %zu tiles, ground albedo %g", sky->tiling.name, sky->tiling.n_tiles,
-                     sky->ground_albedo);
+        terminal_log(state->t, "sky: %s, %zu tiles, ground albedo %g%s", sky->tiling.name,
+                     sky->tiling.n_tiles, sky->ground_albedo, aimed);
     if (sky->first_bounce != NULL && f->closed)
         terminal_warn(state->t, "the scene is closed: no element sees the sky");
 }
@@ -169,6 +173,8 @@ lam_status stage_form_factors(precompute_state *state, lam_error *error) {
                                      .scratch_name = "form-factors.rows",
                                      .large = state_large_place(state),
                                      .sky = state->options->sky,
+                                     .portals = state->portals,
+                                     .n_portals = state->n_portals,
                                      .ground_albedo = state->options->ground_albedo};
     TRY(form_factors_make(&state->m, state->order, &how, &state->f, error));
     state_log_kept(state, &state->f);
@@ -182,6 +188,8 @@ lam_status stage_near_pairs(precompute_state *state, lam_error *error) {
                                      .progress = &state->progress,
                                      .stage = "near pairs",
                                      .sky = state->options->sky,
+                                     .portals = state->portals,
+                                     .n_portals = state->n_portals,
                                      .ground_albedo = state->options->ground_albedo};
     const lam_status status = ray_rows_create(&state->m, &how, &state->rays, error);
     if (status == LAM_OK)

@@ -21,6 +21,7 @@ typedef struct precompute_options {
     uint64_t rays, resolution;          /* rays: OPTION_AUTO */
     const char *sky;                    /* a tiling, or NULL; from a store: that of the store */
     double ground_albedo;
+    option_list portals;                /* names of groups */
     const char *keep_form_factors;      /* NULL: they are not kept; "": as they are; "compressed" */
     const char *emitters;               /* FILE, group=NAME, sky; or NULL */
     const char *receivers, *importance; /* NAME,NAME; FILE; one of them, or both NULL */

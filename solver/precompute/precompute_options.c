@@ -96,6 +96,13 @@ static const option_row sample_rows[] = {
      .preset = "none",
      .parse = parse_sky,
      .help = "Tiles of the sky that may light the store: 145, 144 MF^2 + 1, or A sectors by B bands"},
+    {.name = "portal",
+     .kind = OPTION_LIST,
+     .offset = FIELD(portals),
+     .argument = "GROUP",
+     .otherwise = "the holes of the mesh, where little light leaves it",
+     .help = "A group of faces in the plane of a window, at which rays for the sky are aimed; the faces "
+             "neither block nor reflect light, and the store does not have them. May be repeated"},
     {0},
 };
 

@@ -64,11 +64,13 @@ typedef struct precompute_state {
     row_stream stream;             /* of rays */
     compressed_factors compressed; /* of f; n is 0 where they are kept as they are, or not */
     recipe recipe;                 /* of f */
-    pairs_cost cost;               /* of the recipe, from a sample; seconds is 0 where none was taken */
-    bool dear;                     /* the pairs of the recipe so far would take too long */
-    bool plain;                    /* near pairs would too: rays alone are taken */
-    size_t least_rays;             /* in place of pairs that are dear */
-    bool large;                    /* its rows and the judge's lie in the scratch folder */
+    plane_rectangle portals[OPTION_LIST_MAX]; /* around the groups of --portal */
+    size_t n_portals;
+    pairs_cost cost;   /* of the recipe, from a sample; seconds is 0 where none was taken */
+    bool dear;         /* the pairs of the recipe so far would take too long */
+    bool plain;        /* near pairs would too: rays alone are taken */
+    size_t least_rays; /* in place of pairs that are dear */
+    bool large;        /* its rows and the judge's lie in the scratch folder */
     size_t sky_tiles;
     size_t probes;
     emitter_list emitters;
@@ -161,6 +163,9 @@ recipe state_near_recipe(const precompute_state *state);
  * both, and near pairs against rays alone, sets cost, dear, plain and least_rays, and logs why:
  * stage_pairs.c. A new choice of the recipe follows where dear is set. */
 lam_status state_weigh_pairs(precompute_state *state, lam_error *error);
+
+/* Takes the groups of --portal out of the mesh, and rectangles around them into portals: stage_portals.c. */
+lam_status state_take_portals(precompute_state *state, lam_error *error);
 
 /* The closure that --closed stands for: precompute.c. */
 scene_closure state_closure(const precompute_options *options);

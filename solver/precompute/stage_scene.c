@@ -64,6 +64,7 @@ lam_status stage_load_scene(precompute_state *state, lam_error *error) {
     if (report.clamped > 0)
         terminal_log(state->t, "%zu material%s reflected all light or more, or nearly: set to .9999",
                      report.clamped, report.clamped == 1 ? "" : "s");
+    TRY(state_take_portals(state, error));
     if (o->orient) TRY(orient(state, error));
 done:
     return status;

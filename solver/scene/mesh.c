@@ -3,6 +3,7 @@
 
 #include "solver/scene/plane.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -167,4 +168,40 @@ void mesh_centroid(const mesh *m, size_t element, double centroid[3]) {
     const double share = area_abc + area_acd > 0 ? area_acd / (area_abc + area_acd) : 0;
     for (int k = 0; k < 3; k++)
         centroid[k] = a[k] + ((c[k] - a[k]) + (1 - share) * (b[k] - a[k]) + share * (d[k] - a[k])) / 3;
+}
+
+/* Renumbers the groups that still have elements. Names lie in one block, in order. */
+static void drop_empty_groups(mesh *m) {
+    size_t kept = 0;
+    for (uint32_t g = 0; g < m->n_groups; g++) {
+        bool used = false;
+        for (size_t i = 0; i < m->n; i++) used = used || m->group[i] == g;
+        if (!used) continue;
+        for (size_t i = 0; i < m->n; i++)
+            if (m->group[i] == g) m->group[i] = (uint32_t)kept;
+        m->group_names[kept++] = m->group_names[g];
+    }
+    m->n_groups = kept;
+}
+
+void mesh_drop(mesh *m, const bool *dropped) {
+    const size_t before = m->n;
+    size_t n = 0;
+    for (size_t i = 0; i < before; i++) n += !dropped[i];
+    assert(n > 0);
+    for (size_t c = 0, to = 0; c < m->n_channels; c++)
+        for (size_t i = 0; i < before; i++) {
+            if (dropped[i]) continue;
+            m->reflectance[to] = m->reflectance[c * before + i];
+            m->emission[to++] = m->emission[c * before + i];
+        }
+    for (size_t i = 0, to = 0; i < before; i++) {
+        if (dropped[i]) continue;
+        memmove(m->elements[to], m->elements[i], sizeof *m->elements);
+        memmove(m->normal[to], m->normal[i], sizeof *m->normal);
+        m->area[to] = m->area[i];
+        m->group[to++] = m->group[i];
+    }
+    m->n = n;
+    drop_empty_groups(m);
 }

@@ -71,6 +71,35 @@ class Sky(unittest.TestCase):
         done = run("precompute", self.folder / "hole.h5", "-o", self.folder / "again.h5", "--closed")
         self.assertEqual(done.returncode, 2, done.stderr)
 
+    def test_portal(self):
+        """A window whose rim is no loop of the mesh: its panes say where rays are aimed, and are no elements."""
+        scene, panes = self.folder / "panes.obj", self.folder / "panes"
+        points = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
+        faces = ["1 2 4 3", "1 3 7 5", "2 6 8 4", "1 5 6 2", "3 4 8 7"]
+        low, high = 0.45, 0.55
+        roof = [(0, 0, 1, low), (0, high, 1, 1), (0, low, low, high), (high, low, 1, high)]
+        text = "".join("v %g %g %g\n" % p for p in points) + "o box\n" + "".join("f %s\n" % f for f in faces)
+        count = len(points)
+        for name, (x, y, u, w), z in [("roof", r, 1) for r in roof] + [("pane.1", (low, low, 0.5, high), 1),
+                                                                      ("pane.2", (0.5, low, high, high), 1)]:
+            text += f"o {name}\n" + "".join(f"v {a} {b} {z}\n" for a, b in ((x, y), (x, w), (u, w), (u, y)))
+            text += "f %d %d %d %d\n" % tuple(range(count + 1, count + 5))
+            count += 4
+        scene.write_text(text)
+        options = ["--elements", 200, "--sky", "tregenza", "--rays", 1024, "--probes", 0, "--reflectance", 0.5]
+        done = run("precompute", scene, "-o", panes, *options, "--portal", "pane.1", "--portal", "pane.2")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stderr, "2 faces of portals, which are no elements")
+        self.assertRegex(done.stderr, "rays are aimed at 2 openings")
+        with h5py.File(panes) as f:
+            self.assertEqual([name.decode() for name in f["mesh/group_names"][:]], ["box", "roof"])
+            power = f["mesh/area"][:] @ f["sky/first_bounce"][:].sum(0) / np.pi
+        self.assertAlmostEqual(power, 0.01, delta=0.0002)
+        for group, says in (("glass", 'the scene has no group "glass"'), ("box", "do not lie in one plane")):
+            done = run("precompute", scene, "-o", panes, *options, "--portal", group)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn(says, done.stderr)
+
     def npy(self, name, values):
         path = self.folder / name
         np.save(path, np.asarray(values))

@@ -2,6 +2,7 @@
 
 #include "solver/formfactor/leaving.h"
 #include "solver/formfactor/pairs/pairs.h"
+#include "solver/formfactor/rays/portals.h"
 #include "solver/formfactor/rays/rays.h"
 #include "solver/formfactor/rows/upper.h"
 #include "solver/formfactor/visibility/parts.h"
@@ -16,6 +17,7 @@ static const double unit = 0x1p-44;
 struct ray_rows {
     const mesh *m;
     visibility *v;
+    portals aimed;      /* rays for the sky; n is 0: none */
     form_factors f;     /* everything but the rows */
     csr near;           /* rows of F with the near pairs only, 0 where they are hidden; n is 0: none */
     double *near_sums;  /* [n], row sums of near */
@@ -105,6 +107,9 @@ lam_status ray_rows_create(const mesh *m, const form_factor_options *options, ra
     if (options->sky != NULL)
         TRY(sky_bounce_create(options->sky, m->up, options->ground_albedo, n, &r->f.sky, error));
     TRY(visibility_create(m, &r->v, error));
+    if (options->sky != NULL)
+        TRY(portals_find(m, r->v, options->recipe.seed, options->recipe.rays / 4, options->portals,
+                         options->n_portals, &r->aimed, error));
     r->noise_share = find_noise_share(r);
     TRY(find_parts(r, error));
     if (options->recipe.method == RECIPE_NEAR_PAIRS) {
@@ -219,6 +224,8 @@ typedef struct ray_batch {
 static void ray_batch_begin(const ray_rows *r, size_t element, uint64_t seed, const sky_bounce *sky,
                             ray_batch *g) {
     g->rays = (ray_context){.m = r->m, .v = r->v, .seed = seed, .sky = sky};
+    if (sky != NULL && r->aimed.n > 0) g->rays.portals = &r->aimed;
+    rays_aim(&g->rays, element, r->f.recipe.rays);
     g->near = near_of(r, element);
     g->element = element;
     g->first = 0;
@@ -270,8 +277,10 @@ static void find_row(ray_rows *r, size_t i, double *sky, filling *to) {
             __atomic_fetch_add(&r->received[j], (uint64_t)((each - mine) / unit), __ATOMIC_RELAXED);
         }
     ray_batch_end(r, &g, .5, to);
+    if (g.rays.in_front != 0)
+        portals_cast(&r->aimed, g.rays.in_front, &g.rays, &g.sampler, i, g.n_rays, &g.tally, sky);
     r->own[i] = own;
-    r->f.leaving[i] = (double)g.tally.left / (double)g.n_rays;
+    r->f.leaving[i] = fmin(g.tally.left / (double)g.n_rays, 1);
     r->f.absorbed[i] = (double)g.tally.lost / (double)g.n_rays;
     if (sky != NULL) sky_bounce_put(&r->f.sky, i, sky, (double)g.n_rays);
 }

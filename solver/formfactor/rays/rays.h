@@ -20,13 +20,25 @@ typedef struct ray_context {
     const mesh *m;
     const visibility *v;
     uint64_t seed;
-    const sky_bounce *sky; /* bins the rays that leave; NULL: no sky */
+    const sky_bounce *sky;         /* bins the rays that leave; NULL: no sky */
+    const struct portals *portals; /* rays are aimed at these, too; NULL: none */
+    unsigned in_front;             /* the portals that the present element's rays are aimed at */
+    size_t n_rays;                 /* of the present element, where there are portals */
 } ray_context;
 
-/* Counts of an element's rays that hit no front. */
+/* An element's rays that hit no front. */
 typedef struct ray_tally {
-    size_t left, lost; /* rays that left the scene, rays that hit back faces */
+    double left, squares; /* weights of the rays that left the scene, and of their squares: 1 each without
+                             portals (portals.h) */
+    size_t count;         /* of these rays */
+    size_t lost;          /* rays that hit back faces */
 } ray_tally;
+
+static inline void ray_tally_leave(ray_tally *t, double weight) {
+    t->left += weight;
+    t->squares += weight * weight;
+    t->count++;
+}
 
 /* Rays that are cast and counted together. */
 enum { RAYS_AT_ONCE = SAMPLE_ORDERED };
@@ -37,6 +49,13 @@ enum { RAYS_AT_ONCE = SAMPLE_ORDERED };
  * the element and the seed alone. */
 size_t rays_meet(const ray_context *c, const element_sampler *sampler, size_t element, size_t first,
                  size_t last, uint32_t *met, ray_tally *tally, double *sky);
+
+/* Makes a context with portals ready for an element and its number of rays by the cosine. */
+void rays_aim(ray_context *c, size_t element, size_t n_rays);
+
+/* The variance of left / n_rays, at least that of one ray of the mean weight, or, where none left, of weight
+ * 1, a sixteenth where rays are aimed at portals. */
+double rays_variance(const ray_tally *tally, size_t n_rays, bool aimed);
 
 /* Casts rays, at most RAYS_AT_ONCE, from each of n_elements elements, spread over the order, and ignores
  * their hits: to time them. */

@@ -405,10 +405,50 @@ START_TEST(loading_refuses_bad_values) {
 }
 END_TEST
 
+/* Elements of two channels and three groups, of which one group loses all. */
+START_TEST(dropped_elements) {
+    mesh m = make_cube();
+    static const char *const names[] = {"one", "glass", "two"};
+    static const bool dropped[] = {false, true, false, false, true, false};
+    free(m.group_names);
+    m.group_names = malloc(3 * sizeof *m.group_names + 16);
+    char *text = (char *)(m.group_names + 3);
+    for (size_t g = 0; g < 3; g++) {
+        m.group_names[g] = text;
+        text = stpcpy(text, names[g]) + 1;
+    }
+    m.n_groups = 3;
+    m.n_channels = 2;
+    m.reflectance = realloc(m.reflectance, 12 * sizeof *m.reflectance);
+    m.emission = realloc(m.emission, 12 * sizeof *m.emission);
+    for (uint32_t i = 0; i < 6; i++) m.group[i] = dropped[i] ? 1 : i < 3 ? 0 : 2;
+    for (size_t k = 0; k < 12; k++) m.reflectance[k] = .01f * (float)k, m.emission[k] = (float)k;
+    for (size_t i = 0; i < 6; i++) m.area[i] = 1 + (double)i;
+    for (size_t i = 0; i < 6; i++) m.normal[i][0] = (float)i;
+    mesh_drop(&m, dropped);
+    static const size_t kept[] = {0, 2, 3, 5};
+    ck_assert_uint_eq(m.n, 4);
+    ck_assert_uint_eq(m.n_groups, 2);
+    ck_assert_str_eq(m.group_names[0], "one");
+    ck_assert_str_eq(m.group_names[1], "two");
+    for (size_t k = 0; k < 4; k++) {
+        ck_assert_mem_eq(m.elements[k], cube_elements[kept[k]], sizeof *m.elements);
+        ck_assert_uint_eq(m.group[k], kept[k] < 3 ? 0 : 1);
+        ck_assert(m.area[k] == 1 + (double)kept[k] && m.normal[k][0] == (float)kept[k]);
+        for (size_t c = 0; c < 2; c++) {
+            ck_assert(m.emission[c * 4 + k] == (float)(c * 6 + kept[k]));
+            ck_assert(m.reflectance[c * 4 + k] == .01f * (float)(c * 6 + kept[k]));
+        }
+    }
+    mesh_free(&m);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("mesh");
     TCase *tests = tcase_create("mesh");
     tcase_set_timeout(tests, 120);
+    tcase_add_test(tests, dropped_elements);
     tcase_add_test(tests, areas_and_normals_are_exact);
     tcase_add_test(tests, measuring_refuses_bad_elements);
     tcase_add_test(tests, two_sided_meshes_have_backs);
