@@ -1,5 +1,5 @@
 /* Emissions of a command line or of files: --emit GROUP=V[,V,V], --emission FILE.npy|.json and --sky
- * FILE.npy. The room codec knows the formats; this one knows files, options and batches. */
+ * FILE.npy|.mtx|.smx. The room codec knows the formats; this one knows files, options and batches. */
 #ifndef LAMBERT_LIGHT_EMISSION_H
 #define LAMBERT_LIGHT_EMISSION_H
 
@@ -16,6 +16,7 @@ typedef struct emission {
     float *E;
     float *L; /* [n_vectors][C][m], radiances of the tiles of the store's sky, W/(m^2 sr); NULL: no sky */
     float *W; /* [n_vectors][C][s], weights of the store's emitters, beside E and L; NULL: none given */
+    bool by_luminance;          /* L is the luminance of a coloured sky, for a grey store */
     const struct sunlight *sun; /* [n_vectors], on every channel, beside L; borrowed, NULL: none */
 } emission;
 
@@ -26,6 +27,7 @@ typedef struct emission_scene {
     const mesh *m; /* borrowed */
     group_index groups;
     size_t n_tiles, n_emitters; /* of the store's sky and operator; 0: none */
+    char tiling[32];            /* of the sky; "": not known */
 } emission_scene;
 
 /* Without sky and emitters; the caller sets them, or emission_scene_sources does. O(n + g log g). Errors:
@@ -54,8 +56,10 @@ lam_status emission_check_items(const option_list *items, lam_error *error);
  * Errors name the file, the place, the value and the limit. */
 lam_status emission_read(const char *path, const emission_scene *scene, emission *out, lam_error *error);
 
-/* Puts e under the sky of an NPY file, shaped as an emission of m tiles. One sky goes with every emission,
- * one emission with every sky (steady); else there must be as many of both. */
+/* Puts e under the sky of an NPY file, shaped as an emission of m tiles, or of a matrix of Radiance (.mtx,
+ * .smx) on the tiles of the scene. One sky goes with every emission, one emission with every sky (steady);
+ * else there must be as many of both. A coloured sky lights a grey store by its luminance, .265 R + .670 G +
+ * .065 B (Radiance's), and sets by_luminance: an NPY file of it is [b][3][m]. */
 lam_status emission_add_sky(emission *e, const char *path, const emission_scene *scene, lam_error *error);
 
 /* The same for a batch of skies L [n_skies][m], which is copied to every channel; path names it in messages.

@@ -2,6 +2,8 @@
 #include "solver/base/atomic_file.h"
 #include "solver/base/file_text.h"
 #include "solver/codec/request.h"
+#include "solver/daylight/sky_matrix.h"
+#include "solver/daylight/weather.h"
 #include "solver/light/emission.h"
 
 #include <stdlib.h>
@@ -96,15 +98,69 @@ done:
     return status;
 }
 
+/* Puts [n_skies][3][n_tiles] into one channel: the luminance of Radiance's colours. */
+static void take_luminance(size_t n_skies, size_t n_tiles, float *L) {
+    static const double weights[3] = {.265, .670, .065};
+    for (size_t v = 0; v < n_skies; v++)
+        for (size_t t = 0; t < n_tiles; t++) {
+            double sum = 0;
+            for (size_t c = 0; c < 3; c++) sum += weights[c] * (double)L[(3 * v + c) * n_tiles + t];
+            L[v * n_tiles + t] = (float)sum; /* at or before what is read later */
+        }
+}
+
+/* The sky of a matrix, whose patches must be the tiles of the scene. */
+static lam_status add_matrix(emission *e, const char *path, const emission_scene *scene, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t C = scene->m->n_channels, m = scene->n_tiles;
+    sky_matrix read = {.n = 0};
+    float *L = NULL;
+    TRY(sky_matrix_read(path, NULL, NULL, &read, error));
+    /* Tregenza's tiles are Reinhart's with MF 1. */
+    const bool same = strcmp(read.tiling.name, scene->tiling) == 0 ||
+                      (strcmp(read.tiling.name, "tregenza") == 0 && strcmp(scene->tiling, "reinhart:1") == 0);
+    if (!same)
+        FAIL(error, LAM_ERR_ARGUMENT, "--sky %.200s: has the patches of %s, the store has the tiles of %s",
+             path, read.tiling.name, scene->tiling);
+    if (read.n_channels != 1 && C != 1 && read.n_channels != C)
+        FAIL(error, LAM_ERR_ARGUMENT, "--sky %.200s: has %zu components, the store %zu channels", path,
+             read.n_channels, C);
+    if (read.n_channels > C) {
+        take_luminance(read.n, m, read.L);
+        e->by_luminance = true;
+        read.n_channels = 1;
+    }
+    TRY(emission_allocate(path, C, m, read.n, &L, error));
+    for (size_t row = 0; row < read.n * C; row++)
+        memcpy(L + row * m, read.L + (read.n_channels == C ? row : row / C) * m, m * sizeof *L);
+    TRY(put_under(e, path, C, m, read.n, &L, error));
+    e->batch = true;
+done:
+    free(L);
+    sky_matrix_free(&read);
+    return status;
+}
+
 lam_status emission_add_sky(emission *e, const char *path, const emission_scene *scene, lam_error *error) {
     lam_status status = LAM_OK;
     radiosity_request sky = {0};
-    const codec_scene about = {
-        .n = scene->n_tiles, .n_channels = scene->m->n_channels, .item = "tile of the sky"};
+    codec_scene about = {.n = scene->n_tiles, .n_channels = scene->m->n_channels, .item = "tile of the sky"};
+    lam_error other = {.message = ""};
     if (scene->n_tiles == 0)
         FAIL(error, LAM_ERR_ARGUMENT, "--sky %s: the store has no sky; precompute it with --sky", path);
-    TRY(read_with(codec_read_npy, path, about, &sky, error));
-    TRY(put_under(e, path, about.n_channels, about.n, sky.n_rhs, &sky.E, error));
+    if (weather_is_named(path))
+        FAIL(error, LAM_ERR_ARGUMENT, "--sky %s: hours of a weather file are for lambert solve", path);
+    if (sky_matrix_is_named(path)) return add_matrix(e, path, scene, error);
+    status = read_with(codec_read_npy, path, about, &sky, error);
+    if (status == LAM_ERR_ARGUMENT && about.n_channels == 1) { /* of another shape: perhaps a coloured one */
+        about.n_channels = 3;
+        if (read_with(codec_read_npy, path, about, &sky, &other) != LAM_OK) goto done;
+        status = LAM_OK;
+        take_luminance(sky.n_rhs, about.n, sky.E);
+        e->by_luminance = true;
+    }
+    TRY(status);
+    TRY(put_under(e, path, scene->m->n_channels, about.n, sky.n_rhs, &sky.E, error));
     e->batch = e->batch || sky.batch;
 done:
     radiosity_request_free(&sky);

@@ -253,6 +253,7 @@ static lam_status render(const char *path, const fields *f, terminal *t, lam_err
     codec_quantity_find(f->quantity, strlen(f->quantity), &quantity);
     TRY(view_open(path, f, &v, error));
     TRY(light_open(v.s, &v.m, &f->light, false, &lit, error));
+    light_log(&lit, t);
     if (lit.light.n_vectors != 1)
         FAIL(error, LAM_ERR_ARGUMENT, "%s: holds %zu emissions, a picture shows exactly 1",
              f->light.emission != NULL ? f->light.emission : f->light.sky, lit.light.n_vectors);

@@ -265,6 +265,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     TRY(store_get_text(s, "/", "name", &scene, error));
     TRY(mesh_load(s, &m, &row_sums, error));
     TRY(light_open(s, &m, &f->light, f->weather != NULL, &lit, error));
+    light_log(&lit, t);
     TRY(reductions_bind(reductions, n_reductions, &lit.scene.groups, error));
     if (lit.own && is_dark(&lit.light, m.n * m.n_channels))
         FAIL(error, LAM_ERR_ARGUMENT,
@@ -372,6 +373,10 @@ int cmd_solve(int argc, char **argv) {
     if (light_check(&f.light, &error) != LAM_OK) return options_usage(verb.name, "%s", error.message);
     if (f.light.sky != NULL && f.weather != NULL)
         return options_usage(verb.name, "give --sky or --weather, not both");
+    if (f.light.sky != NULL && weather_is_named(f.light.sky)) {
+        f.weather = f.light.sky;
+        f.light.sky = NULL;
+    }
     if (f.weather != NULL && !weather_is_named(f.weather))
         return options_usage(verb.name, "--weather %s: must end in .epw or .wea", f.weather);
     if (f.weather == NULL && (f.photometric || options_given(&given, "sun")))

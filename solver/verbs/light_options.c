@@ -4,6 +4,8 @@
 #include "solver/operator/sky_light.h"
 
 #include <omp.h>
+#include <stdio.h>
+#include <stdlib.h>
 
 #define FIELD(member) offsetof(light_options, member)
 const option_row light_rows[] = {
@@ -21,9 +23,12 @@ const option_row light_rows[] = {
     {.name = "sky",
      .kind = OPTION_TEXT,
      .offset = FIELD(sky),
-     .argument = "FILE.npy",
-     .help = "Radiances of the tiles of the sky, W/(m2 sr): [m], [C][m], or a batch of them for solve; alone "
-             "or added to the other light"},
+     .argument = "FILE.npy|.mtx|.smx|.epw|.wea",
+     .help =
+         "Radiances of the tiles of the sky, W/(m2 sr): [m], [C][m], or a batch of them for solve; alone "
+         "or added to the other light. solve also takes what `lambert sky` reads: a matrix of Radiance on "
+         "the tiles of the store, and weather, as --weather does. A store of one channel takes coloured "
+         "skies, [b][3][m], by their luminance"},
     {0},
 };
 
@@ -39,15 +44,19 @@ done:
 lam_status light_open(store *s, const mesh *m, const light_options *options, bool other, lit_store *out,
                       lam_error *error) {
     lam_status status = LAM_OK;
+    char *tiling = NULL;
     const emission_options given = {
         .items = &options->emit, .path = options->emission, .sky = options->sky, .other = other};
     TRY(emission_scene_create(m, &out->scene, error));
     TRY(sky_load(s, m->n, &out->sky, error));
     TRY(operator_load(s, &out->op, error));
     emission_scene_sources(&out->scene, out->op, out->sky);
+    if (out->sky != NULL) TRY(store_get_text(s, "/sky", "tiling", &tiling, error));
+    if (tiling != NULL) snprintf(out->scene.tiling, sizeof out->scene.tiling, "%s", tiling);
     TRY(emission_choose(&out->scene, &given, &out->light, &out->own, error));
     lam_operator_set_threads(out->op, (size_t)omp_get_max_threads());
 done:
+    free(tiling);
     return status;
 }
 
@@ -56,4 +65,10 @@ void light_close(lit_store *lit) {
     emission_free(&lit->light);
     lam_operator_close(lit->op);
     lam_sky_close(lit->sky);
+}
+
+void light_log(const lit_store *lit, terminal *t) {
+    if (lit->light.by_luminance)
+        terminal_log(t, "the store is grey: the coloured sky lights it by its luminance, .265 R + .670 G + "
+                        ".065 B");
 }

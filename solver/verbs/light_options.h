@@ -2,6 +2,7 @@
 #ifndef LAMBERT_VERBS_LIGHT_OPTIONS_H
 #define LAMBERT_VERBS_LIGHT_OPTIONS_H
 
+#include "solver/base/terminal.h"
 #include "solver/light/emission.h"
 #include "store/store.h"
 
@@ -32,5 +33,8 @@ typedef struct lit_store {
 lam_status light_open(store *s, const mesh *m, const light_options *options, bool other, lit_store *out,
                       lam_error *error);
 void light_close(lit_store *lit);
+
+/* Says where a coloured sky lights a grey store. */
+void light_log(const lit_store *lit, terminal *t);
 
 #endif

@@ -128,6 +128,33 @@ class SkyMatrix(unittest.TestCase):
         np.testing.assert_allclose(year[0] / year[0, :1], np.array([1, 1.004 / .96, 1.118 / .96])[:, None] *
                                    np.ones(5), rtol=1e-4)
 
+    def test_solve_reads_matrices(self):
+        """Without `lambert sky` between: the same answers, a grey store by the luminance of Radiance's colours."""
+        rng = np.random.default_rng(6)
+        values = rng.random((578, 4, 3))
+        path, direct, by_way = self.folder / "b.smx", self.folder / "direct.npy", self.folder / "way.npy"
+        skies, _ = self.convert(values)
+        path.write_bytes(matrix(values))
+        must("solve", self.stores["colour"], "--sky", path, "-o", direct)
+        must("solve", self.stores["colour"], "--sky", self.folder / "a.npy", "-o", by_way)
+        np.testing.assert_array_equal(np.load(direct), np.load(by_way))
+        np.save(self.folder / "grey.npy", np.einsum("c,bct->bt", (.265, .670, .065), skies).astype(np.float32))
+        must("solve", self.stores["grey"], "--sky", self.folder / "grey.npy", "-o", by_way)
+        for sky in path, self.folder / "a.npy":
+            done = must("solve", self.stores["grey"], "--sky", sky, "-o", direct)
+            self.assertEqual(done.stderr.count("lights it by its luminance, .265 R + .670 G + .065 B"), 1)
+            np.testing.assert_allclose(np.load(direct), np.load(by_way), rtol=1e-6)
+        path.write_bytes(matrix(values[:, :, :1] * np.ones(3)))  # grey: no word of luminance, in either store
+        done = must("solve", self.stores["colour"], "--sky", path, "--annual", "sum", "-o", direct)
+        self.assertNotIn("luminance", done.stderr)
+        path.write_bytes(matrix(values[:146]))
+        done = lambert("solve", self.stores["grey"], "--sky", path, "-o", direct)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("b.smx: has the patches of tregenza, the store has the tiles of reinhart:2", done.stderr)
+        done = lambert("render", self.stores["grey"], "--sky", self.folder / "year.epw", "-o", self.folder / "a.png")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("hours of a weather file are for lambert solve", done.stderr)
+
     def test_refused(self):
         out = self.folder / "none.npy"
         good = matrix(np.ones((146, 2, 3)))

@@ -116,6 +116,9 @@ class SkyWeather(unittest.TestCase):
         self.assertEqual(light.shape, (8760, 4))
         # Measured to the noise of the form factors with tiles.
         self.assertAlmostEqual(light.mean(axis=1).sum() / self.horizontal.sum(), 1, delta=.03)
+        direct = self.folder / "direct.npy"
+        must("solve", self.store, "--sky", self.wea, "--quantity", "irradiance", "-o", direct)
+        np.testing.assert_array_equal(np.load(direct), light)
 
     def test_photometric(self):
         skies, _ = self.sky(self.wea)

@@ -254,6 +254,13 @@ START_TEST(test_skies_from_files) {
     ck_assert(e.n_vectors == 1 && !e.batch);
     ck_assert_mem_eq(e.L, ((float[]){1, 2}), 2 * sizeof(float));
     emission_free(&e);
+    /* Two coloured skies over a grey scene: .265 x 1 + .67 x 3 + .065 x 5 = 2.6, and so on by 1 and 6. */
+    ck_assert_int_eq(under_sky(&m, 1, 3, (size_t[]){2, 3, 2}, &e, &error), LAM_OK);
+    ck_assert(e.n_vectors == 2 && e.batch && e.by_luminance);
+    for (int k = 0; k < 4; k++) ck_assert_float_eq_tol(e.L[k], ((float[]){2.6f, 3.6f, 8.6f, 9.6f})[k], 1e-6f);
+    emission_free(&e);
+    ck_assert_int_eq(under_sky(&m, 1, 3, (size_t[]){2, 4, 2}, &e, &error), LAM_ERR_ARGUMENT);
+    emission_free(&e);
     ck_assert_int_eq(under_sky(&colour, 1, 1, (size_t[]){2}, &e, &error), LAM_OK);
     ck_assert_mem_eq(e.L, ((float[]){1, 2, 1, 2, 1, 2}), 6 * sizeof(float));
     emission_free(&e);
