@@ -1,6 +1,7 @@
 #include "solver/light/annual.h"
 
 #include "solver/light/sunlight.h"
+#include "solver/linalg/dense.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -185,13 +186,117 @@ done:
     return status;
 }
 
-/* Counts the hours of n answers x that a figure takes. */
-static void count_hours(const annual_figure *f, size_t n, size_t row, const float *x, uint32_t *count) {
+/* The answers to all tiles of a sky and to a steady emission beside it, of which the answer to any hour is a
+ * sum: x_h = x_E + sum_t L_ht x_t. */
+typedef struct tile_answers {
+    size_t terms; /* tiles + 1; 0: hours are answered one by one */
+    float *x;     /* [C][terms][width], the emission last */
+    float *share; /* [AT_ONCE][terms], of one channel */
+    float *mixed; /* [AT_ONCE][width] */
+} tile_answers;
+
+static void tile_answers_free(tile_answers *a) {
+    free(a->x);
+    free(a->share);
+    free(a->mixed);
+    *a = (tile_answers){.terms = 0};
+}
+
+/* Tiles are answered first where there are fewer of them than hours, and their answers take no more than
+ * this.
+ */
+static const double mixed_bytes = 0x1p30;
+
+static bool worth_mixing(const work *w, const emission *light, size_t n_vectors) {
+    if (light->L == NULL || !light->steady || light->sun != NULL || lam_operator_emitters(w->op) > 0)
+        return false;
+    const double terms = (double)lam_sky_tiles(w->sky) + 1;
+    return terms < (double)n_vectors && terms * (double)w->row * sizeof(float) <= mixed_bytes;
+}
+
+/* Answers n vectors of light and puts them behind the terms that are there. */
+static lam_status add_answers(const work *w, const emission *light, size_t n, tile_answers *a,
+                              lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t C = lam_operator_channels(w->op), width = w->row / C, terms = lam_sky_tiles(w->sky) + 1;
+    const size_t most = n < AT_ONCE ? n : AT_ONCE;
+    emission_pass p = {0};
+    size_t vectors[AT_ONCE];
+    float *x = memory_allocate(most, w->row * sizeof *x, "answers to tiles", error);
+    if (x == NULL) TRY(LAM_ERR_MEMORY);
+    TRY(emission_pass_create(light, w->op, w->sky, w->quantity, w->n_selected, w->selected, most, &p, error));
+    for (size_t first = 0; first < n; first += most) {
+        const size_t now = n - first < most ? n - first : most;
+        if (progress_cancelled(w->steps)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
+        progress_report(w->steps, "tiles", (double)first / (double)n);
+        for (size_t k = 0; k < now; k++) vectors[k] = first + k;
+        TRY(emission_pass_solve(&p, now, vectors, x, error));
+        for (size_t k = 0; k < now; k++)
+            for (size_t c = 0; c < C; c++)
+                memcpy(a->x + (c * terms + a->terms + k) * width, x + (k * C + c) * width, width * sizeof *x);
+        a->terms += now;
+    }
+done:
+    emission_pass_free(&p);
+    free(x);
+    return status;
+}
+
+static lam_status tile_answers_make(const work *w, const emission *light, tile_answers *out,
+                                    lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t C = lam_operator_channels(w->op), n = lam_operator_elements(w->op);
+    const size_t m = lam_sky_tiles(w->sky), terms = m + 1, width = w->row / C;
+    tile_answers a = {.terms = 0};
+    float *dark = memory_allocate(C * n, sizeof *dark, "answers to tiles", error);
+    float *units = memory_allocate(m + 1, C * m * sizeof *units, "answers to tiles", error);
+    a.x = memory_allocate(terms, w->row * sizeof *a.x, "answers to tiles", error);
+    a.share = memory_allocate(AT_ONCE, terms * sizeof *a.share, "answers to tiles", error);
+    a.mixed = memory_allocate(AT_ONCE, width * sizeof *a.mixed, "answers to tiles", error);
+    if (dark == NULL || units == NULL || a.x == NULL || a.share == NULL || a.mixed == NULL)
+        TRY(LAM_ERR_MEMORY);
+    for (size_t t = 0; t < m; t++)
+        for (size_t c = 0; c < C; c++) units[(t * C + c) * m + t] = 1;
+    const emission tiles = {.n_vectors = m, .steady = true, .E = dark, .L = units},
+                   lamps = {.n_vectors = 1, .steady = true, .E = light->E, .L = units + m * C * m};
+    TRY(add_answers(w, &tiles, m, &a, error));
+    TRY(add_answers(w, &lamps, 1, &a, error));
+    *out = a;
+    a = (tile_answers){.terms = 0};
+done:
+    tile_answers_free(&a);
+    free(dark);
+    free(units);
+    return status;
+}
+
+/* Counts the hours of n answers x [n][width] that a figure takes. */
+static void count_hours(const annual_figure *f, size_t n, size_t width, const float *x, uint32_t *count) {
     for (size_t k = 0; k < n; k++)
-        for (size_t i = 0; i < row; i++) {
-            const double value = (double)x[k * row + i];
+        for (size_t i = 0; i < width; i++) {
+            const double value = (double)x[k * width + i];
             count[i] += value >= f->low && value <= f->high;
         }
+}
+
+static void count_all(const work *w, size_t n, size_t width, const float *x, uint32_t *count) {
+    for (size_t k = 0; k < w->options->n_figures; k++)
+        if (!w->options->figures[k].is_sum)
+            count_hours(&w->options->figures[k], n, width, x, count + k * w->row);
+}
+
+/* Counts n hours that are sums of the answers to tiles. */
+static void count_mixed(const work *w, const emission *light, const tile_answers *a, size_t n,
+                        const size_t *vectors, uint32_t *count) {
+    const size_t C = lam_operator_channels(w->op), m = a->terms - 1, width = w->row / C;
+    for (size_t c = 0; c < C; c++) {
+        for (size_t k = 0; k < n; k++) {
+            memcpy(a->share + k * a->terms, light->L + (vectors[k] * C + c) * m, m * sizeof *a->share);
+            a->share[k * a->terms + m] = 1;
+        }
+        dense_multiply(n, a->terms, width, a->share, a->x + c * a->terms * width, false, a->mixed);
+        count_all(w, n, width, a->mixed, count + c * width);
+    }
 }
 
 static lam_status make_shares(const work *w, const emission *light, const size_t *vectors, size_t n_vectors,
@@ -199,21 +304,27 @@ static lam_status make_shares(const work *w, const emission *light, const size_t
     lam_status status = LAM_OK;
     const size_t n_figures = w->options->n_figures, most = n_vectors < AT_ONCE ? n_vectors : AT_ONCE;
     const size_t dark = sum->counted - n_vectors;
+    const bool mixed = worth_mixing(w, light, n_vectors);
     emission_pass p = {0};
+    tile_answers tiles = {.terms = 0};
     uint32_t *count = memory_allocate(n_figures, w->row * sizeof *count, "hours", error);
     float *x = memory_allocate(most + 1, w->row * sizeof *x, "hours", error);
     if (count == NULL || x == NULL) TRY(LAM_ERR_MEMORY);
-    if (n_vectors > 0)
+    if (mixed)
+        TRY(tile_answers_make(w, light, &tiles, error));
+    else if (n_vectors > 0)
         TRY(emission_pass_create(light, w->op, w->sky, w->quantity, w->n_selected, w->selected, most, &p,
                                  error));
     for (size_t first = 0; first < n_vectors; first += most) {
         const size_t left = n_vectors - first, now = left < most ? left : most;
         if (progress_cancelled(w->steps)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         progress_report(w->steps, "hours", (double)first / (double)n_vectors);
+        if (mixed) {
+            count_mixed(w, light, &tiles, now, vectors + first, count);
+            continue;
+        }
         TRY(emission_pass_solve(&p, now, vectors + first, x, error));
-        for (size_t k = 0; k < n_figures; k++)
-            if (!w->options->figures[k].is_sum)
-                count_hours(&w->options->figures[k], now, w->row, x, count + k * w->row);
+        count_all(w, now, w->row, x, count);
     }
     for (size_t k = 0; k < n_figures; k++) {
         const annual_figure *f = &w->options->figures[k];
@@ -224,6 +335,7 @@ static lam_status make_shares(const work *w, const emission *light, const size_t
     }
 done:
     emission_pass_free(&p);
+    tile_answers_free(&tiles);
     free(count);
     free(x);
     return status;
