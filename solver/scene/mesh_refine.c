@@ -1,7 +1,7 @@
 /* Subdivision: every face into a grid of cells, or m^2 triangles, with vertices shared across faces. */
 #include "solver/scene/face_grid.h"
-#include "solver/scene/mesh.h"
-#include "solver/scene/tables.h"
+#include "solver/scene/mesh_cells.h"
+#include "solver/scene/mesh_refined.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -131,74 +131,115 @@ done:
     return status;
 }
 
-static lam_status add_quad(point_table *points, const double p[4][3], uint32_t *element, lam_error *error) {
+lam_status refined_mesh_begin(const mesh *m, size_t n, refined_mesh *out, lam_error *error) {
     lam_status status = LAM_OK;
-    for (int k = 0; k < 4; k++) TRY(point_table_add(points, p[k], &element[k], error));
+    refined_mesh r = {.n = n};
+    if (m->two_sided) FAIL(error, LAM_ERR_ARGUMENT, "mesh: refine before making it two-sided");
+    if (n >= MESH_NO_VERTEX)
+        FAIL(error, LAM_ERR_ARGUMENT, "mesh: this would make more than %u elements", MESH_NO_VERTEX - 1);
+    r.elements = memory_allocate(n, sizeof *r.elements, "refined mesh", error);
+    r.face = memory_allocate(n, sizeof *r.face, "refined mesh", error);
+    if (r.elements == NULL || r.face == NULL) TRY(LAM_ERR_MEMORY);
+    *out = r;
+    r = (refined_mesh){.n = 0};
+done:
+    refined_mesh_free(&r);
+    return status;
+}
+
+void refined_mesh_free(refined_mesh *r) {
+    free(r->elements);
+    free(r->face);
+    point_table_free(&r->points);
+    *r = (refined_mesh){.n = 0};
+}
+
+lam_status refined_mesh_add(refined_mesh *r, size_t i, size_t corners, const double (*p)[3],
+                            lam_error *error) {
+    lam_status status = LAM_OK;
+    r->elements[i][3] = MESH_NO_VERTEX;
+    for (size_t k = 0; k < corners; k++) TRY(point_table_add(&r->points, p[k], &r->elements[i][k], error));
 done:
     return status;
 }
 
-static lam_status cut_quad(const face *f, face_cut cut, point_table *points, uint32_t (*out)[4],
-                           lam_error *error) {
+lam_status refined_mesh_end(refined_mesh *r, const mesh *m, mesh *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = r->n, channels = m->n_channels;
+    mesh fine = {.n = n, .n_channels = channels, .unit = m->unit, .up = m->up};
+    fine.group = memory_allocate(n, sizeof *fine.group, "refined mesh", error);
+    fine.reflectance = memory_allocate(n * channels, sizeof *fine.reflectance, "refined mesh", error);
+    fine.emission = memory_allocate(n * channels, sizeof *fine.emission, "refined mesh", error);
+    if (fine.group == NULL || fine.reflectance == NULL || fine.emission == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < n; i++) {
+        fine.group[i] = m->group[r->face[i]];
+        for (size_t c = 0; c < channels; c++) {
+            fine.reflectance[c * n + i] = m->reflectance[c * m->n + r->face[i]];
+            fine.emission[c * n + i] = m->emission[c * m->n + r->face[i]];
+        }
+    }
+    fine.elements = r->elements;
+    fine.vertices = r->points.points;
+    fine.n_vertices = r->points.n;
+    r->elements = NULL;
+    r->points.points = NULL;
+    TRY(mesh_measure(&fine, error));
+    memcpy(fine.name, m->name, sizeof fine.name);
+    memcpy(fine.source_hash, m->source_hash, sizeof fine.source_hash);
+    *out = fine;
+    fine = (mesh){0};
+done:
+    mesh_free(&fine);
+    return status;
+}
+
+void mesh_replace(mesh *m, mesh *by) {
+    by->n_groups = m->n_groups;
+    by->group_names = m->group_names;
+    m->group_names = NULL;
+    mesh_free(m);
+    *m = *by;
+    *by = (mesh){0};
+}
+
+static lam_status cut_quad(const face *f, face_cut cut, refined_mesh *fine, size_t at, lam_error *error) {
     lam_status status = LAM_OK;
     for (uint32_t j = 0; j < cut.b; j++)
         for (uint32_t i = 0; i < cut.a; i++) {
             double p[4][3];
             for (int k = 0; k < 4; k++)
                 grid_point(f->p, i + (k == 1 || k == 2), cut.a, j + (k >= 2), cut.b, p[k]);
-            TRY(add_quad(points, (const double(*)[3])p, *out++, error));
+            TRY(refined_mesh_add(fine, at++, 4, (const double(*)[3])p, error));
         }
 done:
     return status;
 }
 
-static lam_status cut_triangle(const face *f, uint32_t m, point_table *points, uint32_t (*out)[4],
-                               lam_error *error) {
+static lam_status cut_triangle(const face *f, uint32_t m, refined_mesh *fine, size_t at, lam_error *error) {
     lam_status status = LAM_OK;
     for (uint32_t j = 0; j < m; j++)
         for (uint32_t i = 0; i + j < m; i++) {
             /* the triangle that stands as its parent does, then the one turned over to its right */
             const uint32_t steps[2][3][2] = {{{i, j}, {i + 1, j}, {i, j + 1}},
                                              {{i + 1, j}, {i + 1, j + 1}, {i, j + 1}}};
-            for (int t = 0; t < (i + j + 1 < m ? 2 : 1); t++, out++) {
-                for (int k = 0; k < 3; k++) {
-                    double p[3];
-                    triangle_point(f->p, steps[t][k][0], steps[t][k][1], m, p);
-                    TRY(point_table_add(points, p, &(*out)[k], error));
-                }
-                (*out)[3] = MESH_NO_VERTEX;
+            for (int t = 0; t < (i + j + 1 < m ? 2 : 1); t++) {
+                double p[3][3];
+                for (int k = 0; k < 3; k++) triangle_point(f->p, steps[t][k][0], steps[t][k][1], m, p[k]);
+                TRY(refined_mesh_add(fine, at++, 3, (const double(*)[3])p, error));
             }
         }
 done:
     return status;
 }
 
-/* Fills elements, vertices, group and materials of fine. */
-static lam_status cut_faces(const mesh *m, const face_cut *cuts, point_table *points, mesh *fine,
-                            lam_error *error) {
+static lam_status cut_faces(const mesh *m, const face_cut *cuts, refined_mesh *fine, lam_error *error) {
     lam_status status = LAM_OK;
     size_t at = 0;
-    fine->elements = memory_allocate(fine->n, sizeof *fine->elements, "refined mesh", error);
-    fine->group = memory_allocate(fine->n, sizeof *fine->group, "refined mesh", error);
-    fine->reflectance =
-        memory_allocate(fine->n * m->n_channels, sizeof *fine->reflectance, "refined mesh", error);
-    fine->emission = memory_allocate(fine->n * m->n_channels, sizeof *fine->emission, "refined mesh", error);
-    if (fine->elements == NULL || fine->group == NULL || fine->reflectance == NULL || fine->emission == NULL)
-        TRY(LAM_ERR_MEMORY);
     for (size_t i = 0; i < m->n; i++) {
         const face f = face_of(m, i);
         const size_t pieces = cut_pieces(m, i, cuts[i]);
-        if (f.n == 4)
-            TRY(cut_quad(&f, cuts[i], points, fine->elements + at, error));
-        else
-            TRY(cut_triangle(&f, cuts[i].a, points, fine->elements + at, error));
-        for (size_t p = 0; p < pieces; p++, at++) {
-            fine->group[at] = m->group[i];
-            for (size_t c = 0; c < m->n_channels; c++) {
-                fine->reflectance[c * fine->n + at] = m->reflectance[c * m->n + i];
-                fine->emission[c * fine->n + at] = m->emission[c * m->n + i];
-            }
-        }
+        TRY(f.n == 4 ? cut_quad(&f, cuts[i], fine, at, error) : cut_triangle(&f, cuts[i].a, fine, at, error));
+        for (size_t p = 0; p < pieces; p++) fine->face[at++] = (uint32_t)i;
     }
 done:
     return status;
@@ -206,37 +247,21 @@ done:
 
 lam_status mesh_refine(mesh *m, const mesh_refinement *how, lam_error *error) {
     lam_status status = LAM_OK;
-    mesh fine = {0};
-    point_table points = {0};
+    refined_mesh fine = {.n = 0};
+    mesh made = {0};
+    size_t n = 0;
     face_cut *cuts = memory_allocate(m->n, sizeof *cuts, "refined mesh", error);
     if (cuts == NULL) return LAM_ERR_MEMORY;
     if (m->two_sided) FAIL(error, LAM_ERR_ARGUMENT, "mesh: refine before making it two-sided");
     TRY(plan_cuts(m, how, cuts, error));
-    for (size_t i = 0; i < m->n; i++) {
-        fine.n += cut_pieces(m, i, cuts[i]);
-        if (fine.n >= MESH_NO_VERTEX)
-            FAIL(error, LAM_ERR_ARGUMENT, "mesh: this would make more than %u elements", MESH_NO_VERTEX - 1);
-    }
-    if (fine.n == m->n) goto done; /* nothing to cut */
-    TRY(cut_faces(m, cuts, &points, &fine, error));
-    fine.vertices = points.points;
-    fine.n_vertices = points.n;
-    points.points = NULL;
-    TRY(mesh_measure(&fine, error));
-    fine.n_channels = m->n_channels;
-    fine.n_groups = m->n_groups;
-    fine.group_names = m->group_names;
-    m->group_names = NULL;
-    fine.unit = m->unit;
-    fine.up = m->up;
-    memcpy(fine.name, m->name, sizeof fine.name);
-    memcpy(fine.source_hash, m->source_hash, sizeof fine.source_hash);
-    mesh_free(m);
-    *m = fine;
-    fine = (mesh){0};
+    for (size_t i = 0; i < m->n && n < MESH_NO_VERTEX; i++) n += cut_pieces(m, i, cuts[i]);
+    if (n == m->n) goto done; /* nothing to cut */
+    TRY(refined_mesh_begin(m, n, &fine, error));
+    TRY(cut_faces(m, cuts, &fine, error));
+    TRY(refined_mesh_end(&fine, m, &made, error));
+    mesh_replace(m, &made);
 done:
     free(cuts);
-    point_table_free(&points);
-    mesh_free(&fine);
+    refined_mesh_free(&fine);
     return status;
 }

@@ -1,6 +1,7 @@
 #include "support/suite.h"
 
 #include "solver/scene/mesh.h"
+#include "solver/scene/mesh_cells.h"
 #include "support/scene.h"
 
 /* A mesh of quads and triangles (4th index MESH_NO_VERTEX) in one group, grey .5. */
@@ -444,6 +445,65 @@ START_TEST(dropped_elements) {
 }
 END_TEST
 
+static double cell_area(const mesh *m, const mesh_cell *c) {
+    double corners[4][3];
+    mesh_cell_corners(m, c, corners);
+    return mesh_cell_area((const double(*)[3])corners, c->n);
+}
+
+/* Halves have half of the area of a cell each, whichever side is halved, down to cells of one step. */
+START_TEST(halves_of_cells_are_equal) {
+    mesh m = _i == 0 ? make_cube() : make_octahedron();
+    for (size_t side = 0; side < (_i == 0 ? 2u : 3u); side++) {
+        mesh_cell cell = mesh_cell_of(&m, 1), halves[2];
+        const double whole = m.area[1];
+        ck_assert_double_eq_tol(cell_area(&m, &cell), whole, 1e-15);
+        for (size_t step = 0; mesh_cell_halve(&cell, (side + step) % (_i == 0 ? 2u : 3u), halves); step++) {
+            const double area = cell_area(&m, &cell);
+            for (int k = 0; k < 2; k++)
+                ck_assert_double_eq_tol(cell_area(&m, &halves[k]), area / 2, 1e-12 * whole);
+            cell = halves[step % 2];
+        }
+        ck_assert_double_lt(cell_area(&m, &cell), whole / (1 << 14)); /* 15 halvings of a side, at least */
+    }
+    mesh_free(&m);
+}
+END_TEST
+
+/* Cells cover the faces in their order, keep their planes, fronts, groups and materials, and share corners.
+ */
+START_TEST(meshes_of_cells_cover_faces) {
+    mesh m = _i == 0 ? make_cube() : make_octahedron(), fine = {0};
+    mesh_cell *cells = NULL;
+    size_t n;
+    lam_error error = {0};
+    const double area = total_area(&m), most = m.area[0] / 5;
+    ck_ok(mesh_cells_even(&m, most, 1000, &cells, &n, &error));
+    ck_assert_uint_eq(n, 8 * m.n);
+    ck_ok(mesh_of_cells(&m, n, cells, &fine, &error));
+    ck_assert_uint_eq(fine.n, n);
+    ck_assert_double_eq_tol(total_area(&fine), area, 1e-12 * area);
+    for (size_t i = 0; i < n; i++) {
+        const size_t face = cells[i].face;
+        ck_assert_uint_eq(face, i / 8);
+        ck_assert_double_le(fine.area[i], most);
+        ck_assert_uint_eq(fine.group[i], m.group[face]);
+        ck_assert(fine.emission[i] == m.emission[face]);
+        for (int d = 0; d < 3; d++) ck_assert_float_eq_tol(fine.normal[i][d], m.normal[face][d], 1e-6f);
+    }
+    ck_assert_uint_lt(fine.n_vertices, 2 * n); /* of 3 n or 4 n corners */
+    mesh_replace(&m, &fine);
+    ck_assert_uint_eq(m.n, n);
+    ck_assert_str_eq(m.group_names[0], "all");
+    ck_assert_ptr_null(fine.vertices);
+    free(cells);
+    ck_ok(mesh_cells_even(&m, 0, n + 3, &cells, &n, &error)); /* no more than may be */
+    ck_assert_uint_eq(n, m.n + 3);
+    free(cells);
+    mesh_free(&m);
+}
+END_TEST
+
 int main(void) {
     Suite *suite = suite_create("mesh");
     TCase *tests = tcase_create("mesh");
@@ -462,6 +522,8 @@ int main(void) {
     tcase_add_test(tests, fewer_elements_than_faces_changes_nothing);
     tcase_add_test(tests, store_keeps_every_bit);
     tcase_add_loop_test(tests, loading_refuses_bad_values, 0, 11);
+    tcase_add_loop_test(tests, halves_of_cells_are_equal, 0, 2);
+    tcase_add_loop_test(tests, meshes_of_cells_cover_faces, 0, 2);
     suite_add_tcase(suite, tests);
     return suite_run(suite);
 }
