@@ -1,0 +1,31 @@
+/* Meshes of unequal elements: faces are halved where the light of a coarse solution changes, as long as
+ * constants on elements leave more than an error that is asked for (Cohen et al. 1986 subdivide by
+ * differences of radiosities; here each cell gathers at points within itself, so that neither direct light
+ * nor the cell's own size waits for a new solution). */
+#ifndef LAMBERT_ADAPT_ADAPTIVE_H
+#define LAMBERT_ADAPT_ADAPTIVE_H
+
+#include "solver/scene/mesh.h"
+
+typedef struct adaptive_options {
+    double error;    /* |error| / |B - E| that constants on elements may leave, for each light */
+    size_t elements; /* at most, both sides counted; no face is joined with another */
+    bool two_sided;  /* the mesh will be: both sides of a face are looked at */
+    uint64_t seed;
+    const progress *progress;
+} adaptive_options;
+
+typedef struct adaptive_report {
+    bool has_lamps;
+    double lamps, even; /* estimated errors of the mesh that was made, of the light of lamps and of 1 from
+                           every element */
+    bool reached;       /* both are at most what was asked for */
+} adaptive_report;
+
+/* Divides the faces of a mesh in place. The scene's lamps and 1 from every element are its lights; a coarse
+ * solution is found for them first. Deterministic, for any number of threads. Cost: 320 rays and segments for
+ * each cell that was looked at, about twice the number of elements, and the coarse solution. Errors: those of
+ * coarse_light_make and mesh_of_cells. */
+lam_status adaptive_refine(mesh *m, const adaptive_options *how, adaptive_report *report, lam_error *error);
+
+#endif

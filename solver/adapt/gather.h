@@ -1,0 +1,37 @@
+/* Final gathering: the irradiance at points of a scene from an answer that is constant on elements,
+ *     H(x) = integral of B(y) V(x, y) cos cos' / (pi r^2) dA(y),
+ * by cosine-weighted rays and, for lamps, by samples on them too, joined by the balance heuristic (Veach and
+ * Guibas 1995). Unbiased for that answer. Immutable once created: any number of threads may gather. Must not
+ * know operators. */
+#ifndef LAMBERT_ADAPT_GATHER_H
+#define LAMBERT_ADAPT_GATHER_H
+
+#include "solver/scene/mesh.h"
+
+/* Samples of a half of an estimate: rays, and places on lamps. */
+enum { GATHER_HALVES = 2, GATHER_RAYS = 32, GATHER_LAMP_SAMPLES = 32 };
+
+/* At most so many lights, and channels of all of them. */
+enum { GATHER_VALUES_MOST = 9 };
+
+typedef struct gather gather;
+
+/* The answers that are gathered from: B [n_lights][C][n]. lamps [C][n], or NULL, is the part of the first
+ * light that lamps emit, which samples look for. All three must outlive what is made. Errors: LAM_ERR_MEMORY,
+ * LAM_ERR_INTERNAL. */
+lam_status gather_create(const mesh *m, size_t n_lights, const float *B, const float *lamps, gather **out,
+                         lam_error *error);
+void gather_free(gather *g);
+
+size_t gather_values(const gather *g); /* n_lights C */
+
+/* H [n_points][GATHER_HALVES][n_lights C] at points of the plane of an element. The halves are independent.
+ * All points share the directions of rays and the places on lamps, which the key chooses, so that differences
+ * between near points have little noise. Cost: for each point 64 rays and 16 segments. */
+void gather_at(const gather *g, uint32_t element, uint64_t key, size_t n_points, const double (*points)[3],
+               double *H);
+
+/* Points of an element at (u, w) of the unit square; the map preserves area. */
+void gather_place(const gather *g, uint32_t element, size_t n, const float (*uw)[2], double (*points)[3]);
+
+#endif

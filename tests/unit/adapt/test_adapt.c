@@ -1,0 +1,282 @@
+/* Light at points, the error of a mesh and adaptive meshes, against the closed form of a floor below a lamp.
+ */
+#include "solver/adapt/adaptive.h"
+#include "solver/adapt/gather.h"
+#include "solver/adapt/mesh_error.h"
+#include "support/box.h"
+#include "support/scene.h"
+#include "support/suite.h"
+
+#include <omp.h>
+
+static const float rho = .5f;
+
+/* A floor of 3 x 3 m, cells x cells elements, 1 m below a lamp of 1 x 1 m that emits 1. The lamp is the last
+ * element and reflects nothing, so that B = rho F on the floor. */
+static mesh floor_and_lamp(size_t cells) {
+    mesh m = {0};
+    for (size_t j = 0; j < cells; j++)
+        for (size_t i = 0; i < cells; i++) {
+            const double step = 3. / (double)cells;
+            mesh_add_cell(&m,
+                          &(box_cell){.axis = 2,
+                                      .level = 0,
+                                      .from = {step * (double)i, step * (double)j, 0},
+                                      .to = {step * (double)(i + 1), step * (double)(j + 1), 0}},
+                          true);
+        }
+    mesh_add_cell(&m, &(box_cell){.axis = 2, .level = 1, .from = {.7, 1, 1}, .to = {1.7, 2, 1}}, false);
+    mesh_finish(&m, rho);
+    m.reflectance[m.n - 1] = 0;
+    m.emission[m.n - 1] = 1;
+    return m;
+}
+
+/* The share of light from a point that meets a rectangle [0, a] x [0, b] at height 1 above a corner of it
+ * (Howell, configuration C-11), odd in a and in b. */
+static double corner(double a, double b) {
+    const double s = sqrt(1 + a * a), t = sqrt(1 + b * b);
+    return (a / s * atan(b / s) + b / t * atan(a / t)) / (2 * M_PI);
+}
+
+/* F from the point (x, y) of the floor to the lamp. */
+static double truth(double x, double y) {
+    return corner(1.7 - x, 2 - y) - corner(.7 - x, 2 - y) - corner(1.7 - x, 1 - y) + corner(.7 - x, 1 - y);
+}
+
+/* Mean and variance of the truth over the bounds of an element of the floor, by 16 x 16 points. */
+static void over(const mesh *m, size_t i, double *mean, double *variance) {
+    enum { POINTS = 16 };
+    const double *low = m->vertices[m->elements[i][0]], *high = m->vertices[m->elements[i][2]];
+    double sum = 0, squares = 0;
+    for (int k = 0; k < POINTS * POINTS; k++) {
+        const double u = (k % POINTS + .5) / POINTS, v = (k / POINTS + .5) / POINTS;
+        const double F = truth(low[0] + u * (high[0] - low[0]), low[1] + v * (high[1] - low[1]));
+        sum += F;
+        squares += F * F;
+    }
+    *mean = sum / (POINTS * POINTS);
+    *variance = squares / (POINTS * POINTS) - *mean * *mean;
+}
+
+/* The true error of constants, and B [n] with them; the elements that are not the lamp lie in the floor. */
+static double true_error(const mesh *m, float *B) {
+    double off = 0, all = 0;
+    for (size_t i = 0; i < m->n; i++) {
+        double mean, variance;
+        if (B != NULL) B[i] = m->emission[i];
+        if (m->emission[i] > 0) continue;
+        over(m, i, &mean, &variance);
+        if (B != NULL) B[i] = rho * (float)mean;
+        off += m->area[i] * variance;
+        all += m->area[i] * mean * mean;
+    }
+    return sqrt(off / all);
+}
+
+/* The light of the lamp at points of the floor, near and far from it: the mean over keys is the closed form,
+ * the halves are independent, and rays alone, which know of no lamp, say the same. */
+START_TEST(light_at_points) {
+    enum { KEYS = 400 };
+    static const double points[3][3] = {{1.2, 1.5, 0}, {.1, .2, 0}, {2.9, 2.9, 0}};
+    mesh m = floor_and_lamp(1);
+    const float B[2] = {0, 1};
+    gather *g = NULL;
+    lam_error error = {0};
+    ck_ok(gather_create(&m, 1, B, _i == 0 ? B : NULL, &g, &error));
+    ck_assert_uint_eq(gather_values(g), 1);
+    for (int p = 0; p < 3; p++) {
+        const double F = truth(points[p][0], points[p][1]);
+        double sum = 0, squares = 0, product = 0;
+        for (uint64_t key = 0; key < KEYS; key++) {
+            double H[GATHER_HALVES];
+            gather_at(g, 0, key, 1, &points[p], H);
+            sum += (H[0] + H[1]) / 2;
+            squares += ((H[0] - F) * (H[0] - F) + (H[1] - F) * (H[1] - F)) / 2;
+            product += (H[0] - F) * (H[1] - F);
+        }
+        /* four standard errors of means over keys; of a product of independent halves likewise */
+        const double variance = squares / KEYS;
+        ck_assert_double_le(fabs(sum / KEYS - F), 4 * sqrt(variance / 2 / KEYS) + 1e-6);
+        ck_assert_double_le(fabs(product / KEYS), 4 * variance / sqrt(KEYS));
+        /* samples of the lamp leave a few hundredths of the light at a key, rays alone about as much as there
+         * is */
+        if (_i == 0) ck_assert_double_le(sqrt(variance), .1 * F);
+    }
+    gather_free(g);
+    mesh_free(&m);
+}
+END_TEST
+
+/* A bright plate that turns its back to a point leaves it dark, and another point as bright as it was. */
+START_TEST(shadow) {
+    static const double points[2][3] = {{1.2, 1.5, 0}, {.1, .2, 0}};
+    mesh m = floor_and_lamp(1);
+    const box_cell plate = {.axis = 2, .level = .1, .from = {.6, .9, .1}, .to = {1.8, 2.1, .1}};
+    const float B[3] = {0, 1, 5}, lamps[3] = {0, 1, 0};
+    double H[2 * GATHER_HALVES], light = 0;
+    gather *g = NULL;
+    lam_error error = {0};
+    free(m.reflectance);
+    free(m.emission);
+    free(m.group);
+    mesh_add_cell(&m, &plate, true);
+    mesh_finish(&m, rho);
+    ck_ok(gather_create(&m, 1, B, lamps, &g, &error));
+    for (uint64_t key = 0; key < 100; key++) {
+        gather_at(g, 0, key, 2, points, H);
+        ck_assert(H[0] == 0 && H[1] == 0);
+        light += (H[2] + H[3]) / 200;
+    }
+    ck_assert_double_eq_tol(light, truth(.1, .2), .02 * truth(.1, .2));
+    gather_free(g);
+    mesh_free(&m);
+}
+END_TEST
+
+/* In a closed box that sends out 1 everywhere, 1 arrives everywhere. */
+START_TEST(furnace) {
+    static const double size[3] = {1, 2, 3}, points[2][3] = {{.5, 1e-4, 0}, {.99, 1.7, 0}};
+    mesh m = box_mesh(size, 2, .5f);
+    float *B = malloc(2 * m.n * sizeof *B);
+    double H[2 * GATHER_HALVES * 2];
+    gather *g = NULL;
+    lam_error error = {0};
+    for (size_t i = 0; i < m.n; i++) B[i] = 1, B[m.n + i] = 2;
+    ck_ok(gather_create(&m, 2, B, NULL, &g, &error));
+    gather_at(g, 4 * 4, 1, 2, points, H); /* the floor's first element */
+    for (size_t k = 0; k < 4; k++) {
+        ck_assert_double_eq_tol(H[2 * k], 1, 1e-6);
+        ck_assert_double_eq_tol(H[2 * k + 1], 2, 2e-6);
+    }
+    gather_free(g);
+    free(B);
+    mesh_free(&m);
+}
+END_TEST
+
+/* The stated error of a uniform floor is the true one within a tenth: 1,024 looks of a relative spread of 2
+ * to 3 have a standard error of the square below .1, of the error half of that. */
+START_TEST(error_of_a_uniform_mesh) {
+    static const size_t cells[] = {4, 12, 32};
+    mesh m = floor_and_lamp(cells[_i]);
+    float *B = malloc(m.n * sizeof *B);
+    double stated = 0;
+    lam_error error = {0};
+    const double off = true_error(&m, B);
+    ck_ok(mesh_error(&m, 1, m.emission, B, true, 3, NULL, &stated, &error));
+    printf("%zu elements: stated %g, true %g\n", m.n, stated, off);
+    ck_assert_double_eq_tol(stated, off, .1 * off);
+    free(B);
+    mesh_free(&m);
+}
+END_TEST
+
+/* Where nothing is reflected, or all is the same, there is no error. */
+START_TEST(no_error) {
+    static const double size[3] = {1, 1, 1};
+    mesh m = box_mesh(size, 3, .5f);
+    float *E = malloc(2 * m.n * sizeof *E), *B = malloc(2 * m.n * sizeof *B);
+    double stated[2] = {-1, -1};
+    lam_error error = {0};
+    for (size_t i = 0; i < m.n; i++) { /* B = E / (1 - rho) in a furnace; a light that is off */
+        E[i] = 1, B[i] = 2;
+        E[m.n + i] = B[m.n + i] = 0;
+    }
+    ck_ok(mesh_error(&m, 2, E, B, false, 3, NULL, stated, &error));
+    ck_assert_double_le(stated[0], 1e-6);
+    ck_assert(stated[1] == 0);
+    free(E);
+    free(B);
+    mesh_free(&m);
+}
+END_TEST
+
+/* The adaptive floor keeps the error that was asked for, to a fifth, with fewer elements than a uniform one
+ * of the same error; it covers the floor and keeps group and materials. */
+START_TEST(adaptive_floor) {
+    mesh m = floor_and_lamp(1);
+    const adaptive_options how = {.error = .04, .elements = 10000, .seed = 1};
+    adaptive_report report;
+    lam_error error = {0};
+    const double area = total_area(&m);
+    ck_ok(adaptive_refine(&m, &how, &report, &error));
+    const double off = true_error(&m, NULL);
+    ck_assert(report.reached && report.has_lamps);
+    ck_assert_double_le(report.lamps, .04);
+    ck_assert_double_le(off, 1.2 * .04);
+    ck_assert_double_eq_tol(report.lamps, off, .2 * off);
+    ck_assert_double_eq_tol(total_area(&m), area, 1e-12 * area);
+    size_t cells = 1;
+    for (double uniform = 1; uniform > off; cells++) {
+        mesh even = floor_and_lamp(cells);
+        uniform = true_error(&even, NULL);
+        mesh_free(&even);
+    }
+    printf("%zu elements adaptive of error %g, %zu uniform\n", m.n, off, cells * cells + 1);
+    ck_assert_uint_lt(m.n, cells * cells);
+    mesh_free(&m);
+}
+END_TEST
+
+/* No more elements than are asked for, which is told; the same ones for any number of threads. */
+START_TEST(limit_and_threads) {
+    mesh m[2];
+    adaptive_report report[2];
+    lam_error error = {0};
+    for (int k = 0; k < 2; k++) {
+        const adaptive_options how = {.error = 1e-4, .elements = 500, .seed = 1};
+        omp_set_num_threads(k == 0 ? 1 : 5);
+        m[k] = floor_and_lamp(1);
+        ck_ok(adaptive_refine(&m[k], &how, &report[k], &error));
+        ck_assert(!report[k].reached);
+        ck_assert_uint_eq(m[k].n, 500);
+    }
+    ck_assert_uint_eq(m[0].n_vertices, m[1].n_vertices);
+    ck_assert_mem_eq(m[0].vertices, m[1].vertices, m[0].n_vertices * sizeof *m[0].vertices);
+    ck_assert_mem_eq(m[0].elements, m[1].elements, m[0].n * sizeof *m[0].elements);
+    ck_assert(report[0].lamps == report[1].lamps);
+    for (int k = 0; k < 2; k++) mesh_free(&m[k]);
+}
+END_TEST
+
+/* A floor that looks away from the lamp is divided as one that looks up to it, where both sides will be
+ * there, and not at all where its front alone is. */
+START_TEST(two_sided) {
+    mesh m[3];
+    adaptive_report report;
+    lam_error error = {0};
+    for (int k = 0; k < 3; k++) {
+        const adaptive_options how = {.error = .05, .elements = 4000, .seed = 1, .two_sided = k != 2};
+        m[k] = floor_and_lamp(1);
+        if (k > 0) { /* turned */
+            const uint32_t swap = m[k].elements[0][1];
+            m[k].elements[0][1] = m[k].elements[0][3];
+            m[k].elements[0][3] = swap;
+            ck_ok(mesh_measure(&m[k], &error));
+        }
+        ck_ok(adaptive_refine(&m[k], &how, &report, &error));
+        ck_assert(report.reached);
+    }
+    printf("up %zu, down %zu, front alone %zu\n", m[0].n, m[1].n, m[2].n);
+    ck_assert_double_gt((double)m[1].n, 1.5 * (double)m[2].n); /* which is what division begins with */
+    ck_assert_double_eq_tol((double)m[1].n, (double)m[0].n, .2 * (double)m[0].n);
+    for (int k = 0; k < 3; k++) mesh_free(&m[k]);
+}
+END_TEST
+
+int main(void) {
+    Suite *s = suite_create("adapt");
+    TCase *c = tcase_create("all");
+    tcase_set_timeout(c, 300);
+    tcase_add_loop_test(c, light_at_points, 0, 2);
+    tcase_add_test(c, shadow);
+    tcase_add_test(c, furnace);
+    tcase_add_loop_test(c, error_of_a_uniform_mesh, 0, 3);
+    tcase_add_test(c, no_error);
+    tcase_add_test(c, adaptive_floor);
+    tcase_add_test(c, limit_and_threads);
+    tcase_add_test(c, two_sided);
+    suite_add_tcase(s, c);
+    return suite_run(s);
+}
