@@ -153,6 +153,7 @@ const bench_suite bench_suites[] = {
     {.name = "cities", .run = bench_cities},
     {.name = "service", .script = "service.py"},
     {.name = "hierarchical", .run = bench_hierarchical},
+    {.name = "mesh", .run = bench_mesh},
     {.name = NULL},
 };
 

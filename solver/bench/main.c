@@ -55,7 +55,7 @@ static const option_row rows[] = {
      .offset = FIELD(scene),
      .argument = "SCENE",
      .help = "formfactors: the open scene of throughput and resolution, every face an element (houses); "
-             "hierarchical: the only scene, divided where it is coarse"},
+             "hierarchical: the only scene, divided where it is coarse; mesh: one more scene"},
     OPTION_ROW_SEED(FIELD(seed), .help = "Seed of all sampling"),
     {0},
 };
@@ -74,7 +74,8 @@ static const option_command command = {
         "and nginx "
         "take part where they are installed), hierarchical (this kind of operator beside all others at equal "
         "error, "
-        "and its growth). Each suite writes its tables as CSV and JSON, and its plots as SVG and PNG where "
+        "and its growth), mesh (the error of values that are constant on elements, on uniform and adaptive "
+        "meshes). Each suite writes its tables as CSV and JSON, and its plots as SVG and PNG where "
         "matplotlib "
         "is installed.",
     .least_arguments = 1,

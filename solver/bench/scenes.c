@@ -99,6 +99,49 @@ done:
     return status;
 }
 
+/* Six parallelograms of a box, fronts outwards or inwards. */
+static size_t add_box(scene_piece *pieces, const double low[3], const double high[3], bool inwards) {
+    for (size_t k = 0; k < 6; k++) {
+        const size_t axis = k / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
+        const bool upper = k % 2 == 1;
+        scene_piece p = {.triangle = false};
+        memcpy(p.corner, low, sizeof p.corner);
+        if (upper) p.corner[axis] = high[axis];
+        /* u x v points along the axis */
+        double *first = upper != inwards ? p.along : p.across,
+               *second = upper != inwards ? p.across : p.along;
+        first[u] = high[u] - low[u];
+        second[v] = high[v] - low[v];
+        pieces[k] = p;
+    }
+    return 6;
+}
+
+lam_status scene_furnished(mesh *out, lam_error *error) {
+    enum { LEGS = 4, BOXES = 5 + LEGS };
+    /* The lamp hangs 2 cm below the ceiling, so that nothing touches it; the furniture stands 1 mm apart. */
+    static const double boxes[BOXES][2][3] = {
+        {{2.4, 1.6, 2.94}, {3.4, 2.6, 2.98}},   {{1.2, 1, .72}, {2.8, 1.9, .76}},
+        {{3.4, 3.3, .001}, {5.2, 3.95, 1.9}},   {{4.2, .3, .001}, {5, 1.1, .45}},
+        {{4.9, .3, .451}, {5, 1.1, .95}},       {{1.25, 1.05, .001}, {1.3, 1.1, .719}},
+        {{1.25, 1.8, .001}, {1.3, 1.85, .719}}, {{2.7, 1.05, .001}, {2.75, 1.1, .719}},
+        {{2.7, 1.8, .001}, {2.75, 1.85, .719}}};
+    static const double origin[3] = {0, 0, 0}, size[3] = {6, 4, 3};
+    lam_status status = LAM_OK;
+    scene_piece pieces[6 * (1 + BOXES)];
+    mesh m = {0};
+    size_t n = add_box(pieces, origin, size, true);
+    for (size_t k = 0; k < BOXES; k++) n += add_box(pieces + n, boxes[k][0], boxes[k][1], false);
+    TRY(scene_of_pieces(pieces, n, &m, error));
+    for (size_t i = 0; i < n; i++) m.reflectance[i] = i < 6 ? .6f : .4f;
+    m.emission[6 + 4] = 100; /* the lower side of the lamp */
+    *out = m;
+    m = (mesh){0};
+done:
+    mesh_free(&m);
+    return status;
+}
+
 lam_status scene_file(const char *path, mesh *out, lam_error *error) {
     const import_options how = {.unit = 1, .reflectance = -1};
     import_report report = {0};

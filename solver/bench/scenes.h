@@ -23,6 +23,10 @@ lam_status scene_houses(size_t lots, uint64_t seed, mesh *out, lam_error *error)
 /* The Cornell box of `lambert generate cornell --elements`. */
 lam_status scene_cornell(size_t elements, mesh *out, lam_error *error);
 
+/* A room of 6 x 4 x 3 m with a square lamp below its ceiling, a table, a cabinet and a chair: faces as large
+ * as they are, reflectance .6 and .4. */
+lam_status scene_furnished(mesh *out, lam_error *error);
+
 /* Any of the scenes of `lambert generate`, by way of a file in a folder of its own. */
 lam_status scene_generated(const generate_options *how, mesh *out, lam_error *error);
 

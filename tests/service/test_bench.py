@@ -129,6 +129,27 @@ class FormFactors(unittest.TestCase):
             self.assertTrue(math.isfinite(float(row["lamp"])))
 
 
+class Mesh(unittest.TestCase):
+    """One quick run: a Cornell box, uniform and adaptive, against both truths."""
+
+    def test_errors_of_the_mesh(self):
+        with tempfile.TemporaryDirectory() as folder:
+            done = lambert("bench", "mesh", "--quick", "-o", folder)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            with open(os.path.join(folder, "mesh-mesh.csv"), encoding="utf-8", newline="") as stream:
+                rows = list(csv.DictReader(stream))
+        self.assertEqual({(row["mesh"], row["light"]) for row in rows},
+                         {(mesh, light) for mesh in ("uniform", "adaptive") for light in ("lamps", "even")})
+        self.assertEqual({row["method"] for row in rows}, {"converged", "hierarchical"})
+        for row in rows:
+            constant, means, stated = (float(row[name]) for name in ("constant", "means", "stated"))
+            # the stated error is the truth within a factor of 2
+            self.assertTrue(.5 * constant < stated < 2 * constant, row)
+            self.assertLess(means, constant, row)
+            # points have the finer mesh's error within 3 standard errors and the 4 % that 16 parts leave
+            self.assertLess(abs(float(row["points"]) - constant), 3 * float(row["bar"]) + .04 * constant, row)
+
+
 class Hierarchical(unittest.TestCase):
     """One quick run: every kind on two scenes, and what it says of them at equal error."""
 
