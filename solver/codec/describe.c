@@ -92,7 +92,7 @@ static void add_report(json_t *out, json_t *operator_attributes) {
 }
 
 static lam_status add_error(store *s, json_t *out, lam_error *error) {
-    static const char *const groups[] = {"single", "lights", "random"};
+    static const char *const groups[] = {"single", "lights", "random", "mesh"};
     lam_status status = LAM_OK;
     json_t *figures = NULL;
     if (!store_has(s, "/error")) {

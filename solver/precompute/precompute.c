@@ -304,6 +304,7 @@ lam_status precompute_run(const precompute_options *options, const option_result
     TRY(stage_open_scratch(&state, error));
     TRY(stage_forecast(&state, error));
     TRY(run_trials(&state, error));
+    if (state.probes > 0) TRY(stage_mesh_error(&state, error));
 
     if (state_compresses(options)) {
         started = clock_seconds();

@@ -13,6 +13,7 @@ typedef struct precompute_options {
     const char *output;
     uint64_t subdivide, elements;
     double max_edge, unit, reflectance; /* reflectance: negative, the file's own */
+    double mesh_error;                  /* 0: faces are divided by their size alone */
     const char *up;                     /* NULL: by the file */
     const char *assets;                 /* a folder, or NULL */
     bool two_sided, orient;
@@ -88,6 +89,8 @@ typedef enum seed_purpose {
     SEED_PRECISION = 4,     /* emissions that the loss of --store-precision is measured with */
     SEED_FIRST_LIGHT = 5,   /* the judge's direct illumination of single elements */
     SEED_OTHER_ROWS = 6,    /* rows of a stream that a self-check compares with */
+    SEED_MESH = 7,          /* the coarse solution of --mesh-error, and its light at points */
+    SEED_MESH_ERROR = 8,    /* light at points by which the error of the mesh is stated */
     SEED_VERIFY_FIRST = 11, /* of verify: its samples, probes and direct illumination */
     SEED_VERIFY_SECOND = 12,
     SEED_VERIFY_PROBES = 13,

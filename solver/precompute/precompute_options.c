@@ -46,6 +46,16 @@ static const option_row mesh_rows[] = {
      .above = true,
      .help = "Divide until no edge is longer than this"},
     OPTION_ROW_ELEMENTS(FIELD(elements), 4e9, .help = "Divide into about N elements"),
+    {.name = "mesh-error",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(mesh_error),
+     .argument = "X",
+     .least = 0,
+     .most = 1,
+     .above = true,
+     .help = "Divide where light changes, until constants on elements leave at most this share of the "
+             "reflected light of the scene's lamps and of light that all elements emit; at most --elements, "
+             "else 40,000"},
     {.name = "unit",
      .kind = OPTION_NUMBER,
      .offset = FIELD(unit),

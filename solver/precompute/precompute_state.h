@@ -40,6 +40,13 @@ typedef struct trial_course {
 /* Single elements by which an operator is judged at least, unless --probes gives their number. */
 enum { PROBES_LEAST = 32 };
 
+/* The share of light that constants on elements leave, |error| / |B - E|: of the scene's lamps or of all
+ * emitters together, and of 1 from every element. */
+typedef struct mesh_figures {
+    bool has_lights, has_even;
+    double lights, even;
+} mesh_figures;
+
 typedef struct precompute_state {
     const precompute_options *options;
     precompute_options chosen;    /* with --time: the options, once it has chosen the recipe */
@@ -79,6 +86,7 @@ typedef struct precompute_state {
     lam_operator *op;
     build_report built;
     error_report errors;
+    mesh_figures errors_of_mesh;
     trial_course trial;
     char advice[ERROR_ADVICE_BYTES]; /* on them; "" where there is none */
     forecast_rates rates;            /* of the machine; processors is 0 before they are measured */
@@ -121,6 +129,12 @@ lam_status stage_load_store(precompute_state *state, lam_error *error);
 
 /* Refines the mesh, orders it, and chooses a recipe that memory has room for. */
 lam_status stage_prepare_mesh(precompute_state *state, lam_error *error);
+
+/* --mesh-error: divides the mesh, says what that leaves, and warns where it is more than was asked for. The
+ * error of the mesh by the operator's answers, and its place in the store: stage_mesh_error.c. */
+lam_status state_refine_by_error(precompute_state *state, lam_error *error);
+lam_status stage_mesh_error(precompute_state *state, lam_error *error);
+lam_status state_save_mesh_error(const precompute_state *state, store *s, lam_error *error);
 
 /* Opens the folder for rows where one was given and is needed. */
 lam_status stage_open_scratch(precompute_state *state, lam_error *error);

@@ -79,7 +79,8 @@ static double elements_after(const mesh *m, const precompute_options *o) {
         n = fmax(n, area / (o->max_edge * o->max_edge));
     }
     if (o->two_sided) n *= 2;
-    return fmax(n, (double)o->elements);
+    /* With --mesh-error they are the most, and nobody knows yet how many it takes. */
+    return o->mesh_error > 0 ? n : fmax(n, (double)o->elements);
 }
 
 /* The options that decide. */
@@ -436,7 +437,8 @@ static void log_mesh(const precompute_state *state) {
                  m->n_channels == 1 ? "" : "s", m->two_sided ? ", two-sided" : "");
     terminal_log(state->t, "%.4g m x %.4g m, %.4g m high, %c up; --up and --unit set axis and unit", size[0],
                  size[1], height, m->up);
-    if (o->subdivide == 0 && o->max_edge == 0 && o->elements == 0 && largest > coarse_share * area)
+    if (o->subdivide == 0 && o->max_edge == 0 && o->elements == 0 && o->mesh_error == 0 &&
+        largest > coarse_share * area)
         terminal_log(state->t,
                      "one element has %.0f %% of the area, and light does not vary across an element: "
                      "--elements %d divides the faces",
@@ -449,10 +451,13 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
     /* --elements counts both sides. */
     const mesh_refinement refinement = {.subdivide_levels = (unsigned)o->subdivide,
                                         .max_edge = o->max_edge,
-                                        .elements = o->two_sided ? (o->elements + 1) / 2 : o->elements};
+                                        .elements = o->mesh_error > 0 ? 0
+                                                    : o->two_sided    ? (o->elements + 1) / 2
+                                                                      : o->elements};
     TRY(check_before_mesh(state, elements_after(&state->m, o), error));
     if (refinement.subdivide_levels > 0 || refinement.max_edge > 0 || refinement.elements > 0)
         TRY(mesh_refine(&state->m, &refinement, error));
+    if (o->mesh_error > 0) TRY(state_refine_by_error(state, error));
     if (o->two_sided) TRY(mesh_make_two_sided(&state->m, error));
     state->order = memory_allocate(state->m.n, sizeof *state->order, "the order of the elements", error);
     if (state->order == NULL) TRY(LAM_ERR_MEMORY);

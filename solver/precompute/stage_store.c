@@ -70,6 +70,7 @@ lam_status stage_store(precompute_state *state, lam_error *error) {
     if (state->importance.n > 0) TRY(save_importance(state, s, error));
     TRY(save_report(state, s, error));
     if (state->probes > 0) TRY(judge_save(&state->errors, s, error));
+    TRY(state_save_mesh_error(state, s, error));
     TRY(terminal_check(error));
     store *sealing = s;
     s = NULL;

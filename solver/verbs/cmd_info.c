@@ -110,6 +110,16 @@ static void print_receivers(const char *name, const json_t *group) {
            json_integer_value(json_object_get(group, "receivers_is_bound")) != 0 ? "  at most" : "");
 }
 
+/* The error that no accuracy of the operator lowers. */
+static void print_mesh(const json_t *figures) {
+    const json_t *lights = json_object_get(figures, "lights"), *even = json_object_get(figures, "even");
+    if (!json_is_number(lights) && !json_is_number(even)) return;
+    printf("  mesh   ");
+    if (json_is_number(lights)) printf("  lights %.3g", json_number_value(lights));
+    if (json_is_number(even)) printf("  even %.3g", json_number_value(even));
+    puts("  indirect, of constants on elements, beside the errors above");
+}
+
 /* sources: probes emitted in these alone. */
 static void print_error(const json_t *figures, bool sources) {
     static const char *const names[] = {"single", "lights", "random"};
@@ -126,6 +136,7 @@ static void print_error(const json_t *figures, bool sources) {
         print_receivers(names[i], group);
         receivers = receivers || json_object_get(group, "receivers_indirect") != NULL;
     }
+    print_mesh(json_object_get(figures, "mesh"));
     if (receivers)
         puts("  receivers: of the light that is read, all probes together; total: of the light of all "
              "elements");

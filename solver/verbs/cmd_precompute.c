@@ -125,8 +125,8 @@ static int check_time(const precompute_options *o, const option_result *given) {
 
 /* 0, or the status of wrong usage where arguments do not go together. */
 static int check_together(const precompute_options *o, const option_result *given) {
-    static const char *const of_mesh[] = {"subdivide", "max-edge", "elements", "unit",  "up",
-                                          "two-sided", "orient",   "closed",   "assets"};
+    static const char *const of_mesh[] = {"subdivide", "max-edge",  "elements", "mesh-error", "unit",
+                                          "up",        "two-sided", "orient",   "closed",     "assets"};
     static const char *const of_sky[] = {"sky", "ground-albedo", "portal"};
     const int refinements = (o->subdivide > 0) + (o->max_edge > 0) + (o->elements > 0);
     const build_method *method = method_find(o->build.method);

@@ -27,7 +27,7 @@ class Usage(Case):
 
     def test_help_names_every_option_of_the_contract(self):
         known = must("precompute", "--help").stdout
-        for option in ("subdivide max-edge elements unit up two-sided reflectance form-factors rays resolution quality "
+        for option in ("subdivide max-edge elements mesh-error unit up two-sided reflectance form-factors rays resolution quality "
                        "sky ground-albedo keep-form-factors method factorizer epsilon alpha levels rank keep-factors "
                        "coherence min-area assign threshold correction emitters "
                        "store-precision threads memory scratch seed probes quiet progress").split():

@@ -396,7 +396,12 @@ class StoreTest(unittest.TestCase):
     def test_errors_are_stored(self, name, path):
         with h5py.File(path, "r") as f:
             self.assertIn("single", f["error"])
-            for group in f["error"].values():
+            # of what constants leave: every light is there that the operator answers
+            of_mesh = dict(f["error/mesh"].attrs)
+            self.assertEqual("even" in of_mesh, name != "emitters")
+            for share in of_mesh.values():
+                self.assertTrue(0 <= share < 10, share)
+            for group in (g for kind, g in f["error"].items() if kind != "mesh"):
                 attributes = group.attrs
                 self.assertGreater(attributes["probes"], 0)
                 for kind in ("total", "operator"):

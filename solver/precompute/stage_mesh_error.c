@@ -1,0 +1,103 @@
+/* The mesh as a source of error: elements where light changes (--mesh-error), and the error that constants on
+ * elements leave, as the store states it. */
+#include "solver/adapt/adaptive.h"
+#include "solver/adapt/mesh_error.h"
+#include "solver/precompute/precompute_state.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Elements that --mesh-error makes at most, unless --elements gives their number. */
+enum { ADAPTIVE_ELEMENTS = 40000 };
+
+lam_status state_refine_by_error(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = state->options;
+    const adaptive_options how = {.error = o->mesh_error,
+                                  .elements = o->elements > 0 ? o->elements : ADAPTIVE_ELEMENTS,
+                                  .two_sided = o->two_sided,
+                                  .seed = precompute_seed(o->seed, SEED_MESH),
+                                  .progress = &state->progress};
+    adaptive_report made;
+    char lamps[64] = "";
+    TRY(adaptive_refine(&state->m, &how, &made, error));
+    if (made.has_lamps) snprintf(lamps, sizeof lamps, "%.3g of the light of lamps and ", made.lamps);
+    terminal_log(state->t, "constants on elements leave %s%.3g of light that all elements emit", lamps,
+                 made.even);
+    if (!made.reached)
+        terminal_warn(state->t,
+                      "--mesh-error %g is not kept with %zu elements: they leave %.3g; --elements takes more "
+                      "than %zu",
+                      o->mesh_error, state->m.n * (o->two_sided ? 2 : 1),
+                      made.lamps > made.even ? made.lamps : made.even, how.elements);
+done:
+    return status;
+}
+
+/* The lights that errors are stated for: E [n_lights][C][n], freed with free(). An operator of few emitters
+ * knows no other light than theirs. */
+static lam_status choose_lights(precompute_state *state, float **out, lam_error *error) {
+    const mesh *m = &state->m;
+    const size_t vector = m->n * m->n_channels;
+    mesh_figures *figures = &state->errors_of_mesh;
+    float *E = memory_allocate(2 * vector, sizeof *E, "the error of the mesh", error);
+    if (E == NULL) return LAM_ERR_MEMORY;
+    if (state->emitters.s > 0) {
+        for (size_t k = 0; state->emitters.light.E != NULL && k < state->emitters.s * vector; k++)
+            E[k % vector] += state->emitters.light.E[k];
+    } else {
+        memcpy(E, m->emission, vector * sizeof *E);
+    }
+    for (size_t i = 0; i < vector; i++) figures->has_lights = figures->has_lights || E[i] > 0;
+    figures->has_even = state->emitters.s == 0;
+    float *even = figures->has_lights ? E + vector : E;
+    for (size_t i = 0; figures->has_even && i < vector; i++) even[i] = 1;
+    *out = E;
+    return LAM_OK;
+}
+
+lam_status stage_mesh_error(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t vector = state->m.n * state->m.n_channels;
+    mesh_figures *figures = &state->errors_of_mesh;
+    double found[2] = {0};
+    float *E = NULL, *B = NULL;
+    void *work = NULL;
+    *figures = (mesh_figures){.has_lights = false};
+    TRY(choose_lights(state, &E, error));
+    const size_t n_lights = (size_t)figures->has_lights + figures->has_even;
+    if (n_lights == 0) goto done;
+    const size_t bytes = lam_operator_work_bytes(state->op, n_lights);
+    B = memory_allocate(n_lights * vector, sizeof *B, "the error of the mesh", error);
+    work = memory_allocate(bytes, 1, "the error of the mesh", error);
+    if (B == NULL || work == NULL) TRY(LAM_ERR_MEMORY);
+    status = lam_operator_apply(state->op, n_lights, LAM_RADIOSITY, E, B, work, bytes, error);
+    if (status == LAM_ERR_ARGUMENT &&
+        state->emitters.s > 0) { /* a sum that no weights give: nothing is stated */
+        *figures = (mesh_figures){.has_lights = false};
+        status = LAM_OK;
+        goto done;
+    }
+    TRY(status);
+    TRY(mesh_error(&state->m, n_lights, E, B, figures->has_lights,
+                   precompute_seed(state->options->seed, SEED_MESH_ERROR), &state->progress, found, error));
+    figures->lights = found[0];
+    figures->even = found[n_lights - 1];
+    if (figures->has_lights) terminal_log(state->t, "mesh     lights indirect %.3g", figures->lights);
+    if (figures->has_even) terminal_log(state->t, "mesh     even indirect %.3g", figures->even);
+done:
+    free(E);
+    free(B);
+    free(work);
+    return status;
+}
+
+lam_status state_save_mesh_error(const precompute_state *state, store *s, lam_error *error) {
+    lam_status status = LAM_OK;
+    const mesh_figures *figures = &state->errors_of_mesh;
+    if (figures->has_lights) TRY(store_set_number(s, "/error/mesh", "lights", figures->lights, error));
+    if (figures->has_even) TRY(store_set_number(s, "/error/mesh", "even", figures->even, error));
+done:
+    return status;
+}

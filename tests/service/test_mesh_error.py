@@ -1,0 +1,58 @@
+"""Black box: elements where light changes (--mesh-error), and the error of the mesh that stores state."""
+
+import json
+import unittest
+
+from case import Case
+from command import must
+
+
+class MeshError(Case):
+    """A Cornell box, coarse, uniform and adaptive."""
+
+    def setUp(self):
+        super().setUp()
+        self.scene = self.path("box.obj")
+        must("generate", "cornell", "--elements", 10, "-o", self.scene)
+
+    def made(self, name, *options):
+        store = self.path(name)
+        done = must("precompute", self.scene, "-o", store, "--probes", 32, *options)
+        return json.loads(must("info", store, "--json").stdout), done.stderr, store
+
+    def test_error_is_kept(self):
+        about, log, store = self.made("kept.h5", "--mesh-error", .1)
+        figures = about["error"]["mesh"]
+        # stated by points of its own; of 300 looks the standard error of an error is below a tenth
+        self.assertLess(max(figures["lights"], figures["even"]), 1.2 * .1)
+        self.assertGreater(figures["lights"], .5 * .1)
+        self.assertIn("constants on elements leave", log)
+        self.assertNotIn("is not kept", log)
+        self.assertIn(f"lights {figures['lights']:.3g}", must("info", store).stdout)
+
+    def test_fewer_elements_than_uniform(self):
+        adaptive, _, _ = self.made("adaptive.h5", "--mesh-error", .07)
+        uniform, _, _ = self.made("uniform.h5", "--elements", adaptive["elements"])
+        self.assertLess(adaptive["error"]["mesh"]["lights"], .9 * uniform["error"]["mesh"]["lights"])
+
+    def test_limit_is_told(self):
+        about, log, _ = self.made("few.h5", "--mesh-error", .001, "--elements", 400)
+        self.assertEqual(about["elements"], 400)
+        self.assertIn("--mesh-error 0.001 is not kept with 400 elements", log)
+
+    def test_two_sided_and_repeatable(self):
+        first, _, _ = self.made("first.h5", "--mesh-error", .2, "--two-sided", "--threads", 1)
+        again, _, _ = self.made("again.h5", "--mesh-error", .2, "--two-sided", "--threads", 2)
+        self.assertEqual(first["elements"] % 2, 0)
+        for member in ("elements", "groups"):
+            self.assertEqual(first[member], again[member])
+        self.assertEqual(first["error"]["mesh"], again["error"]["mesh"])
+
+    def test_no_measurement(self):
+        store = self.path("none.h5")
+        must("precompute", self.scene, "-o", store, "--probes", 0)
+        self.assertEqual(json.loads(must("info", store, "--json").stdout)["error"], {})
+
+
+if __name__ == "__main__":
+    unittest.main()
