@@ -29,6 +29,8 @@ static bool write_error(buffer *b, const answer_notes *notes) {
     return buffer_append_text(b, ",\"error\":{\"relative_mean\":") &&
            json_write_double(b, notes->relative_mean) && buffer_append_text(b, ",\"indirect_mean\":") &&
            json_write_double(b, notes->indirect_mean) &&
+           (!(notes->mesh > 0) ||
+            (buffer_append_text(b, ",\"mesh\":") && json_write_double(b, notes->mesh))) &&
            (of == NULL || buffer_printf(b, ",\"of\":\"%s\"", of)) &&
            (from == NULL || buffer_printf(b, ",\"from\":\"%s\"", from)) && buffer_append(b, "}", 1);
 }

@@ -20,6 +20,7 @@ typedef struct answer_notes {
     lam_quantity quantity;
     bool has_error;
     double relative_mean, indirect_mean;
+    double mesh;          /* the share of reflected light that constants on elements leave; 0: not stated */
     const char *error_of; /* the elements that the error is of, "receivers" or "all", where a store was built
                              for receivers; NULL: it was built for all */
     const char *error_from; /* "sources" where a store was built for these and they alone emit; "others": not

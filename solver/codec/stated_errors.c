@@ -23,6 +23,16 @@ static stated_error read_error(store *s, const char *relative, const char *indir
     return found;
 }
 
+static double read_mesh_error(store *s) {
+    static const char *const lights[] = {"lights", "even"};
+    double found = 0;
+    for (size_t i = 0; i < 2 && store_has(s, "/error/mesh"); i++)
+        if (store_has_attribute(s, "/error/mesh", lights[i]) &&
+            store_get_number(s, "/error/mesh", lights[i], &found, NULL) == LAM_OK && isfinite(found))
+            return found;
+    return 0;
+}
+
 /* *out [n]: true where a weight is above 0; NULL of NULL. */
 static lam_status find_members(const float *weights, size_t n, bool **out, lam_error *error) {
     if (weights == NULL) return LAM_OK;
@@ -35,7 +45,9 @@ static lam_status find_members(const float *weights, size_t n, bool **out, lam_e
 lam_status stated_errors_read(store *s, size_t n, stated_errors *out, lam_error *error) {
     lam_status status = LAM_OK;
     importance weights = {.n = 0};
-    stated_errors made = {.n = n, .all = read_error(s, "total_relative_mean", "total_indirect_mean")};
+    stated_errors made = {.n = n,
+                          .all = read_error(s, "total_relative_mean", "total_indirect_mean"),
+                          .mesh = read_mesh_error(s)};
     TRY(importance_load(s, n, &weights, error));
     TRY(find_members(weights.read, n, &made.read, error));
     TRY(find_members(weights.emits, n, &made.emits, error));
@@ -79,6 +91,7 @@ void stated_errors_note(const stated_errors *e, answer_scope scope, answer_notes
     notes->has_error = of->known && !strange;
     notes->relative_mean = of->relative;
     notes->indirect_mean = of->indirect;
+    notes->mesh = e->mesh;
     notes->error_of = e->read == NULL || strange ? NULL : receivers ? "receivers" : "all";
     notes->error_from = e->emits == NULL ? NULL : strange ? "others" : "sources";
 }

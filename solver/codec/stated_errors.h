@@ -13,7 +13,9 @@ typedef struct stated_error {
 
 /* Zeroed: nothing is stated. */
 typedef struct stated_errors {
-    stated_error all;       /* means over probes, of the light of all elements */
+    stated_error all; /* means over probes, of the light of all elements */
+    double mesh; /* share of reflected light that constants on elements leave, of the scene's lamps, else of
+                    light that all elements emit; 0: not stated */
     stated_error receivers; /* of the light of receivers; known only where the store was built for them */
     bool *read;             /* [n], true of receivers; NULL: the store was built for all elements */
     bool *emits; /* [n], true of sources; NULL: for any emission. All figures are of theirs alone */

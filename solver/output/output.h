@@ -41,6 +41,7 @@ typedef struct solution {
     reduction *reductions;
     size_t n_reductions;               /* 0: the values themselves are written */
     double relative, indirect;         /* mean error that the store states; negative: not measured */
+    double mesh;                       /* of answer_notes */
     const char *error_of, *error_from; /* of answer_notes */
 } solution;
 

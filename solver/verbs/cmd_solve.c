@@ -144,6 +144,7 @@ static void take_error(const stated_errors *stated, const emission *light, size_
     stated_errors_note(stated, scope, &notes);
     if (notes.has_error) out->relative = notes.relative_mean;
     if (notes.has_error) out->indirect = notes.indirect_mean;
+    out->mesh = notes.mesh;
     out->error_of = notes.error_of;
     out->error_from = notes.error_from;
     if (others > 0)

@@ -29,6 +29,9 @@ class MeshError(Case):
         self.assertIn("constants on elements leave", log)
         self.assertNotIn("is not kept", log)
         self.assertIn(f"lights {figures['lights']:.3g}", must("info", store).stdout)
+        must("solve", store, "--emit", "lamp=1", "-o", self.path("answer.json"))
+        with open(self.path("answer.json"), encoding="utf-8") as stream:
+            self.assertEqual(json.load(stream)["error"]["mesh"], figures["lights"])
 
     def test_fewer_elements_than_uniform(self):
         adaptive, _, _ = self.made("adaptive.h5", "--mesh-error", .07)
