@@ -2,8 +2,10 @@
 
 #include "solver/base/clock.h"
 #include "solver/method/guided_reference.h"
+#include "solver/method/judge_by_group.h"
 #include "solver/method/judge_figures.h"
 #include "solver/method/judge_probes.h"
+#include "solver/method/judge_sky.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -14,7 +16,7 @@ static const double certain = .1;
 /* Noise below this share of a figure may be taken out of it. */
 static const double noise_most = 1. / 3;
 /* Random emissions are all alike. Where the references are no twins the noise is measured by some of the
- * first round: random emission, the lights, and some single elements. */
+ * first round: random emission, whole groups, the lights, and some single elements. */
 enum { RANDOM_LEAST = 4, NOISE_PROBES = 12 };
 
 /* Figures of a group so far: against the operator's own F, and against the references. */
@@ -180,7 +182,7 @@ static void report_round(const judge_input *input, size_t round, double part) {
 /* The number of emissions of a group, 0 where they are endless. */
 static size_t all_of(const probe_source *source, int group) {
     if (group == JUDGE_RANDOM) return 0;
-    return group == JUDGE_LIGHTS ? 1 : source->n_singles;
+    return group == JUDGE_LIGHTS ? 1 : group == JUDGE_WHOLE ? source->n_whole : source->n_singles;
 }
 
 /* True where the mean of a figure over its probes is known well enough. */
@@ -196,7 +198,7 @@ static bool are_same(const factor_product *a, const factor_product *b) {
 /* Emissions of one round, against all references. The operator's own error is found until it is certain, the
  * noise where the references are no twins, are found in the first round. */
 static lam_status measure(const lam_operator *op, measured *m, const probe_source *source, size_t round,
-                          group_tally *t, lam_error *error) {
+                          group_tally *t, by_group_sums *by_group, lam_error *error) {
     lam_status status = LAM_OK;
     const judge_input *input = m->input;
     const probes *p = &m->p;
@@ -204,7 +206,8 @@ static lam_status measure(const lam_operator *op, measured *m, const probe_sourc
     const bool each = input->relation != REFERENCE_COARSER;
     const bool total = input->independent.n > 0, noisy = input->other.n > 0 && (first || each);
     const bool own = first || !is_certain(&t[JUDGE_SINGLE].own.indirect, all_of(source, JUDGE_SINGLE));
-    const size_t n_noisy = each || m->at_once ? p->m : p->m < NOISE_PROBES ? p->m : NOISE_PROBES;
+    const size_t some = NOISE_PROBES + p->begin[JUDGE_LIGHTS] - p->begin[JUDGE_WHOLE];
+    const size_t n_noisy = each || m->at_once || p->m < some ? p->m : some;
     size_t *all = memory_allocate(p->m, sizeof *all, "probes", error);
     size_t *others = memory_allocate(p->m, sizeof *others, "probes", error), n_others = 0;
     m->x = memory_allocate(p->m, vector_of(input) * sizeof *m->x, "reference", error);
@@ -234,6 +237,7 @@ static lam_status measure(const lam_operator *op, measured *m, const probe_sourc
         for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
             const figure_probe one = probe_of(m, v, m->x, noisy && v < n_noisy ? m->y : NULL, true);
             figures_add(&one, &t[g].total);
+            if (by_group->n > 0) by_group_add(&one, g, 0, by_group);
             if (input->read != NULL) receivers_add(&one, input->read, &t[g].total_receivers);
         }
 done:
@@ -253,7 +257,7 @@ double judge_of_operator(const error_group *g) {
 /* The probes of the next round; false where there are none. An LU takes all of them at once. */
 static bool next_counts(const judge_input *input, const probe_source *source, const group_tally *t,
                         bool at_once, size_t counts[JUDGE_GROUPS]) {
-    const size_t least[JUDGE_GROUPS] = {RANDOM_LEAST, 1,
+    const size_t least[JUDGE_GROUPS] = {RANDOM_LEAST, 0, 1,
                                         input->probes_least > 0 ? input->probes_least : input->probes};
     size_t all = 0;
     for (int g = 0; g < JUDGE_GROUPS; g++) {
@@ -308,38 +312,80 @@ static bool is_dense(const lam_operator *op, const judge_input *input, size_t m)
     return false;
 }
 
+/* The errors of light from a sky, all over and, where by_group was begun, by group. */
+static lam_status measure_sky(const lam_operator *op, const judge_input *input, by_group_sums *by_group,
+                              error_group *found, group_errors *made, lam_error *error) {
+    lam_status status = LAM_OK;
+    group_tally t = {.done = 0};
+    if (by_group->n > 0) {
+        by_group_free(by_group);
+        TRY(by_group_begin(input, by_group, error));
+    }
+    TRY(judge_sky_add(op, input, &t.total, by_group, &t.done, error));
+    if (t.done == 0) goto done;
+    found->probes = t.done;
+    found->probes_noise = figures_spread(&t.total.indirect, 0);
+    finish_total(&t, 0, found);
+    if (by_group->n == 0) goto done;
+    TRY(by_group_finish(by_group, GROUP_SKY_FIGURES, made->sky, error));
+    TRY(judge_sky_powers(input, made, error));
+done:
+    return status;
+}
+
 lam_status judge_operator(const lam_operator *op, const judge_input *input, error_report *report,
                           lam_error *error) {
     lam_status status = LAM_OK;
     const double start = clock_seconds();
     error_report found = {0};
-    error_group *groups[JUDGE_GROUPS] = {&found.random, &found.lights, &found.single};
+    error_group *groups[JUDGE_GROUPS] = {&found.random, &found.whole, &found.lights, &found.single};
     group_tally t[JUDGE_GROUPS] = {{.done = 0}};
     size_t counts[JUDGE_GROUPS], rounds = 0;
     step_rates rates = {.own = 0};
     probe_source source;
     measured m = {.input = input};
+    by_group_sums by_group = {.n = 0};
+    group_errors made = {.n_groups = 0};
     TRY(probe_source_make(input->problem, op, input->emission, input->emits, input->probes,
                           JUDGE_RANDOM_PROBES, input->seed, &source, error));
-    const bool at_once = is_dense(op, input, source.most[0] + source.most[1] + source.most[2]);
+    if (input->group != NULL)
+        TRY(probe_source_add_groups(&source, input->group, input->n_groups, JUDGE_WHOLE_PROBES, error));
+    if (input->by_group != NULL && input->group != NULL && input->independent.n > 0)
+        TRY(by_group_begin(input, &by_group, error));
+    size_t most = 0;
+    for (int g = 0; g < JUDGE_GROUPS; g++) most += source.most[g];
+    const bool at_once = is_dense(op, input, most);
     progress_report(input->progress, "judge", 0);
     for (; next_counts(input, &source, t, at_once, counts); rounds++) {
         if (progress_cancelled(input->progress)) FAIL(error, LAM_ERR_CANCELLED, "cancelled");
         measured_free(&m);
         m = (measured){.input = input, .rates = &rates, .at_once = at_once};
         TRY(probes_next(&source, counts, rounds == 0, &m.p, error));
-        TRY(measure(op, &m, &source, rounds, t, error));
+        TRY(measure(op, &m, &source, rounds, t, &by_group, error));
         if (rounds == 0) add_physics(&m, groups);
         for (int g = 0; g < JUDGE_GROUPS; g++) t[g].done += counts[g];
         report_round(input, rounds, 1);
     }
     for (int g = 0; g < JUDGE_GROUPS; g++)
         finish_group(input, &t[g], g == JUDGE_SINGLE, all_of(&source, g), groups[g]);
+    if (by_group.n > 0) {
+        TRY(by_group_finish(&by_group, GROUP_FIGURES, made.of, error));
+        made.n_groups = by_group.n_groups;
+        made.n_rows = by_group.n_rows;
+    }
+    if (input->sky != NULL) TRY(measure_sky(op, input, &by_group, &found.sky, &made, error));
+    if (input->by_group != NULL) {
+        group_errors_free(input->by_group);
+        *input->by_group = made;
+        made = (group_errors){.n_groups = 0};
+    }
     progress_report(input->progress, "judge", 1);
     found.has_total = input->independent.n > 0;
     found.seconds = clock_seconds() - start;
     *report = found;
 done:
+    by_group_free(&by_group);
+    group_errors_free(&made);
     probe_source_free(&source);
     measured_free(&m);
     return status;

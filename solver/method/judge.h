@@ -6,7 +6,7 @@
 #include "solver/method/method.h"
 
 /* Probes that are solved together; of random emission at most. */
-enum { JUDGE_AT_ONCE = 16, JUDGE_RANDOM_PROBES = 8 };
+enum { JUDGE_AT_ONCE = 16, JUDGE_RANDOM_PROBES = 8, JUDGE_WHOLE_PROBES = 3 };
 
 /* Mean, standard deviation and largest value over the probes of a group. */
 typedef struct error_figures {
@@ -44,8 +44,61 @@ typedef struct error_group {
 double judge_total(const error_group *g);
 double judge_of_operator(const error_group *g);
 
+/* The errors in each group of the scene, for answers to any emission E of power P = sum A E (per channel,
+ * squares added up) and effective number of emitters N = P^2 / sum A^2 E^2. In double; [n_rows][n_groups]:
+ * row 0 is of the elements of a group, or of those that are read, row 1 then of its others. Zeroed: nothing
+ * is known.
+ *
+ * The error of an answer, of the mean of a group or the root of the mean square of its elements, is about
+ *     P sqrt(one^2 / N^2 + many^2 (1 - 1/N) / N + even^2),
+ * in which errors of the light of single elements are independent: they add up in squares, to many^2 / N,
+ * where those of one element of any size are one^2, and even is what whole groups and the scene's own lights
+ * are off beyond that. */
+enum {
+    GROUP_MEAN_ONE,
+    GROUP_MEAN_MANY,
+    GROUP_MEAN_EVEN,
+    GROUP_RMS_ONE,
+    GROUP_RMS_MANY,
+    GROUP_RMS_EVEN,
+    /* For people: errors of the mean of a group over the reflected light in it, over all probes together and
+     * the largest, by random emission, by elements that light it at least as much as the whole scene, and by
+     * those that light it less. */
+    GROUP_UNIFORM,
+    GROUP_UNIFORM_LARGEST,
+    GROUP_NEAR,
+    GROUP_NEAR_LARGEST,
+    GROUP_FAR,
+    GROUP_FAR_LARGEST,
+    GROUP_FIGURES,
+    GROUP_SKY_FIGURES = GROUP_UNIFORM
+};
+typedef struct group_errors {
+    size_t n_groups, n_rows;
+    double *of[GROUP_FIGURES];
+    /* The first figures once more, of skies: P = sum_t L_t Q_t with the power Q_t that radiance 1 of tile t
+     * sends into the scene after the first bounce, and N = P^2 / sum (L_t Q_t)^2. NULL: no sky was judged. */
+    double *sky[GROUP_SKY_FIGURES];
+    size_t n_channels, n_tiles;
+    double *sky_power; /* [C][n_tiles], Q_t = sum A rho first_bounce_t, m^2 sr */
+    double *sky_first; /* [n_groups][n_tiles], mean first_bounce_t over a group, sr; NULL: too many numbers */
+} group_errors;
+void group_errors_free(group_errors *e);
+
+/* The first bounce of a sky, [m][n], sr: the operator's, and two independent samples by which it is judged.
+ */
+typedef struct judged_sky {
+    size_t n_tiles;
+    const float *own, *samples[2];
+} judged_sky;
+
+/* Skies by which it is judged: two that shine from everywhere, and single tiles. */
+enum { JUDGE_EVEN_SKIES = 2, JUDGE_SUNS = 4 };
+
 typedef struct error_report {
     error_group single, lights, random;
+    error_group whole; /* one whole group of the scene emits evenly */
+    error_group sky;   /* only a sky shines; against the independent sample alone */
     bool has_total;
     double seconds;
 } error_report;
@@ -57,10 +110,15 @@ typedef enum reference_relation { REFERENCE_TWIN, REFERENCE_DISTURBED, REFERENCE
 
 typedef struct judge_input {
     const build_problem *problem;
-    const double *row_sums;     /* [n] of own */
-    const float *emission;      /* [C][n], the scene's own */
-    const float *read;          /* [n], weights of what is read, by element; NULL: all is read */
-    const float *emits;         /* [n], above 0 of the elements that alone emit in probes; NULL: all */
+    const double *row_sums; /* [n] of own */
+    const float *emission;  /* [C][n], the scene's own */
+    const float *read;      /* [n], weights of what is read, by element; NULL: all is read */
+    const float *emits;     /* [n], above 0 of the elements that alone emit in probes; NULL: all */
+    const uint32_t *group;  /* [n], below n_groups: groups of the scene; NULL: none emits as a whole */
+    size_t n_groups;
+    const judged_sky *sky;      /* NULL: none, or the scene is closed */
+    group_errors *by_group;     /* filled with the errors in each group, if there is an independent F and
+                                   `group`; NULL: not asked for */
     factor_product own;         /* the very F that the operator was built from */
     factor_product independent; /* an F that shares no sample with it; n = 0: no total error */
     factor_product other;       /* another one; n = 0: the noise of the reference is not measured */
@@ -88,7 +146,10 @@ typedef struct judge_input {
 lam_status judge_operator(const lam_operator *op, const judge_input *input, error_report *report,
                           lam_error *error);
 
-/* /error of a store. */
+/* /error/by_group of a store. */
+lam_status judge_save_groups(const group_errors *e, store *s, lam_error *error);
+
+/* /error of a store, without by_group. */
 lam_status judge_save(const error_report *report, store *s, lam_error *error);
 
 #endif

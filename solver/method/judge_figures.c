@@ -8,25 +8,16 @@ static const double dark = 1e-6;
 /* Noise below this share of a figure of receivers may be taken out of it. */
 static const double noise_most = 1. / 3;
 
-/* Of element i in channel c. */
-typedef struct number {
-    double b, bounced, off, noise; /* B, B - E, x, t */
-    double apart;                  /* error of x by the coarser reference */
-} number;
-
-static number number_at(const figure_probe *p, size_t k) {
+figure_number figure_number_at(const figure_probe *p, size_t k) {
     const double x = p->x[k], y = p->y != NULL ? p->y[k] : x;
-    number one = {.off = x};
+    figure_number one = {.off = x};
     if (p->relation == REFERENCE_TWIN) one.off = .5 * (x + y), one.noise = .5 * (x - y);
     if (p->relation == REFERENCE_DISTURBED) one.noise = y - x;
     if (p->relation == REFERENCE_COARSER) one.apart = p->other_share * (x - y);
+    if (p->spread != NULL) one.light = (double)p->problem->reflectance[k] * p->spread[k];
     one.b = (double)p->B[k] + one.off;
     one.bounced = one.b - (double)p->E[k];
     return one;
-}
-
-static double light_at(const figure_probe *p, size_t k) {
-    return p->spread != NULL ? (double)p->problem->reflectance[k] * p->spread[k] : 0;
 }
 
 /* Squares, area-weighted, channels stacked. */
@@ -40,12 +31,12 @@ static squares squares_of(const figure_probe *p, const float *read) {
     squares s = {.b = 0};
     for (size_t k = 0; k < C * n; k++) {
         const double weight = read != NULL ? (double)read[k % n] : 1;
-        const double a = weight * p->problem->area[k % n], light = light_at(p, k);
-        const number one = number_at(p, k);
+        const double a = weight * p->problem->area[k % n];
+        const figure_number one = figure_number_at(p, k);
         s.b += a * one.b * one.b;
         s.bounced += a * one.bounced * one.bounced;
         s.off += a * one.off * one.off;
-        s.noise += a * (one.noise * one.noise + light * light);
+        s.noise += a * (one.noise * one.noise + one.light * one.light);
         s.apart += a * one.apart * one.apart;
     }
     return s;
@@ -63,8 +54,8 @@ static void find_noise(const figure_probe *p, noise_sums *out) {
     for (size_t i = 0; i < n; i++) {
         const size_t part = i * FIGURE_PARTS / n;
         for (size_t k = i; k < C * n; k += n) {
-            const number one = number_at(p, k);
-            const double at = 2 * p->problem->area[i] * (one.noise + light_at(p, k));
+            const figure_number one = figure_number_at(p, k);
+            const double at = 2 * p->problem->area[i] * (one.noise + one.light);
             out->off[part] += at * one.off;
             out->bounced[part] += at * one.bounced;
             out->b[part] += at * one.b;

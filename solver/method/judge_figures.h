@@ -18,6 +18,13 @@ typedef struct figure_probe {
     double other_share;
 } figure_probe;
 
+/* Of element k % n in channel k / n: B, B - E, the error x, the noise t in it, that of the first light, and
+ * the error of x by the coarser reference. */
+typedef struct figure_number {
+    double b, bounced, off, noise, light, apart;
+} figure_number;
+figure_number figure_number_at(const figure_probe *p, size_t k);
+
 /* Sums over the figures f of one sort: with the noise in them, or without it. */
 typedef struct figure_sums {
     double f, f2, most;         /* of f, of f^2; the largest f */

@@ -27,13 +27,15 @@ lam_status probe_source_make(const build_problem *problem, const lam_operator *o
                              const float *emits, size_t singles, size_t randoms, uint64_t seed,
                              probe_source *out, lam_error *error) {
     const size_t s = lam_operator_emitters(op), all = s > 0 ? s : problem->n;
-    *out = (probe_source){.problem = problem,
-                          .op = op,
-                          .emission = emission,
-                          .emits = emits,
-                          .most = {randoms, any_light(op, problem, emission, emits)},
-                          .draw = seed,
-                          .random = seed + 1};
+    *out = (probe_source){
+        .problem = problem,
+        .op = op,
+        .emission = emission,
+        .emits = emits,
+        .most = {[JUDGE_RANDOM] = randoms, [JUDGE_LIGHTS] = any_light(op, problem, emission, emits)},
+        .draw = seed,
+        .random = seed + 1,
+        .draw_whole = seed + 2};
     out->deck = memory_allocate(all, sizeof *out->deck, "probes", error);
     if (out->deck == NULL) return LAM_ERR_MEMORY;
     for (size_t k = 0; k < all; k++)
@@ -42,9 +44,29 @@ lam_status probe_source_make(const build_problem *problem, const lam_operator *o
     return LAM_OK;
 }
 
+lam_status probe_source_add_groups(probe_source *s, const uint32_t *group, size_t n_groups, size_t most,
+                                   lam_error *error) {
+    lam_status status = LAM_OK;
+    bool *may = NULL;
+    if (lam_operator_emitters(s->op) > 0) return LAM_OK;
+    may = memory_allocate(n_groups, sizeof *may, "probes", error);
+    s->whole = memory_allocate(n_groups, sizeof *s->whole, "probes", error);
+    if (may == NULL || s->whole == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t i = 0; i < s->problem->n; i++)
+        if (s->emits == NULL || s->emits[i] > 0) may[group[i]] = true;
+    for (size_t g = 0; g < n_groups; g++)
+        if (may[g]) s->whole[s->n_whole++] = (uint32_t)g;
+    s->group = group;
+    s->most[JUDGE_WHOLE] = most < s->n_whole ? most : s->n_whole;
+done:
+    free(may);
+    return status;
+}
+
 void probe_source_free(probe_source *s) {
     free(s->deck);
-    s->deck = NULL;
+    free(s->whole);
+    s->deck = s->whole = NULL;
 }
 
 void probes_free(probes *p) {
@@ -56,26 +78,29 @@ void probes_free(probes *p) {
     *p = (probes){.m = 0};
 }
 
-/* The next one of the deck, without repetition. */
-static size_t draw_single(probe_source *s) {
-    const size_t v = s->made[JUDGE_SINGLE]++;
-    const size_t other = v + (size_t)(random_unit(&s->draw) * (double)(s->n_singles - v));
-    const uint32_t drawn = s->deck[other];
-    s->deck[other] = s->deck[v];
-    s->deck[v] = drawn;
+/* Card v of a deck, v having been drawn before, without repetition. */
+static size_t draw(uint32_t *deck, size_t count, size_t v, uint64_t *state) {
+    const size_t other = v + (size_t)(random_unit(state) * (double)(count - v));
+    const uint32_t drawn = deck[other];
+    deck[other] = deck[v];
+    deck[v] = drawn;
     return drawn;
 }
 
-/* numbers [C][count]: 1 at a drawn place, those of the scene's own light, or random ones. */
+/* numbers [C][count]: 1 at a drawn place or all over a drawn group, those of the scene's own light, or random
+ * ones. */
 static lam_status set_numbers(probe_source *s, int group, size_t count, float *numbers, lam_error *error) {
     const size_t C = s->problem->n_channels;
     if (group == JUDGE_SINGLE) {
-        const size_t at = draw_single(s);
+        const size_t at = draw(s->deck, s->n_singles, s->made[group]++, &s->draw);
         for (size_t c = 0; c < C; c++) numbers[c * count + at] = 1;
         return LAM_OK;
     }
-    s->made[group]++;
-    if (group == JUDGE_RANDOM)
+    const size_t v = s->made[group]++;
+    if (group == JUDGE_WHOLE) {
+        const size_t drawn = draw(s->whole, s->n_whole, v, &s->draw_whole);
+        for (size_t k = 0; k < C * count; k++) numbers[k] = s->group[k % count] == drawn;
+    } else if (group == JUDGE_RANDOM)
         for (size_t k = 0; k < C * count; k++) numbers[k] = (float)random_unit(&s->random);
     else if (lam_operator_emitters(s->op) > 0)
         return lam_operator_weights(s->op, 1, s->emission, 0, NULL, numbers, error);

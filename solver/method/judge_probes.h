@@ -5,25 +5,34 @@
 #include "solver/method/method.h"
 
 /* In the order of a round. */
-enum { JUDGE_RANDOM, JUDGE_LIGHTS, JUDGE_SINGLE, JUDGE_GROUPS };
+enum { JUDGE_RANDOM, JUDGE_WHOLE, JUDGE_LIGHTS, JUDGE_SINGLE, JUDGE_GROUPS };
 
-/* A source of emissions: single elements (or emitters), drawn without repetition, the scene's own light, and
- * random light of all elements (emitters); with sources, of these elements alone. */
+/* A source of emissions: single elements (or emitters), drawn without repetition, the scene's own light,
+ * random light of all elements (emitters), and whole groups of the scene, drawn without repetition, each of
+ * which emits evenly; with sources, of these elements alone. */
 typedef struct probe_source {
     const build_problem *problem;
     const lam_operator *op;
     const float *emission; /* [C][n], the scene's own */
     const float *emits;    /* [n], above 0 of elements that emit; NULL: all */
+    const uint32_t *group; /* [n], of each element; NULL: no whole groups are drawn */
     size_t n_singles;      /* in the deck */
+    size_t n_whole;        /* groups in their deck, of which some element may emit */
+    uint32_t *whole;       /* [n_whole] drawn so far, then the others */
     size_t most[JUDGE_GROUPS], made[JUDGE_GROUPS];
-    uint32_t *deck;        /* [n or emitters, or those that emit] drawn so far, then the others */
-    uint64_t draw, random; /* states */
+    uint32_t *deck;                    /* [n or emitters, or those that emit] drawn so far, then the others */
+    uint64_t draw, random, draw_whole; /* states */
 } probe_source;
 
 /* singles: at most; emits may be NULL, as it is of an operator of emitters. Errors: LAM_ERR_MEMORY. */
 lam_status probe_source_make(const build_problem *problem, const lam_operator *op, const float *emission,
                              const float *emits, size_t singles, size_t randoms, uint64_t seed,
                              probe_source *out, lam_error *error);
+
+/* Adds at most `most` of the groups 0 ... n_groups - 1, group [n] being those of the elements; an operator of
+ * emitters cannot answer them, and gets none. Errors: LAM_ERR_MEMORY. */
+lam_status probe_source_add_groups(probe_source *s, const uint32_t *group, size_t n_groups, size_t most,
+                                   lam_error *error);
 void probe_source_free(probe_source *s);
 
 /* Emissions E and the operator's radiosity and irradiance, [m][C][n]; those of group g are begin[g] ...

@@ -43,6 +43,7 @@ static lam_status save_group(store *s, const char *name, const error_group *g, b
         if (g->probes_noise >= 0) TRY(store_set_number(s, name, "probes_noise", g->probes_noise, error));
         TRY(store_set_integer(s, name, "total_is_bound", g->is_bound, error));
     }
+    if (g->operator_probes == 0) goto done;
     TRY(store_set_integer(s, name, "operator_probes", (int64_t)g->operator_probes, error));
     TRY(save_figures(s, name, "operator_relative", &g->operator_relative, error));
     TRY(save_figures(s, name, "operator_indirect", &g->operator_indirect, error));
@@ -58,6 +59,40 @@ lam_status judge_save(const error_report *report, store *s, lam_error *error) {
     TRY(save_group(s, "/error/single", &report->single, report->has_total, error));
     TRY(save_group(s, "/error/lights", &report->lights, report->has_total, error));
     TRY(save_group(s, "/error/random", &report->random, report->has_total, error));
+    TRY(save_group(s, "/error/whole", &report->whole, report->has_total, error));
+    TRY(save_group(s, "/error/sky", &report->sky, report->has_total, error));
+done:
+    return status;
+}
+
+lam_status judge_save_groups(const group_errors *e, store *s, lam_error *error) {
+    static const char *const names[GROUP_FIGURES] = {[GROUP_MEAN_ONE] = "mean_one",
+                                                     [GROUP_MEAN_MANY] = "mean_many",
+                                                     [GROUP_MEAN_EVEN] = "mean_even",
+                                                     [GROUP_RMS_ONE] = "rms_one",
+                                                     [GROUP_RMS_MANY] = "rms_many",
+                                                     [GROUP_RMS_EVEN] = "rms_even",
+                                                     [GROUP_UNIFORM] = "uniform",
+                                                     [GROUP_UNIFORM_LARGEST] = "uniform_largest",
+                                                     [GROUP_NEAR] = "near",
+                                                     [GROUP_NEAR_LARGEST] = "near_largest",
+                                                     [GROUP_FAR] = "far",
+                                                     [GROUP_FAR_LARGEST] = "far_largest"};
+    lam_status status = LAM_OK;
+    char path[64];
+    for (int k = 0; k < GROUP_FIGURES && e->n_rows > 0; k++) {
+        snprintf(path, sizeof path, "/error/by_group/%s", names[k]);
+        TRY(store_write(s, path, STORE_F64, 2, (size_t[]){e->n_rows, e->n_groups}, e->of[k], error));
+        if (k >= GROUP_SKY_FIGURES || e->sky[k] == NULL) continue;
+        snprintf(path, sizeof path, "/error/by_group/sky_%s", names[k]);
+        TRY(store_write(s, path, STORE_F64, 2, (size_t[]){e->n_rows, e->n_groups}, e->sky[k], error));
+    }
+    if (e->sky_power != NULL)
+        TRY(store_write(s, "/error/by_group/sky_power", STORE_F64, 2, (size_t[]){e->n_channels, e->n_tiles},
+                        e->sky_power, error));
+    if (e->sky_first != NULL)
+        TRY(store_write(s, "/error/by_group/sky_first", STORE_F64, 2, (size_t[]){e->n_groups, e->n_tiles},
+                        e->sky_first, error));
 done:
     return status;
 }

@@ -1,7 +1,9 @@
 #include "solver/precompute/judging.h"
 
+#include "solver/base/random.h"
 #include "solver/formfactor/blocks/block_light.h"
 #include "solver/formfactor/pairs/first_light.h"
+#include "solver/formfactor/sky_sample.h"
 #include "solver/operator/blocks/block_store.h"
 #include "solver/precompute/trial.h"
 
@@ -23,7 +25,9 @@ struct judge_references {
     block_light *by_blocks;
     size_t n;
     bool keeps;
-    light_kept lamp; /* of several elements, which takes as long as that of many single ones */
+    sky_bounce sky[2]; /* samples of the first bounce; n = 0: none */
+    judged_sky light;  /* a view of these, and of the first bounce that is judged */
+    light_kept lamp;   /* of several elements, which takes as long as that of many single ones */
 };
 
 static void light_kept_free(light_kept *l) {
@@ -47,6 +51,7 @@ void judge_references_free(judge_references *r) {
     first_light_destroy(r->by_rays);
     block_light_destroy(r->by_blocks);
     light_kept_free(&r->lamp);
+    for (int h = 0; h < 2; h++) sky_bounce_free(&r->sky[h]);
     free(r);
 }
 
@@ -57,6 +62,9 @@ double judge_references_bytes(const judge_references *r) {
     if (r == NULL) return 0;
     double bytes = (r->by_blocks != NULL ? walk_bytes : 0) * (double)r->n + lamp_bytes * (double)r->n;
     if (r->finer.n > 0) bytes += (double)block_factors_bytes(&r->finer);
+    for (int h = 0; h < 2; h++)
+        if (r->sky[h].first_bounce != NULL)
+            bytes += sizeof(float) * (double)r->sky[h].tiling.n_tiles * (double)r->n;
     for (int h = 0; h < 2; h++)
         if (r->half[h].F.indptr != NULL) bytes += entry_bytes * (double)(r->n + r->half[h].F.indptr[r->n]);
     return bytes;
@@ -161,6 +169,15 @@ static bool fits(const judging *j, const judge_references *r) {
            !trial_recipes_differ(&r->halves[1], &j->halves[1]);
 }
 
+/* Rays of each of the two samples from an element. Their noise is taken out; what is left of it, in the error
+ * of an answer that they share, falls with the number of elements. */
+enum { SKY_RAYS = 512 };
+
+/* True where the sky is judged: one whose light is in the scene. */
+static bool has_sky(const judging *j) {
+    return j->by_group != NULL && j->f->sky.first_bounce != NULL && !j->f->closed;
+}
+
 /* The form factors and the light that are lacking: of few elements by a walk of the tree, or by pairs. */
 static lam_status make_references(const judging *j, judge_references *r, lam_error *error) {
     lam_status status = LAM_OK;
@@ -175,6 +192,15 @@ static lam_status make_references(const judging *j, judge_references *r, lam_err
     /* The direct illumination of one element by rays is mostly noise. */
     if (!blocks && recipe_noise(&j->f->recipe) > 0 && r->by_rays == NULL)
         TRY(first_light_create(j->m, j->first_light_seed, &r->by_rays, error));
+    if (!has_sky(j)) goto done;
+    for (int h = 0; h < 2; h++)
+        if (r->sky[h].first_bounce == NULL)
+            TRY(sky_sample_make(j->m, j->order, &j->f->sky, SKY_RAYS,
+                                random_mix(j->first_light_seed + 1 + (uint64_t)h), j->progress, &r->sky[h],
+                                error));
+    r->light = (judged_sky){.n_tiles = j->f->sky.tiling.n_tiles,
+                            .own = j->f->sky.first_bounce,
+                            .samples = {r->sky[0].first_bounce, r->sky[1].first_bounce}};
 done:
     return status;
 }
@@ -189,6 +215,10 @@ static judge_input input_of(const judging *j, judge_references *r) {
                          .emission = j->m->emission,
                          .read = j->importance != NULL ? j->importance->read : NULL,
                          .emits = j->importance != NULL ? j->importance->emits : NULL,
+                         .group = j->by_group != NULL ? j->m->group : NULL,
+                         .n_groups = j->m->n_groups,
+                         .by_group = j->by_group,
+                         .sky = has_sky(j) ? &r->light : NULL,
                          .own = own,
                          .independent = blocks ? block_factors_product(&r->finer)
                                                : factor_product_of_rows(&r->half[0].F),

@@ -29,6 +29,8 @@ typedef struct judging {
     const large_place *large;
     uint64_t probes_seed, first_light_seed;
     size_t probes, probes_least; /* as in judge_input */
+    group_errors *by_group; /* filled with the errors in each group of the mesh, for which whole groups are
+                               probes, too; NULL: not asked for */
     const progress *progress;
     void (*sampled)(void *context, const form_factors *half); /* after each sample that was made; or NULL */
     void *context;

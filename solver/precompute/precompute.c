@@ -39,6 +39,7 @@ void state_free(precompute_state *state) {
     importance_free(&state->importance);
     scratch_close(state->scratch, false);
     lam_operator_close(state->op);
+    group_errors_free(&state->by_group);
     trial_made_free(&state->trial.best);
     judge_references_free(state->trial.references);
 }

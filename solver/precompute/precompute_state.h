@@ -22,6 +22,7 @@ typedef struct trial_made {
     lam_operator *op; /* NULL: nothing was made */
     build_report built;
     error_report errors;
+    group_errors by_group;
     double epsilon; /* that it was built for */
 } trial_made;
 
@@ -87,6 +88,7 @@ typedef struct precompute_state {
     build_report built;
     error_report errors;
     mesh_figures errors_of_mesh;
+    group_errors by_group;
     trial_course trial;
     char advice[ERROR_ADVICE_BYTES]; /* on them; "" where there is none */
     forecast_rates rates;            /* of the machine; processors is 0 before they are measured */

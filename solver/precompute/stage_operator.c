@@ -213,7 +213,8 @@ static void log_figures(terminal *t, const char *name, const error_group *g, boo
         terminal_log(t, "%-8s total relative %s%.3g, indirect %s%.3g (noise of the reference %.2g%s)", name,
                      at_most, g->total_relative.mean, at_most, g->total_indirect.mean, g->reference_noise,
                      probes);
-    terminal_log(t, "%-8s operator relative %.3g, indirect %.3g", name, g->operator_relative.mean,
+    if (g->operator_probes > 0)
+        terminal_log(t, "%-8s operator relative %.3g, indirect %.3g", name, g->operator_relative.mean,
                  g->operator_indirect.mean);
     if (!g->receivers.known) return;
     const receiver_figures *r = &g->receivers;
@@ -276,6 +277,7 @@ lam_status stage_judge(precompute_state *state, lam_error *error) {
                  .first_light_seed = precompute_seed(seed, SEED_FIRST_LIGHT),
                  .probes = state->probes,
                  .probes_least = state->options->probes == OPTION_AUTO ? PROBES_LEAST : 0,
+                 .by_group = &state->by_group,
                  .progress = &state->progress,
                  .sampled = log_half,
                  .context = state,
@@ -292,6 +294,8 @@ lam_status stage_judge(precompute_state *state, lam_error *error) {
     log_figures(state->t, "single", &state->errors.single, state->errors.has_total);
     log_figures(state->t, "lights", &state->errors.lights, state->errors.has_total);
     log_figures(state->t, "random", &state->errors.random, state->errors.has_total);
+    log_figures(state->t, "whole", &state->errors.whole, state->errors.has_total);
+    log_figures(state->t, "sky", &state->errors.sky, state->errors.has_total);
 done:
     return status;
 }

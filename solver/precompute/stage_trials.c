@@ -8,15 +8,20 @@ void trial_made_free(trial_made *made) {
     form_factors_free(&made->f);
     block_factors_free(&made->blocks);
     lam_operator_close(made->op);
+    group_errors_free(&made->by_group);
     *made = (trial_made){.op = NULL};
 }
 
 /* Puts the operator of the trial that just ended aside. */
 static void set_aside(precompute_state *state) {
     trial_made_free(&state->trial.best);
-    state->trial.best = (trial_made){
-        .op = state->op, .built = state->built, .errors = state->errors, .epsilon = state->trial.epsilon};
+    state->trial.best = (trial_made){.op = state->op,
+                                     .built = state->built,
+                                     .errors = state->errors,
+                                     .by_group = state->by_group,
+                                     .epsilon = state->trial.epsilon};
     state->op = NULL;
+    state->by_group = (group_errors){.n_groups = 0};
 }
 
 /* Makes room for other form factors. The operator put aside keeps those that it was built from, their rows
@@ -44,6 +49,9 @@ void state_take_back(precompute_state *state) {
     state->op = best->op;
     state->built = best->built;
     state->errors = best->errors;
+    group_errors_free(&state->by_group);
+    state->by_group = best->by_group;
+    best->by_group = (group_errors){.n_groups = 0};
     state->trial.epsilon = best->epsilon;
     best->op = NULL;
     if (best->f.row_sums == NULL) return;

@@ -254,6 +254,13 @@ class StoreTest(unittest.TestCase):
                 expected["/operator/order"] = ((n,), "<u4")
             found = {p: (d.shape, d.dtype.str) for p, d in datasets(f).items()
                      if not p.startswith("/checksum/")}
+            law = [f"{what}_{part}" for what in ("rms", "mean") for part in ("one", "many", "even")]
+            by_group = law + [near + largest for near in ("uniform", "near", "far") for largest in ("", "_largest")]
+            if "error/by_group/sky_power" in f:  # a sky shines into the scene
+                by_group += ["sky_" + figure for figure in law]
+                expected["/error/by_group/sky_power"] = ((C, 12), "<f8")
+                expected["/error/by_group/sky_first"] = ((g, 12), "<f8")
+            expected.update({f"/error/by_group/{figure}": ((1, g), "<f8") for figure in by_group})
             names = found.pop("/mesh/group_names")
             self.assertEqual(names[0], (g,))
             self.assertRegex(names[1], r"^\|S\d+$")
@@ -401,16 +408,20 @@ class StoreTest(unittest.TestCase):
             self.assertEqual("even" in of_mesh, name != "emitters")
             for share in of_mesh.values():
                 self.assertTrue(0 <= share < 10, share)
-            for group in (g for kind, g in f["error"].items() if kind != "mesh"):
+            for name, figures in f.get("error/by_group", {}).items():
+                if "sky" not in name:
+                    self.assertEqual(figures.shape, (1, len(f["mesh/group_names"])), name)
+            for group in (f["error"][name] for name in f["error"] if name not in ("by_group", "mesh")):
                 attributes = group.attrs
                 self.assertGreater(attributes["probes"], 0)
-                for kind in ("total", "operator"):
+                own = "operator_probes" in attributes  # not of skies
+                for kind in ("total", "operator")[:2 if own else 1]:
                     for norm in ("relative", "indirect"):
                         figures = [attributes[f"{kind}_{norm}_{what}"] for what in ("mean", "std", "max")]
                         self.assertTrue(np.isfinite(figures).all())
                         # the mean may pass the largest by rounding where all are equal
                         self.assertLessEqual(figures[0], figures[2] * (1 + 1e-12))
-                for what in ("reference_noise", "negative_share", "energy_balance"):
+                for what in ("reference_noise", "negative_share", "energy_balance")[:3 if own else 1]:
                     self.assertTrue(np.isfinite(attributes[what]), what)
 
     @each_store

@@ -492,7 +492,7 @@ START_TEST(sources_alone_emit) {
     for (size_t k = 0; k < VECTOR; k++) s.emission[k] = 3;
     ck_ok(probe_source_make(&problem, s.op, s.emission, emits, N, 4, 5, &source, &error));
     ck_assert_uint_eq(source.most[JUDGE_SINGLE], SOURCES + 1);
-    ck_ok(probes_next(&source, (size_t[]){4, 1, SOURCES + 1}, false, &p, &error));
+    ck_ok(probes_next(&source, (size_t[]){4, 0, 1, SOURCES + 1}, false, &p, &error));
     for (size_t v = 0; v < p.m; v++)
         for (size_t k = 0; k < VECTOR; k++) {
             const float E = p.E[v * VECTOR + k];

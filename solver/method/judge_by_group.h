@@ -1,0 +1,49 @@
+/* The errors of probes in each group of the scene (group_errors). Private to judge.c. */
+#ifndef LAMBERT_METHOD_JUDGE_BY_GROUP_H
+#define LAMBERT_METHOD_JUDGE_BY_GROUP_H
+
+#include "solver/method/judge_figures.h"
+#include "solver/method/judge_probes.h"
+
+/* Sums over probes in one bin, a row of one group: of squares of errors and of the noise in them. */
+typedef struct bin_sums {
+    double area;
+    /* By single elements: e^2 N / P^2, and e^2; of the mean of the bin, and of the mean square in it. */
+    double mean_one, mean_one_noise, mean_all, mean_all_noise;
+    double rms_one, rms_one_noise, rms_all, rms_all_noise;
+    /* Of means: errors, their noise, reflected light, and the largest ratio. */
+    double off[3], noise[3], light[3], largest[3];
+} bin_sums;
+
+/* A probe in which many elements shine together: e^2 / P^2 in each bin, less the noise where that is small.
+ */
+typedef struct even_probe {
+    double per_number;  /* 1 / N */
+    double *mean, *rms; /* [n_bins] */
+} even_probe;
+
+typedef struct by_group_sums {
+    size_t n, n_groups, n_rows; /* n: elements; 0: nothing is summed */
+    const uint32_t *group;
+    const float *read;
+    size_t n_single;
+    double power;   /* sum of P^2 / N of single elements */
+    bin_sums *bins; /* [n_rows][n_groups] */
+    double *work;   /* two numbers of all bins, of a channel and of a probe */
+    even_probe even[JUDGE_WHOLE_PROBES + 1];
+    size_t n_even;
+} by_group_sums;
+
+/* Errors: LAM_ERR_MEMORY. */
+lam_status by_group_begin(const judge_input *input, by_group_sums *out, lam_error *error);
+
+/* Adds a probe of a group of probes, JUDGE_...; number: the effective number of emitters, 0: of elements that
+ * emit. Cost: O(C n). */
+void by_group_add(const figure_probe *p, int kind, double number, by_group_sums *to);
+
+/* The first n_figures of [GROUP_FIGURES] or [GROUP_SKY_FIGURES], each [n_rows][n_groups]. Errors:
+ * LAM_ERR_MEMORY, after which of is untouched. */
+lam_status by_group_finish(const by_group_sums *sums, int n_figures, double **of, lam_error *error);
+void by_group_free(by_group_sums *sums);
+
+#endif
