@@ -21,6 +21,7 @@ typedef struct radiosity_solve {
     double *figures;        /* of reduce, in place of values; else NULL */
     float *W;               /* [n_rhs][C][s], weights of a store of emitters; else NULL */
     refined_solve *refined; /* for a request with a tolerance; else NULL */
+    name_error *errors;     /* of names that are reduced, or NULL */
     problem why;            /* of a pass that failed */
     bool failed;
 } radiosity_solve;
@@ -33,6 +34,7 @@ static void solve_free(radiosity_solve *s) {
     free(s->figures);
     free(s->H0);
     free(s->W);
+    free(s->errors);
     free(s);
 }
 
@@ -220,6 +222,9 @@ static bool write_answer(call *in, radiosity_solve *s) {
     bool good = !s->failed;
     if (s->refined != NULL)
         return good && refined_end(in, &s->request, s->refined, &s->notes, &s->answer, &s->why);
+    if (good && in->accept.type == MEDIA_JSON &&
+        !scene_note_own_error(in->scene, &s->request, s->H0, s->out, &s->notes, &s->errors))
+        return problem_set(&s->why, PROBLEM_NO_MEMORY, "not enough memory for the error of the answer");
     if (s->figures != NULL)
         return good && figures_add(in->scene, &s->request, 0, s->shape.n_rhs, s->own, s->figures, &s->why) &&
                figures_write(in->scene, &s->request, s->figures, &s->notes, &s->answer, &s->why);

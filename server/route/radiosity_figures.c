@@ -77,18 +77,21 @@ static bool evaluate(const call *in, radiosity_request *request, adjoint_row *co
     double *figures = reduce_figures(r, request->n_rhs, s->n_channels);
     double *means = memory_allocate(request->n_rhs, s->n_channels * sizeof *means, "means", NULL);
     float *weights = NULL;
-    bool good = figures != NULL && means != NULL;
+    mean_errors errors = {.names = NULL};
+    bool good = figures != NULL && means != NULL && scene_mean_errors_begin(s, request, notes, &errors);
     if (!good)
         problem_set(why, PROBLEM_NO_MEMORY,
                     "not enough memory for the answer; ask for fewer vectors or groups");
     if (good && !adjoint_row_suffices(s, rows[0], request)) good = weights_of(in, request, &weights, why);
     for (size_t k = 0; good && k < r->n_names; k++) {
         adjoint_row_evaluate(s, rows[k], request, weights, means);
+        scene_mean_errors_add(s, request, k, means, &errors, notes);
         reduce_means(r, k, s->n_channels, request->n_rhs, rows[k]->area, means, figures);
     }
     const double solved = clock_ms();
     notes->solve_ms += solved;
     good = good && figures_write(s, request, figures, notes, b, why);
+    mean_errors_free(&errors);
     free(figures);
     free(means);
     free(weights);

@@ -106,47 +106,13 @@ static lam_status find_groups(const scene *made,
 /* The errors for answers, and the groups that have nothing but receivers, or but sources. */
 static lam_status read_errors(store *s, scene *made, lam_error *error) {
     lam_status status = LAM_OK;
-    TRY(stated_errors_read(s, made->n, &made->errors, error));
+    const error_scene about = scene_for_errors(made);
+    TRY(stated_errors_read(s, &about, &made->errors, error));
     if (made->errors.read != NULL) TRY(find_groups(made, stated_errors_others, &made->group_read, error));
     if (made->errors.emits != NULL)
         TRY(find_groups(made, stated_errors_strangers, &made->group_emits, error));
 done:
     return status;
-}
-
-/* True where the store was built for receivers and the request asks for nothing else. */
-static bool asks_receivers(const scene *s, const radiosity_request *request) {
-    const reduce_request *r = &request->reduce;
-    if (s->errors.read == NULL) return false;
-    if (!r->on)
-        return stated_errors_others(&s->errors, request->select ? request->n_selected : s->n,
-                                    request->select ? request->selected : NULL) == 0;
-    for (size_t k = 0; k < r->n_names; k++)
-        for (size_t g = 0; g < r->names[k].n_groups; g++)
-            if (!s->group_read[r->names[k].groups[g]]) return false;
-    return true;
-}
-
-/* True where the store was built for sources and something else emits. */
-static bool has_strange_light(const scene *s, const radiosity_request *request) {
-    const size_t C = s->n_channels, rows = (request->E != NULL ? request->n_dense : 0) * C;
-    const side_rows *sky = &request->sky;
-    if (s->errors.emits == NULL) return false;
-    for (size_t k = 0; k < request->n_spots; k++) {
-        const emission_spot *spot = &request->spots[k];
-        bool lit = false;
-        for (size_t c = 0; c < C; c++) lit = lit || request->colours[k * C + c] != 0;
-        if (lit && !(spot->whole_group ? s->group_emits : s->errors.emits)[spot->where]) return true;
-    }
-    for (size_t k = 0; sky->values != NULL && k < sky->n * C * lam_sky_tiles(s->sky); k++)
-        if (sky->values[k] > 0) return true;
-    return stated_errors_is_strange(&s->errors, rows, request->E);
-}
-
-void scene_note_error(const scene *s, const radiosity_request *request, answer_notes *notes) {
-    const answer_scope scope = {.receivers_only = asks_receivers(s, request),
-                                .strange = has_strange_light(s, request)};
-    stated_errors_note(&s->errors, scope, notes);
 }
 
 static lam_status read_groups(store *s, scene *made, lam_error *error) {

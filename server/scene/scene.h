@@ -84,6 +84,30 @@ lam_status scene_open_variant(scene *base, const char *name, const char *groups,
  * sources. Any thread. */
 void scene_note_error(const scene *s, const radiosity_request *request, answer_notes *notes);
 
+/* A view of the scene for errors by group. */
+error_scene scene_for_errors(const scene *s);
+
+/* Replaces that error by the one of the answer's own emission and sky, where the store states errors by
+ * group: of a batch the largest over its vectors. E of the request holds every vector; values are
+ * [n_rhs][C][count] of all elements or of those selected, H0 the direct light of the sky or NULL. *names
+ * (freed with free() after the answer is written) belongs to the notes. O(n_rhs C n). False when memory is
+ * short. */
+bool scene_note_own_error(const scene *s, const radiosity_request *request, const float *H0,
+                          const float *values, answer_notes *notes, name_error **names);
+
+/* The same of a linear reduction, name by name; means are [n_rhs][C]. The notes refer to it until it is
+ * freed. */
+typedef struct mean_errors {
+    name_error *names;    /* [n_names]; NULL: that of the store stays */
+    emission_size *sizes; /* [n_rhs] */
+    double *emission;     /* [2][n_rhs][C], work */
+} mean_errors;
+bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, answer_notes *notes,
+                             mean_errors *out);
+void scene_mean_errors_add(const scene *s, const radiosity_request *request, size_t k, const double *means,
+                           mean_errors *to, answer_notes *notes);
+void mean_errors_free(mean_errors *e);
+
 /* Adds a reference, to be dropped by scene_release. Any thread. */
 scene *scene_acquire(scene *s);
 void scene_release(scene *s);

@@ -3,6 +3,7 @@
 #define LAMBERT_CODEC_ANSWER_H
 
 #include "lambert/lambert.h"
+#include "solver/codec/answer_error.h"
 #include "solver/codec/media.h"
 #include "solver/codec/problem.h"
 
@@ -19,8 +20,13 @@ typedef struct answer_notes {
     const char *scene;
     lam_quantity quantity;
     bool has_error;
-    double relative_mean, indirect_mean;
-    double mesh;          /* the share of reflected light that constants on elements leave; 0: not stated */
+    double relative_mean, indirect_mean; /* not finite: there is nothing that they could be relative to */
+    double mesh; /* the share of reflected light that constants on elements leave; 0: not stated */
+    const char *error_light; /* the light that the error is of: "own", the answer's; "lights" of the scene or
+                                "single" elements, whatever the answer's is */
+    double emitters;         /* effective number, of "own" */
+    size_t n_name_errors;
+    const name_error *name_errors; /* of "own": of the names that are reduced */
     const char *error_of; /* the elements that the error is of, "receivers" or "all", where a store was built
                              for receivers; NULL: it was built for all */
     const char *error_from; /* "sources" where a store was built for these and they alone emit; "others": not

@@ -91,8 +91,58 @@ static void add_report(json_t *out, json_t *operator_attributes) {
     json_object_set_new(out, "report", report);
 }
 
+/* Groups whose errors are described: a city has thousands. */
+enum { GROUPS_DESCRIBED = 32 };
+
+/* The group with the largest figure that is not taken yet; n: none. */
+static size_t worst_group(const double *figure, const bool *taken, size_t n) {
+    size_t worst = n;
+    for (size_t g = 0; g < n; g++)
+        if (!taken[g] && isfinite(figure[g]) && (worst == n || figure[g] > figure[worst])) worst = g;
+    return worst;
+}
+
+/* The errors of the means of groups, those with the largest one by uniform light first. */
+static lam_status add_error_by_group(store *s, json_t *figures, const json_t *groups, lam_error *error) {
+    static const char *const names[] = {"uniform", "uniform_largest", "near", "near_largest",
+                                        "far",     "far_largest"};
+    enum { NAMES = sizeof names / sizeof *names };
+    lam_status status = LAM_OK;
+    const size_t n = json_array_size(groups);
+    void *data[NAMES] = {NULL};
+    bool *taken = NULL;
+    json_t *list = NULL;
+    if (!store_has(s, "/error/by_group")) return LAM_OK;
+    for (size_t k = 0; k < NAMES; k++) {
+        char path[64];
+        size_t dims[2] = {SIZE_MAX, n};
+        snprintf(path, sizeof path, "/error/by_group/%s", names[k]);
+        TRY(store_read(s, path, STORE_F64, 2, dims, &data[k], error));
+        if (dims[0] == 0) FAIL(error, LAM_ERR_FORMAT, "%s: %s is empty", store_path(s), path);
+    }
+    taken = memory_allocate(n, sizeof *taken, "errors of groups", error);
+    if (taken == NULL) TRY(LAM_ERR_MEMORY);
+    list = json_array();
+    for (size_t count = 0; count < GROUPS_DESCRIBED; count++) {
+        const size_t g = worst_group(data[0], taken, n);
+        if (g == n) break;
+        taken[g] = true;
+        json_t *one = json_object();
+        copy_member(one, "name", json_array_get(groups, g), "name");
+        for (size_t k = 0; k < NAMES; k++)
+            json_object_set_new(one, names[k], describe_number(((const double *)data[k])[g]));
+        json_array_append_new(list, one);
+    }
+    json_object_set(figures, "by_group", list);
+done:
+    for (size_t k = 0; k < NAMES; k++) free(data[k]);
+    free(taken);
+    json_decref(list);
+    return status;
+}
+
 static lam_status add_error(store *s, json_t *out, lam_error *error) {
-    static const char *const groups[] = {"single", "lights", "random", "mesh"};
+    static const char *const groups[] = {"single", "lights", "random", "whole", "sky", "mesh"};
     lam_status status = LAM_OK;
     json_t *figures = NULL;
     if (!store_has(s, "/error")) {
@@ -108,6 +158,7 @@ static lam_status add_error(store *s, json_t *out, lam_error *error) {
         TRY(attributes_of(s, path, &group, error));
         json_object_set_new(figures, groups[i], group);
     }
+    TRY(add_error_by_group(s, figures, json_object_get(out, "groups"), error));
     json_object_set(out, "error", figures);
 done:
     json_decref(figures);

@@ -8,18 +8,21 @@
 void stated_errors_free(stated_errors *e) {
     free(e->read);
     free(e->emits);
+    error_by_group_free(&e->by_group);
     *e = (stated_errors){.n = 0};
 }
 
 static stated_error read_error(store *s, const char *relative, const char *indirect) {
     static const char *const groups[] = {"/error/lights", "/error/single"};
     stated_error found = {.known = false};
-    for (size_t i = 0; i < sizeof groups / sizeof groups[0] && !found.known; i++)
+    for (size_t i = 0; i < sizeof groups / sizeof groups[0] && !found.known; i++) {
+        found.light = groups[i] + sizeof "/error/" - 1;
         found.known = store_has(s, groups[i]) && store_has_attribute(s, groups[i], relative) &&
                       store_has_attribute(s, groups[i], indirect) &&
                       store_get_number(s, groups[i], relative, &found.relative, NULL) == LAM_OK &&
                       store_get_number(s, groups[i], indirect, &found.indirect, NULL) == LAM_OK &&
                       isfinite(found.relative) && isfinite(found.indirect);
+    }
     return found;
 }
 
@@ -42,8 +45,10 @@ static lam_status find_members(const float *weights, size_t n, bool **out, lam_e
     return LAM_OK;
 }
 
-lam_status stated_errors_read(store *s, size_t n, stated_errors *out, lam_error *error) {
+lam_status stated_errors_read(store *s, const error_scene *scene, stated_errors *out, lam_error *error) {
     lam_status status = LAM_OK;
+    const size_t n = scene->n;
+    error_scene about = *scene;
     importance weights = {.n = 0};
     stated_errors made = {.n = n,
                           .all = read_error(s, "total_relative_mean", "total_indirect_mean"),
@@ -52,12 +57,13 @@ lam_status stated_errors_read(store *s, size_t n, stated_errors *out, lam_error 
     TRY(find_members(weights.read, n, &made.read, error));
     TRY(find_members(weights.emits, n, &made.emits, error));
     if (made.read != NULL) made.receivers = read_error(s, "receivers_relative", "receivers_indirect");
+    about.read = made.read;
+    TRY(error_by_group_read(s, &about, &made.by_group, error));
     *out = made;
-    made.read = made.emits = NULL;
+    made = (stated_errors){.n = 0};
 done:
     importance_free(&weights);
-    free(made.read);
-    free(made.emits);
+    stated_errors_free(&made);
     return status;
 }
 
@@ -92,6 +98,7 @@ void stated_errors_note(const stated_errors *e, answer_scope scope, answer_notes
     notes->relative_mean = of->relative;
     notes->indirect_mean = of->indirect;
     notes->mesh = e->mesh;
+    notes->error_light = of->light;
     notes->error_of = e->read == NULL || strange ? NULL : receivers ? "receivers" : "all";
     notes->error_from = e->emits == NULL ? NULL : strange ? "others" : "sources";
 }

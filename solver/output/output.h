@@ -4,6 +4,7 @@
 #define LAMBERT_OUTPUT_OUTPUT_H
 
 #include "lambert/lambert.h"
+#include "solver/codec/answer_error.h"
 #include "solver/codec/group_figures.h"
 #include "solver/scene/mesh.h"
 
@@ -40,9 +41,12 @@ typedef struct solution {
     const size_t *iterations;
     reduction *reductions;
     size_t n_reductions;               /* 0: the values themselves are written */
-    double relative, indirect;         /* mean error that the store states; negative: not measured */
+    double relative, indirect;         /* mean error that is stated; negative: none is */
     double mesh;                       /* of answer_notes */
     const char *error_of, *error_from; /* of answer_notes */
+    const char *error_light;           /* likewise */
+    double emitters;                   /* likewise */
+    const name_error *name_errors;     /* [n_reductions], of error_light "own"; or NULL */
 } solution;
 
 /* Computes the figures of every reduction. LAM_ERR_MEMORY. */

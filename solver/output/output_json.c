@@ -147,6 +147,10 @@ static lam_status write_all(const solution *s, bool means, FILE *stream, lam_err
                                 .mesh = s->mesh,
                                 .error_of = s->error_of,
                                 .error_from = s->error_from,
+                                .error_light = s->error_light,
+                                .emitters = s->emitters,
+                                .n_name_errors = s->name_errors != NULL ? s->n_reductions : 0,
+                                .name_errors = s->name_errors,
                                 .certificates = s->certificates,
                                 .iterations = s->iterations};
     const bool vectors = !means && s->names == NULL && s->n_reductions == 0;

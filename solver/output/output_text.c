@@ -59,7 +59,13 @@ void output_print(const solution *s) {
         print_reductions(s);
     else
         print_means(s);
-    if (s->relative >= 0)
+    const bool own = s->error_light != NULL && strcmp(s->error_light, "own") == 0;
+    if (s->relative >= 0 && own)
+        printf("stated error of this answer%s%s%s%s, %.3g emitters: relative %.3g, indirect %.3g\n",
+               s->error_of != NULL ? ", of the light of " : "", s->error_of != NULL ? s->error_of : "",
+               s->error_from != NULL ? ", emitted by " : "", s->error_from != NULL ? s->error_from : "",
+               s->emitters, s->relative, s->indirect);
+    else if (s->relative >= 0)
         printf("stated error of the store%s%s%s%s: relative %.3g, indirect %.3g\n",
                s->error_of != NULL ? ", of the light of " : "", s->error_of != NULL ? s->error_of : "",
                s->error_from != NULL ? ", emitted by " : "", s->error_from != NULL ? s->error_from : "",

@@ -120,9 +120,35 @@ static void print_mesh(const json_t *figures) {
     puts("  indirect, of constants on elements, beside the errors above");
 }
 
+/* Prints the groups whose means have the largest errors: all probes together, and the largest. */
+static void print_error_by_group(const json_t *groups) {
+    enum { MOST = 8 };
+    static const char *const figures[] = {"uniform", "uniform_largest", "near", "near_largest",
+                                          "far",     "far_largest"};
+    const size_t count = json_array_size(groups), shown = count < MOST ? count : MOST;
+    if (shown == 0) return;
+    printf("errors of means   %10s%10s%10s%10s%10s%10s\n", "uniform", "largest", "near", "largest", "far",
+           "largest");
+    for (size_t g = 0; g < shown; g++) {
+        const json_t *one = json_array_get(groups, g);
+        printf("  %-16.16s", json_string_value(json_object_get(one, "name")));
+        for (size_t k = 0; k < sizeof figures / sizeof *figures; k++) {
+            const json_t *figure = json_object_get(one, figures[k]);
+            if (json_is_number(figure))
+                printf("%10.2g", json_number_value(figure));
+            else
+                printf("%10s", "-");
+        }
+        putchar('\n');
+    }
+    puts("  of a group's mean over the reflected light there, groups with the largest first; uniform: random "
+         "emission;\n"
+         "  near, far: single elements that light the group more, or less, than the whole scene");
+}
+
 /* sources: probes emitted in these alone. */
 static void print_error(const json_t *figures, bool sources) {
-    static const char *const names[] = {"single", "lights", "random"};
+    static const char *const names[] = {"single", "lights", "random", "whole", "sky"};
     bool receivers = false;
     if (json_object_size(figures) == 0) {
         puts("errors            not measured (--probes 0)");
@@ -146,6 +172,7 @@ static void print_error(const json_t *figures, bool sources) {
          "  operator: against the sample that it was built from\n"
          "  +-: standard errors of the mean indirect error, by the noise of that sample and by the choice of "
          "probes");
+    print_error_by_group(json_object_get(figures, "by_group"));
 }
 
 /* Prints as many groups as fit on a screen: a city has hundreds of them. */

@@ -145,6 +145,7 @@ static void take_error(const stated_errors *stated, const emission *light, size_
     if (notes.has_error) out->relative = notes.relative_mean;
     if (notes.has_error) out->indirect = notes.indirect_mean;
     out->mesh = notes.mesh;
+    if (notes.has_error) out->error_light = notes.error_light;
     out->error_of = notes.error_of;
     out->error_from = notes.error_from;
     if (others > 0)
@@ -156,6 +157,76 @@ static void take_error(const stated_errors *stated, const emission *light, size_
     if (stated->emits != NULL && scope.strange)
         terminal_warn(t, "there is light from elsewhere than the sources, which the store was built for: the "
                          "answer is only roughly right, and no error is stated for it");
+}
+
+/* The error of one vector, or of the names that are reduced: the larger figures stay. */
+static lam_status add_own_error(const stated_errors *stated, const error_scene *scene, const error_answer *of,
+                                solution *out, name_error *names, lam_error *error) {
+    const emission_size both = emission_size_sum(&of->size, &of->sky);
+    const double emitters = emission_size_number(&both);
+    answer_error one = {.relative = 0};
+    bool good = true;
+    if (out->n_reductions == 0) good = answer_error_of(&stated->by_group, scene, of, &one);
+    for (size_t r = 0; good && r < out->n_reductions; r++) {
+        name_error name;
+        good = name_errors_of(&stated->by_group, scene, of, &out->reductions[r].request, &name);
+        if (!good) break;
+        names[r].mean = fmax(names[r].mean, name.mean);
+        names[r].elements = fmax(names[r].elements, name.elements);
+        one.indirect = fmax(one.indirect, name.mean);
+        one.relative = fmax(one.relative, name.relative);
+    }
+    if (!good) return status_fail(error, LAM_ERR_MEMORY, "not enough memory for the error of the answer");
+    if (one.indirect >= out->indirect) out->emitters = emitters;
+    out->indirect = fmax(out->indirect, one.indirect);
+    out->relative = fmax(out->relative, one.relative);
+    return LAM_OK;
+}
+
+/* Replaces the error of the store by that of the answer's own light, of a batch the largest over its vectors,
+ * unless the sun itself shines or nothing is stated. */
+static lam_status take_own_error(const stated_errors *stated, const error_scene *scene, const emission *light,
+                                 const lam_sky *sky, size_t n_selected, const uint32_t *selected,
+                                 solution *out, name_error **names, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t n = scene->n, row = n * scene->n_channels;
+    const error_by_group *by = &stated->by_group;
+    const size_t m = sky != NULL ? lam_sky_tiles(sky) : 0, C = scene->n_channels;
+    float *H0 = NULL;
+    if (by->n_bins == 0 || out->relative < 0 || light->sun != NULL || light->E == NULL ||
+        (light->L != NULL && by->n_tiles != m))
+        return LAM_OK;
+    name_error *made = memory_allocate(out->n_reductions, sizeof *made, "errors", error);
+    if (made == NULL) return LAM_ERR_MEMORY;
+    if (light->L != NULL) {
+        H0 = memory_allocate(row, sizeof *H0, "the light of the sky", error);
+        if (H0 == NULL) TRY(LAM_ERR_MEMORY);
+    }
+    out->relative = out->indirect = 0;
+    for (size_t r = 0; r < out->n_reductions; r++) made[r].name = out->reductions[r].group;
+    for (size_t v = 0; v < out->n_vectors; v++) {
+        error_answer of = {.quantity = out->quantity,
+                           .E = light->E + (light->steady ? 0 : v * row),
+                           .H0 = H0,
+                           .count = selected != NULL ? n_selected : n,
+                           .selected = selected,
+                           .values = out->values + v * row,
+                           .whole = true};
+        for (size_t c = 0; c < scene->n_channels; c++)
+            emission_size_add(&of.size, n, scene->area, of.E + c * n);
+        for (size_t c = 0; light->L != NULL && c < C; c++)
+            emission_size_add(&of.sky, m, by->sky_power + c * m, light->L + (v * C + c) * m);
+        if (light->L != NULL) lam_sky_irradiance(sky, C, light->L + v * C * m, H0);
+        TRY(add_own_error(stated, scene, &of, out, made, error));
+    }
+    out->error_light = "own";
+    if (out->n_reductions > 0) out->name_errors = made;
+    *names = made;
+    made = NULL;
+done:
+    free(H0);
+    free(made);
+    return status;
 }
 
 /* The elements of the groups that are reduced, *selected freed with free(); NULL where all are wanted. */
@@ -258,6 +329,8 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     uint32_t *selected = NULL;
     size_t n_selected = 0;
     stated_errors stated = {.n = 0};
+    error_scene about = {.n = 0};
+    name_error *name_errors = NULL;
     sunlight sun = {0};
     const char *names[ANNUAL_MOST];
     for (size_t k = 0; k < year->n_figures; k++) names[k] = year->figures[k].name;
@@ -265,6 +338,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     TRY(store_open(path, &s, error));
     TRY(store_get_text(s, "/", "name", &scene, error));
     TRY(mesh_load(s, &m, &row_sums, error));
+    about = (error_scene){.n = m.n, .n_channels = m.n_channels, .area = m.area, .reflectance = m.reflectance};
     TRY(light_open(s, &m, &f->light, f->weather != NULL, &lit, error));
     light_log(&lit, t);
     TRY(reductions_bind(reductions, n_reductions, &lit.scene.groups, error));
@@ -275,7 +349,9 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
     if (lit.own) terminal_log(t, "no --emit, --emission, --sky or --weather: the scene's own light");
     /* With --reduce only figures are written, also with -o. */
     TRY(wanted_elements(&m, reductions, n_reductions, &n_selected, &selected, error));
-    TRY(stated_errors_read(s, m.n, &stated, error));
+    about.groups = &lit.scene.groups;
+    TRY(stated_errors_read(s, &about, &stated, error));
+    about.read = stated.read;
     if (f->weather != NULL) {
         const weather_options hours = {.path = f->weather,
                                        .photometric = f->photometric,
@@ -313,6 +389,9 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
                            &values, error));
     }
     out.values = values;
+    if (values != NULL && year->n_figures == 0 && lam_operator_emitters(lit.op) == 0)
+        TRY(take_own_error(&stated, &about, &lit.light, lit.sky, n_selected, selected, &out, &name_errors,
+                           error));
     if (f->smooth) TRY(find_corners(&out, &lit.light, &corners, error));
     out.corners = corners;
     TRY(reductions_fill(&out, error));
@@ -324,6 +403,7 @@ static lam_status solve(const char *path, const fields *f, const annual_options 
         output_print(&out);
 done:
     free(scene);
+    free(name_errors);
     free(selected);
     stated_errors_free(&stated);
     free(values);

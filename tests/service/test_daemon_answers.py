@@ -163,14 +163,14 @@ class Answers(unittest.TestCase):
 
     def test_error_and_times(self):
         answer = self.solve("grey", {"emission": [1] * 60}).json()
-        self.assertEqual(answer["error"], {"relative_mean": 0.125, "indirect_mean": 0.25})
+        self.assertEqual(answer["error"], {"relative_mean": 0.125, "indirect_mean": 0.25, "light": "lights"})
         self.assertEqual(sorted(answer["time_ms"]), ["encode", "parse", "solve"])
         for value in answer["time_ms"].values():
             self.assertGreaterEqual(value, 0)
         self.assertNotIn("error", self.solve("exact", {"emission": [1] * 40}).json())
 
-    RECEIVERS = {"relative_mean": 0.03125, "indirect_mean": 0.0625, "of": "receivers"}
-    ALL = {"relative_mean": 0.125, "indirect_mean": 0.25, "of": "all"}
+    RECEIVERS = {"relative_mean": 0.03125, "indirect_mean": 0.0625, "light": "lights", "of": "receivers"}
+    ALL = {"relative_mean": 0.125, "indirect_mean": 0.25, "light": "lights", "of": "all"}
 
     def test_answers_of_receivers_alone_have_their_error(self):
         floor, lamp, wall = (self.desks.members(name).tolist() for name in ("floor", "lamp", "wall"))
@@ -206,7 +206,7 @@ class Answers(unittest.TestCase):
             self.assertEqual(about["error"][light]["total_indirect_mean"], 0.25)
         self.assertIsNone(self.daemon.get("/v1/scenes/grey").json()["importance"])
 
-    SOURCES = {"relative_mean": 0.125, "indirect_mean": 0.25, "from": "sources"}
+    SOURCES = {"relative_mean": 0.125, "indirect_mean": 0.25, "light": "lights", "from": "sources"}
     OTHERS = {"from": "others"}
 
     def test_answers_to_sources_alone_have_an_error(self):

@@ -102,8 +102,9 @@ class Importance(Case):
             if strange:
                 self.assertEqual(error, {"from": "others"})
             else:
-                self.assertEqual((error["indirect_mean"], error["from"]), (stated, "sources"))
-        self.assertIn("stated error of the store, emitted by sources: ", must("solve", self.lit).stdout)
+                self.assertEqual((error["light"], error["from"]), ("own", "sources"))
+                self.assertTrue(.1 * stated < error["indirect_mean"] < 10 * stated, (stated, error))
+        self.assertIn("stated error of this answer, emitted by sources, ", must("solve", self.lit).stdout)
         self.assertNotIn("stated error", must("solve", self.lit, "--emit", "floor=1").stdout)
 
     def test_receivers_and_sources_go_together(self):
@@ -145,10 +146,13 @@ class Importance(Case):
             stated = file["error/lights"].attrs["receivers_indirect"]
             of_all = file["error/lights"].attrs["total_indirect_mean"]
         error = json.loads(done.stdout)["error"]
-        self.assertEqual((error["indirect_mean"], error["of"]), (stated, "receivers"))
+        self.assertEqual((error["light"], error["of"]), ("own", "receivers"))
+        self.assertEqual(set(error["groups"]), {"lamp"})
+        self.assertTrue(.01 * stated < error["groups"]["lamp"]["elements"] < 10 * stated, (stated, error))
         error = json.loads(must("solve", self.store, "--reduce", "lamp=mean", "--reduce", "floor=mean", "--json").stdout)["error"]
-        self.assertEqual((error["indirect_mean"], error["of"]), (of_all, "all"))
-        self.assertIn("stated error of the store, of the light of receivers: ", must("solve", self.store, "--reduce", "lamp=mean").stdout)
+        self.assertEqual((set(error["groups"]), error["of"]), ({"lamp", "floor"}, "all"))
+        self.assertGreater(error["groups"]["floor"]["elements"], .1 * of_all)
+        self.assertIn("stated error of this answer, of the light of receivers, ", must("solve", self.store, "--reduce", "lamp=mean").stdout)
         self.assertNotIn("of the light of", must("solve", self.all).stdout)
         self.assertNotIn(warning, must("solve", self.all).stderr)
 

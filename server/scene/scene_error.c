@@ -1,0 +1,273 @@
+/* The errors of answers (scene.h): of their own emission where the store states errors by group. */
+#include "server/scene/scene.h"
+
+#include "solver/operator/sky_light.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* True where the store was built for receivers and the request asks for nothing else. */
+static bool asks_receivers(const scene *s, const radiosity_request *request) {
+    const reduce_request *r = &request->reduce;
+    if (s->errors.read == NULL) return false;
+    if (!r->on)
+        return stated_errors_others(&s->errors, request->select ? request->n_selected : s->n,
+                                    request->select ? request->selected : NULL) == 0;
+    for (size_t k = 0; k < r->n_names; k++)
+        for (size_t g = 0; g < r->names[k].n_groups; g++)
+            if (!s->group_read[r->names[k].groups[g]]) return false;
+    return true;
+}
+
+/* True where the store was built for sources and something else emits. */
+static bool has_strange_light(const scene *s, const radiosity_request *request) {
+    const size_t C = s->n_channels, rows = (request->E != NULL ? request->n_dense : 0) * C;
+    const side_rows *sky = &request->sky;
+    if (s->errors.emits == NULL) return false;
+    for (size_t k = 0; k < request->n_spots; k++) {
+        const emission_spot *spot = &request->spots[k];
+        bool lit = false;
+        for (size_t c = 0; c < C; c++) lit = lit || request->colours[k * C + c] != 0;
+        if (lit && !(spot->whole_group ? s->group_emits : s->errors.emits)[spot->where]) return true;
+    }
+    for (size_t k = 0; sky->values != NULL && k < sky->n * C * lam_sky_tiles(s->sky); k++)
+        if (sky->values[k] > 0) return true;
+    return stated_errors_is_strange(&s->errors, rows, request->E);
+}
+
+void scene_note_error(const scene *s, const radiosity_request *request, answer_notes *notes) {
+    const answer_scope scope = {.receivers_only = asks_receivers(s, request),
+                                .strange = has_strange_light(s, request)};
+    stated_errors_note(&s->errors, scope, notes);
+}
+
+error_scene scene_for_errors(const scene *s) {
+    return (error_scene){.n = s->n,
+                         .n_channels = s->n_channels,
+                         .area = s->area,
+                         .reflectance = s->reflectance,
+                         .groups = &s->groups,
+                         .read = s->errors.read};
+}
+
+/* True where the error of the answer's own emission can be told. */
+static bool has_own_error(const scene *s, const radiosity_request *request, const answer_notes *notes) {
+    const error_by_group *e = &s->errors.by_group;
+    const bool whole = !request->reduce.linear || e->sky_first != NULL;
+    return e->n_bins > 0 && notes->has_error && s->n_emitters == 0 && request->tolerance == 0 &&
+           (request->sky.values == NULL || (whole && e->n_tiles == lam_sky_tiles(s->sky)));
+}
+
+/* The size of the sky of vector v. */
+static emission_size size_of_sky(const scene *s, const radiosity_request *request, size_t v) {
+    const error_by_group *e = &s->errors.by_group;
+    const size_t C = s->n_channels, m = e->n_tiles;
+    emission_size size = {.power2 = 0};
+    for (size_t c = 0; v < request->sky.n && request->sky.values != NULL && c < C; c++)
+        emission_size_add(&size, m, e->sky_power + c * m, request->sky.values + (v * C + c) * m);
+    return size;
+}
+
+static bool is_larger(double a, double b) {
+    return a > b || isnan(a);
+}
+
+/* Takes the larger of each figure of vectors of a batch. */
+static void take_error(const answer_error *one, answer_notes *notes) {
+    if (is_larger(one->indirect, notes->indirect_mean)) {
+        notes->indirect_mean = one->indirect;
+        notes->emitters = one->emitters;
+    }
+    if (is_larger(one->relative, notes->relative_mean)) notes->relative_mean = one->relative;
+}
+
+static void take_names(const reduce_request *reduce, const name_error *one, double emitters,
+                       answer_notes *notes, name_error *names) {
+    for (size_t k = 0; k < reduce->n_names; k++) {
+        const answer_error mean = {one[k].relative, one[k].mean, emitters};
+        take_error(&mean, notes);
+        if (is_larger(one[k].mean, names[k].mean)) names[k].mean = one[k].mean;
+        if (is_larger(one[k].elements, names[k].elements)) names[k].elements = one[k].elements;
+    }
+}
+
+/* The notes of an error of the answer's own emission, before any vector is taken. */
+static void begin_own(const reduce_request *reduce, name_error *names, answer_notes *notes) {
+    notes->error_light = "own";
+    notes->relative_mean = notes->indirect_mean = -1;
+    notes->n_name_errors = reduce->on ? reduce->n_names : 0;
+    notes->name_errors = names;
+    for (size_t k = 0; k < notes->n_name_errors; k++) names[k].name = reduce_text(reduce, k);
+}
+
+bool scene_note_own_error(const scene *s, const radiosity_request *request, const float *H0,
+                          const float *values, answer_notes *notes, name_error **names) {
+    const error_scene about = scene_for_errors(s);
+    const reduce_request *reduce = &request->reduce;
+    const size_t C = s->n_channels, vector = C * s->n;
+    const size_t count = request->select ? request->n_selected : s->n;
+    answer_notes made = *notes;
+    *names = NULL;
+    if (!has_own_error(s, request, notes)) return true;
+    name_error *const kept = memory_allocate(reduce->n_names, 2 * sizeof *kept, "errors", NULL);
+    bool good = kept != NULL;
+    begin_own(reduce, kept, &made);
+    for (size_t v = 0; good && v < request->n_rhs; v++) {
+        error_answer of = {.quantity = request->quantity,
+                           .E = request->E + v * vector,
+                           .H0 = H0 != NULL ? H0 + v * vector : NULL,
+                           .count = count,
+                           .selected = request->select ? request->selected : NULL,
+                           .values = values + v * C * count};
+        answer_error one;
+        for (size_t c = 0; c < C; c++) emission_size_add(&of.size, s->n, s->area, of.E + c * s->n);
+        of.sky = size_of_sky(s, request, v);
+        if (reduce->on) {
+            good = name_errors_of(&s->errors.by_group, &about, &of, reduce, kept + reduce->n_names);
+            const emission_size both = emission_size_sum(&of.size, &of.sky);
+            if (good) take_names(reduce, kept + reduce->n_names, emission_size_number(&both), &made, kept);
+        } else {
+            good = answer_error_of(&s->errors.by_group, &about, &of, &one);
+            if (good) take_error(&one, &made);
+        }
+    }
+    if (good) *notes = made;
+    if (good) *names = kept;
+    if (!good) free(kept);
+    return good;
+}
+
+/* Emissions of a request with spots: their sizes, and their means over a name, [n_rhs][C]. */
+static void size_of_spots(const scene *s, const radiosity_request *request, double *power,
+                          emission_size *size) {
+    const size_t C = s->n_channels;
+    const error_by_group *e = &s->errors.by_group;
+    for (size_t k = 0; k < request->n_spots; k++) {
+        const emission_spot *spot = &request->spots[k];
+        const double a = spot->whole_group ? 0 : s->area[spot->where];
+        double area = a, squares = a * a;
+        if (spot->whole_group) {
+            squares = e->squares[spot->where];
+            for (size_t bin = spot->where; bin < e->n_bins; bin += e->n_groups) area += e->area[bin];
+        }
+        for (size_t c = 0; c < C; c++) {
+            const double value = (double)request->colours[k * C + c];
+            power[spot->vector * C + c] += area * value;
+            size[spot->vector].squares += squares * value * value;
+        }
+    }
+    for (size_t v = 0; v < request->n_rhs; v++)
+        for (size_t c = 0; c < C; c++) size[v].power2 += power[v * C + c] * power[v * C + c];
+    for (size_t v = 0; v < request->n_dense; v++) {
+        size[v] = (emission_size){.power2 = 0};
+        for (size_t c = 0; c < C; c++)
+            emission_size_add(&size[v], s->n, s->area, request->E + (v * C + c) * s->n);
+    }
+}
+
+static bool is_in_name(const reduce_name *name, size_t group) {
+    for (size_t g = 0; g < name->n_groups; g++)
+        if (name->groups[g] == group) return true;
+    return false;
+}
+
+/* emission [n_rhs][C]: means over the name. */
+static void emission_of_name(const scene *s, const radiosity_request *request, const reduce_name *name,
+                             double *emission) {
+    const size_t C = s->n_channels;
+    const error_by_group *e = &s->errors.by_group;
+    double all = 0;
+    memset(emission, 0, request->n_rhs * C * sizeof *emission);
+    for (size_t g = 0; g < name->n_groups; g++) {
+        const uint32_t group = name->groups[g];
+        for (size_t bin = group; bin < e->n_bins; bin += e->n_groups) all += e->area[bin];
+        for (size_t row = 0; row < request->n_dense * C; row++)
+            for (uint32_t k = s->groups.start[group]; k < s->groups.start[group + 1]; k++) {
+                const size_t i = s->groups.elements[k];
+                emission[row] += s->area[i] * (double)request->E[row * s->n + i];
+            }
+    }
+    for (size_t k = 0; k < request->n_spots; k++) {
+        const emission_spot *spot = &request->spots[k];
+        const size_t group = spot->whole_group ? spot->where : e->bin[spot->where] % e->n_groups;
+        if (spot->vector < request->n_dense || !is_in_name(name, group)) continue;
+        double area = spot->whole_group ? 0 : s->area[spot->where];
+        for (size_t bin = group; spot->whole_group && bin < e->n_bins; bin += e->n_groups)
+            area += e->area[bin];
+        for (size_t c = 0; c < C; c++)
+            emission[spot->vector * C + c] += area * (double)request->colours[k * C + c];
+    }
+    for (size_t k = 0; all > 0 && k < request->n_rhs * C; k++) emission[k] /= all;
+}
+
+/* direct [n_rhs][C]: means of the direct light of skies over the name. */
+static void direct_of_name(const scene *s, const radiosity_request *request, const reduce_name *name,
+                           double *direct) {
+    const size_t C = s->n_channels;
+    const error_by_group *e = &s->errors.by_group;
+    const side_rows *sky = &request->sky;
+    double all = 0;
+    memset(direct, 0, request->n_rhs * C * sizeof *direct);
+    for (size_t g = 0; sky->values != NULL && g < name->n_groups; g++) {
+        double area = 0;
+        for (size_t bin = name->groups[g]; bin < e->n_bins; bin += e->n_groups) area += e->area[bin];
+        all += area;
+        for (size_t row = 0; row < sky->n * C; row++)
+            for (size_t t = 0; t < e->n_tiles; t++)
+                direct[row] += area * e->sky_first[name->groups[g] * e->n_tiles + t] *
+                               (double)sky->values[row * e->n_tiles + t];
+    }
+    for (size_t k = 0; all > 0 && k < request->n_rhs * C; k++) direct[k] /= all;
+}
+
+bool scene_mean_errors_begin(const scene *s, const radiosity_request *request, answer_notes *notes,
+                             mean_errors *out) {
+    const reduce_request *reduce = &request->reduce;
+    mean_errors made = {.names = NULL};
+    *out = made;
+    if (!has_own_error(s, request, notes)) return true;
+    const size_t rows = request->n_rhs * s->n_channels;
+    made.names = memory_allocate(reduce->n_names, sizeof *made.names, "errors", NULL);
+    made.sizes = memory_allocate(request->n_rhs, sizeof *made.sizes, "errors", NULL);
+    made.emission = memory_allocate(rows, 2 * sizeof *made.emission, "errors", NULL);
+    if (made.names == NULL || made.sizes == NULL || made.emission == NULL) {
+        mean_errors_free(&made);
+        return false;
+    }
+    size_of_spots(s, request, made.emission, made.sizes);
+    begin_own(reduce, made.names, notes);
+    *out = made;
+    return true;
+}
+
+void scene_mean_errors_add(const scene *s, const radiosity_request *request, size_t k, const double *means,
+                           mean_errors *to, answer_notes *notes) {
+    const reduce_name *name = &request->reduce.names[k];
+    const size_t C = s->n_channels;
+    if (to->names == NULL) return;
+    double *const direct = to->emission + request->n_rhs * C;
+    emission_of_name(s, request, name, to->emission);
+    direct_of_name(s, request, name, direct);
+    for (size_t v = 0; v < request->n_rhs; v++) {
+        const name_means of = {.quantity = request->quantity,
+                               .size = to->sizes[v],
+                               .sky = size_of_sky(s, request, v),
+                               .value = means + v * C,
+                               .emission = to->emission + v * C,
+                               .direct = direct + v * C};
+        const name_error one = name_error_of_means(&s->errors.by_group, name, &of);
+        const emission_size both = emission_size_sum(&of.size, &of.sky);
+        const answer_error mean = {one.relative, one.mean, emission_size_number(&both)};
+        take_error(&mean, notes);
+        if (is_larger(one.mean, to->names[k].mean)) to->names[k].mean = one.mean;
+        if (is_larger(one.elements, to->names[k].elements)) to->names[k].elements = one.elements;
+    }
+}
+
+void mean_errors_free(mean_errors *e) {
+    free(e->names);
+    free(e->sizes);
+    free(e->emission);
+    *e = (mean_errors){.names = NULL};
+}

@@ -1,0 +1,318 @@
+#include "solver/codec/answer_error.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#define GROUP "/error/by_group"
+
+static void law_free(error_law *law) {
+    free(law->one);
+    free(law->many);
+    free(law->even);
+    free(law->mean_one);
+    free(law->mean_many);
+    free(law->mean_even);
+}
+
+void error_by_group_free(error_by_group *e) {
+    law_free(&e->law);
+    law_free(&e->sky);
+    free(e->sky_power);
+    free(e->sky_first);
+    free(e->area);
+    free(e->squares);
+    free(e->reflectance);
+    free(e->bin);
+    *e = (error_by_group){.n_bins = 0};
+}
+
+/* Reads numbers, [dims[0]][dims[1]]. One that is negative or not finite is no number of ours. */
+static lam_status read_numbers(store *s, const char *name, size_t dims[2], double **out, lam_error *error) {
+    lam_status status = LAM_OK;
+    char path[64];
+    void *data = NULL;
+    snprintf(path, sizeof path, GROUP "/%s", name);
+    TRY(store_read(s, path, STORE_F64, 2, dims, &data, error));
+    *out = data;
+    for (size_t k = 0; k < dims[0] * dims[1]; k++)
+        if (!((*out)[k] >= 0 && isfinite((*out)[k])))
+            FAIL(error, LAM_ERR_FORMAT, "%s: %s[%zu] = %g, must be at least 0", store_path(s), path, k,
+                 (*out)[k]);
+done:
+    return status;
+}
+
+/* The figures of emissions, or, with the prefix "sky_", of skies. */
+static lam_status read_law(store *s, const char *prefix, error_by_group *e, error_law *law,
+                           lam_error *error) {
+    lam_status status = LAM_OK;
+    char name[32];
+    struct {
+        const char *name;
+        double **to;
+    } figures[] = {{"rms_one", &law->one},         {"rms_many", &law->many},
+                   {"rms_even", &law->even},       {"mean_one", &law->mean_one},
+                   {"mean_many", &law->mean_many}, {"mean_even", &law->mean_even}};
+    for (size_t k = 0; k < sizeof figures / sizeof *figures; k++) {
+        size_t dims[2] = {e->n_bins > 0 ? e->n_bins / e->n_groups : SIZE_MAX, e->n_groups};
+        snprintf(name, sizeof name, "%s%s", prefix, figures[k].name);
+        TRY(read_numbers(s, name, dims, figures[k].to, error));
+        if (dims[0] < 1 || dims[0] > 2)
+            FAIL(error, LAM_ERR_FORMAT, "%s: " GROUP "/%s has %zu rows, must have 1 or 2", store_path(s),
+                 name, dims[0]);
+        e->n_bins = dims[0] * dims[1];
+    }
+done:
+    return status;
+}
+
+static lam_status read_sky(store *s, error_by_group *e, lam_error *error) {
+    lam_status status = LAM_OK;
+    size_t dims[2] = {e->n_channels, SIZE_MAX};
+    if (!store_has(s, GROUP "/sky_power")) return LAM_OK;
+    TRY(read_law(s, "sky_", e, &e->sky, error));
+    TRY(read_numbers(s, "sky_power", dims, &e->sky_power, error));
+    e->n_tiles = dims[1];
+    if (store_has(s, GROUP "/sky_first"))
+        TRY(read_numbers(s, "sky_first", (size_t[]){e->n_groups, e->n_tiles}, &e->sky_first, error));
+done:
+    return status;
+}
+
+/* The areas of bins, the squares of groups, and their mean reflectances. */
+static void find_sums(const error_scene *scene, error_by_group *e) {
+    const group_index *groups = scene->groups;
+    for (size_t g = 0; g < groups->n_groups; g++) {
+        double area = 0;
+        for (uint32_t k = groups->start[g]; k < groups->start[g + 1]; k++) {
+            const size_t i = groups->elements[k];
+            const bool other = scene->read != NULL && !scene->read[i] && e->n_bins > e->n_groups;
+            const size_t bin = g + (other ? e->n_groups : 0);
+            e->bin[i] = (uint32_t)bin;
+            e->area[bin] += scene->area[i];
+            e->squares[g] += scene->area[i] * scene->area[i];
+            area += scene->area[i];
+            for (size_t c = 0; c < scene->n_channels; c++)
+                e->reflectance[c * e->n_groups + g] +=
+                    scene->area[i] * (double)scene->reflectance[c * scene->n + i];
+        }
+        for (size_t c = 0; area > 0 && c < scene->n_channels; c++)
+            e->reflectance[c * e->n_groups + g] /= area;
+    }
+}
+
+lam_status error_by_group_read(store *s, const error_scene *scene, error_by_group *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    error_by_group e = {.n_groups = scene->groups->n_groups, .n_channels = scene->n_channels};
+    if (!store_has(s, GROUP)) return LAM_OK;
+    TRY(read_law(s, "", &e, &e.law, error));
+    TRY(read_sky(s, &e, error));
+    e.area = memory_allocate(e.n_bins, sizeof *e.area, "errors of groups", error);
+    e.squares = memory_allocate(e.n_groups, sizeof *e.squares, "errors of groups", error);
+    e.reflectance =
+        memory_allocate(e.n_groups, e.n_channels * sizeof *e.reflectance, "errors of groups", error);
+    e.bin = memory_allocate(scene->n, sizeof *e.bin, "errors of groups", error);
+    if (e.area == NULL || e.squares == NULL || e.reflectance == NULL || e.bin == NULL) TRY(LAM_ERR_MEMORY);
+    find_sums(scene, &e);
+    *out = e;
+    e = (error_by_group){.n_bins = 0};
+done:
+    error_by_group_free(&e);
+    return status;
+}
+
+double emission_size_number(const emission_size *e) {
+    return e->squares > 0 ? e->power2 / e->squares : 0;
+}
+
+void emission_size_add(emission_size *e, size_t n, const double *weights, const float *E) {
+    double power = 0, squares = 0;
+    for (size_t i = 0; i < n; i++) {
+        const double flux = weights[i] * (double)E[i];
+        power += flux;
+        squares += flux * flux;
+    }
+    e->power2 += power * power;
+    e->squares += squares;
+}
+
+emission_size emission_size_sum(const emission_size *a, const emission_size *b) {
+    const double power = sqrt(a->power2) + sqrt(b->power2);
+    return (emission_size){power * power, a->squares + b->squares};
+}
+
+/* P^2 (one^2 / N^2 + many^2 (1 - 1/N) / N + even^2): the square of an error. */
+static double error2(const emission_size *size, double one, double many, double even) {
+    const double share = size->power2 > 0 ? size->squares / size->power2 : 1; /* 1 / N */
+    return size->power2 *
+           (one * one * share * share + many * many * share * fmax(0, 1 - share) + even * even);
+}
+
+/* The emission and the sky of an answer. */
+typedef struct light_sizes {
+    emission_size size, sky;
+} light_sizes;
+
+static double elements_error2(const error_by_group *e, const light_sizes *of, size_t bin) {
+    const error_law *law = &e->law, *sky = &e->sky;
+    double sum = error2(&of->size, law->one[bin], law->many[bin], law->even[bin]);
+    if (of->sky.power2 > 0) sum += error2(&of->sky, sky->one[bin], sky->many[bin], sky->even[bin]);
+    return sum;
+}
+
+static double mean_error2(const error_by_group *e, const light_sizes *of, size_t bin) {
+    const error_law *law = &e->law, *sky = &e->sky;
+    double sum = error2(&of->size, law->mean_one[bin], law->mean_many[bin], law->mean_even[bin]);
+    if (of->sky.power2 > 0)
+        sum += error2(&of->sky, sky->mean_one[bin], sky->mean_many[bin], sky->mean_even[bin]);
+    return sum;
+}
+
+/* The error over the light that there is without it: the light of the answer has the error in it, and its
+ * square is larger by that of the error on average. Not finite where nothing is left. */
+static double ratio(double error2, double light2) {
+    return error2 > 0 ? sqrt(error2 / fmax(light2 - error2, 0)) : 0;
+}
+
+/* Sums over the values of a bin: A, and of r = B - E - rho H0 and B the sums of A r^2, A B^2 over channels,
+ * and of each channel A r and A B. */
+typedef struct value_sums {
+    double area, reflected2, radiosity2;
+    double *reflected, *radiosity; /* [C] */
+} value_sums;
+
+/* [n_bins]; freed with free(). */
+static value_sums *sum_values(const error_by_group *e, const error_scene *scene, const error_answer *of) {
+    const size_t n = scene->n, C = scene->n_channels;
+    size_t bytes;
+    if (!size_multiply(e->n_bins, sizeof(value_sums) + 2 * C * sizeof(double), &bytes)) return NULL;
+    value_sums *sums = memory_allocate(bytes, 1, "errors of groups", NULL);
+    if (sums == NULL) return NULL;
+    double *numbers = (double *)(void *)(sums + e->n_bins);
+    for (size_t b = 0; b < e->n_bins; b++) {
+        sums[b].reflected = numbers + 2 * b * C;
+        sums[b].radiosity = sums[b].reflected + C;
+    }
+    for (size_t k = 0; k < of->count; k++) {
+        const size_t i = of->selected != NULL ? of->selected[k] : k;
+        const double a = scene->area[i];
+        value_sums *to = &sums[e->bin[i]];
+        to->area += a;
+        for (size_t c = 0; c < C; c++) {
+            const double value = (double)(of->whole ? of->values[c * n + i] : of->values[c * of->count + k]);
+            const double rho = (double)scene->reflectance[c * n + i];
+            const double sky = of->H0 != NULL ? (double)of->H0[c * n + i] : 0;
+            const double direct = (of->E != NULL ? (double)of->E[c * n + i] : 0) + rho * sky;
+            const double r = of->quantity == LAM_INDIRECT     ? value
+                             : of->quantity == LAM_IRRADIANCE ? rho * (value - sky)
+                                                              : value - direct;
+            to->reflected2 += a * r * r;
+            to->radiosity2 += a * (r + direct) * (r + direct);
+            to->reflected[c] += a * r;
+            to->radiosity[c] += a * (r + direct);
+        }
+    }
+    return sums;
+}
+
+bool answer_error_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
+                     answer_error *out) {
+    double off = 0, reflected = 0, radiosity = 0;
+    const light_sizes sizes = {of->size, of->sky};
+    const emission_size both = emission_size_sum(&of->size, &of->sky);
+    value_sums *sums = sum_values(e, scene, of);
+    if (sums == NULL) return false;
+    for (size_t b = 0; b < e->n_bins; b++) {
+        off += sums[b].area * elements_error2(e, &sizes, b);
+        reflected += sums[b].reflected2;
+        radiosity += sums[b].radiosity2;
+    }
+    free(sums);
+    *out = (answer_error){.relative = ratio(off, radiosity),
+                          .indirect = ratio(off, reflected),
+                          .emitters = emission_size_number(&both)};
+    return true;
+}
+
+/* Mean squared errors of a name's bins, by area. */
+typedef struct name_sums {
+    double area, mean2, elements2;
+} name_sums;
+
+static void add_bin(const error_by_group *e, const light_sizes *size, size_t bin, double area,
+                    name_sums *to) {
+    to->area += area;
+    to->mean2 += area * mean_error2(e, size, bin);
+    to->elements2 += area * elements_error2(e, size, bin);
+}
+
+/* reflected2, radiosity2: squares of the means over the name. */
+static name_error finish_name(const name_sums *s, double reflected2, double radiosity2) {
+    if (!(s->area > 0)) return (name_error){.mean = 0};
+    return (name_error){.mean = ratio(s->mean2 / s->area, reflected2),
+                        .elements = ratio(s->elements2 / s->area, reflected2),
+                        .relative = ratio(s->mean2 / s->area, radiosity2)};
+}
+
+bool name_errors_of(const error_by_group *e, const error_scene *scene, const error_answer *of,
+                    const reduce_request *names, name_error *errors) {
+    const size_t n_rows = e->n_bins / e->n_groups;
+    const light_sizes sizes = {of->size, of->sky};
+    value_sums *sums = sum_values(e, scene, of);
+    if (sums == NULL) return false;
+    for (size_t k = 0; k < names->n_names; k++) {
+        const reduce_name *name = &names->names[k];
+        name_sums s = {.area = 0};
+        double reflected2 = 0, radiosity2 = 0;
+        for (size_t g = 0; g < name->n_groups; g++)
+            for (size_t row = 0; row < n_rows; row++) {
+                const size_t bin = row * e->n_groups + name->groups[g];
+                add_bin(e, &sizes, bin, sums[bin].area, &s);
+            }
+        for (size_t c = 0; c < scene->n_channels; c++) {
+            double reflected = 0, radiosity = 0;
+            for (size_t g = 0; g < name->n_groups; g++)
+                for (size_t row = 0; row < n_rows; row++) {
+                    const size_t bin = row * e->n_groups + name->groups[g];
+                    reflected += sums[bin].reflected[c];
+                    radiosity += sums[bin].radiosity[c];
+                }
+            reflected2 += reflected * reflected / (s.area * s.area);
+            radiosity2 += radiosity * radiosity / (s.area * s.area);
+        }
+        const name_error found = finish_name(&s, reflected2, radiosity2);
+        errors[k].mean = found.mean;
+        errors[k].elements = found.elements;
+        errors[k].relative = found.relative;
+    }
+    free(sums);
+    return true;
+}
+
+name_error name_error_of_means(const error_by_group *e, const reduce_name *name, const name_means *means) {
+    const size_t n_rows = e->n_bins / e->n_groups;
+    const light_sizes sizes = {means->size, means->sky};
+    name_sums s = {.area = 0};
+    double reflected2 = 0, radiosity2 = 0;
+    for (size_t g = 0; g < name->n_groups; g++)
+        for (size_t row = 0; row < n_rows; row++) {
+            const size_t bin = row * e->n_groups + name->groups[g];
+            add_bin(e, &sizes, bin, e->area[bin], &s);
+        }
+    for (size_t c = 0; c < e->n_channels; c++) {
+        double rho = 0;
+        for (size_t g = 0; g < name->n_groups; g++)
+            for (size_t row = 0; row < n_rows; row++)
+                rho += e->area[row * e->n_groups + name->groups[g]] *
+                       e->reflectance[c * e->n_groups + name->groups[g]];
+        rho /= s.area;
+        const double value = means->value[c], direct = means->emission[c] + rho * means->direct[c];
+        const double r = means->quantity == LAM_INDIRECT     ? value
+                         : means->quantity == LAM_IRRADIANCE ? rho * (value - means->direct[c])
+                                                             : value - direct;
+        reflected2 += r * r;
+        radiosity2 += (r + direct) * (r + direct);
+    }
+    return finish_name(&s, reflected2, radiosity2);
+}

@@ -1,0 +1,171 @@
+/* The error of an answer against the same by plain sums: three elements of two groups, two channels. */
+#include "solver/codec/answer_error.h"
+#include "support/suite.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { N = 3, C = 2, G = 2, TILES = 2 };
+static const double area[N] = {1, 2, 4};
+static const float rho[C * N] = {.5f, .5f, .25f, .5f, .5f, .75f};
+static uint32_t start[] = {0, 2, 3}, elements[] = {0, 1, 2}, sorted[] = {0, 1};
+static char *names[] = {(char[]){"desk"}, (char[]){"lamp"}};
+static const group_index groups = {G, names, start, elements, sorted};
+static const error_scene scene = {N, C, area, rho, &groups, NULL};
+
+/* Figures of the groups, as a store states them. */
+static double one[] = {.03, .01}, many[] = {.04, .005}, even[] = {.01, .02};
+static double mean_one[] = {.03, .01}, mean_many[] = {.02, .005}, mean_even[] = {.001, .002};
+static double sky_one[] = {.07, .06}, sky_many[] = {.05, .04}, sky_even[] = {.01, .02};
+static double bin_area[] = {3, 4}, squares[] = {5, 16}, mean_rho[] = {.5, .25, .5, .75};
+static uint32_t bin[] = {0, 0, 1};
+static double sky_power[] = {2, 1, 3, 1}, sky_first[] = {.1, .2, .3, .4};
+static const error_by_group stated = {
+    .n_groups = G,
+    .n_bins = G,
+    .n_channels = C,
+    .n_tiles = TILES,
+    .law = {one, many, even, mean_one, mean_many, mean_even},
+    .sky = {sky_one, sky_many, sky_even, sky_one, sky_many, sky_even},
+    .area = bin_area,
+    .squares = squares,
+    .reflectance = mean_rho,
+    .bin = bin,
+    .sky_power = sky_power,
+    .sky_first = sky_first,
+};
+
+/* P^2 (a^2 / N^2 + b^2 (1 - 1 / N) / N + c^2). */
+static double law(double P2, double number, double a, double b, double c) {
+    return P2 * (a * a / number / number + b * b / number * (1 - 1 / number) + c * c);
+}
+
+/* Emission of elements 0 and 2 and the direct light of a sky; the reflected light r. */
+static const float E[C * N] = {1, 0, 2, 3, 0, 0}, H0[C * N] = {.1f, .1f, .3f, .2f, .2f, .4f};
+static const double r[C * N] = {.5, .25, .125, 1, .5, .25};
+
+/* P_c = 1 + 8 and 3; sum A^2 E^2 = 1 + 64 + 9. */
+static const double P2 = 81 + 9, A2E2 = 74;
+
+static void fill(lam_quantity quantity, bool lit, float values[C * N]) {
+    for (size_t k = 0; k < C * N; k++) {
+        const double sky = lit ? (double)H0[k] : 0;
+        values[k] = (float)(quantity == LAM_INDIRECT     ? r[k]
+                            : quantity == LAM_IRRADIANCE ? r[k] / (double)rho[k] + sky
+                                                         : r[k] + (double)E[k] + (double)rho[k] * sky);
+    }
+}
+
+static error_answer answer_of(lam_quantity quantity, const float *values) {
+    error_answer of = {.quantity = quantity, .E = E, .count = N, .values = values};
+    for (size_t c = 0; c < C; c++) emission_size_add(&of.size, N, area, E + c * N);
+    return of;
+}
+
+START_TEST(all_elements_count_by_their_group) {
+    const lam_quantity quantity = (lam_quantity[]){LAM_RADIOSITY, LAM_IRRADIANCE, LAM_INDIRECT}[_i % 3];
+    const bool lit = _i >= 3;
+    float values[C * N];
+    answer_error found;
+    fill(quantity, lit, values);
+    error_answer of = answer_of(quantity, values);
+    double off = 3 * law(P2, P2 / A2E2, .03, .04, .01) + 4 * law(P2, P2 / A2E2, .01, .005, .02);
+    if (lit) { /* both tiles shine with 1 in each channel: P_c = 3, 4; squares 4 + 1 + 9 + 1 */
+        const float L[TILES] = {1, 1};
+        of.H0 = H0;
+        for (size_t c = 0; c < C; c++) emission_size_add(&of.sky, TILES, sky_power + c * TILES, L);
+        off += 3 * law(25, 25. / 15, .07, .05, .01) + 4 * law(25, 25. / 15, .06, .04, .02);
+    }
+    double reflected = 0, radiosity = 0;
+    for (size_t k = 0; k < C * N; k++) {
+        const double b = r[k] + (double)E[k] + (lit ? (double)rho[k] * (double)H0[k] : 0);
+        reflected += area[k % N] * r[k] * r[k];
+        radiosity += area[k % N] * b * b;
+    }
+    ck_assert(answer_error_of(&stated, &scene, &of, &found));
+    ck_assert_double_eq_tol(found.indirect, sqrt(off / (reflected - off)), 1e-5 * found.indirect);
+    ck_assert_double_eq_tol(found.relative, sqrt(off / (radiosity - off)), 1e-5 * found.relative);
+    const double power = sqrt(P2) + (lit ? 5 : 0);
+    ck_assert_double_eq_tol(found.emitters, power * power / (A2E2 + (lit ? 15 : 0)), 1e-9);
+}
+END_TEST
+
+START_TEST(selected_elements_are_those_of_the_answer) {
+    float values[C * N], some[C];
+    const uint32_t selected[] = {2};
+    answer_error found;
+    fill(LAM_RADIOSITY, false, values);
+    error_answer of = answer_of(LAM_RADIOSITY, some);
+    for (size_t c = 0; c < C; c++) some[c] = values[c * N + 2];
+    of.count = 1;
+    of.selected = selected;
+    ck_assert(answer_error_of(&stated, &scene, &of, &found));
+    const double off = law(P2, P2 / A2E2, .01, .005, .02), reflected = .125 * .125 + .25 * .25;
+    ck_assert_double_eq_tol(found.indirect, sqrt(off / (reflected - off)), 1e-5);
+    /* The same of whole vectors. */
+    answer_error again;
+    of.values = values;
+    of.whole = true;
+    ck_assert(answer_error_of(&stated, &scene, &of, &again));
+    ck_assert(again.indirect == found.indirect && again.relative == found.relative);
+}
+END_TEST
+
+START_TEST(names_have_errors_of_their_means) {
+    const lam_quantity quantity = (lam_quantity[]){LAM_RADIOSITY, LAM_IRRADIANCE, LAM_INDIRECT}[_i];
+    const uint32_t desk[] = {0}, both[] = {0, 1};
+    reduce_name list[] = {{.groups = desk, .n_groups = 1}, {.groups = both, .n_groups = 2}};
+    const reduce_request request = {.on = true, .names = list, .n_names = 2};
+    float values[C * N];
+    name_error found[2] = {{.name = "kept"}};
+    fill(quantity, false, values);
+    const error_answer of = answer_of(quantity, values);
+    ck_assert(name_errors_of(&stated, &scene, &of, &request, found));
+    const double number = P2 / A2E2, mean0 = law(P2, number, .03, .02, .001),
+                 rms0 = law(P2, number, .03, .04, .01);
+    const double r0 = (.5 + 2 * .25) / 3, r1 = (1 + 2 * .5) / 3, reflected = r0 * r0 + r1 * r1;
+    ck_assert_str_eq(found[0].name, "kept");
+    ck_assert_double_eq_tol(found[0].mean, sqrt(mean0 / (reflected - mean0)), 1e-5);
+    ck_assert_double_eq_tol(found[0].elements, sqrt(rms0 / (reflected - rms0)), 1e-4);
+    const double all = (3 * mean0 + 4 * law(P2, number, .01, .005, .002)) / 7;
+    const double a0 = (3 * r0 + 4 * .125) / 7, a1 = (3 * r1 + 4 * .25) / 7;
+    ck_assert_double_eq_tol(found[1].mean, sqrt(all / (a0 * a0 + a1 * a1 - all)), 1e-5);
+    /* By means alone; in a group that has one reflectance. */
+    double value[C] = {0}, emission[C] = {0};
+    const double direct[C] = {0};
+    for (size_t k = 0; k < C * 2; k++) {
+        const size_t c = k / 2, i = k % 2;
+        value[c] += area[i] * (double)values[c * N + i] / 3;
+        emission[c] += area[i] * (double)E[c * N + i] / 3;
+    }
+    const name_means means = {
+        .quantity = quantity, .size = of.size, .value = value, .emission = emission, .direct = direct};
+    const name_error same = name_error_of_means(&stated, &list[0], &means);
+    ck_assert_double_eq_tol(same.mean, found[0].mean, 1e-6);
+    ck_assert_double_eq_tol(same.elements, found[0].elements, 1e-5);
+    ck_assert_double_eq_tol(same.relative, found[0].relative, 1e-6);
+}
+END_TEST
+
+START_TEST(darkness_has_no_error_and_no_light_no_ratio) {
+    const float dark[C * N] = {0};
+    answer_error found;
+    error_answer of = {.quantity = LAM_RADIOSITY, .E = dark, .count = N, .values = dark};
+    ck_assert(answer_error_of(&stated, &scene, &of, &found));
+    ck_assert(found.relative == 0 && found.indirect == 0 && found.emitters == 0);
+    of = answer_of(LAM_INDIRECT, dark);
+    ck_assert(answer_error_of(&stated, &scene, &of, &found));
+    ck_assert(isinf(found.indirect) && isfinite(found.relative));
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("answer_error");
+    TCase *cases = tcase_create("answer_error");
+    tcase_add_loop_test(cases, all_elements_count_by_their_group, 0, 6);
+    tcase_add_test(cases, selected_elements_are_those_of_the_answer);
+    tcase_add_loop_test(cases, names_have_errors_of_their_means, 0, 3);
+    tcase_add_test(cases, darkness_has_no_error_and_no_light_no_ratio);
+    suite_add_tcase(suite, cases);
+    return suite_run(suite);
+}
