@@ -54,8 +54,10 @@ static const option_row rows[] = {
      .kind = OPTION_TEXT,
      .offset = FIELD(scene),
      .argument = "SCENE",
-     .help = "formfactors: the open scene of throughput and resolution, every face an element (houses); "
-             "hierarchical: the only scene, divided where it is coarse; mesh: one more scene"},
+     .help =
+         "formfactors: the open scene of throughput and resolution, every face an element (houses); "
+         "hierarchical: the only scene, divided where it is coarse; mesh: one more scene; honesty: a file "
+         "or a folder of scenes in place of its own"},
     OPTION_ROW_SEED(FIELD(seed), .help = "Seed of all sampling"),
     {0},
 };
@@ -75,7 +77,8 @@ static const option_command command = {
         "take part where they are installed), hierarchical (this kind of operator beside all others at equal "
         "error, "
         "and its growth), mesh (the error of values that are constant on elements, on uniform and adaptive "
-        "meshes). Each suite writes its tables as CSV and JSON, and its plots as SVG and PNG where "
+        "meshes), honesty (the errors that answers state beside the true ones, by random requests). "
+        "Each suite writes its tables as CSV and JSON, and its plots as SVG and PNG where "
         "matplotlib "
         "is installed.",
     .least_arguments = 1,
@@ -338,7 +341,8 @@ static lam_status run_suite(const bench_run *run, const bench_suite *suite, cons
     } else {
         snprintf(seed, sizeof seed, "%llu", (unsigned long long)run->seed);
         TRY(find_script(programs, suite->script, path, error));
-        const char *const arguments[] = {path, programs, bench_scale_name(run->scale), seed, NULL};
+        const char *const arguments[] = {path, programs,   bench_scale_name(run->scale),
+                                         seed, run->scene, NULL};
         TRY(script_run(run, arguments, error));
     }
     if (find_script(programs, "plots.py", path, &missing) != LAM_OK) {

@@ -1,0 +1,314 @@
+#!/usr/bin/python3
+"""Suite honesty of lambert-bench: the errors that answers state beside the true ones.
+
+    honesty.py PROGRAMS SCALE SEED [SCENE]
+
+PROGRAMS is the folder of lambert, lambertd and lambert-bench; SCALE is quick, default or full; SCENE is a scene file, or
+a folder of some, in place of the scenes of the suite. Each scene is precomputed at defaults, and once more as the exact
+inverse of form factors pair by pair at high quality, with another seed, which is the reference. Both stores get the same random requests:
+groups, elements, random emission, the scene's own light and skies, of which all elements, groups or single elements are
+selected, or groups reduced. lambert-bench reads standard output: one JSON object a line, as of service.py.
+"""
+
+import csv
+import json
+import math
+import os
+import pathlib
+import random
+import signal
+import sys
+import tempfile
+
+import numpy as np
+
+from service_programs import Client, Failure, Program, post
+
+SECONDS = 3600
+# share of the elements of each scene, requests of a scene
+SIZES = {"quick": (.25, 30), "default": (1, 200), "full": (2, 400)}
+# Below 1,025 elements the preset is an exact inverse, which has the error of the form factors alone.
+SCENES = {"cornell": (1300, ["cornell"]), "closed cornell": (640, ["cornell", "--closed"]), "rooms": (1300, ["rooms"]),
+          "patio": (1300, ["patio"]), "atrium": (1300, ["atrium"]), "maze": (1300, ["maze"]),
+          "canopy": (1300, ["canopy"]), "anechoic": (640, ["anechoic"]), "city 1": (640, ["city", "--variant", "1"]),
+          "city 3": (1300, ["city", "--variant", "3", "--terrain", "hill"])}
+QUICK = "cornell", "closed cornell"
+SUFFIXES = ".obj", ".gltf", ".glb", ".ply", ".stl", ".off"
+EMISSIONS = "group", "groups", "element", "elements", "random", "own"
+SKIES = "even sky", "cloudy sky", "sun"
+TARGETS = "all", "group", "elements", "reduce"
+LIMITS = 2, .2  # of the true error over the stated one: hardly ever above, mostly above
+WANTED = .95, .5
+
+
+def tell(**record):
+    print(json.dumps(record), flush=True)
+
+
+def table(name, title, columns, rows):
+    clean = [[None if isinstance(x, float) and not math.isfinite(x) else x for x in row] for row in rows]
+    tell(table={"name": name, "title": title, "columns": columns, "rows": clean})
+
+
+COUNTS = (("requests", "", "with a stated and a true error"),
+          ("below", "", "share whose true error is below twice the stated one; wanted: .95"),
+          ("above", "", "share whose true error is above a fifth of the stated one; wanted: .5"),
+          ("median", "", "true over stated error, median"), ("largest", "", "true over stated error, largest"),
+          ("unstated", "", "answers that state no error"))
+
+
+def counts_of(ratios, unstated):
+    if not ratios:
+        return [0., math.nan, math.nan, math.nan, math.nan, float(unstated)]
+    found = np.array(ratios)
+    return [float(len(found)), float((found < LIMITS[0]).mean()), float((found > LIMITS[1]).mean()),
+            float(np.median(found)), float(found.max()), float(unstated)]
+
+
+class Store:
+    """A store behind a daemon."""
+
+    def __init__(self, folder, programs, path, name):
+        self.daemon = Program(name, folder, programs / "lambertd", f"{path}:bench", "--listen", "127.0.0.1:0")
+        self.client = Client(self.daemon.port())
+
+    def ask(self, request):
+        body = json.dumps(request).encode()
+        answer, _ = self.client.must(post("/v1/scenes/bench/radiosity", "application/json", body), "lambertd")
+        return json.loads(bytes(answer))
+
+    def about(self):
+        answer, _ = self.client.must(b"GET /v1/scenes/bench HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n", "lambertd")
+        return json.loads(bytes(answer))
+
+    def stop(self):
+        self.client.close()
+        self.daemon.stop()
+
+
+class Requests:
+    """Random requests to a scene."""
+
+    def __init__(self, about, groups, own, tiles, seed):
+        self.random = random.Random(seed)
+        self.n, self.names, self.own, self.tiles = about["elements"], sorted(set(groups)), own, tiles
+
+    def elements(self, most):
+        return sorted(self.random.sample(range(self.n), min(self.n, self.random.randint(1, most))))
+
+    def emission(self, kind):
+        r = self.random
+        if kind == "group":
+            return {"groups": {r.choice(self.names): 1}}
+        if kind == "groups":
+            return {"groups": {name: r.uniform(.1, 1)
+                               for name in r.sample(self.names, min(len(self.names), r.randint(2, 5)))}}
+        if kind == "element":
+            return {"elements": [r.randrange(self.n)], "values": [1]}
+        if kind == "elements":
+            chosen = self.elements(50)
+            return {"elements": chosen, "values": [r.uniform(.1, 1) for _ in chosen]}
+        if kind == "random":
+            return [r.random() for _ in range(self.n)]
+        if kind == "own":
+            return self.own
+        if kind == "even sky":
+            return {"sky": [1] * self.tiles}
+        if kind == "cloudy sky":
+            return {"sky": [r.uniform(.2, 1) for _ in range(self.tiles)]}
+        sun = [.05] * self.tiles
+        sun[r.randrange(self.tiles)] = 50
+        return {"sky": sun}
+
+    def draw(self):
+        kinds = [kind for kind in EMISSIONS if kind != "own" or self.own is not None]
+        kind = self.random.choice(kinds + list(SKIES) * (self.tiles > 0))
+        target = self.random.choice(TARGETS)
+        request = {"emission": self.emission(kind)}
+        if target == "group":
+            request["select"] = {"groups": [self.random.choice(self.names)]}
+        elif target == "elements":
+            request["select"] = {"elements": self.elements(50)}
+        elif target == "reduce":
+            chosen = self.random.sample(self.names, min(len(self.names), self.random.randint(1, 3)))
+            request["reduce"] = {"groups": chosen, "with": self.random.choice([["mean"], ["mean", "min", "max"]])}
+        return kind, target, request
+
+
+class Scene:
+    def __init__(self, bench, name, path):
+        self.bench, self.name, self.path = bench, name, path
+        self.n_requests = bench.n_requests
+
+    def precompute(self, store, *options):
+        if "--seed" not in options:
+            options = *options, "--seed", str(self.bench.seed)
+        Program("lambert", self.bench.folder, self.bench.programs / "lambert", "precompute", self.path, "-o", store,
+                "--quiet", "--sky", "tregenza", *options).finish(SECONDS)
+
+    def measure(self):
+        folder = self.bench.folder
+        stores = [folder / "asked.h5", folder / "reference.h5"]
+        served = []
+        try:
+            self.precompute(stores[0])
+            self.precompute(stores[1], "--seed", str(self.bench.seed + 1000), "--quality", "high", "--method", "exact",
+                            "--probes", "0")
+            self.read_elements(stores[0])
+            for store in stores:
+                served.append(Store(folder, self.bench.programs, store, "lambertd"))
+            return self.compare(*served)
+        finally:
+            for store in served:
+                store.stop()
+            for store in stores:
+                store.unlink(missing_ok=True)
+
+    def read_elements(self, store):
+        """Areas and groups, as a file of values has them."""
+        values = self.bench.folder / "values.csv"
+        Program("lambert", self.bench.folder, self.bench.programs / "lambert", "solve", store, "--emission",
+                self.dark(store), "-o", values).finish(SECONDS)
+        with open(values, newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        self.area = np.array([float(row["area"]) for row in rows])
+        self.groups = [row["group"] for row in rows]
+
+    def dark(self, store):
+        about = json.loads(Program("lambert", self.bench.folder, self.bench.programs / "lambert", "info", store,
+                                   "--json").finish(SECONDS))
+        path = self.bench.folder / "dark.npy"
+        np.save(path, np.zeros(about["elements"], dtype=np.float32))
+        return path
+
+    def compare(self, asked, reference):
+        about = asked.about()
+        tiles = about["sky"]["tiles"] if about["sky"] else 0
+        if tiles and not self.is_lit(asked, tiles):
+            tiles = 0
+        requests = Requests(about, self.groups, self.own_emission(), tiles, self.bench.seed)
+        found = []
+        for _ in range(self.n_requests):
+            kind, target, request = requests.draw()
+            truth = self.error(target, request, asked, reference)
+            found += [(kind, target, true, stated) for true, stated in truth]
+        return about, found
+
+    @staticmethod
+    def is_lit(store, tiles):
+        answer = store.ask({"emission": {"sky": [1] * tiles}, "quantity": "irradiance"})
+        return np.max(answer["irradiance"]) > 0
+
+    def own_emission(self):
+        """Groups whose names say that they are lamps shine in scenes of `lambert generate`."""
+        lamps = sorted({name for name in self.groups if "lamp" in name or "light" in name})
+        return {"groups": {name: 1 for name in lamps}} if lamps else None
+
+    def weights(self, request):
+        if "select" not in request:
+            return self.area
+        if "elements" in request["select"]:
+            return self.area[request["select"]["elements"]]
+        return self.area[[k for k, group in enumerate(self.groups) if group == request["select"]["groups"][0]]]
+
+    def error(self, target, request, asked, reference):
+        """Pairs of the true and the stated indirect error, one of each name of a reduction; None: not stated."""
+        answer, truth = asked.ask(request), reference.ask(request)
+        light = reference.ask({**request, "quantity": "indirect"})
+        stated = answer.get("error", {})
+        if stated.get("light") == "own":  # null says that any error is possible
+            stated = self.infinite(stated)
+        if target != "reduce":
+            area = self.weights(request)
+            off = np.array(answer["radiosity"], dtype=float) - np.array(truth["radiosity"], dtype=float)
+            true = self.norm(off, area) / max(self.norm(np.array(light["indirect"], dtype=float), area), 1e-300)
+            return [(true, stated.get("indirect_mean"))] if true < 1e100 else []
+        pairs = []
+        for name in request["reduce"]["groups"]:
+            means = [np.atleast_1d(np.array(of["groups"][name]["mean"], dtype=float)) for of in (answer, truth, light)]
+            there = np.linalg.norm(means[2])
+            one = stated.get("groups", {}).get(name, {}).get("mean", stated.get("indirect_mean"))
+            if there > 0:
+                pairs.append((float(np.linalg.norm(means[0] - means[1]) / there), one))
+        return pairs
+
+    @classmethod
+    def infinite(cls, x):
+        if isinstance(x, dict):
+            return {key: cls.infinite(value) for key, value in x.items()}
+        return math.inf if x is None else x
+
+    @staticmethod
+    def norm(x, area):
+        return float(np.sqrt((area * np.atleast_2d(x) ** 2).sum()))
+
+
+class Bench:
+    def __init__(self, programs, scale, seed, given=None):
+        self.programs, self.quick, self.seed = pathlib.Path(programs), scale == "quick", int(seed)
+        self.share, self.n_requests = SIZES[scale]
+        self.given = pathlib.Path(given).resolve() if given else None
+
+    def scenes(self):
+        if self.given is not None:
+            files = sorted(self.given.iterdir()) if self.given.is_dir() else [self.given]
+            for file in files:
+                if file.suffix.lower() in SUFFIXES:
+                    yield file.stem, file
+            return
+        for name, (elements, words) in SCENES.items():
+            if self.quick and name not in QUICK:
+                continue
+            path = self.folder / "scene.obj"
+            Program("lambert", self.folder, self.programs / "lambert", "generate", *words, "--elements",
+                    str(round(self.share * elements)), "-o", path).finish(SECONDS)
+            yield name, path
+
+    def run(self):
+        with tempfile.TemporaryDirectory(prefix="lambert-bench-", dir=os.environ.get("TMPDIR") or "/tmp") as path:
+            self.folder = pathlib.Path(path).resolve()
+            rows, all_pairs, measured = [], [], 0
+            for name, file in self.scenes():
+                about, pairs = Scene(self, name, file).measure()
+                rows.append([name, float(about["elements"]), *self.summary(pairs)])
+                tell(log=f"{name}, {about['elements']} elements, {about['kind']}: of {rows[-1][2]:.0f} errors "
+                         f"{rows[-1][3]:.3f} are below twice the stated one, {rows[-1][4]:.3f} above a fifth")
+                all_pairs += pairs
+                measured += 1
+            if measured == 0:
+                raise Failure(f"{self.given}: no scene file ({', '.join(SUFFIXES)})")
+            rows.append(["all", None, *self.summary(all_pairs)])
+            table("scenes", "Stated errors of answers to random requests beside the true ones",
+                  (("scene", None, "name, or all"), ("elements", "", "n"), *COUNTS), rows)
+            kinds = [("emission", kind, 0) for kind in EMISSIONS + SKIES] + [("target", kind, 1) for kind in TARGETS]
+            table("kinds", "The same by emission and by what was asked for",
+                  (("by", None, "emission or target"), ("kind", None, "of it"), *COUNTS),
+                  [[by, kind, *self.summary([pair for pair in all_pairs if pair[place] == kind])]
+                   for by, kind, place in kinds])
+
+    @staticmethod
+    def summary(pairs):
+        """true over stated error: 0 of an answer that is exact, and stated so."""
+        known = [(true, stated) for _, _, true, stated in pairs if stated is not None]
+        ratios = [true / stated if stated > 0 else 1. if true == 0 else math.inf for true, stated in known]
+        return counts_of(ratios, len(pairs) - len(known))
+
+
+def cancel(_number, _frame):
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise Failure("cancelled")
+
+
+def main():
+    signal.signal(signal.SIGTERM, cancel)
+    try:
+        Bench(*sys.argv[1:]).run()
+    except (Failure, OSError) as failure:
+        try:
+            tell(error=str(failure))
+        except BrokenPipeError:
+            pass
+        os._exit(1)
+
+
+main()
