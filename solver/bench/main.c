@@ -67,20 +67,14 @@ static const option_command command = {
     .arguments = "SUITE... [-o DIR]",
     .summary =
         "Measure. Suites: formfactors (error against exact values and against time, rays per second), "
-        "lowrank "
-        "(factorizations and two meshes beside the tables of the papers), stability (operators of problems "
-        "that are "
-        "numerically hard), cities (sparse inverses, few emitters and Jacobi sweeps beside the tables of the "
-        "thesis), "
-        "service (lambertd under load beside servers that compute nothing and beside solves in process; wrk "
-        "and nginx "
-        "take part where they are installed), hierarchical (this kind of operator beside all others at equal "
-        "error, "
-        "and its growth), mesh (the error of values that are constant on elements, on uniform and adaptive "
-        "meshes), honesty (the errors that answers state beside the true ones, by random requests). "
-        "Each suite writes its tables as CSV and JSON, and its plots as SVG and PNG where "
-        "matplotlib "
-        "is installed.",
+        "lowrank (factorizations and two meshes beside the tables of the papers), stability (operators "
+        "of problems that are numerically hard), cities (sparse inverses, few emitters and Jacobi sweeps "
+        "beside the tables of the thesis), service (lambertd under load beside servers that compute "
+        "nothing and beside solves in process; wrk and nginx take part where they are installed), "
+        "hierarchical (this kind of operator beside all others at equal error, and its growth), mesh "
+        "(the error of values that are constant on elements, on uniform and adaptive meshes), honesty "
+        "(the errors that answers state beside the true ones, by random requests). Each suite writes its "
+        "tables as CSV and JSON, and its plots as SVG and PNG where matplotlib is installed.",
     .least_arguments = 1,
     .most_arguments = SUITES_MOST,
 };
