@@ -59,7 +59,7 @@ static lam_status gather(const bench_run *run, const mesh *m, const uint32_t *ta
     float *E = NULL;
     size_t first;
     TRY(mesh_lights(m, &E, &first, error));
-    TRY(walk_scene_create(m, &scene, error));
+    TRY(walk_scene_create(m, CLOSURE_MEASURED, &scene, error));
     const walk_problem problem = {.n_rhs = MESH_LIGHTS,
                                   .E = E,
                                   .quantity = LAM_INDIRECT,
