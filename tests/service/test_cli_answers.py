@@ -39,7 +39,7 @@ class Answers(Case):
             answer = json.load(file)
         self.assertEqual((answer["scene"], answer["elements"], answer["channels"], answer["quantity"]),
                          ("box", 96, 1, "radiosity"))
-        self.assertEqual(set(answer["error"]), {"relative_mean", "indirect_mean", "light", "emitters"})
+        self.assertEqual(set(answer["error"]), {"relative_mean", "indirect_mean", "mesh", "light", "emitters"})
         numpy.testing.assert_array_equal(numpy.array(answer["radiosity"], "f4"), B)
         with open(self.solve("a.csv", *light), newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
