@@ -150,6 +150,53 @@ class Mesh(unittest.TestCase):
             self.assertLess(abs(float(row["points"]) - constant), 3 * float(row["bar"]) + .04 * constant, row)
 
 
+class Honesty(unittest.TestCase):
+    """One quick run: answers to random requests to a Cornell box, open with skies and closed, state errors like the true ones."""
+
+    COUNTS = ["requests", "below", "above", "median", "largest", "unstated"]
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        done = lambert("bench", "honesty", "--quick", "-o", folder.name)
+        assert done.returncode == 0, done.stderr
+        cls.tables = {}
+        for name in "scenes", "kinds":
+            with open(os.path.join(folder.name, f"honesty-{name}.csv"), encoding="utf-8", newline="") as stream:
+                cls.tables[name] = list(csv.DictReader(stream))
+
+    def shares(self, row):
+        return [float(row[name]) for name in ("below", "above")]
+
+    def test_scenes(self):
+        rows = self.tables["scenes"]
+        self.assertEqual(list(rows[0]), ["scene", "elements", *self.COUNTS])
+        self.assertEqual([row["scene"] for row in rows], ["cornell", "closed cornell", "all"])
+        for row in rows:
+            below, above = self.shares(row)
+            # Of 30 requests of a scene, reductions state an error for each group.
+            self.assertGreaterEqual(float(row["requests"]), 30 if row["scene"] != "all" else 60, row)
+            self.assertGreaterEqual(below, .9, row)
+            # An error stated ten times too large would be above nothing.
+            self.assertGreaterEqual(above, .5, row)
+            self.assertEqual(float(row["unstated"]), 0, row)
+            self.assertTrue(.2 < float(row["median"]) < 2 and float(row["median"]) <= float(row["largest"]), row)
+        self.assertEqual(float(rows[2]["requests"]), sum(float(row["requests"]) for row in rows[:2]))
+
+    def test_kinds(self):
+        rows = self.tables["kinds"]
+        self.assertEqual(list(rows[0]), ["by", "kind", *self.COUNTS])
+        whole = self.tables["scenes"][-1]
+        for by, kinds in (("emission", {"group", "groups", "element", "elements", "random", "own", "even sky", "cloudy sky", "sun"}),
+                          ("target", {"all", "group", "elements", "reduce"})):
+            of = [row for row in rows if row["by"] == by]
+            self.assertEqual({row["kind"] for row in of}, kinds)
+            for name, place in (("below", 0), ("above", 1)):
+                counted = sum(float(row["requests"]) * self.shares(row)[place] for row in of if float(row["requests"]) > 0)
+                self.assertAlmostEqual(counted, float(whole["requests"]) * float(whole[name]), delta=.5)
+
+
 class Hierarchical(unittest.TestCase):
     """One quick run: every kind on two scenes, and what it says of them at equal error."""
 
