@@ -26,6 +26,43 @@ typedef struct group_tally {
     receiver_sums own_receivers, total_receivers;
 } group_tally;
 
+/* Errors of groups of the scene: against the references, and of the probes whose errors against the
+ * operator's own F are found, both. */
+typedef struct group_sums {
+    by_group_sums total, same, own;
+} group_sums;
+
+static void group_sums_free(group_sums *s) {
+    by_group_free(&s->total);
+    by_group_free(&s->same);
+    by_group_free(&s->own);
+}
+
+static lam_status group_sums_begin(const judge_input *input, group_sums *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    TRY(by_group_begin(input, &out->total, error));
+    TRY(by_group_begin(input, &out->same, error));
+    TRY(by_group_begin(input, &out->own, error));
+done:
+    return status;
+}
+
+static lam_status group_sums_finish(const group_sums *s, group_errors *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    double *same[GROUP_FIGURES] = {NULL};
+    TRY(by_group_finish(&s->total, GROUP_FIGURES, out->of, error));
+    TRY(by_group_finish(&s->own, GROUP_FIGURES, out->of_operator, error));
+    TRY(by_group_finish(&s->same, GROUP_FIGURES, same, error));
+    for (int f = 0; f < GROUP_FIGURES; f++)
+        for (size_t k = 0; k < s->total.n_rows * s->total.n_groups; k++)
+            out->of_operator[f][k] *= same[f][k] > 0 ? out->of[f][k] / same[f][k] : 1;
+    out->n_groups = s->total.n_groups;
+    out->n_rows = s->total.n_rows;
+done:
+    for (int f = 0; f < GROUP_FIGURES; f++) free(same[f]);
+    return status;
+}
+
 /* The largest ratios of steps so far, of each reference (reference_answers). */
 typedef struct step_rates {
     double own, independent, other;
@@ -198,7 +235,7 @@ static bool are_same(const factor_product *a, const factor_product *b) {
 /* Emissions of one round, against all references. The operator's own error is found until it is certain, the
  * noise where the references are no twins, are found in the first round. */
 static lam_status measure(const lam_operator *op, measured *m, const probe_source *source, size_t round,
-                          group_tally *t, by_group_sums *by_group, lam_error *error) {
+                          group_tally *t, group_sums *by_group, lam_error *error) {
     lam_status status = LAM_OK;
     const judge_input *input = m->input;
     const probes *p = &m->p;
@@ -219,6 +256,7 @@ static lam_status measure(const lam_operator *op, measured *m, const probe_sourc
             for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
                 const figure_probe one = probe_of(m, v, m->x, NULL, false);
                 figures_add(&one, &t[g].own);
+                if (by_group->own.n > 0) by_group_add(&one, g, 0, &by_group->own);
                 if (input->read != NULL) receivers_add(&one, input->read, &t[g].own_receivers);
                 t[g].n_operator++;
             }
@@ -237,7 +275,8 @@ static lam_status measure(const lam_operator *op, measured *m, const probe_sourc
         for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
             const figure_probe one = probe_of(m, v, m->x, noisy && v < n_noisy ? m->y : NULL, true);
             figures_add(&one, &t[g].total);
-            if (by_group->n > 0) by_group_add(&one, g, 0, by_group);
+            if (by_group->total.n > 0) by_group_add(&one, g, 0, &by_group->total);
+            if (by_group->total.n > 0 && own) by_group_add(&one, g, 0, &by_group->same);
             if (input->read != NULL) receivers_add(&one, input->read, &t[g].total_receivers);
         }
 done:
@@ -344,14 +383,14 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     step_rates rates = {.own = 0};
     probe_source source;
     measured m = {.input = input};
-    by_group_sums by_group = {.n = 0};
+    group_sums by_group = {.total = {.n = 0}};
     group_errors made = {.n_groups = 0};
     TRY(probe_source_make(input->problem, op, input->emission, input->emits, input->probes,
                           JUDGE_RANDOM_PROBES, input->seed, &source, error));
     if (input->group != NULL)
         TRY(probe_source_add_groups(&source, input->group, input->n_groups, JUDGE_WHOLE_PROBES, error));
     if (input->by_group != NULL && input->group != NULL && input->independent.n > 0)
-        TRY(by_group_begin(input, &by_group, error));
+        TRY(group_sums_begin(input, &by_group, error));
     size_t most = 0;
     for (int g = 0; g < JUDGE_GROUPS; g++) most += source.most[g];
     const bool at_once = is_dense(op, input, most);
@@ -368,12 +407,8 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     }
     for (int g = 0; g < JUDGE_GROUPS; g++)
         finish_group(input, &t[g], g == JUDGE_SINGLE, all_of(&source, g), groups[g]);
-    if (by_group.n > 0) {
-        TRY(by_group_finish(&by_group, GROUP_FIGURES, made.of, error));
-        made.n_groups = by_group.n_groups;
-        made.n_rows = by_group.n_rows;
-    }
-    if (input->sky != NULL) TRY(measure_sky(op, input, &by_group, &found.sky, &made, error));
+    if (by_group.total.n > 0) TRY(group_sums_finish(&by_group, &made, error));
+    if (input->sky != NULL) TRY(measure_sky(op, input, &by_group.total, &found.sky, &made, error));
     if (input->by_group != NULL) {
         group_errors_free(input->by_group);
         *input->by_group = made;
@@ -384,7 +419,7 @@ lam_status judge_operator(const lam_operator *op, const judge_input *input, erro
     found.seconds = clock_seconds() - start;
     *report = found;
 done:
-    by_group_free(&by_group);
+    group_sums_free(&by_group);
     group_errors_free(&made);
     probe_source_free(&source);
     measured_free(&m);

@@ -76,6 +76,9 @@ enum {
 typedef struct group_errors {
     size_t n_groups, n_rows;
     double *of[GROUP_FIGURES];
+    /* The part of them that is against the very F of the operator, by its share of the error of those probes
+     * that are compared with it. Not stored. */
+    double *of_operator[GROUP_FIGURES];
     /* The first figures once more, of skies: P = sum_t L_t Q_t with the power Q_t that radiance 1 of tile t
      * sends into the scene after the first bounce, and N = P^2 / sum (L_t Q_t)^2. NULL: no sky was judged. */
     double *sky[GROUP_SKY_FIGURES];
@@ -84,6 +87,15 @@ typedef struct group_errors {
     double *sky_first; /* [n_groups][n_tiles], mean first_bounce_t over a group, sr; NULL: too many numbers */
 } group_errors;
 void group_errors_free(group_errors *e);
+
+/* The largest of uniform, near and far over the groups, of their elements that are read. */
+typedef struct worst_group {
+    size_t group;       /* n_groups: no such figure is known */
+    int figure;         /* GROUP_UNIFORM, GROUP_NEAR or GROUP_FAR */
+    double total;       /* against the reference; 0 where none is known */
+    double of_operator; /* its part against the operator's own F; where it is not known as much as the rest */
+} worst_group;
+worst_group judge_worst_group(const group_errors *e);
 
 /* The first bounce of a sky, [m][n], sr: the operator's, and two independent samples by which it is judged.
  */

@@ -210,8 +210,26 @@ lam_status by_group_finish(const by_group_sums *sums, int n_figures, double **of
     return LAM_OK;
 }
 
+worst_group judge_worst_group(const group_errors *e) {
+    static const int sorts[] = {GROUP_UNIFORM, GROUP_NEAR, GROUP_FAR};
+    worst_group worst = {.group = e->n_groups, .figure = GROUP_UNIFORM};
+    for (size_t k = 0; k < sizeof sorts / sizeof *sorts && e->of[sorts[k]] != NULL; k++) {
+        const double *total = e->of[sorts[k]], *own = e->of_operator[sorts[k]];
+        for (size_t g = 0; g < e->n_groups; g++) {
+            if (!(total[g] > worst.total)) continue; /* nor where it is not known */
+            worst = (worst_group){.group = g,
+                                  .figure = sorts[k],
+                                  .total = total[g],
+                                  .of_operator = own != NULL && own[g] >= 0 ? fmin(own[g], total[g])
+                                                                            : total[g] * sqrt(.5)};
+        }
+    }
+    return worst;
+}
+
 void group_errors_free(group_errors *e) {
     for (int f = 0; f < GROUP_FIGURES; f++) free(e->of[f]);
+    for (int f = 0; f < GROUP_FIGURES; f++) free(e->of_operator[f]);
     for (int f = 0; f < GROUP_SKY_FIGURES; f++) free(e->sky[f]);
     free(e->sky_power);
     free(e->sky_first);

@@ -12,6 +12,8 @@ static const report_words words[] = {
     {"rcond", "reciprocal condition number", ""},
     {"epsilon", "norm error at most", ""},
     {"epsilon_stated", "error that --epsilon is about, as stated", ""},
+    {"group_error", "error of the worst group at most", ""},
+    {"group_error_stated", "error of the worst group, as stated", ""},
     {"trials", "trials", ""},
     {"measured_norm_error", "measured norm error", ""},
     {"norm", "order of the norm", ""},

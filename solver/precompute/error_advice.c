@@ -24,10 +24,14 @@ static size_t rays_for(size_t rays, double error, double most) {
     return more < RECIPE_RAYS_MOST ? more : RECIPE_RAYS_MOST;
 }
 
-static void advise(const error_advice_input *input, const error_group *g, double most, char option[64]) {
+static bool is_compressed(double of_operator, double error) {
+    return of_operator * of_operator > compression_share * error * error;
+}
+
+static void advise(const error_advice_input *input, double error, double of_operator, double most,
+                   char option[64]) {
     const recipe *r = &input->recipe;
-    const double error = judge_total(g), of_operator = judge_of_operator(g);
-    const bool compressed = of_operator * of_operator > compression_share * error * error;
+    const bool compressed = is_compressed(of_operator, error);
     char memory[32];
     forecast_format_bytes(input->lacking, memory);
     if (input->lacking > 0)
@@ -44,6 +48,26 @@ static void advise(const error_advice_input *input, const error_group *g, double
         snprintf(option, 64, input->finest || input->spent ? "a finer mesh" : "--quality high");
 }
 
+/* True where --group-error is missed, and --epsilon by no more. */
+static bool advise_group(const error_advice_input *input, double excess, char text[ERROR_ADVICE_BYTES]) {
+    const worst_group *w = input->worst;
+    char what[TRIAL_WORST_TEXT], option[64];
+    if (!(input->group_asked > 0) || !(w->total > input->group_asked) ||
+        excess > w->total / input->group_asked)
+        return false;
+    if (input->trials_left > 0)
+        snprintf(option, sizeof option, "--trials %zu", input->trials_left);
+    else if (input->other_method != NULL && is_compressed(w->of_operator, w->total))
+        snprintf(option, sizeof option, "--method %s", input->other_method);
+    else
+        advise(input, w->total, w->of_operator, input->group_asked, option);
+    trial_describe_worst(w, input->worst_name, what);
+    snprintf(text, ERROR_ADVICE_BYTES,
+             "the error of %s is stated as %.2g, above %g of --group-error; %s%s would lower it", what,
+             w->total, input->group_asked, input->from_store ? "the scene precomputed with " : "", option);
+    return true;
+}
+
 void error_advice(const error_advice_input *input, char text[ERROR_ADVICE_BYTES]) {
     const error_report *e = input->errors;
     const double most = input->asked > 0 ? input->asked : error_most;
@@ -52,8 +76,10 @@ void error_advice(const error_advice_input *input, char text[ERROR_ADVICE_BYTES]
     const error_group *g = lights ? &e->lights : &e->random;
     char option[64];
     text[0] = '\0';
-    if (!e->has_total || !(judge_total(g) > most)) return;
-    advise(input, g, most, option);
+    if (!e->has_total) return;
+    if (advise_group(input, input->asked > 0 ? judge_total(g) / input->asked : 0, text)) return;
+    if (!(judge_total(g) > most)) return;
+    advise(input, judge_total(g), judge_of_operator(g), most, option);
     snprintf(text, ERROR_ADVICE_BYTES,
              "the indirect error of %s is stated as %.2g, above %g%s; %s%s would lower it",
              lights ? "the scene's own lights" : "random emission", judge_total(g), most,

@@ -6,27 +6,33 @@
 #include "solver/formfactor/recipe.h"
 #include "solver/method/judge.h"
 
-enum { ERROR_ADVICE_BYTES = 256 };
+enum { ERROR_ADVICE_BYTES = 320 };
 
 /* The makings of a store whose errors were measured. */
 typedef struct error_advice_input {
     const error_report *errors;
-    recipe recipe;   /* of the form factors */
-    double asked;    /* the error of --epsilon that trials did not reach; 0: there were none */
-    double epsilon;  /* that the operator was built for */
-    double lacking;  /* bytes that a finer trial would have needed; 0: memory was no limit */
-    bool spent;      /* finer form factors of this recipe were tried and hardly lowered the error */
-    bool by_noise;   /* of the operator: build_report */
-    bool finest;     /* --quality high already */
-    bool from_store; /* form factors are those of a store */
+    recipe recipe;            /* of the form factors */
+    double asked;             /* the error of --epsilon that trials did not reach; 0: there were none */
+    double group_asked;       /* that of --group-error; 0: it was not given */
+    const worst_group *worst; /* as stated, and its name; may be NULL where group_asked is 0 */
+    const char *worst_name;
+    size_t trials_left;       /* as many may --trials be, where it was the limit, else 0 */
+    const char *other_method; /* that follows --epsilon, where the method of the store does not; else NULL */
+    double epsilon;           /* that the operator was built for */
+    double lacking;           /* bytes that a finer trial would have needed; 0: memory was no limit */
+    bool spent;               /* finer form factors of this recipe were tried and hardly lowered the error */
+    bool by_noise;            /* of the operator: build_report */
+    bool finest;              /* --quality high already */
+    bool from_store;          /* form factors are those of a store */
 } error_advice_input;
 
 /* text: about the scene's own lights or random emission, whichever has the larger indirect error, where that
  * is above .03; else empty. Of an error asked for: about its group alone (trial.h), where that is above it.
- * Single elements never count: their error is that of the noise of one element's light, for which --tolerance
- * is there. The option follows from where most of the error is: compression gets a smaller --epsilon, rays,
- * and compression that follows their noise, more of them, N ~ 1 / error^2, and the rest --quality high. A
- * trial that memory had no room for gets more --memory. */
+ * An error of --group-error that is missed, and by more than that of --epsilon, comes first. Single elements
+ * never count: their error is that of the noise of one element's light, for which --tolerance is there. The
+ * option follows from where most of the error is: compression gets a smaller --epsilon, rays, and compression
+ * that follows their noise, more of them, N ~ 1 / error^2, and the rest --quality high. A trial that memory
+ * had no room for gets more --memory. */
 void error_advice(const error_advice_input *input, char text[ERROR_ADVICE_BYTES]);
 
 #endif

@@ -264,7 +264,8 @@ done:
     return status;
 }
 
-/* Trials until --epsilon is kept. One that memory has no room for leaves the best of those before. */
+/* Trials until --epsilon and --group-error are kept. One that memory has no room for leaves the best of those
+ * before. */
 static lam_status run_trials(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     do {
@@ -290,6 +291,7 @@ lam_status precompute_run(const precompute_options *options, const option_result
     lam_status status = LAM_OK;
     precompute_state state = state_begin(options, t);
     if (options_given(given, "epsilon")) state.trial.asked = options->build.epsilon;
+    state.trial.group = options->group_error;
 
     double started = state.started = clock_seconds();
     state.started_used = clock_processor_seconds();

@@ -4,6 +4,7 @@
 
 #include "solver/base/terminal.h"
 #include "solver/method/choice.h"
+#include "solver/precompute/error_advice.h"
 #include "solver/precompute/forecast.h"
 #include "solver/scene/mesh.h"
 
@@ -31,7 +32,8 @@ typedef struct precompute_options {
     uint64_t threads, memory;           /* memory: bytes; 0: 70 % of what is free */
     const char *scratch;                /* a folder, or NULL */
     uint64_t seed, probes;              /* probes: OPTION_AUTO */
-    uint64_t trials;                    /* of an --epsilon that is kept, at most */
+    double group_error;                 /* of the worst group, to keep; 0: none is asked for */
+    uint64_t trials;                    /* of an error that is kept, at most */
     double time;                        /* seconds; 0: no limit */
     bool quiet, progress;
     const char *input;
@@ -73,7 +75,7 @@ lam_status precompute_classify(const precompute_options *options, terminal *t, d
 typedef struct precompute_result {
     build_report report;
     char unused[256];
-    char advice[256];
+    char advice[ERROR_ADVICE_BYTES];
     forecast_times forecast, spent; /* processor seconds of the stages: the forecast, and the truth */
 } precompute_result;
 lam_status precompute_run(const precompute_options *options, const option_result *given, terminal *t,

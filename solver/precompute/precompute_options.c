@@ -215,6 +215,18 @@ static const option_row resource_rows[] = {
      .most = 1e6,
      .help = "Single elements that the error is measured with; auto: 32 to 200, until the mean is certain or "
              "they take as long as the form factors; 0: no measurement"},
+    {.name = "group-error",
+     .kind = OPTION_NUMBER,
+     .offset = FIELD(group_error),
+     .argument = "X",
+     .otherwise = "whatever --epsilon leaves",
+     .most = 1,
+     .above = true,
+     .below = true,
+     .help =
+         "Largest stated error of the mean of any group over the light that is reflected there, by random "
+         "emission and by single elements near and far, which up to --trials operators are built to "
+         "keep"},
     {.name = "trials",
      .kind = OPTION_COUNT,
      .offset = FIELD(trials),
@@ -222,7 +234,8 @@ static const option_row resource_rows[] = {
      .preset = "3",
      .least = 1,
      .most = TRIALS_MOST,
-     .help = "Operators that are built at most until the error that --epsilon asks for is kept"},
+     .help = "Operators that are built at most until the errors that --epsilon and --group-error ask for are "
+             "kept"},
     {.name = "time",
      .kind = OPTION_NUMBER,
      .offset = FIELD(time),

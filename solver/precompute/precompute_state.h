@@ -24,17 +24,23 @@ typedef struct trial_made {
     error_report errors;
     group_errors by_group;
     double epsilon; /* that it was built for */
+    double excess;  /* of the goal that is missed most */
 } trial_made;
 
-/* The trials of an --epsilon that is an error to keep. */
+/* The trials of an --epsilon or a --group-error that is an error to keep. */
 typedef struct trial_course {
-    double asked;    /* 0: nothing is kept */
-    double epsilon;  /* that the operator is built for */
-    size_t count;    /* of trials that ended */
-    double lacking;  /* bytes that a finer trial would have needed; 0: memory was no limit */
-    double factors;  /* that part of the error before the form factors were made anew; 0: they were not */
-    bool spent;      /* which hardly lowered it: they are not made again */
-    trial_made best; /* before the last */
+    double asked;       /* by --epsilon; 0: nothing is kept */
+    double group;       /* by --group-error; 0: nothing is kept */
+    double epsilon;     /* that the operator is built for */
+    size_t count;       /* of trials that ended */
+    double lacking;     /* bytes that a finer trial would have needed; 0: memory was no limit */
+    double factors;     /* that part of the error, over its limit, before the form factors were made anew; 0:
+                           they were not */
+    trial_knobs before; /* of the trial before, and its error */
+    trial_goal missed;  /* asked is 0: there was none */
+    bool group_missed;  /* it was that of a group of the scene */
+    bool spent;         /* which hardly lowered it: they are not made again */
+    trial_made best;    /* before the last */
     judge_references *references; /* of the judge, for a next trial of the same form factors; NULL: none */
 } trial_course;
 
@@ -209,12 +215,14 @@ lam_status stage_judge(precompute_state *state, lam_error *error);
  * stage_operator.c. */
 void state_advise(precompute_state *state);
 
-/* After form factors, operator and judge: where --epsilon asks for a smaller error, turns the knobs and
- * releases all that is to be made again; false: the best trial is in place. True where the trial
- * that is being made may not be the last. The trial that was put aside in place of one that failed. The
+/* After form factors, operator and judge: where --epsilon or --group-error asks for a smaller error, turns
+ * the knobs and releases all that is to be made again; false: the best trial is in place. True where the
+ * trial that is being made may not be the last. The trial that was put aside in place of one that failed. The
  * figures of the trials, into the report: stage_trials.c. */
 bool state_next_trial(precompute_state *state);
 bool state_may_try_again(const precompute_state *state);
+bool state_keeps_epsilon(const precompute_state *state);   /* the error of its method is that of --epsilon */
+bool state_follows_epsilon(const precompute_state *state); /* its method has a use for --epsilon */
 void state_take_back(precompute_state *state);
 void state_report_trials(precompute_state *state);
 void trial_made_free(trial_made *made);

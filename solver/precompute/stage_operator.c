@@ -215,7 +215,7 @@ static void log_figures(terminal *t, const char *name, const error_group *g, boo
                      probes);
     if (g->operator_probes > 0)
         terminal_log(t, "%-8s operator relative %.3g, indirect %.3g", name, g->operator_relative.mean,
-                 g->operator_indirect.mean);
+                     g->operator_indirect.mean);
     if (!g->receivers.known) return;
     const receiver_figures *r = &g->receivers;
     at_most = r->is_bound ? "at most " : "";
@@ -237,11 +237,26 @@ static lam_status trace_again(precompute_state *state, lam_error *error) {
     return status;
 }
 
+/* The first method whose epsilon is kept. */
+static const char *keeper(void) {
+    for (size_t k = 0; method_at(k) != NULL; k++)
+        if (method_at(k)->flags & METHOD_KEEPS_EPSILON) return method_at(k)->name;
+    return NULL;
+}
+
 void state_advise(precompute_state *state) {
     const precompute_options *o = state->options;
+    const bool all_tried = state->trial.count == o->trials && o->trials < TRIALS_MOST;
+    const worst_group worst = judge_worst_group(&state->by_group);
+    const bool known = worst.group < state->by_group.n_groups;
     const error_advice_input input = {.errors = &state->errors,
                                       .recipe = state->f.recipe,
-                                      .asked = state->trial.count > 0 ? state->trial.asked : 0,
+                                      .asked = state_keeps_epsilon(state) ? state->trial.asked : 0,
+                                      .group_asked = state->trial.group,
+                                      .worst = &worst,
+                                      .worst_name = known ? state->m.group_names[worst.group] : "",
+                                      .trials_left = all_tried ? TRIALS_MOST : 0,
+                                      .other_method = state_follows_epsilon(state) ? NULL : keeper(),
                                       .epsilon = state->trial.epsilon,
                                       .lacking = state->trial.lacking,
                                       .spent = state->trial.spent,

@@ -1,5 +1,5 @@
-/* --epsilon kept: after a trial, that is form factors, operator and judge, either it is good enough, or the
- * next one gets finer knobs (trial.h). The best stays. */
+/* --epsilon and --group-error kept: after a trial, that is form factors, operator and judge, either it is
+ * good enough, or the next one gets finer knobs (trial.h). The best stays. */
 #include "solver/precompute/precompute_state.h"
 
 #include <stdlib.h>
@@ -13,13 +13,14 @@ void trial_made_free(trial_made *made) {
 }
 
 /* Puts the operator of the trial that just ended aside. */
-static void set_aside(precompute_state *state) {
+static void set_aside(precompute_state *state, double excess) {
     trial_made_free(&state->trial.best);
     state->trial.best = (trial_made){.op = state->op,
                                      .built = state->built,
                                      .errors = state->errors,
                                      .by_group = state->by_group,
-                                     .epsilon = state->trial.epsilon};
+                                     .epsilon = state->trial.epsilon,
+                                     .excess = excess};
     state->op = NULL;
     state->by_group = (group_errors){.n_groups = 0};
 }
@@ -63,8 +64,25 @@ void state_take_back(precompute_state *state) {
     best->blocks = (block_factors){.n = 0};
 }
 
-static double error_of(const error_report *errors) {
-    return judge_total(trial_group(errors));
+bool state_keeps_epsilon(const precompute_state *state) {
+    return state->trial.asked > 0 && state->probes > 0 &&
+           (method_find(state->built.method)->flags & METHOD_KEEPS_EPSILON) != 0;
+}
+
+static bool keeps_group_error(const precompute_state *state) {
+    return state->trial.group > 0 && state->probes > 0;
+}
+
+/* The goal of which most is lacking; *group: it is that of --group-error. */
+static trial_goal goal_of(const precompute_state *state, bool *group) {
+    const bool by_noise = state->built.by_noise;
+    const worst_group worst = judge_worst_group(&state->by_group);
+    const trial_goal of_group = trial_goal_of_group(state->trial.group, &worst, by_noise);
+    const trial_goal of_epsilon = {.asked = state_keeps_epsilon(state) ? state->trial.asked : 0,
+                                   .errors = trial_errors_of(trial_group(&state->errors), by_noise)};
+    *group = keeps_group_error(state) &&
+             (!state_keeps_epsilon(state) || trial_excess(&of_group) > trial_excess(&of_epsilon));
+    return *group ? of_group : of_epsilon;
 }
 
 /* Bytes of the next trial, beside the operator, and where they are kept the form factors, of this one. */
@@ -98,12 +116,21 @@ static bool fit(precompute_state *state, const trial_knobs *from, trial_knobs *n
     return next->epsilon != from->epsilon || trial_recipes_differ(&from->recipe, &next->recipe);
 }
 
+bool state_follows_epsilon(const precompute_state *state) {
+    const build_method *m = method_find(state->built.method);
+    const build_options *o = &state->options->build;
+    return method_has_option(m, "epsilon") &&
+           (m->ignores == NULL || !m->ignores(method_own_const(o, m), &state->built, "epsilon"));
+}
+
 /* Rows of a store are as they are, and those of a scratch folder are kept for a run that goes on. */
 static trial_limits limits_of(const precompute_state *state) {
     const precompute_options *o = state->options;
     const bool made = !o->from_store && o->scratch == NULL && !state->trial.spent;
-    return (trial_limits){
-        .rays = made && o->rays == OPTION_AUTO, .accuracy = made, .finest = state_finest_accuracy()};
+    return (trial_limits){.rays = made && o->rays == OPTION_AUTO,
+                          .accuracy = made,
+                          .fixed_epsilon = !state_follows_epsilon(state),
+                          .finest = state_finest_accuracy()};
 }
 
 /* Finer form factors are no use where they left more than this share of their part of the error: a finer
@@ -112,26 +139,30 @@ static const double spent_share = .9;
 
 /* The knobs of the next trial; false: there is none, as nothing can be turned. */
 static bool turn(precompute_state *state, const trial_knobs *from, trial_knobs *next) {
-    const trial_errors errors = trial_errors_of(trial_group(&state->errors), state->built.by_noise);
-    state->trial.spent = state->trial.spent ||
-                         (state->trial.factors > 0 && errors.factors > spent_share * state->trial.factors);
+    bool group;
+    const trial_goal goal = goal_of(state, &group);
+    const bool same = group == state->trial.group_missed && state->trial.missed.asked > 0;
+    state->trial.spent =
+        state->trial.spent || (state->trial.factors > 0 && same &&
+                               goal.errors.factors / goal.asked > spent_share * state->trial.factors);
     trial_limits limits = limits_of(state);
+    if (same && group)
+        limits.power = trial_power(from->epsilon, goal.errors.compression, state->trial.before.epsilon,
+                                   state->trial.missed.errors.compression);
     state->trial.factors = 0;
     state->trial.lacking = 0;
-    if (!trial_turn(state->trial.asked, &errors, &limits, from, next)) return false;
+    if (!trial_turn(goal.asked, &goal.errors, &limits, from, next)) return false;
     if (fit(state, from, next)) return true;
     limits.rays = limits.accuracy = false;
-    return trial_turn(state->trial.asked, &errors, &limits, from, next) && fit(state, from, next);
+    return trial_turn(goal.asked, &goal.errors, &limits, from, next) && fit(state, from, next);
 }
 
-/* True if --epsilon of this method is an error to keep. */
-static bool keeps_epsilon(const precompute_state *state) {
-    return state->trial.asked > 0 && state->probes > 0 &&
-           (method_find(state->built.method)->flags & METHOD_KEEPS_EPSILON) != 0;
+static bool keeps_any(const precompute_state *state) {
+    return state_keeps_epsilon(state) || keeps_group_error(state);
 }
 
 bool state_may_try_again(const precompute_state *state) {
-    return keeps_epsilon(state) && state->trial.count + 1 < state->options->trials;
+    return keeps_any(state) && state->trial.count + 1 < state->options->trials;
 }
 
 /* The form factors of the judge stay where those of the operator do, and all of its references where memory
@@ -144,35 +175,60 @@ static void release_references(precompute_state *state, const trial_knobs *next,
     *r = NULL;
 }
 
+/* Says what the trial has, and what is turned next. */
+static void log_trial(const precompute_state *state, const trial_goal *goal, bool group, const char *knobs) {
+    const error_group *g = trial_group(&state->errors);
+    const worst_group worst = judge_worst_group(&state->by_group);
+    const char *next = knobs[0] != '\0' ? "; next: " : "";
+    char what[TRIAL_WORST_TEXT];
+    if (!group) {
+        terminal_log(
+            state->t, "trial %zu: the indirect error of %s is stated as %.2g, --epsilon asks for %g%s%s",
+            state->trial.count, g == &state->errors.lights ? "the scene's own lights" : "random emission",
+            goal->errors.total, goal->asked, next, knobs);
+        return;
+    }
+    if (worst.group == state->by_group.n_groups) {
+        terminal_log(state->t, "trial %zu: no group has reflected light, --group-error has nothing to keep",
+                     state->trial.count);
+        return;
+    }
+    trial_describe_worst(&worst, state->m.group_names[worst.group], what);
+    terminal_log(state->t, "trial %zu: the error of %s is stated as %.2g, --group-error asks for %g%s%s",
+                 state->trial.count, what, goal->errors.total, goal->asked, next, knobs);
+}
+
 bool state_next_trial(precompute_state *state) {
     trial_course *all = &state->trial;
     const trial_knobs from = {.epsilon = all->epsilon, .recipe = state->recipe};
     trial_knobs next = from;
     char knobs[TRIAL_TEXT] = "";
-    const error_group *g = trial_group(&state->errors);
-    const double error = judge_total(g);
-    if (!keeps_epsilon(state)) return false;
+    bool group;
+    const trial_goal goal = goal_of(state, &group);
+    const double excess = trial_excess(&goal);
+    if (!keeps_any(state)) return false;
     all->count++;
-    const bool better = all->best.op == NULL || error < error_of(&all->best.errors);
-    const bool again = error > all->asked && all->count < state->options->trials && turn(state, &from, &next);
+    const bool better = all->best.op == NULL || excess < all->best.excess;
+    const bool again = excess > 1 && all->count < state->options->trials && turn(state, &from, &next);
     if (again) trial_describe(&from, &next, knobs);
-    terminal_log(state->t, "trial %zu: the indirect error of %s is stated as %.2g, --epsilon asks for %g%s%s",
-                 all->count, g == &state->errors.lights ? "the scene's own lights" : "random emission", error,
-                 all->asked, again ? "; next: " : "", knobs);
+    log_trial(state, &goal, group, knobs);
     if (!again) {
         if (!better) state_take_back(state);
         return false;
     }
     release_references(state, &next, !trial_recipes_differ(&from.recipe, &next.recipe));
-    if (better) set_aside(state);
+    if (better) set_aside(state, excess);
     lam_operator_close(state->op);
     state->op = NULL;
     if (trial_recipes_differ(&from.recipe, &next.recipe)) {
-        all->factors = trial_errors_of(g, state->built.by_noise).factors;
+        all->factors = goal.errors.factors / goal.asked;
         release_factors(state);
     } else {
         state->streamed = false; /* the rows are there, as the judge needed them */
     }
+    all->before = from;
+    all->missed = goal;
+    all->group_missed = group;
     state->recipe = next.recipe;
     all->epsilon = next.epsilon;
     return true;
@@ -183,7 +239,13 @@ void state_report_trials(precompute_state *state) {
     judge_references_free(all->references);
     all->references = NULL;
     if (all->count == 0) return;
-    report_number(&state->built, "epsilon", all->asked);
-    report_number(&state->built, "epsilon_stated", error_of(&state->errors));
+    if (state_keeps_epsilon(state)) {
+        report_number(&state->built, "epsilon", all->asked);
+        report_number(&state->built, "epsilon_stated", judge_total(trial_group(&state->errors)));
+    }
+    if (keeps_group_error(state)) {
+        report_number(&state->built, "group_error", all->group);
+        report_number(&state->built, "group_error_stated", judge_worst_group(&state->by_group).total);
+    }
     report_count(&state->built, "trials", (double)all->count);
 }

@@ -7,18 +7,43 @@
 /* Of the error asked for: the laws are no exact ones. */
 static const double aimed_share = .9;
 static const double turn_most = 64;
-static const double power_of_epsilon = .6, power_of_rays = -.5, power_of_pairs = 1, power_of_blocks = .5;
+static const double power_of_epsilon = .6, power_least = .2, power_of_rays = -.5, power_of_pairs = 1,
+                    power_of_blocks = .5;
 
 const error_group *trial_group(const error_report *errors) {
     return errors->lights.probes > 0 ? &errors->lights : &errors->random;
 }
 
-trial_errors trial_errors_of(const error_group *g, bool by_noise) {
-    const double total = judge_total(g), compression = judge_of_operator(g);
+static trial_errors parts_of(double total, double compression, bool by_noise) {
     return (trial_errors){.total = total,
                           .compression = compression,
                           .factors = sqrt(fmax(total * total - compression * compression, 0)),
                           .by_noise = by_noise};
+}
+
+trial_errors trial_errors_of(const error_group *g, bool by_noise) {
+    return parts_of(judge_total(g), judge_of_operator(g), by_noise);
+}
+
+trial_goal trial_goal_of_group(double asked, const worst_group *worst, bool by_noise) {
+    return (trial_goal){.asked = asked, .errors = parts_of(worst->total, worst->of_operator, by_noise)};
+}
+
+double trial_power(double epsilon, double compression, double epsilon_before, double compression_before) {
+    if (!(epsilon < epsilon_before) || !(compression > 0) || !(compression_before > 0)) return 0;
+    const double power = log(compression / compression_before) / log(epsilon / epsilon_before);
+    return fmin(fmax(power, power_least), power_of_epsilon);
+}
+
+double trial_excess(const trial_goal *g) {
+    return g->asked > 0 ? g->errors.total / g->asked : 0;
+}
+
+void trial_describe_worst(const worst_group *worst, const char *name, char text[TRIAL_WORST_TEXT]) {
+    const char *light = worst->figure == GROUP_UNIFORM ? "random emission"
+                        : worst->figure == GROUP_NEAR  ? "single elements that light it most"
+                                                       : "single elements that light it little";
+    snprintf(text, TRIAL_WORST_TEXT, "the mean of %.60s by %s", name, light);
 }
 
 /* The factor of a knob that takes an error, which is as its power, from one value to another below it. */
@@ -50,9 +75,9 @@ static bool finer_recipe(const trial_limits *limits, double error, double wanted
     return trial_recipes_differ(&before, r);
 }
 
-static bool finer_epsilon(double error, double wanted, double *epsilon) {
-    if (!(wanted < error)) return false;
-    *epsilon *= factor_for(error, wanted, power_of_epsilon);
+static bool finer_epsilon(const trial_limits *limits, double error, double wanted, double *epsilon) {
+    if (limits->fixed_epsilon || !(wanted < error)) return false;
+    *epsilon *= factor_for(error, wanted, limits->power > 0 ? limits->power : power_of_epsilon);
     return true;
 }
 
@@ -72,7 +97,7 @@ bool trial_turn(double asked, const trial_errors *errors, const trial_limits *li
     const double wanted_F = both ? half : C > F ? F : rest_of(wanted, C);
     const bool turned = finer_recipe(limits, F, wanted_F, &next->recipe);
     const double wanted_C = both && turned ? half : F >= C && turned ? C : rest_of(wanted, F);
-    return finer_epsilon(C, wanted_C, &next->epsilon) || turned;
+    return finer_epsilon(limits, C, wanted_C, &next->epsilon) || turned;
 }
 
 bool trial_recipes_differ(const recipe *a, const recipe *b) {

@@ -102,7 +102,7 @@ static char *command_line(int argc, char **argv) {
 /* --time chooses these itself, or they need time that it does not forecast. */
 static int check_time(const precompute_options *o, const option_result *given) {
     static const char *const chosen[] = {"epsilon", "rays", "quality", "resolution", "trials"};
-    static const char *const not_forecast[] = {"emitters", "scratch"};
+    static const char *const not_forecast[] = {"emitters", "scratch", "group-error"};
     const build_method *method = method_find(o->build.method);
     if (!(o->time > 0)) return 0;
     for (size_t i = 0; i < sizeof chosen / sizeof *chosen; i++)
@@ -153,6 +153,11 @@ static int check_together(const precompute_options *o, const option_result *give
         return options_usage(command.name, "--resolution %" PRIu64 ": must be even", o->resolution);
     if (!o->from_store && same_file(o->input, o->output))
         return options_usage(command.name, "-o %s: is the scene itself", o->output);
+    if (o->group_error > 0 && o->probes == 0)
+        return options_usage(command.name,
+                             "--group-error %g: needs errors that are measured: give --probes "
+                             "above 0, or leave it out",
+                             o->group_error);
     if (check_time(o, given) != 0) return 2;
     if (is_other_file(o->output))
         return options_usage(command.name,

@@ -59,6 +59,31 @@ START_TEST(a_single_element_counts_by_its_power) {
 }
 END_TEST
 
+/* Of two groups: figures that are not known do not count, nor do the largest of single probes. */
+START_TEST(the_worst_group) {
+    double uniform[] = {.1, NAN}, near[] = {NAN, .3}, far[] = {.2, NAN}, one[] = {9, 9}, own[] = {NAN, .1};
+    group_errors e = {.n_groups = GROUPS, .n_rows = 1};
+    worst_group worst = judge_worst_group(&e);
+    ck_assert_uint_eq(worst.group, GROUPS);
+    ck_assert_double_eq(worst.total, 0);
+    e.of[GROUP_UNIFORM] = uniform;
+    e.of[GROUP_NEAR] = near;
+    e.of[GROUP_FAR] = far;
+    e.of[GROUP_MEAN_ONE] = e.of[GROUP_FAR_LARGEST] = one;
+    e.of_operator[GROUP_NEAR] = e.of_operator[GROUP_FAR] = own;
+    worst = judge_worst_group(&e);
+    ck_assert_uint_eq(worst.group, 1);
+    ck_assert_int_eq(worst.figure, GROUP_NEAR);
+    ck_assert_double_eq(worst.total, .3);
+    ck_assert_double_eq(worst.of_operator, .1);
+    near[1] = .15; /* group 0, of whose operator nothing is known */
+    worst = judge_worst_group(&e);
+    ck_assert_uint_eq(worst.group, 0);
+    ck_assert_int_eq(worst.figure, GROUP_FAR);
+    ck_assert_double_eq_tol(worst.of_operator, .2 * sqrt(.5), 1e-15);
+}
+END_TEST
+
 START_TEST(noise_that_is_large_stays) {
     const float E[VECTOR] = {0, 1, 0, 0, 1, 0}, B[VECTOR] = {1, 1, 1, 1, 1, 1};
     const double x[VECTOR] = {0, 0, .3, 0, 0, .3}, y[VECTOR] = {0, 0, .1, 0, 0, .1};
@@ -155,6 +180,7 @@ int main(void) {
     Suite *suite = suite_create("judge_by_group");
     TCase *cases = tcase_create("judge_by_group");
     tcase_add_test(cases, a_single_element_counts_by_its_power);
+    tcase_add_test(cases, the_worst_group);
     tcase_add_test(cases, noise_that_is_large_stays);
     tcase_add_loop_test(cases, whole_groups_show_what_does_not_average_out, 0, 2);
     tcase_add_test(cases, receivers_have_a_row_of_their_own);

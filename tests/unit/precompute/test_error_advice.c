@@ -37,6 +37,36 @@ START_TEST(a_small_error_needs_none) {
 }
 END_TEST
 
+START_TEST(the_worst_group_comes_first) {
+    char text[ERROR_ADVICE_BYTES];
+    const error_report errors = {.random = {.probes = 8, .total_indirect = {.04, 0, .04}}, .has_total = true};
+    const worst_group worst = {.group = 1, .figure = GROUP_FAR, .total = .5, .of_operator = .49};
+    error_advice_input input = {.errors = &errors,
+                                .recipe = pairs,
+                                .epsilon = .05,
+                                .group_asked = .1,
+                                .worst = &worst,
+                                .worst_name = "cellar"};
+    error_advice(&input, text);
+    ck_assert_str_eq(text,
+                     "the error of the mean of cellar by single elements that light it little is stated as "
+                     "0.5, above 0.1 of --group-error; --epsilon 0.01 would lower it");
+    input.other_method = "other";
+    error_advice(&input, text);
+    ck_assert_ptr_nonnull(strstr(text, "; --method other would"));
+    input.trials_left = 3;
+    error_advice(&input, text);
+    ck_assert_ptr_nonnull(strstr(text, "; --trials 3 would"));
+    input.asked = .004; /* --epsilon is missed by a factor of 10, the group by 5 */
+    error_advice(&input, text);
+    ck_assert_ptr_nonnull(strstr(text, "random emission is stated as 0.04, above 0.004 of --epsilon"));
+    input.asked = 0;
+    input.group_asked = .5; /* which is kept */
+    error_advice(&input, text);
+    ck_assert_ptr_nonnull(strstr(text, "random emission is stated as 0.04, above 0.03;"));
+}
+END_TEST
+
 /* Noise falls with the root of the rays: 1.5 times too much takes 2.25 times the rays, 4,096 as a power. */
 START_TEST(noise_takes_rays) {
     char text[ERROR_ADVICE_BYTES];
@@ -122,6 +152,7 @@ int main(void) {
     Suite *suite = suite_create("error_advice");
     TCase *cases = tcase_create("error_advice");
     tcase_add_test(cases, a_small_error_needs_none);
+    tcase_add_test(cases, the_worst_group_comes_first);
     tcase_add_test(cases, noise_takes_rays);
     tcase_add_test(cases, compression_takes_epsilon);
     tcase_add_test(cases, other_recipes);

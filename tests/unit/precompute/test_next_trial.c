@@ -1,5 +1,5 @@
-/* The trials of --epsilon: which operator and form factors stay, and when they end. Operators and form
- * factors are real, errors are made up. */
+/* The trials of --epsilon and --group-error: which operator and form factors stay, and when they end.
+ * Operators and form factors are real, errors are made up. */
 #include "solver/base/terminal.h"
 #include "solver/precompute/precompute_state.h"
 #include "support/scene.h"
@@ -150,6 +150,96 @@ START_TEST(memory_is_a_limit) {
 }
 END_TEST
 
+/* Errors of the only group, by light from far away. */
+static void set_group_error(precompute_state *state, double total, double of_operator) {
+    group_errors *e = &state->by_group;
+    group_errors_free(e);
+    *e = (group_errors){.n_groups = 1, .n_rows = 1};
+    for (int f = 0; f < GROUP_FIGURES; f++) {
+        e->of[f] = memory_allocate(1, sizeof **e->of, "errors", NULL);
+        e->of_operator[f] = memory_allocate(1, sizeof **e->of_operator, "errors", NULL);
+        ck_assert(e->of[f] != NULL && e->of_operator[f] != NULL);
+    }
+    e->of[GROUP_UNIFORM][0] = total / 4;
+    e->of[GROUP_NEAR][0] = NAN;
+    e->of[GROUP_FAR][0] = total;
+    e->of_operator[GROUP_FAR][0] = of_operator;
+}
+
+/* The error of the group is the one that most is lacking of; the law of its compression is measured. */
+START_TEST(the_worst_group_is_kept) {
+    precompute_options options;
+    terminal t;
+    precompute_state state;
+    begin(&options, &t, &state);
+    state.trial.group = .1;
+    make(&state, .015, .001);
+    set_group_error(&state, .4, .4);
+    const double first = state.trial.epsilon;
+    const size_t rays = state.recipe.rays;
+    ck_assert(state_next_trial(&state));
+    ck_assert_uint_eq(state.recipe.rays, rays);
+    const double second = state.trial.epsilon;
+    ck_assert_double_eq_tol(second, first * pow(.09 / .4, 1 / .6), 1e-12);
+    make(&state, .009, .001);
+    set_group_error(&state, .3, .3);
+    ck_assert(state_next_trial(&state));
+    const double power = log(.3 / .4) / log(second / first);
+    const double factor = fmax(pow(.09 / .3, 1 / power), 1. / 64);
+    ck_assert_double_eq_tol(state.trial.epsilon, second * factor, 1e-9 * second);
+    make(&state, .02, .001); /* --epsilon by 2, as much as the best of before lacked */
+    set_group_error(&state, .05, .05);
+    const lam_operator *last = state.op;
+    ck_assert(!state_next_trial(&state));
+    ck_assert_ptr_eq(state.op, last);
+    state_report_trials(&state);
+    ck_assert_double_eq(report_get(&state.built, "group_error", 0), .1);
+    ck_assert_double_eq(report_get(&state.built, "group_error_stated", 0), .05);
+    ck_assert_double_eq(report_get(&state.built, "epsilon_stated", 0), .02);
+    ck_assert_double_eq(report_get(&state.built, "trials", 0), 3);
+    state_free(&state);
+}
+END_TEST
+
+/* A kind that does not keep epsilon gets finer form factors, as long as these are what the group lacks. */
+START_TEST(other_kinds_keep_groups_by_form_factors) {
+    precompute_options options;
+    terminal t;
+    precompute_state state;
+    begin(&options, &t, &state);
+    options.build = build_presets("exact");
+    state.trial.asked = 0;
+    state.trial.group = .1;
+    make(&state, .02, .001);
+    set_group_error(&state, .2, .01);
+    ck_assert(state_next_trial(&state));
+    ck_assert_uint_gt(state.recipe.rays, 256);
+    make(&state, .02, .001);
+    set_group_error(&state, .2, .2);
+    state.trial.spent = false;
+    const double epsilon = state.trial.epsilon;
+    ck_assert(!state_next_trial(&state));
+    ck_assert_double_eq(state.trial.epsilon, epsilon);
+    state_report_trials(&state);
+    ck_assert_double_eq(report_get(&state.built, "epsilon_stated", -1), -1);
+    state_free(&state);
+}
+END_TEST
+
+START_TEST(a_group_that_is_not_measured_ends_it) {
+    precompute_options options;
+    terminal t;
+    precompute_state state;
+    begin(&options, &t, &state);
+    state.trial.asked = 0;
+    state.trial.group = .1;
+    make(&state, .02, .001);
+    ck_assert(!state_next_trial(&state));
+    ck_assert_uint_eq(state.trial.count, 1);
+    state_free(&state);
+}
+END_TEST
+
 START_TEST(nothing_is_tried_where_nothing_was_asked_or_measured) {
     for (int k = 0; k < 3; k++) {
         precompute_options options;
@@ -176,6 +266,9 @@ int main(void) {
     tcase_add_test(cases, form_factors_are_used_again);
     tcase_add_test(cases, a_knob_without_effect_is_left);
     tcase_add_test(cases, memory_is_a_limit);
+    tcase_add_test(cases, the_worst_group_is_kept);
+    tcase_add_test(cases, other_kinds_keep_groups_by_form_factors);
+    tcase_add_test(cases, a_group_that_is_not_measured_ends_it);
     tcase_add_test(cases, nothing_is_tried_where_nothing_was_asked_or_measured);
     suite_add_tcase(suite, cases);
     return suite_run(suite);

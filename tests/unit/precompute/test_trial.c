@@ -104,6 +104,51 @@ START_TEST(a_part_that_stays) {
 }
 END_TEST
 
+/* An operator that does not follow epsilon leaves the form factors as the only knob. */
+START_TEST(an_epsilon_without_effect_stays) {
+    const trial_limits limits = {.accuracy = true, .fixed_epsilon = true, .finest = 7e-6};
+    const trial_errors compressed = parts(.03, .001), even = parts(.011, .011);
+    trial_knobs next;
+    ck_assert(!trial_turn(.01, &compressed, &limits, &of_pairs, &next));
+    ck_assert(trial_turn(.01, &even, &limits, &of_pairs, &next));
+    ck_assert_double_eq(next.epsilon, of_pairs.epsilon);
+    ck_assert_double_lt(next.recipe.accuracy, of_pairs.recipe.accuracy);
+}
+END_TEST
+
+/* Where four times less epsilon halved the compression, it falls as epsilon^1/2. */
+START_TEST(the_measured_law_is_taken) {
+    const double power = trial_power(.01, .2, .04, .4);
+    ck_assert_double_eq_tol(power, .5, 1e-12);
+    ck_assert_double_eq(trial_power(.01, .05, .04, .4), .6); /* it will not go on so well */
+    ck_assert_double_eq(trial_power(.01, .39, .04, .4), .2);
+    ck_assert_double_eq(trial_power(.01, .5, .04, .4), .2);
+    ck_assert_double_eq(trial_power(.04, .2, .04, .4), 0); /* epsilon was not turned */
+    ck_assert_double_eq(trial_power(.01, 0, .04, .4), 0);
+    const trial_limits limits = {.power = .5};
+    const trial_errors e = parts(.02, 0);
+    trial_knobs next;
+    ck_assert(trial_turn(.01, &e, &limits, &of_pairs, &next));
+    ck_assert_double_eq_tol(next.epsilon, .01 * (.9 * .9 / 4), 1e-12);
+}
+END_TEST
+
+START_TEST(goals_of_groups) {
+    const worst_group worst = {.group = 2, .figure = GROUP_FAR, .total = .5, .of_operator = .3};
+    const trial_goal goal = trial_goal_of_group(.1, &worst, false), none = {.errors = goal.errors};
+    char text[TRIAL_WORST_TEXT], name[200];
+    ck_assert_double_eq_tol(trial_excess(&goal), 5, 1e-12);
+    ck_assert_double_eq(trial_excess(&none), 0);
+    ck_assert_double_eq_tol(goal.errors.factors, .4, 1e-12);
+    trial_describe_worst(&worst, "cellar", text);
+    ck_assert_str_eq(text, "the mean of cellar by single elements that light it little");
+    memset(name, 'x', sizeof name - 1);
+    name[sizeof name - 1] = '\0';
+    trial_describe_worst(&worst, name, text);
+    ck_assert_uint_lt(strlen(text), TRIAL_WORST_TEXT - 1);
+}
+END_TEST
+
 START_TEST(knobs_have_limits) {
     const trial_errors huge = parts(.9, 90), noisy = {.total = 90, .by_noise = true};
     trial_knobs next, finest = of_pairs, most = of_rays;
@@ -150,6 +195,9 @@ int main(void) {
     tcase_add_test(cases, only_the_larger_part_is_turned);
     tcase_add_test(cases, noise_leaves_rays_alone);
     tcase_add_test(cases, a_part_that_stays);
+    tcase_add_test(cases, an_epsilon_without_effect_stays);
+    tcase_add_test(cases, the_measured_law_is_taken);
+    tcase_add_test(cases, goals_of_groups);
     tcase_add_test(cases, knobs_have_limits);
     tcase_add_test(cases, the_log_names_what_differs);
     suite_add_tcase(suite, cases);
