@@ -1,22 +1,20 @@
 #include "solver/formfactor/sky_sample.h"
 
-#include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/rays/rays.h"
 
 #include <stdlib.h>
 
-lam_status sky_sample_make(const mesh *m, const uint32_t *order, const sky_bounce *like, size_t rays,
-                           uint64_t seed, const progress *steps, sky_bounce *out, lam_error *error) {
+lam_status sky_sample_make(const mesh *m, const uint32_t *order, const sky_bounce *like,
+                           const form_factor_options *options, sky_bounce *out, lam_error *error) {
     lam_status status = LAM_OK;
     visibility *v = NULL;
     packed_rows counts = {0};
     sky_bounce made = {.n = 0};
     double *scale = memory_allocate(m->n, 3 * sizeof *scale, "the sky for the judge", error);
-    const form_factor_options how = {.recipe = {.method = RECIPE_RAYS, .rays = rays, .seed = seed},
-                                     .without_rows = true,
-                                     .bounce = &made,
-                                     .progress = steps,
-                                     .stage = "the sky for the judge"};
+    form_factor_options how = *options;
+    how.recipe.method = RECIPE_RAYS;
+    how.without_rows = true;
+    how.bounce = &made;
     if (scale == NULL) TRY(LAM_ERR_MEMORY);
     TRY(sky_bounce_create(like->tiling.name, m->up, like->ground_albedo, m->n, &made, error));
     TRY(visibility_create(m, &v, error));

@@ -3,12 +3,15 @@
 #ifndef LAMBERT_FORMFACTOR_SKY_SAMPLE_H
 #define LAMBERT_FORMFACTOR_SKY_SAMPLE_H
 
-#include "solver/formfactor/sky_bounce.h"
+#include "solver/formfactor/formfactor.h"
 #include "solver/scene/mesh.h"
 
-/* As `like`, its tiling and ground, by this many rays from each element. order as for form_factors_make.
- * Cost: n rays rays and 4 m n bytes. Errors: LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
-lam_status sky_sample_make(const mesh *m, const uint32_t *order, const sky_bounce *like, size_t rays,
-                           uint64_t seed, const progress *steps, sky_bounce *out, lam_error *error);
+/* As `like`, its tiling and ground, by options->recipe.rays rays from each element and recipe.seed, with
+ * options->progress, stage and portals: without these, rays are aimed at the holes of the mesh (portals.h),
+ * as they are for the bounce that is judged. order as for form_factors_make. Cost: n rays rays, half of them
+ * and a quarter towards portals where there are any, and 4 m n bytes. Errors: LAM_ERR_ARGUMENT,
+ * LAM_ERR_MEMORY, LAM_ERR_CANCELLED. */
+lam_status sky_sample_make(const mesh *m, const uint32_t *order, const sky_bounce *like,
+                           const form_factor_options *options, sky_bounce *out, lam_error *error);
 
 #endif

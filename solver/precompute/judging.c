@@ -193,11 +193,16 @@ static lam_status make_references(const judging *j, judge_references *r, lam_err
     if (!blocks && recipe_noise(&j->f->recipe) > 0 && r->by_rays == NULL)
         TRY(first_light_create(j->m, j->first_light_seed, &r->by_rays, error));
     if (!has_sky(j)) goto done;
-    for (int h = 0; h < 2; h++)
+    for (int h = 0; h < 2; h++) {
+        const form_factor_options how = {
+            .recipe = {.rays = SKY_RAYS, .seed = random_mix(j->first_light_seed + 1 + (uint64_t)h)},
+            .portals = j->portals,
+            .n_portals = j->n_portals,
+            .progress = j->progress,
+            .stage = "the sky for the judge"};
         if (r->sky[h].first_bounce == NULL)
-            TRY(sky_sample_make(j->m, j->order, &j->f->sky, SKY_RAYS,
-                                random_mix(j->first_light_seed + 1 + (uint64_t)h), j->progress, &r->sky[h],
-                                error));
+            TRY(sky_sample_make(j->m, j->order, &j->f->sky, &how, &r->sky[h], error));
+    }
     r->light = (judged_sky){.n_tiles = j->f->sky.tiling.n_tiles,
                             .own = j->f->sky.first_bounce,
                             .samples = {r->sky[0].first_bounce, r->sky[1].first_bounce}};

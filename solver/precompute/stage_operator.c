@@ -283,6 +283,8 @@ lam_status stage_judge(precompute_state *state, lam_error *error) {
                  .order = state->order,
                  .problem = &problem,
                  .f = &state->f,
+                 .portals = state->portals,
+                 .n_portals = state->n_portals,
                  .importance = state->importance.n > 0 ? &state->importance : NULL,
                  .scratch_names = {"judge-1.rows", "judge-2.rows"},
                  .stages = {"form factors for the judge, 1 of 2", "form factors for the judge, 2 of 2"},

@@ -1,6 +1,7 @@
 /* Rays towards openings: no bias, the same sum as by rays alone, and far less noise. */
 #include "solver/formfactor/formfactor.h"
 #include "solver/formfactor/rays/portals.h"
+#include "solver/formfactor/sky_sample.h"
 #include "support/box.h"
 #include "support/suite.h"
 
@@ -154,6 +155,52 @@ START_TEST(no_bias) {
 }
 END_TEST
 
+/* The sample by which a first bounce is judged is aimed at the hole, too, and at a portal that is given in
+ * its place: one that nobody sees the sky through leaves the noise of rays by the cosine. Within 5 standard
+ * errors of the truth for each element, as above; of 64 seeds a variance is known to a fifth. */
+START_TEST(samples_of_the_judge_are_aimed) {
+    mesh m = room(false);
+    const plane_rectangle useless = {{0, 0, 0}, {{4, 0, 0}, {0, 4, 0}}};
+    enum { SEEDS = 64, RAYS = 512 };
+    uint32_t *order = malloc(m.n * sizeof *order);
+    double *sum = calloc(m.n, sizeof *sum), *squares = calloc(m.n, sizeof *squares), noise[2] = {0};
+    lam_error error = {0};
+    sky_bounce like = {.n = 0};
+    ck_ok(mesh_z_order(&m, order, &error));
+    ck_ok(sky_bounce_create("tregenza", m.up, 0, m.n, &like, &error));
+    for (int given = 0; given < 2; given++) {
+        memset(sum, 0, m.n * sizeof *sum);
+        memset(squares, 0, m.n * sizeof *squares);
+        for (uint64_t seed = 0; seed < SEEDS; seed++) {
+            const form_factor_options how = {.recipe = {.rays = RAYS, .seed = seed},
+                                             .portals = given ? &useless : NULL,
+                                             .n_portals = (size_t)given};
+            form_factors f = {.row_sums = NULL};
+            ck_ok(sky_sample_make(&m, order, &like, &how, &f.sky, &error));
+            for (size_t i = 0; i < m.n; i++) {
+                const double seen = sky_seen(&f, i);
+                sum[i] += seen / SEEDS;
+                squares[i] += seen * seen / SEEDS;
+            }
+            sky_bounce_free(&f.sky);
+        }
+        for (size_t i = 0; i < m.n; i++) {
+            const double truth = exact(&m, i), variance = fmax(0, squares[i] - sum[i] * sum[i]);
+            ck_assert_msg(fabs(sum[i] - truth) <= 5 * sqrt(variance / (SEEDS - 1)) + 1e-6,
+                          "element %zu: %g for %g, +- %g", i, sum[i], truth, sqrt(variance / (SEEDS - 1)));
+            noise[given] += variance;
+        }
+    }
+    printf("noise %g of rays at the hole, %g of others\n", sqrt(noise[0]), sqrt(noise[1]));
+    ck_assert_double_lt(noise[0], noise[1] / 20);
+    sky_bounce_free(&like);
+    free(order);
+    free(sum);
+    free(squares);
+    mesh_free(&m);
+}
+END_TEST
+
 /* Pairs behind a plate, whose shadows are sampled: rays take over where they know better, and what the hole
  * lets in, .64, is distributed whole. Against rays in plenty. */
 START_TEST(pairs_and_rays_together) {
@@ -214,6 +261,7 @@ int main(void) {
     tcase_add_test(tc, hole_is_found);
     tcase_add_test(tc, open_and_closed_scenes_have_none);
     tcase_add_test(tc, no_bias);
+    tcase_add_test(tc, samples_of_the_judge_are_aimed);
     tcase_add_test(tc, pairs_and_rays_together);
     tcase_add_test(tc, same_for_any_threads);
     tcase_add_test(tc, rectangles);
