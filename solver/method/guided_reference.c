@@ -257,6 +257,11 @@ typedef struct columns {
     size_t count, channel, n_channels; /* channels `channel` ... */
 } columns;
 
+/* H + share D of a number of a first light that is known. */
+static double first_at(const reference_answers *a, size_t at) {
+    return a->first[at] + (a->spread != NULL ? a->share * a->spread[at] : 0);
+}
+
 /* r = E - B~ + R F B~, or, where the first light H is known, E - B~ + R H + R F (B~ - E): what B = B~ + x
  * lacks, (I - R F) x = r. x and y are [n][columns], r is [columns][n]. */
 static lam_status residual(const reference_system *s, const reference_answers *a, const columns *of,
@@ -277,7 +282,7 @@ static lam_status residual(const reference_system *s, const reference_answers *a
         for (size_t k = 0; k < count; k++) {
             const size_t v = of->which[k / of->n_channels], c = of->channel + k % of->n_channels;
             const size_t at = (v * C + c) * n + i;
-            const double H = y[i * count + k] + (a->first != NULL && a->known[v] ? a->first[at] : 0);
+            const double H = y[i * count + k] + (a->first != NULL && a->known[v] ? first_at(a, at) : 0);
             r[k * n + i] = (double)a->E[at] - (double)a->B[at] + (double)s->reflectance[c * n + i] * H;
         }
 done:

@@ -38,6 +38,8 @@ typedef struct reference_answers {
         *first; /* [][C][n] H, the light that E itself gives, in place of F E where `known`; NULL: F E
                  */
     const bool *known;
+    const double *spread; /* [][C][n] D: H + share D is taken in place of H; NULL: H */
+    double share;
     double *rate; /* the largest ratio of a step to the one before, of this operator and F so far; 0: of none.
                      Below .005 of eight probes or more, others are left with their first step, which is then
                      off by about so much. NULL: none is */

@@ -138,15 +138,27 @@ static void keep(void *context, size_t v, size_t channel, const double *x) {
     memcpy(to->x + (v * C + channel) * n, x, n * sizeof *x);
 }
 
-/* x [][C][n]: corrections of the answers which[count] by F; first: with the first light that is known. */
+/* The share of D in the first light H of the independent reference or of the other one: of twins each has an
+ * estimate of its own, H + D and H - D, and a disturbed one has as much of that noise as H itself. Their
+ * distance then has the noise of the first light, and all that bounces on of it. */
+static double share_of_spread(const judge_input *input, bool other) {
+    if (input->other.n == 0 || input->relation == REFERENCE_COARSER) return 0;
+    return input->relation == REFERENCE_TWIN ? (other ? -1 : 1) : (other ? 1 : 0);
+}
+
+/* x [][C][n]: corrections of the answers which[count] by F, the other reference or not; first: with the first
+ * light that is known. */
 static lam_status solve(const lam_operator *op, const measured *m, const factor_product *F, bool first,
-                        size_t count, const size_t *which, double *rate, double *x, lam_error *error) {
+                        bool other, size_t count, const size_t *which, double *rate, double *x,
+                        lam_error *error) {
     const reference_system system = system_of(m->input, F);
     const reference_answers answers = {.op = op,
                                        .E = m->p.E,
                                        .B = m->p.B,
                                        .first = first ? m->first : NULL,
                                        .known = m->known,
+                                       .spread = m->spread,
+                                       .share = share_of_spread(m->input, other),
                                        .rate = rate,
                                        .progress = m->input->progress};
     corrections to = {m->input, x};
@@ -171,11 +183,12 @@ static lam_status prepare_other(measured *m, size_t n_noisy, bool by_own, size_t
 }
 
 /* Probe v with its corrections x and y (NULL: not known), by the references of the total error or by the
- * operator's own. */
+ * operator's own. The noise of the first light is a part of y - x or comes beside (share_of_spread). */
 static figure_probe probe_of(const measured *m, size_t v, const double *x, const double *y, bool total) {
     const judge_input *input = m->input;
     const size_t first = v * vector_of(input);
-    const bool spread = total && m->known != NULL && m->known[v];
+    const bool apart = input->other.n == 0 || input->relation == REFERENCE_COARSER;
+    const bool spread = total && apart && m->known != NULL && m->known[v];
     return (figure_probe){.problem = input->problem,
                           .E = m->p.E + first,
                           .B = m->p.B + first,
@@ -251,7 +264,7 @@ static lam_status measure(const lam_operator *op, measured *m, const probe_sourc
     if (m->x == NULL || all == NULL || others == NULL) TRY(LAM_ERR_MEMORY);
     for (size_t v = 0; v < p->m; v++) all[v] = v;
     if (own) {
-        TRY(solve(op, m, &input->own, false, p->m, all, &m->rates->own, m->x, error));
+        TRY(solve(op, m, &input->own, false, false, p->m, all, &m->rates->own, m->x, error));
         for (int g = 0; g < JUDGE_GROUPS; g++)
             for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
                 const figure_probe one = probe_of(m, v, m->x, NULL, false);
@@ -266,11 +279,11 @@ static lam_status measure(const lam_operator *op, measured *m, const probe_sourc
     TRY(find_first_light(m, error));
     const bool by_own = are_same(&input->other, &input->own);
     if (noisy) TRY(prepare_other(m, n_noisy, own && by_own, others, &n_others, error));
-    TRY(solve(op, m, &input->independent, true, p->m, all, &m->rates->independent, m->x, error));
+    TRY(solve(op, m, &input->independent, true, false, p->m, all, &m->rates->independent, m->x, error));
     report_round(input, round, .6);
     if (n_others > 0)
-        TRY(solve(op, m, &input->other, true, n_others, others, by_own ? &m->rates->own : &m->rates->other,
-                  m->y, error));
+        TRY(solve(op, m, &input->other, true, true, n_others, others,
+                  by_own ? &m->rates->own : &m->rates->other, m->y, error));
     for (int g = 0; g < JUDGE_GROUPS; g++)
         for (size_t v = p->begin[g]; v < p->begin[g + 1]; v++) {
             const figure_probe one = probe_of(m, v, m->x, noisy && v < n_noisy ? m->y : NULL, true);

@@ -152,9 +152,10 @@ typedef struct judge_input {
 /* Measures. With x the correction of an answer by the reference, B = B~ + x, a squared error is |x|^2 less
  * the power of the noise in x, by a sample t of it (judge_figures.h). Of twins, x = (x_1 + x_2) / 2 and
  * t = (x_1 - x_2) / 2, which leaves <x_1, x_2>: in this the noise of two independent samples has no part on
- * average. Of a disturbed reference t is the distance of both solutions. To t comes rho D, the noise of the
- * first light. Of a finer and a coarser reference the noise is stated alone. Cost: a converged solve per
- * probe and reference, started from the operator's own answer. */
+ * average. Of a disturbed reference t is the distance of both solutions. Each of both has its own
+ * first light, so that its noise and what bounces on of it are in t; without another reference of that
+ * quality, t is rho D alone. Of a finer and a coarser reference the noise is stated alone. Cost: a converged
+ * solve per probe and reference, started from the operator's own answer. */
 lam_status judge_operator(const lam_operator *op, const judge_input *input, error_report *report,
                           lam_error *error);
 

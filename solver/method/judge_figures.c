@@ -15,6 +15,7 @@ figure_number figure_number_at(const figure_probe *p, size_t k) {
     if (p->relation == REFERENCE_DISTURBED) one.noise = y - x;
     if (p->relation == REFERENCE_COARSER) one.apart = p->other_share * (x - y);
     if (p->spread != NULL) one.light = (double)p->problem->reflectance[k] * p->spread[k];
+    if (p->noise != NULL) one.light += p->noise[k];
     one.b = (double)p->B[k] + one.off;
     one.bounced = one.b - (double)p->E[k];
     return one;

@@ -14,6 +14,7 @@ typedef struct figure_probe {
     const float *E, *B;   /* [C][n] */
     const double *x, *y;  /* [C][n] corrections by the reference and the other one; y: NULL: not known */
     const double *spread; /* [C][n] of the first light; NULL: none */
+    const double *noise;  /* [C][n] in x, beside that between x and y; NULL: none */
     reference_relation relation;
     double other_share;
 } figure_probe;

@@ -22,14 +22,14 @@ typedef struct skies {
     float *L;
     float *E[3]; /* by the operator's own, and by each sample */
     float *B;
-    double *x[2];
+    double *x[3]; /* by the independent reference and each sample; by the other one and the mean of both */
 } skies;
 
 static void skies_free(skies *s) {
     free(s->L);
     for (int k = 0; k < 3; k++) free(s->E[k]);
     free(s->B);
-    for (int k = 0; k < 2; k++) free(s->x[k]);
+    for (int k = 0; k < 3; k++) free(s->x[k]);
 }
 
 /* power [C][m]: sum A rho first_bounce of each tile. */
@@ -93,14 +93,14 @@ static void keep(void *context, size_t v, size_t channel, const double *x) {
     memcpy(to->x + (v * to->n_channels + channel) * to->n, x, to->n * sizeof *x);
 }
 
-/* x: corrections of the answers to the emission by sample k, by F. */
-static lam_status solve(const lam_operator *op, const judge_input *input, const factor_product *F, int k,
-                        const skies *s, lam_error *error) {
+/* x [count][C][n]: corrections of the answers to the emissions E, by F. */
+static lam_status solve(const lam_operator *op, const judge_input *input, const factor_product *F,
+                        const skies *s, const float *E, double *x, lam_error *error) {
     const build_problem *p = input->problem;
     const reference_system system = {p->n, p->n_channels, F, p->area, p->reflectance};
-    const reference_answers answers = {.op = op, .E = s->E[1 + k], .B = s->B, .progress = input->progress};
+    const reference_answers answers = {.op = op, .E = E, .B = s->B, .progress = input->progress};
     const size_t all[SKIES] = {0, 1, 2, 3, 4, 5};
-    corrections to = {p->n, p->n_channels, s->x[k]};
+    corrections to = {p->n, p->n_channels, x};
     return guided_reference_each(&system, &answers, s->count, all, keep, &to, error);
 }
 
@@ -139,7 +139,7 @@ static lam_status allocate(const judge_input *input, skies *s, lam_error *error)
     for (int k = 0; k < 3; k++)
         if ((s->E[k] = memory_allocate(SKIES, vector * sizeof *s->E[k], "skies", error)) == NULL)
             return LAM_ERR_MEMORY;
-    for (int k = 0; k < 2; k++)
+    for (int k = 0; k < 3; k++)
         if ((s->x[k] = memory_allocate(SKIES, vector * sizeof *s->x[k], "skies", error)) == NULL)
             return LAM_ERR_MEMORY;
     return LAM_OK;
@@ -152,6 +152,7 @@ lam_status judge_sky_add(const lam_operator *op, const judge_input *input, figur
     const size_t m = input->sky->n_tiles, vector = p->n * p->n_channels;
     const float *const firsts[3] = {input->sky->own, input->sky->samples[0], input->sky->samples[1]};
     const bool twins = input->relation == REFERENCE_TWIN && input->other.n > 0;
+    const bool apart = input->other.n > 0 && !twins;
     skies s = {.count = 0};
     double *power = NULL, *weight = NULL;
     if (lam_operator_emitters(op) > 0 || input->independent.n == 0) return LAM_OK;
@@ -164,16 +165,26 @@ lam_status judge_sky_add(const lam_operator *op, const judge_input *input, figur
     if (!draw(m, weight, input->seed + 3, &s)) goto done;
     for (int k = 0; k < 3; k++) light(input, firsts[k], &s, s.E[k]);
     TRY(answer(op, &s, error));
-    TRY(solve(op, input, &input->independent, 0, &s, error));
-    TRY(solve(op, input, twins ? &input->other : &input->independent, 1, &s, error));
+    TRY(solve(op, input, &input->independent, &s, s.E[1], s.x[0], error));
+    TRY(solve(op, input, twins ? &input->other : &input->independent, &s, s.E[2], s.x[1], error));
     for (size_t k = 0; k < s.count * vector; k++) s.E[1][k] = .5f * (s.E[1][k] + s.E[2][k]);
+    if (apart) {
+        TRY(solve(op, input, &input->other, &s, s.E[1], s.x[2], error));
+        for (size_t k = 0; k < s.count * vector; k++) {
+            const double x = s.x[0][k], y = s.x[1][k];
+            s.x[0][k] = .5 * (x + y);
+            s.x[1][k] = .5 * (x - y);
+        }
+    }
     for (size_t v = 0; v < s.count; v++) {
         const figure_probe one = {.problem = p,
                                   .E = s.E[1] + v * vector,
                                   .B = s.B + v * vector,
                                   .x = s.x[0] + v * vector,
-                                  .y = s.x[1] + v * vector,
-                                  .relation = REFERENCE_TWIN};
+                                  .y = s.x[apart ? 2 : 1] + v * vector,
+                                  .noise = apart ? s.x[1] + v * vector : NULL,
+                                  .relation = apart ? input->relation : REFERENCE_TWIN,
+                                  .other_share = input->other_share};
         figures_add(&one, figures);
         if (sums->n > 0)
             by_group_add(&one, v < JUDGE_EVEN_SKIES ? JUDGE_WHOLE : JUDGE_SINGLE,

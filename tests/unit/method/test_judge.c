@@ -40,8 +40,15 @@ static double first_of(size_t e, size_t i) {
     return i == e ? 0 : .03 + .002 * (double)((i + 2 * e) % 3);
 }
 
-/* The converged B of E [C][n]; the light of the bright element e itself is first_of where that is known. */
-static void solve(const subject *s, const csr *F, const double *E, size_t e, bool known, double *B) {
+/* Half the difference of two estimates of that light. */
+static double spread_of(size_t e, size_t i) {
+    return i == e ? 0 : .001 * (double)((3 * i + e) % 5);
+}
+
+/* The converged B of E [C][n]; the light of the bright element e itself is first_of, and a share of its
+ * spread, where that is known. */
+static void solve(const subject *s, const csr *F, const double *E, size_t e, bool known, double share,
+                  double *B) {
     lam_error error = {.message = ""};
     for (size_t c = 0; c < C; c++) {
         const float *rho = s->rho + c * N;
@@ -49,8 +56,10 @@ static void solve(const subject *s, const csr *F, const double *E, size_t e, boo
         reference *r = NULL;
         csr_multiply_rows(F, 0, N, 1, E + c * N, light);
         for (size_t i = 0; i < N; i++)
-            emitted[i] =
-                E[c * N + i] + (known ? (double)rho[i] * (E[c * N + e] * first_of(e, i) - light[i]) : 0);
+            emitted[i] = E[c * N + i] +
+                         (known ? (double)rho[i] *
+                                      (E[c * N + e] * (first_of(e, i) + share * spread_of(e, i)) - light[i])
+                                : 0);
         ck_ok(reference_create(F, s->m.area, rho, REFERENCE_DENSE, &r, &error));
         ck_ok(reference_solve(r, 1, emitted, B + c * N, 0, NULL, &error));
         reference_destroy(r);
@@ -70,7 +79,7 @@ static void make_operator(subject *s) {
     for (size_t e = 0; e < N; e++) {
         double E[VECTOR], B[VECTOR];
         light_up(e, E);
-        solve(s, &s->F[OWN], E, e, false, B);
+        solve(s, &s->F[OWN], E, e, false, 0, B);
         for (size_t k = 0; k < VECTOR; k++) {
             const float p = (float)((B[k] - E[k]) * (1 + .01 * ((double)((k + e) % 5) - 2)));
             P[(k / N * N + k % N) * N + e] = p;
@@ -96,11 +105,6 @@ static void subject_free(subject *s) {
     lam_operator_close(s->op);
     for (size_t k = 0; k < SAMPLES; k++) csr_free(&s->F[k]);
     mesh_free(&s->m);
-}
-
-/* Half the difference of two estimates of that light. */
-static double spread_of(size_t e, size_t i) {
-    return i == e ? 0 : .001 * (double)((3 * i + e) % 5);
 }
 
 /* A flag for known first light, and the elements in the order of the probes, the lights first. */
@@ -211,6 +215,12 @@ typedef struct expectations {
     expected own, relative, indirect;
 } expectations;
 
+/* Twins have independent estimates of the first light, a disturbed reference one that is as noisy. */
+static double share_of(reference_relation relation, size_t sample) {
+    if (relation == REFERENCE_TWIN) return sample == BETTER ? 1 : -1;
+    return relation == REFERENCE_DISTURBED && sample == OTHER ? 1 : 0;
+}
+
 /* coarse: the coarser reference is known. */
 static void add_one(const subject *s, size_t e, double strength, bool known, reference_relation relation,
                     bool coarse, expectations *to) {
@@ -219,7 +229,7 @@ static void add_one(const subject *s, size_t e, double strength, bool known, ref
     for (size_t c = 0; c < C; c++) own.E[c * N + e] = strength;
     for (size_t k = 0; k < VECTOR; k++) own.B[k] = strength * (double)s->B[e][k];
     for (size_t f = 0; f < SAMPLES; f++) {
-        solve(s, &s->F[f], own.E, e, known && f != OWN, x[f]);
+        solve(s, &s->F[f], own.E, e, known && f != OWN, share_of(relation, f), x[f]);
         for (size_t k = 0; k < VECTOR; k++) x[f][k] -= own.B[k];
     }
     all = own;
@@ -230,7 +240,8 @@ static void add_one(const subject *s, size_t e, double strength, bool known, ref
         if (relation == REFERENCE_TWIN) all.noise[k] = .5 * (better - other);
         if (relation == REFERENCE_DISTURBED) all.noise[k] = other - better;
         if (relation == REFERENCE_COARSER && coarse) all.apart[k] = other_share * (better - other);
-        const double light = known ? (double)s->rho[k] * strength * spread_of(e, k % N) : 0;
+        const double light =
+            known && relation == REFERENCE_COARSER ? (double)s->rho[k] * strength * spread_of(e, k % N) : 0;
         all.noise2[k] = all.noise[k] * all.noise[k] + light * light;
         all.noise[k] += light;
     }
@@ -378,7 +389,7 @@ static void state(double off, double scale, uint64_t seed, error_group *stated, 
     for (size_t e = 0; e < N; e++) {
         answer one = {.E = {0}};
         light_up(e, one.E);
-        solve(&s, &exact, one.E, e, false, one.off);
+        solve(&s, &exact, one.E, e, false, 0, one.off);
         for (size_t k = 0; k < VECTOR; k++) {
             one.B[k] = (double)s.B[e][k];
             one.off[k] -= one.B[k];
