@@ -29,6 +29,7 @@ static const report_words words[] = {
     {"threshold", "values dropped below", ""},
     {"correction", "correction of dropped values", ""},
     {"probe_residual", "residual of random emission", ""},
+    {"smooth_residual", "residual of smooth emission", ""},
     {"uniform_error", "error of uniform radiosity", ""},
     {"residual", "largest residual of an emitter", ""},
     {"sweeps", "most products with the form factors", ""},

@@ -32,6 +32,8 @@ typedef struct build_report {
     double cost;   /* of an answer, as choice.h counts it, where the method knows it; 0: not */
     bool by_noise; /* the compression follows the noise of rays, so that a smaller epsilon changes nothing */
     bool below_noise; /* the bound asked for is below the noise of the form factors, which is stored too */
+    double
+        doubtful; /* the residual of smooth emission that the tolerance leaves, where it is larger; else 0 */
 } build_report;
 
 /* Each replaces a figure of the same name. */

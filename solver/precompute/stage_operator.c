@@ -175,6 +175,13 @@ static void log_report(const precompute_state *state) {
             "noise; --rays %zu would fit",
             o->build.epsilon, recipe_noise(&state->f.recipe), state->f.recipe.rays,
             recipe_auto_rays(o->build.epsilon, 1. / 4));
+    if (r->doubtful > 0)
+        terminal_warn(
+            state->t,
+            "the operator leaves %.2g of smooth light unexplained, above the %.2g that --epsilon %g "
+            "allows: its answers to light of large areas are off by about as much; take another "
+            "--method or --form-factors",
+            report_get(r, "smooth_residual", 0), r->doubtful, o->build.epsilon);
     terminal_log(state->t, "%s", r->reason);
 }
 

@@ -389,7 +389,7 @@ static lam_status build(const build_problem *problem, const build_options *optio
         numbers_of_S / (double)n, tree->n_frames, n_nodes, n_shapes, roots.count,
         roots.count == 1 ? "" : "s that exchange no light", n_own < C ? ", equal channels share them" : "",
         corrected ? "; the mean error of uniform emission is corrected" : "");
-    TRY(self_check(problem, row_sums, made, options->seed, report, error));
+    TRY(self_check(problem, row_sums, made, epsilon, options->seed, report, error));
     *op = made;
     made = NULL;
 done:
