@@ -48,14 +48,11 @@ void walk_cast(const walk_scene *s, const walker *w, size_t n, ray_packet *rays,
     visibility_cast(s->v, rays, n, self, 0, hits);
 }
 
-static void draw_place(walker *w) {
+void walk_draw_place(walker *w) {
     for (int d = 0; d < 4; d++) w->place[d] = random_unit(&w->random);
 }
 
-/* Russian roulette at an element: the walk goes on with the probability
- *     q = max_c (rho_c w_c) / max_c w_c,        w_c <- rho_c w_c / q,
- * which leaves the expectation of every channel as it is and the largest weight too. */
-static bool survives(const mesh *m, walker *w, uint32_t element) {
+bool walk_survives(const mesh *m, walker *w, uint32_t element) {
     double before = 0, after = 0;
     for (size_t c = 0; c < m->n_channels; c++) {
         before = fmax(before, w->weight[c]);
@@ -73,14 +70,14 @@ static bool advance(const walk_batch *b, walker *w, uint32_t element, bool back)
     if (element == VISIBILITY_NOTHING || back || element == w->at) {
         const bool crack = element == VISIBILITY_NOTHING ? s->closed : back ? s->fronts : true;
         if (!crack || ++w->lost == LOST_MOST) return false;
-        draw_place(w);
+        walk_draw_place(w);
         return true;
     }
     b->arrive(b->context, w, element);
-    if (!survives(s->m, w, element)) return false;
+    if (!walk_survives(s->m, w, element)) return false;
     w->at = element;
     w->lost = 0;
-    draw_place(w);
+    walk_draw_place(w);
     return true;
 }
 
@@ -110,6 +107,7 @@ void walk_batch_go(const walk_batch *b) {
         }
         if (n == 0) break;
         walk_cast(b->scene, w, n, &rays, &hits);
+        if (b->rays != NULL) *b->rays += (double)n;
         size_t kept = 0;
         for (size_t i = 0; i < n; i++)
             if (advance(b, &w[i], hits.element[i], hits.back[i])) w[kept++] = w[i];

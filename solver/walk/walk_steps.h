@@ -18,6 +18,7 @@ struct walk_scene {
 /* One walk. */
 typedef struct walker {
     uint32_t at;                  /* the element that its next ray leaves */
+    uint32_t path;                /* its number among those of the caller */
     unsigned lost;                /* rays through cracks since it came there */
     double place[4];              /* in [0, 1): two for the point, two for the direction */
     double weight[WALK_CHANNELS]; /* of what it has met; power when it was shot */
@@ -40,10 +41,19 @@ typedef struct walk_batch {
     bool (*start)(void *context, walker *w);
     void (*arrive)(void *context, const walker *w, uint32_t element);
     void *context;
+    double *rays; /* counts those that are cast; or NULL */
 } walk_batch;
 
 /* Takes all walks of a batch from their start to their end, or until run->stop. */
 void walk_batch_go(const walk_batch *b);
+
+/* A new place at random, from the walk's own stream. */
+void walk_draw_place(walker *w);
+
+/* Russian roulette at an element: the walk goes on with the probability
+ *     q = max_c (rho_c w_c) / max_c w_c,        w_c <- rho_c w_c / q,
+ * which leaves the expectation of every channel as it is and the largest weight too. */
+bool walk_survives(const mesh *m, walker *w, uint32_t element);
 
 /* Casts the next rays of n walks, at most VISIBILITY_PACKET, from their places. */
 void walk_cast(const walk_scene *s, const walker *w, size_t n, ray_packet *rays, hit_packet *hits);

@@ -1,0 +1,321 @@
+#include "solver/walk/reuse.h"
+
+#include "solver/base/clock.h"
+#include "solver/base/random.h"
+#include "solver/walk/reuse_weights.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Paths whose first hits are found together. */
+enum { CHUNK = 1024 };
+
+void reuse_estimates_free(reuse_estimates *e) {
+    free(e->H);
+    free(e->error);
+    *e = (reuse_estimates){.n = 0};
+}
+
+/* All that batches share. */
+typedef struct reuse {
+    const walk_scene *scene;
+    const reuse_problem *problem;
+    size_t n, C, s, of_batch; /* paths of a position in a batch */
+    light_frame *frames;      /* [s] */
+    light_table table;        /* of them */
+    const light_maps *maps;   /* or NULL */
+    walk_run *run;
+} reuse;
+
+/* One batch, and the walk of a chunk of its paths. */
+typedef struct reuse_batch {
+    const reuse *r;
+    double *sum; /* [n][C][s]: power over that of the light */
+    first_hit *hits;
+    float *weight; /* [CHUNK][s] */
+    size_t count, next;
+    double rays, trace, reuse;
+} reuse_batch;
+
+static void to_float(const double a[3], float out[3]) {
+    for (int d = 0; d < 3; d++) out[d] = (float)a[d];
+}
+
+static void frame_of(const walk_scene *s, const moving_light *l, const light_pose *p, light_frame *out) {
+    double normal[3], side[3], tangent[3], centre[3] = {0, 0, 0}, at[3], lift[3];
+    const double rounding = visibility_rounding(s->v);
+    light_pose_direction(p, l->normal, normal);
+    for (int d = 0; d < 3; d++) side[d] = l->corner[1][d] - l->corner[0][d];
+    light_pose_direction(p, side, tangent);
+    const double length = sqrt(tangent[0] * tangent[0] + tangent[1] * tangent[1] + tangent[2] * tangent[2]);
+    for (int d = 0; d < 3; d++) tangent[d] /= length;
+    const double b[3] = {normal[1] * tangent[2] - normal[2] * tangent[1],
+                         normal[2] * tangent[0] - normal[0] * tangent[2],
+                         normal[0] * tangent[1] - normal[1] * tangent[0]};
+    for (size_t k = 0; k < l->n_corners; k++)
+        for (int d = 0; d < 3; d++) centre[d] += l->corner[k][d] / (double)l->n_corners;
+    light_pose_point(p, centre, at);
+    /* A light that lies in a face starts above it. */
+    for (int d = 0; d < 3; d++) lift[d] = p->move[d] + 4 * rounding * normal[d];
+    for (int d = 0; d < 3; d++) at[d] += 4 * rounding * normal[d];
+    visibility_recentre(s->v, lift, out->move);
+    visibility_recentre(s->v, at, out->centre);
+    for (int d = 0; d < 3; d++) to_float(p->turn[d], out->turn[d]);
+    to_float(tangent, out->tangent);
+    to_float(b, out->bitangent);
+    to_float(normal, out->normal);
+}
+
+/* Casts the first rays of up to CHUNK paths of a position. */
+static void find_hits(reuse_batch *b, walk_starts *starts, size_t position) {
+    const reuse *r = b->r;
+    const light_frame *f = &r->frames[position];
+    static const double all[2] = {0, 1};
+    uint32_t self[VISIBILITY_PACKET];
+    for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = VISIBILITY_NOTHING;
+    b->count = b->next = 0;
+    while (b->count < CHUNK) {
+        first_hit *const at = b->hits + b->count;
+        ray_packet rays;
+        hit_packet hits;
+        size_t n = 0;
+        for (; n < VISIBILITY_PACKET; n++) {
+            walker w;
+            size_t only;
+            double point[3];
+            if (!walk_starts_next(starts, all, 1, &w, &only)) break;
+            moving_light_point(r->problem->light, w.place[0], w.place[1], point);
+            const float radius = (float)sqrt(w.place[2]), angle = (float)(2 * M_PI * w.place[3]),
+                        x = radius * cosf(angle), y = radius * sinf(angle),
+                        z = sqrtf(fmaxf(1 - radius * radius, 1e-12f));
+            at[n] = (first_hit){.position = (uint32_t)position, .random = w.random};
+            to_float(point, at[n].local);
+            for (int d = 0; d < 3; d++) {
+                rays.origin[d][n] = f->turn[d][0] * at[n].local[0] + f->turn[d][1] * at[n].local[1] +
+                                    f->turn[d][2] * at[n].local[2] + f->move[d];
+                rays.direction[d][n] = x * f->tangent[d] + y * f->bitangent[d] + z * f->normal[d];
+            }
+        }
+        if (n == 0) break;
+        for (size_t i = n; i < VISIBILITY_PACKET; i++)
+            for (int d = 0; d < 3; d++) rays.origin[d][i] = rays.direction[d][i] = 0;
+        visibility_cast(r->scene->v, &rays, n, self, 0, &hits);
+        for (size_t i = 0; i < n; i++) {
+            const bool front = hits.element[i] != VISIBILITY_NOTHING && !hits.back[i];
+            at[i].element = front ? hits.element[i] : VISIBILITY_NOTHING;
+            for (int d = 0; d < 3; d++)
+                at[i].y[d] = rays.origin[d][i] + (front ? hits.distance[i] * rays.direction[d][i] : 0);
+        }
+        b->rays += (double)n;
+        b->count += n;
+    }
+}
+
+/* eq. 2.8 with the same N for all positions; a path of its own position alone has the weight 1 / N. */
+static void weigh(reuse_batch *b) {
+    const reuse *r = b->r;
+    const float per_path = 1 / (float)r->of_batch;
+    for (size_t k = 0; k < b->count; k++) {
+        float *const w = b->weight + k * r->s, sum = 0;
+        if (b->hits[k].element == VISIBILITY_NOTHING) continue;
+        reuse_kernels(r->scene, &r->table, r->frames, r->maps, &b->hits[k], w);
+        for (size_t l = 0; l < r->s; l++) sum += w[l];
+        const float scale = sum > 0 ? per_path / sum : 0;
+        for (size_t l = 0; l < r->s; l++) w[l] *= scale;
+    }
+}
+
+static void deposit(const reuse_batch *b, const walker *w, uint32_t element) {
+    const reuse *r = b->r;
+    const size_t s = r->s, C = r->C;
+    double *const sum = b->sum + (size_t)element * C * s;
+    if (r->problem->way == REUSE_NONE) {
+        for (size_t c = 0; c < C; c++)
+            sum[c * s + b->hits[w->path].position] += w->weight[c] / (double)r->of_batch;
+        return;
+    }
+    const float *const weight = b->weight + w->path * s;
+    for (size_t c = 0; c < C; c++) {
+        const double power = w->weight[c];
+        double *const out = sum + c * s;
+#pragma omp simd
+        for (size_t l = 0; l < s; l++) out[l] += power * (double)weight[l];
+    }
+}
+
+/* The next path of the chunk that goes on from its first hit. */
+static bool start(void *context, walker *w) {
+    reuse_batch *b = context;
+    while (b->next < b->count) {
+        const size_t k = b->next++;
+        const first_hit *hit = &b->hits[k];
+        if (hit->element == VISIBILITY_NOTHING) continue;
+        w->random = hit->random;
+        w->path = (uint32_t)k;
+        for (size_t c = 0; c < b->r->C; c++) w->weight[c] = 1;
+        deposit(b, w, hit->element);
+        if (!walk_survives(b->r->scene->m, w, hit->element)) continue;
+        w->at = hit->element;
+        walk_draw_place(w);
+        return true;
+    }
+    return false;
+}
+
+static void arrive(void *context, const walker *w, uint32_t element) {
+    deposit(context, w, element);
+}
+
+static void go(reuse_batch *b, size_t number) {
+    const reuse *r = b->r;
+    const walk_batch walks = {
+        .scene = r->scene, .run = r->run, .start = start, .arrive = arrive, .context = b, .rays = &b->rays};
+    for (size_t l = 0; l < r->s && !r->run->stop; l++) {
+        walk_starts starts;
+        walk_starts_init(&starts, r->problem->seed, number * r->s + l, r->of_batch);
+        for (;;) {
+            const double begun = clock_thread_seconds();
+            find_hits(b, &starts, l);
+            if (b->count == 0) break;
+            const double traced = clock_thread_seconds();
+            if (r->problem->way != REUSE_NONE) weigh(b);
+            const double weighed = clock_thread_seconds();
+            walk_batch_go(&walks);
+            b->reuse += weighed - traced;
+            b->trace += traced - begun + clock_thread_seconds() - weighed;
+        }
+    }
+}
+
+/* Adds a batch to the sums and squares [C][s][n] of the estimates, in the order of batches. */
+static void add_batch(const reuse *r, const double *sum, double *mean, double *square) {
+    const mesh *m = r->scene->m;
+    for (size_t i = 0; i < r->n; i++)
+        for (size_t c = 0; c < r->C; c++) {
+            const double power = r->problem->light->emission[c] * r->problem->light->area / m->area[i];
+            for (size_t l = 0; l < r->s; l++) {
+                const double x = power * sum[(i * r->C + c) * r->s + l];
+                const size_t k = (c * r->s + l) * r->n + i;
+                mean[k] += x;
+                square[k] += x * x;
+            }
+        }
+}
+
+static lam_status run_batches(const reuse *r, reuse_estimates *e, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t size = r->n * r->C * r->s;
+    bool failed = false;
+    double rays = 0;
+    double *mean = memory_allocate(size, sizeof *mean, "paths", error);
+    double *square = memory_allocate(size, sizeof *square, "paths", error);
+    if (mean == NULL || square == NULL) TRY(LAM_ERR_MEMORY);
+#pragma omp parallel
+    {
+        reuse_batch b = {.r = r};
+        b.sum = malloc(size * sizeof *b.sum);
+        b.hits = malloc((CHUNK + VISIBILITY_PACKET) * sizeof *b.hits);
+        b.weight = malloc((CHUNK + VISIBILITY_PACKET) * r->s * sizeof *b.weight);
+        const bool ready = b.sum != NULL && b.hits != NULL && b.weight != NULL;
+#pragma omp for schedule(static, 1) ordered
+        for (size_t k = 0; k < WALK_BATCHES; k++) {
+            if (ready) {
+                memset(b.sum, 0, size * sizeof *b.sum);
+                b.rays = 0;
+                go(&b, k);
+            }
+#pragma omp ordered
+            {
+                if (ready)
+                    add_batch(r, b.sum, mean, square);
+                else
+                    failed = true;
+                rays += b.rays;
+            }
+        }
+#pragma omp critical(reuse_seconds)
+        {
+            e->trace_seconds += b.trace;
+            e->reuse_seconds += b.reuse;
+        }
+        free(b.sum);
+        free(b.hits);
+        free(b.weight);
+    }
+    if (failed) FAIL(error, LAM_ERR_MEMORY, "paths: out of memory");
+    TRY(walk_run_end(r->run, error));
+    for (size_t k = 0; k < size; k++) {
+        const double x = mean[k] / WALK_BATCHES;
+        e->H[k] = (float)x;
+        e->error[k] = (float)sqrt(fmax(0, square[k] / WALK_BATCHES - x * x) / (WALK_BATCHES - 1));
+    }
+    e->rays = rays / ((double)e->paths * (double)r->s);
+done:
+    free(mean);
+    free(square);
+    return status;
+}
+
+/* A position whose light reaches nothing is a mistake. */
+static lam_status check_reach(const reuse *r, const reuse_estimates *e, lam_error *error) {
+    lam_status status = LAM_OK;
+    for (size_t l = 0; l < r->s; l++) {
+        double most = 0;
+        for (size_t c = 0; c < r->C; c++)
+            for (size_t i = 0; i < r->n; i++) most = fmax(most, (double)e->H[(c * r->s + l) * r->n + i]);
+        if (!(most > 0))
+            FAIL(error, LAM_ERR_ARGUMENT,
+                 "position %zu (%s): its light reaches no front of the scene; is it inside a wall, or turned "
+                 "away?",
+                 l, r->problem->light->pose[l].name);
+    }
+done:
+    return status;
+}
+
+lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_estimates *out,
+                      lam_error *error) {
+    lam_status status = LAM_OK;
+    const moving_light *light = problem->light;
+    reuse_estimates e = {.n = s->m->n, .n_channels = s->m->n_channels, .n_positions = light->n};
+    light_maps maps = {.side = 0};
+    reuse r = {.scene = s, .problem = problem, .n = e.n, .C = e.n_channels, .s = e.n_positions};
+    size_t rows, size;
+    if (problem->paths == 0 || light->n == 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "%zu paths of %zu positions: must be at least 1", problem->paths,
+             light->n);
+    e.paths = ((problem->paths - 1) / WALK_BATCHES + 1) * WALK_BATCHES;
+    r.of_batch = e.paths / WALK_BATCHES;
+    if (!size_multiply(e.n_channels, e.n_positions, &rows) || !size_multiply(rows, e.n, &size))
+        FAIL(error, LAM_ERR_MEMORY, "paths: too many positions");
+    e.H = memory_allocate(size, sizeof *e.H, "paths", error);
+    e.error = memory_allocate(size, sizeof *e.error, "paths", error);
+    r.frames = memory_allocate(e.n_positions, sizeof *r.frames, "paths", error);
+    if (e.H == NULL || e.error == NULL || r.frames == NULL) TRY(LAM_ERR_MEMORY);
+    for (size_t l = 0; l < e.n_positions; l++) frame_of(s, light, &light->pose[l], &r.frames[l]);
+    TRY(light_table_create(e.n_positions, r.frames, &r.table, error));
+    walk_run run = {.progress = problem->progress,
+                    .stage = problem->stage,
+                    .all = (double)e.paths * (double)e.n_positions};
+    r.run = &run;
+    if (problem->way == REUSE_MAPS || problem->way == REUSE_CUBES) {
+        const double begun = clock_seconds();
+        if (problem->resolution < 2)
+            FAIL(error, LAM_ERR_ARGUMENT, "maps of %zu cells a side: must be at least 2",
+                 problem->resolution);
+        TRY(light_maps_create(s, e.n_positions, r.frames, problem->way, problem->resolution, &maps, error));
+        e.maps_seconds = clock_seconds() - begun;
+        r.maps = &maps;
+    }
+    TRY(run_batches(&r, &e, error));
+    TRY(check_reach(&r, &e, error));
+    *out = e;
+    e = (reuse_estimates){.n = 0};
+done:
+    free(r.frames);
+    light_table_free(&r.table);
+    light_maps_free(&maps);
+    reuse_estimates_free(&e);
+    return status;
+}

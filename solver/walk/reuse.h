@@ -1,0 +1,46 @@
+/* Reuse of shooting paths (Castro et al.): the light of all positions of a moving light from
+ * walks that serve every one of them. A path of position i whose first hit is y carries for position j the
+ * power
+ *     Phi F(x_j, y) / sum_l N_l F(x_l, y)                                             (eq. 2.8)
+ * with x_l the same point of the light as pose l carries it, N_l the paths of position l, and
+ * F(x, y) = cos cos V / (pi r^2). Must not know form factors between elements. */
+#ifndef LAMBERT_WALK_REUSE_H
+#define LAMBERT_WALK_REUSE_H
+
+#include "solver/walk/moving_light.h"
+#include "solver/walk/walk.h"
+
+/* REUSE_NONE: every position by its own paths (approach A). REUSE_EXACT: V by a ray each (B). REUSE_MAPS: V
+ * by maps of the hemisphere about the light's centre that hold the nearest facet and its distance (C, fig.
+ * 4). REUSE_CUBES: by hemicubes that hold facets alone (D, fig. 6), with F from the centre of the light. */
+typedef enum reuse_way { REUSE_NONE, REUSE_EXACT, REUSE_MAPS, REUSE_CUBES } reuse_way;
+
+typedef struct reuse_problem {
+    const moving_light *light; /* its positions are its poses */
+    reuse_way way;
+    size_t paths;      /* of each position, rounded up to a multiple of WALK_BATCHES */
+    size_t resolution; /* of maps: cells along the side of a map, pixels along the top of a hemicube */
+    uint64_t seed;     /* the bits of estimates depend on it, not on threads */
+    const progress *progress;
+    const char *stage;
+} reuse_problem;
+
+typedef struct reuse_estimates {
+    size_t n, n_channels, n_positions; /* elements, C, s */
+    size_t paths;                      /* as rounded up */
+    float *H, *error; /* [C][s][n] W/m2: the mean irradiance of an element, and its standard error from
+                         batches */
+    double rays;      /* of a path, mean, the first one included */
+    double maps_seconds, trace_seconds, reuse_seconds; /* of a thread */
+} reuse_estimates;
+
+void reuse_estimates_free(reuse_estimates *e);
+
+/* REUSE_NONE and REUSE_EXACT are unbiased; the bias of the others goes with the size of the light and of the
+ * cells. Cost: s * paths walks, for REUSE_EXACT s - 1 more rays for each; memory 8 (T + 2) n C s bytes for T
+ * threads. Errors: LAM_ERR_ARGUMENT names a position that reaches nothing, LAM_ERR_MEMORY, LAM_ERR_CANCELLED.
+ */
+lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_estimates *out,
+                      lam_error *error);
+
+#endif

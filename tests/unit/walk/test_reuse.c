@@ -1,0 +1,339 @@
+/* Paths that serve all positions of a light against closed forms and against paths of their own. */
+#include "solver/method/reference.h"
+#include "solver/walk/reuse.h"
+#include "support/box.h"
+#include "support/dense.h"
+#include "support/scene.h"
+#include "support/suite.h"
+
+#include <omp.h>
+
+static const double unit[3] = {1, 1, 1};
+enum { DIVISIONS = 4, POSITIONS = 4 };
+
+/* A square of a quarter of a side in the plane z = 0, which looks down, and where it is carried: along a line
+ * below the ceiling, and turned to look along x. */
+static moving_light square_light(void) {
+    static const double corners[4][3] = {{0, 0, 0}, {0, .25, 0}, {.25, .25, 0}, {.25, 0, 0}};
+    static const double moves[POSITIONS][3] = {
+        {.25, .25, .75}, {.375, .25, .75}, {.6, .5, .75}, {.25, .5, .3}};
+    moving_light l;
+    lam_error error = {.message = ""};
+    double(*corner)[3] = test_allocate(4, sizeof *corner);
+    memcpy(corner, corners, sizeof corners);
+    ck_ok(moving_light_create(4, corner, &l, &error));
+    l.n = POSITIONS;
+    l.pose = test_allocate(POSITIONS, sizeof *l.pose);
+    l.emission[0] = 3;
+    for (size_t k = 0; k < POSITIONS; k++) {
+        l.pose[k].name = strdup("a position");
+        for (int d = 0; d < 3; d++) {
+            l.pose[k].move[d] = moves[k][d];
+            l.pose[k].turn[d][d] = 1;
+        }
+    }
+    /* Turned about y: (x, y, z) becomes (-z, y, x), and what looks down looks along x. */
+    static const double about_y[3][3] = {{0, 0, -1}, {0, 1, 0}, {1, 0, 0}};
+    memcpy(l.pose[3].turn, about_y, sizeof about_y);
+    return l;
+}
+
+/* The cell that a pose of the square covers. */
+static box_cell cell_at(const light_pose *p, bool along_x) {
+    box_cell c = {.axis = along_x ? 0 : 2, .level = p->move[along_x ? 0 : 2]};
+    for (int d = 0; d < 3; d++) {
+        c.from[d] = p->move[d];
+        c.to[d] = p->move[d] + (d == c.axis ? 0 : .25);
+    }
+    return c;
+}
+
+/* Irradiance H [s][n] in the empty box, exactly: first light by closed forms, and all bounces. */
+static double *exact_light(const mesh *m, const moving_light *l, const csr *F) {
+    const size_t n = m->n;
+    double *H = test_allocate(POSITIONS * n, sizeof *H), *E = test_allocate(POSITIONS * n, sizeof *E);
+    reference *r = NULL;
+    lam_error error = {.message = ""};
+    for (size_t k = 0; k < POSITIONS; k++) {
+        const box_cell light = cell_at(&l->pose[k], k == 3);
+        for (size_t i = 0; i < n; i++) {
+            const box_cell cell = box_cell_of(unit, DIVISIONS, i);
+            const int a = light.axis;
+            /* In front of the light lies what is below it, or beyond it along x. */
+            const bool before =
+                a == 0 ? cell.from[0] >= light.level - 1e-12 : cell.to[2] <= light.level + 1e-12;
+            const bool same = cell.axis == a && fabs(cell.level - light.level) < 1e-12;
+            const double direct =
+                before && !same ? l->emission[0] * box_exchange(&cell, &light) / m->area[i] : 0;
+            H[k * n + i] = E[k * n + i] = (double)m->reflectance[i] * direct;
+        }
+    }
+    ck_ok(reference_create(F, m->area, m->reflectance, REFERENCE_DENSE, &r, &error));
+    ck_ok(reference_solve(r, POSITIONS, E, H, 1e-12, NULL, &error));
+    for (size_t k = 0; k < POSITIONS * n; k++) H[k] /= (double)m->reflectance[k % n];
+    reference_destroy(r);
+    free(E);
+    return H;
+}
+
+static reuse_estimates reuse(const mesh *m, const moving_light *l, reuse_way way, size_t paths,
+                             size_t resolution, uint64_t seed) {
+    walk_scene *s = NULL;
+    reuse_estimates e;
+    lam_error error = {.message = ""};
+    const reuse_problem problem = {
+        .light = l, .way = way, .paths = paths, .resolution = resolution, .seed = seed};
+    ck_ok(walk_scene_create(m, CLOSURE_MEASURED, &s, &error));
+    ck_ok(walk_reuse(s, &problem, &e, &error));
+    walk_scene_free(s);
+    return e;
+}
+
+/* The mean square of (H~ - H) / error over elements that have an error, of one position. */
+static double chi_square(const reuse_estimates *e, size_t position, const double *H) {
+    double sum = 0, count = 0;
+    for (size_t i = 0; i < e->n; i++) {
+        const size_t k = position * e->n + i;
+        ck_assert(e->error[k] > 0);
+        sum += pow(((double)e->H[k] - H[k]) / (double)e->error[k], 2);
+        count++;
+    }
+    return sum / count;
+}
+
+/* Errors from 32 batches are Student's, whose square has the mean 31 / 29; 96 elements of a position, which
+ * are not independent. */
+START_TEST(agrees_with_closed_forms) {
+    const reuse_way way = _i == 0 ? REUSE_NONE : REUSE_EXACT;
+    mesh m = box_mesh(unit, DIVISIONS, .6f);
+    csr F = box_form_factors(unit, DIVISIONS, m.area);
+    moving_light l = square_light();
+    double *H = exact_light(&m, &l, &F);
+    reuse_estimates e = reuse(&m, &l, way, 40000, 0, 7);
+    ck_assert_uint_eq(e.paths % WALK_BATCHES, 0);
+    ck_assert_double_ge(e.rays, 1 / (1 - .6) - .1);
+    for (size_t k = 0; k < POSITIONS; k++) {
+        const double chi = chi_square(&e, k, H);
+        ck_assert_msg(chi > .5 && chi < 31. / 29 + 5 * sqrt(2. / 96), "position %zu: %g", k, chi);
+    }
+    reuse_estimates_free(&e);
+    free(H);
+    moving_light_free(&l);
+    csr_free(&F);
+    mesh_free(&m);
+}
+END_TEST
+
+static double square_error(const reuse_estimates *e, size_t position, const double *H, const mesh *m) {
+    double sum = 0;
+    for (size_t i = 0; i < e->n; i++)
+        sum += m->area[i] * pow((double)e->H[position * e->n + i] - H[position * e->n + i], 2);
+    return sum;
+}
+
+/* Positions of the line share their paths: their errors fall, though each has as many paths of its own. */
+START_TEST(sharing_lowers_the_error) {
+    mesh m = box_mesh(unit, DIVISIONS, .6f);
+    csr F = box_form_factors(unit, DIVISIONS, m.area);
+    moving_light l = square_light();
+    double *H = exact_light(&m, &l, &F), own = 0, shared = 0;
+    for (uint64_t seed = 1; seed <= 8; seed++) {
+        reuse_estimates a = reuse(&m, &l, REUSE_NONE, 6400, 0, seed),
+                        b = reuse(&m, &l, REUSE_EXACT, 6400, 0, seed);
+        for (size_t k = 0; k < 3; k++) {
+            own += square_error(&a, k, H, &m);
+            shared += square_error(&b, k, H, &m);
+        }
+        reuse_estimates_free(&a);
+        reuse_estimates_free(&b);
+    }
+    ck_assert_msg(shared < .6 * own, "%g for %g", shared, own);
+    free(H);
+    moving_light_free(&l);
+    csr_free(&F);
+    mesh_free(&m);
+}
+END_TEST
+
+/* A Cornell box, whose blocks hide the light of some positions from others. */
+static mesh cornell(void) {
+    const generate_options how = {.kind = "cornell", .elements = 150, .reflectance = .5, .seed = 1};
+    return generate_good(&how);
+}
+
+/* A light that goes down between the blocks, turning. */
+static moving_light falling_light(const mesh *m) {
+    moving_light l = square_light();
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t v = 0; v < m->n_vertices; v++)
+        for (int d = 0; d < 3; d++) {
+            low[d] = fmin(low[d], m->vertices[v][d]);
+            high[d] = fmax(high[d], m->vertices[v][d]);
+        }
+    for (size_t k = 0; k < l.n; k++) {
+        const double angle = .4 * (double)k;
+        const double turn[3][3] = {{cos(angle), 0, -sin(angle)}, {0, 1, 0}, {sin(angle), 0, cos(angle)}};
+        memcpy(l.pose[k].turn, turn, sizeof turn);
+        for (int d = 0; d < 3; d++) l.pose[k].move[d] = .5 * (low[d] + high[d]);
+        l.pose[k].move[2] = high[2] - (.1 + .2 * (double)k) * (high[2] - low[2]);
+    }
+    for (int c = 0; c < MOVING_LIGHT_CHANNELS; c++) l.emission[c] = 1;
+    return l;
+}
+
+/* Where something hides, shared paths agree with paths of their own. */
+START_TEST(rays_know_what_is_hidden) {
+    mesh m = cornell();
+    moving_light l = falling_light(&m);
+    reuse_estimates a = reuse(&m, &l, REUSE_NONE, 64000, 0, 3), b = reuse(&m, &l, REUSE_EXACT, 16000, 0, 5);
+    for (size_t k = 0; k < l.n * m.n_channels; k++) {
+        double sum = 0, count = 0;
+        for (size_t i = 0; i < m.n; i++) {
+            const size_t at = k * m.n + i;
+            const double both = hypot((double)a.error[at], (double)b.error[at]);
+            if (!(both > 0)) continue;
+            sum += pow(((double)a.H[at] - (double)b.H[at]) / both, 2);
+            count++;
+        }
+        ck_assert_double_gt(count, .5 * (double)m.n);
+        ck_assert_msg(sum / count < 31. / 29 + 5 * sqrt(2 / count), "row %zu: %g of %g", k, sum / count,
+                      count);
+    }
+    reuse_estimates_free(&a);
+    reuse_estimates_free(&b);
+    moving_light_free(&l);
+    mesh_free(&m);
+}
+END_TEST
+
+/* |H~ - H| / |H| over all positions and elements. */
+static double distance(const reuse_estimates *e, const reuse_estimates *of, const mesh *m) {
+    double off = 0, all = 0;
+    for (size_t k = 0; k < of->n_channels * of->n_positions * of->n; k++) {
+        const double a = m->area[k % of->n];
+        off += a * pow((double)e->H[k] - (double)of->H[k], 2);
+        all += a * pow((double)of->H[k], 2);
+    }
+    return sqrt(off / all);
+}
+
+/* Maps are biased, the less the finer they are and the smaller the light is. */
+START_TEST(maps_come_close) {
+    const reuse_way way = _i == 0 ? REUSE_MAPS : REUSE_CUBES;
+    mesh m = cornell();
+    moving_light l = falling_light(&m);
+    for (size_t k = 0; k < l.n_corners; k++)
+        for (int d = 0; d < 3; d++) l.corner[k][d] *= .02;
+    l.area *= .0004;
+    reuse_estimates exact = reuse(&m, &l, REUSE_EXACT, 32000, 0, 3), coarse = reuse(&m, &l, way, 32000, 4, 3),
+                    fine = reuse(&m, &l, way, 32000, 256, 3);
+    const double far = distance(&coarse, &exact, &m), near = distance(&fine, &exact, &m);
+    ck_assert_msg(near < .02 && near < .3 * far, "%g at 256 cells, %g at 4", near, far);
+    reuse_estimates_free(&exact);
+    reuse_estimates_free(&coarse);
+    reuse_estimates_free(&fine);
+    moving_light_free(&l);
+    mesh_free(&m);
+}
+END_TEST
+
+START_TEST(bits_do_not_depend_on_threads) {
+    mesh m = cornell();
+    moving_light l = falling_light(&m);
+    const int threads = omp_get_max_threads();
+    omp_set_num_threads(1);
+    reuse_estimates one = reuse(&m, &l, REUSE_EXACT, 3200, 0, 2);
+    omp_set_num_threads(3);
+    reuse_estimates three = reuse(&m, &l, REUSE_EXACT, 3200, 0, 2);
+    omp_set_num_threads(threads);
+    const size_t size = m.n * m.n_channels * l.n;
+    ck_assert_mem_eq(one.H, three.H, size * sizeof *one.H);
+    ck_assert_mem_eq(one.error, three.error, size * sizeof *one.error);
+    ck_assert_double_eq(one.rays, three.rays);
+    reuse_estimates_free(&one);
+    reuse_estimates_free(&three);
+    moving_light_free(&l);
+    mesh_free(&m);
+}
+END_TEST
+
+/* Points fill the polygon evenly: means of coordinates and of their squares. */
+START_TEST(points_are_uniform) {
+    static const double corners[5][3] = {{0, 0, 1}, {2, 0, 1}, {3, 1, 1}, {1, 2, 1}, {0, 1, 1}};
+    moving_light l;
+    lam_error error = {.message = ""};
+    double(*corner)[3] = test_allocate(5, sizeof *corner), sum[3] = {0, 0, 0};
+    memcpy(corner, corners, sizeof corners);
+    ck_ok(moving_light_create(5, corner, &l, &error));
+    enum { SIDE = 1000 };
+    for (int a = 0; a < SIDE; a++)
+        for (int b = 0; b < SIDE; b++) {
+            double x[3];
+            moving_light_point(&l, (a + .5) / SIDE, (b + .5) / SIDE, x);
+            sum[0] += x[0] / (SIDE * SIDE);
+            sum[1] += x[1] / (SIDE * SIDE);
+            sum[2] += x[0] * x[1] / (SIDE * SIDE);
+            ck_assert_double_eq_tol(x[2], 1, 1e-12);
+        }
+    /* By Green's theorem. */
+    double area = 0, mx = 0, my = 0, mxy = 0;
+    for (int k = 0; k < 5; k++) {
+        const double *p = corners[k], *q = corners[(k + 1) % 5], c = p[0] * q[1] - q[0] * p[1];
+        area += c / 2;
+        mx += (p[0] + q[0]) * c / 6;
+        my += (p[1] + q[1]) * c / 6;
+        mxy += (p[0] * q[1] + 2 * p[0] * p[1] + 2 * q[0] * q[1] + q[0] * p[1]) * c / 24;
+    }
+    ck_assert_double_eq_tol(l.area, area, 1e-12);
+    ck_assert_double_eq_tol(sum[0], mx / area, 2e-3);
+    ck_assert_double_eq_tol(sum[1], my / area, 2e-3);
+    ck_assert_double_eq_tol(sum[2], mxy / area, 4e-3);
+    ck_assert_double_eq_tol(l.normal[2], 1, 1e-12);
+    moving_light_free(&l);
+}
+END_TEST
+
+static void refused(const char *says, size_t n, const double (*corners)[3]) {
+    moving_light l;
+    lam_error error = {.message = ""};
+    double(*corner)[3] = test_allocate(n, sizeof *corner);
+    memcpy(corner, corners, n * sizeof *corner);
+    ck_assert_int_eq(moving_light_create(n, corner, &l, &error), LAM_ERR_ARGUMENT);
+    ck_assert_msg(strstr(error.message, says) != NULL, "%s", error.message);
+}
+
+START_TEST(refuses_what_is_no_light) {
+    refused("at least 3", 2, (const double[][3]){{0, 0, 0}, {1, 0, 0}});
+    refused("no area", 3, (const double[][3]){{0, 0, 0}, {1, 0, 0}, {2, 0, 0}});
+    refused("off the plane", 4, (const double[][3]){{0, 0, 0}, {1, 0, 0}, {1, 1, .2}, {0, 1, 0}});
+    refused("corner 2", 4, (const double[][3]){{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {.9, .1, 0}});
+    mesh m = box_mesh(unit, DIVISIONS, .6f);
+    moving_light l = square_light();
+    walk_scene *s = NULL;
+    reuse_estimates e;
+    lam_error error = {.message = ""};
+    const reuse_problem problem = {.light = &l, .way = REUSE_EXACT, .paths = 64, .seed = 1};
+    l.pose[2].move[2] = -3; /* below the floor, which it sees nothing of */
+    ck_ok(walk_scene_create(&m, CLOSURE_MEASURED, &s, &error));
+    ck_assert_int_eq(walk_reuse(s, &problem, &e, &error), LAM_ERR_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(error.message, "position 2 (a position)"));
+    walk_scene_free(s);
+    moving_light_free(&l);
+    mesh_free(&m);
+}
+END_TEST
+
+int main(void) {
+    Suite *suite = suite_create("reuse");
+    TCase *tests = tcase_create("reuse");
+    tcase_set_timeout(tests, 300);
+    tcase_add_loop_test(tests, agrees_with_closed_forms, 0, 2);
+    tcase_add_test(tests, sharing_lowers_the_error);
+    tcase_add_test(tests, rays_know_what_is_hidden);
+    tcase_add_loop_test(tests, maps_come_close, 0, 2);
+    tcase_add_test(tests, bits_do_not_depend_on_threads);
+    tcase_add_test(tests, points_are_uniform);
+    tcase_add_test(tests, refuses_what_is_no_light);
+    suite_add_tcase(suite, tests);
+    return suite_run_together(suite);
+}
