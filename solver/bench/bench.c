@@ -154,6 +154,7 @@ const bench_suite bench_suites[] = {
     {.name = "service", .script = "service.py"},
     {.name = "hierarchical", .run = bench_hierarchical},
     {.name = "mesh", .run = bench_mesh},
+    {.name = "reuse", .run = bench_reuse},
     {.name = "honesty", .script = "honesty.py"},
     {.name = NULL},
 };

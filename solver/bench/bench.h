@@ -91,7 +91,7 @@ lam_status bench_check(const bench_run *run, lam_error *error);
 typedef lam_status bench_suite_run(const bench_run *run, lam_error *error);
 
 bench_suite_run bench_formfactors, bench_lowrank, bench_stability, bench_cities, bench_hierarchical,
-    bench_mesh;
+    bench_mesh, bench_reuse;
 
 /* A suite is a function, or a script that writes its results as JSON (main.c). */
 typedef struct bench_suite {

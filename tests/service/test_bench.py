@@ -372,6 +372,27 @@ class Cities(unittest.TestCase):
             self.assertTrue(1 < row["density"] < 30, row)
 
 
+class Reuse(unittest.TestCase):
+    """One quick run: paths that serve all positions of a lamp beside paths of their own."""
+
+    def test_positions(self):
+        with tempfile.TemporaryDirectory() as folder:
+            out = os.path.join(folder, "results")
+            done = lambert("bench", "reuse", "--quick", "-o", out)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            with open(os.path.join(out, "reuse-positions.csv"), encoding="utf-8", newline="") as stream:
+                rows = list(csv.DictReader(stream))
+        self.assertEqual([row["approach"][0] for row in rows], list("ABCDABCD"))
+        for row in rows:
+            own = row["approach"][0] == "A"
+            self.assertTrue(2 < float(row["rays_per_path"]) < 4, row)
+            for frame in "1", "15", "20":
+                ratio = float(row["mse_" + frame])
+                self.assertTrue(ratio == 1 if own else ratio > 2, row)
+            self.assertTrue(own or float(row["flicker"]) > 5, row)
+            self.assertEqual(float(row["maps_s"]) > 0, row["approach"][0] in "CD")
+
+
 class Refusals(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
