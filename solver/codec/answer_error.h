@@ -66,8 +66,8 @@ typedef struct error_answer {
     emission_size size, sky; /* of the emission, and of the sky: of tiles in place of elements */
 } error_answer;
 
-/* The root of the mean squared error over the light that is left where that error is taken out of the light of
- * the answer, in squares; not finite where none is. */
+/* The root of the mean squared error over the light that is left where that error is taken out of the light
+ * of the answer, in squares; not finite where none is. */
 typedef struct answer_error {
     double relative; /* |B~ - B| / |B| */
     double indirect; /* |B~ - B| / |B - E - rho H0| */

@@ -194,9 +194,9 @@ START_TEST(figures_of_cities_are_whole) {
     const bench_run run = {.scale = BENCH_QUICK, .seed = 1, .sink = &sink};
     ck_assert_msg(cities_radiosity(&run, &error) == LAM_OK, "%s", error.message);
     ck_assert_msg(cities_figures(&run, &error) == LAM_OK, "%s", error.message);
-    ck_assert_str_eq(h.tables,
-                     " bounces bounces-curves relaxation tiles map kinds singular-values singular-values-curves"
-                     " distribution distribution-curves");
+    ck_assert_str_eq(
+        h.tables, " bounces bounces-curves relaxation tiles map kinds singular-values singular-values-curves"
+                  " distribution distribution-curves");
     ck_assert_uint_eq(h.map_rows, MAP_SCENES);
     ck_assert_uint_eq(h.kind_rows, 6 * MAP_MAIN);
 }
