@@ -113,7 +113,7 @@ class Usage(Case):
                      "render a.h5 -o b.png --animate c.npy"):
             with self.subTest(line):
                 self.refused(2, "no such option", *line.split())
-        self.refused(2, "no such suite", "bench", "reuse")
+        self.refused(2, "no such suite", "bench", "nothing")
         self.refused(2, "must end in", "solve", "a.h5", "-o", "b.glb")
 
     def test_a_full_disk_behind_standard_output(self):
