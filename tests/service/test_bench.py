@@ -411,7 +411,7 @@ class Refusals(unittest.TestCase):
         self.refused(2, "too few arguments", "-o", out)
         self.refused(2, "no such suite", "speed", "-o", out)
         self.refused(2, "exclude each other", "formfactors", "--quick", "--full", "-o", out)
-        self.refused(2, "no such suite", "formfactors", "reuse", "-o", out)
+        self.refused(2, "no such suite", "formfactors", "nothing", "-o", out)
         self.assertEqual(os.listdir(self.folder), [])
 
     def test_folders(self):
