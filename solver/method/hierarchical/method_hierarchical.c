@@ -299,6 +299,36 @@ done:
     return status;
 }
 
+/* Figures of a build, for its report. */
+typedef struct build_figures {
+    double threshold, entries, numbers_of_S; /* coefficients of all K, and of S */
+    size_t n_own, n_nodes, n_shapes;
+    bool corrected;
+} build_figures;
+
+/* The number of channels that no earlier one is like, and the last of them. */
+static size_t own_channels(const build_problem *problem, size_t *last) {
+    size_t count = 0;
+    for (size_t c = 0; c < problem->n_channels; c++)
+        if (operator_like_channel(problem->n, problem->reflectance, c) == c) count++, *last = c;
+    return count;
+}
+
+/* Says how the operator was made, and how large it came out. */
+static void describe_build(const build_problem *problem, const plane_tree *tree, const wavelet_roots *roots,
+                           const build_figures *f, build_report *report) {
+    const double n = (double)problem->n;
+    snprintf(
+        report->detail, sizeof report->detail,
+        "threshold %.2g by %s, %.3g stored coefficients per element (%.3g of S), %zu planes, %zu clusters "
+        "of %zu shapes, %zu part%s%s%s",
+        f->threshold, report->by_noise ? "the noise of the rays" : "--epsilon",
+        f->entries / (n * (double)f->n_own), f->numbers_of_S / n, tree->n_frames, f->n_nodes, f->n_shapes,
+        roots->count, roots->count == 1 ? "" : "s that exchange no light",
+        f->n_own < problem->n_channels ? ", equal channels share them" : "",
+        f->corrected ? "; the mean error of uniform emission is corrected" : "");
+}
+
 static lam_status build(const build_problem *problem, const build_options *options, const void *own,
                         lam_operator **op, build_report *report, lam_error *error) {
     lam_status status = LAM_OK;
@@ -318,7 +348,6 @@ static lam_status build(const build_problem *problem, const build_options *optio
     double *sums = memory_allocate(n, sizeof *sums, "operator", error);
     const double *row_sums = sums;
     double planes = 1, least, threshold;
-    bool corrected = false;
     if (arrays.K == NULL || rho == NULL || area == NULL || sums == NULL) TRY(LAM_ERR_MEMORY);
     if (problem->blocks == NULL) {
         TRY(wavelet_tree_make(n, problem->F, problem->stream != NULL ? problem->stream->part : NULL,
@@ -347,9 +376,8 @@ static lam_status build(const build_problem *problem, const build_options *optio
                                 : expand_rows(&x, sums, &row_sums, &S, error));
     const double expanded = clock_seconds(), numbers_of_S = (double)S.indptr[n];
     report_step_add(report, problem->stream != NULL ? "rays, wavelets" : "wavelets", expanded - started);
-    size_t n_own = 0, last = 0; /* channels that no earlier one is like; the last of them */
-    for (size_t c = 0; c < C; c++)
-        if (operator_like_channel(n, problem->reflectance, c) == c) n_own++, last = c;
+    size_t last = 0;
+    const size_t n_own = own_channels(problem, &last);
     for (size_t c = 0; c < C; c++) {
         if (operator_like_channel(n, problem->reflectance, c) != c) continue;
         for (size_t p = 0; p < n; p++) rho[p] = problem->reflectance[c * n + tree->order[p]];
@@ -372,23 +400,17 @@ static lam_status build(const build_problem *problem, const build_options *optio
         TRY(impose_uniform(problem, c, row_sums, tree, &roots, area, &inverse, &arrays.K[c], error));
         entries += (double)arrays.K[c].indptr[n];
     }
-    const size_t n_shapes = arrays.basis.n_shapes, n_nodes = arrays.basis.n_nodes;
+    build_figures figures = {
+        threshold, entries, numbers_of_S, n_own, arrays.basis.n_nodes, arrays.basis.n_shapes, false};
     TRY(operator_hierarchical_create(n, C, problem->reflectance, area, tree->order, &arrays, &made, error));
     lam_operator_set_threads(made, n_threads);
     /* Light in proportion to the mean of several parts would not stay in its own. */
     if (roots.count <= 1 + (size_t)(tree->n_alone > 0))
-        TRY(correct_mean(problem, row_sums, epsilon, tree->order, made, &corrected, error));
+        TRY(correct_mean(problem, row_sums, epsilon, tree->order, made, &figures.corrected, error));
     report_number(report, "threshold", threshold);
     report->by_noise = !(threshold > least);
     report_step_add(report, "invert", clock_seconds() - expanded);
-    snprintf(
-        report->detail, sizeof report->detail,
-        "threshold %.2g by %s, %.3g stored coefficients per element (%.3g of S), %zu planes, %zu clusters "
-        "of %zu shapes, %zu part%s%s%s",
-        threshold, threshold > least ? "--epsilon" : "the noise of the rays", entries / (double)(n * n_own),
-        numbers_of_S / (double)n, tree->n_frames, n_nodes, n_shapes, roots.count,
-        roots.count == 1 ? "" : "s that exchange no light", n_own < C ? ", equal channels share them" : "",
-        corrected ? "; the mean error of uniform emission is corrected" : "");
+    describe_build(problem, tree, &roots, &figures, report);
     TRY(self_check(problem, row_sums, made, epsilon, options->seed, report, error));
     *op = made;
     made = NULL;
