@@ -70,9 +70,6 @@ double portals_weight(const portals *p, unsigned in_front, size_t n_rays, const 
     return sum > 0 ? of_cosine / sum : 0;
 }
 
-/* The largest single-precision number below 1, which places of points must not round to. */
-static const double below_one = 1 - 0x1p-24;
-
 /* Eight rays from points of an element to points of a portal; a lane whose point lies behind the element is
  * cast along its normal, and cosine is 0. */
 static void aim(const portal *p, const element_sampler *sampler, const double x[4][VISIBILITY_PACKET],
@@ -80,8 +77,7 @@ static void aim(const portal *p, const element_sampler *sampler, const double x[
     for (int i = 0; i < VISIBILITY_PACKET; i++) {
         float from[3];
         double to[3], normal[3];
-        element_sampler_point(sampler, (float)fmin(x[0][i], below_one), (float)fmin(x[1][i], below_one),
-                              from);
+        element_sampler_point(sampler, (float)x[0][i], (float)x[1][i], from);
         for (int d = 0; d < 3; d++) {
             to[d] = p->corner[d] + x[2][i] * p->edge[0][d] + x[3][i] * p->edge[1][d] - (double)from[d];
             normal[d] = (double)sampler->frame.normal[d];

@@ -136,7 +136,7 @@ void element_sampler_point(const element_sampler *s, float u, float w, float poi
     int piece = 0;
     if (!s->parallelogram) {
         /* u chooses the triangle and is rescaled to [0, 1); then the square is folded along its diagonal. */
-        if (u < s->first_share) {
+        if (u < s->first_share || !(s->first_share < 1)) { /* u may have been rounded to 1 */
             u = u / s->first_share;
         } else {
             u = (u - s->first_share) / (1 - s->first_share);

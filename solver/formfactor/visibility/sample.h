@@ -45,7 +45,7 @@ enum { SAMPLE_ORDERED = 1024 };
 void element_sampler_order(const element_sampler *s, uint32_t first, size_t count,
                            uint32_t order[SAMPLE_ORDERED]);
 
-/* The point of the element at (u, w) in the unit square; the map preserves area. */
+/* The point of the element at (u, w) in the unit square, its sides included; the map preserves area. */
 void element_sampler_point(const element_sampler *s, float u, float w, float point[3]);
 
 /* Point pairs on two elements: a Sobol' sequence, digitally shifted, so that each point is uniform in the

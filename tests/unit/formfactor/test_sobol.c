@@ -258,6 +258,11 @@ START_TEST(triangles_keep_area_and_neighbours) {
             }
         }
     for (int q = 0; q < 4; q++) ck_assert_int_le(abs((int)count[q] - SIDE * SIDE / 4), 6 * SIDE);
+    for (int corner = 1; corner < 4; corner++) { /* places that single precision rounds to 1 */
+        float p[3];
+        element_sampler_point(&s, (float)(corner & 1), (float)(corner >> 1), p);
+        ck_assert(p[0] >= 0 && p[1] >= 0 && p[0] / 3 + p[1] / 2 <= 1 + 1e-6f);
+    }
 }
 END_TEST
 
