@@ -1,5 +1,6 @@
 #include "solver/adapt/gather.h"
 
+#include "solver/base/cosine.h"
 #include "solver/base/random.h"
 #include "solver/formfactor/visibility/sample.h"
 
@@ -85,16 +86,6 @@ static double spread(const uint64_t shift[2], size_t k, int d) {
     return (double)(uint32_t)(start + (uint32_t)k * step[d % 2]) * 0x1p-32;
 }
 
-/* The cosine-weighted direction at (x, y): radius sqrt(x) and angle 2 pi y of the disc, raised to the sphere.
- */
-static void aim(const element_frame *f, double x, double y, float direction[3]) {
-    const double radius = sqrt(x), angle = 2 * M_PI * y;
-    const float along = (float)(radius * cos(angle)), across = (float)(radius * sin(angle)),
-                up = (float)sqrt(fmax(1 - x, 1e-12));
-    for (int d = 0; d < 3; d++)
-        direction[d] = along * f->tangent[d] + across * f->bitangent[d] + up * f->normal[d];
-}
-
 static size_t lamp_at(const gather *g, double power) {
     size_t low = 0, high = g->n_lamps;
     while (high - low > 1) {
@@ -108,21 +99,20 @@ static size_t lamp_at(const gather *g, double power) {
 }
 
 static void draw(const gather *g, uint32_t element, uint64_t key, gather_samples *s) {
-    static const float below_one = 1 - 0x1p-24f;
     element_frame frame;
     element_frame_init(&frame, g->m, element);
     for (size_t h = 0; h < GATHER_HALVES; h++) {
         const uint64_t first = random_hash(key ^ random_hash(h + 1)), shift[2] = {first, random_hash(first)};
         for (size_t r = 0; r < GATHER_RAYS; r++)
-            aim(&frame, spread(shift, r, 0), spread(shift, r, 1), s->direction[h][r]);
+            cosine_direction(frame.tangent, frame.bitangent, frame.normal, spread(shift, r, 0),
+                             spread(shift, r, 1), s->direction[h][r]);
         for (size_t k = 0; k < GATHER_LAMP_SAMPLES && g->n_lamps > 0; k++) {
             const double turn = random_to_double(random_hash(shift[1]));
             const size_t lamp = lamp_at(g, ((double)k + turn) / GATHER_LAMP_SAMPLES * g->before[g->n_lamps]);
             element_sampler sampler;
             float point[3];
             element_sampler_init(&sampler, g->m, g->v, g->lamp[lamp], 0);
-            element_sampler_point(&sampler, fminf((float)spread(shift, k, 2), below_one),
-                                  fminf((float)spread(shift, k, 3), below_one), point);
+            element_sampler_point(&sampler, (float)spread(shift, k, 2), (float)spread(shift, k, 3), point);
             s->lamp[h][k] = g->lamp[lamp];
             for (int d = 0; d < 3; d++) s->place[h][k][d] = (double)point[d];
         }

@@ -1,6 +1,7 @@
 #include "solver/walk/reuse.h"
 
 #include "solver/base/clock.h"
+#include "solver/base/cosine.h"
 #include "solver/base/random.h"
 #include "solver/walk/reuse_weights.h"
 
@@ -86,15 +87,14 @@ static void find_hits(reuse_batch *b, walk_starts *starts, size_t position) {
             double point[3];
             if (!walk_starts_next(starts, all, 1, &w, &only)) break;
             moving_light_point(r->problem->light, w.place[0], w.place[1], point);
-            const float radius = (float)sqrt(w.place[2]), angle = (float)(2 * M_PI * w.place[3]),
-                        x = radius * cosf(angle), y = radius * sinf(angle),
-                        z = sqrtf(fmaxf(1 - radius * radius, 1e-12f));
+            float direction[3];
+            cosine_direction(f->tangent, f->bitangent, f->normal, w.place[2], w.place[3], direction);
             at[n] = (first_hit){.position = (uint32_t)position, .random = w.random};
             to_float(point, at[n].local);
             for (int d = 0; d < 3; d++) {
                 rays.origin[d][n] = f->turn[d][0] * at[n].local[0] + f->turn[d][1] * at[n].local[1] +
                                     f->turn[d][2] * at[n].local[2] + f->move[d];
-                rays.direction[d][n] = x * f->tangent[d] + y * f->bitangent[d] + z * f->normal[d];
+                rays.direction[d][n] = direction[d];
             }
         }
         if (n == 0) break;

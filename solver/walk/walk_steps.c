@@ -1,5 +1,6 @@
 #include "solver/walk/walk_steps.h"
 
+#include "solver/base/cosine.h"
 #include "solver/base/random.h"
 #include "solver/formfactor/visibility/sample.h"
 
@@ -10,19 +11,6 @@ enum { LOST_MOST = 64 };
 
 /* Packets between two looks at the progress. */
 enum { PACKETS_AT_ONCE = 4096 };
-
-/* The largest single-precision number below 1. */
-static const double below_one = 1 - 0x1p-24;
-
-/* A cosine-weighted direction, which this room does not share with the form factors: the point of the disc
- * at radius sqrt(x), angle 2 pi y, raised to the sphere. */
-static void aim(const element_frame *f, double x, double y, float direction[3]) {
-    const double radius = sqrt(x), angle = 2 * M_PI * y;
-    const float along = (float)(radius * cos(angle)), across = (float)(radius * sin(angle)),
-                up = (float)sqrt(fmax(1 - x, 1e-12));
-    for (int d = 0; d < 3; d++)
-        direction[d] = along * f->tangent[d] + across * f->bitangent[d] + up * f->normal[d];
-}
 
 void walk_cast(const walk_scene *s, const walker *w, size_t n, ray_packet *rays, hit_packet *hits) {
     uint32_t self[VISIBILITY_PACKET];
@@ -36,9 +24,9 @@ void walk_cast(const walk_scene *s, const walker *w, size_t n, ray_packet *rays,
         element_sampler sampler;
         float origin[3], direction[3];
         element_sampler_init(&sampler, s->m, s->v, w[i].at, 0);
-        element_sampler_point(&sampler, (float)fmin(place[0], below_one), (float)fmin(place[1], below_one),
-                              origin);
-        aim(&sampler.frame, place[2], place[3], direction);
+        const element_frame *f = &sampler.frame;
+        element_sampler_point(&sampler, (float)place[0], (float)place[1], origin);
+        cosine_direction(f->tangent, f->bitangent, f->normal, place[2], place[3], direction);
         for (int d = 0; d < 3; d++) {
             rays->origin[d][i] = origin[d];
             rays->direction[d][i] = direction[d];

@@ -26,7 +26,7 @@ static void place(const element_sampler *area, const double turn[4], size_t k, s
     const double u = ((double)k + turn[0]) / (double)n;
     double w = turn[1] + (double)k * .6180339887498949;
     w -= floor(w);
-    element_sampler_point(area, (float)fmin(u, 1 - 0x1p-24), (float)fmin(w, 1 - 0x1p-24), point);
+    element_sampler_point(area, (float)u, (float)w, point);
 }
 
 lam_status sun_rays_create(const mesh *m, size_t n_points, uint64_t seed, size_t n_wanted,
