@@ -182,9 +182,40 @@ typedef struct value_sums {
     double *reflected, *radiosity; /* [C] */
 } value_sums;
 
+/* Adds values first ... last - 1 of the answer, whose elements are in one bin: sums in registers, as those in
+ * memory would wait for each other. */
+static void add_run(const error_scene *scene, const error_answer *of, size_t first, size_t last,
+                    value_sums *to) {
+    const size_t n = scene->n;
+    const double of_sky = of->quantity == LAM_IRRADIANCE, of_direct = of->quantity == LAM_RADIOSITY;
+    for (size_t c = 0; c < scene->n_channels; c++) {
+        const float *values = of->values + c * (of->whole ? n : of->count);
+        double area = 0, reflected = 0, reflected2 = 0, radiosity = 0, radiosity2 = 0;
+        for (size_t k = first; k < last; k++) {
+            const size_t i = of->selected != NULL ? of->selected[k] : k;
+            const double a = scene->area[i], rho = (double)scene->reflectance[c * n + i];
+            const double sky = of->H0 != NULL ? (double)of->H0[c * n + i] : 0;
+            const double direct = (of->E != NULL ? (double)of->E[c * n + i] : 0) + rho * sky;
+            const double value = (double)values[of->whole ? i : k];
+            const double scale = of->quantity == LAM_IRRADIANCE ? rho : 1;
+            const double r = scale * (value - of_sky * sky - of_direct * direct), b = r + direct;
+            area += a;
+            reflected += a * r;
+            reflected2 += a * r * r;
+            radiosity += a * b;
+            radiosity2 += a * b * b;
+        }
+        if (c == 0) to->area += area;
+        to->reflected[c] += reflected;
+        to->reflected2 += reflected2;
+        to->radiosity[c] += radiosity;
+        to->radiosity2 += radiosity2;
+    }
+}
+
 /* [n_bins]; freed with free(). */
 static value_sums *sum_values(const error_by_group *e, const error_scene *scene, const error_answer *of) {
-    const size_t n = scene->n, C = scene->n_channels;
+    const size_t C = scene->n_channels;
     size_t bytes;
     if (!size_multiply(e->n_bins, sizeof(value_sums) + 2 * C * sizeof(double), &bytes)) return NULL;
     value_sums *sums = memory_allocate(bytes, 1, "errors of groups", NULL);
@@ -194,24 +225,11 @@ static value_sums *sum_values(const error_by_group *e, const error_scene *scene,
         sums[b].reflected = numbers + 2 * b * C;
         sums[b].radiosity = sums[b].reflected + C;
     }
-    for (size_t k = 0; k < of->count; k++) {
-        const size_t i = of->selected != NULL ? of->selected[k] : k;
-        const double a = scene->area[i];
-        value_sums *to = &sums[e->bin[i]];
-        to->area += a;
-        for (size_t c = 0; c < C; c++) {
-            const double value = (double)(of->whole ? of->values[c * n + i] : of->values[c * of->count + k]);
-            const double rho = (double)scene->reflectance[c * n + i];
-            const double sky = of->H0 != NULL ? (double)of->H0[c * n + i] : 0;
-            const double direct = (of->E != NULL ? (double)of->E[c * n + i] : 0) + rho * sky;
-            const double r = of->quantity == LAM_INDIRECT     ? value
-                             : of->quantity == LAM_IRRADIANCE ? rho * (value - sky)
-                                                              : value - direct;
-            to->reflected2 += a * r * r;
-            to->radiosity2 += a * (r + direct) * (r + direct);
-            to->reflected[c] += a * r;
-            to->radiosity[c] += a * (r + direct);
-        }
+    for (size_t first = 0, last; first < of->count; first = last) {
+        const uint32_t bin = e->bin[of->selected != NULL ? of->selected[first] : first];
+        for (last = first + 1; last < of->count; last++)
+            if (e->bin[of->selected != NULL ? of->selected[last] : last] != bin) break;
+        add_run(scene, of, first, last, &sums[bin]);
     }
     return sums;
 }
