@@ -217,6 +217,21 @@ done:
     return status;
 }
 
+lam_status lowrank_box_and_patio(const bench_run *run, const size_t sizes[2], lowrank_of_scene *one,
+                                 table *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    lowrank_scene s = {.name = NULL};
+    for (int k = 0; k < 2; k++) {
+        TRY(k == 0 ? lowrank_cornell(run, sizes[0], &s, error) : lowrank_patio(run, sizes[1], &s, error));
+        TRY(one(run, &s, k == 1, out, error));
+        lowrank_scene_free(&s);
+    }
+    TRY(bench_table(run, out, error));
+done:
+    lowrank_scene_free(&s);
+    return status;
+}
+
 factorizer_options lowrank_options(const bench_run *run, double epsilon, size_t rank) {
     return (factorizer_options){.epsilon = epsilon,
                                 .rank = rank,

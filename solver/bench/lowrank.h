@@ -41,6 +41,13 @@ lam_status lowrank_room(const bench_run *run, size_t divisions, lowrank_scene *o
 lam_status lowrank_cornell(const bench_run *run, size_t elements, lowrank_scene *out, lam_error *error);
 lam_status lowrank_patio(const bench_run *run, size_t elements, lowrank_scene *out, lam_error *error);
 
+/* Calls one with the Cornell box of sizes[0] elements, then with the courtyard of sizes[1], and hands
+ * the table on. */
+typedef lam_status lowrank_of_scene(const bench_run *run, const lowrank_scene *s, bool courtyard, table *out,
+                                    lam_error *error);
+lam_status lowrank_box_and_patio(const bench_run *run, const size_t sizes[2], lowrank_of_scene *one,
+                                 table *out, lam_error *error);
+
 /* lowrank_begin_peak returns the bytes of memory now and resets the peak of the process (where the kernel
  * allows it); lowrank_peak returns how far the peak has passed them since. */
 double lowrank_begin_peak(void);

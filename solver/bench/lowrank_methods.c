@@ -143,8 +143,23 @@ done:
     return status;
 }
 
-/* The patio of Fernandez et al. 2011 (24,128 elements in 1,364 patches, 430 answers a second of a GPU), where
- * time is given to it, and a box; real operators in place of table answers' arbitrary numbers. */
+enum { PATCHES_OF_PATIO = 1364, PAPER_PATIO = 24128 };
+
+/* As many patches as the patio of Fernandez et al. 2011 has: 1,364 of 24,128 elements, where a GPU gave 430
+ * answers a second. */
+static lam_status try_two_meshes(const bench_run *run, const lowrank_scene *s, bool courtyard, table *out,
+                                 lam_error *error) {
+    static const char *const assigns[] = {"inclusion", "proximity"};
+    lam_status status = LAM_OK;
+    const size_t patches = s->m.n * PATCHES_OF_PATIO / PAPER_PATIO;
+    const double theirs = courtyard && run->scale == BENCH_FULL ? 430 : NAN;
+    for (size_t a = 0; a < sizeof assigns / sizeof *assigns; a++)
+        TRY(add_two_meshes(run, s, patches, assigns[a], theirs, out, error));
+done:
+    return status;
+}
+
+/* Real operators in place of table answers' arbitrary numbers. */
 lam_status lowrank_of_two_meshes(const bench_run *run, lam_error *error) {
     static const table_column two_mesh_columns[] = {
         {"scene", NULL, "name of the scene"},
@@ -159,39 +174,26 @@ lam_status lowrank_of_two_meshes(const bench_run *run, lam_error *error) {
         {"single_indirect", "", "|B~ - B|/|B - E|, one bright element, mean"},
         {"random_indirect", "", "random emission of all elements"},
         {"paper_gpu_not_run", "1/s", "as published; nothing ran on a GPU"}};
-    static const size_t sizes[3][2] = {{640, 640}, {2560, 2700}, {2560, 24128}};
-    static const char *const assigns[] = {"inclusion", "proximity"};
-    enum { PATCHES_OF_PATIO = 1364, PAPER_PATIO = 24128 };
-    lam_status status = LAM_OK;
-    lowrank_scene s = {.name = NULL};
+    static const size_t sizes[3][2] = {{640, 640}, {2560, 2700}, {2560, PAPER_PATIO}};
     table out = {.name = "two-meshes",
                  .title = "Two meshes by inclusion and by proximity",
                  .columns = two_mesh_columns,
                  .n_columns = sizeof two_mesh_columns / sizeof *two_mesh_columns,
                  .printed = true};
-    for (int k = 0; k < 2; k++) {
-        const size_t elements = sizes[run->scale][k];
-        TRY(k == 0 ? lowrank_cornell(run, elements, &s, error) : lowrank_patio(run, elements, &s, error));
-        const bool papers = k == 1 && elements == PAPER_PATIO;
-        const size_t patches = s.m.n * PATCHES_OF_PATIO / PAPER_PATIO;
-        for (size_t a = 0; a < sizeof assigns / sizeof *assigns; a++)
-            TRY(add_two_meshes(run, &s, patches, assigns[a], papers ? 430 : NAN, &out, error));
-        lowrank_scene_free(&s);
-    }
-    TRY(bench_table(run, &out, error));
-done:
-    lowrank_scene_free(&s);
+    const lam_status status = lowrank_box_and_patio(run, sizes[run->scale], try_two_meshes, &out, error);
     table_free(&out);
     return status;
 }
 
 /* The lamps of a scene, or a hundredth of its elements, close together, where it has none. */
-static lam_status relax(const bench_run *run, const lowrank_scene *s, table *out, lam_error *error) {
+static lam_status relax(const bench_run *run, const lowrank_scene *s, bool courtyard, table *out,
+                        lam_error *error) {
     static const double epsilons[] = {.05, .003};
     enum { LIT = 100 };
     lam_status status = LAM_OK;
     const size_t n = s->m.n;
     bool shines = false;
+    (void)courtyard;
     build_problem problem = lowrank_problem(s);
     problem.n_channels = 1;
     float *E = memory_allocate(n, sizeof *E, "emission", error);
@@ -211,18 +213,9 @@ done:
 }
 
 lam_status lowrank_of_relaxation(const bench_run *run, lam_error *error) {
-    lam_status status = LAM_OK;
-    const size_t elements = run->scale == BENCH_QUICK ? 640 : 2560;
-    lowrank_scene s = {.name = NULL};
+    static const size_t sizes[3][2] = {{640, 640}, {2560, 2560}, {2560, 2560}};
     table out = relaxation_table();
-    for (int k = 0; k < 2; k++) {
-        TRY(k == 0 ? lowrank_cornell(run, elements, &s, error) : lowrank_patio(run, elements, &s, error));
-        TRY(relax(run, &s, &out, error));
-        lowrank_scene_free(&s);
-    }
-    TRY(bench_table(run, &out, error));
-done:
-    lowrank_scene_free(&s);
+    const lam_status status = lowrank_box_and_patio(run, sizes[run->scale], relax, &out, error);
     table_free(&out);
     return status;
 }

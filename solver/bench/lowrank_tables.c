@@ -395,6 +395,15 @@ done:
     return status;
 }
 
+static lam_status add_epsilons(const bench_run *run, const lowrank_scene *s, bool courtyard, table *out,
+                               lam_error *error) {
+    lam_status status = LAM_OK;
+    for (int e = 0; e < RADIOSITY_EPSILONS; e++)
+        TRY(add_epsilon(run, s, radiosity_epsilons[e], courtyard ? patio[e] : cornell[e], out, error));
+done:
+    return status;
+}
+
 lam_status lowrank_of_radiosity(const bench_run *run, lam_error *error) {
     static const table_column columns[] = {
         {"scene", NULL, "name of the scene"},
@@ -416,23 +425,12 @@ lam_status lowrank_of_radiosity(const bench_run *run, lam_error *error) {
         {"thesis_max", "", "as published"},
     };
     static const size_t sizes[3][2] = {{640, 640}, {2560, 2700}, {2560, 21888}};
-    lam_status status = LAM_OK;
-    lowrank_scene s = {.name = NULL};
     table out = {.name = "radiosity",
                  .title = "Error of the radiosity at the real error of the thesis (tables 3.6 and 3.7)",
                  .columns = columns,
                  .n_columns = sizeof columns / sizeof *columns,
                  .printed = true};
-    for (int k = 0; k < 2; k++) {
-        TRY(k == 0 ? lowrank_cornell(run, sizes[run->scale][0], &s, error)
-                   : lowrank_patio(run, sizes[run->scale][1], &s, error));
-        for (int e = 0; e < RADIOSITY_EPSILONS; e++)
-            TRY(add_epsilon(run, &s, radiosity_epsilons[e], k == 0 ? cornell[e] : patio[e], &out, error));
-        lowrank_scene_free(&s);
-    }
-    TRY(bench_table(run, &out, error));
-done:
-    lowrank_scene_free(&s);
+    const lam_status status = lowrank_box_and_patio(run, sizes[run->scale], add_epsilons, &out, error);
     table_free(&out);
     return status;
 }

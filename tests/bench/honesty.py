@@ -16,13 +16,12 @@ import math
 import os
 import pathlib
 import random
-import signal
 import sys
 import tempfile
 
 import numpy as np
 
-from service_programs import Client, Failure, Program, post
+from service_programs import Client, Failure, Program, post, run_suite, tell
 
 SECONDS = 3600
 # share of the elements of each scene, requests of a scene
@@ -39,10 +38,6 @@ SKIES = "even sky", "cloudy sky", "sun"
 TARGETS = "all", "group", "elements", "reduce"
 LIMITS = 2, .2  # of the true error over the stated one: hardly ever above, mostly above
 WANTED = .95, .5
-
-
-def tell(**record):
-    print(json.dumps(record), flush=True)
 
 
 def table(name, title, columns, rows):
@@ -294,21 +289,4 @@ class Bench:
         return counts_of(ratios, len(pairs) - len(known))
 
 
-def cancel(_number, _frame):
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    raise Failure("cancelled")
-
-
-def main():
-    signal.signal(signal.SIGTERM, cancel)
-    try:
-        Bench(*sys.argv[1:]).run()
-    except (Failure, OSError) as failure:
-        try:
-            tell(error=str(failure))
-        except BrokenPipeError:
-            pass
-        os._exit(1)
-
-
-main()
+run_suite(lambda: Bench(*sys.argv[1:]).run())

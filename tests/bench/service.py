@@ -16,7 +16,6 @@ import math
 import os
 import pathlib
 import shutil
-import signal
 import socket
 import statistics
 import sys
@@ -25,7 +24,8 @@ import time
 
 import numpy as np
 
-from service_programs import ANSWER_S, Client, Failure, GET_FILE, NGINX_CONFIGURATION, Program, Solver, WRK_SCRIPT, post
+from service_programs import (ANSWER_S, Client, Failure, GET_FILE, NGINX_CONFIGURATION, Program, Solver, WRK_SCRIPT, post,
+                              run_suite, tell)
 
 CLIENTS = 1, 4, 16
 ONE, MANY = CLIENTS[0], CLIENTS[-1]
@@ -41,10 +41,6 @@ SIZES = {"quick": [(200, 32, 1)],
          "default": [(2560, 416, 1), (24128, 1364, 1), (163840, 4000, 3)],
          "full": [(2560, 416, 5), (24128, 1364, 5), (163840, 4000, 10)]}
 PATH = "/v1/scenes/bench/"
-
-
-def tell(**record):
-    print(json.dumps(record), flush=True)
 
 
 class Table:
@@ -457,21 +453,4 @@ class Bench:
             table.write()
 
 
-def cancel(_number, _frame):
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    raise Failure("cancelled")
-
-
-def main():
-    signal.signal(signal.SIGTERM, cancel)
-    try:
-        Bench(*sys.argv[1:]).run()
-    except (Failure, OSError) as failure:
-        try:
-            tell(error=str(failure))
-        except BrokenPipeError:
-            pass
-        os._exit(1)
-
-
-main()
+run_suite(lambda: Bench(*sys.argv[1:]).run())

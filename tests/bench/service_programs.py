@@ -1,7 +1,9 @@
 """Programs that suite service of lambert-bench drives, their configurations, and a client of HTTP."""
 
 import ctypes
+import json
 import math
+import os
 import signal
 import socket
 import subprocess
@@ -184,3 +186,25 @@ class Client:
         self.must(request, what)
         while time.perf_counter() < end:
             self.must(request, what)
+
+
+def tell(**record):
+    print(json.dumps(record), flush=True)
+
+
+def cancel(_number, _frame):
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise Failure("cancelled")
+
+
+def run_suite(run):
+    """Calls run; what fails becomes a record of lambert-bench and the status 1."""
+    signal.signal(signal.SIGTERM, cancel)
+    try:
+        run()
+    except (Failure, OSError) as failure:
+        try:
+            tell(error=str(failure))
+        except BrokenPipeError:
+            pass
+        os._exit(1)
