@@ -25,19 +25,25 @@ static void free_figures(double **of, int count) {
     for (int f = 0; f < count; f++) free(of[f]);
 }
 
-START_TEST(a_single_element_counts_by_its_power) {
-    /* Channel 0 of element 1 emits 3, channel 1 of it 1: P^2 = 4 (9 + 1), N = 1. */
-    const float E[VECTOR] = {0, 3, 0, 0, 1, 0}, B[VECTOR] = {1, 4, 1, 1, 2, 1};
-    const double x[VECTOR] = {.3, .1, .2, .1, .1, .1}, y[VECTOR] = {.1, .1, .2, .1, .1, .1};
+/* The figures [GROUP_FIGURES] of one single element, freed by free_figures. */
+static void judge_single(const float *E, const float *B, const double *x, const double *y, double **of) {
     const figure_probe one = {
         .problem = &problem, .E = E, .B = B, .x = x, .y = y, .relation = REFERENCE_TWIN};
     const judge_input input = input_of();
     by_group_sums sums = {.n = 0};
-    double *of[GROUP_FIGURES] = {NULL};
     lam_error error = {.message = ""};
     ck_ok(by_group_begin(&input, &sums, &error));
     by_group_add(&one, JUDGE_SINGLE, 0, &sums);
     ck_ok(by_group_finish(&sums, GROUP_FIGURES, of, &error));
+    by_group_free(&sums);
+}
+
+START_TEST(a_single_element_counts_by_its_power) {
+    /* Channel 0 of element 1 emits 3, channel 1 of it 1: P^2 = 4 (9 + 1), N = 1. */
+    const float E[VECTOR] = {0, 3, 0, 0, 1, 0}, B[VECTOR] = {1, 4, 1, 1, 2, 1};
+    const double x[VECTOR] = {.3, .1, .2, .1, .1, .1}, y[VECTOR] = {.1, .1, .2, .1, .1, .1};
+    double *of[GROUP_FIGURES] = {NULL};
+    judge_single(E, B, x, y, of);
     /* Means of x: group 0 (1 * .2 + 2 * .1) / 3 and .1, group 1 .2 and .1; the noise of the mean of
      * group 0 is .1 / 3 in channel 0, its square less than a ninth of the rest; that of its elements is more,
      * and stays. */
@@ -55,7 +61,6 @@ START_TEST(a_single_element_counts_by_its_power) {
     ck_assert_double_eq_tol(of[GROUP_NEAR][1], sqrt(mean1 / light1), 1e-7);
     ck_assert(isnan(of[GROUP_FAR][1]) && isnan(of[GROUP_UNIFORM][1]));
     free_figures(of, GROUP_FIGURES);
-    by_group_free(&sums);
 }
 END_TEST
 
@@ -87,19 +92,11 @@ END_TEST
 START_TEST(noise_that_is_large_stays) {
     const float E[VECTOR] = {0, 1, 0, 0, 1, 0}, B[VECTOR] = {1, 1, 1, 1, 1, 1};
     const double x[VECTOR] = {0, 0, .3, 0, 0, .3}, y[VECTOR] = {0, 0, .1, 0, 0, .1};
-    const figure_probe one = {
-        .problem = &problem, .E = E, .B = B, .x = x, .y = y, .relation = REFERENCE_TWIN};
-    const judge_input input = input_of();
-    by_group_sums sums = {.n = 0};
     double *of[GROUP_FIGURES] = {NULL};
-    lam_error error = {.message = ""};
-    ck_ok(by_group_begin(&input, &sums, &error));
-    by_group_add(&one, JUDGE_SINGLE, 0, &sums);
-    ck_ok(by_group_finish(&sums, GROUP_FIGURES, of, &error));
+    judge_single(E, B, x, y, of);
     /* The error is .2, its noise .1: more than a third. */
     ck_assert_double_eq_tol(of[GROUP_MEAN_ONE][1], sqrt(2 * .04 / (4 + 4)), 1e-12);
     free_figures(of, GROUP_FIGURES);
-    by_group_free(&sums);
 }
 END_TEST
 
