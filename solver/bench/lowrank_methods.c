@@ -1,5 +1,5 @@
-/* Every method at several settings: run time and memory against error; two meshes against the SVD at equal k.
- */
+/* Every method at several settings: run time and memory against error; two meshes of real scenes; iterations
+ * without an operator. */
 #include "solver/bench/formfactors.h"
 #include "solver/bench/lowrank.h"
 #include "solver/bench/relaxation.h"
