@@ -1,5 +1,5 @@
-/* F(x_l, y) of one first hit for all positions of a light: the kernel in vector registers, and visibility by a
- * ray to each position or by maps that were made once. */
+/* F(x_l, y) of one first hit for all positions of a light: the kernel in vector registers, and visibility by
+ * a ray to each position or by maps that were made once. */
 #include "solver/walk/reuse_weights.h"
 
 #include "solver/base/cpu.h"
