@@ -3,6 +3,7 @@
 #include "solver/base/clock.h"
 #include "solver/base/cosine.h"
 #include "solver/base/random.h"
+#include "solver/walk/reuse_sums.h"
 #include "solver/walk/reuse_weights.h"
 
 #include <math.h>
@@ -15,6 +16,8 @@ enum { CHUNK = 1024 };
 void reuse_estimates_free(reuse_estimates *e) {
     free(e->H);
     free(e->error);
+    free(e->direct);
+    free(e->covariance);
     *e = (reuse_estimates){.n = 0};
 }
 
@@ -32,7 +35,7 @@ typedef struct reuse {
 /* One batch, and the walk of a chunk of its paths. */
 typedef struct reuse_batch {
     const reuse *r;
-    double *sum; /* [n][C][s]: power over that of the light */
+    double *first, *later; /* [n][s] and [n][C][s]: power over that of the light, straight and reflected */
     first_hit *hits;
     float *weight; /* [CHUNK][s] */
     size_t count, next;
@@ -126,19 +129,34 @@ static void weigh(reuse_batch *b) {
     }
 }
 
-static void deposit(const reuse_batch *b, const walker *w, uint32_t element) {
+/* Adds the light that comes to an element straight from the light, the same in all channels. */
+static void deposit_first(const reuse_batch *b, size_t path, uint32_t element) {
+    const reuse *r = b->r;
+    const size_t s = r->s;
+    double *const first = b->first + (size_t)element * s;
+    const float *const weight = b->weight + path * s;
+    if (r->problem->way == REUSE_NONE) {
+        first[b->hits[path].position] += 1 / (double)r->of_batch;
+        return;
+    }
+#pragma omp simd
+    for (size_t l = 0; l < s; l++) first[l] += (double)weight[l];
+}
+
+static void arrive(void *context, const walker *w, uint32_t element) {
+    const reuse_batch *b = context;
     const reuse *r = b->r;
     const size_t s = r->s, C = r->C;
-    double *const sum = b->sum + (size_t)element * C * s;
+    double *const later = b->later + (size_t)element * C * s;
     if (r->problem->way == REUSE_NONE) {
         for (size_t c = 0; c < C; c++)
-            sum[c * s + b->hits[w->path].position] += w->weight[c] / (double)r->of_batch;
+            later[c * s + b->hits[w->path].position] += w->weight[c] / (double)r->of_batch;
         return;
     }
     const float *const weight = b->weight + w->path * s;
     for (size_t c = 0; c < C; c++) {
         const double power = w->weight[c];
-        double *const out = sum + c * s;
+        double *const out = later + c * s;
 #pragma omp simd
         for (size_t l = 0; l < s; l++) out[l] += power * (double)weight[l];
     }
@@ -154,17 +172,13 @@ static bool start(void *context, walker *w) {
         w->random = hit->random;
         w->path = (uint32_t)k;
         for (size_t c = 0; c < b->r->C; c++) w->weight[c] = 1;
-        deposit(b, w, hit->element);
+        deposit_first(b, k, hit->element);
         if (!walk_survives(b->r->scene->m, w, hit->element)) continue;
         w->at = hit->element;
         walk_draw_place(w);
         return true;
     }
     return false;
-}
-
-static void arrive(void *context, const walker *w, uint32_t element) {
-    deposit(context, w, element);
 }
 
 static void go(reuse_batch *b, size_t number) {
@@ -188,47 +202,33 @@ static void go(reuse_batch *b, size_t number) {
     }
 }
 
-/* Adds a batch to the sums and squares [C][s][n] of the estimates, in the order of batches. */
-static void add_batch(const reuse *r, const double *sum, double *mean, double *square) {
-    const mesh *m = r->scene->m;
-    for (size_t i = 0; i < r->n; i++)
-        for (size_t c = 0; c < r->C; c++) {
-            const double power = r->problem->light->emission[c] * r->problem->light->area / m->area[i];
-            for (size_t l = 0; l < r->s; l++) {
-                const double x = power * sum[(i * r->C + c) * r->s + l];
-                const size_t k = (c * r->s + l) * r->n + i;
-                mean[k] += x;
-                square[k] += x * x;
-            }
-        }
-}
-
 static lam_status run_batches(const reuse *r, reuse_estimates *e, lam_error *error) {
     lam_status status = LAM_OK;
-    const size_t size = r->n * r->C * r->s;
+    const size_t straight = r->n * r->s, size = straight * r->C;
     bool failed = false;
     double rays = 0;
-    double *mean = memory_allocate(size, sizeof *mean, "paths", error);
-    double *square = memory_allocate(size, sizeof *square, "paths", error);
-    if (mean == NULL || square == NULL) TRY(LAM_ERR_MEMORY);
+    reuse_sums sums = {.s = 0};
+    TRY(reuse_sums_create(r->scene->m, r->problem->light, r->problem->way != REUSE_NONE, &sums, error));
 #pragma omp parallel
     {
         reuse_batch b = {.r = r};
-        b.sum = malloc(size * sizeof *b.sum);
+        b.first = malloc(straight * sizeof *b.first);
+        b.later = malloc(size * sizeof *b.later);
         b.hits = malloc((CHUNK + VISIBILITY_PACKET) * sizeof *b.hits);
         b.weight = malloc((CHUNK + VISIBILITY_PACKET) * r->s * sizeof *b.weight);
-        const bool ready = b.sum != NULL && b.hits != NULL && b.weight != NULL;
+        const bool ready = b.first != NULL && b.later != NULL && b.hits != NULL && b.weight != NULL;
 #pragma omp for schedule(static, 1) ordered
         for (size_t k = 0; k < WALK_BATCHES; k++) {
             if (ready) {
-                memset(b.sum, 0, size * sizeof *b.sum);
+                memset(b.first, 0, straight * sizeof *b.first);
+                memset(b.later, 0, size * sizeof *b.later);
                 b.rays = 0;
                 go(&b, k);
             }
 #pragma omp ordered
             {
                 if (ready)
-                    add_batch(r, b.sum, mean, square);
+                    reuse_sums_add(&sums, b.first, b.later);
                 else
                     failed = true;
                 rays += b.rays;
@@ -239,21 +239,17 @@ static lam_status run_batches(const reuse *r, reuse_estimates *e, lam_error *err
             e->trace_seconds += b.trace;
             e->reuse_seconds += b.reuse;
         }
-        free(b.sum);
+        free(b.first);
+        free(b.later);
         free(b.hits);
         free(b.weight);
     }
     if (failed) FAIL(error, LAM_ERR_MEMORY, "paths: out of memory");
     TRY(walk_run_end(r->run, error));
-    for (size_t k = 0; k < size; k++) {
-        const double x = mean[k] / WALK_BATCHES;
-        e->H[k] = (float)x;
-        e->error[k] = (float)sqrt(fmax(0, square[k] / WALK_BATCHES - x * x) / (WALK_BATCHES - 1));
-    }
+    reuse_sums_end(&sums, e);
     e->rays = rays / ((double)e->paths * (double)r->s);
 done:
-    free(mean);
-    free(square);
+    reuse_sums_free(&sums);
     return status;
 }
 
@@ -291,8 +287,11 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
         FAIL(error, LAM_ERR_MEMORY, "paths: too many positions");
     e.H = memory_allocate(size, sizeof *e.H, "paths", error);
     e.error = memory_allocate(size, sizeof *e.error, "paths", error);
+    e.direct = memory_allocate(e.n_positions, e.n * sizeof *e.direct, "paths", error);
+    e.covariance = memory_allocate(e.n_positions, e.n_positions * sizeof *e.covariance, "paths", error);
     r.frames = memory_allocate(e.n_positions, sizeof *r.frames, "paths", error);
-    if (e.H == NULL || e.error == NULL || r.frames == NULL) TRY(LAM_ERR_MEMORY);
+    if (e.H == NULL || e.error == NULL || e.direct == NULL || e.covariance == NULL || r.frames == NULL)
+        TRY(LAM_ERR_MEMORY);
     for (size_t l = 0; l < e.n_positions; l++) frame_of(s, light, &light->pose[l], &r.frames[l]);
     TRY(light_table_create(e.n_positions, r.frames, &r.table, error));
     walk_run run = {.progress = problem->progress,

@@ -30,15 +30,21 @@ typedef struct reuse_estimates {
     size_t paths;                      /* as rounded up */
     float *H, *error; /* [C][s][n] W/m2: the mean irradiance of an element, and its standard error from
                          batches */
-    double rays;      /* of a path, mean, the first one included */
+    float *direct;    /* [s][n]: the part of H that comes straight from the light, of the emission 1 W/m2 */
+    /* [s][s] W2/m2: the sum over channels and elements of area rho^2 Cov(H_j, H_l) for the positions j and l,
+     * from batches. The radiosity of a mix of the positions with weights w has the standard error sqrt(w' K
+     * w) in the norm |B|^2 = sum over channels and elements of area B^2. */
+    double *covariance;
+    double rays;                                       /* of a path, mean, the first one included */
     double maps_seconds, trace_seconds, reuse_seconds; /* of a thread */
 } reuse_estimates;
 
 void reuse_estimates_free(reuse_estimates *e);
 
 /* REUSE_NONE and REUSE_EXACT are unbiased; the bias of the others goes with the size of the light and of the
- * cells. Cost: s * paths walks, for REUSE_EXACT s - 1 more rays for each; memory 8 (T + 2) n C s bytes for T
- * threads. Errors: LAM_ERR_ARGUMENT names a position that reaches nothing, LAM_ERR_MEMORY, LAM_ERR_CANCELLED.
+ * cells. Cost: s * paths walks, for REUSE_EXACT s - 1 more rays for each; memory 8 ((T + 2) C + T + 1) n s
+ * bytes for T threads. Errors: LAM_ERR_ARGUMENT names a position that reaches nothing, LAM_ERR_MEMORY,
+ * LAM_ERR_CANCELLED.
  */
 lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_estimates *out,
                       lam_error *error);

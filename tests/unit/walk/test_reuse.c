@@ -48,30 +48,38 @@ static box_cell cell_at(const light_pose *p, bool along_x) {
     return c;
 }
 
-/* Irradiance H [s][n] in the empty box, exactly: first light by closed forms, and all bounces. */
-static double *exact_light(const mesh *m, const moving_light *l, const csr *F) {
-    const size_t n = m->n;
-    double *H = test_allocate(POSITIONS * n, sizeof *H), *E = test_allocate(POSITIONS * n, sizeof *E);
-    reference *r = NULL;
-    lam_error error = {.message = ""};
+/* The light that comes straight from the square, exactly, [s][n], of the emission 1. */
+static double *exact_direct(const mesh *m, const moving_light *l) {
+    double *direct = test_allocate(POSITIONS * m->n, sizeof *direct);
     for (size_t k = 0; k < POSITIONS; k++) {
         const box_cell light = cell_at(&l->pose[k], k == 3);
-        for (size_t i = 0; i < n; i++) {
+        for (size_t i = 0; i < m->n; i++) {
             const box_cell cell = box_cell_of(unit, DIVISIONS, i);
             const int a = light.axis;
             /* In front of the light lies what is below it, or beyond it along x. */
             const bool before =
                 a == 0 ? cell.from[0] >= light.level - 1e-12 : cell.to[2] <= light.level + 1e-12;
             const bool same = cell.axis == a && fabs(cell.level - light.level) < 1e-12;
-            const double direct =
-                before && !same ? l->emission[0] * box_exchange(&cell, &light) / m->area[i] : 0;
-            H[k * n + i] = E[k * n + i] = (double)m->reflectance[i] * direct;
+            direct[k * m->n + i] = before && !same ? box_exchange(&cell, &light) / m->area[i] : 0;
         }
     }
+    return direct;
+}
+
+/* Irradiance H [s][n] in the empty box, exactly: first light by closed forms, and all bounces. */
+static double *exact_light(const mesh *m, const moving_light *l, const csr *F) {
+    const size_t n = m->n;
+    double *H = test_allocate(POSITIONS * n, sizeof *H), *E = test_allocate(POSITIONS * n, sizeof *E);
+    reference *r = NULL;
+    lam_error error = {.message = ""};
+    double *direct = exact_direct(m, l);
+    for (size_t k = 0; k < POSITIONS * n; k++)
+        H[k] = E[k] = (double)m->reflectance[k % n] * l->emission[0] * direct[k];
     ck_ok(reference_create(F, m->area, m->reflectance, REFERENCE_DENSE, &r, &error));
     ck_ok(reference_solve(r, POSITIONS, E, H, 1e-12, NULL, &error));
     for (size_t k = 0; k < POSITIONS * n; k++) H[k] /= (double)m->reflectance[k % n];
     reference_destroy(r);
+    free(direct);
     free(E);
     return H;
 }
@@ -120,6 +128,91 @@ START_TEST(agrees_with_closed_forms) {
     free(H);
     moving_light_free(&l);
     csr_free(&F);
+    mesh_free(&m);
+}
+END_TEST
+
+/* Elements get a part p of the power of the light. No path has a weight above 1 / N, so that the variance of
+ * an estimate of p is at most p / N, of which 5 standard deviations of a chi-square of as many elements as
+ * get light are allowed. */
+START_TEST(direct_light_is_the_form_factor) {
+    const reuse_way way = _i == 0 ? REUSE_NONE : REUSE_EXACT;
+    mesh m = box_mesh(unit, DIVISIONS, .6f);
+    moving_light l = square_light();
+    double *exact = exact_direct(&m, &l);
+    reuse_estimates e = reuse(&m, &l, way, 40000, 0, 7);
+    for (size_t k = 0; k < POSITIONS; k++) {
+        double sum = 0, count = 0;
+        for (size_t i = 0; i < m.n; i++) {
+            const size_t at = k * m.n + i;
+            const double part = exact[at] * m.area[i] / l.area, off = (double)e.direct[at] - exact[at];
+            if (part == 0) ck_assert_double_eq((double)e.direct[at], 0);
+            ck_assert_double_ge((double)e.H[at], l.emission[0] * (double)e.direct[at] * (1 - 1e-6));
+            if (part < 1e-4) continue;
+            sum += pow(off * m.area[i] / l.area, 2) * (double)e.paths / part;
+            count++;
+        }
+        ck_assert_double_gt(count, 20);
+        ck_assert_msg(sum / count < 1 + 5 * sqrt(2 / count), "position %zu: %g of %g", k, sum / count, count);
+    }
+    reuse_estimates_free(&e);
+    free(exact);
+    moving_light_free(&l);
+    mesh_free(&m);
+}
+END_TEST
+
+/* w' K w. */
+static double quadratic(const double *K, const double w[POSITIONS]) {
+    double sum = 0;
+    for (size_t j = 0; j < POSITIONS; j++)
+        for (size_t k = 0; k < POSITIONS; k++) sum += w[j] * w[k] * K[j * POSITIONS + k];
+    return sum;
+}
+
+/* The stated error of a mix beside its mean square around the mean of 32 seeds, in the norm that it is stated
+ * in. A path meets four elements, so that at least 24 of 96 deviate by themselves: the squares of a mix have
+ * the relative standard deviation sqrt(2 / (31 * 24)), of which 4 are allowed. The first two positions share
+ * most paths, so that the error of their difference is far below that of independent estimates. */
+START_TEST(covariance_is_that_of_seeds) {
+    enum { SEEDS = 32, MIXES = 6 };
+    static const double mix[MIXES][POSITIONS] = {{1, 0, 0, 0},  {0, 0, 0, 1},  {1, 1, 1, 1},
+                                                 {1, -1, 0, 0}, {.5, 0, 2, 0}, {0, 1, -1, 1}};
+    const reuse_way way = _i == 0 ? REUSE_NONE : REUSE_EXACT;
+    mesh m = box_mesh(unit, DIVISIONS, .6f);
+    moving_light l = square_light();
+    reuse_estimates e[SEEDS];
+    double stated[MIXES] = {0}, apart = 0, mean[POSITIONS];
+    for (size_t r = 0; r < SEEDS; r++) {
+        e[r] = reuse(&m, &l, way, 3200, 0, r + 1);
+        for (size_t k = 0; k < MIXES; k++) stated[k] += quadratic(e[r].covariance, mix[k]) / SEEDS;
+        for (size_t j = 0; j < 2; j++) apart += e[r].covariance[j * POSITIONS + j] / SEEDS;
+        for (size_t j = 0; j < POSITIONS; j++) {
+            double sum = 0;
+            for (size_t i = 0; i < m.n; i++) sum += m.area[i] * pow(.6 * (double)e[r].error[j * m.n + i], 2);
+            ck_assert_double_eq_tol(e[r].covariance[j * POSITIONS + j], sum, 1e-5 * sum);
+        }
+    }
+    for (size_t k = 0; k < MIXES; k++) {
+        double found = 0;
+        for (size_t i = 0; i < m.n; i++) {
+            for (size_t j = 0; j < POSITIONS; j++) {
+                mean[j] = 0;
+                for (size_t r = 0; r < SEEDS; r++) mean[j] += (double)e[r].H[j * m.n + i] / SEEDS;
+            }
+            for (size_t r = 0; r < SEEDS; r++) {
+                double off = 0;
+                for (size_t j = 0; j < POSITIONS; j++)
+                    off += mix[k][j] * ((double)e[r].H[j * m.n + i] - mean[j]);
+                found += m.area[i] * pow(.6 * off, 2) / (SEEDS - 1);
+            }
+        }
+        ck_assert_msg(fabs(found / stated[k] - 1) < 4 * sqrt(2. / (31 * 24)), "mix %zu: %g for %g", k, found,
+                      stated[k]);
+    }
+    if (way == REUSE_EXACT) ck_assert_msg(stated[3] < .5 * apart, "%g of %g", stated[3], apart);
+    for (size_t r = 0; r < SEEDS; r++) reuse_estimates_free(&e[r]);
+    moving_light_free(&l);
     mesh_free(&m);
 }
 END_TEST
@@ -328,6 +421,8 @@ int main(void) {
     TCase *tests = tcase_create("reuse");
     tcase_set_timeout(tests, 300);
     tcase_add_loop_test(tests, agrees_with_closed_forms, 0, 2);
+    tcase_add_loop_test(tests, direct_light_is_the_form_factor, 0, 2);
+    tcase_add_loop_test(tests, covariance_is_that_of_seeds, 0, 2);
     tcase_add_test(tests, sharing_lowers_the_error);
     tcase_add_test(tests, rays_know_what_is_hidden);
     tcase_add_loop_test(tests, maps_come_close, 0, 2);

@@ -1,0 +1,97 @@
+/* The sums over batches of reused paths: means, standard errors, and the covariance of positions, which
+ * shared paths make correlated. */
+#include "solver/walk/reuse_sums.h"
+
+#include "solver/base/cpu.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Rows that go into the covariance together: one pass over it for all. */
+enum { SUMS_ROWS = 8 };
+
+#define CPU_KERNELS "solver/walk/reuse_sums_kernels.inc"
+#include "solver/base/cpu_kernels.inc"
+
+void reuse_sums_free(reuse_sums *t) {
+    free(t->mean);
+    free(t->square);
+    free(t->direct);
+    free(t->covariance);
+    free(t->left);
+    free(t->right);
+    *t = (reuse_sums){.s = 0};
+}
+
+lam_status reuse_sums_create(const mesh *m, const moving_light *light, bool shared, reuse_sums *out,
+                             lam_error *error) {
+    const size_t s = light->n, size = m->n * m->n_channels * s;
+    reuse_sums t = {.m = m, .light = light, .s = s, .shared = shared};
+    t.mean = memory_allocate(size, sizeof *t.mean, "paths", error);
+    t.square = memory_allocate(size, sizeof *t.square, "paths", error);
+    t.direct = memory_allocate(m->n, s * sizeof *t.direct, "paths", error);
+    t.covariance = memory_allocate(s, s * sizeof *t.covariance, "paths", error);
+    t.left = memory_allocate(SUMS_ROWS, s * sizeof *t.left, "paths", error);
+    t.right = memory_allocate(SUMS_ROWS, s * sizeof *t.right, "paths", error);
+    if (t.mean == NULL || t.square == NULL || t.direct == NULL || t.covariance == NULL || t.left == NULL ||
+        t.right == NULL) {
+        reuse_sums_free(&t);
+        return LAM_ERR_MEMORY;
+    }
+    *out = t;
+    return LAM_OK;
+}
+
+void reuse_sums_add(reuse_sums *t, const double *first, const double *later) {
+    typedef void move_mean(size_t, double, double, const double *, const double *, double *, double *,
+                           double *);
+    typedef void outer(size_t, const double *, const double *, double *);
+    static move_mean *const moves[] = CPU_TABLE(move_portable, move_avx2, move_avx512);
+    static outer *const outers[] = CPU_TABLE(outer_portable, outer_avx2, outer_avx512);
+    const cpu_level level = cpu_best();
+    const mesh *m = t->m;
+    const size_t s = t->s, C = m->n_channels;
+    const double batches = (double)++t->batches, step = 1 / batches;
+    size_t rows = 0;
+    for (size_t i = 0; i < m->n; i++) {
+        for (size_t l = 0; l < s; l++) t->direct[i * s + l] += first[i * s + l];
+        for (size_t c = 0; c < C; c++) {
+            const size_t at = (i * C + c) * s;
+            const double power = t->light->emission[c] * t->light->area / m->area[i];
+            const double rho = (double)m->reflectance[c * m->n + i];
+            const double factor = m->area[i] * rho * rho * (1 - step);
+            double *const left = t->left + rows * s, *const right = t->right + rows * s;
+            moves[level](s, power, step, first + i * s, later + at, t->mean + at, t->square + at, right);
+            if (!t->shared) {
+                for (size_t l = 0; l < s; l++) t->covariance[l * s + l] += factor * right[l] * right[l];
+                continue;
+            }
+            for (size_t l = 0; l < s; l++) left[l] = factor * right[l];
+            if (++rows < SUMS_ROWS) continue;
+            outers[level](s, t->left, t->right, t->covariance);
+            rows = 0;
+        }
+    }
+    if (rows == 0) return;
+    memset(t->left + rows * s, 0, (SUMS_ROWS - rows) * s * sizeof *t->left);
+    outers[level](s, t->left, t->right, t->covariance);
+}
+
+void reuse_sums_end(const reuse_sums *t, reuse_estimates *e) {
+    const size_t n = e->n, C = e->n_channels, s = t->s;
+    const double batches = (double)t->batches, of_mean = 1 / (batches * (batches - 1));
+    for (size_t i = 0; i < n; i++) {
+        for (size_t l = 0; l < s; l++)
+            e->direct[l * n + i] = (float)(t->direct[i * s + l] * t->light->area / (t->m->area[i] * batches));
+        for (size_t c = 0; c < C; c++)
+            for (size_t l = 0; l < s; l++) {
+                const size_t from = (i * C + c) * s + l, to = (c * s + l) * n + i;
+                e->H[to] = (float)t->mean[from];
+                e->error[to] = (float)sqrt(t->square[from] * of_mean);
+            }
+    }
+    for (size_t j = 0; j < s; j++)
+        for (size_t l = j; l < s; l++)
+            e->covariance[j * s + l] = e->covariance[l * s + j] = t->covariance[j * s + l] * of_mean;
+}

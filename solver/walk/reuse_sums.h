@@ -1,0 +1,35 @@
+/* Means over the batches of reused paths and what they scatter by, private to reuse*.c. */
+#ifndef LAMBERT_WALK_REUSE_SUMS_H
+#define LAMBERT_WALK_REUSE_SUMS_H
+
+#include "solver/scene/mesh.h"
+#include "solver/walk/reuse.h"
+
+/* Batches that were added, of all elements, channels and positions (n C s numbers each, in the order of the
+ * sums of a batch): after b batches x_1 ... x_b the mean and sum_k (x_k - mean) (x_k - mean)', which a batch
+ * with d = x_(b+1) - mean raises by b/(b + 1) d d' (Welford 1962). Nothing is lost to cancellation, and the
+ * covariance stays positive semidefinite. */
+typedef struct reuse_sums {
+    const mesh *m;
+    const moving_light *light;
+    size_t s, batches;
+    bool shared;          /* positions share paths: without that no two of them are correlated */
+    double *mean;         /* [n][C][s] W/m2 */
+    double *square;       /* [n][C][s]: the diagonal */
+    double *direct;       /* [n][s]: sum over batches */
+    double *covariance;   /* [s][s]: sum over channels and elements with area rho^2, upper triangle */
+    double *left, *right; /* [SUMS_ROWS][s]: rows of d that wait for the covariance, left with its factor */
+} reuse_sums;
+
+lam_status reuse_sums_create(const mesh *m, const moving_light *light, bool shared, reuse_sums *out,
+                             lam_error *error);
+void reuse_sums_free(reuse_sums *t);
+
+/* Adds a batch: power over that of the light which comes to elements straight from it, first [n][s], and by
+ * reflection, later [n][C][s]. Cost: n C s^2 / 2 multiplications. */
+void reuse_sums_add(reuse_sums *t, const double *first, const double *later);
+
+/* Writes H, error, covariance and direct of the estimates, which the caller has allocated. */
+void reuse_sums_end(const reuse_sums *t, reuse_estimates *e);
+
+#endif
