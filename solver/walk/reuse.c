@@ -10,9 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Paths whose first hits are found together. */
-enum { CHUNK = 1024 };
-
 void reuse_estimates_free(reuse_estimates *e) {
     free(e->H);
     free(e->error);
@@ -27,7 +24,6 @@ typedef struct reuse {
     const reuse_problem *problem;
     size_t n, C, s, of_batch; /* paths of a position in a batch */
     light_frame *frames;      /* [s] */
-    light_table table;        /* of them */
     const light_maps *maps;   /* or NULL */
     walk_run *run;
 } reuse;
@@ -36,9 +32,10 @@ typedef struct reuse {
 typedef struct reuse_batch {
     const reuse *r;
     double *first, *later; /* [n][s] and [n][C][s]: power over that of the light, straight and reflected */
-    first_hit *hits;
-    float *weight; /* [CHUNK][s] */
-    size_t count, next;
+    first_hits *hits;
+    float *weight, *work;  /* [HITS_MOST][s]; see reuse_weights */
+    walk_starts starts;    /* of position, 0 <= position <= s */
+    size_t position, next; /* of hits: the next to go on */
     double rays, trace, reuse;
 } reuse_batch;
 
@@ -71,62 +68,79 @@ static void frame_of(const walk_scene *s, const moving_light *l, const light_pos
     to_float(normal, out->normal);
 }
 
-/* Casts the first rays of up to CHUNK paths of a position. */
-static void find_hits(reuse_batch *b, walk_starts *starts, size_t position) {
-    const reuse *r = b->r;
-    const light_frame *f = &r->frames[position];
+/* The first rays of up to eight paths of the position at hand; returns how many. */
+static size_t first_rays(reuse_batch *b, ray_packet *rays, float local[][3], uint64_t *random) {
     static const double all[2] = {0, 1};
-    uint32_t self[VISIBILITY_PACKET];
-    for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = VISIBILITY_NOTHING;
-    b->count = b->next = 0;
-    while (b->count < CHUNK) {
-        first_hit *const at = b->hits + b->count;
-        ray_packet rays;
-        hit_packet hits;
-        size_t n = 0;
-        for (; n < VISIBILITY_PACKET; n++) {
-            walker w;
-            size_t only;
-            double point[3];
-            if (!walk_starts_next(starts, all, 1, &w, &only)) break;
-            moving_light_point(r->problem->light, w.place[0], w.place[1], point);
-            float direction[3];
-            cosine_direction(f->tangent, f->bitangent, f->normal, w.place[2], w.place[3], direction);
-            at[n] = (first_hit){.position = (uint32_t)position, .random = w.random};
-            to_float(point, at[n].local);
-            for (int d = 0; d < 3; d++) {
-                rays.origin[d][n] = f->turn[d][0] * at[n].local[0] + f->turn[d][1] * at[n].local[1] +
-                                    f->turn[d][2] * at[n].local[2] + f->move[d];
-                rays.direction[d][n] = direction[d];
-            }
+    const light_frame *f = &b->r->frames[b->position];
+    size_t n = 0;
+    for (; n < VISIBILITY_PACKET; n++) {
+        walker w;
+        size_t only;
+        double point[3];
+        float direction[3];
+        if (!walk_starts_next(&b->starts, all, 1, &w, &only)) break;
+        moving_light_point(b->r->problem->light, w.place[0], w.place[1], point);
+        cosine_direction(f->tangent, f->bitangent, f->normal, w.place[2], w.place[3], direction);
+        to_float(point, local[n]);
+        random[n] = w.random;
+        for (int d = 0; d < 3; d++) {
+            rays->origin[d][n] = f->turn[d][0] * local[n][0] + f->turn[d][1] * local[n][1] +
+                                 f->turn[d][2] * local[n][2] + f->move[d];
+            rays->direction[d][n] = direction[d];
         }
-        if (n == 0) break;
-        for (size_t i = n; i < VISIBILITY_PACKET; i++)
-            for (int d = 0; d < 3; d++) rays.origin[d][i] = rays.direction[d][i] = 0;
-        visibility_cast(r->scene->v, &rays, n, self, 0, &hits);
-        for (size_t i = 0; i < n; i++) {
-            const bool front = hits.element[i] != VISIBILITY_NOTHING && !hits.back[i];
-            at[i].element = front ? hits.element[i] : VISIBILITY_NOTHING;
-            for (int d = 0; d < 3; d++)
-                at[i].y[d] = rays.origin[d][i] + (front ? hits.distance[i] * rays.direction[d][i] : 0);
-        }
-        b->rays += (double)n;
-        b->count += n;
+    }
+    for (size_t i = n; i < VISIBILITY_PACKET; i++)
+        for (int d = 0; d < 3; d++) rays->origin[d][i] = rays->direction[d][i] = 0;
+    return n;
+}
+
+/* Numbers that kernels read beyond the last hit: a point whose normal is 0 gets nothing. */
+static void fill_up(first_hits *h) {
+    for (size_t k = h->count; k % HITS_LANES != 0; k++) {
+        h->facet[k] = h->position[k] = VISIBILITY_NOTHING;
+        for (int d = 0; d < 3; d++) h->local[d][k] = h->y[d][k] = h->normal[d][k] = 0;
     }
 }
 
-/* eq. 2.8 with the same N for all positions; a path of its own position alone has the weight 1 / N. */
-static void weigh(reuse_batch *b) {
+/* Casts first rays of the positions of batch `number` until a chunk of hits is full or all have been cast. */
+static void find_hits(reuse_batch *b, size_t number) {
     const reuse *r = b->r;
-    const float per_path = 1 / (float)r->of_batch;
-    for (size_t k = 0; k < b->count; k++) {
-        float *const w = b->weight + k * r->s, sum = 0;
-        if (b->hits[k].element == VISIBILITY_NOTHING) continue;
-        reuse_kernels(r->scene, &r->table, r->frames, r->maps, &b->hits[k], w);
-        for (size_t l = 0; l < r->s; l++) sum += w[l];
-        const float scale = sum > 0 ? per_path / sum : 0;
-        for (size_t l = 0; l < r->s; l++) w[l] *= scale;
+    const mesh *m = r->scene->m;
+    const facets *facet = visibility_facets(r->scene->v);
+    first_hits *const h = b->hits;
+    uint32_t self[VISIBILITY_PACKET];
+    for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = VISIBILITY_NOTHING;
+    h->count = b->next = 0;
+    while (b->position < r->s && h->count + VISIBILITY_PACKET <= HITS_MOST) {
+        ray_packet rays;
+        hit_packet hits;
+        float local[VISIBILITY_PACKET][3];
+        uint64_t random[VISIBILITY_PACKET];
+        const size_t n = first_rays(b, &rays, local, random);
+        if (n == 0) {
+            if (++b->position < r->s)
+                walk_starts_init(&b->starts, r->problem->seed, number * r->s + b->position, r->of_batch);
+            continue;
+        }
+        visibility_cast(r->scene->v, &rays, n, self, 0, &hits);
+        b->rays += (double)n;
+        for (size_t i = 0; i < n; i++) {
+            const uint32_t element = hits.element[i];
+            const size_t k = h->count;
+            if (element == VISIBILITY_NOTHING || hits.back[i]) continue;
+            h->element[k] = element;
+            h->facet[k] = facet->of_element[element % m->n];
+            h->position[k] = (uint32_t)b->position;
+            h->random[k] = random[i];
+            for (int d = 0; d < 3; d++) {
+                h->local[d][k] = local[i][d];
+                h->y[d][k] = rays.origin[d][i] + hits.distance[i] * rays.direction[d][i];
+                h->normal[d][k] = m->normal[element][d];
+            }
+            h->count++;
+        }
     }
+    fill_up(h);
 }
 
 /* Adds the light that comes to an element straight from the light, the same in all channels. */
@@ -136,7 +150,7 @@ static void deposit_first(const reuse_batch *b, size_t path, uint32_t element) {
     double *const first = b->first + (size_t)element * s;
     const float *const weight = b->weight + path * s;
     if (r->problem->way == REUSE_NONE) {
-        first[b->hits[path].position] += 1 / (double)r->of_batch;
+        first[b->hits->position[path]] += 1 / (double)r->of_batch;
         return;
     }
 #pragma omp simd
@@ -150,7 +164,7 @@ static void arrive(void *context, const walker *w, uint32_t element) {
     double *const later = b->later + (size_t)element * C * s;
     if (r->problem->way == REUSE_NONE) {
         for (size_t c = 0; c < C; c++)
-            later[c * s + b->hits[w->path].position] += w->weight[c] / (double)r->of_batch;
+            later[c * s + b->hits->position[w->path]] += w->weight[c] / (double)r->of_batch;
         return;
     }
     const float *const weight = b->weight + w->path * s;
@@ -165,16 +179,15 @@ static void arrive(void *context, const walker *w, uint32_t element) {
 /* The next path of the chunk that goes on from its first hit. */
 static bool start(void *context, walker *w) {
     reuse_batch *b = context;
-    while (b->next < b->count) {
+    const first_hits *h = b->hits;
+    while (b->next < h->count) {
         const size_t k = b->next++;
-        const first_hit *hit = &b->hits[k];
-        if (hit->element == VISIBILITY_NOTHING) continue;
-        w->random = hit->random;
+        w->random = h->random[k];
         w->path = (uint32_t)k;
         for (size_t c = 0; c < b->r->C; c++) w->weight[c] = 1;
-        deposit_first(b, k, hit->element);
-        if (!walk_survives(b->r->scene->m, w, hit->element)) continue;
-        w->at = hit->element;
+        deposit_first(b, k, h->element[k]);
+        if (!walk_survives(b->r->scene->m, w, h->element[k])) continue;
+        w->at = h->element[k];
         walk_draw_place(w);
         return true;
     }
@@ -185,20 +198,19 @@ static void go(reuse_batch *b, size_t number) {
     const reuse *r = b->r;
     const walk_batch walks = {
         .scene = r->scene, .run = r->run, .start = start, .arrive = arrive, .context = b, .rays = &b->rays};
-    for (size_t l = 0; l < r->s && !r->run->stop; l++) {
-        walk_starts starts;
-        walk_starts_init(&starts, r->problem->seed, number * r->s + l, r->of_batch);
-        for (;;) {
-            const double begun = clock_thread_seconds();
-            find_hits(b, &starts, l);
-            if (b->count == 0) break;
-            const double traced = clock_thread_seconds();
-            if (r->problem->way != REUSE_NONE) weigh(b);
-            const double weighed = clock_thread_seconds();
-            walk_batch_go(&walks);
-            b->reuse += weighed - traced;
-            b->trace += traced - begun + clock_thread_seconds() - weighed;
-        }
+    b->position = 0;
+    walk_starts_init(&b->starts, r->problem->seed, number * r->s, r->of_batch);
+    while (!r->run->stop) {
+        const double begun = clock_thread_seconds();
+        find_hits(b, number);
+        if (b->hits->count == 0 && b->position == r->s) break;
+        const double traced = clock_thread_seconds();
+        if (r->problem->way != REUSE_NONE)
+            reuse_weights(r->scene, r->s, r->frames, r->maps, b->hits, b->work, b->weight);
+        const double weighed = clock_thread_seconds();
+        walk_batch_go(&walks);
+        b->reuse += weighed - traced;
+        b->trace += traced - begun + clock_thread_seconds() - weighed;
     }
 }
 
@@ -214,9 +226,11 @@ static lam_status run_batches(const reuse *r, reuse_estimates *e, lam_error *err
         reuse_batch b = {.r = r};
         b.first = malloc(straight * sizeof *b.first);
         b.later = malloc(size * sizeof *b.later);
-        b.hits = malloc((CHUNK + VISIBILITY_PACKET) * sizeof *b.hits);
-        b.weight = malloc((CHUNK + VISIBILITY_PACKET) * r->s * sizeof *b.weight);
-        const bool ready = b.first != NULL && b.later != NULL && b.hits != NULL && b.weight != NULL;
+        b.hits = malloc(sizeof *b.hits);
+        b.weight = malloc(HITS_MOST * r->s * sizeof *b.weight);
+        b.work = malloc(HITS_BLOCK * (r->s + 1) * sizeof *b.work);
+        const bool ready =
+            b.first != NULL && b.later != NULL && b.hits != NULL && b.weight != NULL && b.work != NULL;
 #pragma omp for schedule(static, 1) ordered
         for (size_t k = 0; k < WALK_BATCHES; k++) {
             if (ready) {
@@ -243,6 +257,7 @@ static lam_status run_batches(const reuse *r, reuse_estimates *e, lam_error *err
         free(b.later);
         free(b.hits);
         free(b.weight);
+        free(b.work);
     }
     if (failed) FAIL(error, LAM_ERR_MEMORY, "paths: out of memory");
     TRY(walk_run_end(r->run, error));
@@ -292,8 +307,10 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
     r.frames = memory_allocate(e.n_positions, sizeof *r.frames, "paths", error);
     if (e.H == NULL || e.error == NULL || e.direct == NULL || e.covariance == NULL || r.frames == NULL)
         TRY(LAM_ERR_MEMORY);
-    for (size_t l = 0; l < e.n_positions; l++) frame_of(s, light, &light->pose[l], &r.frames[l]);
-    TRY(light_table_create(e.n_positions, r.frames, &r.table, error));
+    for (size_t l = 0; l < e.n_positions; l++) {
+        frame_of(s, light, &light->pose[l], &r.frames[l]);
+        r.frames[l].paths = (float)r.of_batch;
+    }
     walk_run run = {.progress = problem->progress,
                     .stage = problem->stage,
                     .all = (double)e.paths * (double)e.n_positions};
@@ -313,7 +330,6 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
     e = (reuse_estimates){.n = 0};
 done:
     free(r.frames);
-    light_table_free(&r.table);
     light_maps_free(&maps);
     reuse_estimates_free(&e);
     return status;

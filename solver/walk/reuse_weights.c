@@ -6,6 +6,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { SIDE_MOST = 1 << 14 };
 
@@ -14,40 +15,6 @@ static const float near_part = 1e-4f;
 
 static float dot(const float a[3], const float b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void point_of(const light_frame *f, const float local[3], float out[3]) {
-    for (int d = 0; d < 3; d++) out[d] = dot(f->turn[d], local) + f->move[d];
-}
-
-/* Sets f[l] to 0 where a ray from x_l meets something before y. */
-static void see(const walk_scene *s, size_t count, const uint32_t *which, const float (*x)[3],
-                const first_hit *hit, float *f) {
-    const facets *facet = visibility_facets(s->v);
-    const uint32_t own = facet->of_element[hit->element % s->m->n];
-    const float rounding = (float)visibility_rounding(s->v);
-    uint32_t self[VISIBILITY_PACKET];
-    for (size_t begin = 0; begin < count; begin += VISIBILITY_PACKET) {
-        const size_t n = count - begin < VISIBILITY_PACKET ? count - begin : VISIBILITY_PACKET;
-        ray_packet rays;
-        hit_packet hits;
-        for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
-            self[i] = VISIBILITY_NOTHING;
-            const size_t k = begin + (i < n ? i : 0);
-            for (int d = 0; d < 3; d++) {
-                rays.origin[d][i] = x[k][d];
-                rays.direction[d][i] = hit->y[d] - x[k][d];
-            }
-        }
-        visibility_cast(s->v, &rays, n, self, VISIBILITY_TOGETHER, &hits);
-        for (size_t i = 0; i < n; i++) {
-            if (hits.element[i] == VISIBILITY_NOTHING) continue;
-            const float r[3] = {rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
-            const float last = 1 - near_part - 4 * rounding / sqrtf(dot(r, r));
-            const bool at_y = !hits.back[i] && facet->of_element[hits.element[i]] == own;
-            if (!at_y && hits.distance[i] < last) f[which[begin + i]] = 0;
-        }
-    }
 }
 
 /* The direction through the middle of a cell, in the frame; false for a cell beyond the disc. */
@@ -98,15 +65,18 @@ static void look(const walk_scene *s, const light_frame *f, light_maps *m, size_
         for (size_t i = 0; i < n; i++) {
             const size_t at = position * m->cells + begin + i;
             const bool met = hits.element[i] != VISIBILITY_NOTHING;
-            m->facet[at] = met ? facet->of_element[hits.element[i]] : VISIBILITY_NOTHING;
-            if (m->distance != NULL) m->distance[at] = met ? hits.distance[i] : INFINITY;
+            const uint32_t seen = met ? facet->of_element[hits.element[i] % s->m->n] : VISIBILITY_NOTHING;
+            if (m->cell != NULL)
+                m->cell[at] = (map_cell){.facet = seen, .distance = met ? hits.distance[i] : INFINITY};
+            else
+                m->facet[at] = seen;
         }
     }
 }
 
 void light_maps_free(light_maps *m) {
     free(m->facet);
-    free(m->distance);
+    free(m->cell);
     *m = (light_maps){.side = 0};
 }
 
@@ -118,83 +88,99 @@ lam_status light_maps_create(const walk_scene *s, size_t n, const light_frame *f
         return status_fail(error, LAM_ERR_ARGUMENT,
                            "visibility maps of %zu cells a side for %zu positions: more than 2^31 cells",
                            resolution, n);
-    m.facet = memory_allocate(n, m.cells * sizeof *m.facet, "visibility maps", error);
-    if (m.facet != NULL && way == REUSE_MAPS)
-        m.distance = memory_allocate(n, m.cells * sizeof *m.distance, "visibility maps", error);
-    if (m.facet == NULL || (way == REUSE_MAPS && m.distance == NULL)) {
-        light_maps_free(&m);
-        return LAM_ERR_MEMORY;
-    }
+    if (way == REUSE_MAPS)
+        m.cell = memory_allocate(n, m.cells * sizeof *m.cell, "visibility maps", error);
+    else
+        m.facet = memory_allocate(n, m.cells * sizeof *m.facet, "visibility maps", error);
+    if (m.facet == NULL && m.cell == NULL) return LAM_ERR_MEMORY;
 #pragma omp parallel for schedule(dynamic, 1)
     for (size_t l = 0; l < n; l++) look(s, &frames[l], &m, l);
     *out = m;
     return LAM_OK;
 }
 
-void light_table_free(light_table *t) {
-    free(t->turn[0]);
-    *t = (light_table){.n = 0};
-}
-
-lam_status light_table_create(size_t n, const light_frame *frames, light_table *out, lam_error *error) {
-    enum { NUMBERS = sizeof(light_frame) / sizeof(float) };
-    float *all = memory_allocate(n, NUMBERS * sizeof *all, "positions", error);
-    light_table t = {.n = n};
-    float **const groups[] = {t.turn, t.move, t.tangent, t.bitangent, t.normal, t.centre};
-    static const size_t sizes[] = {9, 3, 3, 3, 3, 3};
-    size_t at = 0;
-    if (all == NULL) return LAM_ERR_MEMORY;
-    for (size_t g = 0; g < sizeof sizes / sizeof *sizes; g++)
-        for (size_t k = 0; k < sizes[g]; k++) groups[g][k] = all + n * at++;
-    for (size_t l = 0; l < n; l++) {
-        const light_frame *f = &frames[l];
-        for (int d = 0; d < 3; d++) {
-            for (int k = 0; k < 3; k++) t.turn[3 * d + k][l] = f->turn[d][k];
-            t.move[d][l] = f->move[d];
-            t.tangent[d][l] = f->tangent[d];
-            t.bitangent[d][l] = f->bitangent[d];
-            t.normal[d][l] = f->normal[d];
-            t.centre[d][l] = f->centre[d];
-        }
-    }
-    *out = t;
-    return LAM_OK;
-}
-
 #define CPU_KERNELS "solver/walk/reuse_kernels.inc"
 #include "solver/base/cpu_kernels.inc"
 
-/* Sets f to 0 where rays find something before y, but for the path's own position. */
-static void see_all(const walk_scene *s, size_t n, const light_frame *frames, const first_hit *hit,
+/* Sets f[l * HITS_BLOCK] to 0 for the positions l from which a ray meets something before hit k, but for the
+ * path's own. */
+static void see_all(const walk_scene *s, size_t n, const light_frame *frames, const first_hits *h, size_t k,
                     float *f) {
-    enum { AT_ONCE = 64 };
-    uint32_t which[AT_ONCE];
-    float x[AT_ONCE][3];
+    uint32_t self[VISIBILITY_PACKET], which[VISIBILITY_PACKET];
+    const facets *facet = visibility_facets(s->v);
+    const float rounding = (float)visibility_rounding(s->v);
+    const float local[3] = {h->local[0][k], h->local[1][k], h->local[2][k]};
+    ray_packet rays;
+    hit_packet hits;
     size_t count = 0;
-    for (size_t l = 0; l < n; l++) {
-        if (l == hit->position || !(f[l] > 0)) continue;
-        point_of(&frames[l], hit->local, x[count]);
-        which[count++] = (uint32_t)l;
-        if (count < AT_ONCE) continue;
-        see(s, count, which, (const float(*)[3])x, hit, f);
+    for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = VISIBILITY_NOTHING;
+    memset(&rays, 0, sizeof rays);
+    for (size_t l = 0; l <= n; l++) {
+        if (l < n && l != h->position[k] && f[l * HITS_BLOCK] > 0) {
+            for (int d = 0; d < 3; d++) {
+                const float x = dot(frames[l].turn[d], local) + frames[l].move[d];
+                rays.origin[d][count] = x;
+                rays.direction[d][count] = h->y[d][k] - x;
+            }
+            which[count++] = (uint32_t)l;
+        }
+        if (count == 0 || (l < n && count < VISIBILITY_PACKET)) continue;
+        visibility_cast(s->v, &rays, count, self, VISIBILITY_TOGETHER, &hits);
+        for (size_t i = 0; i < count; i++) {
+            if (hits.element[i] == VISIBILITY_NOTHING) continue;
+            const float r[3] = {rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
+            const float last = 1 - near_part - 4 * rounding / sqrtf(dot(r, r));
+            const bool at_y = !hits.back[i] && facet->of_element[hits.element[i] % s->m->n] == h->facet[k];
+            if (!at_y && hits.distance[i] < last) f[which[i] * HITS_BLOCK] = 0;
+        }
         count = 0;
     }
-    if (count > 0) see(s, count, which, (const float(*)[3])x, hit, f);
 }
 
-void reuse_kernels(const walk_scene *s, const light_table *table, const light_frame *frames,
-                   const light_maps *maps, const first_hit *hit, float *f) {
-    typedef void exchange(const light_table *, const first_hit *, const float *, bool, float *);
-    typedef void show(const light_table *, const light_maps *, const first_hit *, uint32_t, float *);
+/* f[l * HITS_BLOCK + k] = F(x_l, y_k) times pi for n hits from begin on, a multiple of HITS_LANES. */
+static void kernels_of(const walk_scene *s, size_t n_positions, const light_frame *frames,
+                       const light_maps *maps, const first_hits *h, size_t begin, size_t n, float *f) {
+    typedef void exchange(size_t, const light_frame *, const first_hits *, size_t, float *);
+    typedef void look_up(size_t, const light_frame *, uint32_t, size_t, const map_cell *, const first_hits *,
+                         size_t, float *);
+    typedef void project(size_t, const light_frame *, uint32_t, size_t, const uint32_t *, const first_hits *,
+                         size_t, float *);
     static exchange *const exchanges[] = CPU_TABLE(exchange_portable, exchange_avx2, exchange_avx512);
-    static show *const shows[] = CPU_TABLE(show_portable, show_avx2, show_avx512);
+    static look_up *const look_ups[] = CPU_TABLE(maps_portable, maps_avx2, maps_avx512);
+    static project *const projects[] = CPU_TABLE(cubes_portable, cubes_avx2, cubes_avx512);
     const cpu_level level = cpu_best();
-    exchanges[level](table, hit, s->m->normal[hit->element], maps != NULL && maps->way == REUSE_CUBES, f);
-    const float own = f[hit->position];
-    if (maps == NULL) {
-        see_all(s, table->n, frames, hit, f);
-        return;
+    for (size_t l = 0; l < n_positions; l++) {
+        float *const row = f + l * HITS_BLOCK;
+        if (maps != NULL && maps->way == REUSE_CUBES) {
+            projects[level](n, &frames[l], (uint32_t)l, maps->side, maps->facet + l * maps->cells, h, begin,
+                            row);
+            continue;
+        }
+        exchanges[level](n, &frames[l], h, begin, row);
+        if (maps != NULL)
+            look_ups[level](n, &frames[l], (uint32_t)l, maps->side, maps->cell + l * maps->cells, h, begin,
+                            row);
     }
-    shows[level](table, maps, hit, visibility_facets(s->v)->of_element[hit->element], f);
-    f[hit->position] = own;
+    for (size_t k = 0; k < n && maps == NULL && begin + k < h->count; k++)
+        see_all(s, n_positions, frames, h, begin + k, f + k);
+}
+
+void reuse_weights(const walk_scene *s, size_t n, const light_frame *frames, const light_maps *maps,
+                   const first_hits *hits, float *work, float *weight) {
+    typedef void gain(size_t, float, const float *, float *);
+    static gain *const gains[] = CPU_TABLE(gain_portable, gain_avx2, gain_avx512);
+    const cpu_level level = cpu_best();
+    float *const sum = work + HITS_BLOCK * n;
+    for (size_t begin = 0; begin < hits->count; begin += HITS_BLOCK) {
+        const size_t left = hits->count - begin, count = left < HITS_BLOCK ? left : HITS_BLOCK;
+        const size_t filled = (count + HITS_LANES - 1) / HITS_LANES * HITS_LANES;
+        kernels_of(s, n, frames, maps, hits, begin, filled, work);
+        memset(sum, 0, filled * sizeof *sum);
+        for (size_t l = 0; l < n; l++) gains[level](filled, frames[l].paths, work + l * HITS_BLOCK, sum);
+        for (size_t k = 0; k < count; k++) {
+            const float scale = sum[k] > 0 ? 1 / sum[k] : 0;
+            float *const out = weight + (begin + k) * n;
+            for (size_t l = 0; l < n; l++) out[l] = work[l * HITS_BLOCK + k] * scale;
+        }
+    }
 }
