@@ -10,9 +10,6 @@
 
 enum { SIDE_MOST = 1 << 14 };
 
-/* A hit within this part of the distance to y, or as rounding moves it, is y. */
-static const float near_part = 1e-4f;
-
 /* Far below the fourth power of any distance, added to it so that nothing is divided by 0. */
 static const float tiny = 1e-30f;
 
@@ -117,37 +114,33 @@ lam_status light_maps_create(const walk_scene *s, size_t n, const light_frame *f
 #define CPU_KERNELS "solver/walk/reuse_kernels.inc"
 #include "solver/base/cpu_kernels.inc"
 
-/* Sets f[l * HITS_BLOCK] to 0 for the positions l from which a ray meets something before hit k, but for the
- * path's own. */
+/* Sets f[l * HITS_BLOCK] to 0 for the positions l between which and hit k something stands, but for the
+ * path's own. Segments begin above the face that was hit by more than rounding, and all in one point. */
 static void see_all(const walk_scene *s, size_t n, const light_frame *frames, const first_hits *h, size_t k,
                     float *f) {
-    uint32_t self[VISIBILITY_PACKET], which[VISIBILITY_PACKET];
-    const facets *facet = visibility_facets(s->v);
-    const float rounding = (float)visibility_rounding(s->v);
+    uint32_t which[VISIBILITY_PACKET];
+    const float lift = 4 * (float)visibility_rounding(s->v);
     const float local[3] = {h->local[0][k], h->local[1][k], h->local[2][k]};
-    ray_packet rays;
-    hit_packet hits;
+    float y[3];
+    ray_packet segments;
     size_t count = 0;
-    for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = VISIBILITY_NOTHING;
-    memset(&rays, 0, sizeof rays);
+    for (int d = 0; d < 3; d++) {
+        y[d] = h->y[d][k] + lift * h->normal[d][k];
+        for (int i = 0; i < VISIBILITY_PACKET; i++) {
+            segments.origin[d][i] = y[d];
+            segments.direction[d][i] = 0;
+        }
+    }
     for (size_t l = 0; l <= n; l++) {
         if (l < n && l != h->position[k] && f[l * HITS_BLOCK] > 0) {
-            for (int d = 0; d < 3; d++) {
-                const float x = dot(frames[l].turn[d], local) + frames[l].move[d];
-                rays.origin[d][count] = x;
-                rays.direction[d][count] = h->y[d][k] - x;
-            }
+            for (int d = 0; d < 3; d++)
+                segments.direction[d][count] = dot(frames[l].turn[d], local) + frames[l].move[d] - y[d];
             which[count++] = (uint32_t)l;
         }
         if (count == 0 || (l < n && count < VISIBILITY_PACKET)) continue;
-        visibility_cast(s->v, &rays, count, self, VISIBILITY_TOGETHER, &hits);
-        for (size_t i = 0; i < count; i++) {
-            if (hits.element[i] == VISIBILITY_NOTHING) continue;
-            const float r[3] = {rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
-            const float last = 1 - near_part - 4 * rounding / sqrtf(dot(r, r));
-            const bool at_y = !hits.back[i] && facet->of_element[hits.element[i] % s->m->n] == h->facet[k];
-            if (!at_y && hits.distance[i] < last) f[which[i] * HITS_BLOCK] = 0;
-        }
+        const unsigned blocked = visibility_between(s->v, &segments, count);
+        for (size_t i = 0; i < count; i++)
+            if ((blocked >> i & 1) != 0) f[which[i] * HITS_BLOCK] = 0;
         count = 0;
     }
 }

@@ -441,6 +441,23 @@ unsigned visibility_blocked(const visibility *v, const ray_packet *segments, siz
     return blocked;
 }
 
+unsigned visibility_between(const visibility *v, const ray_packet *segments, size_t n_segments) {
+    struct RTCRayHit8 packet __attribute__((aligned(32)));
+    int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
+    struct RTCIntersectContext context;
+    unsigned blocked = 0;
+    rtcInitIntersectContext(&context);
+    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    packet_set(&packet, segments);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        active[i] = i < n_segments ? -1 : 0;
+        packet.ray.tfar[i] = 1;
+    }
+    rtcOccluded8(active, v->scene, &context, &packet.ray);
+    for (size_t i = 0; i < n_segments; i++) blocked |= (unsigned)(packet.ray.tfar[i] < 0) << i;
+    return blocked;
+}
+
 /* One packet of the bare loop; with count, returns how many rays hit their own facet. */
 static size_t cast_bare(const visibility *v, const ray_packet *rays, const float nearest[VISIBILITY_PACKET],
                         uint32_t self, bool count) {

@@ -61,6 +61,10 @@ void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays,
 unsigned visibility_blocked(const visibility *v, const ray_packet *segments, size_t n_segments,
                             const uint32_t *from, const uint32_t *to);
 
+/* The same for segments that touch no face at their ends: everything between them blocks. They are all cast
+ * as a coherent packet (VISIBILITY_TOGETHER). */
+unsigned visibility_between(const visibility *v, const ray_packet *segments, size_t n_segments);
+
 /* The speed of Embree alone, as a measure for visibility_cast: casts packets in memory, by all threads,
  * without a filter and without reading the hits. Packet p leaves element self[p]; its rays start above it by
  * more than rounding. own, unless NULL, is set to the number of rays that hit their own facet nevertheless,
