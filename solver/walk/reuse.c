@@ -79,8 +79,10 @@ static size_t first_rays(reuse_batch *b, ray_packet *rays, float local[][3], uin
         double point[3];
         float direction[3];
         if (!walk_starts_next(&b->starts, all, 1, &w, &only)) break;
-        moving_light_point(b->r->problem->light, w.place[0], w.place[1], point);
-        cosine_direction(f->tangent, f->bitangent, f->normal, w.place[2], w.place[3], direction);
+        double place[4];
+        for (int d = 0; d < 4; d++) place[d] = w.place[d] * 0x1p-32;
+        moving_light_point(b->r->problem->light, place[0], place[1], point);
+        cosine_direction(f->tangent, f->bitangent, f->normal, place[2], place[3], direction);
         to_float(point, local[n]);
         random[n] = w.random;
         for (int d = 0; d < 3; d++) {
@@ -186,7 +188,7 @@ static bool start(void *context, walker *w) {
         w->path = (uint32_t)k;
         for (size_t c = 0; c < b->r->C; c++) w->weight[c] = 1;
         deposit_first(b, k, h->element[k]);
-        if (!walk_survives(b->r->scene->m, w, h->element[k])) continue;
+        if (!walk_survives(b->r->scene, w, h->element[k])) continue;
         w->at = h->element[k];
         walk_draw_place(w);
         return true;

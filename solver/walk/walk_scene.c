@@ -71,6 +71,7 @@ lam_status walk_scene_create(const mesh *m, scene_closure closure, walk_scene **
     if (s == NULL) return LAM_ERR_MEMORY;
     s->m = m;
     TRY(visibility_create(m, &s->v, error));
+    TRY(walk_shapes_create(s, error));
     TRY(look_around(s, closure, error));
     *out = s;
     s = NULL;
@@ -82,6 +83,8 @@ done:
 void walk_scene_free(walk_scene *s) {
     if (s == NULL) return;
     visibility_destroy(s->v);
+    free(s->shapes);
+    free(s->halves);
     free(s);
 }
 

@@ -1,54 +1,35 @@
 #include "solver/walk/walk_steps.h"
 
-#include "solver/base/cosine.h"
 #include "solver/base/random.h"
-#include "solver/formfactor/visibility/sample.h"
 
 #include <math.h>
 
 /* A walk that has lost so many rays in a row is in a corner that single precision cannot leave: it ends. */
 enum { LOST_MOST = 64 };
 
-/* Packets between two looks at the progress. */
-enum { PACKETS_AT_ONCE = 4096 };
-
-void walk_cast(const walk_scene *s, const walker *w, size_t n, ray_packet *rays, hit_packet *hits) {
-    uint32_t self[VISIBILITY_PACKET];
-    for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
-        if (i >= n) { /* not cast, but read */
-            for (int d = 0; d < 3; d++) rays->origin[d][i] = rays->direction[d][i] = 0;
-            self[i] = VISIBILITY_NOTHING;
-            continue;
-        }
-        const double *place = w[i].place;
-        element_sampler sampler;
-        float origin[3], direction[3];
-        element_sampler_init(&sampler, s->m, s->v, w[i].at, 0);
-        const element_frame *f = &sampler.frame;
-        element_sampler_point(&sampler, (float)place[0], (float)place[1], origin);
-        cosine_direction(f->tangent, f->bitangent, f->normal, place[2], place[3], direction);
-        for (int d = 0; d < 3; d++) {
-            rays->origin[d][i] = origin[d];
-            rays->direction[d][i] = direction[d];
-        }
-        self[i] = w[i].at;
-    }
-    visibility_cast(s->v, rays, n, self, 0, hits);
-}
+/* Steps of all walks between two looks at the progress. */
+enum { STREAMS_AT_ONCE = 128 };
 
 void walk_draw_place(walker *w) {
-    for (int d = 0; d < 4; d++) w->place[d] = random_unit(&w->random);
+    for (int d = 0; d < 4; d += 2) {
+        const uint64_t bits = random_next(&w->random);
+        w->place[d] = (uint32_t)bits;
+        w->place[d + 1] = (uint32_t)(bits >> 32);
+    }
 }
 
-bool walk_survives(const mesh *m, walker *w, uint32_t element) {
+bool walk_survives(const walk_scene *s, walker *w, uint32_t element) {
+    const size_t channels = s->m->n_channels;
+    const float *reflectance = s->shapes[element].reflectance;
     double before = 0, after = 0;
-    for (size_t c = 0; c < m->n_channels; c++) {
-        before = fmax(before, w->weight[c]);
-        w->weight[c] *= (double)m->reflectance[c * m->n + element];
-        after = fmax(after, w->weight[c]);
+    for (size_t c = 0; c < channels; c++) {
+        before = w->weight[c] > before ? w->weight[c] : before;
+        w->weight[c] *= (double)reflectance[c];
+        after = w->weight[c] > after ? w->weight[c] : after;
     }
     if (!(random_unit(&w->random) * before < after)) return false;
-    for (size_t c = 0; c < m->n_channels; c++) w->weight[c] *= before / after;
+    const double scale = before / after;
+    for (size_t c = 0; c < channels; c++) w->weight[c] *= scale;
     return true;
 }
 
@@ -62,7 +43,7 @@ static bool advance(const walk_batch *b, walker *w, uint32_t element, bool back)
         return true;
     }
     b->arrive(b->context, w, element);
-    if (!walk_survives(s->m, w, element)) return false;
+    if (!walk_survives(s, w, element)) return false;
     w->at = element;
     w->lost = 0;
     walk_draw_place(w);
@@ -83,24 +64,27 @@ static bool go_on(walk_run *run, size_t begun) {
 }
 
 void walk_batch_go(const walk_batch *b) {
-    walker w[VISIBILITY_PACKET];
-    ray_packet rays;
-    hit_packet hits;
+    walker w[WALK_STREAM];
+    ray_packet rays[WALK_STREAM / VISIBILITY_PACKET];
+    hit_packet hits[WALK_STREAM / VISIBILITY_PACKET];
     size_t n = 0, begun = 0;
     if (!go_on(b->run, 0)) return;
-    for (size_t packet = 1;; packet++) {
-        while (n < VISIBILITY_PACKET && b->start(b->context, &w[n])) {
+    for (size_t stream = 1;; stream++) {
+        while (n < WALK_STREAM && b->start(b->context, &w[n])) {
             w[n++].lost = 0;
             begun++;
         }
         if (n == 0) break;
-        walk_cast(b->scene, w, n, &rays, &hits);
+        walk_cast(b->scene, w, n, rays, hits);
         if (b->rays != NULL) *b->rays += (double)n;
         size_t kept = 0;
-        for (size_t i = 0; i < n; i++)
-            if (advance(b, &w[i], hits.element[i], hits.back[i])) w[kept++] = w[i];
+        for (size_t i = 0; i < n; i++) {
+            const hit_packet *of = &hits[i / VISIBILITY_PACKET];
+            const size_t lane = i % VISIBILITY_PACKET;
+            if (advance(b, &w[i], of->element[lane], of->back[lane])) w[kept++] = w[i];
+        }
         n = kept;
-        if (packet % PACKETS_AT_ONCE == 0) {
+        if (stream % STREAMS_AT_ONCE == 0) {
             if (!go_on(b->run, begun)) return;
             begun = 0;
         }
@@ -124,8 +108,7 @@ bool walk_starts_next(walk_starts *s, const double *before, size_t n, walker *w,
     const double x = ((double)s->next + s->turn) / (double)s->count * before[n];
     while (s->cursor + 1 < n && before[s->cursor + 1] <= x) s->cursor++;
     *k = s->cursor;
-    for (int d = 0; d < 4; d++)
-        w->place[d] = (double)(uint32_t)(s->shift[d] + (uint32_t)s->next * step[d]) * 0x1p-32;
+    for (int d = 0; d < 4; d++) w->place[d] = s->shift[d] + (uint32_t)s->next * step[d];
     w->random = random_hash(s->random + s->next);
     s->next++;
     return true;

@@ -1,4 +1,4 @@
-/* The steps of walks, eight side by side: rays, ends and Russian roulette. Knows neither targets nor
+/* The steps of walks, many side by side: rays, ends and Russian roulette. Knows neither targets nor
  * emissions. */
 #ifndef LAMBERT_WALK_WALK_STEPS_H
 #define LAMBERT_WALK_WALK_STEPS_H
@@ -6,13 +6,30 @@
 #include "solver/formfactor/visibility/visibility.h"
 #include "solver/walk/walk.h"
 
-enum { WALK_CHANNELS = 3 };
+/* Walks that take their steps side by side at most, a multiple of VISIBILITY_PACKET. */
+enum { WALK_CHANNELS = 3, WALK_STREAM = 256 };
+
+/* An element as walks need it, in one line of a cache. */
+typedef struct walk_shape {
+    float corner[3], edge[2][3], normal[3]; /* recentred; a triangle, or a parallelogram */
+    float per_edge;                         /* 1 over the length of edge[0], negative for triangles */
+    float reflectance[WALK_CHANNELS];
+} walk_shape;
+
+/* A quadrilateral that is no parallelogram is the triangle of its shape and that of edge[1] and a third one.
+ */
+typedef struct walk_halves {
+    float share; /* of the area that the first triangle has; 1 for other elements */
+    float third[3];
+} walk_halves;
 
 struct walk_scene {
     const mesh *m;
     visibility *v;
-    bool closed; /* rays leave through cracks only */
-    bool fronts; /* rays hit backs through cracks only */
+    walk_shape *shapes;  /* [n] */
+    walk_halves *halves; /* [n], or NULL where no element needs them */
+    bool closed;         /* rays leave through cracks only */
+    bool fronts;         /* rays hit backs through cracks only */
 };
 
 /* One walk. */
@@ -20,7 +37,7 @@ typedef struct walker {
     uint32_t at;                  /* the element that its next ray leaves */
     uint32_t path;                /* its number among those of the caller */
     unsigned lost;                /* rays through cracks since it came there */
-    double place[4];              /* in [0, 1): two for the point, two for the direction */
+    uint32_t place[4];            /* in 2^-32: two for the point, two for the direction */
     double weight[WALK_CHANNELS]; /* of what it has met; power when it was shot */
     uint64_t random;              /* its own stream */
 } walker;
@@ -53,9 +70,12 @@ void walk_draw_place(walker *w);
 /* Russian roulette at an element: the walk goes on with the probability
  *     q = max_c (rho_c w_c) / max_c w_c,        w_c <- rho_c w_c / q,
  * which leaves the expectation of every channel as it is and the largest weight too. */
-bool walk_survives(const mesh *m, walker *w, uint32_t element);
+bool walk_survives(const walk_scene *s, walker *w, uint32_t element);
 
-/* Casts the next rays of n walks, at most VISIBILITY_PACKET, from their places. */
+/* Makes the shapes of a scene, freed with it. Errors: LAM_ERR_MEMORY. */
+lam_status walk_shapes_create(walk_scene *s, lam_error *error);
+
+/* Casts the next rays of n walks, at most WALK_STREAM, from their places: packets of rays and of hits. */
 void walk_cast(const walk_scene *s, const walker *w, size_t n, ray_packet *rays, hit_packet *hits);
 
 /* The starts of one batch: low-discrepancy places, and strata of what elements are chosen by. */
