@@ -1,8 +1,7 @@
 #include "solver/walk/reuse.h"
 
 #include "solver/base/clock.h"
-#include "solver/base/cosine.h"
-#include "solver/base/random.h"
+#include "solver/walk/light_frames.h"
 #include "solver/walk/reuse_sums.h"
 #include "solver/walk/reuse_weights.h"
 
@@ -24,7 +23,8 @@ typedef struct reuse {
     const reuse_problem *problem;
     size_t n, C, s, of_batch; /* paths of a position in a batch */
     light_frame *frames;      /* [s] */
-    const light_maps *maps;   /* or NULL */
+    light_pieces pieces;
+    const light_maps *maps; /* or NULL */
     walk_run *run;
 } reuse;
 
@@ -39,63 +39,6 @@ typedef struct reuse_batch {
     double rays, trace, reuse;
 } reuse_batch;
 
-static void to_float(const double a[3], float out[3]) {
-    for (int d = 0; d < 3; d++) out[d] = (float)a[d];
-}
-
-static void frame_of(const walk_scene *s, const moving_light *l, const light_pose *p, light_frame *out) {
-    double normal[3], side[3], tangent[3], centre[3] = {0, 0, 0}, at[3], lift[3];
-    const double rounding = visibility_rounding(s->v);
-    light_pose_direction(p, l->normal, normal);
-    for (int d = 0; d < 3; d++) side[d] = l->corner[1][d] - l->corner[0][d];
-    light_pose_direction(p, side, tangent);
-    const double length = sqrt(tangent[0] * tangent[0] + tangent[1] * tangent[1] + tangent[2] * tangent[2]);
-    for (int d = 0; d < 3; d++) tangent[d] /= length;
-    const double b[3] = {normal[1] * tangent[2] - normal[2] * tangent[1],
-                         normal[2] * tangent[0] - normal[0] * tangent[2],
-                         normal[0] * tangent[1] - normal[1] * tangent[0]};
-    for (size_t k = 0; k < l->n_corners; k++)
-        for (int d = 0; d < 3; d++) centre[d] += l->corner[k][d] / (double)l->n_corners;
-    light_pose_point(p, centre, at);
-    /* A light that lies in a face starts above it. */
-    for (int d = 0; d < 3; d++) lift[d] = p->move[d] + 4 * rounding * normal[d];
-    for (int d = 0; d < 3; d++) at[d] += 4 * rounding * normal[d];
-    visibility_recentre(s->v, lift, out->move);
-    visibility_recentre(s->v, at, out->centre);
-    for (int d = 0; d < 3; d++) to_float(p->turn[d], out->turn[d]);
-    to_float(tangent, out->tangent);
-    to_float(b, out->bitangent);
-    to_float(normal, out->normal);
-}
-
-/* The first rays of up to eight paths of the position at hand; returns how many. */
-static size_t first_rays(reuse_batch *b, ray_packet *rays, float local[][3], uint64_t *random) {
-    static const double all[2] = {0, 1};
-    const light_frame *f = &b->r->frames[b->position];
-    size_t n = 0;
-    for (; n < VISIBILITY_PACKET; n++) {
-        walker w;
-        size_t only;
-        double point[3];
-        float direction[3];
-        if (!walk_starts_next(&b->starts, all, 1, &w, &only)) break;
-        double place[4];
-        for (int d = 0; d < 4; d++) place[d] = w.place[d] * 0x1p-32;
-        moving_light_point(b->r->problem->light, place[0], place[1], point);
-        cosine_direction(f->tangent, f->bitangent, f->normal, place[2], place[3], direction);
-        to_float(point, local[n]);
-        random[n] = w.random;
-        for (int d = 0; d < 3; d++) {
-            rays->origin[d][n] = f->turn[d][0] * local[n][0] + f->turn[d][1] * local[n][1] +
-                                 f->turn[d][2] * local[n][2] + f->move[d];
-            rays->direction[d][n] = direction[d];
-        }
-    }
-    for (size_t i = n; i < VISIBILITY_PACKET; i++)
-        for (int d = 0; d < 3; d++) rays->origin[d][i] = rays->direction[d][i] = 0;
-    return n;
-}
-
 /* Numbers that kernels read beyond the last hit: a point whose normal is 0 gets nothing. */
 static void fill_up(first_hits *h) {
     for (size_t k = h->count; k % HITS_LANES != 0; k++) {
@@ -104,45 +47,76 @@ static void fill_up(first_hits *h) {
     }
 }
 
+/* First rays of the position at hand, at most so many; returns how many. */
+static size_t first_rays(reuse_batch *b, size_t most, ray_packet *rays, float local[][3], uint64_t *random) {
+    static const double all[2] = {0, 1};
+    const light_pieces *light = &b->r->pieces;
+    const walk_shape *shape = light->carried + b->position * light->n;
+    walk_places p;
+    walker w;
+    size_t n = 0, only;
+    for (; n < most && walk_starts_next(&b->starts, all, 1, &w, &only); n++) {
+        const size_t k = light_pieces_choose(light, &w.place[0]);
+        walk_place_set(&p, n, &shape[k], w.place);
+        light_pieces_point(light, k, w.place, local[n]);
+        random[n] = w.random;
+    }
+    const size_t last = n;
+    for (; n % VISIBILITY_PACKET != 0; n++) walk_place_set(&p, n, &shape[0], w.place);
+    walk_leave(&p, n, rays);
+    return last;
+}
+
+/* Adds the hits of n rays on fronts. */
+static void keep_hits(reuse_batch *b, size_t n, const ray_packet *rays, const hit_packet *met,
+                      float local[][3], const uint64_t *random) {
+    first_hits *const h = b->hits;
+    for (size_t i = 0; i < n; i++) {
+        const hit_packet *of = &met[i / VISIBILITY_PACKET];
+        const ray_packet *ray = &rays[i / VISIBILITY_PACKET];
+        const size_t lane = i % VISIBILITY_PACKET, k = h->count;
+        const uint32_t element = of->element[lane];
+        if (element == VISIBILITY_NOTHING || of->back[lane]) continue;
+        const walk_shape *shape = &b->r->scene->shapes[element];
+        h->element[k] = element;
+        h->facet[k] = shape->facet & ~WALK_TRIANGLE;
+        h->position[k] = (uint32_t)b->position;
+        h->random[k] = random[i];
+        for (int d = 0; d < 3; d++) {
+            h->local[d][k] = local[i][d];
+            h->y[d][k] = ray->origin[d][lane] + of->distance[lane] * ray->direction[d][lane];
+            h->normal[d][k] = shape->normal[d];
+        }
+        h->count++;
+    }
+}
+
 /* Casts first rays of the positions of batch `number` until a chunk of hits is full or all have been cast. */
 static void find_hits(reuse_batch *b, size_t number) {
     const reuse *r = b->r;
-    const mesh *m = r->scene->m;
-    const facets *facet = visibility_facets(r->scene->v);
-    first_hits *const h = b->hits;
+    ray_packet rays[WALK_STREAM / VISIBILITY_PACKET];
+    hit_packet met;
+    float local[WALK_STREAM][3];
+    uint64_t random[WALK_STREAM];
     uint32_t self[VISIBILITY_PACKET];
     for (int i = 0; i < VISIBILITY_PACKET; i++) self[i] = VISIBILITY_NOTHING;
-    h->count = b->next = 0;
-    while (b->position < r->s && h->count + VISIBILITY_PACKET <= HITS_MOST) {
-        ray_packet rays;
-        hit_packet hits;
-        float local[VISIBILITY_PACKET][3];
-        uint64_t random[VISIBILITY_PACKET];
-        const size_t n = first_rays(b, &rays, local, random);
+    b->hits->count = b->next = 0;
+    while (b->position < r->s && b->hits->count < HITS_MOST) {
+        const size_t room = HITS_MOST - b->hits->count;
+        const size_t n = first_rays(b, room < WALK_STREAM ? room : WALK_STREAM, rays, local, random);
         if (n == 0) {
             if (++b->position < r->s)
                 walk_starts_init(&b->starts, r->problem->seed, number * r->s + b->position, r->of_batch);
             continue;
         }
-        visibility_cast(r->scene->v, &rays, n, self, 0, &hits);
         b->rays += (double)n;
-        for (size_t i = 0; i < n; i++) {
-            const uint32_t element = hits.element[i];
-            const size_t k = h->count;
-            if (element == VISIBILITY_NOTHING || hits.back[i]) continue;
-            h->element[k] = element;
-            h->facet[k] = facet->of_element[element % m->n];
-            h->position[k] = (uint32_t)b->position;
-            h->random[k] = random[i];
-            for (int d = 0; d < 3; d++) {
-                h->local[d][k] = local[i][d];
-                h->y[d][k] = rays.origin[d][i] + hits.distance[i] * rays.direction[d][i];
-                h->normal[d][k] = m->normal[element][d];
-            }
-            h->count++;
+        for (size_t j = 0; j < n; j += VISIBILITY_PACKET) {
+            const size_t of_packet = n - j < VISIBILITY_PACKET ? n - j : VISIBILITY_PACKET;
+            visibility_cast_lifted(r->scene->v, &rays[j / VISIBILITY_PACKET], of_packet, self, self, &met);
+            keep_hits(b, of_packet, &rays[j / VISIBILITY_PACKET], &met, local + j, random + j);
         }
     }
-    fill_up(h);
+    fill_up(b->hits);
 }
 
 /* Adds the light that comes to an element straight from the light, the same in all channels. */
@@ -310,9 +284,10 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
     if (e.H == NULL || e.error == NULL || e.direct == NULL || e.covariance == NULL || r.frames == NULL)
         TRY(LAM_ERR_MEMORY);
     for (size_t l = 0; l < e.n_positions; l++) {
-        frame_of(s, light, &light->pose[l], &r.frames[l]);
+        light_frame_set(s->v, light, &light->pose[l], &r.frames[l]);
         r.frames[l].paths = (float)r.of_batch;
     }
+    TRY(light_pieces_create(light, r.frames, &r.pieces, error));
     walk_run run = {.progress = problem->progress,
                     .stage = problem->stage,
                     .all = (double)e.paths * (double)e.n_positions};
@@ -332,6 +307,7 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
     e = (reuse_estimates){.n = 0};
 done:
     free(r.frames);
+    light_pieces_free(&r.pieces);
     light_maps_free(&maps);
     reuse_estimates_free(&e);
     return status;

@@ -2,15 +2,8 @@
 #ifndef LAMBERT_WALK_REUSE_WEIGHTS_H
 #define LAMBERT_WALK_REUSE_WEIGHTS_H
 
+#include "solver/walk/light_frames.h"
 #include "solver/walk/reuse.h"
-#include "solver/walk/walk_steps.h"
-
-/* One position, recentred (visibility_recentre). */
-typedef struct light_frame {
-    float turn[3][3], move[3];
-    float tangent[3], bitangent[3], normal[3], centre[3];
-    float paths; /* N_l: of this position in a batch */
-} light_frame;
 
 /* Hits of a chunk; those of which weights are found together; and the lanes of the widest vectors, to a
  * multiple of which arrays are filled up. */

@@ -8,13 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What leave() reads of up to WALK_STREAM walks. */
-typedef struct walk_places {
-    float corner[3][WALK_STREAM], edge[2][3][WALK_STREAM], normal[3][WALK_STREAM], per_edge[WALK_STREAM];
-    float u[WALK_STREAM], w[WALK_STREAM], x[WALK_STREAM]; /* in [0, 1) */
-    uint32_t turn[WALK_STREAM];                           /* in 2^-32 of a turn */
-} walk_places;
-
 static float to_unit(uint32_t bits) {
     return (float)(bits >> 8) * 0x1p-24f;
 }
@@ -43,10 +36,10 @@ static bool set_shape(const mesh *m, const visibility *v, size_t element, walk_s
     const uint32_t *corner = m->elements[element];
     const double *a = m->vertices[corner[0]], *b = m->vertices[corner[1]], *c = m->vertices[corner[2]];
     const double *last = c;
-    double length = 0;
+    const float lift = 2 * (float)visibility_rounding(v);
+    const size_t n_fronts = m->two_sided ? m->n / 2 : m->n;
     bool uneven = false;
-    for (int d = 0; d < 3; d++) length += (b[d] - a[d]) * (b[d] - a[d]);
-    s->per_edge = (float)(-1 / sqrt(length));
+    s->facet = visibility_facets(v)->of_element[element % n_fronts] | WALK_TRIANGLE;
     if (mesh_corners(m, element) == 4) {
         const double *e = m->vertices[corner[3]];
         double off = 0, size = 0;
@@ -56,7 +49,7 @@ static bool set_shape(const mesh *m, const visibility *v, size_t element, walk_s
         }
         uneven = off > 1e-9 * size;
         if (!uneven) {
-            s->per_edge = -s->per_edge;
+            s->facet &= ~WALK_TRIANGLE;
             last = e;
         } else if (halves != NULL) {
             const double first = triangle_area(a, b, c), second = triangle_area(a, c, e);
@@ -67,8 +60,11 @@ static bool set_shape(const mesh *m, const visibility *v, size_t element, walk_s
     visibility_recentre(v, a, s->corner);
     set_edge(a, b, s->edge[0]);
     set_edge(a, last, s->edge[1]);
-    for (int d = 0; d < 3; d++) s->normal[d] = m->normal[element][d];
-    for (size_t c3 = 0; c3 < m->n_channels; c3++) s->reflectance[c3] = m->reflectance[c3 * m->n + element];
+    for (int d = 0; d < 3; d++) {
+        s->normal[d] = m->normal[element][d];
+        s->corner[d] += lift * s->normal[d];
+    }
+    for (size_t k = 0; k < m->n_channels; k++) s->reflectance[k] = m->reflectance[k * m->n + element];
     return uneven;
 }
 
@@ -88,50 +84,54 @@ lam_status walk_shapes_create(walk_scene *s, lam_error *error) {
     return LAM_OK;
 }
 
-static void set_place(const walk_scene *s, const walker *w, size_t j, walk_places *p) {
-    const walk_shape *shape = &s->shapes[w->at];
-    const float *first = shape->edge[0], *second = shape->edge[1];
-    float u = to_unit(w->place[0]), per_edge = shape->per_edge;
-    if (s->halves != NULL && s->halves[w->at].share < 1) {
-        /* u chooses the triangle and is rescaled to [0, 1). */
-        const walk_halves *h = &s->halves[w->at];
-        if (u < h->share) {
-            u /= h->share;
-        } else {
-            u = (u - h->share) / (1 - h->share);
-            first = shape->edge[1];
-            second = h->third;
-            per_edge = -1 / sqrtf(first[0] * first[0] + first[1] * first[1] + first[2] * first[2]);
-        }
-    }
+void walk_place_set(walk_places *p, size_t j, const walk_shape *shape, const uint32_t place[4]) {
     for (int d = 0; d < 3; d++) {
         p->corner[d][j] = shape->corner[d];
-        p->edge[0][d][j] = first[d];
-        p->edge[1][d][j] = second[d];
+        p->edge[0][d][j] = shape->edge[0][d];
+        p->edge[1][d][j] = shape->edge[1][d];
         p->normal[d][j] = shape->normal[d];
     }
-    p->per_edge[j] = per_edge;
-    p->u[j] = u;
-    p->w[j] = to_unit(w->place[1]);
-    p->x[j] = to_unit(w->place[2]);
-    p->turn[j] = w->place[3];
+    p->fold[j] = (shape->facet & WALK_TRIANGLE) != 0 ? .5f : 0;
+    p->u[j] = to_unit(place[0]);
+    p->w[j] = to_unit(place[1]);
+    p->x[j] = to_unit(place[2]);
+    p->turn[j] = place[3];
+}
+
+/* The coordinate u of place j chooses the triangle of a quadrilateral and is rescaled to [0, 1). */
+static void choose_half(walk_places *p, size_t j, const walk_shape *shape, const walk_halves *h) {
+    if (p->u[j] < h->share) {
+        p->u[j] /= h->share;
+        return;
+    }
+    p->u[j] = (p->u[j] - h->share) / (1 - h->share);
+    for (int d = 0; d < 3; d++) {
+        p->edge[0][d][j] = shape->edge[1][d];
+        p->edge[1][d][j] = h->third[d];
+    }
+}
+
+void walk_leave(const walk_places *p, size_t n, ray_packet *rays) {
+    typedef void leave(size_t, const walk_places *, ray_packet *);
+    static leave *const leaves[] = CPU_TABLE(leave_portable, leave_avx2, leave_avx512);
+    leaves[cpu_best()](n / VISIBILITY_PACKET, p, rays);
 }
 
 void walk_cast(const walk_scene *s, const walker *w, size_t n, ray_packet *rays, hit_packet *hits) {
-    typedef void leave(size_t, const walk_places *, float, ray_packet *);
-    static leave *const leaves[] = CPU_TABLE(leave_portable, leave_avx2, leave_avx512);
-    const size_t packets = (n + VISIBILITY_PACKET - 1) / VISIBILITY_PACKET;
+    const size_t filled = (n + VISIBILITY_PACKET - 1) / VISIBILITY_PACKET * VISIBILITY_PACKET;
     walk_places p;
-    uint32_t self[WALK_STREAM];
-    for (size_t j = 0; j < packets * VISIBILITY_PACKET; j++) {
-        const walker *of = &w[j < n ? j : n - 1]; /* the last packet is filled up */
-        set_place(s, of, j, &p);
+    uint32_t self[WALK_STREAM], facet[WALK_STREAM];
+    for (size_t j = 0; j < filled; j++) {
+        const walker *of = &w[j < n ? j : n - 1];
+        const walk_shape *shape = &s->shapes[of->at];
+        walk_place_set(&p, j, shape, of->place);
+        if (s->halves != NULL && s->halves[of->at].share < 1) choose_half(&p, j, shape, &s->halves[of->at]);
         self[j] = of->at;
+        facet[j] = shape->facet & ~WALK_TRIANGLE;
     }
-    leaves[cpu_best()](packets, &p, 0, rays);
-    for (size_t k = 0; k < packets; k++) {
-        const size_t left = n - k * VISIBILITY_PACKET;
-        visibility_cast(s->v, &rays[k], left < VISIBILITY_PACKET ? left : VISIBILITY_PACKET,
-                        self + k * VISIBILITY_PACKET, 0, &hits[k]);
-    }
+    walk_leave(&p, filled, rays);
+    for (size_t j = 0; j < n; j += VISIBILITY_PACKET)
+        visibility_cast_lifted(s->v, &rays[j / VISIBILITY_PACKET],
+                               n - j < VISIBILITY_PACKET ? n - j : VISIBILITY_PACKET, self + j, facet + j,
+                               &hits[j / VISIBILITY_PACKET]);
 }

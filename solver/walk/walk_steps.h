@@ -9,12 +9,22 @@
 /* Walks that take their steps side by side at most, a multiple of VISIBILITY_PACKET. */
 enum { WALK_CHANNELS = 3, WALK_STREAM = 256 };
 
+#define WALK_TRIANGLE 0x80000000u
+
 /* An element as walks need it, in one line of a cache. */
 typedef struct walk_shape {
-    float corner[3], edge[2][3], normal[3]; /* recentred; a triangle, or a parallelogram */
-    float per_edge;                         /* 1 over the length of edge[0], negative for triangles */
+    float corner[3], edge[2][3], normal[3]; /* recentred, the corner lifted; a triangle, or a parallelogram */
     float reflectance[WALK_CHANNELS];
+    uint32_t facet; /* of the scene, and WALK_TRIANGLE */
 } walk_shape;
+
+/* The places that many rays leave. */
+typedef struct walk_places {
+    float corner[3][WALK_STREAM], edge[2][3][WALK_STREAM], normal[3][WALK_STREAM];
+    float fold[WALK_STREAM];                              /* 1/2 for triangles, else 0 */
+    float u[WALK_STREAM], w[WALK_STREAM], x[WALK_STREAM]; /* in [0, 1) */
+    uint32_t turn[WALK_STREAM];                           /* in 2^-32 of a turn */
+} walk_places;
 
 /* A quadrilateral that is no parallelogram is the triangle of its shape and that of edge[1] and a third one.
  */
@@ -74,6 +84,13 @@ bool walk_survives(const walk_scene *s, walker *w, uint32_t element);
 
 /* Makes the shapes of a scene, freed with it. Errors: LAM_ERR_MEMORY. */
 lam_status walk_shapes_create(walk_scene *s, lam_error *error);
+
+/* Place j: the point and the direction of the numbers that a walker has for them. */
+void walk_place_set(walk_places *p, size_t j, const walk_shape *shape, const uint32_t place[4]);
+
+/* The rays that leave n places, a multiple of VISIBILITY_PACKET: origins uniform over shapes, directions
+ * cosine-weighted. */
+void walk_leave(const walk_places *p, size_t n, ray_packet *rays);
 
 /* Casts the next rays of n walks, at most WALK_STREAM, from their places: packets of rays and of hits. */
 void walk_cast(const walk_scene *s, const walker *w, size_t n, ray_packet *rays, hit_packet *hits);

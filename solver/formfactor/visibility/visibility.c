@@ -375,6 +375,43 @@ void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays,
             hits->element[i] += (uint32_t)v->n_fronts;
 }
 
+void visibility_cast_lifted(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
+                            const uint32_t *facet, hit_packet *hits) {
+    struct RTCRayHit8 ray __attribute__((aligned(32)));
+    int active[VISIBILITY_PACKET] __attribute__((aligned(32)));
+    struct RTCIntersectContext context;
+    uint32_t piece[VISIBILITY_PACKET], lane[VISIBILITY_PACKET], found[VISIBILITY_PACKET];
+    float u[VISIBILITY_PACKET], v_at[VISIBILITY_PACKET];
+    size_t open = 0;
+    bool plain = !v->mesh->two_sided;
+    rtcInitIntersectContext(&context);
+    packet_set(&ray, rays);
+    for (size_t i = 0; i < VISIBILITY_PACKET; i++) active[i] = i < n_rays ? -1 : 0;
+    rtcIntersect8(active, v->scene, &context, &ray);
+    for (size_t i = 0; i < n_rays; i++) {
+        hits->distance[i] = ray.ray.tfar[i];
+        hits->back[i] = false;
+        hits->element[i] = VISIBILITY_NOTHING;
+        if (ray.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+        const primitive *p = &v->primitives[ray.hit.geomID[i]][ray.hit.primID[i]];
+        const float cosine =
+            along_normal(v, p->facet, ray.ray.dir_x[i], ray.ray.dir_y[i], ray.ray.dir_z[i]);
+        plain = plain && cosine < 0 && p->facet != facet[i] && -cosine * ray.ray.tfar[i] > v->rounding;
+        hits->element[i] = p->element;
+        piece[open] = p->piece;
+        u[open] = ray.hit.u[i];
+        v_at[open] = ray.hit.v[i];
+        lane[open] = (uint32_t)i;
+        open += p->element == MESH_NO_VERTEX;
+    }
+    if (!plain) {
+        visibility_cast(v, rays, n_rays, self, 0, hits);
+        return;
+    }
+    if (open > 0) facet_grids_find(&v->grids, open, piece, u, v_at, found);
+    for (size_t k = 0; k < open; k++) hits->element[lane[k]] = found[k];
+}
+
 /* The data of the filter of segments: the facets at both ends, by lane, which is the segment's id. */
 typedef struct segment_context {
     struct RTCIntersectContext embree;

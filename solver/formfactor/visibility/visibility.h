@@ -56,6 +56,12 @@ enum { VISIBILITY_CULL_BACK = 1, VISIBILITY_TOGETHER = 2 };
 void visibility_cast(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
                      unsigned how, hit_packet *hits);
 
+/* visibility_cast with how = 0 for rays that start above the plane of their element by 2 visibility_rounding,
+ * as walks make them: facet[i] is the facet of self[i] (visibility_facets), or both are VISIBILITY_NOTHING.
+ */
+void visibility_cast_lifted(const visibility *v, const ray_packet *rays, size_t n_rays, const uint32_t *self,
+                            const uint32_t *facet, hit_packet *hits);
+
 /* Bit i of the result is set where segment i < n_segments is blocked, from its origin to origin + direction,
  * points of the elements from[i] and to[i]. Neither these two nor faces in their planes block it. */
 unsigned visibility_blocked(const visibility *v, const ray_packet *segments, size_t n_segments,
