@@ -22,6 +22,7 @@ typedef struct reuse {
     const walk_scene *scene;
     const reuse_problem *problem;
     size_t n, C, s, of_batch; /* paths of a position in a batch */
+    double per_path;          /* 1 / of_batch */
     light_frame *frames;      /* [s] */
     light_pieces pieces;
     const light_maps *maps; /* or NULL */
@@ -126,29 +127,38 @@ static void deposit_first(const reuse_batch *b, size_t path, uint32_t element) {
     double *const first = b->first + (size_t)element * s;
     const float *const weight = b->weight + path * s;
     if (r->problem->way == REUSE_NONE) {
-        first[b->hits->position[path]] += 1 / (double)r->of_batch;
+        first[b->hits->position[path]] += r->per_path;
         return;
     }
 #pragma omp simd
     for (size_t l = 0; l < s; l++) first[l] += (double)weight[l];
 }
 
-static void arrive(void *context, const walker *w, uint32_t element) {
+/* Paths of their own: the sums of the position that each belongs to. */
+static void arrive_alone(void *context, size_t n, const walker *w, const uint32_t *element) {
     const reuse_batch *b = context;
-    const reuse *r = b->r;
-    const size_t s = r->s, C = r->C;
-    double *const later = b->later + (size_t)element * C * s;
-    if (r->problem->way == REUSE_NONE) {
-        for (size_t c = 0; c < C; c++)
-            later[c * s + b->hits->position[w->path]] += w->weight[c] / (double)r->of_batch;
-        return;
+    const size_t s = b->r->s, C = b->r->C;
+    for (size_t i = 0; i < n; i++) {
+        if (element[i] == VISIBILITY_NOTHING) continue;
+        double *const later = b->later + (size_t)element[i] * C * s + b->hits->position[w[i].path];
+        for (size_t c = 0; c < C; c++) later[c * s] += w[i].weight[c] * b->r->per_path;
     }
-    const float *const weight = b->weight + w->path * s;
-    for (size_t c = 0; c < C; c++) {
-        const double power = w->weight[c];
-        double *const out = later + c * s;
+}
+
+/* Paths for all positions. */
+static void arrive_shared(void *context, size_t n, const walker *w, const uint32_t *element) {
+    const reuse_batch *b = context;
+    const size_t s = b->r->s, C = b->r->C;
+    for (size_t i = 0; i < n; i++) {
+        if (element[i] == VISIBILITY_NOTHING) continue;
+        double *const later = b->later + (size_t)element[i] * C * s;
+        const float *const weight = b->weight + w[i].path * s;
+        for (size_t c = 0; c < C; c++) {
+            const double power = w[i].weight[c];
+            double *const out = later + c * s;
 #pragma omp simd
-        for (size_t l = 0; l < s; l++) out[l] += power * (double)weight[l];
+            for (size_t l = 0; l < s; l++) out[l] += power * (double)weight[l];
+        }
     }
 }
 
@@ -172,8 +182,12 @@ static bool start(void *context, walker *w) {
 
 static void go(reuse_batch *b, size_t number) {
     const reuse *r = b->r;
-    const walk_batch walks = {
-        .scene = r->scene, .run = r->run, .start = start, .arrive = arrive, .context = b, .rays = &b->rays};
+    const walk_batch walks = {.scene = r->scene,
+                              .run = r->run,
+                              .start = start,
+                              .arrive = r->problem->way == REUSE_NONE ? arrive_alone : arrive_shared,
+                              .context = b,
+                              .rays = &b->rays};
     b->position = 0;
     walk_starts_init(&b->starts, r->problem->seed, number * r->s, r->of_batch);
     while (!r->run->stop) {
@@ -274,6 +288,7 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
              light->n);
     e.paths = ((problem->paths - 1) / WALK_BATCHES + 1) * WALK_BATCHES;
     r.of_batch = e.paths / WALK_BATCHES;
+    r.per_path = 1 / (double)r.of_batch;
     if (!size_multiply(e.n_channels, e.n_positions, &rows) || !size_multiply(rows, e.n, &size))
         FAIL(error, LAM_ERR_MEMORY, "paths: too many positions");
     e.H = memory_allocate(size, sizeof *e.H, "paths", error);

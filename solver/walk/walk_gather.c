@@ -66,8 +66,7 @@ static bool start(void *context, walker *w) {
     return true;
 }
 
-static void arrive(void *context, const walker *w, uint32_t element) {
-    gathering *g = context;
+static void arrive_one(gathering *g, const walker *w, uint32_t element) {
     const size_t n = g->m->n, channels = g->m->n_channels;
     for (size_t r = 0; r < g->problem->n_rhs; r++) {
         const float *E = g->problem->E + r * channels * n + element;
@@ -79,6 +78,11 @@ static void arrive(void *context, const walker *w, uint32_t element) {
         }
         g->visits[r] += raised;
     }
+}
+
+static void arrive(void *context, size_t n, const walker *w, const uint32_t *element) {
+    for (size_t i = 0; i < n; i++)
+        if (element[i] != VISIBILITY_NOTHING) arrive_one(context, &w[i], element[i]);
 }
 
 /* A visit adds at most the largest emission, and its weight is at most the largest at a start, 1. */

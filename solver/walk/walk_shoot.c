@@ -30,8 +30,7 @@ static bool start(void *context, walker *w) {
     return true;
 }
 
-static void arrive(void *context, const walker *w, uint32_t element) {
-    shooting *s = context;
+static void arrive_one(shooting *s, const walker *w, uint32_t element) {
     const uint32_t t = s->problem->target[element];
     bool raised = false;
     if (t == WALK_NO_TARGET) return;
@@ -42,6 +41,11 @@ static void arrive(void *context, const walker *w, uint32_t element) {
         raised = raised || value > 0;
     }
     s->visits[t] += raised;
+}
+
+static void arrive(void *context, size_t n, const walker *w, const uint32_t *element) {
+    for (size_t i = 0; i < n; i++)
+        if (element[i] != VISIBILITY_NOTHING) arrive_one(context, &w[i], element[i]);
 }
 
 /* The memory of one emission at a time. */

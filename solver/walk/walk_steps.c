@@ -27,27 +27,52 @@ bool walk_survives(const walk_scene *s, walker *w, uint32_t element) {
         w->weight[c] *= (double)reflectance[c];
         after = w->weight[c] > after ? w->weight[c] : after;
     }
-    if (!(random_unit(&w->random) * before < after)) return false;
+    /* The weights of a walk that ends are never read: a branch here would be mispredicted half of the time.
+     */
+    const bool survives = random_unit(&w->random) * before < after;
     const double scale = before / after;
     for (size_t c = 0; c < channels; c++) w->weight[c] *= scale;
+    return survives;
+}
+
+/* The element that the ray of a walk has led to the front of, else VISIBILITY_NOTHING. */
+static uint32_t front_met(const walker *w, const hit_packet *hits, size_t lane) {
+    const uint32_t element = hits->element[lane];
+    return hits->back[lane] || element == w->at ? VISIBILITY_NOTHING : element;
+}
+
+/* True for a walk that leaves its element by another ray, because this one slipped through a crack. */
+static bool leaves_again(const walk_scene *s, walker *w, const hit_packet *hits, size_t lane) {
+    const bool crack = hits->element[lane] == VISIBILITY_NOTHING ? s->closed
+                       : hits->back[lane]                        ? s->fronts
+                                                                 : true;
+    if (!crack || ++w->lost == LOST_MOST) return false;
+    walk_draw_place(w);
     return true;
 }
 
-/* Takes a walk to where its ray led; false where it ends. */
-static bool advance(const walk_batch *b, walker *w, uint32_t element, bool back) {
-    const walk_scene *s = b->scene;
-    if (element == VISIBILITY_NOTHING || back || element == w->at) {
-        const bool crack = element == VISIBILITY_NOTHING ? s->closed : back ? s->fronts : true;
-        if (!crack || ++w->lost == LOST_MOST) return false;
-        walk_draw_place(w);
-        return true;
+/* Takes n walks to where their rays led; returns how many go on, those in front. */
+static size_t advance(const walk_batch *b, size_t n, walker *w, const hit_packet *hits) {
+    uint32_t met[WALK_STREAM];
+    size_t kept = 0;
+    for (size_t i = 0; i < n; i++) {
+        met[i] = front_met(&w[i], &hits[i / VISIBILITY_PACKET], i % VISIBILITY_PACKET);
+        if (met[i] != VISIBILITY_NOTHING) __builtin_prefetch(&b->scene->shapes[met[i]]);
     }
-    b->arrive(b->context, w, element);
-    if (!walk_survives(s, w, element)) return false;
-    w->at = element;
-    w->lost = 0;
-    walk_draw_place(w);
-    return true;
+    b->arrive(b->context, n, w, met);
+    for (size_t i = 0; i < n; i++) {
+        walker *const of = &w[kept];
+        *of = w[i];
+        if (met[i] == VISIBILITY_NOTHING) {
+            kept += leaves_again(b->scene, of, &hits[i / VISIBILITY_PACKET], i % VISIBILITY_PACKET);
+            continue;
+        }
+        kept += walk_survives(b->scene, of, met[i]);
+        of->at = met[i];
+        of->lost = 0;
+        walk_draw_place(of);
+    }
+    return kept;
 }
 
 /* Counts walks that have begun; false where the run has to stop. */
@@ -77,13 +102,7 @@ void walk_batch_go(const walk_batch *b) {
         if (n == 0) break;
         walk_cast(b->scene, w, n, rays, hits);
         if (b->rays != NULL) *b->rays += (double)n;
-        size_t kept = 0;
-        for (size_t i = 0; i < n; i++) {
-            const hit_packet *of = &hits[i / VISIBILITY_PACKET];
-            const size_t lane = i % VISIBILITY_PACKET;
-            if (advance(b, &w[i], of->element[lane], of->back[lane])) w[kept++] = w[i];
-        }
-        n = kept;
+        n = advance(b, n, w, hits);
         if (stream % STREAMS_AT_ONCE == 0) {
             if (!go_on(b->run, begun)) return;
             begun = 0;

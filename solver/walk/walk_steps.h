@@ -61,12 +61,13 @@ typedef struct walk_run {
 } walk_run;
 
 /* Walks that share a stream of starts. start sets element, place, weight and random of the next walk, or
- * returns false after the last one; arrive is called when a walk comes to the front of an element. */
+ * returns false after the last one; arrive is called when walks come to the fronts of elements, or to
+ * VISIBILITY_NOTHING where one of them does not. */
 typedef struct walk_batch {
     const walk_scene *scene;
     walk_run *run;
     bool (*start)(void *context, walker *w);
-    void (*arrive)(void *context, const walker *w, uint32_t element);
+    void (*arrive)(void *context, size_t n, const walker *w, const uint32_t *element);
     void *context;
     double *rays; /* counts those that are cast; or NULL */
 } walk_batch;
