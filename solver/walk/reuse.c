@@ -32,7 +32,7 @@ typedef struct reuse {
 /* One batch, and the walk of a chunk of its paths. */
 typedef struct reuse_batch {
     const reuse *r;
-    double *first, *later; /* [n][s] and [n][C][s]: power over that of the light, straight and reflected */
+    double *first, *later; /* of reuse_sums_add */
     first_hits *hits;
     float *weight, *work;  /* [HITS_MOST][s]; see reuse_weights */
     walk_starts starts;    /* of position, 0 <= position <= s */
@@ -111,6 +111,7 @@ static void find_hits(reuse_batch *b, size_t number) {
             continue;
         }
         b->rays += (double)n;
+        walk_log_add(r->run->log, n / VISIBILITY_PACKET, rays);
         for (size_t j = 0; j < n; j += VISIBILITY_PACKET) {
             const size_t of_packet = n - j < VISIBILITY_PACKET ? n - j : VISIBILITY_PACKET;
             visibility_cast_lifted(r->scene->v, &rays[j / VISIBILITY_PACKET], of_packet, self, self, &met);
@@ -124,12 +125,12 @@ static void find_hits(reuse_batch *b, size_t number) {
 static void deposit_first(const reuse_batch *b, size_t path, uint32_t element) {
     const reuse *r = b->r;
     const size_t s = r->s;
-    double *const first = b->first + (size_t)element * s;
-    const float *const weight = b->weight + path * s;
     if (r->problem->way == REUSE_NONE) {
-        first[b->hits->position[path]] += r->per_path;
+        b->first[b->hits->position[path] * r->n + element] += r->per_path;
         return;
     }
+    double *const first = b->first + (size_t)element * s;
+    const float *const weight = b->weight + path * s;
 #pragma omp simd
     for (size_t l = 0; l < s; l++) first[l] += (double)weight[l];
 }
@@ -137,11 +138,11 @@ static void deposit_first(const reuse_batch *b, size_t path, uint32_t element) {
 /* Paths of their own: the sums of the position that each belongs to. */
 static void arrive_alone(void *context, size_t n, const walker *w, const uint32_t *element) {
     const reuse_batch *b = context;
-    const size_t s = b->r->s, C = b->r->C;
+    const size_t C = b->r->C;
     for (size_t i = 0; i < n; i++) {
         if (element[i] == VISIBILITY_NOTHING) continue;
-        double *const later = b->later + (size_t)element[i] * C * s + b->hits->position[w[i].path];
-        for (size_t c = 0; c < C; c++) later[c * s] += w[i].weight[c] * b->r->per_path;
+        double *const later = b->later + (b->hits->position[w[i].path] * b->r->n + element[i]) * C;
+        for (size_t c = 0; c < C; c++) later[c] += w[i].weight[c] * b->r->per_path;
     }
 }
 
@@ -303,7 +304,8 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
         r.frames[l].paths = (float)r.of_batch;
     }
     TRY(light_pieces_create(light, r.frames, &r.pieces, error));
-    walk_run run = {.progress = problem->progress,
+    walk_run run = {.log = problem->log,
+                    .progress = problem->progress,
                     .stage = problem->stage,
                     .all = (double)e.paths * (double)e.n_positions};
     r.run = &run;

@@ -23,6 +23,7 @@ typedef struct reuse_problem {
     uint64_t seed;     /* the bits of estimates depend on it, not on threads */
     const progress *progress;
     const char *stage;
+    walk_log *log; /* for measurements, or NULL */
 } reuse_problem;
 
 typedef struct reuse_estimates {

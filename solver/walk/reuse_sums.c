@@ -15,6 +15,8 @@ enum { SUMS_ROWS = 8 };
 #include "solver/base/cpu_kernels.inc"
 
 void reuse_sums_free(reuse_sums *t) {
+    free(t->gain);
+    free(t->norm);
     free(t->mean);
     free(t->square);
     free(t->direct);
@@ -28,22 +30,51 @@ lam_status reuse_sums_create(const mesh *m, const moving_light *light, bool shar
                              lam_error *error) {
     const size_t s = light->n, size = m->n * m->n_channels * s;
     reuse_sums t = {.m = m, .light = light, .s = s, .shared = shared};
+    t.gain = memory_allocate(m->n, m->n_channels * sizeof *t.gain, "paths", error);
+    t.norm = memory_allocate(m->n, m->n_channels * sizeof *t.norm, "paths", error);
     t.mean = memory_allocate(size, sizeof *t.mean, "paths", error);
     t.square = memory_allocate(size, sizeof *t.square, "paths", error);
     t.direct = memory_allocate(m->n, s * sizeof *t.direct, "paths", error);
     t.covariance = memory_allocate(s, s * sizeof *t.covariance, "paths", error);
     t.left = memory_allocate(SUMS_ROWS, s * sizeof *t.left, "paths", error);
     t.right = memory_allocate(SUMS_ROWS, s * sizeof *t.right, "paths", error);
-    if (t.mean == NULL || t.square == NULL || t.direct == NULL || t.covariance == NULL || t.left == NULL ||
-        t.right == NULL) {
+    if (t.gain == NULL || t.norm == NULL || t.mean == NULL || t.square == NULL || t.direct == NULL ||
+        t.covariance == NULL || t.left == NULL || t.right == NULL) {
         reuse_sums_free(&t);
         return LAM_ERR_MEMORY;
     }
+    for (size_t i = 0; i < m->n; i++)
+        for (size_t c = 0; c < m->n_channels; c++) {
+            const double rho = (double)m->reflectance[c * m->n + i];
+            t.gain[i * m->n_channels + c] = light->emission[c] * light->area / m->area[i];
+            t.norm[i * m->n_channels + c] = m->area[i] * rho * rho;
+        }
     *out = t;
     return LAM_OK;
 }
 
-void reuse_sums_add(reuse_sums *t, const double *first, const double *later) {
+static void add_alone(reuse_sums *t, const double *first, const double *later) {
+    const size_t n = t->m->n, C = t->m->n_channels;
+    const double step = 1 / (double)t->batches;
+    for (size_t l = 0; l < t->s; l++) {
+        const double *const straight = first + l * n, *const reflected = later + l * n * C;
+        double *const mean = t->mean + l * n * C, *const square = t->square + l * n * C;
+        double *const direct = t->direct + l * n, spread = 0;
+        for (size_t i = 0; i < n; i++) {
+            direct[i] += straight[i];
+            for (size_t k = i * C; k < (i + 1) * C; k++) {
+                const double off = t->gain[k] * (straight[i] + reflected[k]) - mean[k];
+                const double more = (1 - step) * off * off;
+                mean[k] += step * off;
+                square[k] += more;
+                spread += t->norm[k] * more;
+            }
+        }
+        t->covariance[l * t->s + l] += spread;
+    }
+}
+
+static void add_shared(reuse_sums *t, const double *first, const double *later) {
     typedef void move_mean(size_t, double, double, const double *, const double *, double *, double *,
                            double *);
     typedef void outer(size_t, const double *, const double *, double *);
@@ -52,21 +83,16 @@ void reuse_sums_add(reuse_sums *t, const double *first, const double *later) {
     const cpu_level level = cpu_best();
     const mesh *m = t->m;
     const size_t s = t->s, C = m->n_channels;
-    const double batches = (double)++t->batches, step = 1 / batches;
+    const double step = 1 / (double)t->batches;
     size_t rows = 0;
     for (size_t i = 0; i < m->n; i++) {
         for (size_t l = 0; l < s; l++) t->direct[i * s + l] += first[i * s + l];
         for (size_t c = 0; c < C; c++) {
             const size_t at = (i * C + c) * s;
-            const double power = t->light->emission[c] * t->light->area / m->area[i];
-            const double rho = (double)m->reflectance[c * m->n + i];
-            const double factor = m->area[i] * rho * rho * (1 - step);
+            const double factor = t->norm[i * C + c] * (1 - step);
             double *const left = t->left + rows * s, *const right = t->right + rows * s;
-            moves[level](s, power, step, first + i * s, later + at, t->mean + at, t->square + at, right);
-            if (!t->shared) {
-                for (size_t l = 0; l < s; l++) t->covariance[l * s + l] += factor * right[l] * right[l];
-                continue;
-            }
+            moves[level](s, t->gain[i * C + c], step, first + i * s, later + at, t->mean + at, t->square + at,
+                         right);
             for (size_t l = 0; l < s; l++) left[l] = factor * right[l];
             if (++rows < SUMS_ROWS) continue;
             outers[level](s, t->left, t->right, t->covariance);
@@ -78,15 +104,26 @@ void reuse_sums_add(reuse_sums *t, const double *first, const double *later) {
     outers[level](s, t->left, t->right, t->covariance);
 }
 
+void reuse_sums_add(reuse_sums *t, const double *first, const double *later) {
+    t->batches++;
+    if (t->shared)
+        add_shared(t, first, later);
+    else
+        add_alone(t, first, later);
+}
+
 void reuse_sums_end(const reuse_sums *t, reuse_estimates *e) {
     const size_t n = e->n, C = e->n_channels, s = t->s;
     const double batches = (double)t->batches, of_mean = 1 / (batches * (batches - 1));
     for (size_t i = 0; i < n; i++) {
-        for (size_t l = 0; l < s; l++)
-            e->direct[l * n + i] = (float)(t->direct[i * s + l] * t->light->area / (t->m->area[i] * batches));
+        for (size_t l = 0; l < s; l++) {
+            const double sum = t->direct[t->shared ? i * s + l : l * n + i];
+            e->direct[l * n + i] = (float)(sum * t->light->area / (t->m->area[i] * batches));
+        }
         for (size_t c = 0; c < C; c++)
             for (size_t l = 0; l < s; l++) {
-                const size_t from = (i * C + c) * s + l, to = (c * s + l) * n + i;
+                const size_t from = t->shared ? (i * C + c) * s + l : (l * n + i) * C + c,
+                             to = (c * s + l) * n + i;
                 e->H[to] = (float)t->mean[from];
                 e->error[to] = (float)sqrt(t->square[from] * of_mean);
             }

@@ -5,18 +5,20 @@
 #include "solver/scene/mesh.h"
 #include "solver/walk/reuse.h"
 
-/* Batches that were added, of all elements, channels and positions (n C s numbers each, in the order of the
- * sums of a batch): after b batches x_1 ... x_b the mean and sum_k (x_k - mean) (x_k - mean)', which a batch
- * with d = x_(b+1) - mean raises by b/(b + 1) d d' (Welford 1962). Nothing is lost to cancellation, and the
- * covariance stays positive semidefinite. */
+/* Batches that were added, of all elements, channels and positions: n C s numbers each, [n][C][s] where
+ * positions share paths, else [s][n][C], so that a path meets neighbouring numbers. After b batches x_1 ...
+ * x_b the mean and sum_k (x_k - mean) (x_k - mean)', which a batch with d = x_(b+1) - mean raises by b/(b +
+ * 1) d d' (Welford 1962). Nothing is lost to cancellation, and the covariance stays positive semidefinite. */
 typedef struct reuse_sums {
     const mesh *m;
     const moving_light *light;
     size_t s, batches;
     bool shared;          /* positions share paths: without that no two of them are correlated */
-    double *mean;         /* [n][C][s] W/m2 */
-    double *square;       /* [n][C][s]: the diagonal */
-    double *direct;       /* [n][s]: sum over batches */
+    double *gain;         /* [n][C] power of the light over the area of the element */
+    double *norm;         /* [n][C] area rho^2 */
+    double *mean;         /* [n][C][s] or [s][n][C] W/m2 */
+    double *square;       /* the same: the diagonal */
+    double *direct;       /* [n][s] or [s][n]: sum over batches */
     double *covariance;   /* [s][s]: sum over channels and elements with area rho^2, upper triangle */
     double *left, *right; /* [SUMS_ROWS][s]: rows of d that wait for the covariance, left with its factor */
 } reuse_sums;
@@ -26,7 +28,8 @@ lam_status reuse_sums_create(const mesh *m, const moving_light *light, bool shar
 void reuse_sums_free(reuse_sums *t);
 
 /* Adds a batch: power over that of the light which comes to elements straight from it, first [n][s], and by
- * reflection, later [n][C][s]. Cost: n C s^2 / 2 multiplications. */
+ * reflection, later [n][C][s]; or [s][n] and [s][n][C]. Cost: n C s^2 / 2 multiplications where paths are
+ * shared. */
 void reuse_sums_add(reuse_sums *t, const double *first, const double *later);
 
 /* Writes H, error, covariance and direct of the estimates, which the caller has allocated. */

@@ -8,6 +8,7 @@
 
 #include "lambert/lambert.h"
 #include "solver/formfactor/leaving.h"
+#include "solver/formfactor/visibility/visibility.h"
 #include "solver/scene/mesh.h"
 
 /* The walks of an estimate are cut into this many batches, whose means give its standard error. */
@@ -15,6 +16,12 @@ enum { WALK_BATCHES = 32 };
 
 /* An element that is in no target. */
 #define WALK_NO_TARGET 0xFFFFFFFFu
+
+/* Rays as they were cast, the first that come: a measurement casts them again. */
+typedef struct walk_log {
+    size_t count, capacity; /* packets */
+    ray_packet *packets;    /* [capacity], the caller's */
+} walk_log;
 
 /* A mesh made ready for walks; immutable, so that any number of threads may use it. */
 typedef struct walk_scene walk_scene;
@@ -26,6 +33,10 @@ typedef struct walk_scene walk_scene;
  * LAM_ERR_INTERNAL. */
 lam_status walk_scene_create(const mesh *m, scene_closure closure, walk_scene **out, lam_error *error);
 void walk_scene_free(walk_scene *s);
+
+/* The processor seconds of all threads that Embree alone takes for the packets of a log. Errors:
+ * LAM_ERR_MEMORY. */
+lam_status walk_log_bare_seconds(const walk_scene *s, const walk_log *log, double *seconds, lam_error *error);
 
 /* The estimates asked for: the area mean of a quantity over each target, a set of elements. An element is in
  * one target at most. Light that comes from outside (a sky, the sun) is emission too: E + rho H0, and H0 has

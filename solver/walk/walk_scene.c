@@ -1,4 +1,5 @@
 /* The scene of walks, and the checks and memory that both ways to walk share. */
+#include "solver/base/clock.h"
 #include "solver/formfactor/leaving.h"
 #include "solver/formfactor/visibility/openings.h"
 #include "solver/walk/walk_steps.h"
@@ -86,6 +87,22 @@ void walk_scene_free(walk_scene *s) {
     free(s->shapes);
     free(s->halves);
     free(s);
+}
+
+void walk_log_add(walk_log *log, size_t n_packets, const ray_packet *rays) {
+    if (log == NULL || log->count == log->capacity) return;
+#pragma omp critical(walk_log)
+    for (size_t k = 0; k < n_packets && log->count < log->capacity; k++) log->packets[log->count++] = rays[k];
+}
+
+lam_status walk_log_bare_seconds(const walk_scene *s, const walk_log *log, double *seconds,
+                                 lam_error *error) {
+    double wall;
+    const double begun = clock_processor_seconds();
+    const lam_status status =
+        visibility_bare_seconds(s->v, log->packets, NULL, log->count, &wall, NULL, error);
+    *seconds = clock_processor_seconds() - begun;
+    return status;
 }
 
 void walk_estimates_free(walk_estimates *e) {

@@ -1,7 +1,5 @@
 #include "solver/walk/walk_steps.h"
 
-#include "solver/base/random.h"
-
 #include <math.h>
 
 /* A walk that has lost so many rays in a row is in a corner that single precision cannot leave: it ends. */
@@ -16,23 +14,6 @@ void walk_draw_place(walker *w) {
         w->place[d] = (uint32_t)bits;
         w->place[d + 1] = (uint32_t)(bits >> 32);
     }
-}
-
-bool walk_survives(const walk_scene *s, walker *w, uint32_t element) {
-    const size_t channels = s->m->n_channels;
-    const float *reflectance = s->shapes[element].reflectance;
-    double before = 0, after = 0;
-    for (size_t c = 0; c < channels; c++) {
-        before = w->weight[c] > before ? w->weight[c] : before;
-        w->weight[c] *= (double)reflectance[c];
-        after = w->weight[c] > after ? w->weight[c] : after;
-    }
-    /* The weights of a walk that ends are never read: a branch here would be mispredicted half of the time.
-     */
-    const bool survives = random_unit(&w->random) * before < after;
-    const double scale = before / after;
-    for (size_t c = 0; c < channels; c++) w->weight[c] *= scale;
-    return survives;
 }
 
 /* The element that the ray of a walk has led to the front of, else VISIBILITY_NOTHING. */
@@ -95,12 +76,14 @@ void walk_batch_go(const walk_batch *b) {
     size_t n = 0, begun = 0;
     if (!go_on(b->run, 0)) return;
     for (size_t stream = 1;; stream++) {
-        while (n < WALK_STREAM && b->start(b->context, &w[n])) {
-            w[n++].lost = 0;
-            begun++;
+        for (; n < WALK_STREAM; n++, begun++) {
+            w[n].lost = 0;
+            for (int c = 0; c < WALK_CHANNELS; c++) w[n].weight[c] = 0;
+            if (!b->start(b->context, &w[n])) break;
         }
         if (n == 0) break;
         walk_cast(b->scene, w, n, rays, hits);
+        walk_log_add(b->run->log, n / VISIBILITY_PACKET, rays);
         if (b->rays != NULL) *b->rays += (double)n;
         n = advance(b, n, w, hits);
         if (stream % STREAMS_AT_ONCE == 0) {

@@ -3,6 +3,7 @@
 #ifndef LAMBERT_WALK_WALK_STEPS_H
 #define LAMBERT_WALK_WALK_STEPS_H
 
+#include "solver/base/random.h"
 #include "solver/formfactor/visibility/visibility.h"
 #include "solver/walk/walk.h"
 
@@ -48,7 +49,7 @@ typedef struct walker {
     uint32_t path;                /* its number among those of the caller */
     unsigned lost;                /* rays through cracks since it came there */
     uint32_t place[4];            /* in 2^-32: two for the point, two for the direction */
-    double weight[WALK_CHANNELS]; /* of what it has met; power when it was shot */
+    double weight[WALK_CHANNELS]; /* of what it has met; power when it was shot; 0 beyond the channels */
     uint64_t random;              /* its own stream */
 } walker;
 
@@ -58,11 +59,12 @@ typedef struct walk_run {
     const char *stage;
     double begun, all; /* walks */
     bool stop;
+    walk_log *log; /* or NULL */
 } walk_run;
 
-/* Walks that share a stream of starts. start sets element, place, weight and random of the next walk, or
- * returns false after the last one; arrive is called when walks come to the fronts of elements, or to
- * VISIBILITY_NOTHING where one of them does not. */
+/* Walks that share a stream of starts. start sets element, place, weights (0 before) and random of the next
+ * walk, or returns false after the last one; arrive is called when walks come to the fronts of elements, or
+ * to VISIBILITY_NOTHING where one of them does not. */
 typedef struct walk_batch {
     const walk_scene *scene;
     walk_run *run;
@@ -72,6 +74,9 @@ typedef struct walk_batch {
     double *rays; /* counts those that are cast; or NULL */
 } walk_batch;
 
+/* Keeps packets of rays that were cast, for measurements. */
+void walk_log_add(walk_log *log, size_t n_packets, const ray_packet *rays);
+
 /* Takes all walks of a batch from their start to their end, or until run->stop. */
 void walk_batch_go(const walk_batch *b);
 
@@ -80,8 +85,20 @@ void walk_draw_place(walker *w);
 
 /* Russian roulette at an element: the walk goes on with the probability
  *     q = max_c (rho_c w_c) / max_c w_c,        w_c <- rho_c w_c / q,
- * which leaves the expectation of every channel as it is and the largest weight too. */
-bool walk_survives(const walk_scene *s, walker *w, uint32_t element);
+ * which leaves the expectation of every channel as it is and the largest weight too. The weights of a walk
+ * that ends are never read: a branch for them would be mispredicted half of the time. */
+static inline bool walk_survives(const walk_scene *s, walker *w, uint32_t element) {
+    const float *reflectance = s->shapes[element].reflectance;
+    double before = 0, after = 0, weight[WALK_CHANNELS];
+    for (size_t c = 0; c < WALK_CHANNELS; c++) {
+        before = w->weight[c] > before ? w->weight[c] : before;
+        weight[c] = w->weight[c] * (double)reflectance[c];
+        after = weight[c] > after ? weight[c] : after;
+    }
+    const double scale = before / after;
+    for (size_t c = 0; c < WALK_CHANNELS; c++) w->weight[c] = weight[c] * scale;
+    return random_unit(&w->random) * before < after;
+}
 
 /* Makes the shapes of a scene, freed with it. Errors: LAM_ERR_MEMORY. */
 lam_status walk_shapes_create(walk_scene *s, lam_error *error);

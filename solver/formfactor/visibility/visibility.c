@@ -394,8 +394,7 @@ void visibility_cast_lifted(const visibility *v, const ray_packet *rays, size_t 
         hits->element[i] = VISIBILITY_NOTHING;
         if (ray.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
         const primitive *p = &v->primitives[ray.hit.geomID[i]][ray.hit.primID[i]];
-        const float cosine =
-            along_normal(v, p->facet, ray.ray.dir_x[i], ray.ray.dir_y[i], ray.ray.dir_z[i]);
+        const float cosine = along_normal(v, p->facet, ray.ray.dir_x[i], ray.ray.dir_y[i], ray.ray.dir_z[i]);
         plain = plain && cosine < 0 && p->facet != facet[i] && -cosine * ray.ray.tfar[i] > v->rounding;
         hits->element[i] = p->element;
         piece[open] = p->piece;
@@ -519,14 +518,14 @@ lam_status visibility_bare_seconds(const visibility *v, const ray_packet *packet
     if (nearest == NULL) return LAM_ERR_MEMORY;
 #pragma omp parallel for schedule(static)
     for (size_t p = 0; p < n_packets; p++)
-        for (size_t i = 0; i < VISIBILITY_PACKET; i++) {
+        for (size_t i = 0; i < VISIBILITY_PACKET && self != NULL; i++) {
             const float cosine = along_normal(v, v->facets.of_element[self[p]], packets[p].direction[0][i],
                                               packets[p].direction[1][i], packets[p].direction[2][i]);
             nearest[p][i] = 2 * v->rounding / fmaxf(cosine, 1e-3f);
         }
     const double started = clock_seconds();
 #pragma omp parallel for schedule(dynamic, 256)
-    for (size_t p = 0; p < n_packets; p++) cast_bare(v, &packets[p], nearest[p], self[p], false);
+    for (size_t p = 0; p < n_packets; p++) cast_bare(v, &packets[p], nearest[p], 0, false);
     *seconds = clock_seconds() - started;
     if (own != NULL) {
         size_t count = 0;

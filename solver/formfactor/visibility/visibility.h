@@ -73,8 +73,8 @@ unsigned visibility_between(const visibility *v, const ray_packet *segments, siz
 
 /* The speed of Embree alone, as a measure for visibility_cast: casts packets in memory, by all threads,
  * without a filter and without reading the hits. Packet p leaves element self[p]; its rays start above it by
- * more than rounding. own, unless NULL, is set to the number of rays that hit their own facet nevertheless,
- * by a second, untimed cast. Errors: LAM_ERR_MEMORY. */
+ * more than rounding; with self NULL they are cast from where they are. own, unless NULL, is set to the
+ * number of rays that hit their own facet nevertheless, by a second, untimed cast. Errors: LAM_ERR_MEMORY. */
 lam_status visibility_bare_seconds(const visibility *v, const ray_packet *packets, const uint32_t *self,
                                    size_t n_packets, double *seconds, size_t *own, lam_error *error);
 
