@@ -53,18 +53,19 @@ static size_t first_rays(reuse_batch *b, size_t most, ray_packet *rays, float lo
     static const double all[2] = {0, 1};
     const light_pieces *light = &b->r->pieces;
     const walk_shape *shape = light->carried + b->position * light->n;
-    walk_places p;
+    walk_places p[WALK_STREAM / VISIBILITY_PACKET];
     walker w;
     size_t n = 0, only;
     for (; n < most && walk_starts_next(&b->starts, all, 1, &w, &only); n++) {
         const size_t k = light_pieces_choose(light, &w.place[0]);
-        walk_place_set(&p, n, &shape[k], w.place);
+        walk_place_set(&p[n / VISIBILITY_PACKET], n % VISIBILITY_PACKET, &shape[k], w.place);
         light_pieces_point(light, k, w.place, local[n]);
         random[n] = w.random;
     }
     const size_t last = n;
-    for (; n % VISIBILITY_PACKET != 0; n++) walk_place_set(&p, n, &shape[0], w.place);
-    walk_leave(&p, n, rays);
+    for (; n % VISIBILITY_PACKET != 0; n++)
+        walk_place_set(&p[n / VISIBILITY_PACKET], n % VISIBILITY_PACKET, &shape[0], w.place);
+    walk_leave(p, n / VISIBILITY_PACKET, rays);
     return last;
 }
 
@@ -149,18 +150,7 @@ static void arrive_alone(void *context, size_t n, const walker *w, const uint32_
 /* Paths for all positions. */
 static void arrive_shared(void *context, size_t n, const walker *w, const uint32_t *element) {
     const reuse_batch *b = context;
-    const size_t s = b->r->s, C = b->r->C;
-    for (size_t i = 0; i < n; i++) {
-        if (element[i] == VISIBILITY_NOTHING) continue;
-        double *const later = b->later + (size_t)element[i] * C * s;
-        const float *const weight = b->weight + w[i].path * s;
-        for (size_t c = 0; c < C; c++) {
-            const double power = w[i].weight[c];
-            double *const out = later + c * s;
-#pragma omp simd
-            for (size_t l = 0; l < s; l++) out[l] += power * (double)weight[l];
-        }
-    }
+    reuse_deposit(n, b->r->s, b->r->C, w, element, b->weight, b->later);
 }
 
 /* The next path of the chunk that goes on from its first hit. */

@@ -14,6 +14,13 @@ enum { SUMS_ROWS = 8 };
 #define CPU_KERNELS "solver/walk/reuse_sums_kernels.inc"
 #include "solver/base/cpu_kernels.inc"
 
+void reuse_deposit(size_t n, size_t s, size_t C, const walker *w, const uint32_t *element,
+                   const float *weight, double *later) {
+    typedef void deposit(size_t, size_t, size_t, const walker *, const uint32_t *, const float *, double *);
+    static deposit *const deposits[] = CPU_TABLE(deposit_portable, deposit_avx2, deposit_avx512);
+    deposits[cpu_best()](n, s, C, w, element, weight, later);
+}
+
 void reuse_sums_free(reuse_sums *t) {
     free(t->gain);
     free(t->norm);

@@ -4,6 +4,7 @@
 
 #include "solver/scene/mesh.h"
 #include "solver/walk/reuse.h"
+#include "solver/walk/walk_steps.h"
 
 /* Batches that were added, of all elements, channels and positions: n C s numbers each, [n][C][s] where
  * positions share paths, else [s][n][C], so that a path meets neighbouring numbers. After b batches x_1 ...
@@ -31,6 +32,11 @@ void reuse_sums_free(reuse_sums *t);
  * reflection, later [n][C][s]; or [s][n] and [s][n][C]. Cost: n C s^2 / 2 multiplications where paths are
  * shared. */
 void reuse_sums_add(reuse_sums *t, const double *first, const double *later);
+
+/* Adds the power of n walks that serve all s positions to `later` [n][C][s] of the elements that they come
+ * to, VISIBILITY_NOTHING where one does not: in the parts weight [paths][s]. */
+void reuse_deposit(size_t n, size_t s, size_t C, const walker *w, const uint32_t *element,
+                   const float *weight, double *later);
 
 /* Writes H, error, covariance and direct of the estimates, which the caller has allocated. */
 void reuse_sums_end(const reuse_sums *t, reuse_estimates *e);

@@ -6,18 +6,19 @@
 #include "solver/walk/reuse.h"
 
 /* Hits of a chunk; those of which weights are found together; and the lanes of the widest vectors, to a
- * multiple of which arrays are filled up. */
-enum { HITS_MOST = 1024, HITS_BLOCK = 256, HITS_LANES = 16 };
+ * multiple of which arrays are filled up; they are longer than a power of two, so that the same places of
+ * several arrays do not compete for one part of a cache. */
+enum { HITS_MOST = 2048, HITS_BLOCK = 256, HITS_LANES = 16, HITS_ROOM = HITS_MOST + HITS_LANES };
 
 /* First hits on fronts, one array for each number, in the order of their positions. */
 typedef struct first_hits {
     size_t count;
-    uint32_t element[HITS_MOST], facet[HITS_MOST];
-    uint32_t position[HITS_MOST]; /* that the path belongs to */
-    float local[3][HITS_MOST];    /* the point of the light, before any pose */
-    float y[3][HITS_MOST];        /* recentred */
-    float normal[3][HITS_MOST];   /* at y */
-    uint64_t random[HITS_MOST];   /* the stream of the walk */
+    uint32_t element[HITS_ROOM], facet[HITS_ROOM];
+    uint32_t position[HITS_ROOM]; /* that the path belongs to */
+    float local[3][HITS_ROOM];    /* the point of the light, before any pose */
+    float y[3][HITS_ROOM];        /* recentred */
+    float normal[3][HITS_ROOM];   /* at y */
+    uint64_t random[HITS_ROOM];   /* the stream of the walk */
 } first_hits;
 
 /* A cell of a map. */

@@ -84,52 +84,55 @@ lam_status walk_shapes_create(walk_scene *s, lam_error *error) {
     return LAM_OK;
 }
 
-void walk_place_set(walk_places *p, size_t j, const walk_shape *shape, const uint32_t place[4]) {
+void walk_place_set(walk_places *p, size_t i, const walk_shape *shape, const uint32_t place[4]) {
     for (int d = 0; d < 3; d++) {
-        p->corner[d][j] = shape->corner[d];
-        p->edge[0][d][j] = shape->edge[0][d];
-        p->edge[1][d][j] = shape->edge[1][d];
-        p->normal[d][j] = shape->normal[d];
+        p->corner[d][i] = shape->corner[d];
+        p->edge[0][d][i] = shape->edge[0][d];
+        p->edge[1][d][i] = shape->edge[1][d];
+        p->normal[d][i] = shape->normal[d];
     }
-    p->fold[j] = (shape->facet & WALK_TRIANGLE) != 0 ? .5f : 0;
-    p->u[j] = to_unit(place[0]);
-    p->w[j] = to_unit(place[1]);
-    p->x[j] = to_unit(place[2]);
-    p->turn[j] = place[3];
+    p->fold[i] = (shape->facet & WALK_TRIANGLE) != 0 ? .5f : 0;
+    p->u[i] = to_unit(place[0]);
+    p->w[i] = to_unit(place[1]);
+    p->x[i] = to_unit(place[2]);
+    p->turn[i] = place[3];
 }
 
-/* The coordinate u of place j chooses the triangle of a quadrilateral and is rescaled to [0, 1). */
-static void choose_half(walk_places *p, size_t j, const walk_shape *shape, const walk_halves *h) {
-    if (p->u[j] < h->share) {
-        p->u[j] /= h->share;
+/* The coordinate u of lane i chooses the triangle of a quadrilateral and is rescaled to [0, 1). */
+static void choose_half(walk_places *p, size_t i, const walk_shape *shape, const walk_halves *h) {
+    if (p->u[i] < h->share) {
+        p->u[i] /= h->share;
         return;
     }
-    p->u[j] = (p->u[j] - h->share) / (1 - h->share);
+    p->u[i] = (p->u[i] - h->share) / (1 - h->share);
     for (int d = 0; d < 3; d++) {
-        p->edge[0][d][j] = shape->edge[1][d];
-        p->edge[1][d][j] = h->third[d];
+        p->edge[0][d][i] = shape->edge[1][d];
+        p->edge[1][d][i] = h->third[d];
     }
 }
 
 void walk_leave(const walk_places *p, size_t n, ray_packet *rays) {
     typedef void leave(size_t, const walk_places *, ray_packet *);
     static leave *const leaves[] = CPU_TABLE(leave_portable, leave_avx2, leave_avx512);
-    leaves[cpu_best()](n / VISIBILITY_PACKET, p, rays);
+    leaves[cpu_best()](n, p, rays);
 }
 
 void walk_cast(const walk_scene *s, const walker *w, size_t n, ray_packet *rays, hit_packet *hits) {
     const size_t filled = (n + VISIBILITY_PACKET - 1) / VISIBILITY_PACKET * VISIBILITY_PACKET;
-    walk_places p;
+    walk_places p[WALK_STREAM / VISIBILITY_PACKET];
     uint32_t self[WALK_STREAM], facet[WALK_STREAM];
     for (size_t j = 0; j < filled; j++) {
         const walker *of = &w[j < n ? j : n - 1];
         const walk_shape *shape = &s->shapes[of->at];
-        walk_place_set(&p, j, shape, of->place);
-        if (s->halves != NULL && s->halves[of->at].share < 1) choose_half(&p, j, shape, &s->halves[of->at]);
+        walk_places *const to = &p[j / VISIBILITY_PACKET];
+        const size_t lane = j % VISIBILITY_PACKET;
+        walk_place_set(to, lane, shape, of->place);
+        if (s->halves != NULL && s->halves[of->at].share < 1)
+            choose_half(to, lane, shape, &s->halves[of->at]);
         self[j] = of->at;
         facet[j] = shape->facet & ~WALK_TRIANGLE;
     }
-    walk_leave(&p, filled, rays);
+    walk_leave(p, filled / VISIBILITY_PACKET, rays);
     for (size_t j = 0; j < n; j += VISIBILITY_PACKET)
         visibility_cast_lifted(s->v, &rays[j / VISIBILITY_PACKET],
                                n - j < VISIBILITY_PACKET ? n - j : VISIBILITY_PACKET, self + j, facet + j,

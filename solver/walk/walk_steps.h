@@ -19,12 +19,12 @@ typedef struct walk_shape {
     uint32_t facet; /* of the scene, and WALK_TRIANGLE */
 } walk_shape;
 
-/* The places that many rays leave. */
+/* The places that a packet of rays leaves. */
 typedef struct walk_places {
-    float corner[3][WALK_STREAM], edge[2][3][WALK_STREAM], normal[3][WALK_STREAM];
-    float fold[WALK_STREAM];                              /* 1/2 for triangles, else 0 */
-    float u[WALK_STREAM], w[WALK_STREAM], x[WALK_STREAM]; /* in [0, 1) */
-    uint32_t turn[WALK_STREAM];                           /* in 2^-32 of a turn */
+    float corner[3][VISIBILITY_PACKET], edge[2][3][VISIBILITY_PACKET], normal[3][VISIBILITY_PACKET];
+    float fold[VISIBILITY_PACKET];                                          /* 1/2 for triangles, else 0 */
+    float u[VISIBILITY_PACKET], w[VISIBILITY_PACKET], x[VISIBILITY_PACKET]; /* in [0, 1) */
+    uint32_t turn[VISIBILITY_PACKET];                                       /* in 2^-32 of a turn */
 } walk_places;
 
 /* A quadrilateral that is no parallelogram is the triangle of its shape and that of edge[1] and a third one.
@@ -103,11 +103,10 @@ static inline bool walk_survives(const walk_scene *s, walker *w, uint32_t elemen
 /* Makes the shapes of a scene, freed with it. Errors: LAM_ERR_MEMORY. */
 lam_status walk_shapes_create(walk_scene *s, lam_error *error);
 
-/* Place j: the point and the direction of the numbers that a walker has for them. */
-void walk_place_set(walk_places *p, size_t j, const walk_shape *shape, const uint32_t place[4]);
+/* Lane i: the point and the direction of the numbers that a walker has for them. */
+void walk_place_set(walk_places *p, size_t i, const walk_shape *shape, const uint32_t place[4]);
 
-/* The rays that leave n places, a multiple of VISIBILITY_PACKET: origins uniform over shapes, directions
- * cosine-weighted. */
+/* The rays that leave n packets of places: origins uniform over shapes, directions cosine-weighted. */
 void walk_leave(const walk_places *p, size_t n, ray_packet *rays);
 
 /* Casts the next rays of n walks, at most WALK_STREAM, from their places: packets of rays and of hits. */
