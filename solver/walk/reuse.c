@@ -2,6 +2,7 @@
 
 #include "solver/base/clock.h"
 #include "solver/walk/light_frames.h"
+#include "solver/walk/reuse_counts.h"
 #include "solver/walk/reuse_sums.h"
 #include "solver/walk/reuse_weights.h"
 
@@ -14,16 +15,20 @@ void reuse_estimates_free(reuse_estimates *e) {
     free(e->error);
     free(e->direct);
     free(e->covariance);
+    free(e->count);
     *e = (reuse_estimates){.n = 0};
 }
+
+/* First rays of each position that a pilot has at most. */
+enum { PILOT = 512 };
 
 /* All that batches share. */
 typedef struct reuse {
     const walk_scene *scene;
     const reuse_problem *problem;
-    size_t n, C, s, of_batch; /* paths of a position in a batch */
-    double per_path;          /* 1 / of_batch */
-    light_frame *frames;      /* [s] */
+    size_t n, C, s;
+    size_t *of_batch;    /* [s]: paths of a position in a batch */
+    light_frame *frames; /* [s] */
     light_pieces pieces;
     const light_maps *maps; /* or NULL */
     walk_run *run;
@@ -93,6 +98,13 @@ static void keep_hits(reuse_batch *b, size_t n, const ray_packet *rays, const hi
     }
 }
 
+static void begin_position(reuse_batch *b, size_t number, size_t position) {
+    b->position = position;
+    if (position < b->r->s)
+        walk_starts_init(&b->starts, b->r->problem->seed, number * b->r->s + position,
+                         b->r->of_batch[position]);
+}
+
 /* Casts first rays of the positions of batch `number` until a chunk of hits is full or all have been cast. */
 static void find_hits(reuse_batch *b, size_t number) {
     const reuse *r = b->r;
@@ -107,8 +119,7 @@ static void find_hits(reuse_batch *b, size_t number) {
         const size_t room = HITS_MOST - b->hits->count;
         const size_t n = first_rays(b, room < WALK_STREAM ? room : WALK_STREAM, rays, local, random);
         if (n == 0) {
-            if (++b->position < r->s)
-                walk_starts_init(&b->starts, r->problem->seed, number * r->s + b->position, r->of_batch);
+            begin_position(b, number, b->position + 1);
             continue;
         }
         b->rays += (double)n;
@@ -127,7 +138,7 @@ static void deposit_first(const reuse_batch *b, size_t path, uint32_t element) {
     const reuse *r = b->r;
     const size_t s = r->s;
     if (r->problem->way == REUSE_NONE) {
-        b->first[b->hits->position[path] * r->n + element] += r->per_path;
+        b->first[b->hits->position[path] * r->n + element] += 1 / (double)r->of_batch[0];
         return;
     }
     double *const first = b->first + (size_t)element * s;
@@ -140,10 +151,11 @@ static void deposit_first(const reuse_batch *b, size_t path, uint32_t element) {
 static void arrive_alone(void *context, size_t n, const walker *w, const uint32_t *element) {
     const reuse_batch *b = context;
     const size_t C = b->r->C;
+    const double per_path = 1 / (double)b->r->of_batch[0];
     for (size_t i = 0; i < n; i++) {
         if (element[i] == VISIBILITY_NOTHING) continue;
         double *const later = b->later + (b->hits->position[w[i].path] * b->r->n + element[i]) * C;
-        for (size_t c = 0; c < C; c++) later[c] += w[i].weight[c] * b->r->per_path;
+        for (size_t c = 0; c < C; c++) later[c] += w[i].weight[c] * per_path;
     }
 }
 
@@ -179,8 +191,7 @@ static void go(reuse_batch *b, size_t number) {
                               .arrive = r->problem->way == REUSE_NONE ? arrive_alone : arrive_shared,
                               .context = b,
                               .rays = &b->rays};
-    b->position = 0;
-    walk_starts_init(&b->starts, r->problem->seed, number * r->s, r->of_batch);
+    begin_position(b, number, 0);
     while (!r->run->stop) {
         const double begun = clock_thread_seconds();
         find_hits(b, number);
@@ -195,6 +206,55 @@ static void go(reuse_batch *b, size_t number) {
     }
 }
 
+/* The memory of a chunk of hits. */
+static bool batch_memory(reuse_batch *b) {
+    b->hits = malloc(sizeof *b->hits);
+    b->weight = malloc(HITS_MOST * b->r->s * sizeof *b->weight);
+    b->work = malloc(HITS_BLOCK * (b->r->s + 1) * sizeof *b->work);
+    return b->hits != NULL && b->weight != NULL && b->work != NULL;
+}
+
+static void batch_memory_free(reuse_batch *b) {
+    free(b->hits);
+    free(b->weight);
+    free(b->work);
+}
+
+static void set_counts(reuse *r, size_t of_batch, const double *part) {
+    for (size_t l = 0; l < r->s; l++) {
+        const double count = (double)of_batch * (part != NULL ? part[l] : 1);
+        r->of_batch[l] = count > 1 ? (size_t)(count + .5) : 1;
+        r->frames[l].paths = (float)r->of_batch[l];
+    }
+}
+
+/* Sets the counts of paths by a pilot of first hits, a batch that no estimate has. */
+static lam_status count_paths(reuse *r, size_t of_batch, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t twentieth = of_batch * WALK_BATCHES / 20, pilot = twentieth < PILOT ? twentieth : PILOT;
+    size_t known = 0;
+    reuse_batch b = {.r = r};
+    double *part = memory_allocate(r->s, sizeof *part, "paths", error);
+    float *weight = memory_allocate(r->s * pilot, r->s * sizeof *weight, "paths", error);
+    if (part == NULL || weight == NULL) TRY(LAM_ERR_MEMORY);
+    if (!batch_memory(&b)) FAIL(error, LAM_ERR_MEMORY, "paths: out of memory");
+    set_counts(r, pilot, NULL);
+    begin_position(&b, WALK_BATCHES, 0);
+    while (pilot > 0) {
+        find_hits(&b, WALK_BATCHES);
+        if (b.hits->count == 0 && b.position == r->s) break;
+        reuse_weights(r->scene, r->s, r->frames, r->maps, b.hits, b.work, weight + known * r->s);
+        known += b.hits->count;
+    }
+    TRY(reuse_counts(known, r->s, weight, part, error));
+    set_counts(r, of_batch, part);
+done:
+    batch_memory_free(&b);
+    free(weight);
+    free(part);
+    return status;
+}
+
 static lam_status run_batches(const reuse *r, reuse_estimates *e, lam_error *error) {
     lam_status status = LAM_OK;
     const size_t straight = r->n * r->s, size = straight * r->C;
@@ -207,11 +267,7 @@ static lam_status run_batches(const reuse *r, reuse_estimates *e, lam_error *err
         reuse_batch b = {.r = r};
         b.first = malloc(straight * sizeof *b.first);
         b.later = malloc(size * sizeof *b.later);
-        b.hits = malloc(sizeof *b.hits);
-        b.weight = malloc(HITS_MOST * r->s * sizeof *b.weight);
-        b.work = malloc(HITS_BLOCK * (r->s + 1) * sizeof *b.work);
-        const bool ready =
-            b.first != NULL && b.later != NULL && b.hits != NULL && b.weight != NULL && b.work != NULL;
+        const bool ready = batch_memory(&b) && b.first != NULL && b.later != NULL;
 #pragma omp for schedule(static, 1) ordered
         for (size_t k = 0; k < WALK_BATCHES; k++) {
             if (ready) {
@@ -236,14 +292,14 @@ static lam_status run_batches(const reuse *r, reuse_estimates *e, lam_error *err
         }
         free(b.first);
         free(b.later);
-        free(b.hits);
-        free(b.weight);
-        free(b.work);
+        batch_memory_free(&b);
     }
     if (failed) FAIL(error, LAM_ERR_MEMORY, "paths: out of memory");
     TRY(walk_run_end(r->run, error));
     reuse_sums_end(&sums, e);
-    e->rays = rays / ((double)e->paths * (double)r->s);
+    double paths = 0;
+    for (size_t l = 0; l < r->s; l++) paths += (double)e->count[l];
+    e->rays = rays / paths;
 done:
     reuse_sums_free(&sums);
     return status;
@@ -278,8 +334,7 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
         FAIL(error, LAM_ERR_ARGUMENT, "%zu paths of %zu positions: must be at least 1", problem->paths,
              light->n);
     e.paths = ((problem->paths - 1) / WALK_BATCHES + 1) * WALK_BATCHES;
-    r.of_batch = e.paths / WALK_BATCHES;
-    r.per_path = 1 / (double)r.of_batch;
+    const size_t of_batch = e.paths / WALK_BATCHES;
     if (!size_multiply(e.n_channels, e.n_positions, &rows) || !size_multiply(rows, e.n, &size))
         FAIL(error, LAM_ERR_MEMORY, "paths: too many positions");
     e.H = memory_allocate(size, sizeof *e.H, "paths", error);
@@ -287,12 +342,13 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
     e.direct = memory_allocate(e.n_positions, e.n * sizeof *e.direct, "paths", error);
     e.covariance = memory_allocate(e.n_positions, e.n_positions * sizeof *e.covariance, "paths", error);
     r.frames = memory_allocate(e.n_positions, sizeof *r.frames, "paths", error);
-    if (e.H == NULL || e.error == NULL || e.direct == NULL || e.covariance == NULL || r.frames == NULL)
+    r.of_batch = memory_allocate(e.n_positions, sizeof *r.of_batch, "paths", error);
+    e.count = memory_allocate(e.n_positions, sizeof *e.count, "paths", error);
+    if (e.H == NULL || e.error == NULL || e.direct == NULL || e.covariance == NULL || r.frames == NULL ||
+        r.of_batch == NULL || e.count == NULL)
         TRY(LAM_ERR_MEMORY);
-    for (size_t l = 0; l < e.n_positions; l++) {
-        light_frame_set(s->v, light, &light->pose[l], &r.frames[l]);
-        r.frames[l].paths = (float)r.of_batch;
-    }
+    for (size_t l = 0; l < e.n_positions; l++) light_frame_set(s->v, light, &light->pose[l], &r.frames[l]);
+    set_counts(&r, of_batch, NULL);
     TRY(light_pieces_create(light, r.frames, &r.pieces, error));
     walk_run run = {.log = problem->log,
                     .progress = problem->progress,
@@ -308,12 +364,15 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
         e.maps_seconds = clock_seconds() - begun;
         r.maps = &maps;
     }
+    if (problem->even && problem->way != REUSE_NONE) TRY(count_paths(&r, of_batch, error));
+    for (size_t l = 0; l < r.s; l++) e.count[l] = r.of_batch[l] * WALK_BATCHES;
     TRY(run_batches(&r, &e, error));
     TRY(check_reach(&r, &e, error));
     *out = e;
     e = (reuse_estimates){.n = 0};
 done:
     free(r.frames);
+    free(r.of_batch);
     light_pieces_free(&r.pieces);
     light_maps_free(&maps);
     reuse_estimates_free(&e);

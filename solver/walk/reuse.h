@@ -18,7 +18,8 @@ typedef enum reuse_way { REUSE_NONE, REUSE_EXACT, REUSE_MAPS, REUSE_CUBES } reus
 typedef struct reuse_problem {
     const moving_light *light; /* its positions are its poses */
     reuse_way way;
-    size_t paths;      /* of each position, rounded up to a multiple of WALK_BATCHES */
+    size_t paths; /* of each position, rounded up to a multiple of WALK_BATCHES */
+    bool even;    /* as many paths in all, but those of positions by a pilot that evens out their errors */
     size_t resolution; /* of maps: cells along the side of a map, pixels along the top of a hemicube */
     uint64_t seed;     /* the bits of estimates depend on it, not on threads */
     const progress *progress;
@@ -28,7 +29,8 @@ typedef struct reuse_problem {
 
 typedef struct reuse_estimates {
     size_t n, n_channels, n_positions; /* elements, C, s */
-    size_t paths;                      /* as rounded up */
+    size_t paths;                      /* as rounded up: of each position, or their mean */
+    size_t *count;                     /* [s]: of each */
     float *H, *error; /* [C][s][n] W/m2: the mean irradiance of an element, and its standard error from
                          batches */
     float *direct;    /* [s][n]: the part of H that comes straight from the light, of the emission 1 W/m2 */
@@ -42,10 +44,11 @@ typedef struct reuse_estimates {
 
 void reuse_estimates_free(reuse_estimates *e);
 
-/* REUSE_NONE and REUSE_EXACT are unbiased; the bias of the others goes with the size of the light and of the
- * cells. Cost: s * paths walks, for REUSE_EXACT s - 1 more rays for each; memory 8 ((T + 2) C + T + 1) n s
- * bytes for T threads. Errors: LAM_ERR_ARGUMENT names a position that reaches nothing, LAM_ERR_MEMORY,
- * LAM_ERR_CANCELLED.
+/* With even the counts N_l of paths come from first hits of a pilot, of a twentieth of the paths at most,
+ * whose own light is not used, so that nothing is biased; REUSE_NONE leaves them equal. REUSE_NONE and
+ * REUSE_EXACT are unbiased; the bias of the others goes with the size of the light and of the cells. Cost: s
+ * * paths walks, for REUSE_EXACT s - 1 more rays for each; memory 8 ((T + 2) C + T + 1) n s bytes for T
+ * threads. Errors: LAM_ERR_ARGUMENT names a position that reaches nothing, LAM_ERR_MEMORY, LAM_ERR_CANCELLED.
  */
 lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_estimates *out,
                       lam_error *error);
