@@ -99,10 +99,14 @@ static void keep_hits(reuse_batch *b, size_t n, const ray_packet *rays, const hi
 }
 
 static void begin_position(reuse_batch *b, size_t number, size_t position) {
+    const reuse *r = b->r;
+    const bool shared = r->problem->way != REUSE_NONE;
+    const size_t before = shared && position > 0 ? b->starts.count : 0;
     b->position = position;
-    if (position < b->r->s)
-        walk_starts_init(&b->starts, b->r->problem->seed, number * b->r->s + position,
-                         b->r->of_batch[position]);
+    if (position >= r->s) return;
+    walk_starts_init(&b->starts, r->problem->seed, number * r->s + (shared ? 0 : position),
+                     before + r->of_batch[position]);
+    b->starts.next = before;
 }
 
 /* Casts first rays of the positions of batch `number` until a chunk of hits is full or all have been cast. */
