@@ -98,15 +98,16 @@ static void keep_hits(reuse_batch *b, size_t n, const ray_packet *rays, const hi
     }
 }
 
+/* Shared paths of a batch take their places from one sequence, since every position has the light of all. */
 static void begin_position(reuse_batch *b, size_t number, size_t position) {
     const reuse *r = b->r;
     const bool shared = r->problem->way != REUSE_NONE;
-    const size_t before = shared && position > 0 ? b->starts.count : 0;
     b->position = position;
     if (position >= r->s) return;
-    walk_starts_init(&b->starts, r->problem->seed, number * r->s + (shared ? 0 : position),
-                     before + r->of_batch[position]);
-    b->starts.next = before;
+    if (shared && position > 0)
+        b->starts.count += r->of_batch[position];
+    else
+        walk_starts_init(&b->starts, r->problem->seed, number * r->s + position, r->of_batch[position]);
 }
 
 /* Casts first rays of the positions of batch `number` until a chunk of hits is full or all have been cast. */

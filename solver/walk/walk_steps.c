@@ -1,6 +1,9 @@
 #include "solver/walk/walk_steps.h"
 
+#include "solver/formfactor/visibility/sobol.h"
+
 #include <math.h>
+#include <string.h>
 
 /* A walk that has lost so many rays in a row is in a corner that single precision cannot leave: it ends. */
 enum { LOST_MOST = 64 };
@@ -94,25 +97,29 @@ void walk_batch_go(const walk_batch *b) {
     go_on(b->run, begun);
 }
 
+/* The first two dimensions of the sequence, which are more even in pairs than the others, for the direction.
+ */
+static const int start_dimension[4] = {2, 3, 0, 1};
+
 void walk_starts_init(walk_starts *s, uint64_t seed, uint64_t key, size_t count) {
     uint64_t state = random_hash(random_hash(seed) ^ random_hash(key + 1));
     *s = (walk_starts){.count = count};
     s->turn = random_unit(&state);
-    for (int d = 0; d < 4; d++) s->shift[d] = (uint32_t)(random_next(&state) >> 32);
+    for (int d = 0; d < 4; d++) s->place[d] = (uint32_t)(random_next(&state) >> 32);
     s->random = random_next(&state);
 }
 
 bool walk_starts_next(walk_starts *s, const double *before, size_t n, walker *w, size_t *k) {
-    /* The 4-d Kronecker sequence of the generalised golden ratio (Roberts 2018): frac(phi^-d), phi^5 = phi +
-     * 1, in units of 2^-32. */
-    static const uint32_t step[4] = {3679390609u, 3152041523u, 2700274807u, 2313257605u};
     if (s->next >= s->count) return false;
     const double x = ((double)s->next + s->turn) / (double)s->count * before[n];
     while (s->cursor + 1 < n && before[s->cursor + 1] <= x) s->cursor++;
     *k = s->cursor;
-    for (int d = 0; d < 4; d++) w->place[d] = s->shift[d] + (uint32_t)s->next * step[d];
+    memcpy(w->place, s->place, sizeof w->place);
     w->random = random_hash(s->random + s->next);
     s->next++;
+    /* The order of Gray codes: one bit of the index changes at each step (Antonov and Saleev 1979). */
+    const int bit = __builtin_ctz((uint32_t)s->next | 1u << (SOBOL_BITS - 1));
+    for (int d = 0; d < 4; d++) s->place[d] ^= sobol_direction[start_dimension[d]][bit];
     return true;
 }
 

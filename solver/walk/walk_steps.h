@@ -115,8 +115,8 @@ void walk_cast(const walk_scene *s, const walker *w, size_t n, ray_packet *rays,
 /* The starts of one batch: low-discrepancy places, and strata of what elements are chosen by. */
 typedef struct walk_starts {
     size_t next, count;
-    double turn; /* of the strata */
-    uint32_t shift[4];
+    double turn;       /* of the strata */
+    uint32_t place[4]; /* of the next walk: a point of Sobol's sequence, shifted by random bits */
     uint64_t random;
     size_t cursor;
 } walk_starts;
