@@ -84,17 +84,21 @@ static double *exact_light(const mesh *m, const moving_light *l, const csr *F) {
     return H;
 }
 
-static reuse_estimates reuse(const mesh *m, const moving_light *l, reuse_way way, size_t paths,
-                             size_t resolution, uint64_t seed) {
+static reuse_estimates solve(const mesh *m, const reuse_problem *problem) {
     walk_scene *s = NULL;
     reuse_estimates e;
     lam_error error = {.message = ""};
-    const reuse_problem problem = {
-        .light = l, .way = way, .paths = paths, .resolution = resolution, .seed = seed};
     ck_ok(walk_scene_create(m, CLOSURE_MEASURED, &s, &error));
-    ck_ok(walk_reuse(s, &problem, &e, &error));
+    ck_ok(walk_reuse(s, problem, &e, &error));
     walk_scene_free(s);
     return e;
+}
+
+static reuse_estimates reuse(const mesh *m, const moving_light *l, reuse_way way, size_t paths,
+                             size_t resolution, uint64_t seed) {
+    const reuse_problem problem = {
+        .light = l, .way = way, .paths = paths, .resolution = resolution, .seed = seed};
+    return solve(m, &problem);
 }
 
 /* The mean square of (H~ - H) / error over elements that have an error, of one position. */
@@ -117,7 +121,8 @@ START_TEST(agrees_with_closed_forms) {
     csr F = box_form_factors(unit, DIVISIONS, m.area);
     moving_light l = square_light();
     double *H = exact_light(&m, &l, &F);
-    reuse_estimates e = reuse(&m, &l, way, 40000, 0, 7);
+    const reuse_problem problem = {.light = &l, .way = way, .even = _i == 2, .paths = 40000, .seed = 7};
+    reuse_estimates e = solve(&m, &problem);
     ck_assert_uint_eq(e.paths % WALK_BATCHES, 0);
     ck_assert_double_ge(e.rays, 1 / (1 - .6) - .1);
     for (size_t k = 0; k < POSITIONS; k++) {
@@ -254,21 +259,54 @@ static mesh cornell(void) {
     return generate_good(&how);
 }
 
-/* A light that goes down between the blocks, turning. */
-static moving_light falling_light(const mesh *m) {
-    moving_light l = square_light();
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+static void bounds(const mesh *m, double low[3], double high[3]) {
+    for (int d = 0; d < 3; d++) {
+        low[d] = INFINITY;
+        high[d] = -INFINITY;
+    }
     for (size_t v = 0; v < m->n_vertices; v++)
         for (int d = 0; d < 3; d++) {
             low[d] = fmin(low[d], m->vertices[v][d]);
             high[d] = fmax(high[d], m->vertices[v][d]);
         }
+}
+
+/* The pose at these parts of the way from low to high, turned about y. */
+static void set_pose(light_pose *p, double angle, const double part[3], const double low[3],
+                     const double high[3]) {
+    const double turn[3][3] = {{cos(angle), 0, -sin(angle)}, {0, 1, 0}, {sin(angle), 0, cos(angle)}};
+    memcpy(p->turn, turn, sizeof turn);
+    for (int d = 0; d < 3; d++) p->move[d] = low[d] + part[d] * (high[d] - low[d]);
+}
+
+/* A light that goes down between the blocks, turning. */
+static moving_light falling_light(const mesh *m) {
+    moving_light l = square_light();
+    double low[3], high[3];
+    bounds(m, low, high);
     for (size_t k = 0; k < l.n; k++) {
-        const double angle = .4 * (double)k;
-        const double turn[3][3] = {{cos(angle), 0, -sin(angle)}, {0, 1, 0}, {sin(angle), 0, cos(angle)}};
-        memcpy(l.pose[k].turn, turn, sizeof turn);
-        for (int d = 0; d < 3; d++) l.pose[k].move[d] = .5 * (low[d] + high[d]);
-        l.pose[k].move[2] = high[2] - (.1 + .2 * (double)k) * (high[2] - low[2]);
+        const double part[3] = {.5, .5, .9 - .2 * (double)k};
+        set_pose(&l.pose[k], .4 * (double)k, part, low, high);
+    }
+    for (int c = 0; c < MOVING_LIGHT_CHANNELS; c++) l.emission[c] = 1;
+    return l;
+}
+
+/* The same square at positions on half an ellipse, whose first and last share the fewest paths. */
+static moving_light curved_light(const mesh *m) {
+    enum { CURVE = 16 };
+    moving_light l = square_light();
+    double low[3], high[3];
+    bounds(m, low, high);
+    for (size_t k = 0; k < l.n; k++) free(l.pose[k].name);
+    free(l.pose);
+    l.n = CURVE;
+    l.pose = test_allocate(CURVE, sizeof *l.pose);
+    for (size_t k = 0; k < CURVE; k++) {
+        const double a = M_PI * (double)k / (CURVE - 1);
+        const double part[3] = {.5 - .3 * cos(a), .5, .6 + .25 * sin(a)};
+        l.pose[k].name = strdup("a position");
+        set_pose(&l.pose[k], .5 * (a - M_PI / 2), part, low, high);
     }
     for (int c = 0; c < MOVING_LIGHT_CHANNELS; c++) l.emission[c] = 1;
     return l;
@@ -330,18 +368,54 @@ START_TEST(maps_come_close) {
 }
 END_TEST
 
+static double largest(const reuse_estimates *e) {
+    double most = 0;
+    for (size_t k = 0; k < e->n_positions; k++) most = fmax(most, e->covariance[k * (e->n_positions + 1)]);
+    return most;
+}
+
+/* Counts of paths by a pilot: as many in all, more of the positions whose errors are largest. The stated
+ * squares of errors are sums over elements with a relative standard deviation below .1 each. */
+START_TEST(counts_even_out_errors) {
+    mesh m = cornell();
+    moving_light l = curved_light(&m);
+    reuse_problem problem = {.light = &l, .way = REUSE_EXACT, .paths = 6400, .seed = 4};
+    reuse_estimates same = solve(&m, &problem);
+    problem.even = true;
+    reuse_estimates even = solve(&m, &problem);
+    size_t sum = 0, most = 0;
+    for (size_t k = 0; k < l.n; k++) {
+        ck_assert_uint_eq(same.count[k], 6400);
+        sum += even.count[k];
+        most = even.count[k] > most ? even.count[k] : most;
+    }
+    ck_assert_double_eq_tol((double)sum, 6400. * (double)l.n, .5 * WALK_BATCHES * (double)l.n);
+    ck_assert_uint_gt(most, 6400);
+    ck_assert_msg(largest(&even) < .85 * largest(&same), "%g of %g", largest(&even), largest(&same));
+    reuse_estimates_free(&same);
+    reuse_estimates_free(&even);
+    moving_light_free(&l);
+    mesh_free(&m);
+}
+END_TEST
+
 START_TEST(bits_do_not_depend_on_threads) {
+    static const reuse_way ways[] = {REUSE_NONE, REUSE_EXACT, REUSE_MAPS, REUSE_CUBES};
     mesh m = cornell();
     moving_light l = falling_light(&m);
     const int threads = omp_get_max_threads();
+    const reuse_problem problem = {
+        .light = &l, .way = ways[_i], .even = true, .paths = 3200, .resolution = 32, .seed = 2};
     omp_set_num_threads(1);
-    reuse_estimates one = reuse(&m, &l, REUSE_EXACT, 3200, 0, 2);
+    reuse_estimates one = solve(&m, &problem);
     omp_set_num_threads(3);
-    reuse_estimates three = reuse(&m, &l, REUSE_EXACT, 3200, 0, 2);
+    reuse_estimates three = solve(&m, &problem);
     omp_set_num_threads(threads);
     const size_t size = m.n * m.n_channels * l.n;
     ck_assert_mem_eq(one.H, three.H, size * sizeof *one.H);
     ck_assert_mem_eq(one.error, three.error, size * sizeof *one.error);
+    ck_assert_mem_eq(one.direct, three.direct, m.n * l.n * sizeof *one.direct);
+    ck_assert_mem_eq(one.covariance, three.covariance, l.n * l.n * sizeof *one.covariance);
     ck_assert_double_eq(one.rays, three.rays);
     reuse_estimates_free(&one);
     reuse_estimates_free(&three);
@@ -420,13 +494,14 @@ int main(void) {
     Suite *suite = suite_create("reuse");
     TCase *tests = tcase_create("reuse");
     tcase_set_timeout(tests, 300);
-    tcase_add_loop_test(tests, agrees_with_closed_forms, 0, 2);
+    tcase_add_loop_test(tests, agrees_with_closed_forms, 0, 3);
     tcase_add_loop_test(tests, direct_light_is_the_form_factor, 0, 2);
     tcase_add_loop_test(tests, covariance_is_that_of_seeds, 0, 2);
     tcase_add_test(tests, sharing_lowers_the_error);
     tcase_add_test(tests, rays_know_what_is_hidden);
     tcase_add_loop_test(tests, maps_come_close, 0, 2);
-    tcase_add_test(tests, bits_do_not_depend_on_threads);
+    tcase_add_test(tests, counts_even_out_errors);
+    tcase_add_loop_test(tests, bits_do_not_depend_on_threads, 0, 4);
     tcase_add_test(tests, points_are_uniform);
     tcase_add_test(tests, refuses_what_is_no_light);
     suite_add_tcase(suite, tests);
