@@ -54,10 +54,10 @@ static const option_row rows[] = {
      .kind = OPTION_TEXT,
      .offset = FIELD(scene),
      .argument = "SCENE",
-     .help =
-         "formfactors: the open scene of throughput and resolution, every face an element (houses); "
-         "hierarchical: the only scene, divided where it is coarse; mesh: one more scene; honesty: a file "
-         "or a folder of scenes in place of its own"},
+     .help = "formfactors: the open scene of throughput and resolution, every face an element (houses); "
+             "hierarchical: the only scene, divided where it is coarse; mesh: one more scene; "
+             "reuse: the second scene of the speed of walks; honesty: a file "
+             "or a folder of scenes in place of its own"},
     OPTION_ROW_SEED(FIELD(seed), .help = "Seed of all sampling"),
     {0},
 };

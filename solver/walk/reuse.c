@@ -361,12 +361,12 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
                     .all = (double)e.paths * (double)e.n_positions};
     r.run = &run;
     if (problem->way == REUSE_MAPS || problem->way == REUSE_CUBES) {
-        const double begun = clock_seconds();
+        const double begun = clock_processor_seconds();
         if (problem->resolution < 2)
             FAIL(error, LAM_ERR_ARGUMENT, "maps of %zu cells a side: must be at least 2",
                  problem->resolution);
         TRY(light_maps_create(s, e.n_positions, r.frames, problem->way, problem->resolution, &maps, error));
-        e.maps_seconds = clock_seconds() - begun;
+        e.maps_seconds = clock_processor_seconds() - begun;
         r.maps = &maps;
     }
     if (problem->even && problem->way != REUSE_NONE) TRY(count_paths(&r, of_batch, error));

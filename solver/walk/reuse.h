@@ -39,7 +39,7 @@ typedef struct reuse_estimates {
      * w) in the norm |B|^2 = sum over channels and elements of area B^2. */
     double *covariance;
     double rays;                                       /* of a path, mean, the first one included */
-    double maps_seconds, trace_seconds, reuse_seconds; /* of a thread */
+    double maps_seconds, trace_seconds, reuse_seconds; /* processor time of all threads */
 } reuse_estimates;
 
 void reuse_estimates_free(reuse_estimates *e);

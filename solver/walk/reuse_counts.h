@@ -1,4 +1,4 @@
-/* How many paths start at each position of a light, private to reuse*.c. */
+/* The number of paths that start at each position of a light, private to reuse*.c. */
 #ifndef LAMBERT_WALK_REUSE_COUNTS_H
 #define LAMBERT_WALK_REUSE_COUNTS_H
 

@@ -3,6 +3,7 @@
 #include "solver/walk/reuse_weights.h"
 
 #include "solver/base/cpu.h"
+#include "solver/walk/blend.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -12,18 +13,6 @@ enum { SIDE_MOST = 1 << 14 };
 
 /* Far below the fourth power of any distance, added to it so that nothing is divided by 0. */
 static const float tiny = 1e-30f;
-
-/* a where all bits of the mask are set, b where none is: a choice that stays one when compilers know that
- * others depend on the same condition. */
-static inline float blend(int mask, float a, float b) {
-    int x, y;
-    memcpy(&x, &a, sizeof x);
-    memcpy(&y, &b, sizeof y);
-    const int both = (x & mask) | (y & ~mask);
-    float value;
-    memcpy(&value, &both, sizeof value);
-    return value;
-}
 
 static float dot(const float a[3], const float b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

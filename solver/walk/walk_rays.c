@@ -1,25 +1,15 @@
 /* The rays of walks: elements in the form that walks need them in, and origins and directions of many walks
  * at once. */
 #include "solver/base/cpu.h"
-#include "solver/scene/plane.h"
+#include "solver/base/vector3.h"
+#include "solver/walk/blend.h"
 #include "solver/walk/walk_steps.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 static float to_unit(uint32_t bits) {
     return (float)(bits >> 8) * 0x1p-24f;
-}
-
-static inline float blend(int mask, float a, float b) {
-    int x, y;
-    memcpy(&x, &a, sizeof x);
-    memcpy(&y, &b, sizeof y);
-    const int both = (x & mask) | (y & ~mask);
-    float value;
-    memcpy(&value, &both, sizeof value);
-    return value;
 }
 
 #define CPU_KERNELS "solver/walk/walk_kernels.inc"
@@ -28,6 +18,15 @@ static inline float blend(int mask, float a, float b) {
 /* An edge from corner a. */
 static void set_edge(const double *a, const double *b, float out[3]) {
     for (int d = 0; d < 3; d++) out[d] = (float)(b[d] - a[d]);
+}
+
+/* Twice the area of a triangle. */
+static double twice_area(const double *a, const double *b, const double *c) {
+    double u[3], w[3], normal[3];
+    subtract3(b, a, u);
+    subtract3(c, a, w);
+    cross3(u, w, normal);
+    return sqrt(dot3(normal, normal));
 }
 
 /* True for a quadrilateral that is not a parallelogram. */
@@ -52,7 +51,7 @@ static bool set_shape(const mesh *m, const visibility *v, size_t element, walk_s
             s->facet &= ~WALK_TRIANGLE;
             last = e;
         } else if (halves != NULL) {
-            const double first = triangle_area(a, b, c), second = triangle_area(a, c, e);
+            const double first = twice_area(a, b, c), second = twice_area(a, c, e);
             halves->share = (float)(first / (first + second));
             set_edge(a, e, halves->third);
         }

@@ -220,6 +220,29 @@ def hierarchical(results):
                          {kind: points(of, column, "single") for (kind,), of in groups(rows, "kind")}, "xy")
 
 
+def reuse(results):
+    letters = {"A": "A, own paths", "B": "B, rays", "C": "C, maps", "D": "D, hemicubes"}
+    for (experiment,), rows in groups(results.rows("positions"), "experiment"):
+        for frame in 1, 15, 20:
+            results.draw(f"experiment-{experiment:.0f}-frame-{frame}",
+                         f"Experiment {experiment:.0f}, frame {frame}: error by time ([3], figure 9)",
+                         "processor time of all positions (s)", "mean square error without bias",
+                         {name: points(of, "seconds", f"variance_{frame}")
+                          for (name,), of in groups(rows, "approach")}, "xy")
+        maps = {letters[name[0]]: [(row["paths"], row["maps_s"] + row["reuse_s"]) for row in of]
+                for (name,), of in groups(rows, "approach") if name[0] in "CD"}
+        walks = [(row["paths"], row["trace_s"]) for row in rows if row["approach"].startswith("D")]
+        results.draw(f"experiment-{experiment:.0f}-weights",
+                     f"Experiment {experiment:.0f}: maps and weights by paths ([3], figure 10)",
+                     "paths of each position", "processor time (s)",
+                     maps | {"walks, beside them": {"points": walks, "linestyle": "--"}}, "xy")
+    by_lamp = groups(results.rows("maps"), "lamp", "approach")
+    results.draw("maps", "Bias of visibility maps by resolution", "cells along the side of a map",
+                 "bias over the standard error of B",
+                 {f"{name[0]}, lamp of {lamp:g}": sorted(points(of, "resolution", "bias_of_error"))
+                  for (lamp, name), of in by_lamp}, "xy")
+
+
 def service(results):
     rows = [row for row in results.rows("load") if row["format"] == "npy" and row["server"] in ("lambertd", "sleeping")]
     results.draw("throughput", "Answers a second in NPY, beside a server that sleeps instead of solving",
@@ -230,7 +253,7 @@ def service(results):
 
 
 def main():
-    suites = {draw.__name__: draw for draw in (formfactors, lowrank, cities, hierarchical, service)}
+    suites = {draw.__name__: draw for draw in (formfactors, lowrank, cities, hierarchical, reuse, service)}
     folder, *names = sys.argv[1:]
     for name in names:
         if name in suites:

@@ -375,22 +375,47 @@ class Cities(unittest.TestCase):
 class Reuse(unittest.TestCase):
     """One quick run: paths that serve all positions of a lamp beside paths of their own."""
 
-    def test_positions(self):
+    @classmethod
+    def setUpClass(cls):
+        cls.tables = {}
         with tempfile.TemporaryDirectory() as folder:
             out = os.path.join(folder, "results")
             done = lambert("bench", "reuse", "--quick", "-o", out)
-            self.assertEqual(done.returncode, 0, done.stderr)
-            with open(os.path.join(out, "reuse-positions.csv"), encoding="utf-8", newline="") as stream:
-                rows = list(csv.DictReader(stream))
-        self.assertEqual([row["approach"][0] for row in rows], list("ABCDABCD"))
+            assert done.returncode == 0, done.stderr
+            for name in "positions", "maps", "speed":
+                with open(os.path.join(out, f"reuse-{name}.csv"), encoding="utf-8", newline="") as stream:
+                    cls.tables[name] = list(csv.DictReader(stream))
+
+    def test_positions(self):
+        rows = self.tables["positions"]
+        self.assertEqual([row["approach"][0] for row in rows], list("ABCDB" * 4))
         for row in rows:
             own = row["approach"][0] == "A"
             self.assertTrue(2 < float(row["rays_per_path"]) < 4, row)
-            for frame in "1", "15", "20":
+            for frame in "1", "15", "20", "mean", "largest":
                 ratio = float(row["mse_" + frame])
                 self.assertTrue(ratio == 1 if own else ratio > 2, row)
             self.assertTrue(own or float(row["flicker"]) > 5, row)
             self.assertEqual(float(row["maps_s"]) > 0, row["approach"][0] in "CD")
+
+    def test_counts(self):
+        """Counts of paths by a pilot lower the largest error: by a third of it, where they are said to."""
+        rows = {(row["experiment"], row["paths"], row["approach"]): row for row in self.tables["positions"]}
+        for experiment in "1", "2":
+            same, uneven = (float(rows[experiment, "640", name]["mse_largest"])
+                            for name in ("B, reused, rays", "B, uneven counts"))
+            self.assertGreater(uneven, 1.2 * same)
+
+    def test_maps(self):
+        """Finer maps have less bias."""
+        bias = {(row["approach"][0], row["resolution"]): float(row["bias"]) for row in self.tables["maps"]}
+        for approach in "C", "D":
+            self.assertLess(bias[approach, "64"], .5 * bias[approach, "16"])
+
+    def test_speed(self):
+        for row in self.tables["speed"]:
+            self.assertGreater(float(row["bare_ns"]), 0)
+            self.assertAlmostEqual(float(row["ratio"]), float(row["bare_ns"]) / float(row["walk_ns"]), delta=.01)
 
 
 class Refusals(unittest.TestCase):
