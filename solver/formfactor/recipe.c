@@ -66,10 +66,14 @@ lam_status recipe_save(const recipe *r, const recipe_names *names, store *s, lam
     if (r->method == RECIPE_HEMICUBE)
         TRY(store_set_integer(s, group, "resolution", (int64_t)r->resolution, error));
     if (r->accuracy > 0) TRY(store_set_number(s, group, "accuracy", r->accuracy, error));
-    if (r->closure != CLOSURE_MEASURED)
-        TRY(store_set_text(s, group, "closure", closure_names[r->closure], error));
+    TRY(recipe_save_closure(r->closure, group, s, error));
 done:
     return status;
+}
+
+lam_status recipe_save_closure(scene_closure closure, const char *group, store *s, lam_error *error) {
+    if (closure == CLOSURE_MEASURED) return LAM_OK;
+    return store_set_text(s, group, "closure", closure_names[closure], error);
 }
 
 lam_status recipe_load_closure(store *s, const char *group, scene_closure *out, lam_error *error) {

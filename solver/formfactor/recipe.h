@@ -54,6 +54,7 @@ lam_status recipe_load(store *s, const recipe_names *names, recipe *out, lam_err
 
 /* The closure alone, of a group that may have nothing else of a recipe: CLOSURE_MEASURED without an
  * attribute. */
+lam_status recipe_save_closure(scene_closure closure, const char *group, store *s, lam_error *error);
 lam_status recipe_load_closure(store *s, const char *group, scene_closure *out, lam_error *error);
 
 /* The relative tolerance of the unoccluded factors of pairs. */

@@ -4,6 +4,7 @@
 
 #include "solver/base/clock.h"
 #include "solver/method/choice.h"
+#include "solver/method/emitters_options.h"
 #include "solver/method/many_lights.h"
 #include "solver/operator/sky_light.h"
 
@@ -11,9 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct emitters_options {
-    const char *emitters; /* read by whoever makes the problem */
-} emitters_options;
+enum { FRAMES_MOST = 65536 };
 
 static const option_row rows[] = {
     {.name = "emitters",
@@ -22,10 +21,47 @@ static const option_row rows[] = {
      .argument = "FILE|group=NAME|sky",
      .help = "The emissions that the store answers: each of a .json or .npy file, each of the groups "
              "NAME,NAME, or every tile of --sky; --method auto then takes emitters"},
+    {.name = "positions",
+     .kind = OPTION_TEXT,
+     .offset = offsetof(emitters_options, positions),
+     .argument = "FILE.json",
+     .help = "The positions of a light that is no part of the scene, an emitter each: found by random walks, "
+             "without form factors"},
+    {.name = "path",
+     .kind = OPTION_TEXT,
+     .offset = offsetof(emitters_options, path),
+     .argument = "FILE.json",
+     .help = "The same of a light that moves along a curve, in --frames positions"},
+    {.name = "frames",
+     .kind = OPTION_COUNT,
+     .offset = offsetof(emitters_options, frames),
+     .argument = "N",
+     .otherwise = "it has to be given with --path",
+     .least = 2,
+     .most = FRAMES_MOST,
+     .help = "Positions along --path, evenly by its length"},
+    {.name = "reuse",
+     .kind = OPTION_CHOICE,
+     .offset = offsetof(emitters_options, reuse),
+     .preset = "B",
+     .choices = "A|B|C|D",
+     .help =
+         "Paths serve their own position (A) or every one: by a ray to each position (B), by maps of what "
+         "each sees (C), or by hemicubes (D). A and B are unbiased; C and D are biased where shadows have "
+         "edges"},
+    {.name = "paths",
+     .kind = OPTION_COUNT,
+     .offset = offsetof(emitters_options, paths),
+     .argument = "N",
+     .preset = "100000",
+     .least = 1,
+     .most = 1e9,
+     .help = "Random walks from each position; the error falls with their square root"},
     {0},
 };
 
-static const char missing[] = "--method emitters: give --emitters FILE, group=NAME or sky";
+static const char missing[] =
+    "--method emitters: give --emitters FILE, group=NAME or sky, or --positions FILE, or --path FILE";
 
 /* Residual at which the light of an emitter counts as converged: a few units of single precision. */
 static const double tolerance = 1e-6;
@@ -139,9 +175,18 @@ done:
 }
 
 static lam_status check(const void *own, lam_error *error) {
-    if (((const emitters_options *)own)->emitters == NULL)
-        return status_fail(error, LAM_ERR_ARGUMENT, "%s", missing);
-    return LAM_OK;
+    lam_status status = LAM_OK;
+    const emitters_options *o = own;
+    const int ways = (o->emitters != NULL) + (o->positions != NULL) + (o->path != NULL);
+    if (ways == 0) FAIL(error, LAM_ERR_ARGUMENT, "%s", missing);
+    if (ways > 1)
+        FAIL(error, LAM_ERR_ARGUMENT, "--emitters, --positions and --path exclude each other: give one");
+    if (o->path != NULL && o->frames == 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "--path: give --frames N too, the number of positions along it");
+    if (o->path == NULL && o->frames > 0)
+        FAIL(error, LAM_ERR_ARGUMENT, "--frames: is for --path FILE.json, which is not given");
+done:
+    return status;
 }
 
 /* Light, emissions and what the sky gives of every emitter, and the vectors of a block that iterates. */
@@ -155,7 +200,8 @@ static void forecast(const method_scale *scale, const void *own, method_forecast
 static lam_status weigh(const decision *so_far, void *own, candidate *out, lam_error *error) {
     const build_problem *p = so_far->problem;
     (void)error;
-    if (p->emitters == NULL && ((const emitters_options *)own)->emitters == NULL) return LAM_OK;
+    const emitters_options *o = own;
+    if (p->emitters == NULL && o->emitters == NULL && !emitters_are_positions(o)) return LAM_OK;
     out->claim = CLAIM_INPUT;
     if (p->emitters == NULL) return LAM_OK;
     out->cost = (double)p->n * (double)p->emitters->s;
@@ -174,3 +220,7 @@ const build_method method_emitters = {
     .build = build,
 };
 _Static_assert(sizeof(emitters_options) <= METHOD_OPTIONS_BYTES, "they fit");
+
+const emitters_options *emitters_options_of(const build_options *options) {
+    return method_own_const(options, &method_emitters);
+}

@@ -32,6 +32,9 @@ static const report_words words[] = {
     {"smooth_residual", "residual of smooth emission", ""},
     {"uniform_error", "error of uniform radiosity", ""},
     {"residual", "largest residual of an emitter", ""},
+    {"paths", "random walks of each position", ""},
+    {"reuse", "walks serve other positions by way", ""},
+    {"rays_of_path", "rays of a walk", ""},
     {"sweeps", "most products with the form factors", ""},
 };
 

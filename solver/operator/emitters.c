@@ -19,6 +19,8 @@ void emitter_arrays_free(emitter_arrays *a) {
     free(a->values);
     free(a->L);
     lam_sky_close(a->sky);
+    free(a->direct);
+    free(a->exitance);
     *a = (emitter_arrays){.s = 0};
 }
 
@@ -59,6 +61,14 @@ static lam_status check_light(const emitter_arrays *a, size_t n, size_t n_channe
     if (a->L != NULL &&
         (a->sky == NULL || lam_sky_tiles(a->sky) != a->n_tiles || lam_sky_elements(a->sky) != n))
         FAIL(error, LAM_ERR_FORMAT, "/operator/L is of %zu tiles, the store's sky is not", a->n_tiles);
+    for (size_t k = 0; a->direct != NULL && k < a->s * n; k++)
+        if (!(a->direct[k] >= 0 && isfinite(a->direct[k])))
+            FAIL(error, LAM_ERR_NUMERIC, "/operator/direct[%zu] = %g, must be at least 0", k,
+                 (double)a->direct[k]);
+    for (size_t c = 0; a->direct != NULL && c < n_channels; c++)
+        if (!(a->exitance[c] >= 0 && isfinite(a->exitance[c])))
+            FAIL(error, LAM_ERR_NUMERIC, "/operator/exitance[%zu] = %g, must be at least 0", c,
+                 (double)a->exitance[c]);
 done:
     return status;
 }
@@ -182,6 +192,15 @@ static lam_status emitters_load(store *s, size_t n, size_t n_channels, const flo
         a.n_tiles = tiles[2];
         TRY(sky_load(s, n, &a.sky, error));
     }
+    if (store_has(s, "/operator/direct")) {
+        size_t direct[STORE_MAX_RANK] = {a.s, n}, channels[STORE_MAX_RANK] = {n_channels};
+        TRY(store_read(s, "/operator/direct", STORE_F32, 2, direct, &data, error));
+        a.direct = data;
+        data = NULL;
+        TRY(store_read(s, "/operator/exitance", STORE_F32, 1, channels, &data, error));
+        a.exitance = data;
+        data = NULL;
+    }
     TRY(operator_emitters_create(n, n_channels, reflectance, &a, op, error));
 done:
     free(data);
@@ -211,6 +230,10 @@ static lam_status emitters_save(const lam_operator *op, store *s, lam_error *err
     TRY(store_write(s, "/operator/B", STORE_F32, 3, dims, B, error));
     TRY(csr_save(&E, "/operator/E", s, error));
     if (a->L != NULL) TRY(store_write(s, "/operator/L", STORE_F32, 3, tiles, a->L, error));
+    if (a->direct != NULL) {
+        TRY(store_write(s, "/operator/direct", STORE_F32, 2, dims + 1, a->direct, error));
+        TRY(store_write(s, "/operator/exitance", STORE_F32, 1, dims, a->exitance, error));
+    }
 done:
     free(B);
     free(by_row);

@@ -14,8 +14,11 @@ typedef struct emitter_arrays {
     uint32_t *elements;
     float *values;
     size_t n_tiles;
-    float *L;     /* [C][s][m], radiances of the sky's tiles; NULL: no emitter is of the sky */
-    lam_sky *sky; /* with L */
+    float *L;        /* [C][s][m], radiances of the sky's tiles; NULL: no emitter is of the sky */
+    lam_sky *sky;    /* with L */
+    float *direct;   /* [s][n], the irradiance that each gives directly where 1 W/m^2 leaves it, of emitters
+                        that are no part of the mesh; NULL: there are none */
+    float *exitance; /* [C], with direct: W/m^2 of such an emitter of weight 1 */
 } emitter_arrays;
 
 void emitter_arrays_free(emitter_arrays *arrays);

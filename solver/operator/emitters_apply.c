@@ -41,6 +41,16 @@ static void sum_tiles(const emitters *self, size_t c, const float *W, float *L) 
             L[t] += W[k] * a->L[(c * a->s + k) * a->n_tiles + t];
 }
 
+/* H0 [n] += the light that comes straight from emitters outside the mesh. */
+static void add_direct(const emitters *self, size_t c, const float *W, float *H0) {
+    const emitter_arrays *a = &self->a;
+    const size_t n = self->base.n;
+    for (size_t k = 0; a->direct != NULL && k < a->s; k++) {
+        const float power = W[k] * a->exitance[c];
+        for (size_t i = 0; power != 0 && i < n; i++) H0[i] += power * a->direct[k * n + i];
+    }
+}
+
 static bool is_close(float x, float y) {
     return fabsf(x - y) <= close_enough * fmaxf(fabsf(x), fabsf(y));
 }
@@ -64,6 +74,12 @@ static lam_status weights_of_one(const emitters *self, size_t c, const float *E,
     }
     for (size_t k = 0; k < s; k++) {
         const uint32_t at = self->own[c * s + k];
+        if (self->a.direct != NULL)
+            FAIL(error, LAM_ERR_ARGUMENT,
+                 "the emitters of this store are no part of its mesh, nor of a sky; give \"emitters\", a "
+                 "weight "
+                 "each or by name, such as \"%.40s\"",
+                 self->a.names[k]);
         if (at == EMITTERS_NONE)
             FAIL(error, LAM_ERR_ARGUMENT,
                  "emitter %zu (%.40s) shares every place with another one, so an emission does not show its "
@@ -124,9 +140,11 @@ lam_status operator_emitters_light(const lam_operator *op, size_t n_rhs, const f
     for (size_t row = 0; row < n_rhs * C; row++) {
         const float *w = W + row * self->a.s;
         add_emission(self, row % C, w, E + row * n);
-        if (self->a.L == NULL) continue;
-        sum_tiles(self, row % C, w, L);
-        lam_sky_irradiance(self->a.sky, 1, L, H0 + row * n);
+        if (self->a.L != NULL) {
+            sum_tiles(self, row % C, w, L);
+            lam_sky_irradiance(self->a.sky, 1, L, H0 + row * n);
+        }
+        add_direct(self, row % C, w, H0 + row * n);
     }
     free(L);
     return LAM_OK;
@@ -152,6 +170,11 @@ lam_status operator_emitters_light_double(const lam_operator *op, size_t n_rhs, 
             for (size_t t = 0; a->L != NULL && t < m; t++) L[t] += w * (double)a->L[of * m + t];
         }
         if (a->L != NULL) sky_irradiance_double(a->sky, 1, L, H0 + row * n);
+        for (size_t k = 0; a->direct != NULL && k < s; k++) {
+            const double power = (double)W[row * s + k] * (double)a->exitance[row % C];
+            for (size_t i = 0; power != 0 && i < n; i++)
+                H0[row * n + i] += power * (double)a->direct[k * n + i];
+        }
     }
     free(L);
     return LAM_OK;
@@ -217,15 +240,15 @@ lam_status lam_operator_apply_emitters(const lam_operator *op, size_t n_rhs, lam
             else
                 panel_expand(&self->T[c], m, w + c * s, C * s, to + c * count, C * count, rest);
         for (size_t row = 0; row < m * C; row++) {
-            const bool sky = quantity == LAM_INDIRECT && self->a.L != NULL;
-            if (quantity == LAM_RADIOSITY) {
-                memset(other, 0, n * sizeof *other);
-                add_emission(self, row % C, w + row * s, other);
-            } else if (sky) {
+            const bool direct = quantity == LAM_INDIRECT && (self->a.L != NULL || self->a.direct != NULL);
+            if (quantity == LAM_RADIOSITY || direct) memset(other, 0, n * sizeof *other);
+            if (quantity == LAM_RADIOSITY) add_emission(self, row % C, w + row * s, other);
+            if (direct && self->a.L != NULL) {
                 sum_tiles(self, row % C, w + row * s, L);
                 lam_sky_irradiance(self->a.sky, 1, L, other);
             }
-            finish(op, row % C, quantity, quantity == LAM_RADIOSITY || sky ? other : NULL, count, selected,
+            if (direct) add_direct(self, row % C, w + row * s, other);
+            finish(op, row % C, quantity, quantity == LAM_RADIOSITY || direct ? other : NULL, count, selected,
                    to + row * count);
         }
     }
@@ -244,8 +267,8 @@ static void pull_back(const lam_operator *op, size_t c, lam_quantity quantity, c
             pulled[i] = rho[i] > 0 ? g[i] : 0;
 }
 
-/* w [s] += the transpose of the emitters' emission times g (radiosity), or of -rho H0 of their skies times g
- * (indirect). other: [n]. */
+/* w [s] += the transpose of the emitters' emission times g (radiosity), or of -rho H0 times g (indirect).
+ * other: [n]. */
 static void adjoint_of_light(const lam_operator *op, size_t c, lam_quantity quantity, const float *g,
                              float *other, float *L, float *w) {
     const emitters *self = operator_emitters_of(op);
@@ -257,8 +280,14 @@ static void adjoint_of_light(const lam_operator *op, size_t c, lam_quantity quan
             sum += (double)a->values[e] * (double)g[a->elements[e]];
         w[k] += (float)sum;
     }
-    if (quantity != LAM_INDIRECT || a->L == NULL) return;
+    if (quantity != LAM_INDIRECT) return;
     for (size_t i = 0; i < op->n; i++) other[i] = rho[i] * g[i];
+    for (size_t k = 0; a->direct != NULL && k < a->s; k++) {
+        double sum = 0;
+        for (size_t i = 0; i < op->n; i++) sum += (double)other[i] * (double)a->direct[k * op->n + i];
+        w[k] -= (float)(sum * (double)a->exitance[c]);
+    }
+    if (a->L == NULL) return;
     lam_sky_adjoint(a->sky, 1, other, L);
     for (size_t k = 0; k < a->s; k++) {
         double sum = 0;

@@ -3,6 +3,7 @@
 
 #include "solver/base/clock.h"
 #include "solver/base/random.h"
+#include "solver/method/emitters_options.h"
 #include "solver/precompute/precompute_state.h"
 
 #include <omp.h>
@@ -38,6 +39,9 @@ void state_free(precompute_state *state) {
     emitter_list_free(&state->emitters);
     importance_free(&state->importance);
     scratch_close(state->scratch, false);
+    moving_light_free(&state->light);
+    reuse_estimates_free(&state->paths);
+    free(state->position_errors);
     lam_operator_close(state->op);
     group_errors_free(&state->by_group);
     trial_made_free(&state->trial.best);
@@ -286,6 +290,35 @@ done:
     return status;
 }
 
+/* All from the input to an operator and its errors, by form factors. */
+static lam_status run_stages(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *options = state->options;
+    double started = clock_seconds();
+    TRY(options->from_store ? stage_load_store(state, error) : stage_load_scene(state, error));
+    log_stage(state, "import", started);
+    TRY(terminal_check(error));
+
+    started = clock_seconds();
+    TRY(stage_prepare_mesh(state, error));
+    log_stage(state, "mesh", started);
+    TRY(terminal_check(error));
+
+    TRY(stage_open_scratch(state, error));
+    TRY(stage_forecast(state, error));
+    TRY(run_trials(state, error));
+    if (state->probes > 0) TRY(stage_mesh_error(state, error));
+
+    if (state_compresses(options)) {
+        started = clock_seconds();
+        TRY(stage_compress(state, error));
+        log_stage(state, "compress", started);
+        TRY(terminal_check(error));
+    }
+done:
+    return status;
+}
+
 lam_status precompute_run(const precompute_options *options, const option_result *given, terminal *t,
                           precompute_result *result, lam_error *error) {
     lam_status status = LAM_OK;
@@ -293,30 +326,11 @@ lam_status precompute_run(const precompute_options *options, const option_result
     if (options_given(given, "epsilon")) state.trial.asked = options->build.epsilon;
     state.trial.group = options->group_error;
 
-    double started = state.started = clock_seconds();
+    state.started = clock_seconds();
     state.started_used = clock_processor_seconds();
-    TRY(options->from_store ? stage_load_store(&state, error) : stage_load_scene(&state, error));
-    log_stage(&state, "import", started);
-    TRY(terminal_check(error));
-
-    started = clock_seconds();
-    TRY(stage_prepare_mesh(&state, error));
-    log_stage(&state, "mesh", started);
-    TRY(terminal_check(error));
-
-    TRY(stage_open_scratch(&state, error));
-    TRY(stage_forecast(&state, error));
-    TRY(run_trials(&state, error));
-    if (state.probes > 0) TRY(stage_mesh_error(&state, error));
-
-    if (state_compresses(options)) {
-        started = clock_seconds();
-        TRY(stage_compress(&state, error));
-        log_stage(&state, "compress", started);
-        TRY(terminal_check(error));
-    }
-
-    started = clock_seconds();
+    TRY(emitters_are_positions(emitters_options_of(&options->build)) ? stage_positions(&state, error)
+                                                                     : run_stages(&state, error));
+    const double started = clock_seconds();
     TRY(stage_store(&state, error));
     log_stage(&state, "store", started);
     scratch_close(state.scratch, true);

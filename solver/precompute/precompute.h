@@ -93,6 +93,7 @@ typedef enum seed_purpose {
     SEED_OTHER_ROWS = 6,    /* rows of a stream that a self-check compares with */
     SEED_MESH = 7,          /* the coarse solution of --mesh-error, and its light at points */
     SEED_MESH_ERROR = 8,    /* light at points by which the error of the mesh is stated */
+    SEED_POSITIONS = 9,     /* paths of a moving light */
     SEED_VERIFY_FIRST = 11, /* of verify: its samples, probes and direct illumination */
     SEED_VERIFY_SECOND = 12,
     SEED_VERIFY_PROBES = 13,

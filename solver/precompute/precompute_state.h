@@ -14,6 +14,7 @@
 #include "solver/precompute/judging.h"
 #include "solver/precompute/precompute.h"
 #include "solver/precompute/trial.h"
+#include "solver/walk/reuse.h"
 
 /* All that a trial of --epsilon makes. */
 typedef struct trial_made {
@@ -90,6 +91,9 @@ typedef struct precompute_state {
     emitter_list emitters;
     emitter_source emitting; /* a view of emitters, for methods */
     importance importance;   /* n is 0 where all is read, and may emit */
+    moving_light light;      /* of --positions or --path; n is 0 where there is none */
+    reuse_estimates paths;   /* from it */
+    double *position_errors; /* [2][s], relative and indirect; NULL: not judged */
     lam_operator *op;
     build_report built;
     error_report errors;
@@ -137,6 +141,16 @@ lam_status stage_load_store(precompute_state *state, lam_error *error);
 
 /* Refines the mesh, orders it, and chooses a recipe that memory has room for. */
 lam_status stage_prepare_mesh(precompute_state *state, lam_error *error);
+
+/* Divides the mesh as asked for, and logs what it is. */
+lam_status state_refine_mesh(precompute_state *state, lam_error *error);
+void state_log_mesh(const precompute_state *state);
+
+/* --positions and --path: all from the scene to the operator, without form factors; its errors, and their
+ * place in the store: stage_positions.c, positions_error.c. */
+lam_status stage_positions(precompute_state *state, lam_error *error);
+lam_status state_judge_positions(precompute_state *state, lam_error *error);
+lam_status state_save_positions(const precompute_state *state, store *s, lam_error *error);
 
 /* --mesh-error: divides the mesh, says what that leaves, and warns where it is more than was asked for. The
  * error of the mesh by the operator's answers, and its place in the store: stage_mesh_error.c. */

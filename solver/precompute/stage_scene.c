@@ -412,7 +412,7 @@ static const double coarse_share = .02;
 enum { COARSE_ADVICE = 5000 };
 
 /* Logs what shows a wrong axis or unit, or a mesh too coarse to show light. */
-static void log_mesh(const precompute_state *state) {
+void state_log_mesh(const precompute_state *state) {
     const mesh *m = &state->m;
     const precompute_options *o = state->options;
     const char axes[] = {'x', 'y', 'z'};
@@ -445,7 +445,7 @@ static void log_mesh(const precompute_state *state) {
                      100 * largest / area, COARSE_ADVICE);
 }
 
-lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
+lam_status state_refine_mesh(precompute_state *state, lam_error *error) {
     lam_status status = LAM_OK;
     const precompute_options *o = state->options;
     /* --elements counts both sides. */
@@ -454,11 +454,19 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
                                         .elements = o->mesh_error > 0 ? 0
                                                     : o->two_sided    ? (o->elements + 1) / 2
                                                                       : o->elements};
-    TRY(check_before_mesh(state, elements_after(&state->m, o), error));
     if (refinement.subdivide_levels > 0 || refinement.max_edge > 0 || refinement.elements > 0)
         TRY(mesh_refine(&state->m, &refinement, error));
     if (o->mesh_error > 0) TRY(state_refine_by_error(state, error));
     if (o->two_sided) TRY(mesh_make_two_sided(&state->m, error));
+done:
+    return status;
+}
+
+lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const precompute_options *o = state->options;
+    TRY(check_before_mesh(state, elements_after(&state->m, o), error));
+    TRY(state_refine_mesh(state, error));
     state->order = memory_allocate(state->m.n, sizeof *state->order, "the order of the elements", error);
     if (state->order == NULL) TRY(LAM_ERR_MEMORY);
     TRY(mesh_z_order(&state->m, state->order, error));
@@ -480,7 +488,7 @@ lam_status stage_prepare_mesh(precompute_state *state, lam_error *error) {
         TRY(emitter_list_read(o->emitters, &state->m, state->sky_tiles, &state->emitters, error));
         TRY(choose_recipe_that_fits(state, (double)state->m.n, error));
     }
-    log_mesh(state);
+    state_log_mesh(state);
 done:
     return status;
 }

@@ -13,6 +13,10 @@ static lam_status save_report(const precompute_state *state, store *s, lam_error
     TRY(store_set_text(s, "/operator", "reason", state->built.reason, error));
     TRY(report_save(&state->built, s, error));
     if (about.density >= 0) TRY(store_set_number(s, "/operator", "density", about.density, error));
+    if (state->light.n > 0) { /* there are no form factors */
+        TRY(recipe_save_closure(state_closure(state->options), recipe_of_operator.group, s, error));
+        goto done;
+    }
     /* The recipe of the form factors, so that they can be made again where they are not kept. */
     TRY(recipe_save(&state->f.recipe, &recipe_of_operator, s, error));
 done:
@@ -69,7 +73,8 @@ lam_status stage_store(precompute_state *state, lam_error *error) {
     TRY(operator_save(state->op, s, error));
     if (state->importance.n > 0) TRY(save_importance(state, s, error));
     TRY(save_report(state, s, error));
-    if (state->probes > 0) TRY(judge_save(&state->errors, s, error));
+    if (state->probes > 0 || state->light.n > 0) TRY(judge_save(&state->errors, s, error));
+    TRY(state_save_positions(state, s, error));
     TRY(state_save_mesh_error(state, s, error));
     if (state->probes > 0) TRY(judge_save_groups(&state->by_group, s, error));
     TRY(terminal_check(error));

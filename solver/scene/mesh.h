@@ -77,7 +77,8 @@ void mesh_bounds(const mesh *m, double centre[3], double *radius);
 /* The centroid of an element. */
 void mesh_centroid(const mesh *m, size_t element, double centroid[3]);
 
-/* /mesh of a store (store/FORMAT.md); loading checks every index and value. */
+/* /mesh of a store (store/FORMAT.md); loading checks every index and value. row_sums are NULL where no form
+ * factors were found. */
 lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error *error);
 lam_status mesh_load(store *s, mesh *m, double **row_sums, lam_error *error);
 

@@ -20,7 +20,7 @@ lam_status mesh_save(const mesh *m, const double *row_sums, store *s, lam_error 
     TRY(store_write(s, "/mesh/emission", STORE_F32, 2, of_channels, m->emission, error));
     TRY(store_write(s, "/mesh/group", STORE_U32, 1, &m->n, m->group, error));
     TRY(store_write_texts(s, "/mesh/group_names", m->n_groups, (const char *const *)m->group_names, error));
-    TRY(store_write(s, "/mesh/row_sums", STORE_F64, 1, &m->n, row_sums, error));
+    if (row_sums != NULL) TRY(store_write(s, "/mesh/row_sums", STORE_F64, 1, &m->n, row_sums, error));
     TRY(store_set_text(s, "/mesh", "geometry_hash", hash, error));
     TRY(store_set_text(s, "/mesh", "source_hash", m->source_hash, error));
     TRY(store_set_text(s, "/mesh", "name", m->name, error));
@@ -166,7 +166,8 @@ lam_status mesh_load(store *s, mesh *m, double **row_sums, lam_error *error) {
         if (loaded.group[i] >= loaded.n_groups)
             FAIL(error, LAM_ERR_FORMAT, "%s: /mesh/group[%zu] = %u, there are %zu group names", store_path(s),
                  i, loaded.group[i], loaded.n_groups);
-    TRY(load_f64(s, "/mesh/row_sums", loaded.n, 0, false, &sums, error));
+    if (store_has(s, "/mesh/row_sums") || store_has(s, "/form_factors") || store_has(s, "/sky"))
+        TRY(load_f64(s, "/mesh/row_sums", loaded.n, 0, false, &sums, error));
     *m = loaded;
     loaded = (mesh){0};
     if (row_sums != NULL) {

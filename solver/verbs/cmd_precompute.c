@@ -1,6 +1,7 @@
 /* lambert precompute: turns a scene into a store. */
 #include "solver/base/atomic_file.h"
 #include "solver/codec/describe.h"
+#include "solver/method/emitters_options.h"
 #include "solver/precompute/precompute.h"
 #include "solver/verbs/verbs.h"
 
@@ -123,6 +124,25 @@ static int check_time(const precompute_options *o, const option_result *given) {
     return 0;
 }
 
+/* Positions of a light need no form factors, and have no use for what is about these. */
+static int check_positions(const precompute_options *o, const option_result *given) {
+    static const char *const others[] = {"sky",        "portal",  "keep-form-factors", "receivers",
+                                         "importance", "sources", "group-error",       "time"};
+    const emitters_options *positions = emitters_options_of(&o->build);
+    if (!emitters_are_positions(positions)) return 0;
+    const char *const name = positions->positions != NULL ? "positions" : "path";
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
+        if (options_given(given, others[i]))
+            return options_usage(command.name,
+                                 "--%s: is not supported together with --%s, whose light is found "
+                                 "without form factors",
+                                 others[i], name);
+    if (strcmp(o->build.method, "auto") != 0 && strcmp(o->build.method, "emitters") != 0)
+        return options_usage(command.name, "--%s: gives a store of emitters: leave out --method %s", name,
+                             o->build.method);
+    return 0;
+}
+
 /* 0, or the status of wrong usage where arguments do not go together. */
 static int check_together(const precompute_options *o, const option_result *given) {
     static const char *const of_mesh[] = {"subdivide", "max-edge",  "elements", "mesh-error", "unit",
@@ -144,6 +164,10 @@ static int check_together(const precompute_options *o, const option_result *give
             return options_usage(command.name,
                                  "--%s: the mesh of a store is fixed; precompute from its scene instead",
                                  of_mesh[i]);
+    if (check_positions(o, given) != 0) return 2;
+    const emitters_options *of_light = emitters_options_of(&o->build);
+    if (method == NULL && (emitters_are_positions(of_light) || of_light->frames > 0))
+        method = method_find("emitters");
     if (method == NULL) method = method_fallback(); /* auto may come to it */
     if (method->check != NULL && method->check(method_own_const(&o->build, method), &error) != LAM_OK)
         return options_usage(command.name, "%s", error.message);

@@ -80,7 +80,9 @@ lam_status verify_mesh(examination *e, check *c, lam_error *error) {
     mesh_geometry_hash(m, hash);
     if (strcmp(recorded, hash) != 0)
         check_say(c, VERDICT_BROKEN, "geometry_hash is %.32s, the mesh gives %s", recorded, hash);
-    for (size_t i = 0; i < m->n && c->verdict == VERDICT_OK; i++)
+    if (e->row_sums == NULL && !store_has(e->s, "/operator/direct"))
+        check_say(c, VERDICT_BROKEN, "/mesh/row_sums is missing");
+    for (size_t i = 0; i < m->n && e->row_sums != NULL && c->verdict == VERDICT_OK; i++)
         if (!(e->row_sums[i] >= 0 && e->row_sums[i] <= 1 + 1e-6))
             check_say(c, VERDICT_BROKEN, "row_sums[%zu] = %.9g, must be from 0 to 1", i, e->row_sums[i]);
     for (size_t i = 0; i < m->n_channels * m->n && c->verdict == VERDICT_OK; i++) {

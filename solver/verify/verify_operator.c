@@ -174,6 +174,10 @@ lam_status verify_energy(examination *e, check *c, lam_error *error) {
     float *B = NULL, *H = NULL;
     lit light = {.own = false};
     if (examination_skips(e, c)) return LAM_OK;
+    if (e->row_sums == NULL) {
+        check_say(c, VERDICT_SKIPPED, "the store knows no row sums: its light was found by random walks");
+        return LAM_OK;
+    }
     const mesh *m = &e->m;
     const size_t count = m->n * m->n_channels;
     double emitted = 0, accounted = 0, area = 0, received = 0;
@@ -325,6 +329,10 @@ lam_status verify_error(examination *e, check *c, lam_error *error) {
     if (examination_skips(e, c)) return LAM_OK;
     if (e->probes == 0 || !store_has(e->s, "/error/single")) {
         check_say(c, VERDICT_SKIPPED, e->probes == 0 ? "not measured again (--probes 0)" : "none is stated");
+        return LAM_OK;
+    }
+    if (e->row_sums == NULL) {
+        check_say(c, VERDICT_SKIPPED, "stated by random walks; --walks N compares the answers with others");
         return LAM_OK;
     }
     if (e->probes > e->m.n) e->probes = e->m.n;

@@ -1,0 +1,185 @@
+/* The store of a moving light: an emitter for each of its positions, found by walks that need no form
+ * factors (solver/walk/reuse.h). */
+#include "solver/base/clock.h"
+#include "solver/light/light_path.h"
+#include "solver/method/emitters_options.h"
+#include "solver/operator/emitters.h"
+#include "solver/precompute/precompute_state.h"
+
+#include <math.h>
+#include <omp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Cells along the side of a map (C), and pixels along the top of a hemicube (D). */
+enum { MAP_CELLS = 64, CUBE_PIXELS = 256 };
+
+/* A grey scene under a coloured light has the channels of the light. */
+static lam_status take_colours(mesh *m, lam_error *error) {
+    float **const arrays[] = {&m->reflectance, &m->emission};
+    if (m->n_channels != 1) return LAM_OK;
+    for (size_t k = 0; k < 2; k++) {
+        float *wide = memory_allocate(MOVING_LIGHT_CHANNELS, m->n * sizeof *wide, "the mesh", error);
+        if (wide == NULL) return LAM_ERR_MEMORY;
+        for (size_t c = 0; c < MOVING_LIGHT_CHANNELS; c++)
+            memcpy(wide + c * m->n, *arrays[k], m->n * sizeof *wide);
+        free(*arrays[k]);
+        *arrays[k] = wide;
+    }
+    m->n_channels = MOVING_LIGHT_CHANNELS;
+    return LAM_OK;
+}
+
+/* The mesh of a store, whatever its operator is. */
+static lam_status load_mesh(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    store *s = NULL;
+    TRY(store_open(state->options->input, &s, error));
+    TRY(mesh_load(s, &state->m, NULL, error));
+    if (state->m.n_channels != 1 && state->m.n_channels != MOVING_LIGHT_CHANNELS)
+        FAIL(error, LAM_ERR_ARGUMENT, "%s: has %zu channels, a moving light needs 1 or %d",
+             state->options->input, state->m.n_channels, MOVING_LIGHT_CHANNELS);
+    if (state->options->reflectance >= 0)
+        for (size_t i = 0; i < state->m.n * state->m.n_channels; i++)
+            state->m.reflectance[i] = (float)state->options->reflectance;
+done:
+    store_close(s);
+    return status;
+}
+
+static lam_status read_light(precompute_state *state, const emitters_options *how, lam_error *error) {
+    lam_status status = LAM_OK;
+    const bool listed = how->positions != NULL;
+    const light_path_request request = {.path = listed ? how->positions : how->path,
+                                        .frames = listed ? 0 : (size_t)how->frames,
+                                        .unit = state->options->from_store ? 1 : state->m.unit};
+    bool coloured = false;
+    TRY(light_path_read(&request, &state->light, &coloured, error));
+    if (coloured) TRY(take_colours(&state->m, error));
+    terminal_log(state->t, "%zu positions of a light of %.3g m2", state->light.n, state->light.area);
+done:
+    return status;
+}
+
+/* Fails before any walk where the sums of all threads, the estimates and the operator have no room. */
+static lam_status check_memory(const precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const double n = (double)state->m.n, C = (double)state->m.n_channels, s = (double)state->light.n;
+    const double threads = (double)omp_get_max_threads();
+    const double bytes = 8 * n * s * ((threads + 2) * C + threads + 1) + 4 * n * s * (4 * C + 1);
+    if (bytes > state->memory)
+        FAIL(
+            error, LAM_ERR_MEMORY,
+            "%zu positions of %zu elements take about %.2g GB with %d threads, --memory allows %.2g GB: give "
+            "fewer positions, elements or --threads",
+            state->light.n, state->m.n, 1e-9 * bytes, (int)threads, 1e-9 * state->memory);
+done:
+    return status;
+}
+
+static lam_status walk(precompute_state *state, const emitters_options *how, lam_error *error) {
+    lam_status status = LAM_OK;
+    const reuse_way way = (reuse_way)(how->reuse[0] - 'A');
+    const reuse_problem problem = {.light = &state->light,
+                                   .way = way,
+                                   .paths = (size_t)how->paths,
+                                   .resolution = way == REUSE_CUBES ? CUBE_PIXELS : MAP_CELLS,
+                                   .seed = precompute_seed(state->options->seed, SEED_POSITIONS),
+                                   .progress = &state->progress,
+                                   .stage = "paths"};
+    walk_scene *scene = NULL;
+    TRY(walk_scene_create(&state->m, state_closure(state->options), &scene, error));
+    TRY(walk_reuse(scene, &problem, &state->paths, error));
+    terminal_log(state->t, "%zu paths of each position, %.3g rays each", state->paths.paths,
+                 state->paths.rays);
+done:
+    walk_scene_free(scene);
+    return status;
+}
+
+static lam_status copy_names(const moving_light *l, char ***names, lam_error *error) {
+    size_t bytes = l->n * sizeof(char *);
+    for (size_t k = 0; k < l->n; k++) bytes += strlen(l->pose[k].name) + 1;
+    *names = memory_allocate(bytes, 1, "names of positions", error);
+    if (*names == NULL) return LAM_ERR_MEMORY;
+    char *text = (char *)(*names + l->n);
+    for (size_t k = 0; k < l->n; k++) {
+        (*names)[k] = text;
+        text = stpcpy(text, l->pose[k].name) + 1;
+    }
+    return LAM_OK;
+}
+
+/* No element emits: the light is no part of the mesh. */
+static lam_status make_operator(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const mesh *m = &state->m;
+    const size_t n = m->n, C = m->n_channels, s = state->light.n;
+    emitter_arrays a = {.s = s};
+    TRY(copy_names(&state->light, &a.names, error));
+    a.T = memory_allocate(C * s, n * sizeof *a.T, "light of positions", error);
+    a.ends = memory_allocate(C * s + 1, sizeof *a.ends, "light of positions", error);
+    a.elements = memory_allocate(1, sizeof *a.elements, "light of positions", error);
+    a.values = memory_allocate(1, sizeof *a.values, "light of positions", error);
+    a.exitance = memory_allocate(C, sizeof *a.exitance, "light of positions", error);
+    if (a.T == NULL || a.ends == NULL || a.elements == NULL || a.values == NULL || a.exitance == NULL)
+        TRY(LAM_ERR_MEMORY);
+    for (size_t c = 0; c < C; c++) {
+        a.exitance[c] = (float)state->light.emission[c];
+        for (size_t k = 0; k < s; k++)
+            for (size_t i = 0; i < n; i++) {
+                const float rho = m->reflectance[c * n + i];
+                a.T[(c * s + k) * n + i] = (rho > 0 ? rho : 1) * state->paths.H[(c * s + k) * n + i];
+            }
+    }
+    a.direct = state->paths.direct;
+    state->paths.direct = NULL;
+    TRY(operator_emitters_create(n, C, m->reflectance, &a, &state->op, error));
+done:
+    emitter_arrays_free(&a);
+    return status;
+}
+
+static void report(precompute_state *state, const emitters_options *how) {
+    static const char *const ways[] = {
+        "A: every position by its own paths", "B: paths serve all positions, by a ray to each",
+        "C: paths serve all positions, by maps", "D: paths serve all positions, by hemicubes"};
+    build_report *r = &state->built;
+    r->method = method_find("emitters")->name;
+    snprintf(r->detail, sizeof r->detail, "%zu paths of each; %s", state->paths.paths,
+             ways[how->reuse[0] - 'A']);
+    snprintf(r->reason, sizeof r->reason, "emitters: %zu positions of a light asked for by --%s; %s",
+             state->light.n, how->positions != NULL ? "positions" : "path", r->detail);
+    report_count(r, "paths", (double)state->paths.paths);
+    report_text(r, "reuse", how->reuse);
+    report_number(r, "rays_of_path", state->paths.rays);
+    terminal_log(state->t, "%s", r->reason);
+}
+
+lam_status stage_positions(precompute_state *state, lam_error *error) {
+    lam_status status = LAM_OK;
+    const emitters_options *how = emitters_options_of(&state->options->build);
+    double started = clock_seconds();
+    TRY(state->options->from_store ? load_mesh(state, error) : stage_load_scene(state, error));
+    terminal_log_stage(state->t, "import", clock_seconds() - started);
+    TRY(terminal_check(error));
+    started = clock_seconds();
+    if (!state->options->from_store) TRY(state_refine_mesh(state, error));
+    state_log_mesh(state);
+    TRY(read_light(state, how, error));
+    TRY(check_memory(state, error));
+    terminal_log_stage(state->t, "mesh", clock_seconds() - started);
+    started = clock_seconds();
+    TRY(walk(state, how, error));
+    terminal_log_stage(state->t, "paths", clock_seconds() - started);
+    started = clock_seconds();
+    TRY(make_operator(state, error));
+    report(state, how);
+    lam_operator_set_threads(state->op, (size_t)omp_get_max_threads());
+    TRY(state_judge_positions(state, error));
+    terminal_log_stage(state->t, "judge", clock_seconds() - started);
+    TRY(terminal_check(error));
+done:
+    return status;
+}
