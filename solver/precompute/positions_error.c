@@ -10,8 +10,7 @@ enum { MIXTURES = 64 };
 /* Squared norms of mixtures with weights w: w' M w, channels stacked. */
 typedef struct norms {
     size_t s;
-    const double *covariance; /* [C][s][s] */
-    size_t n_channels;
+    const double *covariance;      /* [s][s] */
     double *radiosity, *reflected; /* [s][s], of B and of B - rho H0 */
 } norms;
 
@@ -31,9 +30,7 @@ static double ratio(double error2, double light2) {
 }
 
 static void measure(const norms *of, const double *w, double *relative, double *indirect) {
-    double error2 = 0;
-    for (size_t c = 0; c < of->n_channels; c++)
-        error2 += square(of->covariance + c * of->s * of->s, of->s, w);
+    const double error2 = square(of->covariance, of->s, w);
     *relative = ratio(error2, square(of->radiosity, of->s, w));
     *indirect = ratio(error2, square(of->reflected, of->s, w));
 }
@@ -103,7 +100,7 @@ lam_status state_judge_positions(precompute_state *state, lam_error *error) {
     const mesh *m = &state->m;
     const reuse_estimates *e = &state->paths;
     const size_t n = m->n, C = m->n_channels, s = e->n_positions;
-    norms of = {.s = s, .n_channels = C, .covariance = e->covariance};
+    norms of = {.s = s, .covariance = e->covariance};
     float *x = memory_allocate(s, n * sizeof *x, "errors of positions", error);
     double *w = memory_allocate(s, sizeof *w, "errors of positions", error);
     of.radiosity = memory_allocate(s, s * sizeof *of.radiosity, "errors of positions", error);
@@ -137,9 +134,9 @@ done:
 lam_status state_save_positions(const precompute_state *state, store *s, lam_error *error) {
     lam_status status = LAM_OK;
     const reuse_estimates *e = &state->paths;
-    const size_t positions = e->n_positions, dims[3] = {e->n_channels, positions, positions};
+    const size_t positions = e->n_positions, dims[2] = {positions, positions};
     if (state->position_errors == NULL) return LAM_OK;
-    TRY(store_write(s, "/error/emitters/covariance", STORE_F64, 3, dims, e->covariance, error));
+    TRY(store_write(s, "/error/emitters/covariance", STORE_F64, 2, dims, e->covariance, error));
     TRY(store_write(s, "/error/emitters/relative", STORE_F64, 1, &positions, state->position_errors, error));
     TRY(store_write(s, "/error/emitters/indirect", STORE_F64, 1, &positions,
                     state->position_errors + positions, error));

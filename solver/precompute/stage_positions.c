@@ -174,10 +174,10 @@ lam_status stage_positions(precompute_state *state, lam_error *error) {
     TRY(walk(state, how, error));
     terminal_log_stage(state->t, "paths", clock_seconds() - started);
     started = clock_seconds();
-    TRY(make_operator(state, error));
     report(state, how);
-    lam_operator_set_threads(state->op, (size_t)omp_get_max_threads());
     TRY(state_judge_positions(state, error));
+    TRY(make_operator(state, error)); /* it takes the direct light over */
+    lam_operator_set_threads(state->op, (size_t)omp_get_max_threads());
     terminal_log_stage(state->t, "judge", clock_seconds() - started);
     TRY(terminal_check(error));
 done:
