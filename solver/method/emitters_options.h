@@ -8,7 +8,7 @@ typedef struct emitters_options {
     const char *emitters;         /* FILE, group=NAME, sky */
     const char *positions, *path; /* FILE.json of a moving light */
     uint64_t frames;              /* along path */
-    const char *reuse;            /* "A" to "D" */
+    const char *reuse;            /* "A" to "E" */
     uint64_t paths;               /* walks of each position */
 } emitters_options;
 

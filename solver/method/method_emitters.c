@@ -43,12 +43,13 @@ static const option_row rows[] = {
     {.name = "reuse",
      .kind = OPTION_CHOICE,
      .offset = offsetof(emitters_options, reuse),
-     .preset = "B",
-     .choices = "A|B|C|D",
+     .preset = "E",
+     .choices = "A|B|C|D|E",
      .help =
-         "Paths serve their own position (A) or every one: by a ray to each position (B), by maps of what "
-         "each sees (C), or by hemicubes (D). A and B are unbiased; C and D are biased where shadows have "
-         "edges"},
+         "Walks serve their own position (A) or every one: by a ray to each position (B), by maps of what "
+         "each sees (C), or by hemicubes (D), all from the light; or from the elements that its direct "
+         "light comes to, which rays find (E). A, B and E are unbiased; C and D are off where shadows "
+         "have edges"},
     {.name = "paths",
      .kind = OPTION_COUNT,
      .offset = offsetof(emitters_options, paths),

@@ -144,7 +144,8 @@ done:
 static void report(precompute_state *state, const emitters_options *how) {
     static const char *const ways[] = {
         "A: every position by its own paths", "B: paths serve all positions, by a ray to each",
-        "C: paths serve all positions, by maps", "D: paths serve all positions, by hemicubes"};
+        "C: paths serve all positions, by maps", "D: paths serve all positions, by hemicubes",
+        "E: walks from the elements that are lit serve all positions"};
     build_report *r = &state->built;
     r->method = method_find("emitters")->name;
     snprintf(r->detail, sizeof r->detail, "%zu paths of each; %s", state->paths.paths,

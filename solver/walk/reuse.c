@@ -3,6 +3,7 @@
 #include "solver/base/clock.h"
 #include "solver/walk/light_frames.h"
 #include "solver/walk/reuse_counts.h"
+#include "solver/walk/reuse_elements.h"
 #include "solver/walk/reuse_sums.h"
 #include "solver/walk/reuse_weights.h"
 
@@ -369,9 +370,10 @@ lam_status walk_reuse(const walk_scene *s, const reuse_problem *problem, reuse_e
         e.maps_seconds = clock_processor_seconds() - begun;
         r.maps = &maps;
     }
-    if (problem->even && problem->way != REUSE_NONE) TRY(count_paths(&r, of_batch, error));
+    if (problem->even && problem->way != REUSE_NONE &&
+        problem->way != REUSE_ELEMENTS) TRY(count_paths(&r, of_batch, error));
     for (size_t l = 0; l < r.s; l++) e.count[l] = r.of_batch[l] * WALK_BATCHES;
-    TRY(run_batches(&r, &e, error));
+    TRY(problem->way == REUSE_ELEMENTS ? reuse_elements(s, problem, &e, error) : run_batches(&r, &e, error));
     TRY(check_reach(&r, &e, error));
     *out = e;
     e = (reuse_estimates){.n = 0};

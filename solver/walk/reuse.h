@@ -12,8 +12,10 @@
 
 /* REUSE_NONE: every position by its own paths (approach A). REUSE_EXACT: V by a ray each (B). REUSE_MAPS: V
  * by maps of the hemisphere about the light's centre that hold the nearest facet and its distance (C, fig.
- * 4). REUSE_CUBES: by hemicubes that hold facets alone (D, fig. 6), with F from the centre of the light. */
-typedef enum reuse_way { REUSE_NONE, REUSE_EXACT, REUSE_MAPS, REUSE_CUBES } reuse_way;
+ * 4). REUSE_CUBES: by hemicubes that hold facets alone (D, fig. 6), with F from the centre of the light.
+ * REUSE_ELEMENTS (E, ours): the direct light of every position by segments, and walks for all of them from
+ * the elements that it lights. */
+typedef enum reuse_way { REUSE_NONE, REUSE_EXACT, REUSE_MAPS, REUSE_CUBES, REUSE_ELEMENTS } reuse_way;
 
 typedef struct reuse_problem {
     const moving_light *light; /* its positions are its poses */
@@ -45,8 +47,8 @@ typedef struct reuse_estimates {
 void reuse_estimates_free(reuse_estimates *e);
 
 /* With even the counts N_l of paths come from first hits of a pilot, of a twentieth of the paths at most,
- * whose own light is not used, so that nothing is biased; REUSE_NONE leaves them equal. REUSE_NONE and
- * REUSE_EXACT are unbiased; the bias of the others goes with the size of the light and of the cells. Cost: s
+ * whose own light is not used, so that nothing is biased; REUSE_NONE and REUSE_ELEMENTS leave them equal.
+ * These two and REUSE_EXACT are unbiased; the bias of the others goes with the size of the light and of the cells. Cost: s
  * * paths walks, for REUSE_EXACT s - 1 more rays for each; memory 8 ((T + 2) C + T + 1) n s bytes for T
  * threads. Errors: LAM_ERR_ARGUMENT names a position that reaches nothing, LAM_ERR_MEMORY, LAM_ERR_CANCELLED.
  */

@@ -183,7 +183,8 @@ START_TEST(covariance_is_that_of_seeds) {
     enum { SEEDS = 32, MIXES = 6 };
     static const double mix[MIXES][POSITIONS] = {{1, 0, 0, 0},  {0, 0, 0, 1},  {1, 1, 1, 1},
                                                  {1, -1, 0, 0}, {.5, 0, 2, 0}, {0, 1, -1, 1}};
-    const reuse_way way = _i == 0 ? REUSE_NONE : REUSE_EXACT;
+    static const reuse_way ways[] = {REUSE_NONE, REUSE_EXACT, REUSE_ELEMENTS};
+    const reuse_way way = ways[_i];
     mesh m = box_mesh(unit, DIVISIONS, .6f);
     moving_light l = square_light();
     reuse_estimates e[SEEDS];
@@ -215,7 +216,7 @@ START_TEST(covariance_is_that_of_seeds) {
         ck_assert_msg(fabs(found / stated[k] - 1) < 4 * sqrt(2. / (31 * 24)), "mix %zu: %g for %g", k, found,
                       stated[k]);
     }
-    if (way == REUSE_EXACT) ck_assert_msg(stated[3] < .5 * apart, "%g of %g", stated[3], apart);
+    if (way != REUSE_NONE) ck_assert_msg(stated[3] < .5 * apart, "%g of %g", stated[3], apart);
     for (size_t r = 0; r < SEEDS; r++) reuse_estimates_free(&e[r]);
     moving_light_free(&l);
     mesh_free(&m);
@@ -312,11 +313,54 @@ static moving_light curved_light(const mesh *m) {
     return l;
 }
 
+/* Walks from elements: the mean square over elements and seeds is what is stated, and the power that all
+ * elements receive, whose error is far smaller, is right on average (Student's distribution of 63 degrees).
+ */
+START_TEST(walks_from_elements_agree_with_closed_forms) {
+    enum { SEEDS = 64 };
+    mesh m = box_mesh(unit, DIVISIONS, .6f);
+    csr F = box_form_factors(unit, DIVISIONS, m.area);
+    moving_light l = square_light();
+    double *H = exact_light(&m, &l, &F), *direct = exact_direct(&m, &l), off[POSITIONS][SEEDS];
+    double found = 0, stated = 0, missed = 0, straight = 0;
+    for (size_t r = 0; r < SEEDS; r++) {
+        reuse_estimates e = reuse(&m, &l, REUSE_ELEMENTS, 3200, 0, r + 1);
+        for (size_t k = 0; k < POSITIONS; k++) {
+            found += square_error(&e, k, H, &m);
+            off[k][r] = 0;
+            for (size_t i = 0; i < m.n; i++) {
+                const size_t at = k * m.n + i;
+                stated += m.area[i] * pow((double)e.error[at], 2);
+                missed += pow((double)e.direct[at] - direct[at], 2);
+                straight += pow(direct[at], 2);
+                off[k][r] += m.area[i] * ((double)e.H[at] - H[at]);
+            }
+        }
+        reuse_estimates_free(&e);
+    }
+    ck_assert_msg(found > .7 * stated && found < 1.4 * stated, "%g for %g", found, stated);
+    ck_assert_msg(missed < 1e-4 * straight, "%g of %g", missed, straight);
+    for (size_t k = 0; k < POSITIONS; k++) {
+        double mean = 0, spread = 0;
+        for (size_t r = 0; r < SEEDS; r++) mean += off[k][r] / SEEDS;
+        for (size_t r = 0; r < SEEDS; r++) spread += pow(off[k][r] - mean, 2) / (SEEDS * (SEEDS - 1.));
+        ck_assert_msg(fabs(mean) < 4.5 * sqrt(spread), "position %zu: %g +- %g", k, mean, sqrt(spread));
+    }
+    free(H);
+    free(direct);
+    moving_light_free(&l);
+    csr_free(&F);
+    mesh_free(&m);
+}
+END_TEST
+
 /* Where something hides, shared paths agree with paths of their own. */
 START_TEST(rays_know_what_is_hidden) {
     mesh m = cornell();
     moving_light l = falling_light(&m);
-    reuse_estimates a = reuse(&m, &l, REUSE_NONE, 64000, 0, 3), b = reuse(&m, &l, REUSE_EXACT, 16000, 0, 5);
+    const bool from_light = _i == 0;
+    reuse_estimates a = reuse(&m, &l, REUSE_NONE, 64000, 0, 3),
+                    b = reuse(&m, &l, from_light ? REUSE_EXACT : REUSE_ELEMENTS, 16000, 0, 5);
     for (size_t k = 0; k < l.n * m.n_channels; k++) {
         double sum = 0, count = 0;
         for (size_t i = 0; i < m.n; i++) {
@@ -400,7 +444,8 @@ START_TEST(counts_even_out_errors) {
 END_TEST
 
 START_TEST(bits_do_not_depend_on_threads) {
-    static const reuse_way ways[] = {REUSE_NONE, REUSE_EXACT, REUSE_MAPS, REUSE_CUBES};
+    static const reuse_way ways[] = {REUSE_NONE, REUSE_EXACT, REUSE_MAPS, REUSE_CUBES,
+                                     REUSE_ELEMENTS};
     mesh m = cornell();
     moving_light l = falling_light(&m);
     const int threads = omp_get_max_threads();
@@ -496,12 +541,13 @@ int main(void) {
     tcase_set_timeout(tests, 300);
     tcase_add_loop_test(tests, agrees_with_closed_forms, 0, 3);
     tcase_add_loop_test(tests, direct_light_is_the_form_factor, 0, 2);
-    tcase_add_loop_test(tests, covariance_is_that_of_seeds, 0, 2);
+    tcase_add_loop_test(tests, covariance_is_that_of_seeds, 0, 3);
     tcase_add_test(tests, sharing_lowers_the_error);
-    tcase_add_test(tests, rays_know_what_is_hidden);
+    tcase_add_test(tests, walks_from_elements_agree_with_closed_forms);
+    tcase_add_loop_test(tests, rays_know_what_is_hidden, 0, 2);
     tcase_add_loop_test(tests, maps_come_close, 0, 2);
     tcase_add_test(tests, counts_even_out_errors);
-    tcase_add_loop_test(tests, bits_do_not_depend_on_threads, 0, 4);
+    tcase_add_loop_test(tests, bits_do_not_depend_on_threads, 0, 5);
     tcase_add_test(tests, points_are_uniform);
     tcase_add_test(tests, refuses_what_is_no_light);
     suite_add_tcase(suite, tests);
