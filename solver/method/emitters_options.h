@@ -12,7 +12,7 @@ typedef struct emitters_options {
     uint64_t paths;               /* walks of each position */
 } emitters_options;
 
-/* Those of a build. */
+/* The options of emitters among those of a build. */
 const emitters_options *emitters_options_of(const build_options *options);
 
 /* True where the emitters are positions of a light outside the mesh. */
