@@ -48,6 +48,7 @@ codec_scene call_codec_scene(const call *in) {
                          .groups = &s->groups,
                          .n_tiles = s->sky != NULL ? lam_sky_tiles(s->sky) : 0,
                          .n_emitters = s->n_emitters,
+                         .emitters = &s->emitters,
                          .max_batch = c->max_batch,
                          .max_bytes =
                              4 * c->max_body > LEAST_EMISSION_LIMIT ? 4 * c->max_body : LEAST_EMISSION_LIMIT,

@@ -193,6 +193,7 @@ static lam_status read_store(store *s, const scene_options *options, scene *made
     lam_operator_set_threads(made->op, threads_of(made->op, options->threads));
     TRY(sky_load(s, made->n, &made->sky, error));
     made->n_emitters = lam_operator_emitters(made->op);
+    TRY(group_index_of_emitters(made->op, &made->emitters, error));
     made->work_bytes = pass_work_bytes(made);
     TRY(read_groups(s, made, error));
     TRY(read_area(s, made, error));
@@ -301,6 +302,7 @@ void scene_release(scene *s) {
     if (s->base == NULL) {
         lam_sky_close(s->sky);
         group_index_free(&s->groups);
+        group_index_free(&s->emitters);
         free(s->area);
         stated_errors_free(&s->errors);
         free(s->group_read);

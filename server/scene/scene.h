@@ -32,6 +32,7 @@ struct scene {
     lam_operator *op;
     const float *reflectance; /* [C][n], of op */
     group_index groups;
+    group_index emitters;  /* by name */
     double *area;          /* [n], m^2 */
     lam_sky *sky;          /* NULL: none */
     size_t n_emitters;     /* 0: the store answers any emission */

@@ -41,6 +41,33 @@ done:
     return status;
 }
 
+lam_status group_index_of_emitters(const lam_operator *op, group_index *out, lam_error *error) {
+    lam_status status = LAM_OK;
+    const size_t s = lam_operator_emitters(op);
+    size_t bytes = s * sizeof(char *);
+    uint32_t *own = NULL;
+    *out = (group_index){.n_groups = 0};
+    if (s == 0) return LAM_OK;
+    for (size_t k = 0; k < s; k++) bytes += strlen(lam_operator_emitter_name(op, k)) + 1;
+    char **names = memory_allocate(bytes, 1, "names of emitters", error);
+    own = memory_allocate(s, sizeof *own, "names of emitters", error);
+    if (names == NULL || own == NULL) {
+        free(names);
+        TRY(LAM_ERR_MEMORY);
+    }
+    char *text = (char *)(names + s);
+    for (size_t k = 0; k < s; k++) {
+        own[k] = (uint32_t)k;
+        names[k] = text;
+        text = stpcpy(text, lam_operator_emitter_name(op, k)) + 1;
+    }
+    TRY(group_index_make(s, own, s, names, out, error));
+    out->noun = "emitter";
+done:
+    free(own);
+    return status;
+}
+
 void group_index_free(group_index *index) {
     free(index->names);
     free(index->start);
@@ -102,8 +129,9 @@ void group_index_miss(const group_index *index, const char *name, size_t length,
     enum { SHOWN = 80 };
     const char *cut = length > SHOWN ? "..." : "";
     char word[NEAREST_LENGTH_MAX + 1] = "", nearest[NEAREST_LENGTH_MAX + 1] = "";
-    size_t at = (size_t)snprintf(text, GROUP_MISS, "no group \"%.*s%s\"",
-                                 length > SHOWN ? SHOWN : (int)length, name, cut);
+    size_t at =
+        (size_t)snprintf(text, GROUP_MISS, "no %s \"%.*s%s\"", index->noun != NULL ? index->noun : "group",
+                         length > SHOWN ? SHOWN : (int)length, name, cut);
     if (length <= NEAREST_LENGTH_MAX) {
         memcpy(word, name, length);
         find_nearest(index, word, nearest);

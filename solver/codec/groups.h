@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 typedef struct group_index {
+    const char *noun; /* static: of what messages speak */
     size_t n_groups;
     char **names;       /* [n_groups], one block, owned */
     uint32_t *start;    /* [n_groups + 1], into elements */
@@ -17,6 +18,10 @@ typedef struct group_index {
 /* Takes over names, also on an error. group is [n]. Errors: LAM_ERR_FORMAT (a group that has no name). */
 lam_status group_index_make(size_t n, const uint32_t *group, size_t n_groups, char **names, group_index *out,
                             lam_error *error);
+
+/* The emitters of an operator of few emitters, by name: emitter k is group k of element k. Of another
+ * operator it is empty. Errors: LAM_ERR_MEMORY. */
+lam_status group_index_of_emitters(const lam_operator *op, group_index *out, lam_error *error);
 
 void group_index_free(group_index *index);
 

@@ -223,15 +223,45 @@ static bool read_sky(parser *p) {
     return read_side(p, p->scene->n_tiles, "tile", L);
 }
 
-/* One weight for each emitter. */
+/* {"pose-1": w, ...} into row [C][s]: the others are 0. */
+static bool read_named_emitters(parser *p, float *row) {
+    const group_index *emitters = p->scene->emitters;
+    const size_t C = p->scene->n_channels, s = p->scene->n_emitters, mark = p->pointer_length;
+    json_slice key;
+    index_set_clear(&p->seen);
+    if (!json_enter_object(&p->r)) return parser_fault(p);
+    while (parser_next_member(p, &key)) {
+        const uint32_t *found = NULL;
+        size_t n_found;
+        parser_point_key(p, key.bytes, key.length);
+        if (!parser_find_in(p, emitters, &key, &found, &n_found)) return false;
+        if (!read_colour(p, p->colour)) return false;
+        for (size_t k = 0; k < n_found; k++) {
+            const index_set_result added = index_set_add(&p->seen, found[k]);
+            if (added == INDEX_SET_KNOWN)
+                return parser_refuse(p, PROBLEM_GIVEN_TWICE, "%s: the emitter %s is given twice",
+                                     parser_here(p), emitters->names[found[k]]);
+            if (added == INDEX_SET_NO_MEMORY)
+                return problem_set(p->why, PROBLEM_NO_MEMORY,
+                                   "not enough memory for the weights of emitters");
+            for (size_t c = 0; c < C; c++) row[c * s + found[k]] = p->colour[c];
+        }
+        p->pointer_length = mark;
+    }
+    return p->why->status == 0;
+}
+
+/* One weight for each emitter, or weights by name. */
 static bool read_emitters(parser *p) {
     float *W;
     if (p->scene->n_emitters == 0)
         return parser_refuse(p, PROBLEM_NOT_IN_STORE, "%s: the store has no precomputed emitters",
                              parser_here(p));
-    if (!parser_expect(p, JSON_ARRAY, "an array of weights")) return false;
+    const bool named = p->scene->emitters != NULL && json_peek(&p->r) == JSON_OBJECT;
+    if (!named && !parser_expect(p, JSON_ARRAY, "an array of weights, or an object of names and weights"))
+        return false;
     if (!radiosity_request_emitters(p->request, p->scene, &W, p->why)) return refused_here(p);
-    return read_side(p, p->scene->n_emitters, "emitter", W);
+    return named ? read_named_emitters(p, W) : read_side(p, p->scene->n_emitters, "emitter", W);
 }
 
 static bool read_emission_object(parser *p) {

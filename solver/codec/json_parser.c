@@ -165,12 +165,17 @@ bool parser_read_group(parser *p, json_slice *name, const uint32_t **groups, siz
     return parser_find_group(p, name, groups, n_groups);
 }
 
-bool parser_find_group(parser *p, const json_slice *name, const uint32_t **groups, size_t *n_groups) {
+bool parser_find_in(parser *p, const group_index *index, const json_slice *name, const uint32_t **groups,
+                    size_t *n_groups) {
     char miss[GROUP_MISS];
-    *n_groups = group_index_find(p->scene->groups, name->bytes, name->length, groups);
+    *n_groups = group_index_find(index, name->bytes, name->length, groups);
     if (*n_groups > 0) return true;
-    group_index_miss(p->scene->groups, name->bytes, name->length, miss);
+    group_index_miss(index, name->bytes, name->length, miss);
     return parser_refuse(p, PROBLEM_UNKNOWN_GROUP, "%s: the scene has %s", parser_here(p), miss);
+}
+
+bool parser_find_group(parser *p, const json_slice *name, const uint32_t **groups, size_t *n_groups) {
+    return parser_find_in(p, p->scene->groups, name, groups, n_groups);
 }
 
 bool parser_read_quantity(parser *p, lam_quantity *quantity) {

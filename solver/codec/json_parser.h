@@ -87,6 +87,8 @@ bool parser_append(parser *p, index_list *list, const uint32_t *indices, size_t 
 
 /* The groups that a name means, and those of the text that comes next; name is valid until the next text is
  * read. */
+bool parser_find_in(parser *p, const group_index *index, const json_slice *name, const uint32_t **groups,
+                    size_t *n_groups);
 bool parser_find_group(parser *p, const json_slice *name, const uint32_t **groups, size_t *n_groups);
 bool parser_read_group(parser *p, json_slice *name, const uint32_t **groups, size_t *n_groups);
 

@@ -13,10 +13,11 @@ typedef struct codec_scene {
     size_t n;
     size_t n_channels;
     const group_index *groups;
-    size_t n_tiles;     /* of the sky; 0: none */
-    size_t n_emitters;  /* 0: none */
-    size_t max_batch;   /* vectors in a request, at most CODEC_BATCH_MOST */
-    size_t max_bytes;   /* of emission vectors in a request */
+    size_t n_tiles;              /* of the sky; 0: none */
+    size_t n_emitters;           /* 0: none */
+    const group_index *emitters; /* these by name; NULL: they have none */
+    size_t max_batch;            /* vectors in a request, at most CODEC_BATCH_MOST */
+    size_t max_bytes;            /* of emission vectors in a request */
     bool only_linear;   /* anything but a linear reduction of sparse vectors is refused (503) before it costs
                            more than its text */
     size_t max_rows;    /* adjoint rows that the scene keeps: at most so many groups are reduced by them */

@@ -48,12 +48,15 @@ done:
 
 void emission_scene_free(emission_scene *scene) {
     group_index_free(&scene->groups);
+    group_index_free(&scene->emitters);
     *scene = (emission_scene){0};
 }
 
-void emission_scene_sources(emission_scene *scene, const lam_operator *op, const lam_sky *sky) {
+lam_status emission_scene_sources(emission_scene *scene, const lam_operator *op, const lam_sky *sky,
+                                  lam_error *error) {
     scene->n_tiles = sky != NULL ? lam_sky_tiles(sky) : 0;
     scene->n_emitters = lam_operator_emitters(op);
+    return group_index_of_emitters(op, &scene->emitters, error);
 }
 
 lam_status emission_fill_group(const emission_scene *scene, const char *what, const char *name,
@@ -119,7 +122,20 @@ done:
     return status;
 }
 
-static lam_status fill_item(const emission_scene *scene, const char *item, float *E, lam_error *error) {
+/* An emitter of this name: its weight in every channel; W is [C][s]. False where there is none. */
+static bool fill_emitter(const emission_scene *scene, const char *name, const double *values, float *W) {
+    const group_index *emitters = &scene->emitters;
+    const uint32_t *found = NULL;
+    const size_t n_found = group_index_find(emitters, name, strlen(name), &found);
+    for (size_t k = 0; k < n_found; k++)
+        for (size_t c = 0; c < scene->m->n_channels; c++)
+            W[c * scene->n_emitters + found[k]] = (float)values[c];
+    return n_found > 0;
+}
+
+/* Into E, or, of an emitter, into W, which is NULL where the store has none. */
+static lam_status fill_item(const emission_scene *scene, const char *item, float *E, float *W,
+                            lam_error *error) {
     lam_status status = LAM_OK;
     const size_t C = scene->m->n_channels;
     double *values = NULL;
@@ -137,7 +153,8 @@ static lam_status fill_item(const emission_scene *scene, const char *item, float
         for (size_t c = 0; c < C; c++) values[c] = all;
     }
     snprintf(what, sizeof what, "--emit %s", item);
-    TRY(emission_fill_group(scene, what, name, values, E, error));
+    if (W == NULL || !fill_emitter(scene, name, values, W))
+        TRY(emission_fill_group(scene, what, name, values, E, error));
 done:
     free(name);
     free(values);
@@ -151,13 +168,16 @@ static lam_status one_vector(const mesh *m, float **E, lam_error *error) {
 lam_status emission_from_groups(const emission_scene *scene, const option_list *items, emission *out,
                                 lam_error *error) {
     lam_status status = LAM_OK;
-    float *E = NULL;
+    float *E = NULL, *W = NULL;
     TRY(one_vector(scene->m, &E, error));
-    for (size_t i = 0; i < items->count; i++) TRY(fill_item(scene, items->items[i], E, error));
-    *out = (emission){.n_vectors = 1, .E = E};
-    E = NULL;
+    if (scene->n_emitters > 0)
+        TRY(emission_allocate("emission", scene->m->n_channels, scene->n_emitters, 1, &W, error));
+    for (size_t i = 0; i < items->count; i++) TRY(fill_item(scene, items->items[i], E, W, error));
+    *out = (emission){.n_vectors = 1, .E = E, .W = W};
+    E = W = NULL;
 done:
     free(E);
+    free(W);
     return status;
 }
 

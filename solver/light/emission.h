@@ -26,6 +26,7 @@ void emission_free(emission *e);
 typedef struct emission_scene {
     const mesh *m; /* borrowed */
     group_index groups;
+    group_index emitters;       /* by name, once emission_scene_sources was called */
     size_t n_tiles, n_emitters; /* of the store's sky and operator; 0: none */
     char tiling[32];            /* of the sky; "": not known */
 } emission_scene;
@@ -35,16 +36,18 @@ typedef struct emission_scene {
 lam_status emission_scene_create(const mesh *m, emission_scene *out, lam_error *error);
 void emission_scene_free(emission_scene *scene);
 
-/* Takes the tiles and emitters of a store's operator and sky, which may be NULL. */
-void emission_scene_sources(emission_scene *scene, const lam_operator *op, const lam_sky *sky);
+/* Takes the tiles and emitters of a store's operator and sky, which may be NULL. Errors: LAM_ERR_MEMORY. */
+lam_status emission_scene_sources(emission_scene *scene, const lam_operator *op, const lam_sky *sky,
+                                  lam_error *error);
 
 /* Every element of the groups that name means emits values [C], or 1 in every channel where values is NULL;
  * E is [C][n]. LAM_ERR_ARGUMENT for an unknown name: the message begins with what and suggests a name. */
 lam_status emission_fill_group(const emission_scene *scene, const char *what, const char *name,
                                const double *values, float *E, lam_error *error);
 
-/* One vector by group names: each item is GROUP=V or GROUP=V,V,V, one V per channel; the other groups are
- * dark. A later item replaces an earlier one. Errors: LAM_ERR_ARGUMENT names the item. */
+/* One vector by names of groups, or of emitters of a store of few, which then is W: each item is NAME=V or
+ * NAME=V,V,V, one V per channel; the others are dark. A later item replaces an earlier one. Errors:
+ * LAM_ERR_ARGUMENT names the item. */
 lam_status emission_from_groups(const emission_scene *scene, const option_list *items, emission *out,
                                 lam_error *error);
 

@@ -51,7 +51,8 @@ lam_status emission_read(const char *path, const emission_scene *scene, emission
                                .n_channels = scene->m->n_channels,
                                .groups = &scene->groups,
                                .n_tiles = scene->n_tiles,
-                               .n_emitters = scene->n_emitters};
+                               .n_emitters = scene->n_emitters,
+                               .emitters = &scene->emitters};
     atomic_file_extension(path, extension);
     const bool npy = strcmp(extension, "npy") == 0;
     if (!npy && strcmp(extension, "json") != 0)

@@ -50,7 +50,7 @@ lam_status light_open(store *s, const mesh *m, const light_options *options, boo
     TRY(emission_scene_create(m, &out->scene, error));
     TRY(sky_load(s, m->n, &out->sky, error));
     TRY(operator_load(s, &out->op, error));
-    emission_scene_sources(&out->scene, out->op, out->sky);
+    TRY(emission_scene_sources(&out->scene, out->op, out->sky, error));
     if (out->sky != NULL) TRY(store_get_text(s, "/sky", "tiling", &tiling, error));
     if (tiling != NULL) snprintf(out->scene.tiling, sizeof out->scene.tiling, "%s", tiling);
     TRY(emission_choose(&out->scene, &given, &out->light, &out->own, error));

@@ -10,7 +10,8 @@ static const double area[N] = {1, 2, 4};
 static const float rho[C * N] = {.5f, .5f, .25f, .5f, .5f, .75f};
 static uint32_t start[] = {0, 2, 3}, elements[] = {0, 1, 2}, sorted[] = {0, 1};
 static char *names[] = {(char[]){"desk"}, (char[]){"lamp"}};
-static const group_index groups = {G, names, start, elements, sorted};
+static const group_index groups = {
+    .n_groups = G, .names = names, .start = start, .elements = elements, .sorted = sorted};
 static const error_scene scene = {N, C, area, rho, &groups, NULL};
 
 /* Figures of the groups, as a store states them. */
